@@ -420,6 +420,7 @@ static const hxDefinition default_definition = {
     .body.knee_radius = 0.0,
     .body.shank_radius = 0.0,
     .body.shank_position = 0.0,
+    .terrain.grid = 1.0,
 };
 
 void hx_definition_default(hxDefinition *definition) {
@@ -866,7 +867,7 @@ static const hxRange definition_ranges[] = {
     {"solver.tolerance", "", 1e-13, 1.0, offsetof(hxDefinition, solver.tolerance), 0},
     {"solver.step_max", "s", 1e-09, 1.0, offsetof(hxDefinition, solver.step_max), 0},
     {"solver.projection", "", 1, 2, offsetof(hxDefinition, solver.projection), 1},
-    {"terrain.kind", "", 1, 2, offsetof(hxDefinition, terrain.kind), 1},
+    {"terrain.kind", "", 1, 3, offsetof(hxDefinition, terrain.kind), 1},
     {"terrain.height", "m", -10000.0, 10000.0, offsetof(hxDefinition, terrain.height), 0},
     {"terrain.incline", "rad", -1.5, 1.5, offsetof(hxDefinition, terrain.incline), 0},
     {"terrain.heading", "rad", -6.283185307179586, 6.283185307179586, offsetof(hxDefinition, terrain.heading), 0},
@@ -931,6 +932,7 @@ static const hxRange definition_ranges[] = {
     {"body.knee_radius", "m", 0.0, 10.0, offsetof(hxDefinition, body.knee_radius), 0},
     {"body.shank_radius", "m", 0.0, 10.0, offsetof(hxDefinition, body.shank_radius), 0},
     {"body.shank_position", "", 0.0, 1.0, offsetof(hxDefinition, body.shank_position), 0},
+    {"terrain.grid", "", 1.0, 9999.0, offsetof(hxDefinition, terrain.grid), 0},
 };
 
 size_t hx_definition_ranges(const hxRange **range) {

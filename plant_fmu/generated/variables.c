@@ -867,7 +867,7 @@ static const hxVariable parameters[] = {
     {"solver.tolerance", "1", 1e-13, 1.0, offsetof(struct hxVariables, definition.solver.tolerance), HX_REAL, 1},
     {"solver.step_max", "s", 1e-09, 1.0, offsetof(struct hxVariables, definition.solver.step_max), HX_REAL, 1},
     {"solver.projection", "", 1, 2, offsetof(struct hxVariables, definition.solver.projection), HX_INTEGER, 1},
-    {"terrain.kind", "", 1, 2, offsetof(struct hxVariables, definition.terrain.kind), HX_INTEGER, 1},
+    {"terrain.kind", "", 1, 3, offsetof(struct hxVariables, definition.terrain.kind), HX_INTEGER, 1},
     {"terrain.height", "m", -10000.0, 10000.0, offsetof(struct hxVariables, definition.terrain.height), HX_REAL, 1},
     {"terrain.incline", "rad", -1.5, 1.5, offsetof(struct hxVariables, definition.terrain.incline), HX_REAL, 1},
     {"terrain.heading", "rad", -6.283185307179586, 6.283185307179586, offsetof(struct hxVariables, definition.terrain.heading), HX_REAL, 1},
@@ -932,6 +932,7 @@ static const hxVariable parameters[] = {
     {"body.knee_radius", "m", 0.0, 10.0, offsetof(struct hxVariables, definition.body.knee_radius), HX_REAL, 1},
     {"body.shank_radius", "m", 0.0, 10.0, offsetof(struct hxVariables, definition.body.shank_radius), HX_REAL, 1},
     {"body.shank_position", "1", 0.0, 1.0, offsetof(struct hxVariables, definition.body.shank_position), HX_REAL, 1},
+    {"terrain.grid", "1", 1.0, 9999.0, offsetof(struct hxVariables, definition.terrain.grid), HX_REAL, 1},
 };
 
 static const hxVariable locals[] = {
@@ -1086,7 +1087,7 @@ const size_t hx_state_count = sizeof states / sizeof states[0];
 
 _Static_assert(sizeof states / sizeof states[0] == sizeof(hxCoordinates) / sizeof(double), "each state has its row");
 
-const char hx_default_guid[] = "{e53ba8fc-50c1-4808-b444-289c4d7bc6b4}";
+const char hx_default_guid[] = "{27369239-fea3-40c0-898b-219da757dc9b}";
 
 _Static_assert(HX_CONTACT_EXACT_RESTITUTION == 1, "ContactLaw");
 _Static_assert(HX_CONTACT_FLORES == 2, "ContactLaw");
@@ -1109,3 +1110,4 @@ _Static_assert(HX_PROJECTION_NONE == 1, "Projection");
 _Static_assert(HX_PROJECTION_STEP == 2, "Projection");
 _Static_assert(HX_TERRAIN_FLAT == 1, "TerrainKind");
 _Static_assert(HX_TERRAIN_SLOPE == 2, "TerrainKind");
+_Static_assert(HX_TERRAIN_GRID == 3, "TerrainKind");

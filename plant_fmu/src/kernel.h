@@ -42,7 +42,8 @@ typedef struct hxKernel {
                       hxCoordinates *x, hxCoordinates *rate);
 
   /* Computes penetration and approach speed of all contacts. */
-  void (*depths)(const hxModel *model, const hxPlantMotion *motion, hxDepths *depths);
+  void (*depths)(const hxModel *model, const hxContactState *contact, const hxPlantMotion *motion,
+                 hxDepths *depths);
 
   /* Switches the contacts that are due at the state's time by these penetrations. */
   void (*switch_contacts)(const hxModel *model, const hxDepths *depths, hxState *state);

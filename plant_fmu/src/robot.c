@@ -241,6 +241,7 @@ static void compile_rows(hxModel *model, const hxDefinition *d) {
   model->radius[HX_SHANK] = d->body.shank_radius;
   model->radius[HX_TORSO] = d->body.corner_radius;
   model->row[model->rows++] = HX_FOOT;
+  if (hx_has_cells(model)) model->row[model->rows++] = HX_WALL;
   model->foot_rows = model->rows;
   if (knees) model->row[model->rows++] = HX_KNEE;
   if (shanks) model->row[model->rows++] = HX_SHANK;
@@ -248,7 +249,8 @@ static void compile_rows(hxModel *model, const hxDefinition *d) {
   if (model->torso_rows) model->row[model->rows] = HX_TORSO;
 }
 
-void hx_model_compile(hxModel *model, const hxDefinition *d) {
+void hx_model_compile(hxModel *model, const hxDefinition *d, const hxTerrain *terrain) {
+  model->terrain = d->terrain.kind == HX_TERRAIN_GRID ? terrain : NULL;
   model->torso_mass = d->torso.mass;
   for (int i = 0; i < 6; ++i) model->torso_inertia[i] = d->torso.inertia[i];
   for (int slot = 0; slot < HX_SLOTS; ++slot) {

@@ -63,6 +63,10 @@ typedef struct hxModel {
   int contact_law, friction_law, terrain_kind, servo_mode, method, projection;
   int rows, foot_rows, torso_rows; /* computed: on tibias, of these on feet, on the torso (0, 1) */
   int row[HX_ROWS];                /* rows that are computed: on feet, tibias, torso */
+  union {
+    const hxTerrain *terrain; /* NULL: plane; not saved */
+    int64_t terrain_bits;     /* the same size on every machine */
+  };
   double stiffness, damping_scale, impact_speed_floor; /* eq. 14 */
   double mu, slope;                                    /* eq. 15 */
   double presliding, bristle_damping;                  /* eq. 16, 17 */
@@ -88,11 +92,18 @@ typedef struct hxContactState {
   double closed[HX_ROWS][HX_SLOTS];       /* 1 from touch-down to lift-off, else 0 */
   double damping[HX_ROWS][HX_SLOTS];      /* s/m  d of eq. 14, fixed at touch-down */
   double impact_speed[HX_ROWS][HX_SLOTS]; /* m/s  at the last touch-down */
+  double stiffness[HX_ROWS][HX_SLOTS];    /* N/m^1.5  K of the ground where it touched down */
+  double mu[HX_ROWS][HX_SLOTS];           /* 1        friction of that ground */
+  double static_rise[HX_ROWS][HX_SLOTS];  /* 1        mu_s - mu of eq. 18 */
+  double cell[2][HX_SLOTS]; /* 1    blocks: column and row over which a foot is; < 0: not held */
 } hxContactState;
 
 /* Penetration and approach speed of all contacts; only the model's rows are set. */
 typedef struct hxDepths {
   double delta[HX_ROWS][HX_SLOTS], ddelta[HX_ROWS][HX_SLOTS]; /* m, m/s */
+  /* on a grid only */
+  double centre[3][HX_SLOTS]; /* m  of feet, world axes */
+  double outside[HX_SLOTS];   /* m  how far a foot is outside of the cell that is held for it */
 } hxDepths;
 
 /* A row of contacts at one end of a step. World axes. */
@@ -166,6 +177,7 @@ typedef struct hxState {
 struct hxPlant {
   hxModel model;
   hxState state;
+  const hxTerrain *terrain; /* of later resets */
   char message[HX_MESSAGE_SIZE];
 };
 

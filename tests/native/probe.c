@@ -13,6 +13,7 @@
 #include "lanes/dynamics.h"
 #include "method.h"
 #include "robot.h"
+#include "terrain.h"
 
 #if defined(__GNUC__)
 #pragma GCC diagnostic ignored                                                                     \
@@ -87,6 +88,7 @@ static const ProbeField fields[] = {
     FIELD(hxDefinition, terrain.height),
     FIELD(hxDefinition, terrain.incline),
     FIELD(hxDefinition, terrain.heading),
+    FIELD(hxDefinition, terrain.grid),
     FIELD(hxDefinition, initial.position),
     FIELD(hxDefinition, initial.quaternion),
     FIELD(hxDefinition, initial.velocity),
@@ -269,8 +271,9 @@ HX_API double hx_probe_contact_damping(const hxPlant *plant, double impact_speed
 /* Computes the normal force. out: force, elastic part, stiffness, viscosity. */
 HX_API void hx_probe_normal_force(const hxPlant *plant, double closed, double damping, double delta,
                                   double ddelta, double out[4]) {
-  const hxNormalForce f = hx_normal_force(&plant->model, hx_splat(closed), hx_splat(damping),
-                                          hx_splat(delta), hx_splat(ddelta));
+  const hxContactLawAt law = {hx_splat(closed), hx_splat(damping),
+                              hx_splat(plant->model.stiffness)};
+  const hxNormalForce f = hx_normal_force(law, hx_splat(delta), hx_splat(ddelta));
   out[0] = hx_lane(f.force, 0), out[1] = hx_lane(f.elastic, 0), out[2] = hx_lane(f.stiffness, 0),
   out[3] = hx_lane(f.viscosity, 0);
 }
@@ -291,9 +294,22 @@ HX_API void hx_probe_servo(const hxPlant *plant, double angle, double speed,
 
 /* Computes the ground at a point. out: distance, normal. */
 HX_API void hx_probe_ground(const hxPlant *plant, const double point[3], double out[4]) {
-  const hxGround ground = hx_ground(&plant->model, hx_splat_vec3(point));
+  const hxGround ground = hx_ground(&plant->model, &plant->state.contact, HX_FOOT, 0, 1,
+                                    hx_splat_vec3(point));
   out[0] = hx_lane(ground.distance, 0);
   put3(ground.normal, 0, out + 1);
+}
+
+/* A face of a grid at a point, kind: 0 top, 1 wall, 2 the nearer; out: distance, normal, its
+ * derivative by the point xx yy zz xy xz yz. */
+HX_API void hx_probe_face(const hxTerrain *terrain, int kind, const double point[3],
+                          double out[10]) {
+  const double none[2] = {-1.0, -1.0};
+  hxFace face;
+  hx_terrain_face(terrain, (hxFaceKind)kind, none, point, &face);
+  out[0] = face.distance;
+  memcpy(out + 1, face.normal, sizeof face.normal);
+  memcpy(out + 4, face.bend, sizeof face.bend);
 }
 
 /* Switches the plant's contacts and returns them. state: closed, damping, impact speed. */
@@ -303,6 +319,7 @@ HX_API int hx_probe_contact_switch(hxPlant *plant, const double delta[HX_LEGS],
   hxContactState *contact = &plant->state.contact;
   memcpy(depths.delta[HX_FOOT], delta, HX_LEGS * sizeof(double));
   memcpy(depths.ddelta[HX_FOOT], ddelta, HX_LEGS * sizeof(double));
+  memset(depths.centre, 0, sizeof depths.centre);
   const int touchdowns = hx_contact_switch(&plant->model, &depths, contact);
   memcpy(state[0], contact->closed[HX_FOOT], HX_LEGS * sizeof(double));
   memcpy(state[1], contact->damping[HX_FOOT], HX_LEGS * sizeof(double));

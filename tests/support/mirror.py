@@ -86,7 +86,7 @@ HxDefinition = record(
             ("projection", ct.c_int),
         ),
     ),
-    ("terrain", record("Terrain", ("kind", ct.c_int), *reals("height incline heading"))),
+    ("terrain", record("Terrain", ("kind", ct.c_int), *reals("height incline heading grid"))),
     (
         "initial",
         record(

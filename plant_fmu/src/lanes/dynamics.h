@@ -389,7 +389,7 @@ static void hx_dynamics_evaluate(const hxModel *model, const hxContactState *con
   hxInertia6 I[HX_PACKS];
   hxForce6 p[HX_PACKS];
   const int reactions = multipliers || model->servo_mode == HX_SERVO_KINEMATIC;
-  hx_dynamics_forces(model, contact, command, t, motion, reactions, work);
+  hx_dynamics_forces(model, contact, command, t, motion, reactions, multipliers, work);
   /* the stage's response to the shifts (eq. 20, 21) */
   for (int pack = 0; implicit && pack < HX_PACKS; ++pack) {
     if (!implicit->change) keep_slopes(model, contact, pack, &work->pack[pack], implicit);

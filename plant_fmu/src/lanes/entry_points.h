@@ -18,10 +18,11 @@ static void kernel_start(const hxModel *model, double t, hxState *state) {
   state->motion.actuator_work = state->motion.push_work = state->motion.dissipated = 0.0;
   state->evaluations = state->steps = state->rejected = state->touchdowns = 0.0;
   hxDepths depths;
-  hx_depths_of(model, &state->motion, &depths);
+  hx_contact_release(&state->contact);
+  hx_depths_of(model, &state->contact, &state->motion, &depths);
   hx_contact_start(model, &depths, &state->contact);
   memset(state->motion.bristle, 0, sizeof state->motion.bristle);
-  hx_dynamics_forces(model, &state->contact, &no_command, t, &state->motion, 0, &work);
+  hx_dynamics_forces(model, &state->contact, &no_command, t, &state->motion, 0, 1, &work);
   hx_moment_update(model, state);
   memset(&state->completed, 0, sizeof state->completed);
   memset(&state->measured, 0, sizeof state->measured);
@@ -98,6 +99,13 @@ static void trapezoidal_impulses(const hxModel *model, const hxWork *work, doubl
   completed->known = 1.0;
 }
 
+/* Hands contacts over between rows at the end of an importer's step. */
+static void settle_cells(const hxModel *model, hxState *state) {
+  hxDepths depths;
+  hx_depths_of_moment(model, &state->contact, &state->moment, &depths);
+  hx_cross_cells(model, &depths, state);
+}
+
 static void kernel_measure(const hxModel *model, const hxCommand *command, hxState *state) {
   hxMoment end;
   hxWork work;
@@ -113,7 +121,7 @@ static void kernel_measure(const hxModel *model, const hxCommand *command, hxSta
                  .from = &state->moment,
                  .to = &end};
   for (int node = 0; node <= INTERVALS; ++node) path.command[node] = command;
-  hx_moment_of(model, &state->motion, &end);
+  hx_moment_of(model, &state->contact, &state->motion, &end);
   end.time = state->time;
   hx_dynamics_evaluate(model, &state->contact, command, state->time, &state->motion, NULL, 1, &work,
                        &rate);
@@ -128,6 +136,7 @@ static void kernel_measure(const hxModel *model, const hxCommand *command, hxSta
     hx_measure_path(&path, &impulses, &works, &state->measured);
   }
   hx_copy_moment(model, &state->moment, &end);
+  if (hx_has_cells(model)) settle_cells(model, state);
   hx_fill_measured_slots(model, state);
   for (int joint = 0; joint < HX_JOINTS; ++joint) {
     hx_fill_slots(state->completed.motor[joint]);
@@ -152,7 +161,7 @@ static void kernel_integral_rates(const hxModel *model, const hxState *state,
   hxWork work;
   hx_dynamics_evaluate(model, &state->contact, command, state->time, &state->motion, NULL, 1, &work,
                        &all);
-  hx_integral_rates_fill(model, &work, rate);
+  hx_integral_rates_fill(model, &state->contact, &work, rate);
 }
 
 static void kernel_accelerations(const hxModel *model, const hxState *state,

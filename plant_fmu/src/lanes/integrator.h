@@ -37,29 +37,12 @@ typedef struct {
   double error; /* error of the step over the tolerance; 0 without an estimate */
 } hxTrial;
 
-static inline void store_depths(const hxContactKinematics *kin, int row, int slot,
-                                hxDepths *depths) {
-  hx_store(&depths->delta[row][slot], kin->delta);
-  hx_store(&depths->ddelta[row][slot], kin->ddelta);
-}
-
 /* Computes penetration and approach speed of all contacts. */
-static inline void hx_depths_of(const hxModel *model, const hxPlantMotion *motion,
-                                hxDepths *depths) {
-  for (int slot = 0; slot < HX_PACKS * HX_LANES; slot += HX_LANES) {
-    const hxBody tibia = hx_link_body(motion, HX_JOINTS - 1, slot);
-    for (int k = 0; k < model->rows; ++k) {
-      const int row = model->row[k];
-      const hxContactKinematics kin = hx_tibia_contact(model, motion, row, slot, &tibia);
-      store_depths(&kin, row, slot, depths);
-    }
-  }
-  if (!model->torso_rows) return;
-  const hxBody torso = hx_torso_body(motion);
-  for (int slot = 0; slot < HX_SLOTS; slot += HX_LANES) {
-    const hxContactKinematics kin = hx_torso_contact(model, motion, slot, &torso);
-    store_depths(&kin, HX_TORSO, slot, depths);
-  }
+static inline void hx_depths_of(const hxModel *model, const hxContactState *state,
+                                const hxPlantMotion *motion, hxDepths *depths) {
+  hxMoment moment;
+  hx_moment_of(model, state, motion, &moment);
+  hx_depths_of_moment(model, state, &moment, depths);
 }
 
 /* ---- one step ---- */
@@ -226,14 +209,17 @@ HX_INLINE double deepest_open_of(const hxContactState *contact, const hxDepths *
   return depth;
 }
 
-/* Returns the penetration of the deepest open contact, m. */
+/* Returns the penetration of the deepest open contact, or how far a foot has left its cell, m. */
 static double deepest_open(const hxStart *start, const hxDepths *depths) {
   const hxModel *model = start->model;
   double depth = deepest_open_of(start->contact, depths, HX_FOOT, HX_LEGS, -HUGE_VAL);
   for (int k = 1; k < model->rows; ++k)
     depth = deepest_open_of(start->contact, depths, model->row[k], HX_LEGS, depth);
-  return model->torso_rows ? deepest_open_of(start->contact, depths, HX_TORSO, HX_SLOTS, depth)
-                           : depth;
+  if (model->torso_rows)
+    depth = deepest_open_of(start->contact, depths, HX_TORSO, HX_SLOTS, depth);
+  for (int leg = 0; model->terrain && leg < HX_LEGS; ++leg)
+    depth = fmax(depth, depths->outside[leg]);
+  return depth;
 }
 
 /* Returns where on [0, 1] the cubic with these ends and slopes (per unit) reaches a level between
@@ -266,6 +252,15 @@ static double first_crossing(const hxStart *start, int row, double h, const hxDe
   return first;
 }
 
+/* Returns the first x at which a foot leaves its cell by a level; 1: none. */
+static double first_exit(const hxDepths *low, const hxDepths *high, double level) {
+  double first = 1.0;
+  for (int leg = 0; leg < HX_LEGS; ++leg)
+    if (high->outside[leg] > level)
+      first = fmin(first, (level - low->outside[leg]) / (high->outside[leg] - low->outside[leg]));
+  return first;
+}
+
 /* Returns the time at which the first open contact reaches half the touch depth, by the cubics
  * through depths and speeds at two times. */
 static double expected_touch(const hxStart *start, double t_low, const hxDepths *low, double t_high,
@@ -275,6 +270,7 @@ static double expected_touch(const hxStart *start, double t_low, const hxDepths 
   double first = 1.0;
   for (int k = 0; k < model->rows + model->torso_rows; ++k)
     first = fmin(first, first_crossing(start, model->row[k], h, low, high, level));
+  if (model->terrain) first = fmin(first, first_exit(low, high, level));
   return t_low + first * h;
 }
 
@@ -284,14 +280,14 @@ static double find_touchdown(const hxStart *start, double h, hxState *state, hxT
                              hxDepths *depths) {
   double low = 0.0, high = h;
   hxDepths found, depths_low;
-  hx_depths_of(start->model, start->y, &depths_low);
+  hx_depths_of(start->model, start->contact, start->y, &depths_low);
   for (int guess = 1; deepest_open(start, depths) > start->touch && high - low > step_floor;
        ++guess) {
     double middle = guess % 3 ? expected_touch(start, low, &depths_low, high, depths) : low;
     if (!(middle > low && middle < high)) middle = 0.5 * (low + high);
     hxTrial nearer;
     try_step(start, middle, state, &nearer);
-    hx_depths_of(start->model, &nearer.y, &found);
+    hx_depths_of(start->model, start->contact, &nearer.y, &found);
     if (deepest_open(start, &found) > 0.0)
       high = middle, *depths = found, *trial = nearer;
     else
@@ -424,17 +420,18 @@ static hxStatus advance(const hxStart *start, double h_max, double *next_step, h
   /* shorten the step to the first touch-down, measure it, switch contacts */
   hxMoment end;
   hxDepths depths;
-  hx_moment_of(model, &trial.y, &end);
-  hx_depths_of_moment(model, &end, &depths);
+  hx_moment_of(model, start->contact, &trial.y, &end);
+  hx_depths_of_moment(model, start->contact, &end, &depths);
   *taken = h;
   if (deepest_open(start, &depths) > 0.0) {
     *taken = find_touchdown(start, h, state, &trial, &depths);
-    hx_moment_of(model, &trial.y, &end);
+    hx_moment_of(model, start->contact, &trial.y, &end);
   }
   end.time = start->t + *taken;
   measure_step(start, *taken, &end, state, &trial);
   state->motion = trial.y;
   state->steps += 1.0;
+  if (model->terrain) hx_cross_cells(model, &depths, state);
   *event = hx_switch_contacts(model, &depths, start->t + *taken, state);
   return HX_OK;
 }

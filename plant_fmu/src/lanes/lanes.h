@@ -67,7 +67,17 @@ static inline hxReal hx_load(const double *slots) {
 }
 
 static inline void hx_store(double *slots, hxReal x) { memcpy(slots, &x, sizeof x); }
-static inline double hx_re(double x) { return x; } /* real part; complex_step.h has another */
+
+/* Numbers of complex_step.h have a real part and a derivative; these have no derivative. */
+static inline double hx_re(double x) { return x; }
+static inline double hx_slope(double x) {
+  (void)x;
+  return 0.0;
+}
+static inline double hx_with_slope(double x, double slope) {
+  (void)slope;
+  return x;
+}
 
 #if HX_LANES == 1
 static inline hxReal hx_splat(double x) { return x; }

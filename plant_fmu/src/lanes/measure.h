@@ -58,32 +58,34 @@ HX_INLINE void store_contact_moment(const hxModel *model, const hxContactKinemat
 }
 
 /* Stores a row of contacts on the tibias. */
-HX_INLINE void row_moment(const hxModel *model, const hxPlantMotion *motion, int row, int slot,
-                          const hxBody *tibia, hxMoment *moment) {
-  const hxContactKinematics kin = hx_tibia_contact(model, motion, row, slot, tibia);
+HX_INLINE void row_moment(const hxModel *model, const hxContactState *state,
+                          const hxPlantMotion *motion, int row, int slot, const hxBody *tibia,
+                          hxMoment *moment) {
+  const hxContactKinematics kin = hx_tibia_contact(model, state, motion, row, slot, 1, tibia);
   store_contact_moment(model, &kin, row, slot, hx_link_vec3(motion, HX_JOINTS - 1, HX_R, slot),
                        tibia->w, &moment->contact[row]);
 }
 
-HX_RARE void further_moments(const hxModel *model, const hxPlantMotion *motion, int slot,
-                             const hxBody *tibia, hxMoment *moment) {
+HX_RARE void further_moments(const hxModel *model, const hxContactState *state,
+                             const hxPlantMotion *motion, int slot, const hxBody *tibia,
+                             hxMoment *moment) {
   for (int k = 1; k < model->rows; ++k)
-    row_moment(model, motion, model->row[k], slot, tibia, moment);
+    row_moment(model, state, motion, model->row[k], slot, tibia, moment);
 }
 
 /* Stores the torso's contacts. */
-HX_RARE void torso_moment(const hxModel *model, const hxPlantMotion *motion, const hxBody *torso,
-                          hxMoment *moment) {
+HX_RARE void torso_moment(const hxModel *model, const hxContactState *state,
+                          const hxPlantMotion *motion, const hxBody *torso, hxMoment *moment) {
   for (int slot = 0; slot < HX_SLOTS; slot += HX_LANES) {
-    const hxContactKinematics kin = hx_torso_contact(model, motion, slot, torso);
+    const hxContactKinematics kin = hx_torso_contact(model, state, motion, slot, 1, torso);
     store_contact_moment(model, &kin, HX_TORSO, slot, hx_torso_vec3(motion, HX_R), torso->w,
                          &moment->contact[HX_TORSO]);
   }
 }
 
 /* Computes angles, speeds and contacts of a motion. */
-static inline void hx_moment_of(const hxModel *model, const hxPlantMotion *motion,
-                                hxMoment *moment) {
+static inline void hx_moment_of(const hxModel *model, const hxContactState *state,
+                                const hxPlantMotion *motion, hxMoment *moment) {
   const hxBody torso = hx_torso_body(motion);
   for (int slot = 0; slot < HX_PACKS * HX_LANES; slot += HX_LANES) {
     hxBody i = torso, j = torso;
@@ -98,10 +100,10 @@ static inline void hx_moment_of(const hxModel *model, const hxPlantMotion *motio
       const hxVec3 s = hx_mul(i.axes, hx_load_vec3(m->s_i, slot));
       hx_store(&moment->speed[joint][slot], hx_dot(s, hx_sub3(j.w, i.w)));
     }
-    row_moment(model, motion, HX_FOOT, slot, &j, moment);
-    if (model->rows > 1) further_moments(model, motion, slot, &j, moment);
+    row_moment(model, state, motion, HX_FOOT, slot, &j, moment);
+    if (model->rows > 1) further_moments(model, state, motion, slot, &j, moment);
   }
-  if (model->torso_rows) torso_moment(model, motion, &torso, moment);
+  if (model->torso_rows) torso_moment(model, state, motion, &torso, moment);
   moment->stale = 0.0;
 }
 
@@ -112,19 +114,35 @@ static inline void hx_copy_moment(const hxModel *model, hxMoment *to, const hxMo
     to->contact[model->row[k]] = from->contact[model->row[k]];
 }
 
+/* Copies the places of the feet, and computes how far they are outside of their cells. */
+HX_RARE void feet_on_grid(const hxModel *model, const hxContactState *state,
+                          const hxMoment *moment, hxDepths *depths) {
+  const int cells = hx_has_cells(model);
+  memcpy(depths->centre, moment->contact[HX_FOOT].centre, sizeof depths->centre);
+  for (int leg = 0; leg < HX_LEGS; ++leg) {
+    const double centre[3] = {depths->centre[0][leg], depths->centre[1][leg],
+                              depths->centre[2][leg]},
+                 cell[2] = {state->cell[0][leg], state->cell[1][leg]};
+    depths->outside[leg] = cells && cell[0] >= 0.0
+                               ? hx_terrain_outside(model->terrain, centre, cell)
+                               : -hx_far;
+  }
+}
+
 /* Copies penetration and approach speed of all contacts. */
-static inline void hx_depths_of_moment(const hxModel *model, const hxMoment *moment,
-                                       hxDepths *depths) {
+static inline void hx_depths_of_moment(const hxModel *model, const hxContactState *state,
+                                       const hxMoment *moment, hxDepths *depths) {
   for (int k = 0; k < model->rows + model->torso_rows; ++k) {
     const hxContactMoment *contact = &moment->contact[model->row[k]];
     memcpy(depths->delta[model->row[k]], contact->delta, sizeof contact->delta);
     memcpy(depths->ddelta[model->row[k]], contact->ddelta, sizeof contact->ddelta);
   }
+  if (model->terrain) feet_on_grid(model, state, moment, depths);
 }
 
 /* Sets the state's moment from its motion and time. */
 static inline void hx_moment_update(const hxModel *model, hxState *state) {
-  hx_moment_of(model, &state->motion, &state->moment);
+  hx_moment_of(model, &state->contact, &state->motion, &state->moment);
   state->moment.time = state->time;
 }
 
@@ -182,6 +200,17 @@ static inline int hx_switch_contacts(const hxModel *model, const hxDepths *depth
   return 1;
 }
 
+/* Hands the contacts of feet that have left their cells over to the rows that they continue in;
+ * depths and moment become those over the new cells. */
+HX_RARE void hx_cross_cells(const hxModel *model, hxDepths *depths, hxState *state) {
+  const hxMoment before = state->moment;
+  const int crossed = hx_contact_cross(model, depths, &state->contact);
+  if (!crossed) return;
+  hx_moment_of(model, &state->contact, &state->motion, &state->moment);
+  hx_contact_hand_over(&before, &state->moment, crossed, &state->contact);
+  hx_depths_of_moment(model, &state->contact, &state->moment, depths);
+}
+
 /* ---- works and losses (eq. 27) ---- */
 
 /* Returns the mean of two values. */
@@ -195,21 +224,28 @@ static inline hxVec3 mean_vec3(const double (*from)[HX_SLOTS], const double (*to
 }
 
 /* Returns the elastic energy 2/5 K delta^(5/2) of closed contacts, J. */
-static inline hxReal stored_in_contact(const hxModel *model, hxReal closed, const double *delta) {
+static inline hxReal stored_in_contact(hxContactLawAt law, const double *delta) {
   const hxReal depth = hx_max(hx_load(delta), hx_splat(0.0));
-  return closed * (0.4 * model->stiffness) * (depth * depth) * hx_sqrt(depth);
+  return law.closed * (0.4 * law.stiffness) * (depth * depth) * hx_sqrt(depth);
+}
+
+/* Returns the approach velocity ddelta n. */
+static inline hxVec3 approach_of(const hxContactMoment *moment, int slot) {
+  return hx_scale(hx_load(&moment->ddelta[slot]),
+                  hx_load_vec3((const double (*)[HX_SLOTS])moment->normal, slot));
 }
 
 /* Computes what a row of contacts and its friction lose in a step with these impulses (eq. 27). */
 HX_INLINE void contact_works(const hxPath *path, int row, int slot, hxVec3 impulse, hxReal *contact,
                              hxReal *friction) {
   const hxContactMoment *from = &path->from->contact[row], *to = &path->to->contact[row];
-  const hxReal closed = hx_load(&path->contact->closed[row][slot]);
-  const hxVec3 normal = mean_vec3(from->normal, to->normal, slot),
-               slip = mean_vec3(from->slip, to->slip, slot);
-  const hxReal taken = hx_dot(impulse, normal) * mean_of(&from->ddelta[slot], &to->ddelta[slot]);
-  const hxReal stored = stored_in_contact(path->model, closed, &to->delta[slot]) -
-                        stored_in_contact(path->model, closed, &from->delta[slot]);
+  const hxContactLawAt law = hx_law_at(path->contact, row, slot);
+  const hxVec3 slip = mean_vec3(from->slip, to->slip, slot);
+  const hxVec3 approach = hx_scale(
+      hx_splat(0.5), hx_add3(approach_of(from, slot), approach_of(to, slot)));
+  const hxReal taken = hx_dot(impulse, approach);
+  const hxReal stored =
+      stored_in_contact(law, &to->delta[slot]) - stored_in_contact(law, &from->delta[slot]);
   *contact = taken - stored;
   *friction = -hx_dot(impulse, slip);
 }
@@ -349,7 +385,7 @@ static inline hxReal share_above(hxReal from, hxReal to, double limit, hxReal *m
 typedef struct {
   hxVec3 slip_from, slip_to, mean_slip;     /* m/s */
   hxReal delta, slope_from, rise, slope_to; /* m  the cubic of the depth */
-  hxReal closed, damping;
+  hxContactLawAt law;
 } hxFootPath;
 
 /* Returns the path of a row of feet. */
@@ -367,8 +403,7 @@ HX_INLINE hxFootPath foot_path(const hxPath *path, int row, int slot) {
                       .slope_from = h * hx_load(&from->ddelta[slot]),
                       .rise = hx_load(&to->delta[slot]) - delta,
                       .slope_to = h * hx_load(&to->ddelta[slot]),
-                      .closed = hx_load(&path->contact->closed[row][slot]),
-                      .damping = hx_load(&path->contact->damping[row][slot])};
+                      .law = hx_law_at(path->contact, row, slot)};
 }
 
 /* Normal force of feet, its rate and the sliding speed at a point of a step. */
@@ -383,7 +418,7 @@ HX_INLINE hxFootInstant foot_at(const hxPath *path, const hxFootPath *foot, doub
   const hxCubic depth = cubic(foot->delta, foot->slope_from, foot->rise, foot->slope_to, x);
   const hxReal approach = per_step * depth.rate;
   const hxNormalForce f =
-      hx_normal_force(path->model, foot->closed, foot->damping, depth.value, approach);
+      hx_normal_force(foot->law, depth.value, approach);
   const hxVec3 slip = sliding(foot->slip_from, foot->slip_to, foot->mean_slip, x);
   return (hxFootInstant){f.force, f.stiffness * approach + f.viscosity * (bends * depth.second),
                          hx_sqrt(hx_dot(slip, slip))};
@@ -438,10 +473,12 @@ static inline double force_within(const hxPath *path, int row, int leg, double x
   const double h = path->h, delta = from->delta[leg];
   const hxCubic depth = cubic(hx_splat(delta), hx_splat(h * from->ddelta[leg]),
                               hx_splat(to->delta[leg] - delta), hx_splat(h * to->ddelta[leg]), x);
-  const hxReal closed = hx_splat(path->contact->closed[row][leg]),
-               damping = hx_splat(path->contact->damping[row][leg]);
+  const hxContactState *contact = path->contact;
+  const hxContactLawAt law = {hx_splat(contact->closed[row][leg]),
+                              hx_splat(contact->damping[row][leg]),
+                              hx_splat(contact->stiffness[row][leg])};
   return hx_lane(
-      hx_normal_force(path->model, closed, damping, depth.value, hx_splat(1.0 / h) * depth.rate)
+      hx_normal_force(law, depth.value, hx_splat(1.0 / h) * depth.rate)
           .force,
       0);
 }
@@ -491,7 +528,7 @@ static inline void measure_cone(const hxPath *path, int row, const hxImpulses *i
     const hxReal along = hx_dot(impulse->contact[row][pack], normal);
     const hxVec3 across = hx_add_scaled(impulse->contact[row][pack], -along, normal);
     const hxReal share =
-        hx_sqrt(hx_dot(across, across)) / hx_max(path->model->mu * along, hx_splat(1e-300));
+        hx_sqrt(hx_dot(across, across)) / hx_max(hx_load(&path->contact->mu[row][slot]) * along, hx_splat(1e-300));
     hx_store(&place[slot], hx_cone_place(share));
     hx_store(&pressed[slot], along);
   }

@@ -231,8 +231,8 @@ static int cone_bin(double share) {
 }
 
 /* Fills the rates of a foot's integrals. */
-static void fill_foot_rates(const hxModel *model, const hxLegWork *work, int lane, int leg,
-                            hxOutput *rate) {
+static void fill_foot_rates(const hxModel *model, const hxContactState *state,
+                            const hxLegWork *work, int lane, int leg, hxOutput *rate) {
   double sum = 0.0;
   for (int k = 0; k < model->foot_rows; ++k) {
     const hxContactWork *foot = &work->contact[model->row[k]];
@@ -240,7 +240,7 @@ static void fill_foot_rates(const hxModel *model, const hxLegWork *work, int lan
                  across = tangential_force(model, foot, lane);
     sum += force;
     if (force > model->load_threshold && hx_has_cone(model))
-      rate->cone_time[cone_bin(across / (model->mu * force))] += 1.0;
+      rate->cone_time[cone_bin(across / fmax(state->mu[model->row[k]][leg] * force, 1e-300))] += 1.0;
   }
   const hxContactWork *deeper = &work->contact[deeper_row(model, work, lane)];
   rate->foot.impulse[leg] = sum;
@@ -249,7 +249,8 @@ static void fill_foot_rates(const hxModel *model, const hxLegWork *work, int lan
 }
 
 /* Fills the rates of the integrals since the start; rates of peaks are 0. */
-static void hx_integral_rates_fill(const hxModel *model, const hxWork *work, hxOutput *rate) {
+static void hx_integral_rates_fill(const hxModel *model, const hxContactState *state,
+                                   const hxWork *work, hxOutput *rate) {
   const hxLossPowers losses = hx_loss_powers(model, work);
   rate->energy.contact_loss = losses.contact;
   rate->energy.friction_loss = losses.friction;
@@ -265,7 +266,7 @@ static void hx_integral_rates_fill(const hxModel *model, const hxWork *work, hxO
       rate->negative_work[leg][joint] = fmax(-power, 0.0);
       rate->torque_squared[leg][joint] = torque * torque;
     }
-    fill_foot_rates(model, w, lane, leg, rate);
+    fill_foot_rates(model, state, w, lane, leg, rate);
     rate->foot.peak_force[leg] = rate->foot.peak_force_rate[leg] = rate->foot.landing_rate[leg] =
         rate->foot.landings[leg] = 0.0;
   }

@@ -13,8 +13,7 @@ HX_INLINE hxContactSlope contact_slope(const hxModel *model, const hxContactStat
   const hxContactKinematics *kin = &contact->kin;
   const hxReal deeper = kin->delta + implicit->ahead * hx_max(kin->ddelta, hx_splat(0.0));
   const hxNormalForce ahead =
-      hx_normal_force(model, hx_load(&state->closed[row][slot]),
-                      hx_load(&state->damping[row][slot]), deeper, kin->ddelta);
+      hx_normal_force(hx_law_at(state, row, slot), deeper, kin->ddelta);
   hxContactSlope slope = {.stiffness = ahead.stiffness, .viscosity = ahead.viscosity};
   if (!has_bristles(model, row)) {
     slope.drag = ahead.force * contact->drag_per_load;
