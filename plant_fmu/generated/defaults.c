@@ -410,6 +410,17 @@ static const hxDefinition default_definition = {
     .initial.speed[5][2] = 0.0,
     .friction.mu_static = 0.0,
     .friction.stribeck_speed = 0.005,
+    .body.torso_box[0] = 0.0,
+    .body.torso_box[1] = 0.0,
+    .body.torso_box[2] = 0.0,
+    .body.torso_centre[0] = 0.0,
+    .body.torso_centre[1] = 0.0,
+    .body.torso_centre[2] = 0.0,
+    .body.corner_radius = 0.0,
+    .body.knee_radius = 0.0,
+    .body.shank_radius = 0.0,
+    .body.shank_position = 0.0,
+    .terrain.grid = 1.0,
 };
 
 void hx_definition_default(hxDefinition *definition) {
@@ -856,7 +867,7 @@ static const hxRange definition_ranges[] = {
     {"solver.tolerance", "", 1e-13, 1.0, offsetof(hxDefinition, solver.tolerance), 0},
     {"solver.step_max", "s", 1e-09, 1.0, offsetof(hxDefinition, solver.step_max), 0},
     {"solver.projection", "", 1, 2, offsetof(hxDefinition, solver.projection), 1},
-    {"terrain.kind", "", 1, 2, offsetof(hxDefinition, terrain.kind), 1},
+    {"terrain.kind", "", 1, 3, offsetof(hxDefinition, terrain.kind), 1},
     {"terrain.height", "m", -10000.0, 10000.0, offsetof(hxDefinition, terrain.height), 0},
     {"terrain.incline", "rad", -1.5, 1.5, offsetof(hxDefinition, terrain.incline), 0},
     {"terrain.heading", "rad", -6.283185307179586, 6.283185307179586, offsetof(hxDefinition, terrain.heading), 0},
@@ -911,6 +922,17 @@ static const hxRange definition_ranges[] = {
     {"initial.RR.tibia.speed", "rad/s", -10000.0, 10000.0, offsetof(hxDefinition, initial.speed[5][2]), 0},
     {"friction.mu_static", "", 0.0, 100.0, offsetof(hxDefinition, friction.mu_static), 0},
     {"friction.stribeck_speed", "m/s", 1e-06, 100.0, offsetof(hxDefinition, friction.stribeck_speed), 0},
+    {"body.torso_box[1]", "m", 0.0, 10.0, offsetof(hxDefinition, body.torso_box[0]), 0},
+    {"body.torso_box[2]", "m", 0.0, 10.0, offsetof(hxDefinition, body.torso_box[1]), 0},
+    {"body.torso_box[3]", "m", 0.0, 10.0, offsetof(hxDefinition, body.torso_box[2]), 0},
+    {"body.torso_centre[1]", "m", -10.0, 10.0, offsetof(hxDefinition, body.torso_centre[0]), 0},
+    {"body.torso_centre[2]", "m", -10.0, 10.0, offsetof(hxDefinition, body.torso_centre[1]), 0},
+    {"body.torso_centre[3]", "m", -10.0, 10.0, offsetof(hxDefinition, body.torso_centre[2]), 0},
+    {"body.corner_radius", "m", 0.0, 10.0, offsetof(hxDefinition, body.corner_radius), 0},
+    {"body.knee_radius", "m", 0.0, 10.0, offsetof(hxDefinition, body.knee_radius), 0},
+    {"body.shank_radius", "m", 0.0, 10.0, offsetof(hxDefinition, body.shank_radius), 0},
+    {"body.shank_position", "", 0.0, 1.0, offsetof(hxDefinition, body.shank_position), 0},
+    {"terrain.grid", "", 1.0, 9999.0, offsetof(hxDefinition, terrain.grid), 0},
 };
 
 size_t hx_definition_ranges(const hxRange **range) {

@@ -867,7 +867,7 @@ static const hxVariable parameters[] = {
     {"solver.tolerance", "1", 1e-13, 1.0, offsetof(struct hxVariables, definition.solver.tolerance), HX_REAL, 1},
     {"solver.step_max", "s", 1e-09, 1.0, offsetof(struct hxVariables, definition.solver.step_max), HX_REAL, 1},
     {"solver.projection", "", 1, 2, offsetof(struct hxVariables, definition.solver.projection), HX_INTEGER, 1},
-    {"terrain.kind", "", 1, 2, offsetof(struct hxVariables, definition.terrain.kind), HX_INTEGER, 1},
+    {"terrain.kind", "", 1, 3, offsetof(struct hxVariables, definition.terrain.kind), HX_INTEGER, 1},
     {"terrain.height", "m", -10000.0, 10000.0, offsetof(struct hxVariables, definition.terrain.height), HX_REAL, 1},
     {"terrain.incline", "rad", -1.5, 1.5, offsetof(struct hxVariables, definition.terrain.incline), HX_REAL, 1},
     {"terrain.heading", "rad", -6.283185307179586, 6.283185307179586, offsetof(struct hxVariables, definition.terrain.heading), HX_REAL, 1},
@@ -922,6 +922,17 @@ static const hxVariable parameters[] = {
     {"initial.RR.tibia.speed", "rad/s", -10000.0, 10000.0, offsetof(struct hxVariables, definition.initial.speed[5][2]), HX_REAL, 0},
     {"friction.mu_static", "1", 0.0, 100.0, offsetof(struct hxVariables, definition.friction.mu_static), HX_REAL, 1},
     {"friction.stribeck_speed", "m/s", 1e-06, 100.0, offsetof(struct hxVariables, definition.friction.stribeck_speed), HX_REAL, 1},
+    {"body.torso_box[1]", "m", 0.0, 10.0, offsetof(struct hxVariables, definition.body.torso_box[0]), HX_REAL, 3},
+    {"body.torso_box[2]", "m", 0.0, 10.0, offsetof(struct hxVariables, definition.body.torso_box[1]), HX_REAL, 0},
+    {"body.torso_box[3]", "m", 0.0, 10.0, offsetof(struct hxVariables, definition.body.torso_box[2]), HX_REAL, 0},
+    {"body.torso_centre[1]", "m", -10.0, 10.0, offsetof(struct hxVariables, definition.body.torso_centre[0]), HX_REAL, 3},
+    {"body.torso_centre[2]", "m", -10.0, 10.0, offsetof(struct hxVariables, definition.body.torso_centre[1]), HX_REAL, 0},
+    {"body.torso_centre[3]", "m", -10.0, 10.0, offsetof(struct hxVariables, definition.body.torso_centre[2]), HX_REAL, 0},
+    {"body.corner_radius", "m", 0.0, 10.0, offsetof(struct hxVariables, definition.body.corner_radius), HX_REAL, 1},
+    {"body.knee_radius", "m", 0.0, 10.0, offsetof(struct hxVariables, definition.body.knee_radius), HX_REAL, 1},
+    {"body.shank_radius", "m", 0.0, 10.0, offsetof(struct hxVariables, definition.body.shank_radius), HX_REAL, 1},
+    {"body.shank_position", "1", 0.0, 1.0, offsetof(struct hxVariables, definition.body.shank_position), HX_REAL, 1},
+    {"terrain.grid", "1", 1.0, 9999.0, offsetof(struct hxVariables, definition.terrain.grid), HX_REAL, 1},
 };
 
 static const hxVariable locals[] = {
@@ -1076,7 +1087,7 @@ const size_t hx_state_count = sizeof states / sizeof states[0];
 
 _Static_assert(sizeof states / sizeof states[0] == sizeof(hxCoordinates) / sizeof(double), "each state has its row");
 
-const char hx_default_guid[] = "{f247d8c4-a7e7-4ece-a85b-a2b2be0886e1}";
+const char hx_default_guid[] = "{b848c433-3cf2-45d1-80c3-5db2cc14f640}";
 
 _Static_assert(HX_CONTACT_EXACT_RESTITUTION == 1, "ContactLaw");
 _Static_assert(HX_CONTACT_FLORES == 2, "ContactLaw");
@@ -1099,3 +1110,4 @@ _Static_assert(HX_PROJECTION_NONE == 1, "Projection");
 _Static_assert(HX_PROJECTION_STEP == 2, "Projection");
 _Static_assert(HX_TERRAIN_FLAT == 1, "TerrainKind");
 _Static_assert(HX_TERRAIN_SLOPE == 2, "TerrainKind");
+_Static_assert(HX_TERRAIN_GRID == 3, "TerrainKind");

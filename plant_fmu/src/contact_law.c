@@ -1,8 +1,10 @@
 #include "contact_law.h"
 
 #include <math.h>
+#include <string.h>
 
 #include "elementary.h"
+#include "terrain.h"
 
 double hx_exact_restitution_chi(double e) {
   if (e >= 1.0) return 0.0;
@@ -61,53 +63,180 @@ const hxContactRow *hx_contact(int law) {
                                                                                : NULL;
 }
 
-/* Closes a foot and fixes its damping by the impact speed, m/s. */
-static void close_foot(const hxModel *model, hxContactState *contact, int leg,
-                       double impact_speed) {
-  contact->closed[leg] = 1.0;
-  contact->impact_speed[leg] = impact_speed;
-  contact->damping[leg] = hx_contact(model->contact_law)->damping(model, impact_speed);
+/* Sets stiffness and friction of a contact to those of the ground of a material, NULL: of the
+ * definition. */
+static void set_ground(const hxModel *model, const double *material, int row, int slot,
+                       hxContactState *contact) {
+  double stiffness = model->stiffness, mu = model->mu, mu_static = model->mu + model->static_rise;
+  if (material && !isnan(material[HX_MATERIAL_STIFFNESS]))
+    stiffness = material[HX_MATERIAL_STIFFNESS];
+  if (material && !isnan(material[HX_MATERIAL_MU])) mu = material[HX_MATERIAL_MU];
+  if (material && !isnan(material[HX_MATERIAL_MU_STATIC]))
+    mu_static = material[HX_MATERIAL_MU_STATIC];
+  contact->stiffness[row][slot] = stiffness;
+  contact->mu[row][slot] = mu;
+  contact->static_rise[row][slot] = material ? fmax(mu_static - mu, 0.0) : model->static_rise;
 }
 
-static void open_foot(hxContactState *contact, int leg) {
-  contact->closed[leg] = 0.0;
-  contact->damping[leg] = 0.0;
+/* Returns the material under a foot; bodies have the definition's ground. */
+static const double *material_under(const hxModel *model, const hxDepths *depths, int row,
+                                    int slot) {
+  if (!model->terrain || row > HX_WALL) return NULL;
+  const double centre[3] = {depths->centre[0][slot], depths->centre[1][slot],
+                            depths->centre[2][slot]};
+  return hx_terrain_material(model->terrain, centre);
 }
 
-static void fill_contact_slots(hxContactState *contact) {
-  hx_fill_slots(contact->closed);
-  hx_fill_slots(contact->damping);
-  hx_fill_slots(contact->impact_speed);
+/* Closes a contact: fixes its damping by the impact speed, m/s, and its ground by its place. */
+static void close_contact(const hxModel *model, const hxDepths *depths, int row, int slot,
+                          double impact_speed, hxContactState *contact) {
+  set_ground(model, material_under(model, depths, row, slot), row, slot, contact);
+  contact->closed[row][slot] = 1.0;
+  contact->impact_speed[row][slot] = impact_speed;
+  contact->damping[row][slot] = hx_contact(model->contact_law)->damping(model, impact_speed);
 }
 
-void hx_contact_start(const hxModel *model, const double delta[HX_SLOTS], hxContactState *contact) {
+static void open_contact(hxContactState *contact, int row, int slot) {
+  contact->closed[row][slot] = 0.0;
+  contact->damping[row][slot] = 0.0;
+}
+
+/* Copies leg 0 into the unused slots of a row on the tibias. */
+static void fill_contact_slots(hxContactState *contact, int row) {
+  if (row == HX_TORSO) return;
+  hx_fill_slots(contact->closed[row]);
+  hx_fill_slots(contact->damping[row]);
+  hx_fill_slots(contact->impact_speed[row]);
+  hx_fill_slots(contact->stiffness[row]);
+  hx_fill_slots(contact->mu[row]);
+  hx_fill_slots(contact->static_rise[row]);
+}
+
+/* Holds the cells of feet that touch the ground, and releases those of others. */
+static void hold_cells(const hxModel *model, const hxDepths *depths, hxContactState *contact) {
   for (int leg = 0; leg < HX_LEGS; ++leg) {
-    open_foot(contact, leg);
-    contact->impact_speed[leg] = 0.0;
-    if (delta[leg] > 0.0) close_foot(model, contact, leg, 0.0);
+    const int touches =
+        contact->closed[HX_FOOT][leg] != 0.0 || contact->closed[HX_WALL][leg] != 0.0;
+    const double centre[3] = {depths->centre[0][leg], depths->centre[1][leg],
+                              depths->centre[2][leg]};
+    double cell[2] = {contact->cell[0][leg], contact->cell[1][leg]};
+    if (touches && cell[0] < 0.0) hx_terrain_cell_at(model->terrain, centre, cell);
+    for (int i = 0; i < 2; ++i) contact->cell[i][leg] = touches ? cell[i] : -1.0;
   }
-  fill_contact_slots(contact);
+  for (int i = 0; i < 2; ++i) hx_fill_slots(contact->cell[i]);
+}
+
+int hx_has_cells(const hxModel *model) {
+  return model->terrain && hx_terrain_surface(model->terrain) == HX_SURFACE_BLOCKS;
+}
+
+void hx_contact_release(hxContactState *contact) {
+  memset(contact, 0, sizeof *contact);
+  for (int slot = 0; slot < HX_SLOTS; ++slot)
+    contact->cell[0][slot] = contact->cell[1][slot] = -1.0;
+}
+
+void hx_contact_start(const hxModel *model, const hxDepths *depths, hxContactState *contact) {
+  hx_contact_release(contact);
+  for (int row = 0; row < HX_ROWS; ++row)
+    for (int slot = 0; slot < HX_SLOTS; ++slot) set_ground(model, NULL, row, slot, contact);
+  for (int k = 0; k < model->rows + model->torso_rows; ++k) {
+    const int row = model->row[k];
+    for (int slot = 0; slot < hx_slots_of(row); ++slot)
+      if (depths->delta[row][slot] > 0.0) close_contact(model, depths, row, slot, 0.0, contact);
+    fill_contact_slots(contact, row);
+  }
+  if (hx_has_cells(model)) hold_cells(model, depths, contact);
 }
 
 void hx_contact_slacken(const hxContactState *contact, hxPlantMotion *motion) {
   for (int i = 0; i < 3; ++i) {
     for (int leg = 0; leg < HX_LEGS; ++leg)
-      if (contact->closed[leg] == 0.0) motion->bristle[i][leg] = 0.0;
+      if (contact->closed[HX_FOOT][leg] == 0.0) motion->bristle[i][leg] = 0.0;
     hx_fill_slots(motion->bristle[i]);
   }
 }
 
-int hx_contact_switch(const hxModel *model, const double delta[HX_SLOTS],
-                      const double ddelta[HX_SLOTS], hxContactState *contact) {
-  int touchdowns = 0;
-  for (int leg = 0; leg < HX_LEGS; ++leg) {
-    if (contact->closed[leg] == 0.0 && delta[leg] > 0.0) {
-      close_foot(model, contact, leg, ddelta[leg]);
-      ++touchdowns;
-    } else if (contact->closed[leg] != 0.0 && delta[leg] <= 0.0) {
-      open_foot(contact, leg);
-    }
+int hx_contact_is_due(const hxModel *model, const hxDepths *depths, const hxContactState *contact) {
+  int due = 0;
+  for (int k = 0; k < model->rows + model->torso_rows; ++k) {
+    const double *closed = contact->closed[model->row[k]], *delta = depths->delta[model->row[k]];
+    for (int leg = 0; leg < HX_LEGS; ++leg) due |= (closed[leg] != 0.0) != (delta[leg] > 0.0);
+    if (model->row[k] == HX_TORSO)
+      for (int slot = HX_LEGS; slot < HX_SLOTS; ++slot)
+        due |= (closed[slot] != 0.0) != (delta[slot] > 0.0);
   }
-  fill_contact_slots(contact);
+  return due;
+}
+
+int hx_contact_switch(const hxModel *model, const hxDepths *depths, hxContactState *contact) {
+  int touchdowns = 0;
+  for (int k = 0; k < model->rows + model->torso_rows; ++k) {
+    const int row = model->row[k];
+    for (int slot = 0; slot < hx_slots_of(row); ++slot) {
+      const int closed = contact->closed[row][slot] != 0.0;
+      if (!closed && depths->delta[row][slot] > 0.0) {
+        close_contact(model, depths, row, slot, depths->ddelta[row][slot], contact);
+        ++touchdowns;
+      } else if (closed && depths->delta[row][slot] <= 0.0) {
+        open_contact(contact, row, slot);
+      }
+    }
+    fill_contact_slots(contact, row);
+  }
+  if (hx_has_cells(model)) hold_cells(model, depths, contact);
   return touchdowns;
+}
+
+/* Returns whether a row of a leg at one side of a border is the same contact as a row at the other
+ * side: the same depth along the same normal. */
+static int is_same(const hxContactMoment *a, const hxContactMoment *b, int leg) {
+  const double slack = 1e-6; /* m and 1; the border is found to 1e-10 m */
+  double square = 0.0;
+  for (int i = 0; i < 3; ++i) {
+    const double d = a->normal[i][leg] - b->normal[i][leg];
+    square += d * d;
+  }
+  return fabs(a->delta[leg] - b->delta[leg]) < slack && square < slack;
+}
+
+/* Copies the contact of a row of a leg to another row. */
+static void copy_contact(const hxContactState *from, int row_from, int row_to, int leg,
+                         hxContactState *to) {
+  to->closed[row_to][leg] = from->closed[row_from][leg];
+  to->damping[row_to][leg] = from->damping[row_from][leg];
+  to->impact_speed[row_to][leg] = from->impact_speed[row_from][leg];
+  to->stiffness[row_to][leg] = from->stiffness[row_from][leg];
+  to->mu[row_to][leg] = from->mu[row_from][leg];
+  to->static_rise[row_to][leg] = from->static_rise[row_from][leg];
+}
+
+int hx_contact_cross(const hxModel *model, const hxDepths *depths, hxContactState *contact) {
+  int crossed = 0;
+  for (int leg = 0; leg < HX_LEGS; ++leg) {
+    const double centre[3] = {depths->centre[0][leg], depths->centre[1][leg],
+                              depths->centre[2][leg]};
+    double cell[2];
+    if (contact->cell[0][leg] < 0.0 || depths->outside[leg] <= 0.0) continue;
+    hx_terrain_cell_at(model->terrain, centre, cell);
+    contact->cell[0][leg] = cell[0], contact->cell[1][leg] = cell[1];
+    crossed |= 1 << leg;
+  }
+  for (int i = 0; i < 2; ++i) hx_fill_slots(contact->cell[i]);
+  return crossed;
+}
+
+void hx_contact_hand_over(const hxMoment *before, const hxMoment *after, int crossed,
+                          hxContactState *contact) {
+  const hxContactState was = *contact;
+  for (int leg = 0; leg < HX_LEGS; ++leg)
+    for (int to = HX_FOOT; to <= HX_WALL && crossed >> leg & 1; ++to) {
+      open_contact(contact, to, leg);
+      for (int from = HX_FOOT; from <= HX_WALL; ++from)
+        if (was.closed[from][leg] != 0.0 &&
+            is_same(&before->contact[from], &after->contact[to], leg))
+          copy_contact(&was, from, to, leg, contact);
+    }
+  fill_contact_slots(contact, HX_FOOT);
+  fill_contact_slots(contact, HX_WALL);
 }

@@ -19,17 +19,34 @@ const hxContactRow *hx_contact(int law); /* NULL for an unknown law */
  * e)]. */
 double hx_exact_restitution_chi(double e);
 
-/* Sets the contacts at the start of a motion: feet in the ground are closed, with impact speed 0.
+/* Opens all contacts and holds no cells. */
+void hx_contact_release(hxContactState *contact);
+
+/* Sets the contacts at the start of a motion: those in the ground are closed, with impact speed 0.
  */
-void hx_contact_start(const hxModel *model, const double delta[HX_SLOTS], hxContactState *contact);
+void hx_contact_start(const hxModel *model, const hxDepths *depths, hxContactState *contact);
+
+/* Returns whether feet stand on cells of blocks. */
+int hx_has_cells(const hxModel *model);
+
+/* Moves the held cells of feet that have left them to those that they are over; returns a bit for
+ * each leg that did. */
+int hx_contact_cross(const hxModel *model, const hxDepths *depths, hxContactState *contact);
+
+/* Gives the contacts of legs that have crossed a border to the rows that they continue in: those
+ * with the same depth and normal before and after. A contact that does not continue opens. */
+void hx_contact_hand_over(const hxMoment *before, const hxMoment *after, int crossed,
+                          hxContactState *contact);
 
 /* Sets the bristles of open feet to 0 (eq. 16). */
 void hx_contact_slacken(const hxContactState *contact, hxPlantMotion *motion);
 
-/* Closes open feet that are in the ground and opens closed feet that are out of it; returns the
- * number of touch-downs. */
-int hx_contact_switch(const hxModel *model, const double delta[HX_SLOTS],
-                      const double ddelta[HX_SLOTS], hxContactState *contact);
+/* Returns whether a contact has to be closed or opened. */
+int hx_contact_is_due(const hxModel *model, const hxDepths *depths, const hxContactState *contact);
+
+/* Closes open contacts that are in the ground and opens closed ones that are out of it; returns
+ * the number of touch-downs. */
+int hx_contact_switch(const hxModel *model, const hxDepths *depths, hxContactState *contact);
 
 HX_HIDDEN_END
 

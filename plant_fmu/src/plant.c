@@ -9,20 +9,22 @@
 #include "kernel.h"
 #include "robot.h"
 #include "tangent.h"
+#include "terrain.h"
 #include "validation.h"
 
 /* A saved state: a header that identifies it, then the plant's model and state. */
 typedef struct {
   uint64_t magic, version, size, checksum;
+  uint64_t terrain; /* checksum of the grid; 0: none */
   hxModel model;
   hxState state;
 } hxSavedPlant;
 
 static const uint64_t magic = 0x74616c5064507868u; /* "hxPdPlat" */
-static const uint64_t saved_version = 7;
+static const uint64_t saved_version = 8;
 
 static uint64_t checksum(const hxSavedPlant *saved) {
-  return hx_checksum(0, &saved->model, sizeof *saved - offsetof(hxSavedPlant, model));
+  return hx_checksum(0, &saved->terrain, sizeof *saved - offsetof(hxSavedPlant, terrain));
 }
 
 /* Sets the plant's message and returns the status. */
@@ -45,17 +47,40 @@ hxPlant *hx_plant_create(void) {
 
 void hx_plant_destroy(hxPlant *plant) { free(plant); }
 
+void hx_plant_set_terrain(hxPlant *plant, const hxTerrain *terrain) { plant->terrain = terrain; }
+
+/* Returns whether a definition's ground is there and suits its contacts; else writes why not. */
+static hxStatus check_terrain(const hxPlant *plant, const hxDefinition *d, char *message) {
+  if (d->terrain.kind != HX_TERRAIN_GRID) return HX_OK;
+  if (!plant->terrain) {
+    snprintf(message, HX_MESSAGE_SIZE,
+             "terrain.kind: got grid, expected a grid; load one and set it before the reset "
+             "(hx_plant_set_terrain), or choose flat or slope");
+    return HX_INVALID_MODEL;
+  }
+  const double radius = fmax(fmax(d->foot_radius, d->body.corner_radius),
+                             fmax(d->body.knee_radius, d->body.shank_radius));
+  const double cell = hx_terrain_cell_size(plant->terrain);
+  if (hx_terrain_surface(plant->terrain) == HX_SURFACE_SMOOTH || cell >= 2.0 * radius) return HX_OK;
+  snprintf(message, HX_MESSAGE_SIZE,
+           "terrain.grid: got blocks with cells of %.9g m, expected at least %.9g m, twice the "
+           "largest radius that touches them; resample the grid, or reduce foot.radius",
+           cell, 2.0 * radius);
+  return HX_INVALID_MODEL;
+}
+
 hxStatus hx_plant_reset(hxPlant *plant, const hxDefinition *definition, double t) {
   char message[HX_MESSAGE_SIZE];
   double body[HX_BODIES][HX_BODY_STATE];
   if (!isfinite(t))
     return fail(plant, HX_INVALID_ARGUMENT,
                 "start time: got a number that is not finite, expected a finite time in s");
-  const hxStatus status = hx_definition_check(definition, message);
+  hxStatus status = hx_definition_check(definition, message);
+  if (status == HX_OK) status = check_terrain(plant, definition, message);
   if (status != HX_OK) return fail(plant, status, message);
   memset(&plant->model, 0, sizeof plant->model);
   memset(&plant->state, 0, sizeof plant->state);
-  hx_model_compile(&plant->model, definition);
+  hx_model_compile(&plant->model, definition, plant->terrain);
   hx_initial_bodies(definition, body);
   hx_motion_from_bodies(&plant->model, (const double (*)[HX_BODY_STATE])body, &plant->state.motion);
   hx_kernel()->start(&plant->model, t, &plant->state);
@@ -153,6 +178,8 @@ void hx_plant_get_state(const hxPlant *plant, void *bytes) {
                         .size = sizeof saved,
                         .model = plant->model,
                         .state = plant->state};
+  saved.terrain = plant->model.terrain ? hx_terrain_checksum(plant->model.terrain) : 0;
+  saved.model.terrain_bits = 0;
   saved.checksum = checksum(&saved);
   memcpy(bytes, &saved, sizeof saved);
 }
@@ -174,6 +201,11 @@ hxStatus hx_plant_set_state(hxPlant *plant, const void *bytes, size_t size) {
     return fail(
         plant, HX_BAD_STATE,
         "saved state: got a damaged one, expected one whose checksum is right; save it again");
+  if (saved.terrain && (!plant->terrain || hx_terrain_checksum(plant->terrain) != saved.terrain))
+    return fail(plant, HX_BAD_STATE,
+                "saved state: its ground is a grid that this plant does not have; set the one that "
+                "it was saved with before");
+  saved.model.terrain = saved.terrain ? plant->terrain : NULL;
   plant->model = saved.model;
   plant->state = saved.state;
   return HX_OK;
@@ -228,32 +260,33 @@ void hx_plant_rates(const hxPlant *plant, const hxInput *input, hxCoordinates *r
  * their rounding (docs/equations.md). */
 static const double switch_band = 1e-10;
 
-static void feet_of(const hxPlant *plant, double delta[HX_SLOTS], double ddelta[HX_SLOTS]) {
-  hx_kernel()->feet(&plant->model, &plant->state.motion, delta, ddelta);
-}
-
 void hx_plant_indicators(const hxPlant *plant, double indicator[HX_LEGS]) {
-  double delta[HX_SLOTS], ddelta[HX_SLOTS];
-  feet_of(plant, delta, ddelta);
+  hxDepths depths;
+  hx_kernel()->depths(&plant->model, &plant->state.contact, &plant->state.motion, &depths);
   for (int leg = 0; leg < HX_LEGS; ++leg)
     indicator[leg] =
-        delta[leg] + (plant->state.contact.closed[leg] != 0.0 ? switch_band : -switch_band);
+        depths.delta[HX_FOOT][leg] +
+        (plant->state.contact.closed[HX_FOOT][leg] != 0.0 ? switch_band : -switch_band);
 }
 
-/* Returns the penetration that makes a foot switch, or keep its state. */
+/* Returns the penetration that makes a contact switch, or keep its state. */
 static double switching_depth(int closed, double delta, double ddelta) {
   if (closed) return delta <= -switch_band || (delta < 0.0 && ddelta < 0.0) ? -1.0 : 1.0;
   return delta >= switch_band || (delta > 0.0 && ddelta > 0.0) ? 1.0 : -1.0;
 }
 
 int hx_plant_update_contacts(hxPlant *plant) {
-  double delta[HX_SLOTS], ddelta[HX_SLOTS];
+  hxDepths depths;
+  const hxModel *model = &plant->model;
   const hxPlantMotion before = plant->state.motion;
-  feet_of(plant, delta, ddelta);
-  for (int slot = 0; slot < HX_SLOTS; ++slot)
-    delta[slot] =
-        switching_depth(plant->state.contact.closed[slot] != 0.0, delta[slot], ddelta[slot]);
-  hx_kernel()->switch_contacts(&plant->model, delta, ddelta, &plant->state);
+  hx_kernel()->depths(model, &plant->state.contact, &plant->state.motion, &depths);
+  for (int k = 0; k < model->rows + model->torso_rows; ++k) {
+    const int row = model->row[k];
+    for (int slot = 0; slot < hx_slots_of(row); ++slot)
+      depths.delta[row][slot] = switching_depth(plant->state.contact.closed[row][slot] != 0.0,
+                                                depths.delta[row][slot], depths.ddelta[row][slot]);
+  }
+  hx_kernel()->switch_contacts(model, &depths, &plant->state);
   return memcmp(before.bristle, plant->state.motion.bristle, sizeof before.bristle) != 0;
 }
 

@@ -10,8 +10,8 @@ HX_HIDDEN_BEGIN
  * axis's smallest component (the first of equal ones), b = axis x a. */
 void hx_axis_normals(const double axis[3], double a[3], double b[3]);
 
-/* Computes the model of a checked definition. */
-void hx_model_compile(hxModel *model, const hxDefinition *definition);
+/* Computes the model of a checked definition; terrain: its ground if that is a grid. */
+void hx_model_compile(hxModel *model, const hxDefinition *definition, const hxTerrain *terrain);
 
 /* Computes the initial states of all bodies from the definition's torso and joint states; the
  * constraints are satisfied exactly. */

@@ -14,6 +14,8 @@
 #pragma GCC optimize("cx-limited-range")
 #endif
 
+#include "terrain.h" /* before double is redefined: queries of the ground are real */
+
 /* In this file every number of the structures is complex; to_complex() converts the bytes of real
  * structures. */
 typedef double _Complex hxComplex;

@@ -13,6 +13,7 @@
 #include "lanes/dynamics.h"
 #include "method.h"
 #include "robot.h"
+#include "terrain.h"
 
 #if defined(__GNUC__)
 #pragma GCC diagnostic ignored                                                                     \
@@ -50,6 +51,12 @@ static const ProbeField fields[] = {
     FIELD(hxDefinition, torso.inertia),
     FIELD(hxDefinition, leg),
     FIELD(hxDefinition, foot_radius),
+    FIELD(hxDefinition, body.torso_box),
+    FIELD(hxDefinition, body.torso_centre),
+    FIELD(hxDefinition, body.corner_radius),
+    FIELD(hxDefinition, body.knee_radius),
+    FIELD(hxDefinition, body.shank_radius),
+    FIELD(hxDefinition, body.shank_position),
     FIELD(hxDefinition, contact.law),
     FIELD(hxDefinition, contact.stiffness),
     FIELD(hxDefinition, contact.restitution),
@@ -81,6 +88,7 @@ static const ProbeField fields[] = {
     FIELD(hxDefinition, terrain.height),
     FIELD(hxDefinition, terrain.incline),
     FIELD(hxDefinition, terrain.heading),
+    FIELD(hxDefinition, terrain.grid),
     FIELD(hxDefinition, initial.position),
     FIELD(hxDefinition, initial.quaternion),
     FIELD(hxDefinition, initial.velocity),
@@ -263,8 +271,9 @@ HX_API double hx_probe_contact_damping(const hxPlant *plant, double impact_speed
 /* Computes the normal force. out: force, elastic part, stiffness, viscosity. */
 HX_API void hx_probe_normal_force(const hxPlant *plant, double closed, double damping, double delta,
                                   double ddelta, double out[4]) {
-  const hxNormalForce f = hx_normal_force(&plant->model, hx_splat(closed), hx_splat(damping),
-                                          hx_splat(delta), hx_splat(ddelta));
+  const hxContactLawAt law = {hx_splat(closed), hx_splat(damping),
+                              hx_splat(plant->model.stiffness)};
+  const hxNormalForce f = hx_normal_force(law, hx_splat(delta), hx_splat(ddelta));
   out[0] = hx_lane(f.force, 0), out[1] = hx_lane(f.elastic, 0), out[2] = hx_lane(f.stiffness, 0),
   out[3] = hx_lane(f.viscosity, 0);
 }
@@ -285,22 +294,36 @@ HX_API void hx_probe_servo(const hxPlant *plant, double angle, double speed,
 
 /* Computes the ground at a point. out: distance, normal. */
 HX_API void hx_probe_ground(const hxPlant *plant, const double point[3], double out[4]) {
-  const hxGround ground = hx_ground(&plant->model, hx_splat_vec3(point));
+  const hxGround ground = hx_ground(&plant->model, &plant->state.contact, HX_FOOT, 0, 1,
+                                    hx_splat_vec3(point));
   out[0] = hx_lane(ground.distance, 0);
   put3(ground.normal, 0, out + 1);
+}
+
+/* A face of a grid at a point, kind: 0 top, 1 wall, 2 the nearer; out: distance, normal, its
+ * derivative by the point xx yy zz xy xz yz. */
+HX_API void hx_probe_face(const hxTerrain *terrain, int kind, const double point[3],
+                          double out[10]) {
+  const double none[2] = {-1.0, -1.0};
+  hxFace face;
+  hx_terrain_face(terrain, (hxFaceKind)kind, none, point, &face);
+  out[0] = face.distance;
+  memcpy(out + 1, face.normal, sizeof face.normal);
+  memcpy(out + 4, face.bend, sizeof face.bend);
 }
 
 /* Switches the plant's contacts and returns them. state: closed, damping, impact speed. */
 HX_API int hx_probe_contact_switch(hxPlant *plant, const double delta[HX_LEGS],
                                    const double ddelta[HX_LEGS], double state[3][HX_LEGS]) {
-  double slots[2][HX_SLOTS] = {{0}};
+  hxDepths depths;
   hxContactState *contact = &plant->state.contact;
-  memcpy(slots[0], delta, HX_LEGS * sizeof(double));
-  memcpy(slots[1], ddelta, HX_LEGS * sizeof(double));
-  const int touchdowns = hx_contact_switch(&plant->model, slots[0], slots[1], contact);
-  memcpy(state[0], contact->closed, HX_LEGS * sizeof(double));
-  memcpy(state[1], contact->damping, HX_LEGS * sizeof(double));
-  memcpy(state[2], contact->impact_speed, HX_LEGS * sizeof(double));
+  memcpy(depths.delta[HX_FOOT], delta, HX_LEGS * sizeof(double));
+  memcpy(depths.ddelta[HX_FOOT], ddelta, HX_LEGS * sizeof(double));
+  memset(depths.centre, 0, sizeof depths.centre);
+  const int touchdowns = hx_contact_switch(&plant->model, &depths, contact);
+  memcpy(state[0], contact->closed[HX_FOOT], HX_LEGS * sizeof(double));
+  memcpy(state[1], contact->damping[HX_FOOT], HX_LEGS * sizeof(double));
+  memcpy(state[2], contact->impact_speed[HX_FOOT], HX_LEGS * sizeof(double));
   return touchdowns;
 }
 
@@ -344,15 +367,15 @@ HX_API void hx_probe_foot(hxPlant *plant, const hxInput *input, int leg, double 
   hxImplicit implicit = {.z = 1e-3, .ahead = ahead};
   evaluate(plant, input, 0.0, &implicit, &work, &rate);
   const int lane = leg % HX_LANES, pack = leg / HX_LANES;
-  const hxFootWork *foot = &work.pack[pack].foot;
+  const hxContactWork *foot = &work.pack[pack].contact[HX_FOOT];
+  const hxContactSlope *slope = &implicit.slope[pack].contact[HX_FOOT];
   const hxVec3 tibia = hx_link_vec3(&plant->state.motion, HX_JOINTS - 1, HX_R, leg - lane);
   put3(hx_add3(tibia, foot->kin.arm), lane, out), put3(foot->kin.velocity, lane, out + 3),
       put3(foot->kin.normal, lane, out + 6);
   out[9] = hx_lane(foot->kin.delta, lane), out[10] = hx_lane(foot->kin.ddelta, lane);
   put3(foot->force, lane, out + 11);
-  out[14] = hx_lane(implicit.slope[pack].stiffness, lane),
-  out[15] = hx_lane(implicit.slope[pack].viscosity, lane);
-  out[16] = hx_lane(implicit.slope[pack].drag, lane);
+  out[14] = hx_lane(slope->stiffness, lane), out[15] = hx_lane(slope->viscosity, lane);
+  out[16] = hx_lane(slope->drag, lane);
 }
 
 /* Computes dy/dt under a command that is `age` seconds old: of the bodies, and the powers of

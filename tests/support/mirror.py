@@ -43,6 +43,15 @@ HxDefinition = record(
     ("leg", HxLeg * LEGS),
     ("foot_radius", Real),
     (
+        "body",
+        record(
+            "Body",
+            ("torso_box", Vector3),
+            ("torso_centre", Vector3),
+            *reals("corner_radius knee_radius shank_radius shank_position"),
+        ),
+    ),
+    (
         "contact",
         record(
             "Contact",
@@ -77,7 +86,7 @@ HxDefinition = record(
             ("projection", ct.c_int),
         ),
     ),
-    ("terrain", record("Terrain", ("kind", ct.c_int), *reals("height incline heading"))),
+    ("terrain", record("Terrain", ("kind", ct.c_int), *reals("height incline heading grid"))),
     (
         "initial",
         record(

@@ -202,7 +202,7 @@ def _put_settings(d: Any, robot: Robot) -> None:
         target, source = getattr(d, section), getattr(robot, section)
         for name, kind in target._fields_:
             if kind is Real:
-                setattr(target, name, getattr(source, name))
+                setattr(target, name, getattr(source, name, 1.0))  # terrain.grid: the first
     put(d.gravity, robot.gravity)
 
 

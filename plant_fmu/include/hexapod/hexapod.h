@@ -14,6 +14,7 @@
 
 #include "hexapod/legs.h"
 #include "hexapod/status.h"
+#include "hexapod/terrain.h"
 
 #ifdef __cplusplus
 extern "C" {
@@ -41,7 +42,11 @@ typedef enum hxFrictionLaw {
   HX_FRICTION_BRISTLE
 } hxFrictionLaw;
 
-typedef enum hxTerrainKind { HX_TERRAIN_FLAT = 1, HX_TERRAIN_SLOPE } hxTerrainKind;
+typedef enum hxTerrainKind {
+  HX_TERRAIN_FLAT = 1,
+  HX_TERRAIN_SLOPE,
+  HX_TERRAIN_GRID /* an hxTerrain, see hx_plant_set_terrain */
+} hxTerrainKind;
 
 typedef enum hxServoMode { HX_SERVO_POSITION = 1, HX_SERVO_TORQUE, HX_SERVO_KINEMATIC } hxServoMode;
 
@@ -84,7 +89,16 @@ typedef struct hxDefinition {
     double inertia[6]; /* kg m2  about the centre of mass, torso axes: xx yy zz xy xz yz */
   } torso;
   hxLeg leg[HX_LEGS];
-  double foot_radius; /* m */
+  double foot_radius;       /* m */
+  struct {                  /* spheres that touch the ground besides the feet; see hxTerrain */
+    double torso_box[3];    /* m  half edges along the torso's axes of a box whose eight corners
+                             *    touch the ground; 0 0 0: they do not */
+    double torso_centre[3]; /* m  centre of the box from the torso's origin */
+    double corner_radius;   /* m  of spheres at the box's corners; 0: points */
+    double knee_radius;     /* m  of a sphere at the tibia's joint; 0: none */
+    double shank_radius;    /* m  of a sphere on the tibia's line; 0: none */
+    double shank_position;  /* 1  its place, 0 at the joint, 1 at the foot's centre */
+  } body;
   struct {
     int law;                   /* hxContactLaw */
     double stiffness;          /* N/m^1.5  K of eq. 14 */
@@ -123,9 +137,10 @@ typedef struct hxDefinition {
   } solver;
   struct {
     int kind;       /* hxTerrainKind */
-    double height;  /* m    of the ground at the world's origin */
+    double height;  /* m    of the ground at the world's origin, of a grid's zero */
     double incline; /* rad  of HX_TERRAIN_SLOPE: the ground rises along the heading */
     double heading; /* rad  about z, from x */
+    double grid;    /* 1    which grid of an FMU's resources; the plant itself ignores it */
   } terrain;
   struct {
     double position[3];         /* m      torso's centre of mass */
@@ -240,6 +255,11 @@ HX_API hxStatus hx_definition_check(const hxDefinition *definition, char *messag
 /* Allocates a plant with the default robot in its initial state; NULL when out of memory. */
 HX_API hxPlant *hx_plant_create(void);
 HX_API void hx_plant_destroy(hxPlant *plant);
+
+/* Sets the ground of later resets to definitions whose terrain.kind is HX_TERRAIN_GRID; NULL: none.
+ * The plant keeps the pointer, so the terrain must not be destroyed before the plant is, or is
+ * reset on another ground. Saved states are refused by plants with another ground. */
+HX_API void hx_plant_set_terrain(hxPlant *plant, const hxTerrain *terrain);
 
 /* Sets a definition and its initial state at time t, s. On failure only the plant's message
  * changes. */

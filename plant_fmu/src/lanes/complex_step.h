@@ -24,6 +24,9 @@ static inline hxComplex hx_complex(double re, double im) {
   return x;
 }
 
+static inline double hx_slope(hxComplex x) { return hx_im(x); }
+static inline hxComplex hx_with_slope(double x, double slope) { return hx_complex(x, slope); }
+
 static inline hxReal hx_load(const hxNumber *slots) { return slots[0]; }
 static inline void hx_store(hxNumber *slots, hxReal x) { slots[0] = x; }
 static inline hxReal hx_splat(hxNumber x) { return x; }

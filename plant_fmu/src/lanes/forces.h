@@ -145,24 +145,51 @@ static inline hxMotion6 link_velocity(const hxPlantMotion *m, int joint, int slo
   return (hxMotion6){hx_link_vec3(m, joint, HX_W, slot), hx_link_vec3(m, joint, HX_V, slot)};
 }
 
-/* Returns the contact point, relative to the torso's centre of mass. */
-static inline hxVec3 contact_point(const hxLegWork *leg) {
-  return hx_add3(leg->joint[HX_JOINTS - 1].c, leg->foot.kin.arm);
+/* Returns the point of a contact on the tibia, relative to the torso's centre of mass. */
+static inline hxVec3 contact_point(const hxLegWork *leg, const hxContactWork *contact) {
+  return hx_add3(leg->joint[HX_JOINTS - 1].c, contact->kin.arm);
 }
 
-/* Applies a force to the tibia at x: p -= (x x force, force). */
-static inline void push_tibia(hxLegWork *leg, hxVec3 x, hxVec3 force) {
-  hxForce6 *p = &leg->joint[HX_JOINTS - 1].p;
+/* Applies a force to a body at x: p -= (x x force, force). */
+static inline void push_body(hxForce6 *p, hxVec3 x, hxVec3 force) {
   p->lin = hx_sub3(p->lin, force);
   p->ang = hx_sub3(p->ang, hx_cross(x, force));
 }
 
-/* Computes the contact force and applies it to the tibia. */
-static inline void leg_foot(const hxModel *model, const hxContactState *contact,
-                            const hxPlantMotion *motion, int slot, hxLegWork *leg) {
-  leg->foot.kin = hx_foot_kinematics(model, motion, slot, &leg->joint[HX_JOINTS - 1].body);
-  hx_foot_force(model, contact, slot, hx_load_vec3(motion->bristle, slot), &leg->foot);
-  push_tibia(leg, contact_point(leg), leg->foot.force);
+/* Computes the contact force of a row and applies it to the tibia. */
+HX_INLINE void leg_contact(const hxModel *model, const hxContactState *state,
+                           const hxPlantMotion *motion, int row, int slot, int all,
+                           hxLegWork *leg) {
+  hxJointWork *tibia = &leg->joint[HX_JOINTS - 1];
+  hxContactWork *contact = &leg->contact[row];
+  contact->kin = hx_tibia_contact(model, state, motion, row, slot, all, &tibia->body);
+  hx_contact_force(model, state, row, slot, motion, contact);
+  push_body(&tibia->p, contact_point(leg, contact), contact->force);
+}
+
+HX_RARE void further_contacts(const hxModel *model, const hxContactState *state,
+                              const hxPlantMotion *motion, int slot, int all, hxLegWork *leg) {
+  for (int k = 1; k < model->rows; ++k) leg_contact(model, state, motion, model->row[k], slot, all, leg);
+}
+
+/* Computes the contact forces of a leg. */
+HX_INLINE void leg_contacts(const hxModel *model, const hxContactState *state,
+                            const hxPlantMotion *motion, int slot, int all, hxLegWork *leg) {
+  leg_contact(model, state, motion, HX_FOOT, slot, all, leg);
+  if (model->rows > 1) further_contacts(model, state, motion, slot, all, leg);
+}
+
+/* Computes the contact forces of the torso and applies them. */
+HX_RARE void torso_contacts(const hxModel *model, const hxContactState *state,
+                            const hxPlantMotion *motion, int all, hxWork *work) {
+  for (int pack = 0; pack < HX_TORSO_PACKS; ++pack) {
+    hxContactWork *contact = &work->torso_contact[pack];
+    const int slot = pack * HX_LANES;
+    contact->kin = hx_torso_contact(model, state, motion, slot, all, &work->torso);
+    hx_contact_force(model, state, HX_TORSO, slot, motion, contact);
+    work->torso_p[pack] = (hxForce6){hx_zero3(), hx_zero3()};
+    push_body(&work->torso_p[pack], contact->kin.arm, contact->force);
+  }
 }
 
 /* Computes orientation and inertia of the torso. */
@@ -178,7 +205,8 @@ static inline void torso_pass(const hxModel *model, const hxPlantMotion *motion,
  * reactions it also keeps what the multipliers need. */
 static inline void hx_dynamics_forces(const hxModel *model, const hxContactState *contact,
                                       const hxCommand *command, double t,
-                                      const hxPlantMotion *motion, int reactions, hxWork *work) {
+                                      const hxPlantMotion *motion, int reactions, int all,
+                                      hxWork *work) {
   torso_pass(model, motion, work);
   joint_angles(model, motion, work);
   for (int joint = 0; joint < HX_JOINTS; ++joint)
@@ -191,7 +219,8 @@ static inline void hx_dynamics_forces(const hxModel *model, const hxContactState
     for (int pack = 0; pack < HX_PACKS; ++pack)
       joint_torque(model, command, joint, pack * HX_LANES, &work->pack[pack].joint[joint]);
   for (int pack = 0; pack < HX_PACKS; ++pack)
-    leg_foot(model, contact, motion, pack * HX_LANES, &work->pack[pack]);
+    leg_contacts(model, contact, motion, pack * HX_LANES, all, &work->pack[pack]);
+  if (model->torso_rows) torso_contacts(model, contact, motion, all, work);
 }
 
 #endif

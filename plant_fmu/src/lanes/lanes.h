@@ -19,6 +19,17 @@
 #include "../elementary.h"
 #include "../state.h"
 
+/* Functions of one row of contacts are inline for the feet's first row, HX_INLINE; those for rows
+ * that few robots and grounds have stay out of line, HX_RARE, so that flat ground costs the same
+ * with and without them. */
+#if defined(__GNUC__)
+#define HX_INLINE static inline __attribute__((always_inline))
+#define HX_RARE static __attribute__((noinline))
+#else
+#define HX_INLINE static inline
+#define HX_RARE static
+#endif
+
 #ifndef HX_TANGENT
 typedef double hxNumber; /* number type of the structures of state.h and hexapod.h */
 
@@ -56,6 +67,17 @@ static inline hxReal hx_load(const double *slots) {
 }
 
 static inline void hx_store(double *slots, hxReal x) { memcpy(slots, &x, sizeof x); }
+
+/* Numbers of complex_step.h have a real part and a derivative; these have no derivative. */
+static inline double hx_re(double x) { return x; }
+static inline double hx_slope(double x) {
+  (void)x;
+  return 0.0;
+}
+static inline double hx_with_slope(double x, double slope) {
+  (void)slope;
+  return x;
+}
 
 #if HX_LANES == 1
 static inline hxReal hx_splat(double x) { return x; }
@@ -192,6 +214,13 @@ static inline void hx_lanes_sin_cos(hxReal x, hxReal *sine, hxReal *cosine) {
 enum {
   HX_PACKS = (HX_LEGS + HX_LANES - 1) / HX_LANES
 }; /* packs that hold all legs, HX_LANES legs in each */
+
+/* Returns the sum over eight slots, in an order that does not depend on the width. */
+static inline hxNumber hx_sum_slots(const hxReal pack[HX_SLOTS / HX_LANES]) {
+  hxNumber x[HX_SLOTS];
+  for (int p = 0; p < HX_SLOTS / HX_LANES; ++p) hx_store(&x[p * HX_LANES], pack[p]);
+  return ((x[0] + x[4]) + (x[2] + x[6])) + ((x[1] + x[5]) + (x[3] + x[7]));
+}
 
 /* Returns the sum over the legs, in every lane. The order of additions does not depend on the
  * width: ((x0 + x4) + x2) + ((x1 + x5) + x3). */

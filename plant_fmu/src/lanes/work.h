@@ -1,4 +1,4 @@
-/* work.h - intermediate results of an evaluation: joints, feet and torso of all packs, rates, and
+/* work.h - intermediate results of an evaluation: joints, contacts and torso, rates, and
  * a stage's derivatives */
 #ifndef HX_WORK_H
 #define HX_WORK_H
@@ -40,16 +40,17 @@ typedef struct {
 
 typedef struct {
   hxJointWork joint[HX_JOINTS];
-  hxFootWork foot;
-  hxVec3 response;                     /* N  stage's addition to the foot's force */
-  hxVec3 foot_shift, foot_speed_shift; /* m, m/s  of the contact point (eq. 20), without its a */
-  hxVec3 bristle_force;                /* N  bristles' part of response (eq. 21) */
+  hxContactWork contact[HX_TIBIA_ROWS];
 } hxLegWork;
+
+enum { HX_TORSO_PACKS = HX_SLOTS / HX_LANES }; /* packs that hold all contacts of the torso */
 
 typedef struct {
   hxBody torso;
   hxSym3 torso_J;
   hxMotion6 torso_acceleration; /* a - g */
+  hxContactWork torso_contact[HX_TORSO_PACKS];
+  hxForce6 torso_p[HX_TORSO_PACKS]; /* less forces of the ground on the torso, as hxJointWork.p */
   hxLegWork pack[HX_PACKS];
 } hxWork;
 
@@ -66,10 +67,11 @@ typedef union {
   };
 } hxRate;
 
-/* Returns whether the friction law is the bristle law. */
-static inline int has_bristles(const hxModel *model) {
-  return model->friction_law == HX_FRICTION_BRISTLE;
-}
+/* Slopes of a row of contacts for all stages of a step. */
+typedef struct {
+  hxReal stiffness, viscosity, drag;
+  hxReal bristle, yield; /* N/m, 1/s  bristle stiffness/(1 + z yield), release rate */
+} hxContactSlope;
 
 /* Data of a stage of a linearly implicit method (eq. 19). The derivatives of contact and servo
  * forces are the first stage's; the other stages reuse them. */
@@ -79,9 +81,9 @@ typedef struct {
   const hxRate *change; /* sum of h g_ij k_j over earlier stages; NULL: the first stage */
   struct {
     hxReal motor_stiffness[HX_JOINTS], motor_damping[HX_JOINTS], gear_drag[HX_JOINTS];
-    hxReal stiffness, viscosity, drag;
-    hxReal bristle, yield; /* N/m, 1/s  bristle stiffness/(1 + z yield), release rate */
+    hxContactSlope contact[HX_TIBIA_ROWS];
   } slope[HX_PACKS];
+  hxContactSlope torso_slope[HX_TORSO_PACKS];
 } hxImplicit;
 
 #endif
