@@ -172,9 +172,11 @@ class Terrain:
     """
 
     kind: Annotated[str, Choice(TERRAINS)]
-    height: Annotated[float, Number("m", default=0.0)]
-    incline: Annotated[float, Number("rad", above=-math.pi / 2, below=math.pi / 2, default=0.0)]
-    heading: Annotated[float, Number("rad", default=0.0)]
+    height: Annotated[float, Number("m", default=0.0)] = 0.0
+    incline: Annotated[float, Number("rad", above=-math.pi / 2, below=math.pi / 2, default=0.0)] = (
+        0.0
+    )
+    heading: Annotated[float, Number("rad", default=0.0)] = 0.0
     surface: Surface | None = None  # of the kind grid; other kinds do not use it
 
     @property

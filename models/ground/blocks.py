@@ -1,10 +1,11 @@
 """Computes the faces of a surface of blocks that a sphere may touch.
 
 The surface is the union of columns with flat tops. A sphere whose centre lies in a cell may touch
-two faces at once: the top T of that cell, and W, the nearest of the higher columns beside the cell:
-its wall while the centre is lower than its top, its edge or corner above that. A neighbour that is
-not higher is hidden, so that there are no edges inside a flat area. A diagonal neighbour counts only
-where its nearest point is above both columns beside it, because otherwise one of them hides it.
+two faces at once: the top of that cell, and the nearest of the higher columns beside the cell. The
+latter is touched at its wall while the centre is lower than its top, and at its edge or corner
+above that. A neighbour that is not higher is hidden, so that there are no edges inside a flat area.
+A diagonal neighbour counts only where its nearest point is above both columns beside it; else one
+of them hides it.
 """
 
 from __future__ import annotations

@@ -14,8 +14,9 @@ import numpy as np
 from hexapod_cosim.models.ground.surface import Array, Surface
 
 ITERATIONS = 100
-HALVINGS = 60
-CONVERGED = 4.0 * np.finfo(float).eps
+HALVINGS = 40
+CONVERGED = 1e-14  # m    of a step
+SHORT = 1e-6  # m    steps that are not tried: the change of the distance is lost in rounding
 
 # powers of t (1, t, t^2, t^3) in columns; weights of the nodes -1, 0, 1, 2 in rows
 CATMULL_ROM = 0.5 * np.array(
@@ -33,7 +34,7 @@ def _place(coordinate: float, count: int) -> tuple[int, float, float]:
     coordinate is on the map.
     """
     inside = min(max(coordinate, 0.0), float(count - 1))
-    cell = min(int(math.floor(inside)), count - 2)
+    cell = min(math.floor(inside), count - 2)
     return cell, inside - cell, 1.0 if 0.0 <= coordinate <= count - 1 else 0.0
 
 
@@ -91,19 +92,22 @@ def nearest_point(surface: Surface, point: Array) -> tuple[Array, Array]:
         if np.all(np.linalg.eigvalsh(hessian + above * curvature) > 0.0):
             hessian = hessian + above * curvature
         step = -np.linalg.solve(hessian, gradient)
-        if np.max(np.abs(step)) <= CONVERGED * (1.0 + np.max(np.abs(place))):
-            break
         square = float((place - point[:2]) @ (place - point[:2]) + above * above)
         for _ in range(HALVINGS):
             trial = height_and_slopes(surface, *(place + step))
             off = place + step - point[:2]
-            if float(off @ off) + (trial[0] - point[2]) ** 2 <= square:
+            if (
+                np.max(np.abs(step)) < SHORT
+                or float(off @ off) + (trial[0] - point[2]) ** 2 <= square
+            ):
                 break
             step = 0.5 * step
         else:
             break
         place = place + step
         height, slope, curvature = trial
+        if np.max(np.abs(step)) <= CONVERGED:
+            break
     normal = np.array([-slope[0], -slope[1], 1.0]) / math.sqrt(1.0 + float(slope @ slope))
     return np.array([*place, height]), normal
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -58,8 +58,16 @@ def read_keys(table: Any, where: str) -> dict[str, Any]:
         if key != "patch"
     }
     if "patch" in given:
-        values["patch"] = read_patches(given["patch"], f"{where}.patch")
+        values["patch"] = patch_lists(read_patches(given["patch"], f"{where}.patch"))
     return values
+
+
+def patch_lists(patches: Iterable[Mapping[str, Any]]) -> list[dict[str, Any]]:
+    """Returns patches as files give them, with lists instead of tuples."""
+    return [
+        {key: list(value) if isinstance(value, tuple) else value for key, value in one.items()}
+        for one in patches
+    ]
 
 
 def check_kind(kind: Any, where: str) -> None:
@@ -145,8 +153,5 @@ def terrain_table(terrain: Terrain) -> dict[str, Any]:
         )
     recipe = dict(terrain.surface.recipe)
     if "patch" in recipe:
-        recipe["patch"] = [
-            {key: list(value) if isinstance(value, tuple) else value for key, value in one.items()}
-            for one in recipe["patch"]
-        ]
+        recipe["patch"] = patch_lists(recipe["patch"])
     return {**recipe, **placed}
