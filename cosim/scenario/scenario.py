@@ -133,7 +133,7 @@ def with_overrides(table: Mapping[str, Any], overrides: Iterable[str]) -> dict[s
             raise ScenarioError(
                 "not a setting", got=text, expected="NAME=VALUE", fix=fix, where="--set"
             )
-        values[name] = _parse(value)
+        values[name] = parse_value(value)
     return with_values(table, values)
 
 
@@ -148,7 +148,7 @@ def with_values(table: Mapping[str, Any], values: Mapping[str, Any]) -> dict[str
     return changed
 
 
-def _parse(value: str) -> Any:
+def parse_value(value: str) -> Any:
     """Returns the value as TOML reads it; other text is a string, so names need no quotes."""
     try:
         return tomllib.loads(f"value = {value}")["value"]
@@ -271,14 +271,14 @@ def _record(record: type[Any], table: Any, where: str) -> Any:
 def _read_setting(name: str, table: Any, where: str) -> dict[str, Any]:
     """Reads a section of settings that robot files have as well."""
     if name == "terrain":
-        return _read_terrain(table, where)
+        return read_terrain_keys(table, where)
     record = SETTINGS[name]
     keys = [key for key in specs(record) if key not in UNUSED.get(name, ())]
     refuse_unknown_keys(expect_table(table, where), keys, where)
     return _read(record, table, where)
 
 
-def _read_terrain(table: Any, where: str) -> dict[str, Any]:
+def read_terrain_keys(table: Any, where: str) -> dict[str, Any]:
     """Reads [terrain]: the keys of a plane or of a surface, and patches."""
     given, keys = dict(expect_table(table, where)), terrain_specs()
     for key, value in given.items():

@@ -32,6 +32,7 @@ from hexapod_cosim.models.ground.parameters import (
 )
 from hexapod_cosim.models.ground.patches import check_soil, read_patches, with_patches, with_soil
 from hexapod_cosim.models.ground.surface import Surface
+from hexapod_cosim.models.schema import Number
 
 MOST_NODES = 1 << 24  # of a generated surface
 KEPT = 32  # surfaces in the cache
@@ -186,6 +187,8 @@ CATALOGUE: dict[str, Entry] = {
                 0.0, "steeper maps become blocks; 0: always smooth", least=0.0, most=1e3
             ),
             "platform_size": replace(PLATFORM, default=0.0),
+            "x": Parameter(spec=Number("m"), default=0.0, about="middle of the map"),
+            "y": Parameter(spec=Number("m"), default=0.0, about="middle of the map"),
         },
     ),
 }  # fmt: skip

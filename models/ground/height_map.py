@@ -1,7 +1,7 @@
 """Reads height maps from files: 16-bit PNG, NumPy arrays and ESRI ASCII grids.
 
 The first row of a picture and of an ASCII grid is the northern one, at the largest y; row 0 of an
-array is at the smallest y, as in `Surface`. The middle of the map comes to the world's origin.
+array is at the smallest y, as in `Surface`. The middle of the map comes to (x, y).
 """
 
 from __future__ import annotations
@@ -26,8 +26,8 @@ def heightfield(values: SimpleNamespace) -> Surface:
     """Returns the surface of a height map's file.
 
     values: file, horizontal_scale [m] (0: that of the file), vertical_scale [m per unit] (0: that
-    of the file), slope_threshold (0: always smooth), platform_size [m]. Where the map is somewhere
-    steeper than the threshold, its values become blocks. Raises RobotError.
+    of the file), slope_threshold (0: always smooth), platform_size [m], x, y [m]. Where the map is
+    somewhere steeper than the threshold, its values become blocks. Raises RobotError.
     """
     path = Path(values.file)
     reader = _READERS.get(path.suffix.lower())
@@ -90,8 +90,8 @@ def _surface(path: Path, height: Array, cell: float, values: SimpleNamespace) ->
     blocks = 0.0 < values.slope_threshold < steepest
     rows, columns = height.shape
     shift = 0.0 if not blocks else 0.5
-    x = cell * (np.arange(columns) - 0.5 * (columns - 1))
-    y = cell * (np.arange(rows) - 0.5 * (rows - 1))
+    x = values.x + cell * (np.arange(columns) - 0.5 * (columns - 1))
+    y = values.y + cell * (np.arange(rows) - 0.5 * (rows - 1))
     grid = np.meshgrid(x, y)
     height = _flattened(height, grid[0], grid[1], cell, values.platform_size)
     return Surface(
