@@ -65,7 +65,7 @@ def _add_field(
     field = ET.SubElement(asset, "hfield", name="ground", nrow=str(surface.rows))
     field.set("ncol", str(surface.columns))
     field.set("size", numbers((0.5 * (right - left), 0.5 * (high - low), span, BELOW)))
-    # MuJoCo reads rows of text from the largest y on
+    # the first row of the attribute is the one at the largest y
     shares = (surface.height[::-1] - lowest) / span
     field.set("elevation", " ".join(f"{share:.9g}" for share in shares.ravel()))
     place = (0.5 * (left + right), 0.5 * (low + high), height + lowest)

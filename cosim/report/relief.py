@@ -16,7 +16,7 @@ from PIL import Image
 from hexapod_cosim.controller.figure_style import DPI, SETTINGS, UNDATED
 from hexapod_cosim.cosim.common.files import atomic_path
 from hexapod_cosim.models import Robot, foot_positions
-from hexapod_cosim.models.ground.smooth import height_and_slopes
+from hexapod_cosim.models.ground.smooth import heights_at
 from hexapod_cosim.models.ground.surface import Array, Surface
 
 WIDTH = 5.0  # in
@@ -66,7 +66,8 @@ def _draw(axes: Axes, surface: Surface) -> None:
     left, right, low, high = surface.extent
     axes.imshow(shaded, origin="lower", extent=(left, right, low, high), interpolation="nearest")
     step = next((step for step in STEPS if span / step <= CONTOURS), STEPS[-1])
-    levels = step * np.arange(np.floor(lowest / step), np.ceil(highest / step) + 1.0)
+    # half a step off, because level ground at a contour line has no line
+    levels = step * (np.arange(np.floor(lowest / step), np.ceil(highest / step) + 1.0) + 0.5)
     if surface.kind == "smooth" and highest > lowest:
         axes.contour(x, y, height, levels=levels, colors="0.15", linewidths=0.4)
     text = f"{1e3 * lowest:.3g} to {1e3 * highest:.3g} mm"
@@ -86,8 +87,7 @@ def sampled(surface: Surface) -> tuple[Array, Array, Array]:
         across = np.minimum(((x - left) / surface.cell).astype(int), surface.columns - 1)
         along = np.minimum(((y - low) / surface.cell).astype(int), surface.rows - 1)
         return x, y, surface.height[np.ix_(along, across)]
-    height = [[height_and_slopes(surface, u, v)[0] for u in x.tolist()] for v in y.tolist()]
-    return x, y, np.array(height)
+    return x, y, heights_at(surface, x, y)
 
 
 def _draw_robot(axes: Axes, robot: Robot) -> None:

@@ -75,6 +75,25 @@ def height_and_slopes(surface: Surface, x: float, y: float) -> tuple[float, Arra
     )
 
 
+def node_weights(coordinates: Array, count: int) -> Array:
+    """Returns the weights (coordinates, nodes) of a grid's nodes at grid coordinates."""
+    weights = np.zeros((len(coordinates), count + 2))  # with a ghost at each end
+    for row, coordinate in enumerate(coordinates.tolist()):
+        cell, t, _ = _place(coordinate, count)
+        weights[row, cell : cell + 4] = _weights(t)[0]
+    inner = weights[:, 1:-1]
+    inner[:, :2] += weights[:, :1] * np.array([2.0, -1.0])
+    inner[:, -2:] += weights[:, -1:] * np.array([-1.0, 2.0])
+    return inner
+
+
+def heights_at(surface: Surface, x: Array, y: Array) -> Array:
+    """Returns the heights (y, x) [m] of a smooth surface at all pairs of x and y [m]."""
+    across = node_weights((x - surface.x0) / surface.cell, surface.columns)
+    along = node_weights((y - surface.y0) / surface.cell, surface.rows)
+    return np.asarray(along @ surface.height @ across.T)
+
+
 def nearest_point(surface: Surface, point: Array) -> tuple[Array, Array]:
     """Returns the point (3,) of the surface nearest to a point (3,), and its unit normal (3,).
 

@@ -7,6 +7,7 @@ one width that repeats, the blocks are chosen so that the width is exact.
 
 from __future__ import annotations
 
+import math
 from types import SimpleNamespace
 
 import numpy as np
@@ -49,6 +50,11 @@ def _platform(x: Array, y: Array, size: float) -> Mask:
     return np.maximum(np.abs(x), np.abs(y)) <= 0.5 * size
 
 
+def _edge(platform: float, cell: float) -> float:
+    """Returns half the platform's edge [m], rounded up to whole blocks."""
+    return cell * math.ceil(0.5 * platform / cell - 1e-9)
+
+
 def _stairs_along(distance: Array, width: float, number: float) -> Array:
     """Returns the number of steps passed at a distance [m] from their begin, up to `number`."""
     return np.clip(np.floor(distance / width + 1.0), 0.0, number)
@@ -58,7 +64,7 @@ def stairs(values: SimpleNamespace) -> Surface:
     """Returns num_steps steps up along +x, which begin at the platform's edge, and a landing."""
     cell = _fitting(values.step_width, values.horizontal_scale)
     x, y = _cells(values.size, values.size, cell)
-    begin = cell * round(0.5 * values.platform_size / cell)
+    begin = _edge(values.platform_size, cell)
     passed = _stairs_along(x - begin, values.step_width, values.num_steps)
     return _surface("stairs", x, y, cell, values.step_height * passed)
 
@@ -66,7 +72,7 @@ def stairs(values: SimpleNamespace) -> Surface:
 def _pyramid(values: SimpleNamespace, name: str, sign: float) -> Surface:
     cell = _fitting(values.step_width, values.horizontal_scale)
     x, y = _cells(values.size, values.size, cell)
-    begin = cell * round(0.5 * values.platform_size / cell)
+    begin = _edge(values.platform_size, cell)
     outside = np.maximum(np.abs(x), np.abs(y)) - begin
     passed = _stairs_along(outside, values.step_width, np.inf)
     return _surface(name, x, y, cell, sign * values.step_height * passed)
@@ -85,7 +91,7 @@ def inverted_pyramid_stairs(values: SimpleNamespace) -> Surface:
 def _one_step(values: SimpleNamespace, name: str, sign: float) -> Surface:
     cell = values.horizontal_scale
     x, y = _cells(values.size, values.size, cell)
-    high = x > cell * round(0.5 * values.platform_size / cell)
+    high = x > _edge(values.platform_size, cell)
     return _surface(name, x, y, cell, np.where(high, sign * values.step_height, 0.0))
 
 
@@ -103,7 +109,7 @@ def steps(values: SimpleNamespace) -> Surface:
     """Returns kerbs across x: step_width high, step_width low, and so on."""
     cell = _fitting(values.step_width, values.horizontal_scale)
     x, y = _cells(values.size, values.size, cell)
-    begin = cell * round(0.5 * values.platform_size / cell)
+    begin = _edge(values.platform_size, cell)
     passed = np.floor((np.abs(x) - begin) / values.step_width)
     high = (passed >= 0.0) & (np.mod(passed, 2.0) == 0.0)
     return _surface("steps", x, y, cell, np.where(high, values.step_height, 0.0))
@@ -142,7 +148,7 @@ def gaps(values: SimpleNamespace) -> Surface:
     x, y = _cells(values.size, values.size, cell)
     width = round(values.gap_size / cell)
     period = width + max(round(values.gap_distance / cell), 1)
-    begin = cell * round(0.5 * values.platform_size / cell)
+    begin = _edge(values.platform_size, cell)
     block = np.floor((np.abs(x) - begin) / cell)
     open_ = (block >= 0.0) & (np.mod(block, period) < width)
     return _surface("gaps", x, y, cell, np.where(open_, -values.depth, 0.0))
@@ -195,7 +201,7 @@ def course(values: SimpleNamespace) -> Surface:
     x, y = _cells(2.0 * (5.0 + 0.5 * values.platform_size), values.size, cell)
     keep = x[0] > -0.5 * values.size
     x, y = x[:, keep], y[:, keep]
-    along = x - cell * round(0.5 * values.platform_size / cell)
+    along = x - _edge(values.platform_size, cell)
     section = np.floor(along)
     within = along - section
     stone = SimpleNamespace(
