@@ -110,7 +110,8 @@ def _flattened(height: Array, x: Array, y: Array, cell: float, platform: float) 
     if platform <= 0.0 or not inside.any():
         return height
     level = float(np.mean(height[inside]))
-    return np.asarray(level + (height - level) * off_platform(x, y, cell, platform))
+    share = off_platform(x, y, cell, platform)
+    return np.where(share < 1.0, level + (height - level) * share, height)
 
 
 def _read_png(path: Path) -> tuple[Array, float, float]:
