@@ -221,11 +221,11 @@ def _check_terrain(robot: Robot, where: str) -> None:
             fix='give Terrain(kind="grid", surface=...)',
             where=where + ".surface",
         )
-    if terrain.surface.kind == "blocks" and terrain.surface.cell < radius:
+    if terrain.surface.kind == "blocks" and terrain.surface.cell < 2.0 * radius:
         raise RobotError(
-            "blocks smaller than a foot",
+            "blocks narrower than a foot",
             got=f"{terrain.surface.cell:.4g} m",
-            expected=f"at least foot.radius = {radius:g} m",
+            expected=f"at least twice foot.radius, {2.0 * radius:g} m",
             fix="enlarge terrain.horizontal_scale",
             where=where,
         )

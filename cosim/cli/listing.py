@@ -20,7 +20,7 @@ from hexapod_cosim.models.ground.catalogue import CATALOGUE, Entry
 from hexapod_cosim.models.ground.parameters import DIFFICULTY
 from hexapod_cosim.models.ground.table import PLACED
 from hexapod_cosim.models.records import PLANES
-from hexapod_cosim.models.schema import specs
+from hexapod_cosim.models.schema import Number, specs
 
 Rows = list[dict[str, Any]]
 
@@ -69,15 +69,17 @@ def gaits() -> Rows:
 
 def terrains() -> Rows:
     """Returns the kinds of ground with the defaults of their parameters."""
-    planes: Rows = [row for row in _choices("TerrainKind") if row["name"] in PLANES]
-    keys = specs(Terrain)
+    planes = [row for row in _choices("TerrainKind") if row["name"] in PLANES]
     for row in planes:
-        row["parameters"] = ", ".join(
-            f"{key} 0 {getattr(keys[key], 'unit', '')}"
-            for key in PLACED
-            if row["name"] == "slope" or key == "height"
-        )
+        keys = PLACED if row["name"] == "slope" else PLACED[:1]
+        row["about"] += ": " + ", ".join(f"{key} 0 {_unit(key)}" for key in keys)
     return [*planes, *(_surface(name, entry) for name, entry in CATALOGUE.items())]
+
+
+def _unit(key: str) -> str:
+    """Returns the unit of a key of planes."""
+    spec = specs(Terrain)[key]
+    return spec.unit if isinstance(spec, Number) else ""
 
 
 def _surface(name: str, entry: Entry) -> dict[str, Any]:
@@ -85,7 +87,7 @@ def _surface(name: str, entry: Entry) -> dict[str, Any]:
     texts = [
         f"{key} {value_text(one, one.value(DIFFICULTY))}" for key, one in entry.parameters.items()
     ]
-    return {"name": name, "about": entry.about, "parameters": ", ".join(texts)}
+    return {"name": name, "about": f"{entry.about}: {', '.join(texts)}"}
 
 
 def laws() -> Rows:

@@ -10,7 +10,6 @@ import typer
 
 from hexapod_cosim.cosim.cli import completion
 from hexapod_cosim.cosim.cli.terminal import Json, show_files, show_json, show_table, show_text
-from hexapod_cosim.cosim.report.relief import draw_relief, write_heights
 from hexapod_cosim.cosim.scenario.scenario import parse_value, read_terrain_keys
 from hexapod_cosim.models import HexapodError, load_robot, unknown_name
 from hexapod_cosim.models.ground.catalogue import CATALOGUE
@@ -64,6 +63,9 @@ def terrain(
     json: Json = False,
 ) -> None:
     """Show a surface of the ground: its size and parameters, its picture, its height map."""
+    # Matplotlib takes a moment to import
+    from hexapod_cosim.cosim.report.relief import draw_relief, write_heights  # noqa: PLC0415
+
     surface = surface_from(name, values or [])
     written, keys = list[Path](), dict[str, float]()
     if output is not None:

@@ -15,6 +15,7 @@ import mujoco
 import numpy as np
 import pytest
 
+from hexapod_cosim.cosim.cli.terrain_command import value_text
 from hexapod_cosim.models import RobotError, load_robot, robot_from_table
 from hexapod_cosim.models.ground.catalogue import CATALOGUE, make_surface
 from hexapod_cosim.models.ground.grid_file import (
@@ -24,6 +25,7 @@ from hexapod_cosim.models.ground.grid_file import (
     surface_from_bytes,
     write_grid,
 )
+from hexapod_cosim.models.ground.parameters import DIFFICULTY, RANDOM_TILE
 from hexapod_cosim.models.ground.smooth import height_and_slopes, heights_at
 from hexapod_cosim.models.ground.surface import Surface
 from hexapod_cosim.models.ground.table import merged_terrain, terrain_table
@@ -235,7 +237,7 @@ BAD_TABLES: list[tuple[dict[str, Any], str]] = [
     ({"height": 0.0}, "one of flat, slope, plane, stairs"),
     ({"kind": "flat", "step_height": 0.1}, "step_height"),
     ({"kind": "flat", "patch": [{"x": 0, "y": 0, "size": 1, "mu": 0.1}]}, 'kind = "plane"'),
-    ({"kind": "rubble", "horizontal_scale": 0.01}, "blocks smaller than a foot"),
+    ({"kind": "rubble", "horizontal_scale": 0.01}, "blocks narrower than a foot"),
     ({"kind": "wave", "incline": 2.0}, "incline"),
 ]
 
@@ -312,3 +314,20 @@ def test_a_robot_in_mujoco_begins_on_its_ground() -> None:
         mujoco.mj_step(model, data)
     feet = [data.site(f"{leg.name}_foot").xpos[2] for leg in robot.legs]
     assert feet == pytest.approx([robot.foot.radius] * 6, abs=2e-3)
+
+
+def documented(name: str) -> str:
+    """Returns the row of a surface in docs/ground.md."""
+    entry = CATALOGUE[name]
+    kind = "either" if name == "heightfield" else make_surface(name, {}).kind
+    own = [
+        f"`{key}` {value_text(parameter, parameter.value(DIFFICULTY))}"
+        for key, parameter in entry.parameters.items()
+        if parameter != RANDOM_TILE.get(key)
+    ]
+    return f"| `{name}` | {kind} | {entry.about} | {', '.join(own)} |"
+
+
+def test_the_page_lists_the_surfaces_with_their_defaults() -> None:
+    page = (ATHENA.parents[1] / "docs" / "ground.md").read_text(encoding="utf-8")
+    assert not [name for name in CATALOGUE if documented(name) not in page.splitlines()]
