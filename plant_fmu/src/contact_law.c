@@ -4,7 +4,7 @@
 #include <string.h>
 
 #include "elementary.h"
-#include "terrain.h"
+#include "ground/surface.h"
 
 double hx_exact_restitution_chi(double e) {
   if (e >= 1.0) return 0.0;

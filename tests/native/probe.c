@@ -8,12 +8,12 @@
 
 #include "contact_law.h"
 #include "elementary.h"
+#include "ground/surface.h"
 #include "hexapod/hexapod.h"
 #include "kernel.h"
 #include "lanes/dynamics.h"
 #include "method.h"
 #include "robot.h"
-#include "terrain.h"
 
 #if defined(__GNUC__)
 #pragma GCC diagnostic ignored                                                                     \

@@ -3,7 +3,7 @@
 #ifndef HX_FOOT_H
 #define HX_FOOT_H
 
-#include "../terrain.h"
+#include "../ground/surface.h"
 #include "kinematics.h"
 
 /* Distance of a point from the ground, and the ground's normal. */

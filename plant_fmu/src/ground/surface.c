@@ -1,4 +1,4 @@
-#include "terrain.h"
+#include "surface.h"
 
 #include <math.h>
 #include <stdio.h>
