@@ -1087,7 +1087,7 @@ const size_t hx_state_count = sizeof states / sizeof states[0];
 
 _Static_assert(sizeof states / sizeof states[0] == sizeof(hxCoordinates) / sizeof(double), "each state has its row");
 
-const char hx_default_guid[] = "{b848c433-3cf2-45d1-80c3-5db2cc14f640}";
+const char hx_default_guid[] = "{20f115bb-d42b-49a3-bca9-3629a7024bde}";
 
 _Static_assert(HX_CONTACT_EXACT_RESTITUTION == 1, "ContactLaw");
 _Static_assert(HX_CONTACT_FLORES == 2, "ContactLaw");

@@ -6,10 +6,10 @@
 #include <string.h>
 
 #include "contact_law.h"
+#include "ground/surface.h"
 #include "kernel.h"
 #include "robot.h"
 #include "tangent.h"
-#include "terrain.h"
 #include "validation.h"
 
 /* A saved state: a header that identifies it, then the plant's model and state. */

@@ -217,8 +217,7 @@ static void compile_tibia_points(hxModel *model, const hxDefinition *d, int leg,
   double tip[3], shank[3];
   link_tip(&d->leg[leg].link[HX_JOINTS - 1], tip);
   for (int i = 0; i < 3; ++i) shank[i] = d->body.shank_position * tip[i];
-  set_tibia_point(model, d, leg, slot, HX_FOOT, tip);
-  set_tibia_point(model, d, leg, slot, HX_WALL, tip);
+  for (int row = HX_FOOT; hx_is_of_foot(row); ++row) set_tibia_point(model, d, leg, slot, row, tip);
   set_tibia_point(model, d, leg, slot, HX_KNEE, joint);
   set_tibia_point(model, d, leg, slot, HX_SHANK, shank);
 }
@@ -236,12 +235,13 @@ static void compile_torso_point(hxModel *model, const hxDefinition *d, int slot)
 static void compile_rows(hxModel *model, const hxDefinition *d) {
   const double *box = d->body.torso_box;
   const int knees = d->body.knee_radius > 0.0, shanks = d->body.shank_radius > 0.0;
-  model->radius[HX_FOOT] = model->radius[HX_WALL] = d->foot_radius;
+  for (int row = HX_FOOT; hx_is_of_foot(row); ++row) model->radius[row] = d->foot_radius;
   model->radius[HX_KNEE] = d->body.knee_radius;
   model->radius[HX_SHANK] = d->body.shank_radius;
   model->radius[HX_TORSO] = d->body.corner_radius;
   model->row[model->rows++] = HX_FOOT;
-  if (hx_has_cells(model)) model->row[model->rows++] = HX_WALL;
+  for (int row = HX_WALL; hx_has_cells(model) && hx_is_of_foot(row); ++row)
+    model->row[model->rows++] = row;
   model->foot_rows = model->rows;
   if (knees) model->row[model->rows++] = HX_KNEE;
   if (shanks) model->row[model->rows++] = HX_SHANK;

@@ -22,7 +22,17 @@ enum {
 /* Rows of contacts with the ground: spheres of which each slot has one. Those before the torso's
  * are on the tibia, one for each leg; the torso's row has eight points of the torso. A model lists
  * the rows that it computes. */
-enum { HX_FOOT, HX_WALL, HX_KNEE, HX_SHANK, HX_TORSO, HX_ROWS, HX_TIBIA_ROWS = HX_TORSO };
+enum {
+  HX_FOOT,   /* the ground below the foot: the only row of feet but on blocks */
+  HX_WALL,   /* a higher block beside the foot along x */
+  HX_SIDE,   /* one along y */
+  HX_CORNER, /* one across the cell's corner */
+  HX_KNEE,
+  HX_SHANK,
+  HX_TORSO,
+  HX_ROWS,
+  HX_TIBIA_ROWS = HX_TORSO
+};
 
 /* Offsets of position, quaternion, velocity and angular velocity in a body state. */
 enum { HX_R = 0, HX_P = 3, HX_V = 7, HX_W = 10 };
@@ -180,6 +190,9 @@ struct hxPlant {
   const hxTerrain *terrain; /* of later resets */
   char message[HX_MESSAGE_SIZE];
 };
+
+/* Returns whether a row's contacts are those of feet. */
+static inline int hx_is_of_foot(int row) { return row < HX_KNEE; }
 
 /* Returns how many slots of a row of contacts hold one. */
 static inline int hx_slots_of(int row) { return row == HX_TORSO ? HX_SLOTS : HX_LEGS; }

@@ -8,12 +8,12 @@
 
 #include "contact_law.h"
 #include "elementary.h"
+#include "ground/surface.h"
 #include "hexapod/hexapod.h"
 #include "kernel.h"
 #include "lanes/dynamics.h"
 #include "method.h"
 #include "robot.h"
-#include "terrain.h"
 
 #if defined(__GNUC__)
 #pragma GCC diagnostic ignored                                                                     \
@@ -294,19 +294,19 @@ HX_API void hx_probe_servo(const hxPlant *plant, double angle, double speed,
 
 /* Computes the ground at a point. out: distance, normal. */
 HX_API void hx_probe_ground(const hxPlant *plant, const double point[3], double out[4]) {
-  const hxGround ground = hx_ground(&plant->model, &plant->state.contact, HX_FOOT, 0, 1,
-                                    hx_splat_vec3(point));
+  const hxGround ground =
+      hx_ground(&plant->model, &plant->state.contact, HX_FOOT, 0, 1, hx_splat_vec3(point));
   out[0] = hx_lane(ground.distance, 0);
   put3(ground.normal, 0, out + 1);
 }
 
-/* A face of a grid at a point, kind: 0 top, 1 wall, 2 the nearer; out: distance, normal, its
+/* A face of a grid at a point, kind: an hxFaceKind; out: distance, normal, its
  * derivative by the point xx yy zz xy xz yz. */
 HX_API void hx_probe_face(const hxTerrain *terrain, int kind, const double point[3],
                           double out[10]) {
   const double none[2] = {-1.0, -1.0};
   hxFace face;
-  hx_terrain_face(terrain, (hxFaceKind)kind, none, point, &face);
+  hx_terrain_face(terrain, (hxFaceKind)kind, none, point, 1, &face);
   out[0] = face.distance;
   memcpy(out + 1, face.normal, sizeof face.normal);
   memcpy(out + 4, face.bend, sizeof face.bend);

@@ -36,8 +36,8 @@ static inline void sweep_sum(const hxModel *model, const hxRigid6 *own, hxReal r
 HX_RARE void sweep_rows(const hxModel *model, const hxImplicit *implicit, int pack,
                         const hxRigid6 *own, const hxReal *resists, hxLegWork *leg, hxInertia6 *I) {
   *I = row_inertia(model, implicit, pack, HX_FOOT, leg);
-  for (int k = 1; k < model->rows; ++k) {
-    const hxInertia6 row = row_inertia(model, implicit, pack, model->row[k], leg);
+  for (int k = 1; k < leg->rows; ++k) {
+    const hxInertia6 row = row_inertia(model, implicit, pack, leg->row[k], leg);
     *I = hx_inertia_add(I, &row);
   }
   sweep_sum(model, own, *resists, &leg->joint[HX_JOINTS - 1].sweep, I);
@@ -54,7 +54,7 @@ static inline void sweep_inertia(const hxModel *model, const hxImplicit *implici
     const double z = implicit->z;
     resists += z * servo_damping(implicit, pack, joint) +
                (z * z) * implicit->slope[pack].motor_stiffness[joint];
-    if (joint == HX_JOINTS - 1 && model->rows > 1) {
+    if (joint == HX_JOINTS - 1 && leg->rows > 1) {
       sweep_rows(model, implicit, pack, &own, &resists, leg, I);
       return;
     }
@@ -94,7 +94,7 @@ static inline void leg_multipliers(const hxModel *model, const hxImplicit *impli
   const int slot = pack * HX_LANES;
   /* at the link's centre of mass: from the ground, then from the child */
   hxForce6 handed = row_wrench(model, implicit, pack, HX_FOOT, leg);
-  if (model->rows > 1) handed = hx_force_add(handed, further_wrenches(model, implicit, pack, leg));
+  if (leg->rows > 1) handed = hx_force_add(handed, further_wrenches(model, implicit, pack, leg));
   for (int joint = HX_JOINTS - 1; joint >= 0; --joint) {
     hxJointWork *k = &leg->joint[joint];
     const hxJointKinematics *kin = &k->reaction.kin;
@@ -275,16 +275,16 @@ static inline hxLossPowers hx_loss_powers(const hxModel *model, const hxWork *wo
     contact[pack] = damping_power(&leg->contact[HX_FOOT]);
     friction[pack] = hx_friction_power(model, HX_FOOT, &leg->contact[HX_FOOT]);
     gear[pack] = hx_splat(0.0);
-    for (int k = 1; k < model->rows; ++k) {
-      contact[pack] += damping_power(&leg->contact[model->row[k]]);
-      friction[pack] += hx_friction_power(model, model->row[k], &leg->contact[model->row[k]]);
+    for (int k = 1; k < leg->rows; ++k) {
+      contact[pack] += damping_power(&leg->contact[leg->row[k]]);
+      friction[pack] += hx_friction_power(model, leg->row[k], &leg->contact[leg->row[k]]);
     }
     for (int joint = 0; joint < HX_JOINTS; ++joint)
       gear[pack] -= leg->joint[joint].servo.friction * leg->joint[joint].speed;
   }
   hxLossPowers losses = {hx_lane(hx_sum_legs(contact), 0), hx_lane(hx_sum_legs(friction), 0),
                          hx_lane(hx_sum_legs(gear), 0)};
-  if (model->torso_rows) add_torso_losses(model, work, &losses);
+  if (work->torso_rows) add_torso_losses(model, work, &losses);
   return losses;
 }
 
@@ -337,9 +337,9 @@ HX_RARE void add_further_impulses(const hxModel *model, const hxImplicit *implic
                                   const hxWork *work, double weight, hxImpulses *sum) {
   const hxReal w = hx_splat(weight);
   for (int pack = 0; pack < HX_PACKS; ++pack)
-    for (int k = 1; k < model->rows; ++k)
-      add_row_impulse(model, implicit, pack, model->row[k], &work->pack[pack], w, sum);
-  for (int pack = 0; model->torso_rows && pack < HX_TORSO_PACKS; ++pack)
+    for (int k = 1; k < work->pack[pack].rows; ++k)
+      add_row_impulse(model, implicit, pack, work->pack[pack].row[k], &work->pack[pack], w, sum);
+  for (int pack = 0; work->torso_rows && pack < HX_TORSO_PACKS; ++pack)
     sum->torso[pack] =
         hx_add_scaled(sum->torso[pack], w,
                       stage_force(model, implicit, implicit ? &implicit->torso_slope[pack] : NULL,
@@ -396,7 +396,7 @@ static void hx_dynamics_evaluate(const hxModel *model, const hxContactState *con
     leg_response(model, implicit, motion, pack, &work->pack[pack]);
     if (has_bristles(model, HX_FOOT)) bristle_response(implicit, pack, HX_FOOT, &work->pack[pack]);
   }
-  if (implicit && model->torso_rows) torso_response(model, contact, motion, implicit, work);
+  if (implicit && work->torso_rows) torso_response(model, contact, motion, implicit, work);
 
   /* sweeps: leaf to root, the torso, root to leaf. Packs alternate, so that the operations of one
    * overlap the latency of the other. */
@@ -407,7 +407,7 @@ static void hx_dynamics_evaluate(const hxModel *model, const hxContactState *con
   for (int joint = HX_JOINTS - 1; joint >= 0; --joint)
     for (int pack = 0; pack < HX_PACKS; ++pack)
       sweep_force(&work->pack[pack].joint[joint], &p[pack]);
-  if (model->torso_rows) add_torso_contacts(model, implicit, work, I, p);
+  if (work->torso_rows) add_torso_contacts(model, implicit, work, I, p);
   work->torso_acceleration = torso_acceleration(model, command, work, I, p);
   for (int pack = 0; pack < HX_PACKS; ++pack) {
     hxMotion6 a = work->torso_acceleration;

@@ -3,7 +3,7 @@
 #ifndef HX_FOOT_H
 #define HX_FOOT_H
 
-#include "../terrain.h"
+#include "../ground/surface.h"
 #include "kinematics.h"
 
 /* Distance of a point from the ground, and the ground's normal. */
@@ -64,34 +64,53 @@ static inline void put_face(const hxFace *face, const hxNumber point[3], hxNumbe
                             hxNumber normal[3]) {
   const double *n = face->normal, *m = face->bend;
   const double d[3] = {hx_slope(point[0]), hx_slope(point[1]), hx_slope(point[2])};
+  if (!HX_HAS_SLOPES) {
+    *distance = face->distance;
+    for (int i = 0; i < 3; ++i) normal[i] = n[i];
+    return;
+  }
   distance[0] = hx_with_slope(face->distance, n[0] * d[0] + n[1] * d[1] + n[2] * d[2]);
   normal[0] = hx_with_slope(n[0], m[0] * d[0] + m[3] * d[1] + m[4] * d[2]);
   normal[1] = hx_with_slope(n[1], m[3] * d[0] + m[1] * d[1] + m[5] * d[2]);
   normal[2] = hx_with_slope(n[2], m[4] * d[0] + m[5] * d[1] + m[2] * d[2]);
 }
 
+/* Computes a face of a grid at a point; feet keep the cell that is held for them. */
+static inline void query_grid(const hxModel *model, const hxContactState *state, hxFaceKind kind,
+                              int slot, const hxNumber point[3], hxFace *face) {
+  const double real[3] = {hx_re(point[0]), hx_re(point[1]), hx_re(point[2])},
+               none[2] = {-1.0, -1.0},
+               held[2] = {hx_re(state->cell[0][slot]), hx_re(state->cell[1][slot])};
+  hx_terrain_face(model->terrain, kind, kind == HX_FACE_NEAREST ? none : held, real, HX_HAS_SLOPES,
+                  face);
+}
+
 /* Returns distance and normal of a grid at a row's points, lane by lane. Without all, open contacts
  * are left far away. */
 HX_RARE hxGround hx_grid(const hxModel *model, const hxContactState *state, int row, int slot,
                          int all, const hxVec3 *point) {
-  static const hxFaceKind kind[HX_ROWS] = {HX_FACE_TOP, HX_FACE_WALL, HX_FACE_NEARER,
-                                           HX_FACE_NEARER, HX_FACE_NEARER};
+  static const hxFaceKind kind[HX_ROWS] = {HX_FACE_TOP,    HX_FACE_WALL,    HX_FACE_SIDE,
+                                           HX_FACE_CORNER, HX_FACE_NEAREST, HX_FACE_NEAREST,
+                                           HX_FACE_NEAREST};
   hxNumber at[3][HX_LANES], distance[HX_LANES], normal[3][HX_LANES];
   hx_store(at[0], point->x), hx_store(at[1], point->y), hx_store(at[2], point->z);
   for (int lane = 0; lane < HX_LANES; ++lane) {
-    const int place = slot + lane;
+    const int place = slot + lane, mirrors = row != HX_TORSO && place >= HX_LEGS && slot == 0;
     const hxNumber p[3] = {at[0][lane], at[1][lane], at[2][lane] - model->ground_point[2]};
-    const double real[3] = {hx_re(p[0]), hx_re(p[1]), hx_re(p[2])};
-    const double free_cell[2] = {-1.0, -1.0},
-                 held[2] = {hx_re(state->cell[0][place]), hx_re(state->cell[1][place])};
-    hxFace face = {.distance = hx_far, .normal = {0.0, 0.0, 1.0}};
     hxNumber n[3];
+    if (mirrors) {
+      distance[lane] = distance[0];
+      for (int i = 0; i < 3; ++i) normal[i][lane] = normal[i][0];
+      continue;
+    }
+    hxFace face = {.distance = hx_far, .normal = {0.0, 0.0, 1.0}};
     if (all || hx_re(state->closed[row][place]) != 0.0)
-      hx_terrain_face(model->terrain, kind[row], row <= HX_WALL ? held : free_cell, real, &face);
+      query_grid(model, state, kind[row], place, p, &face);
     put_face(&face, p, &distance[lane], n);
     for (int i = 0; i < 3; ++i) normal[i][lane] = n[i];
   }
-  return (hxGround){hx_load(distance), {hx_load(normal[0]), hx_load(normal[1]), hx_load(normal[2])}};
+  return (hxGround){hx_load(distance),
+                    {hx_load(normal[0]), hx_load(normal[1]), hx_load(normal[2])}};
 }
 
 /* Returns distance and normal of the ground at the points of a row of contacts. All other code is
@@ -127,7 +146,7 @@ HX_INLINE hxReal hx_friction(const hxModel *model, hxReal speed) {
  * mu)/(1 + (p/v_s)^2) (eq. 18).
  */
 HX_INLINE hxBristle hx_bristle(const hxModel *model, const hxContactState *state, int row, int slot,
-                              hxVec3 b, hxVec3 slip) {
+                               hxVec3 b, hxVec3 slip) {
   const hxReal closed = hx_load(&state->closed[row][slot]);
   const hxReal zero = hx_splat(0.0), one = hx_splat(1.0);
   const hxNumber per_length = 1.0 / model->presliding;
@@ -186,8 +205,10 @@ HX_INLINE hxNormalForce hx_normal_force(hxContactLawAt law, hxReal delta, hxReal
 
 /* Computes contact point, penetration and velocity of a row of contacts from the motion of their
  * bodies: centres of mass r, their velocities v, orientations and angular velocities. */
-HX_INLINE hxContactKinematics hx_contact_kinematics(const hxModel *model, const hxContactState *state, int row, int slot, int all,
-                                                    hxVec3 r, hxVec3 v, const hxBody *body) {
+HX_INLINE hxContactKinematics hx_contact_kinematics(const hxModel *model,
+                                                    const hxContactState *state, int row, int slot,
+                                                    int all, hxVec3 r, hxVec3 v,
+                                                    const hxBody *body) {
   const hxNumber radius = model->radius[row];
   const hxVec3 to_centre = hx_mul(body->R_WB, hx_load_vec3(model->point[row], slot));
   const hxGround ground = hx_ground(model, state, row, slot, all, hx_add3(r, to_centre));
@@ -224,13 +245,12 @@ HX_INLINE void hx_contact_force(const hxModel *model, const hxContactState *stat
   contact->slip = hx_add_scaled(kin->velocity, kin->ddelta, kin->normal);
   contact->slip_speed = hx_sqrt(hx_dot(contact->slip, contact->slip));
   if (has_bristles(model, row)) {
-    contact->bristle = hx_bristle(model, state, row, slot, hx_load_vec3(motion->bristle, slot),
-                                  contact->slip);
+    contact->bristle =
+        hx_bristle(model, state, row, slot, hx_load_vec3(motion->bristle, slot), contact->slip);
     contact->force = hx_scale(contact->normal.force, hx_sub3(kin->normal, contact->bristle.grip));
     return;
   }
-  contact->drag_per_load =
-      hx_load(&state->mu[row][slot]) * hx_friction(model, contact->slip_speed);
+  contact->drag_per_load = hx_load(&state->mu[row][slot]) * hx_friction(model, contact->slip_speed);
   contact->drag = contact->normal.force * contact->drag_per_load;
   contact->force =
       hx_add_scaled(hx_scale(contact->normal.force, kin->normal), -contact->drag, contact->slip);

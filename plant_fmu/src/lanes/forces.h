@@ -167,14 +167,26 @@ HX_INLINE void leg_contact(const hxModel *model, const hxContactState *state,
   push_body(&tibia->p, contact_point(leg, contact), contact->force);
 }
 
-HX_RARE void further_contacts(const hxModel *model, const hxContactState *state,
-                              const hxPlantMotion *motion, int slot, int all, hxLegWork *leg) {
-  for (int k = 1; k < model->rows; ++k) leg_contact(model, state, motion, model->row[k], slot, all, leg);
+/* Returns whether a row has a closed contact in a pack. */
+static inline int is_used(const hxContactState *state, int row, int slot) {
+  int used = 0;
+  for (int lane = 0; lane < HX_LANES; ++lane) used |= hx_re(state->closed[row][slot + lane]) != 0.0;
+  return used;
 }
 
-/* Computes the contact forces of a leg. */
-HX_INLINE void leg_contacts(const hxModel *model, const hxContactState *state,
-                            const hxPlantMotion *motion, int slot, int all, hxLegWork *leg) {
+HX_RARE void further_contacts(const hxModel *model, const hxContactState *state,
+                              const hxPlantMotion *motion, int slot, int all, hxLegWork *leg) {
+  for (int k = 1; k < model->rows; ++k)
+    if (all || is_used(state, model->row[k], slot)) {
+      leg->row[leg->rows++] = model->row[k];
+      leg_contact(model, state, motion, model->row[k], slot, all, leg);
+    }
+}
+
+/* Computes the contact forces of a leg; without all, only those of rows with closed contacts. */
+static inline void leg_contacts(const hxModel *model, const hxContactState *state,
+                                const hxPlantMotion *motion, int slot, int all, hxLegWork *leg) {
+  leg->rows = 1, leg->row[0] = HX_FOOT;
   leg_contact(model, state, motion, HX_FOOT, slot, all, leg);
   if (model->rows > 1) further_contacts(model, state, motion, slot, all, leg);
 }
@@ -182,6 +194,9 @@ HX_INLINE void leg_contacts(const hxModel *model, const hxContactState *state,
 /* Computes the contact forces of the torso and applies them. */
 HX_RARE void torso_contacts(const hxModel *model, const hxContactState *state,
                             const hxPlantMotion *motion, int all, hxWork *work) {
+  for (int slot = 0; slot < HX_SLOTS; slot += HX_LANES)
+    work->torso_rows |= all || is_used(state, HX_TORSO, slot);
+  if (!work->torso_rows) return;
   for (int pack = 0; pack < HX_TORSO_PACKS; ++pack) {
     hxContactWork *contact = &work->torso_contact[pack];
     const int slot = pack * HX_LANES;
@@ -220,6 +235,7 @@ static inline void hx_dynamics_forces(const hxModel *model, const hxContactState
       joint_torque(model, command, joint, pack * HX_LANES, &work->pack[pack].joint[joint]);
   for (int pack = 0; pack < HX_PACKS; ++pack)
     leg_contacts(model, contact, motion, pack * HX_LANES, all, &work->pack[pack]);
+  work->torso_rows = 0;
   if (model->torso_rows) torso_contacts(model, contact, motion, all, work);
 }
 

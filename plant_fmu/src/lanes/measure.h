@@ -115,17 +115,16 @@ static inline void hx_copy_moment(const hxModel *model, hxMoment *to, const hxMo
 }
 
 /* Copies the places of the feet, and computes how far they are outside of their cells. */
-HX_RARE void feet_on_grid(const hxModel *model, const hxContactState *state,
-                          const hxMoment *moment, hxDepths *depths) {
+HX_RARE void feet_on_grid(const hxModel *model, const hxContactState *state, const hxMoment *moment,
+                          hxDepths *depths) {
   const int cells = hx_has_cells(model);
   memcpy(depths->centre, moment->contact[HX_FOOT].centre, sizeof depths->centre);
   for (int leg = 0; leg < HX_LEGS; ++leg) {
     const double centre[3] = {depths->centre[0][leg], depths->centre[1][leg],
                               depths->centre[2][leg]},
                  cell[2] = {state->cell[0][leg], state->cell[1][leg]};
-    depths->outside[leg] = cells && cell[0] >= 0.0
-                               ? hx_terrain_outside(model->terrain, centre, cell)
-                               : -hx_far;
+    depths->outside[leg] =
+        cells && cell[0] >= 0.0 ? hx_terrain_outside(model->terrain, centre, cell) : -hx_far;
   }
 }
 
@@ -241,8 +240,8 @@ HX_INLINE void contact_works(const hxPath *path, int row, int slot, hxVec3 impul
   const hxContactMoment *from = &path->from->contact[row], *to = &path->to->contact[row];
   const hxContactLawAt law = hx_law_at(path->contact, row, slot);
   const hxVec3 slip = mean_vec3(from->slip, to->slip, slot);
-  const hxVec3 approach = hx_scale(
-      hx_splat(0.5), hx_add3(approach_of(from, slot), approach_of(to, slot)));
+  const hxVec3 approach =
+      hx_scale(hx_splat(0.5), hx_add3(approach_of(from, slot), approach_of(to, slot)));
   const hxReal taken = hx_dot(impulse, approach);
   const hxReal stored =
       stored_in_contact(law, &to->delta[slot]) - stored_in_contact(law, &from->delta[slot]);
@@ -417,8 +416,7 @@ HX_INLINE hxFootInstant foot_at(const hxPath *path, const hxFootPath *foot, doub
   const hxReal bends = path->h < shortest_bend ? hx_splat(0.0) : per_step * per_step;
   const hxCubic depth = cubic(foot->delta, foot->slope_from, foot->rise, foot->slope_to, x);
   const hxReal approach = per_step * depth.rate;
-  const hxNormalForce f =
-      hx_normal_force(foot->law, depth.value, approach);
+  const hxNormalForce f = hx_normal_force(foot->law, depth.value, approach);
   const hxVec3 slip = sliding(foot->slip_from, foot->slip_to, foot->mean_slip, x);
   return (hxFootInstant){f.force, f.stiffness * approach + f.viscosity * (bends * depth.second),
                          hx_sqrt(hx_dot(slip, slip))};
@@ -477,10 +475,7 @@ static inline double force_within(const hxPath *path, int row, int leg, double x
   const hxContactLawAt law = {hx_splat(contact->closed[row][leg]),
                               hx_splat(contact->damping[row][leg]),
                               hx_splat(contact->stiffness[row][leg])};
-  return hx_lane(
-      hx_normal_force(law, depth.value, hx_splat(1.0 / h) * depth.rate)
-          .force,
-      0);
+  return hx_lane(hx_normal_force(law, depth.value, hx_splat(1.0 / h) * depth.rate).force, 0);
 }
 
 /* Takes the samples of a leg's landing that lie within a step: forces at times t_n after
@@ -527,8 +522,8 @@ static inline void measure_cone(const hxPath *path, int row, const hxImpulses *i
     const hxVec3 normal = mean_vec3(from->normal, to->normal, slot);
     const hxReal along = hx_dot(impulse->contact[row][pack], normal);
     const hxVec3 across = hx_add_scaled(impulse->contact[row][pack], -along, normal);
-    const hxReal share =
-        hx_sqrt(hx_dot(across, across)) / hx_max(hx_load(&path->contact->mu[row][slot]) * along, hx_splat(1e-300));
+    const hxReal share = hx_sqrt(hx_dot(across, across)) /
+                         hx_max(hx_load(&path->contact->mu[row][slot]) * along, hx_splat(1e-300));
     hx_store(&place[slot], hx_cone_place(share));
     hx_store(&pressed[slot], along);
   }

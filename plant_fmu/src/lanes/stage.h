@@ -12,8 +12,7 @@ HX_INLINE hxContactSlope contact_slope(const hxModel *model, const hxContactStat
                                        const hxImplicit *implicit) {
   const hxContactKinematics *kin = &contact->kin;
   const hxReal deeper = kin->delta + implicit->ahead * hx_max(kin->ddelta, hx_splat(0.0));
-  const hxNormalForce ahead =
-      hx_normal_force(hx_law_at(state, row, slot), deeper, kin->ddelta);
+  const hxNormalForce ahead = hx_normal_force(hx_law_at(state, row, slot), deeper, kin->ddelta);
   hxContactSlope slope = {.stiffness = ahead.stiffness, .viscosity = ahead.viscosity};
   if (!has_bristles(model, row)) {
     slope.drag = ahead.force * contact->drag_per_load;
@@ -34,15 +33,15 @@ HX_INLINE void keep_contact_slope(const hxModel *model, const hxContactState *st
 
 HX_RARE void keep_further_slopes(const hxModel *model, const hxContactState *state, int pack,
                                  const hxLegWork *leg, hxImplicit *implicit) {
-  for (int k = 1; k < model->rows; ++k)
-    keep_contact_slope(model, state, pack, model->row[k], leg, implicit);
+  for (int k = 1; k < leg->rows; ++k)
+    keep_contact_slope(model, state, pack, leg->row[k], leg, implicit);
 }
 
 /* Stores the derivatives of a leg's forces for all stages of a step. */
 static inline void keep_slopes(const hxModel *model, const hxContactState *state, int pack,
                                const hxLegWork *leg, hxImplicit *implicit) {
   keep_contact_slope(model, state, pack, HX_FOOT, leg, implicit);
-  if (model->rows > 1) keep_further_slopes(model, state, pack, leg, implicit);
+  if (leg->rows > 1) keep_further_slopes(model, state, pack, leg, implicit);
   for (int joint = 0; joint < HX_JOINTS; ++joint) {
     implicit->slope[pack].motor_stiffness[joint] = leg->joint[joint].servo.stiffness;
     implicit->slope[pack].motor_damping[joint] = leg->joint[joint].servo.damping;
@@ -110,14 +109,14 @@ HX_INLINE void row_response(const hxImplicit *implicit, int pack, int row, const
 
 HX_RARE void further_responses(const hxModel *model, const hxImplicit *implicit, int pack,
                                const hxShift *tibia, hxLegWork *leg) {
-  for (int k = 1; k < model->rows; ++k) row_response(implicit, pack, model->row[k], tibia, leg);
+  for (int k = 1; k < leg->rows; ++k) row_response(implicit, pack, leg->row[k], tibia, leg);
 }
 
 /* Adds the responses of a leg's contacts to the tibia's p. */
 static inline void tibia_response(const hxModel *model, const hxImplicit *implicit, int pack,
                                   const hxShift *tibia, hxLegWork *leg) {
   row_response(implicit, pack, HX_FOOT, tibia, leg);
-  if (model->rows > 1) further_responses(model, implicit, pack, tibia, leg);
+  if (leg->rows > 1) further_responses(model, implicit, pack, tibia, leg);
 }
 
 /* Adds G_v dv + G_x dx, the response of servos and contacts to the shifts, to torques and p. */
@@ -272,8 +271,8 @@ HX_INLINE hxForce6 row_wrench(const hxModel *model, const hxImplicit *implicit, 
 HX_RARE hxForce6 further_wrenches(const hxModel *model, const hxImplicit *implicit, int pack,
                                   const hxLegWork *leg) {
   hxForce6 sum = {hx_zero3(), hx_zero3()};
-  for (int k = 1; k < model->rows; ++k)
-    sum = hx_force_add(sum, row_wrench(model, implicit, pack, model->row[k], leg));
+  for (int k = 1; k < leg->rows; ++k)
+    sum = hx_force_add(sum, row_wrench(model, implicit, pack, leg->row[k], leg));
   return sum;
 }
 

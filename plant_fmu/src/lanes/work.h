@@ -40,6 +40,7 @@ typedef struct {
 
 typedef struct {
   hxJointWork joint[HX_JOINTS];
+  int rows, row[HX_TIBIA_ROWS]; /* rows of contacts that this evaluation computes */
   hxContactWork contact[HX_TIBIA_ROWS];
 } hxLegWork;
 
@@ -49,6 +50,7 @@ typedef struct {
   hxBody torso;
   hxSym3 torso_J;
   hxMotion6 torso_acceleration; /* a - g */
+  int torso_rows;               /* 1: this evaluation computes the torso's contacts */
   hxContactWork torso_contact[HX_TORSO_PACKS];
   hxForce6 torso_p[HX_TORSO_PACKS]; /* less forces of the ground on the torso, as hxJointWork.p */
   hxLegWork pack[HX_PACKS];
