@@ -504,7 +504,7 @@ const char *const hx_log_category_names[] = {
 const hxStateRow *const hx_states = 0;
 const size_t hx_state_count = 0;
 
-const char hx_default_guid[] = "{a5d3e280-a654-4df0-92a9-d21c2b6cb4b9}";
+const char hx_default_guid[] = "{c295efdb-d348-4a48-be7a-4915c600c34f}";
 
 _Static_assert(HX_CONTROL_KINEMATIC == 1, "Control");
 _Static_assert(HX_CONTROL_COMPLIANT == 2, "Control");

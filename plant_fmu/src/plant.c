@@ -7,6 +7,7 @@
 
 #include "check.h"
 #include "contact_law.h"
+#include "hexapod/checker.h"
 #include "kernel.h"
 #include "robot.h"
 #include "tangent.h"
@@ -19,7 +20,7 @@ typedef struct {
 } hxSavedPlant;
 
 static const uint64_t magic = 0x74616c5064507868u; /* "hxPdPlat" */
-static const uint64_t saved_version = 7;
+static const uint64_t saved_version = 8;
 
 static uint64_t checksum(const hxSavedPlant *saved) {
   return hx_checksum(0, &saved->model, sizeof *saved - offsetof(hxSavedPlant, model));
@@ -45,21 +46,47 @@ hxPlant *hx_plant_create(void) {
 
 void hx_plant_destroy(hxPlant *plant) { free(plant); }
 
+static void feet_of(const hxPlant *plant, double delta[HX_SLOTS], double ddelta[HX_SLOTS]) {
+  hx_kernel()->feet(&plant->model, &plant->state.motion, delta, ddelta);
+}
+
+/* Fails if the centre of a foot lies in the ground: the contact law does not hold at such depths,
+ * and its force would throw the robot up. */
+static hxStatus check_start_depth(hxPlant *plant, char message[HX_MESSAGE_SIZE]) {
+  double delta[HX_SLOTS], ddelta[HX_SLOTS];
+  const double radius = plant->model.foot_radius;
+  feet_of(plant, delta, ddelta);
+  for (int leg = 0; leg < HX_LEGS; ++leg)
+    if (delta[leg] > radius) {
+      snprintf(message, HX_MESSAGE_SIZE,
+               "initial.position: got foot %s %.4g m deep in the ground, expected at most its "
+               "radius, %.4g m; raise initial.position[3] by %.4g m or more, or lower "
+               "terrain.height",
+               hx_leg_name(leg), delta[leg], radius, delta[leg] - radius);
+      return HX_INVALID_MODEL;
+    }
+  return HX_OK;
+}
+
 hxStatus hx_plant_reset(hxPlant *plant, const hxDefinition *definition, double t) {
   char message[HX_MESSAGE_SIZE];
   double body[HX_BODIES][HX_BODY_STATE];
   if (!isfinite(t))
     return fail(plant, HX_INVALID_ARGUMENT,
                 "start time: got a number that is not finite, expected seconds");
-  const hxStatus status = hx_definition_check(definition, message);
+  hxStatus status = hx_definition_check(definition, message);
   if (status != HX_OK) return fail(plant, status, message);
-  memset(&plant->model, 0, sizeof plant->model);
-  memset(&plant->state, 0, sizeof plant->state);
-  hx_model_compile(&plant->model, definition);
+  hxPlant fresh = *plant;
+  memset(&fresh.model, 0, sizeof fresh.model);
+  memset(&fresh.state, 0, sizeof fresh.state);
+  hx_model_compile(&fresh.model, definition);
   hx_initial_bodies(definition, body);
-  hx_motion_from_bodies(&plant->model, (const double (*)[HX_BODY_STATE])body, &plant->state.motion);
-  hx_kernel()->start(&plant->model, t, &plant->state);
-  plant->message[0] = '\0';
+  hx_motion_from_bodies(&fresh.model, (const double (*)[HX_BODY_STATE])body, &fresh.state.motion);
+  status = check_start_depth(&fresh, message);
+  if (status != HX_OK) return fail(plant, status, message);
+  hx_kernel()->start(&fresh.model, t, &fresh.state);
+  fresh.message[0] = '\0';
+  *plant = fresh;
   return HX_OK;
 }
 
@@ -221,10 +248,6 @@ void hx_plant_rates(const hxPlant *plant, const hxInput *input, hxCoordinates *r
  * that direction. Otherwise solvers that locate one foot's sign change would miss another's within
  * their rounding (docs/equations.md). */
 static const double switch_band = 1e-10;
-
-static void feet_of(const hxPlant *plant, double delta[HX_SLOTS], double ddelta[HX_SLOTS]) {
-  hx_kernel()->feet(&plant->model, &plant->state.motion, delta, ddelta);
-}
 
 void hx_plant_indicators(const hxPlant *plant, double indicator[HX_LEGS]) {
   double delta[HX_SLOTS], ddelta[HX_SLOTS];

@@ -44,6 +44,7 @@ typedef struct hxJointModel {
   double point_j[3][HX_SLOTS]; /* child's centre of mass to the joint's point, child's axes */
   double zero[4][HX_SLOTS];    /* rotation from parent's to child's axes at angle 0 */
   double frame[4][HX_SLOTS];   /* rotation from link axes of hexapod.h to child's axes */
+  double middle[HX_SLOTS], half_range[HX_SLOTS]; /* rad  between the stops */
 } hxJointModel;
 
 typedef struct hxModel {
@@ -55,10 +56,16 @@ typedef struct hxModel {
   double gravity[3];
   double alpha, beta; /* Baumgarte */
   int contact_law, friction_law, terrain_kind, servo_mode, method, projection;
+  int velocity_terms;               /* 1: the tanh law has static friction or a viscous part */
+  int spin_friction, roll_friction; /* 1: the feet resist spin, rolling */
+  int stops;                        /* 1: the joints have stops */
   double stiffness, damping_scale, impact_speed_floor; /* eq. 14 */
   double mu, slope;                                    /* eq. 15 */
   double presliding, bristle_damping;                  /* eq. 16, 17 */
   double static_rise, per_stribeck;                    /* eq. 18: mu_s - mu, 1/v_s */
+  double viscous;                                      /* s/m  eq. 31 */
+  double spin_radius, rolling_radius;                  /* m  eq. 34 */
+  double stop_stiffness, stop_damping;                 /* N m/rad, N m s/rad  eq. 35 */
   double kp, kd, torque_max, speed_max, rotor_inertia, coulomb_friction;
   double ground_point[3], ground_normal[3];
   double step, tolerance, step_max;
@@ -90,6 +97,7 @@ typedef struct hxMoment {
   double normal[3][HX_SLOTS];               /* 1      normal of the ground at the foot */
   double slip[3][HX_SLOTS];                 /* m/s    of the foot's material along the ground */
   double roll[3][HX_SLOTS];                 /* m/s    its part due to the foot's rotation */
+  double turn[3][HX_SLOTS];                 /* rad/s  of the tibia */
   double delta[HX_SLOTS], ddelta[HX_SLOTS]; /* m, m/s penetration, approach speed */
   double time;                              /* s */
   double stale;                             /* 1      1: coordinates were set since */
@@ -99,7 +107,9 @@ typedef struct hxMoment {
 typedef struct hxCompleted {
   double motor[HX_JOINTS][HX_SLOTS]; /* N m  motor torques */
   double gear[HX_JOINTS][HX_SLOTS];  /* N m  gear friction */
+  double stop[HX_JOINTS][HX_SLOTS];  /* N m  stops */
   double foot[3][HX_SLOTS];          /* N    ground on feet, world axes */
+  double moment[3][HX_SLOTS];        /* N m  spin and rolling friction on tibias, world axes */
   double known;                      /* 1    0: no step was completed yet */
 } hxCompleted;
 
@@ -121,7 +131,8 @@ typedef struct hxMeasured {
   double landing_left[HX_SLOTS];                 /* 1       samples of the landing still to take */
   double landed_at[HX_SLOTS];                    /* s       time of the last touch-down */
   double landings[HX_SLOTS];                     /* 1       touch-downs */
-  double contact_loss, friction_loss, gear_loss; /* J  their sum is the dissipated energy */
+  double contact_loss, friction_loss, gear_loss; /* J  their sum is the dissipated energy; stops
+                                                  *    count with the gears */
   double cone_time[HX_CONE_BINS]; /* s  feet under load, by share of the friction cone */
 } hxMeasured;
 

@@ -32,8 +32,8 @@ static inline void sweep_inertia(const hxModel *model, const hxImplicit *implici
   hxReal resists = hx_splat(model->rotor_inertia);
   if (implicit) {
     const double z = implicit->z;
-    resists += z * servo_damping(implicit, pack, joint) +
-               (z * z) * implicit->slope[pack].motor_stiffness[joint];
+    resists += z * joint_damping(model, implicit, pack, joint) +
+               (z * z) * joint_stiffness(model, implicit, pack, joint);
     if (joint == HX_JOINTS - 1) *I = contact_inertia(model, implicit, pack, leg);
   } else if (joint == HX_JOINTS - 1) {
     sweep->U = hx_rigid_mul(&own, sweep->S);
@@ -75,6 +75,8 @@ static inline void leg_multipliers(const hxModel *model, const hxImplicit *impli
   hxForce6 handed = {
       hx_cross(leg->foot.kin.arm, ground),
       ground}; /* at the link's centre of mass: from the ground, then from the child */
+  if (has_turning_friction(model))
+    handed.ang = hx_add3(handed.ang, stage_moment(implicit, pack, leg));
   for (int joint = HX_JOINTS - 1; joint >= 0; --joint) {
     hxJointWork *k = &leg->joint[joint];
     const hxJointKinematics *kin = &k->reaction.kin;
@@ -199,7 +201,7 @@ static inline void store_bristle_rates(const hxModel *model, const hxContactStat
   for (int i = 0; i < 3 && HX_PACKS * HX_LANES < HX_SLOTS; ++i) hx_fill_slots(rate->bristle[i]);
 }
 
-/* Powers that contact damping, friction and gears of all legs dissipate, W. */
+/* Powers that contact damping, friction, and gears with stops of all legs dissipate, W. */
 typedef struct {
   hxNumber contact, friction, gear;
 } hxLossPowers;
@@ -212,9 +214,13 @@ static inline hxLossPowers hx_loss_powers(const hxModel *model, const hxWork *wo
     const hxNormalForce *f = &leg->foot.normal;
     contact[pack] = (f->force - f->elastic) * leg->foot.kin.ddelta;
     friction[pack] = hx_friction_power(model, &leg->foot);
+    if (has_turning_friction(model))
+      friction[pack] -= hx_dot(leg->foot.moment, leg->joint[HX_JOINTS - 1].body.w);
     gear[pack] = hx_splat(0.0);
-    for (int joint = 0; joint < HX_JOINTS; ++joint)
+    for (int joint = 0; joint < HX_JOINTS; ++joint) {
       gear[pack] -= leg->joint[joint].servo.friction * leg->joint[joint].speed;
+      if (model->stops) gear[pack] += leg->joint[joint].stop.damped * leg->joint[joint].speed;
+    }
   }
   return (hxLossPowers){hx_lane(hx_sum_legs(contact), 0), hx_lane(hx_sum_legs(friction), 0),
                         hx_lane(hx_sum_legs(gear), 0)};
@@ -245,9 +251,21 @@ static inline void store_powers(const hxModel *model, const hxCommand *command,
 typedef struct {
   hxReal motor[HX_JOINTS][HX_PACKS]; /* N m s        motors on their joints */
   hxReal gear[HX_JOINTS][HX_PACKS];  /* N m s        gear friction on the joints */
+  hxReal stop[HX_JOINTS][HX_PACKS];  /* N m s        stops on the joints */
   hxVec3 foot[HX_PACKS];             /* N s          ground on feet */
+  hxVec3 moment[HX_PACKS];           /* N m s        spin and rolling friction on tibias */
   hxNumber push[6];                  /* N s, N m s   force, then torque on the torso */
 } hxImpulses;
+
+/* Returns the torque of a joint's stops that a stage's accelerations contain. */
+static inline hxReal stage_stop(const hxImplicit *implicit, int pack, int joint,
+                                const hxJointWork *k) {
+  if (!implicit) return k->stop.torque;
+  const double z = implicit->z;
+  return k->stop.torque -
+         implicit->slope[pack].stop_stiffness[joint] * (k->angle_shift + (z * z) * k->qdd) -
+         implicit->slope[pack].stop_damping[joint] * (k->speed_shift + z * k->qdd);
+}
 
 /* Adds a stage's impulses: weight times the forces that the stage's accelerations contain, with
  * their linearly implicit parts. */
@@ -272,8 +290,11 @@ static inline void hx_add_impulses(const hxModel *model, const hxCommand *comman
       }
       sum->motor[joint][pack] += w * motor;
       sum->gear[joint][pack] += w * gear;
+      if (model->stops) sum->stop[joint][pack] += w * stage_stop(implicit, pack, joint, k);
     }
     sum->foot[pack] = hx_add_scaled(sum->foot[pack], w, stage_force(model, implicit, pack, leg));
+    if (has_turning_friction(model))
+      sum->moment[pack] = hx_add_scaled(sum->moment[pack], w, stage_moment(implicit, pack, leg));
   }
   for (int i = 0; i < 3; ++i) {
     sum->push[i] += weight * command->push_force[i];
@@ -295,7 +316,7 @@ static void hx_dynamics_evaluate(const hxModel *model, const hxContactState *con
   /* the stage's response to the shifts (eq. 20, 21) */
   for (int pack = 0; implicit && pack < HX_PACKS; ++pack) {
     if (!implicit->change) keep_slopes(model, contact, pack, &work->pack[pack], implicit);
-    leg_response(implicit, motion, pack, &work->pack[pack]);
+    leg_response(model, implicit, motion, pack, &work->pack[pack]);
     if (has_bristles(model)) bristle_response(implicit, pack, &work->pack[pack]);
   }
 

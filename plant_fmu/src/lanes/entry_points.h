@@ -65,8 +65,8 @@ static void kernel_switch_contacts(const hxModel *model, const double delta[HX_S
 
 /* Computes the impulses h/2 (previous forces + present forces), and keeps the present forces as
  * the previous ones. */
-static void trapezoidal_impulses(const hxWork *work, double h, hxCompleted *completed,
-                                 hxImpulses *impulses) {
+static void trapezoidal_impulses(const hxModel *model, const hxWork *work, double h,
+                                 hxCompleted *completed, hxImpulses *impulses) {
   for (int pack = 0; pack < HX_PACKS; ++pack) {
     const hxLegWork *leg = &work->pack[pack];
     const int slot = pack * HX_LANES;
@@ -78,11 +78,21 @@ static void trapezoidal_impulses(const hxWork *work, double h, hxCompleted *comp
       impulses->gear[joint][pack] = half * (hx_load(gear) + servo->friction);
       hx_store(motor, servo->torque);
       hx_store(gear, servo->friction);
+      if (model->stops) {
+        double *stop = &completed->stop[joint][slot];
+        impulses->stop[joint][pack] = half * (hx_load(stop) + leg->joint[joint].stop.torque);
+        hx_store(stop, leg->joint[joint].stop.torque);
+      }
     }
     impulses->foot[pack] =
         hx_scale(half, hx_add3(hx_load_vec3((const double (*)[HX_SLOTS])completed->foot, slot),
                                leg->foot.force));
     hx_store_vec3(completed->foot, slot, leg->foot.force);
+    if (has_turning_friction(model)) {
+      const hxVec3 before = hx_load_vec3((const double (*)[HX_SLOTS])completed->moment, slot);
+      impulses->moment[pack] = hx_scale(half, hx_add3(before, leg->foot.moment));
+      hx_store_vec3(completed->moment, slot, leg->foot.moment);
+    }
   }
   completed->known = 1.0;
 }
@@ -107,10 +117,10 @@ static void kernel_measure(const hxModel *model, const hxCommand *command, hxSta
   end.time = state->time;
   hx_dynamics_evaluate(model, &state->contact, command, state->time, &state->motion, NULL, 1, &work,
                        &rate);
-  trapezoidal_impulses(&work, h, &state->completed, &impulses);
+  trapezoidal_impulses(model, &work, h, &state->completed, &impulses);
   if (!known)
     trapezoidal_impulses(
-        &work, h, &state->completed,
+        model, &work, h, &state->completed,
         &impulses); /* the first step has no previous forces: they equal the present ones */
   hx_reset_peaks(&state->measured);
   if (h > 0.0) {
@@ -122,8 +132,12 @@ static void kernel_measure(const hxModel *model, const hxCommand *command, hxSta
   for (int joint = 0; joint < HX_JOINTS; ++joint) {
     hx_fill_slots(state->completed.motor[joint]);
     hx_fill_slots(state->completed.gear[joint]);
+    hx_fill_slots(state->completed.stop[joint]);
   }
-  for (int i = 0; i < 3; ++i) hx_fill_slots(state->completed.foot[i]);
+  for (int i = 0; i < 3; ++i) {
+    hx_fill_slots(state->completed.foot[i]);
+    hx_fill_slots(state->completed.moment[i]);
+  }
 }
 
 static void kernel_output(const hxModel *model, const hxState *state, const hxCommand *command,

@@ -1,7 +1,9 @@
-/* foot.h - contact of a spherical foot with compliant ground: kinematics and forces (eq. 14-18) */
+/* foot.h - contact of a spherical foot with compliant ground: kinematics and forces (eq. 14, 15);
+ * friction.h holds the laws of friction */
 #ifndef HX_FOOT_H
 #define HX_FOOT_H
 
+#include "friction.h"
 #include "kinematics.h"
 
 /* Distance of a point from the ground, and the ground's normal. */
@@ -26,15 +28,6 @@ typedef struct {
   hxReal viscosity; /* N s/m  df_n/d(ddelta) */
 } hxNormalForce;
 
-/* Tangential force of a foot with bristles (eq. 16-18). */
-typedef struct {
-  hxVec3 grip;      /* 1    -f_t over f_n */
-  hxVec3 rate;      /* m/s  db/dt */
-  hxReal stiffness; /* 1/m  grip over b (secant) */
-  hxReal damping;   /* s/m  derivative of grip by db/dt */
-  hxReal yield; /* 1/s  derivative of db/dt by -b: rate at which sliding bristles are released */
-} hxBristle;
-
 typedef struct {
   hxFootKinematics kin;
   hxNormalForce normal;
@@ -42,11 +35,20 @@ typedef struct {
   hxReal slip_speed;
   hxReal drag;          /* N s/m   tangential force over slip speed */
   hxReal drag_per_load; /* s/m     drag over f_n */
-  hxBristle bristle;    /* set by the bristle law only */
+  hxBristle bristle;    /* set by laws with bristles only */
+  hxTurningFriction turning; /* set by hx_foot_moment only */
+  hxVec3 moment;             /* N m  of spin and rolling friction on the tibia */
 } hxFootWork;
 
-static const double spring_limit =
-    0.7; /* 1  of the presliding; bristles below it are springs (eq. 16) */
+/* Returns whether the friction law has bristles. */
+static inline int has_bristles(const hxModel *model) {
+  return model->friction_law == HX_FRICTION_BRISTLE || model->friction_law == HX_FRICTION_LUGRE;
+}
+
+/* Returns whether the feet resist spin or rolling. */
+static inline int has_turning_friction(const hxModel *model) {
+  return model->spin_friction || model->roll_friction;
+}
 
 /* Returns distance and normal of the ground at a point. All other code is independent of the
  * terrain. */
@@ -56,53 +58,6 @@ static inline hxGround hx_ground(const hxModel *model, hxVec3 point) {
                       {hx_splat(0.0), hx_splat(0.0), hx_splat(1.0)}};
   const hxVec3 n = hx_splat_vec3(model->ground_normal);
   return (hxGround){hx_dot(n, hx_sub3(point, hx_splat_vec3(model->ground_point))), n};
-}
-
-/* Returns g of f_t = -mu f_n g(|v_t|) v_t (eq. 15): tanh(k_t v) / v, whose limit at rest is k_t.
- * The series k_t (1 - (k_t v)^2 / 3) is exact below k_t v = 1e-5. */
-static inline hxReal hx_friction(const hxModel *model, hxReal speed) {
-  if (model->friction_law == HX_FRICTION_NONE) return hx_splat(0.0);
-  const hxReal x = model->slope * speed;
-  const hxMask slow = hx_less(x, hx_splat(1e-5));
-  return model->slope * hx_select(slow, 1.0 - x * x * (1.0 / 3.0),
-                                  hx_tanh_ratio(hx_select(slow, hx_splat(1.0), x)));
-}
-
-/* Elasto-plastic bristles (eq. 16, 17) with u = b/b_max in the unit disc: db/dt = v - Y (v.u)+
- * u/|u|.
- *
- * The friction force is the share w = u (3 - u.u)/2 + d room/|(room, d)| of mu f_n, with the
- * damping d = 3/2 tau db/dt / b_max. The spring leaves room = 1 - |u| (3 - u.u)/2 to the damping,
- * so that w stays within the disc too, and w is C1 at |u| = 1, where a foot slides.
- *
- * The friction coefficient falls with the sliding speed p of the bristles: mu(p) = mu + (mu_s -
- * mu)/(1 + (p/v_s)^2) (eq. 18).
- */
-static inline hxBristle hx_bristle(const hxModel *model, hxReal closed, hxVec3 b, hxVec3 slip) {
-  const hxReal zero = hx_splat(0.0), one = hx_splat(1.0);
-  const hxNumber per_length = 1.0 / model->presliding;
-  const hxVec3 u = hx_scale(hx_splat(per_length), b);
-  const hxReal size = hx_sqrt(hx_dot(u, u)), within = hx_min(size, one);
-  const hxReal s = hx_clip((size - spring_limit) * (1.0 / (1.0 - spring_limit)), zero, one);
-  const hxReal release_rate = s * s * (3.0 - 2.0 * s) * hx_max(hx_dot(slip, u), zero) /
-                              hx_max(size, hx_splat(spring_limit));
-  const hxVec3 rate = hx_scale(closed, hx_add_scaled(slip, -release_rate, u));
-  const hxVec3 d = hx_scale(hx_splat(1.5 * model->bristle_damping * per_length), rate);
-  const hxReal spring = (1.5 - 0.5 * within * within) / hx_max(size, one);
-  const hxReal room = 1.0 - spring * size;
-  const hxReal share =
-      room / hx_sqrt(room * room + hx_dot(d, d) +
-                     1e-30); /* 1e-30: without room and motion the share is 0, not 0/0 */
-  const hxVec3 w = hx_add_scaled(hx_scale(spring, u), share, d);
-  const hxReal sliding = hx_splat(model->per_stribeck) * release_rate * size;
-  const hxReal mu = model->mu + model->static_rise / (1.0 + sliding * sliding);
-  return (hxBristle){
-      .grip = hx_scale(mu, w),
-      .rate = rate,
-      .stiffness = (mu * per_length) * spring,
-      .damping = (1.5 * mu * model->bristle_damping * per_length) * share,
-      .yield = per_length * release_rate,
-  };
 }
 
 /* Returns f_n = K delta^(3/2) (1 + d ddelta) >= 0 of a closed contact (eq. 14), and its
@@ -145,19 +100,29 @@ static inline void hx_foot_force(const hxModel *model, const hxContactState *con
                                  hx_load(&contact->damping[slot]), kin->delta, kin->ddelta);
   foot->slip = hx_add_scaled(kin->velocity, kin->ddelta, kin->normal);
   foot->slip_speed = hx_sqrt(hx_dot(foot->slip, foot->slip));
-  if (model->friction_law == HX_FRICTION_BRISTLE) {
-    foot->bristle = hx_bristle(model, hx_load(&contact->closed[slot]), bristle, foot->slip);
+  if (has_bristles(model)) {
+    const hxReal closed = hx_load(&contact->closed[slot]);
+    foot->bristle = model->friction_law == HX_FRICTION_LUGRE
+                        ? hx_lugre(model, closed, bristle, foot->slip)
+                        : hx_bristle(model, closed, bristle, foot->slip);
     foot->force = hx_scale(foot->normal.force, hx_sub3(kin->normal, foot->bristle.grip));
     return;
   }
-  foot->drag_per_load = model->mu * hx_friction(model, foot->slip_speed);
+  foot->drag_per_load = hx_friction_drag(model, foot->slip_speed);
   foot->drag = foot->normal.force * foot->drag_per_load;
   foot->force = hx_add_scaled(hx_scale(foot->normal.force, kin->normal), -foot->drag, foot->slip);
 }
 
-/* Returns the power that friction dissipates, W. */
+/* Computes the moment of spin and rolling friction on a tibia that turns at w; the foot's normal
+ * force is known. */
+static inline void hx_foot_moment(const hxModel *model, hxVec3 w, hxFootWork *foot) {
+  foot->turning = hx_turning_friction(model, hx_splat(model->foot_radius), foot->kin.normal, w);
+  foot->moment = hx_scale(foot->normal.force, foot->turning.moment);
+}
+
+/* Returns the power that sliding friction dissipates, W. */
 static inline hxReal hx_friction_power(const hxModel *model, const hxFootWork *foot) {
-  if (model->friction_law == HX_FRICTION_BRISTLE)
+  if (has_bristles(model))
     return foot->normal.force * hx_dot(foot->bristle.grip, foot->slip);
   return foot->drag * foot->slip_speed * foot->slip_speed;
 }

@@ -128,7 +128,7 @@ static inline void leg_pass(const hxModel *model, const hxCommand *command, doub
                joint > 0 ? &leg->joint[joint - 1].body : torso, &chain, &leg->joint[joint]);
 }
 
-/* Computes the torques of motor and gear on a joint (eq. 12). */
+/* Computes the torques of motor, gear and stops on a joint (eq. 12, 35). */
 static inline void joint_torque(const hxModel *model, const hxCommand *command, int joint, int slot,
                                 hxJointWork *k) {
   k->servo = hx_servo_torque(model, k->angle, k->speed, hx_load(&command->angle[joint][slot]),
@@ -136,6 +136,10 @@ static inline void joint_torque(const hxModel *model, const hxCommand *command, 
                              hx_load(&command->torque[joint][slot]));
   k->torque = model->servo_mode == HX_SERVO_KINEMATIC ? k->servo.friction
                                                       : k->servo.torque + k->servo.friction;
+  if (model->stops) {
+    k->stop = hx_stop_torque(model, joint, slot, k->angle, k->speed);
+    k->torque += k->stop.torque;
+  }
 }
 
 static inline hxMotion6 torso_velocity(const hxPlantMotion *m) {
@@ -158,12 +162,22 @@ static inline void push_tibia(hxLegWork *leg, hxVec3 x, hxVec3 force) {
   p->ang = hx_sub3(p->ang, hx_cross(x, force));
 }
 
-/* Computes the contact force and applies it to the tibia. */
+/* Applies a moment to the tibia. */
+static inline void turn_tibia(hxLegWork *leg, hxVec3 moment) {
+  hxForce6 *p = &leg->joint[HX_JOINTS - 1].p;
+  p->ang = hx_sub3(p->ang, moment);
+}
+
+/* Computes the contact's force and moment and applies them to the tibia. */
 static inline void leg_foot(const hxModel *model, const hxContactState *contact,
                             const hxPlantMotion *motion, int slot, hxLegWork *leg) {
   leg->foot.kin = hx_foot_kinematics(model, motion, slot, &leg->joint[HX_JOINTS - 1].body);
   hx_foot_force(model, contact, slot, hx_load_vec3(motion->bristle, slot), &leg->foot);
   push_tibia(leg, contact_point(leg), leg->foot.force);
+  if (has_turning_friction(model)) {
+    hx_foot_moment(model, leg->joint[HX_JOINTS - 1].body.w, &leg->foot);
+    turn_tibia(leg, leg->foot.moment);
+  }
 }
 
 /* Computes orientation and inertia of the torso. */

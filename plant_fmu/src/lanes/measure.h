@@ -16,7 +16,6 @@
 static const double landing_sample = 1e-4; /* s  between two samples of a landing's force */
 static const double nearly_sliding = 0.9;  /* 1  of the friction cone */
 static const double shortest_bend = 1e-7;  /* s  shorter steps: differences are rounding errors */
-static const double half_turn = 3.14159265358979323846;
 
 /* Nodes of a step at which forces are evaluated, and Simpson's weights: feet use all nodes, motors
  * every second one. */
@@ -68,6 +67,7 @@ static inline void hx_moment_of(const hxModel *model, const hxPlantMotion *motio
     hx_store_vec3(moment->normal, slot, foot.normal);
     hx_store_vec3(moment->slip, slot, hx_add_scaled(foot.velocity, foot.ddelta, foot.normal));
     hx_store_vec3(moment->roll, slot, hx_cross(j.w, to_point));
+    hx_store_vec3(moment->turn, slot, j.w);
     hx_store(&moment->delta[slot], foot.delta);
     hx_store(&moment->ddelta[slot], foot.ddelta);
   }
@@ -132,6 +132,28 @@ static inline hxReal stored_in_contact(const hxModel *model, hxReal closed, cons
   return closed * (0.4 * model->stiffness) * (depth * depth) * hx_sqrt(depth);
 }
 
+/* Returns the energy that a joint's stops store, J. */
+static inline hxReal stored_in_stop(const hxModel *model, int joint, int slot, hxReal angle) {
+  const hxReal x = hx_overrun(model, joint, slot, angle);
+  return (0.5 * model->stop_stiffness) * (x * x);
+}
+
+/* Returns what the stops of a pack of legs lose in a step: their work on the joints less what they
+ * store. */
+static inline hxReal stop_loss(const hxPath *path, const hxImpulses *impulse, int pack) {
+  const int slot = pack * HX_LANES;
+  hxReal loss = hx_splat(0.0);
+  for (int joint = 0; joint < HX_JOINTS; ++joint) {
+    const hxReal speed = mean_of(&path->from->speed[joint][slot], &path->to->speed[joint][slot]);
+    const hxReal before = hx_load(&path->from->angle[joint][slot]),
+                 after = hx_load(&path->to->angle[joint][slot]);
+    const hxReal stored = stored_in_stop(path->model, joint, slot, after) -
+                          stored_in_stop(path->model, joint, slot, before);
+    loss -= impulse->stop[joint][pack] * speed + stored;
+  }
+  return loss;
+}
+
 /* Computes works and losses of a step from its impulses (eq. 27). */
 static inline void hx_step_works(const hxPath *path, const hxImpulses *impulse,
                                  hxStepWorks *works) {
@@ -155,6 +177,10 @@ static inline void hx_step_works(const hxPath *path, const hxImpulses *impulse,
                           stored_in_contact(path->model, closed, &from->delta[slot]);
     works->contact[pack] = taken - stored;
     works->friction[pack] = -hx_dot(impulse->foot[pack], slip);
+    if (has_turning_friction(path->model))
+      works->friction[pack] -=
+          hx_dot(impulse->moment[pack], mean_vec3(from->turn, to->turn, slot));
+    if (path->model->stops) works->gear[pack] += stop_loss(path, impulse, pack);
   }
 }
 
@@ -172,12 +198,6 @@ static inline hxCubic cubic(hxReal from, hxReal slope_from, hxReal rise, hxReal 
   return (hxCubic){from + x * (slope_from + x * (curve + x * bend)),
                    slope_from + x * (2.0 * curve + (3.0 * x) * bend),
                    2.0 * curve + (6.0 * x) * bend};
-}
-
-/* Returns the angle in [-pi, pi], of an angle at most one turn outside. */
-static inline hxReal within_turn(hxReal angle) {
-  const hxReal low = hx_select(hx_less(hx_splat(half_turn), angle), angle - 2.0 * half_turn, angle);
-  return hx_select(hx_less(low, hx_splat(-half_turn)), low + 2.0 * half_turn, low);
 }
 
 /* Measures one joint: positive and negative work, whose difference is the step's work, and the

@@ -45,7 +45,8 @@ static hxNumber hx_kinetic_energy(const hxModel *model, const hxPlantMotion *mot
   return hx_lane(torso + hx_sum_legs(legs), 0);
 }
 
-/* Returns the potential energy of gravity and contacts, J; a contact's is 2/5 K delta^(5/2). */
+/* Returns the potential energy of gravity, contacts and stops, J; a contact's is 2/5 K
+ * delta^(5/2), a stop's k x^2/2. */
 static hxNumber hx_potential_energy(const hxModel *model, const hxPlantMotion *motion,
                                     const hxWork *work) {
   const hxVec3 g = hx_splat_vec3(model->gravity);
@@ -54,9 +55,14 @@ static hxNumber hx_potential_energy(const hxModel *model, const hxPlantMotion *m
     const hxFootWork *foot = &work->pack[pack].foot;
     const int slot = pack * HX_LANES;
     legs[pack] = 0.4 * foot->normal.elastic * hx_max(foot->kin.delta, hx_splat(0.0));
-    for (int joint = 0; joint < HX_JOINTS; ++joint)
+    for (int joint = 0; joint < HX_JOINTS; ++joint) {
       legs[pack] -= hx_load(&model->joint[joint].mass[slot]) *
                     hx_dot(g, hx_link_vec3(motion, joint, HX_R, slot));
+      if (model->stops) {
+        const hxReal x = hx_overrun(model, joint, slot, work->pack[pack].joint[joint].angle);
+        legs[pack] += (0.5 * model->stop_stiffness) * (x * x);
+      }
+    }
   }
   return hx_lane(hx_sum_legs(legs) - model->torso_mass * hx_dot(g, hx_torso_vec3(motion, HX_R)), 0);
 }

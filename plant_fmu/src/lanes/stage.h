@@ -30,12 +30,39 @@ static inline void keep_slopes(const hxModel *model, const hxContactState *conta
     implicit->slope[pack].motor_stiffness[joint] = leg->joint[joint].servo.stiffness;
     implicit->slope[pack].motor_damping[joint] = leg->joint[joint].servo.damping;
     implicit->slope[pack].gear_drag[joint] = leg->joint[joint].servo.drag;
+    if (model->stops) {
+      implicit->slope[pack].stop_stiffness[joint] = leg->joint[joint].stop.stiffness;
+      implicit->slope[pack].stop_damping[joint] = leg->joint[joint].stop.damping;
+    }
+  }
+  if (has_turning_friction(model)) {
+    implicit->slope[pack].spin = ahead.force * foot->turning.spin;
+    implicit->slope[pack].roll = ahead.force * foot->turning.roll;
   }
 }
 
-/* Returns the damping of motor and gear together, N m s/rad. */
-static inline hxReal servo_damping(const hxImplicit *implicit, int pack, int joint) {
-  return implicit->slope[pack].motor_damping[joint] + implicit->slope[pack].gear_drag[joint];
+/* Returns the damping of motor, gear and stop together, N m s/rad. */
+static inline hxReal joint_damping(const hxModel *model, const hxImplicit *implicit, int pack,
+                                   int joint) {
+  const hxReal servo =
+      implicit->slope[pack].motor_damping[joint] + implicit->slope[pack].gear_drag[joint];
+  return model->stops ? servo + implicit->slope[pack].stop_damping[joint] : servo;
+}
+
+/* Returns the stiffness of motor and stop together, N m/rad. */
+static inline hxReal joint_stiffness(const hxModel *model, const hxImplicit *implicit, int pack,
+                                     int joint) {
+  const hxReal servo = implicit->slope[pack].motor_stiffness[joint];
+  return model->stops ? servo + implicit->slope[pack].stop_stiffness[joint] : servo;
+}
+
+/* Returns the moment by which spin and rolling friction resist an angular velocity, per unit of
+ * it: spin n n^T + roll (1 - n n^T) (eq. 34). */
+static inline hxVec3 turning_drag(const hxImplicit *implicit, int pack, const hxLegWork *leg,
+                                  hxVec3 w) {
+  const hxReal spin = implicit->slope[pack].spin, roll = implicit->slope[pack].roll;
+  const hxVec3 n = leg->foot.kin.normal;
+  return hx_add_scaled(hx_scale(roll, w), (spin - roll) * hx_dot(n, w), n);
 }
 
 /* Displacement and velocity change of a body without this stage's own acceleration: dx = s_x + z
@@ -65,9 +92,16 @@ static inline hxShift torso_shift(const hxImplicit *implicit, const hxPlantMotio
   return shift(implicit->z, torso_velocity(motion), s_x, torso_velocity(s));
 }
 
-/* Adds G_v dv + G_x dx, the response of servos and contact to the shifts, to torques and p. */
-static inline void leg_response(const hxImplicit *implicit, const hxPlantMotion *motion, int pack,
-                                hxLegWork *leg) {
+/* Adds the response of spin and rolling friction to a shift dv of the tibia to p. */
+static inline void turning_response(const hxImplicit *implicit, int pack, hxVec3 dw,
+                                    hxLegWork *leg) {
+  leg->turn_response = hx_neg(turning_drag(implicit, pack, leg, dw));
+  turn_tibia(leg, leg->turn_response);
+}
+
+/* Adds G_v dv + G_x dx, the response of joints and contact to the shifts, to torques and p. */
+static inline void leg_response(const hxModel *model, const hxImplicit *implicit,
+                                const hxPlantMotion *motion, int pack, hxLegWork *leg) {
   const hxReal k = implicit->slope[pack].stiffness, drag = implicit->slope[pack].drag,
                rest = implicit->slope[pack].viscosity - drag;
   const hxVec3 n = leg->foot.kin.normal, arm = leg->foot.kin.arm;
@@ -75,11 +109,12 @@ static inline void leg_response(const hxImplicit *implicit, const hxPlantMotion 
     for (int joint = 0; joint < HX_JOINTS; ++joint) {
       hxJointWork *work = &leg->joint[joint];
       work->angle_shift = implicit->z * work->speed, work->speed_shift = hx_splat(0.0);
-      work->torque -= implicit->slope[pack].motor_stiffness[joint] * work->angle_shift;
+      work->torque -= joint_stiffness(model, implicit, pack, joint) * work->angle_shift;
     }
     leg->foot_shift = hx_scale(hx_splat(implicit->z), leg->foot.kin.velocity),
     leg->foot_speed_shift = hx_zero3();
     leg->response = hx_scale(implicit->z * k * leg->foot.kin.ddelta, n);
+    leg->turn_response = hx_zero3();
     push_tibia(leg, contact_point(leg), leg->response);
     return;
   }
@@ -90,14 +125,15 @@ static inline void leg_response(const hxImplicit *implicit, const hxPlantMotion 
     j = link_shift(implicit, motion, joint, pack * HX_LANES);
     work->angle_shift = hx_dot(work->sweep.S.ang, hx_sub3(j.x.ang, i.x.ang)),
     work->speed_shift = hx_dot(work->sweep.S.ang, hx_sub3(j.v.ang, i.v.ang));
-    work->torque -= implicit->slope[pack].motor_stiffness[joint] * work->angle_shift +
-                    servo_damping(implicit, pack, joint) * work->speed_shift;
+    work->torque -= joint_stiffness(model, implicit, pack, joint) * work->angle_shift +
+                    joint_damping(model, implicit, pack, joint) * work->speed_shift;
   }
   const hxVec3 x = motion_at(j.x, arm), v = motion_at(j.v, arm);
   leg->foot_shift = x, leg->foot_speed_shift = v;
   const hxReal along = rest * hx_dot(n, v) + k * hx_dot(n, x);
   leg->response = hx_add_scaled(hx_scale(-along, n), -drag, v);
   push_tibia(leg, contact_point(leg), leg->response);
+  if (has_turning_friction(model)) turning_response(implicit, pack, j.v.ang, leg);
 }
 
 /* Subtracts the bristles' response to their own shift s_b + z db/dt from the foot's force (eq.
@@ -134,6 +170,20 @@ static inline hxVec3 contact_resistance(const hxContactBlock *B, hxVec3 a) {
   return hx_add_scaled(hx_scale(B->across, a), B->along * hx_dot(B->n, a), B->n);
 }
 
+/* Adds the part z turning_drag of W to the tibia's inertia, and its product with the bias
+ * acceleration to p. */
+static inline void add_turning_inertia(const hxImplicit *implicit, int pack, hxLegWork *leg,
+                                       hxInertia6 *I) {
+  const hxReal z = hx_splat(implicit->z);
+  const hxReal roll = z * implicit->slope[pack].roll,
+               more = z * implicit->slope[pack].spin - roll;
+  const hxVec3 n = leg->foot.kin.normal, a = hx_scale(more, n);
+  const hxVec3 bias = turning_drag(implicit, pack, leg, leg->joint[HX_JOINTS - 1].bias.ang);
+  I->C = hx_sym_add(I->C, (hxSym3){roll + a.x * n.x, roll + a.y * n.y, roll + a.z * n.z, a.x * n.y,
+                                   a.x * n.z, a.y * n.z});
+  turn_tibia(leg, hx_scale(-z, bias));
+}
+
 /* Returns B as a part of the tibia's inertia, and adds its product with the bias acceleration to
  * p. */
 static inline hxInertia6 contact_inertia(const hxModel *model, const hxImplicit *implicit, int pack,
@@ -143,9 +193,12 @@ static inline hxInertia6 contact_inertia(const hxModel *model, const hxImplicit 
   const hxVec3 bias =
       hx_add3(motion_at(leg->joint[HX_JOINTS - 1].bias, x), hx_splat_vec3(model->gravity));
   push_tibia(leg, x, hx_neg(contact_resistance(&B, bias)));
-  return hx_inertia_at((hxSym3){B.across + an.x * n.x, B.across + an.y * n.y, B.across + an.z * n.z,
-                                an.x * n.y, an.x * n.z, an.y * n.z},
-                       x);
+  hxInertia6 I =
+      hx_inertia_at((hxSym3){B.across + an.x * n.x, B.across + an.y * n.y, B.across + an.z * n.z,
+                             an.x * n.y, an.x * n.z, an.y * n.z},
+                    x);
+  if (has_turning_friction(model)) add_turning_inertia(implicit, pack, leg, &I);
+  return I;
 }
 
 /* Returns the acceleration of the foot's material at the contact point. */
@@ -179,6 +232,15 @@ static inline hxVec3 stage_force(const hxModel *model, const hxImplicit *implici
   const hxContactBlock B = contact_block(implicit, pack, leg);
   return hx_sub3(hx_add3(leg->foot.force, leg->response),
                  contact_resistance(&B, foot_acceleration(model, leg)));
+}
+
+/* Returns the moment of spin and rolling friction on the tibia that a stage's accelerations
+ * contain. */
+static inline hxVec3 stage_moment(const hxImplicit *implicit, int pack, const hxLegWork *leg) {
+  if (!implicit) return leg->foot.moment;
+  const hxVec3 a = leg->joint[HX_JOINTS - 1].acceleration.ang;
+  return hx_add_scaled(hx_add3(leg->foot.moment, leg->turn_response), hx_splat(-implicit->z),
+                       turning_drag(implicit, pack, leg, a));
 }
 
 #endif

@@ -22,9 +22,10 @@ typedef struct {
   hxSym3 J;            /* child's inertia, world axes, about its centre of mass */
   hxVec3 gyroscopic;   /* -w x (J w) */
   hxReal angle, speed; /* rad, rad/s */
-  hxReal torque;       /* N m  servo and gear (kinematic mode: gear and drive) */
+  hxReal torque;       /* N m  servo, gear and stop (kinematic mode: gear and drive) */
   hxReal driven;       /* rad/s2  acceleration of the drive in kinematic mode, else 0 */
   hxServo servo;
+  hxStop stop;    /* set if the model has stops */
   hxMotion6 bias; /* a_k of eq. 8 summed from the hip (kinematic: with S qdd) */
   hxForce6 p;     /* force that the bias needs, less applied forces */
   hxSweep sweep;
@@ -44,6 +45,7 @@ typedef struct {
   hxVec3 response;                     /* N  stage's addition to the foot's force */
   hxVec3 foot_shift, foot_speed_shift; /* m, m/s  of the contact point (eq. 20), without its a */
   hxVec3 bristle_force;                /* N  bristles' part of response (eq. 21) */
+  hxVec3 turn_response;                /* N m  stage's addition to the foot's moment (eq. 34) */
 } hxLegWork;
 
 typedef struct {
@@ -66,11 +68,6 @@ typedef union {
   };
 } hxRate;
 
-/* Returns whether the friction law is the bristle law. */
-static inline int has_bristles(const hxModel *model) {
-  return model->friction_law == HX_FRICTION_BRISTLE;
-}
-
 /* Data of a stage of a linearly implicit method (eq. 19). The derivatives of contact and servo
  * forces are the first stage's; the other stages reuse them. */
 typedef struct {
@@ -81,6 +78,8 @@ typedef struct {
     hxReal motor_stiffness[HX_JOINTS], motor_damping[HX_JOINTS], gear_drag[HX_JOINTS];
     hxReal stiffness, viscosity, drag;
     hxReal bristle, yield; /* N/m, 1/s  bristle stiffness/(1 + z yield), release rate */
+    hxReal spin, roll;     /* N m s  of the foot's moment; set with spin or rolling friction */
+    hxReal stop_stiffness[HX_JOINTS], stop_damping[HX_JOINTS]; /* set if the model has stops */
   } slope[HX_PACKS];
 } hxImplicit;
 
