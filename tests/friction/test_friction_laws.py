@@ -264,7 +264,7 @@ def slid(law: Law, angle: float, duration: float) -> tuple[float, float]:
         return [y[1], 9.81 * (math.sin(raised) + math.cos(raised) * friction), bristle]
 
     end = solve_ivp(
-        rate, (0.0, 1.0 + duration), [0.0, 0.0, 0.0], "Radau", rtol=1e-9, atol=1e-13, max_step=0.05
+        rate, (0.0, 1.0 + duration), [0.0, 0.0, 0.0], "Radau", rtol=1e-7, atol=1e-11, max_step=0.1
     ).y[:, -1]
     return float(end[0]), float(end[1])
 
@@ -279,10 +279,10 @@ def test_bristles_hold_below_the_static_angle_and_slide_above_it(
     """mu_s = 0.6 up to atan(0.6) = 0.5404 rad; above it g (sin a - mu cos a) with mu = 0.4, once
     friction has fallen to mu. LuGre's bristles yield already as the limit comes near.
     """
-    friction = replace(BOTH, law=law, presliding=1e-6, stribeck_speed=1e-3, bristle_damping=0.005)
+    friction = replace(BOTH, law=law, presliding=1e-5, stribeck_speed=1e-3, bristle_damping=0.005)
     tried = twin_law(friction) if where == "twin" else native_law(core, friction)
     held, speed = slid(tried, below, 1.0)
-    assert 0.0 < held < 1e-5
+    assert 0.0 < held < 1e-4
     assert abs(speed) < 1e-9
     _, before = slid(tried, above, 0.3)
     _, after = slid(tried, above, 0.6)
