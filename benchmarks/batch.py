@@ -25,7 +25,7 @@ from typing import Any
 from benchmarks.run import RESULTS, machine
 from hexapod_cosim.controller import Gains
 from hexapod_cosim.cosim.run.batch import run_batch
-from hexapod_cosim.cosim.run.run import chosen_gains
+from hexapod_cosim.cosim.run.preparation import chosen_gains
 from hexapod_cosim.cosim.run.walker import Walker
 from hexapod_cosim.cosim.run.worker_pool import processor_count
 from hexapod_cosim.cosim.scenario.records import Scenario

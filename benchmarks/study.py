@@ -34,7 +34,7 @@ from hexapod_cosim.cosim.export.export import export_fmu
 from hexapod_cosim.cosim.master.loop import COMPLETED, Progress
 from hexapod_cosim.cosim.results.metrics import METRICS
 from hexapod_cosim.cosim.results.summary import Summary
-from hexapod_cosim.cosim.run.run import chosen_gains
+from hexapod_cosim.cosim.run.preparation import chosen_gains
 from hexapod_cosim.cosim.run.walker import Walker
 from hexapod_cosim.cosim.scenario.records import Scenario
 from hexapod_cosim.cosim.scenario.scenario import load_scenario

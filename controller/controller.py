@@ -195,18 +195,18 @@ class Controller(Stateful):
             return activation, np.zeros(LEGS)
         return activation, support.lowering(feet.plane, activation)
 
-    def _place_legs(self, posture: Posture, plane: Plane, height: Array) -> tuple[Plane, Pose]:
+    def place_legs(self, posture: Posture, plane: Plane, height: Array) -> tuple[Plane, Pose]:
         """The shift of the feet as the ground rolls off them (C9) [m], and the legs.
 
         A tibia that pitches by dB rolls the sphere of its foot by -R dB along the outward direction
         of the leg. The shift s changes B itself: s = R (C + s dC/du) is solved by one Newton step.
 
-        plane, height: (6,) centres of the feet, walking frame [m].
+        plane, height: (..., 6) centres of the feet, walking frame [m].
         """
         legs = self.legs
         pose = legs.pose(*posture.see_place(plane, height))
         slope = legs.speeds(pose, pose.heading, 0.0)
-        turns = slope[:, 2] - slope[:, 1]
+        turns = slope[..., 2] - slope[..., 1]
         shift = pose.heading * (legs.rolling(pose.angle) / (1.0 - legs.radius * turns))
         return shift, legs.pose(*posture.see_place(plane + shift, height))
 
@@ -214,7 +214,7 @@ class Controller(Stateful):
         """Turns planned feet into legs and point masses."""
         activation, lowering = self._lower(feet)
         height = feet.height - lowering
-        shift, pose = self._place_legs(posture, feet.plane, height)
+        shift, pose = self.place_legs(posture, feet.plane, height)
         masses = None
         if self.compliant is not None:
             masses = self.compliant.dynamics.place(pose, feet.way, feet.turn, posture)

@@ -1,11 +1,5 @@
-/* fmi2.c - FMI 2.0 for co-simulation and model exchange: every function of the standard, in its
- * order. */
+/* fmi2.c - every function of FMI 2.0, co-simulation and model exchange, in the standard's order. */
 #include "fmi/instance.h"
-
-#include <math.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
 
 #include "fmi2Functions.h"
 
@@ -115,18 +109,12 @@ static const hxCall calls[] = {
 
 /* the instance if the call is legal now; otherwise logs and returns NULL */
 static fmi2Instance *enter(fmi2Component component, fmi2Call call) {
-  fmi2Instance *instance = component;
-  return instance && hx_call_is_legal(&instance->base, &calls[call]) ? instance : NULL;
+  return hx_call_is_legal(component, &calls[call]) ? component : NULL;
 }
 
 static fmi2Status status_of(hxStatus status) {
   if (status == HX_OK) return fmi2OK;
   return status == HX_STEP_TOO_SMALL || status == HX_NOT_FINITE ? fmi2Discard : fmi2Error;
-}
-
-static int has_arrays(fmi2Instance *instance, fmi2Call call, size_t n, const void *array,
-                      const void *other) {
-  return hx_call_has_arrays(&instance->base, &calls[call], n, array, other);
 }
 
 /* ----------------------------------------------------------------------------------------------
@@ -149,11 +137,8 @@ static void log_sink(hxInstance *base, hxLogCategory category, const char *text)
 
 fmi2Status fmi2SetDebugLogging(fmi2Component c, fmi2Boolean loggingOn, size_t nCategories,
                                const fmi2String categories[]) {
-  fmi2Instance *instance = enter(c, SET_DEBUG_LOGGING);
-  if (!instance || !has_arrays(instance, SET_DEBUG_LOGGING, nCategories, categories, categories))
-    return fmi2Error;
-  return status_of(hx_log_select(&instance->base, calls[SET_DEBUG_LOGGING].name, loggingOn,
-                                 nCategories, categories));
+  return status_of(
+      hx_call_log_select(c, &calls[SET_DEBUG_LOGGING], loggingOn, nCategories, categories));
 }
 
 /* ----------------------------------------------------------------------------------------------
@@ -167,15 +152,12 @@ fmi2Component fmi2Instantiate(fmi2String instanceName, fmi2Type fmuType, fmi2Str
                               fmi2String fmuResourceLocation,
                               const fmi2CallbackFunctions *functions, fmi2Boolean visible,
                               fmi2Boolean loggingOn) {
-  fmi2Instance *instance = calloc(1, sizeof *instance);
+  const hxInterface interface = fmuType == fmi2CoSimulation ? HX_CO_SIMULATION : HX_MODEL_EXCHANGE;
+  fmi2Instance *instance =
+      hx_instance_new(sizeof *instance, interface, instanceName, loggingOn, log_sink);
   (void)visible;
   if (!instance) return NULL;
   if (functions) instance->callbacks = *functions;
-  instance->base.sink = log_sink;
-  instance->base.logged = loggingOn ? ~0u : HX_LOG_ALWAYS;
-  if (instanceName) snprintf(instance->base.name, sizeof instance->base.name, "%s", instanceName);
-  instance->base.state.interface =
-      fmuType == fmi2CoSimulation ? HX_CO_SIMULATION : HX_MODEL_EXCHANGE;
   hxStatus status = HX_INVALID_ARGUMENT;
   if (fmuType == fmi2CoSimulation || (fmuType == fmi2ModelExchange && hx_continuous))
     status = hx_instance_open(&instance->base, fmuGUID, fmuResourceLocation);
@@ -189,12 +171,7 @@ fmi2Component fmi2Instantiate(fmi2String instanceName, fmi2Type fmuType, fmi2Str
   return NULL;
 }
 
-void fmi2FreeInstance(fmi2Component c) {
-  fmi2Instance *instance = c;
-  if (!instance) return;
-  hx_instance_close(&instance->base);
-  free(instance);
-}
+void fmi2FreeInstance(fmi2Component c) { hx_instance_free(c); }
 
 fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean toleranceDefined, fmi2Real tolerance,
                                fmi2Real startTime, fmi2Boolean stopTimeDefined, fmi2Real stopTime) {
@@ -209,30 +186,16 @@ fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean toleranceDefined, fm
 }
 
 fmi2Status fmi2EnterInitializationMode(fmi2Component c) {
-  fmi2Instance *instance = enter(c, ENTER_INITIALIZATION_MODE);
-  if (!instance) return fmi2Error;
-  instance->base.state.mode = HX_MODE_INITIALIZATION;
-  return fmi2OK;
+  return status_of(
+      hx_call_enter_mode(c, &calls[ENTER_INITIALIZATION_MODE], HX_MODE_INITIALIZATION));
 }
 
 fmi2Status fmi2ExitInitializationMode(fmi2Component c) {
-  fmi2Instance *instance = enter(c, EXIT_INITIALIZATION_MODE);
-  if (!instance || hx_instance_initialize(&instance->base) != HX_OK) return fmi2Error;
-  instance->base.state.mode =
-      instance->base.state.interface == HX_MODEL_EXCHANGE ? HX_MODE_EVENT : HX_MODE_STEP;
-  hx_log(&instance->base, HX_LOG_EVENT, "initialized at %.17g s",
-         hx_instance_time(&instance->base));
-  return fmi2OK;
+  return status_of(hx_call_exit_initialization(c, &calls[EXIT_INITIALIZATION_MODE]));
 }
 
 fmi2Status fmi2Terminate(fmi2Component c) {
-  fmi2Instance *instance = enter(c, TERMINATE);
-  if (!instance) return fmi2Error;
-  if (instance->base.state.mode != HX_MODE_TERMINATED)
-    hx_log(&instance->base, HX_LOG_EVENT, "terminated at %.17g s",
-           hx_instance_time(&instance->base));
-  instance->base.state.mode = HX_MODE_TERMINATED;
-  return fmi2OK;
+  return status_of(hx_call_terminate(c, &calls[TERMINATE]));
 }
 
 fmi2Status fmi2Reset(fmi2Component c) {
@@ -248,27 +211,14 @@ fmi2Status fmi2Reset(fmi2Component c) {
 
 static fmi2Status get_values(fmi2Component c, fmi2Call call, hxType type,
                              const fmi2ValueReference vr[], size_t nvr, void *value) {
-  fmi2Instance *instance = enter(c, call);
-  if (!instance || !has_arrays(instance, call, nvr, vr, value)) return fmi2Error;
-  return status_of(hx_instance_get(&instance->base, type, vr, nvr, value));
+  if (!hx_call_is_legal_with(c, &calls[call], nvr, vr, value)) return fmi2Error;
+  return status_of(hx_instance_get(c, type, vr, nvr, value));
 }
 
 static fmi2Status set_values(fmi2Component c, fmi2Call call, hxType type,
                              const fmi2ValueReference vr[], size_t nvr, const void *value) {
-  fmi2Instance *instance = enter(c, call);
-  if (!instance || !has_arrays(instance, call, nvr, vr, value)) return fmi2Error;
-  return hx_instance_set(&instance->base, type, vr, nvr, value) == HX_OK ? fmi2OK : fmi2Error;
-}
-
-/* accepts calls for no variables only, since the FMU has no String variables */
-static fmi2Status no_strings(fmi2Component c, fmi2Call call, size_t nvr) {
-  fmi2Instance *instance = enter(c, call);
-  if (instance && nvr == 0) return fmi2OK;
-  if (instance)
-    hx_log(&instance->base, HX_LOG_ERROR,
-           "%s: got %zu variables, expected none, as this FMU has none of type String",
-           calls[call].name, nvr);
-  return fmi2Error;
+  if (!hx_call_is_legal_with(c, &calls[call], nvr, vr, value)) return fmi2Error;
+  return hx_instance_set(c, type, vr, nvr, value) == HX_OK ? fmi2OK : fmi2Error;
 }
 
 fmi2Status fmi2GetReal(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,
@@ -289,7 +239,7 @@ fmi2Status fmi2GetBoolean(fmi2Component c, const fmi2ValueReference vr[], size_t
 fmi2Status fmi2GetString(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,
                          fmi2String value[]) {
   (void)vr, (void)value;
-  return no_strings(c, GET_STRING, nvr);
+  return status_of(hx_call_no_variables(c, &calls[GET_STRING], nvr, " of type String"));
 }
 
 fmi2Status fmi2SetReal(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,
@@ -310,54 +260,36 @@ fmi2Status fmi2SetBoolean(fmi2Component c, const fmi2ValueReference vr[], size_t
 fmi2Status fmi2SetString(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,
                          const fmi2String value[]) {
   (void)vr, (void)value;
-  return no_strings(c, SET_STRING, nvr);
+  return status_of(hx_call_no_variables(c, &calls[SET_STRING], nvr, " of type String"));
 }
 
 /* ----------------------------------------------------------------------------------------------
  * saved states */
 
 fmi2Status fmi2GetFMUstate(fmi2Component c, fmi2FMUstate *FMUstate) {
-  fmi2Instance *instance = enter(c, GET_STATE);
-  if (!instance || !has_arrays(instance, GET_STATE, 1, FMUstate, FMUstate)) return fmi2Error;
-  return status_of(hx_instance_save(&instance->base, FMUstate));
+  return status_of(hx_call_save(c, &calls[GET_STATE], FMUstate));
 }
 
 fmi2Status fmi2SetFMUstate(fmi2Component c, fmi2FMUstate FMUstate) {
-  fmi2Instance *instance = enter(c, SET_STATE);
-  if (!instance || !has_arrays(instance, SET_STATE, 1, FMUstate, FMUstate)) return fmi2Error;
-  return status_of(hx_instance_restore(&instance->base, FMUstate));
+  return status_of(hx_call_restore(c, &calls[SET_STATE], FMUstate));
 }
 
 fmi2Status fmi2FreeFMUstate(fmi2Component c, fmi2FMUstate *FMUstate) {
-  if (!enter(c, FREE_STATE)) return fmi2Error;
-  if (FMUstate) {
-    free(*FMUstate);
-    *FMUstate = NULL;
-  }
-  return fmi2OK;
+  return status_of(hx_call_free_state(c, &calls[FREE_STATE], FMUstate));
 }
 
 fmi2Status fmi2SerializedFMUstateSize(fmi2Component c, fmi2FMUstate FMUstate, size_t *size) {
-  fmi2Instance *instance = enter(c, SERIALIZED_SIZE);
-  if (!instance || !has_arrays(instance, SERIALIZED_SIZE, 1, FMUstate, size)) return fmi2Error;
-  *size = hx_instance_state_size();
-  return fmi2OK;
+  return status_of(hx_call_state_size(c, &calls[SERIALIZED_SIZE], FMUstate, size));
 }
 
 fmi2Status fmi2SerializeFMUstate(fmi2Component c, fmi2FMUstate FMUstate, fmi2Byte serializedState[],
                                  size_t size) {
-  fmi2Instance *instance = enter(c, SERIALIZE);
-  if (!instance || !has_arrays(instance, SERIALIZE, 1, FMUstate, serializedState)) return fmi2Error;
-  return status_of(hx_instance_serialize(&instance->base, calls[SERIALIZE].name, FMUstate,
-                                         serializedState, size));
+  return status_of(hx_call_serialize(c, &calls[SERIALIZE], FMUstate, serializedState, size));
 }
 
 fmi2Status fmi2DeSerializeFMUstate(fmi2Component c, const fmi2Byte serializedState[], size_t size,
                                    fmi2FMUstate *FMUstate) {
-  fmi2Instance *instance = enter(c, DESERIALIZE);
-  if (!instance || !has_arrays(instance, DESERIALIZE, 1, serializedState, FMUstate))
-    return fmi2Error;
-  return status_of(hx_instance_deserialize(&instance->base, serializedState, size, FMUstate));
+  return status_of(hx_call_deserialize(c, &calls[DESERIALIZE], serializedState, size, FMUstate));
 }
 
 /* ----------------------------------------------------------------------------------------------
@@ -385,24 +317,16 @@ fmi2Status fmi2CancelStep(fmi2Component c) {
 
 fmi2Status fmi2SetRealInputDerivatives(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,
                                        const fmi2Integer order[], const fmi2Real value[]) {
-  fmi2Instance *instance = enter(c, SET_INPUT_DERIVATIVES);
-  if (!instance || !has_arrays(instance, SET_INPUT_DERIVATIVES, nvr, vr, value) ||
-      !has_arrays(instance, SET_INPUT_DERIVATIVES, nvr, order, order))
+  if (!hx_call_is_first_order(c, &calls[SET_INPUT_DERIVATIVES], nvr, vr, order, value))
     return fmi2Error;
-  if (!hx_call_is_first_order(&instance->base, &calls[SET_INPUT_DERIVATIVES], nvr, order))
-    return fmi2Error;
-  return status_of(hx_instance_set_input_rates(&instance->base, vr, nvr, value));
+  return status_of(hx_instance_set_input_rates(c, vr, nvr, value));
 }
 
 fmi2Status fmi2GetRealOutputDerivatives(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,
                                         const fmi2Integer order[], fmi2Real value[]) {
-  fmi2Instance *instance = enter(c, GET_OUTPUT_DERIVATIVES);
-  if (!instance || !has_arrays(instance, GET_OUTPUT_DERIVATIVES, nvr, vr, value) ||
-      !has_arrays(instance, GET_OUTPUT_DERIVATIVES, nvr, order, order))
+  if (!hx_call_is_first_order(c, &calls[GET_OUTPUT_DERIVATIVES], nvr, vr, order, value))
     return fmi2Error;
-  if (!hx_call_is_first_order(&instance->base, &calls[GET_OUTPUT_DERIVATIVES], nvr, order))
-    return fmi2Error;
-  return status_of(hx_instance_get_output_rates(&instance->base, vr, nvr, value));
+  return status_of(hx_instance_get_output_rates(c, vr, nvr, value));
 }
 
 /* refuses a kind of status that has no value of the requested type */
@@ -454,29 +378,26 @@ fmi2Status fmi2GetDirectionalDerivative(fmi2Component c, const fmi2ValueReferenc
                                         size_t nUnknown, const fmi2ValueReference vKnown_ref[],
                                         size_t nKnown, const fmi2Real dvKnown[],
                                         fmi2Real dvUnknown[]) {
-  fmi2Instance *instance = enter(c, DIRECTIONAL_DERIVATIVE);
-  if (!instance || !has_arrays(instance, DIRECTIONAL_DERIVATIVE, nUnknown, vUnknown_ref, dvUnknown))
+  if (!hx_call_is_legal_with(c, &calls[DIRECTIONAL_DERIVATIVE], nUnknown, vUnknown_ref, dvUnknown))
     return fmi2Error;
-  if (!has_arrays(instance, DIRECTIONAL_DERIVATIVE, nKnown, vKnown_ref, dvKnown)) return fmi2Error;
-  return status_of(hx_instance_directional(&instance->base, vUnknown_ref, nUnknown, vKnown_ref,
-                                           nKnown, dvKnown, dvUnknown));
+  if (!hx_call_has_arrays(c, &calls[DIRECTIONAL_DERIVATIVE], nKnown, vKnown_ref, dvKnown))
+    return fmi2Error;
+  return status_of(
+      hx_instance_directional(c, vUnknown_ref, nUnknown, vKnown_ref, nKnown, dvKnown, dvUnknown));
 }
 
 /* ----------------------------------------------------------------------------------------------
  * model exchange */
 
 fmi2Status fmi2EnterEventMode(fmi2Component c) {
-  fmi2Instance *instance = enter(c, ENTER_EVENT_MODE);
-  if (!instance) return fmi2Error;
-  instance->base.state.mode = HX_MODE_EVENT;
-  return fmi2OK;
+  return status_of(hx_call_enter_mode(c, &calls[ENTER_EVENT_MODE], HX_MODE_EVENT));
 }
 
 /* Handles touch-downs and lift-offs. One iteration is enough, and there are no time events. */
 fmi2Status fmi2NewDiscreteStates(fmi2Component c, fmi2EventInfo *eventInfo) {
   fmi2Instance *instance = enter(c, NEW_DISCRETE_STATES);
   int changed;
-  if (!instance || !has_arrays(instance, NEW_DISCRETE_STATES, 1, eventInfo, eventInfo))
+  if (!instance || !hx_call_has_arrays(c, &calls[NEW_DISCRETE_STATES], 1, eventInfo, eventInfo))
     return fmi2Error;
   const hxStatus status = hx_instance_update(&instance->base, &changed);
   *eventInfo = (fmi2EventInfo){.valuesOfContinuousStatesChanged = changed};
@@ -484,10 +405,7 @@ fmi2Status fmi2NewDiscreteStates(fmi2Component c, fmi2EventInfo *eventInfo) {
 }
 
 fmi2Status fmi2EnterContinuousTimeMode(fmi2Component c) {
-  fmi2Instance *instance = enter(c, ENTER_CONTINUOUS_TIME_MODE);
-  if (!instance) return fmi2Error;
-  instance->base.state.mode = HX_MODE_CONTINUOUS;
-  return fmi2OK;
+  return status_of(hx_call_enter_mode(c, &calls[ENTER_CONTINUOUS_TIME_MODE], HX_MODE_CONTINUOUS));
 }
 
 fmi2Status fmi2CompletedIntegratorStep(fmi2Component c,
@@ -496,46 +414,37 @@ fmi2Status fmi2CompletedIntegratorStep(fmi2Component c,
                                        fmi2Boolean *terminateSimulation) {
   fmi2Instance *instance = enter(c, COMPLETED_INTEGRATOR_STEP);
   (void)noSetFMUStatePriorToCurrentPoint;
-  if (!instance ||
-      !has_arrays(instance, COMPLETED_INTEGRATOR_STEP, 1, enterEventMode, terminateSimulation))
+  if (!instance || !hx_call_has_arrays(c, &calls[COMPLETED_INTEGRATOR_STEP], 1, enterEventMode,
+                                       terminateSimulation))
     return fmi2Error;
   *enterEventMode = *terminateSimulation = fmi2False;
   return status_of(hx_instance_completed_step(&instance->base));
 }
 
 fmi2Status fmi2SetTime(fmi2Component c, fmi2Real time) {
-  fmi2Instance *instance = enter(c, SET_TIME);
-  return instance ? status_of(hx_instance_set_time(&instance->base, time)) : fmi2Error;
+  return status_of(hx_call_set_time(c, &calls[SET_TIME], time));
 }
 
 fmi2Status fmi2SetContinuousStates(fmi2Component c, const fmi2Real x[], size_t nx) {
-  fmi2Instance *instance = enter(c, SET_CONTINUOUS_STATES);
-  if (!instance || !has_arrays(instance, SET_CONTINUOUS_STATES, nx, x, x)) return fmi2Error;
-  return status_of(hx_instance_set_states(&instance->base, x, nx));
-}
-
-/* a function that reads an array of n doubles */
-typedef hxStatus Getter(hxInstance *instance, double value[], size_t n);
-
-static fmi2Status get_array(fmi2Component c, fmi2Call call, Getter *getter, fmi2Real value[],
-                            size_t n) {
-  fmi2Instance *instance = enter(c, call);
-  if (!instance || !has_arrays(instance, call, n, value, value)) return fmi2Error;
-  return status_of(getter(&instance->base, value, n));
+  return status_of(hx_call_set_states(c, &calls[SET_CONTINUOUS_STATES], x, nx));
 }
 
 fmi2Status fmi2GetDerivatives(fmi2Component c, fmi2Real derivatives[], size_t nx) {
-  return get_array(c, GET_DERIVATIVES, hx_instance_get_rates, derivatives, nx);
+  return status_of(
+      hx_call_get_row(c, &calls[GET_DERIVATIVES], hx_instance_get_rates, derivatives, nx));
 }
 
 fmi2Status fmi2GetEventIndicators(fmi2Component c, fmi2Real eventIndicators[], size_t ni) {
-  return get_array(c, GET_EVENT_INDICATORS, hx_instance_get_indicators, eventIndicators, ni);
+  return status_of(hx_call_get_row(c, &calls[GET_EVENT_INDICATORS], hx_instance_get_indicators,
+                                   eventIndicators, ni));
 }
 
 fmi2Status fmi2GetContinuousStates(fmi2Component c, fmi2Real x[], size_t nx) {
-  return get_array(c, GET_CONTINUOUS_STATES, hx_instance_get_states, x, nx);
+  return status_of(
+      hx_call_get_row(c, &calls[GET_CONTINUOUS_STATES], hx_instance_get_states, x, nx));
 }
 
 fmi2Status fmi2GetNominalsOfContinuousStates(fmi2Component c, fmi2Real x_nominal[], size_t nx) {
-  return get_array(c, GET_NOMINALS, hx_instance_get_nominals, x_nominal, nx);
+  return status_of(
+      hx_call_get_row(c, &calls[GET_NOMINALS], hx_instance_get_nominals, x_nominal, nx));
 }

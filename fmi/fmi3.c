@@ -1,11 +1,7 @@
-/* fmi3.c - FMI 3.0 for model exchange and co-simulation: every function of the standard, in its
- * order. */
+/* fmi3.c - every function of FMI 3.0, model exchange and co-simulation, in the standard's order. */
 #include "fmi/instance.h"
 
 #include <stdint.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
 
 #include "fmi3Functions.h"
 
@@ -13,7 +9,6 @@ typedef struct fmi3InstanceData {
   hxInstance base; /* first: a pointer to it is a pointer to this */
   fmi3InstanceEnvironment environment;
   fmi3LogMessageCallback log;
-  int may_return_early;
 } fmi3InstanceData;
 
 _Static_assert(sizeof(fmi3Float64) == sizeof(double) &&
@@ -116,9 +111,8 @@ static const hxCall calls[] = {
 };
 
 /* the instance if the call is legal now; otherwise logs and returns NULL */
-static fmi3InstanceData *enter(fmi3Instance c, fmi3Call call) {
-  fmi3InstanceData *instance = c;
-  return instance && hx_call_is_legal(&instance->base, &calls[call]) ? instance : NULL;
+static hxInstance *enter(fmi3Instance c, fmi3Call call) {
+  return hx_call_is_legal(c, &calls[call]) ? c : NULL;
 }
 
 static fmi3Status status_of(hxStatus status) {
@@ -126,29 +120,19 @@ static fmi3Status status_of(hxStatus status) {
   return status == HX_STEP_TOO_SMALL || status == HX_NOT_FINITE ? fmi3Discard : fmi3Error;
 }
 
-static int has_arrays(fmi3InstanceData *instance, fmi3Call call, size_t n, const void *array,
-                      const void *other) {
-  return hx_call_has_arrays(&instance->base, &calls[call], n, array, other);
-}
-
 /* Refuses a function that the FMU does not offer. It exists because importers load every function
  * of the standard. */
 static fmi3Status not_supported(fmi3Instance c, const char *name) {
-  fmi3InstanceData *instance = enter(c, UNSUPPORTED);
+  hxInstance *instance = enter(c, UNSUPPORTED);
   if (instance)
-    hx_log(&instance->base, HX_LOG_ERROR,
+    hx_log(instance, HX_LOG_ERROR,
            "%s: got a call, expected none, as the model description does not offer it", name);
   return fmi3Error;
 }
 
-/* accepts calls for no variables only: for types that no variable has, and for clocks */
+/* for types that no variable has, and for clocks */
 static fmi3Status no_variables(fmi3Instance c, fmi3Call call, size_t n) {
-  fmi3InstanceData *instance = enter(c, call);
-  if (instance && n == 0) return fmi3OK;
-  if (instance)
-    hx_log(&instance->base, HX_LOG_ERROR,
-           "%s: got %zu variables, expected none, as this FMU has none", calls[call].name, n);
-  return fmi3Error;
+  return status_of(hx_call_no_variables(c, &calls[call], n, ""));
 }
 
 static void set_flag(fmi3Boolean *place, int value) {
@@ -167,11 +151,8 @@ static void log_sink(hxInstance *base, hxLogCategory category, const char *text)
 
 fmi3Status fmi3SetDebugLogging(fmi3Instance c, fmi3Boolean loggingOn, size_t nCategories,
                                const fmi3String categories[]) {
-  fmi3InstanceData *instance = enter(c, SET_DEBUG_LOGGING);
-  if (!instance || !has_arrays(instance, SET_DEBUG_LOGGING, nCategories, categories, categories))
-    return fmi3Error;
-  return status_of(hx_log_select(&instance->base, calls[SET_DEBUG_LOGGING].name, loggingOn,
-                                 nCategories, categories));
+  return status_of(
+      hx_call_log_select(c, &calls[SET_DEBUG_LOGGING], loggingOn, nCategories, categories));
 }
 
 /* ----------------------------------------------------------------------------------------------
@@ -183,14 +164,11 @@ const char *fmi3GetVersion(void) { return fmi3Version; }
 static fmi3InstanceData *new_instance(hxInterface interface, fmi3String name, fmi3Boolean loggingOn,
                                       fmi3InstanceEnvironment environment,
                                       fmi3LogMessageCallback log) {
-  fmi3InstanceData *instance = calloc(1, sizeof *instance);
+  fmi3InstanceData *instance =
+      hx_instance_new(sizeof *instance, interface, name, loggingOn, log_sink);
   if (!instance) return NULL;
   instance->environment = environment;
   instance->log = log;
-  instance->base.sink = log_sink;
-  instance->base.logged = loggingOn ? ~0u : HX_LOG_ALWAYS;
-  instance->base.state.interface = (int)interface;
-  if (name) snprintf(instance->base.name, sizeof instance->base.name, "%s", name);
   return instance;
 }
 
@@ -236,7 +214,7 @@ fmi3Instance fmi3InstantiateCoSimulation(
       (void)intermediateUpdate;
   if (instance) {
     instance->base.uses_event_mode = eventModeUsed && hx_continuous;
-    instance->may_return_early = earlyReturnAllowed;
+    instance->base.may_return_early = earlyReturnAllowed;
   }
   return open_instance(instance, instantiationToken, resourcePath);
 }
@@ -253,85 +231,59 @@ fmi3Instance fmi3InstantiateScheduledExecution(
       "scheduled execution");
 }
 
-void fmi3FreeInstance(fmi3Instance c) {
-  fmi3InstanceData *instance = c;
-  if (!instance) return;
-  hx_instance_close(&instance->base);
-  free(instance);
-}
+void fmi3FreeInstance(fmi3Instance c) { hx_instance_free(c); }
 
 /* An invalid tolerance gives a warning only, since it is not used. */
 fmi3Status fmi3EnterInitializationMode(fmi3Instance c, fmi3Boolean toleranceDefined,
                                        fmi3Float64 tolerance, fmi3Float64 startTime,
                                        fmi3Boolean stopTimeDefined, fmi3Float64 stopTime) {
-  fmi3InstanceData *instance = enter(c, ENTER_INITIALIZATION_MODE);
+  hxInstance *instance = enter(c, ENTER_INITIALIZATION_MODE);
   const char *name = calls[ENTER_INITIALIZATION_MODE].name;
-  if (!instance || hx_instance_set_experiment(&instance->base, name, startTime, stopTimeDefined,
-                                              stopTime) != HX_OK)
+  if (!instance ||
+      hx_instance_set_experiment(instance, name, startTime, stopTimeDefined, stopTime) != HX_OK)
     return fmi3Error;
-  instance->base.state.mode = HX_MODE_INITIALIZATION;
-  return hx_instance_check_tolerance(&instance->base, name, toleranceDefined, tolerance)
-             ? fmi3OK
-             : fmi3Warning;
+  instance->state.mode = HX_MODE_INITIALIZATION;
+  return hx_instance_check_tolerance(instance, name, toleranceDefined, tolerance) ? fmi3OK
+                                                                                  : fmi3Warning;
 }
 
 fmi3Status fmi3ExitInitializationMode(fmi3Instance c) {
-  fmi3InstanceData *instance = enter(c, EXIT_INITIALIZATION_MODE);
-  if (!instance || hx_instance_initialize(&instance->base) != HX_OK) return fmi3Error;
-  const int events =
-      instance->base.uses_event_mode || instance->base.state.interface == HX_MODEL_EXCHANGE;
-  instance->base.state.mode = events ? HX_MODE_EVENT : HX_MODE_STEP;
-  hx_log(&instance->base, HX_LOG_EVENT, "initialized at %.17g s",
-         hx_instance_time(&instance->base));
-  return fmi3OK;
+  return status_of(hx_call_exit_initialization(c, &calls[EXIT_INITIALIZATION_MODE]));
 }
 
 fmi3Status fmi3EnterEventMode(fmi3Instance c) {
-  fmi3InstanceData *instance = enter(c, ENTER_EVENT_MODE);
+  hxInstance *instance = enter(c, ENTER_EVENT_MODE);
   if (!instance) return fmi3Error;
-  if (instance->base.state.mode == HX_MODE_STEP && !instance->base.uses_event_mode) {
-    hx_log(&instance->base, HX_LOG_ERROR,
+  if (instance->state.mode == HX_MODE_STEP && !instance->uses_event_mode) {
+    hx_log(instance, HX_LOG_ERROR,
            "fmi3EnterEventMode: got a call, expected none, as there are no events or eventModeUsed "
            "was false; nothing was changed");
     return fmi3Error;
   }
-  instance->base.state.mode = HX_MODE_EVENT;
+  instance->state.mode = HX_MODE_EVENT;
   return fmi3OK;
 }
 
 fmi3Status fmi3Terminate(fmi3Instance c) {
-  fmi3InstanceData *instance = enter(c, TERMINATE);
-  if (!instance) return fmi3Error;
-  if (instance->base.state.mode != HX_MODE_TERMINATED)
-    hx_log(&instance->base, HX_LOG_EVENT, "terminated at %.17g s",
-           hx_instance_time(&instance->base));
-  instance->base.state.mode = HX_MODE_TERMINATED;
-  return fmi3OK;
+  return status_of(hx_call_terminate(c, &calls[TERMINATE]));
 }
 
-fmi3Status fmi3Reset(fmi3Instance c) {
-  fmi3InstanceData *instance = enter(c, RESET);
-  if (!instance) return fmi3Error;
-  hx_instance_reset(&instance->base);
-  return fmi3OK;
-}
+fmi3Status fmi3Reset(fmi3Instance c) { return status_of(hx_call_reset(c, &calls[RESET])); }
 
 /* ----------------------------------------------------------------------------------------------
  * values */
 
 static fmi3Status get_values(fmi3Instance c, fmi3Call call, hxType type,
                              const fmi3ValueReference vr[], size_t nvr, void *value, size_t n) {
-  fmi3InstanceData *instance = enter(c, call);
-  if (!instance || !has_arrays(instance, call, nvr, vr, value)) return fmi3Error;
-  return status_of(hx_arrays_get(&instance->base, type, vr, nvr, value, n));
+  if (!hx_call_is_legal_with(c, &calls[call], nvr, vr, value)) return fmi3Error;
+  return status_of(hx_arrays_get(c, type, vr, nvr, value, n));
 }
 
 static fmi3Status set_values(fmi3Instance c, fmi3Call call, hxType type,
                              const fmi3ValueReference vr[], size_t nvr, const void *value,
                              size_t n) {
-  fmi3InstanceData *instance = enter(c, call);
-  if (!instance || !has_arrays(instance, call, nvr, vr, value)) return fmi3Error;
-  return status_of(hx_arrays_set(&instance->base, type, vr, nvr, value, n));
+  if (!hx_call_is_legal_with(c, &calls[call], nvr, vr, value)) return fmi3Error;
+  return status_of(hx_arrays_set(c, type, vr, nvr, value, n));
 }
 
 fmi3Status fmi3GetFloat64(fmi3Instance c, const fmi3ValueReference vr[], size_t nvr,
@@ -424,46 +376,29 @@ fmi3Status fmi3GetVariableDependencies(fmi3Instance c, fmi3ValueReference depend
  * saved states */
 
 fmi3Status fmi3GetFMUState(fmi3Instance c, fmi3FMUState *state) {
-  fmi3InstanceData *instance = enter(c, GET_STATE);
-  if (!instance || !has_arrays(instance, GET_STATE, 1, state, state)) return fmi3Error;
-  return status_of(hx_instance_save(&instance->base, state));
+  return status_of(hx_call_save(c, &calls[GET_STATE], state));
 }
 
 fmi3Status fmi3SetFMUState(fmi3Instance c, fmi3FMUState state) {
-  fmi3InstanceData *instance = enter(c, SET_STATE);
-  if (!instance || !has_arrays(instance, SET_STATE, 1, state, state)) return fmi3Error;
-  return status_of(hx_instance_restore(&instance->base, state));
+  return status_of(hx_call_restore(c, &calls[SET_STATE], state));
 }
 
 fmi3Status fmi3FreeFMUState(fmi3Instance c, fmi3FMUState *state) {
-  if (!enter(c, FREE_STATE)) return fmi3Error;
-  if (state) {
-    free(*state);
-    *state = NULL;
-  }
-  return fmi3OK;
+  return status_of(hx_call_free_state(c, &calls[FREE_STATE], state));
 }
 
 fmi3Status fmi3SerializedFMUStateSize(fmi3Instance c, fmi3FMUState state, size_t *size) {
-  fmi3InstanceData *instance = enter(c, SERIALIZED_SIZE);
-  if (!instance || !has_arrays(instance, SERIALIZED_SIZE, 1, state, size)) return fmi3Error;
-  *size = hx_instance_state_size();
-  return fmi3OK;
+  return status_of(hx_call_state_size(c, &calls[SERIALIZED_SIZE], state, size));
 }
 
 fmi3Status fmi3SerializeFMUState(fmi3Instance c, fmi3FMUState state, fmi3Byte bytes[],
                                  size_t size) {
-  fmi3InstanceData *instance = enter(c, SERIALIZE);
-  if (!instance || !has_arrays(instance, SERIALIZE, 1, state, bytes)) return fmi3Error;
-  return status_of(
-      hx_instance_serialize(&instance->base, calls[SERIALIZE].name, state, bytes, size));
+  return status_of(hx_call_serialize(c, &calls[SERIALIZE], state, bytes, size));
 }
 
 fmi3Status fmi3DeserializeFMUState(fmi3Instance c, const fmi3Byte bytes[], size_t size,
                                    fmi3FMUState *state) {
-  fmi3InstanceData *instance = enter(c, DESERIALIZE);
-  if (!instance || !has_arrays(instance, DESERIALIZE, 1, bytes, state)) return fmi3Error;
-  return status_of(hx_instance_deserialize(&instance->base, bytes, size, state));
+  return status_of(hx_call_deserialize(c, &calls[DESERIALIZE], bytes, size, state));
 }
 
 /* ----------------------------------------------------------------------------------------------
@@ -473,12 +408,12 @@ fmi3Status fmi3GetDirectionalDerivative(fmi3Instance c, const fmi3ValueReference
                                         size_t nUnknowns, const fmi3ValueReference knowns[],
                                         size_t nKnowns, const fmi3Float64 seed[], size_t nSeed,
                                         fmi3Float64 sensitivity[], size_t nSensitivity) {
-  fmi3InstanceData *instance = enter(c, DIRECTIONAL_DERIVATIVE);
-  if (!instance || !has_arrays(instance, DIRECTIONAL_DERIVATIVE, nUnknowns, unknowns, sensitivity))
+  if (!hx_call_is_legal_with(c, &calls[DIRECTIONAL_DERIVATIVE], nUnknowns, unknowns, sensitivity))
     return fmi3Error;
-  if (!has_arrays(instance, DIRECTIONAL_DERIVATIVE, nKnowns, knowns, seed)) return fmi3Error;
-  return status_of(hx_arrays_directional(&instance->base, unknowns, nUnknowns, knowns, nKnowns,
-                                         seed, nSeed, sensitivity, nSensitivity));
+  if (!hx_call_has_arrays(c, &calls[DIRECTIONAL_DERIVATIVE], nKnowns, knowns, seed))
+    return fmi3Error;
+  return status_of(hx_arrays_directional(c, unknowns, nUnknowns, knowns, nKnowns, seed, nSeed,
+                                         sensitivity, nSensitivity));
 }
 
 fmi3Status fmi3GetAdjointDerivative(fmi3Instance c, const fmi3ValueReference unknowns[],
@@ -556,11 +491,11 @@ fmi3Status fmi3UpdateDiscreteStates(fmi3Instance c, fmi3Boolean *discreteStatesN
                                     fmi3Boolean *nominalsOfContinuousStatesChanged,
                                     fmi3Boolean *valuesOfContinuousStatesChanged,
                                     fmi3Boolean *nextEventTimeDefined, fmi3Float64 *nextEventTime) {
-  fmi3InstanceData *instance = enter(c, UPDATE_DISCRETE_STATES);
+  hxInstance *instance = enter(c, UPDATE_DISCRETE_STATES);
   int changed = 0;
   if (!instance) return fmi3Error;
-  const int exchange = instance->base.state.interface == HX_MODEL_EXCHANGE;
-  const hxStatus status = exchange ? hx_instance_update(&instance->base, &changed) : HX_OK;
+  const int exchange = instance->state.interface == HX_MODEL_EXCHANGE;
+  const hxStatus status = exchange ? hx_instance_update(instance, &changed) : HX_OK;
   set_flag(discreteStatesNeedUpdate, 0);
   set_flag(terminateSimulation, 0);
   set_flag(nominalsOfContinuousStatesChanged, 0);
@@ -574,63 +509,47 @@ fmi3Status fmi3UpdateDiscreteStates(fmi3Instance c, fmi3Boolean *discreteStatesN
  * model exchange */
 
 fmi3Status fmi3EnterContinuousTimeMode(fmi3Instance c) {
-  fmi3InstanceData *instance = enter(c, ENTER_CONTINUOUS_TIME_MODE);
-  if (!instance) return fmi3Error;
-  instance->base.state.mode = HX_MODE_CONTINUOUS;
-  return fmi3OK;
+  return status_of(hx_call_enter_mode(c, &calls[ENTER_CONTINUOUS_TIME_MODE], HX_MODE_CONTINUOUS));
 }
 
 fmi3Status fmi3CompletedIntegratorStep(fmi3Instance c, fmi3Boolean noSetFMUStatePriorToCurrentPoint,
                                        fmi3Boolean *enterEventMode,
                                        fmi3Boolean *terminateSimulation) {
   (void)noSetFMUStatePriorToCurrentPoint;
-  fmi3InstanceData *instance = enter(c, COMPLETED_INTEGRATOR_STEP);
+  hxInstance *instance = enter(c, COMPLETED_INTEGRATOR_STEP);
   if (!instance) return fmi3Error;
   set_flag(enterEventMode, 0);
   set_flag(terminateSimulation, 0);
-  return status_of(hx_instance_completed_step(&instance->base));
+  return status_of(hx_instance_completed_step(instance));
 }
 
 fmi3Status fmi3SetTime(fmi3Instance c, fmi3Float64 time) {
-  fmi3InstanceData *instance = enter(c, SET_TIME);
-  return instance ? status_of(hx_instance_set_time(&instance->base, time)) : fmi3Error;
+  return status_of(hx_call_set_time(c, &calls[SET_TIME], time));
 }
 
 fmi3Status fmi3SetContinuousStates(fmi3Instance c, const fmi3Float64 x[], size_t n) {
-  fmi3InstanceData *instance = enter(c, SET_CONTINUOUS_STATES);
-  if (!instance || !has_arrays(instance, SET_CONTINUOUS_STATES, n, x, x)) return fmi3Error;
-  return status_of(hx_instance_set_states(&instance->base, x, n));
-}
-
-/* a function that reads an array of n doubles */
-typedef hxStatus Getter(hxInstance *instance, double value[], size_t n);
-
-static fmi3Status get_row(fmi3Instance c, fmi3Call call, Getter *getter, fmi3Float64 value[],
-                          size_t n) {
-  fmi3InstanceData *instance = enter(c, call);
-  if (!instance || !has_arrays(instance, call, n, value, value)) return fmi3Error;
-  return status_of(getter(&instance->base, value, n));
+  return status_of(hx_call_set_states(c, &calls[SET_CONTINUOUS_STATES], x, n));
 }
 
 fmi3Status fmi3GetContinuousStateDerivatives(fmi3Instance c, fmi3Float64 dx[], size_t n) {
-  return get_row(c, GET_RATES, hx_instance_get_rates, dx, n);
+  return status_of(hx_call_get_row(c, &calls[GET_RATES], hx_instance_get_rates, dx, n));
 }
 
 fmi3Status fmi3GetEventIndicators(fmi3Instance c, fmi3Float64 z[], size_t n) {
-  return get_row(c, GET_EVENT_INDICATORS, hx_instance_get_indicators, z, n);
+  return status_of(
+      hx_call_get_row(c, &calls[GET_EVENT_INDICATORS], hx_instance_get_indicators, z, n));
 }
 
 fmi3Status fmi3GetContinuousStates(fmi3Instance c, fmi3Float64 x[], size_t n) {
-  return get_row(c, GET_CONTINUOUS_STATES, hx_instance_get_states, x, n);
+  return status_of(hx_call_get_row(c, &calls[GET_CONTINUOUS_STATES], hx_instance_get_states, x, n));
 }
 
 fmi3Status fmi3GetNominalsOfContinuousStates(fmi3Instance c, fmi3Float64 nominal[], size_t n) {
-  return get_row(c, GET_NOMINALS, hx_instance_get_nominals, nominal, n);
+  return status_of(hx_call_get_row(c, &calls[GET_NOMINALS], hx_instance_get_nominals, nominal, n));
 }
 
 static fmi3Status get_number(fmi3Instance c, size_t *place, size_t number) {
-  fmi3InstanceData *instance = enter(c, GET_NUMBER);
-  if (!instance || !has_arrays(instance, GET_NUMBER, 1, place, place)) return fmi3Error;
+  if (!hx_call_is_legal_with(c, &calls[GET_NUMBER], 1, place, place)) return fmi3Error;
   *place = number;
   return fmi3OK;
 }
@@ -647,21 +566,14 @@ fmi3Status fmi3GetNumberOfContinuousStates(fmi3Instance c, size_t *n) {
  * co-simulation */
 
 fmi3Status fmi3EnterStepMode(fmi3Instance c) {
-  fmi3InstanceData *instance = enter(c, ENTER_STEP_MODE);
-  if (!instance) return fmi3Error;
-  instance->base.state.mode = HX_MODE_STEP;
-  return fmi3OK;
+  return status_of(hx_call_enter_mode(c, &calls[ENTER_STEP_MODE], HX_MODE_STEP));
 }
 
 fmi3Status fmi3GetOutputDerivatives(fmi3Instance c, const fmi3ValueReference vr[], size_t nvr,
                                     const fmi3Int32 order[], fmi3Float64 value[], size_t n) {
-  fmi3InstanceData *instance = enter(c, GET_OUTPUT_DERIVATIVES);
-  if (!instance || !has_arrays(instance, GET_OUTPUT_DERIVATIVES, nvr, vr, value) ||
-      !has_arrays(instance, GET_OUTPUT_DERIVATIVES, nvr, order, order))
+  if (!hx_call_is_first_order(c, &calls[GET_OUTPUT_DERIVATIVES], nvr, vr, order, value))
     return fmi3Error;
-  if (!hx_call_is_first_order(&instance->base, &calls[GET_OUTPUT_DERIVATIVES], nvr, order))
-    return fmi3Error;
-  return status_of(hx_arrays_get_output_rates(&instance->base, vr, nvr, value, n));
+  return status_of(hx_arrays_get_output_rates(c, vr, nvr, value, n));
 }
 
 /* Returns early where discrete variables change, if the importer allows it; requests event mode, if
@@ -671,15 +583,15 @@ fmi3Status fmi3DoStep(fmi3Instance c, fmi3Float64 currentCommunicationPoint,
                       fmi3Boolean noSetFMUStatePriorToCurrentPoint,
                       fmi3Boolean *eventHandlingNeeded, fmi3Boolean *terminateSimulation,
                       fmi3Boolean *earlyReturn, fmi3Float64 *lastSuccessfulTime) {
-  fmi3InstanceData *instance = enter(c, DO_STEP);
+  hxInstance *instance = enter(c, DO_STEP);
   const double t = currentCommunicationPoint, h = communicationStepSize;
   int event = 0;
   (void)noSetFMUStatePriorToCurrentPoint;
   if (!instance) return fmi3Error;
   const hxStatus status =
-      hx_instance_step_to_event(&instance->base, t, h, instance->may_return_early, &event);
-  const double reached = hx_instance_time(&instance->base);
-  set_flag(eventHandlingNeeded, event && instance->base.uses_event_mode);
+      hx_instance_step_to_event(instance, t, h, instance->may_return_early, &event);
+  const double reached = hx_instance_time(instance);
+  set_flag(eventHandlingNeeded, event && instance->uses_event_mode);
   set_flag(terminateSimulation, 0);
   set_flag(earlyReturn, event && reached < t + h);
   if (lastSuccessfulTime) *lastSuccessfulTime = reached;

@@ -3,6 +3,7 @@
 
 #include <math.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
 /* ----------------------------------------------------------------------------------------------
@@ -30,6 +31,17 @@ static hxStatus check_default_guid(hxInstance *instance, const char *resources) 
   return HX_INVALID_ARGUMENT;
 }
 
+void *hx_instance_new(size_t size, hxInterface interface, const char *name, int logging,
+                      hxLogSink *sink) {
+  hxInstance *instance = calloc(1, size);
+  if (!instance) return NULL;
+  instance->sink = sink;
+  instance->logged = logging ? ~0u : HX_LOG_ALWAYS;
+  instance->state.interface = (int)interface;
+  if (name) snprintf(instance->name, sizeof instance->name, "%s", name);
+  return instance;
+}
+
 hxStatus hx_instance_open(hxInstance *instance, const char *guid, const char *resources) {
   int found = 0;
   if (!instance->name[0] || !guid) {
@@ -53,9 +65,10 @@ hxStatus hx_instance_open(hxInstance *instance, const char *guid, const char *re
   return HX_OK;
 }
 
-void hx_instance_close(hxInstance *instance) {
+void hx_instance_free(hxInstance *instance) {
+  if (!instance) return;
   if (instance->component) hx_component_destroy(instance->component);
-  instance->component = NULL;
+  free(instance);
 }
 
 /* ----------------------------------------------------------------------------------------------

@@ -3,13 +3,13 @@
  *
  * The files of fmi/ in layers; each calls the layers below it only:
  *
- *   fmi2.c  fmi3.c                        the functions of the standard
- *   arrays.c                              FMI 3's arrays
- *   step.c  exchange.c  state.c  call.c   co-simulation, model exchange, saved states, legal order
- *   instance.c                            opening, values, initialization, reset
- *   resources.c                           start values from the FMU's resources
- *   table.c                               the table of variables
- *   log.c                                 messages to the importer
+ *   fmi2.c  fmi3.c               the functions of the standard
+ *   call.c  arrays.c             legal order and calls of both versions; FMI 3's arrays
+ *   step.c  exchange.c  state.c  co-simulation, model exchange, saved states
+ *   instance.c                   opening, values, initialization, reset
+ *   resources.c                  start values from the FMU's resources
+ *   table.c                      the table of variables
+ *   log.c                        messages to the importer
  *
  * Every function either does all that it was asked for or changes nothing; a refusal is logged with
  * what was got and what was expected.
@@ -73,6 +73,7 @@ struct hxInstance {
   char guid[HX_GUID_SIZE];
   char name[HX_NAME_SIZE];
   int uses_event_mode; /* co-simulation: the importer handles events */
+  int may_return_early; /* co-simulation: a step may end where discrete variables change */
   unsigned logged;     /* bit k: category k is passed on */
   hxLogSink *sink;
 };
@@ -119,10 +120,16 @@ hxStatus hx_resources_read(hxInstance *instance, const char *resources, int *fou
 /* ----------------------------------------------------------------------------------------------
  * instance.c */
 
-/* Opens an instance that is zero but for its name, log, sink and interface; resources is a URI, a
- * path or NULL. The instance must be closed on failure too. */
+/* Allocates an instance of `size` bytes, which begin with an hxInstance and are otherwise zero, so
+ * that it can log; NULL when out of memory. */
+void *hx_instance_new(size_t size, hxInterface interface, const char *name, int logging,
+                      hxLogSink *sink);
+
+/* Opens a new instance; resources is a URI, a path or NULL. */
 hxStatus hx_instance_open(hxInstance *instance, const char *guid, const char *resources);
-void hx_instance_close(hxInstance *instance);
+
+/* Frees an instance, opened or not, or NULL. */
+void hx_instance_free(hxInstance *instance);
 
 /* Values of n references. Integers and Booleans are int. */
 hxStatus hx_instance_get(hxInstance *instance, hxType type, const unsigned reference[], size_t n,
@@ -223,12 +230,49 @@ typedef struct hxCall {
   int modes, interfaces;
 } hxCall;
 
-/* Checks of a call: that it is legal now, that arrays of n > 0 elements are not NULL, that all
- * derivatives are of order 1. They return 1, or log and return 0. */
+/* Checks of a call: that it is legal now, which it never is for NULL; that arrays of n > 0 elements
+ * are not NULL; both. They return 1, or log and return 0. */
 int hx_call_is_legal(hxInstance *instance, const hxCall *call);
 int hx_call_has_arrays(hxInstance *instance, const hxCall *call, size_t n, const void *array,
                        const void *other);
-int hx_call_is_first_order(hxInstance *instance, const hxCall *call, size_t n, const int order[]);
+int hx_call_is_legal_with(hxInstance *instance, const hxCall *call, size_t n, const void *array,
+                          const void *other);
+
+/* The same checks of a call for n time derivatives, and that all of them are of order 1. */
+int hx_call_is_first_order(hxInstance *instance, const hxCall *call, size_t n,
+                           const unsigned reference[], const int order[], const double value[]);
+
+/* Calls that do the same in both versions: they check, and then do what the functions of like names
+ * above do. Those that are refused return HX_INVALID_ARGUMENT. */
+
+/* accepts n = 0 variables only; of_type completes the message: "" or " of type ..." */
+hxStatus hx_call_no_variables(hxInstance *instance, const hxCall *call, size_t n,
+                              const char *of_type);
+
+hxStatus hx_call_log_select(hxInstance *instance, const hxCall *call, int on, size_t n,
+                            const char *const category[]);
+hxStatus hx_call_enter_mode(hxInstance *instance, const hxCall *call, hxMode mode);
+hxStatus hx_call_exit_initialization(hxInstance *instance, const hxCall *call);
+hxStatus hx_call_terminate(hxInstance *instance, const hxCall *call);
+hxStatus hx_call_reset(hxInstance *instance, const hxCall *call);
+
+hxStatus hx_call_save(hxInstance *instance, const hxCall *call, void **block);
+hxStatus hx_call_restore(hxInstance *instance, const hxCall *call, const void *block);
+hxStatus hx_call_free_state(hxInstance *instance, const hxCall *call, void **block);
+hxStatus hx_call_state_size(hxInstance *instance, const hxCall *call, const void *block,
+                            size_t *size);
+hxStatus hx_call_serialize(hxInstance *instance, const hxCall *call, void *block, void *bytes,
+                           size_t n);
+hxStatus hx_call_deserialize(hxInstance *instance, const hxCall *call, const void *bytes, size_t n,
+                             void **block);
+
+/* A function of exchange.c that reads an array of n doubles. */
+typedef hxStatus hxGetter(hxInstance *instance, double value[], size_t n);
+
+hxStatus hx_call_set_time(hxInstance *instance, const hxCall *call, double t);
+hxStatus hx_call_set_states(hxInstance *instance, const hxCall *call, const double x[], size_t n);
+hxStatus hx_call_get_row(hxInstance *instance, const hxCall *call, hxGetter *getter, double value[],
+                         size_t n);
 
 /* ----------------------------------------------------------------------------------------------
  * arrays.c */

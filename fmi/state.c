@@ -63,7 +63,7 @@ static hxStatus refuse(hxInstance *instance, const char *what) {
   return HX_BAD_STATE;
 }
 
-/* why a header does not belong to a state of this FMU; NULL when it does */
+/* returns why a header does not belong to a state of this FMU; NULL when it does */
 static const char *fault(const hxInstance *instance, const hxStateHeader *header) {
   if (memcmp(header->magic, state_magic, sizeof state_magic) != 0)
     return "bytes that are no saved state";

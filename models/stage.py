@@ -20,6 +20,7 @@ from hexapod_cosim.models.contact import (
 )
 from hexapod_cosim.models.dynamics import (
     Command,
+    Constraints,
     applied_forces,
     constraints,
     drive_acceleration,
@@ -143,6 +144,34 @@ def law_bristle_rates(robot: Robot, body: Array, bristle: Array, damping: Array)
     return rate
 
 
+def tangential_jacobians(robot: Robot, body: Array) -> list[Array]:
+    """Returns (1 - n n^T) J of each foot (3, 114): the speed of its contact across the normal."""
+    found = []
+    for leg, foot in enumerate(foot_contacts(robot, body)):
+        nn = np.outer(foot.normal, foot.normal)
+        found.append((np.eye(3) - nn) @ contact_jacobian(body, leg, foot))
+    return found
+
+
+def constrained_solution(
+    robot: Robot, body: Array, command: Command, joints: Constraints, W: Array, right: Array
+) -> Array:
+    """Returns alpha (114,) of W alpha = right (114,) under the constraints of the joints (19, 13).
+
+    The arguments are those of `solve_stage` and its constraints and matrices.
+    """
+    # [W  D^T; D  0] [alpha; lambda] = [right; c];  a kinematic drive adds G alpha = qdd
+    c = joints.gamma - 2.0 * robot.baumgarte.alpha * joints.dphi
+    c = c - robot.baumgarte.beta**2 * joints.phi
+    D = joints.D
+    if robot.servo.mode == "kinematic":
+        drive = drive_acceleration(robot, body, command).ravel()
+        D, c = np.vstack([D, joints.G]), np.concatenate([c, drive])
+    none = np.zeros((len(c), len(c)))
+    both = np.linalg.solve(np.block([[W, D.T], [D, none]]), np.concatenate([right, c]))
+    return np.asarray(both[: 6 * BODIES])
+
+
 def solve_stage(
     robot: Robot,
     body: Array,
@@ -176,25 +205,12 @@ def solve_stage(
     right = g + G_v @ s_v + G_x @ (s_x + z * (v + s_v))
 
     # bristles: a spring across the normal, -G_b/(1 + z beta), stretched by s_b + z (db/dt + s_v)
-    along = []
-    for leg, foot in enumerate(foot_contacts(robot, body)):
-        nn = np.outer(foot.normal, foot.normal)
-        T = (np.eye(3) - nn) @ contact_jacobian(body, leg, foot)
+    along = tangential_jacobians(robot, body)
+    for leg, T in enumerate(along):
         spring = slopes.bristle[leg] / (1.0 + z * slopes.beta[leg])
         W += z * z * spring * T.T @ T
         right -= spring * T.T @ (s_b[leg] + z * (rate[leg] + T @ s_v))
-        along.append(T)
-
-    # [W  D^T; D  0] [alpha; lambda] = [right; c];  a kinematic drive adds G alpha = qdd
-    c = joints.gamma - 2.0 * robot.baumgarte.alpha * joints.dphi
-    c = c - robot.baumgarte.beta**2 * joints.phi
-    D = joints.D
-    if robot.servo.mode == "kinematic":
-        drive = drive_acceleration(robot, body, command).ravel()
-        D, c = np.vstack([D, joints.G]), np.concatenate([c, drive])
-    none = np.zeros((len(c), len(c)))
-    both = np.linalg.solve(np.block([[W, D.T], [D, none]]), np.concatenate([right, c]))
-    alpha = both[: 6 * BODIES]
+    alpha = constrained_solution(robot, body, command, joints, W, right)
 
     # nu = v + s_v + z alpha;  k_b/h = (db/dt + s_v + z alpha - beta s_b)/(1 + z beta)
     for leg, T in enumerate(along):

@@ -6,9 +6,10 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass, replace
 
+import tomlkit
+
 from benchmarks.control.cases import Case
 from hexapod_cosim.controller import make_gait
-from hexapod_cosim.cosim.common.toml_text import to_toml
 from hexapod_cosim.cosim.results.comparison import Comparison, compare_runs
 from hexapod_cosim.cosim.results.summary import NO_FIGURES, REFUSED, Summary
 from hexapod_cosim.cosim.run.batch import run_batch
@@ -84,7 +85,7 @@ def _place(
             plan, duration=plan.macro_step * round(cycles * _period(plan) / plan.macro_step)
         )
     )
-    key = to_toml(plan.to_table())
+    key = tomlkit.dumps(plan.to_table())
     plans.setdefault(key, plan)
     return key
 

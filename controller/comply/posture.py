@@ -27,10 +27,10 @@ class Posture(NamedTuple):
     @classmethod
     def of(cls, value: Array, rate: Array) -> Posture:
         """The posture of height, roll and pitch (3,) [m, rad, rad] and their rates per second."""
-        if not (value.any() or rate.any()):
-            return LEVEL
         height, roll, pitch = value.tolist()
         height_rate, roll_rate, pitch_rate = rate.tolist()
+        if not any((height, roll, pitch, height_rate, roll_rate, pitch_rate)):
+            return LEVEL
         cr, sr, cp, sp = math.cos(roll), math.sin(roll), math.cos(pitch), math.sin(pitch)
         rotation = np.array(
             [[cp, sp * sr, sp * cr], [0.0, cr, -sr], [-sp, cp * sr, cp * cr]],

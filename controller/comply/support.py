@@ -24,7 +24,7 @@ RIDGE_SHARE = 1e-9  # 1    of the mean square arm: feet on one line share no mom
 LEAST_ARM = 1e-12  # m2    keeps the equations of no standing foot at all solvable
 LEAST_SPREAD = 1e-4  # m2    of the feet about their centre: less takes no moment about the vertical
 LEAST_LOAD = 1e-6  # N    less is no load to share by
-IDENTITY = np.eye(3)
+ONES = np.ones(LEGS)
 
 
 class Shares(NamedTuple):
@@ -51,8 +51,13 @@ def _smooth(x: Array) -> Array:
 
 
 def _solve(system: Array, needed: tuple[float, float, float]) -> Array:
-    """x of S x = b, S (3, 3) symmetric and positive definite, by S = L D L^T: (3,)."""
-    (d0, s01, s02), (_, s11, s12), (_, _, s22) = system.tolist()
+    """x of S x = b, S (3, 3) symmetric and positive semidefinite, by S = L D L^T: (3,).
+
+    A ridge on the diagonal keeps S definite.
+    """
+    (s00, s01, s02), (_, s11, s12), (_, _, s22) = system.tolist()
+    ridge = RIDGE_SHARE * (s00 + s11 + s22) + LEAST_ARM
+    d0, s11, s22 = s00 + ridge, s11 + ridge, s22 + ridge
     b0, b1, b2 = needed
     l10, l20 = s01 / d0, s02 / d0
     d1 = s11 - l10 * s01
@@ -99,12 +104,9 @@ class Support:
             activation: (6,) in [0, 1].
             weight, moment: what the sums of f_n and of p f_n shall be [N, N m].
         """
-        one = np.array([np.ones(LEGS), feet.real, feet.imag])
+        one = np.array([ONES, feet.real, feet.imag])
         weighted = one * activation
-        system = weighted @ one.T
-        ridge = RIDGE_SHARE * np.trace(system) + LEAST_ARM
-        needed = (weight, moment.real, moment.imag)
-        found = _solve(system + ridge * IDENTITY, needed)
+        found = _solve(weighted @ one.T, (weight, moment.real, moment.imag))
         return np.maximum(found @ weighted, 0.0)
 
     def lowering(self, feet: Plane, activation: Array) -> Array:

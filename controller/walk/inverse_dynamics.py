@@ -71,6 +71,7 @@ class InverseDynamics:
         offset = np.array([[link.offset_y for link in leg] for leg in links])
         inertia = np.array([[link.inertia[:3] for link in leg] for leg in links])
         self.mass = np.array([[link.mass for link in leg] for leg in links])  # kg    (6, 3)
+        self.joint = legs.coxa_length + 1j * legs.coxa_height  # m    (6,) U of the femur's joint
         self.com = com[..., 0] + 1j * com[..., 2]  # m    (6, 3) from the joint, plane of the leg
         self.side = com[..., 1] + np.cumsum(offset, axis=1) - offset  # m    (6, 3) Y
         self.yaw_inertia = inertia[..., 2].sum(axis=1)  # kg m2    (6,)
@@ -94,11 +95,10 @@ class InverseDynamics:
             posture: of the torso in the walking frame.
         """
         legs, turned = self.legs, cis(turn)
-        joint = legs.coxa_length + 1j * legs.coxa_height
-        knee = joint + pose.femur * legs.femur
+        knee = self.joint + pose.femur * legs.femur
         point = np.empty((LEGS, 3), dtype=np.complex128)
         point[:, 0] = self.com[:, 0]
-        point[:, 1] = joint + pose.femur * (legs.femur_zero * self.com[:, 1])
+        point[:, 1] = self.joint + pose.femur * (legs.femur_zero * self.com[:, 1])
         point[:, 2] = knee + pose.tibia * (legs.tibia_zero * self.com[:, 2])
         aside = point.real + 1j * self.side
         place, height = posture.turn(
@@ -179,7 +179,7 @@ class InverseDynamics:
         torque[:, 0] += turning[:, 0] * self.yaw_inertia
         # tau_2 = sum Im((U - U_femur)^* P)    tau_3 = -Im((U - U_knee)^* P)
         inner = along.real + 1j * lift
-        arm = point[:, 1:] - (legs.coxa_length + 1j * legs.coxa_height)[:, None]
+        arm = point[:, 1:] - self.joint[:, None]
         tibia = arm[:, 1] - legs.femur * now.femur
         upper = turning[:, 1] * self.pitch_inertia[:, 1]
         lower = (turning[:, 1] - turning[:, 2]) * self.pitch_inertia[:, 2]

@@ -150,10 +150,9 @@ def travel(twist: Twist, time: Array | float) -> Plane:
     """The way [m] under a constant twist for a time [s]: v (e^(i w t) - 1)/(i w) (C3)."""
     if twist.yaw_rate == 0.0:
         return np.asarray(twist.velocity * time)
-    half = np.asarray(0.5 * twist.yaw_rate * time)
-    turns = np.abs(half) > SMALL_ANGLE
-    chord = np.divide(np.sin(half), half, out=np.ones_like(half), where=turns)
-    return np.asarray(twist.velocity * time * chord * cis(half))
+    half = 0.5 * twist.yaw_rate * time
+    arc = np.maximum(np.abs(half), SMALL_ANGLE)
+    return np.asarray(twist.velocity * time * (np.sin(arc) / arc) * cis(half))
 
 
 # -------------------------------------------------------------------------------- paths of the feet

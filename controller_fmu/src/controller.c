@@ -14,13 +14,13 @@ void hx_controller_compile(const hxControllerDefinition *definition, hxControlle
 
 /* ----------------------------------------------------------------------------------- planning */
 
-/* -1: the step before, 0: the present one, 1: the step after */
+/* Index of a planned step: -1 is the previous one, 0 the present one, 1 the next one. */
 static hxPlannedStep *step_at(hxControllerState *state, int neighbour) {
   return &state->step[(state->present + neighbour + 3) % 3];
 }
 
-/* The command so many periods ahead, posture included; number: periods since the section began.
- * Returns the motion of the body. */
+/* Computes the command a number of periods ahead, including the posture, and returns the motion of
+ * the body. number: periods since the section began. */
 static hxTwist look_ahead(const hxControllerModel *model, const hxControllerState *state,
                           int64_t ahead, int64_t number, hxPlannedStep *step) {
   hx_command_ramp_ahead(&model->ramp, &state->ramp, ahead, step->value, step->rate);
@@ -34,7 +34,8 @@ static hxTwist look_ahead(const hxControllerModel *model, const hxControllerStat
   return twist;
 }
 
-/* activations of the legs, and feet lowered by what the ground will give way under their loads */
+/* Computes the activations of the legs, and lowers the feet by the depth to which the ground will
+ * deform under their loads. */
 static void lower(const hxControllerModel *model, const hxFootPaths *paths, hxPlannedStep *step) {
   const hxSupport *support = &model->laws.support;
   for (int k = 0; k < HX_LEGS; ++k) {
@@ -50,8 +51,8 @@ static void lower(const hxControllerModel *model, const hxFootPaths *paths, hxPl
   for (int k = 0; k < HX_LEGS; ++k) step->height[k] = step->feet.height[k] - step->lowering[k];
 }
 
-/* The shift of a foot as the ground rolls off it (C9), and the leg. A tibia that pitches by dB
- * rolls the sphere of its foot by -R dB along the outward direction of the leg. The shift s
+/* Computes by how far a foot's contact point shifts because its sphere rolls (C9). A tibia that
+ * pitches by dB rolls the sphere by -R dB along the outward direction of the leg. The shift s
  * changes B itself: s = R (C + s dC/du) is solved by one Newton step. */
 static void place_leg(const hxLegSolver *leg, const hxPosture *posture, hxPlane plane,
                       double height, hxPlane *shift, hxPose *pose) {
@@ -68,7 +69,7 @@ static void place_leg(const hxLegSolver *leg, const hxPosture *posture, hxPlane 
   hx_leg_solver_pose(leg, seen, z, pose);
 }
 
-/* turns planned feet into legs and point masses */
+/* Computes the poses of the legs and the point masses for planned feet. */
 static void lay_out(const hxControllerModel *model, const hxFootPaths *paths, hxPlannedStep *step) {
   lower(model, paths, step);
   for (int k = 0; k < HX_LEGS; ++k)
@@ -79,7 +80,8 @@ static void lay_out(const hxControllerModel *model, const hxFootPaths *paths, hx
                               step->feet.turn, &step->posture, &step->masses);
 }
 
-/* the step so many periods after the section began, `ahead` of the present command */
+/* Plans the step a number of periods after the section began; `ahead`: periods after the present
+ * command. */
 static void plan_step(const hxControllerModel *model, const hxControllerState *state,
                       int64_t number, int64_t ahead, const hxPlannedStep *before,
                       hxPlannedStep *step) {
@@ -88,7 +90,7 @@ static void plan_step(const hxControllerModel *model, const hxControllerState *s
   lay_out(model, &state->paths, step);
 }
 
-/* begins a new section at the present step, and plans the step after it */
+/* Begins a new section at the present step, and plans the next step. */
 static void plan_afresh(const hxControllerModel *model, hxControllerState *state) {
   const int moves = hx_command_ramp_moves(&state->ramp),
             settled = hx_command_ramp_settled(&model->ramp, &state->ramp);
@@ -105,8 +107,8 @@ static void plan_afresh(const hxControllerModel *model, hxControllerState *state
   plan_step(model, state, 1, 1, first, step_at(state, 1));
 }
 
-/* Goes to the next step, as planned, and plans the one after it. told: the command has changed, so
- * that the plan is void. */
+/* Advances to the planned next step and plans the one after it. told: the command has changed, so
+ * the plan is void. */
 static void advance(const hxControllerModel *model, int told, hxControllerState *state) {
   if (told || !state->has_after) plan_afresh(model, state);
   state->present = (state->present + 1) % 3;
@@ -122,14 +124,14 @@ static void advance(const hxControllerModel *model, int told, hxControllerState 
 
 /* ------------------------------------------------------------------------------------- joints */
 
-/* rate of a quantity of the present step, one-sided at the end of a section */
+/* Returns the rate of a quantity at the present step, one-sided at the end of a section. */
 static double rate_of(const hxControllerState *state, double before, double now, double after,
                       double period) {
   if (state->has_after && state->has_before) return (after - before) / (2.0 * period);
   return state->has_before ? (now - before) / period : 0.0;
 }
 
-/* the centre of a foot as the command plans it: on its path, rolling, not lowered */
+/* Computes the centre of a foot as the command plans it: on its path, rolling, not lowered. */
 static void show_planned(const hxPlannedStep *now, int k, double planned[3]) {
   hxPlane plane = hx_plane_add(now->feet.plane[k], now->shift[k]);
   double height = now->feet.height[k];
@@ -139,7 +141,7 @@ static void show_planned(const hxPlannedStep *now, int k, double planned[3]) {
   planned[2] = height;
 }
 
-/* joint commands that lead the feet along their paths (C10 to C14) */
+/* Computes joint commands that move the feet along their paths (C10 to C14). */
 static void follow_paths(const hxControllerModel *model, hxControllerState *state) {
   const hxPlannedStep *before = step_at(state, -1), *now = step_at(state, 0),
                       *after = step_at(state, 1);
@@ -167,7 +169,7 @@ static void follow_paths(const hxControllerModel *model, hxControllerState *stat
   }
 }
 
-/* what the present step asks of compliant control (C15 to C20) */
+/* Fills what the present step requires of compliant control (C15 to C20). */
 static void ask(const hxControllerModel *model, hxControllerState *state, hxStance *stance) {
   const hxPlannedStep *now = step_at(state, 0);
   const int inside = state->has_before && state->has_after;
@@ -224,7 +226,7 @@ void hx_controller_tick(const hxControllerModel *model, const hxControllerInput 
                                        input->command.roll,     input->command.pitch};
   const int told = hx_command_ramp_aim(&model->ramp, command, &state->ramp);
   hxStance stance;
-  /* the first tick is the stance itself, whatever is commanded */
+  /* the first tick commands the stance, whatever the input */
   if (state->tick > 0) advance(model, told, state);
   ++state->tick;
   follow_paths(model, state);

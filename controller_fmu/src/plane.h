@@ -1,4 +1,5 @@
-/* plane.h - points and directions of a plane as complex numbers x + i y: a turn is one product. */
+/* plane.h - points and directions of a plane as complex numbers x + i y, so that a rotation is one
+ * product. */
 #ifndef HX_PLANE_H
 #define HX_PLANE_H
 
@@ -20,7 +21,7 @@ static inline hxPlane hx_times(hxPlane a, hxPlane b) {
 }
 static inline double hx_square(hxPlane a) { return a.x * a.x + a.y * a.y; }
 
-/* Re(a^* b) and Im(a^* b): the dot and the cross product of two vectors */
+/* Return Re(a^* b) and Im(a^* b), the dot and the cross product of two vectors. */
 static inline double hx_along(hxPlane a, hxPlane b) { return a.x * b.x + a.y * b.y; }
 static inline double hx_across(hxPlane a, hxPlane b) { return a.x * b.y - a.y * b.x; }
 
@@ -28,7 +29,7 @@ static inline hxPlane hx_over(hxPlane a, hxPlane b) {
   return hx_scaled(hx_times(a, hx_conj(b)), 1.0 / hx_square(b));
 }
 
-/* e^(i angle) */
+/* Returns e^(i angle). */
 static inline hxPlane hx_cis(double angle) { return (hxPlane){cos(angle), sin(angle)}; }
 
 static inline double hx_clamp(double x, double low, double high) {

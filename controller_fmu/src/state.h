@@ -1,13 +1,6 @@
-/* state.h - what a controller is made of: constants compiled from the definition, and the state
- * that moves, without pointers; and its tick, from body command and measurement to joint commands.
- * Python: controller/controller.py.
- *
- *   command -> ramp -> foot paths -> rolling -> posture -> inverse kinematics ---------> angle_ref
- *                         ^                                      |                           ^
- *                       hold                      inverse dynamics -> support -> compliance -+
- *                         ^--- measured angles, attitude        measured forces --^          v
- *                                                                                       torque_ref
- */
+/* state.h - data of a controller: constants compiled from the definition, and the state, without
+ * pointers; and its tick, from body command and measurement to joint commands. Python:
+ * controller/controller.py. */
 #ifndef HX_CONTROLLER_STATE_H
 #define HX_CONTROLLER_STATE_H
 
@@ -25,38 +18,38 @@ typedef struct hxControllerModel {
   hxCompliantModel laws;
 } hxControllerModel;
 
-/* One planned step: what depends on the command alone. Feet in the walking frame. */
+/* One planned step. It depends on the command alone. Feet are in the walking frame. */
 typedef struct hxPlannedStep {
   double value[HX_COMMANDS],
       rate[HX_COMMANDS]; /* vx vy yaw_rate height roll pitch, and per second */
   hxPosture posture;
   hxPlannedFeet feet;
   double activation[HX_LEGS]; /* 1 */
-  double lowering[HX_LEGS]; /* m  by what the ground will give way */
-  double height[HX_LEGS]; /* m  of the feet, lowered */
-  hxPlane shift[HX_LEGS]; /* m  of the feet by the ground rolling off them */
+  double lowering[HX_LEGS]; /* m, deformation of the ground */
+  double height[HX_LEGS]; /* m, of the lowered feet */
+  hxPlane shift[HX_LEGS]; /* m, of contact points, by rolling */
   hxPose pose[HX_LEGS];
   hxMasses masses;
 } hxPlannedStep;
 
 typedef struct hxControllerState {
-  double start; /* s  of the first tick */
+  double start; /* s, time of the first tick */
   double time; /* s */
-  int64_t tick; /* number of the next one */
+  int64_t tick; /* number of the next tick */
   hxCommandRamp ramp;
   hxFootPaths paths;
-  int64_t at; /* the present step, counted from the begin of its section */
-  int64_t last; /* the step at which the command comes to rest and is planned afresh */
+  int64_t at; /* the present step, counted from the beginning of its section */
+  int64_t last; /* the step at which the command comes to rest and is planned again */
   int cut; /* the present step is the last of its section: a leg lifts off or touches down */
   int has_before, has_after; /* the neighbours of the present step are planned */
-  int present; /* place of the present step among `step`, whose places go round */
+  int present; /* index of the present step in `step`, a ring buffer */
   hxPlannedStep step[3];
   hxCompliant compliant;
   hxControllerOutput output; /* of the last tick */
 } hxControllerState;
 
-/* The next tick, computed for its outputs alone: the tick itself takes it over when time goes on
- * under the same input. Not part of the state. */
+/* The next tick, computed early for its outputs. The tick uses it if the input is still the same.
+ * It is not part of the state. */
 typedef struct hxAhead {
   int known;
   hxControllerInput input;
@@ -72,10 +65,10 @@ struct hxController {
 
 void hx_controller_compile(const hxControllerDefinition *definition, hxControllerModel *model);
 
-/* Standing in the stance, all memory cleared. */
+/* Resets to standing in the stance, with all states of the laws cleared. */
 void hx_controller_begin(const hxControllerModel *model, double t, hxControllerState *state);
 
-/* One tick: the commands of this input are state->output. */
+/* Computes one tick; state->output then holds the commands for this input. */
 void hx_controller_tick(const hxControllerModel *model, const hxControllerInput *input,
                         hxControllerState *state);
 

@@ -23,7 +23,7 @@ static void legs(hxChecker *c, const hxControllerDefinition *d) {
   }
 }
 
-/* What numbers within their ranges must be together. */
+/* Checks conditions between several numbers that are within their ranges. */
 static void relations(hxChecker *c, const hxControllerDefinition *d) {
   char expected[96];
   const double stance = d->gait.duty * d->gait.period,

@@ -1,4 +1,4 @@
-/* validation.h - what a controller may be told. */
+/* validation.h - checks of definitions and inputs. */
 #ifndef HX_CONTROLLER_VALIDATION_H
 #define HX_CONTROLLER_VALIDATION_H
 
@@ -7,7 +7,8 @@
 
 HX_HIDDEN_BEGIN
 
-/* Every number of an input within its range; on failure message says what, got, expected. */
+/* Checks the range of every number of an input. On failure message says which value was got and
+ * what was expected. */
 hxStatus hx_controller_input_check(const hxControllerInput *input, char *message);
 
 HX_HIDDEN_END

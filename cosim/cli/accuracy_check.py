@@ -9,7 +9,7 @@ from typing import Annotated
 
 import typer
 
-from hexapod_cosim.controller import Gains
+from hexapod_cosim.cosim.cli.running import RunOptions
 from hexapod_cosim.cosim.cli.terminal import Count, counting_bar, show_table, show_text, warn
 from hexapod_cosim.cosim.report.accuracy import Metrics, Rows, about_accuracy, effect_rows
 from hexapod_cosim.cosim.results.accuracy import (
@@ -38,11 +38,7 @@ def check_accuracy(
     plans: Sequence[Scenario],
     runs: Sequence[Summary],
     folder: Path,
-    *,
-    fmu: Path | None,
-    used: Gains | None,
-    given: Gains | None,
-    engine: str,
+    options: RunOptions,
 ) -> Accuracy:
     """Returns the accuracy of runs of one control, whose results are in a folder already.
 
@@ -50,28 +46,14 @@ def check_accuracy(
         plans: the scenarios of the runs.
         runs: their summaries.
         folder: where their results are, for the message after an interrupt.
-        fmu: the plant; None: exported for the robot.
-        used: the gains of the runs.
-        engine: the engine of the runs, which runs them again.
-        given: the user's gains, which half the macro-step keeps; without them it designs its own.
+        options: those of the runs. Gains that are not given are designed for each macro-step.
     """
     fine = [reference_scenario(plan) for plan in plans]
     half = [halved_scenario(plan) for plan in plans]
     try:
         with counting_bar("accuracy", len(fine) + len(half)) as report_count:
-            references = list(
-                _run(fine, fmu=fmu, gains=used, engine=engine, report_count=report_count, done=0)
-            )
-            halves = list(
-                _run(
-                    half,
-                    fmu=fmu,
-                    gains=given,
-                    engine=engine,
-                    report_count=report_count,
-                    done=len(fine),
-                )
-            )
+            references = list(_run(fine, options, report_count, done=0))
+            halves = list(_run(half, options, report_count, done=len(fine)))
     except KeyboardInterrupt:
         warn(
             f"the results in {folder} are complete, their accuracy was not checked; "
@@ -85,16 +67,12 @@ def check_accuracy(
 
 
 def _run(
-    plans: Sequence[Scenario],
-    *,
-    fmu: Path | None,
-    gains: Gains | None,
-    engine: str,
-    report_count: Count,
-    done: int,
+    plans: Sequence[Scenario], options: RunOptions, report_count: Count, *, done: int
 ) -> Iterator[Summary]:
     """Runs the plans; `done` is the number of runs before them."""
-    with closing(run_batch(plans, fmu=fmu, gains=gains, compiled=engine == "compiled")) as batch:
+    compiled = options.engine == "compiled"
+    runs = run_batch(plans, fmu=options.fmu, gains=options.gains, compiled=compiled)
+    with closing(runs) as batch:
         report_count(done)
         for count, summary in enumerate(batch, start=done + 1):
             report_count(count)

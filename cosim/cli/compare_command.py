@@ -8,9 +8,9 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any
 
+import tomlkit
 import typer
 
-from hexapod_cosim.controller import Gains
 from hexapod_cosim.cosim.cli.accuracy_check import CheckAccuracy, check_accuracy, show_accuracy
 from hexapod_cosim.cosim.cli.failures import FELL, SUCCESS
 from hexapod_cosim.cosim.cli.running import (
@@ -19,12 +19,11 @@ from hexapod_cosim.cosim.cli.running import (
     FolderName,
     GainsFile,
     Name,
+    RunOptions,
     Settings,
-    checked_engine,
     command_line,
     default_folder,
     drawing,
-    given_gains,
     run_into,
     show_rows,
     titled,
@@ -38,7 +37,6 @@ from hexapod_cosim.cosim.cli.terminal import (
     warn,
 )
 from hexapod_cosim.cosim.common.files import RUN_FILE, write_json, write_text
-from hexapod_cosim.cosim.common.toml_text import to_toml
 from hexapod_cosim.cosim.master.interrupts import deferred_interrupts
 from hexapod_cosim.cosim.master.loop import COMPLETED
 from hexapod_cosim.cosim.report.accuracy import with_errors
@@ -64,7 +62,7 @@ from hexapod_cosim.cosim.results.results import (
 )
 from hexapod_cosim.cosim.results.summary import Summary, summarise
 from hexapod_cosim.cosim.run.batch import run_batch
-from hexapod_cosim.cosim.run.run import chosen_gains
+from hexapod_cosim.cosim.run.preparation import chosen_gains
 from hexapod_cosim.cosim.scenario.records import CONTROLS, Scenario
 from hexapod_cosim.cosim.scenario.scenario import load_scenario
 from hexapod_cosim.cosim.scenario.variation import STANDARD
@@ -101,8 +99,9 @@ def compare(
     plan = _plan(scenario, settings or [], seeds)
     if accuracy:
         halved_scenario(plan)  # raises errors before anything is run
-    given, walks = given_gains(gains), checked_engine(engine, runs=seeds)
-    used = chosen_gains(replace(plan, control="compliant"), given)
+    options = RunOptions.read(fmu=fmu, gains=gains, engine=engine, runs=seeds)
+    # designs the gains of all runs, or raises errors before anything is run
+    chosen_gains(replace(plan, control="compliant"), options.gains)
     command = command_line(
         "compare",
         scenario,
@@ -114,38 +113,55 @@ def compare(
         accuracy=accuracy,
     )
     with results_folder(output or default_folder(scenario)) as folder:
-        results, files = _first_seed(plan, folder, command, fmu=fmu, gains=used, engine=walks)
-        comparison = _all_seeds(
-            plan, results, seeds, folder.path, fmu=fmu, gains=used, engine=walks
-        )
+        report = folder.path / REPORT
+        results, files = _first_seed(plan, folder, command, options)
+        comparison = _all_seeds(plan, results, seeds, folder.path, options)
         files += _store(plan, comparison, folder.path, command)
         checked: dict[str, Accuracy] = {}
         if accuracy:
-            checked = _accuracies(
-                plan, comparison, folder.path, fmu=fmu, used=used, given=given, engine=walks
-            )
+            checked = _accuracies(plan, comparison, folder.path, options)
             write_json(folder.path / METRICS_FILE, _table(comparison, checked))
-        with drawing(folder.path):
-            runs = {control: stored_result(result) for control, result in results.items()}
-            files += write_report(
-                runs,
-                folder.path,
-                warn=warn,
-                comparison=comparison,
-                scenario=read_scenario(folder.path),
-                command=command,
-                accuracies=checked,
-            )
+        files += _draw(results, comparison, checked, folder.path, command)
     if json:
-        show_json({**_table(comparison, checked), "report": str(folder.path / REPORT)})
+        show_json({**_table(comparison, checked), "report": str(report)})
     else:
-        net_slip = has_net_slip(next(iter(results.values())).parameters)
-        rows = comparison_rows(comparison, net_slip=net_slip)
-        show_rows(with_errors(rows, checked), CONTROLS)
-        show_accuracy(rows, checked, comparison.means)
-        show_files(files)
-        show_text("\n".join(filter(None, (about(comparison), f"report: {folder.path / REPORT}"))))
+        _show(results, comparison, checked, files)
+        show_text("\n".join(filter(None, (about(comparison), f"report: {report}"))))
     return FELL if comparison.losses else SUCCESS
+
+
+def _draw(
+    results: Mapping[str, Result],
+    comparison: Comparison,
+    checked: Mapping[str, Accuracy],
+    folder: Path,
+    command: str,
+) -> list[Path]:
+    """Writes figures and report; returns the files."""
+    with drawing(folder):
+        return write_report(
+            {control: stored_result(result) for control, result in results.items()},
+            folder,
+            warn=warn,
+            comparison=comparison,
+            scenario=read_scenario(folder),
+            command=command,
+            accuracies=checked,
+        )
+
+
+def _show(
+    results: Mapping[str, Result],
+    comparison: Comparison,
+    checked: Mapping[str, Accuracy],
+    files: Sequence[Path],
+) -> None:
+    """Prints the metrics of both controls, their accuracy if it was checked, and the files."""
+    net_slip = has_net_slip(next(iter(results.values())).parameters)
+    rows = comparison_rows(comparison, net_slip=net_slip)
+    show_rows(with_errors(rows, checked), CONTROLS)
+    show_accuracy(rows, checked, comparison.means)
+    show_files(files)
 
 
 def _plan(scenario: str, settings: Sequence[str], seeds: int) -> Scenario:
@@ -166,10 +182,7 @@ def _first_seed(
     plan: Scenario,
     folder: ResultsFolder,
     command: str,
-    *,
-    fmu: Path | None,
-    gains: Gains | None,
-    engine: str,
+    options: RunOptions,
 ) -> tuple[dict[str, Result], list[Path]]:
     """Runs the first seed under both controls and keeps the recordings."""
     results: dict[str, Result] = {}
@@ -177,9 +190,7 @@ def _first_seed(
     for control in CONTROLS:
         with results_folder(folder.path / control) as part:
             walk = replace(plan, control=control)
-            results[control], written = run_into(
-                walk, [folder, part], command, fmu=fmu, gains=gains, engine=engine
-            )
+            results[control], written = run_into(walk, [folder, part], command, options)
         files += written
     return results, files
 
@@ -189,10 +200,7 @@ def _all_seeds(
     results: Mapping[str, Result],
     seeds: int,
     folder: Path,
-    *,
-    fmu: Path | None,
-    gains: Gains | None,
-    engine: str,
+    options: RunOptions,
 ) -> Comparison:
     """Runs the other seeds; an interrupt or error keeps the completed runs in SEEDS_PARTIAL."""
     scenarios = [
@@ -202,7 +210,8 @@ def _all_seeds(
     ]
     done: list[Summary] = [summarise(results[control]) for control in CONTROLS]
     try:
-        batch = run_batch(scenarios, fmu=fmu, gains=gains, compiled=engine == "compiled")
+        compiled = options.engine == "compiled"
+        batch = run_batch(scenarios, fmu=options.fmu, gains=options.gains, compiled=compiled)
         with counting_bar("seeds", 2 * seeds) as report_count, closing(batch) as runs:
             report_count(len(done))
             for run in runs:
@@ -226,19 +235,13 @@ def _accuracies(
     plan: Scenario,
     comparison: Comparison,
     folder: Path,
-    *,
-    fmu: Path | None,
-    used: Gains | None,
-    given: Gains | None,
-    engine: str,
+    options: RunOptions,
 ) -> dict[str, Accuracy]:
     """Returns the accuracies, by control, of the means over the compared seeds."""
     found = {}
     for control, runs in zip(CONTROLS, comparison.judged, strict=True):
         plans = [replace(plan, control=control, seed=run.seed) for run in runs]
-        found[control] = check_accuracy(
-            plans, runs, folder, fmu=fmu, used=used, given=given, engine=engine
-        )
+        found[control] = check_accuracy(plans, runs, folder, options)
     return found
 
 
@@ -253,7 +256,7 @@ def _table(comparison: Comparison, checked: Mapping[str, Accuracy]) -> dict[str,
 def _store(plan: Scenario, comparison: Comparison, folder: Path, command: str) -> list[Path]:
     """Writes scenario, metrics and run.json; returns these files and seeds.csv."""
     # without the control, since both were run
-    text = to_toml({key: value for key, value in plan.to_table().items() if key != "control"})
+    text = tomlkit.dumps({key: value for key, value in plan.to_table().items() if key != "control"})
     write_text(folder / SCENARIO, text)
     write_json(folder / METRICS_FILE, _table(comparison, {}))
     write_json(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -17,12 +17,11 @@ from hexapod_cosim.cosim.cli.running import (
     FolderName,
     GainsFile,
     Name,
+    RunOptions,
     Settings,
-    checked_engine,
     command_line,
     default_folder,
     drawing,
-    given_gains,
     run_into,
     show_rows,
     titled,
@@ -46,7 +45,6 @@ from hexapod_cosim.cosim.results.results import (
     write_accuracy,
 )
 from hexapod_cosim.cosim.results.summary import summarise
-from hexapod_cosim.cosim.run.run import chosen_gains
 from hexapod_cosim.cosim.scenario.records import CONTROLS
 from hexapod_cosim.cosim.scenario.scenario import load_scenario
 
@@ -79,10 +77,9 @@ def simulate(
     controls = [f"control={control}"] if control else []
     plan = load_scenario(scenario, overrides=[*(settings or []), *controls])
     plan = titled(plan, settings or [])
-    given, walks = given_gains(gains), checked_engine(engine, runs=1)
+    options = RunOptions.read(fmu=fmu, gains=gains, engine=engine, runs=1)
     if accuracy:
         halved_scenario(plan)  # raises errors before anything is run
-    used = chosen_gains(plan, given) if accuracy else given
     command = command_line(
         "simulate",
         scenario,
@@ -94,19 +91,12 @@ def simulate(
         accuracy=accuracy,
     )
     with results_folder(output or default_folder(scenario)) as folder:
-        result, files = run_into(plan, [folder], command, fmu=fmu, gains=used, engine=walks)
+        result, files = run_into(plan, [folder], command, options)
         checked: dict[str, Accuracy] = {}
         if accuracy:
-            checked[plan.control] = check_accuracy(
-                [plan],
-                [summarise(result)],
-                folder.path,
-                fmu=fmu,
-                used=used,
-                given=given,
-                engine=walks,
-            )
-            write_accuracy(folder.path, checked[plan.control].as_table())
+            found = check_accuracy([plan], [summarise(result)], folder.path, options)
+            write_accuracy(folder.path, found.as_table())
+            checked[plan.control] = found
         if plan.outputs.plots:
             with drawing(folder.path):
                 runs = {plan.control: stored_result(result)}
@@ -114,12 +104,18 @@ def simulate(
     if json:
         show_json(_summary(result, folder.path, files, checked))
     else:
-        metrics = {plan.control: result.metrics}
-        rows = metric_rows(metrics, net_slip=has_net_slip(result.parameters))
-        show_rows(with_errors(rows, checked), [plan.control])
-        show_accuracy(rows, checked, metrics)
-        show_files(files)
+        _show(result, files, checked)
     return SUCCESS if result.facts["walk"]["upright"] else FELL
+
+
+def _show(result: Result, files: Sequence[Path], checked: Mapping[str, Accuracy]) -> None:
+    """Prints the metrics of a run, their accuracy if it was checked, and the written files."""
+    control = result.scenario.control
+    metrics = {control: result.metrics}
+    rows = metric_rows(metrics, net_slip=has_net_slip(result.parameters))
+    show_rows(with_errors(rows, checked), [control])
+    show_accuracy(rows, checked, metrics)
+    show_files(files)
 
 
 def report(

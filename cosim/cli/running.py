@@ -5,7 +5,7 @@ from __future__ import annotations
 import shlex
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -75,6 +75,25 @@ class RunError(HexapodError):
     """A run started and did not complete."""
 
 
+@dataclass(frozen=True, kw_only=True)
+class RunOptions:
+    """The user's choices for all runs of a command."""
+
+    fmu: Path | None  # None: exported for the robot
+    gains: Gains | None  # None: designed
+    engine: str  # one of ENGINES
+
+    @classmethod
+    def read(
+        cls, *, fmu: Path | None, gains: Path | None, engine: str | None, runs: int
+    ) -> RunOptions:
+        """Reads the gains of a file, and chooses the engine for a number of runs of each control.
+
+        Raises HexapodError for a bad file and an unknown engine.
+        """
+        return cls(fmu=fmu, gains=given_gains(gains), engine=checked_engine(engine, runs=runs))
+
+
 def command_line(
     name: str,
     scenario: str,
@@ -118,12 +137,9 @@ def run_into(
     plan: Scenario,
     folders: Sequence[ResultsFolder],
     command: str,
-    *,
-    fmu: Path | None,
-    gains: Gains | None,
-    engine: str,
+    options: RunOptions,
 ) -> tuple[Result, list[Path]]:
-    """Runs a scenario on one of ENGINES and writes its results into the last of the folders.
+    """Runs a scenario and writes its results into the last of the folders.
 
     All folders are cleared once the run begins. An interrupt ends the run, but waits until the
     files are written. Raises RunError or KeyboardInterrupt when the run does not complete; its
@@ -137,11 +153,10 @@ def run_into(
                 folder.begin()
 
         with progress_bar(plan.control, plan.duration) as progress:
-            if engine == "compiled":
-                walker = stack.enter_context(Walker(everything=True))
-                result = walker.simulate(plan, fmu=fmu, gains=gains, progress=progress, begin=begin)
-            else:
-                result = run_scenario(plan, fmu=fmu, gains=gains, progress=progress, begin=begin)
+            run = run_scenario
+            if options.engine == "compiled":
+                run = stack.enter_context(Walker(everything=True)).simulate
+            result = run(plan, fmu=options.fmu, gains=options.gains, progress=progress, begin=begin)
         result = replace(result, facts={**result.facts, "command": command})
         files = write_result(result, folders[-1].path)
     for warning in result.facts["warnings"]:

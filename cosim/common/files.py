@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import json
 import math
-import os
 import shutil
 import tempfile
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, TextIO
+from uuid import uuid4
 
 from hexapod_cosim.models import HexapodError
 
@@ -49,28 +49,18 @@ def atomic_path(path: Path) -> Iterator[Path]:
             fix="name a file in it with -o",
             where=str(path),
         )
+    temporary = path.with_name(f".{path.name}.{uuid4().hex[:8]}{path.suffix}")
     try:
-        handle, name = tempfile.mkstemp(
-            prefix=f".{path.name}.", suffix=path.suffix, dir=path.parent
-        )
+        temporary.touch(exist_ok=False)
     except OSError as error:
         raise not_writable(path.parent, error) from error
-    os.close(handle)
     try:
-        yield Path(name)
-        os.chmod(name, 0o666 & ~_umask())
-        os.replace(name, path)
+        yield temporary
+        temporary.replace(path)
     except OSError as error:
         raise not_writable(path, error) from error
     finally:
-        Path(name).unlink(missing_ok=True)
-
-
-def _umask() -> int:
-    """Returns the process's file mode creation mask."""
-    mask = os.umask(0)
-    os.umask(mask)
-    return mask
+        temporary.unlink(missing_ok=True)
 
 
 @contextmanager
@@ -106,6 +96,13 @@ def _finite(value: Any) -> Any:
     if isinstance(value, list | tuple):
         return [_finite(item) for item in value]
     return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def without_none(content: Any) -> Any:
+    """Returns nested values without None, which JSON has for infinities and TOML lacks."""
+    if isinstance(content, Mapping):
+        return {key: without_none(value) for key, value in content.items() if value is not None}
+    return [without_none(value) for value in content] if isinstance(content, list) else content
 
 
 def not_writable(path: Path, error: OSError) -> HexapodError:

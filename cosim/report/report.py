@@ -8,10 +8,10 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
+import tomlkit
 from markupsafe import Markup
 
-from hexapod_cosim.cosim.common.files import write_text
-from hexapod_cosim.cosim.common.toml_text import to_toml
+from hexapod_cosim.cosim.common.files import without_none, write_text
 from hexapod_cosim.cosim.report.accuracy import (
     Metrics,
     Rows,
@@ -164,7 +164,7 @@ def _facts(runs: Mapping[str, StoredResult]) -> dict[str, Any]:
         "durations": {label: _duration(run.facts) for label, run in runs.items()},
         "walked": {label: _walked(run.facts) for label, run in runs.items()},
         "gains": {
-            label: to_toml(run.facts["gains"])
+            label: tomlkit.dumps(without_none(run.facts["gains"]))
             for label, run in runs.items()
             if run.facts.get("gains")
         },

@@ -31,7 +31,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hexapod_cosim.cosim.common.files import atomic_text
-from hexapod_cosim.cosim.results.balance import residual_warnings
+from hexapod_cosim.cosim.results.balance import Unbalanced
 from hexapod_cosim.cosim.results.metrics import FLOORS, METRICS
 from hexapod_cosim.cosim.results.summary import Summary
 from hexapod_cosim.models import HexapodError
@@ -168,7 +168,9 @@ class Comparison:
         return [
             text
             for control, runs in zip(self.labels, (self.first, self.second), strict=True)
-            for text in residual_warnings(control, [run.metrics["energy_residual"] for run in runs])
+            for text in Unbalanced.among([run.metrics["energy_residual"] for run in runs]).warnings(
+                control, runs=len(runs)
+            )
         ]
 
     @property

@@ -8,6 +8,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import tomlkit
+
 from hexapod_cosim.cosim.common.files import (
     RUN_FILE,
     RUNNING,
@@ -17,7 +19,6 @@ from hexapod_cosim.cosim.common.files import (
     write_json,
     write_text,
 )
-from hexapod_cosim.cosim.common.toml_text import to_toml
 from hexapod_cosim.cosim.master.loop import COMPLETED, FAILED, INTERRUPTED
 from hexapod_cosim.cosim.results.accuracy import Accuracy, accuracy_from_table
 from hexapod_cosim.cosim.results.recordings import (
@@ -97,7 +98,7 @@ def write_result(result: Result, folder: Path) -> list[Path]:
     written only where every macro-step is recorded, since they hold from row to row.
     """
     facts, outputs = run_facts(result), result.scenario.outputs
-    scenario, recording = to_toml(result.scenario.to_table()), result.outcome.recording
+    scenario, recording = tomlkit.dumps(result.scenario.to_table()), result.outcome.recording
     write_text(folder / SCENARIO, scenario)
     about = {key: facts[key] for key in ABOUT} | {"scenario": scenario}
     columns, stem = (outputs.csv, RESULTS) if result.completed else (("*",), PARTIAL)
@@ -199,7 +200,7 @@ def stored_result(result: Result) -> StoredResult:
         View(result.outcome.recording, result.parameters, facts["gait_period"]),
         result.metrics,
         facts,
-        to_toml(result.scenario.to_table()),
+        tomlkit.dumps(result.scenario.to_table()),
     )
 
 

@@ -13,7 +13,7 @@ from tempfile import TemporaryDirectory
 from hexapod_cosim.controller import Gains
 from hexapod_cosim.cosim.master.loop import INTERRUPTED
 from hexapod_cosim.cosim.results.summary import Summary, refused_summary, summarise
-from hexapod_cosim.cosim.run.preparation import Preparation
+from hexapod_cosim.cosim.run.preparation import PlantFmus, chosen_gains
 from hexapod_cosim.cosim.run.run import simulate
 from hexapod_cosim.cosim.run.walker import Walker
 from hexapod_cosim.cosim.run.worker_pool import (
@@ -65,8 +65,8 @@ def run_batch(
             as fast, and the figures agree to its last digits.
     """
     with TemporaryDirectory(prefix="hexapod-batch-") as folder:
-        preparation = Preparation(Path(folder), fmu=fmu, gains=gains)
-        tasks = [_prepare(k, scenario, preparation) for k, scenario in enumerate(scenarios)]
+        fmus = PlantFmus(Path(folder), given=fmu)
+        tasks = [_prepare(k, scenario, fmus, gains) for k, scenario in enumerate(scenarios)]
         count = min(processor_count() if workers is None else workers, len(tasks))
         if count <= 1:
             with Walker() if compiled else nullcontext() as walker:
@@ -76,11 +76,11 @@ def run_batch(
                 yield from _in_order(tasks, pool)
 
 
-def _prepare(number: int, scenario: Scenario, preparation: Preparation) -> _Task:
+def _prepare(number: int, scenario: Scenario, fmus: PlantFmus, gains: Gains | None) -> _Task:
     """Makes what the run shares with others; a failure to do so refuses the scenario."""
     try:
-        gains = preparation.gains(scenario)
-        return _Task(number, scenario, fmu=preparation.fmu(scenario.robot), gains=gains)
+        chosen = chosen_gains(scenario, gains)
+        return _Task(number, scenario, fmu=fmus.fmu(scenario.robot), gains=chosen)
     except HexapodError as error:
         return _Task(number, scenario, refusal=refused_summary(scenario, error))
 

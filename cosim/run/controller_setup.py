@@ -6,6 +6,7 @@ from dataclasses import replace
 
 from hexapod_cosim.controller import Gains, GainsError, make_gait
 from hexapod_cosim.cosim.interface.controller_interface import ControllerSetup
+from hexapod_cosim.cosim.run.preparation import designed_gains
 from hexapod_cosim.cosim.scenario.records import CONTROLS
 from hexapod_cosim.models import Robot, unknown_name
 
@@ -43,9 +44,4 @@ def make_setup(
                 fix="leave out the gains",
             )
         return setup
-    if gains is None:
-        # python-control takes a second to import
-        from hexapod_cosim.cosim.design.design import design_for  # noqa: PLC0415
-
-        gains = design_for(robot, period)
-    return replace(setup, gains=gains)
+    return replace(setup, gains=designed_gains(robot, period) if gains is None else gains)

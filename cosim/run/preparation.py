@@ -1,77 +1,94 @@
-"""Makes the gains and plant FMUs that runs share, each of them once."""
+"""Decides which gains and plant FMUs runs share: the gains that a process designs, and the FMUs
+that are exported to a folder.
+"""
 
 from __future__ import annotations
 
-from collections import OrderedDict
-from dataclasses import dataclass
+from dataclasses import replace
+from functools import lru_cache
 from pathlib import Path
 
 from hexapod_cosim.controller import Gains
 from hexapod_cosim.cosim.export.export import export_fmu
-from hexapod_cosim.cosim.run.run import chosen_gains, known_robot
 from hexapod_cosim.cosim.scenario.records import Scenario
-from hexapod_cosim.models import load_robot
+from hexapod_cosim.cosim.scenario.scenario import scenario_robot
+from hexapod_cosim.models import Robot, Servo, load_robot
+from hexapod_cosim.models.records import Vector3
 
 MAX_DESIGNS = 64  # sets of gains that are kept; the least recently used one goes first
 
 
-@dataclass(frozen=True)
-class PreparationKey:
-    """What gains depend on: scenarios with equal keys share them."""
+@lru_cache(maxsize=MAX_DESIGNS)
+def designed_gains(robot: Robot, period: float) -> Gains:
+    """Returns the gains of a robot and a controller period [s]; a process designs them once.
 
-    robot: str  # hash of the robot as its controller knows it
-    control: str
-    macro_step: float  # s
+    Raises GainsError when no gains can be designed.
+    """
+    # python-control takes a second to import
+    from hexapod_cosim.cosim.design.design import design_for  # noqa: PLC0415
 
-
-def preparation_key(scenario: Scenario) -> PreparationKey:
-    """Returns the key of a scenario. Raises HexapodError when its robot cannot be read."""
-    return PreparationKey(known_robot(scenario).hash, scenario.control, scenario.macro_step)
+    return design_for(robot, period)
 
 
-class Preparation:
-    """Gains and plant FMUs, made when they are first asked for and kept for later runs.
+def chosen_gains(scenario: Scenario, given: Gains | None = None) -> Gains | None:
+    """Returns the gains that a scenario runs with, None under kinematic control.
 
-    Gains are kept by PreparationKey. FMUs are kept by the hash of the robot file's content: a
-    run sets the laws and settings of its scenario itself.
+    They are the given ones, or else designed for its robot and macro-step. Raises GainsError when
+    no gains can be designed, HexapodError for a robot that cannot be read.
+    """
+    if scenario.control == "kinematic":
+        return None
+    return designed_gains(*design_key(scenario)) if given is None else given
+
+
+def design_key(scenario: Scenario) -> tuple[Robot, float]:
+    """Returns the robot and the period [s] that gains are designed for.
+
+    Scenarios with equal keys share gains. Raises HexapodError for a robot that cannot be read.
+    """
+    return known_robot(scenario), scenario.macro_step
+
+
+def known_robot(scenario: Scenario, own: Robot | None = None) -> Robot:
+    """Returns the robot as its controller knows it: the robot file with the scenario's servos and
+    gravity.
+
+    The controller has to find out ground, contact and payload by itself.
+
+    own: the scenario's robot, if the caller has it already.
+    """
+    own = own or scenario_robot(scenario)
+    return _with_servo(load_robot(scenario.robot), own.servo, own.gravity)
+
+
+@lru_cache(maxsize=64)
+def _with_servo(robot: Robot, servo: Servo, gravity: Vector3) -> Robot:
+    if (robot.servo, robot.gravity) == (servo, gravity):
+        return robot
+    return replace(robot, servo=servo, gravity=gravity)
+
+
+class PlantFmus:
+    """Plant FMUs, exported when they are first asked for and kept for later runs.
+
+    They are kept by the robot file's content: a run sets the laws and settings of its scenario
+    itself.
 
     Args:
         folder: where FMUs are exported to.
-        fmu: the FMU of all runs; by default one is exported for each robot.
-        gains: the gains of all compliant runs; by default they are designed.
+        given: the FMU of all runs; by default one is exported for each robot.
     """
 
-    def __init__(
-        self, folder: Path, *, fmu: Path | None = None, gains: Gains | None = None
-    ) -> None:
-        self._folder, self._given_fmu, self._given_gains = folder, fmu, gains
-        self._designs: OrderedDict[PreparationKey, Gains] = OrderedDict()
-        self._fmus: dict[str, Path] = {}
-
-    def gains(self, scenario: Scenario) -> Gains | None:
-        """Returns the gains of a scenario, None under kinematic control.
-
-        Raises GainsError when no gains can be designed, HexapodError for a robot that cannot be
-        read.
-        """
-        if scenario.control == "kinematic" or self._given_gains is not None:
-            return chosen_gains(scenario, self._given_gains)
-        key = preparation_key(scenario)
-        if key not in self._designs:
-            gains = chosen_gains(scenario)
-            assert gains is not None  # only kinematic control has none
-            self._designs[key] = gains
-            if len(self._designs) > MAX_DESIGNS:
-                self._designs.popitem(last=False)
-        self._designs.move_to_end(key)
-        return self._designs[key]
+    def __init__(self, folder: Path, given: Path | None = None) -> None:
+        self._folder, self._given = folder, given
+        self._exported: dict[str, Path] = {}
 
     def fmu(self, robot: str) -> Path:
         """Returns the plant FMU of a robot, given by its name or file. Raises HexapodError."""
-        if self._given_fmu is not None:
-            return self._given_fmu
+        if self._given is not None:
+            return self._given
         own = load_robot(robot)
-        if own.hash not in self._fmus:
-            path = self._folder / f"{len(self._fmus)}.fmu"
-            self._fmus[own.hash] = export_fmu(own, path)
-        return self._fmus[own.hash]
+        if own.hash not in self._exported:
+            path = self._folder / str(len(self._exported)) / f"{own.name}.fmu"
+            self._exported[own.hash] = export_fmu(own, path)
+        return self._exported[own.hash]

@@ -8,7 +8,7 @@ import sys
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, replace
-from functools import cache, lru_cache
+from functools import cache
 from importlib.metadata import version
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -17,7 +17,6 @@ from typing import Any
 from hexapod_cosim.controller import Controller, Gains, make_gait
 from hexapod_cosim.cosim.common.components import PLANT
 from hexapod_cosim.cosim.common.plant_files import package_version
-from hexapod_cosim.cosim.export.export import export_fmu
 from hexapod_cosim.cosim.interface.controller_interface import ControllerSetup
 from hexapod_cosim.cosim.interface.interface import plant_roots
 from hexapod_cosim.cosim.interface.start_values import parameter_values
@@ -36,13 +35,13 @@ from hexapod_cosim.cosim.results.warnings import (
     unused_settings,
     walk_warnings,
 )
+from hexapod_cosim.cosim.run.preparation import PlantFmus, chosen_gains, known_robot
 from hexapod_cosim.cosim.scenario.reach import check_commands
 from hexapod_cosim.cosim.scenario.records import Scenario
 from hexapod_cosim.cosim.scenario.scenario import scenario_robot
 from hexapod_cosim.cosim.scenario.schedule import Schedule, make_schedule
 from hexapod_cosim.cosim.scenario.variation import Drawn, delayed, draw, initial_values
-from hexapod_cosim.models import LEG_NAMES, FmuError, Robot, Servo, load_robot
-from hexapod_cosim.models.records import Vector3
+from hexapod_cosim.models import LEG_NAMES, FmuError, Robot
 
 # parameters with these prefixes describe the robot; all others are settings
 BODY_PARAMETERS = ("torso.", "foot.", *(f"{leg}." for leg in LEG_NAMES))
@@ -207,40 +206,6 @@ def make_result(
     )
 
 
-def chosen_gains(scenario: Scenario, gains: Gains | None = None) -> Gains | None:
-    """Returns the gains that a scenario runs with, or None under kinematic control.
-
-    They are the given ones, or else designed for its robot and macro-step.
-    """
-    if scenario.control == "kinematic":
-        return None
-    if gains is not None:
-        return gains
-    # python-control takes a second to import
-    from hexapod_cosim.cosim.design.design import design_for  # noqa: PLC0415
-
-    return design_for(known_robot(scenario), scenario.macro_step)
-
-
-def known_robot(scenario: Scenario, own: Robot | None = None) -> Robot:
-    """Returns the robot as its controller knows it: the robot file with the scenario's servos and
-    gravity.
-
-    The controller has to find out ground, contact and payload by itself.
-
-    own: the scenario's robot, if the caller has it already.
-    """
-    own = own or scenario_robot(scenario)
-    return _with_servo(load_robot(scenario.robot), own.servo, own.gravity)
-
-
-@lru_cache(maxsize=64)
-def _with_servo(robot: Robot, servo: Servo, gravity: Vector3) -> Robot:
-    if (robot.servo, robot.gravity) == (servo, gravity):
-        return robot
-    return replace(robot, servo=servo, gravity=gravity)
-
-
 def sensor_settings(scenario: Scenario, schedule: Schedule) -> SensorSettings | None:
     """Returns the errors of the feet's force sensors; None when there are none."""
     noise = scenario.sensors.foot_force_noise
@@ -262,16 +227,10 @@ def open_plant(scenario: Scenario, path: Path | None = None) -> Iterator[Fmu]:
 
     The FMU is exported to a temporary folder, or the one at `path`, which must hold the same robot.
     """
-    robot = scenario_robot(scenario)
-    if path is not None:
-        with Fmu(path) as plant:
-            apply_settings(plant, robot)
-            yield plant
-        return
     with TemporaryDirectory(prefix="hexapod-") as folder:
-        exported = Path(folder) / f"{robot.name}.fmu"
-        export_fmu(robot, exported)
-        with Fmu(exported) as plant:
+        fmus = PlantFmus(Path(folder), given=path)
+        with Fmu(fmus.fmu(scenario.robot)) as plant:
+            apply_settings(plant, scenario_robot(scenario))
             yield plant
 
 

@@ -26,7 +26,7 @@ from hexapod_cosim.cosim.master.recorder import COMMAND_COLUMNS, chosen_columns
 from hexapod_cosim.cosim.results.metrics import metric_columns
 from hexapod_cosim.cosim.results.result import Result
 from hexapod_cosim.cosim.results.summary import Summary, refused_summary, summarise
-from hexapod_cosim.cosim.run.preparation import Preparation
+from hexapod_cosim.cosim.run.preparation import PlantFmus
 from hexapod_cosim.cosim.run.run import (
     RunPlan,
     describe,
@@ -59,10 +59,10 @@ class Walker:
     def __init__(
         self, *, fmu: Path | None = None, controller: Path | None = None, everything: bool = False
     ) -> None:
-        self._given, self._given_controller, self._everything = fmu, controller, everything
+        self._given_controller, self._everything = controller, everything
         self._open = ExitStack()
         self._folder = Path(self._open.enter_context(TemporaryDirectory(prefix="hexapod-walker-")))
-        self._preparation = Preparation(self._folder)
+        self._fmus = PlantFmus(self._folder, given=fmu)
         # by plant FMU and recorded columns
         self._masters: dict[tuple[Path, tuple[str, ...] | None], tuple[Fmu, NativeMaster]] = {}
         self._controller: Fmu | None = None
@@ -85,10 +85,9 @@ class Walker:
         Arguments are those of run.simulate(). Raises HexapodError when the run cannot start; how a
         run that started ended is in the result.
         """
-        chosen = self._preparation.gains(scenario) if gains is None else gains
-        plan = make_plan(scenario, gains=chosen)
+        plan = make_plan(scenario, gains=gains)
         controller = self._controller_for(plan)
-        plant, master = self._plant(plan, controller, fmu or self._given)
+        plant, master = self._plant(plan, controller, fmu)
         plant.reset()
         plant.set_parameters(self._settings_of(plant, plan.robot))
         parameters = initialise_plant(plant, plan)
@@ -129,7 +128,7 @@ class Walker:
 
     def _plant(self, plan: RunPlan, controller: Fmu, fmu: Path | None) -> tuple[Fmu, NativeMaster]:
         """Returns the plant FMU of the plan and the master that connects it to the controller."""
-        path = self._preparation.fmu(plan.scenario.robot) if fmu is None else fmu
+        path = self._fmus.fmu(plan.scenario.robot) if fmu is None else fmu
         bristles = (
             plan.robot.friction.law in BRISTLE_LAWS or "friction.law" in plan.scenario.parameters
         )

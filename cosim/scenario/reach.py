@@ -1,16 +1,18 @@
-"""Checks before a run, by running the controller, that the legs reach what a scenario commands."""
+"""Checks before a run, by inverse kinematics, that the legs reach what a scenario commands."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
 from dataclasses import astuple, fields
-from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
-from hexapod_cosim.controller import BodyCommand, Controller, Gait, Measurement
+from hexapod_cosim.controller import BodyCommand, Controller, Gait
+from hexapod_cosim.controller.comply.posture import Posture
+from hexapod_cosim.controller.plane import cis
+from hexapod_cosim.controller.walk.trajectory import Twist, travel
 from hexapod_cosim.cosim.scenario.records import Command
 from hexapod_cosim.models import Robot, ScenarioError
 
@@ -19,8 +21,7 @@ Array = NDArray[np.float64]
 NAMES = tuple(item.name for item in fields(BodyCommand))
 UNITS = ("m/s", "m/s", "rad/s", "m", "rad", "rad")
 MOTION = (1.0, 1.0, 1.0, 0.0, 0.0, 0.0)  # selects the velocities; the other entries are posture
-STEPS_PER_CYCLE = 50  # of the controller in a gait period: enough to see every phase
-SETTLING_CYCLES = 2  # one to ramp the command up, one until every foot has landed under it
+STEPS_PER_CYCLE = 50  # in a gait period that are looked at: enough to see every phase
 RESOLUTION = 0.005  # relative, of the limit in the message
 
 
@@ -32,30 +33,32 @@ def check_commands(commands: Sequence[Command], robot: Robot, gait: Gait, *, whe
     """
     for command in commands:
         wanted = np.array(astuple(command)[1:])
-        if not _walks_cached(tuple(wanted.tolist()), robot, gait):
+        if not _walks(wanted, robot, gait):
             place = f"{where} at time = {command.time:g} s" if len(commands) > 1 else where
             raise _reach_error(wanted, robot, gait, place)
 
 
-@lru_cache(maxsize=256)
-def _walks_cached(values: tuple[float, ...], robot: Robot, gait: Gait) -> bool:
-    """Returns `_walks` of the same arguments from a cache."""
-    return _walks(np.array(values), robot, gait)
-
-
 @np.errstate(over="ignore", invalid="ignore")
 def _walks(values: Array, robot: Robot, gait: Gait) -> bool:
-    """Whether all standing feet are within reach throughout a settled cycle of the command (6,)."""
+    """Whether all standing feet are within reach throughout a settled cycle of the command (6,).
+
+    A foot stands under its stance position half-way through its stance (C4); before and after that
+    it is where the motion of the body over the ground puts it (C3, C5).
+    """
     count = max(STEPS_PER_CYCLE, math.ceil(4.0 / min(gait.duty, 1.0 - gait.duty)))
-    period = gait.period / count
-    controller = Controller(robot, period=period, gait=gait)
-    measurement, command = Measurement(), BodyCommand(*values.tolist())
-    diagnostics = controller.diagnostics
-    for k in range((SETTLING_CYCLES + 1) * count):
-        controller.step(k * period, command, measurement)
-        if k >= SETTLING_CYCLES * count and (diagnostics.unreachable & ~diagnostics.swinging).any():
-            return False
-    return True
+    controller = Controller(robot, period=gait.period / count, gait=gait)
+    paths = controller.paths
+    clock = paths.offset + np.arange(count)[:, None] / count  # cycles    (count, 6)
+    phase = clock - np.floor(clock)
+    time = gait.period * (phase - 0.5 * gait.duty)  # s    since half-way
+    vx, vy, yaw_rate = values[:3].tolist()
+    way = travel(Twist(complex(vx, vy), yaw_rate), time)
+    plane = cis(-yaw_rate * time) * (paths.home - way)
+    height = np.broadcast_to(paths.home_height, plane.shape)
+    _, pose = controller.place_legs(Posture.of(values[3:], np.zeros(3)), plane, height)
+    still = np.zeros_like(plane)
+    unreachable = controller.legs.solve(pose, still, still.real).unreachable
+    return not (unreachable & (phase < gait.duty)).any()
 
 
 def _reach_error(wanted: Array, robot: Robot, gait: Gait, where: str) -> ScenarioError:

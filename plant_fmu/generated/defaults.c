@@ -451,6 +451,16 @@ static const hxDefinition default_definition = {
     .leg[5].link[0].angle_max = 0.9599310885968813,
     .leg[5].link[1].angle_max = 1.5707963267948966,
     .leg[5].link[2].angle_max = 2.181661564992912,
+    .body.torso_box[0] = 0.0,
+    .body.torso_box[1] = 0.0,
+    .body.torso_box[2] = 0.0,
+    .body.torso_centre[0] = 0.0,
+    .body.torso_centre[1] = 0.0,
+    .body.torso_centre[2] = 0.0,
+    .body.corner_radius = 0.0,
+    .body.knee_radius = 0.0,
+    .body.shank_radius = 0.0,
+    .body.shank_position = 0.0,
 };
 
 void hx_definition_default(hxDefinition *definition) {
@@ -993,6 +1003,16 @@ static const hxRange definition_ranges[] = {
     {"RR.coxa.angle_max", "rad", -3.141592653589793, 3.141592653589793, offsetof(hxDefinition, leg[5].link[0].angle_max), 0},
     {"RR.femur.angle_max", "rad", -3.141592653589793, 3.141592653589793, offsetof(hxDefinition, leg[5].link[1].angle_max), 0},
     {"RR.tibia.angle_max", "rad", -3.141592653589793, 3.141592653589793, offsetof(hxDefinition, leg[5].link[2].angle_max), 0},
+    {"body.torso_box[1]", "m", 0.0, 10.0, offsetof(hxDefinition, body.torso_box[0]), 0},
+    {"body.torso_box[2]", "m", 0.0, 10.0, offsetof(hxDefinition, body.torso_box[1]), 0},
+    {"body.torso_box[3]", "m", 0.0, 10.0, offsetof(hxDefinition, body.torso_box[2]), 0},
+    {"body.torso_centre[1]", "m", -10.0, 10.0, offsetof(hxDefinition, body.torso_centre[0]), 0},
+    {"body.torso_centre[2]", "m", -10.0, 10.0, offsetof(hxDefinition, body.torso_centre[1]), 0},
+    {"body.torso_centre[3]", "m", -10.0, 10.0, offsetof(hxDefinition, body.torso_centre[2]), 0},
+    {"body.corner_radius", "m", 0.0, 10.0, offsetof(hxDefinition, body.corner_radius), 0},
+    {"body.knee_radius", "m", 0.0, 10.0, offsetof(hxDefinition, body.knee_radius), 0},
+    {"body.shank_radius", "m", 0.0, 10.0, offsetof(hxDefinition, body.shank_radius), 0},
+    {"body.shank_position", "", 0.0, 1.0, offsetof(hxDefinition, body.shank_position), 0},
 };
 
 size_t hx_definition_ranges(const hxRange **range) {

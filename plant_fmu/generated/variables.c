@@ -963,6 +963,16 @@ static const hxVariable parameters[] = {
     {"RR.coxa.angle_max", "rad", -3.141592653589793, 3.141592653589793, offsetof(struct hxVariables, definition.leg[5].link[0].angle_max), HX_REAL, 0},
     {"RR.femur.angle_max", "rad", -3.141592653589793, 3.141592653589793, offsetof(struct hxVariables, definition.leg[5].link[1].angle_max), HX_REAL, 0},
     {"RR.tibia.angle_max", "rad", -3.141592653589793, 3.141592653589793, offsetof(struct hxVariables, definition.leg[5].link[2].angle_max), HX_REAL, 0},
+    {"body.torso_box[1]", "m", 0.0, 10.0, offsetof(struct hxVariables, definition.body.torso_box[0]), HX_REAL, 3},
+    {"body.torso_box[2]", "m", 0.0, 10.0, offsetof(struct hxVariables, definition.body.torso_box[1]), HX_REAL, 0},
+    {"body.torso_box[3]", "m", 0.0, 10.0, offsetof(struct hxVariables, definition.body.torso_box[2]), HX_REAL, 0},
+    {"body.torso_centre[1]", "m", -10.0, 10.0, offsetof(struct hxVariables, definition.body.torso_centre[0]), HX_REAL, 3},
+    {"body.torso_centre[2]", "m", -10.0, 10.0, offsetof(struct hxVariables, definition.body.torso_centre[1]), HX_REAL, 0},
+    {"body.torso_centre[3]", "m", -10.0, 10.0, offsetof(struct hxVariables, definition.body.torso_centre[2]), HX_REAL, 0},
+    {"body.corner_radius", "m", 0.0, 10.0, offsetof(struct hxVariables, definition.body.corner_radius), HX_REAL, 1},
+    {"body.knee_radius", "m", 0.0, 10.0, offsetof(struct hxVariables, definition.body.knee_radius), HX_REAL, 1},
+    {"body.shank_radius", "m", 0.0, 10.0, offsetof(struct hxVariables, definition.body.shank_radius), HX_REAL, 1},
+    {"body.shank_position", "1", 0.0, 1.0, offsetof(struct hxVariables, definition.body.shank_position), HX_REAL, 1},
 };
 
 static const hxVariable locals[] = {
@@ -1117,7 +1127,7 @@ const size_t hx_state_count = sizeof states / sizeof states[0];
 
 _Static_assert(sizeof states / sizeof states[0] == sizeof(hxCoordinates) / sizeof(double), "each state has its row");
 
-const char hx_default_guid[] = "{74f568fc-bdbb-4261-9f0d-4c12fa025c97}";
+const char hx_default_guid[] = "{d12b372b-3b3e-41bd-9ce2-7bcc74492b70}";
 
 _Static_assert(HX_CONTACT_EXACT_RESTITUTION == 1, "ContactLaw");
 _Static_assert(HX_CONTACT_FLORES == 2, "ContactLaw");

@@ -1,6 +1,7 @@
 #include "contact_law.h"
 
 #include <math.h>
+#include <string.h>
 
 #include "elementary.h"
 
@@ -61,53 +62,71 @@ const hxContactRow *hx_contact(int law) {
                                                                                : NULL;
 }
 
-/* Closes a foot and fixes its damping by the impact speed, m/s. */
-static void close_foot(const hxModel *model, hxContactState *contact, int leg,
-                       double impact_speed) {
-  contact->closed[leg] = 1.0;
-  contact->impact_speed[leg] = impact_speed;
-  contact->damping[leg] = hx_contact(model->contact_law)->damping(model, impact_speed);
+/* Closes a contact and fixes its damping by the impact speed, m/s. */
+static void close_contact(const hxModel *model, hxContactState *contact, int row, int slot,
+                          double impact_speed) {
+  contact->closed[row][slot] = 1.0;
+  contact->impact_speed[row][slot] = impact_speed;
+  contact->damping[row][slot] = hx_contact(model->contact_law)->damping(model, impact_speed);
 }
 
-static void open_foot(hxContactState *contact, int leg) {
-  contact->closed[leg] = 0.0;
-  contact->damping[leg] = 0.0;
+static void open_contact(hxContactState *contact, int row, int slot) {
+  contact->closed[row][slot] = 0.0;
+  contact->damping[row][slot] = 0.0;
 }
 
-static void fill_contact_slots(hxContactState *contact) {
-  hx_fill_slots(contact->closed);
-  hx_fill_slots(contact->damping);
-  hx_fill_slots(contact->impact_speed);
+/* Copies leg 0 into the unused slots of a row on the tibias. */
+static void fill_contact_slots(hxContactState *contact, int row) {
+  if (row == HX_TORSO) return;
+  hx_fill_slots(contact->closed[row]);
+  hx_fill_slots(contact->damping[row]);
+  hx_fill_slots(contact->impact_speed[row]);
 }
 
-void hx_contact_start(const hxModel *model, const double delta[HX_SLOTS], hxContactState *contact) {
-  for (int leg = 0; leg < HX_LEGS; ++leg) {
-    open_foot(contact, leg);
-    contact->impact_speed[leg] = 0.0;
-    if (delta[leg] > 0.0) close_foot(model, contact, leg, 0.0);
+void hx_contact_start(const hxModel *model, const hxDepths *depths, hxContactState *contact) {
+  memset(contact, 0, sizeof *contact);
+  for (int k = 0; k < model->rows + model->torso_rows; ++k) {
+    const int row = model->row[k];
+    for (int slot = 0; slot < hx_slots_of(row); ++slot)
+      if (depths->delta[row][slot] > 0.0) close_contact(model, contact, row, slot, 0.0);
+    fill_contact_slots(contact, row);
   }
-  fill_contact_slots(contact);
 }
 
 void hx_contact_slacken(const hxContactState *contact, hxPlantMotion *motion) {
   for (int i = 0; i < 3; ++i) {
     for (int leg = 0; leg < HX_LEGS; ++leg)
-      if (contact->closed[leg] == 0.0) motion->bristle[i][leg] = 0.0;
+      if (contact->closed[HX_FOOT][leg] == 0.0) motion->bristle[i][leg] = 0.0;
     hx_fill_slots(motion->bristle[i]);
   }
 }
 
-int hx_contact_switch(const hxModel *model, const double delta[HX_SLOTS],
-                      const double ddelta[HX_SLOTS], hxContactState *contact) {
-  int touchdowns = 0;
-  for (int leg = 0; leg < HX_LEGS; ++leg) {
-    if (contact->closed[leg] == 0.0 && delta[leg] > 0.0) {
-      close_foot(model, contact, leg, ddelta[leg]);
-      ++touchdowns;
-    } else if (contact->closed[leg] != 0.0 && delta[leg] <= 0.0) {
-      open_foot(contact, leg);
-    }
+int hx_contact_is_due(const hxModel *model, const hxDepths *depths, const hxContactState *contact) {
+  int due = 0;
+  for (int k = 0; k < model->rows + model->torso_rows; ++k) {
+    const double *closed = contact->closed[model->row[k]], *delta = depths->delta[model->row[k]];
+    for (int leg = 0; leg < HX_LEGS; ++leg) due |= (closed[leg] != 0.0) != (delta[leg] > 0.0);
+    if (model->row[k] == HX_TORSO)
+      for (int slot = HX_LEGS; slot < HX_SLOTS; ++slot)
+        due |= (closed[slot] != 0.0) != (delta[slot] > 0.0);
   }
-  fill_contact_slots(contact);
+  return due;
+}
+
+int hx_contact_switch(const hxModel *model, const hxDepths *depths, hxContactState *contact) {
+  int touchdowns = 0;
+  for (int k = 0; k < model->rows + model->torso_rows; ++k) {
+    const int row = model->row[k];
+    for (int slot = 0; slot < hx_slots_of(row); ++slot) {
+      const int closed = contact->closed[row][slot] != 0.0;
+      if (!closed && depths->delta[row][slot] > 0.0) {
+        close_contact(model, contact, row, slot, depths->ddelta[row][slot]);
+        ++touchdowns;
+      } else if (closed && depths->delta[row][slot] <= 0.0) {
+        open_contact(contact, row, slot);
+      }
+    }
+    fill_contact_slots(contact, row);
+  }
   return touchdowns;
 }

@@ -19,17 +19,19 @@ const hxContactRow *hx_contact(int law); /* NULL for an unknown law */
  * e)]. */
 double hx_exact_restitution_chi(double e);
 
-/* Sets the contacts at the start of a motion: feet in the ground are closed, with impact speed 0.
+/* Sets the contacts at the start of a motion: those in the ground are closed, with impact speed 0.
  */
-void hx_contact_start(const hxModel *model, const double delta[HX_SLOTS], hxContactState *contact);
+void hx_contact_start(const hxModel *model, const hxDepths *depths, hxContactState *contact);
 
 /* Sets the bristles of open feet to 0 (eq. 16). */
 void hx_contact_slacken(const hxContactState *contact, hxPlantMotion *motion);
 
-/* Closes open feet that are in the ground and opens closed feet that are out of it; returns the
- * number of touch-downs. */
-int hx_contact_switch(const hxModel *model, const double delta[HX_SLOTS],
-                      const double ddelta[HX_SLOTS], hxContactState *contact);
+/* Returns whether a contact has to be closed or opened. */
+int hx_contact_is_due(const hxModel *model, const hxDepths *depths, const hxContactState *contact);
+
+/* Closes open contacts that are in the ground and opens closed ones that are out of it; returns
+ * the number of touch-downs. */
+int hx_contact_switch(const hxModel *model, const hxDepths *depths, hxContactState *contact);
 
 HX_HIDDEN_END
 

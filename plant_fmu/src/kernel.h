@@ -41,13 +41,11 @@ typedef struct hxKernel {
   void (*coordinates)(const hxModel *model, const hxState *state, const hxCommand *command,
                       hxCoordinates *x, hxCoordinates *rate);
 
-  /* Computes penetration and approach speed of all feet; m, m/s. */
-  void (*feet)(const hxModel *model, const hxPlantMotion *motion, double delta[HX_SLOTS],
-               double ddelta[HX_SLOTS]);
+  /* Computes penetration and approach speed of all contacts. */
+  void (*depths)(const hxModel *model, const hxPlantMotion *motion, hxDepths *depths);
 
   /* Switches the contacts that are due at the state's time by these penetrations. */
-  void (*switch_contacts)(const hxModel *model, const double delta[HX_SLOTS],
-                          const double ddelta[HX_SLOTS], hxState *state);
+  void (*switch_contacts)(const hxModel *model, const hxDepths *depths, hxState *state);
 
   /* Measures the path since the last moment, when an importer's solver has completed its step. */
   void (*measure)(const hxModel *model, const hxCommand *command, hxState *state);

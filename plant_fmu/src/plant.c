@@ -46,16 +46,12 @@ hxPlant *hx_plant_create(void) {
 
 void hx_plant_destroy(hxPlant *plant) { free(plant); }
 
-static void feet_of(const hxPlant *plant, double delta[HX_SLOTS], double ddelta[HX_SLOTS]) {
-  hx_kernel()->feet(&plant->model, &plant->state.motion, delta, ddelta);
-}
-
 /* Fails if the centre of a foot lies in the ground: the contact law does not hold at such depths,
  * and its force would throw the robot up. */
-static hxStatus check_start_depth(hxPlant *plant, char message[HX_MESSAGE_SIZE]) {
-  double delta[HX_SLOTS], ddelta[HX_SLOTS];
-  const double radius = plant->model.foot_radius;
-  feet_of(plant, delta, ddelta);
+static hxStatus check_start_depth(const hxPlant *plant, char message[HX_MESSAGE_SIZE]) {
+  hxDepths depths;
+  const double radius = plant->model.radius[HX_FOOT], *delta = depths.delta[HX_FOOT];
+  hx_kernel()->depths(&plant->model, &plant->state.motion, &depths);
   for (int leg = 0; leg < HX_LEGS; ++leg)
     if (delta[leg] > radius) {
       snprintf(message, HX_MESSAGE_SIZE,
@@ -73,7 +69,7 @@ hxStatus hx_plant_reset(hxPlant *plant, const hxDefinition *definition, double t
   double body[HX_BODIES][HX_BODY_STATE];
   if (!isfinite(t))
     return fail(plant, HX_INVALID_ARGUMENT,
-                "start time: got a number that is not finite, expected seconds");
+                "start time: got a number that is not finite, expected a finite time in s");
   hxStatus status = hx_definition_check(definition, message);
   if (status != HX_OK) return fail(plant, status, message);
   hxPlant fresh = *plant;
@@ -121,8 +117,9 @@ static hxStatus advance(hxPlant *plant, const hxInput *input, const hxInput *rat
   int finite;
   const hxCommand *ramp = ramp_from_rate(rate, &change, &finite);
   if (!finite)
-    return fail(plant, HX_INVALID_ARGUMENT,
-                "rates of inputs: got a number that is not finite, expected units per second");
+    return fail(
+        plant, HX_INVALID_ARGUMENT,
+        "rates of inputs: got a number that is not finite, expected finite rates per second");
   if (!(t_end >= plant->state.time && t_end <= DBL_MAX)) {
     snprintf(plant->message, HX_MESSAGE_SIZE,
              "end of step: got %.17g s, expected a finite time of at least %.17g s", t_end,
@@ -185,16 +182,21 @@ void hx_plant_get_state(const hxPlant *plant, void *bytes) {
 
 hxStatus hx_plant_set_state(hxPlant *plant, const void *bytes, size_t size) {
   hxSavedPlant saved;
-  if (size != sizeof saved)
-    return fail(plant, HX_BAD_STATE,
-                "saved state: its size is not that of this version's states; save it again");
+  if (size != sizeof saved) {
+    snprintf(plant->message, HX_MESSAGE_SIZE,
+             "saved state: got %zu bytes, expected %zu; save it again with this version", size,
+             sizeof saved);
+    return HX_BAD_STATE;
+  }
   memcpy(&saved, bytes, sizeof saved);
   if (saved.magic != magic || saved.version != saved_version || saved.size != sizeof saved)
-    return fail(plant, HX_BAD_STATE,
-                "saved state: not one of this version; save it again with this version");
+    return fail(
+        plant, HX_BAD_STATE,
+        "saved state: got one of another version, expected one of this version; save it again");
   if (saved.checksum != checksum(&saved))
-    return fail(plant, HX_BAD_STATE,
-                "saved state: damaged, its checksum does not match; save it again");
+    return fail(
+        plant, HX_BAD_STATE,
+        "saved state: got a damaged one, expected one whose checksum is right; save it again");
   plant->model = saved.model;
   plant->state = saved.state;
   return HX_OK;
@@ -250,27 +252,32 @@ void hx_plant_rates(const hxPlant *plant, const hxInput *input, hxCoordinates *r
 static const double switch_band = 1e-10;
 
 void hx_plant_indicators(const hxPlant *plant, double indicator[HX_LEGS]) {
-  double delta[HX_SLOTS], ddelta[HX_SLOTS];
-  feet_of(plant, delta, ddelta);
+  hxDepths depths;
+  hx_kernel()->depths(&plant->model, &plant->state.motion, &depths);
   for (int leg = 0; leg < HX_LEGS; ++leg)
     indicator[leg] =
-        delta[leg] + (plant->state.contact.closed[leg] != 0.0 ? switch_band : -switch_band);
+        depths.delta[HX_FOOT][leg] +
+        (plant->state.contact.closed[HX_FOOT][leg] != 0.0 ? switch_band : -switch_band);
 }
 
-/* Returns the penetration that makes a foot switch, or keep its state. */
+/* Returns the penetration that makes a contact switch, or keep its state. */
 static double switching_depth(int closed, double delta, double ddelta) {
   if (closed) return delta <= -switch_band || (delta < 0.0 && ddelta < 0.0) ? -1.0 : 1.0;
   return delta >= switch_band || (delta > 0.0 && ddelta > 0.0) ? 1.0 : -1.0;
 }
 
 int hx_plant_update_contacts(hxPlant *plant) {
-  double delta[HX_SLOTS], ddelta[HX_SLOTS];
+  hxDepths depths;
+  const hxModel *model = &plant->model;
   const hxPlantMotion before = plant->state.motion;
-  feet_of(plant, delta, ddelta);
-  for (int slot = 0; slot < HX_SLOTS; ++slot)
-    delta[slot] =
-        switching_depth(plant->state.contact.closed[slot] != 0.0, delta[slot], ddelta[slot]);
-  hx_kernel()->switch_contacts(&plant->model, delta, ddelta, &plant->state);
+  hx_kernel()->depths(model, &plant->state.motion, &depths);
+  for (int k = 0; k < model->rows + model->torso_rows; ++k) {
+    const int row = model->row[k];
+    for (int slot = 0; slot < hx_slots_of(row); ++slot)
+      depths.delta[row][slot] = switching_depth(plant->state.contact.closed[row][slot] != 0.0,
+                                                depths.delta[row][slot], depths.ddelta[row][slot]);
+  }
+  hx_kernel()->switch_contacts(model, &depths, &plant->state);
   return memcmp(before.bristle, plant->state.motion.bristle, sizeof before.bristle) != 0;
 }
 
@@ -283,7 +290,7 @@ hxStatus hx_plant_tangent(hxPlant *plant, const hxInput *input, const hxInput *d
       largest(largest(0.0, d_input, sizeof *d_input / sizeof(double)), dx, HX_COORDINATES);
   if (!isfinite(scale))
     return fail(plant, HX_INVALID_ARGUMENT,
-                "derivatives: got a direction that is not finite, expected numbers");
+                "derivatives: got a direction that is not finite, expected finite numbers");
   hx_command_from_input(&point.command, input, plant->state.time);
   hx_command_from_input(&point.d_command, d_input ? d_input : &no_input, 0.0);
   hx_plant_get_coordinates(plant, &point.x);
@@ -296,7 +303,8 @@ hxStatus hx_plant_tangent(hxPlant *plant, const hxInput *input, const hxInput *d
   return HX_OK;
 #else
   return fail(plant, HX_INVALID_ARGUMENT,
-              "derivatives: this binary's compiler has no complex numbers; use another");
+              "derivatives: got a call in a binary without complex numbers, expected another "
+              "compiler's binary; build the plant with gcc or clang");
 #endif
 }
 
@@ -314,7 +322,8 @@ hxStatus hx_plant_set_bodies(hxPlant *plant, const double body[HX_BODIES][HX_BOD
   for (int b = 0; b < HX_BODIES; ++b)
     for (int i = 0; i < HX_BODY_STATE; ++i)
       if (!isfinite(body[b][i]))
-        return fail(plant, HX_INVALID_ARGUMENT, "body state: got a number that is not finite");
+        return fail(plant, HX_INVALID_ARGUMENT,
+                    "body state: got a number that is not finite, expected finite numbers");
   hx_motion_from_bodies(&plant->model, body, &plant->state.motion);
   hx_kernel()->start(&plant->model, plant->state.time, &plant->state);
   return HX_OK;

@@ -192,7 +192,6 @@ static void compile_friction(hxModel *model, const hxDefinition *d) {
 
 /* Copies laws and settings, with derived constants. */
 static void compile_settings(hxModel *model, const hxDefinition *d) {
-  model->foot_radius = d->foot_radius;
   model->contact_law = d->contact.law, model->stiffness = d->contact.stiffness;
   model->damping_scale = hx_contact(d->contact.law)->scale(d);
   model->impact_speed_floor = d->contact.impact_speed_floor;
@@ -214,6 +213,56 @@ static void compile_settings(hxModel *model, const hxDefinition *d) {
   model->load_threshold = load_share * weight_of(d);
 }
 
+/* Sets the point of a row of contacts on the tibia, given in link axes from the tibia's joint. */
+static void set_tibia_point(hxModel *model, const hxDefinition *d, int leg, int slot, int row,
+                            const double from_joint[3]) {
+  const double *com = d->leg[leg].link[HX_JOINTS - 1].com;
+  double frame[4], to_joint[4], from_com[3], point[3];
+  for (int i = 0; i < 3; ++i) from_com[i] = from_joint[i] - com[i];
+  joint_frame(d, leg, HX_JOINTS - 1, frame);
+  conjugate(frame, to_joint);
+  rotate(to_joint, from_com, point);
+  for (int i = 0; i < 3; ++i) model->point[row][i][slot] = point[i];
+}
+
+/* Computes the centres of a leg's contacts: the foot at the tibia's tip, the knee at its joint,
+ * the shank between them. */
+static void compile_tibia_points(hxModel *model, const hxDefinition *d, int leg, int slot) {
+  static const double joint[3] = {0.0, 0.0, 0.0};
+  double tip[3], shank[3];
+  link_tip(&d->leg[leg].link[HX_JOINTS - 1], tip);
+  for (int i = 0; i < 3; ++i) shank[i] = d->body.shank_position * tip[i];
+  set_tibia_point(model, d, leg, slot, HX_FOOT, tip);
+  set_tibia_point(model, d, leg, slot, HX_WALL, tip);
+  set_tibia_point(model, d, leg, slot, HX_KNEE, joint);
+  set_tibia_point(model, d, leg, slot, HX_SHANK, shank);
+}
+
+/* Computes the place of a corner of the torso's box; bit i of the slot chooses the corner's side
+ * along axis i. */
+static void compile_torso_point(hxModel *model, const hxDefinition *d, int slot) {
+  for (int i = 0; i < 3; ++i) {
+    const double half = d->body.torso_box[i], side = slot >> i & 1 ? half : -half;
+    model->point[HX_TORSO][i][slot] = d->body.torso_centre[i] + side - d->torso.com[i];
+  }
+}
+
+/* Lists the rows of contacts that the model computes. */
+static void compile_rows(hxModel *model, const hxDefinition *d) {
+  const double *box = d->body.torso_box;
+  const int knees = d->body.knee_radius > 0.0, shanks = d->body.shank_radius > 0.0;
+  model->radius[HX_FOOT] = model->radius[HX_WALL] = d->foot_radius;
+  model->radius[HX_KNEE] = d->body.knee_radius;
+  model->radius[HX_SHANK] = d->body.shank_radius;
+  model->radius[HX_TORSO] = d->body.corner_radius;
+  model->row[model->rows++] = HX_FOOT;
+  model->foot_rows = model->rows;
+  if (knees) model->row[model->rows++] = HX_KNEE;
+  if (shanks) model->row[model->rows++] = HX_SHANK;
+  model->torso_rows = box[0] > 0.0 || box[1] > 0.0 || box[2] > 0.0;
+  if (model->torso_rows) model->row[model->rows] = HX_TORSO;
+}
+
 void hx_model_compile(hxModel *model, const hxDefinition *d) {
   model->torso_mass = d->torso.mass;
   for (int i = 0; i < 6; ++i) model->torso_inertia[i] = d->torso.inertia[i];
@@ -221,15 +270,10 @@ void hx_model_compile(hxModel *model, const hxDefinition *d) {
     const int leg = slot < HX_LEGS ? slot : 0;
     for (int joint = 0; joint < HX_JOINTS; ++joint)
       compile_joint(&model->joint[joint], d, leg, joint, slot);
-    const hxLink *tibia = &d->leg[leg].link[HX_JOINTS - 1];
-    double tip[3], frame[4], to_joint[4], foot[3];
-    link_tip(tibia, tip);
-    for (int i = 0; i < 3; ++i) tip[i] -= tibia->com[i];
-    joint_frame(d, leg, HX_JOINTS - 1, frame);
-    conjugate(frame, to_joint);
-    rotate(to_joint, tip, foot);
-    for (int i = 0; i < 3; ++i) model->point_foot[i][slot] = foot[i];
+    compile_tibia_points(model, d, leg, slot);
+    compile_torso_point(model, d, slot);
   }
+  compile_rows(model, d);
   compile_ground(model, d);
   compile_settings(model, d);
 }

@@ -15,8 +15,22 @@ enum {
   HX_SLOTS = 8, /* legs in memory, padded: slots past the last leg mirror leg 0 */
   HX_TORSO_SIZE = 16,
   HX_BODIES_SIZE = HX_TORSO_SIZE + HX_JOINTS * HX_BODY_STATE * HX_SLOTS,
-  HX_BRISTLE_SIZE = 3 * HX_SLOTS,
+  HX_BRISTLE_SIZE = 3 * HX_SLOTS, /* of one row of contacts */
   HX_MOTION_SIZE = HX_BODIES_SIZE + HX_BRISTLE_SIZE
+};
+
+/* Rows of contacts with the ground: spheres of which each slot has one. Those before the torso's
+ * are on the tibia, one for each leg; the torso's row has eight points of the torso. A model lists
+ * the rows that it computes. */
+enum {
+  HX_FOOT,
+  HX_WALL,
+  HX_KNEE,
+  HX_SHANK,
+  HX_TORSO,
+  HX_ROWS,
+  HX_FOOT_ROWS = HX_KNEE,
+  HX_TIBIA_ROWS = HX_TORSO
 };
 
 /* Offsets of position, quaternion, velocity and angular velocity in a body state. */
@@ -51,14 +65,17 @@ typedef struct hxModel {
   double torso_mass;
   double torso_inertia[6];
   hxJointModel joint[HX_JOINTS];
-  double point_foot[3][HX_SLOTS]; /* tibia's centre of mass to the foot's centre, tibia's axes */
-  double foot_radius;
+  double point[HX_ROWS][3][HX_SLOTS]; /* m  centres of contacts' spheres from the centre of mass of
+                                       *    tibia or torso, in the axes of that body's state */
+  double radius[HX_ROWS];             /* m */
   double gravity[3];
   double alpha, beta; /* Baumgarte */
   int contact_law, friction_law, terrain_kind, servo_mode, method, projection;
   int velocity_terms;               /* 1: the tanh law has static friction or a viscous part */
   int spin_friction, roll_friction; /* 1: the feet resist spin, rolling */
   int stops;                        /* 1: the joints have stops */
+  int rows, foot_rows, torso_rows; /* computed: on tibias, of these on feet, on the torso (0, 1) */
+  int row[HX_ROWS];                /* rows that are computed: on feet, tibias, torso */
   double stiffness, damping_scale, impact_speed_floor; /* eq. 14 */
   double mu, slope;                                    /* eq. 15 */
   double presliding, bristle_damping;                  /* eq. 16, 17 */
@@ -84,36 +101,49 @@ typedef struct hxCommand {
 
 /* State of the contacts. It changes at touch-down and lift-off only, never within a step. */
 typedef struct hxContactState {
-  double closed[HX_SLOTS];       /* 1 from touch-down to lift-off, else 0 */
-  double damping[HX_SLOTS];      /* s/m  d of eq. 14, fixed at touch-down */
-  double impact_speed[HX_SLOTS]; /* m/s  at the last touch-down */
+  double closed[HX_ROWS][HX_SLOTS];       /* 1 from touch-down to lift-off, else 0 */
+  double damping[HX_ROWS][HX_SLOTS];      /* s/m  d of eq. 14, fixed at touch-down */
+  double impact_speed[HX_ROWS][HX_SLOTS]; /* m/s  at the last touch-down */
 } hxContactState;
 
-/* Joints and feet at one end of a step, from which its works and peaks are computed. World axes. */
-typedef struct hxMoment {
-  double angle[HX_JOINTS][HX_SLOTS];        /* rad */
-  double speed[HX_JOINTS][HX_SLOTS];        /* rad/s */
-  double centre[3][HX_SLOTS];               /* m      centre of the foot's sphere */
-  double normal[3][HX_SLOTS];               /* 1      normal of the ground at the foot */
-  double slip[3][HX_SLOTS];                 /* m/s    of the foot's material along the ground */
-  double roll[3][HX_SLOTS];                 /* m/s    its part due to the foot's rotation */
-  double turn[3][HX_SLOTS];                 /* rad/s  of the tibia */
+/* Penetration and approach speed of all contacts; only the model's rows are set. */
+typedef struct hxDepths {
+  double delta[HX_ROWS][HX_SLOTS], ddelta[HX_ROWS][HX_SLOTS]; /* m, m/s */
+} hxDepths;
+
+/* A row of contacts at one end of a step. World axes. */
+typedef struct hxContactMoment {
+  double centre[3][HX_SLOTS];               /* m      centre of the sphere */
+  double normal[3][HX_SLOTS];               /* 1      normal of the ground */
+  double slip[3][HX_SLOTS];                 /* m/s    of the body's material along the ground */
+  double roll[3][HX_SLOTS];                 /* m/s    its part due to the body's rotation */
   double delta[HX_SLOTS], ddelta[HX_SLOTS]; /* m, m/s penetration, approach speed */
-  double time;                              /* s */
-  double stale;                             /* 1      1: coordinates were set since */
+} hxContactMoment;
+
+/* Joints and contacts at one end of a step, from which its works and peaks are computed. */
+typedef struct hxMoment {
+  double angle[HX_JOINTS][HX_SLOTS]; /* rad */
+  double speed[HX_JOINTS][HX_SLOTS]; /* rad/s */
+  double turn[3][HX_SLOTS];          /* rad/s  of the tibias, world axes */
+  double time;                       /* s */
+  double stale;                      /* 1      1: coordinates were set since */
+  hxContactMoment contact[HX_ROWS];  /* the model's rows are set */
 } hxMoment;
 
 /* Forces at the last completed step of an importer's solver (model exchange). */
 typedef struct hxCompleted {
-  double motor[HX_JOINTS][HX_SLOTS]; /* N m  motor torques */
-  double gear[HX_JOINTS][HX_SLOTS];  /* N m  gear friction */
-  double stop[HX_JOINTS][HX_SLOTS];  /* N m  stops */
-  double foot[3][HX_SLOTS];          /* N    ground on feet, world axes */
-  double moment[3][HX_SLOTS];        /* N m  spin and rolling friction on tibias, world axes */
-  double known;                      /* 1    0: no step was completed yet */
+  double motor[HX_JOINTS][HX_SLOTS];    /* N m  motor torques */
+  double gear[HX_JOINTS][HX_SLOTS];     /* N m  gear friction */
+  double contact[HX_ROWS][3][HX_SLOTS]; /* N    ground on feet and bodies, world axes */
+  double stop[HX_JOINTS][HX_SLOTS];     /* N m  stops */
+  double moment[HX_FOOT_ROWS][3][HX_SLOTS]; /* N m  spin and rolling friction on tibias */
+  double known;                         /* 1    0: no step was completed yet */
 } hxCompleted;
 
-enum { HX_MOMENT_ROWS = offsetof(hxMoment, time) / (HX_SLOTS * sizeof(double)) };
+enum {
+  HX_MOMENT_LINES = offsetof(hxMoment, time) / (HX_SLOTS * sizeof(double)),
+  HX_CONTACT_LINES = sizeof(hxContactMoment) / (HX_SLOTS * sizeof(double))
+};
 
 enum { HX_RISE_SAMPLES = 10 }; /* samples in the rise window of 1 ms */
 
@@ -136,7 +166,7 @@ typedef struct hxMeasured {
   double cone_time[HX_CONE_BINS]; /* s  feet under load, by share of the friction cone */
 } hxMeasured;
 
-enum { HX_MEASURED_ROWS = offsetof(hxMeasured, contact_loss) / (HX_SLOTS * sizeof(double)) };
+enum { HX_MEASURED_LINES = offsetof(hxMeasured, contact_loss) / (HX_SLOTS * sizeof(double)) };
 
 typedef struct hxState {
   double time;
@@ -158,6 +188,9 @@ struct hxPlant {
   hxState state;
   char message[HX_MESSAGE_SIZE];
 };
+
+/* Returns how many slots of a row of contacts hold one. */
+static inline int hx_slots_of(int row) { return row == HX_TORSO ? HX_SLOTS : HX_LEGS; }
 
 /* Copies leg 0 into the slots past the last leg, so that every lane holds a physical leg. */
 static inline void hx_fill_slots(double *slots) {

@@ -1,5 +1,7 @@
-"""A robot heavier than its servos carry: the support asks for less, the arch stays, and far too
-heavy a robot walks kinematically.
+"""Tests the control of a robot that is heavier than its servos can carry.
+
+The support is reduced and the squeeze between the legs stays; a robot that is far too heavy walks
+under kinematic control.
 """
 
 from __future__ import annotations
@@ -16,7 +18,7 @@ from hexapod_cosim.controller import Parts
 from hexapod_cosim.controller.sense.burden import Burden
 
 MOST, CYCLE = 5.0, 1.0  # N m, s
-WEIGHT_TIME = 0.5  # s    a fifth of which smooths the measured weight
+WEIGHT_TIME = 0.5  # s; a fifth of it smooths the measured weight
 
 
 def make() -> Burden:
@@ -24,7 +26,7 @@ def make() -> Burden:
 
 
 def of_weight(ratio: float) -> Burden:
-    """After so long that the measured weight is known."""
+    """Returns a burden that has converged to a measured weight, given over the modelled weight."""
     burden = make()
     for _ in range(4000):
         burden.weigh(ratio)
@@ -46,7 +48,9 @@ def of_weight(ratio: float) -> Burden:
 def test_no_servo_is_asked_for_more_than_it_may_and_for_less_where_the_arch_has_to_help(
     needed: float, scale: float, strength: float
 ) -> None:
-    """All of the torque allowed down to 84 % of what is needed, nothing from 54 % on."""
+    """The support has all of the allowed torque down to 84 % of the needed torque, and none below
+    54 %.
+    """
     burden = make()
     burden.step(needed, scale)
     assert burden.strength == pytest.approx(strength, abs=1e-9)
@@ -60,7 +64,11 @@ def test_no_servo_is_asked_for_more_than_it_may_and_for_less_where_the_arch_has_
 def test_the_arch_may_go_as_far_as_servos_carry_the_measured_weight_without_it(
     heft: float, freedom: float
 ) -> None:
-    """Wholly down to 95 % of it, not at all from 80 % on; whatever the support believes as yet."""
+    """The slip PID may remove all of the squeeze where the servos carry 95 % of the measured
+    weight, and none below 80 %.
+
+    The weight that the support assumes has no influence.
+    """
     burden = of_weight(heft)
     burden.step(MOST, 0.3)
     assert burden.freedom == pytest.approx(freedom, abs=1e-9)
@@ -69,7 +77,7 @@ def test_the_arch_may_go_as_far_as_servos_carry_the_measured_weight_without_it(
 def test_far_too_heavy_is_half_more_than_servos_carry_and_stays_so_down_to_a_third() -> None:
     burden, found = of_weight(1.0), []
     for needed in (7.4, 7.6, 6.8, 6.7, 7.4, 7.6):
-        burden.peak = 0.0  # without the peak of before
+        burden.peak = 0.0  # without the peak of the steps before
         burden.step(needed, 1.0)
         found.append(burden.overburdened)
     assert found == [False, True, True, False, False, True]
@@ -104,8 +112,9 @@ def test_a_saved_burden_goes_on_the_same() -> None:
 
 
 def test_servos_that_saturate_would_be_asked_for_the_same_part_of_every_share() -> None:
-    """1.9 times the weight on servos that may only give 90 % of what that asks: all torques for
-    the load shrink by the same factor.
+    """The weight is 1.9 times the model's, and the servos have 90 % of the torque for it.
+
+    All torques for the load shrink by the same factor.
     """
     largest = 0.9 * 1.9 * float(np.abs(carried()).max())
     weak = replace(GAINS, limits=replace(GAINS.limits, torque=largest))
@@ -121,15 +130,15 @@ def test_servos_that_saturate_would_be_asked_for_the_same_part_of_every_share() 
 
 
 def carried() -> np.ndarray:
-    """(6, 3) torques for the planned load [N m]."""
+    """Returns the torques (6, 3) for the planned load [N m]."""
     laws = make_laws()
     plan(laws)
     return laws.planned.carry
 
 
 def test_the_squeeze_of_a_robot_too_heavy_for_its_servos_is_left_to_it() -> None:
-    """Under the same squeeze: where servos carry the weight the feet give way, where they carry
-    3/4 of it they do not.
+    """Under the same squeeze the feet give way where the servos carry the weight, and do not where
+    they carry 3/4 of it.
     """
     bends = []
     for share in (1.1, 0.75):

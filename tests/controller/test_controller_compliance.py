@@ -1,4 +1,4 @@
-"""What the measured forces do to the joints of a standing robot."""
+"""Tests what the measured forces do to the joints of a standing robot."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def slip_gains(**changes: float) -> Gains:
 
 
 def contact_jacobians(robot: Robot) -> np.ndarray:
-    """(6, 3, 3) of the contact points in the stance, by the twin."""
+    """Returns the Jacobians (6, 3, 3) of the contact points in the stance, by the twin."""
     still = np.zeros((1, 6, 3))
     motion = Motion(
         PERIOD, np.zeros(1, dtype=complex), np.zeros(1), np.zeros((1, 3)), robot.stance[None], still
@@ -43,8 +43,9 @@ def contact_jacobians(robot: Robot) -> np.ndarray:
 
 
 def stuck_forces(robot: Robot, laws: Laws) -> np.ndarray:
-    """(6, 3) change of the ground's forces on feet that stick: the joints cannot move, so kp
-    bend = -J^T f.
+    """Returns the change (6, 3) of the ground's forces on feet that stick.
+
+    The joints cannot move, so kp bend = -J^T f.
     """
     torque = robot.servo.kp * laws.bend
     return np.array(
@@ -83,7 +84,7 @@ def test_squeezing_is_given_way_to_and_adds_up_to_nothing() -> None:
     assert np.abs(answer.sum(axis=0)).max() < ROUND_OFF
     assert abs((HOME.conj() * (answer @ [1.0, 1.0j])).imag.sum()) < ROUND_OFF
     assert np.abs(answer[[0, 2, 3, 5]]).max() < ROUND_OFF
-    assert laws.shift[1, 1] > 0.0 > laws.shift[4, 1]  # away with the force
+    assert laws.shift[1, 1] > 0.0 > laws.shift[4, 1]  # the feet yield to the force
 
 
 def test_a_foot_that_measures_nothing_pushes_nothing() -> None:
@@ -129,7 +130,7 @@ def test_the_suspension_lifts_by_its_deflection_and_pushes_a_foot_that_sticks_do
     assert laws.law.deflection[2] > 0.0 > laws.law.deflection[3]
     stuck = stuck_forces(robot, laws)
     assert np.abs(stuck[:, :2]).max() < ROUND_OFF
-    assert stuck[2, 2] < 0.0 < stuck[3, 2]  # the leg carries less where it carried too much
+    assert stuck[2, 2] < 0.0 < stuck[3, 2]  # the leg carries less because it carried too much
 
 
 def test_at_its_share_the_suspension_rests_and_beyond_it_gives_way_by_force_over_stiffness() -> (
@@ -160,8 +161,10 @@ def test_feet_without_a_share_have_no_suspension() -> None:
 def test_giving_way_takes_the_slip_from_legs_that_squeeze_and_resisting_adds_to_it(
     sign: float, low: float, high: float
 ) -> None:
-    """Two legs whose paths drift apart: f = -c x', leg f = (x - path - shift)/C, in backward
-    Euler. Slip with the law over without.
+    """Simulates two legs whose paths drift apart: f = -c x', leg f = (x - path - shift)/C, by
+    backward Euler.
+
+    Compares the distances that the feet slip with the law and without.
     """
     compliance = (contact_jacobians(ROBOT)[1] @ contact_jacobians(ROBOT)[1].T / ROBOT.servo.kp)[
         1, 1
@@ -210,7 +213,7 @@ def test_a_foot_in_the_air_forgets_and_others_do_not() -> None:
     for _ in range(30):
         laws.law.pid.force = laws.law.pid.smooth = np.zeros(
             6, dtype=np.complex128
-        )  # the filter's memory of the force
+        )  # the filter's state, which follows the force
         before = laws.integral
         run(laws, force, 1, standing="101111")
         fade = math.exp(-PERIOD / GAINS.slip.load_time)
@@ -223,7 +226,7 @@ def test_the_answer_is_clamped_in_length_with_its_direction_kept() -> None:
     force[:, :2] = 0.0
     direction = np.array([HOME[0].real, HOME[0].imag]) / abs(
         HOME[0]
-    )  # of two feet that face each other, which squeeze along their line
+    )  # two feet that face each other, which squeeze along the line between them
     force[0, :2], force[5, :2] = 5.0 * direction, -5.0 * direction
     run(laws, force, 400)
     np.testing.assert_allclose(laws.answer[0], 0.1 * WEIGHT / 3.0 * direction, rtol=1e-9)
@@ -242,7 +245,7 @@ def test_back_calculation_frees_the_answer_soon_after_the_force_turns() -> None:
             counts[-1] += 1
     assert (
         counts[0] < 0.1 / PERIOD
-    )  # its limit alone takes 0.02 s to integrate away, the filter another 0.02 s
+    )  # integrating back from the limit takes 0.02 s, the filter another 0.02 s
     assert counts[1] > 150
 
 
@@ -287,8 +290,8 @@ def test_no_weight_is_believed_beyond_reason() -> None:
 
 
 def test_the_torques_carry_the_shares_and_the_legs_without_any_bend() -> None:
-    """kp bend aside, the joints of the stance are told all that holds them: gravity of the links
-    and -J^T of the shares.
+    """Apart from kp bend, the torques of the stance are the links' gravity and -J^T of
+    the shares.
     """
     laws = make_laws(parts=NO_LIMITS)
     plan(laws)
@@ -299,7 +302,7 @@ def test_the_torques_carry_the_shares_and_the_legs_without_any_bend() -> None:
     np.testing.assert_allclose(laws.torque, rest(ROBOT).torque - still, atol=1e-4)
     assert (
         np.abs(laws.bend).max() < 1e-3
-    )  # rad    the suspension's, of the time in which the support grew
+    )  # rad; deflection of the suspension while the support grew
 
 
 def test_corrections_keep_their_rate_and_torques_their_limit() -> None:
@@ -332,6 +335,9 @@ def test_without_its_parts_nothing_is_corrected() -> None:
 
 
 def test_a_force_not_believed_is_replaced_by_the_plans_and_from_three_on_all_are() -> None:
+    """One wrong force is replaced by the planned one; with three or more wrong forces all are
+    replaced.
+    """
     laws, dead, spike = make_laws(gains=make_gains(ROBOT)), squeezing(0.0), squeezing(0.0)
     run(laws, dead, 400)
     dead[1] = 0.0
@@ -383,8 +389,10 @@ def test_saved_laws_go_on_bit_for_bit() -> None:
 
 
 def test_a_sliding_robot_goes_over_to_kinematic_control_and_back_once_it_holds() -> None:
-    """All feet drag by more than half of what they carry: no share and no answer is told any
-    more, and every leg says so.
+    """All feet drag with more than half of their loads.
+
+    The torques then contain neither shares nor answers of the slip PID, and every leg reports
+    fallback.
     """
     laws, calm, sliding = make_laws(), squeezing(), squeezing()
     sliding[:, 0] = -0.6 * WEIGHT / 6.0
@@ -410,7 +418,7 @@ def test_a_sliding_robot_goes_over_to_kinematic_control_and_back_once_it_holds()
 def test_feet_that_carry_less_than_half_the_weight_together_tell_no_slide(
     carried: float, falls_back: bool
 ) -> None:
-    """They have only just met the ground, and skid."""
+    """Such feet have only just met the ground and may skid."""
     laws, sliding = make_laws(), squeezing(0.0)
     run(laws, squeezing(0.0), 400)
     sliding[:, 2] *= carried
@@ -420,8 +428,9 @@ def test_feet_that_carry_less_than_half_the_weight_together_tell_no_slide(
 
 
 def steps_until_fallback(drag: float, total: float) -> int:
-    """Feet that drag by this share of what they carry, together so much of the weight: periods
-    until kinematic control, 0 for never.
+    """Returns the periods until kinematic control, 0 for never.
+
+    Each foot drags by the share `drag` of its load; all feet carry the share `total` of the weight.
     """
     laws, force = make_laws(), squeezing(0.0)
     run(laws, force, 400)
@@ -442,7 +451,7 @@ def steps_until_fallback(drag: float, total: float) -> int:
 def test_a_robot_slides_when_loaded_feet_drag_by_55_percent_for_40_milliseconds(
     drag: float, total: float, count: int
 ) -> None:
-    """At a period of 5 ms: eight times are 40 ms, nine are more."""
+    """At a period of 5 ms, 40 ms are eight periods; the ninth is longer."""
     assert steps_until_fallback(drag, total) == count
 
 
@@ -460,7 +469,8 @@ def test_feet_are_trusted_again_half_a_cycle_after_the_last_slide() -> None:
     while laws.trust < 1.0:
         laws.feel(calm)
         count += 1
-    # 1 - e^(-t/load_time) to within 1 %, all feet's fallback told from the first of these steps on
+    # trust rises by 1 - e^(-t/load_time), here to 0.99; from the first step of the rise on no foot
+    # reports fallback
     assert count == pytest.approx(
         0.5 * ROBOT.gait.period / PERIOD + math.log(100.0) * GAINS.slip.load_time / PERIOD, abs=1
     )
@@ -490,8 +500,8 @@ def test_a_leg_that_should_stand_and_does_not_is_given_no_share_until_it_does() 
 
 
 def test_a_robot_that_outruns_its_joints_goes_over_to_kinematic_control() -> None:
-    """By the share of the time in which some joint is asked for too much, smoothed over a gait
-    cycle; and back when it is less.
+    """The criterion is the share of time in which a joint exceeds its speed, smoothed over a gait
+    cycle. Control becomes compliant again when the share falls.
     """
     laws, force = make_laws(), squeezing()
     run(laws, force, 400)

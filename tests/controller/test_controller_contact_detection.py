@@ -1,5 +1,5 @@
-"""Touch-down and lift-off without flicker, and sensors that are wrong told from ground that is
-not there.
+"""Tests the detection of touch-down and lift-off without flicker, and the distinction between
+faulty sensors and missing ground.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ import pytest
 from hexapod_cosim.controller.sense.contact_detection import ContactDetector, SensorWatch
 
 WEIGHT, CYCLE, PERIOD = 50.0, 1.0, 0.005  # N, s, s
-TOUCHES, LIFTS = 1.0, 0.25  # N    2 and 0.5 % of the weight
+TOUCHES, LIFTS = 1.0, 0.25  # N; 2 % and 0.5 % of the weight
 NONE, ALL = np.zeros(6, dtype=bool), np.ones(6, dtype=bool)
 
 
@@ -34,7 +34,7 @@ def test_a_foot_touches_down_above_2_percent_of_the_weight_and_lifts_off_below_h
 @pytest.mark.parametrize("level", [TOUCHES, LIFTS, 0.5 * (TOUCHES + LIFTS)])
 def test_noise_on_a_force_near_a_threshold_makes_no_foot_flicker(level: float) -> None:
     detector, generator = ContactDetector(WEIGHT), np.random.default_rng(0)
-    noise = (TOUCHES - LIFTS) / 3.0  # a third of the hysteresis to either side
+    noise = (TOUCHES - LIFTS) / 3.0  # N; a third of the hysteresis to either side
     states = np.array(
         [detector.step(level + generator.uniform(-noise, noise, 6)) for _ in range(2000)]
     )
@@ -52,7 +52,7 @@ def test_feet_are_told_apart_and_what_was_found_before_is_left_alone() -> None:
 
 
 def until_doubted(watch: SensorWatch, leg: int, **seen: np.ndarray | float) -> int:
-    """Looks until the sensor is doubted, none of the others ever."""
+    """Returns the time [s] after which a sensor is doubted; no other sensor may ever be doubted."""
     for count in range(1, 1000):
         doubted = watch.look(**seen)  # type: ignore[arg-type]
         assert not any(doubted[other] for other in range(6) if other != leg)
@@ -64,7 +64,7 @@ def until_doubted(watch: SensorWatch, leg: int, **seen: np.ndarray | float) -> i
 def test_a_dead_sensor_of_a_foot_that_carries_is_doubted_after_a_tenth_of_a_second() -> None:
     watch = SensorWatch(WEIGHT, cycle=CYCLE, period=PERIOD)
     count = until_doubted(watch, 2, touching=but(2), total=40.0, standing=ALL, high=NONE)
-    assert count in {20, 21}  # times are sums
+    assert count in {20, 21}  # times are sums of periods
 
 
 def test_a_stuck_sensor_of_a_foot_in_mid_swing_is_doubted_after_60_milliseconds() -> None:
@@ -76,7 +76,7 @@ def test_a_stuck_sensor_of_a_foot_in_mid_swing_is_doubted_after_60_milliseconds(
 def test_a_missing_foothold_whose_weight_the_others_carry_is_not_a_dead_sensor() -> None:
     watch = SensorWatch(WEIGHT, cycle=CYCLE, period=PERIOD)
     for _ in range(1000):
-        assert not any(watch.look(but(2), 46.1, ALL, NONE))  # N    92 % of the weight are 46
+        assert not any(watch.look(but(2), 46.1, ALL, NONE))  # N; 92 % of the weight are 46
     assert not watch.busy()
     assert until_doubted(watch, 2, touching=but(2), total=45.9, standing=ALL, high=NONE)
 
@@ -112,7 +112,7 @@ def test_a_sensor_that_stays_dead_stays_doubted() -> None:
     watch = SensorWatch(WEIGHT, cycle=CYCLE, period=PERIOD)
     until_doubted(watch, 2, touching=but(2), total=0.5 * WEIGHT, standing=ALL, high=NONE)
     for k in range(1000):
-        stands = k // 100 % 2 == 0  # walking: dead in the stance only
+        stands = k // 100 % 2 == 0  # the robot walks, and the sensor is dead in stance only
         assert watch.look(
             but(2), 0.5 * WEIGHT, ALL if stands else but(2), NONE if stands else only(2)
         )[2]

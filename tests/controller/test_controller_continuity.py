@@ -1,5 +1,5 @@
-"""What the servos are told to carry does not jump when feet touch down or lift off, nor when a
-walk begins and ends.
+"""Tests that torque references do not jump when feet touch down or lift off, nor when a walk begins
+or ends.
 """
 
 from __future__ import annotations
@@ -17,15 +17,17 @@ PERIODS = (0.002, 0.001)  # s
 LARGEST = {
     "athena": 3.2,
     "phantomx_mk4": 1.7,
-}  # N m    of 5.4 and 2.7 allowed: what the middle leg of a tripod needs, and gear friction
+}  # N m; of 5.4 and 2.7 allowed: load of the middle leg of a tripod, and gear friction
 STANDING, WALKING = 0.2, 3.3  # s
 STOPPING = 2.5  # cycles
 
 
 @cache
 def torques(name: str, gait: str, period: float) -> np.ndarray:
-    """(steps, 6, 3) torque_ref [N m] of a robot that does what is planned, its weight known from
-    the start: it stands, walks and stops.
+    """Returns torque_ref (steps, 6, 3) [N m] of a robot that stands, walks and stops exactly as
+    planned.
+
+    Its weight is known from the start.
     """
     robot = load_robot(name)
     timing = make_gait(robot, gait)
@@ -52,7 +54,7 @@ def torques(name: str, gait: str, period: float) -> np.ndarray:
 
 
 def steepest(name: str, gait: str, period: float) -> float:
-    """N m    largest change in a period once the walk is under way"""
+    """Returns the largest change of a torque in a period [N m], once the walk is under way."""
     under_way = slice(round((STANDING + 1.2) / period), round((STANDING + WALKING) / period))
     return float(np.abs(np.diff(torques(name, gait, period)[under_way], axis=0)).max())
 
@@ -68,9 +70,9 @@ def test_the_largest_torque_is_what_the_load_needs_whatever_the_period(
 
 @pytest.mark.parametrize("name", LARGEST)
 def test_torques_are_continuous_over_touch_downs_and_lift_offs(name: str) -> None:
-    """A hand-over changes 3 N m by at most 1.9/0.05 s, 0.11 N m in 1 ms.
+    """A hand-over changes 3 N m by at most 1.9/0.05 s, which is 0.11 N m in 1 ms.
 
-    Gears' friction that reverses and feet that begin to press in add to that.
+    Gear friction that reverses, and feet that begin to press into the ground, add to it.
     """
     coarse, fine = (steepest(name, "tripod", period) for period in PERIODS)
     assert coarse < 0.6
@@ -79,7 +81,7 @@ def test_torques_are_continuous_over_touch_downs_and_lift_offs(name: str) -> Non
 
 @pytest.mark.parametrize("gait", ["tripod", "ripple", "wave"])
 def test_no_torque_jumps_when_a_walk_begins_or_ends(gait: str) -> None:
-    """Legs that begin in the time of their swing or stay at home have no hand-over; what is left
-    is how the others begin and end theirs.
+    """Legs that begin during their swing, or stay at home, have no hand-over. The remaining change
+    is how the other legs begin and end theirs.
     """
     assert np.abs(np.diff(torques("athena", gait, 0.002), axis=0)).max() < 0.8

@@ -1,4 +1,4 @@
-"""The laws of a foot: its parts, and nothing but its parts."""
+"""Tests that the laws of a foot are the sum of its parts."""
 
 from __future__ import annotations
 
@@ -15,18 +15,18 @@ from hexapod_cosim.controller.comply.suspension import discretise
 from hexapod_cosim.models import load_robot
 
 GAINS = replace(make_gains(load_robot("athena")), slip=replace(SLIP, kd=0.002))
-ROUND_OFF = 1e-12  # N, m: of sums of a few products of order 1 to 10
+ROUND_OFF = 1e-12  # N, m; sums of a few products of order 1 to 10
 STEPS = 60
 
 
 def inputs(seed: int = 5) -> np.ndarray:
-    """(steps, 6, 4) forces x, y, z [N] and loads [1]."""
+    """Returns forces x, y, z [N] and loads [1] of the feet, shape (steps, 6, 4)."""
     generator = np.random.default_rng(seed)
     return np.asarray(generator.normal(size=(STEPS, 6, 4)) * [3.0, 3.0, 10.0, 0.5])
 
 
 def stepped(law: FootLaw, given: np.ndarray) -> np.ndarray:
-    """(6, 5) answer x and y, deflection, its rate and load after a step."""
+    """Returns answer x and y, deflection, its rate and load (6, 5) after a step."""
     law.step(given[:, 0] + 1j * given[:, 1], given[:, 2], given[:, 3])
     return np.column_stack([law.answer.real, law.answer.imag, law.deflection, law.rate, law.load])
 

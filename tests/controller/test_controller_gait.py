@@ -1,4 +1,4 @@
-"""Gaits: who stands when, and whether that carries the robot."""
+"""Tests gaits: which legs stand at which time, and whether they carry the robot."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ import pytest
 from hexapod_cosim.controller import PATTERNS, LegSolver, make_gait
 from hexapod_cosim.models import GAITS, HexapodError, load_robot
 
-CLOCKS = np.linspace(0.0, 1.0, 240, endpoint=False) + 1e-7  # cycles, off the switching points
-# front right, mid right, rear right, rear left, mid left, front left: multiplier x offset / (stance
-# + swing)
+CLOCKS = np.linspace(0.0, 1.0, 240, endpoint=False) + 1e-7  # cycles, away from the switching points
+# order: front right, mid right, rear right, rear left, mid left, front left; multiplier x offset /
+# (stance + swing)
 OPENSHC = {
     "tripod": np.array([0, 1, 0, 1, 0, 1]) * 2 / 4,
     "ripple": np.array([2, 0, 4, 1, 3, 5]) * 1 / 6,
@@ -22,8 +22,8 @@ OPENSHC = {
 
 
 def margin(feet: np.ndarray) -> float:
-    """Distance from the origin to the edge of the convex hull of feet (n, 2) [m]; negative
-    outside.
+    """Returns the distance [m] from the origin to the edge of the convex hull of feet (n, 2),
+    negative outside.
     """
     if len(feet) < 3:
         return -np.inf

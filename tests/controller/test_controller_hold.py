@@ -1,5 +1,5 @@
-"""The slow loops, seen through ideal geometry: feet fixed to the ground under a torso that lies
-or walks otherwise than planned.
+"""Tests the slow loops on ideal geometry: the feet are fixed to the ground, and the torso lies or
+walks otherwise than planned.
 """
 
 from __future__ import annotations
@@ -16,8 +16,8 @@ from standing import HOME
 from hexapod_cosim.controller import Parts
 from hexapod_cosim.controller.walk.hold import Hold, Sight, fit_plane
 
-LEVEL = np.full(6, -0.12)  # m    planned heights of the feet
-LOADS = np.full(6, 0.5)  # of a third of the weight
+LEVEL = np.full(6, -0.12)  # m; planned heights of the feet
+LOADS = np.full(6, 0.5)  # relative to a third of the weight
 LOOKS = 200
 EXACT = 1e-12
 
@@ -27,7 +27,7 @@ def make(parts: Parts | None = None, **changes: float) -> Hold:
 
 
 def sight(**changes: Any) -> Sight:
-    """At rest, as planned."""
+    """Returns what the loops see of a robot that rests as planned, with changes."""
     still = Sight(HOME, LEVEL, HOME, LEVEL, LOADS, np.zeros(2), 0.0, 0j, 0.0)
     values: dict[str, Any] = {
         name: np.array(value) if isinstance(value, list | tuple) else value
@@ -37,14 +37,14 @@ def sight(**changes: Any) -> Sight:
 
 
 def seen_heights(low: float, roll: float, pitch: float) -> np.ndarray:
-    """Feet on a plane, seen from a torso that is so much too low and turned against it: to first
-    order.
+    """Returns heights (6,) of feet on a plane, seen from a torso that is too low by `low` [m] and
+    inclined, to first order.
     """
     return np.asarray(LEVEL + low + HOME.real * pitch - HOME.imag * roll)
 
 
 def plane(height: np.ndarray, weights: np.ndarray) -> np.ndarray:
-    """(3,) of the feet in the stance."""
+    """Returns the coefficients (3,) of the plane through the feet of the stance."""
     found = fit_plane(HOME, height, weights)
     assert found is not None
     return found
@@ -58,16 +58,16 @@ def settle(
     pitch: float = 0.0,
     ground: tuple[float, float] = (0.0, 0.0),
 ) -> Iterator[np.ndarray]:
-    """What is left of a wrong height and tilt [m, rad, rad] against level feet, as the lift of the
-    feet takes effect.
+    """Yields the remaining error of height and tilt [m, rad, rad] while the lift of the feet takes
+    effect.
 
-    Raising the feet by lift = a + b x + c y (torso axes) lowers the torso by a, and turns it.
+    Raising the feet by lift = a + b x + c y (torso axes) lowers the torso by a and inclines it.
     """
     base = np.column_stack([np.ones(6), HOME.real, HOME.imag])
     for _ in range(LOOKS):
         a, b, c = np.linalg.lstsq(base, np.array(hold.lift), rcond=None)[0]
-        # with the feet raised by b x in the torso's axes and standing on the ground, the nose comes
-        # down: pitch grows by b, roll by -c
+        # raising the feet by b x in torso axes while they stand on the ground lowers the nose:
+        # pitch grows by b, roll by -c
         now = np.add([low, roll, pitch], [a, -c, b])
         tilt = now[1] + ground[0], now[2] + ground[1]
         hold.look(sight(height=seen_heights(*now), tilt=tilt))
@@ -92,6 +92,7 @@ def test_a_plane_near_points_is_the_weighted_least_squares() -> None:
 
 
 def test_feet_in_the_air_tell_nothing_and_two_or_three_in_a_line_no_plane() -> None:
+    """Feet in the air are ignored; two or three feet in a line define no plane."""
     height, line = (
         np.array([5.0, 0.0, 5.0, 0.0, 5.0, 0.0]),
         np.array([0j, 0.1 + 0.1j, 0.2 + 0.2j, 0j, 0j, 0j]),
@@ -119,7 +120,8 @@ def test_a_torso_that_lies_wrong_is_driven_back_at_the_stated_rates(
     hold = make()
     left = np.array(list(settle(hold, low=low, roll=roll, pitch=pitch)))
     time = hold.every * PERIOD * np.arange(LOOKS)
-    # an integral over rate x time steps: (1 - rate h)^k, which is e^(-rate t) but for rate h / 2
+    # an integrator with time steps h: (1 - rate h)^k, which differs from e^(-rate t) by a relative
+    # rate h/2
     np.testing.assert_allclose(
         left[:, 0],
         low * (1.0 - HOLD.height_rate * hold.every * PERIOD) ** np.arange(LOOKS),
@@ -140,7 +142,9 @@ def test_on_a_slope_the_torso_is_held_parallel_to_it() -> None:
 
 
 def test_ground_that_begins_to_slope_is_followed_with_its_time() -> None:
-    """The tilt that the sensor gives is at first held against; then it is the ground's."""
+    """The loop first compensates the tilt that the sensor measures; later it attributes the tilt to
+    the ground.
+    """
     hold = make()
     list(settle(hold))
     first = np.array(list(settle(hold, ground=(0.0, 0.03))))
@@ -151,8 +155,8 @@ def test_ground_that_begins_to_slope_is_followed_with_its_time() -> None:
 
 
 def test_commanded_tilts_are_no_errors() -> None:
-    """The tilt given is beyond the command, the feet are where they were planned: nothing is
-    corrected.
+    """The measured tilt excludes the commanded one and the feet are where they were planned, so
+    nothing is corrected.
     """
     hold = make()
     for _ in range(50):
@@ -184,7 +188,7 @@ def test_a_foot_counts_from_three_tenths_of_a_third_of_the_weight_on() -> None:
 
 
 def test_three_feet_span_a_plane_from_a_determinant_of_a_millionth_on() -> None:
-    """m4, of the covariance of three feet at 0, a and i b: a^2 b^2/27."""
+    """The determinant [m4] is that of the covariance of three feet at 0, a and i b: a^2 b^2/27."""
     for b, spans in ((0.0515, False), (0.0525, True)):
         found = fit_plane(
             np.array([0j, 0.1, 1j * b, 0j, 0j, 0j]),
@@ -203,8 +207,10 @@ def walk(
     told: tuple[complex, float],
     looks: int = 100,
 ) -> tuple[complex, float]:
-    """Feet fixed to the ground under a torso that moves with a steady twist, all but `legs` in
-    the air. The true way and heading.
+    """Moves a torso with a steady twist over feet fixed to the ground; all but `legs` are in the
+    air.
+
+    Returns the true displacement and heading.
     """
     way, yaw, time = 0j, 0.0, hold.every * PERIOD
     loads = [1.0 if leg in legs else 0.0 for leg in range(6)]
@@ -214,7 +220,7 @@ def walk(
         feet = np.exp(-1j * yaw) * (HOME - way)
         shaken = np.where(
             np.array(loads) > 0.0, feet, feet + 0.1 * np.sin(k)
-        )  # feet in the air go anywhere
+        )  # feet in the air may be anywhere
         hold.look(sight(plane=shaken, load=loads, yaw=yaw, velocity=told[0], yaw_rate=told[1]))
     return way, yaw
 
@@ -229,7 +235,7 @@ def test_the_way_and_heading_lost_are_the_commanded_less_the_true_ones_whichever
     way, yaw = walk(hold, 0.07 - 0.02j, yaw_rate, legs=legs, told=told, looks=looks)
     time = hold.every * PERIOD * looks
     assert hold.heading == pytest.approx(told[1] * time - yaw, abs=1e-9)
-    # the commanded way, along the commanded heading half-way through each look
+    # the commanded displacement, along the commanded heading in the middle of each look
     middle = told[1] * hold.every * PERIOD * (np.arange(looks) + 0.5)
     commanded = (told[0] * np.exp(1j * middle) * hold.every * PERIOD).sum()
     assert hold.way == pytest.approx(commanded - way, abs=1e-9)
@@ -238,9 +244,7 @@ def test_the_way_and_heading_lost_are_the_commanded_less_the_true_ones_whichever
 def test_a_walk_as_commanded_loses_nothing() -> None:
     hold = make()
     walk(hold, 0.08 - 0.02j, 0.3, legs=(0, 2, 4), told=(0.08 - 0.02j, 0.3))
-    arc = (
-        (0.3 * hold.every * PERIOD) ** 2 / 24.0 * 0.08 * 4.0
-    )  # m    chord and arc differ by so much of the way
+    arc = (0.3 * hold.every * PERIOD) ** 2 / 24.0 * 0.08 * 4.0  # m; difference of arc and chord
     assert abs(hold.way) < 1.1 * arc
     assert hold.heading == pytest.approx(0.0, abs=EXACT)
 
@@ -265,15 +269,15 @@ def test_without_a_foot_that_stood_all_the_time_the_way_is_taken_as_commanded() 
 def test_steering_drives_a_steady_loss_to_a_steady_correction_that_makes_it_good(
     heading: float,
 ) -> None:
-    """The robot walks 6 mm/s less than it is told, and turns 0.01 rad/s more."""
+    """The robot walks 6 mm/s less than commanded and turns 0.01 rad/s more."""
     hold, time, way, yaw = make(), make().every * PERIOD, 0j, heading
     for _ in range(600):
         feet = np.exp(-1j * yaw) * (HOME - way)
         hold.look(sight(plane=feet, yaw=yaw, velocity=0.08 + 0j, yaw_rate=0.0))
         way += np.exp(1j * yaw) * (0.08 + hold.velocity - 0.006) * time
         yaw += (hold.yaw_rate + 0.01) * time
-    # the turn leaves a heading behind, so the robot walks a little sideways to keep to the
-    # commanded one
+    # the turn leaves a constant heading error, so the robot walks a little sideways to keep to the
+    # commanded heading
     assert hold.heading == pytest.approx(-0.01 / HOLD.path_rate, rel=1e-3)
     assert hold.velocity == pytest.approx(
         0.006 + 0.08 * (np.exp(1j * hold.heading) - 1.0), abs=1e-4

@@ -1,4 +1,6 @@
-"""What a planned motion asks for, against the multibody twin: body by body, by virtual work."""
+"""Tests the forces and torques that a planned motion requires against the multibody twin, body by
+body, by virtual work.
+"""
 
 from __future__ import annotations
 
@@ -26,10 +28,12 @@ POINT = (
     0.0,
     0.0,
     0.0,
-)  # kg m2    of a body that is a point as far as anything here can tell
-BALL = (2e-4, 2e-4, 2e-4, 0.0, 0.0, 0.0)  # kg m2    alike about all axes
-ROUND_OFF = 1e-9  # N, N m    second differences of 1 m: 4 eps / h^2 = 4e-11 m/s2, of some kg
-# N m    the twin's axes turn by (h w)^2 = 3e-5 in a period: of rotors of 0.01 kg m2 at 10 rad/s2
+)  # kg m2; negligible, as of a point mass
+BALL = (2e-4, 2e-4, 2e-4, 0.0, 0.0, 0.0)  # kg m2; equal about all axes
+# N, N m; second differences of 1 m have errors of 4 eps/h^2 = 4e-11 m/s2, times some kg
+ROUND_OFF = 1e-9
+# N m; the twin's axes turn by (h w)^2 = 3e-5 in a period, which acts on rotors of 0.01 kg m2 at 10
+# rad/s2
 SWEPT = 2e-6
 SWINGING = np.array([True, False, True, False, True, False])
 
@@ -39,8 +43,8 @@ def wave(size: float, rate: float, at: float) -> Callable[[np.ndarray], np.ndarr
 
 
 def moving(robot: Robot, *, turning: float, leaning: float, start: float) -> tuple[Motion, Demand]:
-    """Three steps of a torso that sways, turns and leans over three standing feet while three
-    others swing.
+    """Returns three time steps of a torso that sways, turns and leans over three standing feet
+    while three others swing.
     """
     t = start + PERIOD * np.arange(-1.0, 2.0)
     legs = LegSolver(robot)
@@ -77,8 +81,8 @@ def moving(robot: Robot, *, turning: float, leaning: float, start: float) -> tup
 
 
 def differences(robot: Robot, motion: Motion, demand: Demand) -> dict[str, float]:
-    """By how much a demand misses what the twin needs: largest errors of push and weight [N],
-    moment and torques [N m].
+    """Returns the largest errors of a demand against the twin: push and weight [N], moment and
+    torques [N m].
     """
     needed, body, _ = twin_needs(robot, motion, 1)
     floor = HIGH + LegSolver(robot).forward(robot.stance)[:, 2].mean() - robot.foot.radius
@@ -98,7 +102,7 @@ def differences(robot: Robot, motion: Motion, demand: Demand) -> dict[str, float
 
 
 def points(robot: Robot, *, link: tuple[float, ...] = POINT) -> Robot:
-    """The robot with all its mass in points, or its links' in balls."""
+    """Returns the robot with all its masses as points, or with its links' masses as balls."""
     robot = changed(robot, torso={"inertia": POINT})
     for joint in range(3):
         robot = with_links(robot, joint, inertia=link)
@@ -139,8 +143,8 @@ def test_turning_links_are_exact_when_alike_about_all_axes_and_the_torso_does_no
 def test_what_is_left_out_of_the_robots_motion_is_small(
     name: str, turning: float, leaning: float
 ) -> None:
-    """Angular accelerations here reach 10 rad/s2 of joints and 2 rad/s2 of the torso; inertias
-    5e-4 and 0.035 kg m2.
+    """Joints reach angular accelerations of 10 rad/s2 and the torso 2 rad/s2; the inertias are 5e-4
+    and 0.035 kg m2.
     """
     robot = load_robot(name)
     for start in STARTS:
@@ -148,7 +152,7 @@ def test_what_is_left_out_of_the_robots_motion_is_small(
         found = differences(robot, motion, demand)
         assert max(found["push"], found["weight"]) < ROUND_OFF
         assert found["torque"] < 5e-4 * 10.0
-        # links mostly turn against each other
+        # most contributions of links cancel each other
         assert max(found["moment"], found["twist"]) < 18 * 5e-4 * 10.0 * 0.1 + leaning * 0.035 * 2.0
 
 

@@ -1,4 +1,6 @@
-"""The legs' closed-form kinematics against the twin's rotations, differences and each other."""
+"""Tests the closed-form kinematics of the legs against the twin's rotations, differences, and each
+other.
+"""
 
 from __future__ import annotations
 
@@ -11,14 +13,14 @@ from hexapod_cosim.controller import LegSolver
 from hexapod_cosim.controller.walk.kinematics import Joints
 from hexapod_cosim.models import ReachError, Robot, RobotError, foot_positions, load_robot
 
-ROUND_OFF = 1e-12  # m, rad    of a dozen operations on numbers of order 1
-STEP = 1e-6  # rad    of central differences: truncation 1e-12, round-off 1e-10
+ROUND_OFF = 1e-12  # m, rad; a dozen operations on numbers of order 1
+STEP = 1e-6  # rad, step of central differences: truncation 1e-12, round-off 1e-10
 DIFFERENCE_ERROR = 1e-8  # m/rad
 POSES = 200
 
 
 def robots() -> list[Robot]:
-    """The two packaged robots and one whose legs differ, with sideways offsets."""
+    """Returns the two packaged robots, and one whose legs differ and have sideways offsets."""
     athena = load_robot("athena")
     legs = list(athena.legs)
     coxa, femur, tibia = legs[1].links
@@ -38,8 +40,10 @@ def robot(request: pytest.FixtureRequest) -> Robot:
 
 
 def reachable_poses(robot: Robot, count: int = POSES) -> np.ndarray:
-    """Random joint angles within the limits, knee up and the foot outside the coxa axis: where
-    the inverse is unique.
+    """Returns random joint angles within the limits, with the knee up and the foot outside the coxa
+    axis.
+
+    There the inverse is unique.
     """
     solver, generator = LegSolver(robot), np.random.default_rng(7)
     found: list[np.ndarray] = []
@@ -55,12 +59,12 @@ def reachable_poses(robot: Robot, count: int = POSES) -> np.ndarray:
 
 
 def plane(rows: np.ndarray) -> np.ndarray:
-    """x + i y of rows (..., 3)."""
+    """Returns x + i y of rows (..., 3)."""
     return np.asarray(rows[..., 0] + 1j * rows[..., 1])
 
 
 def solved(solver: LegSolver, foot: np.ndarray, velocity: np.ndarray) -> Joints:
-    """Joints of feet (n, 6, 3) that move so."""
+    """Returns joint angles and speeds for positions and velocities of feet (n, 6, 3)."""
     return solver.solve(solver.pose(plane(foot), foot[..., 2]), plane(velocity), velocity[..., 2])
 
 
@@ -76,7 +80,7 @@ def test_the_inverse_of_forward_is_the_identity(robot: Robot) -> None:
     for angle in reachable_poses(robot):
         np.testing.assert_allclose(
             solver.inverse(solver.forward(angle)), angle, atol=1e-9
-        )  # arccos near a straight leg
+        )  # arccos loses digits near a straight leg
 
 
 def test_the_jacobian_is_the_slope_of_forward_kinematics(robot: Robot) -> None:
@@ -103,8 +107,8 @@ def test_many_poses_at_once_are_the_same_as_each_by_itself(robot: Robot) -> None
 
 
 def test_a_pose_says_where_the_links_point(robot: Robot) -> None:
-    """Foot and knee put together again from the directions, against forward kinematics of the
-    angles.
+    """Computes foot and knee from the directions of the links and compares them with the forward
+    kinematics of the angles.
     """
     solver, foot = LegSolver(robot), LegSolver(robot).forward(reachable_poses(robot, 50))
     pose = solver.pose(plane(foot), foot[..., 2])
@@ -181,7 +185,7 @@ def test_solve_stays_within_the_limits_and_flags_the_leg() -> None:
     solver = LegSolver(robot)
     foot = solver.forward(robot.stance)
     foot[0] *= 3.0
-    foot[5] = solver.hip[:, 5]  # on the coxa's axis
+    foot[5] = solver.hip[:, 5]  # on the axis of the coxa
     joints = solved(solver, foot[None], np.tile([0.1, 0.0, 0.0], (1, 6, 1)))
     assert joints.unreachable.tolist() == [[True, False, False, False, False, True]]
     assert (joints.angle >= solver.angle_min).all()

@@ -1,5 +1,6 @@
-"""At what height feet are expected to meet the ground: what all have in common, or a foot twice,
-is no bump.
+"""Tests at what height a foot is expected to meet the ground.
+
+A height that all feet have in common, or that one foot met twice, does not count as a bump.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ ONLY_TOUCHDOWN = Parts(slip_pid=False, suspension=False, support=False, fallback
 
 
 def step(landings: Landings, swinging: np.ndarray, heights: list[float]) -> None:
-    """These legs swing and come down at heights [m]; the others stand."""
+    """Takes a step in which these legs swing and land at heights [m], while the others stand."""
     landings.look(~swinging, np.full(6, 0.03), swinging)
     landings.look(ALL, np.array(heights), swinging)
     landings.look(ALL, LOW, NONE)
@@ -52,7 +53,8 @@ def test_a_foot_is_expected_where_it_came_down_a_step_before() -> None:
         step(landings, swinging, [0.0] * 6)
     np.testing.assert_array_equal(landings.expected(ALL, LOW, NONE), 0.0)
     step(landings, FIRST, [0.012, 0.0, 0.0, 0.0, 0.0, 0.0])
-    assert landings.expected(ALL, LOW, NONE)[0] == 0.0  # the first time it is a bump
+    # the first landing at this height counts as a bump
+    assert landings.expected(ALL, LOW, NONE)[0] == 0.0
     step(landings, FIRST, [0.012, 0.0, 0.0, 0.0, 0.0, 0.0])
     np.testing.assert_allclose(landings.expected(ALL, LOW, NONE), [0.012, 0.0, 0.0, 0.0, 0.0, 0.0])
 
@@ -79,7 +81,7 @@ def test_what_is_saved_does_not_change() -> None:
 def test_a_foot_is_early_that_meets_the_ground_two_millimetres_above_where_it_is_expected(
     above: float, early: bool
 ) -> None:
-    """All feet have come down at 10 mm before; now foot 0 meets a bump."""
+    """All feet have landed at 10 mm before; now foot 0 meets a bump."""
     landings = Landings()
     for swinging in (FIRST, ~FIRST, FIRST, ~FIRST):
         step(landings, swinging, [0.010] * 6)
@@ -104,7 +106,7 @@ def test_a_foot_is_early_only_while_its_path_is_two_millimetres_above_the_common
 def test_a_path_less_than_two_millimetres_above_its_end_is_not_well_above_the_ground(
     height: float, falls: bool
 ) -> None:
-    """A foot that comes down at 0.05 m/s falls by 0.05 times the control period."""
+    """A foot that moves down at 0.05 m/s falls by 0.05 times the control period."""
     laws = make_laws(parts=ONLY_TOUCHDOWN)
     plan(laws, standing="101111", height=height, rise=-0.05)
     assert laws.planned.well_up.tolist() == [False, falls, False, False, False, False]
@@ -112,8 +114,10 @@ def test_a_path_less_than_two_millimetres_above_its_end_is_not_well_above_the_gr
 
 
 def walk(laws: Laws, ground: np.ndarray, steps: int) -> list[np.ndarray]:
-    """Two tripods in turn, feet that come down from 25 mm at 0.25 m/s onto ground so high [m]
-    (6,). Offsets at the end of each step.
+    """Walks with two alternating tripods whose feet come down from 25 mm at 0.25 m/s onto ground of
+    these heights [m] (6,).
+
+    Returns the offsets at the end of each step.
     """
     found = []
     for k in range(steps):
@@ -138,7 +142,9 @@ def test_ground_that_all_feet_meet_early_raises_none_and_a_bump_raises_the_foot_
 
 
 def test_feet_that_drag_through_soft_ground_have_no_broken_sensors() -> None:
-    """They touch 20 mm above the ends of their paths, a quarter of the step height is 10 mm."""
+    """The feet touch the ground 20 mm above the ends of their paths; a quarter of the step height
+    is 10 mm.
+    """
     laws = make_laws()
     walk(laws, np.full(6, 0.02), 8)
     assert not laws.doubted.any()

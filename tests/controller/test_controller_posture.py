@@ -1,5 +1,5 @@
-"""The torso over its feet: from the walking frame to the torso's, and the velocities that go
-with it.
+"""Tests the transformation of feet from the walking frame to the torso's frame, with their
+velocities.
 """
 
 from __future__ import annotations
@@ -12,13 +12,13 @@ from hexapod_cosim.controller.walk.kinematics import Feet
 from hexapod_cosim.models.kinematics import axis_rotation
 
 ROUND_OFF = 1e-14  # m
-STEP = 1e-4  # s    of central differences: truncation STEP^2 x 5^3 x 0.2 m / 6
+STEP = 1e-4  # s, step of central differences: truncation STEP^2 x 5^3 x 0.2 m/6
 DIFFERENCE_ERROR = 1e-7  # m/s
 TIMES = (0.1, 0.3, 0.7, 1.1)
 
 
 def moving_feet(t: float) -> Feet:
-    """Feet that go round in the walking frame, with their velocities."""
+    """Returns feet that move on circles in the walking frame, with their velocities."""
     legs = np.arange(6.0)
     plane = 0.2 * np.exp(1j * legs) + 0.03 * np.exp(1j * (3.0 * t + legs))
     height = -0.12 + 0.02 * np.sin(4.0 * t + legs)
@@ -26,7 +26,7 @@ def moving_feet(t: float) -> Feet:
 
 
 def posture(t: float) -> Posture:
-    """A torso whose height, roll and pitch all move."""
+    """Returns a torso whose height, roll and pitch all change."""
     value = np.array(
         [0.01 * np.sin(2.0 * t), 0.3 * np.sin(3.0 * t + 0.5), 0.2 * np.sin(5.0 * t - 1.0)]
     )

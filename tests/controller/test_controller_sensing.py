@@ -1,5 +1,5 @@
-"""What compliant control makes of its sensors: forces in the right axes, feet where they are,
-sensors that lie.
+"""Tests how compliant control uses its sensors: axes of forces, positions of feet,
+wrong sensors.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ def test_the_slow_loops_see_a_robot_that_does_what_is_planned_where_it_is_planne
     for sight in seen[-10:]:
         lag = (
             PERIOD * (0.05 + 0.1 * 0.3) if command.vx else 0.0
-        )  # m    the joints are where they were told to be a period ago
+        )  # m; joints are where they were commanded to be a period ago
         standing = np.array(sight.load) > 0.5
         np.testing.assert_allclose(
             np.array(sight.plane)[standing], np.array(sight.planned)[standing], atol=lag + 2e-5
@@ -58,7 +58,7 @@ def test_the_slow_loops_see_a_robot_that_does_what_is_planned_where_it_is_planne
         )
         assert sight.tilt.tolist() == pytest.approx(
             [-command.roll, -command.pitch], abs=1e-9
-        )  # of a torso that is told to lie level
+        )  # the torso is commanded to be level
         assert (sight.velocity, sight.yaw_rate, sight.yaw) == (
             complex(command.vx, command.vy),
             command.yaw_rate,
@@ -67,7 +67,7 @@ def test_the_slow_loops_see_a_robot_that_does_what_is_planned_where_it_is_planne
 
 
 def test_reaching_for_missing_ground_is_told_to_the_servos_as_speed() -> None:
-    """Foot 1 feels nothing, the others carry its load."""
+    """Foot 1 measures no force, the other feet carry its load."""
     controller = make(
         compliant=True,
         parts=Parts(slip_pid=False, suspension=False, support=False, posture=False, path=False),
@@ -78,7 +78,7 @@ def test_reaching_for_missing_ground_is_told_to_the_servos_as_speed() -> None:
     moved = run(controller, BodyCommand(), 100, measurement=measurement)[:, :2, 1]
     slope = np.diff(moved[:, 0], axis=0) / PERIOD
     reaching = np.abs(slope).max(axis=1) > 0.0
-    assert 40 < reaching.sum() < 60  # 20 mm at 0.08 m/s
+    assert 40 < reaching.sum() < 60  # periods in 20 mm at 0.08 m/s
     np.testing.assert_allclose(moved[1:, 1][reaching][:-1], slope[reaching][:-1], rtol=1e-6)
     assert not moved[1:, 1][~reaching].any()
     assert controller.diagnostics.lift[1] < -0.019
@@ -88,7 +88,7 @@ def test_reaching_for_missing_ground_is_told_to_the_servos_as_speed() -> None:
 def test_steering_is_led_over_without_a_jump_and_looked_at_afresh_only_when_asked() -> None:
     compliant, ramp = (
         make(compliant=True).compliant,
-        np.minimum(np.arange(41) * PERIOD / 0.1, 1.0),  # over 0.1 s
+        np.minimum(np.arange(41) * PERIOD / 0.1, 1.0),  # the ramp takes 0.1 s
     )
     assert compliant is not None
 
@@ -104,7 +104,7 @@ def test_steering_is_led_over_without_a_jump_and_looked_at_afresh_only_when_aske
     np.testing.assert_allclose(
         steered(afresh=True), ramp[7] * goal + np.outer(ramp, other - ramp[7] * goal), atol=1e-15
     )
-    for past, since in ((30, 0), (4, 4)):  # at a stop it fades, however often that is asked
+    for past, since in ((30, 0), (4, 4)):  # at a stop it fades, however often steer() is called
         np.testing.assert_allclose(
             steered(past, moves=False)[: 41 - since],
             np.outer(1.0 - ramp[since:], other),

@@ -1,4 +1,4 @@
-"""The PID against slip: python-control's sampling of the continuous law."""
+"""Tests the PID against slip: it is python-control's sampling of the continuous law."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from hexapod_cosim.controller.comply.slip_pid import SlipPid, squeeze
 
 STATES = ("force", "smooth", "integral", "slope")
 FREQUENCIES = np.geomspace(0.1, 0.99 * np.pi / PERIOD, 50)  # rad/s
-RELATIVE = 1e-9  # of the response: round-off of python-control's polynomials of order 3
+RELATIVE = 1e-9  # relative to the response: round-off of python-control's polynomials of order 3
 WITH_SLOPE = replace(SLIP, kd=0.003, derivative_time=0.007)
 GAINS = {
     "pi": SLIP,
@@ -33,8 +33,8 @@ def continuous(gains: SlipGains) -> control.TransferFunction:
 
 
 def running(gains: SlipGains, *, period: float = PERIOD) -> control.StateSpace:
-    """The law that runs, as python-control sees it: what a step makes of each state, and of a
-    force, alone.
+    """Returns the implemented law as a python-control system, from one step for each state and one
+    for a force.
     """
     columns = []
     for cause in (*STATES, "input"):
@@ -71,23 +71,23 @@ def test_its_frequency_response_is_the_continuous_one_at_the_warped_frequency(na
 
 
 def test_a_steady_force_is_answered_by_kp_and_an_integral_that_lacks_the_filters_lag() -> None:
-    """u = kp f + ki f (t - T_f) once the filter has settled: the trapezoid loses nothing of the
-    area.
+    """After the filter has settled, u = kp f + ki f (t - T_f): the trapezoidal rule integrates the
+    area exactly.
     """
     pid, force, count = SlipPid(SLIP, period=PERIOD), 3.0, 400
     for _ in range(count):
         answer = pid.step(np.full(6, force + 0j))
     lasted = (
         count - 0.5
-    ) * PERIOD  # a force first seen at a step counts from half a period before it
+    ) * PERIOD  # a force that is first seen at a step counts from half a period before it
     assert answer[0] == pytest.approx(
         force * (SLIP.kp + SLIP.ki * (lasted - SLIP.filter_time)), rel=1e-9
     )
 
 
 def test_the_squeeze_is_what_is_left_beside_the_best_push_and_twist_of_the_body() -> None:
-    """Least sum of |e|^2/n over all pushes and twists shared by load, n (D + i w (p - c))/N: by
-    weighted least squares.
+    """Compares with weighted least squares: the smallest sum of |e|^2/n over all pushes and twists
+    shared by load, n (D + i w (p - c))/N.
     """
     generator = np.random.default_rng(5)
     for count in (3, 4, 6):
@@ -97,7 +97,7 @@ def test_the_squeeze_is_what_is_left_beside_the_best_push_and_twist_of_the_body(
         normal = generator.uniform(0.5, 2.0, count)
         moved = normal * np.stack(
             [np.ones(count), 1j * np.ones(count), 1j * feet]
-        )  # by a push along x, along y, and a twist
+        )  # of a push along x, a push along y, and a twist
         weighted = moved / np.sqrt(normal)
         base, target = (
             np.concatenate([rows.real, rows.imag], axis=-1)

@@ -1,4 +1,6 @@
-"""Who carries what: the hand-over between legs, and shares that balance forces and moments."""
+"""Tests which leg carries what: the hand-over between legs, and shares that balance forces and
+moments.
+"""
 
 from __future__ import annotations
 
@@ -18,7 +20,7 @@ HOME = LegSolver(ROBOT).forward(ROBOT.stance)[:, :2] @ np.array([1.0, 1.0j])
 REST = InverseDynamics(ROBOT, LegSolver(ROBOT), period=0.005).rest()
 CLOCKS = np.linspace(0.0, 1.0, 1000, endpoint=False) + 1e-7  # cycles
 ALL, NONE = np.ones(6, dtype=bool), np.zeros(6, dtype=bool)
-RIDGED = 1e-8 * WEIGHT  # N, N m    ten times what the ridge of 1e-9 takes from the balance
+RIDGED = 1e-8 * WEIGHT  # N, N m; ten times what the ridge of 1e-9 changes in the balance
 BALANCED = ("111111", "101010", "010101", "110111", "101101", "011110")
 
 
@@ -41,7 +43,7 @@ def make(
 def demand(
     *, push: complex = 0j, moment: complex = 0j, twist: float = 0.0, load: float = WEIGHT
 ) -> Demand:
-    """Of one step that asks no torques."""
+    """Returns the demand of one step that needs no torques."""
     return Demand(np.zeros((6, 3)), np.zeros((6, 3, 3)), push, load, moment, twist)
 
 
@@ -89,10 +91,10 @@ def test_hand_overs_are_smooth(gait: str) -> None:
     active = make(gait).activation(phases(gait), NONE, NONE, walking=True)
     width = 0.05 / make_gait(ROBOT, gait).period  # cycles
     slope = np.diff(active, axis=0) * len(CLOCKS)
-    assert np.abs(slope).max() < 1.9 / width  # a quintic's steepest is 1.875
+    assert np.abs(slope).max() < 1.9 / width  # the largest slope of a quintic is 1.875
     assert (
         np.abs(np.diff(slope, axis=0)).max() * len(CLOCKS) < 5.8 / width**2
-    )  # and its strongest bend 5.77
+    )  # its largest second derivative is 5.77
 
 
 def test_a_hand_over_is_never_longer_than_stance_or_swing() -> None:
@@ -113,7 +115,7 @@ def test_who_stands_still_or_has_nowhere_to_step_is_active() -> None:
     early, late = phase < 0.25, (phase > 0.25) & (phase < 0.5)
     assert (
         stayed[early | (phase >= 0.5)] == 1.0
-    ).all()  # it need not take up what it never gave up
+    ).all()  # it has no load to take over, because it never gave its load away
     np.testing.assert_array_equal(stayed[late], steps[late])
     assert (stays[late] == 1.0).all()
     np.testing.assert_array_equal(stays[early], steps[early])
@@ -127,7 +129,7 @@ def test_shares_balance_force_and_moment(standing: str) -> None:
     assert shares.normal @ HOME == pytest.approx(asked.moment, abs=RIDGED)
     assert shares.push.sum() == pytest.approx(3.0 - 2.0j, abs=1e-9)
     assert (HOME.conj() * shares.push).imag.sum() == pytest.approx(0.4, abs=1e-9)
-    # per load the pushes are those of a body that moves and turns: none squeezes another
+    # pushes per load are those of a moving and turning body, so none squeezes another
     carries = shares.normal > 0.0
     per, arm = shares.push[carries] / shares.normal[carries], HOME[carries] - HOME[carries].mean()
     spin = (arm.conj() * per).imag.sum() / (abs(arm) ** 2).sum()
@@ -139,7 +141,7 @@ def test_shares_balance_force_and_moment(standing: str) -> None:
 
 
 def test_of_all_shares_that_balance_the_sum_of_squares_is_least() -> None:
-    """Any change that keeps force and moment makes sum f^2/a greater, by second order."""
+    """Any change that keeps force and moment increases sum f^2/a by second order."""
     active = np.array([1.0, 0.4, 1.0, 0.7, 1.0, 0.2])
     normal = normal_shares(make(), HOME, active, demand(moment=WEIGHT * 0.01))
     balance = np.array([np.ones(6), HOME.real, HOME.imag])
@@ -170,8 +172,8 @@ def test_two_feet_or_one_carry_what_they_can_without_their_moment(
 
 
 def test_the_ridge_changes_loads_of_feet_on_a_line_by_a_billionth_of_the_weight() -> None:
-    """S = sum a (1, y^2), ridge = 1e-9 (S_00 + S_yy) + 1e-12, the vertical force W S_00/(S_00 +
-    ridge).
+    """With S = sum a (1, y^2) and ridge = 1e-9 (S_00 + S_yy) + 1e-12, the vertical force is W
+    S_00/(S_00 + ridge).
     """
     feet, y = np.array([0.1j, -0.1j, 0j, 0j, 0j, 0j]), 0.1
     for active, lost in ((1.0, 1e-9 * (1.0 + y * y)), (1e-6, 0.5e-6 + 1e-9 * (1.0 + y * y))):

@@ -1,4 +1,4 @@
-"""The virtual suspension against the differential equation it stands for."""
+"""Tests the virtual suspension against the differential equation that it solves."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ from hexapod_cosim.models import load_robot
 
 GAINS = suspension(load_robot("athena"))
 CRITICAL = GAINS.damping
-TOLERANCE = 1e-9  # relative, of the solver
+TOLERANCE = 1e-9  # relative, error of the reference solver
 ROUND_OFF = 1e-13  # m
 
 
 def responses(gains: SuspensionGains, forces: np.ndarray) -> np.ndarray:
-    """(n, 2) deflection and its rate after each period under forces (n,)."""
+    """Returns the deflection and its rate (n, 2) after each period under forces (n,)."""
     (a, b), state, found = discretise(gains, period=PERIOD), np.zeros(2), []
     for force in forces:
         state = a @ state + b * force

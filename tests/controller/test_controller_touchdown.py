@@ -1,4 +1,6 @@
-"""Ground met early or late: a foot is not pressed into it, and reaches for it."""
+"""Tests ground that is met early or late: a foot is not pressed into early ground, and reaches down
+for late ground.
+"""
 
 from __future__ import annotations
 
@@ -70,8 +72,8 @@ def test_a_foot_that_finds_no_ground_reaches_down_after_the_grace_time_to_the_li
         down.step(missing, STILL, NO, YES)
         offsets.append(down.offset[2])
     begun = next(k for k, offset in enumerate(offsets) if offset)
-    assert begun in {8, 9}  # 40 ms; times are sums
-    reach = -0.08 * PERIOD * np.arange(1, 101 - begun)  # 80 mm/s, to 20 mm
+    assert begun in {8, 9}  # 40 ms are 8 periods; times are sums, so it may be the 9th
+    reach = -0.08 * PERIOD * np.arange(1, 101 - begun)  # with 80 mm/s down to 20 mm
     np.testing.assert_allclose(offsets[begun:], np.maximum(reach, -0.02), atol=1e-12)
 
 
@@ -85,7 +87,7 @@ def test_it_stops_where_it_finds_the_ground() -> None:
         down.step(YES, STILL, NO, YES)
     assert down.offset[2] == found
     for _ in range(7):
-        down.step(missing, STILL, NO, YES)  # and a short loss of contact does not move it
+        down.step(missing, STILL, NO, YES)  # a short loss of contact does not move the foot
     assert down.offset[2] == found
 
 
@@ -121,8 +123,9 @@ def test_a_saved_state_does_not_change() -> None:
 
 
 def descend(laws: Laws, touching: bool) -> list[float]:
-    """Offsets of foot 1 while it comes down from 20 mm at 0.05 m/s, with a force on it from 8 mm
-    on or not.
+    """Returns the offsets of foot 1 while it moves from 20 mm down at 0.05 m/s.
+
+    With `touching` a force acts on it below 8 mm.
     """
     offsets, height, rise = [], 0.02, -0.05
     while height > 0.0:
@@ -137,7 +140,7 @@ def descend(laws: Laws, touching: bool) -> list[float]:
 
 def test_the_laws_hold_a_foot_that_touches_well_above_the_end_of_its_path() -> None:
     offsets = descend(make_laws(parts=ONLY_TOUCHDOWN), touching=True)
-    # from the first force at 8 mm to 2 mm the path falls 0.25 mm a step
+    # the path falls 0.25 mm a step; the first force comes at 8 mm, and 2 mm are left
     assert offsets[-1] == pytest.approx(0.006, abs=2.6e-4)
     assert not any(descend(make_laws(parts=ONLY_TOUCHDOWN), touching=False))
     assert not any(descend(make_laws(parts=Parts(touchdown=False)), touching=True))

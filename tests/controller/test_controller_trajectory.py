@@ -1,4 +1,6 @@
-"""Foot paths: at rest on the ground, smooth through the air, and home again."""
+"""Tests foot paths: at rest on the ground, smooth in the air, and ending at the stance
+positions.
+"""
 
 from __future__ import annotations
 
@@ -18,7 +20,9 @@ TWIST, STRAIGHT, REST = Twist(0.05 - 0.03j, 0.4), Twist(0.08 + 0j, 0.0), Twist(0
 
 
 class Walk:
-    """The paths of a walk, taken section by section. `at`: steps since the section began."""
+    """The paths of a walk, computed section by section. `at` counts the steps since the section
+    began.
+    """
 
     def __init__(
         self, name: str = "tripod", *, period: float = PERIOD, touchdown_speed: float = 0.0
@@ -29,7 +33,7 @@ class Walk:
         self.feet, self.at = self.paths.reset(), 0
 
     def step(self, twist: Twist, *, going: bool = True, afresh: bool = False) -> None:
-        """One period on; a section begins where the last ends, or afresh."""
+        """Advances by one period; a new section begins where the last one ends, or afresh."""
         if afresh or self.at == 0 or not self.paths.reach(self.at + 1):
             self.feet, self.at = self.paths.plan(self.feet, self.at, going=going, twist=twist), 0
         self.at += 1
@@ -37,20 +41,22 @@ class Walk:
 
     @property
     def progress(self) -> np.ndarray:
-        """(6,) the parts of their swings that swinging feet have done, else 0."""
+        """Returns the part (6,) of the swing that swinging feet have completed, 0 for
+        the others.
+        """
         tau = (self.feet.phase - self.gait.duty) / (1.0 - self.gait.duty)
         return np.where(self.paths.swinging, tau, 0.0)
 
 
 def advance(walk: Walk, twist: Twist, steps: int, *, going: bool = True) -> Iterator[Walk]:
-    """Steps under a steady twist from now on."""
+    """Takes steps under a steady twist."""
     for k in range(steps):
         walk.step(twist, going=going, afresh=k == 0)
         yield walk
 
 
 def record(steps: Iterable[Walk]) -> dict[str, np.ndarray]:
-    """What the feet were in each step, `swinging` and `progress`."""
+    """Records the feet of each step, `swinging` and `progress`."""
     rows = [
         {**walk.feet._asdict(), "swinging": walk.paths.swinging, "progress": walk.progress}
         for walk in steps
@@ -62,13 +68,13 @@ def record(steps: Iterable[Walk]) -> dict[str, np.ndarray]:
 
 
 def steady(walk: Walk, twist: Twist, steps: int) -> dict[str, np.ndarray]:
-    """Records of each step under a steady twist, after two cycles to get going."""
+    """Returns the records of each step under a steady twist, after two cycles."""
     record(advance(walk, twist, round(2.0 * walk.gait.period / walk.paths.period)))
     return record(advance(walk, twist, steps))
 
 
 def ground_velocity(log: dict[str, np.ndarray], twist: Twist) -> np.ndarray:
-    """Horizontal velocity of the feet over the ground [m/s]: dp/dt + v + i w p."""
+    """Returns the horizontal velocity of the feet over the ground [m/s]: dp/dt + v + i w p."""
     velocity: np.ndarray = log["velocity"] + twist[0] + 1j * twist[1] * log["plane"]
     return velocity
 
@@ -87,7 +93,7 @@ def test_velocity_is_the_slope_of_position_and_nothing_jumps(twist: Twist) -> No
     log = steady(Walk("ripple"), twist, 1000)
     largest = (
         30.0 * PERIOD
-    )  # m/s    a step's change of velocity at 30 m/s2; a jump of velocity would be of order 0.1
+    )  # m/s; velocities change by 30 m/s2 in a step; a jump would be of order 0.1
     for position, velocity in (("plane", "velocity"), ("height", "rise")):
         slope = np.diff(log[position], axis=0) / PERIOD
         mean = 0.5 * (log[velocity][1:] + log[velocity][:-1])
@@ -102,10 +108,10 @@ def test_feet_lift_off_and_touch_down_at_rest_on_the_ground(twist: Twist) -> Non
     ends = log["swinging"] & ((log["progress"] < 0.1) | (log["progress"] > 0.9))
     assert (
         np.abs(over_ground[ends]).max() < 1e-9
-    )  # ds/dt (landing - p)/(1 - s) loses digits as s nears 1
+    )  # ds/dt (landing - p)/(1 - s) loses digits near s = 1
     edge = log["swinging"] & ((log["progress"] < 0.005) | (log["progress"] > 0.995))
     assert edge.any()
-    assert np.abs(log["rise"][edge]).max() < 2e-3  # 192 H tau^2 / T at tau = 0.005: 0.4 mm/s
+    assert np.abs(log["rise"][edge]).max() < 2e-3  # 192 H tau^2/T at tau = 0.005 is 0.4 mm/s
 
 
 @pytest.mark.parametrize(
@@ -187,7 +193,9 @@ def test_a_foot_within_a_nanometre_of_its_stance_position_stays_where_it_is(
 
 @pytest.mark.parametrize("name", GAITS)
 def test_a_section_that_begins_afresh_under_the_same_twist_is_the_same_walk(name: str) -> None:
-    """To round-off: the feet's goals are aimed anew from where they are."""
+    """The walk differs by round-off only, because the feet's landing points are computed again from
+    where the feet are.
+    """
     whole, cut = Walk(name, period=0.007), Walk(name, period=0.007)
     for k in range(400):
         whole.step(TWIST)

@@ -1,5 +1,5 @@
-"""The controller in Python and the one in C, file by file: the same functions in the same order,
-the same constants, the same equations.
+"""Compares the controllers in Python and C file by file: the same functions in the same order, the
+same constants, the same equations.
 """
 
 from __future__ import annotations
@@ -15,19 +15,19 @@ PYTHON, C = ROOT / "controller", ROOT / "controller_fmu/src"
 
 
 def files_below(folder: Path, suffix: str) -> set[str]:
-    """The files of a folder and the folders in it, without their suffix."""
+    """Returns the files of a folder and of its folders, without their suffixes."""
     return {
         path.relative_to(folder).with_suffix("").as_posix() for path in folder.rglob(f"*{suffix}")
     }
 
 
 PAIRS = sorted(files_below(C, ".c") & files_below(PYTHON, ".py"))
-# tick times, saved states and refusals around the controller; in Python the constructor's and
-# `step`'s own
+# C has functions around the controller for tick times, saved states and refusals; Python has the
+# constructor and `step`
 ONLY_C = {"walk/schedule", "validation"}
-# state.h declares what controller.c defines, and all types of the state
+# state.h declares what controller.c defines, and contains all types of the state
 HEADERS = {"plane", "state"}
-# numpy does for all legs what C does for one, or a loop or a sum does
+# numpy does for all legs what C does in a function for one leg, in a loop or as a sum
 ONE_LEG = {
     "place_leg": "place_legs",
     "place_foot": "place_feet",
@@ -44,7 +44,8 @@ PREFIX = re.compile(
 FUNCTION = re.compile(r"^(?:static )?(?:const )?\w+ \*?(\w+)\([^;]*?\) \{", re.MULTILINE)
 CONSTANT = re.compile(r"(\w+) = (-?[\d.e+-]+)(?=[,;])")
 CITATION = re.compile(r"\bC(\d+)(?: to C(\d+))?\b")
-C_ONLY_CONSTANTS = {"turn", "gear_speed"}  # math.tau and the plant's GEAR_SPEED in Python
+# Python takes these from math.tau and from the plant's GEAR_SPEED
+C_ONLY_CONSTANTS = {"turn", "gear_speed"}
 
 
 def c_functions(stem: str) -> list[str]:
@@ -64,7 +65,7 @@ def python_functions(stem: str) -> list[str]:
 
 
 def is_in_order(few: list[str], many: list[str]) -> bool:
-    """Whether few is what is left of many when some are left out."""
+    """Returns whether `few` is a subsequence of `many`."""
     rest = iter(many)
     return all(name in rest for name in few)
 
@@ -73,7 +74,8 @@ def test_every_file_has_its_twin() -> None:
     assert files_below(C, ".c") - ONLY_C == set(PAIRS)
     headers = {name for name in PAIRS if name != "controller"} | {"validation"} | HEADERS
     assert files_below(C, ".h") == headers
-    own = {"plane", "memory", "gains", "parts", "size", "figure_style"}  # of Python alone
+    # files that only Python has
+    own = {"plane", "memory", "gains", "parts", "size", "figure_style"}
     python = {
         name
         for name in files_below(PYTHON, ".py")
@@ -89,7 +91,8 @@ def test_each_function_in_c_has_its_twin_in_python_in_the_same_order(stem: str) 
         "sense/contact_detection",
         "comply/slip_pid",
         "controller",
-    }:  # C compiles no model of the detector and the PID; reset and step are last
+        # C compiles no models of the detector and of the PID; reset and step are last
+    }:
         assert sorted(set(ours) - {"compile"}) == sorted(set(ours) & set(theirs) - {"compile"})
         return
     assert ours

@@ -1,4 +1,4 @@
-"""The controller as a whole: from body command and measurement to joint commands."""
+"""Tests the whole controller, from body command and measurement to joint commands."""
 
 from __future__ import annotations
 
@@ -22,8 +22,8 @@ from hexapod_cosim.models import GAITS, foot_positions, load_robot
 from hexapod_cosim.models.kinematics import quaternion_product
 
 ROUND_OFF = 1e-12  # rad
-LOWERED = 5e-5  # rad    some hundredths of a millimetre over 0.1 m
-MIRROR = np.array([3, 4, 5, 0, 1, 2])  # legs seen in a mirror
+LOWERED = 5e-5  # rad; some hundredths of a millimetre over 0.1 m
+MIRROR = np.array([3, 4, 5, 0, 1, 2])  # legs exchanged by mirroring
 MIRRORED_JOINT = np.array([-1.0, 1.0, 1.0])
 ROBOTS = ("athena", "phantomx_mk4")
 
@@ -31,8 +31,10 @@ ROBOTS = ("athena", "phantomx_mk4")
 @pytest.mark.parametrize("name", ROBOTS)
 @pytest.mark.parametrize("compliant", [False, True])
 def test_the_first_command_is_the_stance(name: str, compliant: bool) -> None:
-    """Compliant: but for what the ground gives way, with torques for the legs' own weight; the
-    support grows with the weight felt.
+    """Under compliant control the first command also contains the deflection of the ground and
+    torques for the weight of the legs.
+
+    The support grows with the measured weight.
     """
     robot, controller = load_robot(name), make(name, compliant=compliant)
     out = controller.step(0.0, BodyCommand(vx=0.08), Measurement(angle=robot.stance))
@@ -43,7 +45,7 @@ def test_the_first_command_is_the_stance(name: str, compliant: bool) -> None:
     assert out.torque_ref.any() == compliant
     assert (
         np.abs(out.torque_ref).max() < 9.81 * sum(link.mass for link in robot.legs[0].links) * 0.1
-    )  # N m    0.1 m: the legs' centres
+    )  # N m; lever of 0.1 m for the centres of mass of the legs
 
 
 @pytest.mark.parametrize("name", ROBOTS)
@@ -61,11 +63,11 @@ def test_a_walk_starts_and_ends_in_the_stance_without_jumps(name: str, gait: str
     assert np.abs(np.diff(angle, axis=0)).max() < robot.servo.speed_max * PERIOD * 1.3
     assert (
         np.abs(np.diff(angle, 2, axis=0)).max() < 200.0 * PERIOD**2
-    )  # rad/s2; a jump of speed would be of order 1 rad/s
+    )  # rad/s2; a jump of the speed would be of order 1 rad/s
     again = run(controller, BodyCommand(vx=0.02, yaw_rate=0.03), cycle, first=6 * cycle)
     np.testing.assert_allclose(
         again[:, 0], angle[1 : cycle + 1], atol=1e-6
-    )  # the clock starts at the same phase
+    )  # the gait's clock starts at the same phase
 
 
 @pytest.mark.parametrize("name", ROBOTS)
@@ -81,8 +83,8 @@ def test_a_walk_starts_and_ends_in_the_stance_without_jumps(name: str, gait: str
 def test_the_contact_points_of_standing_feet_rest_on_the_ground(
     name: str, command: BodyCommand
 ) -> None:
-    """FK of the commanded angles: foot centres, plus what their spheres roll, move by minus the
-    body's twist.
+    """The forward kinematics of the commanded angles give the feet's centres. With the rolling of
+    their spheres they move by minus the body's twist.
     """
     robot = load_robot(name)
     controller = make(name)
@@ -109,16 +111,17 @@ def test_the_contact_points_of_standing_feet_rest_on_the_ground(
             )
         before, swinging = (foot, pitch), controller.diagnostics.swinging.copy()
     assert compared > 600
-    # rolling is solved by one Newton step, chords lack h^2/24 of an arc and headings turn
-    # meanwhile; the body moves at 50 mm/s
+    # rolling is solved by one Newton step, a chord lacks h^2/24 of its arc, and the heading turns
+    # during a step; the body moves at 50 mm/s
     assert worst < 3e-4
 
 
 @pytest.mark.parametrize("gait", GAITS)
 def test_speed_and_acceleration_lead_from_each_angle_to_the_next(gait: str) -> None:
-    """q + qd h + qdd h^2/2 is the next q, but where a leg lifts off or touches down next.
+    """q + qd h + qdd h^2/2 is the next q, except where a leg lifts off or touches down in the next
+    step.
 
-    There qdd is that of the period before, and misses by its change, h^3/3 of up to 4e4 rad/s3 in
+    There qdd is that of the period before. The error is its change, h^3/3 times up to 4e4 rad/s3 in
     the quick swings of the wave gait.
     """
     controller, missed, accelerations = make(gait=make_gait(load_robot("athena"), gait)), [], []
@@ -150,11 +153,11 @@ def test_a_joint_at_its_limit_has_no_acceleration_and_none_exceeds_a_reversal() 
     assert found[0, 0] == found[1, 1] == found[2, 2] == 0.0
     assert found[3, 0] == pytest.approx(
         2.0 * legs.speed_max / 0.01
-    )  # 2 (0.1 rad)/(10 ms)^2 = 2000 rad/s2 would be more
+    )  # rad/s2; without the limit it would be 2 (0.1 rad)/(10 ms)^2 = 2000
     assert legs.accelerations(pose, 0.1, angle, speed)[3, 0] == pytest.approx(20.0)
     assert legs.accelerations(pose, -0.1, angle, speed)[3, 0] == pytest.approx(
         20.0
-    )  # a neighbour that lies before
+    )  # the neighbour is the previous position
     assert not legs.accelerations(None, 0.01, angle, speed).any()
 
 
@@ -162,13 +165,13 @@ def test_a_joint_at_its_limit_has_no_acceleration_and_none_exceeds_a_reversal() 
 def test_speed_ref_is_the_slope_of_angle_ref(compliant: bool) -> None:
     controller = make(
         compliant=compliant, parts=Parts(suspension=False, slip_pid=False)
-    )  # what answers to forces has no speed_ref
+    )  # parts that react to forces have no speed_ref
     walk = obey(controller, BodyCommand(vx=0.08, height=0.01), 800)
     slope = np.diff(walk[:, 0], axis=0) / PERIOD
     mean = 0.5 * (walk[1:, 1] + walk[:-1, 1])
     assert np.abs(slope - mean)[20:].max() < (
         0.1 if compliant else 0.05
-    )  # rad/s    of speeds up to 3: the trapezoid's error; slow loops look every 40 ms
+    )  # rad/s, of speeds up to 3; the error of the trapezoidal rule; slow loops run every 40 ms
 
 
 def test_a_robot_that_does_what_is_planned_is_hardly_corrected() -> None:
@@ -179,7 +182,7 @@ def test_a_robot_that_does_what_is_planned_is_hardly_corrected() -> None:
     )
     assert (
         np.abs(corrected[:, 0] - plain[:, 0])[600:].max() < 8e-3
-    )  # rad    0.8 mm: of that the ground gives way by half
+    )  # rad; 0.8 mm, half of which is the deflection of the ground
     shown = controller.diagnostics
     assert not shown.fallback.any()
     assert controller.compliant is not None
@@ -225,7 +228,7 @@ def test_a_restored_controller_goes_on_bit_for_bit(compliant: bool) -> None:
     start = run(controller, BodyCommand(vx=0.08), 130, measurement=squeezed())
     run(
         controller, command, 67, first=130, measurement=squeezed()
-    )  # the ramp and a planned swing are under way
+    )  # the ramp and a planned swing are in progress
     state = controller.save()
     first = run(controller, command, 300, first=197, measurement=squeezed())
     run(controller, BodyCommand(vy=-0.03), 100, first=497, measurement=squeezed())
@@ -248,7 +251,7 @@ def test_a_restored_controller_goes_on_bit_for_bit_amid_doubts_and_missing_groun
     controller, measurement, command = make(compliant=True), squeezed(), BodyCommand(vx=0.08)
     run(
         controller, command, 250, measurement=measurement
-    )  # feet in mid-swing that feel a force are doubted
+    )  # feet that measure a force in mid-swing are doubted
     measurement.foot_force[:, 2] *= [0.0, 2.0, 0.0, 2.0, 0.0, 2.0]
     run(controller, command, 33, first=250, measurement=measurement)
     state, shown = controller.save(), controller.diagnostics
@@ -270,7 +273,7 @@ def test_kinematic_control_does_not_look_at_the_forces() -> None:
 
 
 def test_the_diagnostics_tell_where_the_corrections_move_the_feet() -> None:
-    """To first order: the angles are corrected, not the feet."""
+    """The prediction holds to first order, because the angles are corrected and not the feet."""
     controller, robot = make(compliant=True), load_robot("athena")
     for k in range(30):
         out = controller.step(k * PERIOD, BodyCommand(), squeezed())
@@ -289,8 +292,8 @@ def test_the_diagnostics_tell_where_the_corrections_move_the_feet() -> None:
 
 
 def test_the_planned_feet_are_where_kinematic_control_sends_them() -> None:
-    """Walking, turning and leaning: the commanded angles put each foot's centre on the plan, so
-    what compliance adds is not in it.
+    """While walking, turning and leaning the commanded angles put each foot's centre on the plan.
+    The corrections of compliance are not part of the plan.
     """
     controller, robot = make(), load_robot("athena")
     stance = foot_positions(robot, robot.stance)
@@ -309,8 +312,8 @@ def test_the_planned_feet_are_where_kinematic_control_sends_them() -> None:
 
 
 def test_the_planned_feet_are_the_same_under_both_controls() -> None:
-    """A squeezed, compliant robot moves its feet; the plan of a command that the path is not
-    held to does not move.
+    """The feet of a squeezed robot move under compliant control, but its plan does not, as long as
+    the robot is not steered back to its path.
     """
     kinematic, compliant = make(), make(compliant=True)
     for k in range(60):
@@ -328,7 +331,7 @@ def test_the_planned_feet_are_the_same_under_both_controls() -> None:
 
 
 def test_forces_are_judged_in_the_torsos_axes() -> None:
-    """Turning robot and forces together in the world changes nothing."""
+    """Turning the robot and the forces together in the world changes nothing."""
     yaw, straight = 0.7, squeezed()
     turned = squeezed()
     c, s = np.cos(yaw), np.sin(yaw)
@@ -358,7 +361,7 @@ def test_posture_and_height_turn_and_lift_the_torso_over_its_feet() -> None:
     np.testing.assert_allclose(on_ground[:, 2], home[:, 2], atol=1e-9)
     np.testing.assert_allclose(
         on_ground[:, :2], home[:, :2], atol=0.005
-    )  # they roll by R times the tibias' change of pitch
+    )  # the feet roll by their radius times the change of the tibias' pitch
 
 
 def test_a_leg_that_cannot_follow_is_flagged_and_stays_within_its_limits() -> None:
@@ -381,7 +384,7 @@ def test_what_leads_back_to_the_way_is_led_over_in_a_tenth_of_a_second() -> None
     compliant.hold.velocity, compliant.hold.yaw_rate = 0.01 - 0.004j, 0.02
     compliant.steer(0, moves=True, afresh=True)
     v, yaw_rate = np.array([compliant.addition(k) for k in range(31)]).T
-    part = np.minimum(np.arange(31) / 20.0, 1.0)  # periods of 5 ms
+    part = np.minimum(np.arange(31) / 20.0, 1.0)  # a tenth of a second are 20 periods of 5 ms
     np.testing.assert_allclose(v, part * (0.01 - 0.004j), atol=1e-12)
     np.testing.assert_allclose(yaw_rate, part * 0.02, atol=1e-12)
 

@@ -1,5 +1,5 @@
-"""The controller in C is the one in Python, to round-off: the same commands under the same
-measurements, over whole walks.
+"""Compares the C controller with the Python controller over whole walks: the same commands under
+the same measurements, to round-off.
 """
 
 from __future__ import annotations
@@ -32,13 +32,15 @@ from hexapod_cosim.models import load_robot
 ROBOTS = ("athena", "phantomx_mk4")
 ALL_PARTS, NO_FALLBACK = Parts(), Parts(fallback=False)
 ANGLE = 1e-12  # rad
-SPEED = 1e-12  # 1    of a servo's largest
-# 1    of a servo's largest: accelerations are second differences, which make of the paths' last
-# bits 4e-16 m / h^2 = 2e-11 m/s2; times the robot's mass and the legs' length that is some 1e-12 N
-# m in either controller, of servos of 3 and 6 N m
+SPEED = 1e-12  # relative to a servo's largest speed
+# relative to a servo's largest torque. The last bits of the paths change second differences by
+# 4e-16 m/h^2 = 2e-11 m/s2. Times the robot's mass and the legs' length that is about 1e-12 N m in
+# either controller, for servos of 3 and 6 N m.
 TORQUE = 3e-12
 ACCELERATION = (
-    3e-12  # of what turns a servo's largest speed round within a period; a second difference, too
+    # relative to the acceleration that reverses a servo's largest speed within a period; also a
+    # second difference
+    3e-12
 )
 STEPS = 2000  # a walk of 10 s
 Sense = Callable[[Controller, int, Measurement], None]
@@ -60,8 +62,8 @@ def setup_of(
 
 
 def program(t: float) -> BodyCommand:
-    """Straight on, all six at once half-way through a ramp and a swing, turning on the spot, and
-    to a stop.
+    """Returns the command: straight on, all six components at once during a ramp and a swing,
+    turning on the spot, stop.
     """
     if t < 3.0:
         return BodyCommand(vx=0.04)
@@ -73,8 +75,9 @@ def program(t: float) -> BodyCommand:
 
 
 class Ground:
-    """Forces and angles as planned but for noise, so that every law has something to do; the
-    same for the same seed.
+    """Provides forces and angles as planned, plus noise that acts on every law.
+
+    The same seed gives the same noise.
     """
 
     def __init__(self, *, noise: float = 0.1) -> None:
@@ -96,10 +99,10 @@ class Ground:
 def differences(
     core: ct.CDLL, setup: ControllerSetup, *, sense: Sense, steps: int = STEPS
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Largest differences of angle, speed, torque and acceleration over a walk, in rad and of the
-    servo's largest; (steps, 6) fallback.
+    """Returns the largest differences of angle, speed, torque and acceleration over a walk, in rad
+    and relative to the servo, and the fallback (steps, 6).
 
-    Diagnostics must be the same at every step.
+    Asserts that the diagnostics are the same at every step.
     """
     reference, native = setup.build(), NativeController(core, setup)
     measurement, worst, fallback = Measurement(angle=setup.robot.stance.copy()), np.zeros(4), []
@@ -158,9 +161,9 @@ def test_a_walk_is_the_same(
 
 
 def dead_and_stuck(force: np.ndarray, step: int) -> None:
-    force[1] *= not 400 <= step < 900  # reads nothing
+    force[1] *= not 400 <= step < 900  # the sensor reads nothing
     if 700 <= step < 1100:
-        force[3] = [1.0, -2.0, 15.0]  # and another one the same for ever
+        force[3] = [1.0, -2.0, 15.0]  # another sensor reads the same all the time
     if 1300 <= step < 1500:
         force[[0, 2, 4]] = 0.0
 
@@ -174,7 +177,7 @@ def dragged(force: np.ndarray, step: int) -> None:
 
 
 def barely_met(force: np.ndarray, step: int) -> None:
-    """The whole robot slides on feet that carry 0.4, then 0.6 of its weight."""
+    """Lets the whole robot slide on feet that carry 0.4, then 0.6 of its weight."""
     for begin, share in ((500, 0.4), (900, 0.6)):
         if begin <= step < begin + 40:
             force *= share
@@ -183,12 +186,12 @@ def barely_met(force: np.ndarray, step: int) -> None:
 
 def uneven(force: np.ndarray, step: int) -> None:
     if step % 200 < 30:
-        force[:, 2] += 5.0  # ground in mid-swing, not for long
+        force[:, 2] += 5.0  # a short contact in mid-swing
     if step % 170 < 12:
-        force[2] = 0.0  # and none under a leg that stands
+        force[2] = 0.0  # a short loss of contact of a standing leg
     if 1000 <= step < 1180:
         force *= 2.0
-        force[4] = 0.0  # no ground for long, while the others carry its load
+        force[4] = 0.0  # a long loss of contact, while the other legs carry the load
     if 600 <= step < 800:
         force[:, 1] += [9.0, -9.0, 9.0, -9.0, 9.0, -9.0]  # squeezed beyond all limits
 
@@ -197,7 +200,7 @@ def heavy(force: np.ndarray, step: int) -> None:
     if step >= 300:
         force *= (
             2.1 if step < 900 else 4.2 if step < 1300 else 1.0
-        )  # more than servos carry, far more, and what was planned
+        )  # more than the servos carry, then far more, then the planned load
 
 
 @pytest.mark.parametrize("spoil", [dead_and_stuck, dragged, barely_met, uneven, heavy])
@@ -223,8 +226,10 @@ def test_sensors_that_lie_ground_that_is_missing_and_slides_are_answered_at_the_
 def test_ground_that_is_met_early_is_answered_at_the_same_step(
     controller_core: ct.CDLL, gait: str, bump: float, parts: Parts
 ) -> None:
-    """By all feet at 12 mm, by one higher, then by none: soft ground with a bump on it, and a torso
-    that has come up again. Without fallback a bump as high as the limit of what feet are held up.
+    """The ground is met by all feet at 12 mm, by one foot higher, then by none: soft ground with a
+    bump, and a torso that has risen again.
+
+    Without fallback the bump is as high as the largest offset of a foot.
     """
     ground = Ground()
 
@@ -319,12 +324,12 @@ def test_legs_may_differ(controller_core: ct.CDLL) -> None:
 
 
 # ------------------------------------------------------------------------------------------------
-# as an instance
+# instances
 
 
 def stepped(native: NativeController, first: int, count: int) -> np.ndarray:
-    """(count, 3, 6, 3) commands of a walk with feet that are pressed and squeezed, from a step
-    on.
+    """Returns the commands (count, 3, 6, 3) of a walk with pressed and squeezed feet, from step
+    `first` on.
     """
     robot, found = load_robot("athena"), []
     generator = np.random.default_rng(8)
@@ -375,7 +380,7 @@ def test_inputs_that_change_at_a_rate_are_taken_as_they_are_at_each_tick(
     assert ramped.save() == stepped_input.save()
 
 
-def test_looking_changes_nothing(controller_core: ct.CDLL) -> None:
+def test_reading_outputs_changes_nothing(controller_core: ct.CDLL) -> None:
     native = NativeController(controller_core, setup_of())
     stepped(native, 0, 50)
     saved = native.save()
@@ -383,14 +388,16 @@ def test_looking_changes_nothing(controller_core: ct.CDLL) -> None:
     native.input.command[0] = 0.3
     native.input.foot_force[0][2] = 50.0
     second = commands(native.output())
-    assert (first != second).any()  # outputs depend on inputs at once
+    assert (first != second).any()  # outputs depend on inputs directly
     assert native.save() == saved
 
 
 @pytest.mark.parametrize("between", ["nothing", "another input", "a restored state", "a reset"])
-def test_a_step_after_a_look_is_the_step_without(controller_core: ct.CDLL, between: str) -> None:
-    """A look keeps its tick for the step that follows: only for the same state under the same
-    input.
+def test_reading_outputs_does_not_change_the_next_step(
+    controller_core: ct.CDLL, between: str
+) -> None:
+    """output() stores its tick for the step that follows, to be used only with the same state and
+    the same input.
     """
     native, plain = (NativeController(controller_core, setup_of()) for _ in range(2))
     stepped(native, 0, 50)
@@ -412,8 +419,8 @@ def test_a_step_after_a_look_is_the_step_without(controller_core: ct.CDLL, betwe
 
 
 def test_ticks_come_at_their_times_whatever_the_steps_are(controller_core: ct.CDLL) -> None:
-    """Steps of two periods do both ticks under the same input; half a step holds the commands of
-    the last tick.
+    """Steps of two periods execute both ticks under the same input; half a step keeps the commands
+    of the last tick.
     """
     setup, force = setup_of(), np.tile([0.2, 0.0, 9.0], (6, 1))
     fine, coarse, half = (NativeController(controller_core, setup, start=7.0) for _ in range(3))
@@ -429,7 +436,7 @@ def test_ticks_come_at_their_times_whatever_the_steps_are(controller_core: ct.CD
         coarse.go(7.0 + (2 * k + 2) * PERIOD)
         ticked = commands(half.output())
         half.go(7.0 + (2 * k + 0.5) * PERIOD)
-        half.input.command[1] = 0.05  # comes between two ticks, and goes
+        half.input.command[1] = 0.05  # the input changes between two ticks and changes back
         np.testing.assert_array_equal(commands(half.output()), ticked)
         half.input.command[1] = 0.0
         half.go(7.0 + (2 * k + 2) * PERIOD)
@@ -452,7 +459,7 @@ def test_a_clock_that_is_off_by_round_off_ticks_all_the_same(
 
 
 # ------------------------------------------------------------------------------------------------
-# what is refused
+# refusals
 
 
 @pytest.mark.parametrize(
@@ -502,7 +509,7 @@ def test_a_saved_state_that_is_damaged_is_refused(controller_core: ct.CDLL) -> N
     damaged[len(saved) // 2] ^= 1
     for bad, reason in (
         (bytes(damaged), "damaged"),
-        (saved[:-8], "size"),
+        (saved[:-8], "bytes, expected"),
         (b"x" * len(saved), "version"),
     ):
         with pytest.raises(NativeError, match=reason):
@@ -521,11 +528,11 @@ def test_absurd_commands_end_in_finite_joint_commands(controller_core: ct.CDLL) 
 
 
 # ------------------------------------------------------------------------------------------------
-# pieces
+# functions
 
 
 def scattered(generator: np.random.Generator, reach: float) -> np.ndarray:
-    """(6, 2) feet whose root mean square distance from their centre is this [m]."""
+    """Returns feet (6, 2) whose root mean square distance from their centre is this [m]."""
     feet = generator.normal(size=(6, 2))
     return np.asarray(feet * reach / np.sqrt(((feet - feet.mean(axis=0)) ** 2).sum() / 6.0))
 
@@ -577,10 +584,10 @@ def test_shares_are_the_same_down_to_no_load_or_feet_that_stand_together(
             none, np.zeros((6, 3, 3)), push=0.3 - 0.2j, weight=load, moment=0j, twist=0.4,
         )  # fmt: skip
         expected = support.shares(feet @ [1.0, 1.0j], active, demand).forces()
-        scale = np.abs(expected).max(axis=0)  # of pushes and of loads
+        scale = np.abs(expected).max(axis=0)  # scales of the pushes and of the loads
         np.testing.assert_allclose(
             found / scale, expected / scale, atol=1e-9
-        )  # a system of condition 1e6 at most
+        )  # the system's condition number is at most 1e6
 
 
 @pytest.mark.parametrize("ratio", [0.05, 0.999999, 1.0, 1.000001, 3.0, 1e4])

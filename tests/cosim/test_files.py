@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import stat
 from pathlib import Path
 
 import pytest
@@ -40,3 +42,22 @@ def test_a_block_that_fails_leaves_the_earlier_file_and_nothing_else(tmp_path: P
         half_written(path)
     assert path.read_text() == "earlier"
     assert list(tmp_path.iterdir()) == [path]
+
+
+@pytest.mark.skipif(os.name == "nt", reason="Windows has no file mode creation mask")
+@pytest.mark.parametrize(("mask", "mode"), [(0o022, 0o644), (0o077, 0o600)])
+def test_a_written_file_has_the_permissions_of_the_mask(
+    tmp_path: Path, mask: int, mode: int
+) -> None:
+    before = os.umask(mask)
+    try:
+        write_text(tmp_path / "file.txt", "text")
+    finally:
+        os.umask(before)
+    assert stat.S_IMODE((tmp_path / "file.txt").stat().st_mode) == mode
+
+
+def test_a_file_that_cannot_be_made_is_reported_with_its_folder(tmp_path: Path) -> None:
+    with pytest.raises(HexapodError, match="cannot write: got 'No such file or directory'"):
+        write_text(tmp_path / "missing" / "file.txt", "text")
+    assert list(tmp_path.iterdir()) == []

@@ -10,10 +10,10 @@ from dataclasses import asdict
 from pathlib import Path
 
 import pytest
+import tomlkit
 
 from hexapod_cosim.controller import Controller, Parts, make_gait
-from hexapod_cosim.cosim.common.toml_text import to_toml
-from hexapod_cosim.cosim.run.run import known_robot
+from hexapod_cosim.cosim.run.preparation import known_robot
 from hexapod_cosim.cosim.scenario.records import MAX_STEPS, Variation
 from hexapod_cosim.cosim.scenario.scenario import (
     list_scenarios,
@@ -36,7 +36,7 @@ def test_a_bundled_scenario_loads_and_fits_its_robot(name: str) -> None:
 def test_the_scenario_as_run_reads_back_as_the_same(name: str) -> None:
     scenario = load_scenario(name)
     assert (
-        scenario_from_table(tomllib.loads(to_toml(scenario.to_table())), where=scenario.where)
+        scenario_from_table(tomllib.loads(tomlkit.dumps(scenario.to_table())), where=scenario.where)
         == scenario
     )
 
@@ -124,7 +124,7 @@ def test_gravity_is_a_number_a_vector_or_an_fmu_parameter_and_all_are_one_key(
     assert scenario.parameters == {}
     assert scenario_robot(scenario).gravity == known_robot(scenario).gravity == gravity
     assert (
-        scenario_from_table(tomllib.loads(to_toml(scenario.to_table())), where=scenario.where)
+        scenario_from_table(tomllib.loads(tomlkit.dumps(scenario.to_table())), where=scenario.where)
         == scenario
     )
 
@@ -233,7 +233,7 @@ def test_faults_delays_switches_and_variations_are_read_and_written() -> None:
     assert scenario.compliance == Parts(slip_pid=False)
     assert scenario.variation == Variation(attitude=math.radians(1.0), command_delay=0.05)
     assert (
-        scenario_from_table(tomllib.loads(to_toml(scenario.to_table())), where=scenario.where)
+        scenario_from_table(tomllib.loads(tomlkit.dumps(scenario.to_table())), where=scenario.where)
         == scenario
     )
 
@@ -432,10 +432,25 @@ def test_all_errors_share_the_one_base() -> None:
             "list": [{"a": 1}, {"a": 2, "b": {"c": [1]}}],
         },
         {"dotted.key": {"torso.com[1]": 0.5}, "spaced key": 1},
+        {"a": "delete \x7f", "b": "escape \x1b"},
     ],
 )
 def test_toml_text_reads_back_as_the_table(table: dict[str, object]) -> None:
-    assert tomllib.loads(to_toml(table)) == table
+    assert tomllib.loads(tomlkit.dumps(table)) == table
+
+
+def test_toml_text_has_each_value_on_one_line() -> None:
+    table = {"position": [0.1, -1e-300, 3.0], "inertia": (1.0, 2.0, 3.0, 0.0, 0.0, 1 / 3)}
+    assert tomlkit.dumps(table).splitlines() == [
+        "position = [0.1, -1e-300, 3.0]",
+        "inertia = [1.0, 2.0, 3.0, 0.0, 0.0, 0.3333333333333333]",
+    ]
+
+
+def test_a_title_with_a_control_character_is_stored_and_read_back() -> None:
+    scenario = load_scenario("walk_flat", overrides=["title=delete \x7f"])
+    table = tomllib.loads(tomlkit.dumps(scenario.to_table()))
+    assert scenario_from_table(table, where=scenario.where).title == "delete \x7f"
 
 
 def test_the_robots_gait_is_used_where_the_scenario_gives_none() -> None:

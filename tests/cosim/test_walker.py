@@ -208,7 +208,7 @@ def test_a_refused_step_ends_the_walk_as_in_python_and_the_next_one_begins_afres
     expected, _ = in_python(bad, walker)
     found = walker.simulate(bad)
     assert (found.outcome.status, found.outcome.simulated) == (FAILED, expected.simulated)
-    assert found.outcome.reason.replace("0.fmu", "athena.fmu") == expected.reason
+    assert found.outcome.reason == expected.reason
     assert "not finite" in expected.reason
     assert len(found.outcome.recording.time) == len(expected.recording.time)
     assert steady(walker.summary(WALKS[0], gains=gains_of(WALKS[0]))) == steady(good)

@@ -1,5 +1,6 @@
-"""Trials with many instances, libraries, threads and steps. Each prints its figures and exits with
-1 if they are bad.
+"""Runs trials with many instances, libraries, threads and steps.
+
+Each trial prints its figures and exits with 1 if they are bad.
 
 usage: PYTHONPATH=tests/support python tests/fmi/endurance.py LIBRARY [TRIAL COUNT]
 
@@ -116,8 +117,8 @@ def trace(plant: Plant, seed: int, first: int, last: int) -> list[list[float]]:
 
 
 def threads(library: Path, count: int) -> Figures:
-    """Steps 64 instances from 2 threads in turns; results must equal those of single instances bit
-    for bit.
+    """Steps 64 instances from 2 threads in turns; the results must equal those of single instances
+    bit for bit.
     """
     plants = [Plant(library, name=f"plant {k}").initialize() for k in range(64)]
     together: list[list[list[float]]] = [[] for _ in plants]
@@ -136,9 +137,9 @@ def threads(library: Path, count: int) -> Figures:
 
 
 def clock(library: Path, count: int) -> Figures:
-    """Steps of 1/60 s of a master that sums up time:
+    """Steps by 1/60 s with the clock of a master that sums up time.
 
-    the FMU follows its clock to the last bit until the stop time.
+    The FMU must follow this clock to the last bit until the stop time.
     """
     size, now, reached = 1.0 / 60.0, 0.0, ctypes.c_double()
     with Plant(library) as plant:
@@ -165,9 +166,9 @@ def clock(library: Path, count: int) -> Figures:
 
 
 def states(library: Path, count: int) -> Figures:
-    """Saves a state at every step and frees none:
+    """Saves a state at every step and frees none.
 
-    the memory is that of the states, and steps do not slow down.
+    The memory must be that of the states, and steps must not slow down.
     """
     with Plant(library) as plant:
         plant.initialize()

@@ -1,9 +1,11 @@
-"""Random calls, legal and illegal, compared with a model of the standard's state machine.
+"""Makes random calls, legal and illegal, and compares the FMU with a model of the standard's state
+machine.
 
 usage: PYTHONPATH=tests/support python tests/fmi/fuzz.py LIBRARY SEED CALLS
 
 After each call the status must be one that the model allows, a refused call must not have changed
-the state, and a reset instance must equal a new one. Exits with 1 and the last calls otherwise.
+the state, and a reset instance must equal a new one. Exits with 1 and prints the last calls
+otherwise.
 """
 
 from __future__ import annotations
@@ -31,7 +33,7 @@ FOREIGN = (
     "fmi2EnterEventMode",
     "fmi2EnterContinuousTimeMode",
     "fmi2CancelStep",
-)  # not of co-simulation, or with nothing to cancel
+)  # functions that are not for co-simulation, or have nothing to cancel
 INPUTS = [
     variable
     for variable in ATHENA.of_causality("input")
@@ -43,9 +45,9 @@ SAFE = (
     "contact.restitution",
     "servo.kp",
     "gravity[1]",
-)  # parameters, each free of the others
+)  # parameters that are independent of each other
 UNKNOWN = (999, 3999, 2**31, 2**32 - 1)
-GENTLE = 0.05  # of an input's range at most, so that most steps can be taken
+GENTLE = 0.05  # largest part of an input's range, so that most steps succeed
 Statuses = tuple[int, ...]
 
 
@@ -55,7 +57,7 @@ class RuleViolationError(AssertionError):
 
 @dataclass(frozen=True)
 class Model:
-    """The known state of an instance."""
+    """The state of an instance as far as it is known."""
 
     mode: str = INSTANTIATED
     time: float = 0.0  # s
@@ -64,7 +66,7 @@ class Model:
 
 @dataclass
 class Fuzz:
-    """An instance, its model, and saved states with their models."""
+    """Holds an instance, its model, and saved states with their models."""
 
     plant: Plant
     random: Random

@@ -39,7 +39,9 @@ EVERYTHING = os.environ.get("HEXAPOD_PLATFORMS") == "all"  # as `make test-platf
 
 @dataclass(frozen=True)
 class Emulator:
-    """How programs for a target run on this machine: required programs, command, form of paths."""
+    """Describes how programs for a target run on this machine: required programs, command, form of
+    paths.
+    """
 
     needs: tuple[str, ...] = ()
     command: tuple[str, ...] = ()
@@ -124,7 +126,7 @@ def build_walker(target: str, folder: Path) -> Path:
         "-mcpu=baseline",
         *COMPILE,
         "-s",
-    )  # a library's: the system libraries are made once for both
+    )  # the system libraries are compiled once for libraries and programs
     libraries = [] if "windows" in target else ["-ldl"]
     command = [
         *find_compiler().command,

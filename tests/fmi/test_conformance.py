@@ -1,6 +1,5 @@
-"""Conformance of an FMU's archive and documents:
-
-exported FMUs have no problems, and each kind of damage is found and named.
+"""Tests that archives and documents of exported FMUs conform to the standard, and that each kind of
+damage is found and named.
 """
 
 from __future__ import annotations

@@ -1,4 +1,6 @@
-"""Short trials of endurance.py, each in its own process, so that a crash fails one test only."""
+"""Runs short trials of endurance.py, each in its own process, so that a crash fails one
+test only.
+"""
 
 from __future__ import annotations
 
@@ -12,7 +14,7 @@ import pytest
 SHORT = {"instances": 500, "libraries": 200, "threads": 20, "states": 500, "clock": 5000}
 SCRIPTS = Path(__file__).parent
 SUPPORT = SCRIPTS.parent / "support"  # modules that the scripts import
-TIMEOUT = 600  # s, much longer than any trial; ends calls that hang
+TIMEOUT = 600  # s, much longer than any trial; calls that hang are ended
 
 
 def outcome(script: str, *arguments: str) -> str:
@@ -41,9 +43,9 @@ def test_a_trial_with_many_repetitions_succeeds(
 
 @pytest.mark.parametrize("seed", range(4))
 def test_random_calls_keep_to_the_standard_s_state_machine(plant_library: Path, seed: int) -> None:
-    """Nothing crashes, refused calls change nothing and log a message, and a reset instance equals
+    """No call crashes, refused calls change nothing and log a message, and a reset instance equals
     a new one byte for byte.
     """
     counts = outcome("fuzz.py", str(plant_library), str(seed), "1500")
-    assert "0:" in counts  # some were legal
-    assert "3:" in counts  # some were not
+    assert "0:" in counts  # some calls were legal
+    assert "3:" in counts  # some calls were not

@@ -1,6 +1,6 @@
-"""FMI 2.0 through the standard's C interface:
+"""Tests FMI 2.0 through the standard's C interface: order of calls, values, steps, log.
 
-order of calls, values, stepping, log. Physics is tested elsewhere.
+Other files test the physics.
 """
 
 from __future__ import annotations
@@ -38,7 +38,8 @@ def test_the_fmu_passes_fmpy_validation(athena_fmu: Path) -> None:
 
 
 def test_the_fmu_stands_still_in_fmpy(athena_fmu: Path) -> None:
-    # m: the statics agree with the plant's equilibrium far better than a foot's 0.66 mm sinkage
+    # m; the equilibria of the statics and of the plant differ far less than a foot's 0.66 mm of
+    # sinkage
     settled = 1e-5
     result = fmpy.simulate_fmu(str(athena_fmu), output=["torso.position[3]", "torso.roll"])
     assert result["time"][-1] == pytest.approx(2.0)

@@ -1,6 +1,5 @@
-"""FMI 3.0 through the standard's C interface:
-
-the plant of FMI 2.0, arrays, events, order of calls, refusals, saved states.
+"""Tests FMI 3.0 through the standard's C interface: the same plant as in FMI 2.0, arrays, events,
+order of calls, refusals, saved states.
 """
 
 from __future__ import annotations
@@ -25,7 +24,7 @@ from hexapod_cosim.cosim.interface.model_description3 import (
 )
 
 H = 0.005  # s, communication step
-DROP = 0.15  # m, a torso that high falls for some 50 ms before the feet touch down
+DROP = 0.15  # m; a torso from this height falls for about 50 ms before the feet touch down
 PUSH = 3.0  # N
 NAN, INF = math.nan, math.inf
 
@@ -40,8 +39,9 @@ def dropped(plant: Plant3) -> Plant3:
 
 
 def to_end(plant: Plant3, end: float, *, size: float = H, enter: bool = False) -> list[float]:
-    """Steps to the points of a regular grid, continuing after early returns; returns the times of
-    events.
+    """Steps to the points of a regular grid and continues after early returns.
+
+    Returns the times of the events.
     """
     time, k, events = 0.0, 1, []
     while time < end:
@@ -116,8 +116,8 @@ def test_events_and_early_returns_do_not_change_the_motion(
         times = to_end(broken, end, enter=events)
         assert len(times) >= 3
         assert early == any(not math.isclose(time / H, round(time / H)) for time in times)
-        # 1e-12: an end that an importer reaches as t + h in pieces may differ in the last bit, and
-        # with it the last step
+        # 1e-12: the end of a step that an importer reaches in pieces may differ in the last bit,
+        # and with it the last step
         np.testing.assert_allclose(broken.everything(), whole.everything(), rtol=1e-12, atol=1e-12)
         assert broken.get("solver.steps") == whole.get("solver.steps")
 
@@ -275,7 +275,7 @@ def test_a_step_that_cannot_be_taken_is_discarded_and_changes_nothing(plant3: Pl
 
 
 def test_an_event_is_where_a_foot_touches_down(plant_library: Path) -> None:
-    touch = 1e-6  # m: what the integrator calls touching
+    touch = 1e-6  # m; penetration that the integrator counts as touching
     with Plant3(plant_library, events=True, early=True) as plant:
         dropped(plant)
         assert plant.get("foot.contact")[0].tolist() == [False] * 6

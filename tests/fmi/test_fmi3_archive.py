@@ -1,7 +1,5 @@
-"""The FMI 3.0 FMU as a file:
-
-validation by fmpy and the standard's schemas, runs by fmpy compared with FMI 2.0, sources,
-terminals, derivatives.
+"""Tests the FMI 3.0 FMU as a file: validation by fmpy and by the standard's schemas, runs of fmpy
+compared with FMI 2.0, sources, terminals, derivatives.
 """
 
 from __future__ import annotations
@@ -60,7 +58,7 @@ def run2(path: Path, **options: Any) -> NDArray[np.float64]:
 
 
 def run3(path: Path, **options: Any) -> NDArray[np.float64]:
-    """Returns the last row of an FMI 3.0 run: the elements that SEEN2 names."""
+    """Returns the last row of an FMI 3.0 run, with the elements that SEEN2 names."""
     result = fmpy.simulate_fmu(
         str(path),
         stop_time=STOP,
@@ -103,7 +101,7 @@ def test_the_archive_has_the_folders_of_fmi_3(exported3: Path) -> None:
         "resources/start_values.txt",
         "sources/fmi/fmi3.c",
     } | pictures <= names
-    assert not names & {"sources/fmi/fmi2.c", "model.png"}  # of FMI 2
+    assert not names & {"sources/fmi/fmi2.c", "model.png"}  # files of FMI 2
 
 
 def test_the_fmu_stands_still_in_fmpy(exported3: Path) -> None:
@@ -129,7 +127,7 @@ def test_early_returns_change_nothing_but_rounding(
     exported3: Path, athena_fmu: Path, event_mode: bool
 ) -> None:
     expected = run2(athena_fmu, fmi_type="CoSimulation")
-    # fmpy asks for the rest of a step, whose end may then differ in the last bit
+    # fmpy then steps over the rest of a step, whose end may differ in the last bit
     found = run3(
         exported3, fmi_type="CoSimulation", early_return_allowed=True, use_event_mode=event_mode
     )

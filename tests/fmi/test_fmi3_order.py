@@ -1,4 +1,4 @@
-"""FMI 3.0: instantiation, order of calls, functions that are not offered, reset."""
+"""Tests FMI 3.0: instantiation, order of calls, functions that are not offered, reset."""
 
 from __future__ import annotations
 
@@ -121,8 +121,8 @@ EVERY = (
     COMPLETED,
     COUNT,
 )
-# which of EVERY are legal after each call of a walk: what the standard's state machines say, and
-# the liberties that fmi3.c names
+# calls of EVERY that are legal after each call of a walk, by the standard's state machines and the
+# liberties that fmi3.c names
 LEGAL: dict[str, dict[str, tuple[tuple[object, ...], ...]]] = {
     "plain": {"": (ENTER,), "init": (EXIT,), "run": (STEP, END), "end": (END,)},
     "events": {

@@ -1,4 +1,4 @@
-"""Model exchange, derivatives and dependencies: the FMU with other solvers and tools."""
+"""Tests model exchange, derivatives and dependencies, which other solvers and tools use."""
 
 from __future__ import annotations
 
@@ -26,11 +26,11 @@ STEPPED = [
     if name.startswith("solver.") or ATHENA.variable(name).variability == "discrete"
 ]
 LEGS = ("LF", "LM", "LR", "RF", "RM", "RR")
-ROUNDING = 1e-12  # 1    of the largest number of its kind
+ROUNDING = 1e-12  # relative to the largest number of its kind
 
 
 class EventInfo(ctypes.Structure):
-    """fmi2EventInfo."""
+    """The structure fmi2EventInfo."""
 
     _fields_ = (
         *(
@@ -65,7 +65,7 @@ def put_states(plant: Plant, x: Array) -> int:
 def directional(
     plant: Plant, unknowns: Sequence[str], knowns: Sequence[str], change: Sequence[float] | Array
 ) -> tuple[int, Array]:
-    """Returns status and derivatives of the unknowns."""
+    """Returns status and directional derivatives of the unknowns."""
     wanted, given = ATHENA.references(unknowns), ATHENA.references(knowns)
     result = doubles(np.full(len(wanted), np.nan))
     status = plant.call(
@@ -117,7 +117,7 @@ THROWN = {
     "initial.velocity[1]": 0.2,
     "initial.angular_velocity[2]": 0.5,
 }
-CONVERGED = 2e-9  # m, rad    both solvers at 1e-9; twelve touch-downs multiply what they leave
+CONVERGED = 2e-9  # m, rad; both solvers have 1e-9, and twelve touch-downs amplify the difference
 
 
 @pytest.mark.parametrize("law", ["tanh", "bristle"])
@@ -219,8 +219,8 @@ def test_the_commands_of_a_walk_give_the_same_path_with_another_solver(athena_fm
     )
     late = (
         0.5 * 0.0005 * 0.5
-        # m    a command held for half a millisecond lags half of that, at half a radian a second
-        # and half a metre
+        # m; a command that is held for 0.5 ms lags by half of that, with speeds of 0.5 rad/s and
+        # legs of 0.5 m
     )
     for name in STATES[:7]:
         np.testing.assert_allclose(
@@ -288,7 +288,7 @@ def test_indicators_are_the_feet_s_penetrations_and_an_event_closes_a_foot(solve
     for z, contact in (
         (0.05, 1.0),
         (0.0, 0.0),
-    ):  # up: the feet still count as closed until the event, then they are open
+    ):  # the motion is upwards: the feet count as closed until the event, after which they are open
         moved = x.copy()
         moved[height] += z
         assert put_states(solved, moved) == OK
@@ -306,8 +306,8 @@ def test_indicators_are_the_feet_s_penetrations_and_an_event_closes_a_foot(solve
 def test_feet_at_the_ground_s_surface_stand_on_it(
     plant_library: Path, athena_fmu: Path, depth: float, speed: float
 ) -> None:
-    """An event indicator agrees with the contact, so no foot is lost that starts, rests or reverses
-    within 0.1 nm of the ground.
+    """An event indicator agrees with the contact, so the contact of a foot that starts, rests or
+    reverses within 0.1 nm of the ground is not lost.
     """
     with Plant(plant_library, kind=MODEL_EXCHANGE) as plant:
         plant.set_reals({"solver.tolerance": 1e-8})
@@ -340,7 +340,7 @@ def test_feet_at_the_ground_s_surface_stand_on_it(
     )
     np.testing.assert_allclose(
         theirs["torso.position[3]"], ours["torso.position[3]"], atol=1e-5
-    )  # CS at its default tolerance
+    )  # co-simulation at its default tolerance
 
 
 def test_a_foot_that_lifts_off_slackens_its_bristles_and_changes_no_other_state(
@@ -438,7 +438,7 @@ def test_derivatives_of_many_knowns_are_the_sum_of_each_one_s(running: Plant) ->
     )
     np.testing.assert_allclose(
         together, single, atol=1e-11 * np.abs(together).max()
-    )  # of 130 terms
+    )  # rounding of sums of 130 terms
 
 
 def test_derivatives_do_not_depend_on_the_size_of_the_change(running: Plant) -> None:
@@ -521,10 +521,10 @@ def test_an_input_that_moves_is_the_limit_of_one_that_is_set_often(
     moving, coarse, fine = (end[~works] for end in ends)
     assert (
         np.abs(moving - fine).max() < 0.35 * np.abs(moving - coarse).max() + 1e-7
-    )  # order 2: a quarter; 1e-7: the solver's
+    )  # the error of order 2 is a quarter; 1e-7 is the solver's error
     np.testing.assert_allclose(
         ends[0][works], ends[2][works], rtol=1e-4
-    )  # of order 2 in the step, which is longer in one piece
+    )  # the error is of order 2 in the step, which is longer without interruptions
 
 
 def test_a_kinematic_joint_keeps_its_speed_while_another_one_s_angle_has_a_rate(
@@ -579,7 +579,7 @@ def test_rates_of_outputs_are_their_slopes_over_time(running: Plant) -> None:
         "peak_force",
         "peak_force_rate",
         "landing_rate",
-    )  # of whole steps, so no functions of time
+    )  # peaks of whole steps, which are no functions of time
     names = [name for name in names if name.rpartition(".")[2] not in peaks]
     h, t, samples = 1e-4, 0.005, []
     assert running.call("fmi2SetRealInputDerivatives", None, ctypes.c_size_t(0), None, None) == OK
@@ -598,7 +598,7 @@ def test_rates_of_outputs_are_their_slopes_over_time(running: Plant) -> None:
     )
     np.testing.assert_array_less(
         np.abs(slopes - central) / scale, 0.02
-    )  # five points of a solution to 1e-6, 0.1 ms apart
+    )  # derivative from five points of a solution with errors of 1e-6, 0.1 ms apart
 
 
 # ---- dependencies
@@ -611,7 +611,7 @@ VARIANTS: tuple[dict[str, float], ...] = (
 
 
 def moved(library: Path, variant: dict[str, float], *, initialize: bool = True) -> Plant:
-    """Returns a moving instance in a skew posture, with all feet deep in soft ground."""
+    """Returns a moving instance in an asymmetric posture, with all feet deep in soft ground."""
     plant, rng = Plant(library), np.random.default_rng(5)
     soft = {
         "contact.law": 5,
@@ -642,12 +642,13 @@ def test_dependencies_of_unknowns_are_those_of_the_description(plant_library: Pa
         with moved(plant_library, variant) as plant:
             for start, end in itertools.pairwise(
                 (0.0, 0.0005, 0.001, 0.002, 0.005, 0.01)
-            ):  # some feet slide, some hold
+            ):  # some feet slide, some stick
                 assert plant.step(start, end - start) == OK, plant.last_message
                 jacobian = np.array(
                     [directional(plant, UNKNOWNS, [known], [1.0])[1] for known in knowns]
                 ).T
-                seen |= np.abs(jacobian) > 1e-9 * np.abs(jacobian).max(axis=0)  # less is rounding
+                # smaller values are rounding
+                seen |= np.abs(jacobian) > 1e-9 * np.abs(jacobian).max(axis=0)
     for name, row in zip(UNKNOWNS, seen, strict=True):
         found, stated = (
             {known for known, does in zip(knowns, row, strict=True) if does},
@@ -662,7 +663,7 @@ def test_dependencies_of_unknowns_are_those_of_the_description(plant_library: Pa
 
 
 def kinds(names: Iterable[str]) -> set[str]:
-    """Returns names without their index."""
+    """Returns the names without their indices."""
     return {name.partition("[")[0] for name in names}
 
 

@@ -1,6 +1,5 @@
-"""Behaviour of real importers that test_fmi.py and test_export.py do not cover:
-
-unusual arguments, clocks and ends.
+"""Tests the behaviour of real importers that test_fmi.py and test_export.py do not cover: unusual
+arguments, clocks and ends.
 """
 
 from __future__ import annotations
@@ -23,13 +22,13 @@ from hexapod_cosim.cosim.interface.model_description import render_fmi2
 from hexapod_cosim.models.robot import load_robot
 
 H = 0.01  # s
-TRUE = -1  # as importers written in Basic or Fortran send it
+TRUE = -1  # true as importers written in Basic or Fortran pass it
 SETTABLE = {"Real": "fmi2SetReal", "Enumeration": "fmi2SetInteger", "Boolean": "fmi2SetBoolean"}
 
 
 @pytest.fixture
 def another(tmp_path: Path) -> tuple[str, Path]:
-    """Returns GUID and resources of a robot other than the compiled-in one."""
+    """Returns GUID and resources of a robot that is not the compiled-in one."""
     interface = load_interface(load_robot("phantomx_mk4"))
     guid = render_fmi2(interface).guid
     folder = tmp_path / "größe 100% %41" / "resources"
@@ -39,7 +38,7 @@ def another(tmp_path: Path) -> tuple[str, Path]:
 
 
 def set_starts(plant: Plant) -> None:
-    """Sets every variable with a start value to it, type by type."""
+    """Sets every variable with a start value to that value, type by type."""
     for kind, function in SETTABLE.items():
         variables = [
             variable
@@ -216,7 +215,7 @@ def test_outputs_read_in_initialisation_mode_are_those_of_the_first_communicatio
 
 
 def test_a_step_of_a_tenth_may_miss_its_last_bits(running: Plant) -> None:
-    """0.3 - 0.2 = 0.09999999999999998, from a clock that says 0.30000000000000004."""
+    """The step is 0.3 - 0.2 = 0.09999999999999998, and the clock is at 0.30000000000000004."""
     for begin, size in (
         (0.0, 0.1),
         (0.1, 0.1),
@@ -273,11 +272,12 @@ def test_the_clock_follows_the_importer_over_many_steps(
 def test_a_clock_that_is_a_sum_of_a_million_steps_reaches_the_stop_time(
     plant: Plant, size: float
 ) -> None:
+    """The importer adds up the communication points."""
     total = 0.0
     for _ in range(1_000_000):
         total += size
-    assert abs(total - 1e6 * size) > 1e-9 * size  # what an importer that sums is off by
-    start = total - size  # as after a step to the stop time
+    assert abs(total - 1e6 * size) > 1e-9 * size  # s; error of an importer that adds up
+    start = total - size  # the clock as after a step to the stop time
     assert plant.call("fmi2SetupExperiment", 0, 0.0, start, 1, 1e6 * size) == OK
     assert plant.call("fmi2EnterInitializationMode") == OK
     assert plant.call("fmi2ExitInitializationMode") == OK
@@ -315,7 +315,7 @@ def test_states_saved_at_every_step_take_only_the_memory_of_their_bytes(
         states.append(running.save())
     assert (
         resident() - before < 1.1 * steps * size + 2e6
-    )  # bytes: allocation rounds up; Python's own objects
+    )  # bytes; allocations round up, and Python has objects of its own
     assert running.call("fmi2SetFMUstate", states[0]) == OK
     assert running.step(H / 10.0, H / 10.0) == OK
     for state in states:
@@ -347,7 +347,7 @@ def test_fmpy_runs_an_fmu_unpacked_anywhere(
 
 
 def test_a_walk_continues_after_every_kind_of_refusal(running: Plant, plant_library: Path) -> None:
-    """An importer that ignores errors gets the results of one without errors."""
+    """An importer that ignores errors gets the same results as one without errors."""
     mistakes: list[Callable[[], int]] = [
         lambda: running.step(math.nan, H),
         lambda: running.step(0.0, -H),

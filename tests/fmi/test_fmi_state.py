@@ -1,4 +1,6 @@
-"""Saved states, reset and several instances: the state is in the FMU's bytes."""
+"""Tests saved states, reset and several instances: the bytes of an instance contain its whole
+state.
+"""
 
 from __future__ import annotations
 
@@ -94,7 +96,7 @@ def test_a_single_damaged_byte_is_refused_and_changes_nothing(plant: Plant, plac
 @pytest.mark.parametrize("mask", [0x80, 0x40, 0x01])
 @pytest.mark.parametrize("places", [(207, 1207), (1207, 1215), (-1001, -9), (-17, -1)])
 def test_two_damaged_bytes_do_not_cancel(plant: Plant, places: tuple[int, int], mask: int) -> None:
-    """Among them are the last bytes of words, which hold signs, and neighbours."""
+    """The pairs contain the last bytes of words, which hold signs, and neighbouring bytes."""
     state = plant.save()
     data = bytearray(plant.serialize(state))
     for place in places:
@@ -166,7 +168,7 @@ def test_interleaved_instances_are_independent(plant: Plant, plant_library: Path
 
 
 def test_the_start_time_only_shifts_the_clock(plant: Plant, plant_library: Path) -> None:
-    start = 1024.0  # s: exact, and so are start + k H up to the last bits that the clock adopts
+    start = 1024.0  # s; exact, as are start + k H up to the last bits that the clock adopts
     names = ["torso.position[3]", "LF.tibia.angle"]
     with Plant(plant_library) as late:
         late.initialize(start=start)

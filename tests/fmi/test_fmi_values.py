@@ -1,6 +1,5 @@
-"""Values through the standard's C interface:
-
-which are refused, and that a refusal changes nothing.
+"""Tests values through the standard's C interface: which ones are refused, and that a refusal
+changes nothing.
 """
 
 from __future__ import annotations
@@ -53,7 +52,7 @@ def test_a_value_out_of_range_is_refused_with_the_range(
 LIMITED = [
     variable for variable in ATHENA.of_causality("input", "parameter") if variable.type == "Real"
 ]
-# what a limit would break though each number may be what it is: an impossible inertia, a law that
+# values within their own limits that are invalid together: an impossible inertia, a law that
 # divides by the restitution, static friction under a law that has none
 RELATED = [
     *(variable.name for variable in LIMITED if ".inertia_" in variable.name),

@@ -1,5 +1,7 @@
-"""`make test-importers` passes exactly when every other tool that could be installed ran and
-agrees. The adapters of these tests are scripts.
+"""Tests that `make test-importers` passes exactly when every other tool that could be installed ran
+and agrees.
+
+Scripts stand for the adapters of the tools.
 """
 
 from __future__ import annotations
@@ -22,7 +24,7 @@ from tools.importers.walk import STEP, Walk
 
 PYTHON = Path(sys.executable)
 INSTALLED, MISSING = ("numpy",), ("no-such-distribution",)  # packages of tools
-# each is called with FMU INPUTS NAMES OUTPUTS
+# each script is called with FMU INPUTS NAMES OUTPUTS
 ADAPTERS = {
     "right": "import shutil, sys; shutil.copy(sys.argv[2], sys.argv[4])",
     "crashes": "raise RuntimeError('the step failed')",
@@ -38,7 +40,7 @@ FAILING = [name for name in ADAPTERS if name != "right"]
 
 
 class ReplayedWalk(Walk):
-    """A walk without an FMU, whose replay returns the reference."""
+    """A walk without an FMU whose replay returns the reference."""
 
     def replay(self, ends: NDArray[np.float64], steps: NDArray[np.float64]) -> Recording:
         return self.reference

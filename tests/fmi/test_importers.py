@@ -1,6 +1,5 @@
-"""A short form of `make test-importers`:
-
-fmpy, our master and the C importer of examples/ with the same recorded walk.
+"""Runs a short form of `make test-importers`: fmpy, the project's master and the C importer of
+examples/ repeat one recorded walk.
 """
 
 from __future__ import annotations
@@ -20,7 +19,7 @@ from hexapod_cosim.cosim.results.recordings import read_csv, write_csv
 from tools.importers.compare import ROUND_OFF, largest_difference
 from tools.importers.walk import STEP, Walk, record
 
-DURATION = 0.6  # s    the ramp, a lift-off and a touch-down
+DURATION = 0.6  # s; long enough for the ramp, a lift-off and a touch-down
 STANDING = 200  # steps of the C importer without commands
 MOST_LINES = 72  # of the C importer
 ROOT = Path(__file__).resolve().parents[2]
@@ -109,8 +108,8 @@ def test_the_c_importer_walks_as_fmpy_does(walk: Walk, importer: Path, tmp_path:
     assert done.returncode == 0, done.stderr
     (tmp_path / "outputs.csv").write_text(done.stdout, encoding="utf-8")
     found = read_csv(tmp_path / "outputs.csv")
-    # it reads outputs after it has set the inputs of the next step, which reach torques and
-    # accelerations at once, but no positions
+    # the importer reads outputs after it has set the inputs of the next step, which act directly on
+    # torques and accelerations but not on positions
     names = [
         name
         for name in found.names
@@ -163,7 +162,7 @@ def test_the_c_importer_refuses_a_short_row_and_takes_names_without_quotes(
     done = run(importer, walk.unpacked, commands)
     assert done.returncode == 1
     assert "a row of too few commands" in done.stderr
-    assert len(done.stdout.splitlines()) == 3  # names and the rows before each of two steps
+    assert len(done.stdout.splitlines()) == 3  # names, and the rows before each of two steps
 
 
 @pytest.mark.parametrize(

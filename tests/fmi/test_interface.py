@@ -1,4 +1,6 @@
-"""interface.toml: it contains the agreed names, and generated files agree with it."""
+"""Tests that interface.toml contains the agreed names and that the generated files
+agree with it.
+"""
 
 from __future__ import annotations
 
@@ -25,8 +27,8 @@ LEGS = ("LF", "LM", "LR", "RF", "RM", "RR")
 JOINTS = ("coxa", "femur", "tibia")
 INERTIA = ("xx", "yy", "zz", "xy", "xz", "yz")
 
-# the names that other tools rely on; L, J, i and I stand for legs, joints, indices and inertia
-# entries
+# names that other tools rely on; L, J, i and I stand for legs, joints, indices and entries of
+# inertias
 CONTRACT = {
     "input": (
         "L.J.angle_ref L.J.speed_ref L.J.torque_ref torso.push_force[3] torso.push_torque[3] "

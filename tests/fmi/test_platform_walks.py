@@ -1,5 +1,5 @@
-"""The FMU's binaries for all platforms that run on this machine, under emulators too, repeat a
-recorded walk bit for bit.
+"""Tests that the FMU's binaries for all platforms that this machine can run, also under emulators,
+repeat a recorded walk bit for bit.
 
 `make test-platforms` installs the emulators and skips nothing.
 """

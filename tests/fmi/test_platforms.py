@@ -1,4 +1,4 @@
-"""Binaries for other platforms: format, exported functions and required libraries.
+"""Tests binaries for other platforms: format, exported functions and required libraries.
 
 The system libraries for Windows take two minutes to compile the first time. `make test-platforms`
 skips nothing.
@@ -32,7 +32,7 @@ from hexapod_cosim.models.errors import FmuError
 LINKER_MADE = {
     "__mh_dylib_header",
     "___dso_handle",
-}  # Zig's linker for macOS exports its own two marks
+}  # Zig's linker for macOS exports two symbols of its own
 NEWEST_GLIBC = (2, 17)
 SYSTEM = {
     "linux": re.compile(r"lib[cm]\.so\.6"),
@@ -62,8 +62,10 @@ def system_of(target: str) -> str:
 
 @pytest.fixture(scope="session")
 def built() -> dict[str, bytes]:
-    """Returns the plant's binaries by target, built in parallel or taken from the cache; Windows
-    only where it does not take minutes.
+    """Returns the plant's binaries by target, built in parallel or taken from the cache.
+
+    Windows is included only if its system libraries are compiled already or all platforms are
+    required.
     """
     quick = [target for target in TARGETS if target != "x86_64-windows"]
     with ThreadPoolExecutor() as pool:
@@ -193,9 +195,8 @@ def plant_sources() -> list[Path]:
 
 
 def compiled(folder: Path, sources: list[Path], *command: str) -> Any:
-    """Compiles sources as an importer does:
-
-    with flags for a shared library and some optimisation only.
+    """Compiles sources as importers do, with flags for a shared library and some
+    optimisation only.
     """
     out = folder / "plain.so"
     plant, root = source_files()["component.c"].parent, source_files()["fmi/fmi2.c"].parents[1]
@@ -222,9 +223,8 @@ def test_internal_names_are_hidden_in_binaries_that_importers_compile(tmp_path: 
 
 
 def fused(binary: Any) -> int:
-    """Returns the fused multiply-adds in code for 64-bit Arm:
-
-    scalar (fmadd and variants), vector (fmla, fmls), vector by element.
+    """Returns the fused multiply-adds in code for 64-bit Arm: scalar (fmadd and variants), vector
+    (fmla, fmls), and vector by element.
     """
     code = bytes(binary.get_section(".text").content)
     words = [
@@ -290,7 +290,7 @@ def test_both_versions_accept_both_standards_names() -> None:
     assert platforms.choose_platforms(["aarch64-darwin"], fmi=3) == ["aarch64-darwin"]
     assert platforms.choose_platforms(["aarch64-darwin", "x86_64-darwin"], fmi=2) == [
         "darwin64"
-    ]  # one file for both
+    ]  # a universal binary is one file for both
     assert platforms.choose_platforms(["win64", "x86_64-windows"], fmi=3) == ["x86_64-windows"]
     assert platforms.choose_platforms(["sources"], fmi=3) == []
     with pytest.raises(FmuError, match="got 'win32', expected linux64, win64"):

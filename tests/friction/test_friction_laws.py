@@ -270,9 +270,7 @@ def slid(law: Law, angle: float, duration: float) -> tuple[float, float]:
 
 
 @pytest.mark.parametrize("where", ["twin", "plant"])
-@pytest.mark.parametrize(
-    ("law", "below", "above"), [("bristle", 0.53, 0.55), ("lugre", 0.5, 0.58)]
-)
+@pytest.mark.parametrize(("law", "below", "above"), [("bristle", 0.53, 0.55), ("lugre", 0.5, 0.58)])
 def test_bristles_hold_below_the_static_angle_and_slide_above_it(
     core: ct.CDLL, law: str, below: float, above: float, where: str
 ) -> None:
@@ -311,4 +309,3 @@ def test_lugre_creeps_under_a_load_that_oscillates_and_the_bristle_law_does_not(
         moved[law] = float(found[1] - found[0])
     assert abs(moved["bristle"]) < 1e-7
     assert moved["lugre"] > 1e-5
-

@@ -1,5 +1,5 @@
-"""Provides random robots, and any robot as an equivalent URDF with other frames, signs, parts and
-names.
+"""Provides random robots, and writes any robot as an equivalent URDF with other frames, signs,
+parts and names.
 """
 
 from __future__ import annotations
@@ -18,8 +18,10 @@ from hexapod_cosim.models.records import JOINT_NAMES, LEG_NAMES, Array
 
 
 def random_robot(seed: int, *, pattern: bool) -> Robot:
-    """Six legs that all differ: lengths, offsets, masses of random bodies, yaws, limits; axes
-    that the controller takes, or any.
+    """Returns a robot whose six legs all differ: lengths, offsets, masses of random bodies, yaws,
+    limits.
+
+    Its axes are those that the controller requires, or any.
     """
     rng, robot = np.random.default_rng(seed), load_robot(("athena", "phantomx_mk4")[seed % 2])
     mass, com, inertia = _random_matter(rng, 3.0, np.array(robot.torso.size))
@@ -65,7 +67,7 @@ def _random_link(link: Link, rng: np.random.Generator, *, pattern: bool) -> Link
 
 
 def _random_matter(rng: np.random.Generator, mass: float, size: Array) -> tuple[float, Any, Any]:
-    """Mass, centre and inertia of ten points: a possible body."""
+    """Returns mass, centre of mass and inertia of ten point masses, which a real body can have."""
     weights, points = (
         rng.uniform(0.5, 1.5, 10) * mass / 10.0,
         rng.uniform(-0.5, 0.5, (10, 3)) * size,
@@ -85,10 +87,10 @@ def _triple(values: Array) -> tuple[float, float, float]:
 
 
 def disguised(robot: Robot, seed: int, extension: str = "") -> str:
-    """The robot with links' frames turned at random, joints counted the other way round, matter in
-    two links each, other names and order.
+    """Returns a URDF of the robot with other frames, order and names.
 
-    `extension` is put in at the end.
+    The frames of the links are turned at random, the joints count in the opposite direction, and
+    the mass of each link is split in two. `extension` is inserted at the end.
     """
     rng = np.random.default_rng(seed)
     root = ET.Element("robot", name=robot.name)
@@ -119,7 +121,8 @@ def _disguised_leg(root: ET.Element, number: int, robot: Robot, rng: np.random.G
         _turn(0.0, 0.0, leg.hip_yaw),
     )
     for joint, link in zip("xyz", leg.links, strict=True):
-        # R and R_above: this link's and its parent's axes in the torso's at angle 0
+        # R and R_above: rotation from the axes of this link and of its parent to the torso's, at
+        # angle 0
         name, R, sign = (
             f"l{number}{joint}",
             R_hip @ _turn(*rng.uniform(-1.5, 1.5, 3)),
@@ -163,7 +166,7 @@ def _disguised_leg(root: ET.Element, number: int, robot: Robot, rng: np.random.G
 
 
 def stances(robot: Robot) -> str:
-    """The part of our own element that says how it stands, and with which servo."""
+    """Returns the `<hexapod>` element with the stance and the servos."""
     servo = robot.servo
     legs = "".join(f'<{leg.name} stance="{_text(leg.stance)}"/>' for leg in robot.legs)
     gains = f'kp="{servo.kp}" kd="{servo.kd}" rotor_inertia="{servo.rotor_inertia}"'
@@ -173,8 +176,10 @@ def stances(robot: Robot) -> str:
 def _halves(
     root: ET.Element, name: str, mass: float, com: Array, inertia: Array, rng: np.random.Generator
 ) -> ET.Element:
-    """A link of half the mass, and one fixed to it, turned, with the other half; together they
-    have the inertia.
+    """Returns a link with half of the mass and a second one, turned and fixed to it, with the other
+    half.
+
+    Together they have the inertia.
     """
     d, Q = rng.normal(0.0, 1e-3, 3), _turn(*rng.uniform(-1.5, 1.5, 3))
     part = 0.5 * inertia - 0.5 * mass * (d @ d * np.eye(3) - np.outer(d, d))
@@ -216,7 +221,9 @@ def _joint(
 
 
 def _turn(roll: float, pitch: float, yaw: float) -> Array:
-    """(3, 3) Rz Ry Rx, as products: not the importer's closed form."""
+    """Returns the rotation (3, 3) Rz Ry Rx as a product of matrices, unlike the importer's closed
+    form.
+    """
     (cr, cp, cy), (sr, sp, sy) = np.cos((roll, pitch, yaw)), np.sin((roll, pitch, yaw))
     Rx = np.array([[1.0, 0.0, 0.0], [0.0, cr, -sr], [0.0, sr, cr]])
     Ry = np.array([[cp, 0.0, sp], [0.0, 1.0, 0.0], [-sp, 0.0, cp]])
@@ -229,7 +236,7 @@ def _text(values: Any) -> str:
 
 
 def differences(a: Robot, b: Robot) -> Mapping[str, float]:
-    """Largest absolute difference of the numbers of two robots' bodies, by what they are."""
+    """Returns the largest absolute differences between the bodies of two robots, by quantity."""
     found: dict[str, float] = {}
     pairs: list[tuple[str, Any, Any]] = [("torso", a.torso, b.torso)]
     for leg, x, y in zip(LEG_NAMES, a.legs, b.legs, strict=True):

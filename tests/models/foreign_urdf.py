@@ -1,4 +1,4 @@
-"""Provides a URDF as other authors write them, and the same robot in this project's format."""
+"""Provides a URDF as other authors write them, and the same robot as a robot file."""
 
 from __future__ import annotations
 
@@ -20,10 +20,11 @@ HIPS = {
     "RM": (0.0, -0.11, -90),
     "RR": (-0.14, -0.09, -120),
 }
-NUMBERS = {"RM": 1, "LR": 2, "LF": 3, "RR": 4, "LM": 5, "RF": 6}  # as someone counted the legs
+# the legs in the order of their numbers in the URDF
+NUMBERS = {"RM": 1, "LR": 2, "LF": 3, "RR": 4, "LM": 5, "RF": 6}
 
-# another naming, base_footprint below, rpy rounded to print, axes z throughout, right legs' the
-# other way round, masses in fixed links
+# other names, a base_footprint below, rpy rounded as printed, z axes throughout, the axes of right
+# legs reversed, masses in fixed links
 LEG = """
   <joint name="j_c{n}" type="revolute">
     <parent link="body"/> <child link="coxa_{n}"/>
@@ -107,8 +108,10 @@ def spider_urdf(names: Iterable[str] = NUMBERS) -> str:
 
 
 def _spider_leg(name: str) -> str:
-    """A left leg's joints turn as ours; a right one's coxa and femur the other way, and with the
-    femur the tibia.
+    """Returns the links and joints of a leg.
+
+    The joints of a left leg turn as those of this project. On the right the coxa and the femur, and
+    with it the tibia, turn the other way.
     """
     x, y, yaw = HIPS[name]
     left = name.startswith("L")
@@ -135,14 +138,15 @@ def spider() -> Robot:
 
 
 def spider_table() -> dict[str, Any]:
-    """The same robot as a file of ours would have it, put together by the parallel-axis theorem
-    by hand.
+    """Returns the same robot as the tables of a robot file.
+
+    Masses are combined here by the parallel-axis theorem, written out by hand.
     """
     table = athena_table()
     for name in ("links", "legs", "source"):
         del table[name]
-    # battery, turned by 90 degrees: xx and yy change places; d = (-0.06, 0, 0.03) between the two,
-    # reduced mass 2 x 0.4 / 2.4
+    # the battery is turned by 90 degrees, which exchanges xx and yy; d = (-0.06, 0, 0.03) between
+    # the two, reduced mass 2 x 0.4/2.4
     m, dx, dz = 2.0 * 0.4 / 2.4, 0.06, 0.03
     inertia = [
         8e-3 + 5e-4 + m * dz * dz,
@@ -182,7 +186,7 @@ def spider_table() -> dict[str, Any]:
 
 
 def _spider_links() -> dict[str, dict[str, Any]]:
-    # toe of 0.01 kg at 0.15 m on a tibia of 0.09 kg with its centre at 0.06 m
+    # a toe of 0.01 kg at 0.15 m on a tibia of 0.09 kg whose centre of mass is at 0.06 m
     shift = 0.09 * 0.01 / 0.1 * (0.15 - 0.06) ** 2
     rows = (
         ("coxa", 0.15, 0.05, 0.03, (6e-5, 8e-5, 9e-5), [0.0, 0.0, 1.0]),

@@ -104,8 +104,8 @@ def test_hash_follows_the_content_and_not_the_provenance() -> None:
 
 
 def test_equal_robots_hash_equal() -> None:
-    """Whole numbers and minus zero, which a caller may write, are the same numbers; a mass of
-    2.6 kg and a tenth of it are not.
+    """Integers and minus zero, which a caller may write, are the same numbers as 1.0 and 0.0. A
+    mass of 2.6 kg and one of 0.26 kg differ.
     """
     robot = load_robot("athena")
     assert robot.torso.com == (0.0, 0.0, 0.0)
@@ -130,7 +130,7 @@ def test_a_heavier_torso_gets_its_own_inertia_and_a_softer_foot_its_own_stiffnes
 
 
 def test_the_motor_constant_is_the_data_sheets_or_else_an_ideal_motors() -> None:
-    """MX-64: 6.0 N m at stall from 12 V and 4.1 A. An ideal motor takes at stall its torque
+    """MX-64: 6.0 N m at stall from 12 V and 4.1 A. At stall an ideal motor draws its stall torque
     times its no-load speed.
     """
     assert load_robot("athena").servo.motor_constant == pytest.approx(

@@ -22,11 +22,9 @@ from hexapod_cosim.models.statics import settled
 from hexapod_cosim.models.terrain import ground_normal
 from hexapod_cosim.models.urdf.writer import robot_to_urdf
 
-EXACT = (
-    1e-12  # relative to the largest entry: some 1e3 times the rounding of a dozen products in a row
-)
-# MuJoCo turns inertias to principal axes, by an iteration that ends at 1e-12, and keeps the axes as
-# a quaternion
+EXACT = 1e-12  # relative to the largest entry: about 1e3 times the rounding of a dozen products
+# MuJoCo computes principal axes of inertias by an iteration that ends at 1e-12, and stores the axes
+# as a quaternion
 PRINCIPAL_AXES = 1e-9
 UNKNOWNS = 24
 ROBOTS = {
@@ -41,7 +39,9 @@ def robot(request: pytest.FixtureRequest) -> Robot:
 
 
 def pose(robot: Robot, seed: int) -> tuple[Array, Array, Array]:
-    """Place of the torso's frame (3,), its quaternion (4,), joint angles (6, 3)."""
+    """Pose of a robot: position of the torso's frame (3,), its quaternion (4,), joint angles (6,
+    3).
+    """
     rng = np.random.default_rng(seed)
     quaternion = rng.normal(0.0, 0.3, 4) + np.eye(4)[0]
     return (
@@ -60,7 +60,9 @@ def bodies(
     spin: Array,
     speed: Array,
 ) -> Array:
-    """(19, 13) our bodies, from place, velocity and spin of the torso's frame, world axes."""
+    """Returns this project's bodies (19, 13) from position, velocity and angular velocity of the
+    torso's frame in world axes.
+    """
     arm = rotation_matrix(quaternion) @ np.array(robot.torso.com)
     return body_states(
         robot, place + arm, quaternion, velocity + np.cross(spin, arm), spin, angle, speed
@@ -70,8 +72,8 @@ def bodies(
 def our_mass_matrix(
     robot: Robot, place: Array, quaternion: Array, angle: Array, *, local_velocity: bool
 ) -> Array:
-    """(24, 24) of the torso frame's velocity (torso or world axes), its spin in torso axes and
-    the joints' speeds.
+    """Returns the mass matrix (24, 24) for the velocity of the torso's frame (torso or world axes),
+    its angular velocity in torso axes and the joint speeds.
     """
     R, columns = rotation_matrix(quaternion), []
     for unit in np.eye(UNKNOWNS):
@@ -116,7 +118,7 @@ def test_pinocchio_reads_the_urdf_as_the_robot(robot: Robot) -> None:
         q[[model.joints[joint].idx_q for joint in joints]] = angle.ravel()
         light = replace(
             robot, servo=replace(robot.servo, rotor_inertia=0.0)
-        )  # a URDF has no rotors
+        )  # a URDF has no rotor inertias
         H = np.triu(pin.crba(model, data, q))
         H = (H + H.T - np.diag(np.diag(H)))[np.ix_(order, order)]
         assert_same(H, our_mass_matrix(light, place, quaternion, angle, local_velocity=True), EXACT)
@@ -137,8 +139,8 @@ def still() -> tuple[Array, Array, Array]:
 
 
 def test_viewers_find_geometry_in_the_urdf(robot: Robot) -> None:
-    """What meshcat and its like are given: the torso, a cylinder a link, a sphere a foot; for
-    contact the feet alone.
+    """Viewers such as meshcat get the torso, a cylinder for each link and a sphere for each foot.
+    The contact geometry has the feet only.
     """
     text = robot_to_urdf(robot)
     model = pin.buildModelFromXML(text)
@@ -150,8 +152,8 @@ def test_viewers_find_geometry_in_the_urdf(robot: Robot) -> None:
 
 
 def test_the_exported_file_loads_as_viewers_load_it(robot: Robot, tmp_path: Path) -> None:
-    """pinocchio's MeshcatVisualizer takes these three: every body has its mass and something of
-    a size to show, without any mesh.
+    """Pinocchio's MeshcatVisualizer needs these three models. Every body has its mass and a visible
+    shape, without any mesh.
     """
     path = export_description(robot, tmp_path / "robot.urdf", FORMATS["urdf"])
     model, _, shown = pin.buildModelsFromUrdf(str(path), root_joint=pin.JointModelFreeFlyer())
@@ -167,7 +169,7 @@ def test_the_exported_file_loads_as_viewers_load_it(robot: Robot, tmp_path: Path
 
 
 def test_mujoco_reads_the_urdf_with_the_same_masses(robot: Robot) -> None:
-    """Its torso stands still, as MuJoCo has it with every URDF; its mass is there all the same."""
+    """MuJoCo fixes the torso of every URDF in the world; its mass is kept nevertheless."""
     model = mujoco.MjModel.from_xml_string(robot_to_urdf(robot))
     data = mujoco.MjData(model)
     assert_same(model.body_mass[model.body_mass > 0.0].sum(), robot.total_mass, EXACT)
@@ -248,14 +250,14 @@ def test_in_mujoco_the_robot_stands_as_deep_in_the_ground_as_hertz_says(name: st
     assert data.ncon == 6
     assert sum(contact_force(model, data, k) for k in range(6)) == pytest.approx(
         robot.weight, rel=1e-3
-    )  # the last tremor
+    )  # after the last oscillation
     tripod = (robot.weight / 3.0 / robot.contact.stiffness) ** (2.0 / 3.0)
-    # a linear spring that is right at a third of the weight gives half of that depth at a sixth;
-    # the mobility varies by legs and pose
+    # a linear spring that is right at a third of the weight has half of that depth at a sixth; the
+    # mobility differs by leg and pose
     assert np.mean([-contact.dist for contact in data.contact]) == pytest.approx(
         0.5 * tripod, rel=0.1
     )
-    # feet that stick hold legs up that would spread them on feet that creep; rigid legs would hold
+    # MuJoCo's feet stick and hold legs that would spread on feet that creep; rigid legs would hold
     # the torso higher
     rigid = robot.foot.radius - foot_positions(robot, robot.stance)[:, 2].min() + robot.torso.com[2]
     height = (data.qpos[:3] + rotation_matrix(data.qpos[3:7]) @ np.array(robot.torso.com))[2]
@@ -285,4 +287,4 @@ def test_mujocos_ground_is_the_robots_slope() -> None:
     feet = np.array([data.site(f"{leg}_foot").xpos for leg in LEG_NAMES]) - ground.pos
     assert feet @ ground_normal(robot.terrain) == pytest.approx(
         np.full(6, robot.foot.radius), abs=1e-9
-    )  # m    the stance is that flat
+    )  # m, flatness of the stance

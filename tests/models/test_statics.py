@@ -16,8 +16,9 @@ from hexapod_cosim.models.kinematics import body_states, foot_centres, rotation_
 from hexapod_cosim.models.records import Array
 from hexapod_cosim.models.statics import Standing, settled, standing
 
-AT_REST = 1e-6  # m/s2 and rad/s2: balance to 1e-9 N over the lightest inertias leaves less
-BALANCE = 1e-8  # N, sums of forces that balance to 1e-9 each
+# m/s2 and rad/s2: forces that balance to 1e-9 N accelerate the smallest inertias less than that
+AT_REST = 1e-6
+BALANCE = 1e-8  # N, of sums of forces that balance to 1e-9 each
 ROBOTS = ("athena", "phantomx_mk4")
 MODES = ("position", "torque", "kinematic")
 
@@ -183,7 +184,7 @@ def with_friction(robot: Robot, **friction: object) -> Robot:
 def test_on_level_ground_the_robot_stands_without_friction_as_with_it(
     friction: dict[str, object], mode: str
 ) -> None:
-    """The servos hold it: no foot pushes along the ground in the pose of rest."""
+    """The servos hold the robot, so no foot pushes along the ground in the pose of rest."""
     robot = robot_on("athena", mode=mode)
     slippery = with_friction(robot, **friction)
     pose, held = standing(slippery), standing(robot)
@@ -204,8 +205,8 @@ def test_on_level_ground_the_robot_stands_without_friction_as_with_it(
 def test_a_slope_steeper_than_friction_holds_lets_the_robot_slide_as_one_body(
     friction: dict[str, float | str], mode: str
 ) -> None:
-    """All bodies accelerate by g (sin a - mu cos a) downhill, and none turns: of a slope of 0.4
-    rad, 3.8202 or 2.0131 m/s2.
+    """All bodies accelerate downhill by g (sin a - mu cos a) and none turns. On a slope of 0.4 rad
+    this is 3.8202 or 2.0131 m/s2.
     """
     robot = with_friction(robot_on("athena", mode=mode, kind="slope", incline=0.4), **friction)
     pose = standing(robot)
@@ -216,7 +217,7 @@ def test_a_slope_steeper_than_friction_holds_lets_the_robot_slide_as_one_body(
     assert pose.slide == pytest.approx(size * downhill, abs=1e-4)
     fast = (
         10.0 * downhill if robot.friction.law == "tanh" else np.zeros(3)
-    )  # m/s  tanh friction is all there
+    )  # m/s, at which the tanh law has its full friction
     body = body_states(
         robot, pose.position, pose.quaternion, fast, np.zeros(3), pose.angle, np.zeros((6, 3))
     )
@@ -237,8 +238,8 @@ def test_a_robot_slides_from_the_friction_angle_on(law: str, share: float, slide
 def test_bristles_hold_the_robot_up_to_their_static_friction_and_let_it_slide_with_kinetic(
     incline: float, slides: bool
 ) -> None:
-    """0.3 and 0.6: tan 0.5 = 0.546, tan 0.6 = 0.684, where it slides at 9.81 (sin 0.6 - 0.3 cos
-    0.6) = 3.1101 m/s2.
+    """The coefficients are 0.3 and 0.6; tan 0.5 = 0.546 and tan 0.6 = 0.684. At 0.6 rad the robot
+    slides with 9.81 (sin 0.6 - 0.3 cos 0.6) = 3.1101 m/s2.
     """
     robot = with_friction(
         robot_on("athena", kind="slope", incline=incline, law="bristle"), mu=0.3, mu_static=0.6

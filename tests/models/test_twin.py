@@ -46,15 +46,17 @@ from hexapod_cosim.models.kinematics import (
 from hexapod_cosim.models.records import Array
 from hexapod_cosim.models.terrain import ground
 
-EXACT = 1e-12  # relative to the size of what is compared: some 1e3 roundings
-DIFFERENCE = 1e-6  # s, of central differences; their error is about 1e-8 of the third derivative
+EXACT = 1e-12  # relative to the size of the compared quantities: about 1e3 roundings
+DIFFERENCE = 1e-6  # s, of central differences, whose error is about 1e-8 of the third derivative
 DIFFERENCES_AGREE = 1e-6
 ROBOTS = ("athena", "phantomx_mk4")
 NO_CONTACT = np.full(6, np.nan)
 
 
 def random_bodies(robot: Robot, seed: int, *, height: float = 0.12, drift: float = 0.0) -> Array:
-    """Bodies near the stance, moving; `drift` pulls them off their joints (m, m/s and so on)."""
+    """Returns moving bodies near the stance; `drift` moves them off their joints (m, m/s and so
+    on).
+    """
     rng = np.random.default_rng(seed)
     quaternion = np.array([1.0, 0.0, 0.0, 0.0]) + rng.normal(0.0, 0.05, 4)
     angle, speed = robot.stance + rng.normal(0.0, 0.2, (6, 3)), rng.normal(0.0, 2.0, (6, 3))
@@ -96,7 +98,9 @@ def advanced(body: Array, dv: Array, h: float) -> Array:
 
 
 def close(a: Any, b: Any, tolerance: float) -> bool:
-    """Largest difference within the tolerance, relative to the largest entry (or 1)."""
+    """Asserts that the largest difference, relative to the largest entry or 1, is within the
+    tolerance.
+    """
     return float(np.max(np.abs(np.subtract(a, b)))) <= tolerance * max(
         1.0, float(np.max(np.abs(b)))
     )
@@ -202,7 +206,7 @@ def test_accelerations_satisfy_the_stabilised_constraints_and_every_body_balance
     wanted = joints.gamma - 2.0 * alpha * joints.dphi - beta**2 * joints.phi
     assert close(joints.D @ result.dv.ravel(), wanted, 1e-10)
 
-    # each body by itself: child and parent feel equal and opposite reactions, each at its own copy
+    # balance of each body: child and parent get equal and opposite reactions, each at its own copy
     # of the drifted joint's point
     force, torque = joint_reactions(robot, body, result.multipliers)
     applied = applied_forces(robot, body, command, np.full(6, 5.0))

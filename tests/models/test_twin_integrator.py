@@ -1,4 +1,6 @@
-"""The integrator's readable twin: its closed forms, and the C plant's steps against its steps."""
+"""Tests the readable twin of the integrator: its closed forms, and the steps of the C plant against
+its steps.
+"""
 
 from __future__ import annotations
 
@@ -31,14 +33,15 @@ from hexapod_cosim.models.method import METHOD, Stage, method_step
 from hexapod_cosim.models.records import Array
 
 PLACES = 1e-14  # m, 1: some tens of roundings
-SPEEDS = 1e-11  # of the largest: the dense system of 204 unknowns loses four digits
+SPEEDS = 1e-11  # relative to the largest speed: the dense system of 204 unknowns loses four digits
 IMPLICIT = ("rosw3", "ros2")
 ORDER = {"rosw3": 3, "ros2": 2, "dp54": 5, "bs32": 3, "rk4": 4}
-STEP = {"rosw3": 1e-3, "ros2": 1e-3, "dp54": 2e-5, "bs32": 2e-5, "rk4": 2e-5}  # s  stable ones
+# s, for which all methods are stable
+STEP = {"rosw3": 1e-3, "ros2": 1e-3, "dp54": 2e-5, "bs32": 2e-5, "rk4": 2e-5}
 ONE = np.ones(1)
 
 
-# the methods by themselves
+# the methods alone
 
 
 @pytest.mark.parametrize("name", METHODS)
@@ -56,7 +59,7 @@ def test_the_rows_of_the_methods_are_those_of_the_plant(core: ct.CDLL, name: str
 
 
 def w_stage(name: str, h: float, t_0: float, slope: float) -> Stage:
-    """A stage on y' = -2 t y^2 with A = slope y_i, which is not the derivative of f."""
+    """Takes a stage on y' = -2 t y^2 with A = slope y_i, which is not the derivative of f."""
     z = h * METHOD[name].gamma
 
     def stage(elapsed: float, y: Array, change: Array) -> Array:
@@ -69,7 +72,7 @@ def w_stage(name: str, h: float, t_0: float, slope: float) -> Stage:
 @pytest.mark.parametrize("slope", [0.0, -0.7])
 @pytest.mark.parametrize("name", METHODS)
 def test_each_method_has_its_order_with_a_wrong_matrix_that_moves(name: str, slope: float) -> None:
-    """y = 1/(1 + t^2) solves y' = -2 t y^2; explicit methods do not look at A."""
+    """y = 1/(1 + t^2) solves y' = -2 t y^2. Explicit methods do not use A."""
     errors, counts = [], np.array([16, 32, 64])
     for n in counts:
         y, h = ONE, 1.0 / n
@@ -82,7 +85,7 @@ def test_each_method_has_its_order_with_a_wrong_matrix_that_moves(name: str, slo
 
 
 def amplified(name: str, matrix: Array, y: Array) -> Array:
-    """y_1 of y' = matrix y over h = 1 with the exact A."""
+    """Returns y_1 of y' = matrix y over h = 1 with the exact matrix A."""
     m = METHOD[name]
     W = np.eye(len(y)) - m.gamma * matrix
 
@@ -94,7 +97,9 @@ def amplified(name: str, matrix: Array, y: Array) -> Array:
 
 @pytest.mark.parametrize("name", IMPLICIT)
 def test_stiff_linear_motion_is_damped_at_once_and_oscillation_never_grows(name: str) -> None:
-    """L-stable: R -> 0 at minus infinity. A-stable: |R(i w)| <= 1 for every w."""
+    """L-stability: the amplification R tends to 0 at minus infinity. A-stability: |R(i w)| <= 1 for
+    every w.
+    """
     assert abs(float(amplified(name, np.array([[-1e8]]), ONE)[0])) < 1e-7
     for w in np.logspace(-2, 4, 61):
         turn = np.array([[0.0, -w], [w, 0.0]])
@@ -108,7 +113,7 @@ def test_the_explicit_methods_have_the_taylor_series_of_their_order() -> None:
     assert amplified("dp54", x * np.eye(1), ONE)[0] == pytest.approx(math.exp(x), abs=1e-14)
 
 
-# step sizes and touch-downs by themselves
+# step sizes and touch-downs alone
 
 
 def test_the_step_factor_aims_at_the_tolerance_within_its_limits() -> None:
@@ -120,7 +125,9 @@ def test_the_step_factor_aims_at_the_tolerance_within_its_limits() -> None:
 
 
 def test_an_error_counts_by_its_scale_and_quaternions_by_their_joints_axes() -> None:
-    """A coxa's axes a, b, s are its link's turned by 90 degrees about z: 1 becomes 0.7071."""
+    """A coxa's axes a, b, s are its link's axes turned by 90 degrees about z, so an error of 1
+    counts as 0.7071.
+    """
     robot = changed(load_robot("athena"), solver={"tolerance": 1e-3})
     for row, entry, expected in [
         (0, 0, 1e4),  # 0.1 m
@@ -140,7 +147,7 @@ def test_a_cubic_is_crossed_where_it_reaches_the_level() -> None:
 
 
 def test_a_falling_robot_touches_down_when_and_as_fast_as_a_stone() -> None:
-    """Without torques nothing moves but downwards; a touch-down is found to 1e-10 m."""
+    """Without torques the robot only falls. A touch-down is found to 1e-10 m."""
     solver = {"method": "rk4", "step": 0.02}
     robot = changed(load_robot("athena"), servo={"mode": "torque"}, solver=solver)
     still = np.zeros(3)
@@ -170,7 +177,9 @@ def test_bodies_on_their_joints_stay_there_when_projected_and_drifted_ones_retur
 
 @pytest.mark.parametrize("mode", ["position", "kinematic"])
 def test_a_short_step_is_the_acceleration_of_equation_one(mode: str) -> None:
-    """The first order of a step in h is what eq. 1 says, whatever the method."""
+    """To first order in h, a step of any method changes the velocities by h times the accelerations
+    of eq. 1.
+    """
     h = 1e-7
     robot = changed(lopsided(), servo={"mode": mode}, solver={"step": h})
     body, command = random_bodies(robot, 2), random_command(robot, 2)
@@ -190,7 +199,9 @@ def assert_same_steps(
     command: Command,
     ends: list[float],
 ) -> State:
-    """Both go from these bodies to the ends [s]: same motion, contacts and counts of the solver."""
+    """Asserts that the plant and the twin, from these bodies to the ends [s], have the same motion,
+    contacts and counts of the solver.
+    """
     plant, state = Plant(core, robot), start_state(robot, body)
     plant.bodies = body
     for t in ends:
@@ -244,7 +255,7 @@ def test_a_step_cut_short_by_the_end_does_not_shorten_the_next(core: ct.CDLL, na
     flying = random_pose(robot, 1) | {"position": np.array([0.0, 0.0, 2.0])}
     body, command = body_states(robot, **flying), random_command(robot, 1)
     state = assert_same_steps(core, robot, body, command, [2e-3, 2.001e-3])
-    assert state.next_step > 5e-5  # five times the last step would be 5e-6
+    assert state.next_step > 5e-5  # s; five times the last step would be 5e-6
 
 
 @pytest.mark.parametrize("name", METHODS)
@@ -276,7 +287,8 @@ def test_projected_steps_of_drifted_bodies_are_the_plants(core: ct.CDLL, name: s
         ("rosw3", 2e-6, {"law": "tanh"}),
         ("ros2", 2e-6, {"law": "tanh"}),
         ("bs32", 2e-8, {"law": "tanh"}),
-        ("rosw3", 2e-6, {"law": "bristle", "presliding": 1e-6}),  # bristles decide the steps
+        # error of the bristles decides the step size
+        ("rosw3", 2e-6, {"law": "bristle", "presliding": 1e-6}),
     ],
 )
 def test_controlled_steps_through_a_touch_down_are_the_plants(
@@ -285,11 +297,13 @@ def test_controlled_steps_through_a_touch_down_are_the_plants(
     tolerance: float,
     friction: dict[str, Any],
 ) -> None:
-    """The same steps tried, rejected and kept, and the same guesses of when the foot touches."""
+    """The twin tries, rejects and accepts the same steps and makes the same guesses of the
+    touch-down time.
+    """
     solver = {"method": name, "step": 0.0, "tolerance": tolerance}
     robot = changed(load_robot("athena"), solver=solver, friction=friction)
     body = body_states(robot, **landing(robot))
-    body[:, 2] -= 1.9e-3  # 0.1 mm above the ground is left
+    body[:, 2] -= 1.9e-3  # m, height above the ground: 0.1 mm is left
     command = random_command(robot, 3)
     state = assert_same_steps(core, robot, body, command, [2e-4, 4e-4])
     assert state.touchdowns == 1

@@ -21,8 +21,8 @@ from hexapod_cosim.models.friction import friction_force
 from hexapod_cosim.models.records import Array
 from hexapod_cosim.models.terrain import ground
 
-EXACT = 1e-12  # relative: some 1e3 roundings
-FIGURES = 1e-4  # printed with four to six digits
+EXACT = 1e-12  # relative: about 1e3 roundings
+FIGURES = 1e-4  # of figures that are printed with four to six digits
 
 
 def test_the_servo_follows_its_law_inside_the_torque_speed_line() -> None:

@@ -1,5 +1,5 @@
-"""The plant's measures of one step against models/measure.py, whose impulses are those of an
-explicit method's stages.
+"""Compares the plant's measures of one step with models/measure.py, whose impulses come from the
+stages of an explicit method.
 """
 
 from __future__ import annotations
@@ -39,7 +39,9 @@ SAME = 1e-9  # relative: differences of depths and angles over a step lose some 
 def stage_forces(
     robot: Robot, body: Array, command: Command, damping: Array
 ) -> tuple[Array, Array, Array]:
-    """Motor and gear torques (6, 3) and forces on feet (6, 3) at body states (19, 13)."""
+    """Returns motor and gear torques (6, 3) each and the forces on the feet (6, 3) for bodies (19,
+    13).
+    """
     angle, speed = joint_angles(robot, body), joint_speeds(robot, body)
     motor = servo_torque(
         robot.servo, angle, speed, command.angle_ref, command.speed_ref, command.torque_ref
@@ -64,7 +66,7 @@ def test_a_step_s_measures_are_those_of_the_readable_equations(
         terrain=terrain,
         servo={"torque_max": 3.0, "speed_max": 8.0},
     )
-    robot = changed(robot, friction={"slope": 0.3})  # sliding feet use a part of their cones
+    robot = changed(robot, friction={"slope": 0.3})  # sliding feet use part of their friction cones
     command = random_command(robot, seed)
     plant, there = (Plant(core, robot, **random_pose(robot, seed)) for _ in range(2))
     before, damping = plant.bodies, standing_damping(robot, plant.bodies)
@@ -108,8 +110,10 @@ def test_a_step_s_measures_are_those_of_the_readable_equations(
 
 
 def step_ends(plant: Plant, duration: float, h: float) -> tuple[Array, Array]:
-    """Of a plant in fixed steps of h [s], which touch-downs split: times (n,) [s], and for each
-    foot (n, 4, 6) penetration, approach speed, whether it is closed, impact speed.
+    """Returns the ends of fixed steps of h [s], which touch-downs split.
+
+    The result is the times (n,) [s] and, for each foot, penetration, approach speed, whether it is
+    closed, and impact speed (n, 4, 6).
     """
     command, times, feet = plant.hold(), [], []
     for k in range(1, round(duration / h) + 1):
@@ -125,12 +129,12 @@ def step_ends(plant: Plant, duration: float, h: float) -> tuple[Array, Array]:
 
 @pytest.mark.parametrize(
     "restitution", [0.1, 0.9]
-)  # feet that stay on the ground, and feet that bounce within 20 ms
+)  # the feet stay on the ground with 0.1, and bounce within 20 ms with 0.9
 def test_the_rise_of_a_landing_is_that_of_the_readable_equations(
     core: ct.CDLL, restitution: float
 ) -> None:
-    """A robot dropped with a roll and a pitch rate, so that no two feet land alike, in steps
-    that are no multiple of 0.1 ms.
+    """A robot is dropped with roll and pitch rates, so no two feet land alike, in steps that are no
+    multiple of 0.1 ms.
     """
     settings = {"law": "exact_restitution", "restitution": restitution}
     robot = changed(

@@ -1,5 +1,5 @@
-"""The readable equations against an independent engine: Pinocchio's articulated-body algorithm
-in joint coordinates.
+"""Compares the readable equations with an independent engine, Pinocchio's articulated-body
+algorithm in joint coordinates.
 """
 
 from __future__ import annotations
@@ -24,13 +24,13 @@ from hexapod_cosim.models.kinematics import (
 )
 from hexapod_cosim.models.records import Array
 
-# relative to the largest entry: some 1e3 times what rounding makes of two different algorithms here
+# relative to the largest entry: about 1e3 times the rounding of the two algorithms
 AGREEMENT = 1e-11
 ROBOTS = ("athena", "phantomx_mk4")
 
 
 def random_bodies(robot: Robot, seed: int) -> Array:
-    """Bodies near the stance, moving, some of their feet in the ground."""
+    """Returns moving bodies near the stance, some of whose feet are in the ground."""
     rng = np.random.default_rng(seed)
     quaternion, position = rng.normal(0.0, 0.05, 4) + np.eye(4)[0], np.array([0.3, -0.2, 0.12])
     angle, speed = robot.stance + rng.normal(0.0, 0.2, (6, 3)), rng.normal(0.0, 2.0, (6, 3))
@@ -51,7 +51,7 @@ def random_command(robot: Robot, seed: int) -> Command:
 
 
 def pinocchio_model(robot: Robot) -> Any:
-    """The same robot as a free-flyer at the torso's centre of mass and 18 revolute joints."""
+    """Returns the robot as a free-flyer at the torso's centre of mass with 18 revolute joints."""
     model = pin.Model()
     model.gravity.linear = np.array(robot.gravity)
     root = model.addJoint(0, pin.JointModelFreeFlyer(), pin.SE3.Identity(), "torso")
@@ -85,11 +85,11 @@ def pinocchio_model(robot: Robot) -> Any:
 def pinocchio_accelerations(
     robot: Robot, body: Array, torque: Array, foot: Array, push: Array
 ) -> Array:
-    """(24,) torso's linear and angular acceleration in the world and the joints', by the
-    articulated-body algorithm.
+    """Returns the accelerations (24,) by the articulated-body algorithm: the torso's linear and
+    angular acceleration in world axes and those of the joints.
 
-    torque (6, 3) at the joints; foot (6, 2, 3) contact points and forces in the world; push (6,)
-    force and torque on the torso.
+    torque (6, 3) acts at the joints; foot (6, 2, 3) holds contact points and forces in world axes;
+    push (6,) is the force and torque on the torso.
     """
     model = pinocchio_model(robot)
     data = model.createData()

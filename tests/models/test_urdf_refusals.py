@@ -13,8 +13,8 @@ from foreign_urdf import SIDE, spider_urdf
 
 from hexapod_cosim.models import RobotError, load_robot
 
-# a word of the spider and what it becomes; the first place alone, which is leg RM's (number 1) for
-# what is in a leg
+# a word of the spider's URDF and its replacement; only its first place is replaced, which for words
+# in legs is leg RM (number 1)
 ARM = """<link name="camera"><inertial><mass value="0.1"/>
 <inertia ixx="1e-5" iyy="1e-5" izz="1e-5"/></inertial></link>
 <joint name="pan" type="continuous"><parent link="body"/><child link="camera"/></joint>"""

@@ -14,7 +14,9 @@ from hexapod_cosim.models import check_robot, list_robots, load_robot
 from hexapod_cosim.models.urdf.writer import robot_to_urdf
 
 ROUNDING = (
-    1e-12  # kg, m, kg m2, rad: some 1e4 times the rounding of what is turned, shifted and added up
+    # kg, m, kg m2, rad: about 1e4 times the rounding of quantities that are turned, shifted and
+    # added
+    1e-12
 )
 SEEDS = range(8)
 
@@ -55,7 +57,7 @@ def test_a_robot_in_other_frames_names_and_parts_is_the_same_robot(
         if difference > ROUNDING
     }
     assert apart == {}
-    # what a URDF does not tell is assumed
+    # quantities that a URDF does not contain are assumed
     torque, constant = (
         0.2 * robot.servo.torque_max,
         math.sqrt(robot.servo.torque_max / robot.servo.speed_max),

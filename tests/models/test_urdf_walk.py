@@ -1,5 +1,5 @@
-"""A URDF's robot in the FMU and under the controller; the commands that write and read robots
-for other tools.
+"""Tests a URDF's robot in the FMU and under the controller, and the commands that write and read
+robots for other tools.
 """
 
 from __future__ import annotations
@@ -11,28 +11,28 @@ from pathlib import Path
 
 import fmpy
 import pytest
+import tomlkit
 from command import Call, assert_refused
 from disguised_urdf import disguised, stances
 from foreign_urdf import SIDE, athena_table, spider_table, spider_urdf
 
-from hexapod_cosim.cosim.common.toml_text import to_toml
 from hexapod_cosim.cosim.master.recorder import Recording
 from hexapod_cosim.cosim.results.recordings import read_recording
 from hexapod_cosim.cosim.results.results import RESULTS
 from hexapod_cosim.models import LEG_NAMES, RobotError, list_robots, load_robot
 
-# m    the robots differ in the last bits of some inertias; what contact makes of that in seconds
+# m; the robots differ in the last bits of some inertias, which contacts amplify over seconds
 SAME_WALK = 1e-9
-SAME_COURSE = 0.1  # m    the walk is as long as commanded, less the ramps
+SAME_COURSE = 0.1  # m; the length of the walk is the commanded one less the ramps
 
 
 @pytest.fixture
 def files(tmp_path: Path) -> Path:
-    """A folder with a spider.urdf, a side file, and the same robot in our own words."""
+    """Returns a folder with spider.urdf, a side file, and the same robot as a robot file."""
     (tmp_path / "spider.urdf").write_text(spider_urdf(), encoding="utf-8")
     table = spider_table()
     table["gait"] |= {"stride": 0.07, "step_height": 0.03}
-    (tmp_path / "ours.toml").write_text(to_toml(table), encoding="utf-8")
+    (tmp_path / "ours.toml").write_text(tomlkit.dumps(table), encoding="utf-8")
     (tmp_path / "side.toml").write_text(
         f"{SIDE}\n[gait]\nperiod = 1.0\nstride = 0.07\nstep_height = 0.03\n", encoding="utf-8"
     )
@@ -63,9 +63,9 @@ def test_a_urdf_robot_walks_as_the_same_robot_in_a_file_of_ours(call: Call, file
 
 
 def test_a_urdf_robot_of_any_size_is_given_a_gait_of_one_froude_number(tmp_path: Path) -> None:
-    """Hips 0.12 m above the feet: 1 s, 0.08 m, 0.04 m.
+    """With the hips 0.12 m above the feet the gait has 1 s, 0.08 m and 0.04 m.
 
-    Strides and steps go with the height, the period with its root.
+    Strides and step heights are proportional to the height, the period to its square root.
     """
     (tmp_path / "spider.urdf").write_text(spider_urdf(), encoding="utf-8")
     gait = load_robot(tmp_path / "spider.urdf").gait
@@ -74,12 +74,12 @@ def test_a_urdf_robot_of_any_size_is_given_a_gait_of_one_froude_number(tmp_path:
     assert gait.step_height == pytest.approx(0.5 * gait.stride)
 
 
-def test_where_a_joint_counts_from_is_a_matter_of_words(call: Call, tmp_path: Path) -> None:
-    """Tibias that hang straight down at angle 0, as most URDFs draw them: length 0, all in the
-    offset.
+def test_the_zero_of_a_joint_angle_does_not_change_the_walk(call: Call, tmp_path: Path) -> None:
+    """At angle 0 the tibias hang straight down, as most URDFs draw them: the length is 0 and the
+    offset contains all.
     """
     table = athena_table()
-    (tmp_path / "ours.toml").write_text(to_toml(table), encoding="utf-8")
+    (tmp_path / "ours.toml").write_text(tomlkit.dumps(table), encoding="utf-8")
     tibia, quarter = table["links"]["tibia"], 0.5 * math.pi
     tibia |= {
         "length": 0.0,
@@ -88,7 +88,7 @@ def test_where_a_joint_counts_from_is_a_matter_of_words(call: Call, tmp_path: Pa
         "inertia": [*tibia["inertia"][2::-1], 0.0, 0.0, 0.0],
     }
     tibia |= {key: tibia[key] - quarter for key in ("angle_min", "angle_max", "stance")}
-    (tmp_path / "hanging.toml").write_text(to_toml(table), encoding="utf-8")
+    (tmp_path / "hanging.toml").write_text(tomlkit.dumps(table), encoding="utf-8")
     ours, hanging = (
         walked(call, tmp_path / f"{name}.toml", tmp_path / name, 2.0)
         for name in ("ours", "hanging")
@@ -112,7 +112,7 @@ def test_a_bare_urdf_stands_in_any_tool_and_walks(call: Call, files: Path) -> No
     result = fmpy.simulate_fmu(str(path), output=names, stop_time=1.0)
     assert sum(result[name][-1] for name in names) == pytest.approx(
         robot.weight, rel=1e-3
-    )  # the last tremor
+    )  # after the last oscillation
     course = walked(call, files / "spider.urdf", files / "walk", 2.0).column("torso.position[1]")
     assert course[-1] > SAME_COURSE
 
@@ -182,11 +182,12 @@ def test_a_mistake_leaves_one_paragraph_and_no_file(
 
 
 def test_forward_may_be_another_axis_of_the_urdf(tmp_path: Path) -> None:
-    """A robot drawn with y forward is, once that is said, the one drawn with x forward."""
+    """A robot drawn with y forward, and declared so, equals the robot drawn with x forward."""
     robot = load_robot("athena")
     text = disguised(robot, 3, stances(robot))
     (tmp_path / "x.urdf").write_text(text, encoding="utf-8")
-    # a root without mass, turned by -90 degrees against the trunk: the trunk's x is the root's y
+    # the root has no mass and is turned by -90 degrees against the trunk: the trunk's x is the
+    # root's y
     turned = (
         '<link name="root"/><joint name="turn" type="fixed"><parent link="root"/>'
         '<child link="trunk"/><origin rpy="0 0 1.5708"/></joint>'
@@ -226,7 +227,7 @@ def test_a_side_file_stands_above_the_urdf(tmp_path: Path) -> None:
 
 
 def test_what_a_urdf_has_wrong_or_lacks_a_side_file_may_give(tmp_path: Path) -> None:
-    """As in published URDFs: a quarter turn as 1.5704, an inertia in other units, feet that are
+    """As in published URDFs, a quarter turn is 1.5704, an inertia has other units, and feet are
     meshes only.
     """
     text = (

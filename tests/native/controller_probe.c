@@ -1,5 +1,4 @@
-/* controller_probe.c - the controller's internal functions for the tests, under names that the
- * library shows. */
+/* controller_probe.c - exports the controller's internal functions for the tests. */
 #include <string.h>
 
 #include "comply/slip_pid.h"
@@ -23,7 +22,7 @@ void hx_probe_squeeze(const double normal[HX_LEGS], const hxPlane feet[HX_LEGS],
   hx_squeeze(normal, feet, push);
 }
 
-/* asked: push x y, weight, moment x y, twist */
+/* Computes the feet's shares. asked: push x y, weight, moment x y, twist. */
 void hx_probe_shares(const hxPlane feet[HX_LEGS], const double activation[HX_LEGS],
                      const double asked[6], double force[HX_LEGS][3]) {
   hxDemand demand;

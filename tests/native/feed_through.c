@@ -1,6 +1,8 @@
-// An FMU of FMI 2.0 that answers at once, for tests of packages: reference = start + gain (angle -
-// start) + swing sin(2 pi t) while the foot touches the ground, plus a millionth of the steps so
-// far. What it counts moves in doStep, what it puts out follows its inputs and its time.
+// feed_through.c - an FMU of FMI 2.0 with direct feed-through, for tests of packages.
+//
+// reference = start + gain (angle - start) + swing sin(2 pi t) + 1e-6 times the number of steps,
+// where the swing is added only while the foot touches the ground. doStep changes the number of
+// steps; the output depends directly on inputs and time.
 #include "fmi2Functions.h"
 #include <math.h>
 #include <stdlib.h>

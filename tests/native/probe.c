@@ -1,7 +1,7 @@
-/* probe.c - the plant's internal functions for the tests, one leg (one lane) at a time.
+/* probe.c - exports the plant's internal functions for the tests, one leg (one lane) at a time.
  *
- * Compiled into the shared library with HX_PROBE only. Vectors and matrices cross as rows of
- * doubles.
+ * It is compiled into the shared library with HX_PROBE only. Vectors and matrices are passed as
+ * rows of doubles.
  */
 #include <stddef.h>
 #include <string.h>
@@ -52,6 +52,12 @@ static const ProbeField fields[] = {
     FIELD(hxDefinition, torso.inertia),
     FIELD(hxDefinition, leg),
     FIELD(hxDefinition, foot_radius),
+    FIELD(hxDefinition, body.torso_box),
+    FIELD(hxDefinition, body.torso_centre),
+    FIELD(hxDefinition, body.corner_radius),
+    FIELD(hxDefinition, body.knee_radius),
+    FIELD(hxDefinition, body.shank_radius),
+    FIELD(hxDefinition, body.shank_position),
     FIELD(hxDefinition, contact.law),
     FIELD(hxDefinition, contact.stiffness),
     FIELD(hxDefinition, contact.restitution),
@@ -238,8 +244,9 @@ static void put_column(hxForce6 f, int j, double out[6][6]) {
   for (int i = 0; i < 6; ++i) out[i][j] = column[i];
 }
 
-/* as 6 x 6, angular part first, from the origin: a body with mass and J at c; that less s U U^T, by
- * both ways; a block A at c and the body less s U U^T; the inverse of the last, column by column */
+/* Computes four 6 x 6 inertias about the origin, angular part first: of a body with mass and J at
+ * c; of the body less s U U^T, by two functions; of these plus a block A at c; and the inverse of
+ * the last, column by column. */
 HX_API void hx_probe_inertia(double mass, const double J[3][3], const double A[3][3],
                              const double c[3], double s, const double U[6], double out[4][6][6]) {
   const hxRigid6 body = hx_rigid_inertia(hx_splat(mass), take_sym3(J), hx_splat_vec3(c));
@@ -266,7 +273,7 @@ HX_API double hx_probe_contact_damping(const hxPlant *plant, double impact_speed
   return hx_contact(plant->model.contact_law)->damping(&plant->model, impact_speed);
 }
 
-/* out: force, elastic part, stiffness, viscosity */
+/* Computes the normal force. out: force, elastic part, stiffness, viscosity. */
 HX_API void hx_probe_normal_force(const hxPlant *plant, double closed, double damping, double delta,
                                   double ddelta, double out[4]) {
   const hxNormalForce f = hx_normal_force(&plant->model, hx_splat(closed), hx_splat(damping),
@@ -299,7 +306,7 @@ HX_API void hx_probe_sliding(const hxPlant *plant, const double slip[3], const d
 HX_API void hx_probe_turning(const hxPlant *plant, const double normal[3], const double w[3],
                              double out[5]) {
   const hxTurningFriction f =
-      hx_turning_friction(&plant->model, hx_splat(plant->model.foot_radius),
+      hx_turning_friction(&plant->model, hx_splat(plant->model.radius[HX_FOOT]),
                           hx_splat_vec3(normal), hx_splat_vec3(w));
   put3(f.moment, 0, out);
   out[3] = hx_lane(f.spin, 0), out[4] = hx_lane(f.roll, 0);
@@ -315,7 +322,7 @@ HX_API void hx_probe_stop(const hxPlant *plant, int leg, int joint, double angle
   out[2] = hx_lane(stop.stiffness, lane), out[3] = hx_lane(stop.damping, lane);
 }
 
-/* command: angle, speed, torque; out: torque, friction, stiffness, damping */
+/* Computes a servo. command: angle, speed, torque; out: torque, friction, stiffness, damping. */
 HX_API void hx_probe_servo(const hxPlant *plant, double angle, double speed,
                            const double command[3], double out[4]) {
   const hxServo servo =
@@ -325,24 +332,24 @@ HX_API void hx_probe_servo(const hxPlant *plant, double angle, double speed,
   out[2] = hx_lane(servo.stiffness, 0), out[3] = hx_lane(servo.damping + servo.drag, 0);
 }
 
-/* out: distance, normal */
+/* Computes the ground at a point. out: distance, normal. */
 HX_API void hx_probe_ground(const hxPlant *plant, const double point[3], double out[4]) {
   const hxGround ground = hx_ground(&plant->model, hx_splat_vec3(point));
   out[0] = hx_lane(ground.distance, 0);
   put3(ground.normal, 0, out + 1);
 }
 
-/* the plant's contacts after a switch; state: closed, damping, impact speed */
+/* Switches the plant's contacts and returns them. state: closed, damping, impact speed. */
 HX_API int hx_probe_contact_switch(hxPlant *plant, const double delta[HX_LEGS],
                                    const double ddelta[HX_LEGS], double state[3][HX_LEGS]) {
-  double slots[2][HX_SLOTS] = {{0}};
+  hxDepths depths;
   hxContactState *contact = &plant->state.contact;
-  memcpy(slots[0], delta, HX_LEGS * sizeof(double));
-  memcpy(slots[1], ddelta, HX_LEGS * sizeof(double));
-  const int touchdowns = hx_contact_switch(&plant->model, slots[0], slots[1], contact);
-  memcpy(state[0], contact->closed, HX_LEGS * sizeof(double));
-  memcpy(state[1], contact->damping, HX_LEGS * sizeof(double));
-  memcpy(state[2], contact->impact_speed, HX_LEGS * sizeof(double));
+  memcpy(depths.delta[HX_FOOT], delta, HX_LEGS * sizeof(double));
+  memcpy(depths.ddelta[HX_FOOT], ddelta, HX_LEGS * sizeof(double));
+  const int touchdowns = hx_contact_switch(&plant->model, &depths, contact);
+  memcpy(state[0], contact->closed[HX_FOOT], HX_LEGS * sizeof(double));
+  memcpy(state[1], contact->damping[HX_FOOT], HX_LEGS * sizeof(double));
+  memcpy(state[2], contact->impact_speed[HX_FOOT], HX_LEGS * sizeof(double));
   return touchdowns;
 }
 
@@ -356,7 +363,8 @@ static void evaluate(hxPlant *plant, const hxInput *input, double age, hxImplici
                        &plant->state.motion, implicit, 1, work, rate);
 }
 
-/* out: Phi 5, dPhi 5, s, s_i^P, s_j^P, angle, speed, inertia xx yy zz xy xz yz */
+/* Computes a joint. out: Phi 5, dPhi 5, s, s_i^P, s_j^P, angle, speed, inertia xx yy zz xy xz yz.
+ */
 HX_API void hx_probe_joint(hxPlant *plant, const hxInput *input, int leg, int joint,
                            double out[27]) {
   hxWork work;
@@ -376,8 +384,8 @@ HX_API void hx_probe_joint(hxPlant *plant, const hxInput *input, int leg, int jo
   for (int i = 0; i < 6; ++i) out[21 + i] = hx_lane(J[i], lane);
 }
 
-/* out: point, velocity, normal, penetration, approach speed, force on the foot, its slopes
- * stiffness, viscosity, drag as a step of length `ahead` takes them */
+/* Computes a foot. out: point, velocity, normal, penetration, approach speed, force on the foot,
+ * and the force's derivatives (stiffness, viscosity, drag) for a step of length `ahead`. */
 HX_API void hx_probe_foot(hxPlant *plant, const hxInput *input, int leg, double ahead,
                           double out[17]) {
   hxWork work;
@@ -385,19 +393,19 @@ HX_API void hx_probe_foot(hxPlant *plant, const hxInput *input, int leg, double 
   hxImplicit implicit = {.z = 1e-3, .ahead = ahead};
   evaluate(plant, input, 0.0, &implicit, &work, &rate);
   const int lane = leg % HX_LANES, pack = leg / HX_LANES;
-  const hxFootWork *foot = &work.pack[pack].foot;
+  const hxContactWork *foot = &work.pack[pack].contact[HX_FOOT];
+  const hxContactSlope *slope = &implicit.slope[pack].contact[HX_FOOT];
   const hxVec3 tibia = hx_link_vec3(&plant->state.motion, HX_JOINTS - 1, HX_R, leg - lane);
   put3(hx_add3(tibia, foot->kin.arm), lane, out), put3(foot->kin.velocity, lane, out + 3),
       put3(foot->kin.normal, lane, out + 6);
   out[9] = hx_lane(foot->kin.delta, lane), out[10] = hx_lane(foot->kin.ddelta, lane);
   put3(foot->force, lane, out + 11);
-  out[14] = hx_lane(implicit.slope[pack].stiffness, lane),
-  out[15] = hx_lane(implicit.slope[pack].viscosity, lane);
-  out[16] = hx_lane(implicit.slope[pack].drag, lane);
+  out[14] = hx_lane(slope->stiffness, lane), out[15] = hx_lane(slope->viscosity, lane);
+  out[16] = hx_lane(slope->drag, lane);
 }
 
-/* dy/dt under a command given `age` seconds ago: bodies, and the powers of motors, push and
- * everything that dissipates */
+/* Computes dy/dt under a command that is `age` seconds old: of the bodies, and the powers of
+ * motors, push and dissipation. */
 HX_API void hx_probe_rate(hxPlant *plant, const hxInput *input, double age,
                           double body[HX_BODIES][HX_BODY_STATE], double power[3]) {
   hxWork work;
@@ -415,7 +423,7 @@ static void fill_bristles(const double z[HX_LEGS][3], hxPlantMotion *motion) {
   }
 }
 
-/* Sets the bristles; rate: their db/dt. */
+/* Sets the bristles and computes their rates db/dt. */
 HX_API void hx_probe_bristles(hxPlant *plant, const hxInput *input, const double z[HX_LEGS][3],
                               double rate[HX_LEGS][3]) {
   hxWork work;
@@ -426,7 +434,7 @@ HX_API void hx_probe_bristles(hxPlant *plant, const hxInput *input, const double
     for (int i = 0; i < 3; ++i) rate[leg][i] = all.motion.bristle[i][leg];
 }
 
-/* a change from (v, w) of s_x and of s_v: rows of the bodies */
+/* Writes the changes s_x and s_v, rows of the bodies (linear, angular), into a rate. */
 static void put_change(const double s_x[HX_BODIES][6], const double s_v[HX_BODIES][6],
                        hxRate *change) {
   memset(change, 0, sizeof *change);
@@ -443,9 +451,9 @@ static void put_change(const double s_x[HX_BODIES][6], const double s_v[HX_BODIE
   }
 }
 
-/* k/h of a stage (eq. 19) with h gamma = z after changes s_x, s_v (linear, angular rows): the
- * bodies' rates and the angular velocities theirs stand for. The slopes are this point's, `ahead`
- * of it. */
+/* Computes k/h of a stage (eq. 19) with h gamma = z after the changes s_x and s_v (rows linear,
+ * angular): the rates of the bodies, and the angular velocities of their quaternions' rates. The
+ * derivatives of the forces are those at this state for a step of length `ahead`. */
 HX_API void hx_probe_stage(hxPlant *plant, const hxInput *input, double z, double ahead,
                            const double s_x[HX_BODIES][6], const double s_v[HX_BODIES][6],
                            double body[HX_BODIES][HX_BODY_STATE], double turn[HX_BODIES][3]) {
@@ -470,7 +478,8 @@ HX_API void hx_probe_stain_stack(int byte) {
   for (size_t i = 0; i < sizeof stain; ++i) stain[i] = (char)byte;
 }
 
-/* dy/dt by the i-th kernel; its name, or NULL when there is none or it does not run here */
+/* Computes dy/dt with the i-th kernel. Returns its name, or NULL when there is none or the
+ * processor does not support it. */
 HX_API const char *hx_probe_kernel(int i, hxPlant *plant, const hxInput *input,
                                    double body[HX_BODIES][HX_BODY_STATE]) {
   hxCommand command;
@@ -484,7 +493,7 @@ HX_API const char *hx_probe_kernel(int i, hxPlant *plant, const hxInput *input,
   return hx_kernels[i]->name;
 }
 
-/* shape: stages, order, error order; the rest as in hxMethodRow */
+/* Copies a row of the methods. shape: stages, order, error order; others as in hxMethodRow. */
 HX_API void hx_probe_method(int method, int shape[3], double *gamma, double a[HX_STAGES][HX_STAGES],
                             double g[HX_STAGES][HX_STAGES], double c[HX_STAGES],
                             double b[HX_STAGES], double e[HX_STAGES]) {

@@ -1,4 +1,4 @@
-/* test_controller.c - tests the controller through controller.h: rest, saved states, misuse. */
+/* test_controller.c - tests the controller through controller.h: standing, saved states, misuse. */
 #include <stdlib.h>
 #include <string.h>
 

@@ -109,7 +109,7 @@ static void solvers_of_others_see_it_fall(void) {
   fmi2EventInfo event;
   size_t n = 0;
   for (const char *at = description; (at = strstr(at + 1, "derivative=\"")) != NULL;
-       ++n) { /* counts states */
+       ++n) { /* n becomes the number of states */
   }
   CHECK(n > 0 && n <= MOST);
   CHECK(set(fmu, "initial.position[3]", 1.0) == fmi2OK);
@@ -120,7 +120,7 @@ static void solvers_of_others_see_it_fall(void) {
         fmi2GetDerivatives(fmu, rate, n) == fmi2OK);
   CHECK(fmi2GetEventIndicators(fmu, foot, FEET) == fmi2OK);
   for (int k = 0; k < FEET; ++k)
-    NEAR(foot[k], -0.87, 0.02); /* m  the default robot's torso stands at 0.13 */
+    NEAR(foot[k], -0.87, 0.02); /* m; the torso is 0.13 above the ground */
   CHECK(fmi2SetTime(fmu, 0.001) == fmi2OK && fmi2SetContinuousStates(fmu, state, n) == fmi2OK);
   CHECK(fmi2GetDerivatives(fmu, rate, n) == fmi2OK &&
         fmi2GetContinuousStates(fmu, state, n) == fmi2OK);

@@ -86,7 +86,7 @@ static double dropped(fmi3Boolean events) {
   return z;
 }
 
-/* an importer computes the end in pieces, so the last step may differ by rounding */
+/* the end of a step is a sum of pieces, so the last step may differ by rounding */
 static void stops_at_touch_downs_leave_no_trace(void) {
   NEAR(dropped(fmi3True), dropped(fmi3False), 1e-12);
 }

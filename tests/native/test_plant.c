@@ -1,5 +1,5 @@
-/* test_plant.c - the plant through hexapod.h alone: laws of motion, the same bits, refusals, and
- * every choice of law at work. */
+/* test_plant.c - tests the plant through hexapod.h: laws of motion, equal bits after repeating and
+ * restoring, refusals, and every choice of law. */
 #include <stdlib.h>
 #include <string.h>
 
@@ -34,8 +34,8 @@ static void walk_in_place(hxPlant *plant, double t_end) {
   }
 }
 
-/* motors that do nothing and gears without friction: nothing but gravity acts on a robot in the air
- */
+/* Makes motors without torque and gears without friction, so that only gravity acts on a robot in
+ * the air. */
 static hxDefinition falling_robot(void) {
   hxDefinition robot;
   hx_definition_default(&robot);
@@ -122,7 +122,7 @@ static void tangents_are_differences(void) {
   change.push_force[2] = 1.0;
   change.torque_ref[RM][TIBIA] = 0.1;
   const hxStatus status = hx_plant_tangent(plant, &input, &change, NULL, &tangent, &d_output);
-  CHECK(status == HX_OK || status == HX_INVALID_ARGUMENT); /* a compiler without complex numbers */
+  CHECK(status == HX_OK || status == HX_INVALID_ARGUMENT); /* compilers without complex numbers */
   hx_plant_rates(plant, &input, &rate);
   input.push_force[2] += step * change.push_force[2];
   input.torque_ref[RM][TIBIA] += step * change.torque_ref[RM][TIBIA];
@@ -136,7 +136,7 @@ static void tangents_are_differences(void) {
   hx_plant_destroy(plant);
 }
 
-/* ---- the same bits ---- */
+/* ---- equal bits ---- */
 
 static void a_saved_state_goes_on_as_it_would_have(void) {
   hxPlant *one = hx_plant_create(), *two = hx_plant_create();
@@ -222,7 +222,7 @@ static void bad_input_changes_nothing(void) {
   hx_plant_destroy(plant);
 }
 
-/* ---- every choice ---- */
+/* ---- every law, method and mode ---- */
 
 static void moves(hxPlant *plant, const hxDefinition *robot) {
   double body[HX_BODIES][HX_BODY_STATE];

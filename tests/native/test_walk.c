@@ -1,5 +1,5 @@
-/* test_walk.c - plant and controller as two C libraries in one loop: the robot walks as it is told,
- * under either control, twice alike. */
+/* test_walk.c - tests plant and controller as two C libraries in one loop: under both controls the
+ * robot walks as commanded, and a second walk has the same bits. */
 #include <string.h>
 
 #include <hexapod/controller.h>

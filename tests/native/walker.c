@@ -2,9 +2,10 @@
  * bit.
  *
  * usage: walker LIBRARY GUID RESOURCES INPUTS
- * INPUTS, words apart: number of inputs and their references, number of outputs and theirs, number
- * of steps, step size, then the inputs of each step; Reals as 64-bit patterns in hexadecimal.
- * Prints a line of such patterns a step. Exit code 0 when every call was well.
+ * INPUTS contains, separated by spaces: number of inputs and their references, number of outputs
+ * and theirs, number of steps, step size, then the inputs of each step; Reals as 64-bit patterns in
+ * hexadecimal. Prints a line of such patterns for each step. Exits with 0 when every call
+ * succeeded.
  */
 #include <inttypes.h>
 #include <stdarg.h>
@@ -74,7 +75,7 @@ static void print_reals(const double *value, size_t n) {
 
 enum { MOST = 2000 };
 
-/* Returns their number, 0 for damaged ones. */
+/* Returns the number of references, 0 if they are damaged. */
 static unsigned read_references(FILE *file, fmi2ValueReference reference[MOST]) {
   unsigned n;
   if (fscanf(file, "%u", &n) != 1 || n > MOST) return 0;

@@ -1,5 +1,6 @@
-"""Computes derivatives of contact and servo forces by differences of the twin, for W = M - z G_v -
-z^2 G_x.
+"""Computes derivatives of contact and servo forces by central differences of the twin's forces.
+
+They enter the matrix W = M - z G_v - z^2 G_x of an implicit stage.
 """
 
 from __future__ import annotations
@@ -22,11 +23,11 @@ from hexapod_cosim.models.kinematics import (
 )
 from hexapod_cosim.models.records import Array
 
-STEP = 1e-7  # m, rad, m/s: of central differences
+STEP = 1e-7  # step of the central differences in m, rad, m/s
 
 
 def resting(robot: Robot, seed: int) -> Array:
-    """Returns bodies at rest on their joints, feet in the ground.
+    """Returns bodies at rest whose joints are satisfied and whose feet are in the ground.
 
     W's approximate derivatives are exact there, except for geometric stiffness.
     """
@@ -96,17 +97,17 @@ def joint_slopes(robot: Robot, command: Command, body: Array) -> tuple[Array, Ar
 
 @dataclass(frozen=True)
 class LawSlopes:
-    """Derivatives of the laws: joint torques (18,), and foot forces by displacement and velocity
-    (3, 3).
+    """Derivatives of the laws: of joint torques (18,), and of foot forces by displacement and
+    velocity (3, 3) each.
     """
 
     by_angle: Array
     by_speed: Array
-    feet: dict[int, tuple[Array, Array]]  # by leg, those in the ground
+    feet: dict[int, tuple[Array, Array]]  # legs whose feet are in the ground
 
 
 def law_slopes(robot: Robot, command: Command, body: Array) -> LawSlopes:
-    """Returns the derivatives of the laws at these bodies."""
+    """Returns the derivatives of the laws for these bodies."""
     damping = standing_damping(robot, body)
     touching = [
         leg for leg, foot in enumerate(foot_contacts(robot, body)) if foot.penetration > 0.0
@@ -119,7 +120,7 @@ def law_slopes(robot: Robot, command: Command, body: Array) -> LawSlopes:
 
 
 def assembled(robot: Robot, body: Array, law: LawSlopes) -> tuple[Array, Array]:
-    """Returns G_x and G_v (114, 114) of these laws at the bodies, without geometric stiffness, as
+    """Returns the matrices G_x and G_v (114, 114) of these laws, without geometric stiffness, as in
     W.
     """
     G, feet = constraints(robot, body).G, foot_contacts(robot, body)
@@ -133,5 +134,5 @@ def assembled(robot: Robot, body: Array, law: LawSlopes) -> tuple[Array, Array]:
 
 
 def slopes(robot: Robot, command: Command, body: Array) -> tuple[Array, Array]:
-    """Returns G_x and G_v (114, 114) of contacts and servos at these bodies."""
+    """Returns the matrices G_x and G_v (114, 114) of contacts and servos for these bodies."""
     return assembled(robot, body, law_slopes(robot, command, body))

@@ -1,4 +1,6 @@
-"""Tests the bristle law: a block on an incline, pushes, and a walk."""
+"""Tests the bristle law of friction by itself and with the whole plant: a block on an incline,
+pushes, and a walk.
+"""
 
 from __future__ import annotations
 
@@ -19,19 +21,19 @@ from hexapod_cosim.models.records import Array
 
 FRICTION = replace(load_robot("athena").friction, law="bristle")
 EXACT = 1e-12  # relative: rounding
-HELD = 1e-9  # m in a minute: the tanh law creeps 0.1 m in that time at a share of 0.3
-CLOSED = 1e-6  # relative, of the way given: at rest but for what is left of the first swing
-UNEVEN = 1e-3  # relative, of one foot's bristle against another's: the leaning block turns a little
-# relative: the block leans as its downhill feet take more of its weight, and its feet roll
+HELD = 1e-9  # m, motion in a minute; under the tanh law the block creeps 0.1 m at a share of 0.3
+CLOSED = 1e-6  # relative, of the deflection: what is left of the first oscillation
+UNEVEN = 1e-3  # relative, between the bristles of the six feet: the leaning block turns a little
+# relative: the block leans because its downhill feet carry more of its weight, and its feet roll
 LEANING = 0.03
-# of the presliding: some steps' error, 1e-3 each at the default tolerance; the force keeps its cone
-# all the same
+# relative to the presliding: the error of some steps, 1e-3 each at the default tolerance; the
+# friction force stays in its cone nevertheless
 OVERSHOT = 5e-3
-# m: where a push that comes back leaves the block; a thousandth of what one swing moves it
+# m, displacement after each cycle of a push; a thousandth of the displacement within one cycle
 RETURNED = 1e-8
 
 
-# the law by itself
+# the law alone
 
 
 def test_below_break_away_a_bristle_is_a_spring() -> None:
@@ -83,8 +85,10 @@ def test_turning_slip_and_bristle_turns_the_force() -> None:
 
 
 def test_a_bristle_lets_go_without_a_step_in_its_rate() -> None:
-    """The rate is C1 in the deflection: slopes on either side of the spring limit and of the
-    presliding agree to first order in the distance.
+    """Checks that the rate is continuously differentiable in the deflection.
+
+    The slopes on both sides of the spring limit and of the presliding agree to first order in the
+    distance.
     """
     x_axis = np.array([1.0, 0.0, 0.0])
     for share in (SPRING_LIMIT, 1.0):
@@ -103,11 +107,13 @@ def test_a_bristle_lets_go_without_a_step_in_its_rate() -> None:
         assert slopes[0] == pytest.approx(slopes[1], abs=0.05)
 
 
-# the incline
+# the block on the incline
 
 
 def given(share: float) -> float:
-    """Returns the deflection over the presliding for a share of the limit: u (3 - u^2)/2."""
+    """Returns the solution u of u (3 - u^2)/2 = share: the deflection divided by the presliding
+    under a share of the friction limit.
+    """
     return 2.0 * math.sin(math.asin(share) / 3.0)
 
 
@@ -157,7 +163,7 @@ def test_a_push_to_and_fro_below_break_away_does_not_walk_the_block_downhill(
     assert given(math.tan(0.15) / mu + 0.35 / math.cos(0.15)) < 0.9 * SPRING_LIMIT
     way = np.array([math.cos(heading), math.sin(heading), 0.0])
     places, swing = [], 0.0
-    for k in range(1200):  # 60 swings of 0.1 s, from the third on compared at their ends
+    for k in range(1200):  # 60 cycles of 0.1 s; the ends of cycles are compared from the 11th on
         t = 5e-3 * k
         plant.step(
             t + 5e-3, replace(plant.hold(), push_force=size * math.sin(20.0 * math.pi * t) * way)
@@ -189,7 +195,8 @@ def test_what_bristles_hold_they_give_back(core: ct.CDLL) -> None:
         taken.append(plant.output().energy.dissipated - start)
     u = given(0.3)
     held = force / 0.3 * robot.friction.presliding * (0.75 * u**2 - 0.125 * u**4)
-    assert max(taken) == pytest.approx(held, rel=0.05)  # the push is held in steps of 10 ms
+    # 5 %, because the push is constant over 10 ms
+    assert max(taken) == pytest.approx(held, rel=0.05)
     assert taken[-1] < 0.05 * held
 
 
@@ -228,8 +235,9 @@ def test_a_walk_converges_in_proportion_to_the_tolerance(core: ct.CDLL) -> None:
 
 
 def test_a_stuck_leg_does_not_ring(core: ct.CDLL) -> None:
-    """After a push the standing robot is at rest within a fifth of a second, because bristles damp
-    the motion that the servos leave.
+    """Checks that the standing robot is at rest within 0.2 s of a push.
+
+    The bristles damp the motion that the servos leave.
     """
     robot = changed(load_robot("athena"), friction={"law": "bristle"}, solver=ACCURATE)
     plant, speeds = stood(core, robot), []

@@ -19,10 +19,11 @@ from hexapod_cosim.models import Robot, load_robot
 from hexapod_cosim.models.contact import exact_restitution_chi, foot_contacts
 from hexapod_cosim.models.kinematics import body_states
 
-RESTITUTION = 1e-3  # what is asked of the exact law
-FIGURES = 1e-4  # of the reference table, printed with four digits
-TIGHT = 1e-8  # of the error control: its part in a restitution is below 1e-5
-LOCATED = 1e-9  # m/s: a touch-down found to 1e-10 m at 1 m/s leaves 1e-9 m/s under gravity
+RESTITUTION = 1e-3  # of the exact law
+FIGURES = 1e-4  # of figures that the reference table prints with four digits
+TIGHT = 1e-8  # tolerance; the error in a restitution is then below 1e-5
+# m/s: touch-down is found to 1e-10 m; at 1 m/s gravity changes the speed by 1e-9 m/s over that way
+LOCATED = 1e-9
 STILL = np.zeros(3)
 
 
@@ -43,7 +44,7 @@ def changed_gravity(robot: Robot, gravity: float) -> Robot:
 
 
 def above(robot: Robot, clearance: float) -> np.ndarray[Any, np.dtype[np.float64]]:
-    """Returns the torso's position in the level stance at a height of the feet [m]."""
+    """Returns the torso's position in the level stance with the feet at a height [m]."""
     feet = foot_contacts(
         robot, body_states(robot, STILL, np.eye(4)[0], STILL, STILL, robot.stance, np.zeros((6, 3)))
     )
@@ -55,8 +56,8 @@ def falling(core: ct.CDLL, robot: Robot, *, clearance: float = 1e-3, speed: floa
 
 
 def flown_off(plant: Plant, *, step: float = 1e-4, limit: float = 2.0) -> Any:
-    """Returns the output just after all feet have left the ground again; `deepest` is the deepest
-    penetration.
+    """Returns the first output after all feet have left the ground; its field `deepest` is the
+    deepest penetration [m].
     """
     deepest, touched, end = 0.0, False, plant.time + limit
     while plant.time < end:
@@ -103,14 +104,16 @@ def test_hertz_gives_everything_back(core: ct.CDLL) -> None:
     assert bounced.torso.velocity[2] == pytest.approx(0.4, rel=1e-6)
     assert bounced.energy.dissipated == pytest.approx(
         0.0, abs=1e-6 * bounced.energy.kinetic
-    )  # eq. 27 is of order 2 in the step
+    )  # eq. 27 is of order 2 in the step size
 
 
 @pytest.mark.parametrize("speed", [0.2, 0.8])
 def test_a_constant_damping_factor_gives_back_less_the_faster_the_impact(
     core: ct.CDLL, speed: float
 ) -> None:
-    """It is the law with chi = 1.5 c v0: chi (1 + e) = ln[(1 + chi)/(1 - chi e)]."""
+    """Checks chi (1 + e) = ln[(1 + chi)/(1 - chi e)] with chi = 1.5 c v0, which follows from the
+    law.
+    """
     bounced = flown_off(falling(core, rigid("constant_damping", damping_factor=1.1), speed=speed))
     chi, e = 1.5 * 1.1 * speed, bounced.torso.velocity[2] / speed
     assert chi * (1.0 + e) == pytest.approx(math.log((1.0 + chi) / (1.0 - chi * e)), rel=1e-5)
@@ -125,7 +128,7 @@ def test_the_deepest_penetration_has_its_closed_form(core: ct.CDLL, law: str) ->
     depth = (2.5 * robot.total_mass * speed**2 / (6.0 * robot.contact.stiffness) * share) ** 0.4
     assert bounced.deepest == pytest.approx(
         depth, rel=1e-5
-    )  # seen every 10 us: half a microsecond's parabola at most
+    )  # samples are 10 us apart, and the depth is a parabola near its maximum
 
 
 def test_the_energy_lost_in_an_impact_is_one_less_the_restitution_squared(core: ct.CDLL) -> None:
@@ -137,8 +140,10 @@ def test_the_energy_lost_in_an_impact_is_one_less_the_restitution_squared(core: 
 
 
 def test_every_apex_of_a_bouncing_robot_is_lower_by_the_restitution_squared(core: ct.CDLL) -> None:
-    """Gravity does work in the contact over delta_max; a stiff ground and a weak gravity keep it
-    below 1e-3.
+    """The robot bounces and each apex is compared with the previous one.
+
+    Gravity does work over the depth of the contact; stiff ground and weak gravity keep it below
+    1e-3.
     """
     e, height, gravity = 0.8, 0.1, 1.0
     robot = rigid(gravity=gravity, restitution=e, stiffness=1e10)
@@ -168,7 +173,7 @@ def test_the_impact_speed_is_the_ballistic_one_whatever_the_macro_step(
     height, gravity = 0.08, 9.81
     robot = changed(
         rigid(gravity=gravity), solver={"method": method, "tolerance": 1e-6}
-    )  # a parabola: exact with any
+    )  # a parabola, which every method integrates exactly
     plant = falling(core, robot, clearance=height)
     while not plant.output().solver.touchdowns:
         plant.step(plant.time + macro)
@@ -194,7 +199,10 @@ def test_fixed_steps_find_the_touchdown_too(core: ct.CDLL) -> None:
 def test_a_coarse_implicit_step_through_an_impact_gains_no_energy(
     core: ct.CDLL, method: str, step: float
 ) -> None:
-    """The impact takes about 10 ms; the steps use the stiffness at the end of the approach."""
+    """Checks that the robot rises more slowly than it fell.
+
+    The impact takes about 10 ms; the steps use the stiffness at the end of the approach.
+    """
     plant, fastest = (
         falling(
             core,
@@ -206,14 +214,17 @@ def test_a_coarse_implicit_step_through_an_impact_gains_no_energy(
     for _ in range(14):
         plant.step(plant.time + 0.021)
         fastest = max(fastest, float(plant.output().torso.velocity[2]))
-    assert 0.3 < fastest < 0.8  # of 1.25 m/s; an exact impact gives back some 0.6 m/s
+    # m/s; the impact speed is 1.25 m/s, an exact solution rebounds with about 0.6 m/s
+    assert 0.3 < fastest < 0.8
 
 
 def test_feet_of_unequal_height_touch_down_one_after_the_other(core: ct.CDLL) -> None:
-    """The first foot lands with the speed of free fall; all landings are sampled."""
+    """The first foot lands with the speed of free fall, and the impact speeds of all landings are
+    stored.
+    """
     robot = rigid(gravity=9.81)
     angle = robot.stance.copy()
-    angle[:, 1] -= 0.01 * np.arange(6)  # femurs lower: leg RR reaches furthest down
+    angle[:, 1] -= 0.01 * np.arange(6)  # the femur of leg RR is lower, so that its foot lands first
     feet = foot_contacts(
         robot, body_states(robot, STILL, np.eye(4)[0], STILL, STILL, angle, np.zeros((6, 3)))
     )
@@ -251,7 +262,7 @@ def test_the_impact_speed_is_held_until_lift_off_and_the_next_touchdown_samples_
             damped += 1
     first, second = sorted(set(speeds), reverse=True)[:2]
     assert damped > 30
-    # gravity adds to the rebound what it takes in the fall: a few per cent at this stiffness
+    # gravity changes the speeds over the depth of the contact, by a few per cent at this stiffness
     assert second / first == pytest.approx(0.5, abs=0.05)
 
 
@@ -275,8 +286,8 @@ def test_a_touchdown_below_the_floor_counts_as_the_floor(core: ct.CDLL) -> None:
 
 
 def test_the_ground_never_pulls(core: ct.CDLL) -> None:
-    """A foot leaves faster than it landed, so that its damping force would exceed its elastic
-    force.
+    """The foot leaves the ground faster than it landed, so that its damping force would exceed its
+    elastic force and the sum would pull.
     """
     robot = changed(rigid(restitution=0.2, gravity=9.81), servo={"mode": "position"})
     plant = falling(core, robot, clearance=0.02)

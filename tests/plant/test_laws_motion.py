@@ -17,9 +17,10 @@ from hexapod_cosim.models.dynamics import Command
 from hexapod_cosim.models.energy import kinetic_energy, momentum, potential_energy
 from hexapod_cosim.models.records import Array
 
-ROUNDING = 1e-13  # relative, per quantity: sums of 19 terms over some hundred steps
+# relative, for each quantity: rounding of sums of 19 terms over some hundred steps
+ROUNDING = 1e-13
 CONSTRAINED = (
-    1e-9  # relative, of what is conserved up to the integrator's error at a tolerance of 1e-12
+    1e-9  # relative, of conserved quantities: the integrator's error at a tolerance of 1e-12
 )
 FLIGHT: dict[str, Any] = {"method": "dp54", "tolerance": 1e-12, "step_max": 1.0}
 LOSSLESS: dict[str, Any] = {
@@ -58,7 +59,7 @@ def free(**solver: Any) -> Robot:
 def test_linear_momentum_changes_by_the_weight_alone_to_rounding(
     core: ct.CDLL, mode: str, method: str
 ) -> None:
-    """This holds with any servo torque; every method preserves linear invariants exactly."""
+    """The law holds under any servo torque; every method preserves linear invariants exactly."""
     robot = changed(load_robot("phantomx_mk4"), servo={"mode": mode}, solver={"method": method})
     plant = tumbling(core, robot)
     before = momentum(robot, plant.bodies)[0]
@@ -96,7 +97,7 @@ def test_the_energy_of_a_free_robot_is_conserved_at_the_order_of_the_method(
         assert plant.output().energy.residual == pytest.approx(
             kinetic_energy(robot, plant.bodies) - before, abs=1e-12
         )
-    # at least: a method may keep energy better than it keeps the motion
+    # at least: a method may conserve energy with a higher order than it has for the motion
     assert math.log2(errors[0] / errors[1]) > order - 0.3
     assert errors[0] < 1e-2 * before
 
@@ -113,7 +114,7 @@ def test_a_falling_robot_trades_potential_for_kinetic_energy(core: ct.CDLL) -> N
 
 @pytest.mark.parametrize("axis", range(3))
 def test_a_spin_about_a_principal_axis_is_steady(core: ct.CDLL, axis: int) -> None:
-    """With locked joints and level legs the principal axes are the torso's by symmetry."""
+    """With locked joints and level legs the torso's axes are principal axes by symmetry."""
     robot = replace(
         changed(load_robot("athena"), servo={"mode": "kinematic"}, solver=FLIGHT),
         gravity=WEIGHTLESS,
@@ -144,16 +145,17 @@ def test_a_spin_about_a_skew_axis_wobbles_but_keeps_its_momentum_and_energy(core
 
 # the pendulum
 
-# s: 1 kg on 1 m without a rod, let go horizontally, g = 9.81 m/s2; 4 K(sin 45 deg) sqrt(l/g)
+# s, period of 1 kg at 1 m on a massless rod, released horizontally: 4 K(sin 45 deg) sqrt(l/g) with
+# g = 9.81 m/s2
 PERIOD = 2.3678419476
-BOB = (1e-9, 1e-9, 1e-9, 0.0, 0.0, 0.0)  # kg m2, of 1 kg m2 about the joint
+BOB = (1e-9, 1e-9, 1e-9, 0.0, 0.0, 0.0)  # kg m2; the bob has 1 kg m2 about the joint
 HEAVY = (1e6, 1e6, 1e6, 0.0, 0.0, 0.0)
 
 
 def pendulums() -> Robot:
-    """Returns six 1 kg bobs on 1 m tibias.
+    """Returns a robot with a 1 kg bob at the end of each tibia of 1 m.
 
-    Coxas and femurs are too heavy to move, and their joints lie at the hips.
+    Coxas and femurs are too heavy to move, and their joints are at the hips.
     """
     robot = changed(
         load_robot("athena"),
@@ -168,29 +170,30 @@ def pendulums() -> Robot:
 
 def test_a_pendulum_let_go_horizontally_has_its_closed_period(core: ct.CDLL) -> None:
     robot, flat = pendulums(), np.zeros((6, 3))
-    # the push that carries everything but swings with nothing: the torso weighs too much to answer
-    # the bobs
+    # the push carries the weight of all bodies but the bobs; the torso is too heavy to react to the
+    # bobs
     carry = Command(angle_ref=flat, push_force=np.array([0.0, 0.0, robot.total_mass * 9.81]))
     plant = Plant(core, robot, angle=flat)
     plant.step(PERIOD / 4.0, carry)
     bottom = plant.output(carry)
     assert bottom.angle[:, 2] == pytest.approx(np.full(6, math.pi / 2.0), abs=1e-7)
     assert bottom.speed[:, 2] == pytest.approx(np.full(6, math.sqrt(2.0 * 9.81)), rel=1e-7)
-    # centripetal force and weight: 3 m g
+    # N, centripetal force plus weight: 3 m g
     assert bottom.reaction_force[:, 2, 2] == pytest.approx(np.full(6, 3.0 * 9.81), rel=1e-6)
     plant.step(PERIOD, carry)
     back = plant.output(carry)
     assert back.angle[:, 2] == pytest.approx(np.zeros(6), abs=1e-9)
     late = (
         back.speed[:, 2] / 9.81
-    )  # s: at the turning point speed is g/l times the time passed since
+    )  # s; near the turning point the speed is g/l times the time since then
     assert late == pytest.approx(np.zeros(6), abs=2e-8)
 
 
 # symmetry
 
-FIXED: dict[str, Any] = {"method": "rosw3", "step": 1e-4}  # no decisions that rounding could tip
-MIRRORED = 1e-9  # after 1500 steps with impacts: rounding, grown by the contacts' stiffness
+# no step-size control, whose decisions rounding could change
+FIXED: dict[str, Any] = {"method": "rosw3", "step": 1e-4}
+MIRRORED = 1e-9  # after 1500 steps with impacts: rounding, amplified by the stiff contacts
 OTHER_SIDE = [3, 4, 5, 0, 1, 2]
 COXA = np.array([-1.0, 1.0, 1.0])
 POLAR, AXIAL, TURN = (
@@ -211,7 +214,7 @@ def mirrored_command(command: Command) -> Command:
 
 
 def landed(plant: Plant, mirror: Any) -> tuple[Any, Any]:
-    """Returns output and bodies after five commands, in which the robot lands."""
+    """Returns output and bodies after five commands during which the robot lands."""
     for k in range(5):
         command = mirror(random_command(plant.robot, k, size=0.3))
         plant.step(0.03 * (k + 1), command)
@@ -265,8 +268,8 @@ def test_the_order_of_the_legs_does_not_matter(core: ct.CDLL) -> None:
 
 
 def test_turning_the_world_turns_the_motion(core: ct.CDLL) -> None:
-    """The robot starts rotated about the vertical on flat ground; no law depends on the direction
-    of x.
+    """The robot starts turned about the vertical on flat ground; no law depends on the direction of
+    x.
     """
     robot, turn = changed(load_robot("athena"), solver=FIXED), 0.7
     z = np.array([math.cos(turn / 2.0), 0.0, 0.0, math.sin(turn / 2.0)])

@@ -1,7 +1,7 @@
 """Tests servos with the whole plant: limits, rotor inertia, gear friction, kinematic drives.
 
-Coxas and femurs are too heavy to move, so that each tibia is a link on a wall with closed forms for
-its joint.
+Coxas and femurs are too heavy to move. Each tibia is therefore a link on a wall, for whose joint
+closed forms exist.
 """
 
 from __future__ import annotations
@@ -21,8 +21,8 @@ from hexapod_cosim.models.contact import standing_damping
 from hexapod_cosim.models.dynamics import Command, accelerations
 from hexapod_cosim.models.statics import standing
 
-# relative, of closed forms: a tibia's inertia over that of its wall is 1e-7; and an error control
-# of 1e-10 a step
+# relative, of closed forms: a tibia's inertia is 1e-7 of its wall's, and the error control allows
+# 1e-10 a step
 CLOSED = 1e-6
 WEIGHTLESS = (0.0, 0.0, 0.0)
 FLIGHT: dict[str, Any] = {"method": "dp54", "tolerance": 1e-10, "step_max": 1.0}
@@ -35,7 +35,7 @@ STRETCHED = np.zeros((6, 3))
 
 
 def walled(**servo: Any) -> Robot:
-    """Returns a robot without gravity whose femurs do not move."""
+    """Returns a robot without gravity whose femurs are too heavy to move."""
     robot = changed(
         load_robot("athena"),
         servo={"coulomb_friction": 0.0} | servo,
@@ -47,13 +47,13 @@ def walled(**servo: Any) -> Robot:
 
 
 def tibia_inertia(robot: Robot) -> float:
-    """Returns the inertia about the knee, with the rotor's [kg m2]."""
+    """Returns the inertia of a tibia and its rotor about the knee [kg m2]."""
     tibia = robot.legs[0].links[2]
     return tibia.inertia[1] + tibia.mass * tibia.com[0] ** 2 + robot.servo.rotor_inertia
 
 
 def tibias(value: float) -> Any:
-    """Returns (6, 3) with this value at every knee."""
+    """Returns an array (6, 3) with this value at every knee and 0 elsewhere."""
     return np.array([0.0, 0.0, value]) * np.ones((6, 1))
 
 
@@ -94,8 +94,8 @@ def test_a_torque_meets_the_link_and_its_rotor(core: ct.CDLL) -> None:
 
 
 def test_torque_is_limited_at_stall_and_by_the_torque_speed_line(core: ct.CDLL) -> None:
-    """Full command from rest: w = w0 (1 - exp(-tau t / (I w0))) along the line, and never faster
-    than no-load.
+    """Under full command from rest the speed is w = w0 (1 - exp(-tau t/(I w0))) along the
+    torque-speed line, and never exceeds the no-load speed.
     """
     robot = walled(mode="torque")
     plant, command = (
@@ -132,7 +132,9 @@ def test_no_torque_is_left_beyond_the_no_load_speed_but_full_braking_is(
 
 
 def test_gear_friction_stops_a_tibia_at_its_closed_rate(core: ct.CDLL) -> None:
-    """-tau tanh(w / 0.05): sinh(w / 0.05) decays exponentially; fast, that is a constant rate."""
+    """The gear torque is -tau tanh(w/0.05), so sinh(w/0.05) decays exponentially; at high speed the
+    deceleration is constant.
+    """
     robot = walled(mode="torque", coulomb_friction=0.05)
     plant = Plant(core, robot, angle=STRETCHED, speed=tibias(1.0))
     rate = 0.05 / tibia_inertia(robot)
@@ -146,7 +148,7 @@ def test_gear_friction_stops_a_tibia_at_its_closed_rate(core: ct.CDLL) -> None:
     assert energy.actuator_work == 0.0
 
 
-# the kinematic drive
+# kinematic drives
 
 
 def driven(robot: Robot) -> Robot:
@@ -157,9 +159,7 @@ def driven(robot: Robot) -> Robot:
 def test_a_kinematic_drive_follows_its_reference_in_the_air_and_on_the_ground(
     core: ct.CDLL, name: str
 ) -> None:
-    """The references q + qd h are consistent from step to step, so that the joints follow them
-    exactly.
-    """
+    """The references q + qd h are consistent from step to step, so joints follow them exactly."""
     robot = driven(load_robot(name))
     start = landing(robot)
     angle, speed = start["angle"].copy(), start["speed"]
@@ -173,7 +173,7 @@ def test_a_kinematic_drive_follows_its_reference_in_the_air_and_on_the_ground(
     assert output.solver.touchdowns > 0
 
 
-ACCELERATION = np.tile([30.0, -40.0, 25.0], (6, 1))  # rad/s2
+ACCELERATION = np.tile([30.0, -40.0, 25.0], (6, 1))  # rad/s2, of the references
 
 
 def in_flight(**baumgarte: float) -> Robot:
@@ -186,8 +186,8 @@ def in_flight(**baumgarte: float) -> Robot:
 def test_a_drive_told_its_acceleration_stays_on_its_parabola(
     core: ct.CDLL, baumgarte: dict[str, float]
 ) -> None:
-    """From rest by 30 rad/s2 for 20 ms: 6 mrad and 0.6 rad/s; then from there, with that speed,
-    as far again and two such ways more.
+    """With 30 rad/s2 from rest a drive is at 6 mrad with 0.6 rad/s after 20 ms, and at 24 mrad
+    after 40 ms.
     """
     robot = in_flight(**baumgarte)
     plant, way = Plant(core, robot), ACCELERATION / 30.0
@@ -204,8 +204,8 @@ def test_a_drive_told_its_acceleration_stays_on_its_parabola(
 def test_a_drive_told_no_acceleration_lags_by_the_acceleration_over_beta_squared(
     core: ct.CDLL,
 ) -> None:
-    """Importers may leave acceleration_ref at 0: 30 rad/s2 over (100/s)^2 are 3 mrad in the steady
-    state.
+    """Importers may leave acceleration_ref at 0. The steady lag is then 30 rad/s2 over (100/s)^2, 3
+    mrad.
     """
     robot, h = in_flight(alpha=100.0, beta=100.0), 1e-4
     plant, lag = Plant(core, robot), {}
@@ -214,7 +214,8 @@ def test_a_drive_told_no_acceleration_lags_by_the_acceleration_over_beta_squared
         angle, speed = robot.stance + 0.5 * ACCELERATION * t**2, ACCELERATION * t
         plant.step(t + h, Command(angle_ref=angle, speed_ref=speed))
         lag[k] = angle + speed * h - plant.output().angle
-    assert lag[1499] == pytest.approx(ACCELERATION / 1e4, rel=0.02)  # h is 1 % of the drive's time
+    # the lag differs by h, which is 1 % of the drive's time constant
+    assert lag[1499] == pytest.approx(ACCELERATION / 1e4, rel=0.02)
 
 
 @pytest.mark.parametrize("mode", ["position", "torque"])
@@ -228,8 +229,8 @@ def test_a_servo_does_not_look_at_acceleration_ref(core: ct.CDLL, mode: str) -> 
 
 
 def test_a_rate_of_an_input_takes_the_place_of_the_input_above_it(core: ct.CDLL) -> None:
-    """speed_ref that grows is acceleration_ref; acceleration_ref that grows moves the drive by
-    t^3/6 of its rate.
+    """A rate of speed_ref acts as acceleration_ref, and a rate of acceleration_ref moves the drive
+    by t^3/6 times the rate.
     """
     robot = in_flight(alpha=5.0, beta=80.0)
     plants = [Plant(core, robot) for _ in range(3)]
@@ -243,14 +244,14 @@ def test_a_rate_of_an_input_takes_the_place_of_the_input_above_it(core: ct.CDLL)
     way = ACCELERATION / 30.0
     for plant, parabola in zip(
         plants, (0.006, 0.006, 0.002), strict=True
-    ):  # 30 t^2/2, and 1500 t^3/6
+    ):  # rad; of 30 rad/s2 by t^2/2, and of 1500 rad/s3 by t^3/6
         assert plant.output().angle - robot.stance == pytest.approx(
             (0.06 + parabola) * way, abs=1e-8
         )
 
 
 def test_a_drive_off_its_reference_returns_at_the_rate_of_its_stabilisation(core: ct.CDLL) -> None:
-    """alpha = beta: critically damped, error (1 + alpha t) exp(-alpha t)."""
+    """With alpha = beta the error decays critically damped: (1 + alpha t) exp(-alpha t)."""
     robot = changed(driven(load_robot("athena")), solver=FLIGHT)
     plant, alpha = Plant(core, robot, angle=robot.stance + 0.1), robot.baumgarte.alpha
     assert robot.baumgarte.beta == alpha
@@ -262,13 +263,15 @@ def test_a_drive_off_its_reference_returns_at_the_rate_of_its_stabilisation(core
 
 
 def test_drive_torque_is_that_of_inverse_dynamics(core: ct.CDLL) -> None:
-    """As the twin's dense system has it; and torque servos given it move the same way."""
+    """The drive torques equal those of the twin's dense system, and torque servos with these
+    torques move in the same way.
+    """
     robot = driven(load_robot("athena"))
     plant = Plant(core, robot, **landing(robot))
     command = replace(random_command(robot, 2, size=0.3), torque_ref=np.zeros((6, 3)))
     plant.step(0.03, command)
     body = plant.bodies
-    plant.bodies = body  # contacts as if put down slowly, as the twin takes them
+    plant.bodies = body  # the contacts have no impact speed, as the twin takes them
     solved = plant.accelerations(command)
     dense = accelerations(robot, body, command, standing_damping(robot, body))
     assert solved.drive_torque == pytest.approx(dense.drive_torque, rel=1e-9, abs=1e-9)
@@ -292,7 +295,9 @@ def test_drives_that_hold_a_standing_robot_give_the_torques_that_servos_give(cor
 
 
 def test_drive_work_is_what_the_robot_gains(core: ct.CDLL) -> None:
-    """Legs swing in free fall without gravity, so that multiplier times speed is the only power."""
+    """The legs swing in free fall without gravity, so the drives' multipliers times speeds are the
+    only power.
+    """
     robot = replace(
         changed(driven(load_robot("athena")), servo={"coulomb_friction": 0.0}, solver=FLIGHT),
         gravity=WEIGHTLESS,

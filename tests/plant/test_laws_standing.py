@@ -1,5 +1,5 @@
-"""Tests standing, creeping, sliding and marching with the whole plant: balances, friction cone,
-energy audit.
+"""Tests standing, creeping, sliding and marching with the whole plant: balances of forces, friction
+cone, energy balance.
 """
 
 from __future__ import annotations
@@ -22,12 +22,13 @@ from hexapod_cosim.models.kinematics import body_states, rotation_matrix
 from hexapod_cosim.models.records import Array
 from hexapod_cosim.models.statics import standing
 
-AT_REST = 1e-9  # relative, and m, m/s, m/s2: the settled pose is in balance to 1e-9 N
-CREEP = 1e-9  # relative, of the creep's speed: settling takes milliseconds
-SLIDE = 1e-5  # relative, of the acceleration: in proportion to the tolerance, 1e-8 leaves 1e-6
-WALK = 1e-3  # of the energy turned over, at the default tolerance of 1e-5 a step
+AT_REST = 1e-9  # relative, m, m/s and m/s2: the forces of the settled pose balance to 1e-9 N
+CREEP = 1e-9  # relative, of the creep speed: the block settles within milliseconds
+# relative, of the acceleration: in proportion to the tolerance, of which 1e-8 leaves 1e-6
+SLIDE = 1e-5
+WALK = 1e-3  # of the work of motors and push at the default tolerance of 1e-5 a step
 DRIFT = (
-    2e-6  # m or 1, of all joints: the same tolerance, with Baumgarte's 50 1/s holding against it
+    2e-6  # m or 1, sum over all joints at the same tolerance, against which Baumgarte's 50 1/s acts
 )
 ROBOTS = ("athena", "phantomx_mk4")
 ACCURATE: dict[str, Any] = {"tolerance": 1e-8}
@@ -85,15 +86,15 @@ def test_a_dropped_robot_comes_to_carry_its_weight(core: ct.CDLL, name: str) -> 
 
 
 def test_standing_joint_torques_are_the_statics_of_the_legs(core: ct.CDLL) -> None:
-    """tau = -J^T f with the foot's Jacobian, and the legs' own weight: virtual work by
-    differences.
+    """The torques are tau = -J^T f with the foot's Jacobian, and the legs' own weight, both by
+    virtual work from differences.
     """
     robot = changed(load_robot("athena"), solver=ACCURATE)
     pose = standing(robot)
     torque = stood(core, robot).output().torque
 
     def work(angle: Array) -> float:
-        """Returns the potential of the legs' weight minus the work of foot forces, with the torso
+        """Returns the potential energy of the legs less the work of the foot forces, with the torso
         fixed.
         """
         body = body_states(
@@ -111,7 +112,7 @@ def test_standing_joint_torques_are_the_statics_of_the_legs(core: ct.CDLL) -> No
         assert torque[leg, joint] == pytest.approx(slope, abs=1e-6)
 
 
-# the incline, joints locked: a block
+# a block on an incline: the robot with locked joints
 
 
 def block(
@@ -128,7 +129,9 @@ def block(
 
 
 def laid(core: ct.CDLL, robot: Robot, quaternion: Array) -> Plant:
-    """Returns the stance pressed into the ground by the depth that carries its weight."""
+    """Returns the robot in its stance, pressed into the ground by the depth that carries its
+    weight.
+    """
     still, flat = np.zeros(3), np.zeros((6, 3))
     feet = foot_contacts(
         robot, body_states(robot, still, quaternion, still, still, robot.stance, flat)
@@ -141,8 +144,9 @@ def laid(core: ct.CDLL, robot: Robot, quaternion: Array) -> Plant:
 def tilted(
     core: ct.CDLL, angle: float, heading: float, *, by: str, law: str = "tanh"
 ) -> tuple[Plant, Array, Array]:
-    """Returns a block on an incline, by tilted gravity or sloping ground, with the downhill
-    direction and the normal.
+    """Returns a block on an incline, the downhill direction and the normal.
+
+    The incline is made of tilted gravity or of sloping ground.
     """
     uphill = np.array([math.cos(heading), math.sin(heading), 0.0])
     if by == "gravity":
@@ -194,7 +198,7 @@ def test_above_the_friction_angle_a_block_accelerates_at_its_closed_rate(
     gained = float(plant.output().torso.velocity @ downhill) - before
     assert (
         before > 0.2
-    )  # tanh(100 s/m v) is 1 to the last digit; bristles have gone some hundred preslidings
+    )  # tanh(100 s/m v) is 1 to the last digit; bristles have slid over some hundred preslidings
     assert gained / 0.3 == pytest.approx(
         9.81 * (math.sin(angle) - plant.robot.friction.mu * math.cos(angle)), rel=SLIDE
     )
@@ -214,7 +218,7 @@ def test_without_friction_a_block_slides_as_if_there_were_none(core: ct.CDLL) ->
 
 
 def marching(robot: Robot, t: float) -> Command:
-    """Returns the command that lifts two tripods in turn, twice a second, and sways."""
+    """Returns a command that lifts two tripods in turn, twice a second, under a varying push."""
     phase = 2.0 * math.pi * 2.0 * t + math.pi * (np.arange(6) % 2)
     swing = np.clip(np.sin(phase), 0.0, None)
     angle = robot.stance + np.column_stack([0.1 * np.cos(phase), 0.35 * swing, 0.2 * swing])
@@ -234,7 +238,9 @@ def marched(
 
 @pytest.mark.parametrize("mode", ["position", "kinematic"])
 @pytest.mark.parametrize("law", ["tanh", "bristle"])
-def test_walking_keeps_the_energy_books_and_the_joints(core: ct.CDLL, mode: str, law: str) -> None:
+def test_walking_keeps_the_energy_balance_and_the_joints(
+    core: ct.CDLL, mode: str, law: str
+) -> None:
     robot = changed(load_robot("athena"), servo={"mode": mode}, friction={"law": law})
     seen = marched(core, robot)
     last, turnover = seen[-1].energy, max(output.energy.dissipated for output in seen)
@@ -248,9 +254,9 @@ def test_walking_keeps_the_energy_books_and_the_joints(core: ct.CDLL, mode: str,
 
 
 @pytest.mark.parametrize("law", ["tanh", "bristle"])
-def test_the_books_close_with_the_tolerance(core: ct.CDLL, law: str) -> None:
-    """Steps of an order of 3 shorten by 10 for a tolerance of a thousandth; works of order 2 in
-    the step (eq. 27) gain 100.
+def test_the_energy_balance_closes_with_the_tolerance(core: ct.CDLL, law: str) -> None:
+    """Steps of a method of order 3 become 10 times shorter for a thousandth of the tolerance. Works
+    are of order 2 in the step (eq. 27), so their error becomes 100 times smaller.
     """
     robot, residuals = changed(load_robot("athena"), friction={"law": law}), []
     for tolerance in (1e-3, 1e-6):

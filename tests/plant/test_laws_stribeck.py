@@ -1,10 +1,10 @@
-"""Static friction above kinetic: the law by itself, pushes, and a mass on a spring that sticks and
-slips.
+"""Tests static friction above kinetic friction: the law alone, pushes, and a mass on a spring that
+alternately sticks and slips.
 
-That mass is the block on its feet, behind a spring of 100 N/m for each of its kilograms, whose end
-moves at 0.1 m/s. With coefficients 0.6 and 0.4 Coulomb's law sticks until the spring pulls with
-0.6 m g, and slips for (2 pi - 2 atan(x w/v))/w, x = 0.2 g/w^2, w = 10/s. That is 0.408432 s, and
-0.392400 s of sticking.
+The mass is the robot with locked joints. A spring of 100 N/m for each kilogram pulls it; the far
+end of the spring moves at 0.1 m/s. With coefficients 0.6 and 0.4, under Coulomb's law the mass
+sticks until the spring pulls with 0.6 m g, and slips for (2 pi - 2 atan(x w/v))/w with x = 0.2
+g/w^2 and w = 10/s. A slip takes 0.408432 s and a stick 0.392400 s.
 """
 
 from __future__ import annotations
@@ -50,8 +50,8 @@ def test_friction_falls_from_static_to_kinetic_half_way_at_the_stribeck_speed(
 
 @pytest.mark.parametrize("slip", [0.0, 0.3, -0.3])
 def test_a_foot_that_sticks_has_static_friction_however_it_swings(slip: float) -> None:
-    """Half-way up a bristle: 0.6 of the load times u (3 - u^2)/2 = 0.6875; and a sliding foot
-    that turns back sticks.
+    """Half-way up a bristle, u = 0.5, the force is 0.6 times u (3 - u^2)/2 = 0.6875 of the load. A
+    sliding foot that reverses sticks again.
     """
     assert bristle_force(FRICTION, 10.0, slip * ALONG, 0.5e-4 * ALONG) == pytest.approx(
         -10.0 * 0.6 * 0.6875 * ALONG, rel=EXACT
@@ -77,7 +77,9 @@ def sticky(core: ct.CDLL, **friction: float) -> Plant:
 
 
 def pushed(plant: Plant, begin: float, end: float, *, until: float) -> None:
-    """A push along x that goes from one share of the weight to another."""
+    """Pushes the plant along x with a force that changes linearly from one share of the weight to
+    another.
+    """
     now, weight = plant.output().time, plant.robot.total_mass * 9.81
     along, none = np.array([weight, 0.0, 0.0]), np.zeros((6, 3))
     rate = Command(angle_ref=none, push_force=(end - begin) / (until - now) * along)
@@ -88,7 +90,7 @@ def pushed(plant: Plant, begin: float, end: float, *, until: float) -> None:
 def test_a_push_that_grows_is_held_up_to_the_static_coefficient(
     core: ct.CDLL, share: float, holds: bool
 ) -> None:
-    """On short bristles: those that give way quickly as the limit comes near slide, and lose
+    """The bristles are short, because bristles that deflect quickly near the limit slide and lose
     static friction.
     """
     plant = sticky(core, presliding=1e-5)
@@ -98,8 +100,8 @@ def test_a_push_that_grows_is_held_up_to_the_static_coefficient(
 
 
 def test_a_block_that_was_set_off_slides_on_with_kinetic_friction(core: ct.CDLL) -> None:
-    """Half its weight does not move it; more sets it off, and under that half again it gains
-    (0.5 - 0.4) g.
+    """A push of half the weight does not move the block and a larger one does. Under half the
+    weight again the block accelerates by (0.5 - 0.4) g.
     """
     plant = sticky(core)
     pushed(plant, 0.0, 0.5, until=1.0)
@@ -115,7 +117,9 @@ def test_a_block_that_was_set_off_slides_on_with_kinetic_friction(core: ct.CDLL)
 
 
 def phases(plant: Plant, *, until: float, h: float = 2e-3) -> tuple[list[float], list[float]]:
-    """Lengths [s] of the slips and the sticks between them of the block behind its spring."""
+    """Returns the durations [s] of the slips of the block behind its spring and of the sticks
+    between them.
+    """
     mass, place = plant.robot.total_mass, plant.output().torso.position[0]
     moving, changes, last = False, [], 0.0
     for k in range(round(until / h)):
@@ -137,8 +141,8 @@ def phases(plant: Plant, *, until: float, h: float = 2e-3) -> tuple[list[float],
 
 
 def test_the_twins_law_sticks_and_slips_by_the_closed_form_too() -> None:
-    """A point of 1 kg on a belt at 0.1 m/s, behind a spring of 100 N/m: it slips where it falls
-    back by more than 1 mm/s.
+    """A point of 1 kg lies on a belt that moves at 0.1 m/s, behind a spring of 100 N/m. It counts
+    as slipping while it is slower than the belt by more than 1 mm/s.
     """
     friction = replace(FRICTION, presliding=1e-6, stribeck_speed=1e-4, bristle_damping=0.005)
     x_axis = np.array([1.0, 0.0, 0.0])
@@ -162,7 +166,9 @@ def test_the_twins_law_sticks_and_slips_by_the_closed_form_too() -> None:
 
 
 def test_a_mass_on_a_spring_sticks_and_slips_by_its_closed_form(core: ct.CDLL) -> None:
-    """To 0.3 %, of which 0.25 % are the 1 mm/s from which it counts as moving."""
+    """The durations agree to 0.3 %, of which 0.25 % come from the 1 mm/s above which the block
+    counts as moving.
+    """
     slips, sticks = phases(sticky(core, presliding=2e-6, stribeck_speed=2e-4), until=2.4)
     assert len(slips) >= 2
     assert slips == pytest.approx([0.408432] * len(slips), rel=3e-3)

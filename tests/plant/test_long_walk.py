@@ -1,4 +1,6 @@
-"""Tests long walks: energy audit, joints, independence of stiff laws and leg numbers."""
+"""Tests long walks: energy balance, drift of the joints, independence of stiff laws and of the
+order of the legs.
+"""
 
 from __future__ import annotations
 
@@ -17,15 +19,15 @@ from hexapod_cosim.models.dynamics import Command
 from hexapod_cosim.models.statics import settled
 
 H = 5e-3  # s
-BOOKS = 1e-4  # of the work done: the energy residual after a minute
-DRIFT = 1e-6  # m, 1: of all joints together, after ten minutes
-PROJECTED = 1e-13  # the same when the links are put back after every step: rounding
-RENUMBERED = 1e-9  # m, rad: what rounding has grown to after a second of walking
-STIFF = 2.0  # of the evaluations
+BALANCE = 1e-4  # of the motors' work: the energy residual after a minute
+DRIFT = 1e-6  # m and 1, sum over all joints after ten minutes
+PROJECTED = 1e-13  # the same with projection after every step: rounding
+RENUMBERED = 1e-9  # m and rad: rounding after a second of walking
+STIFF = 2.0  # relative, of the evaluations
 
 
 def walking(robot: Robot, duration: float) -> Iterator[tuple[float, Command]]:
-    """Yields end time and joint commands of every step of a kinematic walk at 0.08 m/s."""
+    """Yields the end time and the joint commands of every step of a kinematic walk at 0.08 m/s."""
     controller = Controller(robot, period=H, gait=make_gait(robot, robot.gait.name))
     nothing, forward = Measurement(), BodyCommand(vx=0.08)
     for k in range(round(duration / H)):
@@ -46,11 +48,11 @@ def walk(core: ct.CDLL, robot: Robot, duration: float) -> Plant:
 
 
 @pytest.mark.parametrize("robot", ["athena", "phantomx_mk4"])
-def test_the_energy_books_of_a_minute_balance(core: ct.CDLL, robot: str) -> None:
+def test_the_energy_balance_of_a_minute_closes(core: ct.CDLL, robot: str) -> None:
     """The PhantomX's servos work at their limits."""
     energy = walk(core, load_robot(robot), 60.0).output().energy
     assert energy.actuator_work > 10.0
-    assert abs(energy.residual) < BOOKS * energy.actuator_work
+    assert abs(energy.residual) < BALANCE * energy.actuator_work
 
 
 def test_ten_minutes_of_walking_leave_the_joints_together(core: ct.CDLL) -> None:
@@ -78,13 +80,13 @@ def test_steep_friction_and_hard_feet_cost_at_most_twice_the_steps(core: ct.CDLL
         )
 
 
-def test_the_books_of_feet_that_stick_balance(core: ct.CDLL) -> None:
-    """To a tenth of the usual at a tenth of the usual tolerance: works are of order 2 in the
-    step (eq. 27).
+def test_the_energy_balance_of_feet_that_stick_closes(core: ct.CDLL) -> None:
+    """The residual is a tenth of the usual one at a tenth of the usual tolerance, because works are
+    of order 2 in the step (eq. 27).
     """
     robot = changed(load_robot("athena"), friction={"law": "bristle"}, solver={"tolerance": 1e-5})
     energy = walk(core, robot, 5.0).output().energy
-    assert abs(energy.residual) < 0.1 * BOOKS * energy.actuator_work
+    assert abs(energy.residual) < 0.1 * BALANCE * energy.actuator_work
 
 
 @pytest.mark.parametrize("name", ["athena", "phantomx_mk4"])
@@ -116,4 +118,4 @@ def test_legs_in_another_order_walk_the_same_way(core: ct.CDLL) -> None:
     assert here.angle[order] == pytest.approx(there.angle, abs=RENUMBERED)
     assert not np.array_equal(
         there.torso.position, here.torso.position
-    )  # the sums over the legs round differently: it was another run
+    )  # sums over the legs round differently, so the bits differ

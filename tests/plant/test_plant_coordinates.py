@@ -1,4 +1,4 @@
-"""Tests the plant in coordinates for importers' solvers, and its exact derivatives."""
+"""Tests the plant in the coordinates that importers' solvers use, and its exact derivatives."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ CONTACT = slice(
     HxOutput.foot.offset // 8 + HxOutput.foot.size // 8,
 )
 ANGLE, SPEED = slice(13, 31), slice(31, 49)
-ROUNDING = 1e-12  # 1    of sums of some hundred products
+ROUNDING = 1e-12  # relative: rounding of sums of some hundred products
 
-# derivatives at nodes -4 .. 4 of the polynomial through them: central differences of order 8, whose
-# error at this step is rounding, some 1e-12 of the largest derivative of its kind
+# derivatives at nodes -4 .. 4 of the polynomial through them, which are central differences of
+# order 8; their error at this step is rounding, about 1e-12 of the largest derivative of its kind
 STENCIL = np.array([1 / 280, -4 / 105, 1 / 5, -4 / 5, 0.0, 4 / 5, -1 / 5, 4 / 105, -1 / 280])
 STEP = 1e-3
-DIFFERENCE = 1e-10  # 1
+DIFFERENCE = 1e-10  # relative to the largest derivative of its kind
 
 VARIANTS: tuple[dict[str, dict[str, Any]], ...] = (
     {"servo": {"kp": 30.0}},
@@ -41,9 +41,9 @@ VARIANTS: tuple[dict[str, dict[str, Any]], ...] = (
 
 
 def smooth(robot: Robot) -> Robot:
-    """Returns a robot far from kinks.
+    """Returns a robot whose forces are smooth near the state of the test.
 
-    Its servos stay below their limits, and its contacts are permanent.
+    Its servos stay below their limits, and its contacts stay closed.
     """
     gentle = changed(robot, servo={"torque_max": 1e4, "speed_max": 1e4})
     return (
@@ -54,7 +54,7 @@ def smooth(robot: Robot) -> Robot:
 
 
 def moving(core: ct.CDLL, robot: Robot, seed: int) -> tuple[Plant, Command]:
-    """A plant in the midst of a motion with feet in the ground, bristles bent, and a command."""
+    """Returns a plant that moves, with feet in the ground, deflected bristles and a command."""
     plant, command = Plant(core, robot, **random_pose(robot, seed)), random_command(robot, seed)
     plant.step(0.002, command)
     return plant, command
@@ -65,7 +65,7 @@ def changed_input(command: Command, change: Array) -> Any:
 
 
 def observed(plant: Plant, given: Any, x: Array) -> tuple[Array, Array]:
-    """Rates and outputs (bytes as doubles) at coordinates x under an HxInput."""
+    """Returns rates and outputs (the bytes as doubles) at the coordinates x under an HxInput."""
     plant.coordinates = x
     rate, output = HxCoordinates(), HxOutput()
     plant.core.hx_plant_rates(plant.handle, given, rate)
@@ -121,7 +121,7 @@ def test_rates_are_those_of_the_bodies(core: ct.CDLL) -> None:
     np.testing.assert_allclose(dx[ANGLE], x[SPEED], atol=ROUNDING)
     links = np.linalg.norm(
         np.diff(body[1:4, 10:13], axis=0), axis=1
-    )  # joint speeds of leg LF but for the sign
+    )  # the speeds of leg LF's joints, whose sign the plant's axes may reverse
     np.testing.assert_allclose(np.abs(x[SPEED][1:3]), links, atol=ROUNDING * 10)
 
 

@@ -1,5 +1,5 @@
-"""Eq. 1 solved in O(n) by the C plant: against the dense 204 x 204 system, against Pinocchio,
-and its linearly implicit sibling.
+"""Tests the O(n) solution of eq. 1 by the C plant against the dense 204 x 204 system and Pinocchio,
+and its linearly implicit form against the dense one.
 """
 
 from __future__ import annotations
@@ -38,10 +38,10 @@ from hexapod_cosim.models.kinematics import (
 )
 from hexapod_cosim.models.records import Array
 
-DENSE = 1e-10  # relative: what the dense solve itself loses; its condition number is some 1e6
-PINOCCHIO = 1e-9  # relative: a foot's force, 1e-4 m deep, amplifies the rounding of its height
+DENSE = 1e-10  # relative: the error of the dense solution, whose condition number is about 1e6
+PINOCCHIO = 1e-9  # relative: the force of a foot 1e-4 m deep amplifies the rounding of its height
 MODES = ("position", "torque", "kinematic")
-# the high floor keeps the damping low: feet that recede still press
+# the high floor keeps the damping low, so that receding feet still press
 ROBOTS = {
     robot.name: changed(robot, contact={"impact_speed_floor": 2.0})
     for robot in (
@@ -195,13 +195,15 @@ def test_forward_dynamics_agree_with_pinocchio(
 
 # the linearly implicit solve: W u + D^T mu = G_v dv + G_x dx, D u = 0, W = M - z G_v - z^2 G_x
 
-DIFFERENCES = 1e-5  # relative: what differences leave of a force of 10 N whose slope is 1e5 N/m
-Z = 7e-4  # s: h gamma of a step that the stiff terms rule
+DIFFERENCES = 1e-5  # relative: error of differences of a force of 10 N whose slope is 1e5 N/m
+Z = 7e-4  # s: h gamma of a step in which the stiff terms dominate
 
 
 def implicit(core: ct.CDLL, plant: Plant, command: Command, dx: Array, dv: Array) -> Array:
-    """(114,) u for displacements dx and velocity changes dv (19, 6), linear then angular: what a
-    stage adds to the accelerations a where s_v + z a = dv and s_x + z (v + s_v) + z^2 a = dx.
+    """Returns u (114,), the change of the accelerations a by a stage, for given displacements dx
+    and velocity changes dv (19, 6), linear then angular.
+
+    The stage's increments satisfy s_v + z a = dv and s_x + z (v + s_v) + z^2 a = dx.
     """
     body, a = plant.bodies, plant.accelerations(command).dv
     s_v = dv - Z * a
@@ -224,8 +226,8 @@ def implicit(core: ct.CDLL, plant: Plant, command: Command, dx: Array, dv: Array
 def stage(
     core: ct.CDLL, plant: Plant, command: Command, s_x: Array, s_v: Array
 ) -> tuple[Array, Array]:
-    """(19, 13) k/h of a stage after the changes (19, 6), and the angular velocities (19, 3) of
-    its quaternion rates.
+    """Returns k/h (19, 13) of a stage after the changes (19, 6), and the angular velocities (19, 3)
+    of its quaternion rates.
     """
     rate, turn = np.zeros((19, 13)), np.zeros((19, 3))
     arguments: list[Any] = [
@@ -253,7 +255,7 @@ def test_the_implicit_solve_is_the_dense_one_with_slopes_from_differences(
         lopsided(8), servo={"mode": mode}, terrain={"kind": terrain, "incline": 0.2, "heading": 0.5}
     )
     body, rng = resting(robot, 8), np.random.default_rng(8)
-    # one servo in ten is at its limit: it has no stiffness there
+    # one servo in ten is at its torque limit, where it has no stiffness
     command = Command(angle_ref=robot.stance + 10.0 * (rng.uniform(size=(6, 3)) < 0.1))
     G_x, G_v = slopes(robot, command, body)
     joints = constraints(robot, body)
@@ -302,9 +304,11 @@ def test_the_stage_matrix_uses_the_secant_of_friction_when_a_foot_slips(core: ct
 
 @pytest.mark.parametrize("method", METHODS)
 def test_method_coefficients_satisfy_the_order_conditions(core: ct.CDLL, method: str) -> None:
-    """For a Rosenbrock-W method of order p with any A: every tree of order <= p with some of its
-    nodes taken implicitly; for one whose A is formed anew at every stage, A's change along the
-    solution too.
+    """Checks the conditions of a Rosenbrock-W method of order p with any matrix A: every tree of
+    order <= p with some of its nodes taken implicitly.
+
+    For a method whose A is computed anew at every stage, the change of A along the solution counts
+    too.
     """
     shape, gamma = (ct.c_int * 3)(), ct.c_double()
     a, g, c, b, e = np.zeros((7, 7)), np.zeros((7, 7)), np.zeros(7), np.zeros(7), np.zeros(7)

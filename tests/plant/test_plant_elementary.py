@@ -1,4 +1,4 @@
-"""Sine, cosine, arc tangent and logarithm of the plant, which do without libm so that every
+"""Tests the plant's sine, cosine, arc tangent and logarithm, which do not use libm so that every
 platform gives the same bits.
 """
 
@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 from plant import pointer
 
-ULP = 2.3e-16  # of 1
-FEW_ULPS = 8e-16  # relative: a square root and two halvings before the polynomial
-LOGARITHM = 4e-15  # relative: in 1 + x, rounded, and twelve terms
+ULP = 2.3e-16  # relative to 1
+FEW_ULPS = 8e-16  # relative: a square root and two halvings of the angle before the polynomial
+LOGARITHM = 4e-15  # relative: rounding of 1 + x and of twelve terms
 
 
 @pytest.fixture(scope="module")

@@ -12,8 +12,8 @@ from states import changed
 from hexapod_cosim.models import Robot, load_robot
 from hexapod_cosim.models.dynamics import Command
 
-END = 0.15  # s, in which a robot dropped from DROP has touched down, bounced and touched down again
-DROP = 0.15  # m
+END = 0.15  # s, in which a robot dropped from DROP touches down, bounces and touches down again
+DROP = 0.15  # m, height of the drop
 ATHENA = load_robot("athena")
 
 
@@ -22,7 +22,9 @@ def dropped(core: ct.CDLL, robot: Robot) -> Plant:
 
 
 def command_of(robot: Robot) -> Command:
-    """Returns a command that moves the joints, so that kinematic drives depend on its time."""
+    """Returns a command that moves the joints, so that kinematic drives depend on the command's
+    time.
+    """
     return Command(angle_ref=robot.stance, speed_ref=np.full((6, 3), 0.2))
 
 
@@ -71,7 +73,7 @@ def test_another_input_after_a_stop_is_a_call_of_its_own(core: ct.CDLL) -> None:
     assert (early > late).all()
 
 
-def test_without_a_stop_events_are_told_all_the_same(core: ct.CDLL) -> None:
+def test_events_are_reported_without_a_stop_too(core: ct.CDLL) -> None:
     command, plain, told = command_of(ATHENA), dropped(core, ATHENA), dropped(core, ATHENA)
     plain.step(END, command)
     assert told.step_to_event(END, command, stop=False)

@@ -36,10 +36,11 @@ from hexapod_cosim.models.kinematics import (
 from hexapod_cosim.models.records import Array
 from hexapod_cosim.models.terrain import ground
 
-# relative: the same formula, its operations in another order, some hundred roundings long
+# relative: the same formula with its operations in another order, some hundred roundings
 SAME = 1e-13
 CONTACT_SAME = (
-    1e-10  # relative, of forces: a penetration of 1e-5 m is the difference of coordinates of 0.1 m
+    # relative, of forces: a penetration of 1e-5 m is the difference of coordinates of about 0.1 m
+    1e-10
 )
 DRIFT = 0.02
 LEG_JOINTS = [(leg, joint) for leg in range(6) for joint in range(3)]
@@ -108,7 +109,7 @@ def test_inertias_are_taken_to_another_point_by_the_congruence(core: ct.CDLL) ->
         J, A = (root @ root.T for root in rng.normal(size=(2, 3, 3)))
         X = np.eye(6)
         X[3:6, 0:3] = -skew(c)  # v at c = v + w x c
-        s = -abs(s)  # what is left stays positive definite
+        s = -abs(s)  # the difference stays positive definite
         at_c = np.block([[J, np.zeros((3, 3))], [np.zeros((3, 3)), mass * np.eye(3) + A]])
         body, less, whole, inverse = probed(
             core.hx_probe_inertia, mass, J, A, c, s, U, size=144
@@ -169,7 +170,8 @@ def test_bodies_start_on_their_joints_where_the_twin_puts_them(core: ct.CDLL) ->
 def test_bodies_come_back_as_they_were_set(core: ct.CDLL) -> None:
     plant, body = drifted(core, load_robot("athena"), 5)
     assert distance(plant.bodies, body) < SAME
-    others = [0, 1, 2, *range(7, 13)]  # the quaternions are kept in the joints' axes
+    # the plant keeps quaternions in the axes of the joints, so they round
+    others = [0, 1, 2, *range(7, 13)]
     assert np.array_equal(plant.bodies[:, others], body[:, others])
 
 
@@ -219,7 +221,7 @@ def test_foot_kinematics_and_forces_are_the_twins(
 
 
 def test_a_step_takes_a_foots_slopes_where_its_approach_leads_it(core: ct.CDLL) -> None:
-    """The derivatives are those at delta + h ddelta while the foot approaches."""
+    """While the foot approaches, the derivatives are those at delta + h ddelta."""
     robot = changed(lopsided(7), contact={"impact_speed_floor": 2.0})
     plant, body = drifted(core, robot, 7)
     damping, approaching = contact_damping(robot.contact, 0.0), 0
@@ -305,8 +307,8 @@ def test_friction_is_the_twins_through_its_limit_at_rest(core: ct.CDLL) -> None:
 def test_bristles_and_their_force_are_the_twins(
     core: ct.CDLL, terrain: dict[str, Any], static: dict[str, float]
 ) -> None:
-    """Slack, stretched, sliding and overstretched bristles, along the slip and against it; an
-    open foot's do not move.
+    """Covers slack, stretched, sliding and overstretched bristles, along the slip and against it.
+    The bristles of an open foot do not move.
     """
     robot = changed(
         lopsided(7),
@@ -320,7 +322,7 @@ def test_bristles_and_their_force_are_the_twins(
         feet = foot_contacts(robot, body)
         z = np.cross(
             rng.normal(size=(6, 3)), feet[0].normal
-        )  # along the ground, of the size that is due
+        )  # the bristle force along the ground, with its size
         z *= size * robot.friction.presliding / np.linalg.norm(z, axis=1, keepdims=True)
         rate = probed(core.hx_probe_bristles, plant, inputs(plant.hold()), z, size=18).reshape(6, 3)
         output = plant.output()
@@ -347,12 +349,12 @@ def test_bristles_and_their_force_are_the_twins(
         (0.99, True, False),
         (1.2, True, True),
         (0.8, False, True),
-    } <= seen  # size, closed, slipping on
+    } <= seen  # deflection over the presliding, contact closed, foot slips on
 
 
 @pytest.mark.parametrize("e", [1e-3, 0.1, 0.3, 0.5, 0.7, 0.9, 0.99, 0.9999, 1.0])
 def test_the_exact_restitution_factor_is_the_twins(core: ct.CDLL, e: float) -> None:
-    # both sides of its equation are of the size of chi and differ by chi^3: near e = 1 half the
+    # both sides of the equation are of the size of chi and differ by chi^3; near e = 1 half of the
     # digits are lost
     rounding = 3e-8
     assert asked(core.hx_probe_exact_restitution_chi, e) == pytest.approx(
@@ -392,7 +394,8 @@ def test_the_servo_is_the_twins_and_its_slopes_are_its_derivatives(
         clipped += got[2] == 0.0
         if (
             got[2] > 0.0
-        ):  # on the torque-speed line the damping is left out on purpose: the line is no spring
+            # on the torque-speed line the plant omits the damping on purpose
+        ):
             assert got[3] == pytest.approx(
                 (total(qd - 1e-6) - total(qd + 1e-6)) / 2e-6, rel=1e-5, abs=1e-5
             )

@@ -1,5 +1,5 @@
-"""The integrators: order by regression, error control in proportion to its tolerance, steps as
-asked for.
+"""Tests the integrators: order by regression, error in proportion to the tolerance, lengths of
+steps.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from hexapod_cosim.models.records import Array
 
 ORDER = {"rosw3": 3, "ros2": 2, "dp54": 5, "bs32": 3, "rk4": 4}
 EMBEDDED = ("rosw3", "ros2", "dp54", "bs32")
-SLOPE = 0.1  # of the regression, off the order
+SLOPE = 0.1  # difference of the regression's order from the method's order
 BASE = load_robot("phantomx_mk4")
 WIDE_SERVO: dict[str, Any] = {
     "torque_max": 100.0,
@@ -34,8 +34,8 @@ WIDE_SERVO: dict[str, Any] = {
 
 @dataclass(frozen=True)
 class Problem:
-    """A smooth motion: robot, start, command and duration [s]; steps by order at which the error
-    is asymptotic and above rounding.
+    """A smooth motion: robot, start, command, duration [s], and the numbers of steps, by order, at
+    which the error is asymptotic and above rounding.
     """
 
     robot: Robot
@@ -43,11 +43,11 @@ class Problem:
     command: Command
     duration: float
     counts: Callable[[int], tuple[int, ...]]
-    bristles: float = 0.0  # at the start, along x, over the presliding
+    bristles: float = 0.0  # deflection at the start along x, divided by the presliding
 
 
 def tumbling() -> Problem:
-    """Free fall with spinning links and constant torques: nothing stiff."""
+    """Returns free fall with spinning links and constant torques, in which nothing is stiff."""
     rng = np.random.default_rng(0)
     start = {
         "quaternion": [1.0, 0.1, 0.2, 0.3],
@@ -67,7 +67,9 @@ def tumbling() -> Problem:
 
 
 def driven() -> Problem:
-    """Kinematic drives on a ramp that they do not start on: the right side depends on time."""
+    """Returns kinematic drives on a ramp whose start differs from theirs, so the right side depends
+    on time.
+    """
     start = {"angle": BASE.stance + 0.05, "angular_velocity": [1.0, -2.0, 1.5]}
     command = Command(angle_ref=BASE.stance, speed_ref=random_command(BASE, 1).speed_ref)
     return Problem(
@@ -80,8 +82,9 @@ def driven() -> Problem:
 
 
 def pressed() -> Problem:
-    """All feet in soft ground, sliding, servos working: contact and servo enter W, and no foot
-    leaves or lands.
+    """Returns a robot with all feet in soft ground, sliding, with working servos.
+
+    Contacts and servos enter W, and no foot leaves the ground or lands.
     """
     robot = changed(
         BASE,
@@ -105,7 +108,7 @@ def pressed() -> Problem:
 
 
 def stuck() -> Problem:
-    """The same on bristles far from letting go."""
+    """Returns the same motion with bristle friction, far from the spring limit."""
     problem = pressed()
     robot = changed(problem.robot, friction={"law": "bristle", "presliding": 0.05})
     return replace(
@@ -117,7 +120,7 @@ def stuck() -> Problem:
 
 
 def sliding() -> Problem:
-    """The same on bristles stretched to the full, the robot sliding on along x."""
+    """Returns the same motion with fully stretched bristles, while the robot slides along x."""
     problem, friction = pressed(), {"law": "bristle", "presliding": 2e-3, "mu": 0.2}
     start = problem.start | {"velocity": [0.5, 0.0, 0.0]}
     return replace(
@@ -126,8 +129,8 @@ def sliding() -> Problem:
 
 
 def weakening() -> Problem:
-    """The same with static friction above kinetic, at speeds at which friction falls from one to
-    the other.
+    """Returns the same motion with static friction above kinetic friction, at speeds between the
+    two.
     """
     problem = sliding()
     return replace(
@@ -185,7 +188,7 @@ def test_each_method_has_its_order(core: ct.CDLL, method: str, problem: Problem)
 def test_no_foot_lands_or_leaves_while_pressed_and_bristles_stay_stuck_or_sliding(
     core: ct.CDLL, name: str
 ) -> None:
-    """What the order of those problems rests on."""
+    """Checks the assumption of the order tests of these problems."""
     problem, stretched = PROBLEMS[name], []
     plant = started(core, problem)
     for k in range(1, 11):
@@ -217,7 +220,8 @@ def test_the_error_falls_in_proportion_to_the_tolerance(
             step_max=1.0,
         )
         errors.append(float(np.max(np.abs(got - exact) / scale)))
-    # a method of order p estimated at order p - 1 keeps h^p in proportion to the tolerance
+    # an error estimate of order p - 1 keeps h^p of a method of order p in proportion to the
+    # tolerance
     assert slope(tolerances, errors) == pytest.approx(1.0, abs=0.2)
     assert np.all(np.array(errors) < 30.0 * tolerances)
 
@@ -244,8 +248,8 @@ def test_the_longest_step_is_kept_under_error_control(core: ct.CDLL) -> None:
 
 
 def test_an_error_estimate_above_the_tolerance_rejects_the_step(core: ct.CDLL) -> None:
-    """A servo that hits a wall of torque after a long quiet flight: the step grown in flight is
-    too long for it.
+    """A servo receives a large torque after a long quiet flight. The step has grown in flight and
+    is too long for the torque.
     """
     robot = changed(BASE, solver={"tolerance": 1e-8, "step_max": 1.0})
     plant = Plant(core, robot, position=(0.0, 0.0, 5.0))
@@ -260,8 +264,9 @@ def test_an_error_estimate_above_the_tolerance_rejects_the_step(core: ct.CDLL) -
 def test_the_step_length_ends_where_the_macro_step_ends_and_the_pieces_add_up(
     core: ct.CDLL,
 ) -> None:
-    """The same fixed steps, taken in one call or in many, give the same bits: inputs and
-    contacts alone tie a step to its call.
+    """The same fixed steps give the same bits in one call and in many.
+
+    Only inputs and contacts relate a step to its call.
     """
     problem = PROBLEMS["pressed"]
     robot = changed(problem.robot, solver={"method": "rosw3", "step": 2.0**-10})

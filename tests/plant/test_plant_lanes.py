@@ -1,5 +1,5 @@
-"""The lanes' own mathematics (no libm there) against numpy, and that neither lane width nor
-instruction set changes a motion.
+"""Tests the lanes' own functions, which do not use libm, against numpy, and that neither lane width
+nor instruction set changes a motion.
 """
 
 from __future__ import annotations
@@ -24,9 +24,9 @@ TANH_ULPS, EXPM1_ULPS, ANGLE_ULPS = (
     4.0,
     4.0,
     4.0,
-)  # a handful of roundings each: no error of method may be seen
+)  # units in the last place: a few roundings each; no error of method is allowed
 ROOT = Path(__file__).parents[2]
-BASELINE = "-DHX_BASELINE_ONLY"  # no kernel beside the one whose lanes are asked for
+BASELINE = "-DHX_BASELINE_ONLY"  # without the kernels for other instruction sets
 WIDTHS = {
     name: [BASELINE, f"-DHX_LANES={lanes}"]
     for name, lanes in (("scalar", 1), ("two", 2), ("four", 4), ("eight", 8))
@@ -43,12 +43,12 @@ def mapped(function: Callable[..., None], *arguments: Array) -> Array:
 
 
 def ulps(got: Array, exact: Array) -> float:
-    """Largest error in units of the last place of the exact value."""
+    """Returns the largest error in units in the last place of the exact value."""
     return float(np.max(np.abs(got - exact) / np.spacing(np.abs(exact))))
 
 
 def logarithmic(low: float, high: float, seed: int) -> Array:
-    """4096 numbers of both signs, sizes spread evenly over the decades."""
+    """Returns 4096 numbers of both signs whose sizes are spread evenly over the decades."""
     rng = np.random.default_rng(seed)
     sizes: Array = np.exp(rng.uniform(np.log(low), np.log(high), 4096)) * rng.choice(
         [-1.0, 1.0], 4096
@@ -134,7 +134,7 @@ def test_the_motion_does_not_depend_on_the_lane_width(
 def test_what_lies_on_the_stack_does_not_matter(
     core: ct.CDLL, other_cores: dict[str, ct.CDLL], width: str, garbage: int, law: str
 ) -> None:
-    """Slots that no pack covers must not be read before they are written: 0xFF... is a NaN."""
+    """Lanes that no leg occupies must be written before they are read: 0xFF... is a NaN."""
     robot = changed(load_robot("athena"), friction={"law": law})
     plants = [
         Plant(library, robot, **random_pose(robot, 5)) for library in (core, other_cores[width])
@@ -164,8 +164,8 @@ def test_every_kernel_of_this_build_that_runs_here_gives_the_same_rates(core: ct
 
 @pytest.fixture(scope="session")
 def other_cores(tmp_path_factory: pytest.TempPathFactory) -> dict[str, ct.CDLL]:
-    """The plant compiled for other lane widths, and with less optimisation than the one under
-    test.
+    """Returns the plant compiled for other lane widths, and with less optimisation than the plant
+    under test.
     """
     compiler = shutil.which("cc") or shutil.which("gcc") or shutil.which("clang")
     assert compiler, "these tests need a C compiler"

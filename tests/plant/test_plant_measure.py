@@ -24,9 +24,9 @@ from hexapod_cosim.models.dynamics import Command
 from hexapod_cosim.models.records import Array
 
 G = 9.81  # m/s2
-SUMS = 1e-9  # J: what adding in another order may change
-SAMPLED = 5e-3  # relative: a trapezoidal sum of samples 0.1 ms apart
-CLOSED = 1e-3  # relative: paths between the ends of steps at a tolerance of 1e-8
+SUMS = 1e-9  # J: what another order of summation may change
+SAMPLED = 5e-3  # relative: error of trapezoidal sums of samples 0.1 ms apart
+CLOSED = 1e-3  # relative: error of the path between the ends of steps at a tolerance of 1e-8
 
 
 def weight(robot: Robot) -> float:
@@ -35,8 +35,8 @@ def weight(robot: Robot) -> float:
 
 
 def hertz_forces(mass: float, stiffness: float, speed: float, duration: float) -> Array:
-    """(n,) normal force [N] of a mass [kg] on a Hertzian contact, m d'' = -K d^(3/2), in steps
-    of 1 us from touch-down on.
+    """Returns the normal force [N] of a mass [kg] on a Hertzian contact, m d'' = -K d^(3/2), in
+    steps of 1 us from touch-down on.
     """
     depth, approach, forces = 0.0, speed, [0.0]
     for _ in range(round(duration / 1e-6)):
@@ -47,8 +47,9 @@ def hertz_forces(mass: float, stiffness: float, speed: float, duration: float) -
 
 
 def rises(forces: Array) -> Array:
-    """(windows,) rise [N/s] over 1 ms up to every 0.1 ms after the first of forces 1 us apart,
-    which follows on none.
+    """Returns the rises [N/s] over 1 ms that end every 0.1 ms.
+
+    The forces are 1 us apart; before the first of them the force is 0.
     """
     late = forces[100::100]
     early = np.concatenate([np.zeros(1000), forces])[100 : 100 + 100 * len(late) : 100]
@@ -60,7 +61,7 @@ def rises(forces: Array) -> Array:
 
 @pytest.mark.parametrize("e", [0.3, 0.7])
 def test_the_impulse_of_an_impact_is_the_momentum_that_it_gives(core: ct.CDLL, e: float) -> None:
-    """Without gravity: (1 + e) m v, shared by six feet."""
+    """Without gravity the impulse is (1 + e) m v, shared by six feet."""
     robot = rigid(restitution=e)
     bounced = flown_off(falling(core, robot, speed=0.4), step=2e-3)
     mass = weight(robot) / G
@@ -70,13 +71,13 @@ def test_the_impulse_of_an_impact_is_the_momentum_that_it_gives(core: ct.CDLL, e
 
 
 def test_peak_and_steepest_rise_of_an_elastic_impact_have_their_closed_forms(core: ct.CDLL) -> None:
-    """Hertz: m v^2/2 = 2/5 K d^(5/2) at the peak; K d^(3/2) rises most steeply where d^(5/2) = 5
-    m v^2/(14 K).
+    """Hertz: m v^2/2 = 2/5 K d^(5/2) at the peak, and K d^(3/2) rises most steeply where d^(5/2) =
+    5 m v^2/(14 K).
     """
     robot, speed, stiffness = rigid("hertz", stiffness=1e6), 0.5, 1e6
     mass = weight(robot) / G / 6.0
     plant = falling(core, robot, clearance=1e-4, speed=speed)
-    plant.step(0.05)  # the whole impact within one call
+    plant.step(0.05)  # one call covers the whole impact
     bounced = plant.output()
     assert bounced.torso.velocity[2] == pytest.approx(speed, rel=CLOSED)
     deepest = (1.25 * mass * speed**2 / stiffness) ** 0.4
@@ -97,7 +98,7 @@ def test_peak_and_steepest_rise_of_an_elastic_impact_have_their_closed_forms(cor
 
 
 def test_the_landing_rate_is_that_of_the_first_20_milliseconds(core: ct.CDLL) -> None:
-    """A soft Hertzian contact, whose force rises ever more steeply for more than 40 ms."""
+    """The force of a soft Hertzian contact rises ever more steeply for more than 40 ms."""
     stiffness, speed = 1200.0, 0.1
     robot = rigid("hertz", stiffness=stiffness)
     rates = rises(hertz_forces(weight(robot) / G / 6.0, stiffness, speed, 0.040))
@@ -111,7 +112,7 @@ def test_the_landing_rate_is_that_of_the_first_20_milliseconds(core: ct.CDLL) ->
 def test_the_landing_rate_does_not_depend_on_the_communication_step(
     core: ct.CDLL, step: float
 ) -> None:
-    """Of 1 ms windows that begin and end within calls of 0.02, 0.37 and 50 ms."""
+    """The windows of 1 ms begin and end within calls of 0.02, 0.37 and 50 ms."""
     robot, mass = rigid("hertz", stiffness=1e6), weight(load_robot("athena")) / G / 6.0
     plant = falling(core, robot, clearance=1e-4, speed=0.5)
     while plant.time < 0.03:
@@ -132,8 +133,8 @@ def test_the_loss_of_an_impact_is_the_kinetic_energy_it_takes(core: ct.CDLL) -> 
 
 
 def test_a_robot_that_slides_to_rest_slips_the_way_of_its_friction(core: ct.CDLL) -> None:
-    """With locked joints and mu = 0.3 from 0.5 m/s: v^2/(2 mu g), and the kinetic energy goes
-    into friction.
+    """With locked joints and mu = 0.3 a robot at 0.5 m/s slides v^2/(2 mu g), and friction
+    dissipates its kinetic energy.
     """
     robot = changed(rigid(gravity=G), friction={"mu": 0.3, "slope": 1e4})
     start = above(robot, 0.0)
@@ -150,8 +151,8 @@ def test_a_robot_that_slides_to_rest_slips_the_way_of_its_friction(core: ct.CDLL
 def test_a_torque_that_turns_a_free_joint_does_its_work_and_its_square_adds_up(
     core: ct.CDLL,
 ) -> None:
-    """Torque mode without gravity and gear friction: the works are what is moved, the squared
-    torque's integral is tau^2 t.
+    """In torque mode without gravity and gear friction the works add up to the kinetic energy, and
+    the integral of the squared torque is tau^2 t.
     """
     free = {"mode": "torque", "coulomb_friction": 0.0, "speed_max": 1e6, "torque_max": 1e3}
     robot = replace(
@@ -199,9 +200,10 @@ def robot(request: pytest.FixtureRequest) -> Robot:
 def samples(
     core: ct.CDLL, robot: Robot, every: float, duration: float = 0.6
 ) -> tuple[list[tuple[Any, Any]], list[Any]]:
-    """Of a walk in holds of 5 ms, whose commands are the same for any `every`: outputs at the
-    beginning and end of every piece of so many seconds, both under the command in force, and at the
-    end of every hold.
+    """Returns outputs of a walk whose commands change every 5 ms, whatever `every` is.
+
+    The outputs are those at the beginning and at the end of every piece of `every` seconds, both
+    under the command of the piece, and those at the end of every command.
     """
     plant = standing(core, robot)
     pieces, ends = [], []
@@ -217,7 +219,7 @@ def samples(
     return pieces, ends
 
 
-def test_the_parts_add_up_to_the_books(core: ct.CDLL, robot: Robot) -> None:
+def test_the_parts_add_up_to_the_energy_balance(core: ct.CDLL, robot: Robot) -> None:
     for output in samples(core, robot, 5e-3)[1][::10]:
         works = float(np.sum(output.positive_work) - np.sum(output.negative_work))
         losses = output.energy.contact_loss + output.energy.friction_loss + output.energy.gear_loss
@@ -226,15 +228,15 @@ def test_the_parts_add_up_to_the_books(core: ct.CDLL, robot: Robot) -> None:
 
 
 def test_what_is_measured_is_what_fine_samples_add_up_to(core: ct.CDLL, robot: Robot) -> None:
-    """At the default tolerance in holds of 5 ms, against sums of forces, speeds and torques
-    sampled every 0.1 ms.
+    """Compares the plant at the default tolerance, with commands of 5 ms, with sums of forces,
+    speeds and torques sampled every 0.1 ms.
     """
     fine, _ = samples(core, changed(robot, solver={"tolerance": 1e-7}), 1e-4)
     _, coarse = samples(core, robot, 5e-3)
     least = 0.01 * weight(robot)
 
     def total(value: Callable[[Any], Array]) -> float:
-        """The trapezoidal sum over the pieces."""
+        """Returns the trapezoidal sum over the pieces."""
         return float(sum(0.5e-4 * np.sum(value(before) + value(after)) for before, after in fine))
 
     def slip(output: Any) -> Array:
@@ -262,7 +264,7 @@ def test_what_is_measured_is_what_fine_samples_add_up_to(core: ct.CDLL, robot: R
     assert max(output.foot.peak_force_rate.max() for output in coarse) > 0.9 * float(rise.max())
 
 
-def test_the_way_of_looking_changes_no_integral_and_loses_no_peak(
+def test_the_interval_of_reading_changes_no_integral_and_loses_no_peak(
     core: ct.CDLL, robot: Robot
 ) -> None:
     often = [after for _, after in samples(core, robot, 1e-3)[0]]
@@ -280,8 +282,8 @@ def test_the_way_of_looking_changes_no_integral_and_loses_no_peak(
 
 
 def test_steps_as_short_as_rounding_make_no_steep_forces(core: ct.CDLL) -> None:
-    """A standing robot in steps down to 1e-11 s, over which depths change by their last bits
-    alone.
+    """A robot stands and takes steps down to 1e-11 s, over which only the last bits of the depths
+    change.
     """
     plant = standing(core, load_robot("athena"))
     for size in (1e-9, 1e-10, 1.1e-11):
@@ -299,7 +301,7 @@ def test_peaks_begin_anew_with_every_call(core: ct.CDLL) -> None:
     flying = plant.output().foot
     assert float(flying.peak_force.max()) == 0.0
     assert float(flying.peak_force_rate.max()) == 0.0
-    assert float(flying.landing_rate.min()) > 1e3  # is kept until the next touch-down
+    assert float(flying.landing_rate.min()) > 1e3  # kept until the next touch-down
 
 
 def test_the_first_peak_is_the_load_at_the_start(core: ct.CDLL) -> None:
@@ -323,15 +325,16 @@ def test_measures_come_back_with_a_saved_state(core: ct.CDLL, robot: Robot) -> N
     assert ends[0] == ends[1]
 
 
-# ---- the books ----
+# ---- energy balance ----
 
 
 @pytest.mark.parametrize(("name", "tolerance"), [("rosw3", 1e-4), ("ros2", 0.1)])
-def test_the_books_close_where_motors_are_on_their_torque_speed_line(
+def test_the_energy_balance_closes_where_motors_are_on_their_torque_speed_line(
     core: ct.CDLL, name: str, tolerance: float
 ) -> None:
-    """Legs swung to and fro so fast that the line limits them; a stage's torque that is clipped
-    after its shift leaves some 1 %.
+    """The legs swing so fast that the torque-speed line limits the motors.
+
+    Clipping a stage's torque after its shift by the implicit increment would leave about 1 %.
     """
     robot = changed(load_robot("athena"), solver={"method": name, "tolerance": tolerance})
     plant = Plant(core, robot, position=(0.0, 0.0, 1.0))

@@ -22,10 +22,11 @@ from hexapod_cosim.models.energy import constraint_errors, kinetic_energy, poten
 from hexapod_cosim.models.kinematics import axis_quaternion, quaternion_product, rotation_matrix
 from hexapod_cosim.models.records import Array
 
-# relative: the same formula, its operations in another order, some hundred roundings long
+# relative: the same formula with its operations in another order, some hundred roundings
 SAME = 1e-13
 CONTACT_SAME = (
-    1e-10  # relative, of forces: a penetration of 1e-5 m is the difference of coordinates of 0.1 m
+    # relative, of forces: a penetration of 1e-5 m is the difference of coordinates of about 0.1 m
+    1e-10
 )
 DRIFT = 0.02
 SLOPE = {"kind": "slope", "height": -0.02, "incline": 0.3, "heading": 2.1}
@@ -94,7 +95,7 @@ def test_slip_speed_and_tangential_force_are_the_parts_along_the_ground(
 
 
 def numbers(value: Any) -> list[float]:
-    """Returns all numbers of a structure, in order."""
+    """Returns all numbers of a structure in the order of its fields."""
     if isinstance(value, ct.Structure):
         return [number for field in value._fields_ for number in numbers(getattr(value, field[0]))]
     return (
@@ -110,7 +111,7 @@ def test_the_compiled_in_robot_is_athena_in_its_settled_pose(core: ct.CDLL) -> N
     plant = Plant(core, load_robot("athena"), **vars(seen(default).initial))
     assert (
         float(np.max(np.abs(plant.accelerations().dv))) < 1e-3
-    )  # m/s2, rad/s2: the pose is given to 1e-10 m
+    )  # m/s2, rad/s2: the pose is known to 1e-10 m
     default.initial = athena.initial
     assert numbers(default) == numbers(athena)
 

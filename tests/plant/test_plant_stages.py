@@ -1,5 +1,5 @@
-"""A step of the integrator, stage by stage, against the textbook's formula: the dense system of
-eq. 19 and 20, bristles of eq. 21.
+"""Tests a step of the integrator, stage by stage, against the dense systems of eq. 19 and 20, and
+for bristles of eq. 21.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from hexapod_cosim.models.records import Array
 
 @dataclass(frozen=True)
 class Tableau:
-    """A row of the plant's methods."""
+    """A row of the plant's table of methods."""
 
     stages: int
     gamma: float
@@ -44,7 +44,7 @@ def coefficients(core: ct.CDLL, method: str) -> Tableau:
 
 
 def rates(core: ct.CDLL, plant: Plant, command: Command) -> Callable[[Array], Array]:
-    """dy/dt of bodies (247,), by the plant put there."""
+    """Returns dy/dt of the bodies (247,), which the plant computes from them."""
 
     def rate(y: Array) -> Array:
         plant.bodies = y.reshape(19, 13)
@@ -63,8 +63,9 @@ def rates(core: ct.CDLL, plant: Plant, command: Command) -> Callable[[Array], Ar
 
 @dataclass
 class DenseStages:
-    """The stages of eq. 19 one after the other, solved as the dense system: nu (114,) that
-    positions advance with, and alpha.
+    """Computes the stages of eq. 19 one after the other as dense systems.
+
+    Each yields nu (114,), with which positions advance, and the accelerations alpha.
     """
 
     robot: Robot
@@ -73,8 +74,8 @@ class DenseStages:
     z: float
 
     def solve(self, body: Array, s_x: Array, s_v: Array) -> tuple[Array, Array]:
-        """W u + D^T mu = G_v (s_v + z a) + G_x (s_x + z (v + s_v) + z^2 a), D u = 0; alpha = a +
-        u, nu = v + s_v + z alpha.
+        """Solves W u + D^T mu = G_v (s_v + z a) + G_x (s_x + z (v + s_v) + z^2 a), D u = 0 and
+        returns alpha = a + u and nu = v + s_v + z alpha.
         """
         z, v, a = (
             self.z,
@@ -92,7 +93,7 @@ class DenseStages:
 
 
 def body_rates(body: Array, nu: Array, alpha: Array) -> Array:
-    """(247,) dy/dt of positions that advance with nu."""
+    """Returns dy/dt (247,) of bodies whose positions advance with nu."""
     w = nu.reshape(19, 6)
     turns = np.array(
         [quaternion_rate(p, turn) for p, turn in zip(body[:, 3:7], w[:, 3:6], strict=True)]
@@ -102,12 +103,12 @@ def body_rates(body: Array, nu: Array, alpha: Array) -> Array:
 
 @pytest.mark.parametrize("method", ["rosw3", "ros2"])
 def test_an_implicit_step_is_that_of_the_dense_stages(core: ct.CDLL, method: str) -> None:
-    """Contact and servo keep the first stage's slopes, masses and joints are each stage's own; h
-    is many of friction's times.
+    """The slopes of contacts and servos are those of the first stage, masses and joints are those
+    of each stage. The step h is many time constants of friction.
     """
     h, robot = 2e-3, changed(load_robot("athena"), solver={"method": method, "step": 2e-3})
     body, command = resting(robot, 1), Command(angle_ref=robot.stance)
-    body[:, 2] += 1.5e-4 - 4e-4  # all feet in the ground
+    body[:, 2] += 1.5e-4 - 4e-4  # all feet are in the ground
     plant, there = Plant(core, robot), Plant(core, robot)
     plant.bodies = body
 
@@ -137,15 +138,18 @@ def test_an_implicit_step_is_that_of_the_dense_stages(core: ct.CDLL, method: str
 
 @dataclass
 class StuckStages(DenseStages):
-    """The same on bristles that do not let go, for which eq. 21 has beta = 0. rate leaves their
-    own in bristle_rate.
+    """Computes the same stages with bristles below the spring limit, for which eq. 21 has beta = 0.
+
+    `rate` stores the rates of the bristles in `bristle_rate`.
     """
 
     G_b: Array  # (6,) N/m
     bristle_rate: Array  # (6, 3) m/s
 
     def grips(self, body: Array) -> Array:
-        """(6, 114, 3) what a force along flat ground on each foot does to the bodies."""
+        """Returns (6, 114, 3): the generalised forces on the bodies by a unit force along flat
+        ground on each foot.
+        """
         G = np.zeros((6, 114, 3))
         for leg, foot in enumerate(foot_contacts(self.robot, body)):
             tibia = 3 * (leg + 1)
@@ -157,8 +161,8 @@ class StuckStages(DenseStages):
     def solve_stuck(
         self, body: Array, s_x: Array, s_v: Array, s_b: Array
     ) -> tuple[Array, Array, Array]:
-        """W has z^2 G_b at each foot more, the right side G_b (s_b + z (db/dt + s_v + z a)): nu,
-        alpha and k_b/h.
+        """Adds z^2 G_b at each foot to W, and G_b (s_b + z (db/dt + s_v + z a)) to the right side;
+        returns nu, alpha and k_b/h.
         """
         z, grips = self.z, self.grips(body)
         a = self.rate(body.ravel()).reshape(19, 13)[:, 7:13].ravel()
@@ -178,6 +182,30 @@ class StuckStages(DenseStages):
         return nu, a + u, self.bristle_rate + np.einsum("lij,i->lj", grips, s_v + z * (a + u))
 
 
+def plant_rate(core: ct.CDLL, plant: Plant, command: Command) -> Array:
+    """Returns the rates of the plant's bodies at its state (247,)."""
+    result, power = np.zeros((19, 13)), np.zeros(3)
+    core.hx_probe_rate(
+        ct.c_void_p(plant.handle),
+        ct.byref(inputs(command)),
+        ct.c_double(0.0),
+        pointer(result),
+        pointer(power),
+    )
+    return result.ravel()
+
+
+def standing_loads(robot: Robot, body: Array) -> Array:
+    """Returns the normal forces on feet at rest (6,) [N]."""
+    damping = standing_damping(robot, body)
+    return np.array(
+        [
+            normal_force(robot.contact, damping[leg], foot.penetration, 0.0)
+            for leg, foot in enumerate(foot_contacts(robot, body))
+        ]
+    )
+
+
 @pytest.mark.parametrize("static", [0.0, 0.9])
 @pytest.mark.parametrize("method", ["rosw3", "ros2"])
 def test_an_implicit_step_on_bristles_is_that_of_the_dense_stages(
@@ -186,14 +214,10 @@ def test_an_implicit_step_on_bristles_is_that_of_the_dense_stages(
     h, friction = 2e-3, {"law": "bristle", "mu_static": static}
     robot = changed(load_robot("athena"), solver={"method": method, "step": h}, friction=friction)
     body, command = resting(robot, 1), Command(angle_ref=robot.stance)
-    body[:, 2] += 1.5e-4 - 4e-4  # all feet in the ground
+    body[:, 2] += 1.5e-4 - 4e-4  # all feet are in the ground
     u = np.random.default_rng(3).uniform(-0.3, 0.3, (6, 3)) * [1.0, 1.0, 0.0]
-    b, plant, there, m = (
-        u * robot.friction.presliding,
-        Plant(core, robot),
-        Plant(core, robot),
-        coefficients(core, method),
-    )
+    b, m = u * robot.friction.presliding, coefficients(core, method)
+    plant, there = Plant(core, robot), Plant(core, robot)
 
     def put(target: Plant, bodies: Array, bristles: Array) -> Array:
         target.bodies = bodies
@@ -202,37 +226,16 @@ def test_an_implicit_step_on_bristles_is_that_of_the_dense_stages(
         )
 
     def rate(_: Array) -> Array:
-        result, power = np.zeros((19, 13)), np.zeros(3)
-        core.hx_probe_rate(
-            ct.c_void_p(there.handle),
-            ct.byref(inputs(command)),
-            ct.c_double(0.0),
-            pointer(result),
-            pointer(power),
-        )
-        return result.ravel()
+        return plant_rate(core, there, command)
 
     put(plant, body, b)
-    damping = standing_damping(robot, body)
-    load = [
-        normal_force(robot.contact, damping[leg], foot.penetration, 0.0)
-        for leg, foot in enumerate(foot_contacts(robot, body))
-    ]
-    G_b = (
-        -(static or 0.7)
-        * np.array(load)
-        * (3.0 - np.sum(u * u, axis=1))
-        / (2.0 * robot.friction.presliding)
-    )
+    G_b = -(static or 0.7) * standing_loads(robot, body) * (3.0 - np.sum(u * u, axis=1))
+    G_b = G_b / (2.0 * robot.friction.presliding)
     stages = StuckStages(
         robot, law_slopes(robot, command, body), rate, h * m.gamma, G_b, np.zeros((6, 3))
     )
-    k, nu, alpha, k_b = (
-        np.zeros((7, 247)),
-        np.zeros((7, 114)),
-        np.zeros((7, 114)),
-        np.zeros((7, 6, 3)),
-    )
+    k, k_b = np.zeros((7, 247)), np.zeros((7, 6, 3))
+    nu, alpha = np.zeros((2, 7, 114))
     for i in range(m.stages):
         y = (body.ravel() + h * m.a[i] @ k).reshape(19, 13)
         stages.bristle_rate = put(there, y, b + h * np.tensordot(m.a[i], k_b, 1))
@@ -263,8 +266,8 @@ def test_an_implicit_step_on_bristles_is_that_of_the_dense_stages(
 def test_a_step_is_rejected_when_its_largest_scaled_error_exceeds_the_tolerance(
     core: ct.CDLL, size: float, deciding: range, margin: float
 ) -> None:
-    """Scales 0.1 m, 1 (quaternion), 1 m/s, 10 rad/s; the smaller a robot, the more its turning
-    counts. The first step tried is 1e-4 s.
+    """The error scales are 0.1 m, 1 (quaternion), 1 m/s and 10 rad/s; the smaller a robot, the more
+    its rotation counts. The first step that is tried has 1e-4 s.
     """
     h, robot = 1e-4, scaled(PROBLEMS["tumbling"].robot, size)
     start = PROBLEMS["tumbling"].start | {
@@ -294,8 +297,8 @@ def test_a_step_is_rejected_when_its_largest_scaled_error_exceeds_the_tolerance(
 
 @pytest.mark.parametrize("margin", [0.99, 1.01])
 def test_bristles_count_by_their_error_over_ten_preslidings(core: ct.CDLL, margin: float) -> None:
-    """Feet set sliding on slack bristles, short and weak ones: what is first to go wrong. The
-    first step tried is 1e-4 s.
+    """The feet slide on slack bristles that are short and weak, so their error is the largest. The
+    first step that is tried has 1e-4 s.
     """
     h, m, still = 1e-4, coefficients(core, "bs32"), Command(angle_ref=load_robot("athena").stance)
     robot = changed(

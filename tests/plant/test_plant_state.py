@@ -1,4 +1,6 @@
-"""Tests that reruns, restores, resets and other plants change no bit of a plant."""
+"""Tests that repeating, restoring and resetting a plant, and stepping other plants, change no bit
+of its motion.
+"""
 
 from __future__ import annotations
 
@@ -35,7 +37,7 @@ def test_restoring_at_any_point_gives_the_same_bits_in_another_instance(
     whole = trail(Plant(core, robot, **landing(robot)), 12)
     touching = set()
     for k in (0, 3, 6, 9, 11):
-        stranger = Plant(core, other)  # of another robot, at another time
+        stranger = Plant(core, other)  # the other instance had another robot and another time
         stranger.step(0.01)
         stranger.restore(whole[k])
         assert stranger.save() == whole[k]
@@ -45,7 +47,7 @@ def test_restoring_at_any_point_gives_the_same_bits_in_another_instance(
     assert len(touching) > 1  # in the air as well as in contact
 
 
-def test_looking_at_outputs_accelerations_or_bytes_changes_nothing(core: ct.CDLL) -> None:
+def test_reading_outputs_accelerations_or_bytes_changes_nothing(core: ct.CDLL) -> None:
     robot = load_robot("phantomx_mk4")
     plant = Plant(core, robot, **landing(robot))
     for saved in trail(Plant(core, robot, **landing(robot)), 8):
@@ -80,7 +82,7 @@ def test_a_reset_goes_back_to_the_exact_start(core: ct.CDLL, law: str) -> None:
     assert trail(plant, 6) == first
 
 
-def test_setting_the_bodies_starts_the_books_anew_at_the_same_time(core: ct.CDLL) -> None:
+def test_setting_the_bodies_restarts_the_energy_balance_at_the_same_time(core: ct.CDLL) -> None:
     robot = load_robot("athena")
     plant = Plant(core, robot, **landing(robot))
     trail(plant, 8)
@@ -98,8 +100,8 @@ def test_setting_the_bodies_starts_the_books_anew_at_the_same_time(core: ct.CDLL
 
 @pytest.mark.parametrize("start", [0.0, 1.0, 64.0, 1000.1])
 def test_a_quiet_call_takes_one_step_whatever_the_clock_says(core: ct.CDLL, start: float) -> None:
-    """step_max is the call's length, which the clock's last bit makes longer in two calls of
-    three.
+    """step_max is the call's length. The rounding of the clock makes two calls of three longer by a
+    last bit.
     """
     robot = load_robot("athena")
     position, quaternion, angle = settled(robot)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 import re
 from collections.abc import Mapping, Sequence
@@ -10,6 +11,7 @@ from pathlib import Path
 import pytest
 from command import Call
 
+from hexapod_cosim.cosim.common.files import write_json
 from hexapod_cosim.cosim.master.loop import COMPLETED
 from hexapod_cosim.cosim.report import report
 from hexapod_cosim.cosim.report.headline import cards, creep_note, headline, plain_headline
@@ -266,3 +268,20 @@ def test_a_damaged_folder_is_reported_in_a_paragraph_and_left_as_it_is(
     assert "unexpected" not in err
     assert len(err.strip().splitlines()) == 1
     assert sorted(path.name for path in folder.iterdir()) == before
+
+
+def test_a_report_is_made_again_from_gains_that_json_cannot_hold(
+    call: Call, tmp_path: Path
+) -> None:
+    folder = tmp_path / "out"
+    set_up = ("--set", "duration=0.2", "--set", "outputs.plots=false")
+    assert call("simulate", "stand", "-o", folder, *set_up)[0] == 0
+    facts = json.loads((folder / "run.json").read_text(encoding="utf-8"))
+    facts["gains"] = {"robot": "athena", "margins": {"gain": math.inf, "phase": 60.5}}
+    write_json(folder / "run.json", facts)
+    assert '"gain": null' in (folder / "run.json").read_text(encoding="utf-8")
+    code, _, err = call("report", folder)
+    assert (code, err) == (0, "")
+    page = (folder / "report.html").read_text(encoding="utf-8")
+    assert "phase = 60.5" in page
+    assert "gain = null" not in page

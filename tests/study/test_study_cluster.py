@@ -14,12 +14,12 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+import tomlkit
 from command import COMMAND
 from dask_cluster import HELPERS, TIMEOUT, dask_scheduler, kill, mortal_workers, restarting_workers
 from distributed import Client
 from studies import KINEMATIC, SLOW, digest, quiet, rows, run_quietly, study_of
 
-from hexapod_cosim.cosim.common.toml_text import to_toml
 from hexapod_cosim.cosim.study.execute import cluster
 from hexapod_cosim.cosim.study.execute.chunk import Chunk
 from hexapod_cosim.cosim.study.execute.cluster_worker import run_chunk
@@ -169,7 +169,7 @@ def test_a_program_killed_on_a_cluster_leaves_its_results_and_the_cluster_in_ord
     athena_fmu: Path, tmp_path: Path, scheduler: str
 ) -> None:
     file, folder = tmp_path / "study.toml", tmp_path / "out"
-    file.write_text(to_toml(REAL))
+    file.write_text(tomlkit.dumps(REAL))
     words = [
         *COMMAND,
         "study",

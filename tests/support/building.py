@@ -1,7 +1,6 @@
-"""Builds the plant for tests:
+"""Builds the plant for tests.
 
-one incremental CMake build in build/test, which is also installed to build/plant, where the
-exporter finds it.
+One incremental CMake build in build/test is installed to build/plant, where the exporter finds it.
 """
 
 from __future__ import annotations
@@ -15,7 +14,7 @@ from pathlib import Path
 from filelock import FileLock
 
 ROOT = Path(__file__).resolve().parents[2]
-PRESET = os.environ.get("HEXAPOD_PRESET", "test")  # `make test-sanitize` has another
+PRESET = os.environ.get("HEXAPOD_PRESET", "test")  # `make test-sanitize` uses another folder
 BUILD = ROOT / "build" / PRESET
 PACKED = ROOT / "build" / "plant" if PRESET == "test" else BUILD / "plant"
 
@@ -43,7 +42,8 @@ def built() -> Path:
 
 def _build() -> None:
     if _configure().returncode != 0:
-        shutil.rmtree(BUILD, ignore_errors=True)  # its CMake, Python or generator is missing
+        # CMake, Python or the generator of the build folder is missing
+        shutil.rmtree(BUILD, ignore_errors=True)
         _succeed(_configure())
     _succeed(_cmake("--build", "--preset", PRESET))
     _succeed(_cmake("--install", str(BUILD), "--prefix", str(PACKED)))
@@ -69,7 +69,7 @@ def _cmake(*arguments: str) -> subprocess.CompletedProcess[str]:
     environment = os.environ | {
         "PATH": _search_path(),
         "LD_PRELOAD": "",
-    }  # sanitizers are for the tests only
+    }  # sanitizers are used in the tests' own build only
     return subprocess.run(
         [cmake, *arguments], cwd=ROOT, env=environment, capture_output=True, text=True, check=False
     )

@@ -55,9 +55,9 @@ def squeezed(generator: np.random.Generator | None = None) -> Measurement:
 
 
 def obey(controller: Controller, command: BodyCommand, steps: int) -> np.ndarray:
-    """Runs a controller of a robot that follows every plan:
+    """Runs a controller of a robot that follows every plan.
 
-    its feet carry the planned shares and its joints are at their commanded angles.
+    The feet carry the planned shares and the joints are at their commanded angles.
     """
     measurement, compliant, found = (
         Measurement(angle=controller.stance.copy()),

@@ -37,7 +37,7 @@ class Step(NamedTuple):
 
 
 class Plant3:
-    """One instance; `handle` is None when instantiation was refused."""
+    """An instance of the FMU; `handle` is None when instantiation was refused."""
 
     def __init__(
         self,

@@ -24,7 +24,7 @@ _LOGGER = ctypes.CFUNCTYPE(
 
 
 class Callbacks(ctypes.Structure):
-    """fmi2CallbackFunctions; the memory functions stay NULL."""
+    """The structure fmi2CallbackFunctions; the memory functions stay NULL."""
 
     _fields_ = (
         ("logger", _LOGGER),
@@ -36,7 +36,7 @@ class Callbacks(ctypes.Structure):
 
 
 class Plant:
-    """One instance; `component` is None when instantiation was refused."""
+    """An instance of the FMU; `component` is None when instantiation was refused."""
 
     def __init__(
         self,

@@ -1,4 +1,4 @@
-"""Hand-made gains, so that tests of the controller do not depend on the design."""
+"""Provides hand-made gains, so that tests of the controller do not depend on the design."""
 
 from __future__ import annotations
 
@@ -51,9 +51,8 @@ def weight(robot: Robot) -> float:
 def suspension(
     robot: Robot, *, deflection: float = 0.003, frequency: float = 5.0
 ) -> SuspensionGains:
-    """Returns a critically damped suspension:
-
-    its deflection under a third of the weight [m], its natural frequency [Hz].
+    """Returns a critically damped suspension with this deflection under a third of the weight [m]
+    and this natural frequency [Hz].
     """
     stiffness, omega = weight(robot) / TRIPOD_LEGS / deflection, 2.0 * math.pi * frequency
     return SuspensionGains(

@@ -1,5 +1,5 @@
-"""Repeats a walk in steps of 0.1 ms; reads the plant's measures there, and calculates the same from
-samples of force, velocity, torque and speed.
+"""Repeats a walk in steps of 0.1 ms, reads the plant's measures, and calculates the same figures
+from samples of force, velocity, torque and speed.
 """
 
 from __future__ import annotations
@@ -36,9 +36,10 @@ QUANTITIES = {
 
 @dataclass(frozen=True)
 class Samples:
-    """A walk on flat ground in intervals of 0.1 ms:
+    """Samples of a walk on flat ground in intervals of 0.1 ms.
 
-    values at their starts, under the new command, and at their ends, under the same command.
+    Each quantity has its values at the start of the interval, under the new command, and at its
+    end, under the same command.
     """
 
     time: Array  # s    (n,) starts of the intervals
@@ -57,17 +58,17 @@ class Samples:
 
 @dataclass(frozen=True)
 class Repeated:
-    """A walk driven again in steps of 0.1 ms."""
+    """A walk that was repeated in steps of 0.1 ms."""
 
     samples: Samples
-    recording: Recording  # the plant's outputs at the macro-steps, rows as those of the walk
+    recording: Recording  # outputs of the plant at the macro-steps, in the rows of the walk
 
 
 def repeated(scenario: Scenario, recording: Recording, *, begin: float) -> Repeated:
-    """Repeats a scenario on the plant with the recorded commands, each held for a macro-step;
-    samples it after a time [s] and reads the plant's own outputs in the same run.
+    """Repeats a scenario on the plant with the recorded commands, each held for a macro-step.
 
-    Columns that are no output of the plant are those of the given recording.
+    Samples it after a time [s] and reads the plant's own outputs in the same run. Columns that are
+    no outputs of the plant are taken from the given recording.
     """
     names = [name for names in QUANTITIES.values() for name in names]
     joints = [name for names in COMMANDED.values() for name in names]
@@ -102,26 +103,24 @@ def repeated(scenario: Scenario, recording: Recording, *, begin: float) -> Repea
             if k >= first:
                 seen.get()
                 rows[1, k - first] = seen.values
+    times = FINE * np.arange(first, count, dtype=np.float64)
+    return Repeated(as_samples(times, rows), Recording(recording.names, again))
+
+
+def as_samples(times: Array, rows: Array) -> Samples:
+    """Splits rows (2, times, variables) by the quantities."""
     torque, speed, normal, across, velocity = np.split(
         rows, np.cumsum([len(each) for each in QUANTITIES.values()])[:-1], axis=2
     )
-    samples = Samples(
-        FINE * np.arange(first, count, dtype=np.float64),
-        torque,
-        speed,
-        normal,
-        across,
-        velocity.reshape(2, -1, 6, 3),
-    )
-    return Repeated(samples, Recording(recording.names, again))
+    return Samples(times, torque, speed, normal, across, velocity.reshape(2, -1, 6, 3))
 
 
 def sampled_metrics(before: Samples, walk: Walk, servo: Servo, *, mu: float) -> dict[str, float]:
-    """Returns the metrics that are made of the plant's measures, from samples alone.
+    """Returns the metrics that use the plant's measures, calculated from samples alone.
 
-    before: samples that begin at least half a gait cycle before the walk's measured part, for
-    touch-downs that are bounces of a landing before it. Weight, distance [m] and times are those
-    of the walk.
+    before: samples that begin at least half a gait cycle before the walk's measured part, to
+    recognise touch-downs that are bounces of an earlier landing. Weight, distance [m] and times are
+    those of the walk.
     """
     samples = before.after(walk.begin)
     squares, work = integral(samples.torque**2), driven(samples)
@@ -187,11 +186,11 @@ def landing_rates(samples: Samples, *, apart: float, after: float) -> list[float
 
 
 def _steepest(time: Array, force: Array, k: int) -> float:
-    """Largest rise [N/s] over 1 ms in the 20 ms after a touch-down in the interval that ends at
-    sample k.
+    """Returns the largest rise [N/s] over 1 ms in the 20 ms after a touch-down in the interval that
+    ends at sample k.
 
-    A Hertzian contact's depth, in proportion to force^(2/3), grows evenly at first: that tells when
-    within the interval.
+    The depth of a Hertzian contact is proportional to force^(2/3) and grows linearly at first,
+    which gives the time of the touch-down within the interval.
     """
     depth = force[k : k + 2] ** (2.0 / 3.0)
     touch = time[k] - FINE * min(depth[0] / max(depth[1] - depth[0], 1e-300), 1.0)

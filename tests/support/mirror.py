@@ -44,6 +44,15 @@ HxDefinition = record(
     ("leg", HxLeg * LEGS),
     ("foot_radius", Real),
     (
+        "body",
+        record(
+            "Body",
+            ("torso_box", Vector3),
+            ("torso_centre", Vector3),
+            *reals("corner_radius knee_radius shank_radius shank_position"),
+        ),
+    ),
+    (
         "contact",
         record(
             "Contact",

@@ -1,6 +1,6 @@
-"""Calls the C controller from Python:
+"""Calls the C controller from Python.
 
-one instance with the interface of `Controller`, set up through the C library's table of ranges.
+An instance has the interface of `Controller` and is set up through the C library's table of ranges.
 """
 
 from __future__ import annotations
@@ -143,7 +143,7 @@ class NativeController:
         return self.out
 
     def go(self, t_end: float, *, rate: Any = None) -> None:
-        """Steps to t_end [s] with the present input, which changes at a rate [1/s]."""
+        """Steps to t_end [s] with the present input and its rate of change [1/s]."""
         self._checked(
             self._core.hx_controller_step(
                 self._handle, ct.byref(self.input), None if rate is None else ct.byref(rate), t_end

@@ -1,6 +1,5 @@
-"""Calls the C plant from Python:
-
-instances, definitions of robots, and internal functions through the probe.
+"""Calls the C plant from Python: instances, definitions of robots, and internal functions through
+the probe.
 """
 
 from __future__ import annotations
@@ -345,9 +344,9 @@ class Plant:
         return flat(d_rate), d_output
 
     def accelerations(self, command: Command | None = None) -> Accelerations:
-        """Solves eq.
+        """Returns the accelerations of (eq. 1) at the present state.
 
-        1 at the present state; the gear torque, which the plant does not output, is left at 0.
+        The plant does not output the gear torque, which stays 0.
         """
         dv, multipliers = np.zeros((BODIES, 6)), np.zeros((BODIES - 1, MULTIPLIERS))
         drive, gear = np.zeros((LEGS, JOINTS)), np.zeros((LEGS, JOINTS))

@@ -47,10 +47,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import tomlkit
 from numpy.typing import NDArray
 
 from hexapod_cosim.controller import BodyCommand, Controller, LegSolver, Measurement, make_gait
-from hexapod_cosim.cosim.common.toml_text import to_toml
 from hexapod_cosim.cosim.scenario.records import Scenario
 from hexapod_cosim.cosim.scenario.scenario import scenario_from_table
 from hexapod_cosim.models import LEG_NAMES, Robot, load_robot
@@ -66,14 +66,14 @@ COUNT = 30
 GRAVITY = 9.81  # m/s2
 PERIOD = 0.005  # s    of the controller
 CYCLES = 8.0  # 1    of a walk, the ramp to its speed included
-TRIPODS = ((0, 2, 4), (1, 3, 5))  # LF LR RM and LM RF RR
+TRIPODS = ((0, 2, 4), (1, 3, 5))  # the two tripods LF LR RM and LM RF RR
 MARGIN = 0.25  # 1    of the hips' height, from the centre of mass to a tripod's edge
 
 
 def draw_robot(number: int, folder: Path) -> tuple[Path, Robot]:
     """Draws the robot of this number, writes it to a file in the folder and loads it from there."""
     path = folder / f"random_{number}.toml"
-    path.write_text(to_toml(draw_table(number)), encoding="utf-8")
+    path.write_text(tomlkit.dumps(draw_table(number)), encoding="utf-8")
     return path, load_robot(path)
 
 

@@ -1,4 +1,4 @@
-"""Robots of the same shape and density in other sizes (Froude's similarity).
+"""Provides robots of the same shape and density in other sizes, by Froude's similarity.
 
 Lengths are multiplied by l, masses by l^3, times by sqrt(l).
 """
@@ -76,7 +76,7 @@ def _scaled_link(link: Link, by: float) -> Link:
 
 
 def _scaled_contact(contact: Contact, by: float) -> Contact:
-    """The stiffness K of F = K d^1.5 is proportional to sqrt(R) E."""
+    """Scales the contact, whose stiffness K in F = K d^1.5 is proportional to sqrt(R) E."""
     return replace(
         contact,
         stiffness=by**1.5 * contact.stiffness,

@@ -1,4 +1,4 @@
-"""The force laws of a robot that stands in its stance on all legs or some."""
+"""Provides the control laws of a robot that stands in its stance on all legs or some."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ WEIGHT = weight(ROBOT)  # N
 GAINS = make_gains(ROBOT)
 HOME = LegSolver(ROBOT).forward(ROBOT.stance)[:, :2] @ np.array([1.0, 1.0j])
 ALL = "111111"
-RAISED = 0.03  # m    height of a foot in mid-swing
+RAISED = 0.03  # m; height of a foot in mid-swing
 
 
 @cache
@@ -27,22 +27,22 @@ def rest(robot: Robot) -> Demand:
 
 
 class Laws(Compliance):
-    """The laws together with what the present step asks of them."""
+    """The laws, and what the present step requires of them."""
 
     planned: Plan
 
     def feel(self, force: np.ndarray) -> None:
-        """One period under forces (6, 3) on the feet."""
+        """Advances the laws by one period under forces (6, 3) on the feet."""
         self.step(self.planned, force)
 
     @property
     def answer(self) -> np.ndarray:
-        """(6, 2) of the slip PID [N]."""
+        """Returns the output of the slip PID (6, 2) [N]."""
         return np.column_stack([self.law.answer.real, self.law.answer.imag])
 
     @property
     def integral(self) -> np.ndarray:
-        """(6, 2) of the slip PID [N]."""
+        """Returns the integral of the slip PID (6, 2) [N]."""
         return np.column_stack([self.law.pid.integral.real, self.law.pid.integral.imag])
 
 

@@ -1,5 +1,5 @@
-"""Random but seeded robots, motions and commands for the plant's tests, as general as the equations
-allow.
+"""Provides random but seeded robots, motions and commands for the plant's tests, as general as the
+equations allow.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from hexapod_cosim.models.records import Array, Vector3, Vector6
 from hexapod_cosim.models.terrain import ground_normal
 
 LEGS, JOINTS = 6, 3
-MACRO = 0.004  # s  of a trail
+MACRO = 0.004  # s, macro-step of a trail
 
 
 def changed(robot: Robot, **sections: dict[str, Any]) -> Robot:
@@ -72,9 +72,10 @@ def scaled(robot: Robot, size: float) -> Robot:
 
 
 def lopsided(seed: int = 0) -> Robot:
-    """Returns a robot without symmetries:
+    """Returns a robot without symmetries.
 
-    skew axes, offsets, products of inertia, a centre of mass away from the torso's origin.
+    It has inclined axes, offsets, products of inertia, and a centre of mass away from the torso's
+    origin.
     """
     robot, rng = load_robot("phantomx_mk4"), np.random.default_rng(seed)
     torso = replace(

@@ -1,5 +1,5 @@
-"""Forces and torques that a planned motion of the multibody twin requires, calculated body by body
-by virtual work.
+"""Calculates the forces and torques that a planned motion requires of the multibody twin, body by
+body by virtual work.
 """
 
 from __future__ import annotations
@@ -17,16 +17,16 @@ from hexapod_cosim.models.kinematics import (
     rotation_matrix,
 )
 
-HIGH = 1.0  # m    height of the twin over the ground: foot forces are prescribed, not calculated
+# m; height of the twin over the ground, so that no foot is in contact: the forces are prescribed
+HIGH = 1.0
 NONE = np.full(6, np.nan)  # no foot in contact
 X, Y, Z = np.eye(3)
 
 
 @dataclass(frozen=True)
 class Motion:
-    """A motion:
-
-    the torso's position over the ground and attitude, and the joints. Rows are time steps.
+    """A motion: the torso's position over the ground, its attitude, and the joints. Rows are time
+    steps.
     """
 
     period: float  # s    between rows

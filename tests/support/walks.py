@@ -1,4 +1,4 @@
-"""Synthetic recordings of a walk."""
+"""Provides synthetic recordings of walks."""
 
 from __future__ import annotations
 
@@ -30,8 +30,8 @@ DISTANCE = SPEED * PERIOD * (CYCLES - 2)  # m    in the cycles of the metrics
 
 
 class Walk:
-    """A synthetic recording, zero unless a test sets values; the torso moves along x at the
-    commanded speed.
+    """A synthetic recording whose values are zero unless a test sets them; the torso moves along x
+    at the commanded speed.
 
     h: time between rows [s]. planned: whether the controller outputs the planned feet.
     """

@@ -17,11 +17,11 @@ extern "C" {
 #endif
 
 typedef enum hxControl {
-  HX_CONTROL_KINEMATIC = 1, /* follows the paths, no measurement */
-  HX_CONTROL_COMPLIANT      /* answers to the measured forces as well */
+  HX_CONTROL_KINEMATIC = 1, /* follows the paths, uses no measurement */
+  HX_CONTROL_COMPLIANT      /* also reacts to the measured forces */
 } hxControl;
 
-/* Which leg is in the air when: offsets by name, or the ones given. */
+/* Pattern of a gait: phase offsets by name, or given ones. */
 typedef enum hxPattern {
   HX_PATTERN_TRIPOD = 1,
   HX_PATTERN_RIPPLE,
@@ -30,7 +30,7 @@ typedef enum hxPattern {
   HX_PATTERN_CUSTOM
 } hxPattern;
 
-/* What the controller knows of a link; joint axes are z, -y, y (docs/architecture.md). */
+/* The controller's model of a link; joint axes are z, -y, y (docs/architecture.md). */
 typedef struct hxKnownLink {
   double mass;                  /* kg */
   double length;                /* m     next joint (tibia: foot centre) along the link's x */
@@ -57,7 +57,7 @@ typedef struct hxGait {
   double touchdown_speed;  /* m/s  vertical, at the end of a swing */
 } hxGait;
 
-/* What gains.toml holds, without what it was designed for. */
+/* Contents of gains.toml, without the data that they were designed for. */
 typedef struct hxGains {
   struct {
     double kp;               /* 1 */
@@ -76,18 +76,18 @@ typedef struct hxGains {
     double limit;      /* m    largest deflection */
   } suspension;
   struct {
-    double handover_time;  /* s   in which one set of legs hands the weight to the next */
+    double handover_time;  /* s   in which one set of legs hands its load over to the next */
     double weight_time;    /* s   smoothing of the measured weight */
   } support;
   struct {
     double attitude_rate;  /* 1/s    integral of roll and pitch */
-    double height_rate;    /* 1/s    and of the height */
+    double height_rate;    /* 1/s    integral of the height */
     double ground_time;    /* s      smoothing of the ground's inclination */
     double angle_limit;    /* rad    largest correction of roll and pitch */
-    double height_limit;   /* m      and of the height */
-    double path_rate;      /* 1/s    from way and heading lost to velocity */
-    double speed_limit;    /* m/s    largest such change */
-    double turn_limit;     /* rad/s  and of the yaw rate */
+    double height_limit;   /* m      largest correction of the height */
+    double path_rate;      /* 1/s    from lost displacement and heading to velocity */
+    double speed_limit;    /* m/s    largest change of the velocity */
+    double turn_limit;     /* rad/s  largest change of the yaw rate */
   } hold;
   struct {
     double speed;   /* rad/s  fastest change of an angle's correction */
@@ -95,13 +95,13 @@ typedef struct hxGains {
   } limits;
 } hxGains;
 
-/* Switches, 1 or 0: parts of the compliant control that are at work. */
+/* Switches, 1 or 0: enabled parts of the compliant control. */
 typedef struct hxParts {
   int support, slip_pid, suspension, touchdown, posture, path, limits, fallback;
 } hxParts;
 
-/* The robot as its controller knows it, the gait and the laws. hx_controller_definition_default
- * fills in the ATHENA-like robot. */
+/* The controller's model of the robot, the gait and the laws. hx_controller_definition_default sets
+ * the ATHENA-like robot. */
 typedef struct hxControllerDefinition {
   double period;  /* s    between two steps of the controller */
   int control;    /* hxControl */
@@ -125,7 +125,7 @@ typedef struct hxControllerDefinition {
   hxParts parts;
 } hxControllerDefinition;
 
-/* What the controller is told and what it senses. */
+/* Command and measurements of the controller. */
 typedef struct hxControllerInput {
   struct {
     double vx, vy;       /* m/s    forward, to the left */
@@ -146,7 +146,7 @@ typedef struct hxControllerOutput {
   int unreachable[HX_LEGS];               /* the joints cannot follow */
   int fallback[HX_LEGS];                  /* walks without feedback */
   double shift[HX_LEGS][2]; /* m  horizontal correction of the foot, walking frame */
-  double lift[HX_LEGS]; /* m  and the vertical one */
+  double lift[HX_LEGS]; /* m  vertical correction of the foot */
   double planned[HX_LEGS][3]; /* m  the foot's centre as the command plans it, torso frame, without
                                  any correction */
   double acceleration_ref[HX_LEGS][HX_JOINTS]; /* rad/s2  planned, for kinematic drives */
@@ -156,14 +156,14 @@ typedef struct hxController hxController;
 
 HX_API void hx_controller_definition_default(hxControllerDefinition *definition);
 HX_API void hx_controller_input_default(
-    hxControllerInput *input); /* nothing commanded, nothing felt, joints in the stance */
+    hxControllerInput *input); /* no command, no forces, joints in the stance */
 
-/* The ranges of every number in either structure; returns how many there are. */
+/* Sets *range to the ranges of all numbers of the structure; returns how many there are. */
 HX_API size_t hx_controller_definition_ranges(const hxRange **range);
 HX_API size_t hx_controller_input_ranges(const hxRange **range);
 
-/* Checks a definition. On failure message (HX_MESSAGE_SIZE bytes, may be NULL) says what, got,
- * expected. */
+/* Checks a definition. On failure message (HX_MESSAGE_SIZE bytes, may be NULL) says which value was
+ * got and what was expected. */
 HX_API hxStatus hx_controller_definition_check(const hxControllerDefinition *definition,
                                                char *message);
 
@@ -171,19 +171,19 @@ HX_API hxStatus hx_controller_definition_check(const hxControllerDefinition *def
 HX_API hxController *hx_controller_create(void);
 HX_API void hx_controller_destroy(hxController *controller);
 
-/* Standing in the stance, all memory cleared, the first tick at time t. On failure nothing changes
- * but the message. */
+/* Resets to standing in the stance, with the first tick at time t. On failure only the message
+ * changes. */
 HX_API hxStatus hx_controller_reset(hxController *controller,
                                     const hxControllerDefinition *definition, double t);
 
-/* The joint commands at the present time: of this input when a tick is due, else those of the last
- * tick. Changes nothing that counts: what was calculated is only kept for the step that follows
- * under the same input. */
+/* Computes the joint commands at the present time: those of this input when a tick is due,
+ * otherwise those of the last tick. The state does not change; the result is kept for the step that
+ * follows under the same input. */
 HX_API void hx_controller_output(hxController *controller, const hxControllerInput *input,
                                  hxControllerOutput *output);
 
-/* Goes on to t_end >= time under this input, which changes at a rate (1/s; NULL: is held): all
- * ticks before t_end are done. On failure nothing changes but the message. */
+/* Steps to t_end >= time under this input, which changes at a rate (1/s; NULL: is constant), and
+ * executes all ticks before t_end. On failure only the message changes. */
 HX_API hxStatus hx_controller_step(hxController *controller, const hxControllerInput *input,
                                    const hxControllerInput *rate, double t_end);
 
@@ -191,8 +191,8 @@ HX_API double hx_controller_time(const hxController *controller);
 HX_API const char *
 hx_controller_message(const hxController *controller); /* of the last failure, "" before any */
 
-/* The controller's bytes: size, copy out, copy in (checked: HX_BAD_STATE leaves the controller as
- * it was). */
+/* Save and restore the controller as bytes. hx_controller_set_state checks them; HX_BAD_STATE: the
+ * controller is unchanged. */
 HX_API size_t hx_controller_state_size(void);
 HX_API void hx_controller_get_state(const hxController *controller, void *bytes);
 HX_API hxStatus hx_controller_set_state(hxController *controller, const void *bytes, size_t size);

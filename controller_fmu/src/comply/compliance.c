@@ -2,20 +2,21 @@
 
 #include <string.h>
 
-/* 1  common tangential over normal force beyond the plan: only a robot that slides has it */
+/* 1, common tangential over normal force beyond the plan, which only a sliding robot reaches */
 static const double sliding_drag = 0.55;
-static const double calm_cycles = 0.5; /* 1  gait cycles without it until feet are trusted again */
-static const double sliding_time = 0.04; /* s  longer than a foot skids when it touches down */
-/* 1  of the weight: feet that carry less together have only just met the ground */
+/* 1, gait cycles without sliding until feet are trusted again */
+static const double calm_cycles = 0.5;
+static const double sliding_time = 0.04; /* s, longer than a foot skids at touch-down */
+/* 1, of the weight: feet that carry less in all have only just met the ground */
 static const double settled_share = 0.5;
-/* 1  share of the time in which joints are asked for more speed than a servo has */
+/* 1, share of the time in which joints would need more speed than a servo has */
 static const double joints_follow = 0.35, joints_do_not = 0.45;
-static const double gripped = 0.99; /* 1  of its share: a leg with more carries it */
-/* 1  in thirds of the weight: the design's margins hold up to it */
+static const double gripped = 0.99; /* 1, of its share: a leg that is given more carries it */
+/* 1, in thirds of the weight: the margins of the design hold up to this load */
 static const double largest_load = 2.0;
-/* 1  measured over modelled weight that the support believes */
+/* 1, measured over modelled weight, range that the support accepts */
 static const double least_scale = 0.5, largest_scale = 3.0;
-/* 1  of the step height: a foot planned higher is certainly in the air */
+/* 1, of the step height: a foot that is planned higher is in the air for certain */
 static const double high_share = 0.25;
 
 enum {
@@ -88,7 +89,7 @@ void hx_compliance_plan(const hxComplianceModel *model, const hxDemand *demand,
 
 /* ----------------------------------------------------------------------------------- contacts */
 
-/* feet whose sensors are not believed feel what is planned */
+/* Replaces the forces of sensors that are not trusted by the planned ones. */
 static void replace_forces(const hxPlan *plan, double force[HX_LEGS][3], hxCompliance *laws) {
   for (int leg = 0; leg < HX_LEGS; ++leg) {
     if (!laws->doubted[leg]) continue;
@@ -99,8 +100,8 @@ static void replace_forces(const hxPlan *plan, double force[HX_LEGS][3], hxCompl
   }
 }
 
-/* Which sensors are believed (C34); all feet's are not once those of a tripod are not.
- * met: heights at which the feet meet the ground without any bump [m]. */
+/* Decides which sensors are trusted (C34). When the sensors of three feet are not, none is. met:
+ * heights at which the feet meet the ground without a bump [m]. */
 static void judge_sensors(const hxComplianceModel *model, const hxPlan *plan,
                           const double met[HX_LEGS], double force[HX_LEGS][3], hxCompliance *laws) {
   int high[HX_LEGS], doubted = 0;
@@ -118,7 +119,7 @@ static void judge_sensors(const hxComplianceModel *model, const hxPlan *plan,
   if (doubted) replace_forces(plan, force, laws);
 }
 
-/* answers ground that is met early or late (C36) */
+/* Adapts the paths to ground that is met early or late (C36). */
 static void meet_ground(const hxComplianceModel *model, const hxPlan *plan,
                         const double met[HX_LEGS], hxCompliance *laws) {
   double falling[HX_LEGS];
@@ -130,7 +131,7 @@ static void meet_ground(const hxComplianceModel *model, const hxPlan *plan,
                     &laws->touchdown);
 }
 
-/* decides between a wrong sensor and ground that is met early or late */
+/* Decides between a wrong sensor and ground that is met early or late. */
 static void examine_contacts(const hxComplianceModel *model, const hxPlan *plan,
                              double force[HX_LEGS][3], hxCompliance *laws) {
   double met[HX_LEGS];
@@ -142,7 +143,7 @@ static void examine_contacts(const hxComplianceModel *model, const hxPlan *plan,
     meet_ground(model, plan, met, laws);
 }
 
-/* whether contacts contradict the plan, or did so and the answer to it is under way */
+/* Returns whether contacts contradict the plan, or have done so and the reaction is in progress. */
 static int contacts_differ(const hxPlan *plan, const hxCompliance *laws) {
   int found = hx_sensor_watch_busy(&laws->watch) || hx_touchdown_busy(&laws->touchdown);
   for (int leg = 0; leg < HX_LEGS; ++leg)
@@ -153,9 +154,9 @@ static int contacts_differ(const hxPlan *plan, const hxCompliance *laws) {
 
 /* -------------------------------------------------------------------------- inputs and weight */
 
-/* Gives the plan of the load up while it does not hold (C33): for a robot that slides, whose joints
- * cannot follow or that is far too heavy. drag: the common tangential force of the feet beyond the
- * plan over the normal one. */
+/* Reduces the trust in the planned load while the robot slides, its joints cannot follow, or it is
+ * far too heavy (C33). drag: the common tangential force of the feet beyond the plan, over the
+ * normal force. */
 static void update_trust(const hxComplianceModel *model, const hxPlan *plan, double drag,
                          hxCompliance *laws) {
   laws->asked += model->follow_cycle * ((double)plan->hurried - laws->asked);
@@ -172,7 +173,7 @@ static void update_trust(const hxComplianceModel *model, const hxPlan *plan, dou
   for (int leg = 0; leg < HX_LEGS; ++leg) laws->fallback[leg] = laws->doubted[leg] || goal == 0.0;
 }
 
-/* The squeeze and normal forces felt (C24); returns the sum of the latter [N]. */
+/* Computes the measured squeeze and normal forces (C24), and returns the sum of the latter [N]. */
 static double law_inputs(const hxComplianceModel *model, const hxPlan *plan,
                          const double force[HX_LEGS][3], hxPlane push[HX_LEGS],
                          double normal[HX_LEGS], hxCompliance *laws) {
@@ -195,8 +196,8 @@ static double law_inputs(const hxComplianceModel *model, const hxPlan *plan,
   return total;
 }
 
-/* Follows the measured over the planned weight (C30), and what the servos carry of it.
- * total: the sum of the normal forces felt [N]. */
+/* Updates the ratio of measured to planned weight (C30), and the part of it that the servos carry.
+ * total: the sum of the measured normal forces [N]. */
 static void update_weight(const hxComplianceModel *model, const hxPlan *plan, double total,
                           hxCompliance *laws) {
   const double ratio = total / fmax(plan->weight, hx_load_floor),
@@ -210,7 +211,7 @@ static void update_weight(const hxComplianceModel *model, const hxPlan *plan, do
   hx_burden_step(&model->burden, plan->needed, laws->scale, &laws->burden);
 }
 
-/* normal force of a foot beyond its share [N], 0 of feet that have none (C26) */
+/* Returns the normal force of a foot beyond its share [N], 0 for feet without a share (C26). */
 static double excess(const hxComplianceModel *model, const hxPlan *plan, int leg, double normal,
                      const hxCompliance *laws) {
   const int live = model->parts.suspension && plan->shares.activation[leg] > 0.0;
@@ -219,7 +220,8 @@ static double excess(const hxComplianceModel *model, const hxPlan *plan, int leg
 
 /* --------------------------------------------------------------------------------------- laws */
 
-/* limits the answers of the PID, their direction kept; the integrals give way (C27) */
+/* Limits the lengths of the PID's answers and keeps their directions; reduces the integrals
+ * accordingly (C27). */
 static void limit_answers(const hxComplianceModel *model, hxCompliance *laws) {
   for (int leg = 0; leg < HX_LEGS; ++leg) {
     hxFootLaw *law = &laws->law[leg];
@@ -231,7 +233,7 @@ static void limit_answers(const hxComplianceModel *model, hxCompliance *laws) {
   }
 }
 
-/* at its stop a suspension stands still */
+/* Limits the deflections of the suspensions; at the limit the rate is 0. */
 static void limit_deflections(const hxComplianceModel *model, hxCompliance *laws) {
   for (int leg = 0; leg < HX_LEGS; ++leg) {
     hxFootLaw *law = &laws->law[leg];
@@ -240,7 +242,8 @@ static void limit_deflections(const hxComplianceModel *model, hxCompliance *laws
   }
 }
 
-/* The laws one period on, limited, and the forces that they answer by (C25 to C27). */
+/* Advances the laws by one period, limits them, and computes the forces by which they react (C25 to
+ * C27). */
 static void step_laws(const hxComplianceModel *model, const hxPlan *plan,
                       const hxPlane push[HX_LEGS], const double normal[HX_LEGS],
                       double answer[HX_LEGS][3], hxCompliance *laws) {
@@ -254,7 +257,7 @@ static void step_laws(const hxComplianceModel *model, const hxPlan *plan,
     answers += hx_square(laws->law[leg].answer);
     deflections += laws->law[leg].deflection * laws->law[leg].deflection;
   }
-  /* no single one is beyond its limit when all together are not */
+  /* when the root of the sum of squares is within a limit, so is each value */
   if (answers > model->largest * model->largest) limit_answers(model, laws);
   if (deflections > model->deepest * model->deepest) limit_deflections(model, laws);
   for (int leg = 0; leg < HX_LEGS; ++leg) {
@@ -276,7 +279,8 @@ static void step_laws(const hxComplianceModel *model, const hxPlan *plan,
 
 /* ------------------------------------------------------------------------------------- joints */
 
-/* gives a leg that stands only in the plan its share back as it loads (C29) */
+/* Takes its share from a leg that does not touch the ground where it should stand, and gives it
+ * back gradually once the leg touches (C29). */
 static void restore_grip(const hxComplianceModel *model, const hxPlan *plan, hxCompliance *laws) {
   laws->slack = 0;
   for (int leg = 0; leg < HX_LEGS; ++leg) {
@@ -287,7 +291,7 @@ static void restore_grip(const hxComplianceModel *model, const hxPlan *plan, hxC
   }
 }
 
-/* leads the bend of a joint to the wanted one and limits its torque (C28, C29) */
+/* Moves the bend of a joint towards the wanted one and limits its torque (C28, C29). */
 static void limit_joint(const hxComplianceModel *model, double wanted, double *bend,
                         double *torque) {
   if (!model->parts.limits) {
@@ -298,8 +302,8 @@ static void limit_joint(const hxComplianceModel *model, double wanted, double *b
   *torque = hx_clamp(*torque, -model->most, model->most);
 }
 
-/* Turns the forces of the laws and the planned load into angles and torques: bend = J^T f/kp (C28);
- * torque = trust (own + grip strength scale carry) (C29). */
+/* Converts the forces of the laws and the planned load into angles and torques: bend = J^T f/kp
+ * (C28); torque = trust (own + grip strength scale carry) (C29). */
 static void actuate(const hxComplianceModel *model, const hxPlan *plan,
                     const double answer[HX_LEGS][3], hxCompliance *laws) {
   const double strength = model->parts.limits ? laws->burden.strength : 1.0;

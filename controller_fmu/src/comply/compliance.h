@@ -19,32 +19,32 @@ typedef struct hxComplianceModel {
   hxSensorWatchModel watch;
   hxBurdenModel burden;
   double period; /* s */
-  /* N  of the robot; a third of it; what feet that have met the ground carry together */
+  /* N, of the robot; a third of it; load of all feet from which on they have settled */
   double weight, share, settled;
   double softness; /* rad/N m of the servos */
-  double high; /* m       a foot planned higher is certainly in the air */
-  /* 1  of the smoothings, over a period */
+  double high; /* m, a foot that is planned higher is in the air for certain */
+  /* 1, factors of the smoothings over a period */
   double tracking, memory, follow_load, follow_cycle, follow_weight;
-  int64_t calm; /* steps   without sliding until feet are trusted again */
-  double largest, deepest; /* N, m    limits of the laws' answers */
-  double most, fastest; /* N m, rad  limits of torque and of the bend's change in a period */
+  int64_t calm; /* steps without sliding until feet are trusted again */
+  double largest, deepest; /* N, m, limits of the laws' reactions */
+  double most, fastest; /* N m, rad, limits of the torque and of the bend's change in a period */
 } hxComplianceModel;
 
-/* What a step asks. */
+/* What a planned step requires of the laws. */
 typedef struct hxPlan {
   double own[HX_LEGS][HX_JOINTS]; /* N m  torques for the legs' own weight and motion */
-  double carry[HX_LEGS][HX_JOINTS]; /* N m  and for the planned load */
+  double carry[HX_LEGS][HX_JOINTS]; /* N m, torques for the planned load */
   double lever[HX_LEGS][HX_JOINTS][3]; /* m    J^T of the contact points */
   hxShares shares;
   hxPlane feet[HX_LEGS]; /* m    contact points */
-  double weight; /* N    of all shares */
-  int standing[HX_LEGS]; /* carries its whole share */
-  int well_up[HX_LEGS]; /* well above the ground: in the air even if it is met early */
-  double height[HX_LEGS]; /* m    of the paths over their ends */
-  double needed; /* N m  largest of carry */
+  double weight; /* N, sum of all shares */
+  int standing[HX_LEGS]; /* the leg carries its whole share */
+  int well_up[HX_LEGS]; /* the foot is in the air even if it meets the ground early */
+  double height[HX_LEGS]; /* m, of the paths above their ends */
+  double needed; /* N m, largest element of carry */
   int swinging[HX_LEGS];
-  double falling[HX_LEGS]; /* m    by which feet well above the ground come down in a period */
-  int hurried; /* some joint is asked for more speed than its servo has */
+  double falling[HX_LEGS]; /* m, by which feet well above the ground move down in a period */
+  int hurried; /* a joint would need more speed than its servo has */
 } hxPlan;
 
 typedef struct hxCompliance {
@@ -55,29 +55,31 @@ typedef struct hxCompliance {
   hxBurden burden;
   int touching[HX_LEGS];
   double bend[HX_LEGS][HX_JOINTS]; /* rad  corrections of the joints' angles */
-  double torque[HX_LEGS][HX_JOINTS]; /* N m  for the servos */
-  double shift[HX_LEGS][3]; /* m    of the feet that comes of bend */
-  int doubted[HX_LEGS]; /* its sensor is not believed */
-  /* walks without feedback: doubted, or the robot slides or outruns its joints */
+  double torque[HX_LEGS][HX_JOINTS]; /* N m, for the servos */
+  double shift[HX_LEGS][3]; /* m, of the feet, caused by bend */
+  int doubted[HX_LEGS]; /* the foot's sensor is not trusted */
+  /* walks without feedback, because the sensor is not trusted, the robot slides, or its joints do
+   * not follow */
   int fallback[HX_LEGS];
-  double grip[HX_LEGS]; /* 1    of its share that a leg is given back as it loads */
-  int slack; /* some leg is */
+  double grip[HX_LEGS]; /* 1, part of its share that a leg has got back while it loads */
+  int slack; /* some leg has not got its whole share back */
   double scale; /* 1    measured over planned weight */
-  double trust; /* 1    less while the robot slides or its joints cannot follow */
+  double trust; /* 1, below 1 while the robot slides or its joints cannot follow */
   int outrun;
-  double asked; /* 1    share of the time in which paths ask more speed than a servo has */
-  int64_t dragged, sliding; /* steps  for how long; until feet are trusted again */
+  double asked; /* 1, share of the time in which paths need more speed than a servo has */
+  int64_t dragged, sliding; /* steps: duration of the dragging; time until feet are trusted again */
 } hxCompliance;
 
 void hx_compliance_compile(const hxControllerDefinition *definition, hxComplianceModel *model);
 void hx_compliance_reset(hxCompliance *laws);
 
-/* What a step asks of the laws; height, rise: of the feet's paths over the stance [m, m/s]. */
+/* Sets what a step requires of the laws; height, rise: of the feet's paths above the stance [m,
+ * m/s]. */
 void hx_compliance_plan(const hxComplianceModel *model, const hxDemand *demand,
                         const double height[HX_LEGS], const double rise[HX_LEGS], hxPlan *plan);
 
-/* One period on. force: of the ground on the feet, walking frame [N]; replaced by the planned
- * one where a sensor is not believed. */
+/* Advances the laws by one period. force: of the ground on the feet, walking frame [N]; replaced by
+ * the planned one where a sensor is not trusted. */
 void hx_compliance_step(const hxComplianceModel *model, const hxPlan *plan,
                         double force[HX_LEGS][3], hxCompliance *laws);
 

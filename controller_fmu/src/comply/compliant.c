@@ -2,7 +2,7 @@
 
 #include <string.h>
 
-/* s  in which a change of the added velocity is led over */
+/* s, duration of the transition of the added velocity */
 static const double steering_time = 0.1;
 
 void hx_compliant_compile(const hxControllerDefinition *definition, const hxLegSolver leg[HX_LEGS],
@@ -61,7 +61,7 @@ void hx_compliant_steer(const hxCompliantModel *model, int64_t steps, int moves,
 
 /* ------------------------------------------------------------------------------------ sensors */
 
-/* the foot forces in the walking frame (C22): f_K = R_KT R_TW f_W */
+/* Computes the foot forces in the walking frame (C22): f_K = R_KT R_TW f_W. */
 static void sense(const hxControllerInput *input, const hxPosture *posture,
                   double force[HX_LEGS][3]) {
   const double w = input->quaternion[0], x = input->quaternion[1], y = input->quaternion[2],
@@ -84,7 +84,7 @@ static void sense(const hxControllerInput *input, const hxPosture *posture,
   }
 }
 
-/* shows the slow loops where the standing feet are */
+/* Passes the measured positions of the standing feet to the slow loops. */
 static void look(const hxCompliantModel *model, const hxLegSolver leg[HX_LEGS],
                  const hxStance *stance, const hxControllerInput *input, hxCompliant *compliant) {
   const double w = input->quaternion[0], x = input->quaternion[1], y = input->quaternion[2],
@@ -115,7 +115,7 @@ static void look(const hxCompliantModel *model, const hxLegSolver leg[HX_LEGS],
 
 /* --------------------------------------------------------------------------------------- step */
 
-/* the joint angles of a leg, bent by the laws and with the foot raised (C41) */
+/* Computes the joint angles of a leg, bent by the laws and with the foot raised (C41). */
 static void correct(const hxLegSolver *leg, const double climb[HX_JOINTS],
                     const double bend[HX_JOINTS], double raised, double angle[HX_JOINTS]) {
   for (int joint = 0; joint < HX_JOINTS; ++joint)

@@ -1,5 +1,5 @@
-/* compliant.h - compliant control around its laws: from the sensors to the corrected feet.
- * Python: controller/comply/compliant.py. */
+/* compliant.h - compliant control around its laws, from the sensors to the corrected feet. Python:
+ * controller/comply/compliant.py. */
 #ifndef HX_COMPLIANT_H
 #define HX_COMPLIANT_H
 
@@ -12,52 +12,55 @@ HX_HIDDEN_BEGIN
 
 typedef struct hxCompliantModel {
   double per_second; /* 1/s   one over the period */
-  double leading; /* steps in which a change of the added velocity is led over */
+  double leading; /* steps of the transition of the added velocity */
   hxInverseDynamics dynamics;
   hxSupport support;
   hxComplianceModel laws;
   hxHoldModel hold;
 } hxCompliantModel;
 
-/* What the lost way adds to the commanded velocity, led over from one value to the next. */
+/* Velocity that steers back to the path, added to the commanded one, with a transition from one
+ * value to the next. */
 typedef struct hxSteering {
   hxTwist begin, goal;
-  int64_t past; /* steps since the begin, at the first step planned */
+  int64_t past; /* steps from the start of the transition to the first planned step */
 } hxSteering;
 
 typedef struct hxCompliant {
   hxCompliance laws;
   hxHold hold;
   hxSteering steering;
-  int64_t count; /* steps done */
-  double offset[HX_LEGS]; /* m  of early and late touch-downs, at the last step */
-  int moving; /* they have just changed */
+  int64_t count; /* number of steps */
+  double offset[HX_LEGS]; /* m, offsets for early and late touch-downs at the last step */
+  int moving; /* the offsets have just changed */
 } hxCompliant;
 
-/* What a step asks, and where it is. */
+/* What a step requires, and its commands. */
 typedef struct hxStance {
   hxPlan plan;
   double climb[HX_LEGS][HX_JOINTS]; /* rad/m  of the joints as a foot rises */
   const double *value; /* (6) commanded vx vy yaw_rate height roll pitch */
   const hxPosture *posture;
   const hxPlane *plane; /* m  (6) planned feet, walking frame */
-  const double *height; /* m  (6) and what they are lowered to */
+  const double *height; /* m, (6) heights of the lowered feet */
 } hxStance;
 
 void hx_compliant_compile(const hxControllerDefinition *definition, const hxLegSolver leg[HX_LEGS],
                           hxCompliantModel *model);
 void hx_compliant_reset(hxCompliant *compliant);
 
-/* Before new steps are planned: takes over what the slow loops ask for, when a leg lifts off or
- * touches down (afresh) and at a stop (not moves) (C40). steps: periods since the last planning. */
+/* Called before new steps are planned: takes over the corrections of the slow loops, when a leg
+ * lifts off or touches down (afresh), and at a stop (not moves) (C40). steps: periods since the
+ * last planning. */
 void hx_compliant_steer(const hxCompliantModel *model, int64_t steps, int moves, int afresh,
                         hxCompliant *compliant);
 
-/* What is added to the commanded velocity so many periods after the first planned step (C40). */
+/* Returns what is added to the commanded velocity a number of periods after the first planned step
+ * (C40). */
 hxTwist hx_compliant_addition(const hxCompliantModel *model, const hxCompliant *compliant,
                               int64_t steps);
 
-/* One period on: corrects the joint commands of this step in place (C41). */
+/* Advances by one period: corrects the joint commands of this step in place (C41). */
 void hx_compliant_step(const hxCompliantModel *model, const hxLegSolver leg[HX_LEGS],
                        const hxStance *stance, const hxControllerInput *input,
                        hxCompliant *compliant, hxControllerOutput *output);

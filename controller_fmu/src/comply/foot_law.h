@@ -13,7 +13,7 @@ HX_HIDDEN_BEGIN
 typedef struct hxFootLawModel {
   hxSlipPidModel pid;
   hxSuspension suspension;
-  double keep; /* 1  of the smoothed load, over a period */
+  double keep; /* 1, factor of the smoothed load over a period */
 } hxFootLawModel;
 
 typedef struct hxFootLaw {
@@ -25,8 +25,8 @@ typedef struct hxFootLaw {
 
 void hx_foot_law_compile(const hxControllerDefinition *definition, hxFootLawModel *model);
 
-/* One period on. push, excess: tangential and normal force to give way to [N] (C25, C26); load:
- * measured, in thirds of the weight [1] (C27). */
+/* Advances the law by one period. push, excess: tangential and normal force to which the foot
+ * yields [N] (C25, C26); load: measured, in thirds of the weight [1] (C27). */
 void hx_foot_law_step(const hxFootLawModel *model, hxPlane push, double excess, double load,
                       hxFootLaw *law);
 

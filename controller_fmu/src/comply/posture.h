@@ -17,14 +17,15 @@ typedef struct hxPosture {
   double spin[3]; /* rad/s  w_KT, torso axes */
 } hxPosture;
 
-/* Roll about x first, then pitch about y [m, rad, per second]. */
+/* Sets the torso's posture: first roll about x, then pitch about y [m, rad, per second]. */
 void hx_posture_of(hxPosture *posture, const double value[3], const double rate[3]);
 
-/* R_KT p and R_TK p of p = (plane, z), in place. */
+/* Compute R_KT p and R_TK p of p = (plane, z), in place. */
 void hx_posture_turn(const hxPosture *posture, hxPlane *plane, double *z);
 void hx_posture_turn_back(const hxPosture *posture, hxPlane *plane, double *z);
 
-/* A foot of the walking frame, its place and velocity, seen in the torso frame, in place. */
+/* Transforms position and velocity of a foot from the walking frame to the torso frame, in place.
+ */
 void hx_posture_see_place(const hxPosture *posture, hxPlane *plane, double *height);
 void hx_posture_see(const hxPosture *posture, hxPlane *plane, double *height, hxPlane *velocity,
                     double *rise);

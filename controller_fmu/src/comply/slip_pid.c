@@ -1,7 +1,7 @@
 #include "slip_pid.h"
 
 const double hx_load_floor = 1e-6;
-/* m2  of the feet about their centre: less takes no moment about the vertical */
+/* m2, of the feet about their centre: feet that are closer take no moment about the vertical */
 static const double least_spread = 1e-4;
 
 void hx_squeeze(const double normal[HX_LEGS], const hxPlane feet[HX_LEGS], hxPlane push[HX_LEGS]) {

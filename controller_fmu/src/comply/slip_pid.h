@@ -15,7 +15,7 @@ typedef struct hxSlipPidModel {
   double filter, derivative; /* s  T_f, T_d */
 } hxSlipPidModel;
 
-/* What one PID remembers, of the last period. */
+/* State of one PID, from the last period. */
 typedef struct hxSlipPid {
   double force; /* N   e */
   double smooth; /* N   e', filtered */
@@ -23,13 +23,14 @@ typedef struct hxSlipPid {
   double slope; /* N   filtered derivative */
 } hxSlipPid;
 
-extern const double hx_load_floor; /* N  below it no foot carries anything */
+extern const double hx_load_floor; /* N, a foot with a smaller normal force carries no load */
 
-/* Tangential forces on feet [N] less what pushes and turns the body as one, shared by load
- * (C24), in place; normal: forces on the feet [N]; feet: their places [m]. */
+/* Subtracts from the tangential forces on the feet [N] the part that pushes and turns the body as a
+ * whole, shared by load (C24), in place; normal: forces on the feet [N]; feet: their positions [m].
+ */
 void hx_squeeze(const double normal[HX_LEGS], const hxPlane feet[HX_LEGS], hxPlane push[HX_LEGS]);
 
-/* The answer of this period to a force [N] (C25). */
+/* Returns the PID's answer to a force in this period [N] (C25). */
 double hx_slip_pid_step(const hxSlipPidModel *pid, double force, hxSlipPid *state);
 
 HX_HIDDEN_END

@@ -1,26 +1,26 @@
 #include "support.h"
 
-/* 1  of the mean square arm: feet on one line share no moment about it */
+/* 1, of the mean square arm: feet on one line share no moment about it */
 static const double ridge_share = 1e-9;
-/* m2  keeps the equations of no standing foot at all solvable */
+/* m2, makes the equations solvable when no foot stands */
 static const double least_arm = 1e-12;
-/* m2  of the feet about their centre: less takes no moment about the vertical */
+/* m2, of the feet about their centre: feet that are closer take no moment about the vertical */
 static const double least_spread = 1e-4;
-static const double least_load = 1e-6;     /* N   less is no load to share by */
+static const double least_load = 1e-6;     /* N, a smaller load is not shared */
 
-/* depth [m] to which the ground gives way under a load [N] (C21) */
+/* Returns the depth [m] by which the ground deforms under a load [N] (C21). */
 static double indentation(double load, double stiffness) {
   const double root = cbrt(load / stiffness);
   return root * root;
 }
 
-/* from 0 to 1 over [0, 1] without a jump in rate or acceleration */
+/* Returns a transition from 0 to 1 over [0, 1] with continuous rate and acceleration. */
 static double smooth(double x) {
   const double y = hx_clamp(x, 0.0, 1.0);
   return y * y * y * (10.0 + y * (6.0 * y - 15.0));
 }
 
-/* x of S x = b, S symmetric and positive definite: x = L^-T D^-1 L^-1 b */
+/* Solves S x = b for symmetric, positive definite S: x = L^-T D^-1 L^-1 b. */
 static void solve(const double S[6], const double b[3], double x[3]) { /* S: 00 01 02 11 12 22 */
   const double d0 = S[0], l10 = S[1] / d0, l20 = S[2] / d0;
   const double d1 = S[3] - l10 * S[1], l21 = (S[4] - l20 * S[1]) / d1;
@@ -45,7 +45,7 @@ void hx_support_compile(const hxControllerDefinition *definition, const hxDemand
 
 double hx_support_activation(const hxSupport *model, double phase, int stayed, int stays,
                              int walking) {
-  /* a leg that stayed where it was has neither given up its load nor takes it up again */
+  /* a leg that stayed at its position has not given up its load and does not take it up again */
   if (!walking || (stayed && phase >= model->duty)) return 1.0;
   const double half = 0.5 * model->handover,
                since = fmod(phase + half, 1.0); /* cycles since the activation began to rise */
@@ -54,7 +54,8 @@ double hx_support_activation(const hxSupport *model, double phase, int stayed, i
   return fmin(rising, falling);
 }
 
-/* the vertical shares (C19): sums of f_n and of p f_n are weight and moment; never negative */
+/* Computes the vertical shares (C19): the sums of f_n and of p f_n are weight and moment; no share
+ * is negative. */
 static void share_normal(const hxPlane feet[HX_LEGS], const double activation[HX_LEGS],
                          double weight, hxPlane moment, double normal[HX_LEGS]) {
   const double needed[3] = {weight, moment.x, moment.y};

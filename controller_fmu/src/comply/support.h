@@ -1,5 +1,5 @@
-/* support.h - which foot carries what: the planned weight and acceleration of the robot, shared
- * by the standing feet. Python: controller/comply/support.py. */
+/* support.h - shares of the feet: the planned weight and acceleration of the robot, distributed
+ * over the standing feet. Python: controller/comply/support.py. */
 #ifndef HX_SUPPORT_H
 #define HX_SUPPORT_H
 
@@ -9,11 +9,11 @@
 HX_HIDDEN_BEGIN
 
 typedef struct hxSupport {
-  double duty, handover; /* cycles  a leg's hand-overs never overlap, whatever the gait */
+  double duty, handover; /* cycles; hand-overs of a leg never overlap, whatever the gait */
   double stiffness; /* N/m^1.5 */
-  double rest_weight; /* N       what the robot asks for in its stance */
+  double rest_weight; /* N, that the robot requires in its stance */
   hxPlane rest_moment; /* N m */
-  double rest_depth; /* m       a foot presses in by in the stance */
+  double rest_depth; /* m, penetration of a foot in the stance */
 } hxSupport;
 
 /* Planned forces of the ground on the feet at one step, walking frame. */
@@ -26,17 +26,17 @@ typedef struct hxShares {
 void hx_support_compile(const hxControllerDefinition *definition, const hxDemand *rest,
                         hxSupport *model);
 
-/* The activation of a leg at a gait phase (C18), in [0, 1]. stayed, stays: it had nowhere to
- * step at its last lift-off, or will have nowhere to step at its next one. */
+/* Returns the activation of a leg at a gait phase (C18), in [0, 1]. stayed, stays: the foot had no
+ * step to make at its last lift-off, or will have none at its next one. */
 double hx_support_activation(const hxSupport *model, double phase, int stayed, int stays,
                              int walking);
 
-/* How much lower than planned the feet must be for the torso to keep its height over ground that
- * gives way (C21) [m]. */
+/* Returns by how much the feet must be lower than planned, so that the torso keeps its height over
+ * ground that deforms (C21) [m]. */
 void hx_support_lowering(const hxSupport *model, const hxPlane feet[HX_LEGS],
                          const double activation[HX_LEGS], double lowering[HX_LEGS]);
 
-/* The shares of feet in the walking frame (C19, C20); activations are given. */
+/* Computes the shares of feet in the walking frame (C19, C20); activations are given. */
 void hx_support_shares(const hxPlane feet[HX_LEGS], const hxDemand *demand, hxShares *shares);
 
 HX_HIDDEN_END

@@ -19,7 +19,7 @@ void hx_suspension_discretise(double mass, double damping, double stiffness, dou
   } else if (x < 1.0) {
     even = decay * cosh(x);
     odd = decay * (x > 0.0 ? sinh(x) / mu : period);
-  } else { /* of a strong damper: neither exponential may overflow */
+  } else { /* strongly damped: neither exponential may overflow */
     const double slow = exp(-omega2 / (sigma + mu) * period), fast = exp(-(mu + sigma) * period);
     even = 0.5 * (slow + fast);
     odd = 0.5 * (slow - fast) / mu;
@@ -28,7 +28,7 @@ void hx_suspension_discretise(double mass, double damping, double stiffness, dou
   suspension->a[0][1] = odd;
   suspension->a[1][0] = -omega2 * odd;
   suspension->a[1][1] = even - sigma * odd;
-  /* from rest, z approaches f/k as the deflection of a released spring leaves it */
+  /* from rest, z approaches f/k as a released spring moves from its deflection to rest */
   suspension->b[0] = (1.0 - suspension->a[0][0]) / stiffness;
   suspension->b[1] = odd / mass;
 }

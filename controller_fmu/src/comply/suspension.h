@@ -8,7 +8,8 @@
 
 HX_HIDDEN_BEGIN
 
-/* x(k+1) = a x(k) + b f(k) of x = (z, z'), exact under a force held over a period. */
+/* Coefficients of x(k+1) = a x(k) + b f(k) for x = (z, z'), exact for a force that is constant over
+ * a period. */
 typedef struct hxSuspension {
   double a[2][2], b[2];
 } hxSuspension;

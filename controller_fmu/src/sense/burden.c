@@ -2,15 +2,16 @@
 
 #include "../plane.h"
 
-/* 1  of the time in which the support follows the weight: the arch must not go first */
+/* 1, of the time in which the support follows the weight: the support must change before the
+ * squeeze is removed */
 static const double quick = 0.2;
-/* 1  part of the torque needed that servos may give */
+/* 1, part of the needed torque that servos may give */
 static const double no_support = 0.54, full_support = 0.84;
-/* 1  part of the weight that servos carry */
+/* 1, part of the weight that servos carry */
 static const double arch_stays = 0.8, arch_goes = 0.95;
-/* 1  of the torque allowed, to carry the measured weight */
+/* 1, of the allowed torque, needed to carry the measured weight */
 static const double support_helps = 1.35, support_fails = 1.5;
-/* 1  measured over modelled weight: less or more is no weight */
+/* 1, measured over modelled weight; values outside are not taken as weights */
 static const double lightest = 0.5, heaviest = 4.0;
 
 void hx_burden_compile(const hxControllerDefinition *definition, hxBurdenModel *model) {

@@ -2,11 +2,12 @@
 
 #include <math.h>
 
-/* 1  of the weight: a foot with more has touched down, with less has lifted off */
+/* 1, of the weight: a foot with more touches down, a foot with less lifts off */
 static const double touch = 0.02, lift = 0.005;
-/* s  a force this long on a foot in mid-swing is a contradiction */
+/* s, a force of this duration on a foot in mid-swing is a contradiction */
 static const double airborne_time = 0.06;
-/* s  none this long on a foot that should carry is one, too; both exceed the lag of the sensors */
+/* s, no force for this time on a foot that should carry load is a contradiction; both exceed the
+ * delay of the sensors */
 static const double absent_time = 0.10;
 static const double missing_share = 0.92; /* 1  of the weight */
 static const double memory_cycles = 1.5; /* 1  gait cycles */

@@ -4,7 +4,7 @@
 
 #include "touchdown.h"
 
-/* the least of the other five; 0 when that is infinite */
+/* Returns the smallest of the other five heights; 0 when it is infinite. */
 static double least_of_others(const double values[HX_LEGS], int leg) {
   double least = INFINITY;
   for (int other = 0; other < HX_LEGS; ++other)

@@ -6,11 +6,11 @@ const double hx_early = 0.002;
 
 static const double reach_speed = 0.08;  /* m/s  downwards */
 static const double reach_limit = 0.020; /* m */
-static const double hold_limit = 0.030;  /* m    upwards: as high as a swing of the robots goes */
-/* s  after the planned touch-down, in which a foot may be late */
+static const double hold_limit = 0.030;  /* m, upwards: the largest step height of the robots */
+/* s, delay after the planned touch-down that is tolerated */
 static const double grace = 0.040;
-static const double return_time = 0.060; /* s    in which an offset goes in the swing */
-static const double negligible = 1e-5; /* m    an offset less than this is none */
+static const double return_time = 0.060; /* s, in which an offset decays in the swing */
+static const double negligible = 1e-5; /* m, a smaller offset is set to 0 */
 
 int hx_touchdown_busy(const hxTouchdown *touchdown) {
   int busy = 0;
@@ -19,7 +19,7 @@ int hx_touchdown_busy(const hxTouchdown *touchdown) {
   return busy;
 }
 
-/* the next offset of a foot that has missed the ground so long [s] */
+/* Returns the next offset of a foot that has missed the ground for a time [s]. */
 static double moved(double offset, double late, double period, int touching, double falling,
                     int swinging) {
   if (late > grace) return fmax(offset - reach_speed * period, -reach_limit);

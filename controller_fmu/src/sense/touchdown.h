@@ -9,19 +9,19 @@
 HX_HIDDEN_BEGIN
 
 extern const double
-    hx_early; /* m  a foot that meets the ground with more of its way down to go has met it early */
+    hx_early; /* m, a foot that meets the ground earlier on its way down has met it early */
 
 typedef struct hxTouchdown {
-  double offset[HX_LEGS]; /* m  by which paths are raised */
-  double late[HX_LEGS]; /* s  for how long the ground has been missed */
+  double offset[HX_LEGS]; /* m, by which the paths are raised */
+  double late[HX_LEGS]; /* s, for how long the ground has been missing */
 } hxTouchdown;
 
-/* Whether some foot has an offset or misses the ground. */
+/* Returns whether some foot has an offset or misses the ground. */
 int hx_touchdown_busy(const hxTouchdown *touchdown);
 
-/* One period [s] on (C36). touching: feet that report a force; falling: how far the path of a
- * foot that met the ground early comes down in this period [m], 0 of the others; swinging: legs
- * planned in the air; loaded: legs planned to carry their whole share. */
+/* Advances by one period [s] (C36). touching: feet that report a force; falling: distance by which
+ * the path of a foot that met the ground early moves down in this period [m], 0 for the others;
+ * swinging: legs planned in the air; loaded: legs planned to carry their whole share. */
 void hx_touchdown_step(double period, const int touching[HX_LEGS], const double falling[HX_LEGS],
                        const int swinging[HX_LEGS], const int loaded[HX_LEGS],
                        hxTouchdown *touchdown);

@@ -1,8 +1,8 @@
 #include "gait.h"
 
-/* The timing of a gait in whole numbers, as in OpenSHC: stance + swing parts of a cycle; the
- * offset of a leg, around the robot from the front right to the front left one, is its
- * multiplier times `offset`. */
+/* Timing of a gait in whole numbers, as in OpenSHC: a cycle has stance + swing parts; the phase
+ * offset of a leg is its multiplier times `offset`. Multipliers are ordered around the robot, from
+ * the front right to the front left leg. */
 typedef struct {
   int stance, swing, offset, multiplier[HX_LEGS];
 } hxTiming;

@@ -1,13 +1,13 @@
 #include "hold.h"
 
-static const double look_time = 0.04;          /* s   between two looks, at least a period */
-/* 1  thirds of the weight on a foot that certainly does not slip along */
+static const double look_time = 0.04;          /* s, interval of the loops, at least a period */
+/* 1, in thirds of the weight: a foot with a larger load does not slip */
 static const double loaded = 0.3;
-static const double determinant_floor = 1e-6;  /* m4  feet on one line tell no tilt */
+static const double determinant_floor = 1e-6;  /* m4, feet on one line define no plane */
 static const double turn = 6.283185307179586;  /* rad */
 
-/* The plane height = c + s_x x + s_y y of least weighted squares (C37): fit = c, s_x, s_y. Returns
- * whether the feet span a plane. */
+/* Fits the plane height = c + s_x x + s_y y of least weighted squares (C37): fit = c, s_x, s_y.
+ * Returns whether the feet define a plane. */
 static int fit_plane(const hxSight *seen, double fit[3]) {
   double total = 0.0, x0 = 0.0, y0 = 0.0, z0 = 0.0, xx = 0.0, yy = 0.0, xy = 0.0, xz = 0.0,
          yz = 0.0;
@@ -60,11 +60,11 @@ void hx_hold_compile(const hxControllerDefinition *definition, hxHoldModel *mode
   model->turn_limit = definition->gains.hold.turn_limit;
 }
 
-/* integrates height and tilt against the ground (C38) */
+/* Integrates the errors of height and tilt relative to the ground (C38). */
 static void hold_posture(const hxHoldModel *model, const hxSight *seen, hxHold *hold) {
   double fit[3];
   if (!fit_plane(seen, fit)) return;
-  /* against the planned feet the torso is pitched by s_x and rolled by -s_y */
+  /* relative to the planned feet the torso is pitched by s_x and rolled by -s_y */
   const double leaning[2] = {seen->tilt[0] + fit[2], seen->tilt[1] - fit[1]};
   for (int i = 0; i < 2; ++i) {
     const double ground = hold->ground_known ? hold->ground[i] : leaning[i];
@@ -81,7 +81,8 @@ static void hold_posture(const hxHoldModel *model, const hxSight *seen, hxHold *
                       seen->planned[leg].y * hold->angle[0] - hold->height;
 }
 
-/* Adds what was lost since the last look (C39). foot: turned by the yaw [m]. */
+/* Adds the displacement and heading lost since the last update (C39). foot: turned by the yaw [m].
+ */
 static void add_lost_way(const hxHoldModel *model, const hxSight *seen, const hxPlane foot[HX_LEGS],
                          hxHold *hold) {
   const hxPlane ahead = hx_cis(hold->yaw + hold->heading + 0.5 * seen->yaw_rate * model->time);
@@ -99,7 +100,7 @@ static void add_lost_way(const hxHoldModel *model, const hxSight *seen, const hx
   hold->heading += seen->yaw_rate * model->time - remainder(seen->yaw - hold->yaw, turn);
 }
 
-/* leads the robot back to its way (C39, C40) */
+/* Computes the velocity that leads the robot back to its path (C39, C40). */
 static void hold_path(const hxHoldModel *model, const hxSight *seen, hxHold *hold) {
   const hxPlane turned = hx_cis(seen->yaw);
   hxPlane foot[HX_LEGS];

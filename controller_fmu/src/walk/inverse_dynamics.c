@@ -2,7 +2,7 @@
 
 #include <string.h>
 
-/* rad/s  where the gear's dry friction saturates, as in the plant */
+/* rad/s, speed at which the gear's dry friction saturates, as in the plant */
 static const double gear_speed = 0.05;
 
 void hx_inverse_dynamics_compile(const hxControllerDefinition *definition,
@@ -71,7 +71,7 @@ void hx_inverse_dynamics_place(const hxInverseDynamics *model, const hxLegSolver
 
 /* ------------------------------------------------------------------------------------- forces */
 
-/* the second difference of three steps */
+/* Returns the second difference of three steps. */
 static double acceleration(double before, double now, double after, double period) {
   return (after - 2.0 * now + before) / (period * period);
 }
@@ -81,7 +81,7 @@ static hxPlane plane_acceleration(hxPlane before, hxPlane now, hxPlane after, do
                   acceleration(before.y, now.y, after.y, period));
 }
 
-/* adds m (a + g) of a point, walking frame, to what the ground must give (C16) */
+/* Adds m (a + g) of a point, walking frame, to the demand on the ground (C16). */
 static void add_force(hxPlane push, double lift, hxPlane place, double height, double floor,
                       hxDemand *demand) {
   demand->push = hx_plane_add(demand->push, push);
@@ -108,7 +108,7 @@ static void demand_torso(const hxInverseDynamics *model, const hxNeighbours *mot
   demand->twist += model->torso_inertia * hx_across(now->turn, spin);
 }
 
-/* m (a + g) of the links of a leg: added to the demand (C16), and returned in the torso frame */
+/* Adds m (a + g) of the links of a leg to the demand (C16), and returns it in the torso frame. */
 static void demand_links(const hxInverseDynamics *model, const hxNeighbours *motion, int leg,
                          const hxPosture *posture, hxPlane push[HX_JOINTS], double lift[HX_JOINTS],
                          hxDemand *demand) {
@@ -131,7 +131,7 @@ static void demand_links(const hxInverseDynamics *model, const hxNeighbours *mot
   }
 }
 
-/* the joint torques of a leg (C15) from the forces that its links need, torso frame */
+/* Computes the joint torques of a leg (C15) from the forces on its links, torso frame. */
 static void demand_torques(const hxInverseDynamics *model, const hxLegSolver *leg,
                            const hxNeighbours *motion, int k, const hxPlane push[HX_JOINTS],
                            const double lift[HX_JOINTS], const double speed[HX_JOINTS],
@@ -163,7 +163,7 @@ static void demand_torques(const hxInverseDynamics *model, const hxLegSolver *le
   torque[2] -= hx_across(tibia, inner[2]) + lower;
 }
 
-/* J^T of the contact point (C17), a row for each joint */
+/* Computes J^T of the contact point (C17), a row for each joint. */
 static void lever_of(const hxLegSolver *leg, const hxPose *pose, const hxPosture *posture,
                      double lever[HX_JOINTS][3]) {
   const hxPlane femur = hx_plane_sub(pose->foot, hx_plane(0.0, leg->radius));

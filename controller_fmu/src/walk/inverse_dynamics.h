@@ -1,5 +1,5 @@
-/* inverse_dynamics.h - what the planned motion demands of servos and ground.
- * Python: controller/walk/inverse_dynamics.py. */
+/* inverse_dynamics.h - torques and ground forces that the planned motion requires. Python:
+ * controller/walk/inverse_dynamics.py. */
 #ifndef HX_INVERSE_DYNAMICS_H
 #define HX_INVERSE_DYNAMICS_H
 
@@ -12,7 +12,7 @@ HX_HIDDEN_BEGIN
 typedef struct hxInverseDynamics {
   double period, gravity; /* s, m/s2 */
   double rotor, friction; /* kg m2, N m  of servo and gear */
-  double floor; /* m   the ground under the stance, torso frame */
+  double floor; /* m, height of the ground below the stance, torso frame */
   double torso_mass, torso_inertia;
   hxPlane torso_com;
   double torso_com_z;
@@ -24,30 +24,30 @@ typedef struct hxInverseDynamics {
   double pitch_inertia[HX_LEGS][HX_JOINTS];
 } hxInverseDynamics;
 
-/* Where the mass points are at one step. */
+/* Positions of the mass points at one step. */
 typedef struct hxMasses {
   hxPlane point[HX_LEGS][HX_JOINTS]; /* m   U, from where the coxa axis meets the hip */
   hxPlane place[HX_LEGS][HX_JOINTS]; /* m   walking frame */
   double height[HX_LEGS][HX_JOINTS]; /* m */
-  hxPlane ground[HX_LEGS][HX_JOINTS]; /* m   over the ground, where the walk began */
+  hxPlane ground[HX_LEGS][HX_JOINTS]; /* m, relative to the ground, from the start of the walk */
   hxPlane torso_place, torso_ground; /* m */
   double torso_height; /* m */
   hxPlane turn; /* 1   e^(i yaw) of the walking frame */
 } hxMasses;
 
-/* What a planned motion demands at one step. */
+/* Torques and ground forces that a planned motion requires at one step. */
 typedef struct hxDemand {
   double torque[HX_LEGS][HX_JOINTS]; /* N m  of the joints for the legs' own weight and motion,
                                         their feet free */
   double lever[HX_LEGS][HX_JOINTS]
               [3]; /* m    J^T: joint torques per force on the contact point, walking frame */
   hxPlane push; /* N    horizontal force the ground must give the robot, walking frame */
-  double weight; /* N    and the vertical one */
-  hxPlane moment; /* N m  what the sum of p f_n over the feet must be */
-  double twist; /* N m  and that of Im(p^* f_h), the moment about the vertical */
+  double weight; /* N, vertical force of the ground */
+  hxPlane moment; /* N m, sum of p f_n over the feet */
+  double twist; /* N m, sum of Im(p^* f_h), the moment about the vertical */
 } hxDemand;
 
-/* Three successive steps; without one on either side the present one has no acceleration. */
+/* Three successive steps. Without one of the neighbours the present step has no acceleration. */
 typedef struct hxNeighbours {
   const hxMasses *masses[3]; /* before, now, after */
   const hxPose *pose[3]; /* of all legs */

@@ -1,12 +1,12 @@
 #include "kinematics.h"
 
-/* rad or 1  round-off at the edge of the reach is not "unreachable" */
+/* rad or 1, tolerance for round-off at the edge of the reach */
 static const double flag_tolerance = 1e-9;
-/* 1  floor of sin(gamma): a straight leg has no finite joint speed */
+/* 1, floor of sin(gamma), because a straight leg has no finite joint speed */
 static const double singular_sine = 0.02;
-/* 1  least cos(gamma): a folded leg of equal links has no direction */
+/* 1, least cos(gamma), because a folded leg of equal links has no direction */
 static const double folded_cosine = -1.0 + 1e-12;
-static const double radius_floor = 1e-9; /* m2  floor of the squared distance from the coxa axis */
+static const double radius_floor = 1e-9; /* m2, floor of the squared distance from the coxa axis */
 
 void hx_leg_solver_compile(const hxControllerDefinition *definition, int leg, hxLegSolver *model) {
   const hxKnownLeg *known = &definition->leg[leg];
@@ -89,7 +89,7 @@ int hx_leg_solver_solve(const hxLegSolver *model, const hxPose *pose, hxPlane ve
   hx_leg_solver_speeds(model, pose, velocity, rise, speed);
   for (int joint = 0; joint < HX_JOINTS; ++joint) {
     angle[joint] = hx_clamp(pose->angle[joint], model->angle_min[joint], model->angle_max[joint]);
-    /* a joint held by its limit has no speed */
+    /* a joint that its limit holds has no speed */
     const int held = !(fabs(pose->angle[joint] - angle[joint]) <= flag_tolerance);
     speed[joint] = held ? 0.0 : hx_clamp(speed[joint], -model->speed_max, model->speed_max);
     missed |= held;

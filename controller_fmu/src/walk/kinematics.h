@@ -33,33 +33,33 @@ typedef struct hxPose {
   hxPlane foot; /* m    from the femur joint to the foot, u + i w */
   hxPlane femur, tibia; /* 1    e^(i A), e^(i B) */
   double angle[HX_JOINTS]; /* rad  without joint limits */
-  int lost; /* the foot is out of reach: these are the nearest angles */
+  int lost; /* the foot is out of reach, and the angles are the nearest ones */
 } hxPose;
 
 void hx_leg_solver_compile(const hxControllerDefinition *definition, int leg, hxLegSolver *model);
 
-/* The centre of the foot at joint angles (C11). */
+/* Computes the centre of the foot from the joint angles (C11). */
 void hx_leg_solver_forward(const hxLegSolver *model, const double angle[HX_JOINTS], double foot[3]);
 
-/* How far the round foot has rolled outwards since the stance (C9) [m]. */
+/* Returns how far the spherical foot has rolled outwards since the stance (C9) [m]. */
 double hx_leg_solver_rolling(const hxLegSolver *model, const double angle[HX_JOINTS]);
 
-/* Inverse kinematics without joint limits (C12): every target gives a pose. */
+/* Solves the inverse kinematics without joint limits (C12). Every target gives a pose. */
 void hx_leg_solver_pose(const hxLegSolver *model, hxPlane plane, double height, hxPose *pose);
 
-/* Joint speeds [rad/s] of a foot that moves with this velocity, torso frame [m/s] (C13). */
+/* Computes the joint speeds [rad/s] of a foot with this velocity, torso frame [m/s] (C13). */
 void hx_leg_solver_speeds(const hxLegSolver *model, const hxPose *pose, hxPlane velocity,
                           double rise, double speed[HX_JOINTS]);
 
-/* Angles within the joints' limits and speeds that servos can reach. Returns whether the foot
+/* Limits angles to the joints' limits and speeds to those of the servos. Returns whether the foot
  * misses its target. */
 int hx_leg_solver_solve(const hxLegSolver *model, const hxPose *pose, hxPlane velocity, double rise,
                         double angle[HX_JOINTS], double speed[HX_JOINTS]);
 
-/* Joint accelerations [rad/s2] that lead to the angles of a neighbouring step (C14), `ahead` [s]
- * of this one, negative when it lies before; none without a neighbour. A joint that its limits
- * hold, of angle or of speed, has none, and none has more than reverses the largest speed within
- * that time. */
+/* Computes the joint accelerations [rad/s2] that lead to the angles of a neighbouring step (C14).
+ * ahead: time to the neighbour [s], negative for the previous step; without a neighbour they are 0.
+ * A joint at a limit of angle or speed has none. None is larger than that which reverses the
+ * largest speed within this time. */
 void hx_leg_solver_accelerations(const hxLegSolver *model, const hxPose *neighbour, double ahead,
                                  const double angle[HX_JOINTS], const double speed[HX_JOINTS],
                                  double acceleration[HX_JOINTS]);

@@ -1,5 +1,5 @@
-/* schedule.c - the public functions of a controller: ticks at their times, saved states,
- * refusals. */
+/* schedule.c - the public functions of a controller: ticks at their times, saved states, refusals.
+ */
 #include <float.h>
 #include <stddef.h>
 #include <stdio.h>
@@ -9,7 +9,7 @@
 #include "../state.h"
 #include "../validation.h"
 
-/* A saved state: model and state behind what it takes to recognise them. */
+/* A saved state: a header that identifies it, then the controller's model and state. */
 typedef struct {
   uint64_t magic, version, size, checksum;
   hxControllerModel model;
@@ -18,7 +18,7 @@ typedef struct {
 
 static const uint64_t magic = 0x72746e6f43507868u; /* "hxPContr" */
 static const uint64_t saved_version = 2;
-/* 1  of a period: a tick this much after the present time is due */
+/* 1, of a period: a tick that is later than the present time by less than this is due */
 static const double clock_tolerance = 0.01;
 
 static uint64_t checksum(const hxSaved *saved) {
@@ -49,7 +49,7 @@ hxStatus hx_controller_reset(hxController *controller, const hxControllerDefinit
   char message[HX_MESSAGE_SIZE];
   if (!isfinite(t))
     return refuse(controller, HX_INVALID_ARGUMENT,
-                  "start time: got a number that is not finite, expected seconds");
+                  "start time: got a number that is not finite, expected a finite time in s");
   const hxStatus status = hx_controller_definition_check(definition, message);
   if (status != HX_OK) return refuse(controller, status, message);
   hx_controller_compile(definition, &controller->model);
@@ -64,7 +64,7 @@ static double next_tick(const hxController *controller) {
 }
 
 static int is_finite(const hxControllerOutput *output) {
-  double sum = 0.0; /* anything that is not finite makes it so */
+  double sum = 0.0; /* the sum is not finite if any number is not */
   for (int leg = 0; leg < HX_LEGS; ++leg)
     for (int joint = 0; joint < HX_JOINTS; ++joint)
       sum += 0.0 * output->angle_ref[leg][joint] + 0.0 * output->speed_ref[leg][joint] +
@@ -72,7 +72,8 @@ static int is_finite(const hxControllerOutput *output) {
   return sum == 0.0;
 }
 
-/* whether the next tick under this input has been computed; inputs consist of doubles alone */
+/* Returns whether the next tick under this input has been computed. Inputs consist of doubles only.
+ */
 static int is_ahead(const hxController *controller, const hxControllerInput *input) {
   return controller->ahead.known && memcmp(&controller->ahead.input, input, sizeof *input) == 0;
 }
@@ -101,7 +102,7 @@ static void tick(hxController *controller, const hxControllerInput *input) {
   controller->ahead.known = 0;
 }
 
-/* The input a while after it was given, changing at a rate. */
+/* Computes the input some time after it was set, with its rate of change. */
 static void ramp_input(const hxControllerInput *input, const hxControllerInput *rate, double time,
                        hxControllerInput *now) {
   double value[sizeof *now / sizeof(double)], slope[sizeof *now / sizeof(double)];
@@ -152,16 +153,21 @@ void hx_controller_get_state(const hxController *controller, void *bytes) {
 
 hxStatus hx_controller_set_state(hxController *controller, const void *bytes, size_t size) {
   hxSaved saved;
-  if (size != sizeof saved)
-    return refuse(controller, HX_BAD_STATE,
-                  "saved state: its size is not that of this version's states; save it again");
+  if (size != sizeof saved) {
+    snprintf(controller->message, HX_MESSAGE_SIZE,
+             "saved state: got %zu bytes, expected %zu; save it again with this version", size,
+             sizeof saved);
+    return HX_BAD_STATE;
+  }
   memcpy(&saved, bytes, sizeof saved);
   if (saved.magic != magic || saved.version != saved_version || saved.size != sizeof saved)
-    return refuse(controller, HX_BAD_STATE,
-                  "saved state: not one of this version; save it again with this version");
+    return refuse(
+        controller, HX_BAD_STATE,
+        "saved state: got one of another version, expected one of this version; save it again");
   if (saved.checksum != checksum(&saved))
-    return refuse(controller, HX_BAD_STATE,
-                  "saved state: damaged, its checksum does not match; save it again");
+    return refuse(
+        controller, HX_BAD_STATE,
+        "saved state: got a damaged one, expected one whose checksum is right; save it again");
   memcpy(&controller->model, &saved.model, sizeof saved.model);
   memcpy(&controller->state, &saved.state, sizeof saved.state);
   controller->ahead.known = 0;

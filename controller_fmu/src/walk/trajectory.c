@@ -4,15 +4,16 @@
 
 #include <string.h>
 
-static const double dwell = 0.1; /* 1   share of the swing at each end with vertical motion only */
-/* 1  part of the swing after which the landing point stays fixed to the ground */
+/* 1, share of the swing at each end in which the foot moves vertically only */
+static const double dwell = 0.1;
+/* 1, part of the swing after which the landing point stays fixed on the ground */
 static const double freeze = 0.75;
-/* m  a foot this close to its stance position need not step any more */
+/* m, a foot this close to its stance position makes no step */
 static const double home_tolerance = 1e-9;
-/* cycles  the clock starts this much before the first lift-off */
+/* cycles by which the clock starts before the first lift-off */
 static const double clock_epsilon = 1e-9;
 static const double nearly_done = 1e-12; /* 1   floor of 1 - s */
-static const double small_angle = 1e-12; /* rad below it sin(a)/a is 1 */
+static const double small_angle = 1e-12; /* rad, below it sin(a)/a is 1 */
 
 /* ------------------------------------------------------------------------------------ command */
 
@@ -70,7 +71,7 @@ void hx_command_ramp_ahead(const hxCommandRampModel *model, const hxCommandRamp 
 
 /* ------------------------------------------------------------------------------------- shapes */
 
-/* the horizontal progress s in [0, 1] at the part tau of a swing, and ds/dtau (C6) */
+/* Computes the horizontal progress s in [0, 1] at the part tau of a swing, and ds/dtau (C6). */
 static void blend(double tau, double *s, double *slope) {
   const double y = hx_clamp((2.0 * tau - 1.0) / (1.0 - 2.0 * dwell), -1.0, 1.0);
   const double y4 = y * y * y * y, flat = 1.0 - y4;
@@ -78,15 +79,16 @@ static void blend(double tau, double *s, double *slope) {
   *slope = 45.0 / 32.0 * flat * flat / (1.0 - 2.0 * dwell);
 }
 
-/* The lift z of the foot at the part tau of a swing, and dz/dtau [m] (C7). top: the step height;
- * down: the touch-down speed times the duration of the swing [m]. */
+/* Computes the lift z of the foot at the part tau of a swing, and dz/dtau [m] (C7). top: the step
+ * height; down: the touch-down speed times the duration of the swing [m]. */
 static void hop(double tau, double top, double down, double *lift, double *climb) {
   const double arch = tau * (1.0 - tau), bow = 64.0 * top * arch * arch, fall = down * tau * tau;
   *lift = (bow + fall) * arch;
   *climb = 3.0 * bow * (1.0 - 2.0 * tau) + fall * (3.0 - 4.0 * tau);
 }
 
-/* the way [m] under a constant twist for a time [s]: v (e^(i w t) - 1)/(i w) (C3) */
+/* Returns the displacement [m] under a constant twist for a time [s]: v (e^(i w t) - 1)/(i w) (C3).
+ */
 static hxPlane travel(hxTwist twist, double time) {
   const double half = 0.5 * twist.yaw_rate * time;
   const double chord = fabs(half) > small_angle ? sin(half) / half : 1.0;
@@ -118,17 +120,17 @@ void hx_foot_paths_compile(const hxControllerDefinition *definition, const hxLeg
   }
 }
 
-/* the phase of a leg so many periods after the begin of the walk (C2) */
+/* Returns the phase of a leg a number of periods after the start of the walk (C2). */
 static double phase_after(const hxFootPathsModel *model, int leg, int64_t number) {
   const double clock = model->offset[leg] + (double)number * model->period / model->gait_period;
   return clock - floor(clock);
 }
 
-/* standing still with the feet at `plane`, the gait clock rewound */
+/* Stops with the feet at `plane` and resets the gait clock. */
 static void rest(const hxFootPathsModel *model, const hxPlane plane[HX_LEGS], hxFootPaths *paths,
                  hxPlannedFeet *feet) {
   hxPlane place[HX_LEGS];
-  memcpy(place, plane, sizeof place); /* plane may lie in feet */
+  memcpy(place, plane, sizeof place); /* plane may point into feet */
   memset(paths, 0, sizeof *paths);
   memset(feet, 0, sizeof *feet);
   for (int leg = 0; leg < HX_LEGS; ++leg) {
@@ -143,7 +145,8 @@ void hx_foot_paths_reset(const hxFootPathsModel *model, hxFootPaths *paths, hxPl
   rest(model, model->home, paths, feet);
 }
 
-/* Which legs are in the air in the coming section, by the gait clock; returns whether any is. */
+/* Determines which legs are in the air in the coming section, by the gait clock. Returns whether
+ * any leg is. */
 static int lift_off(const hxFootPathsModel *model, const hxFootPaths *old, hxFootPaths *paths) {
   int any = 0;
   for (int leg = 0; leg < HX_LEGS; ++leg) {
@@ -158,8 +161,8 @@ static int lift_off(const hxFootPathsModel *model, const hxFootPaths *old, hxFoo
   return any;
 }
 
-/* Keeps the feet that are home there. Returns whether all are home and on the ground; place: where
- * they are, those that have just landed at their goals. */
+/* Keeps feet in place that are at their stance positions. Returns whether all are there and on the
+ * ground. place: positions of the feet; those that have just landed are at their goals. */
 static int come_home(const hxFootPathsModel *model, const hxFootPaths *old,
                      const hxPlannedFeet *now, int any_swinging, hxFootPaths *paths,
                      hxPlane place[HX_LEGS]) {
@@ -177,18 +180,18 @@ static int come_home(const hxFootPathsModel *model, const hxFootPaths *old,
   return all_home && !any_swinging && !any_lifted;
 }
 
-/* the part tau of its swing that a leg at this phase has done */
+/* Returns the part tau of its swing that a leg at this phase has completed. */
 static double progress(const hxFootPathsModel *model, double phase) {
   return (phase - model->duty) / (1.0 - model->duty);
 }
 
-/* where a foot is on the ground (C5) */
+/* Returns the position of a foot on the ground (C5). */
 static hxPlane ground_of(const hxPlannedFeet *feet, int leg) {
   return hx_plane_sub(feet->goal[leg], hx_scaled(feet->pull[leg], 1.0 - feet->blend[leg]));
 }
 
-/* Place and velocity of a foot whose phase, goal, pull and frame are known (C5 to C8); carried:
- * where it was on the ground at the step before, back: e^(-i turn). */
+/* Computes position and velocity of a foot with known phase, goal, pull and frame (C5 to C8).
+ * carried: its position on the ground at the previous step; back: e^(-i turn). */
 static void place_foot(const hxFootPathsModel *model, const hxFootPaths *paths, int leg,
                        hxPlane back, hxPlane carried, hxPlannedFeet *feet) {
   const double tau = progress(model, feet->phase[leg]), w = feet->twist.yaw_rate;
@@ -205,7 +208,7 @@ static void place_foot(const hxFootPathsModel *model, const hxFootPaths *paths, 
   feet->rise[leg] = paths->swinging[leg] ? climb / model->swing_time : 0.0;
 }
 
-/* the present step once more, with the legs in the air that will be in the section */
+/* Computes the present step again, with those legs in the air that swing in the section. */
 static void set_out(const hxFootPathsModel *model, const hxFootPaths *paths,
                     const hxPlannedFeet *now, hxTwist twist, hxPlannedFeet *first) {
   const hxPlannedFeet present = *now;
@@ -255,14 +258,14 @@ int hx_foot_paths_reach(const hxFootPathsModel *model, const hxFootPaths *paths,
   return 1;
 }
 
-/* the landing point (C4), ground frame relative to the present place */
+/* Returns the landing point (C4), ground frame, relative to the present position. */
 static hxPlane landing(const hxFootPathsModel *model, int leg, double tau, hxTwist twist) {
   const double ahead = model->landing_lead - tau * model->swing_time;
   return hx_plane_add(hx_times(hx_cis(twist.yaw_rate * ahead), model->home[leg]),
                       travel(twist, ahead));
 }
 
-/* way and turn of the walking frame since the begin of the walk (C3) */
+/* Computes displacement and turn of the walking frame since the start of the walk (C3). */
 static void odometry(double period, const hxPlannedFeet *before, hxTwist twist,
                      hxPlannedFeet *feet) {
   const hxTwist *last = &before->twist;
@@ -284,12 +287,12 @@ void hx_foot_paths_walk(const hxFootPathsModel *model, const hxFootPaths *paths,
   for (int leg = 0; leg < HX_LEGS; ++leg) {
     feet->phase[leg] = phase_after(model, leg, paths->before + number);
     const double tau = progress(model, feet->phase[leg]);
-    /* every foot is aimed once */
+    /* each foot gets its goal once */
     const int free = paths->swinging[leg] && (tau < freeze || (number == 1 && paths->lifted[leg]));
     feet->goal[leg] = free
                           ? hx_plane_add(feet->way, hx_times(turn, landing(model, leg, tau, twist)))
                           : before->goal[leg];
-    /* the way to the landing point shrinks as 1 - s (C5) */
+    /* the distance to the landing point is proportional to 1 - s (C5) */
     const double left = 1.0 - before->blend[leg];
     const hxPlane moved = hx_scaled(hx_plane_sub(feet->goal[leg], before->goal[leg]),
                                     1.0 / (left < nearly_done ? nearly_done : left));

@@ -17,7 +17,7 @@ from hexapod_cosim.controller import Gains
 from hexapod_cosim.cosim.common.plant_files import code_hash, package_version
 from hexapod_cosim.cosim.export.controller_export import export_controller
 from hexapod_cosim.cosim.run.controller_setup import make_setup
-from hexapod_cosim.cosim.run.preparation import Preparation, preparation_key
+from hexapod_cosim.cosim.run.preparation import PlantFmus, chosen_gains, design_key
 from hexapod_cosim.cosim.scenario.scenario import scenario_from_table
 from hexapod_cosim.cosim.study.execute.engines import find_engine
 from hexapod_cosim.cosim.study.plan.records import Case, Factor, Study, StudyError
@@ -67,15 +67,15 @@ def make_job(
         )
     files = {name: _read(Path(name)) for name in names if name not in list_robots()}
     with TemporaryDirectory(prefix="hexapod-study-") as folder:
-        preparation = Preparation(Path(folder), fmu=fmu, gains=gains)
+        plants = PlantFmus(Path(folder), given=fmu)
         return Job(
             name=uuid4().hex,
             cases=study.cases,
             factors=study.factors,
-            fmus={name: _read(preparation.fmu(name)) for name in names},
+            fmus={name: _read(plants.fmu(name)) for name in names},
             controller=_controller(Path(folder)),
             robots=files,
-            gains=gains or _common_gains(study, preparation),
+            gains=gains or _common_gains(study),
             engine=engine,
             environment=environment(study),
         )
@@ -105,7 +105,7 @@ def _read(path: Path) -> bytes:
         ) from error
 
 
-def _common_gains(study: Study, preparation: Preparation) -> Gains | None:
+def _common_gains(study: Study) -> Gains | None:
     """Designs gains when all compliant runs share one set; returns None otherwise."""
     if "compliant" not in study.run_controls:
         return None
@@ -114,9 +114,9 @@ def _common_gains(study: Study, preparation: Preparation) -> Gains | None:
         for case in study.cases.values()
     ]
     varied = any(factor.name.startswith(DESIGN_FACTORS) for factor in study.factors)
-    if varied or len(set(map(preparation_key, scenarios))) > 1:
+    if varied or len(set(map(design_key, scenarios))) > 1:
         return None
-    return preparation.gains(scenarios[0])
+    return chosen_gains(scenarios[0])
 
 
 def environment(study: Study | None = None) -> dict[str, str]:

@@ -18,7 +18,7 @@ from hexapod_cosim.controller import Gains
 from hexapod_cosim.cosim.master.loop import FAILED, INTERRUPTED, Progress
 from hexapod_cosim.cosim.results.metrics import METRICS
 from hexapod_cosim.cosim.results.summary import NO_FIGURES, REFUSED, Summary
-from hexapod_cosim.cosim.run.preparation import Preparation
+from hexapod_cosim.cosim.run.preparation import chosen_gains
 from hexapod_cosim.cosim.scenario.records import Scenario
 from hexapod_cosim.cosim.scenario.scenario import scenario_from_table, with_values
 from hexapod_cosim.cosim.study.execute.engines import Engine, find_engine
@@ -59,7 +59,6 @@ class JobContext:
         }
         self._controller = self._unpack("controller", ".fmu", job.controller)
         self._engines: dict[str, Engine] = {}
-        self._preparation = Preparation(Path(self._folder.name), gains=job.gains)
         self._known: OrderedDict[bytes, Summary] = OrderedDict()
 
     def _unpack(self, name: str, suffix: str, content: bytes) -> Path:
@@ -141,7 +140,7 @@ class JobContext:
 
     def _gains(self, scenario: Scenario, order: Order) -> Gains | None:
         """Returns the gains of an order, with the values of the factors."""
-        gains = self._preparation.gains(scenario)
+        gains = chosen_gains(scenario, self._job.gains)
         if gains is None:
             return None
         return changed_gains(gains, settings_of(order, self._job.factors))

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from hexapod_cosim.cosim.master.loop import COMPLETED
-from hexapod_cosim.cosim.results.balance import balance_warnings
 from hexapod_cosim.cosim.study.plan.records import SOBOL, Study
 from hexapod_cosim.cosim.study.store.results import Results
 from hexapod_cosim.cosim.study.store.table import Overall
@@ -62,7 +61,5 @@ def _of_walks(results: Results) -> Iterator[str]:
 
 def _of_balances(overall: Overall) -> Iterator[str]:
     """Yields a note for each control with runs whose energy balance does not close."""
-    for control, (missing, largest) in sorted(overall.unbalanced.items()):
-        yield from balance_warnings(
-            control, missing=missing, runs=overall.total[control], largest=largest
-        )
+    for control, unbalanced in sorted(overall.unbalanced.items()):
+        yield from unbalanced.warnings(control, runs=overall.total[control])

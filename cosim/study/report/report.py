@@ -8,10 +8,10 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+import tomlkit
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
-from hexapod_cosim.cosim.common.files import write_text
-from hexapod_cosim.cosim.common.toml_text import to_toml
+from hexapod_cosim.cosim.common.files import without_none, write_text
 from hexapod_cosim.cosim.results.comparison import METHOD, Change
 from hexapod_cosim.cosim.results.metrics import DUST, FLOORS, METRICS, shown_metrics
 from hexapod_cosim.cosim.study.plan.objective import WALKED
@@ -78,22 +78,12 @@ def _embedded(svg: Path) -> str:
 def _toml(results: Results) -> dict[str, str]:
     """Returns the files that repeat the study, by title."""
     gains = results.manifest["gains"]
-    texts = {"The study": to_toml(_without_none(results.manifest["study"]))}
+    texts = {"The study": tomlkit.dumps(without_none(results.manifest["study"]))}
     texts |= {
-        f"Scenario {name}": to_toml(_without_none(table))
+        f"Scenario {name}": tomlkit.dumps(without_none(table))
         for name, table in results.manifest["scenarios"].items()
     }
-    return texts | ({} if gains is None else {"Gains": to_toml(_without_none(gains))})
-
-
-def _without_none(content: Any) -> Any:
-    """Returns the content without None, which JSON has for an unlimited duration.
-
-    In a scenario file such a duration is left out.
-    """
-    if isinstance(content, Mapping):
-        return {key: _without_none(value) for key, value in content.items() if value is not None}
-    return [_without_none(value) for value in content] if isinstance(content, list) else content
+    return texts | ({} if gains is None else {"Gains": tomlkit.dumps(without_none(gains))})
 
 
 def interval_meaning(results: Results) -> str:

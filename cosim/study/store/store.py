@@ -12,14 +12,15 @@ from __future__ import annotations
 import errno
 import os
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from time import monotonic
-from typing import Any
+from typing import Any, BinaryIO
 from uuid import uuid4
 
 import numpy as np
 import pyarrow as pa
+import pyarrow.compute as pc
 import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
@@ -55,10 +56,30 @@ def write_durably(path: Path, content: bytes) -> None:
 
     Raises StudyError when the disk is full, HexapodError when the file cannot be written.
     """
+    with _durable_file(path) as file:
+        file.write(content)
+
+
+def write_whole(path: Path, tables: Iterable[pa.Table], schema: pa.Schema) -> None:
+    """Writes tables to one Parquet file as write_durably() does. The same rows give the same bytes.
+
+    Raises as write_durably() does.
+    """
+    with (
+        _durable_file(path) as file,
+        pq.ParquetWriter(file, schema, compression=COMPRESSION) as writer,
+    ):
+        for table in tables:
+            writer.write_table(table.select(schema.names).cast(schema))
+
+
+@contextmanager
+def _durable_file(path: Path) -> Iterator[BinaryIO]:
+    """Yields a file that is flushed to the disk and replaces `path` when the block succeeds."""
     part = _unfinished(path)
     try:
         with part.open("wb") as file:
-            file.write(content)
+            yield file
             file.flush()
             os.fsync(file.fileno())
         os.replace(part, path)
@@ -201,7 +222,7 @@ class Store:
                 table = read_part(path, self._schema)
                 found |= {
                     row[RUN]: row
-                    for row in table.filter(pa.compute.field(RUN).isin(list(runs))).to_pylist()
+                    for row in table.filter(pc.field(RUN).isin(list(runs))).to_pylist()
                 }
         return found
 
@@ -258,7 +279,7 @@ class Store:
 
     def _block(self, begin: int, stop: int, ranges: Mapping[Path, tuple[int, int]]) -> pa.Table:
         """Returns the runs from `begin` to before `stop`. Raises FileNotFoundError."""
-        place = pa.compute.field(RUN)
+        place = pc.field(RUN)
         paths = [path for path, (low, high) in ranges.items() if low < stop and high >= begin]
         tables = [
             read_part(path, self._schema).filter((place >= begin) & (place < stop))
@@ -274,23 +295,3 @@ class Store:
             runs = runs_of(path, self._schema)
             self._ranges[path] = (int(runs[0]), int(runs[-1])) if len(runs) else (0, -1)
         return self._ranges[path]
-
-
-def write_whole(path: Path, tables: Iterable[pa.Table], schema: pa.Schema) -> None:
-    """Writes tables to one Parquet file, completely or not at all.
-
-    The same rows give the same bytes. Raises StudyError when the disk is full.
-    """
-    part = _unfinished(path)
-    try:
-        with part.open("wb") as file:
-            with pq.ParquetWriter(file, schema, compression=COMPRESSION) as writer:
-                for table in tables:
-                    writer.write_table(table.select(schema.names).cast(schema))
-            file.flush()
-            os.fsync(file.fileno())
-        os.replace(part, path)
-    except OSError as error:
-        raise _not_written(path, error) from error
-    finally:
-        part.unlink(missing_ok=True)

@@ -6,6 +6,7 @@ results.parquet only.
 
 from __future__ import annotations
 
+import re
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -15,7 +16,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
 
-from hexapod_cosim.cosim.results.balance import UNBALANCED
+from hexapod_cosim.cosim.results.balance import Unbalanced
 from hexapod_cosim.cosim.results.comparison import Change, made_change
 from hexapod_cosim.cosim.results.metrics import OF_THE_RUN
 from hexapod_cosim.cosim.study.plan.records import SCENARIO_FACTOR, Study
@@ -64,14 +65,13 @@ class Overall:
     means: Mapping[str, Mapping[str, Mean]]  # by control and metric
     # numbers of walks, and of walks with any metric, by scenario and control
     walks: Mapping[tuple[str, str], tuple[int, int]]
-    # numbers of runs whose energy residual is above UNBALANCED, and the largest, by control
-    unbalanced: Mapping[str, tuple[int, float]]
+    unbalanced: Mapping[str, Unbalanced]  # by control
 
 
 MAX_REASONS = 30  # that are shown
 MAX_KINDS = 1000  # of failures that are counted apart, which bounds the memory
 OTHER = "other reasons"
-DIGITS = str.maketrans("0123456789", "#" * 10)
+NUMBER = re.compile(r"[0-9#]+(?:\.[0-9#]+)?")
 
 
 def point_at(block: Block, place: int, study: Study) -> Point:
@@ -137,7 +137,7 @@ class Tally:
         self._sums: Sums | None = None
         self._failures = Counter[tuple[str, str, str]]()
         self._walks: dict[tuple[str, str], tuple[int, int]] = {}
-        self._unbalanced: dict[str, tuple[int, float]] = {}
+        self._unbalanced = dict.fromkeys(study.run_controls, Unbalanced())
 
     def add(self, rows: Rows) -> None:
         """Adds runs; both runs of a pair must be added together."""
@@ -146,9 +146,10 @@ class Tally:
         for case, control, walked, figured in _walks(rows.table):
             before = self._walks.get((case, control), (0, 0))
             self._walks[case, control] = before[0] + walked, before[1] + figured
-        for control, count, largest in _unbalanced(rows.table):
-            known = self._unbalanced.get(control, (0, 0.0))
-            self._unbalanced[control] = known[0] + count, max(known[1], largest)
+        for control, known in self._unbalanced.items():
+            runs = rows.table.filter(pc.equal(rows.table["control"], control))
+            found = Unbalanced.among(runs["energy_residual"].to_numpy())
+            self._unbalanced[control] = known.merged(found)
         lost = rows.table.filter(pc.invert(rows.table["walked"])).select(
             ["control", "status", "reason", "warnings"]
         )
@@ -188,18 +189,6 @@ def _walks(table: pa.Table) -> list[tuple[str, str, int, int]]:
     ]
 
 
-def _unbalanced(table: pa.Table) -> list[tuple[str, int, float]]:
-    """Returns control, number and largest residual of runs whose residual is above UNBALANCED."""
-    above = table.filter(pc.greater(table["energy_residual"], UNBALANCED))
-    residuals = above.select(["control", "energy_residual"]).group_by("control")
-    return [
-        (row["control"], row["energy_residual_count"], row["energy_residual_max"])
-        for row in residuals.aggregate(
-            [("energy_residual", "count"), ("energy_residual", "max")]
-        ).to_pylist()
-    ]
-
-
 def _no_sums(study: Study) -> Sums:
     size = len(study.run_controls)
     none = np.zeros((1, size), dtype=np.int64)
@@ -214,11 +203,4 @@ def _reason(row: Row) -> str:
     So reasons that differ in numbers only are counted together.
     """
     text = str(row["reason"] or row["warnings"].partition(" | ")[0] or "the robot fell")
-    return _without_numbers(text)
-
-
-def _without_numbers(text: str) -> str:
-    words = text.translate(DIGITS)
-    while "##" in words:
-        words = words.replace("##", "#")
-    return words.replace("#.#", "#")
+    return NUMBER.sub("#", text)

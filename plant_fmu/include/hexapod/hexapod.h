@@ -87,7 +87,16 @@ typedef struct hxDefinition {
     double inertia[6]; /* kg m2  about the centre of mass, torso axes: xx yy zz xy xz yz */
   } torso;
   hxLeg leg[HX_LEGS];
-  double foot_radius; /* m */
+  double foot_radius;       /* m */
+  struct {                  /* spheres that touch the ground besides the feet; see hxTerrain */
+    double torso_box[3];    /* m  half edges along the torso's axes of a box whose eight corners
+                             *    touch the ground; 0 0 0: they do not */
+    double torso_centre[3]; /* m  centre of the box from the torso's origin */
+    double corner_radius;   /* m  of spheres at the box's corners; 0: points */
+    double knee_radius;     /* m  of a sphere at the tibia's joint; 0: none */
+    double shank_radius;    /* m  of a sphere on the tibia's line; 0: none */
+    double shank_position;  /* 1  its place, 0 at the joint, 1 at the foot's centre */
+  } body;
   struct {
     int law;                   /* hxContactLaw */
     double stiffness;          /* N/m^1.5  K of eq. 14 */

@@ -23,6 +23,26 @@ static inline hxRigid6 link_inertia(const hxModel *model, const hxJointWork *k, 
   return hx_rigid_inertia(hx_load(&model->joint[joint].mass[slot]), k->J, k->c);
 }
 
+/* Adds the link's own inertia, computes U = I S, and passes I - U U^T/d to the parent. */
+static inline void sweep_sum(const hxModel *model, const hxRigid6 *own, hxReal resists,
+                             hxSweep *sweep, hxInertia6 *I) {
+  hx_inertia_add_rigid(I, own);
+  sweep->U = hx_inertia_mul(I, sweep->S);
+  sweep->inverse_d = sweep_inverse(model, sweep, resists);
+  hx_inertia_downdate(I, sweep->inverse_d, sweep->U);
+}
+
+/* Does this for a tibia with several rows of contacts. */
+HX_RARE void sweep_rows(const hxModel *model, const hxImplicit *implicit, int pack,
+                        const hxRigid6 *own, const hxReal *resists, hxLegWork *leg, hxInertia6 *I) {
+  *I = row_inertia(model, implicit, pack, HX_FOOT, leg);
+  for (int k = 1; k < model->rows; ++k) {
+    const hxInertia6 row = row_inertia(model, implicit, pack, model->row[k], leg);
+    *I = hx_inertia_add(I, &row);
+  }
+  sweep_sum(model, own, *resists, &leg->joint[HX_JOINTS - 1].sweep, I);
+}
+
 /* Computes U = I S of a link with all it carries, and passes I - U U^T/d to the parent (eq. 10). */
 static inline void sweep_inertia(const hxModel *model, const hxImplicit *implicit, int joint,
                                  int pack, hxLegWork *leg, hxInertia6 *I) {
@@ -34,17 +54,18 @@ static inline void sweep_inertia(const hxModel *model, const hxImplicit *implici
     const double z = implicit->z;
     resists += z * joint_damping(model, implicit, pack, joint) +
                (z * z) * joint_stiffness(model, implicit, pack, joint);
-    if (joint == HX_JOINTS - 1) *I = contact_inertia(model, implicit, pack, leg);
+    if (joint == HX_JOINTS - 1 && model->rows > 1) {
+      sweep_rows(model, implicit, pack, &own, &resists, leg, I);
+      return;
+    }
+    if (joint == HX_JOINTS - 1) *I = row_inertia(model, implicit, pack, HX_FOOT, leg);
   } else if (joint == HX_JOINTS - 1) {
     sweep->U = hx_rigid_mul(&own, sweep->S);
     sweep->inverse_d = sweep_inverse(model, sweep, resists);
     *I = hx_rigid_downdate(&own, sweep->inverse_d, sweep->U);
     return;
   }
-  hx_inertia_add_rigid(I, &own);
-  sweep->U = hx_inertia_mul(I, sweep->S);
-  sweep->inverse_d = sweep_inverse(model, sweep, resists);
-  hx_inertia_downdate(I, sweep->inverse_d, sweep->U);
+  sweep_sum(model, &own, resists, sweep, I);
 }
 
 /* Computes u = torque - S.p, and passes p + U u/d to the parent (eq. 11). */
@@ -70,13 +91,10 @@ static inline void sweep_motion(hxJointWork *k, hxMotion6 *a) {
  * component along the axis, with u1 = a x s, u2 = b x s. */
 static inline void leg_multipliers(const hxModel *model, const hxImplicit *implicit, int pack,
                                    hxLegWork *leg) {
-  const hxVec3 ground = stage_force(model, implicit, pack, leg);
   const int slot = pack * HX_LANES;
-  hxForce6 handed = {
-      hx_cross(leg->foot.kin.arm, ground),
-      ground}; /* at the link's centre of mass: from the ground, then from the child */
-  if (has_turning_friction(model))
-    handed.ang = hx_add3(handed.ang, stage_moment(implicit, pack, leg));
+  /* at the link's centre of mass: from the ground, then from the child */
+  hxForce6 handed = row_wrench(model, implicit, pack, HX_FOOT, leg);
+  if (model->rows > 1) handed = hx_force_add(handed, further_wrenches(model, implicit, pack, leg));
   for (int joint = HX_JOINTS - 1; joint >= 0; --joint) {
     hxJointWork *k = &leg->joint[joint];
     const hxJointKinematics *kin = &k->reaction.kin;
@@ -108,13 +126,40 @@ static inline void sum_packs(const hxReal *first, size_t stride, int n, hxReal *
   }
 }
 
+/* Adds the sum of n consecutive numbers of each pack's struct over the torso's contacts to the
+ * first leg's numbers. */
+static inline void add_slots(const hxReal *first, int n, hxReal *sum) {
+  for (int i = 0; i < n; ++i) {
+    hxReal x[HX_TORSO_PACKS];
+    hxNumber lanes[HX_LANES] = {0.0};
+    for (int k = 0; k < HX_TORSO_PACKS; ++k) x[k] = first[k * n + i];
+    lanes[0] = hx_sum_slots(x);
+    sum[i] += hx_load(lanes);
+  }
+}
+
+/* Adds p and the blocks of the torso's contacts to what the first leg passes to the torso. */
+HX_RARE void add_torso_contacts(const hxModel *model, const hxImplicit *implicit, hxWork *work,
+                                hxInertia6 *I, hxForce6 *p) {
+  enum { INERTIA = sizeof(hxInertia6) / sizeof(hxReal), FORCE = sizeof(hxForce6) / sizeof(hxReal) };
+  hxInertia6 blocks[HX_TORSO_PACKS];
+  for (int pack = 0; implicit && pack < HX_TORSO_PACKS; ++pack) {
+    const hxContactWork *contact = &work->torso_contact[pack];
+    const hxContactBlock B = contact_block(implicit, &implicit->torso_slope[pack], contact);
+    blocks[pack] =
+        contact_inertia(&B, contact->kin.arm, hx_splat_vec3(model->gravity), &work->torso_p[pack]);
+  }
+  if (implicit) add_slots(&blocks->C.xx, INERTIA, &I->C.xx);
+  add_slots(&work->torso_p->ang.x, FORCE, &p->ang.x);
+}
+
 /* Solves (I + sum of legs) (dv - g) = push and gyroscopic torque - sum of legs. */
 static inline hxMotion6 torso_acceleration(const hxModel *model, const hxCommand *command,
                                            const hxWork *work, const hxInertia6 *I,
                                            const hxForce6 *p) {
+  enum { INERTIA = sizeof(hxInertia6) / sizeof(hxReal), FORCE = sizeof(hxForce6) / sizeof(hxReal) };
   const hxReal m = hx_splat(model->torso_mass), o = hx_splat(0.0);
   const hxVec3 gyroscopic = hx_cross(hx_sym_mul(work->torso_J, work->torso.w), work->torso.w);
-  enum { INERTIA = sizeof(hxInertia6) / sizeof(hxReal), FORCE = sizeof(hxForce6) / sizeof(hxReal) };
   union {
     hxReal entry[INERTIA];
     hxInertia6 I;
@@ -206,24 +251,52 @@ typedef struct {
   hxNumber contact, friction, gear;
 } hxLossPowers;
 
-/* Returns the sums over all legs of the powers that contact, friction and gears dissipate. */
+/* Returns the power that the damping of a row of contacts dissipates, W. */
+HX_INLINE hxReal damping_power(const hxContactWork *contact) {
+  return (contact->normal.force - contact->normal.elastic) * contact->kin.ddelta;
+}
+
+/* Adds the powers that the torso's contacts dissipate. */
+HX_RARE void add_torso_losses(const hxModel *model, const hxWork *work, hxLossPowers *losses) {
+  hxReal contact[HX_TORSO_PACKS], friction[HX_TORSO_PACKS];
+  for (int pack = 0; pack < HX_TORSO_PACKS; ++pack) {
+    contact[pack] = damping_power(&work->torso_contact[pack]);
+    friction[pack] = hx_friction_power(model, HX_TORSO, &work->torso_contact[pack]);
+  }
+  losses->contact += hx_sum_slots(contact);
+  losses->friction += hx_sum_slots(friction);
+}
+
+/* Returns the power that spin and rolling friction of all rows of a leg's foot dissipates, W. */
+HX_RARE hxReal turning_power(const hxModel *model, const hxLegWork *leg) {
+  hxReal power = hx_splat(0.0);
+  for (int k = 0; k < model->foot_rows; ++k)
+    power -= hx_dot(leg->contact[model->row[k]].moment, leg->joint[HX_JOINTS - 1].body.w);
+  return power;
+}
+
+/* Returns the sums of the powers that all contacts, friction and gears dissipate. */
 static inline hxLossPowers hx_loss_powers(const hxModel *model, const hxWork *work) {
   hxReal contact[HX_PACKS], friction[HX_PACKS], gear[HX_PACKS];
   for (int pack = 0; pack < HX_PACKS; ++pack) {
     const hxLegWork *leg = &work->pack[pack];
-    const hxNormalForce *f = &leg->foot.normal;
-    contact[pack] = (f->force - f->elastic) * leg->foot.kin.ddelta;
-    friction[pack] = hx_friction_power(model, &leg->foot);
-    if (has_turning_friction(model))
-      friction[pack] -= hx_dot(leg->foot.moment, leg->joint[HX_JOINTS - 1].body.w);
+    contact[pack] = damping_power(&leg->contact[HX_FOOT]);
+    friction[pack] = hx_friction_power(model, HX_FOOT, &leg->contact[HX_FOOT]);
+    if (has_turning_friction(model, HX_FOOT)) friction[pack] += turning_power(model, leg);
     gear[pack] = hx_splat(0.0);
+    for (int k = 1; k < model->rows; ++k) {
+      contact[pack] += damping_power(&leg->contact[model->row[k]]);
+      friction[pack] += hx_friction_power(model, model->row[k], &leg->contact[model->row[k]]);
+    }
     for (int joint = 0; joint < HX_JOINTS; ++joint) {
       gear[pack] -= leg->joint[joint].servo.friction * leg->joint[joint].speed;
       if (model->stops) gear[pack] += leg->joint[joint].stop.damped * leg->joint[joint].speed;
     }
   }
-  return (hxLossPowers){hx_lane(hx_sum_legs(contact), 0), hx_lane(hx_sum_legs(friction), 0),
-                        hx_lane(hx_sum_legs(gear), 0)};
+  hxLossPowers losses = {hx_lane(hx_sum_legs(contact), 0), hx_lane(hx_sum_legs(friction), 0),
+                         hx_lane(hx_sum_legs(gear), 0)};
+  if (model->torso_rows) add_torso_losses(model, work, &losses);
+  return losses;
 }
 
 /* Stores the powers of motors, pushes and losses. They are rates for an importer's solver: a step
@@ -249,22 +322,70 @@ static inline void store_powers(const hxModel *model, const hxCommand *command,
 /* Impulses of a step's forces, summed over its stages. Shape [joint][pack] and [pack], legs in
  * lanes. */
 typedef struct {
-  hxReal motor[HX_JOINTS][HX_PACKS]; /* N m s        motors on their joints */
-  hxReal gear[HX_JOINTS][HX_PACKS];  /* N m s        gear friction on the joints */
-  hxReal stop[HX_JOINTS][HX_PACKS];  /* N m s        stops on the joints */
-  hxVec3 foot[HX_PACKS];             /* N s          ground on feet */
-  hxVec3 moment[HX_PACKS];           /* N m s        spin and rolling friction on tibias */
-  hxNumber push[6];                  /* N s, N m s   force, then torque on the torso */
+  hxReal motor[HX_JOINTS][HX_PACKS];       /* N m s        motors on their joints */
+  hxReal gear[HX_JOINTS][HX_PACKS];        /* N m s        gear friction on the joints */
+  hxNumber push[6];                        /* N s, N m s   force, then torque on the torso */
+  hxVec3 contact[HX_TIBIA_ROWS][HX_PACKS]; /* N s    ground on feet and tibias */
+  hxVec3 torso[HX_TORSO_PACKS];            /* N s    ground on the torso's points */
+  hxReal stop[HX_JOINTS][HX_PACKS];        /* N m s  stops on the joints */
+  hxVec3 moment[HX_FOOT_ROWS][HX_PACKS];   /* N m s  spin and rolling friction on tibias */
 } hxImpulses;
 
-/* Returns the torque of a joint's stops that a stage's accelerations contain. */
-static inline hxReal stage_stop(const hxImplicit *implicit, int pack, int joint,
-                                const hxJointWork *k) {
-  if (!implicit) return k->stop.torque;
-  const double z = implicit->z;
-  return k->stop.torque -
-         implicit->slope[pack].stop_stiffness[joint] * (k->angle_shift + (z * z) * k->qdd) -
-         implicit->slope[pack].stop_damping[joint] * (k->speed_shift + z * k->qdd);
+/* Sets the impulses to 0; those of other contacts than feet, of stops and of moments only where
+ * the model has some. */
+static inline void hx_clear_impulses(const hxModel *model, hxImpulses *sum) {
+  memset(sum, 0, offsetof(hxImpulses, contact) + sizeof sum->contact[HX_FOOT]);
+  if (model->rows > 1) memset(&sum->contact[1], 0, sizeof sum->contact - sizeof sum->contact[0]);
+  if (model->torso_rows) memset(sum->torso, 0, sizeof sum->torso);
+  if (model->stops) memset(sum->stop, 0, sizeof sum->stop);
+  if (has_turning_friction(model, HX_FOOT)) memset(sum->moment, 0, sizeof sum->moment);
+}
+
+/* Adds a stage's impulses of the stops of a leg. */
+HX_RARE void add_stop_impulses(const hxImplicit *implicit, int pack, const hxLegWork *leg, double w,
+                               hxImpulses *sum) {
+  for (int joint = 0; joint < HX_JOINTS; ++joint) {
+    const hxJointWork *k = &leg->joint[joint];
+    hxReal torque = k->stop.torque;
+    if (implicit) {
+      const double z = implicit->z;
+      torque -=
+          implicit->slope[pack].stop_stiffness[joint] * (k->angle_shift + (z * z) * k->qdd) +
+          implicit->slope[pack].stop_damping[joint] * (k->speed_shift + z * k->qdd);
+    }
+    sum->stop[joint][pack] += w * torque;
+  }
+}
+
+/* Adds a stage's impulses of the spin and rolling friction of a leg. */
+HX_RARE void add_moment_impulses(const hxModel *model, const hxImplicit *implicit, int pack,
+                                 const hxLegWork *leg, double w, hxImpulses *sum) {
+  for (int k = 0; k < model->foot_rows; ++k) {
+    hxVec3 *moment = &sum->moment[model->row[k]][pack];
+    const hxVec3 stage = row_stage_moment(implicit, pack, model->row[k], leg);
+    *moment = hx_add_scaled(*moment, hx_splat(w), stage);
+  }
+}
+
+/* Adds a stage's impulses of a row of contacts on the tibias. */
+HX_INLINE void add_row_impulse(const hxModel *model, const hxImplicit *implicit, int pack, int row,
+                               const hxLegWork *leg, hxReal w, hxImpulses *sum) {
+  hxVec3 *contact = &sum->contact[row][pack];
+  *contact = hx_add_scaled(*contact, w, row_stage_force(model, implicit, pack, row, leg));
+}
+
+/* Adds a stage's impulses of all other contacts than the feet's first row. */
+HX_RARE void add_further_impulses(const hxModel *model, const hxImplicit *implicit,
+                                  const hxWork *work, double weight, hxImpulses *sum) {
+  const hxReal w = hx_splat(weight);
+  for (int pack = 0; pack < HX_PACKS; ++pack)
+    for (int k = 1; k < model->rows; ++k)
+      add_row_impulse(model, implicit, pack, model->row[k], &work->pack[pack], w, sum);
+  for (int pack = 0; model->torso_rows && pack < HX_TORSO_PACKS; ++pack)
+    sum->torso[pack] =
+        hx_add_scaled(sum->torso[pack], w,
+                      stage_force(model, implicit, implicit ? &implicit->torso_slope[pack] : NULL,
+                                  work->torso_acceleration, &work->torso_contact[pack]));
 }
 
 /* Adds a stage's impulses: weight times the forces that the stage's accelerations contain, with
@@ -290,12 +411,13 @@ static inline void hx_add_impulses(const hxModel *model, const hxCommand *comman
       }
       sum->motor[joint][pack] += w * motor;
       sum->gear[joint][pack] += w * gear;
-      if (model->stops) sum->stop[joint][pack] += w * stage_stop(implicit, pack, joint, k);
     }
-    sum->foot[pack] = hx_add_scaled(sum->foot[pack], w, stage_force(model, implicit, pack, leg));
-    if (has_turning_friction(model))
-      sum->moment[pack] = hx_add_scaled(sum->moment[pack], w, stage_moment(implicit, pack, leg));
+    add_row_impulse(model, implicit, pack, HX_FOOT, leg, w, sum);
+    if (model->stops) add_stop_impulses(implicit, pack, leg, weight, sum);
+    if (has_turning_friction(model, HX_FOOT))
+      add_moment_impulses(model, implicit, pack, leg, weight, sum);
   }
+  if (model->rows + model->torso_rows > 1) add_further_impulses(model, implicit, work, weight, sum);
   for (int i = 0; i < 3; ++i) {
     sum->push[i] += weight * command->push_force[i];
     sum->push[3 + i] += weight * command->push_torque[i];
@@ -317,8 +439,9 @@ static void hx_dynamics_evaluate(const hxModel *model, const hxContactState *con
   for (int pack = 0; implicit && pack < HX_PACKS; ++pack) {
     if (!implicit->change) keep_slopes(model, contact, pack, &work->pack[pack], implicit);
     leg_response(model, implicit, motion, pack, &work->pack[pack]);
-    if (has_bristles(model)) bristle_response(implicit, pack, &work->pack[pack]);
+    if (has_bristles(model, HX_FOOT)) bristle_response(implicit, pack, HX_FOOT, &work->pack[pack]);
   }
+  if (implicit && model->torso_rows) torso_response(model, contact, motion, implicit, work);
 
   /* sweeps: leaf to root, the torso, root to leaf. Packs alternate, so that the operations of one
    * overlap the latency of the other. */
@@ -329,6 +452,7 @@ static void hx_dynamics_evaluate(const hxModel *model, const hxContactState *con
   for (int joint = HX_JOINTS - 1; joint >= 0; --joint)
     for (int pack = 0; pack < HX_PACKS; ++pack)
       sweep_force(&work->pack[pack].joint[joint], &p[pack]);
+  if (model->torso_rows) add_torso_contacts(model, implicit, work, I, p);
   work->torso_acceleration = torso_acceleration(model, command, work, I, p);
   for (int pack = 0; pack < HX_PACKS; ++pack) {
     hxMotion6 a = work->torso_acceleration;
@@ -342,7 +466,8 @@ static void hx_dynamics_evaluate(const hxModel *model, const hxContactState *con
     for (int joint = 0; joint < HX_JOINTS; ++joint)
       store_link_rate(model, motion, implicit, joint, pack * HX_LANES,
                       &work->pack[pack].joint[joint], rate);
-  if (has_bristles(model)) store_bristle_rates(model, contact, implicit, work, &rate->motion);
+  if (has_bristles(model, HX_FOOT))
+    store_bristle_rates(model, contact, implicit, work, &rate->motion);
   fill_rate_slots(rate);
   if (!implicit)
     store_powers(model, command, motion, work, &rate->motion);

@@ -17,16 +17,21 @@ static void kernel_start(const hxModel *model, double t, hxState *state) {
   state->next_step = state->first_step = fmin(first_step_size, model->step_max);
   state->motion.actuator_work = state->motion.push_work = state->motion.dissipated = 0.0;
   state->evaluations = state->steps = state->rejected = state->touchdowns = 0.0;
-  const hxFeet feet = feet_of(model, &state->motion);
-  hx_contact_start(model, feet.delta, &state->contact);
+  hxDepths depths;
+  hx_depths_of(model, &state->motion, &depths);
+  hx_contact_start(model, &depths, &state->contact);
   memset(state->motion.bristle, 0, sizeof state->motion.bristle);
   hx_dynamics_forces(model, &state->contact, &no_command, t, &state->motion, 0, &work);
   hx_moment_update(model, state);
   memset(&state->completed, 0, sizeof state->completed);
   memset(&state->measured, 0, sizeof state->measured);
-  for (int pack = 0; pack < HX_PACKS; ++pack)
-    hx_store(&state->measured.peak_force[pack * HX_LANES], work.pack[pack].foot.normal.force);
-  hx_fill_measured_slots(state);
+  for (int pack = 0; pack < HX_PACKS; ++pack) {
+    hxReal force = work.pack[pack].contact[HX_FOOT].normal.force;
+    for (int k = 1; k < model->foot_rows; ++k)
+      force += work.pack[pack].contact[model->row[k]].normal.force;
+    hx_store(&state->measured.peak_force[pack * HX_LANES], force);
+  }
+  hx_fill_measured_slots(model, state);
   state->stored_at_start = hx_kinetic_energy(model, &state->motion, &work) +
                            hx_potential_energy(model, &state->motion, &work);
 }
@@ -51,16 +56,28 @@ static void kernel_coordinates(const hxModel *model, const hxState *state, const
   if (rate) hx_coordinates_rate(&all.motion, &work, rate);
 }
 
-static void kernel_feet(const hxModel *model, const hxPlantMotion *motion, double delta[HX_SLOTS],
-                        double ddelta[HX_SLOTS]) {
-  const hxFeet feet = feet_of(model, motion);
-  memcpy(delta, feet.delta, sizeof feet.delta);
-  memcpy(ddelta, feet.ddelta, sizeof feet.ddelta);
+static void kernel_switch_contacts(const hxModel *model, const hxDepths *depths, hxState *state) {
+  if (!hx_switch_contacts(model, depths, state->time, state) && has_bristles(model, HX_FOOT))
+    hx_contact_slacken(&state->contact, &state->motion); /* the importer may have set bristles */
 }
 
-static void kernel_switch_contacts(const hxModel *model, const double delta[HX_SLOTS],
-                                   const double ddelta[HX_SLOTS], hxState *state) {
-  hx_switch_contacts(model, delta, ddelta, state->time, state);
+/* Computes the impulse h/2 (previous force + present force), and keeps the present force as the
+ * previous one. */
+static hxVec3 vec3_impulse(hxVec3 force, hxReal half, int slot, double (*previous)[HX_SLOTS]) {
+  const hxVec3 before = hx_load_vec3((const double (*)[HX_SLOTS])previous, slot);
+  hx_store_vec3(previous, slot, force);
+  return hx_scale(half, hx_add3(before, force));
+}
+
+/* Computes the same of the stops of a leg. */
+static void stop_impulses(const hxLegWork *leg, hxReal half, int pack, hxCompleted *completed,
+                          hxImpulses *impulses) {
+  for (int joint = 0; joint < HX_JOINTS; ++joint) {
+    double *previous = &completed->stop[joint][pack * HX_LANES];
+    const hxReal torque = leg->joint[joint].stop.torque;
+    impulses->stop[joint][pack] = half * (hx_load(previous) + torque);
+    hx_store(previous, torque);
+  }
 }
 
 /* Computes the impulses h/2 (previous forces + present forces), and keeps the present forces as
@@ -78,22 +95,20 @@ static void trapezoidal_impulses(const hxModel *model, const hxWork *work, doubl
       impulses->gear[joint][pack] = half * (hx_load(gear) + servo->friction);
       hx_store(motor, servo->torque);
       hx_store(gear, servo->friction);
-      if (model->stops) {
-        double *stop = &completed->stop[joint][slot];
-        impulses->stop[joint][pack] = half * (hx_load(stop) + leg->joint[joint].stop.torque);
-        hx_store(stop, leg->joint[joint].stop.torque);
-      }
     }
-    impulses->foot[pack] =
-        hx_scale(half, hx_add3(hx_load_vec3((const double (*)[HX_SLOTS])completed->foot, slot),
-                               leg->foot.force));
-    hx_store_vec3(completed->foot, slot, leg->foot.force);
-    if (has_turning_friction(model)) {
-      const hxVec3 before = hx_load_vec3((const double (*)[HX_SLOTS])completed->moment, slot);
-      impulses->moment[pack] = hx_scale(half, hx_add3(before, leg->foot.moment));
-      hx_store_vec3(completed->moment, slot, leg->foot.moment);
+    if (model->stops) stop_impulses(leg, half, pack, completed, impulses);
+    for (int k = 0; k < model->rows; ++k) {
+      const int row = model->row[k];
+      impulses->contact[row][pack] =
+          vec3_impulse(leg->contact[row].force, half, slot, completed->contact[row]);
+      if (has_turning_friction(model, row))
+        impulses->moment[row][pack] =
+            vec3_impulse(leg->contact[row].moment, half, slot, completed->moment[row]);
     }
   }
+  for (int pack = 0; model->torso_rows && pack < HX_TORSO_PACKS; ++pack)
+    impulses->torso[pack] = vec3_impulse(work->torso_contact[pack].force, hx_splat(0.5 * h),
+                                         pack * HX_LANES, completed->contact[HX_TORSO]);
   completed->known = 1.0;
 }
 
@@ -112,7 +127,6 @@ static void kernel_measure(const hxModel *model, const hxCommand *command, hxSta
                  .from = &state->moment,
                  .to = &end};
   for (int node = 0; node <= INTERVALS; ++node) path.command[node] = command;
-  memset(&end, 0, sizeof end);
   hx_moment_of(model, &state->motion, &end);
   end.time = state->time;
   hx_dynamics_evaluate(model, &state->contact, command, state->time, &state->motion, NULL, 1, &work,
@@ -127,17 +141,17 @@ static void kernel_measure(const hxModel *model, const hxCommand *command, hxSta
     hx_step_works(&path, &impulses, &works);
     hx_measure_path(&path, &impulses, &works, &state->measured);
   }
-  state->moment = end;
-  hx_fill_measured_slots(state);
+  hx_copy_moment(model, &state->moment, &end);
+  hx_fill_measured_slots(model, state);
   for (int joint = 0; joint < HX_JOINTS; ++joint) {
     hx_fill_slots(state->completed.motor[joint]);
     hx_fill_slots(state->completed.gear[joint]);
     hx_fill_slots(state->completed.stop[joint]);
   }
-  for (int i = 0; i < 3; ++i) {
-    hx_fill_slots(state->completed.foot[i]);
-    hx_fill_slots(state->completed.moment[i]);
-  }
+  for (int k = 0; k < model->rows; ++k)
+    for (int i = 0; i < 3; ++i) hx_fill_slots(state->completed.contact[model->row[k]][i]);
+  for (int row = 0; row < HX_FOOT_ROWS; ++row)
+    for (int i = 0; i < 3; ++i) hx_fill_slots(state->completed.moment[row][i]);
 }
 
 static void kernel_output(const hxModel *model, const hxState *state, const hxCommand *command,
@@ -177,7 +191,7 @@ static void kernel_accelerations(const hxModel *model, const hxState *state,
    .derivative = kernel_derivative,                                                                \
    .place = hx_motion_from_coordinates,                                                            \
    .coordinates = kernel_coordinates,                                                              \
-   .feet = kernel_feet,                                                                            \
+   .depths = hx_depths_of,                                                                         \
    .switch_contacts = kernel_switch_contacts,                                                      \
    .measure = kernel_measure,                                                                      \
    .output = kernel_output,                                                                        \

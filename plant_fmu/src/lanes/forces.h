@@ -9,8 +9,7 @@
 
 #include "work.h"
 
-/* ---- root to leaf: where everything is and what it feels there
- * ------------------------------------------------------------ */
+/* ---- root to leaf: kinematics and forces ---- */
 
 /* Sums along a leg, up to the present link. */
 typedef struct {
@@ -150,33 +149,56 @@ static inline hxMotion6 link_velocity(const hxPlantMotion *m, int joint, int slo
   return (hxMotion6){hx_link_vec3(m, joint, HX_W, slot), hx_link_vec3(m, joint, HX_V, slot)};
 }
 
-/* Returns the contact point, relative to the torso's centre of mass. */
-static inline hxVec3 contact_point(const hxLegWork *leg) {
-  return hx_add3(leg->joint[HX_JOINTS - 1].c, leg->foot.kin.arm);
+/* Returns the point of a contact on the tibia, relative to the torso's centre of mass. */
+static inline hxVec3 contact_point(const hxLegWork *leg, const hxContactWork *contact) {
+  return hx_add3(leg->joint[HX_JOINTS - 1].c, contact->kin.arm);
 }
 
-/* Applies a force to the tibia at x: p -= (x x force, force). */
-static inline void push_tibia(hxLegWork *leg, hxVec3 x, hxVec3 force) {
-  hxForce6 *p = &leg->joint[HX_JOINTS - 1].p;
+/* Applies a force to a body at x: p -= (x x force, force). */
+static inline void push_body(hxForce6 *p, hxVec3 x, hxVec3 force) {
   p->lin = hx_sub3(p->lin, force);
   p->ang = hx_sub3(p->ang, hx_cross(x, force));
 }
 
-/* Applies a moment to the tibia. */
-static inline void turn_tibia(hxLegWork *leg, hxVec3 moment) {
-  hxForce6 *p = &leg->joint[HX_JOINTS - 1].p;
-  p->ang = hx_sub3(p->ang, moment);
+/* Applies a moment to a body. */
+static inline void turn_body(hxForce6 *p, hxVec3 moment) { p->ang = hx_sub3(p->ang, moment); }
+
+/* Computes the contact force of a row and applies it to the tibia. */
+HX_INLINE void leg_contact(const hxModel *model, const hxContactState *state,
+                           const hxPlantMotion *motion, int row, int slot, hxLegWork *leg) {
+  hxJointWork *tibia = &leg->joint[HX_JOINTS - 1];
+  hxContactWork *contact = &leg->contact[row];
+  contact->kin = hx_tibia_contact(model, motion, row, slot, &tibia->body);
+  hx_contact_force(model, state, row, slot, motion, contact);
+  push_body(&tibia->p, contact_point(leg, contact), contact->force);
+  if (has_turning_friction(model, row)) {
+    hx_contact_moment(model, row, &tibia->body.w, contact);
+    turn_body(&tibia->p, contact->moment);
+  }
 }
 
-/* Computes the contact's force and moment and applies them to the tibia. */
-static inline void leg_foot(const hxModel *model, const hxContactState *contact,
+HX_RARE void further_contacts(const hxModel *model, const hxContactState *state,
+                              const hxPlantMotion *motion, int slot, hxLegWork *leg) {
+  for (int k = 1; k < model->rows; ++k) leg_contact(model, state, motion, model->row[k], slot, leg);
+}
+
+/* Computes the contact forces of a leg. */
+HX_INLINE void leg_contacts(const hxModel *model, const hxContactState *state,
                             const hxPlantMotion *motion, int slot, hxLegWork *leg) {
-  leg->foot.kin = hx_foot_kinematics(model, motion, slot, &leg->joint[HX_JOINTS - 1].body);
-  hx_foot_force(model, contact, slot, hx_load_vec3(motion->bristle, slot), &leg->foot);
-  push_tibia(leg, contact_point(leg), leg->foot.force);
-  if (has_turning_friction(model)) {
-    hx_foot_moment(model, leg->joint[HX_JOINTS - 1].body.w, &leg->foot);
-    turn_tibia(leg, leg->foot.moment);
+  leg_contact(model, state, motion, HX_FOOT, slot, leg);
+  if (model->rows > 1) further_contacts(model, state, motion, slot, leg);
+}
+
+/* Computes the contact forces of the torso and applies them. */
+HX_RARE void torso_contacts(const hxModel *model, const hxContactState *state,
+                            const hxPlantMotion *motion, hxWork *work) {
+  for (int pack = 0; pack < HX_TORSO_PACKS; ++pack) {
+    hxContactWork *contact = &work->torso_contact[pack];
+    const int slot = pack * HX_LANES;
+    contact->kin = hx_torso_contact(model, motion, slot, &work->torso);
+    hx_contact_force(model, state, HX_TORSO, slot, motion, contact);
+    work->torso_p[pack] = (hxForce6){hx_zero3(), hx_zero3()};
+    push_body(&work->torso_p[pack], contact->kin.arm, contact->force);
   }
 }
 
@@ -206,7 +228,8 @@ static inline void hx_dynamics_forces(const hxModel *model, const hxContactState
     for (int pack = 0; pack < HX_PACKS; ++pack)
       joint_torque(model, command, joint, pack * HX_LANES, &work->pack[pack].joint[joint]);
   for (int pack = 0; pack < HX_PACKS; ++pack)
-    leg_foot(model, contact, motion, pack * HX_LANES, &work->pack[pack]);
+    leg_contacts(model, contact, motion, pack * HX_LANES, &work->pack[pack]);
+  if (model->torso_rows) torso_contacts(model, contact, motion, work);
 }
 
 #endif

@@ -25,14 +25,14 @@ static const double spring_limit =
 static const double no_friction = 1e-30; /* 1  keeps ratios of coefficients finite at mu = 0 */
 
 /* Returns mu(p) = mu + (mu_s - mu)/(1 + (p/v_s)^2) at a sliding speed p (eq. 18). */
-static inline hxReal hx_sliding_mu(const hxModel *model, hxReal speed) {
+HX_INLINE hxReal hx_sliding_mu(const hxModel *model, hxReal speed) {
   const hxReal x = hx_splat(model->per_stribeck) * speed;
   return model->mu + model->static_rise / (1.0 + x * x);
 }
 
 /* Returns g of f_t = -mu f_n g(|v_t|) v_t (eq. 15): tanh(k_t v) / v, whose limit at rest is k_t.
  * The series k_t (1 - (k_t v)^2 / 3) is exact below k_t v = 1e-5. */
-static inline hxReal hx_friction(const hxModel *model, hxReal speed) {
+HX_INLINE hxReal hx_friction(const hxModel *model, hxReal speed) {
   if (model->friction_law == HX_FRICTION_NONE) return hx_splat(0.0);
   const hxReal x = model->slope * speed;
   const hxMask slow = hx_less(x, hx_splat(1e-5));
@@ -42,7 +42,7 @@ static inline hxReal hx_friction(const hxModel *model, hxReal speed) {
 
 /* Returns the tanh law's tangential force over load and slip speed, s/m (eq. 15, 31):
  * mu(v) tanh(k_t v)/v + viscous. The plain law, mu_static = viscous = 0, needs no division more. */
-static inline hxReal hx_friction_drag(const hxModel *model, hxReal speed) {
+HX_INLINE hxReal hx_friction_drag(const hxModel *model, hxReal speed) {
   if (!model->velocity_terms) return model->mu * hx_friction(model, speed);
   return hx_sliding_mu(model, speed) * hx_friction(model, speed) + model->viscous;
 }
@@ -57,7 +57,7 @@ static inline hxReal hx_friction_drag(const hxModel *model, hxReal speed) {
  * The friction coefficient falls with the sliding speed p of the bristles: mu(p) = mu + (mu_s -
  * mu)/(1 + (p/v_s)^2) (eq. 18). The viscous part of eq. 31 is added.
  */
-static inline hxBristle hx_bristle(const hxModel *model, hxReal closed, hxVec3 b, hxVec3 slip) {
+HX_INLINE hxBristle hx_bristle(const hxModel *model, hxReal closed, hxVec3 b, hxVec3 slip) {
   const hxReal zero = hx_splat(0.0), one = hx_splat(1.0);
   const hxNumber per_length = 1.0 / model->presliding;
   const hxVec3 u = hx_scale(hx_splat(per_length), b);
@@ -86,7 +86,7 @@ static inline hxBristle hx_bristle(const hxModel *model, hxReal closed, hxVec3 b
 /* The LuGre law (eq. 32, 33): db/dt = v - |v| mu_0/mu(|v|) b/b_max, and the friction over load is
  * mu_0 b/b_max + sigma db/dt + viscous v. sigma falls with the speed, so that the law dissipates
  * and bristles in steady motion keep the force within mu(|v|) f_n. */
-static inline hxBristle hx_lugre(const hxModel *model, hxReal closed, hxVec3 b, hxVec3 slip) {
+HX_INLINE hxBristle hx_lugre(const hxModel *model, hxReal closed, hxVec3 b, hxVec3 slip) {
   const hxNumber rest = model->mu + model->static_rise, stiffness = rest / model->presliding;
   const hxNumber still_damping = stiffness * model->bristle_damping;
   const hxReal speed = hx_sqrt(hx_dot(slip, slip));
@@ -106,7 +106,7 @@ static inline hxBristle hx_lugre(const hxModel *model, hxReal closed, hxVec3 b, 
 
 /* Returns the moment over the load of spin about the normal and of rolling across it (eq. 34), at
  * the angular velocity w of a body whose sphere touches the ground. */
-static inline hxTurningFriction hx_turning_friction(const hxModel *model, hxReal radius,
+HX_INLINE hxTurningFriction hx_turning_friction(const hxModel *model, hxReal radius,
                                                     hxVec3 normal, hxVec3 w) {
   const hxReal spin = hx_dot(normal, w);
   const hxVec3 roll = hx_add_scaled(w, -spin, normal);

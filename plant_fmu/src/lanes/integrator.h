@@ -26,15 +26,10 @@ typedef struct {
   const hxContactState *contact;
   const hxMethodRow *method;
   double t;
-  double touch;     /* m  largest depth of a foot that has just touched down */
+  double touch;     /* m  largest depth of a contact that has just touched down */
   double last_step; /* limit of accepted and rejected steps */
   const hxPlantMotion *y;
 } hxStart;
-
-/* Penetration and approach speed of all feet, m, m/s. */
-typedef struct {
-  double delta[HX_SLOTS], ddelta[HX_SLOTS];
-} hxFeet;
 
 typedef struct {
   hxPlantMotion y;
@@ -42,16 +37,29 @@ typedef struct {
   double error; /* error of the step over the tolerance; 0 without an estimate */
 } hxTrial;
 
-/* Computes penetration and approach speed of all feet. */
-static inline hxFeet feet_of(const hxModel *model, const hxPlantMotion *motion) {
-  hxFeet feet;
+static inline void store_depths(const hxContactKinematics *kin, int row, int slot,
+                                hxDepths *depths) {
+  hx_store(&depths->delta[row][slot], kin->delta);
+  hx_store(&depths->ddelta[row][slot], kin->ddelta);
+}
+
+/* Computes penetration and approach speed of all contacts. */
+static inline void hx_depths_of(const hxModel *model, const hxPlantMotion *motion,
+                                hxDepths *depths) {
   for (int slot = 0; slot < HX_PACKS * HX_LANES; slot += HX_LANES) {
     const hxBody tibia = hx_link_body(motion, HX_JOINTS - 1, slot);
-    const hxFootKinematics foot = hx_foot_kinematics(model, motion, slot, &tibia);
-    hx_store(&feet.delta[slot], foot.delta);
-    hx_store(&feet.ddelta[slot], foot.ddelta);
+    for (int k = 0; k < model->rows; ++k) {
+      const int row = model->row[k];
+      const hxContactKinematics kin = hx_tibia_contact(model, motion, row, slot, &tibia);
+      store_depths(&kin, row, slot, depths);
+    }
   }
-  return feet;
+  if (!model->torso_rows) return;
+  const hxBody torso = hx_torso_body(motion);
+  for (int slot = 0; slot < HX_SLOTS; slot += HX_LANES) {
+    const hxContactKinematics kin = hx_torso_contact(model, motion, slot, &torso);
+    store_depths(&kin, HX_TORSO, slot, depths);
+  }
 }
 
 /* ---- one step ---- */
@@ -95,7 +103,7 @@ static inline void combine(const hxModel *model, double *out, const double *base
                            const double *weights, const hxRate *k, int n, int first) {
   enum { END = HX_TURN_SIZE + HX_BODIES_SIZE };
   combine_part(out, base, h, weights, k, n, first, END - first);
-  if (has_bristles(model))
+  if (has_bristles(model, HX_FOOT))
     combine_n(out + END - first, base ? base + END - first : NULL, h, weights, k, n, END,
               HX_BRISTLE_SIZE);
 }
@@ -116,7 +124,7 @@ static double error_norm(const hxModel *model, const hxPlantMotion *error) {
       for (int slot = 0; slot < HX_PACKS * HX_LANES; slot += HX_LANES)
         links = hx_max(links, scale * hx_abs(hx_load(&error->link[joint][i][slot])));
   }
-  for (int i = 0; i < 3 && has_bristles(model); ++i)
+  for (int i = 0; i < 3 && has_bristles(model, HX_FOOT); ++i)
     for (int slot = 0; slot < HX_PACKS * HX_LANES; slot += HX_LANES)
       links = hx_max(links, 1.0 / (bristle_scale * model->presliding) *
                                 hx_abs(hx_load(&error->bristle[i][slot])));
@@ -176,7 +184,7 @@ static void try_step(const hxStart *start, double h, hxState *state, hxTrial *tr
   hxPlantMotion y;
   hxWork work;
   hxCommand now;
-  memset(&trial->impulses, 0, sizeof trial->impulses);
+  hx_clear_impulses(model, &trial->impulses);
   /* stages: y_i = y_0 + sum a_ij k_j, k_i by eq. 19 */
   for (int i = 0; i < m->stages; ++i) {
     const double t = start->t + m->c[i] * h;
@@ -209,12 +217,23 @@ static void try_step(const hxStart *start, double h, hxState *state, hxTrial *tr
 
 /* ---- touch-down ---- */
 
-/* Returns the penetration of the deepest open foot, m. */
-static double deepest_open_foot(const hxContactState *contact, const hxFeet *feet) {
-  double depth = -HUGE_VAL;
-  for (int leg = 0; leg < HX_LEGS; ++leg)
-    if (contact->closed[leg] == 0.0 && feet->delta[leg] > depth) depth = feet->delta[leg];
+/* Returns the larger of a depth and the deepest open contact's of a row, m. */
+HX_INLINE double deepest_open_of(const hxContactState *contact, const hxDepths *depths, int row,
+                                 int slots, double depth) {
+  for (int slot = 0; slot < slots; ++slot)
+    if (contact->closed[row][slot] == 0.0 && depths->delta[row][slot] > depth)
+      depth = depths->delta[row][slot];
   return depth;
+}
+
+/* Returns the penetration of the deepest open contact, m. */
+static double deepest_open(const hxStart *start, const hxDepths *depths) {
+  const hxModel *model = start->model;
+  double depth = deepest_open_of(start->contact, depths, HX_FOOT, HX_LEGS, -HUGE_VAL);
+  for (int k = 1; k < model->rows; ++k)
+    depth = deepest_open_of(start->contact, depths, model->row[k], HX_LEGS, depth);
+  return model->torso_rows ? deepest_open_of(start->contact, depths, HX_TORSO, HX_SLOTS, depth)
+                           : depth;
 }
 
 /* Returns where on [0, 1] the cubic with these ends and slopes (per unit) reaches a level between
@@ -234,38 +253,49 @@ static double cubic_crossing(double from, double slope_from, double to, double s
   return high;
 }
 
-/* Returns the time at which the first open foot reaches half the touch depth, by the cubics
- * through depths and speeds at two times. */
-static double expected_touch(const hxStart *start, double t_low, const hxFeet *low, double t_high,
-                             const hxFeet *high) {
-  const double h = t_high - t_low, level = 0.5 * start->touch;
+/* Returns the first x at which an open contact of a row reaches a level; 1: none. */
+static double first_crossing(const hxStart *start, int row, double h, const hxDepths *low,
+                             const hxDepths *high, double level) {
   double first = 1.0;
-  for (int leg = 0; leg < HX_LEGS; ++leg)
-    if (start->contact->closed[leg] == 0.0 && high->delta[leg] > level) {
-      const double x = cubic_crossing(low->delta[leg], h * low->ddelta[leg], high->delta[leg],
-                                      h * high->ddelta[leg], level);
+  for (int slot = 0; slot < hx_slots_of(row); ++slot)
+    if (start->contact->closed[row][slot] == 0.0 && high->delta[row][slot] > level) {
+      const double x = cubic_crossing(low->delta[row][slot], h * low->ddelta[row][slot],
+                                      high->delta[row][slot], h * high->ddelta[row][slot], level);
       first = x < first ? x : first;
     }
+  return first;
+}
+
+/* Returns the time at which the first open contact reaches half the touch depth, by the cubics
+ * through depths and speeds at two times. */
+static double expected_touch(const hxStart *start, double t_low, const hxDepths *low, double t_high,
+                             const hxDepths *high) {
+  const double h = t_high - t_low, level = 0.5 * start->touch;
+  const hxModel *model = start->model;
+  double first = 1.0;
+  for (int k = 0; k < model->rows + model->torso_rows; ++k)
+    first = fmin(first, first_crossing(start, model->row[k], h, low, high, level));
   return t_low + first * h;
 }
 
 /* Shortens a step that ends below the ground to one that ends on it: each guess is a step of its
- * own; every third halves what is left, should the cubics crawl. */
+ * own; every third halves what is left, in case the cubics converge slowly. */
 static double find_touchdown(const hxStart *start, double h, hxState *state, hxTrial *trial,
-                             hxFeet *feet) {
+                             hxDepths *depths) {
   double low = 0.0, high = h;
-  hxFeet feet_low = feet_of(start->model, start->y);
-  for (int guess = 1;
-       deepest_open_foot(start->contact, feet) > start->touch && high - low > step_floor; ++guess) {
-    double middle = guess % 3 ? expected_touch(start, low, &feet_low, high, feet) : low;
+  hxDepths found, depths_low;
+  hx_depths_of(start->model, start->y, &depths_low);
+  for (int guess = 1; deepest_open(start, depths) > start->touch && high - low > step_floor;
+       ++guess) {
+    double middle = guess % 3 ? expected_touch(start, low, &depths_low, high, depths) : low;
     if (!(middle > low && middle < high)) middle = 0.5 * (low + high);
     hxTrial nearer;
     try_step(start, middle, state, &nearer);
-    const hxFeet found = feet_of(start->model, &nearer.y);
-    if (deepest_open_foot(start->contact, &found) > 0.0)
-      high = middle, *feet = found, *trial = nearer;
+    hx_depths_of(start->model, &nearer.y, &found);
+    if (deepest_open(start, &found) > 0.0)
+      high = middle, *depths = found, *trial = nearer;
     else
-      low = middle, feet_low = found;
+      low = middle, depths_low = found;
   }
   return high;
 }
@@ -296,8 +326,7 @@ static double step_factor(const hxMethodRow *method, double error) {
   return 0.9 * inverse_root(error, n);
 }
 
-/* Steps that a call over a time may take: no call runs on for ever. */
-/* Returns the limit of the steps of a call over a time, s. */
+/* Returns the largest number of steps in a call over a time, s, so that every call ends. */
 static double steps_allowed(double time) {
   return fmin(step_limits[0] + step_limits[1] * time, step_limits[2]);
 }
@@ -307,11 +336,10 @@ static hxStatus step_failure(const hxTrial *trial, double t, double h, char *mes
   const int lost = isnan(trial->error);
   snprintf(message, HX_MESSAGE_SIZE,
            lost ? "the motion is not finite any more at t = %.9g s (step %.3g s); check masses, "
-                  "stiffness and inputs, or let the error "
-                  "control choose the step (solver.step = 0)"
-                : "the error control gives up at t = %.9g s (step %.3g s), where it finds no step "
-                  "that takes the motion on in reasonable "
-                  "time; check the inputs for extreme values, raise solver.tolerance or use a "
+                  "stiffness and inputs, or let the error control choose the step (solver.step = 0)"
+                : "the error control finds no step that meets the tolerance, or needs too many "
+                  "steps, at t = %.9g s (step %.3g s); check the inputs for extreme values, raise "
+                  "solver.tolerance or use a "
                   "linearly implicit solver.method",
            t, h);
   return lost ? HX_NOT_FINITE : HX_STEP_TOO_SMALL;
@@ -327,7 +355,7 @@ static int all_finite(const hxPlantMotion *y) {
   return total == 0.0;
 }
 
-/* ---- what a step did ---- */
+/* ---- measures of a step ---- */
 
 /* Returns the work of the push: its impulses times the mean of the torso's velocities at both ends
  * (eq. 27). */
@@ -363,13 +391,13 @@ static void measure_step(const hxStart *start, double h, const hxMoment *end, hx
   trial->y.actuator_work += hx_lane(hx_sum_legs(work), 0);
   trial->y.push_work += push_work(&trial->impulses, start->y, &trial->y);
   trial->y.dissipated = (measured->contact_loss + measured->friction_loss) + measured->gear_loss;
-  state->moment = *end;
+  hx_copy_moment(start->model, &state->moment, end);
 }
 
 /* Advances the state by one accepted step of at most h_max, shortened by the error control and by
- * touch-downs; *taken is its length. */
+ * touch-downs; *taken is its length, *event whether contacts switched at its end. */
 static hxStatus advance(const hxStart *start, double h_max, double *next_step, hxState *state,
-                        double *taken, char *message) {
+                        double *taken, int *event, char *message) {
   const hxModel *model = start->model;
   hxTrial trial;
   double h = model->step > 0.0
@@ -395,21 +423,19 @@ static hxStatus advance(const hxStart *start, double h_max, double *next_step, h
   }
   /* shorten the step to the first touch-down, measure it, switch contacts */
   hxMoment end;
-  hxFeet feet;
-  memset(&end, 0, sizeof end);
+  hxDepths depths;
   hx_moment_of(model, &trial.y, &end);
-  memcpy(feet.delta, end.delta, sizeof feet.delta);
-  memcpy(feet.ddelta, end.ddelta, sizeof feet.ddelta);
+  hx_depths_of_moment(model, &end, &depths);
   *taken = h;
-  if (deepest_open_foot(start->contact, &feet) > 0.0) {
-    *taken = find_touchdown(start, h, state, &trial, &feet);
+  if (deepest_open(start, &depths) > 0.0) {
+    *taken = find_touchdown(start, h, state, &trial, &depths);
     hx_moment_of(model, &trial.y, &end);
   }
   end.time = start->t + *taken;
   measure_step(start, *taken, &end, state, &trial);
   state->motion = trial.y;
   state->steps += 1.0;
-  hx_switch_contacts(model, feet.delta, feet.ddelta, start->t + *taken, state);
+  *event = hx_switch_contacts(model, &depths, start->t + *taken, state);
   return HX_OK;
 }
 
@@ -430,15 +456,15 @@ static hxStatus run_to(const hxModel *model, const hxCommand *command, const hxC
   double *next_step = command->time < state->time ? &state->next_step : &first;
   while (state->time < t_end && !(events->stop && events->found)) {
     const double left = t_end - state->time;
-    const hxContactState before = state->contact;
     double taken;
+    int event = 0;
     start.t = state->time;
-    const hxStatus status = advance(&start, left, next_step, state, &taken, message);
+    const hxStatus status = advance(&start, left, next_step, state, &taken, &event, message);
     if (status != HX_OK) return status;
     if (next_step == &first) state->first_step = first, next_step = &state->next_step;
     const double t = state->time + taken;
     state->time = taken >= left || t_end - t < step_floor ? t_end : t;
-    events->found |= memcmp(before.closed, state->contact.closed, sizeof before.closed) != 0;
+    events->found |= event;
   }
   return HX_OK;
 }
@@ -473,7 +499,7 @@ static hxStatus hx_integrate(const hxModel *model, const hxCommand *command, con
   const hxStatus status = (model->step == 0.0 ? run_to : run_fixed)(model, command, ramp, t_end,
                                                                     events, state, message);
   fill_motion_slots(&state->motion);
-  hx_fill_measured_slots(state);
+  hx_fill_measured_slots(model, state);
   return status;
 }
 

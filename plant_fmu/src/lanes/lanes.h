@@ -19,6 +19,17 @@
 #include "../elementary.h"
 #include "../state.h"
 
+/* Functions of one row of contacts are inline for the feet's first row, HX_INLINE; those for rows
+ * that few robots and grounds have stay out of line, HX_RARE, so that flat ground costs the same
+ * with and without them. */
+#if defined(__GNUC__)
+#define HX_INLINE static inline __attribute__((always_inline))
+#define HX_RARE static __attribute__((noinline))
+#else
+#define HX_INLINE static inline
+#define HX_RARE static
+#endif
+
 #ifndef HX_TANGENT
 typedef double hxNumber; /* number type of the structures of state.h and hexapod.h */
 
@@ -56,6 +67,7 @@ static inline hxReal hx_load(const double *slots) {
 }
 
 static inline void hx_store(double *slots, hxReal x) { memcpy(slots, &x, sizeof x); }
+static inline double hx_re(double x) { return x; } /* real part; complex_step.h has another */
 
 #if HX_LANES == 1
 static inline hxReal hx_splat(double x) { return x; }
@@ -114,7 +126,7 @@ static inline hxReal hx_abs(hxReal x) { return hx_from_bits(hx_bits(x) & INT64_M
  * (2^k - 1) */
 static inline hxReal hx_expm1(hxReal x) {
   const double round =
-      6755399441055744.0; /* 1.5 * 2^52: adding and taking it away rounds to an integer */
+      6755399441055744.0; /* 1.5 * 2^52: adding and subtracting it rounds to an integer */
   const double ln2_high = 6.93147180369123816490e-01,
                ln2_low = 1.90821492927058770002e-10; /* ln 2 in two pieces */
   const hxReal shifted = x * 1.4426950408889634 + round;
@@ -192,6 +204,13 @@ static inline void hx_lanes_sin_cos(hxReal x, hxReal *sine, hxReal *cosine) {
 enum {
   HX_PACKS = (HX_LEGS + HX_LANES - 1) / HX_LANES
 }; /* packs that hold all legs, HX_LANES legs in each */
+
+/* Returns the sum over eight slots, in an order that does not depend on the width. */
+static inline hxNumber hx_sum_slots(const hxReal pack[HX_SLOTS / HX_LANES]) {
+  hxNumber x[HX_SLOTS];
+  for (int p = 0; p < HX_SLOTS / HX_LANES; ++p) hx_store(&x[p * HX_LANES], pack[p]);
+  return ((x[0] + x[4]) + (x[2] + x[6])) + ((x[1] + x[5]) + (x[3] + x[7]));
+}
 
 /* Returns the sum over the legs, in every lane. The order of additions does not depend on the
  * width: ((x0 + x4) + x2) + ((x1 + x5) + x3). */

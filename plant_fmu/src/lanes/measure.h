@@ -1,4 +1,5 @@
-/* measure.h - measurements of a step: works, losses, slip, impulses and peaks of joints and feet
+/* measure.h - measurements of a step: works and losses of joints and contacts; slip, impulses and
+ * peaks of feet
  *
  * Works and losses are the impulses of the step's forces times the mean of the speeds at its ends
  * (eq. 27), so that they equal the change of kinetic energy. Other integrals follow the step's
@@ -27,8 +28,9 @@ static const double motor_weight[INTERVALS + 1] = {1.0 / 6, 0.0, 4.0 / 6, 0.0, 1
 /* Works and losses of a step, J, legs in lanes. */
 typedef struct {
   hxReal motor[HX_JOINTS][HX_PACKS];
-  hxReal mean_torque[HX_JOINTS][HX_PACKS]; /* N m  of the motors */
-  hxReal contact[HX_PACKS], friction[HX_PACKS], gear[HX_PACKS];
+  hxReal mean_torque[HX_JOINTS][HX_PACKS];                      /* N m  of the motors */
+  hxReal contact[HX_PACKS], friction[HX_PACKS], gear[HX_PACKS]; /* of all rows on the tibias */
+  hxNumber torso_contact, torso_friction;
 } hxStepWorks;
 
 /* A step between two moments. */
@@ -42,7 +44,43 @@ typedef struct {
 
 /* ---- moments ---- */
 
-/* Computes angles, speeds and feet of a motion. */
+/* Stores a row of contacts of bodies with centres of mass r and angular velocities w. */
+HX_INLINE void store_contact_moment(const hxModel *model, const hxContactKinematics *kin, int row,
+                                    int slot, hxVec3 r, hxVec3 w, hxContactMoment *moment) {
+  const hxVec3 to_point = hx_scale(hx_splat(-model->radius[row]), kin->normal);
+  hx_store_vec3(moment->centre, slot, hx_add3(r, hx_sub3(kin->arm, to_point)));
+  hx_store_vec3(moment->normal, slot, kin->normal);
+  hx_store_vec3(moment->slip, slot, hx_add_scaled(kin->velocity, kin->ddelta, kin->normal));
+  hx_store_vec3(moment->roll, slot, hx_cross(w, to_point));
+  hx_store(&moment->delta[slot], kin->delta);
+  hx_store(&moment->ddelta[slot], kin->ddelta);
+}
+
+/* Stores a row of contacts on the tibias. */
+HX_INLINE void row_moment(const hxModel *model, const hxPlantMotion *motion, int row, int slot,
+                          const hxBody *tibia, hxMoment *moment) {
+  const hxContactKinematics kin = hx_tibia_contact(model, motion, row, slot, tibia);
+  store_contact_moment(model, &kin, row, slot, hx_link_vec3(motion, HX_JOINTS - 1, HX_R, slot),
+                       tibia->w, &moment->contact[row]);
+}
+
+HX_RARE void further_moments(const hxModel *model, const hxPlantMotion *motion, int slot,
+                             const hxBody *tibia, hxMoment *moment) {
+  for (int k = 1; k < model->rows; ++k)
+    row_moment(model, motion, model->row[k], slot, tibia, moment);
+}
+
+/* Stores the torso's contacts. */
+HX_RARE void torso_moment(const hxModel *model, const hxPlantMotion *motion, const hxBody *torso,
+                          hxMoment *moment) {
+  for (int slot = 0; slot < HX_SLOTS; slot += HX_LANES) {
+    const hxContactKinematics kin = hx_torso_contact(model, motion, slot, torso);
+    store_contact_moment(model, &kin, HX_TORSO, slot, hx_torso_vec3(motion, HX_R), torso->w,
+                         &moment->contact[HX_TORSO]);
+  }
+}
+
+/* Computes angles, speeds and contacts of a motion. */
 static inline void hx_moment_of(const hxModel *model, const hxPlantMotion *motion,
                                 hxMoment *moment) {
   const hxBody torso = hx_torso_body(motion);
@@ -59,17 +97,28 @@ static inline void hx_moment_of(const hxModel *model, const hxPlantMotion *motio
       const hxVec3 s = hx_mul(i.axes, hx_load_vec3(m->s_i, slot));
       hx_store(&moment->speed[joint][slot], hx_dot(s, hx_sub3(j.w, i.w)));
     }
-    const hxFootKinematics foot = hx_foot_kinematics(model, motion, slot, &j);
-    const hxVec3 to_point = hx_scale(hx_splat(-model->foot_radius), foot.normal);
-    const hxVec3 centre =
-        hx_add3(hx_link_vec3(motion, HX_JOINTS - 1, HX_R, slot), hx_sub3(foot.arm, to_point));
-    hx_store_vec3(moment->centre, slot, centre);
-    hx_store_vec3(moment->normal, slot, foot.normal);
-    hx_store_vec3(moment->slip, slot, hx_add_scaled(foot.velocity, foot.ddelta, foot.normal));
-    hx_store_vec3(moment->roll, slot, hx_cross(j.w, to_point));
     hx_store_vec3(moment->turn, slot, j.w);
-    hx_store(&moment->delta[slot], foot.delta);
-    hx_store(&moment->ddelta[slot], foot.ddelta);
+    row_moment(model, motion, HX_FOOT, slot, &j, moment);
+    if (model->rows > 1) further_moments(model, motion, slot, &j, moment);
+  }
+  if (model->torso_rows) torso_moment(model, motion, &torso, moment);
+  moment->stale = 0.0;
+}
+
+/* Copies a moment, of contacts those of the model's rows. */
+static inline void hx_copy_moment(const hxModel *model, hxMoment *to, const hxMoment *from) {
+  memcpy(to, from, offsetof(hxMoment, contact[1]));
+  for (int k = 1; k < model->rows + model->torso_rows; ++k)
+    to->contact[model->row[k]] = from->contact[model->row[k]];
+}
+
+/* Copies penetration and approach speed of all contacts. */
+static inline void hx_depths_of_moment(const hxModel *model, const hxMoment *moment,
+                                       hxDepths *depths) {
+  for (int k = 0; k < model->rows + model->torso_rows; ++k) {
+    const hxContactMoment *contact = &moment->contact[model->row[k]];
+    memcpy(depths->delta[model->row[k]], contact->delta, sizeof contact->delta);
+    memcpy(depths->ddelta[model->row[k]], contact->ddelta, sizeof contact->ddelta);
   }
 }
 
@@ -77,7 +126,6 @@ static inline void hx_moment_of(const hxModel *model, const hxPlantMotion *motio
 static inline void hx_moment_update(const hxModel *model, hxState *state) {
   hx_moment_of(model, &state->motion, &state->moment);
   state->moment.time = state->time;
-  state->moment.stale = 0.0;
 }
 
 /* Resets the peaks, which are those of one call. */
@@ -86,32 +134,52 @@ static inline void hx_reset_peaks(hxMeasured *measured) {
   memset(measured->peak_rate, 0, sizeof measured->peak_rate);
 }
 
-/* Copies leg 0 into the unused slots of the first rows of a structure. */
-static inline void fill_rows(void *structure, size_t rows) {
+/* Copies leg 0 into the unused slots of the first lines of a structure. */
+static inline void fill_lines(void *structure, size_t lines) {
   double *first = structure;
-  for (size_t row = 0; row < rows; ++row) hx_fill_slots(&first[row * HX_SLOTS]);
+  for (size_t line = 0; line < lines; ++line) hx_fill_slots(&first[line * HX_SLOTS]);
 }
 
 /* Copies leg 0 into the unused slots of all measurements. */
-static inline void hx_fill_measured_slots(hxState *state) {
-  fill_rows(&state->moment, HX_MOMENT_ROWS);
-  fill_rows(&state->measured, HX_MEASURED_ROWS);
+static inline void hx_fill_measured_slots(const hxModel *model, hxState *state) {
+  fill_lines(&state->moment, HX_MOMENT_LINES);
+  for (int k = 0; k < model->rows; ++k)
+    fill_lines(&state->moment.contact[model->row[k]], HX_CONTACT_LINES);
+  fill_lines(&state->measured, HX_MEASURED_LINES);
 }
 
-/* Switches the contacts that are due at time t, and starts the measurement of landings. */
-static inline void hx_switch_contacts(const hxModel *model, const double delta[HX_SLOTS],
-                                      const double ddelta[HX_SLOTS], double t, hxState *state) {
-  const hxContactState before = state->contact;
-  state->touchdowns += hx_contact_switch(model, delta, ddelta, &state->contact);
+/* Sets whether each foot touches the ground, by any of its rows. */
+static inline void feet_on_ground(const hxModel *model, const hxContactState *contact,
+                                  int touches[HX_SLOTS]) {
+  for (int slot = 0; slot < HX_SLOTS; ++slot) {
+    touches[slot] = 0;
+    for (int k = 0; k < model->foot_rows; ++k)
+      touches[slot] |= contact->closed[model->row[k]][slot] != 0.0;
+  }
+}
+
+/* Starts the measurement of a landing at time t. */
+static inline void start_landing(int slot, double t, hxMeasured *measured) {
+  measured->landings[slot] += 1.0;
+  measured->landed_at[slot] = t;
+  measured->landing_left[slot] = LANDING_SAMPLES;
+  measured->landing_rate[slot] = 0.0;
+  for (int i = 0; i < HX_RISE_SAMPLES; ++i) measured->landing_force[i][slot] = 0.0;
+}
+
+/* Switches the contacts that are due at time t, and starts the measurement of landings; returns
+ * whether there were some. */
+static inline int hx_switch_contacts(const hxModel *model, const hxDepths *depths, double t,
+                                     hxState *state) {
+  if (!hx_contact_is_due(model, depths, &state->contact)) return 0;
+  int before[HX_SLOTS], after[HX_SLOTS];
+  feet_on_ground(model, &state->contact, before);
+  state->touchdowns += hx_contact_switch(model, depths, &state->contact);
+  feet_on_ground(model, &state->contact, after);
   for (int slot = 0; slot < HX_SLOTS; ++slot)
-    if (before.closed[slot] == 0.0 && state->contact.closed[slot] != 0.0) {
-      state->measured.landings[slot] += 1.0;
-      state->measured.landed_at[slot] = t;
-      state->measured.landing_left[slot] = LANDING_SAMPLES;
-      state->measured.landing_rate[slot] = 0.0;
-      for (int i = 0; i < HX_RISE_SAMPLES; ++i) state->measured.landing_force[i][slot] = 0.0;
-    }
-  if (has_bristles(model)) hx_contact_slacken(&state->contact, &state->motion);
+    if (after[slot] && !before[slot]) start_landing(slot, t, &state->measured);
+  if (has_bristles(model, HX_FOOT)) hx_contact_slacken(&state->contact, &state->motion);
+  return 1;
 }
 
 /* ---- works and losses (eq. 27) ---- */
@@ -126,10 +194,44 @@ static inline hxVec3 mean_vec3(const double (*from)[HX_SLOTS], const double (*to
   return hx_scale(hx_splat(0.5), hx_add3(hx_load_vec3(from, slot), hx_load_vec3(to, slot)));
 }
 
-/* Returns the elastic energy 2/5 K delta^(5/2) of closed feet, J. */
+/* Returns the elastic energy 2/5 K delta^(5/2) of closed contacts, J. */
 static inline hxReal stored_in_contact(const hxModel *model, hxReal closed, const double *delta) {
   const hxReal depth = hx_max(hx_load(delta), hx_splat(0.0));
   return closed * (0.4 * model->stiffness) * (depth * depth) * hx_sqrt(depth);
+}
+
+/* Computes what a row of contacts and its friction lose in a step with these impulses (eq. 27). */
+HX_INLINE void contact_works(const hxPath *path, int row, int slot, hxVec3 impulse, hxReal *contact,
+                             hxReal *friction) {
+  const hxContactMoment *from = &path->from->contact[row], *to = &path->to->contact[row];
+  const hxReal closed = hx_load(&path->contact->closed[row][slot]);
+  const hxVec3 normal = mean_vec3(from->normal, to->normal, slot),
+               slip = mean_vec3(from->slip, to->slip, slot);
+  const hxReal taken = hx_dot(impulse, normal) * mean_of(&from->ddelta[slot], &to->ddelta[slot]);
+  const hxReal stored = stored_in_contact(path->model, closed, &to->delta[slot]) -
+                        stored_in_contact(path->model, closed, &from->delta[slot]);
+  *contact = taken - stored;
+  *friction = -hx_dot(impulse, slip);
+}
+
+HX_RARE void add_further_works(const hxPath *path, int pack, const hxImpulses *impulse,
+                               hxStepWorks *works) {
+  for (int k = 1; k < path->model->rows; ++k) {
+    const int row = path->model->row[k];
+    hxReal contact, friction;
+    contact_works(path, row, pack * HX_LANES, impulse->contact[row][pack], &contact, &friction);
+    works->contact[pack] += contact, works->friction[pack] += friction;
+  }
+}
+
+/* Sums the losses of the torso's contacts. */
+HX_RARE void torso_works(const hxPath *path, const hxImpulses *impulse, hxStepWorks *works) {
+  hxReal contact[HX_TORSO_PACKS], friction[HX_TORSO_PACKS];
+  for (int pack = 0; pack < HX_TORSO_PACKS; ++pack)
+    contact_works(path, HX_TORSO, pack * HX_LANES, impulse->torso[pack], &contact[pack],
+                  &friction[pack]);
+  works->torso_contact = hx_sum_slots(contact);
+  works->torso_friction = hx_sum_slots(friction);
 }
 
 /* Returns the energy that a joint's stops store, J. */
@@ -138,20 +240,27 @@ static inline hxReal stored_in_stop(const hxModel *model, int joint, int slot, h
   return (0.5 * model->stop_stiffness) * (x * x);
 }
 
-/* Returns what the stops of a pack of legs lose in a step: their work on the joints less what they
+/* Adds what the stops of a pack of legs lose in a step: their work on the joints less what they
  * store. */
-static inline hxReal stop_loss(const hxPath *path, const hxImpulses *impulse, int pack) {
+HX_RARE void add_stop_works(const hxPath *path, const hxImpulses *impulse, int pack,
+                            hxStepWorks *works) {
   const int slot = pack * HX_LANES;
-  hxReal loss = hx_splat(0.0);
   for (int joint = 0; joint < HX_JOINTS; ++joint) {
     const hxReal speed = mean_of(&path->from->speed[joint][slot], &path->to->speed[joint][slot]);
     const hxReal before = hx_load(&path->from->angle[joint][slot]),
                  after = hx_load(&path->to->angle[joint][slot]);
     const hxReal stored = stored_in_stop(path->model, joint, slot, after) -
                           stored_in_stop(path->model, joint, slot, before);
-    loss -= impulse->stop[joint][pack] * speed + stored;
+    works->gear[pack] -= impulse->stop[joint][pack] * speed + stored;
   }
-  return loss;
+}
+
+/* Adds what spin and rolling friction of a pack of feet lose in a step. */
+HX_RARE void add_turning_works(const hxPath *path, const hxImpulses *impulse, int pack,
+                               hxStepWorks *works) {
+  const hxVec3 turn = mean_vec3(path->from->turn, path->to->turn, pack * HX_LANES);
+  for (int k = 0; k < path->model->foot_rows; ++k)
+    works->friction[pack] -= hx_dot(impulse->moment[path->model->row[k]][pack], turn);
 }
 
 /* Computes works and losses of a step from its impulses (eq. 27). */
@@ -168,20 +277,14 @@ static inline void hx_step_works(const hxPath *path, const hxImpulses *impulse,
       works->mean_torque[joint][pack] = impulse->motor[joint][pack] * per_step;
       works->gear[pack] -= impulse->gear[joint][pack] * speed;
     }
-    const hxReal closed = hx_load(&path->contact->closed[slot]);
-    const hxVec3 normal = mean_vec3(from->normal, to->normal, slot),
-                 slip = mean_vec3(from->slip, to->slip, slot);
-    const hxReal taken =
-        hx_dot(impulse->foot[pack], normal) * mean_of(&from->ddelta[slot], &to->ddelta[slot]);
-    const hxReal stored = stored_in_contact(path->model, closed, &to->delta[slot]) -
-                          stored_in_contact(path->model, closed, &from->delta[slot]);
-    works->contact[pack] = taken - stored;
-    works->friction[pack] = -hx_dot(impulse->foot[pack], slip);
-    if (has_turning_friction(path->model))
-      works->friction[pack] -=
-          hx_dot(impulse->moment[pack], mean_vec3(from->turn, to->turn, slot));
-    if (path->model->stops) works->gear[pack] += stop_loss(path, impulse, pack);
+    contact_works(path, HX_FOOT, slot, impulse->contact[HX_FOOT][pack], &works->contact[pack],
+                  &works->friction[pack]);
+    if (path->model->rows > 1) add_further_works(path, pack, impulse, works);
+    if (path->model->stops) add_stop_works(path, impulse, pack, works);
+    if (has_turning_friction(path->model, HX_FOOT)) add_turning_works(path, impulse, pack, works);
   }
+  works->torso_contact = works->torso_friction = 0.0;
+  if (path->model->torso_rows) torso_works(path, impulse, works);
 }
 
 /* ---- joints ---- */
@@ -267,42 +370,86 @@ static inline hxReal share_above(hxReal from, hxReal to, double limit, hxReal *m
   return high - low;
 }
 
-/* Measures one pack of feet: slip under load, impulse, peaks (eq. 28). */
-static inline void measure_feet(const hxPath *path, int slot, hxMeasured *measured) {
-  const hxModel *model = path->model;
-  const hxMoment *from = path->from, *to = path->to;
-  const hxReal zero = hx_splat(0.0), h = hx_splat(path->h), per_step = hx_splat(1.0 / path->h);
-  const hxReal closed = hx_load(&path->contact->closed[slot]),
-               damping = hx_load(&path->contact->damping[slot]);
-  const hxVec3 slip_from = hx_load_vec3(from->slip, slot), slip_to = hx_load_vec3(to->slip, slot);
+/* A contact of feet along a step, legs in lanes. */
+typedef struct {
+  hxVec3 slip_from, slip_to, mean_slip;     /* m/s */
+  hxReal delta, slope_from, rise, slope_to; /* m  the cubic of the depth */
+  hxReal closed, damping;
+} hxFootPath;
+
+/* Returns the path of a row of feet. */
+HX_INLINE hxFootPath foot_path(const hxPath *path, int row, int slot) {
+  const hxContactMoment *from = &path->from->contact[row], *to = &path->to->contact[row];
+  const hxReal h = hx_splat(path->h), per_step = hx_splat(1.0 / path->h);
   const hxVec3 way = hx_sub3(hx_load_vec3(to->centre, slot), hx_load_vec3(from->centre, slot));
   const hxVec3 along = along_ground(way, mean_vec3(from->normal, to->normal, slot));
-  const hxVec3 mean = hx_add3(hx_scale(per_step, along), mean_vec3(from->roll, to->roll, slot));
-  const hxReal delta = hx_load(&from->delta[slot]), slope_from = h * hx_load(&from->ddelta[slot]);
-  const hxReal rise = hx_load(&to->delta[slot]) - delta, slope_to = h * hx_load(&to->ddelta[slot]);
+  const hxReal delta = hx_load(&from->delta[slot]);
+  return (hxFootPath){.slip_from = hx_load_vec3(from->slip, slot),
+                      .slip_to = hx_load_vec3(to->slip, slot),
+                      .mean_slip =
+                          hx_add3(hx_scale(per_step, along), mean_vec3(from->roll, to->roll, slot)),
+                      .delta = delta,
+                      .slope_from = h * hx_load(&from->ddelta[slot]),
+                      .rise = hx_load(&to->delta[slot]) - delta,
+                      .slope_to = h * hx_load(&to->ddelta[slot]),
+                      .closed = hx_load(&path->contact->closed[row][slot]),
+                      .damping = hx_load(&path->contact->damping[row][slot])};
+}
+
+/* Normal force of feet, its rate and the sliding speed at a point of a step. */
+typedef struct {
+  hxReal force, rate, speed;
+} hxFootInstant;
+
+/* Computes them for a row of feet at x in [0, 1]. */
+HX_INLINE hxFootInstant foot_at(const hxPath *path, const hxFootPath *foot, double x) {
+  const hxReal per_step = hx_splat(1.0 / path->h);
+  const hxReal bends = path->h < shortest_bend ? hx_splat(0.0) : per_step * per_step;
+  const hxCubic depth = cubic(foot->delta, foot->slope_from, foot->rise, foot->slope_to, x);
+  const hxReal approach = per_step * depth.rate;
+  const hxNormalForce f =
+      hx_normal_force(path->model, foot->closed, foot->damping, depth.value, approach);
+  const hxVec3 slip = sliding(foot->slip_from, foot->slip_to, foot->mean_slip, x);
+  return (hxFootInstant){f.force, f.stiffness * approach + f.viscosity * (bends * depth.second),
+                         hx_sqrt(hx_dot(slip, slip))};
+}
+
+/* Adds further contacts of the same feet; the sliding speed is that of the largest force. */
+HX_RARE hxFootInstant with_further_feet(const hxPath *path, int slot, double x, hxFootInstant sum) {
+  hxReal largest = sum.force;
+  for (int k = 1; k < path->model->foot_rows; ++k) {
+    const hxFootPath foot = foot_path(path, path->model->row[k], slot);
+    const hxFootInstant now = foot_at(path, &foot, x);
+    sum.speed = hx_select(hx_less(largest, now.force), now.speed, sum.speed);
+    largest = hx_max(largest, now.force);
+    sum.force += now.force, sum.rate += now.rate;
+  }
+  return sum;
+}
+
+/* Measures one pack of feet: slip under load, impulse, peaks (eq. 28). */
+HX_INLINE void measure_feet(const hxPath *path, int slot, hxMeasured *measured) {
+  const hxModel *model = path->model;
+  const hxReal zero = hx_splat(0.0), h = hx_splat(path->h);
+  const hxFootPath foot = foot_path(path, HX_FOOT, slot);
   hxReal peak = hx_load(&measured->peak_force[slot]),
          steepest = hx_load(&measured->peak_rate[slot]);
   hxReal impulse = zero, slipped = zero;
-  const hxReal bends = path->h < shortest_bend ? zero : per_step * per_step;
   hxReal last_force = zero, last_speed = zero;
   /* impulse, peaks and slip under load by Simpson's rule (eq. 28) */
   for (int node = 0; node <= INTERVALS; ++node) {
     const double x = (double)node / INTERVALS;
-    const hxCubic depth = cubic(delta, slope_from, rise, slope_to, x);
-    const hxReal approach = per_step * depth.rate;
-    const hxNormalForce f = hx_normal_force(model, closed, damping, depth.value, approach);
-    const hxVec3 slip = sliding(slip_from, slip_to, mean, x);
-    const hxReal speed = hx_sqrt(hx_dot(slip, slip));
-    const hxReal rate = f.stiffness * approach + f.viscosity * (bends * depth.second);
-    peak = hx_max(peak, f.force);
-    steepest = hx_max(steepest, rate);
-    impulse += hx_splat(path->h * foot_weight[node]) * f.force;
+    hxFootInstant now = foot_at(path, &foot, x);
+    if (model->foot_rows > 1) now = with_further_feet(path, slot, x, now);
+    peak = hx_max(peak, now.force);
+    steepest = hx_max(steepest, now.rate);
+    impulse += hx_splat(path->h * foot_weight[node]) * now.force;
     if (node > 0) {
       hxReal middle;
-      const hxReal share = share_above(last_force, f.force, model->load_threshold, &middle);
-      slipped += (h * (1.0 / INTERVALS)) * share * (last_speed + middle * (speed - last_speed));
+      const hxReal share = share_above(last_force, now.force, model->load_threshold, &middle);
+      slipped += (h * (1.0 / INTERVALS)) * share * (last_speed + middle * (now.speed - last_speed));
     }
-    last_force = f.force, last_speed = speed;
+    last_force = now.force, last_speed = now.speed;
   }
   hx_store(&measured->peak_force[slot], peak);
   hx_store(&measured->peak_rate[slot], steepest);
@@ -310,14 +457,14 @@ static inline void measure_feet(const hxPath *path, int slot, hxMeasured *measur
   hx_store(&measured->slip_distance[slot], hx_load(&measured->slip_distance[slot]) + slipped);
 }
 
-/* Returns the normal force of a leg's foot at x in [0, 1] of a step, N. */
-static inline double force_within(const hxPath *path, int leg, double x) {
-  const double h = path->h, delta = path->from->delta[leg];
-  const hxCubic depth =
-      cubic(hx_splat(delta), hx_splat(h * path->from->ddelta[leg]),
-            hx_splat(path->to->delta[leg] - delta), hx_splat(h * path->to->ddelta[leg]), x);
-  const hxReal closed = hx_splat(path->contact->closed[leg]),
-               damping = hx_splat(path->contact->damping[leg]);
+/* Returns the normal force of a leg's contact at x in [0, 1] of a step, N. */
+static inline double force_within(const hxPath *path, int row, int leg, double x) {
+  const hxContactMoment *from = &path->from->contact[row], *to = &path->to->contact[row];
+  const double h = path->h, delta = from->delta[leg];
+  const hxCubic depth = cubic(hx_splat(delta), hx_splat(h * from->ddelta[leg]),
+                              hx_splat(to->delta[leg] - delta), hx_splat(h * to->ddelta[leg]), x);
+  const hxReal closed = hx_splat(path->contact->closed[row][leg]),
+               damping = hx_splat(path->contact->damping[row][leg]);
   return hx_lane(
       hx_normal_force(path->model, closed, damping, depth.value, hx_splat(1.0 / h) * depth.rate)
           .force,
@@ -333,7 +480,9 @@ static inline void measure_landing(const hxPath *path, int leg, hxMeasured *meas
     const double x = (measured->landed_at[leg] + n * landing_sample - path->t) / path->h;
     if (x > 1.0) return;
     double *oldest = &measured->landing_force[n % HX_RISE_SAMPLES][leg];
-    const double force = force_within(path, leg, fmax(x, 0.0));
+    double force = 0.0;
+    for (int k = 0; k < path->model->foot_rows; ++k)
+      force += force_within(path, path->model->row[k], leg, fmax(x, 0.0));
     const double rate = (force - *oldest) / (HX_RISE_SAMPLES * landing_sample);
     measured->landing_rate[leg] = fmax(measured->landing_rate[leg], rate);
     *oldest = force;
@@ -354,16 +503,18 @@ static inline int hx_has_cone(const hxModel *model) {
   return model->mu > 0.0 && model->friction_law != HX_FRICTION_NONE;
 }
 
-/* Adds the step to the time of feet under load, by the share of the cone that its impulses use. */
-static inline void measure_cone(const hxPath *path, const hxImpulses *impulse,
+/* Adds the step to the time of a row of feet under load, by the share of the cone that its
+ * impulses use. */
+static inline void measure_cone(const hxPath *path, int row, const hxImpulses *impulse,
                                 hxMeasured *measured) {
+  const hxContactMoment *from = &path->from->contact[row], *to = &path->to->contact[row];
   double place[HX_SLOTS], pressed[HX_SLOTS];
   if (!hx_has_cone(path->model)) return;
   for (int pack = 0; pack < HX_PACKS; ++pack) {
     const int slot = pack * HX_LANES;
-    const hxVec3 normal = mean_vec3(path->from->normal, path->to->normal, slot);
-    const hxReal along = hx_dot(impulse->foot[pack], normal);
-    const hxVec3 across = hx_add_scaled(impulse->foot[pack], -along, normal);
+    const hxVec3 normal = mean_vec3(from->normal, to->normal, slot);
+    const hxReal along = hx_dot(impulse->contact[row][pack], normal);
+    const hxVec3 across = hx_add_scaled(impulse->contact[row][pack], -along, normal);
     const hxReal share =
         hx_sqrt(hx_dot(across, across)) / hx_max(path->model->mu * along, hx_splat(1e-300));
     hx_store(&place[slot], hx_cone_place(share));
@@ -386,9 +537,10 @@ static inline void hx_measure_path(const hxPath *path, const hxImpulses *impulse
     measure_feet(path, pack * HX_LANES, measured);
   }
   for (int leg = 0; leg < HX_LEGS; ++leg) measure_landing(path, leg, measured);
-  measure_cone(path, impulse, measured);
-  measured->contact_loss += hx_lane(hx_sum_legs(works->contact), 0);
-  measured->friction_loss += hx_lane(hx_sum_legs(works->friction), 0);
+  for (int k = 0; k < path->model->foot_rows; ++k)
+    measure_cone(path, path->model->row[k], impulse, measured);
+  measured->contact_loss += hx_lane(hx_sum_legs(works->contact), 0) + works->torso_contact;
+  measured->friction_loss += hx_lane(hx_sum_legs(works->friction), 0) + works->torso_friction;
   measured->gear_loss += hx_lane(hx_sum_legs(works->gear), 0);
 }
 

@@ -45,26 +45,46 @@ static hxNumber hx_kinetic_energy(const hxModel *model, const hxPlantMotion *mot
   return hx_lane(torso + hx_sum_legs(legs), 0);
 }
 
-/* Returns the potential energy of gravity, contacts and stops, J; a contact's is 2/5 K
- * delta^(5/2), a stop's k x^2/2. */
+/* Returns the elastic energy 2/5 K delta^(5/2) of a row of contacts, J. */
+static hxReal elastic_energy(const hxContactWork *contact) {
+  return 0.4 * contact->normal.elastic * hx_max(contact->kin.delta, hx_splat(0.0));
+}
+
+static hxNumber torso_elastic_energy(const hxWork *work) {
+  hxReal energy[HX_TORSO_PACKS];
+  for (int pack = 0; pack < HX_TORSO_PACKS; ++pack)
+    energy[pack] = elastic_energy(&work->torso_contact[pack]);
+  return hx_sum_slots(energy);
+}
+
+/* Returns the energy k x^2/2 that the stops of a leg store, J. */
+static hxReal stop_energy(const hxModel *model, const hxLegWork *leg, int slot) {
+  hxReal energy = hx_splat(0.0);
+  for (int joint = 0; joint < HX_JOINTS; ++joint) {
+    const hxReal x = hx_overrun(model, joint, slot, leg->joint[joint].angle);
+    energy += (0.5 * model->stop_stiffness) * (x * x);
+  }
+  return energy;
+}
+
+/* Returns the potential energy of gravity, contacts and stops, J. */
 static hxNumber hx_potential_energy(const hxModel *model, const hxPlantMotion *motion,
                                     const hxWork *work) {
   const hxVec3 g = hx_splat_vec3(model->gravity);
   hxReal legs[HX_PACKS];
   for (int pack = 0; pack < HX_PACKS; ++pack) {
-    const hxFootWork *foot = &work->pack[pack].foot;
+    const hxContactWork *contact = work->pack[pack].contact;
     const int slot = pack * HX_LANES;
-    legs[pack] = 0.4 * foot->normal.elastic * hx_max(foot->kin.delta, hx_splat(0.0));
-    for (int joint = 0; joint < HX_JOINTS; ++joint) {
+    legs[pack] = elastic_energy(&contact[HX_FOOT]);
+    for (int k = 1; k < model->rows; ++k) legs[pack] += elastic_energy(&contact[model->row[k]]);
+    if (model->stops) legs[pack] += stop_energy(model, &work->pack[pack], slot);
+    for (int joint = 0; joint < HX_JOINTS; ++joint)
       legs[pack] -= hx_load(&model->joint[joint].mass[slot]) *
                     hx_dot(g, hx_link_vec3(motion, joint, HX_R, slot));
-      if (model->stops) {
-        const hxReal x = hx_overrun(model, joint, slot, work->pack[pack].joint[joint].angle);
-        legs[pack] += (0.5 * model->stop_stiffness) * (x * x);
-      }
-    }
   }
-  return hx_lane(hx_sum_legs(legs) - model->torso_mass * hx_dot(g, hx_torso_vec3(motion, HX_R)), 0);
+  const hxNumber sum =
+      hx_lane(hx_sum_legs(legs) - model->torso_mass * hx_dot(g, hx_torso_vec3(motion, HX_R)), 0);
+  return model->torso_rows ? sum + torso_elastic_energy(work) : sum;
 }
 
 /* Fills a joint's outputs. The reaction on the child is the force -lambda and, about the joint's
@@ -86,24 +106,49 @@ static void fill_joint(const hxState *state, const hxJointWork *k, int lane, int
 }
 
 /* Returns the size of the tangential force, N. */
-static hxNumber tangential_force(const hxModel *model, const hxFootWork *foot, int lane) {
+static hxNumber tangential_force(const hxModel *model, const hxContactWork *foot, int lane) {
   const hxVec3 grip = foot->bristle.grip;
-  return hx_lane(has_bristles(model) ? foot->normal.force * hx_sqrt(hx_dot(grip, grip))
-                                     : foot->drag * foot->slip_speed,
+  return hx_lane(has_bristles(model, HX_FOOT) ? foot->normal.force * hx_sqrt(hx_dot(grip, grip))
+                                              : foot->drag * foot->slip_speed,
                  lane);
 }
 
-/* Fills a foot's outputs. */
-static void fill_foot(const hxModel *model, const hxState *state, const hxFootWork *foot,
+/* Returns the deeper row of a foot. */
+static int deeper_row(const hxModel *model, const hxLegWork *leg, int lane) {
+  int deepest = HX_FOOT;
+  for (int k = 1; k < model->foot_rows; ++k) {
+    const hxReal *delta = &leg->contact[model->row[k]].kin.delta;
+    if (hx_re(hx_lane(*delta, lane)) > hx_re(hx_lane(leg->contact[deepest].kin.delta, lane)))
+      deepest = model->row[k];
+  }
+  return deepest;
+}
+
+/* Adds the forces of a foot's further rows. */
+static void add_foot_row(const hxModel *model, const hxState *state, const hxContactWork *foot,
+                         int row, int lane, int leg, hxOutput *o) {
+  hxNumber force[3];
+  get3(foot->force, lane, force);
+  for (int i = 0; i < 3; ++i) o->foot.force[leg][i] += force[i];
+  o->foot.normal_force[leg] += hx_lane(foot->normal.force, lane);
+  o->foot.tangential_force[leg] += tangential_force(model, foot, lane);
+  o->foot.contact[leg] |= state->contact.closed[row][leg] != 0.0;
+}
+
+/* Fills a foot's outputs: forces are sums over its rows, the point is that of its deeper row. */
+static void fill_foot(const hxModel *model, const hxState *state, const hxLegWork *work,
                       hxVec3 tibia, int lane, int leg, hxOutput *o) {
+  const hxContactWork *foot = &work->contact[HX_FOOT];
+  const int row = deeper_row(model, work, lane);
+  const hxContactWork *deeper = &work->contact[row];
   get3(foot->force, lane, o->foot.force[leg]);
-  get3(hx_add3(tibia, foot->kin.arm), lane, o->foot.position[leg]);
-  get3(foot->kin.velocity, lane, o->foot.velocity[leg]);
+  get3(hx_add3(tibia, deeper->kin.arm), lane, o->foot.position[leg]);
+  get3(deeper->kin.velocity, lane, o->foot.velocity[leg]);
   o->foot.normal_force[leg] = hx_lane(foot->normal.force, lane);
   o->foot.tangential_force[leg] = tangential_force(model, foot, lane);
-  o->foot.slip_speed[leg] = hx_lane(foot->slip_speed, lane);
-  o->foot.penetration[leg] = hx_lane(foot->kin.delta, lane);
-  o->foot.impact_speed[leg] = state->contact.impact_speed[leg];
+  o->foot.slip_speed[leg] = hx_lane(deeper->slip_speed, lane);
+  o->foot.penetration[leg] = hx_lane(deeper->kin.delta, lane);
+  o->foot.impact_speed[leg] = state->contact.impact_speed[row][leg];
   for (int i = 0; i < 3; ++i) o->foot.bristle[leg][i] = state->motion.bristle[i][leg];
   o->foot.slip_distance[leg] = state->measured.slip_distance[leg];
   o->foot.impulse[leg] = state->measured.impulse[leg];
@@ -111,7 +156,9 @@ static void fill_foot(const hxModel *model, const hxState *state, const hxFootWo
   o->foot.peak_force_rate[leg] = state->measured.peak_rate[leg];
   o->foot.landing_rate[leg] = state->measured.landing_rate[leg];
   o->foot.landings[leg] = state->measured.landings[leg];
-  o->foot.contact[leg] = state->contact.closed[leg] != 0.0;
+  o->foot.contact[leg] = state->contact.closed[HX_FOOT][leg] != 0.0;
+  for (int k = 1; k < model->foot_rows; ++k)
+    add_foot_row(model, state, &work->contact[model->row[k]], model->row[k], lane, leg, o);
 }
 
 /* Fills the outputs of torso and IMU. */
@@ -175,7 +222,7 @@ static void hx_output_fill(const hxModel *model, const hxState *state, const hxW
     for (int joint = 0; joint < HX_JOINTS; ++joint)
       fill_joint(state, &w->joint[joint], lane, leg, joint, o);
     const hxVec3 tibia = hx_link_vec3(&state->motion, HX_JOINTS - 1, HX_R, leg - lane);
-    fill_foot(model, state, &w->foot, tibia, lane, leg, o);
+    fill_foot(model, state, w, tibia, lane, leg, o);
   }
   fill_torso(&state->motion, work, o);
   for (int i = 0; i < HX_CONE_BINS; ++i) o->cone_time[i] = state->measured.cone_time[i];
@@ -192,6 +239,24 @@ static void hx_output_fill(const hxModel *model, const hxState *state, const hxW
 static int cone_bin(double share) {
   const double place = hx_lane(hx_cone_place(hx_splat(share)), 0);
   return (int)place;
+}
+
+/* Fills the rates of a foot's integrals. */
+static void fill_foot_rates(const hxModel *model, const hxLegWork *work, int lane, int leg,
+                            hxOutput *rate) {
+  double sum = 0.0;
+  for (int k = 0; k < model->foot_rows; ++k) {
+    const hxContactWork *foot = &work->contact[model->row[k]];
+    const double force = hx_lane(foot->normal.force, lane),
+                 across = tangential_force(model, foot, lane);
+    sum += force;
+    if (force > model->load_threshold && hx_has_cone(model))
+      rate->cone_time[cone_bin(across / (model->mu * force))] += 1.0;
+  }
+  const hxContactWork *deeper = &work->contact[deeper_row(model, work, lane)];
+  rate->foot.impulse[leg] = sum;
+  rate->foot.slip_distance[leg] =
+      sum > model->load_threshold ? hx_lane(deeper->slip_speed, lane) : 0.0;
 }
 
 /* Fills the rates of the integrals since the start; rates of peaks are 0. */
@@ -211,13 +276,7 @@ static void hx_integral_rates_fill(const hxModel *model, const hxWork *work, hxO
       rate->negative_work[leg][joint] = fmax(-power, 0.0);
       rate->torque_squared[leg][joint] = torque * torque;
     }
-    const double force = hx_lane(w->foot.normal.force, lane),
-                 across = tangential_force(model, &w->foot, lane);
-    if (force > model->load_threshold && hx_has_cone(model))
-      rate->cone_time[cone_bin(across / (model->mu * force))] += 1.0;
-    rate->foot.impulse[leg] = force;
-    rate->foot.slip_distance[leg] =
-        force > model->load_threshold ? hx_lane(w->foot.slip_speed, lane) : 0.0;
+    fill_foot_rates(model, w, lane, leg, rate);
     rate->foot.peak_force[leg] = rate->foot.peak_force_rate[leg] = rate->foot.landing_rate[leg] =
         rate->foot.landings[leg] = 0.0;
   }

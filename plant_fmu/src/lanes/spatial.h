@@ -74,6 +74,13 @@ static inline hxSym3 hx_sym_add(hxSym3 A, hxSym3 B) {
   return (hxSym3){A.xx + B.xx, A.yy + B.yy, A.zz + B.zz, A.xy + B.xy, A.xz + B.xz, A.yz + B.yz};
 }
 
+/* Returns the sum of two inertias about the same point. */
+static inline hxInertia6 hx_inertia_add(const hxInertia6 *I, const hxInertia6 *J) {
+  return (hxInertia6){hx_sym_add(I->C, J->C),
+                      {hx_add3(I->H.x, J->H.x), hx_add3(I->H.y, J->H.y), hx_add3(I->H.z, J->H.z)},
+                      hx_sym_add(I->A, J->A)};
+}
+
 /* Adds the inertia of a rigid body about the same point. */
 static inline void hx_inertia_add_rigid(hxInertia6 *I, const hxRigid6 *r) {
   I->C = hx_sym_add(I->C, r->C);

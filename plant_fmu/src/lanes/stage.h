@@ -5,27 +5,49 @@
 
 #include "forces.h"
 
-/* Stores the derivatives of the forces for all stages of a step. The contact's are taken at the
- * depth expected a step ahead, because a foot that has just touched down has none yet. */
-static inline void keep_slopes(const hxModel *model, const hxContactState *contact, int pack,
-                               const hxLegWork *leg, hxImplicit *implicit) {
-  const hxFootWork *foot = &leg->foot;
-  const int slot = pack * HX_LANES;
-  const hxReal deeper = foot->kin.delta + implicit->ahead * hx_max(foot->kin.ddelta, hx_splat(0.0));
+/* Returns the derivatives of a row's contact forces, taken at the depth expected a step ahead,
+ * because a contact that has just touched down has none yet. */
+HX_INLINE hxContactSlope contact_slope(const hxModel *model, const hxContactState *state, int row,
+                                       int slot, const hxContactWork *contact,
+                                       const hxImplicit *implicit) {
+  const hxContactKinematics *kin = &contact->kin;
+  const hxReal deeper = kin->delta + implicit->ahead * hx_max(kin->ddelta, hx_splat(0.0));
   const hxNormalForce ahead =
-      hx_normal_force(model, hx_load(&contact->closed[slot]), hx_load(&contact->damping[slot]),
-                      deeper, foot->kin.ddelta);
-  implicit->slope[pack].stiffness = ahead.stiffness;
-  implicit->slope[pack].viscosity = ahead.viscosity;
-  if (has_bristles(model)) {
-    implicit->slope[pack].yield = foot->bristle.yield;
-    implicit->slope[pack].bristle =
-        ahead.force * foot->bristle.stiffness / (1.0 + implicit->z * foot->bristle.yield);
-    implicit->slope[pack].drag =
-        ahead.force * foot->bristle.damping + implicit->z * implicit->slope[pack].bristle;
-  } else {
-    implicit->slope[pack].drag = ahead.force * foot->drag_per_load;
+      hx_normal_force(model, hx_load(&state->closed[row][slot]),
+                      hx_load(&state->damping[row][slot]), deeper, kin->ddelta);
+  hxContactSlope slope = {.stiffness = ahead.stiffness, .viscosity = ahead.viscosity};
+  if (has_turning_friction(model, row)) {
+    slope.spin = ahead.force * contact->turning.spin;
+    slope.roll = ahead.force * contact->turning.roll;
   }
+  if (!has_bristles(model, row)) {
+    slope.drag = ahead.force * contact->drag_per_load;
+    return slope;
+  }
+  slope.yield = contact->bristle.yield;
+  slope.bristle = ahead.force * contact->bristle.stiffness / (1.0 + implicit->z * slope.yield);
+  slope.drag = ahead.force * contact->bristle.damping + implicit->z * slope.bristle;
+  return slope;
+}
+
+/* Stores them for all stages of a step. */
+HX_INLINE void keep_contact_slope(const hxModel *model, const hxContactState *state, int pack,
+                                  int row, const hxLegWork *leg, hxImplicit *implicit) {
+  implicit->slope[pack].contact[row] =
+      contact_slope(model, state, row, pack * HX_LANES, &leg->contact[row], implicit);
+}
+
+HX_RARE void keep_further_slopes(const hxModel *model, const hxContactState *state, int pack,
+                                 const hxLegWork *leg, hxImplicit *implicit) {
+  for (int k = 1; k < model->rows; ++k)
+    keep_contact_slope(model, state, pack, model->row[k], leg, implicit);
+}
+
+/* Stores the derivatives of a leg's forces for all stages of a step. */
+static inline void keep_slopes(const hxModel *model, const hxContactState *state, int pack,
+                               const hxLegWork *leg, hxImplicit *implicit) {
+  keep_contact_slope(model, state, pack, HX_FOOT, leg, implicit);
+  if (model->rows > 1) keep_further_slopes(model, state, pack, leg, implicit);
   for (int joint = 0; joint < HX_JOINTS; ++joint) {
     implicit->slope[pack].motor_stiffness[joint] = leg->joint[joint].servo.stiffness;
     implicit->slope[pack].motor_damping[joint] = leg->joint[joint].servo.damping;
@@ -34,10 +56,6 @@ static inline void keep_slopes(const hxModel *model, const hxContactState *conta
       implicit->slope[pack].stop_stiffness[joint] = leg->joint[joint].stop.stiffness;
       implicit->slope[pack].stop_damping[joint] = leg->joint[joint].stop.damping;
     }
-  }
-  if (has_turning_friction(model)) {
-    implicit->slope[pack].spin = ahead.force * foot->turning.spin;
-    implicit->slope[pack].roll = ahead.force * foot->turning.roll;
   }
 }
 
@@ -56,13 +74,12 @@ static inline hxReal joint_stiffness(const hxModel *model, const hxImplicit *imp
   return model->stops ? servo + implicit->slope[pack].stop_stiffness[joint] : servo;
 }
 
-/* Returns the moment by which spin and rolling friction resist an angular velocity, per unit of
- * it: spin n n^T + roll (1 - n n^T) (eq. 34). */
-static inline hxVec3 turning_drag(const hxImplicit *implicit, int pack, const hxLegWork *leg,
+/* Returns the moment by which spin and rolling friction resist an angular velocity: (spin n n^T +
+ * roll (1 - n n^T)) w (eq. 34). */
+static inline hxVec3 turning_drag(const hxContactSlope *slope, const hxContactWork *contact,
                                   hxVec3 w) {
-  const hxReal spin = implicit->slope[pack].spin, roll = implicit->slope[pack].roll;
-  const hxVec3 n = leg->foot.kin.normal;
-  return hx_add_scaled(hx_scale(roll, w), (spin - roll) * hx_dot(n, w), n);
+  const hxVec3 n = contact->kin.normal;
+  return hx_add_scaled(hx_scale(slope->roll, w), (slope->spin - slope->roll) * hx_dot(n, w), n);
 }
 
 /* Displacement and velocity change of a body without this stage's own acceleration: dx = s_x + z
@@ -92,33 +109,69 @@ static inline hxShift torso_shift(const hxImplicit *implicit, const hxPlantMotio
   return shift(implicit->z, torso_velocity(motion), s_x, torso_velocity(s));
 }
 
-/* Adds the response of spin and rolling friction to a shift dv of the tibia to p. */
-static inline void turning_response(const hxImplicit *implicit, int pack, hxVec3 dw,
-                                    hxLegWork *leg) {
-  leg->turn_response = hx_neg(turning_drag(implicit, pack, leg, dw));
-  turn_tibia(leg, leg->turn_response);
+/* Computes the response G_v dv + G_x dx of a contact to the shift of its body, NULL in the first
+ * stage: dx = z v, dv = 0. */
+HX_INLINE void contact_response(const hxImplicit *implicit, const hxContactSlope *slope,
+                                const hxShift *body, hxContactWork *contact) {
+  const hxVec3 n = contact->kin.normal, arm = contact->kin.arm;
+  if (!body) {
+    contact->shift = hx_scale(hx_splat(implicit->z), contact->kin.velocity);
+    contact->speed_shift = hx_zero3();
+    contact->response = hx_scale(implicit->z * slope->stiffness * contact->kin.ddelta, n);
+    return;
+  }
+  const hxVec3 x = motion_at(body->x, arm), v = motion_at(body->v, arm);
+  contact->shift = x, contact->speed_shift = v;
+  const hxReal along =
+      (slope->viscosity - slope->drag) * hx_dot(n, v) + slope->stiffness * hx_dot(n, x);
+  contact->response = hx_add_scaled(hx_scale(-along, n), -slope->drag, v);
 }
 
-/* Adds G_v dv + G_x dx, the response of joints and contact to the shifts, to torques and p. */
+/* Adds the response of spin and rolling friction to the shift of the body, NULL in the first
+ * stage, to its p. */
+HX_RARE void turning_response(const hxContactSlope *slope, const hxShift *body, hxForce6 *p,
+                              hxContactWork *contact) {
+  contact->turn_response = body ? hx_neg(turning_drag(slope, contact, body->v.ang)) : hx_zero3();
+  turn_body(p, contact->turn_response);
+}
+
+/* Adds the response of a row to the tibia's p. */
+HX_INLINE void row_response(const hxModel *model, const hxImplicit *implicit, int pack, int row,
+                            const hxShift *tibia, hxLegWork *leg) {
+  hxContactWork *contact = &leg->contact[row];
+  const hxContactSlope *slope = &implicit->slope[pack].contact[row];
+  hxForce6 *p = &leg->joint[HX_JOINTS - 1].p;
+  contact_response(implicit, slope, tibia, contact);
+  push_body(p, contact_point(leg, contact), contact->response);
+  if (has_turning_friction(model, row)) turning_response(slope, tibia, p, contact);
+}
+
+HX_RARE void further_responses(const hxModel *model, const hxImplicit *implicit, int pack,
+                               const hxShift *tibia, hxLegWork *leg) {
+  for (int k = 1; k < model->rows; ++k)
+    row_response(model, implicit, pack, model->row[k], tibia, leg);
+}
+
+/* Adds the responses of a leg's contacts to the tibia's p. */
+static inline void tibia_response(const hxModel *model, const hxImplicit *implicit, int pack,
+                                  const hxShift *tibia, hxLegWork *leg) {
+  row_response(model, implicit, pack, HX_FOOT, tibia, leg);
+  if (model->rows > 1) further_responses(model, implicit, pack, tibia, leg);
+}
+
+/* Adds G_v dv + G_x dx, the response of joints and contacts to the shifts, to torques and p. */
 static inline void leg_response(const hxModel *model, const hxImplicit *implicit,
                                 const hxPlantMotion *motion, int pack, hxLegWork *leg) {
-  const hxReal k = implicit->slope[pack].stiffness, drag = implicit->slope[pack].drag,
-               rest = implicit->slope[pack].viscosity - drag;
-  const hxVec3 n = leg->foot.kin.normal, arm = leg->foot.kin.arm;
   if (!implicit->change) { /* first stage: dx = z v, dv = 0 */
     for (int joint = 0; joint < HX_JOINTS; ++joint) {
       hxJointWork *work = &leg->joint[joint];
       work->angle_shift = implicit->z * work->speed, work->speed_shift = hx_splat(0.0);
       work->torque -= joint_stiffness(model, implicit, pack, joint) * work->angle_shift;
     }
-    leg->foot_shift = hx_scale(hx_splat(implicit->z), leg->foot.kin.velocity),
-    leg->foot_speed_shift = hx_zero3();
-    leg->response = hx_scale(implicit->z * k * leg->foot.kin.ddelta, n);
-    leg->turn_response = hx_zero3();
-    push_tibia(leg, contact_point(leg), leg->response);
+    tibia_response(model, implicit, pack, NULL, leg);
     return;
   }
-  /* later stages: shifts of joints and contact point, then their forces */
+  /* later stages: shifts of joints and contact points, then their forces */
   hxShift i = torso_shift(implicit, motion), j = i;
   for (int joint = 0; joint < HX_JOINTS; ++joint, i = j) {
     hxJointWork *work = &leg->joint[joint];
@@ -128,25 +181,37 @@ static inline void leg_response(const hxModel *model, const hxImplicit *implicit
     work->torque -= joint_stiffness(model, implicit, pack, joint) * work->angle_shift +
                     joint_damping(model, implicit, pack, joint) * work->speed_shift;
   }
-  const hxVec3 x = motion_at(j.x, arm), v = motion_at(j.v, arm);
-  leg->foot_shift = x, leg->foot_speed_shift = v;
-  const hxReal along = rest * hx_dot(n, v) + k * hx_dot(n, x);
-  leg->response = hx_add_scaled(hx_scale(-along, n), -drag, v);
-  push_tibia(leg, contact_point(leg), leg->response);
-  if (has_turning_friction(model)) turning_response(implicit, pack, j.v.ang, leg);
+  tibia_response(model, implicit, pack, &j, leg);
 }
 
-/* Subtracts the bristles' response to their own shift s_b + z db/dt from the foot's force (eq.
- * 21). */
-static inline void bristle_response(const hxImplicit *implicit, int pack, hxLegWork *leg) {
-  const hxVec3 own = hx_scale(hx_splat(implicit->z), leg->foot.bristle.rate);
+/* Keeps the slopes of the torso's contacts in the first stage, and adds their responses to p. */
+HX_RARE void torso_response(const hxModel *model, const hxContactState *state,
+                            const hxPlantMotion *motion, hxImplicit *implicit, hxWork *work) {
+  hxShift shifted;
+  if (implicit->change) shifted = torso_shift(implicit, motion);
+  for (int pack = 0; pack < HX_TORSO_PACKS; ++pack) {
+    hxContactWork *contact = &work->torso_contact[pack];
+    hxContactSlope *slope = &implicit->torso_slope[pack];
+    if (!implicit->change)
+      *slope = contact_slope(model, state, HX_TORSO, pack * HX_LANES, contact, implicit);
+    contact_response(implicit, slope, implicit->change ? &shifted : NULL, contact);
+    push_body(&work->torso_p[pack], contact->kin.arm, contact->response);
+  }
+}
+
+/* Subtracts the bristles' response to their own shift s_b + z db/dt from the forces of a row of
+ * feet (eq. 21). */
+HX_INLINE void bristle_response(const hxImplicit *implicit, int pack, int row, hxLegWork *leg) {
+  hxContactWork *contact = &leg->contact[row];
+  const hxVec3 own = hx_scale(hx_splat(implicit->z), contact->bristle.rate);
   const hxVec3 moved =
       implicit->change
           ? hx_add3(hx_load_vec3(implicit->change->motion.bristle, pack * HX_LANES), own)
           : own;
-  leg->bristle_force = hx_scale(implicit->slope[pack].bristle, moved);
-  leg->response = hx_sub3(leg->response, leg->bristle_force);
-  push_tibia(leg, contact_point(leg), hx_neg(leg->bristle_force));
+  contact->bristle_force = hx_scale(implicit->slope[pack].contact[row].bristle, moved);
+  contact->response = hx_sub3(contact->response, contact->bristle_force);
+  push_body(&leg->joint[HX_JOINTS - 1].p, contact_point(leg, contact),
+            hx_neg(contact->bristle_force));
 }
 
 /* The contact's part of W at the contact point: B = across 1 + along n n^T, with across = z c_t
@@ -156,68 +221,78 @@ typedef struct {
   hxReal across, along;
 } hxContactBlock;
 
-static inline hxContactBlock contact_block(const hxImplicit *implicit, int pack,
-                                           const hxLegWork *leg) {
+HX_INLINE hxContactBlock contact_block(const hxImplicit *implicit, const hxContactSlope *slope,
+                                       const hxContactWork *contact) {
   const double z = implicit->z;
-  const hxReal across = z * implicit->slope[pack].drag;
-  const hxReal along =
-      z * implicit->slope[pack].viscosity + z * z * implicit->slope[pack].stiffness - across;
-  return (hxContactBlock){leg->foot.kin.normal, across, along};
+  const hxReal across = z * slope->drag;
+  const hxReal along = z * slope->viscosity + z * z * slope->stiffness - across;
+  return (hxContactBlock){contact->kin.normal, across, along};
 }
 
-/* Returns B a, the force by which an acceleration of the contact point reduces the foot's force. */
-static inline hxVec3 contact_resistance(const hxContactBlock *B, hxVec3 a) {
+/* Returns B a, the force by which an acceleration of the contact point reduces the contact's force.
+ */
+HX_INLINE hxVec3 contact_resistance(const hxContactBlock *B, hxVec3 a) {
   return hx_add_scaled(hx_scale(B->across, a), B->along * hx_dot(B->n, a), B->n);
 }
 
-/* Adds the part z turning_drag of W to the tibia's inertia, and its product with the bias
- * acceleration to p. */
-static inline void add_turning_inertia(const hxImplicit *implicit, int pack, hxLegWork *leg,
-                                       hxInertia6 *I) {
-  const hxReal z = hx_splat(implicit->z);
-  const hxReal roll = z * implicit->slope[pack].roll,
-               more = z * implicit->slope[pack].spin - roll;
-  const hxVec3 n = leg->foot.kin.normal, a = hx_scale(more, n);
-  const hxVec3 bias = turning_drag(implicit, pack, leg, leg->joint[HX_JOINTS - 1].bias.ang);
-  I->C = hx_sym_add(I->C, (hxSym3){roll + a.x * n.x, roll + a.y * n.y, roll + a.z * n.z, a.x * n.y,
-                                   a.x * n.z, a.y * n.z});
-  turn_tibia(leg, hx_scale(-z, bias));
+/* Returns B at x as a part of the body's inertia, and adds its product with the acceleration that
+ * the body has without its spatial acceleration to p. */
+HX_INLINE hxInertia6 contact_inertia(const hxContactBlock *B, hxVec3 x, hxVec3 bias, hxForce6 *p) {
+  const hxVec3 n = B->n, an = hx_scale(B->along, n);
+  push_body(p, x, hx_neg(contact_resistance(B, bias)));
+  return hx_inertia_at((hxSym3){B->across + an.x * n.x, B->across + an.y * n.y,
+                                B->across + an.z * n.z, an.x * n.y, an.x * n.z, an.y * n.z},
+                       x);
 }
 
-/* Returns B as a part of the tibia's inertia, and adds its product with the bias acceleration to
- * p. */
-static inline hxInertia6 contact_inertia(const hxModel *model, const hxImplicit *implicit, int pack,
-                                         hxLegWork *leg) {
-  const hxContactBlock B = contact_block(implicit, pack, leg);
-  const hxVec3 n = B.n, x = contact_point(leg), an = hx_scale(B.along, n);
-  const hxVec3 bias =
-      hx_add3(motion_at(leg->joint[HX_JOINTS - 1].bias, x), hx_splat_vec3(model->gravity));
-  push_tibia(leg, x, hx_neg(contact_resistance(&B, bias)));
-  hxInertia6 I =
-      hx_inertia_at((hxSym3){B.across + an.x * n.x, B.across + an.y * n.y, B.across + an.z * n.z,
-                             an.x * n.y, an.x * n.z, an.y * n.z},
-                    x);
-  if (has_turning_friction(model)) add_turning_inertia(implicit, pack, leg, &I);
+/* Adds the part z turning_drag of W to the inertia of a body, and its product with the body's
+ * angular bias acceleration to p. */
+HX_RARE void add_turning_inertia(const hxImplicit *implicit, const hxContactSlope *slope,
+                                 const hxContactWork *contact, const hxVec3 *bias, hxForce6 *p,
+                                 hxInertia6 *I) {
+  const hxReal z = hx_splat(implicit->z);
+  const hxReal roll = z * slope->roll, more = z * slope->spin - roll;
+  const hxVec3 n = contact->kin.normal, a = hx_scale(more, n);
+  I->C = hx_sym_add(I->C, (hxSym3){roll + a.x * n.x, roll + a.y * n.y, roll + a.z * n.z, a.x * n.y,
+                                   a.x * n.z, a.y * n.z});
+  turn_body(p, hx_scale(-z, turning_drag(slope, contact, *bias)));
+}
+
+/* Returns the block of a row as a part of the tibia's inertia. */
+HX_INLINE hxInertia6 row_inertia(const hxModel *model, const hxImplicit *implicit, int pack,
+                                 int row, hxLegWork *leg) {
+  hxJointWork *tibia = &leg->joint[HX_JOINTS - 1];
+  const hxContactWork *contact = &leg->contact[row];
+  const hxContactSlope *slope = &implicit->slope[pack].contact[row];
+  const hxContactBlock B = contact_block(implicit, slope, contact);
+  const hxVec3 x = contact_point(leg, contact);
+  const hxVec3 bias = hx_add3(motion_at(tibia->bias, x), hx_splat_vec3(model->gravity));
+  hxInertia6 I = contact_inertia(&B, x, bias, &tibia->p);
+  if (has_turning_friction(model, row))
+    add_turning_inertia(implicit, slope, contact, &tibia->bias.ang, &tibia->p, &I);
   return I;
 }
 
-/* Returns the acceleration of the foot's material at the contact point. */
-static inline hxVec3 foot_acceleration(const hxModel *model, const hxLegWork *leg) {
-  return hx_add3(motion_at(leg->joint[HX_JOINTS - 1].acceleration, leg->foot.kin.arm),
-                 hx_splat_vec3(model->gravity));
+/* Returns the acceleration of the material at a contact point, from the body's acceleration a - g
+ * at its centre of mass. */
+HX_INLINE hxVec3 contact_acceleration(const hxModel *model, hxMotion6 felt,
+                                      const hxContactWork *contact) {
+  return hx_add3(motion_at(felt, contact->kin.arm), hx_splat_vec3(model->gravity));
 }
 
 /* Returns db/dt of a stage (eq. 21): k = (f + s_v + z a - yield s_b)/(1 + z yield) along the
  * ground, where f is the bristle law's rate. */
-static inline hxVec3 bristle_rate(const hxModel *model, const hxContactState *contact,
+static inline hxVec3 bristle_rate(const hxModel *model, const hxContactState *state,
                                   const hxImplicit *implicit, int pack, const hxLegWork *leg) {
-  hxVec3 rate = leg->foot.bristle.rate;
+  const hxContactWork *contact = &leg->contact[HX_FOOT];
+  hxVec3 rate = contact->bristle.rate;
   if (!implicit) return rate;
-  const hxVec3 n = leg->foot.kin.normal,
-               dv = hx_add_scaled(leg->foot_speed_shift, hx_splat(implicit->z),
-                                  foot_acceleration(model, leg));
-  const hxReal yield = implicit->slope[pack].yield,
-               closed = hx_load(&contact->closed[pack * HX_LANES]);
+  const hxMotion6 felt = leg->joint[HX_JOINTS - 1].acceleration;
+  const hxVec3 n = contact->kin.normal,
+               dv = hx_add_scaled(contact->speed_shift, hx_splat(implicit->z),
+                                  contact_acceleration(model, felt, contact));
+  const hxReal yield = implicit->slope[pack].contact[HX_FOOT].yield,
+               closed = hx_load(&state->closed[HX_FOOT][pack * HX_LANES]);
   rate = hx_add_scaled(rate, closed, hx_add_scaled(dv, -hx_dot(n, dv), n));
   if (implicit->change)
     rate = hx_add_scaled(rate, -yield,
@@ -225,22 +300,53 @@ static inline hxVec3 bristle_rate(const hxModel *model, const hxContactState *co
   return hx_scale(1.0 / (1.0 + implicit->z * yield), rate);
 }
 
-/* Returns the force of the ground on the foot that a stage's accelerations contain. */
-static inline hxVec3 stage_force(const hxModel *model, const hxImplicit *implicit, int pack,
-                                 const hxLegWork *leg) {
-  if (!implicit) return leg->foot.force;
-  const hxContactBlock B = contact_block(implicit, pack, leg);
-  return hx_sub3(hx_add3(leg->foot.force, leg->response),
-                 contact_resistance(&B, foot_acceleration(model, leg)));
+/* Returns the force of the ground on a body at a contact that a stage's accelerations contain;
+ * implicit NULL: the force itself. */
+HX_INLINE hxVec3 stage_force(const hxModel *model, const hxImplicit *implicit,
+                             const hxContactSlope *slope, hxMotion6 felt,
+                             const hxContactWork *contact) {
+  if (!implicit) return contact->force;
+  const hxContactBlock B = contact_block(implicit, slope, contact);
+  return hx_sub3(hx_add3(contact->force, contact->response),
+                 contact_resistance(&B, contact_acceleration(model, felt, contact)));
+}
+
+/* Returns the same of a row of contacts on the tibias. */
+HX_INLINE hxVec3 row_stage_force(const hxModel *model, const hxImplicit *implicit, int pack,
+                                 int row, const hxLegWork *leg) {
+  return stage_force(model, implicit, implicit ? &implicit->slope[pack].contact[row] : NULL,
+                     leg->joint[HX_JOINTS - 1].acceleration, &leg->contact[row]);
 }
 
 /* Returns the moment of spin and rolling friction on the tibia that a stage's accelerations
  * contain. */
-static inline hxVec3 stage_moment(const hxImplicit *implicit, int pack, const hxLegWork *leg) {
-  if (!implicit) return leg->foot.moment;
-  const hxVec3 a = leg->joint[HX_JOINTS - 1].acceleration.ang;
-  return hx_add_scaled(hx_add3(leg->foot.moment, leg->turn_response), hx_splat(-implicit->z),
-                       turning_drag(implicit, pack, leg, a));
+static inline hxVec3 row_stage_moment(const hxImplicit *implicit, int pack, int row,
+                                      const hxLegWork *leg) {
+  const hxContactWork *contact = &leg->contact[row];
+  if (!implicit) return contact->moment;
+  const hxVec3 drag = turning_drag(&implicit->slope[pack].contact[row], contact,
+                                   leg->joint[HX_JOINTS - 1].acceleration.ang);
+  return hx_add_scaled(hx_add3(contact->moment, contact->turn_response), hx_splat(-implicit->z),
+                       drag);
+}
+
+/* Returns force and moment of the ground on the tibia at a row's point, about its centre of
+ * mass. */
+HX_INLINE hxForce6 row_wrench(const hxModel *model, const hxImplicit *implicit, int pack, int row,
+                              const hxLegWork *leg) {
+  const hxVec3 ground = row_stage_force(model, implicit, pack, row, leg);
+  hxForce6 wrench = {hx_cross(leg->contact[row].kin.arm, ground), ground};
+  if (has_turning_friction(model, row))
+    wrench.ang = hx_add3(wrench.ang, row_stage_moment(implicit, pack, row, leg));
+  return wrench;
+}
+
+HX_RARE hxForce6 further_wrenches(const hxModel *model, const hxImplicit *implicit, int pack,
+                                  const hxLegWork *leg) {
+  hxForce6 sum = {hx_zero3(), hx_zero3()};
+  for (int k = 1; k < model->rows; ++k)
+    sum = hx_force_add(sum, row_wrench(model, implicit, pack, model->row[k], leg));
+  return sum;
 }
 
 #endif

@@ -1,4 +1,4 @@
-/* work.h - intermediate results of an evaluation: joints, feet and torso of all packs, rates, and
+/* work.h - intermediate results of an evaluation: joints, contacts and torso, rates, and
  * a stage's derivatives */
 #ifndef HX_WORK_H
 #define HX_WORK_H
@@ -41,17 +41,17 @@ typedef struct {
 
 typedef struct {
   hxJointWork joint[HX_JOINTS];
-  hxFootWork foot;
-  hxVec3 response;                     /* N  stage's addition to the foot's force */
-  hxVec3 foot_shift, foot_speed_shift; /* m, m/s  of the contact point (eq. 20), without its a */
-  hxVec3 bristle_force;                /* N  bristles' part of response (eq. 21) */
-  hxVec3 turn_response;                /* N m  stage's addition to the foot's moment (eq. 34) */
+  hxContactWork contact[HX_TIBIA_ROWS];
 } hxLegWork;
+
+enum { HX_TORSO_PACKS = HX_SLOTS / HX_LANES }; /* packs that hold all contacts of the torso */
 
 typedef struct {
   hxBody torso;
   hxSym3 torso_J;
   hxMotion6 torso_acceleration; /* a - g */
+  hxContactWork torso_contact[HX_TORSO_PACKS];
+  hxForce6 torso_p[HX_TORSO_PACKS]; /* less forces of the ground on the torso, as hxJointWork.p */
   hxLegWork pack[HX_PACKS];
 } hxWork;
 
@@ -68,6 +68,13 @@ typedef union {
   };
 } hxRate;
 
+/* Slopes of a row of contacts for all stages of a step. */
+typedef struct {
+  hxReal stiffness, viscosity, drag;
+  hxReal bristle, yield; /* N/m, 1/s  bristle stiffness/(1 + z yield), release rate */
+  hxReal spin, roll;     /* N m s  of the moment; set with spin or rolling friction */
+} hxContactSlope;
+
 /* Data of a stage of a linearly implicit method (eq. 19). The derivatives of contact and servo
  * forces are the first stage's; the other stages reuse them. */
 typedef struct {
@@ -76,11 +83,10 @@ typedef struct {
   const hxRate *change; /* sum of h g_ij k_j over earlier stages; NULL: the first stage */
   struct {
     hxReal motor_stiffness[HX_JOINTS], motor_damping[HX_JOINTS], gear_drag[HX_JOINTS];
-    hxReal stiffness, viscosity, drag;
-    hxReal bristle, yield; /* N/m, 1/s  bristle stiffness/(1 + z yield), release rate */
-    hxReal spin, roll;     /* N m s  of the foot's moment; set with spin or rolling friction */
+    hxContactSlope contact[HX_TIBIA_ROWS];
     hxReal stop_stiffness[HX_JOINTS], stop_damping[HX_JOINTS]; /* set if the model has stops */
   } slope[HX_PACKS];
+  hxContactSlope torso_slope[HX_TORSO_PACKS];
 } hxImplicit;
 
 #endif

@@ -17,7 +17,7 @@ from hexapod_cosim.cosim.scenario.records import CONTROLS
 from hexapod_cosim.cosim.scenario.scenario import list_scenarios, load_scenario
 from hexapod_cosim.models import load_robot
 from tools.docs.validation.shown import PALETTE, Shown, short
-from tools.docs.validation.walked import changed, gains_of
+from tools.docs.validation.walked import changed
 
 TOLERANCES = (1e-1, 1e-2, 1e-4, 1e-6)
 DURATION = 4.0  # s
@@ -92,7 +92,7 @@ def scenarios() -> Shown:
         def residuals(name: str, *settings: str) -> str:
             controls = [f"control={each}" for each in CONTROLS]
             plans = [load_scenario(name, overrides=[each, *settings]) for each in controls]
-            runs = [walker.simulate(plan, gains=gains_of(plan)) for plan in plans]
+            runs = [walker.simulate(plan) for plan in plans]
             return changed((run.metrics["energy_residual"] for run in runs), told=short)
 
         def row(name: str, *settings: str) -> list[str]:

@@ -23,7 +23,6 @@ from tools.docs.validation.shown import PALETTE, Shown
 from tools.docs.validation.walked import (
     MILLI,
     changed,
-    gains_of,
     judged,
     shown,
     under_both,
@@ -115,7 +114,7 @@ def _twisted(*settings: str) -> Result:
     """
     plan = load_scenario("walk_flat", overrides=["control=compliant", *settings])
     with patch.object(compliance, "squeeze", _with_twist):
-        return simulate(plan, gains=gains_of(plan))
+        return simulate(plan)
 
 
 def _with_twist(push: Plane, normal: Array, feet: Plane) -> Plane:
@@ -159,7 +158,7 @@ def slip_pid() -> Shown:
 def _seeded_slip(*settings: str) -> float:
     """m/m    of the judged walk of the first seed under compliant control"""
     plan = judged_walk("one seed", *settings).plan("compliant", seeds("judged")[0])
-    result = walker().simulate(plan, gains=gains_of(plan))
+    result = walker().simulate(plan)
     if not (result.completed and result.facts["walk"]["upright"]):
         raise RuntimeError(f"{settings}: {result.outcome.reason or 'fell'}")
     return result.metrics["slip_per_metre"]

@@ -1,4 +1,4 @@
-"""Runs the walks of the results; each walk is run once, and gains are designed once."""
+"""Runs the walks of the results; each walk is run once."""
 
 from __future__ import annotations
 
@@ -8,16 +8,12 @@ from functools import cache
 
 import numpy as np
 
-from hexapod_cosim.controller import Gains
-from hexapod_cosim.cosim.design.design import design_for
 from hexapod_cosim.cosim.results.metrics import METRICS
 from hexapod_cosim.cosim.results.result import Result
 from hexapod_cosim.cosim.results.walk import View, Walk
-from hexapod_cosim.cosim.run.run import known_robot
 from hexapod_cosim.cosim.run.walker import Walker
-from hexapod_cosim.cosim.scenario.records import CONTROLS, Scenario
+from hexapod_cosim.cosim.scenario.records import CONTROLS
 from hexapod_cosim.cosim.scenario.scenario import load_scenario
-from hexapod_cosim.models import Robot
 
 MILLI = 1e3
 
@@ -31,21 +27,10 @@ def walker() -> Walker:
 
 
 @cache
-def _designed(robot: Robot, period: float) -> Gains:
-    return design_for(robot, period)
-
-
-def gains_of(scenario: Scenario) -> Gains | None:
-    """Returns the gains of a scenario, None under kinematic control."""
-    kinematic = scenario.control == "kinematic"
-    return None if kinematic else _designed(known_robot(scenario), scenario.macro_step)
-
-
-@cache
 def walk(*settings: str, scenario: str = "walk_flat") -> Result:
     """A shipped scenario, by default the judged walk, with some settings."""
     plan = load_scenario(scenario, overrides=settings)
-    return walker().simulate(plan, gains=gains_of(plan))
+    return walker().simulate(plan)
 
 
 def under_both(*settings: str, scenario: str = "walk_flat") -> tuple[Result, Result]:
