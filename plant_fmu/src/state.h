@@ -74,8 +74,8 @@ typedef struct hxModel {
   int velocity_terms;               /* 1: the tanh law has static friction or a viscous part */
   int spin_friction, roll_friction; /* 1: the feet resist spin, rolling */
   int stops;                        /* 1: the joints have stops */
-  int rows, foot_rows, torso_rows; /* computed: on tibias, of these on feet, on the torso (0, 1) */
-  int row[HX_ROWS];                /* rows that are computed: on feet, tibias, torso */
+  int rows, foot_rows, torso_rows;  /* computed: on tibias, of these on feet, on the torso (0, 1) */
+  int row[HX_ROWS];                 /* rows that are computed: on feet, tibias, torso */
   double stiffness, damping_scale, impact_speed_floor; /* eq. 14 */
   double mu, slope;                                    /* eq. 15 */
   double presliding, bristle_damping;                  /* eq. 16, 17 */
@@ -132,12 +132,12 @@ typedef struct hxMoment {
 
 /* Forces at the last completed step of an importer's solver (model exchange). */
 typedef struct hxCompleted {
-  double motor[HX_JOINTS][HX_SLOTS];    /* N m  motor torques */
-  double gear[HX_JOINTS][HX_SLOTS];     /* N m  gear friction */
-  double contact[HX_ROWS][3][HX_SLOTS]; /* N    ground on feet and bodies, world axes */
-  double stop[HX_JOINTS][HX_SLOTS];     /* N m  stops */
+  double motor[HX_JOINTS][HX_SLOTS];        /* N m  motor torques */
+  double gear[HX_JOINTS][HX_SLOTS];         /* N m  gear friction */
+  double contact[HX_ROWS][3][HX_SLOTS];     /* N    ground on feet and bodies, world axes */
+  double stop[HX_JOINTS][HX_SLOTS];         /* N m  stops */
   double moment[HX_FOOT_ROWS][3][HX_SLOTS]; /* N m  spin and rolling friction on tibias */
-  double known;                         /* 1    0: no step was completed yet */
+  double known;                             /* 1    0: no step was completed yet */
 } hxCompleted;
 
 enum {

@@ -176,9 +176,7 @@ def test_static_friction_is_the_kinetic_one_unless_set() -> None:
 
 
 def test_static_friction_is_refused_without_friction() -> None:
-    scenario = load_scenario(
-        "walk_flat", overrides=["friction.law=none", "friction.mu_static=0.8"]
-    )
+    scenario = load_scenario("walk_flat", overrides=["friction.law=none", "friction.mu_static=0.8"])
     message = (
         r"friction\.mu_static: static friction that has no effect: "
         r"got '0\.8 with the law none', expected friction\.law = tanh or bristle or lugre"
@@ -192,9 +190,7 @@ def test_static_friction_is_refused_without_friction() -> None:
 
 @pytest.mark.parametrize("law", ["tanh", "bristle", "lugre"])
 def test_every_law_with_friction_takes_a_static_coefficient(law: str) -> None:
-    sticks = load_scenario(
-        "walk_flat", overrides=[f"friction.law={law}", "friction.mu_static=0.8"]
-    )
+    sticks = load_scenario("walk_flat", overrides=[f"friction.law={law}", "friction.mu_static=0.8"])
     assert scenario_robot(sticks).friction.mu_static == 0.8
 
 

@@ -349,9 +349,8 @@ HX_RARE void add_stop_impulses(const hxImplicit *implicit, int pack, const hxLeg
     hxReal torque = k->stop.torque;
     if (implicit) {
       const double z = implicit->z;
-      torque -=
-          implicit->slope[pack].stop_stiffness[joint] * (k->angle_shift + (z * z) * k->qdd) +
-          implicit->slope[pack].stop_damping[joint] * (k->speed_shift + z * k->qdd);
+      torque -= implicit->slope[pack].stop_stiffness[joint] * (k->angle_shift + (z * z) * k->qdd) +
+                implicit->slope[pack].stop_damping[joint] * (k->speed_shift + z * k->qdd);
     }
     sum->stop[joint][pack] += w * torque;
   }

@@ -46,8 +46,8 @@ typedef struct {
 
 /* Returns whether the contacts of a row stand on bristles; bodies slide by the tanh law then. */
 static inline int has_bristles(const hxModel *model, int row) {
-  return row < HX_FOOT_ROWS && (model->friction_law == HX_FRICTION_BRISTLE ||
-                                model->friction_law == HX_FRICTION_LUGRE);
+  return row < HX_FOOT_ROWS &&
+         (model->friction_law == HX_FRICTION_BRISTLE || model->friction_law == HX_FRICTION_LUGRE);
 }
 
 /* Returns whether the contacts of a row resist spin or rolling: feet do. */

@@ -106,8 +106,8 @@ HX_INLINE hxBristle hx_lugre(const hxModel *model, hxReal closed, hxVec3 b, hxVe
 
 /* Returns the moment over the load of spin about the normal and of rolling across it (eq. 34), at
  * the angular velocity w of a body whose sphere touches the ground. */
-HX_INLINE hxTurningFriction hx_turning_friction(const hxModel *model, hxReal radius,
-                                                    hxVec3 normal, hxVec3 w) {
+HX_INLINE hxTurningFriction hx_turning_friction(const hxModel *model, hxReal radius, hxVec3 normal,
+                                                hxVec3 w) {
   const hxReal spin = hx_dot(normal, w);
   const hxVec3 roll = hx_add_scaled(w, -spin, normal);
   hxTurningFriction f = {hx_zero3(), hx_splat(0.0), hx_splat(0.0)};
