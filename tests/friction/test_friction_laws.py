@@ -212,7 +212,7 @@ def phases(law: Law, *, size: float = 1.0) -> Array:
         rate, (0.0, 1.9), [0.0, belt, 0.0], method="Radau", rtol=1e-7, atol=1e-12, events=behind
     )
     times = found.t_events[0]
-    return np.diff(times[times > 0.3])[:2]
+    return np.asarray(np.diff(times[times > 0.3])[:2])
 
 
 @pytest.mark.parametrize("where", ["twin", "plant"])

@@ -123,7 +123,7 @@ def test_losses_of_a_step_are_those_of_the_readable_equations(core: ct.CDLL, see
         ]
         sums = [total + H * m.b[i] * force for total, force in zip(sums, forces, strict=True)]
     plant.step(H, command)
-    impulses = Impulses(*sums[:3], stop=sums[3], moment=sums[4])
+    impulses = Impulses(sums[0], sums[1], sums[2], stop=sums[3], moment=sums[4])
     works = step_works(robot, before, plant.bodies, H, impulses, ~np.isnan(damping))
     energy = plant.output(command).energy
     assert np.any(sums[3] != 0.0)
