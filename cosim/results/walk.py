@@ -23,7 +23,9 @@ SHOWN_CYCLES = 3  # in plots of what happens within a gait cycle
 ROUND_OFF = 1e-6  # s    of a recorded time
 # numbers of the FMU's enumerations
 FLAT, SLOPE, GRID = (TERRAINS.index(kind) + 1 for kind in ("flat", "slope", "grid"))
-NONE, TANH, BRISTLE = (FRICTION_LAWS.index(law) + 1 for law in ("none", "tanh", "bristle"))
+NONE, TANH, BRISTLE, LUGRE = (
+    FRICTION_LAWS.index(law) + 1 for law in ("none", "tanh", "bristle", "lugre")
+)
 
 
 @dataclass(frozen=True)

@@ -41,7 +41,13 @@ from hexapod_cosim.cosim.scenario.reach import check_commands
 from hexapod_cosim.cosim.scenario.records import Scenario
 from hexapod_cosim.cosim.scenario.scenario import scenario_robot
 from hexapod_cosim.cosim.scenario.schedule import Schedule, make_schedule
-from hexapod_cosim.cosim.scenario.variation import Drawn, delayed, draw, initial_values
+from hexapod_cosim.cosim.scenario.variation import (
+    Drawn,
+    check_start_depth,
+    delayed,
+    draw,
+    initial_values,
+)
 from hexapod_cosim.models import LEG_NAMES, FmuError, Robot
 from hexapod_cosim.models.ground.grid_file import grid_bytes
 from hexapod_cosim.models.terrain import surface_of
@@ -156,6 +162,9 @@ def initialise_plant(plant: Fmu, plan: RunPlan) -> dict[str, float]:
     scenario = plan.scenario
     _check_measurements(plant)
     plant.set_parameters(scenario.parameters)
+    if scenario.parameters and all(name.startswith("initial.") for name in scenario.parameters):
+        # with other parameters the robot's own numbers may not be the plant's, which checks too
+        check_start_depth(plan.robot, plant.parameters(), where=f"{scenario.where}: initial")
     if plan.drawn is not None:
         plant.set_parameters(initial_values(plan.robot, plant.parameters(), plan.drawn))
     plant.initialise(scenario.start, scenario.start + scenario.duration)

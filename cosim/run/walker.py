@@ -38,6 +38,7 @@ from hexapod_cosim.cosim.run.run import (
 )
 from hexapod_cosim.cosim.scenario.records import Scenario
 from hexapod_cosim.models import HexapodError, Robot
+from hexapod_cosim.models.records import BRISTLE_LAWS
 
 MAX_SETTINGS = 64  # robots whose settings are kept
 
@@ -129,7 +130,7 @@ class Walker:
         """Returns the plant FMU of the plan and the master that connects it to the controller."""
         path = self._fmus.fmu(plan.scenario.robot) if fmu is None else fmu
         bristles = (
-            plan.robot.friction.law == "bristle" or "friction.law" in plan.scenario.parameters
+            plan.robot.friction.law in BRISTLE_LAWS or "friction.law" in plan.scenario.parameters
         )
         columns = None if self._everything else metric_columns(bristles=bristles)
         key = path, columns
