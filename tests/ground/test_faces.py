@@ -33,7 +33,8 @@ def test_a_grid_that_is_a_plane_has_the_plane_s_distance_and_normal(core: ct.CDL
 @pytest.mark.parametrize("side", [1.0, -1.0], ids=["bump", "bowl"])
 def test_bump_and_bowl_have_a_sphere_s_distance(core: ct.CDLL, side: float) -> None:
     ground = Ground(
-        core, sampled(lambda x, y: side * (np.sqrt(RHO**2 - x**2 - y**2) - RHO), size=0.2, cell=5e-4)
+        core,
+        sampled(lambda x, y: side * (np.sqrt(RHO**2 - x**2 - y**2) - RHO), size=0.2, cell=5e-4),
     )
     for above in points(200, seed=2):
         rise = side * (np.sqrt(RHO**2 - above[0] ** 2 - above[1] ** 2) - RHO)
