@@ -1,5 +1,5 @@
 """Computes the torques of a joint's servo (eq. 12): PD control with feed-forward, torque-speed
-line, gear friction; and the torque of the joint's stops (eq. 35).
+line, gear friction; and the torque of the joint's stops (eq. 39).
 """
 
 from __future__ import annotations
@@ -75,7 +75,7 @@ def overrun(angle: Array, angle_min: Array, angle_max: Array) -> Array:
 
 
 def stop_torque(servo: Servo, past: Array, speed: Array) -> Array:
-    """Returns the torque of the stops on the child [N m], in the shape of the inputs (eq. 35).
+    """Returns the torque of the stops on the child [N m], in the shape of the inputs (eq. 39).
 
     It is -(k x + c qd), in which the damper's part is limited to the spring's: the torque is
     continuous where a joint reaches a stop, and a stop does not pull. past: x of `overrun` [rad].

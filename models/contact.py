@@ -169,7 +169,7 @@ def foot_force(
 
 
 def foot_moment(robot: Robot, foot: FootContact, damping: float, turn: Array) -> Array:
-    """Returns the moment (3,) of spin and rolling friction on the tibia [N m] (eq. 34).
+    """Returns the moment (3,) of spin and rolling friction on the tibia [N m] (eq. 38).
 
     turn: angular velocity (3,) of the tibia [rad/s].
     """

@@ -1,5 +1,5 @@
-"""Computes friction: the tanh law (eq. 15, 31), elasto-plastic bristles (eq. 16-18), LuGre (eq. 32,
-33), and the moments of spin and rolling (eq. 34).
+"""Computes friction: the tanh law (eq. 15, 35), elasto-plastic bristles (eq. 16-18), LuGre (eq. 36,
+37), and the moments of spin and rolling (eq. 38).
 
 Velocities and deflections lie along the ground, in world axes.
 """
@@ -38,14 +38,14 @@ def sliding_velocity(presliding: float, slip: Array, bristle: Array) -> Array:
 
 
 def bristle_rate(friction: Friction, slip: Array, bristle: Array) -> Array:
-    """Returns db/dt (3,) [m/s] of a closed foot's bristles (eq. 16, 32); 0 without bristles."""
+    """Returns db/dt (3,) [m/s] of a closed foot's bristles (eq. 16, 36); 0 without bristles."""
     if friction.law not in BRISTLE_LAWS:
         return np.zeros(3)
     return slip - yielding_velocity(friction, slip, bristle)
 
 
 def yielding_velocity(friction: Friction, slip: Array, bristle: Array) -> Array:
-    """Returns the part (..., 3) of the slip (..., 3) [m/s] that stretches no bristle (eq. 16, 32).
+    """Returns the part (..., 3) of the slip (..., 3) [m/s] that stretches no bristle (eq. 16, 36).
 
     bristle: deflections (..., 3) [m] of a law with bristles.
     """
@@ -69,7 +69,7 @@ def sliding_friction(friction: Friction, sliding: float) -> float:
 
 
 def bristle_force(friction: Friction, normal: float, slip: Array, bristle: Array) -> Array:
-    """Returns the tangential force f_t (3,) of the bristle law [N] (eq. 17, 31).
+    """Returns the tangential force f_t (3,) of the bristle law [N] (eq. 17, 35).
 
     f_t = -mu(p) f_n (u (3 - u.u)/2 + d room/|(room, d)|) with u = b/b_max, limited to length 1, and
     d = 3/2 tau db/dt / b_max. The spring leaves room = 1 - |u| (3 - u.u)/2 to the damping, so that
@@ -122,7 +122,7 @@ def bristle_slopes(friction: Friction, slip: Array, bristle: Array) -> BristleSl
 
 
 def _lugre_slopes(friction: Friction, slip: Array) -> BristleSlopes:
-    """Returns stiffness mu_0/b_max, damping sigma and release rate of the LuGre law (eq. 33)."""
+    """Returns stiffness mu_0/b_max, damping sigma and release rate of the LuGre law (eq. 37)."""
     stiffness = rest_friction(friction) / friction.presliding
     still = stiffness * friction.bristle_damping
     speed = float(np.linalg.norm(slip))
@@ -139,7 +139,7 @@ def rest_friction(friction: Friction) -> float:
 def lugre_release(friction: Friction, speed: Array) -> Array:
     """Returns the rate [1/s] at which the bristles of the LuGre law yield at a slip speed [m/s].
 
-    It is v mu_0 / (mu(v) b_max) (eq. 32), in the shape of v.
+    It is v mu_0 / (mu(v) b_max) (eq. 36), in the shape of v.
     """
     ratio = (rest_friction(friction) + NO_FRICTION) / (
         stribeck_curve(friction, speed) + NO_FRICTION
@@ -156,7 +156,7 @@ def lugre_sliding(friction: Friction, slip: Array, bristle: Array) -> Array:
 
 
 def lugre_force(friction: Friction, normal: float, slip: Array, bristle: Array) -> Array:
-    """Returns the tangential force f_t (3,) of the LuGre law [N] (eq. 33).
+    """Returns the tangential force f_t (3,) of the LuGre law [N] (eq. 37).
 
     f_t = -f_n (mu_0 b/b_max + sigma db/dt + viscous v_t). sigma = sigma_1/(1 + sigma_1 |v_t|/mu)
     falls with the speed: with a constant one the law could release energy (it is passive for
@@ -173,7 +173,7 @@ def friction_force(
 ) -> Array:
     """Returns the tangential force f_t (3,) [N].
 
-    The tanh law has f_t = -f_n (mu(v) tanh(k_t v) + viscous v) v_t/v, v = |v_t| (eq. 15, 31).
+    The tanh law has f_t = -f_n (mu(v) tanh(k_t v) + viscous v) v_t/v, v = |v_t| (eq. 15, 35).
     bristle: deflection b (3,) [m] of laws with bristles, 0 by default.
     """
     if friction.law == "none":
@@ -195,7 +195,7 @@ def _tanh_per_speed(friction: Friction, speed: float) -> float:
 def friction_drag(friction: Friction, speed: float) -> float:
     """Returns the tanh law's force over load and slip speed [s/m] at a slip speed [m/s].
 
-    It is mu(v) tanh(k_t v)/v + viscous (eq. 15, 31).
+    It is mu(v) tanh(k_t v)/v + viscous (eq. 15, 35).
     """
     if friction.law == "none":
         return 0.0
@@ -205,7 +205,7 @@ def friction_drag(friction: Friction, speed: float) -> float:
 def turning_slopes(
     friction: Friction, radius: float, normal: Array, turn: Array
 ) -> tuple[float, float]:
-    """Returns the moments of spin and rolling friction over load and angular speed [m s] (eq. 34).
+    """Returns the moments of spin and rolling friction over load and angular speed [m s] (eq. 38).
 
     radius: that of the sphere [m]; its speeds R |w_n| and R |w_t| regularise the moments.
     normal: (3,) of the ground; turn: angular velocity (3,) [rad/s].
@@ -225,7 +225,7 @@ def turning_slopes(
 def turning_moment(
     friction: Friction, radius: float, load: float, normal: Array, turn: Array
 ) -> Array:
-    """Returns the moment (3,) [N m] of spin and rolling friction at a load [N] (eq. 34).
+    """Returns the moment (3,) [N m] of spin and rolling friction at a load [N] (eq. 38).
 
     The other arguments are those of `turning_slopes`.
     """

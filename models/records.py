@@ -112,31 +112,31 @@ class Contact:
 
 @dataclass(frozen=True, kw_only=True)
 class Friction:
-    """Friction law (eq. 15-18, 31-34)."""
+    """Friction law (eq. 15-18, 35-38)."""
 
     law: Annotated[str, Choice(FRICTION_LAWS)]
     mu: Annotated[float, Number("1", at_least=0.0)]
     # static friction; 0: mu
     mu_static: Annotated[float, Number("1", at_least=0.0, default=0.0)] = 0.0
-    slope: Annotated[float, Number("s/m", above=0.0)]  # k_t of eq. 15, tanh law, and of eq. 34
-    # b_max of eq. 16 and 32, laws with bristles; default of a file: Mindlin
+    slope: Annotated[float, Number("s/m", above=0.0)]  # k_t of eq. 15, tanh law, and of eq. 38
+    # b_max of eq. 16 and 36, laws with bristles; default of a file: Mindlin
     presliding: Annotated[float, Number("m", at_least=1e-7, at_most=1.0)]
-    # tau of eq. 17 and 33, laws with bristles
+    # tau of eq. 17 and 37, laws with bristles
     bristle_damping: Annotated[float, Number("s", at_least=0.0, at_most=10.0, default=0.005)]
     # v_s of eq. 18
     stribeck_speed: Annotated[float, Number("m/s", at_least=1e-6, at_most=100.0, default=0.005)] = (
         0.005
     )
-    # of eq. 31: what a slip of 1 m/s adds to the coefficient
+    # of eq. 35: what a slip of 1 m/s adds to the coefficient
     viscous: Annotated[float, Number("s/m", at_least=0.0, at_most=1e6, default=0.0)] = 0.0
-    # r_s and r_r of eq. 34: moments against spin over mu f_n and against rolling over f_n
+    # r_s and r_r of eq. 38: moments against spin over mu f_n and against rolling over f_n
     spin_radius: Annotated[float, Number("m", at_least=0.0, at_most=10.0, default=0.0)] = 0.0
     rolling_radius: Annotated[float, Number("m", at_least=0.0, at_most=10.0, default=0.0)] = 0.0
 
 
 @dataclass(frozen=True, kw_only=True)
 class Servo:
-    """Servo of every joint (eq. 12) and the joints' stops (eq. 35)."""
+    """Servo of every joint (eq. 12) and the joints' stops (eq. 39)."""
 
     mode: Annotated[str, Choice(SERVO_MODES)]
     kp: Annotated[float, Number("N m/rad", at_least=0.0)]

@@ -1,7 +1,8 @@
 /* state.h - data of a plant: the model (constants compiled from the definition) and the state.
  *
- * Legs are stored innermost, [quantity][component][slot]. The structures hold no pointers, so a
- * copy of their bytes is a copy of the plant.
+ * Legs are stored innermost, [quantity][component][slot]. But for the terrain, whose checksum a
+ * saved state holds, the structures hold no pointers, so a copy of their bytes is a copy of the
+ * plant.
  */
 #ifndef HX_STATE_H
 #define HX_STATE_H
@@ -86,9 +87,9 @@ typedef struct hxModel {
   double mu, slope;                                    /* eq. 15 */
   double presliding, bristle_damping;                  /* eq. 16, 17 */
   double static_rise, per_stribeck;                    /* eq. 18: mu_s - mu, 1/v_s */
-  double viscous;                                      /* s/m  eq. 31 */
-  double spin_radius, rolling_radius;                  /* m  eq. 34 */
-  double stop_stiffness, stop_damping;                 /* N m/rad, N m s/rad  eq. 35 */
+  double viscous;                                      /* s/m  eq. 35 */
+  double spin_radius, rolling_radius;                  /* m  eq. 38 */
+  double stop_stiffness, stop_damping;                 /* N m/rad, N m s/rad  eq. 39 */
   double kp, kd, torque_max, speed_max, rotor_inertia, coulomb_friction;
   double ground_point[3], ground_normal[3];
   double step, tolerance, step_max;

@@ -1,4 +1,4 @@
-"""Joint stops (eq. 35): a link that strikes its stop has closed forms; stops and books."""
+"""Joint stops (eq. 39): a link that strikes its stop has closed forms; stops and books."""
 
 from __future__ import annotations
 

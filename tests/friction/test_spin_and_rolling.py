@@ -1,4 +1,4 @@
-"""Spin and rolling friction of the feet (eq. 34): discs and spheres that come to rest by closed
+"""Spin and rolling friction of the feet (eq. 38): discs and spheres that come to rest by closed
 forms, the whole robot, and its energy balance.
 """
 

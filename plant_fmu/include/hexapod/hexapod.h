@@ -6,7 +6,8 @@
  * RR, joints (and the link each one moves) in the order coxa, femur, tibia. Bodies: 0 = torso, 1 +
  * 3 leg + joint = link. Equation numbers refer to docs/equations.md.
  *
- * A plant contains no pointers and no hidden state, and the library has no globals: a plant's
+ * A plant contains no pointer but the one to its terrain and no hidden state, and the library has
+ * no globals: a plant's
  * bytes are its state. After hx_plant_create no function allocates, prints or exits.
  */
 #ifndef HEXAPOD_H
@@ -112,14 +113,14 @@ typedef struct hxDefinition {
   struct {
     int law;                /* hxFrictionLaw */
     double mu;              /* 1 */
-    double slope;           /* s/m  k_t of eq. 15, tanh law, and of eq. 34 */
-    double presliding;      /* m    b_max of eq. 16, 32: a foot pushed this far slides */
-    double bristle_damping; /* s    tau of eq. 17, 33: damping of bristles over their stiffness */
+    double slope;           /* s/m  k_t of eq. 15, tanh law, and of eq. 38 */
+    double presliding;      /* m    b_max of eq. 16, 36: a foot pushed this far slides */
+    double bristle_damping; /* s    tau of eq. 17, 37: damping of bristles over their stiffness */
     double mu_static;       /* 1    static friction; 0: mu */
     double stribeck_speed;  /* m/s  v_s of eq. 18: half-way from mu_static to mu */
-    double viscous;         /* s/m  of eq. 31: coefficient added for each m/s of slip; 0: none */
-    double spin_radius;     /* m    r_s of eq. 34: moment against spin over mu f_n; 0: none */
-    double rolling_radius;  /* m    r_r of eq. 34: moment against rolling over f_n; 0: none */
+    double viscous;         /* s/m  of eq. 35: coefficient added for each m/s of slip; 0: none */
+    double spin_radius;     /* m    r_s of eq. 38: moment against spin over mu f_n; 0: none */
+    double rolling_radius;  /* m    r_r of eq. 38: moment against rolling over f_n; 0: none */
   } friction;
   struct {
     int mode;                /* hxServoMode, all joints */
@@ -129,8 +130,8 @@ typedef struct hxDefinition {
     double speed_max;        /* rad/s    no-load speed: the torque-speed line ends here */
     double rotor_inertia;    /* kg m2    seen at the joint */
     double coulomb_friction; /* N m      in the gear, regularised by tanh(speed / 0.05 rad/s) */
-    double stop_stiffness;   /* N m/rad    k of the joints' stops (eq. 35); 0: no stops */
-    double stop_damping;     /* N m s/rad  c of eq. 35 */
+    double stop_stiffness;   /* N m/rad    k of the joints' stops (eq. 39); 0: no stops */
+    double stop_damping;     /* N m s/rad  c of eq. 39 */
   } servo;
   struct {
     double alpha, beta; /* 1/s */
@@ -188,7 +189,7 @@ typedef struct hxOutput {
     double position[HX_LEGS][3];      /* m    contact point: the foot's lowest point */
     double velocity[HX_LEGS][3];      /* m/s  of the foot's material at the contact point */
     double slip_speed[HX_LEGS];       /* m/s  tangential part of the velocity */
-    double bristle[HX_LEGS][3];       /* m    b of eq. 16, 32; 0 with other laws */
+    double bristle[HX_LEGS][3];       /* m    b of eq. 16, 36; 0 with other laws */
     double penetration[HX_LEGS];      /* m    < 0: clearance */
     double impact_speed[HX_LEGS];     /* m/s  at the last touch-down */
     double slip_distance[HX_LEGS];    /* m    slip under more than 1 % of the weight */

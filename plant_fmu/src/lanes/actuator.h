@@ -65,7 +65,7 @@ static inline hxReal within_turn(hxReal angle) {
   return hx_select(hx_less(low, hx_splat(-half_turn)), low + 2.0 * half_turn, low);
 }
 
-/* A joint's stops (eq. 35). */
+/* A joint's stops (eq. 39). */
 typedef struct {
   hxReal torque;    /* N m        stop on child */
   hxReal damped;    /* N m        the damper's part of -torque */
@@ -82,7 +82,7 @@ static inline hxReal hx_overrun(const hxModel *model, int joint, int slot, hxRea
 }
 
 /* Returns the torque of the stops, -(k x + c qd), the damper's part limited to the spring's, so
- * that a stop takes and releases a joint without a jump and does not pull (eq. 35). */
+ * that a stop takes and releases a joint without a jump and does not pull (eq. 39). */
 static inline hxStop hx_stop_torque(const hxModel *model, int joint, int slot, hxReal angle,
                                     hxReal speed) {
   const hxReal zero = hx_splat(0.0), k = hx_splat(model->stop_stiffness);

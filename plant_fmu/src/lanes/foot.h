@@ -41,7 +41,7 @@ typedef struct {
   hxVec3 shift, speed_shift; /* m, m/s  of the contact point (eq. 20), without its a */
   hxVec3 bristle_force;      /* N  bristles' part of response (eq. 21) */
   hxTurningFriction turning; /* this and the next two: set with spin or rolling friction */
-  hxVec3 moment;             /* N m  of spin and rolling friction on the body (eq. 34) */
+  hxVec3 moment;             /* N m  of spin and rolling friction on the body (eq. 38) */
   hxVec3 turn_response;      /* N m  stage's addition to the moment */
 } hxContactWork;
 

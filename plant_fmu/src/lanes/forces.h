@@ -127,7 +127,7 @@ static inline void leg_pass(const hxModel *model, const hxCommand *command, doub
                joint > 0 ? &leg->joint[joint - 1].body : torso, &chain, &leg->joint[joint]);
 }
 
-/* Computes the torques of motor, gear and stops on a joint (eq. 12, 35). */
+/* Computes the torques of motor, gear and stops on a joint (eq. 12, 39). */
 static inline void joint_torque(const hxModel *model, const hxCommand *command, int joint, int slot,
                                 hxJointWork *k) {
   k->servo = hx_servo_torque(model, k->angle, k->speed, hx_load(&command->angle[joint][slot]),

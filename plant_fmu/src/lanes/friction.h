@@ -1,11 +1,11 @@
-/* friction.h - friction of a contact over its normal load: sliding by the tanh law (eq. 15, 31),
- * bristles (eq. 16-18), LuGre (eq. 32, 33), and the moments of spin and rolling (eq. 34) */
+/* friction.h - friction of a contact over its normal load: sliding by the tanh law (eq. 15, 35),
+ * bristles (eq. 16-18), LuGre (eq. 36, 37), and the moments of spin and rolling (eq. 38) */
 #ifndef HX_FRICTION_H
 #define HX_FRICTION_H
 
 #include "vec3.h"
 
-/* Tangential force of a foot with bristles (eq. 16-18, 32, 33). */
+/* Tangential force of a foot with bristles (eq. 16-18, 36, 37). */
 typedef struct {
   hxVec3 grip;      /* 1    -f_t over f_n */
   hxVec3 rate;      /* m/s  db/dt */
@@ -14,7 +14,7 @@ typedef struct {
   hxReal yield; /* 1/s  derivative of db/dt by -b: rate at which sliding bristles are released */
 } hxBristle;
 
-/* Moment of spin and rolling friction over the normal force (eq. 34). */
+/* Moment of spin and rolling friction over the normal force (eq. 38). */
 typedef struct {
   hxVec3 moment;     /* m      moment on the body over f_n */
   hxReal spin, roll; /* m s    moment over angular speed, about the normal and across it */
@@ -45,7 +45,7 @@ HX_INLINE hxReal hx_friction(const hxModel *model, hxReal speed) {
                                   hx_tanh_ratio(hx_select(slow, hx_splat(1.0), x)));
 }
 
-/* Returns the tanh law's tangential force over load and slip speed, s/m (eq. 15, 31):
+/* Returns the tanh law's tangential force over load and slip speed, s/m (eq. 15, 35):
  * mu(v) tanh(k_t v)/v + viscous. The plain law, mu_static = viscous = 0, needs no division more. */
 HX_INLINE hxReal hx_friction_drag(const hxModel *model, hxFrictionAt at, hxReal speed) {
   if (!model->velocity_terms) return at.mu * hx_friction(model, speed);
@@ -60,7 +60,7 @@ HX_INLINE hxReal hx_friction_drag(const hxModel *model, hxFrictionAt at, hxReal 
  * so that w stays within the disc too, and w is C1 at |u| = 1, where a foot slides.
  *
  * The friction coefficient falls with the sliding speed p of the bristles: mu(p) = mu + (mu_s -
- * mu)/(1 + (p/v_s)^2) (eq. 18). The viscous part of eq. 31 is added.
+ * mu)/(1 + (p/v_s)^2) (eq. 18). The viscous part of eq. 35 is added.
  */
 HX_INLINE hxBristle hx_bristle(const hxModel *model, hxFrictionAt at, hxReal closed, hxVec3 b,
                                hxVec3 slip) {
@@ -89,7 +89,7 @@ HX_INLINE hxBristle hx_bristle(const hxModel *model, hxFrictionAt at, hxReal clo
   };
 }
 
-/* The LuGre law (eq. 32, 33): db/dt = v - |v| mu_0/mu(|v|) b/b_max, and the friction over load is
+/* The LuGre law (eq. 36, 37): db/dt = v - |v| mu_0/mu(|v|) b/b_max, and the friction over load is
  * mu_0 b/b_max + sigma db/dt + viscous v. sigma falls with the speed, so that the law dissipates
  * and bristles in steady motion keep the force within mu(|v|) f_n. */
 HX_INLINE hxBristle hx_lugre(const hxModel *model, hxFrictionAt at, hxReal closed, hxVec3 b,
@@ -111,7 +111,7 @@ HX_INLINE hxBristle hx_lugre(const hxModel *model, hxFrictionAt at, hxReal close
   };
 }
 
-/* Returns the moment over the load of spin about the normal and of rolling across it (eq. 34), at
+/* Returns the moment over the load of spin about the normal and of rolling across it (eq. 38), at
  * the angular velocity w of a body whose sphere touches the ground. */
 HX_INLINE hxTurningFriction hx_turning_friction(const hxModel *model, hxFrictionAt at,
                                                 hxReal radius, hxVec3 normal, hxVec3 w) {

@@ -73,7 +73,7 @@ static inline hxReal joint_stiffness(const hxModel *model, const hxImplicit *imp
 }
 
 /* Returns the moment by which spin and rolling friction resist an angular velocity: (spin n n^T +
- * roll (1 - n n^T)) w (eq. 34). */
+ * roll (1 - n n^T)) w (eq. 38). */
 static inline hxVec3 turning_drag(const hxContactSlope *slope, const hxContactWork *contact,
                                   hxVec3 w) {
   const hxVec3 n = contact->kin.normal;
