@@ -64,13 +64,14 @@ const hxContactRow *hx_contact(int law) {
 }
 
 /* Sets stiffness and friction of a contact to those of the ground of a material, NULL: of the
- * definition. */
+ * definition. A material with a kinetic coefficient of its own has no static rise unless it says
+ * so. */
 static void set_ground(const hxModel *model, const double *material, int row, int slot,
                        hxContactState *contact) {
   double stiffness = model->stiffness, mu = model->mu, mu_static = model->mu + model->static_rise;
   if (material && !isnan(material[HX_MATERIAL_STIFFNESS]))
     stiffness = material[HX_MATERIAL_STIFFNESS];
-  if (material && !isnan(material[HX_MATERIAL_MU])) mu = material[HX_MATERIAL_MU];
+  if (material && !isnan(material[HX_MATERIAL_MU])) mu = mu_static = material[HX_MATERIAL_MU];
   if (material && !isnan(material[HX_MATERIAL_MU_STATIC]))
     mu_static = material[HX_MATERIAL_MU_STATIC];
   contact->stiffness[row][slot] = stiffness;
