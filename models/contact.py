@@ -15,7 +15,7 @@ import numpy as np
 
 from hexapod_cosim.models.kinematics import JOINTS, LEGS, cross, foot_centres
 from hexapod_cosim.models.records import Array, Contact, Friction, Robot
-from hexapod_cosim.models.terrain import ground
+from hexapod_cosim.models.terrain import Face, ground_faces
 
 SPRING_LIMIT = 0.7  # 1  of the presliding; bristles below it are springs (eq. 16)
 # below it the closed form of _log_rest loses more digits than its series omits
@@ -217,13 +217,39 @@ class FootContact:
 
 
 def foot_contact(robot: Robot, tibia: Array, centre: Array) -> FootContact:
-    """Returns the contact of a foot from the state (13,) of its tibia and its centre (3,)."""
-    distance, normal = ground(robot.terrain, centre)
+    """Returns the contact of a foot with the ground below it.
+
+    It is that of the surface, or of the top of the block over which the foot's centre is.
+
+    Args:
+        robot: the robot.
+        tibia: (13,) state of the foot's tibia.
+        centre: (3,) of the foot [m].
+    """
+    return _contact(robot, tibia, centre, ground_faces(robot.terrain, centre)[0])
+
+
+def _contact(robot: Robot, tibia: Array, centre: Array, face: Face) -> FootContact:
+    """Returns the contact of a foot with one face of the ground."""
+    distance, normal = face
     point = centre - robot.foot.radius * normal
     velocity = tibia[7:10] + cross(tibia[10:13], point - tibia[0:3])
     return FootContact(
         point, velocity, normal, robot.foot.radius - distance, float(-velocity @ normal)
     )
+
+
+def wall_contacts(robot: Robot, body: Array) -> tuple[FootContact | None, ...]:
+    """Returns the second contacts of the six feet of bodies (19, 13), with walls and edges.
+
+    Only surfaces of blocks have walls; None where there is none beside a foot.
+    """
+    found: list[FootContact | None] = []
+    for leg, centre in enumerate(foot_centres(robot, body)):
+        walls = ground_faces(robot.terrain, centre)[1:]
+        tibia = body[JOINTS * (leg + 1)]
+        found.append(_contact(robot, tibia, centre, walls[0]) if walls else None)
+    return tuple(found)
 
 
 def foot_contacts(robot: Robot, body: Array) -> tuple[FootContact, ...]:

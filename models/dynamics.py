@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from hexapod_cosim.models.actuator import gear_friction, servo_torque
-from hexapod_cosim.models.contact import foot_contacts, foot_force
+from hexapod_cosim.models.contact import foot_contacts, foot_force, wall_contacts
 from hexapod_cosim.models.kinematics import (
     BODIES,
     JOINTS,
@@ -166,17 +166,25 @@ def applied_forces(
 ) -> Array:
     """Returns the forces g (19, 6) of eq. 1 without the joints' torques [N, N m].
 
-    damping: (6,) of the contacts [s/m], nan for open feet. bristle: deflections (6, 3) [m], 0 by
-    default.
+    damping: of the contacts [s/m], nan for open ones: (6,) of the feet with the ground, or (2, 6)
+    with that of `wall_contacts` in the second row. bristle: deflections [m], 0 by default: (6, 3),
+    or (2, 6, 3) accordingly.
     """
     g = np.zeros((BODIES, 6))
     g[:, 0:3] = masses(robot)[:, None] * np.array(robot.gravity)
     J, w = world_inertias(robot, body), body[:, 10:13]
     g[:, 3:6] = -np.cross(w, np.einsum("kij,kj->ki", J, w))
-    for leg, foot in enumerate(foot_contacts(robot, body)):
-        tibia = JOINTS * (leg + 1)
-        force = foot_force(robot, foot, damping[leg], None if bristle is None else bristle[leg])
-        g[tibia] += np.concatenate([force, cross(foot.point - body[tibia, 0:3], force)])
+    rows = [foot_contacts(robot, body), wall_contacts(robot, body)]
+    damping = np.atleast_2d(damping)
+    still = np.zeros((len(damping), LEGS, 3))
+    deflection = still if bristle is None else bristle.reshape(still.shape)
+    for row, feet in enumerate(rows[: len(damping)]):
+        for leg, foot in enumerate(feet):
+            if foot is None:
+                continue
+            tibia = JOINTS * (leg + 1)
+            force = foot_force(robot, foot, damping[row, leg], deflection[row, leg])
+            g[tibia] += np.concatenate([force, cross(foot.point - body[tibia, 0:3], force)])
     g[0] += np.concatenate([command.push_force, command.push_torque])
     return g
 

@@ -11,13 +11,14 @@ import hashlib
 import json
 import math
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property
 from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from hexapod_cosim.models.ground.surface import Surface
 from hexapod_cosim.models.schema import Choice, Number, Vector
 
 Array = NDArray[np.float64]
@@ -39,7 +40,8 @@ STATIC_LAWS = ("bristle",)  # friction laws with a static friction coefficient
 SERVO_MODES = ("position", "torque", "kinematic")
 METHODS = ("rosw3", "ros2", "dp54", "bs32", "rk4")
 PROJECTIONS = ("none", "step")
-TERRAINS = ("flat", "slope")
+TERRAINS = ("flat", "slope", "grid")
+PLANES = ("flat", "slope")  # kinds of ground without a surface
 GAITS = ("tripod", "ripple", "wave", "amble")
 
 
@@ -163,12 +165,26 @@ class Solver:
 
 @dataclass(frozen=True, kw_only=True)
 class Terrain:
-    """Ground plane; a slope rises by `incline` along `heading`."""
+    """The ground: level, a slope that rises by `incline` along `heading`, or a surface.
+
+    The heights of a surface are above `height`. Files give the name of the surface as `kind`, which
+    is "grid" here.
+    """
 
     kind: Annotated[str, Choice(TERRAINS)]
-    height: Annotated[float, Number("m", default=0.0)]
-    incline: Annotated[float, Number("rad", above=-math.pi / 2, below=math.pi / 2, default=0.0)]
-    heading: Annotated[float, Number("rad", default=0.0)]
+    height: Annotated[float, Number("m", default=0.0)] = 0.0
+    incline: Annotated[float, Number("rad", above=-math.pi / 2, below=math.pi / 2, default=0.0)] = (
+        0.0
+    )
+    heading: Annotated[float, Number("rad", default=0.0)] = 0.0
+    surface: Surface | None = None  # of the kind grid; other kinds do not use it
+
+    @property
+    def name(self) -> str:
+        """The kind as files give it: flat, slope or the name of a surface."""
+        if self.kind != "grid" or self.surface is None:
+            return self.kind
+        return str(self.surface.recipe.get("kind", self.surface.name))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -241,6 +257,9 @@ class Robot:
     @cached_property
     def hash(self) -> str:
         """SHA-256 in hexadecimal of all fields but `source`; equal robots have equal hashes."""
-        content = _plain(asdict(self))
-        del content["source"]
+        surface = self.terrain.surface if self.terrain.kind == "grid" else None
+        content = _plain(asdict(replace(self, terrain=replace(self.terrain, surface=None))))
+        del content["source"], content["terrain"]["surface"]
+        if surface is not None:
+            content["terrain"]["surface"] = surface.digest
         return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()

@@ -8,6 +8,10 @@ gravity.
 If gravity along the ground exceeds friction, the robot slides. The pose is then that of rest under
 gravity minus the common acceleration of all bodies. Without friction on level ground this
 acceleration is 0, and the pose is that of any other friction.
+
+On a surface the robot takes its pose on level ground, at the height at which no foot is deeper in
+the surface than it is on level ground. Where the feet stand on a level part of the surface, this is
+the pose of rest; elsewhere the robot falls by the unevenness under its feet when a run begins.
 """
 
 from __future__ import annotations
@@ -27,17 +31,20 @@ from hexapod_cosim.models.kinematics import (
     axis_quaternion,
     body_states,
     cross,
+    foot_centres,
     joint_models,
     quaternion_product,
     rotation_matrix,
 )
 from hexapod_cosim.models.records import STATIC_LAWS, Array, Baumgarte, Gait, Robot, Solver
-from hexapod_cosim.models.terrain import ground_normal
+from hexapod_cosim.models.terrain import ground, ground_height, ground_normal, surface_of
 
 RESIDUAL = 1e-9  # N, N m  about 1e4 times the rounding of such forces
 ITERATIONS = 60
 DIFFERENCE = 1e-7  # 1  step of the Jacobian's differences
 LEVEL = 1e-12  # 1  of gravity; a smaller part along the ground is rounding
+LEAST_RISE = 1e-13  # m
+UP = np.array([0.0, 0.0, 1.0])
 TORSO = 6  # the torso's unknowns and residuals
 UNKNOWNS = TORSO + LEGS * JOINTS
 
@@ -139,7 +146,34 @@ def standing(robot: Robot) -> Standing:
     law, because torque servos alone would not stand; kinematic drives hold it exactly. Raises
     RobotError when there is no such pose because servos are too weak or too soft.
     """
-    return _cached_standing(_standing_key(robot))
+    if surface_of(robot.terrain) is None:
+        return _cached_standing(_standing_key(robot))
+    level = replace(robot, terrain=replace(robot.terrain, kind="flat", surface=None))
+    pose = _cached_standing(_standing_key(level))
+    position = pose.position + np.array([0.0, 0.0, _rise(robot, pose)])
+    position.flags.writeable = False
+    return replace(pose, position=position)
+
+
+def _rise(robot: Robot, pose: Standing) -> float:
+    """Returns how far [m] the pose on level ground has to rise on the robot's surface.
+
+    The feet are then at most as deep in the surface as in level ground.
+    """
+    still = np.zeros((LEGS, JOINTS))
+    body = body_states(
+        robot, pose.position, pose.quaternion, np.zeros(3), np.zeros(3), pose.angle, still
+    )
+    terrain, centres = robot.terrain, foot_centres(robot, body)
+    allowed = centres[:, 2] - terrain.height  # distance of the centres from level ground
+    rise = max(ground_height(terrain, x, y) for x, y, _ in centres) - terrain.height
+    for _ in range(ITERATIONS):
+        nearest = [ground(terrain, centre + rise * UP)[0] for centre in centres]
+        deeper = float(np.max(allowed - nearest))
+        if deeper <= LEAST_RISE:
+            break
+        rise += deeper
+    return rise
 
 
 @lru_cache(maxsize=64)

@@ -31,6 +31,7 @@ from hexapod_cosim.cosim.results.walk import View
 from hexapod_cosim.cosim.results.warnings import (
     describe_walk,
     missing_metrics_warnings,
+    off_map_warnings,
     short_run_warnings,
     unused_settings,
     walk_warnings,
@@ -42,9 +43,12 @@ from hexapod_cosim.cosim.scenario.scenario import scenario_robot
 from hexapod_cosim.cosim.scenario.schedule import Schedule, make_schedule
 from hexapod_cosim.cosim.scenario.variation import Drawn, delayed, draw, initial_values
 from hexapod_cosim.models import LEG_NAMES, FmuError, Robot
+from hexapod_cosim.models.ground.grid_file import grid_bytes
+from hexapod_cosim.models.terrain import surface_of
 
 # parameters with these prefixes describe the robot; all others are settings
 BODY_PARAMETERS = ("torso.", "foot.", *(f"{leg}." for leg in LEG_NAMES))
+GRID = "terrain.grid"  # parameter: number of the grid file in the FMU's resources
 ROUND_OFF = 1e-6  # of a macro-step, in a delay
 SAME = 1e-9  # relative, of a parameter that was printed and read again
 
@@ -190,6 +194,7 @@ def make_result(
             *facts["warnings"],
             *unused_settings(scenario, setup.robot),
             *walk_warnings(view, setup.robot),
+            *off_map_warnings(view.recording, surface_of(plan.robot.terrain)),
             *missing,
         ],
         "gains": None if setup.gains is None else asdict(setup.gains),
@@ -247,7 +252,7 @@ def different_settings(plant: Fmu, robot: Robot) -> dict[str, float]:
 
     Raises FmuError when the FMU holds another robot.
     """
-    wanted = parameter_values(PLANT, plant_roots(robot))
+    wanted = parameter_values(PLANT, plant_roots(robot)) | _grid_of(plant, robot)
     present = plant.parameters()
     changes = {
         name: value
@@ -269,6 +274,25 @@ def different_settings(plant: Fmu, robot: Robot) -> dict[str, float]:
                 where=str(plant.path),
             )
     return changes
+
+
+def _grid_of(plant: Fmu, robot: Robot) -> dict[str, float]:
+    """Returns the parameter that chooses the robot's surface, whose grid file the FMU gets.
+
+    Raises FmuError when the FMU is of a version without surfaces.
+    """
+    surface = surface_of(robot.terrain)
+    if surface is None:
+        return {}
+    if GRID not in plant.variables:
+        raise FmuError(
+            "an FMU without surfaces",
+            got=f"no {GRID}",
+            expected="an FMU that reads grid files",
+            fix="export it again with `hexapod export`",
+            where=str(plant.path),
+        )
+    return {GRID: float(plant.provide_grid(grid_bytes(surface)))}
 
 
 def describe(robot: Robot, plant: Fmu, period: float) -> dict[str, Any]:
