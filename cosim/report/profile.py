@@ -108,10 +108,8 @@ def _averaged(time: Array, values: Array, period: float) -> Array:
     if half < 1:
         return values
     # continued by point reflection, so that ends stay where they are and keep their direction
-    before, after = (
-        2.0 * values[0] - values[half:0:-1],
-        2.0 * values[-1] - values[-2 : -half - 2 : -1],
-    )
+    before = 2.0 * values[0] - values[half:0:-1]
+    after = 2.0 * values[-1] - values[-2 : -half - 2 : -1]
     sums = np.cumsum(np.concatenate([0.0 * values[:1], before, values, after]), axis=0)
     return np.asarray((sums[2 * half + 1 :] - sums[: -2 * half - 1]) / (2 * half + 1))
 

@@ -34,6 +34,7 @@ def pack_surface(surface: Surface, parameters: Mapping[str, float]) -> dict[str,
     height = surface.height[::every, ::every]
     low, step = float(height.min()), float(np.ptp(height)) / STEPS
     steps = np.round((height - low) / (step or 1.0)).astype(np.uint16)
+    material = surface.material
     return {
         "kind": surface.kind,
         "name": str(surface.recipe.get("kind", surface.name)),
@@ -46,9 +47,7 @@ def pack_surface(surface: Surface, parameters: Mapping[str, float]) -> dict[str,
         "step": step,
         "data": _deflated_steps(steps),
         "materials": material_legend(surface, parameters),
-        "material": ""
-        if surface.material is None
-        else _deflated(surface.material[::every, ::every]),
+        "material": "" if material is None else _deflated(material[::every, ::every]),
     }
 
 

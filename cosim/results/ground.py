@@ -128,7 +128,7 @@ def _text(value: Any) -> str:
 
 
 def recipe_of(facts: Mapping[str, Any]) -> Mapping[str, Any]:
-    """Returns the keys of [terrain] that a run's facts hold. Raises RobotError for other content."""
+    """Returns the keys of [terrain] in a run's facts. Raises RobotError for other content."""
     recipe = facts.get("terrain") or {}
     if not isinstance(recipe, Mapping):
         raise RobotError("the facts of the ground", got=recipe, expected="a table", where="terrain")

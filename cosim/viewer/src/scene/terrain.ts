@@ -59,7 +59,7 @@ const COLOUR = `
 vec3 tone = diffuseColor.rgb * (1.0 - vLook.x - vLook.y - vLook.z)
   + soil * vLook.x + slippery * vLook.y + patchColour * vLook.z;
 float level = clamp((vPlace.z - range.x) * range.y, 0.0, 1.0);
-tone *= mix(0.87, 1.0, level);
+tone *= mix(0.82, 1.0, level);
 if (vUp > 0.5) {
   tone = mix(tone, line, 0.55 * meshOf(vPlace.xy, 0.5, 0.006));
   tone = mix(tone, line, 0.3 * meshOf(vPlace.xy, 0.1, 0.0025));
