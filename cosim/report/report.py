@@ -26,6 +26,7 @@ from hexapod_cosim.cosim.report.servos import servo_rows
 from hexapod_cosim.cosim.report.surface import material_legend
 from hexapod_cosim.cosim.results.accuracy import Accuracy
 from hexapod_cosim.cosim.results.comparison import BETTER, METHOD, SAME, WORSE, Change, Comparison
+from hexapod_cosim.cosim.results.drop import drop_text
 from hexapod_cosim.cosim.results.ground import describe_terrain
 from hexapod_cosim.cosim.results.metrics import DUST, FLOORS, METRICS, has_net_slip, shown_metrics
 from hexapod_cosim.cosim.results.results import StoredResult
@@ -259,7 +260,8 @@ def _walked(facts: Mapping[str, Any]) -> str:
 
 
 def _robot(facts: Mapping[str, Any]) -> str:
-    return f"Robot {facts['robot']['name']}, {_duration(facts)}."
+    drop = f" {drop_text(facts['drop'])}" if facts.get("drop") else ""
+    return f"Robot {facts['robot']['name']}, {_duration(facts)}.{drop}"
 
 
 def metric_rows(metrics: Metrics, *, net_slip: bool) -> Rows:

@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from hexapod_cosim.cosim.interface.names import foot_names
 from hexapod_cosim.cosim.master.recorder import COMMAND_COLUMNS
 from hexapod_cosim.cosim.results.walk import View
 from hexapod_cosim.models import CONTACT_LAWS
@@ -50,10 +51,12 @@ def describe_drop(view: View) -> Drop | None:
     `contact.impact_speed_floor` are left out: there the law does not deliver what it is asked for.
     """
     recording = view.recording
-    needed = [*(name for name in COMMAND_COLUMNS if name in recording.names)]
-    if len(recording.time) < 2 or recording.columns(needed).any():
+    needed = {*COMMAND_COLUMNS, *foot_names("contact"), *foot_names("impact_speed")}
+    if len(recording.time) < 2 or not needed <= set(recording.names):
         return None
-    touching = (recording.feet("contact") > 0.5).any(axis=1)
+    if recording.columns(list(COMMAND_COLUMNS)).any():
+        return None
+    touching = np.asarray((recording.feet("contact") > 0.5).any(axis=1))
     if touching[0]:
         return None
     begins = np.flatnonzero(touching[1:] & ~touching[:-1]) + 1

@@ -25,6 +25,7 @@ from hexapod_cosim.cosim.master.force_sensor import ForceSensor, SensorSettings
 from hexapod_cosim.cosim.master.loop import COMPLETED, Outcome, Progress, diagnostic_columns, run
 from hexapod_cosim.cosim.master.recorder import Recorder, chosen_columns
 from hexapod_cosim.cosim.master.signals import Signals
+from hexapod_cosim.cosim.results.drop import describe_drop
 from hexapod_cosim.cosim.results.ground import is_on_surface, surface_of_grid
 from hexapod_cosim.cosim.results.metrics import MEASURED_BY_PLANT, compute_metrics, metric_columns
 from hexapod_cosim.cosim.results.result import Result
@@ -196,7 +197,7 @@ def make_result(
     """
     scenario, setup, drawn = plan.scenario, plan.controller, plan.drawn
     view = View(outcome.judged, parameters, setup.gait.period)
-    missing = []
+    missing, drop = list[str](), describe_drop(replace(view, recording=outcome.recording))
     if outcome.status == COMPLETED:
         missing = [*short_run_warnings(view), *missing_metrics_warnings(view)]
     found = {
@@ -209,6 +210,7 @@ def make_result(
         ],
         "gains": None if setup.gains is None else asdict(setup.gains),
         "walk": describe_walk(view, setup.robot),
+        "drop": None if drop is None else drop.as_facts(),
         "drawn": None if drawn is None else drawn.as_facts(),
     }
     metrics = compute_metrics(view, servo=plan.robot.servo, realtime_factor=outcome.realtime_factor)
