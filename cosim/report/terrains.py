@@ -21,7 +21,8 @@ from hexapod_cosim.cosim.results.comparison import Comparison
 from hexapod_cosim.cosim.results.summary import Summary
 
 TABLE, FIGURE = "terrains.csv", "terrains"
-MARKS = {"kinematic": "o", "compliant": "s"}
+MARKS = {"kinematic": ("o", 7.0), "compliant": ("s", 3.6)}  # marker and its size
+ROOM = 1.06  # of an axis over its largest value
 
 
 @dataclass(frozen=True)
@@ -32,7 +33,6 @@ class Quantity:
     unit: str
     digits: int
     title: str
-    least: float | None = 0.0  # of the figure's axis
 
 
 QUANTITIES = (
@@ -147,16 +147,16 @@ def _draw_quantity(axis: Axes, quantity: Quantity, rows: list[Row], scenarios: l
     table = np.array(list(by_control.values()))
     axis.hlines(range(len(scenarios)), *_ends(table), color="0.8", linewidth=2.2, zorder=1)
     for control, values in by_control.items():
-        mark: dict[str, Any] = {"marker": MARKS[control], "markersize": 5, "linestyle": "none"}
+        marker, size = MARKS[control]
+        mark: dict[str, Any] = {"marker": marker, "markersize": size, "linestyle": "none"}
         places = list(range(len(scenarios)))
         axis.plot(
             values, places, color=STYLES[control]["color"], label=control, clip_on=False, **mark
         )
     axis.set_title(quantity.title, fontsize="small")
     axis.set_xlabel(quantity.unit)
-    axis.set_xlim(left=quantity.least)
-    if quantity.unit == "%":
-        axis.set_xlim(0.0, 100.0)
+    most = 100.0 if quantity.unit == "%" else float(np.nanmax(table, initial=0.0))
+    axis.set_xlim(0.0, ROOM * (most or 1.0))
     axis.grid(visible=True, axis="x")
 
 

@@ -38,7 +38,7 @@ export class Actor {
     this.model = new RobotModel(run.robot, mark);
     const { surface } = relief;
     this.floor = surface ? new Terrain(surface, run.ground.height) : new Floor(relief);
-    const dents = surface ? findDents(run.ground.stances ?? [], run.robot.foot) : [];
+    const dents = surface ? findDents(run.ground.stances ?? [], surface, run.robot.foot) : [];
     if (dents.length > 0) this.dents = new Dents(dents, relief, recording);
     this.arrows = new ForceArrows(run.robot.legs.length);
     this.lamp.castShadow = true;
@@ -70,7 +70,7 @@ export class Actor {
     this.scene.fog = new Fog(colours.sky, 2.2, 6.5);
     if (this.floor instanceof Terrain) this.floor.paint(colours);
     else this.floor.paint(colours.floor, colours.grid);
-    this.dents?.paint(this.onSoil() ? colours.soil : colours.floor);
+    this.dents?.paint(colours.soil);
     this.arrows.paint(colours.force);
     this.sky.intensity = colours.dark ? 1.15 : 1.7;
     this.lamp.intensity = colours.dark ? 2.2 : 2.3;
@@ -121,12 +121,6 @@ export class Actor {
     if (!this.relief.surface) return new Vector3(x, y, this.relief.height(x, y));
     const first = this.poseAt(this.recording.start).position;
     return new Vector3(x, y, z - first.z + this.relief.height(first.x, first.y));
-  }
-
-  /** Tells whether dents are in a soil that has a colour of its own. */
-  private onSoil(): boolean {
-    const { surface } = this.relief;
-    return surface?.materials.some(({ look }) => look === "soil") ?? false;
   }
 
   private touching(time: number): boolean[] {

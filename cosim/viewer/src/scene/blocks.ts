@@ -2,6 +2,8 @@ import { BufferAttribute, BufferGeometry } from "three";
 import { BEYOND, type Looks } from "./smooth";
 import type { Surface } from "./surface";
 
+const LONGEST = 0.5; // m    of a line
+
 /** Corners, normals and materials of quadrilaterals, and the edges that are drawn as lines. */
 class Quads {
   private readonly positions: number[] = [];
@@ -166,5 +168,11 @@ function addWall(
     alongX ? [sign, 0, 0] : [0, sign, 0],
     look,
   );
-  for (const z of [low, high]) quads.addLine(at(from, z), at(to, z));
+  // long lines are divided: their depth would lose too many digits against that of the faces
+  const pieces = Math.ceil((to - from) / LONGEST);
+  for (const z of [low, high])
+    for (let k = 0; k < pieces; k++) {
+      const place = (share: number) => at(from + (share * (to - from)) / pieces, z);
+      quads.addLine(place(k), place(k + 1));
+    }
 }

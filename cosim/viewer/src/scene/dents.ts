@@ -11,8 +11,9 @@ import {
 import type { Recording } from "../recording";
 import type { PackedStance } from "../types";
 import type { Relief } from "./relief";
+import type { Surface } from "./surface";
 
-const LEAST = 0.001; // m    of depth; a foot on hard ground is less deep and leaves no dent
+const LEAST = 0.001; // m    of depth; a smaller dent is not drawn
 const LIFT = 0.0012; // m    of a dent's middle above the ground, which would hide it
 const RIM = 0.16; // height of the rim over the dent's radius
 const RINGS = [0, 0.25, 0.5, 0.7, 0.82, 0.92, 1, 1.15, 1.35]; // radii over that of the dent
@@ -29,9 +30,13 @@ export interface Dent {
 }
 
 /** Returns the dents that feet leave in soft ground, in order of time. */
-export function findDents(stances: readonly PackedStance[], radius: number): Dent[] {
+export function findDents(
+  stances: readonly PackedStance[],
+  surface: Surface,
+  radius: number,
+): Dent[] {
   return stances
-    .filter(([, , , , depth]) => depth > LEAST)
+    .filter(([, , x, y, depth]) => depth > LEAST && surface.lookAt(x, y) === "soil")
     .map(([, time, x, y, depth]) => ({ time, x, y, depth, radius: mouth(radius, depth) }))
     .sort((a, b) => a.time - b.time);
 }

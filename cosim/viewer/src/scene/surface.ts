@@ -63,6 +63,11 @@ export class Surface {
     ];
   }
 
+  /** Returns what the material at a position is drawn as, "" for the ground of the definition. */
+  lookAt(x: number, y: number): string {
+    return this.materials[this.materialAt(x, y) - 1]?.look ?? "";
+  }
+
   private bicubic(across: number, up: number): Place {
     const [column, a, da] = weights(across, this.columns);
     const [row, b, db] = weights(up, this.rows);

@@ -96,7 +96,9 @@ export class Terrain extends Group {
     else {
       const { faces, edges } = blockGeometry(surface, looks);
       this.addMesh(new Mesh(faces, this.material));
-      this.add(new LineSegments(edges, this.edge));
+      const lines = new LineSegments(edges, this.edge);
+      lines.frustumCulled = false;
+      this.add(lines);
     }
     const [low, high] = surface.range;
     this.uniforms.range.value = new Vector3(
