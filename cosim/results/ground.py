@@ -21,7 +21,7 @@ from hexapod_cosim.models.terrain import ground_height
 Array = NDArray[np.float64]
 
 GROUND = "ground.terrain"  # the grid file in a folder of results
-MARGIN = 3.0  # m    of the surface around the torso's path
+MARGIN = 2.75  # m    of the surface around the torso's path
 LEAST_HIGH = 5e-4  # m    of a height that a text gives
 
 
