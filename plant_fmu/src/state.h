@@ -1,7 +1,8 @@
 /* state.h - data of a plant: the model (constants compiled from the definition) and the state.
  *
- * Legs are stored innermost, [quantity][component][slot]. The structures hold no pointers, so a
- * copy of their bytes is a copy of the plant.
+ * Legs are stored innermost, [quantity][component][slot]. But for the terrain, whose checksum a
+ * saved state holds, the structures hold no pointers, so a copy of their bytes is a copy of the
+ * plant.
  */
 #ifndef HX_STATE_H
 #define HX_STATE_H

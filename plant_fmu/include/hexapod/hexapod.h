@@ -6,7 +6,8 @@
  * RR, joints (and the link each one moves) in the order coxa, femur, tibia. Bodies: 0 = torso, 1 +
  * 3 leg + joint = link. Equation numbers refer to docs/equations.md.
  *
- * A plant contains no pointers and no hidden state, and the library has no globals: a plant's
+ * A plant contains no pointer but the one to its terrain and no hidden state, and the library has
+ * no globals: a plant's
  * bytes are its state. After hx_plant_create no function allocates, prints or exits.
  */
 #ifndef HEXAPOD_H

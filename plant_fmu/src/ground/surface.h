@@ -1,4 +1,4 @@
-/* surface.h - distance of a sphere's centre from an uneven ground (eq. HXSURF). Scalar and compiled
+/* surface.h - distance of a sphere's centre from an uneven ground (eq. 31-34). Scalar and compiled
  * once, so that all kernels get the same bits. Heights are above the terrain's own zero. */
 #ifndef HX_SURFACE_H
 #define HX_SURFACE_H

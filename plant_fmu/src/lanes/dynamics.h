@@ -393,7 +393,7 @@ static void hx_dynamics_evaluate(const hxModel *model, const hxContactState *con
   /* the stage's response to the shifts (eq. 20, 21) */
   for (int pack = 0; implicit && pack < HX_PACKS; ++pack) {
     if (!implicit->change) keep_slopes(model, contact, pack, &work->pack[pack], implicit);
-    leg_response(model, implicit, motion, pack, &work->pack[pack]);
+    leg_response(implicit, motion, pack, &work->pack[pack]);
     if (has_bristles(model, HX_FOOT)) bristle_response(implicit, pack, HX_FOOT, &work->pack[pack]);
   }
   if (implicit && work->torso_rows) torso_response(model, contact, motion, implicit, work);

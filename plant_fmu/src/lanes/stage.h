@@ -107,28 +107,28 @@ HX_INLINE void row_response(const hxImplicit *implicit, int pack, int row, const
   push_body(&leg->joint[HX_JOINTS - 1].p, contact_point(leg, contact), contact->response);
 }
 
-HX_RARE void further_responses(const hxModel *model, const hxImplicit *implicit, int pack,
-                               const hxShift *tibia, hxLegWork *leg) {
+HX_RARE void further_responses(const hxImplicit *implicit, int pack, const hxShift *tibia,
+                               hxLegWork *leg) {
   for (int k = 1; k < leg->rows; ++k) row_response(implicit, pack, leg->row[k], tibia, leg);
 }
 
 /* Adds the responses of a leg's contacts to the tibia's p. */
-static inline void tibia_response(const hxModel *model, const hxImplicit *implicit, int pack,
-                                  const hxShift *tibia, hxLegWork *leg) {
+static inline void tibia_response(const hxImplicit *implicit, int pack, const hxShift *tibia,
+                                  hxLegWork *leg) {
   row_response(implicit, pack, HX_FOOT, tibia, leg);
-  if (leg->rows > 1) further_responses(model, implicit, pack, tibia, leg);
+  if (leg->rows > 1) further_responses(implicit, pack, tibia, leg);
 }
 
 /* Adds G_v dv + G_x dx, the response of servos and contacts to the shifts, to torques and p. */
-static inline void leg_response(const hxModel *model, const hxImplicit *implicit,
-                                const hxPlantMotion *motion, int pack, hxLegWork *leg) {
+static inline void leg_response(const hxImplicit *implicit, const hxPlantMotion *motion, int pack,
+                                hxLegWork *leg) {
   if (!implicit->change) { /* first stage: dx = z v, dv = 0 */
     for (int joint = 0; joint < HX_JOINTS; ++joint) {
       hxJointWork *work = &leg->joint[joint];
       work->angle_shift = implicit->z * work->speed, work->speed_shift = hx_splat(0.0);
       work->torque -= implicit->slope[pack].motor_stiffness[joint] * work->angle_shift;
     }
-    tibia_response(model, implicit, pack, NULL, leg);
+    tibia_response(implicit, pack, NULL, leg);
     return;
   }
   /* later stages: shifts of joints and contact points, then their forces */
@@ -141,7 +141,7 @@ static inline void leg_response(const hxModel *model, const hxImplicit *implicit
     work->torque -= implicit->slope[pack].motor_stiffness[joint] * work->angle_shift +
                     servo_damping(implicit, pack, joint) * work->speed_shift;
   }
-  tibia_response(model, implicit, pack, &j, leg);
+  tibia_response(implicit, pack, &j, leg);
 }
 
 /* Keeps the slopes of the torso's contacts in the first stage, and adds their responses to p. */
