@@ -1,4 +1,4 @@
-"""Tests what a report tells of the ground: packed heights, the part around a walk, profile, dents."""
+"""Tests what a report tells of the ground: heights, the part around a walk, profile, stances."""
 
 from __future__ import annotations
 
