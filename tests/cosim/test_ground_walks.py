@@ -52,7 +52,6 @@ def test_feet_that_find_no_ground_neither_end_the_run_nor_its_metrics(control: s
     assert result.completed
     fell = any("the robot fell at" in text for text in result.facts["warnings"])
     assert result.facts["walk"]["upright"] == (not fell)
-    assert result.facts["walk"]["distance"] < 0.5 * 0.1 * 10.0
     for name in ("peak_force", "slip_per_metre", "roll_rms", "energy_residual"):
         assert math.isfinite(result.metrics[name])
     assert result.surface is not None

@@ -82,7 +82,8 @@ def test_forty_thousand_blocks_of_different_height_open(
     walk: StoredResult, tmp_path: Path, browser: Any
 ) -> None:
     row, column = np.indices((200, 200))
-    heights = -1e-3 * ((7 * row + 13 * column) % 97)  # neighbours always differ
+    # neighbours always differ
+    heights = np.asarray(-1e-3 * ((7 * row + 13 * column) % 97), dtype=np.float64)
     surface = Surface(kind="blocks", height=heights, x0=-5.0, y0=-5.0, cell=0.05)
     page = opened(walk, surface, tmp_path, browser)
     assert page.errors == []

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from hexapod_cosim.cosim.interface.names import foot_names, foot_vector_names, vector_names
 from hexapod_cosim.cosim.master.recorder import Recording
@@ -49,8 +50,8 @@ def random_blocks(count: int) -> Surface:
 
 def walked(*, sunk: float = 0.0, rise: float = 0.0) -> View:
     """Returns a straight walk along x whose left front foot stands from 1 s to 2 s at x = 0.2."""
-    time = STEP * np.arange(ROWS)
-    columns = {
+    time = STEP * np.arange(ROWS, dtype=np.float64)
+    columns: dict[str, NDArray[np.float64]] = {
         name: np.zeros(ROWS) for name in ("time", "torso.yaw", *vector_names("torso.position"))
     }
     columns |= {
