@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from hexapod_cosim.cosim.interface.names import vector_names
 from hexapod_cosim.cosim.master.recorder import COMMAND_COLUMNS, Recording
 from hexapod_cosim.models import FRICTION_LAWS, TERRAINS
+from hexapod_cosim.models.ground.surface import Surface
 
 Array = NDArray[np.float64]
 
@@ -35,6 +36,7 @@ class View:
     recording: Recording
     parameters: Mapping[str, float]  # of the FMU
     period: float  # s    of the gait
+    surface: Surface | None = None  # around the walk, for reports; None: a plane, or not needed
 
     @cached_property
     def walk(self) -> Walk | None:
@@ -45,7 +47,7 @@ class View:
         """Returns the last SHOWN_CYCLES gait cycles of the run."""
         time = self.recording.time
         begin = int(np.searchsorted(time, time[-1] - SHOWN_CYCLES * self.period))
-        return View(self.recording.rows(slice(begin, None)), self.parameters, self.period)
+        return replace(self, recording=self.recording.rows(slice(begin, None)))
 
 
 @dataclass(frozen=True)

@@ -34,6 +34,7 @@ from hexapod_cosim.cosim.run.run import (
     initialise_plant,
     make_plan,
     make_result,
+    run_surface,
     sensor_settings,
 )
 from hexapod_cosim.cosim.scenario.records import Scenario
@@ -108,9 +109,10 @@ class Walker:
         )
         self.loop_time = thread_time() - started
         facts = describe(plan.controller.robot, plant, plan.controller.gait.period)
-        return make_result(
-            plan, outcome, parameters, facts | {"warnings": plan.controller.warnings}
-        )
+        facts |= {"warnings": plan.controller.warnings}
+        # only a run that records everything gets a report, which shows the surface
+        surface = run_surface(plant, plan.robot, parameters) if self._everything else None
+        return make_result(plan, outcome, parameters, facts, surface=surface)
 
     def summary(
         self,
