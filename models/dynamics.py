@@ -13,8 +13,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from hexapod_cosim.models.actuator import gear_friction, servo_torque
-from hexapod_cosim.models.contact import foot_contacts, foot_force
+from hexapod_cosim.models.actuator import gear_friction, overrun, servo_torque, stop_torque
+from hexapod_cosim.models.contact import foot_contacts, foot_force, foot_moment, wall_contacts
 from hexapod_cosim.models.kinematics import (
     BODIES,
     JOINTS,
@@ -166,17 +166,27 @@ def applied_forces(
 ) -> Array:
     """Returns the forces g (19, 6) of eq. 1 without the joints' torques [N, N m].
 
-    damping: (6,) of the contacts [s/m], nan for open feet. bristle: deflections (6, 3) [m], 0 by
-    default.
+    damping: of the contacts [s/m], nan for open ones: (6,) of the feet with the ground, or (2, 6)
+    with that of `wall_contacts` in the second row. bristle: deflections [m], 0 by default: (6, 3),
+    or (2, 6, 3) accordingly.
     """
     g = np.zeros((BODIES, 6))
     g[:, 0:3] = masses(robot)[:, None] * np.array(robot.gravity)
     J, w = world_inertias(robot, body), body[:, 10:13]
     g[:, 3:6] = -np.cross(w, np.einsum("kij,kj->ki", J, w))
-    for leg, foot in enumerate(foot_contacts(robot, body)):
-        tibia = JOINTS * (leg + 1)
-        force = foot_force(robot, foot, damping[leg], None if bristle is None else bristle[leg])
-        g[tibia] += np.concatenate([force, cross(foot.point - body[tibia, 0:3], force)])
+    rows = [foot_contacts(robot, body), wall_contacts(robot, body)]
+    damping = np.atleast_2d(damping)
+    still = np.zeros((len(damping), LEGS, 3))
+    deflection = still if bristle is None else bristle.reshape(still.shape)
+    for row, feet in enumerate(rows[: len(damping)]):
+        for leg, foot in enumerate(feet):
+            if foot is None:
+                continue
+            tibia = JOINTS * (leg + 1)
+            force = foot_force(robot, foot, damping[row, leg], deflection[row, leg])
+            moment = foot_moment(robot, foot, damping[row, leg], body[tibia, 10:13])
+            arm = foot.point - body[tibia, 0:3]
+            g[tibia] += np.concatenate([force, cross(arm, force) + moment])
     g[0] += np.concatenate([command.push_force, command.push_torque])
     return g
 
@@ -193,6 +203,16 @@ def joint_torques(robot: Robot, body: Array, command: Command) -> tuple[Array, A
     return servo_torque(
         robot.servo, angle, speed, command.angle_ref, command.speed_ref, command.torque_ref
     ), gear
+
+
+def joint_overruns(robot: Robot, body: Array) -> Array:
+    """Returns how far joints are past their stops (6, 3) [rad]."""
+    return overrun(joint_angles(robot, body), robot.angle_min, robot.angle_max)
+
+
+def stop_torques(robot: Robot, body: Array) -> Array:
+    """Returns the torques (6, 3) of the stops on the child [N m]; 0 in kinematic mode."""
+    return stop_torque(robot.servo, joint_overruns(robot, body), joint_speeds(robot, body))
 
 
 def drive_acceleration(robot: Robot, body: Array, command: Command) -> Array:
@@ -258,7 +278,7 @@ def accelerations(
     motor, gear = joint_torques(robot, body, command)
     g = (
         applied_forces(robot, body, command, damping, bristle).ravel()
-        + joints.G.T @ (motor + gear).ravel()
+        + joints.G.T @ (motor + gear + stop_torques(robot, body)).ravel()
     )
     D, c = constraint_equations(robot, body, command)
     solution = solve_constrained(mass_matrix(robot, body), g, D, c)

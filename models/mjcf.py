@@ -5,6 +5,10 @@ MuJoCo's contact is a spring and a damper of accelerations. Its stiffness is cho
 of a standing tripod sink in as deep as with Hertz's law, its damping so that a free bounce has the
 restitution. Friction is Coulomb's, with an elliptic cone. The servos' torque-speed line and the
 tanh law's creep are omitted.
+
+A surface of blocks becomes boxes, one for each rectangle of equal height, with the same faces. A
+smooth surface becomes a height field, whose triangles between the nodes replace the bicubic
+surface. Both end at the map's edges, and materials of patches are omitted.
 """
 
 from __future__ import annotations
@@ -26,7 +30,9 @@ from hexapod_cosim.models.kinematics import (
     quaternion_product,
     rotation_matrix,
 )
+from hexapod_cosim.models.mjcf_ground import APPROXIMATION, add_surface
 from hexapod_cosim.models.records import JOINT_NAMES, Array, Leg, Link, Robot, Vector3
+from hexapod_cosim.models.terrain import ground_height, surface_of
 from hexapod_cosim.models.urdf.writer import COLOURS, THICKNESS, numbers
 
 TIME_STEP = 0.001  # s
@@ -48,9 +54,15 @@ def robot_to_mjcf(robot: Robot) -> str:
     option = ET.SubElement(root, "option", timestep=repr(TIME_STEP), gravity=numbers(robot.gravity))
     option.attrib |= {"integrator": "implicitfast", "cone": "elliptic", "impratio": "10"}
     _assets(root)
+    surface = surface_of(robot.terrain)
+    if surface is not None:
+        root.insert(0, ET.Comment(f" {APPROXIMATION[surface.kind]} "))
     world = ET.SubElement(root, "worldbody")
     ET.SubElement(world, "light", pos="0 0 3", dir="0 0 -1", directional="true")
-    _ground(world, robot)
+    if surface is None:
+        _ground(world, robot)
+    else:
+        add_surface(root, world, surface, robot.terrain.height, _contact_attributes(robot))
     _torso(world, robot)
     _servos(root, robot)
     _stance(root, robot)
@@ -88,11 +100,18 @@ def _ground(world: ET.Element, robot: Robot) -> None:
         material="ground",
         pos=numbers((0.0, 0.0, robot.terrain.height)),
         quat=numbers(_ground_quaternion(robot)),
-        friction=_friction(robot),
-        solref=_solref(robot),
-        solimp=_solimp(),
-        priority="1",
+        attrib=_contact_attributes(robot),
     )
+
+
+def _contact_attributes(robot: Robot) -> dict[str, str]:
+    """Returns the attributes of the ground's contact."""
+    return {
+        "friction": _friction(robot),
+        "solref": _solref(robot),
+        "solimp": _solimp(),
+        "priority": "1",
+    }
 
 
 def _friction(robot: Robot) -> str:
@@ -237,13 +256,19 @@ def _servos(root: ET.Element, robot: Robot) -> None:
 
 
 def _stance(root: ET.Element, robot: Robot) -> None:
-    """Adds the standing pose: the lowest feet touch the ground, and the torso is parallel to it."""
+    """Adds the standing pose: the lowest feet touch the ground, and the torso is parallel to it.
+
+    On a surface the pose is above the highest place below a foot.
+    """
     tilt = _ground_quaternion(robot)
     heading = robot.terrain.heading if robot.terrain.kind == "slope" else 0.0
     quaternion = quaternion_product(tilt, axis_quaternion(Z, -heading))
     feet = foot_positions(robot, robot.stance)
     height = robot.foot.radius - float(np.min(feet[:, 2]))  # of the torso's frame above the plane
-    place = np.array([0.0, 0.0, robot.terrain.height]) + height * rotation_matrix(tilt)[:, 2]
+    level = robot.terrain.height
+    if surface_of(robot.terrain) is not None:
+        level = max(ground_height(robot.terrain, x, y) for x, y, _ in feet)
+    place = np.array([0.0, 0.0, level]) + height * rotation_matrix(tilt)[:, 2]
     key = ET.SubElement(ET.SubElement(root, "keyframe"), "key", name="stance")
     key.set("qpos", numbers([*place, *quaternion, *robot.stance.ravel()]))
     key.set("ctrl", numbers(robot.stance.ravel()))

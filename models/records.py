@@ -11,13 +11,14 @@ import hashlib
 import json
 import math
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property
 from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from hexapod_cosim.models.ground.surface import Surface
 from hexapod_cosim.models.schema import Choice, Number, Vector
 
 Array = NDArray[np.float64]
@@ -34,12 +35,14 @@ CONTACT_LAWS = (
     "constant_damping",
     "hertz",
 )
-FRICTION_LAWS = ("tanh", "none", "bristle")
-STATIC_LAWS = ("bristle",)  # friction laws with a static friction coefficient
+FRICTION_LAWS = ("tanh", "none", "bristle", "lugre")
+STATIC_LAWS = ("tanh", "bristle", "lugre")  # friction laws with a static friction coefficient
+BRISTLE_LAWS = ("bristle", "lugre")  # friction laws with bristles, under which a foot can hold
 SERVO_MODES = ("position", "torque", "kinematic")
 METHODS = ("rosw3", "ros2", "dp54", "bs32", "rk4")
 PROJECTIONS = ("none", "step")
-TERRAINS = ("flat", "slope")
+TERRAINS = ("flat", "slope", "grid")
+PLANES = ("flat", "slope")  # kinds of ground without a surface
 SOIL_LAWS = ("none", "bekker", "granular", "mud")
 GAITS = ("tripod", "ripple", "wave", "amble")
 
@@ -112,26 +115,31 @@ class Contact:
 
 @dataclass(frozen=True, kw_only=True)
 class Friction:
-    """Friction law (eq. 15-18)."""
+    """Friction law (eq. 15-18, 35-38)."""
 
     law: Annotated[str, Choice(FRICTION_LAWS)]
     mu: Annotated[float, Number("1", at_least=0.0)]
-    # static friction, bristle law; 0: mu
+    # static friction; 0: mu
     mu_static: Annotated[float, Number("1", at_least=0.0, default=0.0)] = 0.0
-    slope: Annotated[float, Number("s/m", above=0.0)]  # k_t of eq. 15, tanh law
-    # b_max of eq. 16, bristle law; default of a file: Mindlin
+    slope: Annotated[float, Number("s/m", above=0.0)]  # k_t of eq. 15, tanh law, and of eq. 38
+    # b_max of eq. 16 and 36, laws with bristles; default of a file: Mindlin
     presliding: Annotated[float, Number("m", at_least=1e-7, at_most=1.0)]
-    # tau of eq. 17, bristle law
+    # tau of eq. 17 and 37, laws with bristles
     bristle_damping: Annotated[float, Number("s", at_least=0.0, at_most=10.0, default=0.005)]
-    # v_s of eq. 18, bristle law
+    # v_s of eq. 18
     stribeck_speed: Annotated[float, Number("m/s", at_least=1e-6, at_most=100.0, default=0.005)] = (
         0.005
     )
+    # of eq. 35: what a slip of 1 m/s adds to the coefficient
+    viscous: Annotated[float, Number("s/m", at_least=0.0, at_most=1e6, default=0.0)] = 0.0
+    # r_s and r_r of eq. 38: moments against spin over mu f_n and against rolling over f_n
+    spin_radius: Annotated[float, Number("m", at_least=0.0, at_most=10.0, default=0.0)] = 0.0
+    rolling_radius: Annotated[float, Number("m", at_least=0.0, at_most=10.0, default=0.0)] = 0.0
 
 
 @dataclass(frozen=True, kw_only=True)
 class Servo:
-    """Servo of every joint (eq. 12)."""
+    """Servo of every joint (eq. 12) and the joints' stops (eq. 39)."""
 
     mode: Annotated[str, Choice(SERVO_MODES)]
     kp: Annotated[float, Number("N m/rad", at_least=0.0)]
@@ -143,6 +151,13 @@ class Servo:
     torque_continuous: Annotated[float, Number("N m", above=0.0)]  # a larger one gives a warning
     # torque over the root of the copper loss, at the joint; default of a file: ideal motor
     motor_constant: Annotated[float, Number("N m/sqrt(W)", above=0.0)]
+    # stops at the links' angle_min and angle_max; 0: none
+    stop_stiffness: Annotated[float, Number("N m/rad", at_least=0.0, at_most=1e8, default=0.0)] = (
+        0.0
+    )
+    stop_damping: Annotated[float, Number("N m s/rad", at_least=0.0, at_most=1e8, default=0.0)] = (
+        0.0
+    )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -166,12 +181,26 @@ class Solver:
 
 @dataclass(frozen=True, kw_only=True)
 class Terrain:
-    """Ground plane; a slope rises by `incline` along `heading`."""
+    """The ground: level, a slope that rises by `incline` along `heading`, or a surface.
+
+    The heights of a surface are above `height`. Files give the name of the surface as `kind`, which
+    is "grid" here.
+    """
 
     kind: Annotated[str, Choice(TERRAINS)]
-    height: Annotated[float, Number("m", default=0.0)]
-    incline: Annotated[float, Number("rad", above=-math.pi / 2, below=math.pi / 2, default=0.0)]
-    heading: Annotated[float, Number("rad", default=0.0)]
+    height: Annotated[float, Number("m", default=0.0)] = 0.0
+    incline: Annotated[float, Number("rad", above=-math.pi / 2, below=math.pi / 2, default=0.0)] = (
+        0.0
+    )
+    heading: Annotated[float, Number("rad", default=0.0)] = 0.0
+    surface: Surface | None = None  # of the kind grid; other kinds do not use it
+
+    @property
+    def name(self) -> str:
+        """The kind as files give it: flat, slope or the name of a surface."""
+        if self.kind != "grid" or self.surface is None:
+            return self.kind
+        return str(self.surface.recipe.get("kind", self.surface.name))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -273,6 +302,9 @@ class Robot:
     @cached_property
     def hash(self) -> str:
         """SHA-256 in hexadecimal of all fields but `source`; equal robots have equal hashes."""
-        content = _plain(asdict(self))
-        del content["source"]
+        surface = self.terrain.surface if self.terrain.kind == "grid" else None
+        content = _plain(asdict(replace(self, terrain=replace(self.terrain, surface=None))))
+        del content["source"], content["terrain"]["surface"]
+        if surface is not None:
+            content["terrain"]["surface"] = surface.digest
         return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()

@@ -22,6 +22,7 @@ from pathlib import Path
 from typing import Any
 
 from hexapod_cosim.models.errors import RobotError, unknown_name
+from hexapod_cosim.models.ground.table import beside, read_terrain
 from hexapod_cosim.models.records import (
     CONTACT_LAWS,
     FRICTION_LAWS,
@@ -126,19 +127,31 @@ def load_robot(path_or_name: str | Path) -> Robot:
             fix="correct that line",
             where=str(path),
         ) from error
-    if alone is None:
-        return _robot_from_urdf(side_table(tomllib.loads(text), path.parent, str(path)), str(path))
-    return alone
+    if alone is not None:
+        return alone
+    table = _terrain_beside(tomllib.loads(text), path.parent)
+    if "urdf" in table:
+        return _robot_from_urdf(side_table(table, path.parent, str(path)), str(path))
+    return robot_from_table(table, where=str(path))
+
+
+def _terrain_beside(table: dict[str, Any], folder: Path) -> dict[str, Any]:
+    """Returns a file's tables with the path of a height map relative to a folder resolved."""
+    terrain = table.get("terrain")
+    return table | {"terrain": beside(terrain, folder)} if isinstance(terrain, dict) else table
 
 
 @lru_cache(maxsize=64)
 def _robot_from_text(text: str, where: str) -> Robot | None:
-    """Returns the robot of a file's text, or None if it refers to a URDF.
+    """Returns the robot of a file's text, or None if it refers to a URDF or a height map.
 
-    Results are cached by the text; a URDF can change without it.
+    Results are cached by the text; the other file can change without it.
     """
     table = tomllib.loads(text)
-    return None if "urdf" in table else robot_from_table(table, where=where)
+    terrain = table.get("terrain")
+    if "urdf" in table or (isinstance(terrain, dict) and "file" in terrain):
+        return None
+    return robot_from_table(table, where=where)
 
 
 def _robot_from_urdf(table: Mapping[str, Any], where: str) -> Robot:
@@ -225,6 +238,8 @@ def _read_friction(
 
 def _read_section(table: Mapping[str, Any], name: str, where: str) -> Any:
     record = SECTIONS[name]
+    if record is Terrain:
+        return read_terrain(_section(table, name, where), where)
     if record is Soil:  # no section: rigid ground
         section = soil_table(table.get(name, {}), where)
     else:

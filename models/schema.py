@@ -115,7 +115,22 @@ class Choice:
         return value
 
 
-Spec = Number | Vector | Choice
+@dataclass(frozen=True)
+class Text:
+    """A text that is not empty."""
+
+    default: str | None = None
+
+    def read(self, value: Any, where: str) -> str:
+        """Returns the text. Raises RobotError; `where` names the key."""
+        if not isinstance(value, str) or not value:
+            raise RobotError(
+                "wrong type", got=value, expected="a text", fix="give it in quotes", where=where
+            )
+        return value
+
+
+Spec = Number | Vector | Choice | Text
 
 
 def specs(record: type[Any]) -> dict[str, Spec]:
@@ -180,15 +195,18 @@ def require(record: type[Any], given: Mapping[str, Any], where: str) -> dict[str
     values |= given
     for key, spec in specs(record).items():
         if key not in values:
-            expected = (
-                f"one of {', '.join(spec.names)}"
-                if isinstance(spec, Choice)
-                else f"a value in {spec.unit}"
-            )
+            expected = expected_text(spec)
             raise RobotError(
                 "missing key", expected=expected, fix=f"add `{key} = ...`", where=f"{where}.{key}"
             )
     return values
+
+
+def expected_text(spec: Spec) -> str:
+    """Returns in words which values a specification allows."""
+    if isinstance(spec, Choice):
+        return f"one of {', '.join(spec.names)}"
+    return "a text" if isinstance(spec, Text) else f"a value in {spec.unit}"
 
 
 def check_record(record: Any, where: str) -> None:

@@ -233,6 +233,30 @@ def _check_laws(robot: Robot, at: str) -> None:
             where=at + "servo.torque_continuous",
         )
     _check_static_friction(friction, at + "friction.mu_static")
+    _check_terrain(robot, at + "terrain")
+
+
+def _check_terrain(robot: Robot, where: str) -> None:
+    """Checks that a ground of the kind grid has a surface, and that its blocks fit the feet."""
+    terrain, radius = robot.terrain, robot.foot.radius
+    if terrain.kind != "grid":
+        return
+    if terrain.surface is None:
+        raise RobotError(
+            "no surface",
+            got=None,
+            expected="a surface of the ground",
+            fix='give Terrain(kind="grid", surface=...)',
+            where=where + ".surface",
+        )
+    if terrain.surface.kind == "blocks" and terrain.surface.cell < 2.0 * radius:
+        raise RobotError(
+            "blocks narrower than a foot",
+            got=f"{terrain.surface.cell:.4g} m",
+            expected=f"at least twice foot.radius, {2.0 * radius:g} m",
+            fix="enlarge terrain.horizontal_scale",
+            where=where,
+        )
 
 
 def _check_static_friction(friction: Friction, where: str) -> None:

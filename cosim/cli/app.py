@@ -13,6 +13,7 @@ from hexapod_cosim.cosim.cli import (
     listing,
     run_commands,
     study_command,
+    terrain_command,
 )
 from hexapod_cosim.cosim.cli.failures import EPILOG
 from hexapod_cosim.cosim.common.plant_files import package_version
@@ -31,6 +32,7 @@ app.command("study", epilog=study_command.EPILOG)(study_command.study)
 app.command("design")(fmu_commands.design)
 app.command("report")(run_commands.report)
 app.command("validate")(fmu_commands.validate)
+app.command("terrain")(terrain_command.terrain)
 app.command("list")(listing.list_what)
 
 

@@ -17,6 +17,7 @@ from hexapod_cosim.cosim.scenario.checks import setting_names
 from hexapod_cosim.cosim.scenario.records import CONTROLS, KEYS, SECTIONS
 from hexapod_cosim.cosim.scenario.scenario import list_scenarios
 from hexapod_cosim.models import list_robots
+from hexapod_cosim.models.ground.catalogue import CATALOGUE
 
 Offers = list[tuple[str, str]]  # word, meaning
 Complete = Callable[[str], Offers]
@@ -54,6 +55,7 @@ def _meaning(column: Column) -> str:
 
 scenario = _offering(_scenarios)
 setting = _offering(_settings)
+terrain = _offering(lambda: ((name, entry.about) for name, entry in CATALOGUE.items()))
 robot = _offering(lambda: ((name, "") for name in list_robots()))
 gait = _offering(
     lambda: ((name, f"duty factor {pattern.duty:.3g}") for name, pattern in PATTERNS.items())

@@ -11,6 +11,7 @@ import typer
 from hexapod_cosim.cosim.cli import completion
 from hexapod_cosim.cosim.cli.running import GainsFile, given_gains
 from hexapod_cosim.cosim.cli.terminal import Json, is_given, show_files, show_json, waiting, warn
+from hexapod_cosim.cosim.cli.terrain_command import surfaces_from
 from hexapod_cosim.cosim.export.controller_export import export_controller
 from hexapod_cosim.cosim.export.export import export_fmu
 from hexapod_cosim.cosim.export.robot_files import Format, chosen_format, export_description
@@ -24,6 +25,7 @@ from hexapod_cosim.cosim.interface.controller_interface import ControllerSetup
 from hexapod_cosim.cosim.run.controller_setup import make_setup
 from hexapod_cosim.cosim.scenario.records import CONTROLS
 from hexapod_cosim.models import HexapodError, Robot, load_robot
+from hexapod_cosim.models.ground.surface import Surface
 
 RobotName = Annotated[
     str,
@@ -75,6 +77,16 @@ Values = Annotated[
         help="Of the package: controller.command.vx=0.05, plant.friction.mu=0.5, ...",
     ),
 ]
+Terrains = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--terrain",
+        metavar="NAME[:KEY=VALUE,...]",
+        help="Pack a surface of `hexapod list terrains` into the plant's FMU; repeat it for "
+        "several, between which the parameter terrain.grid chooses.",
+        autocompletion=completion.terrain,
+    ),
+]
 ControllerName = Annotated[
     str | None,
     typer.Option(
@@ -98,10 +110,12 @@ DEFAULT_PERIOD = 0.005  # s, the default macro-step
 DEFAULT_CONTROL = "compliant"  # of a package
 CONTROLLER_OPTIONS = ("gait", "gains", "period")
 DESCRIPTION, PLANT_FMU = "a robot's description", "the plant's FMU"
+CONTROLLER_FMU = "a package or a controller's FMU"
 # options without effect, by what is written
 UNUSED_OPTIONS = {
-    DESCRIPTION: ("fmi", "platforms", "controller", *CONTROLLER_OPTIONS),
+    DESCRIPTION: ("fmi", "platforms", "terrain", "controller", *CONTROLLER_OPTIONS),
     PLANT_FMU: CONTROLLER_OPTIONS,
+    CONTROLLER_FMU: ("terrain",),
 }
 
 
@@ -125,6 +139,7 @@ def export(
     mjcf: Mjcf = False,
     ssp: Ssp = False,
     values: Values = None,
+    terrain: Terrains = None,
     controller: ControllerName = None,
     gait: GaitName = None,
     gains: GainsFile = None,
@@ -143,8 +158,11 @@ def export(
         path = _export_description(loaded, output, form)
     elif control is None:
         _refuse_unused_options(context, PLANT_FMU)
-        path = _export_plant(loaded, output, fmi=fmi, platforms=chosen)
+        path = _export_plant(
+            loaded, output, fmi=fmi, platforms=chosen, terrains=surfaces_from(terrain or [])
+        )
     else:
+        _refuse_unused_options(context, CONTROLLER_FMU)
         options = ControllerOptions(control=control, gait=gait, gains=gains, period=period)
         if package:
             path = _export_package(loaded, output, options, values=values or [], platforms=chosen)
@@ -160,12 +178,17 @@ def _export_description(robot: Robot, output: Path | None, form: Format) -> Path
 
 
 def _export_plant(
-    robot: Robot, output: Path | None, *, fmi: int, platforms: list[str] | None
+    robot: Robot,
+    output: Path | None,
+    *,
+    fmi: int,
+    platforms: list[str] | None,
+    terrains: list[Surface],
 ) -> Path:
     """Writes the plant's FMU and returns its path."""
     path = _fmu_path(output, robot.name)
     with waiting("compiling" if platforms else None):
-        return export_fmu(robot, path, fmi=fmi, platforms=platforms)
+        return export_fmu(robot, path, fmi=fmi, platforms=platforms, terrains=terrains)
 
 
 def _export_controller(

@@ -11,10 +11,16 @@ import typer
 
 from hexapod_cosim.controller import PATTERNS
 from hexapod_cosim.cosim.cli.terminal import Json, show_json, show_table
+from hexapod_cosim.cosim.cli.terrain_command import value_text
 from hexapod_cosim.cosim.interface.interface import load_interface
 from hexapod_cosim.cosim.scenario.scenario import list_scenarios
 from hexapod_cosim.cosim.study.plan.bundled import list_studies
-from hexapod_cosim.models import LEG_NAMES, list_robots, load_robot, unknown_name
+from hexapod_cosim.models import LEG_NAMES, Terrain, list_robots, load_robot, unknown_name
+from hexapod_cosim.models.ground.catalogue import CATALOGUE, Entry
+from hexapod_cosim.models.ground.parameters import DIFFICULTY
+from hexapod_cosim.models.ground.table import PLACED
+from hexapod_cosim.models.records import PLANES
+from hexapod_cosim.models.schema import Number, specs
 from hexapod_cosim.models.soil.presets import list_soils, soil_preset
 
 Rows = list[dict[str, Any]]
@@ -63,8 +69,26 @@ def gaits() -> Rows:
 
 
 def terrains() -> Rows:
-    """Returns the kinds of ground."""
-    return _choices("TerrainKind")
+    """Returns the kinds of ground with the defaults of their parameters."""
+    planes = [row for row in _choices("TerrainKind") if row["name"] in PLANES]
+    for row in planes:
+        keys = PLACED if row["name"] == "slope" else PLACED[:1]
+        row["about"] += ": " + ", ".join(f"{key} 0 {_unit(key)}" for key in keys)
+    return [*planes, *(_surface(name, entry) for name, entry in CATALOGUE.items())]
+
+
+def _unit(key: str) -> str:
+    """Returns the unit of a key of planes."""
+    spec = specs(Terrain)[key]
+    return spec.unit if isinstance(spec, Number) else ""
+
+
+def _surface(name: str, entry: Entry) -> dict[str, Any]:
+    """Returns the row of a surface of the catalogue."""
+    texts = [
+        f"{key} {value_text(one, one.value(DIFFICULTY))}" for key, one in entry.parameters.items()
+    ]
+    return {"name": name, "about": f"{entry.about}: {', '.join(texts)}"}
 
 
 def soils() -> Rows:

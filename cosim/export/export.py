@@ -5,10 +5,12 @@ values.
 from __future__ import annotations
 
 import zipfile
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from functools import reduce
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from types import MappingProxyType
 
 from hexapod_cosim.cosim.common.components import PLANT, Component
 from hexapod_cosim.cosim.common.files import atomic_path, not_writable
@@ -27,15 +29,25 @@ from hexapod_cosim.cosim.interface.interface import Interface, Variable, load_in
 from hexapod_cosim.cosim.interface.model_description import render_fmi2
 from hexapod_cosim.cosim.interface.model_description3 import render_build_description, render_fmi3
 from hexapod_cosim.models.errors import FmuError
+from hexapod_cosim.models.ground.grid_file import grid_bytes
+from hexapod_cosim.models.ground.surface import Surface
 from hexapod_cosim.models.records import Robot
+from hexapod_cosim.models.terrain import surface_of
+from hexapod_cosim.models.validation import check_settings
 
 FMI_VERSIONS = (2, 3)
 FNV_BASIS, FNV_PRIME, MASK, WORD = 0xCBF29CE484222325, 0x100000001B3, (1 << 64) - 1, 8
+NOTHING: Mapping[str, bytes] = MappingProxyType({})
 TIMESTAMP = (1980, 1, 1, 0, 0, 0)  # of every member, so that archives are reproducible
 
 
 def export_fmu(
-    robot: Robot, path: str | Path, *, fmi: int = 2, platforms: Iterable[str] | None = None
+    robot: Robot,
+    path: str | Path,
+    *,
+    fmi: int = 2,
+    platforms: Iterable[str] | None = None,
+    terrains: Sequence[Surface] = (),
 ) -> Path:
     """Writes the plant's FMU of a robot and returns its path.
 
@@ -45,17 +57,42 @@ def export_fmu(
         fmi: version of the standard.
         platforms: names such as linux64 or "all", to cross-compile binaries; "sources" for no
             binary. By default the installed binary of this machine.
+        terrains: surfaces to pack as grid files, numbered from 1; after the robot's own, if it
+            stands on one. If it does not, the FMU starts on the first of them.
 
     Raises FmuError without a binary or cross compiler and for an unknown version or platform,
     HexapodError when the path cannot be written.
     """
-    return export_interface(load_interface(robot), path, fmi=fmi, platforms=platforms)
+    own = surface_of(robot.terrain)
+    grids = list(dict.fromkeys([*([] if own is None else [own]), *terrains]))
+    if grids and own is None:
+        robot = replace(robot, terrain=replace(robot.terrain, kind="grid", surface=grids[0]))
+        check_settings(robot)
+    return export_interface(
+        load_interface(robot), path, fmi=fmi, platforms=platforms, grids=grid_members(grids)
+    )
+
+
+def grid_members(surfaces: Iterable[Surface]) -> dict[str, bytes]:
+    """Returns grid files by their path in the FMU, numbered from 1."""
+    return {
+        f"resources/terrain/{number}.terrain": grid_bytes(surface)
+        for number, surface in enumerate(surfaces, start=1)
+    }
 
 
 def export_interface(
-    interface: Interface, path: str | Path, *, fmi: int = 2, platforms: Iterable[str] | None = None
+    interface: Interface,
+    path: str | Path,
+    *,
+    fmi: int = 2,
+    platforms: Iterable[str] | None = None,
+    grids: Mapping[str, bytes] = NOTHING,
 ) -> Path:
-    """Writes the FMU of a component with this interface; arguments and errors as `export_fmu`."""
+    """Writes the FMU of a component with this interface; arguments and errors as `export_fmu`.
+
+    grids: grid files by their path in the FMU.
+    """
     if fmi not in FMI_VERSIONS:
         offered = ", ".join(map(str, FMI_VERSIONS))
         raise FmuError(
@@ -68,7 +105,7 @@ def export_interface(
         binaries = build_binaries(
             component_library(component), choose_platforms(platforms, fmi=fmi), fmi=fmi
         )
-    return write_archive(Path(path), _members(interface, binaries, fmi))
+    return write_archive(Path(path), _members(interface, dict(binaries) | dict(grids), fmi))
 
 
 def installed_binary(component: Component = PLANT, *, fmi: int = 2) -> dict[str, bytes]:

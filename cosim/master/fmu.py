@@ -99,6 +99,11 @@ class FmuBlock:
             raise self._fmu.failure("the FMU does not take its inputs", status)
 
 
+def _digest(content: bytes) -> str:
+    """Returns the SHA-256 of bytes, in hex."""
+    return hashlib.sha256(content).hexdigest()
+
+
 class Fmu:
     """One instance of an FMI 2.0 co-simulation FMU; a context manager that frees it.
 
@@ -114,6 +119,7 @@ class Fmu:
         self.clear_log = self._log.clear  # called before each call: errors quote new messages only
         self._directory = TemporaryDirectory(prefix="hexapod-fmu-")
         self._slave: Any = None
+        self._grids: dict[str, int] | None = None  # numbers of grid files by their digest
         try:
             self._instantiate(name)
         except Exception as error:
@@ -178,6 +184,28 @@ class Fmu:
     def _last_message(self, status: int) -> str:
         """Returns the FMU's last message, or the status where it gave none."""
         return self._log[-1] if self._log else f"status {STATUS[status]} without a message"
+
+    def provide_grid(self, content: bytes) -> int:
+        """Puts a grid file into the unpacked resources of this instance, and returns its number.
+
+        A grid file of equal content is not written again. The number is a value of terrain.grid.
+        """
+        folder = Path(self._directory.name) / "resources" / "terrain"
+        if self._grids is None:
+            present = sorted(folder.glob("*.terrain"))
+            self._grids = {_digest(path.read_bytes()): int(path.stem) for path in present}
+        digest = _digest(content)
+        if digest not in self._grids:
+            number = 1 + max(self._grids.values(), default=0)
+            folder.mkdir(parents=True, exist_ok=True)
+            (folder / f"{number}.terrain").write_bytes(content)
+            self._grids[digest] = number
+        return self._grids[digest]
+
+    def grid(self, number: int) -> bytes | None:
+        """Returns the content of a grid file in the resources of this instance; None without it."""
+        path = Path(self._directory.name) / "resources" / "terrain" / f"{number}.terrain"
+        return path.read_bytes() if path.is_file() else None
 
     def names(self, causality: str, kind: str = "Real") -> list[str]:
         """Names of all variables of a causality and FMI type, in model description order."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from hexapod_cosim.cosim.interface.names import vector_names
 from hexapod_cosim.cosim.master.recorder import COMMAND_COLUMNS, Recording
 from hexapod_cosim.models import FRICTION_LAWS, TERRAINS
+from hexapod_cosim.models.ground.surface import Surface
 
 Array = NDArray[np.float64]
 
@@ -22,8 +23,10 @@ LEAST_TURN = 0.05  # rad    less is standing, not turning
 SHOWN_CYCLES = 3  # in plots of what happens within a gait cycle
 ROUND_OFF = 1e-6  # s    of a recorded time
 # numbers of the FMU's enumerations
-FLAT = TERRAINS.index("flat") + 1
-NONE, TANH, BRISTLE = (FRICTION_LAWS.index(law) + 1 for law in ("none", "tanh", "bristle"))
+FLAT, SLOPE, GRID = (TERRAINS.index(kind) + 1 for kind in ("flat", "slope", "grid"))
+NONE, TANH, BRISTLE, LUGRE = (
+    FRICTION_LAWS.index(law) + 1 for law in ("none", "tanh", "bristle", "lugre")
+)
 
 
 @dataclass(frozen=True)
@@ -33,6 +36,7 @@ class View:
     recording: Recording
     parameters: Mapping[str, float]  # of the FMU
     period: float  # s    of the gait
+    surface: Surface | None = None  # around the walk, for reports; None: a plane, or not needed
 
     @cached_property
     def walk(self) -> Walk | None:
@@ -43,7 +47,7 @@ class View:
         """Returns the last SHOWN_CYCLES gait cycles of the run."""
         time = self.recording.time
         begin = int(np.searchsorted(time, time[-1] - SHOWN_CYCLES * self.period))
-        return View(self.recording.rows(slice(begin, None)), self.parameters, self.period)
+        return replace(self, recording=self.recording.rows(slice(begin, None)))
 
 
 @dataclass(frozen=True)
@@ -195,25 +199,46 @@ def commanded_path(recording: Recording, *, heading: float | None = None) -> Arr
 
 
 def body_height(part: Recording, parameters: Mapping[str, float]) -> Array:
-    """Returns the height of the torso above the ground along z [m] (rows,)."""
+    """Returns the height of the torso above the ground along z [m] (rows,).
+
+    The ground of a surface is the mean height of the feet in contact, of the last ones while there
+    are none. Its height below the torso would jump at each stone and gap.
+    """
     x, y, z = part.vector("torso.position").T
+    if parameters.get("terrain.kind", FLAT) == GRID:
+        return np.asarray(z - _feet_level(part, parameters))
     heading = parameters.get("terrain.heading", 0.0)
     rise = x * np.cos(heading) + y * np.sin(heading)
     ground: Array = parameters.get("terrain.height", 0.0) + np.tan(_incline(parameters)) * rise
     return np.asarray(z - ground)
 
 
+def _feet_level(part: Recording, parameters: Mapping[str, float]) -> Array:
+    """Returns the mean height of the contact points of feet in contact [m] (rows,).
+
+    Rows without a contact have the value of the last row with one; before the first contact it is
+    `terrain.height`.
+    """
+    touching = part.feet("contact") > 0.5
+    count = touching.sum(axis=1)
+    height = np.where(touching, part.foot_vectors("position")[:, :, 2], 0.0).sum(axis=1)
+    level = height / np.maximum(count, 1)
+    latest = np.maximum.accumulate(np.where(count > 0, np.arange(len(count)), -1))
+    before = parameters.get("terrain.height", 0.0)
+    return np.where(latest >= 0, level[np.maximum(latest, 0)], before)
+
+
 def ground_normal(parameters: Mapping[str, float]) -> Array:
-    """Returns the ground's upward normal (3,), world axes."""
+    """Returns the ground's upward normal (3,), world axes; that of a surface is the vertical."""
     heading, incline = parameters.get("terrain.heading", 0.0), _incline(parameters)
     sine = np.sin(incline)
     return np.array([-sine * np.cos(heading), -sine * np.sin(heading), np.cos(incline)])
 
 
 def _incline(parameters: Mapping[str, float]) -> float:
-    """Returns the incline of the ground [rad], which is 0 for flat ground."""
-    flat = parameters.get("terrain.kind", FLAT) == FLAT
-    return 0.0 if flat else float(parameters.get("terrain.incline", 0.0))
+    """Returns the incline of the ground [rad], which is 0 for all but slopes."""
+    slope = parameters.get("terrain.kind", FLAT) == SLOPE
+    return float(parameters.get("terrain.incline", 0.0)) if slope else 0.0
 
 
 def real_feet(recording: Recording, parameters: Mapping[str, float]) -> Array:

@@ -8,7 +8,8 @@ A robot has fallen when
   expected height is the height at the first foot contact plus the commanded change of height; or
 - its torso is lower than half its own thickness, at any time: then it lies on the ground.
 
-Heights are above the ground. So a robot that starts in the air has not fallen unless it lands
+Heights are above the ground; on a surface, above the level of the feet that touch it, and the
+normal is the vertical. So a robot that starts in the air has not fallen unless it lands
 badly.
 """
 
@@ -16,7 +17,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -29,7 +29,8 @@ from hexapod_cosim.cosim.results.metrics import energy_residual
 from hexapod_cosim.cosim.results.walk import LEAST_DISTANCE, SKIPPED_CYCLES, View, body_height
 from hexapod_cosim.cosim.scenario.records import Scenario
 from hexapod_cosim.models import FRICTION_LAWS, LEG_NAMES, TERRAINS, Robot, Terrain
-from hexapod_cosim.models.records import STATIC_LAWS
+from hexapod_cosim.models.ground.surface import Surface
+from hexapod_cosim.models.records import BRISTLE_LAWS
 from hexapod_cosim.models.statics import sliding
 from hexapod_cosim.models.terrain import ground_normal
 
@@ -142,7 +143,7 @@ def friction_warnings(parameters: Mapping[str, float]) -> list[str]:
     law = FRICTION_LAWS[round(parameters["friction.law"]) - 1]
     mu = 0.0 if law == "none" else parameters["friction.mu"]
     gravity = np.array([parameters[name] for name in vector_names("gravity")])
-    static = parameters.get("friction.mu_static", 0.0) if law in STATIC_LAWS else 0.0
+    static = parameters.get("friction.mu_static", 0.0) if law in BRISTLE_LAWS else 0.0
     slide = float(np.linalg.norm(sliding(gravity, _normal(parameters), mu, static)))
     if slide:
         why = "without friction" if mu == 0.0 else f"which friction (mu = {mu:g}) does not hold"
@@ -167,14 +168,15 @@ def unused_settings(scenario: Scenario, robot: Robot) -> list[str]:
         for command in scenario.commands
         if command.time >= end
     ]
-    terrain = replace(robot.terrain, **scenario.settings.get("terrain", {}))
+    kind = scenario.settings.get("terrain", {}).get("kind", robot.terrain.name)
     given = {**scenario.settings.get("terrain", {}), **scenario.parameters}
     sloped = [
         key for key in ("incline", "heading") if given.get(key) or given.get(f"terrain.{key}")
     ]
-    if terrain.kind == "flat":
+    if kind != "slope":
+        ground = "flat ground" if kind == "flat" else f"the surface {kind}"
         found += [
-            f"terrain.{key} does nothing on flat ground; set terrain.kind=slope" for key in sloped
+            f"terrain.{key} does nothing on {ground}; set terrain.kind=slope" for key in sloped
         ]
     return found
 
@@ -191,6 +193,23 @@ def walk_warnings(view: View, robot: Robot) -> list[str]:
         found += [f"a foot was out of its leg's reach for {share:.1%} of the time"] if share else []
     found += [*fallback_warnings(recording), *servo_warnings(recording, robot)]
     return [*found, *energy_warnings(view)]
+
+
+def off_map_warnings(recording: Recording, surface: Surface | None) -> list[str]:
+    """Warns where the torso has left the map of a surface, with the time and the way out."""
+    if surface is None or not len(recording.time):
+        return []
+    x, y, _ = recording.vector("torso.position").T
+    left, right, low, high = surface.extent
+    off = (x < left) | (x > right) | (y < low) | (y > high)
+    if not off.any():
+        return []
+    k = int(np.argmax(off))
+    return [
+        f"the robot left the map of the ground at {recording.time[k]:.3f} s, at x = {x[k]:.3g} m, "
+        f"y = {y[k]:.3g} m: beyond it the height of its border goes on; enlarge terrain.size, or "
+        "shorten the run"
+    ]
 
 
 def servo_warnings(recording: Recording, robot: Robot) -> list[str]:

@@ -18,6 +18,7 @@ from hexapod_cosim.cosim.scenario.records import (
     Variation,
 )
 from hexapod_cosim.models import ScenarioError, load_robot, nearest_name
+from hexapod_cosim.models.ground.table import terrain_specs
 from hexapod_cosim.models.schema import specs
 
 WHOLE_STEPS_TOLERANCE = 1e-6  # of a macro-step: allows for the round-off of a decimal duration
@@ -119,11 +120,12 @@ def _unknown(kind: str, name: str, valid: list[str], expected: str, *, where: st
 def setting_names() -> list[str]:
     """Returns the scenario's dotted keys."""
     records = {"command": Command, "sensors": Sensors, "variation": Variation, **SETTINGS}
-    keys = [
+    keys = [("terrain", key) for key in (*terrain_specs(), "patch")]
+    keys += [
         (section, key)
         for section, record in records.items()
         for key in specs(record)
-        if key not in UNUSED.get(section, ())
+        if section != "terrain" and key not in UNUSED.get(section, ())
     ]
     plain = {"outputs": Outputs, "compliance": Parts}
     keys += [(section, item.name) for section, record in plain.items() for item in fields(record)]

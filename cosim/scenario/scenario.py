@@ -43,7 +43,14 @@ from hexapod_cosim.cosim.scenario.records import (
     Variation,
 )
 from hexapod_cosim.models import Robot, RobotError, ScenarioError, load_robot, unknown_name
-from hexapod_cosim.models.records import STATIC_LAWS, Soil
+from hexapod_cosim.models.ground.table import (
+    beside,
+    merged_terrain,
+    patch_specs,
+    read_keys,
+    terrain_specs,
+)
+from hexapod_cosim.models.records import STATIC_LAWS, Soil, Terrain
 from hexapod_cosim.models.schema import (
     Number,
     expect_table,
@@ -61,9 +68,8 @@ NUMBER = Number(GRAVITY.unit)
 
 def list_scenarios() -> dict[str, Path]:
     """Returns the bundled scenarios by name."""
-    return {
-        path.stem: path for path in sorted((Path(__file__).parent / "scenarios").glob("*.toml"))
-    }
+    found = {path.stem: path for path in (Path(__file__).parent / "scenarios").rglob("*.toml")}
+    return dict(sorted(found.items()))
 
 
 def load_scenario(path_or_name: str | Path, *, overrides: Sequence[str] = ()) -> Scenario:
@@ -97,9 +103,11 @@ def read_tables(path_or_name: str | Path) -> tuple[dict[str, Any], str]:
             fix="correct that line",
             where=str(path),
         ) from error
-    beside = path.parent / str(table.get("robot", ""))
-    if "robot" in table and beside.is_file():  # a robot file beside the scenario
-        table["robot"] = str(beside.resolve())
+    if isinstance(table.get("terrain"), dict):
+        table["terrain"] = beside(table["terrain"], path.parent)
+    near = path.parent / str(table.get("robot", ""))
+    if "robot" in table and near.is_file():  # a robot file beside the scenario
+        table["robot"] = str(near.resolve())
     return table, path.name if path in list_scenarios().values() else str(path)
 
 
@@ -125,7 +133,7 @@ def with_overrides(table: Mapping[str, Any], overrides: Iterable[str]) -> dict[s
             raise ScenarioError(
                 "not a setting", got=text, expected="NAME=VALUE", fix=fix, where="--set"
             )
-        values[name] = _parse(value)
+        values[name] = parse_value(value)
     return with_values(table, values)
 
 
@@ -140,7 +148,7 @@ def with_values(table: Mapping[str, Any], values: Mapping[str, Any]) -> dict[str
     return changed
 
 
-def _parse(value: str) -> Any:
+def parse_value(value: str) -> Any:
     """Returns the value as TOML reads it; other text is a string, so names need no quotes."""
     try:
         return tomllib.loads(f"value = {value}")["value"]
@@ -262,12 +270,41 @@ def _record(record: type[Any], table: Any, where: str) -> Any:
 
 def _read_setting(name: str, table: Any, where: str) -> dict[str, Any]:
     """Reads a section of settings that robot files have as well."""
+    if name == "terrain":
+        return read_terrain_keys(table, where)
     record = SETTINGS[name]
     if record is Soil:
         table = soil_table(table, where)
     keys = [key for key in specs(record) if key not in UNUSED.get(name, ())]
     refuse_unknown_keys(expect_table(table, where), keys, where)
     return _read(record, table, where)
+
+
+def read_terrain_keys(table: Any, where: str) -> dict[str, Any]:
+    """Reads [terrain]: the keys of a plane or of a surface, and patches."""
+    given, keys = dict(expect_table(table, where)), terrain_specs()
+    for key, value in given.items():
+        if key in keys:
+            given[key] = to_si(value, keys[key], f"{where}.{key}")
+    patches = given.get("patch")
+    if isinstance(patches, list | tuple):
+        given["patch"] = [_patch_in_si(one, f"{where}.patch[{k}]") for k, one in enumerate(patches)]
+    return read_keys(given, where)
+
+
+def _patch_in_si(table: Any, where: str) -> Any:
+    """Returns a patch with its quantities converted to SI."""
+    if not isinstance(table, Mapping):
+        return table
+    keys = patch_specs()
+    return {
+        key: [to_si(item, keys[key], f"{where}.{key}") for item in value]
+        if isinstance(value, list)
+        else to_si(value, keys[key], f"{where}.{key}")
+        if key in keys
+        else value
+        for key, value in table.items()
+    }
 
 
 def _read_commands(value: Any, where: str) -> tuple[Command, ...]:
@@ -385,8 +422,9 @@ def scenario_robot(scenario: Scenario) -> Robot:
     changes = {
         name: replace(getattr(own, name), **dict(values))
         for name, values in scenario.settings.items()
-        if name != "gait"
+        if name not in ("gait", "terrain")
     }
+    changes["terrain"] = scenario_terrain(scenario, own)
     friction = changes.get("friction", own.friction)
     if "mu_static" not in scenario.settings.get("friction", {}) and (
         friction.law not in STATIC_LAWS or friction.mu_static < friction.mu
@@ -401,6 +439,12 @@ def scenario_robot(scenario: Scenario) -> Robot:
         _check_gravity(robot, where=f"{scenario.where}: gravity")
     check_settings(robot, where=f"{scenario.where} with robot {robot.name}")
     return robot
+
+
+def scenario_terrain(scenario: Scenario, own: Robot) -> Terrain:
+    """Returns the ground of a scenario with its robot. Raises ScenarioError."""
+    with _errors_of(scenario.where):
+        return merged_terrain(own.terrain, scenario.settings.get("terrain", {}), "terrain")
 
 
 def _check_gravity(robot: Robot, *, where: str) -> None:

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from hexapod_cosim.models.errors import RobotError, unknown_name
+from hexapod_cosim.models.ground.table import beside, patch_specs, read_keys, terrain_specs
 from hexapod_cosim.models.kinematics import axis_rotation
 from hexapod_cosim.models.records import (
     JOINT_NAMES,
@@ -84,9 +85,14 @@ SECTIONS: dict[str, type[Any]] = {
 }
 EXTENSION_FIELDS: dict[str, dict[str, Any]] = {
     **{name: dict(specs(record)) for name, record in SECTIONS.items()},
+    "terrain": terrain_specs(),
     "world": {"gravity": Vector("m/s2", 3)},
     **{name: {"stance": Vector("rad", 3)} for name in LEG_NAMES},
 }
+
+
+# elements within a section of <hexapod>
+EXTENSION_ENTRIES = {"terrain": {"patch": {**patch_specs(), "size": Vector("m", 2)}}}
 
 
 @dataclass(frozen=True)
@@ -165,7 +171,8 @@ def urdf_table(
     """
     options, side = options or Options(), {} if side is None else side
     urdf = parse_urdf(_read(path), where=str(path), ignore=options.ignore)
-    own = extension_tables(urdf, EXTENSION_FIELDS)
+    own = extension_tables(urdf, EXTENSION_FIELDS, EXTENSION_ENTRIES)
+    own = _terrain_beside(own, path.parent)
     keep = options.keep_frames or (
         urdf.extension is not None and urdf.extension.get("frames") == "ours"
     )
@@ -180,6 +187,11 @@ def urdf_table(
     )
     table["source"] = _source(urdf, legs, assumed) | dict(side.get("source", {}))
     return table
+
+
+def _terrain_beside(own: Table, folder: Path) -> Table:
+    """Returns the tables with the path of a height map relative to a folder resolved."""
+    return own | {"terrain": beside(own["terrain"], folder)} if "terrain" in own else own
 
 
 def _read(path: Path) -> bytes:
@@ -315,6 +327,9 @@ def _check_side(side: Mapping[str, Any], where: str) -> None:
     refuse_unknown_keys(side, ["name", "gravity", "source", "links", "legs", *SECTIONS], where)
     for name, record in SECTIONS.items():
         at, value = f"{where}: {name}", side.get(name, {})
+        if name == "terrain":
+            read_keys(expect_table(value, at), at)
+            continue
         section = soil_table(value, at) if record is Soil else expect_table(value, at)
         read_given(record, section, at)
     legs = expect_table(side.get("legs", {}), f"{where}: legs")

@@ -11,7 +11,8 @@ import xml.etree.ElementTree as ET
 from collections.abc import Iterable
 from typing import Any
 
-from hexapod_cosim.models.records import JOINT_NAMES, Leg, Link, Robot, Vector3
+from hexapod_cosim.models.ground.table import terrain_table
+from hexapod_cosim.models.records import JOINT_NAMES, Leg, Link, Robot, Terrain, Vector3
 from hexapod_cosim.models.schema import specs
 from hexapod_cosim.models.urdf.elements import EXTENSION
 
@@ -131,9 +132,23 @@ def _extension(root: ET.Element, robot: Robot) -> None:
     ET.SubElement(own, "torso", size=numbers(robot.torso.size))
     for name in RECORDS:
         record = getattr(robot, name)
+        if name == "terrain":
+            _terrain(own, record)
+            continue
         ET.SubElement(own, name, {key: _text(getattr(record, key)) for key in specs(type(record))})
     for leg in robot.legs:
         ET.SubElement(own, leg.name, stance=numbers(leg.stance))
+
+
+def _terrain(own: ET.Element, terrain: Terrain) -> None:
+    """Writes the ground: keys as attributes, patches as elements."""
+    table = terrain_table(terrain)
+    patches = table.pop("patch", [])
+    element = ET.SubElement(own, "terrain", {key: _text(value) for key, value in table.items()})
+    for patch in patches:
+        values = {key: value for key, value in patch.items() if key != "size"}
+        attributes = {key: _text(value) for key, value in values.items()}
+        ET.SubElement(element, "patch", attributes | {"size": numbers(patch["size"])})
 
 
 def _text(value: Any) -> str:

@@ -6,7 +6,8 @@ if(MSVC)
   set(HX_WARNINGS /W4)
 else()
   set(HX_WARNINGS -Wall -Wextra -Wpedantic -Wconversion -Wno-sign-conversion -Wshadow
-    -Wstrict-prototypes -Wmissing-prototypes -Wvla)
+    -Wstrict-prototypes -Wmissing-prototypes -Wvla
+    -Werror=implicit-function-declaration) # else C takes the result for an int, whatever it is
 endif()
 
 if(HX_LINT)

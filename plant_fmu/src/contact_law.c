@@ -5,7 +5,7 @@
 
 #include "elementary.h"
 #include "ground/soil.h"
-#include "terrain.h"
+#include "ground/surface.h"
 
 double hx_exact_restitution_chi(double e) {
   if (e >= 1.0) return 0.0;
@@ -65,13 +65,14 @@ const hxContactRow *hx_contact(int law) {
 }
 
 /* Sets stiffness and friction of a contact to those of the ground of a material, NULL: of the
- * definition. */
+ * definition. A material with a kinetic coefficient of its own has no static rise unless it says
+ * so. */
 static void set_ground(const hxModel *model, const double *material, int row, int slot,
                        hxContactState *contact) {
   double stiffness = model->stiffness, mu = model->mu, mu_static = model->mu + model->static_rise;
   if (material && !isnan(material[HX_MATERIAL_STIFFNESS]))
     stiffness = material[HX_MATERIAL_STIFFNESS];
-  if (material && !isnan(material[HX_MATERIAL_MU])) mu = material[HX_MATERIAL_MU];
+  if (material && !isnan(material[HX_MATERIAL_MU])) mu = mu_static = material[HX_MATERIAL_MU];
   if (material && !isnan(material[HX_MATERIAL_MU_STATIC]))
     mu_static = material[HX_MATERIAL_MU_STATIC];
   contact->stiffness[row][slot] = stiffness;
@@ -240,6 +241,8 @@ static void copy_contact(const hxContactState *from, int row_from, int row_to, i
   to->stiffness[row_to][leg] = from->stiffness[row_from][leg];
   to->mu[row_to][leg] = from->mu[row_from][leg];
   to->static_rise[row_to][leg] = from->static_rise[row_from][leg];
+  if (row_to == HX_FOOT && row_from != HX_FOOT) /* walls are rigid */
+    to->on_soil[leg] = to->plastic[leg] = 0.0;
 }
 
 int hx_contact_cross(const hxModel *model, const hxDepths *depths, hxContactState *contact) {
@@ -269,4 +272,5 @@ void hx_contact_hand_over(const hxMoment *before, const hxMoment *after, int cro
           copy_contact(&was, from, to, leg, contact);
     }
   for (int row = HX_FOOT; hx_is_of_foot(row); ++row) fill_contact_slots(contact, row);
+  hx_fill_slots(contact->plastic);
 }

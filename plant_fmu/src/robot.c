@@ -6,6 +6,7 @@
 #include "contact_law.h"
 #include "elementary.h"
 #include "ground/soil.h"
+#include "ground/surface.h"
 
 static void cross(const double a[3], const double b[3], double out[3]) {
   out[0] = a[1] * b[2] - a[2] * b[1];
@@ -147,6 +148,8 @@ static void compile_joint(hxJointModel *m, const hxDefinition *d, int leg, int j
   for (int i = 0; i < 3; ++i)
     m->s_i[i][slot] = s_i[i], m->point_i[i][slot] = point_i[i], m->point_j[i][slot] = point_j[i];
   for (int i = 0; i < 4; ++i) m->zero[i][slot] = zero[i], m->frame[i][slot] = frame_j[i];
+  m->middle[slot] = 0.5 * (link->angle_min + link->angle_max);
+  m->half_range[slot] = 0.5 * (link->angle_max - link->angle_min);
 }
 
 /* Computes a point and the normal of the ground. */
@@ -174,6 +177,28 @@ static double weight_of(const hxDefinition *d) {
                      d->gravity[2] * d->gravity[2]);
 }
 
+/* Copies friction and its choices. Feet without friction resist neither spin nor rolling. */
+static void compile_friction(hxModel *model, const hxDefinition *d) {
+  const int rubs = d->friction.law != HX_FRICTION_NONE;
+  model->friction_law = d->friction.law, model->mu = d->friction.mu,
+  model->slope = d->friction.slope;
+  model->presliding = d->friction.presliding, model->bristle_damping = d->friction.bristle_damping;
+  model->static_rise = fmax(d->friction.mu_static - d->friction.mu, 0.0),
+  model->per_stribeck = 1.0 / d->friction.stribeck_speed;
+  model->viscous = rubs ? d->friction.viscous : 0.0;
+  model->spin_radius = d->friction.spin_radius, model->rolling_radius = d->friction.rolling_radius;
+  /* materials of a grid may have static friction of their own */
+  model->velocity_terms = rubs && (model->static_rise > 0.0 || model->viscous > 0.0 ||
+                                    d->terrain.kind == HX_TERRAIN_GRID);
+  model->spin_friction = rubs && model->spin_radius > 0.0;
+  model->roll_friction = rubs && model->rolling_radius > 0.0;
+}
+
+/* Returns whether bristles of friction hold the feet on rigid ground. */
+static int has_friction_bristles(const hxDefinition *d) {
+  return d->friction.law == HX_FRICTION_BRISTLE || d->friction.law == HX_FRICTION_LUGRE;
+}
+
 /* Computes the constants of the definition's soil; the terrain is known. */
 static void compile_soil(hxModel *model, const hxDefinition *d) {
   hxSoil soil;
@@ -185,7 +210,7 @@ static void compile_soil(hxModel *model, const hxDefinition *d) {
   model->bristle_length = d->friction.presliding;
   if (d->soil.law != HX_SOIL_NONE)
     model->bristle_length = d->soil.shear_displacement;
-  else if (on_grid > 0.0 && d->friction.law != HX_FRICTION_BRISTLE)
+  else if (on_grid > 0.0 && !has_friction_bristles(d))
     model->bristle_length = on_grid;
 }
 
@@ -196,17 +221,15 @@ static void compile_settings(hxModel *model, const hxDefinition *d) {
   model->impact_speed_floor = d->contact.impact_speed_floor;
   for (int i = 0; i < 3; ++i) model->gravity[i] = d->gravity[i];
   model->alpha = d->baumgarte.alpha, model->beta = d->baumgarte.beta;
-  model->friction_law = d->friction.law, model->mu = d->friction.mu,
-  model->slope = d->friction.slope;
-  model->presliding = d->friction.presliding, model->bristle_damping = d->friction.bristle_damping;
-  model->static_rise = fmax(d->friction.mu_static - d->friction.mu, 0.0),
-  model->per_stribeck = 1.0 / d->friction.stribeck_speed;
+  compile_friction(model, d);
   model->servo_mode = d->servo.mode;
   model->kp = d->servo.mode == HX_SERVO_POSITION ? d->servo.kp : 0.0;
   model->kd = d->servo.mode == HX_SERVO_POSITION ? d->servo.kd : 0.0;
   model->torque_max = d->servo.torque_max, model->speed_max = d->servo.speed_max;
   model->rotor_inertia = d->servo.rotor_inertia,
   model->coulomb_friction = d->servo.coulomb_friction;
+  model->stop_stiffness = d->servo.stop_stiffness, model->stop_damping = d->servo.stop_damping;
+  model->stops = d->servo.mode != HX_SERVO_KINEMATIC && d->servo.stop_stiffness > 0.0;
   model->terrain_kind = d->terrain.kind;
   model->method = d->solver.method, model->step = d->solver.step;
   model->tolerance = d->solver.tolerance, model->step_max = d->solver.step_max,

@@ -41,7 +41,7 @@ ROOMS = {
 }
 MOST_FILES = 20  # in a folder that people write
 # third-party packages by folder; cosim may use what pyproject lists
-MAY_USE = {"models": {"numpy"}, "controller": {"numpy", "scipy", "control", "matplotlib"}}
+MAY_USE = {"models": {"numpy", "PIL"}, "controller": {"numpy", "scipy", "control", "matplotlib"}}
 RUN_TIME_ONLY = {"numpy", "scipy"}  # of the controller outside controller/design
 INCLUDE = re.compile(r'^\s*#\s*include\s+["<]([^">]+)[">]', re.MULTILINE)
 STANDARD_C = {

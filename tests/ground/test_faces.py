@@ -38,8 +38,8 @@ def test_bump_and_bowl_have_a_sphere_s_distance(core: ct.CDLL, side: float) -> N
     )
     for above in points(200, seed=2):
         rise = side * (np.sqrt(RHO**2 - above[0] ** 2 - above[1] ** 2) - RHO)
-        arm = above + [0.0, 0.0, rise + side * RHO]
-        distance, normal, bend = ground.face(above + [0.0, 0.0, rise])
+        arm = above + np.array([0.0, 0.0, rise + side * RHO])
+        distance, normal, bend = ground.face(above + np.array([0.0, 0.0, rise]))
         length = np.linalg.norm(arm)
         assert distance == pytest.approx(side * (length - RHO), abs=1e-9)
         assert np.abs(normal - side * arm / length).max() < 5e-6  # slopes err by h^2 s'''/6
@@ -134,11 +134,11 @@ def test_columns_of_equal_height_have_no_edge_between_them(core: ct.CDLL) -> Non
         assert ground.face([0.999, 0.999, 0.201], kind)[0] == 1000.0
 
 
-HEAD = dict(height=np.zeros((3, 4)), cell=0.1)
+PLAIN = grid_bytes(np.zeros((3, 4)), cell=0.1)
 BAD = {
-    "not begin with hxGrid01": b"hxGrid02" + grid_bytes(**HEAD)[8:],
+    "not begin with hxGrid01": b"hxGrid02" + PLAIN[8:],
     "at least the 128 bytes": b"hxGrid01",
-    "cut off or damaged": grid_bytes(**HEAD)[:-1],
+    "cut off or damaged": PLAIN[:-1],
     r"height\[1\]\[2\]: got nan": grid_bytes(
         np.where(np.arange(12).reshape(3, 4) == 6, np.nan, 0.0), cell=0.1
     ),

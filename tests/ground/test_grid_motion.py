@@ -182,7 +182,7 @@ def test_a_grid_that_is_missing_or_too_fine_for_the_feet_is_refused(core: ct.CDL
         plant.reset(d)
     assert missing.value.status == INVALID_MODEL
     fine = Ground(core, grid_bytes(np.zeros((9, 9)), cell=0.01, kind=BLOCKS))
-    with pytest.raises(PlantError, match="blocks with cells of 0.01 m, expected at least"):
+    with pytest.raises(PlantError, match=r"blocks with cells of 0\.01 m, expected at least"):
         start_on_grid(plant, fine)
     assert plant.save() == before
 

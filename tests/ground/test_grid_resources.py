@@ -16,10 +16,10 @@ GRID = 3  # terrain.kind
 
 @pytest.fixture
 def resources(tmp_path: Path) -> Path:
-    """Returns a resources folder with three grids: level at 0 and at 50 mm, and a damaged one."""
+    """Returns a resources folder with three grids: level at 0 and at -50 mm, and a damaged one."""
     folder = tmp_path / "resources of an FMU" / "terrain"
     folder.mkdir(parents=True)
-    for number, height in ((1, 0.0), (2, 0.05)):
+    for number, height in ((1, 0.0), (2, -0.05)):
         file = grid_bytes(np.full((41, 41), height), cell=0.1, origin=(-2.0, -2.0))
         (folder / f"{number}.terrain").write_bytes(file)
     (folder / "3.terrain").write_bytes(b"hxGrid01 and nothing more")
@@ -42,7 +42,7 @@ def test_the_grid_is_chosen_by_its_number(plant_library: Path, resources: Path) 
         with Plant(plant_library, resources=resources.as_uri()) as plant:
             assert on_grid(plant, grid) == OK
             depth.append(plant.real("LF.foot.penetration"))
-    assert depth[1] - depth[0] == pytest.approx(0.05, abs=1e-12)
+    assert depth[0] - depth[1] == pytest.approx(0.05, abs=1e-12)
 
 
 @pytest.mark.parametrize(

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from grids import BLOCKS, Ground, grid_bytes, on_grid
 from plant import Plant, PlantError, pointer
 from states import changed
 
@@ -210,3 +211,58 @@ def test_soil_on_a_slope_creeps_less_than_it_shears(core: ct.CDLL) -> None:
     out = plant.output()
     assert out.foot.force.sum(axis=0) == pytest.approx([0.0, 0.0, robot.weight], abs=1e-3)
     assert np.max(np.linalg.norm(out.foot.bristle, axis=1)) < robot.soil.shear_displacement
+
+
+def test_a_soil_of_a_grids_table_is_the_same_as_that_of_the_definition(core: ct.CDLL) -> None:
+    """A level grid whose material is dry sand, and a definition of rigid ground."""
+    soil, rigid = on_soil("dry_sand"), changed(load_robot("athena"), foot={"pad_radius": 0.025})
+    row = np.concatenate([[np.nan] * 3, law.table_row(soil.soil)])
+    flat, soft = np.zeros((5, 5)), np.ones((5, 5))
+    file = grid_bytes(flat, cell=1.0, origin=(-2.0, -2.0), material=soft, table=row[None])
+    ground = Ground(core, file)
+    pose = standing(soil)
+    start: dict[str, Any] = {
+        "position": np.add(pose.position, (0.0, 0.0, 0.002)),
+        "quaternion": pose.quaternion,
+        "angle": pose.angle,
+    }
+    plane, grid = Plant(core, soil, **start), on_grid(core, rigid, ground, **start)
+    for plant in (plane, grid):
+        walk(plant, 0.5)
+    here, there = plane.output(), grid.output()
+    assert here.footprints == there.footprints
+    assert there.torso.position == pytest.approx(here.torso.position, abs=1e-9)
+    assert there.foot.sinkage == pytest.approx(here.foot.sinkage, abs=1e-9)
+    assert np.max(there.foot.sinkage) > 0.001
+
+
+def test_soil_on_blocks_that_are_not_level_is_refused(core: ct.CDLL) -> None:
+    row = np.concatenate([[np.nan] * 3, law.table_row(soil_preset("dry_sand").soil)])
+    height, soft = np.zeros((5, 5)), np.zeros((5, 5))
+    soft[2, 2] = 1.0
+    for place, refused in ((0, False), (1, True), (3, True), (4, False)):
+        stepped = height.copy()
+        stepped[2, place] = -0.1
+        file = grid_bytes(stepped, cell=0.5, kind=BLOCKS, material=soft, table=row[None])
+        if refused:
+            with pytest.raises(ValueError, match=r"material\[2\]\[2\].*level blocks"):
+                Ground(core, file)
+        else:
+            Ground(core, file)
+
+
+def test_a_foot_may_start_deeper_than_its_radius_in_soil_and_not_in_rigid_ground(
+    core: ct.CDLL,
+) -> None:
+    soft = on_soil("dry_sand", 0.0)
+    pose = standing(soft)
+    start: dict[str, Any] = {"quaternion": pose.quaternion, "angle": pose.angle}
+    deep = np.subtract(pose.position, (0.0, 0.0, 0.02))
+    out = Plant(core, soft, position=deep, **start).output()
+    assert np.all(out.foot.penetration > soft.foot.radius)
+    for leg in range(6):
+        force = law.virgin_force(soft.soil, soft.foot, out.foot.penetration[leg])
+        assert out.foot.normal_force[leg] == pytest.approx(force, rel=REST)
+    rigid = replace(soft, soil=load_robot("athena").soil)
+    with pytest.raises(PlantError, match="deep in the ground"):
+        Plant(core, rigid, position=np.subtract(standing(rigid).position, (0, 0, 0.02)), **start)

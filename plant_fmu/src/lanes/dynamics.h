@@ -52,8 +52,8 @@ static inline void sweep_inertia(const hxModel *model, const hxImplicit *implici
   hxReal resists = hx_splat(model->rotor_inertia);
   if (implicit) {
     const double z = implicit->z;
-    resists += z * servo_damping(implicit, pack, joint) +
-               (z * z) * implicit->slope[pack].motor_stiffness[joint];
+    resists += z * joint_damping(model, implicit, pack, joint) +
+               (z * z) * joint_stiffness(model, implicit, pack, joint);
     if (joint == HX_JOINTS - 1 && leg->rows > 1) {
       sweep_rows(model, implicit, pack, &own, &resists, leg, I);
       return;
@@ -246,7 +246,7 @@ static inline void store_bristle_rates(const hxModel *model, const hxContactStat
   for (int i = 0; i < 3 && HX_PACKS * HX_LANES < HX_SLOTS; ++i) hx_fill_slots(rate->bristle[i]);
 }
 
-/* Powers that contact damping, friction and gears of all legs dissipate, W. */
+/* Powers that contact damping, friction, and gears with stops of all legs dissipate, W. */
 typedef struct {
   hxNumber contact, friction, gear;
 } hxLossPowers;
@@ -267,6 +267,15 @@ HX_RARE void add_torso_losses(const hxModel *model, const hxWork *work, hxLossPo
   losses->friction += hx_sum_slots(friction);
 }
 
+/* Returns the power that spin and rolling friction of all rows of a leg's foot dissipates, W. */
+HX_RARE hxReal turning_power(const hxLegWork *leg) {
+  hxReal power = hx_splat(0.0);
+  for (int k = 0; k < leg->rows; ++k)
+    if (leg->row[k] < HX_FOOT_ROWS)
+      power -= hx_dot(leg->contact[leg->row[k]].moment, leg->joint[HX_JOINTS - 1].body.w);
+  return power;
+}
+
 /* Returns the sums of the powers that all contacts, friction and gears dissipate. */
 static inline hxLossPowers hx_loss_powers(const hxModel *model, const hxWork *work) {
   hxReal contact[HX_PACKS], friction[HX_PACKS], gear[HX_PACKS];
@@ -274,13 +283,16 @@ static inline hxLossPowers hx_loss_powers(const hxModel *model, const hxWork *wo
     const hxLegWork *leg = &work->pack[pack];
     contact[pack] = damping_power(&leg->contact[HX_FOOT]);
     friction[pack] = hx_friction_power(model, HX_FOOT, &leg->contact[HX_FOOT]);
+    if (has_turning_friction(model, HX_FOOT)) friction[pack] += turning_power(leg);
     gear[pack] = hx_splat(0.0);
     for (int k = 1; k < leg->rows; ++k) {
       contact[pack] += damping_power(&leg->contact[leg->row[k]]);
       friction[pack] += hx_friction_power(model, leg->row[k], &leg->contact[leg->row[k]]);
     }
-    for (int joint = 0; joint < HX_JOINTS; ++joint)
+    for (int joint = 0; joint < HX_JOINTS; ++joint) {
       gear[pack] -= leg->joint[joint].servo.friction * leg->joint[joint].speed;
+      if (model->stops) gear[pack] += leg->joint[joint].stop.damped * leg->joint[joint].speed;
+    }
   }
   hxLossPowers losses = {hx_lane(hx_sum_legs(contact), 0), hx_lane(hx_sum_legs(friction), 0),
                          hx_lane(hx_sum_legs(gear), 0)};
@@ -316,13 +328,43 @@ typedef struct {
   hxNumber push[6];                        /* N s, N m s   force, then torque on the torso */
   hxVec3 contact[HX_TIBIA_ROWS][HX_PACKS]; /* N s    ground on feet and tibias */
   hxVec3 torso[HX_TORSO_PACKS];            /* N s    ground on the torso's points */
+  hxReal stop[HX_JOINTS][HX_PACKS];        /* N m s  stops on the joints */
+  hxVec3 moment[HX_FOOT_ROWS][HX_PACKS];   /* N m s  spin and rolling friction on tibias */
 } hxImpulses;
 
-/* Sets the impulses to 0; those of other contacts than feet, only where the model has some. */
+/* Sets the impulses to 0; those of other contacts than feet, of stops and of moments only where
+ * the model has some. */
 static inline void hx_clear_impulses(const hxModel *model, hxImpulses *sum) {
   memset(sum, 0, offsetof(hxImpulses, contact) + sizeof sum->contact[HX_FOOT]);
   if (model->rows > 1) memset(&sum->contact[1], 0, sizeof sum->contact - sizeof sum->contact[0]);
   if (model->torso_rows) memset(sum->torso, 0, sizeof sum->torso);
+  if (model->stops) memset(sum->stop, 0, sizeof sum->stop);
+  if (has_turning_friction(model, HX_FOOT)) memset(sum->moment, 0, sizeof sum->moment);
+}
+
+/* Adds a stage's impulses of the stops of a leg. */
+HX_RARE void add_stop_impulses(const hxImplicit *implicit, int pack, const hxLegWork *leg, double w,
+                               hxImpulses *sum) {
+  for (int joint = 0; joint < HX_JOINTS; ++joint) {
+    const hxJointWork *k = &leg->joint[joint];
+    hxReal torque = k->stop.torque;
+    if (implicit) {
+      const double z = implicit->z;
+      torque -= implicit->slope[pack].stop_stiffness[joint] * (k->angle_shift + (z * z) * k->qdd) +
+                implicit->slope[pack].stop_damping[joint] * (k->speed_shift + z * k->qdd);
+    }
+    sum->stop[joint][pack] += w * torque;
+  }
+}
+
+/* Adds a stage's impulses of the spin and rolling friction of a leg. */
+HX_RARE void add_moment_impulses(const hxImplicit *implicit, int pack, const hxLegWork *leg,
+                                 double w, hxImpulses *sum) {
+  for (int k = 0; k < leg->rows && leg->row[k] < HX_FOOT_ROWS; ++k) {
+    hxVec3 *moment = &sum->moment[leg->row[k]][pack];
+    const hxVec3 stage = row_stage_moment(implicit, pack, leg->row[k], leg);
+    *moment = hx_add_scaled(*moment, hx_splat(w), stage);
+  }
 }
 
 /* Adds a stage's impulses of a row of contacts on the tibias. */
@@ -371,6 +413,8 @@ static inline void hx_add_impulses(const hxModel *model, const hxCommand *comman
       sum->gear[joint][pack] += w * gear;
     }
     add_row_impulse(model, implicit, pack, HX_FOOT, leg, w, sum);
+    if (model->stops) add_stop_impulses(implicit, pack, leg, weight, sum);
+    if (has_turning_friction(model, HX_FOOT)) add_moment_impulses(implicit, pack, leg, weight, sum);
   }
   if (model->rows + model->torso_rows > 1) add_further_impulses(model, implicit, work, weight, sum);
   for (int i = 0; i < 3; ++i) {

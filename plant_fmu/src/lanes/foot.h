@@ -1,9 +1,10 @@
 /* foot.h - contact of a sphere, of a foot or a body, with compliant ground: kinematics and forces
- * (eq. 14-18) */
+ * (eq. 14, 15); friction.h holds the laws of friction */
 #ifndef HX_FOOT_H
 #define HX_FOOT_H
 
-#include "../terrain.h"
+#include "../ground/surface.h"
+#include "friction.h"
 #include "kinematics.h"
 #include "soil.h"
 
@@ -29,15 +30,6 @@ typedef struct {
   hxReal viscosity; /* N s/m  df_n/d(ddelta) */
 } hxNormalForce;
 
-/* Tangential force of a foot with bristles (eq. 16-18). */
-typedef struct {
-  hxVec3 grip;      /* 1    -f_t over f_n */
-  hxVec3 rate;      /* m/s  db/dt */
-  hxReal stiffness; /* 1/m  grip over b (secant) */
-  hxReal damping;   /* s/m  derivative of grip by db/dt */
-  hxReal yield; /* 1/s  derivative of db/dt by -b: rate at which sliding bristles are released */
-} hxBristle;
-
 typedef struct {
   hxContactKinematics kin;
   hxNormalForce normal;
@@ -46,19 +38,30 @@ typedef struct {
   hxReal drag;               /* N s/m   tangential force over slip speed */
   hxReal drag_per_load;      /* s/m     drag over f_n */
   hxReal stored, hold;       /* J, N/m  of soil: elastic energy, shear without load over bristle */
-  hxBristle bristle;         /* set by the bristle law only */
+  hxBristle bristle;         /* set by laws with bristles only */
   hxVec3 response;           /* N  stage's addition to the force (eq. 20) */
   hxVec3 shift, speed_shift; /* m, m/s  of the contact point (eq. 20), without its a */
   hxVec3 bristle_force;      /* N  bristles' part of response (eq. 21) */
+  hxTurningFriction turning; /* this and the next two: set with spin or rolling friction */
+  hxVec3 moment;             /* N m  of spin and rolling friction on the body (eq. 38) */
+  hxVec3 turn_response;      /* N m  stage's addition to the moment */
 } hxContactWork;
 
-static const double spring_limit =
-    0.7; /* 1  of the presliding; bristles below it are springs (eq. 16) */
+/* Returns whether the friction of a row's contacts on rigid ground has bristles; others slide by
+ * the tanh law then. */
+static inline int has_friction_bristles(const hxModel *model, int row) {
+  return row == HX_FOOT &&
+         (model->friction_law == HX_FRICTION_BRISTLE || model->friction_law == HX_FRICTION_LUGRE);
+}
 
-/* Returns whether the friction law of a row's contacts is the bristle law; others slide by the tanh
- * law then. */
-static inline int is_bristle_law(const hxModel *model, int row) {
-  return model->friction_law == HX_FRICTION_BRISTLE && row == HX_FOOT;
+/* Returns whether the contacts of a row stand on bristles, those of friction or of soil. */
+static inline int has_bristles(const hxModel *model, int row) {
+  return has_friction_bristles(model, row) || has_soil(model, row);
+}
+
+/* Returns whether the contacts of a row resist spin or rolling: feet do. */
+static inline int has_turning_friction(const hxModel *model, int row) {
+  return row < HX_FOOT_ROWS && (model->spin_friction || model->roll_friction);
 }
 
 /* Copies distance and normal of a grid at one lane's point. The derivative of both by the point
@@ -86,11 +89,6 @@ static inline void query_grid(const hxModel *model, const hxContactState *state,
                held[2] = {hx_re(state->cell[0][slot]), hx_re(state->cell[1][slot])};
   hx_terrain_face(model->terrain, kind, kind == HX_FACE_NEAREST ? none : held, real, HX_HAS_SLOPES,
                   face);
-}
-
-/* Returns whether bristles of a row's contacts move, those of friction or of soil. */
-static inline int has_bristles(const hxModel *model, int row) {
-  return is_bristle_law(model, row) || has_soil(model, row);
 }
 
 /* Returns distance and normal of a grid at a row's points, lane by lane. Without all, open contacts
@@ -133,56 +131,6 @@ HX_INLINE hxGround hx_ground(const hxModel *model, const hxContactState *state, 
   return (hxGround){hx_dot(n, hx_sub3(point, hx_splat_vec3(model->ground_point))), n};
 }
 
-/* Returns g of f_t = -mu f_n g(|v_t|) v_t (eq. 15): tanh(k_t v) / v, whose limit at rest is k_t.
- * The series k_t (1 - (k_t v)^2 / 3) is exact below k_t v = 1e-5. */
-HX_INLINE hxReal hx_friction(const hxModel *model, hxReal speed) {
-  if (model->friction_law == HX_FRICTION_NONE) return hx_splat(0.0);
-  const hxReal x = model->slope * speed;
-  const hxMask slow = hx_less(x, hx_splat(1e-5));
-  return model->slope * hx_select(slow, 1.0 - x * x * (1.0 / 3.0),
-                                  hx_tanh_ratio(hx_select(slow, hx_splat(1.0), x)));
-}
-
-/* Elasto-plastic bristles (eq. 16, 17) with u = b/b_max in the unit disc: db/dt = v - Y (v.u)+
- * u/|u|.
- *
- * The friction force is the share w = u (3 - u.u)/2 + d room/|(room, d)| of mu f_n, with the
- * damping d = 3/2 tau db/dt / b_max. The spring leaves room = 1 - |u| (3 - u.u)/2 to the damping,
- * so that w stays within the disc too, and w is C1 at |u| = 1, where a foot slides.
- *
- * The friction coefficient falls with the sliding speed p of the bristles: mu(p) = mu + (mu_s -
- * mu)/(1 + (p/v_s)^2) (eq. 18).
- */
-HX_INLINE hxBristle hx_bristle(const hxModel *model, const hxContactState *state, int row, int slot,
-                               hxVec3 b, hxVec3 slip) {
-  const hxReal closed = hx_load(&state->closed[row][slot]);
-  const hxReal zero = hx_splat(0.0), one = hx_splat(1.0);
-  const hxNumber per_length = 1.0 / model->presliding;
-  const hxVec3 u = hx_scale(hx_splat(per_length), b);
-  const hxReal size = hx_sqrt(hx_dot(u, u)), within = hx_min(size, one);
-  const hxReal s = hx_clip((size - spring_limit) * (1.0 / (1.0 - spring_limit)), zero, one);
-  const hxReal release_rate = s * s * (3.0 - 2.0 * s) * hx_max(hx_dot(slip, u), zero) /
-                              hx_max(size, hx_splat(spring_limit));
-  const hxVec3 rate = hx_scale(closed, hx_add_scaled(slip, -release_rate, u));
-  const hxVec3 d = hx_scale(hx_splat(1.5 * model->bristle_damping * per_length), rate);
-  const hxReal spring = (1.5 - 0.5 * within * within) / hx_max(size, one);
-  const hxReal room = 1.0 - spring * size;
-  const hxReal share =
-      room / hx_sqrt(room * room + hx_dot(d, d) +
-                     1e-30); /* 1e-30: without room and motion the share is 0, not 0/0 */
-  const hxVec3 w = hx_add_scaled(hx_scale(spring, u), share, d);
-  const hxReal sliding = hx_splat(model->per_stribeck) * release_rate * size;
-  const hxReal mu = hx_load(&state->mu[row][slot]) +
-                    hx_load(&state->static_rise[row][slot]) / (1.0 + sliding * sliding);
-  return (hxBristle){
-      .grip = hx_scale(mu, w),
-      .rate = rate,
-      .stiffness = (mu * per_length) * spring,
-      .damping = (1.5 * mu * model->bristle_damping * per_length) * share,
-      .yield = per_length * release_rate,
-  };
-}
-
 /* Constants of the normal law of a row of contacts, fixed at touch-down. */
 typedef struct {
   hxReal closed, damping; /* 1, s/m */
@@ -192,6 +140,11 @@ typedef struct {
 HX_INLINE hxContactLawAt hx_law_at(const hxContactState *state, int row, int slot) {
   return (hxContactLawAt){hx_load(&state->closed[row][slot]), hx_load(&state->damping[row][slot]),
                           hx_load(&state->stiffness[row][slot])};
+}
+
+/* Returns the friction coefficients of a row of contacts, fixed at touch-down. */
+HX_INLINE hxFrictionAt hx_friction_at(const hxContactState *state, int row, int slot) {
+  return (hxFrictionAt){hx_load(&state->mu[row][slot]), hx_load(&state->static_rise[row][slot])};
 }
 
 /* Returns f_n = K delta^(3/2) (1 + d ddelta) >= 0 of a closed contact (eq. 14), and its
@@ -237,7 +190,7 @@ HX_RARE void replace_by_soil(const hxModel *model, const hxContactState *state, 
   const hxVec3 b = hx_load_vec3(motion->bristle, slot), none = hx_zero3();
   const hxReal zero = hx_splat(0.0), yield = f.per_displacement * contact->slip_speed;
   const hxBristle rigid =
-      is_bristle_law(model, HX_FOOT) ? contact->bristle : (hxBristle){none, none, zero, zero, zero};
+      has_friction_bristles(model, HX_FOOT) ? contact->bristle : (hxBristle){none, none, zero, zero, zero};
   const hxVec3 grip = hx_scale(f.per_load, b),
                rate = hx_scale(hx_load(&state->closed[HX_FOOT][slot]),
                                hx_add_scaled(contact->slip, -yield, b));
@@ -296,13 +249,18 @@ HX_INLINE void rigid_force(const hxModel *model, const hxContactState *state, in
   contact->normal = hx_normal_force(hx_law_at(state, row, slot), kin->delta, kin->ddelta);
   contact->slip = hx_add_scaled(kin->velocity, kin->ddelta, kin->normal);
   contact->slip_speed = hx_sqrt(hx_dot(contact->slip, contact->slip));
-  if (is_bristle_law(model, row)) {
-    contact->bristle =
-        hx_bristle(model, state, row, slot, hx_load_vec3(motion->bristle, slot), contact->slip);
+  if (has_friction_bristles(model, row)) {
+    const hxFrictionAt at = hx_friction_at(state, row, slot);
+    const hxReal closed = hx_load(&state->closed[row][slot]);
+    const hxVec3 b = hx_load_vec3(motion->bristle, slot);
+    contact->bristle = model->friction_law == HX_FRICTION_LUGRE
+                           ? hx_lugre(model, at, closed, b, contact->slip)
+                           : hx_bristle(model, at, closed, b, contact->slip);
     contact->force = hx_scale(contact->normal.force, hx_sub3(kin->normal, contact->bristle.grip));
     return;
   }
-  contact->drag_per_load = hx_load(&state->mu[row][slot]) * hx_friction(model, contact->slip_speed);
+  contact->drag_per_load =
+      hx_friction_drag(model, hx_friction_at(state, row, slot), contact->slip_speed);
   contact->drag = contact->normal.force * contact->drag_per_load;
   contact->force =
       hx_add_scaled(hx_scale(contact->normal.force, kin->normal), -contact->drag, contact->slip);
@@ -315,11 +273,20 @@ HX_INLINE void hx_contact_force(const hxModel *model, const hxContactState *stat
   if (has_soil(model, row)) replace_by_soil(model, state, slot, motion, contact);
 }
 
-/* Returns the power that friction dissipates, W. */
+/* Computes the moment of spin and rolling friction on bodies that turn at w; the normal forces are
+ * known. */
+HX_RARE void hx_contact_moment(const hxModel *model, const hxContactState *state, int row, int slot,
+                               const hxVec3 *w, hxContactWork *contact) {
+  contact->turning = hx_turning_friction(model, hx_friction_at(state, row, slot),
+                                         hx_splat(model->radius[row]), contact->kin.normal, *w);
+  contact->moment = hx_scale(contact->normal.force, contact->turning.moment);
+}
+
+/* Returns the power that sliding friction dissipates, W. */
 static inline hxReal hx_friction_power(const hxModel *model, int row,
                                        const hxContactWork *contact) {
   if (has_soil(model, row)) return -hx_dot(contact->force, contact->slip);
-  if (is_bristle_law(model, row))
+  if (has_friction_bristles(model, row))
     return contact->normal.force * hx_dot(contact->bristle.grip, contact->slip);
   return contact->drag * contact->slip_speed * contact->slip_speed;
 }

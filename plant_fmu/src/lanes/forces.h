@@ -127,7 +127,7 @@ static inline void leg_pass(const hxModel *model, const hxCommand *command, doub
                joint > 0 ? &leg->joint[joint - 1].body : torso, &chain, &leg->joint[joint]);
 }
 
-/* Computes the torques of motor and gear on a joint (eq. 12). */
+/* Computes the torques of motor, gear and stops on a joint (eq. 12, 39). */
 static inline void joint_torque(const hxModel *model, const hxCommand *command, int joint, int slot,
                                 hxJointWork *k) {
   k->servo = hx_servo_torque(model, k->angle, k->speed, hx_load(&command->angle[joint][slot]),
@@ -135,6 +135,10 @@ static inline void joint_torque(const hxModel *model, const hxCommand *command, 
                              hx_load(&command->torque[joint][slot]));
   k->torque = model->servo_mode == HX_SERVO_KINEMATIC ? k->servo.friction
                                                       : k->servo.torque + k->servo.friction;
+  if (model->stops) {
+    k->stop = hx_stop_torque(model, joint, slot, k->angle, k->speed);
+    k->torque += k->stop.torque;
+  }
 }
 
 static inline hxMotion6 torso_velocity(const hxPlantMotion *m) {
@@ -156,6 +160,9 @@ static inline void push_body(hxForce6 *p, hxVec3 x, hxVec3 force) {
   p->ang = hx_sub3(p->ang, hx_cross(x, force));
 }
 
+/* Applies a moment to a body. */
+static inline void turn_body(hxForce6 *p, hxVec3 moment) { p->ang = hx_sub3(p->ang, moment); }
+
 /* Computes the contact force of a row and applies it to the tibia. */
 HX_INLINE void leg_contact(const hxModel *model, const hxContactState *state,
                            const hxPlantMotion *motion, int row, int slot, int all,
@@ -165,6 +172,10 @@ HX_INLINE void leg_contact(const hxModel *model, const hxContactState *state,
   contact->kin = hx_tibia_contact(model, state, motion, row, slot, all, &tibia->body);
   hx_contact_force(model, state, row, slot, motion, contact);
   push_body(&tibia->p, contact_point(leg, contact), contact->force);
+  if (has_turning_friction(model, row)) {
+    hx_contact_moment(model, state, row, slot, &tibia->body.w, contact);
+    turn_body(&tibia->p, contact->moment);
+  }
 }
 
 /* Returns whether a row has a closed contact in a pack. */

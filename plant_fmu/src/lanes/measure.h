@@ -17,7 +17,6 @@
 static const double landing_sample = 1e-4; /* s  between two samples of a landing's force */
 static const double nearly_sliding = 0.9;  /* 1  of the friction cone */
 static const double shortest_bend = 1e-7;  /* s  shorter steps: differences are rounding errors */
-static const double half_turn = 3.14159265358979323846;
 
 /* Nodes of a step at which forces are evaluated, and Simpson's weights: feet use all nodes, motors
  * every second one. */
@@ -101,6 +100,7 @@ static inline void hx_moment_of(const hxModel *model, const hxContactState *stat
       const hxVec3 s = hx_mul(i.R_WB, hx_load_vec3(m->s_i, slot));
       hx_store(&moment->speed[joint][slot], hx_dot(s, hx_sub3(j.w, i.w)));
     }
+    hx_store_vec3(moment->turn, slot, j.w);
     row_moment(model, state, motion, HX_FOOT, slot, &j, moment);
     if (model->rows > 1) further_moments(model, state, motion, slot, &j, moment);
   }
@@ -296,6 +296,35 @@ HX_RARE void torso_works(const hxPath *path, const hxImpulses *impulse, hxStepWo
   works->torso_friction = hx_sum_slots(friction);
 }
 
+/* Returns the energy that a joint's stops store, J. */
+static inline hxReal stored_in_stop(const hxModel *model, int joint, int slot, hxReal angle) {
+  const hxReal x = hx_overrun(model, joint, slot, angle);
+  return (0.5 * model->stop_stiffness) * (x * x);
+}
+
+/* Adds what the stops of a pack of legs lose in a step: their work on the joints less what they
+ * store. */
+HX_RARE void add_stop_works(const hxPath *path, const hxImpulses *impulse, int pack,
+                            hxStepWorks *works) {
+  const int slot = pack * HX_LANES;
+  for (int joint = 0; joint < HX_JOINTS; ++joint) {
+    const hxReal speed = mean_of(&path->from->speed[joint][slot], &path->to->speed[joint][slot]);
+    const hxReal before = hx_load(&path->from->angle[joint][slot]),
+                 after = hx_load(&path->to->angle[joint][slot]);
+    const hxReal stored = stored_in_stop(path->model, joint, slot, after) -
+                          stored_in_stop(path->model, joint, slot, before);
+    works->gear[pack] -= impulse->stop[joint][pack] * speed + stored;
+  }
+}
+
+/* Adds what spin and rolling friction of a pack of feet lose in a step. */
+HX_RARE void add_turning_works(const hxPath *path, const hxImpulses *impulse, int pack,
+                               hxStepWorks *works) {
+  const hxVec3 turn = mean_vec3(path->from->turn, path->to->turn, pack * HX_LANES);
+  for (int k = 0; k < path->model->foot_rows; ++k)
+    works->friction[pack] -= hx_dot(impulse->moment[path->model->row[k]][pack], turn);
+}
+
 /* Computes works and losses of a step from its impulses (eq. 27). */
 static inline void hx_step_works(const hxPath *path, const hxImpulses *impulse,
                                  hxStepWorks *works) {
@@ -313,6 +342,8 @@ static inline void hx_step_works(const hxPath *path, const hxImpulses *impulse,
     contact_works(path, HX_FOOT, slot, impulse->contact[HX_FOOT][pack], &works->contact[pack],
                   &works->friction[pack]);
     if (path->model->rows > 1) add_further_works(path, pack, impulse, works);
+    if (path->model->stops) add_stop_works(path, impulse, pack, works);
+    if (has_turning_friction(path->model, HX_FOOT)) add_turning_works(path, impulse, pack, works);
   }
   works->torso_contact = works->torso_friction = 0.0;
   if (path->model->torso_rows) torso_works(path, impulse, works);
@@ -332,12 +363,6 @@ static inline hxCubic cubic(hxReal from, hxReal slope_from, hxReal rise, hxReal 
   return (hxCubic){from + x * (slope_from + x * (curve + x * bend)),
                    slope_from + x * (2.0 * curve + (3.0 * x) * bend),
                    2.0 * curve + (6.0 * x) * bend};
-}
-
-/* Returns the angle in [-pi, pi], of an angle at most one turn outside. */
-static inline hxReal within_turn(hxReal angle) {
-  const hxReal low = hx_select(hx_less(hx_splat(half_turn), angle), angle - 2.0 * half_turn, angle);
-  return hx_select(hx_less(low, hx_splat(-half_turn)), low + 2.0 * half_turn, low);
 }
 
 /* Measures one joint: positive and negative work, whose difference is the step's work, and the

@@ -57,7 +57,17 @@ static hxNumber torso_elastic_energy(const hxWork *work) {
   return hx_sum_slots(energy);
 }
 
-/* Returns the potential energy of gravity and contacts, J. */
+/* Returns the energy k x^2/2 that the stops of a leg store, J. */
+static hxReal stop_energy(const hxModel *model, const hxLegWork *leg, int slot) {
+  hxReal energy = hx_splat(0.0);
+  for (int joint = 0; joint < HX_JOINTS; ++joint) {
+    const hxReal x = hx_overrun(model, joint, slot, leg->joint[joint].angle);
+    energy += (0.5 * model->stop_stiffness) * (x * x);
+  }
+  return energy;
+}
+
+/* Returns the potential energy of gravity, contacts and stops, J. */
 static hxNumber hx_potential_energy(const hxModel *model, const hxPlantMotion *motion,
                                     const hxWork *work) {
   const hxVec3 g = hx_splat_vec3(model->gravity);
@@ -67,6 +77,7 @@ static hxNumber hx_potential_energy(const hxModel *model, const hxPlantMotion *m
     const int slot = pack * HX_LANES;
     legs[pack] = model->has_soil ? contact[HX_FOOT].stored : elastic_energy(&contact[HX_FOOT]);
     for (int k = 1; k < model->rows; ++k) legs[pack] += elastic_energy(&contact[model->row[k]]);
+    if (model->stops) legs[pack] += stop_energy(model, &work->pack[pack], slot);
     for (int joint = 0; joint < HX_JOINTS; ++joint)
       legs[pack] -= hx_load(&model->joint[joint].mass[slot]) *
                     hx_dot(g, hx_link_vec3(motion, joint, HX_R, slot));

@@ -1,11 +1,11 @@
-#include "terrain.h"
-
-#include "ground/soil.h"
+#include "surface.h"
 
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+
+#include "soil.h"
 
 /* The head of a grid file. */
 typedef struct {
@@ -127,6 +127,35 @@ static int check_materials(const hxTerrain *terrain, char *message) {
   return 1;
 }
 
+/* Returns whether a column is soil and not level with all its neighbours. */
+static int is_uneven_soil(const hxTerrain *terrain, int64_t row, int64_t col) {
+  const int64_t rows = terrain->head.rows, cols = terrain->head.cols;
+  const unsigned char m = terrain->material[row * cols + col];
+  if (m == 0 || terrain->table[HX_MATERIAL_COLUMNS * (m - 1) + HX_MATERIAL_SOIL] == 0.0) return 0;
+  const double height = terrain->height[row * cols + col];
+  int found = 0;
+  for (int64_t r = row - 1; r <= row + 1; ++r)
+    for (int64_t c = col - 1; c <= col + 1; ++c)
+      found |= r >= 0 && r < rows && c >= 0 && c < cols && terrain->height[r * cols + c] != height;
+  return found;
+}
+
+/* Returns whether soil of blocks is level: a foot that has sunk cannot pass an edge of soil without
+ * a jump of the force, because the laws of soil are those of level ground. */
+static int check_soil_of_blocks(const hxTerrain *terrain, char *message) {
+  if (terrain->head.kind != HX_SURFACE_BLOCKS || !terrain->material) return 1;
+  for (int64_t row = 0; row < terrain->head.rows; ++row)
+    for (int64_t col = 0; col < terrain->head.cols; ++col)
+      if (is_uneven_soil(terrain, row, col)) {
+        snprintf(message, HX_MESSAGE_SIZE,
+                 "terrain grid: material[%lld][%lld]: got soil on a block that is higher or lower than "
+                 "its neighbour, expected soil on level blocks; move it, or make the surface smooth",
+                 (long long)row, (long long)col);
+        return 0;
+      }
+  return 1;
+}
+
 /* Copies the file after its head and sets the pointers to its parts. */
 static hxTerrain *copy_file(const hxGridHead *head, const void *bytes, size_t size) {
   hxTerrain *terrain = malloc(sizeof *terrain + (size - sizeof *head));
@@ -162,7 +191,9 @@ hxTerrain *hx_terrain_create(const void *bytes, size_t size, char *message) {
     snprintf(message, HX_MESSAGE_SIZE, "terrain grid: out of memory; free some and try again");
     return NULL;
   }
-  if (check_heights(terrain, message) && check_materials(terrain, message)) return terrain;
+  if (check_heights(terrain, message) && check_materials(terrain, message) &&
+      check_soil_of_blocks(terrain, message))
+    return terrain;
   hx_terrain_destroy(terrain);
   return NULL;
 }

@@ -1,7 +1,7 @@
-/* terrain.h - distance of a sphere's centre from an uneven ground (eq. HXSURF). Scalar and compiled
+/* surface.h - distance of a sphere's centre from an uneven ground (eq. 31-34). Scalar and compiled
  * once, so that all kernels get the same bits. Heights are above the terrain's own zero. */
-#ifndef HX_SRC_TERRAIN_H
-#define HX_SRC_TERRAIN_H
+#ifndef HX_SURFACE_H
+#define HX_SURFACE_H
 
 #include "hexapod/inside.h"
 #include "hexapod/terrain.h"

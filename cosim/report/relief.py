@@ -1,0 +1,145 @@
+"""Draws a surface of the ground as a shaded relief with contour lines and the robot for scale."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path
+
+import matplotlib
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.colors import LightSource
+from matplotlib.figure import Figure
+from matplotlib.patches import Circle, Rectangle
+from PIL import Image
+
+from hexapod_cosim.controller.figure_style import DPI, SETTINGS, UNDATED
+from hexapod_cosim.cosim.common.files import atomic_path
+from hexapod_cosim.models import Robot, foot_positions
+from hexapod_cosim.models.ground.smooth import heights_at
+from hexapod_cosim.models.ground.surface import Array, Surface
+
+WIDTH = 5.0  # in
+LIGHT = LightSource(azdeg=315.0, altdeg=40.0)
+EXAGGERATION = 1.5  # of slopes in the shading
+SAMPLES = 4  # drawn per cell and direction of a small map
+MOST_SAMPLES = 400  # along an edge
+STEPS = (0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0)  # m
+CONTOURS = 12  # at most
+LEVELS = 65535  # of a 16-bit picture
+
+
+def draw_relief(surface: Surface, robot: Robot, path: Path) -> Path:
+    """Writes the relief as PNG or SVG and returns its path; the robot stands at the origin."""
+    with matplotlib.rc_context(SETTINGS | {"axes.grid": False}):
+        left, right, low, high = surface.extent
+        share = min(max((high - low) / (right - left), 0.25), 1.5)
+        figure = Figure(figsize=(WIDTH, 0.9 * WIDTH * share + 0.4))
+        axes = figure.subplots()
+        _draw(axes, surface)
+        _draw_robot(axes, robot)
+        axes.set_xlabel("x [m]")
+        axes.set_ylabel("y [m]")
+        axes.set_title(surface.name)
+        with atomic_path(path) as part:
+            kind = path.suffix.removeprefix(".")
+            figure.savefig(part, format=kind, dpi=DPI, metadata=UNDATED[kind])
+    return path
+
+
+def _draw(axes: Axes, surface: Surface) -> None:
+    """Draws shading, colour of the height and contour lines."""
+    x, y, height = sampled(surface)
+    pitch = float(x[1] - x[0]), float(y[1] - y[0])
+    lowest, highest = float(height.min()), float(height.max())
+    span = max(highest - lowest, 1e-6)
+    shaded = LIGHT.shade(
+        height,
+        cmap=matplotlib.colormaps["cividis"],
+        vmin=lowest - 0.3 * span,
+        vmax=highest + 0.1 * span,
+        blend_mode="soft",
+        vert_exag=EXAGGERATION,
+        dx=pitch[0],
+        dy=pitch[1],
+    )
+    left, right, low, high = surface.extent
+    axes.imshow(shaded, origin="lower", extent=(left, right, low, high), interpolation="nearest")
+    step = next((step for step in STEPS if span / step <= CONTOURS), STEPS[-1])
+    # half a step off, because level ground at a contour line has no line
+    levels = step * (np.arange(np.floor(lowest / step), np.ceil(highest / step) + 1.0) + 0.5)
+    if surface.kind == "smooth" and highest > lowest:
+        axes.contour(x, y, height, levels=levels, colors="0.15", linewidths=0.4)
+    text = f"{1e3 * lowest:.3g} to {1e3 * highest:.3g} mm"
+    text += f", contour lines every {1e3 * step:g} mm" if surface.kind == "smooth" else ", blocks"
+    axes.text(0.0, -0.14, text, transform=axes.transAxes, fontsize=6.5, va="top")
+
+
+def sampled(surface: Surface) -> tuple[Array, Array, Array]:
+    """Returns x (columns,), y (rows,) and heights (rows, columns) [m] of a picture."""
+    left, right, low, high = surface.extent
+    columns, rows = (
+        min(max(SAMPLES * count, 50), MOST_SAMPLES) for count in (surface.columns, surface.rows)
+    )
+    x = left + (right - left) * (np.arange(columns) + 0.5) / columns
+    y = low + (high - low) * (np.arange(rows) + 0.5) / rows
+    if surface.kind == "blocks":
+        across = np.minimum(((x - left) / surface.cell).astype(int), surface.columns - 1)
+        along = np.minimum(((y - low) / surface.cell).astype(int), surface.rows - 1)
+        return x, y, surface.height[np.ix_(along, across)]
+    return x, y, heights_at(surface, x, y)
+
+
+def _draw_robot(axes: Axes, robot: Robot) -> None:
+    """Draws the torso and the standing feet, for scale."""
+    length, width, _ = robot.torso.size
+    com = robot.torso.com
+    corner = (com[0] - 0.5 * length, com[1] - 0.5 * width)
+    axes.add_patch(Rectangle(corner, length, width, fill=False, color="#D55E00", linewidth=1.0))
+    for x, y, _ in foot_positions(robot, robot.stance):
+        axes.add_patch(Circle((x, y), robot.foot.radius, color="#D55E00"))
+
+
+def write_heights(surface: Surface, path: Path) -> dict[str, float]:
+    """Writes a surface's heights as a 16-bit PNG, and returns the keys of [terrain] to read it.
+
+    Levels are multiples of vertical_scale above the lowest height.
+    """
+    lowest = float(surface.height.min())
+    span = float(surface.height.max()) - lowest
+    scale = max(span / LEVELS, 1e-6)
+    levels = np.round((surface.height - lowest) / scale).astype(np.uint16)
+    with atomic_path(path) as part:
+        Image.fromarray(levels[::-1]).save(part, "PNG", optimize=True)
+    left, right, low, high = surface.extent
+    keys = {
+        "horizontal_scale": surface.cell,
+        "vertical_scale": scale,
+        "height": lowest,
+        "x": 0.5 * (left + right),
+        "y": 0.5 * (low + high),
+    }
+    if surface.kind == "blocks":
+        keys["slope_threshold"] = scale / surface.cell
+    return keys
+
+
+def contact_sheet(surfaces: Iterable[Surface], robot: Robot, path: Path, *, columns: int) -> Path:
+    """Writes the reliefs of several surfaces as one picture and returns its path."""
+    shown = list(surfaces)
+    rows = -(-len(shown) // columns)
+    with matplotlib.rc_context(SETTINGS | {"axes.grid": False, "axes.titlesize": 7.0}):
+        figure = Figure(figsize=(1.8 * columns, 1.95 * rows))
+        grid = figure.subplots(rows, columns, squeeze=False)
+        for axes in grid.ravel()[len(shown) :]:
+            axes.set_axis_off()
+        for axes, surface in zip(grid.ravel(), shown, strict=False):
+            _draw(axes, surface)
+            _draw_robot(axes, robot)
+            axes.texts[0].remove()
+            axes.set_title(surface.name)
+            axes.tick_params(labelsize=5.0)
+        with atomic_path(path) as part:
+            kind = path.suffix.removeprefix(".")
+            figure.savefig(part, format=kind, dpi=DPI, metadata=UNDATED[kind])
+    return path

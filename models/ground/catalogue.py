@@ -1,0 +1,270 @@
+"""The surfaces by name, with their parameters: `make_surface("stairs", {"step_height": 0.02})`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+from hexapod_cosim.models.errors import RobotError, unknown_name
+from hexapod_cosim.models.ground import rough, steps
+from hexapod_cosim.models.ground.height_map import heightfield
+from hexapod_cosim.models.ground.parameters import (
+    HARD,
+    HORIZONTAL,
+    PLATFORM,
+    RANDOM_TILE,
+    SEED,
+    SIZE,
+    TILE,
+    VERTICAL,
+    Parameter,
+    Parameters,
+    count,
+    length,
+    ratio,
+    read_values,
+    text,
+    with_defaults,
+)
+from hexapod_cosim.models.ground.patches import check_soil, read_patches, with_patches, with_soil
+from hexapod_cosim.models.ground.surface import Surface
+from hexapod_cosim.models.schema import Number
+
+MOST_NODES = 1 << 24  # of a generated surface
+KEPT = 32  # surfaces in the cache
+
+
+@dataclass(frozen=True)
+class Entry:
+    """A surface of the catalogue."""
+
+    about: str
+    make: Callable[[SimpleNamespace], Surface]
+    parameters: Parameters
+
+
+# legged_gym's 0.05 + 0.18 difficulty, by half
+STEP_HEIGHT = length((0.025, 0.115), "height of a step")
+STEP_WIDTH = length(0.15, "depth of a step's tread", least=0.01, zero=True)
+DEPTH = length(0.3, "depth of the gaps")
+SLOPE = ratio((0.0, 0.4), "rise over run", least=-2.0, most=2.0)
+SOIL = text("dry_sand", "name of the soil everywhere")
+STEPS: Parameters = {**TILE, "step_height": STEP_HEIGHT, "step_width": STEP_WIDTH}
+ONE_STEP: Parameters = {**TILE, "step_height": STEP_HEIGHT}
+
+CATALOGUE: dict[str, Entry] = {
+    "plane": Entry(
+        "Inclined plane as a grid",
+        rough.plane,
+        {
+            "size": SIZE,
+            "horizontal_scale": HORIZONTAL,
+            "slope_x": ratio(0.0, "rise along +x over run", least=-2.0, most=2.0),
+            "slope_y": ratio(0.0, "rise along +y over run", least=-2.0, most=2.0),
+        },
+    ),
+    "stairs": Entry(
+        "Stairs up along +x and a landing",
+        steps.stairs,
+        {**STEPS, "num_steps": count(5, "number of steps", most=1000)},
+    ),
+    "pyramid_stairs": Entry("Stairs down to all sides", steps.pyramid_stairs, STEPS),
+    "inverted_pyramid_stairs": Entry(
+        "Stairs up to all sides", steps.inverted_pyramid_stairs, STEPS
+    ),
+    "steps": Entry("Kerbs across x", steps.steps, STEPS),
+    "step_up": Entry("One step up along +x", steps.step_up, ONE_STEP),
+    "step_down": Entry("One step down along +x", steps.step_down, ONE_STEP),
+    "stepping_stones": Entry(
+        "Square stones with gaps between them",
+        steps.stepping_stones,
+        {
+            **RANDOM_TILE,
+            "stone_size": length((0.5, 0.1), "edge of a stone", least=0.01, zero=True),
+            "stone_distance": length(0.05, "width of the gaps"),
+            "max_height": length(0.0, "largest deviation of the tops", zero=True),
+            "depth": DEPTH,
+        },
+    ),
+    "gaps": Entry(
+        "Gaps across x",
+        steps.gaps,
+        {
+            **TILE,
+            "gap_size": length((0.02, 0.2), "width of a gap", least=0.01, zero=True),
+            "gap_distance": length(0.4, "ground between two gaps"),
+            "depth": DEPTH,
+        },
+    ),
+    "wave": Entry(
+        "Sine waves along x and y",
+        rough.wave,
+        {
+            **TILE,
+            "amplitude": length((0.02, 0.15), "largest height"),
+            "num_waves": ratio(4.0, "waves along an edge of the map", least=0.1, most=1000.0),
+        },
+    ),
+    "random_uniform": Entry(
+        "Smooth roughness from random heights",
+        rough.random_uniform,
+        {
+            **RANDOM_TILE,
+            "horizontal_scale": replace(HORIZONTAL, default=0.1),
+            "max_height": length((0.01, 0.05), "largest height above and below 0"),
+        },
+    ),
+    "discrete_obstacles": Entry(
+        "Flat rectangles above and below the ground",
+        steps.discrete_obstacles,
+        {
+            **RANDOM_TILE,
+            "max_height": length((0.025, 0.125), "largest height"),
+            "min_size": length(0.2, "shortest edge"),
+            "max_size": length(0.6, "longest edge"),
+            "num_rects": count(40, "number of rectangles"),
+        },
+    ),
+    "pyramid_slope": Entry(
+        "Slopes down to all sides", rough.pyramid_slope, {**TILE, "slope": SLOPE}
+    ),
+    "ramp": Entry(
+        "Ramp up and down along +x",
+        rough.ramp,
+        {**TILE, "slope": SLOPE, "ramp_length": length(0.5, "run of the ramp")},
+    ),
+    "dune": Entry(
+        "Dunes across x, steep on their far side",
+        rough.dune,
+        {
+            **TILE,
+            "dune_height": length((0.03, 0.2), "height of a crest"),
+            "dune_length": length(1.2, "from crest to crest", least=0.1, zero=True),
+        },
+    ),
+    "rubble": Entry(
+        "Square stones of random height",
+        steps.rubble,
+        {
+            **RANDOM_TILE,
+            "stone_size": length(0.2, "edge of a stone", least=0.01, zero=True),
+            "max_height": length((0.02, 0.1), "largest height of a stone"),
+        },
+    ),
+    "sand": Entry(
+        "Level soil",
+        rough.sand,
+        {"size": SIZE, "horizontal_scale": HORIZONTAL, "soil": SOIL},
+    ),
+    "course": Entry(
+        "5 m of rubble, kerbs, stones with gaps, stairs, along +x",
+        steps.course,
+        {
+            "size": replace(SIZE, default=2.0, about="width of the course"),
+            "horizontal_scale": HORIZONTAL,
+            "platform_size": PLATFORM,
+            "difficulty": HARD,
+            "step_height": length((0.015, 0.1), "height of kerbs, stairs and rubble"),
+            "depth": DEPTH,
+            "vertical_scale": VERTICAL,
+            "seed": SEED,
+        },
+    ),
+    "heightfield": Entry(
+        "Height map from a file",
+        heightfield,
+        {
+            "file": text(None, "path of a 16-bit PNG, a .npy array or an ESRI .asc grid"),
+            "horizontal_scale": length(0.0, "per pixel or cell; 0: cellsize of the file",
+                                       zero=True),
+            "vertical_scale": length(0.0, "per unit of height; 0: the file is in metres",
+                                     zero=True),
+            "slope_threshold": ratio(
+                0.0, "steeper maps become blocks; 0: always smooth", least=0.0, most=1e3
+            ),
+            "platform_size": replace(PLATFORM, default=0.0),
+            "x": Parameter(spec=Number("m"), default=0.0, about="middle of the map"),
+            "y": Parameter(spec=Number("m"), default=0.0, about="middle of the map"),
+        },
+    ),
+}  # fmt: skip
+
+
+def entry_of(name: str, *, where: str | None = None) -> Entry:
+    """Returns a surface of the catalogue. Raises RobotError for an unknown name."""
+    if name not in CATALOGUE:
+        raise unknown_name("surface", name, CATALOGUE, where=where, error=RobotError)
+    return CATALOGUE[name]
+
+
+def parameter_of(key: str) -> Parameter | None:
+    """Returns the parameter of this name of the first surface that has one."""
+    found = (entry.parameters.get(key) for entry in CATALOGUE.values())
+    return next((parameter for parameter in found if parameter is not None), None)
+
+
+def make_surface(name: str, given: Mapping[str, Any], *, where: str = "terrain") -> Surface:
+    """Returns a surface of the catalogue. Equal parameters give equal bits.
+
+    Args:
+        name: of the catalogue.
+        given: its parameters that differ from their defaults, and `patch`, a list of tables.
+        where: prefix of keys in messages.
+
+    Raises RobotError.
+    """
+    entry = entry_of(name, where=f"{where}.kind")
+    plain = {key: value for key, value in given.items() if key != "patch"}
+    values = read_values(entry.parameters, plain, where)
+    patches = read_patches(given.get("patch", ()), f"{where}.patch")
+    recipe = {"kind": name, **values, **({"patch": patches} if patches else {})}
+    stamp = _stamp(values)
+    key = tuple(sorted(values.items())), tuple(tuple(sorted(one.items())) for one in patches)
+    return replace(_made(name, *key, stamp, where), recipe=recipe)
+
+
+def _stamp(values: Mapping[str, Any]) -> tuple[int, int]:
+    """Returns time and size of a height map's file, so that a changed file is read again."""
+    try:
+        facts = Path(str(values["file"])).stat()
+    except (KeyError, OSError):
+        return 0, 0
+    return facts.st_mtime_ns, facts.st_size
+
+
+@lru_cache(maxsize=KEPT)
+def _made(
+    name: str,
+    given: tuple[tuple[str, float | str], ...],
+    patches: tuple[tuple[tuple[str, Any], ...], ...],
+    _stamp: tuple[int, int],
+    where: str,
+) -> Surface:
+    """Makes a surface from checked parameters."""
+    entry = CATALOGUE[name]
+    values = with_defaults(entry.parameters, dict(given), where)
+    _check_size(values, where)
+    surface = entry.make(SimpleNamespace(**values))
+    if "soil" in values:
+        check_soil(values["soil"], f"{where}.soil")
+        surface = with_soil(surface, values["soil"])
+    return with_patches(surface, [dict(patch) for patch in patches], where=f"{where}.patch")
+
+
+def _check_size(values: Mapping[str, Any], where: str) -> None:
+    """Raises RobotError for a map of too many or too few heights."""
+    if "size" not in values or "horizontal_scale" not in values:
+        return
+    size, cell = values["size"], values["horizontal_scale"]
+    if not (size / cell) ** 2 <= MOST_NODES or size < 2.0 * cell:
+        raise RobotError(
+            "size and horizontal_scale of the map do not fit together",
+            got=f"{size:g} m in cells of {cell:g} m",
+            expected=f"2 to {round(MOST_NODES**0.5)} cells along an edge",
+            fix="change terrain.size or terrain.horizontal_scale",
+            where=where,
+        )

@@ -1,0 +1,150 @@
+"""Tests the ground of scenarios: keys, units, overrides, grid files in FMUs, heights in results."""
+
+from __future__ import annotations
+
+import tomllib
+import zipfile
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import tomlkit
+
+from hexapod_cosim.cosim.export.export import grid_members
+from hexapod_cosim.cosim.master.fmu import Fmu
+from hexapod_cosim.cosim.master.recorder import Recording
+from hexapod_cosim.cosim.report.relief import write_heights
+from hexapod_cosim.cosim.results.walk import body_height
+from hexapod_cosim.cosim.results.warnings import off_map_warnings, unused_settings
+from hexapod_cosim.cosim.scenario.scenario import (
+    load_scenario,
+    scenario_from_table,
+    scenario_robot,
+    with_overrides,
+)
+from hexapod_cosim.models import LEG_NAMES, ScenarioError
+from hexapod_cosim.models.ground.catalogue import make_surface
+from hexapod_cosim.models.ground.grid_file import grid_bytes, surface_from_bytes
+from hexapod_cosim.models.ground.surface import Surface
+
+GRID = {"terrain.kind": 3.0}
+
+
+def surface_of(*overrides: str, scenario: str = "stand") -> Surface:
+    """Returns the surface of a bundled scenario with settings."""
+    found = scenario_robot(load_scenario(scenario, overrides=list(overrides))).terrain.surface
+    assert found is not None
+    return found
+
+
+def test_settings_choose_a_surface_and_its_parameters() -> None:
+    surface = surface_of("terrain.kind=stairs", "terrain.step_height=30 mm", "terrain.num_steps=2")
+    assert surface == make_surface("stairs", {"step_height": 0.03, "num_steps": 2})
+    assert surface.recipe == {"kind": "stairs", "step_height": 0.03, "num_steps": 2.0}
+
+
+def test_patches_are_tables_of_a_scenario() -> None:
+    table = tomllib.loads(
+        "[terrain]\nkind = 'plane'\n[[terrain.patch]]\nx = '50 cm'\ny = 0\nsize = ['1 m', 0.5]\n"
+        "mu = 0.2\n[[terrain.patch]]\nx = 0.5\ny = 0\nsize = 0.3\nsoil = 'clay'\n"
+    )
+    scenario = scenario_from_table(table, where="test")
+    surface = scenario_robot(scenario).terrain.surface
+    assert surface is not None
+    assert [surface.material_at(x, 0.0) for x in (0.0, 0.2, 0.5, 1.2)] == [1, 1, 2, 0]
+    again = scenario_from_table(tomllib.loads(tomlkit.dumps(scenario.to_table())), where="again")
+    assert scenario_robot(again) == scenario_robot(scenario)
+
+
+def test_a_height_map_lies_beside_its_scenario(tmp_path: Path) -> None:
+    stones = make_surface("course", {})
+    keys = write_heights(stones, tmp_path / "map.png")
+    lines = [f"{key} = {value!r}" for key, value in keys.items()]
+    text = "\n".join(["[terrain]", 'kind = "heightfield"', 'file = "map.png"', *lines])
+    (tmp_path / "walk.toml").write_text(text, encoding="utf-8")
+    robot = scenario_robot(load_scenario(tmp_path / "walk.toml"))
+    surface = robot.terrain.surface
+    assert surface is not None
+    assert surface.kind == "blocks"
+    assert surface.extent == pytest.approx(stones.extent)
+    scale = keys["vertical_scale"]
+    assert surface.height + robot.terrain.height == pytest.approx(stones.height, abs=0.51 * scale)
+
+
+REFUSED = [
+    (["terrain.kind=stiars"], "did you mean 'stairs'"),
+    (["terrain.kind=stairs", "terrain.amplitude=0.1"], "unknown key"),
+    (["terrain.step_higth=0.1"], "did you mean 'step_height'"),
+    (["terrain.step_height=0.1"], "unknown key"),
+    (["terrain.kind=stairs", "terrain.step_height=3 deg"], "m or mm or cm"),
+    (["terrain.kind=stairs", "terrain.patch=[{x=9, y=0, size=1, mu=0.1}]"], "leaves the map"),
+    (["terrain.kind=plane", "terrain.patch=[{x=0, y=0, size=1, soil='mood'}]"], "soil"),
+    (["terrain.kind=heightfield", "terrain.file=nowhere.png"], "cannot read"),
+]
+
+
+@pytest.mark.parametrize(("overrides", "message"), REFUSED)
+def test_a_wrong_ground_is_refused_with_its_key(overrides: list[str], message: str) -> None:
+    with pytest.raises(ScenarioError, match=message) as caught:
+        scenario_robot(load_scenario("stand", overrides=overrides))
+    assert "stand.toml" in str(caught.value.where)
+
+
+def test_overrides_leave_the_given_table_alone() -> None:
+    table = {"terrain": {"kind": "stairs"}}
+    changed = with_overrides(table, ["terrain.step_height=0.03"])
+    assert changed["terrain"] == {"kind": "stairs", "step_height": 0.03}
+    assert table == {"terrain": {"kind": "stairs"}}
+
+
+def test_keys_of_a_slope_do_nothing_on_a_surface() -> None:
+    scenario = load_scenario("stand", overrides=["terrain.kind=stairs", "terrain.incline=5 deg"])
+    (warning,) = unused_settings(scenario, scenario_robot(scenario))
+    assert warning == ("terrain.incline does nothing on the surface stairs; set terrain.kind=slope")
+
+
+def test_grid_files_are_numbered_from_one() -> None:
+    surfaces = [make_surface("stairs", {}), make_surface("wave", {})]
+    members = grid_members(surfaces)
+    assert list(members) == ["resources/terrain/1.terrain", "resources/terrain/2.terrain"]
+    assert [surface_from_bytes(content) for content in members.values()] == surfaces
+
+
+def test_an_opened_fmu_gets_each_grid_once(athena_fmu: Path) -> None:
+    stairs, wave = (grid_bytes(make_surface(name, {})) for name in ("stairs", "wave"))
+    with Fmu(athena_fmu) as plant:
+        assert [plant.provide_grid(content) for content in (stairs, wave, stairs)] == [1, 2, 1]
+    with zipfile.ZipFile(athena_fmu) as archive:  # the file itself stays as it is
+        assert not [name for name in archive.namelist() if name.endswith(".terrain")]
+
+
+def recording(rows: int, **columns: Any) -> Recording:
+    """Returns a recording with the columns that heights above the ground need."""
+    names = ["time", *(f"torso.position[{k}]" for k in (1, 2, 3))]
+    names += [f"{leg}.foot.contact" for leg in LEG_NAMES]
+    names += [f"{leg}.foot.position[{k}]" for leg in LEG_NAMES for k in (1, 2, 3)]
+    data = np.zeros((rows, len(names)))
+    for name, values in columns.items():
+        data[:, names.index(name.replace("__", "."))] = values
+    data[:, 0] = 0.1 * np.arange(rows)
+    return Recording(tuple(names), data)
+
+
+def test_the_height_on_a_surface_is_above_the_feet_in_contact() -> None:
+    part = recording(4, LF__foot__contact=[0, 1, 1, 0], RF__foot__contact=[0, 0, 1, 0])
+    part.data[:, part.names.index("torso.position[3]")] = 0.2
+    part.data[:, part.names.index("LF.foot.position[3]")] = [0.5, 0.04, 0.04, 0.3]
+    part.data[:, part.names.index("RF.foot.position[3]")] = [0.5, 0.30, 0.08, 0.3]
+    height = body_height(part, GRID | {"terrain.height": 0.01})
+    assert height == pytest.approx([0.19, 0.16, 0.14, 0.14])
+
+
+def test_a_robot_that_leaves_the_map_is_reported_with_time_and_place() -> None:
+    surface = make_surface("stairs", {})
+    part = recording(4)
+    assert off_map_warnings(part, surface) == []
+    part.data[:, part.names.index("torso.position[1]")] = [0.0, 1.5, 2.5, 3.5]
+    (warning,) = off_map_warnings(part, surface)
+    assert "left the map of the ground at 0.200 s, at x = 2.5 m, y = 0 m" in warning
+    assert off_map_warnings(part, None) == []
