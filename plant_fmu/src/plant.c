@@ -103,9 +103,9 @@ hxStatus hx_plant_reset(hxPlant *plant, const hxDefinition *definition, double t
   hx_model_compile(&fresh.model, definition, plant->terrain);
   hx_initial_bodies(definition, body);
   hx_motion_from_bodies(&fresh.model, (const double (*)[HX_BODY_STATE])body, &fresh.state.motion);
-  status = check_start_depth(&fresh, message);
-  if (status != HX_OK) return fail(plant, status, message);
   hx_kernel()->start(&fresh.model, t, &fresh.state);
+  status = check_start_depth(&fresh, message); /* the cells of feet on blocks are known now */
+  if (status != HX_OK) return fail(plant, status, message);
   fresh.message[0] = '\0';
   *plant = fresh;
   return HX_OK;
