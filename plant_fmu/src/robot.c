@@ -189,7 +189,7 @@ static void compile_friction(hxModel *model, const hxDefinition *d) {
   model->spin_radius = d->friction.spin_radius, model->rolling_radius = d->friction.rolling_radius;
   /* materials of a grid may have static friction of their own */
   model->velocity_terms = rubs && (model->static_rise > 0.0 || model->viscous > 0.0 ||
-                                    d->terrain.kind == HX_TERRAIN_GRID);
+                                   d->terrain.kind == HX_TERRAIN_GRID);
   model->spin_friction = rubs && model->spin_radius > 0.0;
   model->roll_friction = rubs && model->rolling_radius > 0.0;
 }

@@ -147,10 +147,11 @@ static int check_soil_of_blocks(const hxTerrain *terrain, char *message) {
   for (int64_t row = 0; row < terrain->head.rows; ++row)
     for (int64_t col = 0; col < terrain->head.cols; ++col)
       if (is_uneven_soil(terrain, row, col)) {
-        snprintf(message, HX_MESSAGE_SIZE,
-                 "terrain grid: material[%lld][%lld]: got soil on a block that is higher or lower than "
-                 "its neighbour, expected soil on level blocks; move it, or make the surface smooth",
-                 (long long)row, (long long)col);
+        snprintf(
+            message, HX_MESSAGE_SIZE,
+            "terrain grid: material[%lld][%lld]: got soil on a block that is higher or lower than "
+            "its neighbour, expected soil on level blocks; move it, or make the surface smooth",
+            (long long)row, (long long)col);
         return 0;
       }
   return 1;

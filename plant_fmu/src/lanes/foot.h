@@ -3,10 +3,10 @@
 #ifndef HX_FOOT_H
 #define HX_FOOT_H
 
+#include "../ground/soil_pack.h"
 #include "../ground/surface.h"
 #include "friction.h"
 #include "kinematics.h"
-#include "soil.h"
 
 /* Distance of a point from the ground, and the ground's normal. */
 typedef struct {
@@ -189,8 +189,9 @@ HX_RARE void replace_by_soil(const hxModel *model, const hxContactState *state, 
   const hxSoilPack f = hx_soil_pack(state, slot, kin->delta, kin->ddelta);
   const hxVec3 b = hx_load_vec3(motion->bristle, slot), none = hx_zero3();
   const hxReal zero = hx_splat(0.0), yield = f.per_displacement * contact->slip_speed;
-  const hxBristle rigid =
-      has_friction_bristles(model, HX_FOOT) ? contact->bristle : (hxBristle){none, none, zero, zero, zero};
+  const hxBristle rigid = has_friction_bristles(model, HX_FOOT)
+                              ? contact->bristle
+                              : (hxBristle){none, none, zero, zero, zero};
   const hxVec3 grip = hx_scale(f.per_load, b),
                rate = hx_scale(hx_load(&state->closed[HX_FOOT][slot]),
                                hx_add_scaled(contact->slip, -yield, b));

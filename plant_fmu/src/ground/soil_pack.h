@@ -1,13 +1,13 @@
-/* soil.h - soil under packs of feet: forces on lanes from the scalar functions of ground/soil.h,
+/* soil_pack.h - soil under packs of feet: forces on lanes from the scalar functions of soil.h,
  * plastic depths at the end of a step, footprints
  *
  * The functions are out of line, so that rigid ground costs the same with and without them.
  */
-#ifndef HX_LANES_SOIL_H
-#define HX_LANES_SOIL_H
+#ifndef HX_SOIL_PACK_H
+#define HX_SOIL_PACK_H
 
-#include "../ground/soil.h"
-#include "lanes.h"
+#include "../lanes/lanes.h"
+#include "soil.h"
 
 _Static_assert(sizeof(hxSoil) == HX_SOIL_SIZE * sizeof(double), "a soil consists of numbers");
 
