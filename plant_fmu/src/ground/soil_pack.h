@@ -1,5 +1,4 @@
-/* soil_pack.h - soil under packs of feet: forces on lanes from the scalar functions of soil.h,
- * plastic depths at the end of a step, footprints
+/* soil_pack.h - soil under packs of feet: forces on lanes from the scalar functions of soil.h
  *
  * The functions are out of line, so that rigid ground costs the same with and without them.
  */
@@ -10,8 +9,6 @@
 #include "soil.h"
 
 _Static_assert(sizeof(hxSoil) == HX_SOIL_SIZE * sizeof(double), "a soil consists of numbers");
-
-static const double least_footprint = 1e-6; /* m  shallower ones are not kept */
 
 /* Returns whether a row of contacts may be on soil. */
 static inline int has_soil(const hxModel *model, int row) {
@@ -85,69 +82,5 @@ HX_RARE hxSoilPack hx_soil_pack(const hxContactState *state, int slot, hxReal de
                       .per_load = hx_load(out[6]),
                       .per_displacement = hx_load(out[7])};
 }
-
-#ifndef HX_TANGENT
-
-/* Returns the largest depth of the cubic through depths and sinking speeds (per step) at both ends
- * of a step (eq. 28). */
-static inline double hx_deepest(double from, double slope_from, double to, double slope_to) {
-  if (!(slope_from > 0.0 && slope_to < 0.0)) return fmax(from, to);
-  const double rise = to - from, bend = slope_from + slope_to - 2.0 * rise,
-               curve = rise - slope_from - bend;
-  double low = 0.0, high = 1.0;
-  for (int i = 0; i < 40; ++i) {
-    const double x = 0.5 * (low + high);
-    if (slope_from + x * (2.0 * curve + 3.0 * x * bend) > 0.0)
-      low = x;
-    else
-      high = x;
-  }
-  return fmax(from + low * (slope_from + low * (curve + low * bend)), fmax(from, to));
-}
-
-/* Computes the plastic depths at the end of a step of h, by the largest depth on its path (eq. 44).
- */
-HX_RARE void hx_soil_yield(const hxContactState *state, double h, const hxContactMoment *from,
-                           const hxContactMoment *to, double plastic[HX_SLOTS]) {
-  for (int leg = 0; leg < HX_LEGS; ++leg) {
-    plastic[leg] = state->plastic[leg];
-    if (!is_in_soil(state, leg)) continue;
-    const hxSoil soil = hx_soil_under(state, leg);
-    const double deepest =
-        hx_deepest(from->delta[leg], h * from->ddelta[leg], to->delta[leg], h * to->ddelta[leg]);
-    plastic[leg] = fmax(plastic[leg], hx_soil_plastic_depth(&soil, deepest));
-  }
-  hx_fill_slots(plastic);
-}
-
-/* Records the footprints that feet leave upwards, and looks up those that feet enter from above;
- * depths are relative to the plastic depths and follow them. An open foot under the undisturbed
- * surface is above its footprint, whose bottom it may touch again: a footprint is complete when
- * the foot has left it, and is where the foot lost contact with it last. */
-HX_RARE void hx_soil_switch(const hxContactMoment *feet, hxDepths *depths, hxFootprintLog *log,
-                            hxContactState *state) {
-  double *delta = depths->delta[HX_FOOT];
-  for (int leg = 0; leg < HX_LEGS; ++leg) {
-    double *plastic = &state->plastic[leg],
-           *place[2] = {&state->place[0][leg], &state->place[1][leg]};
-    const double z = delta[leg] + *plastic, x = feet->centre[0][leg], y = feet->centre[1][leg];
-    if (state->closed[HX_FOOT][leg] != 0.0) {
-      if (delta[leg] <= 0.0) *place[0] = x, *place[1] = y;
-      continue;
-    }
-    if (z <= 0.0 && *plastic >= least_footprint)
-      hx_footprints_add(
-          log, &(hxFootprint){*place[0], *place[1], *plastic, hx_soil_under(state, leg).radius});
-    if (z <= 0.0) *plastic = 0.0;
-    if (z > 0.0 && *plastic == 0.0) *plastic = hx_footprints_depth(&log->kept, x, y);
-    delta[leg] = z - *plastic;
-  }
-  hx_fill_slots(state->plastic);
-  hx_fill_slots(state->place[0]);
-  hx_fill_slots(state->place[1]);
-  hx_fill_slots(delta);
-}
-
-#endif
 
 #endif

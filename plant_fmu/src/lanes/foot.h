@@ -164,17 +164,6 @@ HX_INLINE hxNormalForce hx_normal_force(hxContactLawAt law, hxReal delta, hxReal
   };
 }
 
-/* Returns the normal force of feet, with that of soil in place of the force of rigid ground where
- * they touched down on soil (eq. 44, 45). The elastic part is that whose power is stored. */
-HX_RARE hxNormalForce with_soil(const hxContactState *state, int slot, hxReal delta, hxReal ddelta,
-                                hxNormalForce rigid) {
-  const hxMask soft = hx_on_soil(state, slot);
-  const hxSoilPack f = hx_soil_pack(state, slot, delta, ddelta);
-  return (hxNormalForce){
-      hx_select(soft, f.force, rigid.force), hx_select(soft, f.held, rigid.elastic),
-      hx_select(soft, f.stiffness, rigid.stiffness), hx_select(soft, f.viscosity, rigid.viscosity)};
-}
-
 /* Returns a where the mask is set, b elsewhere. */
 static inline hxVec3 select3(hxMask mask, hxVec3 a, hxVec3 b) {
   return (hxVec3){hx_select(mask, a.x, b.x), hx_select(mask, a.y, b.y), hx_select(mask, a.z, b.z)};

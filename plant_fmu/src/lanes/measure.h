@@ -12,6 +12,7 @@
 #define HX_MEASURE_H
 
 #include "../contact_law.h"
+#include "../ground/soil_path.h"
 #include "dynamics.h"
 
 static const double landing_sample = 1e-4; /* s  between two samples of a landing's force */
