@@ -23,6 +23,7 @@ from hexapod_cosim.models.records import (
     LEG_NAMES,
     Array,
     Baumgarte,
+    BodyContact,
     Contact,
     Foot,
     Friction,
@@ -79,6 +80,7 @@ SECTIONS: dict[str, type[Any]] = {
     "solver": Solver,
     "terrain": Terrain,
     "gait": Gait,
+    "body": BodyContact,
 }
 EXTENSION_FIELDS: dict[str, dict[str, Any]] = {
     **{name: dict(specs(record)) for name, record in SECTIONS.items()},

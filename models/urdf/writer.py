@@ -16,7 +16,7 @@ from hexapod_cosim.models.records import JOINT_NAMES, Leg, Link, Robot, Terrain,
 from hexapod_cosim.models.schema import specs
 from hexapod_cosim.models.urdf.elements import EXTENSION
 
-RECORDS = ("foot", "contact", "friction", "servo", "baumgarte", "solver", "terrain", "gait")
+RECORDS = ("foot", "contact", "friction", "servo", "baumgarte", "solver", "terrain", "gait", "body")
 THICKNESS = 0.7  # 1  radius of a drawn link over the foot's
 COLOURS = {"body": "0.30 0.33 0.38 1", "limb": "0.72 0.74 0.78 1", "rubber": "0.85 0.45 0.15 1"}
 
@@ -152,4 +152,6 @@ def _terrain(own: ET.Element, terrain: Terrain) -> None:
 
 
 def _text(value: Any) -> str:
+    if isinstance(value, tuple):
+        return numbers(value)
     return value if isinstance(value, str) else repr(float(value))

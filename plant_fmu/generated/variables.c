@@ -514,6 +514,51 @@ static const hxVariable outputs[] = {
     {"feet.cone_time[29]", "s", 0.0, DBL_MAX, offsetof(struct hxVariables, output.cone_time[28]), HX_REAL, 0},
     {"feet.cone_time[30]", "s", 0.0, DBL_MAX, offsetof(struct hxVariables, output.cone_time[29]), HX_REAL, 0},
     {"feet.cone_time[31]", "s", 0.0, DBL_MAX, offsetof(struct hxVariables, output.cone_time[30]), HX_REAL, 0},
+    {"torso.contact_force[1]", "N", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.torso.contact_force[0]), HX_REAL, 3},
+    {"torso.contact_force[2]", "N", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.torso.contact_force[1]), HX_REAL, 0},
+    {"torso.contact_force[3]", "N", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.torso.contact_force[2]), HX_REAL, 0},
+    {"LF.knee.force[1]", "N", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.body.knee_force[0][0]), HX_REAL, 18},
+    {"LF.knee.force[2]", "N", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.body.knee_force[0][1]), HX_REAL, 0},
+    {"LF.knee.force[3]", "N", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.body.knee_force[0][2]), HX_REAL, 0},
+    {"LM.knee.force[1]", "N", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.body.knee_force[1][0]), HX_REAL, 0},
+    {"LM.knee.force[2]", "N", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.body.knee_force[1][1]), HX_REAL, 0},
+    {"LM.knee.force[3]", "N", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.body.knee_force[1][2]), HX_REAL, 0},
+    {"LR.knee.force[1]", "N", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.body.knee_force[2][0]), HX_REAL, 0},
+    {"LR.knee.force[2]", "N", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.body.knee_force[2][1]), HX_REAL, 0},
+    {"LR.knee.force[3]", "N", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.body.knee_force[2][2]), HX_REAL, 0},
+    {"RF.knee.force[1]", "N", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.body.knee_force[3][0]), HX_REAL, 0},
+    {"RF.knee.force[2]", "N", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.body.knee_force[3][1]), HX_REAL, 0},
+    {"RF.knee.force[3]", "N", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.body.knee_force[3][2]), HX_REAL, 0},
+    {"RM.knee.force[1]", "N", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.body.knee_force[4][0]), HX_REAL, 0},
+    {"RM.knee.force[2]", "N", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.body.knee_force[4][1]), HX_REAL, 0},
+    {"RM.knee.force[3]", "N", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.body.knee_force[4][2]), HX_REAL, 0},
+    {"RR.knee.force[1]", "N", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.body.knee_force[5][0]), HX_REAL, 0},
+    {"RR.knee.force[2]", "N", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.body.knee_force[5][1]), HX_REAL, 0},
+    {"RR.knee.force[3]", "N", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.body.knee_force[5][2]), HX_REAL, 0},
+    {"LF.shank.force[1]", "N", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.body.shank_force[0][0]), HX_REAL, 18},
+    {"LF.shank.force[2]", "N", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.body.shank_force[0][1]), HX_REAL, 0},
+    {"LF.shank.force[3]", "N", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.body.shank_force[0][2]), HX_REAL, 0},
+    {"LM.shank.force[1]", "N", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.body.shank_force[1][0]), HX_REAL, 0},
+    {"LM.shank.force[2]", "N", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.body.shank_force[1][1]), HX_REAL, 0},
+    {"LM.shank.force[3]", "N", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.body.shank_force[1][2]), HX_REAL, 0},
+    {"LR.shank.force[1]", "N", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.body.shank_force[2][0]), HX_REAL, 0},
+    {"LR.shank.force[2]", "N", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.body.shank_force[2][1]), HX_REAL, 0},
+    {"LR.shank.force[3]", "N", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.body.shank_force[2][2]), HX_REAL, 0},
+    {"RF.shank.force[1]", "N", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.body.shank_force[3][0]), HX_REAL, 0},
+    {"RF.shank.force[2]", "N", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.body.shank_force[3][1]), HX_REAL, 0},
+    {"RF.shank.force[3]", "N", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.body.shank_force[3][2]), HX_REAL, 0},
+    {"RM.shank.force[1]", "N", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.body.shank_force[4][0]), HX_REAL, 0},
+    {"RM.shank.force[2]", "N", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.body.shank_force[4][1]), HX_REAL, 0},
+    {"RM.shank.force[3]", "N", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.body.shank_force[4][2]), HX_REAL, 0},
+    {"RR.shank.force[1]", "N", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.body.shank_force[5][0]), HX_REAL, 0},
+    {"RR.shank.force[2]", "N", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.body.shank_force[5][1]), HX_REAL, 0},
+    {"RR.shank.force[3]", "N", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.body.shank_force[5][2]), HX_REAL, 0},
+    {"LF.clearance", "m", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.body.clearance[0]), HX_REAL, 6},
+    {"LM.clearance", "m", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.body.clearance[1]), HX_REAL, 0},
+    {"LR.clearance", "m", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.body.clearance[2]), HX_REAL, 0},
+    {"RF.clearance", "m", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.body.clearance[3]), HX_REAL, 0},
+    {"RM.clearance", "m", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.body.clearance[4]), HX_REAL, 0},
+    {"RR.clearance", "m", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.body.clearance[5]), HX_REAL, 0},
 };
 
 static const hxVariable parameters[] = {
@@ -922,6 +967,7 @@ static const hxVariable parameters[] = {
     {"initial.RR.tibia.speed", "rad/s", -10000.0, 10000.0, offsetof(struct hxVariables, definition.initial.speed[5][2]), HX_REAL, 0},
     {"friction.mu_static", "1", 0.0, 100.0, offsetof(struct hxVariables, definition.friction.mu_static), HX_REAL, 1},
     {"friction.stribeck_speed", "m/s", 1e-06, 100.0, offsetof(struct hxVariables, definition.friction.stribeck_speed), HX_REAL, 1},
+    {"body.contact", "", 1, 2, offsetof(struct hxVariables, definition.body.contact), HX_INTEGER, 1},
     {"body.torso_box[1]", "m", 0.0, 10.0, offsetof(struct hxVariables, definition.body.torso_box[0]), HX_REAL, 3},
     {"body.torso_box[2]", "m", 0.0, 10.0, offsetof(struct hxVariables, definition.body.torso_box[1]), HX_REAL, 0},
     {"body.torso_box[3]", "m", 0.0, 10.0, offsetof(struct hxVariables, definition.body.torso_box[2]), HX_REAL, 0},
@@ -1087,7 +1133,7 @@ const size_t hx_state_count = sizeof states / sizeof states[0];
 
 _Static_assert(sizeof states / sizeof states[0] == sizeof(hxCoordinates) / sizeof(double), "each state has its row");
 
-const char hx_default_guid[] = "{b848c433-3cf2-45d1-80c3-5db2cc14f640}";
+const char hx_default_guid[] = "{1211e542-c280-432d-b3eb-11c6bc700135}";
 
 _Static_assert(HX_CONTACT_EXACT_RESTITUTION == 1, "ContactLaw");
 _Static_assert(HX_CONTACT_FLORES == 2, "ContactLaw");
@@ -1108,6 +1154,8 @@ _Static_assert(HX_METHOD_BS32 == 4, "Method");
 _Static_assert(HX_METHOD_RK4 == 5, "Method");
 _Static_assert(HX_PROJECTION_NONE == 1, "Projection");
 _Static_assert(HX_PROJECTION_STEP == 2, "Projection");
+_Static_assert(HX_BODY_OFF == 1, "BodyContact");
+_Static_assert(HX_BODY_ON == 2, "BodyContact");
 _Static_assert(HX_TERRAIN_FLAT == 1, "TerrainKind");
 _Static_assert(HX_TERRAIN_SLOPE == 2, "TerrainKind");
 _Static_assert(HX_TERRAIN_GRID == 3, "TerrainKind");
