@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from hexapod_cosim.models.actuator import gear_friction, servo_torque
-from hexapod_cosim.models.body.contacts import body_wrenches
+from hexapod_cosim.models.body.contacts import body_wrenches, standing_body_damping
 from hexapod_cosim.models.contact import foot_contacts, foot_force, wall_contacts
 from hexapod_cosim.models.kinematics import (
     BODIES,
@@ -175,7 +175,7 @@ def applied_forces(
     damping: of the contacts [s/m], nan for open ones: (6,) of the feet with the ground, or (2, 6)
     with that of `wall_contacts` in the second row. bristle: deflections [m], 0 by default: (6, 3),
     or (2, 6, 3) accordingly. body_damping: of the contacts of torso, knees and shanks [s/m], in the
-    order of `body_spheres`; None: all open.
+    order of `body_spheres`; None: `standing_body_damping`.
     """
     g = np.zeros((BODIES, 6))
     g[:, 0:3] = masses(robot)[:, None] * np.array(robot.gravity)
@@ -193,7 +193,9 @@ def applied_forces(
             force = foot_force(robot, foot, damping[row, leg], deflection[row, leg])
             g[tibia] += np.concatenate([force, cross(foot.point - body[tibia, 0:3], force)])
     g[0] += np.concatenate([command.push_force, command.push_torque])
-    return g if body_damping is None else g + body_wrenches(robot, body, body_damping)
+    if body_damping is None:
+        body_damping = standing_body_damping(robot, body)
+    return g + body_wrenches(robot, body, body_damping)
 
 
 def joint_torques(robot: Robot, body: Array, command: Command) -> tuple[Array, Array]:

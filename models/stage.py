@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hexapod_cosim.models.actuator import gear_drag, servo_slopes
+from hexapod_cosim.models.body.contacts import body_spheres
 from hexapod_cosim.models.body.slopes import BodySlopes, body_slope_matrices
 from hexapod_cosim.models.contact import (
     BristleSlopes,
@@ -185,7 +186,7 @@ def solve_stage(
 
     # W = M - z G_v - z^2 G_x;  right = g + G_v s_v + G_x (s_x + z (v + s_v))
     motor, gear = joint_torques(robot, body, command)
-    held = None if touching is None else touching[0]
+    held = np.full(len(body_spheres(robot)), np.nan) if touching is None else touching[0]
     g = applied_forces(robot, body, command, damping, bristle, held).ravel()
     g += G.T @ (motor + gear).ravel()
     W = mass_matrix(robot, body) - z * G_v - z * z * G_x

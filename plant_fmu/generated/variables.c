@@ -1133,7 +1133,7 @@ const size_t hx_state_count = sizeof states / sizeof states[0];
 
 _Static_assert(sizeof states / sizeof states[0] == sizeof(hxCoordinates) / sizeof(double), "each state has its row");
 
-const char hx_default_guid[] = "{1211e542-c280-432d-b3eb-11c6bc700135}";
+const char hx_default_guid[] = "{bf68f84c-e0c3-41b4-ae8c-ea5c6f8cad2c}";
 
 _Static_assert(HX_CONTACT_EXACT_RESTITUTION == 1, "ContactLaw");
 _Static_assert(HX_CONTACT_FLORES == 2, "ContactLaw");

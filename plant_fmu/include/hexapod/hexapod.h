@@ -312,7 +312,8 @@ HX_API hxStatus hx_plant_set_coordinates(hxPlant *plant, double t,
 
 /* Reports that the importer's solver has completed its step to the present coordinates. Peaks,
  * integrals and losses of hxOutput belong to the path between two such calls and do not change
- * without them. The works in the coordinates are the solver's own. */
+ * without them. The works in the coordinates are the solver's own. Torso, knees and shanks, which
+ * have no indicators, touch and leave the ground at these calls. */
 HX_API void hx_plant_completed_step(hxPlant *plant, const hxInput *input);
 
 /* Compute the rates of the coordinates and the feet's indicators, and switch the contacts that are
