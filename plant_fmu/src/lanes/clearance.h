@@ -1,5 +1,5 @@
-/* clearance.h - distances between the femurs and tibias of neighbouring legs, as capsules (eq. 38)
- */
+/* clearance.h - distances between the femurs and tibias of neighbouring legs, as capsules;
+ * models/body/clearance.py is the readable form */
 #ifndef HX_CLEARANCE_H
 #define HX_CLEARANCE_H
 
