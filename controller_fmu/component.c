@@ -12,6 +12,11 @@ void hx_component_destroy(hxComponent *component) {
   hx_controller_destroy(controller_of(component));
 }
 
+hxStatus hx_component_set_resources(hxComponent *component, const char *folder) {
+  (void)component, (void)folder; /* the controller reads no files */
+  return HX_OK;
+}
+
 void hx_component_defaults(struct hxVariables *variables) {
   hx_controller_definition_default(&variables->definition);
   hx_controller_input_default(&variables->input);

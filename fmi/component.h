@@ -18,6 +18,10 @@ typedef struct hxComponent hxComponent;
 hxComponent *hx_component_create(void);
 void hx_component_destroy(hxComponent *component);
 
+/* Tells the component the folder of the FMU's resources, a path in UTF-8 that ends in a slash;
+ * NULL: there is none. Returns HX_OUT_OF_MEMORY when out of memory. */
+hxStatus hx_component_set_resources(hxComponent *component, const char *folder);
+
 /* Sets definition and input to the compiled-in defaults. */
 void hx_component_defaults(struct hxVariables *variables);
 

@@ -302,6 +302,24 @@ static hxStatus open_resources(hxInstance *instance, const char *resources, FILE
   return HX_OK;
 }
 
+char *hx_resources_folder(const char *resources) {
+  if (!resources || !resources[0]) return NULL;
+  char *plain = start_values_path(resources, 0), *path = start_values_path(resources, 1);
+  FILE *file = path ? open_file(path) : NULL;
+  const int decoded = file != NULL;
+  if (file) fclose(file);
+  file = plain && !decoded ? open_file(plain) : NULL;
+  if (file) { /* the path was never percent-encoded */
+    fclose(file);
+    free(path);
+    path = plain;
+  } else {
+    free(plain);
+  }
+  if (path) path[strlen(path) - (sizeof file_name - 1)] = '\0';
+  return path;
+}
+
 hxStatus hx_resources_read(hxInstance *instance, const char *resources, int *found) {
   FILE *file;
   *found = 0;

@@ -1,5 +1,5 @@
 """Computes the torques of a joint's servo (eq. 12): PD control with feed-forward, torque-speed
-line, gear friction.
+line, gear friction; and the torque of the joint's stops (eq. 39).
 """
 
 from __future__ import annotations
@@ -56,3 +56,50 @@ def gear_drag(servo: Servo, speed: Array) -> Array:
     input.
     """
     return servo.coulomb_friction / GEAR_SPEED * (1.0 - np.tanh(speed / GEAR_SPEED) ** 2)
+
+
+def has_stops(servo: Servo) -> bool:
+    """Returns whether stops act on the joints: a kinematic drive moves its joint through them."""
+    return servo.stop_stiffness > 0.0 and servo.mode != "kinematic"
+
+
+def overrun(angle: Array, angle_min: Array, angle_max: Array) -> Array:
+    """Returns how far angles are past their stops [rad], > 0 above angle_max, < 0 below angle_min.
+
+    The shape is that of the inputs. Angles are measured from the middle between the stops, so that
+    a joint may pass pi.
+    """
+    half = 0.5 * (angle_max - angle_min)
+    from_middle = (angle - 0.5 * (angle_min + angle_max) + np.pi) % (2.0 * np.pi) - np.pi
+    return np.asarray(from_middle - np.clip(from_middle, -half, half))
+
+
+def stop_torque(servo: Servo, past: Array, speed: Array) -> Array:
+    """Returns the torque of the stops on the child [N m], in the shape of the inputs (eq. 39).
+
+    It is -(k x + c qd), in which the damper's part is limited to the spring's: the torque is
+    continuous where a joint reaches a stop, and a stop does not pull. past: x of `overrun` [rad].
+    """
+    if not has_stops(servo):
+        return np.zeros_like(past)
+    spring = servo.stop_stiffness * past
+    return -(spring + np.clip(servo.stop_damping * speed, -np.abs(spring), np.abs(spring)))
+
+
+def stop_slopes(servo: Servo, past: Array, speed: Array) -> tuple[Array, Array]:
+    """Returns minus the derivatives of `stop_torque` by angle [N m/rad] and by speed [N m s/rad].
+
+    A limited damper doubles the spring on the way in and cancels it on the way out.
+    """
+    if not has_stops(servo):
+        return np.zeros_like(past), np.zeros_like(past)
+    k, wanted = servo.stop_stiffness, np.abs(servo.stop_damping * speed)
+    free = wanted < k * np.abs(past)
+    limited = np.where(past * speed > 0.0, 2.0 * k, 0.0)
+    stiffness = np.where(past == 0.0, 0.0, np.where(free, k, limited))
+    return stiffness, np.where(free, servo.stop_damping, 0.0)
+
+
+def stop_energy(servo: Servo, past: Array) -> Array:
+    """Returns the energy k x^2/2 that stops store [J], in the shape of past (`overrun`)."""
+    return np.asarray(0.5 * servo.stop_stiffness * past**2 * has_stops(servo))

@@ -1,5 +1,5 @@
-"""Computes the contact force of a foot: normal force with restitution (eq. 14), friction (eq.
-15-18).
+"""Computes the contact of a foot: normal force with restitution (eq. 14), and the friction of
+friction.py on it.
 
 f_n = K delta^1.5 max(0, 1 + d ddelta). Touch-down fixes d [s/m] by the approach speed, and d holds
 until lift-off. Most laws have the form d = chi(e) / v0 and differ in chi(e).
@@ -13,11 +13,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from hexapod_cosim.models.friction import friction_force, turning_moment
 from hexapod_cosim.models.kinematics import JOINTS, LEGS, cross, foot_centres
-from hexapod_cosim.models.records import Array, Contact, Friction, Robot
+from hexapod_cosim.models.records import Array, Contact, Robot
 from hexapod_cosim.models.terrain import Face, ground_faces
 
-SPRING_LIMIT = 0.7  # 1  of the presliding; bristles below it are springs (eq. 16)
 # below it the closed form of _log_rest loses more digits than its series omits
 SERIES_BELOW = 1e-2
 SERIES_TERMS = 9
@@ -103,108 +103,6 @@ def normal_slopes(
     return 1.5 * contact.stiffness * root * factor, contact.stiffness * root**3 * damping
 
 
-def bristle_yield(share: Array) -> Array:
-    """Returns Y: the share of the slip along a bristle that is sliding, in the shape of the input.
-
-    share: deflection over presliding. Y rises from 0 at SPRING_LIMIT to 1 at 1 and is C1.
-    """
-    s = np.clip((share - SPRING_LIMIT) / (1.0 - SPRING_LIMIT), 0.0, 1.0)
-    return np.asarray(s * s * (3.0 - 2.0 * s))
-
-
-def sliding_velocity(presliding: float, slip: Array, bristle: Array) -> Array:
-    """Returns the plastic part (..., 3) of the slip velocity (..., 3) [m/s] (eq. 16).
-
-    It is Y (v_t.u)+ u/|u| with u = b/b_max; the rest stretches the bristles.
-    """
-    u = bristle / presliding
-    share = np.linalg.norm(u, axis=-1, keepdims=True)
-    along = np.maximum(np.sum(slip * u, axis=-1, keepdims=True), 0.0)
-    return np.asarray(bristle_yield(share) * along / np.maximum(share, SPRING_LIMIT) * u)
-
-
-def bristle_rate(friction: Friction, slip: Array, bristle: Array) -> Array:
-    """Returns db/dt (3,) [m/s] of a closed foot's bristles (eq. 16)."""
-    return slip - sliding_velocity(friction.presliding, slip, bristle)
-
-
-def sliding_friction(friction: Friction, sliding: float) -> float:
-    """Returns mu(p) = mu + (mu_s - mu)/(1 + (p/v_s)^2) for sliding at p [m/s] (eq. 18)."""
-    above = max(friction.mu_static - friction.mu, 0.0)
-    return friction.mu + above / (1.0 + (sliding / friction.stribeck_speed) ** 2)
-
-
-def bristle_force(friction: Friction, normal: float, slip: Array, bristle: Array) -> Array:
-    """Returns the tangential force f_t (3,) of the bristle law [N] (eq. 17).
-
-    f_t = -mu(p) f_n (u (3 - u.u)/2 + d room/|(room, d)|) with u = b/b_max, limited to length 1, and
-    d = 3/2 tau db/dt / b_max. The spring leaves room = 1 - |u| (3 - u.u)/2 to the damping, so that
-    friction stays within its cone.
-
-    p is the speed of the plastic part of the slip, so that a foot that sticks has static friction
-    at any slip velocity.
-    """
-    u = bristle / friction.presliding
-    d = 1.5 * friction.bristle_damping / friction.presliding * bristle_rate(friction, slip, bristle)
-    u = u / max(float(np.linalg.norm(u)), 1.0)
-    spring = u * (3.0 - u @ u) / 2.0
-    room, push = 1.0 - float(np.linalg.norm(spring)), float(np.linalg.norm(d))
-    damped = d * (room / math.hypot(room, push)) if push > 0.0 else d
-    sliding = float(np.linalg.norm(sliding_velocity(friction.presliding, slip, bristle)))
-    return -sliding_friction(friction, sliding) * normal * (spring + damped)
-
-
-@dataclass(frozen=True)
-class BristleSlopes:
-    """Secants of the bristles' friction -f_t/f_n, and the release rate of bristles."""
-
-    stiffness: float  # 1/m  of friction over load, by b
-    damping: float  # s/m  of friction over load, by db/dt
-    beta: float  # 1/s  of db/dt, by -b
-
-
-def bristle_slopes(friction: Friction, slip: Array, bristle: Array) -> BristleSlopes:
-    """Returns the secants at a slip velocity (3,) [m/s] and a deflection (3,) [m] (eq. 17, 21)."""
-    u = bristle / friction.presliding
-    size, sliding = float(np.linalg.norm(u)), sliding_velocity(friction.presliding, slip, bristle)
-    spring = (3.0 - min(size, 1.0) ** 2) / (2.0 * max(size, 1.0))
-    per_rate = 1.5 * friction.bristle_damping / friction.presliding
-    push = per_rate * float(np.linalg.norm(slip - sliding))
-    room = 1.0 - spring * size
-    share = room / math.hypot(room, push) if push > 0.0 or room > 0.0 else 0.0
-    mu = sliding_friction(friction, float(np.linalg.norm(sliding)))
-    beta = float(bristle_yield(np.array(size))) * max(float(slip @ u), 0.0)
-    beta /= max(size, SPRING_LIMIT) * friction.presliding
-    return BristleSlopes(mu * spring / friction.presliding, mu * per_rate * share, beta)
-
-
-def friction_force(
-    friction: Friction, normal: float, slip: Array, bristle: Array | None = None
-) -> Array:
-    """Returns the tangential force f_t (3,) [N].
-
-    The tanh law has f_t = -mu f_n tanh(k_t |v_t|) v_t/|v_t|, at rest -mu f_n k_t v_t (eq. 15).
-    bristle: deflection b (3,) [m] of the bristle law, 0 by default.
-    """
-    if friction.law == "none":
-        return np.zeros(3)
-    if friction.law == "bristle":
-        return bristle_force(friction, normal, slip, np.zeros(3) if bristle is None else bristle)
-    return -normal * friction_drag(friction, float(np.linalg.norm(slip))) * slip
-
-
-def friction_drag(friction: Friction, speed: float) -> float:
-    """Returns mu tanh(k_t |v_t|)/|v_t| [s/m]: the tanh law's force over load and slip speed [m/s]
-    (eq. 15).
-    """
-    if friction.law == "none":
-        return 0.0
-    x = friction.slope * speed
-    return friction.mu * (
-        math.tanh(x) / speed if x > 1e-5 else friction.slope * (1.0 - x * x / 3.0)
-    )
-
-
 @dataclass(frozen=True)
 class FootContact:
     """Contact of a foot with the ground, world axes."""
@@ -268,6 +166,15 @@ def foot_force(
     f_n = normal_force(robot.contact, damping, foot.penetration, foot.approach_speed)
     slip = foot.velocity + foot.approach_speed * foot.normal
     return f_n * foot.normal + friction_force(robot.friction, f_n, slip, bristle)
+
+
+def foot_moment(robot: Robot, foot: FootContact, damping: float, turn: Array) -> Array:
+    """Returns the moment (3,) of spin and rolling friction on the tibia [N m] (eq. 38).
+
+    turn: angular velocity (3,) of the tibia [rad/s].
+    """
+    f_n = normal_force(robot.contact, damping, foot.penetration, foot.approach_speed)
+    return turning_moment(robot.friction, robot.foot.radius, f_n, foot.normal, turn)
 
 
 def standing_damping(robot: Robot, body: Array) -> Array:

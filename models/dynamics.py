@@ -13,9 +13,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from hexapod_cosim.models.actuator import gear_friction, servo_torque
+from hexapod_cosim.models.actuator import gear_friction, overrun, servo_torque, stop_torque
 from hexapod_cosim.models.body.contacts import body_wrenches, standing_body_damping
-from hexapod_cosim.models.contact import foot_contacts, foot_force, wall_contacts
+from hexapod_cosim.models.contact import foot_contacts, foot_force, foot_moment, wall_contacts
 from hexapod_cosim.models.kinematics import (
     BODIES,
     JOINTS,
@@ -191,7 +191,9 @@ def applied_forces(
                 continue
             tibia = JOINTS * (leg + 1)
             force = foot_force(robot, foot, damping[row, leg], deflection[row, leg])
-            g[tibia] += np.concatenate([force, cross(foot.point - body[tibia, 0:3], force)])
+            moment = foot_moment(robot, foot, damping[row, leg], body[tibia, 10:13])
+            arm = foot.point - body[tibia, 0:3]
+            g[tibia] += np.concatenate([force, cross(arm, force) + moment])
     g[0] += np.concatenate([command.push_force, command.push_torque])
     if body_damping is None:
         body_damping = standing_body_damping(robot, body)
@@ -210,6 +212,16 @@ def joint_torques(robot: Robot, body: Array, command: Command) -> tuple[Array, A
     return servo_torque(
         robot.servo, angle, speed, command.angle_ref, command.speed_ref, command.torque_ref
     ), gear
+
+
+def joint_overruns(robot: Robot, body: Array) -> Array:
+    """Returns how far joints are past their stops (6, 3) [rad]."""
+    return overrun(joint_angles(robot, body), robot.angle_min, robot.angle_max)
+
+
+def stop_torques(robot: Robot, body: Array) -> Array:
+    """Returns the torques (6, 3) of the stops on the child [N m]; 0 in kinematic mode."""
+    return stop_torque(robot.servo, joint_overruns(robot, body), joint_speeds(robot, body))
 
 
 def drive_acceleration(robot: Robot, body: Array, command: Command) -> Array:
@@ -280,7 +292,7 @@ def accelerations(
     motor, gear = joint_torques(robot, body, command)
     g = (
         applied_forces(robot, body, command, damping, bristle, body_damping).ravel()
-        + joints.G.T @ (motor + gear).ravel()
+        + joints.G.T @ (motor + gear + stop_torques(robot, body)).ravel()
     )
     D, c = constraint_equations(robot, body, command)
     solution = solve_constrained(mass_matrix(robot, body), g, D, c)

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from hexapod_cosim.models.actuator import stop_energy
 from hexapod_cosim.models.body.contacts import body_contacts
 from hexapod_cosim.models.contact import foot_contacts, wall_contacts
-from hexapod_cosim.models.dynamics import constraints, masses, world_inertias
+from hexapod_cosim.models.dynamics import constraints, joint_overruns, masses, world_inertias
 from hexapod_cosim.models.kinematics import joint_speeds
 from hexapod_cosim.models.records import Array, Robot
 
@@ -21,8 +22,8 @@ def kinetic_energy(robot: Robot, body: Array) -> float:
 
 
 def potential_energy(robot: Robot, body: Array) -> float:
-    """Returns the potential energy [J] of gravity, 0 at the world's origin, and of the contacts,
-    2/5 K delta^2.5 each.
+    """Returns the potential energy [J] of gravity, 0 at the world's origin, of the contacts, 2/5 K
+    delta^2.5 each, and of the joints' stops.
     """
     gravity = -float(masses(robot) @ (body[:, 0:3] @ np.array(robot.gravity)))
     contacts = [
@@ -31,7 +32,8 @@ def potential_energy(robot: Robot, body: Array) -> float:
         *body_contacts(robot, body),
     ]
     depth = np.array([max(foot.penetration, 0.0) for foot in contacts if foot is not None])
-    return gravity + 0.4 * robot.contact.stiffness * float(np.sum(depth**2.5))
+    stops = float(np.sum(stop_energy(robot.servo, joint_overruns(robot, body))))
+    return gravity + 0.4 * robot.contact.stiffness * float(np.sum(depth**2.5)) + stops
 
 
 def centre_of_mass(robot: Robot, body: Array) -> Array:

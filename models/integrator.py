@@ -26,7 +26,7 @@ from hexapod_cosim.models.kinematics import (
     rotation_matrix,
 )
 from hexapod_cosim.models.method import METHOD, Method, method_step
-from hexapod_cosim.models.records import Array, Robot
+from hexapod_cosim.models.records import BRISTLE_LAWS, Array, Robot
 from hexapod_cosim.models.stage import Slopes, keep_slopes, solve_stage
 
 STEP_FLOOR = 1e-11  # s  the error control fails below this step
@@ -159,7 +159,7 @@ def error_norm(robot: Robot, estimate: Array) -> float:
         turn = frame_quaternion(joint.a_j, joint.b_j, joint.s_j)
         body[joint.child, 3:7] = quaternion_product(body[joint.child, 3:7], turn)
     largest = float(np.max(np.abs(body) / ERROR_SCALE))
-    if robot.friction.law == "bristle":
+    if robot.friction.law in BRISTLE_LAWS:
         bristle = float(np.max(np.abs(estimate[BODY:])))
         largest = max(largest, bristle / (BRISTLE_SCALE * robot.friction.presliding))
     return largest / robot.solver.tolerance

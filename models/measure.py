@@ -8,14 +8,14 @@ plant_fmu/src/lanes/measure.h is the fast form.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import pairwise
 
 import numpy as np
 
-from hexapod_cosim.models.actuator import servo_torque
+from hexapod_cosim.models.actuator import servo_torque, stop_energy
 from hexapod_cosim.models.contact import foot_contacts, normal_force
-from hexapod_cosim.models.dynamics import Command
+from hexapod_cosim.models.dynamics import Command, joint_overruns
 from hexapod_cosim.models.kinematics import (
     JOINTS,
     LEGS,
@@ -45,11 +45,17 @@ class Impulses:
     motor: Array  # (6, 3) N m s  motors on their joints
     gear: Array  # (6, 3) N m s  gear friction on the joints
     foot: Array  # (6, 3) N s    ground on feet, world axes
+    # (6, 3) N m s  stops on the joints
+    stop: Array = field(default_factory=lambda: np.zeros((LEGS, JOINTS)))
+    # (6, 3) N m s  spin and rolling friction on tibias, world axes
+    moment: Array = field(default_factory=lambda: np.zeros((LEGS, 3)))
 
 
 @dataclass(frozen=True)
 class Works:
-    """Works of the motors on the joints, and losses in contacts, friction and gears [J]."""
+    """Works of the motors on the joints, and losses in contacts, friction and gears with stops
+    [J].
+    """
 
     motor: Array  # (6, 3)
     contact: float
@@ -101,7 +107,8 @@ def step_works(
     """Returns the works of a step (eq. 27): impulses times the mean of the speeds at its ends.
 
     The loss in contact is the work of the normal force minus the growth of the stored energy 2/5 K
-    delta^(5/2). closed (6,): feet in contact during the step.
+    delta^(5/2), and that of the stops their work minus the growth of k x^2/2. closed (6,): feet in
+    contact during the step.
     """
     speed = 0.5 * (joint_speeds(robot, before) + joint_speeds(robot, after))
     contact = friction = 0.0
@@ -116,7 +123,14 @@ def step_works(
         ) - float(stored[1] - stored[0])
         slips = [foot.velocity + foot.approach_speed * foot.normal for foot in (first, last)]
         friction -= float(impulses.foot[leg] @ (0.5 * (slips[0] + slips[1])))
-    return Works(impulses.motor * speed, contact, friction, -float(np.sum(impulses.gear * speed)))
+        tibia = JOINTS * (leg + 1)
+        friction -= float(impulses.moment[leg] @ (before + after)[tibia, 10:13]) / 2.0
+    gear = -float(np.sum((impulses.gear + impulses.stop) * speed))
+    held = [
+        float(np.sum(stop_energy(robot.servo, joint_overruns(robot, body))))
+        for body in (before, after)
+    ]
+    return Works(impulses.motor * speed, contact, friction, gear - (held[1] - held[0]))
 
 
 def cone_time(robot: Robot, before: Array, after: Array, h: float, impulses: Impulses) -> Array:

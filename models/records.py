@@ -35,8 +35,9 @@ CONTACT_LAWS = (
     "constant_damping",
     "hertz",
 )
-FRICTION_LAWS = ("tanh", "none", "bristle")
-STATIC_LAWS = ("bristle",)  # friction laws with a static friction coefficient
+FRICTION_LAWS = ("tanh", "none", "bristle", "lugre")
+STATIC_LAWS = ("tanh", "bristle", "lugre")  # friction laws with a static friction coefficient
+BRISTLE_LAWS = ("bristle", "lugre")  # friction laws with bristles, under which a foot can hold
 SERVO_MODES = ("position", "torque", "kinematic")
 METHODS = ("rosw3", "ros2", "dp54", "bs32", "rk4")
 PROJECTIONS = ("none", "step")
@@ -132,26 +133,31 @@ class BodyContact:
 
 @dataclass(frozen=True, kw_only=True)
 class Friction:
-    """Friction law (eq. 15-18)."""
+    """Friction law (eq. 15-18, 35-38)."""
 
     law: Annotated[str, Choice(FRICTION_LAWS)]
     mu: Annotated[float, Number("1", at_least=0.0)]
-    # static friction, bristle law; 0: mu
+    # static friction; 0: mu
     mu_static: Annotated[float, Number("1", at_least=0.0, default=0.0)] = 0.0
-    slope: Annotated[float, Number("s/m", above=0.0)]  # k_t of eq. 15, tanh law
-    # b_max of eq. 16, bristle law; default of a file: Mindlin
+    slope: Annotated[float, Number("s/m", above=0.0)]  # k_t of eq. 15, tanh law, and of eq. 38
+    # b_max of eq. 16 and 36, laws with bristles; default of a file: Mindlin
     presliding: Annotated[float, Number("m", at_least=1e-7, at_most=1.0)]
-    # tau of eq. 17, bristle law
+    # tau of eq. 17 and 37, laws with bristles
     bristle_damping: Annotated[float, Number("s", at_least=0.0, at_most=10.0, default=0.005)]
-    # v_s of eq. 18, bristle law
+    # v_s of eq. 18
     stribeck_speed: Annotated[float, Number("m/s", at_least=1e-6, at_most=100.0, default=0.005)] = (
         0.005
     )
+    # of eq. 35: what a slip of 1 m/s adds to the coefficient
+    viscous: Annotated[float, Number("s/m", at_least=0.0, at_most=1e6, default=0.0)] = 0.0
+    # r_s and r_r of eq. 38: moments against spin over mu f_n and against rolling over f_n
+    spin_radius: Annotated[float, Number("m", at_least=0.0, at_most=10.0, default=0.0)] = 0.0
+    rolling_radius: Annotated[float, Number("m", at_least=0.0, at_most=10.0, default=0.0)] = 0.0
 
 
 @dataclass(frozen=True, kw_only=True)
 class Servo:
-    """Servo of every joint (eq. 12)."""
+    """Servo of every joint (eq. 12) and the joints' stops (eq. 39)."""
 
     mode: Annotated[str, Choice(SERVO_MODES)]
     kp: Annotated[float, Number("N m/rad", at_least=0.0)]
@@ -163,6 +169,13 @@ class Servo:
     torque_continuous: Annotated[float, Number("N m", above=0.0)]  # a larger one gives a warning
     # torque over the root of the copper loss, at the joint; default of a file: ideal motor
     motor_constant: Annotated[float, Number("N m/sqrt(W)", above=0.0)]
+    # stops at the links' angle_min and angle_max; 0: none
+    stop_stiffness: Annotated[float, Number("N m/rad", at_least=0.0, at_most=1e8, default=0.0)] = (
+        0.0
+    )
+    stop_damping: Annotated[float, Number("N m s/rad", at_least=0.0, at_most=1e8, default=0.0)] = (
+        0.0
+    )
 
 
 @dataclass(frozen=True, kw_only=True)

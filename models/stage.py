@@ -12,16 +12,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hexapod_cosim.models.actuator import gear_drag, servo_slopes
+from hexapod_cosim.models.actuator import gear_drag, servo_slopes, stop_slopes
 from hexapod_cosim.models.body.contacts import body_spheres
 from hexapod_cosim.models.body.slopes import BodySlopes, body_slope_matrices
 from hexapod_cosim.models.contact import (
-    BristleSlopes,
     FootContact,
-    bristle_rate,
-    bristle_slopes,
     foot_contacts,
-    friction_drag,
     normal_force,
     normal_slopes,
 )
@@ -30,10 +26,13 @@ from hexapod_cosim.models.dynamics import (
     applied_forces,
     constraint_equations,
     constraints,
+    joint_overruns,
     joint_torques,
     mass_matrix,
     solve_constrained,
+    stop_torques,
 )
+from hexapod_cosim.models.friction import bristle_rate, bristle_slopes, turning_slopes
 from hexapod_cosim.models.kinematics import (
     BODIES,
     JOINTS,
@@ -42,7 +41,7 @@ from hexapod_cosim.models.kinematics import (
     joint_speeds,
     skew,
 )
-from hexapod_cosim.models.records import Array, Robot
+from hexapod_cosim.models.records import BRISTLE_LAWS, Array, Robot
 
 
 @dataclass(frozen=True)
@@ -57,6 +56,10 @@ class Slopes:
     drag: Array  # (6,) N s/m  of friction by slip velocity; bristles: by their rate
     bristle: Array  # (6,) N/m    of friction by the bristles' deflection, -G_b
     beta: Array  # (6,) 1/s    release rate of sliding bristles
+    spin: Array  # (6,) N m s  of the foot's moment by angular velocity, about the normal
+    roll: Array  # (6,) N m s  the same across the normal
+    stop_stiffness: Array  # (6, 3) N m/rad
+    stop_damping: Array  # (6, 3) N m s/rad
 
 
 @dataclass(frozen=True)
@@ -71,14 +74,6 @@ class StageRate:
 def slip_velocity(foot: FootContact) -> Array:
     """Returns the velocity (3,) of the contact point's material along the ground [m/s]."""
     return foot.velocity + foot.approach_speed * foot.normal
-
-
-def _foot_bristle_slopes(robot: Robot, foot: FootContact, bristle: Array) -> BristleSlopes:
-    """Returns friction over load as a spring and a damper; laws without bristles have no spring."""
-    slip = slip_velocity(foot)
-    if robot.friction.law == "bristle":
-        return bristle_slopes(robot.friction, slip, bristle)
-    return BristleSlopes(0.0, friction_drag(robot.friction, float(np.linalg.norm(slip))), 0.0)
 
 
 def keep_slopes(
@@ -103,10 +98,15 @@ def keep_slopes(
         deeper = foot.penetration + ahead * max(foot.approach_speed, 0.0)
         f_n = normal_force(robot.contact, damping[leg], deeper, foot.approach_speed)
         normal = normal_slopes(robot.contact, damping[leg], deeper, foot.approach_speed)
-        along = _foot_bristle_slopes(robot, foot, bristle[leg])
-        feet.append([*normal, f_n * along.damping, f_n * along.stiffness, along.beta])
-    gear = gear_drag(robot.servo, speed)
-    return Slopes(motor_stiffness, motor_damping, gear, *np.array(feet).T)
+        along = bristle_slopes(robot.friction, slip_velocity(foot), bristle[leg])
+        turn = body[JOINTS * (leg + 1), 10:13]
+        spin, roll = turning_slopes(robot.friction, robot.foot.radius, foot.normal, turn)
+        friction = [along.damping, along.stiffness, spin, roll]
+        feet.append([*normal, *(f_n * np.array(friction)), along.beta])
+    stiffness, viscosity, drag, spring, spins, rolls, beta = np.array(feet).T
+    contacts = (stiffness, viscosity, drag, spring, beta, spins, rolls)
+    stops = stop_slopes(robot.servo, joint_overruns(robot, body), speed)
+    return Slopes(motor_stiffness, motor_damping, gear_drag(robot.servo, speed), *contacts, *stops)
 
 
 def contact_jacobian(body: Array, leg: int, foot: FootContact) -> Array:
@@ -121,25 +121,28 @@ def contact_jacobian(body: Array, leg: int, foot: FootContact) -> Array:
 def slope_matrices(robot: Robot, body: Array, slopes: Slopes) -> tuple[Array, Array]:
     """Returns G_x and G_v of eq. 20, each (114, 114), at bodies (19, 13).
 
-    They consist of servos and gears on the joints' axes, and of each contact along its normal n
-    and, by its drag alone, across it.
+    They consist of servos, gears and stops on the joints' axes, of each contact along its normal n
+    and, by its drag alone, across it, and of the moments of spin and rolling on the tibia.
     """
     G = constraints(robot, body).G
-    G_x = -G.T @ (slopes.motor_stiffness.reshape(-1, 1) * G)
-    G_v = -G.T @ ((slopes.motor_damping + slopes.gear_drag).reshape(-1, 1) * G)
+    damping = slopes.motor_damping + slopes.gear_drag + slopes.stop_damping
+    G_x = -G.T @ ((slopes.motor_stiffness + slopes.stop_stiffness).reshape(-1, 1) * G)
+    G_v = -G.T @ (damping.reshape(-1, 1) * G)
     for leg, foot in enumerate(foot_contacts(robot, body)):
         J, nn = contact_jacobian(body, leg, foot), np.outer(foot.normal, foot.normal)
         across = slopes.drag[leg] * (np.eye(3) - nn)
         G_x -= J.T @ (slopes.stiffness[leg] * nn) @ J
         G_v -= J.T @ (slopes.viscosity[leg] * nn + across) @ J
+        turn = slice(6 * JOINTS * (leg + 1) + 3, 6 * JOINTS * (leg + 1) + 6)
+        G_v[turn, turn] -= slopes.spin[leg] * nn + slopes.roll[leg] * (np.eye(3) - nn)
     return G_x, G_v
 
 
 def law_bristle_rates(robot: Robot, body: Array, bristle: Array, damping: Array) -> Array:
-    """Returns db/dt (6, 3) of the bristle law [m/s]; 0 for open feet and with other laws."""
+    """Returns db/dt (6, 3) of the friction law [m/s]; 0 for open feet and without bristles."""
     rate = np.zeros((LEGS, 3))
     for leg, foot in enumerate(foot_contacts(robot, body)):
-        if robot.friction.law == "bristle" and not np.isnan(damping[leg]):
+        if not np.isnan(damping[leg]):
             rate[leg] = bristle_rate(robot.friction, slip_velocity(foot), bristle[leg])
     return rate
 
@@ -188,7 +191,7 @@ def solve_stage(
     motor, gear = joint_torques(robot, body, command)
     held = np.full(len(body_spheres(robot)), np.nan) if touching is None else touching[0]
     g = applied_forces(robot, body, command, damping, bristle, held).ravel()
-    g += G.T @ (motor + gear).ravel()
+    g += G.T @ (motor + gear + stop_torques(robot, body)).ravel()
     W = mass_matrix(robot, body) - z * G_v - z * z * G_x
     right = g + G_v @ s_v + G_x @ (s_x + z * (v + s_v))
 
@@ -204,7 +207,7 @@ def solve_stage(
 
     # nu = v + s_v + z alpha;  k_b/h = (db/dt + s_v + z alpha - beta s_b)/(1 + z beta)
     for leg, T in enumerate(along):
-        if not np.isnan(damping[leg]) and robot.friction.law == "bristle":
+        if not np.isnan(damping[leg]) and robot.friction.law in BRISTLE_LAWS:
             beta = slopes.beta[leg]
             moved = rate[leg] + T @ (s_v + z * alpha) - beta * s_b[leg]
             rate[leg] = moved / (1.0 + z * beta)

@@ -2,7 +2,7 @@
 
 Tanh friction has no force at rest, so on level ground the feet spread until no tangential force
 remains. On a slope no pose of rest exists: the robot creeps, and friction at the creep velocity
-balances gravity. With the bristle law the robot rests on a slope, and deflected bristles balance
+balances gravity. With bristles the robot rests on a slope, and deflected bristles balance
 gravity.
 
 If gravity along the ground exceeds friction, the robot slides. The pose is then that of rest under
@@ -22,8 +22,8 @@ from functools import lru_cache
 import numpy as np
 
 from hexapod_cosim.models.actuator import servo_torque
-from hexapod_cosim.models.contact import foot_contacts, foot_force
-from hexapod_cosim.models.dynamics import masses
+from hexapod_cosim.models.contact import foot_contacts, foot_force, foot_moment
+from hexapod_cosim.models.dynamics import masses, stop_torques
 from hexapod_cosim.models.errors import RobotError
 from hexapod_cosim.models.kinematics import (
     JOINTS,
@@ -36,7 +36,7 @@ from hexapod_cosim.models.kinematics import (
     quaternion_product,
     rotation_matrix,
 )
-from hexapod_cosim.models.records import STATIC_LAWS, Array, Baumgarte, Gait, Robot, Solver
+from hexapod_cosim.models.records import BRISTLE_LAWS, Array, Baumgarte, Gait, Robot, Solver
 from hexapod_cosim.models.terrain import ground, ground_height, ground_normal, surface_of
 
 RESIDUAL = 1e-9  # N, N m  about 1e4 times the rounding of such forces
@@ -88,7 +88,8 @@ def sliding(gravity: Array, normal: Array, mu: float, mu_static: float = 0.0) ->
 def _slide_acceleration(robot: Robot) -> Array:
     """Returns the acceleration (3,) [m/s2] with which the robot slides on its ground."""
     mu = 0.0 if robot.friction.law == "none" else robot.friction.mu
-    mu_static = robot.friction.mu_static if robot.friction.law in STATIC_LAWS else 0.0
+    # under the tanh law static friction holds no foot
+    mu_static = robot.friction.mu_static if robot.friction.law in BRISTLE_LAWS else 0.0
     return sliding(np.array(robot.gravity), ground_normal(robot.terrain), mu, mu_static)
 
 
@@ -105,8 +106,8 @@ def _standing_key(robot: Robot) -> Robot:
     gravity, normal = np.array(robot.gravity), ground_normal(robot.terrain)
     press = -float(gravity @ normal)
     level = float(np.linalg.norm(gravity + press * normal)) <= LEVEL * press
-    if level and (friction.law != "bristle" or max(friction.mu, friction.mu_static) == 0.0):
-        friction = replace(friction, law="tanh", mu=1.0, mu_static=0.0)
+    if level and (friction.law not in BRISTLE_LAWS or max(friction.mu, friction.mu_static) == 0.0):
+        friction = replace(friction, law="tanh", mu=1.0, mu_static=0.0, viscous=0.0)
     still = Gait(name="tripod", period=1.0, duty=0.5, stride=0.0, step_height=1.0)
     return replace(
         robot, solver=calm, gait=still, friction=friction, baumgarte=Baumgarte(alpha=0.0, beta=0.0)
@@ -297,7 +298,7 @@ def _bristles(robot: Robot, body: Array) -> Array:
 
     The unknown creep stands for the deflection: one presliding for each m/s.
     """
-    if robot.friction.law != "bristle":
+    if robot.friction.law not in BRISTLE_LAWS:
         return np.zeros((LEGS, 3))
     return np.array(
         [
@@ -310,7 +311,7 @@ def _bristles(robot: Robot, body: Array) -> Array:
 def _foot_forces(robot: Robot, body: Array) -> Array:
     """Returns the forces (6, 3) of the ground on the feet [N]; feet with bristles are at rest."""
     feet, bristle = foot_contacts(robot, body), _bristles(robot, body)
-    if robot.friction.law == "bristle":
+    if robot.friction.law in BRISTLE_LAWS:
         feet = tuple(replace(foot, velocity=np.zeros(3), approach_speed=0.0) for foot in feet)
     return np.array([foot_force(robot, foot, 0.0, bristle[leg]) for leg, foot in enumerate(feet)])
 
@@ -339,6 +340,8 @@ def _loads(robot: Robot, x: Array) -> Array:
         tibia = JOINTS * (leg + 1)
         force[tibia] += push
         moment[tibia] += cross(foot.point - body[tibia, 0:3], push)
+        if robot.friction.law not in BRISTLE_LAWS:
+            moment[tibia] += foot_moment(robot, foot, 0.0, body[tibia, 10:13])
     on_torso, left_over = _carry_to_torso(robot, body, force, moment)
     angle = x[TORSO:]
     if robot.servo.mode == "kinematic":
@@ -346,6 +349,7 @@ def _loads(robot: Robot, x: Array) -> Array:
     else:
         servo, zero = replace(robot.servo, mode="position"), np.zeros_like(angle)
         left_over += servo_torque(servo, angle, zero, robot.stance.ravel(), zero, zero)
+        left_over += stop_torques(robot, body).ravel()
     return np.column_stack([on_torso, left_over.reshape(LEGS, JOINTS)])
 
 
@@ -375,7 +379,7 @@ def _standing(robot: Robot, x: Array) -> Standing:
     """Returns the pose of rest of the unknowns."""
     position, angle = np.array([0.0, 0.0, x[0]]), x[6:].reshape(LEGS, JOINTS)
     body = _bodies(robot, x)
-    creep = np.zeros(3) if robot.friction.law == "bristle" else _velocity(robot, x)
+    creep = np.zeros(3) if robot.friction.law in BRISTLE_LAWS else _velocity(robot, x)
     return Standing(
         position,
         _attitude(x),
@@ -391,7 +395,7 @@ def _sliding(robot: Robot, pose: Standing, slide: Array) -> Standing:
     """Returns the pose of a sliding robot: without creep, with fully deflected bristles."""
     way = (
         robot.friction.presliding * slide / np.linalg.norm(slide)
-        if robot.friction.law == "bristle"
+        if robot.friction.law in BRISTLE_LAWS
         else np.zeros(3)
     )
     return replace(pose, velocity=np.zeros(3), bristle=np.tile(way, (LEGS, 1)), slide=slide)

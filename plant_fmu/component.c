@@ -1,16 +1,128 @@
-/* component.c - connects the plant to the FMI layer */
+/* component.c - connects the plant to the FMI layer, and reads grids of the ground from the FMU's
+ * resources */
 #include "fmi/component.h"
 
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
-static hxPlant *plant_of(hxComponent *component) { return (hxPlant *)component; }
-static const hxPlant *const_plant(const hxComponent *component) {
-  return (const hxPlant *)component;
+#ifdef _WIN32
+#define WIN32_LEAN_AND_MEAN
+#include <windows.h>
+#endif
+
+struct hxComponent {
+  hxPlant *plant;
+  hxTerrain *terrain; /* of the grid below; NULL: none was read */
+  double grid;        /* its number */
+  char *resources;    /* folder of the FMU's resources, NULL: none */
+  char message[HX_MESSAGE_SIZE];
+};
+
+static hxPlant *plant_of(hxComponent *component) { return component->plant; }
+static const hxPlant *const_plant(const hxComponent *component) { return component->plant; }
+
+hxComponent *hx_component_create(void) {
+  hxComponent *component = calloc(1, sizeof *component);
+  if (!component) return NULL;
+  component->plant = hx_plant_create();
+  if (component->plant) return component;
+  free(component);
+  return NULL;
 }
 
-hxComponent *hx_component_create(void) { return (hxComponent *)hx_plant_create(); }
+void hx_component_destroy(hxComponent *component) {
+  hx_plant_destroy(component->plant);
+  hx_terrain_destroy(component->terrain);
+  free(component->resources);
+  free(component);
+}
 
-void hx_component_destroy(hxComponent *component) { hx_plant_destroy(plant_of(component)); }
+hxStatus hx_component_set_resources(hxComponent *component, const char *folder) {
+  if (!folder) return HX_OK;
+  component->resources = malloc(strlen(folder) + 1);
+  if (!component->resources) return HX_OUT_OF_MEMORY;
+  strcpy(component->resources, folder);
+  return HX_OK;
+}
+
+/* ---- grids ---- */
+
+/* Opens a file whose name is UTF-8. */
+static FILE *open_file(const char *path) {
+#ifdef _WIN32
+  wchar_t wide[32768];
+  return MultiByteToWideChar(CP_UTF8, 0, path, -1, wide, 32768) > 0 ? _wfopen(wide, L"rb") : NULL;
+#else
+  return fopen(path, "rb");
+#endif
+}
+
+/* Returns the bytes of a file, to be freed by the caller; NULL when it cannot be read. */
+static void *read_bytes(const char *path, size_t *size) {
+  FILE *file = open_file(path);
+  char *bytes = NULL;
+  if (!file) return NULL;
+  const long length = fseek(file, 0, SEEK_END) == 0 ? ftell(file) : -1;
+  if (length > 0 && fseek(file, 0, SEEK_SET) == 0) bytes = malloc((size_t)length);
+  *size = length > 0 ? (size_t)length : 0;
+  if (bytes && fread(bytes, 1, *size, file) != *size) {
+    free(bytes);
+    bytes = NULL;
+  }
+  fclose(file);
+  return bytes;
+}
+
+/* Writes what is wrong with a grid to the component's message; returns NULL. */
+static hxTerrain *refuse_grid(hxComponent *component, double grid, const char *what) {
+  const char *folder = component->resources ? component->resources : "(no resources)/";
+  snprintf(component->message, HX_MESSAGE_SIZE,
+           "terrain.grid: got %.9g, expected the number of a grid in the FMU's resources "
+           "(%.160sterrain/%.0f.terrain); %.200s",
+           grid, folder, grid, what);
+  return NULL;
+}
+
+/* Reads a grid of the resources. */
+static hxTerrain *read_grid(hxComponent *component, double grid) {
+  char name[48], message[HX_MESSAGE_SIZE];
+  size_t size = 0;
+  if (!component->resources || grid != floor(grid))
+    return refuse_grid(component, grid,
+                       component->resources ? "give a whole number"
+                                            : "instantiate the FMU with the path of its resources");
+  snprintf(name, sizeof name, "terrain/%.0f.terrain", grid);
+  char *path = malloc(strlen(component->resources) + strlen(name) + 1);
+  if (!path) return refuse_grid(component, grid, "out of memory; free some and try again");
+  strcpy(path, component->resources);
+  strcat(path, name);
+  void *bytes = read_bytes(path, &size);
+  free(path);
+  if (!bytes)
+    return refuse_grid(component, grid,
+                       "the file is missing or cannot be read; export the FMU with that terrain");
+  hxTerrain *terrain = hx_terrain_create(bytes, size, message);
+  free(bytes);
+  return terrain ? terrain : refuse_grid(component, grid, message);
+}
+
+/* Sets *terrain to a grid: the one that is there, or one read from the resources. */
+static hxStatus find_grid(hxComponent *component, double grid, hxTerrain **terrain) {
+  component->message[0] = '\0';
+  *terrain = component->terrain && component->grid == grid ? component->terrain
+                                                           : read_grid(component, grid);
+  return *terrain ? HX_OK : HX_INVALID_ARGUMENT;
+}
+
+/* Keeps a grid that the plant has taken, or frees one that it has not. */
+static void keep_grid(hxComponent *component, double grid, hxTerrain *terrain, hxStatus status) {
+  if (terrain == component->terrain) return;
+  hx_terrain_destroy(status == HX_OK ? component->terrain : terrain);
+  if (status == HX_OK) component->terrain = terrain, component->grid = grid;
+  hx_plant_set_terrain(component->plant, component->terrain);
+}
 
 void hx_component_defaults(struct hxVariables *variables) {
   hx_definition_default(&variables->definition);
@@ -22,7 +134,17 @@ hxStatus hx_component_check(const struct hxVariables *variables, char *message) 
 }
 
 hxStatus hx_component_reset(hxComponent *component, const struct hxVariables *variables, double t) {
-  return hx_plant_reset(plant_of(component), &variables->definition, t);
+  const hxDefinition *definition = &variables->definition;
+  hxTerrain *terrain = NULL;
+  const double grid = definition->terrain.grid;
+  hxStatus status = HX_OK;
+  component->message[0] = '\0';
+  if (definition->terrain.kind == HX_TERRAIN_GRID) status = find_grid(component, grid, &terrain);
+  if (status != HX_OK) return status;
+  hx_plant_set_terrain(component->plant, terrain);
+  status = hx_plant_reset(component->plant, definition, t);
+  keep_grid(component, grid, terrain, status);
+  return status;
 }
 
 hxStatus hx_component_step(hxComponent *component, const struct hxVariables *variables,
@@ -39,17 +161,28 @@ double hx_component_time(const hxComponent *component) {
 }
 
 const char *hx_component_message(const hxComponent *component) {
-  return hx_plant_message(const_plant(component));
+  return component->message[0] ? component->message : hx_plant_message(component->plant);
 }
 
-size_t hx_component_state_size(void) { return hx_plant_state_size(); }
+/* A saved state: the number of the grid that was read last, 0: none; then the plant's state. */
+size_t hx_component_state_size(void) { return sizeof(double) + hx_plant_state_size(); }
 
 void hx_component_get_state(const hxComponent *component, void *bytes) {
-  hx_plant_get_state(const_plant(component), bytes);
+  const double grid = component->terrain ? component->grid : 0.0;
+  memcpy(bytes, &grid, sizeof grid);
+  hx_plant_get_state(component->plant, (char *)bytes + sizeof grid);
 }
 
 hxStatus hx_component_set_state(hxComponent *component, const void *bytes) {
-  return hx_plant_set_state(plant_of(component), bytes, hx_plant_state_size());
+  hxTerrain *terrain = NULL;
+  double grid;
+  memcpy(&grid, bytes, sizeof grid);
+  if (grid != 0.0 && find_grid(component, grid, &terrain) != HX_OK) return HX_BAD_STATE;
+  hx_plant_set_terrain(component->plant, terrain);
+  const hxStatus status = hx_plant_set_state(component->plant, (const char *)bytes + sizeof grid,
+                                             hx_plant_state_size());
+  keep_grid(component, grid, terrain, status);
+  return status;
 }
 
 /* ---- model exchange ---- */

@@ -1,16 +1,17 @@
-"""Defines the command `hexapod compare`: one walk under both controls, over several seeds."""
+"""Defines the command `hexapod compare`: walks under both controls, over several seeds."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from contextlib import closing
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any
 
 import tomlkit
 import typer
 
+from hexapod_cosim.cosim.cli import completion
 from hexapod_cosim.cosim.cli.accuracy_check import CheckAccuracy, check_accuracy, show_accuracy
 from hexapod_cosim.cosim.cli.failures import FELL, SUCCESS
 from hexapod_cosim.cosim.cli.running import (
@@ -18,7 +19,7 @@ from hexapod_cosim.cosim.cli.running import (
     FmuFile,
     FolderName,
     GainsFile,
-    Name,
+    RunError,
     RunOptions,
     Settings,
     command_line,
@@ -33,6 +34,7 @@ from hexapod_cosim.cosim.cli.terminal import (
     counting_bar,
     show_files,
     show_json,
+    show_table,
     show_text,
     warn,
 )
@@ -74,6 +76,17 @@ EPILOG = (
     "and compares the seeds on which both walked."
 )
 MAX_SEEDS = 10_000
+TERRAINS = "terrains"  # folder in out/ of a comparison over several scenarios
+Names = Annotated[
+    list[str] | None,
+    typer.Argument(
+        metavar="SCENARIO...",
+        help="Scenario files, or names of `hexapod list scenarios`; several: a table over them. "
+        "Default walk_flat.",
+        show_default=False,
+        autocompletion=completion.scenario,
+    ),
+]
 Seeds = Annotated[
     int,
     typer.Option(
@@ -85,7 +98,7 @@ Seeds = Annotated[
 
 
 def compare(
-    scenario: Name = "walk_flat",
+    scenarios: Names = None,
     seeds: Seeds = 10,
     settings: Settings = None,
     output: FolderName = None,
@@ -95,39 +108,108 @@ def compare(
     engine: Engine = None,
     json: Json = False,
 ) -> int:
-    """Run a walk under kinematic and under compliant control; report."""
-    plan = _plan(scenario, settings or [], seeds)
-    if accuracy:
-        halved_scenario(plan)  # raises errors before anything is run
+    """Run one or several walks under kinematic and under compliant control; report."""
+    names = scenarios or ["walk_flat"]
     options = RunOptions.read(fmu=fmu, gains=gains, engine=engine, runs=seeds)
-    # designs the gains of all runs, or raises errors before anything is run
-    chosen_gains(replace(plan, control="compliant"), options.gains)
-    command = command_line(
-        "compare",
-        scenario,
-        seeds=seeds,
-        settings=settings,
-        engine=engine,
-        fmu=fmu,
-        gains=gains,
-        accuracy=accuracy,
-    )
-    with results_folder(output or default_folder(scenario)) as folder:
-        report = folder.path / REPORT
-        results, files = _first_seed(plan, folder, command, options)
-        comparison = _all_seeds(plan, results, seeds, folder.path, options)
-        files += _store(plan, comparison, folder.path, command)
+    works = []
+    for name in names:
+        command = command_line(
+            "compare",
+            name,
+            seeds=seeds,
+            settings=settings,
+            engine=engine,
+            fmu=fmu,
+            gains=gains,
+            accuracy=accuracy,
+        )
+        works.append(Work(_plan(name, settings or [], seeds), seeds, command, options, accuracy))
+    for work in works:
+        work.check()
+    if len(works) > 1:
+        return _compare_many(works, names, output or Path("out") / TERRAINS, json=json)
+    done = run_work(works[0], output or default_folder(names[0]))
+    if json:
+        show_json({**_table(done.comparison, done.checked), "report": str(done.report)})
+    else:
+        _show(done.results, done.comparison, done.checked, done.files)
+        show_text("\n".join(filter(None, (about(done.comparison), f"report: {done.report}"))))
+    return FELL if done.comparison.losses else SUCCESS
+
+
+@dataclass(frozen=True)
+class Work:
+    """A comparison to run."""
+
+    plan: Scenario
+    seeds: int
+    command: str
+    options: RunOptions
+    accuracy: bool
+
+    def check(self) -> None:
+        """Designs the gains of all runs, or raises errors before anything is run."""
+        if self.accuracy:
+            halved_scenario(self.plan)
+        chosen_gains(replace(self.plan, control="compliant"), self.options.gains)
+
+
+@dataclass(frozen=True)
+class Done:
+    """A comparison that was run, with its report."""
+
+    results: Mapping[str, Result]
+    comparison: Comparison
+    checked: Mapping[str, Accuracy]
+    files: list[Path]
+    report: Path
+
+
+def run_work(work: Work, path: Path) -> Done:
+    """Runs a comparison into a folder and reports it. Raises HexapodError."""
+    plan, options = work.plan, work.options
+    with results_folder(path) as folder:
+        results, files = _first_seed(plan, folder, work.command, options)
+        comparison = _all_seeds(plan, results, work.seeds, folder.path, options)
+        files += _store(plan, comparison, folder.path, work.command)
         checked: dict[str, Accuracy] = {}
-        if accuracy:
+        if work.accuracy:
             checked = _accuracies(plan, comparison, folder.path, options)
             write_json(folder.path / METRICS_FILE, _table(comparison, checked))
-        files += _draw(results, comparison, checked, folder.path, command)
+        files += _draw(results, comparison, checked, folder.path, work.command)
+    return Done(results, comparison, checked, files, folder.path / REPORT)
+
+
+def _compare_many(works: Sequence[Work], names: Sequence[str], path: Path, *, json: bool) -> int:
+    """Runs comparisons into folders of their own beside a table over all of them."""
+    # imported only here because matplotlib is slow to import
+    from hexapod_cosim.cosim.report import terrains  # noqa: PLC0415
+
+    rows: list[terrains.Row] = []
+    reports = []
+    lost = False
+    for work, name in zip(works, names, strict=True):
+        place = Path(name).stem
+        try:
+            done = run_work(work, path / place)
+        except RunError as error:
+            warn(f"{place}: {error}")
+            lost = True
+            continue
+        rows += terrains.terrain_rows(place, done.comparison)
+        reports.append(done.report)
+        lost = lost or bool(done.comparison.losses)
+    files = terrains.write_terrains(rows, path) if rows else []
     if json:
-        show_json({**_table(comparison, checked), "report": str(report)})
-    else:
-        _show(results, comparison, checked, files)
-        show_text("\n".join(filter(None, (about(comparison), f"report: {report}"))))
-    return FELL if comparison.losses else SUCCESS
+        show_json(
+            {"rows": terrains.rows_as_table(rows), "reports": [str(report) for report in reports]}
+        )
+        return FELL if lost else SUCCESS
+    columns = terrains.table_columns(rows)
+    show_table(list(columns), zip(*columns.values(), strict=True), right=range(2, len(columns)))
+    show_files(files)
+    show_text("\n".join(f"report: {report}" for report in reports))
+    return FELL if lost else SUCCESS
 
 
 def _draw(

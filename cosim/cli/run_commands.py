@@ -26,12 +26,13 @@ from hexapod_cosim.cosim.cli.running import (
     show_rows,
     titled,
 )
-from hexapod_cosim.cosim.cli.terminal import Json, show_files, show_json, warn
+from hexapod_cosim.cosim.cli.terminal import Json, show_files, show_json, show_text, warn
 from hexapod_cosim.cosim.common.files import STUDY
 from hexapod_cosim.cosim.report.accuracy import with_errors
 from hexapod_cosim.cosim.report.report import REPORT, metric_rows, write_report
 from hexapod_cosim.cosim.results.accuracy import Accuracy, halved_scenario
 from hexapod_cosim.cosim.results.comparison import SEEDS, compare_runs, read_seeds
+from hexapod_cosim.cosim.results.drop import drop_text
 from hexapod_cosim.cosim.results.metrics import has_net_slip
 from hexapod_cosim.cosim.results.result import Result
 from hexapod_cosim.cosim.results.results import (
@@ -115,6 +116,8 @@ def _show(result: Result, files: Sequence[Path], checked: Mapping[str, Accuracy]
     rows = metric_rows(metrics, net_slip=has_net_slip(result.parameters))
     show_rows(with_errors(rows, checked), [control])
     show_accuracy(rows, checked, metrics)
+    if result.facts.get("drop"):
+        show_text(drop_text(result.facts["drop"]))
     show_files(files)
 
 

@@ -27,6 +27,7 @@ RESULT_FILES = (
     "seeds.partial.csv",
     "metrics.json",
     "scenario.toml",
+    "ground.terrain",
     "report.html",
     "plots",
     "kinematic",

@@ -202,6 +202,11 @@ class Fmu:
             self._grids[digest] = number
         return self._grids[digest]
 
+    def grid(self, number: int) -> bytes | None:
+        """Returns the content of a grid file in the resources of this instance; None without it."""
+        path = Path(self._directory.name) / "resources" / "terrain" / f"{number}.terrain"
+        return path.read_bytes() if path.is_file() else None
+
     def names(self, causality: str, kind: str = "Real") -> list[str]:
         """Names of all variables of a causality and FMI type, in model description order."""
         return [

@@ -12,7 +12,7 @@ import numpy as np
 from hexapod_cosim.cosim.export.picture import COLOURS, THICKNESS
 from hexapod_cosim.cosim.interface.names import vector_names
 from hexapod_cosim.cosim.results.results import StoredResult
-from hexapod_cosim.cosim.results.walk import FLAT
+from hexapod_cosim.cosim.results.walk import FLAT, SLOPE
 from hexapod_cosim.models import JOINT_NAMES, LEG_NAMES, HexapodError, load_robot
 
 Parameters = Mapping[str, float]
@@ -74,11 +74,14 @@ def torso_size(run: StoredResult) -> list[float]:
 
 
 def describe_ground(parameters: Parameters) -> dict[str, float]:
-    """Returns height [m] at the origin, rise per metre and heading [rad] of the rise."""
-    flat = parameters.get("terrain.kind", FLAT) == FLAT
+    """Returns the plane of a ground: height [m] at the origin, rise per metre, heading [rad] of it.
+
+    The heights of a surface are above the height; it has no rise.
+    """
+    slope = parameters.get("terrain.kind", FLAT) == SLOPE
     return {
         "height": parameters.get("terrain.height", 0.0),
-        "rise": 0.0 if flat else math.tan(parameters.get("terrain.incline", 0.0)),
+        "rise": math.tan(parameters.get("terrain.incline", 0.0)) if slope else 0.0,
         "heading": parameters.get("terrain.heading", 0.0),
     }
 

@@ -4,13 +4,25 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
+from contextlib import suppress
 from typing import Any
 
+import numpy as np
+
+from hexapod_cosim.cosim.master.recorder import ColumnError
 from hexapod_cosim.cosim.report.columns import MOST_ROWS, Chosen, choose
 from hexapod_cosim.cosim.report.geometry import describe_ground, describe_robot
 from hexapod_cosim.cosim.report.packing import pack
+from hexapod_cosim.cosim.report.profile import (
+    find_stances,
+    make_profile,
+    pack_profile,
+    pack_stances,
+)
+from hexapod_cosim.cosim.report.surface import pack_surface, stride
 from hexapod_cosim.cosim.results.results import StoredResult
 from hexapod_cosim.cosim.results.walk import CONTACT_SHARE
+from hexapod_cosim.models.ground.surface import Surface
 
 
 def make_payload(
@@ -24,10 +36,16 @@ def make_payload(
     thinned = [
         _note(label, run, chosen[label]) for label, run in runs.items() if chosen[label].bucket > 1
     ]
+    surfaces = list(
+        dict.fromkeys(run.view.surface for run in runs.values() if run.view.surface is not None)
+    )
+    parameters = next(iter(runs.values())).view.parameters if runs else {}
     content = {
         "contact": CONTACT_SHARE,
-        "runs": [_describe(label, run, chosen[label]) for label, run in runs.items()],
+        "surfaces": [pack_surface(surface, parameters) for surface in surfaces],
+        "runs": [_describe(label, run, chosen[label], surfaces) for label, run in runs.items()],
     }
+    thinned += [_coarse(surface) for surface in surfaces if stride(surface) > 1]
     return content, thinned
 
 
@@ -36,13 +54,30 @@ def as_json(payload: Mapping[str, Any]) -> str:
     return json.dumps(payload, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
 
 
-def _describe(label: str, run: StoredResult, chosen: Chosen) -> dict[str, Any]:
+def _describe(
+    label: str, run: StoredResult, chosen: Chosen, surfaces: list[Surface]
+) -> dict[str, Any]:
     view = run.view
     about = {"label": label, "period": view.period, "bucket": chosen.bucket}
+    ground: dict[str, Any] = describe_ground(view.parameters)
+    columns = dict(chosen.columns)
+    if run.view.surface is not None:
+        ground["surface"] = surfaces.index(run.view.surface)
+        with suppress(ColumnError):  # a recording without positions shows the surface alone
+            stances = find_stances(view, run.view.surface)
+            ground["stances"] = pack_stances(stances)
+            profile = make_profile(view, run.view.surface, stances)
+            columns["way"] = np.interp(chosen.time, view.recording.time, profile.torso_way)
+            ground["profile"] = pack_profile(profile, stances)
+    return about | {"robot": describe_robot(run), "ground": ground} | pack(chosen.time, columns)
+
+
+def _coarse(surface: Surface) -> str:
+    """Returns a note on a surface that is drawn with fewer nodes than it has."""
+    every = stride(surface)
     return (
-        about
-        | {"robot": describe_robot(run), "ground": describe_ground(view.parameters)}
-        | pack(chosen.time, chosen.columns)
+        f"The ground has {surface.height.size} heights around the walk, too many for a page: the "
+        f"replay draws every {every}. of them along x and y."
     )
 
 

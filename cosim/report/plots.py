@@ -16,6 +16,7 @@ from matplotlib.patches import Patch
 from hexapod_cosim.controller.figure_style import DPI, PALETTE, SETTINGS, UNDATED, WIDTH
 from hexapod_cosim.cosim.common.files import atomic_path
 from hexapod_cosim.cosim.master.recorder import ColumnError
+from hexapod_cosim.cosim.report.profile import find_stances, make_profile
 from hexapod_cosim.cosim.results.metrics import planned_feet
 from hexapod_cosim.cosim.results.walk import (
     Array,
@@ -34,6 +35,7 @@ STYLES: dict[str, dict[str, Any]] = {
     "compliant": {"color": "#0072B2", "linestyle": "-", "linewidth": 1.0},
 }
 PLAN = "0.7"  # grey of planned paths
+BAND, GROUND = "0.88", "0.35"  # greys of the height profile
 PLANNED = "0.85"  # grey of planned swings
 LEAST_WIDTH = 2.0  # mm    of the sideways axis: a smaller one would show round-off as a drift
 STRAIGHT = 0.05  # a commanded path no wider than this share of its length is drawn enlarged
@@ -144,6 +146,42 @@ def path(views: Views) -> Figure:
         return figure
     _enlarge(figure, axis)
     return figure
+
+
+def profile(views: Views) -> Figure:
+    """Draws the ground along the torso's path of each run, and where its feet touched down.
+
+    Raises ColumnError where no run was on a surface.
+    """
+    shown = {label: view for label, view in views.items() if view.surface is not None}
+    if not shown:
+        raise ColumnError("not recorded", got="a surface")
+    figure = Figure(figsize=(WIDTH, 0.4 + 1.8 * len(shown)))
+    axes = np.atleast_1d(figure.subplots(len(shown), 1, sharex=True, sharey=True))
+    for axis, (label, view) in zip(axes, shown.items(), strict=True):
+        _draw_profile(axis, label, view)
+    axes[-1].set_xlabel("way along the path [m]")
+    _legend(figure, axes[0])
+    return figure
+
+
+def _draw_profile(axis: Axes, label: str, view: View) -> None:
+    """Draws one run's ground: a line below the torso, a band across the robot's width."""
+    if view.surface is None:
+        return
+    stances = find_stances(view, view.surface)
+    found = make_profile(view, view.surface, stances)
+    band: dict[str, Any] = {"color": BAND, "linewidth": 0, "label": "across the robot's width"}
+    axis.fill_between(found.way, 1e3 * found.low, 1e3 * found.high, **band)
+    axis.plot(found.way, 1e3 * found.ground, color=GROUND, linewidth=1.1, label="below the torso")
+    height = [1e3 * stance.z for stance in stances]
+    dots: dict[str, Any] = {"marker": "o", "markersize": 2.6, "linestyle": "none"}
+    axis.plot(
+        found.stance_way, height, color=STYLES[label]["color"], label="feet touch down", **dots
+    )
+    axis.set_title(label)
+    axis.set_ylabel("height [mm]")
+    axis.margins(x=0.0)
 
 
 def _enlarge(figure: Figure, axis: Axes) -> None:
@@ -303,6 +341,11 @@ FIGURES: dict[str, Drawing] = {
         "Path of the torso",
         "The torso from above, its end marked by a dot, and where the command leads.",
         path,
+    ),
+    "profile": Drawing(
+        "Height profile",
+        "The ground along the torso's path, and where the feet touched down.",
+        profile,
     ),
     "torques": Drawing(
         "Torques",

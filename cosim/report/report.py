@@ -23,13 +23,16 @@ from hexapod_cosim.cosim.report.headline import cards, creep_note, headline, pla
 from hexapod_cosim.cosim.report.page import NO_VIEWER, render, viewer_script
 from hexapod_cosim.cosim.report.payload import as_json, make_payload
 from hexapod_cosim.cosim.report.servos import servo_rows
+from hexapod_cosim.cosim.report.surface import material_legend
 from hexapod_cosim.cosim.results.accuracy import Accuracy
 from hexapod_cosim.cosim.results.comparison import BETTER, METHOD, SAME, WORSE, Change, Comparison
+from hexapod_cosim.cosim.results.drop import drop_text
+from hexapod_cosim.cosim.results.ground import describe_terrain
 from hexapod_cosim.cosim.results.metrics import DUST, FLOORS, METRICS, has_net_slip, shown_metrics
 from hexapod_cosim.cosim.results.results import StoredResult
 from hexapod_cosim.models import JOINT_NAMES
 
-REPORT, PLOTS = "report.html", "plots"
+REPORT, PLOTS, PROFILE = "report.html", "plots", "profile"
 
 
 class Section(NamedTuple):
@@ -60,6 +63,13 @@ SECTIONS = (
         "Height and attitude",
         "Height of the torso above the ground, and its roll, pitch and yaw.",
         "pairs",
+    ),
+    Section(
+        "profile",
+        "Height profile",
+        "The ground along the torso's path: the line below the torso, the band from the lowest to "
+        "the highest ground across the robot's width; dots where feet touched down.",
+        "overhead",
     ),
     Section("torques", "Torques", "The largest absolute torque over the six legs, joint by joint."),
     Section(
@@ -108,7 +118,13 @@ def write_report(
     from hexapod_cosim.cosim.report.plots import FIGURES, save_figures  # noqa: PLC0415
 
     files, skipped = save_figures({label: run.view for label, run in runs.items()}, folder / PLOTS)
-    missing = [f"{FIGURES[name].title} is not drawn: {reason}" for name, reason in skipped.items()]
+    if all(run.view.surface is None for run in runs.values()):
+        skipped[PROFILE] = ""  # a plane has none, which is no loss
+    missing = [
+        f"{FIGURES[name].title} is not drawn: {reason}"
+        for name, reason in skipped.items()
+        if reason
+    ]
     for text in missing:
         warn(text)
     first = next(iter(runs.values()))
@@ -127,12 +143,25 @@ def write_report(
         servos=servo_rows(runs),
         joints=JOINT_NAMES,
         creep=creep_note(first.facts["parameters"]),
+        terrain=describe_terrain(first.view.surface, first.facts["parameters"]),
+        materials=_materials(runs),
         **content | _accuracy(content["rows"], accuracies, metrics),
         **_facts(runs),
         **_replay(runs),
     )
     write_text(folder / REPORT, page)
     return [*files, folder / REPORT]
+
+
+def _materials(runs: Mapping[str, StoredResult]) -> list[dict[str, str]]:
+    """Returns the legend's entries for the materials of the runs' surfaces."""
+    found = [
+        entry
+        for run in runs.values()
+        if run.view.surface is not None
+        for entry in material_legend(run.view.surface, run.view.parameters)
+    ]
+    return [entry for k, entry in enumerate(found) if entry not in found[:k]]
 
 
 def _metrics(runs: Mapping[str, StoredResult], comparison: Comparison | None) -> Metrics:
@@ -231,7 +260,8 @@ def _walked(facts: Mapping[str, Any]) -> str:
 
 
 def _robot(facts: Mapping[str, Any]) -> str:
-    return f"Robot {facts['robot']['name']}, {_duration(facts)}."
+    drop = f" {drop_text(facts['drop'])}" if facts.get("drop") else ""
+    return f"Robot {facts['robot']['name']}, {_duration(facts)}.{drop}"
 
 
 def metric_rows(metrics: Metrics, *, net_slip: bool) -> Rows:

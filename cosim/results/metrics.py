@@ -24,6 +24,7 @@ from hexapod_cosim.cosim.results.support import stability_margins
 from hexapod_cosim.cosim.results.walk import (
     BRISTLE,
     CONTACT_SHARE,
+    LUGRE,
     NONE,
     TANH,
     Array,
@@ -35,8 +36,8 @@ from hexapod_cosim.cosim.results.walk import (
     real_feet,
     robot_weight,
 )
-from hexapod_cosim.models import LEG_NAMES, Servo
-from hexapod_cosim.models.contact import sliding_velocity
+from hexapod_cosim.models import FRICTION_LAWS, LEG_NAMES, Friction, Servo
+from hexapod_cosim.models.friction import yielding_velocity
 
 TANH_LIMIT = 0.999  # limits atanh: a larger share is sliding, not creep
 NEARLY_SLIDING = 0.9  # of the friction cone
@@ -266,11 +267,9 @@ def _net_slip(part: Recording, parameters: Mapping[str, float]) -> Array:
 
     That motion is the creep of the tanh law, or the stretch and return of a bristle.
     """
-    if parameters.get("friction.law", TANH) == BRISTLE:
-        sliding = sliding_velocity(
-            parameters["friction.presliding"],
-            part.foot_vectors("velocity"),
-            part.foot_vectors("bristle"),
+    if parameters.get("friction.law", TANH) in (BRISTLE, LUGRE):
+        sliding = yielding_velocity(
+            _friction(parameters), part.foot_vectors("velocity"), part.foot_vectors("bristle")
         )
         return np.asarray(np.linalg.norm(sliding, axis=-1))
     creep = (
@@ -278,6 +277,13 @@ def _net_slip(part: Recording, parameters: Mapping[str, float]) -> Array:
         / parameters["friction.slope"]
     )
     return np.maximum(part.feet("slip_speed") - creep, 0.0)
+
+
+def _friction(parameters: Mapping[str, float]) -> Friction:
+    """Returns the friction law of a run from the FMU's parameters."""
+    names = ("mu", "mu_static", "slope", "presliding", "bristle_damping", "stribeck_speed")
+    law = FRICTION_LAWS[round(parameters["friction.law"]) - 1]
+    return Friction(law=law, **{name: parameters[f"friction.{name}"] for name in names})
 
 
 def cone_use(part: Recording, parameters: Mapping[str, float]) -> Array:

@@ -8,6 +8,7 @@ from typing import Any
 
 from hexapod_cosim.cosim.master.loop import COMPLETED, Outcome
 from hexapod_cosim.cosim.scenario.records import Scenario
+from hexapod_cosim.models.ground.surface import Surface
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -19,6 +20,7 @@ class Result:
     metrics: Mapping[str, float]
     parameters: Mapping[str, float]  # of the FMU during the run
     facts: Mapping[str, Any]  # robot, FMU, versions, warnings
+    surface: Surface | None = None  # that the FMU read from its resources; None: a plane
 
     @property
     def completed(self) -> bool:

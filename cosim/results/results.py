@@ -21,6 +21,7 @@ from hexapod_cosim.cosim.common.files import (
 )
 from hexapod_cosim.cosim.master.loop import COMPLETED, FAILED, INTERRUPTED
 from hexapod_cosim.cosim.results.accuracy import Accuracy, accuracy_from_table
+from hexapod_cosim.cosim.results.ground import around_walk, read_ground, recipe_of, write_ground
 from hexapod_cosim.cosim.results.recordings import (
     COMMANDS,
     read_recording,
@@ -109,6 +110,7 @@ def write_result(result: Result, folder: Path) -> list[Path]:
     if result.completed and "csv" in outputs.formats and result.scenario.every == 1:
         files.append(folder / COMMANDS)
         write_commands(recording, files[-1])
+    files += write_ground(result.surface, recording, folder)
     if result.completed:
         files.append(folder / METRICS_FILE)
         write_json(files[-1], {**result.metrics, WARNINGS: facts[WARNINGS]})
@@ -130,6 +132,7 @@ def run_facts(result: Result) -> dict[str, Any]:
         "realtime_factor": outcome.realtime_factor,
         "finished": outcome.finished.isoformat(timespec="seconds"),
         **result.facts,
+        "terrain": {} if result.surface is None else dict(result.surface.recipe),
         "parameters": dict(result.parameters),
     }
 
@@ -155,7 +158,12 @@ def read_result(folder: Path) -> StoredResult:
     metrics = read_json(folder / METRICS_FILE)
     if not isinstance(metrics, dict):
         raise _damaged(folder / METRICS_FILE, type(metrics).__name__, "a table of metrics")
-    view = View(read_recording(folder, RESULTS), facts["parameters"], facts["gait_period"])
+    view = View(
+        read_recording(folder, RESULTS),
+        facts["parameters"],
+        facts["gait_period"],
+        read_ground(folder, recipe_of(facts)),
+    )
     checked = metrics.pop(ACCURACY, None)
     metrics.pop(WARNINGS, None)  # also in run.json
     accuracy = None
@@ -195,9 +203,10 @@ def _damaged(path: Path, got: str, expected: str) -> HexapodError:
 
 def stored_result(result: Result) -> StoredResult:
     """Returns what `read_result` would read after the run is written."""
-    facts = run_facts(result)
+    facts, recording = run_facts(result), result.outcome.recording
+    surface = None if result.surface is None else around_walk(result.surface, recording)
     return StoredResult(
-        View(result.outcome.recording, result.parameters, facts["gait_period"]),
+        View(recording, result.parameters, facts["gait_period"], surface),
         result.metrics,
         facts,
         tomlkit.dumps(result.scenario.to_table()),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from hexapod_cosim.cosim.interface.names import vector_names
 from hexapod_cosim.cosim.master.recorder import COMMAND_COLUMNS, Recording
 from hexapod_cosim.models import FRICTION_LAWS, TERRAINS
+from hexapod_cosim.models.ground.surface import Surface
 
 Array = NDArray[np.float64]
 
@@ -23,7 +24,9 @@ SHOWN_CYCLES = 3  # in plots of what happens within a gait cycle
 ROUND_OFF = 1e-6  # s    of a recorded time
 # numbers of the FMU's enumerations
 FLAT, SLOPE, GRID = (TERRAINS.index(kind) + 1 for kind in ("flat", "slope", "grid"))
-NONE, TANH, BRISTLE = (FRICTION_LAWS.index(law) + 1 for law in ("none", "tanh", "bristle"))
+NONE, TANH, BRISTLE, LUGRE = (
+    FRICTION_LAWS.index(law) + 1 for law in ("none", "tanh", "bristle", "lugre")
+)
 
 
 @dataclass(frozen=True)
@@ -33,6 +36,7 @@ class View:
     recording: Recording
     parameters: Mapping[str, float]  # of the FMU
     period: float  # s    of the gait
+    surface: Surface | None = None  # around the walk, for reports; None: a plane, or not needed
 
     @cached_property
     def walk(self) -> Walk | None:
@@ -43,7 +47,7 @@ class View:
         """Returns the last SHOWN_CYCLES gait cycles of the run."""
         time = self.recording.time
         begin = int(np.searchsorted(time, time[-1] - SHOWN_CYCLES * self.period))
-        return View(self.recording.rows(slice(begin, None)), self.parameters, self.period)
+        return replace(self, recording=self.recording.rows(slice(begin, None)))
 
 
 @dataclass(frozen=True)

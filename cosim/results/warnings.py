@@ -30,7 +30,7 @@ from hexapod_cosim.cosim.results.walk import LEAST_DISTANCE, SKIPPED_CYCLES, Vie
 from hexapod_cosim.cosim.scenario.records import Scenario
 from hexapod_cosim.models import FRICTION_LAWS, LEG_NAMES, TERRAINS, Robot, Terrain
 from hexapod_cosim.models.ground.surface import Surface
-from hexapod_cosim.models.records import STATIC_LAWS
+from hexapod_cosim.models.records import BRISTLE_LAWS
 from hexapod_cosim.models.statics import sliding
 from hexapod_cosim.models.terrain import ground_normal
 
@@ -143,7 +143,7 @@ def friction_warnings(parameters: Mapping[str, float]) -> list[str]:
     law = FRICTION_LAWS[round(parameters["friction.law"]) - 1]
     mu = 0.0 if law == "none" else parameters["friction.mu"]
     gravity = np.array([parameters[name] for name in vector_names("gravity")])
-    static = parameters.get("friction.mu_static", 0.0) if law in STATIC_LAWS else 0.0
+    static = parameters.get("friction.mu_static", 0.0) if law in BRISTLE_LAWS else 0.0
     slide = float(np.linalg.norm(sliding(gravity, _normal(parameters), mu, static)))
     if slide:
         why = "without friction" if mu == 0.0 else f"which friction (mu = {mu:g}) does not hold"

@@ -25,6 +25,8 @@ from hexapod_cosim.cosim.master.force_sensor import ForceSensor, SensorSettings
 from hexapod_cosim.cosim.master.loop import COMPLETED, Outcome, Progress, diagnostic_columns, run
 from hexapod_cosim.cosim.master.recorder import Recorder, chosen_columns
 from hexapod_cosim.cosim.master.signals import Signals
+from hexapod_cosim.cosim.results.drop import describe_drop
+from hexapod_cosim.cosim.results.ground import is_on_surface, surface_of_grid
 from hexapod_cosim.cosim.results.metrics import MEASURED_BY_PLANT, compute_metrics, metric_columns
 from hexapod_cosim.cosim.results.result import Result
 from hexapod_cosim.cosim.results.walk import View
@@ -41,9 +43,16 @@ from hexapod_cosim.cosim.scenario.reach import check_commands
 from hexapod_cosim.cosim.scenario.records import Scenario
 from hexapod_cosim.cosim.scenario.scenario import scenario_robot
 from hexapod_cosim.cosim.scenario.schedule import Schedule, make_schedule
-from hexapod_cosim.cosim.scenario.variation import Drawn, delayed, draw, initial_values
+from hexapod_cosim.cosim.scenario.variation import (
+    Drawn,
+    check_start_depth,
+    delayed,
+    draw,
+    initial_values,
+)
 from hexapod_cosim.models import LEG_NAMES, FmuError, Robot
 from hexapod_cosim.models.ground.grid_file import grid_bytes
+from hexapod_cosim.models.ground.surface import Surface
 from hexapod_cosim.models.terrain import surface_of
 
 # parameters with these prefixes describe the robot; all others are settings
@@ -94,7 +103,9 @@ def simulate(
             progress=progress,
         )
         facts = describe(setup.robot, plant, setup.gait.period)
-    return make_result(plan, outcome, parameters, facts | {"warnings": controller.warnings})
+        surface = run_surface(plant, plan.robot, parameters)
+    facts |= {"warnings": controller.warnings}
+    return make_result(plan, outcome, parameters, facts, surface=surface)
 
 
 def _make_recorder(plan: RunPlan, signals: Signals, controller: Controller) -> Recorder:
@@ -156,6 +167,9 @@ def initialise_plant(plant: Fmu, plan: RunPlan) -> dict[str, float]:
     scenario = plan.scenario
     _check_measurements(plant)
     plant.set_parameters(scenario.parameters)
+    if scenario.parameters and all(name.startswith("initial.") for name in scenario.parameters):
+        # with other parameters the robot's own numbers may not be the plant's, which checks too
+        check_start_depth(plan.robot, plant.parameters(), where=f"{scenario.where}: initial")
     if plan.drawn is not None:
         plant.set_parameters(initial_values(plan.robot, plant.parameters(), plan.drawn))
     plant.initialise(scenario.start, scenario.start + scenario.duration)
@@ -178,15 +192,21 @@ def _check_measurements(plant: Fmu) -> None:
 
 
 def make_result(
-    plan: RunPlan, outcome: Outcome, parameters: Mapping[str, float], facts: Mapping[str, Any]
+    plan: RunPlan,
+    outcome: Outcome,
+    parameters: Mapping[str, float],
+    facts: Mapping[str, Any],
+    *,
+    surface: Surface | None = None,
 ) -> Result:
     """Returns the result of a run, with its metrics and warnings.
 
     facts: those of `describe`, and the controller's warnings.
+    surface: the run's, for reports.
     """
     scenario, setup, drawn = plan.scenario, plan.controller, plan.drawn
     view = View(outcome.judged, parameters, setup.gait.period)
-    missing = []
+    missing, drop = list[str](), describe_drop(replace(view, recording=outcome.recording))
     if outcome.status == COMPLETED:
         missing = [*short_run_warnings(view), *missing_metrics_warnings(view)]
     found = {
@@ -199,6 +219,7 @@ def make_result(
         ],
         "gains": None if setup.gains is None else asdict(setup.gains),
         "walk": describe_walk(view, setup.robot),
+        "drop": None if drop is None else drop.as_facts(),
         "drawn": None if drawn is None else drawn.as_facts(),
     }
     metrics = compute_metrics(view, servo=plan.robot.servo, realtime_factor=outcome.realtime_factor)
@@ -208,6 +229,7 @@ def make_result(
         metrics=metrics,
         parameters=parameters,
         facts={**facts, **found},
+        surface=surface,
     )
 
 
@@ -293,6 +315,19 @@ def _grid_of(plant: Fmu, robot: Robot) -> dict[str, float]:
             where=str(plant.path),
         )
     return {GRID: float(plant.provide_grid(grid_bytes(surface)))}
+
+
+def run_surface(plant: Fmu, robot: Robot, parameters: Mapping[str, float]) -> Surface | None:
+    """Returns the surface that a plant with these parameters read from its resources.
+
+    It has the recipe of the robot's surface if both are equal.
+    """
+    if not is_on_surface(parameters):
+        return None
+    own, content = surface_of(robot.terrain), plant.grid(round(parameters[GRID]))
+    if own is not None and content == grid_bytes(own):
+        return own
+    return surface_of_grid(content, {})
 
 
 def describe(robot: Robot, plant: Fmu, period: float) -> dict[str, Any]:

@@ -34,10 +34,12 @@ from hexapod_cosim.cosim.run.run import (
     initialise_plant,
     make_plan,
     make_result,
+    run_surface,
     sensor_settings,
 )
 from hexapod_cosim.cosim.scenario.records import Scenario
 from hexapod_cosim.models import HexapodError, Robot
+from hexapod_cosim.models.records import BRISTLE_LAWS
 
 MAX_SETTINGS = 64  # robots whose settings are kept
 
@@ -107,9 +109,10 @@ class Walker:
         )
         self.loop_time = thread_time() - started
         facts = describe(plan.controller.robot, plant, plan.controller.gait.period)
-        return make_result(
-            plan, outcome, parameters, facts | {"warnings": plan.controller.warnings}
-        )
+        facts |= {"warnings": plan.controller.warnings}
+        # only a run that records everything gets a report, which shows the surface
+        surface = run_surface(plant, plan.robot, parameters) if self._everything else None
+        return make_result(plan, outcome, parameters, facts, surface=surface)
 
     def summary(
         self,
@@ -129,7 +132,7 @@ class Walker:
         """Returns the plant FMU of the plan and the master that connects it to the controller."""
         path = self._fmus.fmu(plan.scenario.robot) if fmu is None else fmu
         bristles = (
-            plan.robot.friction.law == "bristle" or "friction.law" in plan.scenario.parameters
+            plan.robot.friction.law in BRISTLE_LAWS or "friction.law" in plan.scenario.parameters
         )
         columns = None if self._everything else metric_columns(bristles=bristles)
         key = path, columns

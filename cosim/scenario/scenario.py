@@ -67,9 +67,8 @@ NUMBER = Number(GRAVITY.unit)
 
 def list_scenarios() -> dict[str, Path]:
     """Returns the bundled scenarios by name."""
-    return {
-        path.stem: path for path in sorted((Path(__file__).parent / "scenarios").glob("*.toml"))
-    }
+    found = {path.stem: path for path in (Path(__file__).parent / "scenarios").rglob("*.toml")}
+    return dict(sorted(found.items()))
 
 
 def load_scenario(path_or_name: str | Path, *, overrides: Sequence[str] = ()) -> Scenario:

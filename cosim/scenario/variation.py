@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from hexapod_cosim.cosim.interface.names import JOINTS, LEGS, joint_names, vector_names
 from hexapod_cosim.cosim.scenario.records import Command, Variation
-from hexapod_cosim.models import Robot
+from hexapod_cosim.models import LEG_NAMES, Robot, ScenarioError
 from hexapod_cosim.models.kinematics import foot_positions, quaternion_product, rotation_matrix
 from hexapod_cosim.models.terrain import ground
 
@@ -90,6 +90,26 @@ def initial_values(robot: Robot, parameters: Mapping[str, float], drawn: Drawn) 
         for names, values in pairs
         for name, value in zip(names, values.tolist(), strict=True)
     }
+
+
+def check_start_depth(robot: Robot, parameters: Mapping[str, float], *, where: str) -> None:
+    """Raises ScenarioError if a foot starts deeper in the ground than its radius.
+
+    parameters: the FMU's parameters initial.* of the robot's start.
+    """
+    position, quaternion, angle = (
+        np.array([parameters[name] for name in names]) for names in (POSITION, QUATERNION, ANGLE)
+    )
+    depth = _depths(robot, position, quaternion, angle)
+    leg, radius = int(np.argmax(depth)), robot.foot.radius
+    if depth[leg] > radius:
+        raise ScenarioError(
+            "a foot starts deep in the ground",
+            got=f"{LEG_NAMES[leg]} {depth[leg]:.4g} m deep",
+            expected=f"at most the foot's radius, {radius:g} m",
+            fix=f"raise initial.position[3] by {depth[leg] - radius:.4g} m or more",
+            where=where,
+        )
 
 
 @lru_cache(maxsize=64)

@@ -14,7 +14,8 @@ from hexapod_cosim.models.body.contacts import (
     sliding_robot,
     sphere_jacobian,
 )
-from hexapod_cosim.models.contact import friction_drag, normal_force, normal_slopes
+from hexapod_cosim.models.contact import normal_force, normal_slopes
+from hexapod_cosim.models.friction import friction_drag
 from hexapod_cosim.models.records import Array, Robot
 
 

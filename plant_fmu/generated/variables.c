@@ -890,7 +890,7 @@ static const hxVariable parameters[] = {
     {"contact.restitution", "1", 0.0, 1.0, offsetof(struct hxVariables, definition.contact.restitution), HX_REAL, 1},
     {"contact.damping_factor", "s/m", 0.0, 1000000.0, offsetof(struct hxVariables, definition.contact.damping_factor), HX_REAL, 1},
     {"contact.impact_speed_floor", "m/s", 1e-09, 100.0, offsetof(struct hxVariables, definition.contact.impact_speed_floor), HX_REAL, 1},
-    {"friction.law", "", 1, 3, offsetof(struct hxVariables, definition.friction.law), HX_INTEGER, 1},
+    {"friction.law", "", 1, 4, offsetof(struct hxVariables, definition.friction.law), HX_INTEGER, 1},
     {"friction.mu", "1", 0.0, 100.0, offsetof(struct hxVariables, definition.friction.mu), HX_REAL, 1},
     {"friction.slope", "s/m", 0.0, 1000000000.0, offsetof(struct hxVariables, definition.friction.slope), HX_REAL, 1},
     {"friction.presliding", "m", 1e-07, 1.0, offsetof(struct hxVariables, definition.friction.presliding), HX_REAL, 1},
@@ -967,6 +967,47 @@ static const hxVariable parameters[] = {
     {"initial.RR.tibia.speed", "rad/s", -10000.0, 10000.0, offsetof(struct hxVariables, definition.initial.speed[5][2]), HX_REAL, 0},
     {"friction.mu_static", "1", 0.0, 100.0, offsetof(struct hxVariables, definition.friction.mu_static), HX_REAL, 1},
     {"friction.stribeck_speed", "m/s", 1e-06, 100.0, offsetof(struct hxVariables, definition.friction.stribeck_speed), HX_REAL, 1},
+    {"friction.viscous", "s/m", 0.0, 1000000.0, offsetof(struct hxVariables, definition.friction.viscous), HX_REAL, 1},
+    {"friction.spin_radius", "m", 0.0, 10.0, offsetof(struct hxVariables, definition.friction.spin_radius), HX_REAL, 1},
+    {"friction.rolling_radius", "m", 0.0, 10.0, offsetof(struct hxVariables, definition.friction.rolling_radius), HX_REAL, 1},
+    {"servo.stop_stiffness", "N.m/rad", 0.0, 100000000.0, offsetof(struct hxVariables, definition.servo.stop_stiffness), HX_REAL, 1},
+    {"servo.stop_damping", "N.m.s/rad", 0.0, 100000000.0, offsetof(struct hxVariables, definition.servo.stop_damping), HX_REAL, 1},
+    {"LF.coxa.angle_min", "rad", -3.141592653589793, 3.141592653589793, offsetof(struct hxVariables, definition.leg[0].link[0].angle_min), HX_REAL, 18},
+    {"LF.femur.angle_min", "rad", -3.141592653589793, 3.141592653589793, offsetof(struct hxVariables, definition.leg[0].link[1].angle_min), HX_REAL, 0},
+    {"LF.tibia.angle_min", "rad", -3.141592653589793, 3.141592653589793, offsetof(struct hxVariables, definition.leg[0].link[2].angle_min), HX_REAL, 0},
+    {"LM.coxa.angle_min", "rad", -3.141592653589793, 3.141592653589793, offsetof(struct hxVariables, definition.leg[1].link[0].angle_min), HX_REAL, 0},
+    {"LM.femur.angle_min", "rad", -3.141592653589793, 3.141592653589793, offsetof(struct hxVariables, definition.leg[1].link[1].angle_min), HX_REAL, 0},
+    {"LM.tibia.angle_min", "rad", -3.141592653589793, 3.141592653589793, offsetof(struct hxVariables, definition.leg[1].link[2].angle_min), HX_REAL, 0},
+    {"LR.coxa.angle_min", "rad", -3.141592653589793, 3.141592653589793, offsetof(struct hxVariables, definition.leg[2].link[0].angle_min), HX_REAL, 0},
+    {"LR.femur.angle_min", "rad", -3.141592653589793, 3.141592653589793, offsetof(struct hxVariables, definition.leg[2].link[1].angle_min), HX_REAL, 0},
+    {"LR.tibia.angle_min", "rad", -3.141592653589793, 3.141592653589793, offsetof(struct hxVariables, definition.leg[2].link[2].angle_min), HX_REAL, 0},
+    {"RF.coxa.angle_min", "rad", -3.141592653589793, 3.141592653589793, offsetof(struct hxVariables, definition.leg[3].link[0].angle_min), HX_REAL, 0},
+    {"RF.femur.angle_min", "rad", -3.141592653589793, 3.141592653589793, offsetof(struct hxVariables, definition.leg[3].link[1].angle_min), HX_REAL, 0},
+    {"RF.tibia.angle_min", "rad", -3.141592653589793, 3.141592653589793, offsetof(struct hxVariables, definition.leg[3].link[2].angle_min), HX_REAL, 0},
+    {"RM.coxa.angle_min", "rad", -3.141592653589793, 3.141592653589793, offsetof(struct hxVariables, definition.leg[4].link[0].angle_min), HX_REAL, 0},
+    {"RM.femur.angle_min", "rad", -3.141592653589793, 3.141592653589793, offsetof(struct hxVariables, definition.leg[4].link[1].angle_min), HX_REAL, 0},
+    {"RM.tibia.angle_min", "rad", -3.141592653589793, 3.141592653589793, offsetof(struct hxVariables, definition.leg[4].link[2].angle_min), HX_REAL, 0},
+    {"RR.coxa.angle_min", "rad", -3.141592653589793, 3.141592653589793, offsetof(struct hxVariables, definition.leg[5].link[0].angle_min), HX_REAL, 0},
+    {"RR.femur.angle_min", "rad", -3.141592653589793, 3.141592653589793, offsetof(struct hxVariables, definition.leg[5].link[1].angle_min), HX_REAL, 0},
+    {"RR.tibia.angle_min", "rad", -3.141592653589793, 3.141592653589793, offsetof(struct hxVariables, definition.leg[5].link[2].angle_min), HX_REAL, 0},
+    {"LF.coxa.angle_max", "rad", -3.141592653589793, 3.141592653589793, offsetof(struct hxVariables, definition.leg[0].link[0].angle_max), HX_REAL, 18},
+    {"LF.femur.angle_max", "rad", -3.141592653589793, 3.141592653589793, offsetof(struct hxVariables, definition.leg[0].link[1].angle_max), HX_REAL, 0},
+    {"LF.tibia.angle_max", "rad", -3.141592653589793, 3.141592653589793, offsetof(struct hxVariables, definition.leg[0].link[2].angle_max), HX_REAL, 0},
+    {"LM.coxa.angle_max", "rad", -3.141592653589793, 3.141592653589793, offsetof(struct hxVariables, definition.leg[1].link[0].angle_max), HX_REAL, 0},
+    {"LM.femur.angle_max", "rad", -3.141592653589793, 3.141592653589793, offsetof(struct hxVariables, definition.leg[1].link[1].angle_max), HX_REAL, 0},
+    {"LM.tibia.angle_max", "rad", -3.141592653589793, 3.141592653589793, offsetof(struct hxVariables, definition.leg[1].link[2].angle_max), HX_REAL, 0},
+    {"LR.coxa.angle_max", "rad", -3.141592653589793, 3.141592653589793, offsetof(struct hxVariables, definition.leg[2].link[0].angle_max), HX_REAL, 0},
+    {"LR.femur.angle_max", "rad", -3.141592653589793, 3.141592653589793, offsetof(struct hxVariables, definition.leg[2].link[1].angle_max), HX_REAL, 0},
+    {"LR.tibia.angle_max", "rad", -3.141592653589793, 3.141592653589793, offsetof(struct hxVariables, definition.leg[2].link[2].angle_max), HX_REAL, 0},
+    {"RF.coxa.angle_max", "rad", -3.141592653589793, 3.141592653589793, offsetof(struct hxVariables, definition.leg[3].link[0].angle_max), HX_REAL, 0},
+    {"RF.femur.angle_max", "rad", -3.141592653589793, 3.141592653589793, offsetof(struct hxVariables, definition.leg[3].link[1].angle_max), HX_REAL, 0},
+    {"RF.tibia.angle_max", "rad", -3.141592653589793, 3.141592653589793, offsetof(struct hxVariables, definition.leg[3].link[2].angle_max), HX_REAL, 0},
+    {"RM.coxa.angle_max", "rad", -3.141592653589793, 3.141592653589793, offsetof(struct hxVariables, definition.leg[4].link[0].angle_max), HX_REAL, 0},
+    {"RM.femur.angle_max", "rad", -3.141592653589793, 3.141592653589793, offsetof(struct hxVariables, definition.leg[4].link[1].angle_max), HX_REAL, 0},
+    {"RM.tibia.angle_max", "rad", -3.141592653589793, 3.141592653589793, offsetof(struct hxVariables, definition.leg[4].link[2].angle_max), HX_REAL, 0},
+    {"RR.coxa.angle_max", "rad", -3.141592653589793, 3.141592653589793, offsetof(struct hxVariables, definition.leg[5].link[0].angle_max), HX_REAL, 0},
+    {"RR.femur.angle_max", "rad", -3.141592653589793, 3.141592653589793, offsetof(struct hxVariables, definition.leg[5].link[1].angle_max), HX_REAL, 0},
+    {"RR.tibia.angle_max", "rad", -3.141592653589793, 3.141592653589793, offsetof(struct hxVariables, definition.leg[5].link[2].angle_max), HX_REAL, 0},
     {"body.contact", "", 1, 2, offsetof(struct hxVariables, definition.body.contact), HX_INTEGER, 1},
     {"body.torso_box[1]", "m", 0.0, 10.0, offsetof(struct hxVariables, definition.body.torso_box[0]), HX_REAL, 3},
     {"body.torso_box[2]", "m", 0.0, 10.0, offsetof(struct hxVariables, definition.body.torso_box[1]), HX_REAL, 0},
@@ -1133,7 +1174,7 @@ const size_t hx_state_count = sizeof states / sizeof states[0];
 
 _Static_assert(sizeof states / sizeof states[0] == sizeof(hxCoordinates) / sizeof(double), "each state has its row");
 
-const char hx_default_guid[] = "{bf68f84c-e0c3-41b4-ae8c-ea5c6f8cad2c}";
+const char hx_default_guid[] = "{a02230a7-77b1-4f9a-b3bd-bab997bdcec6}";
 
 _Static_assert(HX_CONTACT_EXACT_RESTITUTION == 1, "ContactLaw");
 _Static_assert(HX_CONTACT_FLORES == 2, "ContactLaw");
@@ -1144,6 +1185,7 @@ _Static_assert(HX_CONTACT_HERTZ == 6, "ContactLaw");
 _Static_assert(HX_FRICTION_TANH == 1, "FrictionLaw");
 _Static_assert(HX_FRICTION_NONE == 2, "FrictionLaw");
 _Static_assert(HX_FRICTION_BRISTLE == 3, "FrictionLaw");
+_Static_assert(HX_FRICTION_LUGRE == 4, "FrictionLaw");
 _Static_assert(HX_SERVO_POSITION == 1, "ServoMode");
 _Static_assert(HX_SERVO_TORQUE == 2, "ServoMode");
 _Static_assert(HX_SERVO_KINEMATIC == 3, "ServoMode");

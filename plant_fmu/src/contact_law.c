@@ -4,7 +4,7 @@
 #include <string.h>
 
 #include "elementary.h"
-#include "terrain.h"
+#include "ground/surface.h"
 
 double hx_exact_restitution_chi(double e) {
   if (e >= 1.0) return 0.0;
@@ -64,13 +64,14 @@ const hxContactRow *hx_contact(int law) {
 }
 
 /* Sets stiffness and friction of a contact to those of the ground of a material, NULL: of the
- * definition. */
+ * definition. A material with a kinetic coefficient of its own has no static rise unless it says
+ * so. */
 static void set_ground(const hxModel *model, const double *material, int row, int slot,
                        hxContactState *contact) {
   double stiffness = model->stiffness, mu = model->mu, mu_static = model->mu + model->static_rise;
   if (material && !isnan(material[HX_MATERIAL_STIFFNESS]))
     stiffness = material[HX_MATERIAL_STIFFNESS];
-  if (material && !isnan(material[HX_MATERIAL_MU])) mu = material[HX_MATERIAL_MU];
+  if (material && !isnan(material[HX_MATERIAL_MU])) mu = mu_static = material[HX_MATERIAL_MU];
   if (material && !isnan(material[HX_MATERIAL_MU_STATIC]))
     mu_static = material[HX_MATERIAL_MU_STATIC];
   contact->stiffness[row][slot] = stiffness;
@@ -81,7 +82,7 @@ static void set_ground(const hxModel *model, const double *material, int row, in
 /* Returns the material under a foot; bodies have the definition's ground. */
 static const double *material_under(const hxModel *model, const hxDepths *depths, int row,
                                     int slot) {
-  if (!model->terrain || row > HX_WALL) return NULL;
+  if (!model->terrain || !hx_is_of_foot(row)) return NULL;
   const double centre[3] = {depths->centre[0][slot], depths->centre[1][slot],
                             depths->centre[2][slot]};
   return hx_terrain_material(model->terrain, centre);
@@ -115,8 +116,8 @@ static void fill_contact_slots(hxContactState *contact, int row) {
 /* Holds the cells of feet that touch the ground, and releases those of others. */
 static void hold_cells(const hxModel *model, const hxDepths *depths, hxContactState *contact) {
   for (int leg = 0; leg < HX_LEGS; ++leg) {
-    const int touches =
-        contact->closed[HX_FOOT][leg] != 0.0 || contact->closed[HX_WALL][leg] != 0.0;
+    int touches = 0;
+    for (int row = HX_FOOT; hx_is_of_foot(row); ++row) touches |= contact->closed[row][leg] != 0.0;
     const double centre[3] = {depths->centre[0][leg], depths->centre[1][leg],
                               depths->centre[2][leg]};
     double cell[2] = {contact->cell[0][leg], contact->cell[1][leg]};
@@ -230,13 +231,12 @@ void hx_contact_hand_over(const hxMoment *before, const hxMoment *after, int cro
                           hxContactState *contact) {
   const hxContactState was = *contact;
   for (int leg = 0; leg < HX_LEGS; ++leg)
-    for (int to = HX_FOOT; to <= HX_WALL && crossed >> leg & 1; ++to) {
+    for (int to = HX_FOOT; hx_is_of_foot(to) && crossed >> leg & 1; ++to) {
       open_contact(contact, to, leg);
-      for (int from = HX_FOOT; from <= HX_WALL; ++from)
+      for (int from = HX_FOOT; hx_is_of_foot(from); ++from)
         if (was.closed[from][leg] != 0.0 &&
             is_same(&before->contact[from], &after->contact[to], leg))
           copy_contact(&was, from, to, leg, contact);
     }
-  fill_contact_slots(contact, HX_FOOT);
-  fill_contact_slots(contact, HX_WALL);
+  for (int row = HX_FOOT; hx_is_of_foot(row); ++row) fill_contact_slots(contact, row);
 }

@@ -6,10 +6,11 @@
 #include <string.h>
 
 #include "contact_law.h"
+#include "ground/surface.h"
+#include "hexapod/range_check.h"
 #include "kernel.h"
 #include "robot.h"
 #include "tangent.h"
-#include "terrain.h"
 #include "validation.h"
 
 /* A saved state: a header that identifies it, then the plant's model and state. */
@@ -69,6 +70,24 @@ static hxStatus check_terrain(const hxPlant *plant, const hxDefinition *d, char 
   return HX_INVALID_MODEL;
 }
 
+/* Fails if the centre of a foot lies in the ground: the contact law does not hold at such depths,
+ * and its force would throw the robot up. */
+static hxStatus check_start_depth(const hxPlant *plant, char message[HX_MESSAGE_SIZE]) {
+  hxDepths depths;
+  const double radius = plant->model.radius[HX_FOOT], *delta = depths.delta[HX_FOOT];
+  hx_kernel()->depths(&plant->model, &plant->state.contact, &plant->state.motion, &depths);
+  for (int leg = 0; leg < HX_LEGS; ++leg)
+    if (delta[leg] > radius) {
+      snprintf(message, HX_MESSAGE_SIZE,
+               "initial.position: got foot %s %.4g m deep in the ground, expected at most its "
+               "radius, %.4g m; raise initial.position[3] by %.4g m or more, or lower "
+               "terrain.height",
+               hx_leg_name(leg), delta[leg], radius, delta[leg] - radius);
+      return HX_INVALID_MODEL;
+    }
+  return HX_OK;
+}
+
 hxStatus hx_plant_reset(hxPlant *plant, const hxDefinition *definition, double t) {
   char message[HX_MESSAGE_SIZE];
   double body[HX_BODIES][HX_BODY_STATE];
@@ -78,13 +97,17 @@ hxStatus hx_plant_reset(hxPlant *plant, const hxDefinition *definition, double t
   hxStatus status = hx_definition_check(definition, message);
   if (status == HX_OK) status = check_terrain(plant, definition, message);
   if (status != HX_OK) return fail(plant, status, message);
-  memset(&plant->model, 0, sizeof plant->model);
-  memset(&plant->state, 0, sizeof plant->state);
-  hx_model_compile(&plant->model, definition, plant->terrain);
+  hxPlant fresh = *plant;
+  memset(&fresh.model, 0, sizeof fresh.model);
+  memset(&fresh.state, 0, sizeof fresh.state);
+  hx_model_compile(&fresh.model, definition, plant->terrain);
   hx_initial_bodies(definition, body);
-  hx_motion_from_bodies(&plant->model, (const double (*)[HX_BODY_STATE])body, &plant->state.motion);
-  hx_kernel()->start(&plant->model, t, &plant->state);
-  plant->message[0] = '\0';
+  hx_motion_from_bodies(&fresh.model, (const double (*)[HX_BODY_STATE])body, &fresh.state.motion);
+  hx_kernel()->start(&fresh.model, t, &fresh.state);
+  status = check_start_depth(&fresh, message); /* the cells of feet on blocks are known now */
+  if (status != HX_OK) return fail(plant, status, message);
+  fresh.message[0] = '\0';
+  *plant = fresh;
   return HX_OK;
 }
 

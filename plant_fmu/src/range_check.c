@@ -34,8 +34,12 @@ void hx_check_ranges(hxChecker *checker, const void *structure, const hxRange *r
   }
 }
 
-void hx_joint_label(int leg, int joint, const char *quantity, char name[32]) {
+const char *hx_leg_name(int leg) {
   static const char *const legs[HX_LEGS] = {"LF", "LM", "LR", "RF", "RM", "RR"};
+  return legs[leg];
+}
+
+void hx_joint_label(int leg, int joint, const char *quantity, char name[32]) {
   static const char *const joints[HX_JOINTS] = {"coxa", "femur", "tibia"};
-  snprintf(name, 32, "%s.%s.%s", legs[leg], joints[joint], quantity);
+  snprintf(name, 32, "%s.%s.%s", hx_leg_name(leg), joints[joint], quantity);
 }

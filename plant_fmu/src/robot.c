@@ -146,6 +146,8 @@ static void compile_joint(hxJointModel *m, const hxDefinition *d, int leg, int j
   for (int i = 0; i < 3; ++i)
     m->s_i[i][slot] = s_i[i], m->point_i[i][slot] = point_i[i], m->point_j[i][slot] = point_j[i];
   for (int i = 0; i < 4; ++i) m->zero[i][slot] = zero[i], m->frame[i][slot] = frame_j[i];
+  m->middle[slot] = 0.5 * (link->angle_min + link->angle_max);
+  m->half_range[slot] = 0.5 * (link->angle_max - link->angle_min);
 }
 
 /* Computes a point and the normal of the ground. */
@@ -173,6 +175,23 @@ static double weight_of(const hxDefinition *d) {
                      d->gravity[2] * d->gravity[2]);
 }
 
+/* Copies friction and its choices. Feet without friction resist neither spin nor rolling. */
+static void compile_friction(hxModel *model, const hxDefinition *d) {
+  const int rubs = d->friction.law != HX_FRICTION_NONE;
+  model->friction_law = d->friction.law, model->mu = d->friction.mu,
+  model->slope = d->friction.slope;
+  model->presliding = d->friction.presliding, model->bristle_damping = d->friction.bristle_damping;
+  model->static_rise = fmax(d->friction.mu_static - d->friction.mu, 0.0),
+  model->per_stribeck = 1.0 / d->friction.stribeck_speed;
+  model->viscous = rubs ? d->friction.viscous : 0.0;
+  model->spin_radius = d->friction.spin_radius, model->rolling_radius = d->friction.rolling_radius;
+  /* materials of a grid may have static friction of their own */
+  model->velocity_terms = rubs && (model->static_rise > 0.0 || model->viscous > 0.0 ||
+                                   d->terrain.kind == HX_TERRAIN_GRID);
+  model->spin_friction = rubs && model->spin_radius > 0.0;
+  model->roll_friction = rubs && model->rolling_radius > 0.0;
+}
+
 /* Copies laws and settings, with derived constants. */
 static void compile_settings(hxModel *model, const hxDefinition *d) {
   model->contact_law = d->contact.law, model->stiffness = d->contact.stiffness;
@@ -180,17 +199,15 @@ static void compile_settings(hxModel *model, const hxDefinition *d) {
   model->impact_speed_floor = d->contact.impact_speed_floor;
   for (int i = 0; i < 3; ++i) model->gravity[i] = d->gravity[i];
   model->alpha = d->baumgarte.alpha, model->beta = d->baumgarte.beta;
-  model->friction_law = d->friction.law, model->mu = d->friction.mu,
-  model->slope = d->friction.slope;
-  model->presliding = d->friction.presliding, model->bristle_damping = d->friction.bristle_damping;
-  model->static_rise = fmax(d->friction.mu_static - d->friction.mu, 0.0),
-  model->per_stribeck = 1.0 / d->friction.stribeck_speed;
+  compile_friction(model, d);
   model->servo_mode = d->servo.mode;
   model->kp = d->servo.mode == HX_SERVO_POSITION ? d->servo.kp : 0.0;
   model->kd = d->servo.mode == HX_SERVO_POSITION ? d->servo.kd : 0.0;
   model->torque_max = d->servo.torque_max, model->speed_max = d->servo.speed_max;
   model->rotor_inertia = d->servo.rotor_inertia,
   model->coulomb_friction = d->servo.coulomb_friction;
+  model->stop_stiffness = d->servo.stop_stiffness, model->stop_damping = d->servo.stop_damping;
+  model->stops = d->servo.mode != HX_SERVO_KINEMATIC && d->servo.stop_stiffness > 0.0;
   model->terrain_kind = d->terrain.kind;
   model->method = d->solver.method, model->step = d->solver.step;
   model->tolerance = d->solver.tolerance, model->step_max = d->solver.step_max,
@@ -217,8 +234,7 @@ static void compile_tibia_points(hxModel *model, const hxDefinition *d, int leg,
   double tip[3], shank[3];
   link_tip(&d->leg[leg].link[HX_JOINTS - 1], tip);
   for (int i = 0; i < 3; ++i) shank[i] = d->body.shank_position * tip[i];
-  set_tibia_point(model, d, leg, slot, HX_FOOT, tip);
-  set_tibia_point(model, d, leg, slot, HX_WALL, tip);
+  for (int row = HX_FOOT; hx_is_of_foot(row); ++row) set_tibia_point(model, d, leg, slot, row, tip);
   set_tibia_point(model, d, leg, slot, HX_KNEE, joint);
   set_tibia_point(model, d, leg, slot, HX_SHANK, shank);
 }
@@ -237,12 +253,13 @@ static void compile_rows(hxModel *model, const hxDefinition *d) {
   const double *box = d->body.torso_box;
   const int on = d->body.contact == HX_BODY_ON;
   const int knees = on && d->body.knee_radius > 0.0, shanks = on && d->body.shank_radius > 0.0;
-  model->radius[HX_FOOT] = model->radius[HX_WALL] = d->foot_radius;
+  for (int row = HX_FOOT; hx_is_of_foot(row); ++row) model->radius[row] = d->foot_radius;
   model->radius[HX_KNEE] = d->body.knee_radius;
   model->radius[HX_SHANK] = d->body.shank_radius;
   model->radius[HX_TORSO] = d->body.corner_radius;
   model->row[model->rows++] = HX_FOOT;
-  if (hx_has_cells(model)) model->row[model->rows++] = HX_WALL;
+  for (int row = HX_WALL; hx_has_cells(model) && hx_is_of_foot(row); ++row)
+    model->row[model->rows++] = row;
   model->foot_rows = model->rows;
   if (knees) model->row[model->rows++] = HX_KNEE;
   if (shanks) model->row[model->rows++] = HX_SHANK;

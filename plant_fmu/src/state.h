@@ -1,7 +1,8 @@
 /* state.h - data of a plant: the model (constants compiled from the definition) and the state.
  *
- * Legs are stored innermost, [quantity][component][slot]. The structures hold no pointers, so a
- * copy of their bytes is a copy of the plant.
+ * Legs are stored innermost, [quantity][component][slot]. But for the terrain, whose checksum a
+ * saved state holds, the structures hold no pointers, so a copy of their bytes is a copy of the
+ * plant.
  */
 #ifndef HX_STATE_H
 #define HX_STATE_H
@@ -22,7 +23,18 @@ enum {
 /* Rows of contacts with the ground: spheres of which each slot has one. Those before the torso's
  * are on the tibia, one for each leg; the torso's row has eight points of the torso. A model lists
  * the rows that it computes. */
-enum { HX_FOOT, HX_WALL, HX_KNEE, HX_SHANK, HX_TORSO, HX_ROWS, HX_TIBIA_ROWS = HX_TORSO };
+enum {
+  HX_FOOT,   /* the ground below the foot: the only row of feet but on blocks */
+  HX_WALL,   /* a higher block beside the foot along x */
+  HX_SIDE,   /* one along y */
+  HX_CORNER, /* one across the cell's corner */
+  HX_KNEE,
+  HX_SHANK,
+  HX_TORSO,
+  HX_ROWS,
+  HX_FOOT_ROWS = HX_KNEE,
+  HX_TIBIA_ROWS = HX_TORSO
+};
 
 /* Offsets of position, quaternion, velocity and angular velocity in a body state. */
 enum { HX_R = 0, HX_P = 3, HX_V = 7, HX_W = 10 };
@@ -49,6 +61,7 @@ typedef struct hxJointModel {
   double point_j[3][HX_SLOTS]; /* child's centre of mass to the joint's point, child's axes */
   double zero[4][HX_SLOTS];    /* rotation from parent's to child's axes at angle 0 */
   double frame[4][HX_SLOTS];   /* rotation from link axes of hexapod.h to child's axes */
+  double middle[HX_SLOTS], half_range[HX_SLOTS]; /* rad  between the stops */
 } hxJointModel;
 
 typedef struct hxModel {
@@ -61,8 +74,11 @@ typedef struct hxModel {
   double gravity[3];
   double alpha, beta; /* Baumgarte */
   int contact_law, friction_law, terrain_kind, servo_mode, method, projection;
-  int rows, foot_rows, torso_rows; /* computed: on tibias, of these on feet, on the torso (0, 1) */
-  int row[HX_ROWS];                /* rows that are computed: on feet, tibias, torso */
+  int velocity_terms;               /* 1: the tanh law has static friction or a viscous part */
+  int spin_friction, roll_friction; /* 1: the feet resist spin, rolling */
+  int stops;                        /* 1: the joints have stops */
+  int rows, foot_rows, torso_rows;  /* computed: on tibias, of these on feet, on the torso (0, 1) */
+  int row[HX_ROWS];                 /* rows that are computed: on feet, tibias, torso */
   union {
     const hxTerrain *terrain; /* NULL: plane; not saved */
     int64_t terrain_bits;     /* the same size on every machine */
@@ -71,6 +87,9 @@ typedef struct hxModel {
   double mu, slope;                                    /* eq. 15 */
   double presliding, bristle_damping;                  /* eq. 16, 17 */
   double static_rise, per_stribeck;                    /* eq. 18: mu_s - mu, 1/v_s */
+  double viscous;                                      /* s/m  eq. 35 */
+  double spin_radius, rolling_radius;                  /* m  eq. 38 */
+  double stop_stiffness, stop_damping;                 /* N m/rad, N m s/rad  eq. 39 */
   double kp, kd, torque_max, speed_max, rotor_inertia, coulomb_friction;
   double ground_point[3], ground_normal[3];
   double step, tolerance, step_max;
@@ -119,6 +138,7 @@ typedef struct hxContactMoment {
 typedef struct hxMoment {
   double angle[HX_JOINTS][HX_SLOTS]; /* rad */
   double speed[HX_JOINTS][HX_SLOTS]; /* rad/s */
+  double turn[3][HX_SLOTS];          /* rad/s  of the tibias, world axes */
   double time;                       /* s */
   double stale;                      /* 1      1: coordinates were set since */
   hxContactMoment contact[HX_ROWS];  /* the model's rows are set */
@@ -126,10 +146,12 @@ typedef struct hxMoment {
 
 /* Forces at the last completed step of an importer's solver (model exchange). */
 typedef struct hxCompleted {
-  double motor[HX_JOINTS][HX_SLOTS];    /* N m  motor torques */
-  double gear[HX_JOINTS][HX_SLOTS];     /* N m  gear friction */
-  double contact[HX_ROWS][3][HX_SLOTS]; /* N    ground on feet and bodies, world axes */
-  double known;                         /* 1    0: no step was completed yet */
+  double motor[HX_JOINTS][HX_SLOTS];        /* N m  motor torques */
+  double gear[HX_JOINTS][HX_SLOTS];         /* N m  gear friction */
+  double contact[HX_ROWS][3][HX_SLOTS];     /* N    ground on feet and bodies, world axes */
+  double stop[HX_JOINTS][HX_SLOTS];         /* N m  stops */
+  double moment[HX_FOOT_ROWS][3][HX_SLOTS]; /* N m  spin and rolling friction on tibias */
+  double known;                             /* 1    0: no step was completed yet */
 } hxCompleted;
 
 enum {
@@ -153,7 +175,8 @@ typedef struct hxMeasured {
   double landing_left[HX_SLOTS];                 /* 1       samples of the landing still to take */
   double landed_at[HX_SLOTS];                    /* s       time of the last touch-down */
   double landings[HX_SLOTS];                     /* 1       touch-downs */
-  double contact_loss, friction_loss, gear_loss; /* J  their sum is the dissipated energy */
+  double contact_loss, friction_loss, gear_loss; /* J  their sum is the dissipated energy; stops
+                                                  *    count with the gears */
   double cone_time[HX_CONE_BINS]; /* s  feet under load, by share of the friction cone */
 } hxMeasured;
 
@@ -180,6 +203,9 @@ struct hxPlant {
   const hxTerrain *terrain; /* of later resets */
   char message[HX_MESSAGE_SIZE];
 };
+
+/* Returns whether a row's contacts are those of feet. */
+static inline int hx_is_of_foot(int row) { return row < HX_KNEE; }
 
 /* Returns how many slots of a row of contacts hold one. */
 static inline int hx_slots_of(int row) { return row == HX_TORSO ? HX_SLOTS : HX_LEGS; }

@@ -14,7 +14,7 @@
 #pragma GCC optimize("cx-limited-range")
 #endif
 
-#include "terrain.h" /* before double is redefined: queries of the ground are real */
+#include "ground/surface.h" /* before double is redefined: queries of the ground are real */
 
 /* In this file every number of the structures is complex; to_complex() converts the bytes of real
  * structures. */

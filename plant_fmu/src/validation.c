@@ -46,6 +46,9 @@ static void check_legs(hxChecker *c, const hxDefinition *d) {
       check_inertia(c, name, link->inertia);
       hx_joint_label(leg, joint, "axis", name);
       check_not_zero(c, name, link->axis, 3, "a direction: not all zero");
+      hx_joint_label(leg, joint, "angle_min", name);
+      if (!(link->angle_min < link->angle_max))
+        hx_check_fail(c, name, link->angle_min, "an angle below the joint's angle_max");
       hx_joint_label(leg, joint, "length", name);
       if (tip[0] == 0.0 && tip[1] == 0.0 && tip[2] == 0.0)
         hx_check_fail(c, name, 0.0, "a tip away from the joint: length and offsets not all zero");
@@ -64,10 +67,9 @@ static void check_relations(hxChecker *c, const hxDefinition *d) {
   if (d->friction.mu_static != 0.0 && d->friction.mu_static < d->friction.mu)
     hx_check_fail(c, "friction.mu_static", d->friction.mu_static,
                   "at least friction.mu, or 0, which means the same");
-  else if (d->friction.mu_static > d->friction.mu && d->friction.law != HX_FRICTION_BRISTLE)
+  else if (d->friction.mu_static > d->friction.mu && d->friction.law == HX_FRICTION_NONE)
     hx_check_fail(c, "friction.mu_static", d->friction.mu_static,
-                  "0 or friction.mu with this friction.law; the bristle law alone tells static "
-                  "from kinetic friction");
+                  "0 or friction.mu with friction.law none, which has no friction");
   if (hx_method(d->solver.method)->error_order == 0 && d->solver.step == 0.0)
     hx_check_fail(c, "solver.step", d->solver.step,
                   "a fixed step > 0 with this solver.method, which has no error estimate");

@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+import tomlkit
 
-from hexapod_cosim.cosim.common.toml_text import to_toml
 from hexapod_cosim.cosim.export.export import grid_members
 from hexapod_cosim.cosim.master.fmu import Fmu
 from hexapod_cosim.cosim.master.recorder import Recording
@@ -53,7 +53,7 @@ def test_patches_are_tables_of_a_scenario() -> None:
     surface = scenario_robot(scenario).terrain.surface
     assert surface is not None
     assert [surface.material_at(x, 0.0) for x in (0.0, 0.2, 0.5, 1.2)] == [1, 1, 2, 0]
-    again = scenario_from_table(tomllib.loads(to_toml(scenario.to_table())), where="again")
+    again = scenario_from_table(tomllib.loads(tomlkit.dumps(scenario.to_table())), where="again")
     assert scenario_robot(again) == scenario_robot(scenario)
 
 
@@ -66,7 +66,8 @@ def test_a_height_map_lies_beside_its_scenario(tmp_path: Path) -> None:
     robot = scenario_robot(load_scenario(tmp_path / "walk.toml"))
     surface = robot.terrain.surface
     assert surface is not None
-    assert (surface.kind, surface.extent) == ("blocks", pytest.approx(stones.extent))
+    assert surface.kind == "blocks"
+    assert surface.extent == pytest.approx(stones.extent)
     scale = keys["vertical_scale"]
     assert surface.height + robot.terrain.height == pytest.approx(stones.height, abs=0.51 * scale)
 
@@ -127,7 +128,7 @@ def recording(rows: int, **columns: Any) -> Recording:
     for name, values in columns.items():
         data[:, names.index(name.replace("__", "."))] = values
     data[:, 0] = 0.1 * np.arange(rows)
-    return Recording(names, data)
+    return Recording(tuple(names), data)
 
 
 def test_the_height_on_a_surface_is_above_the_feet_in_contact() -> None:

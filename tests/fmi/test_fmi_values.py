@@ -53,12 +53,19 @@ LIMITED = [
     variable for variable in ATHENA.of_causality("input", "parameter") if variable.type == "Real"
 ]
 # values within their own limits that are invalid together: an impossible inertia, a law that
-# divides by the restitution, static friction under a law that has none
+# divides by the restitution, static friction below the kinetic one, stops in the wrong order
 RELATED = [
     *(variable.name for variable in LIMITED if ".inertia_" in variable.name),
+    *(
+        variable.name
+        for variable in LIMITED
+        if variable.name.endswith((".angle_min", ".angle_max"))
+    ),
     "contact.restitution",
     "friction.mu_static",
 ]
+DEEP = "deep in the ground"  # a start with its feet below the ground is refused
+LOWEST = -10000.0  # m  of the ground: limits of lengths do not put feet into it
 
 
 def started(plant: Plant) -> int:
@@ -84,7 +91,9 @@ def test_every_limit_is_accepted_to_the_end_of_initialization_and_nothing_beyond
         )
         assert plant.set_reals({variable.name: limit}) == OK
         if variable.name not in RELATED:
-            assert started(plant) == OK, plant.last_message
+            if started(plant) != OK:
+                assert DEEP in plant.last_message, variable.name
+                continue
             assert all(map(math.isfinite, plant.everything())), variable.name
 
 
@@ -93,7 +102,8 @@ def test_no_mixture_of_limits_makes_an_output_that_is_no_number(plant: Plant) ->
     free = [
         variable
         for variable in LIMITED
-        if variable.name not in RELATED and ".axis" not in variable.name
+        if variable.name not in [*RELATED, "initial.position[3]", "terrain.height"]
+        and ".axis" not in variable.name
     ]
     for count in (2, 5, 50, len(free)) * 50:
         assert plant.call("fmi2Reset") == OK
@@ -101,7 +111,7 @@ def test_no_mixture_of_limits_makes_an_output_that_is_no_number(plant: Plant) ->
             v.name: random.choice([v.minimum or 0.0, v.maximum or 0.0])
             for v in random.sample(free, count)
         }
-        assert plant.set_reals(limits) == OK
+        assert plant.set_reals(limits | {"terrain.height": LOWEST}) == OK
         assert (
             plant.set_references(
                 "fmi2SetInteger", ATHENA.references(["servo.mode"]), [random.randint(1, 3)]

@@ -228,7 +228,8 @@ def test_a_robot_file_may_name_a_surface() -> None:
     assert robot.hash != flat.hash
     other = robot_from_table(table_with(given | {"step_height": 0.031}), where="test")
     assert len({robot.hash, other.hash, flat.hash}) == 3
-    named = replace(robot.terrain, surface=replace(robot.terrain.surface, name="other"))  # type: ignore[type-var]
+    assert robot.terrain.surface is not None
+    named = replace(robot.terrain, surface=replace(robot.terrain.surface, name="other"))
     assert replace(robot, terrain=named).hash == robot.hash
 
 

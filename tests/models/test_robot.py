@@ -291,8 +291,8 @@ BAD: list[tuple[str, Callable[[Table], None], list[str]]] = [
     ),
     (
         "idle static friction",
-        lambda t: put(t, "friction.mu_static", 0.8),
-        ["friction.mu_static", "has no effect", "got '0.8 with the law tanh'", "leave it out"],
+        lambda t: t["friction"].update(mu_static=0.8, law="none"),
+        ["friction.mu_static", "has no effect", "got '0.8 with the law none'", "leave it out"],
     ),
     (
         "presliding 0",

@@ -9,12 +9,7 @@ import numpy as np
 import pytest
 
 from hexapod_cosim.models import BodyContact, Robot, load_robot
-from hexapod_cosim.models.contact import (
-    foot_contacts,
-    foot_force,
-    friction_force,
-    normal_force,
-)
+from hexapod_cosim.models.contact import foot_contacts, foot_force, normal_force
 from hexapod_cosim.models.dynamics import (
     Command,
     accelerations,
@@ -33,6 +28,7 @@ from hexapod_cosim.models.energy import (
     momentum,
     potential_energy,
 )
+from hexapod_cosim.models.friction import friction_force
 from hexapod_cosim.models.kinematics import (
     axis_normals,
     axis_quaternion,

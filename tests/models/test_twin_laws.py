@@ -15,9 +15,9 @@ from hexapod_cosim.models.contact import (
     achieved_restitution,
     contact_damping,
     exact_restitution_chi,
-    friction_force,
     normal_force,
 )
+from hexapod_cosim.models.friction import friction_force
 from hexapod_cosim.models.records import Array
 from hexapod_cosim.models.terrain import ground
 

@@ -8,12 +8,12 @@
 
 #include "contact_law.h"
 #include "elementary.h"
+#include "ground/surface.h"
 #include "hexapod/hexapod.h"
 #include "kernel.h"
 #include "lanes/dynamics.h"
 #include "method.h"
 #include "robot.h"
-#include "terrain.h"
 
 #if defined(__GNUC__)
 #pragma GCC diagnostic ignored                                                                     \
@@ -43,6 +43,8 @@ static const ProbeField fields[] = {
     FIELD(hxLink, com),
     FIELD(hxLink, inertia),
     FIELD(hxLink, axis),
+    FIELD(hxLink, angle_min),
+    FIELD(hxLink, angle_max),
     FIELD(hxLeg, hip_position),
     FIELD(hxLeg, hip_yaw),
     FIELD(hxLeg, link),
@@ -69,6 +71,9 @@ static const ProbeField fields[] = {
     FIELD(hxDefinition, friction.bristle_damping),
     FIELD(hxDefinition, friction.mu_static),
     FIELD(hxDefinition, friction.stribeck_speed),
+    FIELD(hxDefinition, friction.viscous),
+    FIELD(hxDefinition, friction.spin_radius),
+    FIELD(hxDefinition, friction.rolling_radius),
     FIELD(hxDefinition, servo.mode),
     FIELD(hxDefinition, servo.kp),
     FIELD(hxDefinition, servo.kd),
@@ -76,6 +81,8 @@ static const ProbeField fields[] = {
     FIELD(hxDefinition, servo.speed_max),
     FIELD(hxDefinition, servo.rotor_inertia),
     FIELD(hxDefinition, servo.coulomb_friction),
+    FIELD(hxDefinition, servo.stop_stiffness),
+    FIELD(hxDefinition, servo.stop_damping),
     FIELD(hxDefinition, baumgarte.alpha),
     FIELD(hxDefinition, baumgarte.beta),
     FIELD(hxDefinition, gravity),
@@ -282,6 +289,44 @@ HX_API double hx_probe_friction(const hxPlant *plant, double speed) {
   return hx_lane(hx_friction(&plant->model, hx_splat(speed)), 0);
 }
 
+/* Friction over load of the plant's law at a slip velocity, and at a deflection of its bristles.
+ * out: -f_t/f_n, db/dt, its slopes stiffness, damping, yield */
+HX_API void hx_probe_sliding(const hxPlant *plant, const double slip[3], const double b[3],
+                             double out[9]) {
+  const hxModel *model = &plant->model;
+  const hxVec3 v = hx_splat_vec3(slip), z = hx_splat_vec3(b);
+  const hxReal one = hx_splat(1.0), zero = hx_splat(0.0);
+  const hxFrictionAt at = {hx_splat(model->mu), hx_splat(model->static_rise)};
+  const hxReal drag = hx_friction_drag(model, at, hx_sqrt(hx_dot(v, v)));
+  hxBristle f = {hx_scale(drag, v), hx_zero3(), zero, drag, zero};
+  if (model->friction_law == HX_FRICTION_BRISTLE) f = hx_bristle(model, at, one, z, v);
+  if (model->friction_law == HX_FRICTION_LUGRE) f = hx_lugre(model, at, one, z, v);
+  put3(f.grip, 0, out), put3(f.rate, 0, out + 3);
+  out[6] = hx_lane(f.stiffness, 0), out[7] = hx_lane(f.damping, 0), out[8] = hx_lane(f.yield, 0);
+}
+
+/* Moment of spin and rolling friction over load at an angular velocity. out: moment, its slopes
+ * about the normal and across it */
+HX_API void hx_probe_turning(const hxPlant *plant, const double normal[3], const double w[3],
+                             double out[5]) {
+  const hxFrictionAt at = {hx_splat(plant->model.mu), hx_splat(plant->model.static_rise)};
+  const hxTurningFriction f =
+      hx_turning_friction(&plant->model, at, hx_splat(plant->model.radius[HX_FOOT]),
+                          hx_splat_vec3(normal), hx_splat_vec3(w));
+  put3(f.moment, 0, out);
+  out[3] = hx_lane(f.spin, 0), out[4] = hx_lane(f.roll, 0);
+}
+
+/* Stops of a joint. out: torque, the damper's part, stiffness, damping */
+HX_API void hx_probe_stop(const hxPlant *plant, int leg, int joint, double angle, double speed,
+                          double out[4]) {
+  const int lane = leg % HX_LANES;
+  const hxStop stop =
+      hx_stop_torque(&plant->model, joint, leg - lane, hx_splat(angle), hx_splat(speed));
+  out[0] = hx_lane(stop.torque, lane), out[1] = hx_lane(stop.damped, lane);
+  out[2] = hx_lane(stop.stiffness, lane), out[3] = hx_lane(stop.damping, lane);
+}
+
 /* Computes a servo. command: angle, speed, torque; out: torque, friction, stiffness, damping. */
 HX_API void hx_probe_servo(const hxPlant *plant, double angle, double speed,
                            const double command[3], double out[4]) {
@@ -294,19 +339,19 @@ HX_API void hx_probe_servo(const hxPlant *plant, double angle, double speed,
 
 /* Computes the ground at a point. out: distance, normal. */
 HX_API void hx_probe_ground(const hxPlant *plant, const double point[3], double out[4]) {
-  const hxGround ground = hx_ground(&plant->model, &plant->state.contact, HX_FOOT, 0, 1,
-                                    hx_splat_vec3(point));
+  const hxGround ground =
+      hx_ground(&plant->model, &plant->state.contact, HX_FOOT, 0, 1, hx_splat_vec3(point));
   out[0] = hx_lane(ground.distance, 0);
   put3(ground.normal, 0, out + 1);
 }
 
-/* A face of a grid at a point, kind: 0 top, 1 wall, 2 the nearer; out: distance, normal, its
+/* A face of a grid at a point, kind: an hxFaceKind; out: distance, normal, its
  * derivative by the point xx yy zz xy xz yz. */
 HX_API void hx_probe_face(const hxTerrain *terrain, int kind, const double point[3],
                           double out[10]) {
   const double none[2] = {-1.0, -1.0};
   hxFace face;
-  hx_terrain_face(terrain, (hxFaceKind)kind, none, point, &face);
+  hx_terrain_face(terrain, (hxFaceKind)kind, none, point, 1, &face);
   out[0] = face.distance;
   memcpy(out + 1, face.normal, sizeof face.normal);
   memcpy(out + 4, face.bend, sizeof face.bend);

@@ -15,8 +15,8 @@ from states import changed
 from test_laws_standing import ACCURATE, block, laid, marching, stood, tilted
 
 from hexapod_cosim.models import load_robot
-from hexapod_cosim.models.contact import SPRING_LIMIT, bristle_force, bristle_rate
 from hexapod_cosim.models.dynamics import Command
+from hexapod_cosim.models.friction import SPRING_LIMIT, bristle_force, bristle_rate
 from hexapod_cosim.models.records import Array
 
 FRICTION = replace(load_robot("athena").friction, law="bristle")

@@ -20,8 +20,8 @@ from states import changed
 from test_laws_standing import block, laid
 
 from hexapod_cosim.models import load_robot
-from hexapod_cosim.models.contact import bristle_force, bristle_rate, sliding_friction
 from hexapod_cosim.models.dynamics import Command
+from hexapod_cosim.models.friction import bristle_force, bristle_rate, sliding_friction
 from hexapod_cosim.models.records import Array
 
 FRICTION = replace(

@@ -37,6 +37,11 @@ VARIANTS: tuple[dict[str, dict[str, Any]], ...] = (
     {"friction": {"law": "none"}, "contact": {"law": "hertz"}},
     {"servo": {"mode": "kinematic"}},
     {"servo": {"mode": "torque"}, "terrain": {"kind": "slope", "incline": 0.2, "heading": 0.7}},
+    {"friction": {"mu_static": 1.1, "viscous": 0.3, "stribeck_speed": 0.3, "spin_radius": 0.01}},
+    {
+        "friction": {"law": "lugre", "stribeck_speed": 0.3, "rolling_radius": 0.01},
+        "servo": {"stop_stiffness": 50.0, "stop_damping": 0.1},
+    },
 )
 
 

@@ -15,15 +15,14 @@ from states import changed, distance, lopsided, random_bodies
 from hexapod_cosim.models import CONTACT_LAWS, Robot, load_robot
 from hexapod_cosim.models.actuator import gear_friction, servo_torque
 from hexapod_cosim.models.contact import (
-    bristle_rate,
     contact_damping,
     exact_restitution_chi,
     foot_contacts,
     foot_force,
-    friction_force,
     normal_force,
 )
 from hexapod_cosim.models.dynamics import joint_kinematics, world_inertias
+from hexapod_cosim.models.friction import bristle_rate, friction_force
 from hexapod_cosim.models.kinematics import (
     axis_normals,
     body_states,

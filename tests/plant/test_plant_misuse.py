@@ -151,7 +151,7 @@ IMPOSSIBLE: list[tuple[str, Any, str]] = [
     ("contact.restitution", 1.1, r"contact\.restitution: got 1\.1, expected 0 to 1"),
     ("contact.damping_factor", -1.0, r"contact\.damping_factor: got -1"),
     ("contact.impact_speed_floor", 0.0, r"contact\.impact_speed_floor: got 0"),
-    ("friction.law", 4, r"friction\.law: got 4, expected 1 to 3"),
+    ("friction.law", 5, r"friction\.law: got 5, expected 1 to 4"),
     ("friction.mu", -0.1, r"friction\.mu: got -0\.1"),
     ("friction.slope", math.nan, r"friction\.slope: got -?nan"),
     ("friction.presliding", 0.0, r"friction\.presliding: got 0, expected 1e-07 to 1 m"),
@@ -161,11 +161,16 @@ IMPOSSIBLE: list[tuple[str, Any, str]] = [
         0.1,
         r"friction\.mu_static: got 0\.1, expected at least friction\.mu, or 0",
     ),
+    ("friction.viscous", -1.0, r"friction\.viscous: got -1, expected 0 to 1000000 s/m"),
+    ("friction.spin_radius", -1.0, r"friction\.spin_radius: got -1, expected 0 to 10 m"),
+    ("friction.rolling_radius", math.nan, r"friction\.rolling_radius: got -?nan"),
+    ("servo.stop_stiffness", -1.0, r"servo\.stop_stiffness: got -1"),
+    ("servo.stop_damping", -1.0, r"servo\.stop_damping: got -1"),
+    ("leg[1].link[0].angle_max", 4.0, r"LM\.coxa\.angle_max: got 4, expected -3\.14159265 to"),
     (
-        "friction.mu_static",
-        0.8,
-        r"friction\.mu_static: got 0\.8, expected 0 or friction\.mu with this friction\.law; "
-        r"the bristle law alone",
+        "leg[0].link[2].angle_min",
+        3.0,
+        r"LF\.tibia\.angle_min: got 3, expected an angle below the joint's angle_max",
     ),
     ("friction.stribeck_speed", 0.0, r"friction\.stribeck_speed: got 0, expected 1e-06 to 100 m/s"),
     ("servo.mode", 4, r"servo\.mode: got 4, expected 1 to 3"),
@@ -205,6 +210,31 @@ IMPOSSIBLE: list[tuple[str, Any, str]] = [
         r"initial\.angular_velocity\[3\]: got -inf",
     ),
 ]
+
+
+def test_static_friction_is_refused_without_friction(core: ct.CDLL) -> None:
+    plant = midway(core)
+    start = definition(plant.robot)
+    start.friction.law, start.friction.mu_static = 2, 0.8
+    message = r"friction\.mu_static: got 0\.8, expected 0 or friction\.mu with friction\.law none"
+    refused(plant, lambda: plant.reset(start), INVALID_MODEL, message)
+
+
+def test_a_foot_deeper_than_its_radius_at_the_start_is_refused_with_its_name(
+    core: ct.CDLL,
+) -> None:
+    """The stance's feet have their centres 0.12 m below the torso's, and a radius of 15 mm."""
+    plant = midway(core)
+    stance = plant.robot.stance.copy()
+    height = 0.12
+    start = definition(plant.robot, position=(0.0, 0.0, height + 0.0049), angle=stance)
+    start.terrain.height = 0.025
+    message = (
+        r"initial\.position: got foot LF 0\.0351 m deep in the ground, expected at most its "
+        r"radius, 0\.015 m; raise initial\.position\[3\] by 0\.0201 m or more, or lower "
+        r"terrain\.height$"
+    )
+    refused(plant, lambda: plant.reset(start), INVALID_MODEL, message)
 
 
 @pytest.mark.parametrize(

@@ -11,6 +11,13 @@ from hexapod_cosim.cosim.run.walker import Walker
 from hexapod_cosim.cosim.scenario.scenario import list_scenarios, load_scenario
 
 STANDING = ("stand", "compliant")  # 0.3 J of work in all, of which 0.4 mJ are missing
+# held joints have no compliant control
+WALKS = [
+    (name, control)
+    for name in list_scenarios()
+    for control in ("kinematic", "compliant")
+    if (name, control) != ("drop", "compliant")
+]
 FAST = ("solver.method=ros2", "solver.tolerance=0.1")
 
 
@@ -20,8 +27,7 @@ def walker(plant_build: Path) -> Iterator[Walker]:
         yield made
 
 
-@pytest.mark.parametrize("name", list_scenarios())
-@pytest.mark.parametrize("control", ["kinematic", "compliant"])
+@pytest.mark.parametrize(("name", "control"), WALKS)
 def test_the_energy_balance_of_the_other_robot_closes_too(
     walker: Walker, name: str, control: str
 ) -> None:
@@ -30,8 +36,7 @@ def test_the_energy_balance_of_the_other_robot_closes_too(
     assert missing < (2e-3 if (name, control) == STANDING else 1e-4)
 
 
-@pytest.mark.parametrize("name", list_scenarios())
-@pytest.mark.parametrize("control", ["kinematic", "compliant"])
+@pytest.mark.parametrize(("name", "control"), WALKS)
 def test_the_energy_balance_of_every_bundled_scenario_closes(
     walker: Walker, name: str, control: str
 ) -> None:

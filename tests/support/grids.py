@@ -15,7 +15,7 @@ from hexapod_cosim.models import Robot
 from hexapod_cosim.models.records import Array
 
 SMOOTH, BLOCKS = 1, 2
-TOP, WALL, NEARER = range(3)
+TOP, WALL, SIDE, CORNER, NEAREST = range(5)
 GRID = 3  # terrain.kind
 
 
@@ -76,7 +76,7 @@ class Ground:
         """The checksum of the file."""
         return int(self.core.hx_terrain_checksum(self.handle))
 
-    def face(self, point: Any, kind: int = NEARER) -> tuple[float, Array, Array]:
+    def face(self, point: Any, kind: int = NEAREST) -> tuple[float, Array, Array]:
         """Returns distance, normal and its derivative (3, 3) at a point."""
         place = np.array(point, dtype=float)
         out = probed(

@@ -35,6 +35,7 @@ HxLink = record(
     ("com", Vector3),
     ("inertia", Vector6),
     ("axis", Vector3),
+    *reals("angle_min angle_max"),
 )
 HxLeg = record("HxLeg", ("hip_position", Vector3), ("hip_yaw", Real), ("link", HxLink * JOINTS))
 HxDefinition = record(
@@ -65,7 +66,10 @@ HxDefinition = record(
         record(
             "Friction",
             ("law", ct.c_int),
-            *reals("mu slope presliding bristle_damping mu_static stribeck_speed"),
+            *reals(
+                "mu slope presliding bristle_damping mu_static stribeck_speed viscous "
+                "spin_radius rolling_radius"
+            ),
         ),
     ),
     (
@@ -73,7 +77,10 @@ HxDefinition = record(
         record(
             "Servo",
             ("mode", ct.c_int),
-            *reals("kp kd torque_max speed_max rotor_inertia coulomb_friction"),
+            *reals(
+                "kp kd torque_max speed_max rotor_inertia coulomb_friction stop_stiffness "
+                "stop_damping"
+            ),
         ),
     ),
     ("baumgarte", record("Baumgarte", *reals("alpha beta"))),

@@ -190,6 +190,7 @@ def _put_link(target: Any, link: Link) -> None:
     put(target.com, link.com)
     put(target.inertia, link.inertia)
     put(target.axis, link.axis)
+    target.angle_min, target.angle_max = link.angle_min, link.angle_max
 
 
 def _put_settings(d: Any, robot: Robot) -> None:

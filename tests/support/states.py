@@ -122,8 +122,16 @@ def random_inertia(rng: np.random.Generator, mass: float, size: float) -> Vector
 
 def random_pose(robot: Robot, seed: int) -> dict[str, Array]:
     """Returns a moving initial state near the stance with three feet in the ground, the third by
-    0.5 mm.
+    0.5 mm, the others by half their radius at most.
     """
+    pose = _scattered_pose(robot, seed)
+    for leg in range(LEGS):
+        _raise_foot(robot, pose, leg)
+    return pose
+
+
+def _scattered_pose(robot: Robot, seed: int) -> dict[str, Array]:
+    """Returns a state as `random_pose`, in which two feet are in the ground at any depth."""
     rng = np.random.default_rng(seed)
     pose = {
         "position": np.array([0.3, -0.2, 0.0]),
@@ -135,6 +143,24 @@ def random_pose(robot: Robot, seed: int) -> dict[str, Array]:
     }
     pose["position"][2] = lift(robot, body_states(robot, **pose))
     return pose
+
+
+def _raise_foot(robot: Robot, pose: dict[str, Array], leg: int) -> None:
+    """Bends the femur of a leg whose foot is deeper than half its radius until it is as deep."""
+    given = float(pose["angle"][leg, 1])
+
+    def excess(bend: float) -> float:
+        pose["angle"][leg, 1] = given + bend
+        feet = foot_contacts(robot, body_states(robot, **pose))
+        return feet[leg].penetration - 0.5 * robot.foot.radius
+
+    low, high = 0.0, 1.0
+    if excess(low) <= 0.0:
+        return
+    for _ in range(30):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if excess(middle) > 0.0 else (low, middle)
+    excess(high)
 
 
 def lift(robot: Robot, body: Array) -> float:
@@ -175,7 +201,7 @@ def landing(robot: Robot, seed: int = 3) -> dict[str, Array]:
     """Returns a start with the lowest foot 2 mm above the ground, falling; feet touch down one
     after the other within about 50 ms.
     """
-    pose = random_pose(robot, seed) | {"velocity": np.array([0.1, 0.0, -0.5])}
+    pose = _scattered_pose(robot, seed) | {"velocity": np.array([0.1, 0.0, -0.5])}
     clearance = -max(foot.penetration for foot in foot_contacts(robot, body_states(robot, **pose)))
     pose["position"][2] += 2e-3 - clearance
     return pose

@@ -7,12 +7,16 @@ import { footCentres, poseAt } from "./kinematics";
 import { drawPath } from "./panels/overhead";
 import type { Panel } from "./panels/panel";
 import { labelTimes, panelMakers } from "./panels/panels";
+import { drawProfiles } from "./panels/profile";
 import type { Run } from "./panels/run";
 import { Span } from "./panels/span";
 import { unpack } from "./recording";
 import { Actor } from "./scene/actor";
+import { Relief } from "./scene/relief";
 import { Stage } from "./scene/stage";
 import { findStances } from "./scene/stances";
+import { unpackSurface } from "./scene/surface";
+import { contourDistance } from "./scene/terrain";
 import { enlargement } from "./scene/trails";
 import { property, readColours, Theme } from "./theme";
 import { makeWindowButtons, Transport } from "./transport";
@@ -30,8 +34,13 @@ async function start(): Promise<void> {
   const payload = JSON.parse(byId("recording")!.textContent!) as Payload;
   document.head.append(element("style", "", plotStyle));
   const theme = new Theme(byId<HTMLButtonElement>("theme"));
+  const surfaces = await Promise.all(payload.surfaces.map(unpackSurface));
   const runs: Run[] = await Promise.all(
-    payload.runs.map(async (run) => ({ run, recording: await unpack(run) })),
+    payload.runs.map(async (run) => ({
+      run,
+      recording: await unpack(run),
+      relief: new Relief(run.ground, surfaces[run.ground.surface ?? -1]),
+    })),
   );
   const clock = new Clock(
     Math.min(...runs.map(({ recording }) => recording.start)),
@@ -99,7 +108,8 @@ function makeStage(runs: readonly Run[]): Stage | undefined {
     return new Stage(
       host,
       able.map(
-        ({ run, recording }) => new Actor(run, recording, new Color(property(`--${run.label}`))),
+        ({ run, recording, relief }) =>
+          new Actor(run, recording, relief, new Color(property(`--${run.label}`))),
       ),
     );
   } catch {
@@ -143,8 +153,8 @@ function runFrames(clock: Clock, stage: Stage | undefined): void {
 
 async function addTrails(stage: Stage): Promise<void> {
   await nextTask();
-  const found = stage.actors.map(({ recording, run }) =>
-    findStances(recording, run.robot, run.ground),
+  const found = stage.actors.map(({ recording, run, relief }) =>
+    findStances(recording, run.robot, relief),
   );
   const enlarged = enlargement(found.flat());
   stage.actors.forEach((actor, k) => {
@@ -152,6 +162,17 @@ async function addTrails(stage: Stage): Promise<void> {
   });
   const note = byId("trail-note");
   if (note) note.textContent = enlarged > 1 ? `slip trails, ${enlarged} × as long` : "slip trails";
+  nameContours(stage);
+}
+
+/** Tells in the legend how far apart the contours are. */
+function nameContours(stage: Stage): void {
+  const surface = stage.actors.find(({ relief }) => relief.surface)?.relief.surface;
+  const apart = surface ? contourDistance(surface) : 0;
+  const note = byId("contour-note");
+  if (!note || apart <= 0) return;
+  note.textContent = `contours every ${Number((1e3 * apart).toPrecision(3))} mm`;
+  note.parentElement?.removeAttribute("hidden");
 }
 
 /** Makes one plot after the other; between them the browser can handle other tasks. */
@@ -172,6 +193,7 @@ async function makePanels(runs: readonly Run[], clock: Clock): Promise<Panel[]> 
   }
   labelTimes();
   drawPath(runs, clock);
+  drawProfiles(runs, clock);
   clock.listen(() => cycles.follow(clock.time));
   return panels;
 }

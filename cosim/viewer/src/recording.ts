@@ -75,7 +75,8 @@ export async function unpack(run: PackedRun): Promise<Recording> {
   return new Recording(time, columns);
 }
 
-async function inflate(text: string): Promise<Uint8Array> {
+/** Returns the bytes of a base64 text that zlib compressed. */
+export async function inflate(text: string): Promise<Uint8Array> {
   const raw = atob(text);
   const bytes = new Uint8Array(raw.length);
   for (let k = 0; k < raw.length; k++) bytes[k] = raw.charCodeAt(k);

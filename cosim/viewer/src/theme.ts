@@ -8,6 +8,11 @@ export interface Colours {
   readonly grid: Color;
   readonly force: Color;
   readonly print: Color;
+  readonly contour: Color;
+  readonly edge: Color;
+  readonly soil: Color;
+  readonly slippery: Color;
+  readonly patch: Color;
 }
 
 const KEY = "hexapod-report-theme";
@@ -26,6 +31,11 @@ export function readColours(): Colours {
     grid: colour("--grid"),
     force: colour("--force"),
     print: colour("--print"),
+    contour: colour("--contour"),
+    edge: colour("--edge"),
+    soil: colour("--soil"),
+    slippery: colour("--slippery"),
+    patch: colour("--patch"),
   };
 }
 

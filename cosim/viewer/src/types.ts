@@ -26,10 +26,47 @@ export interface Robot {
   readonly thickness: readonly number[];
 }
 
+/** A foot on the ground: leg, begin [s], x and y [m], depth below the surface [m]. */
+export type PackedStance = readonly [number, number, number, number, number];
+
+/** Heights [0.1 mm] along the torso's path, and touch-downs: leg, time [s], way, height [m]. */
+export interface PackedProfile {
+  readonly begin: number;
+  readonly end: number;
+  readonly ground: readonly number[];
+  readonly low: readonly number[];
+  readonly high: readonly number[];
+  readonly feet: readonly (readonly [number, number, number, number])[];
+}
+
+/** A plane; with `surface`, the number of the surface whose heights are above the plane's. */
 export interface Ground {
   readonly height: number;
   readonly rise: number;
   readonly heading: number;
+  readonly surface?: number;
+  readonly stances?: readonly PackedStance[];
+  readonly profile?: PackedProfile;
+}
+
+export interface Material {
+  readonly look: string;
+  readonly text: string;
+}
+
+export interface PackedSurface {
+  readonly kind: "smooth" | "blocks";
+  readonly name: string;
+  readonly rows: number;
+  readonly columns: number;
+  readonly x0: number;
+  readonly y0: number;
+  readonly cell: number;
+  readonly low: number;
+  readonly step: number;
+  readonly data: string;
+  readonly materials: readonly Material[];
+  readonly material: string;
 }
 
 export interface PackedRun {
@@ -47,5 +84,6 @@ export interface PackedRun {
 
 export interface Payload {
   readonly contact: number;
+  readonly surfaces: readonly PackedSurface[];
   readonly runs: readonly PackedRun[];
 }

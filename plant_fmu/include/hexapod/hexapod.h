@@ -6,7 +6,8 @@
  * RR, joints (and the link each one moves) in the order coxa, femur, tibia. Bodies: 0 = torso, 1 +
  * 3 leg + joint = link. Equation numbers refer to docs/equations.md.
  *
- * A plant contains no pointers and no hidden state, and the library has no globals: a plant's
+ * A plant contains no pointer but the one to its terrain and no hidden state, and the library has
+ * no globals: a plant's
  * bytes are its state. After hx_plant_create no function allocates, prints or exits.
  */
 #ifndef HEXAPOD_H
@@ -39,7 +40,8 @@ typedef enum hxContactLaw {
 typedef enum hxFrictionLaw {
   HX_FRICTION_TANH = 1,
   HX_FRICTION_NONE,
-  HX_FRICTION_BRISTLE
+  HX_FRICTION_BRISTLE,
+  HX_FRICTION_LUGRE
 } hxFrictionLaw;
 
 typedef enum hxTerrainKind {
@@ -76,6 +78,8 @@ typedef struct hxLink {
   double com[3];     /* m      centre of mass, link axes */
   double inertia[6]; /* kg m2  about the centre of mass, link axes: xx yy zz xy xz yz */
   double axis[3];    /* 1      parent link's axes (coxa: hip axes), normalised on use */
+  double angle_min;  /* rad    the joint's stops are at angle_min and angle_max */
+  double angle_max;  /* rad    > angle_min */
 } hxLink;
 
 typedef struct hxLeg {
@@ -113,11 +117,14 @@ typedef struct hxDefinition {
   struct {
     int law;                /* hxFrictionLaw */
     double mu;              /* 1 */
-    double slope;           /* s/m  k_t of eq. 15, tanh law */
-    double presliding;      /* m    b_max of eq. 16, bristle law: a foot pushed this far slides */
-    double bristle_damping; /* s    tau of eq. 17, bristle law: damping over stiffness */
-    double mu_static;       /* 1    static friction, bristle law; 0: mu */
-    double stribeck_speed;  /* m/s  v_s of eq. 18, bristle law: half-way from mu_static to mu */
+    double slope;           /* s/m  k_t of eq. 15, tanh law, and of eq. 38 */
+    double presliding;      /* m    b_max of eq. 16, 36: a foot pushed this far slides */
+    double bristle_damping; /* s    tau of eq. 17, 37: damping of bristles over their stiffness */
+    double mu_static;       /* 1    static friction; 0: mu */
+    double stribeck_speed;  /* m/s  v_s of eq. 18: half-way from mu_static to mu */
+    double viscous;         /* s/m  of eq. 35: coefficient added for each m/s of slip; 0: none */
+    double spin_radius;     /* m    r_s of eq. 38: moment against spin over mu f_n; 0: none */
+    double rolling_radius;  /* m    r_r of eq. 38: moment against rolling over f_n; 0: none */
   } friction;
   struct {
     int mode;                /* hxServoMode, all joints */
@@ -127,6 +134,8 @@ typedef struct hxDefinition {
     double speed_max;        /* rad/s    no-load speed: the torque-speed line ends here */
     double rotor_inertia;    /* kg m2    seen at the joint */
     double coulomb_friction; /* N m      in the gear, regularised by tanh(speed / 0.05 rad/s) */
+    double stop_stiffness;   /* N m/rad    k of the joints' stops (eq. 39); 0: no stops */
+    double stop_damping;     /* N m s/rad  c of eq. 39 */
   } servo;
   struct {
     double alpha, beta; /* 1/s */
@@ -184,7 +193,7 @@ typedef struct hxOutput {
     double position[HX_LEGS][3];      /* m    contact point: the foot's lowest point */
     double velocity[HX_LEGS][3];      /* m/s  of the foot's material at the contact point */
     double slip_speed[HX_LEGS];       /* m/s  tangential part of the velocity */
-    double bristle[HX_LEGS][3];       /* m    b of eq. 16; 0 without the bristle law */
+    double bristle[HX_LEGS][3];       /* m    b of eq. 16, 36; 0 with other laws */
     double penetration[HX_LEGS];      /* m    < 0: clearance */
     double impact_speed[HX_LEGS];     /* m/s  at the last touch-down */
     double slip_distance[HX_LEGS];    /* m    slip under more than 1 % of the weight */
@@ -213,13 +222,13 @@ typedef struct hxOutput {
   } imu;
   struct {
     double kinetic;       /* J  bodies and rotors */
-    double potential;     /* J  gravity and the elastic part of the contacts */
+    double potential;     /* J  gravity and the elastic parts of contacts and stops */
     double actuator_work; /* J  by the motors on the joints */
     double push_work;     /* J  by push_force and push_torque */
     double dissipated;    /* J  in contact, friction (with bristles' energy) and gears */
     double contact_loss;  /* J  in the normal contact */
     double friction_loss; /* J  in friction */
-    double gear_loss;     /* J  in the gears */
+    double gear_loss;     /* J  in the gears and at the joints' stops */
     double residual;      /* J  stored - stored at start - works + dissipated: audit error */
   } energy;
   struct {
@@ -244,7 +253,7 @@ typedef struct hxCoordinates {
   double actuator_work;              /* J */
   double push_work;                  /* J */
   double dissipated;                 /* J */
-  double bristle[HX_LEGS][3];        /* m      world axes; 0 without the bristle law */
+  double bristle[HX_LEGS][3];        /* m      world axes; 0 with other laws */
 } hxCoordinates;
 
 enum { HX_COORDINATES = sizeof(hxCoordinates) / sizeof(double) };

@@ -21,6 +21,9 @@ void hx_check_fail(hxChecker *checker, const char *name, double got, const char 
 /* Fails for the first of n numbers that is outside its range. NaN is outside every range. */
 void hx_check_ranges(hxChecker *checker, const void *structure, const hxRange *range, size_t n);
 
+/* Returns the name of a leg, for example "LF". */
+const char *hx_leg_name(int leg);
+
 /* Writes the variable's name, for example "LF.coxa.QUANTITY". */
 void hx_joint_label(int leg, int joint, const char *quantity, char name[32]);
 

@@ -31,8 +31,8 @@ typedef struct hxTerrain hxTerrain;
 
 typedef enum hxTerrainSurface { HX_SURFACE_SMOOTH = 1, HX_SURFACE_BLOCKS } hxTerrainSurface;
 
-/* Columns of a material. NaN in the first three: as the definition has it. The others belong to
- * the soil's law. */
+/* Columns of a material. NaN in the first three: as the definition has it; mu_static: as mu, where
+ * mu is given. The others belong to the soil's law. */
 typedef enum hxMaterialColumn {
   HX_MATERIAL_MU,        /* 1        friction.mu */
   HX_MATERIAL_MU_STATIC, /* 1        friction.mu_static */

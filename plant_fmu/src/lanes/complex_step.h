@@ -24,6 +24,7 @@ static inline hxComplex hx_complex(double re, double im) {
   return x;
 }
 
+enum { HX_HAS_SLOPES = 1 };
 static inline double hx_slope(hxComplex x) { return hx_im(x); }
 static inline hxComplex hx_with_slope(double x, double slope) { return hx_complex(x, slope); }
 

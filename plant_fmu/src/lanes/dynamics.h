@@ -36,8 +36,8 @@ static inline void sweep_sum(const hxModel *model, const hxRigid6 *own, hxReal r
 HX_RARE void sweep_rows(const hxModel *model, const hxImplicit *implicit, int pack,
                         const hxRigid6 *own, const hxReal *resists, hxLegWork *leg, hxInertia6 *I) {
   *I = row_inertia(model, implicit, pack, HX_FOOT, leg);
-  for (int k = 1; k < model->rows; ++k) {
-    const hxInertia6 row = row_inertia(model, implicit, pack, model->row[k], leg);
+  for (int k = 1; k < leg->rows; ++k) {
+    const hxInertia6 row = row_inertia(model, implicit, pack, leg->row[k], leg);
     *I = hx_inertia_add(I, &row);
   }
   sweep_sum(model, own, *resists, &leg->joint[HX_JOINTS - 1].sweep, I);
@@ -52,9 +52,9 @@ static inline void sweep_inertia(const hxModel *model, const hxImplicit *implici
   hxReal resists = hx_splat(model->rotor_inertia);
   if (implicit) {
     const double z = implicit->z;
-    resists += z * servo_damping(implicit, pack, joint) +
-               (z * z) * implicit->slope[pack].motor_stiffness[joint];
-    if (joint == HX_JOINTS - 1 && model->rows > 1) {
+    resists += z * joint_damping(model, implicit, pack, joint) +
+               (z * z) * joint_stiffness(model, implicit, pack, joint);
+    if (joint == HX_JOINTS - 1 && leg->rows > 1) {
       sweep_rows(model, implicit, pack, &own, &resists, leg, I);
       return;
     }
@@ -94,7 +94,7 @@ static inline void leg_multipliers(const hxModel *model, const hxImplicit *impli
   const int slot = pack * HX_LANES;
   /* at the link's centre of mass: from the ground, then from the child */
   hxForce6 handed = row_wrench(model, implicit, pack, HX_FOOT, leg);
-  if (model->rows > 1) handed = hx_force_add(handed, further_wrenches(model, implicit, pack, leg));
+  if (leg->rows > 1) handed = hx_force_add(handed, further_wrenches(model, implicit, pack, leg));
   for (int joint = HX_JOINTS - 1; joint >= 0; --joint) {
     hxJointWork *k = &leg->joint[joint];
     const hxJointKinematics *kin = &k->reaction.kin;
@@ -246,7 +246,7 @@ static inline void store_bristle_rates(const hxModel *model, const hxContactStat
   for (int i = 0; i < 3 && HX_PACKS * HX_LANES < HX_SLOTS; ++i) hx_fill_slots(rate->bristle[i]);
 }
 
-/* Powers that contact damping, friction and gears of all legs dissipate, W. */
+/* Powers that contact damping, friction, and gears with stops of all legs dissipate, W. */
 typedef struct {
   hxNumber contact, friction, gear;
 } hxLossPowers;
@@ -267,6 +267,15 @@ HX_RARE void add_torso_losses(const hxModel *model, const hxWork *work, hxLossPo
   losses->friction += hx_sum_slots(friction);
 }
 
+/* Returns the power that spin and rolling friction of all rows of a leg's foot dissipates, W. */
+HX_RARE hxReal turning_power(const hxLegWork *leg) {
+  hxReal power = hx_splat(0.0);
+  for (int k = 0; k < leg->rows; ++k)
+    if (leg->row[k] < HX_FOOT_ROWS)
+      power -= hx_dot(leg->contact[leg->row[k]].moment, leg->joint[HX_JOINTS - 1].body.w);
+  return power;
+}
+
 /* Returns the sums of the powers that all contacts, friction and gears dissipate. */
 static inline hxLossPowers hx_loss_powers(const hxModel *model, const hxWork *work) {
   hxReal contact[HX_PACKS], friction[HX_PACKS], gear[HX_PACKS];
@@ -274,17 +283,20 @@ static inline hxLossPowers hx_loss_powers(const hxModel *model, const hxWork *wo
     const hxLegWork *leg = &work->pack[pack];
     contact[pack] = damping_power(&leg->contact[HX_FOOT]);
     friction[pack] = hx_friction_power(model, HX_FOOT, &leg->contact[HX_FOOT]);
+    if (has_turning_friction(model, HX_FOOT)) friction[pack] += turning_power(leg);
     gear[pack] = hx_splat(0.0);
-    for (int k = 1; k < model->rows; ++k) {
-      contact[pack] += damping_power(&leg->contact[model->row[k]]);
-      friction[pack] += hx_friction_power(model, model->row[k], &leg->contact[model->row[k]]);
+    for (int k = 1; k < leg->rows; ++k) {
+      contact[pack] += damping_power(&leg->contact[leg->row[k]]);
+      friction[pack] += hx_friction_power(model, leg->row[k], &leg->contact[leg->row[k]]);
     }
-    for (int joint = 0; joint < HX_JOINTS; ++joint)
+    for (int joint = 0; joint < HX_JOINTS; ++joint) {
       gear[pack] -= leg->joint[joint].servo.friction * leg->joint[joint].speed;
+      if (model->stops) gear[pack] += leg->joint[joint].stop.damped * leg->joint[joint].speed;
+    }
   }
   hxLossPowers losses = {hx_lane(hx_sum_legs(contact), 0), hx_lane(hx_sum_legs(friction), 0),
                          hx_lane(hx_sum_legs(gear), 0)};
-  if (model->torso_rows) add_torso_losses(model, work, &losses);
+  if (work->torso_rows) add_torso_losses(model, work, &losses);
   return losses;
 }
 
@@ -316,13 +328,43 @@ typedef struct {
   hxNumber push[6];                        /* N s, N m s   force, then torque on the torso */
   hxVec3 contact[HX_TIBIA_ROWS][HX_PACKS]; /* N s    ground on feet and tibias */
   hxVec3 torso[HX_TORSO_PACKS];            /* N s    ground on the torso's points */
+  hxReal stop[HX_JOINTS][HX_PACKS];        /* N m s  stops on the joints */
+  hxVec3 moment[HX_FOOT_ROWS][HX_PACKS];   /* N m s  spin and rolling friction on tibias */
 } hxImpulses;
 
-/* Sets the impulses to 0; those of other contacts than feet, only where the model has some. */
+/* Sets the impulses to 0; those of other contacts than feet, of stops and of moments only where
+ * the model has some. */
 static inline void hx_clear_impulses(const hxModel *model, hxImpulses *sum) {
   memset(sum, 0, offsetof(hxImpulses, contact) + sizeof sum->contact[HX_FOOT]);
   if (model->rows > 1) memset(&sum->contact[1], 0, sizeof sum->contact - sizeof sum->contact[0]);
   if (model->torso_rows) memset(sum->torso, 0, sizeof sum->torso);
+  if (model->stops) memset(sum->stop, 0, sizeof sum->stop);
+  if (has_turning_friction(model, HX_FOOT)) memset(sum->moment, 0, sizeof sum->moment);
+}
+
+/* Adds a stage's impulses of the stops of a leg. */
+HX_RARE void add_stop_impulses(const hxImplicit *implicit, int pack, const hxLegWork *leg, double w,
+                               hxImpulses *sum) {
+  for (int joint = 0; joint < HX_JOINTS; ++joint) {
+    const hxJointWork *k = &leg->joint[joint];
+    hxReal torque = k->stop.torque;
+    if (implicit) {
+      const double z = implicit->z;
+      torque -= implicit->slope[pack].stop_stiffness[joint] * (k->angle_shift + (z * z) * k->qdd) +
+                implicit->slope[pack].stop_damping[joint] * (k->speed_shift + z * k->qdd);
+    }
+    sum->stop[joint][pack] += w * torque;
+  }
+}
+
+/* Adds a stage's impulses of the spin and rolling friction of a leg. */
+HX_RARE void add_moment_impulses(const hxImplicit *implicit, int pack, const hxLegWork *leg,
+                                 double w, hxImpulses *sum) {
+  for (int k = 0; k < leg->rows && leg->row[k] < HX_FOOT_ROWS; ++k) {
+    hxVec3 *moment = &sum->moment[leg->row[k]][pack];
+    const hxVec3 stage = row_stage_moment(implicit, pack, leg->row[k], leg);
+    *moment = hx_add_scaled(*moment, hx_splat(w), stage);
+  }
 }
 
 /* Adds a stage's impulses of a row of contacts on the tibias. */
@@ -337,9 +379,9 @@ HX_RARE void add_further_impulses(const hxModel *model, const hxImplicit *implic
                                   const hxWork *work, double weight, hxImpulses *sum) {
   const hxReal w = hx_splat(weight);
   for (int pack = 0; pack < HX_PACKS; ++pack)
-    for (int k = 1; k < model->rows; ++k)
-      add_row_impulse(model, implicit, pack, model->row[k], &work->pack[pack], w, sum);
-  for (int pack = 0; model->torso_rows && pack < HX_TORSO_PACKS; ++pack)
+    for (int k = 1; k < work->pack[pack].rows; ++k)
+      add_row_impulse(model, implicit, pack, work->pack[pack].row[k], &work->pack[pack], w, sum);
+  for (int pack = 0; work->torso_rows && pack < HX_TORSO_PACKS; ++pack)
     sum->torso[pack] =
         hx_add_scaled(sum->torso[pack], w,
                       stage_force(model, implicit, implicit ? &implicit->torso_slope[pack] : NULL,
@@ -371,6 +413,8 @@ static inline void hx_add_impulses(const hxModel *model, const hxCommand *comman
       sum->gear[joint][pack] += w * gear;
     }
     add_row_impulse(model, implicit, pack, HX_FOOT, leg, w, sum);
+    if (model->stops) add_stop_impulses(implicit, pack, leg, weight, sum);
+    if (has_turning_friction(model, HX_FOOT)) add_moment_impulses(implicit, pack, leg, weight, sum);
   }
   if (model->rows + model->torso_rows > 1) add_further_impulses(model, implicit, work, weight, sum);
   for (int i = 0; i < 3; ++i) {
@@ -396,7 +440,7 @@ static void hx_dynamics_evaluate(const hxModel *model, const hxContactState *con
     leg_response(model, implicit, motion, pack, &work->pack[pack]);
     if (has_bristles(model, HX_FOOT)) bristle_response(implicit, pack, HX_FOOT, &work->pack[pack]);
   }
-  if (implicit && model->torso_rows) torso_response(model, contact, motion, implicit, work);
+  if (implicit && work->torso_rows) torso_response(model, contact, motion, implicit, work);
 
   /* sweeps: leaf to root, the torso, root to leaf. Packs alternate, so that the operations of one
    * overlap the latency of the other. */
@@ -407,7 +451,7 @@ static void hx_dynamics_evaluate(const hxModel *model, const hxContactState *con
   for (int joint = HX_JOINTS - 1; joint >= 0; --joint)
     for (int pack = 0; pack < HX_PACKS; ++pack)
       sweep_force(&work->pack[pack].joint[joint], &p[pack]);
-  if (model->torso_rows) add_torso_contacts(model, implicit, work, I, p);
+  if (work->torso_rows) add_torso_contacts(model, implicit, work, I, p);
   work->torso_acceleration = torso_acceleration(model, command, work, I, p);
   for (int pack = 0; pack < HX_PACKS; ++pack) {
     hxMotion6 a = work->torso_acceleration;

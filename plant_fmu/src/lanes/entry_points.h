@@ -62,13 +62,23 @@ static void kernel_switch_contacts(const hxModel *model, const hxDepths *depths,
     hx_contact_slacken(&state->contact, &state->motion); /* the importer may have set bristles */
 }
 
-/* Computes the impulse h/2 (previous force + present force) of a row of contacts, and keeps the
- * present force as the previous one. */
-static hxVec3 contact_impulse(const hxContactWork *contact, hxReal half, int slot,
-                              double (*previous)[HX_SLOTS]) {
+/* Computes the impulse h/2 (previous force + present force), and keeps the present force as the
+ * previous one. */
+static hxVec3 vec3_impulse(hxVec3 force, hxReal half, int slot, double (*previous)[HX_SLOTS]) {
   const hxVec3 before = hx_load_vec3((const double (*)[HX_SLOTS])previous, slot);
-  hx_store_vec3(previous, slot, contact->force);
-  return hx_scale(half, hx_add3(before, contact->force));
+  hx_store_vec3(previous, slot, force);
+  return hx_scale(half, hx_add3(before, force));
+}
+
+/* Computes the same of the stops of a leg. */
+static void stop_impulses(const hxLegWork *leg, hxReal half, int pack, hxCompleted *completed,
+                          hxImpulses *impulses) {
+  for (int joint = 0; joint < HX_JOINTS; ++joint) {
+    double *previous = &completed->stop[joint][pack * HX_LANES];
+    const hxReal torque = leg->joint[joint].stop.torque;
+    impulses->stop[joint][pack] = half * (hx_load(previous) + torque);
+    hx_store(previous, torque);
+  }
 }
 
 /* Computes the impulses h/2 (previous forces + present forces), and keeps the present forces as
@@ -87,15 +97,19 @@ static void trapezoidal_impulses(const hxModel *model, const hxWork *work, doubl
       hx_store(motor, servo->torque);
       hx_store(gear, servo->friction);
     }
+    if (model->stops) stop_impulses(leg, half, pack, completed, impulses);
     for (int k = 0; k < model->rows; ++k) {
       const int row = model->row[k];
       impulses->contact[row][pack] =
-          contact_impulse(&leg->contact[row], half, slot, completed->contact[row]);
+          vec3_impulse(leg->contact[row].force, half, slot, completed->contact[row]);
+      if (has_turning_friction(model, row))
+        impulses->moment[row][pack] =
+            vec3_impulse(leg->contact[row].moment, half, slot, completed->moment[row]);
     }
   }
   for (int pack = 0; model->torso_rows && pack < HX_TORSO_PACKS; ++pack)
-    impulses->torso[pack] = contact_impulse(&work->torso_contact[pack], hx_splat(0.5 * h),
-                                            pack * HX_LANES, completed->contact[HX_TORSO]);
+    impulses->torso[pack] = vec3_impulse(work->torso_contact[pack].force, hx_splat(0.5 * h),
+                                         pack * HX_LANES, completed->contact[HX_TORSO]);
   completed->known = 1.0;
 }
 
@@ -141,9 +155,12 @@ static void kernel_measure(const hxModel *model, const hxCommand *command, hxSta
   for (int joint = 0; joint < HX_JOINTS; ++joint) {
     hx_fill_slots(state->completed.motor[joint]);
     hx_fill_slots(state->completed.gear[joint]);
+    hx_fill_slots(state->completed.stop[joint]);
   }
   for (int k = 0; k < model->rows; ++k)
     for (int i = 0; i < 3; ++i) hx_fill_slots(state->completed.contact[model->row[k]][i]);
+  for (int row = 0; row < HX_FOOT_ROWS; ++row)
+    for (int i = 0; i < 3; ++i) hx_fill_slots(state->completed.moment[row][i]);
 }
 
 static void kernel_output(const hxModel *model, const hxState *state, const hxCommand *command,

@@ -127,7 +127,7 @@ static inline void leg_pass(const hxModel *model, const hxCommand *command, doub
                joint > 0 ? &leg->joint[joint - 1].body : torso, &chain, &leg->joint[joint]);
 }
 
-/* Computes the torques of motor and gear on a joint (eq. 12). */
+/* Computes the torques of motor, gear and stops on a joint (eq. 12, 39). */
 static inline void joint_torque(const hxModel *model, const hxCommand *command, int joint, int slot,
                                 hxJointWork *k) {
   k->servo = hx_servo_torque(model, k->angle, k->speed, hx_load(&command->angle[joint][slot]),
@@ -135,6 +135,10 @@ static inline void joint_torque(const hxModel *model, const hxCommand *command, 
                              hx_load(&command->torque[joint][slot]));
   k->torque = model->servo_mode == HX_SERVO_KINEMATIC ? k->servo.friction
                                                       : k->servo.torque + k->servo.friction;
+  if (model->stops) {
+    k->stop = hx_stop_torque(model, joint, slot, k->angle, k->speed);
+    k->torque += k->stop.torque;
+  }
 }
 
 static inline hxMotion6 torso_velocity(const hxPlantMotion *m) {
@@ -156,6 +160,9 @@ static inline void push_body(hxForce6 *p, hxVec3 x, hxVec3 force) {
   p->ang = hx_sub3(p->ang, hx_cross(x, force));
 }
 
+/* Applies a moment to a body. */
+static inline void turn_body(hxForce6 *p, hxVec3 moment) { p->ang = hx_sub3(p->ang, moment); }
+
 /* Computes the contact force of a row and applies it to the tibia. */
 HX_INLINE void leg_contact(const hxModel *model, const hxContactState *state,
                            const hxPlantMotion *motion, int row, int slot, int all,
@@ -165,16 +172,32 @@ HX_INLINE void leg_contact(const hxModel *model, const hxContactState *state,
   contact->kin = hx_tibia_contact(model, state, motion, row, slot, all, &tibia->body);
   hx_contact_force(model, state, row, slot, motion, contact);
   push_body(&tibia->p, contact_point(leg, contact), contact->force);
+  if (has_turning_friction(model, row)) {
+    hx_contact_moment(model, state, row, slot, &tibia->body.w, contact);
+    turn_body(&tibia->p, contact->moment);
+  }
+}
+
+/* Returns whether a row has a closed contact in a pack. */
+static inline int is_used(const hxContactState *state, int row, int slot) {
+  int used = 0;
+  for (int lane = 0; lane < HX_LANES; ++lane) used |= hx_re(state->closed[row][slot + lane]) != 0.0;
+  return used;
 }
 
 HX_RARE void further_contacts(const hxModel *model, const hxContactState *state,
                               const hxPlantMotion *motion, int slot, int all, hxLegWork *leg) {
-  for (int k = 1; k < model->rows; ++k) leg_contact(model, state, motion, model->row[k], slot, all, leg);
+  for (int k = 1; k < model->rows; ++k)
+    if (all || is_used(state, model->row[k], slot)) {
+      leg->row[leg->rows++] = model->row[k];
+      leg_contact(model, state, motion, model->row[k], slot, all, leg);
+    }
 }
 
-/* Computes the contact forces of a leg. */
-HX_INLINE void leg_contacts(const hxModel *model, const hxContactState *state,
-                            const hxPlantMotion *motion, int slot, int all, hxLegWork *leg) {
+/* Computes the contact forces of a leg; without all, only those of rows with closed contacts. */
+static inline void leg_contacts(const hxModel *model, const hxContactState *state,
+                                const hxPlantMotion *motion, int slot, int all, hxLegWork *leg) {
+  leg->rows = 1, leg->row[0] = HX_FOOT;
   leg_contact(model, state, motion, HX_FOOT, slot, all, leg);
   if (model->rows > 1) further_contacts(model, state, motion, slot, all, leg);
 }
@@ -182,6 +205,9 @@ HX_INLINE void leg_contacts(const hxModel *model, const hxContactState *state,
 /* Computes the contact forces of the torso and applies them. */
 HX_RARE void torso_contacts(const hxModel *model, const hxContactState *state,
                             const hxPlantMotion *motion, int all, hxWork *work) {
+  for (int slot = 0; slot < HX_SLOTS; slot += HX_LANES)
+    work->torso_rows |= all || is_used(state, HX_TORSO, slot);
+  if (!work->torso_rows) return;
   for (int pack = 0; pack < HX_TORSO_PACKS; ++pack) {
     hxContactWork *contact = &work->torso_contact[pack];
     const int slot = pack * HX_LANES;
@@ -220,6 +246,7 @@ static inline void hx_dynamics_forces(const hxModel *model, const hxContactState
       joint_torque(model, command, joint, pack * HX_LANES, &work->pack[pack].joint[joint]);
   for (int pack = 0; pack < HX_PACKS; ++pack)
     leg_contacts(model, contact, motion, pack * HX_LANES, all, &work->pack[pack]);
+  work->torso_rows = 0;
   if (model->torso_rows) torso_contacts(model, contact, motion, all, work);
 }
 

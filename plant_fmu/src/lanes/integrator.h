@@ -216,8 +216,7 @@ static double deepest_open(const hxStart *start, const hxDepths *depths) {
   double depth = deepest_open_of(start->contact, depths, HX_FOOT, HX_LEGS, -HUGE_VAL);
   for (int k = 1; k < model->rows; ++k)
     depth = deepest_open_of(start->contact, depths, model->row[k], HX_LEGS, depth);
-  if (model->torso_rows)
-    depth = deepest_open_of(start->contact, depths, HX_TORSO, HX_SLOTS, depth);
+  if (model->torso_rows) depth = deepest_open_of(start->contact, depths, HX_TORSO, HX_SLOTS, depth);
   for (int leg = 0; model->terrain && leg < HX_LEGS; ++leg)
     depth = fmax(depth, depths->outside[leg]);
   return depth;

@@ -69,6 +69,7 @@ static inline hxReal hx_load(const double *slots) {
 static inline void hx_store(double *slots, hxReal x) { memcpy(slots, &x, sizeof x); }
 
 /* Numbers of complex_step.h have a real part and a derivative; these have no derivative. */
+enum { HX_HAS_SLOPES = 0 };
 static inline double hx_re(double x) { return x; }
 static inline double hx_slope(double x) {
   (void)x;

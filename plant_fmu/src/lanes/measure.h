@@ -17,7 +17,6 @@
 static const double landing_sample = 1e-4; /* s  between two samples of a landing's force */
 static const double nearly_sliding = 0.9;  /* 1  of the friction cone */
 static const double shortest_bend = 1e-7;  /* s  shorter steps: differences are rounding errors */
-static const double half_turn = 3.14159265358979323846;
 
 /* Nodes of a step at which forces are evaluated, and Simpson's weights: feet use all nodes, motors
  * every second one. */
@@ -100,6 +99,7 @@ static inline void hx_moment_of(const hxModel *model, const hxContactState *stat
       const hxVec3 s = hx_mul(i.R_WB, hx_load_vec3(m->s_i, slot));
       hx_store(&moment->speed[joint][slot], hx_dot(s, hx_sub3(j.w, i.w)));
     }
+    hx_store_vec3(moment->turn, slot, j.w);
     row_moment(model, state, motion, HX_FOOT, slot, &j, moment);
     if (model->rows > 1) further_moments(model, state, motion, slot, &j, moment);
   }
@@ -115,17 +115,16 @@ static inline void hx_copy_moment(const hxModel *model, hxMoment *to, const hxMo
 }
 
 /* Copies the places of the feet, and computes how far they are outside of their cells. */
-HX_RARE void feet_on_grid(const hxModel *model, const hxContactState *state,
-                          const hxMoment *moment, hxDepths *depths) {
+HX_RARE void feet_on_grid(const hxModel *model, const hxContactState *state, const hxMoment *moment,
+                          hxDepths *depths) {
   const int cells = hx_has_cells(model);
   memcpy(depths->centre, moment->contact[HX_FOOT].centre, sizeof depths->centre);
   for (int leg = 0; leg < HX_LEGS; ++leg) {
     const double centre[3] = {depths->centre[0][leg], depths->centre[1][leg],
                               depths->centre[2][leg]},
                  cell[2] = {state->cell[0][leg], state->cell[1][leg]};
-    depths->outside[leg] = cells && cell[0] >= 0.0
-                               ? hx_terrain_outside(model->terrain, centre, cell)
-                               : -hx_far;
+    depths->outside[leg] =
+        cells && cell[0] >= 0.0 ? hx_terrain_outside(model->terrain, centre, cell) : -hx_far;
   }
 }
 
@@ -241,8 +240,8 @@ HX_INLINE void contact_works(const hxPath *path, int row, int slot, hxVec3 impul
   const hxContactMoment *from = &path->from->contact[row], *to = &path->to->contact[row];
   const hxContactLawAt law = hx_law_at(path->contact, row, slot);
   const hxVec3 slip = mean_vec3(from->slip, to->slip, slot);
-  const hxVec3 approach = hx_scale(
-      hx_splat(0.5), hx_add3(approach_of(from, slot), approach_of(to, slot)));
+  const hxVec3 approach =
+      hx_scale(hx_splat(0.5), hx_add3(approach_of(from, slot), approach_of(to, slot)));
   const hxReal taken = hx_dot(impulse, approach);
   const hxReal stored =
       stored_in_contact(law, &to->delta[slot]) - stored_in_contact(law, &from->delta[slot]);
@@ -270,6 +269,35 @@ HX_RARE void torso_works(const hxPath *path, const hxImpulses *impulse, hxStepWo
   works->torso_friction = hx_sum_slots(friction);
 }
 
+/* Returns the energy that a joint's stops store, J. */
+static inline hxReal stored_in_stop(const hxModel *model, int joint, int slot, hxReal angle) {
+  const hxReal x = hx_overrun(model, joint, slot, angle);
+  return (0.5 * model->stop_stiffness) * (x * x);
+}
+
+/* Adds what the stops of a pack of legs lose in a step: their work on the joints less what they
+ * store. */
+HX_RARE void add_stop_works(const hxPath *path, const hxImpulses *impulse, int pack,
+                            hxStepWorks *works) {
+  const int slot = pack * HX_LANES;
+  for (int joint = 0; joint < HX_JOINTS; ++joint) {
+    const hxReal speed = mean_of(&path->from->speed[joint][slot], &path->to->speed[joint][slot]);
+    const hxReal before = hx_load(&path->from->angle[joint][slot]),
+                 after = hx_load(&path->to->angle[joint][slot]);
+    const hxReal stored = stored_in_stop(path->model, joint, slot, after) -
+                          stored_in_stop(path->model, joint, slot, before);
+    works->gear[pack] -= impulse->stop[joint][pack] * speed + stored;
+  }
+}
+
+/* Adds what spin and rolling friction of a pack of feet lose in a step. */
+HX_RARE void add_turning_works(const hxPath *path, const hxImpulses *impulse, int pack,
+                               hxStepWorks *works) {
+  const hxVec3 turn = mean_vec3(path->from->turn, path->to->turn, pack * HX_LANES);
+  for (int k = 0; k < path->model->foot_rows; ++k)
+    works->friction[pack] -= hx_dot(impulse->moment[path->model->row[k]][pack], turn);
+}
+
 /* Computes works and losses of a step from its impulses (eq. 27). */
 static inline void hx_step_works(const hxPath *path, const hxImpulses *impulse,
                                  hxStepWorks *works) {
@@ -287,6 +315,8 @@ static inline void hx_step_works(const hxPath *path, const hxImpulses *impulse,
     contact_works(path, HX_FOOT, slot, impulse->contact[HX_FOOT][pack], &works->contact[pack],
                   &works->friction[pack]);
     if (path->model->rows > 1) add_further_works(path, pack, impulse, works);
+    if (path->model->stops) add_stop_works(path, impulse, pack, works);
+    if (has_turning_friction(path->model, HX_FOOT)) add_turning_works(path, impulse, pack, works);
   }
   works->torso_contact = works->torso_friction = 0.0;
   if (path->model->torso_rows) torso_works(path, impulse, works);
@@ -306,12 +336,6 @@ static inline hxCubic cubic(hxReal from, hxReal slope_from, hxReal rise, hxReal 
   return (hxCubic){from + x * (slope_from + x * (curve + x * bend)),
                    slope_from + x * (2.0 * curve + (3.0 * x) * bend),
                    2.0 * curve + (6.0 * x) * bend};
-}
-
-/* Returns the angle in [-pi, pi], of an angle at most one turn outside. */
-static inline hxReal within_turn(hxReal angle) {
-  const hxReal low = hx_select(hx_less(hx_splat(half_turn), angle), angle - 2.0 * half_turn, angle);
-  return hx_select(hx_less(low, hx_splat(-half_turn)), low + 2.0 * half_turn, low);
 }
 
 /* Measures one joint: positive and negative work, whose difference is the step's work, and the
@@ -417,8 +441,7 @@ HX_INLINE hxFootInstant foot_at(const hxPath *path, const hxFootPath *foot, doub
   const hxReal bends = path->h < shortest_bend ? hx_splat(0.0) : per_step * per_step;
   const hxCubic depth = cubic(foot->delta, foot->slope_from, foot->rise, foot->slope_to, x);
   const hxReal approach = per_step * depth.rate;
-  const hxNormalForce f =
-      hx_normal_force(foot->law, depth.value, approach);
+  const hxNormalForce f = hx_normal_force(foot->law, depth.value, approach);
   const hxVec3 slip = sliding(foot->slip_from, foot->slip_to, foot->mean_slip, x);
   return (hxFootInstant){f.force, f.stiffness * approach + f.viscosity * (bends * depth.second),
                          hx_sqrt(hx_dot(slip, slip))};
@@ -477,10 +500,7 @@ static inline double force_within(const hxPath *path, int row, int leg, double x
   const hxContactLawAt law = {hx_splat(contact->closed[row][leg]),
                               hx_splat(contact->damping[row][leg]),
                               hx_splat(contact->stiffness[row][leg])};
-  return hx_lane(
-      hx_normal_force(law, depth.value, hx_splat(1.0 / h) * depth.rate)
-          .force,
-      0);
+  return hx_lane(hx_normal_force(law, depth.value, hx_splat(1.0 / h) * depth.rate).force, 0);
 }
 
 /* Takes the samples of a leg's landing that lie within a step: forces at times t_n after
@@ -527,8 +547,8 @@ static inline void measure_cone(const hxPath *path, int row, const hxImpulses *i
     const hxVec3 normal = mean_vec3(from->normal, to->normal, slot);
     const hxReal along = hx_dot(impulse->contact[row][pack], normal);
     const hxVec3 across = hx_add_scaled(impulse->contact[row][pack], -along, normal);
-    const hxReal share =
-        hx_sqrt(hx_dot(across, across)) / hx_max(hx_load(&path->contact->mu[row][slot]) * along, hx_splat(1e-300));
+    const hxReal share = hx_sqrt(hx_dot(across, across)) /
+                         hx_max(hx_load(&path->contact->mu[row][slot]) * along, hx_splat(1e-300));
     hx_store(&place[slot], hx_cone_place(share));
     hx_store(&pressed[slot], along);
   }

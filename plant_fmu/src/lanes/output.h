@@ -58,7 +58,17 @@ static hxNumber torso_elastic_energy(const hxWork *work) {
   return hx_sum_slots(energy);
 }
 
-/* Returns the potential energy of gravity and contacts, J. */
+/* Returns the energy k x^2/2 that the stops of a leg store, J. */
+static hxReal stop_energy(const hxModel *model, const hxLegWork *leg, int slot) {
+  hxReal energy = hx_splat(0.0);
+  for (int joint = 0; joint < HX_JOINTS; ++joint) {
+    const hxReal x = hx_overrun(model, joint, slot, leg->joint[joint].angle);
+    energy += (0.5 * model->stop_stiffness) * (x * x);
+  }
+  return energy;
+}
+
+/* Returns the potential energy of gravity, contacts and stops, J. */
 static hxNumber hx_potential_energy(const hxModel *model, const hxPlantMotion *motion,
                                     const hxWork *work) {
   const hxVec3 g = hx_splat_vec3(model->gravity);
@@ -68,6 +78,7 @@ static hxNumber hx_potential_energy(const hxModel *model, const hxPlantMotion *m
     const int slot = pack * HX_LANES;
     legs[pack] = elastic_energy(&contact[HX_FOOT]);
     for (int k = 1; k < model->rows; ++k) legs[pack] += elastic_energy(&contact[model->row[k]]);
+    if (model->stops) legs[pack] += stop_energy(model, &work->pack[pack], slot);
     for (int joint = 0; joint < HX_JOINTS; ++joint)
       legs[pack] -= hx_load(&model->joint[joint].mass[slot]) *
                     hx_dot(g, hx_link_vec3(motion, joint, HX_R, slot));
@@ -96,10 +107,11 @@ static void fill_joint(const hxState *state, const hxJointWork *k, int lane, int
 }
 
 /* Returns the size of the tangential force, N. */
-static hxNumber tangential_force(const hxModel *model, const hxContactWork *foot, int lane) {
+static hxNumber tangential_force(const hxModel *model, int row, const hxContactWork *foot,
+                                 int lane) {
   const hxVec3 grip = foot->bristle.grip;
-  return hx_lane(has_bristles(model, HX_FOOT) ? foot->normal.force * hx_sqrt(hx_dot(grip, grip))
-                                              : foot->drag * foot->slip_speed,
+  return hx_lane(has_bristles(model, row) ? foot->normal.force * hx_sqrt(hx_dot(grip, grip))
+                                          : foot->drag * foot->slip_speed,
                  lane);
 }
 
@@ -121,7 +133,7 @@ static void add_foot_row(const hxModel *model, const hxState *state, const hxCon
   get3(foot->force, lane, force);
   for (int i = 0; i < 3; ++i) o->foot.force[leg][i] += force[i];
   o->foot.normal_force[leg] += hx_lane(foot->normal.force, lane);
-  o->foot.tangential_force[leg] += tangential_force(model, foot, lane);
+  o->foot.tangential_force[leg] += tangential_force(model, row, foot, lane);
   o->foot.contact[leg] |= state->contact.closed[row][leg] != 0.0;
 }
 
@@ -135,7 +147,7 @@ static void fill_foot(const hxModel *model, const hxState *state, const hxLegWor
   get3(hx_add3(tibia, deeper->kin.arm), lane, o->foot.position[leg]);
   get3(deeper->kin.velocity, lane, o->foot.velocity[leg]);
   o->foot.normal_force[leg] = hx_lane(foot->normal.force, lane);
-  o->foot.tangential_force[leg] = tangential_force(model, foot, lane);
+  o->foot.tangential_force[leg] = tangential_force(model, HX_FOOT, foot, lane);
   o->foot.slip_speed[leg] = hx_lane(deeper->slip_speed, lane);
   o->foot.penetration[leg] = hx_lane(deeper->kin.delta, lane);
   o->foot.impact_speed[leg] = state->contact.impact_speed[row][leg];
@@ -262,10 +274,11 @@ static void fill_foot_rates(const hxModel *model, const hxContactState *state,
   for (int k = 0; k < model->foot_rows; ++k) {
     const hxContactWork *foot = &work->contact[model->row[k]];
     const double force = hx_lane(foot->normal.force, lane),
-                 across = tangential_force(model, foot, lane);
+                 across = tangential_force(model, model->row[k], foot, lane);
     sum += force;
     if (force > model->load_threshold && hx_has_cone(model))
-      rate->cone_time[cone_bin(across / fmax(state->mu[model->row[k]][leg] * force, 1e-300))] += 1.0;
+      rate->cone_time[cone_bin(across / fmax(state->mu[model->row[k]][leg] * force, 1e-300))] +=
+          1.0;
   }
   const hxContactWork *deeper = &work->contact[deeper_row(model, work, lane)];
   rate->foot.impulse[leg] = sum;

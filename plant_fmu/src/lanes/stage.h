@@ -12,9 +12,12 @@ HX_INLINE hxContactSlope contact_slope(const hxModel *model, const hxContactStat
                                        const hxImplicit *implicit) {
   const hxContactKinematics *kin = &contact->kin;
   const hxReal deeper = kin->delta + implicit->ahead * hx_max(kin->ddelta, hx_splat(0.0));
-  const hxNormalForce ahead =
-      hx_normal_force(hx_law_at(state, row, slot), deeper, kin->ddelta);
+  const hxNormalForce ahead = hx_normal_force(hx_law_at(state, row, slot), deeper, kin->ddelta);
   hxContactSlope slope = {.stiffness = ahead.stiffness, .viscosity = ahead.viscosity};
+  if (has_turning_friction(model, row)) {
+    slope.spin = ahead.force * contact->turning.spin;
+    slope.roll = ahead.force * contact->turning.roll;
+  }
   if (!has_bristles(model, row)) {
     slope.drag = ahead.force * contact->drag_per_load;
     return slope;
@@ -34,25 +37,47 @@ HX_INLINE void keep_contact_slope(const hxModel *model, const hxContactState *st
 
 HX_RARE void keep_further_slopes(const hxModel *model, const hxContactState *state, int pack,
                                  const hxLegWork *leg, hxImplicit *implicit) {
-  for (int k = 1; k < model->rows; ++k)
-    keep_contact_slope(model, state, pack, model->row[k], leg, implicit);
+  for (int k = 1; k < leg->rows; ++k)
+    keep_contact_slope(model, state, pack, leg->row[k], leg, implicit);
 }
 
 /* Stores the derivatives of a leg's forces for all stages of a step. */
 static inline void keep_slopes(const hxModel *model, const hxContactState *state, int pack,
                                const hxLegWork *leg, hxImplicit *implicit) {
   keep_contact_slope(model, state, pack, HX_FOOT, leg, implicit);
-  if (model->rows > 1) keep_further_slopes(model, state, pack, leg, implicit);
+  if (leg->rows > 1) keep_further_slopes(model, state, pack, leg, implicit);
   for (int joint = 0; joint < HX_JOINTS; ++joint) {
     implicit->slope[pack].motor_stiffness[joint] = leg->joint[joint].servo.stiffness;
     implicit->slope[pack].motor_damping[joint] = leg->joint[joint].servo.damping;
     implicit->slope[pack].gear_drag[joint] = leg->joint[joint].servo.drag;
+    if (model->stops) {
+      implicit->slope[pack].stop_stiffness[joint] = leg->joint[joint].stop.stiffness;
+      implicit->slope[pack].stop_damping[joint] = leg->joint[joint].stop.damping;
+    }
   }
 }
 
-/* Returns the damping of motor and gear together, N m s/rad. */
-static inline hxReal servo_damping(const hxImplicit *implicit, int pack, int joint) {
-  return implicit->slope[pack].motor_damping[joint] + implicit->slope[pack].gear_drag[joint];
+/* Returns the damping of motor, gear and stop together, N m s/rad. */
+static inline hxReal joint_damping(const hxModel *model, const hxImplicit *implicit, int pack,
+                                   int joint) {
+  const hxReal servo =
+      implicit->slope[pack].motor_damping[joint] + implicit->slope[pack].gear_drag[joint];
+  return model->stops ? servo + implicit->slope[pack].stop_damping[joint] : servo;
+}
+
+/* Returns the stiffness of motor and stop together, N m/rad. */
+static inline hxReal joint_stiffness(const hxModel *model, const hxImplicit *implicit, int pack,
+                                     int joint) {
+  const hxReal servo = implicit->slope[pack].motor_stiffness[joint];
+  return model->stops ? servo + implicit->slope[pack].stop_stiffness[joint] : servo;
+}
+
+/* Returns the moment by which spin and rolling friction resist an angular velocity: (spin n n^T +
+ * roll (1 - n n^T)) w (eq. 38). */
+static inline hxVec3 turning_drag(const hxContactSlope *slope, const hxContactWork *contact,
+                                  hxVec3 w) {
+  const hxVec3 n = contact->kin.normal;
+  return hx_add_scaled(hx_scale(slope->roll, w), (slope->spin - slope->roll) * hx_dot(n, w), n);
 }
 
 /* Displacement and velocity change of a body without this stage's own acceleration: dx = s_x + z
@@ -100,34 +125,45 @@ HX_INLINE void contact_response(const hxImplicit *implicit, const hxContactSlope
   contact->response = hx_add_scaled(hx_scale(-along, n), -slope->drag, v);
 }
 
+/* Adds the response of spin and rolling friction to the shift of the body, NULL in the first
+ * stage, to its p. */
+HX_RARE void turning_response(const hxContactSlope *slope, const hxShift *body, hxForce6 *p,
+                              hxContactWork *contact) {
+  contact->turn_response = body ? hx_neg(turning_drag(slope, contact, body->v.ang)) : hx_zero3();
+  turn_body(p, contact->turn_response);
+}
+
 /* Adds the response of a row to the tibia's p. */
-HX_INLINE void row_response(const hxImplicit *implicit, int pack, int row, const hxShift *tibia,
-                            hxLegWork *leg) {
+HX_INLINE void row_response(const hxModel *model, const hxImplicit *implicit, int pack, int row,
+                            const hxShift *tibia, hxLegWork *leg) {
   hxContactWork *contact = &leg->contact[row];
-  contact_response(implicit, &implicit->slope[pack].contact[row], tibia, contact);
-  push_body(&leg->joint[HX_JOINTS - 1].p, contact_point(leg, contact), contact->response);
+  const hxContactSlope *slope = &implicit->slope[pack].contact[row];
+  hxForce6 *p = &leg->joint[HX_JOINTS - 1].p;
+  contact_response(implicit, slope, tibia, contact);
+  push_body(p, contact_point(leg, contact), contact->response);
+  if (has_turning_friction(model, row)) turning_response(slope, tibia, p, contact);
 }
 
 HX_RARE void further_responses(const hxModel *model, const hxImplicit *implicit, int pack,
                                const hxShift *tibia, hxLegWork *leg) {
-  for (int k = 1; k < model->rows; ++k) row_response(implicit, pack, model->row[k], tibia, leg);
+  for (int k = 1; k < leg->rows; ++k) row_response(model, implicit, pack, leg->row[k], tibia, leg);
 }
 
 /* Adds the responses of a leg's contacts to the tibia's p. */
 static inline void tibia_response(const hxModel *model, const hxImplicit *implicit, int pack,
                                   const hxShift *tibia, hxLegWork *leg) {
-  row_response(implicit, pack, HX_FOOT, tibia, leg);
-  if (model->rows > 1) further_responses(model, implicit, pack, tibia, leg);
+  row_response(model, implicit, pack, HX_FOOT, tibia, leg);
+  if (leg->rows > 1) further_responses(model, implicit, pack, tibia, leg);
 }
 
-/* Adds G_v dv + G_x dx, the response of servos and contacts to the shifts, to torques and p. */
+/* Adds G_v dv + G_x dx, the response of joints and contacts to the shifts, to torques and p. */
 static inline void leg_response(const hxModel *model, const hxImplicit *implicit,
                                 const hxPlantMotion *motion, int pack, hxLegWork *leg) {
   if (!implicit->change) { /* first stage: dx = z v, dv = 0 */
     for (int joint = 0; joint < HX_JOINTS; ++joint) {
       hxJointWork *work = &leg->joint[joint];
       work->angle_shift = implicit->z * work->speed, work->speed_shift = hx_splat(0.0);
-      work->torque -= implicit->slope[pack].motor_stiffness[joint] * work->angle_shift;
+      work->torque -= joint_stiffness(model, implicit, pack, joint) * work->angle_shift;
     }
     tibia_response(model, implicit, pack, NULL, leg);
     return;
@@ -139,8 +175,8 @@ static inline void leg_response(const hxModel *model, const hxImplicit *implicit
     j = link_shift(implicit, motion, joint, pack * HX_LANES);
     work->angle_shift = hx_dot(work->sweep.S.ang, hx_sub3(j.x.ang, i.x.ang)),
     work->speed_shift = hx_dot(work->sweep.S.ang, hx_sub3(j.v.ang, i.v.ang));
-    work->torque -= implicit->slope[pack].motor_stiffness[joint] * work->angle_shift +
-                    servo_damping(implicit, pack, joint) * work->speed_shift;
+    work->torque -= joint_stiffness(model, implicit, pack, joint) * work->angle_shift +
+                    joint_damping(model, implicit, pack, joint) * work->speed_shift;
   }
   tibia_response(model, implicit, pack, &j, leg);
 }
@@ -206,15 +242,32 @@ HX_INLINE hxInertia6 contact_inertia(const hxContactBlock *B, hxVec3 x, hxVec3 b
                        x);
 }
 
+/* Adds the part z turning_drag of W to the inertia of a body, and its product with the body's
+ * angular bias acceleration to p. */
+HX_RARE void add_turning_inertia(const hxImplicit *implicit, const hxContactSlope *slope,
+                                 const hxContactWork *contact, const hxVec3 *bias, hxForce6 *p,
+                                 hxInertia6 *I) {
+  const hxReal z = hx_splat(implicit->z);
+  const hxReal roll = z * slope->roll, more = z * slope->spin - roll;
+  const hxVec3 n = contact->kin.normal, a = hx_scale(more, n);
+  I->C = hx_sym_add(I->C, (hxSym3){roll + a.x * n.x, roll + a.y * n.y, roll + a.z * n.z, a.x * n.y,
+                                   a.x * n.z, a.y * n.z});
+  turn_body(p, hx_scale(-z, turning_drag(slope, contact, *bias)));
+}
+
 /* Returns the block of a row as a part of the tibia's inertia. */
 HX_INLINE hxInertia6 row_inertia(const hxModel *model, const hxImplicit *implicit, int pack,
                                  int row, hxLegWork *leg) {
   hxJointWork *tibia = &leg->joint[HX_JOINTS - 1];
   const hxContactWork *contact = &leg->contact[row];
-  const hxContactBlock B = contact_block(implicit, &implicit->slope[pack].contact[row], contact);
+  const hxContactSlope *slope = &implicit->slope[pack].contact[row];
+  const hxContactBlock B = contact_block(implicit, slope, contact);
   const hxVec3 x = contact_point(leg, contact);
   const hxVec3 bias = hx_add3(motion_at(tibia->bias, x), hx_splat_vec3(model->gravity));
-  return contact_inertia(&B, x, bias, &tibia->p);
+  hxInertia6 I = contact_inertia(&B, x, bias, &tibia->p);
+  if (has_turning_friction(model, row))
+    add_turning_inertia(implicit, slope, contact, &tibia->bias.ang, &tibia->p, &I);
+  return I;
 }
 
 /* Returns the acceleration of the material at a contact point, from the body's acceleration a - g
@@ -262,18 +315,34 @@ HX_INLINE hxVec3 row_stage_force(const hxModel *model, const hxImplicit *implici
                      leg->joint[HX_JOINTS - 1].acceleration, &leg->contact[row]);
 }
 
-/* Returns the force of the ground on the tibia at a row's point, about its centre of mass. */
+/* Returns the moment of spin and rolling friction on the tibia that a stage's accelerations
+ * contain. */
+static inline hxVec3 row_stage_moment(const hxImplicit *implicit, int pack, int row,
+                                      const hxLegWork *leg) {
+  const hxContactWork *contact = &leg->contact[row];
+  if (!implicit) return contact->moment;
+  const hxVec3 drag = turning_drag(&implicit->slope[pack].contact[row], contact,
+                                   leg->joint[HX_JOINTS - 1].acceleration.ang);
+  return hx_add_scaled(hx_add3(contact->moment, contact->turn_response), hx_splat(-implicit->z),
+                       drag);
+}
+
+/* Returns force and moment of the ground on the tibia at a row's point, about its centre of
+ * mass. */
 HX_INLINE hxForce6 row_wrench(const hxModel *model, const hxImplicit *implicit, int pack, int row,
                               const hxLegWork *leg) {
   const hxVec3 ground = row_stage_force(model, implicit, pack, row, leg);
-  return (hxForce6){hx_cross(leg->contact[row].kin.arm, ground), ground};
+  hxForce6 wrench = {hx_cross(leg->contact[row].kin.arm, ground), ground};
+  if (has_turning_friction(model, row))
+    wrench.ang = hx_add3(wrench.ang, row_stage_moment(implicit, pack, row, leg));
+  return wrench;
 }
 
 HX_RARE hxForce6 further_wrenches(const hxModel *model, const hxImplicit *implicit, int pack,
                                   const hxLegWork *leg) {
   hxForce6 sum = {hx_zero3(), hx_zero3()};
-  for (int k = 1; k < model->rows; ++k)
-    sum = hx_force_add(sum, row_wrench(model, implicit, pack, model->row[k], leg));
+  for (int k = 1; k < leg->rows; ++k)
+    sum = hx_force_add(sum, row_wrench(model, implicit, pack, leg->row[k], leg));
   return sum;
 }
 

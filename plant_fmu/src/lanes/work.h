@@ -22,9 +22,10 @@ typedef struct {
   hxSym3 J;            /* child's inertia, world axes, about its centre of mass */
   hxVec3 gyroscopic;   /* -w x (J w) */
   hxReal angle, speed; /* rad, rad/s */
-  hxReal torque;       /* N m  servo and gear (kinematic mode: gear and drive) */
+  hxReal torque;       /* N m  servo, gear and stop (kinematic mode: gear and drive) */
   hxReal driven;       /* rad/s2  acceleration of the drive in kinematic mode, else 0 */
   hxServo servo;
+  hxStop stop;    /* set if the model has stops */
   hxMotion6 bias; /* a_k of eq. 8 summed from the hip (kinematic: with S qdd) */
   hxForce6 p;     /* force that the bias needs, less applied forces */
   hxSweep sweep;
@@ -40,6 +41,7 @@ typedef struct {
 
 typedef struct {
   hxJointWork joint[HX_JOINTS];
+  int rows, row[HX_TIBIA_ROWS]; /* rows of contacts that this evaluation computes */
   hxContactWork contact[HX_TIBIA_ROWS];
 } hxLegWork;
 
@@ -49,6 +51,7 @@ typedef struct {
   hxBody torso;
   hxSym3 torso_J;
   hxMotion6 torso_acceleration; /* a - g */
+  int torso_rows;               /* 1: this evaluation computes the torso's contacts */
   hxContactWork torso_contact[HX_TORSO_PACKS];
   hxForce6 torso_p[HX_TORSO_PACKS]; /* less forces of the ground on the torso, as hxJointWork.p */
   hxLegWork pack[HX_PACKS];
@@ -71,6 +74,7 @@ typedef union {
 typedef struct {
   hxReal stiffness, viscosity, drag;
   hxReal bristle, yield; /* N/m, 1/s  bristle stiffness/(1 + z yield), release rate */
+  hxReal spin, roll;     /* N m s  of the moment; set with spin or rolling friction */
 } hxContactSlope;
 
 /* Data of a stage of a linearly implicit method (eq. 19). The derivatives of contact and servo
@@ -82,6 +86,7 @@ typedef struct {
   struct {
     hxReal motor_stiffness[HX_JOINTS], motor_damping[HX_JOINTS], gear_drag[HX_JOINTS];
     hxContactSlope contact[HX_TIBIA_ROWS];
+    hxReal stop_stiffness[HX_JOINTS], stop_damping[HX_JOINTS]; /* set if the model has stops */
   } slope[HX_PACKS];
   hxContactSlope torso_slope[HX_TORSO_PACKS];
 } hxImplicit;

@@ -100,12 +100,12 @@ function axes(drawing: SVGElement, frame: Frame): HTMLElement[] {
 }
 
 /** Returns 1, 2 or 5 times a power of ten, such that about as many steps as wished fit. */
-function stepOf([low, high]: readonly [number, number], wished: number): number {
+export function stepOf([low, high]: readonly [number, number], wished: number): number {
   const power = 10 ** Math.floor(Math.log10((high - low) / wished));
   return power * ([1, 2, 5].find((times) => (high - low) / (times * power) <= wished) ?? 10);
 }
 
-function multiples([low, high]: readonly [number, number], step: number): number[] {
+export function multiples([low, high]: readonly [number, number], step: number): number[] {
   const first = Math.ceil(low / step);
   return Array.from(
     { length: Math.max(Math.floor(high / step) - first + 1, 0) },
@@ -212,7 +212,7 @@ function inside(drawing: SVGElement, event: PointerEvent): [number, number] {
   ];
 }
 
-function svg(tag: string, attributes: Record<string, string>): SVGElement {
+export function svg(tag: string, attributes: Record<string, string>): SVGElement {
   const made = document.createElementNS(SVG, tag);
   for (const [name, value] of Object.entries(attributes)) made.setAttribute(name, value);
   return made;

@@ -4,20 +4,25 @@ import type { Recording } from "../recording";
 import type { Colours } from "../theme";
 import type { PackedRun } from "../types";
 import { ForceArrows } from "./arrows";
-import { Floor, groundHeight, groundNormal } from "./ground";
+import { Dents, findDents } from "./dents";
+import { Floor } from "./ground";
+import type { Relief } from "./relief";
 import { RobotModel } from "./robot";
 import type { Stance } from "./stances";
+import { Terrain } from "./terrain";
 import { type Shown, Trails } from "./trails";
 
 const LAMP = new Vector3(0.9, 1.3, 2.6); // m    position of the lamp relative to the robot
 const REACH = 0.55; // m    distance from the robot within which shadows are cast
+const FAR_REACH = 1.1; // m    the same on a surface, which casts shadows too
 
 /** The scene of one run: the robot, the ground, forces and trails at a time. */
 export class Actor {
   readonly scene = new Scene();
   readonly place = new Vector3();
   private readonly model: RobotModel;
-  private readonly floor: Floor;
+  private readonly floor: Floor | Terrain;
+  private readonly dents: Dents | undefined;
   private readonly arrows: ForceArrows;
   private readonly lamp = new DirectionalLight("#ffffff", 2.1);
   private readonly sky = new HemisphereLight("#ffffff", "#8d9099", 1.6);
@@ -27,35 +32,35 @@ export class Actor {
   constructor(
     readonly run: PackedRun,
     readonly recording: Recording,
+    readonly relief: Relief,
     mark: Color,
   ) {
     this.model = new RobotModel(run.robot, mark);
-    this.floor = new Floor(run.ground);
+    const { surface } = relief;
+    this.floor = surface ? new Terrain(surface, run.ground.height) : new Floor(relief);
+    const dents = surface ? findDents(run.ground.stances ?? [], surface, run.robot.foot) : [];
+    if (dents.length > 0) this.dents = new Dents(dents, relief, recording);
     this.arrows = new ForceArrows(run.robot.legs.length);
     this.lamp.castShadow = true;
-    this.lamp.shadow.mapSize.set(1024, 1024);
+    const reach = surface ? FAR_REACH : REACH;
+    this.lamp.shadow.mapSize.set(surface ? 2048 : 1024, surface ? 2048 : 1024);
     this.lamp.shadow.radius = 4;
     this.lamp.shadow.intensity = 0.6;
     this.lamp.shadow.normalBias = 0.004;
     Object.assign(this.lamp.shadow.camera, {
-      left: -REACH,
-      right: REACH,
-      top: REACH,
-      bottom: -REACH,
+      left: -reach,
+      right: reach,
+      top: reach,
+      bottom: -reach,
       near: 0.5,
       far: 6,
     });
     this.scene.add(this.model, this.floor, this.arrows, this.lamp, this.lamp.target, this.sky);
+    if (this.dents) this.scene.add(this.dents);
   }
 
   addTrails(stances: readonly Stance[], enlarged: number): void {
-    this.trails = new Trails(
-      stances,
-      this.recording,
-      this.run.ground,
-      enlarged,
-      this.run.robot.foot,
-    );
+    this.trails = new Trails(stances, this.recording, this.relief, enlarged, this.run.robot.foot);
     if (this.print) this.trails.paint(this.print);
     this.scene.add(this.trails);
   }
@@ -63,7 +68,9 @@ export class Actor {
   paint(colours: Colours): void {
     this.scene.background = colours.sky;
     this.scene.fog = new Fog(colours.sky, 2.2, 6.5);
-    this.floor.paint(colours.floor, colours.grid);
+    if (this.floor instanceof Terrain) this.floor.paint(colours);
+    else this.floor.paint(colours.floor, colours.grid);
+    this.dents?.paint(colours.soil);
     this.arrows.paint(colours.force);
     this.sky.intensity = colours.dark ? 1.15 : 1.7;
     this.lamp.intensity = colours.dark ? 2.2 : 2.3;
@@ -74,17 +81,14 @@ export class Actor {
   /** Shows the run at a time; after the end of its recording, the run stays in its last pose. */
   show(time: number): void {
     const pose = this.poseAt(time);
-    this.place.set(
-      pose.position.x,
-      pose.position.y,
-      groundHeight(this.run.ground, pose.position.x, pose.position.y),
-    );
+    this.place.copy(this.below(pose));
     this.model.place(pose, this.touching(time));
     this.showForces(pose, time);
-    this.floor.follow(pose.position.x, pose.position.y);
+    if (this.floor instanceof Floor) this.floor.follow(pose.position.x, pose.position.y);
     this.lamp.target.position.copy(this.place);
     this.lamp.position.copy(this.place).add(LAMP);
     this.trails?.show(time);
+    this.dents?.show(time);
   }
 
   poseAt(time: number): Pose {
@@ -92,12 +96,31 @@ export class Actor {
   }
 
   /** Returns what is visible now: trails, lit feet, forces [body weights] shown by arrows. */
-  shown(): { trails: Shown; lit: boolean[]; arrows: number[][] } {
+  shown(): {
+    trails: Shown;
+    lit: boolean[];
+    arrows: number[][];
+    triangles: number;
+    dents: number;
+  } {
     return {
       trails: this.trails?.shown() ?? { prints: 0, pieces: 0, latest: null },
       lit: this.model.lit(),
       arrows: this.arrows.shown(),
+      triangles: this.floor instanceof Terrain ? this.floor.triangles : 0,
+      dents: this.dents?.count ?? 0,
     };
+  }
+
+  /**
+   * Returns the point on the ground that the camera looks at. On a surface its height follows that
+   * of the torso, because the ground below the torso may jump.
+   */
+  private below(pose: Pose): Vector3 {
+    const { x, y, z } = pose.position;
+    if (!this.relief.surface) return new Vector3(x, y, this.relief.height(x, y));
+    const first = this.poseAt(this.recording.start).position;
+    return new Vector3(x, y, z - first.z + this.relief.height(first.x, first.y));
   }
 
   private touching(time: number): boolean[] {
@@ -110,9 +133,8 @@ export class Actor {
   }
 
   private showForces(pose: Pose, time: number): void {
-    const normal = groundNormal(this.run.ground);
     const soles = footCentres(this.run.robot, pose).map((foot) =>
-      foot.addScaledVector(normal, -this.run.robot.foot),
+      foot.addScaledVector(this.relief.normal(foot.x, foot.y), -this.run.robot.foot),
     );
     const forces = this.run.robot.legs.map(({ name }) => {
       const axes = ["x", "y", "z"].map((axis) => `${name}.force.${axis}`);

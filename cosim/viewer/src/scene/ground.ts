@@ -10,48 +10,32 @@ import {
   SRGBColorSpace,
   Vector3,
 } from "three";
-import type { Ground } from "../types";
+import { planeNormal, type Relief } from "./relief";
 
 const SIZE = 24; // m    of the drawn plane; fog hides its edge
 const TILE = 0.5; // m    of the grid's texture
 const CELLS = 5; // per tile: lines every 10 cm
 const PIXELS = 512; // of the grid's texture
 
-/** Returns the unit normal of the ground. */
-export function groundNormal(ground: Ground): Vector3 {
-  return new Vector3(
-    -ground.rise * Math.cos(ground.heading),
-    -ground.rise * Math.sin(ground.heading),
-    1,
-  ).normalize();
-}
-
-/** Returns the height of the ground at a position [m]. */
-export function groundHeight(ground: Ground, x: number, y: number): number {
-  return (
-    ground.height + ground.rise * (x * Math.cos(ground.heading) + y * Math.sin(ground.heading))
-  );
-}
-
 /** The plane that the robot walks on, with a 10 cm grid; it follows the robot by whole tiles. */
 export class Floor extends Group {
   private readonly plane: Mesh<PlaneGeometry, MeshLambertMaterial>;
 
-  constructor(private readonly ground: Ground) {
+  constructor(private readonly relief: Relief) {
     super();
     this.plane = new Mesh(new PlaneGeometry(SIZE, SIZE), new MeshLambertMaterial());
     this.plane.receiveShadow = true;
     this.add(this.plane);
     this.quaternion.copy(
-      new Quaternion().setFromUnitVectors(new Vector3(0, 0, 1), groundNormal(ground)),
+      new Quaternion().setFromUnitVectors(new Vector3(0, 0, 1), planeNormal(relief.plane)),
     );
     this.follow(0, 0);
   }
 
   /** Moves the plane so that its middle is near a position. */
   follow(x: number, y: number): void {
-    const place = new Vector3(x, y, groundHeight(this.ground, x, y));
-    const origin = new Vector3(0, 0, this.ground.height);
+    const place = new Vector3(x, y, this.relief.height(x, y));
+    const origin = new Vector3(0, 0, this.relief.plane.height);
     const along = place.sub(origin).applyQuaternion(this.quaternion.clone().invert());
     const snapped = new Vector3(
       Math.round(along.x / TILE) * TILE,

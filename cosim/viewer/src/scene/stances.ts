@@ -1,8 +1,8 @@
-import { Vector3 } from "three";
+import type { Vector3 } from "three";
 import { footCentres, poseAt } from "../kinematics";
 import type { Recording } from "../recording";
-import type { Ground, Robot } from "../types";
-import { groundHeight } from "./ground";
+import type { Robot } from "../types";
+import type { Relief } from "./relief";
 
 const MOST_POINTS = 60; // of a trail
 
@@ -17,7 +17,7 @@ export interface Stance {
 }
 
 /** Returns all stances of all feet; [] when the recording lacks the columns. */
-export function findStances(recording: Recording, robot: Robot, ground: Ground): Stance[] {
+export function findStances(recording: Recording, robot: Robot, relief: Relief): Stance[] {
   return robot.legs.flatMap((leg, index) => {
     const names = [
       `${leg.name}.contact`,
@@ -28,7 +28,7 @@ export function findStances(recording: Recording, robot: Robot, ground: Ground):
     const [contact, x, y] = names.map((name) => recording.column(name));
     return spans(contact).map(([begin, end]) => {
       const foot = footCentres(robot, poseAt(recording, robot, recording.time[begin]))[index];
-      const place = new Vector3(foot.x, foot.y, groundHeight(ground, foot.x, foot.y));
+      const place = relief.mark(foot, robot.foot);
       const rows = sampled(begin, end);
       return {
         place,

@@ -13,8 +13,7 @@ import {
   Vector3,
 } from "three";
 import type { Recording } from "../recording";
-import type { Ground } from "../types";
-import { groundHeight, groundNormal } from "./ground";
+import type { Relief } from "./relief";
 import { type Stance, slippedBy } from "./stances";
 
 const ENLARGED = [1, 2, 5, 10, 20, 50]; // factors by which trails may be drawn longer
@@ -50,15 +49,15 @@ export class Trails extends Group {
   constructor(
     stances: readonly Stance[],
     private readonly recording: Recording,
-    ground: Ground,
+    relief: Relief,
     enlarged: number,
     radius: number,
   ) {
     super();
     const ordered = [...stances].sort((a, b) => a.rows[0] - b.rows[0]);
     this.printRows = ordered.map((stance) => stance.rows[0]);
-    this.prints = footprints(ordered, ground, radius);
-    this.ribbon = this.makeRibbon(ordered, ground, enlarged);
+    this.prints = footprints(ordered, relief, radius);
+    this.ribbon = this.makeRibbon(ordered, relief, enlarged);
     this.add(this.prints, this.ribbon);
   }
 
@@ -87,7 +86,7 @@ export class Trails extends Group {
 
   private makeRibbon(
     stances: readonly Stance[],
-    ground: Ground,
+    relief: Relief,
     enlarged: number,
   ): Mesh<BufferGeometry, MeshBasicMaterial> {
     const pieces = stances
@@ -98,7 +97,11 @@ export class Trails extends Group {
     const colours: number[] = [];
     for (const piece of pieces) {
       this.pieceRows.push(piece.row);
-      for (const [x, y] of corners(piece)) positions.push(x, y, groundHeight(ground, x, y) + LIFT);
+      for (const [x, y] of corners(piece)) {
+        // a trail on a block stays on it: a longer one would climb walls that the foot did not
+        const flat = relief.surface && !relief.surface.smooth;
+        positions.push(x, y, (flat ? piece.level : relief.height(x, y)) + LIFT);
+      }
       const colour = COOL.clone().lerp(HOT, Math.min(piece.way / SCALE, 1));
       for (let k = 0; k < 6; k++) colours.push(colour.r, colour.g, colour.b);
     }
@@ -119,6 +122,8 @@ interface Piece {
   readonly from: readonly [number, number];
   readonly to: readonly [number, number];
   readonly way: number;
+  /** Height of the stance [m]. */
+  readonly level: number;
 }
 
 function piecesOf(stance: Stance, enlarged: number): Piece[] {
@@ -128,7 +133,13 @@ function piecesOf(stance: Stance, enlarged: number): Piece[] {
   ]);
   return stance.rows.slice(1).map((row, k) => {
     const { x, y } = stance.slipped[k + 1];
-    return { row, from: points[k], to: points[k + 1], way: Math.hypot(x, y) };
+    return {
+      row,
+      from: points[k],
+      to: points[k + 1],
+      way: Math.hypot(x, y),
+      level: stance.place.z,
+    };
   });
 }
 
@@ -144,16 +155,16 @@ function corners({ from, to }: Piece): [number, number][] {
   return [a, b, c, c, b, d];
 }
 
-function footprints(stances: readonly Stance[], ground: Ground, radius: number): InstancedMesh {
+function footprints(stances: readonly Stance[], relief: Relief, radius: number): InstancedMesh {
   const material = new MeshBasicMaterial({ transparent: true, opacity: 0.5, depthWrite: false });
   const mesh = new InstancedMesh(
     new CircleGeometry(0.8 * radius, 24),
     material,
     Math.max(stances.length, 1),
   );
-  const normal = groundNormal(ground);
-  const flat = new Quaternion().setFromUnitVectors(new Vector3(0, 0, 1), normal);
   stances.forEach((stance, k) => {
+    const normal = relief.normal(stance.place.x, stance.place.y);
+    const flat = new Quaternion().setFromUnitVectors(new Vector3(0, 0, 1), normal);
     mesh.setMatrixAt(
       k,
       new Matrix4().compose(

@@ -1,7 +1,7 @@
-/* terrain.h - distance of a sphere's centre from an uneven ground (eq. HXSURF). Scalar and compiled
+/* surface.h - distance of a sphere's centre from an uneven ground (eq. 31-34). Scalar and compiled
  * once, so that all kernels get the same bits. Heights are above the terrain's own zero. */
-#ifndef HX_SRC_TERRAIN_H
-#define HX_SRC_TERRAIN_H
+#ifndef HX_SURFACE_H
+#define HX_SURFACE_H
 
 #include "hexapod/inside.h"
 #include "hexapod/terrain.h"
@@ -23,17 +23,22 @@ double hx_terrain_cell_size(const hxTerrain *terrain);
 void hx_terrain_cell_at(const hxTerrain *terrain, const double point[3], double cell[2]);
 double hx_terrain_outside(const hxTerrain *terrain, const double point[3], const double cell[2]);
 
-/* Faces of blocks that a sphere can touch at once: the top of its own cell, and the nearest face,
- * edge or corner of the columns around that are higher. */
-typedef enum hxFaceKind { HX_FACE_TOP, HX_FACE_WALL, HX_FACE_NEARER } hxFaceKind;
+/* Faces of blocks that a sphere can touch at once, if cells are not smaller than it. */
+typedef enum hxFaceKind {
+  HX_FACE_TOP,    /* of its own cell */
+  HX_FACE_WALL,   /* a higher column beside it along x: its wall, or the edge of its top */
+  HX_FACE_SIDE,   /* the same along y */
+  HX_FACE_CORNER, /* edges and corner of a higher column across the cell's corner */
+  HX_FACE_NEAREST /* the nearest of these */
+} hxFaceKind;
 
 extern const double hx_far; /* m  distance of a wall that is not there */
 
 /* Computes a face of blocks, around this cell; with cell[0] < 0 around that below the point. The
  * columns are those of the cell also where the point is not over it, so that the face changes
- * smoothly. A smooth surface has one face. */
+ * smoothly. A smooth surface has one face; its normal's derivative is computed with bends only. */
 void hx_terrain_face(const hxTerrain *terrain, hxFaceKind kind, const double cell[2],
-                     const double point[3], hxFace *face);
+                     const double point[3], int bends, hxFace *face);
 
 /* Returns the row of the table of the material at a point, NULL for the definition's ground. */
 const double *hx_terrain_material(const hxTerrain *terrain, const double point[3]);

@@ -1,4 +1,4 @@
-#include "terrain.h"
+#include "surface.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -16,6 +16,7 @@ typedef struct {
 struct hxTerrain {
   hxGridHead head;
   uint64_t checksum;
+  double per_cell;               /* 1/m */
   const double *height;          /* [rows][cols] */
   const unsigned char *material; /* [rows][cols], NULL: none */
   const double *table;           /* [materials][HX_MATERIAL_COLUMNS] */
@@ -127,6 +128,7 @@ static hxTerrain *copy_file(const hxGridHead *head, const void *bytes, size_t si
   memcpy(terrain->bytes, (const char *)bytes + sizeof *head, size - sizeof *head);
   const char *map = (const char *)(terrain->bytes + head->rows * head->cols);
   terrain->head = *head;
+  terrain->per_cell = 1.0 / head->cell;
   terrain->checksum = hx_checksum(0, bytes, size);
   terrain->height = terrain->bytes;
   terrain->material = head->materials > 0 ? (const unsigned char *)map : NULL;
@@ -171,6 +173,7 @@ double hx_terrain_cell_size(const hxTerrain *terrain) { return terrain->head.cel
 /* Height over a point, its first and second derivatives. */
 typedef struct {
   double s, sx, sy, sxx, sxy, syy;
+  int64_t row, col; /* of the patch */
 } hxPatch;
 
 /* A coordinate on the grid: index of the node before it, place between this and the next node. */
@@ -180,11 +183,11 @@ typedef struct {
   int outside; /* beyond the grid, where the border's height goes on */
 } hxGridPlace;
 
-static hxGridPlace grid_place(double x, double origin, double cell, int64_t nodes) {
-  const double u = (x - origin) / cell, last = (double)(nodes - 1);
-  const double clamped = fmin(fmax(u, 0.0), last);
-  const double node = fmin(floor(clamped), last - 1.0);
-  return (hxGridPlace){(int64_t)node, clamped - node, u < 0.0 || u > last};
+static hxGridPlace grid_place(double x, double origin, double per_cell, int64_t nodes) {
+  const double u = (x - origin) * per_cell, last = (double)(nodes - 1);
+  const double clamped = u < 0.0 ? 0.0 : u > last ? last : u;
+  const int64_t before = (int64_t)clamped, node = before < nodes - 2 ? before : nodes - 2;
+  return (hxGridPlace){node, clamped - (double)node, u < 0.0 || u > last};
 }
 
 /* Computes weights of four nodes by Catmull and Rom's cubic, and their derivatives by the place. */
@@ -208,8 +211,7 @@ static void line_nodes(const double *line, int64_t node, int64_t nodes, double o
 /* Copies the 4 x 4 nodes around a place. */
 static void patch_nodes(const hxTerrain *terrain, int64_t row, int64_t col, double out[4][4]) {
   const int64_t rows = terrain->head.rows, cols = terrain->head.cols;
-  for (int i = 1; i < 3; ++i)
-    line_nodes(terrain->height + (row + i - 1) * cols, col, cols, out[i]);
+  for (int i = 1; i < 3; ++i) line_nodes(terrain->height + (row + i - 1) * cols, col, cols, out[i]);
   for (int i = 0; i < 4; i += 3) {
     const int64_t beyond = row + i - 1;
     const int inner = i == 0 ? 1 : 2, next = i == 0 ? 2 : 1;
@@ -223,9 +225,9 @@ static void patch_nodes(const hxTerrain *terrain, int64_t row, int64_t col, doub
 /* Computes the surface over (x, y). */
 static hxPatch patch_at(const hxTerrain *terrain, double x, double y) {
   const hxGridHead *head = &terrain->head;
-  const hxGridPlace px = grid_place(x, head->x0, head->cell, head->cols),
-                    py = grid_place(y, head->y0, head->cell, head->rows);
-  const double per_cell = 1.0 / head->cell;
+  const double per_cell = terrain->per_cell;
+  const hxGridPlace px = grid_place(x, head->x0, per_cell, head->cols),
+                    py = grid_place(y, head->y0, per_cell, head->rows);
   double node[4][4], wx[3][4], wy[3][4], line[3][4] = {{0.0}};
   patch_nodes(terrain, py.node, px.node, node);
   cubic_weights(px.place, wx);
@@ -234,7 +236,7 @@ static hxPatch patch_at(const hxTerrain *terrain, double x, double y) {
     for (int i = 0; i < 4; ++i)
       line[d][i] = (wx[d][0] * node[i][0] + wx[d][1] * node[i][1]) +
                    (wx[d][2] * node[i][2] + wx[d][3] * node[i][3]);
-  hxPatch p = {0.0, 0.0, 0.0, 0.0, 0.0, 0.0};
+  hxPatch p = {0.0, 0.0, 0.0, 0.0, 0.0, 0.0, py.node, px.node};
   for (int i = 0; i < 4; ++i) {
     p.s += wy[0][i] * line[0][i], p.sx += wy[0][i] * line[1][i], p.sxx += wy[0][i] * line[2][i];
     p.sy += wy[1][i] * line[0][i], p.sxy += wy[1][i] * line[1][i];
@@ -285,11 +287,22 @@ static void set_bend(const hxPatch *p, const hxHessian *H, double per_n, hxFace 
   for (int i = 0; i < 6; ++i) face->bend[i] = turn[row[i]][col[i]];
 }
 
+/* Returns whether (x, y) is on the patch that was computed. */
+static int is_in_patch(const hxTerrain *terrain, const hxPatch *p, double x, double y) {
+  const hxGridHead *head = &terrain->head;
+  return grid_place(x, head->x0, terrain->per_cell, head->cols).node == p->col &&
+         grid_place(y, head->y0, terrain->per_cell, head->rows).node == p->row;
+}
+
+/* Squares of Newton's last step over the cell's. Its end is found by the patch's expansion: third
+ * derivatives, and at a border the jump of the second ones, are left out. */
+static const double close = 1e-7, closest = 1e-14;
+
 /* Computes the face of a smooth surface by Newton's method on the two parameters of its nearest
  * point, from the point below. */
-static void smooth_face(const hxTerrain *terrain, const double point[3], hxFace *face) {
+static void smooth_face(const hxTerrain *terrain, const double point[3], int bends, hxFace *face) {
   enum { MOST = 16 };
-  const double cell = terrain->head.cell, close = 1e-14 * cell * cell;
+  const double cell = terrain->head.cell, area = cell * cell;
   double x = point[0], y = point[1];
   hxPatch p;
   hxHessian H;
@@ -300,25 +313,27 @@ static void smooth_face(const hxTerrain *terrain, const double point[3], hxFace 
     H = hessian_of(&p, rz);
     double dx = (H.xy * gy - H.yy * gx) / H.det, dy = (H.xy * gx - H.xx * gy) / H.det;
     const double square = dx * dx + dy * dy;
-    if (square <= close || i == MOST) {
+    if (square <= closest * area || i == MOST ||
+        (!bends && square <= close * area && is_in_patch(terrain, &p, x + dx, y + dy))) {
       x += dx, y += dy;
       move_patch(&p, dx, dy);
       break;
     }
-    const double limit = square > cell * cell ? cell / sqrt(square) : 1.0;
+    const double limit = square > area ? cell / sqrt(square) : 1.0;
     x += limit * dx, y += limit * dy;
   }
   const double per_n = 1.0 / sqrt(1.0 + p.sx * p.sx + p.sy * p.sy);
   face->normal[0] = -p.sx * per_n, face->normal[1] = -p.sy * per_n, face->normal[2] = per_n;
   face->distance = (point[0] - x) * face->normal[0] + (point[1] - y) * face->normal[1] +
                    (point[2] - p.s) * face->normal[2];
-  set_bend(&p, &H, per_n, face);
+  if (bends) set_bend(&p, &H, per_n, face);
 }
 
 /* ---- blocks ---- */
 
 static double clamped_index(double u, int64_t n) {
-  return fmin(fmax(floor(u), 0.0), (double)(n - 1));
+  const double last = (double)(n - 1);
+  return u <= 0.0 ? 0.0 : u >= last ? last : (double)(int64_t)u;
 }
 
 void hx_terrain_cell_at(const hxTerrain *terrain, const double point[3], double cell[2]) {
@@ -369,8 +384,11 @@ static void keep_nearer(const double away[3], hxFace *face) {
   for (int i = 0; i < 3; ++i) face->normal[i] = away[i] / d;
   const double *n = face->normal;
   const int edges = (away[0] != 0.0) + (away[1] != 0.0) + (away[2] != 0.0);
-  const double bend[6] = {(away[0] != 0.0) - n[0] * n[0], (away[1] != 0.0) - n[1] * n[1],
-                          (away[2] != 0.0) - n[2] * n[2], -n[0] * n[1], -n[0] * n[2],
+  const double bend[6] = {(away[0] != 0.0) - n[0] * n[0],
+                          (away[1] != 0.0) - n[1] * n[1],
+                          (away[2] != 0.0) - n[2] * n[2],
+                          -n[0] * n[1],
+                          -n[0] * n[2],
                           -n[1] * n[2]};
   for (int i = 0; i < 6; ++i) face->bend[i] = edges > 1 ? bend[i] / d : 0.0;
 }
@@ -395,45 +413,53 @@ static void side_column(double gap, double above, int axis, int sign, hxFace *fa
   }
 }
 
-/* Computes the nearest face, edge or corner of the columns around a cell that are higher. */
-static void wall_face(const hxTerrain *terrain, const double point[3], const double cell[2],
-                      hxFace *face) {
+/* Keeps the nearest face of higher columns beside a cell, along x (0) or y (1). */
+static void wall_faces(const hxTerrain *terrain, const double point[3], const double cell[2],
+                       int axis, hxFace *face) {
   const hxGridHead *head = &terrain->head;
   const double own = column_height(terrain, cell[0], cell[1]);
-  double side[2][3], gap[2][3];
-  *face = (hxFace){.distance = hx_far, .normal = {0.0, 0.0, 1.0}};
+  const double origin = axis == 0 ? head->x0 : head->y0;
   for (int k = -1; k <= 1; k += 2) {
-    side[0][k + 1] = column_height(terrain, cell[0] + k, cell[1]);
-    side[1][k + 1] = column_height(terrain, cell[0], cell[1] + k);
-    gap[0][k + 1] = gap_to(point[0], head->x0, head->cell, cell[0], k);
-    gap[1][k + 1] = gap_to(point[1], head->y0, head->cell, cell[1], k);
-    for (int axis = 0; axis < 2; ++axis)
-      if (side[axis][k + 1] > own)
-        side_column(gap[axis][k + 1], point[2] - side[axis][k + 1], axis, k, face);
+    const double top =
+        column_height(terrain, cell[0] + (axis == 0 ? k : 0), cell[1] + (axis == 1 ? k : 0));
+    const double gap = gap_to(point[axis], origin, head->cell, cell[axis], k);
+    if (top > own) side_column(gap, point[2] - top, axis, k, face);
   }
+}
+
+/* Keeps the nearest edge or corner of higher columns across the corners of a cell. One counts where
+ * its nearest point is above both columns beside it. */
+static void corner_faces(const hxTerrain *terrain, const double point[3], const double cell[2],
+                         hxFace *face) {
+  const hxGridHead *head = &terrain->head;
+  const double own = column_height(terrain, cell[0], cell[1]);
   for (int i = -1; i <= 1; i += 2)
     for (int j = -1; j <= 1; j += 2) {
       const double top = column_height(terrain, cell[0] + i, cell[1] + j);
-      const double nearest = fmin(point[2], top), x = gap[0][i + 1], y = gap[1][j + 1];
-      if (!(top > own && nearest > side[0][i + 1] && nearest > side[1][j + 1])) continue;
-      const double away[3] = {-i * fmax(x, 0.0), -j * fmax(y, 0.0), point[2] - nearest};
+      const double nearest = point[2] < top ? point[2] : top;
+      if (!(top > own && nearest > column_height(terrain, cell[0] + i, cell[1]) &&
+            nearest > column_height(terrain, cell[0], cell[1] + j)))
+        continue;
+      const double x = gap_to(point[0], head->x0, head->cell, cell[0], i),
+                   y = gap_to(point[1], head->y0, head->cell, cell[1], j);
+      const double away[3] = {x > 0.0 ? -i * x : 0.0, y > 0.0 ? -j * y : 0.0, point[2] - nearest};
       if (away[0] != 0.0 || away[1] != 0.0 || away[2] != 0.0) keep_nearer(away, face);
     }
 }
 
 void hx_terrain_face(const hxTerrain *terrain, hxFaceKind kind, const double cell[2],
-                     const double point[3], hxFace *face) {
+                     const double point[3], int bends, hxFace *face) {
   double around[2] = {cell[0], cell[1]};
-  hxFace top;
   if (terrain->head.kind == HX_SURFACE_SMOOTH) {
-    smooth_face(terrain, point, face);
+    smooth_face(terrain, point, bends, face);
     return;
   }
   if (cell[0] < 0.0) hx_terrain_cell_at(terrain, point, around);
-  if (kind != HX_FACE_TOP) wall_face(terrain, point, around, face);
-  if (kind == HX_FACE_WALL) return;
-  top_face(terrain, point, around, &top);
-  if (kind == HX_FACE_TOP || top.distance < face->distance) *face = top;
+  *face = (hxFace){.distance = hx_far, .normal = {0.0, 0.0, 1.0}};
+  if (kind == HX_FACE_TOP || kind == HX_FACE_NEAREST) top_face(terrain, point, around, face);
+  if (kind == HX_FACE_WALL || kind == HX_FACE_NEAREST) wall_faces(terrain, point, around, 0, face);
+  if (kind == HX_FACE_SIDE || kind == HX_FACE_NEAREST) wall_faces(terrain, point, around, 1, face);
+  if (kind == HX_FACE_CORNER || kind == HX_FACE_NEAREST) corner_faces(terrain, point, around, face);
 }
 
 /* ---- materials ---- */
@@ -442,10 +468,8 @@ const double *hx_terrain_material(const hxTerrain *terrain, const double point[3
   const hxGridHead *head = &terrain->head;
   const double shift = head->kind == HX_SURFACE_SMOOTH ? 0.5 : 0.0; /* the nearest node */
   if (!terrain->material) return NULL;
-  const int64_t c =
-      (int64_t)clamped_index((point[0] - head->x0) / head->cell + shift, head->cols);
-  const int64_t r =
-      (int64_t)clamped_index((point[1] - head->y0) / head->cell + shift, head->rows);
+  const int64_t c = (int64_t)clamped_index((point[0] - head->x0) / head->cell + shift, head->cols);
+  const int64_t r = (int64_t)clamped_index((point[1] - head->y0) / head->cell + shift, head->rows);
   const int m = terrain->material[r * head->cols + c];
   return m > 0 ? terrain->table + HX_MATERIAL_COLUMNS * (m - 1) : NULL;
 }

@@ -1,0 +1,110 @@
+"""Packs the surface of a run for the viewer: heights in 16-bit steps, materials as bytes.
+
+A height is reproduced within range/131070: 4 um for a surface whose heights differ by half a metre.
+"""
+
+from __future__ import annotations
+
+import base64
+import zlib
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hexapod_cosim.cosim.report.packing import STEPS
+from hexapod_cosim.models.ground.catalogue import CATALOGUE
+from hexapod_cosim.models.ground.patches import PROPERTIES
+from hexapod_cosim.models.ground.soils import LAW, MU, SOILS
+from hexapod_cosim.models.ground.surface import Surface
+
+MOST_NODES = 250_000  # of a drawn surface; a finer one is drawn with every second, third ... node
+SOIL, SLIPPERY, PATCH = "soil", "slippery", "patch"  # what a material is drawn as
+UNITS = {"mu": "", "mu_static": "", "stiffness": " N/m^1.5"}
+
+
+def pack_surface(surface: Surface, parameters: Mapping[str, float]) -> dict[str, Any]:
+    """Returns a surface for the viewer (scene/surface.ts): its grid, heights and materials.
+
+    Heights are steps of `step` [m] above `low` [m]: row by row, as differences of differences along
+    both axes modulo 2^16, all low bytes before all high bytes, deflated.
+    """
+    every = stride(surface)
+    height = surface.height[::every, ::every]
+    low, step = float(height.min()), float(np.ptp(height)) / STEPS
+    steps = np.round((height - low) / (step or 1.0)).astype(np.uint16)
+    material = surface.material
+    return {
+        "kind": surface.kind,
+        "name": str(surface.recipe.get("kind", surface.name)),
+        "rows": height.shape[0],
+        "columns": height.shape[1],
+        "x0": surface.x0,
+        "y0": surface.y0,
+        "cell": every * surface.cell,
+        "low": low,
+        "step": step,
+        "data": _deflated_steps(steps),
+        "materials": material_legend(surface, parameters),
+        "material": "" if material is None else _deflated(material[::every, ::every]),
+    }
+
+
+def stride(surface: Surface) -> int:
+    """Returns how many nodes of a surface one drawn node stands for, along each axis."""
+    return max(int(np.ceil(np.sqrt(surface.height.size / MOST_NODES))), 1)
+
+
+def _deflated_steps(steps: NDArray[np.uint16]) -> str:
+    """Deflates heights; a plane and a step along an axis become almost only zeros."""
+    for axis in (0, 1):
+        edge = np.zeros_like(steps.take([0], axis=axis))
+        steps = np.diff(steps, axis=axis, prepend=edge)
+    planes = steps.astype("<u2").reshape(-1).view(np.uint8).reshape(-1, 2).T
+    return _deflated(np.ascontiguousarray(planes))
+
+
+def _deflated(content: NDArray[np.uint8]) -> str:
+    return base64.b64encode(zlib.compress(content.tobytes(), 9)).decode("ascii")
+
+
+def material_legend(surface: Surface, parameters: Mapping[str, float]) -> list[dict[str, str]]:
+    """Returns what each material from 1 on is drawn as, and its text for the legend."""
+    if surface.materials is None:
+        return []
+    names = _soil_names(surface)
+    return [
+        {"look": _look(row, parameters), "text": _describe(row, name)}
+        for row, name in zip(surface.materials, names, strict=True)
+    ]
+
+
+def _soil_names(surface: Surface) -> list[str]:
+    """Returns the soil of each material as the recipe has it, "" where none is known."""
+    count = 0 if surface.materials is None else len(surface.materials)
+    recipe = surface.recipe
+    entry = CATALOGUE.get(str(recipe.get("kind", "")))
+    names = []
+    if entry is not None and "soil" in entry.parameters:
+        names = [str(recipe.get("soil", entry.parameters["soil"].default))]
+    names += [str(patch.get("soil", "")) for patch in recipe.get("patch", ())]
+    return names if len(names) == count else [""] * count
+
+
+def _look(row: NDArray[np.float64], parameters: Mapping[str, float]) -> str:
+    if row[LAW] > 0.0:
+        return SOIL
+    return SLIPPERY if row[MU] < parameters.get("friction.mu", 0.0) else PATCH
+
+
+def _describe(row: NDArray[np.float64], soil: str) -> str:
+    """Returns the properties of a material that differ from the ground of the definition."""
+    parts = [
+        f"{key} {row[column]:.3g}{UNITS[key]}"
+        for key, column in PROPERTIES.items()
+        if np.isfinite(row[column])
+    ]
+    if row[LAW] > 0.0:
+        parts.insert(0, SOILS[soil].about if soil in SOILS else soil or "soft ground")
+    return ", ".join(parts)

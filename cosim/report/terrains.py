@@ -1,0 +1,180 @@
+"""Compares both controls over several scenarios, such as walks on different ground."""
+
+from __future__ import annotations
+
+import csv
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import matplotlib
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from hexapod_cosim.controller.figure_style import DPI, SETTINGS, UNDATED, WIDTH
+from hexapod_cosim.cosim.common.files import atomic_path, atomic_text
+from hexapod_cosim.cosim.report.plots import STYLES
+from hexapod_cosim.cosim.results.comparison import Comparison
+from hexapod_cosim.cosim.results.summary import Summary
+
+TABLE, FIGURE = "terrains.csv", "terrains"
+MARKS = {"kinematic": ("o", 7.0), "compliant": ("s", 3.6)}  # marker and its size
+ROOM = 1.06  # of an axis over its largest value
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """A column of the table."""
+
+    name: str
+    unit: str
+    digits: int
+    title: str
+
+
+QUANTITIES = (
+    Quantity("walked", "%", 0, "walked to the end"),
+    Quantity("slip", "mm/m", 0, "slip of all feet"),
+    Quantity("peak", "BW", 2, "largest foot force"),
+    Quantity("tilt", "deg", 2, "tilt, RMS"),
+    Quantity("path", "mm/m", 0, "path error"),
+)
+
+
+@dataclass(frozen=True)
+class Row:
+    """Figures of one control in one scenario: means over its runs that walked to the end."""
+
+    scenario: str
+    control: str
+    runs: int
+    walked: int
+    values: Mapping[str, float]  # by the quantity's name; NaN where no run walked
+    reason: str  # why the first run ended that did not walk; "" where all walked
+
+
+def terrain_rows(name: str, comparison: Comparison) -> list[Row]:
+    """Returns the rows of a scenario, one for each control."""
+    both = (comparison.first, comparison.second)
+    return [_row(name, label, runs) for label, runs in zip(comparison.labels, both, strict=True)]
+
+
+def _row(name: str, control: str, runs: tuple[Summary, ...]) -> Row:
+    walked = [run.metrics for run in runs if run.walked]
+    lost = [run for run in runs if not run.walked]
+    reason = next((run.reason or "; ".join(run.warnings[:1]) for run in lost), "")
+    values = {
+        "walked": 100.0 * len(walked) / len(runs),
+        "slip": 1e3 * _mean([run["slip_per_metre"] for run in walked]),
+        "peak": _mean([run["peak_force"] for run in walked]),
+        "tilt": math.degrees(
+            _mean([math.hypot(run["roll_rms"], run["pitch_rms"]) for run in walked])
+        ),
+        "path": 1e3 * _mean([run["path_error"] for run in walked]),
+    }
+    return Row(name, control, len(runs), len(walked), values, reason)
+
+
+def _mean(values: list[float]) -> float:
+    """Returns the mean of the finite values, NaN without any."""
+    finite = [value for value in values if math.isfinite(value)]
+    return float(np.mean(finite)) if finite else math.nan
+
+
+def table_columns(rows: list[Row]) -> dict[str, list[str]]:
+    """Returns the table as texts, column by column."""
+    columns: dict[str, list[str]] = {
+        "scenario": [row.scenario for row in rows],
+        "control": [row.control for row in rows],
+        "walked": [f"{row.walked} of {row.runs}" for row in rows],
+    }
+    for quantity in QUANTITIES[1:]:
+        texts = [_text(row.values[quantity.name], quantity.digits) for row in rows]
+        columns[f"{quantity.name}, {quantity.unit}"] = texts
+    return columns
+
+
+def _text(value: float, digits: int) -> str:
+    return f"{value:.{digits}f}" if math.isfinite(value) else "-"
+
+
+def write_terrains(rows: list[Row], folder: Path) -> list[Path]:
+    """Writes the table as CSV and the figure as PNG and SVG; returns the files."""
+    files = [folder / TABLE]
+    names = [quantity.name for quantity in QUANTITIES[1:]]
+    with atomic_text(files[0]) as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(["scenario", "control", "runs", "walked", *names, "reason"])
+        for row in rows:
+            values = [_cell(row.values[name]) for name in names]
+            facts = [row.scenario, row.control, row.runs, row.walked]
+            writer.writerow([*facts, *values, row.reason])
+    with matplotlib.rc_context(SETTINGS):
+        figure = draw_terrains(rows)
+        for kind, metadata in UNDATED.items():
+            files.append(folder / f"{FIGURE}.{kind}")
+            with atomic_path(files[-1]) as temporary:
+                figure.savefig(temporary, format=kind, dpi=DPI, metadata=metadata)
+    return files
+
+
+def _cell(value: float) -> str:
+    return f"{value:.6g}" if math.isfinite(value) else ""
+
+
+def draw_terrains(rows: list[Row]) -> Figure:
+    """Draws a panel per quantity, a line per scenario, a mark per control."""
+    scenarios = list(dict.fromkeys(row.scenario for row in rows))
+    figure = Figure(figsize=(WIDTH, 0.9 + 0.3 * len(scenarios)))
+    axes = figure.subplots(1, len(QUANTITIES), sharey=True)
+    for axis, quantity in zip(axes, QUANTITIES, strict=True):
+        _draw_quantity(axis, quantity, rows, scenarios)
+    axes[0].set_yticks(range(len(scenarios)), scenarios)
+    axes[0].invert_yaxis()
+    handles, labels = axes[0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside upper center", ncols=len(labels))
+    return figure
+
+
+def _draw_quantity(axis: Axes, quantity: Quantity, rows: list[Row], scenarios: list[str]) -> None:
+    """Draws one panel: both controls of a scenario on one line, joined by a bar."""
+    by_control: dict[str, list[float]] = {}
+    for row in rows:
+        by_control.setdefault(row.control, []).append(row.values[quantity.name])
+    table = np.array(list(by_control.values()))
+    axis.hlines(range(len(scenarios)), *_ends(table), color="0.8", linewidth=2.2, zorder=1)
+    for control, values in by_control.items():
+        marker, size = MARKS[control]
+        mark: dict[str, Any] = {"marker": marker, "markersize": size, "linestyle": "none"}
+        places = list(range(len(scenarios)))
+        axis.plot(
+            values, places, color=STYLES[control]["color"], label=control, clip_on=False, **mark
+        )
+    axis.set_title(quantity.title, fontsize="small")
+    axis.set_xlabel(quantity.unit)
+    most = 100.0 if quantity.unit == "%" else float(np.nanmax(table, initial=0.0))
+    axis.set_xlim(0.0, ROOM * (most or 1.0))
+    axis.grid(visible=True, axis="x")
+
+
+def _ends(table: np.ndarray[Any, np.dtype[np.float64]]) -> tuple[Any, Any]:
+    """Returns the least and the largest of both controls' values, NaN where one is missing."""
+    return table.min(axis=0), table.max(axis=0)
+
+
+def rows_as_table(rows: list[Row]) -> list[dict[str, Any]]:
+    """Returns the rows for JSON."""
+    return [
+        {
+            "scenario": row.scenario,
+            "control": row.control,
+            "runs": row.runs,
+            "walked": row.walked,
+            **{quantity.name: row.values[quantity.name] for quantity in QUANTITIES[1:]},
+            "reason": row.reason,
+        }
+        for row in rows
+    ]

@@ -1,0 +1,98 @@
+"""Measures the restitution that a drop delivers, from the speeds of its impacts.
+
+A robot that flies freely comes back to the height at which its feet left the ground with the speed
+at which they left it. So the speed of an impact over that of the impact before is the restitution
+that the ground delivered, without any error of sampling.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+
+from hexapod_cosim.cosim.interface.names import foot_names
+from hexapod_cosim.cosim.master.recorder import COMMAND_COLUMNS
+from hexapod_cosim.cosim.results.walk import View
+from hexapod_cosim.models import CONTACT_LAWS
+from hexapod_cosim.models.contact import CHI, achieved_restitution
+
+MOST = 5  # impacts that are reported
+
+
+@dataclass(frozen=True)
+class Bounce:
+    """An impact, and the restitution that follows from the speed of the next one."""
+
+    time: float  # s    of the first row with contact
+    speed: float  # m/s    of the impact, mean over the feet
+    restitution: float  # 1
+
+
+@dataclass(frozen=True)
+class Drop:
+    """The restitution of a drop."""
+
+    asked: float | None  # contact.restitution; None: the law has no such parameter
+    of_the_law: float | None  # that the law delivers, by its closed form
+    bounces: tuple[Bounce, ...]
+
+    def as_facts(self) -> dict[str, Any]:
+        """Returns the drop for run.json."""
+        return asdict(self) | {"bounces": [asdict(bounce) for bounce in self.bounces]}
+
+
+def describe_drop(view: View) -> Drop | None:
+    """Returns the restitution of a run that begins in free flight without any command.
+
+    It is None for other runs, and for a robot that never flies again. Impacts slower than
+    `contact.impact_speed_floor` are left out: there the law does not deliver what it is asked for.
+    """
+    recording = view.recording
+    needed = {*COMMAND_COLUMNS, *foot_names("contact"), *foot_names("impact_speed")}
+    if len(recording.time) < 2 or not needed <= set(recording.names):
+        return None
+    if recording.columns(list(COMMAND_COLUMNS)).any():
+        return None
+    touching = np.asarray((recording.feet("contact") > 0.5).any(axis=1))
+    if touching[0]:
+        return None
+    begins = np.flatnonzero(touching[1:] & ~touching[:-1]) + 1
+    # all feet have touched down by the end of a landing, which is the row before the next flight
+    ends = [_end(touching, begin) for begin in begins.tolist()]
+    speeds = recording.feet("impact_speed")[ends].mean(axis=1)
+    floor = view.parameters.get("contact.impact_speed_floor", 0.0)
+    bounces = [
+        Bounce(float(recording.time[begin]), float(before), float(after / before))
+        for begin, before, after in zip(begins, speeds[:-1], speeds[1:], strict=False)
+        if before > floor
+    ]
+    asked, law = asked_restitution(view.parameters)
+    return Drop(asked, law, tuple(bounces[:MOST])) if bounces else None
+
+
+def _end(touching: np.ndarray[Any, np.dtype[np.bool_]], begin: int) -> int:
+    """Returns the last row of a landing that begins in a row."""
+    flight = np.flatnonzero(~touching[begin:])
+    return begin + int(flight[0]) - 1 if len(flight) else len(touching) - 1
+
+
+def asked_restitution(parameters: Mapping[str, float]) -> tuple[float | None, float | None]:
+    """Returns the restitution asked for, and the one that the law delivers by its closed form."""
+    law = CONTACT_LAWS[round(parameters["contact.law"]) - 1]
+    if law not in CHI:
+        return None, 1.0 if law == "hertz" else None
+    asked = parameters["contact.restitution"]
+    return asked, achieved_restitution(CHI[law](asked))
+
+
+def drop_text(drop: Mapping[str, Any]) -> str:
+    """Returns the facts of a drop as one sentence."""
+    asked = "no restitution" if drop["asked"] is None else f"restitution {drop['asked']:.3g}"
+    law = "" if drop["of_the_law"] is None else f", the law gives {drop['of_the_law']:.4f}"
+    delivered = ", ".join(
+        f"{bounce['restitution']:.4f} at {bounce['speed']:.3g} m/s" for bounce in drop["bounces"]
+    )
+    return f"Asked for {asked}{law}; delivered {delivered}."

@@ -1,0 +1,134 @@
+import {
+  BufferAttribute,
+  BufferGeometry,
+  type Color,
+  InstancedMesh,
+  Matrix4,
+  MeshLambertMaterial,
+  Quaternion,
+  Vector3,
+} from "three";
+import type { Recording } from "../recording";
+import type { PackedStance } from "../types";
+import type { Relief } from "./relief";
+import type { Surface } from "./surface";
+
+const LEAST = 0.001; // m    of depth; a smaller dent is not drawn
+const LIFT = 0.0012; // m    of a dent's middle above the ground, which would hide it
+const RIM = 0.16; // height of the rim over the dent's radius
+const RINGS = [0, 0.25, 0.5, 0.7, 0.82, 0.92, 1, 1.15, 1.35]; // radii over that of the dent
+const SECTORS = 28;
+const STEEP = 1.6; // slope of the shaded bowl at its edge
+
+/** A dent: when it is made, where, how deep and how wide [s, m]. */
+export interface Dent {
+  readonly time: number;
+  readonly x: number;
+  readonly y: number;
+  readonly depth: number;
+  readonly radius: number;
+}
+
+/** Returns the dents that feet leave in soft ground, in order of time. */
+export function findDents(
+  stances: readonly PackedStance[],
+  surface: Surface,
+  radius: number,
+): Dent[] {
+  return stances
+    .filter(([, , x, y, depth]) => depth > LEAST && surface.lookAt(x, y) === "soil")
+    .map(([, time, x, y, depth]) => ({ time, x, y, depth, radius: mouth(radius, depth) }))
+    .sort((a, b) => a.time - b.time);
+}
+
+/** Returns the radius of the circle in which a sphere cuts the ground. */
+function mouth(radius: number, depth: number): number {
+  return depth < radius ? Math.sqrt(depth * (2 * radius - depth)) : radius;
+}
+
+/**
+ * Dents at the places where feet stood, each from its touch-down on. A dent is a disc on the ground
+ * that is shaded as a bowl with a rim: a true bowl would lie under the drawn surface.
+ */
+export class Dents extends InstancedMesh<BufferGeometry, MeshLambertMaterial> {
+  private readonly times: readonly number[];
+
+  constructor(
+    dents: readonly Dent[],
+    relief: Relief,
+    private readonly recording: Recording,
+  ) {
+    super(bowl(), new MeshLambertMaterial(), Math.max(dents.length, 1));
+    this.times = dents.map(({ time }) => time);
+    dents.forEach((dent, k) => {
+      const normal = relief.normal(dent.x, dent.y);
+      const place = new Vector3(dent.x, dent.y, relief.height(dent.x, dent.y));
+      this.setMatrixAt(
+        k,
+        new Matrix4().compose(
+          place.addScaledVector(normal, LIFT),
+          new Quaternion().setFromUnitVectors(new Vector3(0, 0, 1), normal),
+          new Vector3(dent.radius, dent.radius, dent.radius),
+        ),
+      );
+    });
+    this.frustumCulled = false;
+    this.receiveShadow = true;
+    this.count = 0;
+  }
+
+  /** Shows the dents that were made up to a time [s]. */
+  show(time: number): void {
+    const now = this.recording.time[this.recording.place(time).row] + 1e-6;
+    let count = 0;
+    while (count < this.times.length && this.times[count] <= now) count++;
+    this.count = count;
+  }
+
+  paint(ground: Color): void {
+    this.material.color.copy(ground);
+    this.material.vertexColors = true;
+    this.material.needsUpdate = true;
+  }
+}
+
+/** Returns a disc of radius 1 with the normals of a bowl and a rim that rises around it. */
+function bowl(): BufferGeometry {
+  const positions: number[] = [];
+  const normals: number[] = [];
+  const colours: number[] = [];
+  for (const radius of RINGS) {
+    const inside = radius < 1;
+    const [first, last] = [1, RINGS[RINGS.length - 1]];
+    const share = inside ? 0 : (radius - first) / (last - first);
+    const slope = inside ? -STEEP * radius : radius === 1 ? 0 : 0.8 * (1 - share);
+    const height = inside ? RIM * Math.max(radius - 0.7, 0) * 3.3 : RIM * (1 - share) ** 2;
+    const shade = inside ? 0.62 + 0.25 * radius * radius : 0.92 + 0.08 * share;
+    for (let k = 0; k <= SECTORS; k++) {
+      const angle = (2 * Math.PI * k) / SECTORS;
+      const [cos, sin] = [Math.cos(angle), Math.sin(angle)];
+      const size = Math.hypot(slope, 1);
+      positions.push(radius * cos, radius * sin, height);
+      normals.push((slope * cos) / size, (slope * sin) / size, 1 / size);
+      colours.push(shade, shade, shade);
+    }
+  }
+  const made = new BufferGeometry();
+  made.setAttribute("position", new BufferAttribute(new Float32Array(positions), 3));
+  made.setAttribute("normal", new BufferAttribute(new Float32Array(normals), 3));
+  made.setAttribute("color", new BufferAttribute(new Float32Array(colours), 3));
+  made.setIndex(ringIndex());
+  return made;
+}
+
+function ringIndex(): number[] {
+  const index: number[] = [];
+  for (let ring = 0; ring + 1 < RINGS.length; ring++) {
+    for (let k = 0; k < SECTORS; k++) {
+      const at = ring * (SECTORS + 1) + k;
+      const next = at + SECTORS + 1;
+      index.push(at, next, next + 1, at, next + 1, at + 1);
+    }
+  }
+  return index;
+}

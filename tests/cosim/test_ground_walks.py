@@ -1,0 +1,58 @@
+"""Walks on the bundled scenarios of uneven ground, with both controls."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from hexapod_cosim.cosim.run.run import simulate
+from hexapod_cosim.cosim.run.walker import Walker
+from hexapod_cosim.cosim.scenario.records import CONTROLS
+from hexapod_cosim.cosim.scenario.scenario import load_scenario
+
+ENERGY = 1e-4  # of the motors' work
+SHARE = 0.7  # of the commanded way that the robot has to walk
+# scenario -> way [m] of the measured cycles that the command asks for
+WAYS = {"stairs": 0.78, "rubble": 0.6, "stones": 0.6, "dune": 1.08, "ramp": 1.38}
+
+
+@pytest.fixture(scope="module")
+def walker(plant_build: Path) -> Iterator[Walker]:
+    with Walker() as made:
+        yield made
+
+
+@pytest.mark.parametrize("name", WAYS)
+@pytest.mark.parametrize("control", CONTROLS)
+def test_both_controls_walk_it_upright(walker: Walker, name: str, control: str) -> None:
+    result = walker.simulate(load_scenario(name, overrides=[f"control={control}"]))
+    walk = result.facts["walk"]
+    assert result.completed
+    assert walk["upright"]
+    assert walk["distance"] > SHARE * WAYS[name]
+    assert result.metrics["energy_residual"] < ENERGY
+
+
+@pytest.mark.usefixtures("plant_build")
+@pytest.mark.parametrize("control", CONTROLS)
+def test_feet_that_find_no_ground_neither_end_the_run_nor_its_metrics(control: str) -> None:
+    """The robot steps into gaps deeper than its legs reach, and falls or hangs between them."""
+    settings = [
+        f"control={control}",
+        "terrain.kind=gaps",
+        "terrain.gap_size=0.3",
+        "terrain.depth=1",
+        "command.vx=0.1",
+        "duration=12",
+    ]
+    result = simulate(load_scenario("walk_flat", overrides=settings))
+    assert result.completed
+    fell = any("the robot fell at" in text for text in result.facts["warnings"])
+    assert result.facts["walk"]["upright"] == (not fell)
+    for name in ("peak_force", "slip_per_metre", "roll_rms", "energy_residual"):
+        assert math.isfinite(result.metrics[name])
+    assert result.surface is not None
+    assert result.surface.recipe["kind"] == "gaps"

@@ -1,0 +1,162 @@
+"""Distance and normal of a grid's surface against closed forms."""
+
+from __future__ import annotations
+
+import ctypes as ct
+
+import numpy as np
+import pytest
+from grids import BLOCKS, CORNER, NEAREST, SIDE, TOP, WALL, Ground, grid_bytes, sampled
+
+from hexapod_cosim.models.records import Array
+
+RHO = 0.3  # m, radius of the sphere that bump and bowl belong to
+
+
+def points(n: int, seed: int) -> Array:
+    """Returns points around the origin (n, 3): x, y within 60 mm, z from 0 to 30 mm."""
+    rng = np.random.default_rng(seed)
+    return rng.uniform([-0.06, -0.06, 0.0], [0.06, 0.06, 0.03], (n, 3))
+
+
+def test_a_grid_that_is_a_plane_has_the_plane_s_distance_and_normal(core: ct.CDLL) -> None:
+    ground = Ground(core, sampled(lambda x, y: 0.3 * x - 0.2 * y + 0.05, size=2.0, cell=0.05))
+    up = np.array([-0.3, 0.2, 1.0]) / np.sqrt(1.13)
+    rng = np.random.default_rng(1)
+    for point in rng.uniform([-0.98, -0.98, -0.5], [0.98, 0.98, 0.5], (300, 3)):
+        distance, normal, bend = ground.face(point)
+        assert distance == pytest.approx(up @ (point - [0.0, 0.0, 0.05]), abs=1e-12)
+        assert np.abs(normal - up).max() < 1e-12
+        assert np.abs(bend).max() < 1e-9
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0], ids=["bump", "bowl"])
+def test_bump_and_bowl_have_a_sphere_s_distance(core: ct.CDLL, side: float) -> None:
+    ground = Ground(
+        core,
+        sampled(lambda x, y: side * (np.sqrt(RHO**2 - x**2 - y**2) - RHO), size=0.2, cell=5e-4),
+    )
+    for above in points(200, seed=2):
+        rise = side * (np.sqrt(RHO**2 - above[0] ** 2 - above[1] ** 2) - RHO)
+        arm = above + np.array([0.0, 0.0, rise + side * RHO])
+        distance, normal, bend = ground.face(above + np.array([0.0, 0.0, rise]))
+        length = np.linalg.norm(arm)
+        assert distance == pytest.approx(side * (length - RHO), abs=1e-9)
+        assert np.abs(normal - side * arm / length).max() < 5e-6  # slopes err by h^2 s'''/6
+        expected = side * (np.eye(3) - np.outer(arm, arm) / length**2) / length
+        assert np.abs(bend - expected).max() < 0.02  # second derivatives of a cubic's cells
+
+
+def test_the_normal_is_the_distance_s_gradient_and_its_bend_the_next(core: ct.CDLL) -> None:
+    rng = np.random.default_rng(3)
+    ground = Ground(core, grid_bytes(rng.uniform(0.0, 0.02, (60, 60)), cell=0.05))
+    h = 1e-6
+    for point in rng.uniform([0.5, 0.5, 0.02], [2.2, 2.2, 0.04], (200, 3)):
+        _, normal, bend = ground.face(point)
+        sides = [(ground.face(point + h * e), ground.face(point - h * e)) for e in np.eye(3)]
+        gradient = np.array([(a[0] - b[0]) / (2 * h) for a, b in sides])
+        turn = np.array([(a[1] - b[1]) / (2 * h) for a, b in sides])
+        assert np.abs(gradient - normal).max() < 1e-7
+        assert np.abs(turn - bend).max() < 1e-3
+        assert np.abs(bend @ normal).max() < 1e-7  # the last step of Newton's method
+
+
+def test_distance_and_normal_are_continuous_over_1000_borders_of_cells(core: ct.CDLL) -> None:
+    rng = np.random.default_rng(4)
+    ground = Ground(core, grid_bytes(rng.uniform(0.0, 0.01, (60, 60)), cell=0.05))
+    nm = np.array([1e-9, 0.0, 0.0])
+    for _ in range(1000):
+        point = np.array([0.05 * rng.integers(5, 55), rng.uniform(0.3, 2.7), 0.025])
+        before, after = ground.face(point - nm), ground.face(point + nm)
+        assert abs(after[0] - before[0]) < 3e-9  # the slope times 2 nm
+        assert np.abs(after[1] - before[1]).max() < 1e-6
+
+
+def test_the_border_s_height_goes_on_beyond_the_grid(core: ct.CDLL) -> None:
+    height = np.array([[0.1, 0.2], [0.1, 0.2]])
+    for kind in (1, BLOCKS):
+        ground = Ground(core, grid_bytes(height, cell=1.0, kind=kind))
+        assert ground.face([-5.0, 0.5, 1.0], TOP)[0] == pytest.approx(0.9, abs=1e-12)
+        assert ground.face([9.0, 0.5, 1.0], TOP)[0] == pytest.approx(0.8, abs=1e-12)
+
+
+def step(core: ct.CDLL) -> Ground:
+    """Returns two blocks: height 0 for x < 0 and 0.1 m for x > 0."""
+    height = np.array([[0.0, 0.1]])
+    return Ground(core, grid_bytes(height, cell=1.0, origin=(-1.0, -0.5), kind=BLOCKS))
+
+
+@pytest.mark.parametrize(
+    ("point", "kind", "distance", "normal"),
+    [
+        ([-0.03, 0.1, 0.05], TOP, 0.05, [0.0, 0.0, 1.0]),
+        ([-0.03, 0.1, 0.05], WALL, 0.03, [-1.0, 0.0, 0.0]),
+        ([-0.03, 0.1, 0.14], WALL, 0.05, [-0.6, 0.0, 0.8]),
+        ([-0.03, 0.1, 0.14], NEAREST, 0.05, [-0.6, 0.0, 0.8]),
+        ([0.03, 0.1, 0.14], TOP, 0.04, [0.0, 0.0, 1.0]),
+        ([0.03, 0.1, 0.14], WALL, 1000.0, [0.0, 0.0, 1.0]),
+    ],
+)
+def test_a_step_has_a_top_a_wall_and_an_edge(
+    core: ct.CDLL, point: list[float], kind: int, distance: float, normal: list[float]
+) -> None:
+    got = step(core).face(point, kind)
+    assert got[0] == pytest.approx(distance, abs=1e-9)
+    assert got[1] == pytest.approx(normal, abs=1e-9)
+
+
+def test_an_edge_s_normal_turns_about_the_edge(core: ct.CDLL) -> None:
+    bend = step(core).face([-0.03, 0.1, 0.14], WALL)[2]
+    along = np.array([0.8, 0.0, 0.6])  # across the edge and the normal
+    assert np.abs(bend - np.outer(along, along) / 0.05).max() < 1e-9
+
+
+def test_a_concave_corner_touches_two_walls_and_a_convex_one_its_edge(core: ct.CDLL) -> None:
+    height = np.array([[0.0, 0.1], [0.1, 0.1]])
+    concave = Ground(core, grid_bytes(height, cell=1.0, origin=(-1.0, -1.0), kind=BLOCKS))
+    place = [-0.03, -0.04, 0.05]
+    assert concave.face(place, WALL)[0] == pytest.approx(0.03, abs=1e-12)
+    assert concave.face(place, SIDE)[0] == pytest.approx(0.04, abs=1e-12)
+    assert concave.face(place, CORNER)[0] == 1000.0  # hidden behind the walls
+    height = np.array([[0.0, 0.0], [0.0, 0.1]])
+    convex = Ground(core, grid_bytes(height, cell=1.0, origin=(-1.0, -1.0), kind=BLOCKS))
+    distance, normal, _ = convex.face(place, CORNER)
+    assert distance == pytest.approx(0.05, abs=1e-12)
+    assert normal == pytest.approx([-0.6, -0.8, 0.0], abs=1e-12)
+    distance, normal, _ = convex.face([-0.02, -0.03, 0.16], CORNER)
+    assert distance == pytest.approx(0.07, abs=1e-12)
+    assert normal == pytest.approx([-2 / 7, -3 / 7, 6 / 7], abs=1e-12)
+
+
+def test_columns_of_equal_height_have_no_edge_between_them(core: ct.CDLL) -> None:
+    ground = Ground(core, grid_bytes(np.full((3, 3), 0.2), cell=1.0, kind=BLOCKS))
+    for kind in (WALL, SIDE, CORNER):
+        assert ground.face([0.999, 0.999, 0.201], kind)[0] == 1000.0
+
+
+PLAIN = grid_bytes(np.zeros((3, 4)), cell=0.1)
+BAD = {
+    "not begin with hxGrid01": b"hxGrid02" + PLAIN[8:],
+    "at least the 128 bytes": b"hxGrid01",
+    "cut off or damaged": PLAIN[:-1],
+    r"height\[1\]\[2\]: got nan": grid_bytes(
+        np.where(np.arange(12).reshape(3, 4) == 6, np.nan, 0.0), cell=0.1
+    ),
+    r"height\[0\]\[0\]: got 20000": grid_bytes(np.full((2, 2), 2e4), cell=0.1),
+    "rows: got 1, expected 2": grid_bytes(np.zeros((1, 4)), cell=0.1),
+    "cell: got 0": grid_bytes(np.zeros((3, 4)), cell=0.0),
+    "cell: got nan": grid_bytes(np.zeros((3, 4)), cell=np.nan),
+    "kind: got 3": grid_bytes(np.zeros((3, 4)), cell=0.1, kind=3),
+    "mu: got -1": grid_bytes(
+        np.zeros((2, 2)), cell=0.1, material=np.ones((2, 2)), table=np.full((1, 16), -1.0)
+    ),
+    "material: got 2": grid_bytes(
+        np.zeros((2, 2)), cell=0.1, material=np.full((2, 2), 2), table=np.zeros((1, 16))
+    ),
+}
+
+
+@pytest.mark.parametrize("message", BAD)
+def test_a_bad_grid_is_refused_by_name(core: ct.CDLL, message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        Ground(core, BAD[message])

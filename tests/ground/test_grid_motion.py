@@ -1,0 +1,231 @@
+"""Motion on grids: a plane as a slope, rebounds, forces over borders and noses, energy, bits."""
+
+from __future__ import annotations
+
+import ctypes as ct
+import math
+
+import numpy as np
+import pytest
+from grids import BLOCKS, Ground, grid_bytes, on_grid, sampled, start_on_grid
+from mirror import BAD_STATE, INVALID_MODEL, HxInput, HxOutput
+from plant import Plant, PlantError, definition, flat, inputs, pointer
+from states import changed
+
+from hexapod_cosim.models import Robot, load_robot
+from hexapod_cosim.models.dynamics import Command
+from hexapod_cosim.models.records import Array
+
+ATHENA = load_robot("athena")
+HEIGHT = 0.2  # m, of the torso above the ground at the start
+
+
+def marching(robot: Robot, t: float) -> Command:
+    """Returns a command that swings the legs by turns: 1 s a cycle, two groups of three."""
+    angle = np.array(robot.stance)
+    for leg in range(6):
+        phase = 2.0 * math.pi * (t + 0.5 * (leg % 2))
+        lift = max(math.sin(phase), 0.0)
+        angle[leg, 0] += 0.25 * math.cos(phase) * (1.0 if leg < 3 else -1.0)
+        angle[leg, 1] -= 0.35 * lift
+        angle[leg, 2] += 0.1 * lift
+    return Command(angle_ref=angle)
+
+
+def march(plant: Plant, until: float) -> Array:
+    """Marches to a time [s] and returns the torso's path (n, 3), 50 times a second."""
+    path = []
+    for k in range(round(plant.time * 50), round(50 * until)):
+        plant.step((k + 1) / 50, marching(plant.robot, k / 50))
+        path.append(plant.output().torso.position)
+    return np.array(path)
+
+
+def rough(seed: int, *, size: float = 4.0, kind: int = 1) -> bytes:
+    """Returns a rough ground: 50 mm cells, 10 mm high, blocks in levels of 5 mm."""
+    rng, n = np.random.default_rng(seed), round(size / 0.05)
+    height = rng.uniform(0.0, 0.01, (n, n)) if kind == 1 else 0.005 * rng.integers(0, 3, (n, n))
+    return grid_bytes(height, cell=0.05, origin=(-size / 2, -size / 2), kind=kind)
+
+
+def test_a_grid_that_is_a_plane_gives_the_path_of_the_slope(core: ct.CDLL) -> None:
+    heading, incline = 0.5, 0.08
+    robot = changed(
+        ATHENA, terrain={"kind": "slope", "incline": incline, "heading": heading, "height": 0.0}
+    )
+    rise = math.tan(incline)
+    ground = Ground(
+        core,
+        sampled(
+            lambda x, y: rise * (math.cos(heading) * x + math.sin(heading) * y), size=6.0, cell=0.05
+        ),
+    )
+    place = {"position": (0.0, 0.0, HEIGHT)}
+    difference = march(Plant(core, robot, **place), 10.0) - march(
+        on_grid(core, ATHENA, ground, **place), 10.0
+    )
+    assert np.abs(difference).max() < 1e-9
+
+
+@pytest.mark.parametrize("kind", [1, BLOCKS])
+def test_energy_balances_on_rough_ground(core: ct.CDLL, kind: int) -> None:
+    for law in ("tanh", "bristle"):
+        ground = Ground(core, rough(1, kind=kind))
+        robot = changed(ATHENA, friction={"law": law})
+        plant = on_grid(core, robot, ground, position=(0.0, 0.0, HEIGHT))
+        march(plant, 4.0)
+        energy = plant.output().energy
+        assert energy.actuator_work > 10.0
+        assert abs(energy.residual) < 1e-4 * energy.actuator_work
+
+
+def sphere_drop(core: ct.CDLL, ground: Ground | None) -> tuple[float, float]:
+    """Drops the robot on its feet at 3 m/s with motors off; returns the first impact's impulse
+    [N s] and peak force [N], sums over the feet.
+    """
+    robot = changed(ATHENA, servo={"mode": "torque"}, friction={"law": "none"})
+    start = {"position": (0.013, 0.021, 0.4), "velocity": (0.0, 0.0, -3.0)}
+    plant = Plant(core, robot, **start)
+    if ground:
+        start_on_grid(plant, ground, **start)
+    command = Command(angle_ref=robot.stance)
+    plant.step(0.15, command)
+    foot = plant.output(command).foot
+    return float(np.sum(foot.impulse)), float(np.max(foot.peak_force))
+
+
+def test_a_foot_rebounds_from_a_grid_as_from_the_plane(core: ct.CDLL) -> None:
+    for kind in (1, BLOCKS):
+        ground = Ground(core, grid_bytes(np.zeros((41, 41)), cell=0.05, origin=(-1, -1), kind=kind))
+        assert sphere_drop(core, ground) == pytest.approx(sphere_drop(core, None), rel=1e-3)
+
+
+def forces(plant: Plant, x: float, z: float) -> Array:
+    """Returns the force on each foot (6, 3) of the robot at rest with its torso at x, z."""
+    body = plant.bodies
+    body[:, 0] += x - body[0, 0]
+    body[:, 2] += z - body[0, 2]
+    plant.bodies = body
+    return np.array(plant.output().foot.force)
+
+
+def test_the_foot_force_is_continuous_over_noses_and_borders(core: ct.CDLL) -> None:
+    height = np.zeros((40, 60))
+    height[:, 30:] = 0.03  # a step of 30 mm at x = 0, under one foot after the other
+    ground = Ground(core, grid_bytes(height, cell=0.05, origin=(-1.5, -1.0), kind=BLOCKS))
+    robot = changed(ATHENA, friction={"law": "none"})
+    plant = on_grid(core, robot, ground, position=(0.0, 0.0, 1.0))
+    foot = np.array(plant.output().foot.position)[0]
+    reach, radius = foot[0], robot.foot.radius
+    drop = 1.0 - (foot[2] + radius) + (0.03 + radius) - 1e-4  # torso's height: 0.1 mm in the nose
+    before, after = forces(plant, -reach - 1e-9, drop), forces(plant, -reach + 1e-9, drop)
+    load = np.linalg.norm(before[0])
+    assert load > 1.0
+    assert np.abs(after[0] - before[0]).max() < 1e-6 * load
+
+
+@pytest.mark.parametrize("kind", [1, BLOCKS])
+def test_a_walk_on_a_grid_is_the_same_on_rerun_and_after_a_restore(
+    core: ct.CDLL, kind: int
+) -> None:
+    ground = Ground(core, rough(2, kind=kind))
+    place = {"position": (0.0, 0.0, HEIGHT)}
+    plant, again = (on_grid(core, ATHENA, ground, **place) for _ in range(2))
+    march(plant, 1.0)
+    march(again, 0.4)
+    saved = again.save()
+    march(again, 0.7)
+    again.restore(saved)
+    march(again, 1.0)
+    assert plant.save() == again.save()
+
+
+@pytest.mark.parametrize("kind", [1, BLOCKS])
+def test_every_kernel_gives_the_same_rates_on_a_grid(core: ct.CDLL, kind: int) -> None:
+    ground = Ground(core, rough(3, kind=kind))
+    plant = on_grid(core, ATHENA, ground, position=(0.0, 0.0, HEIGHT))
+    march(plant, 0.6)
+    core.hx_probe_kernel.restype = ct.c_char_p
+    seen = {}
+    for index in range(8):
+        rate = np.zeros((19, 13))
+        name = core.hx_probe_kernel(
+            index,
+            ct.c_void_p(plant.handle),
+            ct.byref(inputs(marching(ATHENA, 0.6))),
+            pointer(rate),
+        )
+        if name:
+            seen[name] = rate
+    assert b"baseline" in seen
+    assert all(np.array_equal(rate, seen[b"baseline"]) for rate in seen.values())
+
+
+def test_a_state_is_refused_over_another_ground(core: ct.CDLL) -> None:
+    grounds = [Ground(core, rough(seed)) for seed in (4, 5)]
+    assert grounds[0].checksum != grounds[1].checksum
+    place = {"position": (0.0, 0.0, HEIGHT)}
+    one, other = (on_grid(core, ATHENA, ground, **place) for ground in grounds)
+    before = other.save()
+    with pytest.raises(PlantError, match="its ground is a grid that this plant does not have") as e:
+        other.restore(one.save())
+    assert e.value.status == BAD_STATE
+    assert other.save() == before
+
+
+def test_a_grid_that_is_missing_or_too_fine_for_the_feet_is_refused(core: ct.CDLL) -> None:
+    plant = Plant(core, ATHENA)
+    before = plant.save()
+    d = definition(ATHENA)
+    d.terrain.kind = 3
+    with pytest.raises(PlantError, match="got grid, expected a grid; load one") as missing:
+        plant.reset(d)
+    assert missing.value.status == INVALID_MODEL
+    fine = Ground(core, grid_bytes(np.zeros((9, 9)), cell=0.01, kind=BLOCKS))
+    with pytest.raises(PlantError, match=r"blocks with cells of 0\.01 m, expected at least"):
+        start_on_grid(plant, fine)
+    assert plant.save() == before
+
+
+def test_derivatives_on_a_smooth_grid_are_those_of_differences(core: ct.CDLL) -> None:
+    ground = Ground(core, rough(6))
+    robot = changed(ATHENA, solver={"tolerance": 1e-8})
+    plant = on_grid(core, robot, ground, position=(0.0, 0.0, HEIGHT))
+    march(plant, 0.3)
+    command, x = marching(robot, 0.3), plant.coordinates
+    rng = np.random.default_rng(7)
+    dx, h = rng.normal(size=x.size), 1e-7
+    dx[3:7] -= (dx[3:7] @ x[3:7]) * x[3:7]
+    no_input = np.zeros(ct.sizeof(HxInput) // 8)
+    exact, d_output = plant.tangent(command, no_input, dx)
+    assert isinstance(d_output, HxOutput)
+    sides = []
+    for sign in (1.0, -1.0):
+        plant.coordinates = x + sign * h * dx
+        sides.append(plant.rates(command))
+    difference = (sides[0] - sides[1]) / (2.0 * h)
+    assert np.abs(exact - difference).max() < 1e-4 * np.abs(difference).max()
+    assert flat(d_output.foot.force).any()
+
+
+def test_a_material_s_friction_and_stiffness_are_those_of_the_touch_down(core: ct.CDLL) -> None:
+    table = np.full((1, 16), np.nan)
+    table[0, 0], table[0, 2], table[0, 3:] = 0.0, 2e5, 0.0
+    ice = grid_bytes(
+        np.zeros((41, 41)), cell=0.05, origin=(-1, -1), material=np.ones((41, 41)), table=table
+    )
+    robot = changed(ATHENA, friction={"law": "tanh"})
+    place = {"position": (0.0, 0.0, HEIGHT)}
+    plain = grid_bytes(np.zeros((41, 41)), cell=0.05, origin=(-1, -1))
+    feet = []
+    for file in (plain, ice):
+        ground = Ground(core, file)
+        plant = on_grid(core, robot, ground, **place)
+        march(plant, 1.3)
+        feet.append(plant.output(marching(robot, 1.3)).foot)
+    assert np.max(feet[0].tangential_force) > 1.0
+    assert np.all(feet[1].tangential_force == 0.0)
+    depth = [foot.penetration[foot.contact != 0].mean() for foot in feet]
+    load = [foot.normal_force[foot.contact != 0].mean() for foot in feet]
+    stiffness = [f / d**1.5 for f, d in zip(load, depth, strict=True)]
+    assert stiffness[1] < 0.5 * stiffness[0]

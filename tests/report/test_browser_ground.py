@@ -1,0 +1,135 @@
+"""The report of a walk on a surface in a real browser: mesh, dents, legend, profile."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from browser import FLAGS, Opened, find_chromium, launcher
+
+from hexapod_cosim.cosim.report.report import write_report
+from hexapod_cosim.cosim.results.results import StoredResult, stored_result
+from hexapod_cosim.cosim.results.walk import GRID
+from hexapod_cosim.cosim.run.run import simulate
+from hexapod_cosim.cosim.scenario.scenario import load_scenario
+from hexapod_cosim.models import LEG_NAMES
+from hexapod_cosim.models.ground.catalogue import make_surface
+from hexapod_cosim.models.ground.surface import Surface
+
+SUNK = 0.012  # m    that feet stand in the drawn ground
+PHONE = (390, 844)  # px
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Any]:
+    with launcher() as launch:
+        yield launch(*FLAGS)
+
+
+@pytest.fixture(scope="module")
+def walk(plant_build: Path) -> StoredResult:
+    """Returns a walk on flat ground, which the tests draw on surfaces."""
+    find_chromium()
+    return stored_result(simulate(load_scenario("walk_flat", overrides=["duration=3"])))
+
+
+def opened(
+    walk: StoredResult,
+    surface: Surface,
+    folder: Path,
+    browser: Any,
+    *,
+    sunk: float = 0.0,
+    **how: Any,
+) -> Opened:
+    """Opens the report of the walk as if on a surface, with its feet deeper by `sunk`."""
+    recording = walk.view.recording
+    data = recording.data.copy()
+    for leg in LEG_NAMES:
+        data[:, recording.names.index(f"{leg}.foot.position[3]")] -= sunk
+    parameters = {**walk.view.parameters, "terrain.kind": float(GRID)}
+    view = replace(
+        walk.view,
+        recording=replace(recording, data=data),
+        parameters=parameters,
+        surface=surface,
+    )
+    write_report({"kinematic": replace(walk, view=view)}, folder, warn=lambda _: None)
+    return Opened(browser, folder / "report.html", address="#t=2.9", **how)
+
+
+def test_flat_ground_of_blocks_is_one_face(
+    walk: StoredResult, tmp_path: Path, browser: Any
+) -> None:
+    surface = Surface(kind="blocks", height=np.zeros((40, 60)), x0=-1.0, y0=-1.0, cell=0.05)
+    page = opened(walk, surface, tmp_path, browser)
+    assert page.errors == []
+    assert page.value("window.hexapod.shown('kinematic').triangles") == 2
+    page.close()
+
+
+def test_a_step_is_two_faces_and_a_wall(walk: StoredResult, tmp_path: Path, browser: Any) -> None:
+    page = opened(walk, make_surface("step_up", {}), tmp_path, browser)
+    assert page.value("window.hexapod.shown('kinematic').triangles") == 6
+    page.close()
+
+
+def test_forty_thousand_blocks_of_different_height_open(
+    walk: StoredResult, tmp_path: Path, browser: Any
+) -> None:
+    row, column = np.indices((200, 200))
+    # neighbours always differ
+    heights = np.asarray(-1e-3 * ((7 * row + 13 * column) % 97), dtype=np.float64)
+    surface = Surface(kind="blocks", height=heights, x0=-5.0, y0=-5.0, cell=0.05)
+    page = opened(walk, surface, tmp_path, browser)
+    assert page.errors == []
+    # tops, and walls between neighbours along both axes
+    faces = 200 * 200 + 2 * 199 * 200
+    assert page.value("window.hexapod.shown('kinematic').triangles") == 2 * faces
+    page.close()
+
+
+@pytest.mark.parametrize("theme", ["light", "dark"])
+def test_feet_in_soil_leave_a_dent_at_each_touch_down(
+    walk: StoredResult, tmp_path: Path, browser: Any, theme: str
+) -> None:
+    surface = make_surface("sand", {})
+    page = opened(walk, surface, tmp_path, browser, sunk=SUNK, color_scheme=theme)
+    assert page.errors == []
+    contact = walk.view.recording.feet("contact") > 0.5
+    for row in (10, 250, len(contact) - 2):
+        page.seek(float(walk.view.recording.time[row]) + 1e-3)
+        begun = contact[0].sum() + (contact[1 : row + 1] & ~contact[:row]).sum()
+        assert page.value("window.hexapod.shown('kinematic').dents") == begun
+    assert "dry sand" in page.page.locator(".keys").inner_text()
+    page.close()
+
+
+def test_feet_on_hard_ground_leave_no_dents(
+    walk: StoredResult, tmp_path: Path, browser: Any
+) -> None:
+    page = opened(walk, make_surface("wave", {}), tmp_path, browser, sunk=SUNK)
+    assert page.value("window.hexapod.shown('kinematic').dents") == 0
+    assert "contours every" in page.page.locator(".keys").inner_text()
+    page.close()
+
+
+def test_the_profile_is_shown_and_moves_the_replay(
+    walk: StoredResult, tmp_path: Path, browser: Any
+) -> None:
+    page = opened(walk, make_surface("rubble", {}), tmp_path, browser, size=PHONE)
+    drawing = page.page.locator("[data-panels=profile] svg")
+    stances = page.page.locator("[data-panels=profile] .touch").count()
+    contact = walk.view.recording.feet("contact") > 0.5
+    assert stances == contact[0].sum() + (contact[1:] & ~contact[:-1]).sum()
+    drawing.scroll_into_view_if_needed()
+    box = drawing.bounding_box()
+    assert 0 < box["width"] <= PHONE[0]
+    page.page.mouse.click(box["x"] + 1, box["y"] + box["height"] / 2)
+    page.wait("clock.time < 0.1")
+    assert page.value("document.documentElement.scrollWidth") <= PHONE[0]
+    page.close()
