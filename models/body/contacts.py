@@ -70,9 +70,7 @@ def sphere_contact(robot: Robot, sphere: BodySphere, state: Array) -> FootContac
 
 def body_contacts(robot: Robot, body: Array) -> tuple[FootContact, ...]:
     """Returns the contacts of all spheres of `body_spheres`, at bodies (19, 13)."""
-    return tuple(
-        sphere_contact(robot, sphere, body[sphere.body]) for sphere in body_spheres(robot)
-    )
+    return tuple(sphere_contact(robot, sphere, body[sphere.body]) for sphere in body_spheres(robot))
 
 
 def standing_body_damping(robot: Robot, body: Array) -> Array:

@@ -48,8 +48,8 @@ static inline hxReal hx_line_distance(hxVec3 p, hxVec3 a, hxVec3 q, hxVec3 b) {
 }
 
 /* Stores the points of all legs, world axes. */
-static inline void leg_chains(const hxModel *model, const hxPlantMotion *motion,
-                              const hxWork *work, hxNumber chain[HX_CHAIN][3][HX_SLOTS]) {
+static inline void leg_chains(const hxModel *model, const hxPlantMotion *motion, const hxWork *work,
+                              hxNumber chain[HX_CHAIN][3][HX_SLOTS]) {
   for (int pack = 0; pack < HX_PACKS; ++pack) {
     const int slot = pack * HX_LANES;
     const hxJointWork *joint = work->pack[pack].joint;
@@ -69,8 +69,7 @@ static inline void next_chains(hxNumber chain[HX_CHAIN][3][HX_SLOTS],
                                hxNumber next[HX_CHAIN][3][HX_SLOTS]) {
   for (int k = 0; k < HX_CHAIN; ++k)
     for (int i = 0; i < 3; ++i)
-      for (int slot = 0; slot < HX_SLOTS; ++slot)
-        next[k][i][slot] = chain[k][i][hx_next_leg[slot]];
+      for (int slot = 0; slot < HX_SLOTS; ++slot) next[k][i][slot] = chain[k][i][hx_next_leg[slot]];
 }
 
 /* Computes the least distance of each leg's femur and tibia from those of its two neighbours, less
