@@ -13,6 +13,7 @@ from hexapod_cosim.models.errors import (
 )
 from hexapod_cosim.models.kinematics import foot_position, foot_positions
 from hexapod_cosim.models.robot import (
+    BODY_CONTACTS,
     CONTACT_LAWS,
     FRICTION_LAWS,
     GAITS,
@@ -23,6 +24,7 @@ from hexapod_cosim.models.robot import (
     SERVO_MODES,
     TERRAINS,
     Baumgarte,
+    BodyContact,
     Contact,
     Foot,
     Friction,
@@ -43,6 +45,7 @@ from hexapod_cosim.models.robot import (
 )
 
 __all__ = [
+    "BODY_CONTACTS",
     "CONTACT_LAWS",
     "FRICTION_LAWS",
     "GAITS",
@@ -53,6 +56,7 @@ __all__ = [
     "SERVO_MODES",
     "TERRAINS",
     "Baumgarte",
+    "BodyContact",
     "Contact",
     "FmuError",
     "Foot",

@@ -24,6 +24,7 @@ from typing import Any
 from hexapod_cosim.models.errors import RobotError, unknown_name
 from hexapod_cosim.models.ground.table import beside, read_terrain
 from hexapod_cosim.models.records import (
+    BODY_CONTACTS,
     CONTACT_LAWS,
     FRICTION_LAWS,
     GAITS,
@@ -35,6 +36,7 @@ from hexapod_cosim.models.records import (
     TERRAINS,
     Array,
     Baumgarte,
+    BodyContact,
     Contact,
     Foot,
     Friction,
@@ -61,6 +63,7 @@ from hexapod_cosim.models.urdf.table import SECTIONS, element_named, side_table,
 from hexapod_cosim.models.validation import check_robot
 
 __all__ = [
+    "BODY_CONTACTS",
     "CONTACT_LAWS",
     "FRICTION_LAWS",
     "GAITS",
@@ -72,6 +75,7 @@ __all__ = [
     "TERRAINS",
     "Array",
     "Baumgarte",
+    "BodyContact",
     "Contact",
     "Foot",
     "Friction",
@@ -233,6 +237,8 @@ def _read_friction(
 
 def _read_section(table: Mapping[str, Any], name: str, where: str) -> Any:
     record = SECTIONS[name]
+    if record is BodyContact and name not in table:
+        return BodyContact()
     if record is Terrain:
         return read_terrain(_section(table, name, where), where)
     given = read_given(record, _section(table, name, where), where)

@@ -504,7 +504,7 @@ const char *const hx_log_category_names[] = {
 const hxStateRow *const hx_states = 0;
 const size_t hx_state_count = 0;
 
-const char hx_default_guid[] = "{82ee1348-5416-4c33-817c-c19b3d6f2b25}";
+const char hx_default_guid[] = "{0e13a342-c85a-4bfb-b507-bcd3b1ecf348}";
 
 _Static_assert(HX_CONTROL_KINEMATIC == 1, "Control");
 _Static_assert(HX_CONTROL_COMPLIANT == 2, "Control");

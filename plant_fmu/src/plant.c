@@ -265,10 +265,24 @@ hxStatus hx_plant_set_coordinates(hxPlant *plant, double t, const hxCoordinates 
   return HX_OK;
 }
 
+/* Switches the contacts of torso, knees and shanks that are due; feet keep theirs. */
+static void switch_bodies(hxPlant *plant) {
+  hxDepths depths;
+  const hxModel *model = &plant->model;
+  if (model->rows + model->torso_rows == model->foot_rows) return;
+  hx_kernel()->depths(model, &plant->state.contact, &plant->state.motion, &depths);
+  for (int k = 0; k < model->foot_rows; ++k)
+    for (int leg = 0; leg < HX_LEGS; ++leg)
+      depths.delta[model->row[k]][leg] =
+          plant->state.contact.closed[model->row[k]][leg] != 0.0 ? 1.0 : -1.0;
+  hx_kernel()->switch_contacts(model, &depths, &plant->state);
+}
+
 void hx_plant_completed_step(hxPlant *plant, const hxInput *input) {
   hxCommand command;
   hx_command_from_input(&command, input, plant->state.time);
   hx_kernel()->measure(&plant->model, &command, &plant->state);
+  switch_bodies(plant);
 }
 
 void hx_plant_rates(const hxPlant *plant, const hxInput *input, hxCoordinates *rate) {
