@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ctypes as ct
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -44,7 +45,9 @@ def march(plant: Plant, until: float) -> Array:
 def rough(seed: int, *, size: float = 4.0, kind: int = 1) -> bytes:
     """Returns a rough ground: 50 mm cells, 10 mm high, blocks in levels of 5 mm."""
     rng, n = np.random.default_rng(seed), round(size / 0.05)
-    height = rng.uniform(0.0, 0.01, (n, n)) if kind == 1 else 0.005 * rng.integers(0, 3, (n, n))
+    height: Array = np.array(rng.uniform(0.0, 0.01, (n, n)))
+    if kind == BLOCKS:
+        height = 0.005 * rng.integers(0, 3, (n, n)).astype(float)
     return grid_bytes(height, cell=0.05, origin=(-size / 2, -size / 2), kind=kind)
 
 
@@ -84,7 +87,7 @@ def sphere_drop(core: ct.CDLL, ground: Ground | None) -> tuple[float, float]:
     [N s] and peak force [N], sums over the feet.
     """
     robot = changed(ATHENA, servo={"mode": "torque"}, friction={"law": "none"})
-    start = {"position": (0.013, 0.021, 0.4), "velocity": (0.0, 0.0, -3.0)}
+    start: dict[str, Any] = {"position": (0.013, 0.021, 0.4), "velocity": (0.0, 0.0, -3.0)}
     plant = Plant(core, robot, **start)
     if ground:
         start_on_grid(plant, ground, **start)

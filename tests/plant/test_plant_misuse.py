@@ -193,7 +193,7 @@ IMPOSSIBLE: list[tuple[str, Any, str]] = [
         5,
         r"solver\.step: got 0, expected a fixed step > 0 with this solver\.method",
     ),
-    ("terrain.kind", 3, r"terrain\.kind: got 3, expected 1 to 2"),
+    ("terrain.kind", 4, r"terrain\.kind: got 4, expected 1 to 3"),
     ("terrain.height", math.nan, r"terrain\.height: got -?nan"),
     ("terrain.incline", 1.6, r"terrain\.incline: got 1\.6"),
     ("terrain.heading", math.nan, r"terrain\.heading: got -?nan"),

@@ -331,15 +331,16 @@ static void smooth_face(const hxTerrain *terrain, const double point[3], int ben
 
 /* ---- blocks ---- */
 
-static double clamped_index(double u, int64_t n) {
-  const double last = (double)(n - 1);
-  return u <= 0.0 ? 0.0 : u >= last ? last : (double)(int64_t)u;
+static int64_t clamped_index(double u, int64_t n) {
+  return u <= 0.0 ? 0 : u >= (double)(n - 1) ? n - 1 : (int64_t)u;
 }
 
 void hx_terrain_cell_at(const hxTerrain *terrain, const double point[3], double cell[2]) {
   const hxGridHead *head = &terrain->head;
-  cell[0] = clamped_index((point[0] - head->x0) / head->cell, head->cols);
-  cell[1] = clamped_index((point[1] - head->y0) / head->cell, head->rows);
+  const int64_t col = clamped_index((point[0] - head->x0) / head->cell, head->cols);
+  const int64_t row = clamped_index((point[1] - head->y0) / head->cell, head->rows);
+  cell[0] = (double)col;
+  cell[1] = (double)row;
 }
 
 /* Returns how far x is outside of a cell along one axis. */
@@ -359,8 +360,7 @@ double hx_terrain_outside(const hxTerrain *terrain, const double point[3], const
 /* Returns the height of a column, of the border's where there is none. */
 static double column_height(const hxTerrain *terrain, double col, double row) {
   const hxGridHead *head = &terrain->head;
-  const int64_t c = (int64_t)clamped_index(col, head->cols),
-                r = (int64_t)clamped_index(row, head->rows);
+  const int64_t c = clamped_index(col, head->cols), r = clamped_index(row, head->rows);
   return terrain->height[r * head->cols + c];
 }
 
@@ -468,8 +468,8 @@ const double *hx_terrain_material(const hxTerrain *terrain, const double point[3
   const hxGridHead *head = &terrain->head;
   const double shift = head->kind == HX_SURFACE_SMOOTH ? 0.5 : 0.0; /* the nearest node */
   if (!terrain->material) return NULL;
-  const int64_t c = (int64_t)clamped_index((point[0] - head->x0) / head->cell + shift, head->cols);
-  const int64_t r = (int64_t)clamped_index((point[1] - head->y0) / head->cell + shift, head->rows);
+  const int64_t c = clamped_index((point[0] - head->x0) / head->cell + shift, head->cols);
+  const int64_t r = clamped_index((point[1] - head->y0) / head->cell + shift, head->rows);
   const int m = terrain->material[r * head->cols + c];
   return m > 0 ? terrain->table + HX_MATERIAL_COLUMNS * (m - 1) : NULL;
 }
