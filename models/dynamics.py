@@ -285,8 +285,8 @@ def accelerations(
 ) -> Accelerations:
     """Solves eq. 1 for bodies (19, 13), whose joints may have drifted.
 
-    damping, bristle and body_damping are those of `applied_forces`. In kinematic mode the multiplier
-    of a joint's additional row is minus the motor's torque.
+    damping, bristle and body_damping are those of `applied_forces`. In kinematic mode the
+    multiplier of a joint's additional row is minus the motor's torque.
     """
     joints = constraints(robot, body)
     motor, gear = joint_torques(robot, body, command)

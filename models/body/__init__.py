@@ -1,1 +1,1 @@
-"""Computes contacts of the torso, the knees and the shanks with the ground, and distances of legs."""
+"""Computes contacts of torso, knees and shanks with the ground, and distances between legs."""

@@ -1,9 +1,9 @@
 """Computes the spheres of torso, knees and shanks from a URDF's collision elements.
 
 The torso's box encloses its boxes, cylinders, spheres and capsules, along the torso's axes. A
-cylinder or capsule of the femur gives the radius at the knee, one of the tibia that of the shank and
-its place on the line to the foot. Spheres of the tibia besides the foot's give the knee near the
-joint, else the shank. All legs have the largest of their sizes. Meshes are not read.
+cylinder or capsule of the femur gives the radius at the knee. One of the tibia gives that of the
+shank and its place on the line to the foot. Spheres of the tibia besides the foot's give the knee
+near the joint, else the shank. All legs have the largest of their sizes. Meshes are not read.
 """
 
 from __future__ import annotations

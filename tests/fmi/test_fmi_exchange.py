@@ -608,7 +608,14 @@ VARIANTS: tuple[dict[str, float], ...] = (
     {"friction.law": 3, "terrain.kind": 2, "terrain.incline": 0.1, "terrain.heading": 0.5},
     {"servo.mode": 3, "terrain.kind": 2, "terrain.incline": 0.1},
     # torso, knees and shanks are in the ground
-    {"body.torso_box[3]": 0.3, "body.knee_radius": 0.35, "body.shank_radius": 0.35},
+    {
+        "body.torso_box[3]": 0.3,
+        "body.knee_radius": 0.35,
+        "body.shank_radius": 0.35,
+        "terrain.kind": 2,
+        "terrain.incline": 0.1,
+        "terrain.heading": 0.5,
+    },
 )
 
 

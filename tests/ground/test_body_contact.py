@@ -13,7 +13,7 @@ from mirror import LEGS
 from plant import Plant, inputs, pointer
 from states import changed, distance, lopsided, random_bodies, random_command
 
-from hexapod_cosim.models import Robot, load_robot
+from hexapod_cosim.models import Robot
 from hexapod_cosim.models.body.contacts import (
     body_contacts,
     body_forces,

@@ -50,8 +50,8 @@ def test_the_distance_of_lines_has_its_closed_forms() -> None:
 
 def test_the_plants_clearance_is_that_of_the_twin_and_of_brute_force(core: ct.CDLL) -> None:
     size = {"knee_radius": 0.02, "shank_radius": 0.01}
-    for seed, robot in enumerate((load_robot("athena"), lopsided(1), lopsided(2))):
-        robot = changed(robot, body=size)
+    for seed, own in enumerate((load_robot("athena"), lopsided(1), lopsided(2))):
+        robot = changed(own, body=size)
         body = body_states(robot, **random_pose(robot, seed))
         plant = Plant(core, robot)
         plant.bodies = body
