@@ -1174,7 +1174,7 @@ const size_t hx_state_count = sizeof states / sizeof states[0];
 
 _Static_assert(sizeof states / sizeof states[0] == sizeof(hxCoordinates) / sizeof(double), "each state has its row");
 
-const char hx_default_guid[] = "{a02230a7-77b1-4f9a-b3bd-bab997bdcec6}";
+const char hx_default_guid[] = "{d3b1da29-118c-400d-ae24-a6b331adebc4}";
 
 _Static_assert(HX_CONTACT_EXACT_RESTITUTION == 1, "ContactLaw");
 _Static_assert(HX_CONTACT_FLORES == 2, "ContactLaw");
