@@ -1174,7 +1174,7 @@ const size_t hx_state_count = sizeof states / sizeof states[0];
 
 _Static_assert(sizeof states / sizeof states[0] == sizeof(hxCoordinates) / sizeof(double), "each state has its row");
 
-const char hx_default_guid[] = "{813faae2-f93b-4b9f-8cd7-caed56bfd116}";
+const char hx_default_guid[] = "{d17a3017-c014-4733-94fc-a94d90f00fc3}";
 
 _Static_assert(HX_CONTACT_EXACT_RESTITUTION == 1, "ContactLaw");
 _Static_assert(HX_CONTACT_FLORES == 2, "ContactLaw");
