@@ -29,7 +29,8 @@ FLAGS = [
     "--use-angle=swiftshader",
     "--enable-unsafe-swiftshader",
 ]  # WebGL without a graphics card
-COLOURS = 192  # of a picture's palette
+COLOURS = 64  # of a picture's palette
+PICTURE_WIDTH = 800  # px
 GAP = 8  # px    between replays
 PATIENCE = 120_000  # ms
 COLUMNS = {"walked": "walked", "slip": "slip [mm/m]", "peak": "peak [BW]"}
@@ -56,6 +57,8 @@ def main() -> None:
     for picture in replays:
         sheet.paste(picture, (0, top))
         top += picture.height + GAP
+    size = PICTURE_WIDTH, round(sheet.height * PICTURE_WIDTH / sheet.width)
+    sheet = sheet.resize(size, Image.Resampling.LANCZOS)
     reduced(sheet).save(IMAGES / "ground_viewer.png", optimize=True)
 
 

@@ -13,6 +13,7 @@ from hexapod_cosim.models.errors import (
 )
 from hexapod_cosim.models.kinematics import foot_position, foot_positions
 from hexapod_cosim.models.robot import (
+    BODY_CONTACTS,
     CONTACT_LAWS,
     FRICTION_LAWS,
     GAITS,
@@ -24,6 +25,7 @@ from hexapod_cosim.models.robot import (
     SOIL_LAWS,
     TERRAINS,
     Baumgarte,
+    BodyContact,
     Contact,
     Foot,
     Friction,
@@ -45,6 +47,7 @@ from hexapod_cosim.models.robot import (
 )
 
 __all__ = [
+    "BODY_CONTACTS",
     "CONTACT_LAWS",
     "FRICTION_LAWS",
     "GAITS",
@@ -56,6 +59,7 @@ __all__ = [
     "SOIL_LAWS",
     "TERRAINS",
     "Baumgarte",
+    "BodyContact",
     "Contact",
     "FmuError",
     "Foot",

@@ -14,6 +14,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from hexapod_cosim.models.actuator import gear_friction, overrun, servo_torque, stop_torque
+from hexapod_cosim.models.body.contacts import body_wrenches, standing_body_damping
 from hexapod_cosim.models.contact import foot_contacts, foot_force, foot_moment, wall_contacts
 from hexapod_cosim.models.kinematics import (
     BODIES,
@@ -162,13 +163,19 @@ def mass_matrix(robot: Robot, body: Array) -> Array:
 
 
 def applied_forces(
-    robot: Robot, body: Array, command: Command, damping: Array, bristle: Array | None = None
+    robot: Robot,
+    body: Array,
+    command: Command,
+    damping: Array,
+    bristle: Array | None = None,
+    body_damping: Array | None = None,
 ) -> Array:
     """Returns the forces g (19, 6) of eq. 1 without the joints' torques [N, N m].
 
     damping: of the contacts [s/m], nan for open ones: (6,) of the feet with the ground, or (2, 6)
     with that of `wall_contacts` in the second row. bristle: deflections [m], 0 by default: (6, 3),
-    or (2, 6, 3) accordingly.
+    or (2, 6, 3) accordingly. body_damping: of the contacts of torso, knees and shanks [s/m], in the
+    order of `body_spheres`; None: `standing_body_damping`.
     """
     g = np.zeros((BODIES, 6))
     g[:, 0:3] = masses(robot)[:, None] * np.array(robot.gravity)
@@ -188,7 +195,9 @@ def applied_forces(
             arm = foot.point - body[tibia, 0:3]
             g[tibia] += np.concatenate([force, cross(arm, force) + moment])
     g[0] += np.concatenate([command.push_force, command.push_torque])
-    return g
+    if body_damping is None:
+        body_damping = standing_body_damping(robot, body)
+    return g + body_wrenches(robot, body, body_damping)
 
 
 def joint_torques(robot: Robot, body: Array, command: Command) -> tuple[Array, Array]:
@@ -267,17 +276,22 @@ class Accelerations:
 
 
 def accelerations(
-    robot: Robot, body: Array, command: Command, damping: Array, bristle: Array | None = None
+    robot: Robot,
+    body: Array,
+    command: Command,
+    damping: Array,
+    bristle: Array | None = None,
+    body_damping: Array | None = None,
 ) -> Accelerations:
     """Solves eq. 1 for bodies (19, 13), whose joints may have drifted.
 
-    damping (6,) and bristle (6, 3) are those of `applied_forces`. In kinematic mode the multiplier
-    of a joint's additional row is minus the motor's torque.
+    damping, bristle and body_damping are those of `applied_forces`. In kinematic mode the
+    multiplier of a joint's additional row is minus the motor's torque.
     """
     joints = constraints(robot, body)
     motor, gear = joint_torques(robot, body, command)
     g = (
-        applied_forces(robot, body, command, damping, bristle).ravel()
+        applied_forces(robot, body, command, damping, bristle, body_damping).ravel()
         + joints.G.T @ (motor + gear + stop_torques(robot, body)).ravel()
     )
     D, c = constraint_equations(robot, body, command)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from hexapod_cosim.models.actuator import stop_energy
+from hexapod_cosim.models.body.contacts import body_contacts
 from hexapod_cosim.models.contact import foot_contacts, wall_contacts
 from hexapod_cosim.models.dynamics import constraints, joint_overruns, masses, world_inertias
 from hexapod_cosim.models.kinematics import joint_speeds
@@ -25,7 +26,11 @@ def potential_energy(robot: Robot, body: Array) -> float:
     delta^2.5 each, and of the joints' stops.
     """
     gravity = -float(masses(robot) @ (body[:, 0:3] @ np.array(robot.gravity)))
-    contacts = [*foot_contacts(robot, body), *wall_contacts(robot, body)]
+    contacts = [
+        *foot_contacts(robot, body),
+        *wall_contacts(robot, body),
+        *body_contacts(robot, body),
+    ]
     depth = np.array([max(foot.penetration, 0.0) for foot in contacts if foot is not None])
     stops = float(np.sum(stop_energy(robot.servo, joint_overruns(robot, body))))
     return gravity + 0.4 * robot.contact.stiffness * float(np.sum(depth**2.5)) + stops

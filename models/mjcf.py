@@ -31,7 +31,7 @@ from hexapod_cosim.models.kinematics import (
     rotation_matrix,
 )
 from hexapod_cosim.models.mjcf_ground import APPROXIMATION, add_surface
-from hexapod_cosim.models.records import JOINT_NAMES, Array, Leg, Link, Robot, Vector3
+from hexapod_cosim.models.records import JOINT_NAMES, Array, BodyContact, Leg, Link, Robot, Vector3
 from hexapod_cosim.models.terrain import ground_height, surface_of
 from hexapod_cosim.models.urdf.writer import COLOURS, THICKNESS, numbers
 
@@ -40,6 +40,8 @@ TIME_STEP = 0.001  # s
 IMPEDANCE = 0.9
 # geometry for pictures, without contact and mass
 DRAWN = {"contype": "0", "conaffinity": "0", "group": "1", "mass": "0"}
+# geometry that touches the ground only, as feet do, and is not drawn
+TOUCHING = {"contype": "0", "conaffinity": "1", "condim": "3", "group": "3", "mass": "0"}
 UNKNOWNS = 6 + LEGS * JOINTS
 Z = np.array([0.0, 0.0, 1.0])
 UPRIGHT = np.array([1.0, 0.0, 0.0, 0.0])
@@ -183,6 +185,12 @@ def _torso(world: ET.Element, robot: Robot) -> None:
         pos=numbers(robot.torso.com),
         material="body",
     )
+    body = robot.body
+    if body.contact == "on" and any(body.torso_box):
+        edges = numbers(half + body.corner_radius for half in body.torso_box)
+        place = numbers(body.torso_centre)
+        box = {"name": "torso_contact", "type": "box", "size": edges, "pos": place}
+        ET.SubElement(torso, "geom", TOUCHING | box)
     ET.SubElement(torso, "site", name="imu", pos=numbers(robot.torso.com))
     for leg in robot.legs:
         _leg(torso, leg, robot)
@@ -208,6 +216,8 @@ def _leg(torso: ET.Element, leg: Leg, robot: Robot) -> None:
             material="limb",
         )
         place, quaternion = link.tip, UPRIGHT
+    if robot.body.contact == "on":
+        _tibia_spheres(body, leg, robot.body)
     # feet touch the ground only
     foot = ET.SubElement(
         body,
@@ -225,6 +235,18 @@ def _leg(torso: ET.Element, leg: Leg, robot: Robot) -> None:
         "material": "rubber",
     }
     ET.SubElement(body, "site", name=f"{leg.name}_foot", pos=numbers(place))
+
+
+def _tibia_spheres(tibia: ET.Element, leg: Leg, body: BodyContact) -> None:
+    """Adds the spheres of knee and shank."""
+    for name, radius, share in (
+        ("knee", body.knee_radius, 0.0),
+        ("shank", body.shank_radius, body.shank_position),
+    ):
+        if radius > 0.0:
+            place = numbers(share * value for value in leg.links[-1].tip)
+            sphere = {"name": f"{leg.name}_{name}", "type": "sphere", "size": repr(radius)}
+            ET.SubElement(tibia, "geom", TOUCHING | sphere | {"pos": place})
 
 
 def _hinge(body: ET.Element, name: str, link: Link, robot: Robot) -> None:

@@ -41,6 +41,7 @@ BRISTLE_LAWS = ("bristle", "lugre")  # friction laws with bristles, under which 
 SERVO_MODES = ("position", "torque", "kinematic")
 METHODS = ("rosw3", "ros2", "dp54", "bs32", "rk4")
 PROJECTIONS = ("none", "step")
+BODY_CONTACTS = ("off", "on")
 TERRAINS = ("flat", "slope", "grid")
 PLANES = ("flat", "slope")  # kinds of ground without a surface
 SOIL_LAWS = ("none", "bekker", "granular", "mud")
@@ -111,6 +112,26 @@ class Contact:
     restitution: Annotated[float, Number("1", at_least=0.0, at_most=1.0)]
     damping_factor: Annotated[float, Number("s/m", at_least=0.0)]  # c of the constant law
     impact_speed_floor: Annotated[float, Number("m/s", above=0.0)]
+
+
+@dataclass(frozen=True, kw_only=True)
+class BodyContact:
+    """Spheres that touch the ground besides the feet; parts of size 0 do not.
+
+    The radii of knee and shank are also those of femur and tibia, as capsules, in the distances
+    between neighbouring legs, which do not depend on `contact`.
+    """
+
+    contact: Annotated[str, Choice(BODY_CONTACTS, default="off")] = "off"
+    # half edges of a box along the torso's axes, with a sphere around each corner
+    torso_box: Annotated[Vector3, Vector("m", 3, default=(0.0, 0.0, 0.0))] = (0.0, 0.0, 0.0)
+    # centre of the box, from the torso's origin
+    torso_centre: Annotated[Vector3, Vector("m", 3, default=(0.0, 0.0, 0.0))] = (0.0, 0.0, 0.0)
+    corner_radius: Annotated[float, Number("m", at_least=0.0, default=0.0)] = 0.0
+    knee_radius: Annotated[float, Number("m", at_least=0.0, default=0.0)] = 0.0
+    shank_radius: Annotated[float, Number("m", at_least=0.0, default=0.0)] = 0.0
+    # of the shank's sphere: 0 at the tibia's joint, 1 at the foot's centre
+    shank_position: Annotated[float, Number("1", at_least=0.0, at_most=1.0, default=0.5)] = 0.5
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -271,6 +292,7 @@ class Robot:
     solver: Solver
     terrain: Terrain
     gait: Gait
+    body: BodyContact = field(default_factory=BodyContact)
     soil: Soil = Soil()
     source: Mapping[str, str] = field(default_factory=dict, compare=False)
 
@@ -301,10 +323,14 @@ class Robot:
 
     @cached_property
     def hash(self) -> str:
-        """SHA-256 in hexadecimal of all fields but `source`; equal robots have equal hashes."""
+        """SHA-256 in hexadecimal of all fields but `source` and a body without contact; equal
+        robots have equal hashes.
+        """
         surface = self.terrain.surface if self.terrain.kind == "grid" else None
         content = _plain(asdict(replace(self, terrain=replace(self.terrain, surface=None))))
         del content["source"], content["terrain"]["surface"]
+        if self.body.contact == "off":
+            del content["body"]
         if surface is not None:
             content["terrain"]["surface"] = surface.digest
         return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()

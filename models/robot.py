@@ -24,6 +24,7 @@ from typing import Any
 from hexapod_cosim.models.errors import RobotError, unknown_name
 from hexapod_cosim.models.ground.table import beside, read_terrain
 from hexapod_cosim.models.records import (
+    BODY_CONTACTS,
     CONTACT_LAWS,
     FRICTION_LAWS,
     GAITS,
@@ -36,6 +37,7 @@ from hexapod_cosim.models.records import (
     TERRAINS,
     Array,
     Baumgarte,
+    BodyContact,
     Contact,
     Foot,
     Friction,
@@ -64,6 +66,7 @@ from hexapod_cosim.models.urdf.table import SECTIONS, element_named, side_table,
 from hexapod_cosim.models.validation import check_robot
 
 __all__ = [
+    "BODY_CONTACTS",
     "CONTACT_LAWS",
     "FRICTION_LAWS",
     "GAITS",
@@ -76,6 +79,7 @@ __all__ = [
     "TERRAINS",
     "Array",
     "Baumgarte",
+    "BodyContact",
     "Contact",
     "Foot",
     "Friction",
@@ -238,6 +242,8 @@ def _read_friction(
 
 def _read_section(table: Mapping[str, Any], name: str, where: str) -> Any:
     record = SECTIONS[name]
+    if record is BodyContact and name not in table:
+        return BodyContact()
     if record is Terrain:
         return read_terrain(_section(table, name, where), where)
     if record is Soil:  # no section: rigid ground

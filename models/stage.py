@@ -13,6 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from hexapod_cosim.models.actuator import gear_drag, servo_slopes, stop_slopes
+from hexapod_cosim.models.body.contacts import body_spheres
+from hexapod_cosim.models.body.slopes import BodySlopes, body_slope_matrices
 from hexapod_cosim.models.contact import (
     FootContact,
     foot_contacts,
@@ -163,6 +165,7 @@ def solve_stage(
     slopes: Slopes,
     z: float,
     change: tuple[Array, Array, Array],
+    touching: tuple[Array, BodySlopes] | None = None,
 ) -> StageRate:
     """Solves eq. 20 at bodies (19, 13) and bristles (6, 3) with dense matrices.
 
@@ -173,15 +176,21 @@ def solve_stage(
         slopes: those of the step's first stage.
         z: h gamma [s]; 0 for explicit methods.
         change: s_x (114,), s_v (114,) and s_b (6, 3), the sums of g_ij k_j over earlier stages.
+        touching: damping of the contacts of torso, knees and shanks, and their slopes in the step's
+            first stage; None: all open.
     """
     s_x, s_v, s_b = change
     v, G = body[:, 7:13].ravel(), constraints(robot, body).G
     G_x, G_v = slope_matrices(robot, body, slopes)
+    if touching is not None:
+        body_x, body_v = body_slope_matrices(robot, body, touching[1])
+        G_x, G_v = G_x + body_x, G_v + body_v
     rate = law_bristle_rates(robot, body, bristle, damping)
 
     # W = M - z G_v - z^2 G_x;  right = g + G_v s_v + G_x (s_x + z (v + s_v))
     motor, gear = joint_torques(robot, body, command)
-    g = applied_forces(robot, body, command, damping, bristle).ravel()
+    held = np.full(len(body_spheres(robot)), np.nan) if touching is None else touching[0]
+    g = applied_forces(robot, body, command, damping, bristle, held).ravel()
     g += G.T @ (motor + gear + stop_torques(robot, body)).ravel()
     W = mass_matrix(robot, body) - z * G_v - z * z * G_x
     right = g + G_v @ s_v + G_x @ (s_x + z * (v + s_v))

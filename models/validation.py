@@ -17,6 +17,7 @@ from hexapod_cosim.models.records import (
     LEG_NAMES,
     STATIC_LAWS,
     Array,
+    BodyContact,
     Friction,
     Leg,
     Link,
@@ -34,7 +35,7 @@ GYRATION_PER_DIAGONAL = 1.0
 STANCE_PLANE_TOLERANCE = 0.01
 AXIS_TOLERANCE = 1e-6
 # sections that do not concern the bodies
-SETTINGS = ("contact", "friction", "servo", "baumgarte", "solver", "terrain", "soil")
+SETTINGS = ("contact", "friction", "servo", "baumgarte", "solver", "terrain", "soil", "body")
 DISSIPATIVE_LAWS = ("exact_restitution", "flores", "lankarani_nikravesh", "hunt_crossley")
 
 
@@ -234,6 +235,7 @@ def _check_laws(robot: Robot, at: str) -> None:
         )
     _check_static_friction(friction, at + "friction.mu_static")
     _check_terrain(robot, at + "terrain")
+    _check_body(robot.body, at + "body")
 
 
 def _check_terrain(robot: Robot, where: str) -> None:
@@ -256,6 +258,26 @@ def _check_terrain(robot: Robot, where: str) -> None:
             expected=f"at least twice foot.radius, {2.0 * radius:g} m",
             fix="enlarge terrain.horizontal_scale",
             where=where,
+        )
+
+
+def _check_body(body: BodyContact, where: str) -> None:
+    """Checks that the box has no negative edges, and that a body with contact has a sphere."""
+    if min(body.torso_box) < 0.0:
+        raise RobotError(
+            "a box with negative edges",
+            got=list(body.torso_box),
+            expected="half edges >= 0 m",
+            fix="correct them; all 0: the torso touches nothing",
+            where=where + ".torso_box",
+        )
+    if body.contact == "on" and not any((*body.torso_box, body.knee_radius, body.shank_radius)):
+        raise RobotError(
+            "body contact without a body",
+            got="torso_box, knee_radius and shank_radius of 0",
+            expected="at least one of them > 0 m",
+            fix="give the robot's sizes, or leave body.contact off",
+            where=where + ".contact",
         )
 
 

@@ -12,7 +12,6 @@ from datetime import UTC, datetime
 from time import perf_counter
 from typing import Any, Protocol
 
-import numpy as np
 from numpy.typing import NDArray
 
 from hexapod_cosim.controller import BodyCommand, Diagnostics, JointCommand, Measurement
@@ -104,7 +103,9 @@ def diagnostic_columns(controller: JointController) -> dict[tuple[str, ...], NDA
         tuple(f"controller.{leg}.{key}" for leg in LEG_NAMES): getattr(shown, key)
         for key in ("swinging", "unreachable", "lift", "fallback")
     }
-    columns[_leg_vectors("shift", 2)] = np.stack([shown.shift.real, shown.shift.imag], axis=-1)
+    # the columns are the controller's own arrays, which change with every call; a complex number
+    # lies in memory as x, y
+    columns[_leg_vectors("shift", 2)] = shown.shift.view(float)
     columns[_leg_vectors("planned", 3)] = shown.planned
     return columns
 

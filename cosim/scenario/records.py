@@ -11,6 +11,7 @@ from hexapod_cosim.controller import Parts
 from hexapod_cosim.models import (
     LEG_NAMES,
     Baumgarte,
+    BodyContact,
     Contact,
     Friction,
     Gait,
@@ -33,6 +34,7 @@ SETTINGS: dict[str, type[Any]] = {
     "servo": Servo,
     "solver": Solver,
     "baumgarte": Baumgarte,
+    "body": BodyContact,
 }
 UNUSED = {"gait": ("stride",)}  # keys of robot files that scenarios replace by the body command
 GRAVITY = Number("m/s2", above=0.0)  # along -z; or three numbers, a vector in world axes

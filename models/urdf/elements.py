@@ -18,6 +18,7 @@ import numpy as np
 from hexapod_cosim.models.errors import RobotError, unknown_name
 from hexapod_cosim.models.kinematics import inertia_matrix
 from hexapod_cosim.models.records import Array
+from hexapod_cosim.models.urdf.collision import Solid, read_solids
 from hexapod_cosim.models.urdf.values import name_of, number, numbers, origin, read_root
 from hexapod_cosim.models.validation import check_inertia
 
@@ -59,6 +60,7 @@ class UrdfLink:
         # (3,) m    extents along the link's axes of its first collision box, else of its first
         # visual one
     )
+    solids: tuple[Solid, ...] = ()  # its collision shapes but meshes
 
 
 @dataclass(frozen=True, eq=False)
@@ -141,6 +143,7 @@ def _link(element: ET.Element, where: str, ignored: Counter[str]) -> UrdfLink:
         _inertial(element, where),
         tuple(spheres),
         boxes[0] if boxes else None,
+        read_solids(element, where),
     )
 
 

@@ -180,7 +180,7 @@ def _leg(
     wanted = None if keep_frames else _pattern_yaw(turns, chain, outwards)
     yaw, R_HC = _yaw(chain[0], turns[0], wanted, plain=bool((axes == np.eye(3)).all()))
     turns = [R_HC, R_HC @ chain[1].rotation, R_HC @ chain[1].rotation @ chain[2].rotation]
-    foot, radius = _foot(chain[2].body)
+    foot, radius = foot_of(chain[2].body)
     tips = [
         turns[0] @ chain[1].position,
         turns[1] @ chain[2].position,
@@ -244,7 +244,7 @@ def _axis(axis: Array, pattern: Array | None) -> tuple[Array, float]:
     return pattern, 1.0 if axis @ pattern > 0.0 else -1.0
 
 
-def _foot(tibia: Body) -> tuple[Array | None, float | None]:
+def foot_of(tibia: Body) -> tuple[Array | None, float | None]:
     """Returns the foot's centre [m] in the tibia's frame, and its radius.
 
     It is the outermost collision sphere, else the outermost fixed link.

@@ -23,6 +23,7 @@ from hexapod_cosim.models.records import (
     LEG_NAMES,
     Array,
     Baumgarte,
+    BodyContact,
     Contact,
     Foot,
     Friction,
@@ -51,9 +52,10 @@ from hexapod_cosim.models.urdf.assumed import (
     equivalent_box,
 )
 from hexapod_cosim.models.urdf.bodies import Body, root_body
+from hexapod_cosim.models.urdf.collision import collision_body
 from hexapod_cosim.models.urdf.elements import DAMPING, Urdf, describe, parse_urdf
 from hexapod_cosim.models.urdf.extension import extension_tables
-from hexapod_cosim.models.urdf.legs import FoundLeg, find_legs, inertia_entries
+from hexapod_cosim.models.urdf.legs import FoundLeg, find_legs, foot_of, inertia_entries
 
 Table = dict[str, Any]
 
@@ -82,6 +84,7 @@ SECTIONS: dict[str, type[Any]] = {
     "terrain": Terrain,
     "soil": Soil,
     "gait": Gait,
+    "body": BodyContact,
 }
 EXTENSION_FIELDS: dict[str, dict[str, Any]] = {
     **{name: dict(specs(record)) for name, record in SECTIONS.items()},
@@ -177,15 +180,15 @@ def urdf_table(
         urdf.extension is not None and urdf.extension.get("frames") == "ours"
     )
     root = root_body(urdf)
-    torso, legs = _found(root, urdf, options.forward, keep_frames=keep)
+    torso, body, legs = _found(root, urdf, options.forward, keep_frames=keep)
     above = _merged(_shaped(own), _spread(side, where or str(path)))
     _refuse_impossible(root, legs, above)
     _refuse_footless(legs, above)
-    table = _merged(_merged(_assumed(), _measured(urdf, torso, legs)), above)
+    table = _merged(_merged(_assumed(), _measured(urdf, torso, body, legs)), above)
     assumed = [name for name in WHOLE if name not in own and name not in side] + _complete(
         table, legs, urdf
     )
-    table["source"] = _source(urdf, legs, assumed) | dict(side.get("source", {}))
+    table["source"] = _source(urdf, legs, assumed, body) | dict(side.get("source", {}))
     return table
 
 
@@ -212,8 +215,8 @@ def _assumed() -> Table:
 
 def _found(
     root: Body, urdf: Urdf, forward: str, *, keep_frames: bool
-) -> tuple[Table, list[FoundLeg]]:
-    """Returns the torso's table and the legs.
+) -> tuple[Table, Table, list[FoundLeg]]:
+    """Returns the tables of torso and body, and the legs.
 
     The torso's frame lies at its heaviest link, with the root link's axes rotated to the forward
     direction.
@@ -232,7 +235,13 @@ def _found(
         "inertia": inertia_entries(axes.T @ inertial.inertia @ axes + 0.0),
     }
     torso["size"] = _box(root, axes, torso) or equivalent_box(torso["mass"], torso["inertia"])
-    return torso, find_legs(root, origin, axes, keep_frames=keep_frames, where=urdf.where)
+    legs = find_legs(root, origin, axes, keep_frames=keep_frames, where=urdf.where)
+    limbs = []
+    for leg in legs:
+        foot, _ = foot_of(leg.servo[2].body)
+        if foot is not None:
+            limbs.append((leg.servo[1].body, leg.servo[2].body, foot))
+    return torso, collision_body(root, origin, axes, limbs), legs
 
 
 def _refuse_impossible(torso: Body, legs: list[FoundLeg], above: Table) -> None:
@@ -280,11 +289,12 @@ def _box(root: Body, axes: Array, torso: Table) -> list[float] | None:
     return [float(edge) for edge in largest] if np.linalg.norm(largest) > gyration else None
 
 
-def _measured(urdf: Urdf, torso: Table, legs: list[FoundLeg]) -> Table:
+def _measured(urdf: Urdf, torso: Table, body: Table, legs: list[FoundLeg]) -> Table:
     """Returns the data of the URDF."""
     table: Table = {
         "name": urdf.name,
         "torso": torso,
+        "body": body,
         "legs": {leg.name: leg.table for leg in legs},
         "servo": {},
         "foot": {},
@@ -429,7 +439,7 @@ def _drop(leg: Table) -> float:
     return max(z, 1e-3)
 
 
-def _source(urdf: Urdf, legs: list[FoundLeg], assumed: list[str]) -> Table:
+def _source(urdf: Urdf, legs: list[FoundLeg], assumed: list[str], body: Table) -> Table:
     source = {"robot": f"read from the URDF of {urdf.name!r}"}
     source |= {f"leg {leg.name}": f"{JOINTS}{', '.join(leg.joints)}" for leg in legs}
     other_way = [name for leg in legs for name in leg.reversed]
@@ -437,6 +447,10 @@ def _source(urdf: Urdf, legs: list[FoundLeg], assumed: list[str]) -> Table:
         source["URDF, angles"] = f"counted against the URDF's axes: {', '.join(other_way)}"
     if assumed:
         source["URDF, assumed"] = f"the URDF does not say, so assumed: {', '.join(assumed)}"
+    if body:
+        source["URDF, body"] = (
+            "from collision shapes: the torso's box encloses them, all legs have the largest radii"
+        )
     ignored = describe(urdf.ignored)
     return source | (
         {"URDF, ignored": f"in the URDF, without effect here: {ignored}"} if ignored else {}

@@ -12,11 +12,30 @@ from collections.abc import Iterable
 from typing import Any
 
 from hexapod_cosim.models.ground.table import terrain_table
-from hexapod_cosim.models.records import JOINT_NAMES, Leg, Link, Robot, Terrain, Vector3
+from hexapod_cosim.models.records import (
+    JOINT_NAMES,
+    BodyContact,
+    Leg,
+    Link,
+    Robot,
+    Terrain,
+    Vector3,
+)
 from hexapod_cosim.models.schema import specs
 from hexapod_cosim.models.urdf.elements import EXTENSION
 
-RECORDS = ("foot", "contact", "friction", "servo", "baumgarte", "solver", "terrain", "soil", "gait")
+RECORDS = (
+    "foot",
+    "contact",
+    "friction",
+    "servo",
+    "baumgarte",
+    "solver",
+    "terrain",
+    "gait",
+    "body",
+    "soil",
+)
 THICKNESS = 0.7  # 1  radius of a drawn link over the foot's
 COLOURS = {"body": "0.30 0.33 0.38 1", "limb": "0.72 0.74 0.78 1", "rubber": "0.85 0.45 0.15 1"}
 
@@ -48,13 +67,20 @@ def _torso(root: ET.Element, robot: Robot) -> None:
     _inertial(torso, robot.torso.mass, robot.torso.com, robot.torso.inertia)
     visual = _shape(torso, "visual", robot.torso.com, "body")
     ET.SubElement(visual, "box", size=numbers(robot.torso.size))
+    body = robot.body
+    if body.contact == "on" and any(body.torso_box):
+        collision = _shape(torso, "collision", body.torso_centre, None)
+        edges = (2.0 * (half + body.corner_radius) for half in body.torso_box)
+        ET.SubElement(collision, "box", size=numbers(edges))
 
 
 def _leg(root: ET.Element, leg: Leg, robot: Robot) -> None:
     parent, place, yaw = "torso", leg.hip_position, leg.hip_yaw
     for name, link in zip(JOINT_NAMES, leg.links, strict=True):
         child = f"{leg.name}_{name}"
-        _limb(root, child, link, THICKNESS * robot.foot.radius)
+        limb = _limb(root, child, link, THICKNESS * robot.foot.radius)
+        if name == "tibia" and robot.body.contact == "on":
+            _tibia_spheres(limb, link, robot.body)
         joint = _joint(root, f"{child}_joint", "revolute", parent, child)
         ET.SubElement(joint, "origin", xyz=numbers(place), rpy=numbers((0.0, 0.0, yaw)))
         ET.SubElement(joint, "axis", xyz=numbers(link.axis))
@@ -77,12 +103,21 @@ def _joint(root: ET.Element, name: str, kind: str, parent: str, child: str) -> E
     return joint
 
 
-def _limb(root: ET.Element, name: str, link: Link, radius: float) -> None:
+def _tibia_spheres(tibia: ET.Element, link: Link, body: BodyContact) -> None:
+    """Adds the spheres of knee and shank as collision shapes."""
+    for radius, share in ((body.knee_radius, 0.0), (body.shank_radius, body.shank_position)):
+        if radius > 0.0:
+            place = (share * value for value in link.tip)
+            ET.SubElement(_shape(tibia, "collision", place, None), "sphere", radius=repr(radius))
+
+
+def _limb(root: ET.Element, name: str, link: Link, radius: float) -> ET.Element:
     element = ET.SubElement(root, "link", name=name)
     _inertial(element, link.mass, link.com, link.inertia)
     middle = tuple(0.5 * value for value in link.tip)
     visual = _shape(element, "visual", middle, "limb", rpy=direction_rpy(link.tip))
     ET.SubElement(visual, "cylinder", radius=repr(radius), length=repr(math.hypot(*link.tip)))
+    return element
 
 
 def _foot(root: ET.Element, name: str, parent: str, place: Vector3, radius: float) -> None:
@@ -152,4 +187,6 @@ def _terrain(own: ET.Element, terrain: Terrain) -> None:
 
 
 def _text(value: Any) -> str:
+    if isinstance(value, tuple):
+        return numbers(value)
     return value if isinstance(value, str) else repr(float(value))

@@ -521,6 +521,51 @@ static const hxVariable outputs[] = {
     {"RM.foot.sinkage", "m", 0.0, DBL_MAX, offsetof(struct hxVariables, output.foot.sinkage[4]), HX_REAL, 0},
     {"RR.foot.sinkage", "m", 0.0, DBL_MAX, offsetof(struct hxVariables, output.foot.sinkage[5]), HX_REAL, 0},
     {"feet.footprints", "1", 0.0, DBL_MAX, offsetof(struct hxVariables, output.footprints), HX_REAL, 1},
+    {"torso.contact_force[1]", "N", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.torso.contact_force[0]), HX_REAL, 3},
+    {"torso.contact_force[2]", "N", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.torso.contact_force[1]), HX_REAL, 0},
+    {"torso.contact_force[3]", "N", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.torso.contact_force[2]), HX_REAL, 0},
+    {"LF.knee.force[1]", "N", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.body.knee_force[0][0]), HX_REAL, 18},
+    {"LF.knee.force[2]", "N", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.body.knee_force[0][1]), HX_REAL, 0},
+    {"LF.knee.force[3]", "N", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.body.knee_force[0][2]), HX_REAL, 0},
+    {"LM.knee.force[1]", "N", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.body.knee_force[1][0]), HX_REAL, 0},
+    {"LM.knee.force[2]", "N", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.body.knee_force[1][1]), HX_REAL, 0},
+    {"LM.knee.force[3]", "N", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.body.knee_force[1][2]), HX_REAL, 0},
+    {"LR.knee.force[1]", "N", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.body.knee_force[2][0]), HX_REAL, 0},
+    {"LR.knee.force[2]", "N", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.body.knee_force[2][1]), HX_REAL, 0},
+    {"LR.knee.force[3]", "N", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.body.knee_force[2][2]), HX_REAL, 0},
+    {"RF.knee.force[1]", "N", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.body.knee_force[3][0]), HX_REAL, 0},
+    {"RF.knee.force[2]", "N", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.body.knee_force[3][1]), HX_REAL, 0},
+    {"RF.knee.force[3]", "N", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.body.knee_force[3][2]), HX_REAL, 0},
+    {"RM.knee.force[1]", "N", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.body.knee_force[4][0]), HX_REAL, 0},
+    {"RM.knee.force[2]", "N", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.body.knee_force[4][1]), HX_REAL, 0},
+    {"RM.knee.force[3]", "N", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.body.knee_force[4][2]), HX_REAL, 0},
+    {"RR.knee.force[1]", "N", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.body.knee_force[5][0]), HX_REAL, 0},
+    {"RR.knee.force[2]", "N", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.body.knee_force[5][1]), HX_REAL, 0},
+    {"RR.knee.force[3]", "N", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.body.knee_force[5][2]), HX_REAL, 0},
+    {"LF.shank.force[1]", "N", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.body.shank_force[0][0]), HX_REAL, 18},
+    {"LF.shank.force[2]", "N", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.body.shank_force[0][1]), HX_REAL, 0},
+    {"LF.shank.force[3]", "N", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.body.shank_force[0][2]), HX_REAL, 0},
+    {"LM.shank.force[1]", "N", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.body.shank_force[1][0]), HX_REAL, 0},
+    {"LM.shank.force[2]", "N", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.body.shank_force[1][1]), HX_REAL, 0},
+    {"LM.shank.force[3]", "N", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.body.shank_force[1][2]), HX_REAL, 0},
+    {"LR.shank.force[1]", "N", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.body.shank_force[2][0]), HX_REAL, 0},
+    {"LR.shank.force[2]", "N", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.body.shank_force[2][1]), HX_REAL, 0},
+    {"LR.shank.force[3]", "N", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.body.shank_force[2][2]), HX_REAL, 0},
+    {"RF.shank.force[1]", "N", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.body.shank_force[3][0]), HX_REAL, 0},
+    {"RF.shank.force[2]", "N", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.body.shank_force[3][1]), HX_REAL, 0},
+    {"RF.shank.force[3]", "N", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.body.shank_force[3][2]), HX_REAL, 0},
+    {"RM.shank.force[1]", "N", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.body.shank_force[4][0]), HX_REAL, 0},
+    {"RM.shank.force[2]", "N", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.body.shank_force[4][1]), HX_REAL, 0},
+    {"RM.shank.force[3]", "N", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.body.shank_force[4][2]), HX_REAL, 0},
+    {"RR.shank.force[1]", "N", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.body.shank_force[5][0]), HX_REAL, 0},
+    {"RR.shank.force[2]", "N", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.body.shank_force[5][1]), HX_REAL, 0},
+    {"RR.shank.force[3]", "N", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.body.shank_force[5][2]), HX_REAL, 0},
+    {"LF.clearance", "m", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.body.clearance[0]), HX_REAL, 6},
+    {"LM.clearance", "m", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.body.clearance[1]), HX_REAL, 0},
+    {"LR.clearance", "m", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.body.clearance[2]), HX_REAL, 0},
+    {"RF.clearance", "m", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.body.clearance[3]), HX_REAL, 0},
+    {"RM.clearance", "m", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.body.clearance[4]), HX_REAL, 0},
+    {"RR.clearance", "m", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.body.clearance[5]), HX_REAL, 0},
 };
 
 static const hxVariable parameters[] = {
@@ -970,6 +1015,7 @@ static const hxVariable parameters[] = {
     {"RR.coxa.angle_max", "rad", -3.141592653589793, 3.141592653589793, offsetof(struct hxVariables, definition.leg[5].link[0].angle_max), HX_REAL, 0},
     {"RR.femur.angle_max", "rad", -3.141592653589793, 3.141592653589793, offsetof(struct hxVariables, definition.leg[5].link[1].angle_max), HX_REAL, 0},
     {"RR.tibia.angle_max", "rad", -3.141592653589793, 3.141592653589793, offsetof(struct hxVariables, definition.leg[5].link[2].angle_max), HX_REAL, 0},
+    {"body.contact", "", 1, 2, offsetof(struct hxVariables, definition.body.contact), HX_INTEGER, 1},
     {"body.torso_box[1]", "m", 0.0, 10.0, offsetof(struct hxVariables, definition.body.torso_box[0]), HX_REAL, 3},
     {"body.torso_box[2]", "m", 0.0, 10.0, offsetof(struct hxVariables, definition.body.torso_box[1]), HX_REAL, 0},
     {"body.torso_box[3]", "m", 0.0, 10.0, offsetof(struct hxVariables, definition.body.torso_box[2]), HX_REAL, 0},
@@ -1151,7 +1197,7 @@ const size_t hx_state_count = sizeof states / sizeof states[0];
 
 _Static_assert(sizeof states / sizeof states[0] == sizeof(hxCoordinates) / sizeof(double), "each state has its row");
 
-const char hx_default_guid[] = "{3f579088-6232-4db8-9484-4a03262e2e27}";
+const char hx_default_guid[] = "{93b2dcf8-9af0-42bf-8178-6653a395bfd9}";
 
 _Static_assert(HX_CONTACT_EXACT_RESTITUTION == 1, "ContactLaw");
 _Static_assert(HX_CONTACT_FLORES == 2, "ContactLaw");
@@ -1177,6 +1223,8 @@ _Static_assert(HX_SOIL_GRANULAR == 3, "SoilLaw");
 _Static_assert(HX_SOIL_MUD == 4, "SoilLaw");
 _Static_assert(HX_PROJECTION_NONE == 1, "Projection");
 _Static_assert(HX_PROJECTION_STEP == 2, "Projection");
+_Static_assert(HX_BODY_OFF == 1, "BodyContact");
+_Static_assert(HX_BODY_ON == 2, "BodyContact");
 _Static_assert(HX_TERRAIN_FLAT == 1, "TerrainKind");
 _Static_assert(HX_TERRAIN_SLOPE == 2, "TerrainKind");
 _Static_assert(HX_TERRAIN_GRID == 3, "TerrainKind");

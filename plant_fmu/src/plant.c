@@ -286,10 +286,33 @@ hxStatus hx_plant_set_coordinates(hxPlant *plant, double t, const hxCoordinates 
   return HX_OK;
 }
 
+/* m  Half-width of the band in which contacts switch. A foot touches the ground at this depth and
+ * leaves it at this height; within the band it switches together with another foot, if it moves in
+ * that direction. Otherwise solvers that locate one foot's sign change would miss another's within
+ * their rounding (docs/equations.md). */
+static const double switch_band = 1e-10;
+
+/* Switches the contacts of torso, knees and shanks that are due; feet keep theirs. */
+static void switch_bodies(hxPlant *plant) {
+  hxDepths depths;
+  const hxModel *model = &plant->model;
+  if (model->rows + model->torso_rows == model->foot_rows) return;
+  hx_kernel()->depths(model, &plant->state.contact, &plant->state.motion, &depths);
+  for (int k = 0; k < model->foot_rows; ++k)
+    for (int leg = 0; leg < HX_LEGS; ++leg) {
+      double *delta = &depths.delta[model->row[k]][leg];
+      *delta = plant->state.contact.closed[model->row[k]][leg] != 0.0 ? fmax(*delta, switch_band)
+                                                                      : fmin(*delta, -switch_band);
+    }
+  hx_footprints_begin(&plant->footprints);
+  hx_kernel()->switch_contacts(model, &depths, &plant->footprints, &plant->state);
+}
+
 void hx_plant_completed_step(hxPlant *plant, const hxInput *input) {
   hxCommand command;
   hx_command_from_input(&command, input, plant->state.time);
   hx_kernel()->measure(&plant->model, &command, &plant->state);
+  switch_bodies(plant);
 }
 
 void hx_plant_rates(const hxPlant *plant, const hxInput *input, hxCoordinates *rate) {
@@ -297,12 +320,6 @@ void hx_plant_rates(const hxPlant *plant, const hxInput *input, hxCoordinates *r
   hx_command_from_input(&command, input, plant->state.time);
   hx_kernel()->coordinates(&plant->model, &plant->state, &command, NULL, rate);
 }
-
-/* m  Half-width of the band in which contacts switch. A foot touches the ground at this depth and
- * leaves it at this height; within the band it switches together with another foot, if it moves in
- * that direction. Otherwise solvers that locate one foot's sign change would miss another's within
- * their rounding (docs/equations.md). */
-static const double switch_band = 1e-10;
 
 void hx_plant_indicators(const hxPlant *plant, double indicator[HX_LEGS]) {
   hxDepths depths;

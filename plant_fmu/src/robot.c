@@ -274,7 +274,8 @@ static void compile_torso_point(hxModel *model, const hxDefinition *d, int slot)
 /* Lists the rows of contacts that the model computes. */
 static void compile_rows(hxModel *model, const hxDefinition *d) {
   const double *box = d->body.torso_box;
-  const int knees = d->body.knee_radius > 0.0, shanks = d->body.shank_radius > 0.0;
+  const int on = d->body.contact == HX_BODY_ON;
+  const int knees = on && d->body.knee_radius > 0.0, shanks = on && d->body.shank_radius > 0.0;
   for (int row = HX_FOOT; hx_is_of_foot(row); ++row) model->radius[row] = d->foot_radius;
   model->radius[HX_KNEE] = d->body.knee_radius;
   model->radius[HX_SHANK] = d->body.shank_radius;
@@ -285,7 +286,7 @@ static void compile_rows(hxModel *model, const hxDefinition *d) {
   model->foot_rows = model->rows;
   if (knees) model->row[model->rows++] = HX_KNEE;
   if (shanks) model->row[model->rows++] = HX_SHANK;
-  model->torso_rows = box[0] > 0.0 || box[1] > 0.0 || box[2] > 0.0;
+  model->torso_rows = on && (box[0] > 0.0 || box[1] > 0.0 || box[2] > 0.0);
   if (model->torso_rows) model->row[model->rows] = HX_TORSO;
 }
 

@@ -74,7 +74,7 @@ typedef struct hxModel {
   hxJointModel joint[HX_JOINTS];
   double point[HX_ROWS][3][HX_SLOTS]; /* m  centres of contacts' spheres from the centre of mass of
                                        *    tibia or torso, in the axes of that body's state */
-  double radius[HX_ROWS];             /* m */
+  double radius[HX_ROWS];             /* m  those of knee and shank are also of femur and tibia */
   double gravity[3];
   double alpha, beta; /* Baumgarte */
   int contact_law, friction_law, terrain_kind, servo_mode, method, projection;

@@ -607,6 +607,15 @@ VARIANTS: tuple[dict[str, float], ...] = (
     {},
     {"friction.law": 3, "terrain.kind": 2, "terrain.incline": 0.1, "terrain.heading": 0.5},
     {"servo.mode": 3, "terrain.kind": 2, "terrain.incline": 0.1},
+    # torso, knees and shanks are in the ground
+    {
+        "body.torso_box[3]": 0.3,
+        "body.knee_radius": 0.35,
+        "body.shank_radius": 0.35,
+        "terrain.kind": 2,
+        "terrain.incline": 0.1,
+        "terrain.heading": 0.5,
+    },
 )
 
 
@@ -619,13 +628,14 @@ def moved(library: Path, variant: dict[str, float], *, initialize: bool = True) 
         "contact.stiffness": 1e3,
         "friction.presliding": 1e-5,
         "friction.mu": 0.1,
+        "foot.radius": 0.16,
+        "terrain.height": -0.07,
     }
     for name, value in (soft | variant).items():
         kind = "fmi2SetReal" if ATHENA.variable(name).type == "Real" else "fmi2SetInteger"
         assert plant.set_references(kind, ATHENA.references([name]), [value]) == OK
     names = [n.name for n in ATHENA.of_causality("parameter") if n.name.startswith("initial.")]
     assert plant.set_reals({name: plant.real(name) + rng.normal(0.0, 0.05) for name in names}) == OK
-    assert plant.set_reals({"initial.position[3]": plant.real("initial.position[3]") - 0.1}) == OK
     assert (
         plant.set_reals(
             {f"torso.push_{kind}[{i}]": 1.0 for kind in ("force", "torque") for i in (1, 2, 3)}

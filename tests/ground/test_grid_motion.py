@@ -45,9 +45,9 @@ def march(plant: Plant, until: float) -> Array:
 def rough(seed: int, *, size: float = 4.0, kind: int = 1) -> bytes:
     """Returns a rough ground: 50 mm cells, 10 mm high, blocks in levels of 5 mm."""
     rng, n = np.random.default_rng(seed), round(size / 0.05)
-    height: Array = (
-        rng.uniform(0.0, 0.01, (n, n)) if kind == 1 else 0.005 * rng.integers(0, 3, (n, n))
-    )
+    height: Array = np.array(rng.uniform(0.0, 0.01, (n, n)))
+    if kind == BLOCKS:
+        height = 0.005 * rng.integers(0, 3, (n, n)).astype(float)
     return grid_bytes(height, cell=0.05, origin=(-size / 2, -size / 2), kind=kind)
 
 

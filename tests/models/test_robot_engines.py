@@ -140,7 +140,7 @@ def still() -> tuple[Array, Array, Array]:
 
 def test_viewers_find_geometry_in_the_urdf(robot: Robot) -> None:
     """Viewers such as meshcat get the torso, a cylinder for each link and a sphere for each foot.
-    The contact geometry has the feet only.
+    The contact geometry has the feet, the torso's box, and spheres of knees and shanks.
     """
     text = robot_to_urdf(robot)
     model = pin.buildModelFromXML(text)
@@ -148,7 +148,7 @@ def test_viewers_find_geometry_in_the_urdf(robot: Robot) -> None:
         pin.buildGeomFromUrdfString(model, text, kind)
         for kind in (pin.GeometryType.VISUAL, pin.GeometryType.COLLISION)
     )
-    assert (shown.ngeoms, touching.ngeoms) == (1 + 18 + 6, 6)
+    assert (shown.ngeoms, touching.ngeoms) == (1 + 18 + 6, 6 + 1 + 6 + 6)
 
 
 def test_the_exported_file_loads_as_viewers_load_it(robot: Robot, tmp_path: Path) -> None:

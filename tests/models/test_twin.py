@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from hexapod_cosim.models import Robot, load_robot
+from hexapod_cosim.models import BodyContact, Robot, load_robot
 from hexapod_cosim.models.contact import foot_contacts, foot_force, normal_force
 from hexapod_cosim.models.dynamics import (
     Command,
@@ -260,7 +260,7 @@ def test_in_free_flight_momentum_changes_by_gravity_alone(mode: str) -> None:
 
 @pytest.mark.parametrize("mode", ["position", "kinematic"])
 def test_power_in_less_power_lost_is_the_rate_of_stored_energy(mode: str) -> None:
-    robot = with_mode(load_robot("athena"), mode)
+    robot = replace(with_mode(load_robot("athena"), mode), body=BodyContact())
     body, command, damping = random_bodies(robot, 8), random_command(robot, 8), np.full(6, 3.0)
     result = accelerations(robot, body, command, damping)
     stored = [

@@ -28,12 +28,15 @@ STILL = np.zeros(3)
 
 
 def rigid(law: str = "exact_restitution", *, gravity: float = 0.0, **contact: Any) -> Robot:
-    """Returns Athena with locked joints; the high stiffness keeps impacts short."""
+    """Returns Athena with locked joints, whose feet alone touch the ground; the high stiffness
+    keeps impacts short.
+    """
     settings = {"law": law} | contact
     robot = changed(
         load_robot("athena"),
         servo={"mode": "kinematic"},
         contact=settings,
+        body={"contact": "off"},
         solver={"tolerance": TIGHT, "step_max": 1.0},
     )
     return changed_gravity(robot, gravity)

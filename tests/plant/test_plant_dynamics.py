@@ -41,9 +41,9 @@ from hexapod_cosim.models.records import Array
 DENSE = 1e-10  # relative: the error of the dense solution, whose condition number is about 1e6
 PINOCCHIO = 1e-9  # relative: the force of a foot 1e-4 m deep amplifies the rounding of its height
 MODES = ("position", "torque", "kinematic")
-# the high floor keeps the damping low, so that receding feet still press
+# the high floor keeps the damping low, so that receding feet still press; feet alone touch
 ROBOTS = {
-    robot.name: changed(robot, contact={"impact_speed_floor": 2.0})
+    robot.name: changed(robot, contact={"impact_speed_floor": 2.0}, body={"contact": "off"})
     for robot in (
         load_robot("athena"),
         load_robot("phantomx_mk4"),

@@ -55,6 +55,7 @@ HxDefinition = record(
         "body",
         record(
             "Body",
+            ("contact", ct.c_int),
             ("torso_box", Vector3),
             ("torso_centre", Vector3),
             *reals("corner_radius knee_radius shank_radius shank_position"),
@@ -180,6 +181,16 @@ HxOutput = record(
             *reals("roll pitch yaw"),
             ("velocity", Vector3),
             ("angular_velocity", Vector3),
+            ("contact_force", Vector3),
+        ),
+    ),
+    (
+        "body",
+        record(
+            "BodyOutput",
+            ("knee_force", LegVectors),
+            ("shank_force", LegVectors),
+            ("clearance", PerLeg),
         ),
     ),
     ("imu", record("ImuOutput", ("specific_force", Vector3), ("angular_velocity", Vector3))),

@@ -26,6 +26,7 @@ from mirror import (
 )
 
 from hexapod_cosim.models import (
+    BODY_CONTACTS,
     CONTACT_LAWS,
     FRICTION_LAWS,
     METHODS,
@@ -201,11 +202,23 @@ def _put_settings(d: Any, robot: Robot) -> None:
     d.solver.projection = 1 + PROJECTIONS.index(robot.solver.projection)
     d.terrain.kind = 1 + TERRAINS.index(robot.terrain.kind)
     d.soil.law = 1 + SOIL_LAWS.index(robot.soil.law)
-    for section in ("contact", "friction", "servo", "baumgarte", "solver", "terrain", "soil"):
+    for section in (
+        "contact",
+        "friction",
+        "servo",
+        "baumgarte",
+        "solver",
+        "terrain",
+        "soil",
+        "body",
+    ):
         target, source = getattr(d, section), getattr(robot, section)
         for name, kind in target._fields_:
             if kind is Real:
                 setattr(target, name, getattr(source, name, 1.0))  # terrain.grid: the first
+    d.body.contact = 1 + BODY_CONTACTS.index(robot.body.contact)
+    for name in ("torso_box", "torso_centre"):
+        put(getattr(d.body, name), getattr(robot.body, name))
     put(d.gravity, robot.gravity)
 
 

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from plant import Plant
 
-from hexapod_cosim.models import Leg, Link, Robot, load_robot
+from hexapod_cosim.models import BodyContact, Leg, Link, Robot, load_robot
 from hexapod_cosim.models.contact import foot_contacts
 from hexapod_cosim.models.dynamics import Command
 from hexapod_cosim.models.kinematics import body_states
@@ -75,7 +75,7 @@ def lopsided(seed: int = 0) -> Robot:
     """Returns a robot without symmetries.
 
     It has inclined axes, offsets, products of inertia, and a centre of mass away from the torso's
-    origin.
+    origin. Its feet alone touch the ground.
     """
     robot, rng = load_robot("phantomx_mk4"), np.random.default_rng(seed)
     torso = replace(
@@ -83,7 +83,8 @@ def lopsided(seed: int = 0) -> Robot:
         com=tuple(rng.normal(0.0, 0.02, 3)),
         inertia=random_inertia(rng, robot.torso.mass, 0.08),
     )
-    return replace(robot, torso=torso, legs=tuple(_lopsided_leg(leg, rng) for leg in robot.legs))
+    legs = tuple(_lopsided_leg(leg, rng) for leg in robot.legs)
+    return replace(robot, torso=torso, legs=legs, body=BodyContact())
 
 
 def _lopsided_leg(leg: Leg, rng: np.random.Generator) -> Leg:

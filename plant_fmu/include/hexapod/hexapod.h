@@ -57,6 +57,9 @@ typedef enum hxSoilLaw {
   HX_SOIL_MUD
 } hxSoilLaw;
 
+/* Whether torso, knees and shanks touch the ground. */
+typedef enum hxBodyContact { HX_BODY_OFF = 1, HX_BODY_ON } hxBodyContact;
+
 typedef enum hxServoMode { HX_SERVO_POSITION = 1, HX_SERVO_TORQUE, HX_SERVO_KINEMATIC } hxServoMode;
 
 typedef enum hxProjection {
@@ -121,12 +124,13 @@ typedef struct hxDefinition {
   hxLeg leg[HX_LEGS];
   double foot_radius;       /* m */
   struct {                  /* spheres that touch the ground besides the feet; see hxTerrain */
+    int contact;            /* hxBodyContact */
     double torso_box[3];    /* m  half edges along the torso's axes of a box whose eight corners
                              *    touch the ground; 0 0 0: they do not */
     double torso_centre[3]; /* m  centre of the box from the torso's origin */
     double corner_radius;   /* m  of spheres at the box's corners; 0: points */
-    double knee_radius;     /* m  of a sphere at the tibia's joint; 0: none */
-    double shank_radius;    /* m  of a sphere on the tibia's line; 0: none */
+    double knee_radius;     /* m  of a sphere at the tibia's joint; 0: none; of the femur */
+    double shank_radius;    /* m  of a sphere on the tibia's line; 0: none; of the tibia */
     double shank_position;  /* 1  its place, 0 at the joint, 1 at the foot's centre */
   } body;
   double foot_pad_radius; /* m  flat round pad of feet on soil; 0: the sphere */
@@ -234,7 +238,13 @@ typedef struct hxOutput {
     double roll, pitch, yaw;           /* rad      z-y-x */
     double velocity[3];                /* m/s */
     double angular_velocity[3];        /* rad/s */
+    double contact_force[3];           /* N        ground on the torso's corners */
   } torso;
+  struct {
+    double knee_force[HX_LEGS][3];  /* N  ground on the knee */
+    double shank_force[HX_LEGS][3]; /* N  ground on the shank */
+    double clearance[HX_LEGS]; /* m  from femur and tibia to those of the two neighbouring legs */
+  } body;
   struct {
     double specific_force[3];   /* m/s2   torso axes, at the centre of mass */
     double angular_velocity[3]; /* rad/s  torso axes */
@@ -354,7 +364,8 @@ HX_API hxStatus hx_plant_set_coordinates(hxPlant *plant, double t,
 
 /* Reports that the importer's solver has completed its step to the present coordinates. Peaks,
  * integrals and losses of hxOutput belong to the path between two such calls and do not change
- * without them. The works in the coordinates are the solver's own. */
+ * without them. The works in the coordinates are the solver's own. Torso, knees and shanks, which
+ * have no indicators, touch and leave the ground at these calls. */
 HX_API void hx_plant_completed_step(hxPlant *plant, const hxInput *input);
 
 /* Compute the rates of the coordinates and the feet's indicators, and switch the contacts that are

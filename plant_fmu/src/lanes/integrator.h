@@ -21,7 +21,8 @@ static const double bristle_scale = 10.0; /* 1  in preslidings */
 
 /* Start of a step and the data that all its trials share. */
 typedef struct {
-  const hxModel *model;
+  const hxModel *model;   /* with all rows of contacts */
+  const hxModel *pressed; /* without the rows of bodies while none of them touches the ground */
   const hxCommand *command, *ramp; /* command and its change per second; ramp NULL: constant */
   const hxContactState *contact;
   const hxMethodRow *method;
@@ -162,7 +163,7 @@ static const hxCommand *command_at(const hxStart *start, double t, hxCommand *no
 /* Computes one step of the method and its error; the state changes only in its counters. */
 static void try_step(const hxStart *start, double h, hxState *state, hxTrial *trial) {
   const hxMethodRow *m = start->method;
-  const hxModel *model = start->model;
+  const hxModel *model = start->pressed;
   hxImplicit implicit = {.z = h * m->gamma, .ahead = h};
   hxRate k[HX_STAGES], change;
   hxPlantMotion y;
@@ -370,7 +371,7 @@ static void measure_step(const hxStart *start, double h, const hxMoment *end, hx
   hxStepWorks works;
   hxCommand command[INTERVALS + 1];
   hxReal work[HX_PACKS];
-  hxPath path = {.model = start->model,
+  hxPath path = {.model = start->pressed,
                  .contact = start->contact,
                  .t = start->t,
                  .h = h,
@@ -442,6 +443,24 @@ static hxStatus advance(const hxStart *start, double h_max, double *next_step, h
   return HX_OK;
 }
 
+/* Returns whether a contact of torso, knees or shanks is closed. */
+static int body_touches(const hxModel *model, const hxContactState *contact) {
+  double closed = 0.0;
+  for (int k = model->foot_rows; k < model->rows + model->torso_rows; ++k)
+    for (int slot = 0; slot < hx_slots_of(model->row[k]); ++slot)
+      closed += contact->closed[model->row[k]][slot];
+  return closed > 0.0;
+}
+
+/* Returns the model without the rows of bodies. Open contacts exert no force, so steps without
+ * these rows have the same bits. */
+HX_RARE const hxModel *feet_alone(const hxModel *model, hxModel *feet) {
+  *feet = *model;
+  feet->rows = model->foot_rows;
+  feet->torso_rows = 0;
+  return feet;
+}
+
 /* Advances from state->time to t_end; the last step ends on t_end exactly. A call that an event
  * interrupted continues with the same steps. */
 static hxStatus run_to(const hxModel *model, const hxCommand *command, const hxCommand *ramp,
@@ -453,6 +472,9 @@ static hxStatus run_to(const hxModel *model, const hxCommand *command, const hxC
                    .method = hx_method(model->method),
                    .y = &state->motion,
                    .footprints = events->footprints};
+  hxModel feet;
+  const int has_body = model->rows + model->torso_rows > model->foot_rows;
+  const hxModel *alone = has_body ? feet_alone(model, &feet) : model;
   start.touch = fmax(touch_depth[0], touch_depth[1] * model->tolerance);
   start.last_step = state->steps + state->rejected + steps_allowed(t_end - state->time);
   double first = fmin(state->first_step,
@@ -463,6 +485,7 @@ static hxStatus run_to(const hxModel *model, const hxCommand *command, const hxC
     double taken;
     int event = 0;
     start.t = state->time;
+    start.pressed = has_body && body_touches(model, &state->contact) ? model : alone;
     const hxStatus status = advance(&start, left, next_step, state, &taken, &event, message);
     if (status != HX_OK) return status;
     if (next_step == &first) state->first_step = first, next_step = &state->next_step;

@@ -2,6 +2,7 @@
 #ifndef HX_OUTPUT_H
 #define HX_OUTPUT_H
 
+#include "../ground/clearance.h"
 #include "dynamics.h"
 #ifndef HX_TANGENT
 #include "measure.h"
@@ -167,6 +168,26 @@ static void fill_foot(const hxModel *model, const hxState *state, const hxLegWor
     add_foot_row(model, state, &work->contact[model->row[k]], model->row[k], lane, leg, o);
 }
 
+/* Fills the force of the ground on a sphere of the tibia; 0 where the model has no such row. */
+static void fill_body_row(const hxModel *model, const hxLegWork *work, int row, int lane,
+                          hxNumber force[3]) {
+  for (int i = 0; i < 3; ++i) force[i] = 0.0;
+  for (int k = model->foot_rows; k < model->rows; ++k)
+    if (model->row[k] == row) get3(work->contact[row].force, lane, force);
+}
+
+/* Fills the sum of the ground's forces on the torso's corners. */
+static void fill_torso_contact(const hxModel *model, const hxWork *work, hxNumber force[3]) {
+  hxReal x[HX_TORSO_PACKS], y[HX_TORSO_PACKS], z[HX_TORSO_PACKS];
+  for (int i = 0; i < 3; ++i) force[i] = 0.0;
+  if (!model->torso_rows) return;
+  for (int pack = 0; pack < HX_TORSO_PACKS; ++pack) {
+    const hxVec3 f = work->torso_contact[pack].force;
+    x[pack] = f.x, y[pack] = f.y, z[pack] = f.z;
+  }
+  force[0] = hx_sum_slots(x), force[1] = hx_sum_slots(y), force[2] = hx_sum_slots(z);
+}
+
 /* Fills the outputs of torso and IMU. */
 static void fill_torso(const hxPlantMotion *motion, const hxWork *work, hxOutput *o) {
   const hxNumber *m = motion->torso;
@@ -229,8 +250,12 @@ static void hx_output_fill(const hxModel *model, const hxState *state, const hxW
       fill_joint(state, &w->joint[joint], lane, leg, joint, o);
     const hxVec3 tibia = hx_link_vec3(&state->motion, HX_JOINTS - 1, HX_R, leg - lane);
     fill_foot(model, state, w, tibia, lane, leg, o);
+    fill_body_row(model, w, HX_KNEE, lane, o->body.knee_force[leg]);
+    fill_body_row(model, w, HX_SHANK, lane, o->body.shank_force[leg]);
   }
   fill_torso(&state->motion, work, o);
+  fill_torso_contact(model, work, o->torso.contact_force);
+  hx_clearances(model, &state->motion, work, o->body.clearance);
   o->footprints = 0.0; /* hx_plant_output() counts them: they are outside the state */
   for (int i = 0; i < HX_CONE_BINS; ++i) o->cone_time[i] = state->measured.cone_time[i];
   fill_energy(model, state, work, o);

@@ -1,0 +1,126 @@
+"""Computes contacts of torso, knees and shanks with the ground.
+
+Each is a sphere with the normal law of the feet (eq. 14) and the friction of the tanh law (eq. 15),
+also where the feet have bristles. The torso has eight, around the corners of a box.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from itertools import product
+
+import numpy as np
+
+from hexapod_cosim.models.contact import FootContact, contact_damping, foot_force
+from hexapod_cosim.models.kinematics import JOINTS, LEGS, cross, rotation_matrix, skew
+from hexapod_cosim.models.records import Array, Robot
+from hexapod_cosim.models.terrain import ground
+
+
+@dataclass(frozen=True)
+class BodySphere:
+    """A sphere of a body that may touch the ground."""
+
+    name: str  # torso, LF.knee, LF.shank, ...
+    body: int  # number of the body
+    centre: Array  # (3,) from the body's centre of mass, body axes [m]
+    radius: float  # m
+
+
+def body_spheres(robot: Robot) -> tuple[BodySphere, ...]:
+    """Returns the spheres of torso, knees and shanks; none without contact of the body.
+
+    The order is that of the C plant: the torso's corners, of which bit i of the number chooses the
+    side along axis i, then the knees, then the shanks.
+    """
+    body = robot.body
+    if body.contact == "off":
+        return ()
+    spheres = []
+    if any(body.torso_box):
+        offset = np.subtract(body.torso_centre, robot.torso.com)
+        for z, y, x in product((-1.0, 1.0), repeat=3):
+            corner = offset + np.array([x, y, z]) * body.torso_box
+            spheres.append(BodySphere("torso", 0, corner, body.corner_radius))
+    for name, radius, share in (
+        ("knee", body.knee_radius, 0.0),
+        ("shank", body.shank_radius, body.shank_position),
+    ):
+        for leg in range(LEGS if radius > 0.0 else 0):
+            tibia = robot.legs[leg].links[-1]
+            centre = share * np.array(tibia.tip) - np.array(tibia.com)
+            label = f"{robot.legs[leg].name}.{name}"
+            spheres.append(BodySphere(label, JOINTS * (leg + 1), centre, radius))
+    return tuple(spheres)
+
+
+def sphere_contact(robot: Robot, sphere: BodySphere, state: Array) -> FootContact:
+    """Returns the contact of a sphere with the nearest face of the ground.
+
+    state: (13,) of the sphere's body.
+    """
+    centre = state[0:3] + rotation_matrix(state[3:7]) @ sphere.centre
+    distance, normal = ground(robot.terrain, centre)
+    point = centre - sphere.radius * normal
+    velocity = state[7:10] + cross(state[10:13], point - state[0:3])
+    depth = sphere.radius - distance
+    return FootContact(point, velocity, normal, depth, float(-velocity @ normal))
+
+
+def body_contacts(robot: Robot, body: Array) -> tuple[FootContact, ...]:
+    """Returns the contacts of all spheres of `body_spheres`, at bodies (19, 13)."""
+    return tuple(sphere_contact(robot, sphere, body[sphere.body]) for sphere in body_spheres(robot))
+
+
+def standing_body_damping(robot: Robot, body: Array) -> Array:
+    """Returns the damping of all spheres [s/m] at impact speed 0; nan for those above the
+    ground.
+    """
+    slow = contact_damping(robot.contact, 0.0)
+    contacts = body_contacts(robot, body)
+    return np.array([slow if contact.penetration > 0.0 else math.nan for contact in contacts])
+
+
+def sliding_robot(robot: Robot) -> Robot:
+    """Returns the robot with the tanh law in place of bristles, which bodies do not have."""
+    if robot.friction.law == "none":
+        return robot
+    return replace(robot, friction=replace(robot.friction, law="tanh", mu_static=0.0))
+
+
+def body_forces(robot: Robot, body: Array, damping: Array) -> Array:
+    """Returns the forces (n, 3) of the ground on all spheres [N].
+
+    damping: (n,) of the contacts [s/m], nan for open ones.
+    """
+    smooth = sliding_robot(robot)
+    forces = [
+        foot_force(smooth, contact, float(held))
+        for contact, held in zip(body_contacts(robot, body), damping, strict=True)
+    ]
+    return np.array(forces).reshape(-1, 3)
+
+
+def body_wrenches(robot: Robot, body: Array, damping: Array) -> Array:
+    """Returns forces and torques (19, 6) of the contacts on the bodies [N, N m].
+
+    Torques are about the centres of mass. damping: as in `body_forces`.
+    """
+    g = np.zeros((len(body), 6))
+    forces = body_forces(robot, body, damping)
+    for sphere, contact, force in zip(
+        body_spheres(robot), body_contacts(robot, body), forces, strict=True
+    ):
+        arm = contact.point - body[sphere.body, 0:3]
+        g[sphere.body] += np.concatenate([force, cross(arm, force)])
+    return g
+
+
+def sphere_jacobian(body: Array, sphere: BodySphere, contact: FootContact) -> Array:
+    """Returns J (3, 114): the velocity of the contact point's material is J v."""
+    at = sphere.body
+    J = np.zeros((3, 6 * len(body)))
+    J[:, 6 * at : 6 * at + 3] = np.eye(3)
+    J[:, 6 * at + 3 : 6 * at + 6] = -skew(contact.point - body[at, 0:3])
+    return J

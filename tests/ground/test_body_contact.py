@@ -1,0 +1,127 @@
+"""Tests contacts of torso, knees and shanks: C plant against the dense twin, laws of rest, energy
+and symmetry, and the same bits everywhere.
+"""
+
+from __future__ import annotations
+
+import ctypes as ct
+from typing import Any
+
+import numpy as np
+import pytest
+from mirror import LEGS
+from plant import Plant, inputs, pointer
+from states import changed, distance, lopsided, random_bodies, random_command
+
+from hexapod_cosim.models import Robot
+from hexapod_cosim.models.body.contacts import (
+    body_contacts,
+    body_forces,
+    body_spheres,
+    standing_body_damping,
+)
+from hexapod_cosim.models.body.slopes import body_slopes
+from hexapod_cosim.models.contact import standing_damping
+from hexapod_cosim.models.dynamics import Command, accelerations
+from hexapod_cosim.models.records import Array
+from hexapod_cosim.models.stage import keep_slopes, solve_stage
+
+DENSE = 1e-10  # relative: the error of the dense solution, whose condition number is about 1e6
+Z = 7e-4  # s: h gamma of a step in which the stiff terms dominate
+TOUCHING: dict[str, Any] = {"contact": "on"}
+# the high floor keeps the damping low, so that receding bodies still press
+SOFT = {"impact_speed_floor": 2.0}
+
+
+def sprawled(robot: Robot, seed: int, *, drift: float = 0.0) -> Array:
+    """Returns moving bodies (19, 13), lowered until torso, knees and shanks are in the ground."""
+    body = random_bodies(robot, seed, drift=drift)
+    spheres = body_spheres(robot)
+    deep = [
+        max(
+            contact.penetration
+            for sphere, contact in zip(spheres, body_contacts(robot, body), strict=True)
+            if sphere.name.endswith(part)
+        )
+        for part in ("torso", "knee", "shank")
+    ]
+    body[:, 2] += min(deep) - 2e-3
+    return body
+
+
+def wide(robot: Robot) -> Robot:
+    """Returns the robot with bodies so large that torso, knees and shanks can touch at once."""
+    size = {"torso_box": (0.12, 0.1, 0.12), "knee_radius": 0.1, "shank_radius": 0.06}
+    return changed(robot, body=TOUCHING | size, contact=SOFT)
+
+
+def at(core: ct.CDLL, robot: Robot, body: Array) -> Plant:
+    plant = Plant(core, robot)
+    plant.bodies = body
+    return plant
+
+
+def touching_parts(robot: Robot, body: Array) -> set[str]:
+    pairs = zip(body_spheres(robot), body_contacts(robot, body), strict=True)
+    return {sphere.name.split(".")[-1] for sphere, contact in pairs if contact.penetration > 0.0}
+
+
+@pytest.mark.parametrize("friction", ["tanh", "none", "bristle"])
+@pytest.mark.parametrize("terrain", ["flat", "slope"])
+def test_accelerations_with_the_body_in_the_ground_are_those_of_the_dense_system(
+    core: ct.CDLL, friction: str, terrain: str
+) -> None:
+    slope = {"kind": terrain, "incline": 0.2, "heading": 2.1}
+    robot = changed(wide(lopsided(3)), friction={"law": friction}, terrain=slope)
+    for seed, drift in ((0, 0.0), (1, 1e-3)):
+        body, command = sprawled(robot, seed, drift=drift), random_command(robot, seed)
+        held = standing_body_damping(robot, body)
+        dense = accelerations(
+            robot, body, command, standing_damping(robot, body), body_damping=held
+        )
+        ours = at(core, robot, body).accelerations(command)
+        assert touching_parts(robot, body) == {"torso", "knee", "shank"}
+        assert distance(ours.dv, dense.dv) < DENSE
+        assert distance(ours.multipliers, dense.multipliers) < DENSE
+
+
+def test_the_outputs_are_the_forces_of_the_twin(core: ct.CDLL) -> None:
+    robot = wide(lopsided(4))
+    body = sprawled(robot, 4)
+    output = at(core, robot, body).output(random_command(robot, 4))
+    forces = body_forces(robot, body, standing_body_damping(robot, body))
+    assert len(forces) == 8 + 2 * LEGS
+    assert distance(output.torso.contact_force, forces[:8].sum(axis=0)) < DENSE
+    assert distance(output.body.knee_force, forces[8:14]) < DENSE
+    assert distance(output.body.shank_force, forces[14:]) < DENSE
+    assert min(np.abs(f).max() for f in (forces[:8], forces[8:14], forces[14:])) > 1.0
+
+
+def stage_rates(
+    core: ct.CDLL, plant: Plant, command: Command, s_x: Array, s_v: Array
+) -> tuple[Array, Array]:
+    """Returns nu and alpha (19, 6) of a stage after the changes s_x and s_v (19, 6)."""
+    rate, turn = np.zeros((19, 13)), np.zeros((19, 3))
+    arguments: list[Any] = [ct.c_void_p(plant.handle), ct.byref(inputs(command))]
+    arguments += [ct.c_double(Z), ct.c_double(0.0)]
+    core.hx_probe_stage(*arguments, *map(pointer, (s_x, s_v, rate, turn)))
+    return np.hstack([rate[:, 0:3], turn]), rate[:, 7:13]
+
+
+def test_an_implicit_stage_with_the_body_in_the_ground_is_the_dense_one(core: ct.CDLL) -> None:
+    robot = wide(lopsided(5))
+    body, command = sprawled(robot, 5), random_command(robot, 5)
+    damping, held = standing_damping(robot, body), standing_body_damping(robot, body)
+    bristle, rng = np.zeros((6, 3)), np.random.default_rng(5)
+    slopes = keep_slopes(robot, body, bristle, command, damping, 0.0)
+    touching = (held, body_slopes(robot, body, held, 0.0))
+    plant = at(core, robot, body)
+    for _ in range(3):
+        s_x, s_v = rng.normal(0.0, 1e-3, (19, 6)), rng.normal(0.0, 0.1, (19, 6))
+        change = (s_x.ravel(), s_v.ravel(), bristle)
+        dense = solve_stage(
+            robot, body, bristle, command, damping, slopes, Z, change, touching=touching
+        )
+        nu, alpha = stage_rates(core, plant, command, s_x, s_v)
+        assert distance(alpha, dense.alpha.reshape(19, 6)) < DENSE
+        assert distance(nu, dense.nu.reshape(19, 6)) < DENSE

@@ -1,0 +1,163 @@
+"""Tests laws of a robot whose torso, knees and shanks touch the ground: rest, energy, symmetry, and
+the same bits by all kernels and after a restore.
+"""
+
+from __future__ import annotations
+
+import ctypes as ct
+from typing import Any
+
+import numpy as np
+import pytest
+from mirror import LEGS
+from plant import Plant, inputs, pointer
+from states import changed
+
+from hexapod_cosim.models import Robot, load_robot
+from hexapod_cosim.models.body.contacts import body_contacts
+from hexapod_cosim.models.dynamics import Command
+from hexapod_cosim.models.records import Array
+
+REST = 1e-6  # relative: what is left of the motion after settling
+MACRO = 0.005  # s
+ON = {"contact": "on"}
+UPTURNED = np.array([0.0, 1.0, 0.0, 0.0])  # turned by half a turn about x
+FOLDED = np.tile([0.0, -0.3, 0.2], (LEGS, 1))  # rad: knees and feet of an upturned robot are high
+KNEELING = np.tile([0.0, -0.5, -0.75], (LEGS, 1))  # rad: the knees are the lowest points
+MIRRORED = [3, 4, 5, 0, 1, 2]  # legs on the other side
+
+
+def athena(**sections: dict[str, Any]) -> Robot:
+    return changed(load_robot("athena"), **{"body": ON} | sections)
+
+
+def dropped(core: ct.CDLL, robot: Robot, angle: Array, height: float, **initial: Any) -> Plant:
+    """Returns a plant with these joint angles, its torso at a height [m]."""
+    return Plant(core, robot, position=(0.0, 0.0, height), angle=angle, **initial)
+
+
+def settle(plant: Plant, angle: Array, seconds: float) -> Any:
+    """Holds the joint angles for a time [s]; returns the output."""
+    command = Command(angle_ref=angle)
+    for k in range(round(seconds / MACRO)):
+        plant.step((k + 1) * MACRO, command)
+    return plant.output(command)
+
+
+def static_depth(robot: Robot, force: Any) -> Array:
+    """Returns the depth [m] at which the normal law bears a force [N]."""
+    depth: Array = (np.asarray(force) / robot.contact.stiffness) ** (2.0 / 3.0)
+    return depth
+
+
+def test_an_upturned_robot_comes_to_rest_on_the_corners_of_its_torso(core: ct.CDLL) -> None:
+    robot = athena()
+    plant = dropped(core, robot, FOLDED, 0.06, quaternion=UPTURNED)
+    output = settle(plant, FOLDED, 3.0)
+    assert output.torso.contact_force[2] == pytest.approx(54.936, rel=REST)
+    assert np.abs(output.torso.contact_force[:2]).max() < 1e-6 * 54.936
+    assert output.foot.normal_force.sum() == 0.0
+    assert output.body.knee_force.max() == output.body.shank_force.max() == 0.0
+    depth = np.array([contact.penetration for contact in body_contacts(robot, plant.bodies)])
+    resting = depth[depth > 0.0]
+    assert resting == pytest.approx(static_depth(robot, np.full(4, 54.936 / 4.0)), rel=1e-5)
+    assert output.torso.position[2] == pytest.approx(0.04 - resting[0], abs=1e-9)
+
+
+def test_a_robot_without_contact_of_the_body_stands_with_its_torso_underground(
+    core: ct.CDLL,
+) -> None:
+    robot = athena(body={"contact": "off"})
+    output = settle(dropped(core, robot, FOLDED, 0.06, quaternion=UPTURNED), FOLDED, 0.5)
+    assert output.torso.position[2] < -0.01
+    assert np.all(output.torso.contact_force == 0.0)
+
+
+def test_a_kneeling_robot_rests_on_its_knees(core: ct.CDLL) -> None:
+    robot = athena()
+    plant = dropped(core, robot, KNEELING, 0.07)
+    output = settle(plant, KNEELING, 3.0)
+    assert output.body.knee_force[:, 2].sum() == pytest.approx(54.936, rel=REST)
+    assert output.body.knee_force[:, 2].min() > 5.0
+    assert output.foot.normal_force.sum() == 0.0
+    assert np.all(output.torso.contact_force == 0.0)
+    depth = np.array([contact.penetration for contact in body_contacts(robot, plant.bodies)])
+    allowed = static_depth(robot, output.body.knee_force[:, 2].max())
+    assert depth.max() <= allowed * (1.0 + 1e-5)
+
+
+@pytest.mark.parametrize("angle", [FOLDED, KNEELING])
+def test_the_energy_books_of_a_drop_close_with_the_tolerance(core: ct.CDLL, angle: Array) -> None:
+    """The residual is the error of the integrator, so it falls with the tolerance."""
+    start = {"quaternion": UPTURNED} if angle is FOLDED else {}
+    residual = {}
+    for tolerance in (1e-4, 1e-7):
+        robot = athena(solver={"tolerance": tolerance})
+        output = settle(dropped(core, robot, angle, 0.1, **start), angle, 0.3)
+        assert output.energy.dissipated > 0.5
+        residual[tolerance] = abs(output.energy.residual) / output.energy.dissipated
+    assert residual[1e-4] < 1e-2
+    assert residual[1e-7] < 1e-5
+
+
+def test_mirrored_drops_are_mirror_images(core: ct.CDLL) -> None:
+    robot = athena(solver={"tolerance": 1e-8})
+    outputs = []
+    for side in (1.0, -1.0):
+        start = {"quaternion": (0.05 * side, 1.0, 0.02 * side, 0.03)}
+        plant = dropped(core, robot, FOLDED, 0.09, **start)
+        outputs.append(settle(plant, FOLDED, 0.15))
+    one, other = outputs
+    flip = np.array([1.0, -1.0, 1.0])
+    assert np.linalg.norm(one.torso.contact_force) > 1.0
+    assert one.torso.position * flip == pytest.approx(other.torso.position, abs=1e-6)
+    assert one.torso.contact_force * flip == pytest.approx(other.torso.contact_force, abs=1e-2)
+    assert one.body.clearance == pytest.approx(other.body.clearance[MIRRORED], abs=1e-6)
+
+
+def test_steps_have_the_same_bits_until_the_body_touches_the_ground(core: ct.CDLL) -> None:
+    plants = [
+        dropped(core, athena(body={"contact": contact}), FOLDED, 0.1, quaternion=UPTURNED)
+        for contact in ("off", "on")
+    ]
+    command, same = Command(angle_ref=FOLDED), []
+    for k in range(40):
+        for plant in plants:
+            plant.step((k + 1) * MACRO, command)
+        same.append(np.array_equal(plants[0].bodies, plants[1].bodies))
+    first = same.index(False)
+    assert 15 < first < 30
+    assert not any(same[first:])
+
+
+def test_every_kernel_gives_the_same_rates_with_the_body_in_the_ground(core: ct.CDLL) -> None:
+    plant = dropped(core, athena(), FOLDED, 0.039, quaternion=UPTURNED)
+    command, seen = Command(angle_ref=FOLDED), {}
+    core.hx_probe_kernel.restype = ct.c_char_p
+    for index in range(8):
+        rate = np.zeros((19, 13))
+        name = core.hx_probe_kernel(
+            index, ct.c_void_p(plant.handle), ct.byref(inputs(command)), pointer(rate)
+        )
+        if name:
+            seen[name] = rate
+    assert plant.output(command).torso.contact_force[2] > 10.0
+    assert all(np.array_equal(rate, seen[b"baseline"]) for rate in seen.values())
+
+
+def test_a_restored_drop_continues_with_the_same_bits(core: ct.CDLL) -> None:
+    robot, command = athena(), Command(angle_ref=FOLDED)
+    plant = dropped(core, robot, FOLDED, 0.06, quaternion=UPTURNED)
+    saved = []
+    for k in range(40):
+        plant.step((k + 1) * MACRO, command)
+        saved.append(plant.save())
+    touching = set()
+    for k in (5, 13, 20):
+        other = Plant(core, load_robot("phantomx_mk4"))
+        other.restore(saved[k])
+        touching.add(bool(other.output(command).torso.contact_force[2] > 0.0))
+        for j in range(k + 1, 40):
+            other.step((j + 1) * MACRO, command)
+        assert other.save() == saved[39]
+    assert touching == {False, True}
