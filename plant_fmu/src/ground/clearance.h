@@ -72,6 +72,10 @@ static inline void next_chains(hxNumber chain[HX_CHAIN][3][HX_SLOTS],
       for (int slot = 0; slot < HX_SLOTS; ++slot) next[k][i][slot] = chain[k][i][hx_next_leg[slot]];
 }
 
+static inline hxVec3 chain_point(hxNumber point[3][HX_SLOTS], int slot) {
+  return (hxVec3){hx_load(&point[0][slot]), hx_load(&point[1][slot]), hx_load(&point[2][slot])};
+}
+
 /* Computes the least distance of each leg's femur and tibia from those of its two neighbours, less
  * the radii of both capsules. */
 static inline void hx_clearances(const hxModel *model, const hxPlantMotion *motion,
@@ -84,9 +88,9 @@ static inline void hx_clearances(const hxModel *model, const hxPlantMotion *moti
     hxReal least = hx_splat(1e9);
     for (int i = 0; i < 2; ++i)
       for (int j = 0; j < 2; ++j) {
-        const hxVec3 p = hx_load_vec3(chain[i], slot), q = hx_load_vec3(next[j], slot);
-        const hxVec3 a = hx_sub3(hx_load_vec3(chain[i + 1], slot), p),
-                     b = hx_sub3(hx_load_vec3(next[j + 1], slot), q);
+        const hxVec3 p = chain_point(chain[i], slot), q = chain_point(next[j], slot);
+        const hxVec3 a = hx_sub3(chain_point(chain[i + 1], slot), p),
+                     b = hx_sub3(chain_point(next[j + 1], slot), q);
         least = hx_min(least, hx_line_distance(p, a, q, b) - (radius[i] + radius[j]));
       }
     hx_store(&gap[slot], least);
