@@ -73,7 +73,7 @@ def runs_here(target: str) -> None:
 
 def test_the_recorded_walk_moves_the_robot(walk: Walk) -> None:
     steps = [
-        list(map(number, walk.expected[k : k + 422])) for k in range(0, len(walk.expected), 422)
+        list(map(number, walk.expected[k : k + 474])) for k in range(0, len(walk.expected), 474)
     ]
     assert len(steps) == 300
     assert len({tuple(step) for step in steps}) == len(steps)

@@ -18,6 +18,8 @@ WALKS = [
     for control in ("kinematic", "compliant")
     if (name, control) != ("drop", "compliant")
 ]
+# at the fastest setting steps go over the corner of the soil's law, where a foot begins to unload
+ON_SOIL = ("sand",)
 FAST = ("solver.method=ros2", "solver.tolerance=0.1")
 
 
@@ -41,7 +43,7 @@ def test_the_energy_balance_of_every_bundled_scenario_closes(
     walker: Walker, name: str, control: str
 ) -> None:
     """The residual is below 1e-4 of the motors' gross work with the default solver, 1e-3 at the
-    fastest setting.
+    fastest setting, 5e-3 there on soil.
     """
     missing = [
         walker.simulate(load_scenario(name, overrides=[f"control={control}", *solver])).metrics[
@@ -50,4 +52,4 @@ def test_the_energy_balance_of_every_bundled_scenario_closes(
         for solver in ((), FAST)
     ]
     assert missing[0] < (2e-3 if (name, control) == STANDING else 1e-4)
-    assert missing[1] < 1e-3
+    assert missing[1] < (5e-3 if name in ON_SOIL else 1e-3)
