@@ -213,7 +213,13 @@ def test_discrete_variables_are_those_that_change_at_events(exported3: Path) -> 
         for variable in description.modelVariables
         if variable.variability == "discrete"
     }
-    assert discrete == {"foot.contact", "foot.impact_speed", "foot.landings", "solver.touchdowns"}
+    assert discrete == {
+        "feet.footprints",
+        "foot.contact",
+        "foot.impact_speed",
+        "foot.landings",
+        "solver.touchdowns",
+    }
 
 
 def test_directional_derivatives_of_arrays_are_fmi_2_s_of_elements(

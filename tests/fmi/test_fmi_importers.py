@@ -143,7 +143,7 @@ def test_true_may_be_minus_one(plant_library: Path) -> None:
 
 def test_booleans_read_are_0_or_1(running: Plant) -> None:
     assert running.step(0.0, H) == OK
-    contacts = ATHENA.references([name for name in ATHENA.by_name if name.endswith(".contact")])
+    contacts = ATHENA.references([name for name in ATHENA.by_name if name.endswith("foot.contact")])
     assert running.get_references("fmi2GetBoolean", contacts) == (OK, [1] * 6)
 
 

@@ -155,7 +155,7 @@ def test_several_seeds_differ_by_the_standard_variation_and_one_seed_is_the_plai
         ),
         (
             optimisation(held_out={"scenarios": ["ripple", "walk_flat"]}),
-            ["trained on", "got 'walk_flat'", 'scenarios = ["amble", "incline"'],
+            ["trained on", "got 'walk_flat'", 'scenarios = ["amble", "course"'],
         ),
         (
             {"factors": {"gains.slip.kp": [math.nan]}},
