@@ -243,9 +243,9 @@ static void every_law_method_and_drive_moves(void) {
   hxDefinition robot;
   hx_definition_default(&robot);
   robot.initial.position[2] += 0.001;
-  robot.terrain.incline = 0.1;
+  robot.terrain.incline = 0.04;
   for (int law = HX_CONTACT_EXACT_RESTITUTION; law <= HX_CONTACT_HERTZ; ++law)
-    for (int friction = HX_FRICTION_TANH; friction <= HX_FRICTION_BRISTLE; ++friction) {
+    for (int friction = HX_FRICTION_TANH; friction <= HX_FRICTION_LUGRE; ++friction) {
       robot.contact.law = law, robot.friction.law = friction;
       robot.terrain.kind = friction == HX_FRICTION_NONE ? HX_TERRAIN_FLAT : HX_TERRAIN_SLOPE;
       moves(plant, &robot);
