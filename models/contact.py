@@ -8,13 +8,13 @@ until lift-off. Most laws have the form d = chi(e) / v0 and differ in chi(e).
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
 import numpy as np
 
 from hexapod_cosim.models.friction import friction_force, turning_moment
-from hexapod_cosim.models.kinematics import JOINTS, LEGS, cross, foot_centres
+from hexapod_cosim.models.kinematics import JOINTS, LEGS, cross, foot_centres, skew
 from hexapod_cosim.models.records import Array, Contact, Robot
 from hexapod_cosim.models.terrain import Face, ground_faces
 
@@ -124,17 +124,22 @@ def foot_contact(robot: Robot, tibia: Array, centre: Array) -> FootContact:
         tibia: (13,) state of the foot's tibia.
         centre: (3,) of the foot [m].
     """
-    return _contact(robot, tibia, centre, ground_faces(robot.terrain, centre)[0])
+    return sphere_contact(tibia, centre, robot.foot.radius, ground_faces(robot.terrain, centre)[0])
 
 
-def _contact(robot: Robot, tibia: Array, centre: Array, face: Face) -> FootContact:
-    """Returns the contact of a foot with one face of the ground."""
+def sphere_contact(state: Array, centre: Array, radius: float, face: Face) -> FootContact:
+    """Returns the contact of a sphere with one face of the ground.
+
+    Args:
+        state: (13,) of the body that carries the sphere.
+        centre: (3,) of the sphere, world axes [m].
+        radius: of the sphere [m].
+        face: distance of the centre from the ground [m], and the ground's normal (3,).
+    """
     distance, normal = face
-    point = centre - robot.foot.radius * normal
-    velocity = tibia[7:10] + cross(tibia[10:13], point - tibia[0:3])
-    return FootContact(
-        point, velocity, normal, robot.foot.radius - distance, float(-velocity @ normal)
-    )
+    point = centre - radius * normal
+    velocity = state[7:10] + cross(state[10:13], point - state[0:3])
+    return FootContact(point, velocity, normal, radius - distance, float(-velocity @ normal))
 
 
 def wall_contacts(robot: Robot, body: Array) -> tuple[FootContact | None, ...]:
@@ -146,7 +151,8 @@ def wall_contacts(robot: Robot, body: Array) -> tuple[FootContact | None, ...]:
     for leg, centre in enumerate(foot_centres(robot, body)):
         walls = ground_faces(robot.terrain, centre)[1:]
         tibia = body[JOINTS * (leg + 1)]
-        found.append(_contact(robot, tibia, centre, walls[0]) if walls else None)
+        touches = sphere_contact(tibia, centre, robot.foot.radius, walls[0]) if walls else None
+        found.append(touches)
     return tuple(found)
 
 
@@ -164,8 +170,8 @@ def foot_force(
     bristle: (3,) as in `friction_force`.
     """
     f_n = normal_force(robot.contact, damping, foot.penetration, foot.approach_speed)
-    slip = foot.velocity + foot.approach_speed * foot.normal
-    return f_n * foot.normal + friction_force(robot.friction, f_n, slip, bristle)
+    friction = friction_force(robot.friction, f_n, slip_velocity(foot), bristle)
+    return f_n * foot.normal + friction
 
 
 def foot_moment(robot: Robot, foot: FootContact, damping: float, turn: Array) -> Array:
@@ -177,9 +183,45 @@ def foot_moment(robot: Robot, foot: FootContact, damping: float, turn: Array) ->
     return turning_moment(robot.friction, robot.foot.radius, f_n, foot.normal, turn)
 
 
+def slip_velocity(contact: FootContact) -> Array:
+    """Returns the velocity (3,) of the contact point's material along the ground [m/s]."""
+    return contact.velocity + contact.approach_speed * contact.normal
+
+
 def standing_damping(robot: Robot, body: Array) -> Array:
     """Returns the damping (6,) [s/m] at impact speed 0; nan for feet above the ground."""
-    slow = contact_damping(robot.contact, 0.0)
-    return np.array(
-        [slow if foot.penetration > 0.0 else math.nan for foot in foot_contacts(robot, body)]
-    )
+    return resting_damping(robot.contact, foot_contacts(robot, body))
+
+
+def resting_damping(law: Contact, contacts: Iterable[FootContact]) -> Array:
+    """Returns the damping (n,) [s/m] at impact speed 0; nan for contacts above the ground."""
+    slow = contact_damping(law, 0.0)
+    return np.array([slow if contact.penetration > 0.0 else math.nan for contact in contacts])
+
+
+def contact_jacobian(body: Array, carrier: int, contact: FootContact) -> Array:
+    """Returns J (3, 114): the velocity of the contact point's material is J v.
+
+    carrier: number of the body that touches.
+    """
+    J = np.zeros((3, 6 * len(body)))
+    J[:, 6 * carrier : 6 * carrier + 3] = np.eye(3)
+    J[:, 6 * carrier + 3 : 6 * carrier + 6] = -skew(contact.point - body[carrier, 0:3])
+    return J
+
+
+def contact_matrices(
+    J: Array, normal: Array, *, stiffness: float, viscosity: float, drag: float
+) -> tuple[Array, Array]:
+    """Returns the parts of G_x and G_v of eq. 20, each (114, 114), of one contact.
+
+    Args:
+        J: (3, 114) as in `contact_jacobian`.
+        normal: (3,) of the ground.
+        stiffness: of the normal force by delta [N/m].
+        viscosity: of the normal force by ddelta [N s/m].
+        drag: of friction by slip velocity [N s/m].
+    """
+    nn = np.outer(normal, normal)
+    across = drag * (np.eye(3) - nn)
+    return -J.T @ (stiffness * nn) @ J, -J.T @ (viscosity * nn + across) @ J

@@ -16,10 +16,12 @@ from hexapod_cosim.models.actuator import gear_drag, servo_slopes, stop_slopes
 from hexapod_cosim.models.body.contacts import body_spheres
 from hexapod_cosim.models.body.slopes import BodySlopes, body_slope_matrices
 from hexapod_cosim.models.contact import (
-    FootContact,
+    contact_jacobian,
+    contact_matrices,
     foot_contacts,
     normal_force,
     normal_slopes,
+    slip_velocity,
 )
 from hexapod_cosim.models.dynamics import (
     Command,
@@ -39,7 +41,6 @@ from hexapod_cosim.models.kinematics import (
     LEGS,
     joint_angles,
     joint_speeds,
-    skew,
 )
 from hexapod_cosim.models.records import BRISTLE_LAWS, Array, Robot
 
@@ -69,11 +70,6 @@ class StageRate:
     nu: Array  # (114,)  m/s and rad/s, body by body
     alpha: Array  # (114,)  m/s2 and rad/s2
     bristle: Array  # (6, 3)  m/s
-
-
-def slip_velocity(foot: FootContact) -> Array:
-    """Returns the velocity (3,) of the contact point's material along the ground [m/s]."""
-    return foot.velocity + foot.approach_speed * foot.normal
 
 
 def keep_slopes(
@@ -109,15 +105,6 @@ def keep_slopes(
     return Slopes(motor_stiffness, motor_damping, gear_drag(robot.servo, speed), *contacts, *stops)
 
 
-def contact_jacobian(body: Array, leg: int, foot: FootContact) -> Array:
-    """Returns J (3, 114): the velocity of the contact point's material is J v."""
-    tibia = JOINTS * (leg + 1)
-    J = np.zeros((3, 6 * BODIES))
-    J[:, 6 * tibia : 6 * tibia + 3] = np.eye(3)
-    J[:, 6 * tibia + 3 : 6 * tibia + 6] = -skew(foot.point - body[tibia, 0:3])
-    return J
-
-
 def slope_matrices(robot: Robot, body: Array, slopes: Slopes) -> tuple[Array, Array]:
     """Returns G_x and G_v of eq. 20, each (114, 114), at bodies (19, 13).
 
@@ -129,10 +116,16 @@ def slope_matrices(robot: Robot, body: Array, slopes: Slopes) -> tuple[Array, Ar
     G_x = -G.T @ ((slopes.motor_stiffness + slopes.stop_stiffness).reshape(-1, 1) * G)
     G_v = -G.T @ (damping.reshape(-1, 1) * G)
     for leg, foot in enumerate(foot_contacts(robot, body)):
-        J, nn = contact_jacobian(body, leg, foot), np.outer(foot.normal, foot.normal)
-        across = slopes.drag[leg] * (np.eye(3) - nn)
-        G_x -= J.T @ (slopes.stiffness[leg] * nn) @ J
-        G_v -= J.T @ (slopes.viscosity[leg] * nn + across) @ J
+        by_x, by_v = contact_matrices(
+            contact_jacobian(body, JOINTS * (leg + 1), foot),
+            foot.normal,
+            stiffness=slopes.stiffness[leg],
+            viscosity=slopes.viscosity[leg],
+            drag=slopes.drag[leg],
+        )
+        G_x += by_x
+        G_v += by_v
+        nn = np.outer(foot.normal, foot.normal)
         turn = slice(6 * JOINTS * (leg + 1) + 3, 6 * JOINTS * (leg + 1) + 6)
         G_v[turn, turn] -= slopes.spin[leg] * nn + slopes.roll[leg] * (np.eye(3) - nn)
     return G_x, G_v
@@ -152,7 +145,7 @@ def tangential_jacobians(robot: Robot, body: Array) -> list[Array]:
     found = []
     for leg, foot in enumerate(foot_contacts(robot, body)):
         nn = np.outer(foot.normal, foot.normal)
-        found.append((np.eye(3) - nn) @ contact_jacobian(body, leg, foot))
+        found.append((np.eye(3) - nn) @ contact_jacobian(body, JOINTS * (leg + 1), foot))
     return found
 
 

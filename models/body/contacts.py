@@ -6,14 +6,18 @@ also where the feet have bristles. The torso has eight, around the corners of a 
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, replace
 from itertools import product
 
 import numpy as np
 
-from hexapod_cosim.models.contact import FootContact, contact_damping, foot_force
-from hexapod_cosim.models.kinematics import JOINTS, LEGS, cross, rotation_matrix, skew
+from hexapod_cosim.models.contact import (
+    FootContact,
+    foot_force,
+    resting_damping,
+    sphere_contact,
+)
+from hexapod_cosim.models.kinematics import JOINTS, LEGS, cross, rotation_matrix
 from hexapod_cosim.models.records import Array, Robot
 from hexapod_cosim.models.terrain import ground
 
@@ -55,31 +59,25 @@ def body_spheres(robot: Robot) -> tuple[BodySphere, ...]:
     return tuple(spheres)
 
 
-def sphere_contact(robot: Robot, sphere: BodySphere, state: Array) -> FootContact:
+def body_contact(robot: Robot, sphere: BodySphere, state: Array) -> FootContact:
     """Returns the contact of a sphere with the nearest face of the ground.
 
     state: (13,) of the sphere's body.
     """
     centre = state[0:3] + rotation_matrix(state[3:7]) @ sphere.centre
-    distance, normal = ground(robot.terrain, centre)
-    point = centre - sphere.radius * normal
-    velocity = state[7:10] + cross(state[10:13], point - state[0:3])
-    depth = sphere.radius - distance
-    return FootContact(point, velocity, normal, depth, float(-velocity @ normal))
+    return sphere_contact(state, centre, sphere.radius, ground(robot.terrain, centre))
 
 
 def body_contacts(robot: Robot, body: Array) -> tuple[FootContact, ...]:
     """Returns the contacts of all spheres of `body_spheres`, at bodies (19, 13)."""
-    return tuple(sphere_contact(robot, sphere, body[sphere.body]) for sphere in body_spheres(robot))
+    return tuple(body_contact(robot, sphere, body[sphere.body]) for sphere in body_spheres(robot))
 
 
 def standing_body_damping(robot: Robot, body: Array) -> Array:
     """Returns the damping of all spheres [s/m] at impact speed 0; nan for those above the
     ground.
     """
-    slow = contact_damping(robot.contact, 0.0)
-    contacts = body_contacts(robot, body)
-    return np.array([slow if contact.penetration > 0.0 else math.nan for contact in contacts])
+    return resting_damping(robot.contact, body_contacts(robot, body))
 
 
 def sliding_robot(robot: Robot) -> Robot:
@@ -115,12 +113,3 @@ def body_wrenches(robot: Robot, body: Array, damping: Array) -> Array:
         arm = contact.point - body[sphere.body, 0:3]
         g[sphere.body] += np.concatenate([force, cross(arm, force)])
     return g
-
-
-def sphere_jacobian(body: Array, sphere: BodySphere, contact: FootContact) -> Array:
-    """Returns J (3, 114): the velocity of the contact point's material is J v."""
-    at = sphere.body
-    J = np.zeros((3, 6 * len(body)))
-    J[:, 6 * at : 6 * at + 3] = np.eye(3)
-    J[:, 6 * at + 3 : 6 * at + 6] = -skew(contact.point - body[at, 0:3])
-    return J

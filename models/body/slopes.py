@@ -12,9 +12,14 @@ from hexapod_cosim.models.body.contacts import (
     body_contacts,
     body_spheres,
     sliding_robot,
-    sphere_jacobian,
 )
-from hexapod_cosim.models.contact import normal_force, normal_slopes
+from hexapod_cosim.models.contact import (
+    contact_jacobian,
+    contact_matrices,
+    normal_force,
+    normal_slopes,
+    slip_velocity,
+)
 from hexapod_cosim.models.friction import friction_drag
 from hexapod_cosim.models.records import Array, Robot
 
@@ -38,8 +43,7 @@ def body_slopes(robot: Robot, body: Array, damping: Array, ahead: float) -> Body
     for contact, held in zip(body_contacts(robot, body), damping.tolist(), strict=True):
         rate = contact.approach_speed
         depth = contact.penetration + ahead * max(rate, 0.0)
-        slip = contact.velocity + rate * contact.normal
-        drag = friction_drag(friction, float(np.linalg.norm(slip)))
+        drag = friction_drag(friction, float(np.linalg.norm(slip_velocity(contact))))
         load = normal_force(robot.contact, held, depth, rate)
         rows.append([*normal_slopes(robot.contact, held, depth, rate), load * drag])
     return BodySlopes(*np.array(rows).reshape(-1, 3).T)
@@ -51,8 +55,13 @@ def body_slope_matrices(robot: Robot, body: Array, slopes: BodySlopes) -> tuple[
     G_x, G_v = np.zeros((size, size)), np.zeros((size, size))
     contacts = body_contacts(robot, body)
     for k, (sphere, contact) in enumerate(zip(body_spheres(robot), contacts, strict=True)):
-        J, nn = sphere_jacobian(body, sphere, contact), np.outer(contact.normal, contact.normal)
-        across = slopes.drag[k] * (np.eye(3) - nn)
-        G_x -= J.T @ (slopes.stiffness[k] * nn) @ J
-        G_v -= J.T @ (slopes.viscosity[k] * nn + across) @ J
+        by_x, by_v = contact_matrices(
+            contact_jacobian(body, sphere.body, contact),
+            contact.normal,
+            stiffness=slopes.stiffness[k],
+            viscosity=slopes.viscosity[k],
+            drag=slopes.drag[k],
+        )
+        G_x += by_x
+        G_v += by_v
     return G_x, G_v

@@ -12,6 +12,7 @@ A foot is a sphere of radius R = foot.radius, or on soil a flat round pad of foo
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 
@@ -99,34 +100,40 @@ def granular_sum(soil: Soil, foot: Foot, z: float) -> tuple[float, float, float]
 
 def virgin_force(soil: Soil, foot: Foot, z: float) -> float:
     """Returns F_v [N], the force of a first monotone loading to depth z [m] (eq. 40-43)."""
-    if z <= 0.0:
-        return 0.0
-    if soil.law == "bekker":
-        return bekker_modulus(soil, foot) * column_sum(foot, z, soil.exponent)
-    if soil.law == "granular":
-        return granular_sum(soil, foot, z)[0]
-    hardened = soil.hardening * column_sum(foot, z, 1.0)
-    return soil.yield_pressure * column_sum(foot, z, 0.0) + hardened
+    return _virgin(soil, foot, z, column_sum, 0) if z > 0.0 else 0.0
 
 
 def virgin_slope(soil: Soil, foot: Foot, z: float) -> float:
     """Returns dF_v/dz [N/m] at z > 0."""
-    if soil.law == "bekker":
-        return bekker_modulus(soil, foot) * column_slope(foot, z, soil.exponent)
-    if soil.law == "granular":
-        return granular_sum(soil, foot, z)[1]
-    hardened = soil.hardening * column_slope(foot, z, 1.0)
-    return soil.yield_pressure * column_slope(foot, z, 0.0) + hardened
+    return _virgin(soil, foot, z, column_slope, 1)
 
 
 def virgin_work(soil: Soil, foot: Foot, z: float) -> float:
     """Returns the work [J] of F_v from 0 to z [m]."""
+    return _virgin(soil, foot, z, column_work, 2)
+
+
+def _virgin(
+    soil: Soil,
+    foot: Foot,
+    z: float,
+    column: Callable[[Foot, float, float], float],
+    granular: int,
+) -> float:
+    """Returns force, slope or work of the virgin curve at z > 0.
+
+    Args:
+        soil: the soil.
+        foot: the foot.
+        z: depth [m].
+        column: `column_sum`, `column_slope` or `column_work`.
+        granular: index of the same quantity in `granular_sum`.
+    """
     if soil.law == "bekker":
-        return bekker_modulus(soil, foot) * column_work(foot, z, soil.exponent)
+        return bekker_modulus(soil, foot) * column(foot, z, soil.exponent)
     if soil.law == "granular":
-        return granular_sum(soil, foot, z)[2]
-    hardened = soil.hardening * column_work(foot, z, 1.0)
-    return soil.yield_pressure * column_work(foot, z, 0.0) + hardened
+        return granular_sum(soil, foot, z)[granular]
+    return soil.yield_pressure * column(foot, z, 0.0) + soil.hardening * column(foot, z, 1.0)
 
 
 def sinkage(soil: Soil, foot: Foot, load: float) -> float:

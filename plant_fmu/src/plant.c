@@ -102,18 +102,22 @@ hxStatus hx_plant_reset(hxPlant *plant, const hxDefinition *definition, double t
   hxStatus status = hx_definition_check(definition, message);
   if (status == HX_OK) status = check_terrain(plant, definition, message);
   if (status != HX_OK) return fail(plant, status, message);
-  hxPlant fresh = *plant;
-  memset(&fresh.model, 0, sizeof fresh.model);
-  memset(&fresh.state, 0, sizeof fresh.state);
-  hx_footprints_clear(&fresh.footprints);
-  hx_model_compile(&fresh.model, definition, plant->terrain);
+  const hxModel model_before = plant->model;
+  const hxState state_before = plant->state;
+  memset(&plant->model, 0, sizeof plant->model);
+  memset(&plant->state, 0, sizeof plant->state);
+  hx_model_compile(&plant->model, definition, plant->terrain);
   hx_initial_bodies(definition, body);
-  hx_motion_from_bodies(&fresh.model, (const double (*)[HX_BODY_STATE])body, &fresh.state.motion);
-  hx_kernel()->start(&fresh.model, t, &fresh.state);
-  status = check_start_depth(&fresh, message); /* the cells of feet on blocks are known now */
-  if (status != HX_OK) return fail(plant, status, message);
-  fresh.message[0] = '\0';
-  *plant = fresh;
+  hx_motion_from_bodies(&plant->model, (const double (*)[HX_BODY_STATE])body, &plant->state.motion);
+  hx_kernel()->start(&plant->model, t, &plant->state);
+  status = check_start_depth(plant, message); /* the cells of feet on blocks are known now */
+  if (status != HX_OK) {
+    plant->model = model_before;
+    plant->state = state_before;
+    return fail(plant, status, message);
+  }
+  hx_footprints_clear(&plant->footprints);
+  plant->message[0] = '\0';
   return HX_OK;
 }
 

@@ -213,6 +213,14 @@ def test_the_fmi_layer_includes_no_core(component: str) -> None:
         assert not inside, f"{path.relative_to(ROOT)} includes {sorted(inside)}"
 
 
+def test_the_ground_knows_nothing_of_legs_in_lanes() -> None:
+    files = c_files("src/ground")
+    assert files
+    for path in files:
+        upward = [name for name in INCLUDE.findall(path.read_text("utf-8")) if "lanes/" in name]
+        assert upward == [], f"{path.relative_to(ROOT)} includes {upward}"
+
+
 def test_the_masters_loop_sees_the_standard_and_nothing_of_the_fmus_it_drives() -> None:
     files = c_files("src", "include/hexapod", component="master")
     assert files

@@ -3,10 +3,10 @@
 #ifndef HX_FOOT_H
 #define HX_FOOT_H
 
-#include "../ground/soil_pack.h"
 #include "../ground/surface.h"
 #include "friction.h"
 #include "kinematics.h"
+#include "soil_pack.h"
 
 /* Distance of a point from the ground, and the ground's normal. */
 typedef struct {

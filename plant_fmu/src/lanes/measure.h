@@ -12,8 +12,8 @@
 #define HX_MEASURE_H
 
 #include "../contact_law.h"
-#include "../ground/soil_path.h"
 #include "dynamics.h"
+#include "soil_path.h"
 
 static const double landing_sample = 1e-4; /* s  between two samples of a landing's force */
 static const double nearly_sliding = 0.9;  /* 1  of the friction cone */

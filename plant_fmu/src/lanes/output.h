@@ -2,7 +2,7 @@
 #ifndef HX_OUTPUT_H
 #define HX_OUTPUT_H
 
-#include "../ground/clearance.h"
+#include "clearance.h"
 #include "dynamics.h"
 #ifndef HX_TANGENT
 #include "measure.h"

@@ -5,8 +5,8 @@
 #ifndef HX_SOIL_PACK_H
 #define HX_SOIL_PACK_H
 
-#include "../lanes/lanes.h"
-#include "soil.h"
+#include "../ground/soil.h"
+#include "lanes.h"
 
 _Static_assert(sizeof(hxSoil) == HX_SOIL_SIZE * sizeof(double), "a soil consists of numbers");
 

@@ -3,7 +3,7 @@
 #ifndef HX_CLEARANCE_H
 #define HX_CLEARANCE_H
 
-#include "../lanes/work.h"
+#include "work.h"
 
 enum { HX_CHAIN = 3 }; /* points of a leg: the joints of femur and tibia, the foot's centre */
 

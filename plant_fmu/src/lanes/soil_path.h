@@ -3,7 +3,7 @@
 #ifndef HX_SOIL_PATH_H
 #define HX_SOIL_PATH_H
 
-#include "../lanes/foot.h"
+#include "foot.h"
 
 static const double least_footprint = 1e-6; /* m  shallower ones are not kept */
 
