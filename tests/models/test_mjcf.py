@@ -29,7 +29,11 @@ def changed(**friction: Any) -> Robot:
 def with_stops() -> Robot:
     """Returns the athena with joint stops and without gears' friction."""
     robot = load_robot("athena")
-    stops: dict[str, Any] = {"stop_stiffness": STIFFNESS, "stop_damping": DAMPING, "coulomb_friction": 0.0}
+    stops: dict[str, Any] = {
+        "stop_stiffness": STIFFNESS,
+        "stop_damping": DAMPING,
+        "coulomb_friction": 0.0,
+    }
     return replace(robot, servo=replace(robot.servo, **stops))
 
 

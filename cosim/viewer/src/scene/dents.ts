@@ -1,7 +1,7 @@
 import {
   BufferAttribute,
   BufferGeometry,
-  type Color,
+  Color,
   InstancedMesh,
   Matrix4,
   MeshLambertMaterial,
@@ -9,15 +9,16 @@ import {
   Vector3,
 } from "three";
 import type { Recording } from "../recording";
-import type { PackedStance } from "../types";
+import type { PackedFootprint } from "../types";
 import type { Relief } from "./relief";
-import type { Surface } from "./surface";
 
 const LEAST = 0.001; // m    of depth; a smaller dent is not drawn
 const LIFT = 0.0012; // m    of a dent's middle above the ground, which would hide it
 const RIM = 0.16; // height of the rim over the dent's radius
 const RINGS = [0, 0.25, 0.5, 0.7, 0.82, 0.92, 1, 1.15, 1.35]; // radii over that of the dent
 const SECTORS = 28;
+const DEEP = 0.03; // m    of depth, from which on a dent has its darkest shade
+const DARK = 0.45; // by which the darkest shade is below the lightest
 const STEEP = 1.6; // slope of the shaded bowl at its edge
 
 /** A dent: when it is made, where, how deep and how wide [s, m]. */
@@ -29,26 +30,17 @@ export interface Dent {
   readonly radius: number;
 }
 
-/** Returns the dents that feet leave in soft ground, in order of time. */
-export function findDents(
-  stances: readonly PackedStance[],
-  surface: Surface,
-  radius: number,
-): Dent[] {
-  return stances
-    .filter(([, , x, y, depth]) => depth > LEAST && surface.lookAt(x, y) === "soil")
-    .map(([, time, x, y, depth]) => ({ time, x, y, depth, radius: mouth(radius, depth) }))
+/** Returns the dents of footprints, in order of time. */
+export function findDents(footprints: readonly PackedFootprint[]): Dent[] {
+  return footprints
+    .filter(([, , , depth]) => depth > LEAST)
+    .map(([time, x, y, depth, radius]) => ({ time, x, y, depth, radius }))
     .sort((a, b) => a.time - b.time);
 }
 
-/** Returns the radius of the circle in which a sphere cuts the ground. */
-function mouth(radius: number, depth: number): number {
-  return depth < radius ? Math.sqrt(depth * (2 * radius - depth)) : radius;
-}
-
 /**
- * Dents at the places where feet stood, each from its touch-down on. A dent is a disc on the ground
- * that is shaded as a bowl with a rim: a true bowl would lie under the drawn surface.
+ * Dents of footprints, each from its touch-down on. A dent is a disc on the ground that is shaded as
+ * a bowl with a rim, a deeper one darker: a true bowl would lie under the drawn surface.
  */
 export class Dents extends InstancedMesh<BufferGeometry, MeshLambertMaterial> {
   private readonly times: readonly number[];
@@ -71,6 +63,8 @@ export class Dents extends InstancedMesh<BufferGeometry, MeshLambertMaterial> {
           new Vector3(dent.radius, dent.radius, dent.radius),
         ),
       );
+      const shade = 1 - DARK * Math.min(dent.depth / DEEP, 1);
+      this.setColorAt(k, new Color(shade, shade, shade));
     });
     this.frustumCulled = false;
     this.receiveShadow = true;
