@@ -7,6 +7,7 @@ A height is reproduced within range/131070: 4 um for a surface whose heights dif
 from __future__ import annotations
 
 import base64
+import math
 import zlib
 from collections.abc import Iterable, Mapping
 from typing import Any
@@ -54,9 +55,19 @@ def pack_surface(surface: Surface, parameters: Mapping[str, float]) -> dict[str,
 
 
 def pack_footprints(footprints: Iterable[Footprint]) -> list[list[float]]:
-    """Returns begin [s], x, y, depth and radius [m] of footprints for the viewer."""
+    """Returns begin, end [s], x, y, depth and radius [m] of footprints for the viewer.
+
+    The end of those that stay is 0.
+    """
     return [
-        [round(one.begin, 6), round(one.x, 5), round(one.y, 5), round(one.depth, 6), one.radius]
+        [
+            round(one.begin, 6),
+            round(one.end, 6) if math.isfinite(one.end) else 0.0,
+            round(one.x, 5),
+            round(one.y, 5),
+            round(one.depth, 6),
+            one.radius,
+        ]
         for one in footprints
     ]
 

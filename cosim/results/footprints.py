@@ -3,10 +3,14 @@
 The plant keeps a footprint where a foot lost contact with it last, with its plastic depth and the
 radius of the foot. Its outputs tell the depth under each foot, which stays until the foot has left
 the footprint, so a recording tells place and time to a row and the depth exactly.
+
+A foot that is not lifted above the surface takes its footprint along: the plant has the later place
+alone, so the one at the earlier place ends when the foot stands on the soil again.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -25,7 +29,8 @@ class Footprint:
     """A footprint in soil, or one that a foot stands in at the end of the run."""
 
     leg: int
-    begin: float  # s    first row with this footprint
+    begin: float  # s    first row in contact
+    end: float  # s    from when on the foot has it at another place; inf: it stays
     x: float  # m    of the foot's last contact in it, world
     y: float
     depth: float  # m    plastic, under the undisturbed surface
@@ -39,14 +44,17 @@ def find_footprints(recording: Recording, parameters: Mapping[str, float]) -> li
     radius = parameters.get("foot.pad_radius", 0.0) or parameters["foot.radius"]
     found = []
     for leg in range(depth.shape[1]):
-        for begin, end in _spans(depth[:, leg] >= LEAST):
-            rows = begin + np.flatnonzero(touching[begin:end, leg])
-            if not len(rows):  # a foot above an older footprint
-                continue
-            x, y = place[rows[-1], leg, :2].tolist()
-            deepest = float(depth[begin:end, leg].max())
-            time = float(recording.time[rows[0]])
-            found.append(Footprint(leg, time, x, y, deepest, radius))
+        for first, last in _spans(depth[:, leg] >= LEAST):
+            # none: the foot is above an older footprint
+            contacts = [
+                (first + begin, first + end) for begin, end in _spans(touching[first:last, leg])
+            ]
+            begins = [float(recording.time[begin]) for begin, _ in contacts]
+            for k, (begin, end) in enumerate(contacts):
+                x, y = place[end - 1, leg, :2].tolist()
+                deepest = float(depth[begin:end, leg].max())
+                until = begins[k + 1] if k + 1 < len(begins) else math.inf
+                found.append(Footprint(leg, begins[k], until, x, y, deepest, radius))
     return sorted(found, key=lambda one: one.begin)
 
 

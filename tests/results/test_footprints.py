@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes as ct
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -52,7 +53,11 @@ def test_footprints_of_a_recording_are_those_of_the_plant(core: ct.CDLL) -> None
     pose = standing(robot)
     plant = Plant(core, robot, position=pose.position, angle=pose.angle)
     recording = stepped(plant, 2.6)
-    found = find_footprints(recording, {"foot.radius": 0.015, "foot.pad_radius": 0.025})
+    found = [
+        one
+        for one in find_footprints(recording, {"foot.radius": 0.015, "foot.pad_radius": 0.025})
+        if one.end == math.inf
+    ]
     true = kept(plant)
     assert 12 <= len(true) <= len(found) <= len(true) + 6  # feet stand in the latest ones
     for x, y, depth, radius in true:
@@ -67,3 +72,14 @@ def test_a_foot_above_an_older_footprint_makes_none() -> None:
     values["LF.foot.sinkage"][1:3] = 0.01
     recording = Recording(("time", *COLUMNS), np.column_stack([np.arange(4.0), *values.values()]))
     assert find_footprints(recording, {"foot.radius": 0.015}) == []
+
+
+def test_a_foot_that_stays_below_the_surface_takes_its_footprint_along() -> None:
+    values = {name: np.zeros(6) for name in COLUMNS}
+    values["LF.foot.sinkage"][:] = 0.01, 0.01, 0.01, 0.012, 0.012, 0.0
+    values["LF.foot.contact"][:] = 1.0, 1.0, 0.0, 1.0, 0.0, 0.0
+    values["LF.foot.position[1]"][:] = 0.1, 0.11, 0.2, 0.3, 0.4, 0.5
+    recording = Recording(("time", *COLUMNS), np.column_stack([np.arange(6.0), *values.values()]))
+    first, second = find_footprints(recording, {"foot.radius": 0.015})
+    assert (first.begin, first.end, first.x, first.depth) == (0.0, 3.0, 0.11, 0.01)
+    assert (second.begin, second.end, second.x, second.depth) == (3.0, math.inf, 0.3, 0.012)
