@@ -31,6 +31,7 @@ RESULT_FILES = (
     "report.html",
     "plots",
     "kinematic",
+    "paper",
     "compliant",
 )
 

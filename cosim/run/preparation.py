@@ -41,6 +41,11 @@ def chosen_gains(scenario: Scenario, given: Gains | None = None) -> Gains | None
     return designed_gains(*design_key(scenario)) if given is None else given
 
 
+def law_of(control: str) -> str:
+    """Returns the law of a controller with gains; kinematic control, without gains, uses none."""
+    return "paper" if control == "paper" else "compliant"
+
+
 def design_key(scenario: Scenario) -> tuple[Robot, float]:
     """Returns the robot and the period [s] that gains are designed for.
 

@@ -38,7 +38,7 @@ from hexapod_cosim.cosim.results.warnings import (
     unused_settings,
     walk_warnings,
 )
-from hexapod_cosim.cosim.run.preparation import PlantFmus, chosen_gains, known_robot
+from hexapod_cosim.cosim.run.preparation import PlantFmus, chosen_gains, known_robot, law_of
 from hexapod_cosim.cosim.scenario.reach import check_commands
 from hexapod_cosim.cosim.scenario.records import Scenario
 from hexapod_cosim.cosim.scenario.scenario import scenario_robot
@@ -84,9 +84,7 @@ def simulate(
     """
     plan = make_plan(scenario, gains=gains)
     setup = plan.controller
-    controller = Controller(
-        setup.robot, period=setup.period, gait=setup.gait, gains=setup.gains, parts=setup.parts
-    )
+    controller = setup.build()
     with open_plant(scenario, fmu) as plant:
         parameters = initialise_plant(plant, plan)
         signals = Signals(plant, sensor=make_sensor(scenario, plan.schedule))
@@ -149,6 +147,7 @@ def make_plan(scenario: Scenario, *, gains: Gains | None = None) -> RunPlan:
         period=scenario.macro_step,
         gains=chosen_gains(scenario, gains),
         parts=scenario.compliance,
+        law=law_of(scenario.control),
     )
     drawn = None if scenario.variation is None else draw(scenario.variation, seed=scenario.seed)
     timed = scenario
