@@ -10,6 +10,7 @@ from pathlib import Path
 
 from hexapod_cosim.controller import Gains
 from hexapod_cosim.cosim.export.export import export_fmu
+from hexapod_cosim.cosim.scenario.controls import control_of
 from hexapod_cosim.cosim.scenario.records import Scenario
 from hexapod_cosim.cosim.scenario.scenario import scenario_robot
 from hexapod_cosim.models import Robot, Servo, load_robot
@@ -31,12 +32,13 @@ def designed_gains(robot: Robot, period: float) -> Gains:
 
 
 def chosen_gains(scenario: Scenario, given: Gains | None = None) -> Gains | None:
-    """Returns the gains that a scenario runs with, None under kinematic control.
+    """Returns the gains that a scenario runs with, None unless its control needs gains.
 
     They are the given ones, or else designed for its robot and macro-step. Raises GainsError when
     no gains can be designed, HexapodError for a robot that cannot be read.
     """
-    if scenario.control == "kinematic":
+    control = control_of(scenario.control)
+    if not control.is_builtin or control.name == "kinematic":
         return None
     return designed_gains(*design_key(scenario)) if given is None else given
 
