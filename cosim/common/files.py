@@ -32,6 +32,8 @@ RESULT_FILES = (
     "plots",
     "kinematic",
     "compliant",
+    "benchmark.json",
+    "runs.csv",
 )
 
 
