@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from hexapod_cosim.controller import Gains
 from hexapod_cosim.cosim.course.reading import run_scenario
 from hexapod_cosim.cosim.course.records import QUANTITIES, Case, Course
+from hexapod_cosim.cosim.results.balance import UNBALANCED
 from hexapod_cosim.cosim.results.summary import Summary
 from hexapod_cosim.cosim.run.batch import run_batch
 from hexapod_cosim.cosim.scenario.records import Scenario
@@ -79,6 +80,8 @@ def failure_of(summary: Summary, *, arrive: float) -> str:
     if not summary.walked:
         return summary.reason or "; ".join(summary.warnings[:1]) or "the robot fell"
     metrics = summary.metrics
+    if metrics["energy_residual"] > UNBALANCED:
+        return f"not valid: the energy balance misses over {100.0 * UNBALANCED:g} % of the work"
     missed, unit = metrics["path_error"], "m per metre walked"
     if math.isnan(missed):
         missed, unit = metrics["yaw_drift_per_radian"], "rad per radian turned"
