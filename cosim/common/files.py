@@ -30,6 +30,8 @@ RESULT_FILES = (
     "ground.terrain",
     "report.html",
     "plots",
+    "benchmark.json",
+    "runs.csv",
 )
 RESERVED_NAMES = frozenset((*RESULT_FILES, RUN_FILE))  # no folder of a control has such a name
 PARTS = "controls"  # key of run.json: labels of a comparison, whose runs have folders of their own
