@@ -304,6 +304,8 @@ static const hxControllerDefinition default_definition = {
     .parts.path = 1,
     .parts.limits = 1,
     .parts.fallback = 1,
+    .parts.squeeze = 0.0,
+    .friction = 0.7,
 };
 
 void hx_controller_definition_default(hxControllerDefinition *definition) {
@@ -667,6 +669,8 @@ static const hxRange definition_ranges[] = {
     {"parts.path", "", -DBL_MAX, DBL_MAX, offsetof(hxControllerDefinition, parts.path), 1},
     {"parts.limits", "", -DBL_MAX, DBL_MAX, offsetof(hxControllerDefinition, parts.limits), 1},
     {"parts.fallback", "", -DBL_MAX, DBL_MAX, offsetof(hxControllerDefinition, parts.fallback), 1},
+    {"parts.squeeze", "", 0.0, 0.99, offsetof(hxControllerDefinition, parts.squeeze), 0},
+    {"friction.mu", "", 0.0, 100.0, offsetof(hxControllerDefinition, friction), 0},
 };
 
 size_t hx_controller_definition_ranges(const hxRange **range) {
