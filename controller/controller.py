@@ -336,7 +336,7 @@ class Controller(Stateful):
         feet = now.feet.plane + now.shift
         plan = compliant.laws.plan(
             demand,
-            compliant.support.shares(feet, now.activation, demand),
+            compliant.shares(feet, now.activation, demand),
             feet=feet,
             height=now.feet.height - self.paths.home_height,
             rise=now.feet.rise,

@@ -20,15 +20,16 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from hexapod_cosim.controller.comply.compliance import Compliance, Plan
+from hexapod_cosim.controller.comply.planned_squeeze import PlannedSqueeze
 from hexapod_cosim.controller.comply.posture import Posture
-from hexapod_cosim.controller.comply.support import Support
+from hexapod_cosim.controller.comply.support import Shares, Support
 from hexapod_cosim.controller.gains import Gains
 from hexapod_cosim.controller.memory import Stateful
 from hexapod_cosim.controller.parts import Parts
 from hexapod_cosim.controller.plane import LEGS, Array, Plane, cis, clamp
 from hexapod_cosim.controller.walk.gait import Gait
 from hexapod_cosim.controller.walk.hold import Hold, Sight
-from hexapod_cosim.controller.walk.inverse_dynamics import InverseDynamics
+from hexapod_cosim.controller.walk.inverse_dynamics import Demand, InverseDynamics
 from hexapod_cosim.controller.walk.kinematics import LegSolver
 from hexapod_cosim.controller.walk.trajectory import Twist
 from hexapod_cosim.models import Robot
@@ -104,6 +105,9 @@ class Compliant(Stateful):
         self.legs, self.per_second, self.leading = legs, 1.0 / period, STEERING_TIME / period
         self.dynamics = InverseDynamics(robot, legs, period=period)
         self.support = Support(robot, gait, gains.support, rest=self.dynamics.rest())
+        self.squeeze = PlannedSqueeze(
+            friction=robot.friction.mu, weight=robot.weight, depth=-self.dynamics.floor
+        )
         self.laws = Compliance(
             gains,
             parts,
@@ -123,6 +127,11 @@ class Compliant(Stateful):
         self.hold.reset()
         self.steering, self.count = NO_STEERING, 0
         self.offset, self.moving = np.zeros(LEGS), False
+
+    def shares(self, feet: Plane, activation: Array, demand: Demand) -> Shares:
+        """Returns the planned forces of feet (6,) x + i y, walking frame [m] (C19, C20, C42)."""
+        shares = self.support.shares(feet, activation, demand)
+        return self.squeeze.add(feet, demand, shares, self.laws.parts.squeeze)
 
     # ------------------------------------------------------------------------------- steering
 

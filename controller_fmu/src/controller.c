@@ -230,6 +230,8 @@ static void ask(const hxControllerModel *model, hxControllerState *state, hxStan
     hx_leg_solver_speeds(&model->leg[k], &now->pose[k], hx_plane(0.0, 0.0), 1.0, stance->climb[k]);
   }
   hx_support_shares(feet, &demand, &plan->shares);
+  hx_planned_squeeze_add(&model->laws.squeeze, feet, &demand, model->laws.laws.parts.squeeze,
+                         &plan->shares);
   hx_compliance_plan(&model->laws.laws, &demand, height, now->feet.rise, plan);
   stance->value = now->value;
   stance->posture = &now->posture;

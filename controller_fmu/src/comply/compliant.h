@@ -7,6 +7,7 @@
 #include "../walk/trajectory.h"
 #include "compliance.h"
 #include "hexapod/inside.h"
+#include "planned_squeeze.h"
 
 HX_HIDDEN_BEGIN
 
@@ -15,6 +16,7 @@ typedef struct hxCompliantModel {
   double leading; /* steps of the transition of the added velocity */
   hxInverseDynamics dynamics;
   hxSupport support;
+  hxPlannedSqueeze squeeze;
   hxComplianceModel laws;
   hxHoldModel hold;
 } hxCompliantModel;
