@@ -4,6 +4,7 @@
 #include <stdio.h>
 
 #include "hexapod/range_check.h"
+#include "plane.h"
 
 static void legs(hxChecker *c, const hxControllerDefinition *d) {
   char name[32];
@@ -16,7 +17,7 @@ static void legs(hxChecker *c, const hxControllerDefinition *d) {
                       "an angle between the joint's angle_min and angle_max");
       /* femur and tibia are the arms of a planar linkage */
       hx_joint_label(leg, joint, "length", name);
-      if (joint > 0 && !(hypot(link->length, link->offset_z) > 1e-6))
+      if (joint > 0 && !(hx_length(hx_plane(link->length, link->offset_z)) > 1e-6))
         hx_check_fail(c, name, link->length,
                       "a tip away from the joint: length and offset_z not both zero");
     }
