@@ -1,8 +1,8 @@
 #include "validation.h"
 
 #include <math.h>
-#include <stdio.h>
 
+#include "hexapod/message.h"
 #include "hexapod/range_check.h"
 #include "plane.h"
 
@@ -29,7 +29,7 @@ static void relations(hxChecker *c, const hxControllerDefinition *d) {
   char expected[96];
   const double stance = d->gait.duty * d->gait.period,
                swing = (1.0 - d->gait.duty) * d->gait.period, shorter = fmin(stance, swing);
-  snprintf(expected, sizeof expected, "less than %.9g s, the gait's shorter phase", shorter);
+  hx_print(expected, sizeof expected, "less than %.9g s, the gait's shorter phase", shorter);
   if (!(d->period < shorter)) hx_check_fail(c, "period", d->period, expected);
   if (d->control == HX_CONTROL_COMPLIANT && !(d->servo.kp > 0.0))
     hx_check_fail(c, "servo.kp", d->servo.kp,
