@@ -518,7 +518,7 @@ const char *const hx_log_category_names[] = {
 const hxStateRow *const hx_states = 0;
 const size_t hx_state_count = 0;
 
-const char hx_default_guid[] = "{d5f76c4c-7f41-4ceb-a1d3-cccf8d854cbf}";
+const char hx_default_guid[] = "{719c50b2-6d49-4774-959c-6c500768c3ec}";
 
 _Static_assert(HX_CONTROL_KINEMATIC == 1, "Control");
 _Static_assert(HX_CONTROL_COMPLIANT == 2, "Control");
