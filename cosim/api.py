@@ -1,16 +1,15 @@
 """The public call: runs a scenario under any controller and writes its report.
 
-    import hexapod_cosim
+import hexapod_cosim
 
-    result = hexapod_cosim.simulate("walk_flat", controller="compliant")
-    print(result.metrics["slip_per_metre"])
-    hexapod_cosim.report(result, "out/walk")
+result = hexapod_cosim.simulate("walk_flat", controller="compliant")
+print(result.metrics["slip_per_metre"])
+hexapod_cosim.report(result, "out/walk")
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import Any

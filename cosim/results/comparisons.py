@@ -131,7 +131,11 @@ def compare_all(runs: Mapping[str, Sequence[Summary]]) -> Comparisons:
 
 
 def write_comparison(
-    folder: Path, scenario: Scenario, comparison: Comparisons, *, labels: Sequence[str],
+    folder: Path,
+    scenario: Scenario,
+    comparison: Comparisons,
+    *,
+    labels: Sequence[str],
     command: str = "",
 ) -> list[Path]:
     """Writes scenario.toml, metrics.json and run.json of a comparison; returns the files.

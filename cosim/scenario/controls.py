@@ -62,7 +62,9 @@ def parse_control(text: str, *, where: str, base: Path | None = None) -> Control
         ScenarioError: the text has none of these forms, or the label cannot name a folder.
     """
     match = LABELLED.fullmatch(text.strip())
-    label, plain = (None, text.strip()) if match is None else (match["label"].strip(), match["text"])
+    label, plain = (
+        (None, text.strip()) if match is None else (match["label"].strip(), match["text"])
+    )
     kind, name, path = _named(plain.strip(), where=where, base=base)
     target = plain.strip() if path is None else f"{path}:{name}" if kind == PYTHON else str(path)
     full = target if label is None else f"{label}={target}"
