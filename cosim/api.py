@@ -36,12 +36,12 @@ from hexapod_cosim.cosim.scenario.controls import (
     control_of,
     distinct_controls,
     parse_control,
+    table_with_control,
 )
 from hexapod_cosim.cosim.scenario.records import Scenario
 from hexapod_cosim.cosim.scenario.scenario import (
     read_tables,
     scenario_from_table,
-    with_control,
     with_values,
 )
 
@@ -103,7 +103,7 @@ def _scenario(
     else:
         table, where = read_tables(scenario)
     if text is not None:
-        table = with_control(table, parse_control(text, where="controller"))
+        table = table_with_control(table, parse_control(text, where="controller").text)
     return scenario_from_table(with_values(table, settings), where=where, given=list(settings))
 
 

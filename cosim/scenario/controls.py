@@ -170,6 +170,12 @@ def read_control(value: Any, where: str) -> tuple[Control, dict[str, Any]]:
     return parse_control(text, where=where), parameters
 
 
+def table_with_control(table: Mapping[str, Any], text: str) -> dict[str, Any]:
+    """Returns a scenario's tables with another control; the parameters of [control] stay."""
+    value = table.get("control")
+    return {**table, "control": {**value, LAW: text} if isinstance(value, Mapping) else text}
+
+
 def control_beside(value: Any, folder: Path) -> Any:
     """Returns the value of `control` with a relative path made absolute if a file lies there."""
     if isinstance(value, Mapping):

@@ -23,7 +23,7 @@ import numpy as np
 
 from hexapod_cosim.controller import Parts
 from hexapod_cosim.cosim.scenario.checks import check_interval, check_parameters, check_steps
-from hexapod_cosim.cosim.scenario.controls import LAW, Control, control_beside, read_control
+from hexapod_cosim.cosim.scenario.controls import LAW, control_beside, read_control
 from hexapod_cosim.cosim.scenario.quantities import to_si
 from hexapod_cosim.cosim.scenario.records import (
     CONTROLS,
@@ -150,11 +150,6 @@ def with_values(table: Mapping[str, Any], values: Mapping[str, Any]) -> dict[str
     for name, value in values.items():
         _set(changed, name, value)
     return changed
-
-
-def with_control(table: Mapping[str, Any], control: Control) -> dict[str, Any]:
-    """Returns a copy of the tables with another control; the parameters of [control] stay."""
-    return with_values(table, {"control": control.text})
 
 
 def parse_value(value: str) -> Any:
