@@ -8,6 +8,7 @@ import typer
 
 from hexapod_cosim.cosim.cli import (
     compare_command,
+    controller_command,
     export_command,
     fmu_commands,
     listing,
@@ -31,6 +32,7 @@ app.command("compare", epilog=compare_command.EPILOG)(compare_command.compare)
 app.command("study", epilog=study_command.EPILOG)(study_command.study)
 app.command("design")(fmu_commands.design)
 app.command("report")(run_commands.report)
+app.add_typer(controller_command.app, name="controller")
 app.command("validate")(fmu_commands.validate)
 app.command("terrain")(terrain_command.terrain)
 app.command("list")(listing.list_what)

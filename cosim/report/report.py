@@ -30,7 +30,14 @@ from hexapod_cosim.cosim.results.comparison import BETTER, METHOD, SAME, WORSE, 
 from hexapod_cosim.cosim.results.comparisons import Comparisons
 from hexapod_cosim.cosim.results.drop import drop_text
 from hexapod_cosim.cosim.results.ground import describe_terrain
-from hexapod_cosim.cosim.results.metrics import DUST, FLOORS, METRICS, has_net_slip, shown_metrics
+from hexapod_cosim.cosim.results.metrics import (
+    DUST,
+    FLOORS,
+    METRICS,
+    has_net_slip,
+    plans_feet,
+    shown_metrics,
+)
 from hexapod_cosim.cosim.results.results import StoredResult
 from hexapod_cosim.models import JOINT_NAMES
 
@@ -122,6 +129,8 @@ def write_report(
     files, skipped = save_figures({label: run.view for label, run in runs.items()}, folder / PLOTS)
     if all(run.view.surface is None for run in runs.values()):
         skipped[PROFILE] = ""  # a plane has none, which is no loss
+    if not any(plans_feet(run.view.recording) for run in runs.values()):
+        skipped["feet"] = ""  # a controller need not tell its plan
     missing = [
         f"{FIGURES[name].title} is not drawn: {reason}"
         for name, reason in skipped.items()
