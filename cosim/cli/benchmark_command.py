@@ -21,15 +21,16 @@ from hexapod_cosim.cosim.cli.terminal import (
     show_json,
     show_table,
     show_text,
+    waiting,
     warn,
 )
-from hexapod_cosim.cosim.common.files import RUN_FILE, write_json
+from hexapod_cosim.cosim.common.files import BENCHMARK, RUN_FILE, write_json
 from hexapod_cosim.cosim.course import texts
 from hexapod_cosim.cosim.course.goals import verdicts
 from hexapod_cosim.cosim.course.reading import load_course
 from hexapod_cosim.cosim.course.records import JUDGE, SPLITS, Course, CourseError
 from hexapod_cosim.cosim.course.runs import Run, run_count, run_course
-from hexapod_cosim.cosim.course.store import write_result
+from hexapod_cosim.cosim.course.store import read_table, write_result
 from hexapod_cosim.cosim.course.table import Table
 from hexapod_cosim.cosim.master.interrupts import deferred_interrupts
 from hexapod_cosim.cosim.master.loop import COMPLETED
@@ -41,7 +42,6 @@ EPILOG = (
     "A robot that falls or gets stuck is a result: it counts as a failure and is in no mean. "
     "Ctrl-C writes the table of the runs that are done."
 )
-KIND = "benchmark"
 MAX_SEEDS = 1000
 Controls = Annotated[
     list[str] | None,
@@ -88,7 +88,7 @@ def benchmark(
     course = load_course(split, names=cases or (), seeds=seeds, quick=quick)
     options = {"control": controls, "case": cases, "seeds": seeds, "gains": gains}
     command = _command_line(options, split=split, quick=quick)
-    with results_folder(output or Path("out") / KIND) as folder:
+    with results_folder(output or Path("out") / BENCHMARK) as folder:
         table, content, files = _run_into(
             folder, course, chosen, given_gains(gains), workers, command
         )
@@ -97,6 +97,7 @@ def benchmark(
     else:
         _show(table)
         show_files(files)
+        show_text(f"report: {files[-1]}")
     return SUCCESS
 
 
@@ -116,17 +117,39 @@ def _run_into(
     except KeyboardInterrupt:
         with deferred_interrupts():
             table = Table(course, tuple(controls), tuple(done))
-            write_result(table, folder.path, command=command, complete=False)
+            _write(table, folder.path, command, complete=False)
             _show(table)
             total = run_count(course, controls)
             warn(f"stopped after {len(done)} of {total} runs; their table is in {folder.path}")
         raise
     table = Table(course, tuple(controls), tuple(done))
-    content, files = write_result(table, folder.path, command=command, complete=True)
+    content, files = _write(table, folder.path, command, complete=True)
     title = f"Course {course.version}, {course.split}: {', '.join(controls)}"
-    facts = {"kind": KIND, "status": COMPLETED, "title": title, "command": command}
+    facts = {"kind": BENCHMARK, "status": COMPLETED, "title": title, "command": command}
     write_json(folder.path / RUN_FILE, facts)
-    return table, content, [*files, folder.path / RUN_FILE]
+    return table, content, [folder.path / RUN_FILE, *files]
+
+
+def _write(
+    table: Table, folder: Path, command: str, *, complete: bool
+) -> tuple[dict[str, Any], list[Path]]:
+    """Writes result, picture and report; returns the content of benchmark.json and the files."""
+    # imported only here because matplotlib is slow to import
+    from hexapod_cosim.cosim.course.report import write_course_report  # noqa: PLC0415
+
+    content, files = write_result(table, folder, command=command, complete=complete)
+    with waiting("drawing the picture and the report"):
+        return content, [*files, *write_course_report(table, content, folder)]
+
+
+def report_on(folder: Path) -> list[Path]:
+    """Writes picture and report of a benchmark's folder again; returns the files.
+
+    Raises HexapodError.
+    """
+    from hexapod_cosim.cosim.course.report import write_course_report  # noqa: PLC0415  slow
+
+    return write_course_report(*read_table(folder), folder)
 
 
 def _collect(
