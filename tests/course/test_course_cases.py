@@ -17,7 +17,7 @@ from hexapod_cosim.models import load_robot
 
 JUDGED, TUNED = load_course("judge"), load_course("tune")
 # physical keys of which the splits may share a value, each with its reason
-SHARED = {
+SHARED: dict[str, list[Any]] = {
     "command.vx": [0.0],  # a turn on the spot
     "torso.com[1]": [0.0],  # a payload above the middle
     "torso.com[2]": [0.0],

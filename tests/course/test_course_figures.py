@@ -108,7 +108,7 @@ def test_a_case_with_few_pairs_is_in_no_median() -> None:
         for seed in range(4)
         for control in CONTROLS
     )
-    found = Table(course, CONTROLS, runs).classes["flat_tanh", "after"]
+    found = Table(course, CONTROLS, runs).classes["flat", "after"]
     assert found.counted("slip") == 0
     assert math.isnan(found.ratio("slip").value)
 
