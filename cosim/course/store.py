@@ -30,7 +30,12 @@ def result_table(table: Table, *, command: str, complete: bool) -> dict[str, Any
     course = table.course
     return {
         "format": FORMAT,
-        "course": {"version": course.version, "hash": course.hash, "split": course.split},
+        "course": {
+            "version": course.version,
+            "hash": course.hash,
+            "split": course.split,
+            "settings": list(course.settings),
+        },
         "command": command,
         "complete": complete,
         "controls": list(table.controls),
@@ -124,7 +129,10 @@ def read_table(folder: Path) -> tuple[Table, dict[str, Any]]:
     content = read_json(folder / RESULT)
     try:
         course = load_course(
-            content["course"]["split"], names=content["cases"], seeds=len(content["seeds"])
+            content["course"]["split"],
+            names=content["cases"],
+            seeds=len(content["seeds"]),
+            settings=content["course"]["settings"],
         )
         if content["course"]["hash"] != course.hash:
             raise CourseError(

@@ -12,9 +12,10 @@ from typing import Any
 import pytest
 
 from hexapod_cosim.cosim.course.reading import CLASSES, FOLDER, load_course, run_scenario
-from hexapod_cosim.cosim.course.records import Case, CourseError
+from hexapod_cosim.cosim.course.records import Case, CourseError, read_entries
 from hexapod_cosim.models import load_robot
 
+KINEMATIC = read_entries(["kinematic"])[0]
 JUDGED, TUNED = load_course("judge"), load_course("tune")
 # physical keys of which the splits may share a value, each with its reason
 SHARED: dict[str, list[Any]] = {
@@ -74,7 +75,7 @@ def test_the_splits_share_no_seed_and_so_no_random_surface() -> None:
     for course in (JUDGED, TUNED):
         case = next(case for case in course.cases if case.name == "rough_10")
         seeds = [
-            run_scenario(case, control="kinematic", seed=seed).settings["terrain"]["seed"]
+            run_scenario(case, entry=KINEMATIC, seed=seed).settings["terrain"]["seed"]
             for seed in course.seeds
         ]
         assert seeds == list(course.seeds)
@@ -105,7 +106,7 @@ def test_no_commanded_speed_is_in_both_splits() -> None:
 
 def test_a_plain_surface_keeps_its_settings_at_every_seed() -> None:
     case = next(case for case in JUDGED.cases if case.name == "stairs_20")
-    scenario = run_scenario(case, control="compliant", seed=7)
+    scenario = run_scenario(case, entry=read_entries(["compliant"])[0], seed=7)
     assert scenario == replace(case.scenario, control="compliant", seed=7)
 
 
@@ -137,6 +138,24 @@ def test_a_sweep_rises_and_differs_in_the_height_alone() -> None:
             other.pop(key)
             assert terrain == other
     assert all(math.isnan(case.height) for case in JUDGED.cases if not case.sweep)
+
+
+def test_an_entry_switches_its_part_off_and_no_other() -> None:
+    reference, last, without = read_entries(["kinematic", "compliant"], ["slip_pid"])
+    assert [reference.label, last.label, without.label] == [
+        "kinematic",
+        "compliant",
+        "without slip_pid",
+    ]
+    base = JUDGED.cases[0].scenario
+    assert last.scenario(base).compliance == base.compliance
+    assert without.scenario(base).compliance == replace(base.compliance, slip_pid=False)
+    assert without.scenario(base).control == "compliant"
+
+
+def test_settings_hold_in_every_case() -> None:
+    course = load_course("judge", settings=["gait.period=1.25"])
+    assert {case.scenario.settings["gait"]["period"] for case in course.cases} == {1.25}
 
 
 def test_cases_are_chosen_by_name_and_by_class() -> None:

@@ -11,6 +11,7 @@ import pytest
 from command import Call, assert_refused
 
 from hexapod_cosim.cosim.course.reading import load_course
+from hexapod_cosim.cosim.course.records import read_entries
 from hexapod_cosim.cosim.course.runs import Run, run_course
 from hexapod_cosim.cosim.course.store import read_table
 
@@ -20,12 +21,12 @@ KINEMATIC = ["--control", "kinematic"]
 @pytest.fixture(scope="module")
 def runs(plant_build: Path) -> tuple[Run, ...]:
     course = load_course("tune", names=["rough_10", "turn"], seeds=2)
-    return tuple(run_course(course, ("kinematic",), workers=1))
+    return tuple(run_course(course, read_entries(["kinematic"]), workers=1))
 
 
 def test_runs_do_not_depend_on_the_number_of_workers(runs: tuple[Run, ...]) -> None:
     course = load_course("tune", names=["rough_10", "turn"], seeds=2)
-    parallel = tuple(run_course(course, ("kinematic",), workers=2))
+    parallel = tuple(run_course(course, read_entries(["kinematic"]), workers=2))
     assert repr(parallel) == repr(runs)
     assert [run.seed for run in runs] == [1000, 1001, 1000, 1001]
     assert all(run.success for run in runs)
@@ -99,8 +100,9 @@ def test_an_interrupt_writes_the_table_of_the_completed_runs(
 @pytest.mark.parametrize(
     ("words", "parts"),
     [
+        (["--without", "slip"], ["unknown part", "slip_pid"]),
         (["--control", "kinematc"], ["unknown control", "kinematic"]),
-        ([*KINEMATIC, *KINEMATIC], ["the same control twice"]),
+        ([*KINEMATIC, *KINEMATIC], ["two controls with one label"]),
         (["--split", "train"], ["unknown split", "judge"]),
         (["--case", "rough_11"], ["unknown case", "rough_10"]),
         (["--seeds", "0"], ["--seeds", "1 to 1000"]),
