@@ -14,8 +14,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from hexapod_cosim.models.actuator import gear_friction, overrun, servo_torque, stop_torque
-from hexapod_cosim.models.body.contacts import body_wrenches, standing_body_damping
-from hexapod_cosim.models.contact import foot_contacts, foot_force, foot_moment, wall_contacts
+from hexapod_cosim.models.body.contacts import standing_body_damping
 from hexapod_cosim.models.kinematics import (
     BODIES,
     JOINTS,
@@ -31,6 +30,7 @@ from hexapod_cosim.models.kinematics import (
     split,
 )
 from hexapod_cosim.models.records import Array, Robot
+from hexapod_cosim.models.touch.forces import Contacts, contact_wrenches, contacts_of
 
 MULTIPLIERS = 5
 
@@ -166,38 +166,27 @@ def applied_forces(
     robot: Robot,
     body: Array,
     command: Command,
-    damping: Array,
+    damping: Array | Contacts,
     bristle: Array | None = None,
     body_damping: Array | None = None,
 ) -> Array:
     """Returns the forces g (19, 6) of eq. 1 without the joints' torques [N, N m].
 
-    damping: of the contacts [s/m], nan for open ones: (6,) of the feet with the ground, or (2, 6)
-    with that of `wall_contacts` in the second row. bristle: deflections [m], 0 by default: (6, 3),
-    or (2, 6, 3) accordingly. body_damping: of the contacts of torso, knees and shanks [s/m], in the
-    order of `body_spheres`; None: `standing_body_damping`.
+    damping: of the feet on the ground below them (6,) [s/m], nan for open ones; or the state of all
+    contacts, which holds those of walls, materials and soil, too. bristle: deflections (6, 3) [m],
+    0 by default. body_damping: with an array of damping alone, that of torso, knees and shanks
+    [s/m], in the order of `body_spheres`; None: `standing_body_damping`.
     """
+    if not isinstance(damping, Contacts):
+        if body_damping is None:
+            body_damping = standing_body_damping(robot, body)
+        damping = contacts_of(robot, damping, body_damping)
     g = np.zeros((BODIES, 6))
     g[:, 0:3] = masses(robot)[:, None] * np.array(robot.gravity)
     J, w = world_inertias(robot, body), body[:, 10:13]
     g[:, 3:6] = -np.cross(w, np.einsum("kij,kj->ki", J, w))
-    rows = [foot_contacts(robot, body), wall_contacts(robot, body)]
-    damping = np.atleast_2d(damping)
-    still = np.zeros((len(damping), LEGS, 3))
-    deflection = still if bristle is None else bristle.reshape(still.shape)
-    for row, feet in enumerate(rows[: len(damping)]):
-        for leg, foot in enumerate(feet):
-            if foot is None:
-                continue
-            tibia = JOINTS * (leg + 1)
-            force = foot_force(robot, foot, damping[row, leg], deflection[row, leg])
-            moment = foot_moment(robot, foot, damping[row, leg], body[tibia, 10:13])
-            arm = foot.point - body[tibia, 0:3]
-            g[tibia] += np.concatenate([force, cross(arm, force) + moment])
     g[0] += np.concatenate([command.push_force, command.push_torque])
-    if body_damping is None:
-        body_damping = standing_body_damping(robot, body)
-    return g + body_wrenches(robot, body, body_damping)
+    return g + contact_wrenches(robot, body, damping, bristle)
 
 
 def joint_torques(robot: Robot, body: Array, command: Command) -> tuple[Array, Array]:
@@ -279,7 +268,7 @@ def accelerations(
     robot: Robot,
     body: Array,
     command: Command,
-    damping: Array,
+    damping: Array | Contacts,
     bristle: Array | None = None,
     body_damping: Array | None = None,
 ) -> Accelerations:
