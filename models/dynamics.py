@@ -149,16 +149,17 @@ def world_inertias(robot: Robot, body: Array) -> Array:
     )
 
 
-def mass_matrix(robot: Robot, body: Array) -> Array:
+def mass_matrix(robot: Robot, body: Array, joints: Constraints | None = None) -> Array:
     """Returns M = diag(m 1, J) + J_r G^T G (114, 114).
 
-    The inertia J_r of the geared rotors acts on the joint speeds.
+    The inertia J_r of the geared rotors acts on the joint speeds. joints: `constraints` at these
+    bodies, if they are known.
     """
     M = np.zeros((6 * BODIES, 6 * BODIES))
     for k, (mass, J) in enumerate(zip(masses(robot), world_inertias(robot, body), strict=True)):
         M[6 * k : 6 * k + 3, 6 * k : 6 * k + 3] = mass * np.eye(3)
         M[6 * k + 3 : 6 * k + 6, 6 * k + 3 : 6 * k + 6] = J
-    G = constraints(robot, body).G
+    G = (joints or constraints(robot, body)).G
     return M + robot.servo.rotor_inertia * G.T @ G
 
 
@@ -231,12 +232,15 @@ def drive_acceleration(robot: Robot, body: Array, command: Command) -> Array:
     )
 
 
-def constraint_equations(robot: Robot, body: Array, command: Command) -> tuple[Array, Array]:
+def constraint_equations(
+    robot: Robot, body: Array, command: Command, joints: Constraints | None = None
+) -> tuple[Array, Array]:
     """Returns D and c of the rows D dv = c of eq. 1 (c: eq. 7) at bodies (19, 13).
 
-    In kinematic mode each joint adds the row G dv = drive_acceleration (eq. 13).
+    In kinematic mode each joint adds the row G dv = drive_acceleration (eq. 13). joints: as in
+    `mass_matrix`.
     """
-    joints = constraints(robot, body)
+    joints = joints or constraints(robot, body)
     c = (
         joints.gamma
         - 2.0 * robot.baumgarte.alpha * joints.dphi
@@ -283,8 +287,8 @@ def accelerations(
         applied_forces(robot, body, command, damping, bristle, body_damping).ravel()
         + joints.G.T @ (motor + gear + stop_torques(robot, body)).ravel()
     )
-    D, c = constraint_equations(robot, body, command)
-    solution = solve_constrained(mass_matrix(robot, body), g, D, c)
+    D, c = constraint_equations(robot, body, command, joints)
+    solution = solve_constrained(mass_matrix(robot, body, joints), g, D, c)
     dv, multiplier, drive = np.split(solution, [6 * BODIES, 6 * BODIES + len(joints.phi)])
     motor = -drive.reshape(LEGS, JOINTS) if robot.servo.mode == "kinematic" else motor
     return Accelerations(dv.reshape(BODIES, 6), multiplier.reshape(-1, MULTIPLIERS), motor, gear)

@@ -165,14 +165,13 @@ def soil_slopes(
 
 
 def slope_matrices(
-    robot: Robot, body: Array, contacts: Contacts, slopes: Slopes
+    robot: Robot, body: Array, contacts: Contacts, slopes: Slopes, G: Array
 ) -> tuple[Array, Array]:
     """Returns G_x and G_v of eq. 20, each (114, 114), at bodies (19, 13).
 
-    They consist of servos, gears and stops on the joints' axes, of each contact along its normal n
+    G: (18, 114) as in `Constraints`. They consist of servos, gears and stops on the joints' axes, of each contact along its normal n
     and, by its drag alone, across it, and of the moments of spin and rolling on the tibia.
     """
-    G = constraints(robot, body).G
     damping = slopes.motor_damping + slopes.gear_drag + slopes.stop_damping
     G_x = -G.T @ ((slopes.motor_stiffness + slopes.stop_stiffness).reshape(-1, 1) * G)
     G_v = -G.T @ (damping.reshape(-1, 1) * G)
@@ -239,14 +238,15 @@ def solve_stage(
     """
     contacts = damping if isinstance(damping, Contacts) else contacts_of(robot, damping)
     s_x, s_v, s_b = change
-    v, G = body[:, 7:13].ravel(), constraints(robot, body).G
-    G_x, G_v = slope_matrices(robot, body, contacts, slopes)
+    v, joints = body[:, 7:13].ravel(), constraints(robot, body)
+    G = joints.G
+    G_x, G_v = slope_matrices(robot, body, contacts, slopes, G)
 
     # W = M - z G_v - z^2 G_x;  right = g + G_v s_v + G_x (s_x + z (v + s_v))
     motor, gear = joint_torques(robot, body, command)
     g = applied_forces(robot, body, command, contacts, bristle).ravel()
     g += G.T @ (motor + gear + stop_torques(robot, body)).ravel()
-    W = mass_matrix(robot, body) - z * G_v - z * z * G_x
+    W = mass_matrix(robot, body, joints) - z * G_v - z * z * G_x
     right = g + G_v @ s_v + G_x @ (s_x + z * (v + s_v))
 
     # bristles: a spring across the normal, -G_b/(1 + z beta), stretched by s_b + z (db/dt + s_v)
@@ -256,7 +256,7 @@ def solve_stage(
         W += z * z * spring * grip.T.T @ grip.T
         right -= spring * grip.T.T @ (s_b[grip.leg] + z * (grip.rate + grip.T @ s_v))
     # [W  D^T; D  0] [alpha; lambda] = [right; c]
-    D, c = constraint_equations(robot, body, command)
+    D, c = constraint_equations(robot, body, command, joints)
     alpha = solve_constrained(W, right, D, c)[: 6 * BODIES]
 
     # nu = v + s_v + z alpha;  k_b/h = (db/dt + s_v + z alpha - beta s_b)/(1 + z beta)

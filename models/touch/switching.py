@@ -193,8 +193,8 @@ def tread(robot: Robot, body: Array, contacts: Contacts, delta: Array) -> tuple[
     """Records the footprints that feet leave upwards, and finds those that feet enter from above.
 
     An open foot below the undisturbed surface is above its footprint, whose bottom it may touch
-    again; the footprint is complete when the foot has left it upwards. Depths (n,) follow the
-    plastic depths to which they refer.
+    again; the footprint is complete when the foot has left it upwards. Rigid ground beside a
+    footprint has none. Depths (n,) follow the plastic depths to which they refer.
     """
     delta, plastic, place = delta.copy(), contacts.plastic.copy(), contacts.place.copy()
     prints = contacts.footprints
@@ -209,7 +209,7 @@ def tread(robot: Robot, body: Array, contacts: Contacts, delta: Array) -> tuple[
                 new = [*place[leg], plastic[leg], soil_radius(robot.foot)]
                 prints = np.vstack([prints, new])
             plastic[leg] = 0.0
-        elif plastic[leg] == 0.0:
+        elif plastic[leg] == 0.0 and ground_under(robot, spots(robot)[leg], centre).is_soft:
             plastic[leg] = footprint_depth(prints, centre)
         delta[leg] = z - plastic[leg]
     return replace(contacts, plastic=plastic, place=place, footprints=prints), delta
