@@ -71,6 +71,10 @@ export interface PackedSurface {
 
 export interface PackedRun {
   readonly label: string;
+  /** The name of the run in the style sheet. */
+  readonly key: string;
+  /** Lengths of strokes and gaps of its curves [px]; none for a whole line. */
+  readonly dash: readonly number[];
   readonly period: number;
   readonly bucket: number;
   readonly robot: Robot;
