@@ -304,8 +304,9 @@ static const hxControllerDefinition default_definition = {
     .parts.path = 1,
     .parts.limits = 1,
     .parts.fallback = 1,
-    .parts.squeeze = 0.0,
+    .parts.squeeze = 0.48,
     .friction = 0.7,
+    .servo.torque_continuous = 1.2,
 };
 
 void hx_controller_definition_default(hxControllerDefinition *definition) {
@@ -671,6 +672,7 @@ static const hxRange definition_ranges[] = {
     {"parts.fallback", "", -DBL_MAX, DBL_MAX, offsetof(hxControllerDefinition, parts.fallback), 1},
     {"parts.squeeze", "", 0.0, 0.99, offsetof(hxControllerDefinition, parts.squeeze), 0},
     {"friction.mu", "", 0.0, 100.0, offsetof(hxControllerDefinition, friction), 0},
+    {"servo.torque_continuous", "N.m", 1e-09, 100000000.0, offsetof(hxControllerDefinition, servo.torque_continuous), 0},
 };
 
 size_t hx_controller_definition_ranges(const hxRange **range) {

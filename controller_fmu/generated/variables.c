@@ -484,6 +484,7 @@ static const hxVariable parameters[] = {
     {"parts.fallback", "", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, definition.parts.fallback), HX_BOOLEAN, 1},
     {"parts.squeeze", "1", 0.0, 0.99, offsetof(struct hxVariables, definition.parts.squeeze), HX_REAL, 1},
     {"friction.mu", "1", 0.0, 100.0, offsetof(struct hxVariables, definition.friction), HX_REAL, 1},
+    {"servo.torque_continuous", "N.m", 1e-09, 100000000.0, offsetof(struct hxVariables, definition.servo.torque_continuous), HX_REAL, 1},
 };
 
 const hxSection hx_sections[HX_CAUSALITIES] = {
@@ -506,7 +507,7 @@ const char *const hx_log_category_names[] = {
 const hxStateRow *const hx_states = 0;
 const size_t hx_state_count = 0;
 
-const char hx_default_guid[] = "{77e13a04-0bcd-4861-900d-2ebb80e26b45}";
+const char hx_default_guid[] = "{55fca776-4387-4643-8ea0-25c941cf79c3}";
 
 _Static_assert(HX_CONTROL_KINEMATIC == 1, "Control");
 _Static_assert(HX_CONTROL_COMPLIANT == 2, "Control");
