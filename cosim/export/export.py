@@ -114,8 +114,8 @@ def export_interface(
         binaries = build_binaries(
             component_library(component), choose_platforms(platforms, fmi=fmi), fmi=fmi
         )
-    offered = for_binaries(with_integers(interface) if integers else interface, binaries)
-    return write_archive(Path(path), _members(offered, dict(binaries) | dict(grids), fmi))
+    complete = for_binaries(with_integers(interface) if integers else interface, binaries)
+    return write_archive(Path(path), _members(complete, dict(binaries) | dict(grids), fmi))
 
 
 def installed_binary(component: Component = PLANT, *, fmi: int = 2) -> dict[str, bytes]:
