@@ -17,10 +17,11 @@ from types import TracebackType
 from typing import Any, Self
 
 import numpy as np
-from fmpy import extract
 from fmpy.fmi2 import FMU2Slave
 from numpy.typing import NDArray
 
+from hexapod_cosim.cosim.common.archives import unpack
+from hexapod_cosim.cosim.common.binaries import refuse_incomplete
 from hexapod_cosim.cosim.common.plant_files import packed_binary
 from hexapod_cosim.cosim.interface.descriptions import read_description
 from hexapod_cosim.cosim.interface.variants import listed_items
@@ -129,9 +130,11 @@ class Fmu:
 
     def _instantiate(self, name: str) -> None:
         """Unpacks the FMU, loads its binary and creates the instance, which logs to our FmuLog."""
-        extract(self.path, self._directory.name)
+        unpack(self.path, Path(self._directory.name))
         identifier = self.description.coSimulation.modelIdentifier
         library = packed_binary(self._directory.name, identifier)
+        if library is not None:
+            refuse_incomplete(library)
         facts = {
             "guid": self.description.guid,
             "modelIdentifier": identifier,
@@ -151,6 +154,8 @@ class Fmu:
         self._do_step = self.bind("fmi2DoStep", self._begin, self._length, no_state_prior)
 
     def _load_error(self, error: Exception) -> FmuError:
+        if isinstance(error, FmuError):
+            return error
         message = self._log[-1] if self._log else str(error)
         fix = "export it again on this machine with `hexapod export`"
         return FmuError("the FMU cannot be loaded", got=message, fix=fix, where=str(self.path))

@@ -15,6 +15,7 @@ from xml.etree.ElementTree import Element
 
 import fmpy
 
+from hexapod_cosim.cosim.common.binaries import incomplete
 from hexapod_cosim.cosim.export.extras import LICENCE, PICTURES
 from hexapod_cosim.cosim.interface.terminals import FOLDER, ICON
 from hexapod_cosim.cosim.validate.description import (
@@ -78,7 +79,10 @@ def archive_problems(path: Path) -> list[str]:
 def read_members(path: Path) -> tuple[dict[str, bytes] | None, list[str]]:
     """Returns the archive's files by path (None if one is damaged) and its problems as a ZIP."""
     with zipfile.ZipFile(path) as archive:
-        damaged = archive.testzip()
+        try:
+            damaged = archive.testzip()
+        except Exception as error:  # zlib's and others, for data that cannot be unpacked
+            return None, [f"the archive is damaged: {error}"]
         if damaged:
             return None, [f"{damaged} is damaged: its checksum is wrong"]
         found = {name: archive.read(name) for name in archive.namelist() if not name.endswith("/")}
@@ -169,7 +173,7 @@ def include_problems(found: dict[str, bytes], fmi: int) -> Iterator[str]:
 def _includes(text: bytes) -> list[str]:
     """Returns the names in quotes that a source includes."""
     return [
-        include.decode()
+        include.decode(errors="replace")
         for include in re.findall(rb'^\s*#\s*include\s+"([^"]+)"', text, re.MULTILINE)
     ]
 
@@ -216,6 +220,9 @@ def library_problems(name: str, data: bytes, platform: str, *, fmi: int = 2) -> 
     if not data.startswith(known_magic) or machine not in machines:
         yield f"{name} is no library of {platform}"
         return
+    damage = incomplete(data)
+    if damage:
+        yield f"{name} cannot be loaded: {damage}"
     start = b"\0_" if magic == MACH else b"\0"
     missing = [
         function
@@ -233,6 +240,7 @@ def _machine_types(data: bytes, magic: bytes, place: int | None, size: int) -> l
     """
     if magic == MACH and data.startswith(FAT):
         count = int.from_bytes(data[4:8], "big")
+        count = min(count, len(data) // FAT_ENTRY_SIZE)
         offsets = range(FAT_ENTRIES, FAT_ENTRIES + FAT_ENTRY_SIZE * count, FAT_ENTRY_SIZE)
         return [data[at : at + 4][::-1] for at in offsets]
     if place is None:
