@@ -504,7 +504,7 @@ const char *const hx_log_category_names[] = {
 const hxStateRow *const hx_states = 0;
 const size_t hx_state_count = 0;
 
-const char hx_default_guid[] = "{78f8a820-160d-4d0d-a17a-3f4e1071ebb4}";
+const char hx_default_guid[] = "{2a89c4b5-81fa-491b-a61a-6a7d68e47623}";
 
 _Static_assert(HX_CONTROL_KINEMATIC == 1, "Control");
 _Static_assert(HX_CONTROL_COMPLIANT == 2, "Control");
