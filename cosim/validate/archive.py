@@ -8,7 +8,6 @@ import posixpath
 import re
 import stat
 import zipfile
-import zlib
 from collections.abc import Iterable, Iterator
 from pathlib import Path, PurePosixPath
 from xml.etree import ElementTree
@@ -16,6 +15,7 @@ from xml.etree.ElementTree import Element
 
 import fmpy
 
+from hexapod_cosim.cosim.common.binaries import incomplete
 from hexapod_cosim.cosim.export.extras import LICENCE, PICTURES
 from hexapod_cosim.cosim.interface.terminals import FOLDER, ICON
 from hexapod_cosim.cosim.validate.description import (
@@ -89,7 +89,7 @@ def read_members(path: Path) -> tuple[dict[str, bytes] | None, list[str]]:
                 found[name] = archive.read(name)
             except zipfile.BadZipFile:
                 damaged.append(f"{name} is damaged: its checksum is wrong")
-            except zlib.error:
+            except Exception:  # zlib's and others, for data that cannot be unpacked
                 damaged.append(f"{name} is damaged: it cannot be unpacked")
         files = {name: data for name, data in found.items() if not name.endswith("/")}
         return (None, damaged) if damaged else (files, list(zip_problems(archive)))
@@ -180,7 +180,7 @@ def include_problems(found: dict[str, bytes], fmi: int) -> Iterator[str]:
 def _includes(text: bytes) -> list[str]:
     """Returns the names in quotes that a source includes."""
     return [
-        include.decode()
+        include.decode(errors="replace")
         for include in re.findall(rb'^\s*#\s*include\s+"([^"]+)"', text, re.MULTILINE)
     ]
 
@@ -227,6 +227,9 @@ def library_problems(name: str, data: bytes, platform: str, *, fmi: int = 2) -> 
     if not data.startswith(known_magic) or machine not in machines:
         yield f"{name} is no library of {platform}"
         return
+    damage = incomplete(data)
+    if damage:
+        yield f"{name} cannot be loaded: {damage}"
     start = b"\0_" if magic == MACH else b"\0"
     missing = [
         function
@@ -244,6 +247,7 @@ def _machine_types(data: bytes, magic: bytes, place: int | None, size: int) -> l
     """
     if magic == MACH and data.startswith(FAT):
         count = int.from_bytes(data[4:8], "big")
+        count = min(count, len(data) // FAT_ENTRY_SIZE)
         offsets = range(FAT_ENTRIES, FAT_ENTRIES + FAT_ENTRY_SIZE * count, FAT_ENTRY_SIZE)
         return [data[at : at + 4][::-1] for at in offsets]
     if place is None:
