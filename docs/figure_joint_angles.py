@@ -91,8 +91,8 @@ def leg_points(robot: Robot, angle: Array) -> Array:
     coxa, femur, _ = (link.length for link in leg.links)
     _, q, _ = angle[LEG]
     hip = np.array(leg.hip_position)
-    knee = hip + [0.0, coxa, 0.0]
-    ankle = knee + [0.0, femur * np.cos(q), femur * np.sin(q)]
+    knee = hip + np.array([0.0, coxa, 0.0])
+    ankle = knee + np.array([0.0, femur * np.cos(q), femur * np.sin(q)])
     foot = foot_positions(robot, angle)[LEG]
     return np.array([[-1e3 * point[1], 1e3 * point[2]] for point in (hip, knee, ankle, foot)])
 
