@@ -9,6 +9,7 @@ from typing import Annotated, Any
 
 import typer
 
+from hexapod_cosim.cosim.cli import benchmark_command
 from hexapod_cosim.cosim.cli.accuracy_check import CheckAccuracy, check_accuracy, show_accuracy
 from hexapod_cosim.cosim.cli.failures import FELL, SUCCESS
 from hexapod_cosim.cosim.cli.running import (
@@ -29,7 +30,7 @@ from hexapod_cosim.cosim.cli.running import (
     titled,
 )
 from hexapod_cosim.cosim.cli.terminal import Json, show_files, show_json, show_text, warn
-from hexapod_cosim.cosim.common.files import PARTS, STUDY
+from hexapod_cosim.cosim.common.files import BENCHMARK, PARTS, STUDY
 from hexapod_cosim.cosim.report.accuracy import with_errors
 from hexapod_cosim.cosim.report.report import REPORT, metric_rows, write_report
 from hexapod_cosim.cosim.results.accuracy import Accuracy, halved_scenario
@@ -153,7 +154,7 @@ def report(
     ],
     json: Json = False,
 ) -> None:
-    """Make the plots and the report of a run, a comparison or a study again."""
+    """Make the plots and the report of a run, a comparison, a study or a benchmark again."""
     facts = read_facts(folder)
     if facts.get("kind") == STUDY:
         # imported only here because it is slow
@@ -161,6 +162,8 @@ def report(
 
         found, files = report_on(folder)
         warn_of(found)
+    elif facts.get("kind") == BENCHMARK:
+        files = benchmark_command.report_on(folder)
     elif facts.get("kind") == "compare":
         files = _report_comparison(folder, facts)
     else:

@@ -16,6 +16,7 @@ from hexapod_cosim.models import HexapodError
 
 RUN_FILE = "run.json"  # marks a folder as written by this package
 RUNNING = "running"
+BENCHMARK = "benchmark"  # the kind of a folder that holds the result of a benchmark
 STUDY = "study"  # the kind of a folder that holds a study, which can be resumed
 RESULT_FILES = (
     "results.parquet",
@@ -30,6 +31,8 @@ RESULT_FILES = (
     "ground.terrain",
     "report.html",
     "plots",
+    "benchmark.json",
+    "runs.csv",
 )
 RESERVED_NAMES = frozenset((*RESULT_FILES, RUN_FILE))  # no folder of a control has such a name
 PARTS = "controls"  # key of run.json: labels of a comparison, whose runs have folders of their own

@@ -18,9 +18,9 @@ from hexapod_cosim.cosim.report.profile import (
     find_stances,
     make_profile,
     pack_profile,
-    pack_stances,
 )
-from hexapod_cosim.cosim.report.surface import pack_surface, stride
+from hexapod_cosim.cosim.report.surface import pack_footprints, pack_surface, stride
+from hexapod_cosim.cosim.results.footprints import find_footprints
 from hexapod_cosim.cosim.results.results import StoredResult
 from hexapod_cosim.cosim.results.walk import CONTACT_SHARE
 from hexapod_cosim.models.ground.surface import Surface
@@ -73,10 +73,11 @@ def _describe(
         ground["surface"] = surfaces.index(run.view.surface)
         with suppress(ColumnError):  # a recording without positions shows the surface alone
             stances = find_stances(view, run.view.surface)
-            ground["stances"] = pack_stances(stances)
             profile = make_profile(view, run.view.surface, stances)
             columns["way"] = np.interp(chosen.time, view.recording.time, profile.torso_way)
             ground["profile"] = pack_profile(profile, stances)
+    with suppress(ColumnError):
+        ground["footprints"] = pack_footprints(find_footprints(view.recording, view.parameters))
     return about | {"robot": describe_robot(run), "ground": ground} | pack(chosen.time, columns)
 
 

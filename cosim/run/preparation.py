@@ -43,6 +43,15 @@ def chosen_gains(scenario: Scenario, given: Gains | None = None) -> Gains | None
     return designed_gains(*design_key(scenario)) if given is None else given
 
 
+def law_of(control: str) -> str:
+    """Returns the law of a built-in controller with gains, from the text of a control.
+
+    Kinematic control has no gains and uses no law.
+    """
+    named = control_of(control)
+    return "paper" if named.is_builtin and named.name == "paper" else "compliant"
+
+
 def design_key(scenario: Scenario) -> tuple[Robot, float]:
     """Returns the robot and the period [s] that gains are designed for.
 

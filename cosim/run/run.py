@@ -44,7 +44,7 @@ from hexapod_cosim.cosim.results.warnings import (
     unused_settings,
     walk_warnings,
 )
-from hexapod_cosim.cosim.run.preparation import PlantFmus, chosen_gains, known_robot
+from hexapod_cosim.cosim.run.preparation import PlantFmus, chosen_gains, known_robot, law_of
 from hexapod_cosim.cosim.scenario.controls import control_of
 from hexapod_cosim.cosim.scenario.reach import check_commands
 from hexapod_cosim.cosim.scenario.records import Scenario
@@ -172,6 +172,7 @@ def make_plan(scenario: Scenario, *, gains: Gains | None = None) -> RunPlan:
         period=scenario.macro_step,
         gains=chosen_gains(scenario, gains),
         parts=scenario.compliance,
+        law=law_of(scenario.control),
     )
     drawn = None if scenario.variation is None else draw(scenario.variation, seed=scenario.seed)
     timed = scenario

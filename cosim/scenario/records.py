@@ -22,7 +22,7 @@ from hexapod_cosim.models import (
 )
 from hexapod_cosim.models.schema import Choice, Number, Vector, specs
 
-CONTROLS = ("kinematic", "compliant")
+CONTROLS = ("kinematic", "paper", "compliant")
 FAULTS = ("dead", "stuck")
 FORMATS = ("parquet", "csv")  # of recordings
 SETTINGS: dict[str, type[Any]] = {
@@ -38,6 +38,8 @@ SETTINGS: dict[str, type[Any]] = {
 }
 UNUSED = {"gait": ("stride",)}  # keys of robot files that scenarios replace by the body command
 GRAVITY = Number("m/s2", above=0.0)  # along -z; or three numbers, a vector in world axes
+# weight of the torques in the planned squeeze of the legs
+SQUEEZE = Number("1", at_least=0.0, at_most=0.99)
 GRAVITY_VECTOR = Vector("m/s2", 3)
 GRAVITY_NAMES = ("gravity[1]", "gravity[2]", "gravity[3]")  # the FMU's parameters
 ZERO = (0.0, 0.0, 0.0)

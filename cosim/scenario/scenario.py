@@ -21,7 +21,7 @@ from typing import Any
 
 import numpy as np
 
-from hexapod_cosim.controller import Parts
+from hexapod_cosim.controller import SWITCHES, Parts
 from hexapod_cosim.cosim.scenario.checks import check_interval, check_parameters, check_steps
 from hexapod_cosim.cosim.scenario.controls import LAW, control_beside, read_control
 from hexapod_cosim.cosim.scenario.quantities import to_si
@@ -35,6 +35,7 @@ from hexapod_cosim.cosim.scenario.records import (
     PLAIN_KEYS,
     SECTIONS,
     SETTINGS,
+    SQUEEZE,
     UNUSED,
     Command,
     Fault,
@@ -351,11 +352,15 @@ def _read_event(table: Any, where: str) -> Push | Fault:
 
 
 def _read_parts(table: Any, where: str) -> Parts:
-    """Reads which parts of the compliant control are active."""
+    """Reads which parts of the compliant control are active, and the weight of the squeeze."""
     refuse_unknown_keys(expect_table(table, where), [item.name for item in fields(Parts)], where)
-    for key, value in table.items():
-        _boolean(value, f"{where}.{key}")
-    return Parts(**table)
+    for key in SWITCHES:
+        if key in table:
+            _boolean(table[key], f"{where}.{key}")
+    given = dict(table)
+    if "squeeze" in given:
+        given["squeeze"] = SQUEEZE.read(given["squeeze"], f"{where}.squeeze")
+    return Parts(**given)
 
 
 def _read_outputs(table: Any, where: str) -> Outputs:

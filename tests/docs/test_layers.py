@@ -36,6 +36,7 @@ ROOMS = {
     "design": [*LOW, "export"],
     "report": [*LOW, "export", "results"],
     "run": RUNNING,
+    "course": [*RUNNING, "report", "run"],
     "study.plan": [*LOW, "results"],
     "study.store": [*LOW, "results", "study.plan"],
     "study.execute": [*RUNNING, "run", "study.plan", "study.store"],

@@ -159,7 +159,7 @@ def _check_gain(factor: Factor, study: Study, where: str) -> None:
         raise StudyError(
             "a gain that no run has",
             got=factor.name,
-            expected="compliant among the controls",
+            expected="compliant or paper among the controls",
             fix=fix,
             where=where,
         )
