@@ -82,11 +82,13 @@ def test_several_terrains_and_several_controls_make_one_table(call: Call, tmp_pa
 
 def test_simulate_runs_each_control_into_a_folder_of_its_label(call: Call, tmp_path: Path) -> None:
     words = ["--control", "kinematic", "--control", CPG]
-    code, _, _ = call(
+    code, out, _ = call(
         "simulate", "walk_flat", *words, "--set", "duration=0.2", "--set", "outputs.plots=false",
+        "--set", "control.lift=0.2", "--json",
         "-o", tmp_path / "out",
     )  # fmt: skip
     assert code == 0
+    assert list(json.loads(out)) == ["kinematic", "Cpg"]
     assert sorted(path.name for path in (tmp_path / "out").iterdir()) == ["Cpg", "kinematic"]
     facts = json.loads((tmp_path / "out" / "Cpg" / "run.json").read_text())
     assert (facts["control"], facts["controller"]["kind"]) == ("Cpg", "python")
