@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 
 from hexapod_cosim.cosim.course.goals import Verdict
+from hexapod_cosim.cosim.course.parts import Effect, judge_parts
 from hexapod_cosim.cosim.course.records import SHOWN, Quantity
 from hexapod_cosim.cosim.course.statistics import Interval, Rate
 from hexapod_cosim.cosim.course.table import ALL, CaseFigures, ClassFigures, Table
@@ -167,6 +168,23 @@ def _alike(figures: CaseFigures) -> Iterator[tuple[str, int]]:
     yield from counts.values()
 
 
+def part_rows(table: Table) -> tuple[list[str], list[list[str]]]:
+    """Returns the table of parts: their best and worst effects, and whether they pay."""
+    rows = [
+        [
+            each.label,
+            *map(_effect, (each.best, each.worst)),
+            "pays" if each.pays else "does not pay",
+        ]
+        for each in judge_parts(table)
+    ]
+    return ["part", "best", "worst", ""], rows
+
+
+def _effect(effect: Effect) -> str:
+    return f"{100.0 * effect.change:+.0f} % {effect.quantity}, {effect.kind}"
+
+
 def sweep_rows(table: Table) -> tuple[list[str], list[list[str]]]:
     """Returns the successes over the heights of each sweep."""
     names = dict.fromkeys(case.sweep for case in table.course.cases if case.sweep)
@@ -179,3 +197,32 @@ def sweep_rows(table: Table) -> tuple[list[str], list[list[str]]]:
             )
             rows.append([name, control, cells])
     return ["heights", "control", "success"], [row for row in rows if row[2]]
+
+
+def tables(
+    table: Table, found: Sequence[Verdict]
+) -> list[tuple[str, tuple[list[str], list[list[str]]]]]:
+    """Returns titles and contents of all tables that are not empty."""
+    every = [
+        ("Parts: best and worst effect on a class, and whether the part pays", part_rows(table)),
+        ("Goals", goal_rows([verdict for verdict in found if verdict.was_run])),
+        (
+            f"Classes: success, and medians over cases of the change from {table.reference} "
+            "(95 % interval)",
+            class_rows(table),
+        ),
+        ("Success over the height of stones and stairs", sweep_rows(table)),
+        ("Cases: means over the successful runs ± half a 95 % interval", case_rows(table)),
+        ("Failures", failure_rows(table)),
+    ]
+    return [(title, content) for title, content in every if content[1]]
+
+
+def markdown(table: Table, found: Sequence[Verdict]) -> str:
+    """Returns all tables as a page in Markdown."""
+    parts = [f"Course {table.course.version}, split {table.course.split}, "
+             f"{len(table.course.seeds)} seeds."]  # fmt: skip
+    for title, (columns, rows) in tables(table, found):
+        lines = [columns, ["---"] * len(columns), *rows]
+        parts += [f"{title}:", "\n".join(f"| {' | '.join(line)} |" for line in lines)]
+    return "\n\n".join(parts) + "\n"
