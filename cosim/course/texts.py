@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterator, Mapping, Sequence
 
 from hexapod_cosim.cosim.course.goals import Verdict
@@ -11,6 +12,7 @@ from hexapod_cosim.cosim.course.records import SHOWN, Quantity
 from hexapod_cosim.cosim.course.statistics import Interval, Rate
 from hexapod_cosim.cosim.course.table import ALL, CaseFigures, ClassFigures, Table
 
+NUMBER = re.compile(r"[0-9.]*[0-9]")
 NONE = "-"  # where there is no value
 LEAST_HALF = 5e-4  # of a mean: a narrower interval is not shown
 SCALES: Mapping[str, tuple[float, str]] = {  # shown value over the metric's, and its unit
@@ -161,8 +163,7 @@ def _alike(figures: CaseFigures) -> Iterator[tuple[str, int]]:
     """Yields reasons with their numbers of runs; reasons that differ in numbers alone are one."""
     counts: dict[str, tuple[str, int]] = {}
     for reason, count in figures.failures.items():
-        words = "".join("#" if letter.isdigit() else letter for letter in reason)
-        key = words.replace("#", "").strip()
+        key = NUMBER.sub("#", reason)
         first, total = counts.get(key, (reason, 0))
         counts[key] = first, total + count
     yield from counts.values()
