@@ -33,6 +33,7 @@ RESULT_FILES = (
     "plots",
     "benchmark.json",
     "runs.csv",
+    "tables.md",
 )
 RESERVED_NAMES = frozenset((*RESULT_FILES, RUN_FILE))  # no folder of a control has such a name
 PARTS = "controls"  # key of run.json: labels of a comparison, whose runs have folders of their own
