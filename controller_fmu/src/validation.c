@@ -31,9 +31,10 @@ static void relations(hxChecker *c, const hxControllerDefinition *d) {
                swing = (1.0 - d->gait.duty) * d->gait.period, shorter = fmin(stance, swing);
   hx_print(expected, sizeof expected, "less than %.9g s, the gait's shorter phase", shorter);
   if (!(d->period < shorter)) hx_check_fail(c, "period", d->period, expected);
-  if (d->control == HX_CONTROL_COMPLIANT && !(d->servo.kp > 0.0))
+  if (d->control != HX_CONTROL_KINEMATIC && !(d->servo.kp > 0.0))
     hx_check_fail(c, "servo.kp", d->servo.kp,
-                  "more than 0 under compliant control, which shifts the servos' targets");
+                  "more than 0 except under kinematic control: the others shift the servos' "
+                  "targets");
   legs(c, d);
 }
 

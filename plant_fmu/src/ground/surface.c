@@ -336,8 +336,13 @@ static int is_in_patch(const hxTerrain *terrain, const hxPatch *p, double x, dou
  * derivatives, and at a border the jump of the second ones, are left out. */
 static const double close = 1e-7, closest = 1e-14;
 
+/* Newton's method that still moves by this share of a cell, squared, has not found a point. */
+static const double lost = 1e-4;
+
 /* Computes the face of a smooth surface by Newton's method on the two parameters of its nearest
- * point, from the point below. */
+ * point, from the point below. Far above a rough surface, beyond the centres of its curvature, the
+ * method may find none; the distance is then that of the plane at the point below, which is far,
+ * too. */
 static void smooth_face(const hxTerrain *terrain, const double point[3], int bends, hxFace *face) {
   enum { MOST = 16 };
   const double cell = terrain->head.cell, area = cell * cell;
@@ -351,6 +356,10 @@ static void smooth_face(const hxTerrain *terrain, const double point[3], int ben
     H = hessian_of(&p, rz);
     double dx = (H.xy * gy - H.yy * gx) / H.det, dy = (H.xy * gx - H.xx * gy) / H.det;
     const double square = dx * dx + dy * dy;
+    if (i == MOST && square > lost * area) {
+      x = point[0], y = point[1], p = patch_at(terrain, x, y);
+      break;
+    }
     if (square <= closest * area || i == MOST ||
         (!bends && square <= close * area && is_in_patch(terrain, &p, x + dx, y + dy))) {
       x += dx, y += dy;
