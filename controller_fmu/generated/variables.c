@@ -519,7 +519,7 @@ const char *const hx_log_category_names[] = {
 const hxStateRow *const hx_states = 0;
 const size_t hx_state_count = 0;
 
-const char hx_default_guid[] = "{2678ca03-626a-4ac3-8151-eff330d98c42}";
+const char hx_default_guid[] = "{4059e6d7-e79a-4216-a498-5191c37b5a1c}";
 
 _Static_assert(HX_CONTROL_KINEMATIC == 1, "Control");
 _Static_assert(HX_CONTROL_COMPLIANT == 2, "Control");
