@@ -35,7 +35,6 @@ from hexapod_cosim.controller.plane import cis
 from hexapod_cosim.controller.size import requirements_for
 from hexapod_cosim.controller.walk.inverse_dynamics import InverseDynamics, Neighbours
 from hexapod_cosim.models import JOINT_NAMES, LEG_NAMES, ReachError, Robot
-
 from hexapod_cosim.models.records import Array
 
 PHASES = 24  # moments of a gait cycle at which loads are computed
