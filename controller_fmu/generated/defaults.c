@@ -304,7 +304,7 @@ static const hxControllerDefinition default_definition = {
     .parts.path = 1,
     .parts.limits = 1,
     .parts.fallback = 1,
-    .parts.squeeze = 0.48,
+    .parts.squeeze = 0.75,
     .friction = 0.7,
     .servo.torque_continuous = 1.2,
 };

@@ -507,7 +507,7 @@ const char *const hx_log_category_names[] = {
 const hxStateRow *const hx_states = 0;
 const size_t hx_state_count = 0;
 
-const char hx_default_guid[] = "{55fca776-4387-4643-8ea0-25c941cf79c3}";
+const char hx_default_guid[] = "{4839bc2c-a7fc-4801-b109-b9c33302a43a}";
 
 _Static_assert(HX_CONTROL_KINEMATIC == 1, "Control");
 _Static_assert(HX_CONTROL_COMPLIANT == 2, "Control");
