@@ -116,7 +116,7 @@ def list_robots() -> list[str]:
 def load_robot(path_or_name: str | Path) -> Robot:
     """Reads and checks a robot file, or a robot of `list_robots()` by name. Raises RobotError."""
     refuse_path(path_or_name, "the robot file", RobotError)
-    path = _robot_path(path_or_name)
+    path = robot_path(path_or_name)
     if path.suffix.lower() == ".urdf":
         return _robot_from_urdf(urdf_table(path), str(path))
     try:
@@ -170,7 +170,7 @@ def _robot_from_urdf(table: Mapping[str, Any], where: str) -> Robot:
         raise element_named(error, table) from error
 
 
-def _robot_path(path_or_name: str | Path) -> Path:
+def robot_path(path_or_name: str | Path) -> Path:
     """Returns the path of a robot file, given by path or by name."""
     path = Path(path_or_name)
     if path.suffix or len(path.parts) != 1 or path.is_file():
