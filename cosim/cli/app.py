@@ -7,6 +7,7 @@ from typing import Annotated
 import typer
 
 from hexapod_cosim.cosim.cli import (
+    benchmark_command,
     compare_command,
     export_command,
     fmu_commands,
@@ -29,6 +30,7 @@ app.command("export")(export_command.export)
 app.command("simulate", epilog=run_commands.EPILOG)(run_commands.simulate)
 app.command("compare", epilog=compare_command.EPILOG)(compare_command.compare)
 app.command("study", epilog=study_command.EPILOG)(study_command.study)
+app.command("benchmark", epilog=benchmark_command.EPILOG)(benchmark_command.benchmark)
 app.command("design")(fmu_commands.design)
 app.command("report")(run_commands.report)
 app.command("validate")(fmu_commands.validate)

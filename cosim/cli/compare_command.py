@@ -65,7 +65,7 @@ from hexapod_cosim.cosim.results.results import (
 from hexapod_cosim.cosim.results.summary import Summary, summarise
 from hexapod_cosim.cosim.run.batch import run_batch
 from hexapod_cosim.cosim.run.preparation import chosen_gains
-from hexapod_cosim.cosim.scenario.records import CONTROLS, Scenario
+from hexapod_cosim.cosim.scenario.records import COMPARED, Scenario
 from hexapod_cosim.cosim.scenario.scenario import load_scenario
 from hexapod_cosim.cosim.scenario.variation import STANDARD
 from hexapod_cosim.models import ScenarioError
@@ -241,7 +241,7 @@ def _show(
     """Prints the metrics of both controls, their accuracy if it was checked, and the files."""
     net_slip = has_net_slip(next(iter(results.values())).parameters)
     rows = comparison_rows(comparison, net_slip=net_slip)
-    show_rows(with_errors(rows, checked), CONTROLS)
+    show_rows(with_errors(rows, checked), COMPARED)
     show_accuracy(rows, checked, comparison.means)
     show_files(files)
 
@@ -269,7 +269,7 @@ def _first_seed(
     """Runs the first seed under both controls and keeps the recordings."""
     results: dict[str, Result] = {}
     files: list[Path] = []
-    for control in CONTROLS:
+    for control in COMPARED:
         with results_folder(folder.path / control) as part:
             walk = replace(plan, control=control)
             results[control], written = run_into(walk, [folder, part], command, options)
@@ -288,9 +288,9 @@ def _all_seeds(
     scenarios = [
         replace(plan, control=control, seed=seed)
         for seed in range(plan.seed + 1, plan.seed + seeds)
-        for control in CONTROLS
+        for control in COMPARED
     ]
-    done: list[Summary] = [summarise(results[control]) for control in CONTROLS]
+    done: list[Summary] = [summarise(results[control]) for control in COMPARED]
     try:
         compiled = options.engine == "compiled"
         batch = run_batch(scenarios, fmu=options.fmu, gains=options.gains, compiled=compiled)
@@ -306,7 +306,7 @@ def _all_seeds(
         raise
     write_seeds(folder / SEEDS, done)
     comparison = compare_runs(
-        *([run for run in done if run.control == control] for control in CONTROLS)
+        *([run for run in done if run.control == control] for control in COMPARED)
     )
     for text in comparison.warnings if seeds > 1 else comparison.losses:
         warn(text)
@@ -321,7 +321,7 @@ def _accuracies(
 ) -> dict[str, Accuracy]:
     """Returns the accuracies, by control, of the means over the compared seeds."""
     found = {}
-    for control, runs in zip(CONTROLS, comparison.judged, strict=True):
+    for control, runs in zip(COMPARED, comparison.judged, strict=True):
         plans = [replace(plan, control=control, seed=run.seed) for run in runs]
         found[control] = check_accuracy(plans, runs, folder, options)
     return found

@@ -46,7 +46,7 @@ from hexapod_cosim.cosim.results.results import (
     write_accuracy,
 )
 from hexapod_cosim.cosim.results.summary import summarise
-from hexapod_cosim.cosim.scenario.records import CONTROLS
+from hexapod_cosim.cosim.scenario.records import COMPARED, CONTROLS
 from hexapod_cosim.cosim.scenario.scenario import load_scenario
 
 EPILOG = (
@@ -155,10 +155,10 @@ def _report_comparison(folder: Path, facts: Mapping[str, Any]) -> list[Path]:
     """Writes the report of a comparison's folder again; `facts` are those of its run.json."""
     seeds = read_seeds(folder / SEEDS)
     return write_report(
-        {control: read_result(folder / control) for control in CONTROLS},
+        {control: read_result(folder / control) for control in COMPARED},
         folder,
         warn=warn,
-        comparison=compare_runs(*(seeds.get(control, []) for control in CONTROLS)),
+        comparison=compare_runs(*(seeds.get(control, []) for control in COMPARED)),
         scenario=read_scenario(folder),
         command=facts.get("command", ""),
         accuracies=read_accuracies(folder),

@@ -32,6 +32,7 @@ from hexapod_cosim.models import JOINT_NAMES, LEG_NAMES
 
 STYLES: dict[str, dict[str, Any]] = {
     "kinematic": {"color": "#D55E00", "linestyle": (0, (4, 1.5)), "linewidth": 1.0},
+    "paper": {"color": "#009E73", "linestyle": (0, (1, 1)), "linewidth": 1.0},
     "compliant": {"color": "#0072B2", "linestyle": "-", "linewidth": 1.0},
 }
 PLAN = "0.7"  # grey of planned paths

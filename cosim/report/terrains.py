@@ -21,7 +21,11 @@ from hexapod_cosim.cosim.results.comparison import Comparison
 from hexapod_cosim.cosim.results.summary import Summary
 
 TABLE, FIGURE = "terrains.csv", "terrains"
-MARKS = {"kinematic": ("o", 7.0), "compliant": ("s", 3.6)}  # marker and its size
+MARKS = {
+    "kinematic": ("o", 7.0),
+    "paper": ("^", 4.0),
+    "compliant": ("s", 3.6),
+}  # marker and its size
 ROOM = 1.06  # of an axis over its largest value
 
 

@@ -1198,7 +1198,7 @@ const size_t hx_state_count = sizeof states / sizeof states[0];
 
 _Static_assert(sizeof states / sizeof states[0] == sizeof(hxCoordinates) / sizeof(double), "each state has its row");
 
-const char hx_default_guid[] = "{e1b3c971-9528-4711-8180-cd97340a565f}";
+const char hx_default_guid[] = "{6e3ed4fc-463d-415f-b49e-ea7da59c3652}";
 
 _Static_assert(HX_CONTACT_EXACT_RESTITUTION == 1, "ContactLaw");
 _Static_assert(HX_CONTACT_FLORES == 2, "ContactLaw");

@@ -34,6 +34,7 @@ ROOMS = {
     "design": [*LOW, "export"],
     "report": [*LOW, "export", "results"],
     "run": [*LOW, "export", "results", "design"],
+    "course": [*LOW, "export", "results", "report", "design", "run"],
     "study.plan": [*LOW, "results"],
     "study.store": [*LOW, "results", "study.plan"],
     "study.execute": [*LOW, "export", "results", "design", "run", "study.plan", "study.store"],

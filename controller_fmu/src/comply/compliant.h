@@ -7,6 +7,7 @@
 #include "../walk/trajectory.h"
 #include "compliance.h"
 #include "hexapod/inside.h"
+#include "planned_squeeze.h"
 
 HX_HIDDEN_BEGIN
 
@@ -15,6 +16,7 @@ typedef struct hxCompliantModel {
   double leading; /* steps of the transition of the added velocity */
   hxInverseDynamics dynamics;
   hxSupport support;
+  hxPlannedSqueeze squeeze;
   hxComplianceModel laws;
   hxHoldModel hold;
 } hxCompliantModel;
@@ -44,6 +46,9 @@ typedef struct hxStance {
   const hxPlane *plane; /* m  (6) planned feet, walking frame */
   const double *height; /* m, (6) heights of the lowered feet */
 } hxStance;
+
+/* Computes the foot forces in the walking frame (C22) [N]: f_K = R_KT R_TW f_W. */
+void hx_sense(const hxControllerInput *input, const hxPosture *posture, double force[HX_LEGS][3]);
 
 void hx_compliant_compile(const hxControllerDefinition *definition, const hxLegSolver leg[HX_LEGS],
                           hxCompliantModel *model);

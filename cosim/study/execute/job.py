@@ -107,7 +107,7 @@ def _read(path: Path) -> bytes:
 
 def _common_gains(study: Study) -> Gains | None:
     """Designs gains when all compliant runs share one set; returns None otherwise."""
-    if "compliant" not in study.run_controls:
+    if set(study.run_controls) <= {"kinematic"}:
         return None
     scenarios = [
         scenario_from_table({**case.table, "control": "compliant"}, where=case.where)

@@ -8,7 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from hexapod_cosim.cosim.scenario.records import CONTROLS
+from hexapod_cosim.cosim.scenario.records import COMPARED, CONTROLS
 from hexapod_cosim.cosim.scenario.scenario import read_tables, scenario_from_table, with_values
 from hexapod_cosim.cosim.scenario.variation import STANDARD
 from hexapod_cosim.cosim.study.plan.bundled import list_studies
@@ -120,7 +120,7 @@ def study_from_table(
         design=_design(table, where),
         points=_points(table, where),
         seeds=read_seeds(table.get("seeds", 1), f"{where}: seeds", most=MAX_SEEDS),
-        controls=names_of(table.get("controls", list(CONTROLS)), CONTROLS, f"{where}: controls"),
+        controls=names_of(table.get("controls", list(COMPARED)), CONTROLS, f"{where}: controls"),
         seed=whole(table.get("seed", 0), f"{where}: seed", least=0, most=MAX_SEED),
         optimise=None if optimise is None else optimise[0],
         source=dict(table),

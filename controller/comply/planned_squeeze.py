@@ -1,0 +1,87 @@
+"""Plans forces by which the standing legs squeeze each other. C: planned_squeeze.c.
+
+Legs that squeeze each other support the torso like an arch: horizontal forces on the feet whose sum
+and moment vanish carry a part of the femurs' load. They use friction, and a foot that uses more of
+its friction slips more. The planned squeeze minimises a weighted sum of both, the squared torques
+of all servos and the squared use of friction (C42), which has a closed form. `squeeze` in [0, 1) is
+the weight: 0 plans no squeeze, and towards 1 the torques alone count. No foot is planned to use
+more than a share of its friction (C43).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from hexapod_cosim.controller.comply.support import LEAST_LOAD, Shares, solve
+from hexapod_cosim.controller.plane import Array, Plane, across, square
+from hexapod_cosim.controller.walk.inverse_dynamics import Demand
+
+MOST_FRICTION = 0.7  # 1    share of its friction that a foot is planned to use at most
+TRIPOD_SHARE = 1.0 / 3.0  # 1    of the weight: the load at which both sums are compared
+LEAST_PUSH = 1e-12  # N    floor of a change of a force that a factor is divided by
+
+
+class PlannedSqueeze:
+    """Computes the squeeze of one robot.
+
+    friction: the coefficient of friction that is believed; weight: of the robot [N]; depth: of the
+    ground below the torso's origin in the stance [m].
+    """
+
+    def __init__(self, *, friction: float, weight: float, depth: float) -> None:
+        self.friction = friction
+        self.torque = depth * TRIPOD_SHARE * weight  # N m    of a tripod's load at this arm
+
+    def _yielding(self, lever: Array, normal: Array, price: float) -> tuple[Array, Array, Array]:
+        """Returns xx, xy, yy (6,) of (J J^T + price/f_n^2)^-1 [1/m2], 0 without a load (C42).
+
+        lever: (6, 3, 3) J^T [m]; normal: (6,) [N]; price [N2 m2].
+        """
+        x, y, n = lever[:, :, 0], lever[:, :, 1], normal * normal
+        xx = n * (x * x).sum(axis=1) + price
+        xy = n * (x * y).sum(axis=1)
+        yy = n * (y * y).sum(axis=1) + price
+        part = n / (xx * yy - xy * xy)
+        return part * yy, -part * xy, part * xx
+
+    def _limit(self, before: Plane, change: Plane, normal: Array) -> float:
+        """Returns the factor on all changes (6,) that keeps each foot within its friction (C43)."""
+        room = MOST_FRICTION * self.friction * normal - np.sqrt(square(before))
+        factor = room / np.maximum(np.sqrt(square(change)), LEAST_PUSH)
+        return min(max(float(factor[normal > LEAST_LOAD].min(initial=1.0)), 0.0), 1.0)
+
+    def add(self, feet: Plane, demand: Demand, shares: Shares, squeeze: float) -> Shares:
+        """Returns shares with the squeeze added; the sums of forces and moments stay.
+
+        Args:
+            feet: (6,) contact points x + i y, walking frame [m].
+            demand: torques and levers of the planned motion.
+            shares: without squeeze (C19, C20).
+            squeeze: weight of the torques, in [0, 1).
+        """
+        if not squeeze > 0.0 or not self.friction > 0.0:
+            return shares
+        normal, push, lever = shares.normal, shares.push, demand.lever
+        price = (1.0 / squeeze - 1.0) * (self.torque / self.friction) ** 2
+        xx, xy, yy = self._yielding(lever, normal, price)
+        # torques that remain for the horizontal forces
+        left = demand.torque - lever[:, :, 2] * normal[:, None]
+        gx, gy = (lever[:, :, 0] * left).sum(axis=1), (lever[:, :, 1] * left).sum(axis=1)
+        wanted = xx * gx + xy * gy + 1j * (xy * gx + yy * gy)
+        # multipliers of the sums of forces and of moments about the centre of the load
+        arm = feet - (normal @ feet) / max(normal.sum(), LEAST_LOAD)
+        x, y = arm.real, arm.imag
+        tx, ty = xy * x - xx * y, yy * x - xy * y
+        system = np.array(
+            [
+                [xx.sum(), xy.sum(), tx.sum()],
+                [xy.sum(), yy.sum(), ty.sum()],
+                [tx.sum(), ty.sum(), (ty * x - tx * y).sum()],
+            ]
+        )
+        over = wanted - push
+        total, twist = over.sum(), float(across(arm, over).sum())
+        a, b, c = solve(system, (total.real, total.imag, twist)).tolist()
+        held = xx * a + xy * b + tx * c + 1j * (xy * a + yy * b + ty * c)
+        change = over - held
+        return shares._replace(push=push + self._limit(push, change, normal) * change)
