@@ -1,9 +1,8 @@
-/* smooth.h - nearest points of a smooth surface (eq. 31, 32), on lanes: the kernels compute the
- * feet of a pack at once; surface.c has one lane, with the same bits */
+/* smooth.h - nearest points of a smooth surface (eq. 31, 32) to a pack of points: the kernels
+ * include it behind lanes.h, surface.c behind one_lane.h, with the same bits for each point */
 #ifndef HX_SMOOTH_H
 #define HX_SMOOTH_H
 
-#include "../lanes/lanes.h"
 #include "surface.h"
 
 /* Height over a point, its first and second derivatives. */

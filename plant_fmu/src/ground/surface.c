@@ -1,5 +1,3 @@
-#define HX_LANES 1 /* the surface at one point */
-
 #include "surface.h"
 
 #include <math.h>
@@ -7,8 +5,10 @@
 #include <string.h>
 
 #include "hexapod/message.h"
-#include "smooth.h"
+#include "one_lane.h"
 #include "soil.h"
+
+#include "smooth.h" /* behind the numbers that it computes with */
 
 const double hx_far = 1e3;
 
