@@ -190,6 +190,21 @@ def test_a_grid_that_is_missing_or_too_fine_for_the_feet_is_refused(core: ct.CDL
     assert plant.save() == before
 
 
+@pytest.mark.parametrize("kind", [1, BLOCKS])
+def test_a_foot_deeper_than_its_radius_at_the_start_is_refused_with_its_depth(
+    core: ct.CDLL, kind: int
+) -> None:
+    ground = Ground(core, grid_bytes(np.zeros((81, 81)), cell=0.05, origin=(-2, -2), kind=kind))
+    plant = on_grid(core, ATHENA, ground, position=(0.0, 0.0, 1.0))
+    above = float(np.min(np.array(plant.output().foot.position)[:, 2]))  # lowest points
+    before = plant.save()
+    refused = r"got foot LF 0\.02 m deep .* at most its radius, 0\.015 m; raise .* by 0\.005 m"
+    with pytest.raises(PlantError, match=refused):
+        start_on_grid(plant, ground, position=(0.0, 0.0, 1.0 - above - 0.02))
+    assert plant.save() == before
+    start_on_grid(plant, ground, position=(0.0, 0.0, 1.0 - above + 1e-6))
+
+
 def test_derivatives_on_a_smooth_grid_are_those_of_differences(core: ct.CDLL) -> None:
     ground = Ground(core, rough(6))
     robot = changed(ATHENA, solver={"tolerance": 1e-8})
