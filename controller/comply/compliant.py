@@ -20,15 +20,17 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from hexapod_cosim.controller.comply.compliance import Compliance, Plan
+from hexapod_cosim.controller.comply.planned_squeeze import PlannedSqueeze
 from hexapod_cosim.controller.comply.posture import Posture
-from hexapod_cosim.controller.comply.support import Support
+from hexapod_cosim.controller.comply.support import Shares, Support
 from hexapod_cosim.controller.gains import Gains
 from hexapod_cosim.controller.memory import Stateful
 from hexapod_cosim.controller.parts import Parts
 from hexapod_cosim.controller.plane import LEGS, Array, Plane, cis, clamp
+from hexapod_cosim.controller.sense.warmth import Warmth
 from hexapod_cosim.controller.walk.gait import Gait
 from hexapod_cosim.controller.walk.hold import Hold, Sight
-from hexapod_cosim.controller.walk.inverse_dynamics import InverseDynamics
+from hexapod_cosim.controller.walk.inverse_dynamics import Demand, InverseDynamics
 from hexapod_cosim.controller.walk.kinematics import LegSolver
 from hexapod_cosim.controller.walk.trajectory import Twist
 from hexapod_cosim.models import Robot
@@ -37,6 +39,21 @@ if TYPE_CHECKING:
     from hexapod_cosim.controller.controller import JointCommand, Measurement
 
 STEERING_TIME = 0.1  # s    duration of the ramp from one added velocity to the next
+
+
+def sense(measurement: Measurement, posture: Posture) -> Array:
+    """Returns the foot forces (6, 3) in the walking frame [N]: f_K = R_KT R_TW f_W (C22)."""
+    w, x, y, z = measurement.quaternion.tolist()
+    xx, yy, zz = x * x, y * y, z * z
+    rotation = np.array(
+        [
+            [1.0 - 2.0 * (yy + zz), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)],
+            [2.0 * (x * y + w * z), 1.0 - 2.0 * (xx + zz), 2.0 * (y * z - w * x)],
+            [2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (xx + yy)],
+        ]
+    )  # R_WT
+    force = measurement.foot_force @ rotation
+    return force if posture.level else np.asarray(force @ posture.rotation.T)
 
 
 class Stance(NamedTuple):
@@ -67,6 +84,7 @@ class Compliant(Stateful):
     Attributes:
         laws: the force laws.
         hold: the slow loops.
+        warmth: of the servos.
         steering: of the path.
         count: number of completed periods.
         offset: (6,) height offsets of early and late touch-downs at the last period [m].
@@ -74,7 +92,7 @@ class Compliant(Stateful):
         stance: that of the last step; not part of the state.
     """
 
-    STATE = ("laws", "hold", "steering", "count", "offset", "moving")
+    STATE = ("laws", "hold", "warmth", "steering", "count", "offset", "moving")
 
     def __init__(
         self,
@@ -89,16 +107,23 @@ class Compliant(Stateful):
         self.legs, self.per_second, self.leading = legs, 1.0 / period, STEERING_TIME / period
         self.dynamics = InverseDynamics(robot, legs, period=period)
         self.support = Support(robot, gait, gains.support, rest=self.dynamics.rest())
+        self.squeeze = PlannedSqueeze(
+            friction=robot.friction.mu, weight=robot.weight, depth=-self.dynamics.floor
+        )
         self.laws = Compliance(
             gains,
             parts,
             weight=robot.weight,
+            depth=-self.dynamics.floor,
             cycle=gait.period,
             kp=robot.servo.kp,
             step_height=gait.step_height,
             period=period,
         )
         self.hold = Hold(gains.hold, parts, period=period)
+        self.warmth = Warmth(
+            rating=robot.servo.torque_continuous, squeeze=parts.squeeze, period=period
+        )
         self.stance: Stance
         self.reset()
 
@@ -106,8 +131,15 @@ class Compliant(Stateful):
         """Resets all laws and the slow loops to their initial states."""
         self.laws.reset()
         self.hold.reset()
+        self.warmth.reset()
         self.steering, self.count = NO_STEERING, 0
         self.offset, self.moving = np.zeros(LEGS), False
+
+    def shares(self, feet: Plane, activation: Array, demand: Demand) -> Shares:
+        """Returns the planned forces of feet (6,) x + i y, walking frame [m] (C19, C20, C42)."""
+        moment = demand.moment + demand.weight * self.laws.lean
+        shares = self.support.shares(feet, activation, demand._replace(moment=moment))
+        return self.squeeze.add(feet, demand, shares, self.warmth.squeeze)
 
     # ------------------------------------------------------------------------------- steering
 
@@ -140,20 +172,6 @@ class Compliant(Stateful):
         self.steering = Steering(self.addition(0), lost if moves else Twist(0j, 0.0), 0)
 
     # -------------------------------------------------------------------------------- sensors
-
-    def _sense(self, measurement: Measurement, posture: Posture) -> Array:
-        """Returns the foot forces (6, 3) in the walking frame [N]: f_K = R_KT R_TW f_W (C22)."""
-        w, x, y, z = measurement.quaternion.tolist()
-        xx, yy, zz = x * x, y * y, z * z
-        rotation = np.array(
-            [
-                [1.0 - 2.0 * (yy + zz), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)],
-                [2.0 * (x * y + w * z), 1.0 - 2.0 * (xx + zz), 2.0 * (y * z - w * x)],
-                [2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (xx + yy)],
-            ]
-        )  # R_WT
-        force = measurement.foot_force @ rotation
-        return force if posture.level else np.asarray(force @ posture.rotation.T)
 
     def _look(self, measurement: Measurement, stance: Stance) -> None:
         """Passes feet, loads and attitude, as measured, to the slow loops."""
@@ -195,7 +213,7 @@ class Compliant(Stateful):
         Returns the shift of the feet by all corrections, walking frame (6, 3) [m].
         """
         laws, self.stance = self.laws, stance
-        laws.step(stance.plan, self._sense(measurement, stance.posture))
+        laws.step(stance.plan, sense(measurement, stance.posture))
         if self.count % self.hold.every == 0:
             if laws.trust == 1.0:
                 self._look(measurement, stance)
@@ -206,6 +224,8 @@ class Compliant(Stateful):
         raised = offset + self.hold.lift
         output.angle_ref[...] = self._correct(output.angle_ref, climb, raised)
         output.torque_ref[...] = laws.torque
+        burden = laws.burden
+        self.warmth.step(laws.torque, burden.heft * burden.peak / burden.most)
         if busy or self.moving:
             rise = (offset - self.offset) * self.per_second
             output.speed_ref[...] += climb * rise[:, None]

@@ -304,6 +304,21 @@ static const hxControllerDefinition default_definition = {
     .parts.path = 1,
     .parts.limits = 1,
     .parts.fallback = 1,
+    .gains.paper_slip.kp = 0.0,
+    .gains.paper_slip.ki = 0.0,
+    .gains.paper_slip.kd = 0.0,
+    .gains.paper_slip.derivative_time = 0.01,
+    .gains.paper_slip.filter_time = 0.01,
+    .gains.paper_slip.load_time = 0.03,
+    .gains.paper_slip.tracking_time = 0.01,
+    .gains.paper_slip.limit = 0.015,
+    .gains.paper_suspension.mass = 6.184645049528298,
+    .gains.paper_suspension.damping = 388.5927090531717,
+    .gains.paper_suspension.stiffness = 6104.0,
+    .gains.paper_suspension.limit = 0.015,
+    .parts.squeeze = 0.48,
+    .friction = 0.7,
+    .servo.torque_continuous = 1.2,
 };
 
 void hx_controller_definition_default(hxControllerDefinition *definition) {
@@ -368,7 +383,7 @@ const char *hx_version(void) {
 }
 
 static const hxRange definition_ranges[] = {
-    {"control", "", 1, 2, offsetof(hxControllerDefinition, control), 1},
+    {"control", "", 1, 3, offsetof(hxControllerDefinition, control), 1},
     {"period", "s", 0.0001, 10.0, offsetof(hxControllerDefinition, period), 0},
     {"torso.mass", "kg", 1e-09, 1000000000.0, offsetof(hxControllerDefinition, torso.mass), 0},
     {"torso.com[1]", "m", -100.0, 100.0, offsetof(hxControllerDefinition, torso.com[0]), 0},
@@ -667,6 +682,21 @@ static const hxRange definition_ranges[] = {
     {"parts.path", "", -DBL_MAX, DBL_MAX, offsetof(hxControllerDefinition, parts.path), 1},
     {"parts.limits", "", -DBL_MAX, DBL_MAX, offsetof(hxControllerDefinition, parts.limits), 1},
     {"parts.fallback", "", -DBL_MAX, DBL_MAX, offsetof(hxControllerDefinition, parts.fallback), 1},
+    {"gains.paper_slip.kp", "m/N", -1000000.0, 1000000.0, offsetof(hxControllerDefinition, gains.paper_slip.kp), 0},
+    {"gains.paper_slip.ki", "m/(N.s)", -1000000.0, 1000000.0, offsetof(hxControllerDefinition, gains.paper_slip.ki), 0},
+    {"gains.paper_slip.kd", "m.s/N", -1000000.0, 1000000.0, offsetof(hxControllerDefinition, gains.paper_slip.kd), 0},
+    {"gains.paper_slip.derivative_time", "s", 1e-09, 1000000.0, offsetof(hxControllerDefinition, gains.paper_slip.derivative_time), 0},
+    {"gains.paper_slip.filter_time", "s", 1e-09, 1000000.0, offsetof(hxControllerDefinition, gains.paper_slip.filter_time), 0},
+    {"gains.paper_slip.load_time", "s", 1e-09, 1000000.0, offsetof(hxControllerDefinition, gains.paper_slip.load_time), 0},
+    {"gains.paper_slip.tracking_time", "s", 1e-09, 1000000.0, offsetof(hxControllerDefinition, gains.paper_slip.tracking_time), 0},
+    {"gains.paper_slip.limit", "m", 1e-09, 10.0, offsetof(hxControllerDefinition, gains.paper_slip.limit), 0},
+    {"gains.paper_suspension.mass", "kg", 1e-09, 1000000000.0, offsetof(hxControllerDefinition, gains.paper_suspension.mass), 0},
+    {"gains.paper_suspension.damping", "N.s/m", 0.0, 1000000000.0, offsetof(hxControllerDefinition, gains.paper_suspension.damping), 0},
+    {"gains.paper_suspension.stiffness", "N/m", 1e-09, 1000000000000.0, offsetof(hxControllerDefinition, gains.paper_suspension.stiffness), 0},
+    {"gains.paper_suspension.limit", "m", 1e-09, 10.0, offsetof(hxControllerDefinition, gains.paper_suspension.limit), 0},
+    {"parts.squeeze", "", 0.0, 0.99, offsetof(hxControllerDefinition, parts.squeeze), 0},
+    {"friction.mu", "", 0.0, 100.0, offsetof(hxControllerDefinition, friction), 0},
+    {"servo.torque_continuous", "N.m", 1e-09, 100000000.0, offsetof(hxControllerDefinition, servo.torque_continuous), 0},
 };
 
 size_t hx_controller_definition_ranges(const hxRange **range) {

@@ -262,7 +262,7 @@ def _fmu_path(output: Path | None, name: str) -> Path:
 def _controller_setup(robot: Robot, options: ControllerOptions) -> ControllerSetup:
     """Builds the controller's setup; shows a warning for gains of another robot or period."""
     gains = given_gains(options.gains)
-    designs = options.control == "compliant" and gains is None
+    designs = options.control != "kinematic" and gains is None
     with waiting("designing the gains" if designs else None):
         setup = make_setup(
             robot, control=options.control, period=options.period, gait=options.gait, gains=gains

@@ -342,20 +342,30 @@ class Fmu:
 
         Raises FmuError.
         """
-        calls = (
-            lambda: self._slave.setupExperiment(startTime=start, stopTime=stop),
-            self._slave.enterInitializationMode,
-            self._slave.exitInitializationMode,
+        self._begin_initialisation(start, stop)
+        self._end_initialisation()
+
+    def _begin_initialisation(self, start: float, stop: float) -> None:
+        """Enters initialisation mode. Raises FmuError."""
+        self._call_to_initialise(
+            lambda: self._slave.setupExperiment(startTime=start, stopTime=stop)
         )
-        for call in calls:
-            self.clear_log()
-            try:
-                call()
-            except Exception as error:
-                message = self._log[-1] if self._log else str(error)
-                raise FmuError(
-                    "the FMU cannot be initialised", got=message, where=str(self.path)
-                ) from error
+        self._call_to_initialise(self._slave.enterInitializationMode)
+
+    def _end_initialisation(self) -> None:
+        """Leaves initialisation mode. Raises FmuError."""
+        self._call_to_initialise(self._slave.exitInitializationMode)
+
+    def _call_to_initialise(self, call: Callable[[], Any]) -> None:
+        """Calls a function of fmpy. Raises FmuError with the FMU's last message."""
+        self.clear_log()
+        try:
+            call()
+        except Exception as error:
+            message = self._log[-1] if self._log else str(error)
+            raise FmuError(
+                "the FMU cannot be initialised", got=message, where=str(self.path)
+            ) from error
 
     def reset(self) -> None:
         """Resets the instance to its start values, not initialised. Raises FmuError."""

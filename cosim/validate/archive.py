@@ -1,5 +1,5 @@
 """Checks the files of an FMU's archive besides modelDescription.xml: ZIP format, sources, binaries,
-terminals, documentation, licence.
+terminals, documentation, licence, grids.
 """
 
 from __future__ import annotations
@@ -8,6 +8,7 @@ import posixpath
 import re
 import stat
 import zipfile
+import zlib
 from collections.abc import Iterable, Iterator
 from pathlib import Path, PurePosixPath
 from xml.etree import ElementTree
@@ -22,6 +23,7 @@ from hexapod_cosim.cosim.validate.description import (
     schema_problems,
     variables,
 )
+from hexapod_cosim.cosim.validate.grids import grid_problems
 from hexapod_cosim.cosim.validate.variable import INTERFACES
 
 DESCRIPTION, PAGE = "modelDescription.xml", "documentation/index.html"
@@ -76,13 +78,21 @@ def archive_problems(path: Path) -> list[str]:
 
 
 def read_members(path: Path) -> tuple[dict[str, bytes] | None, list[str]]:
-    """Returns the archive's files by path (None if one is damaged) and its problems as a ZIP."""
+    """Returns the archive's files by path (None if one is damaged) and its problems as a ZIP.
+
+    The problems of a damaged archive are the names of its damaged files.
+    """
+    found, damaged = {}, []
     with zipfile.ZipFile(path) as archive:
-        damaged = archive.testzip()
-        if damaged:
-            return None, [f"{damaged} is damaged: its checksum is wrong"]
-        found = {name: archive.read(name) for name in archive.namelist() if not name.endswith("/")}
-        return found, list(zip_problems(archive))
+        for name in archive.namelist():
+            try:
+                found[name] = archive.read(name)
+            except zipfile.BadZipFile:
+                damaged.append(f"{name} is damaged: its checksum is wrong")
+            except zlib.error:
+                damaged.append(f"{name} is damaged: it cannot be unpacked")
+        files = {name: data for name, data in found.items() if not name.endswith("/")}
+        return (None, damaged) if damaged else (files, list(zip_problems(archive)))
 
 
 def member_problems(
@@ -101,6 +111,7 @@ def member_problems(
         binary_problems(root, found, fmi),
         terminal_problems(set(names), found),
         document_problems(found, fmi),
+        grid_problems(found),
     )
     return [problem for check in checks for problem in check]
 

@@ -18,7 +18,7 @@ from hexapod_cosim.cosim.common.plant_files import fmi2_platform, packed_binary
 from hexapod_cosim.cosim.interface.descriptions import open_description, read_description
 from hexapod_cosim.cosim.master.fmu import Fmu
 from hexapod_cosim.cosim.master.signals import Signals
-from hexapod_cosim.cosim.validate.archive import DESCRIPTION, archive_problems
+from hexapod_cosim.cosim.validate.archive import DESCRIPTION, archive_problems, read_members
 from hexapod_cosim.cosim.validate.description import description_problems, schema_problems
 from hexapod_cosim.cosim.validate.description3 import description_problems3
 from hexapod_cosim.cosim.validate.start_value import START_VALUES, start_value_problems
@@ -72,7 +72,10 @@ def find_own_problems(path: Path) -> list[str]:
 
     An FMU without a binary for this machine is not run. Raises FmuError for a file that is no FMU.
     """
-    description, problems = read_description(path), archive_problems(path)
+    description, (found, damaged) = read_description(path), read_members(path)
+    if found is None:
+        return damaged
+    problems = archive_problems(path)
     with zipfile.ZipFile(path) as archive:
         names = archive.namelist()
         data = archive.read(START_VALUES) if START_VALUES in names else None

@@ -1197,7 +1197,7 @@ const size_t hx_state_count = sizeof states / sizeof states[0];
 
 _Static_assert(sizeof states / sizeof states[0] == sizeof(hxCoordinates) / sizeof(double), "each state has its row");
 
-const char hx_default_guid[] = "{93b2dcf8-9af0-42bf-8178-6653a395bfd9}";
+const char hx_default_guid[] = "{175432f1-f885-4519-b29e-6b37b27e1ac2}";
 
 _Static_assert(HX_CONTACT_EXACT_RESTITUTION == 1, "ContactLaw");
 _Static_assert(HX_CONTACT_FLORES == 2, "ContactLaw");

@@ -1,12 +1,12 @@
 #include <float.h>
 #include <math.h>
 #include <stdint.h>
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "contact_law.h"
 #include "ground/surface.h"
+#include "hexapod/message.h"
 #include "hexapod/range_check.h"
 #include "kernel.h"
 #include "robot.h"
@@ -34,7 +34,7 @@ static uint64_t checksum(const hxSavedPlant *saved) {
 
 /* Sets the plant's message and returns the status. */
 static hxStatus fail(hxPlant *plant, hxStatus status, const char *text) {
-  snprintf(plant->message, HX_MESSAGE_SIZE, "%s", text);
+  hx_print(plant->message, HX_MESSAGE_SIZE, "%s", text);
   return status;
 }
 
@@ -58,7 +58,7 @@ void hx_plant_set_terrain(hxPlant *plant, const hxTerrain *terrain) { plant->ter
 static hxStatus check_terrain(const hxPlant *plant, const hxDefinition *d, char *message) {
   if (d->terrain.kind != HX_TERRAIN_GRID) return HX_OK;
   if (!plant->terrain) {
-    snprintf(message, HX_MESSAGE_SIZE,
+    hx_print(message, HX_MESSAGE_SIZE,
              "terrain.kind: got grid, expected a grid; load one and set it before the reset "
              "(hx_plant_set_terrain), or choose flat or slope");
     return HX_INVALID_MODEL;
@@ -67,7 +67,7 @@ static hxStatus check_terrain(const hxPlant *plant, const hxDefinition *d, char 
                              fmax(d->body.knee_radius, d->body.shank_radius));
   const double cell = hx_terrain_cell_size(plant->terrain);
   if (hx_terrain_surface(plant->terrain) == HX_SURFACE_SMOOTH || cell >= 2.0 * radius) return HX_OK;
-  snprintf(message, HX_MESSAGE_SIZE,
+  hx_print(message, HX_MESSAGE_SIZE,
            "terrain.grid: got blocks with cells of %.9g m, expected at least %.9g m, twice the "
            "largest radius that touches them; resample the grid, or reduce foot.radius",
            cell, 2.0 * radius);
@@ -83,7 +83,7 @@ static hxStatus check_start_depth(const hxPlant *plant, char message[HX_MESSAGE_
   hx_kernel()->depths(&plant->model, &plant->state.contact, &plant->state.motion, &depths);
   for (int leg = 0; leg < HX_LEGS; ++leg)
     if (delta[leg] > radius) {
-      snprintf(message, HX_MESSAGE_SIZE,
+      hx_print(message, HX_MESSAGE_SIZE,
                "initial.position: got foot %s %.4g m deep in the ground, expected at most its "
                "radius, %.4g m; raise initial.position[3] by %.4g m or more, or lower "
                "terrain.height",
@@ -156,7 +156,7 @@ static hxStatus advance(hxPlant *plant, const hxInput *input, const hxInput *rat
         plant, HX_INVALID_ARGUMENT,
         "rates of inputs: got a number that is not finite, expected finite rates per second");
   if (!(t_end >= plant->state.time && t_end <= DBL_MAX)) {
-    snprintf(plant->message, HX_MESSAGE_SIZE,
+    hx_print(plant->message, HX_MESSAGE_SIZE,
              "end of step: got %.17g s, expected a finite time of at least %.17g s", t_end,
              plant->state.time);
     return HX_INVALID_ARGUMENT;
@@ -233,7 +233,7 @@ void hx_plant_get_state(const hxPlant *plant, void *bytes) {
 hxStatus hx_plant_set_state(hxPlant *plant, const void *bytes, size_t size) {
   hxSavedPlant saved;
   if (size != sizeof saved) {
-    snprintf(plant->message, HX_MESSAGE_SIZE,
+    hx_print(plant->message, HX_MESSAGE_SIZE,
              "saved state: got %zu bytes, expected %zu; save it again with this version", size,
              sizeof saved);
     return HX_BAD_STATE;

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import ctypes as ct
 from collections.abc import Callable
-from dataclasses import fields, replace
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -20,6 +20,7 @@ from hexapod_cosim.controller import (
     Gait,
     LegSolver,
     Measurement,
+    SWITCHES,
     Parts,
     make_gait,
 )
@@ -160,6 +161,25 @@ def test_a_walk_is_the_same(
     assert not fallback.any()
 
 
+@pytest.mark.parametrize("name", ROBOTS)
+def test_a_walk_under_the_papers_control_is_the_same(controller_core: ct.CDLL, name: str) -> None:
+    """The forces are drawn at random, up to both limits of the corrections."""
+    generator = np.random.default_rng(5)
+
+    def sense(_: Controller, step: int, measurement: Measurement) -> None:
+        size = 1.0 + 9.0 * (step % 400 > 350)
+        measurement.foot_force[:] = size * (
+            generator.normal(size=(6, 3)) * 5.0 + [8.0 * (step % 900 > 700), 0.0, 10.0]
+        )
+        turn = np.array([1.0, *(0.02 * generator.normal(size=3))])
+        measurement.quaternion[:] = turn / np.linalg.norm(turn)
+
+    setup = replace(setup_of(name), law="paper")
+    worst, fallback = differences(controller_core, setup, sense=sense)
+    assert close(worst)
+    assert not fallback.any()
+
+
 def dead_and_stuck(force: np.ndarray, step: int) -> None:
     force[1] *= not 400 <= step < 900  # the sensor reads nothing
     if 700 <= step < 1100:
@@ -214,7 +234,9 @@ def test_sensors_that_lie_ground_that_is_missing_and_slides_are_answered_at_the_
         ground(controller, step, measurement)
         spoil(measurement.foot_force, step)
 
-    worst, fallback = differences(controller_core, setup_of(name), sense=sense)
+    # with a planned squeeze even four times the weight does not ask too much of the second robot
+    setup = setup_of(name, parts=Parts(squeeze=0.0))
+    worst, fallback = differences(controller_core, setup, sense=sense)
     assert close(worst)
     assert fallback.any() or spoil is uneven
 
@@ -262,7 +284,7 @@ def test_joints_that_are_outrun_fall_back_at_the_same_step(controller_core: ct.C
     assert not fallback[-1].any()
 
 
-@pytest.mark.parametrize("part", [item.name for item in fields(Parts)])
+@pytest.mark.parametrize("part", SWITCHES)
 def test_each_part_can_be_switched_off(controller_core: ct.CDLL, part: str) -> None:
     ground = Ground()
 
@@ -278,6 +300,16 @@ def test_each_part_can_be_switched_off(controller_core: ct.CDLL, part: str) -> N
             steps=900,
         )[0]
     )
+
+
+@pytest.mark.parametrize("gait", ["tripod", "amble"])
+@pytest.mark.parametrize("weight", [0.0, 0.1, 0.5, 0.99])
+def test_walks_with_a_planned_squeeze_are_the_same(
+    controller_core: ct.CDLL, weight: float, gait: str
+) -> None:
+    setup = setup_of(gait=gait, parts=Parts(squeeze=weight))
+    worst, _ = differences(controller_core, setup, sense=Ground(), steps=1000)
+    assert close(worst)
 
 
 def test_another_period_gait_and_touch_down_speed_are_the_same_too(
@@ -471,7 +503,7 @@ def test_a_clock_that_is_off_by_round_off_ticks_all_the_same(
         ("servo.kp", 0.0, "servo.kp: got 0"),
         ("LM.femur.stance", 3.0, "LM.femur.stance: got 3, expected an angle between"),
         ("gains.slip.kp", np.nan, "gains.slip.kp: got"),
-        ("control", 3, "control: got 3, expected 1 to 2"),
+        ("control", 4, "control: got 4, expected 1 to 3"),
         ("gait.pattern", 0, "gait.pattern: got 0, expected 1 to 5"),
     ],
 )

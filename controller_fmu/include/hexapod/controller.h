@@ -18,7 +18,8 @@ extern "C" {
 
 typedef enum hxControl {
   HX_CONTROL_KINEMATIC = 1, /* follows the paths, uses no measurement */
-  HX_CONTROL_COMPLIANT      /* also reacts to the measured forces */
+  HX_CONTROL_COMPLIANT,     /* also reacts to the measured forces */
+  HX_CONTROL_PAPER          /* corrects the paths by the measured forces as the paper does */
 } hxControl;
 
 /* Pattern of a gait: phase offsets by name, or given ones. */
@@ -93,11 +94,29 @@ typedef struct hxGains {
     double speed;   /* rad/s  fastest change of an angle's correction */
     double torque;  /* N m    largest feed-forward torque */
   } limits;
+  struct {
+    double kp;               /* m/N */
+    double ki;               /* m/(N s) */
+    double kd;               /* m s/N */
+    double derivative_time;  /* s    filter of the derivative */
+    double filter_time;      /* s    force filter */
+    double load_time;        /* s    decay of the shift of a swinging foot */
+    double tracking_time;    /* s    anti-windup */
+    double limit;            /* m    largest shift */
+  } paper_slip;
+  struct {
+    double mass;       /* kg */
+    double damping;    /* N s/m */
+    double stiffness;  /* N/m */
+    double limit;      /* m    largest deflection */
+  } paper_suspension;
 } hxGains;
 
-/* Switches, 1 or 0: enabled parts of the compliant control. */
+/* Switches, 1 or 0: enabled parts of the compliant control; and the weight of the squeeze. */
 typedef struct hxParts {
   int support, slip_pid, suspension, touchdown, posture, path, limits, fallback;
+  /* 1  weight of the servos' torques against the feet's use of friction in the planned squeeze */
+  double squeeze;
 } hxParts;
 
 /* The controller's model of the robot, the gait and the laws. hx_controller_definition_default sets
@@ -113,11 +132,13 @@ typedef struct hxControllerDefinition {
   hxKnownLeg leg[HX_LEGS];
   double foot_radius;        /* m */
   double contact_stiffness;  /* N/m^1.5  of a foot on the ground */
+  double friction;           /* 1        coefficient of friction that is believed */
   struct {
     double kp;                /* N m/rad */
     double speed_max;         /* rad/s */
     double rotor_inertia;     /* kg m2  seen at the joint */
     double coulomb_friction;  /* N m    in the gear */
+    double torque_continuous; /* N m    that it can give for ever */
   } servo;
   double gravity[3];  /* m/s2 */
   hxGait gait;

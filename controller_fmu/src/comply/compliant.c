@@ -5,6 +5,27 @@
 /* s, duration of the transition of the added velocity */
 static const double steering_time = 0.1;
 
+void hx_sense(const hxControllerInput *input, const hxPosture *posture, double force[HX_LEGS][3]) {
+  const double w = input->quaternion[0], x = input->quaternion[1], y = input->quaternion[2],
+               z = input->quaternion[3];
+  const double xx = x * x, yy = y * y, zz = z * z;
+  const double rotation[3][3] = {
+      {1.0 - 2.0 * (yy + zz), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)},
+      {2.0 * (x * y + w * z), 1.0 - 2.0 * (xx + zz), 2.0 * (y * z - w * x)},
+      {2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (xx + yy)}};
+  for (int leg = 0; leg < HX_LEGS; ++leg) {
+    const double *f = input->foot_force[leg];
+    double seen[3];
+    for (int i = 0; i < 3; ++i)
+      seen[i] = f[0] * rotation[0][i] + f[1] * rotation[1][i] + f[2] * rotation[2][i];
+    hxPlane plane = {seen[0], seen[1]};
+    hx_posture_turn(posture, &plane, &seen[2]);
+    force[leg][0] = plane.x;
+    force[leg][1] = plane.y;
+    force[leg][2] = seen[2];
+  }
+}
+
 void hx_compliant_compile(const hxControllerDefinition *definition, const hxLegSolver leg[HX_LEGS],
                           hxCompliantModel *model) {
   const double still[HX_LEGS][HX_JOINTS] = {{0.0}}, zero[3] = {0.0};
@@ -25,13 +46,17 @@ void hx_compliant_compile(const hxControllerDefinition *definition, const hxLegS
   const hxNeighbours motion = {{NULL, &masses, NULL}, {NULL, pose, NULL}};
   hx_inverse_dynamics_demand(&model->dynamics, leg, &motion, still, &level, &rest);
   hx_support_compile(definition, &rest, &model->support);
-  hx_compliance_compile(definition, &model->laws);
+  hx_compliance_compile(definition, -model->dynamics.floor, &model->laws);
+  hx_planned_squeeze_compile(definition->friction, model->laws.weight, -model->dynamics.floor,
+                             &model->squeeze);
   hx_hold_compile(definition, &model->hold);
+  hx_warmth_compile(definition, &model->warmth);
 }
 
-void hx_compliant_reset(hxCompliant *compliant) {
+void hx_compliant_reset(const hxCompliantModel *model, hxCompliant *compliant) {
   memset(compliant, 0, sizeof *compliant);
   hx_compliance_reset(&compliant->laws);
+  hx_warmth_reset(&model->warmth, &compliant->warmth);
 }
 
 /* ----------------------------------------------------------------------------------- steering */
@@ -60,29 +85,6 @@ void hx_compliant_steer(const hxCompliantModel *model, int64_t steps, int moves,
 }
 
 /* ------------------------------------------------------------------------------------ sensors */
-
-/* Computes the foot forces in the walking frame (C22): f_K = R_KT R_TW f_W. */
-static void sense(const hxControllerInput *input, const hxPosture *posture,
-                  double force[HX_LEGS][3]) {
-  const double w = input->quaternion[0], x = input->quaternion[1], y = input->quaternion[2],
-               z = input->quaternion[3];
-  const double xx = x * x, yy = y * y, zz = z * z;
-  const double rotation[3][3] = {
-      {1.0 - 2.0 * (yy + zz), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)},
-      {2.0 * (x * y + w * z), 1.0 - 2.0 * (xx + zz), 2.0 * (y * z - w * x)},
-      {2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (xx + yy)}};
-  for (int leg = 0; leg < HX_LEGS; ++leg) {
-    const double *f = input->foot_force[leg];
-    double seen[3];
-    for (int i = 0; i < 3; ++i)
-      seen[i] = f[0] * rotation[0][i] + f[1] * rotation[1][i] + f[2] * rotation[2][i];
-    hxPlane plane = {seen[0], seen[1]};
-    hx_posture_turn(posture, &plane, &seen[2]);
-    force[leg][0] = plane.x;
-    force[leg][1] = plane.y;
-    force[leg][2] = seen[2];
-  }
-}
 
 /* Passes the measured positions of the standing feet to the slow loops. */
 static void look(const hxCompliantModel *model, const hxLegSolver leg[HX_LEGS],
@@ -128,7 +130,7 @@ void hx_compliant_step(const hxCompliantModel *model, const hxLegSolver leg[HX_L
                        hxCompliant *compliant, hxControllerOutput *output) {
   hxCompliance *laws = &compliant->laws;
   double force[HX_LEGS][3];
-  sense(input, stance->posture, force);
+  hx_sense(input, stance->posture, force);
   hx_compliance_step(&model->laws, &stance->plan, force, laws);
   if (compliant->count % model->hold.every == 0) {
     if (laws->trust == 1.0)
@@ -154,4 +156,7 @@ void hx_compliant_step(const hxCompliantModel *model, const hxLegSolver leg[HX_L
     output->lift[k] = laws->shift[k][2] + raised;
   }
   if (busy || compliant->moving) compliant->moving = busy;
+  const double needed = laws->burden.heft * laws->burden.peak / model->laws.most;
+  hx_warmth_step(&model->warmth, (const double (*)[HX_JOINTS])laws->torque, needed,
+                 &compliant->warmth);
 }

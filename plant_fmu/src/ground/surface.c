@@ -1,10 +1,10 @@
 #include "surface.h"
 
 #include <math.h>
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
+#include "hexapod/message.h"
 #include "soil.h"
 
 /* The head of a grid file. */
@@ -35,7 +35,7 @@ static const double highest = 1e4, farthest = 1e6, cell_range[2] = {1e-4, 1e3};
 
 /* Writes what is wrong with a number of the head and returns 0. */
 static int refuse(char *message, const char *what, double got, const char *expected) {
-  snprintf(message, HX_MESSAGE_SIZE, "terrain grid: %s: got %.9g, expected %s", what, got,
+  hx_print(message, HX_MESSAGE_SIZE, "terrain grid: %s: got %.9g, expected %s", what, got,
            expected);
   return 0;
 }
@@ -46,7 +46,7 @@ static int is_within(double x, double low, double high) { return x >= low && x <
 static int check_head(const hxGridHead *head, char *message) {
   const int64_t least = head->kind == HX_SURFACE_SMOOTH ? 2 : 1;
   if (memcmp(head->magic, "hxGrid01", sizeof head->magic) != 0) {
-    snprintf(message, HX_MESSAGE_SIZE,
+    hx_print(message, HX_MESSAGE_SIZE,
              "terrain grid: got bytes that do not begin with hxGrid01, expected a grid file of "
              "version 1");
     return 0;
@@ -92,7 +92,7 @@ static int check_heights(const hxTerrain *terrain, char *message) {
     for (int64_t col = 0; col < cols; ++col) bad |= !(fabs(height[col]) <= highest);
     for (int64_t col = 0; bad && col < cols; ++col)
       if (!(fabs(height[col]) <= highest)) {
-        snprintf(message, HX_MESSAGE_SIZE,
+        hx_print(message, HX_MESSAGE_SIZE,
                  "terrain grid: height[%lld][%lld]: got %.9g, expected -1e4 to 1e4 m; fill gaps of "
                  "the map",
                  (long long)row, (long long)col, height[col]);
@@ -147,7 +147,7 @@ static int check_soil_of_blocks(const hxTerrain *terrain, char *message) {
   for (int64_t row = 0; row < terrain->head.rows; ++row)
     for (int64_t col = 0; col < terrain->head.cols; ++col)
       if (is_uneven_soil(terrain, row, col)) {
-        snprintf(
+        hx_print(
             message, HX_MESSAGE_SIZE,
             "terrain grid: material[%lld][%lld]: got soil on a block that is higher or lower than "
             "its neighbour, expected soil on level blocks; move it, or make the surface smooth",
@@ -181,7 +181,7 @@ hxTerrain *hx_terrain_create(const void *bytes, size_t size, char *message) {
   memcpy(&head, bytes, sizeof head);
   if (!check_head(&head, message)) return NULL;
   if (file_size(&head) != size) {
-    snprintf(message, HX_MESSAGE_SIZE,
+    hx_print(message, HX_MESSAGE_SIZE,
              "terrain grid: size: got %llu bytes, expected %llu for its rows, cols and materials; "
              "the file is cut off or damaged",
              (unsigned long long)size, (unsigned long long)file_size(&head));
@@ -189,7 +189,7 @@ hxTerrain *hx_terrain_create(const void *bytes, size_t size, char *message) {
   }
   hxTerrain *terrain = copy_file(&head, bytes, size);
   if (!terrain) {
-    snprintf(message, HX_MESSAGE_SIZE, "terrain grid: out of memory; free some and try again");
+    hx_print(message, HX_MESSAGE_SIZE, "terrain grid: out of memory; free some and try again");
     return NULL;
   }
   if (check_heights(terrain, message) && check_materials(terrain, message) &&

@@ -3,10 +3,9 @@
 #ifndef HX_INTEGRATOR_H
 #define HX_INTEGRATOR_H
 
-#include <stdio.h>
-
 #include "../contact_law.h"
 #include "../method.h"
+#include "hexapod/message.h"
 #include "measure.h"
 
 static const double step_floor = 1e-11; /* s  the error control fails below this step */
@@ -331,7 +330,7 @@ static double steps_allowed(double time) {
 /* Writes why no step of h from t succeeds, and returns the status. */
 static hxStatus step_failure(const hxTrial *trial, double t, double h, char *message) {
   const int lost = isnan(trial->error);
-  snprintf(message, HX_MESSAGE_SIZE,
+  hx_print(message, HX_MESSAGE_SIZE,
            lost ? "the motion is not finite any more at t = %.9g s (step %.3g s); check masses, "
                   "stiffness and inputs, or let the error control choose the step (solver.step = 0)"
                 : "the error control finds no step that meets the tolerance, or needs too many "
@@ -502,7 +501,7 @@ static hxStatus run_fixed(const hxModel *model, const hxCommand *command, const 
   const double t_start = command->time;
   const double count = fmax(1.0, ceil((t_end - t_start) / model->step - 1e-9));
   if (count > steps_allowed(t_end - t_start)) {
-    snprintf(message, HX_MESSAGE_SIZE,
+    hx_print(message, HX_MESSAGE_SIZE,
              "solver.step: got %.3g s, which makes %.0f steps of this call, expected at most %.0f; "
              "raise solver.step "
              "or make shorter calls",
