@@ -16,6 +16,9 @@ from states import changed
 from hexapod_cosim.models import Robot, load_robot
 from hexapod_cosim.models.dynamics import Command
 from hexapod_cosim.models.records import Array
+from hexapod_cosim.models.soil.law import table_row
+from hexapod_cosim.models.soil.presets import soil_preset
+from hexapod_cosim.models.statics import standing
 
 ATHENA = load_robot("athena")
 HEIGHT = 0.2  # m, of the torso above the ground at the start
@@ -247,3 +250,44 @@ def test_a_material_s_friction_and_stiffness_are_those_of_the_touch_down(core: c
     load = [foot.normal_force[foot.contact != 0].mean() for foot in feet]
     stiffness = [f / d**1.5 for f, d in zip(load, depth, strict=True)]
     assert stiffness[1] < 0.5 * stiffness[0]
+
+
+def test_a_rigid_patch_beside_a_footprint_carries_a_foot_at_its_surface(core: ct.CDLL) -> None:
+    """The feet in front leave prints in sand 10 mm before a rigid patch, and hop onto it, within
+    the radius of the prints.
+    """
+    robot = changed(ATHENA, foot={"pad_radius": 0.025}, body={"contact": "off"})
+    pose = standing(robot)
+    table = np.array([np.concatenate([[np.nan] * 3, table_row(soil_preset("dry_sand").soil)])])
+    material, front = np.ones((101, 101)), 0.2418825
+    material[:, 51:] = 0.0  # rigid from 10 mm before the front feet's second place on
+    file = grid_bytes(
+        np.zeros((101, 101)),
+        cell=0.1,
+        origin=(front + 0.01 - 5.05, -5.0),
+        material=material,
+        table=table,
+    )
+    ground = Ground(core, file)
+    plant = on_grid(
+        core,
+        robot,
+        ground,
+        position=np.add(pose.position, (0.0, 0.0, 1e-3)),
+        quaternion=pose.quaternion,
+        angle=pose.angle,
+    )
+    weight, landed, sunk = robot.weight, 0, 0.0
+    for k in range(80):
+        push = np.zeros(3)
+        if 10 <= k < 16:
+            push = np.array([0.4, 0.0, 4.0]) * weight
+        plant.step(0.005 * (k + 1), Command(angle_ref=robot.stance, push_force=push))
+        foot = plant.output().foot
+        for leg in (0, 3):
+            if k > 20 and foot.contact[leg] and foot.position[leg][0] > front + 0.01:
+                landed, sunk = landed + 1, max(sunk, float(foot.sinkage[leg]))
+    prints = plant.output().footprints
+    assert prints == 6
+    assert landed > 20
+    assert sunk == 0.0

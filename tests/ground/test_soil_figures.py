@@ -1,5 +1,5 @@
-"""Figures of the measured soils, from their published numbers: force, work and plastic depth of a pad,
-force of a sphere, shear strength. Twin and C plant have them.
+"""Figures of the measured soils, from their published numbers: force, work and plastic depth of a
+pad, force of a sphere, shear strength. Twin and C plant have them.
 
 The expected values were computed apart from this project: forces of spheres and works by numerical
 quadrature of the pressure over columns (Bekker) or surface elements (granular).
@@ -24,8 +24,8 @@ SPHERE = load_robot("athena").foot  # of 15 mm
 PAD = replace(SPHERE, pad_radius=0.025)
 DEPTH = 0.008  # m
 LOAD = 18.3  # N
-# force [N], work [J] of the pad; force [N] of the sphere; of the pad plastic depth [m], energy given
-# back [J], shear strength under LOAD [N]; shear displacement [m]
+# force [N], work [J] of the pad; force [N] of the sphere; of the pad plastic depth [m], energy that
+# it gives back [J], shear strength under LOAD [N]
 FIGURES = (
     ("dry_sand", 15.1978881, 0.0578967167, 2.33966694, 0.00798064945, 1.47043763e-4, 11.7723178),
     ("sandy_loam", 115.396706, 0.543043322, 22.6204918, 0.00785307235, 0.00847748336, 13.5210677),
@@ -33,7 +33,15 @@ FIGURES = (
     ("lete_sand", 400.34037, 1.78623701, 89.4799822, 0.00749027081, 0.102032586, 13.5918098),
     ("snow", 0.322074297, 9.90997836e-4, 0.0532308132, 0.00799958992, 6.60377484e-8, 8.5747489),
     ("lunar", 13.7601758, 0.0550407033, 2.26485094, 0.00798248, 1.2053914e-4, 13.1475922),
-    ("mars_simulant", 16.9815468, 0.0754735412, 4.03279974, 0.00797837842, 1.8358391e-4, 6.46453584),
+    (
+        "mars_simulant",
+        16.9815468,
+        0.0754735412,
+        4.03279974,
+        0.00797837842,
+        1.8358391e-4,
+        6.46453584,
+    ),
     (
         "poppy_seed_loose",
         3.98982267,
