@@ -344,7 +344,7 @@ static const double lost = 1e-4;
  * method may find none; the distance is then that of the plane at the point below, which is far,
  * too. */
 static void smooth_face(const hxTerrain *terrain, const double point[3], int bends, hxFace *face) {
-  enum { MOST = 16 };
+  enum { MOST = 64 }; /* steps of at most a cell each */
   const double cell = terrain->head.cell, area = cell * cell;
   double x = point[0], y = point[1];
   hxPatch p;
