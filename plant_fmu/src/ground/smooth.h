@@ -180,13 +180,17 @@ static inline void replace_nearest(hxMask mask, hxNearest new, hxNearest *neares
  * derivatives, and at a border the jump of the second ones, are left out. */
 static const double close = 1e-7, closest = 1e-14;
 
+/* Newton's method that still moves by this share of a cell, squared, has not found a point. */
+static const double lost = 1e-4;
+
 /* Computes the nearest points of a smooth surface to the lanes `wanted` by Newton's method on
  * their two parameters, from the points below moved by `start`. With `exactly`, also the second
- * derivatives belong to the nearest point. */
+ * derivatives belong to the nearest point. Far above a rough surface, beyond the centres of its
+ * curvature, the method may find none; the point below takes its place, which is far, too. */
 static inline hxNearest hx_nearest_on_surface(const hxTerrain *terrain, hxMask wanted,
                                               const hxReal point[3], const hxReal start[2],
                                               int exactly) {
-  enum { MOST = 16 };
+  enum { MOST = 64 }; /* steps of at most a cell each */
   const double area = terrain->head.cell * terrain->head.cell;
   hxReal x = point[0] + start[0], y = point[1] + start[1];
   hxMask active = wanted;
@@ -209,6 +213,11 @@ static inline hxNearest hx_nearest_on_surface(const hxTerrain *terrain, hxMask w
       found = end;
     else
       replace_nearest(done & active, end, &found);
+    if (i == MOST) {
+      set_stencil(terrain, point[0], point[1], &at);
+      const hxNearest below = {point[0], point[1], patch_at(&at), H};
+      replace_nearest(hx_less(hx_splat(lost * area), square) & active, below, &found);
+    }
     active &= ~done;
     if (!hx_any(active)) return found;
     const hxReal share = share_of_move(terrain, square);
