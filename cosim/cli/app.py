@@ -9,6 +9,7 @@ import typer
 from hexapod_cosim.cosim.cli import (
     benchmark_command,
     compare_command,
+    controller_command,
     export_command,
     fmu_commands,
     listing,
@@ -33,6 +34,7 @@ app.command("study", epilog=study_command.EPILOG)(study_command.study)
 app.command("benchmark", epilog=benchmark_command.EPILOG)(benchmark_command.benchmark)
 app.command("design")(fmu_commands.design)
 app.command("report")(run_commands.report)
+app.add_typer(controller_command.app, name="controller")
 app.command("validate")(fmu_commands.validate)
 app.command("terrain")(terrain_command.terrain)
 app.command("list")(listing.list_what)

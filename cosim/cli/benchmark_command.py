@@ -13,7 +13,7 @@ import typer
 from hexapod_cosim.controller import Gains
 from hexapod_cosim.cosim.cli import completion
 from hexapod_cosim.cosim.cli.failures import SUCCESS
-from hexapod_cosim.cosim.cli.running import GainsFile, given_gains
+from hexapod_cosim.cosim.cli.running import GainsFile, Settings, given_gains
 from hexapod_cosim.cosim.cli.terminal import (
     Json,
     counting_bar,
@@ -21,35 +21,50 @@ from hexapod_cosim.cosim.cli.terminal import (
     show_json,
     show_table,
     show_text,
+    waiting,
     warn,
 )
-from hexapod_cosim.cosim.common.files import RUN_FILE, write_json
+from hexapod_cosim.cosim.common.files import BENCHMARK, RUN_FILE, write_json
 from hexapod_cosim.cosim.course import texts
 from hexapod_cosim.cosim.course.goals import verdicts
 from hexapod_cosim.cosim.course.reading import load_course
-from hexapod_cosim.cosim.course.records import JUDGE, SPLITS, Course, CourseError
+from hexapod_cosim.cosim.course.records import (
+    JUDGE,
+    SPLITS,
+    Course,
+    CourseError,
+    Entry,
+    read_entries,
+)
 from hexapod_cosim.cosim.course.runs import Run, run_count, run_course
-from hexapod_cosim.cosim.course.store import write_result
+from hexapod_cosim.cosim.course.store import read_table, write_result
 from hexapod_cosim.cosim.course.table import Table
 from hexapod_cosim.cosim.master.interrupts import deferred_interrupts
 from hexapod_cosim.cosim.master.loop import COMPLETED
 from hexapod_cosim.cosim.results.results import ResultsFolder, results_folder
 from hexapod_cosim.cosim.scenario.records import CONTROLS
-from hexapod_cosim.models import unknown_name
 
 EPILOG = (
     "A robot that falls or gets stuck is a result: it counts as a failure and is in no mean. "
     "Ctrl-C writes the table of the runs that are done."
 )
-KIND = "benchmark"
 MAX_SEEDS = 1000
 Controls = Annotated[
     list[str] | None,
     typer.Option(
         "--control",
-        metavar="NAME",
-        help="A control to run, repeated for more; the first is the reference. Default: all.",
+        metavar="CONTROL",
+        help=f"{', '.join(CONTROLS)}, law.py:Class or controller.fmu; LABEL=CONTROL names it. "
+        "Repeat it for more columns; the first is the reference. Default: all built-in ones.",
         autocompletion=completion.control,
+    ),
+]
+Without = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--without",
+        metavar="PART",
+        help="Add a column: the last control without this part of the compliant control.",
     ),
 ]
 Cases = Annotated[
@@ -60,6 +75,7 @@ Cases = Annotated[
 
 def benchmark(
     controls: Controls = None,
+    without: Without = None,
     split: Annotated[
         str,
         typer.Option("--split", metavar="|".join(SPLITS), help="Cases to judge or to tune on."),
@@ -74,6 +90,7 @@ def benchmark(
         int | None,
         typer.Option("--workers", metavar="N", help="Processes; default: one for each processor."),
     ] = None,
+    settings: Settings = None,
     output: Annotated[
         Path | None,
         typer.Option("-o", "--output", metavar="DIR", help="Default out/benchmark."),
@@ -82,66 +99,99 @@ def benchmark(
     json: Json = False,
 ) -> int:
     """Judge controls on the course: ground, payload, sensors, pushes, commands, robots."""
-    chosen = _checked_controls(controls or list(CONTROLS))
+    entries = read_entries(controls or CONTROLS, without or ())
     _check_number(seeds, MAX_SEEDS, "--seeds")
     _check_number(workers, MAX_SEEDS, "--workers")
-    course = load_course(split, names=cases or (), seeds=seeds, quick=quick)
-    options = {"control": controls, "case": cases, "seeds": seeds, "gains": gains}
+    course = load_course(
+        split, names=cases or (), seeds=seeds, quick=quick, settings=settings or ()
+    )
+    options = {
+        "control": controls,
+        "without": without,
+        "case": cases,
+        "set": settings,
+        "seeds": seeds,
+        "gains": gains,
+    }
     command = _command_line(options, split=split, quick=quick)
-    with results_folder(output or Path("out") / KIND) as folder:
+    with results_folder(output or Path("out") / BENCHMARK) as folder:
         table, content, files = _run_into(
-            folder, course, chosen, given_gains(gains), workers, command
+            folder, course, entries, given_gains(gains), workers, command
         )
     if json:
         show_json(content)
     else:
         _show(table)
         show_files(files)
+        show_text(f"report: {files[-1]}")
     return SUCCESS
 
 
 def _run_into(
     folder: ResultsFolder,
     course: Course,
-    controls: Sequence[str],
+    entries: Sequence[Entry],
     gains: Gains | None,
     workers: int | None,
     command: str,
 ) -> tuple[Table, dict[str, Any], list[Path]]:
     """Runs the course and writes its result; an interrupt writes that of the completed runs."""
     done: list[Run] = []
+    labels = tuple(entry.label for entry in entries)
     folder.begin()
     try:
-        _collect(done, course, controls, gains=gains, workers=workers)
+        _collect(done, course, entries, gains=gains, workers=workers)
     except KeyboardInterrupt:
         with deferred_interrupts():
-            table = Table(course, tuple(controls), tuple(done))
-            write_result(table, folder.path, command=command, complete=False)
+            table = Table(course, labels, tuple(done))
+            _write(table, folder.path, command, complete=False)
             _show(table)
-            total = run_count(course, controls)
+            total = run_count(course, entries)
             warn(f"stopped after {len(done)} of {total} runs; their table is in {folder.path}")
         raise
-    table = Table(course, tuple(controls), tuple(done))
-    content, files = write_result(table, folder.path, command=command, complete=True)
-    title = f"Course {course.version}, {course.split}: {', '.join(controls)}"
-    facts = {"kind": KIND, "status": COMPLETED, "title": title, "command": command}
+    table = Table(course, labels, tuple(done))
+    content, files = _write(table, folder.path, command, complete=True)
+    title = f"Course {course.version}, {course.split}: {', '.join(labels)}"
+    facts = {"kind": BENCHMARK, "status": COMPLETED, "title": title, "command": command}
     write_json(folder.path / RUN_FILE, facts)
-    return table, content, [*files, folder.path / RUN_FILE]
+    return table, content, [folder.path / RUN_FILE, *files]
+
+
+def _write(
+    table: Table, folder: Path, command: str, *, complete: bool
+) -> tuple[dict[str, Any], list[Path]]:
+    """Writes result, picture and report; returns the content of benchmark.json and the files."""
+    # imported only here because matplotlib is slow to import
+    from hexapod_cosim.cosim.course.report import write_course_report  # noqa: PLC0415
+
+    content, files = write_result(table, folder, command=command, complete=complete)
+    with waiting("drawing the picture and the report"):
+        return content, [*files, *write_course_report(table, content, folder)]
+
+
+def report_on(folder: Path) -> list[Path]:
+    """Writes picture and report of a benchmark's folder again; returns the files.
+
+    Raises HexapodError.
+    """
+    from hexapod_cosim.cosim.course.report import write_course_report  # noqa: PLC0415  slow
+
+    return write_course_report(*read_table(folder), folder)
 
 
 def _collect(
     done: list[Run],
     course: Course,
-    controls: Sequence[str],
+    entries: Sequence[Entry],
     *,
     gains: Gains | None,
     workers: int | None,
 ) -> None:
     """Runs the course and appends each run to `done`."""
-    total, failed = run_count(course, controls), 0
+    total, failed = run_count(course, entries), 0
     with (
         counting_bar("benchmark", total, plain=True) as count,
-        closing(run_course(course, controls, gains=gains, workers=workers)) as runs,
+        closing(run_course(course, entries, gains=gains, workers=workers)) as runs,
     ):
         count(0)
         for run in runs:
@@ -175,22 +225,6 @@ def _tables(table: Table) -> list[tuple[str, tuple[list[str], list[list[str]]]]]
         ),
         ("Goals", texts.goal_rows([each for each in verdicts(table) if each.was_run])),
     ]
-
-
-def _checked_controls(names: Sequence[str]) -> tuple[str, ...]:
-    """Returns the controls. Raises CourseError for an unknown or repeated one."""
-    for name in names:
-        if name not in CONTROLS:
-            raise unknown_name("control", name, CONTROLS, where="--control", error=CourseError)
-    if len(set(names)) < len(names):
-        raise CourseError(
-            "the same control twice",
-            got=list(names),
-            expected="each control once",
-            fix="leave out one of them",
-            where="--control",
-        )
-    return tuple(names)
 
 
 def _check_number(value: int | None, most: int, where: str) -> None:

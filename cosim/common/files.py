@@ -16,6 +16,7 @@ from hexapod_cosim.models import HexapodError
 
 RUN_FILE = "run.json"  # marks a folder as written by this package
 RUNNING = "running"
+BENCHMARK = "benchmark"  # the kind of a folder that holds the result of a benchmark
 STUDY = "study"  # the kind of a folder that holds a study, which can be resumed
 RESULT_FILES = (
     "results.parquet",

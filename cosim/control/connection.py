@@ -95,10 +95,10 @@ def connect(
         FmuError: a name of the table is not the FMU's, or joint commands are missing.
     """
     present = {item.name: item for item in variables}
-    for ours, theirs in table.items():
+    for own, theirs in table.items():
         if theirs not in present:
-            raise _not_in_fmu(ours, theirs, present, where)
-    taken = {theirs: ours for ours, theirs in table.items()}
+            raise _not_in_fmu(own, theirs, present, where)
+    taken = {theirs: own for own, theirs in table.items()}
     found: dict[str, Pairs] = {key: [] for key in ("real", "flag", "out", "info", "mark")}
     unconnected = []
     for item in variables:
@@ -225,9 +225,9 @@ def _expanded(ours: str, theirs: str) -> dict[str, str]:
     legs = LEG_NAMES if "{leg}" in ours else ("",)
     joints = JOINT_NAMES if "{joint}" in ours else ("",)
     return {
-        ours.replace("{leg}", leg).replace("{joint}", joint): theirs.replace(
-            "{leg}", leg
-        ).replace("{joint}", joint)
+        ours.replace("{leg}", leg).replace("{joint}", joint): theirs.replace("{leg}", leg).replace(
+            "{joint}", joint
+        )
         for leg in legs
         for joint in joints
     }

@@ -140,7 +140,7 @@ def _given_law(law: Any, setup: ControllerSetup, scenario: Scenario) -> PythonLa
             path = Path(inspect.getfile(law)).resolve()
         except (TypeError, OSError):  # of a notebook
             path = Path("<notebook>")
-        settings = settings_for(scenario, law.__name__)
+        settings = settings_for(scenario, control_of(scenario.control).label)
         return PythonLaw(build(law, path, arguments_of(setup), settings))
     if not callable(getattr(law, "step", None)):
         raise ControllerError(
@@ -287,7 +287,11 @@ def file_hash(control: Control) -> str:
         ) from error
 
 
-def text_of_law(law: Any) -> str:
-    """Returns the text of the control for a class or an object that a Python program gives."""
-    kind = law if isinstance(law, type) else type(law)
-    return parse_control(f"object:{kind.__name__}", where="controller").text
+def text_of_law(law: Any, label: str | None = None) -> str:
+    """Returns the text of the control for a class or an object that a Python program gives.
+
+    Raises ScenarioError for a label that cannot name a folder.
+    """
+    name = (law if isinstance(law, type) else type(law)).__name__
+    text = f"object:{name}" if label is None else f"{label}=object:{name}"
+    return parse_control(text, where="controller").text

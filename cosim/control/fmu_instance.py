@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import chdir, suppress
+from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, Protocol
@@ -166,9 +167,7 @@ class ControllerFmu3:
             slave.instantiate(logMessage=self._log, loggingOn=True)
         except Exception as error:
             self._directory.cleanup()
-            raise FmuError(
-                "the FMU cannot be loaded", got=str(error), where=str(path)
-            ) from error
+            raise FmuError("the FMU cannot be loaded", got=str(error), where=str(path)) from error
         self.slave = slave
 
     def _log(self, _environment: Any, _status: Any, _category: Any, message: Any) -> None:
@@ -215,11 +214,8 @@ class ControllerFmu3:
             items = value if isinstance(value, list | tuple) else [value]
             kind = variable.type if variable.type != "Enumeration" else "Int64"
             write = getattr(self.slave, f"set{kind}")
-            numbers = [convert(item) for item in items]
             self.called(
-                lambda write=write, reference=variable.valueReference, numbers=numbers: write(
-                    [reference], numbers
-                ),
+                partial(write, [variable.valueReference], [convert(item) for item in items]),
                 f"the FMU refuses parameter {name}",
             )
 
@@ -246,9 +242,7 @@ class ControllerFmu3:
         """Steps from t to t + h [s]. Raises StepError."""
         what = f"the FMU refuses the step from {t:.6g} s"
         *_, early, reached = self.called(
-            lambda: self.slave.doStep(
-                currentCommunicationPoint=t, communicationStepSize=h
-            ),
+            lambda: self.slave.doStep(currentCommunicationPoint=t, communicationStepSize=h),
             what,
         )
         if early:

@@ -53,7 +53,11 @@ def load_class(path: Path, name: str) -> type[Any]:
             "no such class",
             got=name,
             expected=f"one of {', '.join(classes)}" if classes else "a class with the method step",
-            fix=f"did you mean {near!r}?" if near else f"write path:{classes[0]}" if classes else None,
+            fix=f"did you mean {near!r}?"
+            if near
+            else f"write path:{classes[0]}"
+            if classes
+            else None,
             where=str(path),
         )
     return found

@@ -11,9 +11,9 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from hexapod_cosim.cosim.course.records import SPLITS, Case, Course, CourseError
+from hexapod_cosim.cosim.course.records import SPLITS, Case, Course, CourseError, Entry
 from hexapod_cosim.cosim.scenario.records import Scenario
-from hexapod_cosim.cosim.scenario.scenario import scenario_from_table, with_values
+from hexapod_cosim.cosim.scenario.scenario import scenario_from_table, with_overrides, with_values
 from hexapod_cosim.models import unknown_name
 from hexapod_cosim.models.ground.catalogue import CATALOGUE
 
@@ -52,15 +52,21 @@ def course_hash() -> str:
 
 
 def load_course(
-    split: str, *, names: Collection[str] = (), seeds: int | None = None, quick: bool = False
+    split: str,
+    *,
+    names: Collection[str] = (),
+    seeds: int | None = None,
+    quick: bool = False,
+    settings: Sequence[str] = (),
 ) -> Course:
-    """Returns the course of a split. Raises CourseError.
+    """Returns the course of a split. Raises HexapodError.
 
     Args:
         split: one of SPLITS; they share no case and no seed.
         names: cases and classes to choose; by default all.
         seeds: number of runs of each case and control; by default that of the course.
         quick: whether the course's smaller number of seeds is the default.
+        settings: NAME=VALUE, set in every case as by --set.
     """
     if split not in SPLITS:
         raise unknown_name("split", split, SPLITS, where="--split", error=CourseError)
@@ -68,7 +74,11 @@ def load_course(
     table = common["seeds"]
     count = seeds or table["quick" if quick else "count"]
     first = table[split]
-    cases = tuple(case for kind in CLASSES for case in _cases_of(kind, split, common["scenario"]))
+    cases = tuple(
+        case
+        for kind in CLASSES
+        for case in _cases_of(kind, split, common["scenario"], settings=settings)
+    )
     return Course(
         version=common["version"],
         split=split,
@@ -76,6 +86,7 @@ def load_course(
         seeds=tuple(range(first, first + count)),
         arrive=common["arrive"],
         hash=course_hash(),
+        settings=tuple(settings),
     )
 
 
@@ -88,13 +99,16 @@ def _chosen(cases: Sequence[Case], names: Collection[str]) -> tuple[Case, ...]:
     return tuple(case for case in cases if not names or {case.name, case.kind} & set(names))
 
 
-def _cases_of(kind: str, split: str, common: Mapping[str, Any]) -> Iterator[Case]:
+def _cases_of(
+    kind: str, split: str, common: Mapping[str, Any], *, settings: Sequence[str]
+) -> Iterator[Case]:
     """Yields the cases of a class in a split."""
     table = tomllib.loads(_files()[f"{kind}.toml"].decode())
     base = _merged(common, table.get("scenario", {}))
     for entry in table["case"]:
         where = f"{kind}.toml: {entry['name']}, {split}"
         content = with_values(base, {**entry.get("set", {}), **entry[split]})
+        content = with_overrides(content, settings)
         content["title"] = f"{entry['name']}: {entry['about']}"
         yield Case(
             name=entry["name"],
@@ -115,10 +129,10 @@ def _merged(first: Mapping[str, Any], second: Mapping[str, Any]) -> dict[str, An
     return merged
 
 
-def run_scenario(case: Case, *, control: str, seed: int) -> Scenario:
+def run_scenario(case: Case, *, entry: Entry, seed: int) -> Scenario:
     """Returns the scenario of a run; a random surface gets the run's seed."""
     settings = dict(case.scenario.settings)
     terrain = settings.get("terrain", {})
     if "seed" in getattr(CATALOGUE.get(terrain.get("kind", "")), "parameters", {}):
         settings["terrain"] = {**terrain, "seed": seed}
-    return replace(case.scenario, control=control, seed=seed, settings=settings)
+    return replace(entry.scenario(case.scenario), seed=seed, settings=settings)

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 
+from hexapod_cosim.controller.parts import SWITCHES
 from hexapod_cosim.cosim.results.metrics import METRICS, PER_RADIAN
+from hexapod_cosim.cosim.scenario.controls import Control, parse_controls
 from hexapod_cosim.cosim.scenario.records import Scenario
-from hexapod_cosim.models import HexapodError
+from hexapod_cosim.models import HexapodError, unknown_name
 
 JUDGE, TUNE = SPLITS = ("judge", "tune")
 
@@ -31,6 +33,20 @@ class Case:
 
 
 @dataclass(frozen=True)
+class Entry:
+    """A column of the course: a control, with some of its parts off or not."""
+
+    label: str
+    control: Control
+    off: tuple[str, ...] = ()  # parts of the compliant control
+
+    def scenario(self, base: Scenario) -> Scenario:
+        """Returns a scenario under this control."""
+        parts = replace(base.compliance, **dict.fromkeys(self.off, False))
+        return replace(base, control=self.control.text, compliance=parts)
+
+
+@dataclass(frozen=True)
 class Course:
     """The cases of a split, and how they are run."""
 
@@ -40,6 +56,24 @@ class Course:
     seeds: tuple[int, ...]
     arrive: float  # largest path error, or yaw drift of turns on the spot, of a success
     hash: str  # SHA-256 of all case files of both splits
+    settings: tuple[str, ...] = ()  # NAME=VALUE, on top of every case
+
+
+def read_entries(controls: Sequence[str], without: Sequence[str] = ()) -> tuple[Entry, ...]:
+    """Returns the columns of a course. Raises HexapodError.
+
+    Args:
+        controls: texts of controls; the first is the reference.
+        without: parts; each adds a column with the last control and this part off.
+    """
+    found = parse_controls(controls, where="--control")
+    parts = SWITCHES
+    for part in without:
+        if part not in parts:
+            raise unknown_name("part", part, parts, where="--without", error=CourseError)
+    entries = [Entry(control.label, control) for control in found]
+    entries += [Entry(f"without {part}", found[-1], (part,)) for part in dict.fromkeys(without)]
+    return tuple(entries)
 
 
 @dataclass(frozen=True)

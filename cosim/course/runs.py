@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 from hexapod_cosim.controller import Gains
 from hexapod_cosim.cosim.course.reading import run_scenario
-from hexapod_cosim.cosim.course.records import QUANTITIES, Case, Course
+from hexapod_cosim.cosim.course.records import QUANTITIES, Case, Course, Entry
 from hexapod_cosim.cosim.results.balance import UNBALANCED
 from hexapod_cosim.cosim.results.summary import Summary
 from hexapod_cosim.cosim.run.batch import run_batch
@@ -34,7 +34,7 @@ class Run:
 
 def run_course(
     course: Course,
-    controls: Sequence[str],
+    entries: Sequence[Entry],
     *,
     gains: Gains | None = None,
     workers: int | None = None,
@@ -44,23 +44,23 @@ def run_course(
     The runs do not depend on `workers`. Close the iterator where the loop over it may be left
     early.
     """
-    orders = list(_orders(course, controls))
-    scenarios = [scenario for _, scenario in orders]
+    orders = list(_orders(course, entries))
+    scenarios = [scenario for _, _, scenario in orders]
     batch = run_batch(scenarios, gains=gains, workers=workers, compiled=True)
     with closing(batch) as summaries:
-        for (case, scenario), summary in zip(orders, summaries, strict=True):
-            yield judged(case, scenario, summary, arrive=course.arrive)
+        for (case, entry, _), summary in zip(orders, summaries, strict=True):
+            yield judged(case, entry, summary, arrive=course.arrive)
 
 
-def _orders(course: Course, controls: Sequence[str]) -> Iterator[tuple[Case, Scenario]]:
-    """Yields the case and the scenario of each run."""
+def _orders(course: Course, entries: Sequence[Entry]) -> Iterator[tuple[Case, Entry, Scenario]]:
+    """Yields case, control and scenario of each run."""
     for case in course.cases:
         for seed in course.seeds:
-            for control in controls:
-                yield case, run_scenario(case, control=control, seed=seed)
+            for entry in entries:
+                yield case, entry, run_scenario(case, entry=entry, seed=seed)
 
 
-def judged(case: Case, scenario: Scenario, summary: Summary, *, arrive: float) -> Run:
+def judged(case: Case, entry: Entry, summary: Summary, *, arrive: float) -> Run:
     """Returns the run of a summary: a success, or a failure with its reason.
 
     arrive: largest path error [m/m], or yaw drift [rad/rad] of a turn on the spot, of a success.
@@ -68,8 +68,8 @@ def judged(case: Case, scenario: Scenario, summary: Summary, *, arrive: float) -
     values = {quantity.name: quantity.value(summary.metrics) for quantity in QUANTITIES}
     return Run(
         case=case.name,
-        control=scenario.control,
-        seed=scenario.seed,
+        control=entry.label,
+        seed=summary.seed,
         failure=failure_of(summary, arrive=arrive),
         values=values,
     )
@@ -92,6 +92,6 @@ def failure_of(summary: Summary, *, arrive: float) -> str:
     return ""
 
 
-def run_count(course: Course, controls: Sequence[str]) -> int:
+def run_count(course: Course, entries: Sequence[Entry]) -> int:
     """Returns the number of runs of a course."""
-    return len(course.cases) * len(course.seeds) * len(controls)
+    return len(course.cases) * len(course.seeds) * len(entries)

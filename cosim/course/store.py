@@ -6,15 +6,16 @@ import csv
 import math
 import platform
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from hexapod_cosim.cosim.common.files import atomic_text, write_json
+from hexapod_cosim.cosim.common.files import atomic_text, read_json, write_json
 from hexapod_cosim.cosim.common.plant_files import package_version
 from hexapod_cosim.cosim.course.goals import verdicts
-from hexapod_cosim.cosim.course.records import QUANTITIES, Case
+from hexapod_cosim.cosim.course.reading import load_course
+from hexapod_cosim.cosim.course.records import QUANTITIES, Case, CourseError
 from hexapod_cosim.cosim.course.runs import Run
 from hexapod_cosim.cosim.course.statistics import DRAWS
 from hexapod_cosim.cosim.course.table import Table
@@ -29,7 +30,12 @@ def result_table(table: Table, *, command: str, complete: bool) -> dict[str, Any
     course = table.course
     return {
         "format": FORMAT,
-        "course": {"version": course.version, "hash": course.hash, "split": course.split},
+        "course": {
+            "version": course.version,
+            "hash": course.hash,
+            "split": course.split,
+            "settings": list(course.settings),
+        },
         "command": command,
         "complete": complete,
         "controls": list(table.controls),
@@ -116,6 +122,47 @@ def write_runs(path: Path, runs: Sequence[Run]) -> None:
 
 def _cell(value: float) -> str:
     return "" if math.isnan(value) else repr(value)
+
+
+def read_table(folder: Path) -> tuple[Table, dict[str, Any]]:
+    """Reads the table of a folder and the content of its RESULT. Raises HexapodError."""
+    content = read_json(folder / RESULT)
+    try:
+        course = load_course(
+            content["course"]["split"],
+            names=content["cases"],
+            seeds=len(content["seeds"]),
+            settings=content["course"]["settings"],
+        )
+        if content["course"]["hash"] != course.hash:
+            raise CourseError(
+                "the result of another course",
+                got=f"version {content['course']['version']}, {content['course']['hash'][:12]}",
+                expected=f"version {course.version}, {course.hash[:12]}",
+                fix="run `hexapod benchmark` again",
+                where=str(folder / RESULT),
+            )
+        runs = tuple(_read_runs(folder / RUNS))
+        return Table(course, tuple(content["controls"]), runs), content
+    except (KeyError, TypeError, ValueError, OSError) as error:
+        raise CourseError(
+            "damaged result",
+            got=f"{type(error).__name__}: {error}",
+            expected=f"{RESULT} and {RUNS} of a benchmark",
+            fix="run `hexapod benchmark` again",
+            where=str(folder),
+        ) from error
+
+
+def _read_runs(path: Path) -> Iterator[Run]:
+    """Yields the runs of a CSV file."""
+    with path.open(encoding="utf-8", newline="") as file:
+        for row in csv.DictReader(file):
+            values = {
+                item.name: float(row[item.name]) if row[item.name] else math.nan
+                for item in QUANTITIES
+            }
+            yield Run(row["case"], row["control"], int(row["seed"]), row["failure"], values)
 
 
 def write_result(

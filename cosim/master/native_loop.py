@@ -29,7 +29,14 @@ from hexapod_cosim.cosim.master.signals import (
     PUSH,
     check_plant_variables,
 )
-from hexapod_cosim.cosim.master.wiring import JOINT_COMMANDS, Names, Wiring, ours, own_wiring, theirs
+from hexapod_cosim.cosim.master.wiring import (
+    JOINT_COMMANDS,
+    Names,
+    Wiring,
+    ours,
+    own_wiring,
+    theirs,
+)
 from hexapod_cosim.cosim.scenario.schedule import Schedule
 from hexapod_cosim.models import LEG_NAMES, FmuError
 

@@ -74,7 +74,8 @@ class ResultsFolder:
 def results_folder(path: Path, parts: Sequence[str] = ()) -> Iterator[ResultsFolder]:
     """Claims a folder for a run; if the block fails once the run has begun, run.json says so.
 
-    `parts`: names of the folders in it that a comparison writes. Raises HexapodError when the folder cannot be used.
+    `parts`: names of the folders in it that a comparison writes. Raises HexapodError when the
+    folder cannot be used.
     """
     made = claim_folder(path)
     folder = ResultsFolder(path, parts)

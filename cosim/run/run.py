@@ -77,6 +77,7 @@ def simulate(
     progress: Progress | None = None,
     begin: Callable[[], None] | None = None,
     law: Any = None,
+    label: str | None = None,
 ) -> Result:
     """Runs a scenario and returns its recording, metrics and facts.
 
@@ -90,9 +91,10 @@ def simulate(
         progress: called now and then with the simulated time [s].
         begin: called once the run can start, before the first step.
         law: a controller object or its class, which replaces the scenario's control.
+        label: of that law; by default the name of its class.
     """
     if law is not None:
-        scenario = replace(scenario, control=text_of_law(law))
+        scenario = replace(scenario, control=text_of_law(law, label))
     plan = make_plan(scenario, gains=gains)
     setup = plan.controller
     with open_plant(scenario, fmu) as plant, make_controller(plan, law=law) as controller:

@@ -31,8 +31,8 @@ from hexapod_cosim.cosim.interface.controller_interface import (
 from hexapod_cosim.cosim.master.fmu import Fmu, FmuBlock
 from hexapod_cosim.cosim.master.loop import Progress
 from hexapod_cosim.cosim.master.native_loop import NativeMaster
-from hexapod_cosim.cosim.master.wiring import Wiring
 from hexapod_cosim.cosim.master.recorder import COMMAND_COLUMNS, chosen_columns
+from hexapod_cosim.cosim.master.wiring import Wiring
 from hexapod_cosim.cosim.results.metrics import metric_columns
 from hexapod_cosim.cosim.results.result import Result
 from hexapod_cosim.cosim.results.summary import Summary, refused_summary, summarise
@@ -131,9 +131,7 @@ class Walker:
         if control.kind == FMU and control.path is not None:
             with closing(open_controller_fmu(control.path)) as controller:
                 plan = make_plan(scenario, gains=gains)
-                connection = connection_of(
-                    control, controller.described, scenario, plan.controller
-                )
+                connection = connection_of(control, controller.described, scenario, plan.controller)
                 wiring = compiled_wiring(connection)
                 if wiring is not None and isinstance(controller, ControllerFmu2):
                     return self._simulate_fmu(

@@ -62,7 +62,9 @@ def parse_control(text: str, *, where: str, base: Path | None = None) -> Control
         ScenarioError: the text has none of these forms, or the label cannot name a folder.
     """
     match = LABELLED.fullmatch(text.strip())
-    label, plain = (None, text.strip()) if match is None else (match["label"].strip(), match["text"])
+    label, plain = (
+        (None, text.strip()) if match is None else (match["label"].strip(), match["text"])
+    )
     kind, name, path = _named(plain.strip(), where=where, base=base)
     target = plain.strip() if path is None else f"{path}:{name}" if kind == PYTHON else str(path)
     full = target if label is None else f"{label}={target}"
@@ -166,6 +168,12 @@ def read_control(value: Any, where: str) -> tuple[Control, dict[str, Any]]:
         )
     parameters = {key: item for key, item in table.items() if key != LAW}
     return parse_control(text, where=where), parameters
+
+
+def table_with_control(table: Mapping[str, Any], text: str) -> dict[str, Any]:
+    """Returns a scenario's tables with another control; the parameters of [control] stay."""
+    value = table.get("control")
+    return {**table, "control": {**value, LAW: text} if isinstance(value, Mapping) else text}
 
 
 def control_beside(value: Any, folder: Path) -> Any:

@@ -23,7 +23,6 @@ from hexapod_cosim.models import (
 from hexapod_cosim.models.schema import Choice, Number, Vector, specs
 
 CONTROLS = ("kinematic", "paper", "compliant")
-COMPARED = ("kinematic", "compliant")  # by `hexapod compare`, and by studies unless they say more
 FAULTS = ("dead", "stuck")
 FORMATS = ("parquet", "csv")  # of recordings
 SETTINGS: dict[str, type[Any]] = {

@@ -234,7 +234,9 @@ def test_sensors_that_lie_ground_that_is_missing_and_slides_are_answered_at_the_
         ground(controller, step, measurement)
         spoil(measurement.foot_force, step)
 
-    worst, fallback = differences(controller_core, setup_of(name), sense=sense)
+    # with a planned squeeze even four times the weight does not ask too much of the second robot
+    setup = setup_of(name, parts=Parts(squeeze=0.0))
+    worst, fallback = differences(controller_core, setup, sense=sense)
     assert close(worst)
     assert fallback.any() or spoil is uneven
 

@@ -23,21 +23,23 @@ SEES = {
 }
 # what each room of cosim may import; study has rooms of its own
 LOW = ["common", "interface", "scenario", "master"]
+RUNNING = [*LOW, "control", "export", "results", "design"]
 ROOMS = {
     "common": [],
     "interface": LOW[:1],
     "scenario": LOW[:2],
     "master": LOW[:3],
+    "control": LOW,
     "export": LOW,
     "results": LOW,
     "validate": [*LOW, "export"],
     "design": [*LOW, "export"],
     "report": [*LOW, "export", "results"],
-    "run": [*LOW, "export", "results", "design"],
-    "course": [*LOW, "export", "results", "report", "design", "run"],
+    "run": RUNNING,
+    "course": [*RUNNING, "report", "run"],
     "study.plan": [*LOW, "results"],
     "study.store": [*LOW, "results", "study.plan"],
-    "study.execute": [*LOW, "export", "results", "design", "run", "study.plan", "study.store"],
+    "study.execute": [*RUNNING, "run", "study.plan", "study.store"],
     "study.report": [*LOW, "results", "study.plan", "study.store"],
 }
 MOST_FILES = 20  # in a folder that people write
@@ -241,9 +243,9 @@ def test_only_the_fmi_layer_names_the_standard(component: str) -> None:
         )
 
 
-# A second definition stands for the first: complex numbers for lanes, and each component's side of
-# component.h.
-STAND_INS = {"complex_step.h": "hx_", "component.c": "hx_component_"}
+# A second definition stands for the first: complex numbers and one lane for lanes, and each
+# component's side of component.h.
+STAND_INS = {"complex_step.h": "hx_", "one_lane.h": "hx_", "component.c": "hx_component_"}
 DEFINED = re.compile(r"^\}\s*(hx[A-Z]\w*);|^\w[\w ]*?[ *]+(hx_\w+)\([^;{]*\)\s*\{", re.MULTILINE)
 
 

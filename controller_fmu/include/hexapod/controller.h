@@ -138,6 +138,7 @@ typedef struct hxControllerDefinition {
     double speed_max;         /* rad/s */
     double rotor_inertia;     /* kg m2  seen at the joint */
     double coulomb_friction;  /* N m    in the gear */
+    double torque_continuous; /* N m    that it can give for ever */
   } servo;
   double gravity[3];  /* m/s2 */
   hxGait gait;

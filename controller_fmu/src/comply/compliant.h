@@ -3,6 +3,7 @@
 #ifndef HX_COMPLIANT_H
 #define HX_COMPLIANT_H
 
+#include "../sense/warmth.h"
 #include "../walk/hold.h"
 #include "../walk/trajectory.h"
 #include "compliance.h"
@@ -19,6 +20,7 @@ typedef struct hxCompliantModel {
   hxPlannedSqueeze squeeze;
   hxComplianceModel laws;
   hxHoldModel hold;
+  hxWarmthModel warmth;
 } hxCompliantModel;
 
 /* Velocity that steers back to the path, added to the commanded one, with a transition from one
@@ -31,6 +33,7 @@ typedef struct hxSteering {
 typedef struct hxCompliant {
   hxCompliance laws;
   hxHold hold;
+  hxWarmth warmth;
   hxSteering steering;
   int64_t count; /* number of steps */
   double offset[HX_LEGS]; /* m, offsets for early and late touch-downs at the last step */
@@ -52,7 +55,7 @@ void hx_sense(const hxControllerInput *input, const hxPosture *posture, double f
 
 void hx_compliant_compile(const hxControllerDefinition *definition, const hxLegSolver leg[HX_LEGS],
                           hxCompliantModel *model);
-void hx_compliant_reset(hxCompliant *compliant);
+void hx_compliant_reset(const hxCompliantModel *model, hxCompliant *compliant);
 
 /* Called before new steps are planned: takes over the corrections of the slow loops, when a leg
  * lifts off or touches down (afresh), and at a stop (not moves) (C40). steps: periods since the

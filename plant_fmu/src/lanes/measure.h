@@ -232,7 +232,8 @@ static inline void start_landing(int slot, double t, hxMeasured *measured) {
 static inline int hx_switch_contacts(const hxModel *model, hxDepths *depths, double t,
                                      const hxMoment *at, hxFootprintLog *footprints,
                                      hxState *state) {
-  if (model->has_soil) hx_soil_switch(&at->contact[HX_FOOT], depths, footprints, &state->contact);
+  if (model->has_soil)
+    hx_soil_switch(model, &at->contact[HX_FOOT], depths, footprints, &state->contact);
   if (!hx_contact_is_due(model, depths, &state->contact)) return 0;
   int before[HX_SLOTS], after[HX_SLOTS];
   feet_on_ground(model, &state->contact, before);
@@ -252,6 +253,7 @@ HX_RARE void hx_cross_cells(const hxModel *model, hxDepths *depths, hxState *sta
   const hxMoment before = state->moment;
   hx_moment_of(model, &state->contact, &state->motion, &state->moment);
   hx_contact_hand_over(&before, &state->moment, crossed, &state->contact);
+  if (has_bristles(model, HX_FOOT)) hx_contact_slacken(&state->contact, &state->motion);
   for (int leg = 0; leg < HX_LEGS && model->has_soil; ++leg)
     if (crossed >> leg & 1 && state->contact.closed[HX_FOOT][leg] == 0.0)
       state->contact.plastic[leg] = 0.0; /* the new cell is undisturbed */

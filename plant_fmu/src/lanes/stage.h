@@ -305,8 +305,10 @@ static inline hxVec3 bristle_rate(const hxModel *model, const hxContactState *st
   const hxVec3 n = contact->kin.normal,
                dv = hx_add_scaled(contact->speed_shift, hx_splat(implicit->z),
                                   contact_acceleration(model, felt, contact));
-  const hxReal yield = implicit->slope[pack].contact[HX_FOOT].yield,
-               closed = hx_load(&state->closed[HX_FOOT][pack * HX_LANES]);
+  const hxReal yield = implicit->slope[pack].contact[HX_FOOT].yield;
+  hxReal closed = hx_load(&state->closed[HX_FOOT][pack * HX_LANES]);
+  if (!has_friction_bristles(model, HX_FOOT)) /* rigid ground beside soil has no bristles */
+    closed *= hx_load(&state->on_soil[pack * HX_LANES]);
   rate = hx_add_scaled(rate, closed, hx_add_scaled(dv, -hx_dot(n, dv), n));
   if (implicit->change)
     rate = hx_add_scaled(rate, -yield,
