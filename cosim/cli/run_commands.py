@@ -41,6 +41,7 @@ from hexapod_cosim.cosim.results.metrics import has_net_slip
 from hexapod_cosim.cosim.results.result import Result
 from hexapod_cosim.cosim.results.results import (
     ACCURACY,
+    damage_reported,
     read_accuracies,
     read_facts,
     read_result,
@@ -162,25 +163,31 @@ def report(
 ) -> None:
     """Make the plots and the report of a run, a comparison, a study or a benchmark again."""
     facts = read_facts(folder)
+    with damage_reported(folder):
+        files = _report_again(folder, facts)
+    if json:
+        show_json({"report": str(folder / REPORT), "files": [str(file) for file in files]})
+        return
+    show_files(files)
+
+
+def _report_again(folder: Path, facts: Mapping[str, Any]) -> list[Path]:
+    """Writes the report of a folder again; `facts` are those of its run.json."""
     if facts.get("kind") == STUDY:
         # imported only here because it is slow
         from hexapod_cosim.cosim.cli.studying import report_on, warn_of  # noqa: PLC0415
 
         found, files = report_on(folder)
         warn_of(found)
-    elif facts.get("kind") == BENCHMARK:
-        files = benchmark_command.report_on(folder)
-    elif facts.get("kind") == "compare":
-        files = _report_comparison(folder, facts)
-    else:
-        run = read_result(folder)
-        control = run.facts["control"]
-        accuracies = {control: run.accuracy} if run.accuracy else {}
-        files = write_report({control: run}, folder, warn=warn, accuracies=accuracies)
-    if json:
-        show_json({"report": str(folder / REPORT), "files": [str(file) for file in files]})
-        return
-    show_files(files)
+        return list(files)
+    if facts.get("kind") == BENCHMARK:
+        return list(benchmark_command.report_on(folder))
+    if facts.get("kind") == "compare":
+        return _report_comparison(folder, facts)
+    run = read_result(folder)
+    control = run.facts["control"]
+    accuracies = {control: run.accuracy} if run.accuracy else {}
+    return write_report({control: run}, folder, warn=warn, accuracies=accuracies)
 
 
 def _report_comparison(folder: Path, facts: Mapping[str, Any]) -> list[Path]:

@@ -53,6 +53,7 @@ def write_course_report(table: Table, content: Mapping[str, Any], folder: Path) 
         goals={"columns": columns, "rows": list(zip(rows, map(_badge, found), strict=True))}
         if found
         else None,
+        parts=texts.part_rows(table),
         classes=texts.class_rows(table),
         cases=texts.case_rows(table),
         sweeps=texts.sweep_rows(table),
