@@ -314,7 +314,7 @@ class Controller(Stateful):
         shown.planned[...] = self._show_planned()
 
     def _correct_paths(self, paper: Paper, measurement: Measurement) -> None:
-        """Corrects the paths by the foot forces, and the joint commands with them (C46 to C48)."""
+        """Corrects the paths by the foot forces, and the joint commands with them (C47 to C49)."""
         now, out, shown = self._now, self._out, self.diagnostics
         paper.step(sense(measurement, now.posture), self.paths.swinging)
         joints = paper.actuate(self.legs, self._planned_feet(), now.posture)

@@ -181,7 +181,7 @@ static void follow_paths(const hxControllerModel *model, hxControllerState *stat
   }
 }
 
-/* Corrects the paths by the foot forces, and the joint commands with them (C46 to C48). */
+/* Corrects the paths by the foot forces, and the joint commands with them (C47 to C49). */
 static void correct_paths(const hxControllerModel *model, const hxControllerInput *input,
                           hxControllerState *state) {
   const hxPosture *posture = &step_at(state, 0)->posture;
