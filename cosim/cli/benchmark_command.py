@@ -25,6 +25,7 @@ from hexapod_cosim.cosim.cli.terminal import (
     warn,
 )
 from hexapod_cosim.cosim.common.files import BENCHMARK, RUN_FILE, write_json
+from hexapod_cosim.cosim.control.controllers import check_control
 from hexapod_cosim.cosim.course import texts
 from hexapod_cosim.cosim.course.goals import verdicts
 from hexapod_cosim.cosim.course.reading import load_course
@@ -106,6 +107,7 @@ def benchmark(
     course = load_course(
         split, names=cases or (), seeds=seeds, quick=quick, settings=settings or ()
     )
+    check_control(course.cases[0].scenario, [entry.control for entry in entries])
     options = {
         "control": controls,
         "without": without,
