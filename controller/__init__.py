@@ -20,13 +20,14 @@ from hexapod_cosim.controller.gains import (
     load_gains,
     save_gains,
 )
-from hexapod_cosim.controller.parts import Parts
+from hexapod_cosim.controller.parts import SWITCHES, Parts
 from hexapod_cosim.controller.walk.gait import PATTERNS, Gait, Pattern, make_gait
 from hexapod_cosim.controller.walk.kinematics import LegSolver
 from hexapod_cosim.controller.walk.trajectory import BodyCommand, CommandRamp, FootPaths
 
 __all__ = [
     "PATTERNS",
+    "SWITCHES",
     "BodyCommand",
     "CommandRamp",
     "Controller",

@@ -238,13 +238,13 @@ class Controller(Stateful):
         return self._lay_out(value, posture, self.paths.walk(number, twist, before.feet))
 
     def _note_contacts(self) -> None:
-        """Notes which feet have met the ground on their way down (C46)."""
+        """Notes which feet have met the ground on their way down (C50)."""
         if self.compliant is not None:
             falling = self.paths.swinging & (self._now.feet.rise < 0.0)
             self.paths.met = falling & self.compliant.laws.meets()
 
     def _waits(self) -> bool:
-        """Returns whether the gait clock waits for feet at the ends of their swings (C45)."""
+        """Returns whether the gait clock waits for feet at the ends of their swings (C49)."""
         if self.compliant is None:
             return False
         landing = self.paths.landing(self._at)
@@ -338,7 +338,7 @@ class Controller(Stateful):
         shown.planned[...] = self._show_planned()
 
     def _correct_paths(self, paper: Paper, measurement: Measurement) -> None:
-        """Corrects the paths by the foot forces, and the joint commands with them (C42 to C44)."""
+        """Corrects the paths by the foot forces, and the joint commands with them (C46 to C48)."""
         now, out, shown = self._now, self._out, self.diagnostics
         paper.step(sense(measurement, now.posture), self.paths.swinging)
         joints = paper.actuate(self.legs, self._planned_feet(), now.posture)
@@ -360,7 +360,7 @@ class Controller(Stateful):
         feet = now.feet.plane + now.shift
         plan = compliant.laws.plan(
             demand,
-            compliant.support.shares(feet, now.activation, demand),
+            compliant.shares(feet, now.activation, demand),
             feet=feet,
             height=now.feet.height - self.paths.home_height,
             rise=now.feet.rise,

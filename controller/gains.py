@@ -50,7 +50,7 @@ class SuspensionGains:
 
 @dataclass(frozen=True, kw_only=True)
 class PaperSlipGains(SlipGains):
-    """PID of the paper's control, from the tangential force [N] to the shift of the foot (C42).
+    """PID of the paper's control, from the tangential force [N] to the shift of the foot (C46).
 
     The fields are those of SlipGains with other units: kp [m/N], ki [m/(N s)], kd [m s/N], limit
     [m]; load_time is the time constant with which the shift of a swinging foot decays.

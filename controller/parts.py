@@ -1,11 +1,11 @@
-"""Defines the switches of the parts of compliant control.
+"""Defines the switches of the parts of compliant control, and the weight of the squeeze.
 
 Each part can be switched off by itself, so that its effect can be measured.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -22,3 +22,9 @@ class Parts:
     # no feedback from a sensor that contradicts the plan; kinematic control while the robot slides,
     # its joints cannot follow, or it is far too heavy for them
     fallback: bool = True
+    # weight of the servos' torques against the feet's use of friction in the planned squeeze, in
+    # [0, 1): a part of `support`
+    squeeze: float = 0.48
+
+
+SWITCHES = tuple(item.name for item in fields(Parts) if item.name != "squeeze")

@@ -7,11 +7,11 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from hexapod_cosim.controller import Parts
+from hexapod_cosim.controller import SWITCHES
 from hexapod_cosim.cosim.scenario.records import Scenario
 from hexapod_cosim.cosim.scenario.scenario import load_scenario
 from hexapod_cosim.cosim.scenario.variation import STANDARD
@@ -20,7 +20,6 @@ from hexapod_cosim.models import load_robot
 DATA: dict[str, Any] = tomllib.loads(
     (Path(__file__).parent / "scenarios.toml").read_text(encoding="utf-8")
 )
-PARTS = tuple(item.name for item in fields(Parts))
 SWITCH = "compliance."  # settings that begin with it do not apply to kinematic control
 
 
@@ -57,14 +56,19 @@ def judged_walk(name: str = "judged", *settings: str) -> Case:
 
 
 def ablation() -> list[Case]:
-    """Returns cases with no part, each part alone, all but each part, and all parts."""
-    off = {part: f"{SWITCH}{part}=false" for part in PARTS}
+    """Returns cases with no part, each part alone, all but each part, and all parts.
+
+    The squeeze belongs to the support, and so to the support alone.
+    """
+    off = {part: f"{SWITCH}{part}=false" for part in SWITCHES}
+    nothing = judged_walk("no part", *off.values())
     alone = [
         judged_walk(f"{part} alone", *(text for other, text in off.items() if other != part))
-        for part in PARTS
+        for part in SWITCHES
     ]
+    off["squeeze"] = f"{SWITCH}squeeze=0"
     without = [judged_walk(f"all but {part}", text) for part, text in off.items()]
-    return [judged_walk("no part", *off.values()), *alone, *without, judged_walk("all parts")]
+    return [nothing, *alone, *without, judged_walk("all parts")]
 
 
 def sticking() -> list[Case]:

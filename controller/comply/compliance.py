@@ -45,6 +45,7 @@ GRIPPED = 0.99  # 1    of its share: a leg with more carries it
 LARGEST_LOAD = 2.0  # 1    in thirds of the weight: the margins of the design hold up to it
 LEAST_SCALE, LARGEST_SCALE = 0.5, 3.0  # 1    measured over modelled weight that is believed
 CARRYING = 0.1  # 1    in thirds of the weight: an awaited foot with more stands
+LARGEST_LEAN = 0.4  # 1    of the depth of the ground: distance of the centre of mass, each axis
 HIGH_SHARE = 0.25  # 1    of the step height: a foot planned higher is certainly in the air
 
 
@@ -80,6 +81,8 @@ class Compliance(Stateful):
         grip: factor on the planned load of a leg that is regaining contact [1].
         regaining: some grip may be below 1 (scalar).
         scale: measured over planned weight (scalar) [1].
+        lean: horizontal distance of the measured centre of mass from the modelled one, walking
+            frame, x + i y (scalar) [m].
         trust: factor on all corrections and torques (scalar) [1].
         lagging: the joints cannot follow the plan (scalar).
         overspeed_share: share of the time in which the plan exceeds a speed limit (scalar) [1].
@@ -89,7 +92,7 @@ class Compliance(Stateful):
 
     STATE = (
         "law", "detector", "watch", "touchdown", "landings", "burden", "bend", "torque", "shift",
-        "doubted", "fallback", "grip", "regaining", "scale", "trust", "lagging", "overspeed_share",
+        "doubted", "fallback", "grip", "regaining", "scale", "lean", "trust", "lagging", "overspeed_share",
         "slide_periods", "recovery_periods",
     )  # fmt: skip
 
@@ -99,6 +102,7 @@ class Compliance(Stateful):
         parts: Parts,
         *,
         weight: float,
+        depth: float,
         cycle: float,
         kp: float,
         step_height: float,
@@ -106,12 +110,13 @@ class Compliance(Stateful):
     ) -> None:
         """Computes the constants of the laws and resets their state.
 
-        weight: of the robot [N]; cycle, step_height: of its gait [s, m]; kp: of its servos
-        [N m/rad]; period [s].
+        weight: of the robot [N]; depth: of the ground below the torso's origin [m]; cycle,
+        step_height: of its gait [s, m]; kp: of its servos [N m/rad]; period [s].
         """
         self.parts, self.period = parts, period
         self.share = weight / TRIPOD_LEGS  # N
         self.settled = SETTLED_SHARE * weight  # N
+        self.most_lean = LARGEST_LEAN * depth  # m
         self.softness = 1.0 / kp  # rad/N m
         self.high = HIGH_SHARE * step_height  # m
         self.law, self.landings = FootLaw(gains, period=period), Landings()
@@ -138,7 +143,7 @@ class Compliance(Stateful):
         self.bend, self.torque, self.shift = np.zeros((3, LEGS, 3))
         self.doubted, self.fallback = np.zeros((2, LEGS), dtype=np.bool_)
         self.grip, self.regaining = np.ones(LEGS), False
-        self.scale, self.trust = 0.0, 1.0
+        self.scale, self.lean, self.trust = 0.0, 0j, 1.0
         self.lagging, self.overspeed_share = False, 0.0
         self.slide_periods, self.recovery_periods = 0, 0
 
@@ -279,16 +284,32 @@ class Compliance(Stateful):
             return np.zeros(LEGS, dtype=np.complex128), normal, total
         return squeeze(felt, normal, plan.feet), normal, total
 
-    def _update_weight(self, plan: Plan, total: float) -> None:
-        """Updates the ratio of measured to planned weight (C30) and the load of the servos.
+    def _update_lean(self, plan: Plan, normal: Array, total: float) -> None:
+        """Updates the distance of the centre of mass from the modelled one (C44).
 
-        total: sum of the measured normal forces [N].
+        The planned loads contain the present distance. normal: (6,) measured [N]; total: their sum.
+        """
+        if not total > self.settled or not plan.weight > self.settled:
+            return
+        ahead = (normal @ plan.feet) / total - (plan.shares.normal @ plan.feet) / plan.weight
+        lean = self.lean + self.follow_cycle * ahead
+        self.lean = complex(
+            min(max(lean.real, -self.most_lean), self.most_lean),
+            min(max(lean.imag, -self.most_lean), self.most_lean),
+        )
+
+    def _update_weight(self, plan: Plan, normal: Array, total: float) -> None:
+        """Updates the ratio of measured to planned weight (C30), the centre of mass (C44) and the
+        load of the servos.
+
+        normal: (6,) measured normal forces [N]; total: their sum [N].
         """
         if not self.doubted.any():
             ratio = total / max(plan.weight, LOAD_FLOOR)
             scale = min(max(ratio, LEAST_SCALE), LARGEST_SCALE)
             self.scale += self.follow_weight * (scale - self.scale)
             self.burden.weigh(ratio)
+            self._update_lean(plan, normal, total)
         self.burden.step(plan.needed, self.scale)
 
     def _excess(self, plan: Plan, normal: Array) -> Array:
@@ -371,7 +392,7 @@ class Compliance(Stateful):
         self._limit_joints(bend * self.trust, (torque + plan.own) * self.trust)
 
     def meets(self) -> Mask:
-        """Returns the feet (6,) that have met the ground on their way down (C46).
+        """Returns the feet (6,) that have met the ground on their way down (C50).
 
         A sensor that is doubted is left out.
         """
@@ -380,7 +401,7 @@ class Compliance(Stateful):
         return self.touching & ~self.doubted
 
     def waits(self, landing: Mask, *, held: bool) -> bool:
-        """Returns whether the gait clock waits for the feet of legs that end their swing (C45).
+        """Returns whether the gait clock waits for the feet of legs that end their swing (C49).
 
         landing: (6,) these legs; held: it waits already.
         """
@@ -400,6 +421,6 @@ class Compliance(Stateful):
         if self._contacts_differ(plan):
             force = self._examine_contacts(plan, force)
         push, normal, total = self._law_inputs(plan, force)
-        self._update_weight(plan, total)
+        self._update_weight(plan, normal, total)
         answer = self._step_laws(plan, push, normal, self._excess(plan, normal))
         self._actuate(plan, answer)

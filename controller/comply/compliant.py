@@ -20,15 +20,17 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from hexapod_cosim.controller.comply.compliance import Compliance, Plan
+from hexapod_cosim.controller.comply.planned_squeeze import PlannedSqueeze
 from hexapod_cosim.controller.comply.posture import Posture
-from hexapod_cosim.controller.comply.support import Support
+from hexapod_cosim.controller.comply.support import Shares, Support
 from hexapod_cosim.controller.gains import Gains
 from hexapod_cosim.controller.memory import Stateful
 from hexapod_cosim.controller.parts import Parts
 from hexapod_cosim.controller.plane import LEGS, Array, Plane, cis, clamp
+from hexapod_cosim.controller.sense.warmth import Warmth
 from hexapod_cosim.controller.walk.gait import Gait
 from hexapod_cosim.controller.walk.hold import Hold, Sight
-from hexapod_cosim.controller.walk.inverse_dynamics import InverseDynamics
+from hexapod_cosim.controller.walk.inverse_dynamics import Demand, InverseDynamics
 from hexapod_cosim.controller.walk.kinematics import LegSolver
 from hexapod_cosim.controller.walk.trajectory import Twist
 from hexapod_cosim.models import Robot
@@ -82,6 +84,7 @@ class Compliant(Stateful):
     Attributes:
         laws: the force laws.
         hold: the slow loops.
+        warmth: of the servos.
         steering: of the path.
         count: number of completed periods.
         offset: (6,) height offsets of early and late touch-downs at the last period [m].
@@ -89,7 +92,7 @@ class Compliant(Stateful):
         stance: that of the last step; not part of the state.
     """
 
-    STATE = ("laws", "hold", "steering", "count", "offset", "moving")
+    STATE = ("laws", "hold", "warmth", "steering", "count", "offset", "moving")
 
     def __init__(
         self,
@@ -104,16 +107,23 @@ class Compliant(Stateful):
         self.legs, self.per_second, self.leading = legs, 1.0 / period, STEERING_TIME / period
         self.dynamics = InverseDynamics(robot, legs, period=period)
         self.support = Support(robot, gait, gains.support, rest=self.dynamics.rest())
+        self.squeeze = PlannedSqueeze(
+            friction=robot.friction.mu, weight=robot.weight, depth=-self.dynamics.floor
+        )
         self.laws = Compliance(
             gains,
             parts,
             weight=robot.weight,
+            depth=-self.dynamics.floor,
             cycle=gait.period,
             kp=robot.servo.kp,
             step_height=gait.step_height,
             period=period,
         )
         self.hold = Hold(gains.hold, parts, period=period)
+        self.warmth = Warmth(
+            rating=robot.servo.torque_continuous, squeeze=parts.squeeze, period=period
+        )
         self.stance: Stance
         self.reset()
 
@@ -121,8 +131,15 @@ class Compliant(Stateful):
         """Resets all laws and the slow loops to their initial states."""
         self.laws.reset()
         self.hold.reset()
+        self.warmth.reset()
         self.steering, self.count = NO_STEERING, 0
         self.offset, self.moving = np.zeros(LEGS), False
+
+    def shares(self, feet: Plane, activation: Array, demand: Demand) -> Shares:
+        """Returns the planned forces of feet (6,) x + i y, walking frame [m] (C19, C20, C42)."""
+        moment = demand.moment + demand.weight * self.laws.lean
+        shares = self.support.shares(feet, activation, demand._replace(moment=moment))
+        return self.squeeze.add(feet, demand, shares, self.warmth.squeeze)
 
     # ------------------------------------------------------------------------------- steering
 
@@ -207,6 +224,8 @@ class Compliant(Stateful):
         raised = offset + self.hold.lift
         output.angle_ref[...] = self._correct(output.angle_ref, climb, raised)
         output.torque_ref[...] = laws.torque
+        burden = laws.burden
+        self.warmth.step(laws.torque, burden.heft * burden.peak / burden.most)
         if busy or self.moving:
             rise = (offset - self.offset) * self.per_second
             output.speed_ref[...] += climb * rise[:, None]

@@ -49,7 +49,7 @@ def _smooth(x: Array) -> Array:
     return np.asarray(x * x * x * (10.0 + x * (6.0 * x - 15.0)))
 
 
-def _solve(system: Array, needed: tuple[float, float, float]) -> Array:
+def solve(system: Array, needed: tuple[float, float, float]) -> Array:
     """Solves S x = b for x (3,), S (3, 3) symmetric and positive semidefinite, by S = L D L^T.
 
     A ridge on the diagonal makes S definite.
@@ -106,7 +106,7 @@ class Support:
         """
         one = np.array([ONES, feet.real, feet.imag])
         weighted = one * activation
-        found = _solve(weighted @ one.T, (weight, moment.real, moment.imag))
+        found = solve(weighted @ one.T, (weight, moment.real, moment.imag))
         return np.maximum(found @ weighted, 0.0)
 
     def lowering(self, feet: Plane, activation: Array) -> Array:

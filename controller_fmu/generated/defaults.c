@@ -316,6 +316,9 @@ static const hxControllerDefinition default_definition = {
     .gains.paper_suspension.damping = 388.5927090531717,
     .gains.paper_suspension.stiffness = 6104.0,
     .gains.paper_suspension.limit = 0.015,
+    .parts.squeeze = 0.48,
+    .friction = 0.7,
+    .servo.torque_continuous = 1.2,
 };
 
 void hx_controller_definition_default(hxControllerDefinition *definition) {
@@ -691,6 +694,9 @@ static const hxRange definition_ranges[] = {
     {"gains.paper_suspension.damping", "N.s/m", 0.0, 1000000000.0, offsetof(hxControllerDefinition, gains.paper_suspension.damping), 0},
     {"gains.paper_suspension.stiffness", "N/m", 1e-09, 1000000000000.0, offsetof(hxControllerDefinition, gains.paper_suspension.stiffness), 0},
     {"gains.paper_suspension.limit", "m", 1e-09, 10.0, offsetof(hxControllerDefinition, gains.paper_suspension.limit), 0},
+    {"parts.squeeze", "", 0.0, 0.99, offsetof(hxControllerDefinition, parts.squeeze), 0},
+    {"friction.mu", "", 0.0, 100.0, offsetof(hxControllerDefinition, friction), 0},
+    {"servo.torque_continuous", "N.m", 1e-09, 100000000.0, offsetof(hxControllerDefinition, servo.torque_continuous), 0},
 };
 
 size_t hx_controller_definition_ranges(const hxRange **range) {

@@ -494,6 +494,9 @@ static const hxVariable parameters[] = {
     {"gains.paper_suspension.damping", "N.s/m", 0.0, 1000000000.0, offsetof(struct hxVariables, definition.gains.paper_suspension.damping), HX_REAL, 1},
     {"gains.paper_suspension.stiffness", "N/m", 1e-09, 1000000000000.0, offsetof(struct hxVariables, definition.gains.paper_suspension.stiffness), HX_REAL, 1},
     {"gains.paper_suspension.limit", "m", 1e-09, 10.0, offsetof(struct hxVariables, definition.gains.paper_suspension.limit), HX_REAL, 1},
+    {"parts.squeeze", "1", 0.0, 0.99, offsetof(struct hxVariables, definition.parts.squeeze), HX_REAL, 1},
+    {"friction.mu", "1", 0.0, 100.0, offsetof(struct hxVariables, definition.friction), HX_REAL, 1},
+    {"servo.torque_continuous", "N.m", 1e-09, 100000000.0, offsetof(struct hxVariables, definition.servo.torque_continuous), HX_REAL, 1},
 };
 
 const hxSection hx_sections[HX_CAUSALITIES] = {
@@ -516,7 +519,7 @@ const char *const hx_log_category_names[] = {
 const hxStateRow *const hx_states = 0;
 const size_t hx_state_count = 0;
 
-const char hx_default_guid[] = "{cbbdbd89-1312-4104-b7e9-a277e8bbeac7}";
+const char hx_default_guid[] = "{4059e6d7-e79a-4216-a498-5191c37b5a1c}";
 
 _Static_assert(HX_CONTROL_KINEMATIC == 1, "Control");
 _Static_assert(HX_CONTROL_COMPLIANT == 2, "Control");

@@ -94,7 +94,7 @@ static void plan_step(const hxControllerModel *model, const hxControllerState *s
   lay_out(model, &state->paths, step);
 }
 
-/* Notes which feet have met the ground on their way down (C46). */
+/* Notes which feet have met the ground on their way down (C50). */
 static void note_contacts(const hxControllerModel *model, hxControllerState *state) {
   const hxPlannedFeet *feet = &step_at(state, 0)->feet;
   hxFootPaths *paths = &state->paths;
@@ -103,7 +103,7 @@ static void note_contacts(const hxControllerModel *model, hxControllerState *sta
                     hx_compliance_meets(&model->laws.laws, k, &state->compliant.laws);
 }
 
-/* Returns whether the gait clock waits for feet at the ends of their swings (C45). */
+/* Returns whether the gait clock waits for feet at the ends of their swings (C49). */
 static int waits(const hxControllerModel *model, const hxControllerState *state) {
   int landing[HX_LEGS];
   if (!model->compliant) return 0;
@@ -209,7 +209,7 @@ static void follow_paths(const hxControllerModel *model, hxControllerState *stat
   }
 }
 
-/* Corrects the paths by the foot forces, and the joint commands with them (C42 to C44). */
+/* Corrects the paths by the foot forces, and the joint commands with them (C46 to C48). */
 static void correct_paths(const hxControllerModel *model, const hxControllerInput *input,
                           hxControllerState *state) {
   const hxPosture *posture = &step_at(state, 0)->posture;
@@ -258,7 +258,11 @@ static void ask(const hxControllerModel *model, hxControllerState *state, hxStan
       plan->overspeed |= fabs(output->speed_ref[k][joint]) >= model->leg[k].speed_max;
     hx_leg_solver_speeds(&model->leg[k], &now->pose[k], hx_plane(0.0, 0.0), 1.0, stance->climb[k]);
   }
+  demand.moment =
+      hx_plane_add(demand.moment, hx_scaled(state->compliant.laws.lean, demand.weight));
   hx_support_shares(feet, &demand, &plan->shares);
+  hx_planned_squeeze_add(&model->laws.squeeze, feet, &demand, state->compliant.warmth.squeeze,
+                         &plan->shares);
   hx_compliance_plan(&model->laws.laws, &demand, height, now->feet.rise, plan);
   stance->value = now->value;
   stance->posture = &now->posture;
@@ -274,7 +278,7 @@ void hx_controller_begin(const hxControllerModel *model, double t, hxControllerS
   state->start = state->time = t;
   state->cut = 1;
   hx_command_ramp_reset(&model->ramp, &state->ramp);
-  if (model->compliant) hx_compliant_reset(&state->compliant);
+  if (model->compliant) hx_compliant_reset(&model->laws, &state->compliant);
   step = step_at(state, 0);
   hx_foot_paths_reset(&model->paths, &state->paths, &step->feet);
   look_ahead(model, state, 0, 0, step);

@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 from gains import make_gains
 
-from hexapod_cosim.controller import Parts
+from hexapod_cosim.controller import SWITCHES
 from hexapod_cosim.cosim.results.result import Result
 from hexapod_cosim.cosim.run.run import simulate
 from hexapod_cosim.cosim.scenario.scenario import load_scenario
 from hexapod_cosim.models import load_robot
 
 ROBOTS = ("athena", "phantomx_mk4")
-NOTHING = tuple(f"compliance.{part}=false" for part in Parts.__dataclass_fields__)
+NOTHING = tuple(f"compliance.{part}=false" for part in SWITCHES)
 SLIP_LEFT = 0.2  # of that under kinematic control, at most
 
 
@@ -39,14 +39,32 @@ def outputs(result: Result) -> np.ndarray:
 
 @pytest.mark.usefixtures("plant_build")
 @pytest.mark.parametrize("robot", ROBOTS)
-def test_compliance_takes_most_of_the_slip(robot: str) -> None:
-    kinematic, compliant = (walk(robot, control) for control in ("kinematic", "compliant"))
+def test_compliance_without_a_planned_squeeze_takes_most_of_the_slip(robot: str) -> None:
+    kinematic, compliant = (
+        walk(robot, control, "compliance.squeeze=0") for control in ("kinematic", "compliant")
+    )
     assert compliant.completed
     for name in ("slip_per_metre", "slip_net_per_metre"):
         assert compliant.metrics[name] < SLIP_LEFT * kinematic.metrics[name]
     for name in ("height_rms", "path_error", "peak_force"):
         assert compliant.metrics[name] < kinematic.metrics[name]
     assert compliant.facts["walk"]["fallback"] == 0.0
+
+
+@pytest.mark.usefixtures("plant_build")
+def test_the_planned_squeeze_takes_heat_from_the_servos_and_leaves_the_ground_some_slip() -> None:
+    kinematic, none, some, most = (
+        walk("athena", control, f"compliance.squeeze={squeeze}", "friction.law=bristle").metrics
+        for control, squeeze in (
+            ("kinematic", 0), ("compliant", 0), ("compliant", 0.48), ("compliant", 0.95)
+        )
+    )  # fmt: skip
+    assert none["heat"] > 2.5 * kinematic["heat"]
+    assert some["heat"] < 1.55 * kinematic["heat"]
+    assert most["heat"] < 1.2 * kinematic["heat"]
+    slips = [one["slip_per_metre"] for one in (none, some, most)]
+    assert slips == sorted(slips)
+    assert slips[-1] < 0.6 * kinematic["slip_per_metre"]
 
 
 @pytest.mark.usefixtures("plant_build")
@@ -123,9 +141,11 @@ def test_on_ground_100_times_softer_or_with_2_3_times_the_weight_it_is_no_worse_
 
 
 @pytest.mark.usefixtures("plant_build")
-def test_with_three_times_the_weight_it_is_kinematic_control() -> None:
+def test_with_three_times_the_weight_and_no_squeeze_it_is_kinematic_control() -> None:
     kinematic, compliant = (
-        walk("athena", control, "parameters.torso.mass=14", duration=6.0)
+        walk(
+            "athena", control, "parameters.torso.mass=14", "compliance.squeeze=0", duration=6.0
+        )
         for control in ("kinematic", "compliant")
     )
     assert compliant.facts["walk"]["fallback"] > 0.8  # from 1 s on, when that weight is known

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 import tomlkit
 
-from hexapod_cosim.controller import Controller, Parts, make_gait
+from hexapod_cosim.controller import SWITCHES, Controller, Parts, make_gait
 from hexapod_cosim.cosim.run.preparation import known_robot
 from hexapod_cosim.cosim.scenario.records import MAX_STEPS, Variation
 from hexapod_cosim.cosim.scenario.scenario import (
@@ -236,11 +236,17 @@ def test_faults_delays_switches_and_variations_are_read_and_written() -> None:
 
 def test_every_part_of_the_compliance_is_a_switch_that_is_on() -> None:
     assert asdict(load_scenario("walk_flat").compliance) == asdict(Parts())
-    for name in asdict(Parts()):
-        parts = asdict(
-            load_scenario("walk_flat", overrides=[f"compliance.{name}=false"]).compliance
-        )
-        assert [key for key, on in parts.items() if not on] == [name]
+    for name in SWITCHES:
+        parts = load_scenario("walk_flat", overrides=[f"compliance.{name}=false"]).compliance
+        assert [key for key in SWITCHES if not getattr(parts, key)] == [name]
+
+
+def test_the_weight_of_the_squeeze_is_a_number_from_0_to_below_1() -> None:
+    read = load_scenario("walk_flat", overrides=["compliance.squeeze=0.25"])
+    assert read.compliance == Parts(squeeze=0.25)
+    for text in ("-0.1", "1.0", "true", "'much'"):
+        with pytest.raises(ScenarioError, match=r"compliance.squeeze.*expected a finite number"):
+            load_scenario("walk_flat", overrides=[f"compliance.squeeze={text}"])
 
 
 MISTAKES = {

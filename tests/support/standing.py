@@ -18,6 +18,7 @@ WEIGHT = weight(ROBOT)  # N
 GAINS = make_gains(ROBOT)
 HOME = LegSolver(ROBOT).forward(ROBOT.stance)[:, :2] @ np.array([1.0, 1.0j])
 ALL = "111111"
+DEPTH = 0.135  # m; of the ground below the torso's origin
 RAISED = 0.03  # m; height of a foot in mid-swing
 
 
@@ -55,6 +56,7 @@ def make_laws(
         gains,
         Parts() if parts is None else parts,
         weight=weight(robot),
+        depth=DEPTH,
         cycle=gait.period,
         kp=robot.servo.kp,
         step_height=gait.step_height,

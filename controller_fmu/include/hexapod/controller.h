@@ -112,9 +112,11 @@ typedef struct hxGains {
   } paper_suspension;
 } hxGains;
 
-/* Switches, 1 or 0: enabled parts of the compliant control. */
+/* Switches, 1 or 0: enabled parts of the compliant control; and the weight of the squeeze. */
 typedef struct hxParts {
   int support, slip_pid, suspension, touchdown, posture, path, limits, fallback;
+  /* 1  weight of the servos' torques against the feet's use of friction in the planned squeeze */
+  double squeeze;
 } hxParts;
 
 /* The controller's model of the robot, the gait and the laws. hx_controller_definition_default sets
@@ -130,11 +132,13 @@ typedef struct hxControllerDefinition {
   hxKnownLeg leg[HX_LEGS];
   double foot_radius;        /* m */
   double contact_stiffness;  /* N/m^1.5  of a foot on the ground */
+  double friction;           /* 1        coefficient of friction that is believed */
   struct {
     double kp;                /* N m/rad */
     double speed_max;         /* rad/s */
     double rotor_inertia;     /* kg m2  seen at the joint */
     double coulomb_friction;  /* N m    in the gear */
+    double torque_continuous; /* N m    that it can give for ever */
   } servo;
   double gravity[3];  /* m/s2 */
   hxGait gait;

@@ -16,6 +16,8 @@ static const double gripped = 0.99; /* 1, of its share: a leg that is given more
 static const double largest_load = 2.0;
 /* 1, measured over modelled weight, range that the support accepts */
 static const double least_scale = 0.5, largest_scale = 3.0;
+/* 1, of the depth of the ground: distance of the centre of mass, each axis */
+static const double largest_lean = 0.4;
 /* 1, of the step height: a foot that is planned higher is in the air for certain */
 static const double high_share = 0.25;
 static const double carrying =
@@ -33,7 +35,8 @@ static double total_weight(const hxControllerDefinition *d) {
                      d->gravity[2] * d->gravity[2]);
 }
 
-void hx_compliance_compile(const hxControllerDefinition *definition, hxComplianceModel *model) {
+void hx_compliance_compile(const hxControllerDefinition *definition, double depth,
+                           hxComplianceModel *model) {
   const hxGains *gains = &definition->gains;
   const double period = definition->period, cycle = definition->gait.period;
   model->parts = definition->parts;
@@ -42,15 +45,16 @@ void hx_compliance_compile(const hxControllerDefinition *definition, hxComplianc
   model->weight = total_weight(definition);
   model->share = model->weight / HX_TRIPOD_LEGS;
   model->settled = settled_share * model->weight;
+  model->most_lean = largest_lean * depth;
   hx_sensor_watch_compile(model->weight, cycle, period, &model->watch);
   hx_burden_compile(definition, &model->burden);
   model->softness = 1.0 / definition->servo.kp;
   model->high = high_share * definition->gait.step_height;
   model->tracking = fmin(period / gains->slip.tracking_time, 1.0);
-  model->memory = exp(-period / gains->slip.load_time);
+  model->memory = hx_decay(-period / gains->slip.load_time);
   model->follow_load = 1.0 - model->memory;
-  model->follow_cycle = 1.0 - exp(-period / cycle);
-  model->follow_weight = 1.0 - exp(-period / gains->support.weight_time);
+  model->follow_cycle = 1.0 - hx_decay(-period / cycle);
+  model->follow_weight = 1.0 - hx_decay(-period / gains->support.weight_time);
   const double calm = nearbyint(calm_cycles * cycle / period);
   model->calm = (int64_t)calm;
   model->largest = gains->slip.limit * model->share;
@@ -200,17 +204,33 @@ static double law_inputs(const hxComplianceModel *model, const hxPlan *plan,
   }
   const double share = total > hx_load_floor ? 1.0 / total : 0.0;
   if (model->parts.fallback)
-    update_trust(model, plan, total > model->settled ? hypot(common.x, common.y) * share : 0.0,
-                 laws);
+    update_trust(model, plan, total > model->settled ? hx_length(common) * share : 0.0, laws);
   hx_squeeze(normal, plan->feet, push);
   for (int leg = 0; leg < HX_LEGS && !model->parts.slip_pid; ++leg) push[leg] = hx_plane(0.0, 0.0);
   return total;
 }
 
-/* Updates the ratio of measured to planned weight (C30), and the part of it that the servos carry.
- * total: the sum of the measured normal forces [N]. */
-static void update_weight(const hxComplianceModel *model, const hxPlan *plan, double total,
-                          hxCompliance *laws) {
+/* Updates the distance of the centre of mass from the modelled one (C44). The planned loads contain
+ * the present distance. normal: measured [N]; total: their sum. */
+static void update_lean(const hxComplianceModel *model, const hxPlan *plan,
+                        const double normal[HX_LEGS], double total, hxCompliance *laws) {
+  hxPlane measured = {0.0, 0.0}, planned = {0.0, 0.0};
+  if (!(total > model->settled) || !(plan->weight > model->settled)) return;
+  for (int leg = 0; leg < HX_LEGS; ++leg) {
+    measured = hx_plane_add(measured, hx_scaled(plan->feet[leg], normal[leg]));
+    planned = hx_plane_add(planned, hx_scaled(plan->feet[leg], plan->shares.normal[leg]));
+  }
+  const hxPlane ahead =
+      hx_plane_sub(hx_scaled(measured, 1.0 / total), hx_scaled(planned, 1.0 / plan->weight));
+  const hxPlane lean = hx_plane_add(laws->lean, hx_scaled(ahead, model->follow_cycle));
+  laws->lean.x = hx_clamp(lean.x, -model->most_lean, model->most_lean);
+  laws->lean.y = hx_clamp(lean.y, -model->most_lean, model->most_lean);
+}
+
+/* Updates the ratio of measured to planned weight (C30), the centre of mass (C44), and the part of
+ * the weight that the servos carry. normal: measured normal forces [N]; total: their sum [N]. */
+static void update_weight(const hxComplianceModel *model, const hxPlan *plan,
+                          const double normal[HX_LEGS], double total, hxCompliance *laws) {
   const double ratio = total / fmax(plan->weight, hx_load_floor),
                scale = hx_clamp(ratio, least_scale, largest_scale);
   int doubted = 0;
@@ -218,6 +238,7 @@ static void update_weight(const hxComplianceModel *model, const hxPlan *plan, do
   if (!doubted) {
     laws->scale += model->follow_weight * (scale - laws->scale);
     hx_burden_weigh(&model->burden, ratio, &laws->burden);
+    update_lean(model, plan, normal, total, laws);
   }
   hx_burden_step(&model->burden, plan->needed, laws->scale, &laws->burden);
 }
@@ -237,8 +258,7 @@ static void limit_answers(const hxComplianceModel *model, hxCompliance *laws) {
   for (int leg = 0; leg < HX_LEGS; ++leg) {
     hxFootLaw *law = &laws->law[leg];
     const hxPlane wanted = law->answer;
-    law->answer =
-        hx_scaled(wanted, model->largest / fmax(hypot(wanted.x, wanted.y), model->largest));
+    law->answer = hx_scaled(wanted, model->largest / fmax(hx_length(wanted), model->largest));
     law->x.integral += model->tracking * (law->answer.x - wanted.x);
     law->y.integral += model->tracking * (law->answer.y - wanted.y);
   }
@@ -361,7 +381,7 @@ void hx_compliance_step(const hxComplianceModel *model, const hxPlan *plan,
   hx_landings_look(laws->touching, plan->height, plan->swinging, &laws->landings);
   if (contacts_differ(plan, laws)) examine_contacts(model, plan, force, laws);
   const double total = law_inputs(model, plan, (const double (*)[3])force, push, felt, laws);
-  update_weight(model, plan, total, laws);
+  update_weight(model, plan, felt, total, laws);
   step_laws(model, plan, push, felt, answer, laws);
   actuate(model, plan, (const double (*)[3])answer, laws);
 }

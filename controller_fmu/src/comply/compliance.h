@@ -21,6 +21,7 @@ typedef struct hxComplianceModel {
   double period; /* s */
   /* N, of the robot; a third of it; load of all feet from which on they have settled */
   double weight, share, settled;
+  double most_lean; /* m, limit of the distance of the centre of mass, each axis */
   double softness; /* rad/N m of the servos */
   double high; /* m, a foot that is planned higher is in the air for certain */
   /* 1, factors of the smoothings over a period */
@@ -65,6 +66,7 @@ typedef struct hxCompliance {
   double grip[HX_LEGS]; /* 1, factor on the planned load of a leg that is regaining contact */
   int regaining; /* some grip may be below 1 */
   double scale; /* 1    measured over planned weight */
+  hxPlane lean; /* m, of the measured centre of mass from the modelled one, walking frame */
   double trust; /* 1, below 1 while the robot slides or its joints cannot follow */
   int lagging; /* the joints cannot follow the plan */
   double overspeed_share; /* 1, share of the time in which the plan exceeds a speed limit */
@@ -72,7 +74,9 @@ typedef struct hxCompliance {
   int64_t recovery_periods; /* steps that remain until feedback resumes after sliding */
 } hxCompliance;
 
-void hx_compliance_compile(const hxControllerDefinition *definition, hxComplianceModel *model);
+/* depth: of the ground below the torso's origin in the stance [m]. */
+void hx_compliance_compile(const hxControllerDefinition *definition, double depth,
+                           hxComplianceModel *model);
 void hx_compliance_reset(hxCompliance *laws);
 
 /* Sets what a step requires of the laws; height, rise: of the feet's paths above the stance [m,
@@ -80,10 +84,10 @@ void hx_compliance_reset(hxCompliance *laws);
 void hx_compliance_plan(const hxComplianceModel *model, const hxDemand *demand,
                         const double height[HX_LEGS], const double rise[HX_LEGS], hxPlan *plan);
 
-/* Returns whether a foot on its way down has met the ground, and not a sensor that lies (C46). */
+/* Returns whether a foot on its way down has met the ground, and not a sensor that lies (C50). */
 int hx_compliance_meets(const hxComplianceModel *model, int leg, const hxCompliance *laws);
 
-/* Returns whether the gait clock waits for the feet of legs that end their swing (C45). held: it
+/* Returns whether the gait clock waits for the feet of legs that end their swing (C49). held: it
  * waits already. */
 int hx_compliance_waits(const hxComplianceModel *model, const int landing[HX_LEGS], int held,
                         const hxCompliance *laws);

@@ -46,13 +46,17 @@ void hx_compliant_compile(const hxControllerDefinition *definition, const hxLegS
   const hxNeighbours motion = {{NULL, &masses, NULL}, {NULL, pose, NULL}};
   hx_inverse_dynamics_demand(&model->dynamics, leg, &motion, still, &level, &rest);
   hx_support_compile(definition, &rest, &model->support);
-  hx_compliance_compile(definition, &model->laws);
+  hx_compliance_compile(definition, -model->dynamics.floor, &model->laws);
+  hx_planned_squeeze_compile(definition->friction, model->laws.weight, -model->dynamics.floor,
+                             &model->squeeze);
   hx_hold_compile(definition, &model->hold);
+  hx_warmth_compile(definition, &model->warmth);
 }
 
-void hx_compliant_reset(hxCompliant *compliant) {
+void hx_compliant_reset(const hxCompliantModel *model, hxCompliant *compliant) {
   memset(compliant, 0, sizeof *compliant);
   hx_compliance_reset(&compliant->laws);
+  hx_warmth_reset(&model->warmth, &compliant->warmth);
 }
 
 /* ----------------------------------------------------------------------------------- steering */
@@ -152,4 +156,7 @@ void hx_compliant_step(const hxCompliantModel *model, const hxLegSolver leg[HX_L
     output->lift[k] = laws->shift[k][2] + raised;
   }
   if (busy || compliant->moving) compliant->moving = busy;
+  const double needed = laws->burden.heft * laws->burden.peak / model->laws.most;
+  hx_warmth_step(&model->warmth, (const double (*)[HX_JOINTS])laws->torque, needed,
+                 &compliant->warmth);
 }

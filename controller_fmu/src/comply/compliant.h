@@ -3,10 +3,12 @@
 #ifndef HX_COMPLIANT_H
 #define HX_COMPLIANT_H
 
+#include "../sense/warmth.h"
 #include "../walk/hold.h"
 #include "../walk/trajectory.h"
 #include "compliance.h"
 #include "hexapod/inside.h"
+#include "planned_squeeze.h"
 
 HX_HIDDEN_BEGIN
 
@@ -15,8 +17,10 @@ typedef struct hxCompliantModel {
   double leading; /* steps of the transition of the added velocity */
   hxInverseDynamics dynamics;
   hxSupport support;
+  hxPlannedSqueeze squeeze;
   hxComplianceModel laws;
   hxHoldModel hold;
+  hxWarmthModel warmth;
 } hxCompliantModel;
 
 /* Velocity that steers back to the path, added to the commanded one, with a transition from one
@@ -29,6 +33,7 @@ typedef struct hxSteering {
 typedef struct hxCompliant {
   hxCompliance laws;
   hxHold hold;
+  hxWarmth warmth;
   hxSteering steering;
   int64_t count; /* number of steps */
   double offset[HX_LEGS]; /* m, offsets for early and late touch-downs at the last step */
@@ -50,7 +55,7 @@ void hx_sense(const hxControllerInput *input, const hxPosture *posture, double f
 
 void hx_compliant_compile(const hxControllerDefinition *definition, const hxLegSolver leg[HX_LEGS],
                           hxCompliantModel *model);
-void hx_compliant_reset(hxCompliant *compliant);
+void hx_compliant_reset(const hxCompliantModel *model, hxCompliant *compliant);
 
 /* Called before new steps are planned: takes over the corrections of the slow loops, when a leg
  * lifts off or touches down (afresh), and at a stop (not moves) (C40). steps: periods since the

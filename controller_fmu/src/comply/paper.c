@@ -18,7 +18,7 @@ void hx_paper_compile(const hxControllerDefinition *definition, hxPaperModel *mo
   model->deepest = gains->paper_suspension.limit;
 }
 
-/* Updates the shift of a foot for a tangential force [N] (C42). The length of the shift is limited,
+/* Updates the shift of a foot for a tangential force [N] (C46). The length of the shift is limited,
  * and its integral follows the limited value; that of a swinging foot decays. */
 static void yield_sideways(const hxPaperModel *model, hxPlane force, int swinging, int k,
                            hxPaper *paper) {
@@ -32,7 +32,7 @@ static void yield_sideways(const hxPaperModel *model, hxPlane force, int swingin
   paper->y[k].integral = kept * (paper->y[k].integral + model->tracking * (shift.y - wanted.y));
 }
 
-/* Updates the deflection of a suspension for a normal force [N] (C43). */
+/* Updates the deflection of a suspension for a normal force [N] (C47). */
 static void yield_upwards(const hxPaperModel *model, double force, int k, hxPaper *paper) {
   const hxSuspension *s = &model->suspension;
   const double z = paper->lift[k], rate = paper->rate[k],

@@ -20,11 +20,11 @@ static double smooth(double x) {
   return y * y * y * (10.0 + y * (6.0 * y - 15.0));
 }
 
-/* Solves S x = b for symmetric, positive definite S: x = L^-T D^-1 L^-1 b. */
-static void solve(const double S[6], const double b[3], double x[3]) { /* S: 00 01 02 11 12 22 */
-  const double d0 = S[0], l10 = S[1] / d0, l20 = S[2] / d0;
-  const double d1 = S[3] - l10 * S[1], l21 = (S[4] - l20 * S[1]) / d1;
-  const double d2 = S[5] - l20 * S[2] - l21 * l21 * d1;
+void hx_support_solve(const double S[6], const double b[3], double x[3]) {
+  const double ridge = ridge_share * (S[0] + S[3] + S[5]) + least_arm;
+  const double d0 = S[0] + ridge, l10 = S[1] / d0, l20 = S[2] / d0;
+  const double d1 = S[3] + ridge - l10 * S[1], l21 = (S[4] - l20 * S[1]) / d1;
+  const double d2 = S[5] + ridge - l20 * S[2] - l21 * l21 * d1;
   const double y1 = b[1] - l10 * b[0], y2 = b[2] - l20 * b[0] - l21 * y1;
   x[2] = y2 / d2;
   x[1] = y1 / d1 - l21 * x[2];
@@ -69,11 +69,7 @@ static void share_normal(const hxPlane feet[HX_LEGS], const double activation[HX
     S[4] += ax * feet[k].y;
     S[5] += ay * feet[k].y;
   }
-  const double ridge = ridge_share * (S[0] + S[3] + S[5]) + least_arm;
-  S[0] += ridge;
-  S[3] += ridge;
-  S[5] += ridge;
-  solve(S, needed, x);
+  hx_support_solve(S, needed, x);
   for (int k = 0; k < HX_LEGS; ++k) {
     const double share = activation[k] * (x[0] + x[1] * feet[k].x + x[2] * feet[k].y);
     normal[k] = share < 0.0 ? 0.0 : share;

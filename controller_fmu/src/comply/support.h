@@ -23,6 +23,10 @@ typedef struct hxShares {
   hxPlane push[HX_LEGS]; /* N */
 } hxShares;
 
+/* Solves S x = b for symmetric, positive semidefinite S (00 01 02 11 12 22) by L D L^T; a ridge on
+ * the diagonal makes S definite. */
+void hx_support_solve(const double S[6], const double b[3], double x[3]);
+
 void hx_support_compile(const hxControllerDefinition *definition, const hxDemand *rest,
                         hxSupport *model);
 

@@ -150,7 +150,7 @@ def _check_gain(factor: Factor, study: Study, where: str) -> None:
                 fix="correct it",
                 where=where,
             )
-    if set(study.run_controls) <= {"kinematic"}:
+    if study.gains_text is None:
         fix = 'add "compliant" to the controls, or take the gain away: kinematic control has none'
         raise StudyError(
             "a gain that no run has",

@@ -1,0 +1,33 @@
+/* warmth.h - heat of the servos, and the weight of the planned squeeze that follows. Python:
+ * controller/sense/warmth.py. */
+#ifndef HX_WARMTH_H
+#define HX_WARMTH_H
+
+#include "hexapod/controller.h"
+#include "hexapod/inside.h"
+
+HX_HIDDEN_BEGIN
+
+typedef struct hxWarmthModel {
+  double rating; /* N2 m2, square of the continuous torque of a servo */
+  double squeeze; /* 1, weight while all servos are cool */
+  double more; /* 1, what is added when one is hot */
+  double follow; /* 1, factor of the smoothing over a period */
+} hxWarmthModel;
+
+typedef struct hxWarmth {
+  double heat[HX_LEGS][HX_JOINTS]; /* N2 m2, smoothed squares of the feed-forward torques */
+  double squeeze; /* 1, weight of the torques in the planned squeeze */
+} hxWarmth;
+
+void hx_warmth_compile(const hxControllerDefinition *definition, hxWarmthModel *model);
+void hx_warmth_reset(const hxWarmthModel *model, hxWarmth *warmth);
+
+/* Advances by one period (C45). torque: feed-forward torques [N m]; needed: largest torque that the
+ * measured weight needs, over the largest that is allowed [1]. */
+void hx_warmth_step(const hxWarmthModel *model, const double torque[HX_LEGS][HX_JOINTS],
+                    double needed, hxWarmth *warmth);
+
+HX_HIDDEN_END
+
+#endif

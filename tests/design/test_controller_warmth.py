@@ -1,0 +1,82 @@
+"""Tests that the squeeze grows as servos warm up or run short of torque."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from gains import PERIOD
+
+from hexapod_cosim.controller.sense.warmth import COOL, HEAT_TIME, HOT, MOST_SQUEEZE, Warmth
+
+RATING = 1.2  # N m
+MINUTE = round(HEAT_TIME / PERIOD)  # periods
+
+
+def make(squeeze: float = 0.4) -> Warmth:
+    return Warmth(rating=RATING, squeeze=squeeze, period=PERIOD)
+
+
+def loaded(largest: float) -> np.ndarray:
+    """Returns torques (6, 3) of which one is the largest [N m]."""
+    torque = np.full((6, 3), 0.3 * largest)
+    torque[4, 1] = -largest
+    return torque
+
+
+def test_heat_nears_the_square_of_a_constant_torque_by_e_in_a_minute() -> None:
+    warmth = make()
+    for _ in range(MINUTE):
+        warmth.step(loaded(1.0), 0.5)
+    assert warmth.heat.max() == pytest.approx(1.0 - math.exp(-1.0))
+    assert np.unravel_index(warmth.heat.argmax(), (6, 3)) == (4, 1)
+
+
+@pytest.mark.parametrize(
+    ("share", "expected"),
+    [(0.5, 0.4), (COOL, 0.4), (0.9, 0.5 * (0.4 + MOST_SQUEEZE)), (HOT, MOST_SQUEEZE), (3.0, 0.95)],
+)
+def test_the_squeeze_follows_the_hottest_servo(share: float, expected: float) -> None:
+    warmth = make()
+    for _ in range(20 * MINUTE // 100):
+        warmth.follow = 1.0 - math.exp(-100.0 * PERIOD / HEAT_TIME)
+        warmth.step(loaded(math.sqrt(share) * RATING), 0.5)
+    assert warmth.squeeze == pytest.approx(expected, abs=1e-6)
+
+
+def test_cool_servos_keep_the_weight_that_was_set_and_none_stays_none() -> None:
+    for squeeze in (0.0, 0.3, 0.97):
+        warmth = make(squeeze)
+        assert warmth.squeeze == squeeze
+    nothing = make(0.0)
+    nothing.heat = np.full((6, 3), 10.0)
+    nothing.step(loaded(9.0), 2.0)
+    assert nothing.squeeze == 0.0
+
+
+def test_a_saved_warmth_goes_on_the_same_and_a_reset_one_is_cool() -> None:
+    warmth, other = make(), make()
+    for _ in range(1000):
+        warmth.step(loaded(4.0), 0.5)
+    other.restore(warmth.save())
+    for one in (warmth, other):
+        one.step(loaded(2.0), 0.5)
+    assert warmth.squeeze == other.squeeze > 0.4
+    assert (warmth.heat == other.heat).all()
+    warmth.reset()
+    assert warmth.squeeze == 0.4
+    assert not warmth.heat.any()
+
+
+@pytest.mark.parametrize(
+    ("needed", "expected"), [(0.8, 0.4), (0.9, 0.675), (1.0, MOST_SQUEEZE), (4.0, MOST_SQUEEZE)]
+)
+def test_the_squeeze_grows_at_once_when_the_weight_needs_nearly_all_the_torque(
+    needed: float, expected: float
+) -> None:
+    warmth = make()
+    warmth.step(np.zeros((6, 3)), needed)
+    assert warmth.squeeze == pytest.approx(expected)
+    warmth.step(np.zeros((6, 3)), 0.3)
+    assert warmth.squeeze == 0.4
