@@ -166,6 +166,7 @@ fmu: setup
 typing:
 	@mkdir -p $(TYPING)
 	@for part in models controller cosim; do ln -sfn ../../../$$part $(TYPING)/$$part; done
+	@ln -sfn ../../../package/hexapod_cosim/__init__.py $(TYPING)/__init__.py
 
 clean:
 	rm -rf $(VENV) build out dist .pytest_cache .mypy_cache .ruff_cache

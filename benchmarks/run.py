@@ -24,6 +24,9 @@ from rich.progress import track
 
 from benchmarks import BUILD, ROOT
 from benchmarks.figure import draw
+from benchmarks.ground import landings, walks_over_waves
+from benchmarks.ground_map import map_costs
+from benchmarks.ground_table import ground_rows
 from benchmarks.judge import agreement, spreads
 from benchmarks.loop import master_overhead, realtime_factor
 from benchmarks.measure import Bench, Run
@@ -63,8 +66,14 @@ def main() -> None:
         action="store_true",
         help="few walks and settings, no peer that takes long to build",
     )
-    quick = parser.parse_args().quick
-    tools = prepare(quick=quick)
+    parser.add_argument("--ground", action="store_true", help="measure the height fields only")
+    arguments = parser.parse_args()
+    quick, tools = arguments.quick, prepare(quick=arguments.quick or arguments.ground)
+    folder = BUILD / "quick" if quick else RESULTS / machine()
+    ground = measured_ground(tools, folder, quick=quick)
+    if arguments.ground:
+        console.print(shown(ground, title=f"height fields on {machine()}"))
+        return
     series = [
         *_chosen(ours(), quick),
         *_chosen([one for one in peers() if command(one.engine, tools)], quick),
@@ -73,10 +82,9 @@ def main() -> None:
     files = {walk.name: write(walk) for walk in walks}
     bench = Bench(tools, files | _steep_files(walks))
     runs = measured(bench, series, [walk.name for walk in walks])
-    folder = BUILD / "quick" if quick else RESULTS / machine()
     _write_walks(folder, runs, series, tools)
     parts, scaling = measured_parts(bench, series, runs, walks)
-    table = rows(runs, series, parts)
+    table = [*rows(runs, series, parts), *ground]
     _write_csv(folder / "table.csv", [asdict(row) | {"met": row.met} for row in table])
     _write_csv(folder / "instances.csv", scaling)
     _print_results(runs, series, table, tools, folder)
@@ -84,6 +92,21 @@ def main() -> None:
         console.print(
             'quick: few walks, settings and peers; "the best of them" is the best of these only'
         )
+
+
+def measured_ground(tools: Tools, folder: Path, *, quick: bool) -> list[Row]:
+    """Measures the height fields, writes the records and returns their rows of the table."""
+    folder.mkdir(parents=True, exist_ok=True)
+    facts = json.dumps(described(tools), indent=2)
+    (folder / "machine.json").write_text(f"{facts}\n", encoding="utf-8")
+    walks = walks_over_waves(tools, quick=quick)
+    landed, maps = landings(tools), map_costs(tools, quick=quick)
+    found = ground_rows(walks, landed, maps)
+    records = {"ground": walks, "ground_landings": landed, "ground_maps": maps}
+    records["ground_table"] = [asdict(row) | {"met": row.met} for row in found]
+    for name, content in records.items():
+        _write_csv(folder / f"{name}.csv", content)
+    return found
 
 
 def _chosen(series: Sequence[Series], quick: bool) -> list[Series]:
@@ -170,9 +193,6 @@ def _write_walks(folder: Path, runs: Sequence[Run], series: Sequence[Series], to
         for spread in spreads(runs, one)
     ]
     _write_csv(folder / "settings.csv", settings)
-    (folder / "machine.json").write_text(
-        json.dumps(described(tools), indent=2) + "\n", encoding="utf-8"
-    )
     draw(runs, series, folder)
 
 

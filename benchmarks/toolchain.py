@@ -15,7 +15,14 @@ from pathlib import Path
 from benchmarks import BUILD, ROOT
 
 REQUIREMENTS = Path(__file__).parent / "requirements.txt"
-OUR_TARGETS = ("bench_plant", "bench_derivative", "bench_instances", "bench_idle_fmu", "fmu")
+OUR_TARGETS = (
+    "bench_plant",
+    "bench_derivative",
+    "bench_instances",
+    "bench_idle_fmu",
+    "hexapod_c",
+    "fmu",
+)
 PEER_TARGETS = ("mujoco", "pinocchio", "simbody")
 QUICK_TARGETS = ("mujoco",)  # compiles in seconds; Pinocchio takes minutes
 LAST_LINES = 3  # of a failed command's output

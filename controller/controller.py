@@ -20,7 +20,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from hexapod_cosim.controller.comply.compliant import Compliant, Stance
+from hexapod_cosim.controller.comply.compliant import Compliant, Stance, sense
+from hexapod_cosim.controller.comply.paper import Paper
 from hexapod_cosim.controller.comply.posture import Posture
 from hexapod_cosim.controller.gains import Gains
 from hexapod_cosim.controller.memory import Stateful
@@ -36,9 +37,10 @@ from hexapod_cosim.controller.walk.trajectory import (
     PlannedFeet,
     Twist,
 )
-from hexapod_cosim.models import HexapodError, Robot
+from hexapod_cosim.models import HexapodError, Robot, unknown_name
 
 ALL_PARTS = Parts()
+LAWS = ("compliant", "paper")  # what the feet's forces do; without gains control is kinematic
 CLOCK_TOLERANCE = 0.01  # 1    of a period, between the time given and the steps counted
 
 
@@ -117,7 +119,7 @@ def gains_warnings(robot: Robot, gains: Gains | None, period: float) -> tuple[st
 
 
 class Controller(Stateful):
-    """Walks a robot, under kinematic control or with `gains` under compliant control.
+    """Walks a robot, under kinematic control or with `gains` under the control that `law` names.
 
     `warnings` lists problems of the set-up that do not prevent a run, such as gains of another
     robot. Raises RobotError for a joint pattern without closed-form kinematics, ControllerError for
@@ -125,8 +127,8 @@ class Controller(Stateful):
     """
 
     STATE = (
-        "ramp", "paths", "compliant", "_start", "_count", "_at", "_last", "_cut", "_before", "_now",
-        "_after", "_shown",
+        "ramp", "paths", "compliant", "paper", "_start", "_count", "_at", "_last", "_cut",
+        "_before", "_now", "_after", "_shown",
     )  # fmt: skip
 
     def __init__(
@@ -137,6 +139,7 @@ class Controller(Stateful):
         gait: Gait,
         gains: Gains | None = None,
         parts: Parts = ALL_PARTS,
+        law: str = "compliant",
     ) -> None:
         phases = (gait.duty * gait.period, (1.0 - gait.duty) * gait.period)
         if not 0.0 < period < min(phases):
@@ -146,12 +149,17 @@ class Controller(Stateful):
                 expected=f"0 < period < {min(phases):g} s, the gait's shorter phase",
                 fix="shorten the period or slow the gait",
             )
+        if law not in LAWS:
+            raise unknown_name("law", law, LAWS)
         self.period, self.gait, self.gains, self.parts = period, gait, gains, parts
         self.legs, self.stance = LegSolver(robot), robot.stance
         self.ramp = CommandRamp(gait.period, period=period)
         self.paths = FootPaths(gait, self.legs.forward(self.stance), period=period)
         self.compliant: Compliant | None = None
-        if gains is not None:
+        self.paper: Paper | None = None
+        if gains is not None and law == "paper":
+            self.paper = Paper(gains, parts, period=period)
+        elif gains is not None:
             legs = self.legs
             self.compliant = Compliant(robot, gait, gains, parts, legs=legs, period=period)
         self.warnings = gains_warnings(robot, gains, period)
@@ -278,16 +286,20 @@ class Controller(Stateful):
         plane, height = now.posture.see_place(now.feet.plane + now.shift, now.feet.height)
         return rows_of(plane.real, plane.imag, height)
 
-    def _follow_paths(self) -> None:
-        """Computes the joint commands that move the feet along their paths (C10 to C14)."""
-        now, out, shown = self._now, self._out, self.diagnostics
-        feet = Feet(
+    def _planned_feet(self) -> Feet:
+        """Returns the feet of the present step with rolling and lowering, walking frame."""
+        now = self._now
+        return Feet(
             plane=now.feet.plane + now.shift,
             height=now.height,
             velocity=now.feet.velocity + self._rate_of("shift"),
             rise=now.feet.rise - self._rate_of("lowering"),
         )
-        seen = now.posture.see(feet)
+
+    def _follow_paths(self) -> None:
+        """Computes the joint commands that move the feet along their paths (C10 to C14)."""
+        now, out, shown = self._now, self._out, self.diagnostics
+        seen = now.posture.see(self._planned_feet())
         joints = self.legs.solve(now.pose, seen.velocity, seen.rise)
         neighbour, ahead = self._after or self._before, self.period
         if self._after is None:
@@ -300,6 +312,16 @@ class Controller(Stateful):
         shown.swinging[...] = self.paths.swinging
         shown.unreachable[...] = joints.unreachable
         shown.planned[...] = self._show_planned()
+
+    def _correct_paths(self, paper: Paper, measurement: Measurement) -> None:
+        """Corrects the paths by the foot forces, and the joint commands with them (C47 to C49)."""
+        now, out, shown = self._now, self._out, self.diagnostics
+        paper.step(sense(measurement, now.posture), self.paths.swinging)
+        joints = paper.actuate(self.legs, self._planned_feet(), now.posture)
+        out.angle_ref[...], out.speed_ref[...] = joints.angle, joints.speed
+        shown.unreachable[...] = joints.unreachable
+        shift = paper.shift
+        self._show(rows_of(shift.real, shift.imag, paper.lift), _flags())
 
     def _ask(self, compliant: Compliant) -> Stance:
         """Returns planned loads and geometry of the present step for the laws (C15 to C20)."""
@@ -331,6 +353,8 @@ class Controller(Stateful):
         self.ramp.reset()
         if self.compliant is not None:
             self.compliant.reset()
+        if self.paper is not None:
+            self.paper.reset()
         self._start = None
         self._count, self._at, self._last, self._cut = 0, 0, math.inf, True
         feet = self.paths.reset()
@@ -383,6 +407,8 @@ class Controller(Stateful):
                 self._count += 1
                 self._advance(command_changed)
             self._follow_paths()
+            if self.paper is not None:
+                self._correct_paths(self.paper, measurement)
             if self.compliant is not None:
                 shift = self.compliant.step(self._ask(self.compliant), measurement, self._out)
                 self._show(shift, self.compliant.laws.fallback)

@@ -12,7 +12,7 @@ from typing import Any, TypeVar
 
 from hexapod_cosim.models import HexapodError, Robot, nearest_name
 
-FORMAT = 2
+FORMAT = 3
 TRIPOD_LEGS = 3  # legs that share the weight in a tripod gait: the unit of load is weight / 3
 
 
@@ -46,6 +46,15 @@ class SuspensionGains:
     damping: float  # N s/m
     stiffness: float  # N/m
     limit: float  # m    largest deflection
+
+
+@dataclass(frozen=True, kw_only=True)
+class PaperSlipGains(SlipGains):
+    """PID of the paper's control, from the tangential force [N] to the shift of the foot (C47).
+
+    The fields are those of SlipGains with other units: kp [m/N], ki [m/(N s)], kd [m s/N], limit
+    [m]; load_time is the time constant with which the shift of a swinging foot decays.
+    """
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -123,6 +132,10 @@ class Margins:
     support_torque: float  # N m    largest torque of a servo in a standing tripod
     spectral_radius: float  # 1    of the whole closed loop, all feet and both laws together, < 1
     binding: str  # the requirement that limited the gain of the tangential loop
+    # of the paper's control: the worst of its loops, tangential and vertical
+    paper_phase_margin: float = math.inf  # deg
+    paper_gain_margin: float = math.inf  # dB
+    paper_spectral_radius: float = 0.0  # 1    of its whole closed loop, < 1
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -138,6 +151,8 @@ class Gains:
     support: SupportGains
     hold: HoldGains
     limits: LimitGains
+    paper_slip: PaperSlipGains
+    paper_suspension: SuspensionGains
     margins: Margins
     caveats: tuple[str, ...] = ()  # stances that are left out, and why; what was not reached
 
@@ -161,6 +176,8 @@ PARTS: dict[str, type[Any]] = {
     "support": SupportGains,
     "hold": HoldGains,
     "limits": LimitGains,
+    "paper_slip": PaperSlipGains,
+    "paper_suspension": SuspensionGains,
     "margins": Margins,
 }
 POSITIVE = {
@@ -169,6 +186,8 @@ POSITIVE = {
     "support": ("handover_time", "weight_time"),
     "hold": ("ground_time",),
     "limits": ("speed", "torque"),
+    "paper_slip": ("derivative_time", "filter_time", "load_time", "tracking_time", "limit"),
+    "paper_suspension": ("mass", "damping", "stiffness", "limit"),
     "requirements": (
         "phase_margin",
         "filter_time",

@@ -167,7 +167,7 @@ fmi2Component fmi2Instantiate(fmi2String instanceName, fmi2Type fmuType, fmi2Str
            "nothing was instantiated",
            (int)fmuType);
   if (status == HX_OK) return instance;
-  fmi2FreeInstance(instance);
+  hx_instance_free(&instance->base); /* not fmi2FreeInstance: it may be another library's */
   return NULL;
 }
 

@@ -172,11 +172,17 @@ static fmi3InstanceData *new_instance(hxInterface interface, fmi3String name, fm
   return instance;
 }
 
+/* Frees an instance, which may be NULL, and returns NULL. An exported function of the same purpose
+ * could be another library's when the importer loads symbols globally. */
+static fmi3Instance give_up(fmi3InstanceData *instance) {
+  hx_instance_free(instance ? &instance->base : NULL);
+  return NULL;
+}
+
 static fmi3Instance open_instance(fmi3InstanceData *instance, fmi3String token,
                                   fmi3String resources) {
   if (instance && hx_instance_open(&instance->base, token, resources) == HX_OK) return instance;
-  fmi3FreeInstance(instance);
-  return NULL;
+  return give_up(instance);
 }
 
 static fmi3Instance refuse_kind(fmi3InstanceData *instance, const char *kind) {
@@ -185,8 +191,7 @@ static fmi3Instance refuse_kind(fmi3InstanceData *instance, const char *kind) {
            "instantiation: got %s, expected an interface of the model description; nothing was "
            "instantiated",
            kind);
-  fmi3FreeInstance(instance);
-  return NULL;
+  return give_up(instance);
 }
 
 fmi3Instance fmi3InstantiateModelExchange(fmi3String instanceName, fmi3String instantiationToken,

@@ -2,9 +2,10 @@
 #include "fmi/instance.h"
 
 #include <math.h>
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+
+#include "hexapod/message.h"
 
 /* ----------------------------------------------------------------------------------------------
  * opening */
@@ -38,7 +39,7 @@ void *hx_instance_new(size_t size, hxInterface interface, const char *name, int 
   instance->sink = sink;
   instance->logged = logging ? ~0u : HX_LOG_ALWAYS;
   instance->state.interface = (int)interface;
-  if (name) snprintf(instance->name, sizeof instance->name, "%s", name);
+  if (name) hx_print(instance->name, sizeof instance->name, "%s", name);
   return instance;
 }
 
@@ -49,7 +50,7 @@ hxStatus hx_instance_open(hxInstance *instance, const char *guid, const char *re
            guid ? "instance name" : "GUID");
     return HX_INVALID_ARGUMENT;
   }
-  snprintf(instance->guid, sizeof instance->guid, "%s", guid);
+  hx_print(instance->guid, sizeof instance->guid, "%s", guid);
   hx_component_defaults(&instance->start);
   hxStatus status = hx_resources_read(instance, resources, &found);
   if (status == HX_OK && !found) status = check_default_guid(instance, resources);

@@ -2,15 +2,16 @@
 #include "fmi/instance.h"
 
 #include <stdarg.h>
-#include <stdio.h>
 #include <string.h>
+
+#include "hexapod/message.h"
 
 void hx_log(hxInstance *instance, hxLogCategory category, const char *format, ...) {
   char text[HX_LOG_SIZE];
   va_list arguments;
   if (!(instance->logged & 1u << category)) return;
   va_start(arguments, format);
-  vsnprintf(text, sizeof text, format, arguments);
+  hx_print_list(text, sizeof text, format, arguments);
   va_end(arguments);
   instance->sink(instance, category, text);
 }

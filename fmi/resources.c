@@ -12,6 +12,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "hexapod/message.h"
+
 #ifdef _WIN32
 #define WIN32_LEAN_AND_MEAN
 #include <windows.h>
@@ -233,7 +235,7 @@ static hxStatus read_variables(hxInstance *instance, hxReader *reader,
       char *text = next_line(reader);
       if (text) strcpy(shown, text);
       if (!read_variable(variables, variable, section->first + i, text)) {
-        snprintf(expected, sizeof expected, "'%u VALUE %s' with a value in [%g, %g] %s",
+        hx_print(expected, sizeof expected, "'%u VALUE %s' with a value in [%g, %g] %s",
                  section->first + i, variable->name, variable->min, variable->max, variable->unit);
         return refuse(instance, reader, text ? shown : NULL, expected);
       }

@@ -142,20 +142,6 @@ def sphere_contact(state: Array, centre: Array, radius: float, face: Face) -> Fo
     return FootContact(point, velocity, normal, radius - distance, float(-velocity @ normal))
 
 
-def wall_contacts(robot: Robot, body: Array) -> tuple[FootContact | None, ...]:
-    """Returns the second contacts of the six feet of bodies (19, 13), with walls and edges.
-
-    Only surfaces of blocks have walls; None where there is none beside a foot.
-    """
-    found: list[FootContact | None] = []
-    for leg, centre in enumerate(foot_centres(robot, body)):
-        walls = ground_faces(robot.terrain, centre)[1:]
-        tibia = body[JOINTS * (leg + 1)]
-        touches = sphere_contact(tibia, centre, robot.foot.radius, walls[0]) if walls else None
-        found.append(touches)
-    return tuple(found)
-
-
 def foot_contacts(robot: Robot, body: Array) -> tuple[FootContact, ...]:
     """Returns the contacts of the six feet of bodies (19, 13)."""
     centres = foot_centres(robot, body)

@@ -14,8 +14,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from hexapod_cosim.models.actuator import gear_friction, overrun, servo_torque, stop_torque
-from hexapod_cosim.models.body.contacts import body_wrenches, standing_body_damping
-from hexapod_cosim.models.contact import foot_contacts, foot_force, foot_moment, wall_contacts
+from hexapod_cosim.models.body.contacts import standing_body_damping
 from hexapod_cosim.models.kinematics import (
     BODIES,
     JOINTS,
@@ -31,6 +30,7 @@ from hexapod_cosim.models.kinematics import (
     split,
 )
 from hexapod_cosim.models.records import Array, Robot
+from hexapod_cosim.models.touch.forces import Contacts, contact_wrenches, contacts_of
 
 MULTIPLIERS = 5
 
@@ -149,16 +149,17 @@ def world_inertias(robot: Robot, body: Array) -> Array:
     )
 
 
-def mass_matrix(robot: Robot, body: Array) -> Array:
+def mass_matrix(robot: Robot, body: Array, joints: Constraints | None = None) -> Array:
     """Returns M = diag(m 1, J) + J_r G^T G (114, 114).
 
-    The inertia J_r of the geared rotors acts on the joint speeds.
+    The inertia J_r of the geared rotors acts on the joint speeds. joints: `constraints` at these
+    bodies, if they are known.
     """
     M = np.zeros((6 * BODIES, 6 * BODIES))
     for k, (mass, J) in enumerate(zip(masses(robot), world_inertias(robot, body), strict=True)):
         M[6 * k : 6 * k + 3, 6 * k : 6 * k + 3] = mass * np.eye(3)
         M[6 * k + 3 : 6 * k + 6, 6 * k + 3 : 6 * k + 6] = J
-    G = constraints(robot, body).G
+    G = (joints or constraints(robot, body)).G
     return M + robot.servo.rotor_inertia * G.T @ G
 
 
@@ -166,38 +167,27 @@ def applied_forces(
     robot: Robot,
     body: Array,
     command: Command,
-    damping: Array,
+    damping: Array | Contacts,
     bristle: Array | None = None,
     body_damping: Array | None = None,
 ) -> Array:
     """Returns the forces g (19, 6) of eq. 1 without the joints' torques [N, N m].
 
-    damping: of the contacts [s/m], nan for open ones: (6,) of the feet with the ground, or (2, 6)
-    with that of `wall_contacts` in the second row. bristle: deflections [m], 0 by default: (6, 3),
-    or (2, 6, 3) accordingly. body_damping: of the contacts of torso, knees and shanks [s/m], in the
-    order of `body_spheres`; None: `standing_body_damping`.
+    damping: of the feet on the ground below them (6,) [s/m], nan for open ones; or the state of all
+    contacts, which holds those of walls, materials and soil, too. bristle: deflections (6, 3) [m],
+    0 by default. body_damping: with an array of damping alone, that of torso, knees and shanks
+    [s/m], in the order of `body_spheres`; None: `standing_body_damping`.
     """
+    if not isinstance(damping, Contacts):
+        if body_damping is None:
+            body_damping = standing_body_damping(robot, body)
+        damping = contacts_of(robot, damping, body_damping)
     g = np.zeros((BODIES, 6))
     g[:, 0:3] = masses(robot)[:, None] * np.array(robot.gravity)
     J, w = world_inertias(robot, body), body[:, 10:13]
     g[:, 3:6] = -np.cross(w, np.einsum("kij,kj->ki", J, w))
-    rows = [foot_contacts(robot, body), wall_contacts(robot, body)]
-    damping = np.atleast_2d(damping)
-    still = np.zeros((len(damping), LEGS, 3))
-    deflection = still if bristle is None else bristle.reshape(still.shape)
-    for row, feet in enumerate(rows[: len(damping)]):
-        for leg, foot in enumerate(feet):
-            if foot is None:
-                continue
-            tibia = JOINTS * (leg + 1)
-            force = foot_force(robot, foot, damping[row, leg], deflection[row, leg])
-            moment = foot_moment(robot, foot, damping[row, leg], body[tibia, 10:13])
-            arm = foot.point - body[tibia, 0:3]
-            g[tibia] += np.concatenate([force, cross(arm, force) + moment])
     g[0] += np.concatenate([command.push_force, command.push_torque])
-    if body_damping is None:
-        body_damping = standing_body_damping(robot, body)
-    return g + body_wrenches(robot, body, body_damping)
+    return g + contact_wrenches(robot, body, damping, bristle)
 
 
 def joint_torques(robot: Robot, body: Array, command: Command) -> tuple[Array, Array]:
@@ -242,12 +232,15 @@ def drive_acceleration(robot: Robot, body: Array, command: Command) -> Array:
     )
 
 
-def constraint_equations(robot: Robot, body: Array, command: Command) -> tuple[Array, Array]:
+def constraint_equations(
+    robot: Robot, body: Array, command: Command, joints: Constraints | None = None
+) -> tuple[Array, Array]:
     """Returns D and c of the rows D dv = c of eq. 1 (c: eq. 7) at bodies (19, 13).
 
-    In kinematic mode each joint adds the row G dv = drive_acceleration (eq. 13).
+    In kinematic mode each joint adds the row G dv = drive_acceleration (eq. 13). joints: as in
+    `mass_matrix`.
     """
-    joints = constraints(robot, body)
+    joints = joints or constraints(robot, body)
     c = (
         joints.gamma
         - 2.0 * robot.baumgarte.alpha * joints.dphi
@@ -279,7 +272,7 @@ def accelerations(
     robot: Robot,
     body: Array,
     command: Command,
-    damping: Array,
+    damping: Array | Contacts,
     bristle: Array | None = None,
     body_damping: Array | None = None,
 ) -> Accelerations:
@@ -294,8 +287,8 @@ def accelerations(
         applied_forces(robot, body, command, damping, bristle, body_damping).ravel()
         + joints.G.T @ (motor + gear + stop_torques(robot, body)).ravel()
     )
-    D, c = constraint_equations(robot, body, command)
-    solution = solve_constrained(mass_matrix(robot, body), g, D, c)
+    D, c = constraint_equations(robot, body, command, joints)
+    solution = solve_constrained(mass_matrix(robot, body, joints), g, D, c)
     dv, multiplier, drive = np.split(solution, [6 * BODIES, 6 * BODIES + len(joints.phi)])
     motor = -drive.reshape(LEGS, JOINTS) if robot.servo.mode == "kinematic" else motor
     return Accelerations(dv.reshape(BODIES, 6), multiplier.reshape(-1, MULTIPLIERS), motor, gear)

@@ -5,11 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from hexapod_cosim.models.actuator import stop_energy
-from hexapod_cosim.models.body.contacts import body_contacts
-from hexapod_cosim.models.contact import foot_contacts, wall_contacts
 from hexapod_cosim.models.dynamics import constraints, joint_overruns, masses, world_inertias
 from hexapod_cosim.models.kinematics import joint_speeds
 from hexapod_cosim.models.records import Array, Robot
+from hexapod_cosim.models.touch.forces import contacts_at, open_contacts
 
 
 def kinetic_energy(robot: Robot, body: Array) -> float:
@@ -22,16 +21,12 @@ def kinetic_energy(robot: Robot, body: Array) -> float:
 
 
 def potential_energy(robot: Robot, body: Array) -> float:
-    """Returns the potential energy [J] of gravity, 0 at the world's origin, of the contacts, 2/5 K
-    delta^2.5 each, and of the joints' stops.
+    """Returns the potential energy [J] of gravity, 0 at the world's origin, of the contacts with
+    rigid ground, 2/5 K delta^2.5 each, and of the joints' stops.
     """
     gravity = -float(masses(robot) @ (body[:, 0:3] @ np.array(robot.gravity)))
-    contacts = [
-        *foot_contacts(robot, body),
-        *wall_contacts(robot, body),
-        *body_contacts(robot, body),
-    ]
-    depth = np.array([max(foot.penetration, 0.0) for foot in contacts if foot is not None])
+    contacts = contacts_at(robot, body, open_contacts(robot))
+    depth = np.array([max(contact.penetration, 0.0) for contact in contacts])
     stops = float(np.sum(stop_energy(robot.servo, joint_overruns(robot, body))))
     return gravity + 0.4 * robot.contact.stiffness * float(np.sum(depth**2.5)) + stops
 

@@ -1,6 +1,7 @@
 """Integrates the motion with error control and ends a step at every touch-down.
 
-This is the readable form of plant_fmu/src/lanes/integrator.h, with the same names. It omits the
+This is the readable form of plant_fmu/src/lanes/integrator.h, with the same names, on every ground:
+planes, surfaces, blocks and soil, with contacts of feet, torso, knees and shanks. It omits the
 measurements of a step (models/measure.py), commands that change within a step, and calls that an
 event interrupts.
 """
@@ -12,7 +13,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from hexapod_cosim.models.contact import contact_damping, foot_contacts, standing_damping
 from hexapod_cosim.models.dynamics import Command
 from hexapod_cosim.models.errors import HexapodError
 from hexapod_cosim.models.kinematics import (
@@ -26,14 +26,23 @@ from hexapod_cosim.models.kinematics import (
     rotation_matrix,
 )
 from hexapod_cosim.models.method import METHOD, Method, method_step
-from hexapod_cosim.models.records import BRISTLE_LAWS, Array, Robot
+from hexapod_cosim.models.records import Array, Robot
 from hexapod_cosim.models.stage import Slopes, keep_slopes, solve_stage
+from hexapod_cosim.models.touch.forces import Contacts, bristle_length
+from hexapod_cosim.models.touch.switching import (
+    Depths,
+    cross_cells,
+    depths_of,
+    start_contacts,
+    switch_contacts,
+    yield_soil,
+)
 
 STEP_FLOOR = 1e-11  # s  the error control fails below this step
 TOUCH_DEPTH = (1e-10, 1e-6)  # m, m per tolerance  depth to which a touch-down is located
 FIRST_STEP_SIZE = 1e-4  # s  first step
 ERROR_SCALE = np.array([0.1] * 3 + [1.0] * 4 + [1.0] * 3 + [10.0] * 3)  # of r p v w
-BRISTLE_SCALE = 10.0  # preslidings
+BRISTLE_SCALE = 10.0  # preslidings, or shear displacements of soil
 TURN, BODY = 3 * BODIES, BODY_STATE * BODIES  # sizes of a stage's first two parts
 
 
@@ -43,8 +52,7 @@ class State:
 
     body: Array  # (19, 13) r p v w
     bristle: Array  # (6, 3) m
-    damping: Array  # (6,) s/m  of the contacts, nan for open feet
-    impact_speed: Array  # (6,) m/s  at the last touch-down
+    contacts: Contacts
     time: float = 0.0  # s
     next_step: float = FIRST_STEP_SIZE  # s  step that the error control proposes next
     first_step: float = FIRST_STEP_SIZE  # s  the same for the first step of a call
@@ -53,13 +61,15 @@ class State:
     touchdowns: int = 0
     evaluations: int = 0
 
+    @property
+    def damping(self) -> Array:
+        """Damping of the feet on the ground below them (6,) [s/m], nan for open ones."""
+        return self.contacts.damping[:LEGS]
 
-@dataclass(frozen=True)
-class Feet:
-    """Penetration [m] and approach speed [m/s] of all feet, each (6,)."""
-
-    delta: Array
-    ddelta: Array
+    @property
+    def impact_speed(self) -> Array:
+        """Approach speeds of these feet at their last touch-downs (6,) [m/s]."""
+        return self.contacts.impact_speed[:LEGS]
 
 
 @dataclass(frozen=True)
@@ -86,23 +96,15 @@ class Start:
 
     @property
     def touch(self) -> float:
-        """Returns the largest depth of a foot that has just touched down [m]."""
+        """Returns the largest depth of a contact that has just touched down [m]."""
         return max(TOUCH_DEPTH[0], TOUCH_DEPTH[1] * self.robot.solver.tolerance)
 
 
 def start_state(robot: Robot, body: Array, time: float = 0.0) -> State:
-    """Returns the state at bodies (19, 13); feet in the ground are closed, with impact speed 0."""
+    """Returns the state at bodies (19, 13) with the contacts of `start_contacts`."""
     first = min(FIRST_STEP_SIZE, robot.solver.step_max)
-    closed = standing_damping(robot, body)
     still = np.zeros((LEGS, 3))
-    return State(body, still, closed, np.zeros(LEGS), time, first, first)
-
-
-def feet_of(robot: Robot, body: Array) -> Feet:
-    """Returns penetration and approach speed of the feet of bodies (19, 13)."""
-    feet = foot_contacts(robot, body)
-    delta = np.array([foot.penetration for foot in feet])
-    return Feet(delta, np.array([foot.approach_speed for foot in feet]))
+    return State(body, still, start_contacts(robot, body), time, first, first)
 
 
 # one step
@@ -121,7 +123,7 @@ def try_step(start: Start, h: float) -> Trial:
     def stage(elapsed: float, y: Array, change: Array) -> Array:
         body, bristle = y[TURN : TURN + BODY].reshape(BODIES, BODY_STATE), y[TURN + BODY :]
         command = replace(start.command, age=start.command.age + elapsed)
-        at = (robot, body, bristle.reshape(LEGS, 3), command, start.state.damping)
+        at = (robot, body, bristle.reshape(LEGS, 3), command, start.state.contacts)
         if not kept:
             kept.append(keep_slopes(*at, ahead=h))
         rate = solve_stage(*at, kept[0], z, _shifts(change))
@@ -159,9 +161,10 @@ def error_norm(robot: Robot, estimate: Array) -> float:
         turn = frame_quaternion(joint.a_j, joint.b_j, joint.s_j)
         body[joint.child, 3:7] = quaternion_product(body[joint.child, 3:7], turn)
     largest = float(np.max(np.abs(body) / ERROR_SCALE))
-    if robot.friction.law in BRISTLE_LAWS:
+    length = bristle_length(robot)
+    if length > 0.0:
         bristle = float(np.max(np.abs(estimate[BODY:])))
-        largest = max(largest, bristle / (BRISTLE_SCALE * robot.friction.presliding))
+        largest = max(largest, bristle / (BRISTLE_SCALE * length))
     return largest / robot.solver.tolerance
 
 
@@ -200,9 +203,10 @@ def project(robot: Robot, body: Array) -> Array:
 # touch-down
 
 
-def deepest_open_foot(damping: Array, feet: Feet) -> float:
-    """Returns the penetration of the deepest open foot [m]."""
-    return float(np.max(np.where(np.isnan(damping), feet.delta, -math.inf)))
+def deepest_open(contacts: Contacts, depths: Depths) -> float:
+    """Returns the depth of the deepest open contact, or how far a foot has left its cell [m]."""
+    deep = np.where(np.isnan(contacts.damping), depths.delta, -math.inf)
+    return max(float(np.max(deep)), float(np.max(depths.outside)))
 
 
 def cubic_crossing(
@@ -223,13 +227,19 @@ def cubic_crossing(
     return high
 
 
-def expected_touch(start: Start, t_low: float, low: Feet, t_high: float, high: Feet) -> float:
-    """Returns the time [s] at which the first open foot reaches half the touch depth (eq. 24)."""
+def expected_touch(start: Start, t_low: float, low: Depths, t_high: float, high: Depths) -> float:
+    """Returns the time [s] at which the first open contact reaches half the touch depth (eq. 24),
+    or the first foot has left its cell by as much.
+    """
     h, level, first = t_high - t_low, 0.5 * start.touch, 1.0
-    for leg in range(LEGS):
-        if np.isnan(start.state.damping[leg]) and high.delta[leg] > level:
-            ends = (low.delta[leg], h * low.ddelta[leg], high.delta[leg], h * high.ddelta[leg])
+    for k, damping in enumerate(start.state.contacts.damping):
+        if np.isnan(damping) and high.delta[k] > level:
+            ends = (low.delta[k], h * low.ddelta[k], high.delta[k], h * high.ddelta[k])
             first = min(first, cubic_crossing(*ends, level))
+    for leg in range(LEGS):
+        if high.outside[leg] > level:
+            way = high.outside[leg] - low.outside[leg]
+            first = min(first, float((level - low.outside[leg]) / way))
     return t_low + first * h
 
 
@@ -242,45 +252,43 @@ def find_touchdown(start: Start, h: float, trial: Trial) -> tuple[float, Trial, 
     Returns:
         The step [s], its result, and the number of trials.
     """
-    damping, tried = start.state.damping, 0
+    robot, contacts, tried = start.robot, start.state.contacts, 0
     low, high = 0.0, h
-    feet_low, feet = feet_of(start.robot, start.state.body), feet_of(start.robot, trial.body)
-    while deepest_open_foot(damping, feet) > start.touch and high - low > STEP_FLOOR:
+    depths_low = depths_of(robot, start.state.body, contacts)
+    depths = depths_of(robot, trial.body, contacts)
+    while deepest_open(contacts, depths) > start.touch and high - low > STEP_FLOOR:
         tried += 1
-        middle = expected_touch(start, low, feet_low, high, feet) if tried % 3 else low
+        middle = expected_touch(start, low, depths_low, high, depths) if tried % 3 else low
         if not low < middle < high:
             middle = 0.5 * (low + high)
         nearer = try_step(start, middle)
-        found = feet_of(start.robot, nearer.body)
-        if deepest_open_foot(damping, found) > 0.0:
-            high, feet, trial = middle, found, nearer
+        found = depths_of(robot, nearer.body, contacts)
+        if deepest_open(contacts, found) > 0.0:
+            high, depths, trial = middle, found, nearer
         else:
-            low, feet_low = middle, found
+            low, depths_low = middle, found
     return high, trial, tried
 
 
-def switch_contacts(robot: Robot, state: State) -> State:
-    """Closes feet that are in the ground and opens those that are not.
+def end_step(start: Start, h: float, trial: Trial) -> State:
+    """Returns the state after an accepted step of h [s], with its contacts switched.
 
-    The approach speed at touch-down fixes the damping; the bristles of open feet are 0.
+    The soil yields first, then contacts pass between the faces of blocks. The bristles of open feet
+    are 0.
     """
-    feet, damping = feet_of(robot, state.body), state.damping.copy()
-    impact_speed, touchdowns = state.impact_speed.copy(), state.touchdowns
-    for leg in range(LEGS):
-        is_open = bool(np.isnan(damping[leg]))
-        if is_open and feet.delta[leg] > 0.0:
-            impact_speed[leg] = feet.ddelta[leg]
-            damping[leg] = contact_damping(robot.contact, impact_speed[leg])
-            touchdowns += 1
-        elif not is_open and feet.delta[leg] <= 0.0:
-            damping[leg] = math.nan
-    bristle = np.where(np.isnan(damping)[:, None], 0.0, state.bristle)
+    robot, state, contacts = start.robot, start.state, start.state.contacts
+    before, after = (depths_of(robot, body, contacts) for body in (state.body, trial.body))
+    yielded = replace(contacts, plastic=yield_soil(robot, contacts, h, before, after))
+    moved = cross_cells(robot, trial.body, yielded, after)
+    depths = depths_of(robot, trial.body, moved)
+    switched, touchdowns = switch_contacts(robot, trial.body, moved, depths)
+    is_open = np.isnan(switched.damping[:LEGS])
     return replace(
         state,
-        damping=damping,
-        bristle=bristle,
-        impact_speed=impact_speed,
-        touchdowns=touchdowns,
+        body=trial.body,
+        bristle=np.where(is_open[:, None], 0.0, trial.bristle),
+        contacts=switched,
+        touchdowns=state.touchdowns + touchdowns,
     )
 
 
@@ -317,17 +325,15 @@ def advance(start: Start, h_max: float, next_step: float) -> tuple[State, float,
         state = replace(state, next_step=kept)
         next_step = kept
     taken, more = h, 0
-    if deepest_open_foot(state.damping, feet_of(robot, trial.body)) > 0.0:
+    if deepest_open(state.contacts, depths_of(robot, trial.body, state.contacts)) > 0.0:
         taken, trial, more = find_touchdown(start, h, trial)
     state = replace(
-        state,
-        body=trial.body,
-        bristle=trial.bristle,
+        end_step(replace(start, state=state), taken, trial),
         steps=state.steps + 1,
         rejected=state.rejected + rejected,
         evaluations=state.evaluations + stages * (tried + more),
     )
-    return switch_contacts(robot, state), taken, next_step
+    return state, taken, next_step
 
 
 def run_to(robot: Robot, command: Command, state: State, t_call: float, t_end: float) -> State:

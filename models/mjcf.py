@@ -3,8 +3,12 @@ contact.
 
 MuJoCo's contact is a spring and a damper of accelerations. Its stiffness is chosen so that the feet
 of a standing tripod sink in as deep as with Hertz's law, its damping so that a free bounce has the
-restitution. Friction is Coulomb's, with an elliptic cone. The servos' torque-speed line and the
-tanh law's creep are omitted.
+restitution. Friction is Coulomb's, with an elliptic cone; the feet's resistance to spin and rolling
+(eq. 38) becomes torsional and rolling friction. Joint stops (eq. 39) become limits with the same
+spring and damper. The servos' torque-speed line, the tanh law's creep, static friction above the
+kinetic one and viscous friction are omitted, and soil is rigid.
+
+A robot without stops has limits of MuJoCo's own stiffness, which the plant does not have.
 
 A surface of blocks becomes boxes, one for each rectangle of equal height, with the same faces. A
 smooth surface becomes a height field, whose triangles between the nodes replace the bicubic
@@ -31,17 +35,19 @@ from hexapod_cosim.models.kinematics import (
     rotation_matrix,
 )
 from hexapod_cosim.models.mjcf_ground import APPROXIMATION, add_surface
-from hexapod_cosim.models.records import JOINT_NAMES, Array, BodyContact, Leg, Link, Robot, Vector3
+from hexapod_cosim.models.records import JOINT_NAMES, Array, Leg, Link, Robot, Vector3
 from hexapod_cosim.models.terrain import ground_height, surface_of
 from hexapod_cosim.models.urdf.writer import COLOURS, THICKNESS, numbers
 
 TIME_STEP = 0.001  # s
 # 1  MuJoCo's default: the share of a constraint's acceleration that it corrects
 IMPEDANCE = 0.9
+# 1  of joint stops: the limit's force then depends little on the acceleration, as a spring's
+STOP_IMPEDANCE = 0.001
 # geometry for pictures, without contact and mass
 DRAWN = {"contype": "0", "conaffinity": "0", "group": "1", "mass": "0"}
-# geometry that touches the ground only, as feet do, and is not drawn
-TOUCHING = {"contype": "0", "conaffinity": "1", "condim": "3", "group": "3", "mass": "0"}
+# geometry that touches the ground only
+GROUNDED = {"contype": "0", "conaffinity": "1", "mass": "0"}
 UNKNOWNS = 6 + LEGS * JOINTS
 Z = np.array([0.0, 0.0, 1.0])
 UPRIGHT = np.array([1.0, 0.0, 0.0, 0.0])
@@ -107,24 +113,43 @@ def _ground(world: ET.Element, robot: Robot) -> None:
 
 
 def _contact_attributes(robot: Robot) -> dict[str, str]:
-    """Returns the attributes of the ground's contact."""
+    """Returns the attributes of the ground's contact with the feet."""
     return {
-        "friction": _friction(robot),
+        "friction": numbers(_friction(robot)),
+        "condim": _contact_dimensions(robot),
         "solref": _solref(robot),
-        "solimp": _solimp(),
+        "solimp": _solimp(IMPEDANCE),
         "priority": "1",
     }
 
 
-def _friction(robot: Robot) -> str:
-    """Returns the robot's sliding friction, without torsion and rolling: the feet are point
-    contacts.
+def _friction(robot: Robot) -> Vector3:
+    """Returns sliding [1], torsional [m] and rolling [m] friction of the feet.
+
+    MuJoCo's moments are at most the latter two times the normal force; ours are mu r_s f_n against
+    spin and r_r f_n against rolling.
     """
-    return numbers((0.0 if robot.friction.law == "none" else robot.friction.mu, 0.0, 0.0))
+    if robot.friction.law == "none":
+        return (0.0, 0.0, 0.0)
+    mu = robot.friction.mu
+    return (mu, mu * robot.friction.spin_radius, robot.friction.rolling_radius)
 
 
-def _solimp() -> str:
-    return numbers((IMPEDANCE, IMPEDANCE, 0.001, 0.5, 2.0))
+def _contact_dimensions(robot: Robot) -> str:
+    """Returns MuJoCo's condim: 3 sliding, 4 with torsional friction, 6 with rolling friction."""
+    _, torsional, rolling = _friction(robot)
+    return "6" if rolling > 0.0 else "4" if torsional > 0.0 else "3"
+
+
+def _body_attributes(robot: Robot) -> dict[str, str]:
+    """Returns the attributes of torso, knees and shanks: contact without moments, not drawn."""
+    contact = _contact_attributes(robot)
+    sliding = {"friction": numbers((_friction(robot)[0], 0.0, 0.0)), "condim": "3"}
+    return GROUNDED | {"group": "3"} | contact | sliding | {"priority": "2"}
+
+
+def _solimp(impedance: float) -> str:
+    return numbers((impedance, impedance, 0.001, 0.5, 2.0))
 
 
 def _solref(robot: Robot) -> str:
@@ -147,13 +172,24 @@ def tibia_mobility(robot: Robot) -> float:
 
     It is the mean over legs and directions, at angle 0.
     """
+    J, M = _at_zero(robot)
+    tibias = J.reshape(BODIES, 6, UNKNOWNS)[JOINTS::JOINTS, :3].reshape(-1, UNKNOWNS)
+    return float(np.mean(np.sum(tibias * np.linalg.solve(M, tibias.T).T, axis=1)))
+
+
+def joint_mobility(robot: Robot) -> Array:
+    """Returns the accelerations (6, 3) of the joints per torque [1/(kg m2)], at angle 0."""
+    _, M = _at_zero(robot)
+    return np.diag(np.linalg.inv(M))[6:].reshape(LEGS, JOINTS)
+
+
+def _at_zero(robot: Robot) -> tuple[Array, Array]:
+    """Returns the bodies' motion per speed (114, 24) and the mass matrix (24, 24), at angle 0."""
     J = np.stack(
         [_motion(robot, speed).ravel() for speed in np.eye(UNKNOWNS)], axis=-1
     )  # (114, 24)
     body = body_states(robot, np.zeros(3), UPRIGHT, np.zeros(3), np.zeros(3), ZERO, ZERO)
-    M = J.T @ mass_matrix(robot, body) @ J
-    tibias = J.reshape(BODIES, 6, UNKNOWNS)[JOINTS::JOINTS, :3].reshape(-1, UNKNOWNS)
-    return float(np.mean(np.sum(tibias * np.linalg.solve(M, tibias.T).T, axis=1)))
+    return J, np.asarray(J.T @ mass_matrix(robot, body) @ J)
 
 
 def _motion(robot: Robot, speed: Array) -> Array:
@@ -190,21 +226,22 @@ def _torso(world: ET.Element, robot: Robot) -> None:
         edges = numbers(half + body.corner_radius for half in body.torso_box)
         place = numbers(body.torso_centre)
         box = {"name": "torso_contact", "type": "box", "size": edges, "pos": place}
-        ET.SubElement(torso, "geom", TOUCHING | box)
+        ET.SubElement(torso, "geom", _body_attributes(robot) | box)
     ET.SubElement(torso, "site", name="imu", pos=numbers(robot.torso.com))
-    for leg in robot.legs:
-        _leg(torso, leg, robot)
+    for leg, mobility in zip(robot.legs, joint_mobility(robot), strict=True):
+        _leg(torso, leg, robot, mobility)
 
 
-def _leg(torso: ET.Element, leg: Leg, robot: Robot) -> None:
+def _leg(torso: ET.Element, leg: Leg, robot: Robot, mobility: Array) -> None:
+    """Adds a leg; mobility (3,) of its joints [1/(kg m2)]."""
     body, place = torso, leg.hip_position
     quaternion = axis_quaternion(Z, leg.hip_yaw)
-    for name, link in zip(JOINT_NAMES, leg.links, strict=True):
+    for name, link, mobile in zip(JOINT_NAMES, leg.links, mobility, strict=True):
         body = ET.SubElement(
             body, "body", name=f"{leg.name}_{name}", pos=numbers(place), quat=numbers(quaternion)
         )
         _inertial(body, link.mass, link.com, link.inertia)
-        _hinge(body, f"{leg.name}_{name}", link, robot)
+        _hinge(body, f"{leg.name}_{name}", link, robot, float(mobile))
         size = repr(THICKNESS * robot.foot.radius)
         ET.SubElement(
             body,
@@ -217,28 +254,21 @@ def _leg(torso: ET.Element, leg: Leg, robot: Robot) -> None:
         )
         place, quaternion = link.tip, UPRIGHT
     if robot.body.contact == "on":
-        _tibia_spheres(body, leg, robot.body)
-    # feet touch the ground only
-    foot = ET.SubElement(
-        body,
-        "geom",
-        name=f"{leg.name}_foot",
-        type="sphere",
-        size=repr(robot.foot.radius),
-        pos=numbers(place),
-    )
-    foot.attrib |= {
-        "mass": "0",
-        "contype": "0",
-        "conaffinity": "1",
-        "condim": "3",
-        "material": "rubber",
-    }
-    ET.SubElement(body, "site", name=f"{leg.name}_foot", pos=numbers(place))
+        _tibia_spheres(body, leg, robot)
+    _foot(body, leg, robot, place)
 
 
-def _tibia_spheres(tibia: ET.Element, leg: Leg, body: BodyContact) -> None:
+def _foot(tibia: ET.Element, leg: Leg, robot: Robot, place: Vector3) -> None:
+    """Adds the foot's sphere, which touches the ground only, and its site."""
+    sphere = {"name": f"{leg.name}_foot", "type": "sphere", "size": repr(robot.foot.radius)}
+    contact = GROUNDED | {"condim": _contact_dimensions(robot), "material": "rubber"}
+    ET.SubElement(tibia, "geom", contact | sphere | {"pos": numbers(place)})
+    ET.SubElement(tibia, "site", name=f"{leg.name}_foot", pos=numbers(place))
+
+
+def _tibia_spheres(tibia: ET.Element, leg: Leg, robot: Robot) -> None:
     """Adds the spheres of knee and shank."""
+    body = robot.body
     for name, radius, share in (
         ("knee", body.knee_radius, 0.0),
         ("shank", body.shank_radius, body.shank_position),
@@ -246,23 +276,26 @@ def _tibia_spheres(tibia: ET.Element, leg: Leg, body: BodyContact) -> None:
         if radius > 0.0:
             place = numbers(share * value for value in leg.links[-1].tip)
             sphere = {"name": f"{leg.name}_{name}", "type": "sphere", "size": repr(radius)}
-            ET.SubElement(tibia, "geom", TOUCHING | sphere | {"pos": place})
+            ET.SubElement(tibia, "geom", _body_attributes(robot) | sphere | {"pos": place})
 
 
-def _hinge(body: ET.Element, name: str, link: Link, robot: Robot) -> None:
+def _hinge(body: ET.Element, name: str, link: Link, robot: Robot, mobility: float) -> None:
+    """Adds a joint with its limits; mobility in 1/(kg m2)."""
     servo = robot.servo
-    joint = ET.SubElement(
-        body,
-        "joint",
-        name=name,
-        type="hinge",
-        axis=numbers(link.axis),
-        range=numbers((link.angle_min, link.angle_max)),
-    )
+    joint = ET.SubElement(body, "joint", name=name, type="hinge", axis=numbers(link.axis))
     joint.attrib |= {
+        "range": numbers((link.angle_min, link.angle_max)),
         "armature": repr(servo.rotor_inertia),
         "frictionloss": repr(servo.coulomb_friction),
     }
+    if servo.stop_stiffness > 0.0:
+        # MuJoCo's torque at a depth x is (k x + c dx/dt) / ((1 - d) w), with the impedance d and
+        # the mobility w; negative numbers give k and c
+        share = (1.0 - STOP_IMPEDANCE) * mobility
+        joint.set(
+            "solreflimit", numbers((-share * servo.stop_stiffness, -share * servo.stop_damping))
+        )
+        joint.set("solimplimit", _solimp(STOP_IMPEDANCE))
 
 
 def _servos(root: ET.Element, robot: Robot) -> None:

@@ -42,6 +42,7 @@ SERVO_MODES = ("position", "torque", "kinematic")
 METHODS = ("rosw3", "ros2", "dp54", "bs32", "rk4")
 PROJECTIONS = ("none", "step")
 BODY_CONTACTS = ("off", "on")
+SELF_CONTACTS = ("off", "warn")
 TERRAINS = ("flat", "slope", "grid")
 PLANES = ("flat", "slope")  # kinds of ground without a surface
 SOIL_LAWS = ("none", "bekker", "granular", "mud")
@@ -123,6 +124,8 @@ class BodyContact:
     """
 
     contact: Annotated[str, Choice(BODY_CONTACTS, default="off")] = "off"
+    # whether a run warns of neighbouring legs that overlap
+    self_contact: Annotated[str, Choice(SELF_CONTACTS, default="off")] = "off"
     # half edges of a box along the torso's axes, with a sphere around each corner
     torso_box: Annotated[Vector3, Vector("m", 3, default=(0.0, 0.0, 0.0))] = (0.0, 0.0, 0.0)
     # centre of the box, from the torso's origin

@@ -8,17 +8,16 @@ stage. With z = 0 it is eq. 1 itself, the stage of an explicit method.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from hexapod_cosim.models.actuator import gear_drag, servo_slopes, stop_slopes
-from hexapod_cosim.models.body.contacts import body_spheres
-from hexapod_cosim.models.body.slopes import BodySlopes, body_slope_matrices
 from hexapod_cosim.models.contact import (
+    FootContact,
     contact_jacobian,
     contact_matrices,
-    foot_contacts,
     normal_force,
     normal_slopes,
     slip_velocity,
@@ -34,7 +33,7 @@ from hexapod_cosim.models.dynamics import (
     solve_constrained,
     stop_torques,
 )
-from hexapod_cosim.models.friction import bristle_rate, bristle_slopes, turning_slopes
+from hexapod_cosim.models.friction import bristle_slopes, friction_drag, turning_slopes
 from hexapod_cosim.models.kinematics import (
     BODIES,
     JOINTS,
@@ -42,7 +41,30 @@ from hexapod_cosim.models.kinematics import (
     joint_angles,
     joint_speeds,
 )
-from hexapod_cosim.models.records import BRISTLE_LAWS, Array, Robot
+from hexapod_cosim.models.records import Array, Robot
+from hexapod_cosim.models.soil.law import shear_limit, soil_normal_force, soil_normal_slopes
+from hexapod_cosim.models.touch.forces import (
+    Contacts,
+    Held,
+    Spot,
+    closed_contacts,
+    contact_bristle_rate,
+    contacts_of,
+    has_bristles,
+)
+
+
+@dataclass(frozen=True)
+class ContactSlopes:
+    """Derivatives of the forces of one contact."""
+
+    stiffness: float  # N/m    of the normal force by delta
+    viscosity: float  # N s/m  of the normal force by ddelta
+    drag: float  # N s/m  of friction by slip velocity; bristles: by their rate
+    bristle: float = 0.0  # N/m    of friction by the bristles' deflection, -G_b
+    beta: float = 0.0  # 1/s    release rate of sliding bristles
+    spin: float = 0.0  # N m s  of the foot's moment by angular velocity, about the normal
+    roll: float = 0.0  # N m s  the same across the normal
 
 
 @dataclass(frozen=True)
@@ -52,15 +74,9 @@ class Slopes:
     motor_stiffness: Array  # (6, 3) N m/rad
     motor_damping: Array  # (6, 3) N m s/rad
     gear_drag: Array  # (6, 3) N m s/rad
-    stiffness: Array  # (6,) N/m    of the normal force by delta
-    viscosity: Array  # (6,) N s/m  of the normal force by ddelta
-    drag: Array  # (6,) N s/m  of friction by slip velocity; bristles: by their rate
-    bristle: Array  # (6,) N/m    of friction by the bristles' deflection, -G_b
-    beta: Array  # (6,) 1/s    release rate of sliding bristles
-    spin: Array  # (6,) N m s  of the foot's moment by angular velocity, about the normal
-    roll: Array  # (6,) N m s  the same across the normal
     stop_stiffness: Array  # (6, 3) N m/rad
     stop_damping: Array  # (6, 3) N m s/rad
+    contact: Mapping[int, ContactSlopes]  # of closed contacts, by their number
 
 
 @dataclass(frozen=True)
@@ -77,75 +93,126 @@ def keep_slopes(
     body: Array,
     bristle: Array,
     command: Command,
-    damping: Array,
+    damping: Array | Contacts,
     ahead: float,
 ) -> Slopes:
     """Returns the derivatives of the forces at bodies (19, 13) and bristles (6, 3).
 
-    The contact's are taken at delta + ahead max(ddelta, 0), because a foot that has just touched
+    The contacts' are taken at delta + ahead max(ddelta, 0), because a foot that has just touched
     down has neither depth nor derivatives yet, and W would miss its contact. damping: (6,) of the
-    contacts [s/m], nan for open feet.
+    feet [s/m], nan for open ones, or the state of all contacts.
     """
+    contacts = damping if isinstance(damping, Contacts) else contacts_of(robot, damping)
     angle, speed = joint_angles(robot, body), joint_speeds(robot, body)
     references = (command.angle_ref, command.speed_ref, command.torque_ref)
-    motor_stiffness, motor_damping = servo_slopes(robot.servo, angle, speed, *references)
-    feet = []
-    for leg, foot in enumerate(foot_contacts(robot, body)):
-        deeper = foot.penetration + ahead * max(foot.approach_speed, 0.0)
-        f_n = normal_force(robot.contact, damping[leg], deeper, foot.approach_speed)
-        normal = normal_slopes(robot.contact, damping[leg], deeper, foot.approach_speed)
-        along = bristle_slopes(robot.friction, slip_velocity(foot), bristle[leg])
-        turn = body[JOINTS * (leg + 1), 10:13]
-        spin, roll = turning_slopes(robot.friction, robot.foot.radius, foot.normal, turn)
-        friction = [along.damping, along.stiffness, spin, roll]
-        feet.append([*normal, *(f_n * np.array(friction)), along.beta])
-    stiffness, viscosity, drag, spring, spins, rolls, beta = np.array(feet).T
-    contacts = (stiffness, viscosity, drag, spring, beta, spins, rolls)
+    motor = servo_slopes(robot.servo, angle, speed, *references)
     stops = stop_slopes(robot.servo, joint_overruns(robot, body), speed)
-    return Slopes(motor_stiffness, motor_damping, gear_drag(robot.servo, speed), *contacts, *stops)
+    found = {}
+    for k, spot, held, contact in closed_contacts(robot, body, contacts):
+        turn = body[spot.sphere.body, 10:13]
+        if held.is_soft:
+            plastic = float(contacts.plastic[spot.leg])
+            found[k] = soil_slopes(robot, held, plastic, contact, ahead)
+        else:
+            deflection = bristle[spot.leg] if spot.is_sole else np.zeros(3)
+            found[k] = rigid_slopes(robot, spot, held, contact, deflection, turn, ahead)
+    return Slopes(*motor, gear_drag(robot.servo, speed), *stops, found)
 
 
-def slope_matrices(robot: Robot, body: Array, slopes: Slopes) -> tuple[Array, Array]:
+def expected_depth(contact: FootContact, ahead: float) -> float:
+    """Returns the depth [m] that a contact reaches after a time [s]."""
+    return contact.penetration + ahead * max(contact.approach_speed, 0.0)
+
+
+def rigid_slopes(
+    robot: Robot,
+    spot: Spot,
+    held: Held,
+    contact: FootContact,
+    bristle: Array,
+    turn: Array,
+    ahead: float,
+) -> ContactSlopes:
+    """Returns the derivatives of a contact with rigid ground.
+
+    bristle: deflection (3,) of a sole [m]; turn: angular velocity (3,) of the body [rad/s].
+    """
+    at = (held.contact, held.damping, expected_depth(contact, ahead), contact.approach_speed)
+    f_n, (stiffness, viscosity) = normal_force(*at), normal_slopes(*at)
+    slip, friction = slip_velocity(contact), held.friction
+    if not spot.is_sole:
+        along = f_n * friction_drag(friction, float(np.linalg.norm(slip)))
+        slopes = ContactSlopes(stiffness, viscosity, along)
+    else:
+        b = bristle_slopes(friction, slip, bristle)
+        slopes = ContactSlopes(stiffness, viscosity, f_n * b.damping, f_n * b.stiffness, b.beta)
+    if spot.leg < 0:
+        return slopes
+    spin, roll = turning_slopes(friction, robot.foot.radius, contact.normal, turn)
+    return replace(slopes, spin=f_n * spin, roll=f_n * roll)
+
+
+def soil_slopes(
+    robot: Robot, held: Held, plastic: float, contact: FootContact, ahead: float
+) -> ContactSlopes:
+    """Returns the derivatives of a foot on soil at plastic depth z_p [m]; its moments have none."""
+    soil, foot, depth = held.soil, robot.foot, expected_depth(contact, ahead)
+    at = (soil, foot, plastic, depth, contact.approach_speed)
+    limit = shear_limit(soil, foot, max(depth, plastic), soil_normal_force(*at))
+    yielding = float(np.linalg.norm(slip_velocity(contact))) / soil.shear_displacement
+    shear = limit / soil.shear_displacement
+    return ContactSlopes(*soil_normal_slopes(*at), drag=0.0, bristle=shear, beta=yielding)
+
+
+def slope_matrices(
+    robot: Robot, body: Array, contacts: Contacts, slopes: Slopes, G: Array
+) -> tuple[Array, Array]:
     """Returns G_x and G_v of eq. 20, each (114, 114), at bodies (19, 13).
 
-    They consist of servos, gears and stops on the joints' axes, of each contact along its normal n
+    G: (18, 114) as in `Constraints`. They consist of servos, gears and stops on the joints' axes, of each contact along its normal n
     and, by its drag alone, across it, and of the moments of spin and rolling on the tibia.
     """
-    G = constraints(robot, body).G
     damping = slopes.motor_damping + slopes.gear_drag + slopes.stop_damping
     G_x = -G.T @ ((slopes.motor_stiffness + slopes.stop_stiffness).reshape(-1, 1) * G)
     G_v = -G.T @ (damping.reshape(-1, 1) * G)
-    for leg, foot in enumerate(foot_contacts(robot, body)):
+    for k, spot, _, contact in closed_contacts(robot, body, contacts):
+        law = slopes.contact[k]
         by_x, by_v = contact_matrices(
-            contact_jacobian(body, JOINTS * (leg + 1), foot),
-            foot.normal,
-            stiffness=slopes.stiffness[leg],
-            viscosity=slopes.viscosity[leg],
-            drag=slopes.drag[leg],
+            contact_jacobian(body, spot.sphere.body, contact),
+            contact.normal,
+            stiffness=law.stiffness,
+            viscosity=law.viscosity,
+            drag=law.drag,
         )
         G_x += by_x
         G_v += by_v
-        nn = np.outer(foot.normal, foot.normal)
-        turn = slice(6 * JOINTS * (leg + 1) + 3, 6 * JOINTS * (leg + 1) + 6)
-        G_v[turn, turn] -= slopes.spin[leg] * nn + slopes.roll[leg] * (np.eye(3) - nn)
+        nn = np.outer(contact.normal, contact.normal)
+        turn = slice(6 * spot.sphere.body + 3, 6 * spot.sphere.body + 6)
+        G_v[turn, turn] -= law.spin * nn + law.roll * (np.eye(3) - nn)
     return G_x, G_v
 
 
-def law_bristle_rates(robot: Robot, body: Array, bristle: Array, damping: Array) -> Array:
-    """Returns db/dt (6, 3) of the friction law [m/s]; 0 for open feet and without bristles."""
-    rate = np.zeros((LEGS, 3))
-    for leg, foot in enumerate(foot_contacts(robot, body)):
-        if not np.isnan(damping[leg]):
-            rate[leg] = bristle_rate(robot.friction, slip_velocity(foot), bristle[leg])
-    return rate
+@dataclass(frozen=True)
+class Grip:
+    """Bristles of a closed sole in a stage."""
+
+    leg: int
+    T: Array  # (3, 114)  (1 - n n^T) J: the speed of its contact across the normal
+    rate: Array  # (3,) m/s  db/dt of the law
+    law: ContactSlopes
 
 
-def tangential_jacobians(robot: Robot, body: Array) -> list[Array]:
-    """Returns (1 - n n^T) J of each foot (3, 114): the speed of its contact across the normal."""
+def grips(
+    robot: Robot, body: Array, bristle: Array, contacts: Contacts, slopes: Slopes
+) -> list[Grip]:
+    """Returns the bristles of all closed soles that have some."""
     found = []
-    for leg, foot in enumerate(foot_contacts(robot, body)):
-        nn = np.outer(foot.normal, foot.normal)
-        found.append((np.eye(3) - nn) @ contact_jacobian(body, JOINTS * (leg + 1), foot))
+    for k, spot, held, contact in closed_contacts(robot, body, contacts):
+        if spot.is_sole and has_bristles(held):
+            across = np.eye(3) - np.outer(contact.normal, contact.normal)
+            T = across @ contact_jacobian(body, spot.sphere.body, contact)
+            rate = contact_bristle_rate(held, contact, bristle[spot.leg])
+            found.append(Grip(spot.leg, T, rate, slopes.contact[k]))
     return found
 
 
@@ -154,54 +221,47 @@ def solve_stage(
     body: Array,
     bristle: Array,
     command: Command,
-    damping: Array,
+    damping: Array | Contacts,
     slopes: Slopes,
     z: float,
     change: tuple[Array, Array, Array],
-    touching: tuple[Array, BodySlopes] | None = None,
 ) -> StageRate:
     """Solves eq. 20 at bodies (19, 13) and bristles (6, 3) with dense matrices.
 
     Args:
         robot, command: as in `accelerations`.
         body, bristle: y_i of the stage.
-        damping: (6,) of the contacts [s/m], nan for open feet.
+        damping: as in `keep_slopes`.
         slopes: those of the step's first stage.
         z: h gamma [s]; 0 for explicit methods.
         change: s_x (114,), s_v (114,) and s_b (6, 3), the sums of g_ij k_j over earlier stages.
-        touching: damping of the contacts of torso, knees and shanks, and their slopes in the step's
-            first stage; None: all open.
     """
+    contacts = damping if isinstance(damping, Contacts) else contacts_of(robot, damping)
     s_x, s_v, s_b = change
-    v, G = body[:, 7:13].ravel(), constraints(robot, body).G
-    G_x, G_v = slope_matrices(robot, body, slopes)
-    if touching is not None:
-        body_x, body_v = body_slope_matrices(robot, body, touching[1])
-        G_x, G_v = G_x + body_x, G_v + body_v
-    rate = law_bristle_rates(robot, body, bristle, damping)
+    v, joints = body[:, 7:13].ravel(), constraints(robot, body)
+    G = joints.G
+    G_x, G_v = slope_matrices(robot, body, contacts, slopes, G)
 
     # W = M - z G_v - z^2 G_x;  right = g + G_v s_v + G_x (s_x + z (v + s_v))
     motor, gear = joint_torques(robot, body, command)
-    held = np.full(len(body_spheres(robot)), np.nan) if touching is None else touching[0]
-    g = applied_forces(robot, body, command, damping, bristle, held).ravel()
+    g = applied_forces(robot, body, command, contacts, bristle).ravel()
     g += G.T @ (motor + gear + stop_torques(robot, body)).ravel()
-    W = mass_matrix(robot, body) - z * G_v - z * z * G_x
+    W = mass_matrix(robot, body, joints) - z * G_v - z * z * G_x
     right = g + G_v @ s_v + G_x @ (s_x + z * (v + s_v))
 
     # bristles: a spring across the normal, -G_b/(1 + z beta), stretched by s_b + z (db/dt + s_v)
-    along = tangential_jacobians(robot, body)
-    for leg, T in enumerate(along):
-        spring = slopes.bristle[leg] / (1.0 + z * slopes.beta[leg])
-        W += z * z * spring * T.T @ T
-        right -= spring * T.T @ (s_b[leg] + z * (rate[leg] + T @ s_v))
+    held = grips(robot, body, bristle, contacts, slopes)
+    for grip in held:
+        spring = grip.law.bristle / (1.0 + z * grip.law.beta)
+        W += z * z * spring * grip.T.T @ grip.T
+        right -= spring * grip.T.T @ (s_b[grip.leg] + z * (grip.rate + grip.T @ s_v))
     # [W  D^T; D  0] [alpha; lambda] = [right; c]
-    D, c = constraint_equations(robot, body, command)
+    D, c = constraint_equations(robot, body, command, joints)
     alpha = solve_constrained(W, right, D, c)[: 6 * BODIES]
 
     # nu = v + s_v + z alpha;  k_b/h = (db/dt + s_v + z alpha - beta s_b)/(1 + z beta)
-    for leg, T in enumerate(along):
-        if not np.isnan(damping[leg]) and robot.friction.law in BRISTLE_LAWS:
-            beta = slopes.beta[leg]
-            moved = rate[leg] + T @ (s_v + z * alpha) - beta * s_b[leg]
-            rate[leg] = moved / (1.0 + z * beta)
+    rate = np.zeros((LEGS, JOINTS))
+    for grip in held:
+        moved = grip.rate + grip.T @ (s_v + z * alpha) - grip.law.beta * s_b[grip.leg]
+        rate[grip.leg] = moved / (1.0 + z * grip.law.beta)
     return StageRate(v + s_v + z * alpha, alpha, rate)

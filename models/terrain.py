@@ -4,7 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 
-from hexapod_cosim.models.ground.blocks import block_faces, block_height
+from hexapod_cosim.models.ground.blocks import (
+    FACES,
+    TOP,
+    Cell,
+    block_face,
+    block_faces,
+    block_height,
+    cell_at,
+)
 from hexapod_cosim.models.ground.smooth import height_and_slopes, smooth_distance
 from hexapod_cosim.models.ground.surface import Surface
 from hexapod_cosim.models.records import Array, Terrain
@@ -55,6 +63,26 @@ def ground_faces(terrain: Terrain, point: Array) -> list[Face]:
         if surface.kind == "blocks"
         else [smooth_distance(surface, above)]
     )
+
+
+def faces_of_feet(terrain: Terrain) -> tuple[str, ...]:
+    """Returns the kinds of faces that a foot may touch at once, first that of the ground below."""
+    surface = surface_of(terrain)
+    return FACES if surface is not None and surface.kind == "blocks" else (TOP,)
+
+
+def ground_face(terrain: Terrain, point: Array, kind: str, cell: Cell | None) -> Face | None:
+    """Returns one face of the ground at a world point (3,), of a kind of `faces_of_feet`.
+
+    cell: of blocks around which the faces are, None: that below the point. Returns None for a wall
+    that is not there.
+    """
+    surface = surface_of(terrain)
+    if surface is None or surface.kind != "blocks":
+        return ground_faces(terrain, point)[0]
+    above = point - np.array([0.0, 0.0, terrain.height])
+    around = cell_at(surface, float(point[0]), float(point[1])) if cell is None else cell
+    return block_face(surface, above, kind, around)
 
 
 def ground(terrain: Terrain, point: Array) -> Face:

@@ -7,6 +7,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "hexapod/message.h"
+
 #ifdef _WIN32
 #define WIN32_LEAN_AND_MEAN
 #include <windows.h>
@@ -78,7 +80,7 @@ static void *read_bytes(const char *path, size_t *size) {
 /* Writes what is wrong with a grid to the component's message; returns NULL. */
 static hxTerrain *refuse_grid(hxComponent *component, double grid, const char *what) {
   const char *folder = component->resources ? component->resources : "(no resources)/";
-  snprintf(component->message, HX_MESSAGE_SIZE,
+  hx_print(component->message, HX_MESSAGE_SIZE,
            "terrain.grid: got %.9g, expected the number of a grid in the FMU's resources "
            "(%.160sterrain/%.0f.terrain); %.200s",
            grid, folder, grid, what);
@@ -93,7 +95,7 @@ static hxTerrain *read_grid(hxComponent *component, double grid) {
     return refuse_grid(component, grid,
                        component->resources ? "give a whole number"
                                             : "instantiate the FMU with the path of its resources");
-  snprintf(name, sizeof name, "terrain/%.0f.terrain", grid);
+  hx_print(name, sizeof name, "terrain/%.0f.terrain", grid);
   char *path = malloc(strlen(component->resources) + strlen(name) + 1);
   if (!path) return refuse_grid(component, grid, "out of memory; free some and try again");
   strcpy(path, component->resources);

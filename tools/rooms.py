@@ -20,7 +20,13 @@ ROOT = Path(__file__).resolve().parents[1]
 PICTURE = ROOT / "docs" / "images" / "rooms.svg"
 PACKAGE = "hexapod_cosim"
 C_ROOMS = ("fmi", "plant_fmu", "controller_fmu", "master")
-SHARED = ("range_check.h", "inside.h", "legs.h", "status.h")  # the headers that all C rooms share
+SHARED = (
+    "range_check.h",
+    "message.h",
+    "inside.h",
+    "legs.h",
+    "status.h",
+)  # the headers that all C rooms share
 HEADERS = "shared headers (C)"  # their box
 INCLUDE = re.compile(r'^\s*#\s*include\s+"([^"]+)"', re.MULTILINE)
 

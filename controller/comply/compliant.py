@@ -41,6 +41,21 @@ if TYPE_CHECKING:
 STEERING_TIME = 0.1  # s    duration of the ramp from one added velocity to the next
 
 
+def sense(measurement: Measurement, posture: Posture) -> Array:
+    """Returns the foot forces (6, 3) in the walking frame [N]: f_K = R_KT R_TW f_W (C22)."""
+    w, x, y, z = measurement.quaternion.tolist()
+    xx, yy, zz = x * x, y * y, z * z
+    rotation = np.array(
+        [
+            [1.0 - 2.0 * (yy + zz), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)],
+            [2.0 * (x * y + w * z), 1.0 - 2.0 * (xx + zz), 2.0 * (y * z - w * x)],
+            [2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (xx + yy)],
+        ]
+    )  # R_WT
+    force = measurement.foot_force @ rotation
+    return force if posture.level else np.asarray(force @ posture.rotation.T)
+
+
 class Stance(NamedTuple):
     """Plan, command and geometry of the present step."""
 
@@ -160,20 +175,6 @@ class Compliant(Stateful):
 
     # -------------------------------------------------------------------------------- sensors
 
-    def _sense(self, measurement: Measurement, posture: Posture) -> Array:
-        """Returns the foot forces (6, 3) in the walking frame [N]: f_K = R_KT R_TW f_W (C22)."""
-        w, x, y, z = measurement.quaternion.tolist()
-        xx, yy, zz = x * x, y * y, z * z
-        rotation = np.array(
-            [
-                [1.0 - 2.0 * (yy + zz), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)],
-                [2.0 * (x * y + w * z), 1.0 - 2.0 * (xx + zz), 2.0 * (y * z - w * x)],
-                [2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (xx + yy)],
-            ]
-        )  # R_WT
-        force = measurement.foot_force @ rotation
-        return force if posture.level else np.asarray(force @ posture.rotation.T)
-
     def _look(self, measurement: Measurement, stance: Stance) -> None:
         """Passes feet, loads and attitude, as measured, to the slow loops."""
         legs, angle = self.legs, measurement.angle
@@ -214,7 +215,7 @@ class Compliant(Stateful):
         Returns the shift of the feet by all corrections, walking frame (6, 3) [m].
         """
         laws, self.stance = self.laws, stance
-        laws.step(stance.plan, self._sense(measurement, stance.posture))
+        laws.step(stance.plan, sense(measurement, stance.posture))
         if self.count % self.hold.every == 0:
             if laws.trust == 1.0:
                 self._look(measurement, stance)

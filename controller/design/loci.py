@@ -8,7 +8,7 @@ loop of one input and one output, and has margins.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
@@ -30,6 +30,7 @@ from hexapod_cosim.models import Robot
 
 Response = NDArray[np.complex128]
 Plants = Mapping[str, StandingPlant]
+FindLoci = Callable[[Robot, StandingPlant, Array], tuple[Response, Response]]
 SLOWEST = 0.1  # rad/s    lowest frequency of a grid
 RANK = 1e-6  # 1    smaller singular values count as 0
 
@@ -96,9 +97,14 @@ class Loci:
         )
 
 
-def all_loci(robot: Robot, plants: Plants, omega: Array) -> tuple[Loci, Loci]:
-    """Returns the tangential and vertical eigenloci of all plants, without the laws."""
-    found = {name: eigenloci(robot, plant, omega) for name, plant in plants.items()}
+def all_loci(
+    robot: Robot, plants: Plants, omega: Array, *, of: FindLoci = eigenloci
+) -> tuple[Loci, Loci]:
+    """Returns the tangential and vertical eigenloci of all plants, without the laws.
+
+    of: the function that computes those of one plant.
+    """
+    found = {name: of(robot, plant, omega) for name, plant in plants.items()}
     tangential, vertical = (
         Loci(
             omega=omega, names=tuple(name for name, loci in found.items() for _ in loci[which]),

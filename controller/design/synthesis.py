@@ -10,7 +10,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Sequence
-from dataclasses import fields, replace
+from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
@@ -34,6 +34,7 @@ from hexapod_cosim.controller.design.loci import (
     quick_margins,
     response,
 )
+from hexapod_cosim.controller.design.paper import paper_loci, paper_slip, stable
 from hexapod_cosim.controller.design.standing import StandingPlant, weight_share
 from hexapod_cosim.controller.design.verify import MarginFinder, nominal, support_torque, verify
 from hexapod_cosim.controller.gains import (
@@ -94,6 +95,7 @@ def design_gains(
     margins, shortfalls = verify(
         robot, plants, finder, vertical, laws, needs, slip=reached, binding=binding
     )
+    paper = design_paper(robot, plants, needs, period=period)
     return Gains(
         robot=robot.name,
         robot_hash=robot.hash,
@@ -101,14 +103,60 @@ def design_gains(
         requirements=needs,
         slip=laws.slip,
         suspension=suspension,
-        margins=margins,
+        paper_slip=paper_slip(paper.laws, needs),
+        paper_suspension=paper.laws.suspension,
+        margins=replace(
+            margins,
+            paper_phase_margin=paper.phase,
+            paper_gain_margin=paper.gain,
+            paper_spectral_radius=paper.radius,
+        ),
         caveats=(
             *(f"the design leaves out {text}" for text in (*left_out, *too_heavy)),
             *shortfalls,
+            *paper.shortfalls,
         ),
         support=_taken(SupportGains, needs),
         hold=_taken(HoldGains, needs),
         limits=_limits(robot, needs),
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
+class PaperDesign:
+    """Laws of the paper's control and the margins of their worst loops."""
+
+    laws: Laws
+    phase: float  # deg
+    gain: float  # dB
+    radius: float  # 1    spectral radius of the whole loop
+    shortfalls: tuple[str, ...]  # texts on requirements that are missed
+
+
+def design_paper(
+    robot: Robot, plants: Plants, needs: Requirements, *, period: float
+) -> PaperDesign:
+    """Designs the laws of the paper's control by the same requirements, search and margins."""
+    time = size_of(robot).time
+    omega = frequencies(period, SEARCHED, slowest=SLOWEST / time)
+    found = all_loci(robot, plants, omega, of=paper_loci)
+    tangential, vertical = (loci.finer(FINER) for loci in found)
+    slip, _ = design_slip(tangential, needs, period=period, time=time)
+    suspension = design_suspension(robot, vertical, needs, period=period)
+    finder = MarginFinder(robot, plants, period=period, of=paper_loci)
+    late = delay_steps(needs, period=period)
+    laws = Laws(slip=slip, suspension=suspension, period=period, delays=late)
+    laws, _ = _backed_off(finder, tangential, laws, needs)
+    laws, radius = stable(robot, plants, laws)
+    margins = finder.worst(tangential, 0, laws), finder.worst(vertical, 1, laws)
+    phase, gain = min(m.phase for m in margins), min(m.gain for m in margins)
+    missed = phase < needs.phase_margin or gain < needs.gain_margin or radius >= 1.0
+    text = (
+        f"the paper's control has {phase:.3g} deg and {gain:.3g} dB of margin and a spectral "
+        f"radius of {radius:.6g} on these legs"
+    )
+    return PaperDesign(
+        laws=laws, phase=phase, gain=gain, radius=radius, shortfalls=(text,) * missed
     )
 
 

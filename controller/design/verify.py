@@ -11,6 +11,7 @@ from hexapod_cosim.controller.design.closed import closed_loop, spectral_radius
 from hexapod_cosim.controller.design.laws import Laws
 from hexapod_cosim.controller.design.loci import (
     SLOWEST,
+    FindLoci,
     Loci,
     LoopMargins,
     Plants,
@@ -146,9 +147,12 @@ def _missed(robot: Robot, what: str, *, got: object, expected: str) -> GainsErro
 class MarginFinder:
     """Computes margins by python-control, for those loops that a quick estimate finds worst."""
 
-    def __init__(self, robot: Robot, plants: Plants, *, period: float) -> None:
+    def __init__(
+        self, robot: Robot, plants: Plants, *, period: float, of: FindLoci = eigenloci
+    ) -> None:
+        """of: the function that computes the loci of one plant; period [s]."""
         self._omega = frequencies(period, JUDGED, slowest=SLOWEST / size_of(robot).time)
-        self._loci = cache(lambda name: eigenloci(robot, plants[name], self._omega))
+        self._loci = cache(lambda name: of(robot, plants[name], self._omega))
 
     def worst(self, loci: Loci, which: int, laws: Laws) -> LoopMargins:
         """Returns the least margins of the tangential (which = 0) or the vertical (1) loops.

@@ -183,7 +183,7 @@ static const hxVariable outputs[] = {
 };
 
 static const hxVariable parameters[] = {
-    {"control", "", 1, 2, offsetof(struct hxVariables, definition.control), HX_INTEGER, 1},
+    {"control", "", 1, 3, offsetof(struct hxVariables, definition.control), HX_INTEGER, 1},
     {"period", "s", 0.0001, 10.0, offsetof(struct hxVariables, definition.period), HX_REAL, 1},
     {"torso.mass", "kg", 1e-09, 1000000000.0, offsetof(struct hxVariables, definition.torso.mass), HX_REAL, 1},
     {"torso.com[1]", "m", -100.0, 100.0, offsetof(struct hxVariables, definition.torso.com[0]), HX_REAL, 3},
@@ -482,6 +482,18 @@ static const hxVariable parameters[] = {
     {"parts.path", "", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, definition.parts.path), HX_BOOLEAN, 1},
     {"parts.limits", "", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, definition.parts.limits), HX_BOOLEAN, 1},
     {"parts.fallback", "", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, definition.parts.fallback), HX_BOOLEAN, 1},
+    {"gains.paper_slip.kp", "m/N", -1000000.0, 1000000.0, offsetof(struct hxVariables, definition.gains.paper_slip.kp), HX_REAL, 1},
+    {"gains.paper_slip.ki", "m/(N.s)", -1000000.0, 1000000.0, offsetof(struct hxVariables, definition.gains.paper_slip.ki), HX_REAL, 1},
+    {"gains.paper_slip.kd", "m.s/N", -1000000.0, 1000000.0, offsetof(struct hxVariables, definition.gains.paper_slip.kd), HX_REAL, 1},
+    {"gains.paper_slip.derivative_time", "s", 1e-09, 1000000.0, offsetof(struct hxVariables, definition.gains.paper_slip.derivative_time), HX_REAL, 1},
+    {"gains.paper_slip.filter_time", "s", 1e-09, 1000000.0, offsetof(struct hxVariables, definition.gains.paper_slip.filter_time), HX_REAL, 1},
+    {"gains.paper_slip.load_time", "s", 1e-09, 1000000.0, offsetof(struct hxVariables, definition.gains.paper_slip.load_time), HX_REAL, 1},
+    {"gains.paper_slip.tracking_time", "s", 1e-09, 1000000.0, offsetof(struct hxVariables, definition.gains.paper_slip.tracking_time), HX_REAL, 1},
+    {"gains.paper_slip.limit", "m", 1e-09, 10.0, offsetof(struct hxVariables, definition.gains.paper_slip.limit), HX_REAL, 1},
+    {"gains.paper_suspension.mass", "kg", 1e-09, 1000000000.0, offsetof(struct hxVariables, definition.gains.paper_suspension.mass), HX_REAL, 1},
+    {"gains.paper_suspension.damping", "N.s/m", 0.0, 1000000000.0, offsetof(struct hxVariables, definition.gains.paper_suspension.damping), HX_REAL, 1},
+    {"gains.paper_suspension.stiffness", "N/m", 1e-09, 1000000000000.0, offsetof(struct hxVariables, definition.gains.paper_suspension.stiffness), HX_REAL, 1},
+    {"gains.paper_suspension.limit", "m", 1e-09, 10.0, offsetof(struct hxVariables, definition.gains.paper_suspension.limit), HX_REAL, 1},
     {"parts.squeeze", "1", 0.0, 0.99, offsetof(struct hxVariables, definition.parts.squeeze), HX_REAL, 1},
     {"friction.mu", "1", 0.0, 100.0, offsetof(struct hxVariables, definition.friction), HX_REAL, 1},
     {"servo.torque_continuous", "N.m", 1e-09, 100000000.0, offsetof(struct hxVariables, definition.servo.torque_continuous), HX_REAL, 1},
@@ -507,10 +519,11 @@ const char *const hx_log_category_names[] = {
 const hxStateRow *const hx_states = 0;
 const size_t hx_state_count = 0;
 
-const char hx_default_guid[] = "{4839bc2c-a7fc-4801-b109-b9c33302a43a}";
+const char hx_default_guid[] = "{178463c2-939e-403d-904a-43b3859711e1}";
 
 _Static_assert(HX_CONTROL_KINEMATIC == 1, "Control");
 _Static_assert(HX_CONTROL_COMPLIANT == 2, "Control");
+_Static_assert(HX_CONTROL_PAPER == 3, "Control");
 _Static_assert(HX_PATTERN_TRIPOD == 1, "GaitPattern");
 _Static_assert(HX_PATTERN_RIPPLE == 2, "GaitPattern");
 _Static_assert(HX_PATTERN_WAVE == 3, "GaitPattern");

@@ -6,10 +6,12 @@ void hx_controller_compile(const hxControllerDefinition *definition, hxControlle
   memset(model, 0, sizeof *model);
   model->period = definition->period;
   model->compliant = definition->control == HX_CONTROL_COMPLIANT;
+  model->paper = definition->control == HX_CONTROL_PAPER;
   for (int k = 0; k < HX_LEGS; ++k) hx_leg_solver_compile(definition, k, &model->leg[k]);
   hx_command_ramp_compile(definition->gait.period, definition->period, &model->ramp);
   hx_foot_paths_compile(definition, model->leg, &model->paths);
   if (model->compliant) hx_compliant_compile(definition, model->leg, &model->laws);
+  if (model->paper) hx_paper_compile(definition, &model->corrections);
 }
 
 /* ----------------------------------------------------------------------------------- planning */
@@ -141,20 +143,30 @@ static void show_planned(const hxPlannedStep *now, int k, double planned[3]) {
   planned[2] = height;
 }
 
+/* Computes a foot of the present step with rolling and lowering, walking frame [m, m/s]. */
+static void planned_foot(const hxControllerModel *model, hxControllerState *state, int k,
+                         hxPlane *plane, double *height, hxPlane *velocity, double *rise) {
+  const hxPlannedStep *before = step_at(state, -1), *now = step_at(state, 0),
+                      *after = step_at(state, 1);
+  const hxPlane *old = &before->shift[k], *here = &now->shift[k], *next = &after->shift[k];
+  const hxPlane rolling = {rate_of(state, old->x, here->x, next->x, model->period),
+                           rate_of(state, old->y, here->y, next->y, model->period)};
+  *plane = hx_plane_add(now->feet.plane[k], *here);
+  *velocity = hx_plane_add(now->feet.velocity[k], rolling);
+  *height = now->height[k];
+  *rise = now->feet.rise[k] -
+          rate_of(state, before->lowering[k], now->lowering[k], after->lowering[k], model->period);
+}
+
 /* Computes joint commands that move the feet along their paths (C10 to C14). */
 static void follow_paths(const hxControllerModel *model, hxControllerState *state) {
   const hxPlannedStep *before = step_at(state, -1), *now = step_at(state, 0),
                       *after = step_at(state, 1);
   hxControllerOutput *output = &state->output;
   for (int k = 0; k < HX_LEGS; ++k) {
-    const hxPlane *old = &before->shift[k], *here = &now->shift[k], *next = &after->shift[k];
-    const hxPlane rolling = {rate_of(state, old->x, here->x, next->x, model->period),
-                             rate_of(state, old->y, here->y, next->y, model->period)};
-    hxPlane plane = hx_plane_add(now->feet.plane[k], *here),
-            velocity = hx_plane_add(now->feet.velocity[k], rolling);
-    double height = now->height[k];
-    double rise = now->feet.rise[k] - rate_of(state, before->lowering[k], now->lowering[k],
-                                              after->lowering[k], model->period);
+    hxPlane plane, velocity;
+    double height, rise;
+    planned_foot(model, state, k, &plane, &height, &velocity, &rise);
     hx_posture_see(&now->posture, &plane, &height, &velocity, &rise);
     output->unreachable[k] = hx_leg_solver_solve(&model->leg[k], &now->pose[k], velocity, rise,
                                                  output->angle_ref[k], output->speed_ref[k]);
@@ -166,6 +178,28 @@ static void follow_paths(const hxControllerModel *model, hxControllerState *stat
     hx_leg_solver_accelerations(
         &model->leg[k], neighbour, state->has_after ? model->period : -model->period,
         output->angle_ref[k], output->speed_ref[k], output->acceleration_ref[k]);
+  }
+}
+
+/* Corrects the paths by the foot forces, and the joint commands with them (C47 to C49). */
+static void correct_paths(const hxControllerModel *model, const hxControllerInput *input,
+                          hxControllerState *state) {
+  const hxPosture *posture = &step_at(state, 0)->posture;
+  hxControllerOutput *output = &state->output;
+  hxPaper *paper = &state->paper;
+  double force[HX_LEGS][3];
+  hx_sense(input, posture, force);
+  hx_paper_step(&model->corrections, (const double (*)[3])force, state->paths.swinging, paper);
+  for (int k = 0; k < HX_LEGS; ++k) {
+    hxPlane plane, velocity;
+    double height, rise;
+    planned_foot(model, state, k, &plane, &height, &velocity, &rise);
+    output->unreachable[k] =
+        hx_paper_actuate(paper, &model->leg[k], k, posture, plane, height, velocity, rise,
+                         output->angle_ref[k], output->speed_ref[k]);
+    output->shift[k][0] = paper->shift[k].x;
+    output->shift[k][1] = paper->shift[k].y;
+    output->lift[k] = paper->lift[k];
   }
 }
 
@@ -234,6 +268,7 @@ void hx_controller_tick(const hxControllerModel *model, const hxControllerInput 
   if (state->tick > 0) advance(model, told, state);
   ++state->tick;
   follow_paths(model, state);
+  if (model->paper) correct_paths(model, input, state);
   if (!model->compliant) return;
   ask(model, state, &stance);
   hx_compliant_step(&model->laws, model->leg, &stance, input, &state->compliant, &state->output);

@@ -21,6 +21,12 @@ static inline hxPlane hx_times(hxPlane a, hxPlane b) {
 }
 static inline double hx_square(hxPlane a) { return a.x * a.x + a.y * a.y; }
 
+/* Returns the length of a vector. Not by hypot, which would need glibc 2.35. */
+static inline double hx_length(hxPlane a) { return sqrt(hx_square(a)); }
+
+/* Returns e^x for x <= 0, to 1e-16. Not by exp, which would need glibc 2.29. */
+static inline double hx_decay(double x) { return 1.0 + expm1(x); }
+
 /* Return Re(a^* b) and Im(a^* b), the dot and the cross product of two vectors. */
 static inline double hx_along(hxPlane a, hxPlane b) { return a.x * b.x + a.y * b.y; }
 static inline double hx_across(hxPlane a, hxPlane b) { return a.x * b.y - a.y * b.x; }

@@ -5,17 +5,19 @@
 #define HX_CONTROLLER_STATE_H
 
 #include "comply/compliant.h"
+#include "comply/paper.h"
 #include "hexapod/inside.h"
 
 HX_HIDDEN_BEGIN
 
 typedef struct hxControllerModel {
   double period; /* s */
-  int compliant; /* compliant control, otherwise kinematic control */
+  int compliant, paper; /* this control, otherwise kinematic control */
   hxLegSolver leg[HX_LEGS];
   hxCommandRampModel ramp;
   hxFootPathsModel paths;
   hxCompliantModel laws;
+  hxPaperModel corrections; /* of the paper's control */
 } hxControllerModel;
 
 /* One planned step. It depends on the command alone. Feet are in the walking frame. */
@@ -45,6 +47,7 @@ typedef struct hxControllerState {
   int present; /* index of the present step in `step`, a ring buffer */
   hxPlannedStep step[3];
   hxCompliant compliant;
+  hxPaper paper;
   hxControllerOutput output; /* of the last tick */
 } hxControllerState;
 

@@ -1,9 +1,10 @@
 #include "validation.h"
 
 #include <math.h>
-#include <stdio.h>
 
+#include "hexapod/message.h"
 #include "hexapod/range_check.h"
+#include "plane.h"
 
 static void legs(hxChecker *c, const hxControllerDefinition *d) {
   char name[32];
@@ -16,7 +17,7 @@ static void legs(hxChecker *c, const hxControllerDefinition *d) {
                       "an angle between the joint's angle_min and angle_max");
       /* femur and tibia are the arms of a planar linkage */
       hx_joint_label(leg, joint, "length", name);
-      if (joint > 0 && !(hypot(link->length, link->offset_z) > 1e-6))
+      if (joint > 0 && !(hx_length(hx_plane(link->length, link->offset_z)) > 1e-6))
         hx_check_fail(c, name, link->length,
                       "a tip away from the joint: length and offset_z not both zero");
     }
@@ -28,11 +29,12 @@ static void relations(hxChecker *c, const hxControllerDefinition *d) {
   char expected[96];
   const double stance = d->gait.duty * d->gait.period,
                swing = (1.0 - d->gait.duty) * d->gait.period, shorter = fmin(stance, swing);
-  snprintf(expected, sizeof expected, "less than %.9g s, the gait's shorter phase", shorter);
+  hx_print(expected, sizeof expected, "less than %.9g s, the gait's shorter phase", shorter);
   if (!(d->period < shorter)) hx_check_fail(c, "period", d->period, expected);
-  if (d->control == HX_CONTROL_COMPLIANT && !(d->servo.kp > 0.0))
+  if (d->control != HX_CONTROL_KINEMATIC && !(d->servo.kp > 0.0))
     hx_check_fail(c, "servo.kp", d->servo.kp,
-                  "more than 0 under compliant control, which shifts the servos' targets");
+                  "more than 0 except under kinematic control: the others shift the servos' "
+                  "targets");
   legs(c, d);
 }
 

@@ -7,7 +7,9 @@ from typing import Annotated
 import typer
 
 from hexapod_cosim.cosim.cli import (
+    benchmark_command,
     compare_command,
+    controller_command,
     export_command,
     fmu_commands,
     listing,
@@ -29,8 +31,10 @@ app.command("export")(export_command.export)
 app.command("simulate", epilog=run_commands.EPILOG)(run_commands.simulate)
 app.command("compare", epilog=compare_command.EPILOG)(compare_command.compare)
 app.command("study", epilog=study_command.EPILOG)(study_command.study)
+app.command("benchmark", epilog=benchmark_command.EPILOG)(benchmark_command.benchmark)
 app.command("design")(fmu_commands.design)
 app.command("report")(run_commands.report)
+app.add_typer(controller_command.app, name="controller")
 app.command("validate")(fmu_commands.validate)
 app.command("terrain")(terrain_command.terrain)
 app.command("list")(listing.list_what)

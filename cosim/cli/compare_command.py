@@ -1,4 +1,4 @@
-"""Defines the command `hexapod compare`: walks under both controls, over several seeds."""
+"""Defines the command `hexapod compare`: walks under several controls, over several seeds."""
 
 from __future__ import annotations
 
@@ -8,13 +8,13 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any
 
-import tomlkit
 import typer
 
 from hexapod_cosim.cosim.cli import completion
 from hexapod_cosim.cosim.cli.accuracy_check import CheckAccuracy, check_accuracy, show_accuracy
 from hexapod_cosim.cosim.cli.failures import FELL, SUCCESS
 from hexapod_cosim.cosim.cli.running import (
+    ControlNames,
     Engine,
     FmuFile,
     FolderName,
@@ -22,6 +22,7 @@ from hexapod_cosim.cosim.cli.running import (
     RunError,
     RunOptions,
     Settings,
+    chosen_controls,
     command_line,
     default_folder,
     drawing,
@@ -38,25 +39,22 @@ from hexapod_cosim.cosim.cli.terminal import (
     show_text,
     warn,
 )
-from hexapod_cosim.cosim.common.files import RUN_FILE, write_json, write_text
+from hexapod_cosim.cosim.common.files import write_json
 from hexapod_cosim.cosim.master.interrupts import deferred_interrupts
-from hexapod_cosim.cosim.master.loop import COMPLETED
 from hexapod_cosim.cosim.report.accuracy import with_errors
 from hexapod_cosim.cosim.report.report import REPORT, about, comparison_rows, write_report
 from hexapod_cosim.cosim.results.accuracy import Accuracy, halved_scenario
 from hexapod_cosim.cosim.results.comparison import (
     SEEDS,
     SEEDS_PARTIAL,
-    Comparison,
-    compare_runs,
     write_seeds,
 )
+from hexapod_cosim.cosim.results.comparisons import Comparisons, compare_all, write_comparison
 from hexapod_cosim.cosim.results.metrics import has_net_slip
 from hexapod_cosim.cosim.results.result import Result
 from hexapod_cosim.cosim.results.results import (
     ACCURACY,
     METRICS_FILE,
-    SCENARIO,
     ResultsFolder,
     read_scenario,
     results_folder,
@@ -65,17 +63,19 @@ from hexapod_cosim.cosim.results.results import (
 from hexapod_cosim.cosim.results.summary import Summary, summarise
 from hexapod_cosim.cosim.run.batch import run_batch
 from hexapod_cosim.cosim.run.preparation import chosen_gains
-from hexapod_cosim.cosim.scenario.records import CONTROLS, Scenario
+from hexapod_cosim.cosim.scenario.controls import Control
+from hexapod_cosim.cosim.scenario.records import Scenario
 from hexapod_cosim.cosim.scenario.scenario import load_scenario
 from hexapod_cosim.cosim.scenario.variation import STANDARD
 from hexapod_cosim.models import ScenarioError
 
 EPILOG = (
-    f"Exit code {FELL} when the robot did not walk to the end of every run, under either control: "
+    f"Exit code {FELL} when the robot did not walk to the end of every run, under any control: "
     "the report is written all the same, says how many did, "
     "and compares the seeds on which both walked."
 )
 MAX_SEEDS = 10_000
+DEFAULT_CONTROLS = ("kinematic", "compliant")
 TERRAINS = "terrains"  # folder in out/ of a comparison over several scenarios
 Names = Annotated[
     list[str] | None,
@@ -99,6 +99,7 @@ Seeds = Annotated[
 
 def compare(
     scenarios: Names = None,
+    control: ControlNames = None,
     seeds: Seeds = 10,
     settings: Settings = None,
     output: FolderName = None,
@@ -108,7 +109,10 @@ def compare(
     engine: Engine = None,
     json: Json = False,
 ) -> int:
-    """Run one or several walks under kinematic and under compliant control; report."""
+    """Run one or several walks under several controls, and report each against the first.
+
+    Without --control these are kinematic and compliant.
+    """
     names = scenarios or ["walk_flat"]
     options = RunOptions.read(fmu=fmu, gains=gains, engine=engine, runs=seeds)
     works = []
@@ -116,6 +120,7 @@ def compare(
         command = command_line(
             "compare",
             name,
+            controls=control,
             seeds=seeds,
             settings=settings,
             engine=engine,
@@ -123,7 +128,9 @@ def compare(
             gains=gains,
             accuracy=accuracy,
         )
-        works.append(Work(_plan(name, settings or [], seeds), seeds, command, options, accuracy))
+        plan = _plan(name, settings or [], seeds)
+        controls = _controls(control or DEFAULT_CONTROLS, plan)
+        works.append(Work(plan, controls, seeds, command, options, accuracy))
     for work in works:
         work.check()
     if len(works) > 1:
@@ -142,6 +149,7 @@ class Work:
     """A comparison to run."""
 
     plan: Scenario
+    controls: tuple[Control, ...]
     seeds: int
     command: str
     options: RunOptions
@@ -151,7 +159,13 @@ class Work:
         """Designs the gains of all runs, or raises errors before anything is run."""
         if self.accuracy:
             halved_scenario(self.plan)
-        chosen_gains(replace(self.plan, control="compliant"), self.options.gains)
+        for control in self.controls:
+            chosen_gains(replace(self.plan, control=control.text), self.options.gains)
+
+    @property
+    def labels(self) -> list[str]:
+        """The labels of the controls."""
+        return [control.label for control in self.controls]
 
 
 @dataclass(frozen=True)
@@ -159,7 +173,7 @@ class Done:
     """A comparison that was run, with its report."""
 
     results: Mapping[str, Result]
-    comparison: Comparison
+    comparison: Comparisons
     checked: Mapping[str, Accuracy]
     files: list[Path]
     report: Path
@@ -167,14 +181,17 @@ class Done:
 
 def run_work(work: Work, path: Path) -> Done:
     """Runs a comparison into a folder and reports it. Raises HexapodError."""
-    plan, options = work.plan, work.options
-    with results_folder(path) as folder:
-        results, files = _first_seed(plan, folder, work.command, options)
-        comparison = _all_seeds(plan, results, work.seeds, folder.path, options)
-        files += _store(plan, comparison, folder.path, work.command)
+    plan = work.plan
+    with results_folder(path, work.labels) as folder:
+        results, files = _first_seed(work, folder)
+        comparison = _all_seeds(work, results, folder.path)
+        files += [folder.path / SEEDS]
+        files += write_comparison(
+            folder.path, plan, comparison, labels=work.labels, command=work.command
+        )
         checked: dict[str, Accuracy] = {}
         if work.accuracy:
-            checked = _accuracies(plan, comparison, folder.path, options)
+            checked = _accuracies(work, comparison, folder.path)
             write_json(folder.path / METRICS_FILE, _table(comparison, checked))
         files += _draw(results, comparison, checked, folder.path, work.command)
     return Done(results, comparison, checked, files, folder.path / REPORT)
@@ -214,7 +231,7 @@ def _compare_many(works: Sequence[Work], names: Sequence[str], path: Path, *, js
 
 def _draw(
     results: Mapping[str, Result],
-    comparison: Comparison,
+    comparison: Comparisons,
     checked: Mapping[str, Accuracy],
     folder: Path,
     command: str,
@@ -234,14 +251,14 @@ def _draw(
 
 def _show(
     results: Mapping[str, Result],
-    comparison: Comparison,
+    comparison: Comparisons,
     checked: Mapping[str, Accuracy],
     files: Sequence[Path],
 ) -> None:
-    """Prints the metrics of both controls, their accuracy if it was checked, and the files."""
+    """Prints the metrics of all controls, their accuracy if it was checked, and the files."""
     net_slip = has_net_slip(next(iter(results.values())).parameters)
     rows = comparison_rows(comparison, net_slip=net_slip)
-    show_rows(with_errors(rows, checked), CONTROLS)
+    show_rows(with_errors(rows, checked), comparison.labels)
     show_accuracy(rows, checked, comparison.means)
     show_files(files)
 
@@ -260,41 +277,47 @@ def _plan(scenario: str, settings: Sequence[str], seeds: int) -> Scenario:
     return replace(plan, variation=STANDARD) if seeds > 1 and plan.variation is None else plan
 
 
-def _first_seed(
-    plan: Scenario,
-    folder: ResultsFolder,
-    command: str,
-    options: RunOptions,
-) -> tuple[dict[str, Result], list[Path]]:
-    """Runs the first seed under both controls and keeps the recordings."""
+def _controls(texts: Sequence[str], plan: Scenario) -> tuple[Control, ...]:
+    """Returns the controls to compare. Raises HexapodError for fewer than two."""
+    controls = chosen_controls(texts, plan)
+    if len(controls) < 2:
+        raise ScenarioError(
+            "nothing to compare with",
+            got=controls[0].label,
+            expected="two or more controls, the reference first",
+            fix=f"write --control kinematic --control {controls[0].label}, or use simulate",
+            where="--control",
+        )
+    return controls
+
+
+def _first_seed(work: Work, folder: ResultsFolder) -> tuple[dict[str, Result], list[Path]]:
+    """Runs the first seed under all controls and keeps the recordings."""
     results: dict[str, Result] = {}
     files: list[Path] = []
-    for control in CONTROLS:
-        with results_folder(folder.path / control) as part:
-            walk = replace(plan, control=control)
-            results[control], written = run_into(walk, [folder, part], command, options)
-        files += written
+    for control in work.controls:
+        with results_folder(folder.path / control.label) as part:
+            walk = replace(work.plan, control=control.text)
+            results[control.label], files_of_run = run_into(
+                walk, [folder, part], work.command, work.options
+            )
+        files += files_of_run
     return results, files
 
 
-def _all_seeds(
-    plan: Scenario,
-    results: Mapping[str, Result],
-    seeds: int,
-    folder: Path,
-    options: RunOptions,
-) -> Comparison:
+def _all_seeds(work: Work, results: Mapping[str, Result], folder: Path) -> Comparisons:
     """Runs the other seeds; an interrupt or error keeps the completed runs in SEEDS_PARTIAL."""
+    plan, options, count = work.plan, work.options, len(work.controls)
     scenarios = [
-        replace(plan, control=control, seed=seed)
-        for seed in range(plan.seed + 1, plan.seed + seeds)
-        for control in CONTROLS
+        replace(plan, control=control.text, seed=seed)
+        for seed in range(plan.seed + 1, plan.seed + work.seeds)
+        for control in work.controls
     ]
-    done: list[Summary] = [summarise(results[control]) for control in CONTROLS]
+    done: list[Summary] = [summarise(results[label]) for label in work.labels]
     try:
         compiled = options.engine == "compiled"
         batch = run_batch(scenarios, fmu=options.fmu, gains=options.gains, compiled=compiled)
-        with counting_bar("seeds", 2 * seeds) as report_count, closing(batch) as runs:
+        with counting_bar("seeds", count * work.seeds) as report_count, closing(batch) as runs:
             report_count(len(done))
             for run in runs:
                 done.append(run)
@@ -305,44 +328,27 @@ def _all_seeds(
             warn(f"the completed runs are in {folder / SEEDS_PARTIAL}")
         raise
     write_seeds(folder / SEEDS, done)
-    comparison = compare_runs(
-        *([run for run in done if run.control == control] for control in CONTROLS)
+    comparison = compare_all(
+        {label: [run for run in done if run.control == label] for label in work.labels}
     )
-    for text in comparison.warnings if seeds > 1 else comparison.losses:
+    for text in comparison.warnings if work.seeds > 1 else comparison.losses:
         warn(text)
     return comparison
 
 
-def _accuracies(
-    plan: Scenario,
-    comparison: Comparison,
-    folder: Path,
-    options: RunOptions,
-) -> dict[str, Accuracy]:
+def _accuracies(work: Work, comparison: Comparisons, folder: Path) -> dict[str, Accuracy]:
     """Returns the accuracies, by control, of the means over the compared seeds."""
     found = {}
-    for control, runs in zip(CONTROLS, comparison.judged, strict=True):
-        plans = [replace(plan, control=control, seed=run.seed) for run in runs]
-        found[control] = check_accuracy(plans, runs, folder, options)
+    for control in work.controls:
+        runs = comparison.judged[control.label]
+        plans = [replace(work.plan, control=control.text, seed=run.seed) for run in runs]
+        found[control.label] = check_accuracy(plans, runs, folder, work.options)
     return found
 
 
-def _table(comparison: Comparison, checked: Mapping[str, Accuracy]) -> dict[str, Any]:
+def _table(comparison: Comparisons, checked: Mapping[str, Accuracy]) -> dict[str, Any]:
     """Returns the content of metrics.json."""
     table = comparison.as_table()
     if checked:
         table[ACCURACY] = {control: item.as_table() for control, item in checked.items()}
     return table
-
-
-def _store(plan: Scenario, comparison: Comparison, folder: Path, command: str) -> list[Path]:
-    """Writes scenario, metrics and run.json; returns these files and seeds.csv."""
-    # without the control, since both were run
-    text = tomlkit.dumps({key: value for key, value in plan.to_table().items() if key != "control"})
-    write_text(folder / SCENARIO, text)
-    write_json(folder / METRICS_FILE, _table(comparison, {}))
-    write_json(
-        folder / RUN_FILE,
-        {"kind": "compare", "status": COMPLETED, "title": plan.title, "command": command},
-    )
-    return [folder / SEEDS, folder / SCENARIO, folder / METRICS_FILE, folder / RUN_FILE]

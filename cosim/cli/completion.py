@@ -43,7 +43,10 @@ def _toml(path: Path) -> Mapping[str, Any]:
 
 def _settings() -> Iterator[tuple[str, str]]:
     """Yields keys of a scenario, then parameters of the plant's FMU, with their meaning."""
-    for name in (*(key for key in KEYS if key not in SECTIONS), *setting_names()):
+    for name in (
+        *(key for key in KEYS if key not in SECTIONS or key == "control"),
+        *setting_names(),
+    ):
         yield f"{name}=", "of the scenario"
     for name, column in plant_variables("parameter").items():
         yield f"{name}=", _meaning(column)

@@ -55,6 +55,13 @@ Platforms = Annotated[
         "Default: this machine's installed one.",
     ),
 ]
+Integers = Annotated[
+    bool,
+    typer.Option(
+        "--integers",
+        help="Offer integers instead of enumerations, for importers that have none.",
+    ),
+]
 Urdf = Annotated[
     bool, typer.Option("--urdf", help="Write the robot as a URDF instead; so does -o FILE.urdf.")
 ]
@@ -110,12 +117,13 @@ DEFAULT_PERIOD = 0.005  # s, the default macro-step
 DEFAULT_CONTROL = "compliant"  # of a package
 CONTROLLER_OPTIONS = ("gait", "gains", "period")
 DESCRIPTION, PLANT_FMU = "a robot's description", "the plant's FMU"
-CONTROLLER_FMU = "a package or a controller's FMU"
+CONTROLLER_FMU, PACKAGE = "a controller's FMU", "a package"
 # options without effect, by what is written
 UNUSED_OPTIONS = {
-    DESCRIPTION: ("fmi", "platforms", "terrain", "controller", *CONTROLLER_OPTIONS),
+    DESCRIPTION: ("fmi", "platforms", "integers", "terrain", "controller", *CONTROLLER_OPTIONS),
     PLANT_FMU: CONTROLLER_OPTIONS,
     CONTROLLER_FMU: ("terrain",),
+    PACKAGE: ("terrain", "integers"),
 }
 
 
@@ -135,6 +143,7 @@ def export(
     robot: RobotName = "athena",
     fmi: FmiVersion = 2,
     platforms: Platforms = None,
+    integers: Integers = False,
     urdf: Urdf = False,
     mjcf: Mjcf = False,
     ssp: Ssp = False,
@@ -159,15 +168,22 @@ def export(
     elif control is None:
         _refuse_unused_options(context, PLANT_FMU)
         path = _export_plant(
-            loaded, output, fmi=fmi, platforms=chosen, terrains=surfaces_from(terrain or [])
+            loaded,
+            output,
+            fmi=fmi,
+            platforms=chosen,
+            terrains=surfaces_from(terrain or []),
+            integers=integers,
         )
     else:
-        _refuse_unused_options(context, CONTROLLER_FMU)
+        _refuse_unused_options(context, PACKAGE if package else CONTROLLER_FMU)
         options = ControllerOptions(control=control, gait=gait, gains=gains, period=period)
         if package:
             path = _export_package(loaded, output, options, values=values or [], platforms=chosen)
         else:
-            path = _export_controller(loaded, output, options, fmi=fmi, platforms=chosen)
+            path = _export_controller(
+                loaded, output, options, fmi=fmi, platforms=chosen, integers=integers
+            )
     kind = form.name if form is not None else "ssp" if package else "fmu"
     _show_written(path, loaded, kind, json=json)
 
@@ -184,11 +200,14 @@ def _export_plant(
     fmi: int,
     platforms: list[str] | None,
     terrains: list[Surface],
+    integers: bool,
 ) -> Path:
     """Writes the plant's FMU and returns its path."""
     path = _fmu_path(output, robot.name)
     with waiting("compiling" if platforms else None):
-        return export_fmu(robot, path, fmi=fmi, platforms=platforms, terrains=terrains)
+        return export_fmu(
+            robot, path, fmi=fmi, platforms=platforms, terrains=terrains, integers=integers
+        )
 
 
 def _export_controller(
@@ -198,12 +217,13 @@ def _export_controller(
     *,
     fmi: int,
     platforms: list[str] | None,
+    integers: bool,
 ) -> Path:
     """Writes the controller's FMU and returns its path."""
     path = _fmu_path(output, f"{robot.name}_controller")
     setup = _controller_setup(robot, options)
     with waiting("compiling" if platforms else None):
-        return export_controller(setup, path, fmi=fmi, platforms=platforms)
+        return export_controller(setup, path, fmi=fmi, platforms=platforms, integers=integers)
 
 
 def _export_package(
@@ -262,7 +282,7 @@ def _fmu_path(output: Path | None, name: str) -> Path:
 def _controller_setup(robot: Robot, options: ControllerOptions) -> ControllerSetup:
     """Builds the controller's setup; shows a warning for gains of another robot or period."""
     gains = given_gains(options.gains)
-    designs = options.control == "compliant" and gains is None
+    designs = options.control != "kinematic" and gains is None
     with waiting("designing the gains" if designs else None):
         setup = make_setup(
             robot, control=options.control, period=options.period, gait=options.gait, gains=gains

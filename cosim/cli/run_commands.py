@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
-from hexapod_cosim.cosim.cli import completion
+from hexapod_cosim.cosim.cli import benchmark_command
 from hexapod_cosim.cosim.cli.accuracy_check import CheckAccuracy, check_accuracy, show_accuracy
 from hexapod_cosim.cosim.cli.failures import FELL, SUCCESS
 from hexapod_cosim.cosim.cli.running import (
+    ControlNames,
     Engine,
     FmuFile,
     FolderName,
@@ -19,6 +21,7 @@ from hexapod_cosim.cosim.cli.running import (
     Name,
     RunOptions,
     Settings,
+    chosen_controls,
     command_line,
     default_folder,
     drawing,
@@ -27,11 +30,12 @@ from hexapod_cosim.cosim.cli.running import (
     titled,
 )
 from hexapod_cosim.cosim.cli.terminal import Json, show_files, show_json, show_text, warn
-from hexapod_cosim.cosim.common.files import STUDY
+from hexapod_cosim.cosim.common.files import BENCHMARK, PARTS, STUDY
 from hexapod_cosim.cosim.report.accuracy import with_errors
 from hexapod_cosim.cosim.report.report import REPORT, metric_rows, write_report
 from hexapod_cosim.cosim.results.accuracy import Accuracy, halved_scenario
-from hexapod_cosim.cosim.results.comparison import SEEDS, compare_runs, read_seeds
+from hexapod_cosim.cosim.results.comparison import SEEDS, read_seeds
+from hexapod_cosim.cosim.results.comparisons import compare_all
 from hexapod_cosim.cosim.results.drop import drop_text
 from hexapod_cosim.cosim.results.metrics import has_net_slip
 from hexapod_cosim.cosim.results.result import Result
@@ -46,26 +50,17 @@ from hexapod_cosim.cosim.results.results import (
     write_accuracy,
 )
 from hexapod_cosim.cosim.results.summary import summarise
-from hexapod_cosim.cosim.scenario.records import CONTROLS
+from hexapod_cosim.cosim.scenario.controls import control_of, parse_controls
 from hexapod_cosim.cosim.scenario.scenario import load_scenario
 
 EPILOG = (
     f"Exit code {FELL} when the robot fell: what was recorded and measured is written all the same."
 )
-Control = Annotated[
-    str | None,
-    typer.Option(
-        "--control",
-        metavar="|".join(CONTROLS),
-        help="Overrides the scenario's control.",
-        autocompletion=completion.control,
-    ),
-]
 
 
 def simulate(
     scenario: Name = "walk_flat",
-    control: Control = None,
+    control: ControlNames = None,
     settings: Settings = None,
     output: FolderName = None,
     fmu: FmuFile = None,
@@ -74,17 +69,21 @@ def simulate(
     engine: Engine = None,
     json: Json = False,
 ) -> int:
-    """Run one co-simulation: results, metrics, plots."""
-    controls = [f"control={control}"] if control else []
-    plan = load_scenario(scenario, overrides=[*(settings or []), *controls])
-    plan = titled(plan, settings or [])
+    """Run one co-simulation: results, metrics, plots. Several controls: a run of each."""
+    plan = titled(load_scenario(scenario, overrides=settings or []), settings or [])
+    controls = chosen_controls(control or [plan.control], plan)
+    if len(controls) > 1:
+        return _simulate_each(scenario, control or [], settings, output, fmu, gains, accuracy,
+                              engine, json=json)  # fmt: skip
+    plan = replace(plan, control=controls[0].text)
+    label = controls[0].label
     options = RunOptions.read(fmu=fmu, gains=gains, engine=engine, runs=1)
     if accuracy:
         halved_scenario(plan)  # raises errors before anything is run
     command = command_line(
         "simulate",
         scenario,
-        control=control,
+        controls=control,
         settings=settings,
         engine=engine,
         fmu=fmu,
@@ -97,10 +96,10 @@ def simulate(
         if accuracy:
             found = check_accuracy([plan], [summarise(result)], folder.path, options)
             write_accuracy(folder.path, found.as_table())
-            checked[plan.control] = found
+            checked[label] = found
         if plan.outputs.plots:
             with drawing(folder.path):
-                runs = {plan.control: stored_result(result)}
+                runs = {label: stored_result(result)}
                 files += write_report(runs, folder.path, warn=warn, accuracies=checked)
     if json:
         show_json(_summary(result, folder.path, files, checked))
@@ -109,9 +108,34 @@ def simulate(
     return SUCCESS if result.facts["walk"]["upright"] else FELL
 
 
+def _simulate_each(
+    scenario: str,
+    texts: Sequence[str],
+    settings: list[str] | None,
+    output: Path | None,
+    fmu: Path | None,
+    gains: Path | None,
+    accuracy: bool,
+    engine: str | None,
+    *,
+    json: bool,
+) -> int:
+    """Runs a scenario under each of several controls, into a folder by label."""
+    folder, codes = output or default_folder(scenario), []
+    for control in parse_controls(texts, where="--control"):
+        folder.mkdir(parents=True, exist_ok=True)
+        codes.append(
+            simulate(
+                scenario, [control.text], settings, folder / control.label, fmu, gains, accuracy,
+                engine, json=json,
+            )
+        )  # fmt: skip
+    return FELL if FELL in codes else SUCCESS
+
+
 def _show(result: Result, files: Sequence[Path], checked: Mapping[str, Accuracy]) -> None:
     """Prints the metrics of a run, their accuracy if it was checked, and the written files."""
-    control = result.scenario.control
+    control = control_of(result.scenario.control).label
     metrics = {control: result.metrics}
     rows = metric_rows(metrics, net_slip=has_net_slip(result.parameters))
     show_rows(with_errors(rows, checked), [control])
@@ -130,7 +154,7 @@ def report(
     ],
     json: Json = False,
 ) -> None:
-    """Make the plots and the report of a run, a comparison or a study again."""
+    """Make the plots and the report of a run, a comparison, a study or a benchmark again."""
     facts = read_facts(folder)
     if facts.get("kind") == STUDY:
         # imported only here because it is slow
@@ -138,6 +162,8 @@ def report(
 
         found, files = report_on(folder)
         warn_of(found)
+    elif facts.get("kind") == BENCHMARK:
+        files = benchmark_command.report_on(folder)
     elif facts.get("kind") == "compare":
         files = _report_comparison(folder, facts)
     else:
@@ -154,11 +180,13 @@ def report(
 def _report_comparison(folder: Path, facts: Mapping[str, Any]) -> list[Path]:
     """Writes the report of a comparison's folder again; `facts` are those of its run.json."""
     seeds = read_seeds(folder / SEEDS)
+    # comparisons of earlier versions do not name their controls
+    labels = [str(label) for label in facts.get(PARTS, ("kinematic", "compliant"))]
     return write_report(
-        {control: read_result(folder / control) for control in CONTROLS},
+        {label: read_result(folder / label) for label in labels},
         folder,
         warn=warn,
-        comparison=compare_runs(*(seeds.get(control, []) for control in CONTROLS)),
+        comparison=compare_all({label: seeds.get(label, []) for label in labels}),
         scenario=read_scenario(folder),
         command=facts.get("command", ""),
         accuracies=read_accuracies(folder),
@@ -169,8 +197,9 @@ def _summary(
     result: Result, folder: Path, files: list[Path], checked: Mapping[str, Accuracy]
 ) -> dict[str, Any]:
     """Returns what --json prints of a run; `checked` is its accuracy by control, if checked."""
+    label = control_of(result.scenario.control).label
     names = {
-        "control": result.scenario.control,
+        "control": label,
         "directory": str(folder),
         "files": [str(file) for file in files],
     }
@@ -178,5 +207,5 @@ def _summary(
     status = {"status": result.outcome.status}
     summary = {"metrics": dict(result.metrics), **names, **shown, **status}
     if checked:
-        summary[ACCURACY] = checked[result.scenario.control].as_table()
+        summary[ACCURACY] = checked[label].as_table()
     return summary

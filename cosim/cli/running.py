@@ -6,6 +6,7 @@ import shlex
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -14,13 +15,15 @@ import typer
 from hexapod_cosim.controller import Gains, load_gains
 from hexapod_cosim.cosim.cli import completion
 from hexapod_cosim.cosim.cli.terminal import progress_bar, show_table, waiting, warn
+from hexapod_cosim.cosim.control.controllers import check_control
 from hexapod_cosim.cosim.master.interrupts import deferred_interrupts
 from hexapod_cosim.cosim.master.loop import INTERRUPTED
 from hexapod_cosim.cosim.results.result import Result
 from hexapod_cosim.cosim.results.results import ResultsFolder, write_result
 from hexapod_cosim.cosim.run.run import simulate as run_scenario
 from hexapod_cosim.cosim.run.walker import Walker
-from hexapod_cosim.cosim.scenario.records import Scenario
+from hexapod_cosim.cosim.scenario.controls import Control, control_of, parse_controls
+from hexapod_cosim.cosim.scenario.records import CONTROLS, Scenario
 from hexapod_cosim.cosim.study.execute.engines import ENGINES
 from hexapod_cosim.models import HexapodError, unknown_name
 
@@ -68,7 +71,25 @@ Engine = Annotated[
     ),
 ]
 
-UNTITLED = ("control=", "seed=", "outputs.", "duration=")  # settings that keep the title
+ControlNames = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--control",
+        metavar="CONTROL",
+        help=f"{', '.join(CONTROLS)}, law.py:Class or controller.fmu; LABEL=CONTROL names it. "
+        "Repeat it for more.",
+        show_default=False,
+        autocompletion=completion.control,
+    ),
+]
+
+UNTITLED = (
+    "control=",
+    "control.",
+    "seed=",
+    "outputs.",
+    "duration=",
+)  # settings that keep the title
 
 
 class RunError(HexapodError):
@@ -102,10 +123,12 @@ def command_line(
     fmu: Path | None,
     gains: Path | None,
     accuracy: bool = False,
+    controls: Sequence[str] | None = None,
     **more: str | int | None,
 ) -> str:
     """Returns the command that repeats a run."""
-    options = [("--set", text) for text in settings or []]
+    options = [("--control", text) for text in controls or []]
+    options += [("--set", text) for text in settings or []]
     given: dict[str, object] = {**more, "fmu": fmu, "gains": gains}
     options += [(f"--{key}", str(value)) for key, value in given.items() if value is not None]
     flags = ["--check-accuracy"] if accuracy else []
@@ -153,15 +176,16 @@ def run_into(
             for folder in folders:
                 folder.begin()
 
-        with progress_bar(plan.control, plan.duration) as progress:
-            run = run_scenario
+        label = control_of(plan.control).label
+        with progress_bar(label, plan.duration) as progress:
+            run = partial(run_scenario, plan)
             if options.engine == "compiled":
-                run = stack.enter_context(Walker(everything=True)).simulate
-            result = run(plan, fmu=options.fmu, gains=options.gains, progress=progress, begin=begin)
+                run = partial(stack.enter_context(Walker(everything=True)).simulate, plan)
+            result = run(fmu=options.fmu, gains=options.gains, progress=progress, begin=begin)
         result = replace(result, facts={**result.facts, "command": command})
         files = write_result(result, folders[-1].path)
     for warning in result.facts["warnings"]:
-        warn(f"{plan.control}: {warning}")
+        warn(f"{label}: {warning}")
     outcome = result.outcome
     if outcome.status == INTERRUPTED:
         warn(f"stopped at {outcome.simulated:.3f} s; recorded so far: {files[1]}")
@@ -201,11 +225,21 @@ def show_rows(rows: Sequence[Mapping[str, Any]], controls: Sequence[str]) -> Non
     """Prints the rows of a report's table without its empty columns."""
     columns = {"metric": [row["name"] for row in rows], "unit": [row["unit"] for row in rows]}
     columns |= {control: [row["values"][k] for row in rows] for k, control in enumerate(controls)}
-    columns |= {
-        "change": [row["change"] for row in rows],
-        "95 % interval": [row["interval"] for row in rows],
-    }
-    columns |= {"": [row["verdict"] for row in rows]}
+    for k, control in enumerate(controls[1:] if rows and rows[0]["changes"] else []):
+        changes = [row["changes"][k] for row in rows]
+        alone = len(controls) == 2
+        columns["change" if alone else f"{control}: change"] = [one["change"] for one in changes]
+        if alone:  # of more controls, metrics.json and the report have the intervals
+            columns["95 % interval"] = [one["interval"] for one in changes]
+        columns["" if alone else f"{control}: verdict"] = [one["verdict"] for one in changes]
     shown = {name: texts for name, texts in columns.items() if any(texts)}
-    right = [k for k, name in enumerate(shown) if name not in {"metric", "unit", ""}]
+    left = {"metric", "unit", "", *(name for name in shown if name.endswith(": verdict"))}
+    right = [k for k, name in enumerate(shown) if name not in left]
     show_table(list(shown), zip(*shown.values(), strict=True), right=right)
+
+
+def chosen_controls(texts: Sequence[str], plan: Scenario) -> tuple[Control, ...]:
+    """Returns the controls of a command, whose files are checked. Raises HexapodError."""
+    controls = parse_controls(texts, where="--control")
+    check_control(plan, controls)
+    return controls

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from hexapod_cosim.cosim.cli.failures import FELL
-from hexapod_cosim.cosim.cli.running import FmuFile, GainsFile, given_gains
+from hexapod_cosim.cosim.cli.running import ControlNames, FmuFile, GainsFile, given_gains
 from hexapod_cosim.cosim.cli.terminal import Json, warn
 from hexapod_cosim.cosim.study.execute.engines import DEFAULT_ENGINE, ENGINES
 from hexapod_cosim.cosim.study.plan.records import StudyError
@@ -60,6 +60,7 @@ def study(
         str,
         typer.Argument(metavar="STUDY", help="A study file, or a name of `hexapod list studies`."),
     ],
+    control: ControlNames = None,
     output: StudyFolder = None,
     workers: Workers = None,
     scheduler: Scheduler = None,
@@ -70,7 +71,8 @@ def study(
 ) -> int:
     """Run a study: a sweep, a Monte Carlo study or an optimisation.
 
-    A study that was stopped resumes when the same command is started again.
+    --control replaces the controls of the file. A study that was stopped resumes when the same
+    command is started again.
     """
     # imported here: it is slow, and no other command needs it
     from hexapod_cosim.cosim.cli.studying import run_and_report  # noqa: PLC0415
@@ -85,10 +87,12 @@ def study(
         events=warn,
         command=_command_line(
             file,
+            control or [],
             {"engine": engine if engine != DEFAULT_ENGINE else None, "fmu": fmu, "gains": gains},
         ),
     )
-    return run_and_report(file, output or Path("out") / Path(file).stem, options, json=json)
+    folder = output or Path("out") / Path(file).stem
+    return run_and_report(file, folder, options, controls=control or [], json=json)
 
 
 def _checked_workers(count: int | None) -> int | None:
@@ -104,7 +108,7 @@ def _checked_workers(count: int | None) -> int | None:
     return count
 
 
-def _command_line(file: str, options: Mapping[str, object]) -> str:
+def _command_line(file: str, controls: Sequence[str], options: Mapping[str, object]) -> str:
     """Returns the command line that repeats the study, with the options that are not None."""
     words = [
         word
@@ -112,4 +116,5 @@ def _command_line(file: str, options: Mapping[str, object]) -> str:
         if value is not None
         for word in (f"--{name}", str(value))
     ]
+    words = [*(word for text in controls for word in ("--control", text)), *words]
     return shlex.join(["hexapod", "study", file, *words])

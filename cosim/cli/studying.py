@@ -6,7 +6,7 @@ The command itself is in study_command.py, because the imports of this module ta
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
@@ -37,13 +37,17 @@ from hexapod_cosim.cosim.study.store.results import Results, read_results, summa
 MAX_REASONS = 10  # of failures that are shown
 
 
-def run_and_report(file: str, folder: Path, options: Options, *, json: bool) -> int:
+def run_and_report(
+    file: str, folder: Path, options: Options, *, controls: Sequence[str] = (), json: bool
+) -> int:
     """Runs a study, or what is missing of it, writes its report and shows the results.
+
+    `controls` replace those of the file.
 
     Returns:
         The exit code of the command.
     """
-    plan = load_study(file)
+    plan = load_study(file, controls=controls)
     try:
         with progress(plain=not json) as start:
             results = run_study(plan, folder, options=options, start=start)

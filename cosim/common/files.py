@@ -6,7 +6,7 @@ import json
 import math
 import shutil
 import tempfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, TextIO
@@ -16,6 +16,7 @@ from hexapod_cosim.models import HexapodError
 
 RUN_FILE = "run.json"  # marks a folder as written by this package
 RUNNING = "running"
+BENCHMARK = "benchmark"  # the kind of a folder that holds the result of a benchmark
 STUDY = "study"  # the kind of a folder that holds a study, which can be resumed
 RESULT_FILES = (
     "results.parquet",
@@ -30,9 +31,11 @@ RESULT_FILES = (
     "ground.terrain",
     "report.html",
     "plots",
-    "kinematic",
-    "compliant",
+    "benchmark.json",
+    "runs.csv",
 )
+RESERVED_NAMES = frozenset((*RESULT_FILES, RUN_FILE))  # no folder of a control has such a name
+PARTS = "controls"  # key of run.json: labels of a comparison, whose runs have folders of their own
 
 
 @contextmanager
@@ -160,18 +163,29 @@ def claim_folder(folder: Path) -> list[Path]:
     return made
 
 
-def clear_folder(folder: Path) -> None:
+def clear_folder(folder: Path, parts: Sequence[str] = ()) -> None:
     """Deletes an earlier run's files from a claimed folder and marks it as a running run's.
 
-    Raises HexapodError when the folder cannot be written.
+    `parts`: names of the folders in it that the new run will write. Raises HexapodError when the
+    folder cannot be written.
     """
     try:
         folder.mkdir(exist_ok=True)
-        for name in RESULT_FILES:
+        for name in (*RESULT_FILES, *_earlier_parts(folder)):
             _remove(folder / name)
-        write_json(folder / RUN_FILE, {"status": RUNNING})
+        write_json(folder / RUN_FILE, {"status": RUNNING} | ({PARTS: list(parts)} if parts else {}))
     except OSError as error:
         raise not_writable(folder, error) from error
+
+
+def _earlier_parts(folder: Path) -> list[str]:
+    """Returns the names of the folders that an earlier comparison wrote in its folder."""
+    try:
+        names = json.loads((folder / RUN_FILE).read_text(encoding="utf-8"))[PARTS]
+    except (OSError, ValueError, KeyError, TypeError):
+        names = []
+    own = [name for name in names if isinstance(name, str) and Path(name).name == name]
+    return [name for name in own if (folder / name / RUN_FILE).is_file()]
 
 
 def _remove(path: Path) -> None:

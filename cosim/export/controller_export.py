@@ -18,9 +18,12 @@ def export_controller(
     *,
     fmi: int = 2,
     platforms: Iterable[str] | None = None,
+    integers: bool = False,
 ) -> Path:
     """Writes a controller's FMU and returns its path.
 
     Arguments and errors are those of `export_fmu`; also raises the errors of `Controller`.
     """
-    return export_interface(load_controller_interface(setup), path, fmi=fmi, platforms=platforms)
+    return export_interface(
+        load_controller_interface(setup), path, fmi=fmi, platforms=platforms, integers=integers
+    )

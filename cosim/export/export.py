@@ -28,6 +28,7 @@ from hexapod_cosim.cosim.export.reference import reference_members
 from hexapod_cosim.cosim.interface.interface import Interface, Variable, load_interface
 from hexapod_cosim.cosim.interface.model_description import render_fmi2
 from hexapod_cosim.cosim.interface.model_description3 import render_build_description, render_fmi3
+from hexapod_cosim.cosim.interface.variants import for_binaries, with_integers
 from hexapod_cosim.models.errors import FmuError
 from hexapod_cosim.models.ground.grid_file import grid_bytes
 from hexapod_cosim.models.ground.surface import Surface
@@ -48,6 +49,7 @@ def export_fmu(
     fmi: int = 2,
     platforms: Iterable[str] | None = None,
     terrains: Sequence[Surface] = (),
+    integers: bool = False,
 ) -> Path:
     """Writes the plant's FMU of a robot and returns its path.
 
@@ -59,6 +61,7 @@ def export_fmu(
             binary. By default the installed binary of this machine.
         terrains: surfaces to pack as grid files, numbered from 1; after the robot's own, if it
             stands on one. If it does not, the FMU starts on the first of them.
+        integers: offer Integers instead of enumerations, for importers without enumerations.
 
     Raises FmuError without a binary or cross compiler and for an unknown version or platform,
     HexapodError when the path cannot be written.
@@ -69,7 +72,12 @@ def export_fmu(
         robot = replace(robot, terrain=replace(robot.terrain, kind="grid", surface=grids[0]))
         check_settings(robot)
     return export_interface(
-        load_interface(robot), path, fmi=fmi, platforms=platforms, grids=grid_members(grids)
+        load_interface(robot),
+        path,
+        fmi=fmi,
+        platforms=platforms,
+        grids=grid_members(grids),
+        integers=integers,
     )
 
 
@@ -88,6 +96,7 @@ def export_interface(
     fmi: int = 2,
     platforms: Iterable[str] | None = None,
     grids: Mapping[str, bytes] = NOTHING,
+    integers: bool = False,
 ) -> Path:
     """Writes the FMU of a component with this interface; arguments and errors as `export_fmu`.
 
@@ -105,7 +114,8 @@ def export_interface(
         binaries = build_binaries(
             component_library(component), choose_platforms(platforms, fmi=fmi), fmi=fmi
         )
-    return write_archive(Path(path), _members(interface, dict(binaries) | dict(grids), fmi))
+    complete = for_binaries(with_integers(interface) if integers else interface, binaries)
+    return write_archive(Path(path), _members(complete, dict(binaries) | dict(grids), fmi))
 
 
 def installed_binary(component: Component = PLANT, *, fmi: int = 2) -> dict[str, bytes]:

@@ -5,7 +5,7 @@ controller.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from types import SimpleNamespace
 
@@ -31,13 +31,19 @@ UPRIGHT = (1.0, 0.0, 0.0, 0.0)
 
 @dataclass(frozen=True, kw_only=True)
 class ControllerSetup:
-    """The arguments of `Controller`. Without gains the control is kinematic."""
+    """The arguments of `Controller`. Without gains the control is kinematic, otherwise `law`."""
 
     robot: Robot
     gait: Gait
     period: float  # s
     gains: Gains | None = None
     parts: Parts = ALL_PARTS
+    law: str = "compliant"
+
+    @property
+    def control(self) -> str:
+        """Name of the control: kinematic without gains, otherwise that of the law."""
+        return "kinematic" if self.gains is None else self.law
 
     @property
     def warnings(self) -> tuple[str, ...]:
@@ -47,7 +53,12 @@ class ControllerSetup:
     def build(self) -> Controller:
         """Builds the Python controller. Raises RobotError or ControllerError for invalid values."""
         return Controller(
-            self.robot, period=self.period, gait=self.gait, gains=self.gains, parts=self.parts
+            self.robot,
+            period=self.period,
+            gait=self.gait,
+            gains=self.gains,
+            parts=self.parts,
+            law=self.law,
         )
 
 
@@ -64,7 +75,7 @@ def load_controller_interface(setup: ControllerSetup) -> Interface:
 def controller_roots(setup: ControllerSetup) -> SimpleNamespace:
     """Returns the objects that start values in the controller's interface.toml refer to."""
     settings = SimpleNamespace(
-        control="kinematic" if setup.gains is None else "compliant",
+        control=setup.control,
         period=setup.period,
         upright=UPRIGHT,
     )
@@ -125,5 +136,11 @@ def passive_gains(robot: Robot) -> SimpleNamespace:
         speed=wanted.speed_share * servo.speed_max, torque=wanted.torque_share * servo.torque_max
     )
     return SimpleNamespace(
-        slip=slip, suspension=suspension, support=support, hold=hold, limits=limits
+        slip=slip,
+        suspension=suspension,
+        support=support,
+        hold=hold,
+        limits=limits,
+        paper_slip=replace(slip, limit=wanted.deflection_limit),
+        paper_suspension=suspension,
     )

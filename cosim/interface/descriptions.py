@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
-import zipfile
+import re
 from pathlib import Path
 from typing import Any
+from zipfile import ZipFile
 
 from fmpy import read_model_description
 
+from hexapod_cosim.cosim.common.archives import open_archive, read_member
 from hexapod_cosim.models.errors import FmuError
 
 FIX = "make one with `hexapod export -o FILE.fmu`"
+DESCRIPTION = "modelDescription.xml"
+IDENTIFIER = r"[A-Za-z_]\w{0,199}"
 
 
 def read_description(path: Path) -> Any:
@@ -39,8 +43,12 @@ def open_description(path: Path) -> Any:
     if not path.is_file():
         raise FmuError("no such FMU", got=str(path), expected="an existing .fmu file", fix=FIX)
     try:
+        with open_archive(path) as archive:
+            _refuse_markup(archive, path)
         description = read_model_description(path, validate=False)
-    except (zipfile.BadZipFile, KeyError) as error:
+    except FmuError:
+        raise
+    except KeyError as error:
         raise FmuError(
             "not an FMU",
             got=error.args[0],
@@ -55,4 +63,42 @@ def open_description(path: Path) -> Any:
             fix=FIX,
             where=str(path),
         ) from error
+    _refuse_identifiers(description, path)
     return description
+
+
+def _refuse_markup(archive: ZipFile, path: Path) -> None:
+    """Raises FmuError for a model description with a document type, which may define entities."""
+    archive.getinfo(DESCRIPTION)  # raises KeyError
+    found = forbidden_markup(read_member(archive, DESCRIPTION))
+    if found:
+        expected = "XML in UTF-8 without a document type, which might define entities"
+        raise FmuError(
+            "modelDescription.xml is not read",
+            got=found,
+            expected=expected,
+            fix=FIX,
+            where=str(path),
+        )
+
+
+def forbidden_markup(data: bytes) -> str | None:
+    """Returns what a document holds that is not read: a document type or another encoding."""
+    if b"\0" in data or data.startswith((b"\xff\xfe", b"\xfe\xff")):
+        return "another encoding than UTF-8"
+    return "<!DOCTYPE" if b"<!DOCTYPE" in data or b"<!ENTITY" in data else None
+
+
+def _refuse_identifiers(description: Any, path: Path) -> None:
+    """Raises FmuError for a modelIdentifier that is no name of a file in the archive."""
+    for kind in (description.coSimulation, description.modelExchange):
+        name = "hexapod" if kind is None else kind.modelIdentifier
+        if not re.fullmatch(IDENTIFIER, str(name), re.ASCII):
+            expected = "a C identifier of at most 200 characters, such as hexapod"
+            raise FmuError(
+                "modelIdentifier is no file's name",
+                got=name,
+                expected=expected,
+                fix=FIX,
+                where=str(path),
+            )

@@ -24,7 +24,7 @@ from hexapod_cosim.models.records import Robot
 from hexapod_cosim.models.statics import settled
 
 Causality = Literal["input", "output", "parameter", "local"]
-Type = Literal["Real", "Boolean", "Enumeration"]
+Type = Literal["Real", "Boolean", "Enumeration", "Integer"]
 
 CAUSALITIES: tuple[Causality, ...] = ("input", "output", "parameter", "local")
 DEFAULT_VARIABILITY = {
@@ -145,6 +145,7 @@ class Interface:
     first_reference: Mapping[str, int]
     stop_time: float  # s
     step: float  # s
+    directional_derivatives: bool = True  # of components with states: the binary has them
 
     @cached_property
     def by_name(self) -> Mapping[str, Variable]:

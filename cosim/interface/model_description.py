@@ -78,16 +78,17 @@ def _document(interface: Interface) -> Element:
 
 def _add_interfaces(root: Element, interface: Interface) -> None:
     """Adds CoSimulation and, for components with continuous states, ModelExchange."""
-    differentiable = {"providesDirectionalDerivative": _flag(bool(interface.states))}
+    differentiable = bool(interface.states) and interface.directional_derivatives
+    derivatives = {"providesDirectionalDerivative": _flag(differentiable)}
     order = {"maxOutputDerivativeOrder": str(int(bool(interface.states)))}
     identifier = {"modelIdentifier": interface.component.identifier}
     if interface.states:
         _add_sources(
-            SubElement(root, "ModelExchange", identifier | MODEL_EXCHANGE | differentiable),
+            SubElement(root, "ModelExchange", identifier | MODEL_EXCHANGE | derivatives),
             interface.component,
         )
     _add_sources(
-        SubElement(root, "CoSimulation", identifier | CO_SIMULATION | order | differentiable),
+        SubElement(root, "CoSimulation", identifier | CO_SIMULATION | order | derivatives),
         interface.component,
     )
 

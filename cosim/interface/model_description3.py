@@ -39,7 +39,12 @@ CO_SIMULATION = {
     "providesEvaluateDiscreteStates": "false",
 }
 EVENTS = ("hasEventMode", "mightReturnEarlyFromDoStep")  # of components with events
-TYPES = {"Real": "Float64", "Enumeration": "Enumeration", "Boolean": "Boolean"}
+TYPES = {
+    "Real": "Float64",
+    "Enumeration": "Enumeration",
+    "Integer": "Int64",
+    "Boolean": "Boolean",
+}
 TIME = "time"
 
 
@@ -104,8 +109,9 @@ def _document(root: Element) -> str:
 def _add_interfaces(root: Element, interface: Interface) -> None:
     """Adds CoSimulation and, for components with continuous states, ModelExchange."""
     has_states = bool(interface.states)
+    differentiable = has_states and interface.directional_derivatives
     both = {"modelIdentifier": interface.component.identifier} | CAPABILITIES
-    both |= {"providesDirectionalDerivatives": "true" if has_states else "false"}
+    both |= {"providesDirectionalDerivatives": "true" if differentiable else "false"}
     if has_states:
         SubElement(root, "ModelExchange", both | MODEL_EXCHANGE)
     events = dict.fromkeys(EVENTS, "true" if has_states else "false")

@@ -17,12 +17,14 @@ from types import TracebackType
 from typing import Any, Self
 
 import numpy as np
-from fmpy import extract
 from fmpy.fmi2 import FMU2Slave
 from numpy.typing import NDArray
 
+from hexapod_cosim.cosim.common.archives import unpack
+from hexapod_cosim.cosim.common.binaries import refuse_incomplete
 from hexapod_cosim.cosim.common.plant_files import packed_binary
 from hexapod_cosim.cosim.interface.descriptions import read_description
+from hexapod_cosim.cosim.interface.variants import listed_items
 from hexapod_cosim.cosim.master.fmu_log import STATUS, WARNING, FmuLog
 from hexapod_cosim.models.errors import FmuError, nearest_name, unknown_name
 
@@ -128,9 +130,11 @@ class Fmu:
 
     def _instantiate(self, name: str) -> None:
         """Unpacks the FMU, loads its binary and creates the instance, which logs to our FmuLog."""
-        extract(self.path, self._directory.name)
+        unpack(self.path, Path(self._directory.name))
         identifier = self.description.coSimulation.modelIdentifier
         library = packed_binary(self._directory.name, identifier)
+        if library is not None:
+            refuse_incomplete(library)
         facts = {
             "guid": self.description.guid,
             "modelIdentifier": identifier,
@@ -150,6 +154,8 @@ class Fmu:
         self._do_step = self.bind("fmi2DoStep", self._begin, self._length, no_state_prior)
 
     def _load_error(self, error: Exception) -> FmuError:
+        if isinstance(error, FmuError):
+            return error
         message = self._log[-1] if self._log else str(error)
         fix = "export it again on this machine with `hexapod export`"
         return FmuError("the FMU cannot be loaded", got=message, fix=fix, where=str(self.path))
@@ -323,6 +329,11 @@ class Fmu:
             if value not in items:
                 raise unknown_name(f"choice for {name}", value, items, error=FmuError)
             return int(items[value])
+        if variable.type == "Integer" and isinstance(value, str):
+            items = listed_items(variable.description)
+            if value not in items:
+                raise unknown_name(f"choice for {name}", value, items, error=FmuError)
+            return items[value]
         if not isinstance(value, int | float):
             raise FmuError(
                 f"parameter {name} is refused",
@@ -342,20 +353,30 @@ class Fmu:
 
         Raises FmuError.
         """
-        calls = (
-            lambda: self._slave.setupExperiment(startTime=start, stopTime=stop),
-            self._slave.enterInitializationMode,
-            self._slave.exitInitializationMode,
+        self._begin_initialisation(start, stop)
+        self._end_initialisation()
+
+    def _begin_initialisation(self, start: float, stop: float) -> None:
+        """Enters initialisation mode. Raises FmuError."""
+        self._call_to_initialise(
+            lambda: self._slave.setupExperiment(startTime=start, stopTime=stop)
         )
-        for call in calls:
-            self.clear_log()
-            try:
-                call()
-            except Exception as error:
-                message = self._log[-1] if self._log else str(error)
-                raise FmuError(
-                    "the FMU cannot be initialised", got=message, where=str(self.path)
-                ) from error
+        self._call_to_initialise(self._slave.enterInitializationMode)
+
+    def _end_initialisation(self) -> None:
+        """Leaves initialisation mode. Raises FmuError."""
+        self._call_to_initialise(self._slave.exitInitializationMode)
+
+    def _call_to_initialise(self, call: Callable[[], Any]) -> None:
+        """Calls a function of fmpy. Raises FmuError with the FMU's last message."""
+        self.clear_log()
+        try:
+            call()
+        except Exception as error:
+            message = self._log[-1] if self._log else str(error)
+            raise FmuError(
+                "the FMU cannot be initialised", got=message, where=str(self.path)
+            ) from error
 
     def reset(self) -> None:
         """Resets the instance to its start values, not initialised. Raises FmuError."""

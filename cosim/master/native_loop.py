@@ -17,30 +17,31 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hexapod_cosim.cosim.common.plant_files import BUILD, LOOP, shared_library
-from hexapod_cosim.cosim.interface.names import vector_names
 from hexapod_cosim.cosim.master.fmu import Fmu
-from hexapod_cosim.cosim.master.fmu_controller import COMMANDS, FLAGS, SENSED
+from hexapod_cosim.cosim.master.fmu_controller import COMMANDS
 from hexapod_cosim.cosim.master.force_sensor import SensorSettings, noise_factors
 from hexapod_cosim.cosim.master.interrupts import interruptible
 from hexapod_cosim.cosim.master.loop import COMPLETED, FAILED, INTERRUPTED, Outcome, Progress
 from hexapod_cosim.cosim.master.recorder import COMMAND_COLUMNS, Peaks, Recording, kept_moments
 from hexapod_cosim.cosim.master.signals import (
     ACCELERATION,
-    COMMANDED,
     MEASURED,
     PUSH,
     check_plant_variables,
+)
+from hexapod_cosim.cosim.master.wiring import (
+    JOINT_COMMANDS,
+    Names,
+    Wiring,
+    ours,
+    own_wiring,
+    theirs,
 )
 from hexapod_cosim.cosim.scenario.schedule import Schedule
 from hexapod_cosim.models import LEG_NAMES, FmuError
 
 STEPS_PER_CALL = 500  # macro-steps between two checks for interrupts, about 10 ms
 FORCE = MEASURED["foot_force"]
-JOINT_COMMANDS = [name for names in COMMANDED.values() for name in names]
-SHIFT = [name for leg in LEG_NAMES for name in vector_names(f"{leg}.shift", 2)]
-PLANNED = [name for leg in LEG_NAMES for name in vector_names(f"{leg}.planned")]
-DIAGNOSTICS = [*SHIFT, *(f"{leg}.lift" for leg in LEG_NAMES), *PLANNED]
-CONTROLLER_FLAGS = [f"{leg}.{flag}" for flag in FLAGS for leg in LEG_NAMES]
 
 _Size = ct.c_size_t
 _Pointer = ct.c_void_p
@@ -154,8 +155,10 @@ class NativeMaster:
     """A plant FMU connected to a controller FMU, for any number of successive runs.
 
     `columns`: the signals to record; None for all. `judged`: the signals to keep for every
-    macro-step where `columns` are kept for fewer. Raises FmuError when an FMU lacks variables that
-    every FMU of `hexapod export` has.
+    macro-step where `columns` are kept for fewer. `wiring`: the connected variables of a controller
+    FMU with other names or fewer variables than ours; the controller's columns are recorded as far
+    as it has them. Raises FmuError when an FMU lacks variables that every FMU of `hexapod export`
+    has.
     """
 
     def __init__(
@@ -165,29 +168,42 @@ class NativeMaster:
         *,
         columns: Sequence[str] | None = None,
         judged: Sequence[str] = (),
+        wiring: Wiring | None = None,
     ) -> None:
         self._library, self._fmus = _library(), {"plant": plant, "controller": controller}
         outputs, flags = plant.names("output"), plant.names("output", "Boolean")
         check_plant_variables(outputs, plant.names("input"), flags)
-        shown = {"diagnostics": DIAGNOSTICS, "flags": CONTROLLER_FLAGS}  # of the controller
+        self._wiring = wired = own_wiring(plant, controller) if wiring is None else wiring
+        shown = {"diagnostics": wired.diagnostics, "flags": wired.flags}  # of the controller
         if columns is not None:  # read only what is recorded or needed by the controller
-            wanted = {*columns, *(name for key in SENSED for name in MEASURED[key])}
+            wanted = {*columns, *ours(wired.measured), *FORCE}
             outputs = [name for name in outputs if name in wanted]
             flags = [name for name in flags if name in wanted]
             shown = {
-                key: [name for name in names if f"controller.{name}" in wanted]
-                for key, names in shown.items()
+                key: tuple(pair for pair in pairs if f"controller.{pair[0]}" in wanted)
+                for key, pairs in shown.items()
             }
-        shown_names = (f"controller.{name}" for names in shown.values() for name in names)
-        both = set(plant.names("input")) & set(controller.names("output"))
-        self._commands = [*JOINT_COMMANDS, *(ACCELERATION if set(ACCELERATION) <= both else [])]
+        shown_names = [f"controller.{name}" for pairs in shown.values() for name in ours(pairs)]
+        self._commands = ours(wired.outputs)
+        inputs = [name for name in (*JOINT_COMMANDS, *ACCELERATION) if name in plant.variables]
+        kept = [name for name in inputs if name not in self._commands]  # these stay 0
         self._places = {
             name: place
-            for place, name in enumerate((*outputs, *flags, *PUSH, *self._commands, *shown_names))
+            for place, name in enumerate(
+                (*outputs, *flags, *PUSH, *self._commands, *shown_names, *kept)
+            )
         }
         self._reading = len(self._places)  # the sensors' readings come last and are not recorded
         self._value = np.zeros(self._reading + len(FORCE))
-        self.columns = tuple(self._places if columns is None else columns)
+        self.columns = tuple(
+            self._places
+            if columns is None
+            else [
+                name
+                for name in columns
+                if name in self._places or not name.startswith("controller.")
+            ]
+        )
         self._judged = tuple(name for name in self.columns if name in set(judged))
         self._arrays: list[NDArray[Any]] = []  # keeps alive what the structure points to
         self._master = self._make_master(outputs, flags, **shown)
@@ -197,30 +213,32 @@ class NativeMaster:
         outputs: list[str],
         plant_flags: list[str],
         *,
-        diagnostics: list[str],
-        flags: list[str],
+        diagnostics: Names,
+        flags: Names,
     ) -> _Master:
         """Fills the part of the structure that is the same in all runs."""
         plant, controller = self._fmus["plant"], self._fmus["controller"]
-        sensed = [name for key in SENSED for name in MEASURED[key]]
+        commands, sensed = self._wiring.commands, self._wiring.measured
+        given = [*theirs(self._wiring.outputs), *theirs(diagnostics)]
+        place = self._places[self._commands[0]]
         peaks = Peaks(tuple(self._places))
         peak_memory = {
             name: self._keep(np.zeros(len(peaks.places))) for name in ("largest", "seen", "kept")
         }
-        flag_count = max(len(plant_flags), len(CONTROLLER_FLAGS))
+        flag_count = max(len(plant_flags), len(flags))
         return _Master(
             plant=_functions(plant),
             controller=_functions(controller),
             plant_output=self._block(plant, outputs),
             plant_flag=self._block(plant, plant_flags),
             plant_input=self._block(plant, [*PUSH, *self._commands]),
-            controller_output=self._block(controller, [*self._commands, *diagnostics]),
-            controller_flag=self._block(controller, flags, self._reading - len(flags)),
+            controller_output=self._block(controller, given, place),
+            controller_flag=self._block(controller, theirs(flags), place + len(given)),
             flag=self._keep(np.zeros(flag_count, dtype=np.int32)),
             value=self._value.ctypes.data,
-            controller_input=self._references(controller, [*COMMANDS, *sensed]),
-            controller_value=self._keep(np.zeros(len(COMMANDS) + len(sensed))),
-            command_count=len(COMMANDS),
+            controller_input=self._references(controller, theirs((*commands, *sensed))),
+            controller_value=self._keep(np.zeros(len(commands) + len(sensed))),
+            command_count=len(commands),
             sensed_count=len(sensed),
             push_count=len(PUSH),
             push_place=self._places[PUSH[0]],
@@ -295,9 +313,10 @@ class NativeMaster:
     ) -> list[NDArray[Any]]:
         """Points the structure to the arrays of this run and returns them to be kept alive."""
         master, count = self._master, len(schedule.rows)
+        chosen = [COMMANDS.index(name) for name in ours(self._wiring.commands)]
         arrays: dict[str, NDArray[Any] | None] = {
             "time": schedule.times,
-            "command": schedule.rows,
+            "command": schedule.rows[:, chosen],
             "push": schedule.pushes,
         }
         reals = {
@@ -323,9 +342,8 @@ class NativeMaster:
         )
         force = self._reading if parts else sensed
         places = [
-            force + k if name in FORCE else self._places[name]
-            for key in SENSED
-            for k, name in enumerate(MEASURED[key])
+            force + FORCE.index(name) if name in FORCE else self._places[name]
+            for name in ours(self._wiring.measured)
         ]
         where = np.array(places, dtype=np.uintp)
         master.sensed = where.ctypes.data

@@ -8,8 +8,10 @@ from dataclasses import dataclass
 from typing import Any
 
 from hexapod_cosim.cosim.results.comparison import BETTER, WORSE, Change, Comparison
+from hexapod_cosim.cosim.results.comparisons import Comparisons
 from hexapod_cosim.cosim.results.metrics import METRICS, PER_RADIAN
 from hexapod_cosim.cosim.results.walk import TANH
+from hexapod_cosim.cosim.scenario.records import CONTROLS
 
 # metric -> its name on a card and its name in the sentence, where "less" or "more" precedes it.
 # Metrics that depend on no assumed slope of friction come first, slip last.
@@ -89,6 +91,14 @@ def headline(comparison: Comparison) -> list[Part]:
     if gains and losses:
         parts += [Part(", and costs "), *_listed(losses)]
     return [*parts, Part(".")]
+
+
+def headlines(comparison: Comparisons) -> list[Part]:
+    """Returns the headlines of all controls against the first one, one after the other."""
+    parts: list[Part] = []
+    for pair in comparison.pairs:
+        parts += [Part(" ")] * bool(parts) + headline(pair)
+    return parts
 
 
 def _shown(comparison: Comparison) -> dict[str, tuple[str, str]]:
@@ -212,7 +222,9 @@ def _share(value: float) -> str:
 def plain_headline(metrics: Mapping[str, float | None], facts: Mapping[str, Any]) -> list[Part]:
     """Returns the headline of one run: duration, speed, error of the feet, cost of transport."""
     speed = (facts.get("walk") or {}).get("mean_speed")
-    begin = f"{facts['control'].capitalize()} control, {facts['simulated']:.4g} s"
+    label = facts["control"]
+    name = f"{label.capitalize()} control" if label in CONTROLS else f"Control {label}"
+    begin = f"{name}, {facts['simulated']:.4g} s"
     error, cost = metrics.get("foot_error_stance"), metrics.get("cost_of_transport")
     parts = [f"{1e3 * speed:.3g} mm/s"] if speed is not None and math.isfinite(speed) else []
     if error is not None and math.isfinite(error):

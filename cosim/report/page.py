@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -9,6 +10,7 @@ from typing import Any
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
+from hexapod_cosim.cosim.common.control_style import all_styles
 from hexapod_cosim.cosim.common.plant_files import plant_folders
 
 VIEWER = Path("viewer") / "viewer.js"  # in the plant's folder, where CMake installs it
@@ -31,13 +33,10 @@ def environment() -> Environment:
     )
 
 
-def render(template: str, **content: Any) -> str:
-    """Renders a page with the colours of the figures."""
-    # imported only here because matplotlib is slow to import
-    from hexapod_cosim.cosim.report.plots import STYLES  # noqa: PLC0415
-
-    colours = {label: style["color"] for label, style in STYLES.items()}
-    return environment().get_template(template).render(colours=colours, **content)
+def render(template: str, *, controls: Iterable[str] = (), **content: Any) -> str:
+    """Renders a page with the colours of the figures; `controls` are the labels on it."""
+    styles = all_styles(controls)
+    return environment().get_template(template).render(styles=styles, **content)
 
 
 def viewer_script() -> Markup | None:

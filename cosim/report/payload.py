@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from hexapod_cosim.cosim.common.control_style import control_styles
 from hexapod_cosim.cosim.master.recorder import ColumnError
 from hexapod_cosim.cosim.report.columns import MOST_ROWS, Chosen, choose
 from hexapod_cosim.cosim.report.geometry import describe_ground, describe_robot
@@ -17,12 +18,14 @@ from hexapod_cosim.cosim.report.profile import (
     find_stances,
     make_profile,
     pack_profile,
-    pack_stances,
 )
-from hexapod_cosim.cosim.report.surface import pack_surface, stride
+from hexapod_cosim.cosim.report.surface import pack_footprints, pack_surface, stride
+from hexapod_cosim.cosim.results.footprints import find_footprints
 from hexapod_cosim.cosim.results.results import StoredResult
 from hexapod_cosim.cosim.results.walk import CONTACT_SHARE
 from hexapod_cosim.models.ground.surface import Surface
+
+DASH = 1.5  # pixels per point of a dash
 
 
 def make_payload(
@@ -40,10 +43,15 @@ def make_payload(
         dict.fromkeys(run.view.surface for run in runs.values() if run.view.surface is not None)
     )
     parameters = next(iter(runs.values())).view.parameters if runs else {}
+    styles = control_styles(runs)
     content = {
         "contact": CONTACT_SHARE,
         "surfaces": [pack_surface(surface, parameters) for surface in surfaces],
-        "runs": [_describe(label, run, chosen[label], surfaces) for label, run in runs.items()],
+        "runs": [
+            {"key": styles[label].key, "dash": [DASH * part for part in styles[label].dash]}
+            | _describe(label, run, chosen[label], surfaces)
+            for label, run in runs.items()
+        ],
     }
     thinned += [_coarse(surface) for surface in surfaces if stride(surface) > 1]
     return content, thinned
@@ -65,10 +73,11 @@ def _describe(
         ground["surface"] = surfaces.index(run.view.surface)
         with suppress(ColumnError):  # a recording without positions shows the surface alone
             stances = find_stances(view, run.view.surface)
-            ground["stances"] = pack_stances(stances)
             profile = make_profile(view, run.view.surface, stances)
             columns["way"] = np.interp(chosen.time, view.recording.time, profile.torso_way)
             ground["profile"] = pack_profile(profile, stances)
+    with suppress(ColumnError):
+        ground["footprints"] = pack_footprints(find_footprints(view.recording, view.parameters))
     return about | {"robot": describe_robot(run), "ground": ground} | pack(chosen.time, columns)
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -14,10 +14,11 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
 from hexapod_cosim.controller.figure_style import DPI, PALETTE, SETTINGS, UNDATED, WIDTH
+from hexapod_cosim.cosim.common.control_style import control_styles
 from hexapod_cosim.cosim.common.files import atomic_path
 from hexapod_cosim.cosim.master.recorder import ColumnError
 from hexapod_cosim.cosim.report.profile import find_stances, make_profile
-from hexapod_cosim.cosim.results.metrics import planned_feet
+from hexapod_cosim.cosim.results.metrics import planned_feet, plans_feet
 from hexapod_cosim.cosim.results.walk import (
     Array,
     View,
@@ -30,10 +31,6 @@ from hexapod_cosim.cosim.results.walk import (
 )
 from hexapod_cosim.models import JOINT_NAMES, LEG_NAMES
 
-STYLES: dict[str, dict[str, Any]] = {
-    "kinematic": {"color": "#D55E00", "linestyle": (0, (4, 1.5)), "linewidth": 1.0},
-    "compliant": {"color": "#0072B2", "linestyle": "-", "linewidth": 1.0},
-}
 PLAN = "0.7"  # grey of planned paths
 BAND, GROUND = "0.88", "0.35"  # greys of the height profile
 PLANNED = "0.85"  # grey of planned swings
@@ -51,15 +48,28 @@ ENERGIES = {  # line styles
 Views = Mapping[str, View]  # by control
 
 
+def line_styles(labels: Iterable[str]) -> dict[str, dict[str, Any]]:
+    """Returns matplotlib's settings for the line of each control."""
+    return {
+        label: {
+            "color": style.light,
+            "linestyle": (0, style.dash) if style.dash else "-",
+            "linewidth": 1.0,
+        }
+        for label, style in control_styles(labels).items()
+    }
+
+
 def foot_forces(views: Views) -> Figure:
     """Draws the normal force of each foot over the last cycles, in body weights."""
+    styles = line_styles(views)
     figure = Figure(figsize=(WIDTH, 3.8))
     axes = figure.subplots(2, 3, sharex=True, sharey=True)
     for label, view in views.items():
         end = view.last_cycles()
         force = end.recording.feet("normal_force") / robot_weight(view.parameters)
         for leg, axis in enumerate(axes.flat):
-            axis.plot(end.recording.time, force[:, leg], label=label, **STYLES[label])
+            axis.plot(end.recording.time, force[:, leg], label=label, **styles[label])
             axis.set_title(leg_title(leg))
     _label(axes[-1], "time [s]", axes[:, 0], "normal force [BW]")
     _legend(figure, axes.flat[0])
@@ -68,6 +78,7 @@ def foot_forces(views: Views) -> Figure:
 
 def slip(views: Views) -> Figure:
     """Draws the total slip of all feet, and the slip speed of each foot over the last cycles."""
+    styles = line_styles(views)
     figure = Figure(figsize=(WIDTH, 5.0))
     grid = figure.add_gridspec(3, 3)
     top = figure.add_subplot(grid[0, :])
@@ -75,10 +86,10 @@ def slip(views: Views) -> Figure:
     for label, view in views.items():
         time, speed = view.recording.time, slip_under_load(view.recording, view.parameters)
         total = 1e3 * running_integral(time, speed.sum(axis=1))
-        top.plot(time, total, label=label, **STYLES[label])
+        top.plot(time, total, label=label, **styles[label])
         last = slice(-len(view.last_cycles().recording.time), None)
         for leg, axis in enumerate(axes):
-            axis.plot(time[last], 1e3 * speed[last, leg], **STYLES[label])
+            axis.plot(time[last], 1e3 * speed[last, leg], **styles[label])
             axis.set_title(leg_title(leg))
     top.set_xlabel("time [s]")
     top.set_ylabel("slipped way [mm]")
@@ -89,16 +100,20 @@ def slip(views: Views) -> Figure:
 
 def feet(views: Views) -> Figure:
     """Draws each foot's planned and actual path over the last cycles from the side, torso frame."""
+    styles = line_styles(views)
     figure = Figure(figsize=(WIDTH, 3.8))
     axes = figure.subplots(2, 3, sharey=True)
-    for number, (label, view) in enumerate(views.items()):
+    planning = {label: view for label, view in views.items() if plans_feet(view.recording)}
+    if not planning:
+        raise ColumnError("not recorded", got="a plan of the feet")
+    for number, (label, view) in enumerate(planning.items()):
         end = view.last_cycles()
         planned, real = planned_feet(end.recording), real_feet(end.recording, view.parameters)
         for leg, axis in enumerate(axes.flat):
             x, z = 1e3 * planned[:, leg, [0, 2]].T
             axis.plot(x, z, color=PLAN, linewidth=2.2, label=None if number else "planned")
             x, z = 1e3 * real[:, leg, [0, 2]].T
-            axis.plot(x, z, label=label, **STYLES[label])
+            axis.plot(x, z, label=label, **styles[label])
             axis.set_title(leg_title(leg))
     _label(axes[-1], "x, torso frame [mm]", axes[:, 0], "z [mm]")
     _legend(figure, axes.flat[0])
@@ -107,15 +122,16 @@ def feet(views: Views) -> Figure:
 
 def posture(views: Views) -> Figure:
     """Draws height, roll, pitch and yaw of the torso."""
+    styles = line_styles(views)
     figure = Figure(figsize=(WIDTH, 5.2))
     axes = figure.subplots(4, 1, sharex=True)
     for label, view in views.items():
         recording = view.recording
         time, height = recording.time, 1e3 * body_height(recording, view.parameters)
-        axes[0].plot(time, height, label=label, **STYLES[label])
+        axes[0].plot(time, height, label=label, **styles[label])
         for axis, name in zip(axes[1:], ("roll", "pitch", "yaw"), strict=True):
             angle = np.degrees(np.unwrap(recording.column(f"torso.{name}")))
-            axis.plot(time, angle, **STYLES[label])
+            axis.plot(time, angle, **styles[label])
     labels = ("height [mm]", "roll [deg]", "pitch [deg]", "yaw [deg]")
     for axis, text in zip(axes, labels, strict=True):
         axis.set_ylabel(text)
@@ -127,13 +143,14 @@ def posture(views: Views) -> Figure:
 
 def path(views: Views) -> Figure:
     """Draws the actual and the commanded path of the torso from above."""
+    styles = line_styles(views)
     figure = Figure(figsize=(WIDTH, 3.0))
     axis = figure.subplots()
     for label, view in views.items():
         x, y, _ = view.recording.vector("torso.position").T
-        axis.plot(x, 1e3 * y, label=label, **STYLES[label])
+        axis.plot(x, 1e3 * y, label=label, **styles[label])
         dot: dict[str, Any] = {"marker": "o", "markersize": 4, "clip_on": False}
-        axis.plot(x[-1], 1e3 * y[-1], color=STYLES[label]["color"], **dot)
+        axis.plot(x[-1], 1e3 * y[-1], color=styles[label]["color"], **dot)
     x, y = commanded_path(next(iter(views.values())).recording).T
     axis.plot(x, 1e3 * y, color="0.45", linestyle=":", label="commanded, without its ramps")
     axis.margins(x=0.02)
@@ -153,19 +170,20 @@ def profile(views: Views) -> Figure:
 
     Raises ColumnError where no run was on a surface.
     """
+    styles = line_styles(views)
     shown = {label: view for label, view in views.items() if view.surface is not None}
     if not shown:
         raise ColumnError("not recorded", got="a surface")
     figure = Figure(figsize=(WIDTH, 0.4 + 1.8 * len(shown)))
     axes = np.atleast_1d(figure.subplots(len(shown), 1, sharex=True, sharey=True))
     for axis, (label, view) in zip(axes, shown.items(), strict=True):
-        _draw_profile(axis, label, view)
+        _draw_profile(axis, label, view, styles[label]["color"])
     axes[-1].set_xlabel("way along the path [m]")
     _legend(figure, axes[0])
     return figure
 
 
-def _draw_profile(axis: Axes, label: str, view: View) -> None:
+def _draw_profile(axis: Axes, label: str, view: View, colour: str) -> None:
     """Draws one run's ground: a line below the torso, a band across the robot's width."""
     if view.surface is None:
         return
@@ -176,9 +194,7 @@ def _draw_profile(axis: Axes, label: str, view: View) -> None:
     axis.plot(found.way, 1e3 * found.ground, color=GROUND, linewidth=1.1, label="below the torso")
     height = [1e3 * stance.z for stance in stances]
     dots: dict[str, Any] = {"marker": "o", "markersize": 2.6, "linestyle": "none"}
-    axis.plot(
-        found.stance_way, height, color=STYLES[label]["color"], label="feet touch down", **dots
-    )
+    axis.plot(found.stance_way, height, color=colour, label="feet touch down", **dots)
     axis.set_title(label)
     axis.set_ylabel("height [mm]")
     axis.margins(x=0.0)
@@ -203,13 +219,14 @@ def _per_pixel(limits: tuple[float, float], pixels: float) -> float:
 
 def torques(views: Views) -> Figure:
     """Draws the largest absolute torque of the six legs over the last cycles, by joint."""
+    styles = line_styles(views)
     figure = Figure(figsize=(WIDTH, 4.2))
     axes = figure.subplots(3, 1, sharex=True)
     for label, view in views.items():
         end = view.last_cycles().recording
         largest = np.abs(end.joints("torque")).max(axis=1)
         for joint, axis in enumerate(axes):
-            axis.plot(end.time, largest[:, joint], label=label, **STYLES[label])
+            axis.plot(end.time, largest[:, joint], label=label, **styles[label])
             axis.set_ylabel(f"{JOINT_NAMES[joint]} [N m]")
     for axis in axes:
         axis.set_ylim(bottom=0.0)  # last, since it stops automatic scaling
@@ -254,6 +271,7 @@ def energy(views: Views) -> Figure:
 
 def footfall(views: Views) -> Figure:
     """Draws when each foot is on the ground over the last cycles; grey bands are planned swings."""
+    styles = line_styles(views)
     figure = Figure(figsize=(WIDTH, 0.5 + 1.6 * len(views)))
     axes = np.atleast_1d(figure.subplots(len(views), 1, sharex=True))
     for axis, (label, view) in zip(axes, views.items(), strict=True):
@@ -262,14 +280,14 @@ def footfall(views: Views) -> Figure:
             swinging = f"controller.{name}.swinging"
             if swinging in end.names:
                 _bars(axis, end.time, end.column(swinging) > 0.5, leg, height=0.9, color=PLANNED)
-            contact, color = end.feet("contact")[:, leg] > 0.5, STYLES[label]["color"]
+            contact, color = end.feet("contact")[:, leg] > 0.5, styles[label]["color"]
             _bars(axis, end.time, contact, leg, height=0.5, color=color)
         axis.set_yticks(range(len(LEG_NAMES)), LEG_NAMES)
         axis.invert_yaxis()
         axis.set_title(label)
         axis.grid(visible=False)
     axes[-1].set_xlabel("time [s]")
-    keys = {f"on the ground, {label}": STYLES[label]["color"] for label in views} | {
+    keys = {f"on the ground, {label}": styles[label]["color"] for label in views} | {
         "swing the gait plans": PLANNED
     }
     patches = [Patch(color=color, linewidth=0) for color in keys.values()]

@@ -157,11 +157,3 @@ def pack_profile(profile: Profile, stances: list[Stance]) -> dict[str, Any]:
             for way, stance in feet
         ],
     }
-
-
-def pack_stances(stances: list[Stance]) -> list[list[float]]:
-    """Returns leg, begin [s], x, y [m] and depth [m] of stances for the viewer."""
-    return [
-        [one.leg, round(one.begin, 6), round(one.x, 5), round(one.y, 5), round(one.depth, 6)]
-        for one in stances
-    ]

@@ -120,7 +120,7 @@ def write_heights(surface: Surface, path: Path) -> dict[str, float]:
         "y": 0.5 * (low + high),
     }
     if surface.kind == "blocks":
-        keys["slope_threshold"] = scale / surface.cell
+        keys["slope_threshold"] = float(f"{scale / surface.cell:.3g}")
     return keys
 
 

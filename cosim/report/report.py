@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 import tomlkit
 from markupsafe import Markup
 
+from hexapod_cosim.cosim.common.control_style import control_styles
 from hexapod_cosim.cosim.common.files import without_none, write_text
 from hexapod_cosim.cosim.report.accuracy import (
     Metrics,
@@ -19,16 +20,24 @@ from hexapod_cosim.cosim.report.accuracy import (
     effect_rows,
     with_errors,
 )
-from hexapod_cosim.cosim.report.headline import cards, creep_note, headline, plain_headline
+from hexapod_cosim.cosim.report.headline import cards, creep_note, headlines, plain_headline
 from hexapod_cosim.cosim.report.page import NO_VIEWER, render, viewer_script
 from hexapod_cosim.cosim.report.payload import as_json, make_payload
 from hexapod_cosim.cosim.report.servos import servo_rows
 from hexapod_cosim.cosim.report.surface import material_legend
 from hexapod_cosim.cosim.results.accuracy import Accuracy
 from hexapod_cosim.cosim.results.comparison import BETTER, METHOD, SAME, WORSE, Change, Comparison
+from hexapod_cosim.cosim.results.comparisons import Comparisons
 from hexapod_cosim.cosim.results.drop import drop_text
 from hexapod_cosim.cosim.results.ground import describe_terrain
-from hexapod_cosim.cosim.results.metrics import DUST, FLOORS, METRICS, has_net_slip, shown_metrics
+from hexapod_cosim.cosim.results.metrics import (
+    DUST,
+    FLOORS,
+    METRICS,
+    has_net_slip,
+    plans_feet,
+    shown_metrics,
+)
 from hexapod_cosim.cosim.results.results import StoredResult
 from hexapod_cosim.models import JOINT_NAMES
 
@@ -99,7 +108,7 @@ def write_report(
     folder: Path,
     *,
     warn: Callable[[str], None],
-    comparison: Comparison | None = None,
+    comparison: Comparison | Comparisons | None = None,
     scenario: str | None = None,
     command: str | None = None,
     accuracies: Mapping[str, Accuracy] = MappingProxyType({}),
@@ -120,6 +129,8 @@ def write_report(
     files, skipped = save_figures({label: run.view for label, run in runs.items()}, folder / PLOTS)
     if all(run.view.surface is None for run in runs.values()):
         skipped[PROFILE] = ""  # a plane has none, which is no loss
+    if not any(plans_feet(run.view.recording) for run in runs.values()):
+        skipped["feet"] = ""  # a controller need not tell its plan
     missing = [
         f"{FIGURES[name].title} is not drawn: {reason}"
         for name, reason in skipped.items()
@@ -128,15 +139,18 @@ def write_report(
     for text in missing:
         warn(text)
     first = next(iter(runs.values()))
-    content = _one_run(first) if comparison is None else _comparison(comparison, first.facts)
+    whole = as_comparisons(comparison)
+    content = _one_run(first) if whole is None else _comparison(whole, first.facts)
     content["warnings"] = [
         f"{label}: {text}" for label, run in runs.items() for text in run.facts["warnings"]
     ] + content.pop("overall")
     content["scenario"] = first.scenario if scenario is None else scenario
     content["command"] = first.facts.get("command", "") if command is None else command
-    metrics = _metrics(runs, comparison)
+    metrics = _metrics(runs, whole)
     page = render(
         "report.html.jinja",
+        controls=runs,
+        keys={label: style.key for label, style in control_styles(runs).items()},
         title=first.facts["title"],
         sections=[section for section in SECTIONS if section.name not in skipped],
         missing=missing,
@@ -164,7 +178,7 @@ def _materials(runs: Mapping[str, StoredResult]) -> list[dict[str, str]]:
     return [entry for k, entry in enumerate(found) if entry not in found[:k]]
 
 
-def _metrics(runs: Mapping[str, StoredResult], comparison: Comparison | None) -> Metrics:
+def _metrics(runs: Mapping[str, StoredResult], comparison: Comparisons | None) -> Metrics:
     """Returns the metrics of the table: means of a comparison, or those of a single run."""
     if comparison is None:
         return {label: run.metrics for label, run in runs.items()}
@@ -214,16 +228,17 @@ def _one_run(run: StoredResult) -> dict[str, Any]:
     }
 
 
-def _comparison(comparison: Comparison, facts: Mapping[str, Any]) -> dict[str, Any]:
+def _comparison(comparison: Comparisons, facts: Mapping[str, Any]) -> dict[str, Any]:
     """Returns the parts of the page that only a report of a comparison has."""
     rows = comparison_rows(comparison, net_slip=has_net_slip(facts["parameters"]))
     notes = about(comparison)
     means = notes.partition(f"; {METHOD}")[0]
     means = f"{means}; 95 % intervals in brackets." if means else "One run of each control."
     lead = f"Robot {facts['robot']['name']}. {means}"
+    single = len(comparison.pairs) == 1
     return {
-        "headline": headline(comparison),
-        "cards": cards(comparison),
+        "headline": headlines(comparison),
+        "cards": cards(comparison.pairs[0]) if single else [],
         "rows": rows,
         "about": notes,
         "overall": comparison.warnings if len(comparison.seeds) > 1 else comparison.losses,
@@ -269,7 +284,7 @@ def metric_rows(metrics: Metrics, *, net_slip: bool) -> Rows:
 
     metrics: by control.
     """
-    empty = {"change": "", "interval": "", "verdict": ""}
+    empty: dict[str, Any] = {"change": "", "interval": "", "verdict": "", "changes": []}
     shown = [(name, *METRICS[name]) for name in shown_metrics(metrics, net_slip=net_slip)]
     return [
         {
@@ -283,38 +298,68 @@ def metric_rows(metrics: Metrics, *, net_slip: bool) -> Rows:
     ]
 
 
-def comparison_rows(comparison: Comparison, *, net_slip: bool = False) -> Rows:
-    """Returns the rows of the means, with changes from the first control to the second.
+def as_comparisons(comparison: Comparison | Comparisons | None) -> Comparisons | None:
+    """Returns a pair of controls as a comparison of any number."""
+    if isinstance(comparison, Comparison):
+        first, second = comparison.labels
+        runs = {first: comparison.first, second: comparison.second}
+        return Comparisons(runs, (comparison,))
+    return comparison
 
-    Over several seeds, the first row tells how many runs walked to the end.
+
+def comparison_rows(comparison: Comparison | Comparisons, *, net_slip: bool = False) -> Rows:
+    """Returns the rows of the means, with the changes from the first control to each other one.
+
+    `changes` of a row has an entry for each other control; `change`, `interval` and `verdict` are
+    those of the first entry. Over several seeds, the first row tells how many runs walked to the
+    end.
     """
-    rows = metric_rows(comparison.means, net_slip=net_slip)
+    whole = as_comparisons(comparison)
+    assert whole is not None
+    rows = metric_rows(whole.means, net_slip=net_slip)
     for row in rows:
-        change = comparison.changes[row["name"]]
-        row |= {"change": _change(change), "interval": _interval(change), "verdict": change.verdict}
-    count, walked = len(comparison.seeds), list(comparison.walked.values())
+        changes = [_shown_change(pair.changes[row["name"]]) for pair in whole.pairs]
+        row |= {**changes[0], "changes": changes}
+    count, walked = len(whole.seeds), list(whole.walked.values())
     if count == 1:
         return rows
-    verdict = SAME if walked[0] == walked[1] else BETTER if walked[1] > walked[0] else WORSE
+    counted = [
+        {"change": "", "interval": "", "verdict": _more(walked[0], other)} for other in walked[1:]
+    ]
     first = {
         "name": "walked",
         "unit": "runs",
         "meaning": "runs in which the robot walked to the end",
-        "change": "",
-        "interval": "",
+        "values": [f"{number} of {count}" for number in walked],
+        **counted[0],
+        "changes": counted,
     }
-    return [
-        first | {"values": [f"{number} of {count}" for number in walked], "verdict": verdict},
-        *rows,
-    ]
+    return [first, *rows]
 
 
-def about(comparison: Comparison) -> str:
+def _shown_change(change: Change) -> dict[str, str]:
+    return {"change": _change(change), "interval": _interval(change), "verdict": change.verdict}
+
+
+def _more(before: int, after: int) -> str:
+    """Returns the verdict on a number of walks."""
+    return SAME if before == after else BETTER if after > before else WORSE
+
+
+def about(comparison: Comparison | Comparisons) -> str:
     """Returns a sentence on what the table's values are; "" for a single seed."""
-    seeds, n = comparison.seeds, len(comparison.seeds)
+    whole = as_comparisons(comparison)
+    assert whole is not None
+    seeds, n = whole.seeds, len(whole.seeds)
     if n == 1:
         return ""
-    judged = max(change.pairs for change in comparison.changes.values())
+    if len(whole.pairs) > 1:
+        return (
+            f"Means over those of {n} seeds ({seeds[0]} to {seeds[-1]}) on which the control "
+            f"walked to the end; changes are against {whole.reference}, over the pairs in which "
+            f"both walked; {METHOD}."
+        )
+    judged = max(change.pairs for change in whole.pairs[0].changes.values())
     part = f" of the {judged} in which both walked to the end" if judged < n else ""
     return (
         f"Means over {n} seeds ({seeds[0]} to {seeds[-1]}){part}, both controls on each; {METHOD}."

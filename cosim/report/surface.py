@@ -1,4 +1,5 @@
-"""Packs the surface of a run for the viewer: heights in 16-bit steps, materials as bytes.
+"""Packs the surface of a run and its footprints for the viewer: heights in 16-bit steps, materials
+as bytes.
 
 A height is reproduced within range/131070: 4 um for a surface whose heights differ by half a metre.
 """
@@ -6,14 +7,16 @@ A height is reproduced within range/131070: 4 um for a surface whose heights dif
 from __future__ import annotations
 
 import base64
+import math
 import zlib
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from hexapod_cosim.cosim.report.packing import STEPS
+from hexapod_cosim.cosim.results.footprints import Footprint
 from hexapod_cosim.models.ground.catalogue import CATALOGUE
 from hexapod_cosim.models.ground.patches import PROPERTIES
 from hexapod_cosim.models.ground.surface import LAW, MU, Surface
@@ -49,6 +52,24 @@ def pack_surface(surface: Surface, parameters: Mapping[str, float]) -> dict[str,
         "materials": material_legend(surface, parameters),
         "material": "" if material is None else _deflated(material[::every, ::every]),
     }
+
+
+def pack_footprints(footprints: Iterable[Footprint]) -> list[list[float]]:
+    """Returns begin, end [s], x, y, depth and radius [m] of footprints for the viewer.
+
+    The end of those that stay is 0.
+    """
+    return [
+        [
+            round(one.begin, 6),
+            round(one.end, 6) if math.isfinite(one.end) else 0.0,
+            round(one.x, 5),
+            round(one.y, 5),
+            round(one.depth, 6),
+            one.radius,
+        ]
+        for one in footprints
+    ]
 
 
 def stride(surface: Surface) -> int:

@@ -1,4 +1,4 @@
-"""Compares both controls over several scenarios, such as walks on different ground."""
+"""Compares controls over several scenarios, such as walks on different ground."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from hexapod_cosim.controller.figure_style import DPI, SETTINGS, UNDATED, WIDTH
+from hexapod_cosim.cosim.common.control_style import control_styles
 from hexapod_cosim.cosim.common.files import atomic_path, atomic_text
-from hexapod_cosim.cosim.report.plots import STYLES
-from hexapod_cosim.cosim.results.comparison import Comparison
+from hexapod_cosim.cosim.results.comparisons import Comparisons
 from hexapod_cosim.cosim.results.summary import Summary
 
 TABLE, FIGURE = "terrains.csv", "terrains"
-MARKS = {"kinematic": ("o", 7.0), "compliant": ("s", 3.6)}  # marker and its size
+LARGEST, SMALLER = 7.0, 0.75  # size of the first control's mark, and share of each next one's
 ROOM = 1.06  # of an axis over its largest value
 
 
@@ -56,10 +56,9 @@ class Row:
     reason: str  # why the first run ended that did not walk; "" where all walked
 
 
-def terrain_rows(name: str, comparison: Comparison) -> list[Row]:
+def terrain_rows(name: str, comparison: Comparisons) -> list[Row]:
     """Returns the rows of a scenario, one for each control."""
-    both = (comparison.first, comparison.second)
-    return [_row(name, label, runs) for label, runs in zip(comparison.labels, both, strict=True)]
+    return [_row(name, label, runs) for label, runs in comparison.runs.items()]
 
 
 def _row(name: str, control: str, runs: tuple[Summary, ...]) -> Row:
@@ -140,19 +139,22 @@ def draw_terrains(rows: list[Row]) -> Figure:
 
 
 def _draw_quantity(axis: Axes, quantity: Quantity, rows: list[Row], scenarios: list[str]) -> None:
-    """Draws one panel: both controls of a scenario on one line, joined by a bar."""
+    """Draws one panel: all controls of a scenario on one line, joined by a bar."""
     by_control: dict[str, list[float]] = {}
     for row in rows:
         by_control.setdefault(row.control, []).append(row.values[quantity.name])
+    styles = control_styles(by_control)
     table = np.array(list(by_control.values()))
     axis.hlines(range(len(scenarios)), *_ends(table), color="0.8", linewidth=2.2, zorder=1)
-    for control, values in by_control.items():
-        marker, size = MARKS[control]
-        mark: dict[str, Any] = {"marker": marker, "markersize": size, "linestyle": "none"}
+    for number, (control, values) in enumerate(by_control.items()):
+        size = LARGEST * SMALLER**number  # marks of equal values stay visible
+        mark: dict[str, Any] = {
+            "marker": styles[control].marker,
+            "markersize": size,
+            "linestyle": "none",
+        }
         places = list(range(len(scenarios)))
-        axis.plot(
-            values, places, color=STYLES[control]["color"], label=control, clip_on=False, **mark
-        )
+        axis.plot(values, places, color=styles[control].light, label=control, clip_on=False, **mark)
     axis.set_title(quantity.title, fontsize="small")
     axis.set_xlabel(quantity.unit)
     most = 100.0 if quantity.unit == "%" else float(np.nanmax(table, initial=0.0))
@@ -161,7 +163,7 @@ def _draw_quantity(axis: Axes, quantity: Quantity, rows: list[Row], scenarios: l
 
 
 def _ends(table: np.ndarray[Any, np.dtype[np.float64]]) -> tuple[Any, Any]:
-    """Returns the least and the largest of both controls' values, NaN where one is missing."""
+    """Returns the least and the largest of all controls' values, NaN where one is missing."""
     return table.min(axis=0), table.max(axis=0)
 
 

@@ -15,7 +15,9 @@ from hexapod_cosim.cosim.results.walk import FLAT, GRID
 from hexapod_cosim.models.errors import RobotError
 from hexapod_cosim.models.ground.grid_file import read_grid, surface_from_bytes, write_grid
 from hexapod_cosim.models.ground.surface import Surface
+from hexapod_cosim.models.ground.table import terrain_specs
 from hexapod_cosim.models.records import Terrain
+from hexapod_cosim.models.schema import Number
 from hexapod_cosim.models.terrain import ground_height
 
 Array = NDArray[np.float64]
@@ -112,7 +114,7 @@ def describe_terrain(surface: Surface | None, parameters: Mapping[str, float]) -
         incline = np.degrees(parameters.get("terrain.incline", 0.0))
         return f"plane with a slope of {incline:.3g} deg"
     recipe = {key: value for key, value in surface.recipe.items() if key not in ("kind", "patch")}
-    shown = [f"{key} = {_text(value)}" for key, value in recipe.items()]
+    shown = [f"{key} = {_text(key, value)}" for key, value in recipe.items()]
     patches = len(surface.recipe.get("patch", ()))
     shown += [f"{patches} patch{'es' if patches > 1 else ''}"] if patches else []
     name = str(surface.recipe.get("kind", surface.name))
@@ -122,9 +124,13 @@ def describe_terrain(surface: Surface | None, parameters: Mapping[str, float]) -
     return f"{name} ({', '.join(shown)})" if shown else name
 
 
-def _text(value: Any) -> str:
-    """Returns a parameter's value; of a file, the name without its folder."""
-    return f"{value:.4g}" if isinstance(value, int | float) else Path(str(value)).name
+def _text(key: str, value: Any) -> str:
+    """Returns a parameter's value with its unit; of a file, the name without its folder."""
+    if not isinstance(value, int | float):
+        return Path(str(value)).name
+    spec = terrain_specs().get(key)
+    unit = spec.unit if isinstance(spec, Number) else "1"
+    return f"{value:.4g}" + ("" if unit == "1" else f" {unit}")
 
 
 def recipe_of(facts: Mapping[str, Any]) -> Mapping[str, Any]:

@@ -350,6 +350,11 @@ def foot_errors(recording: Recording, parameters: Mapping[str, float]) -> Array:
     return real_feet(recording, parameters) - planned_feet(recording)
 
 
+def plans_feet(recording: Recording) -> bool:
+    """Returns whether the controller reports where it plans the feet."""
+    return set(PLANNED) <= set(recording.names)
+
+
 def planned_feet(recording: Recording) -> Array:
     """Returns each foot's planned centre [m] (rows, 6, 3), torso frame.
 

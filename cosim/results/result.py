@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from hexapod_cosim.cosim.master.loop import COMPLETED, Outcome
+from hexapod_cosim.cosim.master.recorder import Recording
 from hexapod_cosim.cosim.scenario.records import Scenario
 from hexapod_cosim.models.ground.surface import Surface
 
@@ -21,6 +22,11 @@ class Result:
     parameters: Mapping[str, float]  # of the FMU during the run
     facts: Mapping[str, Any]  # robot, FMU, versions, warnings
     surface: Surface | None = None  # that the FMU read from its resources; None: a plane
+
+    @property
+    def recording(self) -> Recording:
+        """The recorded rows: time, the plant's outputs and inputs, commands."""
+        return self.outcome.recording
 
     @property
     def completed(self) -> bool:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -30,6 +30,7 @@ from hexapod_cosim.cosim.results.recordings import (
 )
 from hexapod_cosim.cosim.results.result import Result
 from hexapod_cosim.cosim.results.walk import View
+from hexapod_cosim.cosim.scenario.controls import control_of
 from hexapod_cosim.models import HexapodError
 
 RESULTS, PARTIAL = "results", "results.partial"  # stems of recordings
@@ -57,33 +58,36 @@ class StoredResult:
 class ResultsFolder:
     """A folder for results, which keeps those of an earlier run until the new run has begun."""
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, parts: Sequence[str] = ()) -> None:
         self.path = path
         self.begun = False
+        self._parts = parts
 
     def begin(self) -> None:
         """Clears the folder at the first call."""
         if not self.begun:
-            clear_folder(self.path)
+            clear_folder(self.path, self._parts)
             self.begun = True
 
 
 @contextmanager
-def results_folder(path: Path) -> Iterator[ResultsFolder]:
+def results_folder(path: Path, parts: Sequence[str] = ()) -> Iterator[ResultsFolder]:
     """Claims a folder for a run; if the block fails once the run has begun, run.json says so.
 
-    Raises HexapodError when the folder cannot be used.
+    `parts`: names of the folders in it that a comparison writes. Raises HexapodError when the
+    folder cannot be used.
     """
     made = claim_folder(path)
-    folder = ResultsFolder(path)
+    folder = ResultsFolder(path, parts)
     try:
         yield folder
     except BaseException as error:
-        if folder.begun and read_json(path / RUN_FILE)["status"] == RUNNING:
+        facts = read_json(path / RUN_FILE) if folder.begun else {}
+        if facts.get("status") == RUNNING:
             status, reason = FAILED, str(error)
             if isinstance(error, KeyboardInterrupt):
                 status, reason = INTERRUPTED, "interrupted"
-            write_json(path / RUN_FILE, {"status": status, "reason": reason})
+            write_json(path / RUN_FILE, {**facts, "status": status, "reason": reason})
         raise
     finally:
         for place in () if folder.begun else made:
@@ -126,7 +130,7 @@ def run_facts(result: Result) -> dict[str, Any]:
         "status": outcome.status,
         "reason": outcome.reason,
         "title": scenario.title,
-        "control": scenario.control,
+        "control": control_of(scenario.control).label,
         "simulated": outcome.simulated,
         "wall": outcome.wall,
         "realtime_factor": outcome.realtime_factor,

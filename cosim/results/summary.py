@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from hexapod_cosim.cosim.master.loop import COMPLETED
 from hexapod_cosim.cosim.results.metrics import METRICS
 from hexapod_cosim.cosim.results.result import Result
+from hexapod_cosim.cosim.scenario.controls import control_of
 from hexapod_cosim.cosim.scenario.records import Scenario
 from hexapod_cosim.models import HexapodError
 
@@ -20,7 +21,7 @@ NO_FIGURES = dict.fromkeys(METRICS, math.nan)
 class Summary:
     """Outcome, warnings and metrics of a run."""
 
-    control: str
+    control: str  # label
     seed: int
     status: str  # COMPLETED, FAILED or REFUSED
     reason: str = ""  # a sentence; "" when completed
@@ -40,7 +41,7 @@ def summarise(result: Result) -> Summary:
     """Returns the summary of a run."""
     scenario, walk = result.scenario, result.facts["walk"]
     return Summary(
-        control=scenario.control,
+        control=control_of(scenario.control).label,
         seed=scenario.seed,
         status=result.outcome.status,
         reason=result.outcome.reason,
@@ -54,7 +55,7 @@ def summarise(result: Result) -> Summary:
 def refused_summary(scenario: Scenario, error: HexapodError) -> Summary:
     """Returns the summary of a run that could not start."""
     return Summary(
-        control=scenario.control,
+        control=control_of(scenario.control).label,
         seed=scenario.seed,
         status=REFUSED,
         reason=str(error),

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from hexapod_cosim.cosim.interface.names import vector_names
 from hexapod_cosim.cosim.master.recorder import COMMAND_COLUMNS, Recording
+from hexapod_cosim.cosim.results.feet import feet_of_angles
 from hexapod_cosim.models import FRICTION_LAWS, TERRAINS
 from hexapod_cosim.models.ground.surface import Surface
 
@@ -242,7 +243,13 @@ def _incline(parameters: Mapping[str, float]) -> float:
 
 
 def real_feet(recording: Recording, parameters: Mapping[str, float]) -> Array:
-    """Returns the centres of the feet in the torso's frame [m] (rows, 6, 3)."""
+    """Returns the centres of the feet in the torso's frame [m] (rows, 6, 3).
+
+    On a plane they are a radius above the contact points, along the normal. On a surface, whose
+    normal depends on the place, they follow from the joint angles.
+    """
+    if parameters.get("terrain.kind", FLAT) == GRID:
+        return feet_of_angles(recording, parameters)
     w, x, y, z = recording.vector("torso.quaternion", 4).T
     turn = np.array([
         [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)],

@@ -182,8 +182,8 @@ def unused_settings(scenario: Scenario, robot: Robot) -> list[str]:
 
 
 def walk_warnings(view: View, robot: Robot) -> list[str]:
-    """Warns of a fall, weak friction, legs out of reach, lost feedback, overloaded servos and
-    missing energy.
+    """Warns of a fall, weak friction, legs out of reach, lost feedback, overloaded servos, legs
+    that overlap and missing energy.
     """
     recording, fallen = view.recording, describe_fall(view, robot)
     found = [*([fallen] if fallen else []), *friction_warnings(view.parameters)]
@@ -192,7 +192,30 @@ def walk_warnings(view: View, robot: Robot) -> list[str]:
         share = float(np.mean(recording.columns(unreachable).max(axis=1)))
         found += [f"a foot was out of its leg's reach for {share:.1%} of the time"] if share else []
     found += [*fallback_warnings(recording), *servo_warnings(recording, robot)]
+    found += overlap_warnings(recording, view.parameters)
     return [*found, *energy_warnings(view)]
+
+
+def overlap_warnings(recording: Recording, parameters: Mapping[str, float]) -> list[str]:
+    """Warns of neighbouring legs that overlap, with time and place of the deepest overlap.
+
+    Only with body.self_contact = warn, whose number is 2.
+    """
+    names = [f"{leg}.clearance" for leg in LEG_NAMES]
+    if parameters.get("body.self_contact", 1.0) != 2.0 or not set(names) <= set(recording.names):
+        return []
+    clearance = recording.columns(names)
+    if not len(clearance) or not clearance.min() < 0.0:
+        return []
+    row, leg = np.unravel_index(int(np.argmin(clearance)), clearance.shape)
+    first = int(np.argmax((clearance < 0.0).any(axis=1)))
+    share = float((clearance < 0.0).any(axis=1).mean())
+    return [
+        f"legs overlapped from {recording.time[first]:.3f} s on, for {share:.1%} of the time: leg "
+        f"{LEG_NAMES[leg]} was {-1e3 * clearance[row, leg]:.3g} mm inside its neighbour at "
+        f"{recording.time[row]:.3f} s, and legs exert no force on each other; use shorter steps or "
+        "a slower turn"
+    ]
 
 
 def off_map_warnings(recording: Recording, surface: Surface | None) -> list[str]:

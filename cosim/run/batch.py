@@ -25,6 +25,7 @@ from hexapod_cosim.cosim.run.worker_pool import (
     raise_if_stopped,
     worker_pool,
 )
+from hexapod_cosim.cosim.scenario.controls import control_of
 from hexapod_cosim.cosim.scenario.records import Scenario
 from hexapod_cosim.models import HexapodError
 
@@ -105,9 +106,10 @@ def _summary_of(finished: Finished[_Task, Summary]) -> Summary:
     """Returns the summary of a finished task. Raises HexapodError when its worker died."""
     summary, scenario = finished.result, finished.task.scenario
     if summary is None:
+        label = control_of(scenario.control).label
         raise HexapodError(
             "a worker process of the batch ended by itself",
-            got=f"{scenario.title}, seed {scenario.seed}, {scenario.control} control",
+            got=f"{scenario.title}, seed {scenario.seed}, {label} control",
             fix="look for what ended it (memory?), or run fewer at once",
         )
     if summary.status == INTERRUPTED:

@@ -22,10 +22,10 @@ def make_setup(
     """Returns the controller's set-up as `simulate` would make it.
 
     Args:
-        control: "kinematic" or "compliant".
+        control: "kinematic", "paper" or "compliant".
         period: controller period [s].
         gait: name of a gait; by default the gait of the robot file.
-        gains: gains of the compliant control; by default they are designed for the robot.
+        gains: gains of paper or compliant control; by default they are designed for the robot.
 
     Raises:
         HexapodError: the control or the gait is unknown.
@@ -38,10 +38,11 @@ def make_setup(
     if control == "kinematic":
         if gains is not None:
             raise GainsError(
-                "gains without compliant control",
+                "gains for kinematic control, which has none",
                 got=control,
-                expected="compliant",
+                expected="paper or compliant",
                 fix="leave out the gains",
             )
         return setup
-    return replace(setup, gains=designed_gains(robot, period) if gains is None else gains)
+    chosen = designed_gains(robot, period) if gains is None else gains
+    return replace(setup, gains=chosen, law=control)

@@ -10,6 +10,7 @@ from pathlib import Path
 
 from hexapod_cosim.controller import Gains
 from hexapod_cosim.cosim.export.export import export_fmu
+from hexapod_cosim.cosim.scenario.controls import control_of
 from hexapod_cosim.cosim.scenario.records import Scenario
 from hexapod_cosim.cosim.scenario.scenario import scenario_robot
 from hexapod_cosim.models import Robot, Servo, load_robot
@@ -31,14 +32,24 @@ def designed_gains(robot: Robot, period: float) -> Gains:
 
 
 def chosen_gains(scenario: Scenario, given: Gains | None = None) -> Gains | None:
-    """Returns the gains that a scenario runs with, None under kinematic control.
+    """Returns the gains that a scenario runs with, None unless its control needs gains.
 
     They are the given ones, or else designed for its robot and macro-step. Raises GainsError when
     no gains can be designed, HexapodError for a robot that cannot be read.
     """
-    if scenario.control == "kinematic":
+    control = control_of(scenario.control)
+    if not control.is_builtin or control.name == "kinematic":
         return None
     return designed_gains(*design_key(scenario)) if given is None else given
+
+
+def law_of(control: str) -> str:
+    """Returns the law of a built-in controller with gains, from the text of a control.
+
+    Kinematic control has no gains and uses no law.
+    """
+    named = control_of(control)
+    return "paper" if named.is_builtin and named.name == "paper" else "compliant"
 
 
 def design_key(scenario: Scenario) -> tuple[Robot, float]:

@@ -14,9 +14,15 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from hexapod_cosim.controller import Controller, Gains, make_gait
+from hexapod_cosim.controller import Gains, make_gait
 from hexapod_cosim.cosim.common.components import PLANT
 from hexapod_cosim.cosim.common.plant_files import package_version
+from hexapod_cosim.cosim.control.controllers import (
+    RunController,
+    control_facts,
+    make_controller,
+    text_of_law,
+)
 from hexapod_cosim.cosim.interface.controller_interface import ControllerSetup
 from hexapod_cosim.cosim.interface.interface import plant_roots
 from hexapod_cosim.cosim.interface.start_values import parameter_values
@@ -38,7 +44,8 @@ from hexapod_cosim.cosim.results.warnings import (
     unused_settings,
     walk_warnings,
 )
-from hexapod_cosim.cosim.run.preparation import PlantFmus, chosen_gains, known_robot
+from hexapod_cosim.cosim.run.preparation import PlantFmus, chosen_gains, known_robot, law_of
+from hexapod_cosim.cosim.scenario.controls import control_of
 from hexapod_cosim.cosim.scenario.reach import check_commands
 from hexapod_cosim.cosim.scenario.records import Scenario
 from hexapod_cosim.cosim.scenario.scenario import scenario_robot
@@ -69,6 +76,8 @@ def simulate(
     gains: Gains | None = None,
     progress: Progress | None = None,
     begin: Callable[[], None] | None = None,
+    law: Any = None,
+    label: str | None = None,
 ) -> Result:
     """Runs a scenario and returns its recording, metrics and facts.
 
@@ -81,16 +90,18 @@ def simulate(
         gains: of the compliant control; by default they are designed for the robot.
         progress: called now and then with the simulated time [s].
         begin: called once the run can start, before the first step.
+        law: a controller object or its class, which replaces the scenario's control.
+        label: of that law; by default the name of its class.
     """
+    if law is not None:
+        scenario = replace(scenario, control=text_of_law(law, label))
     plan = make_plan(scenario, gains=gains)
     setup = plan.controller
-    controller = Controller(
-        setup.robot, period=setup.period, gait=setup.gait, gains=setup.gains, parts=setup.parts
-    )
-    with open_plant(scenario, fmu) as plant:
+    with open_plant(scenario, fmu) as plant, make_controller(plan, law=law) as controller:
         parameters = initialise_plant(plant, plan)
         signals = Signals(plant, sensor=make_sensor(scenario, plan.schedule))
         recorder = _make_recorder(plan, signals, controller)
+        start_controller(controller, plant, plan)
         if begin is not None:
             begin()
         outcome = run(
@@ -104,11 +115,22 @@ def simulate(
         )
         facts = describe(setup.robot, plant, setup.gait.period)
         surface = run_surface(plant, plan.robot, parameters)
-    facts |= {"warnings": controller.warnings}
+        facts |= {"warnings": controller.warnings, "controller": control_facts(scenario, law)}
     return make_result(plan, outcome, parameters, facts, surface=surface)
 
 
-def _make_recorder(plan: RunPlan, signals: Signals, controller: Controller) -> Recorder:
+def start_controller(controller: RunController, plant: Fmu, plan: RunPlan) -> None:
+    """Starts a controller at the plant's first outputs. Raises FmuError.
+
+    The outputs are read without the errors of sensors, whose random numbers belong to the run.
+    """
+    scenario, signals = plan.scenario, Signals(plant)
+    signals.read()
+    stop = scenario.start + scenario.duration
+    controller.start(scenario.start, stop, plan.schedule.commands[0], signals.measurement)
+
+
+def _make_recorder(plan: RunPlan, signals: Signals, controller: RunController) -> Recorder:
     """Returns the recorder of a run. Raises ScenarioError for unknown columns in outputs.csv."""
     scenario = plan.scenario
     recorder = Recorder(
@@ -142,13 +164,15 @@ def make_plan(scenario: Scenario, *, gains: Gains | None = None) -> RunPlan:
     own = scenario_robot(scenario)
     robot = known_robot(scenario, own)
     gait = make_gait(robot, **dict(scenario.settings.get("gait", {})))
-    check_commands(scenario.commands, robot, gait, where=f"{scenario.where}: command")
+    if control_of(scenario.control).is_builtin:  # another control has strides of its own
+        check_commands(scenario.commands, robot, gait, where=f"{scenario.where}: command")
     setup = ControllerSetup(
         robot=robot,
         gait=gait,
         period=scenario.macro_step,
         gains=chosen_gains(scenario, gains),
         parts=scenario.compliance,
+        law=law_of(scenario.control),
     )
     drawn = None if scenario.variation is None else draw(scenario.variation, seed=scenario.seed)
     timed = scenario

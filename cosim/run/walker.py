@@ -5,8 +5,8 @@ FMUs are opened once, and gains are designed once.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from contextlib import ExitStack
+from collections.abc import Callable, Sequence
+from contextlib import ExitStack, closing
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from time import thread_time
@@ -14,6 +14,15 @@ from types import TracebackType
 from typing import Self
 
 from hexapod_cosim.controller import Gains
+from hexapod_cosim.cosim.control.connection import Connection
+from hexapod_cosim.cosim.control.controllers import (
+    connection_of,
+    control_facts,
+    fmu_parameters_of,
+)
+from hexapod_cosim.cosim.control.fmu_instance import ControllerFmu2, open_controller_fmu
+from hexapod_cosim.cosim.control.fmu_law import FmuLaw
+from hexapod_cosim.cosim.control.wiring import compiled_wiring
 from hexapod_cosim.cosim.export.controller_export import export_controller
 from hexapod_cosim.cosim.interface.controller_interface import (
     ControllerSetup,
@@ -23,6 +32,7 @@ from hexapod_cosim.cosim.master.fmu import Fmu, FmuBlock
 from hexapod_cosim.cosim.master.loop import Progress
 from hexapod_cosim.cosim.master.native_loop import NativeMaster
 from hexapod_cosim.cosim.master.recorder import COMMAND_COLUMNS, chosen_columns
+from hexapod_cosim.cosim.master.wiring import Wiring
 from hexapod_cosim.cosim.results.metrics import metric_columns
 from hexapod_cosim.cosim.results.result import Result
 from hexapod_cosim.cosim.results.summary import Summary, refused_summary, summarise
@@ -36,7 +46,10 @@ from hexapod_cosim.cosim.run.run import (
     make_result,
     run_surface,
     sensor_settings,
+    simulate,
+    start_controller,
 )
+from hexapod_cosim.cosim.scenario.controls import FMU, Control, control_of
 from hexapod_cosim.cosim.scenario.records import Scenario
 from hexapod_cosim.models import HexapodError, Robot
 from hexapod_cosim.models.records import BRISTLE_LAWS
@@ -64,8 +77,9 @@ class Walker:
         self._open = ExitStack()
         self._folder = Path(self._open.enter_context(TemporaryDirectory(prefix="hexapod-walker-")))
         self._fmus = PlantFmus(self._folder, given=fmu)
-        # by plant FMU and recorded columns
-        self._masters: dict[tuple[Path, tuple[str, ...] | None], tuple[Fmu, NativeMaster]] = {}
+        # by plant FMU and recorded columns, of the built-in controls
+        self._masters: dict[tuple[Path, tuple[str, ...] | None], NativeMaster] = {}
+        self._plants: dict[Path, Fmu] = {}
         self._controller: Fmu | None = None
         self.loop_time = 0.0  # s    processor time of the last run's loop
         # the controller's latest set-up and the blocks of parameters that make it
@@ -86,13 +100,88 @@ class Walker:
         Arguments are those of run.simulate(). Raises HexapodError when the run cannot start; how a
         run that started ended is in the result.
         """
+        control = control_of(scenario.control)
+        if not control.is_builtin:
+            return self._simulate_given(
+                scenario, control, fmu=fmu, gains=gains, progress=progress, begin=begin
+            )
         plan = make_plan(scenario, gains=gains)
         controller = self._controller_for(plan)
         plant, master = self._plant(plan, controller, fmu)
+        parameters = self._initialise_plant(plant, plan)
+        controller.initialise(scenario.start, scenario.start + scenario.duration)
+        return self._run(plan, plant, master, parameters, progress, begin)
+
+    def _simulate_given(
+        self,
+        scenario: Scenario,
+        control: Control,
+        *,
+        fmu: Path | None,
+        gains: Gains | None,
+        progress: Progress | None,
+        begin: Callable[[], None] | None,
+    ) -> Result:
+        """Runs a scenario under the user's control.
+
+        An FMU of FMI 2.0 with floating-point inputs runs on the loop in C, opened anew for each
+        run, because FMUs need not support a reset; all others run on the loop in Python.
+        """
+        path = self._fmus.fmu(scenario.robot) if fmu is None else fmu
+        if control.kind == FMU and control.path is not None:
+            with closing(open_controller_fmu(control.path)) as controller:
+                plan = make_plan(scenario, gains=gains)
+                connection = connection_of(control, controller.described, scenario, plan.controller)
+                wiring = compiled_wiring(connection)
+                if wiring is not None and isinstance(controller, ControllerFmu2):
+                    return self._simulate_fmu(
+                        plan, path, controller, connection, wiring, progress, begin
+                    )
+        return simulate(scenario, fmu=path, gains=gains, progress=progress, begin=begin)
+
+    def _simulate_fmu(
+        self,
+        plan: RunPlan,
+        path: Path,
+        controller: ControllerFmu2,
+        connection: Connection,
+        wiring: Wiring,
+        progress: Progress | None,
+        begin: Callable[[], None] | None,
+    ) -> Result:
+        """Runs a plan under a controller FMU on the loop in C."""
+        control, plant = control_of(plan.scenario.control), self._open_plant(path)
+        master = NativeMaster(
+            plant,
+            controller,
+            columns=self._columns(plan),
+            judged=metric_columns(bristles=True),
+            wiring=wiring,
+        )
+        parameters = self._initialise_plant(plant, plan)
+        controller.set_parameters(fmu_parameters_of(control, controller.described, plan.scenario))
+        law = FmuLaw(controller, connection, period=plan.controller.period)
+        start_controller(law, plant, plan)
+        return self._run(plan, plant, master, parameters, progress, begin, law.warnings)
+
+    def _initialise_plant(self, plant: Fmu, plan: RunPlan) -> dict[str, float]:
+        """Resets and initialises a plant for a plan; returns all its parameters."""
         plant.reset()
         plant.set_parameters(self._settings_of(plant, plan.robot))
-        parameters = initialise_plant(plant, plan)
-        controller.initialise(scenario.start, scenario.start + scenario.duration)
+        return initialise_plant(plant, plan)
+
+    def _run(
+        self,
+        plan: RunPlan,
+        plant: Fmu,
+        master: NativeMaster,
+        parameters: dict[str, float],
+        progress: Progress | None,
+        begin: Callable[[], None] | None,
+        warnings: Sequence[str] = (),
+    ) -> Result:
+        """Runs the loop in C on initialised FMUs; `warnings` are the controller's."""
+        scenario = plan.scenario
         sensor = sensor_settings(scenario, plan.schedule)
         if self._everything:
             chosen_columns(
@@ -109,7 +198,8 @@ class Walker:
         )
         self.loop_time = thread_time() - started
         facts = describe(plan.controller.robot, plant, plan.controller.gait.period)
-        facts |= {"warnings": plan.controller.warnings}
+        facts |= {"warnings": [*plan.controller.warnings, *warnings]}
+        facts |= {"controller": control_facts(scenario)}
         # only a run that records everything gets a report, which shows the surface
         surface = run_surface(plant, plan.robot, parameters) if self._everything else None
         return make_result(plan, outcome, parameters, facts, surface=surface)
@@ -131,19 +221,25 @@ class Walker:
     def _plant(self, plan: RunPlan, controller: Fmu, fmu: Path | None) -> tuple[Fmu, NativeMaster]:
         """Returns the plant FMU of the plan and the master that connects it to the controller."""
         path = self._fmus.fmu(plan.scenario.robot) if fmu is None else fmu
+        plant, columns = self._open_plant(path), self._columns(plan)
+        key = path, columns
+        if key not in self._masters:
+            judged = metric_columns(bristles=True)
+            self._masters[key] = NativeMaster(plant, controller, columns=columns, judged=judged)
+        return plant, self._masters[key]
+
+    def _open_plant(self, path: Path) -> Fmu:
+        """Returns a plant FMU, which stays open until the walker is closed."""
+        if path not in self._plants:
+            self._plants[path] = self._open.enter_context(Fmu(path))
+        return self._plants[path]
+
+    def _columns(self, plan: RunPlan) -> tuple[str, ...] | None:
+        """Returns the columns to record; None for all."""
         bristles = (
             plan.robot.friction.law in BRISTLE_LAWS or "friction.law" in plan.scenario.parameters
         )
-        columns = None if self._everything else metric_columns(bristles=bristles)
-        key = path, columns
-        if key not in self._masters:
-            plant = self._open.enter_context(Fmu(path))
-            judged = metric_columns(bristles=True)
-            self._masters[key] = (
-                plant,
-                NativeMaster(plant, controller, columns=columns, judged=judged),
-            )
-        return self._masters[key]
+        return None if self._everything else metric_columns(bristles=bristles)
 
     def _controller_for(self, plan: RunPlan) -> Fmu:
         """Returns the controller FMU, reset, with the parameters of the plan."""
@@ -171,6 +267,7 @@ class Walker:
     def close(self) -> None:
         """Frees the FMUs. A second call does nothing."""
         self._masters.clear()
+        self._plants.clear()
         self._setup = None
         self._controller = None
         self._open.close()

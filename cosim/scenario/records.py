@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 from typing import Annotated, Any
 
 from hexapod_cosim.controller import Parts
@@ -22,7 +22,7 @@ from hexapod_cosim.models import (
 )
 from hexapod_cosim.models.schema import Choice, Number, Vector, specs
 
-CONTROLS = ("kinematic", "compliant")
+CONTROLS = ("kinematic", "paper", "compliant")
 FAULTS = ("dead", "stuck")
 FORMATS = ("parquet", "csv")  # of recordings
 SETTINGS: dict[str, type[Any]] = {
@@ -128,7 +128,10 @@ class Scenario:
 
     title: str = "walk"
     robot: str = "athena"  # a name of `hexapod list robots`, or a path
-    control: Annotated[str, Choice(CONTROLS, default="kinematic")] = "kinematic"
+    # text of a control: a name of CONTROLS, law.py:Class or controller.fmu, see controls.py
+    control: str = "kinematic"
+    # the other keys of a table [control]: parameters of the user's law or FMU
+    control_settings: Mapping[str, Any] = field(default_factory=dict)
     start: Annotated[float, Number("s", default=0.0)] = 0.0
     duration: Annotated[float, Number("s", above=0.0, default=10.0)] = 10.0
     macro_step: Annotated[float, Number("s", above=0.0, at_most=0.1, default=0.005)] = 0.005
@@ -166,9 +169,12 @@ class Scenario:
 
     def to_table(self) -> dict[str, Any]:
         """Returns the scenario as the tables of an equivalent scenario file."""
-        plain = {key: getattr(self, key) for key in ("title", "robot", *PLAIN_KEYS, "seed")}
+        keys = ("title", "robot", "control", *PLAIN_KEYS, "seed")
+        plain = {key: getattr(self, key) for key in keys}
         plain |= {} if self.gravity is None else {"gravity": list(self.gravity)}
         tables = {key: dict(value) for key, value in self.settings.items() if value}
+        if self.control_settings:  # a table, which stands behind the plain keys
+            tables["control"] = {"law": plain.pop("control"), **self.control_settings}
         lists = {
             "command": [_as_table(entry) for entry in self.commands],
             "events": [_as_table(entry) for entry in self.events],
@@ -184,8 +190,11 @@ class Scenario:
         )
 
 
-PLAIN_KEYS = tuple(specs(Scenario))  # control, start, duration, macro_step
-SECTIONS = ("command", "sensors", "compliance", "variation", "outputs", "parameters", *SETTINGS)
+PLAIN_KEYS = tuple(specs(Scenario))  # start, duration, macro_step
+SECTIONS = (
+    *("command", "control", "sensors", "compliance", "variation", "outputs", "parameters"),
+    *SETTINGS,
+)
 KEYS = ("title", "robot", *PLAIN_KEYS, "seed", "gravity", "events", *SECTIONS)
 
 

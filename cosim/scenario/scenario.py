@@ -23,8 +23,10 @@ import numpy as np
 
 from hexapod_cosim.controller import SWITCHES, Parts
 from hexapod_cosim.cosim.scenario.checks import check_interval, check_parameters, check_steps
+from hexapod_cosim.cosim.scenario.controls import LAW, control_beside, read_control
 from hexapod_cosim.cosim.scenario.quantities import to_si
 from hexapod_cosim.cosim.scenario.records import (
+    CONTROLS,
     FORMATS,
     GRAVITY,
     GRAVITY_NAMES,
@@ -106,6 +108,8 @@ def read_tables(path_or_name: str | Path) -> tuple[dict[str, Any], str]:
         ) from error
     if isinstance(table.get("terrain"), dict):
         table["terrain"] = beside(table["terrain"], path.parent)
+    if "control" in table:
+        table["control"] = control_beside(table["control"], path.parent)
     near = path.parent / str(table.get("robot", ""))
     if "robot" in table and near.is_file():  # a robot file beside the scenario
         table["robot"] = str(near.resolve())
@@ -160,7 +164,11 @@ def parse_value(value: str) -> Any:
 def _set(table: dict[str, Any], name: str, value: Any) -> None:
     """Sets a key of the scenario or an FMU parameter by its dotted name, in place."""
     section, dot, key = name.partition(".")
-    if dot and section in SECTIONS:
+    if name == "control" and isinstance(table.get(name), dict):
+        table[name] = {**table[name], LAW: value}  # another law, with the same parameters
+    elif dot and section in SECTIONS:
+        if section == "control" and isinstance(table.get(section), str):
+            table[section] = {LAW: table[section]}
         inner = table.setdefault(section, {})
         if not isinstance(inner, dict):
             fix = f"set the whole list: --set '{section}=[...]'"
@@ -191,9 +199,12 @@ def scenario_from_table(
         refuse_unknown_keys(table, list(KEYS), "")
         plain_keys = {key: value for key, value in table.items() if key in PLAIN_KEYS}
         plain = require(Scenario, _read(Scenario, plain_keys, ""), "")
+        control, parameters = read_control(table.get("control", CONTROLS[0]), "control")
         scenario = Scenario(
             title=_text(table, "title", Path(where).stem),
             robot=_text(table, "robot", "athena"),
+            control=control.text,
+            control_settings=parameters,
             seed=_seed(table.get("seed", 0)),
             gravity=_read_gravity(table["gravity"], "gravity") if "gravity" in table else None,
             settings={

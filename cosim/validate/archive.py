@@ -1,5 +1,5 @@
 """Checks the files of an FMU's archive besides modelDescription.xml: ZIP format, sources, binaries,
-terminals, documentation, licence.
+terminals, documentation, licence, grids.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ from xml.etree.ElementTree import Element
 
 import fmpy
 
+from hexapod_cosim.cosim.common.binaries import incomplete
 from hexapod_cosim.cosim.export.extras import LICENCE, PICTURES
 from hexapod_cosim.cosim.interface.terminals import FOLDER, ICON
 from hexapod_cosim.cosim.validate.description import (
@@ -22,6 +23,7 @@ from hexapod_cosim.cosim.validate.description import (
     schema_problems,
     variables,
 )
+from hexapod_cosim.cosim.validate.grids import grid_problems
 from hexapod_cosim.cosim.validate.variable import INTERFACES
 
 DESCRIPTION, PAGE = "modelDescription.xml", "documentation/index.html"
@@ -76,13 +78,21 @@ def archive_problems(path: Path) -> list[str]:
 
 
 def read_members(path: Path) -> tuple[dict[str, bytes] | None, list[str]]:
-    """Returns the archive's files by path (None if one is damaged) and its problems as a ZIP."""
+    """Returns the archive's files by path (None if one is damaged) and its problems as a ZIP.
+
+    The problems of a damaged archive are the names of its damaged files.
+    """
+    found, damaged = {}, []
     with zipfile.ZipFile(path) as archive:
-        damaged = archive.testzip()
-        if damaged:
-            return None, [f"{damaged} is damaged: its checksum is wrong"]
-        found = {name: archive.read(name) for name in archive.namelist() if not name.endswith("/")}
-        return found, list(zip_problems(archive))
+        for name in archive.namelist():
+            try:
+                found[name] = archive.read(name)
+            except zipfile.BadZipFile:
+                damaged.append(f"{name} is damaged: its checksum is wrong")
+            except Exception:  # zlib's and others, for data that cannot be unpacked
+                damaged.append(f"{name} is damaged: it cannot be unpacked")
+        files = {name: data for name, data in found.items() if not name.endswith("/")}
+        return (None, damaged) if damaged else (files, list(zip_problems(archive)))
 
 
 def member_problems(
@@ -101,6 +111,7 @@ def member_problems(
         binary_problems(root, found, fmi),
         terminal_problems(set(names), found),
         document_problems(found, fmi),
+        grid_problems(found),
     )
     return [problem for check in checks for problem in check]
 
@@ -169,7 +180,7 @@ def include_problems(found: dict[str, bytes], fmi: int) -> Iterator[str]:
 def _includes(text: bytes) -> list[str]:
     """Returns the names in quotes that a source includes."""
     return [
-        include.decode()
+        include.decode(errors="replace")
         for include in re.findall(rb'^\s*#\s*include\s+"([^"]+)"', text, re.MULTILINE)
     ]
 
@@ -216,6 +227,9 @@ def library_problems(name: str, data: bytes, platform: str, *, fmi: int = 2) -> 
     if not data.startswith(known_magic) or machine not in machines:
         yield f"{name} is no library of {platform}"
         return
+    damage = incomplete(data)
+    if damage:
+        yield f"{name} cannot be loaded: {damage}"
     start = b"\0_" if magic == MACH else b"\0"
     missing = [
         function
@@ -233,6 +247,7 @@ def _machine_types(data: bytes, magic: bytes, place: int | None, size: int) -> l
     """
     if magic == MACH and data.startswith(FAT):
         count = int.from_bytes(data[4:8], "big")
+        count = min(count, len(data) // FAT_ENTRY_SIZE)
         offsets = range(FAT_ENTRIES, FAT_ENTRIES + FAT_ENTRY_SIZE * count, FAT_ENTRY_SIZE)
         return [data[at : at + 4][::-1] for at in offsets]
     if place is None:

@@ -9,16 +9,26 @@ from tempfile import TemporaryDirectory
 from typing import Any
 from xml.etree import ElementTree
 
-from fmpy import extract
 from fmpy.fmi2 import FMU2Slave, fmi2CallbackFunctions
 from fmpy.validation import validate_fmu
 
+from hexapod_cosim.cosim.common.archives import unpack, unsafe_members
+from hexapod_cosim.cosim.common.binaries import incomplete
 from hexapod_cosim.cosim.common.components import CONTROLLER
 from hexapod_cosim.cosim.common.plant_files import fmi2_platform, packed_binary
-from hexapod_cosim.cosim.interface.descriptions import open_description, read_description
+from hexapod_cosim.cosim.interface.descriptions import (
+    forbidden_markup,
+    open_description,
+    read_description,
+)
 from hexapod_cosim.cosim.master.fmu import Fmu
 from hexapod_cosim.cosim.master.signals import Signals
-from hexapod_cosim.cosim.validate.archive import DESCRIPTION, archive_problems
+from hexapod_cosim.cosim.validate.archive import (
+    DESCRIPTION,
+    archive_problems,
+    read_members,
+    zip_problems,
+)
 from hexapod_cosim.cosim.validate.description import description_problems, schema_problems
 from hexapod_cosim.cosim.validate.description3 import description_problems3
 from hexapod_cosim.cosim.validate.start_value import START_VALUES, start_value_problems
@@ -52,11 +62,16 @@ def _unread_problems(path: Path) -> list[str]:
 
     Empty if it is no XML.
     """
+    unsafe = _unsafe_problems(path)
+    if unsafe:
+        return unsafe
     try:
         with zipfile.ZipFile(path) as archive:
             data = archive.read(DESCRIPTION)
         root = ElementTree.fromstring(data)
-    except (OSError, zipfile.BadZipFile, KeyError, ElementTree.ParseError):
+    except Exception:  # also zlib's and the parser's: the error that was raised says why
+        return []
+    if forbidden_markup(data):
         return []
     fmi3 = root.get("fmiVersion", "").startswith("3.")
     broken = schema_problems(
@@ -67,12 +82,28 @@ def _unread_problems(path: Path) -> list[str]:
     return broken or (description_problems3 if fmi3 else description_problems)(root)
 
 
+def _unsafe_problems(path: Path) -> list[str]:
+    """Returns why the archive is not unpacked, and its violations of the ZIP format."""
+    try:
+        with zipfile.ZipFile(path) as archive:
+            unsafe = [
+                f"{what}: got {got!r}, expected {expected}"
+                for what, got, expected in unsafe_members(archive.infolist())
+            ]
+            return [*zip_problems(archive), *unsafe] if unsafe else []
+    except Exception:  # no archive
+        return []
+
+
 def find_own_problems(path: Path) -> list[str]:
     """Returns the problems that this package's own checks find in an FMI 2.0 FMU.
 
     An FMU without a binary for this machine is not run. Raises FmuError for a file that is no FMU.
     """
-    description, problems = read_description(path), archive_problems(path)
+    description, (found, damaged) = read_description(path), read_members(path)
+    if found is None:
+        return damaged
+    problems = archive_problems(path)
     with zipfile.ZipFile(path) as archive:
         names = archive.namelist()
         data = archive.read(START_VALUES) if START_VALUES in names else None
@@ -100,14 +131,17 @@ def _guid_problems(path: Path, description: Any) -> list[str]:
     """Checks that the binary refuses another model description's GUID."""
     callbacks = fmi2CallbackFunctions()
     with TemporaryDirectory(prefix="hexapod-validate-") as folder:
-        extract(path, folder)
+        unpack(path, Path(folder))
         identifier = description.coSimulation.modelIdentifier
+        library = packed_binary(folder, identifier)
+        if library is not None and incomplete(Path(library).read_bytes()):
+            return []  # archive_problems reports it; loading it would end this process
         try:
             with chdir(Path.cwd()):  # fmpy does not restore the working folder when loading fails
                 facts = {
                     "guid": FOREIGN_GUID,
                     "modelIdentifier": identifier,
-                    "libraryPath": packed_binary(folder, identifier),
+                    "libraryPath": library,
                 }
                 slave = FMU2Slave(unzipDirectory=folder, instanceName="validate", **facts)
         except Exception:  # fmpy's errors have no common type; _run_problems reports this one

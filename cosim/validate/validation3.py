@@ -9,9 +9,11 @@ from tempfile import TemporaryDirectory
 from typing import Any
 from xml.etree import ElementTree
 
-from fmpy import extract, platform_tuple
+from fmpy import platform_tuple
 from fmpy.fmi3 import FMU3Slave
 
+from hexapod_cosim.cosim.common.archives import unpack
+from hexapod_cosim.cosim.common.binaries import refuse_incomplete
 from hexapod_cosim.cosim.validate.archive import (
     BUILD_DESCRIPTION,
     DESCRIPTION,
@@ -76,10 +78,13 @@ def _run_problems(path: Path, description: Any) -> list[str]:
     Returns no problems for an FMU without a binary for this machine.
     """
     with TemporaryDirectory(prefix="hexapod-validate-") as folder:
-        extract(path, folder)
-        if not (Path(folder) / "binaries" / platform_tuple).is_dir():
+        unpack(path, Path(folder))
+        binaries = Path(folder) / "binaries" / platform_tuple
+        if not binaries.is_dir():
             return []
         try:
+            for library in binaries.iterdir():
+                refuse_incomplete(library)
             _run_step(folder, description, description.instantiationToken)
         except Exception as error:  # fmpy's errors have no common type
             return [f"binaries: {error}"]

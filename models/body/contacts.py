@@ -17,8 +17,8 @@ from hexapod_cosim.models.contact import (
     resting_damping,
     sphere_contact,
 )
-from hexapod_cosim.models.kinematics import JOINTS, LEGS, cross, rotation_matrix
-from hexapod_cosim.models.records import Array, Robot
+from hexapod_cosim.models.kinematics import JOINTS, LEGS, rotation_matrix
+from hexapod_cosim.models.records import Array, Friction, Robot
 from hexapod_cosim.models.terrain import ground
 
 
@@ -80,11 +80,9 @@ def standing_body_damping(robot: Robot, body: Array) -> Array:
     return resting_damping(robot.contact, body_contacts(robot, body))
 
 
-def sliding_robot(robot: Robot) -> Robot:
-    """Returns the robot with the tanh law in place of bristles, which bodies do not have."""
-    if robot.friction.law == "none":
-        return robot
-    return replace(robot, friction=replace(robot.friction, law="tanh", mu_static=0.0))
+def sliding_friction_of_bodies(friction: Friction) -> Friction:
+    """Returns the tanh law (eq. 35) in place of bristles, which bodies do not have."""
+    return friction if friction.law == "none" else replace(friction, law="tanh")
 
 
 def body_forces(robot: Robot, body: Array, damping: Array) -> Array:
@@ -92,24 +90,9 @@ def body_forces(robot: Robot, body: Array, damping: Array) -> Array:
 
     damping: (n,) of the contacts [s/m], nan for open ones.
     """
-    smooth = sliding_robot(robot)
+    smooth = replace(robot, friction=sliding_friction_of_bodies(robot.friction))
     forces = [
         foot_force(smooth, contact, float(held))
         for contact, held in zip(body_contacts(robot, body), damping, strict=True)
     ]
     return np.array(forces).reshape(-1, 3)
-
-
-def body_wrenches(robot: Robot, body: Array, damping: Array) -> Array:
-    """Returns forces and torques (19, 6) of the contacts on the bodies [N, N m].
-
-    Torques are about the centres of mass. damping: as in `body_forces`.
-    """
-    g = np.zeros((len(body), 6))
-    forces = body_forces(robot, body, damping)
-    for sphere, contact, force in zip(
-        body_spheres(robot), body_contacts(robot, body), forces, strict=True
-    ):
-        arm = contact.point - body[sphere.body, 0:3]
-        g[sphere.body] += np.concatenate([force, cross(arm, force)])
-    return g

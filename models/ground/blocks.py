@@ -1,35 +1,36 @@
 """Computes the faces of a surface of blocks that a sphere may touch.
 
 The surface is the union of columns with flat tops. A sphere whose centre lies in a cell may touch
-two faces at once: the top of that cell, and the nearest of the higher columns beside the cell. The
-latter is touched at its wall while the centre is lower than its top, and at its edge or corner
-above that. A neighbour that is not higher is hidden, so that there are no edges inside a flat area.
-A diagonal neighbour counts only where its nearest point is above both columns beside it; else one
-of them hides it.
+four faces at once: the top of that cell, and higher columns beside it along x, along y and across a
+corner. These are touched at their walls while the centre is lower than their tops, and at an edge
+or corner above that (eq. 34). A neighbour that is not higher is hidden, so that there are no edges
+inside a flat area. A diagonal neighbour counts only where its nearest point is above both columns
+beside it; else one of them hides it.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 
 import numpy as np
 
 from hexapod_cosim.models.ground.surface import Array, Surface
 
 UP = (0.0, 0.0, 1.0)
+TOP = "top"
+FACES = (TOP, "wall", "side", "corner")  # that a sphere can touch at once
+NEIGHBOURS = {  # rows and columns from the cell
+    "wall": ((0, -1), (0, 1)),
+    "side": ((-1, 0), (1, 0)),
+    "corner": ((-1, -1), (-1, 1), (1, -1), (1, 1)),
+}
+
+Cell = tuple[int, int]  # row, column
 
 
 def _cell(coordinate: float, count: int) -> int:
     """Returns the cell of a grid coordinate; border cells go on beyond the map."""
     return min(max(math.floor(coordinate), 0), count - 1)
-
-
-def _nearest(coordinate: float, cell: int, origin: float, size: float, count: int) -> float:
-    """Returns the coordinate of a cell's range that is nearest; border cells have no outer end."""
-    low = -math.inf if cell == 0 else origin + size * cell
-    high = math.inf if cell == count - 1 else origin + size * (cell + 1)
-    return min(max(coordinate, low), high)
 
 
 def block_height(surface: Surface, x: float, y: float) -> float:
@@ -38,38 +39,95 @@ def block_height(surface: Surface, x: float, y: float) -> float:
     return float(surface.height[row, _cell((x - surface.x0) / surface.cell, surface.columns)])
 
 
+def cell_at(surface: Surface, x: float, y: float) -> Cell:
+    """Returns row and column of the cell at (x, y) [m]."""
+    return (
+        _cell((y - surface.y0) / surface.cell, surface.rows),
+        _cell((x - surface.x0) / surface.cell, surface.columns),
+    )
+
+
+def outside(surface: Surface, x: float, y: float, cell: Cell) -> float:
+    """Returns how far (x, y) is outside of a cell [m], negative inside; border cells have no outer
+    end.
+    """
+    ways = []
+    for place, origin, index, count in (
+        (y, surface.y0, cell[0], surface.rows),
+        (x, surface.x0, cell[1], surface.columns),
+    ):
+        low = origin + surface.cell * index
+        ways.append(low - place if index > 0 else -math.inf)
+        ways.append(place - low - surface.cell if index < count - 1 else -math.inf)
+    return max(ways)
+
+
 def block_faces(surface: Surface, point: Array) -> list[tuple[float, Array]]:
     """Returns one or two faces near a point (3,): its distance [m] and the unit normal (3,).
 
     The first is the top of the point's own cell; its distance is negative below the top. The second
     is the nearest face, edge or corner of a higher neighbour, if there is one.
     """
-    row = _cell((point[1] - surface.y0) / surface.cell, surface.rows)
-    column = _cell((point[0] - surface.x0) / surface.cell, surface.columns)
-    top = float(surface.height[row, column])
-    faces = [(float(point[2]) - top, np.array(UP))]
-    walls = list(_walls(surface, point, row, column))
-    return [*faces, min(walls, key=lambda wall: wall[0])] if walls else faces
+    cell = cell_at(surface, float(point[0]), float(point[1]))
+    found = [block_face(surface, point, kind, cell) for kind in FACES]
+    faces = [face for face in found if face is not None]
+    return [faces[0], min(faces[1:], key=lambda face: face[0])] if len(faces) > 1 else faces
 
 
-def _walls(surface: Surface, point: Array, row: int, column: int) -> Iterator[tuple[float, Array]]:
-    """Yields distance and normal of the neighbours that are higher than the own cell."""
-    own = float(surface.height[row, column])
-    for dr, dc in ((0, -1), (0, 1), (-1, 0), (1, 0), (-1, -1), (-1, 1), (1, -1), (1, 1)):
-        r, c = row + dr, column + dc
-        if not (0 <= r < surface.rows and 0 <= c < surface.columns):
-            continue
-        top = float(surface.height[r, c])
-        near = np.array([
-            _nearest(point[0], c, surface.x0, surface.cell, surface.columns),
-            _nearest(point[1], r, surface.y0, surface.cell, surface.rows),
-            min(float(point[2]), top),
-        ])  # fmt: skip
-        beside = max(float(surface.height[r, column]), float(surface.height[row, c]))
-        if top <= own or (dr and dc and near[2] <= beside):
-            continue
-        way = point - near
-        distance = float(np.linalg.norm(way))
-        # a point on the wall itself: the wall's normal points back into the own cell
-        back = np.array([-float(dc), -float(dr), 0.0])
-        yield distance, way / distance if distance > 0.0 else back / np.linalg.norm(back)
+def block_face(surface: Surface, point: Array, kind: str, cell: Cell) -> tuple[float, Array] | None:
+    """Returns distance [m] and normal (3,) of one of FACES around a cell, None if there is none.
+
+    wall, side and corner are those of the higher columns beside the cell along x, along y and
+    across its corners. The columns are those of this cell also for a point outside of it, so that
+    distances change smoothly.
+    """
+    own = float(surface.height[cell])
+    if kind == TOP:
+        return float(point[2]) - own, np.array(UP)
+    faces = [
+        _neighbour(surface, point, cell, way)
+        for way in NEIGHBOURS[kind]
+        if _is_exposed(surface, float(point[2]), cell, way)
+    ]
+    return min(faces, key=lambda face: face[0]) if faces else None
+
+
+def _column(surface: Surface, row: int, column: int) -> float:
+    """Returns the height [m] of a column, of the border's beyond the map."""
+    r, c = min(max(row, 0), surface.rows - 1), min(max(column, 0), surface.columns - 1)
+    return float(surface.height[r, c])
+
+
+def _is_exposed(surface: Surface, z: float, cell: Cell, way: Cell) -> bool:
+    """Returns whether a neighbour of a cell is higher and, across a corner, not hidden at z [m]."""
+    (row, column), (dr, dc) = cell, way
+    top = _column(surface, row + dr, column + dc)
+    if top <= float(surface.height[cell]):
+        return False
+    beside = (_column(surface, row + dr, column), _column(surface, row, column + dc))
+    return dr == 0 or dc == 0 or min(z, top) > max(beside)
+
+
+def _neighbour(surface: Surface, point: Array, cell: Cell, way: Cell) -> tuple[float, Array]:
+    """Returns distance [m] and normal (3,) of the neighbouring column of a cell along `way`."""
+    (row, column), (dr, dc) = cell, way
+    top = _column(surface, row + dr, column + dc)
+    gap_x = _gap(float(point[0]), surface.x0 + surface.cell * column, surface.cell, dc)
+    gap_y = _gap(float(point[1]), surface.y0 + surface.cell * row, surface.cell, dr)
+    above = float(point[2]) - top
+    if dr and dc:
+        away = np.array([-dc * max(gap_x, 0.0), -dr * max(gap_y, 0.0), max(above, 0.0)])
+    elif above <= 0.0:  # beside the wall; behind it the distance is negative
+        return gap_x + gap_y, np.array([-float(dc), -float(dr), 0.0])
+    elif gap_x + gap_y <= 0.0:  # over the neighbour
+        return above, np.array(UP)
+    else:
+        away = np.array([-dc * gap_x, -dr * gap_y, above])
+    distance = float(np.linalg.norm(away))
+    back = np.array([-float(dc), -float(dr), 0.0])
+    return distance, away / distance if distance > 0.0 else back / np.linalg.norm(back)
+
+
+def _gap(coordinate: float, low: float, size: float, way: int) -> float:
+    """Returns the gap [m] to the neighbour on one side of a cell from `low` on, 0 along it."""
+    return low + size - coordinate if way > 0 else coordinate - low if way < 0 else 0.0

@@ -247,3 +247,28 @@ def table_row(soil: Soil) -> tuple[float, ...]:
     law = float(("none", "bekker", "granular", "mud").index(soil.law))
     shear = (soil.cohesion, math.tan(soil.friction_angle), soil.shear_displacement)
     return (law, *curve, *shear, soil.stiffness, soil.damping, soil.alpha_side, 0.0, 0.0, 0.0)
+
+
+def row_soil(row: Array) -> Soil:
+    """Returns the soil of columns 3 to 15 of a material in a grid's table (`table_row`)."""
+    law, first, second, third, cohesion, friction, displacement, stiffness, damping, side, *_ = (
+        float(number) for number in row
+    )
+    name = ("none", "bekker", "granular", "mud")[int(law)]
+    if name == "none":
+        return Soil()
+    fields = {
+        "bekker": ("frictional_modulus", "cohesive_modulus", "exponent"),
+        "granular": ("resistance", "alpha_down", "alpha_ahead"),
+        "mud": ("yield_pressure", "hardening"),
+    }[name]
+    return Soil(
+        law=name,
+        cohesion=cohesion,
+        friction_angle=math.atan(friction),
+        shear_displacement=displacement,
+        stiffness=stiffness,
+        damping=damping,
+        alpha_side=side,
+        **dict(zip(fields, (first, second, third), strict=False)),
+    )

@@ -1016,6 +1016,7 @@ static const hxVariable parameters[] = {
     {"RR.femur.angle_max", "rad", -3.141592653589793, 3.141592653589793, offsetof(struct hxVariables, definition.leg[5].link[1].angle_max), HX_REAL, 0},
     {"RR.tibia.angle_max", "rad", -3.141592653589793, 3.141592653589793, offsetof(struct hxVariables, definition.leg[5].link[2].angle_max), HX_REAL, 0},
     {"body.contact", "", 1, 2, offsetof(struct hxVariables, definition.body.contact), HX_INTEGER, 1},
+    {"body.self_contact", "", 1, 2, offsetof(struct hxVariables, definition.body.self_contact), HX_INTEGER, 1},
     {"body.torso_box[1]", "m", 0.0, 10.0, offsetof(struct hxVariables, definition.body.torso_box[0]), HX_REAL, 3},
     {"body.torso_box[2]", "m", 0.0, 10.0, offsetof(struct hxVariables, definition.body.torso_box[1]), HX_REAL, 0},
     {"body.torso_box[3]", "m", 0.0, 10.0, offsetof(struct hxVariables, definition.body.torso_box[2]), HX_REAL, 0},
@@ -1197,7 +1198,7 @@ const size_t hx_state_count = sizeof states / sizeof states[0];
 
 _Static_assert(sizeof states / sizeof states[0] == sizeof(hxCoordinates) / sizeof(double), "each state has its row");
 
-const char hx_default_guid[] = "{93b2dcf8-9af0-42bf-8178-6653a395bfd9}";
+const char hx_default_guid[] = "{6e3ed4fc-463d-415f-b49e-ea7da59c3652}";
 
 _Static_assert(HX_CONTACT_EXACT_RESTITUTION == 1, "ContactLaw");
 _Static_assert(HX_CONTACT_FLORES == 2, "ContactLaw");
@@ -1225,6 +1226,8 @@ _Static_assert(HX_PROJECTION_NONE == 1, "Projection");
 _Static_assert(HX_PROJECTION_STEP == 2, "Projection");
 _Static_assert(HX_BODY_OFF == 1, "BodyContact");
 _Static_assert(HX_BODY_ON == 2, "BodyContact");
+_Static_assert(HX_SELF_OFF == 1, "SelfContact");
+_Static_assert(HX_SELF_WARN == 2, "SelfContact");
 _Static_assert(HX_TERRAIN_FLAT == 1, "TerrainKind");
 _Static_assert(HX_TERRAIN_SLOPE == 2, "TerrainKind");
 _Static_assert(HX_TERRAIN_GRID == 3, "TerrainKind");

@@ -1,40 +1,41 @@
 #include <float.h>
 #include <math.h>
 #include <stdint.h>
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "contact_law.h"
 #include "ground/surface.h"
+#include "hexapod/message.h"
 #include "hexapod/range_check.h"
 #include "kernel.h"
 #include "robot.h"
 #include "tangent.h"
 #include "validation.h"
 
-/* A saved state: a header that identifies it, then the plant's model and state. */
+/* A saved state: a head that identifies it, then the plant's model and state. */
 typedef struct {
   uint64_t magic, version, size, checksum;
-  uint64_t terrain; /* checksum of the grid; 0: none */
+  uint64_t terrain; /* checksum of the grid; 0: none. The head ends here */
   hxModel model;
   hxState state;
   hxFootprints footprints; /* the last ones; unused entries are 0 */
 } hxSavedPlant;
 
 static const uint64_t magic = 0x74616c5064507868u; /* "hxPdPlat" */
-static const uint64_t saved_version = 9;
+static const uint64_t saved_version = 10;
 
-/* Returns the checksum of everything behind it, of the ring the footprints that exist. */
-static uint64_t checksum(const hxSavedPlant *saved) {
-  const size_t used = (size_t)hx_footprints_number(&saved->footprints),
-               end = offsetof(hxSavedPlant, footprints.print) + used * sizeof(hxFootprint);
-  return hx_checksum(0, &saved->terrain, end - offsetof(hxSavedPlant, terrain));
+/* Returns the checksum of a saved plant's bytes behind it, of the ring those of its footprints. */
+static uint64_t checksum(const unsigned char *bytes, int footprints) {
+  const size_t used = (size_t)footprints * sizeof(hxFootprint),
+               end = offsetof(hxSavedPlant, footprints.print) + used;
+  return hx_checksum(0, bytes + offsetof(hxSavedPlant, terrain),
+                     end - offsetof(hxSavedPlant, terrain));
 }
 
 /* Sets the plant's message and returns the status. */
 static hxStatus fail(hxPlant *plant, hxStatus status, const char *text) {
-  snprintf(plant->message, HX_MESSAGE_SIZE, "%s", text);
+  hx_print(plant->message, HX_MESSAGE_SIZE, "%s", text);
   return status;
 }
 
@@ -58,7 +59,7 @@ void hx_plant_set_terrain(hxPlant *plant, const hxTerrain *terrain) { plant->ter
 static hxStatus check_terrain(const hxPlant *plant, const hxDefinition *d, char *message) {
   if (d->terrain.kind != HX_TERRAIN_GRID) return HX_OK;
   if (!plant->terrain) {
-    snprintf(message, HX_MESSAGE_SIZE,
+    hx_print(message, HX_MESSAGE_SIZE,
              "terrain.kind: got grid, expected a grid; load one and set it before the reset "
              "(hx_plant_set_terrain), or choose flat or slope");
     return HX_INVALID_MODEL;
@@ -67,7 +68,7 @@ static hxStatus check_terrain(const hxPlant *plant, const hxDefinition *d, char 
                              fmax(d->body.knee_radius, d->body.shank_radius));
   const double cell = hx_terrain_cell_size(plant->terrain);
   if (hx_terrain_surface(plant->terrain) == HX_SURFACE_SMOOTH || cell >= 2.0 * radius) return HX_OK;
-  snprintf(message, HX_MESSAGE_SIZE,
+  hx_print(message, HX_MESSAGE_SIZE,
            "terrain.grid: got blocks with cells of %.9g m, expected at least %.9g m, twice the "
            "largest radius that touches them; resample the grid, or reduce foot.radius",
            cell, 2.0 * radius);
@@ -83,7 +84,7 @@ static hxStatus check_start_depth(const hxPlant *plant, char message[HX_MESSAGE_
   hx_kernel()->depths(&plant->model, &plant->state.contact, &plant->state.motion, &depths);
   for (int leg = 0; leg < HX_LEGS; ++leg)
     if (delta[leg] > radius) {
-      snprintf(message, HX_MESSAGE_SIZE,
+      hx_print(message, HX_MESSAGE_SIZE,
                "initial.position: got foot %s %.4g m deep in the ground, expected at most its "
                "radius, %.4g m; raise initial.position[3] by %.4g m or more, or lower "
                "terrain.height",
@@ -147,7 +148,7 @@ static double input_fingerprint(const hxInput *input) {
  * sequence of that call continues, so that the motion does not depend on the interruption. */
 static hxStatus advance(hxPlant *plant, const hxInput *input, const hxInput *rate, double t_end,
                         hxEvents *events) {
-  const hxState before = plant->state;
+  hxState before;
   hxCommand command, change;
   int finite;
   const hxCommand *ramp = ramp_from_rate(rate, &change, &finite);
@@ -156,13 +157,14 @@ static hxStatus advance(hxPlant *plant, const hxInput *input, const hxInput *rat
         plant, HX_INVALID_ARGUMENT,
         "rates of inputs: got a number that is not finite, expected finite rates per second");
   if (!(t_end >= plant->state.time && t_end <= DBL_MAX)) {
-    snprintf(plant->message, HX_MESSAGE_SIZE,
+    hx_print(plant->message, HX_MESSAGE_SIZE,
              "end of step: got %.17g s, expected a finite time of at least %.17g s", t_end,
              plant->state.time);
     return HX_INVALID_ARGUMENT;
   }
   hxStatus status = hx_input_check(input, plant->message);
   if (status != HX_OK) return status;
+  hx_copy_state(&plant->model, &before, &plant->state);
   const double fingerprint =
       !ramp && (events->stop || before.call_input != 0.0) ? input_fingerprint(input) : 0.0;
   const int resumes = before.call_input != 0.0 && before.call_input == fingerprint &&
@@ -173,7 +175,7 @@ static hxStatus advance(hxPlant *plant, const hxInput *input, const hxInput *rat
   status = hx_kernel()->integrate(&plant->model, &command, ramp, t_end, events, &plant->state,
                                   plant->message);
   if (status != HX_OK) {
-    plant->state = before;
+    hx_copy_state(&plant->model, &plant->state, &before);
     hx_footprints_take_back(&plant->footprints);
     return status;
   }
@@ -217,45 +219,60 @@ size_t hx_plant_footprints(const hxPlant *plant, hxFootprint *footprint, size_t 
 
 size_t hx_plant_state_size(void) { return sizeof(hxSavedPlant); }
 
+/* The head of hxSavedPlant. */
+typedef struct {
+  uint64_t magic, version, size, checksum, terrain;
+} hxSavedHead;
+
+/* The saved plant is put together in the caller's bytes, which may have any alignment. */
 void hx_plant_get_state(const hxPlant *plant, void *bytes) {
-  hxSavedPlant saved = {.magic = magic,
-                        .version = saved_version,
-                        .size = sizeof saved,
-                        .model = plant->model,
-                        .state = plant->state};
-  saved.terrain = plant->model.terrain ? hx_terrain_checksum(plant->model.terrain) : 0;
-  saved.model.terrain_bits = 0;
-  hx_footprints_copy(&saved.footprints, &plant->footprints.kept);
-  saved.checksum = checksum(&saved);
-  memcpy(bytes, &saved, sizeof saved);
+  unsigned char *to = bytes;
+  const uint64_t grid = plant->model.terrain ? hx_terrain_checksum(plant->model.terrain) : 0;
+  hxSavedHead head = {magic, saved_version, sizeof(hxSavedPlant), 0, grid};
+  memcpy(to, &head, sizeof head);
+  memcpy(to + offsetof(hxSavedPlant, model), &plant->model, sizeof plant->model);
+  memset(to + offsetof(hxSavedPlant, model.terrain_bits), 0, sizeof plant->model.terrain_bits);
+  memcpy(to + offsetof(hxSavedPlant, state), &plant->state, sizeof plant->state);
+  hx_footprints_write(to + offsetof(hxSavedPlant, footprints), &plant->footprints.kept);
+  head.checksum = checksum(to, hx_footprints_number(&plant->footprints.kept));
+  memcpy(to, &head, sizeof head);
 }
 
-hxStatus hx_plant_set_state(hxPlant *plant, const void *bytes, size_t size) {
-  hxSavedPlant saved;
-  if (size != sizeof saved) {
-    snprintf(plant->message, HX_MESSAGE_SIZE,
+/* Returns whether this plant can continue a saved one, else sets its message. */
+static hxStatus check_saved(hxPlant *plant, const unsigned char *bytes, size_t size,
+                            hxSavedHead *head) {
+  if (size != sizeof(hxSavedPlant)) {
+    hx_print(plant->message, HX_MESSAGE_SIZE,
              "saved state: got %zu bytes, expected %zu; save it again with this version", size,
-             sizeof saved);
+             sizeof(hxSavedPlant));
     return HX_BAD_STATE;
   }
-  memcpy(&saved, bytes, sizeof saved);
-  if (saved.magic != magic || saved.version != saved_version || saved.size != sizeof saved)
+  memcpy(head, bytes, sizeof *head);
+  if (head->magic != magic || head->version != saved_version || head->size != size)
     return fail(
         plant, HX_BAD_STATE,
         "saved state: got one of another version, expected one of this version; save it again");
-  if (saved.checksum != checksum(&saved) || !hx_footprints_are_clear(&saved.footprints))
+  const int footprints = hx_footprints_check(bytes + offsetof(hxSavedPlant, footprints));
+  if (footprints < 0 || head->checksum != checksum(bytes, footprints))
     return fail(
         plant, HX_BAD_STATE,
         "saved state: got a damaged one, expected one whose checksum is right; save it again");
-  if (saved.terrain && (!plant->terrain || hx_terrain_checksum(plant->terrain) != saved.terrain))
+  if (head->terrain && (!plant->terrain || hx_terrain_checksum(plant->terrain) != head->terrain))
     return fail(plant, HX_BAD_STATE,
                 "saved state: its ground is a grid that this plant does not have; set the one that "
                 "it was saved with before");
-  saved.model.terrain = saved.terrain ? plant->terrain : NULL;
-  plant->model = saved.model;
-  plant->state = saved.state;
-  hx_footprints_clear(&plant->footprints);
-  hx_footprints_copy(&plant->footprints.kept, &saved.footprints);
+  return HX_OK;
+}
+
+hxStatus hx_plant_set_state(hxPlant *plant, const void *bytes, size_t size) {
+  const unsigned char *from = bytes;
+  hxSavedHead head;
+  const hxStatus status = check_saved(plant, from, size, &head);
+  if (status != HX_OK) return status;
+  memcpy(&plant->model, from + offsetof(hxSavedPlant, model), sizeof plant->model);
+  memcpy(&plant->state, from + offsetof(hxSavedPlant, state), sizeof plant->state);
+  plant->model.terrain = head.terrain ? plant->terrain : NULL;
+  hx_footprints_read(&plant->footprints, from + offsetof(hxSavedPlant, footprints));
   return HX_OK;
 }
 
@@ -296,18 +313,18 @@ hxStatus hx_plant_set_coordinates(hxPlant *plant, double t, const hxCoordinates 
  * their rounding (docs/equations.md). */
 static const double switch_band = 1e-10;
 
-/* Switches the contacts of torso, knees and shanks that are due; feet keep theirs. */
+/* Switches the contacts that are due and have no indicator: those of torso, knees and shanks, and
+ * of feet with walls. Feet keep theirs with the ground below them. */
 static void switch_bodies(hxPlant *plant) {
   hxDepths depths;
   const hxModel *model = &plant->model;
-  if (model->rows + model->torso_rows == model->foot_rows) return;
+  if (model->rows + model->torso_rows == 1) return;
   hx_kernel()->depths(model, &plant->state.contact, &plant->state.motion, &depths);
-  for (int k = 0; k < model->foot_rows; ++k)
-    for (int leg = 0; leg < HX_LEGS; ++leg) {
-      double *delta = &depths.delta[model->row[k]][leg];
-      *delta = plant->state.contact.closed[model->row[k]][leg] != 0.0 ? fmax(*delta, switch_band)
-                                                                      : fmin(*delta, -switch_band);
-    }
+  for (int leg = 0; leg < HX_LEGS; ++leg) {
+    double *delta = &depths.delta[HX_FOOT][leg];
+    *delta = plant->state.contact.closed[HX_FOOT][leg] != 0.0 ? fmax(*delta, switch_band)
+                                                              : fmin(*delta, -switch_band);
+  }
   hx_footprints_begin(&plant->footprints);
   hx_kernel()->switch_contacts(model, &depths, &plant->footprints, &plant->state);
 }

@@ -1,13 +1,14 @@
 #include "hexapod/range_check.h"
 
-#include <stdio.h>
 #include <string.h>
+
+#include "hexapod/message.h"
 
 void hx_check_fail(hxChecker *checker, const char *name, double got, const char *expected) {
   if (checker->status != HX_OK) return;
   checker->status = HX_INVALID_MODEL;
   if (checker->message)
-    snprintf(checker->message, HX_MESSAGE_SIZE, "%s: got %.9g, expected %s", name, got, expected);
+    hx_print(checker->message, HX_MESSAGE_SIZE, "%s: got %.9g, expected %s", name, got, expected);
 }
 
 static double number_at(const void *structure, const hxRange *range) {
@@ -27,7 +28,7 @@ void hx_check_ranges(hxChecker *checker, const void *structure, const hxRange *r
   for (size_t i = 0; i < n; ++i) {
     const double x = number_at(structure, &range[i]);
     if (x >= range[i].min && x <= range[i].max) continue;
-    snprintf(expected, sizeof expected, "%.9g to %.9g %s", range[i].min, range[i].max,
+    hx_print(expected, sizeof expected, "%.9g to %.9g %s", range[i].min, range[i].max,
              range[i].unit);
     hx_check_fail(checker, range[i].name, x, expected);
     return;
@@ -41,5 +42,5 @@ const char *hx_leg_name(int leg) {
 
 void hx_joint_label(int leg, int joint, const char *quantity, char name[32]) {
   static const char *const joints[HX_JOINTS] = {"coxa", "femur", "tibia"};
-  snprintf(name, 32, "%s.%s.%s", hx_leg_name(leg), joints[joint], quantity);
+  hx_print(name, 32, "%s.%s.%s", hx_leg_name(leg), joints[joint], quantity);
 }

@@ -8,6 +8,7 @@
 #define HX_STATE_H
 
 #include <stddef.h>
+#include <string.h>
 
 #include "ground/footprints.h"
 #include "hexapod/hexapod.h"
@@ -114,8 +115,8 @@ typedef struct hxCommand {
   double time; /* s  time of the command, from which kinematic drives extrapolate (eq. 13) */
 } hxCommand;
 
-/* State of the contacts. It changes at touch-down and lift-off, the plastic depth at the end of
- * steps; never within a step. */
+/* State of the contacts. It changes at touch-down and lift-off, plastic depth and nearest points at
+ * the end of steps; never within a step. */
 typedef struct hxContactState {
   double closed[HX_ROWS][HX_SLOTS];       /* 1 from touch-down to lift-off, else 0 */
   double damping[HX_ROWS][HX_SLOTS];      /* s/m  d of eq. 14, fixed at touch-down */
@@ -125,10 +126,13 @@ typedef struct hxContactState {
   double static_rise[HX_ROWS][HX_SLOTS];  /* 1        mu_s - mu of eq. 18 */
   double on_soil[HX_SLOTS];               /* 1    1: the foot touched down on soil */
   double soil[HX_SLOTS][HX_SOIL_SIZE];    /* an hxSoil, where on_soil is 1 */
-  double plastic[HX_SLOTS];  /* m    depth at which feet touch soil: z_p, or that of the footprint
-                              *      above which a foot is; 0 on rigid ground */
-  double place[2][HX_SLOTS]; /* m    x and y where feet left the bottom of that footprint */
-  double cell[2][HX_SLOTS];  /* 1    blocks: column and row over which a foot is; < 0: not held */
+  double plastic[HX_SLOTS];    /* m    depth at which feet touch soil: z_p, or that of the footprint
+                                *      above which a foot is; 0 on rigid ground */
+  double place[2][HX_SLOTS];   /* m    x and y where feet left the bottom of that footprint */
+  double cell[2][HX_SLOTS];    /* 1    blocks: column and row over which a foot is; < 0: not held */
+  double nearest[2][HX_SLOTS]; /* m  smooth grids: x and y from a foot's centre to the point nearest
+                                *    to it at the start of a step, where the search for that point
+                                *    begins; 0 between calls */
 } hxContactState;
 
 /* Penetration and approach speed of all contacts; only the model's rows are set. */
@@ -206,9 +210,9 @@ typedef struct hxState {
   hxPlantMotion motion;
   hxContactState contact;
   double evaluations, steps, rejected, touchdowns;
+  hxMeasured measured;
   hxMoment moment;       /* end of the last step */
   hxCompleted completed; /* model exchange: end of the last step */
-  hxMeasured measured;
 } hxState;
 
 struct hxPlant {
@@ -218,6 +222,13 @@ struct hxPlant {
   char message[HX_MESSAGE_SIZE];
   hxFootprintLog footprints; /* outside the state, which every call copies */
 };
+
+/* Copies the parts of a state that a step of this model changes. */
+static inline void hx_copy_state(const hxModel *model, hxState *to, const hxState *from) {
+  memcpy(to, from, offsetof(hxState, moment.contact[1]));
+  for (int k = 1; k < model->rows + model->torso_rows; ++k)
+    to->moment.contact[model->row[k]] = from->moment.contact[model->row[k]];
+}
 
 /* Returns whether a row's contacts are those of feet. */
 static inline int hx_is_of_foot(int row) { return row < HX_KNEE; }

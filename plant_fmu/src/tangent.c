@@ -5,7 +5,7 @@
 #include <stdint.h>
 #include <string.h>
 
-#if defined(__GNUC__)
+#if defined(__GNUC__) && !defined(HX_NO_COMPLEX)
 
 /* products of complex numbers without the standard's treatment of infinities */
 #if defined(__clang__)

@@ -7,10 +7,11 @@
 
 HX_HIDDEN_BEGIN
 
-#if defined(__GNUC__)
+/* HX_NO_COMPLEX: build as a compiler without arithmetic on complex numbers does, such as MSVC */
+#if defined(__GNUC__) && !defined(HX_NO_COMPLEX)
 #define HX_HAS_TANGENT 1
 #else
-#define HX_HAS_TANGENT 0 /* MSVC has no arithmetic on complex numbers */
+#define HX_HAS_TANGENT 0
 #endif
 
 /* A point and a direction. */

@@ -31,6 +31,7 @@ HEADERS = {"plane", "state"}
 ONE_LEG = {
     "place_leg": "place_legs",
     "place_foot": "place_feet",
+    "planned_foot": "planned_feet",
     "limit_joint": "limit_joints",
     "begin": "reset",
     "tick": "step",
@@ -39,7 +40,8 @@ WITHOUT_TWIN = {"total_weight", "plane_acceleration", "step_at"}
 PREFIX = re.compile(
     r"^hx_((burden|compliance|compliant|contact_detector|sensor_watch|controller|foot_law|gait"
     r"|hold|inverse_dynamics|leg_solver|landings"
-    r"|planned_squeeze|posture|slip_pid|suspension|support|touchdown|warmth|command_ramp|foot_paths)_)?"
+    r"|paper|planned_squeeze|posture|slip_pid|suspension|support|touchdown|warmth"
+    r"|command_ramp|foot_paths)_)?"
 )
 FUNCTION = re.compile(r"^(?:static )?(?:const )?\w+ \*?(\w+)\([^;]*?\) \{", re.MULTILINE)
 CONSTANT = re.compile(r"(\w+) = (-?[\d.e+-]+)(?=[,;])")
@@ -143,11 +145,11 @@ def cited(text: str) -> set[int]:
 def test_each_equation_of_the_page_is_numbered_in_order() -> None:
     tags = re.findall(r"\\tag\{(\w+)\}", (ROOT / "docs/control.md").read_text(encoding="utf-8"))
     assert tags == [f"C{number}" for number in range(1, len(tags) + 1)]
-    assert len(tags) == 46
+    assert len(tags) == 49
 
 
 def test_each_citation_exists_in_the_page_and_each_equation_is_cited_by_both() -> None:
-    known = set(range(1, 47))
+    known = set(range(1, 50))
     python, c = (
         {
             path: cited(path.read_text(encoding="utf-8"))
@@ -165,5 +167,5 @@ def test_each_citation_exists_in_the_page_and_each_equation_is_cited_by_both() -
 
 def test_each_equation_that_the_picture_names_exists() -> None:
     assert cited((ROOT / "docs/images/control_loop.svg").read_text(encoding="utf-8")) <= set(
-        range(1, 47)
+        range(1, 50)
     )

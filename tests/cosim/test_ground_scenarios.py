@@ -16,7 +16,11 @@ from hexapod_cosim.cosim.master.fmu import Fmu
 from hexapod_cosim.cosim.master.recorder import Recording
 from hexapod_cosim.cosim.report.relief import write_heights
 from hexapod_cosim.cosim.results.walk import body_height
-from hexapod_cosim.cosim.results.warnings import off_map_warnings, unused_settings
+from hexapod_cosim.cosim.results.warnings import (
+    off_map_warnings,
+    overlap_warnings,
+    unused_settings,
+)
 from hexapod_cosim.cosim.scenario.scenario import (
     load_scenario,
     scenario_from_table,
@@ -148,3 +152,16 @@ def test_a_robot_that_leaves_the_map_is_reported_with_time_and_place() -> None:
     (warning,) = off_map_warnings(part, surface)
     assert "left the map of the ground at 0.200 s, at x = 2.5 m, y = 0 m" in warning
     assert off_map_warnings(part, None) == []
+
+
+def test_overlapping_legs_are_reported_once_and_only_on_request() -> None:
+    names = ("time", *(f"{leg}.clearance" for leg in LEG_NAMES))
+    rows = np.full((4, 7), 0.02)
+    rows[:, 0] = [0.0, 0.5, 1.0, 1.5]
+    rows[2, 1:3], rows[3, 1:3] = -0.001, -0.0032
+    run = Recording(names, rows)
+    assert overlap_warnings(run, {"body.self_contact": 1.0}) == []
+    assert overlap_warnings(run.rows(slice(0, 2)), {"body.self_contact": 2.0}) == []
+    (warning,) = overlap_warnings(run, {"body.self_contact": 2.0})
+    assert warning.startswith("legs overlapped from 1.000 s on, for 50.0% of the time: leg LF was ")
+    assert "3.2 mm inside its neighbour at 1.500 s" in warning

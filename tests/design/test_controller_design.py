@@ -360,9 +360,9 @@ def test_caveats_are_kept_and_warned_about(tmp_path: Path) -> None:
         ),
         ("\n[slip]", "\n[slop]", "missing section.*\\[slip\\]"),
         ("stiffness = ", "stiffness = -", "suspension.stiffness: impossible value"),
-        ("format = 2", "format = 1", "unknown format"),
+        ("format = 3", "format = 2", "unknown format"),
         ("limit = ", "limit = true # ", "requirements.slip_limit: wrong type"),
-        ("format = 2", "format = ", "not a TOML file"),
+        ("format = 3", "format = ", "not a TOML file"),
     ],
 )
 def test_a_damaged_gains_file_is_refused(old: str, new: str, message: str, tmp_path: Path) -> None:

@@ -23,20 +23,23 @@ SEES = {
 }
 # what each room of cosim may import; study has rooms of its own
 LOW = ["common", "interface", "scenario", "master"]
+RUNNING = [*LOW, "control", "export", "results", "design"]
 ROOMS = {
     "common": [],
     "interface": LOW[:1],
     "scenario": LOW[:2],
     "master": LOW[:3],
+    "control": LOW,
     "export": LOW,
     "results": LOW,
     "validate": [*LOW, "export"],
     "design": [*LOW, "export"],
     "report": [*LOW, "export", "results"],
-    "run": [*LOW, "export", "results", "design"],
+    "run": RUNNING,
+    "course": [*RUNNING, "report", "run"],
     "study.plan": [*LOW, "results"],
     "study.store": [*LOW, "results", "study.plan"],
-    "study.execute": [*LOW, "export", "results", "design", "run", "study.plan", "study.store"],
+    "study.execute": [*RUNNING, "run", "study.plan", "study.store"],
     "study.report": [*LOW, "results", "study.plan", "study.store"],
 }
 MOST_FILES = 20  # in a folder that people write

@@ -20,11 +20,11 @@ from hexapod_cosim.models.body.contacts import (
     body_spheres,
     standing_body_damping,
 )
-from hexapod_cosim.models.body.slopes import body_slopes
 from hexapod_cosim.models.contact import standing_damping
 from hexapod_cosim.models.dynamics import Command, accelerations
 from hexapod_cosim.models.records import Array
 from hexapod_cosim.models.stage import keep_slopes, solve_stage
+from hexapod_cosim.models.touch.forces import contacts_of
 
 DENSE = 1e-10  # relative: the error of the dense solution, whose condition number is about 1e6
 Z = 7e-4  # s: h gamma of a step in which the stiff terms dominate
@@ -113,15 +113,13 @@ def test_an_implicit_stage_with_the_body_in_the_ground_is_the_dense_one(core: ct
     body, command = sprawled(robot, 5), random_command(robot, 5)
     damping, held = standing_damping(robot, body), standing_body_damping(robot, body)
     bristle, rng = np.zeros((6, 3)), np.random.default_rng(5)
-    slopes = keep_slopes(robot, body, bristle, command, damping, 0.0)
-    touching = (held, body_slopes(robot, body, held, 0.0))
+    touching = contacts_of(robot, damping, held)
+    slopes = keep_slopes(robot, body, bristle, command, touching, 0.0)
     plant = at(core, robot, body)
     for _ in range(3):
         s_x, s_v = rng.normal(0.0, 1e-3, (19, 6)), rng.normal(0.0, 0.1, (19, 6))
         change = (s_x.ravel(), s_v.ravel(), bristle)
-        dense = solve_stage(
-            robot, body, bristle, command, damping, slopes, Z, change, touching=touching
-        )
+        dense = solve_stage(robot, body, bristle, command, touching, slopes, Z, change)
         nu, alpha = stage_rates(core, plant, command, s_x, s_v)
         assert distance(alpha, dense.alpha.reshape(19, 6)) < DENSE
         assert distance(nu, dense.nu.reshape(19, 6)) < DENSE

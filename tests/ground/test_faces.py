@@ -6,7 +6,7 @@ import ctypes as ct
 
 import numpy as np
 import pytest
-from grids import BLOCKS, CORNER, NEAREST, SIDE, TOP, WALL, Ground, grid_bytes, sampled
+from grids import BLOCKS, CORNER, NEAREST, SIDE, SMOOTH, TOP, WALL, Ground, grid_bytes, sampled
 
 from hexapod_cosim.models.records import Array
 
@@ -70,6 +70,27 @@ def test_distance_and_normal_are_continuous_over_1000_borders_of_cells(core: ct.
         before, after = ground.face(point - nm), ground.face(point + nm)
         assert abs(after[0] - before[0]) < 3e-9  # the slope times 2 nm
         assert np.abs(after[1] - before[1]).max() < 1e-6
+
+
+@pytest.mark.parametrize("kind", [SMOOTH, BLOCKS], ids=["smooth", "blocks"])
+@pytest.mark.parametrize("cell", [0.05, 0.004], ids=["50 mm", "4 mm"])
+def test_no_sphere_is_deeper_than_its_bound(core: ct.CDLL, kind: int, cell: float) -> None:
+    rng = np.random.default_rng(11)
+    height = rng.uniform(-0.01, 0.01, (50, 40)) + np.linspace(0.0, 0.2, 40)
+    ground, radius = Ground(core, grid_bytes(height, cell=cell, kind=kind)), 0.015
+    low, high = [-4 * cell, -4 * cell, -0.03], [44 * cell, 54 * cell, 0.3]
+    for centre in rng.uniform(low, high, (3000, 3)):  # at most 40 mm below the surface
+        centre[2] += 0.2 * np.clip(centre[0] / (39 * cell), 0.0, 1.0)
+        distance, _, _ = ground.face(centre)
+        assert ground.depth_bound(centre, radius) >= radius - distance
+
+
+def test_spheres_far_above_a_grid_are_known_not_to_touch_it(core: ct.CDLL) -> None:
+    rng = np.random.default_rng(12)
+    ground = Ground(core, grid_bytes(rng.uniform(-0.01, 0.01, (50, 40)), cell=0.05))
+    for centre in rng.uniform([0.2, 0.2, 0.06], [1.7, 2.2, 1.0], (300, 3)):
+        assert ground.depth_bound(centre, 0.015) < 0.0
+    assert ground.depth_bound([1.0, 1.0, 1.0], 0.06) == 0.06  # beyond the reach: not known
 
 
 def test_the_border_s_height_goes_on_beyond_the_grid(core: ct.CDLL) -> None:

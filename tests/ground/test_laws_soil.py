@@ -194,10 +194,10 @@ def test_the_ring_forgets_the_oldest_footprints_and_takes_back_those_of_a_call(
     """
     depth = np.zeros((3, 4))
     core.hx_probe_footprints(pointer(depth))
-    # at x = 0, 475, 476 and 1499: before the call, in it, and after it was taken back
-    assert depth[0] == pytest.approx([0.0, 0.0, 0.477, 1.5])
+    # at x = 0, 987, 988 and 1499: before the call, in it, and after it was taken back
+    assert depth[0] == pytest.approx([0.0, 0.0, 0.989, 1.5])
     assert depth[1] == pytest.approx([2.0, 0.0, 0.0, 1.5])
-    assert depth[2] == pytest.approx([0.0, 0.0, 0.477, 1.5])
+    assert depth[2] == pytest.approx([0.0, 0.0, 0.989, 1.5])
 
 
 def test_soil_on_a_slope_creeps_less_than_it_shears(core: ct.CDLL) -> None:

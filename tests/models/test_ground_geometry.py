@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from hexapod_cosim.models import load_robot
-from hexapod_cosim.models.contact import foot_contacts, wall_contacts
+from hexapod_cosim.models.contact import foot_contacts
 from hexapod_cosim.models.ground.blocks import block_faces
 from hexapod_cosim.models.ground.catalogue import make_surface
 from hexapod_cosim.models.ground.smooth import height_and_slopes, nearest_point, smooth_distance
@@ -19,6 +19,7 @@ from hexapod_cosim.models.kinematics import body_states, foot_centres
 from hexapod_cosim.models.records import Array, Terrain
 from hexapod_cosim.models.statics import standing
 from hexapod_cosim.models.terrain import ground, ground_faces, ground_height
+from hexapod_cosim.models.touch.forces import contacts_at, open_contacts
 
 PLANE = 1e-12  # m
 CLOSED_FORM = 1e-9  # m
@@ -225,14 +226,15 @@ def test_a_foot_beside_a_step_has_two_contacts() -> None:
     front = float(foot_centres(robot, body)[0, 0])
     step = Surface(kind="blocks", height=[[0.0, 0.04]], x0=front + 0.01 - 1.0, y0=-1.0, cell=1.0)  # type: ignore[arg-type]
     robot = replace(robot, terrain=Terrain(kind="grid", surface=step))
-    floor, wall = foot_contacts(robot, body)[0], wall_contacts(robot, body)[0]
-    assert wall is not None
+    contacts = contacts_at(robot, body, open_contacts(robot))
+    floor, walls = contacts[0], contacts[6:12]
+    wall = walls[0]
     assert wall.penetration == pytest.approx(0.005, abs=PLANE)
     assert wall.normal.tolist() == [-1.0, 0.0, 0.0]
     assert floor.penetration == pytest.approx(
         foot_contacts(load_robot("athena"), body)[0].penetration
     )
-    touching = [wall is not None and wall.penetration > 0.0 for wall in wall_contacts(robot, body)]
+    touching = [wall.penetration > 0.0 for wall in walls]
     assert touching == [True, False, False] * 2
 
 

@@ -250,7 +250,7 @@ HX_API void hx_probe_soil(const hxSoilDefinition *definition, const double *row,
  * first places; writes the depths at four places before the call, in it and after it was taken
  * back. */
 HX_API void hx_probe_footprints(double depth[3][4]) {
-  static const double place[4] = {0.0, 475.0, 476.0, 1499.0};
+  static const double place[4] = {0.0, 987.0, 988.0, 1499.0};
   static hxFootprintLog log;
   hx_footprints_clear(&log);
   for (int k = 0; k < 1500; ++k)
@@ -417,6 +417,12 @@ HX_API void hx_probe_face(const hxTerrain *terrain, int kind, const double point
   out[0] = face.distance;
   memcpy(out + 1, face.normal, sizeof face.normal);
   memcpy(out + 4, face.bend, sizeof face.bend);
+}
+
+/* The upper bound of a sphere's depth in a grid; out: one number. */
+HX_API void hx_probe_depth_bound(const hxTerrain *terrain, const double centre[3], double radius,
+                                 double out[1]) {
+  out[0] = hx_terrain_depth_bound(terrain, centre, radius);
 }
 
 /* Switches the plant's contacts and returns them. state: closed, damping, impact speed. */

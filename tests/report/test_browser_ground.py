@@ -12,6 +12,7 @@ import pytest
 from browser import FLAGS, Opened, find_chromium, launcher
 
 from hexapod_cosim.cosim.report.report import write_report
+from hexapod_cosim.cosim.results.footprints import find_footprints
 from hexapod_cosim.cosim.results.results import StoredResult, stored_result
 from hexapod_cosim.cosim.results.walk import GRID
 from hexapod_cosim.cosim.run.run import simulate
@@ -46,11 +47,13 @@ def opened(
     sunk: float = 0.0,
     **how: Any,
 ) -> Opened:
-    """Opens the report of the walk as if on a surface, with its feet deeper by `sunk`."""
+    """Opens the report of the walk as if on a surface, its feet in footprints of depth `sunk`."""
     recording = walk.view.recording
     data = recording.data.copy()
     for leg in LEG_NAMES:
         data[:, recording.names.index(f"{leg}.foot.position[3]")] -= sunk
+        contact = data[:, recording.names.index(f"{leg}.foot.contact")]
+        data[:, recording.names.index(f"{leg}.foot.sinkage")] = sunk * contact
     parameters = {**walk.view.parameters, "terrain.kind": float(GRID)}
     view = replace(
         walk.view,
@@ -112,9 +115,27 @@ def test_feet_in_soil_leave_a_dent_at_each_touch_down(
 def test_feet_on_hard_ground_leave_no_dents(
     walk: StoredResult, tmp_path: Path, browser: Any
 ) -> None:
-    page = opened(walk, make_surface("wave", {}), tmp_path, browser, sunk=SUNK)
+    page = opened(walk, make_surface("wave", {}), tmp_path, browser)
     assert page.value("window.hexapod.shown('kinematic').dents") == 0
     assert "contours every" in page.page.locator(".keys").inner_text()
+    page.close()
+
+
+def test_footprints_in_a_soft_plane_are_drawn_too(
+    plant_build: Path, tmp_path: Path, browser: Any
+) -> None:
+    overrides = ["duration=2.5", "soil=dry_sand", "foot.pad_radius=0.025", "command.vx=0.06"]
+    run = stored_result(simulate(load_scenario("walk_flat", overrides=overrides)))
+    write_report({"kinematic": run}, tmp_path, warn=lambda _: None)
+    page = Opened(browser, tmp_path / "report.html", address="#t=2.4")
+    assert page.errors == []
+    found = find_footprints(run.view.recording, run.view.parameters)
+    assert len(found) >= 9
+    assert min(one.depth for one in found) > 1e-3  # deep enough to be drawn
+    assert {one.radius for one in found} == {0.025}
+    page.seek(2.499)
+    staying = [one for one in found if one.end > 2.499]
+    assert page.value("window.hexapod.shown('kinematic').dents") == len(staying)
     page.close()
 
 

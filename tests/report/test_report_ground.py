@@ -161,7 +161,7 @@ def test_the_text_of_the_ground_has_its_name_and_parameters() -> None:
     patches = [{"x": 0.5, "y": 0.0, "size": 0.4, "mu": 0.3}]
     surface = make_surface("stairs", {"step_height": 0.03, "num_steps": 4, "patch": patches})
     assert describe_terrain(surface, ON_GRID) == (
-        "stairs (step_height = 0.03, num_steps = 4, 1 patch, heights from 0 to 120 mm)"
+        "stairs (step_height = 0.03 m, num_steps = 4, 1 patch, heights from 0 to 120 mm)"
     )
     assert describe_terrain(None, {"terrain.kind": 1.0}) == "level plane"
     slope = {"terrain.kind": 2.0, "terrain.incline": math.radians(5.0)}

@@ -5,7 +5,13 @@ from __future__ import annotations
 import math
 
 from hexapod_cosim.controller import Gains, Margins, Requirements, SlipGains, SuspensionGains
-from hexapod_cosim.controller.gains import TRIPOD_LEGS, HoldGains, LimitGains, SupportGains
+from hexapod_cosim.controller.gains import (
+    TRIPOD_LEGS,
+    HoldGains,
+    LimitGains,
+    PaperSlipGains,
+    SupportGains,
+)
 from hexapod_cosim.models import Robot
 
 PERIOD = 0.005  # s
@@ -20,6 +26,9 @@ MARGINS = Margins(
     support_torque=0.0,
     spectral_radius=0.99,
     binding="none",
+    paper_phase_margin=60.0,
+    paper_gain_margin=8.0,
+    paper_spectral_radius=0.99,
 )
 SLIP = SlipGains(
     kp=0.2,
@@ -30,6 +39,16 @@ SLIP = SlipGains(
     load_time=0.03,
     tracking_time=0.02,
     limit=1.0,
+)
+PAPER_SLIP = PaperSlipGains(
+    kp=1e-4,
+    ki=2e-3,
+    kd=1e-6,
+    derivative_time=0.01,
+    filter_time=0.01,
+    load_time=0.03,
+    tracking_time=0.02,
+    limit=0.015,
 )
 HOLD = HoldGains(
     attitude_rate=2.0,
@@ -73,5 +92,7 @@ def make_gains(robot: Robot, *, period: float = PERIOD) -> Gains:
         support=SupportGains(handover_time=0.05, weight_time=0.5),
         hold=HOLD,
         limits=LimitGains(speed=0.5 * servo.speed_max, torque=0.9 * servo.torque_max),
+        paper_slip=PAPER_SLIP,
+        paper_suspension=suspension(robot),
         margins=MARGINS,
     )

@@ -85,6 +85,14 @@ class Ground:
         xx, yy, zz, xy, xz, yz = out[4:]
         return float(out[0]), out[1:4], np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
 
+    def depth_bound(self, centre: Any, radius: float) -> float:
+        """Returns the upper bound of a sphere's depth [m]."""
+        place = np.array(centre, dtype=float)
+        handle = ct.c_void_p(self.handle)
+        return float(
+            probed(self.core.hx_probe_depth_bound, handle, place, float(radius), size=1)[0]
+        )
+
 
 def start_on_grid(plant: Plant, ground: Ground, *, height: float = 0.0, **initial: Any) -> None:
     """Resets a plant on a grid whose zero is at `height` [m]."""

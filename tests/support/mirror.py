@@ -56,6 +56,7 @@ HxDefinition = record(
         record(
             "Body",
             ("contact", ct.c_int),
+            ("self_contact", ct.c_int),
             ("torso_box", Vector3),
             ("torso_centre", Vector3),
             *reals("corner_radius knee_radius shank_radius shank_position"),

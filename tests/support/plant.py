@@ -31,6 +31,7 @@ from hexapod_cosim.models import (
     FRICTION_LAWS,
     METHODS,
     PROJECTIONS,
+    SELF_CONTACTS,
     SERVO_MODES,
     SOIL_LAWS,
     TERRAINS,
@@ -217,6 +218,7 @@ def _put_settings(d: Any, robot: Robot) -> None:
             if kind is Real:
                 setattr(target, name, getattr(source, name, 1.0))  # terrain.grid: the first
     d.body.contact = 1 + BODY_CONTACTS.index(robot.body.contact)
+    d.body.self_contact = 1 + SELF_CONTACTS.index(robot.body.self_contact)
     for name in ("torso_box", "torso_centre"):
         put(getattr(d.body, name), getattr(robot.body, name))
     put(d.gravity, robot.gravity)

@@ -13,6 +13,7 @@ HEADERS = (
     "plant_fmu/include/hexapod/status.h",
     "plant_fmu/include/hexapod/legs.h",
     "plant_fmu/include/hexapod/range_check.h",
+    "plant_fmu/include/hexapod/message.h",
     "plant_fmu/include/hexapod/inside.h",
 )
 COMMENT = re.compile(r"/\*(.*?)\*/", flags=re.DOTALL)

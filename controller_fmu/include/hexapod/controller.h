@@ -18,7 +18,8 @@ extern "C" {
 
 typedef enum hxControl {
   HX_CONTROL_KINEMATIC = 1, /* follows the paths, uses no measurement */
-  HX_CONTROL_COMPLIANT      /* also reacts to the measured forces */
+  HX_CONTROL_COMPLIANT,     /* also reacts to the measured forces */
+  HX_CONTROL_PAPER          /* corrects the paths by the measured forces as the paper does */
 } hxControl;
 
 /* Pattern of a gait: phase offsets by name, or given ones. */
@@ -93,6 +94,22 @@ typedef struct hxGains {
     double speed;   /* rad/s  fastest change of an angle's correction */
     double torque;  /* N m    largest feed-forward torque */
   } limits;
+  struct {
+    double kp;               /* m/N */
+    double ki;               /* m/(N s) */
+    double kd;               /* m s/N */
+    double derivative_time;  /* s    filter of the derivative */
+    double filter_time;      /* s    force filter */
+    double load_time;        /* s    decay of the shift of a swinging foot */
+    double tracking_time;    /* s    anti-windup */
+    double limit;            /* m    largest shift */
+  } paper_slip;
+  struct {
+    double mass;       /* kg */
+    double damping;    /* N s/m */
+    double stiffness;  /* N/m */
+    double limit;      /* m    largest deflection */
+  } paper_suspension;
 } hxGains;
 
 /* Switches, 1 or 0: enabled parts of the compliant control; and the weight of the squeeze. */

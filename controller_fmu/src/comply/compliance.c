@@ -49,10 +49,10 @@ void hx_compliance_compile(const hxControllerDefinition *definition, double dept
   model->softness = 1.0 / definition->servo.kp;
   model->high = high_share * definition->gait.step_height;
   model->tracking = fmin(period / gains->slip.tracking_time, 1.0);
-  model->memory = exp(-period / gains->slip.load_time);
+  model->memory = hx_decay(-period / gains->slip.load_time);
   model->follow_load = 1.0 - model->memory;
-  model->follow_cycle = 1.0 - exp(-period / cycle);
-  model->follow_weight = 1.0 - exp(-period / gains->support.weight_time);
+  model->follow_cycle = 1.0 - hx_decay(-period / cycle);
+  model->follow_weight = 1.0 - hx_decay(-period / gains->support.weight_time);
   const double calm = nearbyint(calm_cycles * cycle / period);
   model->calm = (int64_t)calm;
   model->largest = gains->slip.limit * model->share;
@@ -194,8 +194,7 @@ static double law_inputs(const hxComplianceModel *model, const hxPlan *plan,
   }
   const double share = total > hx_load_floor ? 1.0 / total : 0.0;
   if (model->parts.fallback)
-    update_trust(model, plan, total > model->settled ? hypot(common.x, common.y) * share : 0.0,
-                 laws);
+    update_trust(model, plan, total > model->settled ? hx_length(common) * share : 0.0, laws);
   hx_squeeze(normal, plan->feet, push);
   for (int leg = 0; leg < HX_LEGS; ++leg)
     planned[leg] = hx_scaled(plan->shares.squeeze[leg], laws->touching[leg] ? laws->scale : 0.0);
@@ -252,8 +251,7 @@ static void limit_answers(const hxComplianceModel *model, hxCompliance *laws) {
   for (int leg = 0; leg < HX_LEGS; ++leg) {
     hxFootLaw *law = &laws->law[leg];
     const hxPlane wanted = law->answer;
-    law->answer =
-        hx_scaled(wanted, model->largest / fmax(hypot(wanted.x, wanted.y), model->largest));
+    law->answer = hx_scaled(wanted, model->largest / fmax(hx_length(wanted), model->largest));
     law->x.integral += model->tracking * (law->answer.x - wanted.x);
     law->y.integral += model->tracking * (law->answer.y - wanted.y);
   }

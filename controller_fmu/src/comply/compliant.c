@@ -5,6 +5,27 @@
 /* s, duration of the transition of the added velocity */
 static const double steering_time = 0.1;
 
+void hx_sense(const hxControllerInput *input, const hxPosture *posture, double force[HX_LEGS][3]) {
+  const double w = input->quaternion[0], x = input->quaternion[1], y = input->quaternion[2],
+               z = input->quaternion[3];
+  const double xx = x * x, yy = y * y, zz = z * z;
+  const double rotation[3][3] = {
+      {1.0 - 2.0 * (yy + zz), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)},
+      {2.0 * (x * y + w * z), 1.0 - 2.0 * (xx + zz), 2.0 * (y * z - w * x)},
+      {2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (xx + yy)}};
+  for (int leg = 0; leg < HX_LEGS; ++leg) {
+    const double *f = input->foot_force[leg];
+    double seen[3];
+    for (int i = 0; i < 3; ++i)
+      seen[i] = f[0] * rotation[0][i] + f[1] * rotation[1][i] + f[2] * rotation[2][i];
+    hxPlane plane = {seen[0], seen[1]};
+    hx_posture_turn(posture, &plane, &seen[2]);
+    force[leg][0] = plane.x;
+    force[leg][1] = plane.y;
+    force[leg][2] = seen[2];
+  }
+}
+
 void hx_compliant_compile(const hxControllerDefinition *definition, const hxLegSolver leg[HX_LEGS],
                           hxCompliantModel *model) {
   const double still[HX_LEGS][HX_JOINTS] = {{0.0}}, zero[3] = {0.0};
@@ -65,29 +86,6 @@ void hx_compliant_steer(const hxCompliantModel *model, int64_t steps, int moves,
 
 /* ------------------------------------------------------------------------------------ sensors */
 
-/* Computes the foot forces in the walking frame (C22): f_K = R_KT R_TW f_W. */
-static void sense(const hxControllerInput *input, const hxPosture *posture,
-                  double force[HX_LEGS][3]) {
-  const double w = input->quaternion[0], x = input->quaternion[1], y = input->quaternion[2],
-               z = input->quaternion[3];
-  const double xx = x * x, yy = y * y, zz = z * z;
-  const double rotation[3][3] = {
-      {1.0 - 2.0 * (yy + zz), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)},
-      {2.0 * (x * y + w * z), 1.0 - 2.0 * (xx + zz), 2.0 * (y * z - w * x)},
-      {2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (xx + yy)}};
-  for (int leg = 0; leg < HX_LEGS; ++leg) {
-    const double *f = input->foot_force[leg];
-    double seen[3];
-    for (int i = 0; i < 3; ++i)
-      seen[i] = f[0] * rotation[0][i] + f[1] * rotation[1][i] + f[2] * rotation[2][i];
-    hxPlane plane = {seen[0], seen[1]};
-    hx_posture_turn(posture, &plane, &seen[2]);
-    force[leg][0] = plane.x;
-    force[leg][1] = plane.y;
-    force[leg][2] = seen[2];
-  }
-}
-
 /* Passes the measured positions of the standing feet to the slow loops. */
 static void look(const hxCompliantModel *model, const hxLegSolver leg[HX_LEGS],
                  const hxStance *stance, const hxControllerInput *input, hxCompliant *compliant) {
@@ -132,7 +130,7 @@ void hx_compliant_step(const hxCompliantModel *model, const hxLegSolver leg[HX_L
                        hxCompliant *compliant, hxControllerOutput *output) {
   hxCompliance *laws = &compliant->laws;
   double force[HX_LEGS][3];
-  sense(input, stance->posture, force);
+  hx_sense(input, stance->posture, force);
   hx_compliance_step(&model->laws, &stance->plan, force, laws);
   if (compliant->count % model->hold.every == 0) {
     if (laws->trust == 1.0)

@@ -50,6 +50,9 @@ typedef struct hxStance {
   const double *height; /* m, (6) heights of the lowered feet */
 } hxStance;
 
+/* Computes the foot forces in the walking frame (C22) [N]: f_K = R_KT R_TW f_W. */
+void hx_sense(const hxControllerInput *input, const hxPosture *posture, double force[HX_LEGS][3]);
+
 void hx_compliant_compile(const hxControllerDefinition *definition, const hxLegSolver leg[HX_LEGS],
                           hxCompliantModel *model);
 void hx_compliant_reset(const hxCompliantModel *model, hxCompliant *compliant);

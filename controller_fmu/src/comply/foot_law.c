@@ -10,7 +10,7 @@ void hx_foot_law_compile(const hxControllerDefinition *definition, hxFootLawMode
                                 .derivative = gains->slip.derivative_time};
   hx_suspension_discretise(gains->suspension.mass, gains->suspension.damping,
                            gains->suspension.stiffness, definition->period, &model->suspension);
-  model->keep = exp(-definition->period / gains->slip.load_time);
+  model->keep = hx_decay(-definition->period / gains->slip.load_time);
 }
 
 void hx_foot_law_step(const hxFootLawModel *model, hxPlane push, double excess, double load,

@@ -2,6 +2,8 @@
 
 #include <math.h>
 
+#include "../plane.h"
+
 /* The matrix exponential in closed form. With sigma = b/2m, omega^2 = k/m and
  * mu^2 = sigma^2 - omega^2:
  *   z(t)  = e^(-sigma t) ((cosh mu t + sigma sinh(mu t)/mu) z + sinh(mu t)/mu z')
@@ -11,7 +13,7 @@ void hx_suspension_discretise(double mass, double damping, double stiffness, dou
                               hxSuspension *suspension) {
   const double sigma = 0.5 * damping / mass, omega2 = stiffness / mass,
                mu2 = sigma * sigma - omega2;
-  const double mu = sqrt(fabs(mu2)), x = mu * period, decay = exp(-sigma * period);
+  const double mu = sqrt(fabs(mu2)), x = mu * period, decay = hx_decay(-sigma * period);
   double even, odd; /* e^(-sigma t) cosh mu t, e^(-sigma t) sinh(mu t)/mu [s] */
   if (mu2 < 0.0) {
     even = decay * cos(x);
@@ -20,7 +22,8 @@ void hx_suspension_discretise(double mass, double damping, double stiffness, dou
     even = decay * cosh(x);
     odd = decay * (x > 0.0 ? sinh(x) / mu : period);
   } else { /* strongly damped: neither exponential may overflow */
-    const double slow = exp(-omega2 / (sigma + mu) * period), fast = exp(-(mu + sigma) * period);
+    const double slow = hx_decay(-omega2 / (sigma + mu) * period),
+                 fast = hx_decay(-(mu + sigma) * period);
     even = 0.5 * (slow + fast);
     odd = 0.5 * (slow - fast) / mu;
   }

@@ -16,8 +16,9 @@ static const double lightest = 0.5, heaviest = 4.0;
 
 void hx_burden_compile(const hxControllerDefinition *definition, hxBurdenModel *model) {
   model->most = definition->gains.limits.torque;
-  model->fade = exp(-definition->period / definition->gait.period);
-  model->follow = 1.0 - exp(-definition->period / (quick * definition->gains.support.weight_time));
+  model->fade = hx_decay(-definition->period / definition->gait.period);
+  model->follow =
+      1.0 - hx_decay(-definition->period / (quick * definition->gains.support.weight_time));
 }
 
 void hx_burden_reset(hxBurden *burden) { *burden = (hxBurden){1.0, 0.0, 1.0, 1.0, 0}; }

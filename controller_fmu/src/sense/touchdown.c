@@ -2,6 +2,8 @@
 
 #include <math.h>
 
+#include "../plane.h"
+
 const double hx_early = 0.002;
 
 static const double reach_speed = 0.08;  /* m/s  downwards */
@@ -25,7 +27,7 @@ static double moved(double offset, double late, double period, int touching, dou
   if (late > grace) return fmax(offset - reach_speed * period, -reach_limit);
   if (swinging && touching && falling > 0.0) return fmin(offset + falling, hold_limit);
   if (swinging && !touching)
-    return fabs(offset) > negligible ? offset * exp(-period / return_time) : 0.0;
+    return fabs(offset) > negligible ? offset * hx_decay(-period / return_time) : 0.0;
   return offset;
 }
 

@@ -17,7 +17,7 @@ void hx_warmth_compile(const hxControllerDefinition *definition, hxWarmthModel *
   model->rating = rating * rating;
   model->squeeze = squeeze;
   model->more = squeeze > 0.0 ? fmax(most_squeeze - squeeze, 0.0) : 0.0;
-  model->follow = 1.0 - exp(-definition->period / heat_time);
+  model->follow = 1.0 - hx_decay(-definition->period / heat_time);
 }
 
 void hx_warmth_reset(const hxWarmthModel *model, hxWarmth *warmth) {

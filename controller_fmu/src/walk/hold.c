@@ -113,8 +113,7 @@ static void hold_path(const hxHoldModel *model, const hxSight *seen, hxHold *hol
   hold->yaw = seen->yaw;
   hold->looked = 1;
   const hxPlane back = hx_times(hx_scaled(hold->way, model->path_rate), hx_conj(turned));
-  hold->velocity =
-      hx_scaled(back, model->speed_limit / fmax(hypot(back.x, back.y), model->speed_limit));
+  hold->velocity = hx_scaled(back, model->speed_limit / fmax(hx_length(back), model->speed_limit));
   hold->yaw_rate =
       hx_clamp(model->path_rate * hold->heading, -model->turn_limit, model->turn_limit);
 }

@@ -17,8 +17,8 @@ void hx_leg_solver_compile(const hxControllerDefinition *definition, int leg, hx
   model->coxa_length = coxa->length;
   model->coxa_height = coxa->offset_z;
   model->offset_y = coxa->offset_y + femur->offset_y + tibia->offset_y;
-  model->femur = hypot(femur->length, femur->offset_z);
-  model->tibia = hypot(tibia->length, tibia->offset_z);
+  model->femur = hx_length(hx_plane(femur->length, femur->offset_z));
+  model->tibia = hx_length(hx_plane(tibia->length, tibia->offset_z));
   model->femur_tilt = atan2(femur->offset_z, femur->length);
   model->tibia_tilt = atan2(tibia->offset_z, tibia->length);
   model->femur_zero = hx_conj(hx_cis(model->femur_tilt));

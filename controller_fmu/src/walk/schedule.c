@@ -2,12 +2,12 @@
  */
 #include <float.h>
 #include <stddef.h>
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "../state.h"
 #include "../validation.h"
+#include "hexapod/message.h"
 
 /* A saved state: a header that identifies it, then the controller's model and state. */
 typedef struct {
@@ -26,7 +26,7 @@ static uint64_t checksum(const hxSaved *saved) {
 }
 
 static hxStatus refuse(hxController *controller, hxStatus status, const char *text) {
-  snprintf(controller->message, HX_MESSAGE_SIZE, "%s", text);
+  hx_print(controller->message, HX_MESSAGE_SIZE, "%s", text);
   return status;
 }
 
@@ -117,7 +117,7 @@ hxStatus hx_controller_step(hxController *controller, const hxControllerInput *i
   const hxControllerState before = controller->state;
   hxControllerInput now = *input;
   if (!(t_end >= before.time && t_end <= DBL_MAX)) {
-    snprintf(controller->message, HX_MESSAGE_SIZE,
+    hx_print(controller->message, HX_MESSAGE_SIZE,
              "end of step: got %.17g s, expected a finite time of at least %.17g s", t_end,
              before.time);
     return HX_INVALID_ARGUMENT;
@@ -154,7 +154,7 @@ void hx_controller_get_state(const hxController *controller, void *bytes) {
 hxStatus hx_controller_set_state(hxController *controller, const void *bytes, size_t size) {
   hxSaved saved;
   if (size != sizeof saved) {
-    snprintf(controller->message, HX_MESSAGE_SIZE,
+    hx_print(controller->message, HX_MESSAGE_SIZE,
              "saved state: got %zu bytes, expected %zu; save it again with this version", size,
              sizeof saved);
     return HX_BAD_STATE;

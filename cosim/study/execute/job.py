@@ -15,9 +15,11 @@ from uuid import uuid4
 
 from hexapod_cosim.controller import Gains
 from hexapod_cosim.cosim.common.plant_files import code_hash, package_version
+from hexapod_cosim.cosim.control.controllers import check_control
 from hexapod_cosim.cosim.export.controller_export import export_controller
 from hexapod_cosim.cosim.run.controller_setup import make_setup
 from hexapod_cosim.cosim.run.preparation import PlantFmus, chosen_gains, design_key
+from hexapod_cosim.cosim.scenario.controls import table_with_control
 from hexapod_cosim.cosim.scenario.scenario import scenario_from_table
 from hexapod_cosim.cosim.study.execute.engines import find_engine
 from hexapod_cosim.cosim.study.plan.records import Case, Factor, Study, StudyError
@@ -39,6 +41,8 @@ class Job:
     fmus: Mapping[str, bytes]  # plant FMUs by robot, as scenarios name it
     controller: bytes  # the controller FMU, whose parameters each run sets
     robots: Mapping[str, bytes]  # robot files that are not part of the package, by path
+    controls: Mapping[str, str]  # texts of the controls by label
+    laws: Mapping[str, bytes]  # files of the users' controls, by label
     gains: Gains | None  # of all compliant runs; None: workers design them
     engine: str
     environment: Mapping[str, str]  # versions, see environment()
@@ -75,10 +79,23 @@ def make_job(
             fmus={name: _read(plants.fmu(name)) for name in names},
             controller=_controller(Path(folder)),
             robots=files,
+            controls=study.texts,
+            laws=_laws(study),
             gains=gains or _common_gains(study),
             engine=engine,
             environment=environment(study),
         )
+
+
+def _laws(study: Study) -> dict[str, bytes]:
+    """Returns the files of the users' controls by label.
+
+    Raises HexapodError when one cannot be read or does not take the parameters of [control].
+    """
+    controls = study.chosen_controls
+    for case in study.cases.values():
+        check_control(scenario_from_table(case.table, where=case.where), controls)
+    return {control.label: _read(control.path) for control in controls if control.path is not None}
 
 
 def _robots(study: Study) -> list[str]:
@@ -107,10 +124,11 @@ def _read(path: Path) -> bytes:
 
 def _common_gains(study: Study) -> Gains | None:
     """Designs gains when all compliant runs share one set; returns None otherwise."""
-    if "compliant" not in study.run_controls:
+    text = study.gains_text
+    if text is None:
         return None
     scenarios = [
-        scenario_from_table({**case.table, "control": "compliant"}, where=case.where)
+        scenario_from_table(table_with_control(case.table, text), where=case.where)
         for case in study.cases.values()
     ]
     varied = any(factor.name.startswith(DESIGN_FACTORS) for factor in study.factors)
@@ -160,6 +178,15 @@ def manifest_of(study: Study, job: Job, *, runs: int) -> dict[str, Any]:
             name: hashlib.sha256(content).hexdigest() for name, content in job.robots.items()
         },
         "gains": None if job.gains is None else asdict(job.gains),
+    } | _hashes_of_laws(job)
+
+
+def _hashes_of_laws(job: Job) -> dict[str, Any]:
+    """Returns the SHA-256 of the users' controls by label; {} for a study without any."""
+    if not job.laws:
+        return {}
+    return {
+        "laws": {label: hashlib.sha256(content).hexdigest() for label, content in job.laws.items()}
     }
 
 

@@ -19,6 +19,7 @@ from hexapod_cosim.cosim.master.loop import FAILED, INTERRUPTED, Progress
 from hexapod_cosim.cosim.results.metrics import METRICS
 from hexapod_cosim.cosim.results.summary import NO_FIGURES, REFUSED, Summary
 from hexapod_cosim.cosim.run.preparation import chosen_gains
+from hexapod_cosim.cosim.scenario.controls import PYTHON, control_of, table_with_control
 from hexapod_cosim.cosim.scenario.records import Scenario
 from hexapod_cosim.cosim.scenario.scenario import scenario_from_table, with_values
 from hexapod_cosim.cosim.study.execute.engines import Engine, find_engine
@@ -57,6 +58,7 @@ class JobContext:
             name: self._unpack(f"fmu{k}", ".fmu", data)
             for k, (name, data) in enumerate(job.fmus.items())
         }
+        self._controls = {label: self._local(label, text) for label, text in job.controls.items()}
         self._controller = self._unpack("controller", ".fmu", job.controller)
         self._engines: dict[str, Engine] = {}
         self._known: OrderedDict[bytes, Summary] = OrderedDict()
@@ -68,6 +70,23 @@ class JobContext:
         except OSError as error:
             raise _no_room(error, self._folder.name) from error
         return path
+
+    def _local(self, label: str, text: str) -> str:
+        """Returns the text of a control with a path that holds its file on this machine.
+
+        This is the path of the study where it has the same content, else an unpacked copy.
+        """
+        control, content = control_of(text), self._job.laws.get(label)
+        if control.path is None or content is None:
+            return text
+        if control.path.is_file() and control.path.read_bytes() == content:
+            return text
+        folder = Path(self._folder.name) / f"law{len(list(Path(self._folder.name).iterdir()))}"
+        folder.mkdir()
+        copy = self._unpack(
+            str(Path(folder.name) / control.path.stem), control.path.suffix, content
+        )
+        return f"{label}={copy}:{control.name}" if control.kind == PYTHON else f"{label}={copy}"
 
     def run(self, orders: Sequence[Order], progress: Progress) -> Iterator[RunResult]:
         """Yields the result of each order.
@@ -133,7 +152,7 @@ class JobContext:
         }
         table = with_values(case.table, settings)
         return scenario_from_table(
-            {**table, "seed": order.seed, "control": order.control},
+            {**table_with_control(table, self._controls[order.control]), "seed": order.seed},
             where=case.where,
             given=list(settings),
         )

@@ -150,12 +150,12 @@ def _check_gain(factor: Factor, study: Study, where: str) -> None:
                 fix="correct it",
                 where=where,
             )
-    if "compliant" not in study.run_controls:
+    if study.gains_text is None:
         fix = 'add "compliant" to the controls, or take the gain away: kinematic control has none'
         raise StudyError(
             "a gain that no run has",
             got=factor.name,
-            expected="compliant among the controls",
+            expected="compliant or paper among the controls",
             fix=fix,
             where=where,
         )

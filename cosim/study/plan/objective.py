@@ -24,7 +24,6 @@ from collections.abc import Mapping
 from typing import Any
 
 from hexapod_cosim.cosim.results.metrics import METRICS
-from hexapod_cosim.cosim.scenario.records import CONTROLS
 from hexapod_cosim.cosim.study.plan.factors import read_factors
 from hexapod_cosim.cosim.study.plan.held_out import check_held_out_seeds
 from hexapod_cosim.cosim.study.plan.keys import names_of, read_seeds, text_of, whole
@@ -83,9 +82,7 @@ def read_optimise(table: Any, where: str) -> tuple[Optimise, tuple[Factor, ...]]
             SAMPLERS,
             f"{where}.sampler",
         )[0],
-        control=names_of(
-            [text_of(table, "control", "compliant", where)], CONTROLS, f"{where}.control"
-        )[0],
+        control=text_of(table, "control", "compliant", where),
         training=training,
         held_out=held_out,
     )

@@ -8,7 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from hexapod_cosim.cosim.scenario.records import CONTROLS
+from hexapod_cosim.cosim.scenario.controls import Control, control_beside, parse_controls
 from hexapod_cosim.cosim.scenario.scenario import read_tables, scenario_from_table, with_values
 from hexapod_cosim.cosim.scenario.variation import STANDARD
 from hexapod_cosim.cosim.study.plan.bundled import list_studies
@@ -51,6 +51,7 @@ KEYS = (
     "factors",
     "optimise",
 )
+DEFAULT_CONTROLS = ("kinematic", "compliant")
 MAX_POINTS, MAX_SEEDS = 10**8, 10**7
 MAX_SEED = 2**32 - 1  # that all random number generators accept
 MAX_FILE_NAME = 255  # bytes
@@ -59,10 +60,11 @@ STANDARD_TABLE = {
 }
 
 
-def load_study(path_or_name: str | Path) -> Study:
+def load_study(path_or_name: str | Path, *, controls: Sequence[str] = ()) -> Study:
     """Reads a study file, or a bundled one by name.
 
-    Raises StudyError, and ScenarioError for its scenarios.
+    `controls`: texts of controls that replace the file's; relative paths in them start from the
+    current folder. Raises StudyError, and ScenarioError for its scenarios.
     """
     path, bundled = Path(path_or_name), list_studies()
     if not path.suffix and len(path.parts) == 1 and not path.is_file():
@@ -84,9 +86,27 @@ def load_study(path_or_name: str | Path) -> Study:
             fix="correct that line",
             where=str(path),
         ) from error
+    if controls:
+        table = _with_controls(table, controls)
     return study_from_table(
         table, where=path.name if path in bundled.values() else str(path), folder=path.parent
     )
+
+
+def _with_controls(table: dict[str, Any], texts: Sequence[str]) -> dict[str, Any]:
+    """Returns a study's tables with other controls. Raises StudyError."""
+    full = [control.text for control in parse_controls(texts, where="--control")]
+    if not isinstance(table.get("optimise"), dict):
+        return {**table, "controls": full}
+    if len(full) != 1:
+        raise StudyError(
+            "an optimisation has one control",
+            got=len(full),
+            expected="one --control",
+            fix="run the optimisation for each control, into folders of their own",
+            where="--control",
+        )
+    return {**table, "optimise": {**table["optimise"], "control": full[0]}}
 
 
 def study_from_table(
@@ -113,6 +133,9 @@ def study_from_table(
     )
     if optimise is not None:
         _refuse_keys(table, ("factors", "design", "points", "seeds", "controls"), where)
+    controls = _controls(table, optimise, folder, where)
+    if optimise is not None:
+        optimise = replace(optimise[0], control=controls[0].label), optimise[1]
     study = Study(
         title=text_of(table, "title", Path(where).stem, where),
         cases={},
@@ -120,7 +143,8 @@ def study_from_table(
         design=_design(table, where),
         points=_points(table, where),
         seeds=read_seeds(table.get("seeds", 1), f"{where}: seeds", most=MAX_SEEDS),
-        controls=names_of(table.get("controls", list(CONTROLS)), CONTROLS, f"{where}: controls"),
+        controls=tuple(control.label for control in controls),
+        texts={control.label: control.text for control in controls},
         seed=whole(table.get("seed", 0), f"{where}: seed", least=0, most=MAX_SEED),
         optimise=None if optimise is None else optimise[0],
         source=dict(table),
@@ -137,6 +161,25 @@ def study_from_table(
     study = replace(study, cases=_cases(study, folder))
     check_study(study)
     return study
+
+
+def _controls(
+    table: Mapping[str, Any], optimise: object | None, folder: Path, where: str
+) -> tuple[Control, ...]:
+    """Returns the controls of a study's file. Raises ScenarioError, StudyError for no list."""
+    texts, place = table.get("controls", list(DEFAULT_CONTROLS)), f"{where}: controls"
+    if optimise is not None:
+        texts = [table["optimise"].get("control", DEFAULT_CONTROLS[-1])]
+        place = f"{where}: optimise.control"
+    if not isinstance(texts, list) or not texts or not all(isinstance(one, str) for one in texts):
+        raise StudyError(
+            "wrong type",
+            got=texts,
+            expected="a list of controls",
+            fix='write controls = ["kinematic", "law.py:Class"]',
+            where=place,
+        )
+    return parse_controls([control_beside(text, folder) for text in texts], where=place)
 
 
 def _refuse_keys(table: Mapping[str, Any], keys: Sequence[str], where: str) -> None:

@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from hexapod_cosim.cosim.scenario.controls import Control, control_of
 from hexapod_cosim.models import HexapodError
 
 Value = float | int | bool | str
@@ -130,7 +131,8 @@ class Study:
     design: str
     points: int  # of a drawn design
     seeds: Sequence[int]
-    controls: tuple[str, ...]
+    controls: tuple[str, ...]  # labels
+    texts: Mapping[str, str]  # of all controls, by label; see scenario.controls
     seed: int  # of the design and the optimiser
     optimise: Optimise | None
     source: Mapping[str, Any]  # the tables of the file
@@ -140,6 +142,21 @@ class Study:
     def run_controls(self) -> tuple[str, ...]:
         """The controls of its runs."""
         return self.controls if self.optimise is None else (self.optimise.control,)
+
+    @property
+    def chosen_controls(self) -> tuple[Control, ...]:
+        """The controls of its runs, as records."""
+        return tuple(control_of(self.texts[label]) for label in self.run_controls)
+
+    @property
+    def gains_text(self) -> str | None:
+        """The text of the first control that has gains; None without one."""
+        texts = [
+            control.text
+            for control in self.chosen_controls
+            if control.is_builtin and control.name != "kinematic"
+        ]
+        return texts[0] if texts else None
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -10,12 +10,11 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
+from hexapod_cosim.cosim.common.control_style import ControlStyle, control_styles
 from hexapod_cosim.cosim.results.metrics import METRICS
 from hexapod_cosim.cosim.study.plan.records import Factor, Study
 from hexapod_cosim.cosim.study.report.style import (
-    COLOURS,
     COST,
-    MARKS,
     NAMES,
     SLIP,
     Array,
@@ -37,9 +36,12 @@ GREY = "0.55"
 def response(points: Sequence[Point], factor: Factor, study: Study) -> Figure:
     """Draws slip and cost over one factor, with the intervals over the seeds."""
     figure = Figure(figsize=(9.0, 3.4))
+    styles = control_styles(study.run_controls)
     for axes, metric in zip(figure.subplots(1, 2), (SLIP, COST), strict=True):
         for control in study.run_controls:
-            _curve(axes, points, factor, (control, metric), joined=not named(factor))
+            _curve(
+                axes, points, factor, (control, metric), styles[control], joined=not named(factor)
+            )
         _factor_axis(axes, factor)
         axes.set(ylabel=NAMES[metric], ylim=(0.0, None))
     figure.axes[0].legend()
@@ -47,7 +49,13 @@ def response(points: Sequence[Point], factor: Factor, study: Study) -> Figure:
 
 
 def _curve(
-    axes: Axes, points: Sequence[Point], factor: Factor, what: tuple[str, str], *, joined: bool
+    axes: Axes,
+    points: Sequence[Point],
+    factor: Factor,
+    what: tuple[str, str],
+    style: ControlStyle,
+    *,
+    joined: bool,
 ) -> None:
     control, metric = what
     shown = sorted(
@@ -62,8 +70,8 @@ def _curve(
         x,
         mean,
         half,
-        marker=MARKS[control],
-        color=COLOURS[control],
+        marker=style.marker,
+        color=style.light,
         markersize=4,
         linestyle=line,
         linewidth=1.2,
@@ -89,7 +97,7 @@ def effects(points: Sequence[Point], study: Study) -> Figure:
     panels = np.atleast_1d(figure.subplots(rows, columns, sharey=True, squeeze=False).ravel())
     for axes, factor in zip(panels, factors, strict=False):
         for control in study.run_controls:
-            _marks(axes, some_of(points), factor, control)
+            _marks(axes, some_of(points), factor, control, study)
         _factor_axis(axes, factor)
         axes.set_yscale("log")
         axes.margins(x=0.05, y=0.12)
@@ -106,7 +114,9 @@ def shown_effects(study: Study) -> list[Factor]:
     return [factor for factor in study.factors if len(set(factor.values)) != 1][:MAX_EFFECTS]
 
 
-def _marks(axes: Axes, points: Sequence[Point], factor: Factor, control: str) -> None:
+def _marks(axes: Axes, points: Sequence[Point], factor: Factor, control: str, study: Study) -> None:
+    """Draws a mark per point, and a cross at the bottom where no run walked."""
+    style = control_styles(study.run_controls)[control]
     place = np.array([place_of(factor, item.values[factor.name]) for item in points])
     slip = np.array([mean_of(item, control, SLIP) for item in points])
     lost = np.array(
@@ -116,20 +126,20 @@ def _marks(axes: Axes, points: Sequence[Point], factor: Factor, control: str) ->
         place,
         slip,
         linestyle="",
-        marker=MARKS[control],
+        marker=style.marker,
         markersize=4,
         alpha=0.6,
-        color=COLOURS[control],
+        color=style.light,
         label=control,
     )
-    height = 0.02 if control == "kinematic" else 0.07
+    height = 0.02 + 0.05 * study.run_controls.index(control)
     axes.plot(
         place[lost],
         np.full(np.sum(lost), height),
         linestyle="",
         marker="x",
         markersize=4,
-        color=COLOURS[control],
+        color=style.light,
         transform=axes.get_xaxis_transform(),
     )
 
@@ -138,7 +148,7 @@ def pareto(points: Sequence[Point], study: Study) -> Figure:
     """Draws slip against cost of transport with the Pareto front of each control."""
     figure = Figure(figsize=(6.4, 4.2))
     axes = figure.subplots()
-    for control in study.run_controls:
+    for control, style in control_styles(study.run_controls).items():
         pairs = slip_and_cost([point for point in points if not point.held_out], control)
         if not len(pairs):
             continue
@@ -146,17 +156,15 @@ def pareto(points: Sequence[Point], study: Study) -> Figure:
         axes.plot(
             *np.array(shown).T,
             linestyle="",
-            marker=MARKS[control],
+            marker=style.marker,
             markersize=4,
             alpha=0.5,
-            color=COLOURS[control],
+            color=style.light,
             label=control,
         )
         edge = front(pairs)
-        axes.plot(*edge.T, drawstyle="steps-post", color=COLOURS[control], linewidth=1.4)
-        axes.plot(
-            *edge.T, linestyle="", marker=MARKS[control], markersize=5.5, color=COLOURS[control]
-        )
+        axes.plot(*edge.T, drawstyle="steps-post", color=style.light, linewidth=1.4)
+        axes.plot(*edge.T, linestyle="", marker=style.marker, markersize=5.5, color=style.light)
     costs, slips = (np.concatenate([line.get_data()[k] for line in axes.lines]) for k in (0, 1))
     for name, values in (("xscale", np.asarray(costs)), ("yscale", np.asarray(slips))):
         axes.set(

@@ -11,6 +11,7 @@ from typing import Any
 import tomlkit
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
+from hexapod_cosim.cosim.common.control_style import control_styles
 from hexapod_cosim.cosim.common.files import without_none, write_text
 from hexapod_cosim.cosim.results.comparison import METHOD, Change
 from hexapod_cosim.cosim.results.metrics import DUST, FLOORS, METRICS, shown_metrics
@@ -53,6 +54,7 @@ def write_study_report(results: Results, folder: Path) -> list[Path]:
         undefined=StrictUndefined,
     )
     page = environment.get_template("study.html.jinja").render(
+        styles=control_styles(results.study.run_controls),
         results=results,
         overall=overall_rows(results),
         points=point_rows(results),

@@ -17,8 +17,6 @@ from hexapod_cosim.cosim.study.store.table import Point
 Array = NDArray[np.float64]
 _Item = TypeVar("_Item")
 
-COLOURS = {"kinematic": "#D55E00", "compliant": "#0072B2"}
-MARKS = {"kinematic": "s", "compliant": "o"}
 SLIP, COST = "slip_per_metre", "cost_of_transport"
 NAMES = {SLIP: "slip [m/m]", COST: "cost of transport [1]"}
 COLOURMAP, CHANGES = "viridis", "RdBu_r"

@@ -42,8 +42,8 @@ def provenance(manifest: Mapping[str, Any]) -> dict[str, str]:
 
     The metadata depend on the study only, not on where, when and how often it was run. Keys are
     hexapod.NAME with NAME: format, study (its file as JSON), scenarios (in full), seeds, engine,
-    environment (versions), fmus, controller and robots (SHA-256), gains (as JSON) and
-    gains_sha256.
+    environment (versions), fmus, controller and robots (SHA-256), gains (as JSON), gains_sha256
+    and, of a study with users' controls, laws (SHA-256 by label).
     """
     names = (
         "format",
@@ -63,7 +63,7 @@ def provenance(manifest: Mapping[str, Any]) -> dict[str, str]:
         f"{METADATA_PREFIX}{name}": manifest[name]
         if isinstance(manifest[name], str)
         else _compact_json(manifest[name])
-        for name in names
+        for name in (*names, *(["laws"] if "laws" in manifest else []))
     }
     gains = found[f"{METADATA_PREFIX}gains"].encode()
     return found | {f"{METADATA_PREFIX}gains_sha256": hashlib.sha256(gains).hexdigest()}

@@ -109,7 +109,7 @@ function makeStage(runs: readonly Run[]): Stage | undefined {
       host,
       able.map(
         ({ run, recording, relief }) =>
-          new Actor(run, recording, relief, new Color(property(`--${run.label}`))),
+          new Actor(run, recording, relief, new Color(property(`--${run.key}`))),
       ),
     );
   } catch {

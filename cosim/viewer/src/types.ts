@@ -26,8 +26,8 @@ export interface Robot {
   readonly thickness: readonly number[];
 }
 
-/** A foot on the ground: leg, begin [s], x and y [m], depth below the surface [m]. */
-export type PackedStance = readonly [number, number, number, number, number];
+/** A footprint in soil: begin, end (0: it stays) [s], x and y, depth below the surface, radius [m]. */
+export type PackedFootprint = readonly [number, number, number, number, number, number];
 
 /** Heights [0.1 mm] along the torso's path, and touch-downs: leg, time [s], way, height [m]. */
 export interface PackedProfile {
@@ -45,7 +45,7 @@ export interface Ground {
   readonly rise: number;
   readonly heading: number;
   readonly surface?: number;
-  readonly stances?: readonly PackedStance[];
+  readonly footprints?: readonly PackedFootprint[];
   readonly profile?: PackedProfile;
 }
 
@@ -71,6 +71,10 @@ export interface PackedSurface {
 
 export interface PackedRun {
   readonly label: string;
+  /** The name of the run in the style sheet. */
+  readonly key: string;
+  /** Lengths of strokes and gaps of its curves [px]; none for a whole line. */
+  readonly dash: readonly number[];
   readonly period: number;
   readonly bucket: number;
   readonly robot: Robot;

@@ -60,6 +60,10 @@ typedef enum hxSoilLaw {
 /* Whether torso, knees and shanks touch the ground. */
 typedef enum hxBodyContact { HX_BODY_OFF = 1, HX_BODY_ON } hxBodyContact;
 
+/* Whether a run warns of legs that overlap. The plant ignores it: there is no force between legs.
+ */
+typedef enum hxSelfContact { HX_SELF_OFF = 1, HX_SELF_WARN } hxSelfContact;
+
 typedef enum hxServoMode { HX_SERVO_POSITION = 1, HX_SERVO_TORQUE, HX_SERVO_KINEMATIC } hxServoMode;
 
 typedef enum hxProjection {
@@ -125,6 +129,7 @@ typedef struct hxDefinition {
   double foot_radius;       /* m */
   struct {                  /* spheres that touch the ground besides the feet; see hxTerrain */
     int contact;            /* hxBodyContact */
+    int self_contact;       /* hxSelfContact */
     double torso_box[3];    /* m  half edges along the torso's axes of a box whose eight corners
                              *    touch the ground; 0 0 0: they do not */
     double torso_centre[3]; /* m  centre of the box from the torso's origin */
@@ -271,7 +276,7 @@ typedef struct hxOutput {
   double cone_time[HX_CONE_BINS]; /* s  feet under load, by |f_t|/(mu f_n): from 0.9 (i/30)^2 on */
 } hxOutput;
 
-enum { HX_FOOTPRINTS = 1024 }; /* footprints that a plant keeps; older ones are forgotten */
+enum { HX_FOOTPRINTS = 512 }; /* footprints that a plant keeps; older ones are forgotten */
 
 /* A footprint in soil, where a foot left its bottom for the last time. */
 typedef struct hxFootprint {

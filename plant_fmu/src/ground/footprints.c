@@ -1,14 +1,18 @@
 #include "footprints.h"
 
+#include <stddef.h>
 #include <string.h>
 
 /* Returns the ring's entry of footprint k. */
 static int entry(double k) { return (int)((long long)k % HX_FOOTPRINTS); }
 
-int hx_footprints_number(const hxFootprints *footprints) {
-  if (footprints->count >= HX_FOOTPRINTS) return HX_FOOTPRINTS;
-  return footprints->count > 0.0 ? (int)footprints->count : 0; /* 0 for a NaN */
+/* Returns how many of those made a ring holds, 0 for a NaN. */
+static int number_of(double count) {
+  if (count >= HX_FOOTPRINTS) return HX_FOOTPRINTS;
+  return count > 0.0 ? (int)count : 0;
 }
+
+int hx_footprints_number(const hxFootprints *footprints) { return number_of(footprints->count); }
 
 void hx_footprints_clear(hxFootprintLog *log) {
   const size_t used = (size_t)hx_footprints_number(&log->kept);
@@ -47,18 +51,25 @@ double hx_footprints_depth(const hxFootprints *footprints, double x, double y) {
   return depth;
 }
 
-int hx_footprints_are_clear(const hxFootprints *footprints) {
-  const unsigned char *byte = (const unsigned char *)footprints->print;
+int hx_footprints_check(const unsigned char *bytes) {
+  double count;
+  memcpy(&count, bytes + offsetof(hxFootprints, count), sizeof count);
+  const int number = number_of(count);
   unsigned found = 0;
-  for (size_t i = (size_t)hx_footprints_number(footprints) * sizeof(hxFootprint);
-       i < sizeof footprints->print; ++i)
-    found |= byte[i];
-  return found == 0;
+  for (size_t i = offsetof(hxFootprints, print) + (size_t)number * sizeof(hxFootprint);
+       i < sizeof(hxFootprints); ++i)
+    found |= bytes[i];
+  return found == 0 ? number : -1;
 }
 
-void hx_footprints_copy(hxFootprints *to, const hxFootprints *from) {
-  const size_t used = (size_t)hx_footprints_number(from);
-  to->count = from->count;
-  memcpy(to->print, from->print, used * sizeof(hxFootprint));
-  memset(to->print + used, 0, (HX_FOOTPRINTS - used) * sizeof(hxFootprint));
+void hx_footprints_write(unsigned char *bytes, const hxFootprints *from) {
+  const size_t end =
+      offsetof(hxFootprints, print) + (size_t)hx_footprints_number(from) * sizeof(hxFootprint);
+  memcpy(bytes, from, end);
+  memset(bytes + end, 0, sizeof *from - end);
+}
+
+void hx_footprints_read(hxFootprintLog *log, const unsigned char *bytes) {
+  memcpy(&log->kept, bytes, sizeof log->kept);
+  log->call_start = log->kept.count;
 }

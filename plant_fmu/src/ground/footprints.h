@@ -1,5 +1,5 @@
 /* footprints.h - where feet have stood in soil: a ring of footprints, outside the state that every
- * call copies
+ * call copies. A new footprint takes the place of the oldest one when the ring is full.
  *
  * A call that fails takes back the footprints that it made. The entries that it overwrote are kept
  * for that.
@@ -43,11 +43,11 @@ double hx_footprints_depth(const hxFootprints *footprints, double x, double y);
 /* Returns how many footprints the ring holds. */
 int hx_footprints_number(const hxFootprints *footprints);
 
-/* Returns whether the entries past the last footprint are 0, as in a copy. */
-int hx_footprints_are_clear(const hxFootprints *footprints);
-
-/* Copies a ring; entries past the last are set to 0. */
-void hx_footprints_copy(hxFootprints *to, const hxFootprints *from);
+/* Copies a ring to and from bytes of any alignment; entries past the last footprint are 0 there.
+ * The check returns the number of footprints in the bytes, -1 if these entries are not 0. */
+void hx_footprints_write(unsigned char *bytes, const hxFootprints *from);
+void hx_footprints_read(hxFootprintLog *log, const unsigned char *bytes);
+int hx_footprints_check(const unsigned char *bytes);
 
 HX_HIDDEN_END
 

@@ -1,29 +1,14 @@
+#define HX_LANES 1 /* the surface at one point */
+
 #include "surface.h"
 
 #include <math.h>
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
+#include "hexapod/message.h"
+#include "smooth.h"
 #include "soil.h"
-
-/* The head of a grid file. */
-typedef struct {
-  char magic[8];
-  int64_t rows, cols, kind, materials;
-  double x0, y0, cell;
-  char name[64];
-} hxGridHead;
-
-struct hxTerrain {
-  hxGridHead head;
-  uint64_t checksum;
-  double per_cell;               /* 1/m */
-  const double *height;          /* [rows][cols] */
-  const unsigned char *material; /* [rows][cols], NULL: none */
-  const double *table;           /* [materials][HX_MATERIAL_COLUMNS] */
-  double bytes[];                /* the file after its head */
-};
 
 const double hx_far = 1e3;
 
@@ -35,7 +20,7 @@ static const double highest = 1e4, farthest = 1e6, cell_range[2] = {1e-4, 1e3};
 
 /* Writes what is wrong with a number of the head and returns 0. */
 static int refuse(char *message, const char *what, double got, const char *expected) {
-  snprintf(message, HX_MESSAGE_SIZE, "terrain grid: %s: got %.9g, expected %s", what, got,
+  hx_print(message, HX_MESSAGE_SIZE, "terrain grid: %s: got %.9g, expected %s", what, got,
            expected);
   return 0;
 }
@@ -46,7 +31,7 @@ static int is_within(double x, double low, double high) { return x >= low && x <
 static int check_head(const hxGridHead *head, char *message) {
   const int64_t least = head->kind == HX_SURFACE_SMOOTH ? 2 : 1;
   if (memcmp(head->magic, "hxGrid01", sizeof head->magic) != 0) {
-    snprintf(message, HX_MESSAGE_SIZE,
+    hx_print(message, HX_MESSAGE_SIZE,
              "terrain grid: got bytes that do not begin with hxGrid01, expected a grid file of "
              "version 1");
     return 0;
@@ -92,7 +77,7 @@ static int check_heights(const hxTerrain *terrain, char *message) {
     for (int64_t col = 0; col < cols; ++col) bad |= !(fabs(height[col]) <= highest);
     for (int64_t col = 0; bad && col < cols; ++col)
       if (!(fabs(height[col]) <= highest)) {
-        snprintf(message, HX_MESSAGE_SIZE,
+        hx_print(message, HX_MESSAGE_SIZE,
                  "terrain grid: height[%lld][%lld]: got %.9g, expected -1e4 to 1e4 m; fill gaps of "
                  "the map",
                  (long long)row, (long long)col, height[col]);
@@ -147,7 +132,7 @@ static int check_soil_of_blocks(const hxTerrain *terrain, char *message) {
   for (int64_t row = 0; row < terrain->head.rows; ++row)
     for (int64_t col = 0; col < terrain->head.cols; ++col)
       if (is_uneven_soil(terrain, row, col)) {
-        snprintf(
+        hx_print(
             message, HX_MESSAGE_SIZE,
             "terrain grid: material[%lld][%lld]: got soil on a block that is higher or lower than "
             "its neighbour, expected soil on level blocks; move it, or make the surface smooth",
@@ -157,9 +142,29 @@ static int check_soil_of_blocks(const hxTerrain *terrain, char *message) {
   return 1;
 }
 
+/* Reach of a tile: m, and cells at least. Tiles have at least two cells along an edge. */
+static const double least_reach = 0.02;
+
+static int64_t cells_of_reach(const hxGridHead *head) {
+  return (int64_t)ceil(least_reach / head->cell);
+}
+
+static int64_t cells_of_tile(const hxGridHead *head) {
+  const int64_t cells = cells_of_reach(head);
+  return cells > 2 ? cells : 2;
+}
+
+/* Returns how many tiles cover n nodes. */
+static int64_t tiles_over(const hxGridHead *head, int64_t n) {
+  const int64_t cells = cells_of_tile(head);
+  return (n + cells - 1) / cells;
+}
+
 /* Copies the file after its head and sets the pointers to its parts. */
 static hxTerrain *copy_file(const hxGridHead *head, const void *bytes, size_t size) {
-  hxTerrain *terrain = malloc(sizeof *terrain + (size - sizeof *head));
+  const int64_t tile_rows = tiles_over(head, head->rows), tile_cols = tiles_over(head, head->cols);
+  const size_t tops = (size_t)(tile_rows * tile_cols) * sizeof(double);
+  hxTerrain *terrain = malloc(sizeof *terrain + (size - sizeof *head) + tops);
   if (!terrain) return NULL;
   memcpy(terrain->bytes, (const char *)bytes + sizeof *head, size - sizeof *head);
   const char *map = (const char *)(terrain->bytes + head->rows * head->cols);
@@ -169,7 +174,83 @@ static hxTerrain *copy_file(const hxGridHead *head, const void *bytes, size_t si
   terrain->height = terrain->bytes;
   terrain->material = head->materials > 0 ? (const unsigned char *)map : NULL;
   terrain->table = terrain->bytes + head->rows * head->cols + (int64_t)(map_size(head) / 8);
+  terrain->top = terrain->bytes + (size - sizeof *head) / sizeof(double);
+  terrain->tile_rows = tile_rows, terrain->tile_cols = tile_cols;
+  terrain->per_tile = 1.0 / ((double)cells_of_tile(head) * head->cell);
+  terrain->reach = (double)cells_of_reach(head) * head->cell;
   return terrain;
+}
+
+/* Lowest and highest of some heights, m. */
+typedef struct {
+  double low, high;
+} hxHeights;
+
+/* Nodes from first to last along a line of n, those that tile i reaches: its patches depend on a
+ * node before and two behind them. */
+typedef struct {
+  int64_t first, last;
+  int at_border;
+} hxNodes;
+
+static hxNodes nodes_of_tile(const hxGridHead *head, int64_t tile, int64_t n) {
+  const int64_t cells = cells_of_tile(head), reach = cells_of_reach(head);
+  const int64_t first = tile * cells - reach - 1, last = (tile + 1) * cells - 1 + reach + 2;
+  return (hxNodes){first < 0 ? 0 : first, last < n - 1 ? last : n - 1, first < 0 || last > n - 1};
+}
+
+static void widen(hxHeights *heights, double low, double high) {
+  heights->low = low < heights->low ? low : heights->low;
+  heights->high = high > heights->high ? high : heights->high;
+}
+
+/* Returns an upper bound of the ground between nodes of these heights: the weights of a patch have
+ * magnitudes that add up to at most 5/4 along each axis; beyond the map, where nodes continue
+ * linearly, the bound is coarser. */
+static double top_over(const hxTerrain *terrain, const hxHeights *heights, int at_border) {
+  const double middle = 0.5 * (heights->low + heights->high),
+               half = 0.5 * (heights->high - heights->low), rounding = 1e-9;
+  if (terrain->head.kind == HX_SURFACE_BLOCKS) return heights->high + rounding;
+  return middle + (at_border ? 15.0 : 25.0 / 16.0) * half + rounding;
+}
+
+/* Computes the tops of a row of tiles, from lowest and highest heights of each column. */
+static void fill_tops(hxTerrain *terrain, int64_t tile_row, hxHeights *column) {
+  const hxGridHead *head = &terrain->head;
+  const hxNodes rows = nodes_of_tile(head, tile_row, head->rows);
+  for (int64_t row = rows.first; row <= rows.last; ++row) {
+    const double *height = terrain->height + row * head->cols;
+    for (int64_t col = 0; col < head->cols; ++col) {
+      if (row == rows.first) column[col] = (hxHeights){height[col], height[col]};
+      widen(&column[col], height[col], height[col]);
+    }
+  }
+  for (int64_t tile = 0; tile < terrain->tile_cols; ++tile) {
+    const hxNodes cols = nodes_of_tile(head, tile, head->cols);
+    hxHeights all = column[cols.first];
+    for (int64_t col = cols.first; col <= cols.last; ++col)
+      widen(&all, column[col].low, column[col].high);
+    const double top = top_over(terrain, &all, rows.at_border || cols.at_border);
+    terrain->top[tile_row * terrain->tile_cols + tile] = top;
+    terrain->highest = top > terrain->highest ? top : terrain->highest;
+  }
+}
+
+/* Computes the tops of all tiles; returns 0 when out of memory. */
+static int make_tops(hxTerrain *terrain) {
+  hxHeights *column = malloc((size_t)terrain->head.cols * sizeof *column);
+  if (!column) return 0;
+  terrain->highest = -HUGE_VAL;
+  for (int64_t row = 0; row < terrain->tile_rows; ++row) fill_tops(terrain, row, column);
+  free(column);
+  return 1;
+}
+
+/* Refuses a grid for lack of memory. */
+static hxTerrain *refuse_memory(hxTerrain *terrain, char *message) {
+  hx_print(message, HX_MESSAGE_SIZE, "terrain grid: out of memory; free some and try again");
+  hx_terrain_destroy(terrain);
+  return NULL;
 }
 
 hxTerrain *hx_terrain_create(const void *bytes, size_t size, char *message) {
@@ -181,22 +262,20 @@ hxTerrain *hx_terrain_create(const void *bytes, size_t size, char *message) {
   memcpy(&head, bytes, sizeof head);
   if (!check_head(&head, message)) return NULL;
   if (file_size(&head) != size) {
-    snprintf(message, HX_MESSAGE_SIZE,
+    hx_print(message, HX_MESSAGE_SIZE,
              "terrain grid: size: got %llu bytes, expected %llu for its rows, cols and materials; "
              "the file is cut off or damaged",
              (unsigned long long)size, (unsigned long long)file_size(&head));
     return NULL;
   }
   hxTerrain *terrain = copy_file(&head, bytes, size);
-  if (!terrain) {
-    snprintf(message, HX_MESSAGE_SIZE, "terrain grid: out of memory; free some and try again");
+  if (!terrain) return refuse_memory(NULL, message);
+  if (!(check_heights(terrain, message) && check_materials(terrain, message) &&
+        check_soil_of_blocks(terrain, message))) {
+    hx_terrain_destroy(terrain);
     return NULL;
   }
-  if (check_heights(terrain, message) && check_materials(terrain, message) &&
-      check_soil_of_blocks(terrain, message))
-    return terrain;
-  hx_terrain_destroy(terrain);
-  return NULL;
+  return make_tops(terrain) ? terrain : refuse_memory(terrain, message);
 }
 
 void hx_terrain_destroy(hxTerrain *terrain) { free(terrain); }
@@ -208,37 +287,6 @@ double hx_terrain_cell_size(const hxTerrain *terrain) { return terrain->head.cel
 
 /* ---- the smooth surface ---- */
 
-/* Height over a point, its first and second derivatives. */
-typedef struct {
-  double s, sx, sy, sxx, sxy, syy;
-  int64_t row, col; /* of the patch */
-} hxPatch;
-
-/* A coordinate on the grid: index of the node before it, place between this and the next node. */
-typedef struct {
-  int64_t node;
-  double place;
-  int outside; /* beyond the grid, where the border's height goes on */
-} hxGridPlace;
-
-static hxGridPlace grid_place(double x, double origin, double per_cell, int64_t nodes) {
-  const double u = (x - origin) * per_cell, last = (double)(nodes - 1);
-  const double clamped = u < 0.0 ? 0.0 : u > last ? last : u;
-  const int64_t before = (int64_t)clamped, node = before < nodes - 2 ? before : nodes - 2;
-  return (hxGridPlace){node, clamped - (double)node, u < 0.0 || u > last};
-}
-
-/* Computes weights of four nodes by Catmull and Rom's cubic, and their derivatives by the place. */
-static void cubic_weights(double t, double w[3][4]) {
-  const double t2 = t * t, t3 = t2 * t;
-  w[0][0] = -0.5 * t + t2 - 0.5 * t3, w[0][1] = 1.0 - 2.5 * t2 + 1.5 * t3;
-  w[0][2] = 0.5 * t + 2.0 * t2 - 1.5 * t3, w[0][3] = 0.5 * t3 - 0.5 * t2;
-  w[1][0] = -0.5 + 2.0 * t - 1.5 * t2, w[1][1] = 4.5 * t2 - 5.0 * t;
-  w[1][2] = 0.5 + 4.0 * t - 4.5 * t2, w[1][3] = 1.5 * t2 - t;
-  w[2][0] = 2.0 - 3.0 * t, w[2][1] = 9.0 * t - 5.0;
-  w[2][2] = 4.0 - 9.0 * t, w[2][3] = 3.0 * t - 1.0;
-}
-
 /* Copies four nodes of a grid line around a place; nodes beyond the line continue it linearly. */
 static void line_nodes(const double *line, int64_t node, int64_t nodes, double out[4]) {
   out[1] = line[node], out[2] = line[node + 1];
@@ -246,8 +294,7 @@ static void line_nodes(const double *line, int64_t node, int64_t nodes, double o
   out[3] = node + 2 < nodes ? line[node + 2] : 2.0 * out[2] - out[1];
 }
 
-/* Copies the 4 x 4 nodes around a place. */
-static void patch_nodes(const hxTerrain *terrain, int64_t row, int64_t col, double out[4][4]) {
+void hx_terrain_border_nodes(const hxTerrain *terrain, int64_t row, int64_t col, double out[4][4]) {
   const int64_t rows = terrain->head.rows, cols = terrain->head.cols;
   for (int i = 1; i < 3; ++i) line_nodes(terrain->height + (row + i - 1) * cols, col, cols, out[i]);
   for (int i = 0; i < 4; i += 3) {
@@ -260,117 +307,34 @@ static void patch_nodes(const hxTerrain *terrain, int64_t row, int64_t col, doub
   }
 }
 
-/* Computes the surface over (x, y). */
-static hxPatch patch_at(const hxTerrain *terrain, double x, double y) {
-  const hxGridHead *head = &terrain->head;
-  const double per_cell = terrain->per_cell;
-  const hxGridPlace px = grid_place(x, head->x0, per_cell, head->cols),
-                    py = grid_place(y, head->y0, per_cell, head->rows);
-  double node[4][4], wx[3][4], wy[3][4], line[3][4] = {{0.0}};
-  patch_nodes(terrain, py.node, px.node, node);
-  cubic_weights(px.place, wx);
-  cubic_weights(py.place, wy);
-  for (int d = 0; d < 3; ++d)
-    for (int i = 0; i < 4; ++i)
-      line[d][i] = (wx[d][0] * node[i][0] + wx[d][1] * node[i][1]) +
-                   (wx[d][2] * node[i][2] + wx[d][3] * node[i][3]);
-  hxPatch p = {0.0, 0.0, 0.0, 0.0, 0.0, 0.0, py.node, px.node};
-  for (int i = 0; i < 4; ++i) {
-    p.s += wy[0][i] * line[0][i], p.sx += wy[0][i] * line[1][i], p.sxx += wy[0][i] * line[2][i];
-    p.sy += wy[1][i] * line[0][i], p.sxy += wy[1][i] * line[1][i];
-    p.syy += wy[2][i] * line[0][i];
-  }
-  const double by_x = px.outside ? 0.0 : per_cell, by_y = py.outside ? 0.0 : per_cell;
-  p.sx *= by_x, p.sxx *= by_x * by_x, p.sxy *= by_x * by_y;
-  p.sy *= by_y, p.syy *= by_y * by_y;
-  return p;
-}
-
-/* Hessian of half the squared distance from a point rz below the surface, or its part without the
- * surface's bend where the whole has no minimum. */
-typedef struct {
-  double xx, xy, yy, det;
-} hxHessian;
-
-static hxHessian hessian_of(const hxPatch *p, double rz) {
-  const double gxx = 1.0 + p->sx * p->sx, gyy = 1.0 + p->sy * p->sy, gxy = p->sx * p->sy;
-  hxHessian H = {gxx + rz * p->sxx, gxy + rz * p->sxy, gyy + rz * p->syy, 0.0};
-  H.det = H.xx * H.yy - H.xy * H.xy;
-  if (H.xx > 0.1 && H.det > 0.1) return H;
-  return (hxHessian){gxx, gxy, gyy, gxx * gyy - gxy * gxy};
-}
-
-/* Moves the patch along the surface by its own second-order expansion. */
-static void move_patch(hxPatch *p, double dx, double dy) {
-  p->s += dx * (p->sx + 0.5 * (p->sxx * dx + p->sxy * dy)) +
-          dy * (p->sy + 0.5 * (p->sxy * dx + p->syy * dy));
-  p->sx += p->sxx * dx + p->sxy * dy;
-  p->sy += p->sxy * dx + p->syy * dy;
-}
-
 /* Sets the face from the nearest point's patch: d normal/d point = -P S H^-1 J^T / |N|, where N =
  * (-s_x, -s_y, 1), P projects across the normal, S is the surface's second derivative and J the
  * derivative of its points. */
-static void set_bend(const hxPatch *p, const hxHessian *H, double per_n, hxFace *face) {
+static void set_bend(const hxPatch *p, const hxHessian *H, hxFace *face) {
   const double J[2][3] = {{1.0, 0.0, p->sx}, {0.0, 1.0, p->sy}}, *n = face->normal;
   static const int row[6] = {0, 1, 2, 0, 0, 1}, col[6] = {0, 1, 2, 1, 2, 2};
   double turn[3][3];
   for (int k = 0; k < 3; ++k) {
-    const double ux = (H->yy * J[0][k] - H->xy * J[1][k]) / H->det,
-                 uy = (H->xx * J[1][k] - H->xy * J[0][k]) / H->det;
+    const double ux = H->per_det * (H->yy * J[0][k] - H->xy * J[1][k]),
+                 uy = H->per_det * (H->xx * J[1][k] - H->xy * J[0][k]);
     const double dN[3] = {-(p->sxx * ux + p->sxy * uy), -(p->sxy * ux + p->syy * uy), 0.0};
     const double along = n[0] * dN[0] + n[1] * dN[1];
-    for (int i = 0; i < 3; ++i) turn[i][k] = per_n * (dN[i] - along * n[i]);
+    for (int i = 0; i < 3; ++i) turn[i][k] = n[2] * (dN[i] - along * n[i]);
   }
   for (int i = 0; i < 6; ++i) face->bend[i] = turn[row[i]][col[i]];
 }
 
-/* Returns whether (x, y) is on the patch that was computed. */
-static int is_in_patch(const hxTerrain *terrain, const hxPatch *p, double x, double y) {
-  const hxGridHead *head = &terrain->head;
-  return grid_place(x, head->x0, terrain->per_cell, head->cols).node == p->col &&
-         grid_place(y, head->y0, terrain->per_cell, head->rows).node == p->row;
-}
-
-/* Squares of Newton's last step over the cell's. Its end is found by the patch's expansion: third
- * derivatives, and at a border the jump of the second ones, are left out. */
-static const double close = 1e-7, closest = 1e-14;
-
-/* Computes the face of a smooth surface by Newton's method on the two parameters of its nearest
- * point, from the point below. */
 static void smooth_face(const hxTerrain *terrain, const double point[3], int bends, hxFace *face) {
-  enum { MOST = 16 };
-  const double cell = terrain->head.cell, area = cell * cell;
-  double x = point[0], y = point[1];
-  hxPatch p;
-  hxHessian H;
-  for (int i = 0;; ++i) {
-    p = patch_at(terrain, x, y);
-    const double rx = x - point[0], ry = y - point[1], rz = p.s - point[2];
-    const double gx = rx + p.sx * rz, gy = ry + p.sy * rz;
-    H = hessian_of(&p, rz);
-    double dx = (H.xy * gy - H.yy * gx) / H.det, dy = (H.xy * gx - H.xx * gy) / H.det;
-    const double square = dx * dx + dy * dy;
-    if (square <= closest * area || i == MOST ||
-        (!bends && square <= close * area && is_in_patch(terrain, &p, x + dx, y + dy))) {
-      x += dx, y += dy;
-      move_patch(&p, dx, dy);
-      break;
-    }
-    const double limit = square > area ? cell / sqrt(square) : 1.0;
-    x += limit * dx, y += limit * dy;
-  }
-  const double per_n = 1.0 / sqrt(1.0 + p.sx * p.sx + p.sy * p.sy);
-  face->normal[0] = -p.sx * per_n, face->normal[1] = -p.sy * per_n, face->normal[2] = per_n;
-  face->distance = (point[0] - x) * face->normal[0] + (point[1] - y) * face->normal[1] +
-                   (point[2] - p.s) * face->normal[2];
-  if (bends) set_bend(&p, &H, per_n, face);
+  const double below[2] = {0.0, 0.0};
+  const hxNearest nearest = hx_nearest_on_surface(terrain, -1, point, below, bends);
+  face->distance = hx_distance_from_surface(&nearest, point, face->normal);
+  if (bends) set_bend(&nearest.p, &nearest.H, face);
 }
 
 /* ---- blocks ---- */
 
 static int64_t clamped_index(double u, int64_t n) {
-  return u <= 0.0 ? 0 : u >= (double)(n - 1) ? n - 1 : (int64_t)u;
+  return !(u > 0.0) ? 0 : u >= (double)(n - 1) ? n - 1 : (int64_t)u; /* NaN: 0 */
 }
 
 void hx_terrain_cell_at(const hxTerrain *terrain, const double point[3], double cell[2]) {
@@ -498,6 +462,17 @@ void hx_terrain_face(const hxTerrain *terrain, hxFaceKind kind, const double cel
   if (kind == HX_FACE_WALL || kind == HX_FACE_NEAREST) wall_faces(terrain, point, around, 0, face);
   if (kind == HX_FACE_SIDE || kind == HX_FACE_NEAREST) wall_faces(terrain, point, around, 1, face);
   if (kind == HX_FACE_CORNER || kind == HX_FACE_NEAREST) corner_faces(terrain, point, around, face);
+}
+
+/* ---- spheres above the ground ---- */
+
+double hx_terrain_depth_bound(const hxTerrain *terrain, const double centre[3], double radius) {
+  const hxGridHead *head = &terrain->head;
+  if (!(radius < terrain->reach)) return radius; /* unknown: the tile's map does not reach so far */
+  const int64_t col = clamped_index((centre[0] - head->x0) * terrain->per_tile, terrain->tile_cols);
+  const int64_t row = clamped_index((centre[1] - head->y0) * terrain->per_tile, terrain->tile_rows);
+  const double above = centre[2] - terrain->top[row * terrain->tile_cols + col];
+  return radius - (above < terrain->reach ? above : terrain->reach);
 }
 
 /* ---- materials ---- */

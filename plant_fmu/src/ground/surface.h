@@ -8,6 +8,28 @@
 
 HX_HIDDEN_BEGIN
 
+/* The head of a grid file. */
+typedef struct {
+  char magic[8];
+  int64_t rows, cols, kind, materials;
+  double x0, y0, cell;
+  char name[64];
+} hxGridHead;
+
+struct hxTerrain {
+  hxGridHead head;
+  uint64_t checksum;
+  double per_cell;               /* 1/m */
+  const double *height;          /* [rows][cols] */
+  const unsigned char *material; /* [rows][cols], NULL: none */
+  const double *table;           /* [materials][HX_MATERIAL_COLUMNS] */
+  int64_t tile_rows, tile_cols;  /* of the map of heights below */
+  double per_tile, reach;        /* 1/m, m */
+  double highest;                /* m  of the tops */
+  double *top;    /* m  [tile_rows][tile_cols]: no ground within the reach of a tile is higher */
+  double bytes[]; /* the file after its head, then the map of tops */
+};
+
 /* The face of the ground nearest to a point. */
 typedef struct hxFace {
   double distance;  /* m    signed, > 0 outside */
@@ -39,6 +61,13 @@ extern const double hx_far; /* m  distance of a wall that is not there */
  * smoothly. A smooth surface has one face; its normal's derivative is computed with bends only. */
 void hx_terrain_face(const hxTerrain *terrain, hxFaceKind kind, const double cell[2],
                      const double point[3], int bends, hxFace *face);
+
+/* Copies the 4 x 4 nodes around a patch; nodes beyond the grid continue it linearly. */
+void hx_terrain_border_nodes(const hxTerrain *terrain, int64_t row, int64_t col, double out[4][4]);
+
+/* Returns an upper bound of a sphere's depth in the ground, m; negative: it does not touch. The
+ * bound is cheap: a look-up of the highest ground around the sphere. */
+double hx_terrain_depth_bound(const hxTerrain *terrain, const double centre[3], double radius);
 
 /* Returns the least shear displacement of the table's soils, m; 0 if no material is soil. */
 double hx_terrain_shear_displacement(const hxTerrain *terrain);

@@ -35,9 +35,10 @@ static inline void sweep_sum(const hxModel *model, const hxRigid6 *own, hxReal r
 /* Does this for a tibia with several rows of contacts. */
 HX_RARE void sweep_rows(const hxModel *model, const hxImplicit *implicit, int pack,
                         const hxRigid6 *own, const hxReal *resists, hxLegWork *leg, hxInertia6 *I) {
-  *I = row_inertia(model, implicit, pack, HX_FOOT, leg);
+  row_inertia(model, implicit, pack, HX_FOOT, leg, I);
   for (int k = 1; k < leg->rows; ++k) {
-    const hxInertia6 row = row_inertia(model, implicit, pack, leg->row[k], leg);
+    hxInertia6 row;
+    row_inertia(model, implicit, pack, leg->row[k], leg, &row);
     *I = hx_inertia_add(I, &row);
   }
   sweep_sum(model, own, *resists, &leg->joint[HX_JOINTS - 1].sweep, I);
@@ -58,7 +59,7 @@ static inline void sweep_inertia(const hxModel *model, const hxImplicit *implici
       sweep_rows(model, implicit, pack, &own, &resists, leg, I);
       return;
     }
-    if (joint == HX_JOINTS - 1) *I = row_inertia(model, implicit, pack, HX_FOOT, leg);
+    if (joint == HX_JOINTS - 1) row_inertia(model, implicit, pack, HX_FOOT, leg, I);
   } else if (joint == HX_JOINTS - 1) {
     sweep->U = hx_rigid_mul(&own, sweep->S);
     sweep->inverse_d = sweep_inverse(model, sweep, resists);

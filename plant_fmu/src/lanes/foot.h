@@ -3,6 +3,9 @@
 #ifndef HX_FOOT_H
 #define HX_FOOT_H
 
+#ifndef HX_TANGENT
+#include "../ground/smooth.h"
+#endif
 #include "../ground/surface.h"
 #include "friction.h"
 #include "kinematics.h"
@@ -91,8 +94,72 @@ static inline void query_grid(const hxModel *model, const hxContactState *state,
                   face);
 }
 
-/* Returns distance and normal of a grid at a row's points, lane by lane. Without all, open contacts
- * are left far away. */
+/* Contacts whose place on a grid is computed. Others are left above the ground. */
+enum {
+  HX_CLOSED, /* those that are closed */
+  HX_ALL,
+  HX_NEAR /* those that are closed, and open ones that may touch the ground */
+};
+
+/* Computes the face of a grid under the sphere of an open contact, or, where the ground around it
+ * is lower, the least distance that it may have. */
+HX_INLINE void query_near_grid(const hxModel *model, const hxContactState *state, hxFaceKind kind,
+                               int row, int slot, const hxNumber point[3], hxFace *face) {
+  const double real[3] = {hx_re(point[0]), hx_re(point[1]), hx_re(point[2])},
+               radius = hx_re(model->radius[row]),
+               bound = hx_terrain_depth_bound(model->terrain, real, radius);
+  if (bound <= 0.0)
+    face->distance = radius - bound;
+  else
+    query_grid(model, state, kind, slot, point, face);
+}
+
+#ifndef HX_TANGENT
+/* Returns the largest depths that a row of contacts at these points may have, m; not positive: they
+ * do not touch the grid. */
+HX_RARE hxReal hx_grid_depth_bound(const hxModel *model, int row, const hxVec3 *point) {
+  const hxTerrain *terrain = model->terrain;
+  const double radius = model->radius[row];
+  const hxReal z = point->z - model->ground_point[2], above = z - terrain->highest;
+  if (radius < terrain->reach && !hx_any(~hx_less(hx_splat(radius), above)))
+    return radius - hx_min(above, hx_splat(terrain->reach));
+  double at[3][HX_LANES], bound[HX_LANES];
+  hx_store(at[0], point->x), hx_store(at[1], point->y), hx_store(at[2], z);
+  for (int lane = 0; lane < HX_LANES; ++lane) {
+    const double p[3] = {at[0][lane], at[1][lane], at[2][lane]};
+    bound[lane] = hx_terrain_depth_bound(terrain, p, radius);
+  }
+  return hx_load(bound);
+}
+#endif
+
+#ifndef HX_TANGENT
+/* Returns distance and normal of a smooth grid at a row's points. */
+HX_RARE hxGround hx_smooth_grid(const hxModel *model, const hxContactState *state, int row,
+                                int slot, int all, const hxVec3 *point) {
+  const hxReal zero = hx_splat(0.0), one = hx_splat(1.0);
+  const hxReal at[3] = {point->x, point->y, point->z - model->ground_point[2]};
+  hxReal normal[3], distance = hx_splat(hx_far);
+  hxMask wanted = hx_less(zero, hx_load(&state->closed[row][slot]));
+  if (all == HX_ALL) wanted = hx_less(zero, one);
+  if (all == HX_NEAR) {
+    const hxReal bound = hx_grid_depth_bound(model, row, point);
+    wanted |= hx_less(zero, bound);
+    distance = model->radius[row] - bound;
+  }
+  if (!hx_any(wanted)) return (hxGround){distance, {zero, zero, one}};
+  const int is_foot = row == HX_FOOT;
+  const hxReal from[2] = {is_foot ? hx_load(&state->nearest[0][slot]) : zero,
+                          is_foot ? hx_load(&state->nearest[1][slot]) : zero};
+  const hxNearest nearest = hx_nearest_on_surface(model->terrain, wanted, at, from, 0);
+  const hxReal exact = hx_distance_from_surface(&nearest, at, normal);
+  return (hxGround){hx_select(wanted, exact, distance),
+                    {hx_select(wanted, normal[0], zero), hx_select(wanted, normal[1], zero),
+                     hx_select(wanted, normal[2], one)}};
+}
+#endif
+
+/* Returns distance and normal of a grid at a row's points, lane by lane. */
 HX_RARE hxGround hx_grid(const hxModel *model, const hxContactState *state, int row, int slot,
                          int all, const hxVec3 *point) {
   static const hxFaceKind kind[HX_ROWS] = {HX_FACE_TOP,    HX_FACE_WALL,    HX_FACE_SIDE,
@@ -110,8 +177,10 @@ HX_RARE hxGround hx_grid(const hxModel *model, const hxContactState *state, int 
       continue;
     }
     hxFace face = {.distance = hx_far, .normal = {0.0, 0.0, 1.0}};
-    if (all || hx_re(state->closed[row][place]) != 0.0)
+    if (all == HX_ALL || hx_re(state->closed[row][place]) != 0.0)
       query_grid(model, state, kind[row], place, p, &face);
+    else if (all == HX_NEAR)
+      query_near_grid(model, state, kind[row], row, place, p, &face);
     put_face(&face, p, &distance[lane], n);
     for (int i = 0; i < 3; ++i) normal[i][lane] = n[i];
   }
@@ -126,6 +195,11 @@ HX_INLINE hxGround hx_ground(const hxModel *model, const hxContactState *state, 
   if (model->terrain_kind == HX_TERRAIN_FLAT)
     return (hxGround){point.z - model->ground_point[2],
                       {hx_splat(0.0), hx_splat(0.0), hx_splat(1.0)}};
+#ifndef HX_TANGENT
+  if (model->terrain_kind == HX_TERRAIN_GRID &&
+      hx_terrain_surface(model->terrain) == HX_SURFACE_SMOOTH)
+    return hx_smooth_grid(model, state, row, slot, all, &point);
+#endif
   if (model->terrain_kind == HX_TERRAIN_GRID) return hx_grid(model, state, row, slot, all, &point);
   const hxVec3 n = hx_splat_vec3(model->ground_normal);
   return (hxGround){hx_dot(n, hx_sub3(point, hx_splat_vec3(model->ground_point))), n};

@@ -3,10 +3,9 @@
 #ifndef HX_INTEGRATOR_H
 #define HX_INTEGRATOR_H
 
-#include <stdio.h>
-
 #include "../contact_law.h"
 #include "../method.h"
+#include "hexapod/message.h"
 #include "measure.h"
 
 static const double step_floor = 1e-11; /* s  the error control fails below this step */
@@ -43,7 +42,7 @@ typedef struct {
 static inline void hx_depths_of(const hxModel *model, const hxContactState *state,
                                 const hxPlantMotion *motion, hxDepths *depths) {
   hxMoment moment;
-  hx_moment_of(model, state, motion, &moment);
+  hx_moment_and_bound(model, NULL, state, motion, HX_ALL, &moment);
   hx_depths_of_moment(model, state, &moment, depths);
 }
 
@@ -211,9 +210,9 @@ HX_INLINE double deepest_open_of(const hxContactState *contact, const hxDepths *
   return depth;
 }
 
-/* Returns the penetration of the deepest open contact, or how far a foot has left its cell, m. */
-static double deepest_open(const hxStart *start, const hxDepths *depths) {
-  const hxModel *model = start->model;
+/* Returns the penetration of the deepest open contact of a model's rows, or how far a foot has left
+ * its cell, m. */
+static double deepest_open(const hxModel *model, const hxStart *start, const hxDepths *depths) {
   double depth = deepest_open_of(start->contact, depths, HX_FOOT, HX_LEGS, -HUGE_VAL);
   for (int k = 1; k < model->rows; ++k)
     depth = deepest_open_of(start->contact, depths, model->row[k], HX_LEGS, depth);
@@ -282,14 +281,15 @@ static double find_touchdown(const hxStart *start, double h, hxState *state, hxT
   double low = 0.0, high = h;
   hxDepths found, depths_low;
   hx_depths_of(start->model, start->contact, start->y, &depths_low);
-  for (int guess = 1; deepest_open(start, depths) > start->touch && high - low > step_floor;
+  for (int guess = 1;
+       deepest_open(start->model, start, depths) > start->touch && high - low > step_floor;
        ++guess) {
     double middle = guess % 3 ? expected_touch(start, low, &depths_low, high, depths) : low;
     if (!(middle > low && middle < high)) middle = 0.5 * (low + high);
     hxTrial nearer;
     try_step(start, middle, state, &nearer);
     hx_depths_of(start->model, start->contact, &nearer.y, &found);
-    if (deepest_open(start, &found) > 0.0)
+    if (deepest_open(start->model, start, &found) > 0.0)
       high = middle, *depths = found, *trial = nearer;
     else
       low = middle, depths_low = found;
@@ -331,7 +331,7 @@ static double steps_allowed(double time) {
 /* Writes why no step of h from t succeeds, and returns the status. */
 static hxStatus step_failure(const hxTrial *trial, double t, double h, char *message) {
   const int lost = isnan(trial->error);
-  snprintf(message, HX_MESSAGE_SIZE,
+  hx_print(message, HX_MESSAGE_SIZE,
            lost ? "the motion is not finite any more at t = %.9g s (step %.3g s); check masses, "
                   "stiffness and inputs, or let the error control choose the step (solver.step = 0)"
                 : "the error control finds no step that meets the tolerance, or needs too many "
@@ -365,9 +365,9 @@ static double push_work(const hxImpulses *impulses, const hxPlantMotion *from,
 }
 
 /* Adds the works of an accepted step of h to the motion at its end, and its integrals and peaks to
- * the state. */
-static void measure_step(const hxStart *start, double h, const hxMoment *end, hxState *state,
-                         hxTrial *trial) {
+ * the state; its moment has the rows of the model `seen`. */
+static void measure_step(const hxStart *start, const hxModel *seen, double h, const hxMoment *end,
+                         hxState *state, hxTrial *trial) {
   hxStepWorks works;
   hxCommand command[INTERVALS + 1];
   hxReal work[HX_PACKS];
@@ -391,8 +391,34 @@ static void measure_step(const hxStart *start, double h, const hxMoment *end, hx
   trial->y.actuator_work += hx_lane(hx_sum_legs(work), 0);
   trial->y.push_work += push_work(&trial->impulses, start->y, &trial->y);
   trial->y.dissipated = (measured->contact_loss + measured->friction_loss) + measured->gear_loss;
-  hx_copy_moment(start->model, &state->moment, end);
+  hx_copy_moment(seen, &state->moment, end);
   if (start->model->has_soil) memcpy(state->contact.plastic, path.plastic, sizeof path.plastic);
+}
+
+/* Keeps where the feet's nearest points on a smooth grid are. In the next step they have moved
+ * little, so that one evaluation of the surface finds them. */
+static void keep_nearest_points(const hxModel *model, hxState *state) {
+  const hxContactMoment *foot = &state->moment.contact[HX_FOOT];
+  if (!model->terrain || hx_has_cells(model)) return;
+  for (int i = 0; i < 2; ++i)
+    for (int slot = 0; slot < HX_PACKS * HX_LANES; ++slot)
+      state->contact.nearest[i][slot] =
+          foot->normal[i][slot] * (foot->delta[slot] - model->radius[HX_FOOT]);
+}
+
+/* Computes moment and depths at the end of a trial, and returns the model whose rows they contain:
+ * those of bodies are left out where neither they nor an open foot can touch the ground. */
+static const hxModel *end_of_step(const hxStart *start, const hxPlantMotion *y, hxMoment *end,
+                                  hxDepths *depths) {
+  const hxModel *whole = start->model, *seen = start->pressed;
+  if (seen != whole) {
+    const double bound = hx_moment_and_bound(seen, whole, start->contact, y, HX_NEAR, end);
+    hx_depths_of_moment(seen, start->contact, end, depths);
+    if (!(bound > 0.0 || deepest_open(seen, start, depths) > 0.0)) return seen;
+  }
+  hx_moment_of(whole, start->contact, y, end);
+  hx_depths_of_moment(whole, start->contact, end, depths);
+  return whole;
 }
 
 /* Advances the state by one accepted step of at most h_max, shortened by the error control and by
@@ -425,20 +451,20 @@ static hxStatus advance(const hxStart *start, double h_max, double *next_step, h
   /* shorten the step to the first touch-down, measure it, switch contacts */
   hxMoment end;
   hxDepths depths;
-  hx_moment_of(model, start->contact, &trial.y, &end);
-  hx_depths_of_moment(model, start->contact, &end, &depths);
   *taken = h;
-  if (deepest_open(start, &depths) > 0.0) {
+  const hxModel *seen = end_of_step(start, &trial.y, &end, &depths);
+  if (seen == model && deepest_open(model, start, &depths) > 0.0) {
     *taken = find_touchdown(start, h, state, &trial, &depths);
     hx_moment_of(model, start->contact, &trial.y, &end);
   }
   end.time = start->t + *taken;
-  measure_step(start, *taken, &end, state, &trial);
+  measure_step(start, seen, *taken, &end, state, &trial);
   state->motion = trial.y;
   state->steps += 1.0;
-  if (model->terrain) hx_cross_cells(model, &depths, state);
-  if (model->has_soil) hx_depths_of_moment(model, &state->contact, &state->moment, &depths);
-  *event = hx_switch_contacts(model, &depths, start->t + *taken, &state->moment, start->footprints,
+  if (hx_has_cells(model)) hx_cross_cells(seen, &depths, state);
+  keep_nearest_points(model, state);
+  if (model->has_soil) hx_depths_of_moment(seen, &state->contact, &state->moment, &depths);
+  *event = hx_switch_contacts(seen, &depths, start->t + *taken, &state->moment, start->footprints,
                               state);
   return HX_OK;
 }
@@ -502,7 +528,7 @@ static hxStatus run_fixed(const hxModel *model, const hxCommand *command, const 
   const double t_start = command->time;
   const double count = fmax(1.0, ceil((t_end - t_start) / model->step - 1e-9));
   if (count > steps_allowed(t_end - t_start)) {
-    snprintf(message, HX_MESSAGE_SIZE,
+    hx_print(message, HX_MESSAGE_SIZE,
              "solver.step: got %.3g s, which makes %.0f steps of this call, expected at most %.0f; "
              "raise solver.step "
              "or make shorter calls",
@@ -522,9 +548,11 @@ static hxStatus run_fixed(const hxModel *model, const hxCommand *command, const 
 static hxStatus hx_integrate(const hxModel *model, const hxCommand *command, const hxCommand *ramp,
                              double t_end, hxEvents *events, hxState *state, char *message) {
   if (state->moment.stale != 0.0) hx_moment_update(model, state);
+  keep_nearest_points(model, state);
   if (command->time == state->time && t_end > state->time) hx_reset_peaks(&state->measured);
   const hxStatus status = (model->step == 0.0 ? run_to : run_fixed)(model, command, ramp, t_end,
                                                                     events, state, message);
+  memset(state->contact.nearest, 0, sizeof state->contact.nearest);
   fill_motion_slots(&state->motion);
   hx_fill_measured_slots(model, state);
   return status;

@@ -208,6 +208,23 @@ static inline void hx_lanes_sin_cos(hxReal x, hxReal *sine, hxReal *cosine) {
   *sine = hx_load(s), *cosine = hx_load(c);
 }
 
+/* Returns whether a mask is set in any lane. */
+static inline int hx_any(hxMask mask) {
+  int64_t lanes[HX_LANES], any = 0;
+  memcpy(lanes, &mask, sizeof lanes);
+  for (int i = 0; i < HX_LANES; ++i) any |= lanes[i];
+  return any != 0;
+}
+
+/* Returns the largest of all lanes. */
+static inline double hx_largest_lane(hxReal x) {
+  double lanes[HX_LANES], largest;
+  hx_store(lanes, x);
+  largest = lanes[0];
+  for (int i = 1; i < HX_LANES; ++i) largest = lanes[i] > largest ? lanes[i] : largest;
+  return largest;
+}
+
 #else
 #include "complex_step.h"
 #endif

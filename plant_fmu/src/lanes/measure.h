@@ -60,34 +60,64 @@ HX_INLINE void store_contact_moment(const hxModel *model, const hxContactKinemat
 
 /* Stores a row of contacts on the tibias. */
 HX_INLINE void row_moment(const hxModel *model, const hxContactState *state,
-                          const hxPlantMotion *motion, int row, int slot, const hxBody *tibia,
-                          hxMoment *moment) {
-  const hxContactKinematics kin = hx_tibia_contact(model, state, motion, row, slot, 1, tibia);
+                          const hxPlantMotion *motion, int row, int slot, int all,
+                          const hxBody *tibia, hxMoment *moment) {
+  const hxContactKinematics kin = hx_tibia_contact(model, state, motion, row, slot, all, tibia);
   store_contact_moment(model, &kin, row, slot, hx_link_vec3(motion, HX_JOINTS - 1, HX_R, slot),
                        tibia->w, &moment->contact[row]);
 }
 
 HX_RARE void further_moments(const hxModel *model, const hxContactState *state,
-                             const hxPlantMotion *motion, int slot, const hxBody *tibia,
+                             const hxPlantMotion *motion, int slot, int all, const hxBody *tibia,
                              hxMoment *moment) {
   for (int k = 1; k < model->rows; ++k)
-    row_moment(model, state, motion, model->row[k], slot, tibia, moment);
+    row_moment(model, state, motion, model->row[k], slot, all, tibia, moment);
+}
+
+/* Returns the depths of a row of contacts of bodies with centres of mass r, on a grid at most. */
+HX_INLINE hxReal depth_bound(const hxModel *model, int row, int slot, hxVec3 r, const hxMat3 *R) {
+  const hxVec3 point = hx_add3(r, hx_mul(*R, hx_load_vec3(model->point[row], slot)));
+  if (model->terrain_kind == HX_TERRAIN_GRID) return hx_grid_depth_bound(model, row, &point);
+  return model->radius[row] - hx_ground(model, NULL, row, slot, 0, point).distance;
+}
+
+/* Returns the largest of these of knees and shanks, from the centre of mass of their tibias. */
+HX_INLINE hxReal tibia_depth_bound(const hxModel *model, const hxPlantMotion *motion, int slot,
+                                   const hxMat3 *R, hxReal largest) {
+  const hxVec3 r = hx_link_vec3(motion, HX_JOINTS - 1, HX_R, slot);
+  for (int k = model->foot_rows; k < model->rows; ++k)
+    largest = hx_max(largest, depth_bound(model, model->row[k], slot, r, R));
+  return largest;
+}
+
+/* Returns the largest of these of the torso's points. */
+HX_INLINE hxReal torso_depth_bound(const hxModel *model, const hxPlantMotion *motion,
+                                   const hxMat3 *R, hxReal largest) {
+  const hxVec3 r = hx_torso_vec3(motion, HX_R);
+  for (int slot = 0; slot < HX_SLOTS; slot += HX_LANES)
+    largest = hx_max(largest, depth_bound(model, HX_TORSO, slot, r, R));
+  return largest;
 }
 
 /* Stores the torso's contacts. */
 HX_RARE void torso_moment(const hxModel *model, const hxContactState *state,
-                          const hxPlantMotion *motion, const hxBody *torso, hxMoment *moment) {
+                          const hxPlantMotion *motion, int all, const hxBody *torso,
+                          hxMoment *moment) {
   for (int slot = 0; slot < HX_SLOTS; slot += HX_LANES) {
-    const hxContactKinematics kin = hx_torso_contact(model, state, motion, slot, 1, torso);
+    const hxContactKinematics kin = hx_torso_contact(model, state, motion, slot, all, torso);
     store_contact_moment(model, &kin, HX_TORSO, slot, hx_torso_vec3(motion, HX_R), torso->w,
                          &moment->contact[HX_TORSO]);
   }
 }
 
-/* Computes angles, speeds and contacts of a motion. */
-static inline void hx_moment_of(const hxModel *model, const hxContactState *state,
-                                const hxPlantMotion *motion, hxMoment *moment) {
+/* Computes angles, speeds and contacts of a motion, on a grid those that `all` says. With `whole`,
+ * the model whose rows of bodies `model` leaves out, it returns the largest depth that one of their
+ * contacts may have, m. */
+static inline double hx_moment_and_bound(const hxModel *model, const hxModel *whole,
+                                         const hxContactState *state, const hxPlantMotion *motion,
+                                         int all, hxMoment *moment) {
   const hxBody torso = hx_torso_body(motion);
+  hxReal bound = hx_splat(-HUGE_VAL);
   for (int slot = 0; slot < HX_PACKS * HX_LANES; slot += HX_LANES) {
     hxBody i = torso, j = torso;
     for (int joint = 0; joint < HX_JOINTS; ++joint) {
@@ -102,11 +132,20 @@ static inline void hx_moment_of(const hxModel *model, const hxContactState *stat
       hx_store(&moment->speed[joint][slot], hx_dot(s, hx_sub3(j.w, i.w)));
     }
     hx_store_vec3(moment->turn, slot, j.w);
-    row_moment(model, state, motion, HX_FOOT, slot, &j, moment);
-    if (model->rows > 1) further_moments(model, state, motion, slot, &j, moment);
+    row_moment(model, state, motion, HX_FOOT, slot, all, &j, moment);
+    if (model->rows > 1) further_moments(model, state, motion, slot, all, &j, moment);
+    if (whole) bound = tibia_depth_bound(whole, motion, slot, &j.R_WB, bound);
   }
-  if (model->torso_rows) torso_moment(model, state, motion, &torso, moment);
+  if (model->torso_rows) torso_moment(model, state, motion, all, &torso, moment);
+  if (whole && whole->torso_rows) bound = torso_depth_bound(whole, motion, &torso.R_WB, bound);
   moment->stale = 0.0;
+  return hx_largest_lane(bound);
+}
+
+/* Computes the same without a bound. */
+static inline void hx_moment_of(const hxModel *model, const hxContactState *state,
+                                const hxPlantMotion *motion, hxMoment *moment) {
+  hx_moment_and_bound(model, NULL, state, motion, HX_NEAR, moment);
 }
 
 /* Copies a moment, of contacts those of the model's rows. */
@@ -193,7 +232,8 @@ static inline void start_landing(int slot, double t, hxMeasured *measured) {
 static inline int hx_switch_contacts(const hxModel *model, hxDepths *depths, double t,
                                      const hxMoment *at, hxFootprintLog *footprints,
                                      hxState *state) {
-  if (model->has_soil) hx_soil_switch(&at->contact[HX_FOOT], depths, footprints, &state->contact);
+  if (model->has_soil)
+    hx_soil_switch(model, &at->contact[HX_FOOT], depths, footprints, &state->contact);
   if (!hx_contact_is_due(model, depths, &state->contact)) return 0;
   int before[HX_SLOTS], after[HX_SLOTS];
   feet_on_ground(model, &state->contact, before);
@@ -208,11 +248,12 @@ static inline int hx_switch_contacts(const hxModel *model, hxDepths *depths, dou
 /* Hands the contacts of feet that have left their cells over to the rows that they continue in;
  * depths and moment become those over the new cells. */
 HX_RARE void hx_cross_cells(const hxModel *model, hxDepths *depths, hxState *state) {
-  const hxMoment before = state->moment;
   const int crossed = hx_contact_cross(model, depths, &state->contact);
   if (!crossed) return;
+  const hxMoment before = state->moment;
   hx_moment_of(model, &state->contact, &state->motion, &state->moment);
   hx_contact_hand_over(&before, &state->moment, crossed, &state->contact);
+  if (has_bristles(model, HX_FOOT)) hx_contact_slacken(&state->contact, &state->motion);
   for (int leg = 0; leg < HX_LEGS && model->has_soil; ++leg)
     if (crossed >> leg & 1 && state->contact.closed[HX_FOOT][leg] == 0.0)
       state->contact.plastic[leg] = 0.0; /* the new cell is undisturbed */

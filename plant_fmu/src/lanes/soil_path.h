@@ -50,17 +50,27 @@ HX_RARE void hx_soil_yield(const hxContactState *state, double h, const hxContac
   hx_fill_slots(plastic);
 }
 
+/* Returns whether the ground at a foot's centre is soil. */
+HX_RARE int is_over_soil(const hxModel *model, const double centre[3]) {
+  const double *material = model->terrain ? hx_terrain_material(model->terrain, centre) : NULL;
+  hxSoil own;
+  memcpy(&own, model->soil, sizeof own);
+  return material ? material[HX_MATERIAL_SOIL] != 0.0 : (int)own.law != HX_SOIL_NONE;
+}
+
 /* Records the footprints that feet leave upwards, and looks up those that feet enter from above;
  * depths are relative to the plastic depths and follow them. An open foot under the undisturbed
  * surface is above its footprint, whose bottom it may touch again: a footprint is complete when
- * the foot has left it, and is where the foot lost contact with it last. */
-HX_RARE void hx_soil_switch(const hxContactMoment *feet, hxDepths *depths, hxFootprintLog *log,
-                            hxContactState *state) {
+ * the foot has left it, and is where the foot lost contact with it last. Rigid ground beside a
+ * footprint has none. */
+HX_RARE void hx_soil_switch(const hxModel *model, const hxContactMoment *feet, hxDepths *depths,
+                            hxFootprintLog *log, hxContactState *state) {
   double *delta = depths->delta[HX_FOOT];
   for (int leg = 0; leg < HX_LEGS; ++leg) {
     double *plastic = &state->plastic[leg],
            *place[2] = {&state->place[0][leg], &state->place[1][leg]};
-    const double z = delta[leg] + *plastic, x = feet->centre[0][leg], y = feet->centre[1][leg];
+    const double z = delta[leg] + *plastic, x = feet->centre[0][leg], y = feet->centre[1][leg],
+                 centre[3] = {x, y, feet->centre[2][leg]};
     if (state->closed[HX_FOOT][leg] != 0.0) {
       if (delta[leg] <= 0.0) *place[0] = x, *place[1] = y;
       continue;
@@ -69,7 +79,8 @@ HX_RARE void hx_soil_switch(const hxContactMoment *feet, hxDepths *depths, hxFoo
       hx_footprints_add(
           log, &(hxFootprint){*place[0], *place[1], *plastic, hx_soil_under(state, leg).radius});
     if (z <= 0.0) *plastic = 0.0;
-    if (z > 0.0 && *plastic == 0.0) *plastic = hx_footprints_depth(&log->kept, x, y);
+    if (z > 0.0 && *plastic == 0.0 && is_over_soil(model, centre))
+      *plastic = hx_footprints_depth(&log->kept, x, y);
     delta[leg] = z - *plastic;
   }
   hx_fill_slots(state->plastic);

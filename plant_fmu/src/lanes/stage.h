@@ -273,19 +273,18 @@ HX_RARE void add_turning_inertia(const hxImplicit *implicit, const hxContactSlop
   turn_body(p, hx_scale(-z, turning_drag(slope, contact, *bias)));
 }
 
-/* Returns the block of a row as a part of the tibia's inertia. */
-HX_INLINE hxInertia6 row_inertia(const hxModel *model, const hxImplicit *implicit, int pack,
-                                 int row, hxLegWork *leg) {
+/* Sets I to the block of a row as a part of the tibia's inertia. */
+HX_INLINE void row_inertia(const hxModel *model, const hxImplicit *implicit, int pack, int row,
+                           hxLegWork *leg, hxInertia6 *I) {
   hxJointWork *tibia = &leg->joint[HX_JOINTS - 1];
   const hxContactWork *contact = &leg->contact[row];
   const hxContactSlope *slope = &implicit->slope[pack].contact[row];
   const hxContactBlock B = contact_block(implicit, slope, contact);
   const hxVec3 x = contact_point(leg, contact);
   const hxVec3 bias = hx_add3(motion_at(tibia->bias, x), hx_splat_vec3(model->gravity));
-  hxInertia6 I = contact_inertia(&B, x, bias, &tibia->p);
+  *I = contact_inertia(&B, x, bias, &tibia->p);
   if (has_turning_friction(model, row))
-    add_turning_inertia(implicit, slope, contact, &tibia->bias.ang, &tibia->p, &I);
-  return I;
+    add_turning_inertia(implicit, slope, contact, &tibia->bias.ang, &tibia->p, I);
 }
 
 /* Returns the acceleration of the material at a contact point, from the body's acceleration a - g
@@ -306,8 +305,10 @@ static inline hxVec3 bristle_rate(const hxModel *model, const hxContactState *st
   const hxVec3 n = contact->kin.normal,
                dv = hx_add_scaled(contact->speed_shift, hx_splat(implicit->z),
                                   contact_acceleration(model, felt, contact));
-  const hxReal yield = implicit->slope[pack].contact[HX_FOOT].yield,
-               closed = hx_load(&state->closed[HX_FOOT][pack * HX_LANES]);
+  const hxReal yield = implicit->slope[pack].contact[HX_FOOT].yield;
+  hxReal closed = hx_load(&state->closed[HX_FOOT][pack * HX_LANES]);
+  if (!has_friction_bristles(model, HX_FOOT)) /* rigid ground beside soil has no bristles */
+    closed *= hx_load(&state->on_soil[pack * HX_LANES]);
   rate = hx_add_scaled(rate, closed, hx_add_scaled(dv, -hx_dot(n, dv), n));
   if (implicit->change)
     rate = hx_add_scaled(rate, -yield,

@@ -21,7 +21,7 @@ export function footfallPanel(
 ): (() => Panel)[] {
   const legs = run.robot.legs.map(({ name }) => name);
   if (!host || !recording.has(...legs.map((leg) => `${leg}.contact`))) return [];
-  const feet = `--${run.label}`;
+  const feet = `--${run.key}`;
   const draw = (plot: uPlot): void => {
     const context = plot.ctx;
     context.save();

@@ -13,7 +13,7 @@ const LEAST = 0.002; // m    of the sideways axis: a smaller one would show roun
 
 /** A path seen from above [m]. */
 interface Way {
-  readonly label: string;
+  readonly key: string;
   readonly x: Float32Array;
   readonly y: Float32Array;
   readonly time: Float64Array;
@@ -27,7 +27,7 @@ export function drawPath(runs: readonly Run[], clock: Clock): void {
   const host = hostOf("path");
   const ways = runs
     .filter(({ recording }) => recording.has("torso.x", "torso.y"))
-    .map(({ run, recording }) => wayOf(run.label, recording, "torso"));
+    .map(({ run, recording }) => wayOf(run.key, recording, "torso"));
   if (!host || ways.length === 0) return;
   const first = runs[0].recording;
   const planned = first.has("command.x", "command.y") ? [wayOf("commanded", first, "command")] : [];
@@ -38,8 +38,8 @@ export function drawPath(runs: readonly Run[], clock: Clock): void {
     "aria-label": "Path of the torso from above",
   });
   for (const way of [...planned, ...ways])
-    drawing.append(svg("polyline", { class: `way ${way.label}`, points: pointsOf(way, frame) }));
-  const dots = ways.map((way) => svg("circle", { class: `dot ${way.label}`, r: "7" }));
+    drawing.append(svg("polyline", { class: `way ${way.key}`, points: pointsOf(way, frame) }));
+  const dots = ways.map((way) => svg("circle", { class: `dot ${way.key}`, r: "7" }));
   drawing.append(...dots);
   const map = element("div", "map");
   map.append(drawing, ...axes(drawing, frame));
@@ -122,9 +122,9 @@ interface Frame {
   readonly note: string;
 }
 
-function wayOf(label: string, recording: Run["recording"], stem: string): Way {
+function wayOf(key: string, recording: Run["recording"], stem: string): Way {
   return {
-    label,
+    key,
     x: recording.column(`${stem}.x`),
     y: recording.column(`${stem}.y`),
     time: recording.time,

@@ -21,7 +21,6 @@ export interface Spans {
   readonly walk: Span;
 }
 
-const DASH = [6, 3];
 const SIDES: Record<string, string> = { L: "left", R: "right" };
 const ENDS: Record<string, string> = { F: "front", M: "middle", R: "rear" };
 const ENERGIES = [
@@ -135,8 +134,8 @@ function energyPanels({ run, recording }: Run, clock: Clock, span: Span): (() =>
 }
 
 function curveOf({ run, recording }: Run, column: string): Curve {
-  const curve = columnCurve(recording, column, run.label, `--${run.label}`);
-  return run.label === "kinematic" ? { ...curve, dash: DASH } : curve;
+  const curve = columnCurve(recording, column, run.label, `--${run.key}`);
+  return run.dash.length > 0 ? { ...curve, dash: [...run.dash] } : curve;
 }
 
 function columnCurve(recording: Recording, column: string, label: string, colour: string): Curve {

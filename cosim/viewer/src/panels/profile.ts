@@ -49,7 +49,7 @@ function drawProfile(run: Run, profile: PackedProfile, clock: Clock): HTMLElemen
   );
   const dots = profile.feet.map(([, time, way, height]) => {
     const dot = svg("circle", {
-      class: `touch ${run.run.label}`,
+      class: `touch ${run.run.key}`,
       r: "3.6",
       cx: frame.across(way).toFixed(1),
       cy: frame.up(height).toFixed(1),

@@ -38,7 +38,7 @@ export class Actor {
     this.model = new RobotModel(run.robot, mark);
     const { surface } = relief;
     this.floor = surface ? new Terrain(surface, run.ground.height) : new Floor(relief);
-    const dents = surface ? findDents(run.ground.stances ?? [], surface, run.robot.foot) : [];
+    const dents = findDents(run.ground.footprints ?? []);
     if (dents.length > 0) this.dents = new Dents(dents, relief, recording);
     this.arrows = new ForceArrows(run.robot.legs.length);
     this.lamp.castShadow = true;

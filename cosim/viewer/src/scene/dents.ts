@@ -1,7 +1,7 @@
 import {
   BufferAttribute,
   BufferGeometry,
-  type Color,
+  Color,
   InstancedMesh,
   Matrix4,
   MeshLambertMaterial,
@@ -9,80 +9,80 @@ import {
   Vector3,
 } from "three";
 import type { Recording } from "../recording";
-import type { PackedStance } from "../types";
+import type { PackedFootprint } from "../types";
 import type { Relief } from "./relief";
-import type { Surface } from "./surface";
 
 const LEAST = 0.001; // m    of depth; a smaller dent is not drawn
 const LIFT = 0.0012; // m    of a dent's middle above the ground, which would hide it
 const RIM = 0.16; // height of the rim over the dent's radius
 const RINGS = [0, 0.25, 0.5, 0.7, 0.82, 0.92, 1, 1.15, 1.35]; // radii over that of the dent
 const SECTORS = 28;
+const DEEP = 0.03; // m    of depth, from which on a dent has its darkest shade
+const DARK = 0.45; // by which the darkest shade is below the lightest
 const STEEP = 1.6; // slope of the shaded bowl at its edge
 
-/** A dent: when it is made, where, how deep and how wide [s, m]. */
+/** A dent: when it is made and when it ends [s], where, how deep and how wide [m]. */
 export interface Dent {
-  readonly time: number;
+  readonly begin: number;
+  readonly end: number;
   readonly x: number;
   readonly y: number;
   readonly depth: number;
   readonly radius: number;
 }
 
-/** Returns the dents that feet leave in soft ground, in order of time. */
-export function findDents(
-  stances: readonly PackedStance[],
-  surface: Surface,
-  radius: number,
-): Dent[] {
-  return stances
-    .filter(([, , x, y, depth]) => depth > LEAST && surface.lookAt(x, y) === "soil")
-    .map(([, time, x, y, depth]) => ({ time, x, y, depth, radius: mouth(radius, depth) }))
-    .sort((a, b) => a.time - b.time);
-}
-
-/** Returns the radius of the circle in which a sphere cuts the ground. */
-function mouth(radius: number, depth: number): number {
-  return depth < radius ? Math.sqrt(depth * (2 * radius - depth)) : radius;
+/** Returns the dents of footprints, in order of time. */
+export function findDents(footprints: readonly PackedFootprint[]): Dent[] {
+  return footprints
+    .filter(([, , , , depth]) => depth > LEAST)
+    .map(([begin, end, x, y, depth, radius]) => ({
+      begin,
+      end: end > 0 ? end : Number.POSITIVE_INFINITY,
+      x,
+      y,
+      depth,
+      radius,
+    }))
+    .sort((a, b) => a.begin - b.begin);
 }
 
 /**
- * Dents at the places where feet stood, each from its touch-down on. A dent is a disc on the ground
- * that is shaded as a bowl with a rim: a true bowl would lie under the drawn surface.
+ * Dents of footprints, each from its touch-down on. A dent is a disc on the ground that is shaded as
+ * a bowl with a rim, a deeper one darker: a true bowl would lie under the drawn surface.
  */
 export class Dents extends InstancedMesh<BufferGeometry, MeshLambertMaterial> {
-  private readonly times: readonly number[];
+  private readonly places: readonly Matrix4[];
+  private readonly shades: readonly Color[];
 
   constructor(
-    dents: readonly Dent[],
+    private readonly dents: readonly Dent[],
     relief: Relief,
     private readonly recording: Recording,
   ) {
     super(bowl(), new MeshLambertMaterial(), Math.max(dents.length, 1));
-    this.times = dents.map(({ time }) => time);
-    dents.forEach((dent, k) => {
-      const normal = relief.normal(dent.x, dent.y);
-      const place = new Vector3(dent.x, dent.y, relief.height(dent.x, dent.y));
-      this.setMatrixAt(
-        k,
-        new Matrix4().compose(
-          place.addScaledVector(normal, LIFT),
-          new Quaternion().setFromUnitVectors(new Vector3(0, 0, 1), normal),
-          new Vector3(dent.radius, dent.radius, dent.radius),
-        ),
-      );
+    this.places = dents.map((dent) => placed(dent, relief));
+    this.shades = dents.map(({ depth }) => shaded(depth));
+    this.shades.forEach((shade, k) => {
+      this.setColorAt(k, shade); // makes the buffer of colours
     });
     this.frustumCulled = false;
     this.receiveShadow = true;
     this.count = 0;
   }
 
-  /** Shows the dents that were made up to a time [s]. */
+  /** Shows the dents that are there at a time [s]. */
   show(time: number): void {
     const now = this.recording.time[this.recording.place(time).row] + 1e-6;
     let count = 0;
-    while (count < this.times.length && this.times[count] <= now) count++;
+    this.dents.forEach(({ begin, end }, k) => {
+      if (begin > now || end <= now) return;
+      this.setMatrixAt(count, this.places[k]);
+      this.setColorAt(count, this.shades[k]);
+      count++;
+    });
     this.count = count;
+    this.instanceMatrix.needsUpdate = true;
+    if (this.instanceColor) this.instanceColor.needsUpdate = true;
   }
 
   paint(ground: Color): void {
@@ -90,6 +90,23 @@ export class Dents extends InstancedMesh<BufferGeometry, MeshLambertMaterial> {
     this.material.vertexColors = true;
     this.material.needsUpdate = true;
   }
+}
+
+/** Returns place, direction and size of a dent. */
+function placed(dent: Dent, relief: Relief): Matrix4 {
+  const normal = relief.normal(dent.x, dent.y);
+  const place = new Vector3(dent.x, dent.y, relief.height(dent.x, dent.y));
+  return new Matrix4().compose(
+    place.addScaledVector(normal, LIFT),
+    new Quaternion().setFromUnitVectors(new Vector3(0, 0, 1), normal),
+    new Vector3(dent.radius, dent.radius, dent.radius),
+  );
+}
+
+/** Returns the grey of a dent by its depth [m]. */
+function shaded(depth: number): Color {
+  const shade = 1 - DARK * Math.min(depth / DEEP, 1);
+  return new Color(shade, shade, shade);
 }
 
 /** Returns a disc of radius 1 with the normals of a bowl and a rim that rises around it. */

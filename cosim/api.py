@@ -1,0 +1,149 @@
+"""The public call: runs a scenario under any controller and writes its report.
+
+import hexapod_cosim
+
+result = hexapod_cosim.simulate("walk_flat", controller="compliant")
+print(result.metrics["slip_per_metre"])
+hexapod_cosim.report(result, "out/walk")
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+from warnings import warn
+
+from hexapod_cosim.controller import Gains, load_gains
+from hexapod_cosim.cosim.control.controllers import check_control
+from hexapod_cosim.cosim.master.loop import Progress
+from hexapod_cosim.cosim.report.report import write_report
+from hexapod_cosim.cosim.results.comparison import SEEDS, write_seeds
+from hexapod_cosim.cosim.results.comparisons import compare_all, write_comparison
+from hexapod_cosim.cosim.results.result import Result
+from hexapod_cosim.cosim.results.results import (
+    ResultsFolder,
+    read_scenario,
+    results_folder,
+    stored_result,
+    write_result,
+)
+from hexapod_cosim.cosim.results.summary import summarise
+from hexapod_cosim.cosim.run.run import simulate as run_scenario
+from hexapod_cosim.cosim.scenario.controls import (
+    Control,
+    control_of,
+    distinct_controls,
+    parse_control,
+    table_with_control,
+)
+from hexapod_cosim.cosim.scenario.records import Scenario
+from hexapod_cosim.cosim.scenario.scenario import (
+    read_tables,
+    scenario_from_table,
+    with_values,
+)
+
+
+def simulate(
+    scenario: str | Path | Scenario = "walk_flat",
+    controller: Any = None,
+    *,
+    settings: Mapping[str, Any] | None = None,
+    label: str | None = None,
+    fmu: str | Path | None = None,
+    gains: str | Path | Gains | None = None,
+    progress: Progress | None = None,
+) -> Result:
+    """Runs one co-simulation and returns its recording, metrics and facts.
+
+    Args:
+        scenario: a name of `hexapod list scenarios`, a scenario file, or a `Scenario`.
+        controller: a control's text ("compliant", "law.py:Class", "controller.fmu"), a `Control`, a
+            class with the method `step(t, command, measurement)`, or an object of such a class; by
+            default the scenario's control.
+        settings: keys of the scenario or parameters of the FMU, as `--set` of the commands:
+            {"duration": 4, "gait.period": 0.8, "control.amplitude": 0.2}.
+        label: the name of the run in tables and figures; by default the name of the controller.
+        fmu: the plant; by default it is exported for the scenario's robot.
+        gains: of compliant control, or their file; by default they are designed for the robot.
+        progress: called now and then with the simulated time [s].
+
+    Raises:
+        HexapodError: the run cannot start. A run that has started always returns, and
+            `Result.outcome` tells how it ended.
+    """
+    text = controller if isinstance(controller, str) else None
+    if isinstance(controller, Control):
+        text = controller.text
+    law = None if text is not None else controller
+    plan = _scenario(scenario, settings or {}, text)
+    if label is not None and law is None:
+        plain = plan.control.rpartition("=")[2]
+        plan = replace(plan, control=parse_control(f"{label}={plain}", where="label").text)
+    if law is None:
+        check_control(plan, [control_of(plan.control)])
+    return run_scenario(
+        plan,
+        fmu=None if fmu is None else Path(fmu),
+        gains=load_gains(gains) if isinstance(gains, str | Path) else gains,
+        progress=progress,
+        law=law,
+        label=label,
+    )
+
+
+def _scenario(
+    scenario: str | Path | Scenario, settings: Mapping[str, Any], text: str | None
+) -> Scenario:
+    """Returns the scenario with settings and a control's text applied. Raises ScenarioError."""
+    if isinstance(scenario, Scenario):
+        table, where = scenario.to_table(), scenario.where
+    else:
+        table, where = read_tables(scenario)
+    if text is not None:
+        table = table_with_control(table, parse_control(text, where="controller").text)
+    return scenario_from_table(with_values(table, settings), where=where, given=list(settings))
+
+
+def report(results: Result | Sequence[Result], folder: str | Path) -> Path:
+    """Writes runs and their report into a folder and returns the path of report.html.
+
+    Several runs are compared with the first one; each has a folder of its own, named by its label.
+    An earlier run's files in the folder are replaced. Raises HexapodError when a run did not
+    complete, when two runs have one label, and when the folder cannot be used.
+    """
+    runs = [results] if isinstance(results, Result) else list(results)
+    labels = [
+        control.label
+        for control in distinct_controls(
+            [control_of(run.scenario.control) for run in runs], where="report"
+        )
+    ]
+    path = Path(folder)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    if len(runs) == 1:
+        with results_folder(path) as place:
+            place.begin()
+            write_result(runs[0], path)
+            files = write_report({labels[0]: stored_result(runs[0])}, path, warn=warn)
+        return files[-1]
+    with results_folder(path, labels) as place:
+        place.begin()
+        for label, run in zip(labels, runs, strict=True):
+            part = ResultsFolder(path / label)
+            part.begin()
+            write_result(run, part.path)
+        by_label = dict(zip(labels, runs, strict=True))
+        comparison = compare_all({label: [summarise(run)] for label, run in by_label.items()})
+        write_seeds(path / SEEDS, [summarise(run) for run in runs])
+        write_comparison(path, runs[0].scenario, comparison, labels=labels)
+        files = write_report(
+            {label: stored_result(run) for label, run in by_label.items()},
+            path,
+            warn=warn,
+            comparison=comparison,
+            scenario=read_scenario(path),
+        )
+    return files[-1]

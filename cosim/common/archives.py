@@ -1,0 +1,137 @@
+"""Unpacks ZIP archives of others: nothing is written outside the folder, nothing without a limit.
+
+The limits are stated in docs/trust.md.
+"""
+
+from __future__ import annotations
+
+import shutil
+import stat
+import zipfile
+from collections.abc import Iterable, Iterator
+from pathlib import Path, PurePosixPath
+
+from hexapod_cosim.models.errors import FmuError
+
+MEMBERS = 10_000  # the most files and folders of an archive
+MEMBER_SIZE = 256 * 2**20  # bytes, unpacked, of one file
+TOTAL_SIZE = 512 * 2**20  # bytes, unpacked, of all files
+NAME_SIZE = 255  # bytes, of a folder's or file's name
+PATH_SIZE = 1000  # bytes, of a path inside the archive
+METHODS = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
+ENCRYPTED = 1  # general purpose bit
+FIX = "take another copy of the file, and none from a place that you do not trust"
+MAKE = "make one with `hexapod export -o FILE.fmu`"
+
+
+def open_archive(path: Path) -> zipfile.ZipFile:
+    """Opens an archive that is safe to unpack. Raises FmuError for any other file."""
+    try:
+        archive = zipfile.ZipFile(path)
+    except Exception as error:  # zipfile raises errors of many types for damaged files
+        raise FmuError(
+            "not an FMU",
+            got=str(error) or type(error).__name__,
+            expected="a ZIP file with a modelDescription.xml",
+            fix=MAKE,
+            where=str(path),
+        ) from error
+    problem = next(unsafe_members(archive.infolist()), None)
+    if problem is None:
+        return archive
+    archive.close()
+    what, got, expected = problem
+    raise FmuError(what, got=got, expected=expected, fix=FIX, where=str(path))
+
+
+def unpack(path: Path, folder: Path) -> None:
+    """Unpacks an archive into an existing folder. Raises FmuError for an unsafe or damaged one."""
+    with open_archive(path) as archive:
+        for member in archive.infolist():
+            target = folder.joinpath(*PurePosixPath(member.filename).parts)
+            try:
+                _unpack_member(archive, member, target)
+            except Exception as error:  # damaged data; a full disk
+                raise FmuError(
+                    "a file of the archive cannot be unpacked",
+                    got=str(error) or type(error).__name__,
+                    expected="intact data, and room for it",
+                    fix=FIX,
+                    where=f"{path}: {member.filename}",
+                ) from error
+
+
+def read_member(archive: zipfile.ZipFile, name: str) -> bytes:
+    """Returns a file of an opened archive. Raises FmuError for damaged data."""
+    try:
+        return archive.read(name)
+    except Exception as error:
+        raise FmuError(
+            "a file of the archive is damaged",
+            got=str(error) or type(error).__name__,
+            expected="intact data",
+            fix=FIX,
+            where=f"{archive.filename}: {name}",
+        ) from error
+
+
+def _unpack_member(archive: zipfile.ZipFile, member: zipfile.ZipInfo, target: Path) -> None:
+    if member.is_dir():
+        target.mkdir(parents=True, exist_ok=True)
+        return
+    target.parent.mkdir(parents=True, exist_ok=True)
+    with archive.open(member) as source, target.open("xb") as file:
+        shutil.copyfileobj(source, file)  # zipfile reads no more than the stated size
+
+
+def unsafe_members(members: Iterable[zipfile.ZipInfo]) -> Iterator[tuple[str, object, str]]:
+    """Yields why an archive is not unpacked: what, got, expected."""
+    members = list(members)
+    if len(members) > MEMBERS:
+        yield "the archive has too many files", len(members), f"at most {MEMBERS}"
+    total = sum(member.file_size for member in members)
+    if total > TOTAL_SIZE:
+        yield "the archive is too large unpacked", f"{total} bytes", f"at most {TOTAL_SIZE} bytes"
+    for member in members:
+        yield from _unsafe_member(member)
+    yield from _clashes(members)
+
+
+def _unsafe_member(member: zipfile.ZipInfo) -> Iterator[tuple[str, object, str]]:
+    """Yields why one member is not unpacked."""
+    name = member.orig_filename
+    parts = name.removesuffix("/").split("/")
+    inside = "a path inside the archive, of names between single slashes"
+    if "\0" in name or "\\" in name or ":" in name or not {"", ".", ".."}.isdisjoint(parts):
+        yield "the archive would write outside its folder", name, inside
+    size = len(name.encode("utf-8", "surrogatepass"))
+    longest = max(len(part.encode("utf-8", "surrogatepass")) for part in parts)
+    if size > PATH_SIZE or longest > NAME_SIZE:
+        got, expected = f"{size} bytes", f"names of {NAME_SIZE} bytes, paths of {PATH_SIZE}"
+        yield "a path in the archive is too long", got, f"at most {expected}"
+    kind = stat.S_IFMT(member.external_attr >> 16)
+    if kind not in (0, stat.S_IFREG, stat.S_IFDIR):
+        yield "the archive has a link or a device", name, "files and folders only"
+    if member.file_size > MEMBER_SIZE:
+        got = f"{name} of {member.file_size} bytes"
+        yield "a file of the archive is too large", got, f"at most {MEMBER_SIZE} bytes"
+    if member.flag_bits & ENCRYPTED:
+        yield "the archive is encrypted", name, "files without a password"
+    if member.compress_type not in METHODS:
+        got = f"{name} by method {member.compress_type}"
+        yield "the archive is packed by an unknown method", got, "store (0) or deflate (8)"
+
+
+def _clashes(members: Iterable[zipfile.ZipInfo]) -> Iterator[tuple[str, object, str]]:
+    """Yields paths that would overwrite each other, also where case is ignored."""
+    files, folders = set[str](), set[str]()
+    for member in members:
+        path = PurePosixPath(member.filename)
+        name = str(path).casefold()
+        if not member.is_dir() and (name in files or name in folders):
+            yield "a path is in the archive twice", member.filename, "each path once"
+        (folders if member.is_dir() else files).add(name)
+        folders |= {str(parent).casefold() for parent in path.parents}
+    both = sorted(files & folders)
+    if both:
+        yield "a path of the archive is a file and a folder", both[0], "one of them"

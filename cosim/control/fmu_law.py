@@ -1,0 +1,142 @@
+"""Drives a controller FMU, ours or a foreign one, as a controller of the Python master.
+
+At a communication point t the master sets the FMU's inputs, gets its outputs, which hold in the
+plant from t on, and steps the FMU to t + h. Outputs that the FMU computes in its step alone are
+therefore one macro-step late, as with any other importer. Inputs are also set in initialisation
+mode, so that an FMU can compute its first outputs from them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import astuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hexapod_cosim.controller import BodyCommand, Diagnostics, JointCommand, Measurement
+from hexapod_cosim.cosim.control.connection import (
+    DIAGNOSED,
+    DIAGNOSED_FLAGS,
+    SINKS,
+    SOURCES,
+    Connection,
+    Pairs,
+)
+from hexapod_cosim.cosim.control.fmu_instance import ControllerFmu
+from hexapod_cosim.cosim.master.fmu_controller import FLAGS
+from hexapod_cosim.cosim.master.protocols import Block
+from hexapod_cosim.models import JOINT_NAMES, LEG_NAMES, FmuError
+
+LEGS, JOINTS = len(LEG_NAMES), len(JOINT_NAMES)
+REFERENCES = 4  # angle, speed, torque, acceleration
+
+
+class FmuLaw:
+    """Steps a controller FMU through its connection; `period` [s] is the length of its steps."""
+
+    def __init__(self, fmu: ControllerFmu, connection: Connection, *, period: float) -> None:
+        self._fmu, self._period = fmu, period
+        self._inputs = [
+            _Wire(fmu, pairs, SOURCES)
+            for pairs in (connection.inputs, connection.flag_inputs)
+            if pairs
+        ]
+        self._output = _Wire(fmu, connection.outputs, SINKS)
+        self._row = np.zeros(len(SINKS))
+        parts = self._row.reshape(REFERENCES, LEGS, JOINTS)
+        self._out = JointCommand(*parts)
+        self.diagnostics: Diagnostics | None = None
+        self._shown: list[tuple[_Wire, NDArray[np.float64]]] = []
+        if connection.diagnostics and connection.flags:
+            self._show_diagnostics(connection)
+        self._unconnected = connection.unconnected
+
+    def _show_diagnostics(self, connection: Connection) -> None:
+        """Makes the arrays of diagnostics that each step fills."""
+        info = np.zeros(len(DIAGNOSED))
+        self._marks = np.zeros(len(DIAGNOSED_FLAGS))
+        self._shown = [
+            (_Wire(self._fmu, connection.diagnostics, DIAGNOSED), info),
+            (_Wire(self._fmu, connection.flags, DIAGNOSED_FLAGS), self._marks),
+        ]
+        shifts, lifts, feet = np.split(info, [2 * LEGS, 3 * LEGS])
+        self._flags = np.zeros((len(FLAGS), LEGS), dtype=np.bool_)
+        swinging, unreachable, fallback = self._flags
+        self.diagnostics = Diagnostics(
+            swinging, feet.reshape(LEGS, 3), shifts.view(np.complex128), lifts, unreachable,
+            fallback,
+        )  # fmt: skip
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """Tells which inputs of the FMU nothing is connected to."""
+        if not self._unconnected:
+            return ()
+        names = ", ".join(self._unconnected)
+        return (f"inputs of {self._fmu.path.name} keep their start values: {names}",)
+
+    def start(self, t: float, stop: float, command: BodyCommand, measured: Measurement) -> None:
+        """Initialises the FMU at time t [s] with the plant's first outputs. Raises FmuError."""
+        self._fmu.initialise(t, stop, lambda: self._write(command, measured))
+
+    def step(self, t: float, command: BodyCommand, measurement: Measurement) -> JointCommand:
+        """Returns the joint commands for [t, t + period). Raises FmuError.
+
+        The next step reuses the arrays of the result.
+        """
+        self._write(command, measurement)
+        self._output.read_into(self._row)
+        if not np.isfinite(self._row).all():
+            name = SINKS[int(np.argmin(np.isfinite(self._row)))]
+            raise FmuError(
+                "an output of the controller FMU is not finite",
+                got=name,
+                expected=f"finite numbers at {t:g} s",
+                where=self._fmu.path.name,
+            )
+        for wire, row in self._shown:
+            wire.read_into(row)
+        if self._shown:
+            self._flags[...] = self._marks.reshape(self._flags.shape)
+        self._fmu.step(t, self._period)
+        return self._out
+
+    def _write(self, command: BodyCommand, measurement: Measurement) -> None:
+        """Writes the connected inputs."""
+        row = source_row(command, measurement)
+        for wire in self._inputs:
+            wire.write_from(row)
+
+
+class _Wire:
+    """Copies the elements of connected variables between a block and a row of our names."""
+
+    def __init__(self, fmu: ControllerFmu, pairs: Pairs, ours: list[str]) -> None:
+        index = {name: k for k, name in enumerate(ours)}
+        self._block: Block = fmu.block([name for name, _ in pairs])
+        self._places = np.array([index[name] for _, names in pairs for name in names], dtype=int)
+
+    def read_into(self, row: NDArray[np.float64]) -> None:
+        """Reads the variables from the FMU into their places of a row. Raises FmuError."""
+        self._block.get()
+        row[self._places] = self._block.values
+
+    def write_from(self, row: NDArray[np.float64]) -> None:
+        """Writes the variables from their places of a row to the FMU. Raises FmuError."""
+        self._block.values[:] = row[self._places]
+        self._block.set()
+
+
+def source_row(command: BodyCommand, measurement: Measurement) -> NDArray[np.float64]:
+    """Returns command and measurement in the order of SOURCES."""
+    return np.concatenate(
+        [
+            astuple(command),
+            measurement.angle.ravel(),
+            measurement.speed.ravel(),
+            measurement.foot_force.ravel(),
+            measurement.quaternion,
+            measurement.angular_velocity,
+            measurement.contact,
+        ]
+    )

@@ -1,0 +1,5 @@
+"""The course: fixed cases that judge controls, their statistics, goals, picture and report.
+
+Imports `common`, `interface`, `scenario`, `master`, `export`, `results`, `report`, `design` and
+`run`.
+"""

@@ -1,0 +1,118 @@
+"""The records of the course: cases, and the quantities by which controls are judged."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+from hexapod_cosim.controller.parts import SWITCHES
+from hexapod_cosim.cosim.results.metrics import METRICS, PER_RADIAN
+from hexapod_cosim.cosim.scenario.controls import Control, parse_controls
+from hexapod_cosim.cosim.scenario.records import Scenario
+from hexapod_cosim.models import HexapodError, unknown_name
+
+JUDGE, TUNE = SPLITS = ("judge", "tune")
+
+
+class CourseError(HexapodError):
+    """A case file, or a choice of cases, that is not valid."""
+
+
+@dataclass(frozen=True)
+class Case:
+    """One case of the course in one split."""
+
+    name: str
+    kind: str  # the class: the name of the case's file
+    about: str
+    split: str
+    scenario: Scenario
+    sweep: str = ""  # name of the sweep over heights that it belongs to, "": none
+    height: float = math.nan  # m    nominal height of the sweep
+
+
+@dataclass(frozen=True)
+class Entry:
+    """A column of the course: a control, with some of its parts off or not."""
+
+    label: str
+    control: Control
+    off: tuple[str, ...] = ()  # parts of the compliant control
+
+    def scenario(self, base: Scenario) -> Scenario:
+        """Returns a scenario under this control."""
+        parts = replace(base.compliance, **dict.fromkeys(self.off, False))
+        return replace(base, control=self.control.text, compliance=parts)
+
+
+@dataclass(frozen=True)
+class Course:
+    """The cases of a split, and how they are run."""
+
+    version: int
+    split: str
+    cases: tuple[Case, ...]
+    seeds: tuple[int, ...]
+    arrive: float  # largest path error, or yaw drift of turns on the spot, of a success
+    hash: str  # SHA-256 of all case files of both splits
+    settings: tuple[str, ...] = ()  # NAME=VALUE, on top of every case
+
+
+def read_entries(controls: Sequence[str], without: Sequence[str] = ()) -> tuple[Entry, ...]:
+    """Returns the columns of a course. Raises HexapodError.
+
+    Args:
+        controls: texts of controls; the first is the reference.
+        without: parts; each adds a column with the last control and this part off.
+    """
+    found = parse_controls(controls, where="--control")
+    parts = SWITCHES
+    for part in without:
+        if part not in parts:
+            raise unknown_name("part", part, parts, where="--without", error=CourseError)
+    entries = [Entry(control.label, control) for control in found]
+    entries += [Entry(f"without {part}", found[-1], (part,)) for part in dict.fromkeys(without)]
+    return tuple(entries)
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """A figure of a run by which controls are judged; less of it is better."""
+
+    name: str
+    title: str
+    short: str  # title of a narrow column
+    metric: str  # whose floor and unit it has
+    shown: bool = True  # in tables and in the picture
+
+    @property
+    def unit(self) -> str:
+        """The unit of the metric."""
+        return METRICS[self.metric][0]
+
+    def value(self, metrics: Mapping[str, float]) -> float:
+        """Returns the value of a run; per radian where the robot turns on the spot."""
+        if self.name == "tilt":
+            return math.hypot(metrics["roll_rms"], metrics["pitch_rms"])
+        value = metrics[self.metric]
+        radian = PER_RADIAN.get(self.metric)
+        return metrics[radian] if radian is not None and math.isnan(value) else value
+
+
+QUANTITIES = (
+    Quantity("slip", "slip", "slip", "slip_per_metre"),
+    Quantity("slip_net", "net slip", "net slip", "slip_net_per_metre", shown=False),
+    Quantity("peak", "peak force", "peak", "peak_force"),
+    Quantity("loading", "loading rate", "loading", "loading_rate"),
+    Quantity("tilt", "tilt", "tilt", "roll_rms"),
+    Quantity("roll", "roll", "roll", "roll_rms", shown=False),
+    Quantity("path", "path error", "path", "path_error"),
+    Quantity("work", "mechanical energy", "mech.", "cost_of_transport"),
+    Quantity("electrical", "electrical energy", "electr.", "electrical_cost"),
+    Quantity("torque", "joint torque", "torque", "torque_rms", shown=False),
+    Quantity("heat", "heat", "heat", "heat"),
+    Quantity("load", "hottest servo", "servo", "servo_load_max"),
+)
+SHOWN = tuple(quantity for quantity in QUANTITIES if quantity.shown)
+BY_NAME = {quantity.name: quantity for quantity in QUANTITIES}

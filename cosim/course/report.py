@@ -1,0 +1,157 @@
+"""Writes report.html, the report of a course in one file."""
+
+from __future__ import annotations
+
+import base64
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from jinja2 import ChoiceLoader, PackageLoader
+
+from hexapod_cosim.cosim.common.files import write_text
+from hexapod_cosim.cosim.course import texts
+from hexapod_cosim.cosim.course.goals import Verdict, verdicts
+from hexapod_cosim.cosim.course.picture import STEM, THEMES, write_picture
+from hexapod_cosim.cosim.course.records import SHOWN
+from hexapod_cosim.cosim.course.table import ALL, Table
+from hexapod_cosim.cosim.report.page import environment
+from hexapod_cosim.cosim.results.comparison import BETTER, SAME, WORSE
+
+REPORT, TEMPLATE = "report.html", "course.html.jinja"
+
+
+@dataclass(frozen=True)
+class Card:
+    """A figure at the top of the report, as texts."""
+
+    name: str
+    change: str
+    interval: str
+    verdict: str
+
+
+def write_course_report(table: Table, content: Mapping[str, Any], folder: Path) -> list[Path]:
+    """Draws the picture and writes the page. Returns the files, the page last.
+
+    content: of benchmark.json.
+    """
+    files = write_picture(table, folder) if table.cases else []
+    found = [verdict for verdict in verdicts(table) if verdict.was_run]
+    columns, rows = texts.goal_rows(found)
+    page = _environment().get_template(TEMPLATE).render(
+        colours={},
+        title=title_of(table),
+        headline=headline(table),
+        lead=lead(table),
+        warnings=[] if content["complete"] else ["The course was stopped before its end."],
+        cards=cards(table),
+        picture=_pictures(files),
+        reference=table.reference,
+        goals={"columns": columns, "rows": list(zip(rows, map(_badge, found), strict=True))}
+        if found
+        else None,
+        classes=texts.class_rows(table),
+        cases=texts.case_rows(table),
+        sweeps=texts.sweep_rows(table),
+        failures=texts.failure_rows(table),
+        command=content["command"],
+        facts=_facts(content),
+    )  # fmt: skip
+    write_text(folder / REPORT, page)
+    return [*files, folder / REPORT]
+
+
+def _environment() -> Any:
+    """Returns the templates of this folder and those of the folder `report`."""
+    own = environment()
+    loaders = [PackageLoader("hexapod_cosim.cosim", "course"), own.loader]
+    return own.overlay(loader=ChoiceLoader([each for each in loaders if each is not None]))
+
+
+def title_of(table: Table) -> str:
+    """Returns the title of the page."""
+    course = table.course
+    return f"Course {course.version}, split {course.split}: {', '.join(table.controls)}"
+
+
+def headline(table: Table) -> str:
+    """Returns how many runs of each control were successes."""
+    parts = [
+        f"{control} {_share(table.classes[ALL, control].success.interval.value)}"
+        for control in table.controls
+        if (ALL, control) in table.classes
+    ]
+    return f"Successful runs: {', '.join(parts)}" if parts else "No run is complete"
+
+
+def _share(value: float) -> str:
+    return texts.NONE if math.isnan(value) else f"{100.0 * value:.0f} %"
+
+
+def lead(table: Table) -> str:
+    """Returns what was run."""
+    course = table.course
+    return (
+        f"{len(course.cases)} cases, {len(course.seeds)} seeds from {course.seeds[0]}. "
+        f"Changes are from {table.reference}. A success walks upright to the end and arrives."
+    )
+
+
+def cards(table: Table) -> list[Card]:
+    """Returns the medians over all cases of the last control; none without a second control."""
+    if len(table.controls) < 2 or (ALL, table.controls[-1]) not in table.classes:
+        return []
+    figures = table.classes[ALL, table.controls[-1]]
+    found = []
+    for quantity in SHOWN:
+        ratio = figures.ratio(quantity.name)
+        if math.isnan(ratio.value):
+            continue
+        side = (ratio.low > 1.0) - (ratio.high < 1.0)
+        found.append(
+            Card(
+                f"{quantity.title}, {figures.control}",
+                f"{100.0 * (ratio.value - 1.0):+.0f} %",
+                f"{figures.counted(quantity.name)} cases, median",
+                {-1: BETTER, 0: SAME, 1: WORSE}[side],
+            )
+        )
+    return found
+
+
+def _badge(verdict: Verdict) -> str:
+    """Returns the look of a verdict."""
+    if verdict.reached is None:
+        return SAME
+    return BETTER if verdict.reached else WORSE
+
+
+def _pictures(files: Sequence[Path]) -> dict[str, str] | None:
+    """Returns the pictures by theme as data URLs."""
+    found = {
+        theme.name: _embedded(path)
+        for theme in THEMES
+        for path in files
+        if path.name == f"{STEM}-{theme.name}.svg"
+    }
+    return found or None
+
+
+def _embedded(svg: Path) -> str:
+    return "data:image/svg+xml;base64," + base64.b64encode(svg.read_bytes()).decode("ascii")
+
+
+def _facts(content: Mapping[str, Any]) -> dict[str, str]:
+    """Returns what the result depends on, as texts."""
+    course, seeds = content["course"], content["seeds"]
+    return {
+        "course": f"version {course['version']}, split {course['split']}",
+        "SHA-256 of the cases": course["hash"],
+        "seeds": f"{seeds[0]} to {seeds[-1]}",
+        "versions": ", ".join(f"{name} {text}" for name, text in content["versions"].items()),
+        "machine": ", ".join(content["machine"].values()),
+        **content["methods"],
+    }

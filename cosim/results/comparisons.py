@@ -1,0 +1,158 @@
+"""Compares runs under any number of controls: each with the first one, seed by seed.
+
+The first control is the reference. Every other control makes a `Comparison` with it, whose changes
+use the pairs in which both robots walked to the end.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import tomlkit
+
+from hexapod_cosim.cosim.common.files import PARTS, RUN_FILE, write_json, write_text
+from hexapod_cosim.cosim.master.loop import COMPLETED
+from hexapod_cosim.cosim.results.balance import Unbalanced
+from hexapod_cosim.cosim.results.comparison import Comparison, compare_runs
+from hexapod_cosim.cosim.results.metrics import METRICS
+from hexapod_cosim.cosim.results.results import METRICS_FILE, SCENARIO
+from hexapod_cosim.cosim.results.summary import Summary
+from hexapod_cosim.cosim.scenario.records import Scenario
+
+
+@dataclass(frozen=True)
+class Comparisons:
+    """Runs of the same seeds under two or more controls, by label; the first is the reference."""
+
+    runs: Mapping[str, tuple[Summary, ...]]
+    pairs: tuple[Comparison, ...]  # the reference with each of the others, in their order
+
+    @property
+    def labels(self) -> tuple[str, ...]:
+        """The controls."""
+        return tuple(self.runs)
+
+    @property
+    def reference(self) -> str:
+        """The control that the others are compared with."""
+        return self.labels[0]
+
+    @property
+    def seeds(self) -> list[int]:
+        """The seeds of the runs."""
+        return [run.seed for run in self.runs[self.reference]]
+
+    @property
+    def walked(self) -> dict[str, int]:
+        """Number of runs, by control, that completed with the robot upright."""
+        return {label: sum(run.walked for run in runs) for label, runs in self.runs.items()}
+
+    @property
+    def judged(self) -> dict[str, list[Summary]]:
+        """The runs that the means are of, by control.
+
+        With two controls these are the pairs in which both walked; with more, each control's runs
+        that walked, or all where none did.
+        """
+        if len(self.pairs) == 1:
+            return dict(zip(self.labels, self.pairs[0].judged, strict=True))
+        return {
+            label: [run for run in runs if run.walked] or list(runs)
+            for label, runs in self.runs.items()
+        }
+
+    @property
+    def means(self) -> dict[str, dict[str, float]]:
+        """Mean of each metric, by control and metric."""
+        if len(self.pairs) == 1:
+            return self.pairs[0].means
+        return {
+            label: {name: _mean([run.metrics[name] for run in runs]) for name in METRICS}
+            for label, runs in self.judged.items()
+        }
+
+    @property
+    def losses(self) -> list[str]:
+        """Describes the runs in which the robot did not walk to the end."""
+        return [
+            f"{run.control}, seed {run.seed}: "
+            + (run.reason or "; ".join(run.warnings) or "the robot fell")
+            for runs in self.runs.values()
+            for run in runs
+            if not run.walked
+        ]
+
+    @property
+    def unbalanced(self) -> list[str]:
+        """Warns, in one line per control, of runs whose energy balance does not close."""
+        return [
+            text
+            for label, runs in self.runs.items()
+            for text in Unbalanced.among([run.metrics["energy_residual"] for run in runs]).warnings(
+                label, runs=len(runs)
+            )
+        ]
+
+    @property
+    def warnings(self) -> list[str]:
+        """Describes the falls and the energy balances that do not close, over all seeds."""
+        return [*self.losses, *self.unbalanced]
+
+    def as_table(self) -> dict[str, Any]:
+        """Returns a table for JSON: means, changes, numbers of seeds and walks, warnings.
+
+        With two controls the changes are under `change`, with more under `changes` by label.
+        """
+        if len(self.pairs) == 1:
+            return self.pairs[0].as_table()
+        changes = {
+            pair.labels[1]: {name: item.as_table() for name, item in pair.changes.items()}
+            for pair in self.pairs
+        }
+        counts = {"seeds": len(self.seeds), "walked": self.walked}
+        return {
+            **self.means, "reference": self.reference, "changes": changes, **counts,
+            "warnings": self.warnings,
+        }  # fmt: skip
+
+
+def compare_all(runs: Mapping[str, Sequence[Summary]]) -> Comparisons:
+    """Compares the runs of each control with those of the first one.
+
+    Raises HexapodError when their seeds differ.
+    """
+    first, *others = runs.values()
+    pairs = tuple(compare_runs(first, second) for second in others)
+    return Comparisons({label: tuple(some) for label, some in runs.items()}, pairs)
+
+
+def write_comparison(
+    folder: Path,
+    scenario: Scenario,
+    comparison: Comparisons,
+    *,
+    labels: Sequence[str],
+    command: str = "",
+) -> list[Path]:
+    """Writes scenario.toml, metrics.json and run.json of a comparison; returns the files.
+
+    The scenario has no control, since several were run; the parameters of [control] stay.
+    """
+    table = {key: value for key, value in scenario.to_table().items() if key != "control"}
+    if scenario.control_settings:
+        table["control"] = dict(scenario.control_settings)
+    write_text(folder / SCENARIO, tomlkit.dumps(table))
+    write_json(folder / METRICS_FILE, comparison.as_table())
+    facts = {"kind": "compare", "status": COMPLETED, "title": scenario.title, "command": command}
+    write_json(folder / RUN_FILE, {**facts, PARTS: list(labels)})
+    return [folder / name for name in (SCENARIO, METRICS_FILE, RUN_FILE)]
+
+
+def _mean(values: Sequence[float]) -> float:
+    """Returns the mean of the finite values, NaN without any."""
+    finite = np.array(values)[np.isfinite(values)]
+    return float(finite.mean()) if len(finite) else float("nan")

@@ -1,0 +1,268 @@
+"""Computes the forces of all contacts with any ground, and holds what they keep from touch-down to
+lift-off.
+
+A foot touches the ground below it and, on blocks, up to three higher blocks beside it; torso, knees
+and shanks are the spheres of body/contacts.py. A closed contact keeps its damping (eq. 14) and the
+ground on which it touched down: stiffness, friction or soil. Forces are those of rigid ground
+(contact.py) or of soil (soil/law.py).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from hexapod_cosim.models.body.contacts import (
+    BodySphere,
+    body_contact,
+    body_spheres,
+    sliding_friction_of_bodies,
+)
+from hexapod_cosim.models.contact import FootContact, normal_force, slip_velocity, sphere_contact
+from hexapod_cosim.models.friction import bristle_rate, friction_force, turning_moment
+from hexapod_cosim.models.ground.blocks import TOP, Cell
+from hexapod_cosim.models.kinematics import JOINTS, LEGS, cross, rotation_matrix
+from hexapod_cosim.models.records import BRISTLE_LAWS, Array, Contact, Friction, Robot, Soil
+from hexapod_cosim.models.soil.law import (
+    plastic_depth,
+    shear_force,
+    shear_limit,
+    shear_rate,
+    soil_normal_force,
+)
+from hexapod_cosim.models.terrain import faces_of_feet, ground_face, surface_of
+
+NEAREST = "nearest"  # face of torso, knees and shanks
+
+
+@dataclass(frozen=True)
+class Spot:
+    """A sphere and the face of the ground that it may touch."""
+
+    sphere: BodySphere
+    face: str  # of `faces_of_feet`, or NEAREST
+    leg: int  # of feet; -1: of torso, knees and shanks
+
+    @property
+    def is_sole(self) -> bool:
+        """Whether this is a foot on the ground below it, which has bristles and may be on soil."""
+        return self.face == TOP
+
+
+@dataclass(frozen=True)
+class Held:
+    """What a contact keeps from touch-down to lift-off."""
+
+    contact: Contact  # with the stiffness of the ground where it touched down
+    friction: Friction
+    soil: Soil
+    damping: float = math.nan  # s/m  d of eq. 14; nan: open
+    impact_speed: float = 0.0  # m/s  at the last touch-down
+
+    @property
+    def is_open(self) -> bool:
+        """Whether the sphere does not touch the face."""
+        return math.isnan(self.damping)
+
+    @property
+    def is_soft(self) -> bool:
+        """Whether the contact is on soil."""
+        return self.soil.law != "none"
+
+
+@dataclass(frozen=True)
+class Contacts:
+    """State of all contacts. It changes at the ends of steps alone."""
+
+    held: tuple[Held, ...]  # in the order of `spots`
+    plastic: Array  # (6,) m  depth at which feet touch soil: z_p, or that of a footprint; else 0
+    place: Array  # (6, 2) m  where feet lost contact with the bottom of their footprints
+    cell: tuple[Cell | None, ...]  # (6,) of blocks, held while a foot touches; None: not held
+    footprints: Array  # (n, 4) m  x, y, depth, radius
+
+    @property
+    def damping(self) -> Array:
+        """Damping of all contacts (n,) [s/m], nan for open ones."""
+        return np.array([held.damping for held in self.held])
+
+    @property
+    def impact_speed(self) -> Array:
+        """Approach speeds of all contacts at their last touch-downs (n,) [m/s]."""
+        return np.array([held.impact_speed for held in self.held])
+
+
+def spots(robot: Robot) -> tuple[Spot, ...]:
+    """Returns all contacts: feet face by face, then torso, knees and shanks."""
+    feet = []
+    for face in faces_of_feet(robot.terrain):
+        for leg in range(LEGS):
+            tibia = robot.legs[leg].links[-1]
+            centre = np.array(tibia.tip) - np.array(tibia.com)
+            name = f"{robot.legs[leg].name}.foot"
+            sphere = BodySphere(name, JOINTS * (leg + 1), centre, robot.foot.radius)
+            feet.append(Spot(sphere, face, leg))
+    return (*feet, *(Spot(sphere, NEAREST, -1) for sphere in body_spheres(robot)))
+
+
+def own_ground(robot: Robot, spot: Spot) -> Held:
+    """Returns an open contact with the ground of the robot file, without the surface's patches."""
+    soil = robot.soil if spot.is_sole else Soil()
+    return Held(robot.contact, _friction_of(robot.friction, spot), soil)
+
+
+def _friction_of(friction: Friction, spot: Spot) -> Friction:
+    """Returns the friction of a contact: bristles belong to soles alone."""
+    return friction if spot.is_sole else sliding_friction_of_bodies(friction)
+
+
+def open_contacts(robot: Robot) -> Contacts:
+    """Returns the contacts of a robot in the air, over undisturbed ground."""
+    held = tuple(own_ground(robot, spot) for spot in spots(robot))
+    return Contacts(held, np.zeros(LEGS), np.zeros((LEGS, 2)), (None,) * LEGS, np.zeros((0, 4)))
+
+
+def contacts_of(robot: Robot, damping: Array, body_damping: Array | None = None) -> Contacts:
+    """Returns contacts with these dampings [s/m] on the robot's own ground; nan: open.
+
+    damping: (6,) of the soles; contacts with walls are open. body_damping: of torso, knees and
+    shanks, in the order of `body_spheres`; None: open.
+    """
+    contacts = open_contacts(robot)
+    walls = len(contacts.held) - len(body_spheres(robot)) - LEGS
+    bodies = np.full(len(body_spheres(robot)), math.nan) if body_damping is None else body_damping
+    given = np.concatenate([damping, np.full(walls, math.nan), bodies])
+    pairs = zip(contacts.held, given.tolist(), strict=True)
+    return replace(contacts, held=tuple(replace(held, damping=d) for held, d in pairs))
+
+
+def contact_at(robot: Robot, spot: Spot, body: Array, cell: Cell | None = None) -> FootContact:
+    """Returns the kinematics of a contact at bodies (19, 13).
+
+    cell: of blocks, held for a foot. The contact of a wall that is not there is infinitely far.
+    """
+    state = body[spot.sphere.body]
+    if spot.leg < 0:
+        return body_contact(robot, spot.sphere, state)
+    centre = state[0:3] + rotation_matrix(state[3:7]) @ spot.sphere.centre
+    face = ground_face(robot.terrain, centre, spot.face, cell)
+    far = FootContact(centre, np.zeros(3), np.array([0.0, 0.0, 1.0]), -math.inf, 0.0)
+    return far if face is None else sphere_contact(state, centre, spot.sphere.radius, face)
+
+
+def contacts_at(robot: Robot, body: Array, contacts: Contacts) -> list[FootContact]:
+    """Returns the kinematics of all contacts at bodies (19, 13)."""
+    return [
+        contact_at(robot, spot, body, contacts.cell[spot.leg] if spot.leg >= 0 else None)
+        for spot in spots(robot)
+    ]
+
+
+def closed_contacts(
+    robot: Robot, body: Array, contacts: Contacts
+) -> list[tuple[int, Spot, Held, FootContact]]:
+    """Returns number, spot, held ground and kinematics of the closed contacts."""
+    found = []
+    for k, (spot, held) in enumerate(zip(spots(robot), contacts.held, strict=True)):
+        if not held.is_open:
+            cell = contacts.cell[spot.leg] if spot.leg >= 0 else None
+            found.append((k, spot, held, contact_at(robot, spot, body, cell)))
+    return found
+
+
+# forces
+
+
+def contact_load(
+    robot: Robot, held: Held, plastic: float, depth: float, approach_speed: float
+) -> float:
+    """Returns f_n [N] of a closed contact at a depth [m] and an approach speed [m/s] (eq. 14, 45).
+
+    plastic: z_p of a foot on soil [m].
+    """
+    if held.is_soft:
+        return soil_normal_force(held.soil, robot.foot, plastic, depth, approach_speed)
+    return normal_force(held.contact, held.damping, depth, approach_speed)
+
+
+def contact_force(
+    robot: Robot, held: Held, plastic: float, contact: FootContact, bristle: Array | None
+) -> Array:
+    """Returns the force (3,) of the ground on a sphere [N].
+
+    bristle: deflection (3,) of a sole [m]. On soil the depth of shear is not below z_p, so that a
+    foot that leaves the ground within a step keeps its grip to the end of the step.
+    """
+    depth = contact.penetration
+    load = contact_load(robot, held, plastic, depth, contact.approach_speed)
+    if held.is_soft:
+        limit = shear_limit(held.soil, robot.foot, max(depth, plastic), load)
+        sideways = shear_force(held.soil, limit, np.zeros(3) if bristle is None else bristle)
+    else:
+        sideways = friction_force(held.friction, load, slip_velocity(contact), bristle)
+    return load * contact.normal + sideways
+
+
+def contact_wrenches(
+    robot: Robot, body: Array, contacts: Contacts, bristle: Array | None = None
+) -> Array:
+    """Returns forces and torques (19, 6) of all contacts on the bodies (19, 13) [N, N m].
+
+    Torques are about the centres of mass. bristle: deflections (6, 3) [m], 0 by default.
+    """
+    g = np.zeros((len(body), 6))
+    for _, spot, held, contact in closed_contacts(robot, body, contacts):
+        state = body[spot.sphere.body]
+        plastic = float(contacts.plastic[spot.leg]) if held.is_soft else 0.0
+        deflection = bristle[spot.leg] if bristle is not None and spot.is_sole else None
+        force = contact_force(robot, held, plastic, contact, deflection)
+        torque = cross(contact.point - state[0:3], force)
+        if spot.leg >= 0:
+            depth, speed = contact.penetration, contact.approach_speed
+            load = contact_load(robot, held, plastic, depth, speed)
+            friction, radius = held.friction, robot.foot.radius
+            torque += turning_moment(friction, radius, load, contact.normal, state[10:13])
+        g[spot.sphere.body] += np.concatenate([force, torque])
+    return g
+
+
+def has_bristles(held: Held) -> bool:
+    """Returns whether a sole has bristles, those of friction or of shear in soil."""
+    return held.is_soft or held.friction.law in BRISTLE_LAWS
+
+
+def contact_bristle_rate(held: Held, contact: FootContact, bristle: Array) -> Array:
+    """Returns db/dt (3,) [m/s] of a closed sole (eq. 16, 36, 47); 0 without bristles."""
+    slip = slip_velocity(contact)
+    if held.is_soft:
+        return shear_rate(held.soil, slip, bristle)
+    return bristle_rate(held.friction, slip, bristle)
+
+
+def sunk_depth(robot: Robot, soil: Soil, depth: float) -> float:
+    """Returns z_p [m] of a foot that was pressed to a depth [m] into a soil; 0 on rigid ground."""
+    return plastic_depth(soil, robot.foot, depth) if soil.law != "none" and depth > 0.0 else 0.0
+
+
+def has_soil(robot: Robot) -> bool:
+    """Returns whether feet may touch soil, of the robot file or of a patch."""
+    return bristle_length_of_patches(robot) > 0.0 or robot.soil.law != "none"
+
+
+def bristle_length_of_patches(robot: Robot) -> float:
+    """Returns the least shear displacement [m] of the soils of patches; 0: none."""
+    surface = surface_of(robot.terrain)
+    if surface is None or surface.materials is None:
+        return 0.0
+    lengths = [float(row[9]) for row in surface.materials if row[3] != 0.0]
+    return min(lengths, default=0.0)
+
+
+def bristle_length(robot: Robot) -> float:
+    """Returns the length [m] by which errors of bristles are measured; 0 without bristles."""
+    if robot.soil.law != "none":
+        return robot.soil.shear_displacement
+    if robot.friction.law in BRISTLE_LAWS:
+        return robot.friction.presliding
+    return bristle_length_of_patches(robot)

@@ -1,0 +1,268 @@
+"""Switches contacts at the ends of steps: touch-down and lift-off, plastic depth and footprints of
+soil, and contacts that pass from one face of blocks to another.
+
+The fast form is plant_fmu/src/contact_law.c and lanes/soil_path.h.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from hexapod_cosim.models.contact import FootContact, contact_damping
+from hexapod_cosim.models.ground.blocks import Cell, cell_at, outside
+from hexapod_cosim.models.ground.surface import LAW, MU, MU_STATIC, STIFFNESS
+from hexapod_cosim.models.kinematics import LEGS, foot_centres
+from hexapod_cosim.models.records import Array, Robot, Soil
+from hexapod_cosim.models.soil.law import plastic_depth, row_soil, soil_radius
+from hexapod_cosim.models.terrain import surface_of
+from hexapod_cosim.models.touch.forces import (
+    Contacts,
+    Held,
+    Spot,
+    contacts_at,
+    has_soil,
+    open_contacts,
+    own_ground,
+    spots,
+)
+
+LEAST_FOOTPRINT = 1e-6  # m  shallower ones are not kept
+SAME_FACE = 1e-6  # m, 1  depth and normal of one contact at both sides of a border between cells
+
+
+@dataclass(frozen=True)
+class Depths:
+    """Depths and approach speeds of all contacts, and how far feet have left their cells."""
+
+    delta: Array  # (n,) m  of soles above the depth at which they touch soil
+    ddelta: Array  # (n,) m/s
+    outside: Array  # (6,) m  < 0: inside; -inf: no cell is held
+
+
+def has_cells(robot: Robot) -> bool:
+    """Returns whether the ground consists of blocks."""
+    surface = surface_of(robot.terrain)
+    return surface is not None and surface.kind == "blocks"
+
+
+def depths_of(robot: Robot, body: Array, contacts: Contacts) -> Depths:
+    """Returns the depths of all contacts at bodies (19, 13)."""
+    found = contacts_at(robot, body, contacts)
+    delta = np.array([contact.penetration for contact in found])
+    delta[:LEGS] -= contacts.plastic
+    far = np.full(LEGS, -math.inf)
+    surface = surface_of(robot.terrain)
+    if surface is not None and has_cells(robot):
+        for leg, (x, y, _) in enumerate(foot_centres(robot, body).tolist()):
+            cell = contacts.cell[leg]
+            far[leg] = -math.inf if cell is None else outside(surface, x, y, cell)
+    return Depths(delta, np.array([contact.approach_speed for contact in found]), far)
+
+
+# touch-down and lift-off
+
+
+def ground_under(robot: Robot, spot: Spot, centre: Array) -> Held:
+    """Returns an open contact with the ground at a foot's centre (3,), of a patch if there is one.
+
+    A patch with a kinetic coefficient of its own has no static rise unless it gives one. Torso,
+    knees and shanks have the robot's own ground everywhere.
+    """
+    held, surface = own_ground(robot, spot), surface_of(robot.terrain)
+    if spot.leg < 0 or surface is None or surface.materials is None:
+        return held
+    number = surface.material_at(float(centre[0]), float(centre[1]))
+    if number == 0:
+        return held
+    row = surface.materials[number - 1]
+    given = {name: float(row[column]) for name, column in (("mu", MU), ("mu_static", MU_STATIC))}
+    if math.isnan(given["mu"]):
+        given.pop("mu")
+    elif math.isnan(given["mu_static"]):
+        given["mu_static"] = given["mu"]
+    if math.isnan(given["mu_static"]):
+        given.pop("mu_static")
+    stiffness = robot.contact.stiffness if math.isnan(row[STIFFNESS]) else float(row[STIFFNESS])
+    return replace(
+        held,
+        friction=replace(held.friction, **given),
+        contact=replace(robot.contact, stiffness=stiffness),
+        soil=row_soil(row[LAW:]) if spot.is_sole else Soil(),
+    )
+
+
+def closed(robot: Robot, spot: Spot, centre: Array, impact_speed: float) -> Held:
+    """Returns the contact of a sphere that touches down at a speed [m/s]."""
+    held, damping = ground_under(robot, spot, centre), contact_damping(robot.contact, impact_speed)
+    return replace(held, damping=damping, impact_speed=impact_speed)
+
+
+def start_contacts(robot: Robot, body: Array) -> Contacts:
+    """Returns the contacts of bodies (19, 13) at the start: spheres in the ground are closed, with
+    impact speed 0; feet in soil have been pressed into it.
+    """
+    contacts = open_contacts(robot)
+    depths, centres = depths_of(robot, body, contacts), foot_centres(robot, body)
+    held, plastic = list(contacts.held), np.zeros(LEGS)
+    for k, spot in enumerate(spots(robot)):
+        if depths.delta[k] > 0.0:
+            held[k] = closed(robot, spot, centres[spot.leg], 0.0)
+            if held[k].is_soft:
+                depth = float(depths.delta[k])
+                plastic[spot.leg] = plastic_depth(held[k].soil, robot.foot, depth)
+    return hold_cells(robot, body, replace(contacts, held=tuple(held), plastic=plastic))
+
+
+def hold_cells(robot: Robot, body: Array, contacts: Contacts) -> Contacts:
+    """Holds the cells of feet that touch blocks, and releases those of others."""
+    surface = surface_of(robot.terrain)
+    if surface is None or not has_cells(robot):
+        return contacts
+    cells: list[Cell | None] = []
+    for leg, (x, y, _) in enumerate(foot_centres(robot, body).tolist()):
+        touches = any(
+            spot.leg == leg and not held.is_open
+            for spot, held in zip(spots(robot), contacts.held, strict=True)
+        )
+        cells.append((contacts.cell[leg] or cell_at(surface, x, y)) if touches else None)
+    return replace(contacts, cell=tuple(cells))
+
+
+def switch_contacts(
+    robot: Robot, body: Array, contacts: Contacts, depths: Depths
+) -> tuple[Contacts, int]:
+    """Closes spheres that are in the ground and opens those that are not.
+
+    Returns the contacts and the number of touch-downs.
+    """
+    delta = depths.delta
+    if has_soil(robot):
+        contacts, delta = tread(robot, body, contacts, delta)
+    held, centres, touchdowns = list(contacts.held), foot_centres(robot, body), 0
+    for k, spot in enumerate(spots(robot)):
+        if held[k].is_open and delta[k] > 0.0:
+            held[k] = closed(robot, spot, centres[spot.leg], float(depths.ddelta[k]))
+            touchdowns += 1
+        elif not held[k].is_open and delta[k] <= 0.0:
+            held[k] = replace(held[k], damping=math.nan)
+    if all(now is before for now, before in zip(held, contacts.held, strict=True)):
+        return contacts, 0
+    return hold_cells(robot, body, replace(contacts, held=tuple(held))), touchdowns
+
+
+# soil
+
+
+def deepest(start: float, slope_start: float, end: float, slope_end: float) -> float:
+    """Returns the largest value on [0, 1] of the cubic with these ends and slopes (eq. 28)."""
+    if not (slope_start > 0.0 and slope_end < 0.0):
+        return max(start, end)
+    bend = slope_start + slope_end - 2.0 * (end - start)
+    curve = end - start - slope_start - bend
+    low, high = 0.0, 1.0
+    for _ in range(60):
+        x = 0.5 * (low + high)
+        rises = slope_start + x * (2.0 * curve + 3.0 * x * bend) > 0.0
+        low, high = (x, high) if rises else (low, x)
+    top = start + low * (slope_start + low * (curve + low * bend))
+    return max(top, start, end)
+
+
+def yield_soil(robot: Robot, contacts: Contacts, h: float, before: Depths, after: Depths) -> Array:
+    """Returns the plastic depths (6,) [m] at the end of a step of h [s] (eq. 44).
+
+    They follow from the largest depths between the steps' ends. before, after: at the ends, with
+    the plastic depths of the step.
+    """
+    plastic = contacts.plastic.copy()
+    for leg in range(LEGS):
+        held = contacts.held[leg]
+        if held.is_open or not held.is_soft:
+            continue
+        from_, to = (float(ends.delta[leg] + plastic[leg]) for ends in (before, after))
+        slopes = (h * float(before.ddelta[leg]), h * float(after.ddelta[leg]))
+        depth = deepest(from_, slopes[0], to, slopes[1])
+        plastic[leg] = max(plastic[leg], plastic_depth(held.soil, robot.foot, depth))
+    return plastic
+
+
+def tread(robot: Robot, body: Array, contacts: Contacts, delta: Array) -> tuple[Contacts, Array]:
+    """Records the footprints that feet leave upwards, and finds those that feet enter from above.
+
+    An open foot below the undisturbed surface is above its footprint, whose bottom it may touch
+    again; the footprint is complete when the foot has left it upwards. Rigid ground beside a
+    footprint has none. Depths (n,) follow the plastic depths to which they refer.
+    """
+    delta, plastic, place = delta.copy(), contacts.plastic.copy(), contacts.place.copy()
+    prints = contacts.footprints
+    for leg, centre in enumerate(foot_centres(robot, body)):
+        z, held = delta[leg] + plastic[leg], contacts.held[leg]
+        if not held.is_open:
+            if delta[leg] <= 0.0:
+                place[leg] = centre[:2]
+            continue
+        if z <= 0.0:
+            if plastic[leg] >= LEAST_FOOTPRINT:
+                new = [*place[leg], plastic[leg], soil_radius(robot.foot)]
+                prints = np.vstack([prints, new])
+            plastic[leg] = 0.0
+        elif plastic[leg] == 0.0 and ground_under(robot, spots(robot)[leg], centre).is_soft:
+            plastic[leg] = footprint_depth(prints, centre)
+        delta[leg] = z - plastic[leg]
+    return replace(contacts, plastic=plastic, place=place, footprints=prints), delta
+
+
+def footprint_depth(footprints: Array, centre: Array) -> float:
+    """Returns the depth [m] of the deepest footprint around a point; 0 outside of all."""
+    away = np.hypot(footprints[:, 0] - centre[0], footprints[:, 1] - centre[1])
+    return float(np.max(footprints[away <= footprints[:, 3], 2], initial=0.0))
+
+
+# blocks
+
+
+def cross_cells(robot: Robot, body: Array, contacts: Contacts, depths: Depths) -> Contacts:
+    """Hands the contacts of feet that have left their cells over to the faces around the new cells.
+
+    A contact continues in the face that has its depth and its normal, without a touch-down.
+    """
+    surface = surface_of(robot.terrain)
+    gone = [leg for leg in range(LEGS) if depths.outside[leg] > 0.0]
+    if surface is None or not gone:
+        return contacts
+    cells = list(contacts.cell)
+    for leg in gone:
+        x, y, _ = foot_centres(robot, body)[leg].tolist()
+        cells[leg] = cell_at(surface, x, y)
+    moved = replace(contacts, cell=tuple(cells))
+    before, after = contacts_at(robot, body, contacts), contacts_at(robot, body, moved)
+    feet, held, plastic = spots(robot), list(contacts.held), contacts.plastic.copy()
+    for k, spot in enumerate(feet):
+        if spot.leg not in gone:
+            continue
+        held[k] = replace(contacts.held[k], damping=math.nan)
+        for j, other in enumerate(feet):
+            same = other.leg == spot.leg and is_same_face(before[j], after[k])
+            if same and not contacts.held[j].is_open:
+                held[k] = taken_over(contacts.held[j], other, spot, held[k])
+        if spot.is_sole and held[k].is_open:
+            plastic[spot.leg] = 0.0  # the new cell is undisturbed
+    return replace(moved, held=tuple(held), plastic=plastic)
+
+
+def is_same_face(a: FootContact, b: FootContact) -> bool:
+    """Returns whether two contacts of a foot are with the same face: one depth and normal."""
+    turn = float(np.sum((a.normal - b.normal) ** 2))
+    return abs(a.penetration - b.penetration) < SAME_FACE and turn < SAME_FACE
+
+
+def taken_over(old: Held, from_: Spot, to: Spot, before: Held) -> Held:
+    """Returns a contact that continues in another face. Bristles and soil are those of soles."""
+    if from_.is_sole and to.is_sole:
+        return old
+    law = before.friction.law
+    static = replace(old.friction, law=law)
+    return replace(old, friction=static, soil=Soil())

@@ -1,0 +1,232 @@
+/* smooth.h - nearest points of a smooth surface (eq. 31, 32), on lanes: the kernels compute the
+ * feet of a pack at once; surface.c has one lane, with the same bits */
+#ifndef HX_SMOOTH_H
+#define HX_SMOOTH_H
+
+#include "../lanes/lanes.h"
+#include "surface.h"
+
+/* Height over a point, its first and second derivatives. */
+typedef struct {
+  hxReal s, sx, sy, sxx, sxy, syy;
+} hxPatch;
+
+/* A coordinate on the grid: index of the node before it, place between this and the next node, and
+ * cells per metre, 0 beyond the grid, where the border's height goes on. */
+typedef struct {
+  hxReal node, place, per_cell;
+} hxGridPlace;
+
+/* Places of points, and the 4 x 4 nodes around each. */
+typedef struct {
+  hxGridPlace x, y;
+  double col[HX_LANES], row[HX_LANES]; /* of the patches whose nodes these are */
+  double node[4][4][HX_LANES];
+} hxStencil;
+
+/* Returns the largest whole number that is not larger than x, for x from 0 to 2^51. */
+static inline hxReal whole_part(hxReal x) {
+  const double shift = 6755399441055744.0; /* 1.5 * 2^52: adding it rounds to an integer */
+  const hxReal nearest = (x + shift) - shift;
+  return nearest - hx_select(hx_less(x, nearest), hx_splat(1.0), hx_splat(0.0));
+}
+
+/* Returns the place of x, of the first node if x is not a number. */
+static inline hxGridPlace grid_place(hxReal x, double origin, double per_cell, int64_t nodes) {
+  const hxReal u = (x - origin) * per_cell, zero = hx_splat(0.0),
+               last = hx_splat((double)(nodes - 1));
+  const hxReal clamped = hx_select(hx_less(zero, u), hx_min(u, last), zero);
+  const hxReal node = hx_min(whole_part(clamped), hx_splat((double)(nodes - 2)));
+  const hxMask outside = hx_less(u, zero) | hx_less(last, u);
+  return (hxGridPlace){node, clamped - node, hx_select(outside, zero, hx_splat(per_cell))};
+}
+
+/* Computes weights of four nodes by Catmull and Rom's cubic, and their derivatives by the place. */
+static inline void cubic_weights(hxReal t, hxReal w[3][4]) {
+  const hxReal t2 = t * t, t3 = t2 * t;
+  w[0][0] = -0.5 * t + t2 - 0.5 * t3, w[0][1] = 1.0 - 2.5 * t2 + 1.5 * t3;
+  w[0][2] = 0.5 * t + 2.0 * t2 - 1.5 * t3, w[0][3] = 0.5 * t3 - 0.5 * t2;
+  w[1][0] = -0.5 + 2.0 * t - 1.5 * t2, w[1][1] = 4.5 * t2 - 5.0 * t;
+  w[1][2] = 0.5 + 4.0 * t - 4.5 * t2, w[1][3] = 1.5 * t2 - t;
+  w[2][0] = 2.0 - 3.0 * t, w[2][1] = 9.0 * t - 5.0;
+  w[2][2] = 4.0 - 9.0 * t, w[2][3] = 3.0 * t - 1.0;
+}
+
+/* Copies the 4 x 4 nodes of a lane's patch. */
+static inline void copy_nodes(const hxTerrain *terrain, int lane, hxStencil *at) {
+  const int64_t rows = terrain->head.rows, cols = terrain->head.cols, c = (int64_t)at->col[lane],
+                r = (int64_t)at->row[lane];
+  const double *first = terrain->height + (r - 1) * cols + (c - 1);
+  double border[4][4];
+  int64_t stride = cols;
+  if (c < 1 || r < 1 || c + 2 >= cols || r + 2 >= rows) {
+    hx_terrain_border_nodes(terrain, r, c, border);
+    first = border[0], stride = 4;
+  }
+  for (int i = 0; i < 4; ++i)
+    for (int k = 0; k < 4; ++k) at->node[i][k][lane] = first[i * stride + k];
+}
+
+/* Moves the places of a stencil to (x, y). */
+static inline void move_places(const hxTerrain *terrain, hxReal x, hxReal y, hxStencil *at) {
+  const hxGridHead *head = &terrain->head;
+  at->x = grid_place(x, head->x0, terrain->per_cell, head->cols);
+  at->y = grid_place(y, head->y0, terrain->per_cell, head->rows);
+}
+
+/* Sets a stencil to (x, y). */
+static inline void set_stencil(const hxTerrain *terrain, hxReal x, hxReal y, hxStencil *at) {
+  move_places(terrain, x, y, at);
+  hx_store(at->col, at->x.node), hx_store(at->row, at->y.node);
+  for (int lane = 0; lane < HX_LANES; ++lane) copy_nodes(terrain, lane, at);
+}
+
+/* Moves it to (x, y), in the lanes `active` with its nodes. */
+static inline void move_stencil(const hxTerrain *terrain, hxMask active, hxReal x, hxReal y,
+                                hxStencil *at) {
+  double col[HX_LANES], row[HX_LANES];
+  const hxReal unchanged[2] = {hx_load(at->col), hx_load(at->row)};
+  move_places(terrain, x, y, at);
+  hx_store(col, hx_select(active, at->x.node, unchanged[0]));
+  hx_store(row, hx_select(active, at->y.node, unchanged[1]));
+  for (int lane = 0; lane < HX_LANES; ++lane)
+    if (col[lane] < at->col[lane] || col[lane] > at->col[lane] || row[lane] < at->row[lane] ||
+        row[lane] > at->row[lane]) {
+      at->col[lane] = col[lane], at->row[lane] = row[lane];
+      copy_nodes(terrain, lane, at);
+    }
+}
+
+/* Computes the surface over the points of a stencil. */
+static inline hxPatch patch_at(const hxStencil *at) {
+  hxReal wx[3][4], wy[3][4], line[3][4], sum[3][3]; /* sum: [derivatives by y][by x] */
+  cubic_weights(at->x.place, wx);
+  cubic_weights(at->y.place, wy);
+  for (int i = 0; i < 4; ++i) {
+    const hxReal a = hx_load(at->node[i][0]), b = hx_load(at->node[i][1]),
+                 c = hx_load(at->node[i][2]), d = hx_load(at->node[i][3]);
+    for (int k = 0; k < 3; ++k)
+      line[k][i] = (wx[k][0] * a + wx[k][1] * b) + (wx[k][2] * c + wx[k][3] * d);
+  }
+  for (int j = 0; j < 3; ++j)
+    for (int k = 0; j + k < 3; ++k)
+      sum[j][k] = (wy[j][0] * line[k][0] + wy[j][1] * line[k][1]) +
+                  (wy[j][2] * line[k][2] + wy[j][3] * line[k][3]);
+  const hxReal by_x = at->x.per_cell, by_y = at->y.per_cell;
+  return (hxPatch){.s = sum[0][0],
+                   .sx = sum[0][1] * by_x,
+                   .sy = sum[1][0] * by_y,
+                   .sxx = sum[0][2] * (by_x * by_x),
+                   .sxy = sum[1][1] * (by_x * by_y),
+                   .syy = sum[2][0] * (by_y * by_y)};
+}
+
+/* Hessian of half the squared distance from a point rz below the surface, or its part without the
+ * surface's bend where the whole has no minimum. */
+typedef struct {
+  hxReal xx, xy, yy, per_det;
+} hxHessian;
+
+static inline hxHessian hessian_of(const hxPatch *p, hxReal rz) {
+  const hxReal gxx = 1.0 + p->sx * p->sx, gyy = 1.0 + p->sy * p->sy, gxy = p->sx * p->sy;
+  const hxReal xx = gxx + rz * p->sxx, xy = gxy + rz * p->sxy, yy = gyy + rz * p->syy;
+  const hxReal det = xx * yy - xy * xy, least = hx_splat(0.1);
+  const hxMask whole = hx_less(least, xx) & hx_less(least, det);
+  return (hxHessian){hx_select(whole, xx, gxx), hx_select(whole, xy, gxy),
+                     hx_select(whole, yy, gyy), 1.0 / hx_select(whole, det, gxx * gyy - gxy * gxy)};
+}
+
+/* Moves the patch along the surface by its own second-order expansion. */
+static inline hxPatch moved_patch(const hxPatch *p, hxReal dx, hxReal dy) {
+  hxPatch moved = *p;
+  moved.s += dx * (p->sx + 0.5 * (p->sxx * dx + p->sxy * dy)) +
+             dy * (p->sy + 0.5 * (p->sxy * dx + p->syy * dy));
+  moved.sx += p->sxx * dx + p->sxy * dy;
+  moved.sy += p->sxy * dx + p->syy * dy;
+  return moved;
+}
+
+/* Returns which lanes are on the same patch still after a move. */
+static inline hxMask stays_in_patch(const hxTerrain *terrain, const hxStencil *at, hxReal dx,
+                                    hxReal dy) {
+  const hxReal zero = hx_splat(0.0), one = hx_splat(1.0), u = at->x.place + terrain->per_cell * dx,
+               v = at->y.place + terrain->per_cell * dy;
+  return hx_less(u, one) & hx_less(v, one) & ~(hx_less(u, zero) | hx_less(v, zero));
+}
+
+/* Returns the share of a move of these squares that is made: at most a cell. */
+static inline hxReal share_of_move(const hxTerrain *terrain, hxReal square) {
+  const hxReal one = hx_splat(1.0), cell = hx_splat(terrain->head.cell);
+  const hxMask far = hx_less(cell * cell, square);
+  return hx_any(far) ? hx_select(far, cell / hx_sqrt(hx_select(far, square, one)), one) : one;
+}
+
+/* A nearest point: (x, y), the surface there and the Hessian. */
+typedef struct {
+  hxReal x, y;
+  hxPatch p;
+  hxHessian H;
+} hxNearest;
+
+static inline hxReal *entries_of(hxNearest *nearest) { return &nearest->x; }
+
+/* Replaces a nearest point in some lanes. */
+static inline void replace_nearest(hxMask mask, hxNearest new, hxNearest *nearest) {
+  enum { SIZE = sizeof(hxNearest) / sizeof(hxReal) };
+  for (int i = 0; i < SIZE; ++i)
+    entries_of(nearest)[i] = hx_select(mask, entries_of(&new)[i], entries_of(nearest)[i]);
+}
+
+/* Squares of Newton's last step over the cell's. Its end is found by the patch's expansion: third
+ * derivatives, and at a border the jump of the second ones, are left out. */
+static const double close = 1e-7, closest = 1e-14;
+
+/* Computes the nearest points of a smooth surface to the lanes `wanted` by Newton's method on
+ * their two parameters, from the points below moved by `start`. With `exactly`, also the second
+ * derivatives belong to the nearest point. */
+static inline hxNearest hx_nearest_on_surface(const hxTerrain *terrain, hxMask wanted,
+                                              const hxReal point[3], const hxReal start[2],
+                                              int exactly) {
+  enum { MOST = 16 };
+  const double area = terrain->head.cell * terrain->head.cell;
+  hxReal x = point[0] + start[0], y = point[1] + start[1];
+  hxMask active = wanted;
+  hxStencil at;
+  hxNearest found;
+  set_stencil(terrain, x, y, &at);
+  for (int i = 0;; ++i) {
+    const hxPatch p = patch_at(&at);
+    const hxReal rz = p.s - point[2];
+    const hxReal gx = (x - point[0]) + p.sx * rz, gy = (y - point[1]) + p.sy * rz;
+    const hxHessian H = hessian_of(&p, rz);
+    const hxReal dx = H.per_det * (H.xy * gy - H.yy * gx), dy = H.per_det * (H.xy * gx - H.xx * gy);
+    const hxReal square = dx * dx + dy * dy;
+    hxMask done = ~hx_less(hx_splat(closest * area), square);
+    if (!exactly)
+      done |= ~hx_less(hx_splat(close * area), square) & stays_in_patch(terrain, &at, dx, dy);
+    if (i == MOST) done = active;
+    const hxNearest end = {x + dx, y + dy, moved_patch(&p, dx, dy), H};
+    if (i == 0)
+      found = end;
+    else
+      replace_nearest(done & active, end, &found);
+    active &= ~done;
+    if (!hx_any(active)) return found;
+    const hxReal share = share_of_move(terrain, square);
+    x += share * dx, y += share * dy;
+    move_stencil(terrain, active, x, y, &at);
+  }
+}
+
+/* Returns the signed distance of points from the surface at their nearest points, and sets the
+ * normals there. */
+static inline hxReal hx_distance_from_surface(const hxNearest *at, const hxReal point[3],
+                                              hxReal normal[3]) {
+  const hxPatch *p = &at->p;
+  const hxReal per_n = 1.0 / hx_sqrt(1.0 + p->sx * p->sx + p->sy * p->sy);
+  normal[0] = -p->sx * per_n, normal[1] = -p->sy * per_n, normal[2] = per_n;
+  return (point[0] - at->x) * normal[0] + (point[1] - at->y) * normal[1] +
+         (point[2] - p->s) * normal[2];
+}
+
+#endif

@@ -1,0 +1,165 @@
+"""A user's class: its arguments, its commands and its exceptions, told with their line."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from hexapod_cosim.controller import BodyCommand, ControllerError, JointCommand, Measurement
+from hexapod_cosim.cosim.control.controllers import check_control
+from hexapod_cosim.cosim.control.python_law import PythonLaw, build, load_class
+from hexapod_cosim.cosim.scenario.controls import parse_control
+from hexapod_cosim.cosim.scenario.scenario import scenario_from_table
+from hexapod_cosim.models import JOINT_NAMES, LEG_NAMES
+
+GIVEN = {"robot": "the robot", "period": 0.005, "gait": "the gait"}
+
+
+def written(folder: Path, text: str) -> Path:
+    path = folder / "law.py"
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def made(folder: Path, text: str, settings: Mapping[str, Any] | None = None) -> Any:
+    path = written(folder, text)
+    return build(load_class(path, "Law"), path, GIVEN, settings or {})
+
+
+def stepped(law: Any, path: Path | None = None) -> JointCommand:
+    return PythonLaw(law, path=path).step(0.25, BodyCommand(), Measurement())
+
+
+def test_the_class_gets_what_it_asks_for_by_name(tmp_path: Path) -> None:
+    law = made(
+        tmp_path,
+        "class Law:\n"
+        "    def __init__(self, gait, lift, *, period, gain=2.0):\n"
+        "        self.got = gait, lift, period, gain\n"
+        "    def step(self, t, command, measurement): ...\n",
+        {"lift": 0.3, "unused": 1},
+    )
+    assert law.got == ("the gait", 0.3, 0.005, 2.0)
+
+
+def test_a_class_that_takes_any_name_gets_all_parameters(tmp_path: Path) -> None:
+    law = made(
+        tmp_path,
+        "class Law:\n"
+        "    def __init__(self, robot, **rest):\n"
+        "        self.got = robot, rest\n"
+        "    def step(self, t, command, measurement): ...\n",
+        {"lift": 0.3},
+    )
+    assert law.got == ("the robot", {"lift": 0.3})
+
+
+def test_a_missing_parameter_is_named(tmp_path: Path) -> None:
+    with pytest.raises(ControllerError, match="got 'amplitude'.*--set control.amplitude=VALUE"):
+        made(tmp_path, "class Law:\n    def __init__(self, amplitude): ...\n")
+
+
+def test_a_class_without_step_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(ControllerError, match="Law has no method step"):
+        made(tmp_path, "class Law: ...\n")
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("import nothing_of_this_name\n", "line 1, in <module>: ModuleNotFoundError: No module"),
+        ("class Law:\n    x = = 1\n", "line 2: SyntaxError: invalid syntax"),
+        (
+            "class Law:\n    def __init__(self):\n        raise ValueError('two\\nlines')\n",
+            "line 3, in __init__: ValueError: two lines; correct the line `raise ValueError(",
+        ),
+    ],
+)
+def test_an_exception_is_told_in_one_line_with_the_users_line(
+    text: str, message: str, tmp_path: Path
+) -> None:
+    with pytest.raises(ControllerError) as caught:
+        made(tmp_path, text)
+    assert str(caught.value).startswith(f"{tmp_path / 'law.py'}, {message}")
+    assert "\n" not in str(caught.value)
+
+
+def test_an_exception_below_the_users_file_is_told_with_the_users_line(tmp_path: Path) -> None:
+    path = written(
+        tmp_path,
+        "import numpy as np\n"
+        "class Law:\n"
+        "    def step(self, t, command, measurement):\n"
+        "        return np.linalg.inv(np.zeros((2, 2)))\n",
+    )
+    with pytest.raises(ControllerError, match=r"law.py, line 4, in step: LinAlgError: Singular"):
+        stepped(load_class(path, "Law")(), path)
+
+
+def test_joint_angles_alone_are_a_command() -> None:
+    class Law:
+        def step(self, t: float, command: BodyCommand, measurement: Measurement) -> Any:
+            return np.full((6, 3), 0.5)
+
+    command = stepped(Law())
+    assert (command.angle_ref == 0.5).all()
+    assert not command.speed_ref.any()
+
+
+@pytest.mark.parametrize(
+    ("result", "message"),
+    [
+        (None, "step returns no joint command: got 'NoneType'"),
+        (np.zeros(18), "step returns no joint command: got 'ndarray'"),
+        (JointCommand(speed_ref=np.zeros(18)), "speed_ref has a wrong shape: got (18,)"),
+    ],
+)
+def test_another_result_is_refused(result: Any, message: str) -> None:
+    class Law:
+        def step(self, t: float, command: BodyCommand, measurement: Measurement) -> Any:
+            return result
+
+    with pytest.raises(ControllerError) as caught:
+        stepped(Law())
+    assert message in str(caught.value)
+
+
+def test_a_number_that_is_not_finite_is_named_by_joint() -> None:
+    class Law:
+        def step(self, t: float, command: BodyCommand, measurement: Measurement) -> Any:
+            angle = np.zeros((6, 3))
+            angle[LEG_NAMES.index("RM"), JOINT_NAMES.index("femur")] = np.nan
+            return angle
+
+    with pytest.raises(ControllerError, match=r"RM.femur.angle_ref is not finite at 0.25 s"):
+        stepped(Law())
+
+
+def test_a_changed_file_is_read_again(tmp_path: Path) -> None:
+    path = written(tmp_path, "class Law:\n    number = 1\n")
+    assert load_class(path, "Law").number == 1
+    written(tmp_path, "class Law:\n    number = 22\n")
+    assert load_class(path, "Law").number == 22
+
+
+def test_modules_beside_the_file_can_be_imported(tmp_path: Path) -> None:
+    (tmp_path / "beside_the_law.py").write_text("NUMBER = 7\n")
+    path = written(tmp_path, "import beside_the_law\nclass Law:\n    x = beside_the_law.NUMBER\n")
+    assert load_class(path, "Law").x == 7
+
+
+def test_a_parameter_that_no_control_takes_is_refused(tmp_path: Path) -> None:
+    path = written(
+        tmp_path,
+        "class Law:\n    def __init__(self, lift=1): ...\n    def step(self, t, c, m): ...\n",
+    )
+    control = parse_control(f"{path}:Law", where="test")
+    table = {"control": {"law": control.text, "lfit": 3}}
+    with pytest.raises(ControllerError, match="test: control: no control takes.*'lift'"):
+        check_control(scenario_from_table(table, where="test"), [control])
+    table = {"control": {"law": control.text, "lift": 3, "Law": {"lift": 4}, "other": {"x": 1}}}
+    check_control(scenario_from_table(table, where="test"), [control])

@@ -1,0 +1,135 @@
+"""A pattern generator, a pythonfmu controller and ours side by side, under labels of any text."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from pathlib import Path
+
+import pytest
+from command import Call, assert_refused
+
+from hexapod_cosim.cosim.results.comparison import read_seeds
+
+EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
+CPG = f"{EXAMPLES / 'controllers' / 'cpg.py'}:Cpg"
+SWAY = f"sway, by hand={EXAMPLES / '03_own_controller.py'}:Sway"
+CYCLES = ["--set", "duration=3", "--set", "gait.period=0.8"]
+PLAIN = [*CYCLES, "--set", "outputs.plots=false", "--set", "outputs.formats=['parquet']"]
+
+
+@pytest.fixture(scope="module")
+def stride(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    from pythonfmu.builder import FmuBuilder  # noqa: PLC0415  a dependency of this test alone
+
+    folder = tmp_path_factory.mktemp("stride")
+    FmuBuilder.build_FMU(EXAMPLES / "controllers" / "stride.py", dest=folder)
+    shutil.copy(EXAMPLES / "controllers" / "Stride.toml", folder)
+    return folder / "Stride.fmu"
+
+
+def test_four_controls_stand_in_one_table_and_one_report(
+    call: Call, tmp_path: Path, stride: Path
+) -> None:
+    controls = ["kinematic", CPG, f"{stride}", SWAY]
+    words = [word for text in controls for word in ("--control", text)]
+    folder = tmp_path / "out"
+    code, out, _ = call("compare", "walk_flat", *words, "--seeds", "2", *CYCLES, "-o", folder)
+    assert code == 0
+    labels = ["kinematic", "Cpg", "Stride", "sway, by hand"]
+    assert list(read_seeds(folder / "seeds.csv")) == labels
+    table = json.loads((folder / "metrics.json").read_text())
+    assert table["reference"] == "kinematic"
+    assert list(table["changes"]) == labels[1:]
+    assert table["walked"] == dict.fromkeys(labels, 2)
+    page = (folder / "report.html").read_text(encoding="utf-8")
+    for label in labels[1:]:
+        assert f"gainst kinematic control, {label} " in page
+        assert f"{label} against kinematic" in page
+    assert "compliant walks" not in page
+    code, again, _ = call("report", folder)
+    assert code == 0
+    assert "sway, by hand: change" in out
+
+
+def test_the_folders_of_earlier_labels_are_removed(call: Call, tmp_path: Path) -> None:
+    folder = tmp_path / "out"
+    first = ["--control", "kinematic", "--control", f"one={CPG}"]
+    second = ["--control", "kinematic", "--control", f"two={CPG}"]
+    for words in (first, second):
+        assert call("compare", "walk_flat", *words, "--seeds", "1", *PLAIN, "-o", folder)[0] == 0
+    assert sorted(path.name for path in folder.iterdir() if path.is_dir()) == [
+        "kinematic",
+        "plots",
+        "two",
+    ]
+
+
+def test_several_terrains_and_several_controls_make_one_table(call: Call, tmp_path: Path) -> None:
+    words = ["--control", "kinematic", "--control", f"a b={CPG}", "--control", f"c={CPG}"]
+    code, out, _ = call(
+        "compare", "walk_flat", "incline", *words, "--seeds", "1", *CYCLES, "-o", tmp_path / "out"
+    )
+    assert code in (0, 3)
+    rows = (tmp_path / "out" / "terrains.csv").read_text().splitlines()[1:]
+    assert [row.split(",")[:2] for row in rows] == [
+        [scenario, label]
+        for scenario in ("walk_flat", "incline")
+        for label in ("kinematic", "a b", "c")
+    ]
+    assert "a b" in out
+
+
+def test_simulate_runs_each_control_into_a_folder_of_its_label(call: Call, tmp_path: Path) -> None:
+    words = ["--control", "kinematic", "--control", CPG]
+    code, out, _ = call(
+        "simulate", "walk_flat", *words, "--set", "duration=0.2", "--set", "outputs.plots=false",
+        "-o", tmp_path / "out",
+    )  # fmt: skip
+    assert code == 0
+    assert sorted(path.name for path in (tmp_path / "out").iterdir()) == ["Cpg", "kinematic"]
+    facts = json.loads((tmp_path / "out" / "Cpg" / "run.json").read_text())
+    assert (facts["control"], facts["controller"]["kind"]) == ("Cpg", "python")
+
+
+def test_a_law_that_raises_ends_the_run_with_its_line_and_its_recording(
+    call: Call, tmp_path: Path
+) -> None:
+    law = tmp_path / "law.py"
+    law.write_text(
+        "class Law:\n"
+        "    def __init__(self, robot):\n"
+        "        self.stance = robot.stance\n"
+        "    def step(self, t, command, measurement):\n"
+        "        return self.stance if t < 0.1 else self.stanec\n"
+    )
+    outcome = call(
+        "simulate", "walk_flat", "--control", f"{law}:Law", "--set", "duration=1",
+        "-o", tmp_path / "out",
+    )  # fmt: skip
+    assert_refused(
+        outcome, f"the run ended at 0.100 s of 1 s: {law}, line 5, in step: AttributeError:"
+    )
+    assert (tmp_path / "out" / "results.partial.parquet").is_file()
+
+
+def test_a_comparison_needs_two_controls(call: Call, tmp_path: Path) -> None:
+    outcome = call("compare", "walk_flat", "--control", CPG, "-o", tmp_path / "out")
+    assert_refused(outcome, "nothing to compare with", "use simulate")
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_study_runs_the_users_controls_in_its_workers(call: Call, tmp_path: Path) -> None:
+    (tmp_path / "plan.toml").write_text(
+        f'controls = ["kinematic", "mine={CPG}"]\nseeds = 2\n'
+        '[set]\nduration = 3\ngait.period = 0.8\n[factors]\n"control.lift" = [0.2, 0.3]\n'
+    )
+    code, out, err = call(
+        "study", tmp_path / "plan.toml", "--workers", "2", "--json", "-o", tmp_path / "out"
+    )
+    assert code == 0, err
+    summary = json.loads(out)
+    assert summary["runs"] == 8
+    assert "mine" in json.dumps(summary)
+    manifest = json.loads((tmp_path / "out" / "manifest.json").read_text())
+    assert list(manifest["laws"]) == ["mine"]

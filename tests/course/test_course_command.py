@@ -1,0 +1,128 @@
+"""The command `hexapod benchmark`: determinism, files, report, interrupts, mistakes."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from command import Call, assert_refused
+
+from hexapod_cosim.cosim.course.reading import load_course
+from hexapod_cosim.cosim.course.records import read_entries
+from hexapod_cosim.cosim.course.runs import Run, run_course
+from hexapod_cosim.cosim.course.store import read_table
+
+KINEMATIC = ["--control", "kinematic"]
+
+
+@pytest.fixture(scope="module")
+def runs(plant_build: Path) -> tuple[Run, ...]:
+    course = load_course("tune", names=["rough_10", "turn"], seeds=2)
+    return tuple(run_course(course, read_entries(["kinematic"]), workers=1))
+
+
+def test_runs_do_not_depend_on_the_number_of_workers(runs: tuple[Run, ...]) -> None:
+    course = load_course("tune", names=["rough_10", "turn"], seeds=2)
+    parallel = tuple(run_course(course, read_entries(["kinematic"]), workers=2))
+    assert repr(parallel) == repr(runs)
+    assert [run.seed for run in runs] == [1000, 1001, 1000, 1001]
+    assert all(run.success for run in runs)
+
+
+def test_every_seed_has_a_surface_of_its_own(runs: tuple[Run, ...]) -> None:
+    first, second = (run.values["tilt"] for run in runs[:2])
+    assert abs(first - second) > 0.01 * first
+
+
+def replayed(monkeypatch: pytest.MonkeyPatch, found: tuple[Run, ...], *, stop: bool) -> None:
+    """Makes the command get finished runs, and Ctrl-C after them if `stop`."""
+
+    def again(*_: Any, **__: Any) -> Iterator[Run]:
+        yield from found
+        if stop:
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr("hexapod_cosim.cosim.cli.benchmark_command.run_course", again)
+
+
+CHOICE = ["--split", "tune", "--seeds", "2", "--case", "rough_10", "--case", "turn", *KINEMATIC]
+
+
+def test_the_command_writes_json_runs_picture_and_report(
+    call: Call, tmp_path: Path, runs: tuple[Run, ...], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    replayed(monkeypatch, runs, stop=False)
+    code, out, _ = call("benchmark", *CHOICE, "-o", str(tmp_path / "out"), "--json")
+    content = json.loads(out)
+    assert code == 0
+    assert json.loads((tmp_path / "out" / "benchmark.json").read_text()) == content
+    assert (content["complete"], content["reference"]) == (True, "kinematic")
+    assert content["course"]["split"] == "tune"
+    assert content["seeds"] == [1000, 1001]
+    assert list(content["cases"]) == ["rough_10", "turn"]
+    rate = content["cases"]["turn"]["controls"]["kinematic"]["success"]
+    assert (rate["successes"], rate["runs"]) == (2, 2)
+    page = (tmp_path / "out" / "report.html").read_text()
+    assert "rough_10, kinematic" in page
+    assert page.count("data:image/svg+xml") == 2
+    table, _ = read_table(tmp_path / "out")
+    assert repr(table.runs) == repr(runs)
+
+
+def test_report_draws_the_page_again(
+    call: Call, tmp_path: Path, runs: tuple[Run, ...], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    replayed(monkeypatch, runs, stop=False)
+    call("benchmark", *CHOICE, "-o", str(tmp_path / "out"))
+    before = (tmp_path / "out" / "report.html").read_bytes()
+    (tmp_path / "out" / "report.html").unlink()
+    assert call("report", str(tmp_path / "out"))[0] == 0
+    assert (tmp_path / "out" / "report.html").read_bytes() == before
+
+
+def test_an_interrupt_writes_the_table_of_the_completed_runs(
+    call: Call, tmp_path: Path, runs: tuple[Run, ...], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    replayed(monkeypatch, runs[:3], stop=True)
+    code, out, err = call("benchmark", *CHOICE, "-o", str(tmp_path / "out"))
+    assert code == 130
+    assert ["rough_10,", "kinematic", "2/2"] in [line.split()[:3] for line in out.splitlines()]
+    assert "stopped after 3 of 4 runs" in " ".join(err.split())
+    content = json.loads((tmp_path / "out" / "benchmark.json").read_text())
+    assert content["complete"] is False
+    assert (tmp_path / "out" / "report.html").is_file()
+    assert json.loads((tmp_path / "out" / "run.json").read_text())["status"] == "interrupted"
+
+
+@pytest.mark.parametrize(
+    ("words", "parts"),
+    [
+        (["--without", "slip"], ["unknown part", "slip_pid"]),
+        (["--control", "kinematc"], ["unknown control", "kinematic"]),
+        ([*KINEMATIC, *KINEMATIC], ["two controls with one label"]),
+        (["--split", "train"], ["unknown split", "judge"]),
+        (["--case", "rough_11"], ["unknown case", "rough_10"]),
+        (["--seeds", "0"], ["--seeds", "1 to 1000"]),
+        (["--workers", "0"], ["--workers", "1 to"]),
+    ],
+)
+def test_mistakes_are_told_before_anything_is_run(
+    call: Call, tmp_path: Path, words: list[str], parts: list[str]
+) -> None:
+    assert_refused(call("benchmark", *words, "-o", str(tmp_path / "out")), *parts)
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_result_of_another_course_is_refused(
+    call: Call, tmp_path: Path, runs: tuple[Run, ...], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    replayed(monkeypatch, runs, stop=False)
+    call("benchmark", *CHOICE, "-o", str(tmp_path / "out"))
+    path = tmp_path / "out" / "benchmark.json"
+    content = json.loads(path.read_text())
+    content["course"]["hash"] = "0" * 64
+    path.write_text(json.dumps(content))
+    assert_refused(call("report", str(tmp_path / "out")), "another course", "run `hexapod")

@@ -1,0 +1,195 @@
+"""What becomes of the runs of a course: successes, failures, ratios, goals."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import replace
+
+import pytest
+
+from hexapod_cosim.cosim.course import texts
+from hexapod_cosim.cosim.course.goals import Verdict, verdicts
+from hexapod_cosim.cosim.course.reading import load_course
+from hexapod_cosim.cosim.course.records import BY_NAME, QUANTITIES, Case
+from hexapod_cosim.cosim.course.runs import Run, failure_of
+from hexapod_cosim.cosim.course.table import ALL, Table
+from hexapod_cosim.cosim.master.loop import COMPLETED, FAILED
+from hexapod_cosim.cosim.results.metrics import METRICS
+from hexapod_cosim.cosim.results.summary import NO_FIGURES, Summary
+
+CONTROLS = ("before", "after")
+COURSE = load_course("judge", seeds=4)
+
+
+def case_of(name: str) -> Case:
+    return next(case for case in COURSE.cases if case.name == name)
+
+
+def run_of(
+    case: str, control: str, seed: int, values: Mapping[str, float], failure: str = ""
+) -> Run:
+    all_values = dict.fromkeys((item.name for item in QUANTITIES), 1.0) | dict(values)
+    return Run(case, control, seed, failure, all_values)
+
+
+def table_of(figures: Mapping[str, tuple[float, float]], quantity: str) -> Table:
+    """Returns a table with the values of a quantity under both controls in some cases."""
+    course = replace(COURSE, cases=tuple(case_of(name) for name in figures))
+    runs = tuple(
+        run_of(name, control, seed, {quantity: value})
+        for name, values in figures.items()
+        for seed in course.seeds
+        for control, value in zip(CONTROLS, values, strict=True)
+    )
+    return Table(course, CONTROLS, runs)
+
+
+def summary_of(**metrics: float) -> Summary:
+    figures = dict.fromkeys(METRICS, 0.1) | {"energy_residual": 1e-5} | metrics
+    return Summary(control="kinematic", seed=0, status=COMPLETED, upright=True, metrics=figures)
+
+
+def test_a_robot_that_walks_to_the_commanded_end_is_a_success() -> None:
+    assert failure_of(summary_of(path_error=0.49), arrive=0.5) == ""
+    turned = summary_of(path_error=math.nan, yaw_drift_per_radian=0.49)
+    assert failure_of(turned, arrive=0.5) == ""
+
+
+@pytest.mark.parametrize(
+    ("summary", "text"),
+    [
+        (summary_of(path_error=0.51), "did not arrive"),
+        (summary_of(path_error=math.nan, yaw_drift_per_radian=0.6), "did not arrive"),
+        (summary_of(path_error=math.nan, yaw_drift_per_radian=math.nan), "did not get ahead"),
+        (summary_of(energy_residual=0.02), "not valid"),
+        (replace(summary_of(), upright=False, warnings=("the robot fell at 3 s",)), "fell at 3 s"),
+        (
+            Summary(control="x", seed=0, status=FAILED, reason="stopped", metrics=NO_FIGURES),
+            "stopped",
+        ),
+    ],
+)
+def test_any_other_end_is_a_failure_with_its_reason(summary: Summary, text: str) -> None:
+    assert text in failure_of(summary, arrive=0.5)
+
+
+def test_turns_on_the_spot_are_judged_per_radian() -> None:
+    metrics = dict.fromkeys(METRICS, 7.0)
+    metrics |= {"heat": math.nan, "heat_per_radian": 3.0, "roll_rms": 3.0, "pitch_rms": 4.0}
+    assert BY_NAME["heat"].value(metrics) == 3.0
+    assert BY_NAME["slip"].value(metrics) == 7.0
+    assert BY_NAME["tilt"].value(metrics) == 5.0
+
+
+def test_failures_are_in_no_mean_and_their_partners_in_no_ratio() -> None:
+    course = replace(COURSE, cases=(case_of("flat_tanh"),))
+    values = {"before": (1.0, 2.0, 3.0, 100.0), "after": (2.0, 4.0, 100.0, 6.0)}
+    failures = {("before", 3): "stuck", ("after", 2): "stuck"}
+    runs = tuple(
+        run_of("flat_tanh", control, seed, {"slip": values[control][seed]},
+               failures.get((control, seed), ""))
+        for seed in range(4)
+        for control in CONTROLS
+    )  # fmt: skip
+    figures = Table(course, CONTROLS, runs).cases["flat_tanh", "after"]
+    assert (figures.success.successes, figures.success.runs) == (3, 4)
+    assert figures.mean("slip").value == 4.0
+    assert figures.change("slip").relative == 1.0
+    assert figures.change("slip").pairs == 2
+    assert figures.failures == {"stuck": 1}
+    assert figures.counts("slip")
+
+
+def test_a_case_with_few_pairs_is_in_no_median() -> None:
+    course = replace(COURSE, cases=(case_of("flat_tanh"),))
+    runs = tuple(
+        run_of("flat_tanh", control, seed, {}, "stuck" if seed else "")
+        for seed in range(4)
+        for control in CONTROLS
+    )
+    found = Table(course, CONTROLS, runs).classes["flat", "after"]
+    assert found.counted("slip") == 0
+    assert math.isnan(found.ratio("slip").value)
+
+
+def test_class_figures_are_medians_over_cases() -> None:
+    table = table_of(
+        {"sand": (1.0, 0.5), "sand_pads": (2.0, 0.5), "mud": (1.0, 3.0), "mu_03": (1.0, 0.1)},
+        "heat",
+    )
+    assert table.classes["soil", "after"].ratio("heat").value == 0.5
+    # of 0.5, 0.25, 3 and 0.1
+    assert table.classes[ALL, "after"].ratio("heat").value == pytest.approx(0.375)
+    assert table.classes["soil", "after"].success.runs == 12
+
+
+def test_a_seed_that_not_every_control_has_run_is_left_out() -> None:
+    table = table_of({"flat_tanh": (1.0, 2.0)}, "heat")
+    part = replace(table, runs=table.runs[:5])
+    assert [run.seed for run in part.cases["flat_tanh", "after"].runs] == [0, 1]
+
+
+def verdict_of(table: Table, name: str) -> Verdict:
+    return next(verdict for verdict in verdicts(table) if verdict.goal.name == name)
+
+
+def test_goals_are_judged_by_their_bounds() -> None:
+    reached = verdict_of(table_of({"rough_10": (2.0, 0.9), "rough_20": (1.0, 0.4)}, "peak"),
+                         "rough peak")  # fmt: skip
+    assert (reached.reached, reached.sure) == (True, True)
+    assert reached.measured.value.value == pytest.approx(0.425)
+    missed = verdict_of(table_of({"flat_tanh": (1.0, 1.01)}, "electrical"), "flat electrical")
+    assert (missed.reached, missed.sure) == (False, True)
+    slip = verdict_of(table_of({"payload_2kg": (1.0, 0.01), "payload_side": (1.0, 0.03)}, "slip"),
+                      "payload slip")  # fmt: skip
+    assert slip.measured.value.value == pytest.approx(0.03)
+    assert slip.reached is False
+
+
+def test_a_goal_without_its_cases_has_no_value() -> None:
+    found = verdict_of(table_of({"flat_tanh": (1.0, 1.0)}, "slip"), "rough peak")
+    assert found.reached is None
+    assert not found.was_run
+
+
+def sweep_table(first_failures: Mapping[str, int], second_failures: Mapping[str, int]) -> Table:
+    """Returns a table of both sweeps with numbers of failures by case, of 4 runs."""
+    cases = tuple(case for case in COURSE.cases if case.sweep)
+    runs = tuple(
+        run_of(case.name, control, seed, {}, "stuck" if seed < failures.get(case.name, 0) else "")
+        for case in cases
+        for seed in COURSE.seeds
+        for control, failures in zip(CONTROLS, (first_failures, second_failures), strict=True)
+    )
+    return Table(replace(COURSE, cases=cases), CONTROLS, runs)
+
+
+def test_success_is_judged_at_the_lowest_heights_where_the_reference_fails_in_half() -> None:
+    table = sweep_table(
+        {"rubble_30": 1, "rubble_40": 2, "rubble_50": 4, "stairs_25": 3, "stairs_30": 4},
+        {"rubble_50": 4, "stairs_25": 1},
+    )
+    found = verdict_of(table, "success")
+    assert found.measured.note == "rubble_40 and stairs_25"
+    assert found.measured.value.value == 7 / 8
+    assert found.reached is False
+
+
+def test_a_reference_that_never_fails_gives_no_critical_height() -> None:
+    found = verdict_of(sweep_table({"stairs_25": 4}, {}), "success")
+    assert found.reached is None
+    assert found.measured.note == "before does not fail on rough"
+
+
+def test_tables_have_a_cell_for_every_column() -> None:
+    table = sweep_table({"stairs_25": 4}, {"rubble_40": 1})
+    for columns, rows in (
+        texts.case_rows(table),
+        texts.class_rows(table),
+        texts.failure_rows(table),
+        texts.sweep_rows(table),
+        texts.goal_rows(verdicts(table)),
+    ):
+        assert rows
+        assert {len(row) for row in rows} == {len(columns)}

@@ -1,0 +1,122 @@
+"""Tests that a model description offers what its binary and its importer have: no derivatives from
+compilers without complex numbers, integers for importers without enumerations.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import shutil
+import subprocess
+import zipfile
+from collections import Counter
+from pathlib import Path
+from typing import Any
+
+import fmpy
+import pytest
+from fmi_plant import ATHENA as INTERFACE
+from fmi_plant import ERROR, Plant
+from numpy.testing import assert_array_equal
+
+from hexapod_cosim.cosim.common.plant_files import fmi_headers, source_files
+from hexapod_cosim.cosim.export import export
+from hexapod_cosim.cosim.export.export import export_fmu
+from hexapod_cosim.cosim.interface.variants import listed_items
+from hexapod_cosim.cosim.master.fmu import Fmu
+from hexapod_cosim.cosim.validate.validation import find_problems
+from hexapod_cosim.models import FmuError, load_robot
+
+ATHENA = load_robot("athena")
+TF = ("true", "false")
+BINARY = "binaries/linux64/hexapod.so"
+
+
+@pytest.fixture(scope="module")
+def without_complex(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The plant's library as a compiler without complex numbers builds it."""
+    compiler = shutil.which("gcc") or shutil.which("clang")
+    assert compiler is not None
+    folder = tmp_path_factory.mktemp("without_complex")
+    for name, source in source_files().items():
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        (folder / name).write_bytes(source.read_bytes())
+    sources = [name for name in source_files() if name.endswith(".c")]
+    command = [compiler, "-std=c11", "-O0", "-shared", "-fPIC", "-fvisibility=hidden"]
+    command += ["-DHX_NO_COMPLEX", "-DHX_BASELINE_ONLY", "-I.", "-I", str(fmi_headers())]
+    subprocess.run([*command, *sources, "-o", "hexapod.so", "-lm"], cwd=folder, check=True)
+    return folder / "hexapod.so"
+
+
+def promised(fmu: Path) -> Counter[str]:
+    """Returns how many interfaces promise directional derivatives, and how many do not."""
+    with zipfile.ZipFile(fmu) as archive:
+        text = archive.read("modelDescription.xml").decode()
+    found = (text.count(f'providesDirectionalDerivative{s}="{v}"') for s in ("", "s") for v in TF)
+    yes2, no2, yes3, no3 = found
+    return Counter(yes=yes2 + yes3, no=no2 + no3)
+
+
+@pytest.mark.parametrize("fmi", [2, 3])
+def test_derivatives_are_promised_where_the_binary_has_them(
+    plant_library: Path,
+    without_complex: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    fmi: int,
+) -> None:
+    assert promised(export_fmu(ATHENA, tmp_path / "with.fmu", fmi=fmi)) == {"yes": 2, "no": 0}
+
+    def other(*_: Any, **__: Any) -> dict[str, bytes]:
+        return {BINARY: without_complex.read_bytes()}
+
+    monkeypatch.setattr(export, "installed_binary", other)
+    assert promised(export_fmu(ATHENA, tmp_path / "less.fmu", fmi=fmi)) == {"yes": 0, "no": 2}
+
+
+def test_a_binary_without_complex_numbers_refuses_derivatives(without_complex: Path) -> None:
+    with Plant(without_complex) as plant:
+        plant.initialize()
+        reference = (ctypes.c_uint * 1)(0)
+        number = (ctypes.c_double * 1)(1.0)
+        one = ctypes.c_size_t(1)
+        unknown = (ctypes.c_uint * 1)(*INTERFACE.references(["torso.position[3]"]))
+        status = plant.call(
+            "fmi2GetDirectionalDerivative", unknown, one, reference, one, number, number
+        )
+        assert status == ERROR
+        assert "without complex numbers" in plant.last_message
+
+
+@pytest.mark.parametrize("fmi", [2, 3])
+def test_integers_replace_enumerations_and_change_no_result(
+    plant_library: Path, tmp_path: Path, fmi: int
+) -> None:
+    usual = export_fmu(ATHENA, tmp_path / "usual.fmu", fmi=fmi)
+    plain = export_fmu(ATHENA, tmp_path / "plain.fmu", fmi=fmi, integers=True)
+    kinds = Counter(one.type for one in fmpy.read_model_description(str(usual)).modelVariables)
+    others = Counter(one.type for one in fmpy.read_model_description(str(plain)).modelVariables)
+    integer = "Integer" if fmi == 2 else "Int64"
+    assert kinds["Enumeration"] > 0
+    assert others == kinds - Counter(Enumeration=kinds["Enumeration"]) + Counter(
+        {integer: kinds["Enumeration"]}
+    )
+    assert find_problems(plain) == []
+    output = ["torso.position[3]" if fmi == 2 else "torso.position"]
+    one, other = (
+        fmpy.simulate_fmu(str(fmu), stop_time=0.02, output=output) for fmu in (usual, plain)
+    )
+    assert_array_equal(one, other)
+
+
+def test_an_integer_lists_its_items_and_takes_their_names(
+    plant_library: Path, tmp_path: Path
+) -> None:
+    fmu = export_fmu(ATHENA, tmp_path / "plain.fmu", integers=True)
+    with Fmu(fmu) as plant:
+        variable = plant.variables["terrain.kind"]
+        assert (variable.min, variable.max) == ("1", "3")
+        assert listed_items(variable.description) == {"flat": 1, "slope": 2, "grid": 3}
+        plant.set_parameters({"terrain.kind": "slope"})
+        assert plant.parameters()["terrain.kind"] == 2.0
+        with pytest.raises(FmuError, match="got 'hill', expected one of flat, slope, grid"):
+            plant.set_parameters({"terrain.kind": "hill"})
