@@ -31,7 +31,7 @@ LONGEST_INPUT = 4096  # bytes
 LONGEST_CALL = 60  # s  an input that takes longer is a finding
 STATISTIC = re.compile(r"stat::number_of_executed_units: +(\d+)")
 COVERAGE = re.compile(r"cov: (\d+)")
-DRAWN = re.compile(r"- (\d+) passing examples", re.ASCII)
+DRAWN = re.compile(r"- (\d+) passing")
 
 
 @dataclass(frozen=True)
