@@ -133,6 +133,7 @@ def test_a_scenario_is_read_or_refused(tmp_path: Path, content: bytes) -> None:
 
 @MODES
 @given(content=toml_files(STUDIES / "friction_speed.toml"))
+@example(content=b'controls = ["' + 300 * b"5" + b'"]')  # longer than a name may be
 def test_a_study_is_read_or_refused(tmp_path: Path, content: bytes) -> None:
     path = written(tmp_path, "study.toml", content)
     reads(lambda: load_study(path))
