@@ -238,13 +238,13 @@ class Controller(Stateful):
         return self._lay_out(value, posture, self.paths.walk(number, twist, before.feet))
 
     def _note_contacts(self) -> None:
-        """Notes which feet have met the ground on their way down (C50)."""
+        """Notes which feet have met the ground on their way down (C51)."""
         if self.compliant is not None:
             falling = self.paths.swinging & (self._now.feet.rise < 0.0)
             self.paths.met = falling & self.compliant.laws.meets()
 
     def _waits(self) -> bool:
-        """Returns whether the gait clock waits for feet at the ends of their swings (C49)."""
+        """Returns whether the gait clock waits for feet at the ends of their swings (C50)."""
         if self.compliant is None:
             return False
         landing = self.paths.landing(self._at)
@@ -338,7 +338,7 @@ class Controller(Stateful):
         shown.planned[...] = self._show_planned()
 
     def _correct_paths(self, paper: Paper, measurement: Measurement) -> None:
-        """Corrects the paths by the foot forces, and the joint commands with them (C46 to C48)."""
+        """Corrects the paths by the foot forces, and the joint commands with them (C47 to C49)."""
         now, out, shown = self._now, self._out, self.diagnostics
         paper.step(sense(measurement, now.posture), self.paths.swinging)
         joints = paper.actuate(self.legs, self._planned_feet(), now.posture)

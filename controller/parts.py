@@ -24,7 +24,7 @@ class Parts:
     fallback: bool = True
     # weight of the servos' torques against the feet's use of friction in the planned squeeze, in
     # [0, 1): a part of `support`
-    squeeze: float = 0.48
+    squeeze: float = 0.75
 
 
 SWITCHES = tuple(item.name for item in fields(Parts) if item.name != "squeeze")

@@ -23,7 +23,7 @@ from typing import NamedTuple
 import numpy as np
 
 from hexapod_cosim.controller.comply.foot_law import FootLaw
-from hexapod_cosim.controller.comply.slip_pid import LOAD_FLOOR, squeeze
+from hexapod_cosim.controller.comply.slip_pid import LOAD_FLOOR, beyond_plan, squeeze
 from hexapod_cosim.controller.comply.support import Shares
 from hexapod_cosim.controller.gains import TRIPOD_LEGS, Gains
 from hexapod_cosim.controller.memory import Stateful
@@ -211,7 +211,8 @@ class Compliance(Stateful):
         """
         total = float(force[self.touching, 2].sum())
         high = plan.height > self.high + met
-        doubted = self.watch.look(self.touching, total, plan.standing, high)
+        due = plan.standing | plan.awaited
+        doubted = self.watch.look(self.touching, total, due, high)
         self.doubted = doubted | (np.count_nonzero(doubted) >= TRIPOD_LEGS)
         self.fallback = self.doubted | (self.trust < 1.0)
         return self._replace_forces(plan, force) if doubted.any() else force
@@ -272,7 +273,7 @@ class Compliance(Stateful):
         self.fallback = self.doubted | (goal == 0.0)
 
     def _law_inputs(self, plan: Plan, force: Array) -> tuple[Plane, Array, float]:
-        """Returns the squeeze (6,), the normal forces (6,) and their sum [N] (C24)."""
+        """Returns the squeeze (6,), the normal forces (6,) and their sum [N] (C24, C46)."""
         horizontal = force[:, 0] + 1j * force[:, 1]
         felt = np.where(self.touching, horizontal - self.scale * plan.shares.push, 0.0)
         normal = np.where(self.touching, force[:, 2], 0.0)
@@ -282,7 +283,8 @@ class Compliance(Stateful):
             self._update_trust(plan, drag)
         if not self.parts.slip_pid:
             return np.zeros(LEGS, dtype=np.complex128), normal, total
-        return squeeze(felt, normal, plan.feet), normal, total
+        planned = np.where(self.touching, self.scale * plan.shares.squeeze, 0.0)
+        return beyond_plan(squeeze(felt, normal, plan.feet), planned), normal, total
 
     def _update_lean(self, plan: Plan, normal: Array, total: float) -> None:
         """Updates the distance of the centre of mass from the modelled one (C44).
@@ -392,7 +394,7 @@ class Compliance(Stateful):
         self._limit_joints(bend * self.trust, (torque + plan.own) * self.trust)
 
     def meets(self) -> Mask:
-        """Returns the feet (6,) that have met the ground on their way down (C50).
+        """Returns the feet (6,) that have met the ground on their way down (C51).
 
         A sensor that is doubted is left out.
         """
@@ -401,7 +403,7 @@ class Compliance(Stateful):
         return self.touching & ~self.doubted
 
     def waits(self, landing: Mask, *, held: bool) -> bool:
-        """Returns whether the gait clock waits for the feet of legs that end their swing (C49).
+        """Returns whether the gait clock waits for the feet of legs that end their swing (C50).
 
         landing: (6,) these legs; held: it waits already.
         """

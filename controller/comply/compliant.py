@@ -122,7 +122,9 @@ class Compliant(Stateful):
         )
         self.hold = Hold(gains.hold, parts, period=period)
         self.warmth = Warmth(
-            rating=robot.servo.torque_continuous, squeeze=parts.squeeze, period=period
+            rating=robot.servo.torque_continuous,
+            squeeze=parts.squeeze if parts.support else 0.0,
+            period=period,
         )
         self.stance: Stance
         self.reset()

@@ -2,9 +2,9 @@
 
 Section 3 of the paper adds a correction of the foot position to the trajectory of each leg and
 computes the joint angles again by inverse kinematics. The tangential correction is a PID of the
-tangential contact force (C46); the normal one is the deflection of a virtual suspension under the
-normal contact force (C47). There is nothing else: no plan of the loads, no torques, no posture.
-The paper states these laws in words only, so that C46 to C48 are their plainest form.
+tangential contact force (C47); the normal one is the deflection of a virtual suspension under the
+normal contact force (C48). There is nothing else: no plan of the loads, no torques, no posture.
+The paper states these laws in words only, so that C47 to C49 are their plainest form.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ class Paper(Stateful):
         self.lift, self.rate = np.zeros((2, LEGS))
 
     def _yield_sideways(self, force: Plane, swinging: Mask) -> None:
-        """Updates the shifts for tangential forces (6,) [N] (C46).
+        """Updates the shifts for tangential forces (6,) [N] (C47).
 
         The length of a shift is limited, and its integral follows the limited value. The integral
         of a swinging foot decays, so that the foot lands where its trajectory ends.
@@ -62,7 +62,7 @@ class Paper(Stateful):
         self.pid.integral = kept * (self.pid.integral + self.tracking * (self.shift - wanted))
 
     def _yield_upwards(self, force: Array) -> None:
-        """Updates the deflections of the suspensions for normal forces (6,) [N] (C47)."""
+        """Updates the deflections of the suspensions for normal forces (6,) [N] (C48)."""
         z, rate, a, b = self.lift, self.rate, self.a, self.b
         lift = a[0, 0] * z + a[0, 1] * rate + b[0] * force
         self.rate = a[1, 0] * z + a[1, 1] * rate + b[1] * force
@@ -70,7 +70,7 @@ class Paper(Stateful):
         self.lift = clamp(lift, -self.deepest, self.deepest)
 
     def actuate(self, legs: LegSolver, feet: Feet, posture: Posture) -> Joints:
-        """Returns the joints that put the feet on their corrected trajectories (C48).
+        """Returns the joints that put the feet on their corrected trajectories (C49).
 
         feet: planned ones in the walking frame; posture: of the torso.
         """

@@ -95,4 +95,5 @@ class PlannedSqueeze:
         arm = feet - (normal @ feet) / max(normal.sum(), LEAST_LOAD)
         change = self._wanted(demand, normal, yielding) - shares.push
         change = self._balance(change, arm, yielding)
-        return shares._replace(push=shares.push + self._limit(shares, change) * change)
+        change = self._limit(shares, change) * change
+        return shares._replace(push=shares.push + change, squeeze=change)

@@ -13,7 +13,7 @@ import numpy as np
 
 from hexapod_cosim.controller.gains import SlipGains
 from hexapod_cosim.controller.memory import Stateful
-from hexapod_cosim.controller.plane import LEGS, Array, Plane
+from hexapod_cosim.controller.plane import LEGS, Array, Plane, along, square
 
 LOAD_FLOOR = 1e-6  # N    a smaller sum of loads cannot be divided by
 LEAST_SPREAD = 1e-4  # m2    mean square distance of the feet from their centre: below it no twist
@@ -39,6 +39,19 @@ def squeeze(push: Plane, normal: Array, feet: Plane) -> Plane:
     spread = np.vdot(arm, carried).real
     turn = np.vdot(arm, push).imag / spread if spread >= LEAST_SPREAD else 0.0
     return np.asarray(push - (push.sum() * share + 1j * turn * carried))
+
+
+def beyond_plan(found: Plane, planned: Plane) -> Plane:
+    """Subtracts from a squeeze the part of the planned one that it contains (C46).
+
+    The PID then reduces squeeze that is not planned, and does not build up planned squeeze that
+    has been lost to creep. found: (6,) squeeze above the planned one [N]; planned: (6,) [N].
+    """
+    whole = square(planned).sum()
+    if whole <= LOAD_FLOOR:
+        return found
+    missing = -along(planned, found).sum() / whole  # share of the planned squeeze
+    return np.asarray(found + min(max(missing, 0.0), 1.0) * planned)
 
 
 class SlipPid(Stateful):

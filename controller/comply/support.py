@@ -32,6 +32,7 @@ class Shares(NamedTuple):
     activation: Array  # 1    in [0, 1]
     normal: Array  # N    vertical, never negative
     push: Plane  # N    horizontal, x + i y
+    squeeze: Plane  # N    the part of `push` by which the legs squeeze each other (C42)
 
     def forces(self) -> Array:
         """Returns the forces (6, 3) [N]."""
@@ -127,4 +128,5 @@ class Support:
         turn = 0.0
         if spread >= LEAST_SPREAD:
             turn = (demand.twist - across(centre, demand.push)) / spread
-        return Shares(activation, normal, part * (demand.push + 1j * turn * arm))
+        push = part * (demand.push + 1j * turn * arm)
+        return Shares(activation, normal, push, np.zeros_like(push))

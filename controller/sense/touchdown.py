@@ -3,7 +3,7 @@
 A foot that meets the ground before its path ends keeps the height of its contact through its
 stance. A foot that finds no ground at the end of its path moves down at a fixed speed to a limit.
 In the next swing these offsets decay.
-A foot for which the gait clock waits searches at the same speed (C49).
+A foot for which the gait clock waits searches at the same speed (C50).
 """
 
 from __future__ import annotations

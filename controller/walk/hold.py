@@ -21,7 +21,7 @@ from hexapod_cosim.controller.parts import Parts
 from hexapod_cosim.controller.plane import LEGS, Array, Plane, cis, clamp
 
 LOOK_TIME = 0.04  # s    between two looks, at least a period
-LOADED = 0.3  # 1    thirds of the weight; a foot with more load does not slide
+LOADED = 0.4  # 1    thirds of the weight; a foot with more load does not slide
 DETERMINANT_FLOOR = 1e-6  # m4    feet on one line determine no plane
 
 

@@ -235,7 +235,7 @@ class FootPaths(Stateful):
         return np.asarray(clock - np.floor(clock))
 
     def _reached(self, number: int) -> int:
-        """Returns the periods on the gait clock `number` periods after the section began (C49)."""
+        """Returns the periods on the gait clock `number` periods after the section began (C50)."""
         return self.before if self.held else self.before + number
 
     def _rest(self, plane: Plane) -> PlannedFeet:
@@ -370,7 +370,7 @@ class FootPaths(Stateful):
         return np.asarray(self.swinging & stands)
 
     def hold(self, now: PlannedFeet, number: int, *, twist: Twist) -> PlannedFeet:
-        """Begins a section in which the gait clock stands still while the body moves on (C49).
+        """Begins a section in which the gait clock stands still while the body moves on (C50).
 
         Arguments and result are those of plan().
         """
@@ -420,7 +420,7 @@ class FootPaths(Stateful):
         goal = np.where(free, way + cis(turn) * self._landing(tau, twist), before.goal)
         left = np.maximum(1.0 - before.blend, NEARLY_DONE)
         pull = before.pull + (goal - before.goal) / left
-        # a foot stays where it met the ground (C50)
+        # a foot stays where it met the ground (C51)
         goal = np.where(self.met, self._ground_of(before), goal)
         pull = np.where(self.met, 0.0, pull)
         feet = before._replace(phase=phase, goal=goal, pull=pull, way=way, turn=turn, twist=twist)

@@ -316,7 +316,7 @@ static const hxControllerDefinition default_definition = {
     .gains.paper_suspension.damping = 388.5927090531717,
     .gains.paper_suspension.stiffness = 6104.0,
     .gains.paper_suspension.limit = 0.015,
-    .parts.squeeze = 0.48,
+    .parts.squeeze = 0.75,
     .friction = 0.7,
     .servo.torque_continuous = 1.2,
 };

@@ -94,7 +94,7 @@ static void plan_step(const hxControllerModel *model, const hxControllerState *s
   lay_out(model, &state->paths, step);
 }
 
-/* Notes which feet have met the ground on their way down (C50). */
+/* Notes which feet have met the ground on their way down (C51). */
 static void note_contacts(const hxControllerModel *model, hxControllerState *state) {
   const hxPlannedFeet *feet = &step_at(state, 0)->feet;
   hxFootPaths *paths = &state->paths;
@@ -103,7 +103,7 @@ static void note_contacts(const hxControllerModel *model, hxControllerState *sta
                     hx_compliance_meets(&model->laws.laws, k, &state->compliant.laws);
 }
 
-/* Returns whether the gait clock waits for feet at the ends of their swings (C49). */
+/* Returns whether the gait clock waits for feet at the ends of their swings (C50). */
 static int waits(const hxControllerModel *model, const hxControllerState *state) {
   int landing[HX_LEGS];
   if (!model->compliant) return 0;
@@ -209,7 +209,7 @@ static void follow_paths(const hxControllerModel *model, hxControllerState *stat
   }
 }
 
-/* Corrects the paths by the foot forces, and the joint commands with them (C46 to C48). */
+/* Corrects the paths by the foot forces, and the joint commands with them (C47 to C49). */
 static void correct_paths(const hxControllerModel *model, const hxControllerInput *input,
                           hxControllerState *state) {
   const hxPosture *posture = &step_at(state, 0)->posture;

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import typer
 
@@ -18,6 +18,10 @@ from hexapod_cosim.cosim.common.files import not_writable
 from hexapod_cosim.cosim.export.robot_package import SUFFIX as PACKAGE_SUFFIX
 from hexapod_cosim.cosim.validate.validation import find_problems
 from hexapod_cosim.models import FmuError, HexapodError, load_robot
+from hexapod_cosim.models.robot import robot_path
+
+if TYPE_CHECKING:
+    from hexapod_cosim.cosim.design.stance import StanceDesign
 
 MacroStep = Annotated[
     float, typer.Option("--period", "--macro-step", help="Period of the controller [s].")
@@ -34,6 +38,10 @@ RequirementSettings = Annotated[
 DesignFolder = Annotated[
     Path | None,
     typer.Option("-o", "--output", metavar="DIR", help="Where to write; default out/design."),
+]
+StanceFlag = Annotated[
+    bool,
+    typer.Option("--stance", help="Find the stance of least heat first, and write its robot file."),
 ]
 
 
@@ -86,6 +94,7 @@ def design(
     robot: RobotName = "athena",
     macro_step: MacroStep = DEFAULT_PERIOD,
     settings: RequirementSettings = None,
+    stance: StanceFlag = False,
     output: DesignFolder = None,
     json: Json = False,
 ) -> None:
@@ -95,7 +104,10 @@ def design(
     from hexapod_cosim.cosim.design.design import examine_stances, read_requirements  # noqa: PLC0415
     from hexapod_cosim.cosim.design.design_check import check_design  # noqa: PLC0415
 
-    loaded, folder = load_robot(robot), output or Path("out") / "design"
+    loaded, folder, files = load_robot(robot), output or Path("out") / "design", list[Path]()
+    found = design_stance(robot, folder) if stance else None
+    if found is not None:
+        files, loaded = [found.file], found.design.robot
     requirements = read_requirements(settings or [], loaded)
     plants, left_out = examine_stances(loaded, macro_step)
     gains = design_gains(
@@ -105,15 +117,68 @@ def design(
     try:
         folder.mkdir(parents=True, exist_ok=True)
         gains_file = save_gains(gains, folder / "gains.toml")
-        files = [gains_file, *plot_design(loaded, gains, plants, folder)]
+        files += [gains_file, *plot_design(loaded, gains, plants, folder)]
     except OSError as error:
         raise not_writable(folder, error) from error
     if json:
         names = [str(file) for file in files]
-        show_json({"gains": asdict(gains), "check_error": deviation, "files": names})
+        content = {"gains": asdict(gains), "check_error": deviation, "files": names}
+        show_json(content if found is None else content | {"stance": stance_json(found.design)})
     else:
+        if found is not None:
+            show_table(["stance", "before", "after"], stance_rows(found.design), right=(1, 2))
         _show_design(gains, deviation)
         show_files(files)
+
+
+class FoundStance(NamedTuple):
+    """A stance and the robot file that it is written to."""
+
+    design: StanceDesign
+    file: Path
+
+
+def design_stance(robot: str, folder: Path) -> FoundStance:
+    """Finds the stance of least heat of a robot and writes NAME_stance.toml into a folder.
+
+    The robot of the result is that of the written file. Raises GainsError.
+    """
+    from hexapod_cosim.cosim.design.stance import find_stance, write_robot  # noqa: PLC0415
+
+    loaded = load_robot(robot)
+    found, name = find_stance(loaded), f"{loaded.name}_stance"
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        file = write_robot(
+            robot_path(robot), found.robot, folder / f"{name}.toml", name=name
+        )
+    except OSError as error:
+        raise not_writable(folder, error) from error
+    return FoundStance(replace(found, robot=load_robot(file)), file)
+
+
+def stance_rows(found: StanceDesign) -> list[tuple[str, str, str]]:
+    """Returns the rows of the table of a stance: name, value of the robot's own, value found."""
+    before, after = found.before, found.after
+    rows = (
+        ("feet further out [mm]", 0.0, 1e3 * found.outward),
+        ("torso higher [mm]", 0.0, 1e3 * found.deeper),
+        ("heat, sum of squared torques [N2 m2]", before.heat, after.heat),
+        ("hottest servo, RMS [N m]", before.hottest, after.hottest),
+        ("distance from tipping, over the height [1]", before.firmness, after.firmness),
+        ("fastest joint [rad/s]", before.speed, after.speed),
+    )
+    return [(name, f"{first:.4g}", f"{second:.4g}") for name, first, second in rows]
+
+
+def stance_json(found: StanceDesign) -> dict[str, Any]:
+    """Returns what --json prints of a stance."""
+    return {
+        "outward": found.outward,
+        "deeper": found.deeper,
+        "before": asdict(found.before),
+        "after": asdict(found.after),
+    }
 
 
 def _show_design(gains: Gains, deviation: float) -> None:

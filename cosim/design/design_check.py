@@ -43,8 +43,13 @@ class DesignCheck:
 class FeetLaws:
     """Both control laws of the standing feet, with present loads and angles and delayed forces."""
 
-    def __init__(self, robot: Robot, laws: Laws, standing: Places, force: Array) -> None:
-        """standing: indices of the standing legs (n,); force: at rest (n, 3) [N]."""
+    def __init__(
+        self, robot: Robot, laws: Laws, standing: Places, force: Array, factors: Array | float
+    ) -> None:
+        """standing: indices of the standing legs (n,); force: at rest (n, 3) [N]; factors: on the
+        answers of the feet, (n,) or one for all.
+        """
+        self._factors = np.broadcast_to(factors, len(standing))[:, None]
         self._legs, self._kp = LegSolver(robot), robot.servo.kp
         self._share, self._standing = weight_share(robot), standing
         self._rest, (self._pid, self._spring) = force[:, 2], laws.systems
@@ -70,7 +75,8 @@ class FeetLaws:
         self._bounce = spring.A @ self._bounce + spring.B * excess
         load = np.minimum(force[:, 2] / self._share, LARGEST_LOAD)
         vertical = (self.jacobian(angle)[:, 2] ** 2).sum(axis=1) / self._kp
-        return np.column_stack([load[:, None] * answer.reshape(-1, 2), lift[0] / vertical])
+        yielded = np.column_stack([load[:, None] * answer.reshape(-1, 2), lift[0] / vertical])
+        return np.asarray(self._factors * yielded)
 
     def jacobian(self, angle: Array) -> Array:
         """Returns the Jacobians of the standing legs (n, 3, 3)."""
@@ -84,12 +90,18 @@ class FeetLaws:
 
 
 def check_design(
-    robot: Robot, gains: Gains, *, stance: str | None = None, squeeze: float | None = None
+    robot: Robot,
+    gains: Gains,
+    *,
+    stance: str | None = None,
+    squeeze: float | None = None,
+    factors: Array | float = 1.0,
 ) -> DesignCheck:
     """Simulates how both control laws remove a squeeze, in the FMU and in the linear closed loop.
 
     A force makes the standing legs splay. stance: by default the first in which the robot stands;
-    squeeze [N]: by default SQUEEZE times a third of the weight.
+    squeeze [N]: by default SQUEEZE times a third of the weight; factors: on the answers of the
+    standing feet in the FMU, which the prediction does not have.
     """
     period = gains.period
     laws = Laws(
@@ -111,7 +123,7 @@ def check_design(
             fmu, robot, coulomb_friction=friction, slope=robot.friction.slope, period=period
         )
         bench.start(motion, inputs)
-        feet = FeetLaws(robot, laws, places, plant.force[places])
+        feet = FeetLaws(robot, laws, places, plant.force[places], factors)
         disturbance = np.outer(force * rising(time), push).reshape(len(time), -1, 3)
         simulated = _run(bench, feet, inputs, disturbance, places)
     seen = (simulated - simulated[0]).reshape(len(time), -1) @ push / -force

@@ -1,9 +1,9 @@
 """Finds the stance in which the servos of a walking robot heat up least.
 
 Two lengths are varied, the same for all legs: how far the feet stand out from the hips, and how
-deep below them. The heat is the mean sum of squared servo torques over a cycle of the robot's gait
+deep below them, the latter by no more than 15 % of the torso's height. The heat is the mean sum of squared servo torques over a cycle of the robot's gait
 at its stride, at the planned loads (C19, C20, C42) and without accelerations. A stance is allowed
-when the legs reach all steps of the gait with a reserve, no joint needs more than the speed limit
+when the legs reach all steps of the gait with a reserve and lift their feet, no joint needs more than the speed limit
 or its present speed, neighbouring feet keep apart, and the robot stands as firmly as its own stance
 or a quarter of gravity sideways requires.
 """
@@ -35,7 +35,6 @@ from hexapod_cosim.controller.plane import cis
 from hexapod_cosim.controller.size import requirements_for
 from hexapod_cosim.controller.walk.inverse_dynamics import InverseDynamics, Neighbours
 from hexapod_cosim.models import JOINT_NAMES, LEG_NAMES, ReachError, Robot
-
 from hexapod_cosim.models.records import Array
 
 PHASES = 24  # moments of a gait cycle at which loads are computed
@@ -44,6 +43,8 @@ RESERVE = 1.25  # 1    stride that the legs must reach, over that of the gait
 SPEED_SHARE = 0.8  # 1    of a servo's largest speed that a walk may need
 FIRMNESS = 0.25  # 1    distance of the centre of mass from the polygon's edge, of its height
 APART = 4.0  # 1    radii of a foot between the ranges of neighbouring feet
+LIFTED = 0.5  # 1    of the step height, by which a foot can be lifted at least
+HIGHER = 0.15  # 1    of the depth of the ground: most change of the torso's height
 FIRST_STEP, LAST_STEP = 0.16, 0.01  # 1    of the depth of the ground: sizes of the search's steps
 
 
@@ -54,7 +55,8 @@ class Walked:
     heat: float  # N2 m2    mean over the cycle of the sum of squared torques
     hottest: float  # N m    largest RMS torque of a servo
     firmness: float  # 1    least distance from the edge of the feet's polygon, over the height
-    speed: float  # rad/s    largest speed of a joint; infinite where a leg does not reach
+    speed: float  # rad/s    largest speed of a joint; infinite where a standing leg does not reach
+    lifts: bool  # the joints can lift each foot by half the step height, anywhere on its way
 
 
 @dataclass(frozen=True)
@@ -108,6 +110,8 @@ def _best_neighbour(
     found = None
     for out, down in ((1, 0), (-1, 0), (0, 1), (0, -1), (1, 1), (1, -1), (-1, 1), (-1, -1)):
         there = (place[0] + out * size, place[1] + down * size)
+        if abs(there[1]) > HIGHER * _depth(robot):
+            continue
         try:
             moved = with_stance(robot, *there)
         except ReachError:
@@ -122,7 +126,10 @@ def _allowed(robot: Robot, gait: Gait, loads: Walked, before: Walked) -> bool:
     """Returns whether a stance is as firm, as slow and as free of its neighbours as required."""
     firm = min(FIRMNESS, before.firmness)
     fast = max(SPEED_SHARE * robot.servo.speed_max, before.speed)
-    return loads.firmness >= firm and loads.speed <= fast and _gap(robot, gait) >= 0.0
+    lifts = loads.lifts or not before.lifts
+    return (
+        lifts and loads.firmness >= firm and loads.speed <= fast and _gap(robot, gait) >= 0.0
+    )
 
 
 def with_stance(robot: Robot, outward: float, deeper: float) -> Robot:
@@ -148,8 +155,13 @@ def walked(robot: Robot, gait: Gait) -> Walked:
     """Returns the loads of a robot's stance on a straight walk at its stride."""
     torques, firmness = _loads(robot, gait)
     squares = (torques * torques).mean(axis=0)
-    speed = _largest_speed(robot, gait)
-    return Walked(float(squares.sum()), float(np.sqrt(squares.max())), firmness, speed)
+    return Walked(
+        heat=float(squares.sum()),
+        hottest=float(np.sqrt(squares.max())),
+        firmness=firmness,
+        speed=_largest_speed(robot, gait),
+        lifts=_lifts(robot, gait),
+    )
 
 
 def _depth(robot: Robot) -> float:
@@ -220,15 +232,24 @@ def _gap(robot: Robot, gait: Gait) -> float:
     return float(min(np.abs(np.diff(feet[:3])).min(), np.abs(np.diff(feet[3:])).min()) - needed)
 
 
+def _lifts(robot: Robot, gait: Gait) -> bool:
+    """Returns whether the joints can lift each foot anywhere on its way (`Walked`)."""
+    legs = LegSolver(robot)
+    home, way = legs.forward(robot.stance), RESERVE * robot.gait.stride * gait.duty
+    plane = home[:, 0] + 1j * home[:, 1] + way * np.array([[-0.5], [0.0], [0.5]])
+    pose = legs.pose(plane, home[:, 2] + LIFTED * gait.step_height + np.zeros((3, 1)))
+    return not legs.solve(pose, np.zeros_like(plane), np.zeros(plane.shape)).unreachable.any()
+
+
 def _largest_speed(robot: Robot, gait: Gait) -> float:
     """Returns the largest joint speed of a settled walk [rad/s], infinite beyond a leg's reach."""
     period = gait.period / STEPS
     controller = Controller(robot, period=period, gait=gait)
     command = BodyCommand(vx=RESERVE * robot.gait.stride / gait.period)
-    measured, largest = Measurement(), 0.0
+    measured, largest, shown = Measurement(), 0.0, controller.diagnostics
     for step in range(3 * STEPS):
         speed = controller.step(step * period, command, measured).speed_ref
-        if (controller.diagnostics.unreachable & ~controller.diagnostics.swinging).any():
+        if (shown.unreachable & ~shown.swinging).any():
             return float("inf")
         largest = max(largest, float(np.abs(speed).max())) if step >= 2 * STEPS else 0.0
     return largest

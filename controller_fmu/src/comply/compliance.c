@@ -110,13 +110,14 @@ static void replace_forces(const hxPlan *plan, double force[HX_LEGS][3], hxCompl
  * heights at which the feet meet the ground without a bump [m]. */
 static void judge_sensors(const hxComplianceModel *model, const hxPlan *plan,
                           const double met[HX_LEGS], double force[HX_LEGS][3], hxCompliance *laws) {
-  int high[HX_LEGS], doubted = 0;
+  int high[HX_LEGS], due[HX_LEGS], doubted = 0;
   double total = 0.0;
   for (int leg = 0; leg < HX_LEGS; ++leg) {
     high[leg] = plan->height[leg] > model->high + met[leg];
+    due[leg] = plan->standing[leg] || plan->awaited[leg];
     total += laws->touching[leg] ? force[leg][2] : 0.0;
   }
-  hx_sensor_watch_look(&model->watch, laws->touching, total, plan->standing, high, &laws->watch);
+  hx_sensor_watch_look(&model->watch, laws->touching, total, due, high, &laws->watch);
   for (int leg = 0; leg < HX_LEGS; ++leg) doubted += laws->watch.left[leg] > 0.0;
   for (int leg = 0; leg < HX_LEGS; ++leg) {
     laws->doubted[leg] = doubted >= HX_TRIPOD_LEGS || laws->watch.left[leg] > 0.0;
@@ -188,11 +189,12 @@ static void update_trust(const hxComplianceModel *model, const hxPlan *plan, dou
   for (int leg = 0; leg < HX_LEGS; ++leg) laws->fallback[leg] = laws->doubted[leg] || goal == 0.0;
 }
 
-/* Computes the measured squeeze and normal forces (C24), and returns the sum of the latter [N]. */
+/* Computes the measured squeeze and normal forces (C24, C46), and returns the sum of the latter
+ * [N]. */
 static double law_inputs(const hxComplianceModel *model, const hxPlan *plan,
                          const double force[HX_LEGS][3], hxPlane push[HX_LEGS],
                          double normal[HX_LEGS], hxCompliance *laws) {
-  hxPlane common = {0.0, 0.0};
+  hxPlane common = {0.0, 0.0}, planned[HX_LEGS];
   double total = 0.0;
   for (int leg = 0; leg < HX_LEGS; ++leg) {
     const double touching = laws->touching[leg] ? 1.0 : 0.0;
@@ -206,6 +208,9 @@ static double law_inputs(const hxComplianceModel *model, const hxPlan *plan,
   if (model->parts.fallback)
     update_trust(model, plan, total > model->settled ? hx_length(common) * share : 0.0, laws);
   hx_squeeze(normal, plan->feet, push);
+  for (int leg = 0; leg < HX_LEGS; ++leg)
+    planned[leg] = hx_scaled(plan->shares.squeeze[leg], laws->touching[leg] ? laws->scale : 0.0);
+  hx_beyond_plan((const hxPlane *)planned, push);
   for (int leg = 0; leg < HX_LEGS && !model->parts.slip_pid; ++leg) push[leg] = hx_plane(0.0, 0.0);
   return total;
 }

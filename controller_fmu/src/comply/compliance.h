@@ -84,10 +84,10 @@ void hx_compliance_reset(hxCompliance *laws);
 void hx_compliance_plan(const hxComplianceModel *model, const hxDemand *demand,
                         const double height[HX_LEGS], const double rise[HX_LEGS], hxPlan *plan);
 
-/* Returns whether a foot on its way down has met the ground, and not a sensor that lies (C50). */
+/* Returns whether a foot on its way down has met the ground, and not a sensor that lies (C51). */
 int hx_compliance_meets(const hxComplianceModel *model, int leg, const hxCompliance *laws);
 
-/* Returns whether the gait clock waits for the feet of legs that end their swing (C49). held: it
+/* Returns whether the gait clock waits for the feet of legs that end their swing (C50). held: it
  * waits already. */
 int hx_compliance_waits(const hxComplianceModel *model, const int landing[HX_LEGS], int held,
                         const hxCompliance *laws);

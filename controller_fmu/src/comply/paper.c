@@ -1,5 +1,7 @@
 #include "paper.h"
 
+#include "../plane.h"
+
 void hx_paper_compile(const hxControllerDefinition *definition, hxPaperModel *model) {
   const hxGains *gains = &definition->gains;
   model->parts = definition->parts;
@@ -12,13 +14,13 @@ void hx_paper_compile(const hxControllerDefinition *definition, hxPaperModel *mo
   hx_suspension_discretise(gains->paper_suspension.mass, gains->paper_suspension.damping,
                            gains->paper_suspension.stiffness, definition->period,
                            &model->suspension);
-  model->memory = exp(-definition->period / gains->paper_slip.load_time);
+  model->memory = hx_decay(-definition->period / gains->paper_slip.load_time);
   model->tracking = fmin(definition->period / gains->paper_slip.tracking_time, 1.0);
   model->farthest = gains->paper_slip.limit;
   model->deepest = gains->paper_suspension.limit;
 }
 
-/* Updates the shift of a foot for a tangential force [N] (C46). The length of the shift is limited,
+/* Updates the shift of a foot for a tangential force [N] (C47). The length of the shift is limited,
  * and its integral follows the limited value; that of a swinging foot decays. */
 static void yield_sideways(const hxPaperModel *model, hxPlane force, int swinging, int k,
                            hxPaper *paper) {
@@ -26,13 +28,13 @@ static void yield_sideways(const hxPaperModel *model, hxPlane force, int swingin
                           hx_slip_pid_step(&model->pid, force.y, &paper->y[k])};
   const double kept = swinging ? model->memory : 1.0;
   const hxPlane shift =
-      hx_scaled(wanted, model->farthest / fmax(hypot(wanted.x, wanted.y), model->farthest));
+      hx_scaled(wanted, model->farthest / fmax(hx_length(wanted), model->farthest));
   paper->shift[k] = shift;
   paper->x[k].integral = kept * (paper->x[k].integral + model->tracking * (shift.x - wanted.x));
   paper->y[k].integral = kept * (paper->y[k].integral + model->tracking * (shift.y - wanted.y));
 }
 
-/* Updates the deflection of a suspension for a normal force [N] (C47). */
+/* Updates the deflection of a suspension for a normal force [N] (C48). */
 static void yield_upwards(const hxPaperModel *model, double force, int k, hxPaper *paper) {
   const hxSuspension *s = &model->suspension;
   const double z = paper->lift[k], rate = paper->rate[k],

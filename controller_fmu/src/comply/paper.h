@@ -29,12 +29,12 @@ typedef struct hxPaper {
 void hx_paper_compile(const hxControllerDefinition *definition, hxPaperModel *model);
 
 /* Computes the joint angles [rad] and speeds [rad/s] that put a foot on its corrected trajectory
- * (C48), and returns whether the foot misses it. The planned foot is in the walking frame. */
+ * (C49), and returns whether the foot misses it. The planned foot is in the walking frame. */
 int hx_paper_actuate(const hxPaper *paper, const hxLegSolver *leg, int k, const hxPosture *posture,
                      hxPlane plane, double height, hxPlane velocity, double rise,
                      double angle[HX_JOINTS], double speed[HX_JOINTS]);
 
-/* Advances the corrections by one period (C46, C47). force: of the ground on the feet, walking
+/* Advances the corrections by one period (C47, C48). force: of the ground on the feet, walking
  * frame [N]; swinging: legs planned in the air. */
 void hx_paper_step(const hxPaperModel *model, const double force[HX_LEGS][3],
                    const int swinging[HX_LEGS], hxPaper *paper);

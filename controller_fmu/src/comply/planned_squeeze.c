@@ -103,6 +103,8 @@ void hx_planned_squeeze_add(const hxPlannedSqueeze *model, const hxPlane feet[HX
   }
   balance(arm, (const double (*)[3])B, change);
   const double factor = limit(model, shares, change);
-  for (int k = 0; k < HX_LEGS; ++k)
-    shares->push[k] = hx_plane_add(shares->push[k], hx_scaled(change[k], factor));
+  for (int k = 0; k < HX_LEGS; ++k) {
+    shares->squeeze[k] = hx_scaled(change[k], factor);
+    shares->push[k] = hx_plane_add(shares->push[k], shares->squeeze[k]);
+  }
 }

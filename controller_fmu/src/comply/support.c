@@ -100,6 +100,7 @@ void hx_support_shares(const hxPlane feet[HX_LEGS], const hxDemand *demand, hxSh
   /* f_h = (f_n/sum f_n) (F_h + i w (p - c)) (C20) */
   const double w =
       spread < least_spread ? 0.0 : (demand->twist - hx_across(centre, demand->push)) / spread;
+  for (int k = 0; k < HX_LEGS; ++k) shares->squeeze[k] = hx_plane(0.0, 0.0);
   for (int k = 0; k < HX_LEGS; ++k)
     shares->push[k] =
         hx_scaled(hx_plane_add(demand->push, hx_plane(-w * arm[k].y, w * arm[k].x)), part[k]);

@@ -21,6 +21,7 @@ typedef struct hxShares {
   double activation[HX_LEGS]; /* 1  in [0, 1] */
   double normal[HX_LEGS]; /* N */
   hxPlane push[HX_LEGS]; /* N */
+  hxPlane squeeze[HX_LEGS]; /* N, the part of push by which the legs squeeze each other (C42) */
 } hxShares;
 
 /* Solves S x = b for symmetric, positive semidefinite S (00 01 02 11 12 22) by L D L^T; a ridge on

@@ -12,11 +12,12 @@ static const double easy = 0.8, hard = 1.0;
 static const double most_squeeze = 0.95; /* 1, weight of the torques when a servo is hot or short of torque */
 
 void hx_warmth_compile(const hxControllerDefinition *definition, hxWarmthModel *model) {
-  const double rating = definition->servo.torque_continuous, squeeze = definition->parts.squeeze;
+  const double rating = definition->servo.torque_continuous,
+               squeeze = definition->parts.support ? definition->parts.squeeze : 0.0;
   model->rating = rating * rating;
   model->squeeze = squeeze;
   model->more = squeeze > 0.0 ? fmax(most_squeeze - squeeze, 0.0) : 0.0;
-  model->follow = 1.0 - exp(-definition->period / heat_time);
+  model->follow = 1.0 - hx_decay(-definition->period / heat_time);
 }
 
 void hx_warmth_reset(const hxWarmthModel *model, hxWarmth *warmth) {

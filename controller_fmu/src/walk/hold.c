@@ -2,7 +2,7 @@
 
 static const double look_time = 0.04;          /* s, interval of the loops, at least a period */
 /* 1, in thirds of the weight: a foot with a larger load does not slip */
-static const double loaded = 0.3;
+static const double loaded = 0.4;
 static const double determinant_floor = 1e-6;  /* m4, feet on one line define no plane */
 static const double turn = 6.283185307179586;  /* rad */
 

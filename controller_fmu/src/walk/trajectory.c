@@ -126,7 +126,7 @@ static double phase_after(const hxFootPathsModel *model, int leg, int64_t number
   return clock - floor(clock);
 }
 
-/* Returns the periods on the gait clock `number` periods after the section began (C49). */
+/* Returns the periods on the gait clock `number` periods after the section began (C50). */
 static int64_t reached(const hxFootPaths *paths, int64_t number) {
   return paths->held ? paths->before : paths->before + number;
 }
@@ -323,7 +323,7 @@ void hx_foot_paths_walk(const hxFootPathsModel *model, const hxFootPaths *paths,
     const hxPlane moved = hx_scaled(hx_plane_sub(feet->goal[leg], before->goal[leg]),
                                     1.0 / (left < nearly_done ? nearly_done : left));
     feet->pull[leg] = hx_plane_add(before->pull[leg], moved);
-    if (paths->met[leg]) { /* the foot stays where it met the ground (C50) */
+    if (paths->met[leg]) { /* the foot stays where it met the ground (C51) */
       feet->goal[leg] = ground_of(before, leg);
       feet->pull[leg] = hx_plane(0.0, 0.0);
     }

@@ -106,7 +106,7 @@ void hx_foot_paths_plan(const hxFootPathsModel *model, const hxPlannedFeet *now,
 void hx_foot_paths_landing(const hxFootPathsModel *model, const hxFootPaths *paths, int64_t number,
                            int landing[HX_LEGS]);
 
-/* Begins a section in which the gait clock stands still while the body moves on (C49). Arguments
+/* Begins a section in which the gait clock stands still while the body moves on (C50). Arguments
  * are those of hx_foot_paths_plan. */
 void hx_foot_paths_hold(const hxFootPathsModel *model, const hxPlannedFeet *now, int64_t number,
                         hxTwist twist, hxFootPaths *paths, hxPlannedFeet *first);
