@@ -13,9 +13,10 @@ from hexapod_cosim.controller import make_gait
 from hexapod_cosim.cosim.results.comparison import Comparison, compare_runs
 from hexapod_cosim.cosim.results.summary import NO_FIGURES, REFUSED, Summary
 from hexapod_cosim.cosim.run.batch import run_batch
-from hexapod_cosim.cosim.scenario.records import CONTROLS, Scenario
+from hexapod_cosim.cosim.scenario.records import Scenario
 from hexapod_cosim.models import ScenarioError, load_robot
 
+COMPARED = ("kinematic", "compliant")  # the two controls of each comparison
 Progress = Callable[[int, int], None]  # runs done, of how many
 
 
@@ -49,7 +50,7 @@ def measure(
         (section, case, control)
         for section in sections
         for case in section.cases
-        for control in CONTROLS
+        for control in COMPARED
     ]
     plans: dict[str, Scenario] = {}
     wanted = [

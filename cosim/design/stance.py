@@ -127,9 +127,7 @@ def _allowed(robot: Robot, gait: Gait, loads: Walked, before: Walked) -> bool:
     firm = min(FIRMNESS, before.firmness)
     fast = max(SPEED_SHARE * robot.servo.speed_max, before.speed)
     lifts = loads.lifts or not before.lifts
-    return (
-        lifts and loads.firmness >= firm and loads.speed <= fast and _gap(robot, gait) >= 0.0
-    )
+    return lifts and loads.firmness >= firm and loads.speed <= fast and _gap(robot, gait) >= 0.0
 
 
 def with_stance(robot: Robot, outward: float, deeper: float) -> Robot:
@@ -174,9 +172,7 @@ def _loads(robot: Robot, gait: Gait) -> tuple[Array, float]:
     dynamics = InverseDynamics(robot, legs, period=1.0)  # the period is not used without motion
     timing = SupportGains(handover_time=needs.handover_time, weight_time=needs.weight_time)
     support = Support(robot, gait, timing, rest=dynamics.rest())
-    planned = PlannedSqueeze(
-        friction=robot.friction.mu, weight=robot.weight, depth=-dynamics.floor
-    )
+    planned = PlannedSqueeze(friction=robot.friction.mu, weight=robot.weight, depth=-dynamics.floor)
     home, level = legs.forward(robot.stance), Posture.of(np.zeros(3), np.zeros(3))
     torques, firmness = np.zeros((PHASES, len(home), 3)), np.inf
     for k in range(PHASES):

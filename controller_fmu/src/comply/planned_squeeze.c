@@ -77,8 +77,8 @@ static double limit(const hxPlannedSqueeze *model, const hxShares *shares,
   for (int k = 0; k < HX_LEGS; ++k) {
     const double most = most_friction * model->friction * shares->normal[k];
     if (shares->normal[k] > least_load)
-      factor = fmin(factor, (most - sqrt(hx_square(shares->push[k]))) /
-                                fmax(sqrt(hx_square(change[k])), least_push));
+      factor = fmin(factor, (most - hx_length(shares->push[k])) /
+                                fmax(hx_length(change[k]), least_push));
   }
   return fmax(factor, 0.0);
 }
