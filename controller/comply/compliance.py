@@ -92,8 +92,8 @@ class Compliance(Stateful):
 
     STATE = (
         "law", "detector", "watch", "touchdown", "landings", "burden", "bend", "torque", "shift",
-        "doubted", "fallback", "grip", "regaining", "scale", "lean", "trust", "lagging", "overspeed_share",
-        "slide_periods", "recovery_periods",
+        "doubted", "fallback", "grip", "regaining", "scale", "lean", "trust", "lagging",
+        "overspeed_share", "slide_periods", "recovery_periods",
     )  # fmt: skip
 
     def __init__(
