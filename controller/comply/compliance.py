@@ -90,8 +90,8 @@ class Compliance(Stateful):
 
     STATE = (
         "law", "detector", "watch", "touchdown", "landings", "burden", "bend", "torque", "shift",
-        "doubted", "fallback", "grip", "regaining", "scale", "lean", "trust", "lagging", "overspeed_share",
-        "slide_periods", "recovery_periods",
+        "doubted", "fallback", "grip", "regaining", "scale", "lean", "trust", "lagging",
+        "overspeed_share", "slide_periods", "recovery_periods",
     )  # fmt: skip
 
     def __init__(
@@ -283,7 +283,7 @@ class Compliance(Stateful):
         if not total > self.settled or not plan.weight > self.settled:
             return
         ahead = (normal @ plan.feet) / total - (plan.shares.normal @ plan.feet) / plan.weight
-        lean = self.lean + self.follow_cycle * ahead
+        lean = complex(self.lean + self.follow_cycle * ahead)
         self.lean = complex(
             min(max(lean.real, -self.most_lean), self.most_lean),
             min(max(lean.imag, -self.most_lean), self.most_lean),

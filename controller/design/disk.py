@@ -81,6 +81,4 @@ def all_feet(robot: Robot, plant: StandingPlant, laws: Laws) -> DiskMargin:
     """Returns the disk margin of all forces of all standing feet, both laws closed together."""
     omega = frequencies(laws.period, COUNT)
     law: control.StateSpace = compliant_law(robot, plant, laws)
-    return disk_margin(
-        -response(relieved(robot, plant), omega) @ response(law, omega), omega
-    )
+    return disk_margin(-response(relieved(robot, plant), omega) @ response(law, omega), omega)

@@ -149,9 +149,7 @@ def design_stance(robot: str, folder: Path) -> FoundStance:
     found, name = find_stance(loaded), f"{loaded.name}_stance"
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        file = write_robot(
-            robot_path(robot), found.robot, folder / f"{name}.toml", name=name
-        )
+        file = write_robot(robot_path(robot), found.robot, folder / f"{name}.toml", name=name)
     except OSError as error:
         raise not_writable(folder, error) from error
     return FoundStance(replace(found, robot=load_robot(file)), file)

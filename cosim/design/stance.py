@@ -1,11 +1,12 @@
 """Finds the stance in which the servos of a walking robot heat up least.
 
 Two lengths are varied, the same for all legs: how far the feet stand out from the hips, and how
-deep below them, the latter by no more than 15 % of the torso's height. The heat is the mean sum of squared servo torques over a cycle of the robot's gait
-at its stride, at the planned loads (C19, C20, C42) and without accelerations. A stance is allowed
-when the legs reach all steps of the gait with a reserve and lift their feet, no joint needs more than the speed limit
-or its present speed, neighbouring feet keep apart, and the robot stands as firmly as its own stance
-or a quarter of gravity sideways requires.
+deep below them, the latter by no more than 15 % of the torso's height. The heat is the mean sum of
+squared servo torques over a cycle of the robot's gait at its stride, at the planned loads (C19,
+C20, C42) and without accelerations. A stance is allowed when the legs reach all steps of the gait
+with a reserve and lift their feet, no joint needs more than the speed limit or its present speed,
+neighbouring feet keep apart, and the robot stands as firmly as its own stance or a quarter of
+gravity sideways requires.
 """
 
 from __future__ import annotations
@@ -35,7 +36,6 @@ from hexapod_cosim.controller.plane import cis
 from hexapod_cosim.controller.size import requirements_for
 from hexapod_cosim.controller.walk.inverse_dynamics import InverseDynamics, Neighbours
 from hexapod_cosim.models import JOINT_NAMES, LEG_NAMES, ReachError, Robot
-
 from hexapod_cosim.models.records import Array
 
 PHASES = 24  # moments of a gait cycle at which loads are computed
@@ -128,9 +128,7 @@ def _allowed(robot: Robot, gait: Gait, loads: Walked, before: Walked) -> bool:
     firm = min(FIRMNESS, before.firmness)
     fast = max(SPEED_SHARE * robot.servo.speed_max, before.speed)
     lifts = loads.lifts or not before.lifts
-    return (
-        lifts and loads.firmness >= firm and loads.speed <= fast and _gap(robot, gait) >= 0.0
-    )
+    return lifts and loads.firmness >= firm and loads.speed <= fast and _gap(robot, gait) >= 0.0
 
 
 def with_stance(robot: Robot, outward: float, deeper: float) -> Robot:
@@ -175,15 +173,13 @@ def _loads(robot: Robot, gait: Gait) -> tuple[Array, float]:
     dynamics = InverseDynamics(robot, legs, period=1.0)  # the period is not used without motion
     timing = SupportGains(handover_time=needs.handover_time, weight_time=needs.weight_time)
     support = Support(robot, gait, timing, rest=dynamics.rest())
-    planned = PlannedSqueeze(
-        friction=robot.friction.mu, weight=robot.weight, depth=-dynamics.floor
-    )
+    planned = PlannedSqueeze(friction=robot.friction.mu, weight=robot.weight, depth=-dynamics.floor)
     home, level = legs.forward(robot.stance), Posture.of(np.zeros(3), np.zeros(3))
     torques, firmness = np.zeros((PHASES, len(home), 3)), np.inf
     for k in range(PHASES):
         phase = gait.phase((k + 0.5) / PHASES)
         stands, along, lift = _steps(phase, gait, robot.gait.stride)
-        plane = home[:, 0] + 1j * home[:, 1] + along
+        plane = np.asarray(home[:, 0] + 1j * home[:, 1] + along, dtype=np.complex128)
         pose = legs.pose(plane, home[:, 2] + lift)
         masses = dynamics.place(pose, 0j, 0.0, level)
         alone = Neighbours((None, masses, None), (None, pose, None))
@@ -237,7 +233,8 @@ def _lifts(robot: Robot, gait: Gait) -> bool:
     """Returns whether the joints can lift each foot anywhere on its way (`Walked`)."""
     legs = LegSolver(robot)
     home, way = legs.forward(robot.stance), RESERVE * robot.gait.stride * gait.duty
-    plane = home[:, 0] + 1j * home[:, 1] + way * np.array([[-0.5], [0.0], [0.5]])
+    along = way * np.array([[-0.5], [0.0], [0.5]])
+    plane = np.asarray(home[:, 0] + 1j * home[:, 1] + along, dtype=np.complex128)
     pose = legs.pose(plane, home[:, 2] + LIFTED * gait.step_height + np.zeros((3, 1)))
     return not legs.solve(pose, np.zeros_like(plane), np.zeros(plane.shape)).unreachable.any()
 

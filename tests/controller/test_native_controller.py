@@ -15,12 +15,12 @@ from native_controller import COMMANDS, HxControllerInput, NativeController, Nat
 from scipy.linalg import expm
 
 from hexapod_cosim.controller import (
+    SWITCHES,
     BodyCommand,
     Controller,
     Gait,
     LegSolver,
     Measurement,
-    SWITCHES,
     Parts,
     make_gait,
 )

@@ -143,9 +143,7 @@ def test_on_ground_100_times_softer_or_with_2_3_times_the_weight_it_is_no_worse_
 @pytest.mark.usefixtures("plant_build")
 def test_with_three_times_the_weight_and_no_squeeze_it_is_kinematic_control() -> None:
     kinematic, compliant = (
-        walk(
-            "athena", control, "parameters.torso.mass=14", "compliance.squeeze=0", duration=6.0
-        )
+        walk("athena", control, "parameters.torso.mass=14", "compliance.squeeze=0", duration=6.0)
         for control in ("kinematic", "compliant")
     )
     assert compliant.facts["walk"]["fallback"] > 0.8  # from 1 s on, when that weight is known

@@ -126,9 +126,7 @@ def test_the_slip_pid_is_judged_on_plants_that_are_not_its_model() -> None:
         assert whole.removesuffix(", all parts") == without.removesuffix(", all but slip_pid")
         assert plan.parameters == other.parameters
         assert plan.parameters
-        assert {name for name in SWITCHES if not getattr(other.compliance, name)} == {
-            "slip_pid"
-        }
+        assert {name for name in SWITCHES if not getattr(other.compliance, name)} == {"slip_pid"}
         assert all(getattr(plan.compliance, name) for name in SWITCHES)
 
 

@@ -178,7 +178,8 @@ static void update_trust(const hxComplianceModel *model, const hxPlan *plan, dou
   for (int leg = 0; leg < HX_LEGS; ++leg) laws->fallback[leg] = laws->doubted[leg] || goal == 0.0;
 }
 
-/* Computes the measured squeeze and normal forces (C24, C46), and returns the sum of the latter [N]. */
+/* Computes the measured squeeze and normal forces (C24, C46), and returns the sum of the latter
+ * [N]. */
 static double law_inputs(const hxComplianceModel *model, const hxPlan *plan,
                          const double force[HX_LEGS][3], hxPlane push[HX_LEGS],
                          double normal[HX_LEGS], hxCompliance *laws) {
