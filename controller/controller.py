@@ -199,6 +199,7 @@ class Controller(Stateful):
         activation = support.activation(
             feet.phase, paths.stayed, paths.stays, walking=paths.walking
         )
+        activation = np.where(paths.awaited, 0.0, activation)
         if not self.parts.support:
             return activation, np.zeros(LEGS)
         return activation, support.lowering(feet.plane, activation)
@@ -236,14 +237,33 @@ class Controller(Stateful):
         value, posture, twist = self._look_ahead(ahead, number)
         return self._lay_out(value, posture, self.paths.walk(number, twist, before.feet))
 
-    def _plan_afresh(self) -> None:
-        """Begins a new section at the present step, and plans the step after it."""
+    def _note_contacts(self) -> None:
+        """Notes which feet have met the ground on their way down (C51)."""
+        if self.compliant is not None:
+            falling = self.paths.swinging & (self._now.feet.rise < 0.0)
+            self.paths.met = falling & self.compliant.laws.meets()
+
+    def _waits(self) -> bool:
+        """Returns whether the gait clock waits for feet at the ends of their swings (C50)."""
+        if self.compliant is None:
+            return False
+        landing = self.paths.landing(self._at)
+        return self.compliant.laws.waits(landing, held=self.paths.held)
+
+    def _plan_afresh(self, *, waiting: bool) -> None:
+        """Begins a new section at the present step, and plans the step after it.
+
+        waiting: the gait clock stands still in it.
+        """
         moves, settled = self.ramp.moves(), self.ramp.settled()
         if self.compliant is not None:
             self.compliant.steer(self._at, moves=moves, afresh=self._cut)
         value, posture, twist = self._look_ahead(0, 0)
         going = moves or not settled
-        feet = self.paths.plan(self._now.feet, self._at, going=going, twist=twist)
+        if waiting:
+            feet = self.paths.hold(self._now.feet, self._at, twist=twist)
+        else:
+            feet = self.paths.plan(self._now.feet, self._at, going=going, twist=twist)
         self._now = self._lay_out(value, posture, feet)
         self._last = math.inf if moves or settled else self.ramp.end - self.ramp.steps
         self._at = 0
@@ -254,8 +274,12 @@ class Controller(Stateful):
 
         command_changed: the plan no longer applies, and a new section begins.
         """
-        if command_changed or self._after is None:
-            self._plan_afresh()
+        due = command_changed or self._after is None
+        self._note_contacts()
+        if due or self.paths.held:
+            waiting = self._waits()
+            if due or not waiting:
+                self._plan_afresh(waiting=waiting)
         assert self._after is not None
         self._before, self._now, self._after = self._now, self._after, None
         self._at += 1
@@ -341,6 +365,7 @@ class Controller(Stateful):
             height=now.feet.height - self.paths.home_height,
             rise=now.feet.rise,
             swinging=self.paths.swinging,
+            awaited=self.paths.awaited,
             overspeed=bool((np.abs(speed) >= self.legs.speed_max).any()),
         )
         climb = self.legs.speeds(now.pose, 0.0, 1.0)

@@ -11,6 +11,8 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from hexapod_cosim.models import HexapodError, Robot, nearest_name
+from hexapod_cosim.models.errors import refuse_path
+from hexapod_cosim.models.schema import parse_toml
 
 FORMAT = 3
 TRIPOD_LEGS = 3  # legs that share the weight in a tripod gait: the unit of load is weight / 3
@@ -248,8 +250,9 @@ def load_gains(path: str | Path) -> Gains:
     Raises GainsError: the file, the key, what was got and expected.
     """
     where = str(path)
+    refuse_path(path, "the gains file", GainsError)
     try:
-        table = tomllib.loads(Path(path).read_text(encoding="utf-8"))
+        table = parse_toml(Path(path).read_text(encoding="utf-8"))
     except OSError as error:
         raise GainsError(
             "cannot read the gains file",

@@ -4,7 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from difflib import get_close_matches
+from os import PathLike, fspath
 from typing import Any
+
+LONGEST = 600  # characters of a value that a message quotes
+NAME_SIZE, PATH_SIZE = 255, 4000  # bytes, characters  of names and paths
 
 
 class HexapodError(Exception):
@@ -37,9 +41,9 @@ class HexapodError(Exception):
         self.where = where
 
     def __str__(self) -> str:
-        facts = [f"got {self.got!r}"] if self.got is not None else []
+        facts = [f"got {shortened(repr(self.got))}"] if self.got is not None else []
         facts += [f"expected {self.expected}"] if self.expected is not None else []
-        text = f"{self.where}: {self.what}" if self.where else self.what
+        text = f"{shortened(self.where)}: {self.what}" if self.where else self.what
         text += f": {', '.join(facts)}" if facts else ""
         return f"{text}; {self.fix}" if self.fix else text
 
@@ -53,6 +57,29 @@ def _rebuild(
 ) -> HexapodError:
     """Creates an unpickled exception."""
     return kind(what, got=got, expected=expected, fix=fix, where=where)
+
+
+def shortened(text: str) -> str:
+    """Returns a text for a message: one of more than LONGEST characters without its middle."""
+    if len(text) <= LONGEST:
+        return text
+    half = LONGEST // 2 - 20
+    return f"{text[:half]} ... ({len(text)} characters) ... {text[-half:]}"
+
+
+def refuse_path(path: str | PathLike[str], what: str, error: type[HexapodError]) -> None:
+    """Raises an error for a path that no system can open: with a NUL, or too long."""
+    text = fspath(path)
+    longest = max(len(part.encode("utf-8", "surrogatepass")) for part in text.split("/"))
+    if "\0" not in text and longest <= NAME_SIZE and len(text) <= PATH_SIZE:
+        return
+    raise error(
+        f"no path of {what}",
+        got=text,
+        expected=f"a path without NUL, of at most {PATH_SIZE} characters, "
+        f"with names of at most {NAME_SIZE} bytes",
+        fix="give another path",
+    )
 
 
 class RobotError(HexapodError):

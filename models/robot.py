@@ -21,7 +21,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
-from hexapod_cosim.models.errors import RobotError, unknown_name
+from hexapod_cosim.models.errors import RobotError, refuse_path, unknown_name
 from hexapod_cosim.models.ground.table import beside, read_terrain
 from hexapod_cosim.models.records import (
     BODY_CONTACTS,
@@ -58,6 +58,7 @@ from hexapod_cosim.models.schema import (
     Number,
     Vector,
     expect_table,
+    parse_toml,
     read_given,
     refuse_unknown_keys,
     require,
@@ -114,6 +115,7 @@ def list_robots() -> list[str]:
 
 def load_robot(path_or_name: str | Path) -> Robot:
     """Reads and checks a robot file, or a robot of `list_robots()` by name. Raises RobotError."""
+    refuse_path(path_or_name, "the robot file", RobotError)
     path = robot_path(path_or_name)
     if path.suffix.lower() == ".urdf":
         return _robot_from_urdf(urdf_table(path), str(path))
@@ -135,7 +137,7 @@ def load_robot(path_or_name: str | Path) -> Robot:
         ) from error
     if alone is not None:
         return alone
-    table = _terrain_beside(tomllib.loads(text), path.parent)
+    table = _terrain_beside(parse_toml(text), path.parent)
     if "urdf" in table:
         return _robot_from_urdf(side_table(table, path.parent, str(path)), str(path))
     return robot_from_table(table, where=str(path))
@@ -153,7 +155,7 @@ def _robot_from_text(text: str, where: str) -> Robot | None:
 
     Results are cached by the text; the other file can change without it.
     """
-    table = tomllib.loads(text)
+    table = parse_toml(text)
     terrain = table.get("terrain")
     if "urdf" in table or (isinstance(terrain, dict) and "file" in terrain):
         return None

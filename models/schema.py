@@ -6,12 +6,45 @@ Example of a field: `mass: Annotated[float, Number("kg", above=0.0)]`.
 from __future__ import annotations
 
 import math
+import tomllib
 from collections.abc import Hashable, Mapping
 from dataclasses import dataclass
 from functools import cache
 from typing import Any, cast, get_type_hints
 
 from hexapod_cosim.models.errors import RobotError, unknown_name
+
+DEEPEST = 64  # the most tables and arrays inside each other in a TOML file
+LARGEST = 2**63 - 1  # the largest integer of TOML 1.0
+
+
+def parse_toml(text: str) -> dict[str, Any]:
+    """Returns the tables of a TOML text.
+
+    Raises tomllib.TOMLDecodeError, also for integers of more than 64 bits and for tables and arrays
+    more than DEEPEST deep, where Python's reader raises other errors or none.
+    """
+    try:
+        table = tomllib.loads(text)
+        _check_size(table, DEEPEST)
+    except tomllib.TOMLDecodeError:
+        raise
+    except RecursionError as error:
+        raise tomllib.TOMLDecodeError(f"more than {DEEPEST} tables or arrays deep") from error
+    except ValueError as error:  # thousands of digits
+        raise tomllib.TOMLDecodeError("an integer of more than 64 bits") from error
+    return table
+
+
+def _check_size(value: Any, depth: int) -> None:
+    """Raises ValueError for large integers and RecursionError below the given depth."""
+    if depth < 0:
+        raise RecursionError
+    if isinstance(value, int) and abs(value) > LARGEST:
+        raise ValueError
+    inner = value.values() if isinstance(value, dict) else value
+    for item in inner if isinstance(value, dict | list) else ():
+        _check_size(item, depth - 1)
 
 
 @dataclass(frozen=True)

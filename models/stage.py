@@ -169,8 +169,9 @@ def slope_matrices(
 ) -> tuple[Array, Array]:
     """Returns G_x and G_v of eq. 20, each (114, 114), at bodies (19, 13).
 
-    G: (18, 114) as in `Constraints`. They consist of servos, gears and stops on the joints' axes, of each contact along its normal n
-    and, by its drag alone, across it, and of the moments of spin and rolling on the tibia.
+    G: (18, 114) as in `Constraints`. They consist of servos, gears and stops on the joints' axes,
+    of each contact along its normal n and, by its drag alone, across it, and of the moments of spin
+    and rolling on the tibia.
     """
     damping = slopes.motor_damping + slopes.gear_drag + slopes.stop_damping
     G_x = -G.T @ ((slopes.motor_stiffness + slopes.stop_stiffness).reshape(-1, 1) * G)

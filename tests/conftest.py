@@ -22,6 +22,7 @@ from hexapod_cosim.cosim.cli import main
 # what takes longest begins, so that no process is left with it in the end
 LONGEST = (
     "test_docs",
+    "test_side_by_side",
     "test_long_walk",
     "test_walking",
     "test_endurance",

@@ -32,7 +32,7 @@ from hexapod_cosim.controller.plane import LEGS, Array, Mask, Plane, clamp, rows
 from hexapod_cosim.controller.sense.burden import Burden
 from hexapod_cosim.controller.sense.contact_detection import ContactDetector, SensorWatch
 from hexapod_cosim.controller.sense.landing import Landings
-from hexapod_cosim.controller.sense.touchdown import EARLY, Touchdown
+from hexapod_cosim.controller.sense.touchdown import EARLY, REACH_LIMIT, Touchdown
 from hexapod_cosim.controller.walk.inverse_dynamics import Demand
 
 SLIDING_DRAG = 0.55  # 1    common tangential over normal force beyond the plan: only a robot that
@@ -44,6 +44,7 @@ JOINTS_FOLLOW, JOINTS_DO_NOT = 0.35, 0.45  # 1    share of the time with too hig
 GRIPPED = 0.99  # 1    of its share: a leg with more carries it
 LARGEST_LOAD = 2.0  # 1    in thirds of the weight: the margins of the design hold up to it
 LEAST_SCALE, LARGEST_SCALE = 0.5, 3.0  # 1    measured over modelled weight that is believed
+CARRYING = 0.1  # 1    in thirds of the weight: an awaited foot with more stands
 LARGEST_LEAN = 0.4  # 1    of the depth of the ground: distance of the centre of mass, each axis
 HIGH_SHARE = 0.25  # 1    of the step height: a foot planned higher is certainly in the air
 
@@ -62,6 +63,7 @@ class Plan(NamedTuple):
     height: Array  # m    of the paths over their ends
     needed: float  # N m    scalar: the largest of `carry`
     swinging: Mask  # planned in the air
+    awaited: Mask  # the gait clock waits for the foot
     falling: Array  # m    by which feet well above the ground come down in a period
     overspeed: bool  # scalar: the plan exceeds the speed limit of some joint
 
@@ -159,6 +161,7 @@ class Compliance(Stateful):
         height: Array,
         rise: Array,
         swinging: Mask,
+        awaited: Mask,
         overspeed: bool = False,
     ) -> Plan:
         """Returns the plan of a step, from which the laws compute their corrections.
@@ -169,6 +172,7 @@ class Compliance(Stateful):
             feet: (6,) contact points x + i y, walking frame [m].
             height, rise: (6,) of the paths over the stance [m, m/s].
             swinging: (6,) legs planned in the air.
+            awaited: (6,) feet that the gait clock waits for.
             overspeed: the plan exceeds the speed limit of some joint.
         """
         supports = 1.0 if self.parts.support else 0.0
@@ -186,6 +190,7 @@ class Compliance(Stateful):
             height=height,
             needed=float(np.abs(carry).max()),
             swinging=swinging,
+            awaited=awaited,
             falling=np.where(well_up, np.maximum(-self.period * rise, 0.0), 0.0),
             overspeed=overspeed,
         )
@@ -211,12 +216,17 @@ class Compliance(Stateful):
         self.fallback = self.doubted | (self.trust < 1.0)
         return self._replace_forces(plan, force) if doubted.any() else force
 
+    def _carries(self) -> Mask:
+        """Returns the feet (6,) that carry so much that the gait clock need not wait for them."""
+        return self.touching & (self.law.load > CARRYING)
+
     def _meet_ground(self, plan: Plan, met: Array) -> None:
         """Adapts the foot heights to early and late contacts (C36). met: as in _judge_sensors()."""
         self.regaining = True
         early = self.landings.early(met, plan.height)
         falling = np.where(early, plan.falling, 0.0)
-        self.touchdown.step(self.touching, falling, plan.swinging, plan.standing)
+        searching = plan.awaited & ~self.doubted & ~self._carries()
+        self.touchdown.step(self.touching, falling, plan.swinging, plan.standing, searching)
 
     def _examine_contacts(self, plan: Plan, force: Array) -> Array:
         """Decides between a wrong sensor and an early or late contact.
@@ -235,7 +245,7 @@ class Compliance(Stateful):
     def _contacts_differ(self, plan: Plan) -> bool:
         """Returns whether contacts contradict the plan, or a response to it is still under way."""
         certain = plan.standing | plan.well_up
-        differs = ((self.touching != plan.standing) & certain).any()
+        differs = ((self.touching != plan.standing) & certain | plan.awaited).any()
         return bool(differs) or self.watch.busy() or self.touchdown.busy()
 
     # ------------------------------------------------------------------------ inputs and weight
@@ -355,7 +365,7 @@ class Compliance(Stateful):
         planned load [N m]. Returns the scaled torques (6, 3) [N m].
         """
         grip = self.grip + self.follow_load * (1.0 - self.grip)
-        self.grip = np.where(plan.standing & ~self.touching, 0.0, grip)
+        self.grip = np.where((plan.standing | plan.awaited) & ~self.touching, 0.0, grip)
         self.regaining = bool((self.grip < GRIPPED).any())
         return torque * self.grip[:, None]
 
@@ -381,6 +391,26 @@ class Compliance(Stateful):
         bend = self.softness * (plan.lever @ answer[:, :, None])[:, :, 0]
         self.shift = (bend[:, None, :] @ plan.lever)[:, 0, :]  # J bend
         self._limit_joints(bend * self.trust, (torque + plan.own) * self.trust)
+
+    def meets(self) -> Mask:
+        """Returns the feet (6,) that have met the ground on their way down (C51).
+
+        A sensor that is doubted is left out.
+        """
+        if not self.parts.touchdown or self.trust < 1.0:
+            return np.zeros(LEGS, dtype=np.bool_)
+        return self.touching & ~self.doubted
+
+    def waits(self, landing: Mask, *, held: bool) -> bool:
+        """Returns whether the gait clock waits for the feet of legs that end their swing (C50).
+
+        landing: (6,) these legs; held: it waits already.
+        """
+        if not self.parts.touchdown or self.trust < 1.0:
+            return False
+        found = self._carries() if held else self.touching
+        hopeful = self.touchdown.offset > -REACH_LIMIT
+        return bool((landing & ~found & ~self.doubted & hopeful).any())
 
     def step(self, plan: Plan, force: Array) -> None:
         """Advances all laws by one period.

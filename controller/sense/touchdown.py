@@ -3,6 +3,7 @@
 A foot that meets the ground before its path ends keeps the height of its contact through its
 stance. A foot that finds no ground at the end of its path moves down at a fixed speed to a limit.
 In the next swing these offsets decay.
+A foot for which the gait clock waits searches at the same speed (C50).
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ from hexapod_cosim.controller.plane import LEGS, Array, Mask
 
 EARLY = 0.002  # m    a contact more than this above the expected height is early
 REACH_SPEED = 0.08  # m/s    downwards
-REACH_LIMIT = 0.020  # m
+REACH_LIMIT = 0.040  # m
 HOLD_LIMIT = 0.030  # m    upwards: the robots' step height
 GRACE = 0.040  # s    after the planned touch-down, in which a foot may be late
 RETURN_TIME = 0.060  # s    time constant with which an offset vanishes in the swing
@@ -45,7 +46,7 @@ class Touchdown(Stateful):
         """Returns whether some foot has an offset or lacks its planned contact."""
         return bool(self.offset.any() or self.late.any())
 
-    def _moved(self, touching: Mask, falling: Array, swinging: Mask) -> Array:
+    def _moved(self, touching: Mask, falling: Array, swinging: Mask, searching: Mask) -> Array:
         """Returns the next offsets (6,) [m]. Arguments are those of step()."""
         reached = np.maximum(self.offset - REACH_SPEED * self.period, -REACH_LIMIT)
         held = np.minimum(self.offset + falling, HOLD_LIMIT)
@@ -53,9 +54,11 @@ class Touchdown(Stateful):
         faded = np.where(np.abs(self.offset) > NEGLIGIBLE, faded, 0.0)
         in_swing = np.where(touching, np.where(falling > 0.0, held, self.offset), faded)
         moved = np.where(swinging, in_swing, self.offset)
-        return np.where(self.late > GRACE, reached, moved)
+        return np.where(searching | (self.late > GRACE), reached, moved)
 
-    def step(self, touching: Mask, falling: Array, swinging: Mask, loaded: Mask) -> None:
+    def step(
+        self, touching: Mask, falling: Array, swinging: Mask, loaded: Mask, searching: Mask
+    ) -> None:
         """Advances the offsets by one period (C36).
 
         Args:
@@ -64,6 +67,7 @@ class Touchdown(Stateful):
                 0 for the others.
             swinging: (6,) legs planned in the air.
             loaded: (6,) legs planned to carry their whole share.
+            searching: (6,) feet that the gait clock waits for.
         """
         self.late = np.where(loaded & ~touching, self.late + self.period, 0.0)
-        self.offset = self._moved(touching, falling, swinging)
+        self.offset = self._moved(touching, falling, swinging, searching)

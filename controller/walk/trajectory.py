@@ -192,9 +192,16 @@ class FootPaths(Stateful):
         lifted: legs that lift off at the begin of the section.
         stayed: legs that skipped their last step.
         stays: legs that will skip their next step: in their stance under a body at rest.
+        met: feet that have met the ground on their way down, and stay where they are.
+        held: the gait clock stands still until feet at the ends of their swings carry load
+            (scalar).
+        awaited: feet that it waits for.
     """
 
-    STATE = ("walking", "before", "swinging", "standing", "lifted", "stayed", "stays")
+    STATE = (
+        "walking", "before", "swinging", "standing", "lifted", "stayed", "stays", "met", "held",
+        "awaited",
+    )  # fmt: skip
 
     def __init__(self, gait: Gait, home: Array, *, period: float) -> None:
         """Puts all feet in the stance.
@@ -217,6 +224,9 @@ class FootPaths(Stateful):
         self.lifted: Mask
         self.stayed: Mask
         self.stays: Mask
+        self.met: Mask
+        self.held = False
+        self.awaited: Mask
         self.reset()
 
     def _phase_after(self, number: int) -> Array:
@@ -224,12 +234,18 @@ class FootPaths(Stateful):
         clock = self.offset + number * self.period / self.gait.period
         return np.asarray(clock - np.floor(clock))
 
+    def _reached(self, number: int) -> int:
+        """Returns the periods on the gait clock `number` periods after the section began (C50)."""
+        return self.before if self.held else self.before + number
+
     def _rest(self, plane: Plane) -> PlannedFeet:
         """Stops the gait clock at its begin; returns feet that stand still at `plane`."""
         nothing, none = np.zeros(LEGS), np.zeros(LEGS, dtype=np.bool_)
         still = np.zeros(LEGS, dtype=np.complex128)
         self.walking, self.before = False, 0
         self.swinging = self.standing = self.lifted = self.stays = none
+        self.met = self.awaited = none
+        self.held = False
         self.stayed = self.late
         return PlannedFeet(
             plane=plane,
@@ -294,14 +310,15 @@ class FootPaths(Stateful):
             down=self.gait.touchdown_speed * self.swing_time,
         )
         was = back * (carried - feet.way)
-        pulled = back * feet.pull * (slope / self.swing_time)
+        pace = 0.0 if self.held else 1.0 / self.swing_time  # dtau/dt
+        pulled = back * feet.pull * (slope * pace)
         # a foot on the ground: dp/dt = -(v + i w p)
         velocity = pulled - (feet.twist.velocity + 1j * feet.twist.yaw_rate * was)
         return feet._replace(
             plane=back * (self._ground_of(feet) - feet.way),
             height=self.home_height + np.where(self.swinging, lift, 0.0),
             velocity=velocity,
-            rise=np.where(self.swinging, climb / self.swing_time, 0.0),
+            rise=np.where(self.swinging, climb * pace, 0.0),
         )
 
     def _set_out(self, now: PlannedFeet, twist: Twist) -> PlannedFeet:
@@ -327,7 +344,8 @@ class FootPaths(Stateful):
         """
         if not self.walking and not going:
             return self._rest(now.plane)
-        self.before = self.before + number if self.walking else 0
+        self.before = self._reached(number) if self.walking else 0
+        self.held, self.awaited = False, np.zeros(LEGS, dtype=np.bool_)
         swung = self.swinging
         self._lift_off()
         if not going:
@@ -339,12 +357,34 @@ class FootPaths(Stateful):
         self.walking = True
         return self._set_out(now, twist)
 
+    def landing(self, number: int) -> Mask:
+        """Returns the legs (6,) whose swing ends at the present step.
+
+        While the gait clock stands still, these are the legs whose swing ended when it stopped.
+
+        number: periods since the section began.
+        """
+        if not self.walking:
+            return np.zeros(LEGS, dtype=np.bool_)
+        stands = self._phase_after(self._reached(number) + 1) < self.gait.duty
+        return np.asarray(self.swinging & stands)
+
+    def hold(self, now: PlannedFeet, number: int, *, twist: Twist) -> PlannedFeet:
+        """Begins a section in which the gait clock stands still while the body moves on (C50).
+
+        Arguments and result are those of plan().
+        """
+        self.awaited = self.landing(number)
+        self.before = self._reached(number)
+        self.held, self.lifted = True, np.zeros(LEGS, dtype=np.bool_)
+        return self._set_out(now, twist)
+
     def reach(self, number: int) -> bool:
         """Returns whether the step `number` periods after the first belongs to the section.
 
         It does if no leg lifts off or touches down before it.
         """
-        if not self.walking or number == 1:
+        if not self.walking or self.held or number == 1:
             return True
         stands = self._phase_after(self.before + number) < self.gait.duty
         return bool((stands == self.standing).all())
@@ -372,7 +412,7 @@ class FootPaths(Stateful):
         if not self.walking:
             return before
         way, turn = self._odometry(before, twist)
-        phase = self._phase_after(self.before + number)
+        phase = self._phase_after(self._reached(number))
         tau = self._progress(phase)
         free = self.swinging & (tau < FREEZE)
         if number == 1:
@@ -380,5 +420,8 @@ class FootPaths(Stateful):
         goal = np.where(free, way + cis(turn) * self._landing(tau, twist), before.goal)
         left = np.maximum(1.0 - before.blend, NEARLY_DONE)
         pull = before.pull + (goal - before.goal) / left
+        # a foot stays where it met the ground (C51)
+        goal = np.where(self.met, self._ground_of(before), goal)
+        pull = np.where(self.met, 0.0, pull)
         feet = before._replace(phase=phase, goal=goal, pull=pull, way=way, turn=turn, twist=twist)
         return self._place_feet(feet, self._ground_of(before))

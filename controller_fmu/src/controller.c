@@ -42,7 +42,9 @@ static void lower(const hxControllerModel *model, const hxFootPaths *paths, hxPl
   const hxSupport *support = &model->laws.support;
   for (int k = 0; k < HX_LEGS; ++k) {
     step->lowering[k] = 0.0;
-    if (model->compliant)
+    if (paths->awaited[k])
+      step->activation[k] = 0.0;
+    else if (model->compliant)
       step->activation[k] = hx_support_activation(support, step->feet.phase[k], paths->stayed[k],
                                                   paths->stays[k], paths->walking);
     else
@@ -92,8 +94,26 @@ static void plan_step(const hxControllerModel *model, const hxControllerState *s
   lay_out(model, &state->paths, step);
 }
 
-/* Begins a new section at the present step, and plans the next step. */
-static void plan_afresh(const hxControllerModel *model, hxControllerState *state) {
+/* Notes which feet have met the ground on their way down (C51). */
+static void note_contacts(const hxControllerModel *model, hxControllerState *state) {
+  const hxPlannedFeet *feet = &step_at(state, 0)->feet;
+  hxFootPaths *paths = &state->paths;
+  for (int k = 0; k < HX_LEGS; ++k)
+    paths->met[k] = model->compliant && paths->swinging[k] && feet->rise[k] < 0.0 &&
+                    hx_compliance_meets(&model->laws.laws, k, &state->compliant.laws);
+}
+
+/* Returns whether the gait clock waits for feet at the ends of their swings (C50). */
+static int waits(const hxControllerModel *model, const hxControllerState *state) {
+  int landing[HX_LEGS];
+  if (!model->compliant) return 0;
+  hx_foot_paths_landing(&model->paths, &state->paths, state->at, landing);
+  return hx_compliance_waits(&model->laws.laws, landing, state->paths.held, &state->compliant.laws);
+}
+
+/* Begins a new section at the present step, and plans the next step. waiting: the gait clock stands
+ * still in it. */
+static void plan_afresh(const hxControllerModel *model, int waiting, hxControllerState *state) {
   const int moves = hx_command_ramp_moves(&state->ramp),
             settled = hx_command_ramp_settled(&model->ramp, &state->ramp);
   hxPlannedStep *first = step_at(state, 0);
@@ -101,8 +121,11 @@ static void plan_afresh(const hxControllerModel *model, hxControllerState *state
   if (model->compliant)
     hx_compliant_steer(&model->laws, state->at, moves, state->cut, &state->compliant);
   const hxTwist twist = look_ahead(model, state, 0, 0, first);
-  hx_foot_paths_plan(&model->paths, &now, state->at, moves || !settled, twist, &state->paths,
-                     &first->feet);
+  if (waiting)
+    hx_foot_paths_hold(&model->paths, &now, state->at, twist, &state->paths, &first->feet);
+  else
+    hx_foot_paths_plan(&model->paths, &now, state->at, moves || !settled, twist, &state->paths,
+                       &first->feet);
   lay_out(model, &state->paths, first);
   state->last = moves || settled ? INT64_MAX : model->ramp.end - state->ramp.steps;
   state->at = 0;
@@ -112,7 +135,12 @@ static void plan_afresh(const hxControllerModel *model, hxControllerState *state
 /* Advances to the planned next step and plans the one after it. told: the command has changed, so
  * the plan is void. */
 static void advance(const hxControllerModel *model, int told, hxControllerState *state) {
-  if (told || !state->has_after) plan_afresh(model, state);
+  const int due = told || !state->has_after;
+  note_contacts(model, state);
+  if (due || state->paths.held) {
+    const int waiting = waits(model, state);
+    if (due || !waiting) plan_afresh(model, waiting, state);
+  }
   state->present = (state->present + 1) % 3;
   ++state->at;
   ++state->ramp.steps;
@@ -225,6 +253,7 @@ static void ask(const hxControllerModel *model, hxControllerState *state, hxStan
     height[k] = now->feet.height[k] - model->paths.home_height[k];
     plan->shares.activation[k] = now->activation[k];
     plan->swinging[k] = state->paths.swinging[k];
+    plan->awaited[k] = state->paths.awaited[k];
     for (int joint = 0; joint < HX_JOINTS; ++joint)
       plan->overspeed |= fabs(output->speed_ref[k][joint]) >= model->leg[k].speed_max;
     hx_leg_solver_speeds(&model->leg[k], &now->pose[k], hx_plane(0.0, 0.0), 1.0, stance->climb[k]);

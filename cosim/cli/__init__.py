@@ -22,13 +22,43 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except KeyboardInterrupt:
         code = INTERRUPT
     except Exception as error:
+        if _is_interrupt(error):
+            return report_failure("interrupted", INTERRUPT, as_json=_wants_json(given))
         if "--debug" in given:
             raise
+        if isinstance(error, OSError):
+            return report_failure(_refused_by_system(error), FAILURE, as_json=_wants_json(given))
         text = f"unexpected {type(error).__name__}: {error}; run `hexapod --debug ...` to see where"
         return report_failure(text, FAILURE, as_json=_wants_json(given))
     if code == INTERRUPT:
         return report_failure("interrupted", INTERRUPT, as_json=_wants_json(given))
     return code
+
+
+def _is_interrupt(error: BaseException) -> bool:
+    """Returns whether Ctrl-C led to the error: some C extensions turn it into errors of their own
+    while they are imported.
+    """
+    inner: BaseException | None = error
+    seen = set[int]()
+    while inner is not None and id(inner) not in seen:
+        if isinstance(inner, KeyboardInterrupt):
+            return True
+        seen.add(id(inner))
+        inner = inner.__cause__ or inner.__context__
+    return False
+
+
+def _refused_by_system(error: OSError) -> str:
+    """Returns the message for a file, disk or process that the system refused."""
+    from hexapod_cosim.models.errors import shortened  # noqa: PLC0415
+
+    where = f"{shortened(str(error.filename))}: " if error.filename else ""
+    got = shortened(repr(error.strerror or str(error)))
+    return (
+        f"{where}the system refused an operation: got {got}; check the place, its rights and the "
+        "room on the disk, or run `hexapod --debug ...` to see where"
+    )
 
 
 def _wants_json(given: Sequence[str]) -> bool:

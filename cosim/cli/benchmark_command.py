@@ -25,6 +25,7 @@ from hexapod_cosim.cosim.cli.terminal import (
     warn,
 )
 from hexapod_cosim.cosim.common.files import BENCHMARK, RUN_FILE, write_json
+from hexapod_cosim.cosim.control.controllers import check_control
 from hexapod_cosim.cosim.course import texts
 from hexapod_cosim.cosim.course.goals import verdicts
 from hexapod_cosim.cosim.course.reading import load_course
@@ -34,6 +35,7 @@ from hexapod_cosim.cosim.course.records import (
     Course,
     CourseError,
     Entry,
+    lacking,
     read_entries,
 )
 from hexapod_cosim.cosim.course.runs import Run, run_count, run_course
@@ -105,6 +107,7 @@ def benchmark(
     course = load_course(
         split, names=cases or (), seeds=seeds, quick=quick, settings=settings or ()
     )
+    check_control(course.cases[0].scenario, [entry.control for entry in entries])
     options = {
         "control": controls,
         "without": without,
@@ -143,13 +146,13 @@ def _run_into(
         _collect(done, course, entries, gains=gains, workers=workers)
     except KeyboardInterrupt:
         with deferred_interrupts():
-            table = Table(course, labels, tuple(done))
+            table = Table(course, labels, tuple(done), lacking(entries))
             _write(table, folder.path, command, complete=False)
             _show(table)
             total = run_count(course, entries)
             warn(f"stopped after {len(done)} of {total} runs; their table is in {folder.path}")
         raise
-    table = Table(course, labels, tuple(done))
+    table = Table(course, labels, tuple(done), lacking(entries))
     content, files = _write(table, folder.path, command, complete=True)
     title = f"Course {course.version}, {course.split}: {', '.join(labels)}"
     facts = {"kind": BENCHMARK, "status": COMPLETED, "title": title, "command": command}
@@ -207,24 +210,9 @@ def _show(table: Table) -> None:
         f"Course {course.version} ({course.hash[:12]}), split {course.split}, "
         f"{len(course.cases)} cases, {len(course.seeds)} seeds; reference {table.reference}"
     )
-    for title, (columns, rows) in _tables(table):
-        if rows:
-            show_text(f"\n{title}")
-            show_table(columns, rows)
-
-
-def _tables(table: Table) -> list[tuple[str, tuple[list[str], list[list[str]]]]]:
-    """Returns the titles and contents of the printed tables."""
-    return [
-        ("Means over the successful runs ± half a 95 % interval", texts.case_rows(table)),
-        ("Failures", texts.failure_rows(table)),
-        ("Success over the height of steps and roughness", texts.sweep_rows(table)),
-        (
-            f"Medians over cases of the change from {table.reference} (95 % interval)",
-            texts.class_rows(table),
-        ),
-        ("Goals", texts.goal_rows([each for each in verdicts(table) if each.was_run])),
-    ]
+    for title, (columns, rows) in reversed(texts.tables(table, verdicts(table))):
+        show_text(f"\n{title}")
+        show_table(columns, rows)
 
 
 def _check_number(value: int | None, most: int, where: str) -> None:

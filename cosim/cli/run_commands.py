@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -41,6 +41,7 @@ from hexapod_cosim.cosim.results.metrics import has_net_slip
 from hexapod_cosim.cosim.results.result import Result
 from hexapod_cosim.cosim.results.results import (
     ACCURACY,
+    damage_reported,
     read_accuracies,
     read_facts,
     read_result,
@@ -50,7 +51,8 @@ from hexapod_cosim.cosim.results.results import (
     write_accuracy,
 )
 from hexapod_cosim.cosim.results.summary import summarise
-from hexapod_cosim.cosim.scenario.controls import control_of, parse_controls
+from hexapod_cosim.cosim.scenario.controls import control_of
+from hexapod_cosim.cosim.scenario.records import Scenario
 from hexapod_cosim.cosim.scenario.scenario import load_scenario
 
 EPILOG = (
@@ -72,11 +74,6 @@ def simulate(
     """Run one co-simulation: results, metrics, plots. Several controls: a run of each."""
     plan = titled(load_scenario(scenario, overrides=settings or []), settings or [])
     controls = chosen_controls(control or [plan.control], plan)
-    if len(controls) > 1:
-        return _simulate_each(scenario, control or [], settings, output, fmu, gains, accuracy,
-                              engine, json=json)  # fmt: skip
-    plan = replace(plan, control=controls[0].text)
-    label = controls[0].label
     options = RunOptions.read(fmu=fmu, gains=gains, engine=engine, runs=1)
     if accuracy:
         halved_scenario(plan)  # raises errors before anything is run
@@ -90,47 +87,57 @@ def simulate(
         gains=gains,
         accuracy=accuracy,
     )
-    with results_folder(output or default_folder(scenario)) as folder:
-        result, files = run_into(plan, [folder], command, options)
+    folder, done = output or default_folder(scenario), {}
+    for chosen in controls:
+        place = folder
+        if len(controls) > 1:
+            place = folder / chosen.label
+            folder.mkdir(parents=True, exist_ok=True)
+        run = _Run(replace(plan, control=chosen.text), command, options, accuracy)
+        done[chosen.label] = _simulate_one(run, place, quiet=json)
+    if json:
+        summaries = {label: one.summary for label, one in done.items()}
+        show_json(summaries if len(done) > 1 else next(iter(summaries.values())))
+    return SUCCESS if all(one.upright for one in done.values()) else FELL
+
+
+@dataclass(frozen=True)
+class _Run:
+    """A run to simulate."""
+
+    plan: Scenario
+    command: str  # that repeats it
+    options: RunOptions
+    accuracy: bool  # whether it is checked
+
+
+@dataclass(frozen=True)
+class _Simulated:
+    """A run that was simulated."""
+
+    summary: Mapping[str, Any]  # for --json
+    upright: bool
+
+
+def _simulate_one(run: _Run, path: Path, *, quiet: bool) -> _Simulated:
+    """Simulates a run into a folder and prints its metrics unless `quiet`. Raises HexapodError."""
+    plan, label = run.plan, control_of(run.plan.control).label
+    with results_folder(path) as folder:
+        result, files = run_into(plan, [folder], run.command, run.options)
         checked: dict[str, Accuracy] = {}
-        if accuracy:
-            found = check_accuracy([plan], [summarise(result)], folder.path, options)
+        if run.accuracy:
+            found = check_accuracy([plan], [summarise(result)], folder.path, run.options)
             write_accuracy(folder.path, found.as_table())
             checked[label] = found
         if plan.outputs.plots:
             with drawing(folder.path):
                 runs = {label: stored_result(result)}
                 files += write_report(runs, folder.path, warn=warn, accuracies=checked)
-    if json:
-        show_json(_summary(result, folder.path, files, checked))
-    else:
+    if not quiet:
         _show(result, files, checked)
-    return SUCCESS if result.facts["walk"]["upright"] else FELL
-
-
-def _simulate_each(
-    scenario: str,
-    texts: Sequence[str],
-    settings: list[str] | None,
-    output: Path | None,
-    fmu: Path | None,
-    gains: Path | None,
-    accuracy: bool,
-    engine: str | None,
-    *,
-    json: bool,
-) -> int:
-    """Runs a scenario under each of several controls, into a folder by label."""
-    folder, codes = output or default_folder(scenario), []
-    for control in parse_controls(texts, where="--control"):
-        folder.mkdir(parents=True, exist_ok=True)
-        codes.append(
-            simulate(
-                scenario, [control.text], settings, folder / control.label, fmu, gains, accuracy,
-                engine, json=json,
-            )
-        )  # fmt: skip
-    return FELL if FELL in codes else SUCCESS
+    return _Simulated(
+        _summary(result, folder.path, files, checked), result.facts["walk"]["upright"]
+    )
 
 
 def _show(result: Result, files: Sequence[Path], checked: Mapping[str, Accuracy]) -> None:
@@ -156,25 +163,31 @@ def report(
 ) -> None:
     """Make the plots and the report of a run, a comparison, a study or a benchmark again."""
     facts = read_facts(folder)
+    with damage_reported(folder):
+        files = _report_again(folder, facts)
+    if json:
+        show_json({"report": str(folder / REPORT), "files": [str(file) for file in files]})
+        return
+    show_files(files)
+
+
+def _report_again(folder: Path, facts: Mapping[str, Any]) -> list[Path]:
+    """Writes the report of a folder again; `facts` are those of its run.json."""
     if facts.get("kind") == STUDY:
         # imported only here because it is slow
         from hexapod_cosim.cosim.cli.studying import report_on, warn_of  # noqa: PLC0415
 
         found, files = report_on(folder)
         warn_of(found)
-    elif facts.get("kind") == BENCHMARK:
-        files = benchmark_command.report_on(folder)
-    elif facts.get("kind") == "compare":
-        files = _report_comparison(folder, facts)
-    else:
-        run = read_result(folder)
-        control = run.facts["control"]
-        accuracies = {control: run.accuracy} if run.accuracy else {}
-        files = write_report({control: run}, folder, warn=warn, accuracies=accuracies)
-    if json:
-        show_json({"report": str(folder / REPORT), "files": [str(file) for file in files]})
-        return
-    show_files(files)
+        return list(files)
+    if facts.get("kind") == BENCHMARK:
+        return list(benchmark_command.report_on(folder))
+    if facts.get("kind") == "compare":
+        return _report_comparison(folder, facts)
+    run = read_result(folder)
+    control = run.facts["control"]
+    accuracies = {control: run.accuracy} if run.accuracy else {}
+    return write_report({control: run}, folder, warn=warn, accuracies=accuracies)
 
 
 def _report_comparison(folder: Path, facts: Mapping[str, Any]) -> list[Path]:

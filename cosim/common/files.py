@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import os
 import shutil
 import tempfile
 from collections.abc import Iterator, Mapping, Sequence
@@ -13,6 +14,7 @@ from typing import Any, TextIO
 from uuid import uuid4
 
 from hexapod_cosim.models import HexapodError
+from hexapod_cosim.models.errors import refuse_path
 
 RUN_FILE = "run.json"  # marks a folder as written by this package
 RUNNING = "running"
@@ -33,6 +35,7 @@ RESULT_FILES = (
     "plots",
     "benchmark.json",
     "runs.csv",
+    "tables.md",
 )
 RESERVED_NAMES = frozenset((*RESULT_FILES, RUN_FILE))  # no folder of a control has such a name
 PARTS = "controls"  # key of run.json: labels of a comparison, whose runs have folders of their own
@@ -45,6 +48,7 @@ def atomic_path(path: Path) -> Iterator[Path]:
 
     Raises HexapodError when `path` is a folder or cannot be written.
     """
+    refuse_path(path, "a file to write", HexapodError)
     if path.is_dir():
         raise HexapodError(
             "cannot write",
@@ -60,11 +64,29 @@ def atomic_path(path: Path) -> Iterator[Path]:
         raise not_writable(path.parent, error) from error
     try:
         yield temporary
+        flush_file(temporary)
         temporary.replace(path)
+        flush_folder(path.parent)
     except OSError as error:
         raise not_writable(path, error) from error
     finally:
         temporary.unlink(missing_ok=True)
+
+
+def flush_file(path: Path) -> None:
+    """Flushes a file's content to the disk, so that a loss of power cannot take it."""
+    with path.open("rb+") as file:
+        os.fsync(file.fileno())
+
+
+def flush_folder(folder: Path) -> None:
+    """Flushes a rename to the disk; Windows offers no way to do so."""
+    if hasattr(os, "O_DIRECTORY"):
+        handle = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
+        try:
+            os.fsync(handle)
+        finally:
+            os.close(handle)
 
 
 @contextmanager
@@ -136,6 +158,7 @@ def claim_folder(folder: Path) -> list[Path]:
     Returns the folders that were created, the innermost first. Raises HexapodError when the folder
     holds other files or cannot be written.
     """
+    refuse_path(folder, "a folder to write", HexapodError)
     made = [place for place in (folder, *folder.parents) if not place.exists()]
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -208,7 +231,7 @@ def read_json(path: Path) -> Any:
             expected=f"a folder with {path.name}",
             fix=fix,
         ) from error
-    except ValueError as error:
+    except (ValueError, RecursionError) as error:
         raise HexapodError(
             "damaged file",
             got=str(error),

@@ -76,6 +76,12 @@ def read_entries(controls: Sequence[str], without: Sequence[str] = ()) -> tuple[
     return tuple(entries)
 
 
+def lacking(entries: Sequence[Entry]) -> dict[str, str]:
+    """Returns the labels of columns that lack a part, and of the control that has it."""
+    whole = {entry.control: entry.label for entry in entries if not entry.off}
+    return {entry.label: whole[entry.control] for entry in entries if entry.off}
+
+
 @dataclass(frozen=True)
 class Quantity:
     """A figure of a run by which controls are judged; less of it is better."""

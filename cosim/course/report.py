@@ -11,6 +11,7 @@ from typing import Any
 
 from jinja2 import ChoiceLoader, PackageLoader
 
+from hexapod_cosim.cosim.common.control_style import all_styles
 from hexapod_cosim.cosim.common.files import write_text
 from hexapod_cosim.cosim.course import texts
 from hexapod_cosim.cosim.course.goals import Verdict, verdicts
@@ -42,7 +43,7 @@ def write_course_report(table: Table, content: Mapping[str, Any], folder: Path) 
     found = [verdict for verdict in verdicts(table) if verdict.was_run]
     columns, rows = texts.goal_rows(found)
     page = _environment().get_template(TEMPLATE).render(
-        colours={},
+        styles=all_styles(table.controls),
         title=title_of(table),
         headline=headline(table),
         lead=lead(table),
@@ -53,6 +54,7 @@ def write_course_report(table: Table, content: Mapping[str, Any], folder: Path) 
         goals={"columns": columns, "rows": list(zip(rows, map(_badge, found), strict=True))}
         if found
         else None,
+        parts=texts.part_rows(table),
         classes=texts.class_rows(table),
         cases=texts.case_rows(table),
         sweeps=texts.sweep_rows(table),

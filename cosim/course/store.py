@@ -11,16 +11,18 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from hexapod_cosim.cosim.common.files import atomic_text, read_json, write_json
+from hexapod_cosim.cosim.common.files import atomic_text, read_json, write_json, write_text
 from hexapod_cosim.cosim.common.plant_files import package_version
 from hexapod_cosim.cosim.course.goals import verdicts
+from hexapod_cosim.cosim.course.parts import judge_parts
 from hexapod_cosim.cosim.course.reading import load_course
 from hexapod_cosim.cosim.course.records import QUANTITIES, Case, CourseError
 from hexapod_cosim.cosim.course.runs import Run
 from hexapod_cosim.cosim.course.statistics import DRAWS
 from hexapod_cosim.cosim.course.table import Table
+from hexapod_cosim.cosim.course.texts import markdown
 
-RESULT, RUNS = "benchmark.json", "runs.csv"
+RESULT, RUNS, TABLES = "benchmark.json", "runs.csv", "tables.md"
 FORMAT = 1
 PACKAGES = ("numpy", "scipy", "control", "fmpy")
 
@@ -40,6 +42,7 @@ def result_table(table: Table, *, command: str, complete: bool) -> dict[str, Any
         "complete": complete,
         "controls": list(table.controls),
         "reference": table.reference,
+        "lacking": dict(table.parts),
         "seeds": list(course.seeds),
         "versions": versions(),
         "machine": machine(),
@@ -49,6 +52,7 @@ def result_table(table: Table, *, command: str, complete: bool) -> dict[str, Any
             for item in QUANTITIES
         },
         "goals": [verdict.as_table() for verdict in verdicts(table)],
+        "parts": [each.as_table() for each in judge_parts(table)],
         "classes": _by_control(table.classes),
         "cases": {
             name: {**_case_table(case), "controls": controls}
@@ -143,7 +147,8 @@ def read_table(folder: Path) -> tuple[Table, dict[str, Any]]:
                 where=str(folder / RESULT),
             )
         runs = tuple(_read_runs(folder / RUNS))
-        return Table(course, tuple(content["controls"]), runs), content
+        table = Table(course, tuple(content["controls"]), runs, dict(content.get("lacking", {})))
+        return table, content
     except (KeyError, TypeError, ValueError, OSError) as error:
         raise CourseError(
             "damaged result",
@@ -168,8 +173,9 @@ def _read_runs(path: Path) -> Iterator[Run]:
 def write_result(
     table: Table, folder: Path, *, command: str, complete: bool
 ) -> tuple[dict[str, Any], list[Path]]:
-    """Writes RESULT and RUNS into a folder; returns the content of RESULT and the files."""
+    """Writes RESULT, RUNS and TABLES; returns the content of RESULT and the files."""
     content = result_table(table, command=command, complete=complete)
     write_json(folder / RESULT, content)
     write_runs(folder / RUNS, table.runs)
-    return content, [folder / RESULT, folder / RUNS]
+    write_text(folder / TABLES, markdown(table, verdicts(table)))
+    return content, [folder / RESULT, folder / RUNS, folder / TABLES]

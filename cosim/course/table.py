@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
@@ -123,6 +123,8 @@ class Table:
     course: Course
     controls: tuple[str, ...]
     runs: tuple[Run, ...]
+    # columns that lack a part: their label -> that of the control with all its parts
+    parts: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def reference(self) -> str:

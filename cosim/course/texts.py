@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterator, Mapping, Sequence
 
 from hexapod_cosim.cosim.course.goals import Verdict
+from hexapod_cosim.cosim.course.parts import Effect, judge_parts
 from hexapod_cosim.cosim.course.records import SHOWN, Quantity
 from hexapod_cosim.cosim.course.statistics import Interval, Rate
 from hexapod_cosim.cosim.course.table import ALL, CaseFigures, ClassFigures, Table
 
+NUMBER = re.compile(r"[0-9.]*[0-9]")
 NONE = "-"  # where there is no value
 LEAST_HALF = 5e-4  # of a mean: a narrower interval is not shown
 SCALES: Mapping[str, tuple[float, str]] = {  # shown value over the metric's, and its unit
@@ -160,11 +163,27 @@ def _alike(figures: CaseFigures) -> Iterator[tuple[str, int]]:
     """Yields reasons with their numbers of runs; reasons that differ in numbers alone are one."""
     counts: dict[str, tuple[str, int]] = {}
     for reason, count in figures.failures.items():
-        words = "".join("#" if letter.isdigit() else letter for letter in reason)
-        key = words.replace("#", "").strip()
+        key = NUMBER.sub("#", reason)
         first, total = counts.get(key, (reason, 0))
         counts[key] = first, total + count
     yield from counts.values()
+
+
+def part_rows(table: Table) -> tuple[list[str], list[list[str]]]:
+    """Returns the table of parts: their best and worst effects, and whether they pay."""
+    rows = [
+        [
+            each.label,
+            *map(_effect, (each.best, each.worst)),
+            "pays" if each.pays else "does not pay",
+        ]
+        for each in judge_parts(table)
+    ]
+    return ["part", "best", "worst", ""], rows
+
+
+def _effect(effect: Effect) -> str:
+    return f"{100.0 * effect.change:+.0f} % {effect.quantity}, {effect.kind}"
 
 
 def sweep_rows(table: Table) -> tuple[list[str], list[list[str]]]:
@@ -179,3 +198,32 @@ def sweep_rows(table: Table) -> tuple[list[str], list[list[str]]]:
             )
             rows.append([name, control, cells])
     return ["heights", "control", "success"], [row for row in rows if row[2]]
+
+
+def tables(
+    table: Table, found: Sequence[Verdict]
+) -> list[tuple[str, tuple[list[str], list[list[str]]]]]:
+    """Returns titles and contents of all tables that are not empty."""
+    every = [
+        ("Parts: best and worst effect on a class, and whether the part pays", part_rows(table)),
+        ("Goals", goal_rows([verdict for verdict in found if verdict.was_run])),
+        (
+            f"Classes: success, and medians over cases of the change from {table.reference} "
+            "(95 % interval)",
+            class_rows(table),
+        ),
+        ("Success over the height of stones and stairs", sweep_rows(table)),
+        ("Cases: means over the successful runs ± half a 95 % interval", case_rows(table)),
+        ("Failures", failure_rows(table)),
+    ]
+    return [(title, content) for title, content in every if content[1]]
+
+
+def markdown(table: Table, found: Sequence[Verdict]) -> str:
+    """Returns all tables as a page in Markdown."""
+    parts = [f"Course {table.course.version}, split {table.course.split}, "
+             f"{len(table.course.seeds)} seeds."]  # fmt: skip
+    for title, (columns, rows) in tables(table, found):
+        lines = [columns, ["---"] * len(columns), *rows]
+        parts += [f"{title}:", "\n".join(f"| {' | '.join(line)} |" for line in lines)]
+    return "\n\n".join(parts) + "\n"

@@ -10,7 +10,7 @@ from zipfile import ZipFile
 from fmpy import read_model_description
 
 from hexapod_cosim.cosim.common.archives import open_archive, read_member
-from hexapod_cosim.models.errors import FmuError
+from hexapod_cosim.models.errors import FmuError, refuse_path
 
 FIX = "make one with `hexapod export -o FILE.fmu`"
 DESCRIPTION = "modelDescription.xml"
@@ -40,6 +40,7 @@ def open_description(path: Path) -> Any:
 
     Raises FmuError for a file that is no FMU.
     """
+    refuse_path(path, "an FMU", FmuError)
     if not path.is_file():
         raise FmuError("no such FMU", got=str(path), expected="an existing .fmu file", fix=FIX)
     try:

@@ -12,7 +12,6 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import chdir
 from functools import cached_property, partial
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from types import TracebackType
 from typing import Any, Self
 
@@ -23,6 +22,7 @@ from numpy.typing import NDArray
 from hexapod_cosim.cosim.common.archives import unpack
 from hexapod_cosim.cosim.common.binaries import refuse_incomplete
 from hexapod_cosim.cosim.common.plant_files import packed_binary
+from hexapod_cosim.cosim.common.unpacked import UnpackedFolder
 from hexapod_cosim.cosim.interface.descriptions import read_description
 from hexapod_cosim.cosim.interface.variants import listed_items
 from hexapod_cosim.cosim.master.fmu_log import STATUS, WARNING, FmuLog
@@ -119,7 +119,7 @@ class Fmu:
         self._logged = FmuLog()
         self._log = self._logged.messages
         self.clear_log = self._log.clear  # called before each call: errors quote new messages only
-        self._directory = TemporaryDirectory(prefix="hexapod-fmu-")
+        self._directory = UnpackedFolder()
         self._slave: Any = None
         self._grids: dict[str, int] | None = None  # numbers of grid files by their digest
         try:
@@ -130,15 +130,15 @@ class Fmu:
 
     def _instantiate(self, name: str) -> None:
         """Unpacks the FMU, loads its binary and creates the instance, which logs to our FmuLog."""
-        unpack(self.path, Path(self._directory.name))
+        unpack(self.path, self._directory.path)
         identifier = self.description.coSimulation.modelIdentifier
-        library = packed_binary(self._directory.name, identifier)
+        library = packed_binary(self._directory.path, identifier)
         if library is not None:
             refuse_incomplete(library)
         facts = {
             "guid": self.description.guid,
             "modelIdentifier": identifier,
-            "unzipDirectory": self._directory.name,
+            "unzipDirectory": str(self._directory.path),
         }
         with chdir(Path.cwd()):  # fmpy does not restore the folder when the library fails to load
             slave = FMU2Slave(instanceName=name, libraryPath=library, **facts)
@@ -196,9 +196,9 @@ class Fmu:
 
         A grid file of equal content is not written again. The number is a value of terrain.grid.
         """
-        folder = Path(self._directory.name) / "resources" / "terrain"
+        folder = self._directory.path / "resources" / "terrain"
         if self._grids is None:
-            present = sorted(folder.glob("*.terrain"))
+            present = [path for path in folder.glob("*.terrain") if path.stem.isdecimal()]
             self._grids = {_digest(path.read_bytes()): int(path.stem) for path in present}
         digest = _digest(content)
         if digest not in self._grids:
@@ -210,7 +210,7 @@ class Fmu:
 
     def grid(self, number: int) -> bytes | None:
         """Returns the content of a grid file in the resources of this instance; None without it."""
-        path = Path(self._directory.name) / "resources" / "terrain" / f"{number}.terrain"
+        path = self._directory.path / "resources" / "terrain" / f"{number}.terrain"
         return path.read_bytes() if path.is_file() else None
 
     def names(self, causality: str, kind: str = "Real") -> list[str]:
@@ -417,7 +417,7 @@ class Fmu:
         if slave is not None:
             slave.fmiCallLogger = None
             slave.freeInstance()
-        self._directory.cleanup()
+        self._directory.close()
         self._logged.close()
 
     def __enter__(self) -> Self:

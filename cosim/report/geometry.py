@@ -14,6 +14,7 @@ from hexapod_cosim.cosim.interface.names import vector_names
 from hexapod_cosim.cosim.results.results import StoredResult
 from hexapod_cosim.cosim.results.walk import FLAT, SLOPE
 from hexapod_cosim.models import JOINT_NAMES, LEG_NAMES, HexapodError, load_robot
+from hexapod_cosim.models.schema import parse_toml
 
 Parameters = Mapping[str, float]
 
@@ -62,7 +63,7 @@ def torso_size(run: StoredResult) -> list[float]:
     parameters = run.view.parameters
     hips = np.array([_vector(parameters, f"{leg}.hip_position") for leg in LEG_NAMES])
     try:
-        robot = load_robot(tomllib.loads(run.scenario)["robot"])
+        robot = load_robot(parse_toml(run.scenario)["robot"])
     except (HexapodError, KeyError, TypeError, tomllib.TOMLDecodeError):
         robot = None
     if robot is not None:

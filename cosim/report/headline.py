@@ -42,6 +42,7 @@ MILLI = {  # unit -> factor and unit on a card
     "m/rad": (1e3, "mm/rad"),
     "1": (1.0, ""),
 }
+ROUND_OFF = 1e-9  # m    of an error of the feet; a smaller one is not shown
 MOST_GAINS = 4  # in the sentence
 
 
@@ -220,15 +221,31 @@ def _share(value: float) -> str:
 
 
 def plain_headline(metrics: Mapping[str, float | None], facts: Mapping[str, Any]) -> list[Part]:
-    """Returns the headline of one run: duration, speed, error of the feet, cost of transport."""
+    """Returns the headline of one run: duration, speed, error of the feet, cost of transport.
+
+    That of a drop has the restitution of its first impact instead.
+    """
+    if facts.get("drop"):
+        return [_drop_part(facts)]
     speed = (facts.get("walk") or {}).get("mean_speed")
     label = facts["control"]
     name = f"{label.capitalize()} control" if label in CONTROLS else f"Control {label}"
     begin = f"{name}, {facts['simulated']:.4g} s"
     error, cost = metrics.get("foot_error_stance"), metrics.get("cost_of_transport")
     parts = [f"{1e3 * speed:.3g} mm/s"] if speed is not None and math.isfinite(speed) else []
-    if error is not None and math.isfinite(error):
+    if error is not None and math.isfinite(error) and error > ROUND_OFF:
         parts.append(f"standing feet {1e3 * error:.3g} mm from their plan")
     if cost is not None and math.isfinite(cost):
         parts.append(f"cost of transport {cost:.3g}")
     return [Part(f"{begin}: {', '.join(parts)}." if parts else f"{begin}.")]
+
+
+def _drop_part(facts: Mapping[str, Any]) -> Part:
+    """Returns the headline of a drop: the restitution delivered and the one asked for."""
+    drop, asked = facts["drop"], facts["drop"]["asked"]
+    first = drop["bounces"][0]
+    text = (
+        f"Drop, {facts['simulated']:.4g} s: restitution {first['restitution']:.3g} delivered at "
+        f"{first['speed']:.3g} m/s"
+    )
+    return Part(f"{text}, {asked:.3g} asked for." if asked is not None else f"{text}.")

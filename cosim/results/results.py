@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import hashlib
+import tempfile
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
@@ -9,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import tomlkit
+from filelock import FileLock, Timeout
 
 from hexapod_cosim.cosim.common.files import (
     RUN_FILE,
@@ -79,6 +82,7 @@ def results_folder(path: Path, parts: Sequence[str] = ()) -> Iterator[ResultsFol
     """
     made = claim_folder(path)
     folder = ResultsFolder(path, parts)
+    lock = _lock(path)
     try:
         yield folder
     except BaseException as error:
@@ -90,9 +94,35 @@ def results_folder(path: Path, parts: Sequence[str] = ()) -> Iterator[ResultsFol
             write_json(path / RUN_FILE, {**facts, "status": status, "reason": reason})
         raise
     finally:
+        lock.release()
         for place in () if folder.begun else made:
             with suppress(OSError):  # no longer empty
                 place.rmdir()
+
+
+def _lock(folder: Path) -> FileLock:
+    """Locks a folder against other processes. Raises HexapodError when one of them has it.
+
+    The lock's file is in the temporary folder, so that results hold nothing else; the system
+    releases the lock of a killed process. On a file system without locks nothing is locked.
+    """
+    name = hashlib.sha256(str(folder.resolve()).encode("utf-8", "surrogatepass")).hexdigest()[:32]
+    lock = FileLock(
+        Path(tempfile.gettempdir()) / f"hexapod-results-{name}.lock",
+        blocking=False,
+        fallback_to_soft=False,
+    )
+    try:
+        lock.acquire()
+    except Timeout as error:
+        raise HexapodError(
+            "another process writes its results into this folder",
+            fix="wait for it, or choose another with -o",
+            where=str(folder),
+        ) from error
+    except OSError:
+        pass
+    return lock
 
 
 def write_result(result: Result, folder: Path) -> list[Path]:
@@ -174,6 +204,18 @@ def read_result(folder: Path) -> StoredResult:
     if checked is not None:
         accuracy = accuracy_from_table(checked, where=str(folder / METRICS_FILE))
     return StoredResult(view, metrics, facts, read_scenario(folder), accuracy)
+
+
+@contextmanager
+def damage_reported(folder: Path) -> Iterator[None]:
+    """Raises HexapodError for any exception inside, which then is due to damaged results."""
+    try:
+        yield
+    except HexapodError:
+        raise
+    except Exception as error:  # facts of wrong types fail anywhere in a report
+        got = f"{type(error).__name__}: {error}"
+        raise _damaged(folder, got, "results as `hexapod` wrote them") from error
 
 
 def read_facts(folder: Path) -> Mapping[str, Any]:

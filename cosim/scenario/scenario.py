@@ -46,6 +46,7 @@ from hexapod_cosim.cosim.scenario.records import (
     Variation,
 )
 from hexapod_cosim.models import Robot, RobotError, ScenarioError, load_robot, unknown_name
+from hexapod_cosim.models.errors import refuse_path
 from hexapod_cosim.models.ground.table import (
     beside,
     merged_terrain,
@@ -57,6 +58,7 @@ from hexapod_cosim.models.records import STATIC_LAWS, Soil, Terrain
 from hexapod_cosim.models.schema import (
     Number,
     expect_table,
+    parse_toml,
     read_given,
     refuse_unknown_keys,
     require,
@@ -90,9 +92,10 @@ def read_tables(path_or_name: str | Path) -> tuple[dict[str, Any], str]:
 
     The second value is the file's name for messages. Raises ScenarioError.
     """
+    refuse_path(path_or_name, "the scenario", ScenarioError)
     path = _scenario_path(path_or_name)
     try:
-        table = tomllib.loads(path.read_text(encoding="utf-8"))
+        table = parse_toml(path.read_text(encoding="utf-8"))
     except OSError as error:
         fix = "give the path of a scenario file, or one of: " + ", ".join(list_scenarios())
         raise ScenarioError(
@@ -108,6 +111,7 @@ def read_tables(path_or_name: str | Path) -> tuple[dict[str, Any], str]:
         ) from error
     if isinstance(table.get("terrain"), dict):
         table["terrain"] = beside(table["terrain"], path.parent)
+    refuse_path(str(table.get("robot", "")), "the robot file", ScenarioError)
     if "control" in table:
         table["control"] = control_beside(table["control"], path.parent)
     near = path.parent / str(table.get("robot", ""))
@@ -156,7 +160,7 @@ def with_values(table: Mapping[str, Any], values: Mapping[str, Any]) -> dict[str
 def parse_value(value: str) -> Any:
     """Returns the value as TOML reads it; other text is a string, so names need no quotes."""
     try:
-        return tomllib.loads(f"value = {value}")["value"]
+        return parse_toml(f"value = {value}")["value"]
     except tomllib.TOMLDecodeError:
         return value
 

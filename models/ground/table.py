@@ -8,7 +8,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from hexapod_cosim.models.errors import RobotError, unknown_name
+from hexapod_cosim.models.errors import RobotError, refuse_path, unknown_name
 from hexapod_cosim.models.ground.catalogue import CATALOGUE, make_surface
 from hexapod_cosim.models.ground.patches import PATCH, read_patches
 from hexapod_cosim.models.records import PLANES, Terrain
@@ -135,6 +135,7 @@ def beside(table: Mapping[str, Any], folder: Path) -> dict[str, Any]:
     file = table.get("file")
     if not isinstance(file, str) or not file:
         return dict(table)
+    refuse_path(file, "the height map", RobotError)
     return {**table, "file": str((folder / file).resolve())}
 
 

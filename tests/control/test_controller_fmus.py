@@ -92,7 +92,7 @@ def test_a_missing_joint_angle_is_named_with_what_the_fmu_has() -> None:
 
 
 def test_a_table_with_a_wrong_name_is_refused() -> None:
-    with pytest.raises(FmuError, match="not a name of a measurement.*'LF.coxa.angle_ref'"):
+    with pytest.raises(FmuError, match=r"not a name of a measurement.*'LF.coxa.angle_ref'"):
         names_of_map({"LF.coxa.angel_ref": "q"}, where="test")
     with pytest.raises(FmuError, match="the map names a variable that the FMU lacks, for command"):
         connect([real("v", "input")], {"command.vx": "w"}, torque=False, where="test")

@@ -69,8 +69,8 @@ def hexapod_athena() -> Robot:
 def test_a_controller_that_raises_ends_the_run_with_what_was_recorded() -> None:
     result = hexapod_cosim.simulate("walk_flat", Fails, settings=SHORT)
     assert result.outcome.status == "failed"
-    assert result.recording.time[-1] == pytest.approx(0.105)
-    assert f"{Path(__file__).resolve()}, line 40, in step: RuntimeError: no idea" in (
+    assert result.recording.time[-1] == pytest.approx(0.1)  # the step at 0.105 s fails
+    assert f"{Path(__file__).resolve()}, line 37, in step: RuntimeError: no idea" in (
         result.outcome.reason
     )
 

@@ -59,7 +59,7 @@ def test_a_class_that_takes_any_name_gets_all_parameters(tmp_path: Path) -> None
 
 
 def test_a_missing_parameter_is_named(tmp_path: Path) -> None:
-    with pytest.raises(ControllerError, match="got 'amplitude'.*--set control.amplitude=VALUE"):
+    with pytest.raises(ControllerError, match=r"got 'amplitude'.*--set control.amplitude=VALUE"):
         made(tmp_path, "class Law:\n    def __init__(self, amplitude): ...\n")
 
 
@@ -159,7 +159,7 @@ def test_a_parameter_that_no_control_takes_is_refused(tmp_path: Path) -> None:
     )
     control = parse_control(f"{path}:Law", where="test")
     table = {"control": {"law": control.text, "lfit": 3}}
-    with pytest.raises(ControllerError, match="test: control: no control takes.*'lift'"):
+    with pytest.raises(ControllerError, match=r"test: control: no control takes.*'lift'"):
         check_control(scenario_from_table(table, where="test"), [control])
     table = {"control": {"law": control.text, "lift": 3, "Law": {"lift": 4}, "other": {"x": 1}}}
     check_control(scenario_from_table(table, where="test"), [control])

@@ -47,7 +47,7 @@ def test_four_controls_stand_in_one_table_and_one_report(
         assert f"gainst kinematic control, {label} " in page
         assert f"{label} against kinematic" in page
     assert "compliant walks" not in page
-    code, again, _ = call("report", folder)
+    code, _, _ = call("report", folder)
     assert code == 0
     assert "sway, by hand: change" in out
 
@@ -84,9 +84,11 @@ def test_simulate_runs_each_control_into_a_folder_of_its_label(call: Call, tmp_p
     words = ["--control", "kinematic", "--control", CPG]
     code, out, _ = call(
         "simulate", "walk_flat", *words, "--set", "duration=0.2", "--set", "outputs.plots=false",
+        "--set", "control.lift=0.2", "--json",
         "-o", tmp_path / "out",
     )  # fmt: skip
     assert code == 0
+    assert list(json.loads(out)) == ["kinematic", "Cpg"]
     assert sorted(path.name for path in (tmp_path / "out").iterdir()) == ["Cpg", "kinematic"]
     facts = json.loads((tmp_path / "out" / "Cpg" / "run.json").read_text())
     assert (facts["control"], facts["controller"]["kind"]) == ("Cpg", "python")
@@ -108,7 +110,7 @@ def test_a_law_that_raises_ends_the_run_with_its_line_and_its_recording(
         "-o", tmp_path / "out",
     )  # fmt: skip
     assert_refused(
-        outcome, f"the run ended at 0.100 s of 1 s: {law}, line 5, in step: AttributeError:"
+        outcome, f"the run ended at 0.095 s of 1 s: {law}, line 5, in step: AttributeError:"
     )
     assert (tmp_path / "out" / "results.partial.parquet").is_file()
 

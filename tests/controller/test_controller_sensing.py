@@ -10,6 +10,7 @@ from controllers import make, obey, run, squeezed
 from gains import PERIOD
 
 from hexapod_cosim.controller import BodyCommand, Measurement, Parts
+from hexapod_cosim.controller.comply.compliant import sense
 from hexapod_cosim.controller.walk.hold import Sight
 from hexapod_cosim.models.kinematics import axis_quaternion, quaternion_product
 
@@ -26,7 +27,7 @@ def test_the_forces_on_a_torso_that_leans_as_commanded_are_judged_upright() -> N
     compliant = controller.compliant
     assert compliant is not None
     np.testing.assert_allclose(
-        compliant._sense(measurement, compliant.stance.posture), measurement.foot_force, atol=1e-12
+        sense(measurement, compliant.stance.posture), measurement.foot_force, atol=1e-12
     )
 
 
@@ -75,13 +76,13 @@ def test_reaching_for_missing_ground_is_told_to_the_servos_as_speed() -> None:
     measurement = Measurement(angle=controller.stance.copy())
     measurement.foot_force[:, 2] = 11.0
     measurement.foot_force[1] = 0.0
-    moved = run(controller, BodyCommand(), 100, measurement=measurement)[:, :2, 1]
+    moved = run(controller, BodyCommand(), 150, measurement=measurement)[:, :2, 1]
     slope = np.diff(moved[:, 0], axis=0) / PERIOD
     reaching = np.abs(slope).max(axis=1) > 0.0
-    assert 40 < reaching.sum() < 60  # periods in 20 mm at 0.08 m/s
+    assert 90 < reaching.sum() < 110  # periods in 40 mm at 0.08 m/s
     np.testing.assert_allclose(moved[1:, 1][reaching][:-1], slope[reaching][:-1], rtol=1e-6)
     assert not moved[1:, 1][~reaching].any()
-    assert controller.diagnostics.lift[1] < -0.019
+    assert controller.diagnostics.lift[1] < -0.039
     assert not controller.diagnostics.fallback.any()
 
 

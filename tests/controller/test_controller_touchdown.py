@@ -28,7 +28,7 @@ def test_a_foot_that_meets_the_ground_early_keeps_the_height_at_which_it_touched
     for _ in range(15):
         fall = 0.001
         height -= fall
-        down.step(only(2), np.full(6, fall), YES, NO)
+        down.step(only(2), np.full(6, fall), YES, NO, NO)
         total += fall
         heights.append(height + down.offset[2])
     np.testing.assert_allclose(heights, 0.02, atol=1e-12)
@@ -38,22 +38,22 @@ def test_a_foot_that_meets_the_ground_early_keeps_the_height_at_which_it_touched
 
 def test_only_a_foot_that_swings_is_held_up() -> None:
     down = Touchdown(period=PERIOD)
-    down.step(YES, np.full(6, 0.002), NO, NO)
+    down.step(YES, np.full(6, 0.002), NO, NO, NO)
     assert not down.offset.any()
 
 
 def test_it_keeps_it_through_its_stance_and_gives_it_up_in_the_next_swing() -> None:
     down = Touchdown(period=PERIOD)
     for _ in range(5):
-        down.step(only(2), np.full(6, 0.002), YES, NO)
+        down.step(only(2), np.full(6, 0.002), YES, NO, NO)
     for _ in range(100):
-        down.step(YES, STILL, NO, YES)
+        down.step(YES, STILL, NO, YES, NO)
     assert down.offset[2] == pytest.approx(0.01)
     for k in range(1, 40):
-        down.step(NO, STILL, YES, NO)
+        down.step(NO, STILL, YES, NO, NO)
         assert down.offset[2] == pytest.approx(0.01 * math.exp(-k * PERIOD / 0.06))
     for _ in range(60):
-        down.step(NO, STILL, YES, NO)
+        down.step(NO, STILL, YES, NO, NO)
     assert down.offset[2] == 0.0
     assert not down.busy()
 
@@ -61,33 +61,33 @@ def test_it_keeps_it_through_its_stance_and_gives_it_up_in_the_next_swing() -> N
 def test_a_foot_is_held_no_higher_than_it_may() -> None:
     down = Touchdown(period=PERIOD)
     for _ in range(30):
-        down.step(only(2), np.full(6, 0.002), YES, NO)
+        down.step(only(2), np.full(6, 0.002), YES, NO, NO)
     assert down.offset[2] == 0.03
 
 
 def test_a_foot_that_finds_no_ground_reaches_down_after_the_grace_time_to_the_limit() -> None:
     down, missing = Touchdown(period=PERIOD), ~only(2)
     offsets = []
-    for _ in range(100):
-        down.step(missing, STILL, NO, YES)
+    for _ in range(150):
+        down.step(missing, STILL, NO, YES, NO)
         offsets.append(down.offset[2])
     begun = next(k for k, offset in enumerate(offsets) if offset)
     assert begun in {8, 9}  # 40 ms are 8 periods; times are sums, so it may be the 9th
-    reach = -0.08 * PERIOD * np.arange(1, 101 - begun)  # with 80 mm/s down to 20 mm
-    np.testing.assert_allclose(offsets[begun:], np.maximum(reach, -0.02), atol=1e-12)
+    reach = -0.08 * PERIOD * np.arange(1, 151 - begun)  # with 80 mm/s down to 40 mm
+    np.testing.assert_allclose(offsets[begun:], np.maximum(reach, -0.04), atol=1e-12)
 
 
 def test_it_stops_where_it_finds_the_ground() -> None:
     down, missing = Touchdown(period=PERIOD), ~only(2)
     for _ in range(20):
-        down.step(missing, STILL, NO, YES)
+        down.step(missing, STILL, NO, YES, NO)
     found = down.offset[2]
     assert -0.02 < found < 0.0
     for _ in range(50):
-        down.step(YES, STILL, NO, YES)
+        down.step(YES, STILL, NO, YES, NO)
     assert down.offset[2] == found
     for _ in range(7):
-        down.step(missing, STILL, NO, YES)  # a short loss of contact does not move the foot
+        down.step(missing, STILL, NO, YES, NO)  # a short loss of contact does not move the foot
     assert down.offset[2] == found
 
 
@@ -100,24 +100,39 @@ def test_on_flat_ground_nothing_happens() -> None:
             np.full(6, 0.001) if swings else STILL,
             YES if swings else NO,
             NO if swings else YES,
+            NO,
         )
         assert not down.busy()
         assert not down.offset.any()
+
+
+def test_an_awaited_foot_searches_at_once_at_a_set_speed_and_stops_within_a_period() -> None:
+    down = Touchdown(period=PERIOD)
+    for k in range(1, 21):
+        down.step(NO, STILL, YES, NO, only(2))
+        assert down.offset[2] == pytest.approx(-0.08 * PERIOD * k)
+    assert np.count_nonzero(down.offset) == 1
+    found = down.offset[2]
+    down.step(only(2), STILL, YES, NO, NO)
+    assert down.offset[2] == found
+    for _ in range(200):
+        down.step(NO, STILL, YES, NO, only(2))
+    assert down.offset[2] == -0.04
 
 
 def test_what_is_negligible_goes_at_once() -> None:
     down = Touchdown(period=PERIOD)
     for size, goes in ((0.99e-5, True), (1.01e-5, False)):
         down.restore({"offset": np.full(6, size), "late": STILL})
-        down.step(NO, STILL, YES, NO)
+        down.step(NO, STILL, YES, NO, NO)
         assert (down.offset == 0.0).all() == goes
 
 
 def test_a_saved_state_does_not_change() -> None:
     down = Touchdown(period=PERIOD)
-    down.step(only(2), np.full(6, 0.002), YES, NO)
+    down.step(only(2), np.full(6, 0.002), YES, NO, NO)
     state = down.save()
-    down.step(only(2), np.full(6, 0.002), YES, NO)
+    down.step(only(2), np.full(6, 0.002), YES, NO, NO)
     down.restore(state)
     assert down.offset[2] == 0.002
 
@@ -151,8 +166,8 @@ def test_the_laws_reach_for_ground_that_is_missing_while_the_others_carry_the_we
     force[:, 2] *= 6.0 / 5.0
     force[1] = 0.0
     plan(laws)
-    for _ in range(100):
+    for _ in range(150):
         laws.feel(force)
-    assert laws.touchdown.offset[1] == -0.02
+    assert laws.touchdown.offset[1] == -0.04
     assert not laws.doubted.any()
-    assert ROBOT.gait.step_height > 0.02
+    assert ROBOT.gait.step_height >= 0.04

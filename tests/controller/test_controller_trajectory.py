@@ -257,3 +257,45 @@ def test_the_clock_stays_stopped_without_a_command() -> None:
     log = record(advance(walk, REST, 100, going=False))
     np.testing.assert_array_equal(log["plane"], np.tile(walk.paths.home, (100, 1)))
     assert not walk.paths.walking
+
+
+def test_while_the_clock_is_held_no_foot_moves_over_the_ground_and_then_it_continues() -> None:
+    robot = load_robot("athena")
+    paths = FootPaths(make_gait(robot), LegSolver(robot).forward(robot.stance), period=0.005)
+    twist = Twist(0.05 + 0.01j, 0.1)
+    feet, number = paths.plan(paths.reset(), 0, going=True, twist=twist), 0
+    while paths.reach(number + 1):
+        number += 1
+        feet = paths.walk(number, twist, feet)
+    landing = paths.landing(number)
+    assert landing.sum() == 3
+    feet = paths.hold(feet, number, twist=twist)
+    ground, phase = paths._ground_of(feet), feet.phase
+    for k in range(1, 41):
+        assert paths.reach(k)
+        np.testing.assert_array_equal(paths.landing(k), landing)
+        before, feet = feet, paths.walk(k, twist, feet)
+        np.testing.assert_allclose(paths._ground_of(feet), ground, atol=1e-15)
+        np.testing.assert_array_equal(feet.phase, phase)
+        assert not feet.rise.any()
+        np.testing.assert_allclose((feet.plane - before.plane) / 0.005, feet.velocity, atol=1e-4)
+    feet = paths.plan(feet, 40, going=True, twist=twist)
+    np.testing.assert_array_equal(feet.phase, phase)
+    assert not (paths.swinging & landing).any()
+    assert not paths.awaited.any()
+
+
+def test_a_foot_that_has_met_the_ground_stays_there() -> None:
+    robot = load_robot("athena")
+    paths = FootPaths(make_gait(robot), LegSolver(robot).forward(robot.stance), period=0.005)
+    twist = Twist(0.08 + 0j, 0.0)
+    feet = paths.plan(paths.reset(), 0, going=True, twist=twist)
+    for number in range(1, 71):
+        feet = paths.walk(number, twist, feet)
+    leg = int(np.flatnonzero(paths.swinging)[0])
+    paths.met = np.arange(6) == leg
+    place = paths._ground_of(feet)[leg]
+    for number in range(71, 91):
+        feet = paths.walk(number, twist, feet)
+        assert abs(paths._ground_of(feet)[leg] - place) < 1e-15
+        assert feet.velocity[leg] == pytest.approx(-0.08)

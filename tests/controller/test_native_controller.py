@@ -270,6 +270,28 @@ def test_ground_that_is_met_early_is_answered_at_the_same_step(
     assert close(worst)
 
 
+@pytest.mark.parametrize("gait", ["tripod", "ripple", "amble"])
+def test_feet_that_find_no_ground_are_awaited_at_the_same_step(
+    controller_core: ct.CDLL, gait: str
+) -> None:
+    """Foot 2 finds the ground 12 mm lower than planned, foot 3 in some steps nowhere."""
+    ground, held = Ground(), []
+
+    def sense(controller: Controller, step: int, measurement: Measurement) -> None:
+        ground(controller, step, measurement)
+        compliant = controller.compliant
+        assert compliant is not None
+        lowered, awaited = compliant.laws.touchdown.offset, controller.paths.awaited
+        measurement.foot_force[:, 2] += 12.0 * (awaited & (lowered < -0.012))
+        measurement.foot_force[2] *= not (controller.paths.swinging[2] and lowered[2] > -0.012)
+        measurement.foot_force[3] *= step % 700 < 500
+        held.append(controller.paths.held)
+
+    worst, _ = differences(controller_core, setup_of(gait=gait), sense=sense)
+    assert close(worst)
+    assert 0.02 < np.mean(held) < 0.8
+
+
 def test_joints_that_are_outrun_fall_back_at_the_same_step(controller_core: ct.CDLL) -> None:
     setup = setup_of()
     slow = replace(setup.robot, servo=replace(setup.robot.servo, speed_max=1.2))

@@ -104,6 +104,7 @@ def test_an_interrupt_writes_the_table_of_the_completed_runs(
         (["--control", "kinematc"], ["unknown control", "kinematic"]),
         ([*KINEMATIC, *KINEMATIC], ["two controls with one label"]),
         (["--split", "train"], ["unknown split", "judge"]),
+        (["--control", "missing.py:Law"], ["missing.py"]),
         (["--case", "rough_11"], ["unknown case", "rough_10"]),
         (["--seeds", "0"], ["--seeds", "1 to 1000"]),
         (["--workers", "0"], ["--workers", "1 to"]),

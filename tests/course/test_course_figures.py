@@ -10,6 +10,7 @@ import pytest
 
 from hexapod_cosim.cosim.course import texts
 from hexapod_cosim.cosim.course.goals import Verdict, verdicts
+from hexapod_cosim.cosim.course.parts import judge_parts
 from hexapod_cosim.cosim.course.reading import load_course
 from hexapod_cosim.cosim.course.records import BY_NAME, QUANTITIES, Case
 from hexapod_cosim.cosim.course.runs import Run, failure_of
@@ -180,6 +181,33 @@ def test_a_reference_that_never_fails_gives_no_critical_height() -> None:
     found = verdict_of(sweep_table({"stairs_25": 4}, {}), "success")
     assert found.reached is None
     assert found.measured.note == "before does not fail on rough"
+
+
+def part_table(with_part: Mapping[str, float], success: int = 4) -> Table:
+    """Returns a table in which every figure without the part is 1, on flat ground."""
+    course = replace(COURSE, cases=(case_of("flat_tanh"),))
+    runs = tuple(
+        run_of("flat_tanh", label, seed, values, "" if seed < walks else "stuck")
+        for seed in course.seeds
+        for label, values, walks in (("all", with_part, success), ("without x", {}, 4))
+    )
+    return Table(course, ("all", "without x"), runs, {"without x": "all"})
+
+
+def test_a_part_pays_that_betters_a_figure_and_worsens_none() -> None:
+    (found,) = judge_parts(part_table({"slip": 0.85, "heat": 1.04}))
+    assert (found.best.kind, found.best.quantity, found.worst.quantity) == ("flat", "slip", "heat")
+    assert found.best.change == pytest.approx(-0.15)
+    assert found.pays
+
+
+@pytest.mark.parametrize(
+    ("values", "success"),
+    [({"slip": 0.95}, 4), ({"slip": 0.5, "heat": 1.06}, 4), ({"slip": 0.5}, 3)],
+)
+def test_a_part_does_not_pay_otherwise(values: Mapping[str, float], success: int) -> None:
+    (found,) = judge_parts(part_table(values, success))
+    assert not found.pays
 
 
 def test_tables_have_a_cell_for_every_column() -> None:

@@ -262,6 +262,20 @@ def test_the_controller_of_the_page_lowers_the_roll(reader: Path) -> None:
     assert with_law < without
 
 
+def test_the_five_minutes_of_the_page_on_controllers_work_as_typed(reader: Path) -> None:
+    page = blocks(DOCS / "howto" / "my-controller.md")
+    (shell,) = (text for kind, text in page if kind == "sh")
+    lines = shell.splitlines()
+    assert len(lines) == 3
+    for line in lines:
+        run(reader, *shlex.split(line), *(["--seeds", "2"] if " compare " in line else []))
+    assert (reader / "out" / "mine" / "report.html").is_file()
+    code = next(text for kind, text in page if kind == "python")
+    said = run(reader, sys.executable, "-c", code).strip().splitlines()
+    assert [" m, slip " in line for line in said] == [True, True, False]
+    assert said[-1] == str(Path("out") / "both" / "report.html")
+
+
 def test_designed_gains_walk_and_serve_a_task_of_many(reader: Path) -> None:
     """The pages on controllers and on clusters, whose designs go to the same place: once is
     enough.

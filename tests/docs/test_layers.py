@@ -243,9 +243,9 @@ def test_only_the_fmi_layer_names_the_standard(component: str) -> None:
         )
 
 
-# A second definition stands for the first: complex numbers for lanes, and each component's side of
-# component.h.
-STAND_INS = {"complex_step.h": "hx_", "component.c": "hx_component_"}
+# A second definition stands for the first: complex numbers and one lane for lanes, and each
+# component's side of component.h.
+STAND_INS = {"complex_step.h": "hx_", "one_lane.h": "hx_", "component.c": "hx_component_"}
 DEFINED = re.compile(r"^\}\s*(hx[A-Z]\w*);|^\w[\w ]*?[ *]+(hx_\w+)\([^;{]*\)\s*\{", re.MULTILINE)
 
 

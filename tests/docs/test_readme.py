@@ -71,8 +71,23 @@ def test_the_bare_fmu_simulates(folder: Path) -> None:
 
 
 def test_the_python_of_the_readme_prints_a_standing_height(folder: Path) -> None:
-    (snippet,) = (text for kind, text in BLOCKS if kind == "python")
+    _, snippet = (text for kind, text in BLOCKS if kind == "python")
     assert 0.12 < float(run(folder, sys.executable, "-c", snippet)) < 0.14
+
+
+@pytest.mark.parametrize("page", ["README.md", "docs/index.md", "docs/howto/my-controller.md"])
+def test_the_first_code_of_a_page_is_the_public_call(page: str) -> None:
+    first = next(text for kind, text in blocks(ROOT / page) if kind == "python")
+    assert first.startswith("import hexapod_cosim\n")
+    assert "hexapod_cosim.simulate(" in first
+
+
+def test_the_public_call_of_the_readme_writes_a_report(folder: Path) -> None:
+    snippet = next(text for kind, text in BLOCKS if kind == "python")
+    position, slip = run(folder, sys.executable, "-c", snippet).strip().splitlines()
+    assert position.startswith("[")
+    assert 0.0 < float(slip) < 1.0
+    assert (folder / "out" / "walk" / "report.html").is_file()
 
 
 def test_the_scenario_of_the_readme_is_valid(folder: Path) -> None:

@@ -1,5 +1,5 @@
-"""Laws on every surface of the catalogue: energy books, touch-downs on the ground, and the same bits
-by another instance and after a restore.
+"""Laws on every surface of the catalogue: energy books, touch-downs on the ground, and the same
+bits by another instance and after a restore.
 """
 
 from __future__ import annotations

@@ -76,11 +76,10 @@ def test_distance_and_normal_are_continuous_over_1000_borders_of_cells(core: ct.
 @pytest.mark.parametrize("cell", [0.05, 0.004], ids=["50 mm", "4 mm"])
 def test_no_sphere_is_deeper_than_its_bound(core: ct.CDLL, kind: int, cell: float) -> None:
     rng = np.random.default_rng(11)
-    height = rng.uniform(-0.01, 0.01, (50, 40)) + np.linspace(0.0, 0.2, 40)
+    height = cell * (rng.uniform(-0.03, 0.03, (50, 40)) + np.linspace(0.0, 4.0, 40))
     ground, radius = Ground(core, grid_bytes(height, cell=cell, kind=kind)), 0.015
-    low, high = [-4 * cell, -4 * cell, -0.03], [44 * cell, 54 * cell, 0.3]
-    for centre in rng.uniform(low, high, (3000, 3)):  # at most 40 mm below the surface
-        centre[2] += 0.2 * np.clip(centre[0] / (39 * cell), 0.0, 1.0)
+    for place in rng.uniform([-4.0, -4.0, -0.6], [44.0, 54.0, 6.0], (3000, 3)):  # cells
+        centre = cell * (place + [0.0, 0.0, 4.0 * np.clip(place[0] / 39.0, 0.0, 1.0)])
         distance, _, _ = ground.face(centre)
         assert ground.depth_bound(centre, radius) >= radius - distance
 

@@ -16,6 +16,9 @@ from states import changed
 from hexapod_cosim.models import Robot, load_robot
 from hexapod_cosim.models.dynamics import Command
 from hexapod_cosim.models.records import Array
+from hexapod_cosim.models.soil.law import table_row
+from hexapod_cosim.models.soil.presets import soil_preset
+from hexapod_cosim.models.statics import standing
 
 ATHENA = load_robot("athena")
 HEIGHT = 0.2  # m, of the torso above the ground at the start
@@ -190,6 +193,21 @@ def test_a_grid_that_is_missing_or_too_fine_for_the_feet_is_refused(core: ct.CDL
     assert plant.save() == before
 
 
+@pytest.mark.parametrize("kind", [1, BLOCKS])
+def test_a_foot_deeper_than_its_radius_at_the_start_is_refused_with_its_depth(
+    core: ct.CDLL, kind: int
+) -> None:
+    ground = Ground(core, grid_bytes(np.zeros((81, 81)), cell=0.05, origin=(-2, -2), kind=kind))
+    plant = on_grid(core, ATHENA, ground, position=(0.0, 0.0, 1.0))
+    above = float(np.min(np.array(plant.output().foot.position)[:, 2]))  # lowest points
+    before = plant.save()
+    refused = r"got foot LF 0\.02 m deep .* at most its radius, 0\.015 m; raise .* by 0\.005 m"
+    with pytest.raises(PlantError, match=refused):
+        start_on_grid(plant, ground, position=(0.0, 0.0, 1.0 - above - 0.02))
+    assert plant.save() == before
+    start_on_grid(plant, ground, position=(0.0, 0.0, 1.0 - above + 1e-6))
+
+
 def test_derivatives_on_a_smooth_grid_are_those_of_differences(core: ct.CDLL) -> None:
     ground = Ground(core, rough(6))
     robot = changed(ATHENA, solver={"tolerance": 1e-8})
@@ -232,3 +250,44 @@ def test_a_material_s_friction_and_stiffness_are_those_of_the_touch_down(core: c
     load = [foot.normal_force[foot.contact != 0].mean() for foot in feet]
     stiffness = [f / d**1.5 for f, d in zip(load, depth, strict=True)]
     assert stiffness[1] < 0.5 * stiffness[0]
+
+
+def test_a_rigid_patch_beside_a_footprint_carries_a_foot_at_its_surface(core: ct.CDLL) -> None:
+    """The feet in front leave prints in sand 10 mm before a rigid patch, and hop onto it, within
+    the radius of the prints.
+    """
+    robot = changed(ATHENA, foot={"pad_radius": 0.025}, body={"contact": "off"})
+    pose = standing(robot)
+    table = np.array([np.concatenate([[np.nan] * 3, table_row(soil_preset("dry_sand").soil)])])
+    material, front = np.ones((101, 101)), 0.2418825
+    material[:, 51:] = 0.0  # rigid from 10 mm before the front feet's second place on
+    file = grid_bytes(
+        np.zeros((101, 101)),
+        cell=0.1,
+        origin=(front + 0.01 - 5.05, -5.0),
+        material=material,
+        table=table,
+    )
+    ground = Ground(core, file)
+    plant = on_grid(
+        core,
+        robot,
+        ground,
+        position=np.add(pose.position, (0.0, 0.0, 1e-3)),
+        quaternion=pose.quaternion,
+        angle=pose.angle,
+    )
+    weight, landed, sunk = robot.weight, 0, 0.0
+    for k in range(80):
+        push = np.zeros(3)
+        if 10 <= k < 16:
+            push = np.array([0.4, 0.0, 4.0]) * weight
+        plant.step(0.005 * (k + 1), Command(angle_ref=robot.stance, push_force=push))
+        foot = plant.output().foot
+        for leg in (0, 3):
+            if k > 20 and foot.contact[leg] and foot.position[leg][0] > front + 0.01:
+                landed, sunk = landed + 1, max(sunk, float(foot.sinkage[leg]))
+    prints = plant.output().footprints
+    assert prints == 6
+    assert landed > 20
+    assert sunk == 0.0

@@ -1,5 +1,5 @@
-"""A rigid sphere on height fields: oscillation and rolling in a bowl, rebounds at 3 m/s, and forces at
-borders of cells.
+"""A rigid sphere on height fields: oscillation and rolling in a bowl, rebounds at 3 m/s, and forces
+at borders of cells.
 
 The sphere is the torso of a robot whose legs are small, light, locked and inside of it: its eight
 corners coincide, so that each carries an eighth of the load.

@@ -99,9 +99,13 @@ class Opened:
 
         Playwright's own function would need eval, which the page forbids.
         """
+        self.until(lambda: bool(self.value(expression)), expression)
+
+    def until(self, holds: Callable[[], bool], what: str = "the condition") -> None:
+        """Waits until a condition holds: the page draws some frames after an event."""
         end = time.monotonic() + PATIENCE / 1e3
-        while not self.value(expression):
-            assert time.monotonic() < end, f"never true: {expression}"
+        while not holds():
+            assert time.monotonic() < end, f"never true: {what}"
             self.page.wait_for_timeout(50)
 
     def seek(self, seconds: float) -> None:

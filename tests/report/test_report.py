@@ -170,6 +170,17 @@ def test_a_single_run_is_described_by_speed_feet_and_cost() -> None:
     )
     (part,) = plain_headline({"foot_error_stance": None}, facts | {"walk": {}})
     assert part.text == "Compliant control, 10 s."
+    (part,) = plain_headline({"foot_error_stance": 1.4e-16}, facts | {"walk": {}})
+    assert part.text == "Compliant control, 10 s."
+
+
+def test_a_drop_is_described_by_its_restitution() -> None:
+    bounces = [{"speed": 0.94, "restitution": 0.4926}, {"speed": 0.463, "restitution": 0.4824}]
+    facts = {"control": "kinematic", "simulated": 3.0}
+    (part,) = plain_headline({}, facts | {"drop": {"asked": 0.5, "bounces": bounces}})
+    assert part.text == "Drop, 3 s: restitution 0.493 delivered at 0.94 m/s, 0.5 asked for."
+    (part,) = plain_headline({}, facts | {"drop": {"asked": None, "bounces": bounces}})
+    assert part.text == "Drop, 3 s: restitution 0.493 delivered at 0.94 m/s."
 
 
 def test_without_the_viewer_a_report_has_its_tables_and_says_how_to_get_the_rest(

@@ -88,6 +88,7 @@ def plan(
         height=height * air,
         rise=rise * air,
         swinging=~stands,
+        awaited=np.zeros(6, dtype=np.bool_),
         overspeed=overspeed,
     )
 

@@ -20,6 +20,8 @@ static const double least_scale = 0.5, largest_scale = 3.0;
 static const double largest_lean = 0.4;
 /* 1, of the step height: a foot that is planned higher is in the air for certain */
 static const double high_share = 0.25;
+static const double carrying =
+    0.1; /* 1, in thirds of the weight: an awaited foot with more stands */
 
 enum {
   HX_TRIPOD_LEGS = 3
@@ -123,16 +125,24 @@ static void judge_sensors(const hxComplianceModel *model, const hxPlan *plan,
   if (doubted) replace_forces(plan, force, laws);
 }
 
+/* Returns whether a foot carries so much that the gait clock need not wait for it. */
+static int carries(const hxCompliance *laws, int leg) {
+  return laws->touching[leg] && laws->law[leg].load > carrying;
+}
+
 /* Adapts the paths to ground that is met early or late (C36). */
 static void meet_ground(const hxComplianceModel *model, const hxPlan *plan,
                         const double met[HX_LEGS], hxCompliance *laws) {
   double falling[HX_LEGS];
-  int early[HX_LEGS];
+  int early[HX_LEGS], searching[HX_LEGS];
   laws->regaining = 1;
   hx_landings_early(&laws->landings, met, plan->height, early);
-  for (int leg = 0; leg < HX_LEGS; ++leg) falling[leg] = early[leg] ? plan->falling[leg] : 0.0;
+  for (int leg = 0; leg < HX_LEGS; ++leg) {
+    falling[leg] = early[leg] ? plan->falling[leg] : 0.0;
+    searching[leg] = plan->awaited[leg] && !laws->doubted[leg] && !carries(laws, leg);
+  }
   hx_touchdown_step(model->period, laws->touching, falling, plan->swinging, plan->standing,
-                    &laws->touchdown);
+                    searching, &laws->touchdown);
 }
 
 /* Decides between a wrong sensor and ground that is met early or late. */
@@ -151,8 +161,8 @@ static void examine_contacts(const hxComplianceModel *model, const hxPlan *plan,
 static int contacts_differ(const hxPlan *plan, const hxCompliance *laws) {
   int found = hx_sensor_watch_busy(&laws->watch) || hx_touchdown_busy(&laws->touchdown);
   for (int leg = 0; leg < HX_LEGS; ++leg)
-    found |=
-        laws->touching[leg] != plan->standing[leg] && (plan->standing[leg] || plan->well_up[leg]);
+    found |= plan->awaited[leg] || (laws->touching[leg] != plan->standing[leg] &&
+                                    (plan->standing[leg] || plan->well_up[leg]));
   return found;
 }
 
@@ -310,7 +320,7 @@ static void restore_grip(const hxComplianceModel *model, const hxPlan *plan, hxC
   laws->regaining = 0;
   for (int leg = 0; leg < HX_LEGS; ++leg) {
     laws->grip[leg] += model->follow_load * (1.0 - laws->grip[leg]);
-    if (plan->standing[leg] && !laws->touching[leg]) laws->grip[leg] = 0.0;
+    if ((plan->standing[leg] || plan->awaited[leg]) && !laws->touching[leg]) laws->grip[leg] = 0.0;
     for (int joint = 0; joint < HX_JOINTS; ++joint) laws->torque[leg][joint] *= laws->grip[leg];
     laws->regaining |= laws->grip[leg] < gripped;
   }
@@ -348,6 +358,22 @@ static void actuate(const hxComplianceModel *model, const hxPlan *plan,
       limit_joint(model, bend * laws->trust, &laws->bend[leg][joint], &laws->torque[leg][joint]);
     }
   }
+}
+
+int hx_compliance_meets(const hxComplianceModel *model, int leg, const hxCompliance *laws) {
+  return model->parts.touchdown && laws->trust == 1.0 && laws->touching[leg] && !laws->doubted[leg];
+}
+
+int hx_compliance_waits(const hxComplianceModel *model, const int landing[HX_LEGS], int held,
+                        const hxCompliance *laws) {
+  int waits = 0;
+  if (!model->parts.touchdown || laws->trust < 1.0) return 0;
+  for (int leg = 0; leg < HX_LEGS; ++leg) {
+    const int found = held ? carries(laws, leg) : laws->touching[leg];
+    waits |= landing[leg] && !found && !laws->doubted[leg] &&
+             laws->touchdown.offset[leg] > -hx_reach_limit;
+  }
+  return waits;
 }
 
 void hx_compliance_step(const hxComplianceModel *model, const hxPlan *plan,

@@ -44,6 +44,7 @@ typedef struct hxPlan {
   double height[HX_LEGS]; /* m, of the paths above their ends */
   double needed; /* N m, largest element of carry */
   int swinging[HX_LEGS];
+  int awaited[HX_LEGS]; /* the gait clock waits for the foot */
   double falling[HX_LEGS]; /* m, by which feet well above the ground move down in a period */
   int overspeed; /* the plan exceeds the speed limit of some joint */
 } hxPlan;
@@ -82,6 +83,14 @@ void hx_compliance_reset(hxCompliance *laws);
  * m/s]. */
 void hx_compliance_plan(const hxComplianceModel *model, const hxDemand *demand,
                         const double height[HX_LEGS], const double rise[HX_LEGS], hxPlan *plan);
+
+/* Returns whether a foot on its way down has met the ground, and not a sensor that lies (C51). */
+int hx_compliance_meets(const hxComplianceModel *model, int leg, const hxCompliance *laws);
+
+/* Returns whether the gait clock waits for the feet of legs that end their swing (C50). held: it
+ * waits already. */
+int hx_compliance_waits(const hxComplianceModel *model, const int landing[HX_LEGS], int held,
+                        const hxCompliance *laws);
 
 /* Advances the laws by one period. force: of the ground on the feet, walking frame [N]; replaced by
  * the planned one where a sensor is not trusted. */

@@ -1,5 +1,7 @@
 #include "paper.h"
 
+#include "../plane.h"
+
 void hx_paper_compile(const hxControllerDefinition *definition, hxPaperModel *model) {
   const hxGains *gains = &definition->gains;
   model->parts = definition->parts;
@@ -12,7 +14,7 @@ void hx_paper_compile(const hxControllerDefinition *definition, hxPaperModel *mo
   hx_suspension_discretise(gains->paper_suspension.mass, gains->paper_suspension.damping,
                            gains->paper_suspension.stiffness, definition->period,
                            &model->suspension);
-  model->memory = exp(-definition->period / gains->paper_slip.load_time);
+  model->memory = hx_decay(-definition->period / gains->paper_slip.load_time);
   model->tracking = fmin(definition->period / gains->paper_slip.tracking_time, 1.0);
   model->farthest = gains->paper_slip.limit;
   model->deepest = gains->paper_suspension.limit;
@@ -26,7 +28,7 @@ static void yield_sideways(const hxPaperModel *model, hxPlane force, int swingin
                           hx_slip_pid_step(&model->pid, force.y, &paper->y[k])};
   const double kept = swinging ? model->memory : 1.0;
   const hxPlane shift =
-      hx_scaled(wanted, model->farthest / fmax(hypot(wanted.x, wanted.y), model->farthest));
+      hx_scaled(wanted, model->farthest / fmax(hx_length(wanted), model->farthest));
   paper->shift[k] = shift;
   paper->x[k].integral = kept * (paper->x[k].integral + model->tracking * (shift.x - wanted.x));
   paper->y[k].integral = kept * (paper->y[k].integral + model->tracking * (shift.y - wanted.y));

@@ -6,8 +6,9 @@
 
 const double hx_early = 0.002;
 
-static const double reach_speed = 0.08;  /* m/s  downwards */
-static const double reach_limit = 0.020; /* m */
+const double hx_reach_limit = 0.040;
+
+static const double reach_speed = 0.08; /* m/s  downwards */
 static const double hold_limit = 0.030;  /* m, upwards: the largest step height of the robots */
 /* s, delay after the planned touch-down that is tolerated */
 static const double grace = 0.040;
@@ -23,8 +24,8 @@ int hx_touchdown_busy(const hxTouchdown *touchdown) {
 
 /* Returns the next offset of a foot that has missed the ground for a time [s]. */
 static double moved(double offset, double late, double period, int touching, double falling,
-                    int swinging) {
-  if (late > grace) return fmax(offset - reach_speed * period, -reach_limit);
+                    int swinging, int searching) {
+  if (searching || late > grace) return fmax(offset - reach_speed * period, -hx_reach_limit);
   if (swinging && touching && falling > 0.0) return fmin(offset + falling, hold_limit);
   if (swinging && !touching)
     return fabs(offset) > negligible ? offset * hx_decay(-period / return_time) : 0.0;
@@ -33,11 +34,11 @@ static double moved(double offset, double late, double period, int touching, dou
 
 void hx_touchdown_step(double period, const int touching[HX_LEGS], const double falling[HX_LEGS],
                        const int swinging[HX_LEGS], const int loaded[HX_LEGS],
-                       hxTouchdown *touchdown) {
+                       const int searching[HX_LEGS], hxTouchdown *touchdown) {
   for (int leg = 0; leg < HX_LEGS; ++leg) {
     const int misses = loaded[leg] && !touching[leg];
     touchdown->late[leg] = misses ? touchdown->late[leg] + period : 0.0;
     touchdown->offset[leg] = moved(touchdown->offset[leg], touchdown->late[leg], period,
-                                   touching[leg], falling[leg], swinging[leg]);
+                                   touching[leg], falling[leg], swinging[leg], searching[leg]);
   }
 }

@@ -126,6 +126,11 @@ static double phase_after(const hxFootPathsModel *model, int leg, int64_t number
   return clock - floor(clock);
 }
 
+/* Returns the periods on the gait clock `number` periods after the section began (C50). */
+static int64_t reached(const hxFootPaths *paths, int64_t number) {
+  return paths->held ? paths->before : paths->before + number;
+}
+
 /* Stops with the feet at `plane` and resets the gait clock. */
 static void rest(const hxFootPathsModel *model, const hxPlane plane[HX_LEGS], hxFootPaths *paths,
                  hxPlannedFeet *feet) {
@@ -201,11 +206,13 @@ static void place_foot(const hxFootPathsModel *model, const hxFootPaths *paths, 
   const hxPlane was = hx_times(back, hx_plane_sub(carried, feet->way)), v = feet->twist.velocity;
   feet->plane[leg] = hx_times(back, hx_plane_sub(ground_of(feet, leg), feet->way));
   /* a foot on the ground: dp/dt = -(v + i w p) */
-  const hxPlane pulled = hx_scaled(hx_times(back, feet->pull[leg]), slope / model->swing_time);
+  /* dtau/dt */
+  const double pace = paths->held ? 0.0 : 1.0 / model->swing_time;
+  const hxPlane pulled = hx_scaled(hx_times(back, feet->pull[leg]), slope * pace);
   feet->velocity[leg] = hx_plane(pulled.x - (v.x - w * was.y), pulled.y - (v.y + w * was.x));
   hop(tau, model->step_height, model->touchdown_speed * model->swing_time, &lift, &climb);
   feet->height[leg] = model->home_height[leg] + (paths->swinging[leg] ? lift : 0.0);
-  feet->rise[leg] = paths->swinging[leg] ? climb / model->swing_time : 0.0;
+  feet->rise[leg] = paths->swinging[leg] ? climb * pace : 0.0;
 }
 
 /* Computes the present step again, with those legs in the air that swing in the section. */
@@ -236,7 +243,9 @@ void hx_foot_paths_plan(const hxFootPathsModel *model, const hxPlannedFeet *now,
     rest(model, now->plane, paths, first);
     return;
   }
-  paths->before = old.walking ? old.before + number : 0;
+  paths->before = old.walking ? reached(paths, number) : 0;
+  paths->held = 0;
+  memset(paths->awaited, 0, sizeof paths->awaited);
   const int any = lift_off(model, &old, paths);
   if (!going && come_home(model, &old, now, any, paths, place)) {
     rest(model, place, paths, first);
@@ -250,8 +259,25 @@ void hx_foot_paths_plan(const hxFootPathsModel *model, const hxPlannedFeet *now,
   set_out(model, paths, now, twist, first);
 }
 
+void hx_foot_paths_landing(const hxFootPathsModel *model, const hxFootPaths *paths, int64_t number,
+                           int landing[HX_LEGS]) {
+  const int64_t next = reached(paths, number) + 1;
+  for (int leg = 0; leg < HX_LEGS; ++leg)
+    landing[leg] =
+        paths->walking && paths->swinging[leg] && phase_after(model, leg, next) < model->duty;
+}
+
+void hx_foot_paths_hold(const hxFootPathsModel *model, const hxPlannedFeet *now, int64_t number,
+                        hxTwist twist, hxFootPaths *paths, hxPlannedFeet *first) {
+  hx_foot_paths_landing(model, paths, number, paths->awaited);
+  paths->before = reached(paths, number);
+  paths->held = 1;
+  memset(paths->lifted, 0, sizeof paths->lifted);
+  set_out(model, paths, now, twist, first);
+}
+
 int hx_foot_paths_reach(const hxFootPathsModel *model, const hxFootPaths *paths, int64_t number) {
-  if (!paths->walking || number == 1) return 1;
+  if (!paths->walking || paths->held || number == 1) return 1;
   for (int leg = 0; leg < HX_LEGS; ++leg)
     if ((phase_after(model, leg, paths->before + number) < model->duty) != paths->standing[leg])
       return 0;
@@ -285,7 +311,7 @@ void hx_foot_paths_walk(const hxFootPathsModel *model, const hxFootPaths *paths,
   odometry(model->period, before, twist, feet);
   const hxPlane turn = hx_cis(feet->turn), back = hx_conj(turn);
   for (int leg = 0; leg < HX_LEGS; ++leg) {
-    feet->phase[leg] = phase_after(model, leg, paths->before + number);
+    feet->phase[leg] = phase_after(model, leg, reached(paths, number));
     const double tau = progress(model, feet->phase[leg]);
     /* each foot gets its goal once */
     const int free = paths->swinging[leg] && (tau < freeze || (number == 1 && paths->lifted[leg]));
@@ -297,6 +323,10 @@ void hx_foot_paths_walk(const hxFootPathsModel *model, const hxFootPaths *paths,
     const hxPlane moved = hx_scaled(hx_plane_sub(feet->goal[leg], before->goal[leg]),
                                     1.0 / (left < nearly_done ? nearly_done : left));
     feet->pull[leg] = hx_plane_add(before->pull[leg], moved);
+    if (paths->met[leg]) { /* the foot stays where it met the ground (C51) */
+      feet->goal[leg] = ground_of(before, leg);
+      feet->pull[leg] = hx_plane(0.0, 0.0);
+    }
     place_foot(model, paths, leg, back, ground_of(before, leg), feet);
   }
 }

@@ -84,6 +84,9 @@ typedef struct hxFootPaths {
   /* the foot will need no step at its next lift-off: it is at its stance position under a body at
    * rest */
   int stays[HX_LEGS];
+  int met[HX_LEGS]; /* the foot has met the ground on its way down, and stays where it is */
+  int held; /* the gait clock stands still until feet at the ends of their swings carry load */
+  int awaited[HX_LEGS]; /* the gait clock waits for this foot */
 } hxFootPaths;
 
 void hx_foot_paths_compile(const hxControllerDefinition *definition, const hxLegSolver leg[HX_LEGS],
@@ -97,6 +100,16 @@ void hx_foot_paths_reset(const hxFootPathsModel *model, hxFootPaths *paths, hxPl
  * otherwise the feet step to their stance positions and the gait clock stops. */
 void hx_foot_paths_plan(const hxFootPathsModel *model, const hxPlannedFeet *now, int64_t number,
                         int going, hxTwist twist, hxFootPaths *paths, hxPlannedFeet *first);
+
+/* Finds the legs whose swing ends at the present step, or ended at the step at which the gait clock
+ * was stopped. number: periods since the section began. */
+void hx_foot_paths_landing(const hxFootPathsModel *model, const hxFootPaths *paths, int64_t number,
+                           int landing[HX_LEGS]);
+
+/* Begins a section in which the gait clock stands still while the body moves on (C50). Arguments
+ * are those of hx_foot_paths_plan. */
+void hx_foot_paths_hold(const hxFootPathsModel *model, const hxPlannedFeet *now, int64_t number,
+                        hxTwist twist, hxFootPaths *paths, hxPlannedFeet *first);
 
 /* Returns whether a step, in periods after the first, still belongs to the section: no leg lifts
  * off or touches down before it. */

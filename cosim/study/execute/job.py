@@ -20,8 +20,9 @@ from hexapod_cosim.cosim.export.controller_export import export_controller
 from hexapod_cosim.cosim.run.controller_setup import make_setup
 from hexapod_cosim.cosim.run.preparation import PlantFmus, chosen_gains, design_key
 from hexapod_cosim.cosim.scenario.controls import table_with_control
-from hexapod_cosim.cosim.scenario.scenario import scenario_from_table
+from hexapod_cosim.cosim.scenario.scenario import scenario_from_table, with_values
 from hexapod_cosim.cosim.study.execute.engines import find_engine
+from hexapod_cosim.cosim.study.plan.factors import samples
 from hexapod_cosim.cosim.study.plan.records import Case, Factor, Study, StudyError
 from hexapod_cosim.cosim.study.store.manifest import FORMAT
 from hexapod_cosim.models import HexapodError, list_robots, load_robot
@@ -93,8 +94,14 @@ def _laws(study: Study) -> dict[str, bytes]:
     Raises HexapodError when one cannot be read or does not take the parameters of [control].
     """
     controls = study.chosen_controls
+    varied = {
+        factor.name: factor.setting(samples(factor)[0])
+        for factor in study.factors
+        if factor.name.startswith("control.")
+    }
     for case in study.cases.values():
-        check_control(scenario_from_table(case.table, where=case.where), controls)
+        table = with_values(case.table, varied)
+        check_control(scenario_from_table(table, where=case.where), controls)
     return {control.label: _read(control.path) for control in controls if control.path is not None}
 
 

@@ -10,6 +10,7 @@ from typing import Any, get_type_hints
 from hexapod_cosim.controller import Gains
 from hexapod_cosim.controller.gains import POSITIVE
 from hexapod_cosim.cosim.interface.interface import Interface, load_interface
+from hexapod_cosim.cosim.scenario.controls import LAW
 from hexapod_cosim.cosim.scenario.quantities import QUANTITY
 from hexapod_cosim.cosim.scenario.records import Scenario
 from hexapod_cosim.cosim.scenario.scenario import scenario_from_table, with_values
@@ -84,9 +85,12 @@ def _check_factor(factor: Factor, study: Study, where: str) -> None:
 
 
 def check_settable(name: str, where: str, *, kind: str = "factor") -> None:
-    """Raises StudyError for a setting that a study gives its runs itself."""
-    first = name.partition(".")[0]
-    if first in ELSEWHERE:
+    """Raises StudyError for a setting that a study gives its runs itself.
+
+    Parameters of the user's control, such as control.lift, may be set and varied.
+    """
+    first, _, key = name.partition(".")
+    if first in ELSEWHERE and not (first == "control" and key not in ("", LAW)):
         raise StudyError(
             f"not a {kind}", got=name, fix=f"write {ELSEWHERE[first]} instead", where=where
         )

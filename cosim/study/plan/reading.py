@@ -37,6 +37,8 @@ from hexapod_cosim.cosim.study.plan.records import (
     StudyError,
 )
 from hexapod_cosim.models import HexapodError, unknown_name
+from hexapod_cosim.models.errors import refuse_path
+from hexapod_cosim.models.schema import parse_toml
 
 KEYS = (
     "title",
@@ -66,19 +68,20 @@ def load_study(path_or_name: str | Path, *, controls: Sequence[str] = ()) -> Stu
     `controls`: texts of controls that replace the file's; relative paths in them start from the
     current folder. Raises StudyError, and ScenarioError for its scenarios.
     """
+    refuse_path(path_or_name, "the study", StudyError)
     path, bundled = Path(path_or_name), list_studies()
     if not path.suffix and len(path.parts) == 1 and not path.is_file():
         if str(path_or_name) not in bundled:
             raise unknown_name("study", str(path_or_name), bundled, error=StudyError)
         path = bundled[str(path_or_name)]
     try:
-        table = tomllib.loads(path.read_text(encoding="utf-8"))
+        table = parse_toml(path.read_text(encoding="utf-8"))
     except OSError as error:
         fix = "give the path of a study file, or one of: " + ", ".join(bundled)
         raise StudyError(
             "cannot read the study", got=error.strerror, fix=fix, where=str(path)
         ) from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as error:
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise StudyError(
             "not a TOML file",
             got=str(error),

@@ -1,9 +1,8 @@
-/* smooth.h - nearest points of a smooth surface (eq. 31, 32), on lanes: the kernels compute the
- * feet of a pack at once; surface.c has one lane, with the same bits */
+/* smooth.h - nearest points of a smooth surface (eq. 31, 32) to a pack of points: the kernels
+ * include it behind lanes.h, surface.c behind one_lane.h, with the same bits for each point */
 #ifndef HX_SMOOTH_H
 #define HX_SMOOTH_H
 
-#include "../lanes/lanes.h"
 #include "surface.h"
 
 /* Height over a point, its first and second derivatives. */
@@ -181,13 +180,25 @@ static inline void replace_nearest(hxMask mask, hxNearest new, hxNearest *neares
  * derivatives, and at a border the jump of the second ones, are left out. */
 static const double close = 1e-7, closest = 1e-14;
 
+/* Newton's method that still moves by this share of a cell, squared, has not found a point. */
+static const double not_found = 1e-4;
+
+/* Sets the nearest points of some lanes to those below. Far above a rough surface, beyond the
+ * centres of its curvature, Newton's method may find none; the distance is then that of the plane
+ * at the point below, which is far, too. */
+static inline void use_points_below(const hxTerrain *terrain, hxMask mask, const hxReal point[3],
+                                    hxStencil *at, hxNearest *found) {
+  move_stencil(terrain, mask, point[0], point[1], at);
+  replace_nearest(mask, (hxNearest){point[0], point[1], patch_at(at), found->H}, found);
+}
+
 /* Computes the nearest points of a smooth surface to the lanes `wanted` by Newton's method on
  * their two parameters, from the points below moved by `start`. With `exactly`, also the second
  * derivatives belong to the nearest point. */
 static inline hxNearest hx_nearest_on_surface(const hxTerrain *terrain, hxMask wanted,
                                               const hxReal point[3], const hxReal start[2],
                                               int exactly) {
-  enum { MOST = 16 };
+  enum { MOST = 40 };
   const double area = terrain->head.cell * terrain->head.cell;
   hxReal x = point[0] + start[0], y = point[1] + start[1];
   hxMask active = wanted;
@@ -210,6 +221,9 @@ static inline hxNearest hx_nearest_on_surface(const hxTerrain *terrain, hxMask w
       found = end;
     else
       replace_nearest(done & active, end, &found);
+    const hxMask none =
+        i == MOST ? active & hx_less(hx_splat(not_found * area), square) : active ^ active;
+    if (hx_any(none)) use_points_below(terrain, none, point, &at, &found);
     active &= ~done;
     if (!hx_any(active)) return found;
     const hxReal share = share_of_move(terrain, square);

@@ -1,5 +1,3 @@
-#define HX_LANES 1 /* the surface at one point */
-
 #include "surface.h"
 
 #include <math.h>
@@ -7,8 +5,10 @@
 #include <string.h>
 
 #include "hexapod/message.h"
-#include "smooth.h"
+#include "one_lane.h"
 #include "soil.h"
+
+#include "smooth.h" /* behind the numbers that it computes with */
 
 const double hx_far = 1e3;
 
@@ -146,7 +146,8 @@ static int check_soil_of_blocks(const hxTerrain *terrain, char *message) {
 static const double least_reach = 0.02;
 
 static int64_t cells_of_reach(const hxGridHead *head) {
-  return (int64_t)ceil(least_reach / head->cell);
+  const double cells = ceil(least_reach / head->cell);
+  return (int64_t)cells;
 }
 
 static int64_t cells_of_tile(const hxGridHead *head) {
@@ -176,8 +177,9 @@ static hxTerrain *copy_file(const hxGridHead *head, const void *bytes, size_t si
   terrain->table = terrain->bytes + head->rows * head->cols + (int64_t)(map_size(head) / 8);
   terrain->top = terrain->bytes + (size - sizeof *head) / sizeof(double);
   terrain->tile_rows = tile_rows, terrain->tile_cols = tile_cols;
-  terrain->per_tile = 1.0 / ((double)cells_of_tile(head) * head->cell);
-  terrain->reach = (double)cells_of_reach(head) * head->cell;
+  const int64_t tile = cells_of_tile(head), reach = cells_of_reach(head);
+  terrain->per_tile = 1.0 / ((double)tile * head->cell);
+  terrain->reach = (double)reach * head->cell;
   return terrain;
 }
 

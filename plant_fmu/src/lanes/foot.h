@@ -3,13 +3,14 @@
 #ifndef HX_FOOT_H
 #define HX_FOOT_H
 
-#ifndef HX_TANGENT
-#include "../ground/smooth.h"
-#endif
 #include "../ground/surface.h"
 #include "friction.h"
 #include "kinematics.h"
 #include "soil_pack.h"
+
+#ifndef HX_TANGENT
+#include "../ground/smooth.h" /* behind lanes.h */
+#endif
 
 /* Distance of a point from the ground, and the ground's normal. */
 typedef struct {

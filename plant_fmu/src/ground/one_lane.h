@@ -1,0 +1,23 @@
+/* one_lane.h - what smooth.h needs of lanes/lanes.h, with one lane, for sources that no kernel
+ * includes */
+#ifndef HX_ONE_LANE_H
+#define HX_ONE_LANE_H
+
+#include <math.h>
+#include <stdint.h>
+
+#define HX_LANES 1
+
+typedef double hxReal;
+typedef int64_t hxMask;
+
+static inline hxReal hx_load(const double *slots) { return *slots; }
+static inline void hx_store(double *slots, hxReal x) { *slots = x; }
+static inline hxReal hx_splat(double x) { return x; }
+static inline hxReal hx_sqrt(hxReal x) { return sqrt(x); }
+static inline hxMask hx_less(hxReal a, hxReal b) { return a < b ? -1 : 0; }
+static inline hxReal hx_select(hxMask mask, hxReal a, hxReal b) { return mask ? a : b; }
+static inline hxReal hx_min(hxReal a, hxReal b) { return b < a ? b : a; }
+static inline int hx_any(hxMask mask) { return mask != 0; }
+
+#endif

@@ -1,0 +1,81 @@
+"""Tests what .ci/run needs and installs: a Python with venv of a version that is read, and pinned
+versions of every package.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import subprocess
+import tomllib
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+RUN, CONSTRAINTS = ROOT / ".ci" / "run", ROOT / ".ci" / "constraints.txt"
+TOOLS = ("make", "cc", "g++", "clang", "pkg-config", "git", "chromium")
+NAME = re.compile(r"[A-Za-z0-9._-]+")
+
+
+def normal(name: str) -> str:
+    """Returns a package's name as package indices compare it."""
+    return re.sub(r"[-_.]+", "-", name).lower()
+
+
+def said(folder: Path, python: str) -> tuple[int, str]:
+    """Runs .ci/run with stubs of all tools and this Python; returns exit code and stderr."""
+    bash, dirname = shutil.which("bash"), shutil.which("dirname")
+    assert bash is not None
+    assert dirname is not None
+    for name, text in {**dict.fromkeys(TOOLS, "exit 0"), "python": python}.items():
+        (folder / name).write_text(f"#!{bash}\n{text}\n", encoding="utf-8")
+        (folder / name).chmod(0o755)
+    (folder / "dirname").symlink_to(dirname)
+    (folder / "id").symlink_to(shutil.which("id") or "/usr/bin/id")
+    done = subprocess.run(
+        [bash, str(RUN)],
+        env={"PATH": str(folder), "PYTHON": str(folder / "python"), "HOME": os.environ["HOME"]},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    return done.returncode, done.stderr
+
+
+OLD = 'case "$*" in *version_info*) exit 1;; --version) echo "Python 3.9.2";; esac; exit 0'
+NO_VENV = 'case "$*" in *venv*) exit 1;; --version) echo "Python 3.11.2";; esac; exit 0'
+
+
+@pytest.mark.parametrize(
+    ("python", "message"),
+    [
+        (OLD, "got Python 3.9.2, expected Python 3.11 or"),
+        (NO_VENV, "missing: python3 python3-venv"),
+    ],
+)
+def test_an_unusable_python_is_told_before_anything_runs(
+    tmp_path: Path, python: str, message: str
+) -> None:
+    code, text = said(tmp_path, python)
+    assert code == 1
+    assert message in text
+
+
+def test_a_usable_python_runs_every_part(tmp_path: Path) -> None:
+    assert said(tmp_path, "exit 0") == (0, "")
+
+
+def test_every_dependency_is_pinned_in_a_version() -> None:
+    lines = [
+        line
+        for line in CONSTRAINTS.read_text(encoding="utf-8").splitlines()
+        if line and not line.startswith("#")
+    ]
+    assert [line for line in lines if not re.fullmatch(r"[\w.-]+==[\w.+!-]+", line)] == []
+    pinned = {normal(line.partition("==")[0]) for line in lines}
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    needed = [*project["dependencies"], *project["optional-dependencies"]["test"]]
+    names = {normal(match[0]) for text in needed if (match := NAME.match(text))}
+    assert names - pinned - {"hexapod-cosim"} == set()

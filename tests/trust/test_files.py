@@ -1,0 +1,196 @@
+"""Tests that odd and damaged files end in one paragraph that says what is wrong with them, never in
+an unexpected exception.
+"""
+
+from __future__ import annotations
+
+import io
+import json
+import shutil
+from collections.abc import Callable
+from contextlib import redirect_stderr, redirect_stdout
+from pathlib import Path
+
+import pytest
+
+from hexapod_cosim.cosim.cli import main
+from hexapod_cosim.models.schema import parse_toml
+
+MODELS = Path(__file__).resolve().parents[2] / "models"
+ATHENA = (MODELS / "athena.toml").read_text(encoding="utf-8")
+LARGE = {
+    "beyond_float": "1" + 400 * "0",
+    "digits": 5000 * "1",
+    "hexadecimal": "0x" + 6000 * "f",
+    "64_bits": str(2**63),
+}
+DEEP = {
+    "arrays": "x = " + 100_000 * "[",
+    "tables": "x = " + 5000 * "{a=",
+    "keys": ".".join(5000 * "a") + " = 1",
+    "closed": "x = " + 65 * "[" + 65 * "]",
+}
+TEXTS = {
+    **{f"large_{key}": ATHENA.replace("mass = ", f"mass = {n} # ", 1) for key, n in LARGE.items()},
+    **{f"deep_{key}": text for key, text in DEEP.items()},
+}
+LONGEST_MESSAGE = 2000  # characters
+
+
+def said(*arguments: str) -> tuple[int, str]:
+    """Runs the command; returns its exit code and what it writes to stderr."""
+    errors = io.StringIO()
+    with redirect_stderr(errors), redirect_stdout(io.StringIO()):
+        code = main(list(arguments))
+    return code, errors.getvalue()
+
+
+def refused(*arguments: str) -> str:
+    """Runs the command, which must fail in one paragraph; returns that."""
+    code, text = said(*arguments)
+    assert code in (1, 2), text
+    assert "unexpected" not in text
+    assert text.startswith("hexapod: ")
+    assert "\n\n" not in text.strip()
+    assert len(text) < LONGEST_MESSAGE
+    return " ".join(text.split())
+
+
+@pytest.mark.parametrize("name", TEXTS)
+@pytest.mark.parametrize(
+    "command",
+    [
+        lambda file, out: ("export", "--robot", file, "-o", f"{out}.fmu"),
+        lambda file, out: ("simulate", file, "-o", out),
+        lambda file, out: ("study", file, "-o", out),
+        lambda file, out: (
+            *("export", "--controller", "compliant", "--gains", file),
+            *("-o", f"{out}.fmu"),
+        ),
+    ],
+    ids=["robot", "scenario", "study", "gains"],
+)
+def test_large_numbers_and_deep_tables_are_no_toml(
+    plant_build: Path, tmp_path: Path, command: Callable[[str, str], tuple[str, ...]], name: str
+) -> None:
+    file = tmp_path / "file.toml"
+    file.write_text(TEXTS[name], encoding="utf-8")
+    text = refused(*command(str(file), str(tmp_path / "out")))
+    assert "not a TOML file" in text
+    expected = "an integer of more than 64 bits" if name.startswith("large") else "deep"
+    assert expected in text
+    assert [path.name for path in tmp_path.iterdir()] == ["file.toml"]
+
+
+def test_numbers_of_64_bits_and_64_tables_are_read() -> None:
+    assert parse_toml(f"x = {2**63 - 1}") == {"x": 2**63 - 1}
+    assert parse_toml(f"x = {-(2**63) + 1}") == {"x": -(2**63) + 1}
+    inner = parse_toml("x = " + 63 * "[" + 63 * "]")["x"]
+    assert isinstance(inner, list)
+
+
+@pytest.mark.parametrize("value", LARGE.values(), ids=LARGE)
+def test_a_large_number_on_the_command_line_is_no_number(plant_build: Path, value: str) -> None:
+    assert "duration: wrong" in refused("simulate", "walk_flat", "--set", f"duration={value}")
+
+
+@pytest.mark.parametrize(
+    "path", ["a\0b", 5000 * "x", "/".join(40 * [200 * "d"]) + "/x"], ids=["nul", "long", "deep"]
+)
+@pytest.mark.parametrize(
+    "command",
+    [
+        lambda path: ("export", "--robot", f"{path}.toml", "-o", "o.fmu"),
+        lambda path: ("export", "--robot", f"{path}.urdf", "-o", "o.fmu"),
+        lambda path: ("export", "-o", f"{path}.fmu"),
+        lambda path: ("simulate", f"{path}.toml"),
+        lambda path: ("simulate", "walk_flat", "--set", "duration=0.01", "-o", path),
+        lambda path: ("simulate", "walk_flat", "--fmu", f"{path}.fmu"),
+        lambda path: ("study", f"{path}.toml", "-o", "o"),
+        lambda path: ("compare", f"{path}.toml", "-o", "o"),
+        lambda path: ("validate", f"{path}.fmu"),
+        lambda path: ("report", path),
+        lambda path: ("terrain", "stairs", "-o", f"{path}.png"),
+        lambda path: ("export", "--controller", "compliant", "--gains", path, "-o", "o.fmu"),
+    ],
+)
+def test_a_path_that_no_system_opens_is_refused(
+    plant_build: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    command: Callable[[str], tuple[str, ...]],
+    path: str,
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    refused(*command(path))
+
+
+@pytest.fixture(scope="module")
+def results(plant_build: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder of a short run."""
+    folder = tmp_path_factory.mktemp("run") / "out"
+    short = ("--set", "duration=0.1", "--set", "outputs.formats=['parquet']")
+    code, text = said("simulate", "walk_flat", *short, "-o", str(folder))
+    assert code == 0, text
+    return folder
+
+
+def damaged(results: Path, tmp_path: Path, name: str, content: bytes) -> Path:
+    """Returns a copy of results with another file."""
+    copy = tmp_path / "copy"
+    shutil.copytree(results, copy)
+    (copy / name).write_bytes(content)
+    return copy
+
+
+FACTS = ("status", "kind", "title", "control", "gait_period", "parameters", "robot", "fmu")
+
+
+@pytest.mark.parametrize("value", [[1], {"a": [{}]}], ids=["list", "table"])
+@pytest.mark.parametrize("key", FACTS)
+def test_a_report_of_facts_of_wrong_types_says_so(
+    results: Path, tmp_path: Path, key: str, value: object
+) -> None:
+    facts = json.loads((results / "run.json").read_text(encoding="utf-8")) | {key: value}
+    copy = damaged(results, tmp_path, "run.json", json.dumps(facts).encode())
+    code, text = said("report", str(copy))
+    assert "unexpected" not in text
+    assert code == 0 or (code == 1 and text.startswith("hexapod: "))
+
+
+@pytest.mark.parametrize(
+    ("name", "content"),
+    [
+        ("run.json", 100_000 * b"["),
+        ("run.json", b"\xff\xfe{"),
+        ("metrics.json", 100_000 * b'{"a":'),
+        ("metrics.json", b'{"a": ' + 5000 * b"1" + b"}"),
+        ("metrics.json", 10 * b"\0"),
+        ("scenario.toml", b"\xff\xff"),
+        ("results.parquet", b""),
+        ("results.parquet", b"PAR1PAR1"),
+        ("results.parquet", 1000 * b"PAR1"),
+    ],
+)
+def test_a_report_of_a_damaged_file_names_it(
+    results: Path, tmp_path: Path, name: str, content: bytes
+) -> None:
+    assert name in refused("report", str(damaged(results, tmp_path, name, content)))
+
+
+@pytest.mark.parametrize("share", [0.01, 0.5, 0.99])
+def test_a_recording_cut_short_is_named(results: Path, tmp_path: Path, share: float) -> None:
+    whole = (results / "results.parquet").read_bytes()
+    copy = damaged(results, tmp_path, "results.parquet", whole[: int(share * len(whole))])
+    assert "results.parquet" in refused("report", str(copy))
+
+
+def test_an_error_of_the_system_is_one_paragraph(
+    plant_build: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(*_: object, **__: object) -> None:
+        raise OSError(28, "No space left on device", "somewhere")
+
+    monkeypatch.setattr("hexapod_cosim.cosim.cli.fmu_commands.find_problems", full)
+    text = refused("validate", "x.fmu")
+    assert "somewhere: the system refused an operation: got 'No space left on device'" in text

@@ -1,0 +1,125 @@
+"""Tests that runs share nothing: one writer for a folder, no files left behind, results on disk."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from hexapod_cosim.cosim.cli import main
+from hexapod_cosim.cosim.common import files, unpacked
+from hexapod_cosim.cosim.results.results import results_folder
+from hexapod_cosim.models import HexapodError
+
+HOLD = """
+import sys
+from pathlib import Path
+from hexapod_cosim.cosim.common.unpacked import UnpackedFolder
+from hexapod_cosim.cosim.results.results import results_folder
+folder = UnpackedFolder()
+with results_folder(Path(sys.argv[1])):
+    print(folder.path, flush=True)
+    sys.stdin.read()
+"""
+
+
+def holder(folder: Path, temporary: Path) -> subprocess.Popen[str]:
+    """Starts a process that writes results into a folder and has an FMU unpacked."""
+    return subprocess.Popen(
+        [sys.executable, "-c", HOLD, str(folder)],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        env=os.environ | {"TMPDIR": str(temporary)},
+        text=True,
+    )
+
+
+@pytest.fixture
+def temporary(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The system's temporary folder for this test and its processes."""
+    folder = tmp_path / "temporary"
+    folder.mkdir()
+    monkeypatch.setattr("tempfile.tempdir", str(folder))
+    return folder
+
+
+def test_a_second_process_is_refused_and_the_lock_of_a_killed_one_is_free(
+    tmp_path: Path, temporary: Path
+) -> None:
+    folder = tmp_path / "out"
+    process = holder(folder, temporary)
+    assert process.stdout is not None
+    process.stdout.readline()
+    with (
+        pytest.raises(HexapodError, match="another process writes its results into this folder"),
+        results_folder(folder),
+    ):
+        pass
+    process.send_signal(signal.SIGKILL)
+    process.wait()
+    with results_folder(folder):
+        pass
+    process.stdout.close()
+
+
+def test_the_unpacked_folder_of_a_killed_process_is_deleted_by_the_next(
+    tmp_path: Path, temporary: Path
+) -> None:
+    process = holder(tmp_path / "out", temporary)
+    assert process.stdout is not None
+    left = Path(process.stdout.readline().strip())
+    later = left.stat().st_mtime + 1000.0
+    assert unpacked.sweep(now=later) == []  # in use
+    process.send_signal(signal.SIGKILL)
+    process.wait()
+    assert unpacked.sweep(now=left.stat().st_mtime) == []  # may not have its lock yet
+    assert unpacked.sweep(now=later) == [left]
+    assert not left.exists()
+    process.stdout.close()
+
+
+def test_a_folder_that_is_no_unpacked_fmu_is_not_deleted(temporary: Path) -> None:
+    (temporary / "hexapod-fmu-notes").mkdir()
+    (temporary / "hexapod-fmu-notes" / "text").write_text("mine", encoding="utf-8")
+    (temporary / "hexapod-fmu-link").symlink_to(temporary / "hexapod-fmu-notes")
+    later = temporary.stat().st_mtime + 1000.0
+    assert unpacked.sweep(now=later) == []
+    assert (temporary / "hexapod-fmu-notes" / "text").exists()
+
+
+def test_files_are_flushed_before_they_replace_others(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    order: list[str] = []
+    flush, replace = os.fsync, Path.replace
+
+    def flushed(handle: int) -> None:
+        order.append("flush")
+        flush(handle)
+
+    def replaced(self: Path, target: Path) -> Path:
+        order.append("replace")
+        return replace(self, target)
+
+    monkeypatch.setattr(os, "fsync", flushed)
+    monkeypatch.setattr(Path, "replace", replaced)
+    files.write_text(tmp_path / "file", "text")
+    assert order == ["flush", "replace", "flush"]
+
+
+def test_ctrl_c_inside_an_import_is_an_interrupt(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def interrupted(*_: object) -> int:
+        try:
+            raise KeyboardInterrupt
+        except KeyboardInterrupt as error:
+            raise RuntimeError("failed to initialize ft2font") from error
+
+    monkeypatch.setattr("hexapod_cosim.cosim.cli._run", interrupted)
+    assert main(["simulate"]) == 130
+    assert capsys.readouterr().err == "hexapod: interrupted\n"
