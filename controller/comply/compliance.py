@@ -294,7 +294,7 @@ class Compliance(Stateful):
         if not total > self.settled or not plan.weight > self.settled:
             return
         ahead = (normal @ plan.feet) / total - (plan.shares.normal @ plan.feet) / plan.weight
-        lean = self.lean + self.follow_cycle * ahead
+        lean = complex(self.lean + self.follow_cycle * ahead)
         self.lean = complex(
             min(max(lean.real, -self.most_lean), self.most_lean),
             min(max(lean.imag, -self.most_lean), self.most_lean),
