@@ -15,14 +15,14 @@ SANITIZER = rm -f $(REPORT).*; HEXAPOD_PRESET=sanitize ASAN_OPTIONS=detect_leaks
 SANITIZED_END = || { cat $(REPORT).* 2>/dev/null; exit 1; }
 TYPING := build/typing/hexapod_cosim
 SOURCES := pyproject.toml CMakeLists.txt $(shell find fmi plant_fmu controller_fmu master -type f) $(wildcard cosim/viewer/*.* cosim/viewer/src/*.ts cosim/viewer/src/*/*.ts)
-C_FILES = $(wildcard plant_fmu/src/*.[ch] plant_fmu/src/kernels/*.c plant_fmu/src/lanes/*.h plant_fmu/src/ground/*.[ch] fmi/*.[ch] plant_fmu/*.c plant_fmu/include/hexapod/*.h controller_fmu/src/*.[ch] controller_fmu/src/*/*.[ch] controller_fmu/*.c controller_fmu/include/hexapod/*.h master/src/*.c master/include/hexapod/*.h tests/native/*.[ch] benchmarks/native/*.[ch] benchmarks/native/*.cpp examples/*.c examples/c_library/*.c)
+C_FILES = $(wildcard plant_fmu/src/*.[ch] plant_fmu/src/kernels/*.c plant_fmu/src/lanes/*.h plant_fmu/src/ground/*.[ch] fmi/*.[ch] plant_fmu/*.c plant_fmu/include/hexapod/*.h controller_fmu/src/*.[ch] controller_fmu/src/*/*.[ch] controller_fmu/*.c controller_fmu/include/hexapod/*.h master/src/*.c master/include/hexapod/*.h tests/native/*.[ch] tests/fuzz/*.[ch] benchmarks/native/*.[ch] benchmarks/native/*.cpp examples/*.c examples/c_library/*.c)
 EMPTY :=
 TEST_ROOMS := $(subst $(EMPTY) $(EMPTY),:,$(filter-out tests/native tests/conftest.py,$(wildcard tests/[a-z]*[a-z])))
 SANITIZED_SHORT := $(patsubst %,tests/fmi/test_%.py,fmi fmi3 fmi3_order fmi_state fmi_values fmi_exchange) \
 	$(patsubst %,tests/plant/test_plant_%.py,events coordinates misuse)
 SANITIZED := $(SANITIZED_SHORT) tests/fmi/test_fmi_importers.py tests/fmi/test_endurance.py
 
-.PHONY: help setup demo test test-browser test-importers test-platforms test-endurance test-native test-native-sanitize test-sanitize test-sanitize-short test-robots lint-c check bench bench-quick bench-batch bench-opening control study-demo format generate fmu typing clean docs
+.PHONY: help setup demo test test-browser test-importers test-platforms test-endurance test-native test-native-sanitize test-sanitize test-sanitize-short test-robots fuzz fuzz-short mutants lint-c check bench bench-quick bench-batch bench-opening control study-demo format generate fmu typing clean docs
 
 help:
 	@echo "make setup     the hexapod command in $(BIN)"
@@ -36,6 +36,9 @@ help:
 	@echo "make test-sanitize   these, the FMU's tests and random calls under address and undefined-behaviour sanitizers (5 min)"
 	@echo "make test-sanitize-short  the same without random calls and many instances (2 min)"
 	@echo "make test-robots  30 robots drawn at random, 0.5 to 30 kg: all designed for, all walk (3 min)"
+	@echo "make fuzz      libFuzzer on calls, states, start values and grids, Hypothesis on every reader: FUZZ_SECONDS, 3600 in all"
+	@echo "make fuzz-short  the same for a minute in all"
+	@echo "make mutants   MUTANTS (200) small changes of the code, one at a time: which ones the tests find (hours)"
 	@echo "make check     formatters, linters, types, generated files, warnings of gcc and clang"
 	@echo "make lint-c    warnings of gcc and clang alone"
 	@echo "make bench     speed and accuracy against the engines people would pick instead (15 min); bench-quick: 1.5 min"
@@ -104,6 +107,17 @@ test-sanitize: test-native-sanitize
 
 test-sanitize-short: test-native-sanitize
 	$(SANITIZER) $(BIN)/python -m pytest -q $(PARALLEL) $(SANITIZED_SHORT) $(SANITIZED_END)
+
+FUZZ_SECONDS ?= 3600
+fuzz: setup
+	$(BIN)/python -m tools.fuzz $(FUZZ_SECONDS)
+
+fuzz-short: setup
+	$(BIN)/python -m tools.fuzz 60
+
+MUTANTS ?= 200
+mutants: setup
+	$(BIN)/python -m tools.mutants $(MUTANTS)
 
 # warnings are errors: gcc -std=c11 -Wpedantic; clang -Weverything but for plant_fmu/cmake/warnings.cmake
 lint-c: lint-c-gcc lint-c-clang

@@ -104,9 +104,22 @@ static hxStatus each_array(hxInstance *instance, rowsFunction *function, hxType 
   return HX_OK;
 }
 
+/* checks that arrays are of a type; time is Real */
+static hxStatus check_types(hxInstance *instance, hxType type, const unsigned reference[],
+                            size_t n) {
+  hxCausality causality;
+  for (size_t i = 0; i < n; i++)
+    if (reference[i] != hx_time_reference &&
+        !hx_variable_of_type(instance, type, reference[i], &causality))
+      return HX_INVALID_ARGUMENT;
+  return HX_OK;
+}
+
+/* All references are checked before the first value is calculated. */
 hxStatus hx_arrays_get(hxInstance *instance, hxType type, const unsigned reference[], size_t n,
                        void *value, size_t n_values) {
-  const hxStatus status = check_count(instance, type, reference, n, n_values);
+  hxStatus status = check_count(instance, type, reference, n, n_values);
+  if (status == HX_OK) status = check_types(instance, type, reference, n);
   return status == HX_OK ? each_array(instance, hx_instance_get, type, reference, n, value)
                          : status;
 }

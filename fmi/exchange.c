@@ -145,13 +145,19 @@ static const double *unknown_place(hxInstance *instance, unsigned reference,
   return NULL;
 }
 
-/* Calculates derivatives of unknowns along a change of input and state. With in_time the change is
- * a rate over time, so that outputs that are integrals over time change too. */
-static hxStatus differentiate(hxInstance *instance, const struct hxVariables *change, int in_time,
-                              const unsigned unknown[], size_t n, double value[]) {
+/* checks that the unknowns are outputs or rates */
+static hxStatus check_unknowns(hxInstance *instance, const unsigned unknown[], size_t n) {
   struct hxVariables result;
   for (size_t i = 0; i < n; i++)
     if (!unknown_place(instance, unknown[i], &result)) return HX_INVALID_ARGUMENT;
+  return HX_OK;
+}
+
+/* Calculates derivatives of valid unknowns along a change of input and state. With in_time the
+ * change is a rate over time, so that outputs that are integrals over time change too. */
+static hxStatus differentiate(hxInstance *instance, const struct hxVariables *change, int in_time,
+                              const unsigned unknown[], size_t n, double value[]) {
+  struct hxVariables result;
   const hxStatus status =
       hx_continuous->tangent(instance->component, &instance->state.variables, change, &result);
   if (status != HX_OK)
@@ -164,21 +170,21 @@ static hxStatus differentiate(hxInstance *instance, const struct hxVariables *ch
   return status;
 }
 
-/* checks that the component has continuous states, and initializes it if its parameters changed */
+/* checks that the component has continuous states */
 static hxStatus need_states(hxInstance *instance, const char *what) {
-  if (!hx_continuous) {
-    hx_log(instance, HX_LOG_ERROR,
-           "%s: got a call, expected none, as the model description does not offer it", what);
-    return HX_INVALID_ARGUMENT;
-  }
-  return instance->state.model_stale ? hx_instance_initialize(instance) : HX_OK;
+  if (hx_continuous) return HX_OK;
+  hx_log(instance, HX_LOG_ERROR,
+         "%s: got a call, expected none, as the model description does not offer it", what);
+  return HX_INVALID_ARGUMENT;
 }
 
+/* All references are checked before parameters that were set initialize the component. */
 hxStatus hx_instance_directional(hxInstance *instance, const unsigned unknown[], size_t n_unknown,
                                  const unsigned known[], size_t n_known, const double change[],
                                  double result[]) {
   struct hxVariables direction;
-  const hxStatus status = need_states(instance, "directional derivative");
+  hxStatus status = need_states(instance, "directional derivative");
+  if (status == HX_OK) status = check_unknowns(instance, unknown, n_unknown);
   if (status != HX_OK) return status;
   memset(&direction, 0, sizeof direction);
   for (size_t i = 0; i < n_known; i++) {
@@ -186,7 +192,9 @@ hxStatus hx_instance_directional(hxInstance *instance, const unsigned unknown[],
     if (!place) return HX_INVALID_ARGUMENT;
     *place += change[i];
   }
-  return differentiate(instance, &direction, 0, unknown, n_unknown, result);
+  status = hx_instance_refresh(instance, 0, 0);
+  return status == HX_OK ? differentiate(instance, &direction, 0, unknown, n_unknown, result)
+                         : status;
 }
 
 /* Time derivatives: the states change at their rates, the inputs at those of the last step. */
@@ -194,6 +202,7 @@ hxStatus hx_instance_get_output_rates(hxInstance *instance, const unsigned refer
                                       double rate[]) {
   struct hxVariables flow;
   hxStatus status = need_states(instance, "derivatives of outputs");
+  if (status == HX_OK) status = check_unknowns(instance, reference, n);
   if (status == HX_OK) status = hx_instance_refresh(instance, 0, 1);
   if (status != HX_OK) return status;
   memset(&flow, 0, sizeof flow);

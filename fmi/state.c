@@ -1,6 +1,7 @@
 /* state.c - saved states: header, instance and component in one block without pointers. */
 #include "fmi/instance.h"
 
+#include <math.h>
 #include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
@@ -106,12 +107,46 @@ hxStatus hx_instance_deserialize(hxInstance *instance, const void *bytes, size_t
   return status;
 }
 
+static int is_flag(int value) { return value == 0 || value == 1; }
+
+/* whether all values of a causality are in their ranges */
+static int are_in_range(const struct hxVariables *variables, hxCausality causality) {
+  const hxSection *section = &hx_sections[causality];
+  for (unsigned i = 0; i < section->count; i++) {
+    const hxVariable *variable = &section->variable[i];
+    const char *place = (const char *)variables + variable->offset;
+    int number = 0;
+    double real = 0.0;
+    if (variable->type == HX_REAL)
+      memcpy(&real, place, sizeof real);
+    else
+      memcpy(&number, place, sizeof number);
+    if (!hx_variable_in_range(variable, variable->type == HX_REAL ? real : (double)number))
+      return 0;
+  }
+  return 1;
+}
+
+/* Whether the bytes are the state of an instance. A forged state, whose checksum is right, must not
+ * lead to a mode that does not exist or to values that could not be set. */
+static int is_instance_state(const hxInstanceState *state) {
+  static const int modes = HX_MODE_INSTANTIATED | HX_MODE_INITIALIZATION | HX_MODE_STEP |
+                           HX_MODE_TERMINATED | HX_MODE_EVENT | HX_MODE_CONTINUOUS;
+  const int mode = state->mode;
+  return mode > 0 && (mode & ~modes) == 0 && (mode & (mode - 1)) == 0 &&
+         is_flag(state->model_stale) && is_flag(state->output_stale) &&
+         is_flag(state->rate_stale) && is_flag(state->ramped) &&
+         fabs(state->start_time) <= hx_latest_start && !isnan(state->stop_time) &&
+         are_in_range(&state->variables, HX_INPUT) && are_in_range(&state->variables, HX_PARAMETER);
+}
+
 hxStatus hx_instance_restore(hxInstance *instance, const void *bytes) {
   const hxStateBlock *block = bytes;
   const char *what = fault(instance, &block->header);
   if (what) return refuse(instance, what);
   if (block->instance.interface != instance->state.interface)
     return refuse(instance, "one of the other interface");
+  if (!is_instance_state(&block->instance)) return refuse(instance, "a damaged instance");
   if (hx_component_set_state(instance->component, block->component) != HX_OK)
     return refuse(instance, "a damaged component");
   memcpy(&instance->state, &block->instance, sizeof instance->state);

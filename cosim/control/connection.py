@@ -24,6 +24,7 @@ from hexapod_cosim.cosim.interface.names import foot_names, foot_vector_names, v
 from hexapod_cosim.cosim.master.fmu_controller import COMMANDS, FLAGS
 from hexapod_cosim.cosim.master.signals import ACCELERATION, COMMANDED, CONTACT, MEASURED
 from hexapod_cosim.models import JOINT_NAMES, LEG_NAMES, FmuError, nearest_name
+from hexapod_cosim.models.schema import parse_toml
 
 MOST_SHOWN = 12  # names in a message
 # sources of inputs, in the order of the vector that source_vector() fills
@@ -186,7 +187,7 @@ def read_map(path: Path) -> dict[str, Any]:
     if not place.is_file():
         return {}
     try:
-        table = tomllib.loads(place.read_text(encoding="utf-8"))
+        table = parse_toml(place.read_text(encoding="utf-8"))
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise FmuError(
             "not a TOML file", got=str(error), expected="a table [map]", where=str(place)

@@ -21,6 +21,7 @@ from typing import Any
 from hexapod_cosim.cosim.common.files import RESERVED_NAMES
 from hexapod_cosim.cosim.scenario.records import CONTROLS
 from hexapod_cosim.models import ScenarioError, nearest_name
+from hexapod_cosim.models.errors import refuse_path
 
 BUILTIN, PYTHON, FMU = "builtin", "python", "fmu"
 LAW = "law"  # key of [control] that names the control
@@ -177,7 +178,10 @@ def table_with_control(table: Mapping[str, Any], text: str) -> dict[str, Any]:
 
 
 def control_beside(value: Any, folder: Path) -> Any:
-    """Returns the value of `control` with a relative path made absolute if a file lies there."""
+    """Returns the value of `control` with a relative path made absolute if a file lies there.
+
+    Raises ScenarioError for a text that is no path of any system.
+    """
     if isinstance(value, Mapping):
         return {**value, LAW: control_beside(value[LAW], folder)} if LAW in value else value
     if not isinstance(value, str):
@@ -185,4 +189,5 @@ def control_beside(value: Any, folder: Path) -> Any:
     label, equals, text = value.rpartition("=")
     path, colon, name = text.rpartition(":") if CLASS.fullmatch(text) else (text, "", "")
     near = folder / path
+    refuse_path(near, "a control", ScenarioError)
     return f"{label}{equals}{near.resolve()}{colon}{name}" if near.is_file() else value

@@ -127,7 +127,7 @@ def _read_png(path: Path) -> tuple[Array, float, float]:
                 return np.asarray(picture).astype(np.float64)[::-1], 0.0, 0.0
         except UnidentifiedImageError as error:
             raise _wrong_picture(path, "a file of another kind") from error
-        except (OSError, SyntaxError, ValueError) as error:
+        except Exception as error:  # Pillow's readers raise errors of many kinds
             raise _wrong_picture(path, f"a damaged file ({error})") from error
     bits = {"1": "1 bit of grey", "L": "8 bits of grey", "P": "a palette of colours"}
     raise _wrong_picture(path, bits.get(mode, f"colours or transparency ({mode})"))
@@ -148,8 +148,8 @@ def _read_npy(path: Path) -> tuple[Array, float, float]:
     with path.open("rb") as file:
         try:
             array = np.load(file, allow_pickle=False)
-        except (ValueError, EOFError) as error:
-            raise _wrong_array(path, str(error)) from error
+        except Exception as error:  # the header is Python text: errors of its parser, of memory
+            raise _wrong_array(path, f"{type(error).__name__}: {error}") from error
     if not isinstance(array, np.ndarray) or array.dtype.kind not in "fiu" or array.ndim != 2:
         shape = f"{getattr(array, 'ndim', 0)} axes of {getattr(array, 'dtype', type(array))}"
         raise _wrong_array(path, shape)
@@ -179,6 +179,8 @@ def _read_asc(path: Path) -> tuple[Array, float, float]:
     unknown = sorted(set(header) - {*ASC_KEYS, "nodata_value"})
     if unknown or not {"ncols", "nrows"} <= set(header):
         raise _wrong_grid(path, f"the header {', '.join(header) or 'without keys'}")
+    if not all(math.isfinite(header.get(key, 0.0)) for key in ASC_KEYS):
+        raise _wrong_grid(path, "a header with numbers that are not finite")
     rows, columns = round(header["nrows"]), round(header["ncols"])
     try:
         values = np.array(words[begin:], dtype=np.float64)

@@ -1,0 +1,91 @@
+"""Writes the first inputs of the fuzz targets to tests/fuzz/seeds: a few short ones per target.
+
+usage: python tests/fuzz/seeds.py
+
+A seed of calls is a list of bytes that fuzz_fmi2.c or fuzz_fmi3.c decodes; the numbers of calls are
+indices of the table `call` there. Inputs that mutations find are kept in build/fuzz, not here.
+"""
+
+from __future__ import annotations
+
+import struct
+from pathlib import Path
+
+FOLDER = Path(__file__).parent / "seeds"
+PARTS = ("plant", "controller")
+NAN = float("nan")
+# indices of calls
+FMI2 = {"initialize": 3, "get": 10, "set": 12, "save": 16, "restore": 17, "serialize": 19}
+FMI2 |= {"step": 20, "directional": 26, "continuous": 8, "set_states": 30, "row": 31, "update": 27}
+FMI3 = {"initialize": 2, "get": 10, "set": 12, "save": 17, "restore": 18, "serialize": 20}
+FMI3 |= {"step": 21, "directional": 26, "continuous": 8, "set_states": 30, "row": 31, "update": 27}
+
+
+def walks(call: dict[str, int]) -> dict[str, bytes]:
+    """Returns sequences of calls by name: co-simulation with states, model exchange."""
+    step = [call["step"], 0, 4]
+    read = [call["get"], 3, 1, 0, 0, 1, 40, 0, 0, 5, 0]
+    write = [call["set"], 2, 0, 4, 1, 140, 0, 7, 1, 120]
+    state = [call["save"], 0, *step, call["serialize"], 0, 0, call["restore"], 0]
+    begin = [call["initialize"]]
+    rows = [byte for kind in range(4) for byte in (call["row"], kind, 0)]
+    change = [call["set_states"], 0, 1, 9, 0, 100, 140]
+    tangent = [call["directional"], 1, 1, 1, 9, 0, 0, 3, 0, 1, 130]
+    return {
+        "steps": bytes([0, *begin, *step, *read, *write, *step, *step]),
+        "states": bytes([0, *begin, *step, *state, *step, call["restore"], 0, *step]),
+        "events": bytes([6, *begin, *step, call["update"], 0, *step, *state]),
+        "exchange": bytes(
+            [1, *begin, call["update"], 0, call["continuous"], *rows, *change, *tangent, *rows]
+        ),
+    }
+
+
+def grid(rows: int, columns: int, kind: int, table: list[float] | None = None) -> bytes:
+    """Returns a grid file (plant_fmu/include/hexapod/terrain.h), with one material or none."""
+    heights = [0.01 * ((3 * i) % 5) for i in range(rows * columns)]
+    head = struct.pack(
+        "<8s4q3d64s", b"hxGrid01", rows, columns, kind, table is not None, -0.5, -0.5, 0.25, b"seed"
+    )
+    content = head + struct.pack(f"<{len(heights)}d", *heights)
+    if table is None:
+        return content
+    codes = bytes(i % 2 for i in range(len(heights)))
+    return content + codes.ljust(-(-len(codes) // 8) * 8, b"\0") + struct.pack("<16d", *table)
+
+
+def seeds() -> dict[str, dict[str, bytes]]:
+    """Returns the seeds by target and name."""
+    found = {}
+    for part in PARTS:
+        found[f"fuzz_fmi2_{part}"] = walks(FMI2)
+        found[f"fuzz_fmi3_{part}"] = walks(FMI3)
+        found[f"fuzz_start_values_{part}"] = {
+            "valid": bytes([0, 16]),
+            "changed_value": bytes([1, 16, 3, 0, 1, 100, 140]),
+            "changed_bytes": bytes([1, 16, 3, 0, 0, 2, 4, 0, 49, 5, 0, 50]),
+            "without_checksum": bytes([0, 23]),
+        }
+        found[f"fuzz_states_{part}"] = {
+            "valid": bytes([0, 0]),
+            "damaged": bytes([0, 1, 100, 0, 0, 1, 7]),
+            "forged": bytes([1, 2, 72, 0, 0, 1, 7, 0, 1, 0, 0, 100, 140]),
+        }
+    found["fuzz_grid"] = {
+        "smooth": grid(5, 4, 1),
+        "blocks": grid(4, 4, 2),
+        "material": grid(4, 4, 2, [0.3, 0.4, NAN, *13 * [0.0]]),
+    }
+    return found
+
+
+def write(folder: Path) -> None:
+    """Writes all seeds into folders named like the targets."""
+    for target, files in seeds().items():
+        (folder / target).mkdir(parents=True, exist_ok=True)
+        for name, content in files.items():
+            (folder / target / name).write_bytes(content)
+
+
+if __name__ == "__main__":
+    write(FOLDER)

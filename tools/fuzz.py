@@ -1,0 +1,162 @@
+"""Fuzzes the C code by libFuzzer and the Python readers by Hypothesis; prints and writes figures.
+
+usage: python -m tools.fuzz SECONDS [TARGET ...]
+
+Each target of tests/fuzz gets an equal share of the time; the readers (tests/fuzz/test_readers.py),
+which are the target "readers", get one share too. Inputs that reach new code are kept in
+build/fuzz/corpus, inputs that violate a rule are written to build/fuzz/findings, figures to
+build/fuzz/figures.json. The exit code is 1 after a finding.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import shutil
+import subprocess
+import sys
+import time
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[1]
+BUILD = ROOT / "build" / "fuzz"
+SEEDS = ROOT / "tests" / "fuzz" / "seeds"
+READERS = "readers"
+READING = ("-q", "-n", "0", "--hypothesis-show-statistics", "tests/fuzz/test_readers.py")
+LONGEST_INPUT = 4096  # bytes
+LONGEST_CALL = 60  # s  an input that takes longer is a finding
+STATISTIC = re.compile(r"stat::number_of_executed_units: +(\d+)")
+COVERAGE = re.compile(r"cov: (\d+)")
+DRAWN = re.compile(r"- (\d+) passing")
+
+
+@dataclass(frozen=True)
+class Figures:
+    """What one target did."""
+
+    target: str
+    inputs: int
+    covered: int  # edges of the control flow; 0: not measured
+    seconds: float
+    found: bool
+
+
+def build() -> None:
+    """Builds the targets. Raises SystemExit when a tool is missing or the build fails."""
+    if shutil.which("clang") is None:
+        raise SystemExit(
+            "fuzz: no clang, expected one with libFuzzer; install it (Debian, Ubuntu: "
+            "apt-get install clang libclang-rt-dev)"
+        )
+    search = os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])
+    cmake = shutil.which("cmake", path=search) or "cmake"
+    fresh = not (BUILD / "CMakeCache.txt").exists()
+    configure = [cmake, "--preset", "fuzz", f"-DPython_EXECUTABLE={sys.executable}"]
+    commands = [
+        [*configure, *(["-G", "Ninja"] if fresh else [])],
+        [cmake, "--build", "--preset", "fuzz"],
+    ]
+    for command in commands:
+        done = subprocess.run(
+            command,
+            cwd=ROOT,
+            env=os.environ | {"PATH": search},
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+        if done.returncode != 0:
+            raise SystemExit(f"fuzz: {' '.join(command)} failed\n{done.stdout}{done.stderr}")
+
+
+def fuzz(target: str, seconds: float) -> Figures:
+    """Runs one libFuzzer target; prints what it says when it found something."""
+    corpus, findings = BUILD / "corpus" / target, BUILD / "findings" / target
+    for folder in (corpus, findings):
+        folder.mkdir(parents=True, exist_ok=True)
+    options = {
+        "max_total_time": max(1, round(seconds)),
+        "max_len": LONGEST_INPUT,
+        "timeout": LONGEST_CALL,
+        "print_final_stats": 1,
+        "artifact_prefix": f"{findings}/",
+    }
+    begin = time.monotonic()
+    done = subprocess.run(
+        [
+            str(BUILD / "tests" / "fuzz" / target),
+            *(f"-{name}={value}" for name, value in options.items()),
+            str(corpus),
+            str(SEEDS / target),
+        ],
+        capture_output=True,
+        text=True,
+        errors="replace",
+        check=False,
+    )
+    if done.returncode != 0:
+        print(done.stderr[-6000:], file=sys.stderr)
+    inputs, covered = STATISTIC.search(done.stderr), COVERAGE.findall(done.stderr)
+    return Figures(
+        target,
+        int(inputs[1]) if inputs else 0,
+        int(covered[-1]) if covered else 0,
+        time.monotonic() - begin,
+        done.returncode != 0,
+    )
+
+
+def read(seconds: float) -> Figures:
+    """Draws files for the readers by Hypothesis, a new seed each time, until the time is over."""
+    begin, inputs, found = time.monotonic(), 0, False
+    while not found and (inputs == 0 or time.monotonic() - begin < seconds):
+        done = subprocess.run(
+            [sys.executable, "-m", "pytest", *READING],
+            cwd=ROOT,
+            env=os.environ | {"HEXAPOD_FUZZ": "1"},
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+        found = done.returncode != 0
+        if found:
+            print(done.stdout[-6000:], file=sys.stderr)
+        inputs += sum(map(int, DRAWN.findall(done.stdout)))
+        if inputs == 0:
+            break
+    return Figures(READERS, inputs, 0, time.monotonic() - begin, found)
+
+
+def main(arguments: Sequence[str]) -> int:
+    """Runs the targets and returns the exit code."""
+    known = [*sorted(folder.name for folder in SEEDS.iterdir()), READERS]
+    if not arguments or not arguments[0].isdigit() or set(arguments[1:]) - set(known):
+        print(f"usage: python -m tools.fuzz SECONDS [TARGET ...]; targets: {', '.join(known)}")
+        return 2
+    chosen = list(arguments[1:]) or known
+    share = int(arguments[0]) / len(chosen)
+    if set(chosen) != {READERS}:
+        build()
+    figures = []
+    for target in chosen:
+        one = read(share) if target == READERS else fuzz(target, share)
+        said = "a finding" if one.found else "no finding"
+        print(
+            f"{target:30}{one.inputs:12,} inputs {one.covered:7,} edges",
+            f"{one.seconds:7.0f} s  {said}",
+            flush=True,
+        )
+        figures.append(one)
+    BUILD.mkdir(parents=True, exist_ok=True)
+    about = {"finished": datetime.now(UTC).isoformat(timespec="seconds")}
+    text = json.dumps({**about, "targets": [asdict(one) for one in figures]}, indent=1)
+    (BUILD / "figures.json").write_text(text + "\n", encoding="utf-8")
+    return int(any(one.found for one in figures))
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))
