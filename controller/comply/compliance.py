@@ -92,8 +92,8 @@ class Compliance(Stateful):
 
     STATE = (
         "law", "detector", "watch", "touchdown", "landings", "burden", "bend", "torque", "shift",
-        "doubted", "fallback", "grip", "regaining", "scale", "lean", "trust", "lagging", "overspeed_share",
-        "slide_periods", "recovery_periods",
+        "doubted", "fallback", "grip", "regaining", "scale", "lean", "trust", "lagging",
+        "overspeed_share", "slide_periods", "recovery_periods",
     )  # fmt: skip
 
     def __init__(
@@ -211,7 +211,8 @@ class Compliance(Stateful):
         """
         total = float(force[self.touching, 2].sum())
         high = plan.height > self.high + met
-        doubted = self.watch.look(self.touching, total, plan.standing, high)
+        due = plan.standing | plan.awaited
+        doubted = self.watch.look(self.touching, total, due, high)
         self.doubted = doubted | (np.count_nonzero(doubted) >= TRIPOD_LEGS)
         self.fallback = self.doubted | (self.trust < 1.0)
         return self._replace_forces(plan, force) if doubted.any() else force
@@ -293,7 +294,7 @@ class Compliance(Stateful):
         if not total > self.settled or not plan.weight > self.settled:
             return
         ahead = (normal @ plan.feet) / total - (plan.shares.normal @ plan.feet) / plan.weight
-        lean = self.lean + self.follow_cycle * ahead
+        lean = complex(self.lean + self.follow_cycle * ahead)
         self.lean = complex(
             min(max(lean.real, -self.most_lean), self.most_lean),
             min(max(lean.imag, -self.most_lean), self.most_lean),

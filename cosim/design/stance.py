@@ -1,11 +1,12 @@
 """Finds the stance in which the servos of a walking robot heat up least.
 
 Two lengths are varied, the same for all legs: how far the feet stand out from the hips, and how
-deep below them, the latter by no more than 15 % of the torso's height. The heat is the mean sum of squared servo torques over a cycle of the robot's gait
-at its stride, at the planned loads (C19, C20, C42) and without accelerations. A stance is allowed
-when the legs reach all steps of the gait with a reserve and lift their feet, no joint needs more than the speed limit
-or its present speed, neighbouring feet keep apart, and the robot stands as firmly as its own stance
-or a quarter of gravity sideways requires.
+deep below them, the latter by no more than 15 % of the torso's height. The heat is the mean sum of
+squared servo torques over a cycle of the robot's gait at its stride, at the planned loads (C19,
+C20, C42) and without accelerations. A stance is allowed when the legs reach all steps of the gait
+with a reserve and lift their feet, no joint needs more than the speed limit or its present speed,
+neighbouring feet keep apart, and the robot stands as firmly as its own stance or a quarter of
+gravity sideways requires.
 """
 
 from __future__ import annotations
@@ -178,7 +179,7 @@ def _loads(robot: Robot, gait: Gait) -> tuple[Array, float]:
     for k in range(PHASES):
         phase = gait.phase((k + 0.5) / PHASES)
         stands, along, lift = _steps(phase, gait, robot.gait.stride)
-        plane = home[:, 0] + 1j * home[:, 1] + along
+        plane = np.asarray(home[:, 0] + 1j * home[:, 1] + along, dtype=np.complex128)
         pose = legs.pose(plane, home[:, 2] + lift)
         masses = dynamics.place(pose, 0j, 0.0, level)
         alone = Neighbours((None, masses, None), (None, pose, None))
@@ -232,7 +233,8 @@ def _lifts(robot: Robot, gait: Gait) -> bool:
     """Returns whether the joints can lift each foot anywhere on its way (`Walked`)."""
     legs = LegSolver(robot)
     home, way = legs.forward(robot.stance), RESERVE * robot.gait.stride * gait.duty
-    plane = home[:, 0] + 1j * home[:, 1] + way * np.array([[-0.5], [0.0], [0.5]])
+    along = way * np.array([[-0.5], [0.0], [0.5]])
+    plane = np.asarray(home[:, 0] + 1j * home[:, 1] + along, dtype=np.complex128)
     pose = legs.pose(plane, home[:, 2] + LIFTED * gait.step_height + np.zeros((3, 1)))
     return not legs.solve(pose, np.zeros_like(plane), np.zeros(plane.shape)).unreachable.any()
 

@@ -78,17 +78,14 @@ def ground_under(robot: Robot, spot: Spot, centre: Array) -> Held:
     if number == 0:
         return held
     row = surface.materials[number - 1]
-    given = {name: float(row[column]) for name, column in (("mu", MU), ("mu_static", MU_STATIC))}
-    if math.isnan(given["mu"]):
-        given.pop("mu")
-    elif math.isnan(given["mu_static"]):
-        given["mu_static"] = given["mu"]
-    if math.isnan(given["mu_static"]):
-        given.pop("mu_static")
+    # a row with a kinetic coefficient alone has no higher static one
+    mu = held.friction.mu if math.isnan(row[MU]) else float(row[MU])
+    fallback = held.friction.mu_static if math.isnan(row[MU]) else mu
+    mu_static = fallback if math.isnan(row[MU_STATIC]) else float(row[MU_STATIC])
     stiffness = robot.contact.stiffness if math.isnan(row[STIFFNESS]) else float(row[STIFFNESS])
     return replace(
         held,
-        friction=replace(held.friction, **given),
+        friction=replace(held.friction, mu=mu, mu_static=mu_static),
         contact=replace(robot.contact, stiffness=stiffness),
         soil=row_soil(row[LAW:]) if spot.is_sole else Soil(),
     )

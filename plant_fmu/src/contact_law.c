@@ -84,12 +84,14 @@ static void set_ground(const hxModel *model, const double *material, int row, in
 static void set_soil(const hxModel *model, const double *material, int slot,
                      hxContactState *contact) {
   hxSoil soil;
+  double numbers[HX_SOIL_SIZE];
   if (material)
     hx_soil_from_row(material + HX_MATERIAL_SOIL, model->radius[HX_FOOT], model->pad_radius, &soil);
   else
     memcpy(&soil, model->soil, sizeof soil);
   contact->on_soil[slot] = (int)soil.law != HX_SOIL_NONE ? 1.0 : 0.0;
-  memcpy(contact->soil[slot], &soil, sizeof soil);
+  memcpy(numbers, &soil, sizeof soil);
+  for (int i = 0; i < HX_SOIL_SIZE; ++i) contact->soil[i][slot] = numbers[i];
 }
 
 /* Returns the material under a foot; bodies have the definition's ground. */
@@ -128,8 +130,7 @@ static void fill_contact_slots(hxContactState *contact, int row) {
   hx_fill_slots(contact->static_rise[row]);
   if (row != HX_FOOT) return;
   hx_fill_slots(contact->on_soil);
-  for (int slot = HX_LEGS; slot < HX_SLOTS; ++slot)
-    memcpy(contact->soil[slot], contact->soil[0], sizeof contact->soil[0]);
+  for (int i = 0; i < HX_SOIL_SIZE; ++i) hx_fill_slots(contact->soil[i]);
 }
 
 /* Holds the cells of feet that touch the ground, and releases those of others. */
@@ -160,7 +161,9 @@ void hx_contact_release(hxContactState *contact) {
 static void start_in_soil(const hxDepths *depths, hxContactState *contact) {
   for (int leg = 0; leg < HX_LEGS; ++leg) {
     hxSoil soil;
-    memcpy(&soil, contact->soil[leg], sizeof soil);
+    double numbers[HX_SOIL_SIZE];
+    for (int i = 0; i < HX_SOIL_SIZE; ++i) numbers[i] = contact->soil[i][leg];
+    memcpy(&soil, numbers, sizeof soil);
     if (contact->closed[HX_FOOT][leg] != 0.0 && contact->on_soil[leg] != 0.0)
       contact->plastic[leg] = hx_soil_plastic_depth(&soil, depths->delta[HX_FOOT][leg]);
   }

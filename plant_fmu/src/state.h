@@ -125,7 +125,7 @@ typedef struct hxContactState {
   double mu[HX_ROWS][HX_SLOTS];           /* 1        friction of that ground */
   double static_rise[HX_ROWS][HX_SLOTS];  /* 1        mu_s - mu of eq. 18 */
   double on_soil[HX_SLOTS];               /* 1    1: the foot touched down on soil */
-  double soil[HX_SLOTS][HX_SOIL_SIZE];    /* an hxSoil, where on_soil is 1 */
+  double soil[HX_SOIL_SIZE][HX_SLOTS];    /* numbers of an hxSoil, where on_soil is 1 */
   double plastic[HX_SLOTS];    /* m    depth at which feet touch soil: z_p, or that of the footprint
                                 *      above which a foot is; 0 on rigid ground */
   double place[2][HX_SLOTS];   /* m    x and y where feet left the bottom of that footprint */

@@ -30,7 +30,7 @@ def test_heat_nears_the_square_of_a_constant_torque_by_e_in_a_minute() -> None:
     for _ in range(MINUTE):
         warmth.step(loaded(1.0), 0.5)
     assert warmth.heat.max() == pytest.approx(1.0 - math.exp(-1.0))
-    assert np.unravel_index(warmth.heat.argmax(), (6, 3)) == (4, 1)
+    assert int(warmth.heat.argmax()) == 4 * 3 + 1
 
 
 @pytest.mark.parametrize(

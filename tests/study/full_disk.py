@@ -8,7 +8,7 @@ import sys
 
 from hexapod_cosim.cosim.cli import main
 
-FILES = 6  # flushes: of two files and a part, each with its folder
+FILES = 8  # flushes: of three files and a part, each with its folder
 flush, count = os.fsync, [0]
 
 

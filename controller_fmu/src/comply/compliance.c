@@ -110,13 +110,14 @@ static void replace_forces(const hxPlan *plan, double force[HX_LEGS][3], hxCompl
  * heights at which the feet meet the ground without a bump [m]. */
 static void judge_sensors(const hxComplianceModel *model, const hxPlan *plan,
                           const double met[HX_LEGS], double force[HX_LEGS][3], hxCompliance *laws) {
-  int high[HX_LEGS], doubted = 0;
+  int high[HX_LEGS], due[HX_LEGS], doubted = 0;
   double total = 0.0;
   for (int leg = 0; leg < HX_LEGS; ++leg) {
     high[leg] = plan->height[leg] > model->high + met[leg];
+    due[leg] = plan->standing[leg] || plan->awaited[leg];
     total += laws->touching[leg] ? force[leg][2] : 0.0;
   }
-  hx_sensor_watch_look(&model->watch, laws->touching, total, plan->standing, high, &laws->watch);
+  hx_sensor_watch_look(&model->watch, laws->touching, total, due, high, &laws->watch);
   for (int leg = 0; leg < HX_LEGS; ++leg) doubted += laws->watch.left[leg] > 0.0;
   for (int leg = 0; leg < HX_LEGS; ++leg) {
     laws->doubted[leg] = doubted >= HX_TRIPOD_LEGS || laws->watch.left[leg] > 0.0;
@@ -188,7 +189,8 @@ static void update_trust(const hxComplianceModel *model, const hxPlan *plan, dou
   for (int leg = 0; leg < HX_LEGS; ++leg) laws->fallback[leg] = laws->doubted[leg] || goal == 0.0;
 }
 
-/* Computes the measured squeeze and normal forces (C24, C46), and returns the sum of the latter [N]. */
+/* Computes the measured squeeze and normal forces (C24, C46), and returns the sum of the latter
+ * [N]. */
 static double law_inputs(const hxComplianceModel *model, const hxPlan *plan,
                          const double force[HX_LEGS][3], hxPlane push[HX_LEGS],
                          double normal[HX_LEGS], hxCompliance *laws) {

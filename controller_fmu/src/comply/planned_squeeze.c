@@ -77,8 +77,8 @@ static double limit(const hxPlannedSqueeze *model, const hxShares *shares,
   for (int k = 0; k < HX_LEGS; ++k) {
     const double most = most_friction * model->friction * shares->normal[k];
     if (shares->normal[k] > least_load)
-      factor = fmin(factor, (most - hx_length(shares->push[k])) /
-                                fmax(hx_length(change[k]), least_push));
+      factor = fmin(factor,
+                    (most - hx_length(shares->push[k])) / fmax(hx_length(change[k]), least_push));
   }
   return fmax(factor, 0.0);
 }
@@ -98,8 +98,8 @@ void hx_planned_squeeze_add(const hxPlannedSqueeze *model, const hxPlane feet[HX
     const double (*lever)[3] = demand->lever[k];
     yielding(lever, shares->normal[k], price, B[k]);
     arm[k] = hx_plane_sub(feet[k], centre);
-    change[k] = hx_plane_sub(wanted(lever, demand->torque[k], shares->normal[k], B[k]),
-                             shares->push[k]);
+    change[k] =
+        hx_plane_sub(wanted(lever, demand->torque[k], shares->normal[k], B[k]), shares->push[k]);
   }
   balance(arm, (const double (*)[3])B, change);
   const double factor = limit(model, shares, change);

@@ -9,7 +9,8 @@ static const double heat_time = 60.0; /* s, in which a small servo warms up */
 static const double cool = 0.8, hot = 1.0;
 /* 1, torque needed for the measured weight over torque allowed */
 static const double easy = 0.8, hard = 1.0;
-static const double most_squeeze = 0.95; /* 1, weight of the torques when a servo is hot or short of torque */
+static const double most_squeeze =
+    0.95; /* 1, weight of the torques when a servo is hot or short of torque */
 
 void hx_warmth_compile(const hxControllerDefinition *definition, hxWarmthModel *model) {
   const double rating = definition->servo.torque_continuous,

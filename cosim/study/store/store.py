@@ -25,7 +25,7 @@ import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
 from hexapod_cosim.cosim.common.events import EventSink, ignore_event
-from hexapod_cosim.cosim.common.files import not_writable
+from hexapod_cosim.cosim.common.files import flush_folder, not_writable
 from hexapod_cosim.cosim.study.plan.records import StudyError
 from hexapod_cosim.cosim.study.store.parts import (
     COMPRESSION,
@@ -83,7 +83,7 @@ def _durable_file(path: Path) -> Iterator[BinaryIO]:
             file.flush()
             os.fsync(file.fileno())
         os.replace(part, path)
-        _sync_folder(path.parent)
+        flush_folder(path.parent)
     except OSError as error:
         raise _not_written(path, error) from error
     finally:
@@ -93,16 +93,6 @@ def _durable_file(path: Path) -> Iterator[BinaryIO]:
 def _unfinished(path: Path) -> Path:
     """Returns the path of a file while it is written, which is another one for each writer."""
     return path.with_name(f".{path.name}.{uuid4().hex[:8]}.new")
-
-
-def _sync_folder(folder: Path) -> None:
-    """Flushes a rename to the disk; Windows offers no way to do so."""
-    if hasattr(os, "O_DIRECTORY"):
-        handle = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
-        try:
-            os.fsync(handle)
-        finally:
-            os.close(handle)
 
 
 def _not_written(path: Path, error: OSError) -> Exception:

@@ -1,10 +1,11 @@
-/* one_lane.h - what smooth.h needs of lanes/lanes.h, with one lane, for sources that no kernel
- * includes */
+/* one_lane.h - what smooth.h, power.h and soil_law.h need of lanes/lanes.h, with one lane, for
+ * sources that no kernel includes */
 #ifndef HX_ONE_LANE_H
 #define HX_ONE_LANE_H
 
 #include <math.h>
 #include <stdint.h>
+#include <string.h>
 
 #define HX_LANES 1
 
@@ -18,6 +19,17 @@ static inline hxReal hx_sqrt(hxReal x) { return sqrt(x); }
 static inline hxMask hx_less(hxReal a, hxReal b) { return a < b ? -1 : 0; }
 static inline hxReal hx_select(hxMask mask, hxReal a, hxReal b) { return mask ? a : b; }
 static inline hxReal hx_min(hxReal a, hxReal b) { return b < a ? b : a; }
+static inline hxReal hx_max(hxReal a, hxReal b) { return a < b ? b : a; }
+static inline hxMask hx_bits(hxReal x) {
+  hxMask m;
+  memcpy(&m, &x, sizeof m);
+  return m;
+}
+static inline hxReal hx_from_bits(hxMask m) {
+  hxReal x;
+  memcpy(&x, &m, sizeof x);
+  return x;
+}
 static inline int hx_any(hxMask mask) { return mask != 0; }
 
 #endif

@@ -4,8 +4,11 @@
 #include <string.h>
 
 #include "../elementary.h"
+#include "one_lane.h"
 
-static const double pi = 3.14159265358979323846;
+#include "soil_law.h" /* behind the numbers that it computes with */
+
+_Static_assert(sizeof(hxSoils) == sizeof(hxSoil), "a soil consists of the same numbers");
 
 void hx_soil_compile(const hxSoilDefinition *d, double foot_radius, double pad_radius,
                      hxSoil *soil) {
@@ -63,116 +66,49 @@ int hx_soil_row_error(const double row[13]) {
   return -1;
 }
 
-/* ---- virgin curves ---- */
+/* ---- one foot ---- */
 
-/* Returns the integral of (local depth)^n over the foot, and its slope (eq. 41), times a pressure
- * modulus. p = z^n; q = (z - R)^n of a sphere deeper than R. */
-static hxSoilCurve columns(const hxSoil *soil, double modulus, double n, double z, double p,
-                           double q) {
-  if (soil->pad != 0.0) {
-    const double force = modulus * (soil->area * p);
-    return (hxSoilCurve){force, n * force / z};
-  }
-  const double R = soil->radius, above = z > R ? z - R : 0.0, one = 1.0 / (n + 1.0),
-               two = one / (n + 2.0), scale = 2.0 * pi * modulus;
-  const double force = z * p * (R * one - z * two) + above * above * q * two;
-  const double slope = p * (R - z * one) + above * q * one;
-  return (hxSoilCurve){scale * force, scale * slope};
+/* Returns the pack that holds one soil. */
+static hxSoils only(const hxSoil *soil) {
+  hxSoils soils;
+  memcpy(&soils, soil, sizeof soils);
+  return soils;
 }
 
-static hxSoilCurve bekker(const hxSoil *soil, double z) {
-  const double n = soil->exponent, above = soil->pad != 0.0 ? 0.0 : z - soil->radius;
-  const double q = above > 0.0 ? hx_pow(above, n) : 0.0;
-  return columns(soil, soil->modulus, n, z, hx_pow(z, n), q);
-}
+static hxSoilCurve curve_of(hxSoilCurves only) { return (hxSoilCurve){only.force, only.slope}; }
 
-/* eq. 42; e is the depth in radii */
-static hxSoilCurve granular(const hxSoil *soil, double z) {
-  if (soil->pad != 0.0) return (hxSoilCurve){soil->down * soil->area * z, soil->down * soil->area};
-  const double R = soil->radius, e = z / R, o = 1.0 - e, rest = soil->down - soil->side;
-  double force, slope;
-  if (e <= 1.0) {
-    force = soil->side * (0.5 * e * e) +
-            rest * (e * e * (0.5 * o * o + (2.0 / 3.0) * o * e + 0.25 * e * e));
-    slope = soil->side * e + rest * (e * (o * o + o * e + (1.0 / 3.0) * e * e));
-  } else {
-    force = soil->side * (e - 0.5) + rest * ((1.0 / 3.0) * (e - 1.0) + 0.25);
-    slope = soil->side + (1.0 / 3.0) * rest;
-  }
-  return (hxSoilCurve){2.0 * pi * R * R * R * force, 2.0 * pi * R * R * slope};
-}
-
-/* eq. 43 */
-static hxSoilCurve mud(const hxSoil *soil, double z) {
-  const hxSoilCurve yield = columns(soil, soil->yield, 0.0, z, 1.0, 1.0);
-  const hxSoilCurve hard = columns(soil, soil->hardening, 1.0, z, z, z - soil->radius);
-  return (hxSoilCurve){yield.force + hard.force, yield.slope + hard.slope};
+static hxSoilForce force_of(hxSoilForces only) {
+  return (hxSoilForce){only.force, only.elastic, only.slope, only.stiffness, only.viscosity};
 }
 
 hxSoilCurve hx_soil_virgin(const hxSoil *soil, double z) {
-  if (!(z > 0.0)) return (hxSoilCurve){0.0, 0.0};
-  switch ((int)soil->law) {
-  case HX_SOIL_BEKKER:
-    return bekker(soil, z);
-  case HX_SOIL_GRANULAR:
-    return granular(soil, z);
-  default:
-    return mud(soil, z);
-  }
+  const hxSoils soils = only(soil);
+  return curve_of(hx_virgin(&soils, z));
 }
-
-/* ---- unloading and damping ---- */
 
 double hx_soil_plastic_depth(const hxSoil *soil, double z) {
-  return fmax(z - hx_soil_virgin(soil, z).force / soil->unloading, 0.0);
-}
-
-/* Returns min(A Ke (z - z_p), F_v(z)) of a foot deeper than z_p, and its slope. */
-static hxSoilCurve elastic(const hxSoil *soil, double plastic, double z) {
-  const hxSoilCurve line = {soil->unloading * (z - plastic), soil->unloading};
-  const hxSoilCurve virgin = hx_soil_virgin(soil, z);
-  return virgin.force < line.force ? virgin : line;
-}
-
-/* Returns the area of the foot's cross-section at the surface, m2, and its slope by z, m. */
-static hxSoilCurve contact_area(const hxSoil *soil, double z) {
-  if (soil->pad != 0.0 || z >= soil->radius) return (hxSoilCurve){soil->area, 0.0};
-  return (hxSoilCurve){pi * (2.0 * soil->radius - z) * z, 2.0 * pi * (soil->radius - z)};
+  const hxSoils soils = only(soil);
+  return hx_plastic_depth(&soils, z);
 }
 
 hxSoilForce hx_soil_normal_force(const hxSoil *soil, double plastic, double z, double dz) {
-  if (!(z > plastic)) return (hxSoilForce){0.0, 0.0, 0.0, 0.0, 0.0};
-  const hxSoilCurve spring = elastic(soil, plastic, z), area = contact_area(soil, z);
-  const double viscosity = soil->damping * area.force, force = spring.force + viscosity * dz;
-  if (!(force > 0.0)) return (hxSoilForce){0.0, spring.force, spring.slope, 0.0, 0.0};
-  return (hxSoilForce){force, spring.force, spring.slope,
-                       spring.slope + soil->damping * area.slope * dz, viscosity};
+  const hxSoils soils = only(soil);
+  return force_of(hx_soil_forces(&soils, plastic, z, dz));
 }
 
 double hx_soil_stored_energy(const hxSoil *soil, double plastic, double z) {
-  if (!(z > plastic)) return 0.0;
-  const double force = elastic(soil, plastic, z).force;
-  return force * force / (2.0 * soil->unloading);
-}
-
-/* ---- shear ---- */
-
-/* Returns the integral of depth over the foot's profile, m3, and its slope, the profile's area. */
-static hxSoilCurve profile_moment(const hxSoil *soil, double z) {
-  const double R = soil->radius, c = R - z;
-  if (soil->pad != 0.0) return (hxSoilCurve){R * z * z, 2.0 * R * z};
-  if (c <= -R) return (hxSoilCurve){pi * R * R * (z - R), pi * R * R};
-  const double chord = sqrt((R - c) * (R + c));
-  const double segment = R * R * hx_half_turn_angle(chord, c) - c * chord;
-  return (hxSoilCurve){(2.0 / 3.0) * (chord * chord * chord) - c * segment, segment};
+  const hxSoils soils = only(soil);
+  return hx_stored_energy(&soils, plastic, z);
 }
 
 hxSoilCurve hx_soil_shear_base(const hxSoil *soil, double z) {
-  const hxSoilCurve area = contact_area(soil, z);
-  hxSoilCurve base = {soil->cohesion * area.force, soil->cohesion * area.slope};
-  if ((int)soil->law == HX_SOIL_GRANULAR) {
-    const hxSoilCurve moment = profile_moment(soil, z);
-    base.force += soil->ahead * moment.force, base.slope += soil->ahead * moment.slope;
-  }
-  return base;
+  const hxSoils soils = only(soil);
+  return curve_of(hx_shear_base(&soils, z));
+}
+
+hxSoilContact hx_soil_contact(const hxSoil *soil, double plastic, double z, double dz) {
+  const hxSoils soils = only(soil);
+  const hxSoilContacts at = hx_soil_contacts(&soils, plastic, z, dz);
+  return (hxSoilContact){force_of(at.normal), curve_of(at.held), curve_of(at.stored),
+                         curve_of(at.hold)};
 }

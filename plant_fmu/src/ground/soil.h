@@ -41,6 +41,14 @@ typedef struct {
   double viscosity; /* N s/m  df_n/d(dz/dt) */
 } hxSoilForce;
 
+/* Forces of soil on a foot in contact with it. */
+typedef struct {
+  hxSoilForce normal;
+  hxSoilCurve held;   /* N     times the sinking speed: power that is stored; its slope by z */
+  hxSoilCurve stored; /* J, N  energy that unloading gives back */
+  hxSoilCurve hold;   /* N/m   shear over the bristle without load */
+} hxSoilContact;
+
 /* Computes the constants of a soil under feet of this radius and pad radius (0: sphere). */
 void hx_soil_compile(const hxSoilDefinition *definition, double foot_radius, double pad_radius,
                      hxSoil *soil);
@@ -67,6 +75,9 @@ double hx_soil_stored_energy(const hxSoil *soil, double plastic, double z);
 /* Returns the shear force that does not depend on the load, and its slope by the depth (eq. 46):
  * cohesion, and in granular media the resistance of the profile. */
 hxSoilCurve hx_soil_shear_base(const hxSoil *soil, double z);
+
+/* Returns the forces on a foot at depth z that sinks at dz. */
+hxSoilContact hx_soil_contact(const hxSoil *soil, double plastic, double z, double dz);
 
 HX_HIDDEN_END
 

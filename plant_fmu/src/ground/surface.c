@@ -361,8 +361,7 @@ double hx_terrain_outside(const hxTerrain *terrain, const double point[3], const
               outside_along(point[1], head->y0, head->cell, cell[1], head->rows));
 }
 
-/* Returns the height of a column, of the border's where there is none. */
-static double column_height(const hxTerrain *terrain, double col, double row) {
+double hx_terrain_column(const hxTerrain *terrain, double col, double row) {
   const hxGridHead *head = &terrain->head;
   const int64_t c = clamped_index(col, head->cols), r = clamped_index(row, head->rows);
   return terrain->height[r * head->cols + c];
@@ -370,7 +369,7 @@ static double column_height(const hxTerrain *terrain, double col, double row) {
 
 static void top_face(const hxTerrain *terrain, const double point[3], const double cell[2],
                      hxFace *face) {
-  *face = (hxFace){point[2] - column_height(terrain, cell[0], cell[1]), {0.0, 0.0, 1.0}, {0.0}};
+  *face = (hxFace){point[2] - hx_terrain_column(terrain, cell[0], cell[1]), {0.0, 0.0, 1.0}, {0.0}};
 }
 
 /* Returns the gap between a point and the column at offset -1, 0 or 1 from the cell along an axis,
@@ -421,11 +420,11 @@ static void side_column(double gap, double above, int axis, int sign, hxFace *fa
 static void wall_faces(const hxTerrain *terrain, const double point[3], const double cell[2],
                        int axis, hxFace *face) {
   const hxGridHead *head = &terrain->head;
-  const double own = column_height(terrain, cell[0], cell[1]);
+  const double own = hx_terrain_column(terrain, cell[0], cell[1]);
   const double origin = axis == 0 ? head->x0 : head->y0;
   for (int k = -1; k <= 1; k += 2) {
     const double top =
-        column_height(terrain, cell[0] + (axis == 0 ? k : 0), cell[1] + (axis == 1 ? k : 0));
+        hx_terrain_column(terrain, cell[0] + (axis == 0 ? k : 0), cell[1] + (axis == 1 ? k : 0));
     const double gap = gap_to(point[axis], origin, head->cell, cell[axis], k);
     if (top > own) side_column(gap, point[2] - top, axis, k, face);
   }
@@ -436,13 +435,13 @@ static void wall_faces(const hxTerrain *terrain, const double point[3], const do
 static void corner_faces(const hxTerrain *terrain, const double point[3], const double cell[2],
                          hxFace *face) {
   const hxGridHead *head = &terrain->head;
-  const double own = column_height(terrain, cell[0], cell[1]);
+  const double own = hx_terrain_column(terrain, cell[0], cell[1]);
   for (int i = -1; i <= 1; i += 2)
     for (int j = -1; j <= 1; j += 2) {
-      const double top = column_height(terrain, cell[0] + i, cell[1] + j);
+      const double top = hx_terrain_column(terrain, cell[0] + i, cell[1] + j);
       const double nearest = point[2] < top ? point[2] : top;
-      if (!(top > own && nearest > column_height(terrain, cell[0] + i, cell[1]) &&
-            nearest > column_height(terrain, cell[0], cell[1] + j)))
+      if (!(top > own && nearest > hx_terrain_column(terrain, cell[0] + i, cell[1]) &&
+            nearest > hx_terrain_column(terrain, cell[0], cell[1] + j)))
         continue;
       const double x = gap_to(point[0], head->x0, head->cell, cell[0], i),
                    y = gap_to(point[1], head->y0, head->cell, cell[1], j);

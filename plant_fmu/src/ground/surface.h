@@ -45,6 +45,9 @@ double hx_terrain_cell_size(const hxTerrain *terrain);
 void hx_terrain_cell_at(const hxTerrain *terrain, const double point[3], double cell[2]);
 double hx_terrain_outside(const hxTerrain *terrain, const double point[3], const double cell[2]);
 
+/* Returns the height of the top of a cell of blocks, of the border's where there is none. */
+double hx_terrain_column(const hxTerrain *terrain, double col, double row);
+
 /* Faces of blocks that a sphere can touch at once, if cells are not smaller than it. */
 typedef enum hxFaceKind {
   HX_FACE_TOP,    /* of its own cell */

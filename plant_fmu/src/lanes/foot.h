@@ -189,6 +189,21 @@ HX_RARE hxGround hx_grid(const hxModel *model, const hxContactState *state, int 
                     {hx_load(normal[0]), hx_load(normal[1]), hx_load(normal[2])}};
 }
 
+#ifndef HX_TANGENT
+/* Returns the distances of closed feet from the tops of the columns on which they stand. */
+HX_RARE hxGround hx_block_tops(const hxModel *model, const hxContactState *state, int slot,
+                               const hxVec3 *point) {
+  const hxReal zero = hx_splat(0.0), z = point->z - model->ground_point[2];
+  double top[HX_LANES];
+  for (int lane = 0; lane < HX_LANES; ++lane)
+    top[lane] =
+        hx_terrain_column(model->terrain, state->cell[0][slot + lane], state->cell[1][slot + lane]);
+  const hxMask closed = hx_less(zero, hx_load(&state->closed[HX_FOOT][slot]));
+  return (hxGround){hx_select(closed, z - hx_load(top), hx_splat(hx_far)),
+                    {zero, zero, hx_splat(1.0)}};
+}
+#endif
+
 /* Returns distance and normal of the ground at the points of a row of contacts. All other code is
  * independent of the terrain. */
 HX_INLINE hxGround hx_ground(const hxModel *model, const hxContactState *state, int row, int slot,
@@ -200,6 +215,8 @@ HX_INLINE hxGround hx_ground(const hxModel *model, const hxContactState *state, 
   if (model->terrain_kind == HX_TERRAIN_GRID &&
       hx_terrain_surface(model->terrain) == HX_SURFACE_SMOOTH)
     return hx_smooth_grid(model, state, row, slot, all, &point);
+  if (model->terrain_kind == HX_TERRAIN_GRID && row == HX_FOOT && all == HX_CLOSED)
+    return hx_block_tops(model, state, slot, &point);
 #endif
   if (model->terrain_kind == HX_TERRAIN_GRID) return hx_grid(model, state, row, slot, all, &point);
   const hxVec3 n = hx_splat_vec3(model->ground_normal);

@@ -21,7 +21,8 @@ static const double bristle_scale = 10.0; /* 1  in preslidings */
 /* Start of a step and the data that all its trials share. */
 typedef struct {
   const hxModel *model;   /* with all rows of contacts */
-  const hxModel *pressed; /* without the rows of bodies while none of them touches the ground */
+  const hxModel *near;    /* without the rows of bodies while none of them touches the ground */
+  const hxModel *pressed; /* the same with one row of feet while no other touches the ground */
   const hxCommand *command, *ramp; /* command and its change per second; ramp NULL: constant */
   const hxContactState *contact;
   const hxMethodRow *method;
@@ -410,7 +411,7 @@ static void keep_nearest_points(const hxModel *model, hxState *state) {
  * those of bodies are left out where neither they nor an open foot can touch the ground. */
 static const hxModel *end_of_step(const hxStart *start, const hxPlantMotion *y, hxMoment *end,
                                   hxDepths *depths) {
-  const hxModel *whole = start->model, *seen = start->pressed;
+  const hxModel *whole = start->model, *seen = start->near;
   if (seen != whole) {
     const double bound = hx_moment_and_bound(seen, whole, start->contact, y, HX_NEAR, end);
     hx_depths_of_moment(seen, start->contact, end, depths);
@@ -469,20 +470,20 @@ static hxStatus advance(const hxStart *start, double h_max, double *next_step, h
   return HX_OK;
 }
 
-/* Returns whether a contact of torso, knees or shanks is closed. */
-static int body_touches(const hxModel *model, const hxContactState *contact) {
+/* Returns whether a contact of the model's rows from `first` to before `end` is closed. */
+static int is_pressed(const hxModel *model, const hxContactState *contact, int first, int end) {
   double closed = 0.0;
-  for (int k = model->foot_rows; k < model->rows + model->torso_rows; ++k)
+  for (int k = first; k < end; ++k)
     for (int slot = 0; slot < hx_slots_of(model->row[k]); ++slot)
       closed += contact->closed[model->row[k]][slot];
   return closed > 0.0;
 }
 
-/* Returns the model without the rows of bodies. Open contacts exert no force, so steps without
- * these rows have the same bits. */
-HX_RARE const hxModel *feet_alone(const hxModel *model, hxModel *feet) {
+/* Returns the model with its first rows of feet only. Open contacts exert no force, so steps
+ * without their rows have the same bits. */
+HX_RARE const hxModel *feet_alone(const hxModel *model, int rows, hxModel *feet) {
   *feet = *model;
-  feet->rows = model->foot_rows;
+  feet->rows = feet->foot_rows = rows;
   feet->torso_rows = 0;
   return feet;
 }
@@ -498,9 +499,10 @@ static hxStatus run_to(const hxModel *model, const hxCommand *command, const hxC
                    .method = hx_method(model->method),
                    .y = &state->motion,
                    .footprints = events->footprints};
-  hxModel feet;
-  const int has_body = model->rows + model->torso_rows > model->foot_rows;
-  const hxModel *alone = has_body ? feet_alone(model, &feet) : model;
+  hxModel feet, tops;
+  const int rows = model->rows + model->torso_rows, foot_rows = model->foot_rows;
+  const hxModel *all_feet = rows > foot_rows ? feet_alone(model, foot_rows, &feet) : model,
+                *first_feet = foot_rows > 1 ? feet_alone(model, 1, &tops) : all_feet;
   start.touch = fmax(touch_depth[0], touch_depth[1] * model->tolerance);
   start.last_step = state->steps + state->rejected + steps_allowed(t_end - state->time);
   double first = fmin(state->first_step,
@@ -511,7 +513,11 @@ static hxStatus run_to(const hxModel *model, const hxCommand *command, const hxC
     double taken;
     int event = 0;
     start.t = state->time;
-    start.pressed = has_body && body_touches(model, &state->contact) ? model : alone;
+    start.near = start.pressed = model;
+    if (!is_pressed(model, &state->contact, foot_rows, rows)) {
+      start.near = all_feet;
+      start.pressed = is_pressed(model, &state->contact, 1, foot_rows) ? all_feet : first_feet;
+    }
     const hxStatus status = advance(&start, left, next_step, state, &taken, &event, message);
     if (status != HX_OK) return status;
     if (next_step == &first) state->first_step = first, next_step = &state->next_step;

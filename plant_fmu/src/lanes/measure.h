@@ -288,18 +288,15 @@ static inline hxVec3 approach_of(const hxContactMoment *moment, int slot) {
  * it, J. */
 HX_RARE hxReal growth_with_soil(const hxPath *path, int slot, hxReal rigid) {
   const hxContactState *state = path->contact;
-  double growth[HX_LANES];
-  hx_store(growth, rigid);
-  for (int lane = 0; lane < HX_LANES; ++lane) {
-    const int leg = slot + lane;
-    if (!is_in_soil(state, leg)) continue;
-    const hxSoil soil = hx_soil_under(state, leg);
-    const double from = path->from->contact[HX_FOOT].delta[leg],
-                 to = path->to->contact[HX_FOOT].delta[leg];
-    growth[lane] = hx_soil_stored_energy(&soil, path->plastic[leg], to) -
-                   hx_soil_stored_energy(&soil, state->plastic[leg], from);
-  }
-  return hx_load(growth);
+  const hxMask in = hx_in_soil(state, slot);
+  if (!hx_any(in)) return rigid;
+  const hxSoils soil = hx_soils_under(state, slot);
+  const hxReal from = hx_load(&path->from->contact[HX_FOOT].delta[slot]),
+               to = hx_load(&path->to->contact[HX_FOOT].delta[slot]);
+  return hx_select(in,
+                   hx_stored_energy(&soil, hx_load(&path->plastic[slot]), to) -
+                       hx_stored_energy(&soil, hx_load(&state->plastic[slot]), from),
+                   rigid);
 }
 
 /* Computes what a row of contacts and its friction lose in a step with these impulses (eq. 27). */
@@ -617,18 +614,13 @@ static inline int hx_has_cone(const hxModel *model) {
 
 /* Returns the largest impulse of friction, on soil of shear (eq. 46), under a normal impulse. */
 HX_RARE hxReal cone_with_soil(const hxPath *path, int slot, hxReal along, hxReal rigid) {
-  const double *from = path->from->contact[HX_FOOT].delta, *to = path->to->contact[HX_FOOT].delta;
-  double limit[HX_LANES], pressed[HX_LANES];
-  hx_store(limit, rigid);
-  hx_store(pressed, along);
-  for (int lane = 0; lane < HX_LANES; ++lane) {
-    const int leg = slot + lane;
-    if (!is_in_soil(path->contact, leg)) continue;
-    const hxSoil soil = hx_soil_under(path->contact, leg);
-    const double z = fmax(0.5 * (from[leg] + to[leg]), 0.0);
-    limit[lane] = soil.friction * pressed[lane] + path->h * hx_soil_shear_base(&soil, z).force;
-  }
-  return hx_load(limit);
+  const hxMask in = hx_in_soil(path->contact, slot);
+  if (!hx_any(in)) return rigid;
+  const hxReal from = hx_load(&path->from->contact[HX_FOOT].delta[slot]),
+               to = hx_load(&path->to->contact[HX_FOOT].delta[slot]);
+  const hxSoils soil = hx_soils_under(path->contact, slot);
+  const hxReal z = hx_max(0.5 * (from + to), hx_splat(0.0));
+  return hx_select(in, soil.friction * along + path->h * hx_shear_base(&soil, z).force, rigid);
 }
 
 HX_INLINE hxReal cone(const hxPath *path, int row, int slot, hxReal along) {

@@ -8,6 +8,10 @@
 #include "../ground/soil.h"
 #include "lanes.h"
 
+#ifndef HX_TANGENT
+#include "../ground/soil_law.h" /* behind lanes.h */
+#endif
+
 _Static_assert(sizeof(hxSoil) == HX_SOIL_SIZE * sizeof(double), "a soil consists of numbers");
 
 /* Returns whether a row of contacts may be on soil. */
@@ -24,7 +28,7 @@ static inline hxMask hx_on_soil(const hxContactState *state, int slot) {
 static inline hxSoil hx_soil_under(const hxContactState *state, int slot) {
   hxSoil soil;
   double numbers[HX_SOIL_SIZE];
-  for (int i = 0; i < HX_SOIL_SIZE; ++i) numbers[i] = hx_re(state->soil[slot][i]);
+  for (int i = 0; i < HX_SOIL_SIZE; ++i) numbers[i] = hx_re(state->soil[i][slot]);
   memcpy(&soil, numbers, sizeof soil);
   return soil;
 }
@@ -44,43 +48,59 @@ typedef struct {
   hxReal per_displacement;     /* 1/m    1/K */
 } hxSoilPack;
 
+#ifdef HX_TANGENT
 /* Returns the forces on feet at these depths and sinking speeds. */
 HX_RARE hxSoilPack hx_soil_pack(const hxContactState *state, int slot, hxReal delta,
                                 hxReal ddelta) {
-  hxNumber z[HX_LANES], dz[HX_LANES], out[8][HX_LANES];
-  memset(out, 0, sizeof out);
-  hx_store(z, delta);
-  hx_store(dz, ddelta);
-  for (int lane = 0; lane < HX_LANES; ++lane) {
-    if (!is_in_soil(state, slot + lane)) continue;
-    const hxSoil soil = hx_soil_under(state, slot + lane);
-    const double plastic = hx_re(state->plastic[slot + lane]), depth = hx_re(z[lane]),
-                 speed = hx_re(dz[lane]), slope_z = hx_slope(z[lane]),
-                 slope_dz = hx_slope(dz[lane]);
-    const hxSoilForce f = hx_soil_normal_force(&soil, plastic, depth, speed);
-    /* the depth of shear does not fall below z_p: a foot that leaves the ground within a step
-     * keeps its grip to the end of the step */
-    const int above = depth < plastic;
-    const hxSoilCurve base = hx_soil_shear_base(&soil, above ? plastic : depth);
-    const double gains = speed > 0.0 ? f.slope / soil.unloading : 1.0;
-    out[0][lane] = hx_with_slope(f.force, f.stiffness * slope_z + f.viscosity * slope_dz);
-    out[1][lane] = f.stiffness, out[2][lane] = f.viscosity;
-    out[3][lane] = hx_with_slope(f.elastic * gains, f.slope * gains * slope_z);
-    out[4][lane] = hx_with_slope(0.5 * f.elastic * f.elastic / soil.unloading,
-                                 f.elastic * f.slope / soil.unloading * slope_z);
-    out[5][lane] = hx_with_slope(soil.per_displacement * base.force,
-                                 above ? 0.0 : soil.per_displacement * base.slope * slope_z);
-    out[6][lane] = soil.friction * soil.per_displacement;
-    out[7][lane] = soil.per_displacement;
-  }
-  return (hxSoilPack){.force = hx_load(out[0]),
-                      .stiffness = hx_load(out[1]),
-                      .viscosity = hx_load(out[2]),
-                      .held = hx_load(out[3]),
-                      .stored = hx_load(out[4]),
-                      .hold = hx_load(out[5]),
-                      .per_load = hx_load(out[6]),
-                      .per_displacement = hx_load(out[7])};
+  const hxReal none = hx_splat(0.0);
+  if (!is_in_soil(state, slot)) return (hxSoilPack){none, none, none, none, none, none, none, none};
+  const hxSoil soil = hx_soil_under(state, slot);
+  const hxSoilContact f =
+      hx_soil_contact(&soil, hx_re(state->plastic[slot]), hx_re(delta), hx_re(ddelta));
+  const hxSoilForce *n = &f.normal;
+  return (hxSoilPack){.force = hx_with_slope(n->force, n->stiffness * hx_slope(delta) +
+                                                           n->viscosity * hx_slope(ddelta)),
+                      .stiffness = n->stiffness,
+                      .viscosity = n->viscosity,
+                      .held = hx_chain(delta, f.held.force, f.held.slope),
+                      .stored = hx_chain(delta, f.stored.force, f.stored.slope),
+                      .hold = hx_chain(delta, f.hold.force, f.hold.slope),
+                      .per_load = soil.friction * soil.per_displacement,
+                      .per_displacement = soil.per_displacement};
 }
+#else
+/* Returns the soils on which feet touched down. */
+static inline hxSoils hx_soils_under(const hxContactState *state, int slot) {
+  hxSoils soils;
+  hxReal numbers[HX_SOIL_SIZE];
+  for (int i = 0; i < HX_SOIL_SIZE; ++i) numbers[i] = hx_load(&state->soil[i][slot]);
+  memcpy(&soils, numbers, sizeof soils);
+  return soils;
+}
+
+/* Returns which feet are in contact with soil. */
+static inline hxMask hx_in_soil(const hxContactState *state, int slot) {
+  return hx_on_soil(state, slot) & hx_less(hx_splat(0.0), hx_load(&state->closed[HX_FOOT][slot]));
+}
+
+/* Returns the forces on feet at these depths and sinking speeds. */
+HX_RARE hxSoilPack hx_soil_pack(const hxContactState *state, int slot, hxReal delta,
+                                hxReal ddelta) {
+  const hxReal none = hx_splat(0.0);
+  const hxMask in = hx_in_soil(state, slot);
+  if (!hx_any(in)) return (hxSoilPack){none, none, none, none, none, none, none, none};
+  const hxSoils soil = hx_soils_under(state, slot);
+  const hxReal z = hx_select(in, delta, none);
+  const hxSoilContacts f = hx_soil_contacts(&soil, hx_load(&state->plastic[slot]), z, ddelta);
+  return (hxSoilPack){.force = hx_select(in, f.normal.force, none),
+                      .stiffness = hx_select(in, f.normal.stiffness, none),
+                      .viscosity = hx_select(in, f.normal.viscosity, none),
+                      .held = hx_select(in, f.held.force, none),
+                      .stored = hx_select(in, f.stored.force, none),
+                      .hold = hx_select(in, f.hold.force, none),
+                      .per_load = hx_select(in, soil.friction * soil.per_displacement, none),
+                      .per_displacement = hx_select(in, soil.per_displacement, none)};
+}
+#endif
 
 #endif

@@ -39,13 +39,18 @@ static inline double hx_deepest(double from, double slope_from, double to, doubl
  */
 HX_RARE void hx_soil_yield(const hxContactState *state, double h, const hxContactMoment *from,
                            const hxContactMoment *to, double plastic[HX_SLOTS]) {
-  for (int leg = 0; leg < HX_LEGS; ++leg) {
-    plastic[leg] = state->plastic[leg];
-    if (!is_in_soil(state, leg)) continue;
-    const hxSoil soil = hx_soil_under(state, leg);
-    const double deepest =
-        hx_deepest(from->delta[leg], h * from->ddelta[leg], to->delta[leg], h * to->ddelta[leg]);
-    plastic[leg] = fmax(plastic[leg], hx_soil_plastic_depth(&soil, deepest));
+  double deepest[HX_SLOTS] = {0.0};
+  for (int leg = 0; leg < HX_LEGS; ++leg)
+    if (is_in_soil(state, leg))
+      deepest[leg] =
+          hx_deepest(from->delta[leg], h * from->ddelta[leg], to->delta[leg], h * to->ddelta[leg]);
+  hx_fill_slots(deepest);
+  for (int slot = 0; slot < HX_SLOTS; slot += HX_LANES) {
+    const hxMask in = hx_in_soil(state, slot);
+    const hxSoils soil = hx_soils_under(state, slot);
+    const hxReal before = hx_load(&state->plastic[slot]),
+                 now = hx_any(in) ? hx_plastic_depth(&soil, hx_load(&deepest[slot])) : before;
+    hx_store(&plastic[slot], hx_select(in, hx_max(before, now), before));
   }
   hx_fill_slots(plastic);
 }

@@ -10,7 +10,8 @@ from matplotlib.figure import Figure
 from test_conditions import WORLDS
 from test_controller_continuity import LARGEST, steepest
 
-from benchmarks.control.cases import DATA, PARTS, SWITCH, judged_walk, seeds
+from benchmarks.control.cases import DATA, SWITCH, judged_walk, seeds
+from hexapod_cosim.controller import SWITCHES
 from hexapod_cosim.controller.comply import compliance
 from hexapod_cosim.controller.comply.slip_pid import LOAD_FLOOR
 from hexapod_cosim.controller.plane import Array, Plane
@@ -142,7 +143,7 @@ def slip_pid() -> Shown:
 
     These are none, the slip PID alone, all other parts, and all.
     """
-    off = {part: f"{SWITCH}{part}=false" for part in PARTS}
+    off = {part: f"{SWITCH}{part}=false" for part in SWITCHES}
     others = tuple(text for part, text in off.items() if part != "slip_pid")
     cases = (tuple(off.values()), others, (off["slip_pid"],), ())
     columns = (

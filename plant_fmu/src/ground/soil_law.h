@@ -1,0 +1,212 @@
+/* soil_law.h - forces of soft ground on a pack of feet (eq. 40-47): the kernels include it behind
+ * lanes.h, soil.c behind one_lane.h, with the same bits for each foot
+ *
+ * z is the depth of the foot's lowest point under the undisturbed surface, z_p the plastic depth.
+ */
+#ifndef HX_SOIL_LAW_H
+#define HX_SOIL_LAW_H
+
+#include "../elementary.h"
+#include "power.h"
+#include "soil.h"
+
+static const double pi = 3.14159265358979323846;
+
+/* The constants of hxSoil, of the soils under a pack of feet. */
+typedef struct {
+  hxReal law, pad, radius, area;
+  hxReal modulus, exponent;
+  hxReal down, side, ahead;
+  hxReal yield, hardening;
+  hxReal cohesion, friction, per_displacement;
+  hxReal unloading, damping;
+} hxSoils;
+
+/* Forces and their slopes by the depth, N and N/m. */
+typedef struct {
+  hxReal force, slope;
+} hxSoilCurves;
+
+/* Normal forces and their derivatives, as in hxSoilForce. */
+typedef struct {
+  hxReal force, elastic, slope, stiffness, viscosity;
+} hxSoilForces;
+
+/* Returns which soils have a law. */
+static inline hxMask has_law(const hxSoils *soil, int law) {
+  return hx_less(hx_splat(law - 0.5), soil->law) & hx_less(soil->law, hx_splat(law + 0.5));
+}
+
+static inline hxSoilCurves select_curves(hxMask mask, hxSoilCurves a, hxSoilCurves b) {
+  return (hxSoilCurves){hx_select(mask, a.force, b.force), hx_select(mask, a.slope, b.slope)};
+}
+
+/* ---- virgin curves ---- */
+
+/* Returns the integral of (local depth)^n over the foot, and its slope (eq. 41), times a pressure
+ * modulus. p = z^n; q = (z - R)^n of a sphere deeper than R. */
+static inline hxSoilCurves columns(const hxSoils *soil, hxReal modulus, hxReal n, hxReal z,
+                                   hxReal p, hxReal q) {
+  const hxReal zero = hx_splat(0.0), R = soil->radius, flat = modulus * (soil->area * p);
+  const hxReal above = hx_max(z - R, zero), one = 1.0 / (n + 1.0), two = one / (n + 2.0),
+               scale = 2.0 * pi * modulus;
+  const hxReal force = z * p * (R * one - z * two) + above * above * q * two;
+  const hxReal slope = p * (R - z * one) + above * q * one;
+  return select_curves(hx_less(zero, soil->pad), (hxSoilCurves){flat, n * flat / z},
+                       (hxSoilCurves){scale * force, scale * slope});
+}
+
+static inline hxSoilCurves bekker(const hxSoils *soil, hxReal z) {
+  const hxReal n = soil->exponent, zero = hx_splat(0.0), above = z - soil->radius;
+  const hxMask full = hx_less(zero, above) & hx_less(soil->pad, hx_splat(0.5));
+  const hxReal q = hx_any(full) ? hx_select(full, hx_lanes_pow(above, n), zero) : zero;
+  return columns(soil, soil->modulus, n, z, hx_lanes_pow(z, n), q);
+}
+
+/* eq. 42; e is the depth in radii */
+static inline hxSoilCurves granular(const hxSoils *soil, hxReal z) {
+  const hxReal down = soil->down, side = soil->side, R = soil->radius;
+  const hxReal e = z / R, o = 1.0 - e, rest = down - side, flat = down * soil->area;
+  const hxSoilCurves shallow = {
+      side * (0.5 * e * e) + rest * (e * e * (0.5 * o * o + (2.0 / 3.0) * o * e + 0.25 * e * e)),
+      side * e + rest * (e * (o * o + o * e + (1.0 / 3.0) * e * e))};
+  const hxSoilCurves deep = {side * (e - 0.5) + rest * ((1.0 / 3.0) * (e - 1.0) + 0.25),
+                             side + (1.0 / 3.0) * rest};
+  const hxSoilCurves at = select_curves(hx_less(hx_splat(1.0), e), deep, shallow);
+  return select_curves(
+      hx_less(hx_splat(0.0), soil->pad), (hxSoilCurves){flat * z, flat},
+      (hxSoilCurves){2.0 * pi * R * R * R * at.force, 2.0 * pi * R * R * at.slope});
+}
+
+/* eq. 43 */
+static inline hxSoilCurves mud(const hxSoils *soil, hxReal z) {
+  const hxReal zero = hx_splat(0.0), one = hx_splat(1.0);
+  const hxSoilCurves yield = columns(soil, soil->yield, zero, z, one, one);
+  const hxSoilCurves hard = columns(soil, soil->hardening, one, z, z, z - soil->radius);
+  return (hxSoilCurves){yield.force + hard.force, yield.slope + hard.slope};
+}
+
+/* Returns F_v(z) and its slope, as hx_soil_virgin does. */
+static inline hxSoilCurves hx_virgin(const hxSoils *soil, hxReal z) {
+  const hxReal zero = hx_splat(0.0);
+  const hxMask deep = hx_less(zero, z), is_bekker = deep & has_law(soil, HX_SOIL_BEKKER),
+               is_granular = deep & has_law(soil, HX_SOIL_GRANULAR),
+               is_mud = deep & has_law(soil, HX_SOIL_MUD);
+  hxSoilCurves virgin = {zero, zero};
+  if (hx_any(is_bekker)) virgin = select_curves(is_bekker, bekker(soil, z), virgin);
+  if (hx_any(is_granular)) virgin = select_curves(is_granular, granular(soil, z), virgin);
+  if (hx_any(is_mud)) virgin = select_curves(is_mud, mud(soil, z), virgin);
+  return virgin;
+}
+
+/* ---- unloading and damping ---- */
+
+/* Returns the depths that stay when z is unloaded (eq. 44). */
+static inline hxReal hx_plastic_depth(const hxSoils *soil, hxReal z) {
+  return hx_max(z - hx_virgin(soil, z).force / soil->unloading, hx_splat(0.0));
+}
+
+/* Returns min(A Ke (z - z_p), F_v(z)) of feet deeper than z_p, and its slope. */
+static inline hxSoilCurves elastic(const hxSoils *soil, hxReal plastic, hxReal z) {
+  const hxSoilCurves line = {soil->unloading * (z - plastic), soil->unloading};
+  const hxSoilCurves virgin = hx_virgin(soil, z);
+  return select_curves(hx_less(virgin.force, line.force), virgin, line);
+}
+
+/* Returns the area of the foot's cross-section at the surface, m2, and its slope by z, m. */
+static inline hxSoilCurves contact_area(const hxSoils *soil, hxReal z) {
+  const hxReal zero = hx_splat(0.0), R = soil->radius;
+  const hxMask part = hx_less(z, R) & hx_less(soil->pad, hx_splat(0.5));
+  return select_curves(part, (hxSoilCurves){pi * (2.0 * R - z) * z, 2.0 * pi * (R - z)},
+                       (hxSoilCurves){soil->area, zero});
+}
+
+/* Returns f_n and its derivatives, as hx_soil_normal_force does. */
+static inline hxSoilForces hx_soil_forces(const hxSoils *soil, hxReal plastic, hxReal z,
+                                          hxReal dz) {
+  const hxReal zero = hx_splat(0.0);
+  const hxMask touches = hx_less(plastic, z);
+  if (!hx_any(touches)) return (hxSoilForces){zero, zero, zero, zero, zero};
+  const hxSoilCurves spring = elastic(soil, plastic, z), area = contact_area(soil, z);
+  const hxReal viscosity = soil->damping * area.force, force = spring.force + viscosity * dz;
+  const hxMask pushes = touches & hx_less(zero, force);
+  const hxReal slope = hx_select(touches, spring.slope, zero);
+  return (hxSoilForces){.force = hx_select(pushes, force, zero),
+                        .elastic = hx_select(touches, spring.force, zero),
+                        .slope = slope,
+                        .stiffness =
+                            hx_select(pushes, spring.slope + soil->damping * area.slope * dz, zero),
+                        .viscosity = hx_select(pushes, viscosity, zero)};
+}
+
+/* Returns the energy that unloading gives back, J. */
+static inline hxReal hx_stored_energy(const hxSoils *soil, hxReal plastic, hxReal z) {
+  const hxMask touches = hx_less(plastic, z);
+  if (!hx_any(touches)) return hx_splat(0.0);
+  const hxReal force = elastic(soil, plastic, z).force;
+  return hx_select(touches, force * force / (2.0 * soil->unloading), hx_splat(0.0));
+}
+
+/* ---- shear ---- */
+
+/* Returns the half-turn angles of a pack. */
+static inline hxReal half_turn_angles(hxReal y, hxReal x) {
+  double a[HX_LANES], b[HX_LANES];
+  hx_store(a, y), hx_store(b, x);
+  for (int lane = 0; lane < HX_LANES; ++lane) a[lane] = hx_half_turn_angle(a[lane], b[lane]);
+  return hx_load(a);
+}
+
+/* Returns the integral of depth over the foot's profile, m3, and its slope, the profile's area. */
+static inline hxSoilCurves profile_moment(const hxSoils *soil, hxReal z) {
+  const hxReal zero = hx_splat(0.0), R = soil->radius, c = R - z;
+  const hxMask pad = hx_less(zero, soil->pad), part = ~pad & hx_less(-R, c);
+  const hxSoilCurves full = select_curves(pad, (hxSoilCurves){R * z * z, 2.0 * R * z},
+                                          (hxSoilCurves){pi * R * R * (z - R), pi * R * R});
+  if (!hx_any(part)) return full;
+  const hxReal chord = hx_sqrt((R - c) * (R + c));
+  const hxReal segment = R * R * half_turn_angles(chord, c) - c * chord;
+  const hxReal force = (2.0 / 3.0) * (chord * chord * chord) - c * segment;
+  return select_curves(part, (hxSoilCurves){force, segment}, full);
+}
+
+/* Returns the shear force that does not depend on the load, as hx_soil_shear_base does. */
+static inline hxSoilCurves hx_shear_base(const hxSoils *soil, hxReal z) {
+  const hxSoilCurves area = contact_area(soil, z);
+  const hxMask is_granular = has_law(soil, HX_SOIL_GRANULAR);
+  hxSoilCurves base = {soil->cohesion * area.force, soil->cohesion * area.slope};
+  if (!hx_any(is_granular)) return base;
+  const hxSoilCurves moment = profile_moment(soil, z);
+  return select_curves(is_granular,
+                       (hxSoilCurves){base.force + soil->ahead * moment.force,
+                                      base.slope + soil->ahead * moment.slope},
+                       base);
+}
+
+/* ---- both ---- */
+
+/* Forces on feet in contact with soil, as in hxSoilContact. */
+typedef struct {
+  hxSoilForces normal;
+  hxSoilCurves held, stored, hold;
+} hxSoilContacts;
+
+/* Returns the forces on feet at these depths and sinking speeds. */
+static inline hxSoilContacts hx_soil_contacts(const hxSoils *soil, hxReal plastic, hxReal z,
+                                              hxReal dz) {
+  const hxReal zero = hx_splat(0.0);
+  const hxSoilForces f = hx_soil_forces(soil, plastic, z, dz);
+  /* the depth of shear does not fall below z_p: a foot that leaves the ground within a step keeps
+   * its grip to the end of the step */
+  const hxMask above = hx_less(z, plastic);
+  const hxSoilCurves base = hx_shear_base(soil, hx_select(above, plastic, z));
+  const hxReal gains = hx_select(hx_less(zero, dz), f.slope / soil->unloading, hx_splat(1.0));
+  return (hxSoilContacts){.normal = f,
+                          .held = {f.elastic * gains, f.slope * gains},
+                          .stored = {0.5 * f.elastic * f.elastic / soil->unloading,
+                                     f.elastic * f.slope / soil->unloading},
+                          .hold = {soil->per_displacement * base.force,
+                                   hx_select(above, zero, soil->per_displacement * base.slope)}};
+}
+
+#endif
