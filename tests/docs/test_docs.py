@@ -349,6 +349,7 @@ def compiled_scale(tree: Path, *, law: int, restitution: float) -> float:
                 "contact_law.c",
                 "elementary.c",
                 "checksum.c",
+                "message.c",
                 "ground/soil.c",
                 "ground/surface.c",
             )
