@@ -13,11 +13,10 @@ from hexapod_cosim.cosim.interface.names import joint_names
 from hexapod_cosim.cosim.master.recorder import Recording
 from hexapod_cosim.cosim.run.run import simulate
 from hexapod_cosim.cosim.run.walker import Walker
-from hexapod_cosim.cosim.scenario.records import CONTROLS
 from hexapod_cosim.cosim.scenario.scenario import list_scenarios, load_scenario
 from hexapod_cosim.models import load_robot
 from tools.docs.validation.shown import PALETTE, Shown, short
-from tools.docs.validation.walked import changed
+from tools.docs.validation.walked import CONTROLS, changed
 
 TOLERANCES = (1e-1, 1e-2, 1e-4, 1e-6)
 DURATION = 4.0  # s

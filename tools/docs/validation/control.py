@@ -18,10 +18,10 @@ from hexapod_cosim.controller.plane import Array, Plane
 from hexapod_cosim.cosim.master.signals import COMMANDED
 from hexapod_cosim.cosim.results.result import Result
 from hexapod_cosim.cosim.run.run import simulate
-from hexapod_cosim.cosim.scenario.records import CONTROLS
 from hexapod_cosim.cosim.scenario.scenario import load_scenario
 from tools.docs.validation.shown import PALETTE, Shown
 from tools.docs.validation.walked import (
+    CONTROLS,
     MILLI,
     changed,
     judged,

@@ -11,10 +11,9 @@ from hexapod_cosim.cosim.interface.names import joint_names
 from hexapod_cosim.cosim.results.metrics import planned_feet
 from hexapod_cosim.cosim.results.result import Result
 from hexapod_cosim.cosim.results.walk import Array, real_feet
-from hexapod_cosim.cosim.scenario.records import CONTROLS
 from hexapod_cosim.models import JOINT_NAMES, LEG_NAMES, load_robot
 from tools.docs.validation.shown import PALETTE, Shown
-from tools.docs.validation.walked import MILLI, judged, shown, under_both, view
+from tools.docs.validation.walked import CONTROLS, MILLI, judged, shown, under_both, view
 
 ROBOTS = {"athena": "ATHENA-like", "phantomx_mk4": "PhantomX Mark 4"}
 LEGS = ("LM", "LR")  # whose feet are shown

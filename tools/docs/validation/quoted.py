@@ -11,10 +11,9 @@ from hexapod_cosim.cosim.interface.names import joint_names
 from hexapod_cosim.cosim.results.metrics import compute_metrics, shown_metrics
 from hexapod_cosim.cosim.results.result import Result
 from hexapod_cosim.cosim.results.walk import View
-from hexapod_cosim.cosim.scenario.records import CONTROLS
 from hexapod_cosim.models import load_robot
 from tools.docs.validation.shown import Shown
-from tools.docs.validation.walked import figures, heading, judged, walk
+from tools.docs.validation.walked import CONTROLS, figures, heading, judged, walk
 
 PERIOD = 1.0  # s    of the judged walk's gait
 FINE_STEP, COARSE = 0.001, 0.02  # s

@@ -12,12 +12,12 @@ from test_random_robots import odd_robots
 
 from hexapod_cosim.cosim.design.design import design_for
 from hexapod_cosim.cosim.run.walker import Walker
-from hexapod_cosim.cosim.scenario.records import CONTROLS, Scenario
+from hexapod_cosim.cosim.scenario.records import Scenario
 from hexapod_cosim.cosim.scenario.scenario import load_scenario
 from hexapod_cosim.models import Robot, load_robot
 from hexapod_cosim.models.urdf.writer import robot_to_urdf
 from tools.docs.validation.shown import Shown
-from tools.docs.validation.walked import MILLI, changed
+from tools.docs.validation.walked import CONTROLS, MILLI, changed
 
 ALWAYS = (1, 4, 7)  # what `make test` walks
 FIGURES = {

@@ -12,9 +12,9 @@ from hexapod_cosim.cosim.results.metrics import METRICS
 from hexapod_cosim.cosim.results.result import Result
 from hexapod_cosim.cosim.results.walk import View, Walk
 from hexapod_cosim.cosim.run.walker import Walker
-from hexapod_cosim.cosim.scenario.records import CONTROLS
 from hexapod_cosim.cosim.scenario.scenario import load_scenario
 
+CONTROLS = ("kinematic", "compliant")  # that the results set side by side
 MILLI = 1e3
 
 
