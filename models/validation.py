@@ -11,6 +11,8 @@ import math
 import numpy as np
 
 from hexapod_cosim.models.errors import RobotError
+from hexapod_cosim.models.ground.surface import Surface
+from hexapod_cosim.models.ground.valleys import tightest_valley
 from hexapod_cosim.models.kinematics import foot_positions, inertia_matrix
 from hexapod_cosim.models.records import (
     JOINT_NAMES,
@@ -36,6 +38,9 @@ STANCE_PLANE_TOLERANCE = 0.01
 AXIS_TOLERANCE = 1e-6
 # sections that do not concern the bodies
 SETTINGS = ("contact", "friction", "servo", "baumgarte", "solver", "terrain", "soil", "body")
+# 1  least radius of valleys over that of a sphere in them; one nearest point needs 1, and the books
+# of energy close from 1.01 on
+VALLEY_MARGIN = 1.05
 DISSIPATIVE_LAWS = ("exact_restitution", "flores", "lankarani_nikravesh", "hunt_crossley")
 
 
@@ -259,6 +264,38 @@ def _check_terrain(robot: Robot, where: str) -> None:
             fix="enlarge terrain.horizontal_scale",
             where=where,
         )
+    check_valleys(robot, terrain.surface, where)
+
+
+def check_valleys(robot: Robot, surface: Surface, where: str) -> None:
+    """Checks that the spheres that touch the ground have one nearest point in a surface's valleys.
+
+    In a narrower valley a sphere touches at two places, of which the plant computes one: forces
+    jump, and energy is not conserved. Raises RobotError; `where` names the surface.
+    """
+    name, radius = _largest_sphere(robot)
+    limit = VALLEY_MARGIN * radius
+    valley = tightest_valley(surface, limit)
+    if valley is None:
+        return
+    raise RobotError(
+        "valleys narrower than a foot" if name == "foot.radius" else "valleys narrower than a part",
+        got=f"a radius of curvature of {1e3 * valley.radius:.4g} mm at x = {valley.x:.4g} m, "
+        f"y = {valley.y:.4g} m",
+        expected=f"at least {1e3 * limit:.4g} mm, {VALLEY_MARGIN:g} times {name}",
+        fix="enlarge terrain.horizontal_scale, reduce difficulty or heights, choose blocks (a "
+        f"heightfield with slope_threshold), or reduce {name}",
+        where=where,
+    )
+
+
+def _largest_sphere(robot: Robot) -> tuple[str, float]:
+    """Returns the key and the radius [m] of the largest sphere that touches the ground."""
+    spheres = {"foot.radius": robot.foot.radius}
+    if robot.body.contact == "on":
+        for part in ("corner_radius", "knee_radius", "shank_radius"):
+            spheres[f"body.{part}"] = getattr(robot.body, part)
+    return max(spheres.items(), key=lambda sphere: sphere[1])
 
 
 def _check_body(body: BodyContact, where: str) -> None:

@@ -12,7 +12,7 @@ from hexapod_cosim.cosim.results.result import Result
 from hexapod_cosim.cosim.run.run import simulate
 from hexapod_cosim.cosim.run.walker import Walker
 from hexapod_cosim.cosim.scenario.scenario import load_scenario
-from hexapod_cosim.models import load_robot
+from hexapod_cosim.models import RobotError, load_robot
 from hexapod_cosim.models.ground.catalogue import make_surface
 
 RUBBLE = ("terrain.kind=rubble", "terrain.max_height=20 mm")
@@ -49,6 +49,16 @@ def test_a_packed_grid_a_given_fmu_and_the_compiled_loop_give_the_same_figures(
         scenario = load_scenario("walk_flat", overrides=["duration=4", *RUBBLE])
         compiled = walker.simulate(scenario)
     assert figures(compiled) == pytest.approx(figures(own), rel=1e-6)
+
+
+def test_an_export_refuses_valleys_narrower_than_a_foot(tmp_path: Path) -> None:
+    narrow = make_surface("random_uniform", {"horizontal_scale": 0.05, "difficulty": 1.0})
+    surfaces = [make_surface("dune", {}), narrow]
+    with pytest.raises(
+        RobotError, match=r"terrain 2, random_uniform: valleys narrower than a foot"
+    ):
+        export_fmu(load_robot("athena"), tmp_path / "two.fmu", terrains=surfaces)
+    assert list(tmp_path.iterdir()) == []
 
 
 @pytest.mark.parametrize("kind", ["rubble", "random_uniform", "wave", "stepping_stones"])

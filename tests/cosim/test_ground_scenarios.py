@@ -27,7 +27,7 @@ from hexapod_cosim.cosim.scenario.scenario import (
     scenario_robot,
     with_overrides,
 )
-from hexapod_cosim.models import LEG_NAMES, ScenarioError
+from hexapod_cosim.models import LEG_NAMES, RobotError, ScenarioError
 from hexapod_cosim.models.ground.catalogue import make_surface
 from hexapod_cosim.models.ground.grid_file import grid_bytes, surface_from_bytes
 from hexapod_cosim.models.ground.surface import Surface
@@ -106,6 +106,15 @@ def test_keys_of_a_slope_do_nothing_on_a_surface() -> None:
     scenario = load_scenario("stand", overrides=["terrain.kind=stairs", "terrain.incline=5 deg"])
     (warning,) = unused_settings(scenario, scenario_robot(scenario))
     assert warning == ("terrain.incline does nothing on the surface stairs; set terrain.kind=slope")
+
+
+def test_valleys_narrower_than_a_foot_are_refused() -> None:
+    keys = ("kind=random_uniform", "horizontal_scale=0.03", "difficulty=1")
+    scenario = load_scenario("walk_flat", overrides=[f"terrain.{key}" for key in keys])
+    with pytest.raises(
+        RobotError, match=r"walk_flat.*athena: terrain: valleys narrower than a foot"
+    ):
+        scenario_robot(scenario)
 
 
 def test_grid_files_are_numbered_from_one() -> None:

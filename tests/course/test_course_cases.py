@@ -12,7 +12,8 @@ from typing import Any
 import pytest
 
 from hexapod_cosim.cosim.course.reading import CLASSES, FOLDER, load_course, run_scenario
-from hexapod_cosim.cosim.course.records import Case, CourseError, read_entries
+from hexapod_cosim.cosim.course.records import Case, Course, CourseError, read_entries
+from hexapod_cosim.cosim.scenario.scenario import scenario_robot
 from hexapod_cosim.models import load_robot
 
 KINEMATIC = read_entries(["kinematic"])[0]
@@ -171,3 +172,10 @@ def test_cases_are_chosen_by_name_and_by_class() -> None:
 def test_an_unknown_split_or_case_is_refused(split: str, names: list[str], text: str) -> None:
     with pytest.raises(CourseError, match=text):
         load_course(split, names=names)
+
+
+@pytest.mark.parametrize("course", [JUDGED, TUNED], ids=["judge", "tune"])
+def test_the_robot_of_each_case_suits_its_ground(course: Course) -> None:
+    for case in course.cases:
+        for seed in (0, 1009):
+            scenario_robot(run_scenario(case, entry=KINEMATIC, seed=seed))

@@ -242,6 +242,7 @@ BAD_TABLES: list[tuple[dict[str, Any], str]] = [
     ({"kind": "flat", "step_height": 0.1}, "step_height"),
     ({"kind": "flat", "patch": [{"x": 0, "y": 0, "size": 1, "mu": 0.1}]}, 'kind = "plane"'),
     ({"kind": "rubble", "horizontal_scale": 0.01}, "blocks narrower than a foot"),
+    ({"kind": "random_uniform", "horizontal_scale": 0.03}, "valleys narrower than a foot"),
     ({"kind": "wave", "incline": 2.0}, "incline"),
 ]
 
