@@ -105,7 +105,7 @@ def code_lines(text: str, suffix: str) -> Iterator[tuple[int, str]]:
 
 def mutants_of(group: str, path: Path) -> Iterator[Mutant]:
     """Yields every mutant of a file."""
-    name = path.relative_to(ROOT).as_posix()
+    name = path.relative_to(TREE).as_posix()
     for number, line in code_lines(path.read_text(encoding="utf-8"), path.suffix):
         for match in OPERATOR.finditer(line):
             yield Mutant(group, name, number, match.start(), match[0], SWAPS[match[0]])
@@ -120,7 +120,7 @@ def sample(seed: int, groups: list[str]) -> list[Mutant]:
     random, columns = Random(seed), []
     for group in groups:
         patterns = GROUPS[group][0]
-        files = sorted({path for pattern in patterns for path in ROOT.glob(pattern)})
+        files = sorted({path for pattern in patterns for path in TREE.glob(pattern)})
         found = [mutant for path in files for mutant in mutants_of(group, path)]
         random.shuffle(found)
         columns.append(found)
@@ -185,22 +185,25 @@ def first_failure(output: str) -> str:
     return match[1] if match else output[-200:].strip()
 
 
-def apply(mutant: Mutant) -> None:
-    """Writes the changed file into the copy."""
-    lines = (ROOT / mutant.file).read_text(encoding="utf-8").splitlines(keepends=True)
+def changed(mutant: Mutant, text: str) -> str:
+    """Returns the text of the file with the mutant's change."""
+    lines = text.splitlines(keepends=True)
     line = lines[mutant.line - 1]
     assert line[mutant.column :].startswith(mutant.old), mutant
     rest = line[mutant.column + len(mutant.old) :]
     lines[mutant.line - 1] = line[: mutant.column] + mutant.new + rest
-    (TREE / mutant.file).write_text("".join(lines), encoding="utf-8")
+    return "".join(lines)
 
 
 def judge(mutant: Mutant, *, concerned: bool) -> dict[str, Any]:
     """Tests one mutant; returns its fate, what killed it, and the changed line."""
     tests = GROUPS[mutant.group][1]
-    apply(mutant)
+    place = TREE / mutant.file
+    original = place.read_text(encoding="utf-8")
+    text = changed(mutant, original)
+    line = text.splitlines()[mutant.line - 1]
     try:
-        line = (TREE / mutant.file).read_text(encoding="utf-8").splitlines()[mutant.line - 1]
+        place.write_text(text, encoding="utf-8")
         alive, output = builds() if mutant.file.endswith((".c", ".h")) else (True, "")
         fate = "survived" if alive else "does not build"
         for part in ([*tests], [] if concerned else ["tests"]):
@@ -208,8 +211,7 @@ def judge(mutant: Mutant, *, concerned: bool) -> dict[str, Any]:
                 alive, output = passes(*part)
                 fate = "survived" if alive else "killed"
     finally:
-        shutil.copy2(ROOT / mutant.file, TREE / mutant.file)
-        os.utime(TREE / mutant.file)
+        place.write_text(original, encoding="utf-8")
     by = first_failure(output) if fate == "killed" else ""
     return {**asdict(mutant), "fate": fate, "by": by, "text": line.strip(), "concerned": concerned}
 

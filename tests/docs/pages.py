@@ -13,7 +13,8 @@ from pathlib import Path
 
 def blocks(page: Path) -> list[tuple[str, str]]:
     """Kind and text of a page's code."""
-    return re.findall(r"```(\w*)\n(.*?)```", page.read_text(encoding="utf-8"), flags=re.DOTALL)
+    text = page.read_text(encoding="utf-8")
+    return re.findall(r"```([\w{}-]*)[^\n]*\n(.*?)```", text, flags=re.DOTALL)
 
 
 def commands(page: Path, program: str) -> list[str]:

@@ -79,7 +79,8 @@ def test_no_sphere_is_deeper_than_its_bound(core: ct.CDLL, kind: int, cell: floa
     height = cell * (rng.uniform(-0.03, 0.03, (50, 40)) + np.linspace(0.0, 4.0, 40))
     ground, radius = Ground(core, grid_bytes(height, cell=cell, kind=kind)), 0.015
     for place in rng.uniform([-4.0, -4.0, -0.6], [44.0, 54.0, 6.0], (3000, 3)):  # cells
-        centre = cell * (place + [0.0, 0.0, 4.0 * np.clip(place[0] / 39.0, 0.0, 1.0)])
+        rise = np.array([0.0, 0.0, 4.0 * np.clip(place[0] / 39.0, 0.0, 1.0)])
+        centre = cell * (place + rise)
         distance, _, _ = ground.face(centre)
         assert ground.depth_bound(centre, radius) >= radius - distance
 
