@@ -7,11 +7,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
 from hexapod_cosim.cosim.results.comparison import BETTER, WORSE, Change, Comparison
 from hexapod_cosim.cosim.results.comparisons import Comparisons
 from hexapod_cosim.cosim.results.metrics import METRICS, PER_RADIAN
 from hexapod_cosim.cosim.results.walk import TANH
 from hexapod_cosim.cosim.scenario.records import CONTROLS
+from hexapod_cosim.models.ground.surface import LAW, Surface
 
 # metric -> its name on a card and its name in the sentence, where "less" or "more" precedes it.
 # Metrics that depend on no assumed slope of friction come first, slip last.
@@ -42,6 +45,7 @@ MILLI = {  # unit -> factor and unit on a card
     "m/rad": (1e3, "mm/rad"),
     "1": (1.0, ""),
 }
+RIGID = 1.0  # soil.law: none
 ROUND_OFF = 1e-9  # m    of an error of the feet; a smaller one is not shown
 MOST_GAINS = 4  # in the sentence
 
@@ -114,9 +118,25 @@ def _shown(comparison: Comparison) -> dict[str, tuple[str, str]]:
     return shown
 
 
-def creep_note(parameters: Mapping[str, Any]) -> str:
-    """Returns a note on slip under a run's friction law, "" if there is none."""
-    return CREEP if parameters.get("friction.law", TANH) == TANH else ""
+def creep_note(facts: Mapping[str, Any], surface: Surface | None = None) -> str:
+    """Returns a note on slip under a run's friction law, "" if there is none.
+
+    A drop has none, nor has ground with soil: there the law does not act, and slip is shear.
+
+    facts: those of run.json, of which `parameters` and `drop` count. surface: the run's.
+    """
+    parameters = facts["parameters"]
+    creeps = parameters.get("friction.law", TANH) == TANH
+    return CREEP if creeps and not facts.get("drop") and not _has_soil(parameters, surface) else ""
+
+
+def _has_soil(parameters: Mapping[str, Any], surface: Surface | None) -> bool:
+    """Whether the ground of a run is soil, or has soil somewhere."""
+    plain = parameters.get("soil.law", RIGID) != RIGID
+    if surface is None or surface.material is None or surface.materials is None:
+        return bool(plain)
+    soft = np.concatenate([[plain], surface.materials[:, LAW] > 0.0])
+    return bool(soft[np.unique(surface.material)].any())
 
 
 def _falls(comparison: Comparison) -> list[Part]:

@@ -156,7 +156,7 @@ def write_report(
         missing=missing,
         servos=servo_rows(runs),
         joints=JOINT_NAMES,
-        creep=creep_note(first.facts["parameters"]),
+        creep=creep_note(first.facts, first.view.surface),
         terrain=describe_terrain(first.view.surface, first.facts["parameters"]),
         materials=_materials(runs),
         **content | _accuracy(content["rows"], accuracies, metrics),

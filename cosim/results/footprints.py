@@ -1,4 +1,4 @@
-"""Finds the footprints that a run left in soil, from what the plant measured.
+"""Finds the footprints that a run left in soil, and feet that sink too deep, by the outputs.
 
 The plant keeps a footprint where a foot lost contact with it last, with its plastic depth and the
 radius of the foot. Its outputs tell the depth under each foot, which stays until the foot has left
@@ -17,11 +17,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from hexapod_cosim.cosim.interface.names import foot_names
 from hexapod_cosim.cosim.master.recorder import Recording
+from hexapod_cosim.models import LEG_NAMES
 
 Array = NDArray[np.float64]
 
 LEAST = 1e-6  # m    of depth; the plant keeps no shallower footprints
+PAD = 0.025  # m    of the pad that the warning proposes
 
 
 @dataclass(frozen=True)
@@ -56,6 +59,29 @@ def find_footprints(recording: Recording, parameters: Mapping[str, float]) -> li
                 until = begins[k + 1] if k + 1 < len(begins) else math.inf
                 found.append(Footprint(leg, begins[k], until, x, y, deepest, radius))
     return sorted(found, key=lambda one: one.begin)
+
+
+def sinkage_warnings(recording: Recording, parameters: Mapping[str, float]) -> list[str]:
+    """Warns of a foot that sinks into soil deeper than the radius of its sphere or pad.
+
+    The laws of soil count the foot alone; deeper than that the leg above it is in the soil, too.
+    """
+    names = foot_names("sinkage")
+    if not len(recording.time) or not set(names) <= set(recording.names):
+        return []
+    depth, pad = recording.columns(names), parameters.get("foot.pad_radius", 0.0)
+    radius = pad or parameters["foot.radius"]
+    if not depth.max() > radius:
+        return []
+    row, leg = np.unravel_index(int(np.argmax(depth)), depth.shape)
+    kind = "pad" if pad else "sphere"
+    return [
+        f"foot {LEG_NAMES[leg]} sinks too deep: got {1e3 * depth[row, leg]:.3g} mm at "
+        f"{recording.time[row]:.3f} s, expected at most the radius of its {kind}, "
+        f"{1e3 * radius:.3g} mm; the soil's law counts the foot alone and not the leg above it, so "
+        f"depth and slip are not reliable; set foot.pad_radius={max(PAD, 1.5 * pad):.3g}, or walk "
+        "on firmer soil"
+    ]
 
 
 def _spans(flag: NDArray[np.bool_]) -> list[list[int]]:

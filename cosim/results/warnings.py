@@ -25,6 +25,7 @@ from numpy.typing import NDArray
 from hexapod_cosim.cosim.interface.names import joint_names, vector_names
 from hexapod_cosim.cosim.master.recorder import Recording
 from hexapod_cosim.cosim.results.balance import run_balance_warnings
+from hexapod_cosim.cosim.results.footprints import sinkage_warnings
 from hexapod_cosim.cosim.results.metrics import energy_residual
 from hexapod_cosim.cosim.results.walk import LEAST_DISTANCE, SKIPPED_CYCLES, View, body_height
 from hexapod_cosim.cosim.scenario.records import Scenario
@@ -183,7 +184,7 @@ def unused_settings(scenario: Scenario, robot: Robot) -> list[str]:
 
 def walk_warnings(view: View, robot: Robot) -> list[str]:
     """Warns of a fall, weak friction, legs out of reach, lost feedback, overloaded servos, legs
-    that overlap and missing energy.
+    that overlap, feet that sink too deep and missing energy.
     """
     recording, fallen = view.recording, describe_fall(view, robot)
     found = [*([fallen] if fallen else []), *friction_warnings(view.parameters)]
@@ -193,6 +194,7 @@ def walk_warnings(view: View, robot: Robot) -> list[str]:
         found += [f"a foot was out of its leg's reach for {share:.1%} of the time"] if share else []
     found += [*fallback_warnings(recording), *servo_warnings(recording, robot)]
     found += overlap_warnings(recording, view.parameters)
+    found += sinkage_warnings(recording, view.parameters)
     return [*found, *energy_warnings(view)]
 
 

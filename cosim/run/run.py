@@ -232,7 +232,9 @@ def make_result(
     view = View(outcome.judged, parameters, setup.gait.period)
     missing, drop = list[str](), describe_drop(replace(view, recording=outcome.recording))
     if outcome.status == COMPLETED:
-        missing = [*short_run_warnings(view), *missing_metrics_warnings(view)]
+        missing = short_run_warnings(view)
+        # a drop neither walks nor swings a foot, and has the metrics of a drop
+        missing += missing_metrics_warnings(view) if drop is None else []
     found = {
         "warnings": [
             *facts["warnings"],

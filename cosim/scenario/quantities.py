@@ -46,10 +46,10 @@ def to_si(value: Any, spec: Spec, where: str) -> Any:
     )
     if unit not in scales:
         raise ScenarioError(
-            "wrong unit",
+            "wrong unit" if unit else "number without unit in quotes",
             got=value,
             expected=f"a value in {' or '.join(scales)}",
-            fix=f"a plain number is in {spec.unit}",
+            fix=f"a plain number, without quotes, is in {spec.unit}",
             where=where,
         )
     return float(match[1]) * scales[unit]

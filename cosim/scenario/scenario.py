@@ -11,6 +11,7 @@ The FMU's parameters gravity[1] to gravity[3] are entries of the same key.
 
 from __future__ import annotations
 
+import re
 import tomllib
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -68,6 +69,7 @@ from hexapod_cosim.models.soil.presets import soil_table
 from hexapod_cosim.models.terrain import ground_normal
 from hexapod_cosim.models.validation import check_settings
 
+POINTED = re.compile(r"[+-]?(?:\d+\.|\.\d+)(?:[eE][+-]?\d+)?")  # .1 or 1.
 NUMBER = Number(GRAVITY.unit)
 
 
@@ -158,11 +160,14 @@ def with_values(table: Mapping[str, Any], values: Mapping[str, Any]) -> dict[str
 
 
 def parse_value(value: str) -> Any:
-    """Returns the value as TOML reads it; other text is a string, so names need no quotes."""
+    """Returns the value as TOML reads it; other text is a string, so names need no quotes.
+
+    Numbers may begin or end with their point, as .1 and 1., which TOML refuses.
+    """
     try:
         return parse_toml(f"value = {value}")["value"]
     except tomllib.TOMLDecodeError:
-        return value
+        return float(value) if POINTED.fullmatch(value) else value
 
 
 def _set(table: dict[str, Any], name: str, value: Any) -> None:

@@ -177,9 +177,10 @@ def check_heights(height: Array, name: str) -> None:
     bad = np.argwhere(~np.isfinite(height))
     if len(bad):
         row, column = (int(place) for place in bad[0])
+        more = f", and {len(bad) - 1} more" if len(bad) > 1 else ""
         raise RobotError(
             "a height that is no number",
-            got=f"{height[row, column]} in row {row}, column {column}, and {len(bad) - 1} more",
+            got=f"{height[row, column]} in row {row}, column {column}{more}",
             expected="finite heights",
             fix="fill the holes of the map first",
             where=name,

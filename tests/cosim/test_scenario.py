@@ -159,6 +159,21 @@ def test_impossible_gravity_is_refused(override: str, message: str) -> None:
 
 
 @pytest.mark.parametrize(
+    ("text", "value"), [(".1", 0.1), ("-.5", -0.5), ("+1.", 1.0), (".2e-1", 0.02), ("1.e2", 100.0)]
+)
+def test_a_number_may_begin_or_end_with_its_point(text: str, value: float) -> None:
+    assert load_scenario("walk_flat", overrides=[f"command.vx={text}"]).commands[0].vx == value
+
+
+def test_a_number_in_quotes_is_refused_for_its_quotes() -> None:
+    message = (
+        r"number without unit in quotes: got '0\.1'.*a plain number, without quotes, is in m/s"
+    )
+    with pytest.raises(ScenarioError, match=message):
+        load_scenario("walk_flat", overrides=["command.vx='0.1'"])
+
+
+@pytest.mark.parametrize(
     "override", ["gravity=[0, 0, 1.62]", "gravity[3]=1.62", "gravity=[0, 0, 0]"]
 )
 def test_gravity_that_does_not_press_the_robot_onto_the_ground_is_refused(override: str) -> None:

@@ -116,7 +116,7 @@ def test_a_case_with_few_pairs_is_in_no_median() -> None:
 
 def test_class_figures_are_medians_over_cases() -> None:
     table = table_of(
-        {"sand": (1.0, 0.5), "sand_pads": (2.0, 0.5), "mud": (1.0, 3.0), "mu_03": (1.0, 0.1)},
+        {"sand": (1.0, 0.5), "sand_wide": (2.0, 0.5), "mud": (1.0, 3.0), "mu_03": (1.0, 0.1)},
         "heat",
     )
     assert table.classes["soil", "after"].ratio("heat").value == 0.5

@@ -27,7 +27,7 @@ from hexapod_cosim.models.ground.grid_file import (
 )
 from hexapod_cosim.models.ground.parameters import DIFFICULTY, RANDOM_TILE
 from hexapod_cosim.models.ground.smooth import height_and_slopes, heights_at
-from hexapod_cosim.models.ground.surface import Surface
+from hexapod_cosim.models.ground.surface import Surface, check_heights
 from hexapod_cosim.models.ground.table import merged_terrain, terrain_table
 from hexapod_cosim.models.mjcf import robot_to_mjcf
 from hexapod_cosim.models.mjcf_ground import rectangles
@@ -192,6 +192,11 @@ REFUSED: list[tuple[str, dict[str, Any], str]] = [
     ("rubble", {"patch": [{"x": 0.0, "y": 0.0, "size": 1.0, "soil": "dry_sand"}]}, "with edges"),
     ("sand", {"soil": "moon"}, "unknown soil"),
     ("heightfield", {}, "file"),
+    ("stairs", {"size": 0.2}, r"covers the whole map: got 'size 0\.2 m.*at least 0\.9 m"),
+    ("step_up", {"size": 0.82}, "covers the whole map"),
+    ("dune", {"size": 2.0, "platform_size": 2.0}, "covers the whole map"),
+    ("stairs", {"num_steps": 100}, r"on a map of 4 m', expected at most 11 steps; .*size=30\.8"),
+    ("stairs", {"num_steps": 12}, "more steps than the map has room for"),
 ]
 
 
@@ -199,6 +204,23 @@ REFUSED: list[tuple[str, dict[str, Any], str]] = [
 def test_an_impossible_surface_is_refused(name: str, given: dict[str, Any], message: str) -> None:
     with pytest.raises(RobotError, match=message):
         make_surface(name, given)
+
+
+def test_as_many_steps_as_a_message_proposes_fit_on_the_map() -> None:
+    height = make_surface("stairs", {"step_height": 0.02, "num_steps": 11}).height
+    assert height.max() == pytest.approx(0.22)
+    wide = make_surface("stairs", {"step_height": 0.02, "num_steps": 100, "size": 30.8}).height
+    assert wide.max() == pytest.approx(2.0)
+
+
+@pytest.mark.parametrize(
+    ("columns", "said"), [([4], "column 4'"), ([4, 5], "column 4, and 1 more'")]
+)
+def test_a_map_with_holes_tells_the_first_and_how_many_more(columns: list[int], said: str) -> None:
+    height = np.zeros((5, 6))
+    height[3, columns] = math.nan
+    with pytest.raises(RobotError, match=f"nan in row 3, {said}"):
+        check_heights(height, "map")
 
 
 @pytest.mark.parametrize(

@@ -7,6 +7,7 @@ import math
 import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import pytest
 from command import Call
@@ -18,6 +19,7 @@ from hexapod_cosim.cosim.report.headline import cards, creep_note, headline, pla
 from hexapod_cosim.cosim.results.comparison import Comparison, compare_runs
 from hexapod_cosim.cosim.results.metrics import METRICS
 from hexapod_cosim.cosim.results.summary import Summary
+from hexapod_cosim.models.ground.catalogue import make_surface
 
 
 def comparison(
@@ -62,8 +64,32 @@ def test_the_headline_tells_gains_and_costs_and_marks_them() -> None:
 
 def test_slip_which_an_assumed_slope_makes_comes_last_and_with_a_note() -> None:
     assert [card.name for card in cards(comparison({}))][-1] == "slip per metre"
-    assert "friction.slope" in creep_note({"friction.law": 1.0})
-    assert creep_note({"friction.law": 3.0}) == ""  # bristles hold a foot
+    assert "friction.slope" in creep_note({"parameters": {"friction.law": 1.0}, "drop": None})
+    assert creep_note({"parameters": {"friction.law": 3.0}}) == ""  # bristles hold a foot
+
+
+def test_a_drop_has_no_note_on_slip() -> None:
+    assert creep_note({"parameters": {"friction.law": 1.0}, "drop": {"asked": 0.5}}) == ""
+
+
+@pytest.mark.parametrize(
+    ("kind", "keys", "law", "noted"),
+    [
+        ("", {}, 1.0, True),
+        ("", {}, 2.0, False),  # the whole plane is soil
+        ("sand", {}, 1.0, False),
+        ("rubble", {}, 1.0, True),
+        ("wave", {}, 3.0, False),
+        ("plane", {"patch": [{"x": 1.0, "y": 0.0, "size": 1.0, "soil": "mud"}]}, 1.0, False),
+        ("plane", {"patch": [{"x": 1.0, "y": 0.0, "size": 1.0, "mu": 0.2}]}, 1.0, True),
+    ],
+)
+def test_the_note_on_slip_is_for_ground_where_the_law_of_friction_acts(
+    kind: str, keys: dict[str, Any], law: float, noted: bool
+) -> None:
+    surface = make_surface(kind, keys) if kind else None
+    facts = {"parameters": {"friction.law": 1.0, "soil.law": law}}
+    assert bool(creep_note(facts, surface)) == noted
 
 
 def test_the_headline_of_a_robot_that_turns_on_the_spot_is_per_radian() -> None:

@@ -27,6 +27,13 @@ def test_a_stiff_ground_delivers_what_the_law_promises(law: str, delivered: floa
 
 
 @pytest.mark.usefixtures("plant_build")
+def test_a_drop_is_not_warned_of_figures_of_walks() -> None:
+    facts = simulate(load_scenario("drop")).facts
+    assert facts["drop"] is not None
+    assert not [text for text in facts["warnings"] if "walked less" in text or "swung" in text]
+
+
+@pytest.mark.usefixtures("plant_build")
 def test_a_walk_reports_no_drop() -> None:
     assert simulate(load_scenario("walk_flat", overrides=["duration=0.1"])).facts["drop"] is None
 

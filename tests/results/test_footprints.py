@@ -7,12 +7,15 @@ import math
 from dataclasses import replace
 
 import numpy as np
+import pytest
 from plant import Plant, pointer
 from states import changed
 
 from hexapod_cosim.cosim.interface.names import foot_names, foot_vector_names
 from hexapod_cosim.cosim.master.recorder import Recording
-from hexapod_cosim.cosim.results.footprints import find_footprints
+from hexapod_cosim.cosim.results.footprints import find_footprints, sinkage_warnings
+from hexapod_cosim.cosim.run.run import simulate
+from hexapod_cosim.cosim.scenario.scenario import load_scenario
 from hexapod_cosim.models import load_robot
 from hexapod_cosim.models.dynamics import Command
 from hexapod_cosim.models.records import Array
@@ -41,9 +44,9 @@ def stepped(plant: Plant, duration: float) -> Recording:
 def kept(plant: Plant) -> Array:
     """Returns x, y, depth and radius (n, 4) of the plant's footprints [m]."""
     plant.core.hx_plant_footprints.restype = ct.c_size_t
-    found = np.zeros((1024, 4))
+    found = np.zeros((512, 4))
     place = pointer(found)
-    number = plant.core.hx_plant_footprints(ct.c_void_p(plant.handle), place, ct.c_size_t(1024))
+    number = plant.core.hx_plant_footprints(ct.c_void_p(plant.handle), place, ct.c_size_t(512))
     return found[:number]
 
 
@@ -83,3 +86,33 @@ def test_a_foot_that_stays_below_the_surface_takes_its_footprint_along() -> None
     first, second = find_footprints(recording, {"foot.radius": 0.015})
     assert (first.begin, first.end, first.x, first.depth) == (0.0, 3.0, 0.11, 0.01)
     assert (second.begin, second.end, second.x, second.depth) == (3.0, math.inf, 0.3, 0.012)
+
+
+@pytest.mark.parametrize(
+    ("pad", "depth", "said"),
+    [
+        (0.0, 0.015, ""),
+        (0.0, 0.0365, "foot RM sinks too deep: got 36.5 mm at 2.000 s, expected at most the radius "
+         "of its sphere, 15 mm; the soil's law counts the foot alone and not the leg above it, so "
+         "depth and slip are not reliable; set foot.pad_radius=0.025, or walk on firmer soil"),
+        (0.025, 0.0249, ""),
+        (0.03, 0.0365, "its pad, 30 mm"),
+        (0.03, 0.0365, "set foot.pad_radius=0.045,"),
+    ],
+)  # fmt: skip
+def test_a_foot_deeper_than_its_radius_is_warned_of(pad: float, depth: float, said: str) -> None:
+    values = {name: np.zeros(4) for name in COLUMNS}
+    values["LF.foot.sinkage"][1] = 0.5 * depth
+    values["RM.foot.sinkage"][2] = depth
+    recording = Recording(("time", *COLUMNS), np.column_stack([np.arange(4.0), *values.values()]))
+    found = sinkage_warnings(recording, {"foot.radius": 0.015, "foot.pad_radius": pad})
+    assert len(found) == bool(said)
+    assert said in "".join(found)
+
+
+@pytest.mark.usefixtures("plant_build")
+def test_the_walk_on_sand_stays_above_its_pads_radius_and_a_sphere_does_not() -> None:
+    for settings, warned in (([], False), (["foot.pad_radius=0"], True)):
+        result = simulate(load_scenario("sand", overrides=["duration=3", *settings]))
+        warnings = result.facts["warnings"]
+        assert any("sinks too deep" in warning for warning in warnings) == warned
