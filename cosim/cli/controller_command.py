@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from hexapod_cosim.cosim.cli.terminal import show_files, show_text
+from hexapod_cosim.cosim.cli.terminal import Json, show_files, show_json, show_text
 from hexapod_cosim.cosim.control.new_law import class_name, write_law
 
 app = typer.Typer(
@@ -26,8 +26,12 @@ def new(
     output: Annotated[
         Path, typer.Option("-o", "--output", metavar="DIR", help="Folder; default this one.")
     ] = Path(),
+    json: Json = False,
 ) -> None:
     """Write NAME.py, a controller that walks, its test, and a line of README.md."""
     files = write_law(name, output)
+    if json:
+        show_json({"class": class_name(name), "files": [str(file) for file in files]})
+        return
     show_files(files)
     show_text(f"hexapod simulate walk_flat --control {files[0]}:{class_name(name)}")

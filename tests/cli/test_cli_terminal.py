@@ -24,7 +24,16 @@ from hexapod_cosim.cosim.results.results import NEEDED
 
 ESCAPE = "\x1b"
 ALL_COMMANDS = get_command(app).commands  # type: ignore[attr-defined]
-COMMANDS = {name: command for name, command in ALL_COMMANDS.items() if not command.hidden}
+SHOWN = {name: command for name, command in ALL_COMMANDS.items() if not command.hidden}
+# commands of a group count by their own names: "controller new"
+COMMANDS = {
+    " ".join((name, *part)): own
+    for name, command in SHOWN.items()
+    for part, own in (
+        [((child,), each) for child, each in getattr(command, "commands", {}).items()]
+        or [((), command)]
+    )
+}
 
 
 class Terminal(io.StringIO):
