@@ -27,12 +27,9 @@ ALL_COMMANDS = get_command(app).commands  # type: ignore[attr-defined]
 SHOWN = {name: command for name, command in ALL_COMMANDS.items() if not command.hidden}
 # commands of a group count by their own names: "controller new"
 COMMANDS = {
-    " ".join((name, *part)): own
+    f"{name} {child}".strip(): own
     for name, command in SHOWN.items()
-    for part, own in (
-        [((child,), each) for child, each in getattr(command, "commands", {}).items()]
-        or [((), command)]
-    )
+    for child, own in (getattr(command, "commands", {}) or {"": command}).items()
 }
 
 
