@@ -435,7 +435,7 @@ def test_parameters_out_of_range_are_refused(
     ("values", "said"),
     [
         ({"period": 0.6}, "period: got 0.6, expected less than 0.5 s"),
-        ({"servo.kp": 0.0}, "servo.kp: got 0, expected more than 0 under"),
+        ({"servo.kp": 0.0}, "servo.kp: got 0, expected more than 0 except under"),
         ({"RM.tibia.stance": 3.0}, "RM.tibia.stance: got 3, expected an angle between"),
     ],
 )

@@ -80,7 +80,7 @@ def test_sound_grids_have_no_problems(sound: Path) -> None:
         (
             patched(SECOND, HEAD + 16, NAN),
             "resources/terrain/2.terrain: wave: a height that is no number: got 'nan in row 0,"
-            " column 2, and 0 more', expected finite heights; fill the holes of the map first",
+            " column 2', expected finite heights; fill the holes of the map first",
         ),
         (
             lambda files: files.update({SECOND: files[SECOND][:-8]}),
