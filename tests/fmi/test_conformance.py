@@ -288,7 +288,9 @@ def test_libraries_of_every_platform_are_recognised_by_their_bytes(
         for platform, (suffix, _, _, machine) in PLATFORMS.items():
             members[f"binaries/{platform}/hexapod{suffix}"] = heads[suffix] + machine + symbols
 
-    assert archive_problems(rewritten(good, tmp_path / "all.fmu", add)) == []
+    problems = archive_problems(rewritten(good, tmp_path / "all.fmu", add))
+    # the made-up libraries have no parts that a system could load
+    assert [text for text in problems if "cannot be loaded" not in text] == []
 
 
 @pytest.mark.parametrize(
