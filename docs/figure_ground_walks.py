@@ -1,6 +1,6 @@
 """Makes the table and the pictures of walks on uneven ground for docs/ground.md.
 
-hexapod compare stairs rubble stones dune ramp course --seeds 5 -o out/terrains
+hexapod compare stairs rubble stones sand dune ramp course -o out/terrains
 python docs/figure_ground_walks.py out/terrains
 
 Prints the table in Markdown, and writes docs/images/ground_walks.png, the figure of the table, and

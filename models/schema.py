@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 import tomllib
 from collections.abc import Hashable, Mapping
+from copy import deepcopy
 from dataclasses import dataclass
 from functools import cache
 from typing import Any, cast, get_type_hints
@@ -45,6 +46,16 @@ def _check_size(value: Any, depth: int) -> None:
     inner = value.values() if isinstance(value, dict) else value
     for item in inner if isinstance(value, dict | list) else ():
         _check_size(item, depth - 1)
+
+
+def merged_tables(low: Mapping[str, Any], high: Mapping[str, Any]) -> dict[str, Any]:
+    """Returns a copy of the entries of two nested tables; those of `high` take precedence."""
+    both = {
+        key: merged_tables(low[key], high[key])
+        for key in low
+        if isinstance(low[key], Mapping) and isinstance(high.get(key), Mapping)
+    }
+    return deepcopy({**low, **high, **both})
 
 
 @dataclass(frozen=True)

@@ -44,7 +44,7 @@ class Paper(Stateful):
         self.reset()
 
     def reset(self) -> None:
-        """Removes all corrections."""
+        """Sets all shifts, deflections and integrals to zero."""
         self.pid.reset()
         self.shift: Plane = np.zeros(LEGS, dtype=np.complex128)
         self.lift, self.rate = np.zeros((2, LEGS))

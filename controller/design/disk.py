@@ -30,7 +30,7 @@ SCALINGS = 30  # iterations of the diagonal scaling; it converges linearly
 
 @dataclass(frozen=True)
 class DiskMargin:
-    """A multi-loop disk margin."""
+    """The least multi-loop disk margin over frequency, and where it lies."""
 
     alpha: float  # 1    radius of the disk
     frequency: float  # rad/s    at which it is least

@@ -41,7 +41,7 @@ class Warmth(Stateful):
         self.reset()
 
     def reset(self) -> None:
-        """Cools all servos down."""
+        """Sets the heat of all servos to zero, and the squeeze to that of cool servos."""
         self.heat, self.squeeze = np.zeros((LEGS, 3)), self.cool_squeeze
 
     def step(self, torque: Array, needed: float) -> None:

@@ -144,7 +144,7 @@ class Hold(Stateful):
         self.yaw_rate = min(max(turn, -gains.turn_limit), gains.turn_limit)
 
     def look(self, seen: Sight) -> None:
-        """Updates the corrections."""
+        """Updates the corrections of height, tilt and velocity from the measured posture."""
         if self.parts.posture:
             self._hold_posture(seen)
         if self.parts.path:

@@ -11,9 +11,8 @@ from typing import Annotated, Any
 import typer
 
 from hexapod_cosim.controller import Gains
-from hexapod_cosim.cosim.cli import completion
 from hexapod_cosim.cosim.cli.failures import SUCCESS
-from hexapod_cosim.cosim.cli.running import GainsFile, Settings, given_gains
+from hexapod_cosim.cosim.cli.running import ControlNames, GainsFile, Settings, given_gains
 from hexapod_cosim.cosim.cli.terminal import (
     Json,
     counting_bar,
@@ -51,16 +50,6 @@ EPILOG = (
     "Ctrl-C writes the table of the runs that are done."
 )
 MAX_SEEDS = 1000
-Controls = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--control",
-        metavar="CONTROL",
-        help=f"{', '.join(CONTROLS)}, law.py:Class or controller.fmu; LABEL=CONTROL names it. "
-        "Repeat it for more columns; the first is the reference. Default: all built-in ones.",
-        autocompletion=completion.control,
-    ),
-]
 Without = Annotated[
     list[str] | None,
     typer.Option(
@@ -76,7 +65,7 @@ Cases = Annotated[
 
 
 def benchmark(
-    controls: Controls = None,
+    controls: ControlNames = None,
     without: Without = None,
     split: Annotated[
         str,
@@ -100,7 +89,10 @@ def benchmark(
     gains: GainsFile = None,
     json: Json = False,
 ) -> int:
-    """Judge controls on the course: ground, payload, sensors, pushes, commands, robots."""
+    """Judge controls on the course: ground, payload, sensors, pushes, commands, robots.
+
+    Without --control these are all built-in ones; the first control is the reference.
+    """
     entries = read_entries(controls or CONTROLS, without or ())
     _check_number(seeds, MAX_SEEDS, "--seeds")
     _check_number(workers, MAX_SEEDS, "--workers")

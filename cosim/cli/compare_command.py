@@ -64,7 +64,7 @@ from hexapod_cosim.cosim.results.summary import Summary, summarise
 from hexapod_cosim.cosim.run.batch import run_batch
 from hexapod_cosim.cosim.run.preparation import chosen_gains
 from hexapod_cosim.cosim.scenario.controls import Control
-from hexapod_cosim.cosim.scenario.records import Scenario
+from hexapod_cosim.cosim.scenario.records import COMPARED, Scenario
 from hexapod_cosim.cosim.scenario.scenario import load_scenario
 from hexapod_cosim.cosim.scenario.variation import STANDARD
 from hexapod_cosim.models import ScenarioError
@@ -75,7 +75,6 @@ EPILOG = (
     "and compares the seeds on which both walked."
 )
 MAX_SEEDS = 10_000
-DEFAULT_CONTROLS = ("kinematic", "compliant")
 TERRAINS = "terrains"  # folder in out/ of a comparison over several scenarios
 Names = Annotated[
     list[str] | None,
@@ -129,7 +128,7 @@ def compare(
             accuracy=accuracy,
         )
         plan = _plan(name, settings or [], seeds)
-        controls = _controls(control or DEFAULT_CONTROLS, plan)
+        controls = _controls(control or COMPARED, plan)
         works.append(Work(plan, controls, seeds, command, options, accuracy))
     for work in works:
         work.check()
@@ -146,7 +145,7 @@ def compare(
 
 @dataclass(frozen=True)
 class Work:
-    """A comparison to run."""
+    """A comparison to run: its scenario, controls, number of seeds and options."""
 
     plan: Scenario
     controls: tuple[Control, ...]

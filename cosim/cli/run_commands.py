@@ -52,7 +52,7 @@ from hexapod_cosim.cosim.results.results import (
 )
 from hexapod_cosim.cosim.results.summary import summarise
 from hexapod_cosim.cosim.scenario.controls import control_of
-from hexapod_cosim.cosim.scenario.records import Scenario
+from hexapod_cosim.cosim.scenario.records import COMPARED, Scenario
 from hexapod_cosim.cosim.scenario.scenario import load_scenario
 
 EPILOG = (
@@ -194,7 +194,7 @@ def _report_comparison(folder: Path, facts: Mapping[str, Any]) -> list[Path]:
     """Writes the report of a comparison's folder again; `facts` are those of its run.json."""
     seeds = read_seeds(folder / SEEDS)
     # comparisons of earlier versions do not name their controls
-    labels = [str(label) for label in facts.get(PARTS, ("kinematic", "compliant"))]
+    labels = [str(label) for label in facts.get(PARTS, COMPARED)]
     return write_report(
         {label: read_result(folder / label) for label in labels},
         folder,

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import inspect
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -20,7 +19,13 @@ from hexapod_cosim.cosim.control.connection import (
 )
 from hexapod_cosim.cosim.control.fmu_instance import open_controller_fmu
 from hexapod_cosim.cosim.control.fmu_law import FmuLaw
-from hexapod_cosim.cosim.control.python_law import PythonLaw, build, load_class, parameters_of
+from hexapod_cosim.cosim.control.python_law import (
+    PythonLaw,
+    build,
+    file_of,
+    load_class,
+    parameters_of,
+)
 from hexapod_cosim.cosim.interface.controller_interface import ControllerSetup
 from hexapod_cosim.cosim.interface.descriptions import open_description
 from hexapod_cosim.cosim.scenario.controls import (
@@ -40,7 +45,7 @@ class RunController(Protocol):
 
     @property
     def warnings(self) -> Sequence[str]:
-        """Warnings for the report."""
+        """The controller's warnings, which the report shows."""
 
     def start(self, t: float, stop: float, command: BodyCommand, measured: Measurement) -> None:
         """Starts the controller at t [s] with the first measurement."""
@@ -71,7 +76,7 @@ class BuiltIn:
 
     @property
     def warnings(self) -> Sequence[str]:
-        """Warnings about the gains."""
+        """The warnings about its gains, which the report shows."""
         return self._law.warnings
 
     def start(self, t: float, stop: float, command: BodyCommand, measured: Measurement) -> None:
@@ -103,7 +108,7 @@ def make_controller(
     elif chosen.kind == FMU and chosen.path is not None:
         fmu = open_controller_fmu(chosen.path)
         try:
-            fmu.set_parameters(_fmu_parameters(fmu.described, plan.scenario, chosen))
+            fmu.set_parameters(fmu_parameters_of(chosen, fmu.described, plan.scenario))
             connection = connection_of(chosen, fmu.described, plan.scenario, setup)
             yield FmuLaw(fmu, connection, period=setup.period)
         finally:
@@ -136,10 +141,7 @@ def _python_law(
 def _given_law(law: Any, setup: ControllerSetup, scenario: Scenario) -> PythonLaw:
     """Returns the controller for an object or a class that a caller gave."""
     if isinstance(law, type):
-        try:
-            path = Path(inspect.getfile(law)).resolve()
-        except (TypeError, OSError):  # of a notebook
-            path = Path("<notebook>")
+        path = file_of(law) or Path("<notebook>")
         settings = settings_for(scenario, control_of(scenario.control).label)
         return PythonLaw(build(law, path, arguments_of(setup), settings))
     if not callable(getattr(law, "step", None)):
@@ -193,21 +195,14 @@ def connection_of(
     return connect(variables, table, torque=torque, where=str(path))
 
 
-def _fmu_parameters(
-    variables: Sequence[FmuVariable], scenario: Scenario, control: Control
+def fmu_parameters_of(
+    control: Control, variables: Sequence[FmuVariable], scenario: Scenario
 ) -> dict[str, Any]:
     """Returns the parameters of [control] that a controller FMU has."""
     names = {item.name for item in variables if item.causality == "parameter"}
     settings = settings_for(scenario, control.label)
     settings.pop(MAP, None)
     return {name: value for name, value in settings.items() if name in names}
-
-
-def fmu_parameters_of(
-    control: Control, variables: Sequence[FmuVariable], scenario: Scenario
-) -> dict[str, Any]:
-    """Returns the parameters of [control] that a controller FMU has."""
-    return _fmu_parameters(variables, scenario, control)
 
 
 @dataclass(frozen=True)

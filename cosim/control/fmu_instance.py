@@ -33,7 +33,7 @@ class ControllerFmu(Protocol):
 
     @property
     def described(self) -> list[FmuVariable]:
-        """All variables."""
+        """The variables of the FMU, of all causalities."""
 
     def block(self, names: Sequence[str]) -> Block:
         """Returns a block of variables of one type, whose elements stand one after the other."""
@@ -86,7 +86,7 @@ class ControllerFmu2(Fmu):
 
     @property
     def described(self) -> list[FmuVariable]:
-        """All variables."""
+        """The variables of the FMU, of all causalities."""
         return [
             FmuVariable(
                 name, variable.causality, variable.type == "Real", variable.type == "Boolean", 1
@@ -175,7 +175,7 @@ class ControllerFmu3:
 
     @property
     def described(self) -> list[FmuVariable]:
-        """All variables."""
+        """The variables of the FMU, of all causalities."""
         return [
             FmuVariable(
                 name, variable.causality, variable.type in REAL3, variable.type == FLAG3,

@@ -144,7 +144,7 @@ class PythonLaw:
     """
 
     def __init__(self, law: Any, *, path: Path | None = None) -> None:
-        self._law, self._path = law, path or _file_of(type(law))
+        self._law, self._path = law, path or file_of(type(law))
         self._name = type(law).__name__
         self.diagnostics = getattr(law, "diagnostics", None)
 
@@ -193,7 +193,7 @@ class PythonLaw:
         )
 
 
-def _file_of(law: type[Any]) -> Path | None:
+def file_of(law: type[Any]) -> Path | None:
     """Returns the file of a class; None for a class of a notebook or of C code."""
     try:
         return Path(inspect.getfile(law)).resolve()

@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 import tomllib
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from copy import deepcopy
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -16,6 +15,7 @@ from hexapod_cosim.cosim.scenario.records import Scenario
 from hexapod_cosim.cosim.scenario.scenario import scenario_from_table, with_overrides, with_values
 from hexapod_cosim.models import unknown_name
 from hexapod_cosim.models.ground.catalogue import CATALOGUE
+from hexapod_cosim.models.schema import merged_tables
 
 FOLDER = Path(__file__).parent / "cases"
 COMMON = "course.toml"  # holds version, seeds and what all cases share
@@ -104,7 +104,7 @@ def _cases_of(
 ) -> Iterator[Case]:
     """Yields the cases of a class in a split."""
     table = tomllib.loads(_files()[f"{kind}.toml"].decode())
-    base = _merged(common, table.get("scenario", {}))
+    base = merged_tables(common, table.get("scenario", {}))
     for entry in table["case"]:
         where = f"{kind}.toml: {entry['name']}, {split}"
         content = with_values(base, {**entry.get("set", {}), **entry[split]})
@@ -118,15 +118,6 @@ def _cases_of(
             scenario=scenario_from_table(content, where=where),
             **{key: entry[key] for key in ("sweep", "height") if key in entry},
         )
-
-
-def _merged(first: Mapping[str, Any], second: Mapping[str, Any]) -> dict[str, Any]:
-    """Returns the first tables with the entries of the second ones."""
-    merged = deepcopy(dict(first))
-    for key, value in second.items():
-        both = isinstance(value, Mapping) and isinstance(merged.get(key), Mapping)
-        merged[key] = _merged(merged[key], value) if both else deepcopy(value)
-    return merged
 
 
 def run_scenario(case: Case, *, entry: Entry, seed: int) -> Scenario:

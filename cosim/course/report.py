@@ -94,7 +94,7 @@ def _share(value: float) -> str:
 
 
 def lead(table: Table) -> str:
-    """Returns what was run."""
+    """Returns the numbers of cases and seeds, the reference and what a success is, as text."""
     course = table.course
     return (
         f"{len(course.cases)} cases, {len(course.seeds)} seeds from {course.seeds[0]}. "

@@ -128,7 +128,7 @@ class Table:
 
     @property
     def reference(self) -> str:
-        """The first control."""
+        """The label of the first control, with which all others are compared."""
         return self.controls[0]
 
     @cached_property

@@ -23,6 +23,7 @@ from hexapod_cosim.models import (
 from hexapod_cosim.models.schema import Choice, Number, Vector, specs
 
 CONTROLS = ("kinematic", "paper", "compliant")
+COMPARED = ("kinematic", "compliant")  # unless a command or a study names its controls
 FAULTS = ("dead", "stuck")
 FORMATS = ("parquet", "csv")  # of recordings
 SETTINGS: dict[str, type[Any]] = {

@@ -40,6 +40,7 @@ from hexapod_cosim.models.schema import (
     Number,
     Vector,
     expect_table,
+    merged_tables,
     read_given,
     refuse_unknown_keys,
     specs,
@@ -181,10 +182,10 @@ def urdf_table(
     )
     root = root_body(urdf)
     torso, body, legs = _found(root, urdf, options.forward, keep_frames=keep)
-    above = _merged(_shaped(own), _spread(side, where or str(path)))
+    above = merged_tables(_shaped(own), _spread(side, where or str(path)))
     _refuse_impossible(root, legs, above)
     _refuse_footless(legs, above)
-    table = _merged(_merged(_assumed(), _measured(urdf, torso, body, legs)), above)
+    table = merged_tables(merged_tables(_assumed(), _measured(urdf, torso, body, legs)), above)
     assumed = [name for name in WHOLE if name not in own and name not in side] + _complete(
         table, legs, urdf
     )
@@ -328,7 +329,7 @@ def _spread(side: Mapping[str, Any], where: str) -> Table:
     _check_side(side, where)
     table = deepcopy(dict(side))
     links, legs = table.pop("links", {}), table.get("legs", {})
-    table["legs"] = {name: _merged(links, legs.get(name, {})) for name in LEG_NAMES}
+    table["legs"] = {name: merged_tables(links, legs.get(name, {})) for name in LEG_NAMES}
     return table
 
 
@@ -366,17 +367,6 @@ def _check_links(links: Mapping[str, Any], where: str) -> None:
             Link, expect_table(link, f"{where}.{joint}"), f"{where}.{joint}", extra=("stance",)
         )
         Number("rad").read(link.get("stance", 0.0), f"{where}.{joint}.stance")
-
-
-def _merged(low: Mapping[str, Any], high: Mapping[str, Any]) -> Table:
-    """Returns the tables of both; values of the second argument take precedence."""
-    both = {
-        key: _merged(low[key], high[key])
-        for key in low
-        if isinstance(low[key], Mapping) and isinstance(high.get(key), Mapping)
-    }
-    merged: Table = deepcopy({**low, **high, **both})
-    return merged
 
 
 def _complete(table: Table, legs: list[FoundLeg], urdf: Urdf) -> list[str]:

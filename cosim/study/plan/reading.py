@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from hexapod_cosim.cosim.scenario.controls import Control, control_beside, parse_controls
+from hexapod_cosim.cosim.scenario.records import COMPARED
 from hexapod_cosim.cosim.scenario.scenario import read_tables, scenario_from_table, with_values
 from hexapod_cosim.cosim.scenario.variation import STANDARD
 from hexapod_cosim.cosim.study.plan.bundled import list_studies
@@ -53,7 +54,6 @@ KEYS = (
     "factors",
     "optimise",
 )
-DEFAULT_CONTROLS = ("kinematic", "compliant")
 MAX_POINTS, MAX_SEEDS = 10**8, 10**7
 MAX_SEED = 2**32 - 1  # that all random number generators accept
 MAX_FILE_NAME = 255  # bytes
@@ -170,9 +170,9 @@ def _controls(
     table: Mapping[str, Any], optimise: object | None, folder: Path, where: str
 ) -> tuple[Control, ...]:
     """Returns the controls of a study's file. Raises ScenarioError, StudyError for no list."""
-    texts, place = table.get("controls", list(DEFAULT_CONTROLS)), f"{where}: controls"
+    texts, place = table.get("controls", list(COMPARED)), f"{where}: controls"
     if optimise is not None:
-        texts = [table["optimise"].get("control", DEFAULT_CONTROLS[-1])]
+        texts = [table["optimise"].get("control", COMPARED[-1])]
         place = f"{where}: optimise.control"
     if not isinstance(texts, list) or not texts or not all(isinstance(one, str) for one in texts):
         raise StudyError(

@@ -13,10 +13,11 @@ from hexapod_cosim.cosim.interface.names import joint_names
 from hexapod_cosim.cosim.master.recorder import Recording
 from hexapod_cosim.cosim.run.run import simulate
 from hexapod_cosim.cosim.run.walker import Walker
+from hexapod_cosim.cosim.scenario.records import COMPARED
 from hexapod_cosim.cosim.scenario.scenario import list_scenarios, load_scenario
 from hexapod_cosim.models import load_robot
 from tools.docs.validation.shown import PALETTE, Shown, short
-from tools.docs.validation.walked import CONTROLS, changed
+from tools.docs.validation.walked import changed
 
 TOLERANCES = (1e-1, 1e-2, 1e-4, 1e-6)
 DURATION = 4.0  # s
@@ -90,7 +91,7 @@ def scenarios() -> Shown:
     with Walker() as walker:
 
         def residuals(name: str, *settings: str) -> str:
-            controls = [f"control={each}" for each in CONTROLS]
+            controls = [f"control={each}" for each in COMPARED]
             plans = [load_scenario(name, overrides=[each, *settings]) for each in controls]
             runs = [walker.simulate(plan) for plan in plans]
             return changed((run.metrics["energy_residual"] for run in runs), form=short)

@@ -18,10 +18,10 @@ from hexapod_cosim.controller.plane import Array, Plane
 from hexapod_cosim.cosim.master.signals import COMMANDED
 from hexapod_cosim.cosim.results.result import Result
 from hexapod_cosim.cosim.run.run import simulate
+from hexapod_cosim.cosim.scenario.records import COMPARED
 from hexapod_cosim.cosim.scenario.scenario import load_scenario
 from tools.docs.validation.shown import PALETTE, Shown
 from tools.docs.validation.walked import (
-    CONTROLS,
     MILLI,
     changed,
     judged,
@@ -108,7 +108,7 @@ def yaw() -> Shown:
     ):
         runs = (*under_both(*settings), _twisted(*settings))
         rows.append((title, *(shown(scale * run.metrics[metric]) for run in runs)))
-    return Shown(columns=("", *CONTROLS, TWISTED), rows=rows)
+    return Shown(columns=("", *COMPARED, TWISTED), rows=rows)
 
 
 def _twisted(*settings: str) -> Result:

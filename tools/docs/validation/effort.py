@@ -11,9 +11,10 @@ from hexapod_cosim.cosim.interface.names import joint_names
 from hexapod_cosim.cosim.results.metrics import planned_feet
 from hexapod_cosim.cosim.results.result import Result
 from hexapod_cosim.cosim.results.walk import Array, real_feet
+from hexapod_cosim.cosim.scenario.records import COMPARED
 from hexapod_cosim.models import JOINT_NAMES, LEG_NAMES, load_robot
 from tools.docs.validation.shown import PALETTE, Shown
-from tools.docs.validation.walked import CONTROLS, MILLI, judged, shown, under_both, view
+from tools.docs.validation.walked import MILLI, judged, shown, under_both, view
 
 ROBOTS = {"athena": "ATHENA-like", "phantomx_mk4": "PhantomX Mark 4"}
 LEGS = ("LM", "LR")  # whose feet are shown
@@ -28,7 +29,7 @@ def feet() -> Shown:
         panels = figure.subplots(1, len(LEGS), sharey=True)
         for axes, leg in zip(panels, LEGS, strict=True):
             number = LEG_NAMES.index(leg)
-            for k, (name, result) in enumerate(zip(CONTROLS, pairs[ROBOTS["athena"]], strict=True)):
+            for k, (name, result) in enumerate(zip(COMPARED, pairs[ROBOTS["athena"]], strict=True)):
                 last = view(result).last_cycles()
                 if not k:
                     x, z = MILLI * planned_feet(last.recording)[:, number, [0, 2]].T
@@ -45,7 +46,7 @@ def feet() -> Shown:
         for where, metric in (("stance", "foot_error_stance"), ("swing", "foot_error_swing"))
     ]
     return Shown(
-        columns=("feet off the plan, RMS [mm]", *CONTROLS), rows=rows, draw=draw, size=(7.6, 3.0),
+        columns=("feet off the plan, RMS [mm]", *COMPARED), rows=rows, draw=draw, size=(7.6, 3.0),
         alt="Paths of two feet from the side: compliant control keeps to the plan, the other sags",
     )  # fmt: skip
 
@@ -66,7 +67,7 @@ def servos() -> Shown:
     def draw(figure: Figure) -> None:
         panels = figure.subplots(len(ROBOTS), 1, sharex=True, sharey=True)
         for axes, (name, pair) in zip(panels, loads.items(), strict=True):
-            for k, (control, load) in enumerate(zip(CONTROLS, pair, strict=True)):
+            for k, (control, load) in enumerate(zip(COMPARED, pair, strict=True)):
                 axes.bar(places + 0.4 * k - 0.2, load, 0.38, color=PALETTE[k], label=control)
             axes.axhline(1.0, color="0.5", linewidth=1.0)
             axes.grid(visible=False, axis="x")
@@ -78,7 +79,7 @@ def servos() -> Shown:
 
     rows = []
     for name, pair in pairs.items():
-        for control, run in zip(CONTROLS, pair, strict=True):
+        for control, run in zip(COMPARED, pair, strict=True):
             values = [run.metrics[metric] for metric in COSTS]
             cells = [*(shown(value) for value in values[:-1]), shown(100.0 * values[-1])]
             rows.append((f"{ROBOTS[name]}, {control}", *cells))

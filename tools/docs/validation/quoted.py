@@ -11,9 +11,10 @@ from hexapod_cosim.cosim.interface.names import joint_names
 from hexapod_cosim.cosim.results.metrics import compute_metrics, shown_metrics
 from hexapod_cosim.cosim.results.result import Result
 from hexapod_cosim.cosim.results.walk import View
+from hexapod_cosim.cosim.scenario.records import COMPARED
 from hexapod_cosim.models import load_robot
 from tools.docs.validation.shown import Shown
-from tools.docs.validation.walked import CONTROLS, figures, heading, judged, walk
+from tools.docs.validation.walked import figures, heading, judged, walk
 
 PERIOD = 1.0  # s    of the judged walk's gait
 FINE_STEP, COARSE = 0.001, 0.02  # s
@@ -42,7 +43,7 @@ def intervals() -> Shown:
     """
     columns = ["metric"]
     cells: dict[str, list[str]] = {}
-    for control in CONTROLS:
+    for control in COMPARED:
         at = (f"control={control}", f"macro_step={FINE_STEP}")
         every, coarse = walk(*at), walk(*at, f"outputs.interval={COARSE}")
         view = View(coarse.outcome.recording, coarse.parameters, PERIOD)
@@ -74,7 +75,7 @@ def sampled_again() -> Shown:
     the judged walk, whose motion differs by the solver's error.
     """
     servo, rows = load_robot("athena").servo, []
-    for control in CONTROLS:
+    for control in COMPARED:
         result = walk(f"control={control}", "duration=6")
         again = repeated(result.scenario, result.outcome.recording, begin=1.4)
         seen = View(again.recording, result.parameters, PERIOD)
@@ -99,7 +100,7 @@ def work_by_step() -> Shown:
     macro-step.
     """
     rows = []
-    for control in CONTROLS:
+    for control in COMPARED:
         cells = []
         for step in (0.02, 0.005, 0.001):
             result = walk(f"control={control}", f"macro_step={step}", "duration=4")
@@ -124,7 +125,7 @@ def friction() -> Shown:
     runs = {
         (law, control): walk(f"control={control}", *settings)
         for law, settings in LAWS.items()
-        for control in CONTROLS
+        for control in COMPARED
     }
     columns = ("metric", *(f"{law}: {control}" for law, control in runs))
     rows = [(heading(name), *figures(name, list(runs.values()))) for name in OF_FRICTION]

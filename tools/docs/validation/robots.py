@@ -12,12 +12,12 @@ from test_random_robots import odd_robots
 
 from hexapod_cosim.cosim.design.design import design_for
 from hexapod_cosim.cosim.run.walker import Walker
-from hexapod_cosim.cosim.scenario.records import Scenario
+from hexapod_cosim.cosim.scenario.records import COMPARED, Scenario
 from hexapod_cosim.cosim.scenario.scenario import load_scenario
 from hexapod_cosim.models import Robot, load_robot
 from hexapod_cosim.models.urdf.writer import robot_to_urdf
 from tools.docs.validation.shown import Shown
-from tools.docs.validation.walked import CONTROLS, MILLI, changed
+from tools.docs.validation.walked import MILLI, changed
 
 ALWAYS = (1, 4, 7)  # what `make test` walks
 FIGURES = {
@@ -25,7 +25,7 @@ FIGURES = {
     "path_error": ("path error [mm/m]", MILLI),
     "peak_force": ("peak force [BW]", 1.0),
 }
-BOTH = ", ".join(CONTROLS)
+BOTH = ", ".join(COMPARED)
 Walks = Iterator[tuple[str, Robot, Scenario]]
 
 
@@ -35,7 +35,7 @@ def walked() -> Shown:
     with TemporaryDirectory() as folder, Walker() as walker:
         for title, robot, scenario in (*_drawn(Path(folder)), *_odd(Path(folder))):
             gains = design_for(robot, scenario.macro_step)
-            plans = [replace(scenario, control=name) for name in CONTROLS]
+            plans = [replace(scenario, control=name) for name in COMPARED]
             pair = [walker.summary(plan, gains=gains) for plan in plans]
             cells = [
                 changed(scale * each.metrics[key] for each in pair)

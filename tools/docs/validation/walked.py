@@ -12,9 +12,9 @@ from hexapod_cosim.cosim.results.metrics import METRICS
 from hexapod_cosim.cosim.results.result import Result
 from hexapod_cosim.cosim.results.walk import View, Walk
 from hexapod_cosim.cosim.run.walker import Walker
+from hexapod_cosim.cosim.scenario.records import COMPARED
 from hexapod_cosim.cosim.scenario.scenario import load_scenario
 
-CONTROLS = ("kinematic", "compliant")  # that the results set side by side
 MILLI = 1e3
 
 
@@ -35,7 +35,7 @@ def walk(*settings: str, scenario: str = "walk_flat") -> Result:
 
 def under_both(*settings: str, scenario: str = "walk_flat") -> tuple[Result, Result]:
     """Runs it under both controls, kinematic first. Raises RuntimeError unless both walk."""
-    first, second = (walk(f"control={name}", *settings, scenario=scenario) for name in CONTROLS)
+    first, second = (walk(f"control={name}", *settings, scenario=scenario) for name in COMPARED)
     for result in (first, second):
         if not (result.completed and result.facts["walk"]["upright"]):
             raise RuntimeError(f"{scenario} {settings}: {result.outcome.reason or 'fell'}")
