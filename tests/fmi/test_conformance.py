@@ -278,19 +278,20 @@ def test_libraries_of_every_platform_are_recognised_by_their_bytes(
             b"",
         ]
     )
+    # headers of libraries of 64 bits that list no parts
     heads = {
-        ".so": b"\x7fELF" + bytes(14),
+        ".so": b"\x7fELF\x02\x01" + bytes(12),
         ".dll": b"MZ" + bytes(58) + b"\x40\0\0\0" + b"PE\0\0",
         ".dylib": b"\xcf\xfa\xed\xfe",
     }
 
     def add(members: dict[str, bytes]) -> None:
         for platform, (suffix, _, _, machine) in PLATFORMS.items():
-            members[f"binaries/{platform}/hexapod{suffix}"] = heads[suffix] + machine + symbols
+            members[f"binaries/{platform}/hexapod{suffix}"] = (
+                heads[suffix] + machine + bytes(64) + symbols
+            )
 
-    problems = archive_problems(rewritten(good, tmp_path / "all.fmu", add))
-    # the made-up libraries have no parts that a system could load
-    assert [text for text in problems if "cannot be loaded" not in text] == []
+    assert archive_problems(rewritten(good, tmp_path / "all.fmu", add)) == []
 
 
 @pytest.mark.parametrize(
