@@ -2,10 +2,11 @@
 
     python -m tools.wheels [FOLDER]                 all of them, in dist/ by default
 
-Every wheel is made of the same files: those of the wheel that this machine builds, without its
-binaries and C libraries, and the cross-compiled binaries of both FMUs for all platforms. A wheel differs from
-another one by its co-simulation loop and its tag alone, so that `hexapod export --platforms all`
-needs no compiler. The same sources and the same ziglang give the same bytes.
+Every wheel is made of the same files: those of the wheel that this machine builds from the source
+distribution, without its binaries and C libraries, and the cross-compiled binaries of both FMUs
+for all platforms. A wheel differs from another one by its co-simulation loop and its tag alone, so
+that `hexapod export --platforms all` needs no compiler. The same sources and the same ziglang give
+the same bytes.
 
 The binaries for glibc run on musl too: musl's loader takes itself for libc.so.6 and libm.so.6, and
 they require no function that musl lacks (tests/release/test_musl.py). The wheels for Linux
@@ -29,7 +30,7 @@ from pathlib import Path
 from rich.console import Console
 from wheel.wheelfile import WheelFile
 
-from hexapod_cosim.cosim.common.components import CONTROLLER, PLANT, Component
+from hexapod_cosim.cosim.common.components import CONTROLLER, PLANT
 from hexapod_cosim.cosim.common.plant_files import LOOP, fmi_headers
 from hexapod_cosim.cosim.export.cross_build import TARGETS, Library, build_library
 from hexapod_cosim.cosim.export.platforms import component_library
@@ -64,8 +65,7 @@ def main(folder: Path) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     os.environ.setdefault("SOURCE_DATE_EPOCH", commit_time())
     with console.status("building the wheel of this machine and the source distribution"):
-        source = build_source(folder)
-        base = build_base()
+        source, base = build_source(folder)
     with console.status("compiling for all platforms (minutes, the first time)"):
         binaries = cross_compile()
     wheels = [write_wheel(base, platform, binaries, folder) for platform in PLATFORMS]
@@ -83,33 +83,29 @@ def commit_time() -> str:
     return subprocess.check_output(command, cwd=ROOT, text=True).strip()
 
 
-def build_source(folder: Path) -> Path:
-    """Builds the source distribution in a folder and returns its path."""
+def build_source(folder: Path) -> tuple[Path, dict[str, bytes]]:
+    """Builds the source distribution in a folder and this machine's wheel from it.
+
+    Returns the path of the source distribution, and the wheel's files without binaries, by name.
+    """
     with tempfile.TemporaryDirectory() as name:
-        built = _build("--sdist", Path(name), "*.tar.gz")
-        return Path(shutil.copy(built, folder))
+        command = [sys.executable, "-m", "build", "--outdir", name, str(ROOT)]
+        process = subprocess.run(command, capture_output=True, text=True, check=False)
+        if process.returncode != 0:
+            last = f"{process.stdout[-4000:]}{process.stderr[-4000:]}"
+            sys.exit(f"{' '.join(command)} failed:\n{last}")
+        (source,), (wheel,) = Path(name).glob("*.tar.gz"), Path(name).glob("*.whl")
+        return Path(shutil.copy(source, folder)), common_files(wheel)
 
 
-def build_base() -> dict[str, bytes]:
-    """Builds this machine's wheel and returns its files without binaries, by name."""
-    with tempfile.TemporaryDirectory() as name:
-        built = _build("--wheel", Path(name), "*.whl")
-        with zipfile.ZipFile(built) as archive:
-            return {
-                member: archive.read(member)
-                for member in archive.namelist()
-                if not member.startswith((BINARIES, LIBRARIES)) and not member.endswith("/RECORD")
-            }
-
-
-def _build(kind: str, folder: Path, pattern: str) -> Path:
-    """Runs the package `build` and returns the file that it made."""
-    command = [sys.executable, "-m", "build", kind, "--outdir", str(folder), str(ROOT)]
-    process = subprocess.run(command, capture_output=True, text=True, check=False)
-    if process.returncode != 0:
-        sys.exit(f"{' '.join(command)} failed:\n{process.stdout[-4000:]}{process.stderr[-4000:]}")
-    (built,) = folder.glob(pattern)
-    return built
+def common_files(wheel: Path) -> dict[str, bytes]:
+    """Returns the files of a wheel that every platform's wheel has, by name."""
+    with zipfile.ZipFile(wheel) as archive:
+        return {
+            member: archive.read(member)
+            for member in archive.namelist()
+            if not member.startswith((BINARIES, LIBRARIES)) and not member.endswith("/RECORD")
+        }
 
 
 def cross_compile() -> dict[tuple[str, str], bytes]:

@@ -36,9 +36,9 @@ def hexapod(wheels: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The command of a new environment in which this machine's wheel alone is installed."""
     folder = tmp_path_factory.mktemp("environment")
     subprocess.run([sys.executable, "-m", "venv", folder], check=True)
-    install = ["-m", "pip", "install", "--quiet", "--only-binary=:all:", "--find-links", wheels]
-    (folder / "tmp").mkdir()
-    subprocess.run([folder / "bin/python", *install, "hexapod-cosim"], check=True, env=bare(folder))
+    options = ["--quiet", "--only-binary=:all:", "--find-links", str(wheels)]
+    command = [str(folder / "bin/python"), "-m", "pip", "install", *options, "hexapod-cosim"]
+    subprocess.run(command, check=True, env=bare(folder))
     return folder / "bin" / "hexapod"
 
 
@@ -51,7 +51,7 @@ def bare(folder: Path) -> dict[str, str]:
 def run(hexapod: Path, cwd: Path, *arguments: str) -> str:
     """Runs the command outside the source tree and returns its output."""
     process = subprocess.run(
-        [hexapod, *arguments],
+        [str(hexapod), *arguments],
         cwd=cwd,
         env=bare(hexapod.parents[1]),
         capture_output=True,
@@ -73,13 +73,13 @@ def test_the_hashes_are_those_of_the_files(wheels: Path) -> None:
 
 
 def test_the_descriptions_are_what_the_index_accepts(wheels: Path) -> None:
-    files = [*wheels.glob("*.whl"), *wheels.glob("*.tar.gz")]
+    files = [str(path) for path in (*wheels.glob("*.whl"), *wheels.glob("*.tar.gz"))]
     subprocess.run([sys.executable, "-m", "twine", "check", "--strict", *files], check=True)
 
 
 def test_the_linux_wheel_keeps_what_its_tag_promises(wheels: Path) -> None:
     (wheel,) = wheels.glob("*manylinux_2_17_x86_64*.whl")
-    command = [sys.executable, "-m", "auditwheel", "show", wheel]
+    command = [sys.executable, "-m", "auditwheel", "show", str(wheel)]
     shown = subprocess.run(command, capture_output=True, text=True, check=True).stdout
     assert "manylinux_2_17_x86_64" in " ".join(shown.split())
 
@@ -105,7 +105,6 @@ def test_an_fmu_for_all_platforms_needs_no_compiler(hexapod: Path, tmp_path: Pat
 def test_the_examples_come_out_of_the_wheel_and_run(hexapod: Path, tmp_path: Path) -> None:
     run(hexapod, tmp_path, "examples", "-o", "mine")
     assert {path.name for path in (tmp_path / "mine").iterdir()} >= {"01_stand.py", "notebooks"}
-    python = hexapod.with_name("python")
     environment = bare(hexapod.parents[1])
-    command = [python, "01_stand.py"]
+    command = [str(hexapod.with_name("python")), "01_stand.py"]
     subprocess.run(command, cwd=tmp_path / "mine", env=environment, check=True)
