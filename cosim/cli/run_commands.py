@@ -17,6 +17,7 @@ from hexapod_cosim.cosim.cli.running import (
     Engine,
     FmuFile,
     FolderName,
+    Formats,
     GainsFile,
     Name,
     RunOptions,
@@ -28,6 +29,7 @@ from hexapod_cosim.cosim.cli.running import (
     run_into,
     show_rows,
     titled,
+    with_formats,
 )
 from hexapod_cosim.cosim.cli.terminal import Json, show_files, show_json, show_text, warn
 from hexapod_cosim.cosim.common.files import BENCHMARK, PARTS, STUDY
@@ -64,6 +66,7 @@ def simulate(
     scenario: Name = "walk_flat",
     control: ControlNames = None,
     settings: Settings = None,
+    formats: Formats = None,
     output: FolderName = None,
     fmu: FmuFile = None,
     gains: GainsFile = None,
@@ -72,7 +75,8 @@ def simulate(
     json: Json = False,
 ) -> int:
     """Run one co-simulation: results, metrics, plots. Several controls: a run of each."""
-    plan = titled(load_scenario(scenario, overrides=settings or []), settings or [])
+    settings = with_formats(settings, formats)
+    plan = titled(load_scenario(scenario, overrides=settings), settings)
     controls = chosen_controls(control or [plan.control], plan)
     options = RunOptions.read(fmu=fmu, gains=gains, engine=engine, runs=1)
     if accuracy:
