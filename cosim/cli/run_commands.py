@@ -56,7 +56,9 @@ from hexapod_cosim.cosim.results.summary import summarise
 from hexapod_cosim.cosim.scenario.controls import control_of
 from hexapod_cosim.cosim.scenario.records import COMPARED, Scenario
 from hexapod_cosim.cosim.scenario.scenario import load_scenario
+from hexapod_cosim.models import HexapodError
 
+LOG_KINDS = ("replay", "identify")  # folders that depend on a log
 EPILOG = (
     f"Exit code {FELL} when the robot fell: what was recorded and measured is written all the same."
 )
@@ -188,6 +190,14 @@ def _report_again(folder: Path, facts: Mapping[str, Any]) -> list[Path]:
         return list(benchmark_command.report_on(folder))
     if facts.get("kind") == "compare":
         return _report_comparison(folder, facts)
+    if facts.get("kind") in LOG_KINDS:
+        raise HexapodError(
+            "not a run, whose report can be made again",
+            got=f"a folder of `hexapod {facts['kind']}`",
+            expected="a run, a comparison, a study or a benchmark",
+            fix=f"run it again: {facts.get('command', '')}",
+            where=str(folder),
+        )
     run = read_result(folder)
     control = run.facts["control"]
     accuracies = {control: run.accuracy} if run.accuracy else {}

@@ -28,6 +28,7 @@ RESULT_FILES = (
     "results.partial.parquet",
     "results.partial.csv",
     "results.partial.mcap",
+    "replay.csv",
     "seeds.csv",
     "seeds.partial.csv",
     "metrics.json",
