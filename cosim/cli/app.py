@@ -14,6 +14,7 @@ from hexapod_cosim.cosim.cli import (
     export_command,
     fmu_commands,
     listing,
+    replay_command,
     run_commands,
     study_command,
     terrain_command,
@@ -39,6 +40,7 @@ app.add_typer(controller_command.app, name="controller")
 app.command("examples")(examples_command.examples)
 app.command("validate")(fmu_commands.validate)
 app.command("terrain")(terrain_command.terrain)
+app.command("replay")(replay_command.replay)
 app.command("list")(listing.list_what)
 
 
