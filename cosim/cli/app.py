@@ -13,6 +13,7 @@ from hexapod_cosim.cosim.cli import (
     export_command,
     fmu_commands,
     listing,
+    live_command,
     run_commands,
     study_command,
     terrain_command,
@@ -37,6 +38,7 @@ app.command("report")(run_commands.report)
 app.add_typer(controller_command.app, name="controller")
 app.command("validate")(fmu_commands.validate)
 app.command("terrain")(terrain_command.terrain)
+app.command("live")(live_command.live)
 app.command("list")(listing.list_what)
 
 

@@ -37,6 +37,7 @@ ROOMS = {
     "report": [*LOW, "export", "results"],
     "run": RUNNING,
     "course": [*RUNNING, "report", "run"],
+    "live": [*RUNNING, "report", "run"],
     "study.plan": [*LOW, "results"],
     "study.store": [*LOW, "results", "study.plan"],
     "study.execute": [*RUNNING, "run", "study.plan", "study.store"],
