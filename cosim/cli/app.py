@@ -14,13 +14,13 @@ from hexapod_cosim.cosim.cli import (
     export_command,
     fmu_commands,
     listing,
-    live_command,
     replay_command,
     run_commands,
     study_command,
     terrain_command,
 )
 from hexapod_cosim.cosim.cli.failures import EPILOG
+from hexapod_cosim.cosim.cli.live import live_command
 from hexapod_cosim.cosim.common.plant_files import package_version
 
 app = typer.Typer(
