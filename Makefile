@@ -76,7 +76,7 @@ test: setup typing
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest $(PARALLEL)
 
 test-browser: setup
-	HEXAPOD_BROWSER=full $(BIN)/python -m pytest -s tests/report/test_browser.py
+	HEXAPOD_BROWSER=full $(BIN)/python -m pytest -s tests/report/test_browser.py tests/live/test_live_browser.py
 
 test-importers: setup
 	$(BIN)/python -m tools.importers.compare

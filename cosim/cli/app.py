@@ -20,6 +20,7 @@ from hexapod_cosim.cosim.cli import (
     terrain_command,
 )
 from hexapod_cosim.cosim.cli.failures import EPILOG
+from hexapod_cosim.cosim.cli.live import live_command
 from hexapod_cosim.cosim.common.plant_files import package_version
 
 app = typer.Typer(
@@ -40,6 +41,7 @@ app.add_typer(controller_command.app, name="controller")
 app.command("examples")(examples_command.examples)
 app.command("validate")(fmu_commands.validate)
 app.command("terrain")(terrain_command.terrain)
+app.command("live")(live_command.live)
 app.command("replay")(replay_command.replay)
 app.command("list")(listing.list_what)
 

@@ -39,6 +39,7 @@ ROOMS = {
     "run": RUNNING,
     "identify": [*RUNNING, "report", "run"],
     "course": [*RUNNING, "report", "run"],
+    "live": [*RUNNING, "report", "run"],
     "study.plan": [*LOW, "results"],
     "study.store": [*LOW, "results", "study.plan"],
     "study.execute": [*RUNNING, "run", "study.plan", "study.store"],
