@@ -16,11 +16,11 @@ from hexapod_cosim.cosim.cli import (
     listing,
     replay_command,
     run_commands,
-    study_command,
     terrain_command,
 )
 from hexapod_cosim.cosim.cli.failures import EPILOG
 from hexapod_cosim.cosim.cli.live import live_command
+from hexapod_cosim.cosim.cli.study import study_command
 from hexapod_cosim.cosim.common.plant_files import package_version
 
 app = typer.Typer(
