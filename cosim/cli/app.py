@@ -12,6 +12,7 @@ from hexapod_cosim.cosim.cli import (
     controller_command,
     export_command,
     fmu_commands,
+    identify_command,
     listing,
     replay_command,
     run_commands,
@@ -39,6 +40,7 @@ app.add_typer(controller_command.app, name="controller")
 app.command("validate")(fmu_commands.validate)
 app.command("terrain")(terrain_command.terrain)
 app.command("replay")(replay_command.replay)
+app.command("identify")(identify_command.identify)
 app.command("list")(listing.list_what)
 
 
