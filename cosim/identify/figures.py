@@ -22,8 +22,13 @@ ROW = 1.05  # in    height of a row of panels
 COLOURS = (PALETTE[3], PALETTE[0], PALETTE[2])  # of simulations
 
 
-def channel_figures(log: Log, simulations: Simulated) -> dict[str, str]:
-    """Returns a figure of each channel with simulated columns, by the channel's title, as SVG."""
+def channel_figures(
+    log: Log, simulations: Simulated, *, split: float | None = None
+) -> dict[str, str]:
+    """Returns a figure of each channel with simulated columns, by the channel's title, as SVG.
+
+    split: time [s] of a vertical line.
+    """
     found = {}
     for channel in CHANNELS:
         names = [
@@ -33,7 +38,7 @@ def channel_figures(log: Log, simulations: Simulated) -> dict[str, str]:
         ]
         if names:
             with matplotlib.rc_context(SETTINGS):
-                found[channel.title] = _svg(_draw(log, channel, names, simulations))
+                found[channel.title] = _svg(_draw(log, channel, names, simulations, split))
     return found
 
 
@@ -42,7 +47,9 @@ def embedded(svg: str) -> str:
     return "data:image/svg+xml;base64," + base64.b64encode(svg.encode()).decode("ascii")
 
 
-def _draw(log: Log, channel: Channel, names: list[str], simulations: Simulated) -> Figure:
+def _draw(
+    log: Log, channel: Channel, names: list[str], simulations: Simulated, split: float | None
+) -> Figure:
     legs = names[0].split(".")[0] in LEG_NAMES
     across = len(LEG_NAMES) if legs else 3
     rows = -(-len(channel.names if legs else names) // across)
@@ -61,6 +68,8 @@ def _draw(log: Log, channel: Channel, names: list[str], simulations: Simulated) 
             log.time[thin], log.recording.column(name)[thin], color="0.55", label="measured",
             linewidth=1.4,
         )  # fmt: skip
+        if split is not None:
+            axis.axvline(split, color="0.75", linewidth=0.7)
         for colour, (label, columns) in zip(COLOURS, simulations.items(), strict=False):
             axis.plot(log.time[thin], columns[name][thin], color=colour, label=label, linewidth=0.7)
     figure.supylabel(f"[{channel.unit}]", fontsize=7.0)
