@@ -10,9 +10,11 @@ from hexapod_cosim.cosim.cli import (
     benchmark_command,
     compare_command,
     controller_command,
+    examples_command,
     export_command,
     fmu_commands,
     listing,
+    replay_command,
     run_commands,
     study_command,
     terrain_command,
@@ -35,8 +37,10 @@ app.command("benchmark", epilog=benchmark_command.EPILOG)(benchmark_command.benc
 app.command("design")(fmu_commands.design)
 app.command("report")(run_commands.report)
 app.add_typer(controller_command.app, name="controller")
+app.command("examples")(examples_command.examples)
 app.command("validate")(fmu_commands.validate)
 app.command("terrain")(terrain_command.terrain)
+app.command("replay")(replay_command.replay)
 app.command("list")(listing.list_what)
 
 
