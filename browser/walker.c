@@ -10,10 +10,10 @@ static const double STILL = 0.02;       /* rad  joint commands that vary by less
 static const double PATIENCE = 4.0;     /* gait periods  until a change is made while moving */
 
 typedef struct Change {
-  int wanted;             /* a change of control or pattern waits for the robot to stand */
-  int control, pattern;   /* the wanted ones */
-  double since;           /* s   time of the request */
-  double still_since;     /* s   the joint commands have hardly changed since then */
+  int waits;          /* for the robot to stand still */
+  hxWalk walk;        /* the control and gait that come */
+  double since;       /* s   time of the request */
+  double still_since; /* s   the joint commands have hardly changed since then */
   double reference[HX_LEGS][HX_JOINTS]; /* rad  joint commands at that time */
 } Change;
 
@@ -27,6 +27,7 @@ static struct {
   hxControllerInput seen;
   hxControllerOutput command;
   long steps; /* macro-steps since the start */
+  hxWalk wanted; /* by the page */
   Change change;
   double from[HX_LEGS][HX_JOINTS]; /* rad  joint commands from which the present ones fade in */
   double fade_end;                 /* s */
@@ -35,6 +36,7 @@ static struct {
 
 double hx_walker_macro_step(void) { return MACRO_STEP; }
 const hxFrame *hx_walker_frame(void) { return &walker.frame; }
+hxWalk *hx_walker_wanted(void) { return &walker.wanted; }
 hxInput *hx_walker_input(void) { return &walker.input; }
 
 const char *hx_walker_message(void) {
@@ -60,9 +62,7 @@ static void show(void) {
   memcpy(frame->force, out->foot.force, sizeof frame->force);
   memcpy(frame->slip_speed, out->foot.slip_speed, sizeof frame->slip_speed);
   frame->largest_torque = largest;
-  frame->control = walker.walk.control;
-  frame->pattern = walker.walk.gait.pattern;
-  frame->changing = walker.change.wanted;
+  frame->changing = walker.change.waits;
 }
 
 static void read_plant(void) {
@@ -70,12 +70,17 @@ static void read_plant(void) {
   show();
 }
 
-static void choose(int control, int pattern) {
-  walker.walk.control = control;
-  walker.walk.gait.pattern = pattern;
+static void choose(const hxWalk *walk) {
+  hxGait *gait = &walker.walk.gait;
+  walker.walk.control = (int)walk->control;
+  gait->pattern = (int)walk->pattern;
+  gait->period = walk->period;
+  gait->duty = walk->duty;
+  gait->step_height = walk->step_height;
+  gait->touchdown_speed = walk->touchdown_speed;
 }
 
-int hx_walker_start(int control, int pattern, double friction) {
+int hx_walker_start(double friction) {
   if (!walker.plant) walker.plant = hx_plant_create();
   if (!walker.controller) walker.controller = hx_controller_create();
   if (!walker.plant || !walker.controller) return HX_INVALID_ARGUMENT;
@@ -87,7 +92,7 @@ int hx_walker_start(int control, int pattern, double friction) {
   walker.fade_end = 0.0;
   walker.steps = 0;
   walker.robot.friction.mu = friction;
-  choose(control, pattern);
+  choose(&walker.wanted);
   int status = hx_plant_reset(walker.plant, &walker.robot, 0.0);
   if (status == HX_OK) status = hx_controller_reset(walker.controller, &walker.walk, 0.0);
   if (status == HX_OK) read_plant();
@@ -107,10 +112,9 @@ void hx_walker_push(double x, double y, double z) {
   walker.input.push_force[2] = z;
 }
 
-void hx_walker_change(int control, int pattern) {
-  walker.change.wanted = 1;
-  walker.change.control = control;
-  walker.change.pattern = pattern;
+void hx_walker_change(void) {
+  walker.change.waits = 1;
+  walker.change.walk = walker.wanted;
   walker.change.since = walker.change.still_since = walker.output.time;
   memcpy(walker.change.reference, walker.command.angle_ref, sizeof walker.change.reference);
 }
@@ -137,8 +141,8 @@ static int has_stopped(void) {
   double largest = 0.0;
   for (int leg = 0; leg < HX_LEGS; ++leg)
     for (int joint = 0; joint < HX_JOINTS; ++joint)
-      largest = fmax(largest, fabs(walker.command.angle_ref[leg][joint] -
-                                   change->reference[leg][joint]));
+      largest =
+          fmax(largest, fabs(walker.command.angle_ref[leg][joint] - change->reference[leg][joint]));
   if (largest > STILL) {
     change->still_since = now;
     memcpy(change->reference, walker.command.angle_ref, sizeof change->reference);
@@ -148,8 +152,8 @@ static int has_stopped(void) {
 
 /* Lets the wanted controller begin in the stance, faded in from the last joint commands. */
 static int take_over(void) {
-  choose(walker.change.control, walker.change.pattern);
-  walker.change.wanted = 0;
+  choose(&walker.change.walk);
+  walker.change.waits = 0;
   memcpy(walker.from, walker.command.angle_ref, sizeof walker.from);
   walker.fade_end = walker.output.time + FADE;
   return hx_controller_reset(walker.controller, &walker.walk, walker.output.time);
@@ -183,7 +187,7 @@ static int control(double t_end) {
   memcpy(seen->angle, walker.output.angle, sizeof seen->angle);
   memcpy(seen->foot_force, walker.output.foot.force, sizeof seen->foot_force);
   memcpy(seen->quaternion, walker.output.torso.quaternion, sizeof seen->quaternion);
-  if (walker.change.wanted) memset(&seen->command, 0, sizeof seen->command);
+  if (walker.change.waits) memset(&seen->command, 0, sizeof seen->command);
   hx_controller_output(walker.controller, seen, &walker.command);
   const int status = hx_controller_step(walker.controller, seen, NULL, t_end);
   seen->command = asked.command;
@@ -193,7 +197,7 @@ static int control(double t_end) {
 static int macro_step(void) {
   const double t_end = (double)(walker.steps + 1) * MACRO_STEP;
   int status = control(t_end);
-  if (status == HX_OK && walker.change.wanted && has_stopped()) {
+  if (status == HX_OK && walker.change.waits && has_stopped()) {
     status = take_over();
     if (status == HX_OK) status = control(t_end);
   }

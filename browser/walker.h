@@ -9,6 +9,16 @@
 #include "hexapod/controller.h"
 #include "hexapod/hexapod.h"
 
+/* Control and gait. It consists of doubles only. */
+typedef struct hxWalk {
+  double control;         /* hxControl */
+  double pattern;         /* hxPattern */
+  double period;          /* s    one cycle of a leg */
+  double duty;            /* 1    share of the cycle on the ground */
+  double step_height;     /* m    the foot's lift above the ground */
+  double touchdown_speed; /* m/s  vertical, at the end of a swing */
+} hxWalk;
+
 /* What a page shows, as of the last macro-step. It consists of doubles only. */
 typedef struct hxFrame {
   double time;                        /* s    since the start */
@@ -19,13 +29,15 @@ typedef struct hxFrame {
   double force[HX_LEGS][3];           /* N    ground on foot */
   double slip_speed[HX_LEGS];         /* m/s */
   double largest_torque;              /* N m  of all servos */
-  double control, pattern;            /* hxControl, hxPattern that hold */
   double changing;                    /* 1: the robot stops to change its control or gait */
 } hxFrame;
 
+/* The control and gait of the next start or change: the page writes them here. */
+HX_API hxWalk *hx_walker_wanted(void);
+
 /* Allocates the robot once and places it at its start; HX_OK, or the status of the first failure,
  * explained by hx_walker_message. */
-HX_API int hx_walker_start(int control, int pattern, double friction);
+HX_API int hx_walker_start(double friction);
 
 /* Sets the body velocity in the torso's axes [m/s, rad/s] and the height above the stance [m]. */
 HX_API void hx_walker_command(double forward, double left, double turn, double height);
@@ -33,9 +45,9 @@ HX_API void hx_walker_command(double forward, double left, double turn, double h
 /* Sets the force on the torso's centre of mass, world axes [N]. */
 HX_API void hx_walker_push(double x, double y, double z);
 
-/* Changes the control and the pattern of the gait. The present controller stops the robot first;
- * the next one begins in the stance, and the joint commands fade from the old to the new ones. */
-HX_API void hx_walker_change(int control, int pattern);
+/* Changes to the wanted control and gait. The present controller stops the robot first; the next
+ * one begins in the stance, and the joint commands fade from the old to the new ones. */
+HX_API void hx_walker_change(void);
 
 /* Changes the friction coefficient: the plant begins again in its present pose and motion. */
 HX_API int hx_walker_set_friction(double friction);

@@ -24,7 +24,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[1]
 VIEWER = ROOT / "cosim" / "viewer"
 BUNDLE = ROOT / "build" / "viewer" / "viewer.js"  # of reports
-ENTRIES = {"viewer.js": "src/main.ts", "live.js": "src/live/main.ts"}  # by bundle
+ENTRIES = {"viewer.js": "src/main.ts", "live.js": "src/live/main.ts", "browser.js": "src/browser/main.ts"}  # by bundle
 METAFILE = BUNDLE.with_name("metafile.json")  # esbuild's list of bundled files
 LICENCES = BUNDLE.with_name("LICENSES.txt")
 MODULES = VIEWER / "node_modules"

@@ -44,11 +44,13 @@ ELF = ("-fPIC", "-Wl,-z,relro,-z,now,--no-undefined", "-lm")
 
 @dataclass(frozen=True)
 class Target:
-    """A system and processor: Zig's name, suffix and linker flags of its shared libraries."""
+    """A system and processor: Zig's name, suffix and flags of its shared libraries."""
 
     triple: str
     suffix: str
     link: tuple[str, ...] = ()
+    processor: str = "baseline"
+    shared: tuple[str, ...] = ("-shared", "-s")
 
 
 # the oldest supported systems: CentOS 7 (glibc 2.17), macOS 11 (the first for both processors),
@@ -61,6 +63,18 @@ TARGETS = {
     "aarch64-darwin": Target("aarch64-macos.11.0", ".dylib"),
 }
 
+# a module for browsers, which no importer of FMUs loads; all of them have vectors since 2021 or
+# 2023 (Safari)
+BROWSER = "wasm32-wasi"
+WEB_ASSEMBLY = Target(
+    BROWSER,
+    ".wasm",
+    ("-Wl,--export-dynamic", "-Wl,--strip-all", "-Wl,-z,stack-size=1048576"),
+    "generic+simd128+bulk_memory+nontrapping_fptoint",
+    ("-mexec-model=reactor",),
+)
+ALL_TARGETS = {**TARGETS, BROWSER: WEB_ASSEMBLY}
+
 
 @dataclass(frozen=True)
 class Library:
@@ -68,16 +82,18 @@ class Library:
 
     sources: C files and headers by their path in the include folder.
     headers: further include folders.
+    included: C files that others include; they are not compiled by themselves.
     """
 
     name: str
     sources: Mapping[str, Path]
     headers: tuple[Path, ...] = ()
     flags: tuple[str, ...] = field(default=())
+    included: tuple[str, ...] = ()
 
     def digest(self) -> str:
         """Returns a hash of names, flags and contents of all files."""
-        parts = [self.name, *self.flags]
+        parts = [self.name, *self.flags, *self.included]
         files = [
             *self.sources.items(),
             *(
@@ -123,7 +139,7 @@ def build_library(
 
     Args:
         library: the library to build.
-        target: a key of TARGETS.
+        target: a key of ALL_TARGETS.
         compiler: the installed one by default.
         cache_folder: the user's by default; processes may share it.
 
@@ -132,7 +148,7 @@ def build_library(
     compiler, folder = compiler or find_compiler(), cache_folder or user_cache()
     flags = (*_flags(library, target), *library.flags)
     key = _digest([library.digest(), compiler.version, *flags])
-    kept = folder / "binaries" / f"{library.name}-{target}-{key[:32]}{TARGETS[target].suffix}"
+    kept = folder / "binaries" / f"{library.name}-{target}-{key[:32]}{ALL_TARGETS[target].suffix}"
     if kept.is_file() and (data := _verified(kept.read_bytes())):
         return data
     data = _compile(library, [*compiler.command, *flags], target, folder)
@@ -147,19 +163,20 @@ def user_cache() -> Path:
 
 def _flags(library: Library, target: str) -> tuple[str, ...]:
     """Returns the flags of compiler and linker for a target."""
-    chosen = TARGETS[target]
+    chosen = ALL_TARGETS[target]
     link = (
         (f"-Wl,-install_name,@rpath/{library.name}{chosen.suffix}",)
         if chosen.suffix == ".dylib"
         else chosen.link
     )
-    return ("-target", chosen.triple, "-mcpu=baseline", *COMPILE, "-shared", "-s", *link)
+    processor = f"-mcpu={chosen.processor}"
+    return ("-target", chosen.triple, processor, *COMPILE, *chosen.shared, *link)
 
 
 def _compile(library: Library, command: Sequence[str], target: str, cache_folder: Path) -> bytes:
     """Copies the sources into a folder, compiles them there and returns the library's bytes."""
     with tempfile.TemporaryDirectory(prefix="hexapod-build-") as name:
-        root, out = Path(name), library.name + TARGETS[target].suffix
+        root, out = Path(name), library.name + ALL_TARGETS[target].suffix
         for path, source in library.sources.items():
             (root / "in" / path).parent.mkdir(parents=True, exist_ok=True)
             (root / "in" / path).write_bytes(source.read_bytes())
@@ -176,7 +193,11 @@ def _compile(library: Library, command: Sequence[str], target: str, cache_folder
                 for item in ("-isystem", f"headers{number}")
             ),
         ]
-        sources = [path for path in library.sources if path.endswith(".c")]
+        sources = [
+            path
+            for path in library.sources
+            if path.endswith(".c") and path not in library.included
+        ]
         _run([*command, *includes, *sources, "-o", f"../out/{out}"], root, target, cache_folder)
         return (root / "out" / out).read_bytes()
 

@@ -1,4 +1,4 @@
-import type { Link } from "./link";
+import type { Connection } from "./link";
 
 const OFTEN = 40; // ms    between two drives at the most
 const RENEW = 150; // ms    between two drives that are the same, while the robot is to move
@@ -23,7 +23,7 @@ export class Drive {
   private rise = 0;
 
   constructor(
-    private readonly link: Link,
+    private readonly link: Connection,
     speed: number,
   ) {
     this.pace = speed;

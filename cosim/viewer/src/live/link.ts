@@ -13,11 +13,22 @@ export interface Received {
   refused: { reason: string };
 }
 
-type Kind = keyof Received;
+export type Kind = keyof Received;
 export type State = "connecting" | "open" | "silent" | "lost" | "refused";
 
+/** What the page needs of a loop, wherever it runs. */
+export interface Connection {
+  readonly client: number;
+  /** [ms] from a message to the first frame that shows its effect. */
+  readonly latency: number | undefined;
+  readonly state: State;
+  on<K extends Kind>(kind: K, listener: (message: Received[K]) => void): void;
+  watchState(watcher: (state: State) => void): void;
+  send(message: Record<string, unknown>): void;
+}
+
 /** The socket to the loop: connects, connects again, and measures the latency of an echo. */
-export class Link {
+export class Link implements Connection {
   private socket: WebSocket | undefined;
   private readonly listeners: { [K in Kind]?: ((message: Received[K]) => void)[] } = {};
   private readonly watchers: ((state: State) => void)[] = [];

@@ -1,6 +1,6 @@
 import { byId, element } from "../dom";
 import type { Drive } from "./drive";
-import type { Link, State } from "./link";
+import type { Connection, State } from "./link";
 import type { Frame, Settings, Setup, Status } from "./messages";
 
 const SHOWN = 7000; // ms    that a note stays
@@ -22,7 +22,7 @@ export class Panel {
 
   constructor(
     private readonly setup: Setup,
-    private readonly link: Link,
+    private readonly link: Connection,
     private readonly drive: Drive,
   ) {
     this.makeChoices();

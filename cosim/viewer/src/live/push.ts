@@ -1,5 +1,5 @@
 import type { Vector3 } from "three";
-import type { Link } from "./link";
+import type { Connection } from "./link";
 import type { View } from "./view";
 
 const OFTEN = 40; // ms    between two pushes at the most
@@ -15,7 +15,7 @@ export class Pusher {
 
   constructor(
     private readonly view: View,
-    private readonly link: Link,
+    private readonly link: Connection,
     private readonly weight: () => number,
   ) {
     const { canvas } = view;
