@@ -75,6 +75,7 @@ class LiveRobot:
         fault: why a controller was replaced or the plant has stopped; "" without a fault.
         stopped: whether the plant has refused a step; only `place` helps.
         weight: of the robot [N].
+        advance: steps the plant from t [s] by h [s]; `realtime.py` puts a clock around it.
     """
 
     def __init__(self, choices: Choices, *, gains: Gains | None = None) -> None:
@@ -88,6 +89,7 @@ class LiveRobot:
         try:
             path = PlantFmus(self._folder).fmu(choices.scenario.robot)
             self._plant = self._open.enter_context(Fmu(path))
+            self.advance = self._plant.step
             self._begin(choices.first())
             for gait in choices.gaits:  # now, because finding them takes longer than a macro-step
                 scenario = choices.scenario_with(replace(self.settings, gait=gait))
@@ -227,7 +229,7 @@ class LiveRobot:
         self._signals.push[:3] = force
         self._signals.write(self._joints(command))
         try:
-            self._plant.step(self.time, scenario.macro_step)
+            self.advance(self.time, scenario.macro_step)
             self.count += 1
             self._signals.read()
         except HexapodError as error:
