@@ -13,14 +13,15 @@ from hexapod_cosim.cosim.cli import (
     examples_command,
     export_command,
     fmu_commands,
+    identify_command,
     listing,
     replay_command,
     run_commands,
-    study_command,
     terrain_command,
 )
 from hexapod_cosim.cosim.cli.failures import EPILOG
 from hexapod_cosim.cosim.cli.live import live_command, realtime_command
+from hexapod_cosim.cosim.cli.study import study_command
 from hexapod_cosim.cosim.common.plant_files import package_version
 
 app = typer.Typer(
@@ -44,6 +45,7 @@ app.command("terrain")(terrain_command.terrain)
 app.command("live")(live_command.live)
 app.command("realtime")(realtime_command.realtime)
 app.command("replay")(replay_command.replay)
+app.command("identify")(identify_command.identify)
 app.command("list")(listing.list_what)
 
 
