@@ -20,7 +20,7 @@ from hexapod_cosim.cosim.cli import (
     terrain_command,
 )
 from hexapod_cosim.cosim.cli.failures import EPILOG
-from hexapod_cosim.cosim.cli.live import live_command
+from hexapod_cosim.cosim.cli.live import live_command, realtime_command
 from hexapod_cosim.cosim.cli.study import study_command
 from hexapod_cosim.cosim.common.plant_files import package_version
 
@@ -43,6 +43,7 @@ app.command("examples")(examples_command.examples)
 app.command("validate")(fmu_commands.validate)
 app.command("terrain")(terrain_command.terrain)
 app.command("live")(live_command.live)
+app.command("realtime")(realtime_command.realtime)
 app.command("replay")(replay_command.replay)
 app.command("identify")(identify_command.identify)
 app.command("list")(listing.list_what)

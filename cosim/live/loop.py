@@ -13,12 +13,12 @@ from collections import deque
 from collections.abc import Callable
 from dataclasses import astuple
 from multiprocessing.connection import Connection
-from time import perf_counter, sleep
+from time import sleep
 from typing import Any, ClassVar, Protocol
 
 from hexapod_cosim.controller import BodyCommand, Gains
 from hexapod_cosim.cosim.live import state
-from hexapod_cosim.cosim.live.pacing import Pacer
+from hexapod_cosim.cosim.live.pacing import Pacer, wall_time
 from hexapod_cosim.cosim.live.protocol import Action, Change, Drive, Ping, Push
 from hexapod_cosim.cosim.live.robot import MOST_WEIGHTS, LiveRobot
 from hexapod_cosim.cosim.live.settings import Choices, Settings
@@ -58,7 +58,7 @@ class Loop:
         robot: LiveRobot,
         link: Link,
         *,
-        now: Callable[[], float] = perf_counter,
+        now: Callable[[], float] = wall_time,
         pause: Callable[[float], None] = sleep,
     ) -> None:
         self.robot, self._link, self._now, self._pause = robot, link, now, pause
@@ -177,9 +177,10 @@ class Loop:
         before = self.robot.wanted or self.robot.settings
         if self.robot.choices.changed(before, change) == before:
             return
-        self._end_take()
+        count = self.robot.count
         self.robot.change(change)
-        if change.key == "ground":
+        self._end_take()
+        if self.robot.count < count or change.key == "ground":
             self._note_placed()
 
     def _on_do(self, client: int, action: Action) -> None:

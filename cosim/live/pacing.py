@@ -8,12 +8,23 @@ not run through it in a burst.
 
 from __future__ import annotations
 
+import time
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
 
 MOST_LAG = 0.1  # s    behind wall time
 WINDOW = 1.0  # s    over which the real-time factor is taken
+# a clock that goes on while the computer sleeps: Linux has one of its own, macOS's does, and
+# Windows has no clock_gettime
+AWAKE_AND_ASLEEP = getattr(time, "CLOCK_BOOTTIME", getattr(time, "CLOCK_MONOTONIC", None))
+
+
+def wall_time() -> float:
+    """Returns a time [s] that never goes back and goes on while the computer sleeps."""
+    if AWAKE_AND_ASLEEP is None:
+        return time.perf_counter()
+    return time.clock_gettime(AWAKE_AND_ASLEEP)
 
 
 @dataclass

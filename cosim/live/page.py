@@ -42,7 +42,7 @@ def render_page(choices: Choices) -> str:
 
 def describe(choices: Choices) -> dict[str, Any]:
     """Returns what the page needs to know before the loop tells more."""
-    grounds = [{"name": name, "title": _ground_title(name)} for name in choices.grounds]
+    grounds = [{"name": name, "about": _about_ground(name)} for name in choices.grounds]
     return {
         "title": choices.scenario.title,
         "controls": [
@@ -56,10 +56,9 @@ def describe(choices: Choices) -> dict[str, Any]:
     }
 
 
-def _ground_title(name: str) -> str:
-    if name == OWN:
-        return "of the scenario"
-    return "flat" if name == FLAT else CATALOGUE[name].about.lower()
+def _about_ground(name: str) -> str:
+    own = {OWN: "of the scenario", FLAT: "a horizontal plane"}
+    return own[name] if name in own else CATALOGUE[name].about
 
 
 def _environment() -> Environment:

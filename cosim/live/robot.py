@@ -28,7 +28,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
-from hexapod_cosim.controller import BodyCommand, Gains, JointCommand
+from hexapod_cosim.controller import BodyCommand, ControllerError, Gains, JointCommand
 from hexapod_cosim.cosim.control.controllers import make_controller
 from hexapod_cosim.cosim.export.controller_export import export_controller
 from hexapod_cosim.cosim.interface.controller_interface import controller_parameters
@@ -75,6 +75,7 @@ class LiveRobot:
         fault: why a controller was replaced or the plant has stopped; "" without a fault.
         stopped: whether the plant has refused a step; only `place` helps.
         weight: of the robot [N].
+        advance: steps the plant from t [s] by h [s]; `realtime.py` puts a clock around it.
     """
 
     def __init__(self, choices: Choices, *, gains: Gains | None = None) -> None:
@@ -88,7 +89,10 @@ class LiveRobot:
         try:
             path = PlantFmus(self._folder).fmu(choices.scenario.robot)
             self._plant = self._open.enter_context(Fmu(path))
+            self.advance = self._plant.step
             self._begin(choices.first())
+            if self.fault:
+                raise ControllerError(self.fault)
             for gait in choices.gaits:  # now, because finding them takes longer than a macro-step
                 scenario = choices.scenario_with(replace(self.settings, gait=gait))
                 find_limits(self.plan.controller.robot, gait_of(scenario))
@@ -112,9 +116,15 @@ class LiveRobot:
     def place(self, settings: Settings | None = None) -> None:
         """Places the robot at its start, standing, under settings: given, wanted or present ones.
 
-        Raises HexapodError.
+        Raises HexapodError for settings under which it cannot start; it is then placed under
+        those that held before.
         """
-        self._begin(settings or self.wanted or self.settings)
+        before = self.settings
+        try:
+            self._begin(settings or self.wanted or self.settings)
+        except HexapodError:
+            self._begin(before)
+            raise
 
     def _begin(self, settings: Settings) -> None:
         """Starts plant and controller anew. Raises HexapodError."""
@@ -130,9 +140,9 @@ class LiveRobot:
         self.parameters = parameters
         self._signals = Signals(self._plant, sensor=make_sensor(scenario, self.plan.schedule))
         self._signals.read()
-        self._start_controller()
         self._last = JointCommand(angle_ref=self._signals.measurement.angle.copy())
         self._fading = 0
+        self._try_controller()
 
     def change(self, change: Change) -> None:
         """Begins a change of the settings. Raises HexapodError, and then leaves all as it was."""
@@ -142,7 +152,7 @@ class LiveRobot:
             return
         plan = self._plan_of(wanted)
         if change.key == "ground" or self.stopped:
-            self._begin(wanted)
+            self.place(wanted)
         elif change.key == "friction":
             self._change_friction(wanted, plan)
         else:
@@ -183,6 +193,13 @@ class LiveRobot:
         return {
             name: present[key if key in present else f"torso.{key}"] for name, key in own.items()
         }
+
+    def _try_controller(self) -> None:
+        """Starts the controller; one that cannot start is a fault, and the joints hold."""
+        try:
+            self._start_controller()
+        except Exception as error:  # of a user's controller
+            self.fault = _text_of(error)
 
     def _start_controller(self) -> None:
         """Makes the controller of the plan, which begins at the present time in the stance."""
@@ -227,7 +244,7 @@ class LiveRobot:
         self._signals.push[:3] = force
         self._signals.write(self._joints(command))
         try:
-            self._plant.step(self.time, scenario.macro_step)
+            self.advance(self.time, scenario.macro_step)
             self.count += 1
             self._signals.read()
         except HexapodError as error:
@@ -240,12 +257,7 @@ class LiveRobot:
         try:
             found = self._controller.step(self.time, command, self._signals.measurement)
         except Exception as error:  # a user's controller may raise anything
-            text = (
-                str(error)
-                if isinstance(error, HexapodError)
-                else f"{type(error).__name__}: {error}"
-            )
-            self.fault = text
+            self.fault = _text_of(error)
             self._last = self._holding()
             return self._last
         if self._fading > 0:
@@ -267,17 +279,12 @@ class LiveRobot:
         return held
 
     def _take_over(self) -> None:
-        """Lets the next controller begin, faded in from the last joint commands.
-
-        A controller that cannot begin is a fault: the joints hold.
-        """
+        """Lets the next controller begin, faded in from the last joint commands."""
         assert self.wanted is not None
         self._from, self._fading = self._holding(), self._steps_of(FADE)
         self.settings, self.wanted, self.plan, self.fault = self.wanted, None, self._next, ""
-        try:
-            self._start_controller()
-        except Exception as error:  # of a user's controller
-            self.fault, self._last = str(error), self._from
+        self._last = self._from
+        self._try_controller()
 
     @property
     def _h(self) -> float:
@@ -300,6 +307,11 @@ class LiveRobot:
         trace: TracebackType | None,
     ) -> None:
         self.close()
+
+
+def _text_of(error: Exception) -> str:
+    """Returns what happened, in a sentence."""
+    return str(error) if isinstance(error, HexapodError) else f"{type(error).__name__}: {error}"
 
 
 class _Stop:

@@ -15,6 +15,7 @@ from contextlib import asynccontextmanager, suppress
 from dataclasses import dataclass
 from importlib.util import find_spec
 from multiprocessing import get_context
+from multiprocessing.connection import Connection
 from types import MappingProxyType
 from typing import Any
 
@@ -194,18 +195,26 @@ class LiveServer:
         choices: the scenario and the changes that pages may make.
         gains: of the built-in controls.
         port: 0 for a free one.
+        process: what the loop's process runs.
 
     Raises LiveError without the extra `live` and for a port that is taken.
     """
 
-    def __init__(self, choices: Choices, gains: Gains | None, *, port: int = 0) -> None:
+    def __init__(
+        self,
+        choices: Choices,
+        gains: Gains | None,
+        *,
+        port: int = 0,
+        process: Callable[[Connection, Choices, Gains | None], None] = run_process,
+    ) -> None:
         require_extra()
         self._socket = _bound(port)
         self.address = Address(self._socket.getsockname()[1], secrets.token_urlsafe(TOKEN_BYTES))
         context = get_context("spawn")
         ours, theirs = context.Pipe()
         self._process = context.Process(
-            target=run_process, args=(theirs, choices, gains), name="hexapod-live", daemon=True
+            target=process, args=(theirs, choices, gains), name="hexapod-live", daemon=True
         )
         self._page = render_page(choices)
         self._link = LoopLink(ours, self._received)

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from hexapod_cosim.controller import BodyCommand
 from hexapod_cosim.cosim.interface.names import joint_names, vector_names
+from hexapod_cosim.cosim.live import robot as live_robot
 from hexapod_cosim.cosim.live.protocol import Change, Drive
 from hexapod_cosim.cosim.live.robot import LiveRobot
 from hexapod_cosim.cosim.live.settings import (
@@ -21,6 +22,8 @@ from hexapod_cosim.cosim.live.settings import (
     gait_of,
 )
 from hexapod_cosim.cosim.live.take import NO_FORCE, Take
+from hexapod_cosim.cosim.master.fmu import Fmu
+from hexapod_cosim.cosim.run.run import RunPlan
 from hexapod_cosim.cosim.run.walker import Walker
 from hexapod_cosim.cosim.scenario.reach import check_commands
 from hexapod_cosim.cosim.scenario.records import Command
@@ -242,6 +245,29 @@ def test_a_controller_that_raises_is_replaced_by_joints_that_hold(tmp_path: Path
         assert "no legs left" in robot.fault
 
 
+def test_a_controller_that_cannot_begin_is_refused_at_first_and_a_fault_later(
+    tmp_path: Path,
+) -> None:
+    law = tmp_path / "law.py"
+    law.write_text("class Never:\n    def __init__(self):\n        raise OSError('no disk')\n")
+    scenario = load_scenario("stand")
+    texts = control_texts(scenario, ("kinematic",)) | {"Never": f"{law}:Never"}
+    with pytest.raises(HexapodError, match="OSError: no disk"):
+        LiveRobot(Choices(load_scenario("stand", overrides=[f"control={law}:Never"]), texts, {}))
+    with LiveRobot(Choices(scenario, texts, {})) as robot:
+        robot.change(Change("control", "Never"))
+        go_on(robot)
+        for _ in range(2):
+            assert "OSError: no disk" in robot.fault
+            go(robot, 20)
+            assert place_of(robot)[2] > 0.1
+            robot.place()
+        robot.change(Change("control", "kinematic"))
+        go(robot, 400)
+        assert (robot.fault, robot.settings.control) == ("", "kinematic")
+        assert place_of(robot)[0] > 0.02
+
+
 @pytest.mark.parametrize("name", ["athena", "phantomx_mk4"])
 @pytest.mark.parametrize("gait", ["tripod", "wave"])
 def test_the_legs_reach_every_command_that_a_drive_can_ask_for(name: str, gait: str) -> None:
@@ -260,3 +286,23 @@ def test_the_legs_reach_every_command_that_a_drive_can_ask_for(name: str, gait: 
                     wanted = Command(**vars(command))
                     check_commands([wanted], own, gait_of(scenario), where="drive")
     assert min(vars(limits).values()) > 0.0
+
+
+def test_a_ground_on_which_the_robot_cannot_start_leaves_it_on_the_one_before(
+    placed: LiveRobot, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    start = live_robot.initialise_plant
+
+    def refuse_grids(plant: Fmu, plan: RunPlan) -> dict[str, float]:
+        if plan.robot.terrain.kind != "flat":
+            raise HexapodError("no place to stand")
+        return start(plant, plan)
+
+    monkeypatch.setattr(live_robot, "initialise_plant", refuse_grids)
+    go(placed, 50)
+    with pytest.raises(HexapodError, match="no place to stand"):
+        placed.change(Change("ground", "stairs"))
+    assert placed.settings.ground == "scenario"
+    go(placed, 300)
+    assert placed.fault == ""
+    assert place_of(placed)[0] > 0.02

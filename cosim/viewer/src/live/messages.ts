@@ -82,6 +82,6 @@ export interface Setup {
   }[];
   readonly refused: Readonly<Record<string, string>>;
   readonly gaits: readonly string[];
-  readonly grounds: readonly { readonly name: string; readonly title: string }[];
+  readonly grounds: readonly { readonly name: string; readonly about: string }[];
   readonly speed: number;
 }

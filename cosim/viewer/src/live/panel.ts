@@ -4,6 +4,7 @@ import type { Connection, State } from "./link";
 import type { Frame, Settings, Setup, Status } from "./messages";
 
 const SHOWN = 7000; // ms    that a note stays
+const SMOOTH = 0.06; // weight of a frame in the mean of the last ones
 const SLOW = 0.98; // real-time factor below which it is marked
 const STATES: Record<State, string> = {
   connecting: "connecting",
@@ -19,6 +20,8 @@ export class Panel {
   private status: Status | undefined;
   private noted = 0;
   private pages = 1;
+  private forward = 0; // m/s    mean of the last frames
+  private turn = 0; // rad/s
 
   constructor(
     private readonly setup: Setup,
@@ -79,8 +82,10 @@ export class Panel {
     const { latency } = this.link;
     text("latency", latency === undefined ? "–" : `${latency.toFixed(0)} ms`);
     text("seconds", `${frame.seconds.toFixed(1)} s`);
-    text("speed-now", `${(1e3 * frame.speed[0]).toFixed(0)} mm/s`);
-    text("turn-now", `${((180 / Math.PI) * frame.speed[2]).toFixed(0)} °/s`);
+    this.forward += SMOOTH * (frame.speed[0] - this.forward);
+    this.turn += SMOOTH * (frame.speed[2] - this.turn);
+    text("speed-now", `${whole(1e3 * this.forward)} mm/s`);
+    text("turn-now", `${whole((180 / Math.PI) * this.turn)} °/s`);
     const others = this.pages > 1;
     byId("driver")?.toggleAttribute("hidden", !others);
     if (others)
@@ -117,9 +122,11 @@ export class Panel {
       byId("controls")?.append(button);
     }
     const grounds = byId<HTMLSelectElement>("ground");
-    for (const { name, title: about } of this.setup.grounds) {
-      const option = element("option", "", about);
+    for (const { name, about } of this.setup.grounds) {
+      const shown = name === "scenario" ? about : name.replaceAll("_", " ");
+      const option = element("option", "", shown);
       option.value = name;
+      option.title = about;
       grounds?.append(option);
     }
     grounds?.addEventListener("change", () => this.change("ground", grounds.value));
@@ -218,6 +225,11 @@ export function note(sentence: string): void {
   host.append(shown);
   while (host.childElementCount > 3) host.firstElementChild?.remove();
   setTimeout(() => shown.remove(), SHOWN);
+}
+
+/** Returns a whole number without the sign of zero. */
+function whole(value: number): string {
+  return String(Math.round(value) + 0);
 }
 
 function text(id: string, content: string): void {

@@ -1,5 +1,4 @@
 import {
-  ArrowHelper,
   Color,
   DirectionalLight,
   Fog,
@@ -32,7 +31,7 @@ const SHARPEST = 2; // largest number of device pixels per pixel
 const LAMP = new Vector3(0.9, 1.3, 2.6); // m    from the robot
 const REACH = 1.0; // m    from the robot within which shadows are cast
 const SOFT = 0.15; // share of the way to the robot's height that the camera goes in a picture
-const RULER = 0.35; // m    of dragging for a push of one body weight
+const RULER = 0.42; // m    of dragging for a push of one body weight, as long as its arrow
 
 /** The robot on its ground, in one scene, seen by a camera that goes along. */
 export class View {
@@ -43,7 +42,7 @@ export class View {
   readonly controls: OrbitControls;
   private readonly lamp = new DirectionalLight("#ffffff", 2.1);
   private readonly sky = new HemisphereLight("#ffffff", "#8d9099", 1.6);
-  private readonly arrow = new ArrowHelper(new Vector3(1, 0, 0), new Vector3(), 0.1);
+  private readonly push = new ForceArrows(1);
   private readonly anchor = new Vector3();
   private world: World | undefined;
   private relief = new Relief({ height: 0, rise: 0, heading: 0 });
@@ -74,8 +73,8 @@ export class View {
     });
     this.home();
     this.light();
-    this.scene.add(this.arrow);
-    this.arrow.visible = false;
+    this.push.show([new Vector3()], [new Vector3()]);
+    this.scene.add(this.push);
     new ResizeObserver(() => this.resize()).observe(host);
     this.resize();
   }
@@ -114,7 +113,7 @@ export class View {
     if (this.floor instanceof Terrain) this.floor.paint(colours);
     else this.floor?.paint(colours.floor, colours.grid);
     this.forces?.paint(colours.force);
-    this.arrow.setColor(new Color(property("--accent")));
+    this.push.paint(new Color(property("--push")));
     this.sky.intensity = colours.dark ? 1.15 : 1.7;
     this.lamp.intensity = colours.dark ? 2.2 : 2.3;
   }
@@ -178,14 +177,7 @@ export class View {
   }
 
   private showPush(pose: Pose, frame: Frame, weight: number): void {
-    const push = new Vector3(...frame.push).divideScalar(weight);
-    const size = push.length();
-    this.arrow.visible = size > 0.005;
-    if (!this.arrow.visible) return;
-    const length = RULER * size;
-    this.arrow.position.copy(pose.position);
-    this.arrow.setDirection(push.divideScalar(size));
-    this.arrow.setLength(length, Math.min(0.06, 0.5 * length), 0.03);
+    this.push.show([pose.position], [new Vector3(...frame.push).divideScalar(weight)]);
   }
 
   /** Moves camera, lamp and floor with the robot; their height follows softly. */
