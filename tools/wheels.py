@@ -34,9 +34,11 @@ from hexapod_cosim.cosim.common.components import CONTROLLER, PLANT
 from hexapod_cosim.cosim.common.plant_files import LOOP, fmi_headers
 from hexapod_cosim.cosim.export.cross_build import TARGETS, Library, build_library
 from hexapod_cosim.cosim.export.platforms import component_library
+from hexapod_cosim.cosim.live.module import walker_module
 
 ROOT = Path(__file__).parents[1]
 BINARIES, LIBRARIES = "hexapod_cosim/plant/binaries/", "hexapod_cosim/plant/lib/"
+MODULE = "hexapod_cosim/plant/browser/walker.wasm"
 LARGEST = 5_000_000  # bytes of a wheel
 
 
@@ -67,6 +69,7 @@ def main(folder: Path) -> None:
         source, base = build_source(folder)
     with console.status("compiling for all platforms (minutes, the first time)"):
         binaries = cross_compile()
+    base[MODULE] = walker_module()
     wheels = [write_wheel(base, platform, binaries, folder) for platform in PLATFORMS]
     write_hashes(folder, [source, *wheels])
     for path in (source, *wheels):

@@ -194,9 +194,7 @@ def _compile(library: Library, command: Sequence[str], target: str, cache_folder
             ),
         ]
         sources = [
-            path
-            for path in library.sources
-            if path.endswith(".c") and path not in library.included
+            path for path in library.sources if path.endswith(".c") and path not in library.included
         ]
         _run([*command, *includes, *sources, "-o", f"../out/{out}"], root, target, cache_folder)
         return (root / "out" / out).read_bytes()

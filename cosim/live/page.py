@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import base64
+from collections.abc import Mapping
 from typing import Any
 
 from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined
@@ -19,23 +21,39 @@ TEMPLATE, BUNDLE = "live.html.jinja", "live.js"
 
 
 def render_page(choices: Choices) -> str:
-    """Returns the page. Raises HexapodError when the viewer was not built."""
-    script = viewer_script(BUNDLE)
+    """Returns the page of a loop. Raises HexapodError when the viewer was not built."""
+    return fill_page(choices, describe(choices), BUNDLE)
+
+
+def fill_page(
+    choices: Choices, setup: Mapping[str, Any], bundle: str, module: bytes | None = None
+) -> str:
+    """Returns the page with its viewer.
+
+    Args:
+        choices: the scenario and the controls, for titles and colours.
+        setup: what the viewer reads, as JSON.
+        bundle: the viewer's file.
+        module: the robot as WebAssembly, for a page that needs no loop elsewhere.
+
+    Raises HexapodError when the viewer was not built.
+    """
+    script = viewer_script(bundle)
     if script is None:
         raise HexapodError(
-            "the page needs the viewer, which is not installed", got=f"no {BUNDLE}",
+            "the page needs the viewer, which is not installed", got=f"no {bundle}",
             fix="install the package without HX_VIEWER=OFF",
         )  # fmt: skip
-    labels = list(choices.controls)
     return (
         _environment()
         .get_template(TEMPLATE)
         .render(
             title=choices.scenario.title,
             robot=choices.scenario.robot,
-            setup=Markup(as_json(describe(choices))),
-            styles=all_styles(labels),
+            setup=Markup(as_json(setup)),
+            styles=all_styles(list(choices.controls)),
             viewer=script,
+            module=None if module is None else base64.b64encode(module).decode("ascii"),
         )
     )
 

@@ -5,13 +5,14 @@ from __future__ import annotations
 import threading
 import webbrowser
 from dataclasses import replace
+from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from hexapod_cosim.controller import Gains, GainsError
 from hexapod_cosim.cosim.cli.running import ControlNames, GainsFile, Name, Settings, given_gains
-from hexapod_cosim.cosim.cli.terminal import show_text, waiting
+from hexapod_cosim.cosim.cli.terminal import show_files, show_text, waiting
 from hexapod_cosim.cosim.control.controllers import check_control
 from hexapod_cosim.cosim.scenario.controls import parse_controls
 from hexapod_cosim.cosim.scenario.records import CONTROLS, Scenario
@@ -24,6 +25,14 @@ Port = Annotated[
 Browser = Annotated[
     bool, typer.Option("--browser/--no-browser", help="Open the page in the browser.")
 ]
+Page = Annotated[
+    Path | None,
+    typer.Option(
+        "--page",
+        metavar="FILE",
+        help="Write a page instead in which the default robot walks without a server, and stop.",
+    ),
+]
 
 
 def live(
@@ -33,8 +42,15 @@ def live(
     gains: GainsFile = None,
     port: Port = 0,
     browser: Browser = True,
+    page: Page = None,
 ) -> None:
     """Drive the robot in a browser, in real time: keys, gamepad or touch. Ctrl-C ends it."""
+    if page is not None:
+        from hexapod_cosim.cosim.live.static_page import write_static_page  # noqa: PLC0415  slow
+
+        with waiting("building the page"):
+            show_files([write_static_page(page)])
+        return
     from hexapod_cosim.cosim.live.server import LiveServer, require_extra  # noqa: PLC0415  an extra
     from hexapod_cosim.cosim.live.settings import Choices, control_texts  # noqa: PLC0415
 

@@ -2,7 +2,7 @@ import type { Connection, Kind, Received, State } from "../live/link";
 import type { Frame, Limits, Settings, Setup, Status, World } from "../live/messages";
 import { type Walk, type Walker, WalkerError } from "./walker";
 
-const LONGEST = 0.1; // s    made up at once; a longer gap is skipped, as after the sleep of the page
+const LONGEST = 1; // s    made up at once; a longer gap, as of a hidden page, is skipped
 const SPAN = 1000; // ms    over which the real-time factor is measured
 const MOST_WEIGHTS = 3; // body weights    largest push
 
@@ -155,21 +155,21 @@ export class LocalLoop implements Connection {
     return now > then ? ((after - before) * this.walker.step * 1000) / (now - then) : 1;
   }
 
-  /** Returns forward, left [m/s], turn [rad/s]; they share the reach of the legs with the height. */
+  /** Returns forward, left [m/s], turn [rad/s], height [m], which share the reach of the legs. */
   private asked(): number[] {
     const { forward, left, turn, height, speed } = this.drive;
     const { limits } = this.setup.walks[this.settings.gait];
     const shares = [forward, left, turn].map((share) => share * speed);
     const sum = shares.reduce((total, share) => total + Math.abs(share), 0);
     const room = Math.min((1 - Math.abs(height)) / Math.max(sum, 1e-9), 1);
-    return [limits.vx, limits.vy, limits.yaw_rate].map((most, k) => most * room * shares[k]);
+    const velocity = [limits.vx, limits.vy, limits.yaw_rate];
+    const rise = height * (height > 0 ? limits.up : limits.down);
+    return [...velocity.map((most, k) => most * room * shares[k]), rise];
   }
 
   private command(): void {
-    const { limits } = this.setup.walks[this.settings.gait];
-    const { height } = this.drive;
-    const [forward, left, turn] = this.asked();
-    this.walker.command(forward, left, turn, height * (height > 0 ? limits.up : limits.down));
+    const [forward, left, turn, height] = this.asked();
+    this.walker.command(forward, left, turn, height);
   }
 
   private setPush(force: readonly number[]): void {

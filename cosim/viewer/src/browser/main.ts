@@ -10,8 +10,8 @@ async function run(): Promise<void> {
     const walker = await Walker.load(byId("module")!.textContent!.trim());
     start(setup, new LocalLoop(walker, setup));
   } catch (error) {
-    const text = `This browser cannot run the robot: ${error instanceof Error ? error.message : error}`;
-    byId("stage")?.append(element("p", "refusal", text));
+    const reason = error instanceof Error ? error.message : String(error);
+    byId("stage")?.append(element("p", "refusal", `This browser cannot run the robot: ${reason}`));
   }
 }
 

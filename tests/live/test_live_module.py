@@ -1,0 +1,123 @@
+"""The robot as WebAssembly: the plant has the bits of the native one, and the robot walks."""
+
+from __future__ import annotations
+
+import ctypes as ct
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from hexapod_cosim.cosim.live.module import walker_module
+from hexapod_cosim.cosim.run.run import simulate
+from hexapod_cosim.cosim.scenario.scenario import load_scenario
+
+wasmtime = pytest.importorskip("wasmtime")
+
+LEGS, JOINTS = ("LF", "LM", "LR", "RF", "RM", "RR"), ("coxa", "femur", "tibia")
+COMMANDS = ("angle_ref", "speed_ref", "torque_ref")  # the first 54 numbers of hxInput
+OUTPUT = 2000  # bytes of hxOutput that are compared: time to the feet's forces
+TRIPOD = (1.0, 0.75, 0.5, 0.03, 0.0)  # pattern, period, duty, step height, touch-down speed
+KINEMATIC, COMPLIANT = 1.0, 2.0
+
+
+class Module:
+    """An instance of the module, whose functions take and return numbers."""
+
+    def __init__(self) -> None:
+        engine = wasmtime.Engine()
+        self.store = wasmtime.Store(engine)
+        instance = wasmtime.Instance(self.store, wasmtime.Module(engine, walker_module()), [])
+        self.exports = instance.exports(self.store)
+        self.call("_initialize")
+
+    def call(self, name: str, *arguments: float) -> float:
+        found: float = self.exports[name](self.store, *arguments)
+        return found
+
+    def read(self, place: float, size: int) -> bytes:
+        return bytes(self.exports["memory"].read(self.store, int(place), int(place) + size))
+
+    def write(self, place: float, data: bytes) -> None:
+        self.exports["memory"].write(self.store, data, int(place))
+
+    def start(self, control: float, gait: tuple[float, ...] = TRIPOD) -> None:
+        self.write(self.call("hx_walker_wanted"), np.array([control, *gait]).tobytes())
+        assert self.call("hx_walker_start", 0.7) == 0
+
+    def position(self) -> NDArray[np.float64]:
+        """Returns the torso's centre of mass [m], which follows the time in hxFrame."""
+        return np.frombuffer(self.read(self.call("hx_walker_frame"), 32)[8:])
+
+
+@pytest.fixture(scope="module")
+def module() -> Module:
+    return Module()
+
+
+@pytest.fixture(scope="module")
+def commands(athena_fmu: Path) -> NDArray[np.float64]:
+    """Joint commands (300, 54) of a recorded walk of 1.5 s under compliant control."""
+    scenario = load_scenario("walk_flat", overrides=["duration=1.5", "control=compliant"])
+    recording = simulate(scenario, fmu=athena_fmu).recording
+    names = [f"{leg}.{joint}.{name}" for name in COMMANDS for leg in LEGS for joint in JOINTS]
+    return np.ascontiguousarray(recording.columns(names)[:-1])
+
+
+def test_the_plant_has_the_bits_of_the_native_one(
+    module: Module, core: ct.CDLL, commands: NDArray[np.float64]
+) -> None:
+    core.hx_plant_create.restype = ct.c_void_p
+    core.hx_plant_reset.argtypes = [ct.c_void_p, ct.c_void_p, ct.c_double]
+    core.hx_plant_step.argtypes = [ct.c_void_p, ct.c_void_p, ct.c_double]
+    core.hx_plant_output.argtypes = [ct.c_void_p, ct.c_void_p, ct.c_void_p]
+    core.hx_plant_destroy.argtypes = [ct.c_void_p]
+    definition, given, seen = (ct.create_string_buffer(size) for size in (20000, 4000, 20000))
+    core.hx_definition_default(definition)
+    core.hx_input_default(given)
+    plant = core.hx_plant_create()
+    assert core.hx_plant_reset(plant, definition, 0.0) == 0
+    module.start(KINEMATIC)
+    different = 0
+    assert commands.shape == (300, 54)
+    for step, row in enumerate(commands, start=1):
+        ct.memmove(given, row.tobytes(), row.nbytes)
+        module.write(module.call("hx_walker_input"), row.tobytes())
+        assert core.hx_plant_step(plant, given, 0.005 * step) == 0
+        core.hx_plant_output(plant, given, seen)
+        place = module.call("hx_walker_replay", 0.005 * step)
+        different += module.read(place, OUTPUT) != seen.raw[:OUTPUT]
+    core.hx_plant_destroy(plant)
+    assert different == 0
+    assert np.linalg.norm(module.position()[:2]) > 0.05
+
+
+@pytest.mark.parametrize("control", [KINEMATIC, COMPLIANT])
+def test_the_robot_walks_as_fast_as_it_is_told(module: Module, control: float) -> None:
+    module.start(control)
+    module.call("hx_walker_command", 0.08, 0.0, 0.0, 0.0)
+    assert module.call("hx_walker_advance", 1000) == 0
+    assert module.position()[0] == pytest.approx(0.37, abs=0.03)  # it begins after half a cycle
+
+
+def test_control_and_gait_change_when_the_robot_stands_still(module: Module) -> None:
+    module.start(KINEMATIC)
+    module.call("hx_walker_command", 0.08, 0.0, 0.0, 0.0)
+    module.call("hx_walker_advance", 400)
+    walked = module.position()[0]
+    wanted = np.array([COMPLIANT, 4.0, 0.75 * 0.5 / (1 / 3), 2 / 3, 0.03, 0.0])
+    module.write(module.call("hx_walker_wanted"), wanted.tobytes())
+    module.call("hx_walker_change")
+    module.call("hx_walker_advance", 300)
+    stood = module.position()[0]
+    module.call("hx_walker_advance", 800)
+    assert stood - walked < 0.06
+    assert module.position()[0] - stood > 0.15
+
+
+def test_a_start_that_is_no_walk_says_why(module: Module) -> None:
+    module.write(module.call("hx_walker_wanted"), np.array([KINEMATIC, 1, 0.75, 7.0, 0.03, 0]))
+    assert module.call("hx_walker_start", 0.7) != 0
+    text = module.read(module.call("hx_walker_message"), 200).partition(b"\0")[0].decode()
+    assert "duty" in text

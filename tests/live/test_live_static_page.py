@@ -1,0 +1,59 @@
+"""The page with the robot inside, opened from the disk: it walks without a server."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from browser import FLAGS, PATIENCE, launcher
+from hexapod_cosim.cosim.live.static_page import write_static_page
+
+FRAME = "window.hexapod.poses.newest"
+
+
+@pytest.fixture(scope="module")
+def written(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return write_static_page(tmp_path_factory.mktemp("page") / "walk.html")
+
+
+@pytest.fixture(scope="module")
+def page(written: Path) -> Iterator[Any]:
+    with launcher() as launch:
+        found = launch(*FLAGS).new_context(offline=True).new_page()
+        found.set_default_timeout(PATIENCE)
+        found.problems = []
+        found.on("pageerror", lambda error: found.problems.append(str(error)))
+        found.on("request", lambda request: found.problems.append(request.url))
+        found.goto(written.as_uri())
+        found.wait_for_function(f"window.hexapod && {FRAME}")
+        yield found
+
+
+def test_the_page_is_one_file_of_at_most_2_mb(written: Path) -> None:
+    assert written.stat().st_size < 2e6
+
+
+def test_the_robot_walks_and_turns_by_keys_without_a_network(page: Any) -> None:
+    page.keyboard.down("w")
+    page.wait_for_function(f"{FRAME}.position[0] > 0.03")
+    page.keyboard.down("a")
+    page.wait_for_function(f"{FRAME}.quaternion[3] > 0.03")
+    page.keyboard.up("a")
+    page.keyboard.up("w")
+    assert [text for text in page.problems if not text.startswith("file:")] == []
+
+
+def test_control_friction_and_place_answer(page: Any) -> None:
+    page.click("#controls [data-value=paper]")
+    page.wait_for_selector("#controls [data-value=paper][aria-pressed=true]")
+    page.fill("#friction", "0.3")
+    page.dispatch_event("#friction", "change")
+    page.wait_for_function("document.getElementById('friction-value').textContent === '0.30'")
+    placed = page.evaluate(f"{FRAME}.placed")
+    page.click("[data-do=place]")
+    page.wait_for_function(f"{FRAME}.placed > {placed}")
+    assert page.evaluate(f"Math.abs({FRAME}.position[0])") < 0.05
+    assert page.is_hidden("[data-do=record]")
