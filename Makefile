@@ -22,7 +22,7 @@ SANITIZED_SHORT := $(patsubst %,tests/fmi/test_%.py,fmi fmi3 fmi3_order fmi_stat
 	$(patsubst %,tests/plant/test_plant_%.py,events coordinates misuse)
 SANITIZED := $(SANITIZED_SHORT) tests/fmi/test_fmi_importers.py tests/fmi/test_endurance.py
 
-.PHONY: help setup demo test test-browser test-importers test-platforms test-endurance test-native test-native-sanitize test-sanitize test-sanitize-short test-robots test-wheels wheels fuzz fuzz-short mutants lint-c check bench bench-quick bench-batch bench-opening control study-demo format generate fmu typing clean docs
+.PHONY: help setup demo test test-browser test-importers test-platforms test-endurance test-native test-native-sanitize test-sanitize test-sanitize-short test-robots test-wheels wheels fuzz fuzz-short mutants lint-c check bench bench-quick bench-batch bench-gym bench-opening control study-demo format generate fmu typing clean docs
 
 help:
 	@echo "make setup     the hexapod command in $(BIN)"
@@ -45,6 +45,7 @@ help:
 	@echo "make lint-c    warnings of gcc and clang alone"
 	@echo "make bench     speed and accuracy against the engines people would pick instead (15 min); bench-quick: 1.5 min"
 	@echo "make bench-batch  walks a minute on one core and on all, cost of a run beside its loop, memory (5 min)"
+	@echo "make bench-gym  environment steps a second of the learning environments and of mujoco.rollout (1 min)"
 	@echo "make study-demo  500 walks, killed twice and completed; the same uninterrupted and on a Dask cluster: the same bytes (5 min)"
 	@echo "make control   what each part of the compliant control is worth, where, and what it survives: docs/control.md (5 min)"
 	@echo "make docs      the documentation's site: build/docs/index.html (1 min)"
@@ -160,6 +161,9 @@ bench-opening: setup
 
 bench-batch: setup
 	$(BIN)/python -m benchmarks.batch
+
+bench-gym: setup
+	$(BIN)/python -m benchmarks.learning
 
 bench-quick: setup
 	$(BIN)/python -m benchmarks.run --quick

@@ -123,7 +123,7 @@ class EnvSettings:
     # plant parameters drawn for each episode, as factors of a study: name -> (lowest, highest)
     randomise: Mapping[str, Range] = field(default_factory=dict)
     solver: str = "ros2"
-    tolerance: float = 0.01
+    tolerance: float = 0.005  # 0.6 mm of path error in 10 s of a tripod gait
     step_max: float = 0.02  # s
 
     def __post_init__(self) -> None:
