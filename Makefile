@@ -14,15 +14,15 @@ SANITIZER = rm -f $(REPORT).*; HEXAPOD_PRESET=sanitize ASAN_OPTIONS=detect_leaks
 	LD_PRELOAD=$$($(CC) -print-file-name=libasan.so)
 SANITIZED_END = || { cat $(REPORT).* 2>/dev/null; exit 1; }
 TYPING := build/typing/hexapod_cosim
-SOURCES := pyproject.toml CMakeLists.txt $(shell find fmi plant_fmu controller_fmu master -type f) $(wildcard cosim/viewer/*.* cosim/viewer/src/*.ts cosim/viewer/src/*/*.ts)
-C_FILES = $(wildcard plant_fmu/src/*.[ch] plant_fmu/src/kernels/*.c plant_fmu/src/lanes/*.h plant_fmu/src/ground/*.[ch] fmi/*.[ch] plant_fmu/*.c plant_fmu/include/hexapod/*.h controller_fmu/src/*.[ch] controller_fmu/src/*/*.[ch] controller_fmu/*.c controller_fmu/include/hexapod/*.h master/src/*.[ch] master/include/hexapod/*.h tests/native/*.[ch] tests/fuzz/*.[ch] benchmarks/native/*.[ch] benchmarks/native/*.cpp examples/*.c examples/c_library/*.c)
+SOURCES := pyproject.toml CMakeLists.txt $(shell find fmi plant_fmu controller_fmu policy_fmu master -type f) $(wildcard cosim/viewer/*.* cosim/viewer/src/*.ts cosim/viewer/src/*/*.ts)
+C_FILES = $(wildcard plant_fmu/src/*.[ch] plant_fmu/src/kernels/*.c plant_fmu/src/lanes/*.h plant_fmu/src/ground/*.[ch] fmi/*.[ch] plant_fmu/*.c plant_fmu/include/hexapod/*.h controller_fmu/src/*.[ch] controller_fmu/src/*/*.[ch] controller_fmu/*.c controller_fmu/include/hexapod/*.h policy_fmu/src/*.[ch] policy_fmu/*.c policy_fmu/include/hexapod/*.h master/src/*.[ch] master/include/hexapod/*.h tests/native/*.[ch] tests/fuzz/*.[ch] benchmarks/native/*.[ch] benchmarks/native/*.cpp examples/*.c examples/c_library/*.c)
 EMPTY :=
 TEST_ROOMS := $(subst $(EMPTY) $(EMPTY),:,$(filter-out tests/native tests/conftest.py,$(wildcard tests/[a-z]*[a-z])))
 SANITIZED_SHORT := $(patsubst %,tests/fmi/test_%.py,fmi fmi3 fmi3_order fmi_state fmi_values fmi_exchange) \
 	$(patsubst %,tests/plant/test_plant_%.py,events coordinates misuse)
 SANITIZED := $(SANITIZED_SHORT) tests/fmi/test_fmi_importers.py tests/fmi/test_endurance.py
 
-.PHONY: help setup demo test test-browser test-importers test-platforms test-endurance test-native test-native-sanitize test-sanitize test-sanitize-short test-robots test-wheels wheels fuzz fuzz-short mutants lint-c check bench bench-quick bench-batch bench-opening control study-demo format generate fmu typing clean docs
+.PHONY: help setup demo test test-browser test-importers test-platforms test-endurance test-native test-native-sanitize test-sanitize test-sanitize-short test-robots test-wheels wheels fuzz fuzz-short mutants lint-c check bench bench-quick bench-batch bench-gym bench-opening control study-demo format generate fmu typing clean docs
 
 help:
 	@echo "make setup     the hexapod command in $(BIN)"
@@ -45,6 +45,7 @@ help:
 	@echo "make lint-c    warnings of gcc and clang alone"
 	@echo "make bench     speed and accuracy against the engines people would pick instead (15 min); bench-quick: 1.5 min"
 	@echo "make bench-batch  walks a minute on one core and on all, cost of a run beside its loop, memory (5 min)"
+	@echo "make bench-gym  environment steps a second of the learning environments and of mujoco.rollout (1 min)"
 	@echo "make study-demo  500 walks, killed twice and completed; the same uninterrupted and on a Dask cluster: the same bytes (5 min)"
 	@echo "make control   what each part of the compliant control is worth, where, and what it survives: docs/control.md (5 min)"
 	@echo "make docs      the documentation's site: build/docs/index.html (1 min)"
@@ -160,6 +161,9 @@ bench-opening: setup
 
 bench-batch: setup
 	$(BIN)/python -m benchmarks.batch
+
+bench-gym: setup
+	$(BIN)/python -m benchmarks.learning
 
 bench-quick: setup
 	$(BIN)/python -m benchmarks.run --quick

@@ -1,4 +1,4 @@
-"""Writes plant_fmu/generated/ and controller_fmu/generated/ from their interface.toml,
+"""Writes generated/ of plant_fmu, controller_fmu and policy_fmu from their interface.toml,
 models/athena.toml and pyproject.toml's version.
 
 usage: python tools/generate.py [--check]
@@ -26,6 +26,7 @@ from hexapod_cosim.cosim.interface.controller_interface import (
 from hexapod_cosim.cosim.interface.interface import CAUSALITIES, Interface, Variable, load_interface
 from hexapod_cosim.cosim.interface.model_description import render_fmi2
 from hexapod_cosim.cosim.interface.terminals import render_terminals
+from hexapod_cosim.gym.export import load_policy_interface, standing_policy
 from hexapod_cosim.models.robot import load_robot
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -37,7 +38,7 @@ TYPES = {"Real": "HX_REAL", "Enumeration": "HX_INTEGER", "Boolean": "HX_BOOLEAN"
 def main() -> int:
     """Writes or checks the files; returns the exit code."""
     parser = argparse.ArgumentParser(
-        description="Generates plant_fmu/generated/ and controller_fmu/generated/."
+        description="Generates generated/ of plant_fmu, controller_fmu and policy_fmu."
     )
     parser.add_argument(
         "--check", action="store_true", help="write nothing; exit with 1 if a file is stale"
@@ -65,9 +66,14 @@ def render_all() -> dict[Path, str]:
     """Returns path and text of every generated file."""
     robot = load_robot(DEFAULT_ROBOT)
     setup = ControllerSetup(robot=robot, gait=make_gait(robot), period=DEFAULT_PERIOD)
-    return render_component(load_interface(robot)) | render_component(
-        load_controller_interface(setup)
+    interfaces = (
+        load_interface(robot),
+        load_controller_interface(setup),
+        load_policy_interface(standing_policy(DEFAULT_ROBOT), robot),
     )
+    return {
+        path: text for interface in interfaces for path, text in render_component(interface).items()
+    }
 
 
 def render_component(interface: Interface) -> dict[Path, str]:

@@ -19,7 +19,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[1]
 PICTURE = ROOT / "docs" / "images" / "rooms.svg"
 PACKAGE = "hexapod_cosim"
-C_ROOMS = ("fmi", "plant_fmu", "controller_fmu", "master")
+C_ROOMS = ("fmi", "plant_fmu", "controller_fmu", "policy_fmu", "master")
 SHARED = (
     "range_check.h",
     "message.h",

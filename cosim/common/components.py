@@ -1,6 +1,6 @@
-"""The components that FMUs exist for: the plant and its controller.
+"""The components that FMUs exist for: the plant, its controller and learned policies.
 
-Both use the FMI layer in fmi/ and describe their variables in an interface.toml.
+All use the FMI layer in fmi/ and describe their variables in an interface.toml.
 """
 
 from __future__ import annotations
@@ -49,5 +49,19 @@ CONTROLLER = Component(
     description=(
         "Walking controller of a hexapod robot: commands of its {joints} joints from a body "
         "velocity and from foot forces"
+    ),
+)
+POLICY = Component(
+    name="policy",
+    identifier="hexapod_policy",
+    tree="policy_fmu",
+    installed="plant/policy",
+    header="hexapod/policy.h",
+    prefix="policy_",
+    structure="Policy",
+    suffix="_policy",
+    description=(
+        "Learned policy of a hexapod robot: angles of its {joints} joints from a body velocity and "
+        "from measurements by a multilayer perceptron"
     ),
 )

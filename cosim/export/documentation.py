@@ -12,7 +12,6 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from hexapod_cosim.cosim.interface.arrays import arrays
 from hexapod_cosim.cosim.interface.interface import CAUSALITIES, Interface, Pattern, Variable
-from hexapod_cosim.models.records import JOINT_NAMES, LEG_NAMES
 
 INTERFACES = {"CoSimulation": "co-simulation", "ModelExchange": "model exchange"}
 SERIALIZED = (
@@ -57,7 +56,6 @@ NAMES = {
         "first element of angle_ref."
     ),
 }
-AXES = {"leg": LEG_NAMES, "joint": JOINT_NAMES}
 
 Row = dict[str, str]
 
@@ -160,10 +158,11 @@ def _row(name: str, meaning: str, variables: Sequence[Variable], interface: Inte
 
 def _matching(pattern: Pattern, variables: Iterable[Variable]) -> list[Variable]:
     """Returns the variables that a pattern stands for."""
+    labels = dict(pattern.axes)
     expression = re.escape(pattern.name).replace(r"\[i\]", r"\[\d+\]")
     expression = re.sub(
         r"\\\{(\w+)\\\}",
-        lambda match: f"(?:{'|'.join(AXES.get(match[1], (r'[xyz]{2}',)))})",
+        lambda match: f"(?:{'|'.join(map(re.escape, labels[match[1]]))})",
         expression,
     )
     return [variable for variable in variables if re.fullmatch(expression, variable.name)]

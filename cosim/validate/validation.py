@@ -14,7 +14,7 @@ from fmpy.validation import validate_fmu
 
 from hexapod_cosim.cosim.common.archives import unpack, unsafe_members
 from hexapod_cosim.cosim.common.binaries import incomplete
-from hexapod_cosim.cosim.common.components import CONTROLLER
+from hexapod_cosim.cosim.common.components import CONTROLLER, POLICY
 from hexapod_cosim.cosim.common.plant_files import fmi2_platform, packed_binary
 from hexapod_cosim.cosim.interface.descriptions import (
     forbidden_markup,
@@ -117,7 +117,8 @@ def _run_problems(path: Path) -> list[str]:
     try:
         with Fmu(path, name="validate") as plant:
             plant.initialise(0.0, 1.0)
-            if plant.description.coSimulation.modelIdentifier == CONTROLLER.identifier:
+            identifier = plant.description.coSimulation.modelIdentifier
+            if identifier in (CONTROLLER.identifier, POLICY.identifier):
                 plant.block(plant.names("output")).get()
             else:
                 Signals(plant).read()

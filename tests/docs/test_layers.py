@@ -1,5 +1,5 @@
-"""The arrows between the folders: models <- controller <- cosim; src of plant_fmu and
-controller_fmu sees no FMI, fmi nothing of src.
+"""The arrows between the folders: models <- controller <- cosim; src of the components
+sees no FMI, fmi nothing of src.
 """
 
 from __future__ import annotations
@@ -46,6 +46,7 @@ ROOMS = {
     "study.execute": [*RUNNING, "run", "study.plan", "study.store"],
     "study.report": [*LOW, "results", "study.plan", "study.store"],
 }
+COMPONENTS = ("plant_fmu", "controller_fmu", "policy_fmu")  # the folders of FMUs in C
 MOST_FILES = 20  # in a folder that people write
 # third-party packages by folder; cosim may use what pyproject lists
 MAY_USE = {
@@ -131,7 +132,7 @@ def test_each_room_says_what_it_is_for_and_what_it_may_import() -> None:
 
 def test_no_folder_holds_more_files_than_a_reader_can_survey() -> None:
     python = ("models", "controller", "cosim", "gym", "tests", "benchmarks", "tools", "examples")
-    names = (*python, "fmi", "plant_fmu", "controller_fmu", "master")
+    names = (*python, "fmi", *COMPONENTS, "master")
     kinds = {".py", ".c", ".h", ".ts"}
     counts: dict[Path, int] = {}
     for path in (path for name in names for path in (ROOT / name).rglob("*.*")):
@@ -189,13 +190,14 @@ def c_files(*folders: str, component: str = "plant_fmu") -> list[Path]:
     return sorted(set(found))
 
 
-@pytest.mark.parametrize("component", ["plant_fmu", "controller_fmu"])
+@pytest.mark.parametrize("component", COMPONENTS)
 def test_a_core_includes_itself_its_header_and_the_c_library(component: str) -> None:
     folders = ("src", "include/hexapod")
     own = {path.name for path in c_files("src", component=component)}
     public = {
         "plant_fmu": {path.name for path in c_files("include/hexapod")},
         "controller_fmu": {"controller.h", *SHARED_HEADERS},
+        "policy_fmu": {"policy.h", *SHARED_HEADERS},
     }
     own |= {f"hexapod/{name}" for name in public[component]}
     files = c_files(*folders, component=component)
@@ -209,7 +211,7 @@ def test_a_core_includes_itself_its_header_and_the_c_library(component: str) -> 
         assert not foreign, f"{path.relative_to(ROOT)} includes {sorted(foreign)}"
 
 
-@pytest.mark.parametrize("component", ["plant_fmu", "controller_fmu"])
+@pytest.mark.parametrize("component", COMPONENTS)
 def test_the_fmi_layer_includes_no_core(component: str) -> None:
     core = {path.name for path in c_files("src", component=component)}
     files = [*c_files("fmi", component="."), *c_files("generated", component=component)]
@@ -244,7 +246,7 @@ def test_the_masters_loop_sees_the_standard_and_nothing_of_the_fmus_it_drives() 
         assert not foreign, f"{path.relative_to(ROOT)} includes {sorted(foreign)}"
 
 
-@pytest.mark.parametrize("component", ["plant_fmu", "controller_fmu"])
+@pytest.mark.parametrize("component", COMPONENTS)
 def test_only_the_fmi_layer_names_the_standard(component: str) -> None:
     for path in c_files("src", "include/hexapod", component=component):
         assert not re.search(r"\bfmi[23][A-Z]", path.read_text(encoding="utf-8")), (
@@ -260,7 +262,7 @@ DEFINED = re.compile(r"^\}\s*(hx[A-Z]\w*);|^\w[\w ]*?[ *]+(hx_\w+)\([^;{]*\)\s*\
 
 def test_no_two_types_or_functions_of_c_share_a_name() -> None:
     places: dict[str, set[str]] = {}  # within a file alternatives stand behind #if
-    for component in ("plant_fmu", "controller_fmu", "master", "fmi"):
+    for component in (*COMPONENTS, "master", "fmi"):
         folders = ("", "src", "include/hexapod")
         for path in c_files(*folders, component=component):
             text = re.sub(r"/\*.*?\*/", "", path.read_text(encoding="utf-8"), flags=re.DOTALL)

@@ -180,7 +180,7 @@ def test_a_file_that_is_not_up_to_date_is_found(
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text(text, encoding="utf-8")
     assert generator.stale_files() == {}
-    for component in ("plant_fmu", "controller_fmu"):
+    for component in ("plant_fmu", "controller_fmu", "policy_fmu"):
         changed = tmp_path / component / "generated" / "defaults.c"
         kept = changed.read_text(encoding="utf-8")
         changed.write_text("/* by hand */", encoding="utf-8")

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import re
+
 import gymnasium
 import numpy as np
 import pytest
+from building import ROOT
 from gymnasium.utils.env_checker import check_env
 from gymnasium.vector import AutoresetMode
 
@@ -85,3 +88,10 @@ def test_wrong_settings_are_refused_by_name() -> None:
         HexapodEnv(command_vx=(0.2, 0.1))
     with pytest.raises(HexapodError, match=r"friction\.nu"):
         HexapodEnv(randomise={"friction.nu": (0.4, 0.5)})
+
+
+def test_the_example_of_the_page_works_as_typed(capsys: pytest.CaptureFixture[str]) -> None:
+    page = (ROOT / "docs" / "learning.md").read_text(encoding="utf-8")
+    (example,) = re.findall(r"```python\n(.*?)```", page, flags=re.DOTALL)
+    exec(example, {})
+    assert "'progress'" in capsys.readouterr().out

@@ -45,6 +45,7 @@ def test_installed_libraries_need_no_glibc_after_2_14(plant_build: Path) -> None
         "hexapod.so",
         "hexapod_controller.so",
         "hexapod_master.so",
+        "hexapod_policy.so",
         "libhexapod_c.so",
         "libhexapod_controller_c.so",
     }

@@ -1,0 +1,177 @@
+/* policy.c - the public functions of a policy: ticks at their times, saved states, refusals. */
+#include "hexapod/policy.h"
+
+#include <float.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "hexapod/message.h"
+#include "hexapod/range_check.h"
+#include "perceptron.h"
+
+/* Consists of doubles and one integer of 64 bits, without padding. */
+typedef struct hxPolicyState {
+  double start;          /* s  time of the first tick */
+  double time;           /* s */
+  int64_t tick;          /* 1  number of the next tick */
+  hxPolicyOutput output; /*    of the last tick */
+} hxPolicyState;
+
+struct hxPolicy {
+  hxPolicyDefinition definition;
+  hxPolicyState state;
+  char message[HX_MESSAGE_SIZE];
+};
+
+/* A saved state: a header that identifies it, then definition and state. */
+typedef struct {
+  uint64_t magic, version, size, checksum;
+  hxPolicyDefinition definition;
+  hxPolicyState state;
+} hxSavedPolicy;
+
+static const uint64_t magic = 0x6c6f705078786568u; /* "hexxPpol" */
+static const uint64_t saved_version = 1;
+/* 1, of a period: a tick that is later than the present time by less than this is due */
+static const double clock_tolerance = 0.01;
+
+static hxStatus refuse_policy(hxPolicy *policy, hxStatus status, const char *text) {
+  hx_print(policy->message, HX_MESSAGE_SIZE, "%s", text);
+  return status;
+}
+
+const char *hx_policy_message(const hxPolicy *policy) { return policy->message; }
+double hx_policy_time(const hxPolicy *policy) { return policy->state.time; }
+
+hxPolicy *hx_policy_create(void) {
+  hxPolicy *policy = calloc(1, sizeof *policy);
+  hxPolicyDefinition definition;
+  if (!policy) return NULL;
+  hx_policy_definition_default(&definition);
+  hx_policy_reset(policy, &definition, 0.0);
+  return policy;
+}
+
+void hx_policy_destroy(hxPolicy *policy) { free(policy); }
+
+/* ----------------------------------------------------------------------------------------------
+ * checks */
+
+hxStatus hx_policy_definition_check(const hxPolicyDefinition *definition, char *message) {
+  hxChecker checker = {HX_OK, message};
+  const hxRange *range;
+  const size_t n = hx_policy_definition_ranges(&range);
+  hx_check_ranges(&checker, definition, range, n);
+  return checker.status;
+}
+
+static hxStatus check_input(const hxPolicyInput *input, char *message) {
+  hxChecker checker = {HX_OK, message};
+  const hxRange *range;
+  const size_t n = hx_policy_input_ranges(&range);
+  hx_check_ranges(&checker, input, range, n);
+  return checker.status == HX_OK ? HX_OK : HX_INVALID_ARGUMENT;
+}
+
+/* ----------------------------------------------------------------------------------------------
+ * ticks */
+
+hxStatus hx_policy_reset(hxPolicy *policy, const hxPolicyDefinition *definition, double t) {
+  char message[HX_MESSAGE_SIZE];
+  if (!isfinite(t))
+    return refuse_policy(policy, HX_INVALID_ARGUMENT,
+                         "start time: got a number that is not finite, expected a finite time in "
+                         "s");
+  const hxStatus status = hx_policy_definition_check(definition, message);
+  if (status != HX_OK) return refuse_policy(policy, status, message);
+  memset(&policy->state, 0, sizeof policy->state);
+  policy->definition = *definition;
+  policy->state.start = policy->state.time = t;
+  memcpy(policy->state.output.angle_ref, definition->stance, sizeof definition->stance);
+  policy->message[0] = '\0';
+  return HX_OK;
+}
+
+/* Returns the time of the next tick since the first one. */
+static double next_tick(const hxPolicy *policy) {
+  return (double)policy->state.tick * policy->definition.period;
+}
+
+void hx_policy_output(const hxPolicy *policy, const hxPolicyInput *input, hxPolicyOutput *output) {
+  const hxPolicyState *state = &policy->state;
+  const double tick = next_tick(policy), tolerance = clock_tolerance * policy->definition.period;
+  if (state->start + tick - state->time > tolerance)
+    *output = state->output;
+  else
+    hx_policy_act(&policy->definition, input, tick, output);
+}
+
+/* Computes the input some time after it was set, with its rate of change. */
+static void ramp_input(const hxPolicyInput *input, const hxPolicyInput *rate, double time,
+                       hxPolicyInput *now) {
+  double value[sizeof *now / sizeof(double)], slope[sizeof *now / sizeof(double)];
+  memcpy(value, input, sizeof value);
+  memcpy(slope, rate, sizeof slope);
+  for (size_t i = 0; i < sizeof value / sizeof value[0]; ++i) value[i] += slope[i] * time;
+  memcpy(now, value, sizeof value);
+}
+
+hxStatus hx_policy_step(hxPolicy *policy, const hxPolicyInput *input, const hxPolicyInput *rate,
+                        double t_end) {
+  hxPolicyState *state = &policy->state;
+  const double begin = state->time, tolerance = clock_tolerance * policy->definition.period;
+  hxPolicyInput now = *input;
+  if (!(t_end >= begin && t_end <= DBL_MAX)) {
+    hx_print(policy->message, HX_MESSAGE_SIZE,
+             "end of step: got %.17g s, expected a finite time of at least %.17g s", t_end, begin);
+    return HX_INVALID_ARGUMENT;
+  }
+  const hxStatus status = check_input(input, policy->message);
+  if (status != HX_OK) return status;
+  while (t_end - (state->start + next_tick(policy)) > tolerance) {
+    const double tick = next_tick(policy);
+    if (rate) ramp_input(input, rate, fmax(state->start + tick - begin, 0.0), &now);
+    hx_policy_act(&policy->definition, &now, tick, &state->output);
+    ++state->tick;
+  }
+  state->time = t_end;
+  return HX_OK;
+}
+
+/* ----------------------------------------------------------------------------------------------
+ * saved states */
+
+static uint64_t checksum(const hxSavedPolicy *saved) {
+  return hx_checksum(0, &saved->definition, sizeof *saved - offsetof(hxSavedPolicy, definition));
+}
+
+size_t hx_policy_state_size(void) { return sizeof(hxSavedPolicy); }
+
+void hx_policy_get_state(const hxPolicy *policy, void *bytes) {
+  hxSavedPolicy saved = {magic, saved_version, sizeof saved, 0, policy->definition, policy->state};
+  saved.checksum = checksum(&saved);
+  memcpy(bytes, &saved, sizeof saved);
+}
+
+hxStatus hx_policy_set_state(hxPolicy *policy, const void *bytes, size_t size) {
+  hxSavedPolicy saved;
+  if (size != sizeof saved) {
+    hx_print(policy->message, HX_MESSAGE_SIZE,
+             "saved state: got %zu bytes, expected %zu; save it again with this version", size,
+             sizeof saved);
+    return HX_BAD_STATE;
+  }
+  memcpy(&saved, bytes, sizeof saved);
+  if (saved.magic != magic || saved.version != saved_version || saved.size != sizeof saved)
+    return refuse_policy(policy, HX_BAD_STATE,
+                         "saved state: got one of another version, expected one of this version; "
+                         "save it again");
+  if (saved.checksum != checksum(&saved))
+    return refuse_policy(policy, HX_BAD_STATE,
+                         "saved state: got a damaged one, expected one whose checksum is right; "
+                         "save it again");
+  policy->definition = saved.definition;
+  policy->state = saved.state;
+  return HX_OK;
+}

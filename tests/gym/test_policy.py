@@ -1,0 +1,152 @@
+"""Policies: their mirror symmetry, their FMU, their training."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from hexapod_cosim.cosim.interface.names import joint_names, vector_names
+from hexapod_cosim.cosim.master.fmu import Fmu
+from hexapod_cosim.cosim.validate.validation import find_problems
+from hexapod_cosim.gym.__main__ import main
+from hexapod_cosim.gym.batch import Batch
+from hexapod_cosim.gym.export import export_policy, standing_policy
+from hexapod_cosim.gym.policy import (
+    FREE_SIZE,
+    INPUTS,
+    Policy,
+    action_mirror,
+    load_policy,
+    observation_mirror,
+    symmetric_weights,
+)
+from hexapod_cosim.gym.tasks import task
+from hexapod_cosim.gym.train import TrainSettings, train, training_settings
+from hexapod_cosim.models import HexapodError, load_robot
+
+pytestmark = pytest.mark.usefixtures("plant_build")
+INPUT_NAMES = [
+    *("command.vx", "command.vy", "command.yaw_rate"),
+    *joint_names("angle"),
+    *vector_names("torso.quaternion", 4),
+    *vector_names("torso.angular_velocity"),
+]
+
+
+@pytest.fixture(scope="module")
+def policy() -> Policy:
+    """A symmetric policy with random weights, whose actions are partly limited."""
+    free = 0.4 * np.random.default_rng(1).standard_normal(FREE_SIZE)
+    return Policy(**symmetric_weights(free), robot="athena", clock=1.5, action_scale=0.3)
+
+
+@pytest.fixture(scope="module")
+def fmu_path(policy: Policy, tmp_path_factory: pytest.TempPathFactory, plant_build: Path) -> Path:
+    return export_policy(policy, load_robot("athena"), tmp_path_factory.mktemp("p") / "policy.fmu")
+
+
+@pytest.fixture
+def fmu(fmu_path: Path) -> Iterator[Fmu]:
+    with Fmu(fmu_path, name="policy") as opened:
+        yield opened
+
+
+def test_a_symmetric_policy_answers_a_mirrored_observation_with_the_mirrored_action(
+    policy: Policy,
+) -> None:
+    seen = np.random.default_rng(2).standard_normal((7, INPUTS))
+    places, signs = observation_mirror()
+    joints, sides = action_mirror()
+    assert policy(seen[:, places] * signs) == pytest.approx(
+        policy(seen)[:, joints] * sides, rel=1e-12, abs=1e-12
+    )
+    assert (seen[:, places] * signs)[:, places] * signs == pytest.approx(seen, abs=0.0)
+
+
+def test_the_fmu_acts_as_the_policy_does_in_its_environment(policy: Policy, fmu: Fmu) -> None:
+    settings = replace(
+        training_settings(task("Hexapod-v0")), action_scale=0.3, command_yaw_rate=(0.2, 0.2)
+    )
+    inputs, actions = fmu.block(INPUT_NAMES), fmu.block(joint_names("action"))
+    angles = fmu.block(joint_names("angle_ref"))
+    stance = np.array([leg.stance for leg in load_robot("athena").legs]).ravel()
+    fmu.initialise(0.0, 1.0)
+    with Batch(settings, 1, threads=1) as batch:
+        batch.reset(seeds=[3])
+        for step in range(20):
+            wanted = np.clip(policy(batch.observation[0].astype(float)), -1.0, 1.0)
+            value = batch.values(0)
+            command = batch.observation[0, 6:9] / [10.0, 10.0, 1.0]
+            inputs.values[:] = [*command, *(value[name] for name in INPUT_NAMES[3:])]
+            inputs.set()
+            actions.get()
+            angles.get()
+            # observations are float32
+            assert actions.values == pytest.approx(wanted, abs=3e-6)
+            assert angles.values == pytest.approx(stance + 0.3 * actions.values, abs=1e-15)
+            fmu.step(0.02 * step, 0.02)
+            batch.action[0] = wanted
+            batch.step()
+
+
+def test_the_fmu_holds_its_action_between_ticks(fmu: Fmu) -> None:
+    speed, action = fmu.block(["command.vx"]), fmu.block(joint_names("action"))
+    fmu.initialise(0.0, 1.0)
+    seen = []
+    for step in range(8):
+        speed.values[0] = 0.01 * step
+        speed.set()
+        action.get()
+        seen.append(action.values.tolist())
+        fmu.step(0.005 * step, 0.005)
+    assert seen[0] == seen[1] == seen[2] == seen[3]
+    assert seen[4] == seen[5] == seen[6] == seen[7]
+    assert seen[0] != seen[4]
+
+
+def test_the_fmu_is_sound(fmu_path: Path) -> None:
+    assert find_problems(fmu_path) == []
+
+
+def test_a_policy_of_another_robot_is_refused(policy: Policy, tmp_path: Path) -> None:
+    with pytest.raises(HexapodError, match=r"got 'phantomx_mk4', expected athena"):
+        export_policy(policy, load_robot("phantomx_mk4"), tmp_path / "policy.fmu")
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_saved_policy_is_read_again_and_other_files_are_refused(
+    policy: Policy, tmp_path: Path
+) -> None:
+    policy.save(tmp_path / "policy.npz")
+    again = load_policy(tmp_path / "policy.npz")
+    seen = np.ones(INPUTS)
+    assert again(seen).tobytes() == policy(seen).tobytes()
+    assert (again.robot, again.clock, again.action_scale) == ("athena", 1.5, 0.3)
+    for name, content in {"text.npz": b"policy", "empty.npz": b""}.items():
+        (tmp_path / name).write_bytes(content)
+        with pytest.raises(HexapodError, match="not a policy"):
+            load_policy(tmp_path / name)
+
+
+def test_training_is_repeatable_and_leaves_the_standing_policy() -> None:
+    settings = replace(training_settings(task("Hexapod-v0")), duration=0.1)
+    how = TrainSettings(generations=2, pairs=2, seed=4)
+    policies = [train(settings, how, lambda _: None) for _ in range(2)]
+    first, second = (policy(np.ones(INPUTS)) for policy in policies)
+    assert first.tobytes() == second.tobytes()
+    assert np.abs(first - standing_policy("athena")(np.ones(INPUTS))).max() > 0.01
+
+
+def test_the_command_trains_and_exports(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    policy, fmu = tmp_path / "policy.npz", tmp_path / "policy.fmu"
+    assert main(["list"]) == 0
+    assert "HexapodRough-v0" in capsys.readouterr().out
+    assert main(["train", "-o", str(policy), "--minutes", "0.001"]) == 0
+    assert main(["export", str(policy), "-o", str(fmu)]) == 0
+    assert fmu.is_file()
+    assert main(["export", str(fmu), "-o", str(fmu)]) == 2
+    assert "not a policy" in capsys.readouterr().err
