@@ -1,0 +1,117 @@
+"""Drives the plant FMU with the commands of a log."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hexapod_cosim.cosim.identify.log import Log, LogError
+from hexapod_cosim.cosim.master.fmu import Fmu
+from hexapod_cosim.models import FmuError
+
+Array = NDArray[np.float64]
+Event = tuple[float, bool, int]  # time [s], whether it is a command, row of the log
+SAME_TIME = 1e-9  # s    events closer than this are one
+
+
+class LogPlant:
+    """A plant FMU that is reset for each simulation of a log; a context manager that frees it.
+
+    Args:
+        fmu: the plant's file.
+        parameters: parameters of all simulations, by name.
+    """
+
+    def __init__(self, fmu: Path, parameters: Mapping[str, Any] | None = None) -> None:
+        self.fmu = Fmu(fmu)
+        self._common = self.fmu.parameter_blocks(parameters or {})
+        self._outputs = set(self.fmu.names("output"))
+
+    def known(self, names: Sequence[str]) -> list[str]:
+        """Returns those of some columns that are outputs of the FMU."""
+        return [name for name in names if name in self._outputs]
+
+    def simulate(
+        self,
+        log: Log,
+        names: Sequence[str],
+        parameters: Mapping[str, float],
+        *,
+        offset: Array | None = None,
+        delay: float = 0.0,
+    ) -> Array:
+        """Simulates a log and returns outputs at the times of its rows (rows, names).
+
+        Args:
+            log: its commands are the FMU's inputs; each holds until the next row.
+            names: outputs of the FMU.
+            parameters: initial state and further parameters.
+            offset: added to the commanded angles (18,) [rad]; None: nothing.
+            delay: how much older than its row a reading is [s].
+
+        Raises FmuError for a parameter that is refused, LogError for a refused command or step.
+        """
+        commands, time = log.commands, log.time
+        inputs = self.fmu.block(list(commands))
+        outputs = self.fmu.block(list(names))
+        table = np.column_stack(list(commands.values()))
+        if offset is not None:
+            places = [k for k, name in enumerate(commands) if name.endswith(".angle_ref")]
+            table[:, places] += offset
+        self.fmu.reset()
+        self.fmu.set_blocks(self._common)
+        self.fmu.set_parameters(parameters)
+        self.fmu.initialise(float(time[0]), float(time[-1]))
+        found = np.empty((len(time), len(outputs.names)))
+        try:
+            self._run(_events(time, delay), table, inputs, outputs, found)
+        except FmuError as error:
+            raise LogError(
+                "the plant cannot follow the log",
+                got=str(error),
+                expected="a robot that can move as the log says",
+                fix="check the robot file and the units of the commands",
+                where=log.where,
+            ) from error
+        return found
+
+    def _run(
+        self, events: Sequence[Event], table: Array, inputs: Any, outputs: Any, found: Array
+    ) -> None:
+        now = events[0][0]
+        for time, is_command, row in events:
+            if time - now > SAME_TIME:
+                self.fmu.step(now, time - now)
+                now = time
+            if is_command:
+                inputs.values[:] = table[row]
+                inputs.set()
+            else:
+                outputs.get()
+                found[row] = outputs.values
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.fmu.close()
+
+
+def _events(time: Array, delay: float) -> list[Event]:
+    """Returns all readings and commands in order of time; a reading comes before the command of
+    the same time, as the master reads. Readings from before the first row are of the first row.
+    """
+    readings = np.maximum(time - delay, time[0]).tolist()
+    events = [(t, False, k) for k, t in enumerate(readings)]
+    events += [(t, True, k) for k, t in enumerate(time[:-1].tolist())]
+    return sorted(events)
