@@ -1,4 +1,4 @@
-# make demo   set-up, the paper's comparison, and where its report is
+# make demo   set-up, both controls from flat ground into rubble, and where the report is
 # make test   set-up and every test
 
 PYTHON ?= python3
@@ -26,7 +26,7 @@ SANITIZED := $(SANITIZED_SHORT) tests/fmi/test_fmi_importers.py tests/fmi/test_e
 
 help:
 	@echo "make setup     the hexapod command in $(BIN)"
-	@echo "make demo      the paper's comparison; says where its report is"
+	@echo "make demo      both controls from flat ground into rubble; says where the report is"
 	@echo "make test      every test"
 	@echo "make test-browser  the report in Chromium, at full length, and how long it takes to open (1 min)"
 	@echo "make test-importers  the same walk through libcosim, Ecos, ... and how far each is from fmpy (2 min)"
@@ -70,7 +70,7 @@ $(STAMP): $(SOURCES)
 	@touch $@
 
 demo: setup
-	$(BIN)/hexapod compare walk_flat -o out/demo
+	$(BIN)/hexapod compare demo_course -o out/demo
 
 # a process for each core has no use for threads of matrices
 test: setup typing

@@ -1,7 +1,7 @@
 """Makes docs/images/report.png, the README's picture, from a comparison's report as a browser shows
 it.
 
-hexapod compare walk_flat -o out/demo && python docs/figure_report.py out/demo
+hexapod compare walk_flat -o out/flat && python docs/figure_report.py out/flat
 
 Needs Playwright for Python (`pip install -e .[test]` brings it) and a Chromium (HEXAPOD_CHROMIUM
 names one that is not in the path).

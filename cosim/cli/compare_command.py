@@ -61,6 +61,7 @@ from hexapod_cosim.cosim.results.results import (
     stored_result,
 )
 from hexapod_cosim.cosim.results.summary import Summary, summarise
+from hexapod_cosim.cosim.results.walking import different_walks
 from hexapod_cosim.cosim.run.batch import run_batch
 from hexapod_cosim.cosim.run.preparation import chosen_gains
 from hexapod_cosim.cosim.scenario.controls import Control
@@ -259,6 +260,8 @@ def _show(
     rows = comparison_rows(comparison, net_slip=net_slip)
     show_rows(with_errors(rows, checked), comparison.labels)
     show_accuracy(rows, checked, comparison.means)
+    for text in different_walks({label: result.facts for label, result in results.items()}):
+        show_text(text)
     show_files(files)
 
 

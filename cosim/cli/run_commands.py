@@ -53,6 +53,7 @@ from hexapod_cosim.cosim.results.results import (
     write_accuracy,
 )
 from hexapod_cosim.cosim.results.summary import summarise
+from hexapod_cosim.cosim.results.walking import WALKING, walking_text
 from hexapod_cosim.cosim.scenario.controls import control_of
 from hexapod_cosim.cosim.scenario.records import COMPARED, Scenario
 from hexapod_cosim.cosim.scenario.scenario import load_scenario
@@ -153,6 +154,8 @@ def _show(result: Result, files: Sequence[Path], checked: Mapping[str, Accuracy]
     rows = metric_rows(metrics, net_slip=has_net_slip(result.parameters))
     show_rows(with_errors(rows, checked), [control])
     show_accuracy(rows, checked, metrics)
+    if walking := walking_text(result.facts):
+        show_text(f"walk: {walking}")
     if result.facts.get("drop"):
         show_text(drop_text(result.facts["drop"]))
     show_files(files)
@@ -230,7 +233,7 @@ def _summary(
         "directory": str(folder),
         "files": [str(file) for file in files],
     }
-    shown = {key: result.facts[key] for key in ("robot", "walk", "warnings")}
+    shown = {key: result.facts[key] for key in ("robot", "walk", WALKING, "warnings")}
     status = {"status": result.outcome.status}
     summary = {"metrics": dict(result.metrics), **names, **shown, **status}
     if checked:

@@ -177,8 +177,9 @@ def _draw_key(figure: Figure, table: Table, theme: Theme, *, width: float, heigh
     axes = figure.add_axes((LABELS / width, 0.34 / height, 4.0 * CELL / width, 0.08 / height))
     axes.imshow(np.linspace(-1.0, 1.0, 128)[None, :], aspect="auto", cmap=theme.colours)
     axes.set_axis_off()
-    for place, text in ((0.0, "÷ 4"), (0.5, "1"), (1.0, "× 4")):
-        _write(axes, place, -0.9, text, theme.muted, transform=axes.transAxes)
+    ends = ((0.0, "÷ 4, better", "left"), (0.5, "1", "center"), (1.0, "× 4, worse", "right"))
+    for place, text, side in ends:
+        _write(axes, place, -0.9, text, theme.muted, transform=axes.transAxes, ha=side)
     note = (
         f"Change of the means from {table.reference} in %, over seeds on which both succeeded; "
         "pale: not sure; –: fewer than half of them did."

@@ -117,8 +117,11 @@ def _best_neighbour(
             moved = with_stance(robot, *there)
         except ReachError:
             continue
+        torques, _ = _loads(moved, gait)
+        if _heat(torques) >= heat:  # the other checks take longer
+            continue
         loads = walked(moved, gait)
-        if loads.heat < heat and _allowed(moved, gait, loads, before):
+        if _allowed(moved, gait, loads, before):
             found, heat = (there, (moved, loads)), loads.heat
     return found
 
@@ -155,12 +158,17 @@ def walked(robot: Robot, gait: Gait) -> Walked:
     torques, firmness = _loads(robot, gait)
     squares = (torques * torques).mean(axis=0)
     return Walked(
-        heat=float(squares.sum()),
+        heat=_heat(torques),
         hottest=float(np.sqrt(squares.max())),
         firmness=firmness,
-        speed=_largest_speed(robot, gait),
+        speed=settled_motion(robot, gait, _stride_command(robot, gait)).speed,
         lifts=_lifts(robot, gait),
     )
+
+
+def _heat(torques: Array) -> float:
+    """Returns the mean over the cycle of the sum of squared torques (PHASES, 6, 3) [N2 m2]."""
+    return float((torques * torques).mean(axis=0).sum())
 
 
 def _depth(robot: Robot) -> float:
@@ -239,18 +247,33 @@ def _lifts(robot: Robot, gait: Gait) -> bool:
     return not legs.solve(pose, np.zeros_like(plane), np.zeros(plane.shape)).unreachable.any()
 
 
-def _largest_speed(robot: Robot, gait: Gait) -> float:
-    """Returns the largest joint speed of a settled walk [rad/s], infinite beyond a leg's reach."""
+def _stride_command(robot: Robot, gait: Gait) -> BodyCommand:
+    """Returns the command at which a body moves by its stride, with a reserve, in a period."""
+    return BodyCommand(vx=RESERVE * robot.gait.stride / gait.period)
+
+
+@dataclass(frozen=True)
+class Motion:
+    """What a settled walk needs of the joints."""
+
+    speed: float  # rad/s    largest of a joint; infinite where a standing leg does not reach
+    cut: bool  # a swinging foot cannot follow its whole arc
+
+
+def settled_motion(robot: Robot, gait: Gait, command: BodyCommand) -> Motion:
+    """Returns what a settled walk under a command needs of the joints."""
     period = gait.period / STEPS
     controller = Controller(robot, period=period, gait=gait)
-    command = BodyCommand(vx=RESERVE * robot.gait.stride / gait.period)
     measured, largest, shown = Measurement(), 0.0, controller.diagnostics
+    cut = False
     for step in range(3 * STEPS):
         speed = controller.step(step * period, command, measured).speed_ref
         if (shown.unreachable & ~shown.swinging).any():
-            return float("inf")
-        largest = max(largest, float(np.abs(speed).max())) if step >= 2 * STEPS else 0.0
-    return largest
+            return Motion(float("inf"), cut=True)
+        if step >= 2 * STEPS:
+            largest = max(largest, float(np.abs(speed).max()))
+            cut = cut or bool(shown.unreachable.any())
+    return Motion(largest, cut)
 
 
 def write_robot(source: Path, robot: Robot, target: Path, *, name: str) -> Path:

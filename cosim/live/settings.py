@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from hexapod_cosim.controller import PATTERNS, BodyCommand, Gait, make_gait
 from hexapod_cosim.cosim.live.protocol import Change, Drive
-from hexapod_cosim.cosim.run.preparation import known_robot
+from hexapod_cosim.cosim.run.chosen_walk import known_robot
 from hexapod_cosim.cosim.scenario.controls import control_of
 from hexapod_cosim.cosim.scenario.reach import largest_share
 from hexapod_cosim.cosim.scenario.records import CONTROLS, Command, Scenario
@@ -103,8 +103,9 @@ class Choices:
         """Returns the scenario with the settings, standing still. Raises HexapodError."""
         base, own = self.scenario, self.first()
         tables: dict[str, Any] = {name: dict(table) for name, table in base.settings.items()}
-        if settings.gait != own.gait:
-            tables["gait"] = {"name": settings.gait}
+        # the page shows the gait, so that no control chooses another one by itself
+        timing = tables.get("gait", {}) if settings.gait == own.gait else {}
+        tables["gait"] = {**timing, "name": settings.gait}
         if settings.friction != own.friction:
             tables["friction"] = {**tables.get("friction", {}), "mu": settings.friction}
         if settings.ground != OWN:

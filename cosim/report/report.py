@@ -39,6 +39,7 @@ from hexapod_cosim.cosim.results.metrics import (
     shown_metrics,
 )
 from hexapod_cosim.cosim.results.results import StoredResult
+from hexapod_cosim.cosim.results.walking import different_walks, walking_text
 from hexapod_cosim.models import JOINT_NAMES
 
 REPORT, PLOTS, PROFILE = "report.html", "plots", "profile"
@@ -157,6 +158,8 @@ def write_report(
         servos=servo_rows(runs),
         joints=JOINT_NAMES,
         creep=creep_note(first.facts, first.view.surface),
+        walks={label: walking_text(run.facts) for label, run in runs.items()},
+        differences=different_walks({label: run.facts for label, run in runs.items()}),
         terrain=describe_terrain(first.view.surface, first.facts["parameters"]),
         materials=_materials(runs),
         **content | _accuracy(content["rows"], accuracies, metrics),

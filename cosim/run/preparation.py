@@ -4,17 +4,15 @@ that are exported to a folder.
 
 from __future__ import annotations
 
-from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
 
 from hexapod_cosim.controller import Gains
 from hexapod_cosim.cosim.export.export import export_fmu
+from hexapod_cosim.cosim.run.chosen_walk import choose_walk
 from hexapod_cosim.cosim.scenario.controls import control_of
 from hexapod_cosim.cosim.scenario.records import Scenario
-from hexapod_cosim.cosim.scenario.scenario import scenario_robot
-from hexapod_cosim.models import Robot, Servo, load_robot
-from hexapod_cosim.models.records import Vector3
+from hexapod_cosim.models import Robot, load_robot
 
 MAX_DESIGNS = 64  # sets of gains that are kept; the least recently used one goes first
 
@@ -53,30 +51,11 @@ def law_of(control: str) -> str:
 
 
 def design_key(scenario: Scenario) -> tuple[Robot, float]:
-    """Returns the robot and the period [s] that gains are designed for.
+    """Returns the robot, in its stance, and the period [s] that gains are designed for.
 
     Scenarios with equal keys share gains. Raises HexapodError for a robot that cannot be read.
     """
-    return known_robot(scenario), scenario.macro_step
-
-
-def known_robot(scenario: Scenario, own: Robot | None = None) -> Robot:
-    """Returns the robot as its controller knows it: the robot file with the scenario's servos and
-    gravity.
-
-    The controller has to find out ground, contact and payload by itself.
-
-    own: the scenario's robot, if the caller has it already.
-    """
-    own = own or scenario_robot(scenario)
-    return _with_servo(load_robot(scenario.robot), own.servo, own.gravity)
-
-
-@lru_cache(maxsize=64)
-def _with_servo(robot: Robot, servo: Servo, gravity: Vector3) -> Robot:
-    if (robot.servo, robot.gravity) == (servo, gravity):
-        return robot
-    return replace(robot, servo=servo, gravity=gravity)
+    return choose_walk(scenario).robot, scenario.macro_step
 
 
 class PlantFmus:

@@ -14,7 +14,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from hexapod_cosim.controller import Gains, make_gait
+from hexapod_cosim.controller import Gains
 from hexapod_cosim.cosim.common.components import PLANT
 from hexapod_cosim.cosim.common.plant_files import package_version
 from hexapod_cosim.cosim.control.controllers import (
@@ -36,6 +36,7 @@ from hexapod_cosim.cosim.results.ground import is_on_surface, surface_of_grid
 from hexapod_cosim.cosim.results.metrics import MEASURED_BY_PLANT, compute_metrics, metric_columns
 from hexapod_cosim.cosim.results.result import Result
 from hexapod_cosim.cosim.results.walk import View
+from hexapod_cosim.cosim.results.walking import WALKING
 from hexapod_cosim.cosim.results.warnings import (
     describe_walk,
     missing_metrics_warnings,
@@ -44,7 +45,8 @@ from hexapod_cosim.cosim.results.warnings import (
     unused_settings,
     walk_warnings,
 )
-from hexapod_cosim.cosim.run.preparation import PlantFmus, chosen_gains, known_robot, law_of
+from hexapod_cosim.cosim.run.chosen_walk import ChosenWalk, choose_walk
+from hexapod_cosim.cosim.run.preparation import PlantFmus, chosen_gains, law_of
 from hexapod_cosim.cosim.scenario.controls import control_of
 from hexapod_cosim.cosim.scenario.reach import check_commands
 from hexapod_cosim.cosim.scenario.records import Scenario
@@ -97,7 +99,10 @@ def simulate(
         scenario = replace(scenario, control=text_of_law(law, label))
     plan = make_plan(scenario, gains=gains)
     setup = plan.controller
-    with open_plant(scenario, fmu) as plant, make_controller(plan, law=law) as controller:
+    with (
+        open_plant(scenario, fmu, robot=plan.robot) as plant,
+        make_controller(plan, law=law) as controller,
+    ):
         parameters = initialise_plant(plant, plan)
         signals = Signals(plant, sensor=make_sensor(scenario, plan.schedule))
         recorder = _make_recorder(plan, signals, controller)
@@ -150,7 +155,8 @@ class RunPlan:
     """All parts of a run that do not depend on a plant FMU."""
 
     scenario: Scenario
-    robot: Robot  # the plant's
+    robot: Robot  # the plant's, in the stance of the walk
+    walk: ChosenWalk
     controller: ControllerSetup
     schedule: Schedule
     drawn: Drawn | None  # None: nothing is varied
@@ -162,8 +168,8 @@ def make_plan(scenario: Scenario, *, gains: Gains | None = None) -> RunPlan:
     Raises HexapodError for commands that the legs do not reach and where no gains can be designed.
     """
     own = scenario_robot(scenario)
-    robot = known_robot(scenario, own)
-    gait = make_gait(robot, **dict(scenario.settings.get("gait", {})))
+    walk = choose_walk(scenario, own, gains)
+    robot, gait = walk.robot, walk.gait
     if control_of(scenario.control).is_builtin:  # another control has strides of its own
         check_commands(scenario.commands, robot, gait, where=f"{scenario.where}: command")
     setup = ControllerSetup(
@@ -179,7 +185,12 @@ def make_plan(scenario: Scenario, *, gains: Gains | None = None) -> RunPlan:
     if drawn is not None:
         timed = replace(scenario, commands=delayed(scenario.commands, drawn.command_delay))
     return RunPlan(
-        scenario=scenario, robot=own, controller=setup, schedule=make_schedule(timed), drawn=drawn
+        scenario=scenario,
+        robot=walk.standing(own),
+        walk=walk,
+        controller=setup,
+        schedule=make_schedule(timed),
+        drawn=drawn,
     )
 
 
@@ -247,6 +258,7 @@ def make_result(
         "walk": describe_walk(view, setup.robot),
         "drop": None if drop is None else drop.as_facts(),
         "drawn": None if drawn is None else drawn.as_facts(),
+        WALKING: plan.walk.as_facts(),
     }
     metrics = compute_metrics(view, servo=plan.robot.servo, realtime_factor=outcome.realtime_factor)
     return Result(
@@ -275,15 +287,19 @@ def make_sensor(scenario: Scenario, schedule: Schedule) -> ForceSensor | None:
 
 
 @contextmanager
-def open_plant(scenario: Scenario, path: Path | None = None) -> Iterator[Fmu]:
+def open_plant(
+    scenario: Scenario, path: Path | None = None, *, robot: Robot | None = None
+) -> Iterator[Fmu]:
     """Opens the FMU of a scenario and sets the scenario's laws and settings.
 
     The FMU is exported to a temporary folder, or the one at `path`, which must hold the same robot.
+
+    robot: the scenario's robot in the stance of its walk; by default in its own stance.
     """
     with TemporaryDirectory(prefix="hexapod-") as folder:
         fmus = PlantFmus(Path(folder), given=path)
         with Fmu(fmus.fmu(scenario.robot)) as plant:
-            apply_settings(plant, scenario_robot(scenario))
+            apply_settings(plant, scenario_robot(scenario) if robot is None else robot)
             yield plant
 
 

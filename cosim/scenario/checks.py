@@ -11,6 +11,7 @@ from hexapod_cosim.cosim.scenario.records import (
     MAX_STEPS,
     SETTINGS,
     UNUSED,
+    WALK_KEYS,
     Command,
     Outputs,
     Scenario,
@@ -129,4 +130,5 @@ def setting_names() -> list[str]:
     ]
     plain = {"outputs": Outputs, "compliance": Parts}
     keys += [(section, item.name) for section, record in plain.items() for item in fields(record)]
+    keys += [("walk", key) for key in WALK_KEYS]
     return [f"{section}.{key}" for section, key in keys]

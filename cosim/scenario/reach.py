@@ -38,6 +38,11 @@ def check_commands(commands: Sequence[Command], robot: Robot, gait: Gait, *, whe
             raise _reach_error(wanted, robot, gait, place)
 
 
+def reaches(commands: Sequence[Command], robot: Robot, gait: Gait) -> bool:
+    """Returns whether check_commands() accepts the commands."""
+    return all(_walks(np.array(astuple(command)[1:]), robot, gait) for command in commands)
+
+
 @np.errstate(over="ignore", invalid="ignore")
 def _walks(values: Array, robot: Robot, gait: Gait) -> bool:
     """Whether all standing feet are within reach throughout a settled cycle of the command (6,).

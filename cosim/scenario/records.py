@@ -112,6 +112,21 @@ class Variation:
     command_delay: Annotated[float, Number("s", at_least=0.0, default=0.0)] = 0.0
 
 
+OWN, DESIGNED = "own", "designed"
+STANCES = (OWN, DESIGNED)  # or two lengths
+STANCE_CHANGE = Vector("m", 2)
+WALK_KEYS = ("stance",)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Walk:
+    """The stance that a scenario names: what the walk is, besides the gait in [gait]."""
+
+    # OWN: of the robot file. DESIGNED: that of `hexapod design --stance` for the gait. Two lengths:
+    # by which the feet stand further out from the hips, and deeper below them [m]. None: not named
+    stance: str | tuple[float, float] | None = None
+
+
 @dataclass(frozen=True, kw_only=True)
 class Outputs:
     """Which files and columns a run writes."""
@@ -139,6 +154,7 @@ class Scenario:
     macro_step: Annotated[float, Number("s", above=0.0, at_most=0.1, default=0.005)] = 0.005
     seed: int = 0
     gravity: tuple[float, float, float] | None = None  # m/s2    None: the robot's own
+    walk: Walk = Walk()
     settings: Mapping[str, Mapping[str, Any]]  # differences from the robot file, by section
     commands: tuple[Command, ...]  # in order of time
     events: tuple[Push | Fault, ...] = ()
@@ -160,6 +176,12 @@ class Scenario:
         return max(round(self.outputs.interval / self.macro_step), 1)
 
     @property
+    def names_walk(self) -> bool:
+        """Whether the scenario names a gait, its timing or a stance; else the control chooses."""
+        timing = {"name", "period", "duty"} & set(self.settings.get("gait", {}))
+        return bool(timing) or self.walk.stance is not None
+
+    @property
     def pushes(self) -> tuple[Push, ...]:
         """The events that are pushes."""
         return tuple(event for event in self.events if isinstance(event, Push))
@@ -175,6 +197,9 @@ class Scenario:
         plain = {key: getattr(self, key) for key in keys}
         plain |= {} if self.gravity is None else {"gravity": list(self.gravity)}
         tables = {key: dict(value) for key, value in self.settings.items() if value}
+        if self.walk.stance is not None:
+            named = self.walk.stance
+            tables["walk"] = {"stance": named if isinstance(named, str) else list(named)}
         if self.control_settings:  # a table, which stands behind the plain keys
             tables["control"] = {"law": plain.pop("control"), **self.control_settings}
         lists = {
@@ -194,7 +219,7 @@ class Scenario:
 
 PLAIN_KEYS = tuple(specs(Scenario))  # start, duration, macro_step
 SECTIONS = (
-    *("command", "control", "sensors", "compliance", "variation", "outputs", "parameters"),
+    *("command", "control", "walk", "sensors", "compliance", "variation", "outputs", "parameters"),
     *SETTINGS,
 )
 KEYS = ("title", "robot", *PLAIN_KEYS, "seed", "gravity", "events", *SECTIONS)

@@ -38,7 +38,10 @@ from hexapod_cosim.cosim.scenario.records import (
     SECTIONS,
     SETTINGS,
     SQUEEZE,
+    STANCE_CHANGE,
+    STANCES,
     UNUSED,
+    WALK_KEYS,
     Command,
     Fault,
     Outputs,
@@ -46,8 +49,16 @@ from hexapod_cosim.cosim.scenario.records import (
     Scenario,
     Sensors,
     Variation,
+    Walk,
 )
-from hexapod_cosim.models import Robot, RobotError, ScenarioError, load_robot, unknown_name
+from hexapod_cosim.models import (
+    Robot,
+    RobotError,
+    ScenarioError,
+    load_robot,
+    nearest_name,
+    unknown_name,
+)
 from hexapod_cosim.models.errors import refuse_path
 from hexapod_cosim.models.ground.table import (
     beside,
@@ -224,6 +235,7 @@ def scenario_from_table(
             commands=_read_commands(table.get("command", {}), "command"),
             events=_read_events(table.get("events", [])),
             sensors=_record(Sensors, table.get("sensors", {}), "sensors"),
+            walk=_read_walk(table.get("walk", {}), "walk"),
             compliance=_read_parts(table.get("compliance", {}), "compliance"),
             variation=_record(Variation, table["variation"], "variation")
             if "variation" in table
@@ -339,6 +351,26 @@ def _patch_in_si(table: Any, where: str) -> Any:
         else value
         for key, value in table.items()
     }
+
+
+def _read_walk(table: Any, where: str) -> Walk:
+    """Reads [walk]: the stance by its name, or as two lengths."""
+    refuse_unknown_keys(expect_table(table, where), list(WALK_KEYS), where)
+    value = table.get("stance")
+    if isinstance(value, list | tuple):
+        key = f"{where}.stance"
+        outward, deeper = STANCE_CHANGE.read(to_si(value, STANCE_CHANGE, key), key)
+        return Walk(stance=(outward, deeper))
+    if value is not None and value not in STANCES:
+        near = nearest_name(str(value), STANCES)
+        raise ScenarioError(
+            "unknown stance",
+            got=value,
+            expected=f"{', '.join(STANCES)}, or two lengths [m]",
+            fix=f"did you mean {near!r}?" if near else "write stance = [-0.05, 0.02]",
+            where=f"{where}.stance",
+        )
+    return Walk(stance=value)
 
 
 def _read_commands(value: Any, where: str) -> tuple[Command, ...]:

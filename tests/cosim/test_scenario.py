@@ -13,7 +13,7 @@ import pytest
 import tomlkit
 
 from hexapod_cosim.controller import SWITCHES, Controller, Parts, make_gait
-from hexapod_cosim.cosim.run.preparation import known_robot
+from hexapod_cosim.cosim.run.chosen_walk import known_robot
 from hexapod_cosim.cosim.scenario.records import MAX_STEPS, Variation
 from hexapod_cosim.cosim.scenario.scenario import (
     list_scenarios,

@@ -25,8 +25,8 @@ from hexapod_cosim.cosim.master.fmu_controller import COMMANDS, FmuController
 from hexapod_cosim.cosim.master.loop import COMPLETED, JointController, run
 from hexapod_cosim.cosim.master.recorder import Recorder, Recording
 from hexapod_cosim.cosim.master.signals import COMMANDED, MEASURED, Signals
+from hexapod_cosim.cosim.run.chosen_walk import known_robot
 from hexapod_cosim.cosim.run.controller_setup import make_setup
-from hexapod_cosim.cosim.run.preparation import known_robot
 from hexapod_cosim.cosim.run.run import make_sensor, open_plant
 from hexapod_cosim.cosim.scenario.records import Scenario
 from hexapod_cosim.cosim.scenario.scenario import load_scenario

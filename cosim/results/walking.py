@@ -1,0 +1,44 @@
+"""Tells in words which gait and stance a run's control walked."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+WALKING = "walking"  # key of run.json: gait and stance
+LEAST_LENGTH = 5e-4  # m    a smaller change of the stance is not told
+
+
+def walking_text(facts: Mapping[str, Any], *, brief: bool = False) -> str:
+    """Returns gait and stance of a run, and whose choice they were; "" of an earlier version.
+
+    facts: those of run.json; brief: without whose choice.
+    """
+    walking = facts.get(WALKING)
+    if not walking:
+        return ""
+    text = f"{walking['gait']}, period {walking['period']:.3g} s, {_stance(walking)}"
+    if brief:
+        return text
+    return f"{text}, chosen by the {walking['chosen_by']}"
+
+
+def _stance(walking: Mapping[str, Any]) -> str:
+    """Returns the stance against the robot file's."""
+    parts = [
+        f"{1e3 * abs(walking[key]):.0f} mm {more if walking[key] > 0.0 else less}"
+        for key, more, less in (
+            ("outward", "further out from the hips", "nearer to the hips"),
+            ("deeper", "deeper below them", "less deep below them"),
+        )
+        if abs(walking[key]) > LEAST_LENGTH
+    ]
+    return f"feet {' and '.join(parts)}" if parts else "the robot file's stance"
+
+
+def different_walks(facts: Mapping[str, Mapping[str, Any]]) -> list[str]:
+    """Returns a sentence for each control, by label, if the controls walk differently."""
+    texts = {label: walking_text(one, brief=True) for label, one in facts.items()}
+    if len(set(texts.values())) < 2:
+        return []
+    return [f"{label} walks {walking_text(facts[label])}" for label in texts if texts[label]]

@@ -1,0 +1,195 @@
+"""Chooses gait and stance of a run: those that its scenario names, or else those of its control.
+
+A scenario that names a gait (`gait.name`, `gait.period`, `gait.duty`) or a stance (`walk.stance`)
+has chosen the walk of every control; what it leaves out is the robot's own. Otherwise kinematic and
+paper control and all controls of the user walk as the robot file says. Compliant control walks an
+amble at the height of the stance of least heat, with its feet a part of the way from the robot's
+own stance to that one: the whole way would give up too much footing on uneven ground. Where the
+legs do not reach the commands or the step height in this walk, or the joints are not fast enough,
+it keeps the robot's own gait, and then its own stance as well.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from typing import Any
+
+from hexapod_cosim.controller import BodyCommand, Gains, GainsError, Gait, make_gait
+from hexapod_cosim.cosim.design.stance import (
+    SPEED_SHARE,
+    Motion,
+    StanceDesign,
+    find_stance,
+    settled_motion,
+    with_stance,
+)
+from hexapod_cosim.cosim.scenario.controls import control_of
+from hexapod_cosim.cosim.scenario.reach import reaches
+from hexapod_cosim.cosim.scenario.records import DESIGNED, OWN, Command, Scenario
+from hexapod_cosim.cosim.scenario.scenario import scenario_robot
+from hexapod_cosim.models import ReachError, Robot, ScenarioError, Servo, load_robot
+from hexapod_cosim.models.records import Vector3
+
+CHOSEN_GAIT = "amble"  # of compliant control
+FOOTING = 0.4  # 1    of the way to the stance of least heat by which feet move to the hips
+GIVEN, CHOSEN = "given", "chosen"  # stances besides those that a scenario names
+BY_SCENARIO, BY_CONTROL, BY_ROBOT = "scenario", "control", "robot file"
+
+
+@dataclass(frozen=True, kw_only=True)
+class ChosenWalk:
+    """Gait and stance of a run."""
+
+    robot: Robot  # as the controller knows it, in the stance
+    gait: Gait
+    stance: str  # OWN, DESIGNED, GIVEN as two lengths, or CHOSEN by the control
+    outward: float = 0.0  # m    by which the feet stand further out from the hips than the robot's
+    deeper: float = 0.0  # m    and deeper below them
+    chosen_by: str = BY_SCENARIO
+
+    def as_facts(self) -> dict[str, Any]:
+        """Returns what run.json tells about the walk."""
+        return {
+            "gait": self.gait.name,
+            "period": self.gait.period,
+            "duty": self.gait.duty,
+            "stance": self.stance,
+            "outward": self.outward,
+            "deeper": self.deeper,
+            "chosen_by": self.chosen_by,
+        }
+
+    def standing(self, own: Robot) -> Robot:
+        """Returns the plant's robot in the stance."""
+        return own if self.stance == OWN else replace(own, legs=self.robot.legs)
+
+
+def choose_walk(
+    scenario: Scenario, own: Robot | None = None, gains: Gains | None = None
+) -> ChosenWalk:
+    """Returns gait and stance of a run.
+
+    Args:
+        scenario: of the run.
+        own: the plant's robot, if the caller has it already.
+        gains: of the run, if they exist already. Gains that were designed for the robot's own
+            stance and not for the chosen one keep the robot in its own stance and gait.
+
+    Raises:
+        ScenarioError: a named stance is beyond the legs' reach.
+        GainsError: no stance can be designed where the scenario asks for it.
+    """
+    robot = known_robot(scenario, own)
+    settings = dict(scenario.settings.get("gait", {}))
+    plain = ChosenWalk(robot=robot, gait=make_gait(robot, **settings), stance=OWN)
+    if scenario.names_walk:
+        return _named(scenario, plain)
+    control = control_of(scenario.control)
+    if not control.is_builtin or control.name != "compliant":
+        return replace(plain, chosen_by=BY_ROBOT)
+    chosen = _chosen(scenario, replace(plain, chosen_by=BY_CONTROL), settings)
+    if _designed_for(gains, plain.robot, chosen.robot):
+        return replace(plain, chosen_by=BY_CONTROL)
+    return chosen
+
+
+def _named(scenario: Scenario, plain: ChosenWalk) -> ChosenWalk:
+    """Returns the walk with the stance that the scenario names."""
+    stance = scenario.walk.stance
+    if stance is None or stance == OWN:
+        return plain
+    if isinstance(stance, str):
+        design = _design(load_robot(scenario.robot), plain.gait)
+        stance, name = (design.outward, design.deeper), DESIGNED
+    else:
+        name = GIVEN
+    try:
+        return _moved(plain, name, *stance)
+    except ReachError as error:
+        raise ScenarioError(
+            "the legs do not reach this stance",
+            got=f"{stance[0]:g} m outwards and {stance[1]:g} m deeper",
+            expected="feet within the reach of the legs",
+            fix='move the feet less, or write stance = "designed"',
+            where=f"{scenario.where}: walk.stance",
+        ) from error
+
+
+def _moved(walk: ChosenWalk, name: str, outward: float, deeper: float) -> ChosenWalk:
+    """Returns a walk with the feet moved from the robot's own stance [m]. Raises ReachError."""
+    moved = with_stance(walk.robot, outward, deeper)
+    return replace(walk, robot=moved, stance=name, outward=outward, deeper=deeper)
+
+
+def _chosen(scenario: Scenario, plain: ChosenWalk, settings: Mapping[str, Any]) -> ChosenWalk:
+    """Returns the first walk of compliant control that the robot can follow."""
+    for gait in (make_gait(plain.robot, CHOSEN_GAIT, **settings), plain.gait):
+        try:
+            design = _design(load_robot(scenario.robot), gait)
+            begin = replace(plain, gait=gait)
+            walk = _moved(begin, CHOSEN, FOOTING * design.outward, design.deeper)
+        except (GainsError, ReachError):
+            continue
+        if _follows(walk, plain, scenario.commands):
+            return walk
+    return plain
+
+
+def _follows(walk: ChosenWalk, plain: ChosenWalk, commands: Sequence[Command]) -> bool:
+    """Returns whether legs and joints follow the commands in a walk.
+
+    A joint may need SPEED_SHARE of its largest speed, or what the robot's own walk needs.
+    """
+    if not reaches(commands, walk.robot, walk.gait):
+        return False
+    limit = walk.robot.servo.speed_max
+    for command in map(_body_command, commands):
+        own = _motion(plain.robot, plain.gait, command)
+        needed = _motion(walk.robot, walk.gait, command)  # its speed is at most `limit`
+        if needed.speed > max(SPEED_SHARE * limit, own.speed) or needed.speed >= limit:
+            return False
+        if needed.cut and not own.cut:
+            return False
+    return True
+
+
+def _body_command(command: Command) -> BodyCommand:
+    return BodyCommand(vx=command.vx, vy=command.vy, yaw_rate=command.yaw_rate)
+
+
+@lru_cache(maxsize=256)
+def _motion(robot: Robot, gait: Gait, command: BodyCommand) -> Motion:
+    """Returns settled_motion() from a cache."""
+    return settled_motion(robot, gait, command)
+
+
+def _designed_for(gains: Gains | None, own: Robot, chosen: Robot) -> bool:
+    """Returns whether gains are for the robot's own stance, and not for the chosen one."""
+    return gains is not None and gains.robot_hash == own.hash and own.hash != chosen.hash
+
+
+@lru_cache(maxsize=64)
+def _design(robot: Robot, gait: Gait) -> StanceDesign:
+    """Returns the stance of least heat of a robot file; a process designs it once."""
+    return find_stance(robot, gait=gait)
+
+
+def known_robot(scenario: Scenario, own: Robot | None = None) -> Robot:
+    """Returns the robot as its controller knows it: the robot file with the scenario's servos and
+    gravity.
+
+    The controller has to find out ground, contact and payload by itself.
+
+    own: the scenario's robot, if the caller has it already.
+    """
+    own = own or scenario_robot(scenario)
+    return _with_servo(load_robot(scenario.robot), own.servo, own.gravity)
+
+
+@lru_cache(maxsize=64)
+def _with_servo(robot: Robot, servo: Servo, gravity: Vector3) -> Robot:
+    if (robot.servo, robot.gravity) == (servo, gravity):
+        return robot
+    return replace(robot, servo=servo, gravity=gravity)
