@@ -45,7 +45,9 @@ from hexapod_cosim.cosim.results.warnings import (
     walk_warnings,
 )
 from hexapod_cosim.cosim.run.preparation import PlantFmus, chosen_gains, known_robot, law_of
+from hexapod_cosim.cosim.scenario.checks import check_servo_faults
 from hexapod_cosim.cosim.scenario.controls import control_of
+from hexapod_cosim.cosim.scenario.event_log import event_log
 from hexapod_cosim.cosim.scenario.reach import check_commands
 from hexapod_cosim.cosim.scenario.records import Scenario
 from hexapod_cosim.cosim.scenario.scenario import scenario_robot
@@ -163,6 +165,7 @@ def make_plan(scenario: Scenario, *, gains: Gains | None = None) -> RunPlan:
     """
     own = scenario_robot(scenario)
     robot = known_robot(scenario, own)
+    check_servo_faults(scenario, own)
     gait = make_gait(robot, **dict(scenario.settings.get("gait", {})))
     if control_of(scenario.control).is_builtin:  # another control has strides of its own
         check_commands(scenario.commands, robot, gait, where=f"{scenario.where}: command")
@@ -236,6 +239,7 @@ def make_result(
         # a drop neither walks nor swings a foot, and has the metrics of a drop
         missing += missing_metrics_warnings(view) if drop is None else []
     found = {
+        "events": event_log(scenario, outcome.simulated),
         "warnings": [
             *facts["warnings"],
             *unused_settings(scenario, setup.robot),
