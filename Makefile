@@ -22,7 +22,7 @@ SANITIZED_SHORT := $(patsubst %,tests/fmi/test_%.py,fmi fmi3 fmi3_order fmi_stat
 	$(patsubst %,tests/plant/test_plant_%.py,events coordinates misuse)
 SANITIZED := $(SANITIZED_SHORT) tests/fmi/test_fmi_importers.py tests/fmi/test_endurance.py
 
-.PHONY: help setup demo test test-browser test-importers test-platforms test-endurance test-native test-native-sanitize test-sanitize test-sanitize-short test-robots test-wheels wheels fuzz fuzz-short mutants lint-c check bench bench-quick bench-batch bench-gym bench-opening control study-demo format generate fmu typing clean docs
+.PHONY: help setup demo test test-browser test-importers test-platforms test-endurance test-native test-native-sanitize test-sanitize test-sanitize-short test-robots test-wheels wheels test-compilers fuzz fuzz-short mutants soak lint-c check bench bench-quick bench-batch bench-gym bench-opening control study-demo format generate fmu typing clean docs
 
 help:
 	@echo "make setup     the hexapod command in $(BIN)"
@@ -38,9 +38,11 @@ help:
 	@echo "make test-robots  30 robots drawn at random, 0.5 to 30 kg: all designed for, all walk (3 min)"
 	@echo "make wheels    wheels for Linux, Windows and macOS, source distribution and SHA-256 list in dist/ (5 min)"
 	@echo "make test-wheels  these: sizes, tags, and the Linux wheel in an empty environment without a compiler (3 min)"
+	@echo "make test-compilers  the plant built by gcc, clang and zig at -O0 to -O3: the same bits (3 min)"
 	@echo "make fuzz      libFuzzer on calls, states, start values and grids, Hypothesis on every reader: FUZZ_SECONDS, 3600 in all"
 	@echo "make fuzz-short  the same for a minute in all"
 	@echo "make mutants   MUTANTS (200) small changes of the code, one at a time: which ones the tests find (hours)"
+	@echo "make soak      SOAK_SECONDS (86400) of walking with random commands, pushes, faults and restores"
 	@echo "make check     formatters, linters, types, generated files, warnings of gcc and clang"
 	@echo "make lint-c    warnings of gcc and clang alone"
 	@echo "make bench     speed and accuracy against the engines people would pick instead (15 min); bench-quick: 1.5 min"
@@ -90,6 +92,9 @@ test-endurance: setup
 	$(BIN)/python -m pytest -q tests/fmi/test_endurance.py
 	PYTHONPATH=tests/support $(BIN)/python tests/fmi/endurance.py build/test/plant_fmu/hexapod.[sd]*
 
+test-compilers: setup
+	HEXAPOD_COMPILERS=all $(BIN)/python -m pytest -q tests/trust/test_compilers.py
+
 test-robots: setup
 	HEXAPOD_ROBOTS=all $(BIN)/python -m pytest -q -s tests/design/test_random_robots.py
 
@@ -134,6 +139,10 @@ fuzz-short: setup
 MUTANTS ?= 200
 mutants: setup
 	$(BIN)/python -m tools.mutants $(MUTANTS)
+
+SOAK_SECONDS ?= 86400
+soak: setup
+	$(BIN)/python -m tools.soak $(SOAK_SECONDS)
 
 # warnings are errors: gcc -std=c11 -Wpedantic; clang -Weverything but for plant_fmu/cmake/warnings.cmake
 lint-c: lint-c-gcc lint-c-clang

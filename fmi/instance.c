@@ -60,10 +60,14 @@ hxStatus hx_instance_open(hxInstance *instance, const char *guid, const char *re
     hx_log(instance, HX_LOG_ERROR, "instantiation: out of memory; free some and try again");
     return HX_OUT_OF_MEMORY;
   }
-  char *folder = hx_resources_folder(resources);
-  status = hx_component_set_resources(instance->component, folder);
+  char *folder;
+  status = hx_resources_folder(resources, &folder);
+  if (status == HX_OK) status = hx_component_set_resources(instance->component, folder);
   free(folder);
-  if (status != HX_OK) return status;
+  if (status != HX_OK) {
+    hx_log(instance, HX_LOG_ERROR, "resources: out of memory; free some and try again");
+    return status;
+  }
   return_to_start(instance);
   hx_log(instance, HX_LOG_EVENT, "instantiated %s, version %s, start values %s", guid, hx_version(),
          found ? "from the resources" : "compiled in");

@@ -114,9 +114,9 @@ static inline double *hx_variable_place(struct hxVariables *variables, const hxV
 /* ----------------------------------------------------------------------------------------------
  * resources.c */
 
-/* Returns the folder of the resources, a URI or a path, as a path that ends in a slash, to be freed
- * by the caller; NULL without resources and when out of memory. */
-char *hx_resources_folder(const char *resources);
+/* Sets *folder to that of the resources, a URI or a path, as a path that ends in a slash, to be
+ * freed by the caller; NULL without resources. Returns HX_OUT_OF_MEMORY when out of memory. */
+hxStatus hx_resources_folder(const char *resources, char **folder);
 
 /* Reads start_values.txt of the resources into start; sets *found to whether the file exists. */
 hxStatus hx_resources_read(hxInstance *instance, const char *resources, int *found);

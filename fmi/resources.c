@@ -304,13 +304,19 @@ static hxStatus open_resources(hxInstance *instance, const char *resources, FILE
   return HX_OK;
 }
 
-char *hx_resources_folder(const char *resources) {
-  if (!resources || !resources[0]) return NULL;
+hxStatus hx_resources_folder(const char *resources, char **folder) {
+  *folder = NULL;
+  if (!resources || !resources[0]) return HX_OK;
   char *plain = start_values_path(resources, 0), *path = start_values_path(resources, 1);
-  FILE *file = path ? open_file(path) : NULL;
+  if (!plain || !path) {
+    free(plain);
+    free(path);
+    return HX_OUT_OF_MEMORY;
+  }
+  FILE *file = open_file(path);
   const int decoded = file != NULL;
   if (file) fclose(file);
-  file = plain && !decoded ? open_file(plain) : NULL;
+  file = decoded ? NULL : open_file(plain);
   if (file) { /* the path was never percent-encoded */
     fclose(file);
     free(path);
@@ -318,8 +324,9 @@ char *hx_resources_folder(const char *resources) {
   } else {
     free(plain);
   }
-  if (path) path[strlen(path) - (sizeof file_name - 1)] = '\0';
-  return path;
+  path[strlen(path) - (sizeof file_name - 1)] = '\0';
+  *folder = path;
+  return HX_OK;
 }
 
 hxStatus hx_resources_read(hxInstance *instance, const char *resources, int *found) {

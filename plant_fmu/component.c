@@ -61,13 +61,18 @@ static FILE *open_file(const char *path) {
 #endif
 }
 
-/* Returns the bytes of a file, to be freed by the caller; NULL when it cannot be read. */
-static void *read_bytes(const char *path, size_t *size) {
+/* Returns the bytes of a file, to be freed by the caller; NULL when it cannot be read, or when out
+ * of memory, which *short_of_memory tells. */
+static void *read_bytes(const char *path, size_t *size, int *short_of_memory) {
   FILE *file = open_file(path);
   char *bytes = NULL;
+  *short_of_memory = 0;
   if (!file) return NULL;
   const long length = fseek(file, 0, SEEK_END) == 0 ? ftell(file) : -1;
-  if (length > 0 && fseek(file, 0, SEEK_SET) == 0) bytes = malloc((size_t)length);
+  if (length > 0 && fseek(file, 0, SEEK_SET) == 0) {
+    bytes = malloc((size_t)length);
+    *short_of_memory = !bytes;
+  }
   *size = length > 0 ? (size_t)length : 0;
   if (bytes && fread(bytes, 1, *size, file) != *size) {
     free(bytes);
@@ -91,6 +96,7 @@ static hxTerrain *refuse_grid(hxComponent *component, double grid, const char *w
 static hxTerrain *read_grid(hxComponent *component, double grid) {
   char name[48], message[HX_MESSAGE_SIZE];
   size_t size = 0;
+  int short_of_memory;
   if (!component->resources || grid != floor(grid))
     return refuse_grid(component, grid,
                        component->resources ? "give a whole number"
@@ -100,11 +106,14 @@ static hxTerrain *read_grid(hxComponent *component, double grid) {
   if (!path) return refuse_grid(component, grid, "out of memory; free some and try again");
   strcpy(path, component->resources);
   strcat(path, name);
-  void *bytes = read_bytes(path, &size);
+  void *bytes = read_bytes(path, &size, &short_of_memory);
   free(path);
   if (!bytes)
-    return refuse_grid(component, grid,
-                       "the file is missing or cannot be read; export the FMU with that terrain");
+    return refuse_grid(
+        component, grid,
+        short_of_memory
+            ? "out of memory; free some and try again"
+            : "the file is missing or cannot be read; export the FMU with that terrain");
   hxTerrain *terrain = hx_terrain_create(bytes, size, message);
   free(bytes);
   return terrain ? terrain : refuse_grid(component, grid, message);

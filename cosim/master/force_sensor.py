@@ -1,6 +1,7 @@
 """Models the feet's force sensors with noise, delay and faults.
 
-Contacts are derived from forces, so noise does not change them but delay and faults do.
+Contacts are derived from forces, so noise does not change them but delay and faults do. A sensor
+that reads NaN shows no contact.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ from numpy.typing import NDArray
 from hexapod_cosim.cosim.scenario.records import FAULTS
 from hexapod_cosim.models import LEG_NAMES
 
-DEAD, STUCK = (FAULTS.index(name) + 1 for name in ("dead", "stuck"))
+DEAD, STUCK, NAN = (FAULTS.index(name) + 1 for name in ("dead", "stuck", "nan"))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -75,3 +76,4 @@ class ForceSensor:
         alive, dead = (fault != STUCK) | (self._count == 0), fault == DEAD
         self.force[alive], self.contact[alive] = force[alive], contact[alive]
         self.force[dead], self.contact[dead] = 0.0, False
+        self.force[fault == NAN], self.contact[fault == NAN] = np.nan, False

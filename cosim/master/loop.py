@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from hexapod_cosim.controller import BodyCommand, Diagnostics, JointCommand, Measurement
 from hexapod_cosim.cosim.interface.names import vector_names
-from hexapod_cosim.cosim.master.interrupts import interruptible
+from hexapod_cosim.cosim.master.interrupts import Watch, interruptible, watched
 from hexapod_cosim.cosim.master.protocols import Plant
 from hexapod_cosim.cosim.master.recorder import Recorder, Recording
 from hexapod_cosim.cosim.master.signals import Signals
@@ -25,6 +25,7 @@ from hexapod_cosim.models import LEG_NAMES, HexapodError
 
 COMPLETED, FAILED, INTERRUPTED = "completed", "failed", "interrupted"
 PROGRESS_STEPS = 20  # macro-steps between two calls of the progress function
+TIME_LIMIT = 60.0  # s    wall time of one call of a controller; twice as much at most
 
 Progress = Callable[[float], None]  # simulated time since the start [s]
 
@@ -69,16 +70,17 @@ def run(
     *,
     h: float,
     progress: Progress | None = None,
+    time_limit: float = TIME_LIMIT,
 ) -> Outcome:
     """Runs an initialised plant under a controller over the whole schedule in macro-steps of h [s].
 
-    A refused step, any exception of the controller and an interrupt end the run; the outcome
-    tells which.
+    A refused step, any exception of the controller, a call of the controller that takes longer than
+    time_limit [s of wall time] and an interrupt end the run; the outcome tells which.
     """
     status, reason, begin, cause = COMPLETED, "", perf_counter(), None
     try:
-        with interruptible():
-            _loop(plant, signals, controller, schedule, recorder, h=h, progress=progress)
+        with interruptible(), watched(time_limit) as watch:
+            _loop(plant, signals, controller, schedule, recorder, watch, h=h, progress=progress)
     except KeyboardInterrupt:
         status, reason = INTERRUPTED, "interrupted"
     except Exception as error:  # a controller may raise anything; the recorded rows are kept
@@ -122,6 +124,7 @@ def _loop(
     controller: JointController,
     schedule: Schedule,
     recorder: Recorder,
+    watch: Watch,
     *,
     h: float,
     progress: Progress | None,
@@ -131,11 +134,20 @@ def _loop(
     read, control, write = signals.read, controller.step, signals.write
     record, advance = recorder.record, plant.step
     pushes, measurement = schedule.pushes, signals.measurement
+    faults, lost = schedule.servo_faults, schedule.lost
     read()
     for k, (t, command) in enumerate(zip(schedule.times.tolist(), schedule.commands, strict=False)):
         if pushes is not None:
             signals.push[:] = pushes[k]
-        write(control(t, command, measurement))
+        if faults is not None:
+            signals.servo_faults = faults[k]
+        watch.call = k + 1
+        joints = control(t, command, measurement)
+        watch.call = 0
+        if lost is None or not lost[k]:
+            write(joints)
+        else:
+            signals.hold()
         record()
         advance(t, h)
         read()

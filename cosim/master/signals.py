@@ -24,6 +24,7 @@ from hexapod_cosim.cosim.interface.names import (
 )
 from hexapod_cosim.cosim.master.force_sensor import ForceSensor
 from hexapod_cosim.cosim.master.protocols import Plant
+from hexapod_cosim.cosim.scenario.records import SERVO_FAULTS
 from hexapod_cosim.models import FmuError
 
 MEASURED = {
@@ -39,6 +40,7 @@ COMMANDED = {
 ACCELERATION = joint_names("acceleration_ref")  # FMUs of earlier versions lack these
 PUSH = [*vector_names("torso.push_force"), *vector_names("torso.push_torque")]
 CONTACT = foot_names("contact")
+DEAD, STUCK = (SERVO_FAULTS.index(name) + 1 for name in ("dead", "stuck"))
 
 
 class Signals:
@@ -48,7 +50,8 @@ class Signals:
 
     Attributes: `names` and `values` of the whole row, flags as 0 and 1; its blocks `outputs`,
     `flags` and `inputs`; `measurement`, which the controller reads; `push` (6,), which the loop
-    writes: force [N] and torque [N m] on the torso, world axes.
+    writes: force [N] and torque [N m] on the torso, world axes; `servo_faults` (6, 3) of the
+    present macro-step, which the loop sets: 0 none, else 1 + index in SERVO_FAULTS.
     """
 
     def __init__(self, plant: Plant, *, sensor: ForceSensor | None = None) -> None:
@@ -77,6 +80,9 @@ class Signals:
         self._touching = self.flags.values[:LEGS]
         self._sensor = sensor
         self.measurement = self._make_measurement()
+        self.servo_faults: NDArray[np.int8] | None = None
+        self._stuck = np.zeros((LEGS, JOINTS), dtype=bool)  # in the last macro-step
+        self._stuck_at = np.zeros((LEGS, JOINTS))  # rad
 
     def _make_measurement(self) -> Measurement:
         views, begin = {}, 0
@@ -108,7 +114,26 @@ class Signals:
         self._speed_ref[...] = command.speed_ref
         self._torque_ref[...] = command.torque_ref
         self._acceleration_ref[...] = command.acceleration_ref
+        self.hold()
+
+    def hold(self) -> None:
+        """Writes the last joint command again, and the present push."""
+        if self.servo_faults is not None:
+            self._break_servos(self.servo_faults)
         self.inputs.set()
+
+    def _break_servos(self, fault: NDArray[np.int8]) -> None:
+        """Replaces the commands of servos with faults."""
+        dead, stuck = fault == DEAD, fault == STUCK
+        angle, broken = self.measurement.angle, dead | stuck
+        begun = stuck & ~self._stuck
+        self._stuck, self._stuck_at[begun] = stuck, angle[begun]
+        self._angle_ref[stuck] = self._stuck_at[stuck]
+        self._speed_ref[stuck] = 0.0
+        self._angle_ref[dead] = angle[dead]
+        self._speed_ref[dead] = self.measurement.speed[dead]
+        self._torque_ref[broken] = 0.0
+        self._acceleration_ref[:, broken] = 0.0
 
 
 def _move_first(names: Sequence[str], among: Sequence[str]) -> list[str]:

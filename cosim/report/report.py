@@ -145,6 +145,9 @@ def write_report(
     content["warnings"] = [
         f"{label}: {text}" for label, run in runs.items() for text in run.facts["warnings"]
     ] + content.pop("overall")
+    content["events"] = [
+        f"{event['time']:g} s: {event['text']}" for event in first.facts.get("events", [])
+    ]
     content["scenario"] = first.scenario if scenario is None else scenario
     content["command"] = first.facts.get("command", "") if command is None else command
     metrics = _metrics(runs, whole)

@@ -47,7 +47,9 @@ from hexapod_cosim.cosim.results.warnings import (
 )
 from hexapod_cosim.cosim.run.chosen_walk import ChosenWalk, choose_walk
 from hexapod_cosim.cosim.run.preparation import PlantFmus, chosen_gains, law_of
+from hexapod_cosim.cosim.scenario.checks import check_servo_faults
 from hexapod_cosim.cosim.scenario.controls import control_of
+from hexapod_cosim.cosim.scenario.event_log import event_log
 from hexapod_cosim.cosim.scenario.reach import check_commands
 from hexapod_cosim.cosim.scenario.records import Scenario
 from hexapod_cosim.cosim.scenario.scenario import scenario_robot
@@ -168,6 +170,7 @@ def make_plan(scenario: Scenario, *, gains: Gains | None = None) -> RunPlan:
     Raises HexapodError for commands that the legs do not reach and where no gains can be designed.
     """
     own = scenario_robot(scenario)
+    check_servo_faults(scenario, own)
     walk = choose_walk(scenario, own, gains)
     robot, gait = walk.robot, walk.gait
     if control_of(scenario.control).is_builtin:  # another control has strides of its own
@@ -247,6 +250,7 @@ def make_result(
         # a drop neither walks nor swings a foot, and has the metrics of a drop
         missing += missing_metrics_warnings(view) if drop is None else []
     found = {
+        "events": event_log(scenario, outcome.simulated),
         "warnings": [
             *facts["warnings"],
             *unused_settings(scenario, setup.robot),

@@ -97,10 +97,14 @@ class Walker:
     ) -> Result:
         """Runs a scenario, on the plant FMU `fmu` and with `gains` if given.
 
-        Arguments are those of run.simulate(). Raises HexapodError when the run cannot start; how a
+        Arguments are those of run.simulate(), which runs scenarios with faults of servos, lost
+        commands and sensors that read NaN. Raises HexapodError when the run cannot start; how a
         run that started ended is in the result.
         """
         control = control_of(scenario.control)
+        if scenario.has_loop_faults:
+            path = self._fmus.fmu(scenario.robot) if fmu is None else fmu
+            return simulate(scenario, fmu=path, gains=gains, progress=progress, begin=begin)
         if not control.is_builtin:
             return self._simulate_given(
                 scenario, control, fmu=fmu, gains=gains, progress=progress, begin=begin

@@ -18,7 +18,7 @@ from hexapod_cosim.cosim.scenario.records import (
     Sensors,
     Variation,
 )
-from hexapod_cosim.models import ScenarioError, load_robot, nearest_name
+from hexapod_cosim.models import Robot, ScenarioError, load_robot, nearest_name
 from hexapod_cosim.models.ground.table import terrain_specs
 from hexapod_cosim.models.schema import specs
 
@@ -62,6 +62,22 @@ def check_interval(scenario: Scenario) -> None:
             expected=f"a multiple of macro_step = {h:g} s",
             fix=f"{every * h:g} is the nearest; 0 keeps every macro-step",
             where=f"{scenario.where}: outputs.interval",
+        )
+
+
+def check_servo_faults(scenario: Scenario, robot: Robot) -> None:
+    """Refuses dead servos of kinematic drives, which move by prescribed angles without torques.
+
+    Raises ScenarioError.
+    """
+    dead = [event for event in scenario.servo_faults if event.fault == "dead"]
+    if dead and robot.servo.mode == "kinematic":
+        raise ScenarioError(
+            "a dead servo of a kinematic drive",
+            got=f"{dead[0].leg}.{dead[0].joint} dead at {dead[0].time:g} s",
+            expected="servo.mode torque, or the fault stuck",
+            fix="set servo.mode=torque",
+            where=f"{scenario.where}: events",
         )
 
 

@@ -9,6 +9,7 @@ from typing import Annotated, Any
 
 from hexapod_cosim.controller import Parts
 from hexapod_cosim.models import (
+    JOINT_NAMES,
     LEG_NAMES,
     Baumgarte,
     BodyContact,
@@ -24,7 +25,9 @@ from hexapod_cosim.models.schema import Choice, Number, Vector, specs
 
 CONTROLS = ("kinematic", "paper", "compliant")
 COMPARED = ("kinematic", "compliant")  # unless a command or a study names its controls
-FAULTS = ("dead", "stuck")
+FAULTS = ("dead", "stuck", "nan")  # of force sensors
+SERVO_FAULTS = ("dead", "stuck")
+LOST = ("command",)
 FORMATS = ("parquet", "csv", "mcap")  # of recordings
 DEFAULT_FORMATS = ("parquet", "csv")
 SETTINGS: dict[str, type[Any]] = {
@@ -76,13 +79,42 @@ class Push:
 class Fault:
     """A fault of a foot's force sensor from `time` [s from the start of the run].
 
-    A dead sensor reads zero, a stuck one repeats its last reading.
+    A dead sensor reads zero, a stuck one repeats its last reading, and nan is no number.
     """
 
     time: Annotated[float, Number("s", at_least=0.0)]
     leg: Annotated[str, Choice(LEG_NAMES)]
     fault: Annotated[str, Choice(FAULTS)]
     duration: Annotated[float, Number("s", above=0.0, default=math.inf)] = math.inf
+
+
+@dataclass(frozen=True, kw_only=True)
+class ServoFault:
+    """A fault of a joint's servo from `time` [s from the start of the run].
+
+    A dead servo follows the joint: its command is the measured angle and speed, without torque. A
+    stuck one holds the angle that was measured when the fault began.
+    """
+
+    time: Annotated[float, Number("s", at_least=0.0)]
+    leg: Annotated[str, Choice(LEG_NAMES)]
+    joint: Annotated[str, Choice(JOINT_NAMES)]
+    fault: Annotated[str, Choice(SERVO_FAULTS)]
+    duration: Annotated[float, Number("s", above=0.0, default=math.inf)] = math.inf
+
+
+@dataclass(frozen=True, kw_only=True)
+class Lost:
+    """Lost joint commands from `time` [s from the start of the run]: the controller is called, but
+    the servos keep the last command that arrived. The first command cannot be lost.
+    """
+
+    time: Annotated[float, Number("s", above=0.0)]
+    duration: Annotated[float, Number("s", above=0.0)]
+    lost: Annotated[str, Choice(LOST)]
+
+
+Event = Push | Fault | ServoFault | Lost
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -157,7 +189,7 @@ class Scenario:
     walk: Walk = Walk()
     settings: Mapping[str, Mapping[str, Any]]  # differences from the robot file, by section
     commands: tuple[Command, ...]  # in order of time
-    events: tuple[Push | Fault, ...] = ()
+    events: tuple[Event, ...] = ()
     sensors: Sensors = Sensors()
     compliance: Parts = ALL_PARTS  # active parts of the compliant control
     variation: Variation | None = None  # None: the file has no such section
@@ -190,6 +222,23 @@ class Scenario:
     def faults(self) -> tuple[Fault, ...]:
         """The events that are faults of sensors."""
         return tuple(event for event in self.events if isinstance(event, Fault))
+
+    @property
+    def servo_faults(self) -> tuple[ServoFault, ...]:
+        """The events that are faults of servos."""
+        return tuple(event for event in self.events if isinstance(event, ServoFault))
+
+    @property
+    def lost(self) -> tuple[Lost, ...]:
+        """The events that are lost commands."""
+        return tuple(event for event in self.events if isinstance(event, Lost))
+
+    @property
+    def has_loop_faults(self) -> bool:
+        """Whether faults occur that the loop in Python alone knows."""
+        return bool(self.servo_faults or self.lost) or any(
+            event.fault == "nan" for event in self.faults
+        )
 
     def to_table(self) -> dict[str, Any]:
         """Returns the scenario as the tables of an equivalent scenario file."""

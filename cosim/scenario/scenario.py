@@ -43,11 +43,14 @@ from hexapod_cosim.cosim.scenario.records import (
     UNUSED,
     WALK_KEYS,
     Command,
+    Event,
     Fault,
+    Lost,
     Outputs,
     Push,
     Scenario,
     Sensors,
+    ServoFault,
     Variation,
     Walk,
 )
@@ -392,16 +395,20 @@ def _read_commands(value: Any, where: str) -> tuple[Command, ...]:
     return tuple(commands) if times and times[0] == 0.0 else (Command(), *commands)
 
 
-def _read_events(value: Any) -> tuple[Push | Fault, ...]:
+def _read_events(value: Any) -> tuple[Event, ...]:
     entries = _list(value, "events")
     return tuple(_read_event(entry, f"events[{k}]") for k, entry in enumerate(entries))
 
 
-def _read_event(table: Any, where: str) -> Push | Fault:
-    """Reads a fault, which has the key `leg` or `fault`, or else a push."""
-    push, fault = list(specs(Push)), list(specs(Fault))
-    refuse_unknown_keys(expect_table(table, where), list(dict.fromkeys([*push, *fault])), where)
-    event: Push | Fault = _record(Fault if {"leg", "fault"} & set(table) else Push, table, where)
+def _read_event(table: Any, where: str) -> Event:
+    """Reads an event, whose keys tell what it is: `lost`, `joint` (of a servo), `leg` or `fault`
+    (of a force sensor), or else a push.
+    """
+    known = [key for kind in (Push, Fault, ServoFault, Lost) for key in specs(kind)]
+    refuse_unknown_keys(expect_table(table, where), list(dict.fromkeys(known)), where)
+    kind: type[Event] = Fault if {"leg", "fault"} & set(table) else Push
+    kind = ServoFault if "joint" in table else kind
+    event: Event = _record(Lost if "lost" in table else kind, table, where)
     return event
 
 

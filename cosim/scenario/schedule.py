@@ -10,15 +10,24 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hexapod_cosim.controller import BodyCommand
-from hexapod_cosim.cosim.scenario.records import FAULTS, Command, Fault, Push, Scenario
-from hexapod_cosim.models import LEG_NAMES
+from hexapod_cosim.cosim.scenario.records import (
+    FAULTS,
+    SERVO_FAULTS,
+    Command,
+    Fault,
+    Lost,
+    Push,
+    Scenario,
+    ServoFault,
+)
+from hexapod_cosim.models import JOINT_NAMES, LEG_NAMES
 
 ROUND_OFF = 5e-10  # s    of the time of a macro-step
 
 
 @dataclass(frozen=True)
 class Schedule:
-    """Commands, pushes and sensor faults of a run, macro-step by macro-step."""
+    """Commands, pushes and faults of a run, macro-step by macro-step."""
 
     # (steps + 1,) s    start + k h, never a running sum
     times: NDArray[np.float64]
@@ -28,6 +37,9 @@ class Schedule:
     pushes: NDArray[np.float64] | None
     # (steps + 1, 6) faults of the force sensors: 0 none, else 1 + index in FAULTS; None: no faults
     faults: NDArray[np.int8] | None
+    # (steps + 1, 6, 3) faults of the servos: 0 none, else 1 + index in SERVO_FAULTS; None: none
+    servo_faults: NDArray[np.int8] | None = None
+    lost: NDArray[np.bool_] | None = None  # (steps + 1,) the command is lost; None: none are
 
     @cached_property
     def commands(self) -> tuple[BodyCommand, ...]:
@@ -44,7 +56,14 @@ def make_schedule(scenario: Scenario) -> Schedule:
     rows = command_rows(scenario.commands, begins)
     pushes = push_rows(scenario.pushes, begins, h) if scenario.pushes else None
     faults = fault_rows(scenario.faults, times) if scenario.faults else None
-    return Schedule(scenario.start + times, np.vstack([rows, rows[-1:]]), pushes, faults)
+    return Schedule(
+        scenario.start + times,
+        np.vstack([rows, rows[-1:]]),
+        pushes,
+        faults,
+        servo_fault_rows(scenario.servo_faults, times) if scenario.servo_faults else None,
+        lost_rows(scenario.lost, times) if scenario.lost else None,
+    )
 
 
 def command_rows(commands: Sequence[Command], times: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -77,8 +96,35 @@ def fault_rows(faults: Sequence[Fault], times: NDArray[np.float64]) -> NDArray[n
     """
     rows = np.zeros((len(times), len(LEG_NAMES)), dtype=np.int8)
     for fault in faults:
-        begin, end = np.searchsorted(
-            times, [fault.time - ROUND_OFF, fault.time + fault.duration - ROUND_OFF]
-        )
-        rows[begin:end, LEG_NAMES.index(fault.leg)] = FAULTS.index(fault.fault) + 1
+        rows[_span(fault, times), LEG_NAMES.index(fault.leg)] = FAULTS.index(fault.fault) + 1
     return rows
+
+
+def servo_fault_rows(faults: Sequence[ServoFault], times: NDArray[np.float64]) -> NDArray[np.int8]:
+    """Returns the fault of each servo at each time [s from the start] (times, 6, 3), as
+    `fault_rows`.
+    """
+    rows = np.zeros((len(times), len(LEG_NAMES), len(JOINT_NAMES)), dtype=np.int8)
+    for fault in faults:
+        joint = LEG_NAMES.index(fault.leg), JOINT_NAMES.index(fault.joint)
+        rows[(_span(fault, times), *joint)] = SERVO_FAULTS.index(fault.fault) + 1
+    return rows
+
+
+def lost_rows(events: Sequence[Lost], times: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Returns whether the command at each time [s from the start] is lost (times,); never the
+    first.
+    """
+    rows = np.zeros(len(times), dtype=np.bool_)
+    for event in events:
+        rows[_span(event, times)] = True
+    rows[0] = False
+    return rows
+
+
+def _span(event: Fault | ServoFault | Lost, times: NDArray[np.float64]) -> slice:
+    """Returns which times [s from the start] lie within an event."""
+    begin, end = np.searchsorted(
+        times, [event.time - ROUND_OFF, event.time + event.duration - ROUND_OFF]
+    )
+    return slice(int(begin), int(end))
