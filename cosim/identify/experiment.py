@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from types import SimpleNamespace
 
 import numpy as np
@@ -56,9 +57,14 @@ class Experiment:
 
 def robot_parameters(robot: Robot, base: Robot) -> dict[str, float]:
     """Returns the parameters of the FMU in which a robot differs from the one it was made of."""
-    own = parameter_values(PLANT, SimpleNamespace(robot=robot, settled=_REST))
-    other = parameter_values(PLANT, SimpleNamespace(robot=base, settled=_REST))
-    return {name: value for name, value in own.items() if value != other[name]}
+    other = _parameters(base)
+    return {name: value for name, value in _parameters(robot).items() if value != other[name]}
+
+
+@lru_cache(maxsize=8)
+def _parameters(robot: Robot) -> dict[str, float]:
+    """Returns the parameters of a robot's FMU but for its pose of rest."""
+    return parameter_values(PLANT, SimpleNamespace(robot=robot, settled=_REST))
 
 
 def simulated(

@@ -34,15 +34,15 @@ Progress = Callable[[str], None]
 # wrong times, and a difference says nothing of the next touch-down. Torques jump when a command
 # comes, so that they are no smooth functions of the sensors' delay. Both are left out at first.
 SMOOTH = ("angle", "speed", "gyroscope", "position", "attitude")
-STEP = 0.05  # of a difference, in priors: large against the integrator's errors
+STEP = 0.1  # of a difference, in priors: large against the integrator's errors
 ENOUGH = 1e-4  # relative change of the cost at which a stage ends
 TO_DEVIATION = 1.4826  # from the median of absolute values, of a normal distribution
 MOST_RESIDUALS = 150_000  # later ones are thinned evenly
 LONGEST_CORRELATION = 50  # rows
 # A reading is left out around a jump of the simulated signal: there a shift in time by a fraction
 # of a row, of which a difference tells nothing, is a large error.
-JUMP = 4.0  # second difference of a simulated signal [deviations]
-BESIDE = 2  # rows before and after a jump
+JUMP = 1.0  # second difference of a simulated signal [deviations]
+BESIDE = 6  # rows before and after a jump
 FLOOR = 1e-9  # smallest noise, in the units of the channels
 
 
