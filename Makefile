@@ -15,14 +15,14 @@ SANITIZER = rm -f $(REPORT).*; HEXAPOD_PRESET=sanitize ASAN_OPTIONS=detect_leaks
 SANITIZED_END = || { cat $(REPORT).* 2>/dev/null; exit 1; }
 TYPING := build/typing/hexapod_cosim
 SOURCES := pyproject.toml CMakeLists.txt $(shell find fmi plant_fmu controller_fmu master -type f) $(wildcard cosim/viewer/*.* cosim/viewer/src/*.ts cosim/viewer/src/*/*.ts)
-C_FILES = $(wildcard plant_fmu/src/*.[ch] plant_fmu/src/kernels/*.c plant_fmu/src/lanes/*.h plant_fmu/src/ground/*.[ch] fmi/*.[ch] plant_fmu/*.c plant_fmu/include/hexapod/*.h controller_fmu/src/*.[ch] controller_fmu/src/*/*.[ch] controller_fmu/*.c controller_fmu/include/hexapod/*.h master/src/*.c master/include/hexapod/*.h tests/native/*.[ch] tests/fuzz/*.[ch] benchmarks/native/*.[ch] benchmarks/native/*.cpp examples/*.c examples/c_library/*.c)
+C_FILES = $(wildcard plant_fmu/src/*.[ch] plant_fmu/src/kernels/*.c plant_fmu/src/lanes/*.h plant_fmu/src/ground/*.[ch] fmi/*.[ch] plant_fmu/*.c plant_fmu/include/hexapod/*.h controller_fmu/src/*.[ch] controller_fmu/src/*/*.[ch] controller_fmu/*.c controller_fmu/include/hexapod/*.h master/src/*.[ch] master/include/hexapod/*.h tests/native/*.[ch] tests/fuzz/*.[ch] benchmarks/native/*.[ch] benchmarks/native/*.cpp examples/*.c examples/c_library/*.c)
 EMPTY :=
 TEST_ROOMS := $(subst $(EMPTY) $(EMPTY),:,$(filter-out tests/native tests/conftest.py,$(wildcard tests/[a-z]*[a-z])))
 SANITIZED_SHORT := $(patsubst %,tests/fmi/test_%.py,fmi fmi3 fmi3_order fmi_state fmi_values fmi_exchange) \
 	$(patsubst %,tests/plant/test_plant_%.py,events coordinates misuse)
 SANITIZED := $(SANITIZED_SHORT) tests/fmi/test_fmi_importers.py tests/fmi/test_endurance.py
 
-.PHONY: help setup demo test test-browser test-importers test-platforms test-endurance test-native test-native-sanitize test-sanitize test-sanitize-short test-robots fuzz fuzz-short mutants lint-c check bench bench-quick bench-batch bench-opening control identify-campaign study-demo format generate fmu typing clean docs
+.PHONY: help setup demo test test-browser test-importers test-platforms test-endurance test-native test-native-sanitize test-sanitize test-sanitize-short test-robots test-wheels wheels fuzz fuzz-short mutants lint-c check bench bench-quick bench-batch bench-opening control identify-campaign study-demo format generate fmu typing clean docs
 
 help:
 	@echo "make setup     the hexapod command in $(BIN)"
@@ -36,6 +36,8 @@ help:
 	@echo "make test-sanitize   these, the FMU's tests and random calls under address and undefined-behaviour sanitizers (5 min)"
 	@echo "make test-sanitize-short  the same without random calls and many instances (2 min)"
 	@echo "make test-robots  30 robots drawn at random, 0.5 to 30 kg: all designed for, all walk (3 min)"
+	@echo "make wheels    wheels for Linux, Windows and macOS, source distribution and SHA-256 list in dist/ (5 min)"
+	@echo "make test-wheels  these: sizes, tags, and the Linux wheel in an empty environment without a compiler (3 min)"
 	@echo "make fuzz      libFuzzer on calls, states, start values and grids, Hypothesis on every reader: FUZZ_SECONDS, 3600 in all"
 	@echo "make fuzz-short  the same for a minute in all"
 	@echo "make mutants   MUTANTS (200) small changes of the code, one at a time: which ones the tests find (hours)"
@@ -75,7 +77,7 @@ test: setup typing
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest $(PARALLEL)
 
 test-browser: setup
-	HEXAPOD_BROWSER=full $(BIN)/python -m pytest -s tests/report/test_browser.py
+	HEXAPOD_BROWSER=full $(BIN)/python -m pytest -s tests/report/test_browser.py tests/live/test_live_browser.py
 
 test-importers: setup
 	$(BIN)/python -m tools.importers.compare
@@ -90,6 +92,19 @@ test-endurance: setup
 
 test-robots: setup
 	HEXAPOD_ROBOTS=all $(BIN)/python -m pytest -q -s tests/design/test_random_robots.py
+
+WHEELS := dist
+RELEASE := $(VENV)/.release
+
+$(RELEASE): $(STAMP)
+	$(BIN)/python -m pip install --quiet build wheel twine auditwheel ziglang
+	@touch $@
+
+wheels: setup $(RELEASE)
+	$(BIN)/python -m tools.wheels $(WHEELS)
+
+test-wheels: wheels
+	HEXAPOD_WHEELS=$(WHEELS) $(BIN)/python -m pytest -v tests/release
 
 # programs in C, run by ctest
 test-native: setup
@@ -185,7 +200,7 @@ fmu: setup
 # the folders under the name they are imported by, for type checkers
 typing:
 	@mkdir -p $(TYPING)
-	@for part in models controller cosim; do ln -sfn ../../../$$part $(TYPING)/$$part; done
+	@for part in models controller cosim gym; do ln -sfn ../../../$$part $(TYPING)/$$part; done
 	@ln -sfn ../../../package/hexapod_cosim/__init__.py $(TYPING)/__init__.py
 
 clean:

@@ -5,15 +5,17 @@ from __future__ import annotations
 import base64
 import io
 from collections.abc import Mapping
+from typing import TYPE_CHECKING
 
-import matplotlib
 import numpy as np
-from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from hexapod_cosim.controller.figure_style import PALETTE, SETTINGS, UNDATED, WIDTH
 from hexapod_cosim.cosim.identify.log import CHANNELS, Channel, Log
 from hexapod_cosim.models import LEG_NAMES
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 Array = NDArray[np.float64]
 Simulated = Mapping[str, Mapping[str, Array]]  # label of a simulation: columns by name (rows,)
@@ -29,6 +31,8 @@ def channel_figures(
 
     split: time [s] of a vertical line.
     """
+    from matplotlib import rc_context  # noqa: PLC0415  slow to import
+
     found = {}
     for channel in CHANNELS:
         names = [
@@ -37,7 +41,7 @@ def channel_figures(
             if any(name in columns for columns in simulations.values())
         ]
         if names:
-            with matplotlib.rc_context(SETTINGS):
+            with rc_context(SETTINGS):
                 found[channel.title] = _svg(_draw(log, channel, names, simulations, split))
     return found
 
@@ -53,6 +57,8 @@ def _draw(
     legs = names[0].split(".")[0] in LEG_NAMES
     across = len(LEG_NAMES) if legs else 3
     rows = -(-len(channel.names if legs else names) // across)
+    from matplotlib.figure import Figure  # noqa: PLC0415  slow to import
+
     figure = Figure(figsize=(1.5 * WIDTH, ROW * max(rows, 1) + 0.5))
     axes = figure.subplots(rows, across, squeeze=False, sharex=True)
     thin = slice(None, None, max(len(log.time) // MOST_POINTS, 1))

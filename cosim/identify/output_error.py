@@ -15,7 +15,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import least_squares
 
 from hexapod_cosim.cosim.identify.experiment import (
     Experiment,
@@ -294,6 +293,8 @@ def read_noise(problem: Problem) -> dict[str, float]:
 
 def fit(problem: Problem, *, progress: Progress | None = None) -> Fit:
     """Returns the most probable numbers. Raises HexapodError when the plant refuses the start."""
+    from scipy.optimize import least_squares  # noqa: PLC0415  slow to import
+
     z, least, bounds = np.zeros(len(problem.rows)), read_noise(problem), problem.bounds()
     for number, stage in enumerate(STAGES):
         problem.set_noise(

@@ -78,6 +78,7 @@ static const ProbeField fields[] = {
     FIELD(hxDefinition, friction.spin_radius),
     FIELD(hxDefinition, friction.rolling_radius),
     FIELD(hxDefinition, servo.mode),
+    FIELD(hxDefinition, servo.drive),
     FIELD(hxDefinition, servo.kp),
     FIELD(hxDefinition, servo.kd),
     FIELD(hxDefinition, servo.torque_max),
@@ -86,6 +87,8 @@ static const ProbeField fields[] = {
     FIELD(hxDefinition, servo.coulomb_friction),
     FIELD(hxDefinition, servo.stop_stiffness),
     FIELD(hxDefinition, servo.stop_damping),
+    FIELD(hxDefinition, servo.voltage),
+    FIELD(hxDefinition, servo.friction_speed),
     FIELD(hxDefinition, baumgarte.alpha),
     FIELD(hxDefinition, baumgarte.beta),
     FIELD(hxDefinition, gravity),
@@ -179,6 +182,8 @@ static const ProbeField fields[] = {
     FIELD(hxOutput, solver.touchdowns),
     FIELD(hxOutput, footprints),
     FIELD(hxOutput, cone_time),
+    FIELD(hxOutput, current),
+    FIELD(hxOutput, electrical_power),
 };
 
 /* Returns the name of the i-th field, its offset and size; NULL past the last. */
@@ -389,6 +394,16 @@ HX_API void hx_probe_stop(const hxPlant *plant, int leg, int joint, double angle
   out[2] = hx_lane(stop.stiffness, lane), out[3] = hx_lane(stop.damping, lane);
 }
 
+/* Computes the friction of motor and gear under a motor torque and an external torque. out:
+ * friction, drag */
+HX_API void hx_probe_gear(const hxPlant *plant, double speed, double motor, double external,
+                          double out[2]) {
+  const hxReal w = hx_splat(speed), load = hx_splat(external);
+  hxServo servo = {.torque = hx_splat(motor)};
+  hx_measured_friction(&plant->model, &w, &load, &servo);
+  out[0] = hx_lane(servo.friction, 0), out[1] = hx_lane(servo.drag, 0);
+}
+
 /* Computes a servo. command: angle, speed, torque; out: torque, friction, stiffness, damping. */
 HX_API void hx_probe_servo(const hxPlant *plant, double angle, double speed,
                            const double command[3], double out[4]) {
@@ -559,12 +574,6 @@ HX_API void hx_probe_stage(hxPlant *plant, const hxInput *input, double z, doubl
   }
 }
 
-/* Overwrites the stack that the next call uses. */
-HX_API void hx_probe_stain_stack(int byte) {
-  volatile char stain[300000];
-  for (size_t i = 0; i < sizeof stain; ++i) stain[i] = (char)byte;
-}
-
 /* Computes dy/dt with the i-th kernel. Returns its name, or NULL when there is none or the
  * processor does not support it. */
 HX_API const char *hx_probe_kernel(int i, hxPlant *plant, const hxInput *input,
@@ -575,7 +584,7 @@ HX_API const char *hx_probe_kernel(int i, hxPlant *plant, const hxInput *input,
     if (!hx_kernels[k]) return NULL;
   if (!hx_kernels[i]->is_supported()) return NULL;
   hx_command_from_input(&command, input, plant->state.time);
-  hx_kernels[i]->derivative(&plant->model, &plant->state, &command, 1, &rate);
+  hx_kernels[i]->derivative(&plant->model, &plant->state, &command, 1, plant->scratch, &rate);
   hx_bodies_from_motion(&plant->model, &rate, body);
   return hx_kernels[i]->name;
 }
