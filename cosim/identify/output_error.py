@@ -56,7 +56,7 @@ class Stage:
 
 
 ALL = tuple(channel.key for channel in CHANNELS)
-STAGES = (Stage(SMOOTH, 0.3, 1.0, 8), Stage(ALL, 1.0, 1.0, 10), Stage(ALL, 1.0, 3.0, 8))
+STAGES = (Stage(SMOOTH, 0.3, 1.0, 15), Stage(ALL, 1.0, 1.0, 25), Stage(ALL, 1.0, 3.0, 25))
 
 
 @dataclass(frozen=True)

@@ -18,16 +18,17 @@ from secret_robots import NOISE, Secret, secret_robot
 
 from benchmarks.identification.__main__ import GOAL_COVERED, GOAL_RATIO, ratios, summary
 from benchmarks.identification.__main__ import score as score_of
+from hexapod_cosim.cosim.identify import excitation
 from hexapod_cosim.cosim.identify.excitation import Proposal, propose, scenario_text
-from hexapod_cosim.cosim.identify.experiment import Experiment
-from hexapod_cosim.cosim.identify.identify import Identified, identify
+from hexapod_cosim.cosim.identify.experiment import Experiment, of_point
+from hexapod_cosim.cosim.identify.identify import Identified, identify, make_experiment
 from hexapod_cosim.cosim.identify.log import Log
 from hexapod_cosim.cosim.identify.log_plant import LogPlant
-from hexapod_cosim.cosim.identify.output_error import Fit
+from hexapod_cosim.cosim.identify.output_error import Fit, Problem
 from hexapod_cosim.cosim.identify.robot_file import write_robot
 from hexapod_cosim.cosim.identify.screening import screened
 from hexapod_cosim.cosim.identify.start import initial_state
-from hexapod_cosim.cosim.identify.unknowns import ROBOT
+from hexapod_cosim.cosim.identify.unknowns import ROBOT, chosen_unknowns
 from hexapod_cosim.cosim.logs.mcap_writer import write_mcap
 from hexapod_cosim.cosim.master.recorder import Recording
 from hexapod_cosim.models import load_robot
@@ -161,6 +162,46 @@ def test_a_delay_of_whole_rows_shifts_the_readings(secrets: list[Secret], athena
     middle = 0.5 * (now[1:, 0] + now[:-1, 0])
     assert between[1:, 0] == pytest.approx(middle, abs=1e-3)
     assert np.abs(between[1:, 0] - now[1:, 0]).max() > 5e-3
+
+
+def test_a_walk_is_proposed_for_what_it_would_tell(
+    found: list[Identified], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A walk tells at least what it adds; the limits of the servos need a fast one."""
+    only = excitation.walks(found[0].robot)[:1]
+    monkeypatch.setattr(excitation, "walks", lambda _robot: only)
+    monkeypatch.setattr(excitation, "DURATION", 1.0)
+    (one,) = propose(found[0], "athena")
+    assert (one.title, one.tells) == ("A walk straight ahead", ())
+    before = found[0].fit.deviations
+    assert all(one.deviations[key] <= before[key] for key in one.deviations)
+    assert one.deviations["servo.kp"] < 0.99 * before["servo.kp"]
+
+
+def test_the_position_of_another_point_turns_with_the_torso() -> None:
+    columns, quarter = ("torso.position[1]", "torso.position[2]", "torso.position[3]"), np.pi / 2
+    attitude = np.array([[0.0, 0.0, quarter], [quarter, 0.0, 0.0], [0.0, quarter, 0.0]])
+    places = of_point(columns, np.zeros((3, 3)), attitude, np.array([0.1, 0.2, 0.3]))
+    assert places == pytest.approx(
+        np.array([[-0.2, 0.1, 0.3], [0.1, -0.3, 0.2], [0.3, 0.2, -0.1]]), abs=1e-15
+    )
+
+
+def test_two_logs_have_one_robot_and_two_starts(secrets: list[Secret], athena_fmu: Path) -> None:
+    robot, logs = load_robot("athena"), [secrets[0].log, secrets[0].log]
+    rows = chosen_unknowns(robot, logs, GROUPS)
+    assert [row.key for row in rows if row.key.startswith("start.x")] == [
+        "start.x[1]",
+        "start.x[2]",
+    ]
+    both = [make_experiment(log, number, 0.25) for number, log in enumerate(logs)]
+    with LogPlant(athena_fmu) as plant:
+        problem = Problem(plant, robot, both, rows)
+        z = np.zeros(len(rows))
+        z[[row.key for row in rows].index("start.x[2]")] = 1.0
+        first, second = problem.errors(z)
+    place = both[0].columns.index("torso.position[1]")
+    assert second[:, place] - first[:, place] == pytest.approx(0.005, abs=1e-6)
 
 
 def test_a_proposed_walk_is_a_scenario_for_the_identified_robot() -> None:
