@@ -3,9 +3,9 @@
 The numbers minimise the sum of squares of (predicted - measured) / noise over all readings, and of
 (number - number before) / prior over all numbers. The second sum keeps the robot file's value
 where the readings tell nothing. With white noise this is the most probable robot; the covariance is
-that of the linearised problem. The noise of a channel is the typical size of its residuals, and
-residuals beyond three deviations count linearly (Huber's loss). Correlated residuals count as fewer
-readings.
+that of the linearised problem, plus the square of the step that the optimiser left. The noise of a
+channel is the typical size of its residuals, and residuals beyond three deviations count linearly
+(Huber's loss). Correlated residuals count as fewer readings.
 """
 
 from __future__ import annotations
@@ -263,6 +263,16 @@ class Problem:
         return covariance, np.sqrt(np.maximum(eigenvalues, 0.0))
 
 
+def remaining_step(jacobian: Array, residuals: Array) -> Array:
+    """Returns the step (rows,) that Gauss and Newton's method would still take, in priors.
+
+    It is 0 at an optimum. Residuals beyond three deviations count as three.
+    """
+    bounded = np.clip(residuals, -STAGES[-1].scale, STAGES[-1].scale)
+    step: Array = -np.linalg.lstsq(jacobian.T @ jacobian, jacobian.T @ bounded, rcond=None)[0]
+    return step
+
+
 def _correlated(column: Array) -> float:
     """Returns how many readings of a column of residuals in a row count as one."""
     centred = column - np.mean(column)
@@ -318,7 +328,11 @@ def fit(problem: Problem, *, progress: Progress | None = None) -> Fit:
     errors = problem.errors(z)
     problem.set_noise(errors)
     correlated = problem.correlation(errors)
-    covariance, singular = problem.covariance(problem.jacobian(z), correlated)
+    jacobian = problem.jacobian(z)
+    covariance, singular = problem.covariance(jacobian, correlated)
+    left = remaining_step(jacobian, problem.residuals(z))
+    # where touch-downs make the sum of squares rough, the optimiser stops on the way
+    covariance = covariance + np.outer(left, left)
     return Fit(
         rows=problem.rows,
         before=problem.before,

@@ -24,7 +24,7 @@ from hexapod_cosim.cosim.identify.experiment import Experiment, of_point
 from hexapod_cosim.cosim.identify.identify import Identified, identify, make_experiment
 from hexapod_cosim.cosim.identify.log import Log
 from hexapod_cosim.cosim.identify.log_plant import LogPlant
-from hexapod_cosim.cosim.identify.output_error import Fit, Problem
+from hexapod_cosim.cosim.identify.output_error import Fit, Problem, remaining_step
 from hexapod_cosim.cosim.identify.robot_file import write_robot
 from hexapod_cosim.cosim.identify.screening import screened
 from hexapod_cosim.cosim.identify.start import initial_state
@@ -176,6 +176,17 @@ def test_a_walk_is_proposed_for_what_it_would_tell(
     before = found[0].fit.deviations
     assert all(one.deviations[key] <= before[key] for key in one.deviations)
     assert one.deviations["servo.kp"] < 0.99 * before["servo.kp"]
+
+
+def test_no_step_is_left_at_the_optimum_of_a_linear_problem() -> None:
+    rng = np.random.default_rng(1)
+    jacobian, readings = rng.normal(size=(200, 4)), 0.1 * rng.normal(size=200)
+    best = np.linalg.lstsq(jacobian, readings, rcond=None)[0]
+    at_best = jacobian @ best - readings
+    assert remaining_step(jacobian, at_best) == pytest.approx(np.zeros(4), abs=1e-12)
+    away = np.array([0.01, -0.02, 0.03, 0.0])
+    beside = jacobian @ (best + away) - readings
+    assert remaining_step(jacobian, beside) == pytest.approx(-away, abs=1e-12)
 
 
 def test_the_position_of_another_point_turns_with_the_torso() -> None:
