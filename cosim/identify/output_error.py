@@ -269,8 +269,8 @@ def remaining_step(jacobian: Array, residuals: Array) -> Array:
     It is 0 at an optimum. Residuals beyond three deviations count as three.
     """
     bounded = np.clip(residuals, -STAGES[-1].scale, STAGES[-1].scale)
-    step: Array = -np.linalg.lstsq(jacobian.T @ jacobian, jacobian.T @ bounded, rcond=None)[0]
-    return step
+    normal, right = jacobian.T @ jacobian, jacobian.T @ bounded
+    return np.asarray(-np.linalg.lstsq(normal, right, rcond=None)[0], dtype=np.float64)
 
 
 def _correlated(column: Array) -> float:
