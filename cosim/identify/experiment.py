@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from types import SimpleNamespace
 
 import numpy as np
@@ -17,7 +18,7 @@ from hexapod_cosim.cosim.identify.unknowns import CURRENT, DELAY, Unknown, chang
 from hexapod_cosim.cosim.interface.names import joint_names, vector_names
 from hexapod_cosim.cosim.interface.start_values import parameter_values
 from hexapod_cosim.models import Robot
-from hexapod_cosim.models.kinematics import axis_quaternion, quaternion_product
+from hexapod_cosim.models.kinematics import axis_quaternion, quaternion_product, rotation_matrix
 
 Array = NDArray[np.float64]
 PLACE, TURN = vector_names("initial.position"), vector_names("initial.quaternion", 4)
@@ -56,9 +57,14 @@ class Experiment:
 
 def robot_parameters(robot: Robot, base: Robot) -> dict[str, float]:
     """Returns the parameters of the FMU in which a robot differs from the one it was made of."""
-    own = parameter_values(PLANT, SimpleNamespace(robot=robot, settled=_REST))
-    other = parameter_values(PLANT, SimpleNamespace(robot=base, settled=_REST))
-    return {name: value for name, value in own.items() if value != other[name]}
+    other = _parameters(base)
+    return {name: value for name, value in _parameters(robot).items() if value != other[name]}
+
+
+@lru_cache(maxsize=8)
+def _parameters(robot: Robot) -> dict[str, float]:
+    """Returns the parameters of a robot's FMU but for its pose of rest."""
+    return parameter_values(PLANT, SimpleNamespace(robot=robot, settled=_REST))
 
 
 def simulated(
@@ -76,19 +82,48 @@ def simulated(
     """
     robot, log = changed_robot(base, rows, values), experiment.log
     zero = np.array([values.get(f"zero.{name}", 0.0) for name in JOINTS])
+    # the pose in the log is that of the point which the robot file has as the centre of mass
+    offset = np.array(base.torso.com) - np.array(robot.torso.com)
     names = [_source(name) for name in experiment.columns]
-    different = list(dict.fromkeys(names))
+    different = list(dict.fromkeys([*names, *ATTITUDE]))
     found = plant.simulate(
         log,
         different,
         {
             **robot_parameters(robot, base),
-            **_start(log, robot, zero, experiment.number, values),
+            **_start(log, robot, zero, experiment.number, values, offset),
         },
         offset=-zero if zero.any() else None,
         delay=values.get(DELAY, 0.0),
     )
-    return found[:, [different.index(name) for name in names]]
+    own = found[:, [different.index(name) for name in names]]
+    attitude = found[:, [different.index(name) for name in ATTITUDE]]
+    return of_point(experiment.columns, own, attitude, offset)
+
+
+def of_point(columns: Sequence[str], outputs: Array, attitude: Array, offset: Array) -> Array:
+    """Returns outputs (rows, columns) with the position of another point of the torso.
+
+    attitude: roll, pitch and yaw (rows, 3) [rad]. offset: from the centre of mass to the point, in
+    torso axes (3,) [m].
+    """
+    if not offset.any():
+        return outputs
+    found, turned = outputs.copy(), _turned(attitude, offset)
+    for axis, name in enumerate(vector_names("torso.position")):
+        if name in columns:
+            found[:, columns.index(name)] += turned[:, axis]
+    return found
+
+
+def _turned(attitude: Array, vector: Array) -> Array:
+    """Returns a vector of the torso (3,) in world axes (rows, 3), from z-y-x angles (rows, 3)."""
+    (cr, cp, cy), (sr, sp, sy) = np.cos(attitude).T, np.sin(attitude).T
+    x, y, z = vector.tolist()
+    ahead = cp * x + sp * (sr * y + cr * z)
+    left = cr * y - sr * z
+    up = -sp * x + cp * (sr * y + cr * z)
+    return np.column_stack([cy * ahead - sy * left, sy * ahead + cy * left, up])
 
 
 def readings(experiment: Experiment, outputs: Array, values: Mapping[str, float]) -> Array:
@@ -116,16 +151,27 @@ def _source(name: str) -> str:
 
 
 def _start(
-    log: Log, robot: Robot, zero: Array, number: int, values: Mapping[str, float]
+    log: Log,
+    robot: Robot,
+    zero: Array,
+    number: int,
+    values: Mapping[str, float],
+    offset: Array,
 ) -> dict[str, float]:
     """Returns the initial state: that of the first row, without the zeros of the joints' angles
     and with the start values that are unknown.
+
+    offset: from the centre of mass to the point whose position the log has (3,) [m].
     """
     found = initial_state(log, robot)
-    for name, offset in zip(joint_names("angle"), zero.tolist(), strict=True):
-        found[f"initial.{name}"] -= offset
+    for name, angle in zip(joint_names("angle"), zero.tolist(), strict=True):
+        found[f"initial.{name}"] -= angle
     for axis, name in zip("xy", PLACE, strict=False):
         found[name] += values.get(f"start.{axis}[{number + 1}]", 0.0)
+    if log.has(vector_names("torso.position")):
+        turned = rotation_matrix(np.array([found[name] for name in TURN])) @ offset
+        for name, value in zip(PLACE, turned.tolist(), strict=True):
+            found[name] -= value
     yaw = values.get(f"start.yaw[{number + 1}]", 0.0)
     if yaw:
         turn = axis_quaternion(np.array([0.0, 0.0, 1.0]), yaw)

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -81,9 +82,7 @@ class Log:
     def commands(self) -> Mapping[str, Array]:
         """The plant's inputs in the log, by name, each (rows,)."""
         have = set(self.recording.names)
-        return {
-            name: self.recording.column(name) for name in plant_variables("input") if name in have
-        }
+        return {name: self.recording.column(name) for name in input_names() if name in have}
 
     def names(self, channel: Channel) -> tuple[str, ...]:
         """Returns the columns of a channel that the log has."""
@@ -108,6 +107,12 @@ class Log:
         keep = [k for k, name in enumerate(self.recording.names) if name not in names]
         kept = tuple(self.recording.names[k] for k in keep)
         return Log(Recording(kept, self.recording.data[:, keep]), self.where)
+
+
+@cache
+def input_names() -> tuple[str, ...]:
+    """Returns the plant's inputs, which a log's commands are."""
+    return tuple(plant_variables("input"))
 
 
 def read_log(path: Path, *, torso_com: Sequence[float] = (0.0, 0.0, 0.0)) -> Log:
@@ -148,7 +153,7 @@ def log_of(recording: Recording, where: str) -> Log:
         )
     _check_times(recording.time, where)
     known = _with_attitude(recording)
-    wanted = {*plant_variables("input"), *(name for one in CHANNELS for name in one.names)}
+    wanted = {*input_names(), *(name for one in CHANNELS for name in one.names)}
     wanted |= {*vector_names("torso.velocity"), *vector_names("torso.angular_velocity")}
     wanted |= set(vector_names(QUATERNIONS[0], 4))
     keep = [0, *(k for k, name in enumerate(known.names) if name in wanted)]

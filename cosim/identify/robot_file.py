@@ -46,6 +46,7 @@ def robot_text(found: Identified, file: str, folder: Path, logs: Sequence[str]) 
     for name in SECTIONS:
         _set_changed(document, name, getattr(found.file, name), getattr(found.robot, name))
     _set_bodies(document, found.file, found.robot)
+    _set_defaults(document, found.robot)
     return tomlkit.dumps(document)
 
 
@@ -83,7 +84,7 @@ def _sentence(one: Estimate) -> str:
 
 
 def _set_changed(document: Any, name: str, before: Any, after: Any) -> None:
-    """Sets the keys of a section that have changed, and those that the file leaves to defaults."""
+    """Sets the keys of a section that have changed."""
     changed = [
         item.name
         for item in fields(after)
@@ -94,10 +95,14 @@ def _set_changed(document: Any, name: str, before: Any, after: Any) -> None:
     section = document.setdefault(name, tomlkit.table())
     for key in changed:
         section[key] = getattr(after, key)
-    # defaults that depend on numbers which have changed
-    for key in ("motor_constant", "presliding", "stiffness"):
-        if hasattr(after, key) and key not in section:
-            section[key] = getattr(after, key)
+
+
+def _set_defaults(document: Any, after: Robot) -> None:
+    """Sets what a file leaves to a default that depends on numbers which may have changed."""
+    for section, key in (("servo", "motor_constant"), ("friction", "presliding")):
+        table = document.setdefault(section, tomlkit.table())
+        if key not in table:
+            table[key] = getattr(getattr(after, section), key)
 
 
 def _set_bodies(document: Any, before: Robot, after: Robot) -> None:

@@ -11,6 +11,9 @@ from pathlib import Path
 import pytest
 from pages import blocks, commands, run
 
+from hexapod_cosim.cosim.logs.mcap_writer import write_mcap
+from hexapod_cosim.cosim.results.recordings import read_parquet
+
 PAGES = Path(__file__).parents[2] / "docs" / "howto"
 COMMANDS = commands(PAGES / "fmpy.md", "fmpy")
 PYTHON = [text for kind, text in blocks(PAGES / "fmpy.md") if kind == "python"]
@@ -62,6 +65,8 @@ def robots(folder: Path) -> Path:
     """Where a reader with a robot of one's own is: it lies there as a robot file and as a URDF."""
     shutil.copy(Path(__file__).parents[2] / "models" / "athena.toml", folder / "my.toml")
     run(folder, "hexapod", "export", "-o", "my.urdf")
+    walk = read_parquet(folder / "out" / "walk" / "results.parquet")
+    write_mcap(walk.chosen(["*.angle_ref", "*.speed_ref", "*.coxa.angle"]), folder / "log.mcap")
     return folder
 
 
@@ -80,4 +85,5 @@ def test_the_pages_on_robots_and_packages_have_commands() -> None:
 )
 def test_a_command_of_the_pages_on_robots_and_packages_works(robots: Path, command: str) -> None:
     shorter = ["--set", f"duration={SHORT}"] if "simulate" in command else []
+    shorter += ["--find", "servo", "--no-propose"] if "identify" in command else []
     assert run(robots, *shlex.split(command), *shorter)

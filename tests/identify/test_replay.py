@@ -41,9 +41,9 @@ def log(folder: Path) -> Log:
 
 def test_a_recording_of_the_fmu_drives_it_to_the_same_readings(log: Log, athena_fmu: Path) -> None:
     done = replay(log, load_robot("athena"), fmu=athena_fmu)
-    assert len(done.names) == 90
+    assert len(done.names) == 108
     assert {one.channel for one in done.channels} == {
-        "angle", "speed", "torque", "normal_force", "force",
+        "angle", "speed", "torque", "current", "normal_force", "force",
         "gyroscope", "accelerometer", "position", "attitude",
     }  # fmt: skip
     assert max(one.largest for one in done.columns) < ROUND_OFF
@@ -88,7 +88,7 @@ def test_a_log_without_a_pose_begins_with_the_feet_on_the_ground(
     assert initial_state(blind, robot)["initial.position[3]"] == pytest.approx(height, abs=2e-4)
     errors = {one.channel: one.rms for one in replay(blind, robot, fmu=athena_fmu).channels}
     assert set(errors) == {
-        "angle", "speed", "torque", "normal_force", "force", "gyroscope", "accelerometer"
+        "angle", "speed", "torque", "current", "normal_force", "force", "gyroscope", "accelerometer"
     }  # fmt: skip
     assert errors["angle"] < 1e-3
 

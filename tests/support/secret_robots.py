@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 import hexapod_cosim
 from hexapod_cosim.cosim.export.export import export_fmu
-from hexapod_cosim.cosim.identify.experiment import Experiment, readings
-from hexapod_cosim.cosim.identify.log import CHANNELS, Log, log_of
+from hexapod_cosim.cosim.identify.experiment import JOINTS, Experiment, of_point, readings
+from hexapod_cosim.cosim.identify.log import ATTITUDE, CHANNELS, Log, log_of
 from hexapod_cosim.cosim.identify.log_plant import LogPlant
 from hexapod_cosim.cosim.identify.unknowns import (
     DELAY,
@@ -45,7 +45,8 @@ NOISE = {
 SEEN = ("angle", "speed", "torque", "normal_force", "gyroscope", "accelerometer", "position",
         "attitude")  # fmt: skip
 GROUPS = ("servo", "mass", "contact", "sensor")
-REST, PERIOD = 0.5, 0.005  # s    standing still at first, between two rows
+PERIOD = 0.005  # s    between two rows
+REST, BEFORE = 0.5, 1.5  # s    standing still at the start of the log, and before it
 WALK = {
     "command": [
         {"time": 0.0, "vx": 0.08},
@@ -71,15 +72,15 @@ class Secret:
 
 @cache
 def walking_commands(duration: float) -> Log:
-    """Returns commands for standing still and then walking, over a duration [s]."""
+    """Returns commands for standing still from -BEFORE on and then walking, up to a time [s]."""
     settings = {"duration": duration - REST, "outputs.plots": False, **WALK}
     recording = hexapod_cosim.simulate("walk_flat", "kinematic", settings=settings).recording
     names = ("time", *joint_names("angle_ref"), *joint_names("speed_ref"))
     rows = recording.columns(names)
-    still = np.repeat(rows[:1], round(REST / PERIOD), axis=0)
+    still = np.repeat(rows[:1], round((BEFORE + REST) / PERIOD), axis=0)
     still[:, 1 + 18 :] = 0.0
     data = np.vstack([still, rows])
-    data[:, 0] = PERIOD * np.arange(len(data))
+    data[:, 0] = PERIOD * np.arange(len(data)) - BEFORE
     return log_of(Recording(names, data), "commands")
 
 
@@ -113,13 +114,21 @@ def secret_robot(
     experiment = Experiment(
         log=commands, number=0, columns=columns, fitted=slice(None), held_out=slice(0, 0)
     )
+    zero = np.array([values.get(f"zero.{name}", 0.0) for name in JOINTS])
     pose = plant_roots(robot).settled
     start = dict(zip(vector_names("initial.position"), pose.position, strict=True))
     with LogPlant(export_fmu(robot, folder / f"secret{seed}.fmu"), EXACT) as plant:
-        outputs = plant.simulate(commands, columns, start, delay=values.get(DELAY, 0.0))
-    clean = readings(experiment, outputs, values)
+        outputs = plant.simulate(
+            commands, columns, start, offset=-zero, delay=values.get(DELAY, 0.0)
+        )
+    # cameras see a point of the torso, not the centre of mass
+    offset = np.array(file.torso.com) - np.array(robot.torso.com)
+    attitude = outputs[:, [columns.index(name) for name in ATTITUDE]]
+    outputs = of_point(columns, outputs, attitude, offset)
+    recorded = slice(round(BEFORE / PERIOD), None)
+    clean = readings(experiment, outputs, values)[recorded]
     noise = np.array([NOISE[key] for key in experiment.channels])
     noisy = clean + noise * rng.standard_normal(clean.shape)
-    data = np.column_stack([commands.recording.data, noisy])
+    data = np.column_stack([commands.recording.data[recorded], noisy])
     log = log_of(Recording((*commands.recording.names, *columns), data), f"robot {seed}")
     return Secret(robot, values, log, clean, columns)

@@ -1,0 +1,1 @@
+"""Robots with secret numbers, identified from their logs."""

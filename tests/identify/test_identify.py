@@ -1,0 +1,271 @@
+"""Identification: secret robots are found within their intervals, a log tells nothing of what it
+does not show, dead and wrong columns are named, and the robot file is the identified robot.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+import tomllib
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from command import Call, assert_refused
+from secret_robots import NOISE, Secret, secret_robot
+
+from benchmarks.identification.__main__ import GOAL_COVERED, GOAL_RATIO, ratios, summary
+from benchmarks.identification.__main__ import score as score_of
+from hexapod_cosim.cosim.identify import excitation
+from hexapod_cosim.cosim.identify.excitation import Proposal, propose, scenario_text
+from hexapod_cosim.cosim.identify.experiment import Experiment, of_point
+from hexapod_cosim.cosim.identify.identify import Identified, identify, make_experiment
+from hexapod_cosim.cosim.identify.log import Log
+from hexapod_cosim.cosim.identify.log_plant import LogPlant
+from hexapod_cosim.cosim.identify.output_error import Fit, Problem, remaining_step
+from hexapod_cosim.cosim.identify.robot_file import write_robot
+from hexapod_cosim.cosim.identify.screening import screened
+from hexapod_cosim.cosim.identify.start import initial_state
+from hexapod_cosim.cosim.identify.unknowns import ROBOT, chosen_unknowns
+from hexapod_cosim.cosim.logs.mcap_writer import write_mcap
+from hexapod_cosim.cosim.master.recorder import Recording
+from hexapod_cosim.models import load_robot
+
+DURATION = 1.8  # s
+GROUPS = ("servo", "contact")
+
+
+@pytest.fixture(scope="module")
+def secrets(plant_build: Path, tmp_path_factory: pytest.TempPathFactory) -> list[Secret]:
+    folder = tmp_path_factory.mktemp("secret")
+    return [secret_robot(seed, folder, duration=DURATION, groups=GROUPS) for seed in (1, 2)]
+
+
+@pytest.fixture(scope="module")
+def found(secrets: list[Secret]) -> list[Identified]:
+    robot = load_robot("athena")
+    return [identify([secret.log], robot, groups=GROUPS) for secret in secrets]
+
+
+def test_numbers_of_secret_robots_lie_within_their_intervals(
+    secrets: list[Secret], found: list[Identified]
+) -> None:
+    """The campaign of 20 robots and all numbers is `make identify-campaign`."""
+    scores = [score_of(*pair, 0.0) for pair in zip(secrets, found, strict=True)]
+    figures = summary(scores)
+    assert figures["told"] == 16
+    assert figures["covered"] >= GOAL_COVERED
+
+
+def test_the_held_out_errors_of_torque_and_attitude_fall_to_a_tenth(
+    secrets: list[Secret], found: list[Identified]
+) -> None:
+    """A second of walking shows little of the position, which the campaign judges."""
+    for pair in zip(secrets, found, strict=True):
+        gains = ratios(*pair)
+        assert gains["torque"] > GOAL_RATIO
+        assert gains["attitude"] > GOAL_RATIO
+
+
+def test_the_noise_of_the_sensors_is_found(found: list[Identified]) -> None:
+    for key, value in found[0].fit.noise.items():
+        assert value == pytest.approx(NOISE[key], rel=0.2), key
+
+
+def test_a_log_tells_nothing_of_limits_that_the_servos_do_not_reach(
+    found: list[Identified],
+) -> None:
+    for one in found:
+        limits = {each.key: each for each in one.estimates if each.key.endswith("_max")}
+        assert set(limits) == {"servo.torque_max", "servo.speed_max"}
+        assert not any(each.told for each in limits.values())
+        assert [each.deviation for each in limits.values()] == pytest.approx([1.0, 1.0], abs=0.01)
+        assert one.rank == 11  # all but the limits, and three of the start
+        assert one.robot.servo.torque_max == pytest.approx(6.0, rel=1e-3)
+
+
+def test_the_robot_file_is_the_identified_robot(found: list[Identified], tmp_path: Path) -> None:
+    path = tmp_path / "robot.toml"
+    write_robot(found[0], "athena", path, ["out/log.mcap"])
+    again, source = load_robot(path), tomllib.loads(path.read_text(encoding="utf-8"))["source"]
+    assert again.servo == found[0].robot.servo
+    assert (again.name, source["identified"]) == ("athena-identified", "hexapod identify log.mcap")
+    assert source["servo.kp"].startswith("identified from the log: 95 % interval")
+    assert source["servo.torque_max"].startswith("not told by the log")
+    assert "# N m/rad    assumed" in path.read_text(encoding="utf-8")  # comments stay
+
+
+def test_masses_of_all_bodies_are_written_and_read_back(
+    found: list[Identified], tmp_path: Path
+) -> None:
+    robot = load_robot("athena")
+    changed = robot
+    for row in ROBOT:
+        if row.group == "mass" and row.write is not None and row.read is not None:
+            changed = row.write(changed, 1.1 * row.read(changed) + 0.001 * (not row.positive))
+    write_robot(replace(found[0], robot=changed), "athena", tmp_path / "robot.toml", ["x.csv"])
+    assert load_robot(tmp_path / "robot.toml").legs == changed.legs
+    assert changed.torso.mass == pytest.approx(2.86, rel=1e-12)
+    assert changed.legs[4].links[1].com[0] == pytest.approx(0.0725, rel=1e-12)
+
+
+def with_column(log: Log, name: str, change: Callable[[np.ndarray], np.ndarray]) -> Log:
+    """Returns a log with one column changed."""
+    data, place = log.recording.data.copy(), log.recording.names.index(name)
+    data[:, place] = change(data[:, place])
+    return Log(Recording(log.recording.names, data), log.where)
+
+
+WRONG: dict[str, tuple[Callable[[np.ndarray], np.ndarray], str]] = {
+    "LF.femur.angle": (lambda y: np.full_like(y, 0.3), "dead: 0.3 in every row"),
+    "RM.tibia.torque": (lambda y: -y, "wrong sign"),
+    "LR.coxa.angle": (np.degrees, "in degrees: 57 times"),
+    "RR.tibia.angle": (lambda y: np.where(np.arange(len(y)) < 110, np.nan, y), "no number in 110"),
+    "RF.femur.speed": (lambda y: y[::-1].copy(), "does not follow|looks like|wrong sign"),
+    "LM.foot.normal_force": (
+        lambda y: np.where(np.arange(len(y)) > 250, y[250], y),
+        "stuck at",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", WRONG)
+def test_a_dead_or_wrong_column_is_named_and_no_other(name: str, secrets: list[Secret]) -> None:
+    change, why = WRONG[name]
+    experiment = Experiment(
+        log=with_column(secrets[0].log, name, change),
+        number=0,
+        columns=secrets[0].columns,
+        fitted=slice(0, 100),
+        held_out=slice(100, 110),
+    )
+    (bad,) = screened(experiment, secrets[0].clean)
+    assert bad.name == name
+    assert re.search(why, bad.why), bad.why
+
+
+def test_the_columns_of_a_good_log_are_all_kept(found: list[Identified]) -> None:
+    assert [one.bad for one in found] == [(), ()]
+
+
+def test_a_delay_of_whole_rows_shifts_the_readings(secrets: list[Secret], athena_fmu: Path) -> None:
+    log, names = secrets[0].log, ["LF.femur.angle", "RR.tibia.speed"]
+    start = initial_state(log, load_robot("athena"))
+    with LogPlant(athena_fmu) as plant:
+        now = plant.simulate(log, names, start)
+        later = plant.simulate(log, names, start, delay=0.01)
+        between = plant.simulate(log, names, start, delay=0.0025)
+    assert later[2:] == pytest.approx(now[:-2], abs=1e-12)
+    # half a row later an angle is half-way to the row before, but for its curvature
+    middle = 0.5 * (now[1:, 0] + now[:-1, 0])
+    assert between[1:, 0] == pytest.approx(middle, abs=1e-3)
+    assert np.abs(between[1:, 0] - now[1:, 0]).max() > 5e-3
+
+
+def test_a_walk_is_proposed_for_what_it_would_tell(
+    found: list[Identified], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A walk tells at least what it adds; the limits of the servos need a fast one."""
+    only = excitation.walks(found[0].robot)[:1]
+    monkeypatch.setattr(excitation, "walks", lambda _robot: only)
+    monkeypatch.setattr(excitation, "DURATION", 1.0)
+    (one,) = propose(found[0], "athena")
+    assert (one.title, one.tells) == ("A walk straight ahead", ())
+    before = found[0].fit.deviations
+    assert all(one.deviations[key] <= before[key] for key in one.deviations)
+    assert one.deviations["servo.kp"] < 0.99 * before["servo.kp"]
+
+
+def test_no_step_is_left_at_the_optimum_of_a_linear_problem() -> None:
+    rng = np.random.default_rng(1)
+    jacobian, readings = rng.normal(size=(200, 4)), 0.1 * rng.normal(size=200)
+    best = np.linalg.lstsq(jacobian, readings, rcond=None)[0]
+    at_best = jacobian @ best - readings
+    assert remaining_step(jacobian, at_best) == pytest.approx(np.zeros(4), abs=1e-12)
+    away = np.array([0.01, -0.02, 0.03, 0.0])
+    beside = jacobian @ (best + away) - readings
+    assert remaining_step(jacobian, beside) == pytest.approx(-away, abs=1e-12)
+
+
+def test_the_position_of_another_point_turns_with_the_torso() -> None:
+    columns, quarter = ("torso.position[1]", "torso.position[2]", "torso.position[3]"), np.pi / 2
+    attitude = np.array([[0.0, 0.0, quarter], [quarter, 0.0, 0.0], [0.0, quarter, 0.0]])
+    places = of_point(columns, np.zeros((3, 3)), attitude, np.array([0.1, 0.2, 0.3]))
+    assert places == pytest.approx(
+        np.array([[-0.2, 0.1, 0.3], [0.1, -0.3, 0.2], [0.3, 0.2, -0.1]]), abs=1e-15
+    )
+
+
+def test_two_logs_have_one_robot_and_two_starts(secrets: list[Secret], athena_fmu: Path) -> None:
+    robot, logs = load_robot("athena"), [secrets[0].log, secrets[0].log]
+    rows = chosen_unknowns(robot, logs, GROUPS)
+    assert [row.key for row in rows if row.key.startswith("start.x")] == [
+        "start.x[1]",
+        "start.x[2]",
+    ]
+    both = [make_experiment(log, number, 0.25) for number, log in enumerate(logs)]
+    with LogPlant(athena_fmu) as plant:
+        problem = Problem(plant, robot, both, rows)
+        z = np.zeros(len(rows))
+        z[[row.key for row in rows].index("start.x[2]")] = 1.0
+        first, second = problem.errors(z)
+    place = both[0].columns.index("torso.position[1]")
+    assert second[:, place] - first[:, place] == pytest.approx(0.005, abs=1e-6)
+
+
+def test_a_proposed_walk_is_a_scenario_for_the_identified_robot() -> None:
+    text = scenario_text(Proposal("A walk", {"command": [{"vy": 0.05}]}, (), {}, 0.5), "robot.toml")
+    table = tomllib.loads(text)
+    assert table["command"] == [{"vy": 0.05}]
+    assert (table["robot"], table["duration"]) == ("robot.toml", 20.0)
+
+
+def test_without_open_numbers_no_walk_is_proposed(found: list[Identified]) -> None:
+    assert propose(replace(found[0], fit=all_told(found[0])), "athena") == []
+
+
+def all_told(one: Identified) -> Fit:
+    """Returns the fit with a small covariance."""
+    return replace(one.fit, covariance=1e-6 * np.eye(len(one.fit.rows)))
+
+
+def test_the_command_writes_robot_sensors_and_report(
+    call: Call, secrets: list[Secret], tmp_path: Path
+) -> None:
+    """Of half a second: what is found there is not judged."""
+    log = with_column(secrets[0].log, "LF.femur.angle", lambda y: np.full_like(y, 0.3))
+    kept = (".angle", "imu.angular_velocity[1]")
+    short = log.without([name for name in secrets[0].columns if not name.endswith(kept)])
+    write_mcap(short.recording.rows(slice(0, 160)), tmp_path / "log.mcap")
+    place = tmp_path / "out"
+    code, out, err = call(
+        "identify", tmp_path / "log.mcap", "-o", place, "--find", "sensor", "--no-propose", "--json"
+    )
+    assert code == 0
+    assert "LF.femur.angle is left out: dead: 0.3 in every row" in err
+    assert {path.name for path in place.iterdir()} == {
+        "robot.toml", "sensors.toml", "identify.json", "report.html", "run.json"
+    }  # fmt: skip
+    result = json.loads(out)
+    assert [one["key"] for one in result["estimates"]][:2] == [
+        "sensor.delay", "bias.imu.angular_velocity[1]"
+    ]  # fmt: skip
+    assert result["bad_columns"][0]["name"] == "LF.femur.angle"
+    assert "LF.femur.angle is left out" in (place / "report.html").read_text(encoding="utf-8")
+    sensors = tomllib.loads((place / "sensors.toml").read_text(encoding="utf-8"))
+    assert sensors["sensor.delay"]["unit"] == "s"
+
+
+def test_misuse_is_refused_and_leaves_nothing(call: Call, tmp_path: Path) -> None:
+    place = tmp_path / "out"
+    assert_refused(
+        call("identify", "x.csv", "-o", place, "--find", "servos"), "servos", "servo", "--find"
+    )
+    assert_refused(call("identify", "x.csv", "-o", place), "no recording", "x.csv")
+    assert_refused(call("identify", "x.bag", "-o", place), "not a log", ".mcap")
+    assert_refused(
+        call("identify", "x.csv", "-o", place, "--held-out", "2"), "not a share", "--held-out"
+    )
+    assert not place.exists()
