@@ -49,6 +49,8 @@ class LivePage:
     def __init__(self, browser: Any, address: str, **options: Any) -> None:
         self.errors: list[str] = []
         self.requests: list[str] = []
+        # a quarter of the pixels, because they are drawn without a graphics card
+        options = {"device_scale_factor": 0.5, **options}
         self.context = browser.new_context(**options)
         self.page = self.context.new_page()
         self.page.set_default_timeout(PATIENCE)
@@ -99,7 +101,7 @@ def browser() -> Iterator[Any]:
 
 @pytest.fixture(scope="module")
 def live(browser: Any, address: str) -> Iterator[LivePage]:
-    page = LivePage(browser, address, viewport={"width": 960, "height": 600})
+    page = LivePage(browser, address, viewport={"width": 1000, "height": 720})
     yield page
     page.close()
 
@@ -152,8 +154,10 @@ def test_a_gamepad_turns_the_robot_and_its_buttons_act_once(live: LivePage) -> N
 
 def test_dragging_the_robot_pushes_it_and_letting_go_ends_the_push(live: LivePage) -> None:
     live.place()
-    box = live.page.locator("#stage canvas").bounding_box()
-    x, y = box["x"] + 0.5 * box["width"], box["y"] + 0.5 * box["height"]
+    drawn = live.value("view.drawn")
+    live.until(f"view.drawn > {drawn} + 2")  # the robot is drawn at its start
+    box, spot = live.page.locator("#stage canvas").bounding_box(), live.value("view.spot")
+    x, y = spot["x"], spot["y"]
     before = live.value("view.controls.object.position.toArray()")
     live.page.mouse.move(x, y)
     live.page.mouse.down()
@@ -209,7 +213,7 @@ def test_a_recording_is_replayed_and_saved(live: LivePage, tmp_path: Path) -> No
 
 
 def test_two_pages_are_told_who_drives(live: LivePage, browser: Any, address: str) -> None:
-    other = LivePage(browser, address)
+    other = LivePage(browser, address, viewport={"width": 400, "height": 300})
     other.page.keyboard.down("w")
     other.until("frame.driver === link.client")
     live.until("frame.driver !== link.client")

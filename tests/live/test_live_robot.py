@@ -23,7 +23,7 @@ from hexapod_cosim.cosim.live.settings import (
 )
 from hexapod_cosim.cosim.live.take import NO_FORCE, Take
 from hexapod_cosim.cosim.master.fmu import Fmu
-from hexapod_cosim.cosim.run.run import RunPlan
+from hexapod_cosim.cosim.run.run import RunPlan, initialise_plant
 from hexapod_cosim.cosim.run.walker import Walker
 from hexapod_cosim.cosim.scenario.reach import check_commands
 from hexapod_cosim.cosim.scenario.records import Command
@@ -291,7 +291,7 @@ def test_the_legs_reach_every_command_that_a_drive_can_ask_for(name: str, gait: 
 def test_a_ground_on_which_the_robot_cannot_start_leaves_it_on_the_one_before(
     placed: LiveRobot, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    start = live_robot.initialise_plant
+    start = initialise_plant
 
     def refuse_grids(plant: Fmu, plan: RunPlan) -> dict[str, float]:
         if plan.robot.terrain.kind != "flat":

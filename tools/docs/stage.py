@@ -42,7 +42,7 @@ LANGUAGES = {
     ".xml": "xml",
     ".md": "markdown",
 }
-PICTURES = (".png", ".svg", ".jpg")
+PICTURES = (".png", ".svg", ".jpg", ".webp")
 LINK = re.compile(r"(?<=\]\()([^)\s]+)(?=\))")
 CODE = re.compile(r"(^```.*?^```[^\n]*$|`[^`\n]+`)", flags=re.DOTALL | re.MULTILINE)
 HIDDEN = ("__pycache__", "generated")

@@ -97,7 +97,7 @@ function described(world: World): Described[] {
       ],
     },
     {
-      name: "Sliding of feet on the ground",
+      name: "Sliding of feet",
       unit: "mm/s",
       least: [0, 40],
       digits: 0,

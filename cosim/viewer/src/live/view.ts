@@ -49,7 +49,8 @@ export class View {
   private model: RobotModel | undefined;
   private floor: Floor | Terrain | undefined;
   private forces: ForceArrows | undefined;
-  private place = new Vector3();
+  private readonly place = new Vector3();
+  private readonly torso = new Vector3();
   private high: number | undefined;
   /** Number of pictures that were drawn. */
   drawn = 0;
@@ -151,6 +152,13 @@ export class View {
     return to ? to.sub(from).divideScalar(RULER) : new Vector3();
   }
 
+  /** Where the torso is on the page [px], for tests. */
+  get spot(): { x: number; y: number } {
+    const { left, top, width, height } = this.canvas.getBoundingClientRect();
+    const seen = this.torso.clone().project(this.eye);
+    return { x: left + 0.5 * width * (1 + seen.x), y: top + 0.5 * height * (1 - seen.y) };
+  }
+
   /** The point that the camera looks at, which goes with the robot. */
   get ground(): Vector3 {
     return this.place.clone();
@@ -187,6 +195,7 @@ export class View {
     const wished = Math.min(this.relief.height(x, y), z - 0.5 * stood);
     this.high = this.high === undefined ? wished : this.high + SOFT * (wished - this.high);
     this.place.set(x, y, this.high);
+    this.torso.copy(pose.position);
     this.anchor.copy(this.place);
     if (this.floor instanceof Floor) this.floor.follow(x, y);
     this.lamp.target.position.copy(this.place);
