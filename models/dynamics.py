@@ -30,7 +30,12 @@ from hexapod_cosim.models.kinematics import (
     split,
 )
 from hexapod_cosim.models.records import Array, Robot
-from hexapod_cosim.models.servos.motor import friction_torque, has_measured_friction
+from hexapod_cosim.models.servos.motor import (
+    FULL,
+    Power,
+    friction_torque,
+    has_measured_friction,
+)
 from hexapod_cosim.models.touch.forces import Contacts, contact_wrenches, contacts_of
 
 MULTIPLIERS = 5
@@ -51,6 +56,7 @@ class Command:
     push_torque: Array = field(default_factory=lambda: np.zeros(3))  # N m
     # rad/s2, of kinematic drives only
     acceleration_ref: Array = field(default_factory=lambda: np.zeros((LEGS, JOINTS)))
+    power: Power = FULL  # of the motors; shares of limits (6, 3)
     age: float = 0.0  # s  time since the command; kinematic drives extrapolate (eq. 13)
 
 
@@ -210,7 +216,7 @@ def joint_torques(
         )
         return np.zeros_like(gear), gear
     references = (command.angle_ref, command.speed_ref, command.torque_ref)
-    motor = servo_torque(servo, angle, speed, *references)
+    motor = servo_torque(servo, angle, speed, *references, power=command.power)
     if not measured:
         return motor, gear_friction(servo, speed)
     return motor, friction_torque(servo, speed, motor, load)

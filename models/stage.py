@@ -109,7 +109,7 @@ def keep_slopes(
     contacts = damping if isinstance(damping, Contacts) else contacts_of(robot, damping)
     angle, speed = joint_angles(robot, body), joint_speeds(robot, body)
     references = (command.angle_ref, command.speed_ref, command.torque_ref)
-    motor = servo_slopes(robot.servo, angle, speed, *references)
+    motor = servo_slopes(robot.servo, angle, speed, *references, power=command.power)
     stops = stop_slopes(robot.servo, joint_overruns(robot, body), speed)
     found = {}
     for k, spot, held, contact in closed_contacts(robot, body, contacts):
@@ -125,7 +125,11 @@ def keep_slopes(
         forces = applied_forces(robot, body, command, contacts, bristle).ravel()
         load = external_torques(robot, body, command, forces, constraints(robot, body))
         kinematic = robot.servo.mode == "kinematic"
-        torque = -load if kinematic else servo_torque(robot.servo, angle, speed, *references)
+        torque = (
+            -load
+            if kinematic
+            else servo_torque(robot.servo, angle, speed, *references, power=command.power)
+        )
         drag = friction_drag(robot.servo, speed, torque, load)
     return Slopes(*motor, drag, *stops, found)
 

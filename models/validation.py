@@ -248,6 +248,23 @@ def _check_laws(robot: Robot, at: str) -> None:
 def _check_motor(servo: Servo, at: str) -> None:
     """Checks that a motor has its constants."""
     motor = servo.drive == "motor"
+    if servo.winding_capacity > 0.0 and servo.housing_capacity == 0.0:
+        raise RobotError(
+            "a housing without heat capacity",
+            got=servo.housing_capacity,
+            expected="a number > 0 [J/K] where winding_capacity is",
+            fix="give servo.housing_capacity",
+            where=at + "servo.housing_capacity",
+        )
+    coolest = max(servo.derate_temperature, servo.air_temperature)
+    if servo.temperature_max <= coolest:
+        raise RobotError(
+            "windings that are never too hot",
+            got=servo.temperature_max,
+            expected=f"more than {coolest:g} K, derate_temperature and air_temperature",
+            fix="raise servo.temperature_max",
+            where=at + "servo.temperature_max",
+        )
     for key in ("voltage", "torque_constant", "resistance"):
         if motor and not getattr(servo, key) > 0.0:
             raise RobotError(

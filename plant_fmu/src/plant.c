@@ -23,7 +23,7 @@ typedef struct {
 } hxSavedPlant;
 
 static const uint64_t magic = 0x74616c5064507868u; /* "hxPdPlat" */
-static const uint64_t saved_version = 11;
+static const uint64_t saved_version = 12;
 
 /* Returns the checksum of a saved plant's bytes behind it, of the ring those of its footprints. */
 static uint64_t checksum(const unsigned char *bytes, int footprints) {
@@ -146,6 +146,24 @@ static double input_fingerprint(const hxInput *input) {
   return 1.0 + (double)(hx_checksum(1, input, sizeof *input) >> 12);
 }
 
+/* Computes the command of an input at the present time. */
+static void present_command(const hxPlant *plant, const hxInput *input, hxCommand *command) {
+  hx_command_from_input(command, input, plant->state.time);
+  hx_command_supply(command, &plant->model, &plant->state);
+}
+
+/* Sets what the motors get in a call's command; a call that resumes another has what that had. */
+static void supply_motors(hxPlant *plant, int resumes, hxCommand *command) {
+  hxState *state = &plant->state;
+  if (!resumes) {
+    hx_command_supply(command, &plant->model, state);
+    state->supply = command->supply;
+    memcpy(state->duty, command->duty, sizeof state->duty);
+  }
+  command->supply = state->supply;
+  memcpy(command->duty, state->duty, sizeof command->duty);
+}
+
 /* Advances the plant. If an event interrupted the last call and the input is the same, the step
  * sequence of that call continues, so that the motion does not depend on the interruption. */
 static hxStatus advance(hxPlant *plant, const hxInput *input, const hxInput *rate, double t_end,
@@ -172,6 +190,7 @@ static hxStatus advance(hxPlant *plant, const hxInput *input, const hxInput *rat
   const int resumes = before->call_input != 0.0 && before->call_input == fingerprint &&
                       before->call_start < before->time;
   hx_command_from_input(&command, input, resumes ? before->call_start : before->time);
+  supply_motors(plant, resumes, &command);
   hx_footprints_begin(&plant->footprints);
   events->footprints = &plant->footprints;
   status = hx_kernel()->integrate(&plant->model, &command, ramp, t_end, events, &plant->state,
@@ -206,9 +225,11 @@ hxStatus hx_plant_step_to_event(hxPlant *plant, const hxInput *input, double t_e
 
 void hx_plant_output(hxPlant *plant, const hxInput *input, hxOutput *output) {
   hxCommand command;
-  hx_command_from_input(&command, input, plant->state.time);
+  present_command(plant, input, &command);
   hx_kernel()->output(&plant->model, &plant->state, &command, plant->scratch, output);
   output->footprints = plant->footprints.kept.count;
+  if (plant->model.servo_drive == HX_DRIVE_MOTOR)
+    output->supply_voltage = command.supply * plant->model.voltage;
 }
 
 size_t hx_plant_footprints(const hxPlant *plant, hxFootprint *footprint, size_t capacity) {
@@ -333,14 +354,14 @@ static void switch_bodies(hxPlant *plant) {
 
 void hx_plant_completed_step(hxPlant *plant, const hxInput *input) {
   hxCommand command;
-  hx_command_from_input(&command, input, plant->state.time);
+  present_command(plant, input, &command);
   hx_kernel()->measure(&plant->model, &command, &plant->state, plant->scratch);
   switch_bodies(plant);
 }
 
 void hx_plant_rates(const hxPlant *plant, const hxInput *input, hxCoordinates *rate) {
   hxCommand command;
-  hx_command_from_input(&command, input, plant->state.time);
+  present_command(plant, input, &command);
   hx_kernel()->coordinates(&plant->model, &plant->state, &command, plant->scratch, NULL, rate);
 }
 
@@ -390,7 +411,7 @@ hxStatus hx_plant_tangent(hxPlant *plant, const hxInput *input, const hxInput *d
   hxTangentPoint *point = plant->scratch;
   hxCoordinates x;
   hx_plant_get_coordinates(plant, &x); /* before the point, because it uses the same memory */
-  hx_command_from_input(&point->command, input, plant->state.time);
+  present_command(plant, input, &point->command);
   hx_command_from_input(&point->d_command, d_input ? d_input : &no_input, 0.0);
   point->x = x;
   point->dx = dx ? *dx : no_change;
@@ -408,7 +429,7 @@ hxStatus hx_plant_tangent(hxPlant *plant, const hxInput *input, const hxInput *d
 
 void hx_plant_integral_rates(hxPlant *plant, const hxInput *input, hxOutput *rate) {
   hxCommand command;
-  hx_command_from_input(&command, input, plant->state.time);
+  present_command(plant, input, &command);
   hx_kernel()->integral_rates(&plant->model, &plant->state, &command, plant->scratch, rate);
 }
 
@@ -431,7 +452,7 @@ void hx_plant_accelerations(hxPlant *plant, const hxInput *input, double acceler
                             double multiplier[HX_BODIES - 1][HX_MULTIPLIERS],
                             double drive_torque[HX_BODIES - 1]) {
   hxCommand command;
-  hx_command_from_input(&command, input, plant->state.time);
+  present_command(plant, input, &command);
   hx_kernel()->accelerations(&plant->model, &plant->state, &command, plant->scratch, acceleration,
                              multiplier, drive_torque);
 }

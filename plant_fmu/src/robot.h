@@ -23,8 +23,13 @@ void hx_motion_from_bodies(const hxModel *model, const double body[HX_BODIES][HX
 void hx_bodies_from_motion(const hxModel *model, const hxPlantMotion *motion,
                            double body[HX_BODIES][HX_BODY_STATE]);
 
-/* Computes the command of an input given at a time, s. */
+/* Computes the command of an input given at a time, s. Its motors have no supply. */
 void hx_command_from_input(hxCommand *command, const hxInput *input, double time);
+
+/* Sets what the motors get from their supply in a command: the shares of their duty limits by the
+ * temperatures of their windings (eq. 52), and the supply's voltage under the currents of this
+ * command at the last moment (eq. 53). */
+void hx_command_supply(hxCommand *command, const hxModel *model, const hxState *state);
 
 HX_HIDDEN_END
 

@@ -64,6 +64,13 @@ static void check_servo(hxChecker *c, const hxDefinition *d) {
     hx_check_fail(c, "servo.voltage", d->servo.voltage, positive);
   if (motor && !(d->servo.torque_constant > 0.0))
     hx_check_fail(c, "servo.torque_constant", d->servo.torque_constant, positive);
+  if (d->servo.winding_capacity > 0.0 && !(d->servo.housing_capacity > 0.0))
+    hx_check_fail(c, "servo.housing_capacity", d->servo.housing_capacity,
+                  "more than 0 where servo.winding_capacity is");
+  if (!(d->servo.temperature_max > d->servo.derate_temperature &&
+        d->servo.temperature_max > d->servo.air_temperature))
+    hx_check_fail(c, "servo.temperature_max", d->servo.temperature_max,
+                  "more than servo.derate_temperature and servo.air_temperature");
   if (motor && !(d->servo.resistance > 0.0))
     hx_check_fail(c, "servo.resistance", d->servo.resistance, positive);
 }

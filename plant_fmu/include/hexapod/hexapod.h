@@ -6,9 +6,9 @@
  * RR, joints (and the link each one moves) in the order coxa, femur, tibia. Bodies: 0 = torso, 1 +
  * 3 leg + joint = link. Equation numbers refer to docs/equations.md.
  *
- * A plant has no hidden state, and the library has no globals: what hx_plant_get_state copies is the
- * whole state. After hx_plant_create no function allocates, prints or exits. Work space belongs to
- * the plant, so that a call needs less than 48 kB of stack, and one plant is for one thread at a
+ * A plant has no hidden state, and the library has no globals: what hx_plant_get_state copies is
+ * the whole state. After hx_plant_create no function allocates, prints or exits. Work space belongs
+ * to the plant, so that a call needs less than 48 kB of stack, and one plant is for one thread at a
  * time.
  */
 #ifndef HEXAPOD_H
@@ -190,6 +190,16 @@ typedef struct hxDefinition {
     double stribeck_speed;                  /* rad/s      w_s */
     double stribeck_exponent;               /* 1          a */
     double friction_speed;                  /* rad/s      w_f: dry friction saturates there */
+    /* heat of HX_DRIVE_MOTOR (eq. 52), and its supply (eq. 53) */
+    double winding_capacity;   /* J/K  heat capacity of a winding; 0: no heating */
+    double housing_capacity;   /* J/K  of a housing, > 0 */
+    double winding_to_housing; /* K/W  thermal resistance */
+    double housing_to_air;     /* K/W */
+    double air_temperature;    /* K */
+    double start_temperature;  /* K    of windings and housings at the start */
+    double derate_temperature; /* K    of a winding: hotter ones lower the duty limit */
+    double temperature_max;    /* K    there it is 0; > derate_temperature */
+    double supply_resistance;  /* ohm  of the battery and its cables */
   } servo;
   struct {
     double alpha, beta; /* 1/s */
@@ -296,8 +306,12 @@ typedef struct hxOutput {
   } solver;
   double footprints;              /* 1  made in soil since the start */
   double cone_time[HX_CONE_BINS]; /* s  feet under load, by |f_t|/(mu f_n): from 0.9 (i/30)^2 on */
-  double current[HX_LEGS][HX_JOINTS];          /* A  of the motors; 0 with HX_DRIVE_LINE */
-  double electrical_power[HX_LEGS][HX_JOINTS]; /* W  that they take from the supply; likewise */
+  double current[HX_LEGS][HX_JOINTS];             /* A  of the motors; 0 with HX_DRIVE_LINE */
+  double electrical_power[HX_LEGS][HX_JOINTS];    /* W  that they take from the supply; likewise */
+  double winding_temperature[HX_LEGS][HX_JOINTS]; /* K */
+  double housing_temperature[HX_LEGS][HX_JOINTS]; /* K */
+  double remaining_rating[HX_LEGS][HX_JOINTS]; /* 1  of the winding's rise over the air, 0 to 1 */
+  double supply_voltage; /* V  of all servos, under the currents at the start of the last call */
 } hxOutput;
 
 enum { HX_FOOTPRINTS = 512 }; /* footprints that a plant keeps; older ones are forgotten */

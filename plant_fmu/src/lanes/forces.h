@@ -130,9 +130,10 @@ static inline void leg_pass(const hxModel *model, const hxCommand *command, doub
 /* Computes the torques of motor, gear and stops on a joint (eq. 12, 39). */
 static inline void joint_torque(const hxModel *model, const hxCommand *command, int joint, int slot,
                                 hxJointWork *k) {
-  k->servo = hx_servo_torque(model, k->angle, k->speed, hx_load(&command->angle[joint][slot]),
-                             hx_load(&command->speed[joint][slot]),
-                             hx_load(&command->torque[joint][slot]));
+  k->servo =
+      hx_servo_torque(model, k->angle, k->speed, hx_load(&command->angle[joint][slot]),
+                      hx_load(&command->speed[joint][slot]), hx_load(&command->torque[joint][slot]),
+                      hx_power_of(command, joint, slot));
   k->torque = model->servo_mode == HX_SERVO_KINEMATIC ? k->servo.friction
                                                       : k->servo.torque + k->servo.friction;
   if (model->stops) {
