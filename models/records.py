@@ -239,6 +239,9 @@ class Servo:
     )
     # of battery and cables, which all servos share (eq. 53)
     supply_resistance: Annotated[float, Number("ohm", at_least=0.0, at_most=1e6, default=0.0)] = 0.0
+    # how commands reach the servos, but in kinematic mode: transmissions, rounding of angles
+    bus_period: Annotated[float, Number("s", at_least=0.0, at_most=1e3, default=0.0)] = 0.0
+    command_step: Annotated[float, Number("rad", at_least=0.0, at_most=1.0, default=0.0)] = 0.0
 
 
 def _unused_fields(servo: Servo) -> list[str]:

@@ -1,5 +1,6 @@
 """Computes what motors get from their supply: the heat of winding and housing with the duty limit
-of hot motors (eq. 52), and the voltage of a battery under load (eq. 53). The fast forms are in
+of hot motors (eq. 52), and the voltage of a battery under load (eq. 53); and what servos get from
+their bus. The fast forms are in
 plant_fmu/src/lanes/measure.h and plant_fmu/src/robot.c.
 """
 
@@ -9,6 +10,8 @@ import numpy as np
 
 from hexapod_cosim.models.records import Array, Servo
 from hexapod_cosim.models.servos.motor import Power, back_emf_damping, stall_torque
+
+BUS_MARGIN = 1e-9  # s  transmissions this early or late are on time
 
 
 def warmed(
@@ -62,3 +65,17 @@ def supply_power(servo: Servo, speed: Array, wanted: Array, winding: Array) -> P
     back = servo.torque_constant * float(np.sum(duty * speed)) / servo.voltage
     supply = min(1.0, (1.0 + ratio * back) / (1.0 + ratio * float(np.sum(duty**2))))
     return Power(supply, supply * share)
+
+
+def held_commands(servo: Servo, time: Array, angle: Array) -> Array:
+    """Returns the commanded angles (n, ...) [rad] that servos hold at times (n,) [s].
+
+    angle: commands (n, ...) at these times, which begin at 0 and contain all transmissions, at
+    multiples of bus_period; angles are rounded to multiples of command_step.
+    """
+    step, period = servo.command_step, servo.bus_period
+    rounded = step * np.floor(angle / step + 0.5) if step > 0.0 else angle
+    if period == 0.0:
+        return rounded
+    last = np.floor((time + BUS_MARGIN) / period) * period
+    return np.asarray(rounded[np.searchsorted(time, last - BUS_MARGIN)])

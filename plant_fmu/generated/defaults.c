@@ -505,6 +505,8 @@ static const hxDefinition default_definition = {
     .servo.derate_temperature = 343.15,
     .servo.temperature_max = 353.15,
     .servo.supply_resistance = 0.0,
+    .servo.bus_period = 0.0,
+    .servo.command_step = 0.0,
 };
 
 void hx_definition_default(hxDefinition *definition) {
@@ -1101,6 +1103,8 @@ static const hxRange definition_ranges[] = {
     {"servo.derate_temperature", "K", 0.0, 10000.0, offsetof(hxDefinition, servo.derate_temperature), 0},
     {"servo.temperature_max", "K", 0.0, 20000.0, offsetof(hxDefinition, servo.temperature_max), 0},
     {"servo.supply_resistance", "ohm", 0.0, 1000000.0, offsetof(hxDefinition, servo.supply_resistance), 0},
+    {"servo.bus_period", "s", 0.0, 1000.0, offsetof(hxDefinition, servo.bus_period), 0},
+    {"servo.command_step", "rad", 0.0, 1.0, offsetof(hxDefinition, servo.command_step), 0},
 };
 
 size_t hx_definition_ranges(const hxRange **range) {

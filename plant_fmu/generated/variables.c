@@ -1160,6 +1160,8 @@ static const hxVariable parameters[] = {
     {"servo.derate_temperature", "K", 0.0, 10000.0, offsetof(struct hxVariables, definition.servo.derate_temperature), HX_REAL, 1},
     {"servo.temperature_max", "K", 0.0, 20000.0, offsetof(struct hxVariables, definition.servo.temperature_max), HX_REAL, 1},
     {"servo.supply_resistance", "ohm", 0.0, 1000000.0, offsetof(struct hxVariables, definition.servo.supply_resistance), HX_REAL, 1},
+    {"servo.bus_period", "s", 0.0, 1000.0, offsetof(struct hxVariables, definition.servo.bus_period), HX_REAL, 1},
+    {"servo.command_step", "rad", 0.0, 1.0, offsetof(struct hxVariables, definition.servo.command_step), HX_REAL, 1},
 };
 
 static const hxVariable locals[] = {
@@ -1314,7 +1316,7 @@ const size_t hx_state_count = sizeof states / sizeof states[0];
 
 _Static_assert(sizeof states / sizeof states[0] == sizeof(hxCoordinates) / sizeof(double), "each state has its row");
 
-const char hx_default_guid[] = "{9155107e-f014-4f04-9fd9-a0da20910c8f}";
+const char hx_default_guid[] = "{268c539a-6c04-43bf-ade9-81ab0208239e}";
 
 _Static_assert(HX_CONTACT_EXACT_RESTITUTION == 1, "ContactLaw");
 _Static_assert(HX_CONTACT_FLORES == 2, "ContactLaw");

@@ -118,6 +118,7 @@ typedef struct hxModel {
   double per_stribeck_speed, stribeck_exponent; /* s/rad, 1  1/w_s, a */
   double voltage, duty_max, supply_resistance;  /* V, 1, ohm */
   hxHeat heat;
+  double bus_period, command_step; /* s, rad  0 in kinematic mode */
   double ground_point[3], ground_normal[3];
   double soil[HX_SOIL_SIZE]; /* an hxSoil, of the definition */
   double bristle_length;     /* m  presliding, or shear displacement of the soil */
@@ -137,6 +138,15 @@ typedef struct hxCommand {
   double supply; /* 1  voltage of the supply over servo.voltage (eq. 53) */
   double duty[HX_JOINTS][HX_SLOTS]; /* 1  share of the duty limit that heat leaves (eq. 52) */
 } hxCommand;
+
+/* Commands that servos hold until the bus transmits the next ones, legs innermost. */
+typedef struct hxBus {
+  double angle[HX_JOINTS][HX_SLOTS];
+  double speed[HX_JOINTS][HX_SLOTS];
+  double torque[HX_JOINTS][HX_SLOTS];
+  double start; /* s  of the first transmission */
+  double sent;  /* 1  transmissions since */
+} hxBus;
 
 /* State of the contacts. It changes at touch-down and lift-off, plastic depth and nearest points at
  * the end of steps; never within a step. */
@@ -234,6 +244,7 @@ typedef struct hxState {
   double call_input;      /* 1  checksum of its input, a whole number; 0: no such call */
   double supply;          /* 1  hxCommand.supply and duty of the last call */
   double duty[HX_JOINTS][HX_SLOTS];
+  hxBus bus;
   hxPlantMotion motion;
   hxContactState contact;
   double evaluations, steps, rejected, touchdowns;

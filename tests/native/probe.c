@@ -90,6 +90,7 @@ static const ProbeField fields[] = {
     FIELD(hxDefinition, servo.voltage),
     FIELD(hxDefinition, servo.friction_speed),
     FIELD(hxDefinition, servo.supply_resistance),
+    FIELD(hxDefinition, servo.command_step),
     FIELD(hxDefinition, baumgarte.alpha),
     FIELD(hxDefinition, baumgarte.beta),
     FIELD(hxDefinition, gravity),

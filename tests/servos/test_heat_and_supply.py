@@ -197,3 +197,20 @@ def test_servos_without_heat_stay_as_warm_as_they_are() -> None:
     assert Servo.__dataclass_fields__["winding_capacity"].default == 0.0
     servo = with_servo(load_robot("athena"), "mx64_m6").servo
     assert float(duty_share(servo, np.array(1000.0))) == 1.0
+
+
+def test_the_figures_of_a_run_contain_the_energy_from_the_supply(core: ct.CDLL) -> None:
+    """Works of the motors and their squared torques over k_m^2, from which metrics take the
+    electrical cost, are the integral of the electrical power.
+    """
+    robot = with_servo(load_robot("athena"), "mx64_m6")
+    plant, command = Plant(core, robot, **landing(robot)), random_command(robot, 3, size=0.3)
+    powers = [float(np.sum(plant.output(command).electrical_power))]
+    for k in range(400):
+        plant.step(2.5e-4 * (k + 1), command)
+        powers.append(float(np.sum(plant.output(command).electrical_power)))
+    after = plant.output(command)
+    copper = float(np.sum(after.torque_squared)) / robot.servo.motor_constant**2
+    work = float(np.sum(after.positive_work - after.negative_work))
+    assert work + copper == pytest.approx(float(np.trapezoid(powers, dx=2.5e-4)), rel=2e-3)
+    assert copper > abs(work) > 0.0

@@ -96,7 +96,8 @@ HxDefinition = record(
                 "quadratic_motor_friction quadratic_external_friction stribeck_speed "
                 "stribeck_exponent friction_speed winding_capacity housing_capacity "
                 "winding_to_housing housing_to_air air_temperature start_temperature "
-                "derate_temperature temperature_max supply_resistance"
+                "derate_temperature temperature_max supply_resistance "
+                "bus_period command_step"
             ),
         ),
     ),

@@ -200,6 +200,9 @@ typedef struct hxDefinition {
     double derate_temperature; /* K    of a winding: hotter ones lower the duty limit */
     double temperature_max;    /* K    there it is 0; > derate_temperature */
     double supply_resistance;  /* ohm  of the battery and its cables */
+    /* how commands reach the servos, but in kinematic mode */
+    double bus_period;   /* s    from one transmission to the next; 0: at every call */
+    double command_step; /* rad  angles are rounded to multiples of it; 0: they are not */
   } servo;
   struct {
     double alpha, beta; /* 1/s */
