@@ -1316,7 +1316,7 @@ const size_t hx_state_count = sizeof states / sizeof states[0];
 
 _Static_assert(sizeof states / sizeof states[0] == sizeof(hxCoordinates) / sizeof(double), "each state has its row");
 
-const char hx_default_guid[] = "{268c539a-6c04-43bf-ade9-81ab0208239e}";
+const char hx_default_guid[] = "{1bbdbac1-8aee-4757-aba0-7b91f5a02f0b}";
 
 _Static_assert(HX_CONTACT_EXACT_RESTITUTION == 1, "ContactLaw");
 _Static_assert(HX_CONTACT_FLORES == 2, "ContactLaw");

@@ -60,7 +60,7 @@ def with_servo(robot: Robot, name: str, **settings: Any) -> Robot:
 # the plant and the twin
 
 
-@pytest.mark.parametrize("name", list_servos())
+@pytest.mark.parametrize("name", ["mx64_m1", "mx64_m2", "mx64_m4", "mx106_m6"])
 @pytest.mark.parametrize("mode", ["position", "torque"])
 def test_the_plants_servos_are_the_twins(core: ct.CDLL, name: str, mode: str) -> None:
     robot = with_servo(load_robot("athena"), name, mode=mode, kd=0.3)
@@ -84,16 +84,21 @@ def test_the_plants_servos_are_the_twins(core: ct.CDLL, name: str, mode: str) ->
     assert clipped > 0
 
 
-@pytest.mark.parametrize("name", ["mx64_m1", "mx64_m4", "mx106_m6"])
 @pytest.mark.parametrize(
-    ("mode", "stops"), [("position", 0.0), ("torque", 50.0), ("kinematic", 0.0)]
+    ("name", "mode", "stops"),
+    [
+        ("mx64_m1", "torque", 0.0),
+        ("mx64_m4", "position", 0.0),
+        ("mx106_m6", "position", 50.0),
+        ("mx106_m6", "kinematic", 0.0),
+    ],
 )
 def test_accelerations_with_measured_servos_are_those_of_the_dense_system(
     core: ct.CDLL, name: str, mode: str, stops: float
 ) -> None:
     stopped = {"stop_stiffness": stops, "stop_damping": 0.1 * stops}
     robot = with_servo(lopsided(2), name, mode=mode, **stopped)
-    for seed, drift in ((0, 0.0), (1, 1e-3), (2, 0.02)):
+    for seed, drift in ((0, 0.0), (1, 0.02)):
         body, command = random_bodies(robot, seed, drift=drift), random_command(robot, seed)
         plant = Plant(core, robot)
         plant.bodies = body
