@@ -188,10 +188,10 @@ typedef struct {
   const hxInput *input;
   const hxCommand *ramp; /* NULL: constant */
   double fingerprint, start;
-} hxCall;
+} hxStepCall;
 
 /* Sets a part's command, and in *ramp its change per second; servos on a bus hold theirs. */
-static void part_command(hxPlant *plant, const hxCall *call, int resumes, hxCommand *command,
+static void part_command(hxPlant *plant, const hxStepCall *call, int resumes, hxCommand *command,
                          hxCommand *ramp) {
   enum { SIZE = sizeof(hxCommand) / sizeof(double) };
   hxState *state = &plant->state;
@@ -213,7 +213,8 @@ static void part_command(hxPlant *plant, const hxCall *call, int resumes, hxComm
 /* Advances the plant by a part of a call: to its end, or to the next transmission of the bus. If an
  * event interrupted the last part and the input is the same, the step sequence of that part
  * continues, so that the motion does not depend on the interruption. */
-static hxStatus advance_part(hxPlant *plant, const hxCall *call, double t_end, hxEvents *events) {
+static hxStatus advance_part(hxPlant *plant, const hxStepCall *call, double t_end,
+                             hxEvents *events) {
   hxState *state = &plant->state;
   hxCommand command, ramp;
   const int resumes = state->call_input != 0.0 && state->call_input == call->fingerprint &&
@@ -246,7 +247,7 @@ static hxStatus advance(hxPlant *plant, const hxInput *input, const hxInput *rat
   if (status != HX_OK) return status;
   hx_copy_state(&plant->model, before, &plant->state);
   const int told = !ramp && (events->stop || before->call_input != 0.0);
-  const hxCall call = {input, ramp, told ? input_fingerprint(input) : 0.0, before->time};
+  const hxStepCall call = {input, ramp, told ? input_fingerprint(input) : 0.0, before->time};
   hx_footprints_begin(&plant->footprints);
   events->footprints = &plant->footprints;
   do {
