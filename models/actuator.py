@@ -8,23 +8,37 @@ from __future__ import annotations
 import numpy as np
 
 from hexapod_cosim.models.records import Array, Servo
-from hexapod_cosim.models.servos.motor import back_emf_damping, motor_torque, stall_torque
+from hexapod_cosim.models.servos.motor import (
+    FULL,
+    Power,
+    back_emf_damping,
+    motor_torque,
+    stall_torque,
+)
 
 GEAR_SPEED = 0.05  # rad/s  friction_speed of servos that give none; planned torques assume it
 
 
 def servo_torque(
-    servo: Servo, angle: Array, speed: Array, angle_ref: Array, speed_ref: Array, torque_ref: Array
+    servo: Servo,
+    angle: Array,
+    speed: Array,
+    angle_ref: Array,
+    speed_ref: Array,
+    torque_ref: Array,
+    *,
+    power: Power = FULL,
 ) -> Array:
     """Returns the motor's torque on the child [N m], in the shape of the inputs.
 
     The torque is kp (q_ref - q) + kd (qd_ref - qd) + tau_ff, clipped to the torque-speed line, or
-    that of a motor which this drives (`motor_torque`); in torque mode kp = kd = 0.
+    that of a motor which this drives (`motor_torque`) with this power; in torque mode
+    kp = kd = 0.
     """
     kp, kd = (0.0, 0.0) if servo.mode == "torque" else (servo.kp, servo.kd)
     wanted = kp * (angle_ref - angle) + kd * (speed_ref - speed) + torque_ref
     if servo.drive == "motor":
-        return motor_torque(servo, speed, wanted)
+        return motor_torque(servo, speed, wanted, power)
     upper = servo.torque_max * np.clip(1.0 - speed / servo.speed_max, 0.0, 1.0)
     lower = -servo.torque_max * np.clip(1.0 + speed / servo.speed_max, 0.0, 1.0)
     return np.clip(wanted, lower, upper)
@@ -38,7 +52,14 @@ def gear_friction(servo: Servo, speed: Array) -> Array:
 
 
 def servo_slopes(
-    servo: Servo, angle: Array, speed: Array, angle_ref: Array, speed_ref: Array, torque_ref: Array
+    servo: Servo,
+    angle: Array,
+    speed: Array,
+    angle_ref: Array,
+    speed_ref: Array,
+    torque_ref: Array,
+    *,
+    power: Power = FULL,
 ) -> tuple[Array, Array]:
     """Returns minus the derivatives of `servo_torque` by angle [N m/rad] and by speed [N m s/rad].
 
@@ -48,7 +69,9 @@ def servo_slopes(
     kp, kd = (0.0, 0.0) if servo.mode == "torque" else (servo.kp, servo.kd)
     wanted = kp * (angle_ref - angle) + kd * (speed_ref - speed) + torque_ref
     if servo.drive == "motor":
-        return _motor_slopes(servo, speed, wanted, kp, kd)
+        given = power if servo.mode != "torque" else Power(1.0, power.limit)
+        gains = kp * given.supply, kd * given.supply
+        return _motor_slopes(servo, speed, wanted * given.supply, *gains, power.limit)
     load = speed / servo.speed_max
     upper = servo.torque_max * np.clip(1.0 - load, 0.0, 1.0)
     lower = -servo.torque_max * np.clip(1.0 + load, 0.0, 1.0)
@@ -60,12 +83,12 @@ def servo_slopes(
 
 
 def _motor_slopes(
-    servo: Servo, speed: Array, wanted: Array, kp: float, kd: float
+    servo: Servo, speed: Array, wanted: Array, kp: float, kd: float, limit: Array | float
 ) -> tuple[Array, Array]:
     """Returns minus the derivatives of `motor_torque`: by angle [N m/rad], by speed [N m s/rad]."""
     brake, torque_mode = back_emf_damping(servo), servo.mode == "torque"
     driven = wanted + (brake * speed if torque_mode else 0.0)
-    free = np.abs(driven) < stall_torque(servo)
+    free = np.abs(driven) < stall_torque(servo) * limit
     damping = np.where(free, kd - (brake if torque_mode else 0.0), 0.0) + brake
     return np.where(free, kp, 0.0), damping
 

@@ -30,7 +30,12 @@ from hexapod_cosim.models.kinematics import (
     split,
 )
 from hexapod_cosim.models.records import Array, Robot
-from hexapod_cosim.models.servos.motor import friction_torque, has_measured_friction
+from hexapod_cosim.models.servos.motor import (
+    FULL,
+    Power,
+    friction_torque,
+    has_measured_friction,
+)
 from hexapod_cosim.models.touch.forces import Contacts, contact_wrenches, contacts_of
 
 MULTIPLIERS = 5
@@ -51,6 +56,7 @@ class Command:
     push_torque: Array = field(default_factory=lambda: np.zeros(3))  # N m
     # rad/s2, of kinematic drives only
     acceleration_ref: Array = field(default_factory=lambda: np.zeros((LEGS, JOINTS)))
+    power: Power = FULL  # of the motors; shares of limits (6, 3)
     age: float = 0.0  # s  time since the command; kinematic drives extrapolate (eq. 13)
 
 
@@ -196,28 +202,35 @@ def joint_torques(
 ) -> tuple[Array, Array]:
     """Returns motor torque (6, 3) and gear torque (6, 3) on the child [N m].
 
-    The motor torque is 0 in kinematic mode, where it is a multiplier. external: (6, 3) as of
+    The motor torque is 0 in kinematic mode, where it is a multiplier; measured friction is then
+    that of a motor which balances the external torque. external: (6, 3) as of
     `external_torques`, for gears whose friction depends on the load; None: 0.
     """
     servo = robot.servo
     angle, speed = joint_angles(robot, body), joint_speeds(robot, body)
+    load = np.zeros_like(angle) if external is None else external
+    measured = has_measured_friction(servo)
     if servo.mode == "kinematic":
-        gear = gear_friction(servo, speed)
+        gear = (
+            friction_torque(servo, speed, -load, load) if measured else gear_friction(servo, speed)
+        )
         return np.zeros_like(gear), gear
     references = (command.angle_ref, command.speed_ref, command.torque_ref)
-    motor = servo_torque(servo, angle, speed, *references)
-    if not has_measured_friction(servo):
+    motor = servo_torque(servo, angle, speed, *references, power=command.power)
+    if not measured:
         return motor, gear_friction(servo, speed)
-    load = np.zeros_like(motor) if external is None else external
     return motor, friction_torque(servo, speed, motor, load)
 
 
-def external_torques(robot: Robot, body: Array, forces: Array, joints: Constraints) -> Array:
+def external_torques(
+    robot: Robot, body: Array, command: Command, forces: Array, joints: Constraints
+) -> Array:
     """Returns the torques (6, 3) of all but motors and gears on the joints [N m] (eq. 51).
 
     forces: g (114,) of eq. 1 without the joints' torques. The torques are those that the joints
     would have to resist if neither the torso nor any joint accelerated: gravity, ground,
-    centrifugal and Coriolis terms, and the joint's own stops.
+    centrifugal and Coriolis terms, and the joint's own stops. Joints of kinematic drives
+    accelerate as they are driven.
     """
     alpha, beta = robot.baumgarte.alpha, robot.baumgarte.beta
     c = joints.gamma - 2.0 * alpha * joints.dphi - beta**2 * joints.phi
@@ -225,17 +238,21 @@ def external_torques(robot: Robot, body: Array, forces: Array, joints: Constrain
     held = np.vstack([torso, joints.D, joints.G])
     none, turns = np.zeros((6 + len(c), LEGS * JOINTS)), np.eye(LEGS * JOINTS)
     motion = np.linalg.solve(held, np.vstack([none, turns]))  # of the links with each joint
-    bias = np.linalg.solve(held, np.concatenate([np.zeros(6), c, np.zeros(LEGS * JOINTS)]))
+    kinematic = robot.servo.mode == "kinematic"
+    driven = drive_acceleration(robot, body, command).ravel() if kinematic else turns[0] * 0.0
+    bias = np.linalg.solve(held, np.concatenate([np.zeros(6), c, driven]))
     inertia = mass_matrix(replace(robot, servo=replace(robot.servo, rotor_inertia=0.0)), body)
     load = motion.T @ (forces - inertia @ bias)
     return load.reshape(LEGS, JOINTS) + stop_torques(robot, body)
 
 
-def gear_loads(robot: Robot, body: Array, forces: Array, joints: Constraints) -> Array | None:
+def gear_loads(
+    robot: Robot, body: Array, command: Command, forces: Array, joints: Constraints
+) -> Array | None:
     """Returns the `external_torques`, None for gears whose friction does not depend on them."""
-    if robot.servo.mode == "kinematic" or not has_measured_friction(robot.servo):
+    if not has_measured_friction(robot.servo):
         return None
-    return external_torques(robot, body, forces, joints)
+    return external_torques(robot, body, command, forces, joints)
 
 
 def joint_overruns(robot: Robot, body: Array) -> Array:
@@ -317,7 +334,8 @@ def accelerations(
     """
     joints = constraints(robot, body)
     forces = applied_forces(robot, body, command, damping, bristle, body_damping).ravel()
-    motor, gear = joint_torques(robot, body, command, gear_loads(robot, body, forces, joints))
+    load = gear_loads(robot, body, command, forces, joints)
+    motor, gear = joint_torques(robot, body, command, load)
     g = forces + joints.G.T @ (motor + gear + stop_torques(robot, body)).ravel()
     D, c = constraint_equations(robot, body, command, joints)
     solution = solve_constrained(mass_matrix(robot, body, joints), g, D, c)

@@ -217,6 +217,31 @@ class Servo:
     friction_speed: Annotated[float, Number("rad/s", at_least=1e-5, at_most=1e3, default=0.05)] = (
         0.05
     )
+    # heat of a motor (eq. 52); a winding without capacity keeps its temperature
+    winding_capacity: Annotated[float, Number("J/K", at_least=0.0, at_most=1e6, default=0.0)] = 0.0
+    housing_capacity: Annotated[float, Number("J/K", at_least=0.0, at_most=1e6, default=0.0)] = 0.0
+    winding_to_housing: Annotated[float, Number("K/W", at_least=1e-6, at_most=1e6, default=1.0)] = (
+        1.0
+    )
+    housing_to_air: Annotated[float, Number("K/W", at_least=1e-6, at_most=1e6, default=1.0)] = 1.0
+    air_temperature: Annotated[float, Number("K", at_least=0.0, at_most=1e4, default=298.15)] = (
+        298.15
+    )
+    start_temperature: Annotated[float, Number("K", at_least=0.0, at_most=1e4, default=298.15)] = (
+        298.15
+    )
+    # hotter windings lower the duty limit, to 0 at temperature_max
+    derate_temperature: Annotated[float, Number("K", at_least=0.0, at_most=1e4, default=343.15)] = (
+        343.15
+    )
+    temperature_max: Annotated[float, Number("K", at_least=0.0, at_most=2e4, default=353.15)] = (
+        353.15
+    )
+    # of battery and cables, which all servos share (eq. 53)
+    supply_resistance: Annotated[float, Number("ohm", at_least=0.0, at_most=1e6, default=0.0)] = 0.0
+    # how commands reach the servos, but in kinematic mode: transmissions, rounding of angles
+    bus_period: Annotated[float, Number("s", at_least=0.0, at_most=1e3, default=0.0)] = 0.0
+    command_step: Annotated[float, Number("rad", at_least=0.0, at_most=1.0, default=0.0)] = 0.0
 
 
 def _unused_fields(servo: Servo) -> list[str]:

@@ -109,7 +109,7 @@ def keep_slopes(
     contacts = damping if isinstance(damping, Contacts) else contacts_of(robot, damping)
     angle, speed = joint_angles(robot, body), joint_speeds(robot, body)
     references = (command.angle_ref, command.speed_ref, command.torque_ref)
-    motor = servo_slopes(robot.servo, angle, speed, *references)
+    motor = servo_slopes(robot.servo, angle, speed, *references, power=command.power)
     stops = stop_slopes(robot.servo, joint_overruns(robot, body), speed)
     found = {}
     for k, spot, held, contact in closed_contacts(robot, body, contacts):
@@ -121,10 +121,15 @@ def keep_slopes(
             deflection = bristle[spot.leg] if spot.is_sole else np.zeros(3)
             found[k] = rigid_slopes(robot, spot, held, contact, deflection, turn, ahead)
     drag = gear_drag(robot.servo, speed)
-    if has_measured_friction(robot.servo) and robot.servo.mode != "kinematic":
+    if has_measured_friction(robot.servo):
         forces = applied_forces(robot, body, command, contacts, bristle).ravel()
-        load = external_torques(robot, body, forces, constraints(robot, body))
-        torque = servo_torque(robot.servo, angle, speed, *references)
+        load = external_torques(robot, body, command, forces, constraints(robot, body))
+        kinematic = robot.servo.mode == "kinematic"
+        torque = (
+            -load
+            if kinematic
+            else servo_torque(robot.servo, angle, speed, *references, power=command.power)
+        )
         drag = friction_drag(robot.servo, speed, torque, load)
     return Slopes(*motor, drag, *stops, found)
 
@@ -255,7 +260,7 @@ def solve_stage(
 
     # W = M - z G_v - z^2 G_x;  right = g + G_v s_v + G_x (s_x + z (v + s_v))
     g = applied_forces(robot, body, command, contacts, bristle).ravel()
-    motor, gear = joint_torques(robot, body, command, gear_loads(robot, body, g, joints))
+    motor, gear = joint_torques(robot, body, command, gear_loads(robot, body, command, g, joints))
     g += G.T @ (motor + gear + stop_torques(robot, body)).ravel()
     W = mass_matrix(robot, body, joints) - z * G_v - z * z * G_x
     right = g + G_v @ s_v + G_x @ (s_x + z * (v + s_v))

@@ -27,7 +27,6 @@ from hexapod_cosim.models.records import (
     Servo,
 )
 from hexapod_cosim.models.schema import Vector, check_record
-from hexapod_cosim.models.servos.motor import has_measured_friction
 
 # a thin rod satisfies the triangle inequality with equality; rounding to four digits may violate it
 INERTIA_ROUNDING = 1e-3
@@ -247,10 +246,25 @@ def _check_laws(robot: Robot, at: str) -> None:
 
 
 def _check_motor(servo: Servo, at: str) -> None:
-    """Checks that a motor has its constants, and that kinematic drives have neither a motor nor
-    measured friction.
-    """
+    """Checks that a motor has its constants."""
     motor = servo.drive == "motor"
+    if servo.winding_capacity > 0.0 and servo.housing_capacity == 0.0:
+        raise RobotError(
+            "a housing without heat capacity",
+            got=servo.housing_capacity,
+            expected="a number > 0 [J/K] where winding_capacity is",
+            fix="give servo.housing_capacity",
+            where=at + "servo.housing_capacity",
+        )
+    coolest = max(servo.derate_temperature, servo.air_temperature)
+    if servo.temperature_max <= coolest:
+        raise RobotError(
+            "windings that are never too hot",
+            got=servo.temperature_max,
+            expected=f"more than {coolest:g} K, derate_temperature and air_temperature",
+            fix="raise servo.temperature_max",
+            where=at + "servo.temperature_max",
+        )
     for key in ("voltage", "torque_constant", "resistance"):
         if motor and not getattr(servo, key) > 0.0:
             raise RobotError(
@@ -260,14 +274,6 @@ def _check_motor(servo: Servo, at: str) -> None:
                 fix=f"give servo.{key}, or a servo of `hexapod list servos` as servo.model",
                 where=at + f"servo.{key}",
             )
-    if servo.mode == "kinematic" and (motor or has_measured_friction(servo)):
-        raise RobotError(
-            "a kinematic drive has no motor torque",
-            got=servo.mode,
-            expected="position or torque, with a motor or measured friction",
-            fix="set servo.mode, or remove servo.model",
-            where=at + "servo.mode",
-        )
 
 
 def _check_terrain(robot: Robot, where: str) -> None:

@@ -39,6 +39,16 @@ ANGLES = LEGS * JOINTS
 POSES = 6 + ANGLES  # of torso and joints; the states are these and their velocities
 STATES = 2 * POSES
 CHANGE, RATE = 1e-6, 1e-5  # m and rad, m/s and rad/s    differences, for the usual size of robot
+# fields of the servo besides coulomb_friction that are dry friction
+DRY = (
+    "stribeck_friction",
+    "motor_load_friction",
+    "external_load_friction",
+    "stribeck_motor_load_friction",
+    "stribeck_external_load_friction",
+    "quadratic_motor_friction",
+    "quadratic_external_friction",
+)
 TORQUE = 1e-4  # N m    difference, for servos of STIFFNESS; scales with the stiffness
 STIFFNESS = 40.0  # N m/rad
 LONGEST_STEP = 5e-4  # s    of the integration, for the usual size of robot
@@ -92,17 +102,17 @@ class Bench:
     def __init__(
         self, plant: Fmu, robot: Robot, *, coulomb_friction: float, slope: float, period: float
     ) -> None:
-        """robot: the FMU's; coulomb_friction [N m]: of the gears; slope [s/m]: of the feet's
-        friction; period [s].
+        """robot: the FMU's; coulomb_friction [N m]: of the gears, 0 leaves out all their dry
+        friction; slope [s/m]: of the feet's friction; period [s].
         """
         size = size_of(robot)
         self.plant, self.period = plant, period
         self._sizes, self._torque = difference_sizes(size), TORQUE * (robot.servo.kp / STIFFNESS)
         step = period / math.ceil(period / (LONGEST_STEP * size.time) - 1e-9)
-        self._settings = plant.block(
-            ["servo.coulomb_friction", "servo.torque_max", "friction.slope", "solver.step"]
-        )
-        self._settings.values[:] = coulomb_friction, UNLIMITED, slope, step
+        plain = ["servo.coulomb_friction", "servo.torque_max", "friction.slope", "solver.step"]
+        self._settings = plant.block([*plain, *(f"servo.{name}" for name in DRY)])
+        dry = [getattr(robot.servo, name) if coulomb_friction > 0.0 else 0.0 for name in DRY]
+        self._settings.values[:] = coulomb_friction, UNLIMITED, slope, step, *dry
         seen = [
             *vector_names("torso.position"), *MEASURED["quaternion"], *MEASURED["angle"],
             *TORSO_RATES, *MEASURED["speed"],

@@ -8,6 +8,7 @@ Friction Models for the Physics Simulation of Servo Actuators*, ICRA 2025, arXiv
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -44,16 +45,28 @@ def position_gain(servo: Servo, duty_gain: float) -> float:
     return torque_per_volt(servo) * servo.voltage * duty_gain
 
 
-def motor_torque(servo: Servo, speed: Array, wanted: Array) -> Array:
+@dataclass(frozen=True)
+class Power:
+    """What motors get from their supply, shares of one or of each joint [1] (eq. 52, 53)."""
+
+    supply: float  # voltage over that of the servo
+    limit: Array | float  # this times the share of the duty limit that heat leaves
+
+
+FULL = Power(1.0, 1.0)
+
+
+def motor_torque(servo: Servo, speed: Array, wanted: Array, power: Power = FULL) -> Array:
     """Returns the motor's torque on the child [N m] (eq. 48), in the shape of the inputs.
 
     wanted: kp (q_ref - q) + kd (qd_ref - qd) + tau_ff [N m]. In position mode its voltage is
-    R/k_t wanted, as in servos that turn the position error into a duty; torque mode adds the
-    back-EMF, as a current controller does. The voltage is clipped to duty_max times the supply.
+    R/k_t wanted V/V_0 with the supply's V, as in servos that turn the position error into a duty;
+    torque mode adds the back-EMF, as a current controller does. The voltage is clipped to duty_max
+    times the supply.
     """
-    stall, brake = stall_torque(servo), back_emf_damping(servo) * speed
-    held = brake if servo.mode == "torque" else 0.0
-    return np.asarray(np.clip(wanted + held, -stall, stall) - brake)
+    stall, brake = stall_torque(servo) * power.limit, back_emf_damping(servo) * speed
+    driven = wanted + brake if servo.mode == "torque" else wanted * power.supply
+    return np.asarray(np.clip(driven, -stall, stall) - brake)
 
 
 def motor_current(servo: Servo, torque: Array) -> Array:

@@ -496,6 +496,17 @@ static const hxDefinition default_definition = {
     .servo.stribeck_speed = 1.0,
     .servo.stribeck_exponent = 1.0,
     .servo.friction_speed = 0.05,
+    .servo.winding_capacity = 0.0,
+    .servo.housing_capacity = 0.0,
+    .servo.winding_to_housing = 1.0,
+    .servo.housing_to_air = 1.0,
+    .servo.air_temperature = 298.15,
+    .servo.start_temperature = 298.15,
+    .servo.derate_temperature = 343.15,
+    .servo.temperature_max = 353.15,
+    .servo.supply_resistance = 0.0,
+    .servo.bus_period = 0.0,
+    .servo.command_step = 0.0,
 };
 
 void hx_definition_default(hxDefinition *definition) {
@@ -1083,6 +1094,17 @@ static const hxRange definition_ranges[] = {
     {"servo.stribeck_speed", "rad/s", 1e-06, 1000000.0, offsetof(hxDefinition, servo.stribeck_speed), 0},
     {"servo.stribeck_exponent", "", 1e-06, 16.0, offsetof(hxDefinition, servo.stribeck_exponent), 0},
     {"servo.friction_speed", "rad/s", 1e-05, 1000.0, offsetof(hxDefinition, servo.friction_speed), 0},
+    {"servo.winding_capacity", "J/K", 0.0, 1000000.0, offsetof(hxDefinition, servo.winding_capacity), 0},
+    {"servo.housing_capacity", "J/K", 0.0, 1000000.0, offsetof(hxDefinition, servo.housing_capacity), 0},
+    {"servo.winding_to_housing", "K/W", 1e-06, 1000000.0, offsetof(hxDefinition, servo.winding_to_housing), 0},
+    {"servo.housing_to_air", "K/W", 1e-06, 1000000.0, offsetof(hxDefinition, servo.housing_to_air), 0},
+    {"servo.air_temperature", "K", 0.0, 10000.0, offsetof(hxDefinition, servo.air_temperature), 0},
+    {"servo.start_temperature", "K", 0.0, 10000.0, offsetof(hxDefinition, servo.start_temperature), 0},
+    {"servo.derate_temperature", "K", 0.0, 10000.0, offsetof(hxDefinition, servo.derate_temperature), 0},
+    {"servo.temperature_max", "K", 0.0, 20000.0, offsetof(hxDefinition, servo.temperature_max), 0},
+    {"servo.supply_resistance", "ohm", 0.0, 1000000.0, offsetof(hxDefinition, servo.supply_resistance), 0},
+    {"servo.bus_period", "s", 0.0, 1000.0, offsetof(hxDefinition, servo.bus_period), 0},
+    {"servo.command_step", "rad", 0.0, 1.0, offsetof(hxDefinition, servo.command_step), 0},
 };
 
 size_t hx_definition_ranges(const hxRange **range) {

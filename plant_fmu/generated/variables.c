@@ -602,6 +602,61 @@ static const hxVariable outputs[] = {
     {"RR.coxa.electrical_power", "W", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.electrical_power[5][0]), HX_REAL, 0},
     {"RR.femur.electrical_power", "W", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.electrical_power[5][1]), HX_REAL, 0},
     {"RR.tibia.electrical_power", "W", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.electrical_power[5][2]), HX_REAL, 0},
+    {"LF.coxa.winding_temperature", "K", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.winding_temperature[0][0]), HX_REAL, 18},
+    {"LF.femur.winding_temperature", "K", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.winding_temperature[0][1]), HX_REAL, 0},
+    {"LF.tibia.winding_temperature", "K", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.winding_temperature[0][2]), HX_REAL, 0},
+    {"LM.coxa.winding_temperature", "K", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.winding_temperature[1][0]), HX_REAL, 0},
+    {"LM.femur.winding_temperature", "K", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.winding_temperature[1][1]), HX_REAL, 0},
+    {"LM.tibia.winding_temperature", "K", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.winding_temperature[1][2]), HX_REAL, 0},
+    {"LR.coxa.winding_temperature", "K", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.winding_temperature[2][0]), HX_REAL, 0},
+    {"LR.femur.winding_temperature", "K", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.winding_temperature[2][1]), HX_REAL, 0},
+    {"LR.tibia.winding_temperature", "K", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.winding_temperature[2][2]), HX_REAL, 0},
+    {"RF.coxa.winding_temperature", "K", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.winding_temperature[3][0]), HX_REAL, 0},
+    {"RF.femur.winding_temperature", "K", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.winding_temperature[3][1]), HX_REAL, 0},
+    {"RF.tibia.winding_temperature", "K", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.winding_temperature[3][2]), HX_REAL, 0},
+    {"RM.coxa.winding_temperature", "K", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.winding_temperature[4][0]), HX_REAL, 0},
+    {"RM.femur.winding_temperature", "K", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.winding_temperature[4][1]), HX_REAL, 0},
+    {"RM.tibia.winding_temperature", "K", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.winding_temperature[4][2]), HX_REAL, 0},
+    {"RR.coxa.winding_temperature", "K", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.winding_temperature[5][0]), HX_REAL, 0},
+    {"RR.femur.winding_temperature", "K", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.winding_temperature[5][1]), HX_REAL, 0},
+    {"RR.tibia.winding_temperature", "K", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.winding_temperature[5][2]), HX_REAL, 0},
+    {"LF.coxa.housing_temperature", "K", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.housing_temperature[0][0]), HX_REAL, 18},
+    {"LF.femur.housing_temperature", "K", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.housing_temperature[0][1]), HX_REAL, 0},
+    {"LF.tibia.housing_temperature", "K", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.housing_temperature[0][2]), HX_REAL, 0},
+    {"LM.coxa.housing_temperature", "K", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.housing_temperature[1][0]), HX_REAL, 0},
+    {"LM.femur.housing_temperature", "K", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.housing_temperature[1][1]), HX_REAL, 0},
+    {"LM.tibia.housing_temperature", "K", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.housing_temperature[1][2]), HX_REAL, 0},
+    {"LR.coxa.housing_temperature", "K", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.housing_temperature[2][0]), HX_REAL, 0},
+    {"LR.femur.housing_temperature", "K", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.housing_temperature[2][1]), HX_REAL, 0},
+    {"LR.tibia.housing_temperature", "K", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.housing_temperature[2][2]), HX_REAL, 0},
+    {"RF.coxa.housing_temperature", "K", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.housing_temperature[3][0]), HX_REAL, 0},
+    {"RF.femur.housing_temperature", "K", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.housing_temperature[3][1]), HX_REAL, 0},
+    {"RF.tibia.housing_temperature", "K", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.housing_temperature[3][2]), HX_REAL, 0},
+    {"RM.coxa.housing_temperature", "K", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.housing_temperature[4][0]), HX_REAL, 0},
+    {"RM.femur.housing_temperature", "K", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.housing_temperature[4][1]), HX_REAL, 0},
+    {"RM.tibia.housing_temperature", "K", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.housing_temperature[4][2]), HX_REAL, 0},
+    {"RR.coxa.housing_temperature", "K", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.housing_temperature[5][0]), HX_REAL, 0},
+    {"RR.femur.housing_temperature", "K", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.housing_temperature[5][1]), HX_REAL, 0},
+    {"RR.tibia.housing_temperature", "K", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.housing_temperature[5][2]), HX_REAL, 0},
+    {"LF.coxa.remaining_rating", "1", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.remaining_rating[0][0]), HX_REAL, 18},
+    {"LF.femur.remaining_rating", "1", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.remaining_rating[0][1]), HX_REAL, 0},
+    {"LF.tibia.remaining_rating", "1", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.remaining_rating[0][2]), HX_REAL, 0},
+    {"LM.coxa.remaining_rating", "1", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.remaining_rating[1][0]), HX_REAL, 0},
+    {"LM.femur.remaining_rating", "1", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.remaining_rating[1][1]), HX_REAL, 0},
+    {"LM.tibia.remaining_rating", "1", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.remaining_rating[1][2]), HX_REAL, 0},
+    {"LR.coxa.remaining_rating", "1", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.remaining_rating[2][0]), HX_REAL, 0},
+    {"LR.femur.remaining_rating", "1", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.remaining_rating[2][1]), HX_REAL, 0},
+    {"LR.tibia.remaining_rating", "1", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.remaining_rating[2][2]), HX_REAL, 0},
+    {"RF.coxa.remaining_rating", "1", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.remaining_rating[3][0]), HX_REAL, 0},
+    {"RF.femur.remaining_rating", "1", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.remaining_rating[3][1]), HX_REAL, 0},
+    {"RF.tibia.remaining_rating", "1", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.remaining_rating[3][2]), HX_REAL, 0},
+    {"RM.coxa.remaining_rating", "1", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.remaining_rating[4][0]), HX_REAL, 0},
+    {"RM.femur.remaining_rating", "1", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.remaining_rating[4][1]), HX_REAL, 0},
+    {"RM.tibia.remaining_rating", "1", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.remaining_rating[4][2]), HX_REAL, 0},
+    {"RR.coxa.remaining_rating", "1", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.remaining_rating[5][0]), HX_REAL, 0},
+    {"RR.femur.remaining_rating", "1", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.remaining_rating[5][1]), HX_REAL, 0},
+    {"RR.tibia.remaining_rating", "1", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.remaining_rating[5][2]), HX_REAL, 0},
+    {"supply.voltage", "V", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.supply_voltage), HX_REAL, 1},
 };
 
 static const hxVariable parameters[] = {
@@ -1096,6 +1151,17 @@ static const hxVariable parameters[] = {
     {"servo.stribeck_speed", "rad/s", 1e-06, 1000000.0, offsetof(struct hxVariables, definition.servo.stribeck_speed), HX_REAL, 1},
     {"servo.stribeck_exponent", "1", 1e-06, 16.0, offsetof(struct hxVariables, definition.servo.stribeck_exponent), HX_REAL, 1},
     {"servo.friction_speed", "rad/s", 1e-05, 1000.0, offsetof(struct hxVariables, definition.servo.friction_speed), HX_REAL, 1},
+    {"servo.winding_capacity", "J/K", 0.0, 1000000.0, offsetof(struct hxVariables, definition.servo.winding_capacity), HX_REAL, 1},
+    {"servo.housing_capacity", "J/K", 0.0, 1000000.0, offsetof(struct hxVariables, definition.servo.housing_capacity), HX_REAL, 1},
+    {"servo.winding_to_housing", "K/W", 1e-06, 1000000.0, offsetof(struct hxVariables, definition.servo.winding_to_housing), HX_REAL, 1},
+    {"servo.housing_to_air", "K/W", 1e-06, 1000000.0, offsetof(struct hxVariables, definition.servo.housing_to_air), HX_REAL, 1},
+    {"servo.air_temperature", "K", 0.0, 10000.0, offsetof(struct hxVariables, definition.servo.air_temperature), HX_REAL, 1},
+    {"servo.start_temperature", "K", 0.0, 10000.0, offsetof(struct hxVariables, definition.servo.start_temperature), HX_REAL, 1},
+    {"servo.derate_temperature", "K", 0.0, 10000.0, offsetof(struct hxVariables, definition.servo.derate_temperature), HX_REAL, 1},
+    {"servo.temperature_max", "K", 0.0, 20000.0, offsetof(struct hxVariables, definition.servo.temperature_max), HX_REAL, 1},
+    {"servo.supply_resistance", "ohm", 0.0, 1000000.0, offsetof(struct hxVariables, definition.servo.supply_resistance), HX_REAL, 1},
+    {"servo.bus_period", "s", 0.0, 1000.0, offsetof(struct hxVariables, definition.servo.bus_period), HX_REAL, 1},
+    {"servo.command_step", "rad", 0.0, 1.0, offsetof(struct hxVariables, definition.servo.command_step), HX_REAL, 1},
 };
 
 static const hxVariable locals[] = {
@@ -1250,7 +1316,7 @@ const size_t hx_state_count = sizeof states / sizeof states[0];
 
 _Static_assert(sizeof states / sizeof states[0] == sizeof(hxCoordinates) / sizeof(double), "each state has its row");
 
-const char hx_default_guid[] = "{f9327628-8538-42b1-9073-5a24383000cb}";
+const char hx_default_guid[] = "{1bbdbac1-8aee-4757-aba0-7b91f5a02f0b}";
 
 _Static_assert(HX_CONTACT_EXACT_RESTITUTION == 1, "ContactLaw");
 _Static_assert(HX_CONTACT_FLORES == 2, "ContactLaw");

@@ -23,7 +23,7 @@ typedef struct {
 } hxSavedPlant;
 
 static const uint64_t magic = 0x74616c5064507868u; /* "hxPdPlat" */
-static const uint64_t saved_version = 11;
+static const uint64_t saved_version = 13;
 
 /* Returns the checksum of a saved plant's bytes behind it, of the ring those of its footprints. */
 static uint64_t checksum(const unsigned char *bytes, int footprints) {
@@ -146,45 +146,118 @@ static double input_fingerprint(const hxInput *input) {
   return 1.0 + (double)(hx_checksum(1, input, sizeof *input) >> 12);
 }
 
-/* Advances the plant. If an event interrupted the last call and the input is the same, the step
- * sequence of that call continues, so that the motion does not depend on the interruption. */
+/* Computes the command of an input at the present time. */
+static void present_command(const hxPlant *plant, const hxInput *input, hxCommand *command) {
+  hx_command_from_input(command, input, plant->state.time);
+  hx_bus_command(command, &plant->model, &plant->state);
+  hx_command_supply(command, &plant->model, &plant->state);
+}
+
+/* Sets what the motors get in a call's command; a call that resumes another has what that had. */
+static void supply_motors(hxPlant *plant, int resumes, hxCommand *command) {
+  hxState *state = &plant->state;
+  if (!resumes) {
+    hx_command_supply(command, &plant->model, state);
+    state->supply = command->supply;
+    memcpy(state->duty, command->duty, sizeof state->duty);
+  }
+  command->supply = state->supply;
+  memcpy(command->duty, state->duty, sizeof command->duty);
+}
+
+static const double most_parts = 1e6; /* 1  transmissions of the bus within a call */
+
+/* Returns whether a call to t_end is possible, else writes why not. */
+static hxStatus check_end(hxPlant *plant, double t_end) {
+  const double time = plant->state.time, period = plant->model.bus_period;
+  if (!(t_end >= time && t_end <= DBL_MAX)) {
+    hx_print(plant->message, HX_MESSAGE_SIZE,
+             "end of step: got %.17g s, expected a finite time of at least %.17g s", t_end, time);
+    return HX_INVALID_ARGUMENT;
+  }
+  if (!(period > 0.0 && (t_end - time) / period > most_parts)) return HX_OK;
+  hx_print(plant->message, HX_MESSAGE_SIZE,
+           "servo.bus_period: got %.3g s, which makes %.3g transmissions in this call, expected at "
+           "most %.3g; raise servo.bus_period or make shorter calls",
+           period, (t_end - time) / period, most_parts);
+  return HX_INVALID_ARGUMENT;
+}
+
+/* A call: its inputs, their fingerprint or 0, and its start, s. */
+typedef struct {
+  const hxInput *input;
+  const hxCommand *ramp; /* NULL: constant */
+  double fingerprint, start;
+} hxStepCall;
+
+/* Sets a part's command, and in *ramp its change per second; servos on a bus hold theirs. */
+static void part_command(hxPlant *plant, const hxStepCall *call, int resumes, hxCommand *command,
+                         hxCommand *ramp) {
+  enum { SIZE = sizeof(hxCommand) / sizeof(double) };
+  hxState *state = &plant->state;
+  const double elapsed = state->time - call->start;
+  hx_command_from_input(command, call->input, resumes ? state->call_start : state->time);
+  if (hx_has_bus(&plant->model)) {
+    double *to = (double *)command;
+    const double time = command->time, *rate = (const double *)call->ramp;
+    for (int i = 0; call->ramp && i < SIZE; ++i) to[i] += elapsed * rate[i];
+    command->time = time;
+    hx_bus_send(command, &plant->model, state);
+    memset(ramp->angle, 0, sizeof ramp->angle);
+    memset(ramp->speed, 0, sizeof ramp->speed);
+    memset(ramp->torque, 0, sizeof ramp->torque);
+  }
+  supply_motors(plant, resumes, command);
+}
+
+/* Advances the plant by a part of a call: to its end, or to the next transmission of the bus. If an
+ * event interrupted the last part and the input is the same, the step sequence of that part
+ * continues, so that the motion does not depend on the interruption. */
+static hxStatus advance_part(hxPlant *plant, const hxStepCall *call, double t_end,
+                             hxEvents *events) {
+  hxState *state = &plant->state;
+  hxCommand command, ramp;
+  const int resumes = state->call_input != 0.0 && state->call_input == call->fingerprint &&
+                      state->call_start < state->time;
+  if (call->ramp) ramp = *call->ramp;
+  part_command(plant, call, resumes, &command, &ramp);
+  const double end = hx_bus_end(&plant->model, state, t_end);
+  const hxStatus status =
+      hx_kernel()->integrate(&plant->model, &command, call->ramp ? &ramp : NULL, end, events, state,
+                             plant->scratch, plant->message);
+  const int interrupted = state->time < end;
+  state->call_input = interrupted ? call->fingerprint : 0.0;
+  state->call_start = interrupted ? command.time : 0.0;
+  return status;
+}
+
+/* Advances the plant. */
 static hxStatus advance(hxPlant *plant, const hxInput *input, const hxInput *rate, double t_end,
                         hxEvents *events) {
   hxState *before = &plant->state_before;
-  hxCommand command, change;
+  hxCommand change;
   int finite;
   const hxCommand *ramp = ramp_from_rate(rate, &change, &finite);
   if (!finite)
     return fail(
         plant, HX_INVALID_ARGUMENT,
         "rates of inputs: got a number that is not finite, expected finite rates per second");
-  if (!(t_end >= plant->state.time && t_end <= DBL_MAX)) {
-    hx_print(plant->message, HX_MESSAGE_SIZE,
-             "end of step: got %.17g s, expected a finite time of at least %.17g s", t_end,
-             plant->state.time);
-    return HX_INVALID_ARGUMENT;
-  }
-  hxStatus status = hx_input_check(input, plant->message);
+  hxStatus status = check_end(plant, t_end);
+  if (status == HX_OK) status = hx_input_check(input, plant->message);
   if (status != HX_OK) return status;
   hx_copy_state(&plant->model, before, &plant->state);
-  const double fingerprint =
-      !ramp && (events->stop || before->call_input != 0.0) ? input_fingerprint(input) : 0.0;
-  const int resumes = before->call_input != 0.0 && before->call_input == fingerprint &&
-                      before->call_start < before->time;
-  hx_command_from_input(&command, input, resumes ? before->call_start : before->time);
+  const int told = !ramp && (events->stop || before->call_input != 0.0);
+  const hxStepCall call = {input, ramp, told ? input_fingerprint(input) : 0.0, before->time};
   hx_footprints_begin(&plant->footprints);
   events->footprints = &plant->footprints;
-  status = hx_kernel()->integrate(&plant->model, &command, ramp, t_end, events, &plant->state,
-                                  plant->scratch, plant->message);
-  if (status != HX_OK) {
-    hx_copy_state(&plant->model, &plant->state, before);
-    hx_footprints_take_back(&plant->footprints);
-    return status;
-  }
-  const int interrupted = plant->state.time < t_end;
-  plant->state.call_input = interrupted ? fingerprint : 0.0;
-  plant->state.call_start = interrupted ? command.time : 0.0;
-  return HX_OK;
+  do {
+    status = advance_part(plant, &call, t_end, events);
+    events->continues = 1;
+  } while (status == HX_OK && plant->state.time < t_end && !(events->stop && events->found));
+  if (status == HX_OK) return HX_OK;
+  hx_copy_state(&plant->model, &plant->state, before);
+  hx_footprints_take_back(&plant->footprints);
+  return status;
 }
 
 hxStatus hx_plant_step(hxPlant *plant, const hxInput *input, double t_end) {
@@ -206,9 +279,11 @@ hxStatus hx_plant_step_to_event(hxPlant *plant, const hxInput *input, double t_e
 
 void hx_plant_output(hxPlant *plant, const hxInput *input, hxOutput *output) {
   hxCommand command;
-  hx_command_from_input(&command, input, plant->state.time);
+  present_command(plant, input, &command);
   hx_kernel()->output(&plant->model, &plant->state, &command, plant->scratch, output);
   output->footprints = plant->footprints.kept.count;
+  if (plant->model.servo_drive == HX_DRIVE_MOTOR)
+    output->supply_voltage = command.supply * plant->model.voltage;
 }
 
 size_t hx_plant_footprints(const hxPlant *plant, hxFootprint *footprint, size_t capacity) {
@@ -334,13 +409,15 @@ static void switch_bodies(hxPlant *plant) {
 void hx_plant_completed_step(hxPlant *plant, const hxInput *input) {
   hxCommand command;
   hx_command_from_input(&command, input, plant->state.time);
+  if (hx_has_bus(&plant->model)) hx_bus_send(&command, &plant->model, &plant->state);
+  hx_command_supply(&command, &plant->model, &plant->state);
   hx_kernel()->measure(&plant->model, &command, &plant->state, plant->scratch);
   switch_bodies(plant);
 }
 
 void hx_plant_rates(const hxPlant *plant, const hxInput *input, hxCoordinates *rate) {
   hxCommand command;
-  hx_command_from_input(&command, input, plant->state.time);
+  present_command(plant, input, &command);
   hx_kernel()->coordinates(&plant->model, &plant->state, &command, plant->scratch, NULL, rate);
 }
 
@@ -390,7 +467,7 @@ hxStatus hx_plant_tangent(hxPlant *plant, const hxInput *input, const hxInput *d
   hxTangentPoint *point = plant->scratch;
   hxCoordinates x;
   hx_plant_get_coordinates(plant, &x); /* before the point, because it uses the same memory */
-  hx_command_from_input(&point->command, input, plant->state.time);
+  present_command(plant, input, &point->command);
   hx_command_from_input(&point->d_command, d_input ? d_input : &no_input, 0.0);
   point->x = x;
   point->dx = dx ? *dx : no_change;
@@ -408,7 +485,7 @@ hxStatus hx_plant_tangent(hxPlant *plant, const hxInput *input, const hxInput *d
 
 void hx_plant_integral_rates(hxPlant *plant, const hxInput *input, hxOutput *rate) {
   hxCommand command;
-  hx_command_from_input(&command, input, plant->state.time);
+  present_command(plant, input, &command);
   hx_kernel()->integral_rates(&plant->model, &plant->state, &command, plant->scratch, rate);
 }
 
@@ -431,7 +508,7 @@ void hx_plant_accelerations(hxPlant *plant, const hxInput *input, double acceler
                             double multiplier[HX_BODIES - 1][HX_MULTIPLIERS],
                             double drive_torque[HX_BODIES - 1]) {
   hxCommand command;
-  hx_command_from_input(&command, input, plant->state.time);
+  present_command(plant, input, &command);
   hx_kernel()->accelerations(&plant->model, &plant->state, &command, plant->scratch, acceleration,
                              multiplier, drive_torque);
 }

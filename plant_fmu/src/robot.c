@@ -214,6 +214,66 @@ static void compile_soil(hxModel *model, const hxDefinition *d) {
     model->bristle_length = on_grid;
 }
 
+static const double bus_margin = 1e-9; /* s  transmissions this early or late are on time */
+
+int hx_has_bus(const hxModel *model) {
+  return model->bus_period > 0.0 || model->command_step > 0.0;
+}
+
+/* Returns the time of the next transmission, s; without a period the present time. */
+static double next_sending(const hxModel *model, const hxState *state) {
+  return model->bus_period > 0.0 ? state->bus.start + state->bus.sent * model->bus_period
+                                 : state->time;
+}
+
+void hx_bus_command(hxCommand *command, const hxModel *model, const hxState *state) {
+  if (!hx_has_bus(model)) return;
+  if (state->time < next_sending(model, state) - bus_margin) {
+    memcpy(command->angle, state->bus.angle, sizeof command->angle);
+    memcpy(command->speed, state->bus.speed, sizeof command->speed);
+    memcpy(command->torque, state->bus.torque, sizeof command->torque);
+    return;
+  }
+  const double step = model->command_step;
+  for (int i = 0; step > 0.0 && i < HX_JOINTS * HX_SLOTS; ++i) {
+    double *angle = &command->angle[i / HX_SLOTS][i % HX_SLOTS];
+    *angle = step * floor(*angle / step + 0.5);
+  }
+}
+
+void hx_bus_send(hxCommand *command, const hxModel *model, hxState *state) {
+  hx_bus_command(command, model, state);
+  memcpy(state->bus.angle, command->angle, sizeof command->angle);
+  memcpy(state->bus.speed, command->speed, sizeof command->speed);
+  memcpy(state->bus.torque, command->torque, sizeof command->torque);
+  if (model->bus_period > 0.0 && state->time >= next_sending(model, state) - bus_margin)
+    state->bus.sent =
+        floor((state->time + bus_margin - state->bus.start) / model->bus_period) + 1.0;
+}
+
+double hx_bus_end(const hxModel *model, const hxState *state, double t_end) {
+  if (!(model->bus_period > 0.0)) return t_end;
+  const double next = next_sending(model, state);
+  return next > state->time && next < t_end - bus_margin ? next : t_end;
+}
+
+/* Copies the constants of the motors' heat and supply. */
+static void compile_supply(hxModel *model, const hxDefinition *d) {
+  model->heat =
+      (hxHeat){.winding = d->servo.drive == HX_DRIVE_MOTOR ? d->servo.winding_capacity : 0.0,
+               .housing = d->servo.housing_capacity,
+               .to_housing = 1.0 / d->servo.winding_to_housing,
+               .to_air = 1.0 / d->servo.housing_to_air,
+               .air = d->servo.air_temperature,
+               .start = d->servo.start_temperature,
+               .derate = d->servo.derate_temperature,
+               .max = d->servo.temperature_max};
+  model->voltage = d->servo.voltage, model->duty_max = d->servo.duty_max;
+  model->supply_resistance = d->servo.supply_resistance;
+  if (d->servo.mode == HX_SERVO_KINEMATIC) return;
+  model->bus_period = d->servo.bus_period, model->command_step = d->servo.command_step;
+}
+
 /* Computes the constants of the servos' motors, and of the joints' stops. */
 static void compile_servo(hxModel *model, const hxDefinition *d) {
   const int follows = d->servo.mode == HX_SERVO_POSITION, motor = d->servo.drive == HX_DRIVE_MOTOR;
@@ -230,6 +290,7 @@ static void compile_servo(hxModel *model, const hxDefinition *d) {
     model->limit_damping = model->back_emf;
     if (follows) model->free_damping = model->kd + model->back_emf;
   }
+  compile_supply(model, d);
   model->stop_stiffness = d->servo.stop_stiffness, model->stop_damping = d->servo.stop_damping;
   model->stops = d->servo.mode != HX_SERVO_KINEMATIC && d->servo.stop_stiffness > 0.0;
 }
@@ -448,5 +509,47 @@ void hx_command_from_input(hxCommand *command, const hxInput *input, double time
     command->push_force[i] = input->push_force[i];
     command->push_torque[i] = input->push_torque[i];
   }
+  command->supply = 0.0;
+  memset(command->duty, 0, sizeof command->duty);
   command->time = time;
+}
+
+/* Returns the duty of a leg's motor under a command at the last moment, and in *speed the speed of
+ * its joint. */
+static double motor_duty(const hxCommand *command, const hxModel *model, const hxState *state,
+                         int joint, int leg, double *speed) {
+  const double angle = state->moment.angle[joint][leg], w = state->moment.speed[joint][leg];
+  const double limit = model->duty_max * command->duty[joint][leg];
+  double wanted = model->kp * (command->angle[joint][leg] - angle) +
+                  model->kd * (command->speed[joint][leg] - w) + command->torque[joint][leg];
+  if (model->servo_mode == HX_SERVO_TORQUE) wanted += model->back_emf * w;
+  *speed = w;
+  return fmax(-limit, fmin(limit, wanted * model->duty_max / model->stall_torque));
+}
+
+/* Returns the voltage of the supply over servo.voltage, at most 1 (eq. 53): with the duties d, the
+ * current is the sum of d (d V - k_t w)/R. */
+static double supply_share(const hxCommand *command, const hxModel *model, const hxState *state) {
+  const double ratio = model->supply_resistance / model->resistance;
+  double squares = 0.0, back = 0.0, speed;
+  for (int leg = 0; leg < HX_LEGS; ++leg)
+    for (int joint = 0; joint < HX_JOINTS; ++joint) {
+      const double duty = motor_duty(command, model, state, joint, leg, &speed);
+      squares += duty * duty, back += duty * speed;
+    }
+  const double emf = model->torque_constant * back / model->voltage;
+  return fmin(1.0, (1.0 + ratio * emf) / (1.0 + ratio * squares));
+}
+
+void hx_command_supply(hxCommand *command, const hxModel *model, const hxState *state) {
+  const hxHeat *heat = &model->heat;
+  const double per_kelvin = 1.0 / (heat->max - heat->derate);
+  for (int joint = 0; joint < HX_JOINTS; ++joint)
+    for (int slot = 0; slot < HX_SLOTS; ++slot) {
+      const double left = (heat->max - state->measured.winding[joint][slot]) * per_kelvin;
+      command->duty[joint][slot] = heat->winding > 0.0 ? fmax(0.0, fmin(1.0, left)) : 1.0;
+    }
+  const int sags = model->supply_resistance > 0.0 && model->servo_drive == HX_DRIVE_MOTOR &&
+                   model->servo_mode != HX_SERVO_KINEMATIC;
+  command->supply = sags ? supply_share(command, model, state) : 1.0;
 }

@@ -23,8 +23,26 @@ void hx_motion_from_bodies(const hxModel *model, const double body[HX_BODIES][HX
 void hx_bodies_from_motion(const hxModel *model, const hxPlantMotion *motion,
                            double body[HX_BODIES][HX_BODY_STATE]);
 
-/* Computes the command of an input given at a time, s. */
+/* Computes the command of an input given at a time, s. Its motors have no supply. */
 void hx_command_from_input(hxCommand *command, const hxInput *input, double time);
+
+/* Returns whether servos hold commands that a bus transmits, or rounded ones. */
+int hx_has_bus(const hxModel *model);
+
+/* Replaces the commands of joints by those that the servos have at the present time: rounded ones
+ * where the bus transmits now, else those that they hold. */
+void hx_bus_command(hxCommand *command, const hxModel *model, const hxState *state);
+
+/* Does the same, and keeps commands that the bus transmits now. */
+void hx_bus_send(hxCommand *command, const hxModel *model, hxState *state);
+
+/* Returns the time of the next transmission if it is before t_end, else t_end, s. */
+double hx_bus_end(const hxModel *model, const hxState *state, double t_end);
+
+/* Sets what the motors get from their supply in a command: the shares of their duty limits by the
+ * temperatures of their windings (eq. 52), and the supply's voltage under the currents of this
+ * command at the last moment (eq. 53). */
+void hx_command_supply(hxCommand *command, const hxModel *model, const hxState *state);
 
 HX_HIDDEN_END
 

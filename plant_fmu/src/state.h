@@ -69,6 +69,13 @@ typedef struct hxJointModel {
   double middle[HX_SLOTS], half_range[HX_SLOTS]; /* rad  between the stops */
 } hxJointModel;
 
+/* Constants of the heat of winding and housing (eq. 52). */
+typedef struct hxHeat {
+  double winding, housing;        /* J/K  heat capacities; winding 0: no heating */
+  double to_housing, to_air;      /* W/K  conductances */
+  double air, start, derate, max; /* K */
+} hxHeat;
+
 typedef struct hxModel {
   double torso_mass;
   double torso_inertia[6];
@@ -109,6 +116,9 @@ typedef struct hxModel {
   double stribeck_motor, stribeck_external;     /* 1  K_ms, K_es */
   double quadratic_motor, quadratic_external;   /* 1/(N m)  K_mq, K_eq */
   double per_stribeck_speed, stribeck_exponent; /* s/rad, 1  1/w_s, a */
+  double voltage, duty_max, supply_resistance;  /* V, 1, ohm */
+  hxHeat heat;
+  double bus_period, command_step; /* s, rad  0 in kinematic mode */
   double ground_point[3], ground_normal[3];
   double soil[HX_SOIL_SIZE]; /* an hxSoil, of the definition */
   double bristle_length;     /* m  presliding, or shear displacement of the soil */
@@ -124,8 +134,19 @@ typedef struct hxCommand {
   double torque[HX_JOINTS][HX_SLOTS];
   double push_force[3], push_torque[3];
   double acceleration[HX_JOINTS][HX_SLOTS];
-  double time; /* s  time of the command, from which kinematic drives extrapolate (eq. 13) */
+  double time;   /* s  time of the command, from which kinematic drives extrapolate (eq. 13) */
+  double supply; /* 1  voltage of the supply over servo.voltage (eq. 53) */
+  double duty[HX_JOINTS][HX_SLOTS]; /* 1  share of the duty limit that heat leaves (eq. 52) */
 } hxCommand;
+
+/* Commands that servos hold until the bus transmits the next ones, legs innermost. */
+typedef struct hxBus {
+  double angle[HX_JOINTS][HX_SLOTS];
+  double speed[HX_JOINTS][HX_SLOTS];
+  double torque[HX_JOINTS][HX_SLOTS];
+  double start; /* s  of the first transmission */
+  double sent;  /* 1  transmissions since */
+} hxBus;
 
 /* State of the contacts. It changes at touch-down and lift-off, plastic depth and nearest points at
  * the end of steps; never within a step. */
@@ -205,6 +226,8 @@ typedef struct hxMeasured {
   double landing_left[HX_SLOTS];                 /* 1       samples of the landing still to take */
   double landed_at[HX_SLOTS];                    /* s       time of the last touch-down */
   double landings[HX_SLOTS];                     /* 1       touch-downs */
+  double winding[HX_JOINTS][HX_SLOTS];           /* K       temperatures of windings */
+  double housing[HX_JOINTS][HX_SLOTS];           /* K       of housings */
   double contact_loss, friction_loss, gear_loss; /* J  their sum is the dissipated energy; stops
                                                   *    count with the gears */
   double cone_time[HX_CONE_BINS]; /* s  feet under load, by share of the friction cone */
@@ -219,6 +242,9 @@ typedef struct hxState {
   double stored_at_start; /* J  stored energy at the start of the energy audit */
   double call_start;      /* s  start of the call that an event interrupted */
   double call_input;      /* 1  checksum of its input, a whole number; 0: no such call */
+  double supply;          /* 1  hxCommand.supply and duty of the last call */
+  double duty[HX_JOINTS][HX_SLOTS];
+  hxBus bus;
   hxPlantMotion motion;
   hxContactState contact;
   double evaluations, steps, rejected, touchdowns;

@@ -56,26 +56,23 @@ static void check_legs(hxChecker *c, const hxDefinition *d) {
   }
 }
 
-/* Checks the constants of motors, and that kinematic drives have neither a motor nor friction that
- * depends on its torque. */
+/* Checks the constants of motors. */
 static void check_servo(hxChecker *c, const hxDefinition *d) {
   const char *positive = "more than 0 with servo.drive motor";
-  const double load = d->servo.motor_load_friction + d->servo.external_load_friction +
-                      d->servo.stribeck_motor_load_friction +
-                      d->servo.stribeck_external_load_friction + d->servo.quadratic_motor_friction +
-                      d->servo.quadratic_external_friction + d->servo.stribeck_friction +
-                      d->servo.viscous_friction;
   const int motor = d->servo.drive == HX_DRIVE_MOTOR;
   if (motor && !(d->servo.voltage > 0.0))
     hx_check_fail(c, "servo.voltage", d->servo.voltage, positive);
   if (motor && !(d->servo.torque_constant > 0.0))
     hx_check_fail(c, "servo.torque_constant", d->servo.torque_constant, positive);
+  if (d->servo.winding_capacity > 0.0 && !(d->servo.housing_capacity > 0.0))
+    hx_check_fail(c, "servo.housing_capacity", d->servo.housing_capacity,
+                  "more than 0 where servo.winding_capacity is");
+  if (!(d->servo.temperature_max > d->servo.derate_temperature &&
+        d->servo.temperature_max > d->servo.air_temperature))
+    hx_check_fail(c, "servo.temperature_max", d->servo.temperature_max,
+                  "more than servo.derate_temperature and servo.air_temperature");
   if (motor && !(d->servo.resistance > 0.0))
     hx_check_fail(c, "servo.resistance", d->servo.resistance, positive);
-  if (d->servo.mode == HX_SERVO_KINEMATIC && (motor || load > 0.0))
-    hx_check_fail(c, "servo.mode", d->servo.mode,
-                  "position or torque (1 or 2) with a motor or measured friction: a kinematic "
-                  "drive has no motor torque");
 }
 
 /* Checks conditions between several numbers that are within their ranges. */

@@ -63,6 +63,11 @@ RELATED = [
     ),
     "contact.restitution",
     "friction.mu_static",
+    "servo.winding_capacity",
+    "servo.housing_capacity",
+    "servo.air_temperature",
+    "servo.derate_temperature",
+    "servo.temperature_max",
 ]
 DEEP = "deep in the ground"  # a start with its feet below the ground is refused
 LOWEST = -10000.0  # m  of the ground: limits of lengths do not put feet into it

@@ -89,6 +89,8 @@ static const ProbeField fields[] = {
     FIELD(hxDefinition, servo.stop_damping),
     FIELD(hxDefinition, servo.voltage),
     FIELD(hxDefinition, servo.friction_speed),
+    FIELD(hxDefinition, servo.supply_resistance),
+    FIELD(hxDefinition, servo.command_step),
     FIELD(hxDefinition, baumgarte.alpha),
     FIELD(hxDefinition, baumgarte.beta),
     FIELD(hxDefinition, gravity),
@@ -184,6 +186,8 @@ static const ProbeField fields[] = {
     FIELD(hxOutput, cone_time),
     FIELD(hxOutput, current),
     FIELD(hxOutput, electrical_power),
+    FIELD(hxOutput, remaining_rating),
+    FIELD(hxOutput, supply_voltage),
 };
 
 /* Returns the name of the i-th field, its offset and size; NULL past the last. */
@@ -407,9 +411,9 @@ HX_API void hx_probe_gear(const hxPlant *plant, double speed, double motor, doub
 /* Computes a servo. command: angle, speed, torque; out: torque, friction, stiffness, damping. */
 HX_API void hx_probe_servo(const hxPlant *plant, double angle, double speed,
                            const double command[3], double out[4]) {
-  const hxServo servo =
-      hx_servo_torque(&plant->model, hx_splat(angle), hx_splat(speed), hx_splat(command[0]),
-                      hx_splat(command[1]), hx_splat(command[2]));
+  const hxServo servo = hx_servo_torque(
+      &plant->model, hx_splat(angle), hx_splat(speed), hx_splat(command[0]), hx_splat(command[1]),
+      hx_splat(command[2]), (hxPower){hx_splat(1.0), hx_splat(1.0)});
   out[0] = hx_lane(servo.torque, 0), out[1] = hx_lane(servo.friction, 0);
   out[2] = hx_lane(servo.stiffness, 0), out[3] = hx_lane(servo.damping + servo.drag, 0);
 }
@@ -461,6 +465,7 @@ static void evaluate(hxPlant *plant, const hxInput *input, double age, hxImplici
                      hxWork *work, hxRate *rate) {
   hxCommand command;
   hx_command_from_input(&command, input, plant->state.time - age);
+  hx_command_supply(&command, &plant->model, &plant->state);
   hx_dynamics_evaluate(&plant->model, &plant->state.contact, &command, plant->state.time,
                        &plant->state.motion, implicit, 1, work, rate);
 }
@@ -584,6 +589,7 @@ HX_API const char *hx_probe_kernel(int i, hxPlant *plant, const hxInput *input,
     if (!hx_kernels[k]) return NULL;
   if (!hx_kernels[i]->is_supported()) return NULL;
   hx_command_from_input(&command, input, plant->state.time);
+  hx_command_supply(&command, &plant->model, &plant->state);
   hx_kernels[i]->derivative(&plant->model, &plant->state, &command, 1, plant->scratch, &rate);
   hx_bodies_from_motion(&plant->model, &rate, body);
   return hx_kernels[i]->name;

@@ -25,16 +25,7 @@ from hexapod_cosim.models.servos.presets import measured_servo, servo_table
 
 ROD = Rod()
 TIMES = np.arange(0.0, 1.51, 0.05)
-SERVOS = [
-    "mx64_m1",
-    "mx64_m2",
-    "mx64_m3",
-    "mx64_m4",
-    "mx64_m5",
-    "mx64_m6",
-    "mx106_m6",
-    "sts3215_m1",
-]
+SERVOS = ["mx64_m1", "mx64_m2", "mx64_m3", "mx64_m5", "mx64_m6", "mx106_m6", "sts3215_m1"]
 # rad  the plant's walls give way by 1e-7 of the rod's motion, and its error control allows 1e-9
 AGREES = 1e-6
 EULER = 1e-4  # rad  of the published scheme, of order 1, with its step of 10 us

@@ -94,7 +94,10 @@ HxDefinition = record(
                 "stribeck_friction motor_load_friction external_load_friction "
                 "stribeck_motor_load_friction stribeck_external_load_friction "
                 "quadratic_motor_friction quadratic_external_friction stribeck_speed "
-                "stribeck_exponent friction_speed"
+                "stribeck_exponent friction_speed winding_capacity housing_capacity "
+                "winding_to_housing housing_to_air air_temperature start_temperature "
+                "derate_temperature temperature_max supply_resistance "
+                "bus_period command_step"
             ),
         ),
     ),
@@ -216,4 +219,8 @@ HxOutput = record(
     ("cone_time", Real * CONE_BINS),
     ("current", PerJoint),
     ("electrical_power", PerJoint),
+    ("winding_temperature", PerJoint),
+    ("housing_temperature", PerJoint),
+    ("remaining_rating", PerJoint),
+    ("supply_voltage", Real),
 )

@@ -190,6 +190,19 @@ typedef struct hxDefinition {
     double stribeck_speed;                  /* rad/s      w_s */
     double stribeck_exponent;               /* 1          a */
     double friction_speed;                  /* rad/s      w_f: dry friction saturates there */
+    /* heat of HX_DRIVE_MOTOR (eq. 52), and its supply (eq. 53) */
+    double winding_capacity;   /* J/K  heat capacity of a winding; 0: no heating */
+    double housing_capacity;   /* J/K  of a housing, > 0 */
+    double winding_to_housing; /* K/W  thermal resistance */
+    double housing_to_air;     /* K/W */
+    double air_temperature;    /* K */
+    double start_temperature;  /* K    of windings and housings at the start */
+    double derate_temperature; /* K    of a winding: hotter ones lower the duty limit */
+    double temperature_max;    /* K    there it is 0; > derate_temperature */
+    double supply_resistance;  /* ohm  of the battery and its cables */
+    /* how commands reach the servos, but in kinematic mode */
+    double bus_period;   /* s    from one transmission to the next; 0: at every call */
+    double command_step; /* rad  angles are rounded to multiples of it; 0: they are not */
   } servo;
   struct {
     double alpha, beta; /* 1/s */
@@ -296,8 +309,12 @@ typedef struct hxOutput {
   } solver;
   double footprints;              /* 1  made in soil since the start */
   double cone_time[HX_CONE_BINS]; /* s  feet under load, by |f_t|/(mu f_n): from 0.9 (i/30)^2 on */
-  double current[HX_LEGS][HX_JOINTS];          /* A  of the motors; 0 with HX_DRIVE_LINE */
-  double electrical_power[HX_LEGS][HX_JOINTS]; /* W  that they take from the supply; likewise */
+  double current[HX_LEGS][HX_JOINTS];             /* A  of the motors; 0 with HX_DRIVE_LINE */
+  double electrical_power[HX_LEGS][HX_JOINTS];    /* W  that they take from the supply; likewise */
+  double winding_temperature[HX_LEGS][HX_JOINTS]; /* K */
+  double housing_temperature[HX_LEGS][HX_JOINTS]; /* K */
+  double remaining_rating[HX_LEGS][HX_JOINTS]; /* 1  of the winding's rise over the air, 0 to 1 */
+  double supply_voltage; /* V  of all servos, under the currents at the start of the last call */
 } hxOutput;
 
 enum { HX_FOOTPRINTS = 512 }; /* footprints that a plant keeps; older ones are forgotten */

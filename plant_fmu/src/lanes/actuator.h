@@ -25,22 +25,36 @@ typedef struct {
   hxReal load;      /* 1    speed over the no-load speed, of the torque-speed line */
 } hxMotor;
 
+/* What a motor gets from its supply: the voltage over servo.voltage, and this times the share of
+ * the duty limit that heat leaves (eq. 52, 53). */
+typedef struct {
+  hxReal supply, limit; /* 1 */
+} hxPower;
+
+/* Returns these of a joint's motor. */
+static inline hxPower hx_power_of(const hxCommand *command, int joint, int slot) {
+  const hxReal supply = hx_splat(command->supply);
+  return (hxPower){supply, supply * hx_load(&command->duty[joint][slot])};
+}
+
 /* Returns the torque and the limits of a motor whose voltage is limited (eq. 48). The back-EMF
  * lowers the torque of a given voltage; in torque mode the voltage makes up for it. */
-static inline hxMotor voltage_motor(const hxModel *model, hxReal speed, hxReal wanted) {
-  const hxReal brake = model->back_emf * speed;
-  const hxReal high = model->stall_torque - brake, low = -model->stall_torque - brake;
-  if (model->servo_mode != HX_SERVO_TORQUE) wanted -= brake;
+static inline hxMotor voltage_motor(const hxModel *model, hxReal speed, hxReal wanted,
+                                    hxPower power) {
+  const hxReal brake = model->back_emf * speed, stall = model->stall_torque * power.limit;
+  const hxReal high = stall - brake, low = -stall - brake;
+  if (model->servo_mode != HX_SERVO_TORQUE) wanted = wanted * power.supply - brake;
   return (hxMotor){hx_clip(wanted, low, high), wanted, low, high, hx_splat(0.0)};
 }
 
 /* Returns the motor's torque and its limits (eq. 12, 48). */
 static inline hxMotor hx_motor_torque(const hxModel *model, hxReal angle, hxReal speed,
-                                      hxReal angle_ref, hxReal speed_ref, hxReal torque_ref) {
+                                      hxReal angle_ref, hxReal speed_ref, hxReal torque_ref,
+                                      hxPower power) {
   const hxReal zero = hx_splat(0.0), one = hx_splat(1.0);
   const hxReal wanted =
       model->kp * (angle_ref - angle) + model->kd * (speed_ref - speed) + torque_ref;
-  if (model->servo_drive == HX_DRIVE_MOTOR) return voltage_motor(model, speed, wanted);
+  if (model->servo_drive == HX_DRIVE_MOTOR) return voltage_motor(model, speed, wanted, power);
   const hxReal load = speed * (1.0 / model->speed_max);
   const hxReal high = model->torque_max * hx_clip(1.0 - load, zero, one);
   const hxReal low = -model->torque_max * hx_clip(1.0 + load, zero, one);
@@ -49,9 +63,11 @@ static inline hxMotor hx_motor_torque(const hxModel *model, hxReal angle, hxReal
 
 /* Returns the motor's torque, the gear's Coulomb friction and their derivatives (eq. 12, 48). */
 static inline hxServo hx_servo_torque(const hxModel *model, hxReal angle, hxReal speed,
-                                      hxReal angle_ref, hxReal speed_ref, hxReal torque_ref) {
+                                      hxReal angle_ref, hxReal speed_ref, hxReal torque_ref,
+                                      hxPower power) {
   const hxReal zero = hx_splat(0.0), one = hx_splat(1.0);
-  const hxMotor motor = hx_motor_torque(model, angle, speed, angle_ref, speed_ref, torque_ref);
+  const hxMotor motor =
+      hx_motor_torque(model, angle, speed, angle_ref, speed_ref, torque_ref, power);
   const hxMask free = hx_less(motor.low, motor.wanted) & hx_less(motor.wanted, motor.high);
   /* falling: the torque is limited by the sloping part of the torque-speed line */
   const hxMask falling =
@@ -62,7 +78,10 @@ static inline hxServo hx_servo_torque(const hxModel *model, hxReal angle, hxReal
   return (hxServo){
       .torque = motor.torque,
       .friction = -model->coulomb_friction * t,
-      .stiffness = hx_select(free, hx_splat(model->kp), zero),
+      .stiffness = hx_select(free,
+                             model->servo_drive == HX_DRIVE_MOTOR ? model->kp * power.supply
+                                                                  : hx_splat(model->kp),
+                             zero),
       .damping = hx_select(free, hx_splat(model->free_damping),
                            hx_select(falling, hx_splat(model->limit_damping), zero)),
       .drag = (model->coulomb_friction / model->gear_speed) * (1.0 - t * t),

@@ -26,6 +26,11 @@ static void kernel_start(const hxModel *model, double t, hxState *state, void *s
   hx_moment_update(model, state);
   memset(&state->completed, 0, sizeof state->completed);
   memset(&state->measured, 0, sizeof state->measured);
+  memset(&state->bus, 0, sizeof state->bus);
+  state->bus.start = t;
+  for (int i = 0; i < HX_JOINTS * HX_SLOTS; ++i)
+    state->measured.winding[i / HX_SLOTS][i % HX_SLOTS] =
+        state->measured.housing[i / HX_SLOTS][i % HX_SLOTS] = model->heat.start;
   for (int pack = 0; pack < HX_PACKS; ++pack) {
     hxReal force = work->pack[pack].contact[HX_FOOT].normal.force;
     for (int k = 1; k < model->foot_rows; ++k)

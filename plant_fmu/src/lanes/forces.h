@@ -130,9 +130,10 @@ static inline void leg_pass(const hxModel *model, const hxCommand *command, doub
 /* Computes the torques of motor, gear and stops on a joint (eq. 12, 39). */
 static inline void joint_torque(const hxModel *model, const hxCommand *command, int joint, int slot,
                                 hxJointWork *k) {
-  k->servo = hx_servo_torque(model, k->angle, k->speed, hx_load(&command->angle[joint][slot]),
-                             hx_load(&command->speed[joint][slot]),
-                             hx_load(&command->torque[joint][slot]));
+  k->servo =
+      hx_servo_torque(model, k->angle, k->speed, hx_load(&command->angle[joint][slot]),
+                      hx_load(&command->speed[joint][slot]), hx_load(&command->torque[joint][slot]),
+                      hx_power_of(command, joint, slot));
   k->torque = model->servo_mode == HX_SERVO_KINEMATIC ? k->servo.friction
                                                       : k->servo.torque + k->servo.friction;
   if (model->stops) {
@@ -142,7 +143,8 @@ static inline void joint_torque(const hxModel *model, const hxCommand *command, 
 }
 
 /* Computes the friction of a leg's motors and gears under the torques of all but these on the
- * joints (eq. 49-51), tip to hip; the forces on the links are complete. */
+ * joints (eq. 49-51), tip to hip; the forces on the links are complete. The torque of a kinematic
+ * drive is not known yet: its friction is that of a motor which balances the external torque. */
 HX_RARE void gear_frictions(const hxModel *model, int slot, hxLegWork *leg) {
   const hxVec3 up = hx_neg(hx_splat_vec3(model->gravity));
   hxForce6 p = {hx_zero3(), hx_zero3()};
@@ -152,8 +154,10 @@ HX_RARE void gear_frictions(const hxModel *model, int slot, hxLegWork *leg) {
     p = hx_force_add(p, hx_force_add(k->p, (hxForce6){hx_cross(k->c, lin), lin}));
     hxReal external = -hx_power(p, k->sweep.S);
     if (model->stops) external += k->stop.torque;
+    const int kinematic = model->servo_mode == HX_SERVO_KINEMATIC;
+    if (kinematic) k->servo.torque = -external;
     hx_measured_friction(model, &k->speed, &external, &k->servo);
-    k->torque = k->servo.torque + k->servo.friction;
+    k->torque = kinematic ? k->servo.friction : k->servo.torque + k->servo.friction;
     if (model->stops) k->torque += k->stop.torque;
   }
 }

@@ -595,7 +595,8 @@ static hxStatus hx_integrate(const hxModel *model, const hxCommand *command, con
       state->evaluations + evaluations_allowed(model, t_end - command->time);
   if (state->moment.stale != 0.0) hx_moment_update(model, state);
   keep_nearest_points(model, state);
-  if (command->time == state->time && t_end > state->time) hx_reset_peaks(&state->measured);
+  if (command->time == state->time && t_end > state->time && !events->continues)
+    hx_reset_peaks(&state->measured);
   const hxStatus status = (model->step == 0.0 ? run_to : run_fixed)(
       model, command, ramp, t_end, events, state, scratch, message);
   memset(state->contact.nearest, 0, sizeof state->contact.nearest);

@@ -404,10 +404,28 @@ static inline hxCubic cubic(hxReal from, hxReal slope_from, hxReal rise, hxReal 
                    2.0 * curve + (6.0 * x) * bend};
 }
 
+/* Warms winding and housing of a joint's servo by the heat of a step, J (eq. 52), by the
+ * trapezoidal rule: 2 C (T_m - T_0)/h = powers at the mean temperatures T_m. */
+static inline void warm_servo(const hxPath *path, int joint, int slot, hxReal copper, hxReal gear,
+                              hxMeasured *measured) {
+  const hxHeat *heat = &path->model->heat;
+  const double twice = 2.0 / path->h, g = heat->to_housing, k = heat->to_air;
+  const double a = twice * heat->winding + g, b = twice * heat->housing + g + k;
+  const double inverse = 1.0 / (a * b - g * g), per_step = 1.0 / path->h;
+  const hxReal winding = hx_load(&measured->winding[joint][slot]),
+               housing = hx_load(&measured->housing[joint][slot]);
+  const hxReal of_winding = per_step * copper + (twice * heat->winding) * winding;
+  const hxReal of_housing = per_step * gear + (twice * heat->housing) * housing + k * heat->air;
+  const hxReal mean_winding = inverse * (b * of_winding + g * of_housing),
+               mean_housing = inverse * (g * of_winding + a * of_housing);
+  hx_store(&measured->winding[joint][slot], 2.0 * mean_winding - winding);
+  hx_store(&measured->housing[joint][slot], 2.0 * mean_housing - housing);
+}
+
 /* Measures one joint: positive and negative work, whose difference is the step's work, and the
- * integral of the squared torque. */
-static inline void measure_joint(const hxPath *path, int joint, int slot, hxReal work,
-                                 hxReal mean_torque, hxMeasured *measured) {
+ * integral of the squared torque, which it returns, N2 m2 s. */
+static inline hxReal measure_joint(const hxPath *path, int joint, int slot, hxReal work,
+                                   hxReal mean_torque, hxMeasured *measured) {
   const hxModel *model = path->model;
   const hxReal zero = hx_splat(0.0), h = hx_splat(path->h), per_step = hx_splat(1.0 / path->h);
   const hxReal angle = hx_load(&path->from->angle[joint][slot]),
@@ -421,10 +439,11 @@ static inline void measure_joint(const hxPath *path, int joint, int slot, hxReal
     const hxReal speed = per_step * q.rate, weight = hx_splat(path->h * motor_weight[node]);
     hxReal torque = mean_torque; /* a kinematic drive has no torque law */
     if (model->servo_mode != HX_SERVO_KINEMATIC)
-      torque = hx_motor_torque(
-                   model, within_turn(q.value), speed, hx_load(&command->angle[joint][slot]),
-                   hx_load(&command->speed[joint][slot]), hx_load(&command->torque[joint][slot]))
-                   .torque;
+      torque =
+          hx_motor_torque(model, within_turn(q.value), speed, hx_load(&command->angle[joint][slot]),
+                          hx_load(&command->speed[joint][slot]),
+                          hx_load(&command->torque[joint][slot]), hx_power_of(command, joint, slot))
+              .torque;
     positive += weight * hx_max(torque * speed, zero);
     negative += weight * hx_max(-(torque * speed), zero);
     squared += weight * (torque * torque);
@@ -442,6 +461,20 @@ static inline void measure_joint(const hxPath *path, int joint, int slot, hxReal
            hx_load(&measured->negative_work[joint][slot]) + (negative - excess));
   hx_store(&measured->torque_squared[joint][slot],
            hx_load(&measured->torque_squared[joint][slot]) + squared);
+  return squared;
+}
+
+/* Warms the servos of a pack of legs; squared: integrals of their squared torques. */
+HX_RARE void warm_servos(const hxPath *path, int pack, const hxImpulses *impulse,
+                         const hxReal squared[HX_JOINTS], hxMeasured *measured) {
+  const hxModel *model = path->model;
+  const double per_square = model->resistance / (model->torque_constant * model->torque_constant);
+  const int slot = pack * HX_LANES;
+  for (int joint = 0; joint < HX_JOINTS; ++joint) {
+    const hxReal speed = mean_of(&path->from->speed[joint][slot], &path->to->speed[joint][slot]);
+    const hxReal gear = -impulse->gear[joint][pack] * speed;
+    warm_servo(path, joint, slot, per_square * squared[joint], gear, measured);
+  }
 }
 
 /* ---- feet ---- */
@@ -656,9 +689,11 @@ static inline void measure_cone(const hxPath *path, int row, const hxImpulses *i
 static inline void hx_measure_path(const hxPath *path, const hxImpulses *impulse,
                                    const hxStepWorks *works, hxMeasured *measured) {
   for (int pack = 0; pack < HX_PACKS; ++pack) {
+    hxReal squared[HX_JOINTS];
     for (int joint = 0; joint < HX_JOINTS; ++joint)
-      measure_joint(path, joint, pack * HX_LANES, works->motor[joint][pack],
-                    works->mean_torque[joint][pack], measured);
+      squared[joint] = measure_joint(path, joint, pack * HX_LANES, works->motor[joint][pack],
+                                     works->mean_torque[joint][pack], measured);
+    if (path->model->heat.winding > 0.0) warm_servos(path, pack, impulse, squared, measured);
     measure_feet(path, pack * HX_LANES, measured);
   }
   for (int leg = 0; leg < HX_LEGS; ++leg) measure_landing(path, leg, measured);

@@ -88,6 +88,17 @@ static hxNumber hx_potential_energy(const hxModel *model, const hxPlantMotion *m
   return model->torso_rows ? sum + torso_elastic_energy(work) : sum;
 }
 
+/* Fills the temperatures of a joint's servo. */
+static void fill_heat(const hxModel *model, const hxState *state, int leg, int joint, hxOutput *o) {
+  const hxHeat *heat = &model->heat;
+  const hxNumber winding = state->measured.winding[joint][leg];
+  o->winding_temperature[leg][joint] = winding;
+  o->housing_temperature[leg][joint] = state->measured.housing[joint][leg];
+  const hxNumber left = (heat->max - winding) / (heat->max - heat->air);
+  o->remaining_rating[leg][joint] =
+      hx_lane(hx_clip(hx_splat(left), hx_splat(0.0), hx_splat(1.0)), 0);
+}
+
 /* Fills a joint's outputs. The reaction on the child is the force -lambda and, about the joint's
  * point, the torque -(u1 lambda_4 + u2 lambda_5); the motor's torque is not included. */
 static void fill_joint(const hxModel *model, const hxState *state, const hxJointWork *k, int lane,
@@ -250,7 +261,8 @@ static void hx_output_fill(const hxModel *model, const hxState *state, const hxW
     int lane;
     const hxLegWork *w = leg_work(work, leg, &lane);
     for (int joint = 0; joint < HX_JOINTS; ++joint)
-      fill_joint(model, state, &w->joint[joint], lane, leg, joint, o);
+      fill_joint(model, state, &w->joint[joint], lane, leg, joint, o),
+          fill_heat(model, state, leg, joint, o);
     const hxVec3 tibia = hx_link_vec3(&state->motion, HX_JOINTS - 1, HX_R, leg - lane);
     fill_foot(model, state, w, tibia, lane, leg, o);
     fill_body_row(model, w, HX_KNEE, lane, o->body.knee_force[leg]);
@@ -259,7 +271,8 @@ static void hx_output_fill(const hxModel *model, const hxState *state, const hxW
   fill_torso(&state->motion, work, o);
   fill_torso_contact(model, work, o->torso.contact_force);
   hx_clearances(model, &state->motion, work, o->body.clearance);
-  o->footprints = 0.0; /* hx_plant_output() counts them: they are outside the state */
+  o->supply_voltage = 0.0; /* likewise: it belongs to the command */
+  o->footprints = 0.0;     /* hx_plant_output() counts them: they are outside the state */
   for (int i = 0; i < HX_CONE_BINS; ++i) o->cone_time[i] = state->measured.cone_time[i];
   fill_energy(model, state, work, o);
   fill_constraint(model, &state->motion, o);

@@ -1,0 +1,216 @@
+"""Heat of motors and their supply: two thermal nodes against their matrix exponential, the limit of
+hot motors, and a battery whose voltage sags.
+"""
+
+from __future__ import annotations
+
+import ctypes as ct
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from plant import Plant, PlantError
+from scipy.linalg import expm
+from states import changed, landing, random_bodies, random_command, with_links
+from test_laws_servo import HEAVY, tibias, walled
+from test_measured_servos import with_servo
+
+from hexapod_cosim.models import Robot, load_robot
+from hexapod_cosim.models.contact import standing_damping
+from hexapod_cosim.models.dynamics import Command, accelerations
+from hexapod_cosim.models.kinematics import joint_angles, joint_speeds
+from hexapod_cosim.models.records import Servo
+from hexapod_cosim.models.servos.supply import duty_share, supply_power, warmed
+
+WARM: dict[str, Any] = {
+    "winding_capacity": 5.0,
+    "housing_capacity": 80.0,
+    "winding_to_housing": 8.0,
+    "housing_to_air": 17.0,
+}
+AIR = 298.15  # K
+VOLTS = 12.0 * 0.9625
+EXACT = 1e-9  # relative: rounding
+
+
+def blocked(**servo: Any) -> Robot:
+    """Returns a robot in torque mode whose joints are too heavy to move."""
+    robot = with_servo(walled(), "mx64_m1", mode="torque", **servo)
+    wall = HEAVY | {"inertia": (1e9, 1e9, 1e9, 0.0, 0.0, 0.0)}
+    for joint in range(3):
+        robot = with_links(robot, joint, **wall)
+    return changed(robot, solver={"step_max": 0.05})
+
+
+def pushed(torque: float) -> Command:
+    """Returns the command of a torque at every knee [N m]."""
+    return Command(angle_ref=np.zeros((6, 3)), torque_ref=tibias(torque))
+
+
+def test_a_blocked_motor_warms_as_two_nodes_do(core: ct.CDLL) -> None:
+    robot = blocked(**WARM)
+    servo, torque, time = robot.servo, 1.0, 30.0
+    heat = servo.resistance * (torque / servo.torque_constant) ** 2
+    flow = np.array([[-1.0 / 8.0, 1.0 / 8.0], [1.0 / 8.0, -1.0 / 8.0 - 1.0 / 17.0]])
+    rate = flow / np.array([[5.0], [80.0]])
+    rest = -np.linalg.solve(flow, np.array([heat, 0.0]))  # over the air
+    rise = rest - expm(rate * time) @ rest
+    plant = Plant(core, robot, angle=tibias(0.0))
+    plant.step(time, pushed(torque))
+    after = plant.output(pushed(torque))
+    got = [after.winding_temperature[2, 2] - AIR, after.housing_temperature[2, 2] - AIR]
+    assert got == pytest.approx(rise, rel=1e-6)
+    assert rise[0] > 6.0
+    assert after.winding_temperature[2, 0] == pytest.approx(AIR, abs=1e-6)
+    assert after.remaining_rating[2, 2] == pytest.approx(1.0 - rise[0] / 55.0, rel=1e-6)
+    assert rest[0] == pytest.approx(heat * 25.0, rel=EXACT)
+
+
+def test_friction_warms_the_housing_and_the_twin_agrees(core: ct.CDLL) -> None:
+    robot = changed(with_servo(walled(), "mx64_m6", **WARM), solver={"step": 1e-3})
+    plant = Plant(core, robot, angle=tibias(0.2), speed=tibias(2.0))
+    before = plant.output()
+    command = Command(angle_ref=tibias(0.4))
+    plant.step(1e-3, command)
+    after, servo = plant.output(command), robot.servo
+    squared = after.torque_squared[0, 2] - before.torque_squared[0, 2]
+    copper = servo.resistance * squared / servo.torque_constant**2
+    gear = after.energy.gear_loss / 6.0
+    start = np.array(AIR)
+    winding, housing = warmed(servo, start, start, 1e-3, np.array(copper), np.array(gear))
+    assert after.winding_temperature[0, 2] - AIR == pytest.approx(float(winding) - AIR, rel=1e-5)
+    assert after.housing_temperature[0, 2] - AIR == pytest.approx(float(housing) - AIR, rel=1e-5)
+    assert float(housing) > AIR
+
+
+@pytest.mark.parametrize(
+    ("start", "share", "left"),
+    [(343.0, 1.0, 10.15 / 55.0), (348.15, 0.5, 5.0 / 55.0), (353.15, 0.0, 0.0), (400.0, 0.0, 0.0)],
+)
+def test_a_hot_motor_gets_less(core: ct.CDLL, start: float, share: float, left: float) -> None:
+    robot = blocked(start_temperature=start, **WARM)
+    output = Plant(core, robot).output(pushed(100.0))
+    servo = robot.servo
+    assert output.current[3, 2] == pytest.approx(share * VOLTS / servo.resistance, rel=EXACT)
+    assert output.remaining_rating[3, 2] == pytest.approx(left, rel=EXACT)
+    assert float(duty_share(servo, np.array(start))) == pytest.approx(share, rel=EXACT)
+
+
+def test_a_motor_that_overheats_limits_itself(core: ct.CDLL) -> None:
+    """It settles where the power that its limit allows keeps the winding as warm as it is."""
+    robot = blocked(**WARM | {"winding_to_housing": 1.0, "housing_capacity": 1.0})
+    plant = Plant(core, robot)
+    for k in range(300):
+        plant.step(float(k + 1), pushed(100.0))
+    servo, after = robot.servo, plant.output(pushed(100.0))
+    current, winding = after.current[0, 2], after.winding_temperature[0, 2]
+    assert winding - AIR == pytest.approx(18.0 * servo.resistance * current**2, rel=2e-2)
+    assert 343.15 < winding < 353.15
+
+
+def test_heat_changes_nothing_while_motors_are_cool(core: ct.CDLL) -> None:
+    bodies = []
+    for settings in ({}, WARM):
+        robot = with_servo(load_robot("athena"), "mx64_m6", **settings)
+        plant = Plant(core, robot, **landing(robot))
+        plant.step(0.05, random_command(robot, 0, size=0.3))
+        bodies.append(plant.bodies)
+    assert np.array_equal(bodies[0], bodies[1])
+
+
+# the supply
+
+
+def test_a_battery_sags_under_the_currents_of_all_motors(core: ct.CDLL) -> None:
+    """V = V_0 - R_b I, with the current I = sum d (d V)/R of 18 motors at their duty limits."""
+    robot = blocked(supply_resistance=0.1)
+    command = Command(angle_ref=np.zeros((6, 3)), torque_ref=np.full((6, 3), 100.0))
+    output, servo = Plant(core, robot).output(command), robot.servo
+    duty, volts = servo.duty_max, output.supply_voltage
+    taken = 18.0 * duty * duty * volts / servo.resistance
+    assert volts == pytest.approx(12.0 - 0.1 * taken, rel=EXACT)
+    assert volts < 9.0
+    assert output.current == pytest.approx(np.full((6, 3), duty * volts / servo.resistance))
+    assert float(np.sum(output.electrical_power)) == pytest.approx(volts * taken, rel=EXACT)
+
+
+def test_a_battery_is_not_charged(core: ct.CDLL) -> None:
+    robot = with_servo(walled(), "mx64_m1", supply_resistance=0.5)
+    driven = Plant(core, robot, angle=tibias(0.0), speed=tibias(-9.0))
+    output = driven.output(Command(angle_ref=tibias(0.02)))
+    assert output.supply_voltage <= 12.0
+    still = Plant(core, robot, angle=tibias(0.0)).output(Command(angle_ref=tibias(0.0)))
+    assert still.supply_voltage == 12.0
+
+
+@pytest.mark.parametrize("mode", ["position", "torque"])
+def test_accelerations_under_a_sagging_supply_are_the_twins(core: ct.CDLL, mode: str) -> None:
+    hot = WARM | {"start_temperature": 347.0}
+    robot = with_servo(load_robot("athena"), "mx64_m6", mode=mode, supply_resistance=0.2, **hot)
+    robot = changed(robot, body={"contact": "off"})
+    for seed in range(3):
+        body, command = random_bodies(robot, seed), random_command(robot, seed)
+        plant = Plant(core, robot)
+        plant.bodies = body
+        servo, angle, speed = robot.servo, joint_angles(robot, body), joint_speeds(robot, body)
+        wanted = command.torque_ref
+        if mode == "position":
+            wanted = wanted + servo.kp * (command.angle_ref - angle)
+        power = supply_power(servo, speed, wanted, np.full((6, 3), 347.0))
+        shown = plant.output(command).supply_voltage
+        assert shown == pytest.approx(12.0 * power.supply, rel=1e-10)
+        assert power.supply < 0.99
+        dense = accelerations(
+            robot, body, replace(command, power=power), standing_damping(robot, body)
+        )
+        ours = plant.accelerations(command)
+        assert ours.drive_torque == pytest.approx(dense.drive_torque, rel=1e-8, abs=1e-9)
+        assert ours.dv == pytest.approx(dense.dv, rel=1e-6, abs=1e-6)
+
+
+def test_an_interrupted_call_goes_on_with_the_same_supply(core: ct.CDLL) -> None:
+    robot = with_servo(load_robot("athena"), "mx64_m6", supply_resistance=0.2, **WARM)
+    command, whole = random_command(robot, 1, size=0.3), Plant(core, robot, **landing(robot))
+    whole.step(0.1, command)
+    parts, events = Plant(core, robot, **landing(robot)), 0
+    while parts.time < 0.1:
+        events += parts.step_to_event(0.1, command)
+    assert events > 1
+    assert parts.save() == whole.save()
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"winding_capacity": 5.0}, "servo.housing_capacity: got 0, expected more than 0"),
+        ({"temperature_max": 340.0}, "servo.temperature_max: got 340, expected more than"),
+    ],
+)
+def test_impossible_heat_is_refused(core: ct.CDLL, change: dict[str, Any], message: str) -> None:
+    robot = with_servo(load_robot("athena"), "mx64_m6")
+    with pytest.raises(PlantError, match=message):
+        Plant(core, changed(robot, servo=change))
+
+
+def test_servos_without_heat_stay_as_warm_as_they_are() -> None:
+    assert Servo.__dataclass_fields__["winding_capacity"].default == 0.0
+    servo = with_servo(load_robot("athena"), "mx64_m6").servo
+    assert float(duty_share(servo, np.array(1000.0))) == 1.0
+
+
+def test_the_figures_of_a_run_contain_the_energy_from_the_supply(core: ct.CDLL) -> None:
+    """Works of the motors and their squared torques over k_m^2, from which metrics take the
+    electrical cost, are the integral of the electrical power.
+    """
+    robot = with_servo(load_robot("athena"), "mx64_m6")
+    plant, command = Plant(core, robot, **landing(robot)), random_command(robot, 3, size=0.3)
+    powers = [float(np.sum(plant.output(command).electrical_power))]
+    for k in range(400):
+        plant.step(2.5e-4 * (k + 1), command)
+        powers.append(float(np.sum(plant.output(command).electrical_power)))
+    after = plant.output(command)
+    copper = float(np.sum(after.torque_squared)) / robot.servo.motor_constant**2
+    work = float(np.sum(after.positive_work - after.negative_work))
+    assert work + copper == pytest.approx(float(np.trapezoid(powers, dx=2.5e-4)), rel=2e-3)
+    assert copper > abs(work) > 0.0
