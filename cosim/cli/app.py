@@ -10,14 +10,17 @@ from hexapod_cosim.cosim.cli import (
     benchmark_command,
     compare_command,
     controller_command,
+    examples_command,
     export_command,
     fmu_commands,
     listing,
+    replay_command,
     run_commands,
     study_command,
     terrain_command,
 )
 from hexapod_cosim.cosim.cli.failures import EPILOG
+from hexapod_cosim.cosim.cli.live import live_command
 from hexapod_cosim.cosim.common.plant_files import package_version
 
 app = typer.Typer(
@@ -35,8 +38,11 @@ app.command("benchmark", epilog=benchmark_command.EPILOG)(benchmark_command.benc
 app.command("design")(fmu_commands.design)
 app.command("report")(run_commands.report)
 app.add_typer(controller_command.app, name="controller")
+app.command("examples")(examples_command.examples)
 app.command("validate")(fmu_commands.validate)
 app.command("terrain")(terrain_command.terrain)
+app.command("live")(live_command.live)
+app.command("replay")(replay_command.replay)
 app.command("list")(listing.list_what)
 
 

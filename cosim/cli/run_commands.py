@@ -17,6 +17,7 @@ from hexapod_cosim.cosim.cli.running import (
     Engine,
     FmuFile,
     FolderName,
+    Formats,
     GainsFile,
     Name,
     RunOptions,
@@ -28,6 +29,7 @@ from hexapod_cosim.cosim.cli.running import (
     run_into,
     show_rows,
     titled,
+    with_formats,
 )
 from hexapod_cosim.cosim.cli.terminal import Json, show_files, show_json, show_text, warn
 from hexapod_cosim.cosim.common.files import BENCHMARK, PARTS, STUDY
@@ -54,7 +56,9 @@ from hexapod_cosim.cosim.results.summary import summarise
 from hexapod_cosim.cosim.scenario.controls import control_of
 from hexapod_cosim.cosim.scenario.records import COMPARED, Scenario
 from hexapod_cosim.cosim.scenario.scenario import load_scenario
+from hexapod_cosim.models import HexapodError
 
+LOG_KINDS = ("replay", "identify")  # folders that depend on a log
 EPILOG = (
     f"Exit code {FELL} when the robot fell: what was recorded and measured is written all the same."
 )
@@ -64,6 +68,7 @@ def simulate(
     scenario: Name = "walk_flat",
     control: ControlNames = None,
     settings: Settings = None,
+    formats: Formats = None,
     output: FolderName = None,
     fmu: FmuFile = None,
     gains: GainsFile = None,
@@ -72,7 +77,8 @@ def simulate(
     json: Json = False,
 ) -> int:
     """Run one co-simulation: results, metrics, plots. Several controls: a run of each."""
-    plan = titled(load_scenario(scenario, overrides=settings or []), settings or [])
+    settings = with_formats(settings, formats)
+    plan = titled(load_scenario(scenario, overrides=settings), settings)
     controls = chosen_controls(control or [plan.control], plan)
     options = RunOptions.read(fmu=fmu, gains=gains, engine=engine, runs=1)
     if accuracy:
@@ -184,6 +190,14 @@ def _report_again(folder: Path, facts: Mapping[str, Any]) -> list[Path]:
         return list(benchmark_command.report_on(folder))
     if facts.get("kind") == "compare":
         return _report_comparison(folder, facts)
+    if facts.get("kind") in LOG_KINDS:
+        raise HexapodError(
+            "not a run, whose report can be made again",
+            got=f"a folder of `hexapod {facts['kind']}`",
+            expected="a run, a comparison, a study or a benchmark",
+            fix=f"run it again: {facts.get('command', '')}",
+            where=str(folder),
+        )
     run = read_result(folder)
     control = run.facts["control"]
     accuracies = {control: run.accuracy} if run.accuracy else {}

@@ -18,12 +18,13 @@ from hexapod_cosim.cosim.cli.terminal import progress_bar, show_table, waiting, 
 from hexapod_cosim.cosim.control.controllers import check_control
 from hexapod_cosim.cosim.master.interrupts import deferred_interrupts
 from hexapod_cosim.cosim.master.loop import INTERRUPTED
+from hexapod_cosim.cosim.results.recordings import check_formats
 from hexapod_cosim.cosim.results.result import Result
 from hexapod_cosim.cosim.results.results import ResultsFolder, write_result
 from hexapod_cosim.cosim.run.run import simulate as run_scenario
 from hexapod_cosim.cosim.run.walker import Walker
 from hexapod_cosim.cosim.scenario.controls import Control, control_of, parse_controls
-from hexapod_cosim.cosim.scenario.records import CONTROLS, Scenario
+from hexapod_cosim.cosim.scenario.records import CONTROLS, FORMATS, Scenario
 from hexapod_cosim.cosim.study.execute.engines import ENGINES
 from hexapod_cosim.models import HexapodError, unknown_name
 
@@ -61,6 +62,15 @@ GainsFile = Annotated[
     ),
 ]
 
+
+Formats = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--format",
+        metavar="|".join(FORMATS),
+        help="Write the recording as this, instead of outputs.formats. Repeat it for more.",
+    ),
+]
 
 Engine = Annotated[
     str | None,
@@ -113,6 +123,12 @@ class RunOptions:
         Raises HexapodError for a bad file and an unknown engine.
         """
         return cls(fmu=fmu, gains=given_gains(gains), engine=checked_engine(engine, runs=runs))
+
+
+def with_formats(settings: list[str] | None, formats: list[str] | None) -> list[str]:
+    """Returns the settings of a command with those that --format stands for."""
+    chosen = [f"outputs.formats={formats!r}"] if formats else []
+    return [*(settings or []), *chosen]
 
 
 def command_line(
@@ -169,6 +185,7 @@ def run_into(
     files are written. Raises RunError or KeyboardInterrupt when the run does not complete; its
     recording until then is written.
     """
+    check_formats(plan.outputs.formats, start=plan.start, where=f"{plan.where}: outputs.formats")
     with ExitStack() as stack:
 
         def begin() -> None:

@@ -23,9 +23,12 @@ STUDY = "study"  # the kind of a folder that holds a study, which can be resumed
 RESULT_FILES = (
     "results.parquet",
     "results.csv",
+    "results.mcap",
     "commands.csv",
     "results.partial.parquet",
     "results.partial.csv",
+    "results.partial.mcap",
+    "replay.csv",
     "seeds.csv",
     "seeds.partial.csv",
     "metrics.json",

@@ -173,12 +173,19 @@ def packed_binary(folder: str | Path, identifier: str) -> str | None:
 def binary(fmi_platform: str, component: Component = PLANT) -> Path:
     """Returns the newest installed binary of a component for a platform such as linux64.
 
+    An installation that was compiled on this machine has one folder of binaries, with FMI 2's
+    name; a released wheel has one for each platform, with FMI 3's name.
+
     Raises FmuError when there is none or it is older than its sources.
     """
+    names = {fmi_platform}
+    if fmi_platform == fmi2_platform():
+        names.add(fmi3_platform())
     found = [
         path
         for folder in plant_folders()
-        for path in (folder / "binaries" / fmi_platform).glob(f"{component.identifier}.*")
+        for name in names
+        for path in (folder / "binaries" / name).glob(f"{component.identifier}.*")
     ]
     if not found:
         platforms = installed_platforms()
@@ -192,6 +199,18 @@ def binary(fmi_platform: str, component: Component = PLANT) -> Path:
     newest = max(found, key=lambda path: path.stat().st_mtime)
     _refuse_stale(newest, component)
     return newest
+
+
+def released_binary(fmi_platform: str, identifier: str) -> bytes | None:
+    """Returns the binary that a released wheel contains for a platform with FMI 3's name.
+
+    None in a source tree and in a wheel that was built for one machine.
+    """
+    if in_source_tree():
+        return None
+    for path in (_INSTALLED / "binaries" / fmi_platform).glob(f"{identifier}.*"):
+        return path.read_bytes()
+    return None
 
 
 def shared_library(name: str) -> Path:

@@ -1,8 +1,9 @@
 """Builds an FMU's binaries for the platforms of the standard.
 
 One cross compiler (cosim/export/cross_build.py) builds all of them, this machine's too, so that the
-same package gives the same bytes on every machine, and binaries need an old C library only. Unless
-platforms are chosen, an FMU gets the binary that was installed with this package.
+same package gives the same bytes on every machine, and binaries need an old C library only. A
+released wheel contains what this compiler built. Unless platforms are chosen, an FMU gets the
+binary that was installed with this package.
 """
 
 from __future__ import annotations
@@ -12,7 +13,7 @@ from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 
 from hexapod_cosim.cosim.common.components import PLANT, Component
-from hexapod_cosim.cosim.common.plant_files import fmi_headers, source_files
+from hexapod_cosim.cosim.common.plant_files import fmi_headers, released_binary, source_files
 from hexapod_cosim.cosim.export.cross_build import TARGETS, Library, build_library, find_compiler
 from hexapod_cosim.cosim.export.fat_binary import join_mach_o
 from hexapod_cosim.models.errors import FmuError
@@ -73,7 +74,7 @@ def component_library(component: Component = PLANT) -> Library:
 
 
 def build_binaries(library: Library, platforms: Iterable[str], *, fmi: int) -> dict[str, bytes]:
-    """Builds shared libraries in parallel, or takes them from the cache.
+    """Builds shared libraries in parallel, or takes them from a released wheel or the cache.
 
     Returns them by path in the FMU, such as binaries/linux64/hexapod.so.
 
@@ -86,18 +87,25 @@ def build_binaries(library: Library, platforms: Iterable[str], *, fmi: int) -> d
     """
     wanted = {name: platform_targets(fmi)[name] for name in platforms}
     targets = list(dict.fromkeys(target for parts in wanted.values() for target in parts))
-    if not targets:
-        return {}
+    released = {target: released_binary(target, library.name) for target in targets}
+    built = {target: data for target, data in released.items() if data is not None}
+    missing = [target for target in targets if target not in built]
+    if missing:
+        built |= _compile(library, missing)
+    return {
+        _member(library, name, parts): _joined([built[part] for part in parts])
+        for name, parts in wanted.items()
+    }
+
+
+def _compile(library: Library, targets: list[str]) -> dict[str, bytes]:
+    """Builds a library for several targets in parallel."""
     compiler = find_compiler()
     with _thread_pool(len(targets)) as pool:
         libraries = pool.map(
             lambda target: build_library(library, target, compiler=compiler), targets
         )
-        built = dict(zip(targets, libraries, strict=True))
-    return {
-        _member(library, name, parts): _joined([built[part] for part in parts])
-        for name, parts in wanted.items()
-    }
+        return dict(zip(targets, libraries, strict=True))
 
 
 @contextmanager

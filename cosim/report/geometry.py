@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -24,9 +24,13 @@ SAME = 1e-6  # m    tolerance of hip positions by which a robot file is recognis
 
 def describe_robot(run: StoredResult) -> dict[str, Any]:
     """Returns torso, feet and legs [m, rad], with colours and thicknesses of the FMU's picture."""
-    parameters = run.view.parameters
+    return describe_shape(run.view.parameters, torso_size(run))
+
+
+def describe_shape(parameters: Parameters, size: Sequence[float]) -> dict[str, Any]:
+    """Returns what `describe_robot` does, from an FMU's parameters and the torso's edges [m]."""
     return {
-        "torso": {"com": _vector(parameters, "torso.com"), "size": torso_size(run)},
+        "torso": {"com": _vector(parameters, "torso.com"), "size": list(size)},
         "foot": parameters["foot.radius"],
         "legs": [_leg(parameters, leg) for leg in LEG_NAMES],
         "joints": list(JOINT_NAMES),

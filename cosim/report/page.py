@@ -13,7 +13,8 @@ from markupsafe import Markup
 from hexapod_cosim.cosim.common.control_style import all_styles
 from hexapod_cosim.cosim.common.plant_files import plant_folders
 
-VIEWER = Path("viewer") / "viewer.js"  # in the plant's folder, where CMake installs it
+FOLDER = Path("viewer")  # in the plant's folder, where CMake installs the bundles
+VIEWER = "viewer.js"  # the bundle of reports
 NO_VIEWER = (
     "Replay and plots are left out: "
     "this installation was built without the viewer (HX_VIEWER=OFF). "
@@ -39,9 +40,10 @@ def render(template: str, *, controls: Iterable[str] = (), **content: Any) -> st
     return environment().get_template(template).render(styles=styles, **content)
 
 
-def viewer_script() -> Markup | None:
-    """Returns the newest installed viewer's JavaScript for a <script>; None if there is none."""
-    found = [folder / VIEWER for folder in plant_folders() if (folder / VIEWER).is_file()]
+def viewer_script(bundle: str = VIEWER) -> Markup | None:
+    """Returns the newest installed bundle's JavaScript for a <script>; None if there is none."""
+    places = [folder / FOLDER / bundle for folder in plant_folders()]
+    found = [path for path in places if path.is_file()]
     if not found:
         return None
     text = max(found, key=lambda path: path.stat().st_mtime).read_text(encoding="utf-8")

@@ -1,4 +1,4 @@
 """Results of runs: metrics, warnings, recordings, comparisons and result folders.
 
-Imports `common` to `master`.
+Imports `common` to `master` and `logs`.
 """

@@ -1,8 +1,9 @@
-"""Writes and reads recordings: Parquet, CSV for spreadsheets, and the commands alone for importers.
+"""Writes and reads recordings: Parquet, CSV for spreadsheets, MCAP for tools of robots, and the
+commands alone for importers.
 
 A Parquet file has a column of doubles per variable, with unit and description as metadata of each
 field and the run's facts as metadata of the schema. A CSV file has "name [unit]" above each column.
-Both hold the same numbers, bit for bit.
+An MCAP file has ROS 2 messages (cosim/logs). All hold the same numbers, bit for bit.
 """
 
 from __future__ import annotations
@@ -17,9 +18,12 @@ from typing import Any
 import numpy as np
 
 from hexapod_cosim.cosim.common.files import atomic_path
+from hexapod_cosim.cosim.logs.mcap_package import require_mcap
+from hexapod_cosim.cosim.logs.mcap_reader import read_mcap
+from hexapod_cosim.cosim.logs.mcap_writer import check_start, write_mcap
 from hexapod_cosim.cosim.master.recorder import Recording
 from hexapod_cosim.cosim.results.columns import bare_name, heading, known_columns, plant_variables
-from hexapod_cosim.cosim.scenario.records import FORMATS
+from hexapod_cosim.cosim.scenario.records import DEFAULT_FORMATS
 from hexapod_cosim.models import HexapodError
 
 COMMANDS = "commands.csv"
@@ -31,27 +35,51 @@ def write_recording(
     folder: Path,
     stem: str,
     *,
-    formats: Sequence[str] = FORMATS,
+    formats: Sequence[str] = DEFAULT_FORMATS,
     columns: Sequence[str] = ("*",),
     about: Mapping[str, Any] | None = None,
+    torso_com: Sequence[float] = (0.0, 0.0, 0.0),
 ) -> list[Path]:
-    """Writes STEM.parquet with all columns and STEM.csv, as far as wanted; returns the files.
+    """Writes STEM.parquet and STEM.mcap with all columns and STEM.csv, as far as wanted; returns
+    the files.
 
     Args:
         recording: what to write.
         folder: where to write it.
         stem: name of the files without suffix.
-        formats: which of "parquet" and "csv" to write.
+        formats: which of "parquet", "csv" and "mcap" to write.
         columns: patterns of the columns of the CSV file.
-        about: facts of the run, texts or JSON values; metadata of the Parquet file.
+        about: facts of the run, texts or JSON values; metadata of Parquet and MCAP files.
+        torso_com: centre of mass in the torso's frame [m], for the transforms of an MCAP file.
     """
+    facts = _texts(about or {})
     files = [folder / f"{stem}.{kind}" for kind in formats]
     for path in files:
         if path.suffix == ".parquet":
-            write_parquet(recording, path, about=about or {})
+            write_parquet(recording, path, about=facts)
+        elif path.suffix == ".mcap":
+            write_mcap(recording, path, about=facts, torso_com=torso_com)
         else:
             write_csv(recording.chosen(columns), path, units=True)
     return files
+
+
+def check_formats(formats: Sequence[str], *, start: float, where: str) -> None:
+    """Raises HexapodError when a run that starts at a time [s] cannot be written in a format.
+
+    It is called before a run, whose recording would be lost otherwise.
+    """
+    if "mcap" in formats:
+        require_mcap(where)
+        check_start(start, where)
+
+
+def _texts(facts: Mapping[str, Any]) -> dict[str, str]:
+    """Returns facts as texts: JSON of all that are none."""
+    return {
+        key: value if isinstance(value, str) else json.dumps(value, sort_keys=True)
+        for key, value in facts.items()
+    }
 
 
 def write_commands(recording: Recording, path: Path) -> None:
@@ -82,14 +110,13 @@ def read_recording(folder: Path, stem: str) -> Recording:
 
 
 def write_parquet(recording: Recording, path: Path, *, about: Mapping[str, Any]) -> None:
-    """Writes one column per variable. A failed write leaves no partial file."""
+    """Writes one column per variable. A failed write leaves no partial file.
+
+    about: texts or JSON values for the metadata.
+    """
     import pyarrow as pa  # noqa: PLC0415  slow to import
     import pyarrow.parquet as pq  # noqa: PLC0415
 
-    facts = {
-        key: value if isinstance(value, str) else json.dumps(value, sort_keys=True)
-        for key, value in about.items()
-    }
     known = known_columns()
     fields = [
         pa.field(
@@ -101,7 +128,7 @@ def write_parquet(recording: Recording, path: Path, *, about: Mapping[str, Any])
         for name in recording.names
     ]
     columns = [pa.array(values) for values in np.ascontiguousarray(recording.data.T)]
-    table = pa.Table.from_arrays(columns, schema=pa.schema(fields, metadata=facts))
+    table = pa.Table.from_arrays(columns, schema=pa.schema(fields, metadata=_texts(about)))
     with atomic_path(path) as temporary:
         # byte-stream split halves the size of dictionary encoding, in a quarter of its time
         pq.write_table(
@@ -193,4 +220,5 @@ def _not_a_recording(path: Path, error: Exception, expected: str) -> HexapodErro
 READERS: Mapping[str, Callable[[Path], Recording]] = {  # the faster one first
     "parquet": read_parquet,
     "csv": read_csv,
+    "mcap": read_mcap,
 }

@@ -22,6 +22,7 @@ from hexapod_cosim.cosim.common.files import (
     write_json,
     write_text,
 )
+from hexapod_cosim.cosim.interface.names import vector_names
 from hexapod_cosim.cosim.master.loop import COMPLETED, FAILED, INTERRUPTED
 from hexapod_cosim.cosim.results.accuracy import Accuracy, accuracy_from_table
 from hexapod_cosim.cosim.results.ground import around_walk, read_ground, recipe_of, write_ground
@@ -128,9 +129,9 @@ def _lock(folder: Path) -> FileLock:
 def write_result(result: Result, folder: Path) -> list[Path]:
     """Writes a run into a prepared folder and returns the files: scenario, recording, others.
 
-    A run that did not complete leaves `results.partial.*` and no metrics. Parquet, from which
-    reports are made again, holds all columns; CSV holds those that outputs.csv names. Commands are
-    written only where every macro-step is recorded, since they hold from row to row.
+    A run that did not complete leaves `results.partial.*` and no metrics. Parquet and MCAP, from
+    which reports are made again, hold all columns; CSV holds those that outputs.csv names.
+    Commands are written only where every macro-step is recorded, since they hold from row to row.
     """
     facts, outputs = run_facts(result), result.scenario.outputs
     scenario, recording = tomlkit.dumps(result.scenario.to_table()), result.outcome.recording
@@ -139,7 +140,13 @@ def write_result(result: Result, folder: Path) -> list[Path]:
     columns, stem = (outputs.csv, RESULTS) if result.completed else (("*",), PARTIAL)
     files = [folder / SCENARIO]
     files += write_recording(
-        recording, folder, stem, formats=outputs.formats, columns=columns, about=about
+        recording,
+        folder,
+        stem,
+        formats=outputs.formats,
+        columns=columns,
+        about=about,
+        torso_com=[result.parameters.get(name, 0.0) for name in vector_names("torso.com")],
     )
     if result.completed and "csv" in outputs.formats and result.scenario.every == 1:
         files.append(folder / COMMANDS)

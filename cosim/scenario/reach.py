@@ -66,11 +66,11 @@ def _reach_error(wanted: Array, robot: Robot, gait: Gait, where: str) -> Scenari
     motion = wanted * MOTION
     posture = wanted - motion
     if _walks(posture, robot, gait):
-        limit = posture + motion * _largest_share(motion, posture, robot, gait)
+        limit = posture + motion * largest_share(motion, posture, robot, gait)
         what, shown = "the legs do not reach the strides of this command", motion != 0.0
         fix = "slow the command down, or shorten gait.period"
     else:
-        limit = wanted * _largest_share(posture, np.zeros(6), robot, gait)
+        limit = wanted * largest_share(posture, np.zeros(6), robot, gait)
         what, shown = "the legs do not reach this posture", posture != 0.0
         fix = "move the body less"
     expected = (
@@ -80,8 +80,11 @@ def _reach_error(wanted: Array, robot: Robot, gait: Gait, where: str) -> Scenari
     return ScenarioError(what, got=_text(wanted, shown), expected=expected, fix=fix, where=where)
 
 
-def _largest_share(part: Array, rest: Array, robot: Robot, gait: Gait) -> float:
-    """Returns, by bisection, the largest share of `part` that the legs follow on top of `rest`."""
+def largest_share(part: Array, rest: Array, robot: Robot, gait: Gait) -> float:
+    """Returns, by bisection, the largest share of `part` that the legs follow on top of `rest`.
+
+    Both are commands (6,) in SI units; the share is at most 1.
+    """
     low, high = 0.0, 1.0
     while high - low > RESOLUTION * high:
         middle = 0.5 * (low + high) if low > 0.0 else 0.1 * high

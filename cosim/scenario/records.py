@@ -25,7 +25,8 @@ from hexapod_cosim.models.schema import Choice, Number, Vector, specs
 CONTROLS = ("kinematic", "paper", "compliant")
 COMPARED = ("kinematic", "compliant")  # unless a command or a study names its controls
 FAULTS = ("dead", "stuck")
-FORMATS = ("parquet", "csv")  # of recordings
+FORMATS = ("parquet", "csv", "mcap")  # of recordings
+DEFAULT_FORMATS = ("parquet", "csv")
 SETTINGS: dict[str, type[Any]] = {
     "gait": Gait,
     "terrain": Terrain,
@@ -117,7 +118,7 @@ class Outputs:
 
     # patterns of variable names, for the columns of results.csv; Parquet has all columns
     csv: tuple[str, ...] = ("*",)
-    formats: tuple[str, ...] = FORMATS
+    formats: tuple[str, ...] = DEFAULT_FORMATS
     plots: bool = True
     # time between two rows of the recording; 0: every macro-step. Metrics use all macro-steps
     interval: Annotated[float, Number("s", at_least=0.0, default=0.0)] = 0.0

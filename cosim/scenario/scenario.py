@@ -28,6 +28,7 @@ from hexapod_cosim.cosim.scenario.controls import LAW, control_beside, read_cont
 from hexapod_cosim.cosim.scenario.quantities import to_si
 from hexapod_cosim.cosim.scenario.records import (
     CONTROLS,
+    DEFAULT_FORMATS,
     FORMATS,
     GRAVITY,
     GRAVITY_NAMES,
@@ -377,7 +378,7 @@ def _read_outputs(table: Any, where: str) -> Outputs:
     plain = {key: table[key] for key in specs(Outputs) if key in table}
     return Outputs(
         csv=_patterns(table.get("csv", ["*"]), f"{where}.csv"),
-        formats=_formats(table.get("formats", FORMATS), f"{where}.formats"),
+        formats=_formats(table.get("formats", DEFAULT_FORMATS), f"{where}.formats"),
         plots=_boolean(table.get("plots", True), f"{where}.plots"),
         interval=_record(Outputs, plain, where).interval,
     )
@@ -401,7 +402,7 @@ def _formats(value: Any, where: str) -> tuple[str, ...]:
         raise ScenarioError(
             "value not allowed",
             got=value,
-            expected="a list of one or both of " + ", ".join(FORMATS),
+            expected="a list of some of " + ", ".join(FORMATS),
             fix='write formats = ["parquet"]',
             where=where,
         )

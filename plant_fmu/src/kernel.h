@@ -21,26 +21,28 @@ typedef struct hxEvents {
 typedef struct hxKernel {
   const char *name;
   int (*is_supported)(void); /* whether this processor has the instructions */
+  size_t scratch;            /* bytes of work space, see hx_scratch_size */
 
   /* Sets contacts, energy, counters and time at the start of a motion. */
-  void (*start)(const hxModel *model, double t, hxState *state);
+  void (*start)(const hxModel *model, double t, hxState *state, void *scratch);
 
   /* Advances the state to t_end exactly, or to an event; the command changes by ramp per second,
    * or is constant (NULL). A command older than the state belongs to a call that an event
    * interrupted. After a failure the state lies between the two times and the message gives the
    * reason. */
   hxStatus (*integrate)(const hxModel *model, const hxCommand *command, const hxCommand *ramp,
-                        double t_end, hxEvents *events, hxState *state, char *message);
+                        double t_end, hxEvents *events, hxState *state, void *scratch,
+                        char *message);
 
   /* Computes dy/dt, and the multipliers on request. */
   void (*derivative)(const hxModel *model, const hxState *state, const hxCommand *command,
-                     int multipliers, hxPlantMotion *rate);
+                     int multipliers, void *scratch, hxPlantMotion *rate);
 
   /* Computes the motion at coordinates. */
   void (*place)(const hxModel *model, const hxCoordinates *x, hxPlantMotion *motion);
   /* Computes coordinates of a motion and their rates; either result may be NULL. */
   void (*coordinates)(const hxModel *model, const hxState *state, const hxCommand *command,
-                      hxCoordinates *x, hxCoordinates *rate);
+                      void *scratch, hxCoordinates *x, hxCoordinates *rate);
 
   /* Computes penetration and approach speed of all contacts, of feet on soil from the depths at
    * which they touch it. */
@@ -52,19 +54,19 @@ typedef struct hxKernel {
                           hxState *state);
 
   /* Measures the path since the last moment, when an importer's solver has completed its step. */
-  void (*measure)(const hxModel *model, const hxCommand *command, hxState *state);
+  void (*measure)(const hxModel *model, const hxCommand *command, hxState *state, void *scratch);
 
   /* Computes all outputs. */
   void (*output)(const hxModel *model, const hxState *state, const hxCommand *command,
-                 hxOutput *output);
+                 void *scratch, hxOutput *output);
 
   /* Computes the rates of those outputs that are integrals since the start. */
   void (*integral_rates)(const hxModel *model, const hxState *state, const hxCommand *command,
-                         hxOutput *rate);
+                         void *scratch, hxOutput *rate);
 
   /* Solves eq. 1 for accelerations, multipliers and motor torques. */
   void (*accelerations)(const hxModel *model, const hxState *state, const hxCommand *command,
-                        double acceleration[HX_BODIES][6],
+                        void *scratch, double acceleration[HX_BODIES][6],
                         double multiplier[HX_BODIES - 1][HX_MULTIPLIERS],
                         double drive_torque[HX_BODIES - 1]);
 } hxKernel;
@@ -86,6 +88,13 @@ extern const hxKernel *const hx_kernels[];
 
 /* Returns the fastest kernel that this processor supports. */
 const hxKernel *hx_kernel(void);
+
+/* Work space in the memory of an instance, aligned to HX_SCRATCH_ALIGNMENT. Every call may use all
+ * of it, and none reads what another one has left there. */
+enum { HX_SCRATCH_ALIGNMENT = 64 };
+
+/* Returns the size of the work space that every kernel and hx_tangent can do with, bytes. */
+size_t hx_scratch_size(void);
 
 HX_HIDDEN_END
 

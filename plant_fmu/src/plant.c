@@ -43,9 +43,11 @@ const char *hx_plant_message(const hxPlant *plant) { return plant->message; }
 double hx_plant_time(const hxPlant *plant) { return plant->state.time; }
 
 hxPlant *hx_plant_create(void) {
-  hxPlant *plant = calloc(1, sizeof *plant);
+  hxPlant *plant = calloc(1, sizeof *plant + HX_SCRATCH_ALIGNMENT + hx_scratch_size());
   hxDefinition definition;
   if (!plant) return NULL;
+  unsigned char *behind = (unsigned char *)plant + sizeof *plant;
+  plant->scratch = behind + (0 - (uintptr_t)behind) % HX_SCRATCH_ALIGNMENT;
   hx_definition_default(&definition);
   hx_plant_reset(plant, &definition, 0.0);
   return plant;
@@ -103,18 +105,18 @@ hxStatus hx_plant_reset(hxPlant *plant, const hxDefinition *definition, double t
   hxStatus status = hx_definition_check(definition, message);
   if (status == HX_OK) status = check_terrain(plant, definition, message);
   if (status != HX_OK) return fail(plant, status, message);
-  const hxModel model_before = plant->model;
-  const hxState state_before = plant->state;
+  plant->model_before = plant->model;
+  plant->state_before = plant->state;
   memset(&plant->model, 0, sizeof plant->model);
   memset(&plant->state, 0, sizeof plant->state);
   hx_model_compile(&plant->model, definition, plant->terrain);
   hx_initial_bodies(definition, body);
   hx_motion_from_bodies(&plant->model, (const double (*)[HX_BODY_STATE])body, &plant->state.motion);
-  hx_kernel()->start(&plant->model, t, &plant->state);
+  hx_kernel()->start(&plant->model, t, &plant->state, plant->scratch);
   status = check_start_depth(plant, message); /* the cells of feet on blocks are known now */
   if (status != HX_OK) {
-    plant->model = model_before;
-    plant->state = state_before;
+    plant->model = plant->model_before;
+    plant->state = plant->state_before;
     return fail(plant, status, message);
   }
   hx_footprints_clear(&plant->footprints);
@@ -148,7 +150,7 @@ static double input_fingerprint(const hxInput *input) {
  * sequence of that call continues, so that the motion does not depend on the interruption. */
 static hxStatus advance(hxPlant *plant, const hxInput *input, const hxInput *rate, double t_end,
                         hxEvents *events) {
-  hxState before;
+  hxState *before = &plant->state_before;
   hxCommand command, change;
   int finite;
   const hxCommand *ramp = ramp_from_rate(rate, &change, &finite);
@@ -164,18 +166,18 @@ static hxStatus advance(hxPlant *plant, const hxInput *input, const hxInput *rat
   }
   hxStatus status = hx_input_check(input, plant->message);
   if (status != HX_OK) return status;
-  hx_copy_state(&plant->model, &before, &plant->state);
+  hx_copy_state(&plant->model, before, &plant->state);
   const double fingerprint =
-      !ramp && (events->stop || before.call_input != 0.0) ? input_fingerprint(input) : 0.0;
-  const int resumes = before.call_input != 0.0 && before.call_input == fingerprint &&
-                      before.call_start < before.time;
-  hx_command_from_input(&command, input, resumes ? before.call_start : before.time);
+      !ramp && (events->stop || before->call_input != 0.0) ? input_fingerprint(input) : 0.0;
+  const int resumes = before->call_input != 0.0 && before->call_input == fingerprint &&
+                      before->call_start < before->time;
+  hx_command_from_input(&command, input, resumes ? before->call_start : before->time);
   hx_footprints_begin(&plant->footprints);
   events->footprints = &plant->footprints;
   status = hx_kernel()->integrate(&plant->model, &command, ramp, t_end, events, &plant->state,
-                                  plant->message);
+                                  plant->scratch, plant->message);
   if (status != HX_OK) {
-    hx_copy_state(&plant->model, &plant->state, &before);
+    hx_copy_state(&plant->model, &plant->state, before);
     hx_footprints_take_back(&plant->footprints);
     return status;
   }
@@ -205,7 +207,7 @@ hxStatus hx_plant_step_to_event(hxPlant *plant, const hxInput *input, double t_e
 void hx_plant_output(hxPlant *plant, const hxInput *input, hxOutput *output) {
   hxCommand command;
   hx_command_from_input(&command, input, plant->state.time);
-  hx_kernel()->output(&plant->model, &plant->state, &command, output);
+  hx_kernel()->output(&plant->model, &plant->state, &command, plant->scratch, output);
   output->footprints = plant->footprints.kept.count;
 }
 
@@ -279,7 +281,7 @@ hxStatus hx_plant_set_state(hxPlant *plant, const void *bytes, size_t size) {
 static const hxCommand no_command;
 
 void hx_plant_get_coordinates(const hxPlant *plant, hxCoordinates *x) {
-  hx_kernel()->coordinates(&plant->model, &plant->state, &no_command, x, NULL);
+  hx_kernel()->coordinates(&plant->model, &plant->state, &no_command, plant->scratch, x, NULL);
 }
 
 /* Limits of coordinates (m, m/s, rad/s, J) and of angles (rad). Larger ones are errors of a
@@ -332,14 +334,14 @@ static void switch_bodies(hxPlant *plant) {
 void hx_plant_completed_step(hxPlant *plant, const hxInput *input) {
   hxCommand command;
   hx_command_from_input(&command, input, plant->state.time);
-  hx_kernel()->measure(&plant->model, &command, &plant->state);
+  hx_kernel()->measure(&plant->model, &command, &plant->state, plant->scratch);
   switch_bodies(plant);
 }
 
 void hx_plant_rates(const hxPlant *plant, const hxInput *input, hxCoordinates *rate) {
   hxCommand command;
   hx_command_from_input(&command, input, plant->state.time);
-  hx_kernel()->coordinates(&plant->model, &plant->state, &command, NULL, rate);
+  hx_kernel()->coordinates(&plant->model, &plant->state, &command, plant->scratch, NULL, rate);
 }
 
 void hx_plant_indicators(const hxPlant *plant, double indicator[HX_LEGS]) {
@@ -361,7 +363,8 @@ static double switching_depth(int closed, double delta, double ddelta) {
 int hx_plant_update_contacts(hxPlant *plant) {
   hxDepths depths;
   const hxModel *model = &plant->model;
-  const hxPlantMotion before = plant->state.motion;
+  double before[3][HX_SLOTS];
+  memcpy(before, plant->state.motion.bristle, sizeof before);
   hx_kernel()->depths(model, &plant->state.contact, &plant->state.motion, &depths);
   for (int k = 0; k < model->rows + model->torso_rows; ++k) {
     const int row = model->row[k];
@@ -371,28 +374,30 @@ int hx_plant_update_contacts(hxPlant *plant) {
   }
   hx_footprints_begin(&plant->footprints);
   hx_kernel()->switch_contacts(model, &depths, &plant->footprints, &plant->state);
-  return memcmp(before.bristle, plant->state.motion.bristle, sizeof before.bristle) != 0;
+  return memcmp(before, plant->state.motion.bristle, sizeof before) != 0;
 }
 
 hxStatus hx_plant_tangent(hxPlant *plant, const hxInput *input, const hxInput *d_input,
                           const hxCoordinates *dx, hxCoordinates *d_rate, hxOutput *d_output) {
   static const hxInput no_input;
   static const hxCoordinates no_change;
-  hxTangentPoint point;
   const double scale =
       largest(largest(0.0, d_input, sizeof *d_input / sizeof(double)), dx, HX_COORDINATES);
   if (!isfinite(scale))
     return fail(plant, HX_INVALID_ARGUMENT,
                 "derivatives: got a direction that is not finite, expected finite numbers");
-  hx_command_from_input(&point.command, input, plant->state.time);
-  hx_command_from_input(&point.d_command, d_input ? d_input : &no_input, 0.0);
-  hx_plant_get_coordinates(plant, &point.x);
-  point.dx = dx ? *dx : no_change;
-  point.model = plant->model;
-  point.state = plant->state;
-  point.scale = scale > 0.0 ? scale : 1.0;
 #if HX_HAS_TANGENT
-  hx_tangent(&point, d_rate, d_output);
+  hxTangentPoint *point = plant->scratch;
+  hxCoordinates x;
+  hx_plant_get_coordinates(plant, &x); /* before the point, because it uses the same memory */
+  hx_command_from_input(&point->command, input, plant->state.time);
+  hx_command_from_input(&point->d_command, d_input ? d_input : &no_input, 0.0);
+  point->x = x;
+  point->dx = dx ? *dx : no_change;
+  point->model = plant->model;
+  point->state = plant->state;
+  point->scale = scale > 0.0 ? scale : 1.0;
+  hx_tangent(point, d_rate, d_output);
   return HX_OK;
 #else
   return fail(plant, HX_INVALID_ARGUMENT,
@@ -404,7 +409,7 @@ hxStatus hx_plant_tangent(hxPlant *plant, const hxInput *input, const hxInput *d
 void hx_plant_integral_rates(hxPlant *plant, const hxInput *input, hxOutput *rate) {
   hxCommand command;
   hx_command_from_input(&command, input, plant->state.time);
-  hx_kernel()->integral_rates(&plant->model, &plant->state, &command, rate);
+  hx_kernel()->integral_rates(&plant->model, &plant->state, &command, plant->scratch, rate);
 }
 
 void hx_plant_get_bodies(const hxPlant *plant, double body[HX_BODIES][HX_BODY_STATE]) {
@@ -418,7 +423,7 @@ hxStatus hx_plant_set_bodies(hxPlant *plant, const double body[HX_BODIES][HX_BOD
         return fail(plant, HX_INVALID_ARGUMENT,
                     "body state: got a number that is not finite, expected finite numbers");
   hx_motion_from_bodies(&plant->model, body, &plant->state.motion);
-  hx_kernel()->start(&plant->model, plant->state.time, &plant->state);
+  hx_kernel()->start(&plant->model, plant->state.time, &plant->state, plant->scratch);
   return HX_OK;
 }
 
@@ -427,6 +432,6 @@ void hx_plant_accelerations(hxPlant *plant, const hxInput *input, double acceler
                             double drive_torque[HX_BODIES - 1]) {
   hxCommand command;
   hx_command_from_input(&command, input, plant->state.time);
-  hx_kernel()->accelerations(&plant->model, &plant->state, &command, acceleration, multiplier,
-                             drive_torque);
+  hx_kernel()->accelerations(&plant->model, &plant->state, &command, plant->scratch, acceleration,
+                             multiplier, drive_torque);
 }

@@ -222,6 +222,9 @@ struct hxPlant {
   const hxTerrain *terrain; /* of later resets */
   char message[HX_MESSAGE_SIZE];
   hxFootprintLog footprints; /* outside the state, which every call copies */
+  hxModel model_before;      /* those before a call, which one that fails restores */
+  hxState state_before;
+  void *scratch; /* work space behind the plant, see kernel.h */
 };
 
 /* Copies the parts of a state that a step of this model changes. */

@@ -75,29 +75,45 @@ static void output_to_derivatives(const hxOutput *output, double scale, void *re
                  to + OUTPUT_CONTACT / sizeof(double));
 }
 
-void hx_tangent(const hxTangentPoint *real, hxCoordinates *d_rate, hxOutput *d_output) {
-  hxTangentPoint point;
-  hxCoordinates rate;
-  hxOutput output;
+/* The work space; the real point is where the work is written later. */
+typedef struct {
   hxWork work;
+  hxTangentPoint point;
   hxRate all;
-  point_to_complex(real, &point);
-  const double scale = hx_re(point.scale);
-  add_direction((hxComplex *)&point.x, (const hxComplex *)&point.dx, NUMBERS(sizeof point.x),
+  hxOutput output;
+} hxTangentScratch;
+_Static_assert(sizeof(hxWork) >= sizeof(hxTangentPoint) / 2, "the real point lies in the work");
+
+size_t hx_tangent_scratch(void) { return sizeof(hxTangentScratch); }
+
+void hx_tangent(void *memory, hxCoordinates *d_rate, hxOutput *d_output) {
+  hxTangentScratch *scratch = memory;
+  hxTangentPoint *point = &scratch->point;
+  hxOutput *output = &scratch->output;
+  hxWork *work = &scratch->work;
+  hxRate *all = &scratch->all;
+  hxCoordinates rate;
+  point_to_complex(memory, point);
+  const double scale = hx_re(point->scale);
+  add_direction((hxComplex *)&point->x, (const hxComplex *)&point->dx, NUMBERS(sizeof point->x),
                 scale);
-  add_direction((hxComplex *)&point.command, (const hxComplex *)&point.d_command,
-                NUMBERS(sizeof point.command), scale);
-  hx_motion_from_coordinates(&point.model, &point.x, &point.state.motion);
-  memset(&all, 0, sizeof all);
-  hx_dynamics_evaluate(&point.model, &point.state.contact, &point.command, hx_re(point.state.time),
-                       &point.state.motion, NULL, 1, &work, &all);
-  hx_coordinates_rate(&all.motion, &work, &rate);
-  hx_output_fill(&point.model, &point.state, &work, &output);
+  add_direction((hxComplex *)&point->command, (const hxComplex *)&point->d_command,
+                NUMBERS(sizeof point->command), scale);
+  hx_motion_from_coordinates(&point->model, &point->x, &point->state.motion);
+  memset(all, 0, sizeof *all);
+  hx_dynamics_evaluate(&point->model, &point->state.contact, &point->command,
+                       hx_re(point->state.time), &point->state.motion, NULL, 1, work, all);
+  hx_coordinates_rate(&all->motion, work, &rate);
+  hx_output_fill(&point->model, &point->state, work, output);
   if (d_rate)
     to_derivatives((const hxComplex *)&rate, NUMBERS(sizeof rate), scale, (double *)d_rate);
-  if (d_output) output_to_derivatives(&output, scale, d_output);
+  if (d_output) output_to_derivatives(output, scale, d_output);
 }
 
 #else
-typedef int hx_no_tangent; /* ISO C forbids an empty file */
+
+#include "tangent.h"
+
+size_t hx_tangent_scratch(void) { return 0; }
+
 #endif

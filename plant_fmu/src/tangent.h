@@ -23,9 +23,13 @@ typedef struct hxTangentPoint {
   hxModel model;
 } hxTangentPoint;
 
-/* Computes the derivatives of rates and outputs along the direction. Either result may be NULL;
- * contact flags in d_output are 0. */
-void hx_tangent(const hxTangentPoint *point, hxCoordinates *d_rate, hxOutput *d_output);
+/* Returns the size of the work space of hx_tangent, bytes. */
+size_t hx_tangent_scratch(void);
+
+/* Computes the derivatives of rates and outputs along the direction. The work space begins with an
+ * hxTangentPoint, which is overwritten. Either result may be NULL; contact flags in d_output are
+ * 0. */
+void hx_tangent(void *scratch, hxCoordinates *d_rate, hxOutput *d_output);
 
 HX_HIDDEN_END
 

@@ -23,7 +23,7 @@ SEES = {
 }
 # what each room of cosim may import; study has rooms of its own
 LOW = ["common", "interface", "scenario", "master"]
-RUNNING = [*LOW, "control", "export", "results", "design"]
+RUNNING = [*LOW, "control", "export", "logs", "results", "design"]
 ROOMS = {
     "common": [],
     "interface": LOW[:1],
@@ -31,12 +31,15 @@ ROOMS = {
     "master": LOW[:3],
     "control": LOW,
     "export": LOW,
-    "results": LOW,
+    "logs": LOW,
+    "results": [*LOW, "logs"],
     "validate": [*LOW, "export"],
     "design": [*LOW, "export"],
     "report": [*LOW, "export", "results"],
     "run": RUNNING,
+    "identify": [*RUNNING, "report", "run"],
     "course": [*RUNNING, "report", "run"],
+    "live": [*RUNNING, "report", "run"],
     "study.plan": [*LOW, "results"],
     "study.store": [*LOW, "results", "study.plan"],
     "study.execute": [*RUNNING, "run", "study.plan", "study.store"],

@@ -568,12 +568,6 @@ HX_API void hx_probe_stage(hxPlant *plant, const hxInput *input, double z, doubl
   }
 }
 
-/* Overwrites the stack that the next call uses. */
-HX_API void hx_probe_stain_stack(int byte) {
-  volatile char stain[300000];
-  for (size_t i = 0; i < sizeof stain; ++i) stain[i] = (char)byte;
-}
-
 /* Computes dy/dt with the i-th kernel. Returns its name, or NULL when there is none or the
  * processor does not support it. */
 HX_API const char *hx_probe_kernel(int i, hxPlant *plant, const hxInput *input,
@@ -584,7 +578,7 @@ HX_API const char *hx_probe_kernel(int i, hxPlant *plant, const hxInput *input,
     if (!hx_kernels[k]) return NULL;
   if (!hx_kernels[i]->is_supported()) return NULL;
   hx_command_from_input(&command, input, plant->state.time);
-  hx_kernels[i]->derivative(&plant->model, &plant->state, &command, 1, &rate);
+  hx_kernels[i]->derivative(&plant->model, &plant->state, &command, 1, plant->scratch, &rate);
   hx_bodies_from_motion(&plant->model, &rate, body);
   return hx_kernels[i]->name;
 }

@@ -141,7 +141,7 @@ def test_the_motion_does_not_depend_on_the_lane_width(
 @pytest.mark.parametrize("width", WIDTHS)
 @pytest.mark.parametrize("garbage", [0x00, 0xFF])
 @pytest.mark.parametrize("law", ["tanh", "bristle", "soil"])
-def test_what_lies_on_the_stack_does_not_matter(
+def test_what_lies_on_the_stack_and_in_the_work_space_does_not_matter(
     core: ct.CDLL, other_cores: dict[str, ct.CDLL], width: str, garbage: int, law: str
 ) -> None:
     """Lanes that no leg occupies must be written before they are read: 0xFF... is a NaN."""
@@ -149,10 +149,12 @@ def test_what_lies_on_the_stack_does_not_matter(
     plants = [
         Plant(library, robot, **random_pose(robot, 5)) for library in (core, other_cores[width])
     ]
-    for plant in plants:
-        core.hx_probe_stain_stack(garbage)
+    for library, plant in zip((core, other_cores[width]), plants, strict=True):
+        library.hx_probe_stain(ct.c_void_p(plant.handle), garbage)
         plant.step(0.02)
-    assert plants[0].save() == plants[1].save()
+    clean = Plant(core, robot, **random_pose(robot, 5))
+    clean.step(0.02)
+    assert plants[0].save() == plants[1].save() == clean.save()
 
 
 def test_every_kernel_of_this_build_that_runs_here_gives_the_same_rates(core: ct.CDLL) -> None:
@@ -182,7 +184,11 @@ def other_cores(tmp_path_factory: pytest.TempPathFactory) -> dict[str, ct.CDLL]:
     folder, plant = tmp_path_factory.mktemp("widths"), ROOT / "plant_fmu"
     sources = [
         str(path)
-        for path in [*sorted((plant / "src").rglob("*.c")), plant / "generated" / "defaults.c"]
+        for path in [
+            *sorted((plant / "src").rglob("*.c")),
+            plant / "generated" / "defaults.c",
+            ROOT / "tests" / "native" / "stain.c",
+        ]
     ]
     flags = [
         "-std=c11",
@@ -192,6 +198,7 @@ def other_cores(tmp_path_factory: pytest.TempPathFactory) -> dict[str, ct.CDLL]:
         "-ffp-contract=off",
         "-DHX_SHARED",
         f"-I{plant / 'include'}",
+        f"-I{plant / 'src'}",
     ]
     libraries = {}
     for name, extra in WIDTHS.items():

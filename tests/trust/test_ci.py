@@ -15,7 +15,7 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
 RUN, CONSTRAINTS = ROOT / ".ci" / "run", ROOT / ".ci" / "constraints.txt"
-TOOLS = ("make", "cc", "g++", "clang", "pkg-config", "git", "chromium")
+TOOLS = ("make", "cc", "g++", "clang", "pkg-config", "musl-gcc", "git", "chromium")
 NAME = re.compile(r"[A-Za-z0-9._-]+")
 
 

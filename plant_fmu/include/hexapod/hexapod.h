@@ -6,9 +6,10 @@
  * RR, joints (and the link each one moves) in the order coxa, femur, tibia. Bodies: 0 = torso, 1 +
  * 3 leg + joint = link. Equation numbers refer to docs/equations.md.
  *
- * A plant contains no pointer but the one to its terrain and no hidden state, and the library has
- * no globals: a plant's
- * bytes are its state. After hx_plant_create no function allocates, prints or exits.
+ * A plant has no hidden state, and the library has no globals: what hx_plant_get_state copies is the
+ * whole state. After hx_plant_create no function allocates, prints or exits. Work space belongs to
+ * the plant, so that a call needs less than 48 kB of stack, and one plant is for one thread at a
+ * time.
  */
 #ifndef HEXAPOD_H
 #define HEXAPOD_H

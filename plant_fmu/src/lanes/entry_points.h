@@ -9,9 +9,9 @@
 static const double first_step_size = 1e-4; /* s  first step after a reset */
 
 /* The functions of kernel.h's table, which describes them. */
-static void kernel_start(const hxModel *model, double t, hxState *state) {
+static void kernel_start(const hxModel *model, double t, hxState *state, void *scratch) {
   static const hxCommand no_command;
-  hxWork work;
+  hxWork *work = &((hxScratch *)scratch)->work;
   state->time = t;
   state->call_start = state->call_input = 0.0;
   state->next_step = state->first_step = fmin(first_step_size, model->step_max);
@@ -22,39 +22,38 @@ static void kernel_start(const hxModel *model, double t, hxState *state) {
   hx_depths_of(model, &state->contact, &state->motion, &depths);
   hx_contact_start(model, &depths, &state->contact);
   memset(state->motion.bristle, 0, sizeof state->motion.bristle);
-  hx_dynamics_forces(model, &state->contact, &no_command, t, &state->motion, 0, 1, &work);
+  hx_dynamics_forces(model, &state->contact, &no_command, t, &state->motion, 0, 1, work);
   hx_moment_update(model, state);
   memset(&state->completed, 0, sizeof state->completed);
   memset(&state->measured, 0, sizeof state->measured);
   for (int pack = 0; pack < HX_PACKS; ++pack) {
-    hxReal force = work.pack[pack].contact[HX_FOOT].normal.force;
+    hxReal force = work->pack[pack].contact[HX_FOOT].normal.force;
     for (int k = 1; k < model->foot_rows; ++k)
-      force += work.pack[pack].contact[model->row[k]].normal.force;
+      force += work->pack[pack].contact[model->row[k]].normal.force;
     hx_store(&state->measured.peak_force[pack * HX_LANES], force);
   }
   hx_fill_measured_slots(model, state);
-  state->stored_at_start = hx_kinetic_energy(model, &state->motion, &work) +
-                           hx_potential_energy(model, &state->motion, &work);
+  state->stored_at_start = hx_kinetic_energy(model, &state->motion, work) +
+                           hx_potential_energy(model, &state->motion, work);
 }
 
 static void kernel_derivative(const hxModel *model, const hxState *state, const hxCommand *command,
-                              int multipliers, hxPlantMotion *rate) {
-  hxRate all;
-  hxWork work;
+                              int multipliers, void *memory, hxPlantMotion *rate) {
+  hxScratch *scratch = memory;
   hx_dynamics_evaluate(model, &state->contact, command, state->time, &state->motion, NULL,
-                       multipliers, &work, &all);
-  *rate = all.motion;
+                       multipliers, &scratch->work, &scratch->rate);
+  *rate = scratch->rate.motion;
 }
 
 static void kernel_coordinates(const hxModel *model, const hxState *state, const hxCommand *command,
-                               hxCoordinates *x, hxCoordinates *rate) {
-  hxRate all;
-  hxWork work;
-  memset(all.motion.bristle, 0, sizeof all.motion.bristle);
-  hx_dynamics_evaluate(model, &state->contact, command, state->time, &state->motion, NULL, 0, &work,
-                       &all);
-  if (x) hx_coordinates_of(&state->motion, &work, x);
-  if (rate) hx_coordinates_rate(&all.motion, &work, rate);
+                               void *memory, hxCoordinates *x, hxCoordinates *rate) {
+  hxScratch *scratch = memory;
+  hxPlantMotion *motion_rate = &scratch->rate.motion;
+  memset(motion_rate->bristle, 0, sizeof motion_rate->bristle);
+  hx_dynamics_evaluate(model, &state->contact, command, state->time, &state->motion, NULL, 0,
+                       &scratch->work, &scratch->rate);
+  if (x) hx_coordinates_of(&state->motion, &scratch->work, x);
+  if (rate) hx_coordinates_rate(motion_rate, &scratch->work, rate);
 }
 
 static void kernel_switch_contacts(const hxModel *model, hxDepths *depths,
@@ -125,10 +124,10 @@ static void settle_cells(const hxModel *model, hxState *state) {
   hx_cross_cells(model, &depths, state);
 }
 
-static void kernel_measure(const hxModel *model, const hxCommand *command, hxState *state) {
-  hxMoment end;
-  hxWork work;
-  hxRate rate;
+static void kernel_measure(const hxModel *model, const hxCommand *command, hxState *state,
+                           void *memory) {
+  hxScratch *scratch = memory;
+  hxMoment *end = &scratch->end;
   hxImpulses impulses;
   hxStepWorks works;
   const int known = state->completed.known != 0.0;
@@ -138,19 +137,19 @@ static void kernel_measure(const hxModel *model, const hxCommand *command, hxSta
                  .t = state->moment.time,
                  .h = h,
                  .from = &state->moment,
-                 .to = &end};
+                 .to = end};
   for (int node = 0; node <= INTERVALS; ++node) path.command[node] = command;
-  hx_moment_of(model, &state->contact, &state->motion, &end);
-  end.time = state->time;
-  hx_dynamics_evaluate(model, &state->contact, command, state->time, &state->motion, NULL, 1, &work,
-                       &rate);
+  hx_moment_of(model, &state->contact, &state->motion, end);
+  end->time = state->time;
+  hx_dynamics_evaluate(model, &state->contact, command, state->time, &state->motion, NULL, 1,
+                       &scratch->work, &scratch->rate);
   if (model->has_soil)
-    hx_soil_yield(&state->contact, h, &state->moment.contact[HX_FOOT], &end.contact[HX_FOOT],
+    hx_soil_yield(&state->contact, h, &state->moment.contact[HX_FOOT], &end->contact[HX_FOOT],
                   path.plastic);
-  trapezoidal_impulses(model, &work, h, &state->completed, &impulses);
+  trapezoidal_impulses(model, &scratch->work, h, &state->completed, &impulses);
   if (!known)
     trapezoidal_impulses(
-        model, &work, h, &state->completed,
+        model, &scratch->work, h, &state->completed,
         &impulses); /* the first step has no previous forces: they equal the present ones */
   hx_reset_peaks(&state->measured);
   if (h > 0.0) {
@@ -158,7 +157,7 @@ static void kernel_measure(const hxModel *model, const hxCommand *command, hxSta
     hx_measure_path(&path, &impulses, &works, &state->measured);
   }
   if (model->has_soil) memcpy(state->contact.plastic, path.plastic, sizeof path.plastic);
-  hx_copy_moment(model, &state->moment, &end);
+  hx_copy_moment(model, &state->moment, end);
   if (hx_has_cells(model)) settle_cells(model, state);
   hx_fill_measured_slots(model, state);
   for (int joint = 0; joint < HX_JOINTS; ++joint) {
@@ -173,37 +172,37 @@ static void kernel_measure(const hxModel *model, const hxCommand *command, hxSta
 }
 
 static void kernel_output(const hxModel *model, const hxState *state, const hxCommand *command,
-                          hxOutput *output) {
-  hxRate rate;
-  hxWork work;
-  hx_dynamics_evaluate(model, &state->contact, command, state->time, &state->motion, NULL, 1, &work,
-                       &rate);
-  hx_output_fill(model, state, &work, output);
+                          void *memory, hxOutput *output) {
+  hxScratch *scratch = memory;
+  hx_dynamics_evaluate(model, &state->contact, command, state->time, &state->motion, NULL, 1,
+                       &scratch->work, &scratch->rate);
+  hx_output_fill(model, state, &scratch->work, output);
 }
 
 static void kernel_integral_rates(const hxModel *model, const hxState *state,
-                                  const hxCommand *command, hxOutput *rate) {
-  hxRate all;
-  hxWork work;
-  hx_dynamics_evaluate(model, &state->contact, command, state->time, &state->motion, NULL, 1, &work,
-                       &all);
-  hx_integral_rates_fill(model, &state->contact, &work, rate);
+                                  const hxCommand *command, void *memory, hxOutput *rate) {
+  hxScratch *scratch = memory;
+  hx_dynamics_evaluate(model, &state->contact, command, state->time, &state->motion, NULL, 1,
+                       &scratch->work, &scratch->rate);
+  hx_integral_rates_fill(model, &state->contact, &scratch->work, rate);
 }
 
 static void kernel_accelerations(const hxModel *model, const hxState *state,
-                                 const hxCommand *command, double acceleration[HX_BODIES][6],
+                                 const hxCommand *command, void *memory,
+                                 double acceleration[HX_BODIES][6],
                                  double multiplier[HX_BODIES - 1][HX_MULTIPLIERS],
                                  double drive_torque[HX_BODIES - 1]) {
-  hxRate rate;
-  hxWork work;
-  hx_dynamics_evaluate(model, &state->contact, command, state->time, &state->motion, NULL, 1, &work,
-                       &rate);
-  hx_accelerations_fill(&work, &rate.motion, acceleration, multiplier, drive_torque);
+  hxScratch *scratch = memory;
+  hx_dynamics_evaluate(model, &state->contact, command, state->time, &state->motion, NULL, 1,
+                       &scratch->work, &scratch->rate);
+  hx_accelerations_fill(&scratch->work, &scratch->rate.motion, acceleration, multiplier,
+                        drive_torque);
 }
 
 #define HX_KERNEL_TABLE(title, test)                                                               \
   {.name = title,                                                                                  \
    .is_supported = test,                                                                           \
+   .scratch = sizeof(hxScratch),                                                                   \
    .start = kernel_start,                                                                          \
    .integrate = hx_integrate,                                                                      \
    .derivative = kernel_derivative,                                                                \

@@ -18,6 +18,26 @@ static const double touch_depth[2] = {
 static const double error_scale[HX_BODY_STATE] = {0.1, 0.1, 0.1, 1, 1, 1, 1, 1, 1, 1, 10, 10, 10};
 static const double bristle_scale = 10.0; /* 1  in preslidings */
 
+typedef struct {
+  hxPlantMotion y;
+  hxImpulses impulses;
+  double error; /* error of the step over the tolerance; 0 without an estimate */
+} hxTrial;
+
+/* Work space of a call. It belongs to the instance's memory, because threads of importers may have
+ * small stacks. Nothing in it is read by a later call. */
+typedef struct {
+  hxWork work;
+  hxRate rate;
+  /* of a step */
+  hxRate k[HX_STAGES], change;
+  hxImplicit implicit;
+  hxPlantMotion y;
+  hxTrial trial, nearer;
+  hxMoment end;
+  hxModel feet, tops; /* the model without some rows of contacts */
+} hxScratch;
+
 /* Start of a step and the data that all its trials share. */
 typedef struct {
   const hxModel *model;   /* with all rows of contacts */
@@ -31,13 +51,8 @@ typedef struct {
   double last_step; /* limit of accepted and rejected steps */
   const hxPlantMotion *y;
   hxFootprintLog *footprints;
+  hxScratch *scratch;
 } hxStart;
-
-typedef struct {
-  hxPlantMotion y;
-  hxImpulses impulses;
-  double error; /* error of the step over the tolerance; 0 without an estimate */
-} hxTrial;
 
 /* Computes penetration and approach speed of all contacts. */
 static inline void hx_depths_of(const hxModel *model, const hxContactState *state,
@@ -164,25 +179,27 @@ static const hxCommand *command_at(const hxStart *start, double t, hxCommand *no
 static void try_step(const hxStart *start, double h, hxState *state, hxTrial *trial) {
   const hxMethodRow *m = start->method;
   const hxModel *model = start->pressed;
-  hxImplicit implicit = {.z = h * m->gamma, .ahead = h};
-  hxRate k[HX_STAGES], change;
-  hxPlantMotion y;
-  hxWork work;
+  hxImplicit *implicit = &start->scratch->implicit;
+  hxRate *k = start->scratch->k, *change = &start->scratch->change;
+  hxPlantMotion *y = &start->scratch->y;
+  hxWork *work = &start->scratch->work;
   hxCommand now;
+  memset(implicit, 0, sizeof *implicit);
+  implicit->z = h * m->gamma, implicit->ahead = h;
   hx_clear_impulses(model, &trial->impulses);
   /* stages: y_i = y_0 + sum a_ij k_j, k_i by eq. 19 */
   for (int i = 0; i < m->stages; ++i) {
     const double t = start->t + m->c[i] * h;
     if (i > 0) {
-      combine(model, y.y, start->y->y, h, m->a[i], k, i, HX_TURN_SIZE);
-      if (m->gamma > 0.0) combine(model, change.y, NULL, h, m->g[i], k, i, 0);
-      implicit.change = &change;
+      combine(model, y->y, start->y->y, h, m->a[i], k, i, HX_TURN_SIZE);
+      if (m->gamma > 0.0) combine(model, change->y, NULL, h, m->g[i], k, i, 0);
+      implicit->change = change;
     }
     const hxCommand *command = command_at(start, t, &now);
-    hxImplicit *stage = m->gamma > 0.0 ? &implicit : NULL;
-    hx_dynamics_evaluate(model, start->contact, command, t, i > 0 ? &y : start->y, stage, 0, &work,
+    hxImplicit *stage = m->gamma > 0.0 ? implicit : NULL;
+    hx_dynamics_evaluate(model, start->contact, command, t, i > 0 ? y : start->y, stage, 0, work,
                          &k[i]);
-    hx_add_impulses(model, command, stage, &work, h * m->b[i], &trial->impulses);
+    hx_add_impulses(model, command, stage, work, h * m->b[i], &trial->impulses);
     state->evaluations += 1.0;
   }
   /* y_1 = y_0 + sum b_i k_i, error = |sum e_i k_i| */
@@ -190,8 +207,8 @@ static void try_step(const hxStart *start, double h, hxState *state, hxTrial *tr
   combine(model, trial->y.y, start->y->y, h, m->b, k, m->stages, HX_TURN_SIZE);
   trial->error = 0.0;
   if (m->error_order > 0 && model->step == 0.0) {
-    combine(model, y.y, NULL, h, m->e, k, m->stages, HX_TURN_SIZE);
-    trial->error = error_norm(model, &y);
+    combine(model, y->y, NULL, h, m->e, k, m->stages, HX_TURN_SIZE);
+    trial->error = error_norm(model, y);
   }
   trial->y.actuator_work =
       start->y->actuator_work; /* measure_step() adds those of the accepted step */
@@ -287,11 +304,11 @@ static double find_touchdown(const hxStart *start, double h, hxState *state, hxT
        ++guess) {
     double middle = guess % 3 ? expected_touch(start, low, &depths_low, high, depths) : low;
     if (!(middle > low && middle < high)) middle = 0.5 * (low + high);
-    hxTrial nearer;
-    try_step(start, middle, state, &nearer);
-    hx_depths_of(start->model, start->contact, &nearer.y, &found);
+    hxTrial *nearer = &start->scratch->nearer;
+    try_step(start, middle, state, nearer);
+    hx_depths_of(start->model, start->contact, &nearer->y, &found);
     if (deepest_open(start->model, start, &found) > 0.0)
-      high = middle, *depths = found, *trial = nearer;
+      high = middle, *depths = found, *trial = *nearer;
     else
       low = middle, depths_low = found;
   }
@@ -427,40 +444,40 @@ static const hxModel *end_of_step(const hxStart *start, const hxPlantMotion *y, 
 static hxStatus advance(const hxStart *start, double h_max, double *next_step, hxState *state,
                         double *taken, int *event, char *message) {
   const hxModel *model = start->model;
-  hxTrial trial;
+  hxTrial *trial = &start->scratch->trial;
   double h = model->step > 0.0
                  ? h_max
                  : h_max / ceil(fmax(1.0, h_max / *next_step -
                                               1e-9)); /* equal steps; 1e-9: rounding adds no step */
-  trial.error = 0.0;
+  trial->error = 0.0;
   for (;;) {
     if (model->step == 0.0 && state->steps + state->rejected >= start->last_step)
-      return step_failure(&trial, start->t, h, message);
-    try_step(start, h, state, &trial);
-    if (!all_finite(&trial.y)) trial.error = NAN;
-    if (trial.error <= 1.0) break;
+      return step_failure(trial, start->t, h, message);
+    try_step(start, h, state, trial);
+    if (!all_finite(&trial->y)) trial->error = NAN;
+    if (trial->error <= 1.0) break;
     state->rejected += 1.0;
-    h *= fmin(step_factor(start->method, trial.error), 0.9);
-    if (h < step_floor || (model->step > 0.0 && isnan(trial.error)))
-      return step_failure(&trial, start->t, h, message);
+    h *= fmin(step_factor(start->method, trial->error), 0.9);
+    if (h < step_floor || (model->step > 0.0 && isnan(trial->error)))
+      return step_failure(trial, start->t, h, message);
   }
   if (model->step == 0.0) {
-    const double next = fmin(model->step_max, h * step_factor(start->method, trial.error));
+    const double next = fmin(model->step_max, h * step_factor(start->method, trial->error));
     /* a step limited by the end of the interval must not reduce the next step */
     *next_step = state->next_step = h < h_max ? next : fmax(next, state->next_step);
   }
   /* shorten the step to the first touch-down, measure it, switch contacts */
-  hxMoment end;
+  hxMoment *end = &start->scratch->end;
   hxDepths depths;
   *taken = h;
-  const hxModel *seen = end_of_step(start, &trial.y, &end, &depths);
+  const hxModel *seen = end_of_step(start, &trial->y, end, &depths);
   if (seen == model && deepest_open(model, start, &depths) > 0.0) {
-    *taken = find_touchdown(start, h, state, &trial, &depths);
-    hx_moment_of(model, start->contact, &trial.y, &end);
+    *taken = find_touchdown(start, h, state, trial, &depths);
+    hx_moment_of(model, start->contact, &trial->y, end);
   }
-  end.time = start->t + *taken;
-  measure_step(start, seen, *taken, &end, state, &trial);
-  state->motion = trial.y;
+  end->time = start->t + *taken;
+  measure_step(start, seen, *taken, end, state, trial);
+  state->motion = trial->y;
   state->steps += 1.0;
   if (hx_has_cells(model)) hx_cross_cells(seen, &depths, state);
   keep_nearest_points(model, state);
@@ -492,18 +509,19 @@ HX_RARE const hxModel *feet_alone(const hxModel *model, int rows, hxModel *feet)
 /* Advances from state->time to t_end; the last step ends on t_end exactly. A call that an event
  * interrupted continues with the same steps. */
 static hxStatus run_to(const hxModel *model, const hxCommand *command, const hxCommand *ramp,
-                       double t_end, hxEvents *events, hxState *state, char *message) {
+                       double t_end, hxEvents *events, hxState *state, hxScratch *scratch,
+                       char *message) {
   hxStart start = {.model = model,
                    .command = command,
                    .ramp = ramp,
                    .contact = &state->contact,
                    .method = hx_method(model->method),
                    .y = &state->motion,
-                   .footprints = events->footprints};
-  hxModel feet, tops;
+                   .footprints = events->footprints,
+                   .scratch = scratch};
   const int rows = model->rows + model->torso_rows, foot_rows = model->foot_rows;
-  const hxModel *all_feet = rows > foot_rows ? feet_alone(model, foot_rows, &feet) : model,
-                *first_feet = foot_rows > 1 ? feet_alone(model, 1, &tops) : all_feet;
+  const hxModel *all_feet = rows > foot_rows ? feet_alone(model, foot_rows, &scratch->feet) : model,
+                *first_feet = foot_rows > 1 ? feet_alone(model, 1, &scratch->tops) : all_feet;
   start.touch = fmax(touch_depth[0], touch_depth[1] * model->tolerance);
   start.last_step = state->steps + state->rejected + steps_allowed(t_end - state->time);
   double first = fmin(state->first_step,
@@ -531,7 +549,8 @@ static hxStatus run_to(const hxModel *model, const hxCommand *command, const hxC
 
 /* Advances to t_end in equal steps of at most solver.step. */
 static hxStatus run_fixed(const hxModel *model, const hxCommand *command, const hxCommand *ramp,
-                          double t_end, hxEvents *events, hxState *state, char *message) {
+                          double t_end, hxEvents *events, hxState *state, hxScratch *scratch,
+                          char *message) {
   const double t_start = command->time;
   const double count = fmax(1.0, ceil((t_end - t_start) / model->step - 1e-9));
   if (count > steps_allowed(t_end - t_start)) {
@@ -544,7 +563,7 @@ static hxStatus run_fixed(const hxModel *model, const hxCommand *command, const 
   }
   for (double i = 1.0; i <= count && !(events->stop && events->found); i += 1.0) {
     const double t = i < count ? t_start + (t_end - t_start) * (i / count) : t_end;
-    const hxStatus status = run_to(model, command, ramp, t, events, state, message);
+    const hxStatus status = run_to(model, command, ramp, t, events, state, scratch, message);
     if (status != HX_OK) return status;
   }
   return HX_OK;
@@ -553,12 +572,13 @@ static hxStatus run_fixed(const hxModel *model, const hxCommand *command, const 
 /* Advances the state to t_end exactly, or to an event. After a failure the state lies between the
  * two times and the message gives the reason. */
 static hxStatus hx_integrate(const hxModel *model, const hxCommand *command, const hxCommand *ramp,
-                             double t_end, hxEvents *events, hxState *state, char *message) {
+                             double t_end, hxEvents *events, hxState *state, void *scratch,
+                             char *message) {
   if (state->moment.stale != 0.0) hx_moment_update(model, state);
   keep_nearest_points(model, state);
   if (command->time == state->time && t_end > state->time) hx_reset_peaks(&state->measured);
-  const hxStatus status = (model->step == 0.0 ? run_to : run_fixed)(model, command, ramp, t_end,
-                                                                    events, state, message);
+  const hxStatus status = (model->step == 0.0 ? run_to : run_fixed)(
+      model, command, ramp, t_end, events, state, scratch, message);
   memset(state->contact.nearest, 0, sizeof state->contact.nearest);
   fill_motion_slots(&state->motion);
   hx_fill_measured_slots(model, state);

@@ -1,0 +1,1 @@
+"""The commands of the live robot: `hexapod live` and `hexapod realtime`."""

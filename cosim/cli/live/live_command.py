@@ -1,0 +1,79 @@
+"""`hexapod live`: a robot that is driven in a browser, in real time."""
+
+from __future__ import annotations
+
+import threading
+import webbrowser
+from dataclasses import replace
+from typing import Annotated
+
+import typer
+
+from hexapod_cosim.controller import Gains, GainsError
+from hexapod_cosim.cosim.cli.running import ControlNames, GainsFile, Name, Settings, given_gains
+from hexapod_cosim.cosim.cli.terminal import show_text, waiting
+from hexapod_cosim.cosim.control.controllers import check_control
+from hexapod_cosim.cosim.scenario.controls import parse_controls
+from hexapod_cosim.cosim.scenario.records import CONTROLS, Scenario
+from hexapod_cosim.cosim.scenario.scenario import load_scenario
+
+Port = Annotated[
+    int,
+    typer.Option("--port", metavar="PORT", help="Listen on this port; by default on a free one."),
+]
+Browser = Annotated[
+    bool, typer.Option("--browser/--no-browser", help="Open the page in the browser.")
+]
+
+
+def live(
+    scenario: Name = "walk_flat",
+    control: ControlNames = None,
+    settings: Settings = None,
+    gains: GainsFile = None,
+    port: Port = 0,
+    browser: Browser = True,
+) -> None:
+    """Drive the robot in a browser, in real time: keys, gamepad or touch. Ctrl-C ends it."""
+    from hexapod_cosim.cosim.live.server import LiveServer, require_extra  # noqa: PLC0415  an extra
+    from hexapod_cosim.cosim.live.settings import Choices, control_texts  # noqa: PLC0415
+
+    require_extra()
+    plan = load_scenario(scenario, overrides=settings or [])
+    given = parse_controls(control or [plan.control], where="--control")
+    check_control(plan, given)
+    plan = replace(plan, control=given[0].text)
+    found, refusal = _gains_of(plan, given_gains(gains))
+    able = CONTROLS if found is not None else ("kinematic",)
+    texts = {one.label: one.text for one in given} | control_texts(plan, able)
+    refused = {name: refusal for name in CONTROLS if name not in able}
+    with waiting("starting the robot"):
+        server = LiveServer(Choices(plan, texts, refused), found, port=port)
+    try:
+        server.run(lambda url: _announce(url, browser=browser))
+    except KeyboardInterrupt:
+        show_text("stopped")
+
+
+def _gains_of(plan: Scenario, given: Gains | None) -> tuple[Gains | None, str]:
+    """Returns the gains of the built-in controls, or None and why there are none.
+
+    Raises GainsError when the scenario's own control needs them.
+    """
+    from hexapod_cosim.cosim.run.preparation import chosen_gains  # noqa: PLC0415  a slow import
+
+    try:
+        with waiting("designing the gains"):
+            return chosen_gains(replace(plan, control="compliant"), given), ""
+    except GainsError as error:
+        if chosen_gains(plan, given) is not None:
+            raise
+        return None, str(error)
+
+
+def _announce(url: str, *, browser: bool) -> None:
+    """Prints the page's address and opens it."""
+    show_text(f"the robot walks at {url}")
+    show_text("Ctrl-C ends it")
+    if browser:
+        threading.Thread(target=webbrowser.open, args=(url,), daemon=True).start()

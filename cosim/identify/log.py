@@ -1,0 +1,209 @@
+"""Reads the log of a robot: commands, and readings of any sensors, over time.
+
+A log is a CSV, Parquet or MCAP file whose columns have the names of the FMU's variables. It needs
+the commanded angle of every joint; all else is optional. The attitude is compared as roll, pitch
+and yaw, which are made from a quaternion.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hexapod_cosim.cosim.interface.names import (
+    foot_names,
+    foot_vector_names,
+    joint_names,
+    vector_names,
+)
+from hexapod_cosim.cosim.logs.mcap_reader import read_mcap
+from hexapod_cosim.cosim.master.recorder import Recording
+from hexapod_cosim.cosim.results.columns import plant_variables
+from hexapod_cosim.cosim.results.recordings import read_csv, read_parquet
+from hexapod_cosim.models import HexapodError
+
+Array = NDArray[np.float64]
+LEAST_ROWS = 10
+LONGEST_STEP = 0.2  # s    between two rows
+ATTITUDE = ("torso.roll", "torso.pitch", "torso.yaw")
+QUATERNIONS = ("torso.quaternion", "imu.quaternion")  # the first one that a log has counts
+
+
+class LogError(HexapodError):
+    """A log cannot be used."""
+
+
+@dataclass(frozen=True)
+class Channel:
+    """Readings of one kind."""
+
+    key: str
+    title: str
+    unit: str
+    names: tuple[str, ...]
+
+
+CHANNELS = (
+    Channel("angle", "Joint angles", "rad", tuple(joint_names("angle"))),
+    Channel("speed", "Joint speeds", "rad/s", tuple(joint_names("speed"))),
+    Channel("torque", "Servo torques", "N.m", tuple(joint_names("torque"))),
+    Channel("current", "Servo currents", "A", tuple(joint_names("current"))),
+    Channel("normal_force", "Normal forces of feet", "N", tuple(foot_names("normal_force"))),
+    Channel("force", "Forces of feet", "N", tuple(foot_vector_names("force"))),
+    Channel("gyroscope", "Gyroscope", "rad/s", tuple(vector_names("imu.angular_velocity"))),
+    Channel("accelerometer", "Accelerometer", "m/s2", tuple(vector_names("imu.specific_force"))),
+    Channel("position", "Position of the torso", "m", tuple(vector_names("torso.position"))),
+    Channel("attitude", "Attitude of the torso", "rad", ATTITUDE),
+)
+COMMANDS = tuple(joint_names("angle_ref"))
+
+
+@dataclass(frozen=True)
+class Log:
+    """Rows of a log.
+
+    The commands of row k hold from time[k] to time[k + 1]; its readings are of time[k].
+    """
+
+    recording: Recording  # time, commands and known readings
+    where: str
+
+    @property
+    def time(self) -> Array:
+        """Times (rows,) [s]."""
+        return self.recording.time
+
+    @property
+    def commands(self) -> Mapping[str, Array]:
+        """The plant's inputs in the log, by name, each (rows,)."""
+        have = set(self.recording.names)
+        return {
+            name: self.recording.column(name) for name in plant_variables("input") if name in have
+        }
+
+    def names(self, channel: Channel) -> tuple[str, ...]:
+        """Returns the columns of a channel that the log has."""
+        have = set(self.recording.names)
+        return tuple(name for name in channel.names if name in have)
+
+    @property
+    def measured(self) -> tuple[str, ...]:
+        """All columns of readings."""
+        return tuple(name for channel in CHANNELS for name in self.names(channel))
+
+    def has(self, names: Sequence[str]) -> bool:
+        """Returns whether the log has all these columns."""
+        return set(names) <= set(self.recording.names)
+
+    def part(self, rows: slice) -> Log:
+        """Returns some rows of the log."""
+        return Log(self.recording.rows(rows), self.where)
+
+    def without(self, names: Sequence[str]) -> Log:
+        """Returns the log without some columns."""
+        keep = [k for k, name in enumerate(self.recording.names) if name not in names]
+        kept = tuple(self.recording.names[k] for k in keep)
+        return Log(Recording(kept, self.recording.data[:, keep]), self.where)
+
+
+def read_log(path: Path, *, torso_com: Sequence[float] = (0.0, 0.0, 0.0)) -> Log:
+    """Reads a log and checks its times and commands.
+
+    torso_com: centre of mass in the torso's frame [m], for the transforms of an MCAP file.
+
+    Raises LogError for a file of another kind and for unusable rows, HexapodError for one that is
+    missing or damaged.
+    """
+    readers: dict[str, Callable[[], Recording]] = {
+        ".csv": lambda: read_csv(path),
+        ".parquet": lambda: read_parquet(path),
+        ".mcap": lambda: read_mcap(path, torso_com=torso_com),
+    }
+    if path.suffix.lower() not in readers:
+        raise LogError(
+            "not a log",
+            got=path.name,
+            expected="a file that ends in " + ", ".join(readers),
+            fix="name the log's file, not its folder" if path.is_dir() else "convert it",
+            where=str(path),
+        )
+    return log_of(readers[path.suffix.lower()](), str(path))
+
+
+def log_of(recording: Recording, where: str) -> Log:
+    """Returns the log that a recording holds: its commands and known readings. Raises LogError."""
+    missing = [name for name in COMMANDS if name not in recording.names]
+    if missing:
+        raise LogError(
+            "a log without commands",
+            got=f"no column {missing[0]!r}"
+            + (f" and {len(missing) - 1} more" * (len(missing) > 1)),
+            expected="the commanded angles of all 18 joints",
+            fix="name the columns as the FMU's inputs: LF.coxa.angle_ref [rad], ...",
+            where=where,
+        )
+    _check_times(recording.time, where)
+    known = _with_attitude(recording)
+    wanted = {*plant_variables("input"), *(name for one in CHANNELS for name in one.names)}
+    wanted |= {*vector_names("torso.velocity"), *vector_names("torso.angular_velocity")}
+    wanted |= set(vector_names(QUATERNIONS[0], 4))
+    keep = [0, *(k for k, name in enumerate(known.names) if name in wanted)]
+    log = Log(Recording(tuple(known.names[k] for k in keep), known.data[:, keep]), where)
+    for name, values in log.commands.items():
+        if not np.isfinite(values).all():
+            raise LogError(
+                "a command is not a number",
+                got=f"{name} at {log.time[~np.isfinite(values)][0]:g} s",
+                expected="a number in each row",
+                fix="drop these rows or repeat the command before",
+                where=where,
+            )
+    return log
+
+
+def _check_times(time: Array, where: str) -> None:
+    steps = np.diff(time)
+    if len(time) < LEAST_ROWS:
+        raise LogError(
+            "a log that is too short",
+            got=f"{len(time)} rows",
+            expected=f"{LEAST_ROWS} at least",
+            fix="record a longer one",
+            where=where,
+        )
+    bad = ~((steps > 0.0) & (steps <= LONGEST_STEP))
+    if bad.any():
+        k = int(np.flatnonzero(bad)[0])
+        raise LogError(
+            "times of a log",
+            got=f"{steps[k]:g} s from row {k} to row {k + 1}",
+            expected=f"increasing times, at most {LONGEST_STEP} s apart",
+            fix="sort the rows, drop repeated ones, or cut the log at the gap",
+            where=where,
+        )
+
+
+def _with_attitude(recording: Recording) -> Recording:
+    """Returns the recording with roll, pitch and yaw, if it has a quaternion and lacks them."""
+    have = set(recording.names)
+    if set(ATTITUDE) <= have:
+        return recording
+    for stem in QUATERNIONS:
+        names = vector_names(stem, 4)
+        if set(names) <= have:
+            data = np.column_stack([recording.data, roll_pitch_yaw(recording.columns(names))])
+            return Recording((*recording.names, *ATTITUDE), data)
+    return recording
+
+
+def roll_pitch_yaw(quaternions: Array) -> Array:
+    """Returns the z-y-x angles (rows, 3) [rad] of quaternions (rows, 4); the yaw is continuous."""
+    w, x, y, z = (quaternions / np.linalg.norm(quaternions, axis=1, keepdims=True)).T
+    roll = np.arctan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y))
+    pitch = np.arcsin(np.clip(2.0 * (w * y - z * x), -1.0, 1.0))
+    yaw = np.unwrap(np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z)))
+    return np.column_stack([roll, pitch, yaw])

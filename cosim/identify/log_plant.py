@@ -1,0 +1,94 @@
+"""Drives the plant FMU with the commands of a log."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hexapod_cosim.cosim.identify.log import Log, LogError
+from hexapod_cosim.cosim.master.fmu import Fmu
+from hexapod_cosim.models import FmuError
+
+Array = NDArray[np.float64]
+
+
+class LogPlant:
+    """A plant FMU that is reset for each simulation of a log; a context manager that frees it.
+
+    Args:
+        fmu: the plant's file.
+        parameters: parameters of all simulations, by name.
+    """
+
+    def __init__(self, fmu: Path, parameters: Mapping[str, Any] | None = None) -> None:
+        self.fmu = Fmu(fmu)
+        self._common = self.fmu.parameter_blocks(parameters or {})
+        self._outputs = set(self.fmu.names("output"))
+
+    def known(self, names: Sequence[str]) -> list[str]:
+        """Returns those of some columns that are outputs of the FMU."""
+        return [name for name in names if name in self._outputs]
+
+    def simulate(
+        self, log: Log, names: Sequence[str], parameters: Mapping[str, float], offset: Array | None
+    ) -> Array:
+        """Simulates a log and returns outputs at the times of its rows (rows, names).
+
+        Args:
+            log: its commands are the FMU's inputs; each holds until the next row.
+            names: outputs of the FMU.
+            parameters: initial state and further parameters.
+            offset: added to the commanded angles (18,) [rad]; None: nothing.
+
+        Raises FmuError for a parameter that is refused, LogError for a refused command or step.
+        """
+        commands, time = log.commands, log.time
+        inputs = self.fmu.block(list(commands))
+        outputs = self.fmu.block(list(names))
+        table = np.column_stack(list(commands.values()))
+        if offset is not None:
+            places = [k for k, name in enumerate(commands) if name.endswith(".angle_ref")]
+            table[:, places] += offset
+        self.fmu.reset()
+        self.fmu.set_blocks(self._common)
+        self.fmu.set_parameters(parameters)
+        self.fmu.initialise(float(time[0]), float(time[-1]))
+        found = np.empty((len(time), len(outputs.names)))
+        try:
+            self._run(time, table, inputs, outputs, found)
+        except FmuError as error:
+            raise LogError(
+                "the plant cannot follow the log",
+                got=str(error),
+                expected="a robot that can move as the log says",
+                fix="check the robot file and the units of the commands",
+                where=log.where,
+            ) from error
+        return found
+
+    def _run(self, time: Array, table: Array, inputs: Any, outputs: Any, found: Array) -> None:
+        last = len(time) - 1
+        times, steps = time.tolist(), np.diff(time).tolist()
+        for k in range(len(times)):
+            outputs.get()  # before the new commands, as the master reads them
+            found[k] = outputs.values
+            if k < last:
+                inputs.values[:] = table[k]
+                inputs.set()
+                self.fmu.step(times[k], steps[k])
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.fmu.close()

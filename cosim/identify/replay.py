@@ -1,0 +1,74 @@
+"""Replays a log: drives the FMU with its commands and compares all readings."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import numpy as np
+
+from hexapod_cosim.cosim.export.export import export_fmu
+from hexapod_cosim.cosim.identify.comparison import (
+    Difference,
+    channel_differences,
+    column_differences,
+)
+from hexapod_cosim.cosim.identify.log import Log, LogError
+from hexapod_cosim.cosim.identify.log_plant import LogPlant
+from hexapod_cosim.cosim.identify.start import initial_state
+from hexapod_cosim.cosim.master.recorder import Recording
+from hexapod_cosim.models import Robot
+
+
+@dataclass(frozen=True)
+class Replay:
+    """A log and the simulation of it."""
+
+    log: Log
+    simulated: Recording  # time, commands and the outputs of the log's columns
+    names: tuple[str, ...]  # the columns that are compared
+    columns: tuple[Difference, ...]
+
+    @property
+    def channels(self) -> list[Difference]:
+        """The difference of each channel."""
+        return channel_differences(self.columns)
+
+
+def replay(
+    log: Log,
+    robot: Robot,
+    *,
+    fmu: Path | None = None,
+    parameters: Mapping[str, Any] | None = None,
+) -> Replay:
+    """Simulates a robot from the log's first row on, with the log's commands.
+
+    Args:
+        log: commands and the readings to compare.
+        robot: the robot that is simulated.
+        fmu: its FMU; by default it is exported.
+        parameters: further parameters of the FMU, by name.
+
+    Raises HexapodError for a log without readings and where the plant cannot follow the commands.
+    """
+    with TemporaryDirectory(prefix="hexapod-replay-") as folder:
+        path = fmu or export_fmu(robot, Path(folder) / "robot.fmu")
+        with LogPlant(path, parameters) as plant:
+            names = plant.known(log.measured)
+            if not names:
+                raise LogError(
+                    "a log without readings",
+                    got="commands alone",
+                    expected="joint angles, torques, foot forces, an IMU or a pose",
+                    fix="name the columns as the FMU's outputs: LF.coxa.angle [rad], ...",
+                    where=log.where,
+                )
+            found = plant.simulate(log, names, initial_state(log, robot), None)
+    inputs = log.commands
+    data = np.column_stack([log.time, *inputs.values(), found])
+    simulated = Recording(("time", *inputs, *names), data)
+    return Replay(log, simulated, tuple(names), tuple(column_differences(log, names, found)))

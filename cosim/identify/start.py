@@ -1,0 +1,86 @@
+"""Finds the state in which a log begins, as initial values of the FMU.
+
+A log should begin with the robot standing still: all rows before the first change of a command are
+averaged then. Unknown quantities are those of a robot at rest on level ground.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hexapod_cosim.cosim.identify.log import ATTITUDE, Log
+from hexapod_cosim.cosim.interface.names import LEGS, joint_names, vector_names
+from hexapod_cosim.models import Robot
+from hexapod_cosim.models.kinematics import axis_quaternion, foot_positions, quaternion_product
+from hexapod_cosim.models.kinematics import rotation_matrix as rotation
+
+Array = NDArray[np.float64]
+LONGEST_REST = 0.5  # s    of rest that is averaged
+RATES = {  # quantity of the log: initial value of the FMU
+    "torso.velocity": "initial.velocity",
+    "torso.angular_velocity": "initial.angular_velocity",
+}
+
+
+def rest_rows(log: Log) -> int:
+    """Returns the number of rows from the first one on that have its commands."""
+    table = np.column_stack(list(log.commands.values()))
+    moved = np.flatnonzero((table != table[0]).any(axis=1))
+    end = int(moved[0]) if moved.size else len(table)
+    return max(1, min(end, int(np.searchsorted(log.time, log.time[0] + LONGEST_REST))))
+
+
+def initial_state(log: Log, robot: Robot) -> dict[str, float]:
+    """Returns the initial values of the FMU's parameters for the first row of a log."""
+    rest = rest_rows(log)
+    rows = log.recording.rows(slice(0, rest))
+
+    def mean(name: str) -> float:
+        return float(np.mean(rows.column(name)))
+
+    found: dict[str, float] = {}
+    angle = np.zeros((6, 3))
+    commanded = joint_names("angle_ref")
+    for k, name in enumerate(joint_names("angle")):
+        angle.flat[k] = mean(name if log.has([name]) else commanded[k])
+        found[f"initial.{name}"] = float(angle.flat[k])
+    for name in joint_names("speed"):
+        found[f"initial.{name}"] = mean(name) if rest == 1 and log.has([name]) else 0.0
+    turn = _quaternion(log, rows.data, rest)
+    found |= dict(zip(vector_names("initial.quaternion", 4), turn.tolist(), strict=True))
+    place = vector_names("torso.position")
+    position = [mean(name) for name in place] if log.has(place) else _resting(robot, angle, turn)
+    found |= dict(zip(vector_names("initial.position"), position, strict=True))
+    for stem, target in RATES.items():
+        names = vector_names(stem)
+        known = rest == 1 and log.has(names)
+        values = [mean(name) if known else 0.0 for name in names]
+        found |= dict(zip(vector_names(target), values, strict=True))
+    return found
+
+
+def _quaternion(log: Log, rows: Array, rest: int) -> Array:
+    """Returns the attitude (4,) in the first row, or its mean over the rows at rest."""
+    names = vector_names("torso.quaternion", 4)
+    if rest == 1 and log.has(names):
+        first: Array = log.recording.columns(names)[0]
+        return first
+    if not log.has(ATTITUDE):
+        return np.array([1.0, 0.0, 0.0, 0.0])
+    places = [log.recording.names.index(name) for name in ATTITUDE]
+    roll, pitch, yaw = rows[:, places].mean(axis=0).tolist()
+    turn = axis_quaternion(np.array([0.0, 0.0, 1.0]), yaw)
+    turn = quaternion_product(turn, axis_quaternion(np.array([0.0, 1.0, 0.0]), pitch))
+    return quaternion_product(turn, axis_quaternion(np.array([1.0, 0.0, 0.0]), roll))
+
+
+def _resting(robot: Robot, angle: Array, turn: Array) -> list[float]:
+    """Returns the torso's position above the origin at which the lowest foot carries its share.
+
+    The share is a sixth of the weight, under which the foot sinks in by (share/K)^(2/3) (eq. 14).
+    """
+    from_origin = foot_positions(robot, angle) - np.array(robot.torso.com)
+    lowest = float((from_origin @ rotation(turn).T)[:, 2].min())
+    depth = (robot.weight / LEGS / robot.contact.stiffness) ** (2.0 / 3.0)
+    return [0.0, 0.0, robot.terrain.height + robot.foot.radius - depth - lowest]

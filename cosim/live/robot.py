@@ -1,0 +1,331 @@
+"""A robot whose plant and controller are stepped one macro-step at a time, and changed meanwhile.
+
+The steps are those of `cosim/master/loop.py`: read outputs, call the controller, set inputs, step.
+So a walk from the start repeats under `hexapod simulate` bit for bit. The built-in controls are the
+controller FMU; all others run as in `simulate`.
+
+Changes while the robot walks:
+
+- friction: the plant begins again in its present pose and motion, on ground of the new friction.
+  Bristles of the friction laws and the measures of work and slip begin at zero.
+- gait and control: the robot stops, as the present controller stops it, and the next controller
+  begins in the stance; over FADE the joint commands pass from the old ones to the new ones.
+- ground: the robot is placed at its start on the new ground.
+
+A controller that raises an exception is replaced by one that holds the joints where they are.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from contextlib import ExitStack
+from dataclasses import replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from types import TracebackType
+from typing import Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hexapod_cosim.controller import BodyCommand, Gains, JointCommand
+from hexapod_cosim.cosim.control.controllers import make_controller
+from hexapod_cosim.cosim.export.controller_export import export_controller
+from hexapod_cosim.cosim.interface.controller_interface import controller_parameters
+from hexapod_cosim.cosim.live.protocol import Change
+from hexapod_cosim.cosim.live.settings import Choices, Limits, Settings, find_limits, gait_of
+from hexapod_cosim.cosim.live.take import Force
+from hexapod_cosim.cosim.master.fmu import Fmu
+from hexapod_cosim.cosim.master.fmu_controller import FmuController
+from hexapod_cosim.cosim.master.loop import JointController
+from hexapod_cosim.cosim.master.signals import Signals
+from hexapod_cosim.cosim.results.walk import robot_weight
+from hexapod_cosim.cosim.run.preparation import PlantFmus
+from hexapod_cosim.cosim.run.run import (
+    RunPlan,
+    apply_settings,
+    initialise_plant,
+    make_plan,
+    make_sensor,
+)
+from hexapod_cosim.cosim.scenario.controls import control_of
+from hexapod_cosim.models import HexapodError
+
+HORIZON = 1e6  # s    stop time of the FMUs
+FADE = 0.4  # s    from the joint commands of one controller to those of the next
+STILL = 0.02  # rad    joint commands that vary by less for half a gait period stand still
+PATIENCE = 4.0  # gait periods    after which the controller is changed although the robot moves
+STATE = "initial."  # prefix of the plant's parameters for the state at the start
+MOST_WEIGHTS = 3.0  # body weights    largest push
+REST = BodyCommand()
+
+
+class LiveRobot:
+    """Steps a robot; a context manager that frees its FMUs.
+
+    Args:
+        choices: the scenario and the changes that are allowed.
+        gains: of the built-in controls; they are needed unless kinematic control alone is allowed.
+
+    Attributes:
+        settings: the settings that hold.
+        wanted: the settings that are being changed to; None while nothing is changed.
+        limits: the largest commands.
+        count: macro-steps since the robot was placed.
+        fault: why a controller was replaced or the plant has stopped; "" without a fault.
+        stopped: whether the plant has refused a step; only `place` helps.
+        weight: of the robot [N].
+    """
+
+    def __init__(self, choices: Choices, *, gains: Gains | None = None) -> None:
+        self.choices, self._gains = choices, gains
+        self._open = ExitStack()
+        self._folder = Path(self._open.enter_context(TemporaryDirectory(prefix="hexapod-live-")))
+        self._built_in: Fmu | None = None
+        self._law = self._open.enter_context(ExitStack())  # of a user's control
+        self.wanted: Settings | None = None
+        self._from = JointCommand()  # that the present controller is faded in from
+        try:
+            path = PlantFmus(self._folder).fmu(choices.scenario.robot)
+            self._plant = self._open.enter_context(Fmu(path))
+            self._begin(choices.first())
+            for gait in choices.gaits:  # now, because finding them takes longer than a macro-step
+                scenario = choices.scenario_with(replace(self.settings, gait=gait))
+                find_limits(self.plan.controller.robot, gait_of(scenario))
+        except BaseException:
+            self._open.close()
+            raise
+
+    @property
+    def time(self) -> float:
+        """Simulated time [s]."""
+        scenario = self.plan.scenario
+        return scenario.start + scenario.macro_step * self.count
+
+    @property
+    def signals(self) -> Signals:
+        """The plant's variables as of now."""
+        return self._signals
+
+    # ------------------------------------------------------------------------------- changes
+
+    def place(self, settings: Settings | None = None) -> None:
+        """Places the robot at its start, standing, under settings: given, wanted or present ones.
+
+        Raises HexapodError.
+        """
+        self._begin(settings or self.wanted or self.settings)
+
+    def _begin(self, settings: Settings) -> None:
+        """Starts plant and controller anew. Raises HexapodError."""
+        self.plan = self._plan_of(settings)
+        scenario = self.plan.scenario
+        self.count, self.settings, self.wanted = 0, settings, None
+        self.fault, self.stopped = "", False
+        self._plant.reset()
+        apply_settings(self._plant, self.plan.robot)
+        endless = replace(self.plan, scenario=replace(scenario, duration=HORIZON))
+        parameters = initialise_plant(self._plant, endless)
+        self.weight = robot_weight(parameters)
+        self.parameters = parameters
+        self._signals = Signals(self._plant, sensor=make_sensor(scenario, self.plan.schedule))
+        self._signals.read()
+        self._start_controller()
+        self._last = JointCommand(angle_ref=self._signals.measurement.angle.copy())
+        self._fading = 0
+
+    def change(self, change: Change) -> None:
+        """Begins a change of the settings. Raises HexapodError, and then leaves all as it was."""
+        before = self.wanted or self.settings
+        wanted = self.choices.changed(before, change)
+        if wanted == before:
+            return
+        plan = self._plan_of(wanted)
+        if change.key == "ground" or self.stopped:
+            self._begin(wanted)
+        elif change.key == "friction":
+            self._change_friction(wanted, plan)
+        else:
+            self.wanted, self._next = wanted, plan
+            self._stop = _Stop(self._steps_of(0.5 * self._period), self._steps_of(self._patience))
+
+    def _plan_of(self, settings: Settings) -> RunPlan:
+        scenario = self.choices.scenario_with(settings)
+        built_in = control_of(scenario.control).is_builtin
+        return make_plan(scenario, gains=self._gains if built_in else None)
+
+    def _change_friction(self, wanted: Settings, plan: RunPlan) -> None:
+        """Starts the plant again in its present state with another friction."""
+        self.settings = replace(self.settings, friction=wanted.friction)
+        if self.wanted is not None:
+            self.wanted, self._next = wanted, plan
+        friction = plan.robot.friction
+        self.plan = replace(
+            self.plan,
+            scenario=self.choices.scenario_with(self.settings),
+            robot=replace(self.plan.robot, friction=friction),
+        )
+        state = self._state()
+        self._plant.reset()
+        apply_settings(self._plant, self.plan.robot)
+        self._plant.set_parameters({**self.plan.scenario.parameters, **state})
+        self._plant.initialise(self.time, HORIZON)
+        self._signals.read()
+
+    def _state(self) -> dict[str, float]:
+        """Returns the plant's pose and motion as the parameters of a start."""
+        present = dict(zip(self._signals.names, self._signals.values.tolist(), strict=True))
+        own = {
+            name: name.removeprefix(STATE)
+            for name in self._plant.variables
+            if name.startswith(STATE)
+        }
+        return {
+            name: present[key if key in present else f"torso.{key}"] for name, key in own.items()
+        }
+
+    def _start_controller(self) -> None:
+        """Makes the controller of the plan, which begins at the present time in the stance."""
+        setup = self.plan.controller
+        self.limits: Limits = find_limits(setup.robot, setup.gait)
+        self._period = setup.gait.period
+        self._patience = PATIENCE * self._period
+        self._law.close()
+        self._controller: JointController
+        if control_of(self.plan.scenario.control).is_builtin:
+            self._controller = self._built_in_controller()
+            return
+        controller = self._law.enter_context(make_controller(self.plan))
+        controller.start(self.time, HORIZON, REST, self._signals.measurement)
+        self._controller = controller
+
+    def _built_in_controller(self) -> FmuController:
+        """Returns the controller FMU with the parameters of the plan."""
+        setup = self.plan.controller
+        if self._built_in is None:
+            path = export_controller(setup, self._folder / "controller.fmu")
+            self._built_in = self._open.enter_context(Fmu(path, name="controller"))
+        self._built_in.reset()
+        self._built_in.set_parameters(controller_parameters(setup))
+        self._built_in.initialise(self.time, HORIZON)
+        return FmuController(self._built_in, period=setup.period)
+
+    # ------------------------------------------------------------------------------- steps
+
+    def step(self, command: BodyCommand, force: Force) -> None:
+        """Makes one macro-step under a body command and a force on the torso [N], world axes.
+
+        Does nothing once the plant has stopped.
+        """
+        if self.stopped:
+            return
+        scenario = self.plan.scenario
+        if self.wanted is not None:
+            command = REST
+            if self.fault or self._stop.reached(self._last.angle_ref):
+                self._take_over()
+        self._signals.push[:3] = force
+        self._signals.write(self._joints(command))
+        try:
+            self._plant.step(self.time, scenario.macro_step)
+            self.count += 1
+            self._signals.read()
+        except HexapodError as error:
+            self.fault, self.stopped = str(error), True
+
+    def _joints(self, command: BodyCommand) -> JointCommand:
+        """Returns the joint commands of the controller; after a fault, those that hold."""
+        if self.fault:
+            return self._last
+        try:
+            found = self._controller.step(self.time, command, self._signals.measurement)
+        except Exception as error:  # a user's controller may raise anything
+            text = (
+                str(error)
+                if isinstance(error, HexapodError)
+                else f"{type(error).__name__}: {error}"
+            )
+            self.fault = text
+            self._last = self._holding()
+            return self._last
+        if self._fading > 0:
+            share = 1.0 - self._fading / self._steps_of(FADE)
+            self._fading -= 1
+            return _blend(self._from, found, share, self._steps_of(FADE) * self._h)
+        self._last = found
+        return found
+
+    def _holding(self) -> JointCommand:
+        """Returns commands that keep the joints where they were commanded to be last.
+
+        Servos that follow a torque alone keep their last torque: they have no angle to hold.
+        """
+        torque = self.plan.robot.servo.mode == "torque"
+        held = JointCommand(angle_ref=self._last.angle_ref.copy())
+        if torque:
+            held.torque_ref[...] = self._last.torque_ref
+        return held
+
+    def _take_over(self) -> None:
+        """Lets the next controller begin, faded in from the last joint commands.
+
+        A controller that cannot begin is a fault: the joints hold.
+        """
+        assert self.wanted is not None
+        self._from, self._fading = self._holding(), self._steps_of(FADE)
+        self.settings, self.wanted, self.plan, self.fault = self.wanted, None, self._next, ""
+        try:
+            self._start_controller()
+        except Exception as error:  # of a user's controller
+            self.fault, self._last = str(error), self._from
+
+    @property
+    def _h(self) -> float:
+        return self.plan.scenario.macro_step
+
+    def _steps_of(self, seconds: float) -> int:
+        return max(round(seconds / self._h), 1)
+
+    def close(self) -> None:
+        """Frees the FMUs."""
+        self._open.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
+
+
+class _Stop:
+    """Tells when joint commands have stood still for `window` macro-steps, or after `most`."""
+
+    def __init__(self, window: int, most: int) -> None:
+        self._angles: deque[NDArray[np.float64]] = deque(maxlen=window)
+        self._left = most
+
+    def reached(self, angle: NDArray[np.float64]) -> bool:
+        """Notes the joint angles (6, 3) [rad] of a macro-step."""
+        self._angles.append(angle.copy())
+        self._left -= 1
+        if len(self._angles) < (self._angles.maxlen or 0):
+            return False
+        return self._left <= 0 or bool(np.ptp(np.array(self._angles), axis=0).max() < STILL)
+
+
+def _blend(old: JointCommand, new: JointCommand, share: float, duration: float) -> JointCommand:
+    """Returns commands between two; the share runs from 0 to 1 in `duration` [s] as a cubic."""
+    part = share * share * (3.0 - 2.0 * share)
+    rate = 6.0 * share * (1.0 - share) / duration
+    gap = new.angle_ref - old.angle_ref
+    return JointCommand(
+        angle_ref=old.angle_ref + part * gap,
+        speed_ref=part * new.speed_ref + rate * gap,
+        torque_ref=(1.0 - part) * old.torque_ref + part * new.torque_ref,
+        acceleration_ref=part * new.acceleration_ref,
+    )

@@ -1,0 +1,87 @@
+/** What the loop sends (cosim/live/state.py and loop.py). SI units; legs LF LM LR RF RM RR. */
+
+import type { Ground, PackedSurface, Robot } from "../types";
+
+export interface Frame {
+  readonly time: number;
+  readonly position: readonly number[];
+  /** w x y z */
+  readonly quaternion: readonly number[];
+  readonly angle: readonly number[];
+  readonly contact: readonly number[];
+  /** [body weights] three entries a foot */
+  readonly force: readonly number[];
+  /** [N m] the largest of all servos */
+  readonly torque: number;
+  readonly slip: readonly number[];
+  /** forward, left [m/s], turn [rad/s], in the torso's axes */
+  readonly speed: readonly number[];
+  readonly command: readonly number[];
+  /** roll and pitch [rad] */
+  readonly tilt: readonly number[];
+  /** [N] world axes */
+  readonly push: readonly number[];
+  readonly factor: number;
+  readonly steps: number;
+  readonly misses: number;
+  readonly worst: number;
+  readonly gaps: number;
+  readonly skipped: number;
+  /** How often the robot was placed: its pose jumps when this changes. */
+  readonly placed: number;
+  readonly driver: number;
+  /** Time since the robot was placed [s]. */
+  readonly seconds: number;
+  /** Stamps of messages [ms] by page, which took effect since the frame before. */
+  readonly echo: Readonly<Record<string, number>>;
+}
+
+export interface World {
+  readonly robot: Robot;
+  readonly ground: Ground;
+  readonly surfaces: readonly PackedSurface[];
+  /** [N] */
+  readonly weight: number;
+  readonly step: number;
+}
+
+export interface Settings {
+  readonly control: string;
+  readonly gait: string;
+  readonly friction: number;
+  readonly ground: string;
+}
+
+export interface Limits {
+  readonly vx: number;
+  readonly vy: number;
+  readonly yaw_rate: number;
+  readonly up: number;
+  readonly down: number;
+}
+
+export interface Status {
+  readonly settings: Settings;
+  readonly wanted: Settings | null;
+  readonly limits: Limits;
+  readonly fault: string;
+  readonly stopped: boolean;
+  readonly paused: boolean;
+  readonly mode: "free" | "recording" | "replaying";
+  readonly recorded: boolean;
+  readonly notes: readonly (readonly [number, string])[];
+}
+
+/** What the page holds (cosim/live/page.py). */
+export interface Setup {
+  readonly title: string;
+  readonly controls: readonly {
+    readonly name: string;
+    readonly title: string;
+    readonly own: boolean;
+  }[];
+  readonly refused: Readonly<Record<string, string>>;
+  readonly gaits: readonly string[];
+  readonly grounds: readonly { readonly name: string; readonly title: string }[];
+  readonly speed: number;
+}

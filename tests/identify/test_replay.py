@@ -1,0 +1,169 @@
+"""Replays: a recording of the FMU drives it to the same readings, another robot's does not, and
+unusable logs are refused.
+"""
+
+from __future__ import annotations
+
+import csv
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from command import QUICK, Call, assert_refused
+
+from hexapod_cosim.cosim.identify.log import Log, LogError, log_of, read_log, roll_pitch_yaw
+from hexapod_cosim.cosim.identify.replay import replay
+from hexapod_cosim.cosim.identify.start import initial_state, rest_rows
+from hexapod_cosim.cosim.master.recorder import Recording
+from hexapod_cosim.cosim.results.recordings import read_parquet, write_csv
+from hexapod_cosim.models import load_robot
+
+ROUND_OFF = 1e-9  # of joint angles, in rad, and of forces, in N: numbers are computed from states
+FORMATS = ["--format", "mcap", "--format", "parquet"]
+
+
+@pytest.fixture(scope="module")
+def folder(plant_build: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Runs a short walk with `hexapod simulate`."""
+    from hexapod_cosim.cosim.cli import main  # noqa: PLC0415
+
+    folder = tmp_path_factory.mktemp("walked") / "out"
+    assert main(["simulate", "walk_flat", "-o", str(folder), *FORMATS, *QUICK]) == 0
+    return folder
+
+
+@pytest.fixture(scope="module")
+def log(folder: Path) -> Log:
+    return read_log(folder / "results.parquet")
+
+
+def test_a_recording_of_the_fmu_drives_it_to_the_same_readings(log: Log, athena_fmu: Path) -> None:
+    done = replay(log, load_robot("athena"), fmu=athena_fmu)
+    assert len(done.names) == 90
+    assert {one.channel for one in done.channels} == {
+        "angle", "speed", "torque", "normal_force", "force",
+        "gyroscope", "accelerometer", "position", "attitude",
+    }  # fmt: skip
+    assert max(one.largest for one in done.columns) < ROUND_OFF
+
+
+def test_all_formats_of_a_log_are_replayed_alike(
+    log: Log, folder: Path, athena_fmu: Path, tmp_path: Path
+) -> None:
+    write_csv(read_parquet(folder / "results.parquet"), tmp_path / "log.csv", units=True)
+    robot = load_robot("athena")
+    first = replay(log, robot, fmu=athena_fmu).simulated
+    for path in (tmp_path / "log.csv", folder / "results.mcap"):
+        assert replay(read_log(path), robot, fmu=athena_fmu).simulated.data.tobytes() == (
+            first.data.tobytes()
+        )
+
+
+def test_another_robot_does_not_move_as_the_log_says(log: Log, athena_fmu: Path) -> None:
+    robot = load_robot("athena")
+    done = replay(log, robot, fmu=athena_fmu, parameters={"servo.kp": 30.0})
+    errors = {one.channel: one.rms for one in done.channels}
+    assert errors["angle"] > 1e-3
+    assert errors["torque"] > 1e-2
+
+
+def test_a_log_from_the_middle_of_a_walk_begins_with_its_state(log: Log, athena_fmu: Path) -> None:
+    later = log.part(slice(20, None))
+    assert rest_rows(later) == 1
+    done = replay(later, load_robot("athena"), fmu=athena_fmu)
+    errors = {one.channel: one.rms for one in done.channels}
+    # the contacts' memory of the touch-down is no reading
+    assert errors["angle"] < 1e-4
+    assert errors["position"] < 1e-4
+
+
+def test_a_log_without_a_pose_begins_with_the_feet_on_the_ground(
+    log: Log, athena_fmu: Path
+) -> None:
+    blind = log.without([name for name in log.recording.names if name.startswith("torso.")])
+    robot = load_robot("athena")
+    height = initial_state(log, robot)["initial.position[3]"]
+    assert initial_state(blind, robot)["initial.position[3]"] == pytest.approx(height, abs=2e-4)
+    errors = {one.channel: one.rms for one in replay(blind, robot, fmu=athena_fmu).channels}
+    assert set(errors) == {
+        "angle", "speed", "torque", "normal_force", "force", "gyroscope", "accelerometer"
+    }  # fmt: skip
+    assert errors["angle"] < 1e-3
+
+
+def test_roll_pitch_and_yaw_are_the_plants(folder: Path) -> None:
+    recording = read_parquet(folder / "results.parquet")
+    angles = roll_pitch_yaw(recording.vector("torso.quaternion", 4))
+    expected = recording.columns(["torso.roll", "torso.pitch", "torso.yaw"])
+    assert angles == pytest.approx(expected, abs=1e-12)
+
+
+def edited(log: Log, change: Callable[[np.ndarray, tuple[str, ...]], None]) -> Recording:
+    """Returns the rows of a log after a change of a copy."""
+    data = log.recording.data.copy()
+    change(data, log.recording.names)
+    return Recording(log.recording.names, data)
+
+
+def test_unusable_logs_are_refused(log: Log, folder: Path) -> None:
+    names = log.recording.names
+    with pytest.raises(LogError, match=r"no column 'LF\.coxa\.angle_ref' and 17 more"):
+        log_of(Recording(names[:1], log.recording.data[:, :1]), "x.csv")
+    with pytest.raises(LogError, match="3 rows"):
+        log_of(Recording(names, log.recording.data[:3]), "x.csv")
+
+    def twice(data: np.ndarray, _: tuple[str, ...]) -> None:
+        data[5, 0] = data[4, 0]
+
+    with pytest.raises(LogError, match="0 s from row 4 to row 5"):
+        log_of(edited(log, twice), "x.csv")
+
+    def unknown(data: np.ndarray, names: tuple[str, ...]) -> None:
+        data[7, names.index("RM.tibia.angle_ref")] = np.nan
+
+    with pytest.raises(LogError, match=r"RM\.tibia\.angle_ref at 0\.035 s"):
+        log_of(edited(log, unknown), "x.csv")
+    with pytest.raises(LogError, match="name the log's file, not its folder"):
+        read_log(folder)
+
+
+def test_degrees_are_refused_with_the_commands_name(log: Log, athena_fmu: Path) -> None:
+    def degrees(data: np.ndarray, names: tuple[str, ...]) -> None:
+        data[:, names.index("LF.tibia.angle_ref")] *= 57.3
+
+    wrong = log_of(edited(log, degrees), "x.csv")
+    with pytest.raises(LogError, match=r"LF\.tibia\.angle_ref"):
+        replay(wrong, load_robot("athena"), fmu=athena_fmu)
+
+
+def test_the_command_writes_table_rows_and_report(
+    call: Call, folder: Path, tmp_path: Path, athena_fmu: Path
+) -> None:
+    place = tmp_path / "out"
+    code, out, _ = call(
+        "replay", folder / "results.mcap", "-o", place, "--fmu", athena_fmu, "--json"
+    )
+    assert code == 0
+    assert {path.name for path in place.iterdir()} == {
+        "replay.csv", "results.parquet", "report.html", "run.json"
+    }  # fmt: skip
+    channels = {one["channel"]: one for one in json.loads(out)["channels"]}
+    assert channels["torque"]["columns"] == 18
+    assert channels["torque"]["rms"] < ROUND_OFF
+    with (place / "replay.csv").open(encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    assert [row["name"] for row in rows][:2] == ["LF.coxa.angle", "LF.femur.angle"]
+    page = (place / "report.html").read_text(encoding="utf-8")
+    assert "Servo torques" in page
+    assert "LF.coxa.torque" in page
+    assert_refused(call("report", place), "hexapod replay", "run it again")
+
+
+def test_a_wrong_setting_leaves_no_folder(call: Call, folder: Path, tmp_path: Path) -> None:
+    place = tmp_path / "out"
+    options = ("-o", place, "--set", "servo.kq=3")
+    outcome = call("replay", folder / "results.parquet", *options)
+    assert_refused(outcome, "servo.kq", "servo.kp")
+    assert not place.exists()

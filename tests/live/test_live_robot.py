@@ -1,0 +1,262 @@
+"""A robot that is stepped and changed while it walks, without a clock and without a page."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from gains import make_gains
+from numpy.typing import NDArray
+
+from hexapod_cosim.controller import BodyCommand
+from hexapod_cosim.cosim.interface.names import joint_names, vector_names
+from hexapod_cosim.cosim.live.protocol import Change, Drive
+from hexapod_cosim.cosim.live.robot import LiveRobot
+from hexapod_cosim.cosim.live.settings import (
+    Choices,
+    control_texts,
+    find_limits,
+    gait_of,
+)
+from hexapod_cosim.cosim.live.take import NO_FORCE, Take
+from hexapod_cosim.cosim.run.walker import Walker
+from hexapod_cosim.cosim.scenario.reach import check_commands
+from hexapod_cosim.cosim.scenario.records import Command
+from hexapod_cosim.cosim.scenario.scenario import (
+    load_scenario,
+    scenario_from_table,
+)
+from hexapod_cosim.models import HexapodError, load_robot
+from hexapod_cosim.models.schema import parse_toml
+
+WALK = BodyCommand(vx=0.08)
+FAILING = """
+from hexapod_cosim.controller import JointCommand
+import numpy as np
+
+
+class Fails:
+    def __init__(self, robot, period):
+        self.stance, self.last = np.array(robot.stance), int(0.2 / period)
+        self.count = 0
+
+    def step(self, t, command, measurement):
+        self.count += 1
+        if self.count > self.last:
+            raise ZeroDivisionError("no legs left")
+        return self.stance
+"""
+
+
+@pytest.fixture(scope="module")
+def robot() -> Iterator[LiveRobot]:
+    scenario = load_scenario("walk_flat")
+    choices = Choices(scenario, control_texts(scenario), {})
+    with LiveRobot(choices, gains=make_gains(load_robot("athena"))) as made:
+        yield made
+
+
+@pytest.fixture
+def placed(robot: LiveRobot) -> LiveRobot:
+    """The robot at its start under the settings of the scenario."""
+    robot.place(robot.choices.first())
+    return robot
+
+
+def value(robot: LiveRobot, *names: str) -> NDArray[np.float64]:
+    found = dict(zip(robot.signals.names, robot.signals.values, strict=True))
+    return np.array([found[name] for name in names])
+
+
+def place_of(robot: LiveRobot) -> NDArray[np.float64]:
+    return value(robot, *vector_names("torso.position"))
+
+
+def go(robot: LiveRobot, steps: int, command: BodyCommand = WALK) -> None:
+    for _ in range(steps):
+        robot.step(command, NO_FORCE)
+
+
+def go_on(robot: LiveRobot, command: BodyCommand = WALK) -> int:
+    """Walks until a change has been made; returns the macro-steps."""
+    for count in range(2000):
+        if robot.wanted is None:
+            return count
+        robot.step(command, NO_FORCE)
+    pytest.fail("the change was never made")
+
+
+def test_a_live_walk_is_the_walk_of_simulate_bit_for_bit(placed: LiveRobot) -> None:
+    scenario = load_scenario("walk_flat", overrides=["duration=1.0"])
+    with Walker(everything=True) as walker:
+        recording = walker.simulate(scenario).outcome.recording
+    for row in range(200):
+        present = value(placed, *recording.names[1:10])
+        np.testing.assert_array_equal(present, recording.data[row, 1:10])
+        placed.step(WALK, NO_FORCE)
+
+
+def test_friction_changes_while_the_robot_walks_and_its_motion_goes_on(placed: LiveRobot) -> None:
+    go(placed, 300)
+    names = [*joint_names("angle"), *joint_names("speed"), *vector_names("torso.velocity")]
+    before, time = value(placed, *names), placed.time
+    placed.change(Change("friction", 0.3))
+    np.testing.assert_allclose(value(placed, *names), before, rtol=0.0, atol=1e-9)
+    assert placed.time == time
+    assert placed.settings.friction == 0.3
+    assert placed.parameters["friction.mu"] == 0.7  # of the start
+    begin = place_of(placed)[0]
+    go(placed, 300)
+    assert place_of(placed)[0] - begin == pytest.approx(0.12, rel=0.1)
+    assert placed.fault == ""
+
+
+@pytest.mark.parametrize(("friction", "slides"), [(0.7, False), (0.1, True)])
+def test_a_standing_robot_slides_when_the_push_exceeds_the_friction(
+    placed: LiveRobot, friction: float, slides: bool
+) -> None:
+    placed.change(Change("friction", friction))
+    for _ in range(40):
+        placed.step(BodyCommand(), (0.0, 0.3 * placed.weight, 0.0))
+    feet = value(placed, *(f"{leg}.foot.slip_speed" for leg in ("LM", "RM")))
+    # (0.3 - 0.1) g for 0.2 s is 0.39 m/s; the friction of 0.7 holds all feet
+    assert np.all((feet > 0.3) if slides else (feet < 0.01))
+
+
+@pytest.mark.parametrize(
+    "change", [Change("gait", "ripple"), Change("control", "compliant"), Change("control", "paper")]
+)
+def test_gait_and_control_change_while_the_robot_walks_without_a_jump_of_the_joints(
+    placed: LiveRobot, change: Change
+) -> None:
+    go(placed, 300)
+    placed.change(change)
+    largest, angles = 0.0, value(placed, *joint_names("angle_ref"))
+    for _ in range(2000):
+        placed.step(WALK, NO_FORCE)
+        now = value(placed, *joint_names("angle_ref"))
+        largest, angles = max(largest, float(np.abs(now - angles).max())), now
+        if placed.wanted is None and placed.settings == placed.choices.changed(
+            placed.choices.first(), change
+        ):
+            break
+    begin = place_of(placed)[0]
+    for _ in range(600):
+        placed.step(WALK, NO_FORCE)
+        now = value(placed, *joint_names("angle_ref"))
+        largest, angles = max(largest, float(np.abs(now - angles).max())), now
+    assert getattr(placed.settings, change.key) == change.value
+    assert place_of(placed)[0] > begin + 0.1  # it walks on by itself
+    # rad    the swings of these gaits need up to 0.05 rad in a macro-step; a jump would be larger
+    assert largest < 0.1
+    assert placed.fault == ""
+
+
+def test_two_changes_at_once_are_made_together(placed: LiveRobot) -> None:
+    go(placed, 100)
+    placed.change(Change("gait", "wave"))
+    placed.change(Change("control", "compliant"))
+    placed.change(Change("friction", 0.5))
+    go_on(placed)
+    settings = placed.settings
+    assert (settings.gait, settings.control, settings.friction) == ("wave", "compliant", 0.5)
+
+
+def test_another_ground_places_the_robot_on_it(placed: LiveRobot) -> None:
+    go(placed, 300)
+    placed.change(Change("ground", "random_uniform"))
+    assert placed.count == 0
+    assert placed.settings.ground == "random_uniform"
+    go(placed, 300)
+    assert placed.fault == ""
+    assert np.ptp(
+        value(placed, "LF.foot.position[3]", "RF.foot.position[3]", "LM.foot.position[3]")
+    )
+
+
+def test_an_unknown_name_is_refused_and_nothing_changes(placed: LiveRobot) -> None:
+    go(placed, 50)
+    before, settings = placed.signals.values.copy(), placed.settings
+    for key in ("gait", "control", "ground"):
+        with pytest.raises(HexapodError, match=f"unknown {key}: got 'nothing'"):
+            placed.change(Change(key, "nothing"))
+    assert placed.settings == settings
+    np.testing.assert_array_equal(placed.signals.values, before)
+
+
+def test_a_push_moves_the_robot_to_its_side(placed: LiveRobot) -> None:
+    # an eighth of the weight for half a second, against stiff servos
+    for _ in range(100):
+        placed.step(BodyCommand(), (0.0, 0.125 * placed.weight, 0.0))
+    assert place_of(placed)[1] > 1e-4
+    assert value(placed, "torso.push_force[2]") == pytest.approx(0.125 * placed.weight)
+
+
+def test_a_take_saved_as_a_scenario_is_the_same_walk(placed: LiveRobot) -> None:
+    take = Take(placed.plan.scenario)
+    turn = placed.limits.command(Drive(forward=0.4, turn=0.6, speed=0.4))
+    inputs = [(WALK, NO_FORCE)] * 200 + [(turn, NO_FORCE)] * 150 + [(turn, (0.0, 3.0, 1.0))] * 50
+    inputs += [(BodyCommand(), NO_FORCE)] * 50
+    for command, force in inputs:
+        take.note(command, force)
+        placed.step(command, force)
+    scenario = scenario_from_table(parse_toml(take.as_toml()), where="driven.toml")
+    assert scenario.duration == pytest.approx(450 * 0.005)
+    assert len(scenario.commands) == 3
+    assert [push.force for push in scenario.pushes] == [(0.0, 3.0, 1.0)]
+    assert [take.input(k) for k in (0, 199, 200, 350, 449)] == [
+        inputs[k] for k in (0, 199, 200, 350, 449)
+    ]
+    with Walker(everything=True) as walker:
+        recording = walker.simulate(scenario).outcome.recording
+    # the push is a mean over a macro-step, whose times are rounded
+    end = recording.columns(vector_names("torso.position"))[-1]
+    np.testing.assert_allclose(end, place_of(placed), rtol=0.0, atol=1e-9)
+
+
+def test_a_controller_that_raises_is_replaced_by_joints_that_hold(tmp_path: Path) -> None:
+    (tmp_path / "law.py").write_text(FAILING, encoding="utf-8")
+    scenario = load_scenario("stand", overrides=[f"control={tmp_path / 'law.py'}:Fails"])
+    choices = Choices(scenario, control_texts(scenario, ("kinematic",)), {})
+    with LiveRobot(choices) as robot:
+        go(robot, 100, BodyCommand())
+        assert "ZeroDivisionError: no legs left" in robot.fault
+        assert "law.py, line 14" in robot.fault
+        assert not robot.stopped
+        held = value(robot, *joint_names("angle_ref"))
+        height = place_of(robot)[2]
+        go(robot, 100, BodyCommand())
+        np.testing.assert_array_equal(value(robot, *joint_names("angle_ref")), held)
+        assert place_of(robot)[2] == pytest.approx(height, abs=1e-4)
+        # another control takes over at once, and walks
+        robot.change(Change("control", "kinematic"))
+        go(robot, 500)
+        assert robot.fault == ""
+        assert place_of(robot)[0] > 0.05
+        # and the first one fails again in the same way
+        robot.change(Change("control", "Fails"))
+        go_on(robot)
+        go(robot, 200, BodyCommand())
+        assert "no legs left" in robot.fault
+
+
+@pytest.mark.parametrize("name", ["athena", "phantomx_mk4"])
+@pytest.mark.parametrize("gait", ["tripod", "wave"])
+def test_the_legs_reach_every_command_that_a_drive_can_ask_for(name: str, gait: str) -> None:
+    scenario = load_scenario("walk_flat", overrides=[f"robot={name}", f"gait.name={gait}"])
+    plan = Choices(scenario, control_texts(scenario), {})
+    settings = plan.first()
+    assert settings.gait == gait
+    own = load_robot(name)
+    limits = find_limits(own, gait_of(scenario))
+    signs = (-1.0, 0.0, 1.0)
+    for forward in signs:
+        for left in signs:
+            for turn in signs:
+                for height in (-1.0, -0.5, 0.0, 0.5, 1.0):
+                    command = limits.command(Drive(forward, left, turn, height))
+                    wanted = Command(**vars(command))
+                    check_commands([wanted], own, gait_of(scenario), where="drive")
+    assert min(vars(limits).values()) > 0.0

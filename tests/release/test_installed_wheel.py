@@ -1,0 +1,110 @@
+"""A wheel of `make wheels` in an empty virtual environment, with no compiler on PATH.
+
+Runs with HEXAPOD_WHEELS=FOLDER (`make test-wheels`), because it downloads the dependencies.
+"""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import zipfile
+from pathlib import Path
+
+import pytest
+
+FOLDER = os.environ.get("HEXAPOD_WHEELS")
+FAMILIES = {
+    "manylinux_2_17_x86_64.manylinux2014_x86_64.musllinux_1_1_x86_64",
+    "manylinux_2_17_aarch64.manylinux2014_aarch64.musllinux_1_1_aarch64",
+    "win_amd64",
+    "macosx_11_0_x86_64",
+    "macosx_11_0_arm64",
+}
+pytestmark = pytest.mark.skipif(FOLDER is None, reason="needs HEXAPOD_WHEELS: make test-wheels")
+
+
+@pytest.fixture(scope="module")
+def wheels() -> Path:
+    """The folder of the release."""
+    assert FOLDER is not None
+    return Path(FOLDER).resolve()
+
+
+@pytest.fixture(scope="module")
+def hexapod(wheels: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The command of a new environment in which this machine's wheel alone is installed."""
+    folder = tmp_path_factory.mktemp("environment")
+    subprocess.run([sys.executable, "-m", "venv", folder], check=True)
+    options = ["--quiet", "--only-binary=:all:", "--find-links", str(wheels)]
+    command = [str(folder / "bin/python"), "-m", "pip", "install", *options, "hexapod-cosim"]
+    subprocess.run(command, check=True, env=bare(folder))
+    return folder / "bin" / "hexapod"
+
+
+def bare(folder: Path) -> dict[str, str]:
+    """Environment variables with no compiler on PATH and a home of its own."""
+    kept = {name: os.environ[name] for name in os.environ if name.startswith(("PIP_", "SSL_"))}
+    return kept | {"PATH": str(folder / "bin"), "HOME": str(folder), "LANG": "C.UTF-8"}
+
+
+def run(hexapod: Path, cwd: Path, *arguments: str) -> str:
+    """Runs the command outside the source tree and returns its output."""
+    process = subprocess.run(
+        [str(hexapod), *arguments],
+        cwd=cwd,
+        env=bare(hexapod.parents[1]),
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert process.returncode == 0, process.stderr
+    return process.stdout
+
+
+def test_there_is_a_wheel_for_each_platform_of_at_most_5_mb(wheels: Path) -> None:
+    found = {path.stem.split("-py3-none-")[1]: path for path in wheels.glob("*.whl")}
+    assert found.keys() == FAMILIES
+    assert max(path.stat().st_size for path in found.values()) < 5e6
+
+
+def test_the_hashes_are_those_of_the_files(wheels: Path) -> None:
+    subprocess.run(["sha256sum", "--check", "--strict", "SHA256SUMS"], cwd=wheels, check=True)
+
+
+def test_the_descriptions_are_what_the_index_accepts(wheels: Path) -> None:
+    files = [str(path) for path in (*wheels.glob("*.whl"), *wheels.glob("*.tar.gz"))]
+    subprocess.run([sys.executable, "-m", "twine", "check", "--strict", *files], check=True)
+
+
+def test_the_linux_wheel_keeps_what_its_tag_promises(wheels: Path) -> None:
+    (wheel,) = wheels.glob("*manylinux_2_17_x86_64*.whl")
+    command = [sys.executable, "-m", "auditwheel", "show", str(wheel)]
+    shown = subprocess.run(command, capture_output=True, text=True, check=True).stdout
+    assert "manylinux_2_17_x86_64" in " ".join(shown.split())
+
+
+def test_the_first_report_comes_out_of_the_wheel(hexapod: Path, tmp_path: Path) -> None:
+    run(hexapod, tmp_path, "compare", "walk_flat", "--set", "duration=2 s", "-o", "first")
+    assert (tmp_path / "first" / "report.html").stat().st_size > 100_000
+
+
+def test_an_fmu_for_all_platforms_needs_no_compiler(hexapod: Path, tmp_path: Path) -> None:
+    run(hexapod, tmp_path, "export", "--platforms", "all", "-o", "athena.fmu")
+    with zipfile.ZipFile(tmp_path / "athena.fmu") as archive:
+        binaries = {name for name in archive.namelist() if name.startswith("binaries/")}
+    assert {name for name in binaries if not name.endswith("/")} == {
+        "binaries/linux64/hexapod.so",
+        "binaries/aarch64-linux/hexapod.so",
+        "binaries/win64/hexapod.dll",
+        "binaries/darwin64/hexapod.dylib",
+    }
+    run(hexapod, tmp_path, "validate", "athena.fmu")
+
+
+def test_the_examples_come_out_of_the_wheel_and_run(hexapod: Path, tmp_path: Path) -> None:
+    run(hexapod, tmp_path, "examples", "-o", "mine")
+    assert {path.name for path in (tmp_path / "mine").iterdir()} >= {"01_stand.py", "notebooks"}
+    environment = bare(hexapod.parents[1])
+    command = [str(hexapod.with_name("python")), "01_stand.py"]
+    subprocess.run(command, cwd=tmp_path / "mine", env=environment, check=True)

@@ -1,0 +1,180 @@
+"""Builds the release: a wheel for each platform, the source distribution and their SHA-256 list.
+
+    python -m tools.wheels [FOLDER]                 all of them, in dist/ by default
+
+Every wheel is made of the same files: those of the wheel that this machine builds from the source
+distribution, without its binaries and C libraries, and the cross-compiled binaries of both FMUs
+for all platforms. A wheel differs from another one by its co-simulation loop and its tag alone, so
+that `hexapod export --platforms all` needs no compiler. The same sources and the same ziglang give
+the same bytes.
+
+The binaries for glibc run on musl too: musl's loader takes itself for libc.so.6 and libm.so.6, and
+they require no function that musl lacks (tests/release/test_musl.py). The wheels for Linux
+therefore have the tags of both.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+import zipfile
+from collections.abc import Iterable, Mapping
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+
+from rich.console import Console
+from wheel.wheelfile import WheelFile
+
+from hexapod_cosim.cosim.common.components import CONTROLLER, PLANT
+from hexapod_cosim.cosim.common.plant_files import LOOP, fmi_headers
+from hexapod_cosim.cosim.export.cross_build import TARGETS, Library, build_library
+from hexapod_cosim.cosim.export.platforms import component_library
+
+ROOT = Path(__file__).parents[1]
+BINARIES, LIBRARIES = "hexapod_cosim/plant/binaries/", "hexapod_cosim/plant/lib/"
+SHARED = ("-DHX_SHARED",)
+LARGEST = 5_000_000  # bytes of a wheel
+
+
+@dataclass(frozen=True)
+class Platform:
+    """A wheel's target of the cross compiler and the platform part of its tag."""
+
+    target: str
+    tag: str
+
+
+LINUX = "manylinux_2_17_{0}.manylinux2014_{0}.musllinux_1_1_{0}"
+PLATFORMS = (
+    Platform("x86_64-linux", LINUX.format("x86_64")),
+    Platform("aarch64-linux", LINUX.format("aarch64")),
+    Platform("x86_64-windows", "win_amd64"),
+    Platform("x86_64-darwin", "macosx_11_0_x86_64"),
+    Platform("aarch64-darwin", "macosx_11_0_arm64"),
+)
+
+
+def main(folder: Path) -> None:
+    """Builds the release into a folder and reports the size of each file."""
+    console = Console()
+    folder.mkdir(parents=True, exist_ok=True)
+    os.environ.setdefault("SOURCE_DATE_EPOCH", commit_time())
+    with console.status("building the wheel of this machine and the source distribution"):
+        source, base = build_source(folder)
+    with console.status("compiling for all platforms (minutes, the first time)"):
+        binaries = cross_compile()
+    wheels = [write_wheel(base, platform, binaries, folder) for platform in PLATFORMS]
+    write_hashes(folder, [source, *wheels])
+    for path in (source, *wheels):
+        console.print(f"{path.stat().st_size / 1e6:5.2f} MB  {path.name}", highlight=False)
+    large = [path.name for path in wheels if path.stat().st_size > LARGEST]
+    if large:
+        sys.exit(f"wheels of more than {LARGEST / 1e6:.0f} MB: {', '.join(large)}")
+
+
+def commit_time() -> str:
+    """Returns the time of the last commit in seconds, which all files of the release have."""
+    command = ["git", "log", "-1", "--format=%ct"]
+    return subprocess.check_output(command, cwd=ROOT, text=True).strip()
+
+
+def build_source(folder: Path) -> tuple[Path, dict[str, bytes]]:
+    """Builds the source distribution in a folder and this machine's wheel from it.
+
+    Returns the path of the source distribution, and the wheel's files without binaries, by name.
+    """
+    with tempfile.TemporaryDirectory() as name:
+        command = [sys.executable, "-m", "build", "--outdir", name, str(ROOT)]
+        process = subprocess.run(command, capture_output=True, text=True, check=False)
+        if process.returncode != 0:
+            last = f"{process.stdout[-4000:]}{process.stderr[-4000:]}"
+            sys.exit(f"{' '.join(command)} failed:\n{last}")
+        (source,), (wheel,) = Path(name).glob("*.tar.gz"), Path(name).glob("*.whl")
+        return Path(shutil.copy(source, folder)), common_files(wheel)
+
+
+def common_files(wheel: Path) -> dict[str, bytes]:
+    """Returns the files of a wheel that every platform's wheel has, by name."""
+    with zipfile.ZipFile(wheel) as archive:
+        return {
+            member: archive.read(member)
+            for member in archive.namelist()
+            if not member.startswith((BINARIES, LIBRARIES)) and not member.endswith("/RECORD")
+        }
+
+
+def cross_compile() -> dict[tuple[str, str], bytes]:
+    """Compiles both FMUs' binaries and the loop for all targets, by library and target."""
+    libraries = [component_library(PLANT), component_library(CONTROLLER), loop_library()]
+    jobs = [(library, target) for target in TARGETS for library in libraries]
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        built = list(pool.map(lambda job: build_library(*job), jobs))
+    return {(job[0].name, job[1]): data for job, data in zip(jobs, built, strict=True)}
+
+
+def loop_library() -> Library:
+    """Returns the co-simulation loop as a library, as master/CMakeLists.txt builds it."""
+    headers = ROOT / "plant_fmu" / "include" / "hexapod"
+    sources = {f"src/{path.name}": path for path in (ROOT / "master" / "src").glob("*.[ch]")} | {
+        f"hexapod/{path.name}": path
+        for path in ((ROOT / "master" / "include" / "hexapod").glob("*.h"))
+    }
+    shared = {f"hexapod/{path.name}": path for path in headers.glob("*.h")}
+    return Library(LOOP, dict(sorted((shared | sources).items())), (fmi_headers(),), SHARED)
+
+
+def write_wheel(
+    base: Mapping[str, bytes],
+    platform: Platform,
+    binaries: Mapping[tuple[str, str], bytes],
+    folder: Path,
+) -> Path:
+    """Writes the wheel of a platform: files sorted by name, all with SOURCE_DATE_EPOCH.
+
+    base: the files that all wheels have, by name.
+    binaries: by library and target; the loop of the platform's own target is packed, and the
+        FMUs' binaries of all targets.
+    """
+    (description,) = (name for name in base if name.endswith(".dist-info/WHEEL"))
+    members = dict(base)
+    members[description] = wheel_description(base[description], platform.tag)
+    for (library, target), data in binaries.items():
+        suffix = TARGETS[target].suffix
+        if library != LOOP:
+            members[f"{BINARIES}{target}/{library}{suffix}"] = data
+        elif target == platform.target:
+            members[f"{LIBRARIES}{library}{suffix}"] = data
+    name = description.removesuffix(".dist-info/WHEEL")
+    path = folder / f"{name}-py3-none-{platform.tag}.whl"
+    folder.mkdir(parents=True, exist_ok=True)
+    path.unlink(missing_ok=True)
+    with WheelFile(path, "w") as wheel:
+        for member in sorted(members, key=lambda name: (".dist-info/" in name, name)):
+            wheel.writestr(member, members[member], zipfile.ZIP_DEFLATED)
+    return path
+
+
+def wheel_description(text: bytes, platform_tag: str) -> bytes:
+    """Returns a wheel's file WHEEL with the tags of a platform instead of this machine's."""
+    lines = [line for line in text.decode().splitlines() if line and not line.startswith("Tag:")]
+    lines += [f"Tag: py3-none-{tag}" for tag in platform_tag.split(".")]
+    return ("\n".join(lines) + "\n").encode()
+
+
+def write_hashes(folder: Path, files: Iterable[Path]) -> Path:
+    """Writes SHA256SUMS, which `sha256sum --check` reads, and returns its path."""
+    lines = [
+        f"{hashlib.sha256(path.read_bytes()).hexdigest()}  {path.name}\n" for path in sorted(files)
+    ]
+    path = folder / "SHA256SUMS"
+    path.write_text("".join(lines), encoding="utf-8")
+    return path
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1] if len(sys.argv) > 1 else ROOT / "dist"))
