@@ -1198,7 +1198,7 @@ const size_t hx_state_count = sizeof states / sizeof states[0];
 
 _Static_assert(sizeof states / sizeof states[0] == sizeof(hxCoordinates) / sizeof(double), "each state has its row");
 
-const char hx_default_guid[] = "{6e3ed4fc-463d-415f-b49e-ea7da59c3652}";
+const char hx_default_guid[] = "{3120ef99-2b88-4669-9485-96199c37e9e4}";
 
 _Static_assert(HX_CONTACT_EXACT_RESTITUTION == 1, "ContactLaw");
 _Static_assert(HX_CONTACT_FLORES == 2, "ContactLaw");

@@ -220,6 +220,7 @@ struct hxPlant {
   hxModel model;
   hxState state;
   const hxTerrain *terrain; /* of later resets */
+  double valley_limit;      /* m  its valleys are not narrower; 0: not searched yet */
   char message[HX_MESSAGE_SIZE];
   hxFootprintLog footprints; /* outside the state, which every call copies */
   hxModel model_before;      /* those before a call, which one that fails restores */
