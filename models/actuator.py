@@ -1,5 +1,6 @@
 """Computes the torques of a joint's servo (eq. 12): PD control with feed-forward, torque-speed
-line, gear friction; and the torque of the joint's stops (eq. 39).
+line, gear friction; and the torque of the joint's stops (eq. 39). Those of measured servos are in
+servos/motor.py.
 """
 
 from __future__ import annotations
@@ -7,8 +8,9 @@ from __future__ import annotations
 import numpy as np
 
 from hexapod_cosim.models.records import Array, Servo
+from hexapod_cosim.models.servos.motor import back_emf_damping, motor_torque, stall_torque
 
-GEAR_SPEED = 0.05  # rad/s  speed at which the gear's dry friction saturates
+GEAR_SPEED = 0.05  # rad/s  friction_speed of servos that give none; planned torques assume it
 
 
 def servo_torque(
@@ -16,19 +18,23 @@ def servo_torque(
 ) -> Array:
     """Returns the motor's torque on the child [N m], in the shape of the inputs.
 
-    The torque is kp (q_ref - q) + kd (qd_ref - qd) + tau_ff, clipped to the torque-speed line; in
-    torque mode kp = kd = 0.
+    The torque is kp (q_ref - q) + kd (qd_ref - qd) + tau_ff, clipped to the torque-speed line, or
+    that of a motor which this drives (`motor_torque`); in torque mode kp = kd = 0.
     """
     kp, kd = (0.0, 0.0) if servo.mode == "torque" else (servo.kp, servo.kd)
     wanted = kp * (angle_ref - angle) + kd * (speed_ref - speed) + torque_ref
+    if servo.drive == "motor":
+        return motor_torque(servo, speed, wanted)
     upper = servo.torque_max * np.clip(1.0 - speed / servo.speed_max, 0.0, 1.0)
     lower = -servo.torque_max * np.clip(1.0 + speed / servo.speed_max, 0.0, 1.0)
     return np.clip(wanted, lower, upper)
 
 
 def gear_friction(servo: Servo, speed: Array) -> Array:
-    """Returns the gear's torque on the child [N m], -tau_c tanh(qd / 0.05 rad/s), in every mode."""
-    return -servo.coulomb_friction * np.tanh(speed / GEAR_SPEED)
+    """Returns the gear's torque on the child [N m], -tau_c tanh(qd / w_f), in every mode, with w_f
+    `friction_speed`, 0.05 rad/s unless it is given.
+    """
+    return -servo.coulomb_friction * np.tanh(speed / servo.friction_speed)
 
 
 def servo_slopes(
@@ -41,6 +47,8 @@ def servo_slopes(
     """
     kp, kd = (0.0, 0.0) if servo.mode == "torque" else (servo.kp, servo.kd)
     wanted = kp * (angle_ref - angle) + kd * (speed_ref - speed) + torque_ref
+    if servo.drive == "motor":
+        return _motor_slopes(servo, speed, wanted, kp, kd)
     load = speed / servo.speed_max
     upper = servo.torque_max * np.clip(1.0 - load, 0.0, 1.0)
     lower = -servo.torque_max * np.clip(1.0 + load, 0.0, 1.0)
@@ -51,11 +59,23 @@ def servo_slopes(
     return np.where(free, kp, 0.0), np.where(free, kd, line)
 
 
+def _motor_slopes(
+    servo: Servo, speed: Array, wanted: Array, kp: float, kd: float
+) -> tuple[Array, Array]:
+    """Returns minus the derivatives of `motor_torque`: by angle [N m/rad], by speed [N m s/rad]."""
+    brake, torque_mode = back_emf_damping(servo), servo.mode == "torque"
+    driven = wanted + (brake * speed if torque_mode else 0.0)
+    free = np.abs(driven) < stall_torque(servo)
+    damping = np.where(free, kd - (brake if torque_mode else 0.0), 0.0) + brake
+    return np.where(free, kp, 0.0), damping
+
+
 def gear_drag(servo: Servo, speed: Array) -> Array:
     """Returns minus the derivative of `gear_friction` by speed [N m s/rad], in the shape of the
     input.
     """
-    return servo.coulomb_friction / GEAR_SPEED * (1.0 - np.tanh(speed / GEAR_SPEED) ** 2)
+    steep = 1.0 - np.tanh(speed / servo.friction_speed) ** 2
+    return servo.coulomb_friction / servo.friction_speed * steep
 
 
 def has_stops(servo: Servo) -> bool:

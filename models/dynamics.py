@@ -9,7 +9,7 @@ axes: 19 x 6 = 114. Each joint has 5 multipliers: 18 x 5 = 90.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -30,6 +30,7 @@ from hexapod_cosim.models.kinematics import (
     split,
 )
 from hexapod_cosim.models.records import Array, Robot
+from hexapod_cosim.models.servos.motor import friction_torque, has_measured_friction
 from hexapod_cosim.models.touch.forces import Contacts, contact_wrenches, contacts_of
 
 MULTIPLIERS = 5
@@ -190,18 +191,51 @@ def applied_forces(
     return g + contact_wrenches(robot, body, damping, bristle)
 
 
-def joint_torques(robot: Robot, body: Array, command: Command) -> tuple[Array, Array]:
+def joint_torques(
+    robot: Robot, body: Array, command: Command, external: Array | None = None
+) -> tuple[Array, Array]:
     """Returns motor torque (6, 3) and gear torque (6, 3) on the child [N m].
 
-    The motor torque is 0 in kinematic mode, where it is a multiplier.
+    The motor torque is 0 in kinematic mode, where it is a multiplier. external: (6, 3) as of
+    `external_torques`, for gears whose friction depends on the load; None: 0.
     """
+    servo = robot.servo
     angle, speed = joint_angles(robot, body), joint_speeds(robot, body)
-    gear = gear_friction(robot.servo, speed)
-    if robot.servo.mode == "kinematic":
+    if servo.mode == "kinematic":
+        gear = gear_friction(servo, speed)
         return np.zeros_like(gear), gear
-    return servo_torque(
-        robot.servo, angle, speed, command.angle_ref, command.speed_ref, command.torque_ref
-    ), gear
+    references = (command.angle_ref, command.speed_ref, command.torque_ref)
+    motor = servo_torque(servo, angle, speed, *references)
+    if not has_measured_friction(servo):
+        return motor, gear_friction(servo, speed)
+    load = np.zeros_like(motor) if external is None else external
+    return motor, friction_torque(servo, speed, motor, load)
+
+
+def external_torques(robot: Robot, body: Array, forces: Array, joints: Constraints) -> Array:
+    """Returns the torques (6, 3) of all but motors and gears on the joints [N m] (eq. 51).
+
+    forces: g (114,) of eq. 1 without the joints' torques. The torques are those that the joints
+    would have to resist if neither the torso nor any joint accelerated: gravity, ground,
+    centrifugal and Coriolis terms, and the joint's own stops.
+    """
+    alpha, beta = robot.baumgarte.alpha, robot.baumgarte.beta
+    c = joints.gamma - 2.0 * alpha * joints.dphi - beta**2 * joints.phi
+    torso = np.eye(6, 6 * BODIES)
+    held = np.vstack([torso, joints.D, joints.G])
+    none, turns = np.zeros((6 + len(c), LEGS * JOINTS)), np.eye(LEGS * JOINTS)
+    motion = np.linalg.solve(held, np.vstack([none, turns]))  # of the links with each joint
+    bias = np.linalg.solve(held, np.concatenate([np.zeros(6), c, np.zeros(LEGS * JOINTS)]))
+    inertia = mass_matrix(replace(robot, servo=replace(robot.servo, rotor_inertia=0.0)), body)
+    load = motion.T @ (forces - inertia @ bias)
+    return load.reshape(LEGS, JOINTS) + stop_torques(robot, body)
+
+
+def gear_loads(robot: Robot, body: Array, forces: Array, joints: Constraints) -> Array | None:
+    """Returns the `external_torques`, None for gears whose friction does not depend on them."""
+    if robot.servo.mode == "kinematic" or not has_measured_friction(robot.servo):
+        return None
+    return external_torques(robot, body, forces, joints)
 
 
 def joint_overruns(robot: Robot, body: Array) -> Array:
@@ -282,11 +316,9 @@ def accelerations(
     multiplier of a joint's additional row is minus the motor's torque.
     """
     joints = constraints(robot, body)
-    motor, gear = joint_torques(robot, body, command)
-    g = (
-        applied_forces(robot, body, command, damping, bristle, body_damping).ravel()
-        + joints.G.T @ (motor + gear + stop_torques(robot, body)).ravel()
-    )
+    forces = applied_forces(robot, body, command, damping, bristle, body_damping).ravel()
+    motor, gear = joint_torques(robot, body, command, gear_loads(robot, body, forces, joints))
+    g = forces + joints.G.T @ (motor + gear + stop_torques(robot, body)).ravel()
     D, c = constraint_equations(robot, body, command, joints)
     solution = solve_constrained(mass_matrix(robot, body, joints), g, D, c)
     dv, multiplier, drive = np.split(solution, [6 * BODIES, 6 * BODIES + len(joints.phi)])

@@ -11,7 +11,7 @@ import hashlib
 import json
 import math
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, dataclass, field, fields, replace
 from functools import cached_property
 from typing import Annotated, Any
 
@@ -39,6 +39,7 @@ FRICTION_LAWS = ("tanh", "none", "bristle", "lugre")
 STATIC_LAWS = ("tanh", "bristle", "lugre")  # friction laws with a static friction coefficient
 BRISTLE_LAWS = ("bristle", "lugre")  # friction laws with bristles, under which a foot can hold
 SERVO_MODES = ("position", "torque", "kinematic")
+SERVO_DRIVES = ("line", "motor")
 METHODS = ("rosw3", "ros2", "dp54", "bs32", "rk4")
 PROJECTIONS = ("none", "step")
 BODY_CONTACTS = ("off", "on")
@@ -165,7 +166,7 @@ class Friction:
 class Servo:
     """Servo of every joint (eq. 12) and the joints' stops (eq. 39)."""
 
-    mode: Annotated[str, Choice(SERVO_MODES)]
+    mode: Annotated[str, Choice(SERVO_MODES, default="position")]
     kp: Annotated[float, Number("N m/rad", at_least=0.0)]
     kd: Annotated[float, Number("N m s/rad", at_least=0.0)]
     torque_max: Annotated[float, Number("N m", above=0.0)]  # at stall
@@ -182,6 +183,48 @@ class Servo:
     stop_damping: Annotated[float, Number("N m s/rad", at_least=0.0, at_most=1e8, default=0.0)] = (
         0.0
     )
+    # line: PD torque within the torque-speed line; motor: PD voltage on a motor with back-EMF
+    drive: Annotated[str, Choice(SERVO_DRIVES, default="line")] = "line"
+    # of the drive motor (eq. 48); torque constant and resistance are seen at the joint
+    voltage: Annotated[float, Number("V", at_least=0.0, at_most=1e4, default=0.0)] = 0.0
+    duty_max: Annotated[float, Number("1", above=0.0, at_most=1.0, default=1.0)] = 1.0
+    torque_constant: Annotated[float, Number("N m/A", at_least=0.0, at_most=1e6, default=0.0)] = 0.0
+    resistance: Annotated[float, Number("ohm", at_least=0.0, at_most=1e6, default=0.0)] = 0.0
+    # friction of gear and motor besides coulomb_friction (eq. 49, 50); all 0: none
+    viscous_friction: Annotated[
+        float, Number("N m s/rad", at_least=0.0, at_most=1e6, default=0.0)
+    ] = 0.0
+    stribeck_friction: Annotated[float, Number("N m", at_least=0.0, at_most=1e6, default=0.0)] = 0.0
+    motor_load_friction: Annotated[float, Number("1", at_least=0.0, at_most=1.0, default=0.0)] = 0.0
+    external_load_friction: Annotated[
+        float, Number("1", at_least=0.0, at_most=1.0, default=0.0)
+    ] = 0.0
+    stribeck_motor_load_friction: Annotated[
+        float, Number("1", at_least=0.0, at_most=1.0, default=0.0)
+    ] = 0.0
+    stribeck_external_load_friction: Annotated[
+        float, Number("1", at_least=0.0, at_most=1.0, default=0.0)
+    ] = 0.0
+    quadratic_motor_friction: Annotated[
+        float, Number("1/(N m)", at_least=0.0, at_most=1e6, default=0.0)
+    ] = 0.0
+    quadratic_external_friction: Annotated[
+        float, Number("1/(N m)", at_least=0.0, at_most=1e6, default=0.0)
+    ] = 0.0
+    stribeck_speed: Annotated[float, Number("rad/s", at_least=1e-6, at_most=1e6, default=1.0)] = 1.0
+    stribeck_exponent: Annotated[float, Number("1", above=0.0, at_most=16.0, default=1.0)] = 1.0
+    # speed at which the dry friction saturates: it is regularised by tanh(speed / friction_speed)
+    friction_speed: Annotated[float, Number("rad/s", at_least=1e-5, at_most=1e3, default=0.05)] = (
+        0.05
+    )
+
+
+def _unused_fields(servo: Servo) -> list[str]:
+    """Returns the names of the fields from `drive` on if all have their defaults, else none."""
+    names = [item.name for item in fields(Servo)]
+    later = fields(Servo)[names.index("drive") :]
+    usual = all(getattr(servo, item.name) == item.default for item in later)
+    return [item.name for item in later] if usual else []
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -326,14 +369,16 @@ class Robot:
 
     @cached_property
     def hash(self) -> str:
-        """SHA-256 in hexadecimal of all fields but `source` and a body without contact; equal
-        robots have equal hashes.
+        """SHA-256 in hexadecimal of all fields but `source`, a body without contact and the
+        parameters of measured servos where all have their defaults; equal robots have equal hashes.
         """
         surface = self.terrain.surface if self.terrain.kind == "grid" else None
         content = _plain(asdict(replace(self, terrain=replace(self.terrain, surface=None))))
         del content["source"], content["terrain"]["surface"]
         if self.body.contact == "off":
             del content["body"]
+        for name in _unused_fields(self.servo):
+            del content["servo"][name]
         if surface is not None:
             content["terrain"]["surface"] = surface.digest
         return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()

@@ -33,6 +33,7 @@ from hexapod_cosim.models.records import (
     METHODS,
     PROJECTIONS,
     SELF_CONTACTS,
+    SERVO_DRIVES,
     SERVO_MODES,
     SOIL_LAWS,
     TERRAINS,
@@ -63,6 +64,7 @@ from hexapod_cosim.models.schema import (
     refuse_unknown_keys,
     require,
 )
+from hexapod_cosim.models.servos.presets import servo_table
 from hexapod_cosim.models.soil.presets import soil_table
 from hexapod_cosim.models.urdf.table import SECTIONS, element_named, side_table, urdf_table
 from hexapod_cosim.models.validation import check_robot
@@ -77,6 +79,7 @@ __all__ = [
     "METHODS",
     "PROJECTIONS",
     "SELF_CONTACTS",
+    "SERVO_DRIVES",
     "SERVO_MODES",
     "SOIL_LAWS",
     "TERRAINS",
@@ -254,6 +257,8 @@ def _read_section(table: Mapping[str, Any], name: str, where: str) -> Any:
         section = soil_table(table.get(name, {}), where)
     else:
         section = _section(table, name, where)
+    if record is Servo:
+        section = servo_table(section, where)
     given = read_given(record, section, where)
     if record is Torso and {"mass", "size"} <= given.keys():
         given.setdefault("inertia", box_inertia(given["mass"], given["size"]))

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from hexapod_cosim.models.actuator import gear_drag, servo_slopes, stop_slopes
+from hexapod_cosim.models.actuator import gear_drag, servo_slopes, servo_torque, stop_slopes
 from hexapod_cosim.models.contact import (
     FootContact,
     contact_jacobian,
@@ -27,13 +27,16 @@ from hexapod_cosim.models.dynamics import (
     applied_forces,
     constraint_equations,
     constraints,
+    external_torques,
+    gear_loads,
     joint_overruns,
     joint_torques,
     mass_matrix,
     solve_constrained,
     stop_torques,
 )
-from hexapod_cosim.models.friction import bristle_slopes, friction_drag, turning_slopes
+from hexapod_cosim.models.friction import bristle_slopes, turning_slopes
+from hexapod_cosim.models.friction import friction_drag as foot_drag
 from hexapod_cosim.models.kinematics import (
     BODIES,
     JOINTS,
@@ -42,6 +45,7 @@ from hexapod_cosim.models.kinematics import (
     joint_speeds,
 )
 from hexapod_cosim.models.records import Array, Robot
+from hexapod_cosim.models.servos.motor import friction_drag, has_measured_friction
 from hexapod_cosim.models.soil.law import shear_limit, soil_normal_force, soil_normal_slopes
 from hexapod_cosim.models.touch.forces import (
     Contacts,
@@ -116,7 +120,13 @@ def keep_slopes(
         else:
             deflection = bristle[spot.leg] if spot.is_sole else np.zeros(3)
             found[k] = rigid_slopes(robot, spot, held, contact, deflection, turn, ahead)
-    return Slopes(*motor, gear_drag(robot.servo, speed), *stops, found)
+    drag = gear_drag(robot.servo, speed)
+    if has_measured_friction(robot.servo) and robot.servo.mode != "kinematic":
+        forces = applied_forces(robot, body, command, contacts, bristle).ravel()
+        load = external_torques(robot, body, forces, constraints(robot, body))
+        torque = servo_torque(robot.servo, angle, speed, *references)
+        drag = friction_drag(robot.servo, speed, torque, load)
+    return Slopes(*motor, drag, *stops, found)
 
 
 def expected_depth(contact: FootContact, ahead: float) -> float:
@@ -141,7 +151,7 @@ def rigid_slopes(
     f_n, (stiffness, viscosity) = normal_force(*at), normal_slopes(*at)
     slip, friction = slip_velocity(contact), held.friction
     if not spot.is_sole:
-        along = f_n * friction_drag(friction, float(np.linalg.norm(slip)))
+        along = f_n * foot_drag(friction, float(np.linalg.norm(slip)))
         slopes = ContactSlopes(stiffness, viscosity, along)
     else:
         b = bristle_slopes(friction, slip, bristle)
@@ -244,8 +254,8 @@ def solve_stage(
     G_x, G_v = slope_matrices(robot, body, contacts, slopes, G)
 
     # W = M - z G_v - z^2 G_x;  right = g + G_v s_v + G_x (s_x + z (v + s_v))
-    motor, gear = joint_torques(robot, body, command)
     g = applied_forces(robot, body, command, contacts, bristle).ravel()
+    motor, gear = joint_torques(robot, body, command, gear_loads(robot, body, g, joints))
     g += G.T @ (motor + gear + stop_torques(robot, body)).ravel()
     W = mass_matrix(robot, body, joints) - z * G_v - z * z * G_x
     right = g + G_v @ s_v + G_x @ (s_x + z * (v + s_v))

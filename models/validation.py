@@ -24,8 +24,10 @@ from hexapod_cosim.models.records import (
     Leg,
     Link,
     Robot,
+    Servo,
 )
 from hexapod_cosim.models.schema import Vector, check_record
+from hexapod_cosim.models.servos.motor import has_measured_friction
 
 # a thin rod satisfies the triangle inequality with equality; rounding to four digits may violate it
 INERTIA_ROUNDING = 1e-3
@@ -229,6 +231,7 @@ def _check_laws(robot: Robot, at: str) -> None:
             where=at + "solver.step",
         )
     _check_soil(robot, at)
+    _check_motor(servo, at)
     if servo.torque_continuous > servo.torque_max:
         expected = f"at most torque_max = {servo.torque_max:g} N m"
         raise RobotError(
@@ -241,6 +244,30 @@ def _check_laws(robot: Robot, at: str) -> None:
     _check_static_friction(friction, at + "friction.mu_static")
     _check_terrain(robot, at + "terrain")
     _check_body(robot.body, at + "body")
+
+
+def _check_motor(servo: Servo, at: str) -> None:
+    """Checks that a motor has its constants, and that kinematic drives have neither a motor nor
+    measured friction.
+    """
+    motor = servo.drive == "motor"
+    for key in ("voltage", "torque_constant", "resistance"):
+        if motor and not getattr(servo, key) > 0.0:
+            raise RobotError(
+                "a motor without its constants",
+                got=getattr(servo, key),
+                expected="a number > 0 with the drive motor",
+                fix=f"give servo.{key}, or a servo of `hexapod list servos` as servo.model",
+                where=at + f"servo.{key}",
+            )
+    if servo.mode == "kinematic" and (motor or has_measured_friction(servo)):
+        raise RobotError(
+            "a kinematic drive has no motor torque",
+            got=servo.mode,
+            expected="position or torque, with a motor or measured friction",
+            fix="set servo.mode, or remove servo.model",
+            where=at + "servo.mode",
+        )
 
 
 def _check_terrain(robot: Robot, where: str) -> None:

@@ -75,7 +75,7 @@ def arrows() -> Arrows:
 
 def python_files() -> Iterator[Path]:
     """Returns the modules of the Python package."""
-    for folder in ("models", "controller", "cosim"):
+    for folder in ("models", "controller", "cosim", "gym"):
         yield from sorted((ROOT / folder).rglob("*.py"))
 
 

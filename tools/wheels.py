@@ -37,7 +37,6 @@ from hexapod_cosim.cosim.export.platforms import component_library
 
 ROOT = Path(__file__).parents[1]
 BINARIES, LIBRARIES = "hexapod_cosim/plant/binaries/", "hexapod_cosim/plant/lib/"
-SHARED = ("-DHX_SHARED",)
 LARGEST = 5_000_000  # bytes of a wheel
 
 
@@ -118,14 +117,14 @@ def cross_compile() -> dict[tuple[str, str], bytes]:
 
 
 def loop_library() -> Library:
-    """Returns the co-simulation loop as a library, as master/CMakeLists.txt builds it."""
-    headers = ROOT / "plant_fmu" / "include" / "hexapod"
-    sources = {f"src/{path.name}": path for path in (ROOT / "master" / "src").glob("*.[ch]")} | {
-        f"hexapod/{path.name}": path
-        for path in ((ROOT / "master" / "include" / "hexapod").glob("*.h"))
-    }
-    shared = {f"hexapod/{path.name}": path for path in headers.glob("*.h")}
-    return Library(LOOP, dict(sorted((shared | sources).items())), (fmi_headers(),), SHARED)
+    """Returns the co-simulation loops as a library, as master/CMakeLists.txt builds it."""
+    plant, own = ROOT / "plant_fmu", ROOT / "master"
+    files = {f"hexapod/{path.name}": path for path in (plant / "include/hexapod").glob("*.h")}
+    files |= {f"hexapod/{path.name}": path for path in (own / "include/hexapod").glob("*.h")}
+    files |= {f"src/{path.name}": path for path in (own / "src").glob("*.[ch]")}
+    files["src/message.c"] = plant / "src" / "message.c"
+    flags = ("-DHX_SHARED", "-pthread")
+    return Library(LOOP, dict(sorted(files.items())), (fmi_headers(),), flags)
 
 
 def write_wheel(

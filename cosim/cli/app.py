@@ -13,14 +13,15 @@ from hexapod_cosim.cosim.cli import (
     examples_command,
     export_command,
     fmu_commands,
+    identify_command,
     listing,
     replay_command,
     run_commands,
-    study_command,
     terrain_command,
 )
 from hexapod_cosim.cosim.cli.failures import EPILOG
 from hexapod_cosim.cosim.cli.live import live_command
+from hexapod_cosim.cosim.cli.study import study_command
 from hexapod_cosim.cosim.common.plant_files import package_version
 
 app = typer.Typer(
@@ -43,6 +44,7 @@ app.command("validate")(fmu_commands.validate)
 app.command("terrain")(terrain_command.terrain)
 app.command("live")(live_command.live)
 app.command("replay")(replay_command.replay)
+app.command("identify")(identify_command.identify)
 app.command("list")(listing.list_what)
 
 

@@ -21,6 +21,8 @@ from hexapod_cosim.models.ground.parameters import DIFFICULTY
 from hexapod_cosim.models.ground.table import PLACED
 from hexapod_cosim.models.records import PLANES
 from hexapod_cosim.models.schema import Number, specs
+from hexapod_cosim.models.servos.motor import no_load_speed, stall_torque
+from hexapod_cosim.models.servos.presets import list_servos, measured_servo
 from hexapod_cosim.models.soil.presets import list_soils, soil_preset
 
 Rows = list[dict[str, Any]]
@@ -100,6 +102,25 @@ def soils() -> Rows:
     ]
 
 
+def servos() -> Rows:
+    """Returns the measured servos: friction model, voltage [V], stall torque [N m], no-load speed
+    [rad/s], and the source of their numbers.
+    """
+    found = {name: measured_servo(name) for name in list_servos()}
+    return [
+        {
+            "name": name,
+            "friction": one.about.friction_model,
+            "voltage": one.servo.voltage,
+            "stall": stall_torque(one.servo),
+            "no load": no_load_speed(one.servo),
+            "about": one.about.title,
+            "source": one.about.source,
+        }
+        for name, one in found.items()
+    ]
+
+
 def laws() -> Rows:
     """Returns the laws of the normal and the tangential contact force, and of soil."""
     kinds = {"ContactLaw": "contact.law", "FrictionLaw": "friction.law", "SoilLaw": "soil.law"}
@@ -120,6 +141,7 @@ LISTS: dict[str, Callable[[], Rows]] = {
     "gaits": gaits,
     "terrains": terrains,
     "soils": soils,
+    "servos": servos,
     "laws": laws,
 }
 
@@ -135,7 +157,7 @@ What = Annotated[
 
 
 def list_what(what: What, json: Json = False) -> None:
-    """List robots, scenarios, studies, gaits, terrains, soils or laws."""
+    """List robots, scenarios, studies, gaits, terrains, soils, servos or laws."""
     if what not in LISTS:
         raise unknown_name("list", what, LISTS)
     rows = LISTS[what]()

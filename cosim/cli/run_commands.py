@@ -181,7 +181,7 @@ def _report_again(folder: Path, facts: Mapping[str, Any]) -> list[Path]:
     """Writes the report of a folder again; `facts` are those of its run.json."""
     if facts.get("kind") == STUDY:
         # imported only here because it is slow
-        from hexapod_cosim.cosim.cli.studying import report_on, warn_of  # noqa: PLC0415
+        from hexapod_cosim.cosim.cli.study.studying import report_on, warn_of  # noqa: PLC0415
 
         found, files = report_on(folder)
         warn_of(found)

@@ -5,15 +5,17 @@ from __future__ import annotations
 import base64
 import io
 from collections.abc import Mapping
+from typing import TYPE_CHECKING
 
-import matplotlib
 import numpy as np
-from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from hexapod_cosim.controller.figure_style import PALETTE, SETTINGS, UNDATED, WIDTH
 from hexapod_cosim.cosim.identify.log import CHANNELS, Channel, Log
 from hexapod_cosim.models import LEG_NAMES
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 Array = NDArray[np.float64]
 Simulated = Mapping[str, Mapping[str, Array]]  # label of a simulation: columns by name (rows,)
@@ -22,8 +24,15 @@ ROW = 1.05  # in    height of a row of panels
 COLOURS = (PALETTE[3], PALETTE[0], PALETTE[2])  # of simulations
 
 
-def channel_figures(log: Log, simulations: Simulated) -> dict[str, str]:
-    """Returns a figure of each channel with simulated columns, by the channel's title, as SVG."""
+def channel_figures(
+    log: Log, simulations: Simulated, *, split: float | None = None
+) -> dict[str, str]:
+    """Returns a figure of each channel with simulated columns, by the channel's title, as SVG.
+
+    split: time [s] of a vertical line.
+    """
+    from matplotlib import rc_context  # noqa: PLC0415  slow to import
+
     found = {}
     for channel in CHANNELS:
         names = [
@@ -32,8 +41,8 @@ def channel_figures(log: Log, simulations: Simulated) -> dict[str, str]:
             if any(name in columns for columns in simulations.values())
         ]
         if names:
-            with matplotlib.rc_context(SETTINGS):
-                found[channel.title] = _svg(_draw(log, channel, names, simulations))
+            with rc_context(SETTINGS):
+                found[channel.title] = _svg(_draw(log, channel, names, simulations, split))
     return found
 
 
@@ -42,10 +51,14 @@ def embedded(svg: str) -> str:
     return "data:image/svg+xml;base64," + base64.b64encode(svg.encode()).decode("ascii")
 
 
-def _draw(log: Log, channel: Channel, names: list[str], simulations: Simulated) -> Figure:
+def _draw(
+    log: Log, channel: Channel, names: list[str], simulations: Simulated, split: float | None
+) -> Figure:
     legs = names[0].split(".")[0] in LEG_NAMES
     across = len(LEG_NAMES) if legs else 3
     rows = -(-len(channel.names if legs else names) // across)
+    from matplotlib.figure import Figure  # noqa: PLC0415  slow to import
+
     figure = Figure(figsize=(1.5 * WIDTH, ROW * max(rows, 1) + 0.5))
     axes = figure.subplots(rows, across, squeeze=False, sharex=True)
     thin = slice(None, None, max(len(log.time) // MOST_POINTS, 1))
@@ -61,6 +74,8 @@ def _draw(log: Log, channel: Channel, names: list[str], simulations: Simulated) 
             log.time[thin], log.recording.column(name)[thin], color="0.55", label="measured",
             linewidth=1.4,
         )  # fmt: skip
+        if split is not None:
+            axis.axvline(split, color="0.75", linewidth=0.7)
         for colour, (label, columns) in zip(COLOURS, simulations.items(), strict=False):
             axis.plot(log.time[thin], columns[name][thin], color=colour, label=label, linewidth=0.7)
     figure.supylabel(f"[{channel.unit}]", fontsize=7.0)

@@ -15,6 +15,8 @@ from hexapod_cosim.cosim.master.fmu import Fmu
 from hexapod_cosim.models import FmuError
 
 Array = NDArray[np.float64]
+Event = tuple[float, bool, int]  # time [s], whether it is a command, row of the log
+SAME_TIME = 1e-9  # s    events closer than this are one
 
 
 class LogPlant:
@@ -35,7 +37,13 @@ class LogPlant:
         return [name for name in names if name in self._outputs]
 
     def simulate(
-        self, log: Log, names: Sequence[str], parameters: Mapping[str, float], offset: Array | None
+        self,
+        log: Log,
+        names: Sequence[str],
+        parameters: Mapping[str, float],
+        *,
+        offset: Array | None = None,
+        delay: float = 0.0,
     ) -> Array:
         """Simulates a log and returns outputs at the times of its rows (rows, names).
 
@@ -44,6 +52,7 @@ class LogPlant:
             names: outputs of the FMU.
             parameters: initial state and further parameters.
             offset: added to the commanded angles (18,) [rad]; None: nothing.
+            delay: how much older than its row a reading is [s].
 
         Raises FmuError for a parameter that is refused, LogError for a refused command or step.
         """
@@ -60,7 +69,7 @@ class LogPlant:
         self.fmu.initialise(float(time[0]), float(time[-1]))
         found = np.empty((len(time), len(outputs.names)))
         try:
-            self._run(time, table, inputs, outputs, found)
+            self._run(_events(time, delay), table, inputs, outputs, found)
         except FmuError as error:
             raise LogError(
                 "the plant cannot follow the log",
@@ -71,16 +80,20 @@ class LogPlant:
             ) from error
         return found
 
-    def _run(self, time: Array, table: Array, inputs: Any, outputs: Any, found: Array) -> None:
-        last = len(time) - 1
-        times, steps = time.tolist(), np.diff(time).tolist()
-        for k in range(len(times)):
-            outputs.get()  # before the new commands, as the master reads them
-            found[k] = outputs.values
-            if k < last:
-                inputs.values[:] = table[k]
+    def _run(
+        self, events: Sequence[Event], table: Array, inputs: Any, outputs: Any, found: Array
+    ) -> None:
+        now = events[0][0]
+        for time, is_command, row in events:
+            if time - now > SAME_TIME:
+                self.fmu.step(now, time - now)
+                now = time
+            if is_command:
+                inputs.values[:] = table[row]
                 inputs.set()
-                self.fmu.step(times[k], steps[k])
+            else:
+                outputs.get()
+                found[row] = outputs.values
 
     def __enter__(self) -> Self:
         return self
@@ -92,3 +105,13 @@ class LogPlant:
         trace: TracebackType | None,
     ) -> None:
         self.fmu.close()
+
+
+def _events(time: Array, delay: float) -> list[Event]:
+    """Returns all readings and commands in order of time; a reading comes before the command of
+    the same time, as the master reads. Readings from before the first row are of the first row.
+    """
+    readings = np.maximum(time - delay, time[0]).tolist()
+    events = [(t, False, k) for k, t in enumerate(readings)]
+    events += [(t, True, k) for k, t in enumerate(time[:-1].tolist())]
+    return sorted(events)

@@ -67,7 +67,7 @@ def replay(
                     fix="name the columns as the FMU's outputs: LF.coxa.angle [rad], ...",
                     where=log.where,
                 )
-            found = plant.simulate(log, names, initial_state(log, robot), None)
+            found = plant.simulate(log, names, initial_state(log, robot))
     inputs = log.commands
     data = np.column_stack([log.time, *inputs.values(), found])
     simulated = Recording(("time", *inputs, *names), data)

@@ -166,6 +166,11 @@ class Fmu:
         return hashlib.sha256(self.path.read_bytes()).hexdigest()
 
     @property
+    def resources(self) -> str:
+        """URI of the unpacked resources, as an instantiation takes it."""
+        return (self._directory.path / "resources").resolve().as_uri()
+
+    @property
     def component(self) -> int:
         """Pointer to the instance (fmi2Component) as an integer."""
         return int(self._slave.component)

@@ -56,7 +56,7 @@ from hexapod_cosim.models.ground.table import (
     read_keys,
     terrain_specs,
 )
-from hexapod_cosim.models.records import STATIC_LAWS, Soil, Terrain
+from hexapod_cosim.models.records import STATIC_LAWS, Servo, Soil, Terrain
 from hexapod_cosim.models.schema import (
     Number,
     expect_table,
@@ -66,6 +66,7 @@ from hexapod_cosim.models.schema import (
     require,
     specs,
 )
+from hexapod_cosim.models.servos.presets import GAIN, changed_servo, servo_table
 from hexapod_cosim.models.soil.presets import soil_table
 from hexapod_cosim.models.terrain import ground_normal
 from hexapod_cosim.models.validation import check_settings
@@ -297,9 +298,20 @@ def _read_setting(name: str, table: Any, where: str) -> dict[str, Any]:
     record = SETTINGS[name]
     if record is Soil:
         table = soil_table(table, where)
+    if record is Servo:
+        table = servo_table(_servo_in_si(table, where), where)
     keys = [key for key in specs(record) if key not in UNUSED.get(name, ())]
     refuse_unknown_keys(expect_table(table, where), keys, where)
     return _read(record, table, where)
+
+
+def _servo_in_si(table: Any, where: str) -> dict[str, Any]:
+    """Returns the table of a servo with its quantities converted to SI."""
+    keys = {**specs(Servo), GAIN: Number("1/rad")}
+    return {
+        key: to_si(value, keys[key], f"{where}.{key}") if key in keys else value
+        for key, value in expect_table(table, where).items()
+    }
 
 
 def read_terrain_keys(table: Any, where: str) -> dict[str, Any]:
@@ -448,8 +460,10 @@ def scenario_robot(scenario: Scenario) -> Robot:
     changes = {
         name: replace(getattr(own, name), **dict(values))
         for name, values in scenario.settings.items()
-        if name not in ("gait", "terrain")
+        if name not in ("gait", "terrain", "servo")
     }
+    with _errors_of(scenario.where):
+        changes["servo"] = changed_servo(own.servo, scenario.settings.get("servo", {}), "servo")
     changes["terrain"] = scenario_terrain(scenario, own)
     friction = changes.get("friction", own.friction)
     if "mu_static" not in scenario.settings.get("friction", {}) and (

@@ -45,6 +45,7 @@ from hexapod_cosim.models.schema import (
     refuse_unknown_keys,
     specs,
 )
+from hexapod_cosim.models.servos.presets import servo_table
 from hexapod_cosim.models.soil.presets import soil_table
 from hexapod_cosim.models.urdf.assumed import (
     assume_gait,
@@ -328,6 +329,8 @@ def _spread(side: Mapping[str, Any], where: str) -> Table:
     """
     _check_side(side, where)
     table = deepcopy(dict(side))
+    if "servo" in table:  # a measured servo's numbers override the URDF's
+        table["servo"] = dict(servo_table(table["servo"], f"{where}: servo"))
     links, legs = table.pop("links", {}), table.get("legs", {})
     table["legs"] = {name: merged_tables(links, legs.get(name, {})) for name in LEG_NAMES}
     return table
@@ -341,7 +344,8 @@ def _check_side(side: Mapping[str, Any], where: str) -> None:
         if name == "terrain":
             read_keys(expect_table(value, at), at)
             continue
-        section = soil_table(value, at) if record is Soil else expect_table(value, at)
+        readers = {Soil: soil_table, Servo: servo_table}
+        section = readers.get(record, expect_table)(value, at)
         read_given(record, section, at)
     legs = expect_table(side.get("legs", {}), f"{where}: legs")
     refuse_unknown_keys(legs, list(LEG_NAMES), f"{where}: legs")

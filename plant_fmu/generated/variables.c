@@ -566,6 +566,42 @@ static const hxVariable outputs[] = {
     {"RF.clearance", "m", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.body.clearance[3]), HX_REAL, 0},
     {"RM.clearance", "m", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.body.clearance[4]), HX_REAL, 0},
     {"RR.clearance", "m", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.body.clearance[5]), HX_REAL, 0},
+    {"LF.coxa.current", "A", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.current[0][0]), HX_REAL, 18},
+    {"LF.femur.current", "A", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.current[0][1]), HX_REAL, 0},
+    {"LF.tibia.current", "A", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.current[0][2]), HX_REAL, 0},
+    {"LM.coxa.current", "A", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.current[1][0]), HX_REAL, 0},
+    {"LM.femur.current", "A", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.current[1][1]), HX_REAL, 0},
+    {"LM.tibia.current", "A", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.current[1][2]), HX_REAL, 0},
+    {"LR.coxa.current", "A", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.current[2][0]), HX_REAL, 0},
+    {"LR.femur.current", "A", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.current[2][1]), HX_REAL, 0},
+    {"LR.tibia.current", "A", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.current[2][2]), HX_REAL, 0},
+    {"RF.coxa.current", "A", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.current[3][0]), HX_REAL, 0},
+    {"RF.femur.current", "A", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.current[3][1]), HX_REAL, 0},
+    {"RF.tibia.current", "A", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.current[3][2]), HX_REAL, 0},
+    {"RM.coxa.current", "A", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.current[4][0]), HX_REAL, 0},
+    {"RM.femur.current", "A", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.current[4][1]), HX_REAL, 0},
+    {"RM.tibia.current", "A", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.current[4][2]), HX_REAL, 0},
+    {"RR.coxa.current", "A", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.current[5][0]), HX_REAL, 0},
+    {"RR.femur.current", "A", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.current[5][1]), HX_REAL, 0},
+    {"RR.tibia.current", "A", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.current[5][2]), HX_REAL, 0},
+    {"LF.coxa.electrical_power", "W", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.electrical_power[0][0]), HX_REAL, 18},
+    {"LF.femur.electrical_power", "W", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.electrical_power[0][1]), HX_REAL, 0},
+    {"LF.tibia.electrical_power", "W", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.electrical_power[0][2]), HX_REAL, 0},
+    {"LM.coxa.electrical_power", "W", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.electrical_power[1][0]), HX_REAL, 0},
+    {"LM.femur.electrical_power", "W", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.electrical_power[1][1]), HX_REAL, 0},
+    {"LM.tibia.electrical_power", "W", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.electrical_power[1][2]), HX_REAL, 0},
+    {"LR.coxa.electrical_power", "W", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.electrical_power[2][0]), HX_REAL, 0},
+    {"LR.femur.electrical_power", "W", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.electrical_power[2][1]), HX_REAL, 0},
+    {"LR.tibia.electrical_power", "W", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.electrical_power[2][2]), HX_REAL, 0},
+    {"RF.coxa.electrical_power", "W", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.electrical_power[3][0]), HX_REAL, 0},
+    {"RF.femur.electrical_power", "W", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.electrical_power[3][1]), HX_REAL, 0},
+    {"RF.tibia.electrical_power", "W", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.electrical_power[3][2]), HX_REAL, 0},
+    {"RM.coxa.electrical_power", "W", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.electrical_power[4][0]), HX_REAL, 0},
+    {"RM.femur.electrical_power", "W", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.electrical_power[4][1]), HX_REAL, 0},
+    {"RM.tibia.electrical_power", "W", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.electrical_power[4][2]), HX_REAL, 0},
+    {"RR.coxa.electrical_power", "W", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.electrical_power[5][0]), HX_REAL, 0},
+    {"RR.femur.electrical_power", "W", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.electrical_power[5][1]), HX_REAL, 0},
+    {"RR.tibia.electrical_power", "W", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.electrical_power[5][2]), HX_REAL, 0},
 };
 
 static const hxVariable parameters[] = {
@@ -1044,6 +1080,22 @@ static const hxVariable parameters[] = {
     {"soil.shear_displacement", "m", 1e-05, 1.0, offsetof(struct hxVariables, definition.soil.shear_displacement), HX_REAL, 1},
     {"soil.stiffness", "Pa/m", 1.0, 1000000000000000.0, offsetof(struct hxVariables, definition.soil.stiffness), HX_REAL, 1},
     {"soil.damping", "Pa.s/m", 0.0, 1000000000.0, offsetof(struct hxVariables, definition.soil.damping), HX_REAL, 1},
+    {"servo.drive", "", 1, 2, offsetof(struct hxVariables, definition.servo.drive), HX_INTEGER, 1},
+    {"servo.voltage", "V", 0.0, 10000.0, offsetof(struct hxVariables, definition.servo.voltage), HX_REAL, 1},
+    {"servo.duty_max", "1", 1e-06, 1.0, offsetof(struct hxVariables, definition.servo.duty_max), HX_REAL, 1},
+    {"servo.torque_constant", "N.m/A", 0.0, 1000000.0, offsetof(struct hxVariables, definition.servo.torque_constant), HX_REAL, 1},
+    {"servo.resistance", "ohm", 0.0, 1000000.0, offsetof(struct hxVariables, definition.servo.resistance), HX_REAL, 1},
+    {"servo.viscous_friction", "N.m.s/rad", 0.0, 1000000.0, offsetof(struct hxVariables, definition.servo.viscous_friction), HX_REAL, 1},
+    {"servo.stribeck_friction", "N.m", 0.0, 1000000.0, offsetof(struct hxVariables, definition.servo.stribeck_friction), HX_REAL, 1},
+    {"servo.motor_load_friction", "1", 0.0, 1.0, offsetof(struct hxVariables, definition.servo.motor_load_friction), HX_REAL, 1},
+    {"servo.external_load_friction", "1", 0.0, 1.0, offsetof(struct hxVariables, definition.servo.external_load_friction), HX_REAL, 1},
+    {"servo.stribeck_motor_load_friction", "1", 0.0, 1.0, offsetof(struct hxVariables, definition.servo.stribeck_motor_load_friction), HX_REAL, 1},
+    {"servo.stribeck_external_load_friction", "1", 0.0, 1.0, offsetof(struct hxVariables, definition.servo.stribeck_external_load_friction), HX_REAL, 1},
+    {"servo.quadratic_motor_friction", "1/(N.m)", 0.0, 1000000.0, offsetof(struct hxVariables, definition.servo.quadratic_motor_friction), HX_REAL, 1},
+    {"servo.quadratic_external_friction", "1/(N.m)", 0.0, 1000000.0, offsetof(struct hxVariables, definition.servo.quadratic_external_friction), HX_REAL, 1},
+    {"servo.stribeck_speed", "rad/s", 1e-06, 1000000.0, offsetof(struct hxVariables, definition.servo.stribeck_speed), HX_REAL, 1},
+    {"servo.stribeck_exponent", "1", 1e-06, 16.0, offsetof(struct hxVariables, definition.servo.stribeck_exponent), HX_REAL, 1},
+    {"servo.friction_speed", "rad/s", 1e-05, 1000.0, offsetof(struct hxVariables, definition.servo.friction_speed), HX_REAL, 1},
 };
 
 static const hxVariable locals[] = {
@@ -1198,7 +1250,7 @@ const size_t hx_state_count = sizeof states / sizeof states[0];
 
 _Static_assert(sizeof states / sizeof states[0] == sizeof(hxCoordinates) / sizeof(double), "each state has its row");
 
-const char hx_default_guid[] = "{3120ef99-2b88-4669-9485-96199c37e9e4}";
+const char hx_default_guid[] = "{1e998128-9c87-46da-8d13-03535635f42d}";
 
 _Static_assert(HX_CONTACT_EXACT_RESTITUTION == 1, "ContactLaw");
 _Static_assert(HX_CONTACT_FLORES == 2, "ContactLaw");
@@ -1213,6 +1265,8 @@ _Static_assert(HX_FRICTION_LUGRE == 4, "FrictionLaw");
 _Static_assert(HX_SERVO_POSITION == 1, "ServoMode");
 _Static_assert(HX_SERVO_TORQUE == 2, "ServoMode");
 _Static_assert(HX_SERVO_KINEMATIC == 3, "ServoMode");
+_Static_assert(HX_DRIVE_LINE == 1, "ServoDrive");
+_Static_assert(HX_DRIVE_MOTOR == 2, "ServoDrive");
 _Static_assert(HX_METHOD_ROSW3 == 1, "Method");
 _Static_assert(HX_METHOD_ROS2 == 2, "Method");
 _Static_assert(HX_METHOD_DP54 == 3, "Method");

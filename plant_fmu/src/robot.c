@@ -214,6 +214,55 @@ static void compile_soil(hxModel *model, const hxDefinition *d) {
     model->bristle_length = on_grid;
 }
 
+/* Computes the constants of the servos' motors, and of the joints' stops. */
+static void compile_servo(hxModel *model, const hxDefinition *d) {
+  const int follows = d->servo.mode == HX_SERVO_POSITION, motor = d->servo.drive == HX_DRIVE_MOTOR;
+  model->servo_mode = d->servo.mode, model->servo_drive = d->servo.drive;
+  model->kp = follows ? d->servo.kp : 0.0, model->kd = follows ? d->servo.kd : 0.0;
+  model->torque_max = d->servo.torque_max, model->speed_max = d->servo.speed_max;
+  model->free_damping = model->kd, model->limit_damping = model->torque_max / model->speed_max;
+  model->torque_constant = d->servo.torque_constant, model->resistance = d->servo.resistance;
+  model->rotor_inertia = d->servo.rotor_inertia;
+  if (motor) {
+    const double per_volt = d->servo.torque_constant / d->servo.resistance;
+    model->stall_torque = per_volt * d->servo.duty_max * d->servo.voltage;
+    model->back_emf = d->servo.torque_constant * per_volt;
+    model->limit_damping = model->back_emf;
+    if (follows) model->free_damping = model->kd + model->back_emf;
+  }
+  model->stop_stiffness = d->servo.stop_stiffness, model->stop_damping = d->servo.stop_damping;
+  model->stops = d->servo.mode != HX_SERVO_KINEMATIC && d->servo.stop_stiffness > 0.0;
+}
+
+/* Returns whether the gears have Stribeck terms, and in *measured whether they have more than
+ * Coulomb friction. */
+static int gear_terms(const hxDefinition *d, int *measured) {
+  const int stribeck =
+      d->servo.stribeck_friction > 0.0 || d->servo.stribeck_motor_load_friction > 0.0 ||
+      d->servo.stribeck_external_load_friction > 0.0 || d->servo.quadratic_motor_friction > 0.0 ||
+      d->servo.quadratic_external_friction > 0.0;
+  *measured = stribeck || d->servo.viscous_friction > 0.0 || d->servo.motor_load_friction > 0.0 ||
+              d->servo.external_load_friction > 0.0;
+  return stribeck;
+}
+
+/* Copies the constants of the gears' friction (eq. 49, 50). */
+static void compile_gear(hxModel *model, const hxDefinition *d) {
+  model->stribeck = gear_terms(d, &model->measured_friction);
+  model->coulomb_friction = d->servo.coulomb_friction;
+  model->gear_speed = d->servo.friction_speed, model->per_gear_speed = 1.0 / model->gear_speed;
+  model->gear_viscous = d->servo.viscous_friction;
+  model->gear_stribeck = d->servo.stribeck_friction;
+  model->motor_load = d->servo.motor_load_friction;
+  model->external_load = d->servo.external_load_friction;
+  model->stribeck_motor = d->servo.stribeck_motor_load_friction;
+  model->stribeck_external = d->servo.stribeck_external_load_friction;
+  model->quadratic_motor = d->servo.quadratic_motor_friction;
+  model->quadratic_external = d->servo.quadratic_external_friction;
+  model->per_stribeck_speed = 1.0 / d->servo.stribeck_speed;
+  model->stribeck_exponent = d->servo.stribeck_exponent;
+}
+
 /* Copies laws and settings, with derived constants. */
 static void compile_settings(hxModel *model, const hxDefinition *d) {
   model->contact_law = d->contact.law, model->stiffness = d->contact.stiffness;
@@ -222,14 +271,8 @@ static void compile_settings(hxModel *model, const hxDefinition *d) {
   for (int i = 0; i < 3; ++i) model->gravity[i] = d->gravity[i];
   model->alpha = d->baumgarte.alpha, model->beta = d->baumgarte.beta;
   compile_friction(model, d);
-  model->servo_mode = d->servo.mode;
-  model->kp = d->servo.mode == HX_SERVO_POSITION ? d->servo.kp : 0.0;
-  model->kd = d->servo.mode == HX_SERVO_POSITION ? d->servo.kd : 0.0;
-  model->torque_max = d->servo.torque_max, model->speed_max = d->servo.speed_max;
-  model->rotor_inertia = d->servo.rotor_inertia,
-  model->coulomb_friction = d->servo.coulomb_friction;
-  model->stop_stiffness = d->servo.stop_stiffness, model->stop_damping = d->servo.stop_damping;
-  model->stops = d->servo.mode != HX_SERVO_KINEMATIC && d->servo.stop_stiffness > 0.0;
+  compile_servo(model, d);
+  compile_gear(model, d);
   model->terrain_kind = d->terrain.kind;
   model->method = d->solver.method, model->step = d->solver.step;
   model->tolerance = d->solver.tolerance, model->step_max = d->solver.step_max,

@@ -82,6 +82,9 @@ typedef struct hxModel {
   int velocity_terms;               /* 1: the tanh law has static friction or a viscous part */
   int spin_friction, roll_friction; /* 1: the feet resist spin, rolling */
   int stops;                        /* 1: the joints have stops */
+  int servo_drive;                  /* hxServoDrive */
+  int measured_friction;            /* 1: the gears have more than Coulomb friction */
+  int stribeck;                     /* 1: it has Stribeck terms */
   int has_soil; /* 1: feet may touch soil, of the definition or of a material of the terrain */
   int rows, foot_rows, torso_rows; /* computed: on tibias, of these on feet, on the torso (0, 1) */
   int row[HX_ROWS];                /* rows that are computed: on feet, tibias, torso */
@@ -97,6 +100,15 @@ typedef struct hxModel {
   double spin_radius, rolling_radius;                  /* m  eq. 38 */
   double stop_stiffness, stop_damping;                 /* N m/rad, N m s/rad  eq. 39 */
   double kp, kd, torque_max, speed_max, rotor_inertia, coulomb_friction;
+  double stall_torque, back_emf;                /* N m, N m s/rad  eq. 48 */
+  double free_damping, limit_damping;           /* N m s/rad  below the motor's limits, on them */
+  double torque_constant, resistance;           /* N m/A, ohm */
+  double gear_speed, per_gear_speed;            /* rad/s, s/rad  dry friction saturates there */
+  double gear_viscous, gear_stribeck;           /* N m s/rad, N m  K_v, K_cs of eq. 50 */
+  double motor_load, external_load;             /* 1  K_m, K_e */
+  double stribeck_motor, stribeck_external;     /* 1  K_ms, K_es */
+  double quadratic_motor, quadratic_external;   /* 1/(N m)  K_mq, K_eq */
+  double per_stribeck_speed, stribeck_exponent; /* s/rad, 1  1/w_s, a */
   double ground_point[3], ground_normal[3];
   double soil[HX_SOIL_SIZE]; /* an hxSoil, of the definition */
   double bristle_length;     /* m  presliding, or shear displacement of the soil */

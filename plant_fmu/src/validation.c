@@ -56,10 +56,33 @@ static void check_legs(hxChecker *c, const hxDefinition *d) {
   }
 }
 
+/* Checks the constants of motors, and that kinematic drives have neither a motor nor friction that
+ * depends on its torque. */
+static void check_servo(hxChecker *c, const hxDefinition *d) {
+  const char *positive = "more than 0 with servo.drive motor";
+  const double load = d->servo.motor_load_friction + d->servo.external_load_friction +
+                      d->servo.stribeck_motor_load_friction +
+                      d->servo.stribeck_external_load_friction + d->servo.quadratic_motor_friction +
+                      d->servo.quadratic_external_friction + d->servo.stribeck_friction +
+                      d->servo.viscous_friction;
+  const int motor = d->servo.drive == HX_DRIVE_MOTOR;
+  if (motor && !(d->servo.voltage > 0.0))
+    hx_check_fail(c, "servo.voltage", d->servo.voltage, positive);
+  if (motor && !(d->servo.torque_constant > 0.0))
+    hx_check_fail(c, "servo.torque_constant", d->servo.torque_constant, positive);
+  if (motor && !(d->servo.resistance > 0.0))
+    hx_check_fail(c, "servo.resistance", d->servo.resistance, positive);
+  if (d->servo.mode == HX_SERVO_KINEMATIC && (motor || load > 0.0))
+    hx_check_fail(c, "servo.mode", d->servo.mode,
+                  "position or torque (1 or 2) with a motor or measured friction: a kinematic "
+                  "drive has no motor torque");
+}
+
 /* Checks conditions between several numbers that are within their ranges. */
 static void check_relations(hxChecker *c, const hxDefinition *d) {
   check_inertia(c, "torso.inertia_xx", d->torso.inertia);
   check_legs(c, d);
+  check_servo(c, d);
   if ((d->contact.law == HX_CONTACT_EXACT_RESTITUTION || d->contact.law == HX_CONTACT_FLORES) &&
       d->contact.restitution < 1e-3)
     hx_check_fail(c, "contact.restitution", d->contact.restitution,

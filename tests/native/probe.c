@@ -78,6 +78,7 @@ static const ProbeField fields[] = {
     FIELD(hxDefinition, friction.spin_radius),
     FIELD(hxDefinition, friction.rolling_radius),
     FIELD(hxDefinition, servo.mode),
+    FIELD(hxDefinition, servo.drive),
     FIELD(hxDefinition, servo.kp),
     FIELD(hxDefinition, servo.kd),
     FIELD(hxDefinition, servo.torque_max),
@@ -86,6 +87,8 @@ static const ProbeField fields[] = {
     FIELD(hxDefinition, servo.coulomb_friction),
     FIELD(hxDefinition, servo.stop_stiffness),
     FIELD(hxDefinition, servo.stop_damping),
+    FIELD(hxDefinition, servo.voltage),
+    FIELD(hxDefinition, servo.friction_speed),
     FIELD(hxDefinition, baumgarte.alpha),
     FIELD(hxDefinition, baumgarte.beta),
     FIELD(hxDefinition, gravity),
@@ -179,6 +182,8 @@ static const ProbeField fields[] = {
     FIELD(hxOutput, solver.touchdowns),
     FIELD(hxOutput, footprints),
     FIELD(hxOutput, cone_time),
+    FIELD(hxOutput, current),
+    FIELD(hxOutput, electrical_power),
 };
 
 /* Returns the name of the i-th field, its offset and size; NULL past the last. */
@@ -387,6 +392,16 @@ HX_API void hx_probe_stop(const hxPlant *plant, int leg, int joint, double angle
       hx_stop_torque(&plant->model, joint, leg - lane, hx_splat(angle), hx_splat(speed));
   out[0] = hx_lane(stop.torque, lane), out[1] = hx_lane(stop.damped, lane);
   out[2] = hx_lane(stop.stiffness, lane), out[3] = hx_lane(stop.damping, lane);
+}
+
+/* Computes the friction of motor and gear under a motor torque and an external torque. out:
+ * friction, drag */
+HX_API void hx_probe_gear(const hxPlant *plant, double speed, double motor, double external,
+                          double out[2]) {
+  const hxReal w = hx_splat(speed), load = hx_splat(external);
+  hxServo servo = {.torque = hx_splat(motor)};
+  hx_measured_friction(&plant->model, &w, &load, &servo);
+  out[0] = hx_lane(servo.friction, 0), out[1] = hx_lane(servo.drag, 0);
 }
 
 /* Computes a servo. command: angle, speed, torque; out: torque, friction, stiffness, damping. */

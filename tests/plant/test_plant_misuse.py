@@ -287,8 +287,20 @@ def test_no_call_runs_on_for_ever(core: ct.CDLL, settings: dict[str, float]) -> 
     before = plant.save()
     with pytest.raises(
         PlantError,
-        match=r"finds no step|solver\.step: got 1e-07 s, which makes 1000000 steps of this call, "
-        r"expected at most",
+        match=r"finds no step|limit of evaluations|solver\.step: got 1e-07 s, which makes 1000000 "
+        r"steps of this call, expected at most",
     ):
         plant.step(0.1, Command(angle_ref=plant.robot.stance, push_force=np.array([1e8, 0.0, 0.0])))
+    assert plant.save() == before
+
+
+def test_a_call_that_spends_its_evaluations_says_so_and_changes_nothing(core: ct.CDLL) -> None:
+    """Feet start 1 mm deep in a ground whose stiffness is absurd but in range. A call of 2 ms has
+    20,200 attempts of 4 stages each.
+    """
+    robot = changed(load_robot("athena"), contact={"stiffness": 1e12})
+    plant = Plant(core, robot, position=np.array([0.0, 0.0, 0.13]))
+    before = plant.save()
+    with pytest.raises(PlantError, match=r"limit of evaluations is spent .* 80800 evaluations"):
+        plant.step(0.002)
     assert plant.save() == before

@@ -14,7 +14,7 @@ from gains import make_gains
 from matplotlib.figure import Figure
 from studies import KINEMATIC, replace_stored, run_quietly, study_of
 
-from hexapod_cosim.cosim.cli.studying import report_on
+from hexapod_cosim.cosim.cli.study.studying import report_on
 from hexapod_cosim.cosim.results.comparison import made_change
 from hexapod_cosim.cosim.study.plan.records import Study
 from hexapod_cosim.cosim.study.report import heat

@@ -16,7 +16,7 @@ from scipy import stats
 from studies import FAKE, KINEMATIC, replace_stored, rows, run_quietly, study_of
 
 from hexapod_cosim.controller import save_gains
-from hexapod_cosim.cosim.cli.studying import report_on
+from hexapod_cosim.cosim.cli.study.studying import report_on
 from hexapod_cosim.cosim.study.report.curves import front
 from hexapod_cosim.cosim.study.report.report import optimum_changes
 from hexapod_cosim.cosim.study.store.results import POINTS, SUMMARY, read_results

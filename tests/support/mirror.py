@@ -87,9 +87,14 @@ HxDefinition = record(
         record(
             "Servo",
             ("mode", ct.c_int),
+            ("drive", ct.c_int),
             *reals(
                 "kp kd torque_max speed_max rotor_inertia coulomb_friction stop_stiffness "
-                "stop_damping"
+                "stop_damping voltage duty_max torque_constant resistance viscous_friction "
+                "stribeck_friction motor_load_friction external_load_friction "
+                "stribeck_motor_load_friction stribeck_external_load_friction "
+                "quadratic_motor_friction quadratic_external_friction stribeck_speed "
+                "stribeck_exponent friction_speed"
             ),
         ),
     ),
@@ -209,4 +214,6 @@ HxOutput = record(
     ("solver", record("SolverOutput", *reals("evaluations steps rejected touchdowns"))),
     ("footprints", Real),
     ("cone_time", Real * CONE_BINS),
+    ("current", PerJoint),
+    ("electrical_power", PerJoint),
 )

@@ -32,6 +32,7 @@ from hexapod_cosim.models import (
     METHODS,
     PROJECTIONS,
     SELF_CONTACTS,
+    SERVO_DRIVES,
     SERVO_MODES,
     SOIL_LAWS,
     TERRAINS,
@@ -199,6 +200,7 @@ def _put_settings(d: Any, robot: Robot) -> None:
     d.contact.law = 1 + CONTACT_LAWS.index(robot.contact.law)
     d.friction.law = 1 + FRICTION_LAWS.index(robot.friction.law)
     d.servo.mode = 1 + SERVO_MODES.index(robot.servo.mode)
+    d.servo.drive = 1 + SERVO_DRIVES.index(robot.servo.drive)
     d.solver.method = 1 + METHODS.index(robot.solver.method)
     d.solver.projection = 1 + PROJECTIONS.index(robot.solver.projection)
     d.terrain.kind = 1 + TERRAINS.index(robot.terrain.kind)

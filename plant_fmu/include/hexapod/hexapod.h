@@ -6,9 +6,9 @@
  * RR, joints (and the link each one moves) in the order coxa, femur, tibia. Bodies: 0 = torso, 1 +
  * 3 leg + joint = link. Equation numbers refer to docs/equations.md.
  *
- * A plant has no hidden state, and the library has no globals: what hx_plant_get_state copies is the
- * whole state. After hx_plant_create no function allocates, prints or exits. Work space belongs to
- * the plant, so that a call needs less than 48 kB of stack, and one plant is for one thread at a
+ * A plant has no hidden state, and the library has no globals: what hx_plant_get_state copies is
+ * the whole state. After hx_plant_create no function allocates, prints or exits. Work space belongs
+ * to the plant, so that a call needs less than 48 kB of stack, and one plant is for one thread at a
  * time.
  */
 #ifndef HEXAPOD_H
@@ -66,6 +66,9 @@ typedef enum hxBodyContact { HX_BODY_OFF = 1, HX_BODY_ON } hxBodyContact;
 typedef enum hxSelfContact { HX_SELF_OFF = 1, HX_SELF_WARN } hxSelfContact;
 
 typedef enum hxServoMode { HX_SERVO_POSITION = 1, HX_SERVO_TORQUE, HX_SERVO_KINEMATIC } hxServoMode;
+
+/* What limits the servos' torque: the torque-speed line, or a motor's voltage and back-EMF. */
+typedef enum hxServoDrive { HX_DRIVE_LINE = 1, HX_DRIVE_MOTOR } hxServoDrive;
 
 typedef enum hxProjection {
   HX_PROJECTION_NONE = 1, /* joints drift; the Baumgarte terms limit the drift */
@@ -161,14 +164,32 @@ typedef struct hxDefinition {
   } friction;
   struct {
     int mode;                /* hxServoMode, all joints */
+    int drive;               /* hxServoDrive */
     double kp;               /* N m/rad */
     double kd;               /* N m s/rad */
-    double torque_max;       /* N m      at stall */
-    double speed_max;        /* rad/s    no-load speed: the torque-speed line ends here */
+    double torque_max;       /* N m      at stall, of HX_DRIVE_LINE */
+    double speed_max;        /* rad/s    no-load speed, where the torque-speed line ends */
     double rotor_inertia;    /* kg m2    seen at the joint */
-    double coulomb_friction; /* N m      in the gear, regularised by tanh(speed / 0.05 rad/s) */
+    double coulomb_friction; /* N m      in the gear, regularised by tanh(speed/friction_speed) */
     double stop_stiffness;   /* N m/rad    k of the joints' stops (eq. 39); 0: no stops */
     double stop_damping;     /* N m s/rad  c of eq. 39 */
+    /* of HX_DRIVE_MOTOR (eq. 48), seen at the joint */
+    double voltage;         /* V      of the supply */
+    double duty_max;        /* 1      largest duty: the motor gets at most duty_max voltage */
+    double torque_constant; /* N m/A  k_t */
+    double resistance;      /* ohm    R */
+    /* friction of motor and gear besides coulomb_friction (eq. 49, 50) */
+    double viscous_friction;                /* N m s/rad  K_v */
+    double stribeck_friction;               /* N m        K_cs */
+    double motor_load_friction;             /* 1          K_m */
+    double external_load_friction;          /* 1          K_e */
+    double stribeck_motor_load_friction;    /* 1          K_ms */
+    double stribeck_external_load_friction; /* 1          K_es */
+    double quadratic_motor_friction;        /* 1/(N m)    K_mq */
+    double quadratic_external_friction;     /* 1/(N m)    K_eq */
+    double stribeck_speed;                  /* rad/s      w_s */
+    double stribeck_exponent;               /* 1          a */
+    double friction_speed;                  /* rad/s      w_f: dry friction saturates there */
   } servo;
   struct {
     double alpha, beta; /* 1/s */
@@ -275,6 +296,8 @@ typedef struct hxOutput {
   } solver;
   double footprints;              /* 1  made in soil since the start */
   double cone_time[HX_CONE_BINS]; /* s  feet under load, by |f_t|/(mu f_n): from 0.9 (i/30)^2 on */
+  double current[HX_LEGS][HX_JOINTS];          /* A  of the motors; 0 with HX_DRIVE_LINE */
+  double electrical_power[HX_LEGS][HX_JOINTS]; /* W  that they take from the supply; likewise */
 } hxOutput;
 
 enum { HX_FOOTPRINTS = 512 }; /* footprints that a plant keeps; older ones are forgotten */

@@ -1,9 +1,13 @@
-/* actuator.h - the servo of a joint: PD control with feed-forward, torque-speed line, gear
- * friction, and the joint's stops */
+/* actuator.h - the servo of a joint: PD control with feed-forward, torque-speed line or motor,
+ * friction of motor and gear, and the joint's stops */
 #ifndef HX_ACTUATOR_H
 #define HX_ACTUATOR_H
 
 #include "vec3.h"
+
+#ifndef HX_TANGENT
+#include "../ground/power.h" /* behind lanes.h */
+#endif
 
 typedef struct {
   hxReal torque;    /* N m        motor on child */
@@ -13,30 +17,37 @@ typedef struct {
   hxReal drag;      /* N m s/rad  -d friction/d speed */
 } hxServo;
 
-static const double hx_gear_speed =
-    0.05; /* rad/s  speed at which the gear's dry friction saturates */
-
-/* The motor (eq. 12): clip(kp (q_ref - q) + kd (qd_ref - qd) + tau_ff) to the torque-speed line. */
+/* The motor (eq. 12, 48): clip(kp (q_ref - q) + kd (qd_ref - qd) + tau_ff) to its limits. */
 typedef struct {
   hxReal torque;    /* N m        motor on child */
   hxReal wanted;    /* N m  before the limits */
   hxReal low, high; /* N m  limits at this speed */
-  hxReal load;      /* 1    speed over the no-load speed */
+  hxReal load;      /* 1    speed over the no-load speed, of the torque-speed line */
 } hxMotor;
 
-/* Returns the motor's torque and its limits (eq. 12). */
+/* Returns the torque and the limits of a motor whose voltage is limited (eq. 48). The back-EMF
+ * lowers the torque of a given voltage; in torque mode the voltage makes up for it. */
+static inline hxMotor voltage_motor(const hxModel *model, hxReal speed, hxReal wanted) {
+  const hxReal brake = model->back_emf * speed;
+  const hxReal high = model->stall_torque - brake, low = -model->stall_torque - brake;
+  if (model->servo_mode != HX_SERVO_TORQUE) wanted -= brake;
+  return (hxMotor){hx_clip(wanted, low, high), wanted, low, high, hx_splat(0.0)};
+}
+
+/* Returns the motor's torque and its limits (eq. 12, 48). */
 static inline hxMotor hx_motor_torque(const hxModel *model, hxReal angle, hxReal speed,
                                       hxReal angle_ref, hxReal speed_ref, hxReal torque_ref) {
   const hxReal zero = hx_splat(0.0), one = hx_splat(1.0);
   const hxReal wanted =
       model->kp * (angle_ref - angle) + model->kd * (speed_ref - speed) + torque_ref;
+  if (model->servo_drive == HX_DRIVE_MOTOR) return voltage_motor(model, speed, wanted);
   const hxReal load = speed * (1.0 / model->speed_max);
   const hxReal high = model->torque_max * hx_clip(1.0 - load, zero, one);
   const hxReal low = -model->torque_max * hx_clip(1.0 + load, zero, one);
   return (hxMotor){hx_clip(wanted, low, high), wanted, low, high, load};
 }
 
-/* Returns the motor's torque, the gear's -tau_c tanh(qd / 0.05) and their derivatives (eq. 12). */
+/* Returns the motor's torque, the gear's Coulomb friction and their derivatives (eq. 12, 48). */
 static inline hxServo hx_servo_torque(const hxModel *model, hxReal angle, hxReal speed,
                                       hxReal angle_ref, hxReal speed_ref, hxReal torque_ref) {
   const hxReal zero = hx_splat(0.0), one = hx_splat(1.0);
@@ -44,17 +55,70 @@ static inline hxServo hx_servo_torque(const hxModel *model, hxReal angle, hxReal
   const hxMask free = hx_less(motor.low, motor.wanted) & hx_less(motor.wanted, motor.high);
   /* falling: the torque is limited by the sloping part of the torque-speed line */
   const hxMask falling =
-      ~free & hx_less(zero, motor.torque * motor.load) & hx_less(hx_abs(motor.load), one);
-  const hxReal t = hx_tanh(speed * (1.0 / hx_gear_speed));
+      model->servo_drive == HX_DRIVE_MOTOR
+          ? ~free
+          : ~free & hx_less(zero, motor.torque * motor.load) & hx_less(hx_abs(motor.load), one);
+  const hxReal t = hx_tanh(speed * model->per_gear_speed);
   return (hxServo){
       .torque = motor.torque,
       .friction = -model->coulomb_friction * t,
       .stiffness = hx_select(free, hx_splat(model->kp), zero),
-      .damping =
-          hx_select(free, hx_splat(model->kd),
-                    hx_select(falling, hx_splat(model->torque_max / model->speed_max), zero)),
-      .drag = (model->coulomb_friction / hx_gear_speed) * (1.0 - t * t),
+      .damping = hx_select(free, hx_splat(model->free_damping),
+                           hx_select(falling, hx_splat(model->limit_damping), zero)),
+      .drag = (model->coulomb_friction / model->gear_speed) * (1.0 - t * t),
   };
+}
+
+/* Returns exp(-|speed/w_s|^a), the share of the Stribeck terms (eq. 50). */
+static inline hxReal stribeck_share(const hxModel *model, hxReal speed) {
+#ifdef HX_TANGENT
+  const double w = hx_re(speed), a = hx_re(model->stribeck_exponent),
+               power = pow(fabs(w) * hx_re(model->per_stribeck_speed), a), share = exp(-power);
+  return hx_chain(speed, share, w != 0.0 ? -share * power * a / w : 0.0);
+#else
+  const hxReal power =
+      hx_lanes_pow(hx_abs(speed) * model->per_stribeck_speed, hx_splat(model->stribeck_exponent));
+  return 1.0 + hx_expm1(-hx_min(power, hx_splat(40.0)));
+#endif
+}
+
+/* Returns the quadratic term of eq. 50, where the external torque opposes the motor's. */
+static inline hxReal quadratic_friction(const hxModel *model, hxReal motor, hxReal external) {
+  const hxReal zero = hx_splat(0.0), m = hx_abs(motor), e = hx_abs(external);
+  const hxReal weaker = hx_select(hx_less(m, e), model->quadratic_motor * (m * m), zero);
+  const hxReal squares = hx_select(hx_less(e, m), model->quadratic_external * (e * e), weaker);
+  return hx_select(hx_less(motor * external, zero), squares, zero);
+}
+
+/* Sets the friction of a motor and its gear and its derivative, under the external torque on the
+ * joint (eq. 49, 50); the motor's torque is set. */
+HX_RARE void hx_measured_friction(const hxModel *model, const hxReal *speed, const hxReal *external,
+                                  hxServo *servo) {
+  const hxReal motor = servo->torque, t = hx_tanh(*speed * model->per_gear_speed);
+  hxReal budget = model->coulomb_friction +
+                  hx_abs(model->motor_load * motor - model->external_load * *external);
+  if (model->stribeck) {
+    const hxReal load =
+        hx_abs(model->stribeck_motor * motor - model->stribeck_external * *external);
+    budget += stribeck_share(model, *speed) *
+              (model->gear_stribeck + load + quadratic_friction(model, motor, *external));
+  }
+  servo->friction = -(budget * t) - model->gear_viscous * *speed;
+  servo->drag = (budget * model->per_gear_speed) * (1.0 - t * t) + model->gear_viscous;
+}
+
+/* Returns the current of a motor, A; 0 with the torque-speed line, whose motor is unknown. */
+static inline hxReal hx_motor_current(const hxModel *model, hxReal torque) {
+  return model->servo_drive == HX_DRIVE_MOTOR ? torque * (1.0 / model->torque_constant)
+                                              : hx_splat(0.0);
+}
+
+/* Returns the power that a motor takes from its supply, voltage times current, W. */
+static inline hxReal hx_electrical_power(const hxModel *model, hxReal torque, hxReal speed) {
+  const hxReal current = hx_motor_current(model, torque);
+  return model->servo_drive == HX_DRIVE_MOTOR
+             ? torque * speed + model->resistance * (current * current)
+             : hx_splat(0.0);
 }
 
 static const double half_turn = 3.14159265358979323846;

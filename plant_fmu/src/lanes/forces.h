@@ -141,6 +141,23 @@ static inline void joint_torque(const hxModel *model, const hxCommand *command, 
   }
 }
 
+/* Computes the friction of a leg's motors and gears under the torques of all but these on the
+ * joints (eq. 49-51), tip to hip; the forces on the links are complete. */
+HX_RARE void gear_frictions(const hxModel *model, int slot, hxLegWork *leg) {
+  const hxVec3 up = hx_neg(hx_splat_vec3(model->gravity));
+  hxForce6 p = {hx_zero3(), hx_zero3()};
+  for (int joint = HX_JOINTS - 1; joint >= 0; --joint) {
+    hxJointWork *k = &leg->joint[joint];
+    const hxVec3 lin = hx_scale(hx_load(&model->joint[joint].mass[slot]), up);
+    p = hx_force_add(p, hx_force_add(k->p, (hxForce6){hx_cross(k->c, lin), lin}));
+    hxReal external = -hx_power(p, k->sweep.S);
+    if (model->stops) external += k->stop.torque;
+    hx_measured_friction(model, &k->speed, &external, &k->servo);
+    k->torque = k->servo.torque + k->servo.friction;
+    if (model->stops) k->torque += k->stop.torque;
+  }
+}
+
 static inline hxMotion6 torso_velocity(const hxPlantMotion *m) {
   return (hxMotion6){hx_torso_vec3(m, HX_W), hx_torso_vec3(m, HX_V)};
 }
@@ -282,6 +299,8 @@ static inline void hx_dynamics_forces(const hxModel *model, const hxContactState
       joint_torque(model, command, joint, pack * HX_LANES, &work->pack[pack].joint[joint]);
   for (int pack = 0; pack < HX_PACKS; ++pack)
     leg_contacts(model, contact, motion, pack * HX_LANES, all, &work->pack[pack]);
+  for (int pack = 0; model->measured_friction && pack < HX_PACKS; ++pack)
+    gear_frictions(model, pack * HX_LANES, &work->pack[pack]);
   work->torso_rows = 0;
   if (model->torso_rows) torso_contacts(model, contact, motion, all, work);
 }

@@ -9,8 +9,9 @@
 #include "measure.h"
 
 static const double step_floor = 1e-11; /* s  the error control fails below this step */
-static const double step_limits[3] = {
-    1e5, 1e5, 1e6}; /* 1, 1/s, 1  limits of a call's steps: base, per second, highest */
+/* 1, 1/s, 1  limits of a call's steps, so that every call ends: base, per second, highest; of fixed
+ * steps, and of attempts under error control */
+static const double step_limits[3] = {1e5, 1e5, 1e6}, attempt_limits[3] = {2e4, 1e5, 1e6};
 static const double touch_depth[2] = {
     1e-10, 1e-6}; /* m, m per tolerance  a touch-down is located to this depth */
 
@@ -35,7 +36,8 @@ typedef struct {
   hxPlantMotion y;
   hxTrial trial, nearer;
   hxMoment end;
-  hxModel feet, tops; /* the model without some rows of contacts */
+  hxModel feet, tops;     /* the model without some rows of contacts */
+  double last_evaluation; /* number at which the call's limit is spent */
 } hxScratch;
 
 /* Start of a step and the data that all its trials share. */
@@ -47,8 +49,7 @@ typedef struct {
   const hxContactState *contact;
   const hxMethodRow *method;
   double t;
-  double touch;     /* m  largest depth of a contact that has just touched down */
-  double last_step; /* limit of accepted and rejected steps */
+  double touch; /* m  largest depth of a contact that has just touched down */
   const hxPlantMotion *y;
   hxFootprintLog *footprints;
   hxScratch *scratch;
@@ -341,9 +342,27 @@ static double step_factor(const hxMethodRow *method, double error) {
   return 0.9 * inverse_root(error, n);
 }
 
-/* Returns the largest number of steps in a call over a time, s, so that every call ends. */
-static double steps_allowed(double time) {
-  return fmin(step_limits[0] + step_limits[1] * time, step_limits[2]);
+/* Returns the largest number of steps in a call over a time, s. */
+static double steps_allowed(const double limits[3], double time) {
+  return fmin(limits[0] + limits[1] * time, limits[2]);
+}
+
+/* Returns the largest number of evaluations in a call over a time, s: those of its attempts; of
+ * fixed steps twice as many, because touch-downs are located by further ones. */
+static double evaluations_allowed(const hxModel *model, double time) {
+  const double attempts = model->step > 0.0 ? 2.0 * steps_allowed(step_limits, time)
+                                            : steps_allowed(attempt_limits, time);
+  return hx_method(model->method)->stages * attempts;
+}
+
+/* Writes that the call's limit is spent, and returns the status. */
+static hxStatus limit_spent(const hxState *state, double t, double h, char *message) {
+  hx_print(message, HX_MESSAGE_SIZE,
+           "the call's limit of evaluations is spent at t = %.9g s (step %.3g s, %.0f evaluations "
+           "since the start); check masses, stiffness and inputs for extreme values, make shorter "
+           "calls, raise solver.tolerance or use a linearly implicit solver.method",
+           t, h, state->evaluations);
+  return HX_STEP_TOO_SMALL;
 }
 
 /* Writes why no step of h from t succeeds, and returns the status. */
@@ -352,9 +371,8 @@ static hxStatus step_failure(const hxTrial *trial, double t, double h, char *mes
   hx_print(message, HX_MESSAGE_SIZE,
            lost ? "the motion is not finite any more at t = %.9g s (step %.3g s); check masses, "
                   "stiffness and inputs, or let the error control choose the step (solver.step = 0)"
-                : "the error control finds no step that meets the tolerance, or needs too many "
-                  "steps, at t = %.9g s (step %.3g s); check the inputs for extreme values, raise "
-                  "solver.tolerance or use a "
+                : "the error control finds no step that meets the tolerance at t = %.9g s (step "
+                  "%.3g s); check the inputs for extreme values, raise solver.tolerance or use a "
                   "linearly implicit solver.method",
            t, h);
   return lost ? HX_NOT_FINITE : HX_STEP_TOO_SMALL;
@@ -451,8 +469,8 @@ static hxStatus advance(const hxStart *start, double h_max, double *next_step, h
                                               1e-9)); /* equal steps; 1e-9: rounding adds no step */
   trial->error = 0.0;
   for (;;) {
-    if (model->step == 0.0 && state->steps + state->rejected >= start->last_step)
-      return step_failure(trial, start->t, h, message);
+    if (state->evaluations >= start->scratch->last_evaluation)
+      return limit_spent(state, start->t, h, message);
     try_step(start, h, state, trial);
     if (!all_finite(&trial->y)) trial->error = NAN;
     if (trial->error <= 1.0) break;
@@ -523,7 +541,6 @@ static hxStatus run_to(const hxModel *model, const hxCommand *command, const hxC
   const hxModel *all_feet = rows > foot_rows ? feet_alone(model, foot_rows, &scratch->feet) : model,
                 *first_feet = foot_rows > 1 ? feet_alone(model, 1, &scratch->tops) : all_feet;
   start.touch = fmax(touch_depth[0], touch_depth[1] * model->tolerance);
-  start.last_step = state->steps + state->rejected + steps_allowed(t_end - state->time);
   double first = fmin(state->first_step,
                       state->next_step); /* new inputs cause a larger error than the last step's */
   double *next_step = command->time < state->time ? &state->next_step : &first;
@@ -553,12 +570,13 @@ static hxStatus run_fixed(const hxModel *model, const hxCommand *command, const 
                           char *message) {
   const double t_start = command->time;
   const double count = fmax(1.0, ceil((t_end - t_start) / model->step - 1e-9));
-  if (count > steps_allowed(t_end - t_start)) {
+  const double allowed = steps_allowed(step_limits, t_end - t_start);
+  if (count > allowed) {
     hx_print(message, HX_MESSAGE_SIZE,
              "solver.step: got %.3g s, which makes %.0f steps of this call, expected at most %.0f; "
              "raise solver.step "
              "or make shorter calls",
-             model->step, count, steps_allowed(t_end - t_start));
+             model->step, count, allowed);
     return HX_STEP_TOO_SMALL;
   }
   for (double i = 1.0; i <= count && !(events->stop && events->found); i += 1.0) {
@@ -574,6 +592,8 @@ static hxStatus run_fixed(const hxModel *model, const hxCommand *command, const 
 static hxStatus hx_integrate(const hxModel *model, const hxCommand *command, const hxCommand *ramp,
                              double t_end, hxEvents *events, hxState *state, void *scratch,
                              char *message) {
+  ((hxScratch *)scratch)->last_evaluation =
+      state->evaluations + evaluations_allowed(model, t_end - command->time);
   if (state->moment.stale != 0.0) hx_moment_update(model, state);
   keep_nearest_points(model, state);
   if (command->time == state->time && t_end > state->time) hx_reset_peaks(&state->measured);

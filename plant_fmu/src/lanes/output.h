@@ -90,8 +90,8 @@ static hxNumber hx_potential_energy(const hxModel *model, const hxPlantMotion *m
 
 /* Fills a joint's outputs. The reaction on the child is the force -lambda and, about the joint's
  * point, the torque -(u1 lambda_4 + u2 lambda_5); the motor's torque is not included. */
-static void fill_joint(const hxState *state, const hxJointWork *k, int lane, int leg, int joint,
-                       hxOutput *o) {
+static void fill_joint(const hxModel *model, const hxState *state, const hxJointWork *k, int lane,
+                       int leg, int joint, hxOutput *o) {
   const hxVec3 s = k->reaction.kin.s, u1 = hx_cross(k->body.R_WB.x, s),
                u2 = hx_cross(k->body.R_WB.y, s);
   const hxVec3 couple =
@@ -99,6 +99,9 @@ static void fill_joint(const hxState *state, const hxJointWork *k, int lane, int
   o->angle[leg][joint] = hx_lane(k->angle, lane);
   o->speed[leg][joint] = hx_lane(k->speed, lane);
   o->torque[leg][joint] = hx_lane(k->servo.torque, lane);
+  o->current[leg][joint] = hx_lane(hx_motor_current(model, k->servo.torque), lane);
+  o->electrical_power[leg][joint] =
+      hx_lane(hx_electrical_power(model, k->servo.torque, k->speed), lane);
   o->positive_work[leg][joint] = state->measured.positive_work[joint][leg];
   o->negative_work[leg][joint] = state->measured.negative_work[joint][leg];
   o->torque_squared[leg][joint] = state->measured.torque_squared[joint][leg];
@@ -247,7 +250,7 @@ static void hx_output_fill(const hxModel *model, const hxState *state, const hxW
     int lane;
     const hxLegWork *w = leg_work(work, leg, &lane);
     for (int joint = 0; joint < HX_JOINTS; ++joint)
-      fill_joint(state, &w->joint[joint], lane, leg, joint, o);
+      fill_joint(model, state, &w->joint[joint], lane, leg, joint, o);
     const hxVec3 tibia = hx_link_vec3(&state->motion, HX_JOINTS - 1, HX_R, leg - lane);
     fill_foot(model, state, w, tibia, lane, leg, o);
     fill_body_row(model, w, HX_KNEE, lane, o->body.knee_force[leg]);

@@ -75,7 +75,7 @@ def study(
     command is started again.
     """
     # imported here: it is slow, and no other command needs it
-    from hexapod_cosim.cosim.cli.studying import run_and_report  # noqa: PLC0415
+    from hexapod_cosim.cosim.cli.study.studying import run_and_report  # noqa: PLC0415
     from hexapod_cosim.cosim.study.execute.study import Options  # noqa: PLC0415
 
     options = Options(

@@ -1,0 +1,221 @@
+/* walker.c - steps the default robot's plant and controller as the co-simulation master does */
+#include "walker.h"
+
+#include <math.h>
+#include <string.h>
+
+static const double MACRO_STEP = 0.005; /* s    that of the scenarios */
+static const double FADE = 0.4;         /* s    from the commands of one controller to the next */
+static const double STILL = 0.02;       /* rad  joint commands that vary by less stand still */
+static const double PATIENCE = 4.0;     /* gait periods  until a change is made while moving */
+
+typedef struct Change {
+  int wanted;             /* a change of control or pattern waits for the robot to stand */
+  int control, pattern;   /* the wanted ones */
+  double since;           /* s   time of the request */
+  double still_since;     /* s   the joint commands have hardly changed since then */
+  double reference[HX_LEGS][HX_JOINTS]; /* rad  joint commands at that time */
+} Change;
+
+static struct {
+  hxPlant *plant;
+  hxController *controller;
+  hxDefinition robot;
+  hxControllerDefinition walk;
+  hxInput input;
+  hxOutput output;
+  hxControllerInput seen;
+  hxControllerOutput command;
+  long steps; /* macro-steps since the start */
+  Change change;
+  double from[HX_LEGS][HX_JOINTS]; /* rad  joint commands from which the present ones fade in */
+  double fade_end;                 /* s */
+  hxFrame frame;
+} walker;
+
+double hx_walker_macro_step(void) { return MACRO_STEP; }
+const hxFrame *hx_walker_frame(void) { return &walker.frame; }
+hxInput *hx_walker_input(void) { return &walker.input; }
+
+const char *hx_walker_message(void) {
+  const char *text = walker.plant ? hx_plant_message(walker.plant) : "out of memory";
+  return *text || !walker.controller ? text : hx_controller_message(walker.controller);
+}
+
+static void show(void) {
+  const hxOutput *out = &walker.output;
+  hxFrame *frame = &walker.frame;
+  double largest = 0.0;
+  for (int leg = 0; leg < HX_LEGS; ++leg) {
+    frame->contact[leg] = out->foot.contact[leg];
+    for (int joint = 0; joint < HX_JOINTS; ++joint)
+      largest = fmax(largest, fabs(out->torque[leg][joint]));
+  }
+  frame->time = out->time;
+  memcpy(frame->position, out->torso.position, sizeof frame->position);
+  memcpy(frame->quaternion, out->torso.quaternion, sizeof frame->quaternion);
+  memcpy(frame->velocity, out->torso.velocity, sizeof frame->velocity);
+  memcpy(frame->rate, out->torso.angular_velocity, sizeof frame->rate);
+  memcpy(frame->angle, out->angle, sizeof frame->angle);
+  memcpy(frame->force, out->foot.force, sizeof frame->force);
+  memcpy(frame->slip_speed, out->foot.slip_speed, sizeof frame->slip_speed);
+  frame->largest_torque = largest;
+  frame->control = walker.walk.control;
+  frame->pattern = walker.walk.gait.pattern;
+  frame->changing = walker.change.wanted;
+}
+
+static void read_plant(void) {
+  hx_plant_output(walker.plant, &walker.input, &walker.output);
+  show();
+}
+
+static void choose(int control, int pattern) {
+  walker.walk.control = control;
+  walker.walk.gait.pattern = pattern;
+}
+
+int hx_walker_start(int control, int pattern, double friction) {
+  if (!walker.plant) walker.plant = hx_plant_create();
+  if (!walker.controller) walker.controller = hx_controller_create();
+  if (!walker.plant || !walker.controller) return HX_INVALID_ARGUMENT;
+  hx_definition_default(&walker.robot);
+  hx_controller_definition_default(&walker.walk);
+  hx_input_default(&walker.input);
+  hx_controller_input_default(&walker.seen);
+  memset(&walker.change, 0, sizeof walker.change);
+  walker.fade_end = 0.0;
+  walker.steps = 0;
+  walker.robot.friction.mu = friction;
+  choose(control, pattern);
+  int status = hx_plant_reset(walker.plant, &walker.robot, 0.0);
+  if (status == HX_OK) status = hx_controller_reset(walker.controller, &walker.walk, 0.0);
+  if (status == HX_OK) read_plant();
+  return status;
+}
+
+void hx_walker_command(double forward, double left, double turn, double height) {
+  walker.seen.command.vx = forward;
+  walker.seen.command.vy = left;
+  walker.seen.command.yaw_rate = turn;
+  walker.seen.command.height = height;
+}
+
+void hx_walker_push(double x, double y, double z) {
+  walker.input.push_force[0] = x;
+  walker.input.push_force[1] = y;
+  walker.input.push_force[2] = z;
+}
+
+void hx_walker_change(int control, int pattern) {
+  walker.change.wanted = 1;
+  walker.change.control = control;
+  walker.change.pattern = pattern;
+  walker.change.since = walker.change.still_since = walker.output.time;
+  memcpy(walker.change.reference, walker.command.angle_ref, sizeof walker.change.reference);
+}
+
+int hx_walker_set_friction(double friction) {
+  hxDefinition next = walker.robot;
+  memcpy(next.initial.position, walker.output.torso.position, sizeof next.initial.position);
+  memcpy(next.initial.quaternion, walker.output.torso.quaternion, sizeof next.initial.quaternion);
+  memcpy(next.initial.velocity, walker.output.torso.velocity, sizeof next.initial.velocity);
+  memcpy(next.initial.angular_velocity, walker.output.torso.angular_velocity,
+         sizeof next.initial.angular_velocity);
+  memcpy(next.initial.angle, walker.output.angle, sizeof next.initial.angle);
+  memcpy(next.initial.speed, walker.output.speed, sizeof next.initial.speed);
+  next.friction.mu = friction;
+  const int status = hx_plant_reset(walker.plant, &next, walker.output.time);
+  if (status == HX_OK) walker.robot = next;
+  return status;
+}
+
+/* Notes whether the joint commands have stood still for half a gait period, or PATIENCE is over. */
+static int has_stopped(void) {
+  Change *change = &walker.change;
+  const double now = walker.output.time, period = walker.walk.gait.period;
+  double largest = 0.0;
+  for (int leg = 0; leg < HX_LEGS; ++leg)
+    for (int joint = 0; joint < HX_JOINTS; ++joint)
+      largest = fmax(largest, fabs(walker.command.angle_ref[leg][joint] -
+                                   change->reference[leg][joint]));
+  if (largest > STILL) {
+    change->still_since = now;
+    memcpy(change->reference, walker.command.angle_ref, sizeof change->reference);
+  }
+  return now - change->still_since >= 0.5 * period || now - change->since >= PATIENCE * period;
+}
+
+/* Lets the wanted controller begin in the stance, faded in from the last joint commands. */
+static int take_over(void) {
+  choose(walker.change.control, walker.change.pattern);
+  walker.change.wanted = 0;
+  memcpy(walker.from, walker.command.angle_ref, sizeof walker.from);
+  walker.fade_end = walker.output.time + FADE;
+  return hx_controller_reset(walker.controller, &walker.walk, walker.output.time);
+}
+
+/* Returns the share of the old joint commands, from 1 to 0 as a cubic, and its rate [1/s]. */
+static double old_share(double *rate) {
+  const double left = fmax((walker.fade_end - walker.output.time) / FADE, 0.0);
+  *rate = -6.0 * left * (1.0 - left) / FADE;
+  return left * left * (3.0 - 2.0 * left);
+}
+
+/* Writes the joint commands to the plant's input. */
+static void drive(void) {
+  double rate;
+  const double old = old_share(&rate);
+  for (int leg = 0; leg < HX_LEGS; ++leg)
+    for (int joint = 0; joint < HX_JOINTS; ++joint) {
+      const double gap = walker.from[leg][joint] - walker.command.angle_ref[leg][joint];
+      walker.input.angle_ref[leg][joint] = walker.command.angle_ref[leg][joint] + old * gap;
+      walker.input.speed_ref[leg][joint] =
+          (1.0 - old) * walker.command.speed_ref[leg][joint] + rate * gap;
+      walker.input.torque_ref[leg][joint] = (1.0 - old) * walker.command.torque_ref[leg][joint];
+    }
+}
+
+/* Calculates the joint commands of this macro-step. */
+static int control(double t_end) {
+  hxControllerInput *seen = &walker.seen;
+  const hxControllerInput asked = *seen;
+  memcpy(seen->angle, walker.output.angle, sizeof seen->angle);
+  memcpy(seen->foot_force, walker.output.foot.force, sizeof seen->foot_force);
+  memcpy(seen->quaternion, walker.output.torso.quaternion, sizeof seen->quaternion);
+  if (walker.change.wanted) memset(&seen->command, 0, sizeof seen->command);
+  hx_controller_output(walker.controller, seen, &walker.command);
+  const int status = hx_controller_step(walker.controller, seen, NULL, t_end);
+  seen->command = asked.command;
+  return status;
+}
+
+static int macro_step(void) {
+  const double t_end = (double)(walker.steps + 1) * MACRO_STEP;
+  int status = control(t_end);
+  if (status == HX_OK && walker.change.wanted && has_stopped()) {
+    status = take_over();
+    if (status == HX_OK) status = control(t_end);
+  }
+  if (status != HX_OK) return status;
+  drive();
+  status = hx_plant_step(walker.plant, &walker.input, t_end);
+  if (status != HX_OK) return status;
+  ++walker.steps;
+  read_plant();
+  return HX_OK;
+}
+
+int hx_walker_advance(int steps) {
+  for (int k = 0; k < steps; ++k) {
+    const int status = macro_step();
+    if (status != HX_OK) return status;
+  }
+  return HX_OK;
+}
+
+const hxOutput *hx_walker_replay(double t_end) {
+  if (hx_plant_step(walker.plant, &walker.input, t_end) != HX_OK) return NULL;
+  read_plant();
+  return &walker.output;
+}

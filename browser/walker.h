@@ -1,0 +1,55 @@
+/* walker.h - the default robot with its controller, for a page that steps them without a server
+ *
+ * Compiled to WebAssembly together with the cores of plant and controller (tools/browser.py). There
+ * is one robot in a module. SI units, frames and orders as in hexapod.h.
+ */
+#ifndef HEXAPOD_WALKER_H
+#define HEXAPOD_WALKER_H
+
+#include "hexapod/controller.h"
+#include "hexapod/hexapod.h"
+
+/* What a page shows, as of the last macro-step. It consists of doubles only. */
+typedef struct hxFrame {
+  double time;                        /* s    since the start */
+  double position[3], quaternion[4];  /* m, 1 torso's centre of mass, attitude */
+  double velocity[3], rate[3];        /* m/s, rad/s  world axes */
+  double angle[HX_LEGS][HX_JOINTS];   /* rad */
+  double contact[HX_LEGS];            /* 1: the foot touches the ground */
+  double force[HX_LEGS][3];           /* N    ground on foot */
+  double slip_speed[HX_LEGS];         /* m/s */
+  double largest_torque;              /* N m  of all servos */
+  double control, pattern;            /* hxControl, hxPattern that hold */
+  double changing;                    /* 1: the robot stops to change its control or gait */
+} hxFrame;
+
+/* Allocates the robot once and places it at its start; HX_OK, or the status of the first failure,
+ * explained by hx_walker_message. */
+HX_API int hx_walker_start(int control, int pattern, double friction);
+
+/* Sets the body velocity in the torso's axes [m/s, rad/s] and the height above the stance [m]. */
+HX_API void hx_walker_command(double forward, double left, double turn, double height);
+
+/* Sets the force on the torso's centre of mass, world axes [N]. */
+HX_API void hx_walker_push(double x, double y, double z);
+
+/* Changes the control and the pattern of the gait. The present controller stops the robot first;
+ * the next one begins in the stance, and the joint commands fade from the old to the new ones. */
+HX_API void hx_walker_change(int control, int pattern);
+
+/* Changes the friction coefficient: the plant begins again in its present pose and motion. */
+HX_API int hx_walker_set_friction(double friction);
+
+/* Advances by macro-steps of hx_walker_macro_step() [s]. */
+HX_API int hx_walker_advance(int steps);
+HX_API double hx_walker_macro_step(void);
+
+HX_API const hxFrame *hx_walker_frame(void);
+HX_API const char *hx_walker_message(void); /* of the last failure, "" before any */
+
+/* Memory that a page may write to: the plant's input of a replay. */
+HX_API hxInput *hx_walker_input(void);
+/* Steps the plant alone to t_end under hx_walker_input() and returns its outputs. NULL: failed. */
+HX_API const hxOutput *hx_walker_replay(double t_end);
+
+#endif

@@ -1,0 +1,124 @@
+"""Defines the command `hexapod identify`: a robot's numbers from its own logs."""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from hexapod_cosim.cosim.cli.replay_command import RobotName
+from hexapod_cosim.cosim.cli.terminal import (
+    Json,
+    show_files,
+    show_json,
+    show_table,
+    show_text,
+    waiting,
+    warn,
+)
+from hexapod_cosim.cosim.identify.excitation import propose
+from hexapod_cosim.cosim.identify.identify import HELD_OUT, Identified
+from hexapod_cosim.cosim.identify.identify import identify as identify_robot
+from hexapod_cosim.cosim.identify.identify_files import (
+    ERRORS,
+    ESTIMATES,
+    error_rows,
+    estimate_rows,
+    proposal_text,
+    result_table,
+    untold_text,
+    write_identified,
+)
+from hexapod_cosim.cosim.identify.log import read_log
+from hexapod_cosim.cosim.identify.unknowns import GROUPS
+from hexapod_cosim.cosim.results.results import results_folder
+from hexapod_cosim.models import HexapodError, load_robot, unknown_name
+
+FOUND = ("servo", "mass", "contact", "sensor")  # without --find
+Logs = Annotated[
+    list[Path],
+    typer.Argument(
+        metavar="LOG...",
+        help="CSV, Parquet or MCAP files with commands and readings, each from standing still on.",
+    ),
+]
+Find = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--find",
+        metavar="|".join(GROUPS),
+        help="Which numbers to find; repeat it for more. Default: all but zero, the legs' zeros.",
+    ),
+]
+HeldOut = Annotated[
+    float,
+    typer.Option("--held-out", metavar="SHARE", help="Part of each log that only judges."),
+]
+Propose = Annotated[
+    bool,
+    typer.Option("--propose/--no-propose", help="Search for a walk that would tell more."),
+]
+Folder = Annotated[
+    Path | None,
+    typer.Option("-o", "--output", metavar="DIR", help="Where to write; default out/identify."),
+]
+
+
+def identify(
+    logs: Logs,
+    robot: RobotName = "athena",
+    find: Find = None,
+    held_out: HeldOut = HELD_OUT,
+    search: Propose = True,
+    output: Folder = None,
+    json: Json = False,
+) -> None:
+    """Find a robot's masses, servos, contacts and sensors from its own logs."""
+    groups = _checked(find or list(FOUND), held_out)
+    own = load_robot(robot)
+    words = ["hexapod", "identify", *map(str, logs), "--robot", robot]
+    words += [word for name in find or [] for word in ("--find", name)]
+    words += ["--held-out", str(held_out)] if held_out != HELD_OUT else []
+    words += [] if search else ["--no-propose"]
+    recorded = [read_log(path, torso_com=own.torso.com) for path in logs]
+    with results_folder(output or Path("out") / "identify") as folder:
+        with waiting("identifying the robot"):
+            found = identify_robot(recorded, own, groups=groups, held_out=held_out)
+        with waiting("searching for a walk that would tell more"):
+            proposals = propose(found, robot) if search else []
+        folder.begin()
+        files = write_identified(found, proposals, robot, folder.path, command=shlex.join(words))
+    for _, column in found.bad:
+        warn(f"{column.name} is left out: {column.why}")
+    if json:
+        show_json({**result_table(found, proposals), "files": [str(path) for path in files]})
+        return
+    _show(found, files)
+    if search:
+        show_text(proposal_text(proposals))
+
+
+def _checked(names: Sequence[str], held_out: float) -> list[str]:
+    """Returns the groups. Raises HexapodError for an unknown one and a share that is none."""
+    for name in names:
+        if name not in GROUPS:
+            raise unknown_name("group of numbers", name, GROUPS, where="--find")
+    if not 0.0 <= held_out <= 0.9:
+        raise HexapodError(
+            "not a share",
+            got=held_out,
+            expected="0 to 0.9",
+            fix="give --held-out 0.25",
+            where="--held-out",
+        )
+    return list(names)
+
+
+def _show(found: Identified, files: Sequence[Path]) -> None:
+    show_table(ESTIMATES, estimate_rows(found.estimates), right=(2, 3, 4))
+    show_table(ERRORS, error_rows(found.held_out() or found.fitted()), right=(2, 3, 4))
+    show_text(untold_text(found))
+    show_files(files)

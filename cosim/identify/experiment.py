@@ -1,0 +1,134 @@
+"""Predicts the readings of a log from values of the unknowns, by simulation with the FMU."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from types import SimpleNamespace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hexapod_cosim.cosim.common.components import PLANT
+from hexapod_cosim.cosim.identify.log import ATTITUDE, CHANNELS, Log
+from hexapod_cosim.cosim.identify.log_plant import LogPlant
+from hexapod_cosim.cosim.identify.start import initial_state
+from hexapod_cosim.cosim.identify.unknowns import CURRENT, DELAY, Unknown, changed_robot
+from hexapod_cosim.cosim.interface.names import joint_names, vector_names
+from hexapod_cosim.cosim.interface.start_values import parameter_values
+from hexapod_cosim.models import Robot
+from hexapod_cosim.models.kinematics import axis_quaternion, quaternion_product
+
+Array = NDArray[np.float64]
+PLACE, TURN = vector_names("initial.position"), vector_names("initial.quaternion", 4)
+JOINTS = [name.removesuffix(".angle") for name in joint_names("angle")]
+# start values of a pose, which a log replaces
+_REST = SimpleNamespace(
+    position=[0.0] * 3, quaternion=[1.0, 0.0, 0.0, 0.0], angle=[[0.0] * 3 for _ in range(6)]
+)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Experiment:
+    """A log and what is compared of it."""
+
+    log: Log
+    number: int  # of the log, from 0
+    columns: tuple[str, ...]  # readings that are compared
+    fitted: slice  # rows that are compared in the fit
+    held_out: slice  # rows that the fit does not see
+
+    @property
+    def measured(self) -> Array:
+        """The compared readings (rows, columns)."""
+        return self.log.recording.columns(self.columns)
+
+    def without(self, names: Sequence[str]) -> Experiment:
+        """Returns the experiment without some columns."""
+        return replace(self, columns=tuple(name for name in self.columns if name not in names))
+
+    @property
+    def channels(self) -> list[str]:
+        """The channel of each column."""
+        keys = {name: channel.key for channel in CHANNELS for name in channel.names}
+        return [keys[name] for name in self.columns]
+
+
+def robot_parameters(robot: Robot, base: Robot) -> dict[str, float]:
+    """Returns the parameters of the FMU in which a robot differs from the one it was made of."""
+    own = parameter_values(PLANT, SimpleNamespace(robot=robot, settled=_REST))
+    other = parameter_values(PLANT, SimpleNamespace(robot=base, settled=_REST))
+    return {name: value for name, value in own.items() if value != other[name]}
+
+
+def simulated(
+    plant: LogPlant,
+    experiment: Experiment,
+    base: Robot,
+    rows: Sequence[Unknown],
+    values: Mapping[str, float],
+) -> Array:
+    """Simulates a log; returns the outputs of which its readings are made (rows, columns).
+
+    base: the robot of the plant's FMU; `values` replace its numbers.
+
+    Raises HexapodError when the FMU refuses a value or a step.
+    """
+    robot, log = changed_robot(base, rows, values), experiment.log
+    zero = np.array([values.get(f"zero.{name}", 0.0) for name in JOINTS])
+    names = [_source(name) for name in experiment.columns]
+    different = list(dict.fromkeys(names))
+    found = plant.simulate(
+        log,
+        different,
+        {
+            **robot_parameters(robot, base),
+            **_start(log, robot, zero, experiment.number, values),
+        },
+        offset=-zero if zero.any() else None,
+        delay=values.get(DELAY, 0.0),
+    )
+    return found[:, [different.index(name) for name in names]]
+
+
+def readings(experiment: Experiment, outputs: Array, values: Mapping[str, float]) -> Array:
+    """Returns what the sensors read (rows, columns) of the outputs of `simulated`."""
+    found = outputs.copy()
+    for k, name in enumerate(experiment.columns):
+        if name.endswith(".angle"):
+            found[:, k] += values.get(f"zero.{name.removesuffix('.angle')}", 0.0)
+        elif name.endswith(".current"):
+            found[:, k] /= values.get(CURRENT, 1.0)
+        elif name == ATTITUDE[2]:
+            found[:, k] = np.unwrap(found[:, k])
+        found[:, k] += values.get(f"bias.{name}", 0.0)
+    return found
+
+
+def needs_simulation(row: Unknown) -> bool:
+    """Returns whether a number changes more than the reading of simulated outputs."""
+    return not (row.key.startswith("bias.") or row.key == CURRENT)
+
+
+def _source(name: str) -> str:
+    """Returns the output of the FMU that a reading is made of."""
+    return name.removesuffix(".current") + ".torque" if name.endswith(".current") else name
+
+
+def _start(
+    log: Log, robot: Robot, zero: Array, number: int, values: Mapping[str, float]
+) -> dict[str, float]:
+    """Returns the initial state: that of the first row, without the zeros of the joints' angles
+    and with the start values that are unknown.
+    """
+    found = initial_state(log, robot)
+    for name, offset in zip(joint_names("angle"), zero.tolist(), strict=True):
+        found[f"initial.{name}"] -= offset
+    for axis, name in zip("xy", PLACE, strict=False):
+        found[name] += values.get(f"start.{axis}[{number + 1}]", 0.0)
+    yaw = values.get(f"start.yaw[{number + 1}]", 0.0)
+    if yaw:
+        turn = axis_quaternion(np.array([0.0, 0.0, 1.0]), yaw)
+        old = np.array([found[name] for name in TURN])
+        found |= dict(zip(TURN, quaternion_product(turn, old).tolist(), strict=True))
+    return found

@@ -1,0 +1,199 @@
+"""Writes an identification into a folder: robot file, sensors, figures, report."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import tomlkit
+
+from hexapod_cosim.cosim.common.files import RUN_FILE, write_json, write_text
+from hexapod_cosim.cosim.identify.comparison import Difference
+from hexapod_cosim.cosim.identify.excitation import Proposal, scenario_text
+from hexapod_cosim.cosim.identify.figures import channel_figures, embedded
+from hexapod_cosim.cosim.identify.identify import NEAR, Estimate, Identified
+from hexapod_cosim.cosim.identify.page import TITLES, Section, number, rendered
+from hexapod_cosim.cosim.identify.robot_file import SENSORS, sensors_table, write_robot
+
+KIND, ROBOT_FILE, REPORT, RESULT = "identify", "robot.toml", "report.html", "identify.json"
+EXPERIMENT = "experiment.toml"
+ESTIMATES = ("number", "unit", "before", "found", "95 % interval", "told", "nearest partner")
+ERRORS = ("channel", "unit", "before", "after", "ratio")
+
+
+def write_identified(
+    found: Identified,
+    proposals: Sequence[Proposal],
+    file: str,
+    folder: Path,
+    *,
+    command: str,
+) -> list[Path]:
+    """Writes robot.toml, sensors.toml, identify.json, the proposed experiment, the report and
+    run.json; returns the files.
+
+    file: the robot file that was given.
+    """
+    logs = [one.log.where for one in found.experiments]
+    names = [ROBOT_FILE, SENSORS, RESULT]
+    write_robot(found, file, folder / ROBOT_FILE, logs)
+    write_text(folder / SENSORS, tomlkit.dumps(dict(sensors_table(found))))
+    content = result_table(found, proposals)
+    write_json(folder / RESULT, content)
+    if proposals and proposals[0].tells:
+        names.append(EXPERIMENT)
+        write_text(folder / EXPERIMENT, scenario_text(proposals[0], ROBOT_FILE))
+    write_text(folder / REPORT, _page(found, proposals, command))
+    facts = {
+        "kind": KIND,
+        "status": "completed",
+        "logs": logs,
+        "robot": {"name": found.file.name, "hash": found.file.hash},
+        "command": command,
+    }
+    write_json(folder / RUN_FILE, facts)
+    return [folder / name for name in (*names, REPORT, RUN_FILE)]
+
+
+def result_table(found: Identified, proposals: Sequence[Proposal]) -> dict[str, Any]:
+    """Returns everything that was found, for JSON."""
+    return {
+        "estimates": [{**asdict(one), "told": one.told} for one in found.estimates],
+        "rank": found.rank,
+        "unknowns": len(found.fit.rows),
+        "noise": dict(found.fit.noise),
+        "readings_that_count_as_one": dict(found.fit.correlated),
+        "bad_columns": [
+            {"log": found.experiments[number].log.where, **asdict(column)}
+            for number, column in found.bad
+        ],
+        "held_out": _error_table(found.held_out()),
+        "fitted": _error_table(found.fitted()),
+        "proposals": [
+            {"walk": one.title, "tells": list(one.tells), "deviations": dict(one.deviations)}
+            for one in proposals
+        ],
+    }
+
+
+def _error_table(pairs: Sequence[tuple[Difference, Difference]]) -> list[dict[str, Any]]:
+    return [
+        {"channel": one.channel, "unit": one.unit, "before": one.rms, "after": other.rms}
+        for one, other in pairs
+    ]
+
+
+def estimate_rows(estimates: Sequence[Estimate]) -> list[list[str]]:
+    """Returns the rows of a table with ESTIMATES."""
+    return [
+        [
+            one.key,
+            one.unit,
+            number(one.before),
+            f"{one.value:.5g}",
+            f"{one.low:.5g} to {one.high:.5g}",
+            "yes" if one.told else "no",
+            f"{one.partner} {one.correlation:+.2f}" if abs(one.correlation) > NEAR else "",
+        ]
+        for one in estimates
+    ]
+
+
+def error_rows(pairs: Sequence[tuple[Difference, Difference]]) -> list[list[str]]:
+    """Returns the rows of a table with ERRORS."""
+    return [
+        [
+            TITLES[one.channel],
+            one.unit,
+            number(one.rms),
+            number(other.rms),
+            f"{one.rms / other.rms:.1f}" if other.rms > 0.0 else "",
+        ]
+        for one, other in pairs
+    ]
+
+
+def untold_text(found: Identified) -> str:
+    """Returns what the logs cannot tell, as a sentence."""
+    untold = [one.key for one in found.estimates if not one.told]
+    text = (
+        f"The logs tell {found.rank} independent combinations of {len(found.fit.rows)} numbers "
+        "better than the robot file. "
+    )
+    if not untold:
+        return text + "They tell every number."
+    return text + f"They do not tell: {', '.join(untold)}."
+
+
+def proposal_text(proposals: Sequence[Proposal]) -> str:
+    """Returns which experiment would tell more, as a sentence."""
+    if not proposals or not proposals[0].tells:
+        return "None of the walks that were tried would tell more."
+    best = proposals[0]
+    return f"{best.title} would tell: {', '.join(best.tells)}."
+
+
+def _page(found: Identified, proposals: Sequence[Proposal], command: str) -> str:
+    estimates, held = found.estimates, found.held_out()
+    told = [one for one in estimates if one.told]
+    first = found.experiments[0]
+    sides = {"before": found.before[0], "after": found.fit.predictions[0]}
+    simulations = {
+        label: dict(zip(first.columns, own.T, strict=True)) for label, own in sides.items()
+    }
+    split = float(first.log.time[first.held_out][0]) if _rows(first.held_out) else None
+    figures = channel_figures(first.log, simulations, split=split)
+    sections = [
+        Section(
+            title="Held-out rows",
+            caption="Root mean squares of simulated minus measured over the rows that the fit did "
+            "not see, before and after; they contain the noise of the sensors.",
+            columns=ERRORS,
+            rows=error_rows(held),
+            left=2,
+        ),
+        Section(
+            title="Numbers",
+            caption="Told: the logs at least halve what was unknown of a number. The partner is "
+            f"the number with which it is correlated, above {NEAR}.",
+            columns=ESTIMATES,
+            rows=estimate_rows(estimates),
+            left=2,
+        ),
+        Section(title="What the logs cannot tell", caption=untold_text(found)),
+        Section(
+            title="Which experiment would",
+            caption=proposal_text(proposals),
+            columns=("walk", "tells besides", "median deviation"),
+            rows=[
+                [one.title, ", ".join(one.tells) or "nothing", number(one.median)]
+                for one in proposals
+            ],
+            left=2,
+        ),
+        Section(
+            title="Measured and simulated",
+            caption="The rows right of the vertical line were held out.",
+            pictures={title: embedded(svg) for title, svg in figures.items()},
+        ),
+    ]
+    return rendered(
+        sections,
+        title=f"Robot {found.file.name} identified from {len(found.experiments)} log(s)",
+        headline=f"{len(told)} of {len(estimates)} numbers are told by the logs",
+        lead="Each number is the most probable one, given the readings and the robot file.",
+        warnings=[f"{column.name} is left out: {column.why}." for _, column in found.bad],
+        command=command,
+        facts={
+            "logs": ", ".join(one.log.where for one in found.experiments),
+            "rows": ", ".join(str(len(one.log.time)) for one in found.experiments),
+            "noise": ", ".join(f"{key} {value:.3g}" for key, value in found.fit.noise.items()),
+        },
+        source=RESULT,
+    )
+
+
+def _rows(part: slice) -> int:
+    return int(part.stop - part.start)

@@ -1,0 +1,395 @@
+"""Runs many environments in C (master/src/environments.c), over threads.
+
+`Batch` owns the FMUs, the memory that is exchanged with C and the threads. An action array goes in,
+arrays of observations, rewards and flags come out; all of them are views of the memory that C reads
+and writes.
+"""
+
+from __future__ import annotations
+
+import ctypes as ct
+import os
+import threading
+from collections.abc import Mapping, Sequence
+from functools import cache
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hexapod_cosim.cosim.common.plant_files import BUILD, LOOP, shared_library
+from hexapod_cosim.cosim.interface.names import foot_names, joint_names, vector_names
+from hexapod_cosim.cosim.master.fmu import Fmu
+from hexapod_cosim.cosim.master.fmu_controller import COMMANDS, SENSED
+from hexapod_cosim.cosim.master.signals import MEASURED, PUSH
+from hexapod_cosim.cosim.master.wiring import JOINT_COMMANDS
+from hexapod_cosim.gym.plants import (
+    CONTROL_PERIOD,
+    export_base,
+    export_plant,
+    grounds,
+    start_height,
+    surfaces,
+)
+from hexapod_cosim.gym.settings import BLOCKS, JOINTS, RATE, REASONS, TERMS, EnvSettings
+from hexapod_cosim.models import FmuError, HexapodError, Robot
+
+AUTORESET = ("next_step", "same_step", "disabled")  # hxAutoreset in C
+FAILED = REASONS.index("failed")
+MESSAGE_SIZE = 512
+# outputs of the plant in the order of hxEnvPlace
+OUTPUTS = [
+    *MEASURED["angle"],
+    *MEASURED["speed"],
+    *MEASURED["foot_force"],
+    *MEASURED["quaternion"],
+    *MEASURED["angular_velocity"],
+    *joint_names("torque"),
+    *vector_names("torso.position"),
+    *vector_names("torso.velocity"),
+    *vector_names("torso.contact_force"),
+    *foot_names("slip_distance"),
+]
+# functions of an FMU in the order of hxEnvFmu
+CALLS = (
+    *("Instantiate", "FreeInstance", "Reset", "SetupExperiment", "EnterInitializationMode"),
+    *("ExitInitializationMode", "GetReal", "SetReal", "DoStep"),
+)
+
+Array = NDArray[Any]
+_Pointer, _Size = ct.c_void_p, ct.c_size_t
+
+
+class _Fmu(ct.Structure):
+    """hxEnvFmu in C."""
+
+    _fields_ = [
+        *((name, _Pointer) for name in CALLS),
+        ("guid", ct.c_char_p),
+        ("resources", ct.c_char_p),
+    ]
+
+
+class _Draws(ct.Structure):
+    """hxEnvDraws in C."""
+
+    _fields_ = [
+        *((name, _Pointer) for name in ("reference", "low", "high", "whole", "group")),
+        ("count", _Size),
+    ]
+
+
+class _Settings(ct.Structure):
+    """hxEnvSettings in C."""
+
+    _fields_ = [
+        ("plant", _Fmu), ("controller", _Fmu),
+        *((name, _Pointer) for name in (
+            "plant_output", "plant_input", "controller_input", "controller_output")),
+        ("draws", _Draws),
+        ("h", ct.c_double), ("substeps", _Size), ("length", _Size),
+        ("stance", ct.c_double * JOINTS), ("action_scale", ct.c_double * JOINTS),
+        ("action_limit", ct.c_double), ("observed", ct.c_double * 3 * len(BLOCKS)),
+        ("clock", ct.c_double),
+        ("command_low", ct.c_double * 3), ("command_high", ct.c_double * 3),
+        ("push_interval", _Size), ("push_length", _Size), ("push_force", ct.c_double),
+        ("upright", ct.c_double), ("belly_force", ct.c_double),
+        ("weight", ct.c_double * len(TERMS)), ("width", ct.c_double * 2),
+        ("autoreset", ct.c_int),
+    ]  # fmt: skip
+
+
+ARRAYS = (  # of hxEnvArrays in C
+    *("action", "observation", "last", "reward", "term"),
+    *("terminated", "truncated", "refused", "reason"),
+)
+
+
+class _Arrays(ct.Structure):
+    """hxEnvArrays in C."""
+
+    _fields_ = [(name, _Pointer) for name in ARRAYS]
+
+
+@cache
+def _library() -> ct.CDLL:
+    """Loads the C loop and declares its functions. Raises FmuError."""
+    path = shared_library(LOOP)
+    library = ct.CDLL(str(path))
+    if not hasattr(library, "hx_environments_settings_size"):
+        raise FmuError("the co-simulation library is another version's", got=str(path), fix=BUILD)
+    library.hx_environments_settings_size.restype = _Size
+    if library.hx_environments_settings_size() != ct.sizeof(_Settings):
+        raise FmuError("the co-simulation library is another version's", got=str(path), fix=BUILD)
+    library.hx_environments_create.restype = _Pointer
+    library.hx_environments_create.argtypes = [_Pointer, _Pointer, _Size, ct.c_char_p]
+    library.hx_environments_message.restype = ct.c_char_p
+    library.hx_environments_message.argtypes = [_Pointer, _Size]
+    library.hx_environments_reset.argtypes = [_Pointer] * 3
+    for name in ("drawn", "values"):
+        getattr(library, f"hx_environments_{name}").argtypes = [_Pointer, _Size, _Pointer]
+    for name in ("step", "serve", "stop", "destroy"):
+        getattr(library, f"hx_environments_{name}").argtypes = [_Pointer]
+    for name in ("reset", "step", "serve", "stop", "destroy", "drawn", "values"):
+        getattr(library, f"hx_environments_{name}").restype = None
+    return library
+
+
+class Batch:
+    """A number of environments with the same settings; a context manager that frees them.
+
+    Args:
+        settings: of all environments.
+        count: number of environments.
+        threads: that step them; None: one for each core, at most one for each environment.
+        autoreset: "next_step", "same_step" or "disabled", as in Gymnasium.
+
+    Attributes, which `reset` and `step` read and write: `action` (count, 18), float32;
+    `observation` and `last` (count, size), float32; `reward` (count,); `term` (count, 13), the
+    weighted terms of the reward; `terminated`, `truncated` and `refused` (count,), bool; `reason`
+    (count,), an index of REASONS.
+
+    Raises HexapodError for settings that describe no possible robot, ground or controller.
+    """
+
+    def __init__(
+        self,
+        settings: EnvSettings,
+        count: int,
+        *,
+        threads: int | None = None,
+        autoreset: str = "next_step",
+    ) -> None:
+        _check_count("environments", count)
+        cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
+        self.threads = min(cores or 1, count) if threads is None else threads
+        _check_count("threads", self.threads)
+        if autoreset not in AUTORESET:
+            expected = " or ".join(AUTORESET)
+            raise HexapodError(
+                "no such autoreset mode", got=autoreset, expected=expected, fix="name one of these"
+            )
+        self.settings, self.count, self.autoreset = settings, count, autoreset
+        self._all, self._servers, self._fmus = None, list[threading.Thread](), list[Fmu]()
+        self._kept: list[Any] = []
+        try:
+            self._open()
+        except BaseException:
+            self.close()
+            raise
+
+    def _open(self) -> None:
+        """Exports and loads the FMUs, creates the environments and starts the threads."""
+        robots = grounds(self.settings)
+        self.robot = robots[0]
+        with TemporaryDirectory(prefix="hexapod-gym-") as folder:
+            self._fmus.append(Fmu(export_plant(robots, Path(folder))))
+            if self.settings.base != "stance":
+                self._fmus.append(Fmu(export_base(self.settings, self.robot, Path(folder))))
+        self._allocate()
+        native = self._native_settings(robots)
+        arrays = _Arrays(**{name: getattr(self, name).ctypes.data for name in ARRAYS})
+        message = ct.create_string_buffer(MESSAGE_SIZE)
+        self._library = _library()
+        self._all = self._library.hx_environments_create(
+            ct.byref(native), ct.byref(arrays), self.count, message
+        )
+        if not self._all:
+            got = message.value.decode(errors="replace")
+            raise FmuError("the environments cannot be created", got=got, fix="use fewer")
+        for _ in range(self.threads - 1):
+            server = threading.Thread(
+                target=self._library.hx_environments_serve, args=(self._all,), daemon=True
+            )
+            server.start()
+            self._servers.append(server)
+
+    def _allocate(self) -> None:
+        """Allocates the arrays that are exchanged with C."""
+        count, size = self.count, self.settings.size
+        self.action: NDArray[np.float32] = np.zeros((count, JOINTS), np.float32)
+        self.observation: NDArray[np.float32] = np.zeros((count, size), np.float32)
+        self.last: NDArray[np.float32] = np.zeros((count, size), np.float32)
+        self.reward: NDArray[np.float64] = np.zeros(count)
+        self.term: NDArray[np.float64] = np.zeros((count, len(TERMS)))
+        self.terminated: NDArray[np.bool_] = np.zeros(count, bool)
+        self.truncated: NDArray[np.bool_] = np.zeros(count, bool)
+        self.refused: NDArray[np.bool_] = np.zeros(count, bool)
+        self.reason: NDArray[np.int32] = np.zeros(count, np.int32)
+
+    def _keep(self, values: Sequence[Any], dtype: type) -> int:
+        """Returns the address of values that live as long as this object."""
+        array: Array = np.array(values, dtype=dtype)
+        self._kept.append(array)
+        return int(array.ctypes.data)
+
+    def _references(self, fmu: Fmu, names: Sequence[str]) -> int:
+        return self._keep(fmu.references(names), np.uint32)
+
+    def _fmu(self, fmu: Fmu) -> _Fmu:
+        """Returns the functions of an FMU and what its instances are made with."""
+        calls = {name: fmu.address(f"fmi2{name}") for name in CALLS}
+        texts = {"guid": fmu.description.guid.encode(), "resources": fmu.resources.encode()}
+        self._kept.append(texts)
+        return _Fmu(**calls, **texts)
+
+    def _native_settings(self, robots: Sequence[Robot]) -> _Settings:
+        """Returns the settings as C reads them."""
+        given, plant = self.settings, self._fmus[0]
+        stance = np.array([leg.stance for leg in self.robot.legs])
+        commands = (given.command_vx, given.command_vy, given.command_yaw_rate)
+        native = _Settings(
+            plant=self._fmu(plant),
+            plant_output=self._references(plant, OUTPUTS),
+            plant_input=self._references(plant, [*JOINT_COMMANDS, *PUSH[:3]]),
+            draws=self._draws(robots),
+            h=1.0 / RATE,
+            substeps=1,
+            length=given.steps,
+            stance=(ct.c_double * JOINTS)(*stance.ravel()),
+            action_scale=(ct.c_double * JOINTS)(*[given.action_scale] * JOINTS),
+            action_limit=1.0,
+            clock=given.clock,
+            command_low=tuple(low for low, _ in commands),
+            command_high=tuple(high for _, high in commands),
+            push_interval=round(given.push_interval * RATE) if given.push_force else 0,
+            push_length=max(round(given.push_duration * RATE), 1),
+            push_force=given.push_force,
+            upright=float(np.cos(given.max_tilt)),
+            belly_force=given.belly_force,
+            weight=tuple(given.rewards.get(name, 0.0) for name in TERMS),
+            width=given.tracking_width,
+            autoreset=AUTORESET.index(self.autoreset),
+        )
+        for place, name in enumerate(BLOCKS):
+            native.observed[place][:] = np.broadcast_to(given.observation.get(name, 0.0), 3)
+        if len(self._fmus) > 1:
+            self._add_controller(native)
+        return native
+
+    def _add_controller(self, native: _Settings) -> None:
+        """Adds the controller to the settings as C reads them."""
+        controller = self._fmus[1]
+        native.controller = self._fmu(controller)
+        sensed = [name for key in SENSED for name in MEASURED[key]]
+        native.controller_input = self._references(controller, [*COMMANDS, *sensed])
+        native.controller_output = self._references(controller, JOINT_COMMANDS)
+        native.substeps = round(1.0 / (RATE * CONTROL_PERIOD))
+        native.h = CONTROL_PERIOD
+
+    def _draws(self, robots: Sequence[Robot]) -> _Draws:
+        """Returns the parameters that are drawn for each episode, as C reads them."""
+        drawn: dict[str, tuple[float, float, bool]] = {
+            name: (low, high, False) for name, (low, high) in self.settings.randomise.items()
+        }
+        count = len(surfaces(robots))
+        if count > 1:
+            height = start_height(robots)
+            drawn |= {"initial.position[3]": (height, height, False)}
+            drawn |= {"terrain.grid": (1.0, float(count), True)}
+        self.drawn_names = tuple(drawn)
+        for name in drawn:
+            self._check_parameter(name)
+        low, high, whole = ([ends[place] for ends in drawn.values()] for place in range(3))
+        return _Draws(
+            reference=self._references(self._fmus[0], self.drawn_names),
+            low=self._keep(low, float),
+            high=self._keep(high, float),
+            whole=self._keep(whole, np.int32),
+            group=self._keep(range(len(drawn)), np.int32),
+            count=len(drawn),
+        )
+
+    def _check_parameter(self, name: str) -> None:
+        """Raises FmuError unless a name is a real parameter of the plant and may have the values
+        that are drawn for it.
+        """
+        ends = self.settings.randomise.get(name)
+        if ends is not None:
+            for value in ends:
+                self._fmus[0].set_parameters({name: float(value)})
+        if name not in self._fmus[0].names("parameter"):
+            raise FmuError(
+                "a parameter that cannot be drawn",
+                got=name,
+                expected="a parameter of the plant that is a real number",
+                fix="remove it from randomise",
+            )
+
+    def reset(
+        self, *, seeds: Sequence[int] | None = None, mask: NDArray[np.bool_] | None = None
+    ) -> None:
+        """Starts an episode in all environments, or in those of a mask (count,).
+
+        seeds: one for each environment, from which its episodes begin again; None: the next
+        episodes. Raises FmuError when a plant refuses its start.
+        """
+        numbers = None if seeds is None else np.array(seeds, dtype=np.uint64)
+        chosen = None if mask is None else np.ascontiguousarray(mask, dtype=np.uint8)
+        if numbers is not None and numbers.shape != (self.count,):
+            raise HexapodError("seeds", got=numbers.shape, expected=f"{self.count} numbers")
+        if chosen is not None and chosen.shape != (self.count,):
+            raise HexapodError("mask", got=chosen.shape, expected=f"{self.count} flags")
+        self._library.hx_environments_reset(
+            self._handle(),
+            None if chosen is None else chosen.ctypes.data,
+            None if numbers is None else numbers.ctypes.data,
+        )
+        failed = np.flatnonzero(self.reason == FAILED)
+        if failed.size:
+            got = self.message(int(failed[0]))
+            raise FmuError(f"environment {failed[0]} cannot start", got=got)
+
+    def step(self) -> None:
+        """Steps all environments under `action`.
+
+        An environment whose action is not finite does not step: it is `refused`.
+        """
+        self._library.hx_environments_step(self._handle())
+
+    def message(self, index: int) -> str:
+        """Returns the last message of an environment's FMUs."""
+        text: bytes = self._library.hx_environments_message(self._handle(), index)
+        return text.decode(errors="replace")
+
+    def drawn(self, index: int) -> dict[str, float]:
+        """Returns the parameters drawn for the present episode of an environment."""
+        values = np.zeros(len(self.drawn_names))
+        self._library.hx_environments_drawn(self._handle(), index, values.ctypes.data)
+        return dict(zip(self.drawn_names, values.tolist(), strict=True))
+
+    def values(self, index: int) -> Mapping[str, float]:
+        """Returns the outputs of the plant of an environment, by name."""
+        values = np.zeros(len(OUTPUTS))
+        self._library.hx_environments_values(self._handle(), index, values.ctypes.data)
+        return dict(zip(OUTPUTS, values.tolist(), strict=True))
+
+    def _handle(self) -> int:
+        if self._all is None:
+            raise HexapodError("the environments are closed", fix="create new ones")
+        return int(self._all)
+
+    def close(self) -> None:
+        """Ends the threads and frees the environments; may be called twice."""
+        handle, self._all = self._all, None
+        if handle:
+            self._library.hx_environments_stop(handle)
+            for server in self._servers:
+                server.join()
+            self._library.hx_environments_destroy(handle)
+        for fmu in self._fmus:
+            fmu.close()
+        self._fmus.clear()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+
+def _check_count(what: str, count: int) -> None:
+    if count < 1:
+        raise HexapodError(f"number of {what}", got=count, expected="1 or more", fix="give one")

@@ -1,0 +1,186 @@
+"""The settings of an environment: robot, ground, actions, observations, rewards and random
+numbers, as data.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, fields, replace
+from types import MappingProxyType
+from typing import Any
+
+from hexapod_cosim.models import HexapodError, unknown_name
+
+JOINTS = 18
+RATE = 50  # Hz  of actions
+BASES = ("stance", "kinematic", "compliant")  # what actions are added to
+
+# Blocks of an observation in their order, with their sizes (hxEnvBlock in C).
+BLOCKS: Mapping[str, int] = MappingProxyType(
+    {
+        "velocity": 3,
+        "rotation": 3,
+        "gravity": 3,
+        "command": 3,
+        "angle": JOINTS,
+        "speed": JOINTS,
+        "action": JOINTS,
+        "clock": 2,
+    }
+)
+# Terms of the reward in their order (hxEnvTerm in C), with the names that legged_gym uses where it
+# has the term.
+TERMS = (
+    "tracking_lin_vel",
+    "tracking_ang_vel",
+    "progress",
+    "lin_vel_z",
+    "ang_vel_xy",
+    "orientation",
+    "torques",
+    "dof_vel",
+    "power",
+    "action_rate",
+    "feet_slip",
+    "alive",
+    "termination",
+)
+# Reasons for the end of an episode (hxEnvReason in C).
+REASONS = ("", "time", "tilted", "belly", "failed")
+
+Range = tuple[float, float]
+Scale = float | tuple[float, float, float]
+
+# The observation that users of legged_gym expect, with its scales.
+LEGGED_GYM: Mapping[str, Scale] = MappingProxyType(
+    {
+        "velocity": 2.0,
+        "rotation": 0.25,
+        "gravity": 1.0,
+        "command": (2.0, 2.0, 0.25),
+        "angle": 1.0,
+        "speed": 0.05,
+        "action": 1.0,
+    }
+)
+# What a robot can measure, and a clock: the observation of policies that are exported as FMUs.
+MEASURABLE: Mapping[str, Scale] = MappingProxyType(
+    {
+        "rotation": 0.25,
+        "gravity": 1.0,
+        "command": (10.0, 10.0, 1.0),
+        "angle": 1.0,
+        "speed": 0.05,
+        "action": 1.0,
+        "clock": 1.0,
+    }
+)
+OBSERVATIONS: Mapping[str, Mapping[str, Scale]] = MappingProxyType(
+    {"legged_gym": LEGGED_GYM, "measurable": MEASURABLE}
+)
+REWARDS: Mapping[str, float] = MappingProxyType(
+    {
+        "tracking_lin_vel": 1.0,
+        "tracking_ang_vel": 0.5,
+        "lin_vel_z": -2.0,
+        "ang_vel_xy": -0.05,
+        "orientation": -1.0,
+        "torques": -1e-4,
+        "action_rate": -0.01,
+        "termination": -1.0,
+    }
+)
+
+
+@dataclass(frozen=True, kw_only=True)
+class EnvSettings:
+    """Everything that distinguishes one environment from another.
+
+    Raises HexapodError for unknown names and impossible numbers.
+    """
+
+    robot: str = "athena"  # name or file
+    terrain: Mapping[str, Any] = field(
+        default_factory=dict
+    )  # as [terrain] of a scenario; {}: the robot's own
+    terrain_seeds: int = 1  # grounds with seeds 1, 2, ... to draw from, for kinds with a seed
+    pad_radius: float = 0.0  # m  of the feet on soil; 0: the robot's own
+    base: str = "stance"  # what actions are added to: the standing pose or a controller's commands
+    action_scale: float = 0.4  # rad  change of a joint's commanded angle for the action 1
+    observation: Mapping[str, Scale] = field(default_factory=lambda: LEGGED_GYM)
+    rewards: Mapping[str, float] = field(default_factory=lambda: REWARDS)  # weights of the terms
+    tracking_width: tuple[float, float] = (0.1, 0.25)  # m/s, rad/s  of the tracking terms
+    clock: float = 1.5  # Hz
+    duration: float = 20.0  # s  of an episode
+    command_vx: Range = (0.0, 0.15)  # m/s  drawn for each episode
+    command_vy: Range = (-0.05, 0.05)  # m/s
+    command_yaw_rate: Range = (-0.3, 0.3)  # rad/s
+    push_force: float = 0.0  # N    largest push on the torso; 0: none
+    push_interval: float = 2.0  # s    from the start of a push to the next
+    push_duration: float = 0.1  # s
+    max_tilt: float = math.radians(60.0)  # rad  lean that counts as a fall
+    belly_force: float = 1.0  # N    on the torso that counts as a fall
+    # plant parameters drawn for each episode, as factors of a study: name -> (lowest, highest)
+    randomise: Mapping[str, Range] = field(default_factory=dict)
+    solver: str = "ros2"
+    tolerance: float = 0.01
+    step_max: float = 0.02  # s
+
+    def __post_init__(self) -> None:
+        """Checks names and numbers."""
+        _check_names(self.rewards, "term of the reward", TERMS)
+        _check_names(self.observation, "block of the observation", BLOCKS)
+        _check_names([self.base], "base of actions", BASES)
+        for name in ("command_vx", "command_vy", "command_yaw_rate"):
+            check_range(name, getattr(self, name))
+        for name, given in self.randomise.items():
+            check_range(f"randomise: {name}", given)
+        if not all(math.isfinite(weight) for weight in self.rewards.values()):
+            raise _refused("a weight of the reward", dict(self.rewards), "finite numbers")
+        for name in ("action_scale", "duration", "tolerance", "push_interval"):
+            value = getattr(self, name)
+            if not (math.isfinite(value) and value > 0.0):
+                raise _refused(name, value, "a finite number above 0")
+        if not self.observation:
+            raise _refused("observation", "no blocks", f"some of {', '.join(BLOCKS)}")
+
+    @property
+    def size(self) -> int:
+        """Number of values in an observation."""
+        return sum(size for name, size in BLOCKS.items() if name in self.observation)
+
+    @property
+    def steps(self) -> int:
+        """Number of steps in a whole episode."""
+        return max(round(self.duration * RATE), 1)
+
+
+def check_range(name: str, given: Range) -> None:
+    """Raises HexapodError for a range that is not finite or whose ends are exchanged."""
+    if len(given) != 2 or not all(map(math.isfinite, given)) or given[0] > given[1]:
+        raise _refused(name, given, "a range (lowest, highest) of finite numbers")
+
+
+def changed(settings: EnvSettings, changes: Mapping[str, Any]) -> EnvSettings:
+    """Returns settings with changes by name. Raises HexapodError for an unknown name.
+
+    An observation may be given by its name: legged_gym or measurable.
+    """
+    known = [item.name for item in fields(EnvSettings)]
+    _check_names(changes, "setting of the environment", known)
+    given = dict(changes)
+    if isinstance(given.get("observation"), str):
+        _check_names([given["observation"]], "observation", OBSERVATIONS)
+        given["observation"] = OBSERVATIONS[given["observation"]]
+    return replace(settings, **given)
+
+
+def _check_names(names: Iterable[str], what: str, valid: Iterable[str]) -> None:
+    for name in names:
+        if name not in valid:
+            raise unknown_name(what, name, list(valid))
+
+
+def _refused(what: str, got: object, expected: str) -> HexapodError:
+    return HexapodError(what, got=got, expected=expected, fix="change this setting")

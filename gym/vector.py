@@ -1,0 +1,140 @@
+"""Many hexapods as a Gymnasium vector environment whose loop is in C."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from gymnasium.vector import AutoresetMode, VectorEnv
+from gymnasium.vector.utils import batch_space
+from numpy.typing import NDArray
+
+from hexapod_cosim.gym.batch import Batch
+from hexapod_cosim.gym.environment import (
+    LARGEST_SEED,
+    action_space,
+    checked,
+    observation_space,
+)
+from hexapod_cosim.gym.settings import JOINTS, RATE, REASONS, TERMS, changed
+from hexapod_cosim.gym.tasks import task as task_settings
+from hexapod_cosim.models import HexapodError
+
+MODES = {
+    AutoresetMode.NEXT_STEP: "next_step",
+    AutoresetMode.SAME_STEP: "same_step",
+    AutoresetMode.DISABLED: "disabled",
+}
+Result = tuple[
+    NDArray[np.float32], NDArray[np.float64], NDArray[np.bool_], NDArray[np.bool_], dict[str, Any]
+]
+
+
+class HexapodVectorEnv(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[Any]]):
+    """A number of hexapods, stepped together by the C loop over threads.
+
+    Args:
+        num_envs: number of robots.
+        task: the registered name whose settings are used; the other keywords change them.
+        threads: that step the robots; None: one for each core. Results do not depend on it.
+        autoreset_mode: what follows the end of an episode.
+        copy: whether `reset` and `step` return copies of observations, rewards and flags. Without,
+            they return the arrays that the next call overwrites.
+
+    A robot whose action is not finite does not step: `info["refused"]` marks it, its observation
+    stays and its reward is 0. The info of a step also has `terms`, the weighted terms of the reward
+    by name, and `reason` of the episodes that ended.
+    """
+
+    def __init__(
+        self,
+        num_envs: int = 1,
+        *,
+        task: str = "Hexapod-v0",
+        threads: int | None = None,
+        autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
+        copy: bool = True,
+        **changes: Any,
+    ) -> None:
+        mode = AutoresetMode(autoreset_mode)
+        self.settings = changed(task_settings(task), changes)
+        self.num_envs, self._copy, self._mode = num_envs, copy, mode
+        self.metadata = {"autoreset_mode": mode, "render_modes": [], "render_fps": RATE}
+        self.single_action_space = action_space()
+        self.single_observation_space = observation_space(self.settings)
+        self.action_space = batch_space(self.single_action_space, num_envs)
+        self.observation_space = batch_space(self.single_observation_space, num_envs)
+        self._batch = Batch(self.settings, num_envs, threads=threads, autoreset=MODES[mode])
+        self._seeded = False
+
+    def reset(
+        self,
+        *,
+        seed: int | Sequence[int | None] | None = None,
+        options: dict[str, Any] | None = None,
+    ) -> tuple[NDArray[np.float32], dict[str, Any]]:
+        """Starts an episode in all environments, or in those of options["reset_mask"].
+
+        seed: one for each environment, or a number s: environment i has the seed s + i.
+        """
+        mask = None if options is None else options.get("reset_mask")
+        first = seed is None and not self._seeded
+        super().reset(seed=seed if isinstance(seed, int) else None)
+        if first:
+            self._seeded, seed = True, int(self.np_random.integers(LARGEST_SEED))
+        self._batch.reset(seeds=None if seed is None else self._seeds(seed), mask=mask)
+        self._seeded = True
+        drawn = [self._batch.drawn(index) for index in range(self.num_envs)]
+        names = self._batch.drawn_names
+        values = {name: np.array([one[name] for one in drawn]) for name in names}
+        return self._given(self._batch.observation), {"drawn": values}
+
+    def _seeds(self, seed: int | Sequence[int | None]) -> list[int]:
+        """Returns the seeds of all environments. Raises HexapodError."""
+        if isinstance(seed, int):
+            return [seed + index for index in range(self.num_envs)]
+        if len(seed) != self.num_envs:
+            raise HexapodError(
+                "seeds", got=f"{len(seed)} of them", expected=f"{self.num_envs}, one for each"
+            )
+        draw = self.np_random.integers
+        return [int(draw(LARGEST_SEED)) if one is None else one for one in seed]
+
+    def step(self, actions: NDArray[np.float32]) -> Result:
+        """Steps all environments by 20 ms under actions (num_envs, 18) in [-1, 1].
+
+        Raises InvalidAction for another shape.
+        """
+        batch = self._batch
+        batch.action[...] = checked(actions, (self.num_envs, JOINTS))
+        batch.step()
+        return (
+            self._given(batch.observation),
+            self._given(batch.reward),
+            self._given(batch.terminated),
+            self._given(batch.truncated),
+            self._info(),
+        )
+
+    def _info(self) -> dict[str, Any]:
+        batch = self._batch
+        info: dict[str, Any] = {
+            "terms": dict(zip(TERMS, self._given(batch.term).T, strict=True)),
+            "refused": self._given(batch.refused),
+        }
+        ended = batch.terminated | batch.truncated
+        if ended.any():
+            info["reason"] = np.array([REASONS[reason] for reason in batch.reason], dtype=object)
+            info["_reason"] = ended
+            if self._mode is AutoresetMode.SAME_STEP:
+                info["final_obs"] = self._given(batch.last)
+                info["_final_obs"] = ended
+        return info
+
+    def _given(self, array: NDArray[Any]) -> NDArray[Any]:
+        return array.copy() if self._copy else array
+
+    def close_extras(self, **_: Any) -> None:
+        """Ends the threads and frees the plants."""
+        self._batch.close()

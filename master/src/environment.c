@@ -1,0 +1,291 @@
+/* environment.c - one environment: episodes, steps and observations. */
+#include "environment.h"
+
+#include <math.h>
+#include <stdarg.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "hexapod/message.h"
+#include "random.h"
+
+static const double two_pi = 6.283185307179586;
+
+/* ----------------------------------------------------------------------------------------------
+ * FMUs */
+
+/* Keeps a message of an FMU: the logger of its callbacks. */
+#if defined(__GNUC__)
+__attribute__((format(printf, 5, 6)))
+#endif
+static void keep_message(fmi2ComponentEnvironment owner, fmi2String name, fmi2Status status,
+                         fmi2String category, fmi2String format, ...) {
+  hxEnvironment *environment = owner;
+  va_list arguments;
+  (void)name, (void)category;
+  if (status <= fmi2OK) return;
+  va_start(arguments, format);
+  hx_print_list(environment->message, HX_MESSAGE_SIZE, format, arguments);
+  va_end(arguments);
+}
+
+static fmi2Component instantiate(hxEnvironment *environment, const hxEnvFmu *fmu, int which) {
+  const fmi2CallbackFunctions callbacks = {keep_message, calloc, free, NULL, environment};
+  memcpy(&environment->callbacks[which], &callbacks, sizeof callbacks);
+  return fmu->instantiate(which == 0 ? "plant" : "controller", fmi2CoSimulation, fmu->guid,
+                          fmu->resources, &environment->callbacks[which], fmi2False, fmi2False);
+}
+
+int hx_environment_open(hxEnvironment *environment, const hxEnvSettings *settings, double *drawn) {
+  environment->settings = settings;
+  environment->drawn = drawn;
+  environment->ended = 1;
+  environment->plant = instantiate(environment, &settings->plant, 0);
+  if (!environment->plant) return 0;
+  if (!settings->controller.instantiate) return 1;
+  environment->controller = instantiate(environment, &settings->controller, 1);
+  if (environment->controller) return 1;
+  hx_environment_close(environment);
+  return 0;
+}
+
+void hx_environment_close(hxEnvironment *environment) {
+  const hxEnvSettings *settings = environment->settings;
+  if (environment->plant) settings->plant.free_instance(environment->plant);
+  if (environment->controller) settings->controller.free_instance(environment->controller);
+  environment->plant = environment->controller = NULL;
+}
+
+static int accept(fmi2Status status) { return status <= fmi2Warning; }
+
+/* Initialises an instance with its parameters. */
+static int start(const hxEnvFmu *fmu, fmi2Component instance) {
+  return accept(fmu->setup(instance, fmi2False, 0.0, 0.0, fmi2False, 0.0)) &&
+         accept(fmu->enter(instance)) && accept(fmu->leave(instance));
+}
+
+static int read_plant(hxEnvironment *environment) {
+  const hxEnvSettings *settings = environment->settings;
+  return accept(settings->plant.get_real(environment->plant, settings->plant_output, HX_ENV_VALUES,
+                                         environment->value));
+}
+
+/* ----------------------------------------------------------------------------------------------
+ * episodes */
+
+static double uniform(const hxEnvironment *environment, int stream, size_t place) {
+  return hx_uniform(environment->seed, environment->episode, (uint64_t)stream, place);
+}
+
+static void draw_parameters(hxEnvironment *environment) {
+  const hxEnvDraws *draws = &environment->settings->draws;
+  for (size_t i = 0; i < draws->count; ++i) {
+    const double low = draws->low[i], range = draws->high[i] - low;
+    const double u = uniform(environment, HX_STREAM_DRAWS, (size_t)draws->group[i]);
+    environment->drawn[i] = low + (draws->whole[i] ? floor(u * (range + 1.0)) : u * range);
+  }
+}
+
+static void draw_command(hxEnvironment *environment) {
+  const hxEnvSettings *settings = environment->settings;
+  for (size_t i = 0; i < 3; ++i) {
+    const double low = settings->command_low[i], range = settings->command_high[i] - low;
+    environment->body[i] = low + uniform(environment, HX_STREAM_COMMAND, i) * range;
+  }
+}
+
+/* Resets and initialises the FMUs; returns 0 when one refuses. */
+static int restart(hxEnvironment *environment) {
+  const hxEnvSettings *settings = environment->settings;
+  const hxEnvFmu *plant = &settings->plant, *controller = &settings->controller;
+  if (!accept(plant->reset(environment->plant)) ||
+      (settings->draws.count &&
+       !accept(plant->set_real(environment->plant, settings->draws.reference, settings->draws.count,
+                               environment->drawn))) ||
+      !start(plant, environment->plant))
+    return 0;
+  if (environment->controller && (!accept(controller->reset(environment->controller)) ||
+                                  !start(controller, environment->controller)))
+    return 0;
+  return read_plant(environment);
+}
+
+void hx_environment_reset(hxEnvironment *environment) {
+  environment->step = 0;
+  environment->reason = HX_END_NONE;
+  memset(environment->action, 0, sizeof environment->action);
+  memset(environment->input, 0, sizeof environment->input);
+  memset(environment->value, 0, sizeof environment->value);
+  environment->value[HX_ENV_QUATERNION] = 1.0;
+  draw_parameters(environment);
+  draw_command(environment);
+  environment->ended = !restart(environment);
+  if (environment->ended) environment->reason = HX_END_FAILED;
+}
+
+/* ----------------------------------------------------------------------------------------------
+ * steps */
+
+/* Limits and keeps the action; returns the sum of its squared changes. */
+static double take_action(hxEnvironment *environment, const float action[HX_ENV_JOINTS]) {
+  const double limit = environment->settings->action_limit;
+  double change = 0.0;
+  for (int i = 0; i < HX_ENV_JOINTS; ++i) {
+    const double wanted = fmin(fmax((double)action[i], -limit), limit);
+    const double difference = wanted - environment->action[i];
+    change += difference * difference;
+    environment->action[i] = wanted;
+  }
+  return change;
+}
+
+/* Sets the push of this step. */
+static void push(hxEnvironment *environment) {
+  const hxEnvSettings *settings = environment->settings;
+  double *force = environment->input + HX_ENV_COMMANDS;
+  const size_t interval = settings->push_interval;
+  force[0] = force[1] = 0.0;
+  if (!interval || environment->step < interval) return;
+  if (environment->step % interval >= settings->push_length) return;
+  const size_t number = environment->step / interval;
+  const double size = settings->push_force * uniform(environment, HX_STREAM_PUSH, 2 * number);
+  const double angle = two_pi * uniform(environment, HX_STREAM_PUSH, 2 * number + 1);
+  force[0] = size * cos(angle);
+  force[1] = size * sin(angle);
+}
+
+/* Writes the controller's joint commands, or the stance, to the plant's inputs; steps the
+ * controller. */
+static int command_joints(hxEnvironment *environment, double t) {
+  const hxEnvSettings *settings = environment->settings;
+  const hxEnvFmu *fmu = &settings->controller;
+  double given[HX_ENV_BODY + HX_ENV_SENSED];
+  if (!environment->controller) {
+    memcpy(environment->input, settings->stance, sizeof settings->stance);
+    return 1;
+  }
+  memcpy(given, environment->body, sizeof environment->body);
+  memcpy(given + HX_ENV_BODY, environment->value + HX_ENV_ANGLE, HX_ENV_JOINTS * sizeof *given);
+  memcpy(given + HX_ENV_BODY + HX_ENV_JOINTS, environment->value + HX_ENV_FORCE,
+         (3 * HX_ENV_FEET + 4) * sizeof *given);
+  return accept(fmu->set_real(environment->controller, settings->controller_input,
+                              HX_ENV_BODY + HX_ENV_SENSED, given)) &&
+         accept(fmu->get_real(environment->controller, settings->controller_output, HX_ENV_COMMANDS,
+                              environment->input)) &&
+         accept(fmu->do_step(environment->controller, t, settings->h, fmi2True));
+}
+
+static int substep(hxEnvironment *environment, size_t number) {
+  const hxEnvSettings *settings = environment->settings;
+  const double t = (double)(environment->step * settings->substeps + number) * settings->h;
+  if (!command_joints(environment, t)) return 0;
+  for (int i = 0; i < HX_ENV_JOINTS; ++i)
+    environment->input[i] += settings->action_scale[i] * environment->action[i];
+  return accept(settings->plant.set_real(environment->plant, settings->plant_input, HX_ENV_INPUTS,
+                                         environment->input)) &&
+         accept(settings->plant.do_step(environment->plant, t, settings->h, fmi2True)) &&
+         read_plant(environment);
+}
+
+static int advance(hxEnvironment *environment) {
+  push(environment);
+  for (size_t number = 0; number < environment->settings->substeps; ++number)
+    if (!substep(environment, number)) return 0;
+  ++environment->step;
+  return 1;
+}
+
+/* Returns why the episode ends with the present values. */
+static int judge(const hxEnvironment *environment, const hxEnvView *view) {
+  const hxEnvSettings *settings = environment->settings;
+  const double *f = environment->value + HX_ENV_BELLY, limit = settings->belly_force;
+  if (-view->gravity[2] < settings->upright) return HX_END_TILTED;
+  if (f[0] * f[0] + f[1] * f[1] + f[2] * f[2] > limit * limit) return HX_END_BELLY;
+  return environment->step >= settings->length ? HX_END_TIME : HX_END_NONE;
+}
+
+static double slip_distance(const hxEnvironment *environment) {
+  double sum = 0.0;
+  for (int i = 0; i < HX_ENV_FEET; ++i) sum += environment->value[HX_ENV_SLIP + i];
+  return sum;
+}
+
+double hx_environment_step(hxEnvironment *environment, const float action[HX_ENV_JOINTS],
+                           double term[HX_ENV_TERMS]) {
+  const hxEnvSettings *settings = environment->settings;
+  const double before = slip_distance(environment);
+  const double change = take_action(environment, action);
+  const int going = advance(environment);
+  const hxEnvView view = hx_environment_view(environment);
+  environment->reason = going ? judge(environment, &view) : HX_END_FAILED;
+  environment->ended = environment->reason != HX_END_NONE;
+  return hx_reward(environment, change, slip_distance(environment) - before,
+                   (double)settings->substeps * settings->h, term);
+}
+
+/* ----------------------------------------------------------------------------------------------
+ * observations */
+
+/* Computes R^T u, with the rotation R of the quaternion [w x y z], torso to world. */
+static void to_torso(const double p[4], const double u[3], double v[3]) {
+  const double w = p[0], *q = p + 1;
+  const double c[3] = {u[1] * q[2] - u[2] * q[1], u[2] * q[0] - u[0] * q[2],
+                       u[0] * q[1] - u[1] * q[0]}; /* u x q */
+  const double d[3] = {c[1] * q[2] - c[2] * q[1], c[2] * q[0] - c[0] * q[2],
+                       c[0] * q[1] - c[1] * q[0]}; /* (u x q) x q */
+  for (int i = 0; i < 3; ++i) v[i] = u[i] + 2.0 * (w * c[i] + d[i]);
+}
+
+hxEnvView hx_environment_view(const hxEnvironment *environment) {
+  static const double down[3] = {0.0, 0.0, -1.0};
+  const double *value = environment->value, *p = value + HX_ENV_QUATERNION;
+  hxEnvView view;
+  to_torso(p, value + HX_ENV_VELOCITY, view.velocity);
+  to_torso(p, value + HX_ENV_ROTATION, view.rotation);
+  to_torso(p, down, view.gravity);
+  return view;
+}
+
+static const size_t block_size[HX_ENV_BLOCKS] = {
+    3, 3, 3, 3, HX_ENV_JOINTS, HX_ENV_JOINTS, HX_ENV_JOINTS, 2};
+
+/* Returns whether a block is observed. */
+static int sees(const hxEnvSettings *settings, int block) {
+  const double *scale = settings->observed[block];
+  return scale[0] != 0.0 || (block_size[block] == 3 && (scale[1] != 0.0 || scale[2] != 0.0));
+}
+
+size_t hx_environments_observed(const hxEnvSettings *settings) {
+  size_t size = 0;
+  for (int block = 0; block < HX_ENV_BLOCKS; ++block)
+    if (sees(settings, block)) size += block_size[block];
+  return size;
+}
+
+/* Writes a block and returns the place behind it. */
+static float *show(const hxEnvSettings *settings, int block, const double *value, float *to) {
+  const double *scale = settings->observed[block];
+  if (!sees(settings, block)) return to;
+  for (size_t i = 0; i < block_size[block]; ++i)
+    to[i] = (float)(value[i] * scale[block_size[block] == 3 ? i : 0]);
+  return to + block_size[block];
+}
+
+void hx_environment_observe(const hxEnvironment *environment, float *observation) {
+  const hxEnvSettings *settings = environment->settings;
+  const hxEnvView view = hx_environment_view(environment);
+  const double time = (double)(environment->step * settings->substeps) * settings->h;
+  const double turns = settings->clock * time, phase = two_pi * (turns - floor(turns));
+  const double clock[2] = {sin(phase), cos(phase)};
+  double angle[HX_ENV_JOINTS];
+  for (int i = 0; i < HX_ENV_JOINTS; ++i)
+    angle[i] = environment->value[HX_ENV_ANGLE + i] - settings->stance[i];
+  observation = show(settings, HX_SEE_VELOCITY, view.velocity, observation);
+  observation = show(settings, HX_SEE_ROTATION, view.rotation, observation);
+  observation = show(settings, HX_SEE_GRAVITY, view.gravity, observation);
+  observation = show(settings, HX_SEE_COMMAND, environment->body, observation);
+  observation = show(settings, HX_SEE_ANGLE, angle, observation);
+  observation = show(settings, HX_SEE_SPEED, environment->value + HX_ENV_SPEED, observation);
+  observation = show(settings, HX_SEE_ACTION, environment->action, observation);
+  show(settings, HX_SEE_CLOCK, clock, observation);
+}

@@ -1,0 +1,132 @@
+"""Computes the torque of a voltage-driven motor, its current and power (eq. 48), and the friction
+of its gear (eq. 49, 50). The fast form is in plant_fmu/src/lanes/actuator.h.
+
+The equations and the names M1 to M6 are those of Duclusaud, Passault, Padois and Ly, *Extended
+Friction Models for the Physics Simulation of Servo Actuators*, ICRA 2025, arXiv 2410.08650.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from hexapod_cosim.models.records import Array, Servo
+
+
+def torque_per_volt(servo: Servo) -> float:
+    """Returns k_t/R [N m/V]."""
+    return servo.torque_constant / servo.resistance
+
+
+def back_emf_damping(servo: Servo) -> float:
+    """Returns k_t^2/R [N m s/rad], by which the back-EMF damps the joint at a given voltage."""
+    return servo.torque_constant * torque_per_volt(servo)
+
+
+def stall_torque(servo: Servo) -> float:
+    """Returns the motor's torque at its largest voltage and at rest [N m]."""
+    return torque_per_volt(servo) * servo.duty_max * servo.voltage
+
+
+def no_load_speed(servo: Servo) -> float:
+    """Returns the speed at which the back-EMF equals the largest voltage [rad/s]."""
+    return servo.duty_max * servo.voltage / servo.torque_constant
+
+
+def motor_constant(servo: Servo) -> float:
+    """Returns the torque over the root of the copper loss, k_t/sqrt(R) [N m/sqrt(W)]."""
+    return servo.torque_constant / math.sqrt(servo.resistance)
+
+
+def position_gain(servo: Servo, duty_gain: float) -> float:
+    """Returns kp [N m/rad] of a servo whose duty is duty_gain [1/rad] times its position error."""
+    return torque_per_volt(servo) * servo.voltage * duty_gain
+
+
+def motor_torque(servo: Servo, speed: Array, wanted: Array) -> Array:
+    """Returns the motor's torque on the child [N m] (eq. 48), in the shape of the inputs.
+
+    wanted: kp (q_ref - q) + kd (qd_ref - qd) + tau_ff [N m]. In position mode its voltage is
+    R/k_t wanted, as in servos that turn the position error into a duty; torque mode adds the
+    back-EMF, as a current controller does. The voltage is clipped to duty_max times the supply.
+    """
+    stall, brake = stall_torque(servo), back_emf_damping(servo) * speed
+    held = brake if servo.mode == "torque" else 0.0
+    return np.asarray(np.clip(wanted + held, -stall, stall) - brake)
+
+
+def motor_current(servo: Servo, torque: Array) -> Array:
+    """Returns the current of the motor [A], in the shape of its torque [N m]; 0 for the drive line,
+    whose motor is unknown.
+    """
+    return torque / servo.torque_constant if servo.drive == "motor" else np.zeros_like(torque)
+
+
+def electrical_power(servo: Servo, torque: Array, speed: Array) -> Array:
+    """Returns the power that the motor takes from its supply [W], voltage times current, in the
+    shape of the inputs; below 0 it brakes and feeds back. It is 0 for the drive line.
+    """
+    if servo.drive != "motor":
+        return np.zeros_like(torque)
+    return torque * speed + servo.resistance * motor_current(servo, torque) ** 2
+
+
+def has_measured_friction(servo: Servo) -> bool:
+    """Returns whether the gear has more than Coulomb friction."""
+    return (
+        max(
+            servo.viscous_friction,
+            servo.stribeck_friction,
+            servo.motor_load_friction,
+            servo.external_load_friction,
+            servo.stribeck_motor_load_friction,
+            servo.stribeck_external_load_friction,
+            servo.quadratic_motor_friction,
+            servo.quadratic_external_friction,
+        )
+        > 0.0
+    )
+
+
+def friction_budget(servo: Servo, speed: Array, motor: Array, external: Array) -> Array:
+    """Returns the largest dry friction of motor and gear [N m] (eq. 50 without its viscous term).
+
+    motor: torque of the motor; external: torque of gravity, ground and the links' motion on the
+    joint (`external_torques`) [N m]. All arrays have one shape. The models M1 to M5 are special
+    cases: M3 and M4 have equal coefficients for both torques.
+    """
+    load = np.abs(servo.motor_load_friction * motor - servo.external_load_friction * external)
+    sticking = np.abs(
+        servo.stribeck_motor_load_friction * motor
+        - servo.stribeck_external_load_friction * external
+    )
+    opposed = motor * external < 0.0
+    squares = np.where(
+        np.abs(motor) > np.abs(external),
+        servo.quadratic_external_friction * external**2,
+        servo.quadratic_motor_friction * motor**2,
+    )
+    quadratic = np.where(opposed & (np.abs(motor) != np.abs(external)), squares, 0.0)
+    share = np.exp(-(np.abs(speed / servo.stribeck_speed) ** servo.stribeck_exponent))
+    return np.asarray(
+        servo.coulomb_friction + load + share * (servo.stribeck_friction + sticking + quadratic)
+    )
+
+
+def friction_torque(servo: Servo, speed: Array, motor: Array, external: Array) -> Array:
+    """Returns the friction of motor and gear on the child [N m] (eq. 49), in the shape of the
+    inputs, those of `friction_budget`.
+
+    The budget acts against the speed with tanh(speed / friction_speed), so a joint that friction
+    holds creeps at up to about friction_speed.
+    """
+    budget = friction_budget(servo, speed, motor, external)
+    return -budget * np.tanh(speed / servo.friction_speed) - servo.viscous_friction * speed
+
+
+def friction_drag(servo: Servo, speed: Array, motor: Array, external: Array) -> Array:
+    """Returns minus the derivative of `friction_torque` by speed at a given budget [N m s/rad]."""
+    budget = friction_budget(servo, speed, motor, external)
+    steep = 1.0 - np.tanh(speed / servo.friction_speed) ** 2
+    return budget / servo.friction_speed * steep + servo.viscous_friction
