@@ -8,7 +8,12 @@ from hexapod_cosim.models.actuator import stop_energy
 from hexapod_cosim.models.dynamics import constraints, joint_overruns, masses, world_inertias
 from hexapod_cosim.models.kinematics import joint_speeds
 from hexapod_cosim.models.records import Array, Robot
-from hexapod_cosim.models.touch.forces import contacts_at, open_contacts
+from hexapod_cosim.models.touch.forces import (
+    contacts_at,
+    open_contacts,
+    shares_of_feet,
+    spots,
+)
 
 
 def kinetic_energy(robot: Robot, body: Array) -> float:
@@ -22,13 +27,15 @@ def kinetic_energy(robot: Robot, body: Array) -> float:
 
 def potential_energy(robot: Robot, body: Array) -> float:
     """Returns the potential energy [J] of gravity, 0 at the world's origin, of the contacts with
-    rigid ground, 2/5 K delta^2.5 each, and of the joints' stops.
+    rigid ground, 2/5 w K delta^2.5 each with its share w, and of the joints' stops.
     """
     gravity = -float(masses(robot) @ (body[:, 0:3] @ np.array(robot.gravity)))
-    contacts = contacts_at(robot, body, open_contacts(robot))
+    open_ = open_contacts(robot)
+    contacts = contacts_at(robot, body, open_)
+    shares = shares_of_feet(robot, list(zip(spots(robot), open_.held, contacts, strict=True)))
     depth = np.array([max(contact.penetration, 0.0) for contact in contacts])
     stops = float(np.sum(stop_energy(robot.servo, joint_overruns(robot, body))))
-    return gravity + 0.4 * robot.contact.stiffness * float(np.sum(depth**2.5)) + stops
+    return gravity + 0.4 * robot.contact.stiffness * float(shares @ depth**2.5) + stops
 
 
 def centre_of_mass(robot: Robot, body: Array) -> Array:

@@ -277,8 +277,8 @@ def _check_motor(servo: Servo, at: str) -> None:
 
 
 def _check_terrain(robot: Robot, where: str) -> None:
-    """Checks that a ground of the kind grid has a surface, and that its blocks fit the feet."""
-    terrain, radius = robot.terrain, robot.foot.radius
+    """Checks that a ground of the kind grid has a surface, and that it suits the robot."""
+    terrain = robot.terrain
     if terrain.kind != "grid":
         return
     if terrain.surface is None:
@@ -289,30 +289,32 @@ def _check_terrain(robot: Robot, where: str) -> None:
             fix='give Terrain(kind="grid", surface=...)',
             where=where + ".surface",
         )
-    if terrain.surface.kind == "blocks" and terrain.surface.cell < 2.0 * radius:
-        raise RobotError(
-            "blocks narrower than a foot",
-            got=f"{terrain.surface.cell:.4g} m",
-            expected=f"at least twice foot.radius, {2.0 * radius:g} m",
-            fix="enlarge terrain.horizontal_scale",
-            where=where,
-        )
-    check_valleys(robot, terrain.surface, where)
+    check_contact_surface(robot, terrain.surface, where)
 
 
-def check_valleys(robot: Robot, surface: Surface, where: str) -> None:
-    """Checks that the spheres that touch the ground have one nearest point in a surface's valleys.
+def check_contact_surface(robot: Robot, surface: Surface, where: str) -> None:
+    """Checks that blocks and valleys of a surface are wide enough for the spheres that touch it.
 
-    In a narrower valley a sphere touches at two places, of which the plant computes one: forces
-    jump, and energy is not conserved. Raises RobotError; `where` names the surface.
+    A sphere touches one block of a row beside it at most. In a valley narrower than a sphere it
+    touches at two places, of which the plant computes one: forces jump, and energy is not
+    conserved. Raises RobotError; `where` names the surface.
     """
     name, radius = _largest_sphere(robot)
+    part = "foot" if name == "foot.radius" else "part"
+    if surface.kind == "blocks" and surface.cell < 2.0 * radius:
+        raise RobotError(
+            f"blocks narrower than a {part}",
+            got=f"{surface.cell:.4g} m",
+            expected=f"at least twice {name}, {2.0 * radius:g} m",
+            fix=f"enlarge terrain.horizontal_scale, or reduce {name}",
+            where=where,
+        )
     limit = VALLEY_MARGIN * radius
     valley = tightest_valley(surface, limit)
     if valley is None:
         return
     raise RobotError(
-        "valleys narrower than a foot" if name == "foot.radius" else "valleys narrower than a part",
+        f"valleys narrower than a {part}",
         got=f"a radius of curvature of {1e3 * valley.radius:.4g} mm at x = {valley.x:.4g} m, "
         f"y = {valley.y:.4g} m",
         expected=f"at least {1e3 * limit:.4g} mm, {VALLEY_MARGIN:g} times {name}",

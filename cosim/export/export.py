@@ -34,7 +34,7 @@ from hexapod_cosim.models.ground.grid_file import grid_bytes
 from hexapod_cosim.models.ground.surface import Surface
 from hexapod_cosim.models.records import Robot
 from hexapod_cosim.models.terrain import surface_of
-from hexapod_cosim.models.validation import check_settings, check_valleys
+from hexapod_cosim.models.validation import check_contact_surface, check_settings
 
 FMI_VERSIONS = (2, 3)
 FNV_BASIS, FNV_PRIME, MASK, WORD = 0xCBF29CE484222325, 0x100000001B3, (1 << 64) - 1, 8
@@ -72,7 +72,7 @@ def export_fmu(
         robot = replace(robot, terrain=replace(robot.terrain, kind="grid", surface=grids[0]))
         check_settings(robot)
     for number, surface in enumerate(grids, start=1):
-        check_valleys(robot, surface, f"terrain {number}, {surface.name}")
+        check_contact_surface(robot, surface, f"terrain {number}, {surface.name}")
     return export_interface(
         load_interface(robot),
         path,

@@ -87,7 +87,7 @@ def block_face(surface: Surface, point: Array, kind: str, cell: Cell) -> tuple[f
     faces = [
         _neighbour(surface, point, cell, way)
         for way in NEIGHBOURS[kind]
-        if _is_exposed(surface, float(point[2]), cell, way)
+        if _column(surface, cell[0] + way[0], cell[1] + way[1]) > own
     ]
     return min(faces, key=lambda face: face[0]) if faces else None
 
@@ -96,16 +96,6 @@ def _column(surface: Surface, row: int, column: int) -> float:
     """Returns the height [m] of a column, of the border's beyond the map."""
     r, c = min(max(row, 0), surface.rows - 1), min(max(column, 0), surface.columns - 1)
     return float(surface.height[r, c])
-
-
-def _is_exposed(surface: Surface, z: float, cell: Cell, way: Cell) -> bool:
-    """Returns whether a neighbour of a cell is higher and, across a corner, not hidden at z [m]."""
-    (row, column), (dr, dc) = cell, way
-    top = _column(surface, row + dr, column + dc)
-    if top <= float(surface.height[cell]):
-        return False
-    beside = (_column(surface, row + dr, column), _column(surface, row, column + dc))
-    return dr == 0 or dc == 0 or min(z, top) > max(beside)
 
 
 def _neighbour(surface: Surface, point: Array, cell: Cell, way: Cell) -> tuple[float, Array]:

@@ -2,7 +2,10 @@
 
 Between four nodes the surface is the bicubic polynomial with Catmull-Rom slopes: the slope at a
 node is the difference of its neighbours over two cells. Nodes beyond the border follow from linear
-extrapolation, so that a plane is exact. The surface is C1 within the map.
+extrapolation, so that a plane is exact. Beyond the map the slope across its border runs out over 60
+mm: with the distance t from the border and u = t/60 mm the height is b + s (1 - (1 - u)^3)/3 60 mm
+up to u = 1 and constant behind, where b and s are height and slope at the border. The surface is C1
+everywhere.
 """
 
 from __future__ import annotations
@@ -16,6 +19,7 @@ from hexapod_cosim.models.ground.surface import Array, Surface
 ITERATIONS = 100
 HALVINGS = 40
 CONVERGED = 1e-14  # m    of a step
+RUN_OUT = 0.06  # m    beyond the border, over which its slope falls to 0
 SHORT = 1e-6  # m    steps that are not tried: the change of the distance is lost in rounding
 
 # powers of t (1, t, t^2, t^3) in columns; weights of the nodes -1, 0, 1, 2 in rows
@@ -30,12 +34,13 @@ CATMULL_ROM = 0.5 * np.array(
 
 
 def _place(coordinate: float, count: int) -> tuple[int, float, float]:
-    """Returns the cell of a grid coordinate, the place in it from 0 to 1, and whether (1 or 0) the
-    coordinate is on the map.
+    """Returns the cell of a grid coordinate, the place in it from 0 to 1, and how far the
+    coordinate is beyond the map, in cells: positive behind its last node, negative before its first
+    one.
     """
     inside = min(max(coordinate, 0.0), float(count - 1))
     cell = min(math.floor(inside), count - 2)
-    return cell, inside - cell, 1.0 if 0.0 <= coordinate <= count - 1 else 0.0
+    return cell, inside - cell, coordinate - inside
 
 
 def _with_ghosts(values: Array, cell: int, count: int) -> Array:
@@ -45,27 +50,32 @@ def _with_ghosts(values: Array, cell: int, count: int) -> Array:
     return np.stack([before, values[cell], values[cell + 1], behind])
 
 
-def _weights(t: float) -> tuple[Array, Array, Array]:
-    """Returns the four weights at t, and their first and second derivatives by t."""
+def _weights(t: float, beyond: float, cell: float) -> tuple[Array, Array, Array]:
+    """Returns the four weights at t, and their first and second derivatives by t.
+
+    beyond: as in `_place`; cell: spacing of the nodes [m].
+    """
     value = CATMULL_ROM @ np.array([1.0, t, t * t, t**3])
     first = CATMULL_ROM @ np.array([0.0, 1.0, 2.0 * t, 3.0 * t * t])
-    return value, first, CATMULL_ROM @ np.array([0.0, 0.0, 2.0, 6.0 * t])
+    if beyond == 0.0:
+        return value, first, CATMULL_ROM @ np.array([0.0, 0.0, 2.0, 6.0 * t])
+    left = max(1.0 - abs(beyond) * cell / RUN_OUT, 0.0)  # of the run-out
+    way = math.copysign(RUN_OUT / cell, beyond)
+    second = -2.0 * left / way * first
+    return value + way * (1.0 - left**3) / 3.0 * first, left * left * first, second
 
 
 def height_and_slopes(surface: Surface, x: float, y: float) -> tuple[float, Array, Array]:
-    """Returns the height [m] at (x, y), its gradient (2,) and its Hessian (2, 2) [1/m].
-
-    Beyond the map the height is that of the nearest place on its border.
-    """
-    column, t, on_x = _place((x - surface.x0) / surface.cell, surface.columns)
-    row, u, on_y = _place((y - surface.y0) / surface.cell, surface.rows)
+    """Returns the height [m] at (x, y), its gradient (2,) and its Hessian (2, 2) [1/m]."""
+    column, t, beyond_x = _place((x - surface.x0) / surface.cell, surface.columns)
+    row, u, beyond_y = _place((y - surface.y0) / surface.cell, surface.rows)
     band = surface.height[max(row - 1, 0) : row + 3]
     nodes = _with_ghosts(band, row - max(row - 1, 0), len(band))
     nodes = _with_ghosts(nodes.T, column, surface.columns).T  # (4, 4) rows along y
-    a, da, dda = _weights(t)
-    b, db, ddb = _weights(u)
-    da, db = da * on_x / surface.cell, db * on_y / surface.cell
-    dda, ddb = dda * on_x / surface.cell**2, ddb * on_y / surface.cell**2
+    a, da, dda = _weights(t, beyond_x, surface.cell)
+    b, db, ddb = _weights(u, beyond_y, surface.cell)
+    da, db = da / surface.cell, db / surface.cell
+    dda, ddb = dda / surface.cell**2, ddb / surface.cell**2
     gradient = np.array([b @ nodes @ da, db @ nodes @ a])
     mixed = db @ nodes @ da
     return (
@@ -75,12 +85,15 @@ def height_and_slopes(surface: Surface, x: float, y: float) -> tuple[float, Arra
     )
 
 
-def node_weights(coordinates: Array, count: int) -> Array:
-    """Returns the weights (coordinates, nodes) of a grid's nodes at grid coordinates."""
+def node_weights(coordinates: Array, count: int, size: float) -> Array:
+    """Returns the weights (coordinates, nodes) of a grid's nodes at grid coordinates.
+
+    size: of a cell [m].
+    """
     weights = np.zeros((len(coordinates), count + 2))  # with a ghost at each end
     for row, coordinate in enumerate(coordinates.tolist()):
-        cell, t, _ = _place(coordinate, count)
-        weights[row, cell : cell + 4] = _weights(t)[0]
+        cell, t, beyond = _place(coordinate, count)
+        weights[row, cell : cell + 4] = _weights(t, beyond, size)[0]
     inner = weights[:, 1:-1]
     inner[:, :2] += weights[:, :1] * np.array([2.0, -1.0])
     inner[:, -2:] += weights[:, -1:] * np.array([-1.0, 2.0])
@@ -89,8 +102,8 @@ def node_weights(coordinates: Array, count: int) -> Array:
 
 def heights_at(surface: Surface, x: Array, y: Array) -> Array:
     """Returns the heights (y, x) [m] of a smooth surface at all pairs of x and y [m]."""
-    across = node_weights((x - surface.x0) / surface.cell, surface.columns)
-    along = node_weights((y - surface.y0) / surface.cell, surface.rows)
+    across = node_weights((x - surface.x0) / surface.cell, surface.columns, surface.cell)
+    along = node_weights((y - surface.y0) / surface.cell, surface.rows, surface.cell)
     return np.asarray(along @ surface.height @ across.T)
 
 

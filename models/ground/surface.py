@@ -3,7 +3,7 @@
 A smooth surface has its heights at nodes (x0 + cell column, y0 + cell row) and is bicubic between
 them (smooth.py). A surface of blocks has flat cells with vertical walls between them (blocks.py):
 cell (row, column) begins at (x0 + cell column, y0 + cell row). Rows run along +y, columns along +x.
-Beyond the map the height of its border goes on.
+Beyond the map the height of its border goes on, of a smooth surface behind a run-out of its slope.
 """
 
 from __future__ import annotations

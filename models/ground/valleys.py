@@ -8,7 +8,7 @@ centre above it belongs to one point of the surface.
 
 Cells of which an upper bound of the curvature is below the limit are left out. The others are
 sampled, each from its own side, because second derivatives jump at the borders of cells. Beyond the
-map's border, where its height goes on, nothing is computed.
+map's border, where its slope s runs out with the radius 30 mm/s at least, nothing is computed.
 """
 
 from __future__ import annotations

@@ -33,6 +33,7 @@ from hexapod_cosim.models.soil.law import (
     soil_normal_force,
 )
 from hexapod_cosim.models.terrain import faces_of_feet, ground_face, surface_of
+from hexapod_cosim.models.touch.sharing import contact_shares
 
 NEAREST = "nearest"  # face of torso, knees and shanks
 
@@ -137,6 +138,12 @@ def contacts_of(robot: Robot, damping: Array, body_damping: Array | None = None)
     return replace(contacts, held=tuple(replace(held, damping=d) for held, d in pairs))
 
 
+def sphere_centre(spot: Spot, body: Array) -> Array:
+    """Returns the centre (3,) [m] of a contact's sphere at bodies (19, 13)."""
+    state = body[spot.sphere.body]
+    return np.asarray(state[0:3] + rotation_matrix(state[3:7]) @ spot.sphere.centre)
+
+
 def contact_at(robot: Robot, spot: Spot, body: Array, cell: Cell | None = None) -> FootContact:
     """Returns the kinematics of a contact at bodies (19, 13).
 
@@ -145,7 +152,7 @@ def contact_at(robot: Robot, spot: Spot, body: Array, cell: Cell | None = None) 
     state = body[spot.sphere.body]
     if spot.leg < 0:
         return body_contact(robot, spot.sphere, state)
-    centre = state[0:3] + rotation_matrix(state[3:7]) @ spot.sphere.centre
+    centre = sphere_centre(spot, body)
     face = ground_face(robot.terrain, centre, spot.face, cell)
     far = FootContact(centre, np.zeros(3), np.array([0.0, 0.0, 1.0]), -math.inf, 0.0)
     return far if face is None else sphere_contact(state, centre, spot.sphere.radius, face)
@@ -162,13 +169,45 @@ def contacts_at(robot: Robot, body: Array, contacts: Contacts) -> list[FootConta
 def closed_contacts(
     robot: Robot, body: Array, contacts: Contacts
 ) -> list[tuple[int, Spot, Held, FootContact]]:
-    """Returns number, spot, held ground and kinematics of the closed contacts."""
+    """Returns number, spot, held ground and kinematics of the closed contacts.
+
+    The stiffness of feet is multiplied by the shares of their contacts (sharing.py), which are 1
+    but on blocks.
+    """
     found = []
     for k, (spot, held) in enumerate(zip(spots(robot), contacts.held, strict=True)):
         if not held.is_open:
             cell = contacts.cell[spot.leg] if spot.leg >= 0 else None
             found.append((k, spot, held, contact_at(robot, spot, body, cell)))
-    return found
+    shares = shares_of_feet(robot, [(spot, held, contact) for _, spot, held, contact in found])
+    return [
+        (k, spot, _with_share(held, share), contact)
+        for (k, spot, held, contact), share in zip(found, shares.tolist(), strict=True)
+    ]
+
+
+def shares_of_feet(robot: Robot, found: list[tuple[Spot, Held, FootContact]]) -> Array:
+    """Returns the shares (n,) of contacts in the force on their foot; 1 for others than feet."""
+    shares = np.ones(len(found))
+    if len(faces_of_feet(robot.terrain)) == 1:
+        return shares
+    for leg in range(LEGS):
+        places = [
+            place
+            for place, (spot, held, contact) in enumerate(found)
+            if spot.leg == leg and not held.is_soft and contact.penetration > 0.0
+        ]
+        depth = np.array([found[place][2].penetration for place in places])
+        normal = np.array([found[place][2].normal for place in places])
+        shares[places] = contact_shares(depth, normal, robot.foot.radius)
+    return shares
+
+
+def _with_share(held: Held, share: float) -> Held:
+    """Returns a contact whose stiffness is multiplied by a share."""
+    if share == 1.0:
+        return held
+    return replace(held, contact=replace(held.contact, stiffness=share * held.contact.stiffness))
 
 
 # forces

@@ -26,6 +26,8 @@ from hexapod_cosim.models.touch.forces import (
     has_soil,
     open_contacts,
     own_ground,
+    shares_of_feet,
+    sphere_centre,
     spots,
 )
 
@@ -66,13 +68,13 @@ def depths_of(robot: Robot, body: Array, contacts: Contacts) -> Depths:
 
 
 def ground_under(robot: Robot, spot: Spot, centre: Array) -> Held:
-    """Returns an open contact with the ground at a foot's centre (3,), of a patch if there is one.
+    """Returns an open contact with the ground at a sphere's centre (3,), or with its patch.
 
-    A patch with a kinetic coefficient of its own has no static rise unless it gives one. Torso,
-    knees and shanks have the robot's own ground everywhere.
+    A patch with a kinetic coefficient of its own has no static rise unless it gives one. Soil is
+    that of soles; walls, torso, knees and shanks meet rigid ground of the patch's friction.
     """
     held, surface = own_ground(robot, spot), surface_of(robot.terrain)
-    if spot.leg < 0 or surface is None or surface.materials is None:
+    if surface is None or surface.materials is None:
         return held
     number = surface.material_at(float(centre[0]), float(centre[1]))
     if number == 0:
@@ -102,11 +104,11 @@ def start_contacts(robot: Robot, body: Array) -> Contacts:
     impact speed 0; feet in soil have been pressed into it.
     """
     contacts = open_contacts(robot)
-    depths, centres = depths_of(robot, body, contacts), foot_centres(robot, body)
+    depths = depths_of(robot, body, contacts)
     held, plastic = list(contacts.held), np.zeros(LEGS)
     for k, spot in enumerate(spots(robot)):
         if depths.delta[k] > 0.0:
-            held[k] = closed(robot, spot, centres[spot.leg], 0.0)
+            held[k] = closed(robot, spot, sphere_centre(spot, body), 0.0)
             if held[k].is_soft:
                 depth = float(depths.delta[k])
                 plastic[spot.leg] = plastic_depth(held[k].soil, robot.foot, depth)
@@ -138,16 +140,38 @@ def switch_contacts(
     delta = depths.delta
     if has_soil(robot):
         contacts, delta = tread(robot, body, contacts, delta)
-    held, centres, touchdowns = list(contacts.held), foot_centres(robot, body), 0
+    held, touchdowns = list(contacts.held), 0
+    walls = has_cells(robot)
+    found = contacts_at(robot, body, contacts) if walls else []
     for k, spot in enumerate(spots(robot)):
         if held[k].is_open and delta[k] > 0.0:
-            held[k] = closed(robot, spot, centres[spot.leg], float(depths.ddelta[k]))
+            now = closed(robot, spot, sphere_centre(spot, body), float(depths.ddelta[k]))
+            held[k] = _continued(robot, contacts, k, found, now) if walls else now
             touchdowns += 1
         elif not held[k].is_open and delta[k] <= 0.0:
             held[k] = replace(held[k], damping=math.nan)
     if all(now is before for now, before in zip(held, contacts.held, strict=True)):
         return contacts, 0
     return hold_cells(robot, body, replace(contacts, held=tuple(held))), touchdowns
+
+
+def _continued(
+    robot: Robot, contacts: Contacts, number: int, found: list[FootContact], now: Held
+) -> Held:
+    """Returns a contact that closes, with the impact of one that carries the same spot of the foot.
+
+    A step that is lower than a foot is deep causes no impact of its own.
+    """
+    spot, depth, result = spots(robot)[number], 0.0, now
+    for j, (other, held) in enumerate(zip(spots(robot), contacts.held, strict=True)):
+        if spot.leg < 0 or other.leg != spot.leg or held.is_open:
+            continue
+        turn = float(np.sum((found[j].normal - found[number].normal) ** 2))
+        near = turn * robot.foot.radius <= 4.0 * found[j].penetration
+        if near and found[j].penetration > depth:
+            depth = found[j].penetration
+            result = replace(now, damping=held.damping, impact_speed=held.impact_speed)
+    return result
 
 
 # soil
@@ -236,14 +260,18 @@ def cross_cells(robot: Robot, body: Array, contacts: Contacts, depths: Depths) -
         cells[leg] = cell_at(surface, x, y)
     moved = replace(contacts, cell=tuple(cells))
     before, after = contacts_at(robot, body, contacts), contacts_at(robot, body, moved)
+    closed = [j for j, held in enumerate(contacts.held) if not held.is_open]
+    placed = [(spots(robot)[j], contacts.held[j], before[j]) for j in closed]
+    share = dict(zip(closed, shares_of_feet(robot, placed).tolist(), strict=True))
     feet, held, plastic = spots(robot), list(contacts.held), contacts.plastic.copy()
     for k, spot in enumerate(feet):
         if spot.leg not in gone:
             continue
-        held[k] = replace(contacts.held[k], damping=math.nan)
+        held[k], largest = replace(contacts.held[k], damping=math.nan), -1.0
         for j, other in enumerate(feet):
             same = other.leg == spot.leg and is_same_face(before[j], after[k])
-            if same and not contacts.held[j].is_open:
+            if same and j in share and share[j] > largest:
+                largest = share[j]
                 held[k] = taken_over(contacts.held[j], other, spot, held[k])
         if spot.is_sole and held[k].is_open:
             plastic[spot.leg] = 0.0  # the new cell is undisturbed

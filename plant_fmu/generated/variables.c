@@ -1316,7 +1316,7 @@ const size_t hx_state_count = sizeof states / sizeof states[0];
 
 _Static_assert(sizeof states / sizeof states[0] == sizeof(hxCoordinates) / sizeof(double), "each state has its row");
 
-const char hx_default_guid[] = "{1bbdbac1-8aee-4757-aba0-7b91f5a02f0b}";
+const char hx_default_guid[] = "{b6ed6bea-f10f-4d73-8f27-63141e1d1b94}";
 
 _Static_assert(HX_CONTACT_EXACT_RESTITUTION == 1, "ContactLaw");
 _Static_assert(HX_CONTACT_FLORES == 2, "ContactLaw");

@@ -94,12 +94,18 @@ static void set_soil(const hxModel *model, const double *material, int slot,
   for (int i = 0; i < HX_SOIL_SIZE; ++i) contact->soil[i][slot] = numbers[i];
 }
 
-/* Returns the material under a foot; bodies have the definition's ground. */
+/* Copies the centre of a row's sphere. */
+static void centre_of(const hxDepths *depths, int row, int slot, double centre[3]) {
+  for (int i = 0; i < 3; ++i)
+    centre[i] = depths->centre[hx_is_of_foot(row) ? HX_FOOT : row][i][slot];
+}
+
+/* Returns the material under a sphere. */
 static const double *material_under(const hxModel *model, const hxDepths *depths, int row,
                                     int slot) {
-  if (!model->terrain || !hx_is_of_foot(row)) return NULL;
-  const double centre[3] = {depths->centre[0][slot], depths->centre[1][slot],
-                            depths->centre[2][slot]};
+  double centre[3];
+  if (!model->terrain) return NULL;
+  centre_of(depths, row, slot, centre);
   return hx_terrain_material(model->terrain, centre);
 }
 
@@ -138,8 +144,8 @@ static void hold_cells(const hxModel *model, const hxDepths *depths, hxContactSt
   for (int leg = 0; leg < HX_LEGS; ++leg) {
     int touches = 0;
     for (int row = HX_FOOT; hx_is_of_foot(row); ++row) touches |= contact->closed[row][leg] != 0.0;
-    const double centre[3] = {depths->centre[0][leg], depths->centre[1][leg],
-                              depths->centre[2][leg]};
+    double centre[3];
+    centre_of(depths, HX_FOOT, leg, centre);
     double cell[2] = {contact->cell[0][leg], contact->cell[1][leg]};
     if (touches && cell[0] < 0.0) hx_terrain_cell_at(model->terrain, centre, cell);
     for (int i = 0; i < 2; ++i) contact->cell[i][leg] = touches ? cell[i] : -1.0;
@@ -235,6 +241,35 @@ static int is_same(const hxContactMoment *a, const hxContactMoment *b, int leg) 
   return fabs(a->delta[leg] - b->delta[leg]) < slack && square < slack;
 }
 
+/* Returns whether the nearest points of two rows of a leg are so close on the foot that one impact
+ * presses both: a step between them is lower than the first is deep. */
+static int is_one_impact(const hxModel *model, const hxContactMoment *a, const hxContactMoment *b,
+                         int leg) {
+  double square = 0.0;
+  for (int i = 0; i < 3; ++i) {
+    const double d = a->normal[i][leg] - b->normal[i][leg];
+    square += d * d;
+  }
+  return square * model->radius[HX_FOOT] <= 4.0 * a->delta[leg];
+}
+
+void hx_contact_continue_impacts(const hxModel *model, const hxMoment *at,
+                                 const hxContactState *before, hxContactState *contact) {
+  for (int leg = 0; leg < HX_LEGS; ++leg)
+    for (int to = HX_FOOT; hx_is_of_foot(to); ++to) {
+      double deepest = 0.0;
+      if (contact->closed[to][leg] == 0.0 || before->closed[to][leg] != 0.0) continue;
+      for (int from = HX_FOOT; hx_is_of_foot(from); ++from)
+        if (before->closed[from][leg] != 0.0 && at->contact[from].delta[leg] > deepest &&
+            is_one_impact(model, &at->contact[from], &at->contact[to], leg)) {
+          deepest = at->contact[from].delta[leg];
+          contact->damping[to][leg] = before->damping[from][leg];
+          contact->impact_speed[to][leg] = before->impact_speed[from][leg];
+        }
+    }
+  for (int row = HX_FOOT; hx_is_of_foot(row); ++row) fill_contact_slots(contact, row);
+}
+
 /* Copies the contact of a row of a leg to another row. */
 static void copy_contact(const hxContactState *from, int row_from, int row_to, int leg,
                          hxContactState *to) {
@@ -251,8 +286,8 @@ static void copy_contact(const hxContactState *from, int row_from, int row_to, i
 int hx_contact_cross(const hxModel *model, const hxDepths *depths, hxContactState *contact) {
   int crossed = 0;
   for (int leg = 0; leg < HX_LEGS; ++leg) {
-    const double centre[3] = {depths->centre[0][leg], depths->centre[1][leg],
-                              depths->centre[2][leg]};
+    double centre[3];
+    centre_of(depths, HX_FOOT, leg, centre);
     double cell[2];
     if (contact->cell[0][leg] < 0.0 || depths->outside[leg] <= 0.0) continue;
     hx_terrain_cell_at(model->terrain, centre, cell);
@@ -268,11 +303,14 @@ void hx_contact_hand_over(const hxMoment *before, const hxMoment *after, int cro
   const hxContactState was = *contact;
   for (int leg = 0; leg < HX_LEGS; ++leg)
     for (int to = HX_FOOT; hx_is_of_foot(to) && crossed >> leg & 1; ++to) {
+      double share = -1.0;
       open_contact(contact, to, leg);
       for (int from = HX_FOOT; hx_is_of_foot(from); ++from)
-        if (was.closed[from][leg] != 0.0 &&
-            is_same(&before->contact[from], &after->contact[to], leg))
+        if (was.closed[from][leg] != 0.0 && before->share[from][leg] > share &&
+            is_same(&before->contact[from], &after->contact[to], leg)) {
+          share = before->share[from][leg];
           copy_contact(&was, from, to, leg, contact);
+        }
     }
   for (int row = HX_FOOT; hx_is_of_foot(row); ++row) fill_contact_slots(contact, row);
   hx_fill_slots(contact->plastic);

@@ -34,7 +34,8 @@ int hx_has_cells(const hxModel *model);
 int hx_contact_cross(const hxModel *model, const hxDepths *depths, hxContactState *contact);
 
 /* Gives the contacts of legs that have crossed a border to the rows that they continue in: those
- * with the same depth and normal before and after. A contact that does not continue opens. */
+ * with the same depth and normal before and after, of several that with the largest share. A
+ * contact that does not continue opens. */
 void hx_contact_hand_over(const hxMoment *before, const hxMoment *after, int crossed,
                           hxContactState *contact);
 
@@ -47,6 +48,11 @@ int hx_contact_is_due(const hxModel *model, const hxDepths *depths, const hxCont
 /* Closes open contacts that are in the ground and opens closed ones that are out of it; returns
  * the number of touch-downs. */
 int hx_contact_switch(const hxModel *model, const hxDepths *depths, hxContactState *contact);
+
+/* Gives feet's contacts with blocks that have just closed the damping and the impact speed of one
+ * that was closed before and carries the same spot, so that low steps cause no impacts. */
+void hx_contact_continue_impacts(const hxModel *model, const hxMoment *at,
+                                 const hxContactState *before, hxContactState *contact);
 
 HX_HIDDEN_END
 

@@ -172,8 +172,8 @@ typedef struct hxContactState {
 typedef struct hxDepths {
   double delta[HX_ROWS][HX_SLOTS], ddelta[HX_ROWS][HX_SLOTS]; /* m, m/s */
   /* on a grid only */
-  double centre[3][HX_SLOTS]; /* m  of feet, world axes */
-  double outside[HX_SLOTS];   /* m  how far a foot is outside of the cell that is held for it */
+  double centre[HX_ROWS][3][HX_SLOTS]; /* m  of spheres, world axes; those of feet in HX_FOOT */
+  double outside[HX_SLOTS]; /* m  how far a foot is outside of the cell that is held for it */
 } hxDepths;
 
 /* A row of contacts at one end of a step. World axes. */
@@ -187,12 +187,13 @@ typedef struct hxContactMoment {
 
 /* Joints and contacts at one end of a step, from which its works and peaks are computed. */
 typedef struct hxMoment {
-  double angle[HX_JOINTS][HX_SLOTS]; /* rad */
-  double speed[HX_JOINTS][HX_SLOTS]; /* rad/s */
-  double turn[3][HX_SLOTS];          /* rad/s  of the tibias, world axes */
-  double time;                       /* s */
-  double stale;                      /* 1      1: coordinates were set since */
-  hxContactMoment contact[HX_ROWS];  /* the model's rows are set */
+  double angle[HX_JOINTS][HX_SLOTS];    /* rad */
+  double speed[HX_JOINTS][HX_SLOTS];    /* rad/s */
+  double turn[3][HX_SLOTS];             /* rad/s  of the tibias, world axes */
+  double time;                          /* s */
+  double stale;                         /* 1      1: coordinates were set since */
+  hxContactMoment contact[HX_ROWS];     /* the model's rows are set */
+  double share[HX_FOOT_ROWS][HX_SLOTS]; /* 1  of feet on blocks (ground/sharing.h) */
 } hxMoment;
 
 /* Forces at the last completed step of an importer's solver (model exchange). */
@@ -257,6 +258,7 @@ struct hxPlant {
   hxModel model;
   hxState state;
   const hxTerrain *terrain; /* of later resets */
+  double valley_limit;      /* m  its valleys are not narrower; 0: not searched yet */
   char message[HX_MESSAGE_SIZE];
   hxFootprintLog footprints; /* outside the state, which every call copies */
   hxModel model_before;      /* those before a call, which one that fails restores */
@@ -269,6 +271,7 @@ static inline void hx_copy_state(const hxModel *model, hxState *to, const hxStat
   memcpy(to, from, offsetof(hxState, moment.contact[1]));
   for (int k = 1; k < model->rows + model->torso_rows; ++k)
     to->moment.contact[model->row[k]] = from->moment.contact[model->row[k]];
+  if (model->foot_rows > 1) memcpy(to->moment.share, from->moment.share, sizeof to->moment.share);
 }
 
 /* Returns whether a row's contacts are those of feet. */

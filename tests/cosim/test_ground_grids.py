@@ -51,12 +51,18 @@ def test_a_packed_grid_a_given_fmu_and_the_compiled_loop_give_the_same_figures(
     assert figures(compiled) == pytest.approx(figures(own), rel=1e-6)
 
 
-def test_an_export_refuses_valleys_narrower_than_a_foot(tmp_path: Path) -> None:
-    narrow = make_surface("random_uniform", {"horizontal_scale": 0.05, "difficulty": 1.0})
-    surfaces = [make_surface("dune", {}), narrow]
-    with pytest.raises(
-        RobotError, match=r"terrain 2, random_uniform: valleys narrower than a foot"
-    ):
+@pytest.mark.parametrize(
+    ("name", "given", "what"),
+    [
+        ("random_uniform", {"horizontal_scale": 0.05, "difficulty": 1.0}, "valleys"),
+        ("rubble", {"horizontal_scale": 0.01}, "blocks"),
+    ],
+)
+def test_an_export_refuses_further_surfaces_that_do_not_suit_a_foot(
+    tmp_path: Path, name: str, given: dict[str, float], what: str
+) -> None:
+    surfaces = [make_surface("dune", {}), make_surface(name, given)]
+    with pytest.raises(RobotError, match=rf"terrain 2, {name}: {what} narrower than a foot"):
         export_fmu(load_robot("athena"), tmp_path / "two.fmu", terrains=surfaces)
     assert list(tmp_path.iterdir()) == []
 

@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 from grids import BLOCKS, CORNER, NEAREST, SIDE, SMOOTH, TOP, WALL, Ground, grid_bytes, sampled
 
+from hexapod_cosim.models.ground.smooth import height_and_slopes, smooth_distance
+from hexapod_cosim.models.ground.surface import Surface
 from hexapod_cosim.models.records import Array
 
 RHO = 0.3  # m, radius of the sphere that bump and bowl belong to
@@ -93,12 +95,27 @@ def test_spheres_far_above_a_grid_are_known_not_to_touch_it(core: ct.CDLL) -> No
     assert ground.depth_bound([1.0, 1.0, 1.0], 0.06) == 0.06  # beyond the reach: not known
 
 
-def test_the_border_s_height_goes_on_beyond_the_grid(core: ct.CDLL) -> None:
+def test_the_border_s_height_goes_on_beyond_the_run_out_of_its_slope(core: ct.CDLL) -> None:
     height = np.array([[0.1, 0.2], [0.1, 0.2]])
-    for kind in (1, BLOCKS):
+    for kind, rise in ((SMOOTH, 0.002), (BLOCKS, 0.0)):  # a third of 60 mm by a slope of 0.1
         ground = Ground(core, grid_bytes(height, cell=1.0, kind=kind))
-        assert ground.face([-5.0, 0.5, 1.0], TOP)[0] == pytest.approx(0.9, abs=1e-12)
-        assert ground.face([9.0, 0.5, 1.0], TOP)[0] == pytest.approx(0.8, abs=1e-12)
+        assert ground.face([-5.0, 0.5, 1.0], TOP)[0] == pytest.approx(0.9 + rise, abs=1e-12)
+        assert ground.face([9.0, 0.5, 1.0], TOP)[0] == pytest.approx(0.8 - rise, abs=1e-12)
+
+
+def test_distance_and_normal_at_the_edge_of_a_map_are_the_twin_s(core: ct.CDLL) -> None:
+    rng = np.random.default_rng(13)
+    height, cell, first = rng.uniform(0.0, 0.02, (12, 9)), 0.05, np.array([0.4, 0.55])
+    surface = Surface(kind="smooth", height=height, x0=0.0, y0=0.0, cell=cell)
+    ground = Ground(core, grid_bytes(height, cell=cell))
+    for edge in (np.zeros(2), first, np.array([0.0, 0.55])):
+        for away in rng.uniform(-0.1, 0.1, (40, 2)):
+            above = height_and_slopes(surface, *(edge + away))[0] + rng.uniform(0.005, 0.015)
+            point = np.array([*(edge + away), above])
+            distance, normal, _ = ground.face(point)
+            expected, up = smooth_distance(surface, point)
+            assert distance == pytest.approx(expected, abs=1e-12)
+            assert normal == pytest.approx(up, abs=1e-9)
 
 
 def step(core: ct.CDLL) -> Ground:
@@ -138,7 +155,8 @@ def test_a_concave_corner_touches_two_walls_and_a_convex_one_its_edge(core: ct.C
     place = [-0.03, -0.04, 0.05]
     assert concave.face(place, WALL)[0] == pytest.approx(0.03, abs=1e-12)
     assert concave.face(place, SIDE)[0] == pytest.approx(0.04, abs=1e-12)
-    assert concave.face(place, CORNER)[0] == 1000.0  # hidden behind the walls
+    # the edge is behind the walls: it has no share in the force
+    assert concave.face(place, CORNER)[0] == pytest.approx(0.05, abs=1e-12)
     height = np.array([[0.0, 0.0], [0.0, 0.1]])
     convex = Ground(core, grid_bytes(height, cell=1.0, origin=(-1.0, -1.0), kind=BLOCKS))
     distance, normal, _ = convex.face(place, CORNER)

@@ -85,6 +85,21 @@ def test_energy_balances_on_rough_ground(core: ct.CDLL, kind: int) -> None:
         assert abs(energy.residual) < 1e-4 * energy.actuator_work
 
 
+@pytest.mark.parametrize(("height", "path"), [(1e-9, 1e-5), (1e-4, 1e-2)])
+def test_blocks_with_low_steps_carry_a_walk_as_level_ground(
+    core: ct.CDLL, height: float, path: float
+) -> None:
+    rng, paths = np.random.default_rng(1), []
+    for rough in (0.0, height):
+        heights = rough * rng.uniform(0.0, 1.0, (80, 80))
+        ground = Ground(core, grid_bytes(heights, cell=0.05, origin=(-2, -2), kind=BLOCKS))
+        plant = on_grid(core, ATHENA, ground, position=(0.0, 0.0, HEIGHT))
+        paths.append(march(plant, 1.0))
+        energy = plant.output().energy
+        assert abs(energy.residual) < 1e-4 * energy.actuator_work
+    assert np.abs(paths[1] - paths[0]).max() < path
+
+
 def sphere_drop(core: ct.CDLL, ground: Ground | None) -> tuple[float, float]:
     """Drops the robot on its feet at 3 m/s with motors off; returns the first impact's impulse
     [N s] and peak force [N], sums over the feet.
@@ -250,6 +265,31 @@ def test_a_material_s_friction_and_stiffness_are_those_of_the_touch_down(core: c
     load = [foot.normal_force[foot.contact != 0].mean() for foot in feet]
     stiffness = [f / d**1.5 for f, d in zip(load, depth, strict=True)]
     assert stiffness[1] < 0.5 * stiffness[0]
+
+
+def test_the_torso_slides_over_a_patch_of_ice_as_feet_do(core: ct.CDLL) -> None:
+    """An upturned robot slides on its torso's corners, over the middle of a patch or beside it."""
+    table = np.full((1, 16), np.nan)
+    table[0, 0], table[0, 3:] = 0.0, 0.0
+    material = np.zeros((41, 41))
+    material[:, 21:] = 1.0
+    ground = Ground(
+        core,
+        grid_bytes(np.zeros((41, 41)), cell=0.5, origin=(-10, -10), material=material, table=table),
+    )
+    robot = changed(ATHENA, body={"contact": "on"}, friction={"law": "tanh"})
+    folded, left = np.tile([0.0, -0.3, 0.2], (6, 1)), []
+    for x in (5.0, -5.0):
+        start: dict[str, Any] = {"angle": folded, "quaternion": (0.0, 1.0, 0.0, 0.0)}
+        plant = on_grid(
+            core, robot, ground, position=(x, 0.0, 0.0405), velocity=(0.3, 0.0, 0.0), **start
+        )
+        for k in range(20):
+            plant.step(0.005 * (k + 1), Command(angle_ref=folded))
+        output = plant.output(Command(angle_ref=folded))
+        left.append(float(output.torso.velocity[0]))
+    assert left[0] == pytest.approx(0.3, abs=1e-3)
+    assert left[1] < 0.1
 
 
 def test_a_rigid_patch_beside_a_footprint_carries_a_foot_at_its_surface(core: ct.CDLL) -> None:

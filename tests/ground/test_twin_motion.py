@@ -133,6 +133,21 @@ def test_feet_that_slide_over_edges_of_stairs_move_as_the_twins(core: ct.CDLL, l
     assert pair.state.touchdowns >= 2
 
 
+@pytest.mark.parametrize("rise", [2e-5, -2e-5])
+def test_feet_that_slide_over_low_steps_move_as_the_twins(core: ct.CDLL, rise: float) -> None:
+    """Two feet pass a step that is lower than they are deep, which is no touch-down of its own."""
+    nose, height = float(foot_centres(FEET, stood(FEET))[0, 0]) + 1e-3, np.zeros((40, 40))
+    height[:, 20:] = rise
+    surface = Surface(kind="blocks", height=height, x0=nose - 2.0, y0=-1.97, cell=0.1)
+    robot = on(surface)
+    pair = Pair(core, robot, stood(robot, height=-1e-4, velocity=(0.5, 0.0, 0.0)))
+    damping = pair.state.contacts.damping[0]
+    state = pair.move(0.005, lambda _: Command(angle_ref=robot.stance))
+    pair.assert_same()
+    assert foot_centres(robot, state.body)[0, 0] > nose
+    assert state.contacts.damping[0] == damping
+
+
 def test_feet_between_walls_and_floors_move_as_the_twins(core: ct.CDLL) -> None:
     given = {"platform_size": 0.0, "seed": 3, "max_height": 0.02, "stone_size": 0.06}
     robot = on(make_surface("rubble", given))

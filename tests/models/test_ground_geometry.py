@@ -13,7 +13,12 @@ from hexapod_cosim.models import load_robot
 from hexapod_cosim.models.contact import foot_contacts
 from hexapod_cosim.models.ground.blocks import block_faces
 from hexapod_cosim.models.ground.catalogue import make_surface
-from hexapod_cosim.models.ground.smooth import height_and_slopes, nearest_point, smooth_distance
+from hexapod_cosim.models.ground.smooth import (
+    height_and_slopes,
+    heights_at,
+    nearest_point,
+    smooth_distance,
+)
 from hexapod_cosim.models.ground.surface import Surface
 from hexapod_cosim.models.kinematics import body_states, foot_centres
 from hexapod_cosim.models.records import Array, Terrain
@@ -156,14 +161,43 @@ def test_the_force_has_no_jump_at_1000_cell_borders() -> None:
         assert change <= JUMP * float(np.linalg.norm(forces[0]))
 
 
-def test_beyond_the_map_the_border_goes_on() -> None:
+def test_beyond_the_map_the_slope_runs_out_and_the_border_goes_on() -> None:
     surface = make_surface("random_uniform", {"platform_size": 0.0})
-    _, right, _, high = surface.extent
-    inside = height_and_slopes(surface, right, 0.33)[0]
-    assert height_and_slopes(surface, right + 5.0, 0.33)[0] == inside
-    assert height_and_slopes(surface, right + 5.0, high + 2.0)[0] == surface.height[-1, -1]
+    left, right, low, high = surface.extent
+    inside, slope, _ = height_and_slopes(surface, right, 0.33)
+    for way, share in ((0.03, 7.0 / 24.0), (0.06, 1.0 / 3.0), (5.0, 1.0 / 3.0)):
+        height = height_and_slopes(surface, right + way, 0.33)[0]
+        assert height == pytest.approx(inside + 0.06 * share * slope[0], abs=PLANE)
+    corner, slope, curvature = height_and_slopes(surface, left, low)
+    expected = corner - 0.02 * (slope[0] + slope[1]) + 0.02**2 * curvature[0, 1]
+    assert height_and_slopes(surface, left - 5.0, low - 2.0)[0] == pytest.approx(
+        expected, abs=PLANE
+    )
+    assert heights_at(surface, np.array([left - 5.0]), np.array([low - 2.0]))[0, 0] == (
+        pytest.approx(expected, abs=PLANE)
+    )
+    assert not np.any(height_and_slopes(surface, right + 5.0, high + 2.0)[1])
     block = blocks([[0.0, 0.05], [0.1, 0.02]])
     assert block_faces(block, np.array([5.0, 0.05, 0.06]))[0][0] == pytest.approx(0.01)
+
+
+def test_the_force_has_no_jump_at_the_map_s_edge() -> None:
+    surface = make_surface("plane", {"slope_x": 0.3, "slope_y": -0.2})
+    left, right, low, high = surface.extent
+    rng, nanometre = np.random.default_rng(9), 1e-9
+    for _ in range(50):
+        x, y = rng.uniform(left, right), rng.uniform(low, high)
+        for place, way in (((right, y), 0), ((left, y), 0), ((x, high), 1), ((x, low), 1)):
+            height, slope, _ = height_and_slopes(surface, *place)
+            normal = np.array([-slope[0], -slope[1], 1.0]) / math.sqrt(1.0 + slope @ slope)
+            centre = np.array([*place, height]) + (RADIUS - 2e-3) * normal
+            forces = []
+            for side in (-nanometre, nanometre):
+                point = centre + side * np.eye(3)[way]
+                distance, up = smooth_distance(surface, point)
+                forces.append(max(RADIUS - distance, 0.0) ** 1.5 * up)
+            change = float(np.linalg.norm(forces[1] - forces[0]))
+            assert change <= JUMP * float(np.linalg.norm(forces[0]))
 
 
 def test_above_a_flat_block_there_is_one_face() -> None:

@@ -438,6 +438,15 @@ HX_API void hx_probe_face(const hxTerrain *terrain, int kind, const double point
   memcpy(out + 4, face.bend, sizeof face.bend);
 }
 
+/* The shares of contacts of a sphere; normal: rows of three. */
+HX_API void hx_probe_shares(int count, const double *depth, const double *normal, double radius,
+                            double *out) {
+  hxSharers of = {.count = count};
+  memcpy(of.depth, depth, (size_t)count * sizeof *depth);
+  memcpy(of.normal, normal, (size_t)count * sizeof of.normal[0]);
+  hx_shares(&of, radius, out);
+}
+
 /* The upper bound of a sphere's depth in a grid; out: one number. */
 HX_API void hx_probe_depth_bound(const hxTerrain *terrain, const double centre[3], double radius,
                                  double out[1]) {

@@ -9,6 +9,13 @@
 
 #define HX_LANES 1
 
+/* of lanes.h, too: functions that few grounds need stay out of line */
+#if defined(__GNUC__)
+#define HX_RARE static __attribute__((noinline))
+#else
+#define HX_RARE static
+#endif
+
 typedef double hxReal;
 typedef int64_t hxMask;
 

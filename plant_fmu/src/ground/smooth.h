@@ -11,9 +11,10 @@ typedef struct {
 } hxPatch;
 
 /* A coordinate on the grid: index of the node before it, place between this and the next node, and
- * cells per metre, 0 beyond the grid, where the border's height goes on. */
+ * how far it is beyond the grid, in cells, < 0 before its first node. */
 typedef struct {
-  hxReal node, place, per_cell;
+  hxReal node, place, beyond;
+  hxMask outside;
 } hxGridPlace;
 
 /* Places of points, and the 4 x 4 nodes around each. */
@@ -37,7 +38,7 @@ static inline hxGridPlace grid_place(hxReal x, double origin, double per_cell, i
   const hxReal clamped = hx_select(hx_less(zero, u), hx_min(u, last), zero);
   const hxReal node = hx_min(whole_part(clamped), hx_splat((double)(nodes - 2)));
   const hxMask outside = hx_less(u, zero) | hx_less(last, u);
-  return (hxGridPlace){node, clamped - node, hx_select(outside, zero, hx_splat(per_cell))};
+  return (hxGridPlace){node, clamped - node, u - clamped, outside};
 }
 
 /* Computes weights of four nodes by Catmull and Rom's cubic, and their derivatives by the place. */
@@ -49,6 +50,23 @@ static inline void cubic_weights(hxReal t, hxReal w[3][4]) {
   w[1][2] = 0.5 + 4.0 * t - 4.5 * t2, w[1][3] = 1.5 * t2 - t;
   w[2][0] = 2.0 - 3.0 * t, w[2][1] = 9.0 * t - 5.0;
   w[2][2] = 4.0 - 9.0 * t, w[2][3] = 3.0 * t - 1.0;
+}
+
+/* Replaces weights of places beyond the grid, where the slope across its border runs out: with b
+ * and s at the border the height is b + s (1 - (1 - u)^3)/3 of the run-out's length, u from 0 to 1.
+ */
+HX_RARE void run_out(const hxGridPlace *at, hxReal per_cell, hxReal w[3][4]) {
+  const double length = 0.06; /* m */
+  const hxReal zero = hx_splat(0.0), one = hx_splat(1.0), cells = length * per_cell;
+  const hxReal way = hx_select(hx_less(at->beyond, zero), -cells, cells);
+  const hxReal left = hx_max(one - at->beyond / way, zero);
+  const hxReal rise = way * (one - left * left * left) * (1.0 / 3.0);
+  for (int i = 0; i < 4; ++i) {
+    const hxReal slope = w[1][i];
+    w[0][i] = hx_select(at->outside, w[0][i] + rise * slope, w[0][i]);
+    w[1][i] = hx_select(at->outside, left * left * slope, slope);
+    w[2][i] = hx_select(at->outside, (-2.0 * left / way) * slope, w[2][i]);
+  }
 }
 
 /* Copies the 4 x 4 nodes of a lane's patch. */
@@ -97,10 +115,15 @@ static inline void move_stencil(const hxTerrain *terrain, hxMask active, hxReal 
 }
 
 /* Computes the surface over the points of a stencil. */
-static inline hxPatch patch_at(const hxStencil *at) {
+static inline hxPatch patch_at(const hxTerrain *terrain, const hxStencil *at) {
   hxReal wx[3][4], wy[3][4], line[3][4], sum[3][3]; /* sum: [derivatives by y][by x] */
   cubic_weights(at->x.place, wx);
   cubic_weights(at->y.place, wy);
+  const hxReal per_cell = hx_splat(terrain->per_cell);
+  if (hx_any(at->x.outside | at->y.outside)) {
+    run_out(&at->x, per_cell, wx);
+    run_out(&at->y, per_cell, wy);
+  }
   for (int i = 0; i < 4; ++i) {
     const hxReal a = hx_load(at->node[i][0]), b = hx_load(at->node[i][1]),
                  c = hx_load(at->node[i][2]), d = hx_load(at->node[i][3]);
@@ -111,13 +134,13 @@ static inline hxPatch patch_at(const hxStencil *at) {
     for (int k = 0; j + k < 3; ++k)
       sum[j][k] = (wy[j][0] * line[k][0] + wy[j][1] * line[k][1]) +
                   (wy[j][2] * line[k][2] + wy[j][3] * line[k][3]);
-  const hxReal by_x = at->x.per_cell, by_y = at->y.per_cell;
+  const hxReal square = per_cell * per_cell;
   return (hxPatch){.s = sum[0][0],
-                   .sx = sum[0][1] * by_x,
-                   .sy = sum[1][0] * by_y,
-                   .sxx = sum[0][2] * (by_x * by_x),
-                   .sxy = sum[1][1] * (by_x * by_y),
-                   .syy = sum[2][0] * (by_y * by_y)};
+                   .sx = sum[0][1] * per_cell,
+                   .sy = sum[1][0] * per_cell,
+                   .sxx = sum[0][2] * square,
+                   .sxy = sum[1][1] * square,
+                   .syy = sum[2][0] * square};
 }
 
 /* Hessian of half the squared distance from a point rz below the surface, or its part without the
@@ -150,7 +173,8 @@ static inline hxMask stays_in_patch(const hxTerrain *terrain, const hxStencil *a
                                     hxReal dy) {
   const hxReal zero = hx_splat(0.0), one = hx_splat(1.0), u = at->x.place + terrain->per_cell * dx,
                v = at->y.place + terrain->per_cell * dy;
-  return hx_less(u, one) & hx_less(v, one) & ~(hx_less(u, zero) | hx_less(v, zero));
+  return hx_less(u, one) & hx_less(v, one) &
+         ~(hx_less(u, zero) | hx_less(v, zero) | at->x.outside | at->y.outside);
 }
 
 /* Returns the share of a move of these squares that is made: at most a cell. */
@@ -189,7 +213,7 @@ static const double not_found = 1e-4;
 static inline void use_points_below(const hxTerrain *terrain, hxMask mask, const hxReal point[3],
                                     hxStencil *at, hxNearest *found) {
   move_stencil(terrain, mask, point[0], point[1], at);
-  replace_nearest(mask, (hxNearest){point[0], point[1], patch_at(at), found->H}, found);
+  replace_nearest(mask, (hxNearest){point[0], point[1], patch_at(terrain, at), found->H}, found);
 }
 
 /* Computes the nearest points of a smooth surface to the lanes `wanted` by Newton's method on
@@ -206,7 +230,7 @@ static inline hxNearest hx_nearest_on_surface(const hxTerrain *terrain, hxMask w
   hxNearest found;
   set_stencil(terrain, x, y, &at);
   for (int i = 0;; ++i) {
-    const hxPatch p = patch_at(&at);
+    const hxPatch p = patch_at(terrain, &at);
     const hxReal rz = p.s - point[2];
     const hxReal gx = (x - point[0]) + p.sx * rz, gy = (y - point[1]) + p.sy * rz;
     const hxHessian H = hessian_of(&p, rz);

@@ -213,7 +213,10 @@ static double top_over(const hxTerrain *terrain, const hxHeights *heights, int a
   const double middle = 0.5 * (heights->low + heights->high),
                half = 0.5 * (heights->high - heights->low), rounding = 1e-9;
   if (terrain->head.kind == HX_SURFACE_BLOCKS) return heights->high + rounding;
-  return middle + (at_border ? 15.0 : 25.0 / 16.0) * half + rounding;
+  /* the run-out: nodes of the border with 1 + 2 g, g of the last slope in cells */
+  const double beyond = 1.0 + 2.0 * (0.06 / 3.0) / terrain->head.cell,
+               most = beyond * beyond > 15.0 ? beyond * beyond : 15.0;
+  return middle + (at_border ? most : 25.0 / 16.0) * half + rounding;
 }
 
 /* Computes the tops of a row of tiles, from lowest and highest heights of each column. */
@@ -430,8 +433,7 @@ static void wall_faces(const hxTerrain *terrain, const double point[3], const do
   }
 }
 
-/* Keeps the nearest edge or corner of higher columns across the corners of a cell. One counts where
- * its nearest point is above both columns beside it. */
+/* Keeps the nearest wall, edge or corner of higher columns across the corners of a cell. */
 static void corner_faces(const hxTerrain *terrain, const double point[3], const double cell[2],
                          hxFace *face) {
   const hxGridHead *head = &terrain->head;
@@ -439,13 +441,11 @@ static void corner_faces(const hxTerrain *terrain, const double point[3], const 
   for (int i = -1; i <= 1; i += 2)
     for (int j = -1; j <= 1; j += 2) {
       const double top = hx_terrain_column(terrain, cell[0] + i, cell[1] + j);
-      const double nearest = point[2] < top ? point[2] : top;
-      if (!(top > own && nearest > hx_terrain_column(terrain, cell[0] + i, cell[1]) &&
-            nearest > hx_terrain_column(terrain, cell[0], cell[1] + j)))
-        continue;
+      if (!(top > own)) continue;
       const double x = gap_to(point[0], head->x0, head->cell, cell[0], i),
                    y = gap_to(point[1], head->y0, head->cell, cell[1], j);
-      const double away[3] = {x > 0.0 ? -i * x : 0.0, y > 0.0 ? -j * y : 0.0, point[2] - nearest};
+      const double away[3] = {x > 0.0 ? -i * x : 0.0, y > 0.0 ? -j * y : 0.0,
+                              point[2] > top ? point[2] - top : 0.0};
       if (away[0] != 0.0 || away[1] != 0.0 || away[2] != 0.0) keep_nearer(away, face);
     }
 }

@@ -53,7 +53,7 @@ typedef enum hxFaceKind {
   HX_FACE_TOP,    /* of its own cell */
   HX_FACE_WALL,   /* a higher column beside it along x: its wall, or the edge of its top */
   HX_FACE_SIDE,   /* the same along y */
-  HX_FACE_CORNER, /* edges and corner of a higher column across the cell's corner */
+  HX_FACE_CORNER, /* the same of a column across the cell's corner */
   HX_FACE_NEAREST /* the nearest of these */
 } hxFaceKind;
 

@@ -64,7 +64,8 @@ static void kernel_coordinates(const hxModel *model, const hxState *state, const
 static void kernel_switch_contacts(const hxModel *model, hxDepths *depths,
                                    hxFootprintLog *footprints, hxState *state) {
   hxMoment at;
-  if (model->has_soil) hx_moment_of(model, &state->contact, &state->motion, &at);
+  if (model->has_soil || model->foot_rows > 1)
+    hx_moment_of(model, &state->contact, &state->motion, &at);
   if (!hx_switch_contacts(model, depths, state->time, &at, footprints, state) &&
       has_bristles(model, HX_FOOT))
     hx_contact_slacken(&state->contact, &state->motion); /* the importer may have set bristles */

@@ -3,7 +3,7 @@
 #ifndef HX_FOOT_H
 #define HX_FOOT_H
 
-#include "../ground/surface.h"
+#include "../ground/sharing.h"
 #include "friction.h"
 #include "kinematics.h"
 #include "soil_pack.h"
@@ -34,8 +34,16 @@ typedef struct {
   hxReal viscosity; /* N s/m  df_n/d(ddelta) */
 } hxNormalForce;
 
+/* Constants of the normal law of a row of contacts, fixed at touch-down; the stiffness of feet on
+ * blocks with their shares. */
+typedef struct {
+  hxReal closed, damping; /* 1, s/m */
+  hxReal stiffness;       /* N/m^1.5 */
+} hxContactLawAt;
+
 typedef struct {
   hxContactKinematics kin;
+  hxContactLawAt law;
   hxNormalForce normal;
   hxVec3 slip, force; /* m/s, N  tangential velocity, force of the ground on the body */
   hxReal slip_speed;
@@ -223,12 +231,7 @@ HX_INLINE hxGround hx_ground(const hxModel *model, const hxContactState *state, 
   return (hxGround){hx_dot(n, hx_sub3(point, hx_splat_vec3(model->ground_point))), n};
 }
 
-/* Constants of the normal law of a row of contacts, fixed at touch-down. */
-typedef struct {
-  hxReal closed, damping; /* 1, s/m */
-  hxReal stiffness;       /* N/m^1.5 */
-} hxContactLawAt;
-
+/* Returns the constants of a row of contacts, without shares. */
 HX_INLINE hxContactLawAt hx_law_at(const hxContactState *state, int row, int slot) {
   return (hxContactLawAt){hx_load(&state->closed[row][slot]), hx_load(&state->damping[row][slot]),
                           hx_load(&state->stiffness[row][slot])};
@@ -323,12 +326,38 @@ static inline hxContactKinematics hx_torso_contact(const hxModel *model,
                                hx_torso_vec3(motion, HX_V), torso);
 }
 
+/* Depth and normal of a face that a foot may touch. */
+typedef struct {
+  hxNumber delta, normal[3]; /* m, 1 */
+} hxFootFace;
+
+/* Computes the shares of a foot's closed contacts with rigid blocks; others have the share 1. */
+HX_RARE void hx_foot_shares(const hxModel *model, const hxContactState *state, int slot,
+                            const hxFootFace face[HX_FOOT_ROWS], hxNumber share[HX_FOOT_ROWS]) {
+  hxSharers of = {.count = 0};
+  hxNumber found[HX_SHARERS];
+  int row_of[HX_SHARERS];
+  for (int row = HX_FOOT; row < HX_FOOT_ROWS; ++row) {
+    share[row] = 1.0;
+    if (hx_re(state->closed[row][slot]) == 0.0 || !(hx_re(face[row].delta) > 0.0) ||
+        (row == HX_FOOT && model->has_soil && hx_re(state->on_soil[slot]) != 0.0))
+      continue;
+    row_of[of.count] = row;
+    of.depth[of.count] = face[row].delta;
+    for (int i = 0; i < 3; ++i) of.normal[of.count][i] = face[row].normal[i];
+    ++of.count;
+  }
+  if (of.count < 2) return;
+  hx_shares(&of, hx_re(model->radius[HX_FOOT]), found);
+  for (int i = 0; i < of.count; ++i) share[row_of[i]] = found[i];
+}
+
 /* Computes the force of rigid ground on a row of contacts: f_n along the normal, and across it f_t
  * = -mu f_n g(|v_t|) v_t or the bristles' force. All friction laws are chosen by this function. */
 HX_INLINE void rigid_force(const hxModel *model, const hxContactState *state, int row, int slot,
                            const hxPlantMotion *motion, hxContactWork *contact) {
   const hxContactKinematics *kin = &contact->kin;
-  contact->normal = hx_normal_force(hx_law_at(state, row, slot), kin->delta, kin->ddelta);
+  contact->normal = hx_normal_force(contact->law, kin->delta, kin->ddelta);
   contact->slip = hx_add_scaled(kin->velocity, kin->ddelta, kin->normal);
   contact->slip_speed = hx_sqrt(hx_dot(contact->slip, contact->slip));
   if (has_friction_bristles(model, row)) {

@@ -184,13 +184,21 @@ static inline void push_body(hxForce6 *p, hxVec3 x, hxVec3 force) {
 /* Applies a moment to a body. */
 static inline void turn_body(hxForce6 *p, hxVec3 moment) { p->ang = hx_sub3(p->ang, moment); }
 
-/* Computes the contact force of a row and applies it to the tibia. */
+/* Computes kinematics and law of a row of contacts on the tibia. */
 HX_INLINE void leg_contact(const hxModel *model, const hxContactState *state,
                            const hxPlantMotion *motion, int row, int slot, int all,
                            hxLegWork *leg) {
+  hxContactWork *contact = &leg->contact[row];
+  contact->kin =
+      hx_tibia_contact(model, state, motion, row, slot, all, &leg->joint[HX_JOINTS - 1].body);
+  contact->law = hx_law_at(state, row, slot);
+}
+
+/* Computes the contact force of a row and applies it to the tibia. */
+HX_INLINE void push_leg(const hxModel *model, const hxContactState *state,
+                        const hxPlantMotion *motion, int row, int slot, hxLegWork *leg) {
   hxJointWork *tibia = &leg->joint[HX_JOINTS - 1];
   hxContactWork *contact = &leg->contact[row];
-  contact->kin = hx_tibia_contact(model, state, motion, row, slot, all, &tibia->body);
   hx_contact_force(model, state, row, slot, motion, contact);
   push_body(&tibia->p, contact_point(leg, contact), contact->force);
   if (has_turning_friction(model, row)) {
@@ -206,6 +214,25 @@ static inline int is_used(const hxContactState *state, int row, int slot) {
   return used;
 }
 
+/* Multiplies the stiffness of feet on blocks by the shares of their contacts. */
+HX_RARE void share_feet(const hxModel *model, const hxContactState *state, int slot,
+                        hxLegWork *leg) {
+  hxNumber share[HX_FOOT_ROWS], shares[HX_FOOT_ROWS][HX_LANES];
+  for (int lane = 0; lane < HX_LANES; ++lane) {
+    hxFootFace face[HX_FOOT_ROWS] = {0};
+    for (int k = 0; k < leg->rows && hx_is_of_foot(leg->row[k]); ++k) {
+      const hxContactKinematics *kin = &leg->contact[leg->row[k]].kin;
+      face[leg->row[k]] = (hxFootFace){hx_lane(kin->delta, lane),
+                                       {hx_lane(kin->normal.x, lane), hx_lane(kin->normal.y, lane),
+                                        hx_lane(kin->normal.z, lane)}};
+    }
+    hx_foot_shares(model, state, slot + lane, face, share);
+    for (int row = HX_FOOT; row < HX_FOOT_ROWS; ++row) shares[row][lane] = share[row];
+  }
+  for (int k = 0; k < leg->rows && hx_is_of_foot(leg->row[k]); ++k)
+    leg->contact[leg->row[k]].law.stiffness *= hx_load(shares[leg->row[k]]);
+}
+
 HX_RARE void further_contacts(const hxModel *model, const hxContactState *state,
                               const hxPlantMotion *motion, int slot, int all, hxLegWork *leg) {
   for (int k = 1; k < model->rows; ++k)
@@ -213,6 +240,12 @@ HX_RARE void further_contacts(const hxModel *model, const hxContactState *state,
       leg->row[leg->rows++] = model->row[k];
       leg_contact(model, state, motion, model->row[k], slot, all, leg);
     }
+  if (model->foot_rows > 1 && leg->rows > 1) share_feet(model, state, slot, leg);
+}
+
+HX_RARE void push_further(const hxModel *model, const hxContactState *state,
+                          const hxPlantMotion *motion, int slot, hxLegWork *leg) {
+  for (int k = 1; k < leg->rows; ++k) push_leg(model, state, motion, leg->row[k], slot, leg);
 }
 
 /* Computes the contact forces of a leg; without all, only those of rows with closed contacts. */
@@ -221,6 +254,8 @@ static inline void leg_contacts(const hxModel *model, const hxContactState *stat
   leg->rows = 1, leg->row[0] = HX_FOOT;
   leg_contact(model, state, motion, HX_FOOT, slot, all, leg);
   if (model->rows > 1) further_contacts(model, state, motion, slot, all, leg);
+  push_leg(model, state, motion, HX_FOOT, slot, leg);
+  if (leg->rows > 1) push_further(model, state, motion, slot, leg);
 }
 
 /* Computes the contact forces of the torso and applies them. */
@@ -233,6 +268,7 @@ HX_RARE void torso_contacts(const hxModel *model, const hxContactState *state,
     hxContactWork *contact = &work->torso_contact[pack];
     const int slot = pack * HX_LANES;
     contact->kin = hx_torso_contact(model, state, motion, slot, all, &work->torso);
+    contact->law = hx_law_at(state, HX_TORSO, slot);
     hx_contact_force(model, state, HX_TORSO, slot, motion, contact);
     work->torso_p[pack] = (hxForce6){hx_zero3(), hx_zero3()};
     push_body(&work->torso_p[pack], contact->kin.arm, contact->force);

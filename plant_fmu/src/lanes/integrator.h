@@ -502,6 +502,7 @@ static hxStatus advance(const hxStart *start, double h_max, double *next_step, h
   if (model->has_soil) hx_depths_of_moment(seen, &state->contact, &state->moment, &depths);
   *event = hx_switch_contacts(seen, &depths, start->t + *taken, &state->moment, start->footprints,
                               state);
+  if (*event && model->foot_rows > 1) hx_moment_shares(model, &state->contact, &state->moment);
   return HX_OK;
 }
 

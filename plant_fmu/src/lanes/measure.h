@@ -110,6 +110,21 @@ HX_RARE void torso_moment(const hxModel *model, const hxContactState *state,
   }
 }
 
+/* Computes the shares of feet on blocks. */
+HX_RARE void hx_moment_shares(const hxModel *model, const hxContactState *state, hxMoment *moment) {
+  hxNumber share[HX_FOOT_ROWS];
+  for (int slot = 0; slot < HX_SLOTS; ++slot) {
+    hxFootFace face[HX_FOOT_ROWS];
+    for (int row = HX_FOOT; row < HX_FOOT_ROWS; ++row) {
+      const hxContactMoment *at = &moment->contact[row];
+      face[row] = (hxFootFace){at->delta[slot],
+                               {at->normal[0][slot], at->normal[1][slot], at->normal[2][slot]}};
+    }
+    hx_foot_shares(model, state, slot < HX_LEGS ? slot : 0, face, share);
+    for (int row = HX_FOOT; row < HX_FOOT_ROWS; ++row) moment->share[row][slot] = share[row];
+  }
+}
+
 /* Computes angles, speeds and contacts of a motion, on a grid those that `all` says. With `whole`,
  * the model whose rows of bodies `model` leaves out, it returns the largest depth that one of their
  * contacts may have, m. */
@@ -136,6 +151,7 @@ static inline double hx_moment_and_bound(const hxModel *model, const hxModel *wh
     if (model->rows > 1) further_moments(model, state, motion, slot, all, &j, moment);
     if (whole) bound = tibia_depth_bound(whole, motion, slot, &j.R_WB, bound);
   }
+  if (model->foot_rows > 1) hx_moment_shares(model, state, moment);
   if (model->torso_rows) torso_moment(model, state, motion, all, &torso, moment);
   if (whole && whole->torso_rows) bound = torso_depth_bound(whole, motion, &torso.R_WB, bound);
   moment->stale = 0.0;
@@ -153,16 +169,21 @@ static inline void hx_copy_moment(const hxModel *model, hxMoment *to, const hxMo
   memcpy(to, from, offsetof(hxMoment, contact[1]));
   for (int k = 1; k < model->rows + model->torso_rows; ++k)
     to->contact[model->row[k]] = from->contact[model->row[k]];
+  if (model->foot_rows > 1) memcpy(to->share, from->share, sizeof to->share);
 }
 
-/* Copies the places of the feet, and computes how far they are outside of their cells. */
-HX_RARE void feet_on_grid(const hxModel *model, const hxContactState *state, const hxMoment *moment,
-                          hxDepths *depths) {
+/* Copies the places of feet, and of bodies where the ground has materials, and computes how far
+ * feet are outside of their cells. */
+HX_RARE void places_on_grid(const hxModel *model, const hxContactState *state,
+                            const hxMoment *moment, hxDepths *depths) {
   const int cells = hx_has_cells(model);
-  memcpy(depths->centre, moment->contact[HX_FOOT].centre, sizeof depths->centre);
+  const hxNumber(*foot)[HX_SLOTS] = moment->contact[HX_FOOT].centre;
+  memcpy(depths->centre[HX_FOOT], foot, sizeof depths->centre[HX_FOOT]);
+  for (int k = 1; model->terrain->material && k < model->rows + model->torso_rows; ++k)
+    memcpy(depths->centre[model->row[k]], moment->contact[model->row[k]].centre,
+           sizeof depths->centre[HX_FOOT]);
   for (int leg = 0; leg < HX_LEGS; ++leg) {
-    const double centre[3] = {depths->centre[0][leg], depths->centre[1][leg],
-                              depths->centre[2][leg]},
+    const double centre[3] = {foot[0][leg], foot[1][leg], foot[2][leg]},
                  cell[2] = {state->cell[0][leg], state->cell[1][leg]};
     depths->outside[leg] =
         cells && cell[0] >= 0.0 ? hx_terrain_outside(model->terrain, centre, cell) : -hx_far;
@@ -178,7 +199,7 @@ static inline void hx_depths_of_moment(const hxModel *model, const hxContactStat
     memcpy(depths->ddelta[model->row[k]], contact->ddelta, sizeof contact->ddelta);
   }
   if (model->has_soil) hx_depths_on_soil(state, depths);
-  if (model->terrain) feet_on_grid(model, state, moment, depths);
+  if (model->terrain) places_on_grid(model, state, moment, depths);
 }
 
 /* Sets the state's moment from its motion and time. */
@@ -237,7 +258,13 @@ static inline int hx_switch_contacts(const hxModel *model, hxDepths *depths, dou
   if (!hx_contact_is_due(model, depths, &state->contact)) return 0;
   int before[HX_SLOTS], after[HX_SLOTS];
   feet_on_ground(model, &state->contact, before);
-  state->touchdowns += hx_contact_switch(model, depths, &state->contact);
+  if (model->foot_rows > 1) {
+    const hxContactState was = state->contact;
+    state->touchdowns += hx_contact_switch(model, depths, &state->contact);
+    hx_contact_continue_impacts(model, at, &was, &state->contact);
+  } else {
+    state->touchdowns += hx_contact_switch(model, depths, &state->contact);
+  }
   feet_on_ground(model, &state->contact, after);
   for (int slot = 0; slot < HX_SLOTS; ++slot)
     if (after[slot] && !before[slot]) start_landing(slot, t, &state->measured);
@@ -253,6 +280,7 @@ HX_RARE void hx_cross_cells(const hxModel *model, hxDepths *depths, hxState *sta
   const hxMoment before = state->moment;
   hx_moment_of(model, &state->contact, &state->motion, &state->moment);
   hx_contact_hand_over(&before, &state->moment, crossed, &state->contact);
+  hx_moment_shares(model, &state->contact, &state->moment);
   if (has_bristles(model, HX_FOOT)) hx_contact_slacken(&state->contact, &state->motion);
   for (int leg = 0; leg < HX_LEGS && model->has_soil; ++leg)
     if (crossed >> leg & 1 && state->contact.closed[HX_FOOT][leg] == 0.0)
@@ -270,6 +298,11 @@ static inline hxReal mean_of(const double *from, const double *to) {
 static inline hxVec3 mean_vec3(const double (*from)[HX_SLOTS], const double (*to)[HX_SLOTS],
                                int slot) {
   return hx_scale(hx_splat(0.5), hx_add3(hx_load_vec3(from, slot), hx_load_vec3(to, slot)));
+}
+
+/* Returns whether the feet of a step's path share forces among their rows. */
+static inline int has_shares(const hxPath *path, int row) {
+  return path->model->foot_rows > 1 && hx_is_of_foot(row);
 }
 
 /* Returns the elastic energy 2/5 K delta^(5/2) of closed contacts, J. */
@@ -308,8 +341,13 @@ HX_INLINE void contact_works(const hxPath *path, int row, int slot, hxVec3 impul
   const hxVec3 approach =
       hx_scale(hx_splat(0.5), hx_add3(approach_of(from, slot), approach_of(to, slot)));
   const hxReal taken = hx_dot(impulse, approach);
-  hxReal stored =
-      stored_in_contact(law, &to->delta[slot]) - stored_in_contact(law, &from->delta[slot]);
+  hxReal before = stored_in_contact(law, &from->delta[slot]),
+         after = stored_in_contact(law, &to->delta[slot]);
+  if (has_shares(path, row)) {
+    before *= hx_load(&path->from->share[row][slot]);
+    after *= hx_load(&path->to->share[row][slot]);
+  }
+  hxReal stored = after - before;
   if (has_soil(path->model, row)) stored = growth_with_soil(path, slot, stored);
   *contact = taken - stored;
   *friction = -hx_dot(impulse, slip);
@@ -508,6 +546,7 @@ static inline hxReal share_above(hxReal from, hxReal to, double limit, hxReal *m
 typedef struct {
   hxVec3 slip_from, slip_to, mean_slip;     /* m/s */
   hxReal delta, slope_from, rise, slope_to; /* m  the cubic of the depth */
+  hxReal share, share_rise;                 /* 1  on blocks */
   hxContactLawAt law;
   int row, slot;
 } hxFootPath;
@@ -519,17 +558,21 @@ HX_INLINE hxFootPath foot_path(const hxPath *path, int row, int slot) {
   const hxVec3 way = hx_sub3(hx_load_vec3(to->centre, slot), hx_load_vec3(from->centre, slot));
   const hxVec3 along = along_ground(way, mean_vec3(from->normal, to->normal, slot));
   const hxReal delta = hx_load(&from->delta[slot]);
-  return (hxFootPath){.slip_from = hx_load_vec3(from->slip, slot),
-                      .slip_to = hx_load_vec3(to->slip, slot),
-                      .mean_slip =
-                          hx_add3(hx_scale(per_step, along), mean_vec3(from->roll, to->roll, slot)),
-                      .delta = delta,
-                      .slope_from = h * hx_load(&from->ddelta[slot]),
-                      .rise = hx_load(&to->delta[slot]) - delta,
-                      .slope_to = h * hx_load(&to->ddelta[slot]),
-                      .law = hx_law_at(path->contact, row, slot),
-                      .row = row,
-                      .slot = slot};
+  const int shares = has_shares(path, row);
+  const hxReal share = shares ? hx_load(&path->from->share[row][slot]) : hx_splat(1.0);
+  return (hxFootPath){
+      .slip_from = hx_load_vec3(from->slip, slot),
+      .slip_to = hx_load_vec3(to->slip, slot),
+      .mean_slip = hx_add3(hx_scale(per_step, along), mean_vec3(from->roll, to->roll, slot)),
+      .delta = delta,
+      .slope_from = h * hx_load(&from->ddelta[slot]),
+      .rise = hx_load(&to->delta[slot]) - delta,
+      .slope_to = h * hx_load(&to->ddelta[slot]),
+      .share = share,
+      .share_rise = shares ? hx_load(&path->to->share[row][slot]) - share : hx_splat(0.0),
+      .law = hx_law_at(path->contact, row, slot),
+      .row = row,
+      .slot = slot};
 }
 
 /* Normal force of feet, its rate and the sliding speed at a point of a step. */
@@ -543,7 +586,9 @@ HX_INLINE hxFootInstant foot_at(const hxPath *path, const hxFootPath *foot, doub
   const hxReal bends = path->h < shortest_bend ? hx_splat(0.0) : per_step * per_step;
   const hxCubic depth = cubic(foot->delta, foot->slope_from, foot->rise, foot->slope_to, x);
   const hxReal approach = per_step * depth.rate;
-  hxNormalForce f = hx_normal_force(foot->law, depth.value, approach);
+  hxContactLawAt law = foot->law;
+  if (has_shares(path, foot->row)) law.stiffness *= foot->share + x * foot->share_rise;
+  hxNormalForce f = hx_normal_force(law, depth.value, approach);
   if (has_soil(path->model, foot->row))
     f = with_soil(path->contact, foot->slot, depth.value, approach, f);
   const hxVec3 slip = sliding(foot->slip_from, foot->slip_to, foot->mean_slip, x);
@@ -594,6 +639,13 @@ HX_INLINE void measure_feet(const hxPath *path, int slot, hxMeasured *measured) 
   hx_store(&measured->slip_distance[slot], hx_load(&measured->slip_distance[slot]) + slipped);
 }
 
+/* Returns the share of a leg's contact at x in [0, 1] of a step. */
+static inline double share_within(const hxPath *path, int row, int leg, double x) {
+  if (!has_shares(path, row)) return 1.0;
+  const double from = path->from->share[row][leg], to = path->to->share[row][leg];
+  return from + x * (to - from);
+}
+
 /* Returns the normal force of a leg's contact at x in [0, 1] of a step, N. */
 static inline double force_within(const hxPath *path, int row, int leg, double x) {
   const hxContactMoment *from = &path->from->contact[row], *to = &path->to->contact[row];
@@ -607,9 +659,9 @@ static inline double force_within(const hxPath *path, int row, int leg, double x
                                 hx_lane(depth.rate, 0) / h)
         .force;
   }
-  const hxContactLawAt law = {hx_splat(contact->closed[row][leg]),
-                              hx_splat(contact->damping[row][leg]),
-                              hx_splat(contact->stiffness[row][leg])};
+  const hxContactLawAt law = {
+      hx_splat(contact->closed[row][leg]), hx_splat(contact->damping[row][leg]),
+      hx_splat(contact->stiffness[row][leg] * share_within(path, row, leg, x))};
   return hx_lane(hx_normal_force(law, depth.value, hx_splat(1.0 / h) * depth.rate).force, 0);
 }
 

@@ -27,7 +27,7 @@ HX_INLINE hxContactSlope contact_slope(const hxModel *model, const hxContactStat
                                        const hxImplicit *implicit) {
   const hxContactKinematics *kin = &contact->kin;
   const hxReal deeper = kin->delta + implicit->ahead * hx_max(kin->ddelta, hx_splat(0.0));
-  const hxNormalForce ahead = hx_normal_force(hx_law_at(state, row, slot), deeper, kin->ddelta);
+  const hxNormalForce ahead = hx_normal_force(contact->law, deeper, kin->ddelta);
   hxContactSlope slope = {.stiffness = ahead.stiffness, .viscosity = ahead.viscosity};
   if (has_turning_friction(model, row)) {
     slope.spin = ahead.force * contact->turning.spin;
