@@ -117,7 +117,9 @@ def test_control_and_gait_change_when_the_robot_stands_still(module: Module) -> 
 
 
 def test_a_start_that_is_no_walk_says_why(module: Module) -> None:
-    module.write(module.call("hx_walker_wanted"), np.array([KINEMATIC, 1, 0.75, 7.0, 0.03, 0]))
+    module.write(
+        module.call("hx_walker_wanted"), np.array([KINEMATIC, 1.0, 0.75, 7.0, 0.03, 0.0]).tobytes()
+    )
     assert module.call("hx_walker_start", 0.7) != 0
     text = module.read(module.call("hx_walker_message"), 200).partition(b"\0")[0].decode()
     assert "duty" in text

@@ -9,8 +9,11 @@ from pathlib import Path
 
 from sphinx.cmd.build import main as sphinx
 
+from hexapod_cosim.cosim.live.static_page import write_static_page
 from tools.docs import c_api, commands, notebooks, python_api, validation, variables
 from tools.docs.stage import DOCS, ROOT, Stage, pages
+
+WALK = "walk.html"  # the robot on the front page (docs/index.md)
 
 
 def build(out: Path, *, work: Path, computed: bool = True) -> int:
@@ -30,6 +33,8 @@ def build(out: Path, *, work: Path, computed: bool = True) -> int:
     if computed:
         with notebooks.running(work / "notebooks"):
             validation.fill(work)
+    out.mkdir(parents=True, exist_ok=True)
+    write_static_page(out / WALK)
     options = ["-W", "--keep-going", "-q", "-n", "-E", "-j", "auto"]
     return int(
         sphinx([*options, "-c", str(DOCS), "-d", str(work / ".doctrees"), str(work), str(out)])

@@ -92,7 +92,8 @@ static inline hxServo hx_servo_torque(const hxModel *model, hxReal angle, hxReal
 static inline hxReal stribeck_share(const hxModel *model, hxReal speed) {
 #ifdef HX_TANGENT
   const double w = hx_re(speed), a = hx_re(model->stribeck_exponent),
-               power = pow(fabs(w) * hx_re(model->per_stribeck_speed), a), share = exp(-power);
+               power = hx_pow(fabs(w) * hx_re(model->per_stribeck_speed), a),
+               share = 1.0 + expm1(-power); /* the C library's exp is too new a version */
   return hx_chain(speed, share, w != 0.0 ? -share * power * a / w : 0.0);
 #else
   const hxReal power =
