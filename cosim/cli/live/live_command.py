@@ -12,7 +12,7 @@ import typer
 
 from hexapod_cosim.controller import Gains, GainsError
 from hexapod_cosim.cosim.cli.running import ControlNames, GainsFile, Name, Settings, given_gains
-from hexapod_cosim.cosim.cli.terminal import show_files, show_text, waiting
+from hexapod_cosim.cosim.cli.terminal import Json, show_files, show_json, show_text, waiting
 from hexapod_cosim.cosim.control.controllers import check_control
 from hexapod_cosim.cosim.scenario.controls import parse_controls
 from hexapod_cosim.cosim.scenario.records import CONTROLS, Scenario
@@ -43,13 +43,11 @@ def live(
     port: Port = 0,
     browser: Browser = True,
     page: Page = None,
+    json: Json = False,
 ) -> None:
     """Drive the robot in a browser, in real time: keys, gamepad or touch. Ctrl-C ends it."""
     if page is not None:
-        from hexapod_cosim.cosim.live.static_page import write_static_page  # noqa: PLC0415  slow
-
-        with waiting("building the page"):
-            show_files([write_static_page(page)])
+        _write_page(page, json=json)
         return
     from hexapod_cosim.cosim.live.server import LiveServer, require_extra  # noqa: PLC0415  an extra
     from hexapod_cosim.cosim.live.settings import Choices, control_texts  # noqa: PLC0415
@@ -66,9 +64,22 @@ def live(
     with waiting("starting the robot"):
         server = LiveServer(Choices(plan, texts, refused), found, port=port)
     try:
-        server.run(lambda url: _announce(url, browser=browser))
+        server.run(lambda url: _announce(url, browser=browser, json=json))
     except KeyboardInterrupt:
-        show_text("stopped")
+        if not json:
+            show_text("stopped")
+
+
+def _write_page(path: Path, *, json: bool) -> None:
+    """Writes the page without a server."""
+    from hexapod_cosim.cosim.live.static_page import write_static_page  # noqa: PLC0415  slow
+
+    with waiting("building the page"):
+        file = write_static_page(path)
+    if json:
+        show_json({"files": [str(file)]})
+    else:
+        show_files([file])
 
 
 def _gains_of(plan: Scenario, given: Gains | None) -> tuple[Gains | None, str]:
@@ -87,9 +98,12 @@ def _gains_of(plan: Scenario, given: Gains | None) -> tuple[Gains | None, str]:
         return None, str(error)
 
 
-def _announce(url: str, *, browser: bool) -> None:
+def _announce(url: str, *, browser: bool, json: bool) -> None:
     """Prints the page's address and opens it."""
-    show_text(f"the robot walks at {url}")
-    show_text("Ctrl-C ends it")
+    if json:
+        show_json({"url": url})
+    else:
+        show_text(f"the robot walks at {url}")
+        show_text("Ctrl-C ends it")
     if browser:
         threading.Thread(target=webbrowser.open, args=(url,), daemon=True).start()
