@@ -36,7 +36,7 @@ def is_given(context: typer.Context, name: str) -> bool:
 
 def show_json(content: Mapping[str, Any] | Sequence[Any]) -> None:
     """Prints JSON; NaN becomes null."""
-    print(to_json(content))
+    print(to_json(content), flush=True)
 
 
 def show_files(files: Iterable[Path]) -> None:
