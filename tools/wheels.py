@@ -3,7 +3,7 @@
     python -m tools.wheels [FOLDER]                 all of them, in dist/ by default
 
 Every wheel is made of the same files: those of the wheel that this machine builds from the source
-distribution, without its binaries and C libraries, and the cross-compiled binaries of both FMUs
+distribution, without its binaries and C libraries, and the cross-compiled binaries of all FMUs
 for all platforms. A wheel differs from another one by its co-simulation loop and its tag alone, so
 that `hexapod export --platforms all` needs no compiler. The same sources and the same ziglang give
 the same bytes.
@@ -30,7 +30,7 @@ from pathlib import Path
 from rich.console import Console
 from wheel.wheelfile import WheelFile
 
-from hexapod_cosim.cosim.common.components import CONTROLLER, PLANT
+from hexapod_cosim.cosim.common.components import CONTROLLER, PLANT, POLICY
 from hexapod_cosim.cosim.common.plant_files import LOOP, fmi_headers
 from hexapod_cosim.cosim.export.cross_build import TARGETS, Library, build_library
 from hexapod_cosim.cosim.export.platforms import component_library
@@ -112,7 +112,8 @@ def common_files(wheel: Path) -> dict[str, bytes]:
 
 def cross_compile() -> dict[tuple[str, str], bytes]:
     """Compiles both FMUs' binaries and the loop for all targets, by library and target."""
-    libraries = [component_library(PLANT), component_library(CONTROLLER), loop_library()]
+    components = (PLANT, CONTROLLER, POLICY)
+    libraries = [*map(component_library, components), loop_library()]
     jobs = [(library, target) for target in TARGETS for library in libraries]
     with ThreadPoolExecutor(os.cpu_count()) as pool:
         built = list(pool.map(lambda job: build_library(*job), jobs))
