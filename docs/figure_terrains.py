@@ -14,14 +14,16 @@ from hexapod_cosim.cosim.report.relief import contact_sheet
 from hexapod_cosim.models import load_robot
 from hexapod_cosim.models.ground.catalogue import CATALOGUE, make_surface
 
-COLUMNS = 5
+COLUMNS = 6
 COLOURS = 256  # of the picture's palette
 
 
 def main() -> None:
     """Writes the picture."""
     surfaces = [
-        make_surface(name, {}) for name in CATALOGUE if name not in ("plane", "heightfield")
+        make_surface(name, {})
+        for name in CATALOGUE
+        if name != "heightfield"  # needs a file
     ]
     target = Path(__file__).parent / "images" / "terrains.png"
     with TemporaryDirectory() as folder:

@@ -111,7 +111,7 @@ def common_files(wheel: Path) -> dict[str, bytes]:
 
 
 def cross_compile() -> dict[tuple[str, str], bytes]:
-    """Compiles both FMUs' binaries and the loop for all targets, by library and target."""
+    """Compiles all three FMUs' binaries and the loop for all targets, by library and target."""
     components = (PLANT, CONTROLLER, POLICY)
     libraries = [*map(component_library, components), loop_library()]
     jobs = [(library, target) for target in TARGETS for library in libraries]

@@ -8,7 +8,8 @@ from pathlib import Path
 import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.colors import LightSource
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import LightSource, Normalize
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle, Rectangle
 from PIL import Image
@@ -36,8 +37,11 @@ def draw_relief(surface: Surface, robot: Robot, path: Path) -> Path:
         share = min(max((high - low) / (right - left), 0.25), 1.5)
         figure = Figure(figsize=(WIDTH, 0.9 * WIDTH * share + 0.4))
         axes = figure.subplots()
-        _draw(axes, surface)
+        scale = _draw(axes, surface)
         _draw_robot(axes, robot)
+        if np.ptp(surface.height) > 0.0:
+            bar = figure.colorbar(scale, ax=axes, shrink=0.8, pad=0.02, label="height [mm]")
+            bar.ax.set_ylim(1e3 * surface.height.min(), 1e3 * surface.height.max())
         axes.set_xlabel("x [m]")
         axes.set_ylabel("y [m]")
         axes.set_title(surface.name)
@@ -47,17 +51,19 @@ def draw_relief(surface: Surface, robot: Robot, path: Path) -> Path:
     return path
 
 
-def _draw(axes: Axes, surface: Surface) -> None:
-    """Draws shading, colour of the height and contour lines."""
+def _draw(axes: Axes, surface: Surface) -> ScalarMappable:
+    """Draws shading, colour of the height and contour lines; returns the scale of colours [mm]."""
     x, y, height = sampled(surface)
     pitch = float(x[1] - x[0]), float(y[1] - y[0])
     lowest, highest = float(height.min()), float(height.max())
     span = max(highest - lowest, 1e-6)
+    darkest, brightest = lowest - 0.3 * span, highest + 0.1 * span
+    colours = matplotlib.colormaps["cividis"]
     shaded = LIGHT.shade(
         height,
-        cmap=matplotlib.colormaps["cividis"],
-        vmin=lowest - 0.3 * span,
-        vmax=highest + 0.1 * span,
+        cmap=colours,
+        vmin=darkest,
+        vmax=brightest,
         blend_mode="soft",
         vert_exag=EXAGGERATION,
         dx=pitch[0],
@@ -73,6 +79,7 @@ def _draw(axes: Axes, surface: Surface) -> None:
     text = f"{1e3 * lowest:.3g} to {1e3 * highest:.3g} mm"
     text += f", contour lines every {1e3 * step:g} mm" if surface.kind == "smooth" else ", blocks"
     axes.text(0.0, -0.14, text, transform=axes.transAxes, fontsize=6.5, va="top")
+    return ScalarMappable(Normalize(1e3 * darkest, 1e3 * brightest), colours)
 
 
 def sampled(surface: Surface) -> tuple[Array, Array, Array]:
@@ -136,8 +143,9 @@ def contact_sheet(surfaces: Iterable[Surface], robot: Robot, path: Path, *, colu
         for axes, surface in zip(grid.ravel(), shown, strict=False):
             _draw(axes, surface)
             _draw_robot(axes, robot)
+            heights = axes.texts[0].get_text().partition(",")[0]
             axes.texts[0].remove()
-            axes.set_title(surface.name)
+            axes.set_title(f"{surface.name}\n{heights}")
             axes.tick_params(labelsize=5.0)
         with atomic_path(path) as part:
             kind = path.suffix.removeprefix(".")
