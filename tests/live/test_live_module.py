@@ -68,6 +68,7 @@ def commands(athena_fmu: Path) -> NDArray[np.float64]:
 def test_the_plant_has_the_bits_of_the_native_one(
     module: Module, core: ct.CDLL, commands: NDArray[np.float64]
 ) -> None:
+    core = ct.CDLL(core._name)  # types of arguments of its own
     core.hx_plant_create.restype = ct.c_void_p
     core.hx_plant_reset.argtypes = [ct.c_void_p, ct.c_void_p, ct.c_double]
     core.hx_plant_step.argtypes = [ct.c_void_p, ct.c_void_p, ct.c_double]

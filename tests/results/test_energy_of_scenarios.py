@@ -44,8 +44,8 @@ def test_the_energy_balance_of_the_other_robot_closes_too(
 def test_the_energy_balance_of_every_bundled_scenario_closes(
     walker: Walker, name: str, control: str
 ) -> None:
-    """The residual is below 1e-4 of the motors' gross work with the default solver, 1e-3 at the
-    fastest setting, 5e-3 there on soil.
+    """The residual is below 1e-4 of the motors' gross work with the default solver and 1e-3 at the
+    fastest setting. On soil it is up to 2e-2 there, and below 1e-3 at a tenth of its tolerance.
     """
 
     def missing(*solver: str) -> float:
@@ -53,4 +53,5 @@ def test_the_energy_balance_of_every_bundled_scenario_closes(
         return walker.simulate(scenario).metrics["energy_residual"]
 
     assert missing() < (2e-3 if (name, control) == STANDING else 1e-4)
-    assert name in IMPACTS or missing(*FAST) < (5e-3 if name in ON_SOIL else 1e-3)
+    assert name in IMPACTS or missing(*FAST) < (2e-2 if name in ON_SOIL else 1e-3)
+    assert name not in ON_SOIL or missing("solver.method=ros2", "solver.tolerance=0.01") < 1e-3
