@@ -1,7 +1,7 @@
 """Makes docs/images/report.png, the README's picture, from a comparison's report as a browser shows
 it.
 
-hexapod compare walk_flat -o out/flat && python docs/figure_report.py out/flat
+hexapod compare demo_course -o out/demo && python docs/figure_report.py out/demo
 
 Needs Playwright for Python (`pip install -e .[test]` brings it) and a Chromium (HEXAPOD_CHROMIUM
 names one that is not in the path).
@@ -18,8 +18,8 @@ from pathlib import Path
 from PIL import Image
 from playwright.sync_api import sync_playwright
 
-TIME = 5.3  # s    a tripod stands, the other swings
-SIZE = {"width": 1280, "height": 900}  # px
+TIME = 18.0  # s    both robots walk in rubble
+SIZE = {"width": 1280, "height": 1200}  # px
 FLAGS = [
     "--no-sandbox",
     "--use-angle=swiftshader",

@@ -1,4 +1,4 @@
-"""Builds the WebAssembly module of the default robot with its controller (browser/walker.h)."""
+"""Builds the WebAssembly module of the default robot with its controller (wasm/walker.h)."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from hexapod_cosim.cosim.export.cross_build import BROWSER, Library, build_libra
 from hexapod_cosim.models import HexapodError
 
 NAME = "walker"
-CONTROLLER_ROBOT = "controller_fmu/generated/defaults.c"  # browser/controller_defaults.c says why
+CONTROLLER_ROBOT = "controller_fmu/generated/defaults.c"  # wasm/controller_defaults.c says why
 _TREE = Path(__file__).resolve().parents[2]
 
 
@@ -46,7 +46,7 @@ def walker_library() -> Library:
         for path in (folder / "include" / "hexapod").glob("*.h"):
             found[f"hexapod/{path.name}"] = path
         found[f"{component}/generated/defaults.c"] = folder / "generated" / "defaults.c"
-    found |= {f"browser/{path.name}": path for path in (_TREE / "browser").glob("*.[ch]")}
+    found |= {f"wasm/{path.name}": path for path in (_TREE / "wasm").glob("*.[ch]")}
     return Library(
         NAME, dict(sorted(found.items())), flags=("-DHX_SHARED",), included=(CONTROLLER_ROBOT,)
     )

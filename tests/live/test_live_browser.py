@@ -15,7 +15,6 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-
 from browser import FLAGS, PATIENCE, find_chromium, launcher
 
 COMMAND = [sys.executable, "-m", "hexapod_cosim.cosim.cli", "live", "walk_flat", "--no-browser"]

@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-
 from browser import FLAGS, PATIENCE, launcher
+
 from hexapod_cosim.cosim.live.static_page import write_static_page
 
 FRAME = "window.hexapod.poses.newest"
