@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 import webbrowser
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
@@ -63,11 +64,10 @@ def live(
     refused = {name: refusal for name in CONTROLS if name not in able}
     with waiting("starting the robot"):
         server = LiveServer(Choices(plan, texts, refused), found, port=port)
-    try:
+    with suppress(KeyboardInterrupt):  # the server may have taken the signal itself
         server.run(lambda url: _announce(url, browser=browser, json=json))
-    except KeyboardInterrupt:
-        if not json:
-            show_text("stopped")
+    if not json:
+        show_text("stopped")
 
 
 def _write_page(path: Path, *, json: bool) -> None:
