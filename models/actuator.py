@@ -35,13 +35,23 @@ def servo_torque(
     that of a motor which this drives (`motor_torque`) with this power; in torque mode
     kp = kd = 0.
     """
-    kp, kd = (0.0, 0.0) if servo.mode == "torque" else (servo.kp, servo.kd)
+    kp, kd = feedback_gains(servo)
     wanted = kp * (angle_ref - angle) + kd * (speed_ref - speed) + torque_ref
     if servo.drive == "motor":
         return motor_torque(servo, speed, wanted, power)
-    upper = servo.torque_max * np.clip(1.0 - speed / servo.speed_max, 0.0, 1.0)
-    lower = -servo.torque_max * np.clip(1.0 + speed / servo.speed_max, 0.0, 1.0)
-    return np.clip(wanted, lower, upper)
+    return np.clip(wanted, *torque_limits(servo, speed))
+
+
+def feedback_gains(servo: Servo) -> tuple[float, float]:
+    """Returns kp [N m/rad] and kd [N m s/rad] of the servo's law, which are 0 in torque mode."""
+    return (0.0, 0.0) if servo.mode == "torque" else (servo.kp, servo.kd)
+
+
+def torque_limits(servo: Servo, speed: Array) -> tuple[Array, Array]:
+    """Returns the least and largest torque of the torque-speed line [N m]."""
+    load = speed / servo.speed_max
+    lower = -servo.torque_max * np.clip(1.0 + load, 0.0, 1.0)
+    return lower, servo.torque_max * np.clip(1.0 - load, 0.0, 1.0)
 
 
 def gear_friction(servo: Servo, speed: Array) -> Array:
@@ -66,15 +76,14 @@ def servo_slopes(
     Shapes are those of the inputs. The derivatives are 0 where the torque is clipped, except that
     the derivative by speed is the slope of the torque-speed line on that line.
     """
-    kp, kd = (0.0, 0.0) if servo.mode == "torque" else (servo.kp, servo.kd)
+    kp, kd = feedback_gains(servo)
     wanted = kp * (angle_ref - angle) + kd * (speed_ref - speed) + torque_ref
     if servo.drive == "motor":
         given = power if servo.mode != "torque" else Power(1.0, power.limit)
         gains = kp * given.supply, kd * given.supply
         return _motor_slopes(servo, speed, wanted * given.supply, *gains, power.limit)
     load = speed / servo.speed_max
-    upper = servo.torque_max * np.clip(1.0 - load, 0.0, 1.0)
-    lower = -servo.torque_max * np.clip(1.0 + load, 0.0, 1.0)
+    lower, upper = torque_limits(servo, speed)
     torque = np.clip(wanted, lower, upper)
     free = (lower < wanted) & (wanted < upper)
     falling = ~free & (torque * load > 0.0) & (np.abs(load) < 1.0)

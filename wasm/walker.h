@@ -1,7 +1,7 @@
 /* walker.h - the default robot with its controller, for a page that steps them without a server
  *
- * Compiled to WebAssembly together with the cores of plant and controller (cosim/live/module.py). There
- * is one robot in a module. SI units, frames and orders as in hexapod.h.
+ * cosim/live/module.py compiles it to WebAssembly together with the cores of plant and controller.
+ * There is one robot in a module. SI units, frames and orders as in hexapod.h.
  */
 #ifndef HEXAPOD_WALKER_H
 #define HEXAPOD_WALKER_H

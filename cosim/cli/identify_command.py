@@ -9,7 +9,7 @@ from typing import Annotated
 
 import typer
 
-from hexapod_cosim.cosim.cli.replay_command import RobotName
+from hexapod_cosim.cosim.cli.export_command import RobotName
 from hexapod_cosim.cosim.cli.terminal import (
     Json,
     show_files,

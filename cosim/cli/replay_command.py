@@ -9,7 +9,7 @@ from typing import Annotated, Any
 
 import typer
 
-from hexapod_cosim.cosim.cli import completion
+from hexapod_cosim.cosim.cli.export_command import RobotName
 from hexapod_cosim.cosim.cli.running import FmuFile
 from hexapod_cosim.cosim.cli.terminal import Json, show_files, show_json, show_table, waiting
 from hexapod_cosim.cosim.identify.log import read_log
@@ -23,15 +23,6 @@ from hexapod_cosim.models import load_robot
 LogFile = Annotated[
     Path,
     typer.Argument(metavar="LOG", help="A CSV, Parquet or MCAP file with commands and readings."),
-]
-RobotName = Annotated[
-    str,
-    typer.Option(
-        "--robot",
-        metavar="FILE",
-        help="A robot file, a URDF, or a name of `hexapod list robots`.",
-        autocompletion=completion.robot,
-    ),
 ]
 Parameters = Annotated[
     list[str] | None,

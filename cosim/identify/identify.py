@@ -17,7 +17,7 @@ from hexapod_cosim.cosim.identify.comparison import (
     column_differences,
 )
 from hexapod_cosim.cosim.identify.experiment import Experiment
-from hexapod_cosim.cosim.identify.log import CHANNELS, Log, LogError
+from hexapod_cosim.cosim.identify.log import CHANNELS, Log, LogError, without_readings
 from hexapod_cosim.cosim.identify.log_plant import LogPlant
 from hexapod_cosim.cosim.identify.output_error import TO_DEVIATION, Fit, Problem, Progress, fit
 from hexapod_cosim.cosim.identify.screening import BadColumn, misfits, screened
@@ -172,13 +172,7 @@ def make_experiment(log: Log, number: int, held_out: float) -> Experiment:
     if set(vector_names("torso.position")) - set(columns):  # a part of a position has no use
         columns = tuple(name for name in columns if not name.startswith("torso.position"))
     if not columns:
-        raise LogError(
-            "a log without readings",
-            got="commands alone",
-            expected="joint angles, torques, foot forces, an IMU or a pose",
-            fix="name the columns as the FMU's outputs: LF.coxa.angle [rad], ...",
-            where=log.where,
-        )
+        raise without_readings(log)
     count = len(log.time)
     end = count - round(held_out * count)
     begin = int(np.searchsorted(log.time, log.time[0] + SETTLING))

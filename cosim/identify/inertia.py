@@ -22,7 +22,7 @@ ORDER = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))  # xx yy zz xy xz yz
 
 @dataclass(frozen=True)
 class BodyInertia:
-    """A body's log-Cholesky parameters."""
+    """Holds the log-Cholesky parameters of a body's inertia."""
 
     size: float  # a: half the logarithm of the mass in kg
     widths: tuple[float, float, float]  # d: logarithms of lengths in m
@@ -31,12 +31,12 @@ class BodyInertia:
 
     @property
     def mass(self) -> float:
-        """Mass [kg]."""
+        """Returns the mass [kg]."""
         return float(np.exp(2.0 * self.size))
 
     @property
     def inertia(self) -> tuple[float, ...]:
-        """Inertia about the centre of mass: xx yy zz xy xz yz [kg m2]."""
+        """Returns the inertia about the centre of mass: xx yy zz xy xz yz [kg m2]."""
         d, (s12, s13, s23) = np.exp(self.widths), self.shears
         factor = np.array([[d[0], s12, s13], [0.0, d[1], s23], [0.0, 0.0, d[2]]])
         second = self.mass * factor @ factor.T  # about the centre of mass

@@ -40,7 +40,7 @@ class LogError(HexapodError):
 
 @dataclass(frozen=True)
 class Channel:
-    """Readings of one kind."""
+    """Describes the readings of one kind: key, title, unit and names of the columns."""
 
     key: str
     title: str
@@ -75,12 +75,12 @@ class Log:
 
     @property
     def time(self) -> Array:
-        """Times (rows,) [s]."""
+        """Returns the times (rows,) [s]."""
         return self.recording.time
 
     @property
     def commands(self) -> Mapping[str, Array]:
-        """The plant's inputs in the log, by name, each (rows,)."""
+        """Returns the plant's inputs in the log, by name, each (rows,)."""
         have = set(self.recording.names)
         return {name: self.recording.column(name) for name in input_names() if name in have}
 
@@ -91,7 +91,7 @@ class Log:
 
     @property
     def measured(self) -> tuple[str, ...]:
-        """All columns of readings."""
+        """Returns the columns of all readings."""
         return tuple(name for channel in CHANNELS for name in self.names(channel))
 
     def has(self, names: Sequence[str]) -> bool:
@@ -212,3 +212,14 @@ def roll_pitch_yaw(quaternions: Array) -> Array:
     pitch = np.arcsin(np.clip(2.0 * (w * y - z * x), -1.0, 1.0))
     yaw = np.unwrap(np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z)))
     return np.column_stack([roll, pitch, yaw])
+
+
+def without_readings(log: Log) -> LogError:
+    """Returns the error for a log that has no readings which the plant predicts."""
+    return LogError(
+        "a log without readings",
+        got="commands alone",
+        expected="joint angles, torques, foot forces, an IMU or a pose",
+        fix="name the columns as the FMU's outputs: LF.coxa.angle [rad], ...",
+        where=log.where,
+    )

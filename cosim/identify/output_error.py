@@ -61,7 +61,7 @@ STAGES = (Stage(SMOOTH, 0.3, 1.0, 15), Stage(ALL, 1.0, 1.0, 25), Stage(ALL, 1.0,
 
 @dataclass(frozen=True)
 class Fit:
-    """The most probable numbers."""
+    """Holds the most probable numbers, with what their intervals are made of."""
 
     rows: tuple[Unknown, ...]
     before: Mapping[str, float]  # values of the robot file
@@ -74,7 +74,7 @@ class Fit:
 
     @property
     def values(self) -> dict[str, float]:
-        """The numbers by key."""
+        """Returns the numbers by key."""
         return {
             row.key: row.value(z, self.before[row.key])
             for row, z in zip(self.rows, self.z.tolist(), strict=True)

@@ -16,7 +16,7 @@ from hexapod_cosim.cosim.identify.comparison import (
     channel_differences,
     column_differences,
 )
-from hexapod_cosim.cosim.identify.log import Log, LogError
+from hexapod_cosim.cosim.identify.log import Log, without_readings
 from hexapod_cosim.cosim.identify.log_plant import LogPlant
 from hexapod_cosim.cosim.identify.start import initial_state
 from hexapod_cosim.cosim.master.recorder import Recording
@@ -60,13 +60,7 @@ def replay(
         with LogPlant(path, parameters) as plant:
             names = plant.known(log.measured)
             if not names:
-                raise LogError(
-                    "a log without readings",
-                    got="commands alone",
-                    expected="joint angles, torques, foot forces, an IMU or a pose",
-                    fix="name the columns as the FMU's outputs: LF.coxa.angle [rad], ...",
-                    where=log.where,
-                )
+                raise without_readings(log)
             found = plant.simulate(log, names, initial_state(log, robot))
     inputs = log.commands
     data = np.column_stack([log.time, *inputs.values(), found])

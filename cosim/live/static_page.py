@@ -9,22 +9,21 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from hexapod_cosim.controller import Gait, make_gait
+from hexapod_cosim.controller import PATTERNS, Gait, make_gait
+from hexapod_cosim.cosim.common.components import CONTROLLER
 from hexapod_cosim.cosim.common.files import write_text
-from hexapod_cosim.cosim.interface.interface import load_interface
+from hexapod_cosim.cosim.interface.interface import enumerations_of, load_interface
 from hexapod_cosim.cosim.live.module import walker_module
 from hexapod_cosim.cosim.live.page import describe, fill_page
 from hexapod_cosim.cosim.live.settings import FLAT, Choices, control_texts, find_limits
 from hexapod_cosim.cosim.report.geometry import describe_ground, describe_shape
 from hexapod_cosim.cosim.results.walk import robot_weight
+from hexapod_cosim.cosim.scenario.records import CONTROLS
 from hexapod_cosim.cosim.scenario.scenario import load_scenario
 from hexapod_cosim.models import Robot, load_robot
 
 BUNDLE = "browser.js"
 SCENARIO = "walk_flat"
-# hxControl and hxPattern (controller_fmu/include/hexapod/controller.h)
-CONTROLS = {"kinematic": 1, "compliant": 2, "paper": 3}
-PATTERNS = {"tripod": 1, "ripple": 2, "wave": 3, "amble": 4}
 
 
 def write_static_page(path: Path) -> Path:
@@ -46,7 +45,7 @@ def render_static_page() -> str:
 
 def _setup(choices: Choices, robot: Robot) -> dict[str, Any]:
     """Returns what the page reads (cosim/viewer/src/browser/local.ts)."""
-    parameters = _parameters(robot)
+    parameters, types = _parameters(robot), enumerations_of(CONTROLLER)
     world = {
         "robot": describe_shape(parameters, robot.torso.size),
         "ground": describe_ground(parameters),
@@ -56,23 +55,21 @@ def _setup(choices: Choices, robot: Robot) -> dict[str, Any]:
     }
     return describe(choices) | {
         "world": world,
-        "friction": robot.friction.mu,
         "first": vars(replace(choices.first(), ground=FLAT)),
         "grounds": [],
-        "numbers": CONTROLS,
-        "walks": {name: _walk(make_gait(robot, name), robot) for name in PATTERNS},
+        "numbers": {name: types["Control"].number(name) for name in CONTROLS},
+        "walks": {
+            name: _walk(make_gait(robot, name), types["GaitPattern"].number(name), robot)
+            for name in PATTERNS
+        },
     }
 
 
-def _walk(gait: Gait, robot: Robot) -> dict[str, Any]:
-    """Returns a gait in the order of hxWalk, and the largest commands with it."""
-    numbers = [
-        PATTERNS[gait.name],
-        gait.period,
-        gait.duty,
-        gait.step_height,
-        gait.touchdown_speed,
-    ]
+def _walk(gait: Gait, pattern: int, robot: Robot) -> dict[str, Any]:
+    """Returns a gait with its pattern's number in the order of hxWalk, and the largest commands
+    with it.
+    """
+    numbers = [pattern, gait.period, gait.duty, gait.step_height, gait.touchdown_speed]
     return {"gait": numbers, "limits": vars(find_limits(robot, gait))}
 
 

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from browser import FLAGS, PATIENCE, find_chromium, launcher
+from browser import FLAGS, PATIENCE, find_chromium, launcher, watched
 
 COMMAND = [sys.executable, "-m", "hexapod_cosim.cosim.cli", "live", "walk_flat", "--no-browser"]
 PAD = """
@@ -46,19 +46,12 @@ class LivePage:
     """The live page in a browser, with all its errors and requests."""
 
     def __init__(self, browser: Any, address: str, **options: Any) -> None:
-        self.errors: list[str] = []
-        self.requests: list[str] = []
         # a quarter of the pixels, because they are drawn without a graphics card
         options = {"device_scale_factor": 0.5, **options}
         self.context = browser.new_context(**options)
         self.page = self.context.new_page()
         self.page.set_default_timeout(PATIENCE)
-        self.page.on(
-            "console",
-            lambda message: self.errors.append(message.text) if message.type == "error" else None,
-        )
-        self.page.on("pageerror", lambda error: self.errors.append(str(error)))
-        self.page.on("request", lambda request: self.requests.append(request.url))
+        self.errors, self.requests = watched(self.page)
         self.page.add_init_script(PAD)
         self.page.goto(address)
         self.until("window.hexapod?.view?.drawn > 0 && window.hexapod.poses.newest")

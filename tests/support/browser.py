@@ -54,6 +54,19 @@ def launcher() -> Iterator[Launcher]:
         yield lambda *flags: playwright.chromium.launch(executable_path=path, args=[*flags])
 
 
+def watched(page: Any) -> tuple[list[str], list[str]]:
+    """Returns two lists that fill with the errors and with the requests of a page."""
+    errors: list[str] = []
+    requests: list[str] = []
+    page.on(
+        "console",
+        lambda message: errors.append(message.text) if message.type == "error" else None,
+    )
+    page.on("pageerror", lambda error: errors.append(str(error)))
+    page.on("request", lambda request: requests.append(request.url))
+    return errors, requests
+
+
 class Opened:
     """A report in a browser page, with all its errors and requests."""
 
@@ -66,18 +79,11 @@ class Opened:
         size: tuple[int, int] = (1280, 900),
         **options: Any,
     ) -> None:
-        self.errors: list[str] = []
-        self.requests: list[str] = []
         viewport = {"width": size[0], "height": size[1]}
         self.context = browser.new_context(viewport=viewport, offline=True, **options)
         self.page = self.context.new_page()
         self.page.set_default_timeout(PATIENCE)
-        self.page.on(
-            "console",
-            lambda message: self.errors.append(message.text) if message.type == "error" else None,
-        )
-        self.page.on("pageerror", lambda error: self.errors.append(str(error)))
-        self.page.on("request", lambda request: self.requests.append(request.url))
+        self.errors, self.requests = watched(self.page)
         begin = time.perf_counter()
         self.page.goto(file.as_uri() + address)
         self.page.wait_for_selector("html[data-opened]", state="attached")

@@ -82,3 +82,13 @@ function storedTheme(): string | null {
     return null;
   }
 }
+
+/** Returns the style of a plot's axis, in the page's present colours whenever it is drawn. */
+export function quietAxis() {
+  return {
+    stroke: () => property("--muted"),
+    grid: { stroke: () => property("--line"), width: 1 },
+    ticks: { show: false },
+    font: "11px system-ui",
+  };
+}

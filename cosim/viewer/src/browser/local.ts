@@ -9,7 +9,6 @@ const MOST_WEIGHTS = 3; // body weights    largest push
 /** What the page holds (cosim/live/static_page.py). */
 export interface StaticSetup extends Setup {
   readonly world: World;
-  readonly friction: number;
   readonly first: Settings;
   /** hxControl by name. */
   readonly numbers: Readonly<Record<string, number>>;

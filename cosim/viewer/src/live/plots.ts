@@ -1,6 +1,6 @@
 import uPlot from "uplot";
 import { byId, element } from "../dom";
-import { property } from "../theme";
+import { property, quietAxis } from "../theme";
 import type { Frame, World } from "./messages";
 
 const WIDTH = 8; // s    that the plots show
@@ -182,12 +182,7 @@ class Strip {
   }
 
   private describe(box: HTMLElement): uPlot.Options {
-    const quiet = {
-      stroke: () => property("--muted"),
-      grid: { stroke: () => property("--line"), width: 1 },
-      ticks: { show: false },
-      font: "11px system-ui",
-    };
+    const quiet = quietAxis();
     return {
       width: Math.max(box.clientWidth, 100),
       height: box.clientHeight || 110,

@@ -16,6 +16,7 @@ import { OrbitControls } from "three/addons/controls/OrbitControls.js";
 import { footCentres, type Pose } from "../kinematics";
 import { ForceArrows } from "../scene/arrows";
 import { Floor } from "../scene/ground";
+import { castShadows } from "../scene/lamp";
 import { Relief } from "../scene/relief";
 import { RobotModel } from "../scene/robot";
 import { unpackSurface } from "../scene/surface";
@@ -217,19 +218,7 @@ export class View {
   }
 
   private light(): void {
-    this.lamp.castShadow = true;
-    this.lamp.shadow.mapSize.set(2048, 2048);
-    this.lamp.shadow.radius = 4;
-    this.lamp.shadow.intensity = 0.6;
-    this.lamp.shadow.normalBias = 0.004;
-    Object.assign(this.lamp.shadow.camera, {
-      left: -REACH,
-      right: REACH,
-      top: REACH,
-      bottom: -REACH,
-      near: 0.5,
-      far: 6,
-    });
+    castShadows(this.lamp, REACH, 2048);
     this.scene.add(this.lamp, this.lamp.target, this.sky);
   }
 

@@ -1,7 +1,7 @@
 import uPlot from "uplot";
 import type { Clock } from "../clock";
 import { element } from "../dom";
-import { property } from "../theme";
+import { property, quietAxis } from "../theme";
 import type { Span } from "./span";
 
 const LEAST = 1e-4; // relative: a curve with a smaller range is a constant with round-off
@@ -63,12 +63,7 @@ export class Panel {
   private describe(box: HTMLElement): uPlot.Options {
     const [min, max] = this.span.limits;
     const again = () => queueMicrotask(() => this.showTime()); // after uPlot's own layout microtask
-    const quiet = {
-      stroke: () => property("--muted"),
-      grid: { stroke: () => property("--line"), width: 1 },
-      ticks: { show: false },
-      font: "11px system-ui",
-    };
+    const quiet = quietAxis();
     return {
       width: Math.max(box.clientWidth, 120),
       height: this.options.height,

@@ -6,6 +6,7 @@ import type { PackedRun } from "../types";
 import { ForceArrows } from "./arrows";
 import { Dents, findDents } from "./dents";
 import { Floor } from "./ground";
+import { castShadows } from "./lamp";
 import type { Relief } from "./relief";
 import { RobotModel } from "./robot";
 import type { Stance } from "./stances";
@@ -41,20 +42,7 @@ export class Actor {
     const dents = findDents(run.ground.footprints ?? []);
     if (dents.length > 0) this.dents = new Dents(dents, relief, recording);
     this.arrows = new ForceArrows(run.robot.legs.length);
-    this.lamp.castShadow = true;
-    const reach = surface ? FAR_REACH : REACH;
-    this.lamp.shadow.mapSize.set(surface ? 2048 : 1024, surface ? 2048 : 1024);
-    this.lamp.shadow.radius = 4;
-    this.lamp.shadow.intensity = 0.6;
-    this.lamp.shadow.normalBias = 0.004;
-    Object.assign(this.lamp.shadow.camera, {
-      left: -reach,
-      right: reach,
-      top: reach,
-      bottom: -reach,
-      near: 0.5,
-      far: 6,
-    });
+    castShadows(this.lamp, surface ? FAR_REACH : REACH, surface ? 2048 : 1024);
     this.scene.add(this.model, this.floor, this.arrows, this.lamp, this.lamp.target, this.sky);
     if (this.dents) this.scene.add(this.dents);
   }
