@@ -18,11 +18,11 @@ from hexapod_cosim.cosim.common.plant_files import fmi_headers, released_binary,
 from hexapod_cosim.cosim.export import wit
 from hexapod_cosim.cosim.export.cross_build import COMPONENT, Library, build_library
 from hexapod_cosim.cosim.export.platforms import WASM_FOLDER
+from hexapod_cosim.cosim.export.reference import MANIFEST_NAMESPACE
 from hexapod_cosim.models.errors import FmuError
 
 STANDARD, STANDARD_VERSION = "org.modelica.fmi-ls-wasm", "0.1.0"
 MANIFEST = f"extra/{STANDARD}/manifest.xml"
-MANIFEST_NAMESPACE = "http://fmi-standard.org/fmi-ls-manifest"
 _TREE = Path(__file__).resolve().parents[2]
 # functions of stdio.h that the sources call, and what reads from memory instead
 _FILES = {"fopen": "open", "fclose": "close", "fgetc": "getc", "fread": "read"}

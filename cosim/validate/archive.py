@@ -25,6 +25,7 @@ from hexapod_cosim.cosim.validate.description import (
     variables,
 )
 from hexapod_cosim.cosim.validate.grids import grid_problems
+from hexapod_cosim.cosim.validate.related import related_problems
 from hexapod_cosim.cosim.validate.variable import INTERFACES
 from hexapod_cosim.cosim.validate.web_assembly import component_problems
 
@@ -114,6 +115,7 @@ def member_problems(
         terminal_problems(set(names), found),
         document_problems(found, fmi),
         grid_problems(found),
+        related_problems(set(names), found),
     )
     return [problem for check in checks for problem in check]
 
