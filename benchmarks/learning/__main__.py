@@ -20,7 +20,7 @@ import numpy as np
 from mujoco import rollout
 from numpy.typing import NDArray
 
-from benchmarks import fmugym_walk
+from benchmarks.learning import fmugym_walk
 from hexapod_cosim.gym.bench import bench, walking_action
 from hexapod_cosim.gym.settings import JOINTS, RATE, EnvSettings
 from hexapod_cosim.models import load_robot
