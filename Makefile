@@ -22,12 +22,13 @@ SANITIZED_SHORT := $(patsubst %,tests/fmi/test_%.py,fmi fmi3 fmi3_order fmi_stat
 	$(patsubst %,tests/plant/test_plant_%.py,events coordinates misuse)
 SANITIZED := $(SANITIZED_SHORT) tests/fmi/test_fmi_importers.py tests/fmi/test_endurance.py
 
-.PHONY: help setup demo test test-browser test-importers test-platforms test-endurance test-native test-native-sanitize test-sanitize test-sanitize-short test-robots test-wheels wheels test-compilers fuzz fuzz-short mutants soak lint-c check bench bench-quick bench-batch bench-gym bench-opening control study-demo format generate fmu typing clean docs identify-campaign
+.PHONY: help setup demo test test-docs test-browser test-importers test-platforms test-endurance test-native test-native-sanitize test-sanitize test-sanitize-short test-robots test-wheels wheels test-compilers fuzz fuzz-short mutants soak lint-c check bench bench-quick bench-batch bench-gym bench-opening control study-demo format generate fmu typing clean docs identify-campaign
 
 help:
 	@echo "make setup     the hexapod command in $(BIN)"
 	@echo "make demo      both controls from flat ground into rubble; says where the report is"
-	@echo "make test      every test"
+	@echo "make test      the tests"
+	@echo "make test-docs  the site with its notebooks run and its validation computed (5 min)"
 	@echo "make test-browser  the report in Chromium, at full length, and how long it takes to open (1 min)"
 	@echo "make test-importers  the same walk through libcosim, Ecos, ... and how far each is from fmpy (2 min)"
 	@echo "make test-platforms  the binaries for all platforms, Windows under Wine and Arm under qemu-user (installed with apt when root)"
@@ -78,6 +79,10 @@ demo: setup
 # a process for each core has no use for threads of matrices
 test: setup typing
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest $(PARALLEL)
+
+# builds the site with its notebooks run and its validation computed
+test-docs: setup
+	HEXAPOD_SITE=computed $(BIN)/python -m pytest -q tests/docs/test_docs.py -k "site or validation"
 
 test-browser: setup
 	HEXAPOD_BROWSER=full $(BIN)/python -m pytest -s tests/report/test_browser.py tests/live/test_live_browser.py
