@@ -81,7 +81,7 @@ SWAPS = {
 OPERATOR = re.compile(r"(?<= )(\+|-|\*|/|<=?|>=?|==|!=|&&|\|\||and|or)(?= )")
 NUMBER = re.compile(r"(?<![\w.\"])(?<!e-)(\d+\.\d+(?:e-?\d+)?|[1-9]\d*)(?![\w.\"])")
 SIGN = re.compile(r"(?<=[(=,] )-(?=[\w(])|(?<=[(\[])-(?=[a-z(])|(?<=return )-(?=[\w(])")
-DECLARED = re.compile(r"(?<!return)\b(?!return )\w+ \*?\w+\[$")  # the length of an array, before it
+DECLARED = re.compile(r"\b(?!return )\w+ \*?\w+\[$")  # the length of an array, before it
 SKIPPED = re.compile(r"^\s*(#|\*|/\*|//|import |from |assert |@|\"\"\"|\w+: |static const|enum )")
 
 
