@@ -65,7 +65,11 @@ GROUPS: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     ),
     "kinematics": (
         (f"{LANES}/kinematics.h", f"{LANES}/coordinates.h"),
-        (f"{TESTS}plant_functions.py", f"{TESTS}plant_coordinates.py", f"{TESTS}laws_motion.py"),
+        (
+            *(f"{TESTS}{name}.py" for name in ("plant_functions", "plant_coordinates")),
+            f"{TESTS}laws_motion.py",
+            "tests/models/test_twin_integrator.py",
+        ),
     ),
     "control": (("controller_fmu/src/*/*.c", "controller_fmu/src/controller.c"), NATIVE),
     "metrics": (
