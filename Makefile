@@ -5,6 +5,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
+LOCK ?=# a file of pinned requirements with hashes, which .ci/run gives; without one pip chooses versions
 PARALLEL := -n auto --maxprocesses 8 --dist loadfile --no-loadscope-reorder# a process a core; files stay whole, see tests/conftest.py
 CMAKE = PATH="$(CURDIR)/$(BIN):$$PATH" cmake
 CONFIGURE = $(CMAKE) -G Ninja -DPython_EXECUTABLE=$(CURDIR)/$(BIN)/python --log-level=WARNING --preset
@@ -22,7 +23,7 @@ SANITIZED_SHORT := $(patsubst %,tests/fmi/test_%.py,fmi fmi3 fmi3_order fmi_stat
 	$(patsubst %,tests/plant/test_plant_%.py,events coordinates misuse)
 SANITIZED := $(SANITIZED_SHORT) tests/fmi/test_fmi_importers.py tests/fmi/test_endurance.py
 
-.PHONY: help setup demo test test-docs test-browser test-importers test-platforms test-endurance test-native test-native-sanitize test-sanitize test-sanitize-short test-robots test-wheels wheels test-compilers fuzz fuzz-short mutants soak lint-c check bench bench-quick bench-batch bench-gym bench-opening control study-demo format generate fmu typing clean docs identify-campaign
+.PHONY: help setup demo test test-docs test-browser test-importers test-platforms test-endurance test-native test-native-sanitize test-sanitize test-sanitize-short test-robots test-wheels wheels test-compilers fuzz fuzz-short mutants soak lint-c check bench bench-quick bench-batch bench-gym bench-opening control study-demo format generate fmu typing clean docs identify-campaign coverage lock audit
 
 help:
 	@echo "make setup     the hexapod command in $(BIN)"
@@ -42,6 +43,7 @@ help:
 	@echo "make test-compilers  the plant built by gcc, clang and zig at -O0 to -O3: the same bits (3 min)"
 	@echo "make fuzz      libFuzzer on calls, states, start values and grids, Hypothesis on every reader: FUZZ_SECONDS, 3600 in all"
 	@echo "make fuzz-short  the same for a minute in all"
+	@echo "make coverage  branches of plant, controllers and FMI layer that their tests take, per file (10 min)"
 	@echo "make mutants   MUTANTS (200) small changes of the code, one at a time: which ones the tests find (hours)"
 	@echo "make soak      SOAK_SECONDS (86400) of walking with random commands, pushes, faults and restores"
 	@echo "make check     formatters, linters, types, generated files, warnings of gcc and clang"
@@ -56,6 +58,8 @@ help:
 	@echo "make format    formats C and Python"
 	@echo "make generate  generated/ of plant_fmu and controller_fmu from their interface.toml, pictures and reference results from the robot"
 	@echo "make fmu       out/athena.fmu and out/phantomx_mk4.fmu"
+	@echo "make lock      .ci/requirements.txt: the versions of .ci/constraints.txt with the hashes of all files"
+	@echo "make audit     known vulnerabilities of these versions; needs the network"
 	@echo "make clean     removes what these made"
 
 setup: $(STAMP)
@@ -70,7 +74,8 @@ $(STAMP): $(SOURCES)
 	echo "no usable Python: got $$($(PYTHON) --version 2>&1), expected Python 3.11 or later with its venv module;" \
 	"install it (Debian, Ubuntu: apt-get install python3 python3-venv) or name another one with PYTHON=..." >&2; exit 1; }
 	@$(BIN)/python -m pip --version >/dev/null 2>&1 || $(PYTHON) -m venv --clear $(VENV)
-	$(BIN)/python -m pip install --quiet --editable '.[test]'
+	$(if $(LOCK),PIP_CONSTRAINT= $(BIN)/python -m pip install --quiet --require-hashes --requirement $(LOCK))
+	$(BIN)/python -m pip install --quiet $(if $(LOCK),--no-deps --no-build-isolation --editable .,--editable '.[test]')
 	@touch $@
 
 demo: setup
@@ -141,6 +146,23 @@ fuzz: setup
 
 fuzz-short: setup
 	$(BIN)/python -m tools.fuzz 60
+
+coverage: setup
+	$(BIN)/python -m pip install --quiet gcovr
+	$(BIN)/python -m tools.coverage
+
+# .ci/requirements.txt of the versions in .ci/constraints.txt; for the oldest Python of Debian 12
+lock: setup
+	$(BIN)/python -m pip install --quiet uv
+	{ echo "# What continuous integration installs, every file by its hash (make lock; audited by make audit)."; \
+	$(BIN)/uv pip compile --quiet --generate-hashes --no-annotate --no-header --no-emit-index-url --python-version 3.11.2 \
+	pyproject.toml .ci/build.in --extra test --extra release --constraints .ci/constraints.txt; } > build/requirements.txt
+	mv build/requirements.txt .ci/requirements.txt
+
+# known vulnerabilities of these versions; asks a database in the network
+audit: setup
+	$(BIN)/python -m pip install --quiet pip-audit
+	$(BIN)/pip-audit --require-hashes --disable-pip --requirement .ci/requirements.txt
 
 MUTANTS ?= 200
 mutants: setup

@@ -5,8 +5,8 @@ usage: python -m tools.mutants COUNT [--seed N] [--concerned] [--groups GROUP ..
 A mutant changes one operator, comparison, sign or constant. Its tests are those of its group in
 GROUPS and then, unless --concerned is given, all others, up to the first failure. They are run in
 the order of a stored ranking: tests that have killed mutants of the group come first, then fast
-ones. A test run that takes more processor time than LIMIT times that of the unchanged code is a
-failure too, because a mutant may loop for ever.
+ones. A test run that takes more processor time than LIMIT is a failure too, because a mutant may
+loop for ever. In the end, all tests that have killed a mutant must pass with the unchanged code.
 
 The sample is drawn with a seed, from each group in turn, so that each part of it is a fair sample.
 Results are in build/mutants/results.json; a second call continues there until COUNT mutants are
@@ -40,8 +40,9 @@ from typing import Any
 ROOT = Path(__file__).resolve().parents[1]
 BUILD = ROOT / "build" / "mutants"
 TREE, RESULTS = BUILD / "tree", BUILD / "results.json"
+DURATIONS, LATEST = BUILD / "durations.json", BUILD / "latest.json"  # s, of each test
 TIME_LIMIT = 3600.0  # s of wall time, of tests or of a build
-LIMIT, LEAST = 5.0, 60.0  # of the processor time of the unchanged code; s
+LIMIT = 1200  # s of processor time of one process
 FLAGS = "-O1 -DNDEBUG -DHX_BASELINE_ONLY"  # of the copy's C code
 LANES, TESTS = "plant_fmu/src/lanes", "tests/plant/test_"
 NATIVE = ("tests/controller/test_native_controller.py", "tests/controller/test_controller_twins.py")
@@ -64,7 +65,11 @@ GROUPS: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     ),
     "kinematics": (
         (f"{LANES}/kinematics.h", f"{LANES}/coordinates.h"),
-        (f"{TESTS}plant_functions.py", f"{TESTS}plant_coordinates.py", f"{TESTS}laws_motion.py"),
+        (
+            *(f"{TESTS}{name}.py" for name in ("plant_functions", "plant_coordinates")),
+            f"{TESTS}laws_motion.py",
+            "tests/models/test_twin_integrator.py",
+        ),
     ),
     "control": (("controller_fmu/src/*/*.c", "controller_fmu/src/controller.c"), NATIVE),
     "metrics": (
@@ -80,6 +85,7 @@ SWAPS = {
 OPERATOR = re.compile(r"(?<= )(\+|-|\*|/|<=?|>=?|==|!=|&&|\|\||and|or)(?= )")
 NUMBER = re.compile(r"(?<![\w.\"])(?<!e-)(\d+\.\d+(?:e-?\d+)?|[1-9]\d*)(?![\w.\"])")
 SIGN = re.compile(r"(?<=[(=,] )-(?=[\w(])|(?<=[(\[])-(?=[a-z(])|(?<=return )-(?=[\w(])")
+DECLARED = re.compile(r"\b(?!return )\w+ \*?\w+\[$")  # the length of an array, before it
 SKIPPED = re.compile(r"^\s*(#|\*|/\*|//|import |from |assert |@|\"\"\"|\w+: |static const|enum )")
 
 
@@ -121,6 +127,8 @@ def mutants_of(group: str, path: Path) -> Iterator[Mutant]:
         for match in OPERATOR.finditer(line):
             yield Mutant(group, name, number, match.start(), match[0], SWAPS[match[0]])
         for match in NUMBER.finditer(line):
+            if DECLARED.search(line[: match.start()]):
+                continue
             yield Mutant(group, name, number, match.start(), match[0], changed_number(match[0]))
         for match in SIGN.finditer(line):
             yield Mutant(group, name, number, match.start(), "-", "")
@@ -183,19 +191,13 @@ def build_faster() -> None:
     lists.write_text(text, encoding="utf-8")
 
 
-def in_tree(
-    *arguments: str, seconds: float = 0.0, env: dict[str, str] | None = None
-) -> tuple[bool, str]:
-    """Runs the copy's Python, for `seconds` of processor time at most (0: any).
-
-    Returns whether it succeeded, and the last lines of its output.
-    """
+def in_tree(*arguments: str, env: dict[str, str] | None = None) -> tuple[bool, str]:
+    """Runs the copy's Python; returns whether it succeeded, and the last lines of its output."""
     search = os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])
     outside = {"PATH": search, "PYTHONPATH": "", "PYTHONDONTWRITEBYTECODE": "1"}
 
     def limit() -> None:
-        if seconds:
-            resource.setrlimit(resource.RLIMIT_CPU, (round(seconds), round(seconds) + 5))
+        resource.setrlimit(resource.RLIMIT_CPU, (LIMIT, LIMIT + 5))
 
     try:
         done = subprocess.run(
@@ -212,7 +214,7 @@ def in_tree(
     except subprocess.TimeoutExpired:
         return False, f"more than {TIME_LIMIT:g} s"
     if done.returncode == -signal.SIGXCPU:
-        return False, f"more than {seconds:.0f} s of processor time"
+        return False, f"more than {LIMIT} s of processor time"
     return done.returncode == 0, (done.stdout + done.stderr)[-2000:]
 
 
@@ -222,52 +224,48 @@ def builds() -> tuple[bool, str]:
     return in_tree("-c", code)
 
 
-def passes(
-    *tests: str, seconds: float = 0.0, env: dict[str, str] | None = None
-) -> tuple[bool, str]:
+def passes(*tests: str, env: dict[str, str] | None = None) -> tuple[bool, str]:
     """Runs tests of the copy up to the first failure."""
     options = ("-q", "-x", "-n", "0", "-p", "tools.mutants_order", "-p", "no:cacheprovider")
-    return in_tree("-m", "pytest", *options, *tests, seconds=seconds, env=env)
+    return in_tree("-m", "pytest", *options, *tests, env=env)
 
 
 # ---- the ranking of the tests ----
 
 
-@dataclass(frozen=True)
-class Ranking:
-    """What the unchanged copy's tests of one group take."""
+def write_order(results: list[dict[str, Any]], group: str) -> Path:
+    """Writes the rank of each known test for the plugin, and returns the file's path.
 
-    seconds: float  # of processor time, all tests together
-    durations: dict[str, float]  # s, of each test
-
-    def write(self, results: list[dict[str, Any]], group: str) -> Path:
-        """Writes the rank of each test for the plugin, and returns the file's path.
-
-        Tests that killed mutants of the group come first, most kills first, then fast ones.
-        """
-        kills = Counter(one["by"] for one in results if one["group"] == group)
-        tests = sorted(self.durations, key=lambda test: (-kills[test], self.durations[test]))
-        path = BUILD / f"{group}-order.json"
-        path.write_text(json.dumps({test: rank for rank, test in enumerate(tests)}), "utf-8")
-        return path
-
-
-def ranked(group: str) -> Ranking:
-    """Returns the stored ranking of a group, or measures it: its tests must pass.
-
-    Raises SystemExit when they fail.
+    Tests that killed mutants of the group come first, most kills first, then fast ones. Unknown
+    tests come last, in the order of GROUPS.
     """
-    path, raw = BUILD / f"{group}-ranking.json", BUILD / "durations.json"
-    if not path.exists():
-        before = resource.getrusage(resource.RUSAGE_CHILDREN)
-        passed, output = passes(*GROUPS[group][1], env={"HEXAPOD_DURATIONS": str(raw)})
-        if not passed:
-            raise SystemExit(f"mutants: the unchanged copy fails\n{output}")
-        after = resource.getrusage(resource.RUSAGE_CHILDREN)
-        seconds = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
-        durations = json.loads(raw.read_text(encoding="utf-8"))
-        path.write_text(json.dumps({"seconds": seconds, "durations": durations}), "utf-8")
-    return Ranking(**json.loads(path.read_text(encoding="utf-8")))
+    kills = Counter(one["by"] for one in results if one["group"] == group)
+    durations = read_durations()
+    tests = sorted(durations, key=lambda test: (-kills[test], durations[test]))
+    path = BUILD / f"{group}-order.json"
+    path.write_text(json.dumps({test: rank for rank, test in enumerate(tests)}), encoding="utf-8")
+    return path
+
+
+def read_durations() -> dict[str, float]:
+    """Returns how long tests took when they ran last [s]."""
+    known: dict[str, float] = {}
+    for path in (DURATIONS, LATEST):
+        if path.exists():
+            known |= json.loads(path.read_text(encoding="utf-8"))
+    DURATIONS.write_text(json.dumps(known), encoding="utf-8")
+    return known
+
+
+def check_killers(results: list[dict[str, Any]]) -> None:
+    """Raises SystemExit when a test that has killed mutants fails with the unchanged code too."""
+    killers = sorted({one["by"] for one in results if one["fate"] == "killed"})
+    tests = [killer for killer in killers if killer.startswith("tests/")]
+    passed, output = builds()
+    if passed and tests:
+        passed, output = passes(*tests)
+    if not passed:
+        raise SystemExit(f"mutants: the unchanged copy fails\n{output}")
 
 
 def first_failure(output: str) -> str:
@@ -288,9 +286,10 @@ def changed(mutant: Mutant, text: str) -> str:
 
 def judge(mutant: Mutant, results: list[dict[str, Any]], *, concerned: bool) -> dict[str, Any]:
     """Tests one mutant; returns its fate, what killed it, and the changed line."""
-    ranking = ranked(mutant.group)
-    order = {"HEXAPOD_ORDER": str(ranking.write(results, mutant.group))}
-    seconds = LIMIT * ranking.seconds + LEAST
+    order = {
+        "HEXAPOD_ORDER": str(write_order(results, mutant.group)),
+        "HEXAPOD_DURATIONS": str(LATEST),
+    }
     place = TREE / mutant.file
     original = place.read_text(encoding="utf-8")
     text = changed(mutant, original)
@@ -300,7 +299,7 @@ def judge(mutant: Mutant, results: list[dict[str, Any]], *, concerned: bool) -> 
         alive, output = builds() if mutant.file.endswith((".c", ".h")) else (True, "")
         fate = "survived" if alive else "does not build"
         if fate == "survived":
-            alive, output = passes(*GROUPS[mutant.group][1], seconds=seconds, env=order)
+            alive, output = passes(*GROUPS[mutant.group][1], env=order)
             fate = "survived" if alive else "killed"
         if fate == "survived" and not concerned:
             alive, output = passes("tests", env=order)
@@ -359,6 +358,7 @@ def main() -> int:
     judged = judged_again if given.survivors else continued
     for results in judged(results, given):  # noqa: B020 (the generator has the list already)
         RESULTS.write_text(json.dumps(results, indent=1) + "\n", encoding="utf-8")
+    check_killers(results)
     for group in GROUPS:
         fates = Counter(one["fate"] for one in results if one["group"] == group)
         print(f"{group:12}{fates['killed']:4} killed {fates['survived']:4} survived")

@@ -8,7 +8,8 @@ sensors; every fifth piece is repeated from a saved state and must have the same
 robot has fallen, or a run has ended early, the state at the last good start of a piece is restored,
 so that time goes back. Exits with 1 after a number that is not finite, a repeated piece with other
 bits, constraint errors above CONSTRAINT, an energy balance that is wrong by more than RESIDUAL, or
-memory that has grown by more than GROWTH.
+memory that has grown by more than GROWTH. SIGINT and SIGTERM end it early, with the figures until
+then.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ import json
 import sys
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -28,7 +29,8 @@ import numpy as np
 from hexapod_cosim.cosim.export.controller_export import export_controller
 from hexapod_cosim.cosim.interface.controller_interface import controller_parameters
 from hexapod_cosim.cosim.master.fmu import Fmu
-from hexapod_cosim.cosim.master.loop import COMPLETED, Outcome
+from hexapod_cosim.cosim.master.interrupts import termination_as_interrupt
+from hexapod_cosim.cosim.master.loop import COMPLETED, INTERRUPTED, Outcome
 from hexapod_cosim.cosim.master.native_loop import NativeMaster
 from hexapod_cosim.cosim.run.preparation import PlantFmus
 from hexapod_cosim.cosim.run.run import (
@@ -69,6 +71,7 @@ class Figures:
     """What a soak has seen."""
 
     simulated: float = 0.0  # s, of all pieces, also of repeated ones
+    reached: float = 0.0  # s, of the walk's own time
     pieces: int = 0
     repeated: int = 0
     falls: int = 0
@@ -160,9 +163,12 @@ def drawn(scenario: Scenario, start: float, rng: np.random.Generator) -> Scenari
 
 
 def walked(master: NativeMaster, piece: Scenario) -> Outcome:
-    """Runs a piece; the FMUs stand at its start."""
+    """Runs a piece; the FMUs stand at its start. Raises KeyboardInterrupt."""
     schedule = make_schedule(piece)
-    return master.run(schedule, h=piece.macro_step, sensor=sensor_settings(piece, schedule))
+    outcome = master.run(schedule, h=piece.macro_step, sensor=sensor_settings(piece, schedule))
+    if outcome.status == INTERRUPTED:
+        raise KeyboardInterrupt
+    return outcome
 
 
 def has_fallen(outcome: Outcome) -> bool:
@@ -199,34 +205,49 @@ def resident() -> int:
 
 
 def soak(seconds: float, seed: int) -> Figures:
-    """Walks for a time [s of simulation]; returns what it saw."""
-    rng, figures, t, memory = np.random.default_rng(seed), Figures(), 0.0, 0
+    """Walks for a time [s of simulation], or until an interrupt; returns what it saw."""
+    figures = Figures()
     with opened(seconds) as (plan, plant, control):
         master = NativeMaster(plant, control, columns=COLUMNS)
-        calls = StateCalls(plant, control)
+        calls, memory = StateCalls(plant, control), 0
         good = calls.save()
-        while figures.simulated < seconds and not figures.failures:
-            piece = drawn(plan.scenario, t, rng)
-            outcome = walked(master, piece)
-            measure(outcome, figures)
-            figures.pushes += len(piece.pushes)
-            figures.faults += len(piece.faults)
-            if figures.pieces % REPEATED == 0:
-                repeat(master, calls, good, piece, outcome, figures)
-            fell, early = has_fallen(outcome), outcome.status != COMPLETED
-            figures.falls += fell
-            figures.ended_early += early
-            if fell or early:
-                calls.restore(good)
-            else:
-                t += PIECE
-                calls.save(good)
-            if figures.pieces == WARM_UP:
-                memory = resident()
+        with suppress(KeyboardInterrupt), termination_as_interrupt():
+            for piece in pieces(plan.scenario, seconds, np.random.default_rng(seed), figures):
+                walk(master, calls, good, piece, figures)
+                if figures.pieces == WARM_UP:
+                    memory = resident()
         calls.free(good)
         figures.growth = resident() - memory if memory else 0
     judge(figures)
     return figures
+
+
+def pieces(
+    scenario: Scenario, seconds: float, rng: np.random.Generator, figures: Figures
+) -> Iterator[Scenario]:
+    """Yields random pieces until the time [s of simulation] is over or something has failed."""
+    while figures.simulated < seconds and not figures.failures:
+        yield drawn(scenario, figures.reached, rng)
+
+
+def walk(
+    master: NativeMaster, calls: StateCalls, good: Saved, piece: Scenario, figures: Figures
+) -> None:
+    """Walks a piece; repeats some; restores the state at its start when the robot has fallen."""
+    outcome = walked(master, piece)
+    measure(outcome, figures)
+    figures.pushes += len(piece.pushes)
+    figures.faults += len(piece.faults)
+    if figures.pieces % REPEATED == 0:
+        repeat(master, calls, good, piece, outcome, figures)
+    fell, early = has_fallen(outcome), outcome.status != COMPLETED
+    figures.falls += fell
+    figures.ended_early += early
+    if fell or early:
+        calls.restore(good)
+    else:
+        figures.reached += PIECE
+        calls.save(good)
 
 
 def repeat(

@@ -7,7 +7,7 @@ from __future__ import annotations
 import signal
 import sys
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from types import FrameType
 
@@ -62,6 +62,44 @@ def interruptible() -> Iterator[None]:
     finally:
         for number in SIGNALS:
             signal.signal(number, deferred)
+
+
+class _RememberedSignal:
+    """A signal handler that raises KeyboardInterrupt, and records that it did."""
+
+    arrived = False
+
+    def __call__(self, _number: int, _frame: FrameType | None) -> None:
+        self.arrived = True
+        raise KeyboardInterrupt
+
+    def check(self) -> None:
+        """Raises KeyboardInterrupt if an interrupt has arrived."""
+        if self.arrived:
+            raise KeyboardInterrupt
+
+
+@contextmanager
+def remembered_interrupts() -> Iterator[Callable[[], None]]:
+    """Yields a function that raises KeyboardInterrupt if an interrupt has arrived in the block.
+
+    An interrupt in the block raises KeyboardInterrupt at once, as elsewhere. Python drops an
+    exception, though, in a finaliser or in a callback of a weak reference or of the garbage
+    collector, which libraries with threads have, and Ctrl-C with it. A loop that waits calls the
+    function now and then, so that the interrupt is not lost. Handlers other than Python's own are
+    left in place.
+    """
+    remembered = _RememberedSignal()
+    is_main = threading.current_thread() is threading.main_thread()
+    own = signal.default_int_handler
+    replaced = [number for number in SIGNALS if is_main and signal.getsignal(number) is own]
+    for number in replaced:
+        signal.signal(number, remembered)
+    try:
+        yield remembered.check
+    finally:
+        for number in replaced:
+            signal.signal(number, own)
 
 
 @contextmanager

@@ -60,10 +60,27 @@ def test_a_comparison_that_ends_early_says_so_in_both_folders(call: Call, tmp_pa
     )
 
 
+# a control that stands still and tells when 20 macro-steps are over
+STILL = """
+from pathlib import Path
+
+class Still:
+    angle = None
+
+    def step(self, t, command, measurement):
+        if self.angle is None:
+            self.angle = measurement.angle.copy()
+        if t >= 0.1:
+            Path(__file__).with_name("began").touch()
+        return self.angle
+"""
+
+
 def test_ctrl_c_keeps_what_was_recorded_under_another_name(
     plant_build: Path, tmp_path: Path
 ) -> None:
-    folder = tmp_path / "out"
+    folder, law = tmp_path / "out", tmp_path / "law.py"
+    law.write_text(STILL)
     command = [
         *COMMAND,
         "simulate",
@@ -74,15 +91,16 @@ def test_ctrl_c_keeps_what_was_recorded_under_another_name(
         "duration=900",
         "--set",
         "outputs.csv=['torso.*']",
+        "--set",
+        f"control={law}:Still",
     ]
     process = subprocess.Popen(
         command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True
     )
     try:
         deadline = time.monotonic() + 60.0
-        while not (folder / "run.json").exists() and time.monotonic() < deadline:
+        while not (tmp_path / "began").exists() and time.monotonic() < deadline:
             time.sleep(0.05)
-        time.sleep(1.0)  # into the loop, which takes some ten times as long
         os.killpg(process.pid, signal.SIGINT)
         out, err = process.communicate(timeout=120.0)
     finally:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import os
 import pickle
 import signal
@@ -135,17 +134,6 @@ def test_a_scheduler_that_dies_ends_the_study_with_what_is_stored(
     assert_whole(tmp_path / "out", athena_fmu)
 
 
-def interrupted(process: subprocess.Popen[str]) -> str:
-    """Presses Ctrl-C, and again if nothing happens: Python may lose one in a callback of the
-    cluster's client. Returns what the process printed to stderr until it ended.
-    """
-    for _ in range(3):
-        process.send_signal(signal.SIGINT)
-        with contextlib.suppress(subprocess.TimeoutExpired):
-            return process.communicate(timeout=20)[1]
-    return process.communicate(timeout=TIMEOUT)[1]
-
-
 def test_ctrl_c_ends_a_study_that_waits_for_workers(
     scheduler: str, athena_fmu: Path, tmp_path: Path
 ) -> None:
@@ -170,7 +158,8 @@ def test_ctrl_c_ends_a_study_that_waits_for_workers(
     ) as process:
         assert process.stderr is not None
         warning = next(line for line in process.stderr if "waiting for some" in line)
-        err = interrupted(process)
+        process.send_signal(signal.SIGINT)
+        err = process.communicate(timeout=TIMEOUT)[1]
     assert "no workers" in warning
     assert "stopped; the runs so far are in" in err
     assert process.returncode == 130

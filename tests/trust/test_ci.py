@@ -1,5 +1,5 @@
 """Tests what .ci/run needs and installs: a Python with venv of a version that is read, and pinned
-versions of every package.
+versions of every package, with the hashes of their files.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
 RUN, CONSTRAINTS = ROOT / ".ci" / "run", ROOT / ".ci" / "constraints.txt"
+LOCK = ROOT / ".ci" / "requirements.txt"
 TOOLS = ("make", "cc", "g++", "clang", "pkg-config", "musl-gcc", "git", "chromium")
 NAME = re.compile(r"[A-Za-z0-9._-]+")
 
@@ -79,3 +80,43 @@ def test_every_dependency_is_pinned_in_a_version() -> None:
     needed = [*project["dependencies"], *project["optional-dependencies"]["test"]]
     names = {normal(match[0]) for text in needed if (match := NAME.match(text))}
     assert names - pinned - {"hexapod-cosim"} == set()
+
+
+def locked() -> dict[str, tuple[str, list[str]]]:
+    """Returns version and hashes of each package of the lock file by its normal name."""
+    text = LOCK.read_text(encoding="utf-8").partition("\n")[2]
+    entries = re.split(r"\n(?=\w)", text.replace(" \\\n", " "))
+    found = {}
+    for entry in entries:
+        words = entry.split()
+        name, _, version = words[0].partition("==")
+        found[normal(name)] = version, words[1:]
+    return found
+
+
+def test_the_lock_file_has_hashes_of_every_package_and_names_no_server() -> None:
+    packages = locked()
+    assert len(packages) > 150
+    for name, (version, hashes) in packages.items():
+        assert re.fullmatch(r"[\w.+!-]+", version), name
+        assert hashes, name
+        assert all(re.fullmatch(r"--hash=sha256:[0-9a-f]{64}", one) for one in hashes), name
+    text = LOCK.read_text(encoding="utf-8")
+    assert "://" not in text
+    assert "hexapod" not in text
+
+
+def test_the_lock_file_has_the_pinned_versions_and_all_that_the_package_needs() -> None:
+    packages, pinned = locked(), {}
+    for line in CONSTRAINTS.read_text(encoding="utf-8").splitlines():
+        if line and not line.startswith("#"):
+            name, _, version = line.partition("==")
+            pinned[normal(name)] = version
+    both = packages.keys() & pinned.keys()
+    assert {name: packages[name][0] for name in both} == {name: pinned[name] for name in both}
+    table = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+    optional = table["project"]["optional-dependencies"]
+    needed = [*table["project"]["dependencies"], *table["build-system"]["requires"]]
+    needed += [*optional["test"], *optional["release"], *optional["live"], *optional["docs"]]
+    names = {normal(match[0]) for text in needed if (match := NAME.match(text))}
+    assert names - packages.keys() - {"hexapod-cosim"} == set()

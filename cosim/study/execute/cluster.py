@@ -19,6 +19,7 @@ from typing import Any
 
 from hexapod_cosim.cosim.common.events import EventSink
 from hexapod_cosim.cosim.common.installation import install_extra
+from hexapod_cosim.cosim.master.interrupts import remembered_interrupts
 from hexapod_cosim.cosim.run.worker_pool import TASKS_PER_WORKER, Finished
 from hexapod_cosim.cosim.study.execute.chunk import Chunk, FinishedChunk
 from hexapod_cosim.cosim.study.execute.cluster_worker import job_plugin, run_chunk
@@ -47,10 +48,16 @@ class _RemovedWorker:
 
 
 class ClusterExecutor:
-    """Runs chunks on the workers that a connected client sees."""
+    """Runs chunks on the workers that a connected client sees.
 
-    def __init__(self, client: Any, job: Job, events: EventSink) -> None:
+    `check_interrupts` raises KeyboardInterrupt if one has arrived; waiting calls it.
+    """
+
+    def __init__(
+        self, client: Any, job: Job, events: EventSink, check_interrupts: Callable[[], None]
+    ) -> None:
         self._client, self._job, self._event_sink = client, job.name, events
+        self._check_interrupts = check_interrupts
         # by worker, the futures of its chunks in the order of their submission
         self._queues: dict[str, deque[Any]] = {}
         # by future, its worker and chunk
@@ -81,6 +88,7 @@ class ClusterExecutor:
         Raises StudyError when the scheduler is gone, or all workers are for too long.
         """
         while True:
+            self._check_interrupts()
             finished = [item for event in self._next_events() for item in self._handle(event)]
             self._check_workers()
             self._assign()
@@ -252,7 +260,8 @@ def cluster_executor(job: Job, address: str, events: EventSink) -> Iterator[Clus
             client.register_plugin(job_plugin(job), name=name)
         except Exception as error:  # of any kind, from a worker without the package
             raise unfit_worker(error) from error
-        executor = ClusterExecutor(client, job, events)
+        check_interrupts = opened.enter_context(remembered_interrupts())
+        executor = ClusterExecutor(client, job, events, check_interrupts)
         opened.callback(_while_running, client, executor.close)
         yield executor
 

@@ -1,0 +1,95 @@
+"""Measures which branches of plant, controllers and FMI layer their tests take, file by file.
+
+usage: python -m tools.coverage [--reuse]      (make coverage)
+
+Everything is built by gcc with counters (preset coverage: -Og, the baseline kernel alone). The
+native tests and the Python tests in TESTS run on that build; gcovr reads the counters. The headers
+in plant_fmu/src/lanes are counted once, whatever files include them. Prints a table in Markdown and
+writes build/coverage/branches.json and build/coverage/lines.txt, which marks the branches that no
+test took. --reuse reads the counters of an earlier run.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[1]
+BUILD = ROOT / "build" / "coverage"
+TESTS = (
+    *(f"tests/fmi/test_{name}.py" for name in ("fmi", "fmi3", "fmi3_order", "fmi_state")),
+    *(f"tests/fmi/test_{name}.py" for name in ("fmi_values", "fmi_exchange")),
+    *(f"tests/plant/test_plant_{name}.py" for name in ("misuse", "coordinates", "functions")),
+    *(f"tests/plant/test_plant_{name}.py" for name in ("events", "dynamics", "state", "measure")),
+    "tests/controller/test_native_controller.py",
+    "tests/fuzz/test_findings.py",
+    "tests/friction",
+    "tests/ground",
+    "tests/servos",
+)
+# gcc's own counters are exported functions too
+LEFT_OUT = ("--deselect", "tests/fmi/test_fmi.py::test_only_the_standard_is_exported")
+FILES = ("plant_fmu/.*", "controller_fmu/.*", "fmi/.*")
+NO_TESTS_NEEDED = (".*/generated/.*",)  # tables
+
+
+def run(*command: str, check: bool = True) -> None:
+    """Runs a command in the repository with the environment's programs first."""
+    path = os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])
+    env = os.environ | {"PATH": path, "HEXAPOD_PRESET": "coverage"}
+    done = subprocess.run(command, cwd=ROOT, env=env, check=False)
+    if check and done.returncode != 0:
+        raise SystemExit(f"coverage: {' '.join(command[:3])} ... returned {done.returncode}")
+
+
+def measure() -> None:
+    """Builds with counters and runs the tests."""
+    for counters in BUILD.rglob("*.gcda"):
+        counters.unlink()
+    configure = ["cmake", "--preset", "coverage", f"-DPython_EXECUTABLE={sys.executable}"]
+    fresh = not (BUILD / "CMakeCache.txt").exists()
+    run(*configure, "--log-level=WARNING", *(["-G", "Ninja"] if fresh else []))
+    run("cmake", "--build", "--preset", "native-coverage", "--", "--quiet")
+    run("ctest", "--preset", "coverage")
+    run(sys.executable, "-m", "pytest", "-q", "-n", "0", *TESTS, *LEFT_OUT)
+
+
+def table() -> str:
+    """Returns the table of all files, the least covered first, and writes the details."""
+    options = [f"--filter={pattern}" for pattern in FILES]
+    options += [f"--exclude={pattern}" for pattern in NO_TESTS_NEEDED]
+    summary = BUILD / "branches.json"
+    run(
+        str(Path(sys.executable).parent / "gcovr"),
+        *("--root", str(ROOT), "--object-directory", str(BUILD)),
+        *(str(BUILD / part) for part in ("plant_fmu", "controller_fmu")),
+        *options,
+        *("--merge-mode-functions=merge-use-line-min", "--exclude-throw-branches"),
+        *("--json-summary", str(summary), "--txt", str(BUILD / "lines.txt"), "--txt-metric=branch"),
+    )
+    found = json.loads(summary.read_text(encoding="utf-8"))
+    files = [one for one in found["files"] if one["branch_total"]]
+    files.sort(key=lambda one: one["branch_covered"] / one["branch_total"])
+    rows = [(one["filename"], one["branch_covered"], one["branch_total"]) for one in files]
+    rows.append(("all", found["branch_covered"], found["branch_total"]))
+    lines = [f"| {name} | {got} of {of} | {100.0 * got / of:.1f} |" for name, got, of in rows]
+    return "\n".join(["| file | branches | % |", "|---|---|---|", *lines])
+
+
+def main(arguments: Sequence[str]) -> int:
+    """Measures the coverage, or reads an earlier run's, and prints the table."""
+    if set(arguments) - {"--reuse"}:
+        print((__doc__ or "").splitlines()[2], file=sys.stderr)
+        return 2
+    if not arguments:
+        measure()
+    print(table())
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))
