@@ -192,9 +192,22 @@ def test_after_a_sleep_of_the_computer_the_loop_goes_on_and_counts_what_it_misse
         until(opened, lambda m: m["type"] == "frame" and m["seconds"] > after["seconds"] + 0.1)
 
 
+SERVER = """
+from hexapod_cosim.cosim.live.server import LiveServer
+from hexapod_cosim.cosim.live.settings import Choices, control_texts
+from hexapod_cosim.cosim.scenario.scenario import load_scenario
+
+if __name__ == "__main__":
+    scenario = load_scenario("walk_flat")
+    choices = Choices(scenario, control_texts(scenario, ("kinematic",)), {})
+    LiveServer(choices, None).run(lambda url: print(url, flush=True))
+"""
+
+
 @pytest.mark.skipif(sys.platform != "linux", reason="needs /proc")
-def test_when_the_server_is_killed_its_loop_ends_too() -> None:
-    command = [sys.executable, "-m", "hexapod_cosim.cosim.cli", "live", "--no-browser", "--json"]
+def test_when_the_server_is_killed_its_loop_ends_too(tmp_path: Path) -> None:
+    (tmp_path / "serve.py").write_text(SERVER, encoding="utf-8")
+    command = [sys.executable, str(tmp_path / "serve.py")]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as server:
         try:
             assert any("http://127.0.0.1:" in line for line in server.stdout or ())
