@@ -154,7 +154,7 @@ static int has_stopped(void) {
 static int take_over(void) {
   choose(&walker.change.walk);
   walker.change.waits = 0;
-  memcpy(walker.from, walker.command.angle_ref, sizeof walker.from);
+  memcpy(walker.from, walker.input.angle_ref, sizeof walker.from); /* perhaps while fading */
   walker.fade_end = walker.output.time + FADE;
   return hx_controller_reset(walker.controller, &walker.walk, walker.output.time);
 }

@@ -160,7 +160,7 @@ def export(
     robot for other tools.
     """
     form, loaded = chosen_format(output, urdf=urdf, mjcf=mjcf), load_robot(robot)
-    package = chosen_package(output, wanted=ssp, described=form is not None, values=values, fmi=fmi)
+    package = chosen_package(output, wanted=ssp, described=form is not None, values=values)
     control = DEFAULT_CONTROL if package and controller is None else controller
     chosen = None if platforms is None else [name.strip() for name in platforms.split(",")]
     if form is not None:
@@ -180,7 +180,9 @@ def export(
         _refuse_unused_options(context, PACKAGE if package else CONTROLLER_FMU)
         options = ControllerOptions(control=control, gait=gait, gains=gains, period=period)
         if package:
-            path = _export_package(loaded, output, options, values=values or [], platforms=chosen)
+            path = _export_package(
+                loaded, output, options, fmi=fmi, values=values or [], platforms=chosen
+            )
         else:
             path = _export_controller(
                 loaded, output, options, fmi=fmi, platforms=chosen, integers=integers
@@ -232,6 +234,7 @@ def _export_package(
     output: Path | None,
     options: ControllerOptions,
     *,
+    fmi: int,
     values: list[str],
     platforms: list[str] | None,
 ) -> Path:
@@ -239,7 +242,7 @@ def _export_package(
     path = package_path(output, robot.name)
     setup = _controller_setup(robot, options)
     with waiting("compiling" if platforms else None):
-        return export_package(setup, path, values=read_values(values), platforms=platforms)
+        return export_package(setup, path, values=read_values(values), platforms=platforms, fmi=fmi)
 
 
 def _refuse_unused_options(context: typer.Context, written: str) -> None:

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from pathlib import Path
+from types import MappingProxyType
 
 from hexapod_cosim.cosim.export.export import export_interface
+from hexapod_cosim.cosim.export.starts import with_starts
 from hexapod_cosim.cosim.interface.controller_interface import (
     ControllerSetup,
     load_controller_interface,
@@ -19,11 +21,11 @@ def export_controller(
     fmi: int = 2,
     platforms: Iterable[str] | None = None,
     integers: bool = False,
+    starts: Mapping[str, float] = MappingProxyType({}),
 ) -> Path:
     """Writes a controller's FMU and returns its path.
 
     Arguments and errors are those of `export_fmu`; also raises the errors of `Controller`.
     """
-    return export_interface(
-        load_controller_interface(setup), path, fmi=fmi, platforms=platforms, integers=integers
-    )
+    interface = with_starts(load_controller_interface(setup), starts)
+    return export_interface(interface, path, fmi=fmi, platforms=platforms, integers=integers)

@@ -30,6 +30,7 @@ from hexapod_cosim.cosim.export.platforms import (
     component_library,
 )
 from hexapod_cosim.cosim.export.reference import reference_members
+from hexapod_cosim.cosim.export.starts import with_starts
 from hexapod_cosim.cosim.export.wasm_component import component_members
 from hexapod_cosim.cosim.interface.interface import Interface, Variable, load_interface
 from hexapod_cosim.cosim.interface.model_description import render_fmi2
@@ -56,6 +57,7 @@ def export_fmu(
     platforms: Iterable[str] | None = None,
     terrains: Sequence[Surface] = (),
     integers: bool = False,
+    starts: Mapping[str, float] = MappingProxyType({}),
 ) -> Path:
     """Writes the plant's FMU of a robot and returns its path.
 
@@ -69,9 +71,10 @@ def export_fmu(
         terrains: surfaces to pack as grid files, numbered from 1; after the robot's own, if it
             stands on one. If it does not, the FMU starts on the first of them.
         integers: offer Integers instead of enumerations, for importers without enumerations.
+        starts: of inputs and parameters by name, instead of the robot's.
 
-    Raises FmuError without a binary or cross compiler and for an unknown version or platform,
-    HexapodError when the path cannot be written.
+    Raises FmuError without a binary or cross compiler, for an unknown version or platform and for
+    invalid start values; HexapodError when the path cannot be written.
     """
     own = surface_of(robot.terrain)
     grids = list(dict.fromkeys([*([] if own is None else [own]), *terrains]))
@@ -81,7 +84,7 @@ def export_fmu(
     for number, surface in enumerate(grids, start=1):
         check_contact_surface(robot, surface, f"terrain {number}, {surface.name}")
     return export_interface(
-        load_interface(robot),
+        with_starts(load_interface(robot), starts),
         path,
         fmi=fmi,
         platforms=platforms,

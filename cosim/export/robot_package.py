@@ -1,4 +1,8 @@
-"""Writes a robot, its controller and a walking command as one package (SSP)."""
+"""Writes a robot, its controller and a walking command as one package (SSP).
+
+The command and all other chosen values are start values of the FMUs, so that the package walks in
+tools that read no parameter sets; those of SSP 1.0 repeat them.
+"""
 
 from __future__ import annotations
 
@@ -11,13 +15,17 @@ from hexapod_cosim.cosim.export.controller_export import export_controller
 from hexapod_cosim.cosim.export.export import export_fmu
 from hexapod_cosim.cosim.export.platforms import choose_platforms
 from hexapod_cosim.cosim.export.ssp import NOTHING, Experiment, export_ssp
-from hexapod_cosim.cosim.interface.controller_interface import ControllerSetup
+from hexapod_cosim.cosim.export.starts import with_starts
+from hexapod_cosim.cosim.interface.controller_interface import (
+    ControllerSetup,
+    load_controller_interface,
+)
+from hexapod_cosim.cosim.interface.interface import load_interface
 from hexapod_cosim.cosim.scenario.records import GRAVITY_NAMES
 from hexapod_cosim.models import FmuError, HexapodError, unknown_name
 
 PLANT, CONTROLLER = "plant", "controller"  # in the order of calculation
 SUFFIX = ".ssp"
-FMI = 2
 STOP = 10.0  # s
 WALK: Mapping[str, float] = MappingProxyType(
     {"command.vx": 0.08}
@@ -33,6 +41,7 @@ def export_package(
     values: Values = NOTHING,
     stop: float = STOP,
     platforms: Iterable[str] | None = None,
+    fmi: int = 2,
 ) -> Path:
     """Writes a package of plant FMU, controller FMU, connections and parameters; returns its path.
 
@@ -44,11 +53,12 @@ def export_package(
         stop: default stop time of the simulation [s].
         platforms: of both FMUs, as for `export_fmu`. At least one is required, since tools for
             packages do not compile sources.
+        fmi: version of the FMUs. SSP 1.0 packs FMI 2.0, SSP 2.0 FMI 3.0.
 
     Raises the errors of `export_fmu`, `export_controller` and `export_ssp`; FmuError without a
     platform.
     """
-    chosen = None if platforms is None else choose_platforms(platforms, fmi=FMI)
+    chosen = None if platforms is None else choose_platforms(platforms, fmi=fmi)
     if chosen == []:
         fix = "name platforms, or leave out --platforms for this machine's"
         raise FmuError(
@@ -57,25 +67,35 @@ def export_package(
             expected="a binary at least",
             fix=fix,
         )
-    walk = {CONTROLLER: {**WALK, **values.get(CONTROLLER, NOTHING)}}
+    given = {
+        PLANT: dict(values.get(PLANT, NOTHING)),
+        CONTROLLER: {**WALK, **values.get(CONTROLLER, NOTHING)},
+    }
+    _refuse_driven(setup, given)
     with TemporaryDirectory(prefix="hexapod-package-") as folder:
-        fmus = {
-            PLANT: export_fmu(setup.robot, Path(folder) / "plant.fmu", platforms=chosen),
-            CONTROLLER: export_controller(setup, Path(folder) / "controller.fmu", platforms=chosen),
-        }
-        experiment = Experiment(step=setup.period, stop=stop)
-        return export_ssp(
-            path, fmus, title=setup.robot.name, experiment=experiment, values={**values, **walk}
+        files = {name: Path(folder) / f"{name}.fmu" for name in given}
+        export_fmu(setup.robot, files[PLANT], platforms=chosen, fmi=fmi, starts=given[PLANT])
+        export_controller(
+            setup, files[CONTROLLER], platforms=chosen, fmi=fmi, starts=given[CONTROLLER]
         )
+        experiment = Experiment(step=setup.period, stop=stop)
+        return export_ssp(path, files, title=setup.robot.name, experiment=experiment, values=given)
+
+
+def _refuse_driven(setup: ControllerSetup, values: Values) -> None:
+    """Raises FmuError for values of inputs that the other component sets."""
+    parts = {PLANT: load_interface(setup.robot), CONTROLLER: load_controller_interface(setup)}
+    for name, other in ((PLANT, CONTROLLER), (CONTROLLER, PLANT)):
+        driven = {one.name for one in parts[other].of_causality("output")}
+        with_starts(parts[name], values[name], driven=driven)
 
 
 def chosen_package(
-    path: Path | None, *, wanted: bool, described: bool, values: Sequence[str] | None, fmi: int = 2
+    path: Path | None, *, wanted: bool, described: bool, values: Sequence[str] | None
 ) -> bool:
     """Returns whether a package is chosen, by option or by the file's suffix.
 
-    Raises HexapodError for two formats, for values without a package, and for FMI 3.0, whose arrays
-    SSP 1.0 cannot connect.
+    Raises HexapodError for two formats and for values without a package.
     """
     package = wanted or (path is not None and path.suffix == SUFFIX)
     if package and described:
@@ -84,13 +104,6 @@ def chosen_package(
             got="--ssp and a URDF or MJCF",
             expected="one of them",
             fix="run the command twice",
-        )
-    if package and fmi != FMI:
-        raise HexapodError(
-            "no package of such FMUs",
-            got=f"--fmi {fmi}",
-            expected=f"--fmi {FMI}",
-            fix="leave out --fmi",
         )
     if values and not package:
         fix = "add --ssp; a robot's own values belong into its file"

@@ -1,8 +1,10 @@
-"""Writes FMUs, their connections and their parameters as a System Structure package (SSP 1.0).
+"""Writes FMUs, their connections and their parameters as a System Structure package: SSP 1.0 for
+FMUs of FMI 2.0, SSP 2.0 for those of FMI 3.0, whose arrays are connected as a whole.
 
-An output of one component is connected to the input of the other that has the same name and type.
-Unconnected inputs, such as the walking command, are in the parameter set. Enumerations are not,
-since readers of packages refuse them; they keep the FMU's start values.
+An output of one component is connected to the input of the other that has the same name, type and
+dimensions. Unconnected inputs, such as the walking command, are in the parameter set of SSP 1.0.
+Enumerations are not, since readers of packages refuse them; they keep the FMU's start values. A
+package of SSP 2.0 has no parameter sets: all values are the FMUs' start values.
 """
 
 from __future__ import annotations
@@ -18,19 +20,19 @@ from xml.etree.ElementTree import Element, SubElement
 
 from hexapod_cosim.cosim.common.plant_files import DISTRIBUTION, package_version
 from hexapod_cosim.cosim.export.export import write_archive
+from hexapod_cosim.cosim.export.starts import check_range, enumeration_error, unknown_error
 from hexapod_cosim.cosim.interface.descriptions import read_description
-from hexapod_cosim.models.errors import FmuError, nearest_name
+from hexapod_cosim.models.errors import FmuError
 
-VERSION = "1.0"
+VERSIONS = {"2.0": "1.0", "3.0": "2.0"}  # of SSP by FMI's
 STANDARD = "http://ssp-standard.org/SSP1/SystemStructure"
 SSD, SSC, SSV = f"{STANDARD}Description", f"{STANDARD}Common", f"{STANDARD}ParameterValues"
 OSP = "http://opensimulationplatform.com/SSP/OSPAnnotations"
 # some readers require these prefixes, not the namespaces only
 PREFIXES = {"ssd": SSD, "ssc": SSC, "ssv": SSV, "osp": OSP}
 PARAMETER_SET = "start"  # the same name for all components, so that tools apply all sets together
-TYPES = ("Real", "Boolean")
-# enumerations that no robot file has
-OPTIONS = {"control": "choose it with --controller", "gait.pattern": "choose it with --gait"}
+REAL = ("Real", "Float64")  # of FMI 2.0 and 3.0
+TYPES = (*REAL, "Boolean")
 KINDS = ("input", "output", "parameter")
 NOTHING: Mapping[str, Any] = MappingProxyType({})
 BASE_UNITS = ("kg", "m", "s", "A", "K", "mol", "cd", "rad", "factor", "offset")
@@ -72,7 +74,7 @@ class Component:
 
 @dataclass(frozen=True)
 class Connection:
-    """A connection of an output to an input of the same name."""
+    """A connection of an output to an input of the same name, a scalar or an array."""
 
     start: str
     end: str
@@ -95,13 +97,15 @@ def export_ssp(
         title: of the system.
         experiment: default step size and stop time.
         values: of parameters and unconnected inputs by component and name, instead of the FMUs'
-            start values.
+            start values; of FMUs of FMI 2.0 only.
 
-    Raises FmuError for FMUs without co-simulation, FMUs that do not connect, and unknown or invalid
-    values; HexapodError when the path cannot be written.
+    Raises FmuError for FMUs without co-simulation, FMUs of different versions, FMUs that do not
+    connect, and unknown or invalid values; HexapodError when the path cannot be written.
     """
-    components = [Component(name, fmu, read_description(fmu)) for name, fmu in fmus.items()]
-    connections = connect(components)
+    components = [
+        Component(name, fmu, read_description(fmu, tuple(VERSIONS))) for name, fmu in fmus.items()
+    ]
+    connections, version = connect(components), _version(components)
     members = {
         "SystemStructure.ssd": _text(
             structure(components, connections, title=title, experiment=experiment)
@@ -109,10 +113,24 @@ def export_ssp(
     }
     for component in components:
         members[f"resources/{component.name}.fmu"] = component.fmu.read_bytes()
-        members[_values_file(component)] = _text(
-            parameter_set(component, connections, values.get(component.name, NOTHING))
-        )
+        if version == VERSIONS["2.0"]:
+            members[_values_file(component)] = _text(
+                parameter_set(component, connections, values.get(component.name, NOTHING))
+            )
     return write_archive(Path(path), members)
+
+
+def _version(components: Sequence[Component]) -> str:
+    """Returns the version of SSP for the FMUs. Raises FmuError for FMUs of different versions."""
+    found = {one.name: str(one.description.fmiVersion) for one in components}
+    if len(set(found.values())) > 1:
+        raise FmuError(
+            "FMUs of different versions in one package",
+            got=", ".join(f"{name}: FMI {version}" for name, version in found.items()),
+            expected="one version",
+            fix="export all of them with the same --fmi",
+        )
+    return VERSIONS[next(iter(found.values()))]
 
 
 def connect(components: Sequence[Component]) -> list[Connection]:
@@ -126,7 +144,7 @@ def connect(components: Sequence[Component]) -> list[Connection]:
         for target in components
         if source is not target
         for name, output in source.of("output").items()
-        if name in target.of("input") and target.variables[name].type == output.type
+        if name in target.of("input") and _kind(target.variables[name]) == _kind(output)
     ]
     for component in components:
         if not any(component.name in (one.start, one.end) for one in found):
@@ -147,6 +165,11 @@ def connect(components: Sequence[Component]) -> list[Connection]:
     return found
 
 
+def _kind(variable: Any) -> tuple[str, tuple[int, ...]]:
+    """Returns the type and the dimensions of a variable; none of a scalar."""
+    return variable.type, tuple(int(one.start) for one in variable.dimensions or ())
+
+
 def structure(
     components: Sequence[Component],
     connections: Iterable[Connection],
@@ -155,7 +178,10 @@ def structure(
     experiment: Experiment,
 ) -> Element:
     """Returns the root of SystemStructure.ssd."""
-    root = Element("ssd:SystemStructureDescription", _heading(title, "ssd", "ssc", "osp"))
+    version = _version(components)
+    root = Element(
+        "ssd:SystemStructureDescription", _heading(title, "ssd", "ssc", "osp", version=version)
+    )
     system = SubElement(
         root,
         "ssd:System",
@@ -164,7 +190,7 @@ def structure(
     )
     elements = SubElement(system, "ssd:Elements")
     for component in components:
-        _add_component(elements, component)
+        _add_component(elements, component, is_bound=version == VERSIONS["2.0"])
     parent = SubElement(system, "ssd:Connections")
     for one in connections:
         ends = {
@@ -212,36 +238,18 @@ def _check_value(
     if name in {
         one.name for one in component.description.modelVariables if one.type == "Enumeration"
     }:
-        table, _, key = name.rpartition(".")
-        fix = (
-            OPTIONS.get(name)
-            or f"write {key} under [{table}] of a robot file, and give that with --robot FILE"
-        )
-        expected = "a real or Boolean variable: readers of packages refuse enumerations"
-        raise FmuError(
-            f"{component.name}: an enumeration cannot be set in a package",
-            got=name,
-            expected=expected,
-            fix=fix,
-        )
+        raise enumeration_error(component.name, name)
     if name not in settable:
-        near = nearest_name(name, settable)
-        fix = (
-            f"did you mean {near!r}?"
-            if near
-            else "name a parameter or an input that nothing drives"
-        )
-        raise FmuError(f"{component.name} has no such value to set", got=name, fix=fix)
+        raise unknown_error(component.name, name, settable)
     low, high = _range(settable[name])
-    whole = settable[name].type != "Boolean" or value in (0.0, 1.0)
-    if not (whole and math.isfinite(value) and low <= value <= high):
-        expected = f"{low:g} to {high:g} {settable[name].unit or ''}".rstrip()
-        raise FmuError(
-            f"{component.name}.{name} is out of range",
-            got=value,
-            expected=expected,
-            fix="give a value within",
-        )
+    check_range(
+        f"{component.name}.{name}",
+        value,
+        low,
+        high,
+        whole=settable[name].type == "Boolean",
+        unit=settable[name].unit,
+    )
 
 
 def _range(variable: Any) -> tuple[float, float]:
@@ -256,10 +264,10 @@ def _range(variable: Any) -> tuple[float, float]:
     return -math.inf if low is None else low, math.inf if high is None else high
 
 
-def _heading(name: str, *prefixes: str) -> dict[str, str]:
+def _heading(name: str, *prefixes: str, version: str = VERSIONS["2.0"]) -> dict[str, str]:
     """Returns the attributes of a root element."""
     facts = {
-        "version": VERSION,
+        "version": version,
         "name": name,
         "generationTool": f"{DISTRIBUTION} {package_version()}",
     }
@@ -271,8 +279,8 @@ def _values_file(component: Component) -> str:
     return f"resources/{component.name}.ssv"
 
 
-def _add_component(parent: Element, component: Component) -> None:
-    """Adds a component with its connectors and parameter set."""
+def _add_component(parent: Element, component: Component, *, is_bound: bool) -> None:
+    """Adds a component with its connectors and, if it is bound to one, its parameter set."""
     facts = {
         "name": component.name,
         "type": "application/x-fmu-sharedlibrary",
@@ -285,6 +293,10 @@ def _add_component(parent: Element, component: Component) -> None:
             connectors, "ssd:Connector", _described(variable) | {"kind": variable.causality}
         )
         SubElement(connector, f"ssc:{variable.type}", _unit(variable, component))
+        for size in _kind(variable)[1]:
+            SubElement(connector, "ssc:Dimension", size=str(size))
+    if not is_bound:
+        return
     bindings = SubElement(element, "ssd:ParameterBindings")
     SubElement(
         bindings,
@@ -313,7 +325,7 @@ def _unit(variable: Any, component: Component) -> dict[str, str]:
         unit.name == variable.unit and unit.baseUnit is not None
         for unit in component.description.unitDefinitions
     )
-    return {"unit": variable.unit} if variable.type == "Real" and supported else {}
+    return {"unit": variable.unit} if variable.type in REAL and supported else {}
 
 
 def _add_units(root: Element, tag: str, components: Iterable[Component]) -> None:

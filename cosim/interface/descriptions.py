@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Collection
 from pathlib import Path
 from typing import Any
 from zipfile import ZipFile
@@ -17,18 +18,18 @@ DESCRIPTION = "modelDescription.xml"
 IDENTIFIER = r"[A-Za-z_]\w{0,199}"
 
 
-def read_description(path: Path) -> Any:
-    """Returns fmpy's model description of an FMI 2.0 co-simulation FMU.
+def read_description(path: Path, versions: Collection[str] = ("2.0",)) -> Any:
+    """Returns fmpy's model description of a co-simulation FMU of one of the versions of FMI.
 
     Raises FmuError for any other file.
     """
     description = open_description(path)
-    if description.fmiVersion != "2.0" or description.coSimulation is None:
+    if description.fmiVersion not in versions or description.coSimulation is None:
         kind = "co-simulation" if description.coSimulation else "model exchange only"
         raise FmuError(
             "wrong kind of FMU",
             got=f"FMI {description.fmiVersion}, {kind}",
-            expected="FMI 2.0 for co-simulation",
+            expected=f"FMI {' or '.join(versions)} for co-simulation",
             fix=FIX,
             where=str(path),
         )

@@ -263,8 +263,8 @@ class LiveRobot:
         if self._fading > 0:
             share = 1.0 - self._fading / self._steps_of(FADE)
             self._fading -= 1
-            return _blend(self._from, found, share, self._steps_of(FADE) * self._h)
-        self._last = found
+            found = _blend(self._from, found, share, self._steps_of(FADE) * self._h)
+        self._last = found  # what the joints were commanded, whatever comes next
         return found
 
     def _holding(self) -> JointCommand:

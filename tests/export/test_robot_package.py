@@ -6,7 +6,9 @@ from __future__ import annotations
 
 import zipfile
 from pathlib import Path
+from xml.etree import ElementTree
 
+import fmpy
 import numpy as np
 import pytest
 from command import Call
@@ -18,7 +20,7 @@ from hexapod_cosim.cosim.export.robot_package import CONTROLLER, PLANT, export_p
 from hexapod_cosim.cosim.interface.controller_interface import ControllerSetup
 from hexapod_cosim.cosim.master.signals import ACCELERATION, COMMANDED, MEASURED
 from hexapod_cosim.models import FmuError, HexapodError, load_robot
-from tools.importers import delayed
+from tools.importers import delayed, package3
 from tools.importers.compare import largest_difference
 from tools.importers.package import run
 
@@ -52,6 +54,14 @@ def package(
     setup: ControllerSetup, plant_build: Path, tmp_path_factory: pytest.TempPathFactory
 ) -> Path:
     return export_package(setup, tmp_path_factory.mktemp("package") / "athena.ssp")
+
+
+@pytest.fixture(scope="module")
+def arrays_package(
+    setup: ControllerSetup, plant_build: Path, tmp_path_factory: pytest.TempPathFactory
+) -> Path:
+    """A package of FMI 3.0 FMUs."""
+    return export_package(setup, tmp_path_factory.mktemp("arrays") / "athena.ssp", fmi=3)
 
 
 @pytest.fixture(scope="module")
@@ -118,6 +128,83 @@ def test_without_values_the_robot_walks_straight_ahead(package: Path) -> None:
     assert {name: value for name, value in command.items() if value} == {"command.vx": 0.08}
 
 
+def test_the_fmus_themselves_hold_the_walk_s_command(package: Path, tmp_path: Path) -> None:
+    with zipfile.ZipFile(package) as archive:
+        fmu = archive.extract(f"resources/{CONTROLLER}.fmu", tmp_path)
+    starts = {one.name: one.start for one in fmpy.read_model_description(fmu).modelVariables}
+    command = {name: value for name, value in starts.items() if name.startswith("command.")}
+    assert {name: value for name, value in command.items() if float(value)} == {
+        "command.vx": "0.08"
+    }
+
+
+def test_arrays_of_fmi_3_are_connected_as_a_whole_and_there_is_no_parameter_set(
+    arrays_package: Path, tmp_path: Path
+) -> None:
+    with zipfile.ZipFile(arrays_package) as archive:
+        names = archive.namelist()
+        archive.extractall(tmp_path)
+    assert names == ["SystemStructure.ssd", "resources/plant.fmu", "resources/controller.fmu"]
+    root = ElementTree.parse(tmp_path / names[0]).getroot()
+    assert root.get("version") == "2.0"
+    assert [one.get("startConnector") for one in root.iter(f"{package3.SSD}Connection")] == [
+        "angle", "foot.force", "torso.quaternion", "angle_ref", "speed_ref", "torque_ref",
+        "acceleration_ref",
+    ]  # fmt: skip
+    for component in root.iter(f"{package3.SSD}Component"):
+        fmu = fmpy.read_model_description(str(tmp_path / component.get("source", "")))
+        variables = {one.name: one for one in fmu.modelVariables}
+        for connector in component.iter(f"{package3.SSD}Connector"):
+            variable = variables[connector.get("name")]
+            kind, *sizes = connector
+            assert kind.tag == f"{package3.SSC}{variable.type}"
+            assert connector.get("kind") == variable.causality
+            assert [one.get("size") for one in sizes] == [
+                str(one.start) for one in variable.dimensions
+            ]
+
+
+def test_a_package_of_fmi_3_walks_without_a_parameter_set_as_that_of_fmi_2_with_one(
+    package: Path, arrays_package: Path
+) -> None:
+    names = [f"{PLANT}.torso.position", f"{PLANT}.foot.force"]
+    found = package3.run(arrays_package, names, step=PERIOD, steps=STEPS, order=ORDER)
+    scalars = [f"{PLANT}.torso.position[{i}]" for i in (1, 2, 3)]
+    scalars += [
+        f"{PLANT}.{leg}.foot.force[{i}]"
+        for leg in ("LF", "LM", "LR", "RF", "RM", "RR")
+        for i in (1, 2, 3)
+    ]
+    expected = run(package, scalars, step=PERIOD, steps=STEPS, order=ORDER, in_order=True)
+    assert np.array_equal(found, expected.columns(scalars))
+    assert found[-1, 0] - found[0, 0] > 0.02
+
+
+def test_values_are_start_values_of_a_package_without_parameter_sets(
+    setup: ControllerSetup, plant_build: Path, tmp_path: Path
+) -> None:
+    values = read_values(["controller.command.vx=0.05", "plant.friction.mu=0.5"])
+    path = export_package(setup, tmp_path / "athena.ssp", values=values, fmi=3)
+    with zipfile.ZipFile(path) as archive:
+        archive.extractall(tmp_path)
+    for component, name, value in (
+        (PLANT, "friction.mu", 0.5),
+        (CONTROLLER, "command.vx", 0.05),
+    ):
+        fmu = fmpy.read_model_description(str(tmp_path / "resources" / f"{component}.fmu"))
+        (found,) = (one.start for one in fmu.modelVariables if one.name == name)
+        assert float(found) == value
+
+
+def test_a_value_of_an_input_that_the_controller_sets_is_refused(
+    setup: ControllerSetup, tmp_path: Path
+) -> None:
+    values = {PLANT: {"LF.coxa.angle_ref": 0.1}}
+    with pytest.raises(FmuError, match="no such value to set"):
+        export_package(setup, tmp_path / "no.ssp", values=values, fmi=3)
+    assert not list(tmp_path.iterdir())
+
+
 @pytest.mark.parametrize(
     ("text", "said"),
     [("ctrl.command.vx=1", "component"), ("controller.command.vx=fast", "not a number")],
@@ -148,7 +235,7 @@ def test_the_command_packs_a_kinematic_walk(call: Call, tmp_path: Path) -> None:
         (("--set", "plant.friction.mu=0.5", "-o", "one.fmu"), "without a package"),
         (("--ssp", "-o", "one.fmu"), "not a package's name"),
         (("--ssp", "--urdf"), "two formats"),
-        (("--ssp", "--fmi", "3"), "no package of such FMUs"),
+        (("--ssp", "--controller", "kinematic", "--fmi", "4"), "no such FMI version"),
         (("--ssp", "--platforms", "sources"), "without binaries"),
         ((*KINEMATIC, "plant.friction.nu=1"), "did you mean 'friction.mu'"),
         (

@@ -15,8 +15,17 @@ from feed_through import FOOT, JOINT, make_feed_through
 from fmpy.ssp.ssd import read_ssd, read_ssv
 
 from hexapod_cosim.cosim.common.plant_files import fmi2_platform
-from hexapod_cosim.cosim.export.ssp import KINDS, PREFIXES, Experiment, export_ssp
-from hexapod_cosim.cosim.interface.descriptions import read_description
+from hexapod_cosim.cosim.export.export import export_fmu
+from hexapod_cosim.cosim.export.ssp import (
+    KINDS,
+    PREFIXES,
+    Component,
+    Experiment,
+    export_ssp,
+    structure,
+)
+from hexapod_cosim.cosim.interface.descriptions import open_description, read_description
+from hexapod_cosim.models import load_robot
 from hexapod_cosim.models.errors import FmuError, HexapodError
 from tools.importers.package import run
 
@@ -208,3 +217,17 @@ def test_a_value_of_an_unknown_or_connected_variable_or_an_output_is_refused(
 def test_a_file_that_is_no_fmu_is_refused(fmus: dict[str, Path], tmp_path: Path) -> None:
     with pytest.raises(HexapodError, match="no such FMU"):
         pack(tmp_path, fmus | {"controller": tmp_path / "missing.fmu"})
+
+
+def test_fmus_of_different_versions_are_refused(fmus: dict[str, Path], tmp_path: Path) -> None:
+    newer = export_fmu(load_robot("athena"), tmp_path / "plant.fmu", fmi=3)
+    with pytest.raises(FmuError, match="different versions"):
+        structure(
+            [
+                Component("one", newer, open_description(newer)),
+                Component("two", fmus["plant"], open_description(fmus["plant"])),
+            ],
+            [],
+            title="no",
+            experiment=EXPERIMENT,
+        )

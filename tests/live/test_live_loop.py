@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -246,6 +247,48 @@ def test_a_change_of_the_settings_ends_a_recording(loop: Loop, side: Side) -> No
     assert status["mode"] == "free"
     assert status["settings"]["friction"] == 0.4
     assert [note for _, note in status["notes"]] == ["Recorded 0.6 s."]
+
+
+FAILING = """
+import numpy as np
+
+
+class Fails:
+    def __init__(self, robot, period):
+        self.stance = np.array(robot.stance)
+        self.left = 20
+
+    def step(self, t, command, measurement):
+        self.left -= 1
+        if self.left < 0:
+            raise ZeroDivisionError("no legs left")
+        return self.stance
+"""
+
+
+def test_a_controller_that_raises_is_told_to_all_pages_and_the_loop_goes_on(
+    side: Side, tmp_path: Path
+) -> None:
+    (tmp_path / "law.py").write_text(FAILING, encoding="utf-8")
+    scenario = load_scenario("stand", overrides=[f"control={tmp_path / 'law.py'}:Fails"])
+    with LiveRobot(Choices(scenario, control_texts(scenario, ("kinematic",)), {})) as robot:
+        loop = Loop(robot, side, now=lambda: side.time, pause=side.pause)
+        side.post("clients", 0, 1)
+        side.post("do", 1, Action("record"))
+        turn(loop, 100)
+        status = side.last("status")
+        assert robot.count == 100
+        assert "ZeroDivisionError: no legs left" in status["fault"]
+        assert [note for _, note in status["notes"]] == ["Recorded 0.1 s.", status["fault"]]
+        assert not status["stopped"]
+        assert status["mode"] == "free"
+        side.post("set", 1, Change("control", "kinematic"))
+        turn(loop, 20)
+        assert side.last("status")["fault"] == ""
+        assert side.last("status")["settings"]["control"] == "kinematic"
+        side.post("drive", 1, FORWARD)
+        turn(loop, 8)
+        assert side.frames()[-1]["command"][0] > 0.0
 
 
 def test_the_loop_ends_when_the_server_says_so_and_when_it_is_gone(loop: Loop, side: Side) -> None:

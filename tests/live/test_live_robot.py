@@ -245,6 +245,49 @@ def test_a_controller_that_raises_is_replaced_by_joints_that_hold(tmp_path: Path
         assert "no legs left" in robot.fault
 
 
+LEANING = """
+import numpy as np
+
+
+class Leans:
+    def __init__(self, robot, period):
+        self.pose, self.left = np.array(robot.stance), {steps}
+        self.pose[:, 1] += 0.3
+
+    def step(self, t, command, measurement):
+        self.left -= 1
+        if self.left < 0:
+            raise ZeroDivisionError("no legs left")
+        return self.pose
+"""
+
+
+@pytest.mark.parametrize("fails", [False, True], ids=["another change", "a fault"])
+def test_what_happens_while_the_commands_fade_over_makes_no_jump(
+    tmp_path: Path, fails: bool
+) -> None:
+    steps = 40 if fails else 10_000  # the fade takes 80
+    (tmp_path / "law.py").write_text(LEANING.format(steps=steps), encoding="utf-8")
+    scenario = load_scenario("stand")
+    texts = control_texts(scenario, ("kinematic",)) | {"Leans": f"{tmp_path / 'law.py'}:Leans"}
+    with LiveRobot(Choices(scenario, texts, {})) as robot:
+        go(robot, 10, BodyCommand())
+        robot.change(Change("control", "Leans"))
+        go_on(robot, BodyCommand())
+        commanded = [value(robot, *joint_names("angle_ref"))]
+        for step in range(400):
+            if step == 40 and not fails:
+                robot.change(Change("control", "kinematic"))
+            robot.step(BodyCommand(), NO_FORCE)
+            commanded.append(value(robot, *joint_names("angle_ref")))
+        assert ("no legs left" in robot.fault) == fails
+    moved = np.abs(np.array(commanded) - commanded[0]).max(axis=0).max()
+    largest = np.abs(np.diff(commanded, axis=0)).max()
+    assert moved > 0.1
+    # rad    a cubic of 0.3 rad in 80 steps has 0.3 * 1.5 / 80 = 0.0056 in its steepest one
+    assert largest < 0.006
+
+
 def test_a_controller_that_cannot_begin_is_refused_at_first_and_a_fault_later(
     tmp_path: Path,
 ) -> None:

@@ -4,10 +4,16 @@ from __future__ import annotations
 
 import http.client
 import json
+import os
+import signal
+import socket
+import subprocess
+import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -16,6 +22,7 @@ from websockets.sync.client import connect
 
 from hexapod_cosim.cosim.live import server as live_server
 from hexapod_cosim.cosim.live.hub import BURST, MOST_CLIENTS, MOST_DROPPED, MOST_REFUSED, Hub
+from hexapod_cosim.cosim.live.pacing import MOST_LAG
 from hexapod_cosim.cosim.live.server import LiveError, LiveServer
 from hexapod_cosim.cosim.live.settings import Choices, control_texts
 from hexapod_cosim.cosim.scenario.scenario import load_scenario
@@ -151,9 +158,83 @@ def test_two_pages_see_one_robot_and_the_last_command_wins(running: Running) -> 
         assert frame["command"][2] > 0.0
 
 
+def test_a_tab_that_is_closed_while_it_drives_lets_go_of_the_robot(running: Running) -> None:
+    with running.socket() as stays:
+        with running.socket() as closed:
+            until(stays, lambda message: message["type"] == "pages" and message["count"] == 2)
+            closed.send(json.dumps({"type": "drive", "forward": 1, "speed": 0.5}))
+            until(stays, lambda m: m["type"] == "frame" and m["command"][0] > 0)
+            closed.socket.shutdown(socket.SHUT_RDWR)  # as a browser that is killed: no farewell
+        until(stays, lambda message: message["type"] == "pages" and message["count"] == 1)
+        until(stays, lambda m: m["type"] == "frame" and m["command"][0] == 0)
+        # and the page that stays can drive
+        stays.send(json.dumps({"type": "drive", "turn": 1, "speed": 0.5}))
+        until(stays, lambda m: m["type"] == "frame" and m["command"][2] > 0)
+
+
+@pytest.mark.skipif(not hasattr(signal, "SIGSTOP"), reason="no SIGSTOP on this system")
+def test_after_a_sleep_of_the_computer_the_loop_goes_on_and_counts_what_it_missed(
+    running: Running,
+) -> None:
+    with running.socket() as opened:
+        before = until(opened, of("frame"))
+        loop = running.server._process.pid
+        assert loop is not None
+        os.kill(loop, signal.SIGSTOP)
+        asleep = time.monotonic()
+        try:
+            while time.monotonic() < asleep + 2.0 * MOST_LAG:  # a sleep is a gap of the clock
+                time.sleep(MOST_LAG)
+        finally:
+            os.kill(loop, signal.SIGCONT)
+        after = until(opened, lambda m: m["type"] == "frame" and m["gaps"] > before["gaps"])
+        assert after["skipped"] - before["skipped"] > MOST_LAG
+        until(opened, lambda m: m["type"] == "frame" and m["seconds"] > after["seconds"] + 0.1)
+
+
+SERVER = """
+from hexapod_cosim.cosim.live.server import LiveServer
+from hexapod_cosim.cosim.live.settings import Choices, control_texts
+from hexapod_cosim.cosim.scenario.scenario import load_scenario
+
+if __name__ == "__main__":
+    scenario = load_scenario("walk_flat")
+    choices = Choices(scenario, control_texts(scenario, ("kinematic",)), {})
+    LiveServer(choices, None).run(lambda url: print(url, flush=True))
+"""
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="needs /proc")
+def test_when_the_server_is_killed_its_loop_ends_too(tmp_path: Path) -> None:
+    (tmp_path / "serve.py").write_text(SERVER, encoding="utf-8")
+    command = [sys.executable, str(tmp_path / "serve.py")]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as server:
+        try:
+            assert any("http://127.0.0.1:" in line for line in server.stdout or ())
+            tasks = Path(f"/proc/{server.pid}/task").glob("*/children")
+            listed = " ".join(path.read_text(encoding="utf-8") for path in tasks)
+        finally:
+            server.kill()
+    children = [Path("/proc", word) for word in listed.split()]
+    assert children
+    end = time.monotonic() + PATIENCE
+    while any(map(is_running, children)) and time.monotonic() < end:
+        time.sleep(0.05)
+    assert not any(map(is_running, children))
+
+
+def is_running(process: Path) -> bool:
+    """Returns whether a process of /proc exists and is not only waiting for its parent."""
+    try:
+        return "State:\tZ" not in (process / "status").read_text(encoding="utf-8")
+    except OSError:
+        return False
+
+
 def test_what_is_recorded_can_be_fetched(running: Running) -> None:
     with running.socket() as opened:
         opened.send(json.dumps({"type": "do", "action": "record"}))
+        until(opened, lambda m: m["type"] == "status" and m["mode"] == "recording")
         until(opened, lambda m: m["type"] == "frame" and m["seconds"] > 0.1)
         opened.send(json.dumps({"type": "do", "action": "stop"}))
         until(opened, lambda m: m["type"] == "status" and m["recorded"])
