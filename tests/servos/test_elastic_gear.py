@@ -6,12 +6,15 @@ from __future__ import annotations
 
 import ctypes as ct
 import math
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from fmi_plant import ERROR, MODEL_EXCHANGE, OK
+from fmi_plant import Plant as FmuPlant
 from mirror import INVALID_ARGUMENT
-from plant import Plant, PlantError
+from plant import Plant, PlantError, inputs, pointer
 from scipy.integrate import solve_ivp
 from states import changed, distance, landing, lopsided, random_bodies, random_command
 from test_laws_servo import tibia_inertia, tibias, walled
@@ -30,6 +33,7 @@ CLOSED = 1e-8  # rad, rad/s  of closed forms: a tibia's inertia is 1e-7 of its w
 AGREES = 1e-6  # of an independent integration
 DENSE = 1e-9  # relative, of the sweeps and the dense system
 TWIN = 1e-11  # relative, of steps
+SHOWN = ["LF.femur.gear_deflection", "LF.femur.motor_speed", "LF.femur.speed"]
 ELASTIC: dict[str, Any] = {"gear_stiffness": 400.0, "gear_damping": 0.05}
 
 
@@ -313,6 +317,23 @@ def test_a_restored_state_continues_with_the_same_deflections(core: ct.CDLL) -> 
     assert other.save() == plant.save()
 
 
+def test_every_kernel_gives_the_same_rates_with_elastic_gears_and_spinning_rotors(
+    core: ct.CDLL,
+) -> None:
+    robot = with_servo(lopsided(2), "mx64_m6", backlash=0.01, gear_ratio=90.0, **ELASTIC)
+    plant = landed(core, robot, 0.03)
+    seen = {}
+    core.hx_probe_kernel.restype = ct.c_char_p
+    for index in range(8):
+        rate = np.zeros((19, 13))
+        asked = ct.c_void_p(plant.handle), ct.byref(inputs(plant.hold())), pointer(rate)
+        name = core.hx_probe_kernel(index, *asked)
+        if name:
+            seen[name] = rate
+    assert b"baseline" in seen
+    assert all(np.array_equal(rate, seen[b"baseline"]) for rate in seen.values())
+
+
 def test_a_rigid_gear_shows_the_joints_speed_and_no_deflection(core: ct.CDLL) -> None:
     output = landed(core, load_robot("athena"), 0.01).output()
     assert np.array_equal(output.motor_speed, output.speed)
@@ -330,6 +351,37 @@ def test_derivatives_of_elastic_gears_are_refused(core: ct.CDLL) -> None:
     ) as refused:
         plant.tangent(plant.hold(), np.zeros(96), np.zeros(70))
     assert refused.value.status == INVALID_ARGUMENT
+
+
+def test_model_exchange_with_elastic_gears_is_refused(plant_library: Path) -> None:
+    with FmuPlant(plant_library, kind=MODEL_EXCHANGE) as instance:
+        assert instance.set_reals({"servo.gear_stiffness": 400.0}) == OK
+        assert instance.call("fmi2SetupExperiment", 0, 0.0, 0.0, 0, 0.0) == OK
+        assert instance.call("fmi2EnterInitializationMode") == OK
+        assert instance.call("fmi2ExitInitializationMode") == ERROR
+        assert "use co-simulation" in instance.last_message
+        assert instance.call("fmi2Reset") == OK
+        instance.initialize()
+
+
+def test_an_fmu_with_elastic_gears_steps_and_continues_saved_states(
+    plant_library: Path,
+) -> None:
+    gear = ELASTIC | {"backlash": 0.004, "gear_ratio": 200.0}
+    values = {f"servo.{key}": value for key, value in gear.items()}
+    with FmuPlant(plant_library) as instance:
+        assert instance.set_reals(values) == OK
+        instance.initialize()
+        assert instance.step(0.0, 0.02) == OK
+        state = instance.save()
+        assert instance.step(0.02, 0.02) == OK
+        shown = instance.reals(SHOWN)
+        assert instance.call("fmi2SetFMUstate", state) == OK
+        assert instance.step(0.02, 0.02) == OK
+        assert instance.reals(SHOWN) == shown
+        instance.free(state)
+    assert abs(shown[0]) > 1e-5
+    assert shown[1] != shown[2]
 
 
 @pytest.mark.parametrize(
