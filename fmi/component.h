@@ -54,6 +54,9 @@ typedef struct hxContinuous {
   size_t state, rate; /* offsets in struct hxVariables of hx_state_count doubles each */
   size_t indicators;  /* number of event indicators; events are where one changes its sign */
 
+  /* Returns whether the states are the component's whole state, as model exchange needs. */
+  hxStatus (*check)(hxComponent *component);
+
   /* Copies the states to the variables; sets the component to the variables' states at time t. */
   void (*get)(const hxComponent *component, struct hxVariables *variables);
   hxStatus (*set)(hxComponent *component, const struct hxVariables *variables, double t);

@@ -275,8 +275,10 @@ int hx_instance_check_tolerance(hxInstance *instance, const char *call, int defi
 }
 
 hxStatus hx_instance_initialize(hxInstance *instance) {
-  const hxStatus status = hx_component_reset(instance->component, &instance->state.variables,
-                                             instance->state.start_time);
+  hxStatus status = hx_component_reset(instance->component, &instance->state.variables,
+                                       instance->state.start_time);
+  if (status == HX_OK && hx_continuous && instance->state.interface == HX_MODEL_EXCHANGE)
+    status = hx_continuous->check(instance->component);
   if (status != HX_OK) {
     hx_log(instance, HX_LOG_ERROR,
            "parameters: %s; nothing was initialised, correct them and try again",

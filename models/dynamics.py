@@ -30,6 +30,7 @@ from hexapod_cosim.models.kinematics import (
     split,
 )
 from hexapod_cosim.models.records import Array, Robot
+from hexapod_cosim.models.servos.gear import Rotors, gear_torque, is_elastic, spin_inertia
 from hexapod_cosim.models.servos.motor import (
     FULL,
     Power,
@@ -157,17 +158,55 @@ def world_inertias(robot: Robot, body: Array) -> Array:
 
 
 def mass_matrix(robot: Robot, body: Array, joints: Constraints | None = None) -> Array:
-    """Returns M = diag(m 1, J) + J_r G^T G (114, 114).
+    """Returns M = diag(m 1, J) + J_r G^T G (114, 114), with rigid gears.
 
-    The inertia J_r of the geared rotors acts on the joint speeds. joints: `constraints` at these
-    bodies, if they are known.
+    The inertia J_r of the geared rotors acts on the joint speeds; with a gear ratio n it also
+    couples them to the bodies that carry the rotors, J_r/n (G^T P + P^T G) (eq. 57). joints:
+    `constraints` at these bodies, if they are known.
     """
     M = np.zeros((6 * BODIES, 6 * BODIES))
     for k, (mass, J) in enumerate(zip(masses(robot), world_inertias(robot, body), strict=True)):
         M[6 * k : 6 * k + 3, 6 * k : 6 * k + 3] = mass * np.eye(3)
         M[6 * k + 3 : 6 * k + 6, 6 * k + 3 : 6 * k + 6] = J
     G = (joints or constraints(robot, body)).G
-    return M + robot.servo.rotor_inertia * G.T @ G
+    P, spin = carried_turns(robot, G), spin_inertia(robot.servo)
+    return M + robot.servo.rotor_inertia * G.T @ G + spin * (G.T @ P + P.T @ G)
+
+
+def carried_turns(robot: Robot, G: Array) -> Array:
+    """Returns P (18, 114): P v are the speeds s.w_i at which the bodies that carry the rotors turn
+    about the joints' axes.
+
+    G: as in `Constraints`.
+    """
+    P = np.zeros_like(G)
+    for k, joint in enumerate(joint_models(robot)):
+        parent = slice(6 * joint.parent, 6 * joint.parent + 6)
+        P[k, parent] = -G[k, parent]
+    return P
+
+
+def link_matrix(robot: Robot, body: Array, joints: Constraints | None = None) -> Array:
+    """Returns the mass matrix (114, 114) of the links alone, without rotors."""
+    return mass_matrix(replace(robot, servo=replace(robot.servo, rotor_inertia=0.0)), body, joints)
+
+
+def rotor_speeds(robot: Robot, body: Array, rotors: Rotors | None) -> Array:
+    """Returns the speeds (6, 3) of the rotors, seen at the joints [rad/s]; None: rigid gears."""
+    return joint_speeds(robot, body) if rotors is None else rotors.speed
+
+
+def rotor_moments(robot: Robot, body: Array, rotors: Rotors | None) -> Array:
+    """Returns the moments (19, 3) of the rotors on the bodies that carry them, -h w_i x s [N m].
+
+    h is the angular momentum J_r/n times the speed of the rotor, about the joint's axis (eq. 57).
+    """
+    moments = np.zeros((BODIES, 3))
+    spin = spin_inertia(robot.servo) * rotor_speeds(robot, body, rotors).ravel()
+    for joint, h in zip(joint_models(robot), spin, strict=True):
+        s = rotation_matrix(body[joint.parent, 3:7]) @ joint.s_i
+        moments[joint.parent] -= h * cross(body[joint.parent, 10:13], s)
+    return moments
 
 
 def applied_forces(
@@ -177,13 +216,15 @@ def applied_forces(
     damping: Array | Contacts,
     bristle: Array | None = None,
     body_damping: Array | None = None,
+    rotors: Rotors | None = None,
 ) -> Array:
     """Returns the forces g (19, 6) of eq. 1 without the joints' torques [N, N m].
 
     damping: of the feet on the ground below them (6,) [s/m], nan for open ones; or the state of all
     contacts, which holds those of walls, materials and soil, too. bristle: deflections (6, 3) [m],
     0 by default. body_damping: with an array of damping alone, that of torso, knees and shanks
-    [s/m], in the order of `body_spheres`; None: `standing_body_damping`.
+    [s/m], in the order of `body_spheres`; None: `standing_body_damping`. rotors: of elastic gears;
+    None: rigid.
     """
     if not isinstance(damping, Contacts):
         if body_damping is None:
@@ -193,21 +234,28 @@ def applied_forces(
     g[:, 0:3] = masses(robot)[:, None] * np.array(robot.gravity)
     J, w = world_inertias(robot, body), body[:, 10:13]
     g[:, 3:6] = -np.cross(w, np.einsum("kij,kj->ki", J, w))
+    if spin_inertia(robot.servo) != 0.0:
+        g[:, 3:6] += rotor_moments(robot, body, rotors)
     g[0] += np.concatenate([command.push_force, command.push_torque])
     return g + contact_wrenches(robot, body, damping, bristle)
 
 
 def joint_torques(
-    robot: Robot, body: Array, command: Command, external: Array | None = None
+    robot: Robot,
+    body: Array,
+    command: Command,
+    external: Array | None = None,
+    rotors: Rotors | None = None,
 ) -> tuple[Array, Array]:
-    """Returns motor torque (6, 3) and gear torque (6, 3) on the child [N m].
+    """Returns motor torque (6, 3) and friction (6, 3) on the child [N m]; with elastic gears on the
+    rotors, whose state is given and whose speed is the motor's.
 
     The motor torque is 0 in kinematic mode, where it is a multiplier; measured friction is then
     that of a motor which balances the external torque. external: (6, 3) as of
     `external_torques`, for gears whose friction depends on the load; None: 0.
     """
     servo = robot.servo
-    angle, speed = joint_angles(robot, body), joint_speeds(robot, body)
+    angle, speed = joint_angles(robot, body), rotor_speeds(robot, body, rotors)
     load = np.zeros_like(angle) if external is None else external
     measured = has_measured_friction(servo)
     if servo.mode == "kinematic":
@@ -241,8 +289,7 @@ def external_torques(
     kinematic = robot.servo.mode == "kinematic"
     driven = drive_acceleration(robot, body, command).ravel() if kinematic else turns[0] * 0.0
     bias = np.linalg.solve(held, np.concatenate([np.zeros(6), c, driven]))
-    inertia = mass_matrix(replace(robot, servo=replace(robot.servo, rotor_inertia=0.0)), body)
-    load = motion.T @ (forces - inertia @ bias)
+    load = motion.T @ (forces - link_matrix(robot, body) @ bias)
     return load.reshape(LEGS, JOINTS) + stop_torques(robot, body)
 
 
@@ -317,6 +364,13 @@ class Accelerations:
     multipliers: Array  # (18, 5)  lambda
     drive_torque: Array  # (6, 3)  motor on child [N m]; in kinematic mode the drive's multiplier
     gear_torque: Array  # (6, 3)  gear on child [N m]
+    rotor: Array | None = None  # (6, 3)  accelerations of rotors behind elastic gears [rad/s2]
+
+
+def link_torques(robot: Robot, body: Array, rotors: Rotors) -> Array:
+    """Returns the torques (6, 3) of elastic gears on the links [N m]."""
+    rate = rotors.speed - joint_speeds(robot, body)
+    return gear_torque(robot.servo, rotors.deflection, rate)
 
 
 def accelerations(
@@ -326,22 +380,53 @@ def accelerations(
     damping: Array | Contacts,
     bristle: Array | None = None,
     body_damping: Array | None = None,
+    rotors: Rotors | None = None,
 ) -> Accelerations:
     """Solves eq. 1 for bodies (19, 13), whose joints may have drifted.
 
     damping, bristle and body_damping are those of `applied_forces`. In kinematic mode the
-    multiplier of a joint's additional row is minus the motor's torque.
+    multiplier of a joint's additional row is minus the motor's torque. rotors: those of elastic
+    gears, whose accelerations are then part of the solution; None: rigid gears.
     """
     joints = constraints(robot, body)
-    forces = applied_forces(robot, body, command, damping, bristle, body_damping).ravel()
+    forces = applied_forces(robot, body, command, damping, bristle, body_damping, rotors).ravel()
     load = gear_loads(robot, body, command, forces, joints)
-    motor, gear = joint_torques(robot, body, command, load)
+    motor, gear = joint_torques(robot, body, command, load, rotors)
+    if is_elastic(robot.servo):
+        if rotors is None:
+            raise ValueError("rotors: got None, expected the state of the elastic gears' rotors")
+        return _elastic_accelerations(robot, body, command, forces, joints, (motor, gear), rotors)
     g = forces + joints.G.T @ (motor + gear + stop_torques(robot, body)).ravel()
     D, c = constraint_equations(robot, body, command, joints)
     solution = solve_constrained(mass_matrix(robot, body, joints), g, D, c)
     dv, multiplier, drive = np.split(solution, [6 * BODIES, 6 * BODIES + len(joints.phi)])
     motor = -drive.reshape(LEGS, JOINTS) if robot.servo.mode == "kinematic" else motor
     return Accelerations(dv.reshape(BODIES, 6), multiplier.reshape(-1, MULTIPLIERS), motor, gear)
+
+
+def _elastic_accelerations(
+    robot: Robot,
+    body: Array,
+    command: Command,
+    forces: Array,
+    joints: Constraints,
+    torques: tuple[Array, Array],
+    rotors: Rotors,
+) -> Accelerations:
+    """Solves eq. 1 together with the rotors behind elastic gears, J_r m + J_r/n P dv = torque."""
+    count = LEGS * JOINTS
+    on_link = link_torques(robot, body, rotors)
+    g = forces + joints.G.T @ (on_link + stop_torques(robot, body)).ravel()
+    coupling = spin_inertia(robot.servo) * carried_turns(robot, joints.G)
+    M = link_matrix(robot, body, joints)
+    W = np.block([[M, coupling.T], [coupling, robot.servo.rotor_inertia * np.eye(count)]])
+    right = np.concatenate([g, (torques[0] + torques[1] - on_link).ravel()])
+    D, c = constraint_equations(robot, body, command, joints)
+    D = np.hstack([D, np.zeros((len(D), count))])
+    dv, m, multiplier = np.split(solve_constrained(W, right, D, c), [len(M), len(W)])
+    shape = (LEGS, JOINTS)
+    multipliers = multiplier.reshape(-1, MULTIPLIERS)
+    return Accelerations(dv.reshape(BODIES, 6), multipliers, *torques, rotor=m.reshape(shape))
 
 
 def joint_reactions(robot: Robot, body: Array, multipliers: Array) -> tuple[Array, Array]:

@@ -5,9 +5,17 @@ from __future__ import annotations
 import numpy as np
 
 from hexapod_cosim.models.actuator import stop_energy
-from hexapod_cosim.models.dynamics import constraints, joint_overruns, masses, world_inertias
-from hexapod_cosim.models.kinematics import joint_speeds
+from hexapod_cosim.models.dynamics import (
+    carried_turns,
+    constraints,
+    joint_overruns,
+    masses,
+    rotor_speeds,
+    world_inertias,
+)
+from hexapod_cosim.models.kinematics import joint_models, rotation_matrix
 from hexapod_cosim.models.records import Array, Robot
+from hexapod_cosim.models.servos.gear import Rotors, gear_energy, spin_inertia
 from hexapod_cosim.models.touch.forces import (
     contacts_at,
     open_contacts,
@@ -16,18 +24,24 @@ from hexapod_cosim.models.touch.forces import (
 )
 
 
-def kinetic_energy(robot: Robot, body: Array) -> float:
-    """Returns the kinetic energy [J] of the bodies (19, 13) and the geared rotors."""
+def kinetic_energy(robot: Robot, body: Array, rotors: Rotors | None = None) -> float:
+    """Returns the kinetic energy [J] of the bodies (19, 13) and the geared rotors; rotors: those of
+    elastic gears, None: rigid gears.
+    """
     v, w = body[:, 7:10], body[:, 10:13]
     linear = masses(robot) @ np.sum(v * v, axis=1)
     angular = np.einsum("ki,kij,kj->", w, world_inertias(robot, body), w)
-    rotors = robot.servo.rotor_inertia * np.sum(joint_speeds(robot, body) ** 2)
-    return 0.5 * float(linear + angular + rotors)
+    speed = rotor_speeds(robot, body, rotors)
+    geared = robot.servo.rotor_inertia * np.sum(speed**2)
+    turns = carried_turns(robot, constraints(robot, body).G) @ body[:, 7:13].ravel()
+    carried = spin_inertia(robot.servo) * float(speed.ravel() @ turns)
+    return 0.5 * float(linear + angular + geared) + carried
 
 
-def potential_energy(robot: Robot, body: Array) -> float:
+def potential_energy(robot: Robot, body: Array, rotors: Rotors | None = None) -> float:
     """Returns the potential energy [J] of gravity, 0 at the world's origin, of the contacts with
-    rigid ground, 2/5 w K delta^2.5 each with its share w, and of the joints' stops.
+    rigid ground, 2/5 w K delta^2.5 each with its share w, of the joints' stops, and of elastic
+    gears with these rotors.
     """
     gravity = -float(masses(robot) @ (body[:, 0:3] @ np.array(robot.gravity)))
     open_ = open_contacts(robot)
@@ -35,7 +49,8 @@ def potential_energy(robot: Robot, body: Array) -> float:
     shares = shares_of_feet(robot, list(zip(spots(robot), open_.held, contacts, strict=True)))
     depth = np.array([max(contact.penetration, 0.0) for contact in contacts])
     stops = float(np.sum(stop_energy(robot.servo, joint_overruns(robot, body))))
-    return gravity + 0.4 * robot.contact.stiffness * float(shares @ depth**2.5) + stops
+    gears = 0.0 if rotors is None else float(np.sum(gear_energy(robot.servo, rotors.deflection)))
+    return gravity + 0.4 * robot.contact.stiffness * float(shares @ depth**2.5) + stops + gears
 
 
 def centre_of_mass(robot: Robot, body: Array) -> Array:
@@ -43,15 +58,20 @@ def centre_of_mass(robot: Robot, body: Array) -> Array:
     return masses(robot) @ body[:, 0:3] / robot.total_mass
 
 
-def momentum(robot: Robot, body: Array) -> tuple[Array, Array]:
+def momentum(robot: Robot, body: Array, rotors: Rotors | None = None) -> tuple[Array, Array]:
     """Returns linear momentum (3,) [kg m/s] and angular momentum (3,) about the world's origin [kg
     m2/s].
 
-    The spin of the rotors is not included, because it is internal to the geared joints.
+    The spin of the rotors (eq. 57) is included with a gear ratio; without one it is left out.
+    rotors: those of elastic gears, None: rigid gears.
     """
     linear = masses(robot)[:, None] * body[:, 7:10]
     spin = np.einsum("kij,kj->ki", world_inertias(robot, body), body[:, 10:13])
-    return linear.sum(axis=0), (np.cross(body[:, 0:3], linear) + spin).sum(axis=0)
+    about = (np.cross(body[:, 0:3], linear) + spin).sum(axis=0)
+    h = spin_inertia(robot.servo) * rotor_speeds(robot, body, rotors).ravel()
+    for joint, size in zip(joint_models(robot), h, strict=True):
+        about = about + size * (rotation_matrix(body[joint.parent, 3:7]) @ joint.s_i)
+    return linear.sum(axis=0), about
 
 
 def constraint_errors(robot: Robot, body: Array) -> tuple[float, float]:

@@ -5,8 +5,10 @@ MuJoCo's contact is a spring and a damper of accelerations. Its stiffness is cho
 of a standing tripod sink in as deep as with Hertz's law, its damping so that a free bounce has the
 restitution. Friction is Coulomb's, with an elliptic cone; the feet's resistance to spin and rolling
 (eq. 38) becomes torsional and rolling friction. Joint stops (eq. 39) become limits with the same
-spring and damper. The servos' torque-speed line, the tanh law's creep, static friction above the
-kinetic one and viscous friction are omitted, and soil is rigid.
+spring and damper. Viscous friction becomes the joint's damping, and a motor's back-EMF a part of
+kv. The servos' torque-speed line, friction that depends on load and speed, elasticity and play of
+gears, the rotors' angular momentum, the tanh law's creep, static friction above the
+kinetic one and the contacts' viscous friction are omitted, and soil is rigid.
 
 A robot without stops has limits of MuJoCo's own stiffness, which the plant does not have.
 
@@ -20,6 +22,7 @@ from __future__ import annotations
 import math
 import xml.etree.ElementTree as ET
 from collections.abc import Iterable
+from dataclasses import replace
 
 import numpy as np
 
@@ -36,6 +39,7 @@ from hexapod_cosim.models.kinematics import (
 )
 from hexapod_cosim.models.mjcf_ground import APPROXIMATION, add_surface
 from hexapod_cosim.models.records import JOINT_NAMES, Array, Leg, Link, Robot, Vector3
+from hexapod_cosim.models.servos.motor import back_emf_damping
 from hexapod_cosim.models.terrain import ground_height, surface_of
 from hexapod_cosim.models.urdf.writer import COLOURS, THICKNESS, numbers
 
@@ -189,7 +193,8 @@ def _at_zero(robot: Robot) -> tuple[Array, Array]:
         [_motion(robot, speed).ravel() for speed in np.eye(UNKNOWNS)], axis=-1
     )  # (114, 24)
     body = body_states(robot, np.zeros(3), UPRIGHT, np.zeros(3), np.zeros(3), ZERO, ZERO)
-    return J, np.asarray(J.T @ mass_matrix(robot, body) @ J)
+    plain = replace(robot, servo=replace(robot.servo, gear_ratio=0.0))
+    return J, np.asarray(J.T @ mass_matrix(plain, body) @ J)
 
 
 def _motion(robot: Robot, speed: Array) -> Array:
@@ -288,6 +293,8 @@ def _hinge(body: ET.Element, name: str, link: Link, robot: Robot, mobility: floa
         "armature": repr(servo.rotor_inertia),
         "frictionloss": repr(servo.coulomb_friction),
     }
+    if servo.viscous_friction > 0.0:
+        joint.set("damping", repr(servo.viscous_friction))
     if servo.stop_stiffness > 0.0:
         # MuJoCo's torque at a depth x is (k x + c dx/dt) / ((1 - d) w), with the impedance d and
         # the mobility w; negative numbers give k and c
@@ -300,11 +307,12 @@ def _hinge(body: ET.Element, name: str, link: Link, robot: Robot, mobility: floa
 
 def _servos(root: ET.Element, robot: Robot) -> None:
     servo, actuator = robot.servo, ET.SubElement(root, "actuator")
+    damping = servo.kd + (back_emf_damping(servo) if servo.drive == "motor" else 0.0)
     for leg in robot.legs:
         for name, link in zip(JOINT_NAMES, leg.links, strict=True):
             joint = f"{leg.name}_{name}"
             position = ET.SubElement(
-                actuator, "position", name=joint, joint=joint, kp=repr(servo.kp), kv=repr(servo.kd)
+                actuator, "position", name=joint, joint=joint, kp=repr(servo.kp), kv=repr(damping)
             )
             position.set("ctrlrange", numbers((link.angle_min, link.angle_max)))
             position.set("forcerange", numbers((-servo.torque_max, servo.torque_max)))

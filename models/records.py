@@ -242,6 +242,16 @@ class Servo:
     # how commands reach the servos, but in kinematic mode: transmissions, rounding of angles
     bus_period: Annotated[float, Number("s", at_least=0.0, at_most=1e3, default=0.0)] = 0.0
     command_step: Annotated[float, Number("rad", at_least=0.0, at_most=1.0, default=0.0)] = 0.0
+    # gear between rotor and link (eq. 54-56), but in kinematic mode; stiffness 0: rigid
+    gear_stiffness: Annotated[float, Number("N m/rad", at_least=0.0, at_most=1e9, default=0.0)] = (
+        0.0
+    )
+    gear_damping: Annotated[float, Number("N m s/rad", at_least=0.0, at_most=1e6, default=0.0)] = (
+        0.0
+    )
+    backlash: Annotated[float, Number("rad", at_least=0.0, at_most=1.0, default=0.0)] = 0.0
+    # turns of the rotor for one of the joint, < 0: against it (eq. 57); 0: no angular momentum
+    gear_ratio: Annotated[float, Number("1", at_least=-1e6, at_most=1e6, default=0.0)] = 0.0
 
 
 def _unused_fields(servo: Servo) -> list[str]:

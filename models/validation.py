@@ -73,6 +73,7 @@ def check_robot(robot: Robot, *, where: str | None = None) -> None:
         )
     for leg in robot.legs:
         _check_leg(leg, f"{at}legs.{leg.name}")
+    _check_rotors(robot, at)
     _check_stance(robot, at)
 
 
@@ -231,6 +232,7 @@ def _check_laws(robot: Robot, at: str) -> None:
         )
     _check_soil(robot, at)
     _check_motor(servo, at)
+    _check_gear(servo, at)
     if servo.torque_continuous > servo.torque_max:
         expected = f"at most torque_max = {servo.torque_max:g} N m"
         raise RobotError(
@@ -243,6 +245,53 @@ def _check_laws(robot: Robot, at: str) -> None:
     _check_static_friction(friction, at + "friction.mu_static")
     _check_terrain(robot, at + "terrain")
     _check_body(robot.body, at + "body")
+
+
+def _check_gear(servo: Servo, at: str) -> None:
+    if servo.gear_stiffness > 0.0 and servo.rotor_inertia == 0.0:
+        raise RobotError(
+            "elastic gear without a rotor",
+            got=servo.rotor_inertia,
+            expected="rotor_inertia > 0 with gear_stiffness, whose gear moves the rotor",
+            fix="give servo.rotor_inertia, or set servo.gear_stiffness to 0",
+            where=at + "servo.rotor_inertia",
+        )
+    if servo.backlash > 0.0 and servo.gear_stiffness == 0.0:
+        raise RobotError(
+            "play in a rigid gear",
+            got=servo.gear_stiffness,
+            expected="gear_stiffness > 0 with backlash, whose teeth meet elastically",
+            fix="give servo.gear_stiffness, or set servo.backlash to 0",
+            where=at + "servo.gear_stiffness",
+        )
+
+
+def _check_rotors(robot: Robot, at: str) -> None:
+    """Fails for rotors that are heavier than the bodies which contain them.
+
+    The inertia of each about its own axis is J_r/n^2, and the torso has six.
+    """
+    ratio, compliance = robot.servo.gear_ratio, 0.0
+    if ratio == 0.0:
+        return
+    for leg in robot.legs:
+        c, s = math.cos(leg.hip_yaw), math.sin(leg.hip_yaw)
+        hip = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]]) @ leg.links[0].axis
+        carriers = [(robot.torso.inertia, hip, len(robot.legs))]
+        carriers += [(leg.links[k].inertia, np.array(leg.links[k + 1].axis), 1) for k in range(2)]
+        for inertia, axis, count in carriers:
+            form = float(axis @ np.linalg.solve(inertia_matrix(inertia), axis))
+            compliance = max(compliance, count * form)
+    if robot.servo.rotor_inertia * compliance >= ratio**2:
+        least = math.sqrt(robot.servo.rotor_inertia * compliance)
+        raise RobotError(
+            "rotors heavier than the bodies that contain them",
+            got=ratio,
+            expected=f"0, or a size above {least:.3g}: rotor_inertia/gear_ratio^2 is a rotor's "
+            "inertia about its own axis",
+            fix="give servo.gear_ratio as turns of the rotor for one of the joint",
+            where=at + "servo.gear_ratio",
+        )
 
 
 def _check_motor(servo: Servo, at: str) -> None:

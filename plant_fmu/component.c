@@ -198,6 +198,10 @@ hxStatus hx_component_set_state(hxComponent *component, const void *bytes) {
 
 /* ---- model exchange ---- */
 
+static hxStatus check_states(hxComponent *component) {
+  return hx_plant_check_coordinates(plant_of(component));
+}
+
 static void get_state(const hxComponent *component, struct hxVariables *variables) {
   hx_plant_get_coordinates(const_plant(component), &variables->state);
 }
@@ -250,6 +254,7 @@ static const hxContinuous continuous = {
     .state = offsetof(struct hxVariables, state),
     .rate = offsetof(struct hxVariables, rate),
     .indicators = HX_LEGS,
+    .check = check_states,
     .get = get_state,
     .set = set_state,
     .rates = rates,

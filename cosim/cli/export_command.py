@@ -14,7 +14,12 @@ from hexapod_cosim.cosim.cli.terminal import Json, is_given, show_files, show_js
 from hexapod_cosim.cosim.cli.terrain_command import surfaces_from
 from hexapod_cosim.cosim.export.controller_export import export_controller
 from hexapod_cosim.cosim.export.export import export_fmu
-from hexapod_cosim.cosim.export.robot_files import Format, chosen_format, export_description
+from hexapod_cosim.cosim.export.robot_files import (
+    Format,
+    chosen_format,
+    export_description,
+    left_out,
+)
 from hexapod_cosim.cosim.export.robot_package import (
     chosen_package,
     export_package,
@@ -193,7 +198,13 @@ def export(
 
 def _export_description(robot: Robot, output: Path | None, form: Format) -> Path:
     """Writes a robot's URDF or MJCF file and returns its path."""
-    return export_description(robot, output or Path(f"{robot.name}{form.suffix}"), form)
+    path = export_description(robot, output or Path(f"{robot.name}{form.suffix}"), form)
+    lost = left_out(robot.servo, form)
+    if lost:
+        warn(
+            f"{path.name}: {form.title} cannot say and leaves out of the servos: {', '.join(lost)}"
+        )
+    return path
 
 
 def _export_plant(

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from hexapod_cosim.cosim.common.files import not_writable, write_text
 from hexapod_cosim.models import HexapodError, Robot
 from hexapod_cosim.models.mjcf import robot_to_mjcf
+from hexapod_cosim.models.records import Servo
+from hexapod_cosim.models.servos.motor import has_measured_friction
 from hexapod_cosim.models.urdf.writer import robot_to_urdf
 
 
@@ -45,6 +47,23 @@ def chosen_format(path: Path | None, *, urdf: bool, mjcf: bool) -> Format | None
     return next(
         (form for form in FORMATS.values() if path is not None and path.suffix == form.suffix), None
     )
+
+
+def left_out(servo: Servo, form: Format) -> list[str]:
+    """Returns what a format cannot say of the servos, and a robot's file can."""
+    viscous = form.name == "mjcf"  # which has it as the joint's damping
+    load = replace(servo, viscous_friction=0.0) if viscous else servo
+    facts = {
+        "friction that depends on load and speed": has_measured_friction(load),
+        "the limits of the motor's voltage": servo.drive == "motor",
+        "heat": servo.drive == "motor" and servo.winding_capacity > 0.0,
+        "the supply's resistance": servo.drive == "motor" and servo.supply_resistance > 0.0,
+        "the bus and the steps of commands": servo.bus_period > 0.0 or servo.command_step > 0.0,
+        "the elasticity of the gears": servo.gear_stiffness > 0.0,
+        "backlash": servo.backlash > 0.0,
+        "the rotors' angular momentum": servo.gear_ratio != 0.0,
+    }
+    return [name for name, present in facts.items() if present]
 
 
 def export_description(robot: Robot, path: str | Path, form: Format) -> Path:

@@ -507,6 +507,10 @@ static const hxDefinition default_definition = {
     .servo.supply_resistance = 0.0,
     .servo.bus_period = 0.0,
     .servo.command_step = 0.0,
+    .servo.gear_stiffness = 0.0,
+    .servo.gear_damping = 0.0,
+    .servo.backlash = 0.0,
+    .servo.gear_ratio = 0.0,
 };
 
 void hx_definition_default(hxDefinition *definition) {
@@ -1105,6 +1109,10 @@ static const hxRange definition_ranges[] = {
     {"servo.supply_resistance", "ohm", 0.0, 1000000.0, offsetof(hxDefinition, servo.supply_resistance), 0},
     {"servo.bus_period", "s", 0.0, 1000.0, offsetof(hxDefinition, servo.bus_period), 0},
     {"servo.command_step", "rad", 0.0, 1.0, offsetof(hxDefinition, servo.command_step), 0},
+    {"servo.gear_stiffness", "N.m/rad", 0.0, 1000000000.0, offsetof(hxDefinition, servo.gear_stiffness), 0},
+    {"servo.gear_damping", "N.m.s/rad", 0.0, 1000000.0, offsetof(hxDefinition, servo.gear_damping), 0},
+    {"servo.backlash", "rad", 0.0, 1.0, offsetof(hxDefinition, servo.backlash), 0},
+    {"servo.gear_ratio", "", -1000000.0, 1000000.0, offsetof(hxDefinition, servo.gear_ratio), 0},
 };
 
 size_t hx_definition_ranges(const hxRange **range) {

@@ -657,6 +657,42 @@ static const hxVariable outputs[] = {
     {"RR.femur.remaining_rating", "1", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.remaining_rating[5][1]), HX_REAL, 0},
     {"RR.tibia.remaining_rating", "1", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.remaining_rating[5][2]), HX_REAL, 0},
     {"supply.voltage", "V", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.supply_voltage), HX_REAL, 1},
+    {"LF.coxa.gear_deflection", "rad", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.gear_deflection[0][0]), HX_REAL, 18},
+    {"LF.femur.gear_deflection", "rad", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.gear_deflection[0][1]), HX_REAL, 0},
+    {"LF.tibia.gear_deflection", "rad", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.gear_deflection[0][2]), HX_REAL, 0},
+    {"LM.coxa.gear_deflection", "rad", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.gear_deflection[1][0]), HX_REAL, 0},
+    {"LM.femur.gear_deflection", "rad", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.gear_deflection[1][1]), HX_REAL, 0},
+    {"LM.tibia.gear_deflection", "rad", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.gear_deflection[1][2]), HX_REAL, 0},
+    {"LR.coxa.gear_deflection", "rad", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.gear_deflection[2][0]), HX_REAL, 0},
+    {"LR.femur.gear_deflection", "rad", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.gear_deflection[2][1]), HX_REAL, 0},
+    {"LR.tibia.gear_deflection", "rad", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.gear_deflection[2][2]), HX_REAL, 0},
+    {"RF.coxa.gear_deflection", "rad", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.gear_deflection[3][0]), HX_REAL, 0},
+    {"RF.femur.gear_deflection", "rad", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.gear_deflection[3][1]), HX_REAL, 0},
+    {"RF.tibia.gear_deflection", "rad", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.gear_deflection[3][2]), HX_REAL, 0},
+    {"RM.coxa.gear_deflection", "rad", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.gear_deflection[4][0]), HX_REAL, 0},
+    {"RM.femur.gear_deflection", "rad", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.gear_deflection[4][1]), HX_REAL, 0},
+    {"RM.tibia.gear_deflection", "rad", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.gear_deflection[4][2]), HX_REAL, 0},
+    {"RR.coxa.gear_deflection", "rad", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.gear_deflection[5][0]), HX_REAL, 0},
+    {"RR.femur.gear_deflection", "rad", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.gear_deflection[5][1]), HX_REAL, 0},
+    {"RR.tibia.gear_deflection", "rad", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.gear_deflection[5][2]), HX_REAL, 0},
+    {"LF.coxa.motor_speed", "rad/s", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.motor_speed[0][0]), HX_REAL, 18},
+    {"LF.femur.motor_speed", "rad/s", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.motor_speed[0][1]), HX_REAL, 0},
+    {"LF.tibia.motor_speed", "rad/s", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.motor_speed[0][2]), HX_REAL, 0},
+    {"LM.coxa.motor_speed", "rad/s", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.motor_speed[1][0]), HX_REAL, 0},
+    {"LM.femur.motor_speed", "rad/s", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.motor_speed[1][1]), HX_REAL, 0},
+    {"LM.tibia.motor_speed", "rad/s", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.motor_speed[1][2]), HX_REAL, 0},
+    {"LR.coxa.motor_speed", "rad/s", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.motor_speed[2][0]), HX_REAL, 0},
+    {"LR.femur.motor_speed", "rad/s", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.motor_speed[2][1]), HX_REAL, 0},
+    {"LR.tibia.motor_speed", "rad/s", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.motor_speed[2][2]), HX_REAL, 0},
+    {"RF.coxa.motor_speed", "rad/s", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.motor_speed[3][0]), HX_REAL, 0},
+    {"RF.femur.motor_speed", "rad/s", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.motor_speed[3][1]), HX_REAL, 0},
+    {"RF.tibia.motor_speed", "rad/s", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.motor_speed[3][2]), HX_REAL, 0},
+    {"RM.coxa.motor_speed", "rad/s", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.motor_speed[4][0]), HX_REAL, 0},
+    {"RM.femur.motor_speed", "rad/s", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.motor_speed[4][1]), HX_REAL, 0},
+    {"RM.tibia.motor_speed", "rad/s", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.motor_speed[4][2]), HX_REAL, 0},
+    {"RR.coxa.motor_speed", "rad/s", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.motor_speed[5][0]), HX_REAL, 0},
+    {"RR.femur.motor_speed", "rad/s", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.motor_speed[5][1]), HX_REAL, 0},
+    {"RR.tibia.motor_speed", "rad/s", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.motor_speed[5][2]), HX_REAL, 0},
 };
 
 static const hxVariable parameters[] = {
@@ -1162,6 +1198,10 @@ static const hxVariable parameters[] = {
     {"servo.supply_resistance", "ohm", 0.0, 1000000.0, offsetof(struct hxVariables, definition.servo.supply_resistance), HX_REAL, 1},
     {"servo.bus_period", "s", 0.0, 1000.0, offsetof(struct hxVariables, definition.servo.bus_period), HX_REAL, 1},
     {"servo.command_step", "rad", 0.0, 1.0, offsetof(struct hxVariables, definition.servo.command_step), HX_REAL, 1},
+    {"servo.gear_stiffness", "N.m/rad", 0.0, 1000000000.0, offsetof(struct hxVariables, definition.servo.gear_stiffness), HX_REAL, 1},
+    {"servo.gear_damping", "N.m.s/rad", 0.0, 1000000.0, offsetof(struct hxVariables, definition.servo.gear_damping), HX_REAL, 1},
+    {"servo.backlash", "rad", 0.0, 1.0, offsetof(struct hxVariables, definition.servo.backlash), HX_REAL, 1},
+    {"servo.gear_ratio", "1", -1000000.0, 1000000.0, offsetof(struct hxVariables, definition.servo.gear_ratio), HX_REAL, 1},
 };
 
 static const hxVariable locals[] = {
@@ -1316,7 +1356,7 @@ const size_t hx_state_count = sizeof states / sizeof states[0];
 
 _Static_assert(sizeof states / sizeof states[0] == sizeof(hxCoordinates) / sizeof(double), "each state has its row");
 
-const char hx_default_guid[] = "{b6ed6bea-f10f-4d73-8f27-63141e1d1b94}";
+const char hx_default_guid[] = "{5d7c2ba1-3355-48e7-bad0-835c240b6d6e}";
 
 _Static_assert(HX_CONTACT_EXACT_RESTITUTION == 1, "ContactLaw");
 _Static_assert(HX_CONTACT_FLORES == 2, "ContactLaw");

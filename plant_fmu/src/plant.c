@@ -24,7 +24,7 @@ typedef struct {
 } hxSavedPlant;
 
 static const uint64_t magic = 0x74616c5064507868u; /* "hxPdPlat" */
-static const uint64_t saved_version = 14;
+static const uint64_t saved_version = 15;
 
 /* Returns the checksum of a saved plant's bytes behind it, of the ring those of its footprints. */
 static uint64_t checksum(const unsigned char *bytes, int footprints) {
@@ -440,6 +440,14 @@ static void switch_bodies(hxPlant *plant) {
   hx_kernel()->switch_contacts(model, &depths, &plant->footprints, &plant->state);
 }
 
+hxStatus hx_plant_check_coordinates(hxPlant *plant) {
+  if (!plant->model.elastic) return HX_OK;
+  return fail(plant, HX_INVALID_ARGUMENT,
+              "servo.gear_stiffness: got an elastic gear, whose rotors are no continuous states; "
+              "expected 0 (rigid gears) in model exchange and for derivatives; set it to 0, or use "
+              "co-simulation and differences");
+}
+
 void hx_plant_completed_step(hxPlant *plant, const hxInput *input) {
   hxCommand command;
   hx_command_from_input(&command, input, plant->state.time);
@@ -494,6 +502,8 @@ hxStatus hx_plant_tangent(hxPlant *plant, const hxInput *input, const hxInput *d
   static const hxCoordinates no_change;
   const double scale =
       largest(largest(0.0, d_input, sizeof *d_input / sizeof(double)), dx, HX_COORDINATES);
+  const hxStatus status = hx_plant_check_coordinates(plant);
+  if (status != HX_OK) return status;
   if (!isfinite(scale))
     return fail(plant, HX_INVALID_ARGUMENT,
                 "derivatives: got a direction that is not finite, expected finite numbers");

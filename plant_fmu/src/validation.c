@@ -73,6 +73,45 @@ static void check_servo(hxChecker *c, const hxDefinition *d) {
                   "more than servo.derate_temperature and servo.air_temperature");
   if (motor && !(d->servo.resistance > 0.0))
     hx_check_fail(c, "servo.resistance", d->servo.resistance, positive);
+  if (d->servo.gear_stiffness > 0.0 && !(d->servo.rotor_inertia > 0.0))
+    hx_check_fail(c, "servo.rotor_inertia", d->servo.rotor_inertia,
+                  "more than 0 with servo.gear_stiffness, whose gear moves the rotor");
+  if (d->servo.backlash > 0.0 && !(d->servo.gear_stiffness > 0.0))
+    hx_check_fail(c, "servo.gear_stiffness", d->servo.gear_stiffness,
+                  "more than 0 with servo.backlash, whose teeth meet elastically");
+}
+
+/* Returns s^T I^-1 s of an inertia I and the unit vector along an axis, 1/(kg m2). */
+static double compliance_about(const double I[6], const double axis[3]) {
+  const double xx = I[0], yy = I[1], zz = I[2], xy = I[3], xz = I[4], yz = I[5];
+  const double c[6] = {yy * zz - yz * yz, xx * zz - xz * xz, xx * yy - xy * xy,
+                       xz * yz - xy * zz, xy * yz - xz * yy, xy * xz - xx * yz};
+  const double det = xx * c[0] + xy * c[3] + xz * c[4];
+  const double x = axis[0], y = axis[1], z = axis[2];
+  const double form = c[0] * x * x + c[1] * y * y + c[2] * z * z +
+                      2.0 * (c[3] * x * y + c[4] * x * z + c[5] * y * z);
+  return form / (det * (x * x + y * y + z * z));
+}
+
+/* Fails for rotors that are heavier than the bodies which contain them: the inertia of each about
+ * its own axis is J_r/n^2, and the torso has six. */
+static void check_rotors(hxChecker *c, const hxDefinition *d) {
+  const double ratio = d->servo.gear_ratio;
+  double compliance = 0.0;
+  if (ratio == 0.0) return;
+  for (int leg = 0; leg < HX_LEGS; ++leg) {
+    const double yaw = d->leg[leg].hip_yaw, *a = d->leg[leg].link[0].axis;
+    const double axis[3] = {cos(yaw) * a[0] - sin(yaw) * a[1], sin(yaw) * a[0] + cos(yaw) * a[1],
+                            a[2]};
+    compliance = fmax(compliance, HX_LEGS * compliance_about(d->torso.inertia, axis));
+    for (int joint = 1; joint < HX_JOINTS; ++joint)
+      compliance = fmax(compliance, compliance_about(d->leg[leg].link[joint - 1].inertia,
+                                                     d->leg[leg].link[joint].axis));
+  }
+  if (d->servo.rotor_inertia * compliance >= ratio * ratio)
+    hx_check_fail(c, "servo.gear_ratio", ratio,
+                  "0, or turns so many that rotor_inertia over their square is less than the "
+                  "inertia of every body that contains a rotor");
 }
 
 /* Checks conditions between several numbers that are within their ranges. */
@@ -80,6 +119,7 @@ static void check_relations(hxChecker *c, const hxDefinition *d) {
   check_inertia(c, "torso.inertia_xx", d->torso.inertia);
   check_legs(c, d);
   check_servo(c, d);
+  if (c->status == HX_OK) check_rotors(c, d);
   if ((d->contact.law == HX_CONTACT_EXACT_RESTITUTION || d->contact.law == HX_CONTACT_FLORES) &&
       d->contact.restitution < 1e-3)
     hx_check_fail(c, "contact.restitution", d->contact.restitution,

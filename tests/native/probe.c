@@ -91,6 +91,7 @@ static const ProbeField fields[] = {
     FIELD(hxDefinition, servo.friction_speed),
     FIELD(hxDefinition, servo.supply_resistance),
     FIELD(hxDefinition, servo.command_step),
+    FIELD(hxDefinition, servo.gear_ratio),
     FIELD(hxDefinition, baumgarte.alpha),
     FIELD(hxDefinition, baumgarte.beta),
     FIELD(hxDefinition, gravity),
@@ -188,6 +189,7 @@ static const ProbeField fields[] = {
     FIELD(hxOutput, electrical_power),
     FIELD(hxOutput, remaining_rating),
     FIELD(hxOutput, supply_voltage),
+    FIELD(hxOutput, motor_speed),
 };
 
 /* Returns the name of the i-th field, its offset and size; NULL past the last. */

@@ -60,7 +60,9 @@ def logarithmic(low: float, high: float, seed: int) -> Array:
 
 
 def ground(law: str) -> dict[str, dict[str, Any]]:
-    """Returns the sections of a friction law, or of soil under the feet."""
+    """Returns the sections of a friction law, of elastic gears, or of soil under the feet."""
+    if law == "gears":
+        return {"servo": {"gear_stiffness": 400.0, "backlash": 0.01, "gear_ratio": 200.0}}
     if law != "soil":
         return {"friction": {"law": law}}
     return {"soil": asdict(soil_preset("sandy_loam").soil), "foot": {"pad_radius": 0.02}}
@@ -119,7 +121,7 @@ def test_smaller_larger_and_absolute_value_are_taken_lane_by_lane(core: ct.CDLL)
 
 @pytest.mark.parametrize("width", WIDTHS)
 @pytest.mark.parametrize("method", ["rosw3", "dp54"])
-@pytest.mark.parametrize("law", ["tanh", "bristle", "soil"])
+@pytest.mark.parametrize("law", ["tanh", "bristle", "soil", "gears"])
 def test_the_motion_does_not_depend_on_the_lane_width(
     core: ct.CDLL, other_cores: dict[str, ct.CDLL], width: str, method: str, law: str
 ) -> None:
@@ -140,7 +142,7 @@ def test_the_motion_does_not_depend_on_the_lane_width(
 
 @pytest.mark.parametrize("width", WIDTHS)
 @pytest.mark.parametrize("garbage", [0x00, 0xFF])
-@pytest.mark.parametrize("law", ["tanh", "bristle", "soil"])
+@pytest.mark.parametrize("law", ["tanh", "bristle", "soil", "gears"])
 def test_what_lies_on_the_stack_and_in_the_work_space_does_not_matter(
     core: ct.CDLL, other_cores: dict[str, ct.CDLL], width: str, garbage: int, law: str
 ) -> None:

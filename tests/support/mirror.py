@@ -97,7 +97,7 @@ HxDefinition = record(
                 "stribeck_exponent friction_speed winding_capacity housing_capacity "
                 "winding_to_housing housing_to_air air_temperature start_temperature "
                 "derate_temperature temperature_max supply_resistance "
-                "bus_period command_step"
+                "bus_period command_step gear_stiffness gear_damping backlash gear_ratio"
             ),
         ),
     ),
@@ -223,4 +223,6 @@ HxOutput = record(
     ("housing_temperature", PerJoint),
     ("remaining_rating", PerJoint),
     ("supply_voltage", Real),
+    ("gear_deflection", PerJoint),
+    ("motor_speed", PerJoint),
 )

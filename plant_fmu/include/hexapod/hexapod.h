@@ -203,6 +203,12 @@ typedef struct hxDefinition {
     /* how commands reach the servos, but in kinematic mode */
     double bus_period;   /* s    from one transmission to the next; 0: at every call */
     double command_step; /* rad  angles are rounded to multiples of it; 0: they are not */
+    /* gear between rotor and link, but in kinematic mode (eq. 54-56) */
+    double gear_stiffness; /* N m/rad    0: rigid; else rotor_inertia is > 0 */
+    double gear_damping;   /* N m s/rad */
+    double backlash;       /* rad        play of the elastic gear, from side to side */
+    double gear_ratio;     /* 1  turns of the rotor for one of the joint, < 0: against it; 0: the
+                            *    rotor's angular momentum is left out (eq. 57, 58) */
   } servo;
   struct {
     double alpha, beta; /* 1/s */
@@ -291,7 +297,7 @@ typedef struct hxOutput {
   } imu;
   struct {
     double kinetic;       /* J  bodies and rotors */
-    double potential;     /* J  gravity and the elastic parts of contacts and stops */
+    double potential;     /* J  gravity and the elastic parts of contacts, stops and gears */
     double actuator_work; /* J  by the motors on the joints */
     double push_work;     /* J  by push_force and push_torque */
     double dissipated;    /* J  in contact, friction (with bristles' energy) and gears */
@@ -315,6 +321,8 @@ typedef struct hxOutput {
   double housing_temperature[HX_LEGS][HX_JOINTS]; /* K */
   double remaining_rating[HX_LEGS][HX_JOINTS]; /* 1  of the winding's rise over the air, 0 to 1 */
   double supply_voltage; /* V  of all servos, under the currents at the start of the last call */
+  double gear_deflection[HX_LEGS][HX_JOINTS]; /* rad    rotor less link; 0 of a rigid gear */
+  double motor_speed[HX_LEGS][HX_JOINTS];     /* rad/s  of the rotor, seen at the joint */
 } hxOutput;
 
 enum { HX_FOOTPRINTS = 512 }; /* footprints that a plant keeps; older ones are forgotten */
@@ -408,6 +416,10 @@ HX_API void hx_plant_get_coordinates(const hxPlant *plant, hxCoordinates *x);
 HX_API hxStatus hx_plant_set_coordinates(hxPlant *plant, double t,
                                          const hxCoordinates *x); /* contacts stay */
 
+/* Returns HX_OK if the coordinates are the whole state. With elastic gears they are not: model
+ * exchange and derivatives are then refused with HX_INVALID_ARGUMENT. */
+HX_API hxStatus hx_plant_check_coordinates(hxPlant *plant);
+
 /* Reports that the importer's solver has completed its step to the present coordinates. Peaks,
  * integrals and losses of hxOutput belong to the path between two such calls and do not change
  * without them. The works in the coordinates are the solver's own. Torso, knees and shanks, which
@@ -424,7 +436,7 @@ HX_API int hx_plant_update_contacts(hxPlant *plant);        /* 1: bristles chang
 /* Computes derivatives of rates and outputs along a direction of input and coordinates, with
  * contacts held. They are exact to rounding (complex step, lanes/complex_step.h); contact flags
  * and the solver's counters have derivative 0. Changes and results may be NULL. Returns
- * HX_INVALID_ARGUMENT where the compiler has no complex numbers (MSVC). */
+ * HX_INVALID_ARGUMENT where the compiler has no complex numbers (MSVC), and with elastic gears. */
 HX_API hxStatus hx_plant_tangent(hxPlant *plant, const hxInput *input, const hxInput *d_input,
                                  const hxCoordinates *dx, hxCoordinates *d_rate,
                                  hxOutput *d_output);

@@ -17,7 +17,8 @@ static const double touch_depth[2] = {
 
 /* Scales of the error norm (eq. 22): 0.1 m, 1 (quaternion), 1 m/s and 10 rad/s. */
 static const double error_scale[HX_BODY_STATE] = {0.1, 0.1, 0.1, 1, 1, 1, 1, 1, 1, 1, 10, 10, 10};
-static const double bristle_scale = 10.0; /* 1  in preslidings */
+static const double bristle_scale = 10.0;                       /* 1  in preslidings */
+static const double deflection_scale = 0.1, motor_scale = 10.0; /* rad, rad/s  of elastic gears */
 
 typedef struct {
   hxPlantMotion y;
@@ -107,10 +108,26 @@ static inline void combine(const hxModel *model, double *out, const double *base
   if (has_bristles(model, HX_FOOT))
     combine_n(out + END - first, base ? base + END - first : NULL, h, weights, k, n, END,
               HX_BRISTLE_SIZE);
+  if (model->elastic)
+    combine_n(out + END + HX_BRISTLE_SIZE - first,
+              base ? base + END + HX_BRISTLE_SIZE - first : NULL, h, weights, k, n,
+              END + HX_BRISTLE_SIZE, HX_GEAR_SIZE);
 }
 
 /* Returns the larger number; a if b is NaN. */
 static inline double larger_of(double a, double b) { return b > a ? b : a; }
+
+/* Returns the largest error of elastic gears over its scale. */
+HX_RARE hxReal gear_error(const hxPlantMotion *error) {
+  hxReal largest = hx_splat(0.0);
+  for (int joint = 0; joint < HX_JOINTS; ++joint)
+    for (int slot = 0; slot < HX_PACKS * HX_LANES; slot += HX_LANES) {
+      const hxReal moved = hx_abs(hx_load(&error->deflection[joint][slot])),
+                   faster = hx_abs(hx_load(&error->motor_speed[joint][slot]));
+      largest = hx_max(largest, hx_max(1.0 / deflection_scale * moved, 1.0 / motor_scale * faster));
+    }
+  return largest;
+}
 
 /* Returns the largest error over scale and tolerance (eq. 22). NaN is ignored; advance() checks
  * for it. */
@@ -129,6 +146,7 @@ static double error_norm(const hxModel *model, const hxPlantMotion *error) {
     for (int slot = 0; slot < HX_PACKS * HX_LANES; slot += HX_LANES)
       links = hx_max(links, 1.0 / (bristle_scale * model->bristle_length) *
                                 hx_abs(hx_load(&error->bristle[i][slot])));
+  if (model->elastic) links = hx_max(links, gear_error(error));
   hx_store(largest, links);
   for (int lane = 0; lane < HX_LANES; ++lane) worst = larger_of(worst, largest[lane]);
   return worst / model->tolerance;
@@ -204,7 +222,8 @@ static void try_step(const hxStart *start, double h, hxState *state, hxTrial *tr
     state->evaluations += 1.0;
   }
   /* y_1 = y_0 + sum b_i k_i, error = |sum e_i k_i| */
-  memcpy(trial->y.bristle, start->y->bristle, sizeof trial->y.bristle);
+  memcpy(trial->y.bristle, start->y->bristle,
+         sizeof trial->y - offsetof(hxPlantMotion, bristle)); /* and the gears */
   combine(model, trial->y.y, start->y->y, h, m->b, k, m->stages, HX_TURN_SIZE);
   trial->error = 0.0;
   if (m->error_order > 0 && model->step == 0.0) {

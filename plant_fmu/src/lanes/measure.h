@@ -155,6 +155,10 @@ static inline double hx_moment_and_bound(const hxModel *model, const hxModel *wh
   if (model->torso_rows) torso_moment(model, state, motion, all, &torso, moment);
   if (whole && whole->torso_rows) bound = torso_depth_bound(whole, motion, &torso.R_WB, bound);
   moment->stale = 0.0;
+  if (model->elastic) {
+    memcpy(moment->deflection, motion->deflection, sizeof moment->deflection);
+    memcpy(moment->motor_speed, motion->motor_speed, sizeof moment->motor_speed);
+  }
   return hx_largest_lane(bound);
 }
 
@@ -170,6 +174,7 @@ static inline void hx_copy_moment(const hxModel *model, hxMoment *to, const hxMo
   for (int k = 1; k < model->rows + model->torso_rows; ++k)
     to->contact[model->row[k]] = from->contact[model->row[k]];
   if (model->foot_rows > 1) memcpy(to->share, from->share, sizeof to->share);
+  if (model->elastic) hx_copy_gears(to, from);
 }
 
 /* Copies the places of feet, and of bodies where the ground has materials, and computes how far
@@ -394,6 +399,28 @@ HX_RARE void add_stop_works(const hxPath *path, const hxImpulses *impulse, int p
   }
 }
 
+/* Returns the mean of the rotor's speeds at both ends, which with a rigid gear are the joint's. */
+static inline hxReal mean_motor_speed(const hxPath *path, int joint, int slot) {
+  return path->model->elastic
+             ? mean_of(&path->from->motor_speed[joint][slot], &path->to->motor_speed[joint][slot])
+             : mean_of(&path->from->speed[joint][slot], &path->to->speed[joint][slot]);
+}
+
+/* Adds what the dampers of the elastic gears of a pack of legs lose in a step: the work on the
+ * gears less what they store. */
+HX_RARE void add_spring_works(const hxPath *path, const hxImpulses *impulse, int pack,
+                              hxStepWorks *works) {
+  const int slot = pack * HX_LANES;
+  for (int joint = 0; joint < HX_JOINTS; ++joint) {
+    const hxReal faster = mean_motor_speed(path, joint, slot) -
+                          mean_of(&path->from->speed[joint][slot], &path->to->speed[joint][slot]);
+    const hxReal before = hx_load(&path->from->deflection[joint][slot]),
+                 after = hx_load(&path->to->deflection[joint][slot]);
+    const hxReal stored = hx_gear_energy(path->model, after) - hx_gear_energy(path->model, before);
+    works->gear[pack] += impulse->spring[joint][pack] * faster - stored;
+  }
+}
+
 /* Adds what spin and rolling friction of a pack of feet lose in a step. */
 HX_RARE void add_turning_works(const hxPath *path, const hxImpulses *impulse, int pack,
                                hxStepWorks *works) {
@@ -405,13 +432,12 @@ HX_RARE void add_turning_works(const hxPath *path, const hxImpulses *impulse, in
 /* Computes works and losses of a step from its impulses (eq. 27). */
 static inline void hx_step_works(const hxPath *path, const hxImpulses *impulse,
                                  hxStepWorks *works) {
-  const hxMoment *from = path->from, *to = path->to;
   const hxReal per_step = hx_splat(1.0 / path->h);
   for (int pack = 0; pack < HX_PACKS; ++pack) {
     const int slot = pack * HX_LANES;
     works->gear[pack] = hx_splat(0.0);
     for (int joint = 0; joint < HX_JOINTS; ++joint) {
-      const hxReal speed = mean_of(&from->speed[joint][slot], &to->speed[joint][slot]);
+      const hxReal speed = mean_motor_speed(path, joint, slot);
       works->motor[joint][pack] = impulse->motor[joint][pack] * speed;
       works->mean_torque[joint][pack] = impulse->motor[joint][pack] * per_step;
       works->gear[pack] -= impulse->gear[joint][pack] * speed;
@@ -420,6 +446,7 @@ static inline void hx_step_works(const hxPath *path, const hxImpulses *impulse,
                   &works->friction[pack]);
     if (path->model->rows > 1) add_further_works(path, pack, impulse, works);
     if (path->model->stops) add_stop_works(path, impulse, pack, works);
+    if (path->model->elastic) add_spring_works(path, impulse, pack, works);
     if (has_turning_friction(path->model, HX_FOOT)) add_turning_works(path, impulse, pack, works);
   }
   works->torso_contact = works->torso_friction = 0.0;
@@ -460,6 +487,17 @@ static inline void warm_servo(const hxPath *path, int joint, int slot, hxReal co
   hx_store(&measured->housing[joint][slot], 2.0 * mean_housing - housing);
 }
 
+/* Returns how fast a rotor behind an elastic gear turns at x in [0, 1], rad per step; rise: of the
+ * joint's angle. */
+HX_RARE hxReal motor_rate(const hxPath *path, int joint, int slot, hxReal rise, double x) {
+  const hxReal h = hx_splat(path->h);
+  const hxReal deflected =
+      hx_load(&path->to->deflection[joint][slot]) - hx_load(&path->from->deflection[joint][slot]);
+  return cubic(hx_splat(0.0), h * hx_load(&path->from->motor_speed[joint][slot]), rise + deflected,
+               h * hx_load(&path->to->motor_speed[joint][slot]), x)
+      .rate;
+}
+
 /* Measures one joint: positive and negative work, whose difference is the step's work, and the
  * integral of the squared torque, which it returns, N2 m2 s. */
 static inline hxReal measure_joint(const hxPath *path, int joint, int slot, hxReal work,
@@ -474,7 +512,10 @@ static inline hxReal measure_joint(const hxPath *path, int joint, int slot, hxRe
   for (int node = 0; node <= INTERVALS; node += MOTOR_STRIDE) {
     const hxCommand *command = path->command[node];
     const hxCubic q = cubic(angle, slope_from, rise, slope_to, (double)node / INTERVALS);
-    const hxReal speed = per_step * q.rate, weight = hx_splat(path->h * motor_weight[node]);
+    const hxReal speed =
+        per_step *
+        (model->elastic ? motor_rate(path, joint, slot, rise, (double)node / INTERVALS) : q.rate);
+    const hxReal weight = hx_splat(path->h * motor_weight[node]);
     hxReal torque = mean_torque; /* a kinematic drive has no torque law */
     if (model->servo_mode != HX_SERVO_KINEMATIC)
       torque =
@@ -509,7 +550,7 @@ HX_RARE void warm_servos(const hxPath *path, int pack, const hxImpulses *impulse
   const double per_square = model->resistance / (model->torque_constant * model->torque_constant);
   const int slot = pack * HX_LANES;
   for (int joint = 0; joint < HX_JOINTS; ++joint) {
-    const hxReal speed = mean_of(&path->from->speed[joint][slot], &path->to->speed[joint][slot]);
+    const hxReal speed = mean_motor_speed(path, joint, slot);
     const hxReal gear = -impulse->gear[joint][pack] * speed;
     warm_servo(path, joint, slot, per_square * squared[joint], gear, measured);
   }

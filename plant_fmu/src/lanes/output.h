@@ -26,6 +26,18 @@ static hxReal body_kinetic(hxReal mass, hxSym3 J, hxVec3 v, hxVec3 w) {
   return 0.5 * (mass * hx_dot(v, v) + hx_dot(w, hx_sym_mul(J, w)));
 }
 
+/* Returns the part of the kinetic energy by which the rotors of a leg turn with the bodies that
+ * carry them, h s.w_i (eq. 57), J. */
+static hxReal spin_energy(const hxModel *model, const hxBody *torso, const hxLegWork *leg) {
+  hxReal energy = hx_splat(0.0);
+  for (int joint = 0; joint < HX_JOINTS; ++joint) {
+    const hxVec3 w = joint > 0 ? leg->joint[joint - 1].body.w : torso->w;
+    energy += model->spin_inertia * leg->joint[joint].motor_speed *
+              hx_dot(leg->joint[joint].sweep.S.ang, w);
+  }
+  return energy;
+}
+
 /* Returns the kinetic energy of bodies and rotors, J. */
 static hxNumber hx_kinetic_energy(const hxModel *model, const hxPlantMotion *motion,
                                   const hxWork *work) {
@@ -38,10 +50,11 @@ static hxNumber hx_kinetic_energy(const hxModel *model, const hxPlantMotion *mot
       const hxJointWork *k = &work->pack[pack].joint[joint];
       const int slot = pack * HX_LANES;
       const hxReal mass = hx_load(&model->joint[joint].mass[slot]);
-      const hxReal rotor = (0.5 * model->rotor_inertia) * k->speed * k->speed;
+      const hxReal rotor = (0.5 * model->rotor_inertia) * k->motor_speed * k->motor_speed;
       legs[pack] +=
           body_kinetic(mass, k->J, hx_link_vec3(motion, joint, HX_V, slot), k->body.w) + rotor;
     }
+    if (model->spin) legs[pack] += spin_energy(model, &work->torso, &work->pack[pack]);
   }
   return hx_lane(torso + hx_sum_legs(legs), 0);
 }
@@ -79,6 +92,8 @@ static hxNumber hx_potential_energy(const hxModel *model, const hxPlantMotion *m
     legs[pack] = model->has_soil ? contact[HX_FOOT].stored : elastic_energy(&contact[HX_FOOT]);
     for (int k = 1; k < model->rows; ++k) legs[pack] += elastic_energy(&contact[model->row[k]]);
     if (model->stops) legs[pack] += stop_energy(model, &work->pack[pack], slot);
+    for (int joint = 0; model->elastic && joint < HX_JOINTS; ++joint)
+      legs[pack] += hx_gear_energy(model, work->pack[pack].joint[joint].rotor.deflection);
     for (int joint = 0; joint < HX_JOINTS; ++joint)
       legs[pack] -= hx_load(&model->joint[joint].mass[slot]) *
                     hx_dot(g, hx_link_vec3(motion, joint, HX_R, slot));
@@ -112,7 +127,9 @@ static void fill_joint(const hxModel *model, const hxState *state, const hxJoint
   o->torque[leg][joint] = hx_lane(k->servo.torque, lane);
   o->current[leg][joint] = hx_lane(hx_motor_current(model, k->servo.torque), lane);
   o->electrical_power[leg][joint] =
-      hx_lane(hx_electrical_power(model, k->servo.torque, k->speed), lane);
+      hx_lane(hx_electrical_power(model, k->servo.torque, k->motor_speed), lane);
+  o->gear_deflection[leg][joint] = model->elastic ? hx_lane(k->rotor.deflection, lane) : 0.0;
+  o->motor_speed[leg][joint] = hx_lane(k->motor_speed, lane);
   o->positive_work[leg][joint] = state->measured.positive_work[joint][leg];
   o->negative_work[leg][joint] = state->measured.negative_work[joint][leg];
   o->torque_squared[leg][joint] = state->measured.torque_squared[joint][leg];
@@ -330,7 +347,7 @@ static void hx_integral_rates_fill(const hxModel *model, const hxContactState *s
     const hxLegWork *w = leg_work(work, leg, &lane);
     for (int joint = 0; joint < HX_JOINTS; ++joint) {
       const double torque = hx_lane(w->joint[joint].servo.torque, lane),
-                   power = torque * hx_lane(w->joint[joint].speed, lane);
+                   power = torque * hx_lane(w->joint[joint].motor_speed, lane);
       rate->positive_work[leg][joint] = fmax(power, 0.0);
       rate->negative_work[leg][joint] = fmax(-power, 0.0);
       rate->torque_squared[leg][joint] = torque * torque;
