@@ -566,6 +566,24 @@ static const hxVariable outputs[] = {
     {"RF.clearance", "m", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.body.clearance[3]), HX_REAL, 0},
     {"RM.clearance", "m", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.body.clearance[4]), HX_REAL, 0},
     {"RR.clearance", "m", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.body.clearance[5]), HX_REAL, 0},
+    {"LF.neighbour_force[1]", "N", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.body.neighbour_force[0][0]), HX_REAL, 18},
+    {"LF.neighbour_force[2]", "N", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.body.neighbour_force[0][1]), HX_REAL, 0},
+    {"LF.neighbour_force[3]", "N", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.body.neighbour_force[0][2]), HX_REAL, 0},
+    {"LM.neighbour_force[1]", "N", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.body.neighbour_force[1][0]), HX_REAL, 0},
+    {"LM.neighbour_force[2]", "N", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.body.neighbour_force[1][1]), HX_REAL, 0},
+    {"LM.neighbour_force[3]", "N", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.body.neighbour_force[1][2]), HX_REAL, 0},
+    {"LR.neighbour_force[1]", "N", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.body.neighbour_force[2][0]), HX_REAL, 0},
+    {"LR.neighbour_force[2]", "N", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.body.neighbour_force[2][1]), HX_REAL, 0},
+    {"LR.neighbour_force[3]", "N", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.body.neighbour_force[2][2]), HX_REAL, 0},
+    {"RF.neighbour_force[1]", "N", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.body.neighbour_force[3][0]), HX_REAL, 0},
+    {"RF.neighbour_force[2]", "N", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.body.neighbour_force[3][1]), HX_REAL, 0},
+    {"RF.neighbour_force[3]", "N", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.body.neighbour_force[3][2]), HX_REAL, 0},
+    {"RM.neighbour_force[1]", "N", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.body.neighbour_force[4][0]), HX_REAL, 0},
+    {"RM.neighbour_force[2]", "N", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.body.neighbour_force[4][1]), HX_REAL, 0},
+    {"RM.neighbour_force[3]", "N", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.body.neighbour_force[4][2]), HX_REAL, 0},
+    {"RR.neighbour_force[1]", "N", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.body.neighbour_force[5][0]), HX_REAL, 0},
+    {"RR.neighbour_force[2]", "N", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.body.neighbour_force[5][1]), HX_REAL, 0},
+    {"RR.neighbour_force[3]", "N", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.body.neighbour_force[5][2]), HX_REAL, 0},
     {"LF.coxa.current", "A", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.current[0][0]), HX_REAL, 18},
     {"LF.femur.current", "A", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.current[0][1]), HX_REAL, 0},
     {"LF.tibia.current", "A", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.current[0][2]), HX_REAL, 0},
@@ -1107,7 +1125,7 @@ static const hxVariable parameters[] = {
     {"RR.femur.angle_max", "rad", -3.141592653589793, 3.141592653589793, offsetof(struct hxVariables, definition.leg[5].link[1].angle_max), HX_REAL, 0},
     {"RR.tibia.angle_max", "rad", -3.141592653589793, 3.141592653589793, offsetof(struct hxVariables, definition.leg[5].link[2].angle_max), HX_REAL, 0},
     {"body.contact", "", 1, 2, offsetof(struct hxVariables, definition.body.contact), HX_INTEGER, 1},
-    {"body.self_contact", "", 1, 2, offsetof(struct hxVariables, definition.body.self_contact), HX_INTEGER, 1},
+    {"body.self_contact", "", 1, 3, offsetof(struct hxVariables, definition.body.self_contact), HX_INTEGER, 1},
     {"body.torso_box[1]", "m", 0.0, 10.0, offsetof(struct hxVariables, definition.body.torso_box[0]), HX_REAL, 3},
     {"body.torso_box[2]", "m", 0.0, 10.0, offsetof(struct hxVariables, definition.body.torso_box[1]), HX_REAL, 0},
     {"body.torso_box[3]", "m", 0.0, 10.0, offsetof(struct hxVariables, definition.body.torso_box[2]), HX_REAL, 0},
@@ -1316,7 +1334,7 @@ const size_t hx_state_count = sizeof states / sizeof states[0];
 
 _Static_assert(sizeof states / sizeof states[0] == sizeof(hxCoordinates) / sizeof(double), "each state has its row");
 
-const char hx_default_guid[] = "{b6ed6bea-f10f-4d73-8f27-63141e1d1b94}";
+const char hx_default_guid[] = "{1bc5d2ba-c2e6-471d-ad01-fa469ca44e20}";
 
 _Static_assert(HX_CONTACT_EXACT_RESTITUTION == 1, "ContactLaw");
 _Static_assert(HX_CONTACT_FLORES == 2, "ContactLaw");
@@ -1348,6 +1366,7 @@ _Static_assert(HX_BODY_OFF == 1, "BodyContact");
 _Static_assert(HX_BODY_ON == 2, "BodyContact");
 _Static_assert(HX_SELF_OFF == 1, "SelfContact");
 _Static_assert(HX_SELF_WARN == 2, "SelfContact");
+_Static_assert(HX_SELF_FORCE == 3, "SelfContact");
 _Static_assert(HX_TERRAIN_FLAT == 1, "TerrainKind");
 _Static_assert(HX_TERRAIN_SLOPE == 2, "TerrainKind");
 _Static_assert(HX_TERRAIN_GRID == 3, "TerrainKind");

@@ -24,7 +24,7 @@ typedef struct {
 } hxSavedPlant;
 
 static const uint64_t magic = 0x74616c5064507868u; /* "hxPdPlat" */
-static const uint64_t saved_version = 14;
+static const uint64_t saved_version = 15;
 
 /* Returns the checksum of a saved plant's bytes behind it, of the ring those of its footprints. */
 static uint64_t checksum(const unsigned char *bytes, int footprints) {
@@ -130,6 +130,29 @@ static hxStatus check_start_depth(const hxPlant *plant, char message[HX_MESSAGE_
   return HX_OK;
 }
 
+/* Fails if lines of two legs are so near to each other that the contact law does not hold. */
+static hxStatus check_start_overlap(const hxPlant *plant, char message[HX_MESSAGE_SIZE]) {
+  static const char *part[] = {"femur", "tibia"};
+  hxDepths depths;
+  const hxModel *model = &plant->model;
+  if (!model->pair_rows) return HX_OK;
+  hx_kernel()->depths(model, &plant->state.contact, &plant->state.motion, &depths);
+  for (int pair = 0; pair < HX_PAIR_ROWS; ++pair) {
+    const double allowed = 0.5 * model->radius[HX_PAIR + pair];
+    for (int leg = 0; leg < HX_LEGS; ++leg)
+      if (depths.delta[HX_PAIR + pair][leg] > allowed && allowed > 0.0) {
+        hx_print(message, HX_MESSAGE_SIZE,
+                 "initial.%s: got its %s %.4g m inside the %s of leg %s, expected at most %.4g m, "
+                 "half the sum of their radii; move the legs apart, or reduce body.knee_radius or "
+                 "body.shank_radius",
+                 hx_leg_name(leg), part[pair / 2], depths.delta[HX_PAIR + pair][leg],
+                 part[pair % 2], hx_leg_name(hx_next_leg(leg)), allowed);
+        return HX_INVALID_MODEL;
+      }
+  }
+  return HX_OK;
+}
+
 hxStatus hx_plant_reset(hxPlant *plant, const hxDefinition *definition, double t) {
   char message[HX_MESSAGE_SIZE];
   double body[HX_BODIES][HX_BODY_STATE];
@@ -148,6 +171,7 @@ hxStatus hx_plant_reset(hxPlant *plant, const hxDefinition *definition, double t
   hx_motion_from_bodies(&plant->model, (const double (*)[HX_BODY_STATE])body, &plant->state.motion);
   hx_kernel()->start(&plant->model, t, &plant->state, plant->scratch);
   status = check_start_depth(plant, message); /* the cells of feet on blocks are known now */
+  if (status == HX_OK) status = check_start_overlap(plant, message);
   if (status != HX_OK) {
     plant->model = plant->model_before;
     plant->state = plant->state_before;
@@ -429,7 +453,7 @@ static const double switch_band = 1e-10;
 static void switch_bodies(hxPlant *plant) {
   hxDepths depths;
   const hxModel *model = &plant->model;
-  if (model->rows + model->torso_rows == 1) return;
+  if (model->listed == 1) return;
   hx_kernel()->depths(model, &plant->state.contact, &plant->state.motion, &depths);
   for (int leg = 0; leg < HX_LEGS; ++leg) {
     double *delta = &depths.delta[HX_FOOT][leg];
@@ -477,7 +501,7 @@ int hx_plant_update_contacts(hxPlant *plant) {
   double before[3][HX_SLOTS];
   memcpy(before, plant->state.motion.bristle, sizeof before);
   hx_kernel()->depths(model, &plant->state.contact, &plant->state.motion, &depths);
-  for (int k = 0; k < model->rows + model->torso_rows; ++k) {
+  for (int k = 0; k < model->listed; ++k) {
     const int row = model->row[k];
     for (int slot = 0; slot < hx_slots_of(row); ++slot)
       depths.delta[row][slot] = switching_depth(plant->state.contact.closed[row][slot] != 0.0,

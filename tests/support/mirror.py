@@ -200,6 +200,7 @@ HxOutput = record(
             ("knee_force", LegVectors),
             ("shank_force", LegVectors),
             ("clearance", PerLeg),
+            ("neighbour_force", LegVectors),
         ),
     ),
     ("imu", record("ImuOutput", ("specific_force", Vector3), ("angular_velocity", Vector3))),

@@ -63,7 +63,7 @@ typedef enum hxBodyContact { HX_BODY_OFF = 1, HX_BODY_ON } hxBodyContact;
 
 /* Whether a run warns of legs that overlap. The plant ignores it: there is no force between legs.
  */
-typedef enum hxSelfContact { HX_SELF_OFF = 1, HX_SELF_WARN } hxSelfContact;
+typedef enum hxSelfContact { HX_SELF_OFF = 1, HX_SELF_WARN, HX_SELF_FORCE } hxSelfContact;
 
 typedef enum hxServoMode { HX_SERVO_POSITION = 1, HX_SERVO_TORQUE, HX_SERVO_KINEMATIC } hxServoMode;
 
@@ -284,6 +284,7 @@ typedef struct hxOutput {
     double knee_force[HX_LEGS][3];  /* N  ground on the knee */
     double shank_force[HX_LEGS][3]; /* N  ground on the shank */
     double clearance[HX_LEGS]; /* m  from femur and tibia to those of the two neighbouring legs */
+    double neighbour_force[HX_LEGS][3]; /* N  of these legs on femur and tibia */
   } body;
   struct {
     double specific_force[3];   /* m/s2   torso axes, at the centre of mass */
