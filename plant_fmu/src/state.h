@@ -283,6 +283,9 @@ static inline void hx_copy_state(const hxModel *model, hxState *to, const hxStat
 /* Returns whether a row's contacts are those of feet. */
 static inline int hx_is_of_foot(int row) { return row < HX_KNEE; }
 
+/* Returns whether a row's contacts are those of feet with blocks beside them. */
+static inline int hx_is_wall(int row) { return row >= HX_WALL && row < HX_KNEE; }
+
 /* Makes the feet's penetrations relative to the depth at which they touch the ground. */
 static inline void hx_depths_on_soil(const hxContactState *contact, hxDepths *depths) {
   for (int slot = 0; slot < HX_SLOTS; ++slot)

@@ -224,4 +224,15 @@ HxOutput = record(
     ("housing_temperature", PerJoint),
     ("remaining_rating", PerJoint),
     ("supply_voltage", Real),
+    (
+        "depth",
+        record(
+            "Indicators",
+            ("foot", PerLeg),
+            ("knee", PerLeg),
+            ("shank", PerLeg),
+            ("torso", Real * 8),
+            ("neighbour", (Real * 4) * LEGS),
+        ),
+    ),
 )

@@ -24,6 +24,8 @@ extern "C" {
 
 enum {
   HX_BODIES = 1 + HX_LEGS * HX_JOINTS, /* 19 */
+  HX_CORNERS = 8,                      /* of the torso's box */
+  HX_NEIGHBOUR_PAIRS = 4,              /* of lines of a leg and its next leg */
   HX_BODY_STATE = 13,                  /* r[3] p[4] v[3] w[3] */
   HX_MULTIPLIERS = 5,                  /* per joint */
   HX_CONE_BINS = 31                    /* bins of the share of the friction cone that feet use */
@@ -243,6 +245,17 @@ typedef struct hxInput {
   double acceleration_ref[HX_LEGS][HX_JOINTS]; /* rad/s2  kinematic drives only */
 } hxInput;
 
+/* A number for each contact that events close and open. It consists of doubles only, in this order
+ * the event indicators of model exchange. */
+typedef struct hxIndicators {
+  double foot[HX_LEGS], knee[HX_LEGS], shank[HX_LEGS];
+  double torso[HX_CORNERS];
+  double neighbour[HX_LEGS][HX_NEIGHBOUR_PAIRS]; /* with the next leg: femur with femur, with tibia,
+                                                  * tibia with femur, with tibia */
+} hxIndicators;
+
+enum { HX_INDICATORS = sizeof(hxIndicators) / sizeof(double) };
+
 /* Outputs of the robot. Booleans are ints. Integrals run from the start. */
 typedef struct hxOutput {
   double time;                               /* s */
@@ -316,6 +329,7 @@ typedef struct hxOutput {
   double housing_temperature[HX_LEGS][HX_JOINTS]; /* K */
   double remaining_rating[HX_LEGS][HX_JOINTS]; /* 1  of the winding's rise over the air, 0 to 1 */
   double supply_voltage; /* V  of all servos, under the currents at the start of the last call */
+  hxIndicators depth;    /* m  of all contacts, < 0: clearance; -1 where the robot has none */
 } hxOutput;
 
 enum { HX_FOOTPRINTS = 512 }; /* footprints that a plant keeps; older ones are forgotten */
@@ -411,16 +425,16 @@ HX_API hxStatus hx_plant_set_coordinates(hxPlant *plant, double t,
 
 /* Reports that the importer's solver has completed its step to the present coordinates. Peaks,
  * integrals and losses of hxOutput belong to the path between two such calls and do not change
- * without them. The works in the coordinates are the solver's own. Torso, knees and shanks, which
- * have no indicators, touch and leave the ground at these calls. */
+ * without them. The works in the coordinates are the solver's own. Feet touch and leave the walls,
+ * edges and corners of blocks beside them, which have no indicators, at these calls. */
 HX_API void hx_plant_completed_step(hxPlant *plant, const hxInput *input);
 
-/* Compute the rates of the coordinates and the feet's indicators, and switch the contacts that are
- * due. */
+/* Compute the rates of the coordinates and the contacts' indicators, and switch the contacts that
+ * are due. */
 HX_API void hx_plant_rates(const hxPlant *plant, const hxInput *input, hxCoordinates *rate);
 HX_API void hx_plant_indicators(const hxPlant *plant,
-                                double indicator[HX_LEGS]); /* m  penetration +- 0.1 nm */
-HX_API int hx_plant_update_contacts(hxPlant *plant);        /* 1: bristles changed */
+                                hxIndicators *indicator); /* m  penetration +- 0.1 nm */
+HX_API int hx_plant_update_contacts(hxPlant *plant);      /* 1: bristles changed */
 
 /* Computes derivatives of rates and outputs along a direction of input and coordinates, with
  * contacts held. They are exact to rounding (complex step, lanes/complex_step.h); contact flags

@@ -221,6 +221,34 @@ static void fill_torso_contact(const hxModel *model, const hxWork *work, hxNumbe
   force[0] = hx_sum_slots(x), force[1] = hx_sum_slots(y), force[2] = hx_sum_slots(z);
 }
 
+/* Returns the penetration of a row of the tibia; -1 where the model has no such row. */
+static hxNumber depth_of_row(const hxModel *model, const hxLegWork *work, int row, int lane) {
+  for (int k = model->foot_rows; k < model->rows; ++k)
+    if (model->row[k] == row) return hx_lane(work->contact[row].kin.delta, lane);
+  return -1.0;
+}
+
+/* Fills the penetrations of all contacts. */
+static void fill_depths(const hxModel *model, const hxWork *work, hxIndicators *depth) {
+  for (int leg = 0; leg < HX_LEGS; ++leg) {
+    int lane;
+    const hxLegWork *w = leg_work(work, leg, &lane);
+    depth->foot[leg] = hx_lane(w->contact[HX_FOOT].kin.delta, lane);
+    depth->knee[leg] = depth_of_row(model, w, HX_KNEE, lane);
+    depth->shank[leg] = depth_of_row(model, w, HX_SHANK, lane);
+    for (int pair = 0; pair < HX_PAIR_ROWS; ++pair) {
+      depth->neighbour[leg][pair] = -1.0;
+      if (model->pair_rows)
+        depth->neighbour[leg][pair] = hx_lane(work->pair[pair][leg / HX_LANES].kin.delta, lane);
+    }
+  }
+  for (int slot = 0; slot < HX_CORNERS; ++slot) {
+    depth->torso[slot] = -1.0;
+    if (model->torso_rows)
+      depth->torso[slot] = hx_lane(work->torso_contact[slot / HX_LANES].kin.delta, slot % HX_LANES);
+  }
+}
+
 /* Fills the outputs of torso and IMU. */
 static void fill_torso(const hxPlantMotion *motion, const hxWork *work, hxOutput *o) {
   const hxNumber *m = motion->torso;
@@ -291,6 +319,7 @@ static void hx_output_fill(const hxModel *model, const hxState *state, const hxW
   fill_torso(&state->motion, work, o);
   fill_torso_contact(model, work, o->torso.contact_force);
   hx_clearances(model, &state->motion, work, o->body.clearance);
+  fill_depths(model, work, &o->depth);
   o->supply_voltage = 0.0; /* likewise: it belongs to the command */
   o->footprints = 0.0;     /* hx_plant_output() counts them: they are outside the state */
   for (int i = 0; i < HX_CONE_BINS; ++i) o->cone_time[i] = state->measured.cone_time[i];
