@@ -269,7 +269,7 @@ def test_a_foot_may_start_deeper_than_its_radius_in_soil_and_not_in_rigid_ground
 
 
 def test_the_soil_law_does_not_describe_the_spheres_of_the_torso() -> None:
-    """A corner's sphere carries less than a quarter of the robot, but its flat side hardly sinks."""
+    """A corner's sphere carries less than a quarter of the robot; its flat side hardly sinks."""
     robot = load_robot("athena")
     corner = replace(robot.foot, radius=robot.body.corner_radius, pad_radius=0.0)
     knee = replace(corner, radius=robot.body.knee_radius)
