@@ -37,7 +37,12 @@ from hexapod_cosim.models.servos.motor import (
     friction_torque,
     has_measured_friction,
 )
-from hexapod_cosim.models.touch.forces import Contacts, contact_wrenches, contacts_of
+from hexapod_cosim.models.touch.forces import (
+    Contacts,
+    contact_wrenches,
+    contacts_of,
+    standing_pairs,
+)
 
 MULTIPLIERS = 5
 
@@ -223,13 +228,14 @@ def applied_forces(
     damping: of the feet on the ground below them (6,) [s/m], nan for open ones; or the state of all
     contacts, which holds those of walls, materials and soil, too. bristle: deflections (6, 3) [m],
     0 by default. body_damping: with an array of damping alone, that of torso, knees and shanks
-    [s/m], in the order of `body_spheres`; None: `standing_body_damping`. rotors: of elastic gears;
-    None: rigid.
+    [s/m], in the order of `body_spheres`; None: `standing_body_damping`. Legs that overlap then
+    touch as in `standing_pairs`. rotors: of elastic gears; None: rigid.
     """
     if not isinstance(damping, Contacts):
         if body_damping is None:
             body_damping = standing_body_damping(robot, body)
-        damping = contacts_of(robot, damping, body_damping)
+        pairs = standing_pairs(robot, body)
+        damping = replace(contacts_of(robot, damping, body_damping), pairs=pairs)
     g = np.zeros((BODIES, 6))
     g[:, 0:3] = masses(robot)[:, None] * np.array(robot.gravity)
     J, w = world_inertias(robot, body), body[:, 10:13]

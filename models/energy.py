@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from hexapod_cosim.models.actuator import stop_energy
+from hexapod_cosim.models.body.pairs import pair_contacts
 from hexapod_cosim.models.dynamics import (
     carried_turns,
     constraints,
@@ -40,17 +41,19 @@ def kinetic_energy(robot: Robot, body: Array, rotors: Rotors | None = None) -> f
 
 def potential_energy(robot: Robot, body: Array, rotors: Rotors | None = None) -> float:
     """Returns the potential energy [J] of gravity, 0 at the world's origin, of the contacts with
-    rigid ground, 2/5 w K delta^2.5 each with its share w, of the joints' stops, and of elastic
-    gears with these rotors.
+    rigid ground, 2/5 w K delta^2.5 each with its share w, of those between legs, of the joints'
+    stops, and of elastic gears with these rotors.
     """
     gravity = -float(masses(robot) @ (body[:, 0:3] @ np.array(robot.gravity)))
     open_ = open_contacts(robot)
     contacts = contacts_at(robot, body, open_)
     shares = shares_of_feet(robot, list(zip(spots(robot), open_.held, contacts, strict=True)))
     depth = np.array([max(contact.penetration, 0.0) for contact in contacts])
+    pairs = np.array([max(contact.penetration, 0.0) for contact in pair_contacts(robot, body)])
     stops = float(np.sum(stop_energy(robot.servo, joint_overruns(robot, body))))
     gears = 0.0 if rotors is None else float(np.sum(gear_energy(robot.servo, rotors.deflection)))
-    return gravity + 0.4 * robot.contact.stiffness * float(shares @ depth**2.5) + stops + gears
+    elastic = float(shares @ depth**2.5) + float(np.sum(pairs**2.5))
+    return gravity + 0.4 * robot.contact.stiffness * elastic + stops + gears
 
 
 def centre_of_mass(robot: Robot, body: Array) -> Array:

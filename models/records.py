@@ -43,7 +43,7 @@ SERVO_DRIVES = ("line", "motor")
 METHODS = ("rosw3", "ros2", "dp54", "bs32", "rk4")
 PROJECTIONS = ("none", "step")
 BODY_CONTACTS = ("off", "on")
-SELF_CONTACTS = ("off", "warn")
+SELF_CONTACTS = ("off", "warn", "force")
 TERRAINS = ("flat", "slope", "grid")
 PLANES = ("flat", "slope")  # kinds of ground without a surface
 SOIL_LAWS = ("none", "bekker", "granular", "mud")
@@ -125,7 +125,7 @@ class BodyContact:
     """
 
     contact: Annotated[str, Choice(BODY_CONTACTS, default="off")] = "off"
-    # whether a run warns of neighbouring legs that overlap
+    # whether a run warns of neighbouring legs that overlap, or these push each other
     self_contact: Annotated[str, Choice(SELF_CONTACTS, default="off")] = "off"
     # half edges of a box along the torso's axes, with a sphere around each corner
     torso_box: Annotated[Vector3, Vector("m", 3, default=(0.0, 0.0, 0.0))] = (0.0, 0.0, 0.0)

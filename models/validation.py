@@ -400,6 +400,14 @@ def _check_body(body: BodyContact, where: str) -> None:
             fix="give the robot's sizes, or leave body.contact off",
             where=where + ".contact",
         )
+    if body.self_contact == "force" and not any((body.knee_radius, body.shank_radius)):
+        raise RobotError(
+            "forces between legs without a radius",
+            got="knee_radius and shank_radius of 0",
+            expected="at least one of them > 0 m: they are those of femurs and tibias",
+            fix="give the robot's radii, or set body.self_contact to off or warn",
+            where=where + ".self_contact",
+        )
 
 
 def _check_static_friction(friction: Friction, where: str) -> None:

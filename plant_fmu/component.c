@@ -212,7 +212,7 @@ static hxStatus set_state(hxComponent *component, const struct hxVariables *vari
 
 static void rates(hxComponent *component, struct hxVariables *variables) {
   hx_plant_rates(plant_of(component), &variables->input, &variables->rate);
-  hx_plant_indicators(const_plant(component), variables->indicator);
+  hx_plant_indicators(const_plant(component), &variables->indicator);
 }
 
 static void completed(hxComponent *component, const struct hxVariables *variables) {
@@ -225,7 +225,9 @@ static hxStatus step(hxComponent *component, const struct hxVariables *variables
 }
 
 static void indicate(const hxComponent *component, double indicator[]) {
-  hx_plant_indicators(const_plant(component), indicator);
+  hxIndicators all;
+  hx_plant_indicators(const_plant(component), &all);
+  memcpy(indicator, &all, sizeof all);
 }
 
 /* Updates the contacts; bristles are the only states that an event sets. */
@@ -241,7 +243,7 @@ static hxStatus tangent(hxComponent *component, const struct hxVariables *variab
                         const struct hxVariables *change, struct hxVariables *result) {
   const hxStatus status = hx_plant_tangent(plant_of(component), &variables->input, &change->input,
                                            &change->state, &result->rate, &result->output);
-  memcpy(result->indicator, result->output.foot.penetration, sizeof result->indicator);
+  result->indicator = result->output.depth;
   return status;
 }
 
@@ -253,7 +255,7 @@ static void integrals(hxComponent *component, const struct hxVariables *variable
 static const hxContinuous continuous = {
     .state = offsetof(struct hxVariables, state),
     .rate = offsetof(struct hxVariables, rate),
-    .indicators = HX_LEGS,
+    .indicators = HX_INDICATORS,
     .check = check_states,
     .get = get_state,
     .set = set_state,

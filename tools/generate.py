@@ -113,7 +113,7 @@ def render_structure(component: Component) -> str:
             "  hxCoordinates state, rate; /* of model exchange: continuous states and their "
             "derivatives */"
         )
-        lines += ["  double indicator[HX_LEGS]; /* events are its changes of sign */"]
+        lines += ["  hxIndicators indicator; /* events are their changes of sign */"]
     return "\n".join([*lines, "};", "", "#endif", ""])
 
 

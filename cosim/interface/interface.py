@@ -137,7 +137,7 @@ class Interface:
     variables: tuple[Variable, ...]
     states: tuple[State, ...]  # in the order in which importers exchange them
     event_indicators: int
-    indicator_pattern: str | None  # the pattern whose variables are the event indicators
+    indicator_patterns: tuple[str, ...]  # those whose variables are the event indicators
     patterns: tuple[Pattern, ...]
     units: tuple[Unit, ...]
     enumerations: Mapping[str, Enumeration]
@@ -223,7 +223,7 @@ def expand_interface(component: Component, robot: Robot, roots: SimpleNamespace)
         variables=variables,
         states=tuple(_states(table)),
         event_indicators=table["event"]["indicators"] if "event" in table else 0,
-        indicator_pattern=table["event"]["shown_by"] if "event" in table else None,
+        indicator_patterns=tuple(table["event"]["shown_by"]) if "event" in table else (),
         patterns=tuple(
             _pattern(entry, causality, table["axis"])
             for causality in CAUSALITIES

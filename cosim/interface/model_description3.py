@@ -215,7 +215,12 @@ def _add_structure(root: Element, interface: Interface, variables: tuple[Array, 
     )
     states = _arrays_of([state.name for state in interface.states], references, by_reference)
     initial = sorted({array.reference for array in (*outputs, *derivatives, *states)})
-    indicators = [array for array in variables if array.pattern == interface.indicator_pattern]
+    indicators = [
+        array
+        for pattern in interface.indicator_patterns
+        for array in variables
+        if array.pattern == pattern
+    ]
     for title, arrays_, depends in (
         ("Output", outputs, interface.depends),
         ("ContinuousStateDerivative", derivatives, interface.depends),

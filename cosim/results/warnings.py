@@ -31,7 +31,7 @@ from hexapod_cosim.cosim.results.walk import LEAST_DISTANCE, SKIPPED_CYCLES, Vie
 from hexapod_cosim.cosim.scenario.records import Scenario
 from hexapod_cosim.models import FRICTION_LAWS, LEG_NAMES, TERRAINS, Robot, Terrain
 from hexapod_cosim.models.ground.surface import Surface
-from hexapod_cosim.models.records import BRISTLE_LAWS
+from hexapod_cosim.models.records import BRISTLE_LAWS, SELF_CONTACTS
 from hexapod_cosim.models.statics import sliding
 from hexapod_cosim.models.terrain import ground_normal
 
@@ -201,10 +201,14 @@ def walk_warnings(view: View, robot: Robot) -> list[str]:
 def overlap_warnings(recording: Recording, parameters: Mapping[str, float]) -> list[str]:
     """Warns of neighbouring legs that overlap, with time and place of the deepest overlap.
 
-    Only with body.self_contact = warn, whose number is 2.
+    With body.self_contact = warn; with force `push_warnings` describes how legs pushed each
+    other; with off there are none.
     """
+    choice = SELF_CONTACTS[round(parameters.get("body.self_contact", 1.0)) - 1]
+    if choice == "force":
+        return push_warnings(recording)
     names = [f"{leg}.clearance" for leg in LEG_NAMES]
-    if parameters.get("body.self_contact", 1.0) != 2.0 or not set(names) <= set(recording.names):
+    if choice == "off" or not set(names) <= set(recording.names):
         return []
     clearance = recording.columns(names)
     if not len(clearance) or not clearance.min() < 0.0:
@@ -216,7 +220,25 @@ def overlap_warnings(recording: Recording, parameters: Mapping[str, float]) -> l
         f"legs overlapped from {recording.time[first]:.3f} s on, for {share:.1%} of the time: leg "
         f"{LEG_NAMES[leg]} was {-1e3 * clearance[row, leg]:.3g} mm inside its neighbour at "
         f"{recording.time[row]:.3f} s, and legs exert no force on each other; use shorter steps or "
-        "a slower turn"
+        "a slower turn, or let them push each other with body.self_contact=force"
+    ]
+
+
+def push_warnings(recording: Recording) -> list[str]:
+    """Warns of neighbouring legs that push each other, with time and size of the largest force."""
+    names = [name for leg in LEG_NAMES for name in vector_names(f"{leg}.neighbour_force")]
+    if not len(recording.time) or not set(names) <= set(recording.names):
+        return []
+    force = np.linalg.norm(recording.columns(names).reshape(-1, len(LEG_NAMES), 3), axis=2)
+    touching = (force > 0.0).any(axis=1)
+    if not touching.any():
+        return []
+    row, leg = np.unravel_index(int(np.argmax(force)), force.shape)
+    return [
+        f"legs touched each other from {recording.time[int(np.argmax(touching))]:.3f} s on, for "
+        f"{float(touching.mean()):.1%} of the time: leg {LEG_NAMES[leg]} and its neighbour pushed "
+        f"each other with {force[row, leg]:.3g} N at {recording.time[row]:.3f} s; use shorter "
+        "steps or a slower turn"
     ]
 
 

@@ -1,1 +1,1 @@
-"""Computes contacts of torso, knees and shanks with the ground, and distances between legs."""
+"""Computes contacts of torso, knees and shanks with the ground, and of legs with each other."""

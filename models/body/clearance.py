@@ -11,8 +11,8 @@ RING = (0, 1, 2, 5, 4, 3)  # legs around the torso: LF LM LR RR RM RF
 PARALLEL = 1e-12  # 1  squared sine below which lines are parallel
 
 
-def line_distance(p: Array, a: Array, q: Array, b: Array) -> float:
-    """Returns the distance [m] between the lines p + s a and q + t b with s, t in [0, 1].
+def nearest_shares(p: Array, a: Array, q: Array, b: Array) -> tuple[float, float]:
+    """Returns s and t in [0, 1] of the nearest points of the lines p + s a and q + t b.
 
     The squared distance is convex in s and t: its minimum is on an edge of the square, where an end
     of one line is nearest to a point of the other, or at the common normal within it.
@@ -25,7 +25,13 @@ def line_distance(p: Array, a: Array, q: Array, b: Array) -> float:
         s = np.clip((ab * (b @ r) - bb * (a @ r)) / det, 0.0, 1.0)
         t = np.clip((aa * (b @ r) - ab * (a @ r)) / det, 0.0, 1.0)
         pairs.append((float(s), float(t)))
-    return min(float(np.linalg.norm(r + s * a - t * b)) for s, t in pairs)
+    return min(pairs, key=lambda at: float(np.linalg.norm(r + at[0] * a - at[1] * b)))
+
+
+def line_distance(p: Array, a: Array, q: Array, b: Array) -> float:
+    """Returns the distance [m] between the lines p + s a and q + t b with s, t in [0, 1]."""
+    s, t = nearest_shares(p, a, q, b)
+    return float(np.linalg.norm(p - q + s * a - t * b))
 
 
 def share_of(point: Array, line: Array) -> float:

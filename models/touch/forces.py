@@ -20,7 +20,14 @@ from hexapod_cosim.models.body.contacts import (
     body_spheres,
     sliding_friction_of_bodies,
 )
-from hexapod_cosim.models.contact import FootContact, normal_force, slip_velocity, sphere_contact
+from hexapod_cosim.models.body.pairs import leg_pairs, pair_contacts
+from hexapod_cosim.models.contact import (
+    FootContact,
+    contact_damping,
+    normal_force,
+    slip_velocity,
+    sphere_contact,
+)
 from hexapod_cosim.models.friction import bristle_rate, friction_force, turning_moment
 from hexapod_cosim.models.ground.blocks import TOP, Cell
 from hexapod_cosim.models.kinematics import JOINTS, LEGS, cross, rotation_matrix
@@ -82,16 +89,17 @@ class Contacts:
     place: Array  # (6, 2) m  where feet lost contact with the bottom of their footprints
     cell: tuple[Cell | None, ...]  # (6,) of blocks, held while a foot touches; None: not held
     footprints: Array  # (n, 4) m  x, y, depth, radius
+    pairs: tuple[Held, ...] = ()  # contacts between legs, in the order of `leg_pairs`
 
     @property
     def damping(self) -> Array:
-        """Damping of all contacts (n,) [s/m], nan for open ones."""
-        return np.array([held.damping for held in self.held])
+        """Damping of all contacts, last those between legs, (n,) [s/m], nan for open ones."""
+        return np.array([held.damping for held in (*self.held, *self.pairs)])
 
     @property
     def impact_speed(self) -> Array:
         """Approach speeds of all contacts at their last touch-downs (n,) [m/s]."""
-        return np.array([held.impact_speed for held in self.held])
+        return np.array([held.impact_speed for held in (*self.held, *self.pairs)])
 
 
 def spots(robot: Robot) -> tuple[Spot, ...]:
@@ -121,7 +129,24 @@ def _friction_of(friction: Friction, spot: Spot) -> Friction:
 def open_contacts(robot: Robot) -> Contacts:
     """Returns the contacts of a robot in the air, over undisturbed ground."""
     held = tuple(own_ground(robot, spot) for spot in spots(robot))
-    return Contacts(held, np.zeros(LEGS), np.zeros((LEGS, 2)), (None,) * LEGS, np.zeros((0, 4)))
+    pairs = (open_pair(robot),) * len(leg_pairs(robot))
+    nothing = np.zeros(LEGS), np.zeros((LEGS, 2)), (None,) * LEGS, np.zeros((0, 4))
+    return Contacts(held, *nothing, pairs)
+
+
+def open_pair(robot: Robot) -> Held:
+    """Returns an open contact between legs: the robot's own laws, without bristles and soil."""
+    return Held(robot.contact, sliding_friction_of_bodies(robot.friction), Soil())
+
+
+def standing_pairs(robot: Robot, body: Array) -> tuple[Held, ...]:
+    """Returns the contacts between legs of bodies (19, 13): those that overlap are closed, with
+    impact speed 0.
+    """
+    held = open_pair(robot)
+    closed = replace(held, damping=contact_damping(robot.contact, 0.0))
+    found = pair_contacts(robot, body)
+    return tuple(closed if contact.penetration > 0.0 else held for contact in found)
 
 
 def contacts_of(robot: Robot, damping: Array, body_damping: Array | None = None) -> Contacts:
@@ -263,6 +288,22 @@ def contact_wrenches(
             friction, radius = held.friction, robot.foot.radius
             torque += turning_moment(friction, radius, load, contact.normal, state[10:13])
         g[spot.sphere.body] += np.concatenate([force, torque])
+    return g + pair_wrenches(robot, body, contacts)
+
+
+def pair_wrenches(robot: Robot, body: Array, contacts: Contacts) -> Array:
+    """Returns forces and torques (19, 6) of legs on each other [N, N m] (eq. 59)."""
+    g = np.zeros((len(body), 6))
+    if all(held.is_open for held in contacts.pairs):
+        return g
+    found = pair_contacts(robot, body)
+    for pair, held, contact in zip(leg_pairs(robot), contacts.pairs, found, strict=True):
+        if held.is_open:
+            continue
+        force = contact_force(robot, held, 0.0, contact, None)
+        for number, sign in ((pair.body, 1.0), (pair.other_body, -1.0)):
+            torque = cross(contact.point - body[number, 0:3], force)
+            g[number] += sign * np.concatenate([force, torque])
     return g
 
 

@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from hexapod_cosim.models.body.pairs import pair_contacts
 from hexapod_cosim.models.contact import FootContact, contact_damping
 from hexapod_cosim.models.ground.blocks import Cell, cell_at, outside
 from hexapod_cosim.models.ground.surface import LAW, MU, MU_STATIC, STIFFNESS
@@ -29,6 +30,7 @@ from hexapod_cosim.models.touch.forces import (
     shares_of_feet,
     sphere_centre,
     spots,
+    standing_pairs,
 )
 
 LEAST_FOOTPRINT = 1e-6  # m  shallower ones are not kept
@@ -39,7 +41,7 @@ SAME_FACE = 1e-6  # m, 1  depth and normal of one contact at both sides of a bor
 class Depths:
     """Depths and approach speeds of all contacts, and how far feet have left their cells."""
 
-    delta: Array  # (n,) m  of soles above the depth at which they touch soil
+    delta: Array  # (n,) m  of soles above the depth at which they touch soil; legs' pairs last
     ddelta: Array  # (n,) m/s
     outside: Array  # (6,) m  < 0: inside; -inf: no cell is held
 
@@ -52,7 +54,7 @@ def has_cells(robot: Robot) -> bool:
 
 def depths_of(robot: Robot, body: Array, contacts: Contacts) -> Depths:
     """Returns the depths of all contacts at bodies (19, 13)."""
-    found = contacts_at(robot, body, contacts)
+    found = [*contacts_at(robot, body, contacts), *pair_contacts(robot, body)]
     delta = np.array([contact.penetration for contact in found])
     delta[:LEGS] -= contacts.plastic
     far = np.full(LEGS, -math.inf)
@@ -112,7 +114,9 @@ def start_contacts(robot: Robot, body: Array) -> Contacts:
             if held[k].is_soft:
                 depth = float(depths.delta[k])
                 plastic[spot.leg] = plastic_depth(held[k].soil, robot.foot, depth)
-    return hold_cells(robot, body, replace(contacts, held=tuple(held), plastic=plastic))
+    pairs = standing_pairs(robot, body)
+    contacts = replace(contacts, held=tuple(held), plastic=plastic, pairs=pairs)
+    return hold_cells(robot, body, contacts)
 
 
 def hold_cells(robot: Robot, body: Array, contacts: Contacts) -> Contacts:
@@ -150,9 +154,28 @@ def switch_contacts(
             touchdowns += 1
         elif not held[k].is_open and delta[k] <= 0.0:
             held[k] = replace(held[k], damping=math.nan)
+    pairs = switched_pairs(robot, contacts, depths)
+    touchdowns += sum(
+        before.is_open and not now.is_open
+        for before, now in zip(contacts.pairs, pairs, strict=True)
+    )
+    contacts = replace(contacts, pairs=pairs)
     if all(now is before for now, before in zip(held, contacts.held, strict=True)):
-        return contacts, 0
+        return contacts, touchdowns
     return hold_cells(robot, body, replace(contacts, held=tuple(held))), touchdowns
+
+
+def switched_pairs(robot: Robot, contacts: Contacts, depths: Depths) -> tuple[Held, ...]:
+    """Returns the contacts between legs, closed where they overlap and open elsewhere."""
+    found, first = [], len(contacts.held)
+    for k, held in enumerate(contacts.pairs):
+        depth, speed = float(depths.delta[first + k]), float(depths.ddelta[first + k])
+        if held.is_open and depth > 0.0:
+            damping = contact_damping(robot.contact, speed)
+            found.append(replace(held, damping=damping, impact_speed=speed))
+        else:
+            found.append(held if depth > 0.0 else replace(held, damping=math.nan))
+    return tuple(found)
 
 
 def _continued(

@@ -1054,7 +1054,7 @@ static const hxRange definition_ranges[] = {
     {"RR.femur.angle_max", "rad", -3.141592653589793, 3.141592653589793, offsetof(hxDefinition, leg[5].link[1].angle_max), 0},
     {"RR.tibia.angle_max", "rad", -3.141592653589793, 3.141592653589793, offsetof(hxDefinition, leg[5].link[2].angle_max), 0},
     {"body.contact", "", 1, 2, offsetof(hxDefinition, body.contact), 1},
-    {"body.self_contact", "", 1, 2, offsetof(hxDefinition, body.self_contact), 1},
+    {"body.self_contact", "", 1, 3, offsetof(hxDefinition, body.self_contact), 1},
     {"body.torso_box[1]", "m", 0.0, 10.0, offsetof(hxDefinition, body.torso_box[0]), 0},
     {"body.torso_box[2]", "m", 0.0, 10.0, offsetof(hxDefinition, body.torso_box[1]), 0},
     {"body.torso_box[3]", "m", 0.0, 10.0, offsetof(hxDefinition, body.torso_box[2]), 0},

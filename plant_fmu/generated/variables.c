@@ -566,6 +566,24 @@ static const hxVariable outputs[] = {
     {"RF.clearance", "m", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.body.clearance[3]), HX_REAL, 0},
     {"RM.clearance", "m", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.body.clearance[4]), HX_REAL, 0},
     {"RR.clearance", "m", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.body.clearance[5]), HX_REAL, 0},
+    {"LF.neighbour_force[1]", "N", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.body.neighbour_force[0][0]), HX_REAL, 18},
+    {"LF.neighbour_force[2]", "N", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.body.neighbour_force[0][1]), HX_REAL, 0},
+    {"LF.neighbour_force[3]", "N", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.body.neighbour_force[0][2]), HX_REAL, 0},
+    {"LM.neighbour_force[1]", "N", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.body.neighbour_force[1][0]), HX_REAL, 0},
+    {"LM.neighbour_force[2]", "N", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.body.neighbour_force[1][1]), HX_REAL, 0},
+    {"LM.neighbour_force[3]", "N", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.body.neighbour_force[1][2]), HX_REAL, 0},
+    {"LR.neighbour_force[1]", "N", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.body.neighbour_force[2][0]), HX_REAL, 0},
+    {"LR.neighbour_force[2]", "N", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.body.neighbour_force[2][1]), HX_REAL, 0},
+    {"LR.neighbour_force[3]", "N", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.body.neighbour_force[2][2]), HX_REAL, 0},
+    {"RF.neighbour_force[1]", "N", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.body.neighbour_force[3][0]), HX_REAL, 0},
+    {"RF.neighbour_force[2]", "N", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.body.neighbour_force[3][1]), HX_REAL, 0},
+    {"RF.neighbour_force[3]", "N", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.body.neighbour_force[3][2]), HX_REAL, 0},
+    {"RM.neighbour_force[1]", "N", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.body.neighbour_force[4][0]), HX_REAL, 0},
+    {"RM.neighbour_force[2]", "N", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.body.neighbour_force[4][1]), HX_REAL, 0},
+    {"RM.neighbour_force[3]", "N", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.body.neighbour_force[4][2]), HX_REAL, 0},
+    {"RR.neighbour_force[1]", "N", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.body.neighbour_force[5][0]), HX_REAL, 0},
+    {"RR.neighbour_force[2]", "N", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.body.neighbour_force[5][1]), HX_REAL, 0},
+    {"RR.neighbour_force[3]", "N", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.body.neighbour_force[5][2]), HX_REAL, 0},
     {"LF.coxa.current", "A", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.current[0][0]), HX_REAL, 18},
     {"LF.femur.current", "A", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.current[0][1]), HX_REAL, 0},
     {"LF.tibia.current", "A", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.current[0][2]), HX_REAL, 0},
@@ -1143,7 +1161,7 @@ static const hxVariable parameters[] = {
     {"RR.femur.angle_max", "rad", -3.141592653589793, 3.141592653589793, offsetof(struct hxVariables, definition.leg[5].link[1].angle_max), HX_REAL, 0},
     {"RR.tibia.angle_max", "rad", -3.141592653589793, 3.141592653589793, offsetof(struct hxVariables, definition.leg[5].link[2].angle_max), HX_REAL, 0},
     {"body.contact", "", 1, 2, offsetof(struct hxVariables, definition.body.contact), HX_INTEGER, 1},
-    {"body.self_contact", "", 1, 2, offsetof(struct hxVariables, definition.body.self_contact), HX_INTEGER, 1},
+    {"body.self_contact", "", 1, 3, offsetof(struct hxVariables, definition.body.self_contact), HX_INTEGER, 1},
     {"body.torso_box[1]", "m", 0.0, 10.0, offsetof(struct hxVariables, definition.body.torso_box[0]), HX_REAL, 3},
     {"body.torso_box[2]", "m", 0.0, 10.0, offsetof(struct hxVariables, definition.body.torso_box[1]), HX_REAL, 0},
     {"body.torso_box[3]", "m", 0.0, 10.0, offsetof(struct hxVariables, definition.body.torso_box[2]), HX_REAL, 0},
@@ -1254,12 +1272,56 @@ static const hxVariable locals[] = {
     {"der(RR.foot.bristle[1])", "m/s", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, rate.bristle[5][0]), HX_REAL, 0},
     {"der(RR.foot.bristle[2])", "m/s", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, rate.bristle[5][1]), HX_REAL, 0},
     {"der(RR.foot.bristle[3])", "m/s", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, rate.bristle[5][2]), HX_REAL, 0},
-    {"LF.foot.event_indicator", "m", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, indicator[0]), HX_REAL, 6},
-    {"LM.foot.event_indicator", "m", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, indicator[1]), HX_REAL, 0},
-    {"LR.foot.event_indicator", "m", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, indicator[2]), HX_REAL, 0},
-    {"RF.foot.event_indicator", "m", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, indicator[3]), HX_REAL, 0},
-    {"RM.foot.event_indicator", "m", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, indicator[4]), HX_REAL, 0},
-    {"RR.foot.event_indicator", "m", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, indicator[5]), HX_REAL, 0},
+    {"LF.foot.event_indicator", "m", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, indicator.foot[0]), HX_REAL, 6},
+    {"LM.foot.event_indicator", "m", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, indicator.foot[1]), HX_REAL, 0},
+    {"LR.foot.event_indicator", "m", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, indicator.foot[2]), HX_REAL, 0},
+    {"RF.foot.event_indicator", "m", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, indicator.foot[3]), HX_REAL, 0},
+    {"RM.foot.event_indicator", "m", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, indicator.foot[4]), HX_REAL, 0},
+    {"RR.foot.event_indicator", "m", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, indicator.foot[5]), HX_REAL, 0},
+    {"LF.knee.event_indicator", "m", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, indicator.knee[0]), HX_REAL, 6},
+    {"LM.knee.event_indicator", "m", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, indicator.knee[1]), HX_REAL, 0},
+    {"LR.knee.event_indicator", "m", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, indicator.knee[2]), HX_REAL, 0},
+    {"RF.knee.event_indicator", "m", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, indicator.knee[3]), HX_REAL, 0},
+    {"RM.knee.event_indicator", "m", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, indicator.knee[4]), HX_REAL, 0},
+    {"RR.knee.event_indicator", "m", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, indicator.knee[5]), HX_REAL, 0},
+    {"LF.shank.event_indicator", "m", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, indicator.shank[0]), HX_REAL, 6},
+    {"LM.shank.event_indicator", "m", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, indicator.shank[1]), HX_REAL, 0},
+    {"LR.shank.event_indicator", "m", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, indicator.shank[2]), HX_REAL, 0},
+    {"RF.shank.event_indicator", "m", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, indicator.shank[3]), HX_REAL, 0},
+    {"RM.shank.event_indicator", "m", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, indicator.shank[4]), HX_REAL, 0},
+    {"RR.shank.event_indicator", "m", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, indicator.shank[5]), HX_REAL, 0},
+    {"torso.event_indicator[1]", "m", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, indicator.torso[0]), HX_REAL, 8},
+    {"torso.event_indicator[2]", "m", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, indicator.torso[1]), HX_REAL, 0},
+    {"torso.event_indicator[3]", "m", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, indicator.torso[2]), HX_REAL, 0},
+    {"torso.event_indicator[4]", "m", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, indicator.torso[3]), HX_REAL, 0},
+    {"torso.event_indicator[5]", "m", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, indicator.torso[4]), HX_REAL, 0},
+    {"torso.event_indicator[6]", "m", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, indicator.torso[5]), HX_REAL, 0},
+    {"torso.event_indicator[7]", "m", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, indicator.torso[6]), HX_REAL, 0},
+    {"torso.event_indicator[8]", "m", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, indicator.torso[7]), HX_REAL, 0},
+    {"LF.neighbour_event_indicator[1]", "m", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, indicator.neighbour[0][0]), HX_REAL, 24},
+    {"LF.neighbour_event_indicator[2]", "m", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, indicator.neighbour[0][1]), HX_REAL, 0},
+    {"LF.neighbour_event_indicator[3]", "m", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, indicator.neighbour[0][2]), HX_REAL, 0},
+    {"LF.neighbour_event_indicator[4]", "m", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, indicator.neighbour[0][3]), HX_REAL, 0},
+    {"LM.neighbour_event_indicator[1]", "m", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, indicator.neighbour[1][0]), HX_REAL, 0},
+    {"LM.neighbour_event_indicator[2]", "m", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, indicator.neighbour[1][1]), HX_REAL, 0},
+    {"LM.neighbour_event_indicator[3]", "m", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, indicator.neighbour[1][2]), HX_REAL, 0},
+    {"LM.neighbour_event_indicator[4]", "m", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, indicator.neighbour[1][3]), HX_REAL, 0},
+    {"LR.neighbour_event_indicator[1]", "m", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, indicator.neighbour[2][0]), HX_REAL, 0},
+    {"LR.neighbour_event_indicator[2]", "m", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, indicator.neighbour[2][1]), HX_REAL, 0},
+    {"LR.neighbour_event_indicator[3]", "m", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, indicator.neighbour[2][2]), HX_REAL, 0},
+    {"LR.neighbour_event_indicator[4]", "m", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, indicator.neighbour[2][3]), HX_REAL, 0},
+    {"RF.neighbour_event_indicator[1]", "m", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, indicator.neighbour[3][0]), HX_REAL, 0},
+    {"RF.neighbour_event_indicator[2]", "m", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, indicator.neighbour[3][1]), HX_REAL, 0},
+    {"RF.neighbour_event_indicator[3]", "m", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, indicator.neighbour[3][2]), HX_REAL, 0},
+    {"RF.neighbour_event_indicator[4]", "m", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, indicator.neighbour[3][3]), HX_REAL, 0},
+    {"RM.neighbour_event_indicator[1]", "m", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, indicator.neighbour[4][0]), HX_REAL, 0},
+    {"RM.neighbour_event_indicator[2]", "m", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, indicator.neighbour[4][1]), HX_REAL, 0},
+    {"RM.neighbour_event_indicator[3]", "m", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, indicator.neighbour[4][2]), HX_REAL, 0},
+    {"RM.neighbour_event_indicator[4]", "m", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, indicator.neighbour[4][3]), HX_REAL, 0},
+    {"RR.neighbour_event_indicator[1]", "m", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, indicator.neighbour[5][0]), HX_REAL, 0},
+    {"RR.neighbour_event_indicator[2]", "m", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, indicator.neighbour[5][1]), HX_REAL, 0},
+    {"RR.neighbour_event_indicator[3]", "m", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, indicator.neighbour[5][2]), HX_REAL, 0},
+    {"RR.neighbour_event_indicator[4]", "m", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, indicator.neighbour[5][3]), HX_REAL, 0},
 };
 
 const hxSection hx_sections[HX_CAUSALITIES] = {
@@ -1356,7 +1418,7 @@ const size_t hx_state_count = sizeof states / sizeof states[0];
 
 _Static_assert(sizeof states / sizeof states[0] == sizeof(hxCoordinates) / sizeof(double), "each state has its row");
 
-const char hx_default_guid[] = "{5d7c2ba1-3355-48e7-bad0-835c240b6d6e}";
+const char hx_default_guid[] = "{8a83ba24-8c67-4afc-aa47-b50ca8a54707}";
 
 _Static_assert(HX_CONTACT_EXACT_RESTITUTION == 1, "ContactLaw");
 _Static_assert(HX_CONTACT_FLORES == 2, "ContactLaw");
@@ -1388,6 +1450,7 @@ _Static_assert(HX_BODY_OFF == 1, "BodyContact");
 _Static_assert(HX_BODY_ON == 2, "BodyContact");
 _Static_assert(HX_SELF_OFF == 1, "SelfContact");
 _Static_assert(HX_SELF_WARN == 2, "SelfContact");
+_Static_assert(HX_SELF_FORCE == 3, "SelfContact");
 _Static_assert(HX_TERRAIN_FLAT == 1, "TerrainKind");
 _Static_assert(HX_TERRAIN_SLOPE == 2, "TerrainKind");
 _Static_assert(HX_TERRAIN_GRID == 3, "TerrainKind");

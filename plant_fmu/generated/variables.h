@@ -10,7 +10,7 @@ struct hxVariables {
   hxInput input;
   hxOutput output;
   hxCoordinates state, rate; /* of model exchange: continuous states and their derivatives */
-  double indicator[HX_LEGS]; /* events are its changes of sign */
+  hxIndicators indicator; /* events are their changes of sign */
 };
 
 #endif

@@ -104,7 +104,7 @@ static void centre_of(const hxDepths *depths, int row, int slot, double centre[3
 static const double *material_under(const hxModel *model, const hxDepths *depths, int row,
                                     int slot) {
   double centre[3];
-  if (!model->terrain) return NULL;
+  if (!model->terrain || hx_is_of_pair(row)) return NULL;
   centre_of(depths, row, slot, centre);
   return hx_terrain_material(model->terrain, centre);
 }
@@ -180,7 +180,7 @@ void hx_contact_start(const hxModel *model, const hxDepths *depths, hxContactSta
   hx_contact_release(contact);
   for (int row = 0; row < HX_ROWS; ++row)
     for (int slot = 0; slot < HX_SLOTS; ++slot) set_ground(model, NULL, row, slot, contact);
-  for (int k = 0; k < model->rows + model->torso_rows; ++k) {
+  for (int k = 0; k < model->listed; ++k) {
     const int row = model->row[k];
     for (int slot = 0; slot < hx_slots_of(row); ++slot)
       if (depths->delta[row][slot] > 0.0) close_contact(model, depths, row, slot, 0.0, contact);
@@ -200,7 +200,7 @@ void hx_contact_slacken(const hxContactState *contact, hxPlantMotion *motion) {
 
 int hx_contact_is_due(const hxModel *model, const hxDepths *depths, const hxContactState *contact) {
   int due = 0;
-  for (int k = 0; k < model->rows + model->torso_rows; ++k) {
+  for (int k = 0; k < model->listed; ++k) {
     const double *closed = contact->closed[model->row[k]], *delta = depths->delta[model->row[k]];
     for (int leg = 0; leg < HX_LEGS; ++leg) due |= (closed[leg] != 0.0) != (delta[leg] > 0.0);
     if (model->row[k] == HX_TORSO)
@@ -212,7 +212,7 @@ int hx_contact_is_due(const hxModel *model, const hxDepths *depths, const hxCont
 
 int hx_contact_switch(const hxModel *model, const hxDepths *depths, hxContactState *contact) {
   int touchdowns = 0;
-  for (int k = 0; k < model->rows + model->torso_rows; ++k) {
+  for (int k = 0; k < model->listed; ++k) {
     const int row = model->row[k];
     for (int slot = 0; slot < hx_slots_of(row); ++slot) {
       const int closed = contact->closed[row][slot] != 0.0;

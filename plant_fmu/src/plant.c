@@ -130,6 +130,29 @@ static hxStatus check_start_depth(const hxPlant *plant, char message[HX_MESSAGE_
   return HX_OK;
 }
 
+/* Fails if lines of two legs are so near to each other that the contact law does not hold. */
+static hxStatus check_start_overlap(const hxPlant *plant, char message[HX_MESSAGE_SIZE]) {
+  static const char *part[] = {"femur", "tibia"};
+  hxDepths depths;
+  const hxModel *model = &plant->model;
+  if (!model->pair_rows) return HX_OK;
+  hx_kernel()->depths(model, &plant->state.contact, &plant->state.motion, &depths);
+  for (int pair = 0; pair < HX_PAIR_ROWS; ++pair) {
+    const double allowed = 0.5 * model->radius[HX_PAIR + pair];
+    for (int leg = 0; leg < HX_LEGS; ++leg)
+      if (depths.delta[HX_PAIR + pair][leg] > allowed && allowed > 0.0) {
+        hx_print(message, HX_MESSAGE_SIZE,
+                 "initial.%s: got its %s %.4g m inside the %s of leg %s, expected at most %.4g m, "
+                 "half the sum of their radii; move the legs apart, or reduce body.knee_radius or "
+                 "body.shank_radius",
+                 hx_leg_name(leg), part[pair / 2], depths.delta[HX_PAIR + pair][leg],
+                 part[pair % 2], hx_leg_name(hx_next_leg(leg)), allowed);
+        return HX_INVALID_MODEL;
+      }
+  }
+  return HX_OK;
+}
+
 hxStatus hx_plant_reset(hxPlant *plant, const hxDefinition *definition, double t) {
   char message[HX_MESSAGE_SIZE];
   double body[HX_BODIES][HX_BODY_STATE];
@@ -148,6 +171,7 @@ hxStatus hx_plant_reset(hxPlant *plant, const hxDefinition *definition, double t
   hx_motion_from_bodies(&plant->model, (const double (*)[HX_BODY_STATE])body, &plant->state.motion);
   hx_kernel()->start(&plant->model, t, &plant->state, plant->scratch);
   status = check_start_depth(plant, message); /* the cells of feet on blocks are known now */
+  if (status == HX_OK) status = check_start_overlap(plant, message);
   if (status != HX_OK) {
     plant->model = plant->model_before;
     plant->state = plant->state_before;
@@ -424,17 +448,20 @@ hxStatus hx_plant_set_coordinates(hxPlant *plant, double t, const hxCoordinates 
  * their rounding (docs/equations.md). */
 static const double switch_band = 1e-10;
 
-/* Switches the contacts that are due and have no indicator: those of torso, knees and shanks, and
- * of feet with walls. Feet keep theirs with the ground below them. */
-static void switch_bodies(hxPlant *plant) {
+/* Switches the contacts that are due and have no indicator: those of feet with walls. Others stay.
+ */
+static void switch_walls(hxPlant *plant) {
   hxDepths depths;
   const hxModel *model = &plant->model;
-  if (model->rows + model->torso_rows == 1) return;
+  if (model->listed == 1) return;
   hx_kernel()->depths(model, &plant->state.contact, &plant->state.motion, &depths);
-  for (int leg = 0; leg < HX_LEGS; ++leg) {
-    double *delta = &depths.delta[HX_FOOT][leg];
-    *delta = plant->state.contact.closed[HX_FOOT][leg] != 0.0 ? fmax(*delta, switch_band)
-                                                              : fmin(*delta, -switch_band);
+  for (int k = 0; k < model->listed; ++k) {
+    const int row = model->row[k];
+    for (int slot = 0; slot < hx_slots_of(row) && !hx_is_wall(row); ++slot) {
+      double *delta = &depths.delta[row][slot];
+      *delta = plant->state.contact.closed[row][slot] != 0.0 ? fmax(*delta, switch_band)
+                                                             : fmin(*delta, -switch_band);
+    }
   }
   hx_footprints_begin(&plant->footprints);
   hx_kernel()->switch_contacts(model, &depths, &plant->footprints, &plant->state);
@@ -454,7 +481,7 @@ void hx_plant_completed_step(hxPlant *plant, const hxInput *input) {
   if (hx_has_bus(&plant->model)) hx_bus_send(&command, &plant->model, &plant->state);
   hx_command_supply(&command, &plant->model, &plant->state);
   hx_kernel()->measure(&plant->model, &command, &plant->state, plant->scratch);
-  switch_bodies(plant);
+  switch_walls(plant);
 }
 
 void hx_plant_rates(const hxPlant *plant, const hxInput *input, hxCoordinates *rate) {
@@ -463,13 +490,31 @@ void hx_plant_rates(const hxPlant *plant, const hxInput *input, hxCoordinates *r
   hx_kernel()->coordinates(&plant->model, &plant->state, &command, plant->scratch, NULL, rate);
 }
 
-void hx_plant_indicators(const hxPlant *plant, double indicator[HX_LEGS]) {
+/* Returns the indicators of a row of contacts. */
+static double *indicators_of(int row, hxIndicators *indicator) {
+  return row == HX_FOOT    ? indicator->foot
+         : row == HX_KNEE  ? indicator->knee
+         : row == HX_SHANK ? indicator->shank
+                           : indicator->torso;
+}
+
+void hx_plant_indicators(const hxPlant *plant, hxIndicators *indicator) {
+  enum { COUNT = HX_INDICATORS };
   hxDepths depths;
-  hx_kernel()->depths(&plant->model, &plant->state.contact, &plant->state.motion, &depths);
-  for (int leg = 0; leg < HX_LEGS; ++leg)
-    indicator[leg] =
-        depths.delta[HX_FOOT][leg] +
-        (plant->state.contact.closed[HX_FOOT][leg] != 0.0 ? switch_band : -switch_band);
+  const hxModel *model = &plant->model;
+  double all[COUNT];
+  for (int i = 0; i < COUNT; ++i) all[i] = -1.0; /* contacts that the robot does not have */
+  memcpy(indicator, all, sizeof all);
+  hx_kernel()->depths(model, &plant->state.contact, &plant->state.motion, &depths);
+  for (int k = 0; k < model->listed; ++k) {
+    const int row = model->row[k];
+    for (int slot = 0; slot < hx_slots_of(row) && !hx_is_wall(row); ++slot) {
+      const int closed = plant->state.contact.closed[row][slot] != 0.0;
+      double *to = hx_is_of_pair(row) ? &indicator->neighbour[slot][row - HX_PAIR]
+                                      : &indicators_of(row, indicator)[slot];
+      *to = depths.delta[row][slot] + (closed ? switch_band : -switch_band);
+    }
+  }
 }
 
 /* Returns the penetration that makes a contact switch, or keep its state; outside of the band. */
@@ -485,7 +530,7 @@ int hx_plant_update_contacts(hxPlant *plant) {
   double before[3][HX_SLOTS];
   memcpy(before, plant->state.motion.bristle, sizeof before);
   hx_kernel()->depths(model, &plant->state.contact, &plant->state.motion, &depths);
-  for (int k = 0; k < model->rows + model->torso_rows; ++k) {
+  for (int k = 0; k < model->listed; ++k) {
     const int row = model->row[k];
     for (int slot = 0; slot < hx_slots_of(row); ++slot)
       depths.delta[row][slot] = switching_depth(plant->state.contact.closed[row][slot] != 0.0,

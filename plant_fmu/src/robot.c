@@ -389,6 +389,15 @@ static void compile_torso_point(hxModel *model, const hxDefinition *d, int slot)
   }
 }
 
+/* Lists the rows of contacts between legs, the last ones. */
+static void compile_pairs(hxModel *model, const hxDefinition *d) {
+  const double radius[2] = {d->body.knee_radius, d->body.shank_radius};
+  model->pair_rows = d->body.self_contact == HX_SELF_FORCE ? HX_PAIR_ROWS : 0;
+  for (int pair = 0; pair < HX_PAIR_ROWS; ++pair)
+    model->radius[HX_PAIR + pair] = radius[pair / 2] + radius[pair % 2];
+  for (int pair = 0; pair < model->pair_rows; ++pair) model->row[model->listed++] = HX_PAIR + pair;
+}
+
 /* Lists the rows of contacts that the model computes. */
 static void compile_rows(hxModel *model, const hxDefinition *d) {
   const double *box = d->body.torso_box;
@@ -405,7 +414,9 @@ static void compile_rows(hxModel *model, const hxDefinition *d) {
   if (knees) model->row[model->rows++] = HX_KNEE;
   if (shanks) model->row[model->rows++] = HX_SHANK;
   model->torso_rows = on && (box[0] > 0.0 || box[1] > 0.0 || box[2] > 0.0);
+  model->listed = model->rows + model->torso_rows;
   if (model->torso_rows) model->row[model->rows] = HX_TORSO;
+  compile_pairs(model, d);
 }
 
 void hx_model_compile(hxModel *model, const hxDefinition *d, const hxTerrain *terrain) {

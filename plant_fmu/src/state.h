@@ -23,9 +23,9 @@ enum {
   HX_MOTION_SIZE = HX_BODIES_SIZE + HX_BRISTLE_SIZE + HX_GEAR_SIZE
 };
 
-/* Rows of contacts with the ground: spheres of which each slot has one. Those before the torso's
- * are on the tibia, one for each leg; the torso's row has eight points of the torso. A model lists
- * the rows that it computes. */
+/* Rows of contacts: of each, a slot has one. Those before the torso's are spheres on the tibia that
+ * touch the ground, one for each leg; the torso's row has eight points of the torso. In those of
+ * pairs a leg's femur or tibia touches the next leg's. A model lists the rows that it computes. */
 enum {
   HX_FOOT,   /* the ground below the foot: the only row of feet but on blocks */
   HX_WALL,   /* a higher block beside the foot along x */
@@ -34,7 +34,10 @@ enum {
   HX_KNEE,
   HX_SHANK,
   HX_TORSO,
-  HX_ROWS,
+  HX_PAIR, /* the first of four: femur with femur, with tibia, tibia with femur, with tibia */
+  HX_GROUND_ROWS = HX_PAIR,
+  HX_PAIR_ROWS = 4,
+  HX_ROWS = HX_PAIR + HX_PAIR_ROWS,
   HX_FOOT_ROWS = HX_KNEE,
   HX_TIBIA_ROWS = HX_TORSO
 };
@@ -85,7 +88,8 @@ typedef struct hxModel {
   hxJointModel joint[HX_JOINTS];
   double point[HX_ROWS][3][HX_SLOTS]; /* m  centres of contacts' spheres from the centre of mass of
                                        *    tibia or torso, in the axes of that body's state */
-  double radius[HX_ROWS];             /* m  those of knee and shank are also of femur and tibia */
+  double radius[HX_ROWS];             /* m  those of knee and shank are also of femur and tibia;
+                                       *    those of pairs are sums */
   double gravity[3];
   double alpha, beta; /* Baumgarte */
   int contact_law, friction_law, terrain_kind, servo_mode, method, projection;
@@ -99,7 +103,8 @@ typedef struct hxModel {
   int spin;                         /* 1: the rotors have angular momentum (eq. 57) */
   int has_soil; /* 1: feet may touch soil, of the definition or of a material of the terrain */
   int rows, foot_rows, torso_rows; /* computed: on tibias, of these on feet, on the torso (0, 1) */
-  int row[HX_ROWS];                /* rows that are computed: on feet, tibias, torso */
+  int pair_rows, listed;           /* between legs (0 or HX_PAIR_ROWS); all together */
+  int row[HX_ROWS];                /* rows that are computed: on feet, tibias, torso, of pairs */
   union {
     const hxTerrain *terrain; /* NULL: plane; not saved */
     int64_t terrain_bits;     /* the same size on every machine */
@@ -180,13 +185,14 @@ typedef struct hxContactState {
 typedef struct hxDepths {
   double delta[HX_ROWS][HX_SLOTS], ddelta[HX_ROWS][HX_SLOTS]; /* m, m/s */
   /* on a grid only */
-  double centre[HX_ROWS][3][HX_SLOTS]; /* m  of spheres, world axes; those of feet in HX_FOOT */
+  double centre[HX_GROUND_ROWS][3][HX_SLOTS]; /* m  of spheres, world axes; of feet in HX_FOOT */
   double outside[HX_SLOTS]; /* m  how far a foot is outside of the cell that is held for it */
 } hxDepths;
 
-/* A row of contacts at one end of a step. World axes. */
+/* A row of contacts at one end of a step. World axes; for pairs of legs the next leg is the ground.
+ */
 typedef struct hxContactMoment {
-  double centre[3][HX_SLOTS];               /* m      centre of the sphere */
+  double centre[3][HX_SLOTS];               /* m      centre of the sphere; of pairs the point */
   double normal[3][HX_SLOTS];               /* 1      normal of the ground */
   double slip[3][HX_SLOTS];                 /* m/s    of the body's material along the ground */
   double roll[3][HX_SLOTS];                 /* m/s    its part due to the body's rotation */
@@ -285,7 +291,7 @@ static inline void hx_copy_gears(hxMoment *to, const hxMoment *from) {
 /* Copies the parts of a state that a step of this model changes. */
 static inline void hx_copy_state(const hxModel *model, hxState *to, const hxState *from) {
   memcpy(to, from, offsetof(hxState, moment.contact[1]));
-  for (int k = 1; k < model->rows + model->torso_rows; ++k)
+  for (int k = 1; k < model->listed; ++k)
     to->moment.contact[model->row[k]] = from->moment.contact[model->row[k]];
   if (model->foot_rows > 1) memcpy(to->moment.share, from->moment.share, sizeof to->moment.share);
   if (model->elastic) hx_copy_gears(&to->moment, &from->moment);
@@ -294,14 +300,31 @@ static inline void hx_copy_state(const hxModel *model, hxState *to, const hxStat
 /* Returns whether a row's contacts are those of feet. */
 static inline int hx_is_of_foot(int row) { return row < HX_KNEE; }
 
+/* Returns whether a row's contacts are those of feet with blocks beside them. */
+static inline int hx_is_wall(int row) { return row >= HX_WALL && row < HX_KNEE; }
+
 /* Makes the feet's penetrations relative to the depth at which they touch the ground. */
 static inline void hx_depths_on_soil(const hxContactState *contact, hxDepths *depths) {
   for (int slot = 0; slot < HX_SLOTS; ++slot)
     depths->delta[HX_FOOT][slot] -= contact->plastic[slot];
 }
 
+/* Returns whether a row's contacts are those of pairs of legs. */
+static inline int hx_is_of_pair(int row) { return row >= HX_PAIR; }
+
 /* Returns how many slots of a row of contacts hold one. */
 static inline int hx_slots_of(int row) { return row == HX_TORSO ? HX_SLOTS : HX_LEGS; }
+
+/* Return the neighbours of a slot's leg around the torso: LF LM LR RR RM RF. Slots past the last
+ * leg hold leg 0. */
+static inline int hx_next_leg(int slot) {
+  static const int next[HX_SLOTS] = {1, 2, 5, 0, 3, 4, 1, 1};
+  return next[slot];
+}
+static inline int hx_previous_leg(int slot) {
+  static const int previous[HX_SLOTS] = {3, 0, 1, 4, 5, 2, 3, 3};
+  return previous[slot];
+}
 
 /* Copies leg 0 into the slots past the last leg, so that every lane holds a physical leg. */
 static inline void hx_fill_slots(double *slots) {

@@ -133,6 +133,11 @@ static void check_relations(hxChecker *c, const hxDefinition *d) {
   if (hx_method(d->solver.method)->error_order == 0 && d->solver.step == 0.0)
     hx_check_fail(c, "solver.step", d->solver.step,
                   "a fixed step > 0 with this solver.method, which has no error estimate");
+  if (d->body.self_contact == HX_SELF_FORCE && d->body.knee_radius == 0.0 &&
+      d->body.shank_radius == 0.0)
+    hx_check_fail(c, "body.knee_radius", d->body.knee_radius,
+                  "a radius > 0 of femurs, or of tibias (body.shank_radius), with "
+                  "body.self_contact force");
   check_not_zero(c, "initial.quaternion", d->initial.quaternion, 4, "a quaternion: not all zero");
 }
 

@@ -177,8 +177,13 @@ def test_states_and_derivatives_are_arrays_in_fmi_2_s_order(
         assert by_name[state.name].valueReference == ARRAYS[state.name].reference
         flat += [element.name for element in ARRAYS[state.name].elements]
     assert flat == STATE_NAMES
-    assert [indicator.variable.name for indicator in description.eventIndicators] == [
-        "foot.event_indicator"
+    indicators = [indicator.variable.name for indicator in description.eventIndicators]
+    assert indicators == [
+        "foot.event_indicator",
+        "knee.event_indicator",
+        "shank.event_indicator",
+        "torso.event_indicator",
+        "neighbour_event_indicator",
     ]
     with (
         Plant3(plant_library, kind="ModelExchange") as plant,
@@ -188,8 +193,8 @@ def test_states_and_derivatives_are_arrays_in_fmi_2_s_order(
         other.initialize()
         assert plant.row("fmi3GetContinuousStates", 70).tolist() == other.reals(STATE_NAMES)
         assert (
-            plant.row("fmi3GetEventIndicators", 6).tolist()
-            == plant.get("foot.event_indicator")[0].tolist()
+            plant.row("fmi3GetEventIndicators", 50).tolist()
+            == np.concatenate([np.ravel(plant.get(name)[0]) for name in indicators]).tolist()
         )
         rates = [state.derivative for state in ATHENA.states]
         assert plant.row("fmi3GetContinuousStateDerivatives", 70).tolist() == other.reals(rates)

@@ -174,3 +174,15 @@ def test_overlapping_legs_are_reported_once_and_only_on_request() -> None:
     (warning,) = overlap_warnings(run, {"body.self_contact": 2.0})
     assert warning.startswith("legs overlapped from 1.000 s on, for 50.0% of the time: leg LF was ")
     assert "3.2 mm inside its neighbour at 1.500 s" in warning
+
+
+def test_legs_that_push_each_other_are_reported_with_the_largest_force() -> None:
+    forces = [f"{leg}.neighbour_force[{i}]" for leg in LEG_NAMES for i in (1, 2, 3)]
+    rows = np.zeros((4, 19))
+    rows[:, 0] = [0.0, 0.5, 1.0, 1.5]
+    run, parameters = Recording(("time", *forces), rows), {"body.self_contact": 3.0}
+    assert overlap_warnings(run, parameters) == []
+    rows[2, 4:7], rows[3, 4:7] = [0.0, 1.0, 0.0], [3.0, 0.0, -4.0]
+    (warning,) = overlap_warnings(run, parameters)
+    assert warning.startswith("legs touched each other from 1.000 s on, for 50.0% of the time: leg")
+    assert "leg LM and its neighbour pushed each other with 5 N at 1.500 s" in warning

@@ -266,3 +266,19 @@ def test_a_foot_may_start_deeper_than_its_radius_in_soil_and_not_in_rigid_ground
     rigid = replace(soft, soil=load_robot("athena").soil)
     with pytest.raises(PlantError, match="deep in the ground"):
         Plant(core, rigid, position=np.subtract(standing(rigid).position, (0, 0, 0.02)), **start)
+
+
+def test_the_soil_law_does_not_describe_the_spheres_of_the_torso() -> None:
+    """A corner's sphere carries less than a quarter of the robot; its flat side hardly sinks."""
+    robot = load_robot("athena")
+    corner = replace(robot.foot, radius=robot.body.corner_radius, pad_radius=0.0)
+    knee = replace(corner, radius=robot.body.knee_radius)
+    length, width = 2.0 * robot.body.torso_box[0], 2.0 * robot.body.torso_box[1]
+    side = replace(corner, pad_radius=float(np.sqrt(length * width / np.pi)))
+    sand = soil_preset("dry_sand").soil
+    assert law.virgin_force(sand, corner, corner.radius) == pytest.approx(2.08, abs=0.01)
+    assert law.virgin_force(sand, knee, knee.radius) == pytest.approx(2.41, abs=0.01)
+    assert robot.weight / 4.0 == pytest.approx(13.734, abs=1e-3)
+    for name, depth in (("dry_sand", 1.150e-3), ("clay", 1e-6), ("snow", 31.401e-3)):
+        sunk = law.sinkage(soil_preset(name).soil, side, robot.weight)
+        assert sunk == pytest.approx(depth, abs=1e-6)

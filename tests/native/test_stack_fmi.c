@@ -14,12 +14,12 @@
 #include "description.h"
 #include "stack.h"
 
-enum { MOST = 2000, STATES = 200, FEET = 6 };
+enum { MOST = 2000, STATES = 200, FEET = 6, INDICATORS = 50 };
 
 /* What the calls of both versions share. */
 static char folder[4096];
 static fmi2ValueReference input[MOST], output[MOST];
-static double value[MOST], state[STATES], rate[STATES], indicator[FEET];
+static double value[MOST], state[STATES], rate[STATES], indicator[INDICATORS];
 static size_t n_inputs, n_outputs, n_states;
 static int complaints;
 
@@ -114,7 +114,7 @@ static void exchange_two(void *given) {
   CHECK(fmi2SetTime(fmu, 0.001) == fmi2OK);
   CHECK(fmi2SetContinuousStates(fmu, state, n_states) == fmi2OK);
   CHECK(fmi2GetDerivatives(fmu, rate, n_states) == fmi2OK);
-  CHECK(fmi2GetEventIndicators(fmu, indicator, FEET) == fmi2OK);
+  CHECK(fmi2GetEventIndicators(fmu, indicator, INDICATORS) == fmi2OK);
   CHECK(fmi2CompletedIntegratorStep(fmu, fmi2True, &enter, &terminate) == fmi2OK);
 }
 
@@ -206,7 +206,7 @@ static void exchange_three(void *given) {
   CHECK(fmi3SetTime(fmu, 0.001) == fmi3OK);
   CHECK(fmi3SetContinuousStates(fmu, state, n_states) == fmi3OK);
   CHECK(fmi3GetContinuousStateDerivatives(fmu, rate, n_states) == fmi3OK);
-  CHECK(fmi3GetEventIndicators(fmu, indicator, FEET) == fmi3OK);
+  CHECK(fmi3GetEventIndicators(fmu, indicator, INDICATORS) == fmi3OK);
   CHECK(fmi3CompletedIntegratorStep(fmu, fmi3True, &enter, &terminate) == fmi3OK);
 }
 

@@ -200,6 +200,7 @@ HxOutput = record(
             ("knee_force", LegVectors),
             ("shank_force", LegVectors),
             ("clearance", PerLeg),
+            ("neighbour_force", LegVectors),
         ),
     ),
     ("imu", record("ImuOutput", ("specific_force", Vector3), ("angular_velocity", Vector3))),
@@ -225,4 +226,15 @@ HxOutput = record(
     ("supply_voltage", Real),
     ("gear_deflection", PerJoint),
     ("motor_speed", PerJoint),
+    (
+        "depth",
+        record(
+            "Indicators",
+            ("foot", PerLeg),
+            ("knee", PerLeg),
+            ("shank", PerLeg),
+            ("torso", Real * 8),
+            ("neighbour", (Real * 4) * LEGS),
+        ),
+    ),
 )

@@ -24,6 +24,8 @@ extern "C" {
 
 enum {
   HX_BODIES = 1 + HX_LEGS * HX_JOINTS, /* 19 */
+  HX_CORNERS = 8,                      /* of the torso's box */
+  HX_NEIGHBOUR_PAIRS = 4,              /* of lines of a leg and its next leg */
   HX_BODY_STATE = 13,                  /* r[3] p[4] v[3] w[3] */
   HX_MULTIPLIERS = 5,                  /* per joint */
   HX_CONE_BINS = 31                    /* bins of the share of the friction cone that feet use */
@@ -63,7 +65,7 @@ typedef enum hxBodyContact { HX_BODY_OFF = 1, HX_BODY_ON } hxBodyContact;
 
 /* Whether a run warns of legs that overlap. The plant ignores it: there is no force between legs.
  */
-typedef enum hxSelfContact { HX_SELF_OFF = 1, HX_SELF_WARN } hxSelfContact;
+typedef enum hxSelfContact { HX_SELF_OFF = 1, HX_SELF_WARN, HX_SELF_FORCE } hxSelfContact;
 
 typedef enum hxServoMode { HX_SERVO_POSITION = 1, HX_SERVO_TORQUE, HX_SERVO_KINEMATIC } hxServoMode;
 
@@ -249,6 +251,17 @@ typedef struct hxInput {
   double acceleration_ref[HX_LEGS][HX_JOINTS]; /* rad/s2  kinematic drives only */
 } hxInput;
 
+/* A number for each contact that events close and open. It consists of doubles only, in this order
+ * the event indicators of model exchange. */
+typedef struct hxIndicators {
+  double foot[HX_LEGS], knee[HX_LEGS], shank[HX_LEGS];
+  double torso[HX_CORNERS];
+  double neighbour[HX_LEGS][HX_NEIGHBOUR_PAIRS]; /* with the next leg: femur with femur, with tibia,
+                                                  * tibia with femur, with tibia */
+} hxIndicators;
+
+enum { HX_INDICATORS = sizeof(hxIndicators) / sizeof(double) };
+
 /* Outputs of the robot. Booleans are ints. Integrals run from the start. */
 typedef struct hxOutput {
   double time;                               /* s */
@@ -290,6 +303,7 @@ typedef struct hxOutput {
     double knee_force[HX_LEGS][3];  /* N  ground on the knee */
     double shank_force[HX_LEGS][3]; /* N  ground on the shank */
     double clearance[HX_LEGS]; /* m  from femur and tibia to those of the two neighbouring legs */
+    double neighbour_force[HX_LEGS][3]; /* N  of these legs on femur and tibia */
   } body;
   struct {
     double specific_force[3];   /* m/s2   torso axes, at the centre of mass */
@@ -323,6 +337,7 @@ typedef struct hxOutput {
   double supply_voltage; /* V  of all servos, under the currents at the start of the last call */
   double gear_deflection[HX_LEGS][HX_JOINTS]; /* rad    rotor less link; 0 of a rigid gear */
   double motor_speed[HX_LEGS][HX_JOINTS];     /* rad/s  of the rotor, seen at the joint */
+  hxIndicators depth; /* m  of all contacts, < 0: clearance; -1 where the robot has none */
 } hxOutput;
 
 enum { HX_FOOTPRINTS = 512 }; /* footprints that a plant keeps; older ones are forgotten */
@@ -422,16 +437,16 @@ HX_API hxStatus hx_plant_check_coordinates(hxPlant *plant);
 
 /* Reports that the importer's solver has completed its step to the present coordinates. Peaks,
  * integrals and losses of hxOutput belong to the path between two such calls and do not change
- * without them. The works in the coordinates are the solver's own. Torso, knees and shanks, which
- * have no indicators, touch and leave the ground at these calls. */
+ * without them. The works in the coordinates are the solver's own. Feet touch and leave the walls,
+ * edges and corners of blocks beside them, which have no indicators, at these calls. */
 HX_API void hx_plant_completed_step(hxPlant *plant, const hxInput *input);
 
-/* Compute the rates of the coordinates and the feet's indicators, and switch the contacts that are
- * due. */
+/* Compute the rates of the coordinates and the contacts' indicators, and switch the contacts that
+ * are due. */
 HX_API void hx_plant_rates(const hxPlant *plant, const hxInput *input, hxCoordinates *rate);
 HX_API void hx_plant_indicators(const hxPlant *plant,
-                                double indicator[HX_LEGS]); /* m  penetration +- 0.1 nm */
-HX_API int hx_plant_update_contacts(hxPlant *plant);        /* 1: bristles changed */
+                                hxIndicators *indicator); /* m  penetration +- 0.1 nm */
+HX_API int hx_plant_update_contacts(hxPlant *plant);      /* 1: bristles changed */
 
 /* Computes derivatives of rates and outputs along a direction of input and coordinates, with
  * contacts held. They are exact to rounding (complex step, lanes/complex_step.h); contact flags

@@ -116,14 +116,15 @@ static inline void sweep_motion(const hxModel *model, hxJointWork *k, hxMotion6 
  * c of D_ck^T lambda_c. About the joint's point the torque is -(u1 lambda_4 + u2 lambda_5) and the
  * component along the axis, with u1 = a x s, u2 = b x s. */
 static inline void leg_multipliers(const hxModel *model, const hxImplicit *implicit, int pack,
-                                   hxLegWork *leg) {
+                                   int pairs, hxLegWork *leg) {
   const int slot = pack * HX_LANES;
-  /* at the link's centre of mass: from the ground, then from the child */
+  /* at the link's centre of mass: from the ground, then from the child and from other legs */
   hxForce6 handed = row_wrench(model, implicit, pack, HX_FOOT, leg);
   if (leg->rows > 1) handed = hx_force_add(handed, further_wrenches(model, implicit, pack, leg));
   for (int joint = HX_JOINTS - 1; joint >= 0; --joint) {
     hxJointWork *k = &leg->joint[joint];
     const hxJointKinematics *kin = &k->reaction.kin;
+    if (pairs && joint > 0) handed = hx_force_add(handed, leg->by_legs[joint - 1]);
     const hxVec3 lin =
         hx_add_scaled(handed.lin, -hx_load(&model->joint[joint].mass[slot]), k->acceleration.lin);
     const hxVec3 ang =
@@ -315,6 +316,19 @@ HX_RARE void add_torso_losses(const hxModel *model, const hxWork *work, hxLossPo
   losses->friction += hx_sum_slots(friction);
 }
 
+/* Adds the powers that contacts between legs dissipate. */
+HX_RARE void add_pair_losses(const hxModel *model, const hxWork *work, hxLossPowers *losses) {
+  for (int pair = 0; pair < HX_PAIR_ROWS; ++pair) {
+    hxReal contact[HX_PACKS], friction[HX_PACKS];
+    for (int pack = 0; pack < HX_PACKS; ++pack) {
+      contact[pack] = damping_power(&work->pair[pair][pack]);
+      friction[pack] = hx_friction_power(model, HX_PAIR + pair, &work->pair[pair][pack]);
+    }
+    losses->contact += hx_lane(hx_sum_legs(contact), 0);
+    losses->friction += hx_lane(hx_sum_legs(friction), 0);
+  }
+}
+
 /* Returns the power that spin and rolling friction of all rows of a leg's foot dissipates, W. */
 HX_RARE hxReal turning_power(const hxLegWork *leg) {
   hxReal power = hx_splat(0.0);
@@ -346,6 +360,7 @@ static inline hxLossPowers hx_loss_powers(const hxModel *model, const hxWork *wo
   hxLossPowers losses = {hx_lane(hx_sum_legs(contact), 0), hx_lane(hx_sum_legs(friction), 0),
                          hx_lane(hx_sum_legs(gear), 0)};
   if (work->torso_rows) add_torso_losses(model, work, &losses);
+  if (work->pair_rows) add_pair_losses(model, work, &losses);
   return losses;
 }
 
@@ -381,6 +396,7 @@ typedef struct {
   hxReal stop[HX_JOINTS][HX_PACKS];        /* N m s  stops on the joints */
   hxVec3 moment[HX_FOOT_ROWS][HX_PACKS];   /* N m s  spin and rolling friction on tibias */
   hxReal spring[HX_JOINTS][HX_PACKS];      /* N m s  elastic gears on the links */
+  hxVec3 pair[HX_PAIR_ROWS][HX_PACKS];     /* N s    each leg's next leg on it */
 } hxImpulses;
 
 /* Sets the impulses to 0; those of other contacts than feet, of stops and of moments only where
@@ -392,6 +408,7 @@ static inline void hx_clear_impulses(const hxModel *model, hxImpulses *sum) {
   if (model->stops) memset(sum->stop, 0, sizeof sum->stop);
   if (model->elastic) memset(sum->spring, 0, sizeof sum->spring);
   if (has_turning_friction(model, HX_FOOT)) memset(sum->moment, 0, sizeof sum->moment);
+  if (model->pair_rows) memset(sum->pair, 0, sizeof sum->pair);
 }
 
 /* Adds a stage's impulses of the stops of a leg. */
@@ -462,6 +479,9 @@ HX_RARE void add_further_impulses(const hxModel *model, const hxImplicit *implic
         hx_add_scaled(sum->torso[pack], w,
                       stage_force(model, implicit, implicit ? &implicit->torso_slope[pack] : NULL,
                                   work->torso_acceleration, &work->torso_contact[pack]));
+  for (int pair = 0; work->pair_rows && pair < HX_PAIR_ROWS; ++pair)
+    for (int pack = 0; pack < HX_PACKS; ++pack)
+      sum->pair[pair][pack] = hx_add_scaled(sum->pair[pair][pack], w, work->pair[pair][pack].force);
 }
 
 /* Adds a stage's impulses: weight times the forces that the stage's accelerations contain, with
@@ -493,7 +513,7 @@ static inline void hx_add_impulses(const hxModel *model, const hxCommand *comman
     if (model->stops) add_stop_impulses(implicit, pack, leg, weight, sum);
     if (has_turning_friction(model, HX_FOOT)) add_moment_impulses(implicit, pack, leg, weight, sum);
   }
-  if (model->rows + model->torso_rows > 1) add_further_impulses(model, implicit, work, weight, sum);
+  if (model->listed > 1) add_further_impulses(model, implicit, work, weight, sum);
   for (int i = 0; i < 3; ++i) {
     sum->push[i] += weight * command->push_force[i];
     sum->push[3 + i] += weight * command->push_torque[i];
@@ -539,7 +559,7 @@ static void hx_dynamics_evaluate(const hxModel *model, const hxContactState *con
     hxMotion6 a = work->torso_acceleration;
     for (int joint = 0; joint < HX_JOINTS; ++joint)
       sweep_motion(model, &work->pack[pack].joint[joint], &a);
-    if (reactions) leg_multipliers(model, implicit, pack, &work->pack[pack]);
+    if (reactions) leg_multipliers(model, implicit, pack, work->pair_rows, &work->pack[pack]);
   }
   /* dy/dt, or k/h of the stage */
   store_torso_rate(model, motion, implicit, work, rate);

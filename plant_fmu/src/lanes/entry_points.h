@@ -128,6 +128,11 @@ static void trapezoidal_impulses(const hxModel *model, const hxWork *work, doubl
   for (int pack = 0; model->torso_rows && pack < HX_TORSO_PACKS; ++pack)
     impulses->torso[pack] = vec3_impulse(work->torso_contact[pack].force, hx_splat(0.5 * h),
                                          pack * HX_LANES, completed->contact[HX_TORSO]);
+  for (int pair = 0; model->pair_rows && pair < HX_PAIR_ROWS; ++pair)
+    for (int pack = 0; pack < HX_PACKS; ++pack)
+      impulses->pair[pair][pack] =
+          vec3_impulse(work->pair[pair][pack].force, hx_splat(0.5 * h), pack * HX_LANES,
+                       completed->contact[HX_PAIR + pair]);
   completed->known = 1.0;
 }
 
@@ -179,8 +184,9 @@ static void kernel_measure(const hxModel *model, const hxCommand *command, hxSta
     hx_fill_slots(state->completed.gear[joint]);
     hx_fill_slots(state->completed.stop[joint]);
   }
-  for (int k = 0; k < model->rows; ++k)
-    for (int i = 0; i < 3; ++i) hx_fill_slots(state->completed.contact[model->row[k]][i]);
+  for (int k = 0; k < model->listed; ++k)
+    for (int i = 0; i < 3 && model->row[k] != HX_TORSO; ++i)
+      hx_fill_slots(state->completed.contact[model->row[k]][i]);
   for (int row = 0; row < HX_FOOT_ROWS; ++row)
     for (int i = 0; i < 3; ++i) hx_fill_slots(state->completed.moment[row][i]);
 }

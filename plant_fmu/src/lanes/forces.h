@@ -7,6 +7,7 @@
 #ifndef HX_FORCES_H
 #define HX_FORCES_H
 
+#include "clearance.h"
 #include "work.h"
 
 /* ---- root to leaf: kinematics and forces ---- */
@@ -301,6 +302,25 @@ HX_RARE void torso_contacts(const hxModel *model, const hxContactState *state,
   }
 }
 
+/* Applies what other legs exert on a femur or tibia. */
+static inline void push_link(hxJointWork *link, const hxForce6 *wrench) {
+  push_body(&link->p, link->c, wrench->lin);
+  turn_body(&link->p, wrench->ang);
+}
+
+/* Computes the forces between neighbouring legs and applies them. */
+HX_RARE void leg_pairs(const hxModel *model, const hxContactState *state,
+                       const hxPlantMotion *motion, int all, hxWork *work) {
+  for (int row = HX_PAIR; row < HX_ROWS; ++row)
+    for (int slot = 0; slot < HX_PACKS * HX_LANES; slot += HX_LANES)
+      work->pair_rows |= all || is_used(state, row, slot);
+  if (!work->pair_rows) return;
+  hx_pair_forces(model, state, motion, work);
+  for (int pack = 0; pack < HX_PACKS; ++pack)
+    for (int line = 0; line < HX_LINES; ++line)
+      push_link(&work->pack[pack].joint[1 + line], &work->pack[pack].by_legs[line]);
+}
+
 /* Computes orientation and inertia of the torso. */
 static inline void torso_pass(const hxModel *model, const hxPlantMotion *motion, hxWork *work) {
   const hxNumber *J = model->torso_inertia;
@@ -331,6 +351,8 @@ static inline void hx_dynamics_forces(const hxModel *model, const hxContactState
     leg_contacts(model, contact, motion, pack * HX_LANES, all, &work->pack[pack]);
   for (int pack = 0; model->spin && pack < HX_PACKS; ++pack)
     rotor_moments(model, &work->torso, &work->pack[pack]);
+  work->pair_rows = 0;
+  if (model->pair_rows) leg_pairs(model, contact, motion, all, work);
   for (int pack = 0; model->measured_friction && pack < HX_PACKS; ++pack)
     gear_frictions(model, pack * HX_LANES, &work->pack[pack]);
   work->torso_rows = 0;

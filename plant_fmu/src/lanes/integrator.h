@@ -44,7 +44,7 @@ typedef struct {
 /* Start of a step and the data that all its trials share. */
 typedef struct {
   const hxModel *model;   /* with all rows of contacts */
-  const hxModel *near;    /* without the rows of bodies while none of them touches the ground */
+  const hxModel *near;    /* without the rows of bodies and pairs while none of them touches */
   const hxModel *pressed; /* the same with one row of feet while no other touches the ground */
   const hxCommand *command, *ramp; /* command and its change per second; ramp NULL: constant */
   const hxContactState *contact;
@@ -255,6 +255,8 @@ static double deepest_open(const hxModel *model, const hxStart *start, const hxD
   for (int k = 1; k < model->rows; ++k)
     depth = deepest_open_of(start->contact, depths, model->row[k], HX_LEGS, depth);
   if (model->torso_rows) depth = deepest_open_of(start->contact, depths, HX_TORSO, HX_SLOTS, depth);
+  for (int k = model->listed - model->pair_rows; k < model->listed; ++k)
+    depth = deepest_open_of(start->contact, depths, model->row[k], HX_LEGS, depth);
   for (int leg = 0; model->terrain && leg < HX_LEGS; ++leg)
     depth = fmax(depth, depths->outside[leg]);
   return depth;
@@ -306,7 +308,7 @@ static double expected_touch(const hxStart *start, double t_low, const hxDepths 
   const double h = t_high - t_low, level = 0.5 * start->touch;
   const hxModel *model = start->model;
   double first = 1.0;
-  for (int k = 0; k < model->rows + model->torso_rows; ++k)
+  for (int k = 0; k < model->listed; ++k)
     first = fmin(first, first_crossing(start, model->row[k], h, low, high, level));
   if (model->terrain) first = fmin(first, first_exit(low, high, level));
   return t_low + first * h;
@@ -539,7 +541,8 @@ static int is_pressed(const hxModel *model, const hxContactState *contact, int f
 HX_RARE const hxModel *feet_alone(const hxModel *model, int rows, hxModel *feet) {
   *feet = *model;
   feet->rows = feet->foot_rows = rows;
-  feet->torso_rows = 0;
+  feet->listed = rows;
+  feet->torso_rows = feet->pair_rows = 0;
   return feet;
 }
 
@@ -556,7 +559,7 @@ static hxStatus run_to(const hxModel *model, const hxCommand *command, const hxC
                    .y = &state->motion,
                    .footprints = events->footprints,
                    .scratch = scratch};
-  const int rows = model->rows + model->torso_rows, foot_rows = model->foot_rows;
+  const int rows = model->listed, foot_rows = model->foot_rows;
   const hxModel *all_feet = rows > foot_rows ? feet_alone(model, foot_rows, &scratch->feet) : model,
                 *first_feet = foot_rows > 1 ? feet_alone(model, 1, &scratch->tops) : all_feet;
   start.touch = fmax(touch_depth[0], touch_depth[1] * model->tolerance);

@@ -12,6 +12,7 @@
 #define HX_MEASURE_H
 
 #include "../contact_law.h"
+#include "clearance.h"
 #include "dynamics.h"
 #include "soil_path.h"
 
@@ -154,6 +155,8 @@ static inline double hx_moment_and_bound(const hxModel *model, const hxModel *wh
   if (model->foot_rows > 1) hx_moment_shares(model, state, moment);
   if (model->torso_rows) torso_moment(model, state, motion, all, &torso, moment);
   if (whole && whole->torso_rows) bound = torso_depth_bound(whole, motion, &torso.R_WB, bound);
+  if (model->pair_rows) hx_pair_moments(model, motion, moment);
+  if (whole && whole->pair_rows) bound = hx_max(bound, hx_deepest_pair(whole, motion));
   moment->stale = 0.0;
   if (model->elastic) {
     memcpy(moment->deflection, motion->deflection, sizeof moment->deflection);
@@ -171,8 +174,7 @@ static inline void hx_moment_of(const hxModel *model, const hxContactState *stat
 /* Copies a moment, of contacts those of the model's rows. */
 static inline void hx_copy_moment(const hxModel *model, hxMoment *to, const hxMoment *from) {
   memcpy(to, from, offsetof(hxMoment, contact[1]));
-  for (int k = 1; k < model->rows + model->torso_rows; ++k)
-    to->contact[model->row[k]] = from->contact[model->row[k]];
+  for (int k = 1; k < model->listed; ++k) to->contact[model->row[k]] = from->contact[model->row[k]];
   if (model->foot_rows > 1) memcpy(to->share, from->share, sizeof to->share);
   if (model->elastic) hx_copy_gears(to, from);
 }
@@ -198,7 +200,7 @@ HX_RARE void places_on_grid(const hxModel *model, const hxContactState *state,
 /* Copies penetration and approach speed of all contacts. */
 static inline void hx_depths_of_moment(const hxModel *model, const hxContactState *state,
                                        const hxMoment *moment, hxDepths *depths) {
-  for (int k = 0; k < model->rows + model->torso_rows; ++k) {
+  for (int k = 0; k < model->listed; ++k) {
     const hxContactMoment *contact = &moment->contact[model->row[k]];
     memcpy(depths->delta[model->row[k]], contact->delta, sizeof contact->delta);
     memcpy(depths->ddelta[model->row[k]], contact->ddelta, sizeof contact->ddelta);
@@ -228,8 +230,9 @@ static inline void fill_lines(void *structure, size_t lines) {
 /* Copies leg 0 into the unused slots of all measurements. */
 static inline void hx_fill_measured_slots(const hxModel *model, hxState *state) {
   fill_lines(&state->moment, HX_MOMENT_LINES);
-  for (int k = 0; k < model->rows; ++k)
-    fill_lines(&state->moment.contact[model->row[k]], HX_CONTACT_LINES);
+  for (int k = 0; k < model->listed; ++k)
+    if (model->row[k] != HX_TORSO)
+      fill_lines(&state->moment.contact[model->row[k]], HX_CONTACT_LINES);
   fill_lines(&state->measured, HX_MEASURED_LINES);
 }
 
@@ -378,6 +381,17 @@ HX_RARE void torso_works(const hxPath *path, const hxImpulses *impulse, hxStepWo
   works->torso_friction = hx_sum_slots(friction);
 }
 
+/* Adds the losses of contacts between legs. */
+HX_RARE void add_pair_works(const hxPath *path, const hxImpulses *impulse, hxStepWorks *works) {
+  for (int row = HX_PAIR; row < HX_ROWS; ++row)
+    for (int pack = 0; pack < HX_PACKS; ++pack) {
+      hxReal contact, friction;
+      contact_works(path, row, pack * HX_LANES, impulse->pair[row - HX_PAIR][pack], &contact,
+                    &friction);
+      works->contact[pack] += contact, works->friction[pack] += friction;
+    }
+}
+
 /* Returns the energy that a joint's stops store, J. */
 static inline hxReal stored_in_stop(const hxModel *model, int joint, int slot, hxReal angle) {
   const hxReal x = hx_overrun(model, joint, slot, angle);
@@ -451,6 +465,7 @@ static inline void hx_step_works(const hxPath *path, const hxImpulses *impulse,
   }
   works->torso_contact = works->torso_friction = 0.0;
   if (path->model->torso_rows) torso_works(path, impulse, works);
+  if (path->model->pair_rows) add_pair_works(path, impulse, works);
 }
 
 /* ---- joints ---- */

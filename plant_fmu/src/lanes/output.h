@@ -71,6 +71,17 @@ static hxNumber torso_elastic_energy(const hxWork *work) {
   return hx_sum_slots(energy);
 }
 
+/* Returns the elastic energy of contacts between legs, J. */
+static hxNumber pair_elastic_energy(const hxWork *work) {
+  hxReal energy[HX_PACKS];
+  for (int pack = 0; pack < HX_PACKS; ++pack) {
+    energy[pack] = elastic_energy(&work->pair[0][pack]);
+    for (int pair = 1; pair < HX_PAIR_ROWS; ++pair)
+      energy[pack] += elastic_energy(&work->pair[pair][pack]);
+  }
+  return hx_lane(hx_sum_legs(energy), 0);
+}
+
 /* Returns the energy k x^2/2 that the stops of a leg store, J. */
 static hxReal stop_energy(const hxModel *model, const hxLegWork *leg, int slot) {
   hxReal energy = hx_splat(0.0);
@@ -98,9 +109,10 @@ static hxNumber hx_potential_energy(const hxModel *model, const hxPlantMotion *m
       legs[pack] -= hx_load(&model->joint[joint].mass[slot]) *
                     hx_dot(g, hx_link_vec3(motion, joint, HX_R, slot));
   }
-  const hxNumber sum =
+  hxNumber sum =
       hx_lane(hx_sum_legs(legs) - model->torso_mass * hx_dot(g, hx_torso_vec3(motion, HX_R)), 0);
-  return model->torso_rows ? sum + torso_elastic_energy(work) : sum;
+  if (model->torso_rows) sum += torso_elastic_energy(work);
+  return model->pair_rows ? sum + pair_elastic_energy(work) : sum;
 }
 
 /* Fills the temperatures of a joint's servo. */
@@ -207,6 +219,13 @@ static void fill_body_row(const hxModel *model, const hxLegWork *work, int row, 
     if (model->row[k] == row) get3(work->contact[row].force, lane, force);
 }
 
+/* Fills the force of neighbouring legs on femur and tibia. */
+static void fill_neighbour_force(const hxModel *model, const hxLegWork *work, int lane,
+                                 hxNumber force[3]) {
+  for (int i = 0; i < 3; ++i) force[i] = 0.0;
+  if (model->pair_rows) get3(hx_add3(work->by_legs[0].lin, work->by_legs[1].lin), lane, force);
+}
+
 /* Fills the sum of the ground's forces on the torso's corners. */
 static void fill_torso_contact(const hxModel *model, const hxWork *work, hxNumber force[3]) {
   hxReal x[HX_TORSO_PACKS], y[HX_TORSO_PACKS], z[HX_TORSO_PACKS];
@@ -217,6 +236,34 @@ static void fill_torso_contact(const hxModel *model, const hxWork *work, hxNumbe
     x[pack] = f.x, y[pack] = f.y, z[pack] = f.z;
   }
   force[0] = hx_sum_slots(x), force[1] = hx_sum_slots(y), force[2] = hx_sum_slots(z);
+}
+
+/* Returns the penetration of a row of the tibia; -1 where the model has no such row. */
+static hxNumber depth_of_row(const hxModel *model, const hxLegWork *work, int row, int lane) {
+  for (int k = model->foot_rows; k < model->rows; ++k)
+    if (model->row[k] == row) return hx_lane(work->contact[row].kin.delta, lane);
+  return -1.0;
+}
+
+/* Fills the penetrations of all contacts. */
+static void fill_depths(const hxModel *model, const hxWork *work, hxIndicators *depth) {
+  for (int leg = 0; leg < HX_LEGS; ++leg) {
+    int lane;
+    const hxLegWork *w = leg_work(work, leg, &lane);
+    depth->foot[leg] = hx_lane(w->contact[HX_FOOT].kin.delta, lane);
+    depth->knee[leg] = depth_of_row(model, w, HX_KNEE, lane);
+    depth->shank[leg] = depth_of_row(model, w, HX_SHANK, lane);
+    for (int pair = 0; pair < HX_PAIR_ROWS; ++pair) {
+      depth->neighbour[leg][pair] = -1.0;
+      if (model->pair_rows)
+        depth->neighbour[leg][pair] = hx_lane(work->pair[pair][leg / HX_LANES].kin.delta, lane);
+    }
+  }
+  for (int slot = 0; slot < HX_CORNERS; ++slot) {
+    depth->torso[slot] = -1.0;
+    if (model->torso_rows)
+      depth->torso[slot] = hx_lane(work->torso_contact[slot / HX_LANES].kin.delta, slot % HX_LANES);
+  }
 }
 
 /* Fills the outputs of torso and IMU. */
@@ -284,10 +331,12 @@ static void hx_output_fill(const hxModel *model, const hxState *state, const hxW
     fill_foot(model, state, w, tibia, lane, leg, o);
     fill_body_row(model, w, HX_KNEE, lane, o->body.knee_force[leg]);
     fill_body_row(model, w, HX_SHANK, lane, o->body.shank_force[leg]);
+    fill_neighbour_force(model, w, lane, o->body.neighbour_force[leg]);
   }
   fill_torso(&state->motion, work, o);
   fill_torso_contact(model, work, o->torso.contact_force);
   hx_clearances(model, &state->motion, work, o->body.clearance);
+  fill_depths(model, work, &o->depth);
   o->supply_voltage = 0.0; /* likewise: it belongs to the command */
   o->footprints = 0.0;     /* hx_plant_output() counts them: they are outside the state */
   for (int i = 0; i < HX_CONE_BINS; ++i) o->cone_time[i] = state->measured.cone_time[i];

@@ -60,10 +60,14 @@ typedef struct {
   } reaction;
 } hxJointWork;
 
+enum { HX_LINES = 2 }; /* bodies of a leg that other legs may touch: femur and tibia */
+
 typedef struct {
   hxJointWork joint[HX_JOINTS];
   int rows, row[HX_TIBIA_ROWS]; /* rows of contacts that this evaluation computes */
   hxContactWork contact[HX_TIBIA_ROWS];
+  hxForce6 by_legs[HX_LINES]; /* of other legs on femur and tibia, about their centres of mass; set
+                               * where contacts between legs are computed */
 } hxLegWork;
 
 enum { HX_TORSO_PACKS = HX_SLOTS / HX_LANES }; /* packs that hold all contacts of the torso */
@@ -75,6 +79,8 @@ typedef struct {
   int torso_rows;               /* 1: this evaluation computes the torso's contacts */
   hxContactWork torso_contact[HX_TORSO_PACKS];
   hxForce6 torso_p[HX_TORSO_PACKS]; /* less forces of the ground on the torso, as hxJointWork.p */
+  int pair_rows;                    /* 1: this evaluation computes contacts between legs */
+  hxContactWork pair[HX_PAIR_ROWS][HX_PACKS]; /* of each leg with the next one */
   hxLegWork pack[HX_PACKS];
 } hxWork;
 
