@@ -125,9 +125,14 @@ class Job:
         }
 
 
+def on_terrain(robot: Robot, table: Mapping[str, Any]) -> Robot:
+    """Returns the robot on the surface of a table [terrain]."""
+    return replace(robot, terrain=read_terrain(table, "benchmark"))
+
+
 def on_waves(walk: Walk) -> Job:
     """Returns a walk of the family over the waves."""
-    robot = replace(walk.robot, terrain=read_terrain(WAVES, "benchmark"))
+    robot = on_terrain(walk.robot, WAVES)
     return Job(name=walk.name, robot=robot, commands=list(commands(walk)))
 
 
@@ -136,7 +141,7 @@ def landing(*, field: bool) -> Job:
     robot = load_robot("athena")
     robot = replace(robot, foot=replace(robot.foot, radius=SMALL_FOOT))
     if field:
-        robot = replace(robot, terrain=read_terrain(LEVEL, "benchmark"))
+        robot = on_terrain(robot, LEVEL)
     hold = [Command(angle_ref=robot.stance)] * round(FALL / STEP)
     name = f"landing-{'field' if field else 'plane'}"
     return Job(name=name, robot=robot, commands=hold, height=SMALL_FOOT, speed=IMPACT_SPEED)

@@ -8,6 +8,7 @@ from statistics import median
 from typing import Any
 
 from benchmarks.ground import FORCE_STEPS, MUJOCO
+from benchmarks.ground_cost import BLOCKS, FIELD, PLANE, SOIL
 from benchmarks.series import OURS
 from benchmarks.table import Row
 from benchmarks.walks import DURATION
@@ -16,19 +17,40 @@ Record = Mapping[str, Any]
 
 TARGETS = (1e-3, 1e-4, 1e-5)  # m    errors at which the engines are compared
 LOAD_GOAL = 1.0  # s
+COST_GOALS = {FIELD: 1.3, BLOCKS: 1.3, SOIL: 1.5}  # 1    time of a walk over the plane's
 FIXED = {OURS: "rosw3-fixed", MUJOCO: "implicitfast-fixed"}  # whose forces are compared
 
 
 def ground_rows(
-    walks: Sequence[Record], landings: Sequence[Record], maps: Sequence[Record]
+    costs: Sequence[Record],
+    walks: Sequence[Record],
+    landings: Sequence[Record],
+    maps: Sequence[Record],
 ) -> list[Row]:
-    """Returns the rows of walks, foot forces, landings and maps."""
+    """Returns the rows of costs, walks, foot forces, landings and maps."""
     return [
+        *_costs(costs),
         *_at_equal_error(walks),
         *_forces(walks),
         *_landings(landings),
         *_maps(maps),
     ]
+
+
+def _costs(costs: Sequence[Record]) -> Iterator[Row]:
+    """Yields the time of a walk over that of the same walk on the plane, by ground."""
+    (plane,) = (cost for cost in costs if cost["ground"] == PLANE)
+    for cost in costs:
+        if cost is plane:
+            continue
+        more = cost["evaluations"] / plane["evaluations"]
+        yield Row(
+            figure=f"walk on {cost['ground']} ({cost['terrain']}), {more:.2f} x the evaluations: "
+            "time over the plane's",
+            unit="1",
+            ours=cost["seconds"] / plane["seconds"],
+            goal=COST_GOALS[cost["ground"]],
+        )
 
 
 def _at_equal_error(walks: Sequence[Record]) -> Iterator[Row]:

@@ -25,6 +25,7 @@ from rich.progress import track
 from benchmarks import BUILD, ROOT
 from benchmarks.figure import draw
 from benchmarks.ground import landings, walks_over_waves
+from benchmarks.ground_cost import ground_costs
 from benchmarks.ground_map import map_costs
 from benchmarks.ground_table import ground_rows
 from benchmarks.judge import agreement, spreads
@@ -99,10 +100,11 @@ def measured_ground(tools: Tools, folder: Path, *, quick: bool) -> list[Row]:
     folder.mkdir(parents=True, exist_ok=True)
     facts = json.dumps(described(tools), indent=2)
     (folder / "machine.json").write_text(f"{facts}\n", encoding="utf-8")
-    walks = walks_over_waves(tools, quick=quick)
+    costs, walks = ground_costs(tools, quick=quick), walks_over_waves(tools, quick=quick)
     landed, maps = landings(tools), map_costs(tools, quick=quick)
-    found = ground_rows(walks, landed, maps)
+    found = ground_rows(costs, walks, landed, maps)
     records = {"ground": walks, "ground_landings": landed, "ground_maps": maps}
+    records["ground_costs"] = costs
     records["ground_table"] = [asdict(row) | {"met": row.met} for row in found]
     for name, content in records.items():
         _write_csv(folder / f"{name}.csv", content)

@@ -114,13 +114,18 @@ def _reachable(command: BodyCommand, robot: Robot, gait: Gait) -> bool:
     return True
 
 
-def commands(walk: Walk) -> Iterator[Command]:
-    """Yields the commands of the servos at k h, without feedback."""
+def commands(walk: Walk, *, steps: int | None = None) -> Iterator[Command]:
+    """Yields the commands of the servos at k h, without feedback; each has arrays of its own.
+
+    `steps` replaces the number of macro-steps.
+    """
     controller, nothing = Controller(walk.robot, period=STEP, gait=walk.gait), Measurement()
-    for k in range(walk.steps):
+    for k in range(walk.steps if steps is None else steps):
         joints = controller.step(k * STEP, walk.command, nothing)
         yield Command(
-            angle_ref=joints.angle_ref, speed_ref=joints.speed_ref, torque_ref=joints.torque_ref
+            angle_ref=joints.angle_ref.copy(),
+            speed_ref=joints.speed_ref.copy(),
+            torque_ref=joints.torque_ref.copy(),
         )
 
 

@@ -78,6 +78,20 @@ static inline int share_a_spot(const hxSharers *of, double radius,
   return found;
 }
 
+/* Computes the shares of two contacts: both carry, or the deeper one where the other would pull. */
+static inline void share_between_two(const hxNumber depth[2], hxNumber G, hxNumber share[2]) {
+  const double singular = 1e-9; /* as in solve_carriers */
+  const hxNumber pivot = 1.0 - G * G, second = (depth[1] - G * depth[0]) / pivot,
+                 first = depth[0] - G * second;
+  const double alone[2] = {hx_re(depth[0]) * hx_re(depth[0]), hx_re(depth[1]) * hx_re(depth[1])},
+               both = hx_re(first) * hx_re(depth[0]) + hx_re(second) * hx_re(depth[1]);
+  const int deeper = alone[1] > alone[0];
+  const int carry = hx_re(pivot) > singular && hx_re(first) >= 0.0 && hx_re(second) >= 0.0 &&
+                    both > alone[deeper];
+  share[0] = carry ? first / depth[0] : (hxNumber)(deeper ? 0.0 : 1.0);
+  share[1] = carry ? second / depth[1] : (hxNumber)(deeper ? 1.0 : 0.0);
+}
+
 /* Computes the shares of contacts: of all choices that only push, that with the largest lambda .
  * delta is the solution. */
 static inline void hx_shares(const hxSharers *of, double radius, hxNumber share[HX_SHARERS]) {
@@ -85,6 +99,10 @@ static inline void hx_shares(const hxSharers *of, double radius, hxNumber share[
   double best = -1.0;
   for (int i = 0; i < of->count; ++i) share[i] = 1.0;
   if (of->count < 2 || !share_a_spot(of, radius, G)) return;
+  if (of->count == 2) {
+    share_between_two(of->depth, G[1][0], share);
+    return;
+  }
   for (int mask = 1; mask < 1 << of->count; ++mask) {
     hxCarriers at = {.size = 0};
     double value = 0.0;

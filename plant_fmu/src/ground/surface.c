@@ -143,7 +143,7 @@ static int check_soil_of_blocks(const hxTerrain *terrain, char *message) {
 }
 
 /* Reach of a tile: m, and cells at least. Tiles have at least two cells along an edge. */
-static const double least_reach = 0.02;
+static const double least_reach = HX_LEAST_REACH;
 
 static int64_t cells_of_reach(const hxGridHead *head) {
   const double cells = ceil(least_reach / head->cell);
@@ -338,14 +338,10 @@ static void smooth_face(const hxTerrain *terrain, const double point[3], int ben
 
 /* ---- blocks ---- */
 
-static int64_t clamped_index(double u, int64_t n) {
-  return !(u > 0.0) ? 0 : u >= (double)(n - 1) ? n - 1 : (int64_t)u; /* NaN: 0 */
-}
-
 void hx_terrain_cell_at(const hxTerrain *terrain, const double point[3], double cell[2]) {
   const hxGridHead *head = &terrain->head;
-  const int64_t col = clamped_index((point[0] - head->x0) / head->cell, head->cols);
-  const int64_t row = clamped_index((point[1] - head->y0) / head->cell, head->rows);
+  const int64_t col = hx_cell_index((point[0] - head->x0) / head->cell, head->cols);
+  const int64_t row = hx_cell_index((point[1] - head->y0) / head->cell, head->rows);
   cell[0] = (double)col;
   cell[1] = (double)row;
 }
@@ -364,15 +360,33 @@ double hx_terrain_outside(const hxTerrain *terrain, const double point[3], const
               outside_along(point[1], head->y0, head->cell, cell[1], head->rows));
 }
 
-double hx_terrain_column(const hxTerrain *terrain, double col, double row) {
+/* A cell: its column and row, the height of its top, and the ways to those beside it, 0 at the
+ * border. */
+typedef struct {
+  double col, row, own; /* 1, 1, m */
+  const double *height; /* of its own top, in the grid */
+  int64_t left, right;  /* from it to the heights beside it */
+  int64_t below, above; /* along y */
+} hxCellAt;
+
+static void set_cell(const hxTerrain *terrain, const double cell[2], hxCellAt *at) {
   const hxGridHead *head = &terrain->head;
-  const int64_t c = clamped_index(col, head->cols), r = clamped_index(row, head->rows);
-  return terrain->height[r * head->cols + c];
+  const int64_t c = hx_cell_index(cell[0], head->cols), r = hx_cell_index(cell[1], head->rows);
+  at->col = cell[0], at->row = cell[1];
+  at->height = terrain->height + r * head->cols + c;
+  at->own = *at->height;
+  at->left = c > 0 ? -1 : 0, at->right = c < head->cols - 1 ? 1 : 0;
+  at->below = r > 0 ? -head->cols : 0, at->above = r < head->rows - 1 ? head->cols : 0;
 }
 
-static void top_face(const hxTerrain *terrain, const double point[3], const double cell[2],
-                     hxFace *face) {
-  *face = (hxFace){point[2] - hx_terrain_column(terrain, cell[0], cell[1]), {0.0, 0.0, 1.0}, {0.0}};
+/* Returns the height of the top of the cell at offsets -1, 0 or 1. */
+static double top_beside(const hxCellAt *at, int i, int j) {
+  return at->height[(i < 0   ? at->left
+                     : i > 0 ? at->right
+                             : 0) +
+                    (j < 0   ? at->below
+                     : j > 0 ? at->above
+                             : 0)];
 }
 
 /* Returns the gap between a point and the column at offset -1, 0 or 1 from the cell along an axis,
@@ -382,72 +396,86 @@ static double gap_to(double x, double origin, double size, double cell, int offs
   return offset > 0 ? low + size - x : offset < 0 ? x - low : 0.0;
 }
 
-/* Keeps the face with this distance vector from the column's nearest point if it is nearer. */
-static void keep_nearer(const double away[3], hxFace *face) {
-  const double d = sqrt(away[0] * away[0] + away[1] * away[1] + away[2] * away[2]);
-  if (!(d < face->distance)) return;
+/* The nearest of several faces: its distance, and the vector from its nearest point, or a plane's
+ * normal. */
+typedef struct {
+  double distance, away[3];
+  int is_plane;
+} hxNearestFace;
+
+/* Keeps the face with this distance vector from the column's nearest point if it is nearer. A
+ * distance is not less than any component of its vector, also when it is rounded. */
+static void keep_nearer(double x, double y, double z, hxNearestFace *face) {
+  const double limit = face->distance;
+  if (fabs(x) >= limit || fabs(y) >= limit || fabs(z) >= limit) return;
+  const double d = sqrt(x * x + y * y + z * z);
+  if (!(d < limit)) return;
+  face->distance = d, face->is_plane = 0;
+  face->away[0] = x, face->away[1] = y, face->away[2] = z;
+}
+
+/* Keeps a level or a vertical plane if it is nearer. */
+static void keep_plane(double distance, int axis, double sign, hxNearestFace *face) {
+  if (!(distance < face->distance)) return;
+  face->distance = distance, face->is_plane = 1;
+  for (int i = 0; i < 3; ++i) face->away[i] = i == axis ? sign : 0.0;
+}
+
+/* Keeps the nearest face or edge of a column beside the cell, at offset sign along an axis. */
+static void side_column(double gap, double above, int axis, int sign, hxNearestFace *face) {
+  if (above <= 0.0)
+    keep_plane(gap, axis, (double)-sign, face);
+  else if (gap <= 0.0)
+    keep_plane(above, 2, 1.0, face);
+  else
+    keep_nearer(axis == 0 ? -sign * gap : 0.0, axis == 1 ? -sign * gap : 0.0, above, face);
+}
+
+/* Keeps the nearest face of higher columns beside a cell, along x (0) or y (1). */
+static void wall_faces(const hxTerrain *terrain, const double point[3], const hxCellAt *at,
+                       int axis, hxNearestFace *face) {
+  const hxGridHead *head = &terrain->head;
+  const double origin = axis == 0 ? head->x0 : head->y0, cell = axis == 0 ? at->col : at->row;
+  for (int k = -1; k <= 1; k += 2) {
+    const double top = top_beside(at, axis == 0 ? k : 0, axis == 1 ? k : 0);
+    if (top > at->own)
+      side_column(gap_to(point[axis], origin, head->cell, cell, k), point[2] - top, axis, k, face);
+  }
+}
+
+/* Keeps the nearest wall, edge or corner of higher columns across the corners of a cell. */
+static void corner_faces(const hxTerrain *terrain, const double point[3], const hxCellAt *at,
+                         hxNearestFace *face) {
+  const hxGridHead *head = &terrain->head;
+  for (int i = -1; i <= 1; i += 2)
+    for (int j = -1; j <= 1; j += 2) {
+      const double top = top_beside(at, i, j);
+      if (!(top > at->own)) continue;
+      const double x = gap_to(point[0], head->x0, head->cell, at->col, i),
+                   y = gap_to(point[1], head->y0, head->cell, at->row, j);
+      const double ax = x > 0.0 ? -i * x : 0.0, ay = y > 0.0 ? -j * y : 0.0,
+                   az = point[2] > top ? point[2] - top : 0.0;
+      if (ax != 0.0 || ay != 0.0 || az != 0.0) keep_nearer(ax, ay, az, face);
+    }
+}
+
+/* Sets a face from the nearest one: its normal, and at edges the normal's derivative. */
+static void set_face(const hxNearestFace *nearest, int bends, hxFace *face) {
+  const double *away = nearest->away, d = nearest->distance;
   face->distance = d;
-  for (int i = 0; i < 3; ++i) face->normal[i] = away[i] / d;
-  const double *n = face->normal;
+  for (int i = 0; i < 3; ++i) face->normal[i] = nearest->is_plane ? away[i] : away[i] / d;
+  if (!bends) return;
+  for (int i = 0; i < 6; ++i) face->bend[i] = 0.0;
   const int edges = (away[0] != 0.0) + (away[1] != 0.0) + (away[2] != 0.0);
+  if (nearest->is_plane || edges < 2) return;
+  const double *n = face->normal;
   const double bend[6] = {(away[0] != 0.0) - n[0] * n[0],
                           (away[1] != 0.0) - n[1] * n[1],
                           (away[2] != 0.0) - n[2] * n[2],
                           -n[0] * n[1],
                           -n[0] * n[2],
                           -n[1] * n[2]};
-  for (int i = 0; i < 6; ++i) face->bend[i] = edges > 1 ? bend[i] / d : 0.0;
-}
-
-/* Keeps a level or a vertical plane if it is nearer. */
-static void keep_plane(double distance, int axis, double sign, hxFace *face) {
-  if (!(distance < face->distance)) return;
-  *face = (hxFace){.distance = distance};
-  face->normal[axis] = sign;
-}
-
-/* Keeps the nearest face or edge of a column beside the cell, at offset sign along an axis. */
-static void side_column(double gap, double above, int axis, int sign, hxFace *face) {
-  if (above <= 0.0) {
-    keep_plane(gap, axis, (double)-sign, face);
-  } else if (gap <= 0.0) {
-    keep_plane(above, 2, 1.0, face);
-  } else {
-    double away[3] = {0.0, 0.0, above};
-    away[axis] = -sign * gap;
-    keep_nearer(away, face);
-  }
-}
-
-/* Keeps the nearest face of higher columns beside a cell, along x (0) or y (1). */
-static void wall_faces(const hxTerrain *terrain, const double point[3], const double cell[2],
-                       int axis, hxFace *face) {
-  const hxGridHead *head = &terrain->head;
-  const double own = hx_terrain_column(terrain, cell[0], cell[1]);
-  const double origin = axis == 0 ? head->x0 : head->y0;
-  for (int k = -1; k <= 1; k += 2) {
-    const double top =
-        hx_terrain_column(terrain, cell[0] + (axis == 0 ? k : 0), cell[1] + (axis == 1 ? k : 0));
-    const double gap = gap_to(point[axis], origin, head->cell, cell[axis], k);
-    if (top > own) side_column(gap, point[2] - top, axis, k, face);
-  }
-}
-
-/* Keeps the nearest wall, edge or corner of higher columns across the corners of a cell. */
-static void corner_faces(const hxTerrain *terrain, const double point[3], const double cell[2],
-                         hxFace *face) {
-  const hxGridHead *head = &terrain->head;
-  const double own = hx_terrain_column(terrain, cell[0], cell[1]);
-  for (int i = -1; i <= 1; i += 2)
-    for (int j = -1; j <= 1; j += 2) {
-      const double top = hx_terrain_column(terrain, cell[0] + i, cell[1] + j);
-      if (!(top > own)) continue;
-      const double x = gap_to(point[0], head->x0, head->cell, cell[0], i),
-                   y = gap_to(point[1], head->y0, head->cell, cell[1], j);
-      const double away[3] = {x > 0.0 ? -i * x : 0.0, y > 0.0 ? -j * y : 0.0,
-                              point[2] > top ? point[2] - top : 0.0};
-      if (away[0] != 0.0 || away[1] != 0.0 || away[2] != 0.0) keep_nearer(away, face);
-    }
+  for (int i = 0; i < 6; ++i) face->bend[i] = bend[i] / d;
 }
 
 void hx_terrain_face(const hxTerrain *terrain, hxFaceKind kind, const double cell[2],
@@ -458,20 +486,42 @@ void hx_terrain_face(const hxTerrain *terrain, hxFaceKind kind, const double cel
     return;
   }
   if (cell[0] < 0.0) hx_terrain_cell_at(terrain, point, around);
-  *face = (hxFace){.distance = hx_far, .normal = {0.0, 0.0, 1.0}};
-  if (kind == HX_FACE_TOP || kind == HX_FACE_NEAREST) top_face(terrain, point, around, face);
-  if (kind == HX_FACE_WALL || kind == HX_FACE_NEAREST) wall_faces(terrain, point, around, 0, face);
-  if (kind == HX_FACE_SIDE || kind == HX_FACE_NEAREST) wall_faces(terrain, point, around, 1, face);
-  if (kind == HX_FACE_CORNER || kind == HX_FACE_NEAREST) corner_faces(terrain, point, around, face);
+  hxCellAt at;
+  set_cell(terrain, around, &at);
+  const int all = kind == HX_FACE_NEAREST;
+  hxNearestFace nearest = {hx_far, {0.0, 0.0, 1.0}, 1};
+  if (kind == HX_FACE_TOP || all) nearest.distance = point[2] - at.own;
+  if (kind == HX_FACE_WALL || all) wall_faces(terrain, point, &at, 0, &nearest);
+  if (kind == HX_FACE_SIDE || all) wall_faces(terrain, point, &at, 1, &nearest);
+  if (kind == HX_FACE_CORNER || all) corner_faces(terrain, point, &at, &nearest);
+  set_face(&nearest, bends, face);
 }
 
 /* ---- spheres above the ground ---- */
 
+double hx_terrain_top_around(const hxTerrain *terrain, const double centre[3]) {
+  const hxGridHead *head = &terrain->head;
+  const double x = (centre[0] - head->x0) * terrain->per_cell,
+               y = (centre[1] - head->y0) * terrain->per_cell,
+               reach = HX_LEAST_REACH * terrain->per_cell;
+  const double ends[4] = {x - reach, x + reach, y - reach, y + reach};
+  return hx_terrain_top_between(terrain, ends);
+}
+
+/* Returns whether the blocks are so large that few of them are within the least reach. */
+static int has_large_blocks(const hxTerrain *terrain) {
+  return terrain->head.kind == HX_SURFACE_BLOCKS && terrain->head.cell >= least_reach;
+}
+
 double hx_terrain_depth_bound(const hxTerrain *terrain, const double centre[3], double radius) {
   const hxGridHead *head = &terrain->head;
+  if (has_large_blocks(terrain) && radius < 0.9 * least_reach) {
+    const double above = centre[2] - hx_terrain_top_around(terrain, centre);
+    return radius - (above < least_reach ? above : least_reach);
+  }
   if (!(radius < terrain->reach)) return radius; /* unknown: the tile's map does not reach so far */
-  const int64_t col = clamped_index((centre[0] - head->x0) * terrain->per_tile, terrain->tile_cols);
-  const int64_t row = clamped_index((centre[1] - head->y0) * terrain->per_tile, terrain->tile_rows);
+  const int64_t col = hx_cell_index((centre[0] - head->x0) * terrain->per_tile, terrain->tile_cols);
+  const int64_t row = hx_cell_index((centre[1] - head->y0) * terrain->per_tile, terrain->tile_rows);
   const double above = centre[2] - terrain->top[row * terrain->tile_cols + col];
   return radius - (above < terrain->reach ? above : terrain->reach);
 }
@@ -493,8 +543,8 @@ const double *hx_terrain_material(const hxTerrain *terrain, const double point[3
   const hxGridHead *head = &terrain->head;
   const double shift = head->kind == HX_SURFACE_SMOOTH ? 0.5 : 0.0; /* the nearest node */
   if (!terrain->material) return NULL;
-  const int64_t c = clamped_index((point[0] - head->x0) / head->cell + shift, head->cols);
-  const int64_t r = clamped_index((point[1] - head->y0) / head->cell + shift, head->rows);
+  const int64_t c = hx_cell_index((point[0] - head->x0) / head->cell + shift, head->cols);
+  const int64_t r = hx_cell_index((point[1] - head->y0) / head->cell + shift, head->rows);
   const int m = terrain->material[r * head->cols + c];
   return m > 0 ? terrain->table + HX_MATERIAL_COLUMNS * (m - 1) : NULL;
 }

@@ -37,6 +37,8 @@ typedef struct hxFace {
   double bend[6];   /* 1/m  derivative of the normal by the point: xx yy zz xy xz yz */
 } hxFace;
 
+#define HX_LEAST_REACH 0.02 /* m  around a place, in which the highest ground is looked up */
+
 hxTerrainSurface hx_terrain_surface(const hxTerrain *terrain);
 double hx_terrain_cell_size(const hxTerrain *terrain);
 
@@ -45,8 +47,34 @@ double hx_terrain_cell_size(const hxTerrain *terrain);
 void hx_terrain_cell_at(const hxTerrain *terrain, const double point[3], double cell[2]);
 double hx_terrain_outside(const hxTerrain *terrain, const double point[3], const double cell[2]);
 
+/* Returns the index along a line of n cells of a coordinate in cells, of the border's beyond it. */
+static inline int64_t hx_cell_index(double u, int64_t n) {
+  return !(u > 0.0) ? 0 : u >= (double)(n - 1) ? n - 1 : (int64_t)u; /* NaN: 0 */
+}
+
 /* Returns the height of the top of a cell of blocks, of the border's where there is none. */
-double hx_terrain_column(const hxTerrain *terrain, double col, double row);
+static inline double hx_terrain_column(const hxTerrain *terrain, double col, double row) {
+  const hxGridHead *head = &terrain->head;
+  const int64_t c = hx_cell_index(col, head->cols), r = hx_cell_index(row, head->rows);
+  return terrain->height[r * head->cols + c];
+}
+
+static inline double hx_higher_of(double a, double b) { return a < b ? b : a; }
+
+/* Returns the highest top of the blocks between coordinates in cells: least and greatest along x,
+ * least and greatest along y. */
+static inline double hx_terrain_top_between(const hxTerrain *terrain, const double ends[4]) {
+  const hxGridHead *head = &terrain->head;
+  const int64_t c0 = hx_cell_index(ends[0], head->cols), c1 = hx_cell_index(ends[1], head->cols),
+                r0 = hx_cell_index(ends[2], head->rows), r1 = hx_cell_index(ends[3], head->rows);
+  const double *low = terrain->height + r0 * head->cols, *high = terrain->height + r1 * head->cols;
+  double top = hx_higher_of(hx_higher_of(low[c0], low[c1]), hx_higher_of(high[c0], high[c1]));
+  if (c1 - c0 < 2 && r1 - r0 < 2) return top;
+  for (int64_t row = r0; row <= r1; ++row)
+    for (int64_t col = c0; col <= c1; ++col)
+      top = hx_higher_of(top, terrain->height[row * head->cols + col]);
+  return top;
+}
 
 /* Faces of blocks that a sphere can touch at once, if cells are not smaller than it. */
 typedef enum hxFaceKind {
@@ -67,6 +95,10 @@ void hx_terrain_face(const hxTerrain *terrain, hxFaceKind kind, const double cel
 
 /* Copies the 4 x 4 nodes around a patch; nodes beyond the grid continue it linearly. */
 void hx_terrain_border_nodes(const hxTerrain *terrain, int64_t row, int64_t col, double out[4][4]);
+
+/* Returns the height of the highest block within 20 mm along x and y, which are few blocks where
+ * spheres as small as feet walk. */
+double hx_terrain_top_around(const hxTerrain *terrain, const double centre[3]);
 
 /* Returns an upper bound of a sphere's depth in the ground, m; negative: it does not touch. The
  * bound is cheap: a look-up of the highest ground around the sphere. */

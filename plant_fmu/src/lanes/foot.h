@@ -107,8 +107,17 @@ static inline void query_grid(const hxModel *model, const hxContactState *state,
 enum {
   HX_CLOSED, /* those that are closed */
   HX_ALL,
-  HX_NEAR /* those that are closed, and open ones that may touch the ground */
+  HX_NEAR,  /* those that are closed, and open ones that may touch the ground */
+  HX_LISTED /* those that are closed, and open ones of lanes whose bits follow these two */
 };
+
+/* Returns the choice of closed contacts, and of open ones in these lanes. */
+static inline int hx_listed(int lanes) { return lanes ? HX_LISTED | lanes << 2 : HX_CLOSED; }
+
+/* Returns whether the choice contains the open contacts of a lane. */
+static inline int hx_is_listed(int all, int lane) {
+  return all == HX_ALL || ((all & 3) == HX_LISTED && (all >> (2 + lane) & 1));
+}
 
 /* Computes the face of a grid under the sphere of an open contact, or, where the ground around it
  * is lower, the least distance that it may have. */
@@ -186,7 +195,7 @@ HX_RARE hxGround hx_grid(const hxModel *model, const hxContactState *state, int 
       continue;
     }
     hxFace face = {.distance = hx_far, .normal = {0.0, 0.0, 1.0}};
-    if (all == HX_ALL || hx_re(state->closed[row][place]) != 0.0)
+    if (hx_is_listed(all, lane) || hx_re(state->closed[row][place]) != 0.0)
       query_grid(model, state, kind[row], place, p, &face);
     else if (all == HX_NEAR)
       query_near_grid(model, state, kind[row], row, place, p, &face);
@@ -330,6 +339,13 @@ static inline hxContactKinematics hx_torso_contact(const hxModel *model,
 typedef struct {
   hxNumber delta, normal[3]; /* m, 1 */
 } hxFootFace;
+
+/* Returns whether a foot has more than one closed contact. */
+static inline int hx_has_several(const hxContactState *state, int slot) {
+  double closed = 0.0;
+  for (int row = HX_FOOT; row < HX_FOOT_ROWS; ++row) closed += hx_re(state->closed[row][slot]);
+  return closed > 1.0;
+}
 
 /* Computes the shares of a foot's closed contacts with rigid blocks; others have the share 1. */
 HX_RARE void hx_foot_shares(const hxModel *model, const hxContactState *state, int slot,

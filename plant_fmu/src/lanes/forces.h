@@ -245,8 +245,13 @@ static inline int is_used(const hxContactState *state, int row, int slot) {
 HX_RARE void share_feet(const hxModel *model, const hxContactState *state, int slot,
                         hxLegWork *leg) {
   hxNumber share[HX_FOOT_ROWS], shares[HX_FOOT_ROWS][HX_LANES];
+  int several = 0;
+  for (int lane = 0; lane < HX_LANES; ++lane) several |= hx_has_several(state, slot + lane) << lane;
+  if (!several) return; /* all shares are 1 */
   for (int lane = 0; lane < HX_LANES; ++lane) {
     hxFootFace face[HX_FOOT_ROWS] = {0};
+    for (int row = HX_FOOT; row < HX_FOOT_ROWS; ++row) shares[row][lane] = 1.0;
+    if (!(several >> lane & 1)) continue;
     for (int k = 0; k < leg->rows && hx_is_of_foot(leg->row[k]); ++k) {
       const hxContactKinematics *kin = &leg->contact[leg->row[k]].kin;
       face[leg->row[k]] = (hxFootFace){hx_lane(kin->delta, lane),

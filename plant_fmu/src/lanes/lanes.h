@@ -121,6 +121,12 @@ static inline hxReal hx_select(hxMask mask, hxReal a, hxReal b) {
 }
 static inline hxReal hx_min(hxReal a, hxReal b) { return _mm256_min_pd(b, a); }
 static inline hxReal hx_max(hxReal a, hxReal b) { return _mm256_max_pd(b, a); }
+#elif HX_LANES == 8 && defined(__AVX512DQ__)
+static inline hxReal hx_select(hxMask mask, hxReal a, hxReal b) {
+  return _mm512_mask_blend_pd(_mm512_movepi64_mask((__m512i)mask), b, a);
+}
+static inline hxReal hx_min(hxReal a, hxReal b) { return _mm512_min_pd(b, a); }
+static inline hxReal hx_max(hxReal a, hxReal b) { return _mm512_max_pd(b, a); }
 #else
 static inline hxReal hx_select(hxMask mask, hxReal a, hxReal b) {
   return hx_from_bits((mask & hx_bits(a)) | (~mask & hx_bits(b)));
@@ -209,12 +215,18 @@ static inline void hx_lanes_sin_cos(hxReal x, hxReal *sine, hxReal *cosine) {
 }
 
 /* Returns whether a mask is set in any lane. */
+#if HX_LANES == 8 && defined(__AVX512DQ__)
+static inline int hx_any(hxMask mask) { return _mm512_movepi64_mask((__m512i)mask) != 0; }
+#elif HX_LANES == 4 && defined(__AVX__)
+static inline int hx_any(hxMask mask) { return _mm256_movemask_pd(hx_from_bits(mask)) != 0; }
+#else
 static inline int hx_any(hxMask mask) {
   int64_t lanes[HX_LANES], any = 0;
   memcpy(lanes, &mask, sizeof lanes);
   for (int i = 0; i < HX_LANES; ++i) any |= lanes[i];
   return any != 0;
 }
+#endif
 
 /* Returns the largest of all lanes. */
 static inline double hx_largest_lane(hxReal x) {

@@ -68,11 +68,46 @@ HX_INLINE void row_moment(const hxModel *model, const hxContactState *state,
                        tibia->w, &moment->contact[row]);
 }
 
+/* Contacts whose place on a grid is computed, of a pack of feet: with the ground below them, and
+ * with walls beside them; of the tibia's other points. */
+typedef struct {
+  int below, beside, others;
+} hxSearch;
+
 HX_RARE void further_moments(const hxModel *model, const hxContactState *state,
-                             const hxPlantMotion *motion, int slot, int all, const hxBody *tibia,
-                             hxMoment *moment) {
+                             const hxPlantMotion *motion, int slot, const hxSearch *search,
+                             const hxBody *tibia, hxMoment *moment) {
   for (int k = 1; k < model->rows; ++k)
-    row_moment(model, state, motion, model->row[k], slot, all, tibia, moment);
+    row_moment(model, state, motion, model->row[k], slot,
+               hx_is_of_foot(model->row[k]) ? search->beside : search->others, tibia, moment);
+}
+
+/* Leaves out the search of contacts that feet on blocks certainly do not have: those of open feet
+ * that are higher than the ground around them, and walls where no block around a foot is higher
+ * than that on which it stands. */
+HX_RARE void search_near_blocks(const hxModel *model, const hxContactState *state, int slot,
+                                const hxVec3 *centre, hxSearch *search) {
+  const hxTerrain *terrain = model->terrain;
+  const double per_cell = terrain->per_cell, reach = HX_LEAST_REACH * per_cell;
+  const hxReal x = (centre->x - terrain->head.x0) * per_cell,
+               y = (centre->y - terrain->head.y0) * per_cell;
+  double low[2][HX_LANES], high[2][HX_LANES], z[HX_LANES];
+  if (!(model->radius[HX_FOOT] < 0.9 * HX_LEAST_REACH && terrain->head.cell >= HX_LEAST_REACH))
+    return;
+  hx_store(low[0], x - reach), hx_store(high[0], x + reach);
+  hx_store(low[1], y - reach), hx_store(high[1], y + reach);
+  hx_store(z, centre->z - model->ground_point[2]);
+  int below = 0, beside = 0;
+  for (int lane = 0; lane < HX_LANES && slot + lane < HX_LEGS; ++lane) {
+    const double ends[4] = {low[0][lane], high[0][lane], low[1][lane], high[1][lane]};
+    const double top = hx_terrain_top_between(terrain, ends), col = state->cell[0][slot + lane];
+    if (z[lane] - top >= HX_LEAST_REACH) continue;
+    below |= (state->closed[HX_FOOT][slot + lane] == 0.0) << lane;
+    beside |= !(col >= 0.0) || top > hx_terrain_column(terrain, col, state->cell[1][slot + lane])
+                  ? 1 << lane
+                  : 0;
+  }
+  search->below = hx_listed(below), search->beside = hx_listed(beside);
 }
 
 /* Returns the depths of a row of contacts of bodies with centres of mass r, on a grid at most. */
@@ -114,8 +149,11 @@ HX_RARE void torso_moment(const hxModel *model, const hxContactState *state,
 /* Computes the shares of feet on blocks. */
 HX_RARE void hx_moment_shares(const hxModel *model, const hxContactState *state, hxMoment *moment) {
   hxNumber share[HX_FOOT_ROWS];
+  for (int row = HX_FOOT; row < HX_FOOT_ROWS; ++row)
+    for (int slot = 0; slot < HX_SLOTS; ++slot) moment->share[row][slot] = 1.0;
   for (int slot = 0; slot < HX_SLOTS; ++slot) {
     hxFootFace face[HX_FOOT_ROWS];
+    if (!hx_has_several(state, slot)) continue;
     for (int row = HX_FOOT; row < HX_FOOT_ROWS; ++row) {
       const hxContactMoment *at = &moment->contact[row];
       face[row] = (hxFootFace){at->delta[slot],
@@ -148,8 +186,14 @@ static inline double hx_moment_and_bound(const hxModel *model, const hxModel *wh
       hx_store(&moment->speed[joint][slot], hx_dot(s, hx_sub3(j.w, i.w)));
     }
     hx_store_vec3(moment->turn, slot, j.w);
-    row_moment(model, state, motion, HX_FOOT, slot, all, &j, moment);
-    if (model->rows > 1) further_moments(model, state, motion, slot, all, &j, moment);
+    hxSearch search = {all, all, all};
+    if (all == HX_NEAR && model->foot_rows > 1) {
+      const hxVec3 centre = hx_add3(hx_link_vec3(motion, HX_JOINTS - 1, HX_R, slot),
+                                    hx_mul(j.R_WB, hx_load_vec3(model->point[HX_FOOT], slot)));
+      search_near_blocks(model, state, slot, &centre, &search);
+    }
+    row_moment(model, state, motion, HX_FOOT, slot, search.below, &j, moment);
+    if (model->rows > 1) further_moments(model, state, motion, slot, &search, &j, moment);
     if (whole) bound = tibia_depth_bound(whole, motion, slot, &j.R_WB, bound);
   }
   if (model->foot_rows > 1) hx_moment_shares(model, state, moment);

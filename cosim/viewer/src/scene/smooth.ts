@@ -1,9 +1,10 @@
 import { BufferAttribute, BufferGeometry } from "three";
-import type { Surface } from "./surface";
+import { RUN_OUT, type Surface } from "./surface";
 
 export const BEYOND = 12; // m    by which the border's height goes on; fog hides the end
 const FINE = 0.0125; // m    spacing of drawn vertices, if the surface is not too large for it
 const MOST_VERTICES = 250_000;
+const RUN_OUT_PARTS = 6; // drawn cells of the run-out beyond the border
 
 /** Returns the shares of the three colours of materials in that of a material. */
 export type Looks = (material: number) => readonly [number, number, number];
@@ -45,11 +46,22 @@ function subdivision(surface: Surface): number {
   return Math.max(Math.min(wished, most), 1);
 }
 
-/** Returns the coordinates of vertices along an axis, the first and last far beyond the map. */
+/** Returns the coordinates of vertices along an axis: far beyond the map, in the run-out, on it. */
 function coordinates(origin: number, cell: number, count: number, step: number): number[] {
   const cells = Math.round(((count - 1) * cell) / step);
   const inside = Array.from({ length: cells + 1 }, (_, k) => origin + k * step);
-  return [inside[0] - BEYOND, ...inside, inside[cells] + BEYOND];
+  const beyond = Array.from(
+    { length: RUN_OUT_PARTS },
+    (_, k) => (RUN_OUT * (k + 1)) / RUN_OUT_PARTS,
+  );
+  const [first, last] = [inside[0], inside[cells]];
+  return [
+    first - BEYOND,
+    ...beyond.map((way) => first - way).reverse(),
+    ...inside,
+    ...beyond.map((way) => last + way),
+    last + BEYOND,
+  ];
 }
 
 function triangles(columns: number, rows: number): Uint32Array {

@@ -9,6 +9,9 @@ const CATMULL_ROM = [
   [0, 0, -0.5, 0.5],
 ];
 
+/** Length over which the slope of a smooth surface runs out beyond its border [m]. */
+export const RUN_OUT = 0.06;
+
 /** Height [m] of a smooth surface and its slopes along x and y. */
 export interface Place {
   readonly height: number;
@@ -18,7 +21,8 @@ export interface Place {
 
 /**
  * A grid of heights, as models/ground/surface.py defines it: bicubic between nodes, or blocks with
- * flat tops. Beyond the grid the height of its border goes on.
+ * flat tops. Beyond the grid the height of its border goes on, of a smooth surface behind a run-out
+ * of its slope.
  */
 export class Surface {
   constructor(
@@ -69,8 +73,9 @@ export class Surface {
   }
 
   private bicubic(across: number, up: number): Place {
-    const [column, a, da] = weights(across, this.columns);
-    const [row, b, db] = weights(up, this.rows);
+    const length = RUN_OUT / this.cell;
+    const [column, a, da] = weights(across, this.columns, length);
+    const [row, b, db] = weights(up, this.rows, length);
     let [height, slopeX, slopeY] = [0, 0, 0];
     for (let r = 0; r < 4; r++) {
       let [value, slope] = [0, 0];
@@ -98,15 +103,23 @@ export class Surface {
   }
 }
 
-/** Returns the cell of a grid coordinate, and the weights of four nodes for height and slope. */
-function weights(coordinate: number, count: number): [number, number[], number[]] {
+/**
+ * Returns the cell of a grid coordinate, and the weights of four nodes for height and slope. Beyond
+ * the border, at a share u of the length of the run-out [cells], the slope of the border counts
+ * (1 - u)² times, and the height contains its integral.
+ */
+function weights(coordinate: number, count: number, length: number): [number, number[], number[]] {
   const inside = clamp(coordinate, 0, count - 1);
   const cell = Math.min(Math.floor(inside), count - 2);
   const t = inside - cell;
-  const on = coordinate === inside ? 1 : 0;
-  const value = CATMULL_ROM.map(([p, q, r, s]) => p + t * (q + t * (r + t * s)));
-  const slope = CATMULL_ROM.map(([, q, r, s]) => on * (q + t * (2 * r + t * 3 * s)));
-  return [cell, value, slope];
+  const beyond = coordinate - inside;
+  const left = Math.max(1 - Math.abs(beyond) / length, 0);
+  const rise = (Math.sign(beyond) * length * (1 - left ** 3)) / 3;
+  const slope = CATMULL_ROM.map(([, q, r, s]) => q + t * (2 * r + t * 3 * s));
+  const value = CATMULL_ROM.map(
+    ([p, q, r, s], node) => p + t * (q + t * (r + t * s)) + rise * slope[node],
+  );
+  return [cell, value, slope.map((weight) => left * left * weight)];
 }
 
 export function clamp(value: number, low: number, high: number): number {
