@@ -58,7 +58,8 @@ def judged_walk(name: str = "judged", *settings: str) -> Case:
 def ablation() -> list[Case]:
     """Returns cases with no part, each part alone, the default parts, and these but each part.
 
-    The suspension is off by default and added to the others instead. The squeeze belongs to the support, and so to the support alone.
+    The suspension is off by default and added to the others instead. The squeeze belongs to the
+    support, and so to the support alone.
     """
     off, on = ({part: f"{SWITCH}{part}={to}" for part in SWITCHES} for to in ("false", "true"))
     nothing = judged_walk("no part", *off.values())
