@@ -5,16 +5,18 @@ Each part can be switched off by itself, so that its effect can be measured.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 
 
 @dataclass(frozen=True, kw_only=True)
 class Parts:
-    """Switches, all on by default; they have no effect on kinematic control."""
+    """Switches, all on by default but the suspension; they have no effect on kinematic control."""
 
     support: bool = True  # servo torques that carry each leg's share of weight and acceleration
     slip_pid: bool = True  # feet yield to squeezing tangential forces
-    suspension: bool = True  # legs yield to normal forces above their share
+    # legs yield to normal forces; None: under paper control only, because compliant control is
+    # better without it (docs/control.md, "Over ground, errors of the model and pushes")
+    suspension: bool | None = None
     touchdown: bool = True  # foot heights follow early and late touch-downs
     posture: bool = True  # roll, pitch and height are controlled
     path: bool = True  # the path walked is measured at the feet, and its deviation corrected
@@ -24,7 +26,11 @@ class Parts:
     fallback: bool = True
     # weight of the servos' torques against the feet's use of friction in the planned squeeze, in
     # [0, 1): a part of `support`
-    squeeze: float = 0.75
+    squeeze: float = 0.6
+
+    def under(self, law: str) -> Parts:
+        """Returns the same parts with the suspension decided as a law has it by default."""
+        return self if self.suspension is not None else replace(self, suspension=law == "paper")
 
 
 SWITCHES = tuple(item.name for item in fields(Parts) if item.name != "squeeze")

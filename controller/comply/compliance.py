@@ -23,7 +23,7 @@ from typing import NamedTuple
 import numpy as np
 
 from hexapod_cosim.controller.comply.foot_law import FootLaw
-from hexapod_cosim.controller.comply.slip_pid import LOAD_FLOOR, beyond_plan, squeeze
+from hexapod_cosim.controller.comply.slip_pid import LOAD_FLOOR, missing_share, squeeze
 from hexapod_cosim.controller.comply.support import Shares
 from hexapod_cosim.controller.gains import TRIPOD_LEGS, Gains
 from hexapod_cosim.controller.memory import Stateful
@@ -83,6 +83,7 @@ class Compliance(Stateful):
         scale: measured over planned weight (scalar) [1].
         lean: horizontal distance of the measured centre of mass from the modelled one, walking
             frame, x + i y (scalar) [m].
+        held: share of the planned squeeze that the ground holds, smoothed (scalar) [1].
         trust: factor on all corrections and torques (scalar) [1].
         lagging: the joints cannot follow the plan (scalar).
         overspeed_share: share of the time in which the plan exceeds a speed limit (scalar) [1].
@@ -92,8 +93,8 @@ class Compliance(Stateful):
 
     STATE = (
         "law", "detector", "watch", "touchdown", "landings", "burden", "bend", "torque", "shift",
-        "doubted", "fallback", "grip", "regaining", "scale", "lean", "trust", "lagging",
-        "overspeed_share", "slide_periods", "recovery_periods",
+        "doubted", "fallback", "grip", "regaining", "scale", "lean", "held", "trust",
+        "lagging", "overspeed_share", "slide_periods", "recovery_periods",
     )  # fmt: skip
 
     def __init__(
@@ -113,7 +114,7 @@ class Compliance(Stateful):
         weight: of the robot [N]; depth: of the ground below the torso's origin [m]; cycle,
         step_height: of its gait [s, m]; kp: of its servos [N m/rad]; period [s].
         """
-        self.parts, self.period = parts, period
+        self.parts, self.period = parts.under("compliant"), period
         self.share = weight / TRIPOD_LEGS  # N
         self.settled = SETTLED_SHARE * weight  # N
         self.most_lean = LARGEST_LEAN * depth  # m
@@ -143,7 +144,7 @@ class Compliance(Stateful):
         self.bend, self.torque, self.shift = np.zeros((3, LEGS, 3))
         self.doubted, self.fallback = np.zeros((2, LEGS), dtype=np.bool_)
         self.grip, self.regaining = np.ones(LEGS), False
-        self.scale, self.lean, self.trust = 0.0, 0j, 1.0
+        self.scale, self.lean, self.held, self.trust = 0.0, 0j, 1.0, 1.0
         self.lagging, self.overspeed_share = False, 0.0
         self.slide_periods, self.recovery_periods = 0, 0
 
@@ -273,7 +274,10 @@ class Compliance(Stateful):
         self.fallback = self.doubted | (goal == 0.0)
 
     def _law_inputs(self, plan: Plan, force: Array) -> tuple[Plane, Array, float]:
-        """Returns the squeeze (6,), the normal forces (6,) and their sum [N] (C24, C46)."""
+        """Returns the squeeze (6,), the normal forces (6,) and their sum [N] (C24, C46).
+
+        It updates the share of the planned squeeze that is held (C52).
+        """
         horizontal = force[:, 0] + 1j * force[:, 1]
         felt = np.where(self.touching, horizontal - self.scale * plan.shares.push, 0.0)
         normal = np.where(self.touching, force[:, 2], 0.0)
@@ -281,10 +285,13 @@ class Compliance(Stateful):
         if self.parts.fallback:
             drag = abs(felt.sum()) / total if total > max(self.settled, LOAD_FLOOR) else 0.0
             self._update_trust(plan, drag)
+        found = squeeze(felt, normal, plan.feet)
+        planned = np.where(self.touching, self.scale * plan.shares.squeeze, 0.0)
+        missing = missing_share(found, planned)
+        self.held += self.follow_cycle * (1.0 - missing - self.held)
         if not self.parts.slip_pid:
             return np.zeros(LEGS, dtype=np.complex128), normal, total
-        planned = np.where(self.touching, self.scale * plan.shares.squeeze, 0.0)
-        return beyond_plan(squeeze(felt, normal, plan.feet), planned), normal, total
+        return np.asarray(found + missing * planned), normal, total
 
     def _update_lean(self, plan: Plan, normal: Array, total: float) -> None:
         """Updates the distance of the centre of mass from the modelled one (C44).
@@ -316,7 +323,7 @@ class Compliance(Stateful):
 
     def _excess(self, plan: Plan, normal: Array) -> Array:
         """Returns the normal forces (6,) above the planned shares [N]; 0 without a share (C26)."""
-        live = self.parts.suspension & (plan.shares.activation > 0.0)
+        live = bool(self.parts.suspension) & (plan.shares.activation > 0.0)
         return np.where(live, normal - self.scale * plan.shares.normal, 0.0)
 
     # ------------------------------------------------------------------------------------ laws

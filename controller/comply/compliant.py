@@ -124,6 +124,7 @@ class Compliant(Stateful):
         self.warmth = Warmth(
             rating=robot.servo.torque_continuous,
             squeeze=parts.squeeze if parts.support else 0.0,
+            cycle=gait.period,
             period=period,
         )
         self.stance: Stance
@@ -227,7 +228,7 @@ class Compliant(Stateful):
         output.angle_ref[...] = self._correct(output.angle_ref, climb, raised)
         output.torque_ref[...] = laws.torque
         burden = laws.burden
-        self.warmth.step(laws.torque, burden.heft * burden.peak / burden.most)
+        self.warmth.step(laws.torque, burden.heft * burden.peak / burden.most, laws.held)
         if busy or self.moving:
             rise = (offset - self.offset) * self.per_second
             output.speed_ref[...] += climb * rise[:, None]

@@ -41,17 +41,16 @@ def squeeze(push: Plane, normal: Array, feet: Plane) -> Plane:
     return np.asarray(push - (push.sum() * share + 1j * turn * carried))
 
 
-def beyond_plan(found: Plane, planned: Plane) -> Plane:
-    """Subtracts from a squeeze the part of the planned one that it contains (C46).
+def missing_share(found: Plane, planned: Plane) -> float:
+    """Returns the share of the planned squeeze that creep has taken away, in [0, 1] (C46).
 
-    The PID then reduces squeeze that is not planned, and does not build up planned squeeze that
-    has been lost to creep. found: (6,) squeeze above the planned one [N]; planned: (6,) [N].
+    found: (6,) squeeze above the planned one [N]; planned: (6,) [N]. Without planned squeeze it is
+    0.
     """
-    whole = square(planned).sum()
+    whole = float(square(planned).sum())
     if whole <= LOAD_FLOOR:
-        return found
-    missing = -along(planned, found).sum() / whole  # share of the planned squeeze
-    return np.asarray(found + min(max(missing, 0.0), 1.0) * planned)
+        return 0.0
+    return min(max(-float(along(planned, found).sum()) / whole, 0.0), 1.0)
 
 
 class SlipPid(Stateful):

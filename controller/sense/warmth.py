@@ -1,9 +1,10 @@
-"""Raises the planned squeeze while servos are warm or near their torque limit. C: warmth.c.
+"""Raises the planned squeeze where it costs no slip, or servos need it. C: warmth.c.
 
-The heat of a servo is the square of its torque, smoothed with a time in which a small servo warms
-up (C45). The squeeze takes load from the femurs at the price of slip, so it has its set weight
-while the servos are cool and strong enough, and its largest weight once one of them works at its
-continuous torque, or the measured weight needs all the torque that is allowed.
+The squeeze takes load from the femurs. On ground on which feet creep its price is slip, so it has
+its set weight there. It has its largest weight (C45) where the ground holds the planned squeeze
+(C52), where a servo works above its continuous torque, and where the measured weight needs all the
+torque that is allowed. The work of a servo is the square of its torque, smoothed over a gait cycle;
+its heat is the same, smoothed with the time in which a small servo warms up.
 """
 
 from __future__ import annotations
@@ -18,39 +19,53 @@ from hexapod_cosim.controller.plane import LEGS, Array
 HEAT_TIME = 60.0  # s    in which a small servo warms up
 COOL, HOT = 0.8, 1.0  # 1    mean square torque over that of the rating
 EASY, HARD = 0.8, 1.0  # 1    torque needed for the measured weight over torque allowed
-MOST_SQUEEZE = 0.95  # 1    weight of the torques when a servo is hot or short of torque
+OVER, FAR_OVER = 1.0, 1.2  # 1    mean square torque of a gait cycle over that of the rating
+CREEPS, HOLDS = 0.75, 0.82  # 1    share of the planned squeeze that is held
+MOST_SQUEEZE = 0.95  # 1    weight of the torques when it costs nothing or servos need it
 
 
 class Warmth(Stateful):
-    """Smoothed squares of the servos' torques, and the weight of the squeeze that follows.
+    """Smoothed squares of the servos' torques, and the weight of the squeeze.
 
     Attributes:
-        heat: (6, 3) smoothed squares of the feed-forward torques [N2 m2].
+        work: (6, 3) squares of the feed-forward torques, smoothed over a gait cycle [N2 m2].
+        heat: (6, 3) the same, smoothed over a minute [N2 m2].
         squeeze: weight of the torques in the planned squeeze [1].
     """
 
-    STATE = ("heat", "squeeze")
+    STATE = ("work", "heat", "squeeze")
 
-    def __init__(self, *, rating: float, squeeze: float, period: float) -> None:
-        """Resets the state. rating: continuous torque of a servo [N m]; squeeze: weight while all
-        servos are cool, 0 for no squeeze at all [1]; period [s].
+    def __init__(self, *, rating: float, squeeze: float, cycle: float, period: float) -> None:
+        """Resets the state.
+
+        rating: continuous torque of a servo [N m]; squeeze: weight on ground on which feet creep,
+        while all servos are cool, 0 for no squeeze at all [1]; cycle: of the gait [s]; period [s].
         """
         self.rating, self.cool_squeeze = rating * rating, squeeze  # N2 m2, 1
         self.more = max(MOST_SQUEEZE - squeeze, 0.0) if squeeze > 0.0 else 0.0
+        self.follow_work = 1.0 - math.exp(-period / cycle)
         self.follow = 1.0 - math.exp(-period / HEAT_TIME)
         self.reset()
 
     def reset(self) -> None:
-        """Sets the heat of all servos to zero, and the squeeze to that of cool servos."""
-        self.heat, self.squeeze = np.zeros((LEGS, 3)), self.cool_squeeze
+        """Sets work and heat of all servos to zero, and the squeeze to that of cool servos."""
+        self.work, self.heat = np.zeros((2, LEGS, 3))
+        self.squeeze = self.cool_squeeze
 
-    def step(self, torque: Array, needed: float) -> None:
+    def step(self, torque: Array, needed: float, held: float) -> None:
         """Advances by one period (C45).
 
         torque: (6, 3) feed-forward torques [N m]; needed: largest torque that the measured weight
-        needs, over the largest that is allowed [1].
+        needs, over the largest that is allowed [1]; held: share of the planned squeeze that the
+        ground holds [1].
         """
-        self.heat = self.heat + self.follow * (torque * torque - self.heat)
-        hot = (float(self.heat.max()) / self.rating - COOL) / (HOT - COOL)
-        part = max(hot, (needed - EASY) / (HARD - EASY))
+        square = torque * torque
+        self.work = self.work + self.follow_work * (square - self.work)
+        self.heat = self.heat + self.follow * (square - self.heat)
+        part = max(
+            (float(self.heat.max()) / self.rating - COOL) / (HOT - COOL),
+            (float(self.work.max()) / self.rating - OVER) / (FAR_OVER - OVER),
+            (needed - EASY) / (HARD - EASY),
+            (held - CREEPS) / (HOLDS - CREEPS),
+        )
         self.squeeze = self.cool_squeeze + self.more * min(max(part, 0.0), 1.0)

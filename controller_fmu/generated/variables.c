@@ -519,7 +519,7 @@ const char *const hx_log_category_names[] = {
 const hxStateRow *const hx_states = 0;
 const size_t hx_state_count = 0;
 
-const char hx_default_guid[] = "{178463c2-939e-403d-904a-43b3859711e1}";
+const char hx_default_guid[] = "{e663d070-4391-49fd-a74a-08bc4c67290b}";
 
 _Static_assert(HX_CONTROL_KINEMATIC == 1, "Control");
 _Static_assert(HX_CONTROL_COMPLIANT == 2, "Control");

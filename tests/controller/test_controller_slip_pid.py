@@ -10,7 +10,7 @@ import pytest
 from gains import PERIOD, SLIP
 
 from hexapod_cosim.controller import SlipGains
-from hexapod_cosim.controller.comply.slip_pid import SlipPid, beyond_plan, squeeze
+from hexapod_cosim.controller.comply.slip_pid import SlipPid, missing_share, squeeze
 
 STATES = ("force", "smooth", "integral", "slope")
 FREQUENCIES = np.geomspace(0.1, 0.99 * np.pi / PERIOD, 50)  # rad/s
@@ -144,11 +144,11 @@ def test_feet_within_a_centimetre_take_no_moment_and_feet_without_load_keep_thei
     )
 
 
-def test_planned_squeeze_that_is_missing_is_no_error_and_other_squeeze_is() -> None:
+def test_the_missing_share_of_the_planned_squeeze_does_not_depend_on_other_squeeze() -> None:
     draw = np.random.default_rng(8)
     planned, other = draw.normal(size=(2, 6)) + 1j * draw.normal(size=(2, 6))
     other = other - planned * np.vdot(planned, other).real / np.vdot(planned, planned).real
-    for missing, left in ((0.0, 0.0), (0.4, 0.0), (1.0, 0.0), (1.5, -0.5), (-0.3, 0.3)):
-        found = beyond_plan(other - missing * planned, planned)
-        np.testing.assert_allclose(found, other + left * planned, atol=1e-12)
-    assert (beyond_plan(other, np.zeros(6, dtype=np.complex128)) == other).all()
+    for missing, share in ((0.0, 0.0), (0.4, 0.4), (1.0, 1.0), (1.5, 1.0), (-0.3, 0.0)):
+        found = missing_share(other - missing * planned, planned)
+        assert found == pytest.approx(share, abs=1e-12)
+    assert missing_share(other, np.zeros(6, dtype=np.complex128)) == 0.0

@@ -1,4 +1,4 @@
-"""Tests that the squeeze grows as servos warm up or run short of torque."""
+"""Tests that the squeeze grows on ground that holds it, and as servos need it."""
 
 from __future__ import annotations
 
@@ -12,10 +12,12 @@ from hexapod_cosim.controller.sense.warmth import COOL, HEAT_TIME, HOT, MOST_SQU
 
 RATING = 1.2  # N m
 MINUTE = round(HEAT_TIME / PERIOD)  # periods
+CYCLE = 1.0  # s
+LOST = 0.4  # share of the planned squeeze that is held on ground on which feet creep
 
 
 def make(squeeze: float = 0.4) -> Warmth:
-    return Warmth(rating=RATING, squeeze=squeeze, period=PERIOD)
+    return Warmth(rating=RATING, squeeze=squeeze, cycle=CYCLE, period=PERIOD)
 
 
 def loaded(largest: float) -> np.ndarray:
@@ -28,7 +30,7 @@ def loaded(largest: float) -> np.ndarray:
 def test_heat_nears_the_square_of_a_constant_torque_by_e_in_a_minute() -> None:
     warmth = make()
     for _ in range(MINUTE):
-        warmth.step(loaded(1.0), 0.5)
+        warmth.step(loaded(1.0), 0.5, LOST)
     assert warmth.heat.max() == pytest.approx(1.0 - math.exp(-1.0))
     assert int(warmth.heat.argmax()) == 4 * 3 + 1
 
@@ -41,7 +43,7 @@ def test_the_squeeze_follows_the_hottest_servo(share: float, expected: float) ->
     warmth = make()
     for _ in range(20 * MINUTE // 100):
         warmth.follow = 1.0 - math.exp(-100.0 * PERIOD / HEAT_TIME)
-        warmth.step(loaded(math.sqrt(share) * RATING), 0.5)
+        warmth.step(loaded(math.sqrt(share) * RATING), 0.5, LOST)
     assert warmth.squeeze == pytest.approx(expected, abs=1e-6)
 
 
@@ -51,22 +53,24 @@ def test_cool_servos_keep_the_weight_that_was_set_and_none_stays_none() -> None:
         assert warmth.squeeze == squeeze
     nothing = make(0.0)
     nothing.heat = np.full((6, 3), 10.0)
-    nothing.step(loaded(9.0), 2.0)
+    nothing.step(loaded(9.0), 2.0, 1.0)
     assert nothing.squeeze == 0.0
 
 
 def test_a_saved_warmth_goes_on_the_same_and_a_reset_one_is_cool() -> None:
     warmth, other = make(), make()
     for _ in range(1000):
-        warmth.step(loaded(4.0), 0.5)
+        warmth.step(loaded(4.0), 0.5, LOST)
     other.restore(warmth.save())
     for one in (warmth, other):
-        one.step(loaded(2.0), 0.5)
+        one.step(loaded(2.0), 0.5, LOST)
     assert warmth.squeeze == other.squeeze > 0.4
     assert (warmth.heat == other.heat).all()
+    assert (warmth.work == other.work).all()
     warmth.reset()
     assert warmth.squeeze == 0.4
     assert not warmth.heat.any()
+    assert not warmth.work.any()
 
 
 @pytest.mark.parametrize(
@@ -76,7 +80,27 @@ def test_the_squeeze_grows_at_once_when_the_weight_needs_nearly_all_the_torque(
     needed: float, expected: float
 ) -> None:
     warmth = make()
-    warmth.step(np.zeros((6, 3)), needed)
+    warmth.step(np.zeros((6, 3)), needed, LOST)
     assert warmth.squeeze == pytest.approx(expected)
-    warmth.step(np.zeros((6, 3)), 0.3)
+    warmth.step(np.zeros((6, 3)), 0.3, LOST)
     assert warmth.squeeze == 0.4
+
+
+@pytest.mark.parametrize(
+    ("held", "expected"), [(0.0, 0.4), (0.75, 0.4), (0.785, 0.675), (0.82, 0.95), (1.0, 0.95)]
+)
+def test_the_squeeze_grows_where_the_ground_holds_it(held: float, expected: float) -> None:
+    warmth = make()
+    warmth.step(np.zeros((6, 3)), 0.5, held)
+    assert warmth.squeeze == pytest.approx(expected)
+
+
+@pytest.mark.parametrize(("share", "expected"), [(0.9, 0.4), (1.1, 0.675), (1.2, 0.95)])
+def test_the_squeeze_grows_within_some_gait_cycles_when_a_servo_works_above_its_rating(
+    share: float, expected: float
+) -> None:
+    warmth = make()
+    for _ in range(round(12.0 * CYCLE / PERIOD)):
+        warmth.step(loaded(math.sqrt(share) * RATING), 0.5, LOST)
+    assert warmth.squeeze == pytest.approx(expected, abs=1e-4)
+    assert warmth.heat.max() < COOL * RATING**2

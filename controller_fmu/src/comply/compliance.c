@@ -65,7 +65,7 @@ void hx_compliance_compile(const hxControllerDefinition *definition, double dept
 
 void hx_compliance_reset(hxCompliance *laws) {
   memset(laws, 0, sizeof *laws);
-  laws->trust = 1.0;
+  laws->trust = laws->held = 1.0;
   hx_landings_reset(&laws->landings);
   hx_burden_reset(&laws->burden);
   for (int leg = 0; leg < HX_LEGS; ++leg) laws->grip[leg] = 1.0;
@@ -189,8 +189,8 @@ static void update_trust(const hxComplianceModel *model, const hxPlan *plan, dou
   for (int leg = 0; leg < HX_LEGS; ++leg) laws->fallback[leg] = laws->doubted[leg] || goal == 0.0;
 }
 
-/* Computes the measured squeeze and normal forces (C24, C46), and returns the sum of the latter
- * [N]. */
+/* Computes the measured squeeze and normal forces (C24, C46) and updates the share of the planned
+ * squeeze that is held (C52); returns the sum of the normal forces [N]. */
 static double law_inputs(const hxComplianceModel *model, const hxPlan *plan,
                          const double force[HX_LEGS][3], hxPlane push[HX_LEGS],
                          double normal[HX_LEGS], hxCompliance *laws) {
@@ -210,8 +210,11 @@ static double law_inputs(const hxComplianceModel *model, const hxPlan *plan,
   hx_squeeze(normal, plan->feet, push);
   for (int leg = 0; leg < HX_LEGS; ++leg)
     planned[leg] = hx_scaled(plan->shares.squeeze[leg], laws->touching[leg] ? laws->scale : 0.0);
-  hx_beyond_plan((const hxPlane *)planned, push);
-  for (int leg = 0; leg < HX_LEGS && !model->parts.slip_pid; ++leg) push[leg] = hx_plane(0.0, 0.0);
+  const double missing = hx_missing_share((const hxPlane *)push, (const hxPlane *)planned);
+  laws->held += model->follow_cycle * (1.0 - missing - laws->held);
+  for (int leg = 0; leg < HX_LEGS; ++leg)
+    push[leg] = model->parts.slip_pid ? hx_plane_add(push[leg], hx_scaled(planned[leg], missing))
+                                      : hx_plane(0.0, 0.0);
   return total;
 }
 

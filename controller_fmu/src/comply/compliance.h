@@ -67,6 +67,7 @@ typedef struct hxCompliance {
   int regaining; /* some grip may be below 1 */
   double scale; /* 1    measured over planned weight */
   hxPlane lean; /* m, of the measured centre of mass from the modelled one, walking frame */
+  double held; /* 1, share of the planned squeeze that the ground holds, smoothed */
   double trust; /* 1, below 1 while the robot slides or its joints cannot follow */
   int lagging; /* the joints cannot follow the plan */
   double overspeed_share; /* 1, share of the time in which the plan exceeds a speed limit */

@@ -157,6 +157,6 @@ void hx_compliant_step(const hxCompliantModel *model, const hxLegSolver leg[HX_L
   }
   if (busy || compliant->moving) compliant->moving = busy;
   const double needed = laws->burden.heft * laws->burden.peak / model->laws.most;
-  hx_warmth_step(&model->warmth, (const double (*)[HX_JOINTS])laws->torque, needed,
+  hx_warmth_step(&model->warmth, (const double (*)[HX_JOINTS])laws->torque, needed, laws->held,
                  &compliant->warmth);
 }

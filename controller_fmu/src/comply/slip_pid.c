@@ -27,16 +27,13 @@ void hx_squeeze(const double normal[HX_LEGS], const hxPlane feet[HX_LEGS], hxPla
         hx_scaled(hx_plane_add(common, hx_plane(-w * arm[leg].y, w * arm[leg].x)), share[leg]));
 }
 
-void hx_beyond_plan(const hxPlane planned[HX_LEGS], hxPlane found[HX_LEGS]) {
+double hx_missing_share(const hxPlane found[HX_LEGS], const hxPlane planned[HX_LEGS]) {
   double whole = 0.0, present = 0.0;
   for (int leg = 0; leg < HX_LEGS; ++leg) {
     whole += hx_square(planned[leg]);
     present += hx_along(planned[leg], found[leg]);
   }
-  if (whole <= hx_load_floor) return;
-  const double missing = hx_clamp(-present / whole, 0.0, 1.0);
-  for (int leg = 0; leg < HX_LEGS; ++leg)
-    found[leg] = hx_plane_add(found[leg], hx_scaled(planned[leg], missing));
+  return whole <= hx_load_floor ? 0.0 : hx_clamp(-present / whole, 0.0, 1.0);
 }
 
 double hx_slip_pid_step(const hxSlipPidModel *pid, double force, hxSlipPid *state) {

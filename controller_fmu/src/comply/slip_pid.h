@@ -30,10 +30,9 @@ extern const double hx_load_floor; /* N, a foot with a smaller normal force carr
  */
 void hx_squeeze(const double normal[HX_LEGS], const hxPlane feet[HX_LEGS], hxPlane push[HX_LEGS]);
 
-/* Subtracts from a squeeze the part of the planned one that it contains, so that the PID does not
- * build up planned squeeze that is missing (C46), in place. found: squeeze above the planned one
- * [N]; planned [N]. */
-void hx_beyond_plan(const hxPlane planned[HX_LEGS], hxPlane found[HX_LEGS]);
+/* Returns the share of the planned squeeze that creep has taken away, in [0, 1] (C46); 0 without
+ * planned squeeze. found: squeeze above the planned one [N]; planned [N]. */
+double hx_missing_share(const hxPlane found[HX_LEGS], const hxPlane planned[HX_LEGS]);
 
 /* Returns the PID's answer to a force in this period [N] (C25). */
 double hx_slip_pid_step(const hxSlipPidModel *pid, double force, hxSlipPid *state);

@@ -9,8 +9,12 @@ static const double heat_time = 60.0; /* s, in which a small servo warms up */
 static const double cool = 0.8, hot = 1.0;
 /* 1, torque needed for the measured weight over torque allowed */
 static const double easy = 0.8, hard = 1.0;
-static const double most_squeeze =
-    0.95; /* 1, weight of the torques when a servo is hot or short of torque */
+/* 1, mean square torque of a gait cycle over that of the rating */
+static const double over = 1.0, far_over = 1.2;
+/* 1, share of the planned squeeze that is held */
+static const double creeps = 0.75, holds = 0.82;
+/* 1, weight of the torques when it costs nothing or servos need it */
+static const double most_squeeze = 0.95;
 
 void hx_warmth_compile(const hxControllerDefinition *definition, hxWarmthModel *model) {
   const double rating = definition->servo.torque_continuous,
@@ -18,6 +22,7 @@ void hx_warmth_compile(const hxControllerDefinition *definition, hxWarmthModel *
   model->rating = rating * rating;
   model->squeeze = squeeze;
   model->more = squeeze > 0.0 ? fmax(most_squeeze - squeeze, 0.0) : 0.0;
+  model->follow_work = 1.0 - hx_decay(-definition->period / definition->gait.period);
   model->follow = 1.0 - hx_decay(-definition->period / heat_time);
 }
 
@@ -27,15 +32,20 @@ void hx_warmth_reset(const hxWarmthModel *model, hxWarmth *warmth) {
 }
 
 void hx_warmth_step(const hxWarmthModel *model, const double torque[HX_LEGS][HX_JOINTS],
-                    double needed, hxWarmth *warmth) {
-  double worst = 0.0;
+                    double needed, double held, hxWarmth *warmth) {
+  double hottest = 0.0, hardest = 0.0;
   for (int leg = 0; leg < HX_LEGS; ++leg)
     for (int joint = 0; joint < HX_JOINTS; ++joint) {
-      double *heat = &warmth->heat[leg][joint];
-      *heat += model->follow * (torque[leg][joint] * torque[leg][joint] - *heat);
-      worst = fmax(worst, *heat);
+      const double square = torque[leg][joint] * torque[leg][joint];
+      double *work = &warmth->work[leg][joint], *heat = &warmth->heat[leg][joint];
+      *work += model->follow_work * (square - *work);
+      *heat += model->follow * (square - *heat);
+      hardest = fmax(hardest, *work);
+      hottest = fmax(hottest, *heat);
     }
-  const double part =
-      fmax((worst / model->rating - cool) / (hot - cool), (needed - easy) / (hard - easy));
+  const double warm = fmax((hottest / model->rating - cool) / (hot - cool),
+                           (hardest / model->rating - over) / (far_over - over)),
+               part = fmax(warm, fmax((needed - easy) / (hard - easy),
+                                      (held - creeps) / (holds - creeps)));
   warmth->squeeze = model->squeeze + model->more * hx_clamp(part, 0.0, 1.0);
 }

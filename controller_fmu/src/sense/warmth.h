@@ -10,13 +10,14 @@ HX_HIDDEN_BEGIN
 
 typedef struct hxWarmthModel {
   double rating; /* N2 m2, square of the continuous torque of a servo */
-  double squeeze; /* 1, weight while all servos are cool */
-  double more; /* 1, what is added when one is hot */
-  double follow; /* 1, factor of the smoothing over a period */
+  double squeeze; /* 1, weight on ground on which feet creep, while all servos are cool */
+  double more; /* 1, what is added when the ground holds or a servo is hot */
+  double follow_work, follow; /* 1, factors of the smoothings over a period */
 } hxWarmthModel;
 
 typedef struct hxWarmth {
-  double heat[HX_LEGS][HX_JOINTS]; /* N2 m2, smoothed squares of the feed-forward torques */
+  double work[HX_LEGS][HX_JOINTS]; /* N2 m2, squares of the torques, smoothed over a gait cycle */
+  double heat[HX_LEGS][HX_JOINTS]; /* N2 m2, the same, smoothed over a minute */
   double squeeze; /* 1, weight of the torques in the planned squeeze */
 } hxWarmth;
 
@@ -24,9 +25,10 @@ void hx_warmth_compile(const hxControllerDefinition *definition, hxWarmthModel *
 void hx_warmth_reset(const hxWarmthModel *model, hxWarmth *warmth);
 
 /* Advances by one period (C45). torque: feed-forward torques [N m]; needed: largest torque that the
- * measured weight needs, over the largest that is allowed [1]. */
+ * measured weight needs, over the largest that is allowed [1]; held: share of the planned squeeze
+ * that the ground holds [1]. */
 void hx_warmth_step(const hxWarmthModel *model, const double torque[HX_LEGS][HX_JOINTS],
-                    double needed, hxWarmth *warmth);
+                    double needed, double held, hxWarmth *warmth);
 
 HX_HIDDEN_END
 
