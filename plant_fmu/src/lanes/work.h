@@ -79,9 +79,9 @@ typedef struct {
   int torso_rows;               /* 1: this evaluation computes the torso's contacts */
   hxContactWork torso_contact[HX_TORSO_PACKS];
   hxForce6 torso_p[HX_TORSO_PACKS]; /* less forces of the ground on the torso, as hxJointWork.p */
-  int pair_rows;                    /* 1: this evaluation computes contacts between legs */
-  hxContactWork pair[HX_PAIR_ROWS][HX_PACKS]; /* of each leg with the next one */
   hxLegWork pack[HX_PACKS];
+  int pair_rows; /* 1: this evaluation computes contacts between legs */
+  hxContactWork pair[HX_PAIR_ROWS][HX_PACKS]; /* of each leg with the next one */
 } hxWork;
 
 enum { HX_TURN_SIZE = 8 + HX_JOINTS * 3 * HX_SLOTS };
