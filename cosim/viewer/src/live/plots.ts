@@ -23,6 +23,12 @@ interface Described {
   readonly curves: readonly Curve[];
 }
 
+/** Returns a number with a fixed count of digits, and zero without a sign. */
+function fixed(value: number, digits: number): string {
+  const text = value.toFixed(digits);
+  return Number(text) === 0 ? (0).toFixed(digits) : text;
+}
+
 /** Plots that run along: the last seconds of a few quantities. */
 export class Plots {
   private readonly strips: Strip[] = [];
@@ -65,7 +71,7 @@ function described(world: World): Described[] {
   const size = (frame: Frame, k: number) => Math.hypot(...frame.force.slice(3 * k, 3 * k + 3));
   return [
     {
-      name: "Forces on the feet",
+      name: "Foot forces",
       unit: "body weights",
       least: [0, 0.6],
       digits: 2,
@@ -164,7 +170,7 @@ class Strip {
     });
     this.values.forEach((value, k) => {
       const column = this.data[k + 1];
-      value.textContent = column[column.length - 1].toFixed(this.about.digits);
+      value.textContent = fixed(column[column.length - 1], this.about.digits);
     });
   }
 
