@@ -221,13 +221,13 @@ def initialise_plant(plant: Fmu, plan: RunPlan) -> dict[str, float]:
 
 def _check_measurements(plant: Fmu) -> None:
     """Raises FmuError when an FMU lacks the outputs that metrics are made of."""
-    missing = sorted(set(MEASURED_BY_PLANT) - set(plant.names("output")))
+    missing = [name for name in MEASURED_BY_PLANT if name not in plant.variables]
     if missing:
         fix = "export it again with `hexapod export`"
         expected = "the outputs that metrics are made of, which FMUs of earlier versions lack"
         raise FmuError(
             "an FMU without measurements",
-            got=f"no {missing[0]}",
+            got=f"no {min(missing)}",
             expected=expected,
             fix=fix,
             where=str(plant.path),
