@@ -59,8 +59,8 @@ class Figures:
     found: bool
 
 
-def build(folder: Path = BUILD) -> None:
-    """Builds the targets. Raises SystemExit when a tool is missing or the build fails."""
+def build(folder: Path, targets: Sequence[str]) -> None:
+    """Builds targets. Raises SystemExit when a tool is missing or the build fails."""
     if shutil.which("clang") is None:
         raise SystemExit(
             "fuzz: no clang, expected one with libFuzzer; install it (Debian, Ubuntu: "
@@ -77,7 +77,7 @@ def build(folder: Path = BUILD) -> None:
     configure = [cmake, "--preset", folder.name, f"-DPython_EXECUTABLE={sys.executable}"]
     commands = [
         [*configure, *(["-G", "Ninja"] if fresh else [])],
-        [cmake, "--build", "--preset", folder.name],
+        [cmake, "--build", "--preset", folder.name, "--target", *targets],
     ]
     for command in commands:
         done = subprocess.run(
@@ -194,7 +194,7 @@ def main(arguments: Sequence[str]) -> int:
     share = int(arguments[0]) / len(chosen)
     place = AFL_BUILD if by_afl else BUILD
     if set(chosen) != {READERS}:
-        build(place)
+        build(place, [target for target in chosen if target != READERS])
     figures = []
     for target in chosen:
         run = read if target == READERS else partial(fuzz_by_afl if by_afl else fuzz, target)
