@@ -23,7 +23,7 @@ SANITIZED_SHORT := $(patsubst %,tests/fmi/test_%.py,fmi fmi3 fmi3_order fmi_stat
 	$(patsubst %,tests/plant/test_plant_%.py,events coordinates misuse)
 SANITIZED := $(SANITIZED_SHORT) tests/fmi/test_fmi_importers.py tests/fmi/test_endurance.py
 
-.PHONY: help setup demo test test-docs test-browser test-importers test-platforms test-endurance test-native test-native-sanitize test-sanitize test-sanitize-short test-robots test-wheels wheels test-compilers fuzz fuzz-short mutants soak lint-c check bench bench-quick bench-batch bench-gym bench-opening control study-demo format generate fmu typing clean docs identify-campaign coverage lock audit
+.PHONY: help setup demo test test-docs test-browser test-importers test-platforms test-endurance test-native test-native-sanitize test-sanitize test-sanitize-short test-robots test-wheels wheels test-compilers fuzz fuzz-short mutants soak lint-c check bench bench-quick bench-batch bench-gym bench-opening control study-demo format generate fmu typing clean docs identify-campaign coverage lock audit fuzz-afl
 
 help:
 	@echo "make setup     the hexapod command in $(BIN)"
@@ -43,6 +43,7 @@ help:
 	@echo "make test-compilers  the plant built by gcc, clang and zig at -O0 to -O3: the same bits (3 min)"
 	@echo "make fuzz      libFuzzer on calls, states, start values and grids, Hypothesis on every reader: FUZZ_SECONDS, 3600 in all"
 	@echo "make fuzz-short  the same for a minute in all"
+	@echo "make fuzz-afl  the same targets in C by AFL++ (Debian: afl++): FUZZ_SECONDS in all"
 	@echo "make coverage  branches of plant, controllers and FMI layer that their tests take, per file (10 min)"
 	@echo "make mutants   MUTANTS (200) small changes of the code, one at a time: which ones the tests find (hours)"
 	@echo "make soak      SOAK_SECONDS (86400) of walking with random commands, pushes, faults and restores"
@@ -146,6 +147,9 @@ fuzz: setup
 
 fuzz-short: setup
 	$(BIN)/python -m tools.fuzz 60
+
+fuzz-afl: setup
+	$(BIN)/python -m tools.fuzz --afl $(FUZZ_SECONDS)
 
 coverage: setup
 	$(BIN)/python -m pip install --quiet gcovr

@@ -66,7 +66,7 @@ def table() -> str:
     run(
         str(Path(sys.executable).parent / "gcovr"),
         *("--root", str(ROOT), "--object-directory", str(BUILD)),
-        *(str(BUILD / part) for part in ("plant_fmu", "controller_fmu")),
+        *(str(BUILD / part) for part in ("plant_fmu", "controller_fmu", "tests")),
         *options,
         *("--merge-mode-functions=merge-use-line-min", "--exclude-throw-branches"),
         *("--json-summary", str(summary), "--txt", str(BUILD / "lines.txt"), "--txt-metric=branch"),

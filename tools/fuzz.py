@@ -1,11 +1,13 @@
-"""Fuzzes the C code by libFuzzer and the Python readers by Hypothesis; prints and writes figures.
+"""Fuzzes the C code by libFuzzer or AFL++ and the Python readers by Hypothesis; prints and writes
+figures.
 
-usage: python -m tools.fuzz SECONDS [TARGET ...]
+usage: python -m tools.fuzz [--afl] SECONDS [TARGET ...]
 
 Each target of tests/fuzz gets an equal share of the time; the readers (tests/fuzz/test_readers.py),
 which are the target "readers", get one share too. Inputs that reach new code are kept in
 build/fuzz/corpus, inputs that violate a rule are written to build/fuzz/findings, figures to
-build/fuzz/figures.json. The exit code is 1 after a finding.
+build/fuzz/figures.json. With --afl the C targets alone are run, by AFL++, with all files in
+build/fuzz-afl. The exit code is 1 after a finding.
 """
 
 from __future__ import annotations
@@ -20,10 +22,11 @@ import time
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
+from functools import partial
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
-BUILD = ROOT / "build" / "fuzz"
+BUILD, AFL_BUILD = ROOT / "build" / "fuzz", ROOT / "build" / "fuzz-afl"
 SEEDS = ROOT / "tests" / "fuzz" / "seeds"
 READERS = "readers"
 READING = ("-q", "-n", "0", "--hypothesis-show-statistics", "tests/fuzz/test_readers.py")
@@ -31,6 +34,17 @@ LONGEST_INPUT = 4096  # bytes
 LONGEST_CALL = 60  # s  an input that takes longer is a finding
 STATISTIC = re.compile(r"stat::number_of_executed_units: +(\d+)")
 COVERAGE = re.compile(r"cov: (\d+)")
+# AFL++ without its display, and without its advice about the system's settings
+AFL_SETTINGS = dict.fromkeys(
+    (
+        "AFL_NO_UI",
+        "AFL_QUIET",
+        "AFL_SKIP_CPUFREQ",
+        "AFL_NO_AFFINITY",
+        "AFL_I_DONT_CARE_ABOUT_MISSING_CRASHES",
+    ),
+    "1",
+)
 DRAWN = re.compile(r"- (\d+) passing")
 
 
@@ -45,26 +59,31 @@ class Figures:
     found: bool
 
 
-def build() -> None:
-    """Builds the targets. Raises SystemExit when a tool is missing or the build fails."""
+def build(folder: Path, targets: Sequence[str]) -> None:
+    """Builds targets. Raises SystemExit when a tool is missing or the build fails."""
     if shutil.which("clang") is None:
         raise SystemExit(
             "fuzz: no clang, expected one with libFuzzer; install it (Debian, Ubuntu: "
             "apt-get install clang libclang-rt-dev)"
         )
+    if folder == AFL_BUILD and shutil.which("afl-clang-fast") is None:
+        raise SystemExit(
+            "fuzz: no afl-clang-fast, expected AFL++; install it (Debian, Ubuntu: "
+            "apt-get install afl++)"
+        )
     search = os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])
     cmake = shutil.which("cmake", path=search) or "cmake"
-    fresh = not (BUILD / "CMakeCache.txt").exists()
-    configure = [cmake, "--preset", "fuzz", f"-DPython_EXECUTABLE={sys.executable}"]
+    fresh = not (folder / "CMakeCache.txt").exists()
+    configure = [cmake, "--preset", folder.name, f"-DPython_EXECUTABLE={sys.executable}"]
     commands = [
         [*configure, *(["-G", "Ninja"] if fresh else [])],
-        [cmake, "--build", "--preset", "fuzz"],
+        [cmake, "--build", "--preset", folder.name, "--target", *targets],
     ]
     for command in commands:
         done = subprocess.run(
             command,
             cwd=ROOT,
-            env=os.environ | {"PATH": search},
+            env=os.environ | AFL_SETTINGS | {"PATH": search},
             capture_output=True,
             text=True,
             check=False,
@@ -110,6 +129,36 @@ def fuzz(target: str, seconds: float) -> Figures:
     )
 
 
+def fuzz_by_afl(target: str, seconds: float) -> Figures:
+    """Runs one target by AFL++; prints what it says when it could not run."""
+    out = AFL_BUILD / "runs" / target
+    out.mkdir(parents=True, exist_ok=True)
+    begin = time.monotonic()
+    done = subprocess.run(
+        [
+            *("afl-fuzz", "-V", str(max(1, round(seconds))), "-t", str(1000 * LONGEST_CALL)),
+            *("-m", "none", "-i", "-" if (out / "default").exists() else str(SEEDS / target)),
+            *("-o", str(out), "--", str(AFL_BUILD / "tests" / "fuzz" / target)),
+        ],
+        env=os.environ | AFL_SETTINGS,
+        capture_output=True,
+        text=True,
+        errors="replace",
+        check=False,
+    )
+    told = out / "default" / "fuzzer_stats"
+    if done.returncode != 0 or not told.exists():
+        print((done.stdout + done.stderr)[-6000:], file=sys.stderr)
+        return Figures(target, 0, 0, time.monotonic() - begin, found=True)
+    lines = told.read_text(encoding="utf-8").splitlines()
+    value = {key.strip(): text.strip() for key, _, text in (line.partition(":") for line in lines)}
+    found = int(value["saved_crashes"]) + int(value["saved_hangs"]) > 0
+    if found:
+        print(f"{target}: see {out / 'default'}", file=sys.stderr)
+    inputs, edges = int(value["execs_done"]), int(value["edges_found"])
+    return Figures(target, inputs, edges, time.monotonic() - begin, found)
+
+
 def read(seconds: float) -> Figures:
     """Draws files for the readers by Hypothesis, a new seed each time, until the time is over."""
     begin, inputs, found = time.monotonic(), 0, False
@@ -133,17 +182,23 @@ def read(seconds: float) -> Figures:
 
 def main(arguments: Sequence[str]) -> int:
     """Runs the targets and returns the exit code."""
-    known = [*sorted(folder.name for folder in SEEDS.iterdir()), READERS]
+    by_afl = "--afl" in arguments
+    arguments = [word for word in arguments if word != "--afl"]
+    known = [*sorted(folder.name for folder in SEEDS.iterdir()), *([] if by_afl else [READERS])]
     if not arguments or not arguments[0].isdigit() or set(arguments[1:]) - set(known):
-        print(f"usage: python -m tools.fuzz SECONDS [TARGET ...]; targets: {', '.join(known)}")
+        print(
+            f"usage: python -m tools.fuzz [--afl] SECONDS [TARGET ...]; targets: {', '.join(known)}"
+        )
         return 2
     chosen = list(arguments[1:]) or known
     share = int(arguments[0]) / len(chosen)
+    place = AFL_BUILD if by_afl else BUILD
     if set(chosen) != {READERS}:
-        build()
+        build(place, [target for target in chosen if target != READERS])
     figures = []
     for target in chosen:
-        one = read(share) if target == READERS else fuzz(target, share)
+        run = read if target == READERS else partial(fuzz_by_afl if by_afl else fuzz, target)
+        one = run(share)
         said = "a finding" if one.found else "no finding"
         print(
             f"{target:30}{one.inputs:12,} inputs {one.covered:7,} edges",
@@ -151,10 +206,10 @@ def main(arguments: Sequence[str]) -> int:
             flush=True,
         )
         figures.append(one)
-    BUILD.mkdir(parents=True, exist_ok=True)
+    place.mkdir(parents=True, exist_ok=True)
     about = {"finished": datetime.now(UTC).isoformat(timespec="seconds")}
     text = json.dumps({**about, "targets": [asdict(one) for one in figures]}, indent=1)
-    (BUILD / "figures.json").write_text(text + "\n", encoding="utf-8")
+    (place / "figures.json").write_text(text + "\n", encoding="utf-8")
     return int(any(one.found for one in figures))
 
 

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import math
 from copy import deepcopy
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -211,7 +212,7 @@ def test_faults_of_sensors_are_described_and_survive_a_scenario_file() -> None:
     ],
 )
 def test_a_walk_with_faulty_sensors_goes_on_or_says_why_it_ended(
-    control: str, fault: str, status: str
+    plant_build: Path, control: str, fault: str, status: str
 ) -> None:
     overrides = ["duration=0.3", f"control={control}", f"events=[{{time=0.1, {fault}}}]"]
     result = simulate(load_scenario("walk_flat", overrides=overrides))

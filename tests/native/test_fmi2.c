@@ -146,6 +146,108 @@ static void misuse_is_refused(void) {
   CHECK(fmi2DoStep(NULL, 0.0, 0.01, fmi2True) > fmi2Warning);
 }
 
+/* Makes every call of co-simulation that has arguments without them; all must be refused. */
+static void call_without_arguments(fmi2Component fmu) {
+  const fmi2ValueReference reference = reference_of("LF.coxa.angle_ref");
+  const fmi2Real number = 1.0;
+  const fmi2Integer order = 1;
+  CHECK(fmi2SetDebugLogging(fmu, fmi2True, 1, NULL) == fmi2Error);
+  CHECK(fmi2GetReal(fmu, &reference, 1, NULL) == fmi2Error);
+  CHECK(fmi2GetInteger(fmu, NULL, 1, NULL) == fmi2Error);
+  CHECK(fmi2GetBoolean(fmu, NULL, 1, NULL) == fmi2Error);
+  CHECK(fmi2GetString(fmu, NULL, 1, NULL) == fmi2Error);
+  CHECK(fmi2SetReal(fmu, NULL, 1, &number) == fmi2Error);
+  CHECK(fmi2SetInteger(fmu, NULL, 1, &order) == fmi2Error);
+  CHECK(fmi2SetBoolean(fmu, NULL, 1, NULL) == fmi2Error);
+  CHECK(fmi2SetString(fmu, NULL, 1, NULL) == fmi2Error);
+  CHECK(fmi2SetRealInputDerivatives(fmu, &reference, 1, NULL, &number) == fmi2Error);
+  CHECK(fmi2SetRealInputDerivatives(fmu, NULL, 1, &order, &number) == fmi2Error);
+  CHECK(fmi2GetRealOutputDerivatives(fmu, &reference, 1, &order, NULL) == fmi2Error);
+  CHECK(fmi2GetDirectionalDerivative(fmu, NULL, 1, &reference, 1, &number, NULL) == fmi2Error);
+  CHECK(fmi2GetFMUstate(fmu, NULL) == fmi2Error);
+  CHECK(fmi2SetFMUstate(fmu, NULL) == fmi2Error);
+  CHECK(fmi2SerializedFMUstateSize(fmu, NULL, NULL) == fmi2Error);
+  CHECK(fmi2SerializeFMUstate(fmu, NULL, NULL, 1) == fmi2Error);
+  CHECK(fmi2DeSerializeFMUstate(fmu, NULL, 1, NULL) == fmi2Error);
+  CHECK(fmi2CancelStep(fmu) == fmi2Error);
+}
+
+static void calls_without_arguments_are_refused_and_change_nothing(void) {
+  fmi2Component fmu = initialised(fmi2CoSimulation);
+  fmi2FMUstate before = NULL, after = NULL;
+  size_t size = 0;
+  CHECK(fmi2DoStep(fmu, 0.0, 0.01, fmi2True) == fmi2OK);
+  CHECK(fmi2GetFMUstate(fmu, &before) == fmi2OK);
+  CHECK(fmi2SerializedFMUstateSize(fmu, before, &size) == fmi2OK);
+  fmi2Byte *first = malloc(size), *second = malloc(size);
+  complaints = 0;
+  call_without_arguments(NULL);
+  CHECK(complaints == 0); /* without an instance there is no logger */
+  call_without_arguments(fmu);
+  CHECK(complaints > 0);
+  CHECK(fmi2GetFMUstate(fmu, &after) == fmi2OK);
+  CHECK(fmi2SerializeFMUstate(fmu, before, first, size) == fmi2OK &&
+        fmi2SerializeFMUstate(fmu, after, second, size) == fmi2OK);
+  CHECK(memcmp(first, second, size) == 0);
+  CHECK(fmi2DoStep(fmu, 0.01, 0.01, fmi2True) == fmi2OK);
+  free(first), free(second);
+  CHECK(fmi2FreeFMUstate(fmu, &before) == fmi2OK && fmi2FreeFMUstate(fmu, &after) == fmi2OK);
+  fmi2FreeInstance(fmu);
+}
+
+/* Makes every call of model exchange; all must be refused. */
+static void call_model_exchange(fmi2Component fmu) {
+  fmi2Real state[1] = {0.0};
+  fmi2EventInfo event;
+  fmi2Boolean enter, terminate;
+  CHECK(fmi2EnterEventMode(fmu) == fmi2Error);
+  CHECK(fmi2NewDiscreteStates(fmu, &event) == fmi2Error);
+  CHECK(fmi2EnterContinuousTimeMode(fmu) == fmi2Error);
+  CHECK(fmi2CompletedIntegratorStep(fmu, fmi2True, &enter, &terminate) == fmi2Error);
+  CHECK(fmi2SetTime(fmu, 0.0) == fmi2Error);
+  CHECK(fmi2SetContinuousStates(fmu, state, 1) == fmi2Error);
+  CHECK(fmi2GetContinuousStates(fmu, state, 1) == fmi2Error);
+  CHECK(fmi2GetNominalsOfContinuousStates(fmu, state, 1) == fmi2Error);
+  CHECK(fmi2GetDerivatives(fmu, state, 1) == fmi2Error);
+  CHECK(fmi2GetEventIndicators(fmu, state, 1) == fmi2Error);
+}
+
+static void calls_of_the_other_interface_are_refused(void) {
+  fmi2Component fmu = initialised(fmi2CoSimulation);
+  call_model_exchange(NULL);
+  call_model_exchange(fmu);
+  CHECK(fmi2DoStep(fmu, 0.0, 0.01, fmi2True) == fmi2OK);
+  fmi2FreeInstance(fmu);
+  fmu = initialised(fmi2ModelExchange);
+  CHECK(fmi2DoStep(fmu, 0.0, 0.01, fmi2True) == fmi2Error);
+  fmi2FreeInstance(fmu);
+}
+
+static void a_status_is_what_a_step_left(void) {
+  fmi2Component fmu = initialised(fmi2CoSimulation);
+  fmi2Status status;
+  fmi2Real last = -1.0;
+  fmi2Integer integer;
+  fmi2Boolean ended = fmi2True;
+  fmi2String text;
+  CHECK(fmi2DoStep(fmu, 0.0, 0.25, fmi2True) == fmi2OK);
+  CHECK(fmi2GetRealStatus(fmu, fmi2LastSuccessfulTime, &last) == fmi2OK && last == 0.25);
+  CHECK(fmi2GetBooleanStatus(fmu, fmi2Terminated, &ended) == fmi2OK && !ended);
+  CHECK(fmi2GetStatus(fmu, fmi2DoStepStatus, &status) != fmi2Fatal);
+  CHECK(fmi2GetRealStatus(fmu, fmi2LastSuccessfulTime, NULL) > fmi2Warning);
+  CHECK(fmi2GetRealStatus(fmu, fmi2Terminated, &last) > fmi2Warning);
+  CHECK(fmi2GetBooleanStatus(fmu, fmi2LastSuccessfulTime, &ended) > fmi2Warning);
+  CHECK(fmi2GetBooleanStatus(fmu, fmi2Terminated, NULL) > fmi2Warning);
+  CHECK(fmi2GetStatus(fmu, fmi2Terminated, &status) > fmi2Warning);
+  CHECK(fmi2GetStatus(fmu, fmi2DoStepStatus, NULL) > fmi2Warning);
+  CHECK(fmi2GetIntegerStatus(fmu, fmi2PendingStatus, &integer) > fmi2Warning);
+  CHECK(fmi2GetStringStatus(fmu, fmi2PendingStatus, &text) > fmi2Warning);
+  CHECK(fmi2GetStatus(NULL, fmi2DoStepStatus, &status) > fmi2Warning);
+  CHECK(fmi2GetRealStatus(NULL, fmi2LastSuccessfulTime, &last) > fmi2Warning);
+  CHECK(fmi2GetBooleanStatus(NULL, fmi2Terminated, &ended) > fmi2Warning);
+  fmi2FreeInstance(fmu);
+}
+
 int main(int count, char **arguments) {
   if (count != 2) return EXIT_FAILURE;
   open_description(arguments[1]);
@@ -153,5 +255,8 @@ int main(int count, char **arguments) {
   derivatives_are_differences();
   solvers_of_others_see_it_fall();
   misuse_is_refused();
+  calls_without_arguments_are_refused_and_change_nothing();
+  calls_of_the_other_interface_are_refused();
+  a_status_is_what_a_step_left();
   return failures;
 }

@@ -118,11 +118,87 @@ static void a_saved_state_goes_on(void) {
   fmi3FreeInstance(fmu), fmi3FreeInstance(other);
 }
 
+/* Makes calls without their arguments; all must be refused. */
+static void call_without_arguments(fmi3Instance fmu) {
+  const fmi3ValueReference reference = reference_of("LF.coxa.angle_ref");
+  const fmi3Float64 number[1] = {1.0};
+  const fmi3Int32 order = 1;
+  CHECK(fmi3SetDebugLogging(fmu, fmi3True, 1, NULL) == fmi3Error);
+  CHECK(fmi3GetFloat64(fmu, NULL, 1, NULL, 1) == fmi3Error);
+  CHECK(fmi3GetInt32(fmu, NULL, 1, NULL, 1) == fmi3Error);
+  CHECK(fmi3GetBoolean(fmu, NULL, 1, NULL, 1) == fmi3Error);
+  CHECK(fmi3SetFloat64(fmu, &reference, 1, NULL, 18) == fmi3Error);
+  CHECK(fmi3SetInt32(fmu, NULL, 1, &order, 1) == fmi3Error);
+  CHECK(fmi3SetBoolean(fmu, NULL, 1, NULL, 1) == fmi3Error);
+  CHECK(fmi3GetOutputDerivatives(fmu, &reference, 1, &order, NULL, 1) == fmi3Error);
+  CHECK(fmi3GetDirectionalDerivative(fmu, NULL, 1, &reference, 1, number, 1, NULL, 1) == fmi3Error);
+  CHECK(fmi3GetFMUState(fmu, NULL) == fmi3Error);
+  CHECK(fmi3SetFMUState(fmu, NULL) == fmi3Error);
+  CHECK(fmi3SerializedFMUStateSize(fmu, NULL, NULL) == fmi3Error);
+  CHECK(fmi3SerializeFMUState(fmu, NULL, NULL, 1) == fmi3Error);
+  CHECK(fmi3DeserializeFMUState(fmu, NULL, 1, NULL) == fmi3Error);
+  CHECK(fmi3GetNumberOfContinuousStates(fmu, NULL) == fmi3Error);
+  CHECK(fmi3GetNumberOfEventIndicators(fmu, NULL) == fmi3Error);
+}
+
+static void calls_without_arguments_are_refused_and_change_nothing(void) {
+  fmi3Instance fmu = instantiated(fmi3False);
+  fmi3FMUState before = NULL, after = NULL;
+  fmi3Boolean event, terminate, early;
+  fmi3Float64 last;
+  size_t size = 0;
+  initialise(fmu);
+  CHECK(fmi3DoStep(fmu, 0.0, 0.01, fmi3True, &event, &terminate, &early, &last) == fmi3OK);
+  CHECK(fmi3GetFMUState(fmu, &before) == fmi3OK);
+  CHECK(fmi3SerializedFMUStateSize(fmu, before, &size) == fmi3OK);
+  fmi3Byte *first = malloc(size), *second = malloc(size);
+  complaints = 0;
+  call_without_arguments(NULL);
+  CHECK(complaints == 0); /* without an instance there is no logger */
+  call_without_arguments(fmu);
+  CHECK(complaints > 0);
+  CHECK(fmi3GetFMUState(fmu, &after) == fmi3OK);
+  CHECK(fmi3SerializeFMUState(fmu, before, first, size) == fmi3OK &&
+        fmi3SerializeFMUState(fmu, after, second, size) == fmi3OK);
+  CHECK(memcmp(first, second, size) == 0);
+  CHECK(fmi3DoStep(fmu, 0.01, 0.01, fmi3True, &event, &terminate, &early, &last) == fmi3OK);
+  free(first), free(second);
+  CHECK(fmi3FreeFMUState(fmu, &before) == fmi3OK && fmi3FreeFMUState(fmu, &after) == fmi3OK);
+  fmi3FreeInstance(fmu);
+}
+
+/* Makes calls of model exchange; all must be refused. */
+static void call_model_exchange(fmi3Instance fmu) {
+  fmi3Float64 number[1] = {0.0};
+  fmi3Boolean enter, terminate;
+  CHECK(fmi3EnterContinuousTimeMode(fmu) == fmi3Error);
+  CHECK(fmi3CompletedIntegratorStep(fmu, fmi3True, &enter, &terminate) == fmi3Error);
+  CHECK(fmi3SetTime(fmu, 0.0) == fmi3Error);
+  CHECK(fmi3SetContinuousStates(fmu, number, 1) == fmi3Error);
+  CHECK(fmi3GetContinuousStates(fmu, number, 1) == fmi3Error);
+  CHECK(fmi3GetContinuousStateDerivatives(fmu, number, 1) == fmi3Error);
+  CHECK(fmi3GetNominalsOfContinuousStates(fmu, number, 1) == fmi3Error);
+  CHECK(fmi3GetEventIndicators(fmu, number, 1) == fmi3Error);
+}
+
+static void calls_of_the_other_interface_are_refused(void) {
+  fmi3Instance fmu = instantiated(fmi3False);
+  fmi3Boolean event, terminate, early;
+  fmi3Float64 last;
+  initialise(fmu);
+  call_model_exchange(NULL);
+  call_model_exchange(fmu);
+  CHECK(fmi3DoStep(fmu, 0.0, 0.01, fmi3True, &event, &terminate, &early, &last) == fmi3OK);
+  fmi3FreeInstance(fmu);
+}
+
 int main(int count, char **arguments) {
   if (count != 2) return EXIT_FAILURE;
   open_description(arguments[1]);
   arrays_hold_all_legs();
   stops_at_touch_downs_leave_no_trace();
   a_saved_state_goes_on();
+  calls_without_arguments_are_refused_and_change_nothing();
+  calls_of_the_other_interface_are_refused();
   return failures;
 }
