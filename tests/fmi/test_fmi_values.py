@@ -68,6 +68,9 @@ RELATED = [
     "servo.air_temperature",
     "servo.derate_temperature",
     "servo.temperature_max",
+    "servo.gear_stiffness",
+    "servo.backlash",
+    "servo.gear_ratio",
 ]
 DEEP = "deep in the ground"  # a start with its feet below the ground is refused
 LOWEST = -10000.0  # m  of the ground: limits of lengths do not put feet into it

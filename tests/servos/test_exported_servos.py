@@ -1,0 +1,64 @@
+"""What URDF and MJCF files say of a robot's servos, and what `hexapod export` says is left out."""
+
+from __future__ import annotations
+
+import xml.etree.ElementTree as ET
+from pathlib import Path
+
+import pytest
+from test_measured_servos import with_servo
+from typer.testing import CliRunner
+
+from hexapod_cosim.cosim.cli.app import app
+from hexapod_cosim.cosim.export.robot_files import FORMATS, left_out
+from hexapod_cosim.models import load_robot
+from hexapod_cosim.models.mjcf import robot_to_mjcf
+
+
+def test_mjcf_has_viscous_friction_and_the_damping_of_the_back_emf() -> None:
+    robot = with_servo(load_robot("athena"), "mx64_m1")
+    root = ET.fromstring(robot_to_mjcf(robot))
+    joints = root.findall(".//joint[@type='hinge']")
+    damping = [float(joint.get("damping", "")) for joint in joints]
+    assert damping == pytest.approx([0.01169] * 18, abs=1e-5)
+    assert {float(joint.get("frictionloss", "")) for joint in joints} == {
+        robot.servo.coulomb_friction
+    }
+    motors = root.findall("actuator/position")
+    back_emf = 0.66656  # k_t^2/R
+    assert [float(motor.get("kv", "")) for motor in motors] == pytest.approx(
+        [back_emf] * 18, rel=1e-3
+    )
+
+
+def test_an_ideal_servo_loses_nothing_and_gears_their_play() -> None:
+    ideal = load_robot("athena").servo
+    assert [left_out(ideal, form) for form in FORMATS.values()] == [[], []]
+    gear = {"gear_stiffness": 400.0, "backlash": 0.01, "gear_ratio": 200.0}
+    measured = with_servo(load_robot("athena"), "mx64_m1", **gear).servo
+    limits, friction = (
+        "the limits of the motor's voltage",
+        "friction that depends on load and speed",
+    )
+    gears = ["the elasticity of the gears", "backlash", "the rotors' angular momentum"]
+    assert left_out(measured, FORMATS["urdf"]) == [friction, limits, *gears]
+    assert left_out(measured, FORMATS["mjcf"]) == [limits, *gears]
+
+
+def models() -> Path:
+    """Returns the folder of the robots' files."""
+    return Path(__file__).parents[2] / "models"
+
+
+def test_the_command_warns_of_what_a_file_leaves_out(tmp_path: Path) -> None:
+    robot = tmp_path / "mine.toml"
+    text = (models() / "athena.toml").read_text(encoding="utf-8")
+    gear = "[servo]\ngear_stiffness = 400.0  # assumed\nbacklash = 0.01  # assumed\n"
+    robot.write_text(text.replace("[servo]\n", gear), encoding="utf-8")
+    file = tmp_path / "mine.urdf"
+    result = CliRunner().invoke(app, ["export", "--robot", str(robot), "-o", str(file)])
+    assert result.exit_code == 0, result.output
+    assert file.exists()
+    told = " ".join(result.stderr.split())
+    assert "warning: mine.urdf: a URDF cannot say and leaves out of the servos" in told
+    assert "the elasticity of the gears, backlash" in told
