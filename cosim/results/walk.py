@@ -79,7 +79,7 @@ class Walk:
     def gained(self, names: list[str]) -> Array:
         """Returns the growth of cumulative outputs (names,) from begin to end, interpolated."""
         begin, end = (_values_at(self.whole, names, t) for t in (self.begin, self.end))
-        return end - begin
+        return np.asarray(end - begin)
 
     def rms(self, values: Array) -> float:
         """Returns the RMS deviation of values (rows,) from their mean over time."""
@@ -96,7 +96,7 @@ def _values_at(recording: Recording, names: Sequence[str], t: float) -> Array:
     time = recording.time
     before = int(np.searchsorted(time, t, side="right")) - 1
     if before == len(time) - 1:  # the time is rounded, and the last row may be before it
-        return recording.rows(slice(before, None)).columns(names)[0]
+        return np.asarray(recording.rows(slice(before, None)).columns(names)[0])
     (low, high), first = recording.rows(slice(before, before + 2)).columns(names), time[before]
     return np.asarray((high - low) / (time[before + 1] - first) * (t - first) + low)
 

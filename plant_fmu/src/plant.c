@@ -130,6 +130,19 @@ static hxStatus check_start_depth(const hxPlant *plant, char message[HX_MESSAGE_
   return HX_OK;
 }
 
+/* Sets a model to the plant's with its first rows of feet only. */
+static void keep_feet(const hxPlant *plant, int rows, hxModel *feet) {
+  *feet = plant->model;
+  feet->rows = feet->foot_rows = rows;
+  feet->torso_rows = 0;
+}
+
+/* Sets the models without some rows of contacts, after every change of the model. */
+static void derive_models(hxPlant *plant) {
+  keep_feet(plant, plant->model.foot_rows, &plant->all_feet);
+  keep_feet(plant, 1, &plant->first_feet);
+}
+
 hxStatus hx_plant_reset(hxPlant *plant, const hxDefinition *definition, double t) {
   char message[HX_MESSAGE_SIZE];
   double body[HX_BODIES][HX_BODY_STATE];
@@ -153,6 +166,7 @@ hxStatus hx_plant_reset(hxPlant *plant, const hxDefinition *definition, double t
     plant->state = plant->state_before;
     return fail(plant, status, message);
   }
+  derive_models(plant);
   hx_footprints_clear(&plant->footprints);
   plant->message[0] = '\0';
   return HX_OK;
@@ -284,6 +298,7 @@ static hxStatus advance(hxPlant *plant, const hxInput *input, const hxInput *rat
   const hxStepCall call = {input, ramp, told ? input_fingerprint(input) : 0.0, before->time};
   hx_footprints_begin(&plant->footprints);
   events->footprints = &plant->footprints;
+  events->all_feet = &plant->all_feet, events->first_feet = &plant->first_feet;
   do {
     status = advance_part(plant, &call, t_end, events);
     events->continues = 1;
@@ -383,6 +398,7 @@ hxStatus hx_plant_set_state(hxPlant *plant, const void *bytes, size_t size) {
   memcpy(&plant->model, from + offsetof(hxSavedPlant, model), sizeof plant->model);
   memcpy(&plant->state, from + offsetof(hxSavedPlant, state), sizeof plant->state);
   plant->model.terrain = head.terrain ? plant->terrain : NULL;
+  derive_models(plant);
   hx_footprints_read(&plant->footprints, from + offsetof(hxSavedPlant, footprints));
   return HX_OK;
 }

@@ -256,6 +256,9 @@ typedef struct hxState {
 
 struct hxPlant {
   hxModel model;
+  /* the model with the rows of feet alone, and with the first of them: open contacts exert no
+   * force, so steps without their rows have the same bits */
+  hxModel all_feet, first_feet;
   hxState state;
   const hxTerrain *terrain; /* of later resets */
   double valley_limit;      /* m  its valleys are not narrower; 0: not searched yet */
