@@ -12,10 +12,10 @@
 HX_HIDDEN_BEGIN
 
 /* Event handling of a call: stop = end at the first touch-down or lift-off; found = there was one.
- * The models without some rows of contacts are those of hxPlant. */
+ */
 typedef struct hxEvents {
-  const hxModel *all_feet, *first_feet;
   int stop, found;
+  const hxModel *feet;        /* the model with the rows of feet alone */
   int continues;              /* 1: a later part of a call, whose peaks stay */
   hxFootprintLog *footprints; /* that feet leave in soil */
 } hxEvents;

@@ -130,17 +130,11 @@ static hxStatus check_start_depth(const hxPlant *plant, char message[HX_MESSAGE_
   return HX_OK;
 }
 
-/* Sets a model to the plant's with its first rows of feet only. */
-static void keep_feet(const hxPlant *plant, int rows, hxModel *feet) {
-  *feet = plant->model;
-  feet->rows = feet->foot_rows = rows;
-  feet->torso_rows = 0;
-}
-
-/* Sets the models without some rows of contacts, after every change of the model. */
-static void derive_models(hxPlant *plant) {
-  keep_feet(plant, plant->model.foot_rows, &plant->all_feet);
-  keep_feet(plant, 1, &plant->first_feet);
+/* Sets the model with the rows of feet alone, after every change of the model. */
+static void derive_feet(hxPlant *plant) {
+  plant->feet = plant->model;
+  plant->feet.rows = plant->model.foot_rows;
+  plant->feet.torso_rows = 0;
 }
 
 hxStatus hx_plant_reset(hxPlant *plant, const hxDefinition *definition, double t) {
@@ -152,7 +146,7 @@ hxStatus hx_plant_reset(hxPlant *plant, const hxDefinition *definition, double t
   hxStatus status = hx_definition_check(definition, message);
   if (status == HX_OK) status = check_terrain(plant, definition, message);
   if (status != HX_OK) return fail(plant, status, message);
-  plant->model_before = plant->model;
+  plant->feet = plant->model;
   plant->state_before = plant->state;
   memset(&plant->model, 0, sizeof plant->model);
   memset(&plant->state, 0, sizeof plant->state);
@@ -162,11 +156,12 @@ hxStatus hx_plant_reset(hxPlant *plant, const hxDefinition *definition, double t
   hx_kernel()->start(&plant->model, t, &plant->state, plant->scratch);
   status = check_start_depth(plant, message); /* the cells of feet on blocks are known now */
   if (status != HX_OK) {
-    plant->model = plant->model_before;
+    plant->model = plant->feet;
     plant->state = plant->state_before;
+    derive_feet(plant);
     return fail(plant, status, message);
   }
-  derive_models(plant);
+  derive_feet(plant);
   hx_footprints_clear(&plant->footprints);
   plant->message[0] = '\0';
   return HX_OK;
@@ -298,7 +293,7 @@ static hxStatus advance(hxPlant *plant, const hxInput *input, const hxInput *rat
   const hxStepCall call = {input, ramp, told ? input_fingerprint(input) : 0.0, before->time};
   hx_footprints_begin(&plant->footprints);
   events->footprints = &plant->footprints;
-  events->all_feet = &plant->all_feet, events->first_feet = &plant->first_feet;
+  events->feet = &plant->feet;
   do {
     status = advance_part(plant, &call, t_end, events);
     events->continues = 1;
@@ -398,7 +393,7 @@ hxStatus hx_plant_set_state(hxPlant *plant, const void *bytes, size_t size) {
   memcpy(&plant->model, from + offsetof(hxSavedPlant, model), sizeof plant->model);
   memcpy(&plant->state, from + offsetof(hxSavedPlant, state), sizeof plant->state);
   plant->model.terrain = head.terrain ? plant->terrain : NULL;
-  derive_models(plant);
+  derive_feet(plant);
   hx_footprints_read(&plant->footprints, from + offsetof(hxSavedPlant, footprints));
   return HX_OK;
 }

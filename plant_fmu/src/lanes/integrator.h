@@ -37,6 +37,7 @@ typedef struct {
   hxPlantMotion y;
   hxTrial trial, nearer;
   hxMoment end;
+  hxModel tops;           /* the model with one row of feet */
   double last_evaluation; /* number at which the call's limit is spent */
 } hxScratch;
 
@@ -600,6 +601,15 @@ static int is_pressed(const hxModel *model, const hxContactState *contact, int f
   return closed > 0.0;
 }
 
+/* Returns the model with its first row of feet only, of those on blocks. Open contacts exert no
+ * force, so steps without their rows have the same bits. */
+HX_RARE const hxModel *first_row(const hxModel *model, hxModel *first) {
+  *first = *model;
+  first->rows = first->foot_rows = 1;
+  first->torso_rows = 0;
+  return first;
+}
+
 /* Advances from state->time to t_end; the last step ends on t_end exactly. A call that an event
  * interrupted continues with the same steps. */
 static hxStatus run_to(const hxModel *model, const hxCommand *command, const hxCommand *ramp,
@@ -614,8 +624,8 @@ static hxStatus run_to(const hxModel *model, const hxCommand *command, const hxC
                    .footprints = events->footprints,
                    .scratch = scratch};
   const int rows = model->rows + model->torso_rows, foot_rows = model->foot_rows;
-  const hxModel *all_feet = rows > foot_rows ? events->all_feet : model,
-                *first_feet = foot_rows > 1 ? events->first_feet : all_feet;
+  const hxModel *all_feet = rows > foot_rows ? events->feet : model,
+                *first_feet = foot_rows > 1 ? first_row(model, &scratch->tops) : all_feet;
   start.touch = fmax(touch_depth[0], touch_depth[1] * model->tolerance);
   double first = fmin(state->first_step,
                       state->next_step); /* new inputs cause a larger error than the last step's */
