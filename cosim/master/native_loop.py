@@ -330,7 +330,7 @@ class NativeMaster:
             parts = {
                 "memory": np.zeros((sensor.delay + 1, len(FORCE))),
                 "factor": noise_factors(sensor, count),
-                "fault": sensor.faults,
+                "fault": None if sensor.faults is None else sensor.faults.kind,
             }
         master.sensor = _Sensor(
             **{name: array.ctypes.data for name, array in parts.items() if array is not None},

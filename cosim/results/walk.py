@@ -96,7 +96,8 @@ def _values_at(recording: Recording, names: Sequence[str], t: float) -> Array:
     time = recording.time
     before = int(np.searchsorted(time, t, side="right")) - 1
     if before == len(time) - 1:  # the time is rounded, and the last row may be before it
-        return np.asarray(recording.rows(slice(before, None)).columns(names)[0])
+        last: Array = recording.rows(slice(before, None)).columns(names)[0]
+        return last
     (low, high), first = recording.rows(slice(before, before + 2)).columns(names), time[before]
     return np.asarray((high - low) / (time[before + 1] - first) * (t - first) + low)
 
