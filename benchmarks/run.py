@@ -21,14 +21,13 @@ from typing import Any
 from rich.console import Console
 from rich.progress import track
 
-from benchmarks import BUILD
+from benchmarks import BUILD, RESULTS, machine
 from benchmarks.figure import draw
 from benchmarks.ground import landings, walks_over_waves
 from benchmarks.ground_map import map_costs
 from benchmarks.ground_table import ground_rows
 from benchmarks.judge import agreement, spreads
 from benchmarks.loop import compiled_factors, master_overhead, realtime_factor
-from benchmarks.machine import RESULTS, machine
 from benchmarks.measure import Bench, Run
 from benchmarks.parts import (
     cost_of,

@@ -7,16 +7,18 @@ import platform
 from collections.abc import Callable
 from functools import cache
 from importlib.metadata import version
+from importlib.util import find_spec
 from pathlib import Path
 
-from hexapod_cosim import controller, models
 from hexapod_cosim.controller import Gains, GainsError, load_gains, save_gains
-from hexapod_cosim.cosim import design
 from hexapod_cosim.cosim.common.components import PLANT
 from hexapod_cosim.cosim.common.files import atomic_path
 from hexapod_cosim.cosim.common.plant_files import binary, fmi2_platform
 from hexapod_cosim.cosim.export.cross_build import user_cache
 from hexapod_cosim.models import HexapodError, Robot
+
+# whose sources make gains
+PACKAGES = ("hexapod_cosim.controller", "hexapod_cosim.cosim.design", "hexapod_cosim.models")
 
 
 def kept_gains(
@@ -59,8 +61,9 @@ def _key(robot: Robot, period: float) -> str:
 def _tools() -> str:
     """Returns a hash of the plant's binary, the sources and the libraries that make gains."""
     digest = hashlib.sha256(binary(fmi2_platform(), PLANT).read_bytes())
-    for package in (controller, design, models):
-        for place in package.__path__:
+    for package in PACKAGES:
+        spec = find_spec(package)
+        for place in (spec and spec.submodule_search_locations) or ():
             for source in sorted(Path(place).rglob("*.py")):
                 digest.update(source.read_bytes())
     names = ("numpy", "scipy", "control")
