@@ -22,7 +22,7 @@ from contextlib import closing
 from dataclasses import replace
 from typing import Any
 
-from benchmarks.run import RESULTS, machine
+from benchmarks import RESULTS, machine
 from hexapod_cosim.controller import Gains
 from hexapod_cosim.cosim.run.batch import run_batch
 from hexapod_cosim.cosim.run.preparation import chosen_gains

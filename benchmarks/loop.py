@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import zipfile
+from dataclasses import replace
 from pathlib import Path
 from statistics import median
 from tempfile import TemporaryDirectory
@@ -11,11 +12,13 @@ from time import perf_counter
 from benchmarks.toolchain import Tools
 from hexapod_cosim.controller import BodyCommand, JointCommand, Measurement
 from hexapod_cosim.cosim.design.design import design_for
+from hexapod_cosim.cosim.export.controller_export import export_controller
 from hexapod_cosim.cosim.master.fmu import Fmu
 from hexapod_cosim.cosim.master.loop import run
 from hexapod_cosim.cosim.master.recorder import Recorder
 from hexapod_cosim.cosim.master.signals import Signals
-from hexapod_cosim.cosim.run.run import simulate
+from hexapod_cosim.cosim.run.run import make_plan, simulate
+from hexapod_cosim.cosim.run.walker import Walker
 from hexapod_cosim.cosim.scenario.scenario import load_scenario
 from hexapod_cosim.cosim.scenario.schedule import make_schedule
 from hexapod_cosim.models import load_robot
@@ -47,6 +50,27 @@ def realtime_factor(tools: Tools, control: str) -> float:
         simulate(scenario, fmu=tools.fmu, gains=gains).outcome.realtime_factor
         for _ in range(REPEATS)
     )
+
+
+def compiled_factors(tools: Tools) -> dict[str, float]:
+    """Returns the real-time factors of plant FMU and compliant controller FMU, both loaded by fmpy:
+    driven from Python in every macro-step, and by the loop in C.
+    """
+    scenario = load_scenario(SCENARIO, overrides=["control=compliant"])
+    gains = design_for(load_robot(scenario.robot), scenario.macro_step)
+    plan = make_plan(scenario, gains=gains)
+    with TemporaryDirectory(prefix="hexapod-bench-") as folder:
+        controller = export_controller(plan.controller, Path(folder) / "controller.fmu")
+        driven = replace(scenario, control=str(controller))
+        from_python = [
+            simulate(driven, fmu=tools.fmu).outcome.realtime_factor for _ in range(REPEATS)
+        ]
+        with Walker(fmu=tools.fmu, controller=controller, everything=True) as walker:
+            in_c = [
+                walker.simulate(scenario, gains=gains).outcome.realtime_factor
+                for _ in range(REPEATS)
+            ]
+    return {"loop through fmpy": median(from_python), "loop in C": median(in_c)}
 
 
 def master_overhead(tools: Tools) -> float:

@@ -92,6 +92,12 @@ def instances(tools: Tools, walk: Path) -> list[dict[str, Any]]:
     return results
 
 
+def crowding(results: Sequence[dict[str, Any]]) -> float:
+    """Returns the time of a macro-step among the most plants over that of a plant alone."""
+    alone, crowd = (each["microseconds_per_step"] for each in (results[0], results[-1]))
+    return float(crowd / alone)
+
+
 def resident_bytes(results: Sequence[dict[str, Any]]) -> float:
     """Returns the growth of the process per instance [bytes], NaN if the system does not report
     it.

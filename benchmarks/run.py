@@ -12,7 +12,6 @@ import json
 import math
 import os
 import platform
-import re
 import subprocess
 from collections.abc import Iterable, Sequence
 from dataclasses import asdict, replace
@@ -22,17 +21,18 @@ from typing import Any
 from rich.console import Console
 from rich.progress import track
 
-from benchmarks import BUILD, ROOT
+from benchmarks import BUILD, RESULTS, machine
 from benchmarks.figure import draw
 from benchmarks.ground import landings, walks_over_waves
 from benchmarks.ground_cost import ground_costs
 from benchmarks.ground_map import map_costs
 from benchmarks.ground_table import ground_rows
 from benchmarks.judge import agreement, spreads
-from benchmarks.loop import master_overhead, realtime_factor
+from benchmarks.loop import compiled_factors, master_overhead, realtime_factor
 from benchmarks.measure import Bench, Run
 from benchmarks.parts import (
     cost_of,
+    crowding,
     derivatives,
     instances,
     instructions,
@@ -40,11 +40,11 @@ from benchmarks.parts import (
     resident_bytes,
 )
 from benchmarks.series import OURS, PLANT_LAW, Series, command, ours, peers
-from benchmarks.table import Parts, Row, chosen_setting, rows, shown
+from benchmarks.studies import measured_studies
+from benchmarks.table import Parts, Row, chosen_setting, goals, rows, shown
 from benchmarks.toolchain import REQUIREMENTS, Tools, prepare
 from benchmarks.walks import STIFF_RUBBER, STIFF_SLOPE, Walk, family, stiff, write
 
-RESULTS = ROOT / "benchmarks" / "results"
 QUICK_WALKS = 5  # every n-th walk; odd, so that both robots are included
 QUICK_SETTINGS = 2  # every n-th setting
 STEEP = {
@@ -84,7 +84,7 @@ def main() -> None:
     bench = Bench(tools, files | _steep_files(walks))
     runs = measured(bench, series, [walk.name for walk in walks])
     _write_walks(folder, runs, series, tools)
-    parts, scaling = measured_parts(bench, series, runs, walks)
+    parts, scaling = measured_parts(bench, series, runs, walks, quick=quick)
     table = [*rows(runs, series, parts), *ground]
     _write_csv(folder / "table.csv", [asdict(row) | {"met": row.met} for row in table])
     _write_csv(folder / "instances.csv", scaling)
@@ -138,7 +138,12 @@ def measured(bench: Bench, series: Sequence[Series], walks: Sequence[str]) -> li
 
 
 def measured_parts(
-    bench: Bench, series: Sequence[Series], runs: Sequence[Run], walks: Sequence[Walk]
+    bench: Bench,
+    series: Sequence[Series],
+    runs: Sequence[Run],
+    walks: Sequence[Walk],
+    *,
+    quick: bool,
 ) -> tuple[Parts, list[dict[str, Any]]]:
     """Measures the parts other than walks, and the cost by number of instances."""
     files = [bench.walks[walk.name] for walk in walks]
@@ -158,6 +163,9 @@ def measured_parts(
         loop={
             control: realtime_factor(bench.tools, control) for control in ("kinematic", "compliant")
         },
+        compiled=compiled_factors(bench.tools),
+        crowd=crowding(scaling),
+        studies=measured_studies(quick=quick),
         master=master_overhead(bench.tools),
         structure=scaling[0]["bytes_per_instance"],
         resident=resident_bytes(scaling),
@@ -166,21 +174,6 @@ def measured_parts(
         walk_instructions=per_step,
     )
     return parts, scaling
-
-
-def machine() -> str:
-    """Returns the name of this machine's folder, made from its processor's name."""
-    try:
-        text = Path("/proc/cpuinfo").read_text(encoding="utf-8")
-        name = re.search(r"model name\s*:\s*(.+)", text)
-        family_number, model = (
-            re.search(r"cpu family\s*:\s*(\d+)", text),
-            re.search(r"model\s*:\s*(\d+)", text),
-        )
-        words = [match[1] for match in (name, family_number, model) if match]
-    except OSError:
-        words = [platform.processor() or platform.machine()]
-    return re.sub(r"[^a-z0-9]+", "-", "-".join(words).lower()).strip("-")
 
 
 def _write_walks(folder: Path, runs: Sequence[Run], series: Sequence[Series], tools: Tools) -> None:
@@ -234,6 +227,7 @@ def _print_results(
     runs: Sequence[Run], series: Sequence[Series], table: Sequence[Row], tools: Tools, folder: Path
 ) -> None:
     console.print(shown(table, title=f"{len({run.walk for run in runs})} walks on {machine()}"))
+    console.print(shown(goals(table), title="goals"))
     for engine in dict.fromkeys(
         one.engine for one in series if one.engine != OURS and one.law == PLANT_LAW
     ):

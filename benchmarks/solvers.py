@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.run import RESULTS
+from benchmarks import RESULTS
 from benchmarks.study import BOTH, PAGE, put_in_page
 from hexapod_cosim.controller import Gains
 from hexapod_cosim.cosim.common.files import atomic_text

@@ -27,7 +27,7 @@ from unittest.mock import patch
 
 import numpy as np
 
-from benchmarks.run import RESULTS, machine
+from benchmarks import RESULTS, machine
 from hexapod_cosim.controller import Gains
 from hexapod_cosim.cosim.common.files import atomic_text, write_text
 from hexapod_cosim.cosim.export.export import export_fmu

@@ -12,15 +12,20 @@ from rich.table import Table
 from benchmarks.judge import Choice, best, per_evaluation, spreads
 from benchmarks.measure import Run
 from benchmarks.series import DRAKE_LAW, MUJOCO_LAW, OURS, PLANT_LAW, Series
+from benchmarks.studies import Studies
 
 FINE, FINER = 1e-3, 1e-5  # m    errors at which engines are compared
-KERNEL_GOALS = {"avx512": 0.6, "avx2": 0.85, "baseline": 1.5}  # us
+KERNEL_GOALS = {"avx512": 0.62, "avx2": 0.85, "baseline": 1.3}  # us
 MULTIPLIERS_GOAL = 0.1  # of the evaluation
-PINOCCHIO_GOAL, PEERS_GOAL, OWN_CONTACT_GOAL = 8.0, 100.0, 10.0  # times faster
-REALTIME_GOALS = {FINE: 1000.0, FINER: 350.0}
-WORST_GOAL = 500.0  # times real time, at FINE
+PINOCCHIO_GOAL, PEERS_GOAL, OWN_CONTACT_GOAL = 8.0, 60.0, 10.0  # times faster
+REALTIME_GOALS = {FINE: 1800.0, FINER: 600.0}
+WORST_GOAL = 1200.0  # times real time, at FINE
 STEEP_GOAL = 2.0  # times the default's cost
 LOOP_GOAL, MASTER_GOAL = 100.0, 10.0  # times real time; us
+COMPILED_GOAL = 150.0  # times real time
+MANY_GOAL = 2500.0  # simulated seconds per second and core
+WALKS_GOALS = {"default solver": 3500.0, "fast solver": 6500.0}  # per minute
+COMPARISON_GOAL, GAINS_GOAL = 8.0, 1.0  # s
 MEMORY_GOAL = 65536.0  # bytes
 OWN_CONTACT = ("own-implicitfast", 1e-3)  # what MuJoCo's users run
 
@@ -55,6 +60,9 @@ class Parts:
     derivatives: dict[str, dict[str, float]]
     steep: dict[str, float]  # cost over the default's, by what is steep
     loop: dict[str, float]  # real-time factor, by control
+    compiled: dict[str, float]  # of compliant control compiled, by what drives the FMUs
+    crowd: float  # 1    time of a step among many plants, over that of one plant alone
+    studies: Studies
     master: float  # us
     structure: float  # bytes
     resident: float  # bytes
@@ -69,8 +77,15 @@ def rows(runs: Sequence[Run], series: Sequence[Series], parts: Parts) -> list[Ro
         *_evaluation(runs, parts),
         *_walking(runs, series),
         *_own_contact(runs, series),
+        *_many(runs, series, parts),
+        *_studies(parts.studies),
         *_rest(parts),
     ]
+
+
+def goals(found: Sequence[Row]) -> list[Row]:
+    """Returns the rows that have a goal."""
+    return [row for row in found if not math.isnan(row.goal)]
 
 
 def _evaluation(runs: Sequence[Run], parts: Parts) -> Iterable[Row]:
@@ -207,6 +222,36 @@ def _own_contact(runs: Sequence[Run], series: Sequence[Series]) -> Iterable[Row]
             )
 
 
+def _many(runs: Sequence[Run], series: Sequence[Series], parts: Parts) -> Iterable[Row]:
+    """Yields the rate of many plants that one core steps in turn."""
+    alone = _factor(best(runs, [one for one in series if one.engine == OURS], FINE))
+    yield Row(
+        figure=f"many robots on one core, every walk within {FINE:g} m: simulated seconds a second",
+        unit="x",
+        ours=alone / parts.crowd,
+        goal=MANY_GOAL,
+        better="more",
+    )
+
+
+def _studies(studies: Studies) -> Iterable[Row]:
+    for setting, rate in studies.per_minute.items():
+        yield Row(
+            figure=f"compliant walks of 10 s a minute on all cores, {setting}",
+            unit="1/min",
+            ours=rate,
+            goal=WALKS_GOALS[setting],
+            better="more",
+        )
+    times = {
+        "hexapod compare, 20 walks of 10 s, after set-up": (studies.comparison, COMPARISON_GOAL),
+        "gains of a new robot, in a new process": (studies.gains, GAINS_GOAL),
+        "gains of a known robot, in a new process": (studies.kept_gains, GAINS_GOAL),
+    }
+    for figure, (seconds, goal) in times.items():
+        yield Row(figure=figure, unit="s", ours=seconds, goal=goal)
+
+
 def _rest(parts: Parts) -> Iterable[Row]:
     for name, cost in parts.steep.items():
         yield Row(
@@ -218,6 +263,14 @@ def _rest(parts: Parts) -> Iterable[Row]:
             unit="x",
             ours=factor,
             goal=LOOP_GOAL,
+            better="more",
+        )
+    for driven, factor in parts.compiled.items():
+        yield Row(
+            figure=f"whole co-simulation, compiled compliant control, {driven}",
+            unit="x",
+            ours=factor,
+            goal=COMPILED_GOAL,
             better="more",
         )
     yield Row(

@@ -124,14 +124,22 @@ static inline const hxVariable *row_of(hxInstance *instance, hxType type, unsign
   return hx_variable_of_type(instance, type, reference, causality);
 }
 
+/* Places of the first variables of a call. The table of variables is larger than the fastest
+ * memory, so each row is looked up once. */
+enum { KNOWN_PLACES = 512 };
+typedef struct {
+  unsigned offset[KNOWN_PLACES];
+} hxPlaces;
+
 /* checks the references and updates the outputs or rates that are asked for */
-static hxStatus prepare_get(hxInstance *instance, hxType type, const unsigned reference[],
-                            size_t n) {
+static hxStatus prepare_get(hxInstance *instance, hxType type, const unsigned reference[], size_t n,
+                            hxPlaces *places) {
   hxCausality causality = HX_OUTPUT;
   int needs_output = 0, needs_rate = 0;
   for (size_t i = 0; i < n; i++) {
     const hxVariable *variable = row_of(instance, type, reference[i], &causality);
     if (!variable) return HX_INVALID_ARGUMENT;
+    if (i < KNOWN_PLACES) places->offset[i] = (unsigned)variable->offset;
     needs_output |= causality == HX_OUTPUT;
     needs_rate |= causality == HX_LOCAL;
   }
@@ -139,32 +147,38 @@ static hxStatus prepare_get(hxInstance *instance, hxType type, const unsigned re
                                     : HX_OK;
 }
 
+/* the place of a valid reference in the variables */
+static void *place_of(hxInstance *instance, hxType type, const unsigned reference[], size_t i,
+                      const hxPlaces *places) {
+  hxCausality causality = HX_OUTPUT;
+  const size_t offset = i < KNOWN_PLACES ? places->offset[i]
+                                         : row_of(instance, type, reference[i], &causality)->offset;
+  return (char *)&instance->state.variables + offset;
+}
+
 /* copies values of valid references; none when one of them is not finite */
 static hxStatus get_reals(hxInstance *instance, const unsigned reference[], size_t n,
-                          double value[]) {
-  const char *variables = (const char *)&instance->state.variables;
+                          const hxPlaces *places, double value[]) {
   hxCausality causality = HX_OUTPUT;
   for (size_t i = 0; i < n; i++) {
-    const hxVariable *variable = row_of(instance, HX_REAL, reference[i], &causality);
-    const double *number = (const double *)(const void *)(variables + variable->offset);
-    if (!isfinite(*number)) return hx_instance_check_finite(instance, number, 1, variable->name);
+    const double *number = place_of(instance, HX_REAL, reference, i, places);
+    if (!isfinite(*number))
+      return hx_instance_check_finite(instance, number, 1,
+                                      row_of(instance, HX_REAL, reference[i], &causality)->name);
   }
   for (size_t i = 0; i < n; i++)
-    memcpy(value + i, variables + row_of(instance, HX_REAL, reference[i], &causality)->offset,
-           sizeof *value);
+    memcpy(value + i, place_of(instance, HX_REAL, reference, i, places), sizeof *value);
   return HX_OK;
 }
 
 hxStatus hx_instance_get(hxInstance *instance, hxType type, const unsigned reference[], size_t n,
                          void *value) {
-  const char *variables = (const char *)&instance->state.variables;
-  hxCausality causality = HX_OUTPUT;
-  const hxStatus status = prepare_get(instance, type, reference, n);
+  hxPlaces places;
+  const hxStatus status = prepare_get(instance, type, reference, n, &places);
   if (status != HX_OK) return status;
-  if (type == HX_REAL) return get_reals(instance, reference, n, value);
+  if (type == HX_REAL) return get_reals(instance, reference, n, &places, value);
   for (size_t i = 0; i < n; i++)
-    memcpy((int *)value + i, variables + row_of(instance, type, reference[i], &causality)->offset,
-           sizeof(int));
+    memcpy((int *)value + i, place_of(instance, type, reference, i, &places), sizeof(int));
   return HX_OK;
 }
 
@@ -200,35 +214,46 @@ static hxStatus check_set(hxInstance *instance, const hxVariable *variable, hxCa
   return HX_OK;
 }
 
-hxStatus hx_instance_check_set(hxInstance *instance, hxType type, const unsigned reference[],
-                               size_t n, const void *value) {
+/* checks all references and values; sets the places, and *parameters if one is a parameter */
+static hxStatus check_all(hxInstance *instance, hxType type, const unsigned reference[], size_t n,
+                          const void *value, hxPlaces *places, int *parameters) {
   hxCausality causality = HX_INPUT;
+  *parameters = 0;
   for (size_t i = 0; i < n; i++) {
     const hxVariable *variable = row_of(instance, type, reference[i], &causality);
     if (!variable) return HX_INVALID_ARGUMENT;
     const hxStatus status = check_set(instance, variable, causality, value_at(type, value, i));
     if (status != HX_OK) return status;
+    if (i < KNOWN_PLACES) places->offset[i] = (unsigned)variable->offset;
+    *parameters |= causality == HX_PARAMETER;
   }
   return HX_OK;
 }
 
+hxStatus hx_instance_check_set(hxInstance *instance, hxType type, const unsigned reference[],
+                               size_t n, const void *value) {
+  hxPlaces places;
+  int parameters;
+  return check_all(instance, type, reference, n, value, &places, &parameters);
+}
+
 hxStatus hx_instance_set(hxInstance *instance, hxType type, const unsigned reference[], size_t n,
                          const void *value) {
-  char *variables = (char *)&instance->state.variables;
-  hxCausality causality = HX_INPUT;
-  const hxStatus status = hx_instance_check_set(instance, type, reference, n, value);
-  if (status != HX_OK) return status;
+  hxPlaces places;
+  int parameters;
+  const hxStatus status = check_all(instance, type, reference, n, value, &places, &parameters);
+  if (status != HX_OK || n == 0) return status;
   for (size_t i = 0; i < n; i++) {
-    const hxVariable *variable = row_of(instance, type, reference[i], &causality);
+    void *place = place_of(instance, type, reference, i, &places);
     const int number = type == HX_REAL ? 0 : ((const int *)value)[i],
               stored = type == HX_BOOLEAN ? number != 0 : number; /* true may be -1 */
     if (type == HX_REAL)
-      memcpy(variables + variable->offset, (const double *)value + i, sizeof(double));
+      memcpy(place, (const double *)value + i, sizeof(double));
     else
-      memcpy(variables + variable->offset, &stored, sizeof(int));
-    instance->state.model_stale |= causality == HX_PARAMETER;
-    hx_mark_stale(instance);
+      memcpy(place, &stored, sizeof(int));
   }
+  instance->state.model_stale |= parameters;
+  hx_mark_stale(instance);
   return HX_OK;
 }
 

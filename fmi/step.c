@@ -37,9 +37,13 @@ hxStatus hx_instance_set_input_rates(hxInstance *instance, const unsigned refere
 static hxStatus ramp_end(hxInstance *instance, double h, hxInput *end) {
   struct hxVariables *variables = &instance->state.variables, ramp, after;
   const hxSection *inputs = &hx_sections[HX_INPUT];
+  if (!instance->state.ramped) {
+    *end = variables->input;
+    return HX_OK;
+  }
   ramp.input = instance->state.input_rate;
   after.input = variables->input;
-  for (unsigned i = 0; i < inputs->count && instance->state.ramped; i++) {
+  for (unsigned i = 0; i < inputs->count; i++) {
     const hxVariable *variable = &inputs->variable[i];
     const double rate = variable->type == HX_REAL ? *hx_variable_place(&ramp, variable) : 0.0;
     if (rate == 0.0) continue;

@@ -79,7 +79,7 @@ class Walk:
     def gained(self, names: list[str]) -> Array:
         """Returns the growth of cumulative outputs (names,) from begin to end, interpolated."""
         begin, end = (_values_at(self.whole, names, t) for t in (self.begin, self.end))
-        return end - begin
+        return np.asarray(end - begin)
 
     def rms(self, values: Array) -> float:
         """Returns the RMS deviation of values (rows,) from their mean over time."""

@@ -10,6 +10,7 @@ from pathlib import Path
 from hexapod_cosim.controller import Gains
 from hexapod_cosim.cosim.export.export import export_fmu
 from hexapod_cosim.cosim.run.chosen_walk import choose_walk
+from hexapod_cosim.cosim.run.kept_gains import kept_gains
 from hexapod_cosim.cosim.scenario.controls import control_of
 from hexapod_cosim.cosim.scenario.records import Scenario
 from hexapod_cosim.models import Robot, load_robot
@@ -19,11 +20,16 @@ MAX_DESIGNS = 64  # sets of gains that are kept; the least recently used one goe
 
 @lru_cache(maxsize=MAX_DESIGNS)
 def designed_gains(robot: Robot, period: float) -> Gains:
-    """Returns the gains of a robot and a controller period [s]; a process designs them once.
+    """Returns the gains of a robot and a controller period [s].
 
-    Raises GainsError when no gains can be designed.
+    They are designed once and kept in the user's cache. Raises GainsError when no gains can be
+    designed.
     """
-    # python-control takes a second to import
+    return kept_gains(robot, period, _designed)
+
+
+def _designed(robot: Robot, period: float) -> Gains:
+    """Designs gains; python-control takes a second to import."""
     from hexapod_cosim.cosim.design.design import design_for  # noqa: PLC0415
 
     return design_for(robot, period)

@@ -15,6 +15,7 @@ HX_HIDDEN_BEGIN
  */
 typedef struct hxEvents {
   int stop, found;
+  const hxModel *feet;        /* the model with the rows of feet alone */
   int continues;              /* 1: a later part of a call, whose peaks stay */
   hxFootprintLog *footprints; /* that feet leave in soil */
 } hxEvents;

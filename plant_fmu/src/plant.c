@@ -153,6 +153,13 @@ static hxStatus check_start_overlap(const hxPlant *plant, char message[HX_MESSAG
   return HX_OK;
 }
 
+/* Sets the model with the rows of feet alone, after every change of the model. */
+static void derive_feet(hxPlant *plant) {
+  plant->feet = plant->model;
+  plant->feet.rows = plant->feet.listed = plant->model.foot_rows;
+  plant->feet.torso_rows = plant->feet.pair_rows = 0;
+}
+
 hxStatus hx_plant_reset(hxPlant *plant, const hxDefinition *definition, double t) {
   char message[HX_MESSAGE_SIZE];
   double body[HX_BODIES][HX_BODY_STATE];
@@ -162,7 +169,7 @@ hxStatus hx_plant_reset(hxPlant *plant, const hxDefinition *definition, double t
   hxStatus status = hx_definition_check(definition, message);
   if (status == HX_OK) status = check_terrain(plant, definition, message);
   if (status != HX_OK) return fail(plant, status, message);
-  plant->model_before = plant->model;
+  plant->feet = plant->model;
   plant->state_before = plant->state;
   memset(&plant->model, 0, sizeof plant->model);
   memset(&plant->state, 0, sizeof plant->state);
@@ -173,10 +180,12 @@ hxStatus hx_plant_reset(hxPlant *plant, const hxDefinition *definition, double t
   status = check_start_depth(plant, message); /* the cells of feet on blocks are known now */
   if (status == HX_OK) status = check_start_overlap(plant, message);
   if (status != HX_OK) {
-    plant->model = plant->model_before;
+    plant->model = plant->feet;
     plant->state = plant->state_before;
+    derive_feet(plant);
     return fail(plant, status, message);
   }
+  derive_feet(plant);
   hx_footprints_clear(&plant->footprints);
   plant->message[0] = '\0';
   return HX_OK;
@@ -308,6 +317,7 @@ static hxStatus advance(hxPlant *plant, const hxInput *input, const hxInput *rat
   const hxStepCall call = {input, ramp, told ? input_fingerprint(input) : 0.0, before->time};
   hx_footprints_begin(&plant->footprints);
   events->footprints = &plant->footprints;
+  events->feet = &plant->feet;
   do {
     status = advance_part(plant, &call, t_end, events);
     events->continues = 1;
@@ -407,6 +417,7 @@ hxStatus hx_plant_set_state(hxPlant *plant, const void *bytes, size_t size) {
   memcpy(&plant->model, from + offsetof(hxSavedPlant, model), sizeof plant->model);
   memcpy(&plant->state, from + offsetof(hxSavedPlant, state), sizeof plant->state);
   plant->model.terrain = head.terrain ? plant->terrain : NULL;
+  derive_feet(plant);
   hx_footprints_read(&plant->footprints, from + offsetof(hxSavedPlant, footprints));
   return HX_OK;
 }

@@ -272,14 +272,17 @@ typedef struct hxState {
 
 struct hxPlant {
   hxModel model;
+  /* the model with the rows of feet alone: open contacts exert no force, so steps without their
+   * rows have the same bits. A reset keeps the model before it here, which one that fails restores
+   */
+  hxModel feet;
   hxState state;
   const hxTerrain *terrain; /* of later resets */
   double valley_limit;      /* m  its valleys are not narrower; 0: not searched yet */
   char message[HX_MESSAGE_SIZE];
   hxFootprintLog footprints; /* outside the state, which every call copies */
-  hxModel model_before;      /* those before a call, which one that fails restores */
-  hxState state_before;
-  void *scratch; /* work space behind the plant, see kernel.h */
+  hxState state_before;      /* that before a call, which one that fails restores */
+  void *scratch;             /* work space behind the plant, see kernel.h */
 };
 
 /* Copies the elastic gears of a moment. */

@@ -11,6 +11,7 @@ from gains import make_gains
 
 from hexapod_cosim.controller import Gains
 from hexapod_cosim.cosim.run.controller_setup import make_setup
+from hexapod_cosim.cosim.run.kept_gains import kept_gains
 from hexapod_cosim.cosim.run.preparation import (
     PlantFmus,
     chosen_gains,
@@ -30,8 +31,10 @@ def scenario(*changes: str) -> Scenario:
 
 
 @pytest.fixture
-def designs(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[Design]]:
-    """Replaces the design of gains; returns the list of what it is called for."""
+def designs(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Iterator[list[Design]]:
+    """Replaces the design of gains, with a cache of its own; returns the list of what it is called
+    for.
+    """
     calls: list[Design] = []
 
     def design(robot: Robot, period: float) -> Gains:
@@ -39,6 +42,7 @@ def designs(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[Design]]:
         return make_gains(load_robot("athena"), period=period)
 
     monkeypatch.setattr("hexapod_cosim.cosim.design.design.design_for", design)
+    monkeypatch.setattr("hexapod_cosim.cosim.run.kept_gains.user_cache", lambda: tmp_path)
     designed_gains.cache_clear()
     yield calls
     designed_gains.cache_clear()
@@ -51,6 +55,43 @@ def test_gains_are_designed_once_for_robot_and_macro_step(designs: list[Design])
     assert chosen_gains(scenario("macro_step=0.004")) is not first
     assert chosen_gains(scenario("servo.torque_max=3.0")) is not first
     assert len(designs) == 3
+
+
+def test_gains_of_an_earlier_process_are_read_from_the_cache(designs: list[Design]) -> None:
+    first = chosen_gains(scenario())
+    designed_gains.cache_clear()
+    assert chosen_gains(scenario()) == first
+    assert len(designs) == 1
+
+
+def test_kept_gains_have_the_bits_of_designed_ones(tmp_path: Path) -> None:
+    robot = load_robot("athena")
+    gains = replace(make_gains(robot, period=0.005), caveats=('a "text"',))
+    assert kept_gains(robot, 0.005, lambda _robot, _period: gains, tmp_path) is gains
+    assert kept_gains(robot, 0.005, _no_design, tmp_path) == gains
+
+
+def _no_design(robot: Robot, period: float) -> Gains:
+    raise AssertionError("gains that are kept are not designed again")
+
+
+def test_a_damaged_file_of_the_cache_is_replaced(designs: list[Design], tmp_path: Path) -> None:
+    first = chosen_gains(scenario())
+    (path,) = tmp_path.glob("gains/*.toml")
+    path.write_text("period = ", encoding="utf-8")
+    designed_gains.cache_clear()
+    assert chosen_gains(scenario()) == first
+    designed_gains.cache_clear()
+    assert chosen_gains(scenario()) == first
+    assert len(designs) == 2
+
+
+def test_without_a_cache_that_can_be_written_gains_are_designed(
+    designs: list[Design], tmp_path: Path
+) -> None:
+    (tmp_path / "gains").write_text("no folder", encoding="utf-8")
+    assert chosen_gains(scenario()) is not None
+    assert len(designs) == 1
 
 
 def test_a_run_and_a_set_up_share_their_gains(designs: list[Design]) -> None:

@@ -23,7 +23,8 @@ static const double deflection_scale = 0.1, motor_scale = 10.0; /* rad, rad/s  o
 typedef struct {
   hxPlantMotion y;
   hxImpulses impulses;
-  double error; /* error of the step over the tolerance; 0 without an estimate */
+  double error;  /* error of the step over the tolerance; 0 without an estimate */
+  int is_finite; /* 1: all numbers of y are finite */
 } hxTrial;
 
 /* Work space of a call. It belongs to the instance's memory, because threads of importers may have
@@ -37,7 +38,7 @@ typedef struct {
   hxPlantMotion y;
   hxTrial trial, nearer;
   hxMoment end;
-  hxModel feet, tops;     /* the model without some rows of contacts */
+  hxModel tops;           /* the model with one row of feet */
   double last_evaluation; /* number at which the call's limit is spent */
 } hxScratch;
 
@@ -66,101 +67,207 @@ static inline void hx_depths_of(const hxModel *model, const hxContactState *stat
 
 /* ---- one step ---- */
 
-/* Computes base + h sum w_j k_j over n rates, from entry `first` on (base NULL: 0). It is one pass
- * over memory; n and size are constants for the compiler. */
-static inline void combine_n(double *out, const double *base, double h, const double *weights,
-                             const hxRate *k, int n, int first, int size) {
-  hxReal w[HX_STAGES];
+/* Computes base + sum w_j k_j of one pack of entries over n rates, in their order. */
+HX_INLINE hxReal combined(hxReal base, const hxReal *w, const hxRate *k, int n, int entry) {
+  hxReal sum = base;
+  for (int j = 0; j < n; ++j) sum += w[j] * hx_load(&k[j].y[entry]);
+  return sum;
+}
+
+/* Computes the products h w_j of n weights. */
+HX_INLINE void weights_of(hxReal *w, double h, const double *weights, int n) {
   for (int j = 0; j < n; ++j) w[j] = hx_splat(h * weights[j]);
-  for (int i = 0; i < size; i += HX_LANES) {
-    hxReal sum = base ? hx_load(&base[i]) : hx_splat(0.0);
-    for (int j = 0; j < n; ++j) sum += w[j] * hx_load(&k[j].y[first + i]);
-    hx_store(&out[i], sum);
+}
+
+/* Combines the entries from `first` to before `end` of a stage's arguments. w_change NULL: none. */
+HX_INLINE void stage_entries(const hxPlantMotion *from, const hxReal *w_y, const hxReal *w_change,
+                             const hxRate *k, int n, int first, int end, hxPlantMotion *y,
+                             hxRate *change) {
+  for (int i = first; i < end; i += HX_LANES) {
+    const int place = i - HX_TURN_SIZE;
+    hx_store(&y->y[place], combined(hx_load(&from->y[place]), w_y, k, n, i));
+    if (w_change) hx_store(&change->y[i], combined(hx_splat(0.0), w_change, k, n, i));
   }
 }
 
-/* Calls combine_n with n as a constant. */
-static inline void combine_part(double *out, const double *base, double h, const double *weights,
-                                const hxRate *k, int n, int first, int size) {
+/* Computes the arguments of a stage, y = y_0 + h sum a_j k_j, and for a linearly implicit method
+ * change = h sum g_j k_j (g NULL: none), in one pass over n rates. n is a constant for the
+ * compiler. Bristles and elastic gears only where the model has them. */
+HX_INLINE void stage_of_n(const hxModel *model, const hxPlantMotion *from, double h,
+                          const double *a, const double *g, const hxRate *k, int n,
+                          hxPlantMotion *y, hxRate *change) {
+  enum { BRISTLES = HX_TURN_SIZE + HX_BODIES_SIZE, GEARS = BRISTLES + HX_BRISTLE_SIZE };
+  const int end = has_bristles(model, HX_FOOT) ? GEARS : BRISTLES;
+  hxReal w_y[HX_STAGES], weights[HX_STAGES];
+  const hxReal *w_change = g ? weights : NULL;
+  weights_of(w_y, h, a, n);
+  if (g) weights_of(weights, h, g, n);
+  for (int i = 0; g && i < HX_TURN_SIZE; i += HX_LANES)
+    hx_store(&change->y[i], combined(hx_splat(0.0), weights, k, n, i));
+  stage_entries(from, w_y, w_change, k, n, HX_TURN_SIZE, end, y, change);
+  if (model->elastic)
+    stage_entries(from, w_y, w_change, k, n, GEARS, GEARS + HX_GEAR_SIZE, y, change);
+}
+
+/* Calls stage_of_n with n as a constant. */
+static inline void stage_arguments(const hxModel *model, const hxPlantMotion *from, double h,
+                                   const double *a, const double *g, const hxRate *k, int n,
+                                   hxPlantMotion *y, hxRate *change) {
   switch (n) {
   case 1:
-    combine_n(out, base, h, weights, k, 1, first, size);
+    stage_of_n(model, from, h, a, g, k, 1, y, change);
     break;
   case 2:
-    combine_n(out, base, h, weights, k, 2, first, size);
+    stage_of_n(model, from, h, a, g, k, 2, y, change);
     break;
   case 3:
-    combine_n(out, base, h, weights, k, 3, first, size);
-    break;
-  case 4:
-    combine_n(out, base, h, weights, k, 4, first, size);
+    stage_of_n(model, from, h, a, g, k, 3, y, change);
     break;
   default:
-    combine_n(out, base, h, weights, k, n, first, size);
+    stage_of_n(model, from, h, a, g, k, n, y, change);
   }
-}
-
-/* Combines rates from an entry on to the end, bristles only with the bristle law. */
-static inline void combine(const hxModel *model, double *out, const double *base, double h,
-                           const double *weights, const hxRate *k, int n, int first) {
-  enum { END = HX_TURN_SIZE + HX_BODIES_SIZE };
-  combine_part(out, base, h, weights, k, n, first, END - first);
-  if (has_bristles(model, HX_FOOT))
-    combine_n(out + END - first, base ? base + END - first : NULL, h, weights, k, n, END,
-              HX_BRISTLE_SIZE);
-  if (model->elastic)
-    combine_n(out + END + HX_BRISTLE_SIZE - first,
-              base ? base + END + HX_BRISTLE_SIZE - first : NULL, h, weights, k, n,
-              END + HX_BRISTLE_SIZE, HX_GEAR_SIZE);
 }
 
 /* Returns the larger number; a if b is NaN. */
 static inline double larger_of(double a, double b) { return b > a ? b : a; }
 
-/* Returns the largest error of elastic gears over its scale. */
-HX_RARE hxReal gear_error(const hxPlantMotion *error) {
-  hxReal largest = hx_splat(0.0);
-  for (int joint = 0; joint < HX_JOINTS; ++joint)
-    for (int slot = 0; slot < HX_PACKS * HX_LANES; slot += HX_LANES) {
-      const hxReal moved = hx_abs(hx_load(&error->deflection[joint][slot])),
-                   faster = hx_abs(hx_load(&error->motor_speed[joint][slot]));
-      largest = hx_max(largest, hx_max(1.0 / deflection_scale * moved, 1.0 / motor_scale * faster));
-    }
-  return largest;
+/* What the pass over a step's end finds: 0 times all its numbers, and the largest error over its
+ * scale (eq. 22). NaN is ignored by the largest error; the sum shows it. */
+typedef struct {
+  hxReal zeros, links;
+  double torso;
+} hxStepEnd;
+
+/* Returns the larger of an error over its scale and the largest so far. */
+HX_INLINE hxReal larger_error(hxReal largest, double scale, hxReal error) {
+  return hx_max(largest, scale * hx_abs(error));
 }
 
-/* Returns the largest error over scale and tolerance (eq. 22). NaN is ignored; advance() checks
- * for it. */
-static double error_norm(const hxModel *model, const hxPlantMotion *error) {
-  hxReal links = hx_splat(0.0);
-  double largest[HX_LANES];
-  double worst = 0.0;
-  for (int i = 0; i < HX_BODY_STATE; ++i) {
-    const double scale = 1.0 / error_scale[i];
-    worst = larger_of(worst, scale * fabs(error->torso[i]));
-    for (int joint = 0; joint < HX_JOINTS; ++joint)
-      for (int slot = 0; slot < HX_PACKS * HX_LANES; slot += HX_LANES)
-        links = hx_max(links, scale * hx_abs(hx_load(&error->link[joint][i][slot])));
+/* Computes the end of the torso's and the links' step and their errors. */
+HX_INLINE void end_of_bodies(const hxPlantMotion *from, const hxReal *b, const hxReal *e, int n,
+                             int estimates, const hxRate *k, hxPlantMotion *y, hxStepEnd *found) {
+  double error[HX_TORSO_SIZE] = {0.0};
+  for (int i = 0; i < HX_TORSO_SIZE; i += HX_LANES) {
+    hx_store(&y->y[i], combined(hx_load(&from->y[i]), b, k, n, HX_TURN_SIZE + i));
+    if (estimates) hx_store(&error[i], combined(hx_splat(0.0), e, k, n, HX_TURN_SIZE + i));
+    found->zeros += 0.0 * hx_load(&y->y[i]);
   }
-  for (int i = 0; i < 3 && has_bristles(model, HX_FOOT); ++i)
-    for (int slot = 0; slot < HX_PACKS * HX_LANES; slot += HX_LANES)
-      links = hx_max(links, 1.0 / (bristle_scale * model->bristle_length) *
-                                hx_abs(hx_load(&error->bristle[i][slot])));
-  if (model->elastic) links = hx_max(links, gear_error(error));
-  hx_store(largest, links);
-  for (int lane = 0; lane < HX_LANES; ++lane) worst = larger_of(worst, largest[lane]);
-  return worst / model->tolerance;
+  for (int i = 0; i < HX_BODY_STATE; ++i)
+    found->torso = larger_of(found->torso, 1.0 / error_scale[i] * fabs(error[i]));
+  for (int joint = 0; joint < HX_JOINTS; ++joint)
+    for (int i = 0; i < HX_BODY_STATE; ++i)
+      for (int slot = 0; slot < HX_SLOTS; slot += HX_LANES) {
+        const int at = HX_TORSO_SIZE + (joint * HX_BODY_STATE + i) * HX_SLOTS + slot;
+        const hxReal end = combined(hx_load(&from->y[at]), b, k, n, HX_TURN_SIZE + at);
+        hx_store(&y->y[at], end);
+        found->zeros += 0.0 * end;
+        if (estimates && slot < HX_PACKS * HX_LANES)
+          found->links = larger_error(found->links, 1.0 / error_scale[i],
+                                      combined(hx_splat(0.0), e, k, n, HX_TURN_SIZE + at));
+      }
 }
 
-/* Scales all quaternions to unit length. */
-static void normalise_quaternions(hxPlantMotion *m) {
+/* Computes the same of bristles; under laws without them they stay. */
+HX_INLINE void end_of_bristles(const hxModel *model, const hxPlantMotion *from, const hxReal *b,
+                               const hxReal *e, int n, int estimates, const hxRate *k,
+                               hxPlantMotion *y, hxStepEnd *found) {
+  const double scale = 1.0 / (bristle_scale * model->bristle_length);
+  const int move = has_bristles(model, HX_FOOT);
+  for (int i = 0; i < HX_BRISTLE_SIZE; i += HX_LANES) {
+    const int at = HX_BODIES_SIZE + i;
+    hxReal end = hx_load(&from->y[at]);
+    if (move) end = combined(end, b, k, n, HX_TURN_SIZE + at);
+    hx_store(&y->y[at], end);
+    found->zeros += 0.0 * end;
+    if (move && estimates && i % HX_SLOTS < HX_PACKS * HX_LANES)
+      found->links =
+          larger_error(found->links, scale, combined(hx_splat(0.0), e, k, n, HX_TURN_SIZE + at));
+  }
+}
+
+/* Computes the same of elastic gears; rigid ones stay. */
+HX_INLINE void end_of_gears(const hxModel *model, const hxPlantMotion *from, const hxReal *b,
+                            const hxReal *e, int n, int estimates, const hxRate *k,
+                            hxPlantMotion *y, hxStepEnd *found) {
+  enum { GEARS = HX_BODIES_SIZE + HX_BRISTLE_SIZE };
+  if (!model->elastic) {
+    memcpy(&y->y[GEARS], &from->y[GEARS], HX_GEAR_SIZE * sizeof *y->y);
+    return;
+  }
+  for (int i = 0; i < HX_GEAR_SIZE; i += HX_LANES) {
+    const int at = GEARS + i;
+    const double scale = 1.0 / (i < HX_GEAR_SIZE / 2 ? deflection_scale : motor_scale);
+    const hxReal end = combined(hx_load(&from->y[at]), b, k, n, HX_TURN_SIZE + at);
+    hx_store(&y->y[at], end);
+    found->zeros += 0.0 * end;
+    if (estimates && i % HX_SLOTS < HX_PACKS * HX_LANES)
+      found->links =
+          larger_error(found->links, scale, combined(hx_splat(0.0), e, k, n, HX_TURN_SIZE + at));
+  }
+}
+
+/* Computes y_1 = y_0 + h sum b_j k_j and the error h sum e_j k_j in one pass over n rates; n is a
+ * constant for the compiler. */
+HX_INLINE hxStepEnd step_of_n(const hxModel *model, const hxPlantMotion *from, double h,
+                              const hxMethodRow *m, int n, int estimates, const hxRate *k,
+                              hxPlantMotion *y) {
+  hxStepEnd found = {hx_splat(0.0), hx_splat(0.0), 0.0};
+  hxReal b[HX_STAGES], e[HX_STAGES];
+  weights_of(b, h, m->b, n);
+  weights_of(e, h, m->e, n);
+  end_of_bodies(from, b, e, n, estimates, k, y, &found);
+  end_of_bristles(model, from, b, e, n, estimates, k, y, &found);
+  end_of_gears(model, from, b, e, n, estimates, k, y, &found);
+  return found;
+}
+
+/* Calls step_of_n with the number of stages as a constant. */
+static inline hxStepEnd end_step(const hxModel *model, const hxPlantMotion *from, double h,
+                                 const hxMethodRow *m, int estimates, const hxRate *k,
+                                 hxPlantMotion *y) {
+  switch (m->stages) {
+  case 2:
+    return step_of_n(model, from, h, m, 2, estimates, k, y);
+  case 3:
+    return step_of_n(model, from, h, m, 3, estimates, k, y);
+  case 4:
+    return step_of_n(model, from, h, m, 4, estimates, k, y);
+  default:
+    return step_of_n(model, from, h, m, m->stages, estimates, k, y);
+  }
+}
+
+/* Returns the largest error over scale and tolerance. */
+static inline double error_norm(const hxModel *model, const hxStepEnd *found) {
+  return larger_of(found->torso, hx_largest_lane(found->links)) / model->tolerance;
+}
+
+/* Returns whether the sum of all lanes is 0. */
+static inline int is_zero(hxReal x) {
+  double lanes[HX_LANES], total = 0.0;
+  hx_store(lanes, x);
+  for (int lane = 0; lane < HX_LANES; ++lane) total += lanes[lane];
+  return total == 0.0;
+}
+
+/* Returns whether all numbers of a motion are finite: 0 x is NaN otherwise. */
+HX_RARE int all_finite(const hxPlantMotion *y) {
+  hxReal sum = hx_splat(0.0);
+  for (int i = 0; i < HX_MOTION_SIZE; i += HX_LANES) sum += 0.0 * hx_load(&y->y[i]);
+  return is_zero(sum);
+}
+
+/* Scales all quaternions to unit length; adds 0 times their scales to `zeros`. */
+static inline void normalise_quaternions(hxPlantMotion *m, hxReal *zeros) {
   double *p = &m->torso[HX_P];
   const double scale = 1.0 / sqrt(p[0] * p[0] + p[1] * p[1] + p[2] * p[2] + p[3] * p[3]);
+  *zeros += hx_splat(0.0 * scale);
   for (int i = 0; i < 4; ++i) p[i] *= scale;
   for (int joint = 0; joint < HX_JOINTS; ++joint)
     for (int slot = 0; slot < HX_PACKS * HX_LANES; slot += HX_LANES) {
       const hxQuat q = hx_link_quat(m, joint, slot);
       const hxReal s = 1.0 / hx_sqrt(q.w * q.w + q.x * q.x + q.y * q.y + q.z * q.z);
+      *zeros += 0.0 * s;
       hx_store_quat(&m->link[joint][HX_P], slot, (hxQuat){s * q.w, s * q.x, s * q.y, s * q.z});
     }
 }
@@ -203,15 +310,15 @@ static void try_step(const hxStart *start, double h, hxState *state, hxTrial *tr
   hxPlantMotion *y = &start->scratch->y;
   hxWork *work = &start->scratch->work;
   hxCommand now;
-  memset(implicit, 0, sizeof *implicit);
   implicit->z = h * m->gamma, implicit->ahead = h;
+  implicit->change = NULL; /* the first stage sets all slopes that later stages read */
   hx_clear_impulses(model, &trial->impulses);
   /* stages: y_i = y_0 + sum a_ij k_j, k_i by eq. 19 */
   for (int i = 0; i < m->stages; ++i) {
     const double t = start->t + m->c[i] * h;
     if (i > 0) {
-      combine(model, y->y, start->y->y, h, m->a[i], k, i, HX_TURN_SIZE);
-      if (m->gamma > 0.0) combine(model, change->y, NULL, h, m->g[i], k, i, 0);
+      stage_arguments(model, start->y, h, m->a[i], m->gamma > 0.0 ? m->g[i] : NULL, k, i, y,
+                      change);
       implicit->change = change;
     }
     const hxCommand *command = command_at(start, t, &now);
@@ -222,19 +329,18 @@ static void try_step(const hxStart *start, double h, hxState *state, hxTrial *tr
     state->evaluations += 1.0;
   }
   /* y_1 = y_0 + sum b_i k_i, error = |sum e_i k_i| */
-  memcpy(trial->y.bristle, start->y->bristle,
-         sizeof trial->y - offsetof(hxPlantMotion, bristle)); /* and the gears */
-  combine(model, trial->y.y, start->y->y, h, m->b, k, m->stages, HX_TURN_SIZE);
-  trial->error = 0.0;
-  if (m->error_order > 0 && model->step == 0.0) {
-    combine(model, y->y, NULL, h, m->e, k, m->stages, HX_TURN_SIZE);
-    trial->error = error_norm(model, y);
-  }
+  const int estimates = m->error_order > 0 && model->step == 0.0;
+  hxStepEnd end = end_step(model, start->y, h, m, estimates, k, &trial->y);
+  trial->error = estimates ? error_norm(model, &end) : 0.0;
   trial->y.actuator_work =
       start->y->actuator_work; /* measure_step() adds those of the accepted step */
   trial->y.push_work = start->y->push_work, trial->y.dissipated = start->y->dissipated;
-  normalise_quaternions(&trial->y);
-  if (model->projection == HX_PROJECTION_STEP) hx_project(model, &trial->y);
+  normalise_quaternions(&trial->y, &end.zeros);
+  trial->is_finite = is_zero(end.zeros);
+  if (model->projection == HX_PROJECTION_STEP) {
+    hx_project(model, &trial->y);
+    trial->is_finite = all_finite(&trial->y);
+  }
 }
 
 /* ---- touch-down ---- */
@@ -399,16 +505,6 @@ static hxStatus step_failure(const hxTrial *trial, double t, double h, char *mes
   return lost ? HX_NOT_FINITE : HX_STEP_TOO_SMALL;
 }
 
-/* Returns whether all numbers of a motion are finite: 0 x is NaN otherwise. */
-static int all_finite(const hxPlantMotion *y) {
-  hxReal sum = hx_splat(0.0);
-  double lanes[HX_LANES], total = 0.0;
-  for (int i = 0; i < HX_MOTION_SIZE; i += HX_LANES) sum += 0.0 * hx_load(&y->y[i]);
-  hx_store(lanes, sum);
-  for (int lane = 0; lane < HX_LANES; ++lane) total += lanes[lane];
-  return total == 0.0;
-}
-
 /* ---- measures of a step ---- */
 
 /* Returns the work of the push: its impulses times the mean of the torso's velocities at both ends
@@ -493,7 +589,7 @@ static hxStatus advance(const hxStart *start, double h_max, double *next_step, h
     if (state->evaluations >= start->scratch->last_evaluation)
       return limit_spent(state, start->t, h, message);
     try_step(start, h, state, trial);
-    if (!all_finite(&trial->y)) trial->error = NAN;
+    if (!trial->is_finite) trial->error = NAN;
     if (trial->error <= 1.0) break;
     state->rejected += 1.0;
     h *= fmin(step_factor(start->method, trial->error), 0.9);
@@ -536,14 +632,13 @@ static int is_pressed(const hxModel *model, const hxContactState *contact, int f
   return closed > 0.0;
 }
 
-/* Returns the model with its first rows of feet only. Open contacts exert no force, so steps
- * without their rows have the same bits. */
-HX_RARE const hxModel *feet_alone(const hxModel *model, int rows, hxModel *feet) {
-  *feet = *model;
-  feet->rows = feet->foot_rows = rows;
-  feet->listed = rows;
-  feet->torso_rows = feet->pair_rows = 0;
-  return feet;
+/* Returns the model with its first row of feet only, of those on blocks. Open contacts exert no
+ * force, so steps without their rows have the same bits. */
+HX_RARE const hxModel *first_row(const hxModel *model, hxModel *first) {
+  *first = *model;
+  first->rows = first->foot_rows = first->listed = 1;
+  first->torso_rows = first->pair_rows = 0;
+  return first;
 }
 
 /* Advances from state->time to t_end; the last step ends on t_end exactly. A call that an event
@@ -560,8 +655,8 @@ static hxStatus run_to(const hxModel *model, const hxCommand *command, const hxC
                    .footprints = events->footprints,
                    .scratch = scratch};
   const int rows = model->listed, foot_rows = model->foot_rows;
-  const hxModel *all_feet = rows > foot_rows ? feet_alone(model, foot_rows, &scratch->feet) : model,
-                *first_feet = foot_rows > 1 ? feet_alone(model, 1, &scratch->tops) : all_feet;
+  const hxModel *all_feet = rows > foot_rows ? events->feet : model,
+                *first_feet = foot_rows > 1 ? first_row(model, &scratch->tops) : all_feet;
   start.touch = fmax(touch_depth[0], touch_depth[1] * model->tolerance);
   double first = fmin(state->first_step,
                       state->next_step); /* new inputs cause a larger error than the last step's */

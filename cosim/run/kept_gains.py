@@ -1,0 +1,71 @@
+"""Keeps designed gains in the user's cache, by the content of all that they depend on."""
+
+from __future__ import annotations
+
+import hashlib
+import platform
+from collections.abc import Callable
+from functools import cache
+from importlib.metadata import version
+from importlib.util import find_spec
+from pathlib import Path
+
+from hexapod_cosim.controller import Gains, GainsError, load_gains, save_gains
+from hexapod_cosim.cosim.common.components import PLANT
+from hexapod_cosim.cosim.common.files import atomic_path
+from hexapod_cosim.cosim.common.plant_files import binary, fmi2_platform
+from hexapod_cosim.cosim.export.cross_build import user_cache
+from hexapod_cosim.models import HexapodError, Robot
+
+# whose sources make gains
+PACKAGES = ("hexapod_cosim.controller", "hexapod_cosim.cosim.design", "hexapod_cosim.models")
+
+
+def kept_gains(
+    robot: Robot,
+    period: float,
+    make: Callable[[Robot, float], Gains],
+    folder: Path | None = None,
+) -> Gains:
+    """Returns the gains of a robot and a controller period [s], from the cache if they are there.
+
+    Otherwise `make` designs them, and they are written to the cache; a cache that cannot be written
+    is left alone. The name of a file holds a hash of the robot, the period, the plant's binary, the
+    sources of design and models, and the numerical libraries: gains of the same hash have the same
+    bits. Raises what `make` raises.
+
+    folder: of the cache; by default the user's.
+    """
+    folder = (folder or user_cache()) / "gains"
+    path = folder / f"{robot.name}-{_key(robot, period)[:32]}.toml"
+    try:
+        return load_gains(path)
+    except GainsError:  # absent, damaged, or of another version
+        gains = make(robot, period)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with atomic_path(path) as part:
+            save_gains(gains, part)
+    except (OSError, HexapodError):
+        pass
+    return gains
+
+
+def _key(robot: Robot, period: float) -> str:
+    """Returns the hash of a design's inputs in hexadecimal."""
+    parts = [robot.hash, repr(period), _tools()]
+    return hashlib.sha256("\n".join(parts).encode()).hexdigest()
+
+
+@cache
+def _tools() -> str:
+    """Returns a hash of the plant's binary, the sources and the libraries that make gains."""
+    digest = hashlib.sha256(binary(fmi2_platform(), PLANT).read_bytes())
+    for package in PACKAGES:
+        spec = find_spec(package)
+        for place in (spec and spec.submodule_search_locations) or ():
+            for source in sorted(Path(place).rglob("*.py")):
+                digest.update(source.read_bytes())
+    names = ("numpy", "scipy", "control")
+    digest.update(" ".join([platform.python_version(), *map(version, names)]).encode())
+    return digest.hexdigest()
