@@ -146,10 +146,10 @@ def warnings(found: Identified) -> list[str]:
     if worst:
         named = ", ".join(f"{TITLES[key].lower()} ({value:.1f})" for key, value in worst.items())
         texts.append(
-            f"The model does not explain this log: mean squares of residuals over those of the "
-            f"readings' noise are too large in {named}. Intervals of these numbers are "
-            "widened by fitted rows alone and may be too narrow: look at the curves of these "
-            "channels, try --find with fewer groups, or another model of the servo or the ground."
+            "The model does not explain this log: mean squares of residuals over those of the "
+            f"readings' noise are too large in {named}. The intervals are wider for it, but may "
+            "miss the true numbers: find all groups of numbers, look at the curves of these "
+            "channels, or choose another model of servo or ground."
         )
     return texts
 
@@ -274,7 +274,7 @@ def _page(found: Identified, proposals: Sequence[Proposal], command: str) -> str
     ]
     return rendered(
         sections,
-        title=f"Robot {found.file.name} identified from {len(found.experiments)} log(s)",
+        title=f"Robot {found.file.name} identified from {_count(len(found.experiments), 'log')}",
         headline=f"{len(told)} of {len(estimates)} numbers are told by the logs",
         lead="Each number is the most probable one, given the readings and the robot file.",
         warnings=warnings(found),
@@ -286,6 +286,11 @@ def _page(found: Identified, proposals: Sequence[Proposal], command: str) -> str
         },
         source=RESULT,
     )
+
+
+def _count(number: int, name: str) -> str:
+    """Returns a number of things in words."""
+    return f"a {name}" if number == 1 else f"{number} {name}s"
 
 
 def _base_caption(found: Identified) -> str:
