@@ -34,6 +34,12 @@ NOISE = {  # standard deviations of the sensors, by the end of the columns' name
     "torso.roll": 1e-3,  # rad
     "torso.pitch": 1e-3,
     "torso.yaw": 1e-3,
+    "imu.angular_velocity[1]": 0.01,  # rad/s
+    "imu.angular_velocity[2]": 0.01,
+    "imu.angular_velocity[3]": 0.01,
+    "imu.specific_force[1]": 0.1,  # m/s2
+    "imu.specific_force[2]": 0.1,
+    "imu.specific_force[3]": 0.1,
 }
 COMMANDS = (".angle_ref", ".speed_ref")
 

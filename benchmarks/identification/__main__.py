@@ -21,7 +21,7 @@ from time import process_time
 import numpy as np
 from secret_robots import GROUPS, Secret, secret_robot
 
-from hexapod_cosim.cosim.identify.identify import Identified, identify
+from hexapod_cosim.cosim.identify.identify import Identified, identify, usual_workers
 from hexapod_cosim.models import load_robot
 
 JUDGED = ("torque", "position", "attitude")  # channels of the goal: torque and pose
@@ -36,7 +36,7 @@ class Score:
     covered: int  # of these within their 95 % intervals
     missed: tuple[str, ...]
     ratios: dict[str, float]  # by channel: error before over after on held-out rows, without noise
-    seconds: float  # of processor time
+    seconds: float  # of processor time, without that of worker processes
 
 
 def score(secret: Secret, found: Identified, seconds: float) -> Score:
@@ -69,7 +69,12 @@ def run(seeds: Sequence[int], seconds: float) -> list[Score]:
         for seed in seeds:
             secret = secret_robot(seed, Path(folder), duration=seconds, groups=GROUPS)
             begin = process_time()
-            found = identify([secret.log], load_robot("athena"), groups=GROUPS)
+            found = identify(
+                [secret.log],
+                load_robot("athena"),
+                groups=GROUPS,
+                workers=usual_workers([secret.log]),
+            )
             one = score(secret, found, process_time() - begin)
             scores.append(one)
             gains = ", ".join(f"{key} {value:.0f}" for key, value in one.ratios.items())

@@ -20,7 +20,7 @@ from hexapod_cosim.cosim.cli.terminal import (
     warn,
 )
 from hexapod_cosim.cosim.identify.excitation import propose
-from hexapod_cosim.cosim.identify.identify import HELD_OUT, Identified
+from hexapod_cosim.cosim.identify.identify import HELD_OUT, Identified, usual_workers
 from hexapod_cosim.cosim.identify.identify import identify as identify_robot
 from hexapod_cosim.cosim.identify.identify_files import (
     ERRORS,
@@ -30,6 +30,7 @@ from hexapod_cosim.cosim.identify.identify_files import (
     proposal_text,
     result_table,
     untold_text,
+    warnings,
     write_identified,
 )
 from hexapod_cosim.cosim.identify.log import read_log
@@ -61,6 +62,12 @@ Propose = Annotated[
     bool,
     typer.Option("--propose/--no-propose", help="Search for a walk that would tell more."),
 ]
+Workers = Annotated[
+    int | None,
+    typer.Option(
+        "--workers", metavar="N", min=1, help="Processes; default: one for each processor."
+    ),
+]
 Folder = Annotated[
     Path | None,
     typer.Option("-o", "--output", metavar="DIR", help="Where to write; default out/identify."),
@@ -73,6 +80,7 @@ def identify(
     find: Find = None,
     held_out: HeldOut = HELD_OUT,
     search: Propose = True,
+    workers: Workers = None,
     output: Folder = None,
     json: Json = False,
 ) -> None:
@@ -84,15 +92,16 @@ def identify(
     words += ["--held-out", str(held_out)] if held_out != HELD_OUT else []
     words += [] if search else ["--no-propose"]
     recorded = [read_log(path, torso_com=own.torso.com) for path in logs]
+    size = workers or usual_workers(recorded)
     with results_folder(output or Path("out") / "identify") as folder:
         with waiting("identifying the robot"):
-            found = identify_robot(recorded, own, groups=groups, held_out=held_out)
+            found = identify_robot(recorded, own, groups=groups, held_out=held_out, workers=size)
         with waiting("searching for a walk that would tell more"):
             proposals = propose(found, robot) if search else []
         folder.begin()
         files = write_identified(found, proposals, robot, folder.path, command=shlex.join(words))
-    for _, column in found.bad:
-        warn(f"{column.name} is left out: {column.why}")
+    for text in warnings(found):
+        warn(text.removesuffix("."))
     if json:
         show_json({**result_table(found, proposals), "files": [str(path) for path in files]})
         return

@@ -55,6 +55,16 @@ class Experiment:
         return [keys[name] for name in self.columns]
 
 
+def first_part(experiment: Experiment, seconds: float) -> Experiment:
+    """Returns the first seconds of an experiment without held-out rows; itself if it is shorter."""
+    log = experiment.log
+    end = int(np.searchsorted(log.time, log.time[0] + seconds))
+    if end >= experiment.fitted.stop:
+        return experiment
+    part = slice(experiment.fitted.start, end)
+    return replace(experiment, log=log.part(slice(0, end)), fitted=part, held_out=slice(end, end))
+
+
 def robot_parameters(robot: Robot, base: Robot) -> dict[str, float]:
     """Returns the parameters of the FMU in which a robot differs from the one it was made of."""
     other = _parameters(base)
@@ -84,7 +94,7 @@ def simulated(
     zero = np.array([values.get(f"zero.{name}", 0.0) for name in JOINTS])
     # the pose in the log is that of the point which the robot file has as the centre of mass
     offset = np.array(base.torso.com) - np.array(robot.torso.com)
-    names = [_source(name) for name in experiment.columns]
+    names = [_source(name, base) for name in experiment.columns]
     different = list(dict.fromkeys([*names, *ATTITUDE]))
     found = plant.simulate(
         log,
@@ -145,9 +155,14 @@ def needs_simulation(row: Unknown) -> bool:
     return not (row.key.startswith("bias.") or row.key == CURRENT)
 
 
-def _source(name: str) -> str:
-    """Returns the output of the FMU that a reading is made of."""
-    return name.removesuffix(".current") + ".torque" if name.endswith(".current") else name
+def _source(name: str, robot: Robot) -> str:
+    """Returns the output of the FMU that a reading is made of.
+
+    Currents of servos without a model of their motor are torques over a constant.
+    """
+    if name.endswith(".current") and robot.servo.drive != "motor":
+        return name.removesuffix(".current") + ".torque"
+    return name
 
 
 def _start(

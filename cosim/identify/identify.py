@@ -20,6 +20,7 @@ from hexapod_cosim.cosim.identify.experiment import Experiment
 from hexapod_cosim.cosim.identify.log import CHANNELS, Log, LogError, without_readings
 from hexapod_cosim.cosim.identify.log_plant import LogPlant
 from hexapod_cosim.cosim.identify.output_error import TO_DEVIATION, Fit, Problem, Progress, fit
+from hexapod_cosim.cosim.identify.rigid.linear_start import LinearStart, linear_start
 from hexapod_cosim.cosim.identify.screening import BadColumn, misfits, screened
 from hexapod_cosim.cosim.identify.start import rest_rows
 from hexapod_cosim.cosim.identify.unknowns import (
@@ -29,7 +30,9 @@ from hexapod_cosim.cosim.identify.unknowns import (
     changed_robot,
     chosen_unknowns,
 )
+from hexapod_cosim.cosim.identify.workers import simulating_workers
 from hexapod_cosim.cosim.interface.names import vector_names
+from hexapod_cosim.cosim.run.worker_pool import processor_count
 from hexapod_cosim.models import Robot
 
 Array = NDArray[np.float64]
@@ -38,6 +41,7 @@ QUANTILE = 1.959963985  # of a normal distribution, for 95 %
 NEAR = 0.8  # correlation of two numbers that is reported
 HELD_OUT = 0.25  # share of each log at its end that the fit does not see
 SETTLING = 0.1  # s    at the start of a log that is not compared: the first row has noise
+LONG = 4000  # rows from which on worker processes save more time than they take to start
 TOLERANCE = {"solver.tolerance": 1e-5}  # differences of simulations need exact ones
 
 
@@ -72,6 +76,8 @@ class Identified:
     experiments: tuple[Experiment, ...]
     bad: tuple[tuple[int, BadColumn], ...]  # number of the log and column left out
     before: tuple[Array, ...]  # readings that the robot file predicts (rows, columns)
+    linear: LinearStart | None  # what linear least squares tell
+    lacking: str  # what the logs lack for these
 
     @property
     def estimates(self) -> list[Estimate]:
@@ -124,6 +130,7 @@ def identify(
     *,
     groups: Sequence[str] = GROUPS,
     held_out: float = HELD_OUT,
+    workers: int = 1,
     progress: Progress | None = None,
 ) -> Identified:
     """Finds a robot's numbers from logs.
@@ -133,25 +140,40 @@ def identify(
         robot: what is known of it.
         groups: which numbers of the table of unknowns are to be found.
         held_out: share of the rows at the end of each log that only judges the result.
+        workers: number of processes, on which the result does not depend. With more than one, the
+            calling script needs `if __name__ == "__main__"`.
         progress: called with what is being done.
 
     Raises HexapodError for logs without readings and where the plant cannot follow them.
     """
+    # imported here: the command's help starts sooner
+    from threadpoolctl import threadpool_limits  # noqa: PLC0415
+
     report: Callable[[str], None] = progress or (lambda _text: None)
     rows = chosen_unknowns(robot, logs, groups)
-    with TemporaryDirectory(prefix="hexapod-identify-") as folder:
+    # small matrices: threads of linear algebra would wait for each other
+    with threadpool_limits(1), TemporaryDirectory(prefix="hexapod-identify-") as folder:
         path = export_fmu(robot, Path(folder) / "robot.fmu")
-        with LogPlant(path, TOLERANCE) as plant:
+        place = Path(folder) / "workers"
+        with (
+            LogPlant(path, TOLERANCE) as plant,
+            simulating_workers(workers, path, robot, TOLERANCE, place) as pool,
+        ):
             experiments = [make_experiment(log, k, held_out) for k, log in enumerate(logs)]
             report("the columns of the log")
             experiments, bad = _screened(plant, robot, experiments, rows)
-            problem, found = _fitted(plant, robot, experiments, rows, report)
+            report("linear least squares")
+            linear, lacking = linear_start(experiments, robot, rows)
+            start = linear.z(rows, robot) if linear else None
+            problem = Problem(plant, robot, experiments, rows, pool)
+            found = fit(problem, start=start, progress=report)
             late = _misfits(problem, found)
             if late:
                 bad += late
                 report("again, without columns that do not fit")
                 experiments = _without(experiments, late)
-                problem, found = _fitted(plant, robot, experiments, rows, report)
+                problem = Problem(plant, robot, experiments, rows, pool)
+                found = fit(problem, start=start, progress=report)
             before = problem.predictions(np.zeros(len(rows)))
     return Identified(
         file=robot,
@@ -160,7 +182,14 @@ def identify(
         experiments=tuple(experiments),
         bad=tuple(bad),
         before=tuple(before),
+        linear=linear,
+        lacking=lacking,
     )
+
+
+def usual_workers(logs: Sequence[Log]) -> int:
+    """Returns a number of processes for logs: that of processors, but 1 for short logs."""
+    return processor_count() if sum(len(log.time) for log in logs) >= LONG else 1
 
 
 def make_experiment(log: Log, number: int, held_out: float) -> Experiment:
@@ -228,17 +257,6 @@ def _without(
             )
         found.append(kept)
     return found
-
-
-def _fitted(
-    plant: LogPlant,
-    robot: Robot,
-    experiments: Sequence[Experiment],
-    rows: Sequence[Unknown],
-    report: Progress,
-) -> tuple[Problem, Fit]:
-    problem = Problem(plant, robot, experiments, rows)
-    return problem, fit(problem, progress=report)
 
 
 def _misfits(problem: Problem, found: Fit) -> list[tuple[int, BadColumn]]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
@@ -14,12 +15,17 @@ from hexapod_cosim.cosim.identify.comparison import Difference
 from hexapod_cosim.cosim.identify.excitation import Proposal, scenario_text
 from hexapod_cosim.cosim.identify.figures import channel_figures, embedded
 from hexapod_cosim.cosim.identify.identify import NEAR, Estimate, Identified
+from hexapod_cosim.cosim.identify.output_error import EXPLAINED
 from hexapod_cosim.cosim.identify.page import TITLES, Section, number, rendered
+from hexapod_cosim.cosim.identify.rigid.base_parameters import base_of, group_parameters
 from hexapod_cosim.cosim.identify.robot_file import SENSORS, sensors_table, write_robot
 
+BASE_KEYS = ("combination", "unit", "before", "least_squares", "deviation", "found")
 KIND, ROBOT_FILE, REPORT, RESULT = "identify", "robot.toml", "report.html", "identify.json"
 EXPERIMENT = "experiment.toml"
 ESTIMATES = ("number", "unit", "before", "found", "95 % interval", "told", "nearest partner")
+BASE = ("base parameter", "unit", "before", "least squares", "deviation", "found")
+MISFIT = ("channel", "noise", "fitted", "held out")
 ERRORS = ("channel", "unit", "before", "after", "ratio")
 
 
@@ -65,6 +71,13 @@ def result_table(found: Identified, proposals: Sequence[Proposal]) -> dict[str, 
         "unknowns": len(found.fit.rows),
         "noise": dict(found.fit.noise),
         "readings_that_count_as_one": dict(found.fit.correlated),
+        "mean_square_over_noise": {
+            "fitted": {key: one.value for key, one in found.fit.misfit.items()},
+            "held_out": {key: one.value for key, one in found.fit.held_out.items()},
+        },
+        "unexplained": found.fit.unexplained,
+        "base_parameters": [dict(zip(BASE_KEYS, row, strict=True)) for row in base_values(found)],
+        "no_base_parameters": found.lacking,
         "bad_columns": [
             {"log": found.experiments[number].log.where, **asdict(column)}
             for number, column in found.bad
@@ -76,6 +89,69 @@ def result_table(found: Identified, proposals: Sequence[Proposal]) -> dict[str, 
             for one in proposals
         ],
     }
+
+
+def _finite(value: str | float) -> str | float | None:
+    """Returns a value for JSON, which has no infinity."""
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def base_values(found: Identified) -> list[tuple[str, str, float, float, float, float]]:
+    """Returns name, unit, the robot file's value, that of linear least squares, its deviation and
+    the identified robot's value of each base parameter.
+    """
+    if found.linear is None:
+        return []
+    one = found.linear.base
+    own = base_of(found.file).values(group_parameters(found.robot))
+    return [
+        (name, unit, float(before), float(value), float(deviation), float(after))
+        for name, unit, before, value, deviation, after in zip(
+            one.names, one.units, one.before, one.values, one.deviations, own, strict=True
+        )
+    ]
+
+
+def base_rows(found: Identified) -> list[list[str]]:
+    """Returns the rows of a table with BASE, of base parameters that the logs tell well.
+
+    Their deviation is below a tenth of the largest value of their unit.
+    """
+    values = base_values(found)
+    largest = {unit: max(abs(row[2]) for row in values if row[1] == unit) for _, unit, *_ in values}
+    return [
+        [name, unit, number(before), number(value), f"{deviation:.2g}", number(after)]
+        for name, unit, before, value, deviation, after in values
+        if deviation < 0.1 * largest[unit]
+    ]
+
+
+def misfit_rows(found: Identified) -> list[list[str]]:
+    """Returns the rows of a table with MISFIT."""
+    return [
+        [
+            TITLES[key],
+            number(found.fit.noise[key]),
+            f"{one.value:.2f}",
+            f"{found.fit.held_out[key].value:.2f}" if key in found.fit.held_out else "",
+        ]
+        for key, one in found.fit.misfit.items()
+    ]
+
+
+def warnings(found: Identified) -> list[str]:
+    """Returns what a user must know of the result, as sentences."""
+    texts = [f"{column.name} is left out: {column.why}." for _, column in found.bad]
+    worst = found.fit.unexplained
+    if worst:
+        named = ", ".join(f"{TITLES[key].lower()} ({value:.1f})" for key, value in worst.items())
+        texts.append(
+            "The model does not explain this log: mean squares of residuals over those of the "
+            f"readings' noise are too large in {named}. The intervals are wider for it, but may "
+            "miss the true numbers: find all groups of numbers, look at the curves of these "
+            "channels, or choose another model of servo or ground."
+        )
+    return texts
 
 
 def _error_table(pairs: Sequence[tuple[Difference, Difference]]) -> list[dict[str, Any]]:
@@ -162,6 +238,23 @@ def _page(found: Identified, proposals: Sequence[Proposal], command: str) -> str
             rows=estimate_rows(estimates),
             left=2,
         ),
+        Section(
+            title="Does the model explain the log?",
+            caption="Mean squares of residuals over those of the readings' own noise, which their "
+            "second differences show: 1 where the model explains the readings, more where it has "
+            f"errors. Above {EXPLAINED:g} (more where readings are few) the page warns; fitted "
+            "rows above 1 widen all intervals.",
+            columns=MISFIT,
+            rows=misfit_rows(found),
+            left=1,
+        ),
+        Section(
+            title="Base parameters",
+            caption=_base_caption(found),
+            columns=BASE,
+            rows=base_rows(found),
+            left=2,
+        ),
         Section(title="What the logs cannot tell", caption=untold_text(found)),
         Section(
             title="Which experiment would",
@@ -181,10 +274,10 @@ def _page(found: Identified, proposals: Sequence[Proposal], command: str) -> str
     ]
     return rendered(
         sections,
-        title=f"Robot {found.file.name} identified from {len(found.experiments)} log(s)",
+        title=f"Robot {found.file.name} identified from {_count(len(found.experiments), 'log')}",
         headline=f"{len(told)} of {len(estimates)} numbers are told by the logs",
         lead="Each number is the most probable one, given the readings and the robot file.",
-        warnings=[f"{column.name} is left out: {column.why}." for _, column in found.bad],
+        warnings=warnings(found),
         command=command,
         facts={
             "logs": ", ".join(one.log.where for one in found.experiments),
@@ -192,6 +285,25 @@ def _page(found: Identified, proposals: Sequence[Proposal], command: str) -> str
             "noise": ", ".join(f"{key} {value:.3g}" for key, value in found.fit.noise.items()),
         },
         source=RESULT,
+    )
+
+
+def _count(number: int, name: str) -> str:
+    """Returns a number of things in words."""
+    return f"a {name}" if number == 1 else f"{number} {name}s"
+
+
+def _base_caption(found: Identified) -> str:
+    """Returns what base parameters are and where these come from."""
+    text = (
+        "Combinations of masses m, first moments mx and inertias J about the links' joints that "
+        "the equations of motion hold; no log tells their parts apart. "
+    )
+    if found.linear is None:
+        return text + f"They need readings that the logs lack: {found.lacking}."
+    return text + (
+        "Linear least squares found them without a simulation, as a start of the fit; shown are "
+        "those that the logs tell well."
     )
 
 

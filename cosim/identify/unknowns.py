@@ -16,10 +16,13 @@ from hexapod_cosim.cosim.identify.log import CHANNELS, Log
 from hexapod_cosim.cosim.interface.names import joint_names, vector_names
 from hexapod_cosim.models import JOINT_NAMES, Robot
 from hexapod_cosim.models.records import BRISTLE_LAWS
+from hexapod_cosim.models.servos.presets import followed
 
 GROUPS = ("servo", "mass", "contact", "sensor", "zero")  # that a user can choose
 START = "start"  # group of what the first row of a log leaves open
 ALWAYS: Callable[[Robot], bool] = lambda _robot: True  # noqa: E731
+LINE: Callable[[Robot], bool] = lambda robot: robot.servo.drive == "line"  # noqa: E731
+MOTOR: Callable[[Robot], bool] = lambda robot: robot.servo.drive == "motor"  # noqa: E731
 CURRENT = "sensor.torque_constant"
 DELAY = "sensor.delay"
 
@@ -46,6 +49,12 @@ class Unknown:
         if self.positive:
             return before * math.exp(self.prior * z)
         return min(max(before + self.prior * z, self.low), self.high)
+
+    def distance(self, value: float, before: float) -> float:
+        """Returns the z of a value, within the limits of z."""
+        own = math.log(value / before) if self.positive else value - before
+        low, high = self.bounds(before)
+        return min(max(own / self.prior, low), high)
 
     def interval(self, value: float, deviation: float) -> tuple[float, float]:
         """Returns value -+ a deviation in units of the prior."""
@@ -78,6 +87,23 @@ def _section(name: str, unit: str, group: str, prior: float, **more: Any) -> Unk
         return replace(robot, **sections)
 
     return Unknown(key=name, unit=unit, group=group, prior=prior, read=read, write=write, **more)
+
+
+def _motor(name: str, unit: str, prior: float) -> Unknown:
+    """Returns the row of a number of measured servos, named "servo.key".
+
+    What follows from it, as the largest torque, changes with it; kp is a number of its own.
+    """
+    row = _section(name, unit, "servo", prior, applies=MOTOR)
+    plain = row.write
+    if plain is None:
+        raise ValueError(f"{name} is no number of robot files")
+
+    def write(robot: Robot, value: float) -> Robot:
+        changed = plain(robot, value)
+        return replace(changed, servo=followed(changed.servo))
+
+    return replace(row, write=write)
 
 
 def _mass(joint: int | None) -> Unknown:
@@ -144,8 +170,14 @@ ROBOT = (
     _section("servo.kd", "N m s/rad", "servo", 0.3),
     _section("servo.coulomb_friction", "N m", "servo", 0.5),
     _section("servo.rotor_inertia", "kg m2", "servo", 0.5),
-    _section("servo.torque_max", "N m", "servo", 0.2),
-    _section("servo.speed_max", "rad/s", "servo", 0.2),
+    _section("servo.torque_max", "N m", "servo", 0.2, applies=LINE),
+    _section("servo.speed_max", "rad/s", "servo", 0.2, applies=LINE),
+    _motor("servo.torque_constant", "N m/A", 0.2),
+    _motor("servo.resistance", "ohm", 0.2),
+    _motor("servo.viscous_friction", "N m s/rad", 0.5),
+    _motor("servo.stribeck_friction", "N m", 0.5),
+    _motor("servo.motor_load_friction", "1", 0.5),
+    _motor("servo.external_load_friction", "1", 0.5),
     _mass(None),
     *(_com(None, axis, 0.01) for axis in range(3)),
     *(_mass(joint) for joint in range(3)),
@@ -195,7 +227,8 @@ def chosen_unknowns(robot: Robot, logs: Sequence[Log], groups: Sequence[str]) ->
     for row in rows:
         if row.key.startswith("bias.") and row.key.removeprefix("bias.") not in have:
             continue
-        if row.key == CURRENT and not have & set(_channel("current")):
+        # the currents of a servo with a motor follow from its torque constant
+        if row.key == CURRENT and (MOTOR(robot) or not have & set(_channel("current"))):
             continue
         if row.applies(robot) and not (row.positive and row.read and row.read(robot) <= 0.0):
             found.append(row)

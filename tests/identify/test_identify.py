@@ -10,28 +10,39 @@ import tomllib
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
+import tomlkit
 from command import Call, assert_refused
 from secret_robots import NOISE, Secret, secret_robot
 
 from benchmarks.identification.__main__ import GOAL_COVERED, GOAL_RATIO, ratios, summary
 from benchmarks.identification.__main__ import score as score_of
+from hexapod_cosim.cosim.export.export import export_fmu
 from hexapod_cosim.cosim.identify import excitation
 from hexapod_cosim.cosim.identify.excitation import Proposal, propose, scenario_text
 from hexapod_cosim.cosim.identify.experiment import Experiment, of_point
 from hexapod_cosim.cosim.identify.identify import Identified, identify, make_experiment
 from hexapod_cosim.cosim.identify.log import Log
 from hexapod_cosim.cosim.identify.log_plant import LogPlant
-from hexapod_cosim.cosim.identify.output_error import Fit, Problem, remaining_step
+from hexapod_cosim.cosim.identify.output_error import (
+    Fit,
+    Problem,
+    _tried,
+    read_noise,
+    remaining_step,
+)
 from hexapod_cosim.cosim.identify.robot_file import write_robot
 from hexapod_cosim.cosim.identify.screening import screened
 from hexapod_cosim.cosim.identify.start import initial_state
 from hexapod_cosim.cosim.identify.unknowns import ROBOT, chosen_unknowns
+from hexapod_cosim.cosim.identify.workers import simulating_workers
 from hexapod_cosim.cosim.logs.mcap_writer import write_mcap
 from hexapod_cosim.cosim.master.recorder import Recording
 from hexapod_cosim.models import load_robot
+from hexapod_cosim.models.robot import robot_path
 
 DURATION = 1.8  # s
 GROUPS = ("servo", "contact")
@@ -109,6 +120,132 @@ def test_masses_of_all_bodies_are_written_and_read_back(
     assert load_robot(tmp_path / "robot.toml").legs == changed.legs
     assert changed.torso.mass == pytest.approx(2.86, rel=1e-12)
     assert changed.legs[4].links[1].com[0] == pytest.approx(0.0725, rel=1e-12)
+
+
+def test_a_model_that_explains_the_log_leaves_the_noise_of_the_readings(
+    found: list[Identified],
+) -> None:
+    """Second differences of readings show their noise; the mean square is 1 within a third."""
+    for one in found:
+        assert one.fit.unexplained == {}
+        assert max(each.value for each in one.fit.misfit.values()) < 1.33
+
+
+def test_a_channel_that_the_model_does_not_explain_is_named(
+    secrets: list[Secret], found: list[Identified], athena_fmu: Path
+) -> None:
+    """A slow error of 0.05 N m adds 0.00125 (N m)^2 to a noise of 0.0009 (N m)^2."""
+    log = secrets[0].log
+    for name in log.measured:
+        if name.endswith(".torque"):
+            log = with_column(log, name, lambda y: y + 0.05 * np.sin(2e-2 * np.arange(len(y))))
+    robot, one = load_robot("athena"), found[0]
+    with LogPlant(athena_fmu) as plant:
+        problem = Problem(plant, robot, [make_experiment(log, 0, 0.25)], one.fit.rows)
+        noise = read_noise(problem)
+        misfit = problem.misfit(one.fit.z, noise, "fitted")
+    assert noise["torque"] == pytest.approx(NOISE["torque"], rel=0.1)
+    assert misfit["torque"].value == pytest.approx(1.0 + 0.00125 / 0.0009, rel=0.2)
+    assert set(replace(one.fit, misfit=misfit).unexplained) == {"torque"}
+    assert misfit["angle"].value < 1.2
+
+
+class Valleys:
+    """Stands for a problem whose sum of squares has two valleys, the deeper one at 1.9."""
+
+    rows = tuple(row for row in ROBOT if row.key in ("servo.kp", "contact.restitution"))
+    counted: tuple[()] = ()
+
+    def all_known(self) -> tuple[()]:
+        return ()
+
+    def bounds(self) -> tuple[np.ndarray, np.ndarray]:
+        return np.full(2, -8.0), np.full(2, 8.0)
+
+    def residuals(self, z: np.ndarray) -> np.ndarray:
+        return np.array([min(abs(z[1]) + 1.0, 2.0 * abs(z[1] - 1.9)), z[0]])
+
+
+def test_another_start_of_a_contact_leads_out_of_a_wrong_valley() -> None:
+    problem: Any = Valleys()
+    assert _tried(problem, np.zeros(2)).tolist() == [0.0, 2.0]
+    assert _tried(problem, np.array([0.0, 2.0])).tolist() == [0.0, 1.9]
+
+
+def test_worker_processes_give_the_same_derivatives(
+    secrets: list[Secret], athena_fmu: Path, tmp_path: Path
+) -> None:
+    robot, log = load_robot("athena"), secrets[0].log.part(slice(0, 130))
+    rows = chosen_unknowns(robot, [log], ("contact", "sensor"))
+    experiment = make_experiment(log, 0, 0.0)
+    found = []
+    with (
+        LogPlant(athena_fmu) as plant,
+        simulating_workers(2, athena_fmu, robot, {}, tmp_path) as workers,
+    ):
+        for own in (None, workers):
+            problem = Problem(plant, robot, [experiment], rows, own)
+            z = np.zeros(len(rows))
+            problem.set_noise(problem.errors(z))
+            found.append(problem.jacobian(z))
+    assert np.abs(found[0]).max() > 0.1
+    assert np.array_equal(found[0], found[1])
+
+
+MEASURED = "mx64_m4"  # a servo with a model of its motor
+
+
+def measured_robot(folder: Path) -> Path:
+    """Writes athena with a measured servo."""
+    document = tomlkit.parse(robot_path("athena").read_text(encoding="utf-8"))
+    document["servo"] = {"model": MEASURED}
+    path = folder / "measured.toml"
+    path.write_text(tomlkit.dumps(document), encoding="utf-8")
+    return path
+
+
+def test_currents_of_a_measured_servo_are_those_of_its_motor(
+    plant_build: Path, tmp_path: Path
+) -> None:
+    """The plant's motor predicts them: torque over the torque constant that is tried (eq. 48)."""
+    file = load_robot(measured_robot(tmp_path))
+    seen = ("angle", "torque", "current", "attitude")
+    one = secret_robot(3, tmp_path, duration=0.6, groups=("servo",), file=file, seen=seen)
+    rows = chosen_unknowns(file, [one.log], ("servo", "sensor"))
+    keys = [row.key for row in rows]
+    assert "sensor.torque_constant" not in keys
+    assert "servo.torque_max" not in keys
+    place = keys.index("servo.torque_constant")
+    experiment = make_experiment(one.log, 0, 0.0)
+    with LogPlant(export_fmu(file, tmp_path / "file.fmu")) as plant:
+        problem = Problem(plant, file, [experiment], rows)
+        z = np.zeros(len(rows))
+        z[place] = rows[place].distance(
+            1.1 * file.servo.torque_constant, problem.before[keys[place]]
+        )
+        (readings,) = problem.predictions(z)
+    channels = np.array(experiment.channels)
+    current, torque = readings[:, channels == "current"], readings[:, channels == "torque"]
+    assert np.abs(current).max() > 0.1
+    assert current * 1.1 * file.servo.torque_constant == pytest.approx(torque, rel=1e-9, abs=1e-12)
+
+
+def test_numbers_of_a_measured_servo_are_written_and_read_back(
+    found: list[Identified], tmp_path: Path
+) -> None:
+    path = measured_robot(tmp_path)
+    file = load_robot(path)
+    changed = file
+    for row in ROBOT:
+        if row.group == "servo" and row.applies(file) and row.write and row.read:
+            changed = row.write(changed, 1.1 * row.read(changed))
+    assert changed.servo.torque_max == pytest.approx(file.servo.torque_max, rel=1e-12)
+    write_robot(
+        replace(found[0], file=file, robot=changed), str(path), tmp_path / "robot.toml", ["x.csv"]
+    )
+    again = load_robot(tmp_path / "robot.toml").servo
+    assert again == changed.servo
+    assert again.torque_constant == pytest.approx(1.1 * file.servo.torque_constant, rel=1e-12)
 
 
 def with_column(log: Log, name: str, change: Callable[[np.ndarray], np.ndarray]) -> Log:

@@ -97,15 +97,22 @@ def drawn(rows: list[Unknown], robot: Robot, rng: np.random.Generator) -> dict[s
 
 
 def secret_robot(
-    seed: int, folder: Path, *, duration: float, groups: tuple[str, ...] = GROUPS
+    seed: int,
+    folder: Path,
+    *,
+    duration: float,
+    groups: tuple[str, ...] = GROUPS,
+    file: Robot | None = None,
+    seen: tuple[str, ...] = SEEN,
 ) -> Secret:
     """Makes a robot with secret numbers and its log of a walk.
 
-    The torque in the log is that which the servo reports, so that no current is read.
+    file: the robot as it is known, by default athena. seen: channels of the log; by default it has
+    the torque that the servo reports, and no current.
     """
     rng = np.random.default_rng(seed)
-    file, commands = load_robot("athena"), walking_commands(duration)
-    columns = tuple(name for one in CHANNELS if one.key in SEEN for name in one.names)
+    file, commands = file or load_robot("athena"), walking_commands(duration)
+    columns = tuple(name for one in CHANNELS if one.key in seen for name in one.names)
     dummy = Log(Recording((*commands.recording.names, *columns), np.empty((0, 37 + len(columns)))),
                 "")  # fmt: skip
     rows = chosen_unknowns(file, [dummy], groups)
