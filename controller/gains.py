@@ -106,7 +106,7 @@ class Requirements:
     frequency: float = 5.0  # Hz    natural frequency of the suspension, at most
     damping_ratio: float = 1.0  # 1
     deflection_limit: float = 0.015  # m    clamp of the suspension
-    handover_time: float = 0.080  # s
+    handover_time: float = 0.065  # s
     weight_time: float = 0.5  # s
     attitude_rate: float = 2.0  # 1/s
     height_rate: float = 2.0  # 1/s

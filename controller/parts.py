@@ -5,18 +5,16 @@ Each part can be switched off by itself, so that its effect can be measured.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, fields
 
 
 @dataclass(frozen=True, kw_only=True)
 class Parts:
-    """Switches, all on by default but the suspension; they have no effect on kinematic control."""
+    """Switches, all on by default; they have no effect on kinematic control."""
 
     support: bool = True  # servo torques that carry each leg's share of weight and acceleration
     slip_pid: bool = True  # feet yield to squeezing tangential forces
-    # legs yield to normal forces; None: under paper control only, because compliant control is
-    # better without it (docs/control.md, "Over ground, errors of the model and pushes")
-    suspension: bool | None = None
+    suspension: bool = True  # legs yield to normal forces above their share
     touchdown: bool = True  # foot heights follow early and late touch-downs
     posture: bool = True  # roll, pitch and height are controlled
     path: bool = True  # the path walked is measured at the feet, and its deviation corrected
@@ -25,12 +23,8 @@ class Parts:
     # its joints cannot follow, or it is far too heavy for them
     fallback: bool = True
     # weight of the servos' torques against the feet's use of friction in the planned squeeze, in
-    # [0, 1): a part of `support`
+    # [0, 1), on ground on which feet creep: a part of `support`
     squeeze: float = 0.6
-
-    def under(self, law: str) -> Parts:
-        """Returns the same parts with the suspension decided as a law has it by default."""
-        return self if self.suspension is not None else replace(self, suspension=law == "paper")
 
 
 SWITCHES = tuple(item.name for item in fields(Parts) if item.name != "squeeze")

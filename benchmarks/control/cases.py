@@ -56,24 +56,19 @@ def judged_walk(name: str = "judged", *settings: str) -> Case:
 
 
 def ablation() -> list[Case]:
-    """Returns cases with no part, each part alone, the default parts, and these but each part.
+    """Returns cases with no part, each part alone, all but each part, and all parts.
 
-    The suspension is off by default and added to the others instead. The squeeze belongs to the
-    support, and so to the support alone.
+    The squeeze belongs to the support, and so to the support alone.
     """
-    off, on = ({part: f"{SWITCH}{part}={to}" for part in SWITCHES} for to in ("false", "true"))
+    off = {part: f"{SWITCH}{part}=false" for part in SWITCHES}
     nothing = judged_walk("no part", *off.values())
     alone = [
-        judged_walk(
-            f"{part} alone", *(text for other, text in off.items() if other != part), on[part]
-        )
+        judged_walk(f"{part} alone", *(text for other, text in off.items() if other != part))
         for part in SWITCHES
     ]
-    del off["suspension"]
     off["squeeze"] = f"{SWITCH}squeeze=0"
-    without = [judged_walk(f"default but {part}", text) for part, text in off.items()]
-    suspended = judged_walk("default and suspension", on["suspension"])
-    return [nothing, *alone, *without, suspended, judged_walk("default")]
+    without = [judged_walk(f"all but {part}", text) for part, text in off.items()]
+    return [nothing, *alone, *without, judged_walk("all parts")]
 
 
 def sticking() -> list[Case]:

@@ -114,7 +114,7 @@ class Compliance(Stateful):
         weight: of the robot [N]; depth: of the ground below the torso's origin [m]; cycle,
         step_height: of its gait [s, m]; kp: of its servos [N m/rad]; period [s].
         """
-        self.parts, self.period = parts.under("compliant"), period
+        self.parts, self.period = parts, period
         self.share = weight / TRIPOD_LEGS  # N
         self.settled = SETTLED_SHARE * weight  # N
         self.most_lean = LARGEST_LEAN * depth  # m
@@ -323,7 +323,7 @@ class Compliance(Stateful):
 
     def _excess(self, plan: Plan, normal: Array) -> Array:
         """Returns the normal forces (6,) above the planned shares [N]; 0 without a share (C26)."""
-        live = bool(self.parts.suspension) & (plan.shares.activation > 0.0)
+        live = self.parts.suspension & (plan.shares.activation > 0.0)
         return np.where(live, normal - self.scale * plan.shares.normal, 0.0)
 
     # ------------------------------------------------------------------------------------ laws

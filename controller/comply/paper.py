@@ -36,7 +36,7 @@ class Paper(Stateful):
 
     def __init__(self, gains: Gains, parts: Parts, *, period: float) -> None:
         slip = gains.paper_slip
-        self.parts, self.pid = parts.under("paper"), SlipPid(slip, period=period)
+        self.parts, self.pid = parts, SlipPid(slip, period=period)
         self.a, self.b = discretise(gains.paper_suspension, period=period)
         self.memory = math.exp(-period / slip.load_time)
         self.tracking = min(period / slip.tracking_time, 1.0)

@@ -519,7 +519,7 @@ const char *const hx_log_category_names[] = {
 const hxStateRow *const hx_states = 0;
 const size_t hx_state_count = 0;
 
-const char hx_default_guid[] = "{e663d070-4391-49fd-a74a-08bc4c67290b}";
+const char hx_default_guid[] = "{efc6a438-3311-4919-9979-786de6df4023}";
 
 _Static_assert(HX_CONTROL_KINEMATIC == 1, "Control");
 _Static_assert(HX_CONTROL_COMPLIANT == 2, "Control");

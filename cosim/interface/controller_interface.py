@@ -81,11 +81,7 @@ def controller_roots(setup: ControllerSetup) -> SimpleNamespace:
     )
     gains = passive_gains(setup.robot) if setup.gains is None else setup.gains
     return SimpleNamespace(
-        robot=setup.robot,
-        gait=setup.gait,
-        gains=gains,
-        parts=setup.parts.under(setup.law),
-        settings=settings,
+        robot=setup.robot, gait=setup.gait, gains=gains, parts=setup.parts, settings=settings
     )
 
 

@@ -302,8 +302,6 @@ class Scenario:
             "events": [_as_table(entry) for entry in self.events],
         }
         tail = {"sensors": _as_table(self.sensors), "compliance": _as_table(self.compliance)}
-        if self.compliance.suspension is None:  # TOML has no null
-            del tail["compliance"]["suspension"]
         tail |= {"variation": {} if self.variation is None else _as_table(self.variation)}
         tail |= {"outputs": _as_table(self.outputs), "parameters": dict(self.parameters)}
         return (

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import math
 import tomllib
-from dataclasses import asdict, replace
+from dataclasses import asdict
 from pathlib import Path
 
 import pytest
@@ -249,23 +249,11 @@ def test_faults_delays_switches_and_variations_are_read_and_written() -> None:
     )
 
 
-def test_every_part_of_the_compliance_is_a_switch_that_is_on_but_the_suspension() -> None:
+def test_every_part_of_the_compliance_is_a_switch_that_is_on() -> None:
     assert asdict(load_scenario("walk_flat").compliance) == asdict(Parts())
     for name in SWITCHES:
         parts = load_scenario("walk_flat", overrides=[f"compliance.{name}=false"]).compliance
-        assert parts == replace(Parts(), **{name: False})
-    assert {name for name in SWITCHES if not getattr(Parts(), name)} == {"suspension"}
-
-
-def test_the_suspension_is_that_of_the_control_unless_a_scenario_decides() -> None:
-    plain = load_scenario("walk_flat")
-    assert "suspension" not in plain.to_table()["compliance"]
-    assert plain.compliance.under("paper").suspension is True
-    assert plain.compliance.under("compliant").suspension is False
-    for text, law in (("true", "compliant"), ("false", "paper")):
-        given = load_scenario("walk_flat", overrides=[f"compliance.suspension={text}"])
-        assert str(given.to_table()["compliance"]["suspension"]).lower() == text
-        assert str(given.compliance.under(law).suspension).lower() == text
+        assert [key for key in SWITCHES if not getattr(parts, key)] == [name]
 
 
 def test_the_weight_of_the_squeeze_is_a_number_from_0_to_below_1() -> None:

@@ -289,7 +289,7 @@ def test_figures_are_those_of_the_package_for_legs_of_22_to_44_cm() -> None:
     half, double = (requirements_for(scaled_robot(robot, by)) for by in (0.5, 2.0))
     assert half.height_limit == pytest.approx(0.010 * 0.16 / 0.22)
     assert double.height_limit == pytest.approx(0.010 * 0.64 / 0.44)
-    assert double.handover_time == pytest.approx(0.080 * (0.64 / 0.44) ** 0.5)
+    assert double.handover_time == pytest.approx(0.065 * (0.64 / 0.44) ** 0.5)
     assert requirements_for(scaled_robot(robot, 2.0), handover_time=0.04).handover_time == 0.04
 
 
