@@ -11,7 +11,7 @@ import ctypes as ct
 import os
 import threading
 from collections.abc import Mapping, Sequence
-from functools import cache
+from functools import cache, cached_property
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, Self
@@ -33,12 +33,15 @@ from hexapod_cosim.gym.plants import (
     start_height,
     surfaces,
 )
+from hexapod_cosim.gym.render import frame
+from hexapod_cosim.gym.scan import SPACING, GroundMaps, ground_maps
 from hexapod_cosim.gym.settings import BLOCKS, JOINTS, RATE, REASONS, TERMS, EnvSettings
 from hexapod_cosim.models import FmuError, HexapodError, Robot
 
 AUTORESET = ("next_step", "same_step", "disabled")  # hxAutoreset in C
 FAILED = REASONS.index("failed")
 MESSAGE_SIZE = 512
+GROUND = "terrain.grid"  # the parameter that chooses one of several grounds, from 1
 # outputs of the plant in the order of hxEnvPlace
 OUTPUTS = [
     *MEASURED["angle"],
@@ -81,6 +84,16 @@ class _Draws(ct.Structure):
     ]
 
 
+class _Ground(ct.Structure):
+    """hxEnvGround in C."""
+
+    _fields_ = [
+        ("height", _Pointer), ("place", _Pointer),
+        *((name, _Size) for name in ("count", "rows", "columns", "points", "draw")),
+        *((name, ct.c_double) for name in ("x0", "y0", "spacing", "clearance")),
+    ]  # fmt: skip
+
+
 class _Settings(ct.Structure):
     """hxEnvSettings in C."""
 
@@ -88,12 +101,13 @@ class _Settings(ct.Structure):
         ("plant", _Fmu), ("controller", _Fmu),
         *((name, _Pointer) for name in (
             "plant_output", "plant_input", "controller_input", "controller_output")),
-        ("draws", _Draws),
+        ("draws", _Draws), ("ground", _Ground),
         ("h", ct.c_double), ("substeps", _Size), ("length", _Size),
         ("stance", ct.c_double * JOINTS), ("action_scale", ct.c_double * JOINTS),
         ("action_limit", ct.c_double), ("observed", ct.c_double * 3 * len(BLOCKS)),
         ("clock", ct.c_double),
         ("command_low", ct.c_double * 3), ("command_high", ct.c_double * 3),
+        ("command_interval", _Size),
         ("push_interval", _Size), ("push_length", _Size), ("push_force", ct.c_double),
         ("upright", ct.c_double), ("belly_force", ct.c_double),
         ("weight", ct.c_double * len(TERMS)), ("width", ct.c_double * 2),
@@ -183,7 +197,7 @@ class Batch:
     def _open(self) -> None:
         """Exports and loads the FMUs, creates the environments and starts the threads."""
         robots = grounds(self.settings)
-        self.robot = robots[0]
+        self.robot, self._robots = robots[0], robots
         with TemporaryDirectory(prefix="hexapod-gym-") as folder:
             self._fmus.append(Fmu(export_plant(robots, Path(folder))))
             if self.settings.base != "stance":
@@ -219,7 +233,7 @@ class Batch:
         self.refused: NDArray[np.bool_] = np.zeros(count, bool)
         self.reason: NDArray[np.int32] = np.zeros(count, np.int32)
 
-    def _keep(self, values: Sequence[Any], dtype: type) -> int:
+    def _keep(self, values: Sequence[Any] | Array, dtype: type) -> int:
         """Returns the address of values that live as long as this object."""
         array: Array = np.array(values, dtype=dtype)
         self._kept.append(array)
@@ -252,6 +266,7 @@ class Batch:
             action_scale=(ct.c_double * JOINTS)(*[given.action_scale] * JOINTS),
             action_limit=1.0,
             clock=given.clock,
+            command_interval=round(given.command_interval * RATE),
             command_low=tuple(low for low, _ in commands),
             command_high=tuple(high for _, high in commands),
             push_interval=round(given.push_interval * RATE) if given.push_force else 0,
@@ -265,9 +280,34 @@ class Batch:
         )
         for place, name in enumerate(BLOCKS):
             native.observed[place][:] = np.broadcast_to(given.observation.get(name, 0.0), 3)
+        if "heights" in given.observation:
+            native.ground = self._ground()
         if len(self._fmus) > 1:
             self._add_controller(native)
         return native
+
+    @cached_property
+    def _maps(self) -> GroundMaps:
+        return ground_maps(self.settings, self._robots)
+
+    def _ground(self) -> _Ground:
+        """Returns the heights that robots observe, as C reads them."""
+        maps, places = self._maps, self.settings.places
+        names, number = self.drawn_names, GROUND
+        count, rows, columns = maps.height.shape
+        return _Ground(
+            height=self._keep(maps.height, np.float32),
+            place=self._keep(places, float),
+            count=count,
+            rows=rows,
+            columns=columns,
+            points=len(places),
+            draw=names.index(number) if number in names else len(names),
+            x0=maps.first,
+            y0=maps.first,
+            spacing=SPACING,
+            clearance=maps.clearance,
+        )
 
     def _add_controller(self, native: _Settings) -> None:
         """Adds the controller to the settings as C reads them."""
@@ -288,7 +328,7 @@ class Batch:
         if count > 1:
             height = start_height(robots)
             drawn |= {"initial.position[3]": (height, height, False)}
-            drawn |= {"terrain.grid": (1.0, float(count), True)}
+            drawn |= {GROUND: (1.0, float(count), True)}
         self.drawn_names = tuple(drawn)
         for name in drawn:
             self._check_parameter(name)
@@ -365,6 +405,11 @@ class Batch:
         values = np.zeros(len(OUTPUTS))
         self._library.hx_environments_values(self._handle(), index, values.ctypes.data)
         return dict(zip(OUTPUTS, values.tolist(), strict=True))
+
+    def frame(self, index: int) -> NDArray[np.uint8]:
+        """Returns a picture (360, 480, 3) of an environment's robot on its ground."""
+        number = int(self.drawn(index).get(GROUND, 1.0)) - 1
+        return frame(self.robot, self._maps, number, self.values(index))
 
     def _handle(self) -> int:
         if self._all is None:

@@ -14,9 +14,11 @@ from hexapod_cosim.models import HexapodError, unknown_name
 
 JOINTS = 18
 RATE = 50  # Hz  of actions
+MOST_PLACES = 10_000  # whose heights are observed
 BASES = ("stance", "kinematic", "compliant")  # what actions are added to
 
-# Blocks of an observation in their order, with their sizes (hxEnvBlock in C).
+# Blocks of an observation in their order, with their sizes (hxEnvBlock in C). The size of the
+# heights is the number of places that are scanned.
 BLOCKS: Mapping[str, int] = MappingProxyType(
     {
         "velocity": 3,
@@ -27,6 +29,7 @@ BLOCKS: Mapping[str, int] = MappingProxyType(
         "speed": JOINTS,
         "action": JOINTS,
         "clock": 2,
+        "heights": 0,
     }
 )
 # Terms of the reward in their order (hxEnvTerm in C), with the names that legged_gym uses where it
@@ -64,6 +67,8 @@ LEGGED_GYM: Mapping[str, Scale] = MappingProxyType(
         "action": 1.0,
     }
 )
+# The same with heights of the ground around the robot, as on legged_gym's uneven grounds.
+LEGGED_GYM_HEIGHTS: Mapping[str, Scale] = MappingProxyType({**LEGGED_GYM, "heights": 5.0})
 # What a robot can measure, and a clock: the observation of policies that are exported as FMUs
 # (policy_fmu/src/policy.c computes the same).
 MEASURABLE: Mapping[str, Scale] = MappingProxyType(
@@ -76,7 +81,11 @@ MEASURABLE: Mapping[str, Scale] = MappingProxyType(
     }
 )
 OBSERVATIONS: Mapping[str, Mapping[str, Scale]] = MappingProxyType(
-    {"legged_gym": LEGGED_GYM, "measurable": MEASURABLE}
+    {
+        "legged_gym": LEGGED_GYM,
+        "legged_gym_heights": LEGGED_GYM_HEIGHTS,
+        "measurable": MEASURABLE,
+    }
 )
 REWARDS: Mapping[str, float] = MappingProxyType(
     {
@@ -112,7 +121,12 @@ class EnvSettings:
     tracking_width: tuple[float, float] = (0.1, 0.25)  # m/s, rad/s  of the tracking terms
     clock: float = 1.5  # Hz
     duration: float = 20.0  # s  of an episode
-    command_vx: Range = (0.0, 0.15)  # m/s  drawn for each episode
+    # a grid of places around the torso whose heights are observed
+    scan_length: float = 0.8  # m  forward and back, from end to end
+    scan_width: float = 0.5  # m  to the sides
+    scan_spacing: float = 0.05  # m
+    command_interval: float = 0.0  # s  from one draw of the command to the next; 0: the episode
+    command_vx: Range = (0.0, 0.15)  # m/s
     command_vy: Range = (-0.05, 0.05)  # m/s
     command_yaw_rate: Range = (-0.3, 0.3)  # rad/s
     push_force: float = 0.0  # N    largest push on the torso; 0: none
@@ -137,22 +151,45 @@ class EnvSettings:
             check_range(f"randomise: {name}", given)
         if not all(math.isfinite(weight) for weight in self.rewards.values()):
             raise _refused("a weight of the reward", dict(self.rewards), "finite numbers")
-        for name in ("action_scale", "duration", "tolerance", "push_interval"):
+        for name in ("action_scale", "duration", "tolerance", "push_interval", "scan_spacing"):
             value = getattr(self, name)
             if not (math.isfinite(value) and value > 0.0):
                 raise _refused(name, value, "a finite number above 0")
+        for name in ("command_interval", "scan_length", "scan_width"):
+            value = getattr(self, name)
+            if not (math.isfinite(value) and value >= 0.0):
+                raise _refused(name, value, "a finite number, 0 or above")
+        if "heights" in self.observation and len(self.places) > MOST_PLACES:
+            raise _refused("scan_spacing", self.scan_spacing, f"at most {MOST_PLACES} places")
         if not self.observation:
             raise _refused("observation", "no blocks", f"some of {', '.join(BLOCKS)}")
 
     @property
     def size(self) -> int:
         """Number of values in an observation."""
-        return sum(size for name, size in BLOCKS.items() if name in self.observation)
+        scanned = len(self.places) if "heights" in self.observation else 0
+        return scanned + sum(size for name, size in BLOCKS.items() if name in self.observation)
+
+    @property
+    def places(self) -> list[tuple[float, float]]:
+        """Places (forward, left) [m] whose heights are observed: rows from back to front, each from
+        right to left.
+        """
+        along, across = (
+            symmetric(extent, self.scan_spacing) for extent in (self.scan_length, self.scan_width)
+        )
+        return [(x, y) for x in along for y in across]
 
     @property
     def steps(self) -> int:
         """Number of steps in a whole episode."""
         return max(round(self.duration * RATE), 1)
+
+
+def symmetric(extent: float, spacing: float) -> list[float]:
+    """Returns coordinates [m] with a spacing, symmetric about 0, within an extent."""
+    half = math.floor(0.5 * extent / spacing + 1e-9)
+    return [spacing * number for number in range(-half, half + 1)]
 
 
 def check_range(name: str, given: Range) -> None:

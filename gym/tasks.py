@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from types import MappingProxyType
 
-from hexapod_cosim.gym.settings import EnvSettings
+from hexapod_cosim.gym.settings import LEGGED_GYM_HEIGHTS, EnvSettings
 from hexapod_cosim.models import unknown_name
 
 FLAT = EnvSettings()
@@ -14,6 +14,7 @@ ROUGH = replace(
     FLAT,
     terrain={"kind": "rubble", "max_height": 0.03, "stone_size": 0.15},
     terrain_seeds=8,
+    observation=LEGGED_GYM_HEIGHTS,
     randomise={"friction.mu": (0.5, 0.9)},
 )
 SOIL = replace(FLAT, terrain={"kind": "sand", "soil": "dry_sand"}, pad_radius=0.025)

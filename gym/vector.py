@@ -13,8 +13,10 @@ from numpy.typing import NDArray
 from hexapod_cosim.gym.batch import Batch
 from hexapod_cosim.gym.environment import (
     LARGEST_SEED,
+    RENDER_MODES,
     action_space,
     checked,
+    checked_render_mode,
     observation_space,
 )
 from hexapod_cosim.gym.settings import JOINTS, RATE, REASONS, TERMS, changed
@@ -41,6 +43,7 @@ class HexapodVectorEnv(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDArr
         autoreset_mode: what follows the end of an episode.
         copy: whether `reset` and `step` return copies of observations, rewards and flags. Without,
             they return the arrays that the next call overwrites.
+        render_mode: "rgb_array" for `render`.
 
     A robot whose action is not finite does not step: `info["refused"]` marks it, its observation
     stays and its reward is 0. The info of a step also has `terms`, the weighted terms of the reward
@@ -55,12 +58,18 @@ class HexapodVectorEnv(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDArr
         threads: int | None = None,
         autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
         copy: bool = True,
+        render_mode: str | None = None,
         **changes: Any,
     ) -> None:
         mode = AutoresetMode(autoreset_mode)
         self.settings = changed(task_settings(task), changes)
         self.num_envs, self._copy, self._mode = num_envs, copy, mode
-        self.metadata = {"autoreset_mode": mode, "render_modes": [], "render_fps": RATE}
+        self.render_mode = checked_render_mode(render_mode)
+        self.metadata = {
+            "autoreset_mode": mode,
+            "render_modes": list(RENDER_MODES),
+            "render_fps": RATE,
+        }
         self.single_action_space = action_space()
         self.single_observation_space = observation_space(self.settings)
         self.action_space = batch_space(self.single_action_space, num_envs)
@@ -131,6 +140,12 @@ class HexapodVectorEnv(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDArr
                 info["final_obs"] = self._given(batch.last)
                 info["_final_obs"] = ended
         return info
+
+    def render(self) -> tuple[NDArray[np.uint8], ...] | None:
+        """Returns a picture (360, 480, 3) of each robot, None without a render mode."""
+        if self.render_mode is None:
+            return None
+        return tuple(self._batch.frame(index) for index in range(self.num_envs))
 
     def _given(self, array: NDArray[Any]) -> NDArray[Any]:
         return array.copy() if self._copy else array

@@ -32,8 +32,15 @@ from wheel.wheelfile import WheelFile
 
 from hexapod_cosim.cosim.common.components import CONTROLLER, PLANT, POLICY
 from hexapod_cosim.cosim.common.plant_files import LOOP, fmi_headers
-from hexapod_cosim.cosim.export.cross_build import TARGETS, Library, build_library
+from hexapod_cosim.cosim.export.cross_build import (
+    ALL_TARGETS,
+    COMPONENT,
+    TARGETS,
+    Library,
+    build_library,
+)
 from hexapod_cosim.cosim.export.platforms import component_library
+from hexapod_cosim.cosim.export.wasm_component import build_component
 from hexapod_cosim.cosim.live.module import walker_module
 
 ROOT = Path(__file__).parents[1]
@@ -111,13 +118,20 @@ def common_files(wheel: Path) -> dict[str, bytes]:
 
 
 def cross_compile() -> dict[tuple[str, str], bytes]:
-    """Compiles all three FMUs' binaries and the loop for all targets, by library and target."""
+    """Compiles all three FMUs' binaries and the loop for all targets, by library and target, and
+    the FMUs' WebAssembly components.
+    """
     components = (PLANT, CONTROLLER, POLICY)
     libraries = [*map(component_library, components), loop_library()]
     jobs = [(library, target) for target in TARGETS for library in libraries]
     with ThreadPoolExecutor(os.cpu_count()) as pool:
-        built = list(pool.map(lambda job: build_library(*job), jobs))
-    return {(job[0].name, job[1]): data for job, data in zip(jobs, built, strict=True)}
+        built = pool.map(lambda job: build_library(*job), jobs)
+        made = pool.map(build_component, components)
+        found = {(job[0].name, job[1]): data for job, data in zip(jobs, built, strict=True)}
+        named = {
+            (one.identifier, COMPONENT): data for one, data in zip(components, made, strict=True)
+        }
+        return found | named
 
 
 def loop_library() -> Library:
@@ -147,7 +161,7 @@ def write_wheel(
     members = dict(base)
     members[description] = wheel_description(base[description], platform.tag)
     for (library, target), data in binaries.items():
-        suffix = TARGETS[target].suffix
+        suffix = ALL_TARGETS[target].suffix
         if library != LOOP:
             members[f"{BINARIES}{target}/{library}{suffix}"] = data
         elif target == platform.target:

@@ -12,7 +12,7 @@ import os
 import subprocess
 import tempfile
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cache
 from importlib import metadata, util
 from pathlib import Path
@@ -73,7 +73,15 @@ WEB_ASSEMBLY = Target(
     "generic+simd128+bulk_memory+nontrapping_fptoint",
     ("-mexec-model=reactor",),
 )
-ALL_TARGETS = {**TARGETS, BROWSER: WEB_ASSEMBLY}
+# the core module of an FMU's component (wasm_component.py): only what its sources export by name
+COMPONENT = "wasm32-wasip2"
+ALL_TARGETS = {
+    **TARGETS,
+    BROWSER: WEB_ASSEMBLY,
+    COMPONENT: replace(
+        WEB_ASSEMBLY, link=tuple(one for one in WEB_ASSEMBLY.link if "dynamic" not in one)
+    ),
+}
 
 
 @dataclass(frozen=True)

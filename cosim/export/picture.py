@@ -1,4 +1,4 @@
-"""Draws a robot for model.png and the icon of its FMU.
+"""Draws a robot: for model.png and the icon of its FMU, and for frames of a walk.
 
 Links are capsules, the torso is a box; their intersections with rays parallel to the line of sight
 are calculated in closed form. All coordinates are in camera axes (x right, y up, z towards the
@@ -147,10 +147,12 @@ def draw_robot(robot: Robot, *, width: int, height: int) -> bytes:
 
     Width and height are in pixels. Raises RobotError when the robot cannot stand.
     """
-    camera = _camera()
-    capsules, box = _shapes(robot, camera)
+    camera = camera_axes()
+    capsules, box = robot_shapes(robot, *settled(robot), camera)
     x, y = _grid(capsules, box, width * SAMPLES, height * SAMPLES)
-    colour = _shade(capsules, box, camera, x, y)
+    colour = np.zeros((*x.shape, 4))
+    colour[..., 3] = SHADOW * shadow_depth(capsules, box, camera, x, y)
+    draw_shapes([box, *capsules], camera, x, y, colour, np.full_like(x, -np.inf))
     colour[..., :3] *= colour[..., 3:]
     mean = colour.reshape(height, SAMPLES, width, SAMPLES, 4).mean(axis=(1, 3))
     mean[..., :3] /= np.fmax(mean[..., 3:], 1e-9)
@@ -161,7 +163,7 @@ def draw_robot(robot: Robot, *, width: int, height: int) -> bytes:
     return data.getvalue()
 
 
-def _camera() -> Array:
+def camera_axes() -> Array:
     """Returns the camera axes (rows) in world axes."""
     toward = np.array(
         [
@@ -174,9 +176,14 @@ def _camera() -> Array:
     return np.array([right, np.cross(toward, right), toward])
 
 
-def _shapes(robot: Robot, camera: Array) -> tuple[list[Capsule], Box]:
-    """Returns links and torso of the standing robot in camera axes."""
-    position, quaternion, angle = settled(robot)
+def robot_shapes(
+    robot: Robot, position: Array, quaternion: Array, angle: Array, camera: Array
+) -> tuple[list[Capsule], Box]:
+    """Returns links and torso in camera axes.
+
+    position: (3,) of the torso's centre of mass [m]; quaternion: (4,) torso to world; angle: (6, 3)
+    of the joints [rad].
+    """
     bodies = body_states(
         robot, position, quaternion, np.zeros(3), np.zeros(3), angle, np.zeros_like(angle)
     )
@@ -191,7 +198,7 @@ def _shapes(robot: Robot, camera: Array) -> tuple[list[Capsule], Box]:
         capsules.append(
             Capsule(camera @ start, camera @ (start + turn @ np.array(link.tip)), radius, colour)
         )
-    turn = rotation_matrix(quaternion)
+    turn = rotation_matrix(bodies[0, 3:7])
     middle = position - turn @ np.array(robot.torso.com)
     return capsules, Box(
         camera @ middle, camera @ turn, 0.5 * np.array(robot.torso.size), COLOURS["torso"]
@@ -210,20 +217,17 @@ def _grid(capsules: Sequence[Capsule], box: Box, width: int, height: int) -> tup
     return np.meshgrid(x, y)
 
 
-def _shade(capsules: Sequence[Capsule], box: Box, camera: Array, x: Array, y: Array) -> Array:
-    """Returns colours (height, width, 4) from 0 to 1: the nearest surfaces, and shadows on the
-    ground.
+def draw_shapes(
+    shapes: Iterable[Shape], camera: Array, x: Array, y: Array, colour: Array, nearest: Array
+) -> None:
+    """Draws shapes over a picture, where they are nearer to the eye than what it shows.
+
+    colour: (height, width, 4) from 0 to 1; nearest: (height, width) z of what is shown.
     """
-    colour = np.zeros((*x.shape, 4))
-    colour[..., 3] = SHADOW * _shadow(capsules, box, camera, x, y)
-    nearest = np.full_like(x, -np.inf)
-    shapes: list[Shape] = [box, *capsules]
     for shape in shapes:
         part = _window(shape.extent(), x, y)
         z, normal = shape.meet(x[part], y[part])
-        light = AMBIENT + (1.0 - AMBIENT) * np.fmax(
-            np.tensordot(camera @ LIGHT, normal, axes=1), 0.0
-        )
+        light = lit(np.tensordot(camera @ LIGHT, normal, axes=1))
         seen = z > nearest[part]
         nearest[part][seen] = z[seen]
         colour[part][seen] = np.append(
@@ -231,7 +235,12 @@ def _shade(capsules: Sequence[Capsule], box: Box, camera: Array, x: Array, y: Ar
             np.ones((int(seen.sum()), 1)),
             axis=1,
         )
-    return colour
+
+
+def lit(cosine: Array) -> Array:
+    """Returns the brightness of a surface from the cosine of its angle to the light."""
+    brightness: Array = AMBIENT + (1.0 - AMBIENT) * np.fmax(cosine, 0.0)
+    return brightness
 
 
 def _window(extent: Extent, x: Array, y: Array) -> tuple[slice, slice]:
@@ -242,8 +251,8 @@ def _window(extent: Extent, x: Array, y: Array) -> tuple[slice, slice]:
     return slice(int(rows[0]), int(rows[1])), slice(int(columns[0]), int(columns[1]))
 
 
-def _shadow(capsules: Iterable[Capsule], box: Box, camera: Array, x: Array, y: Array) -> Array:
-    """Returns the depth of the shadow on the ground at each sample, from 0 to 1."""
+def shadow_depth(capsules: Iterable[Capsule], box: Box, camera: Array, x: Array, y: Array) -> Array:
+    """Returns the depth of the shadow on the plane z = 0 at each sample, from 0 to 1."""
     up, lamp = camera[:, 2], camera @ LIGHT
     spine = box.axes[:, 0] * (box.half[0] - box.half[1])
     body = Capsule(box.centre - spine, box.centre + spine, float(box.half[1]), box.colour)

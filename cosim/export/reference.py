@@ -1,6 +1,7 @@
 """Calculates the reference results inside an FMU, which importers can compare with.
 
-The files are those of the FMI cross-check: NAME_in.csv, NAME_ref.csv, NAME_ref.opt. The inputs (a
+The files are those of the FMI cross-check: NAME_in.csv, NAME_ref.csv, NAME_ref.opt. They are where
+the layered standard fmi-ls-ref (1.0.0-alpha.1) has related files, with its manifest. The inputs (a
 force on the torso, two moving joints) are sampled at every communication step, so that results do
 not depend on the importer's interpolation. The outputs depend on the state only, so that they may
 be read before or after the next inputs are set.
@@ -15,7 +16,17 @@ from pathlib import Path
 from hexapod_cosim.cosim.interface.interface import Interface
 from hexapod_cosim.cosim.master.fmu import Fmu
 
-FOLDER = "documentation/reference"
+STANDARD, STANDARD_VERSION = "org.fmi-standard.fmi-ls-ref", "1.0.0-alpha.1"
+ABOUT_STANDARD = "Layered Standard providing information on related files included in an FMU."
+FOLDER = f"extra/{STANDARD}"
+MANIFEST = f"{FOLDER}/fmi-ls-manifest.xml"
+MANIFEST_NAMESPACE = "http://fmi-standard.org/fmi-ls-manifest"
+# type, ending of the name, role in the standard, description
+FILES = (
+    ("text/csv", "in.csv", "testcase", "Inputs at every communication point"),
+    ("text/csv", "ref.csv", "result", "Outputs where the FMU was packed"),
+    ("text/csv", "ref.opt", "configuration", "Start, stop, step, relative tolerance"),
+)
 STEP, STEPS = 0.01, 100  # s, 1
 PUSH = 0.05  # amplitude, of the robot's weight
 SWING = 0.05  # rad, amplitude of the moving joints
@@ -39,7 +50,7 @@ DIGITS = 12
 
 
 def reference_members(interface: Interface, fmu: Path) -> dict[str, bytes]:
-    """Runs an FMU and returns the three files by their path in the archive.
+    """Runs an FMU and returns the three files and their manifest by path in the archive.
 
     Raises FmuError when it does not run.
     """
@@ -57,7 +68,24 @@ def reference_members(interface: Interface, fmu: Path) -> dict[str, bytes]:
         f"{start}_ref.opt": "".join(
             f"{name},{value!r}\n" for name, value in options.items()
         ).encode(),
+        MANIFEST: manifest(interface.robot.name),
     }
+
+
+def manifest(name: str) -> bytes:
+    """Returns the standard's manifest of the three files."""
+    related = "".join(
+        f'  <Related type="{kind}" source="{name}_{ending}" role="{role}"\n'
+        f'    description="{about}"/>\n'
+        for kind, ending, role, about in FILES
+    )
+    return (
+        '<?xml version="1.0" encoding="UTF-8"?>\n'
+        f'<fmiReferences xmlns:fmi-ls="{MANIFEST_NAMESPACE}"\n'
+        f'  fmi-ls:fmi-ls-name="{STANDARD}"\n'
+        f'  fmi-ls:fmi-ls-version="{STANDARD_VERSION}"\n'
+        f'  fmi-ls:fmi-ls-description="{ABOUT_STANDARD}">\n{related}</fmiReferences>\n'
+    ).encode()
 
 
 def input_names() -> tuple[str, ...]:

@@ -10,6 +10,7 @@ from hexapod_cosim.models import HexapodError
 
 NAME = "walker"
 CONTROLLER_ROBOT = "controller_fmu/generated/defaults.c"  # wasm/controller_defaults.c says why
+OWN_FILES = ("controller_defaults.c", "walker.c", "walker.h")
 _TREE = Path(__file__).resolve().parents[2]
 
 
@@ -46,7 +47,7 @@ def walker_library() -> Library:
         for path in (folder / "include" / "hexapod").glob("*.h"):
             found[f"hexapod/{path.name}"] = path
         found[f"{component}/generated/defaults.c"] = folder / "generated" / "defaults.c"
-    found |= {f"wasm/{path.name}": path for path in (_TREE / "wasm").glob("*.[ch]")}
+    found |= {f"wasm/{name}": _TREE / "wasm" / name for name in OWN_FILES}
     return Library(
         NAME, dict(sorted(found.items())), flags=("-DHX_SHARED",), included=(CONTROLLER_ROBOT,)
     )

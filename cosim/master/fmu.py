@@ -116,6 +116,7 @@ class Fmu:
         self.path = Path(path)
         self.description = read_description(self.path)
         self.variables = {variable.name: variable for variable in self.description.modelVariables}
+        self._names: dict[tuple[str, str], list[str]] = {}  # by causality and type
         self._logged = FmuLog()
         self._log = self._logged.messages
         self.clear_log = self._log.clear  # called before each call: errors quote new messages only
@@ -220,11 +221,14 @@ class Fmu:
 
     def names(self, causality: str, kind: str = "Real") -> list[str]:
         """Names of all variables of a causality and FMI type, in model description order."""
-        return [
-            name
-            for name, variable in self.variables.items()
-            if variable.causality == causality and variable.type == kind
-        ]
+        key = causality, kind
+        if key not in self._names:
+            self._names[key] = [
+                name
+                for name, variable in self.variables.items()
+                if (variable.causality, variable.type) == key
+            ]
+        return list(self._names[key])
 
     def references(self, names: Sequence[str]) -> list[int]:
         """Value references by name. Raises FmuError for a name the FMU lacks."""

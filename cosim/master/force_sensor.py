@@ -11,10 +11,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from hexapod_cosim.cosim.scenario.records import FAULTS
+from hexapod_cosim.cosim.master.faulty_sensors import FaultySensors
+from hexapod_cosim.cosim.scenario.schedule import SensorFaults
 from hexapod_cosim.models import LEG_NAMES
 
-DEAD, STUCK, NAN = (FAULTS.index(name) + 1 for name in ("dead", "stuck", "nan"))
+NO_CONTACT = (0.0, 0.0, 0.0, 0.0)  # N, N, N, contact
+NO_NUMBERS = (np.nan, np.nan, np.nan, 0.0)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -24,7 +26,7 @@ class SensorSettings:
     noise: float = 0.0  # 1    standard deviation, as a share of the force
     seed: int = 0  # of the noise
     delay: int = 0  # macro-steps; until the first delayed reading, the first reading holds
-    faults: NDArray[np.int8] | None = None  # (steps + 1, 6) 0: none, else 1 + index in FAULTS
+    faults: SensorFaults | None = None
 
 
 def noise_factors(settings: SensorSettings, count: int) -> NDArray[np.float64] | None:
@@ -50,7 +52,8 @@ class ForceSensor:
         self.force, self.contact = np.zeros((legs, 3)), np.zeros(legs, dtype=np.bool_)
         self._forces = np.zeros((delay + 1, legs, 3))  # ring buffers of the last readings
         self._contacts = np.zeros((delay + 1, legs), dtype=np.bool_)
-        self._noise, self._faults = settings.noise, settings.faults
+        self._noise, faults = settings.noise, settings.faults
+        self._faulty = None if faults is None else FaultySensors(faults, NO_CONTACT, NO_NUMBERS)
         self._generator = np.random.default_rng(settings.seed)
         self._count = 0
 
@@ -69,11 +72,9 @@ class ForceSensor:
         self._count = k + 1
 
     def _apply_faults(self, force: NDArray[np.float64], contact: NDArray[np.bool_]) -> None:
-        if self._faults is None:
+        if self._faulty is None:
             self.force[...], self.contact[...] = force, contact
             return
-        fault = self._faults[self._count]
-        alive, dead = (fault != STUCK) | (self._count == 0), fault == DEAD
-        self.force[alive], self.contact[alive] = force[alive], contact[alive]
-        self.force[dead], self.contact[dead] = 0.0, False
-        self.force[fault == NAN], self.contact[fault == NAN] = np.nan, False
+        self._faulty.read(np.column_stack([force, contact]))
+        self.force[...] = self._faulty.reading[:, :3]
+        self.contact[...] = self._faulty.reading[:, 3] != 0.0

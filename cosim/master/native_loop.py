@@ -75,7 +75,7 @@ class _Table(ct.Structure):
     _fields_ = [
         ("column", _Pointer),
         ("columns", _Size),
-        ("row", _Pointer),
+        ("first", _Pointer),
         ("stride", _Size),
         ("rows", _Size),
     ]
@@ -292,7 +292,7 @@ class NativeMaster:
         kept = _allocate_rows(master.kept, self.columns, schedule, every)
         judged = _allocate_rows(master.judged, self._judged, schedule, 1) if every > 1 else None
         if judged is None:
-            master.judged.row = None
+            master.judged.first = None
         self._value[:] = 0.0
         arrays = self._point_to_run(schedule, sensor)
         master.h, master.every = h, every
@@ -330,7 +330,7 @@ class NativeMaster:
             parts = {
                 "memory": np.zeros((sensor.delay + 1, len(FORCE))),
                 "factor": noise_factors(sensor, count),
-                "fault": sensor.faults,
+                "fault": None if sensor.faults is None else sensor.faults.kind,
             }
         master.sensor = _Sensor(
             **{name: array.ctypes.data for name, array in parts.items() if array is not None},
@@ -379,11 +379,14 @@ class NativeMaster:
 def _allocate_rows(
     table: _Table, columns: Sequence[str], schedule: Schedule, every: int
 ) -> NDArray[np.float64]:
-    """Allocates the rows of a table, fills times and commands, and points the table to them."""
+    """Allocates the rows of a table, fills times and commands, and points the table to them.
+
+    Columns adjoin in memory, because metrics read columns.
+    """
     moments = kept_moments(len(schedule.rows), every)
-    data = np.empty((len(moments), 1 + len(columns) + len(COMMAND_COLUMNS)))
+    data = np.empty((len(moments), 1 + len(columns) + len(COMMAND_COLUMNS)), order="F")
     data[:, 0], data[:, 1 + len(columns) :] = schedule.times[moments], schedule.rows[moments]
-    table.row, table.stride = data.ctypes.data + data.itemsize, data.shape[1]
+    table.first, table.stride = data.ctypes.data + data.strides[1], len(moments)
     return data
 
 

@@ -22,6 +22,7 @@ from hexapod_cosim.cosim.interface.names import (
     joint_names,
     vector_names,
 )
+from hexapod_cosim.cosim.master.faulty_sensors import InnerSensors
 from hexapod_cosim.cosim.master.force_sensor import ForceSensor
 from hexapod_cosim.cosim.master.protocols import Plant
 from hexapod_cosim.cosim.scenario.records import SERVO_FAULTS
@@ -46,7 +47,8 @@ DEAD, STUCK = (SERVO_FAULTS.index(name) + 1 for name in ("dead", "stuck"))
 class Signals:
     """The plant's blocks of variables and array views of them.
 
-    `sensor` models the feet's force sensors; None means ideal ones.
+    `sensor` models the feet's force sensors, `inner` those of joints and attitude; None means ideal
+    ones.
 
     Attributes: `names` and `values` of the whole row, flags as 0 and 1; its blocks `outputs`,
     `flags` and `inputs`; `measurement`, which the controller reads; `push` (6,), which the loop
@@ -54,7 +56,13 @@ class Signals:
     present macro-step, which the loop sets: 0 none, else 1 + index in SERVO_FAULTS.
     """
 
-    def __init__(self, plant: Plant, *, sensor: ForceSensor | None = None) -> None:
+    def __init__(
+        self,
+        plant: Plant,
+        *,
+        sensor: ForceSensor | None = None,
+        inner: InnerSensors | None = None,
+    ) -> None:
         outputs, inputs = plant.names("output"), plant.names("input")
         flags = plant.names("output", "Boolean")
         check_plant_variables(outputs, inputs, flags)
@@ -78,7 +86,7 @@ class Signals:
         self._acceleration_ref = accelerations.reshape(-1, LEGS, JOINTS)
         self._contact = np.zeros(LEGS, dtype=bool)
         self._touching = self.flags.values[:LEGS]
-        self._sensor = sensor
+        self._sensor, self._inner = sensor, inner
         self.measurement = self._make_measurement()
         self.servo_faults: NDArray[np.int8] | None = None
         self._stuck = np.zeros((LEGS, JOINTS), dtype=bool)  # in the last macro-step
@@ -90,13 +98,16 @@ class Signals:
             views[key] = self.outputs.values[begin : begin + len(names)]
             begin += len(names)
         self._force = views["foot_force"].reshape(LEGS, len(AXES))
+        self._angle, self._speed = (views[key].reshape(LEGS, JOINTS) for key in ("angle", "speed"))
+        self._torso = views["quaternion"], views["angular_velocity"]
+        inner = self._inner
         return Measurement(
-            angle=views["angle"].reshape(LEGS, JOINTS),
-            speed=views["speed"].reshape(LEGS, JOINTS),
+            angle=self._angle if inner is None else inner.angle,
+            speed=self._speed if inner is None else inner.speed,
             foot_force=self._force if self._sensor is None else self._sensor.force,
             contact=self._contact if self._sensor is None else self._sensor.contact,
-            quaternion=views["quaternion"],
-            angular_velocity=views["angular_velocity"],
+            quaternion=self._torso[0] if inner is None else inner.quaternion,
+            angular_velocity=self._torso[1] if inner is None else inner.angular_velocity,
         )
 
     def read(self) -> None:
@@ -107,6 +118,8 @@ class Signals:
         self._flag_row[...] = self.flags.values
         if self._sensor is not None:
             self._sensor.read(self._force, self._touching)
+        if self._inner is not None:
+            self._inner.read(self._angle, self._speed, *self._torso)
 
     def write(self, command: JointCommand) -> None:
         """Writes a joint command and the present push to the plant's inputs."""
@@ -123,15 +136,15 @@ class Signals:
         self.inputs.set()
 
     def _break_servos(self, fault: NDArray[np.int8]) -> None:
-        """Replaces the commands of servos with faults."""
+        """Replaces the commands of servos with faults. Servos know the true angles."""
         dead, stuck = fault == DEAD, fault == STUCK
-        angle, broken = self.measurement.angle, dead | stuck
+        angle, broken = self._angle, dead | stuck
         begun = stuck & ~self._stuck
         self._stuck, self._stuck_at[begun] = stuck, angle[begun]
         self._angle_ref[stuck] = self._stuck_at[stuck]
         self._speed_ref[stuck] = 0.0
         self._angle_ref[dead] = angle[dead]
-        self._speed_ref[dead] = self.measurement.speed[dead]
+        self._speed_ref[dead] = self._speed[dead]
         self._torque_ref[broken] = 0.0
         self._acceleration_ref[:, broken] = 0.0
 

@@ -12,7 +12,7 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
-from hexapod_cosim.cosim.interface.names import vector_names
+from hexapod_cosim.cosim.interface.names import joint_names, vector_names
 from hexapod_cosim.cosim.master.recorder import Recording
 from hexapod_cosim.models import JOINT_NAMES, LEG_NAMES
 
@@ -97,7 +97,7 @@ def centre_of_mass(recording: Recording, parameters: Mapping[str, float]) -> Arr
 
     It follows from joint angles, torso pose and the FMU's parameters.
     """
-    angle = np.ascontiguousarray(recording.joints("angle").transpose(2, 1, 0))  # (3, 6, rows)
+    angle = recording.columns(joint_names("angle")).T.reshape(len(LEG_NAMES), len(JOINT_NAMES), -1)
     # mass [kg] and first moment [kg m] of the links from this joint on, about the joint
     borne, moment = np.zeros(len(LEG_NAMES)), np.zeros((len(LEG_NAMES), 3, 1))
     for k, joint in reversed(list(enumerate(JOINT_NAMES))):
@@ -107,7 +107,7 @@ def centre_of_mass(recording: Recording, parameters: Mapping[str, float]) -> Arr
             for part in (("mass",), vector_names("com"), vector_names("axis"))
         )
         tip = _of_links(parameters, links, ("length", "offset_y", "offset_z"))
-        moment = _turned(axis, angle[k], moment + (mass * com + borne[:, None] * tip)[..., None])
+        moment = _turned(axis, angle[:, k], moment + (mass * com + borne[:, None] * tip)[..., None])
         borne = borne + mass[:, 0]
     offset = _vector(parameters, "torso.com")
     hips = np.array([_vector(parameters, f"{leg}.hip_position") - offset for leg in LEG_NAMES])

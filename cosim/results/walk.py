@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -78,10 +78,8 @@ class Walk:
 
     def gained(self, names: list[str]) -> Array:
         """Returns the growth of cumulative outputs (names,) from begin to end, interpolated."""
-        columns, time = self.whole.columns(names), self.whole.time
-        return np.array(
-            [np.diff(np.interp([self.begin, self.end], time, each))[0] for each in columns.T]
-        )
+        begin, end = (_values_at(self.whole, names, t) for t in (self.begin, self.end))
+        return end - begin
 
     def rms(self, values: Array) -> float:
         """Returns the RMS deviation of values (rows,) from their mean over time."""
@@ -91,6 +89,17 @@ class Walk:
         """Returns the rows of the whole run after begin, up to end."""
         first, last = np.searchsorted(self.whole.time, np.array([self.begin, self.end]) + ROUND_OFF)
         return slice(int(first), int(last))
+
+
+def _values_at(recording: Recording, names: Sequence[str], t: float) -> Array:
+    """Returns variables (names,) at a time of the recording, by linear interpolation."""
+    time = recording.time
+    before = int(np.searchsorted(time, t, side="right")) - 1
+    if before == len(time) - 1:  # the time is rounded, and the last row may be before it
+        last: Array = recording.rows(slice(before, None)).columns(names)[0]
+        return last
+    (low, high), first = recording.rows(slice(before, before + 2)).columns(names), time[before]
+    return np.asarray((high - low) / (time[before + 1] - first) * (t - first) + low)
 
 
 def time_shares(time: Array) -> Array:
@@ -160,8 +169,14 @@ def _ways(part: Recording, yaw: Array, marks: Array) -> tuple[float, float]:
 
 def robot_weight(parameters: Mapping[str, float]) -> float:
     """Returns the weight [N] of the robot that an FMU's parameters describe."""
-    mass = sum(value for name, value in parameters.items() if name.endswith(".mass"))
+    mass = sum(parameters[name] for name in _masses(tuple(parameters)))
     return float(mass * np.linalg.norm([parameters[name] for name in vector_names("gravity")]))
+
+
+@lru_cache(maxsize=16)
+def _masses(names: tuple[str, ...]) -> tuple[str, ...]:
+    """Returns which of an FMU's parameters are masses."""
+    return tuple(name for name in names if name.endswith(".mass"))
 
 
 def held_integral(time: Array, rate: Array) -> Array:
@@ -261,4 +276,9 @@ def real_feet(recording: Recording, parameters: Mapping[str, float]) -> Array:
     )
     arms = centres - recording.vector("torso.position")[:, None, :]
     com = np.array([parameters[name] for name in vector_names("torso.com")])
-    return np.asarray(np.einsum("jir,rlj->rli", turn, arms) + com)
+    along = arms.transpose(2, 1, 0)  # (3, 6, rows)
+    seen = [
+        turn[0, i] * along[0] + turn[1, i] * along[1] + turn[2, i] * along[2] + com[i]
+        for i in range(3)
+    ]
+    return np.array(seen).transpose(2, 1, 0)

@@ -26,6 +26,7 @@ from hexapod_cosim.cosim.control.controllers import (
 from hexapod_cosim.cosim.interface.controller_interface import ControllerSetup
 from hexapod_cosim.cosim.interface.interface import plant_roots
 from hexapod_cosim.cosim.interface.start_values import parameter_values
+from hexapod_cosim.cosim.master.faulty_sensors import InnerSensors
 from hexapod_cosim.cosim.master.fmu import Fmu
 from hexapod_cosim.cosim.master.force_sensor import ForceSensor, SensorSettings
 from hexapod_cosim.cosim.master.loop import COMPLETED, Outcome, Progress, diagnostic_columns, run
@@ -106,7 +107,11 @@ def simulate(
         make_controller(plan, law=law) as controller,
     ):
         parameters = initialise_plant(plant, plan)
-        signals = Signals(plant, sensor=make_sensor(scenario, plan.schedule))
+        signals = Signals(
+            plant,
+            sensor=make_sensor(scenario, plan.schedule),
+            inner=make_inner_sensors(plan.schedule),
+        )
         recorder = _make_recorder(plan, signals, controller)
         start_controller(controller, plant, plan)
         if begin is not None:
@@ -216,13 +221,13 @@ def initialise_plant(plant: Fmu, plan: RunPlan) -> dict[str, float]:
 
 def _check_measurements(plant: Fmu) -> None:
     """Raises FmuError when an FMU lacks the outputs that metrics are made of."""
-    missing = sorted(set(MEASURED_BY_PLANT) - set(plant.names("output")))
+    missing = [name for name in MEASURED_BY_PLANT if name not in plant.variables]
     if missing:
         fix = "export it again with `hexapod export`"
         expected = "the outputs that metrics are made of, which FMUs of earlier versions lack"
         raise FmuError(
             "an FMU without measurements",
-            got=f"no {missing[0]}",
+            got=f"no {min(missing)}",
             expected=expected,
             fix=fix,
             where=str(plant.path),
@@ -288,6 +293,12 @@ def make_sensor(scenario: Scenario, schedule: Schedule) -> ForceSensor | None:
     """Returns the model of the feet's force sensors; None when they have no errors."""
     settings = sensor_settings(scenario, schedule)
     return None if settings is None else ForceSensor(settings)
+
+
+def make_inner_sensors(schedule: Schedule) -> InnerSensors | None:
+    """Returns the sensors of joints and attitude with their faults; None when they have none."""
+    angle, attitude = schedule.angle_faults, schedule.attitude_faults
+    return None if angle is None and attitude is None else InnerSensors(angle, attitude)
 
 
 @contextmanager

@@ -97,9 +97,9 @@ class Walker:
     ) -> Result:
         """Runs a scenario, on the plant FMU `fmu` and with `gains` if given.
 
-        Arguments are those of run.simulate(), which runs scenarios with faults of servos, lost
-        commands and sensors that read NaN. Raises HexapodError when the run cannot start; how a
-        run that started ended is in the result.
+        Arguments are those of run.simulate(), which runs scenarios with faults that the loop in C
+        does not know (Scenario.has_loop_faults). Raises HexapodError when the run cannot start; how
+        a run that started ended is in the result.
         """
         control = control_of(scenario.control)
         if scenario.has_loop_faults:

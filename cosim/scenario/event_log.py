@@ -5,12 +5,27 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from hexapod_cosim.cosim.scenario.records import Event, Fault, Lost, Push, Scenario, ServoFault
+from hexapod_cosim.cosim.scenario.records import (
+    AngleFault,
+    AttitudeFault,
+    Event,
+    Fault,
+    Lost,
+    Push,
+    Scenario,
+    SensorFault,
+    ServoFault,
+)
 
 SENSOR_TEXTS = {
     "dead": "reads zero",
     "stuck": "repeats its last reading",
     "nan": "reads NaN",
+    "late": "is late by {delay:g} ms",
+}
+LOST_TEXTS = {
+    "command": "the joint commands are lost, and the last one holds",
+    "step": "macro-steps are dropped: the last readings and joint commands hold",
 }
 SERVO_TEXTS = {
     "dead": "is dead: it follows the joint without torque",
@@ -33,12 +48,23 @@ def describe_event(event: Event) -> str:
         case Push():
             text = f"a push of {_vector(event.force)} N and {_vector(event.torque)} N m"
         case Fault():
-            text = f"the force sensor of {event.leg} {SENSOR_TEXTS[event.fault]}"
+            text = f"the force sensor of {event.leg} {_reading(event)}"
+        case AngleFault():
+            text = f"the angle sensor of {event.leg}.{event.joint} {_reading(event)}"
+        case AttitudeFault():
+            text = f"the attitude sensor {_reading(event)}"
         case ServoFault():
             text = f"the servo of {event.leg}.{event.joint} {SERVO_TEXTS[event.fault]}"
         case Lost():
-            text = "the joint commands are lost, and the last one holds"
+            text = LOST_TEXTS[event.lost]
     return text if math.isinf(event.duration) else f"{text}, for {event.duration:g} s"
+
+
+def _reading(event: SensorFault) -> str:
+    """Returns what a faulty sensor reads."""
+    if isinstance(event, AttitudeFault) and event.fault == "dead":
+        return "reads level and at rest"
+    return SENSOR_TEXTS[event.fault].format(delay=1000.0 * event.delay)
 
 
 def _vector(values: tuple[float, ...]) -> str:

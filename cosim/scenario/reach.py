@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import astuple, fields
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,15 +33,22 @@ def check_commands(commands: Sequence[Command], robot: Robot, gait: Gait, *, whe
     ScenarioError, which names the largest command that the legs can follow.
     """
     for command in commands:
-        wanted = np.array(astuple(command)[1:])
-        if not _walks(wanted, robot, gait):
+        values = astuple(command)[1:]
+        if not _walks_cached(values, robot, gait):
+            wanted = np.array(values)
             place = f"{where} at time = {command.time:g} s" if len(commands) > 1 else where
             raise _reach_error(wanted, robot, gait, place)
 
 
 def reaches(commands: Sequence[Command], robot: Robot, gait: Gait) -> bool:
     """Returns whether check_commands() accepts the commands."""
-    return all(_walks(np.array(astuple(command)[1:]), robot, gait) for command in commands)
+    return all(_walks_cached(astuple(command)[1:], robot, gait) for command in commands)
+
+
+@lru_cache(maxsize=256)
+def _walks_cached(values: tuple[float, ...], robot: Robot, gait: Gait) -> bool:
+    """Returns `_walks` of a command's values from a cache: runs of a study share commands."""
+    return _walks(np.array(values), robot, gait)
 
 
 @np.errstate(over="ignore", invalid="ignore")

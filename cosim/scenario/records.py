@@ -25,9 +25,11 @@ from hexapod_cosim.models.schema import Choice, Number, Vector, specs
 
 CONTROLS = ("kinematic", "paper", "compliant")
 COMPARED = ("kinematic", "compliant")  # unless a command or a study names its controls
-FAULTS = ("dead", "stuck", "nan")  # of force sensors
+FAULTS = ("dead", "stuck", "nan", "late")  # of sensors
+ANGLE, ATTITUDE = "angle", "attitude"  # sensors inside the robot
 SERVO_FAULTS = ("dead", "stuck")
-LOST = ("command",)
+LOST = ("command", "step")
+DELAY = Number("s", at_least=0.0, at_most=1.0, default=0.0)  # of late readings
 FORMATS = ("parquet", "csv", "mcap")  # of recordings
 DEFAULT_FORMATS = ("parquet", "csv")
 SETTINGS: dict[str, type[Any]] = {
@@ -79,12 +81,43 @@ class Push:
 class Fault:
     """A fault of a foot's force sensor from `time` [s from the start of the run].
 
-    A dead sensor reads zero, a stuck one repeats its last reading, and nan is no number.
+    A dead sensor reads zero, a stuck one repeats its last reading, and nan is no number. A late one
+    reads what it should have read `delay` earlier, rounded up to whole macro-steps, or else at the
+    start of the run.
     """
 
     time: Annotated[float, Number("s", at_least=0.0)]
     leg: Annotated[str, Choice(LEG_NAMES)]
     fault: Annotated[str, Choice(FAULTS)]
+    delay: Annotated[float, DELAY] = 0.0
+    duration: Annotated[float, Number("s", above=0.0, default=math.inf)] = math.inf
+
+
+@dataclass(frozen=True, kw_only=True)
+class AngleFault:
+    """A fault of a joint's sensor, which gives angle and speed, as a `Fault`. The joint itself
+    moves as before.
+    """
+
+    time: Annotated[float, Number("s", at_least=0.0)]
+    leg: Annotated[str, Choice(LEG_NAMES)]
+    joint: Annotated[str, Choice(JOINT_NAMES)]
+    sensor: Annotated[str, Choice((ANGLE,))]
+    fault: Annotated[str, Choice(FAULTS)]
+    delay: Annotated[float, DELAY] = 0.0
+    duration: Annotated[float, Number("s", above=0.0, default=math.inf)] = math.inf
+
+
+@dataclass(frozen=True, kw_only=True)
+class AttitudeFault:
+    """A fault of the torso's sensor of attitude and rotation rate, as a `Fault`. A dead one reads
+    the level attitude with yaw 0, at rest.
+    """
+
+    time: Annotated[float, Number("s", at_least=0.0)]
+    sensor: Annotated[str, Choice((ATTITUDE,))]
+    fault: Annotated[str, Choice(FAULTS)]
+    delay: Annotated[float, DELAY] = 0.0
     duration: Annotated[float, Number("s", above=0.0, default=math.inf)] = math.inf
 
 
@@ -105,8 +138,11 @@ class ServoFault:
 
 @dataclass(frozen=True, kw_only=True)
 class Lost:
-    """Lost joint commands from `time` [s from the start of the run]: the controller is called, but
-    the servos keep the last command that arrived. The first command cannot be lost.
+    """Lost joint commands or dropped macro-steps from `time` [s from the start of the run].
+
+    Where commands are lost, the controller is called, but the servos keep the last command that
+    arrived. Where a whole macro-step is dropped, the readings do not arrive either: the controller
+    is called with the last ones, because its time goes on. The first macro-step cannot be lost.
     """
 
     time: Annotated[float, Number("s", above=0.0)]
@@ -114,7 +150,8 @@ class Lost:
     lost: Annotated[str, Choice(LOST)]
 
 
-Event = Push | Fault | ServoFault | Lost
+SensorFault = Fault | AngleFault | AttitudeFault
+Event = Push | SensorFault | ServoFault | Lost
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -220,8 +257,18 @@ class Scenario:
 
     @property
     def faults(self) -> tuple[Fault, ...]:
-        """The events that are faults of sensors."""
+        """The events that are faults of force sensors."""
         return tuple(event for event in self.events if isinstance(event, Fault))
+
+    @property
+    def angle_faults(self) -> tuple[AngleFault, ...]:
+        """The events that are faults of joint sensors."""
+        return tuple(event for event in self.events if isinstance(event, AngleFault))
+
+    @property
+    def attitude_faults(self) -> tuple[AttitudeFault, ...]:
+        """The events that are faults of the attitude sensor."""
+        return tuple(event for event in self.events if isinstance(event, AttitudeFault))
 
     @property
     def servo_faults(self) -> tuple[ServoFault, ...]:
@@ -230,15 +277,14 @@ class Scenario:
 
     @property
     def lost(self) -> tuple[Lost, ...]:
-        """The events that are lost commands."""
+        """The events that are lost commands or dropped macro-steps."""
         return tuple(event for event in self.events if isinstance(event, Lost))
 
     @property
     def has_loop_faults(self) -> bool:
         """Whether faults occur that the loop in Python alone knows."""
-        return bool(self.servo_faults or self.lost) or any(
-            event.fault == "nan" for event in self.faults
-        )
+        inner = self.servo_faults or self.lost or self.angle_faults or self.attitude_faults
+        return bool(inner) or any(event.fault in ("nan", "late") for event in self.faults)
 
     def to_table(self) -> dict[str, Any]:
         """Returns the scenario as the tables of an equivalent scenario file."""
@@ -275,9 +321,12 @@ KEYS = ("title", "robot", *PLAIN_KEYS, "seed", "gravity", "events", *SECTIONS)
 
 
 def _as_table(record: Any) -> dict[str, Any]:
-    """Returns the fields of a record, without an infinite duration, which TOML files omit."""
+    """Returns the fields of a record, without an infinite duration and a delay of 0, which files
+    omit.
+    """
+    table = {item.name: getattr(record, item.name) for item in fields(record)}
     return {
-        item.name: value
-        for item in fields(record)
-        if (value := getattr(record, item.name)) != math.inf
+        key: value
+        for key, value in table.items()
+        if value != math.inf and (key, value) != ("delay", 0.0)
     }

@@ -27,6 +27,8 @@ from hexapod_cosim.cosim.scenario.checks import check_interval, check_parameters
 from hexapod_cosim.cosim.scenario.controls import LAW, control_beside, read_control
 from hexapod_cosim.cosim.scenario.quantities import to_si
 from hexapod_cosim.cosim.scenario.records import (
+    ANGLE,
+    ATTITUDE,
     CONTROLS,
     DEFAULT_FORMATS,
     FORMATS,
@@ -42,6 +44,8 @@ from hexapod_cosim.cosim.scenario.records import (
     STANCES,
     UNUSED,
     WALK_KEYS,
+    AngleFault,
+    AttitudeFault,
     Command,
     Event,
     Fault,
@@ -49,6 +53,7 @@ from hexapod_cosim.cosim.scenario.records import (
     Outputs,
     Push,
     Scenario,
+    SensorFault,
     Sensors,
     ServoFault,
     Variation,
@@ -72,6 +77,7 @@ from hexapod_cosim.models.ground.table import (
 )
 from hexapod_cosim.models.records import STATIC_LAWS, Servo, Soil, Terrain
 from hexapod_cosim.models.schema import (
+    Choice,
     Number,
     expect_table,
     parse_toml,
@@ -401,15 +407,42 @@ def _read_events(value: Any) -> tuple[Event, ...]:
 
 
 def _read_event(table: Any, where: str) -> Event:
-    """Reads an event, whose keys tell what it is: `lost`, `joint` (of a servo), `leg` or `fault`
-    (of a force sensor), or else a push.
+    """Reads an event, whose keys tell what it is: `lost`, `sensor` (angle or attitude), `joint` (of
+    a servo), `leg` or `fault` (of a force sensor), or else a push.
     """
-    known = [key for kind in (Push, Fault, ServoFault, Lost) for key in specs(kind)]
+    kinds = (Push, Fault, AngleFault, AttitudeFault, ServoFault, Lost)
+    known = [key for kind in kinds for key in specs(kind)]
     refuse_unknown_keys(expect_table(table, where), list(dict.fromkeys(known)), where)
-    kind: type[Event] = Fault if {"leg", "fault"} & set(table) else Push
-    kind = ServoFault if "joint" in table else kind
-    event: Event = _record(Lost if "lost" in table else kind, table, where)
+    event: Event = _record(_kind_of_event(table, f"{where}.sensor"), table, where)
+    _check_delay(event, where)
     return event
+
+
+def _kind_of_event(table: Mapping[str, Any], where: str) -> type[Event]:
+    """Returns the record that the keys of an event belong to; `where` names its sensor."""
+    if "lost" in table:
+        return Lost
+    if "sensor" in table:
+        sensor = Choice((ANGLE, ATTITUDE)).read(table["sensor"], where)
+        return AngleFault if sensor == ANGLE else AttitudeFault
+    if "joint" in table:
+        return ServoFault
+    return Fault if {"leg", "fault"} & set(table) else Push
+
+
+def _check_delay(event: Event, where: str) -> None:
+    """Raises ScenarioError for a late reading without a delay, and for a delay of other faults."""
+    if not isinstance(event, SensorFault):
+        return
+    if (event.fault == "late") != (event.delay > 0.0):
+        late = event.fault == "late"
+        raise ScenarioError(
+            "a late reading without a delay" if late else "a delay of readings that are not late",
+            got=f"fault = {event.fault!r} and delay = {event.delay:g} s",
+            expected="a delay above 0 with the fault late, and none with others",
+            fix='add delay = "20 ms"' if late else "delete delay, or write fault = 'late'",
+            where=where,
+        )
 
 
 def _read_parts(table: Any, where: str) -> Parts:

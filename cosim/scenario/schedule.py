@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import astuple, dataclass
 from functools import cached_property
@@ -13,16 +14,30 @@ from hexapod_cosim.controller import BodyCommand
 from hexapod_cosim.cosim.scenario.records import (
     FAULTS,
     SERVO_FAULTS,
+    AngleFault,
+    AttitudeFault,
     Command,
     Fault,
     Lost,
     Push,
     Scenario,
+    SensorFault,
     ServoFault,
 )
 from hexapod_cosim.models import JOINT_NAMES, LEG_NAMES
 
 ROUND_OFF = 5e-10  # s    of the time of a macro-step
+
+
+STUCK = FAULTS.index("stuck") + 1
+
+
+@dataclass(frozen=True)
+class SensorFaults:
+    """Faults of n sensors, macro-step by macro-step."""
+
+    kind: NDArray[np.int8]  # (steps + 1, n) 0: none, else 1 + index in FAULTS
+    delay: NDArray[np.int32]  # (steps + 1, n) macro-steps, of late readings
 
 
 @dataclass(frozen=True)
@@ -35,11 +50,13 @@ class Schedule:
     rows: NDArray[np.float64]
     # (steps, 6) force [N] and torque [N m] on the torso, world axes; None: no pushes
     pushes: NDArray[np.float64] | None
-    # (steps + 1, 6) faults of the force sensors: 0 none, else 1 + index in FAULTS; None: no faults
-    faults: NDArray[np.int8] | None
+    faults: SensorFaults | None  # of the feet's force sensors, in the order of the legs
     # (steps + 1, 6, 3) faults of the servos: 0 none, else 1 + index in SERVO_FAULTS; None: none
     servo_faults: NDArray[np.int8] | None = None
     lost: NDArray[np.bool_] | None = None  # (steps + 1,) the command is lost; None: none are
+    # of the joints' sensors (18, leg by leg), of the attitude sensor (1)
+    angle_faults: SensorFaults | None = None
+    attitude_faults: SensorFaults | None = None
 
     @cached_property
     def commands(self) -> tuple[BodyCommand, ...]:
@@ -55,14 +72,24 @@ def make_schedule(scenario: Scenario) -> Schedule:
     begins, h = times[:-1], scenario.macro_step
     rows = command_rows(scenario.commands, begins)
     pushes = push_rows(scenario.pushes, begins, h) if scenario.pushes else None
-    faults = fault_rows(scenario.faults, times) if scenario.faults else None
+    dropped = lost_rows([event for event in scenario.lost if event.lost == "step"], times)
+    force, angle, attitude = (
+        fault_rows(faults, times, dropped, sensors)
+        for faults, sensors in (
+            (scenario.faults, len(LEG_NAMES)),
+            (scenario.angle_faults, len(LEG_NAMES) * len(JOINT_NAMES)),
+            (scenario.attitude_faults, 1),
+        )
+    )
     return Schedule(
         scenario.start + times,
         np.vstack([rows, rows[-1:]]),
         pushes,
-        faults,
+        force,
         servo_fault_rows(scenario.servo_faults, times) if scenario.servo_faults else None,
         lost_rows(scenario.lost, times) if scenario.lost else None,
+        angle,
+        attitude,
     )
 
 
@@ -89,15 +116,39 @@ def push_rows(events: Sequence[Push], times: NDArray[np.float64], h: float) -> N
     return rows
 
 
-def fault_rows(faults: Sequence[Fault], times: NDArray[np.float64]) -> NDArray[np.int8]:
-    """Returns the fault of each foot's force sensor at each time [s from the start] (times, 6).
+def fault_rows(
+    faults: Sequence[SensorFault],
+    times: NDArray[np.float64],
+    dropped: NDArray[np.bool_],
+    sensors: int,
+) -> SensorFaults | None:
+    """Returns the fault of each of `sensors` at each time [s from the start]; None without any.
 
-    Where several faults overlap, the last one in the list holds.
+    Where several faults overlap, the last one in the list holds. In a dropped macro-step (times,)
+    all sensors are stuck.
     """
-    rows = np.zeros((len(times), len(LEG_NAMES)), dtype=np.int8)
+    if not faults and not dropped.any():
+        return None
+    kind = np.zeros((len(times), sensors), dtype=np.int8)
+    delay = np.zeros((len(times), sensors), dtype=np.int32)
+    h = times[1] - times[0]
     for fault in faults:
-        rows[_span(fault, times), LEG_NAMES.index(fault.leg)] = FAULTS.index(fault.fault) + 1
-    return rows
+        place = _span(fault, times), _sensor(fault)
+        kind[place] = FAULTS.index(fault.fault) + 1
+        delay[place] = math.ceil((fault.delay - ROUND_OFF) / h)
+    kind[dropped] = STUCK
+    return SensorFaults(kind, delay)
+
+
+def _sensor(fault: SensorFault) -> int:
+    """Returns the index of a fault's sensor among those of its kind."""
+    match fault:
+        case Fault():
+            return LEG_NAMES.index(fault.leg)
+        case AngleFault():
+            return LEG_NAMES.index(fault.leg) * len(JOINT_NAMES) + JOINT_NAMES.index(fault.joint)
+        case AttitudeFault():
+            return 0
 
 
 def servo_fault_rows(faults: Sequence[ServoFault], times: NDArray[np.float64]) -> NDArray[np.int8]:
@@ -112,8 +163,8 @@ def servo_fault_rows(faults: Sequence[ServoFault], times: NDArray[np.float64]) -
 
 
 def lost_rows(events: Sequence[Lost], times: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """Returns whether the command at each time [s from the start] is lost (times,); never the
-    first.
+    """Returns whether each time [s from the start] lies within one of the events (times,); never
+    the first.
     """
     rows = np.zeros(len(times), dtype=np.bool_)
     for event in events:
@@ -122,7 +173,7 @@ def lost_rows(events: Sequence[Lost], times: NDArray[np.float64]) -> NDArray[np.
     return rows
 
 
-def _span(event: Fault | ServoFault | Lost, times: NDArray[np.float64]) -> slice:
+def _span(event: SensorFault | ServoFault | Lost, times: NDArray[np.float64]) -> slice:
     """Returns which times [s from the start] lie within an event."""
     begin, end = np.searchsorted(
         times, [event.time - ROUND_OFF, event.time + event.duration - ROUND_OFF]

@@ -86,11 +86,15 @@ static void draw_parameters(hxEnvironment *environment) {
   }
 }
 
+/* Draws the command of the present step if one begins with it. */
 static void draw_command(hxEnvironment *environment) {
   const hxEnvSettings *settings = environment->settings;
+  const size_t interval = settings->command_interval;
+  const size_t number = interval ? environment->step / interval : 0;
+  if (environment->step != number * interval) return;
   for (size_t i = 0; i < 3; ++i) {
     const double low = settings->command_low[i], range = settings->command_high[i] - low;
-    environment->body[i] = low + uniform(environment, HX_STREAM_COMMAND, i) * range;
+    environment->body[i] = low + uniform(environment, HX_STREAM_COMMAND, 3 * number + i) * range;
   }
 }
 
@@ -219,8 +223,10 @@ double hx_environment_step(hxEnvironment *environment, const float action[HX_ENV
   const hxEnvView view = hx_environment_view(environment);
   environment->reason = going ? judge(environment, &view) : HX_END_FAILED;
   environment->ended = environment->reason != HX_END_NONE;
-  return hx_reward(environment, change, slip_distance(environment) - before,
+  const double reward = hx_reward(environment, change, slip_distance(environment) - before,
                    (double)settings->substeps * settings->h, term);
+  draw_command(environment);
+  return reward;
 }
 
 /* ----------------------------------------------------------------------------------------------
@@ -247,28 +253,81 @@ hxEnvView hx_environment_view(const hxEnvironment *environment) {
 }
 
 static const size_t block_size[HX_ENV_BLOCKS] = {
-    3, 3, 3, 3, HX_ENV_JOINTS, HX_ENV_JOINTS, HX_ENV_JOINTS, 2};
+    3, 3, 3, 3, HX_ENV_JOINTS, HX_ENV_JOINTS, HX_ENV_JOINTS, 2, 0};
+
+static size_t size_of(const hxEnvSettings *settings, int block) {
+  return block == HX_SEE_HEIGHTS ? settings->ground.points : block_size[block];
+}
+
+/* Returns whether the axes of a block have scales of their own. */
+static int is_vector(int block) { return block_size[block] == 3; }
 
 /* Returns whether a block is observed. */
 static int sees(const hxEnvSettings *settings, int block) {
   const double *scale = settings->observed[block];
-  return scale[0] != 0.0 || (block_size[block] == 3 && (scale[1] != 0.0 || scale[2] != 0.0));
+  return scale[0] != 0.0 || (is_vector(block) && (scale[1] != 0.0 || scale[2] != 0.0));
 }
 
 size_t hx_environments_observed(const hxEnvSettings *settings) {
   size_t size = 0;
   for (int block = 0; block < HX_ENV_BLOCKS; ++block)
-    if (sees(settings, block)) size += block_size[block];
+    if (sees(settings, block)) size += size_of(settings, block);
   return size;
 }
 
 /* Writes a block and returns the place behind it. */
 static float *show(const hxEnvSettings *settings, int block, const double *value, float *to) {
   const double *scale = settings->observed[block];
+  const size_t size = size_of(settings, block);
   if (!sees(settings, block)) return to;
-  for (size_t i = 0; i < block_size[block]; ++i)
-    to[i] = (float)(value[i] * scale[block_size[block] == 3 ? i : 0]);
-  return to + block_size[block];
+  for (size_t i = 0; i < size; ++i) to[i] = (float)(value[i] * scale[is_vector(block) ? i : 0]);
+  return to + size;
+}
+
+/* Returns the node below a coordinate in units of the spacing, and the share of the way to the next
+ * node. Beyond the first and the last node it stays there. */
+static size_t node_below(double coordinate, size_t nodes, double *share) {
+  const double last = (double)(nodes - 1), limited = fmin(fmax(coordinate, 0.0), last);
+  const double node = fmin(floor(limited), last - 1.0);
+  *share = limited - node;
+  return (size_t)node;
+}
+
+/* Returns the height of a ground [m] at a place in the world. */
+static double height_at(const hxEnvGround *ground, const float *height, double x, double y) {
+  double u, v;
+  const size_t column = node_below((x - ground->x0) / ground->spacing, ground->columns, &u);
+  const size_t row = node_below((y - ground->y0) / ground->spacing, ground->rows, &v);
+  const float *low = height + row * ground->columns + column, *high = low + ground->columns;
+  return (1.0 - v) * ((1.0 - u) * (double)low[0] + u * (double)low[1]) +
+         v * ((1.0 - u) * (double)high[0] + u * (double)high[1]);
+}
+
+static const float *present_ground(const hxEnvironment *environment) {
+  const hxEnvSettings *settings = environment->settings;
+  const hxEnvGround *ground = &settings->ground;
+  const size_t number =
+      ground->draw < settings->draws.count ? (size_t)environment->drawn[ground->draw] - 1 : 0;
+  return ground->height + number * ground->rows * ground->columns;
+}
+
+/* Writes the heights of the scanned places. */
+static void scan(const hxEnvironment *environment, float *to) {
+  const hxEnvSettings *settings = environment->settings;
+  const hxEnvGround *ground = &settings->ground;
+  const float *height = present_ground(environment);
+  const double *r = environment->value + HX_ENV_POSITION;
+  const double *p = environment->value + HX_ENV_QUATERNION;
+  /* the torso's x axis, projected onto the horizontal plane */
+  const double x = 1.0 - 2.0 * (p[2] * p[2] + p[3] * p[3]), y = 2.0 * (p[1] * p[2] + p[0] * p[3]);
+  const double length = sqrt(x * x + y * y);
+  const double c = length > 0.0 ? x / length : 1.0, s = length > 0.0 ? y / length : 0.0;
+  for (size_t i = 0; i < ground->points; ++i) {
+    const double a = ground->place[2 * i], b = ground->place[2 * i + 1];
+    const double below = height_at(ground, height, r[0] + c * a - s * b, r[1] + s * a + c * b);
+    const double over = fmin(fmax(r[2] - below - ground->clearance, -1.0), 1.0);
+    to[i] = (float)(over * settings->observed[HX_SEE_HEIGHTS][0]);
+  }
 }
 
 void hx_environment_observe(const hxEnvironment *environment, float *observation) {
@@ -287,5 +346,6 @@ void hx_environment_observe(const hxEnvironment *environment, float *observation
   observation = show(settings, HX_SEE_ANGLE, angle, observation);
   observation = show(settings, HX_SEE_SPEED, environment->value + HX_ENV_SPEED, observation);
   observation = show(settings, HX_SEE_ACTION, environment->action, observation);
-  show(settings, HX_SEE_CLOCK, clock, observation);
+  observation = show(settings, HX_SEE_CLOCK, clock, observation);
+  if (sees(settings, HX_SEE_HEIGHTS)) scan(environment, observation);
 }

@@ -110,10 +110,9 @@ static int step_plant(hxMaster *master) {
 }
 
 static void write_row(hxMasterTable *table, const double *value) {
-  double *row;
-  if (!table->row) return;
-  row = table->row + table->rows * table->stride;
-  for (size_t j = 0; j < table->columns; ++j) row[j] = value[table->column[j]];
+  if (!table->first) return;
+  double *row = table->first + table->rows;
+  for (size_t j = 0; j < table->columns; ++j) row[j * table->stride] = value[table->column[j]];
   ++table->rows;
 }
 

@@ -21,6 +21,7 @@ from fmi_plant import ATHENA, GUID, OK, Plant
 
 from hexapod_cosim.cosim.common import plant_files
 from hexapod_cosim.cosim.export.export import checksum, export_fmu, start_values
+from hexapod_cosim.cosim.export.reference import FOLDER, MANIFEST
 from hexapod_cosim.cosim.interface.interface import load_interface
 from hexapod_cosim.cosim.interface.model_description import render_fmi2
 from hexapod_cosim.models.errors import HexapodError
@@ -71,7 +72,7 @@ def test_cmake_and_the_exporter_write_the_same_fmu(exported: Path, athena_fmu: P
     assert set(ours) == set(cmakes)
     # compiled, drawn and simulated parts are compared in test_extras.py: other compilers and
     # libraries make other bytes
-    made = ("binaries/", "documentation/reference/", "model.png", "terminalsAndIcons/icon.png")
+    made = ("binaries/", f"{FOLDER}/", "model.png", "terminalsAndIcons/icon.png")
     assert [name for name in ours if ours[name] != cmakes[name] and not name.startswith(made)] == []
 
 
@@ -91,7 +92,7 @@ def test_robots_differ_in_description_resources_and_pictures_only(
 ) -> None:
     other = members(export_fmu(load_robot("phantomx_mk4"), tmp_path / "phantomx.fmu"))
     other = {
-        name.replace("reference/phantomx_mk4_", "reference/athena_"): data
+        name.replace(f"{FOLDER}/phantomx_mk4_", f"{FOLDER}/athena_"): data
         for name, data in other.items()
     }
     athena = members(exported)
@@ -99,14 +100,13 @@ def test_robots_differ_in_description_resources_and_pictures_only(
     assert set(other) == set(athena)
     pictures, results = (
         {"model.png", "terminalsAndIcons/icon.png"},
-        {f"documentation/reference/athena_{part}.csv" for part in ("in", "ref")},
+        {f"{FOLDER}/athena_{part}.csv" for part in ("in", "ref")},
     )
-    assert (
-        different
-        == {"modelDescription.xml", "documentation/index.html", "resources/start_values.txt"}
-        | pictures
-        | results
-    )
+    assert different == {
+        "modelDescription.xml",
+        "documentation/index.html",
+        "resources/start_values.txt",
+    } | pictures | results | {MANIFEST}
 
 
 def test_another_robot_starts_with_its_own_values_and_stands(

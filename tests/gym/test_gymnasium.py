@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from typing import Any
 
 import gymnasium
 import numpy as np
@@ -90,8 +91,10 @@ def test_wrong_settings_are_refused_by_name() -> None:
         HexapodEnv(randomise={"friction.nu": (0.4, 0.5)})
 
 
-def test_the_example_of_the_page_works_as_typed(capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_examples_of_the_page_work_as_typed(capsys: pytest.CaptureFixture[str]) -> None:
     page = (ROOT / "docs" / "learning.md").read_text(encoding="utf-8")
-    (example,) = re.findall(r"```python\n(.*?)```", page, flags=re.DOTALL)
-    exec(example, {})
+    names: dict[str, Any] = {}
+    for example in re.findall(r"```python\n(.*?)```", page, flags=re.DOTALL):
+        exec(example, names)
     assert "'progress'" in capsys.readouterr().out
+    assert names["picture"].shape == (360, 480, 3)

@@ -72,12 +72,12 @@ typedef enum hxMasterCall {
   HX_CALL_CONTROLLER_STEP
 } hxMasterCall;
 
-/* Rows of a recording: columns of `value` and the memory they are written to. */
+/* Rows of a recording: columns of `value` and the memory they are written to, column by column. */
 typedef struct hxMasterTable {
   const size_t *column; /* 1     [columns] indices in `value` */
   size_t columns;
-  double *row;   /*       rows, `stride` numbers apart; NULL: none are written */
-  size_t stride; /* 1     at least `columns` */
+  double *first; /*       the first row's first number; NULL: none are written */
+  size_t stride; /* 1     numbers from a column to the next; those of a column adjoin */
   size_t rows;   /* 1     number of rows written */
 } hxMasterTable;
 

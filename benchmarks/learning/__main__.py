@@ -1,8 +1,9 @@
-"""Environment steps per second: the vector environment in C, and mujoco.rollout on the same robot.
+"""Environment steps per second: the vector environment in C, mujoco.rollout on the same robot, and
+fmugym on the same FMU.
 
 usage: python -m benchmarks.learning
 
-Both walk the same open-loop tripod gait, held for 20 ms at a time. The error of a path is measured
+All walk the same open-loop tripod gait, held for 20 ms at a time. The error of a path is measured
 against a fine solution of the same engine, because the contact laws of the two differ. Speeds are
 per second of processor time and core, so that other processes disturb them little; those of the
 clock are shown too.
@@ -19,6 +20,7 @@ import numpy as np
 from mujoco import rollout
 from numpy.typing import NDArray
 
+from benchmarks.learning import fmugym_walk
 from hexapod_cosim.gym.bench import bench, walking_action
 from hexapod_cosim.gym.settings import JOINTS, RATE, EnvSettings
 from hexapod_cosim.models import load_robot
@@ -90,11 +92,13 @@ def mujoco_table(cores: int) -> str:
 
 
 def main() -> None:
-    """Prints both tables."""
+    """Prints the tables."""
     cores = os.cpu_count() or 1
     print(bench(count=COUNT, duration=DURATION), flush=True)
     print()
-    print(mujoco_table(cores))
+    print(mujoco_table(cores), flush=True)
+    print()
+    print(fmugym_walk.table(DURATION))
 
 
 if __name__ == "__main__":

@@ -1,0 +1,1 @@
+"""Environment steps per second, beside mujoco.rollout and fmugym."""
