@@ -23,6 +23,7 @@ from playwright.sync_api import Browser, sync_playwright
 IMAGES = Path(__file__).parent / "images"
 # scenario -> time of the picture [s]
 SHOWN = {"stairs": 9.0, "rubble": 8.0, "stones": 9.0, "dune": 10.0}
+SHOWN |= {"sand": 9.0, "ramp": 8.0, "course": 42.0}
 SIZE = {"width": 1280, "height": 900}  # px
 FLAGS = [
     "--no-sandbox",

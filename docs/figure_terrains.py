@@ -14,7 +14,7 @@ from hexapod_cosim.cosim.report.relief import contact_sheet
 from hexapod_cosim.models import load_robot
 from hexapod_cosim.models.ground.catalogue import CATALOGUE, make_surface
 
-COLUMNS = 6
+COLUMNS = 5
 COLOURS = 256  # of the picture's palette
 
 

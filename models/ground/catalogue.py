@@ -12,6 +12,7 @@ from typing import Any
 
 from hexapod_cosim.models.errors import RobotError, unknown_name
 from hexapod_cosim.models.ground import rough, steps
+from hexapod_cosim.models.ground.curriculum import curriculum
 from hexapod_cosim.models.ground.height_map import heightfield
 from hexapod_cosim.models.ground.parameters import (
     HARD,
@@ -56,6 +57,14 @@ SLOPE = ratio((0.0, 0.4), "rise over run", least=-2.0, most=2.0)
 SOIL = text("dry_sand", "name of the soil everywhere")
 STEPS: Parameters = {**TILE, "step_height": STEP_HEIGHT, "step_width": STEP_WIDTH}
 ONE_STEP: Parameters = {**TILE, "step_height": STEP_HEIGHT}
+TILES = "pyramid_stairs inverted_pyramid_stairs discrete_obstacles stepping_stones"
+TILE_NAMES = (*TILES.split(), "stairs", "steps", "step_up", "step_down", "gaps", "rubble")
+
+
+def _curriculum(values: SimpleNamespace) -> Surface:
+    makers = {name: (CATALOGUE[name].make, CATALOGUE[name].parameters) for name in TILE_NAMES}
+    return curriculum(values, makers)
+
 
 CATALOGUE: dict[str, Entry] = {
     "plane": Entry(
@@ -173,6 +182,19 @@ CATALOGUE: dict[str, Entry] = {
             "depth": DEPTH,
             "vertical_scale": VERTICAL,
             "seed": SEED,
+        },
+    ),
+    "curriculum": Entry(
+        "Tiles of rising difficulty along +x, terrains in columns",
+        _curriculum,
+        {
+            **RANDOM_TILE,
+            "size": replace(SIZE, about="edge of a tile"),
+            "difficulty": replace(HARD, default=1.0, about="of the last row; the first has 0"),
+            "num_rows": count(5, "tiles along x", most=1000),
+            "num_cols": count(4, "tiles along y", most=1000),
+            "border_width": length(1.0, "level ground around the tiles", zero=True),
+            "terrains": text(TILES, "names of the columns' terrains"),
         },
     ),
     "heightfield": Entry(

@@ -31,7 +31,7 @@ from hexapod_cosim.models.ground.surface import Surface, check_heights
 from hexapod_cosim.models.ground.table import merged_terrain, terrain_table
 from hexapod_cosim.models.mjcf import robot_to_mjcf
 from hexapod_cosim.models.mjcf_ground import rectangles
-from hexapod_cosim.models.records import Terrain
+from hexapod_cosim.models.records import Array, Terrain
 from hexapod_cosim.models.terrain import ground_height
 from hexapod_cosim.models.urdf.writer import robot_to_urdf
 
@@ -159,6 +159,36 @@ def test_difficulty_raises_what_is_not_given() -> None:
     assert height(difficulty=1.0, step_height=0.02) == pytest.approx(0.02)
 
 
+def tile(surface: Surface, row: int, column: int, *, blocks: int, border: int) -> Array:
+    """Returns the heights of a tile of a curriculum, whose edges have this many blocks [m]."""
+    below, left = border + column * blocks, border + row * blocks
+    return surface.height[below : below + blocks, left : left + blocks]
+
+
+def test_steps_of_a_curriculum_rise_along_its_rows_and_tiles_fit_together() -> None:
+    given = {"terrains": "pyramid_stairs, inverted_pyramid_stairs", "num_rows": 3, "num_cols": 2}
+    surface = make_surface("curriculum", given)
+    assert surface.extent == pytest.approx((-3.0, 11.0, -7.0, 3.0), abs=1e-12)
+    level = surface.height[0, 0]  # of the border
+    for row, step in enumerate((0.025, 0.07, 0.115)):  # m: difficulty 0, 0.5, 1
+        for column, sign in enumerate((1.0, -1.0)):
+            heights = tile(surface, row, column, blocks=80, border=20) - level
+            assert np.abs(np.diff(heights, axis=1)).max() == pytest.approx(step, abs=1e-12)
+            assert heights[0] == pytest.approx(0.0, abs=1e-12)  # an edge
+            assert sign * heights[40, 40] == pytest.approx(np.abs(heights).max(), abs=1e-12)
+    assert surface.height[60, 60] != 0.0  # a column beside the start's
+    assert surface.height[20 + 80 + 40, 60] == 0.0
+
+
+def test_equal_terrains_of_a_curriculum_are_different_and_have_their_own_seeds() -> None:
+    given = {"terrains": "rubble", "num_rows": 2, "num_cols": 2}
+    surface = make_surface("curriculum", given)
+    first, second = (tile(surface, 1, column, blocks=80, border=20) for column in (0, 1))
+    assert not np.array_equal(first - first[40, 40], second - second[40, 40])
+    assert surface == make_surface("curriculum", given)
+    assert surface != make_surface("curriculum", given | {"seed": 1})
+
+
 def test_random_heights_are_multiples_of_the_vertical_scale() -> None:
     surface = make_surface("rubble", {"vertical_scale": 0.004, "max_height": 0.04})
     levels = surface.height / 0.004
@@ -197,6 +227,11 @@ REFUSED: list[tuple[str, dict[str, Any], str]] = [
     ("dune", {"size": 2.0, "platform_size": 2.0}, "covers the whole map"),
     ("stairs", {"num_steps": 100}, r"on a map of 4 m', expected at most 11 steps; .*size=30\.8"),
     ("stairs", {"num_steps": 12}, "more steps than the map has room for"),
+    ("curriculum", {"terrains": "stairs wave"}, "unknown terrain of tiles"),
+    ("curriculum", {"terrains": " , "}, "a curriculum without terrains"),
+    ("curriculum", {"size": 0.8}, "platforms cover their tiles"),
+    ("curriculum", {"num_rows": 1000, "num_cols": 1000}, "the curriculum is too large"),
+    ("curriculum", {"num_rows": 0}, ">= 1"),
 ]
 
 
