@@ -1418,7 +1418,7 @@ const size_t hx_state_count = sizeof states / sizeof states[0];
 
 _Static_assert(sizeof states / sizeof states[0] == sizeof(hxCoordinates) / sizeof(double), "each state has its row");
 
-const char hx_default_guid[] = "{8a83ba24-8c67-4afc-aa47-b50ca8a54707}";
+const char hx_default_guid[] = "{4663f9ca-0f67-458b-b023-29f57aa26f3d}";
 
 _Static_assert(HX_CONTACT_EXACT_RESTITUTION == 1, "ContactLaw");
 _Static_assert(HX_CONTACT_FLORES == 2, "ContactLaw");

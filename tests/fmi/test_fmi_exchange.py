@@ -620,6 +620,8 @@ VARIANTS: tuple[dict[str, float], ...] = (
         "terrain.incline": 0.1,
         "terrain.heading": 0.5,
     },
+    # neighbouring legs overlap
+    {"body.self_contact": 3, "body.knee_radius": 0.12, "body.shank_radius": 0.12},
 )
 
 
