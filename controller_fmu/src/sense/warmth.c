@@ -45,7 +45,7 @@ void hx_warmth_step(const hxWarmthModel *model, const double torque[HX_LEGS][HX_
     }
   const double warm = fmax((hottest / model->rating - cool) / (hot - cool),
                            (hardest / model->rating - over) / (far_over - over)),
-               part = fmax(warm, fmax((needed - easy) / (hard - easy),
-                                      (held - creeps) / (holds - creeps)));
+               part = fmax(
+                   warm, fmax((needed - easy) / (hard - easy), (held - creeps) / (holds - creeps)));
   warmth->squeeze = model->squeeze + model->more * hx_clamp(part, 0.0, 1.0);
 }
