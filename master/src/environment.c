@@ -224,7 +224,7 @@ double hx_environment_step(hxEnvironment *environment, const float action[HX_ENV
   environment->reason = going ? judge(environment, &view) : HX_END_FAILED;
   environment->ended = environment->reason != HX_END_NONE;
   const double reward = hx_reward(environment, change, slip_distance(environment) - before,
-                   (double)settings->substeps * settings->h, term);
+                                  (double)settings->substeps * settings->h, term);
   draw_command(environment);
   return reward;
 }
