@@ -23,10 +23,10 @@ from rich.progress import track
 
 from benchmarks import BUILD, RESULTS, machine
 from benchmarks.figure import draw
-from benchmarks.ground import landings, walks_over_waves
-from benchmarks.ground_cost import ground_costs
-from benchmarks.ground_map import map_costs
-from benchmarks.ground_table import ground_rows
+from benchmarks.ground.cost import ground_costs
+from benchmarks.ground.size import map_costs
+from benchmarks.ground.table import ground_rows
+from benchmarks.ground.waves import landings, walks_over_waves
 from benchmarks.judge import agreement, spreads
 from benchmarks.loop import compiled_factors, master_overhead, realtime_factor
 from benchmarks.measure import Bench, Run

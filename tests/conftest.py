@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import ctypes
 import os
+import signal
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -18,6 +19,10 @@ from fmi_plant import Plant
 from xdist.scheduler import LoadScopeScheduling
 
 from hexapod_cosim.cosim.cli import main
+
+# A shell that runs the tests in the background lets them ignore Ctrl-C, and their children too.
+if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 
 # what takes longest begins, so that no process is left with it in the end
 LONGEST = (

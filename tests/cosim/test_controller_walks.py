@@ -62,9 +62,10 @@ def test_the_planned_squeeze_takes_heat_from_the_servos_and_leaves_the_ground_so
     assert none["heat"] > 2.5 * kinematic["heat"]
     assert some["heat"] < 1.55 * kinematic["heat"]
     assert most["heat"] < 1.2 * kinematic["heat"]
+    assert none["heat"] > some["heat"] > most["heat"]
     slips = [one["slip_per_metre"] for one in (none, some, most)]
-    assert slips == sorted(slips)
-    assert slips[-1] < 0.6 * kinematic["slip_per_metre"]
+    assert slips[0] < min(slips[1:])
+    assert max(slips) < 0.6 * kinematic["slip_per_metre"]
 
 
 @pytest.mark.usefixtures("plant_build")

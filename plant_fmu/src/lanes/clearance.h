@@ -161,8 +161,8 @@ static inline int next_line(int row) { return (row - HX_PAIR) % HX_LINES; }
 /* Computes a row of contacts between legs: the normal points from the next leg's line to the leg's,
  * the point is in the middle of the overlap, the velocity is that of the leg's material relative to
  * the next leg's; *next_arm: from the centre of mass of the next leg's body to the point, m. */
-static inline hxContactKinematics pair_contact(const hxModel *model, const hxLegLines *own,
-                                               const hxLegLines *next, int row, int slot,
+static inline hxContactKinematics pair_contact(const hxModel *model, hxLegLines *own,
+                                               hxLegLines *next, int row, int slot,
                                                hxVec3 *next_arm) {
   const int i = own_line(row), j = next_line(row);
   const hxVec3 p = chain_point(own->chain[i], slot), q = chain_point(next->chain[j], slot);

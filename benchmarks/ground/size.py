@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from plant import Plant, bound, inputs
 
 from benchmarks import BUILD
-from benchmarks.ground import OurEngine
+from benchmarks.ground.waves import OurEngine
 from benchmarks.toolchain import Tools
 from benchmarks.walks import STEP, commands, family
 from hexapod_cosim.models.ground.grid_file import read_grid, write_grid

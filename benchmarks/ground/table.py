@@ -7,8 +7,8 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from statistics import median
 from typing import Any
 
-from benchmarks.ground import FORCE_STEPS, MUJOCO
-from benchmarks.ground_cost import BLOCKS, FIELD, PLANE, SOIL
+from benchmarks.ground.cost import BLOCKS, FIELD, PLANE, SOIL
+from benchmarks.ground.waves import FORCE_STEPS, MUJOCO
 from benchmarks.series import OURS
 from benchmarks.table import Row
 from benchmarks.walks import DURATION

@@ -13,7 +13,7 @@ from typing import Any
 
 from plant import inputs
 
-from benchmarks.ground import Job, OurEngine, Setting, on_terrain
+from benchmarks.ground.waves import Job, OurEngine, Setting, on_terrain
 from benchmarks.series import OURS
 from benchmarks.toolchain import Tools
 from benchmarks.walks import STEP, Walk, commands
