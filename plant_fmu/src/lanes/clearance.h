@@ -235,37 +235,4 @@ HX_RARE void hx_pair_forces(const hxModel *model, const hxContactState *state,
   }
 }
 
-#ifndef HX_TANGENT
-/* Stores the contacts between legs at one end of a step. */
-HX_RARE void hx_pair_moments(const hxModel *model, const hxPlantMotion *motion, hxMoment *moment) {
-  hxLegLines own, next;
-  leg_lines(model, motion, &own, &next);
-  for (int row = HX_PAIR; row < HX_ROWS; ++row)
-    for (int slot = 0; slot < HX_PACKS * HX_LANES; slot += HX_LANES) {
-      hxContactMoment *to = &moment->contact[row];
-      hxVec3 next_arm;
-      const hxContactKinematics kin = pair_contact(model, &own, &next, row, slot, &next_arm);
-      hx_store_vec3(to->centre, slot, hx_add3(chain_point(own.r[own_line(row)], slot), kin.arm));
-      hx_store_vec3(to->normal, slot, kin.normal);
-      hx_store_vec3(to->slip, slot, hx_add_scaled(kin.velocity, kin.ddelta, kin.normal));
-      hx_store_vec3(to->roll, slot, hx_zero3());
-      hx_store(&to->delta[slot], kin.delta);
-      hx_store(&to->ddelta[slot], kin.ddelta);
-    }
-}
-
-/* Returns the largest depths of contacts between legs, m, legs in lanes. */
-HX_RARE hxReal hx_deepest_pair(const hxModel *model, const hxPlantMotion *motion) {
-  hxLegLines own, next;
-  hxReal deepest = hx_splat(-HUGE_VAL);
-  leg_lines(model, motion, &own, &next);
-  for (int row = HX_PAIR; row < HX_ROWS; ++row)
-    for (int slot = 0; slot < HX_PACKS * HX_LANES; slot += HX_LANES) {
-      hxVec3 next_arm;
-      deepest = hx_max(deepest, pair_contact(model, &own, &next, row, slot, &next_arm).delta);
-    }
-  return deepest;
-}
-#endif
-
 #endif

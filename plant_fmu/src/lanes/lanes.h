@@ -24,7 +24,7 @@
  * with and without them. */
 #if defined(__GNUC__)
 #define HX_INLINE static inline __attribute__((always_inline))
-#define HX_RARE static __attribute__((noinline, unused))
+#define HX_RARE static __attribute__((noinline))
 #else
 #define HX_INLINE static inline
 #define HX_RARE static
