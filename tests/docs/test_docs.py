@@ -56,9 +56,9 @@ class Page(HTMLParser):
 def site(plant_build: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The whole site; notebooks and validation are computed when that is asked for."""
     folder = tmp_path_factory.mktemp("site")
+    words = [sys.executable, "-m", "tools.docs", *([] if COMPUTED else ["--quick"])]
     done = subprocess.run(
-        [sys.executable, "-m", "tools.docs", "-o", folder / "html", "--work", folder / "pages"]
-        + ([] if COMPUTED else ["--quick"]),
+        [*words, "-o", str(folder / "html"), "--work", str(folder / "pages")],
         cwd=ROOT,
         capture_output=True,
         text=True,
