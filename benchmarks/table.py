@@ -257,20 +257,17 @@ def _rest(parts: Parts) -> Iterable[Row]:
         yield Row(
             figure=f"cost with {name} over the default's", unit="1", ours=cost, goal=STEEP_GOAL
         )
-    for control, factor in parts.loop.items():
+    loops = [(f"{control} control", factor, LOOP_GOAL) for control, factor in parts.loop.items()]
+    loops += [
+        (f"compiled compliant control, {driven}", factor, COMPILED_GOAL)
+        for driven, factor in parts.compiled.items()
+    ]
+    for driven, factor, goal in loops:
         yield Row(
-            figure=f"whole co-simulation, {control} control",
+            figure=f"whole co-simulation, {driven}",
             unit="x",
             ours=factor,
-            goal=LOOP_GOAL,
-            better="more",
-        )
-    for driven, factor in parts.compiled.items():
-        yield Row(
-            figure=f"whole co-simulation, compiled compliant control, {driven}",
-            unit="x",
-            ours=factor,
-            goal=COMPILED_GOAL,
+            goal=goal,
             better="more",
         )
     yield Row(

@@ -12,11 +12,9 @@ from numpy.typing import NDArray
 from hexapod_cosim.gym.plants import surfaces
 from hexapod_cosim.gym.settings import EnvSettings, symmetric
 from hexapod_cosim.models import Robot
-from hexapod_cosim.models.ground.smooth import heights_at
-from hexapod_cosim.models.ground.surface import Surface
 from hexapod_cosim.models.records import Array, Terrain
 from hexapod_cosim.models.statics import settled
-from hexapod_cosim.models.terrain import ground_height
+from hexapod_cosim.models.terrain import ground_height, surface_heights
 
 SPACING = 0.02  # m  of the samples
 MARGIN = 0.5  # m  beyond the places that a robot can scan after an episode at its largest speed
@@ -63,7 +61,7 @@ def ground_maps(settings: EnvSettings, robots: Sequence[Robot]) -> GroundMaps:
     nodes = np.array(symmetric(2.0 * reach, SPACING))
     base = robots[0].terrain
     found = surfaces(robots)
-    heights = [base.height + surface_heights(surface, nodes) for surface in found]
+    heights = [base.height + surface_heights(surface, nodes, nodes) for surface in found]
     height = np.array(heights or [plane_heights(base, nodes)], dtype=np.float32)
     return GroundMaps(height, float(nodes[0]), float(level[2]))
 
@@ -73,15 +71,3 @@ def plane_heights(terrain: Terrain, nodes: Array) -> Array:
     origin = ground_height(terrain, 0.0, 0.0)
     rise_x, rise_y = ground_height(terrain, 1.0, 0.0), ground_height(terrain, 0.0, 1.0)
     return np.add.outer((rise_y - origin) * nodes, (rise_x - origin) * nodes) + origin
-
-
-def surface_heights(surface: Surface, nodes: Array) -> Array:
-    """Returns the heights (y, x) [m] of a surface at all pairs of nodes along x and y [m]."""
-    if surface.kind == "smooth":
-        return heights_at(surface, nodes, nodes)
-    row = np.floor((nodes - surface.y0) / surface.cell).astype(int)
-    column = np.floor((nodes - surface.x0) / surface.cell).astype(int)
-    height: Array = surface.height[
-        np.ix_(row.clip(0, surface.rows - 1), column.clip(0, surface.columns - 1))
-    ]
-    return height

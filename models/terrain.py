@@ -11,9 +11,10 @@ from hexapod_cosim.models.ground.blocks import (
     block_face,
     block_faces,
     block_height,
+    block_heights,
     cell_at,
 )
-from hexapod_cosim.models.ground.smooth import height_and_slopes, smooth_distance
+from hexapod_cosim.models.ground.smooth import height_and_slopes, heights_at, smooth_distance
 from hexapod_cosim.models.ground.surface import Surface
 from hexapod_cosim.models.records import Array, Terrain
 
@@ -45,6 +46,13 @@ def ground_height(terrain: Terrain, x: float, y: float) -> float:
     if surface.kind == "blocks":
         return terrain.height + block_height(surface, x, y)
     return terrain.height + height_and_slopes(surface, x, y)[0]
+
+
+def surface_heights(surface: Surface, x: Array, y: Array) -> Array:
+    """Returns the heights (y, x) [m] of a surface at all pairs of x and y [m]."""
+    if surface.kind == "blocks":
+        return block_heights(surface, x, y)
+    return heights_at(surface, x, y)
 
 
 def ground_faces(terrain: Terrain, point: Array) -> list[Face]:

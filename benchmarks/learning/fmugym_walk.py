@@ -22,8 +22,7 @@ from benchmarks import BUILD
 from hexapod_cosim.cosim.interface.names import vector_names
 from hexapod_cosim.cosim.master.signals import MEASURED
 from hexapod_cosim.cosim.master.wiring import JOINT_COMMANDS
-from hexapod_cosim.gym.batch import Batch
-from hexapod_cosim.gym.bench import walking_action
+from hexapod_cosim.gym.bench import steps_per_second, walking_action, ways
 from hexapod_cosim.gym.plants import export_plant, grounds
 from hexapod_cosim.gym.settings import JOINTS, RATE, EnvSettings
 from hexapod_cosim.models.records import Array
@@ -49,14 +48,15 @@ def table(duration: float) -> str:
     except RuntimeError as error:
         return f"fmugym {VERSION} is missing: {error}"
     settings, steps = EnvSettings(duration=2.0 * duration), round(duration * RATE)
-    theirs, ours = _theirs(settings, steps), _ours(settings, steps)
-    apart = float(np.abs(theirs[1] - ours[1]).max())
+    processor, path = _theirs(settings, steps)
+    ours = steps_per_second(settings, count=1, threads=1, steps=steps)[1]
+    apart = float(np.abs(path - ways(settings, 1, steps)[:, 0]).max())
     return "\n".join(
         [
             f"fmugym {VERSION} on the same FMU, one robot, one thread",
             "environment              steps/s of processor time",
-            f"fmugym                   {steps / theirs[0]:25.0f}",
-            f"ours, one robot          {steps / ours[0]:25.0f}",
+            f"fmugym                   {steps / processor:25.0f}",
+            f"ours, one robot          {ours:25.0f}",
             f"largest distance of the two paths: {1e3 * apart:.6f} mm",
         ]
     )
@@ -118,33 +118,12 @@ def _theirs(settings: EnvSettings, steps: int) -> tuple[float, Array]:
         order = {name: place for place, name in enumerate(walk.input_dict)}
         places = [INPUTS.index(name) for name in order]
         shown = list(walk.output_dict)
-        ways = [shown.index(name) for name in vector_names("torso.position")]
+        position = [shown.index(name) for name in vector_names("torso.position")]
         walk.reset()
         began, path_walked = time.process_time(), []
         for command in commands:
             observation, *_ = walk.step(command[places])
-            path_walked.append(observation[ways])
+            path_walked.append(observation[position])
         spent = time.process_time() - began
         walk.close()
     return spent, np.array(path_walked, dtype=float)
-
-
-def _ours(settings: EnvSettings, steps: int) -> tuple[float, Array]:
-    """Walks with our environment, which reports the same numbers."""
-    names = vector_names("torso.position")
-    with Batch(settings, 1, threads=1) as batch:
-        batch.reset(seeds=[0])
-        path = np.zeros((steps, 3))
-        actions = [walking_action(step, 1) for step in range(steps)]
-        began = time.process_time()
-        for action in actions:
-            batch.action[:] = action
-            batch.step()
-        spent = time.process_time() - began
-        batch.reset(seeds=[0])
-        for step, action in enumerate(actions):
-            batch.action[:] = action
-            batch.step()
-            values = batch.values(0)
-            path[step] = [values[name] for name in names]
-    return spent, path

@@ -17,8 +17,8 @@ from PIL import Image
 from hexapod_cosim.controller.figure_style import DPI, SETTINGS, UNDATED
 from hexapod_cosim.cosim.common.files import atomic_path
 from hexapod_cosim.models import Robot, foot_positions
-from hexapod_cosim.models.ground.smooth import heights_at
 from hexapod_cosim.models.ground.surface import Array, Surface
+from hexapod_cosim.models.terrain import surface_heights
 
 WIDTH = 5.0  # in
 LIGHT = LightSource(azdeg=315.0, altdeg=40.0)
@@ -90,11 +90,7 @@ def sampled(surface: Surface) -> tuple[Array, Array, Array]:
     )
     x = left + (right - left) * (np.arange(columns) + 0.5) / columns
     y = low + (high - low) * (np.arange(rows) + 0.5) / rows
-    if surface.kind == "blocks":
-        across = np.minimum(((x - left) / surface.cell).astype(int), surface.columns - 1)
-        along = np.minimum(((y - low) / surface.cell).astype(int), surface.rows - 1)
-        return x, y, surface.height[np.ix_(along, across)]
-    return x, y, heights_at(surface, x, y)
+    return x, y, surface_heights(surface, x, y)
 
 
 def _draw_robot(axes: Axes, robot: Robot) -> None:

@@ -27,9 +27,7 @@ from hexapod_cosim.cosim.scenario.records import (
 from hexapod_cosim.models import JOINT_NAMES, LEG_NAMES
 
 ROUND_OFF = 5e-10  # s    of the time of a macro-step
-
-
-STUCK = FAULTS.index("stuck") + 1
+STUCK = FAULTS.index("stuck") + 1  # the kind of a sensor that repeats its last reading
 
 
 @dataclass(frozen=True)

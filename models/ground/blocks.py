@@ -39,6 +39,14 @@ def block_height(surface: Surface, x: float, y: float) -> float:
     return float(surface.height[row, _cell((x - surface.x0) / surface.cell, surface.columns)])
 
 
+def block_heights(surface: Surface, x: Array, y: Array) -> Array:
+    """Returns the heights (y, x) [m] of the blocks at all pairs of x and y [m]."""
+    row = np.floor((y - surface.y0) / surface.cell).clip(0, surface.rows - 1).astype(int)
+    column = np.floor((x - surface.x0) / surface.cell).clip(0, surface.columns - 1).astype(int)
+    heights: Array = surface.height[np.ix_(row, column)]
+    return heights
+
+
 def cell_at(surface: Surface, x: float, y: float) -> Cell:
     """Returns row and column of the cell at (x, y) [m]."""
     return (
