@@ -167,42 +167,20 @@ HX_INLINE void end_of_bodies(const hxPlantMotion *from, const hxReal *b, const h
       }
 }
 
-/* Computes the same of bristles; under laws without them they stay. */
-HX_INLINE void end_of_bristles(const hxModel *model, const hxPlantMotion *from, const hxReal *b,
-                               const hxReal *e, int n, int estimates, const hxRate *k,
-                               hxPlantMotion *y, hxStepEnd *found) {
-  const double scale = 1.0 / (bristle_scale * model->bristle_length);
-  const int move = has_bristles(model, HX_FOOT);
-  for (int i = 0; i < HX_BRISTLE_SIZE; i += HX_LANES) {
-    const int at = HX_BODIES_SIZE + i;
+/* Computes the same of `size` entries from `first` on, whose errors have one scale. Where they do
+ * not move, because the model has no law for them, they stay. */
+HX_INLINE void end_of_entries(const hxPlantMotion *from, const hxReal *b, const hxReal *e, int n,
+                              int estimates, const hxRate *k, int first, int size, int move,
+                              double scale, hxPlantMotion *y, hxStepEnd *found) {
+  for (int i = 0; i < size; i += HX_LANES) {
+    const int at = first + i;
     hxReal end = hx_load(&from->y[at]);
     if (move) end = combined(end, b, k, n, HX_TURN_SIZE + at);
     hx_store(&y->y[at], end);
     found->zeros += 0.0 * end;
     if (move && estimates && i % HX_SLOTS < HX_PACKS * HX_LANES)
-      found->links =
-          larger_error(found->links, scale, combined(hx_splat(0.0), e, k, n, HX_TURN_SIZE + at));
-  }
-}
-
-/* Computes the same of elastic gears; rigid ones stay. */
-HX_INLINE void end_of_gears(const hxModel *model, const hxPlantMotion *from, const hxReal *b,
-                            const hxReal *e, int n, int estimates, const hxRate *k,
-                            hxPlantMotion *y, hxStepEnd *found) {
-  enum { GEARS = HX_BODIES_SIZE + HX_BRISTLE_SIZE };
-  if (!model->elastic) {
-    memcpy(&y->y[GEARS], &from->y[GEARS], HX_GEAR_SIZE * sizeof *y->y);
-    return;
-  }
-  for (int i = 0; i < HX_GEAR_SIZE; i += HX_LANES) {
-    const int at = GEARS + i;
-    const double scale = 1.0 / (i < HX_GEAR_SIZE / 2 ? deflection_scale : motor_scale);
-    const hxReal end = combined(hx_load(&from->y[at]), b, k, n, HX_TURN_SIZE + at);
-    hx_store(&y->y[at], end);
-    found->zeros += 0.0 * end;
-    if (estimates && i % HX_SLOTS < HX_PACKS * HX_LANES)
-      found->links =
-          larger_error(found->links, scale, combined(hx_splat(0.0), e, k, n, HX_TURN_SIZE + at));
+      found->links = larger_error(found->links, 1.0 / scale,
+                                  combined(hx_splat(0.0), e, k, n, HX_TURN_SIZE + at));
   }
 }
 
@@ -211,13 +189,22 @@ HX_INLINE void end_of_gears(const hxModel *model, const hxPlantMotion *from, con
 HX_INLINE hxStepEnd step_of_n(const hxModel *model, const hxPlantMotion *from, double h,
                               const hxMethodRow *m, int n, int estimates, const hxRate *k,
                               hxPlantMotion *y) {
+  enum {
+    BRISTLES = HX_BODIES_SIZE,
+    DEFLECTIONS = BRISTLES + HX_BRISTLE_SIZE,
+    SPEEDS = DEFLECTIONS + HX_GEAR_SIZE / 2
+  };
   hxStepEnd found = {hx_splat(0.0), hx_splat(0.0), 0.0};
   hxReal b[HX_STAGES], e[HX_STAGES];
   weights_of(b, h, m->b, n);
   weights_of(e, h, m->e, n);
   end_of_bodies(from, b, e, n, estimates, k, y, &found);
-  end_of_bristles(model, from, b, e, n, estimates, k, y, &found);
-  end_of_gears(model, from, b, e, n, estimates, k, y, &found);
+  end_of_entries(from, b, e, n, estimates, k, BRISTLES, HX_BRISTLE_SIZE,
+                 has_bristles(model, HX_FOOT), bristle_scale * model->bristle_length, y, &found);
+  end_of_entries(from, b, e, n, estimates, k, DEFLECTIONS, HX_GEAR_SIZE / 2, model->elastic,
+                 deflection_scale, y, &found);
+  end_of_entries(from, b, e, n, estimates, k, SPEEDS, HX_GEAR_SIZE / 2, model->elastic, motor_scale,
+                 y, &found);
   return found;
 }
 
