@@ -88,7 +88,7 @@ test: setup typing
 
 # builds the site with its notebooks run and its validation computed
 test-docs: setup
-	HEXAPOD_SITE=computed $(BIN)/python -m pytest -q tests/docs/test_docs.py -k "site or validation"
+	HEXAPOD_SITE=computed $(BIN)/python -m pytest -q tests/docs/test_docs.py -k "site or validation or reference"
 
 test-browser: setup
 	HEXAPOD_BROWSER=full $(BIN)/python -m pytest -s tests/report/test_browser.py tests/live/test_live_browser.py
