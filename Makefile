@@ -82,9 +82,8 @@ $(STAMP): $(SOURCES)
 demo: setup
 	$(BIN)/hexapod compare demo_course -o out/demo
 
-# a process for each core has no use for threads of matrices
 test: setup typing
-	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest $(PARALLEL)
+	$(BIN)/python -m pytest $(PARALLEL)
 
 # builds the site with its notebooks run and its validation computed
 test-docs: setup
