@@ -147,7 +147,9 @@ def test_changes_are_of_whole_pairs_whichever_runs_are_missing(share: float, stu
 def test_a_single_control_has_no_pairs() -> None:
     alone = replace(TWO, controls=("compliant",))
     points, overall = summed(made_rows(alone, [0]), alone)
-    assert overall.changes == overall.pairs == points[0].changes == points[0].pairs == {}
+    for found in (overall, points[0]):
+        assert not found.changes
+        assert not found.pairs
 
 
 @pytest.mark.parametrize("share", [1.0, 0.3])
