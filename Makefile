@@ -114,7 +114,7 @@ WHEELS := dist
 RELEASE := $(VENV)/.release
 
 $(RELEASE): $(STAMP)
-	$(BIN)/python -m pip install --quiet build wheel twine auditwheel ziglang
+	$(BIN)/python -m pip install --quiet build wheel twine auditwheel ziglang wasmtime
 	@touch $@
 
 wheels: setup $(RELEASE)
