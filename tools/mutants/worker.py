@@ -166,8 +166,8 @@ def _order(group: str, results: list[Told], left_out: Told, seconds: float) -> T
     """Returns the rank and the time limit of each known test, and those that are left out.
 
     Tests come first that have killed most mutants of the group for the time they take, then the
-    fastest files, whole, as the tests of a file share fixtures. Those after the given seconds are
-    left out.
+    fastest files, whole, as the tests of a file share fixtures. Files that do not end within the
+    given seconds are left out.
     """
     kills = Counter(one["by"] for one in results if one["group"] == group)
     with _lock:
@@ -178,7 +178,10 @@ def _order(group: str, results: list[Told], left_out: Told, seconds: float) -> T
         (test for test in worth if test.startswith(files)), key=lambda test: -worth[test]
     )
     ends = accumulate(durations[test] for test in tests)
-    late = {test: True for test, end in zip(tests, ends, strict=True) if end > seconds}
+    beyond = {
+        test.partition("::")[0] for test, end in zip(tests, ends, strict=True) if end > seconds
+    }
+    late = {test: True for test in tests if test.partition("::")[0] in beyond}
     limits = {test: SECONDS + TIMES * time for test, time in durations.items()}
     return {
         "rank": {test: rank for rank, test in enumerate(tests)},
