@@ -5,9 +5,9 @@ usage: python -m tools.coverage [--reuse]      (make coverage)
 Everything is built by gcc with counters (preset coverage: -Og, the baseline kernel alone, and no
 function inlined). The native tests and the Python tests in TESTS run on that build; gcovr reads the
 counters. Each branch of the source counts once: not once for each place where its function is
-inlined, and not once for each file that includes a header of plant_fmu/src/lanes. Prints a table in Markdown and
-writes build/coverage/branches.json and build/coverage/lines.txt, which marks the branches that no
-test took. --reuse reads the counters of an earlier run.
+inlined, and not once for each file that includes a header of plant_fmu/src/lanes. Prints a table in
+Markdown and writes build/coverage/branches.json and build/coverage/lines.txt, which marks the
+branches that no test took. --reuse reads the counters of an earlier run.
 """
 
 from __future__ import annotations

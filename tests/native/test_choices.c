@@ -268,6 +268,67 @@ static void every_law_of_contact_and_every_method_keeps_them(void) {
     }
 }
 
+/* A grid that is raised carries a robot that is raised with it by the same forces. */
+static void grids_may_be_raised(void) {
+  static const double height[2] = {0.0, 0.25};
+  hxOutput output[2];
+  for (int grid = 0; grid < GRIDS; ++grid) {
+    for (int k = 0; k < 2; ++k) {
+      hxDefinition d;
+      hxInput input;
+      hxPlant *plant = hx_plant_create();
+      hx_definition_default(&d);
+      on_grid(&d), body(&d);
+      d.terrain.height = height[k], d.initial.position[2] += height[k];
+      hx_plant_set_terrain(plant, terrain[grid]);
+      CHECK(hx_plant_reset(plant, &d, 0.0) == HX_OK);
+      walk(plant, 0, 20, 0, "raised grid");
+      command(&input, 20);
+      hx_plant_output(plant, &input, &output[k]);
+      hx_plant_destroy(plant);
+    }
+    CHECK(largest_of(output[0].foot.normal_force, HX_LEGS) > 1.0);
+    for (int leg = 0; leg < HX_LEGS; ++leg)
+      NEAR(output[1].foot.normal_force[leg], output[0].foot.normal_force[leg], 1e-4); /* N */
+  }
+}
+
+static void stiff_stops(hxDefinition *d) {
+  stops(d);
+  d->servo.stop_stiffness = 2e3, d->servo.stop_damping = 5.0;
+}
+static void stiff_turning(hxDefinition *d) {
+  turning(d);
+  d->friction.slope = 1e5, d->friction.spin_radius = d->friction.rolling_radius = 0.01;
+}
+static void stiff_rotors(hxDefinition *d) {
+  turning_elastic(d);
+  d->servo.gear_stiffness = 5000.0, d->servo.gear_damping = 20.0;
+}
+
+/* With steps of many time constants of its laws a robot that drops comes to rest. */
+static void long_steps_are_stable(void) {
+  static void (*const stiff[])(hxDefinition *) = {stiff_stops, stiff_turning, stiff_rotors, lugre};
+  for (size_t k = 0; k < sizeof stiff / sizeof *stiff; ++k)
+    for (int method = HX_METHOD_ROSW3; method <= HX_METHOD_ROS2; ++method) {
+      hxDefinition d;
+      hxInput input;
+      hxOutput output;
+      hxPlant *plant = hx_plant_create();
+      hx_definition_default(&d), hx_input_default(&input);
+      stiff[k](&d);
+      d.solver.method = method, d.solver.step = 2e-3, d.initial.position[2] += 0.005;
+      for (int leg = 0; leg < HX_LEGS; ++leg) input.angle_ref[leg][0] += 0.1;
+      CHECK(hx_plant_reset(plant, &d, 0.0) == HX_OK);
+      CHECK(hx_plant_step(plant, &input, 1.0) == HX_OK);
+      hx_plant_output(plant, &input, &output);
+      if (!(output.energy.kinetic < 1e-4))
+        fprintf(stderr, "stiff %zu, method %d: %g J\n", k, method, output.energy.kinetic);
+      CHECK(output.energy.kinetic < 1e-4); /* J */
+      hx_plant_destroy(plant);
+    }
+}
+
 /* ---- definitions that contradict themselves ---- */
 
 static void heavy_side(hxDefinition *d) { d->torso.inertia[0] = 1.0; }
@@ -366,6 +427,8 @@ int main(int arguments, char *argument[]) {
   read_grids(argument[1]);
   every_choice_keeps_the_laws();
   every_law_of_contact_and_every_method_keeps_them();
+  grids_may_be_raised();
+  long_steps_are_stable();
   contradictions_are_refused_by_name();
   for (int k = 0; k < GRIDS; ++k) hx_terrain_destroy(terrain[k]);
   return failures != 0;
