@@ -334,6 +334,21 @@ def test_walks_with_a_planned_squeeze_are_the_same(
     assert close(worst)
 
 
+def test_steps_of_a_robot_that_is_heavier_than_told_are_the_same(
+    controller_core: ct.CDLL,
+) -> None:
+    gait = replace(make_gait(load_robot("athena"), "amble"), narrowing=0.03)
+    ground, narrowing = Ground(), [0.0]
+
+    def heavy(controller: Controller, step: int, measurement: Measurement) -> None:
+        ground(controller, step, measurement)
+        measurement.foot_force[:] *= 1.4
+        narrowing.append(controller.paths.narrowing)
+
+    assert close(differences(controller_core, setup_of(gait=gait), sense=heavy)[0])
+    assert max(narrowing) == 1.0
+
+
 def test_another_period_gait_and_touch_down_speed_are_the_same_too(
     controller_core: ct.CDLL,
 ) -> None:

@@ -56,6 +56,7 @@ typedef struct hxGait {
   double offset[HX_LEGS];  /* 1    phase of each leg at clock 0, of HX_PATTERN_CUSTOM */
   double step_height;      /* m    the foot's lift above the ground */
   double touchdown_speed;  /* m/s  vertical, at the end of a swing */
+  double narrowing;        /* m    nearer to the hips under a load that the model does not have */
 } hxGait;
 
 /* Contents of gains.toml, without the data that they were designed for. */
