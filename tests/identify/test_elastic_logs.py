@@ -91,7 +91,7 @@ def test_stiffness_and_play_of_gears_are_found(
             deviation = found.deviations[row.key]
             low, high = row.interval(found.values[row.key], ALL_WITHIN * deviation)
             assert low < secret.values[row.key] < high, row.key
-            assert deviation < 0.1 * TOLD, row.key
+            assert deviation < 0.2 * TOLD, row.key
 
 
 def test_gears_that_the_robot_file_has_rigid_are_not_sought(secret: Secret) -> None:
