@@ -54,7 +54,7 @@ help:
 	@echo "make bench-gym  environment steps a second of the learning environments and of mujoco.rollout (1 min)"
 	@echo "make study-demo  500 walks, killed twice and completed; the same uninterrupted and on a Dask cluster: the same bytes (5 min)"
 	@echo "make control   what each part of the compliant control is worth, where, and what it survives: docs/control.md (5 min)"
-	@echo "make identify-campaign  20 robots with secret numbers, identified from logs of 6 s (15 min); ROBOTS and SECONDS"
+	@echo "make identify-campaign  20 robots with secret numbers, identified from logs of 6 s (10 min); ROBOTS, SECONDS, AT_A_TIME; goes on with out/identification_SECONDS.csv"
 	@echo "make docs      the documentation's site: build/docs/index.html (1 min)"
 	@echo "make format    formats C and Python"
 	@echo "make generate  generated/ of plant_fmu and controller_fmu from their interface.toml, pictures and reference results from the robot"
@@ -216,8 +216,10 @@ control: setup
 
 ROBOTS ?= 20
 SECONDS ?= 6
+AT_A_TIME ?= 1
 identify-campaign: setup
-	PYTHONPATH=tests/support $(BIN)/python -m benchmarks.identification --robots $(ROBOTS) --seconds $(SECONDS)
+	PYTHONPATH=tests/support $(BIN)/python -m benchmarks.identification --robots $(ROBOTS) --seconds $(SECONDS) \
+		--workers $(AT_A_TIME) --table out/identification_$(SECONDS).csv
 
 docs: setup
 	rm -rf build/docs
