@@ -1,10 +1,10 @@
 """Writes and reads recordings: CSV for spreadsheets, Parquet, MCAP for tools of robots, and the
 commands alone for importers. RRD files, for the viewer Rerun, are written only.
 
-CSV needs no package; Parquet, MCAP and RRD need the extras `parquet`, `logs` and `rerun`. A Parquet file has a
-column of doubles per variable, with unit and description as metadata of each field and the run's
-facts as metadata of the schema. A CSV file has "name [unit]" above each column. An MCAP file has
-ROS 2 messages (cosim/logs). All hold the same numbers, bit for bit.
+CSV needs no package; Parquet, MCAP and RRD need the extras `parquet`, `logs` and `rerun`. A Parquet
+file has a column of doubles per variable, with unit and description as metadata of each field and
+the run's facts as metadata of the schema. A CSV file has "name [unit]" above each column. An MCAP
+file has ROS 2 messages (cosim/logs). All hold the same numbers, bit for bit.
 """
 
 from __future__ import annotations
