@@ -478,6 +478,7 @@ static const hxVariable parameters[] = {
     {"parts.support", "", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, definition.parts.support), HX_BOOLEAN, 1},
     {"parts.slip_pid", "", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, definition.parts.slip_pid), HX_BOOLEAN, 1},
     {"parts.suspension", "", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, definition.parts.suspension), HX_BOOLEAN, 1},
+    {"parts.paper_suspension", "", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, definition.parts.paper_suspension), HX_BOOLEAN, 1},
     {"parts.touchdown", "", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, definition.parts.touchdown), HX_BOOLEAN, 1},
     {"parts.posture", "", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, definition.parts.posture), HX_BOOLEAN, 1},
     {"parts.path", "", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, definition.parts.path), HX_BOOLEAN, 1},
@@ -520,7 +521,7 @@ const char *const hx_log_category_names[] = {
 const hxStateRow *const hx_states = 0;
 const size_t hx_state_count = 0;
 
-const char hx_default_guid[] = "{80ce22ac-f0e9-4b4f-a89d-edf4b9fcb67c}";
+const char hx_default_guid[] = "{e364f1ea-9b15-44ce-8bd0-bfce8f850f00}";
 
 _Static_assert(HX_CONTROL_KINEMATIC == 1, "Control");
 _Static_assert(HX_CONTROL_COMPLIANT == 2, "Control");

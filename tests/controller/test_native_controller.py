@@ -31,7 +31,8 @@ from hexapod_cosim.cosim.interface.controller_interface import ControllerSetup
 from hexapod_cosim.models import load_robot
 
 ROBOTS = ("athena", "phantomx_mk4")
-ALL_PARTS, NO_FALLBACK = Parts(), Parts(fallback=False)
+ALL_PARTS = Parts(suspension=True)
+NO_FALLBACK = replace(ALL_PARTS, fallback=False)
 ANGLE = 1e-12  # rad
 SPEED = 1e-12  # relative to a servo's largest speed
 # relative to a servo's largest torque. The last bits of the paths change second differences by
@@ -58,7 +59,7 @@ def setup_of(
     timing = gait if isinstance(gait, Gait) else make_gait(robot, gait)
     gains = make_gains(robot) if compliant else None
     return ControllerSetup(
-        robot=robot, gait=timing, period=PERIOD, gains=gains, parts=parts or Parts()
+        robot=robot, gait=timing, period=PERIOD, gains=gains, parts=parts or ALL_PARTS
     )
 
 
@@ -317,7 +318,7 @@ def test_each_part_can_be_switched_off(controller_core: ct.CDLL, part: str) -> N
     assert close(
         differences(
             controller_core,
-            setup_of(parts=replace(Parts(), **{part: False})),
+            setup_of(parts=replace(ALL_PARTS, **{part: False})),
             sense=sense,
             steps=900,
         )[0]
