@@ -185,7 +185,9 @@ def test_prints_of_the_torso_are_found_again_and_are_the_twins(core: ct.CDLL) ->
 
 def body_of(robot: Robot, start: Any, angle: Array) -> Array:
     """Returns bodies (19, 13) at a start: position, quaternion, velocity, angular velocity."""
-    return body_states(robot, *map(np.asarray, start), angle, np.zeros((6, 3)))
+    position, quaternion, velocity, turn = map(np.asarray, start)
+    still = np.zeros((6, 3))
+    return body_states(robot, position, quaternion, velocity, turn, angle, still)
 
 
 def moved_with_the_twin(
