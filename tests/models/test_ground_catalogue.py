@@ -222,7 +222,7 @@ def test_slopes_beside_stairs_become_blocks_of_the_same_height() -> None:
     slope = make_surface("pyramid_slope", {"difficulty": 1.0})
     assert surface.kind == "blocks"
     heights = tile(surface, 1, 1, blocks=80, border=20)
-    places = 0.05 * (np.arange(-40, 40) + 0.5)
+    places: Array = 0.05 * (np.arange(-40.0, 40.0) + 0.5)
     expected = heights_at(slope, places, places)
     assert heights - heights[40, 40] == pytest.approx(expected, abs=1e-6)
     steps = np.abs(np.diff(heights, axis=1))
