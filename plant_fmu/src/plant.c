@@ -572,7 +572,7 @@ hxStatus hx_plant_tangent(hxPlant *plant, const hxInput *input, const hxInput *d
   point->x = x;
   point->dx = dx ? *dx : no_change;
   point->model = plant->model;
-  point->state = plant->state;
+  memcpy(&point->state, &plant->state, offsetof(hxState, moment));
   point->scale = scale > 0.0 ? scale : 1.0;
   hx_tangent(point, d_rate, d_output);
   return HX_OK;
