@@ -32,7 +32,7 @@ help:
 	@echo "make test-docs  the site with its notebooks run and its validation computed (5 min)"
 	@echo "make test-browser  the report in Chromium, at full length, and how long it takes to open (1 min)"
 	@echo "make test-importers  the same walk through libcosim, Ecos, ... and how far each is from fmpy (2 min)"
-	@echo "make test-platforms  the binaries for all platforms, Windows under Wine and Arm under qemu-user (installed with apt when root)"
+	@echo "make test-platforms  the binaries for all platforms, the wheel for Windows under Wine, Arm under qemu-user (installed with apt when root)"
 	@echo "make test-endurance  10,000 instances, 5,000 loadings, a million steps, threads, random calls (10 min)"
 	@echo "make test-native   the tests that are programs in C, run by ctest (1 min)"
 	@echo "make test-sanitize   these, the FMU's tests and random calls under address and undefined-behaviour sanitizers (5 min)"
@@ -95,9 +95,10 @@ test-browser: setup
 test-importers: setup
 	$(BIN)/python -m tools.importers.compare
 
-test-platforms: setup
+test-platforms: wheels
 	$(PYTHON) tools/install_emulators.py
 	HEXAPOD_PLATFORMS=all $(BIN)/python -m pytest tests/fmi/test_platforms.py tests/fmi/test_platform_walks.py tests/export/test_cross_build.py
+	HEXAPOD_PLATFORMS=all HEXAPOD_WHEELS=$(WHEELS) $(BIN)/python -m pytest tests/release/test_windows_wheel.py
 
 test-endurance: setup
 	$(BIN)/python -m pytest -q tests/fmi/test_endurance.py
