@@ -33,7 +33,7 @@ NOTEBOOKS = sorted((DOCS / "notebooks").glob("*.ipynb"))
 PAGES = [
     ROOT / name for name in ("README.md", "CONTRIBUTING.md", "CHANGELOG.md", "benchmarks/README.md")
 ] + sorted(DOCS.rglob("*.md"))
-SHORT = "duration=2"
+SHORT, PLAIN = "duration=2", ["--set", "outputs.plots=false"]
 COMPUTED = os.environ.get("HEXAPOD_SITE") == "computed"
 of_the_site = pytest.mark.skipif(not COMPUTED, reason="built by make test-docs")
 
@@ -231,7 +231,9 @@ def test_the_tutorial_works_as_typed_from_top_to_bottom(reader: Path) -> None:
             done += 1
         elif not kind:
             for line in text.splitlines():
-                run(reader, *shlex.split(line.replace("--show-plot", "")))
+                # the figures of one walk are enough
+                plain = PLAIN if re.match("hexapod simulate(?!.*compliant)", line) else []
+                run(reader, *shlex.split(line.replace("--show-plot", "")), *plain)
                 done += 1
     assert done >= 11
 
@@ -292,8 +294,9 @@ def test_the_five_minutes_of_the_page_on_controllers_work_as_typed(reader: Path)
     (shell,) = (text for kind, text in page if kind == "sh")
     lines = shell.splitlines()
     assert len(lines) == 3
+    more = {"compare": ["--seeds", "2"], "simulate": PLAIN}
     for line in lines:
-        run(reader, *shlex.split(line), *(["--seeds", "2"] if " compare " in line else []))
+        run(reader, *shlex.split(line), *more.get(line.split()[1], []))
     assert (reader / "out" / "mine" / "report.html").is_file()
     code = next(text for kind, text in page if kind == "python")
     said = run(reader, sys.executable, "-c", code).strip().splitlines()
@@ -312,7 +315,8 @@ def test_designed_gains_walk_and_serve_a_task_of_many(reader: Path) -> None:
     ]
     assert len(done) == 4
     for command in [line for line in done if line != "hexapod design -o out/gains"]:
-        run(reader, *shlex.split(re.sub("duration=[0-9]+", SHORT, command)))
+        plain = PLAIN if " simulate " in command else []
+        run(reader, *shlex.split(re.sub("duration=[0-9]+", SHORT, command)), *plain)
     _, task = (text for kind, text in blocks(DOCS / "howto" / "cluster.md") if kind == "python")
     assert (
         run(reader, sys.executable, "-c", task.replace("duration=5", SHORT)).count("completed") == 2

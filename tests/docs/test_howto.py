@@ -18,6 +18,7 @@ PAGES = Path(__file__).parents[2] / "docs" / "howto"
 COMMANDS = commands(PAGES / "fmpy.md", "fmpy")
 PYTHON = [text for kind, text in blocks(PAGES / "fmpy.md") if kind == "python"]
 SHORT = "0.5"  # s
+SHORTER = ["--set", f"duration={SHORT}", "--set", "outputs.plots=false"]
 
 
 @pytest.fixture(scope="module")
@@ -25,7 +26,7 @@ def folder(plant_build: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Where the reader is: the FMU and a recorded walk are there."""
     folder = tmp_path_factory.mktemp("reader")
     run(folder, "hexapod", "export", "-o", "athena.fmu")
-    run(folder, "hexapod", "simulate", "walk_flat", "--set", f"duration={SHORT}", "-o", "out/walk")
+    run(folder, "hexapod", "simulate", "walk_flat", *SHORTER, "-o", "out/walk")
     return folder
 
 
@@ -84,6 +85,6 @@ def test_the_pages_on_robots_and_packages_have_commands() -> None:
     ],
 )
 def test_a_command_of_the_pages_on_robots_and_packages_works(robots: Path, command: str) -> None:
-    shorter = ["--set", f"duration={SHORT}"] if "simulate" in command else []
+    shorter = [*SHORTER] if "simulate" in command else []
     shorter += ["--find", "servo", "--no-propose"] if "identify" in command else []
     assert run(robots, *shlex.split(command), *shorter)

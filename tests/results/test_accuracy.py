@@ -216,6 +216,7 @@ def accuracy_table(folder: Path) -> str:
     )
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_files_and_report_have_the_errors_and_the_report_can_be_made_again(
     call: Call, checked: tuple[Path, Mapping[str, Any]]
 ) -> None:
@@ -269,6 +270,7 @@ def test_without_the_option_nothing_is_walked_again_and_nothing_printed(
     assert "accuracy" not in json.loads((tmp_path / "metrics.json").read_text())
 
 
+@pytest.mark.usefixtures("undrawn")
 @pytest.mark.parametrize("command", [["simulate"], ["compare", "--seeds", "1"]])
 def test_an_interrupt_of_the_check_leaves_whole_results_without_it(
     call: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, command: list[str]

@@ -62,6 +62,7 @@ def test_a_servo_above_its_rating_over_the_run_is_warned_of(torque: float, warne
     assert found == ([text] if warned else [])
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_a_run_at_a_coarse_fixed_step_reports_its_residual_in_terminal_report_and_metrics(
     call: Call, tmp_path: Path
 ) -> None:
@@ -102,6 +103,7 @@ def test_a_comparison_counts_the_runs_of_each_control_whose_energy_balance_misse
     assert text.startswith(f"{expected}: tighten solver.tolerance")
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_a_comparison_over_seeds_reports_its_residuals_in_terminal_report_and_metrics(
     call: Call, tmp_path: Path
 ) -> None:

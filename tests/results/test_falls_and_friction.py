@@ -284,6 +284,7 @@ def test_a_robot_whose_feet_never_swing_says_why_there_is_no_error_in_swing() ->
     assert missing_metrics_warnings(View(walk.recording, PARAMETERS, PERIOD)) == []
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_a_run_that_stands_says_in_terminal_and_report_why_metrics_are_missing(
     call: Call, tmp_path: Path
 ) -> None:

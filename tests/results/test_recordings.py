@@ -257,6 +257,7 @@ def test_formats_can_be_chosen_and_either_is_read_back(
     assert len(read_result(folder).view.recording.time) == 41
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_a_folder_of_an_earlier_version_makes_a_report(call: Call, tmp_path: Path) -> None:
     """Such a folder holds results.csv with bare names."""
     folder = tmp_path / "out"
