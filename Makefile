@@ -82,13 +82,12 @@ $(STAMP): $(SOURCES)
 demo: setup
 	$(BIN)/hexapod compare demo_course -o out/demo
 
-# a process for each core has no use for threads of matrices
 test: setup typing
-	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest $(PARALLEL)
+	$(BIN)/python -m pytest $(PARALLEL)
 
 # builds the site with its notebooks run and its validation computed
 test-docs: setup
-	HEXAPOD_SITE=computed $(BIN)/python -m pytest -q tests/docs/test_docs.py -k "site or validation"
+	HEXAPOD_SITE=computed $(BIN)/python -m pytest -q tests/docs/test_docs.py -k "site or validation or reference"
 
 test-browser: setup
 	HEXAPOD_BROWSER=full $(BIN)/python -m pytest -s tests/report/test_browser.py tests/live/test_live_browser.py

@@ -14,11 +14,12 @@ from collections.abc import Mapping, Sequence
 from functools import cache, cached_property
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any, Self
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from hexapod_cosim.cosim.common.closing import Closing
 from hexapod_cosim.cosim.common.plant_files import BUILD, LOOP, shared_library
 from hexapod_cosim.cosim.interface.names import foot_names, joint_names, vector_names
 from hexapod_cosim.cosim.master.fmu import Fmu
@@ -151,7 +152,7 @@ def _library() -> ct.CDLL:
     return library
 
 
-class Batch:
+class Batch(Closing):
     """A number of environments with the same settings; a context manager that frees them.
 
     Args:
@@ -427,12 +428,6 @@ class Batch:
         for fmu in self._fmus:
             fmu.close()
         self._fmus.clear()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
 
 
 def _check_count(what: str, count: int) -> None:

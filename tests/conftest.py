@@ -4,8 +4,13 @@ internal functions; the command.
 
 from __future__ import annotations
 
-import ctypes
 import os
+
+# Threads of OpenBLAS wait by spinning: beside other processes, small matrices then take ten times
+# as long. OpenBLAS reads the variable when NumPy is imported.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+import ctypes
 import signal
 from collections.abc import Callable, Iterator
 from pathlib import Path

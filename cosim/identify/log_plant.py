@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from types import TracebackType
-from typing import Any, Self
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from hexapod_cosim.cosim.common.closing import Closing
 from hexapod_cosim.cosim.identify.log import Log, LogError
 from hexapod_cosim.cosim.master.fmu import Fmu
 from hexapod_cosim.models import FmuError
@@ -19,7 +19,7 @@ Event = tuple[float, bool, int]  # time [s], whether it is a command, row of the
 SAME_TIME = 1e-9  # s    events closer than this are one
 
 
-class LogPlant:
+class LogPlant(Closing):
     """A plant FMU that is reset for each simulation of a log; a context manager that frees it.
 
     Args:
@@ -95,15 +95,8 @@ class LogPlant:
                 outputs.get()
                 found[row] = outputs.values
 
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def close(self) -> None:
+        """Frees the FMU."""
         self.fmu.close()
 
 

@@ -22,13 +22,12 @@ from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from types import TracebackType
-from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from hexapod_cosim.controller import BodyCommand, ControllerError, Gains, JointCommand
+from hexapod_cosim.cosim.common.closing import Closing
 from hexapod_cosim.cosim.control.controllers import make_controller
 from hexapod_cosim.cosim.export.controller_export import export_controller
 from hexapod_cosim.cosim.interface.controller_interface import controller_parameters
@@ -60,7 +59,7 @@ MOST_WEIGHTS = 3.0  # body weights    largest push
 REST = BodyCommand()
 
 
-class LiveRobot:
+class LiveRobot(Closing):
     """Steps a robot; a context manager that frees its FMUs.
 
     Args:
@@ -296,17 +295,6 @@ class LiveRobot:
     def close(self) -> None:
         """Frees the FMUs."""
         self._open.close()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self.close()
 
 
 def _text_of(error: Exception) -> str:

@@ -12,8 +12,7 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import chdir
 from functools import cached_property, partial
 from pathlib import Path
-from types import TracebackType
-from typing import Any, Self
+from typing import Any
 
 import numpy as np
 from fmpy.fmi2 import FMU2Slave
@@ -21,6 +20,7 @@ from numpy.typing import NDArray
 
 from hexapod_cosim.cosim.common.archives import unpack
 from hexapod_cosim.cosim.common.binaries import refuse_incomplete
+from hexapod_cosim.cosim.common.closing import Closing
 from hexapod_cosim.cosim.common.plant_files import packed_binary
 from hexapod_cosim.cosim.common.unpacked import UnpackedFolder
 from hexapod_cosim.cosim.interface.descriptions import read_description
@@ -106,7 +106,7 @@ def _digest(content: bytes) -> str:
     return hashlib.sha256(content).hexdigest()
 
 
-class Fmu:
+class Fmu(Closing):
     """One instance of an FMI 2.0 co-simulation FMU; a context manager that frees it.
 
     Raises FmuError when the file cannot be loaded as such an FMU.
@@ -428,14 +428,3 @@ class Fmu:
             slave.freeInstance()
         self._directory.close()
         self._logged.close()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self.close()

@@ -10,10 +10,9 @@ from contextlib import ExitStack, closing
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from time import thread_time
-from types import TracebackType
-from typing import Self
 
 from hexapod_cosim.controller import Gains
+from hexapod_cosim.cosim.common.closing import Closing
 from hexapod_cosim.cosim.control.connection import Connection
 from hexapod_cosim.cosim.control.controllers import (
     connection_of,
@@ -57,7 +56,7 @@ from hexapod_cosim.models.records import BRISTLE_LAWS
 MAX_SETTINGS = 64  # robots whose settings are kept
 
 
-class Walker:
+class Walker(Closing):
     """Runs scenarios as `simulate` does, with the controller FMU instead of the Python controller.
 
     It is a context manager for use in one thread. Results do not depend on earlier runs.
@@ -275,14 +274,3 @@ class Walker:
         self._setup = None
         self._controller = None
         self._open.close()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self.close()

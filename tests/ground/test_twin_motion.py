@@ -154,7 +154,7 @@ def test_feet_between_walls_and_floors_move_as_the_twins(core: ct.CDLL) -> None:
     body = stood(robot, height=5e-4, velocity=(0.3, 0.5, -0.4))
     pair = Pair(core, robot, body)
     touched = set()
-    for k in range(1, 13):
+    for k in range(1, 9):
         state = pair.move(k * MACRO, marching)
         touched |= set(np.flatnonzero(~np.isnan(state.contacts.damping)) // 6)
     pair.assert_same()
@@ -215,7 +215,7 @@ def test_patches_of_other_material_are_the_twins(core: ct.CDLL, law: str) -> Non
     )
     robot = on(surface, changed(FEET, friction={"law": law}, foot={"pad_radius": 0.025}))
     pair = Pair(core, robot, stood(robot, height=1e-3, velocity=(0.2, 0.1, -0.3)))
-    state = pair.move(0.06, lambda _: Command(angle_ref=robot.stance))
+    state = pair.move(0.03, lambda _: Command(angle_ref=robot.stance))
     pair.assert_same()
     held = [state.contacts.held[leg] for leg in range(6)]
     assert [h.soil.law for h in held] == ["none", "none", "none", "bekker", "none", "none"]

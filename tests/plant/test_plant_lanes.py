@@ -178,7 +178,7 @@ def test_every_kernel_of_this_build_that_runs_here_gives_the_same_rates(core: ct
 
 @pytest.fixture(scope="session")
 def other_cores(tmp_path_factory: pytest.TempPathFactory) -> dict[str, ct.CDLL]:
-    """Returns the plant compiled for other lane widths, and with less optimisation than the plant
+    """Returns the plant compiled for other lane widths, and without the optimisation of the plant
     under test.
     """
     compiler = shutil.which("cc") or shutil.which("gcc") or shutil.which("clang")
@@ -194,7 +194,7 @@ def other_cores(tmp_path_factory: pytest.TempPathFactory) -> dict[str, ct.CDLL]:
     ]
     flags = [
         "-std=c11",
-        "-O1",
+        "-O0",
         "-shared",
         "-fPIC",
         "-ffp-contract=off",
