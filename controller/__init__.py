@@ -20,12 +20,13 @@ from hexapod_cosim.controller.gains import (
     load_gains,
     save_gains,
 )
-from hexapod_cosim.controller.parts import SWITCHES, Parts
+from hexapod_cosim.controller.parts import COMPLIANT_PARTS, SWITCHES, Parts
 from hexapod_cosim.controller.walk.gait import PATTERNS, Gait, Pattern, make_gait
 from hexapod_cosim.controller.walk.kinematics import LegSolver
 from hexapod_cosim.controller.walk.trajectory import BodyCommand, CommandRamp, FootPaths
 
 __all__ = [
+    "COMPLIANT_PARTS",
     "PATTERNS",
     "SWITCHES",
     "BodyCommand",

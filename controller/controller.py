@@ -26,7 +26,7 @@ from hexapod_cosim.controller.comply.posture import Posture
 from hexapod_cosim.controller.gains import Gains
 from hexapod_cosim.controller.memory import Stateful
 from hexapod_cosim.controller.parts import Parts
-from hexapod_cosim.controller.plane import LEGS, Array, Mask, Plane, rows_of
+from hexapod_cosim.controller.plane import LEGS, Array, Mask, Plane, cis, rows_of
 from hexapod_cosim.controller.walk.gait import Gait
 from hexapod_cosim.controller.walk.inverse_dynamics import Masses, Neighbours
 from hexapod_cosim.controller.walk.kinematics import Feet, LegSolver, Pose
@@ -154,7 +154,11 @@ class Controller(Stateful):
         self.period, self.gait, self.gains, self.parts = period, gait, gains, parts
         self.legs, self.stance = LegSolver(robot), robot.stance
         self.ramp = CommandRamp(gait.period, period=period)
-        self.paths = FootPaths(gait, self.legs.forward(self.stance), period=period)
+        home = self.legs.forward(self.stance)
+        inward = -gait.narrowing * cis(self.legs.hip_yaw + self.stance[:, 0])
+        narrow = self.legs.pose(home[:, 0] + 1j * home[:, 1] + inward, home[:, 2])
+        turned = self.legs.rolling(narrow.angle)
+        self.paths = FootPaths(gait, home, period=period, inward=inward, turned=turned)
         self.compliant: Compliant | None = None
         self.paper: Paper | None = None
         if gains is not None and law == "paper":
@@ -204,26 +208,33 @@ class Controller(Stateful):
             return activation, np.zeros(LEGS)
         return activation, support.lowering(feet.plane, activation)
 
-    def place_legs(self, posture: Posture, plane: Plane, height: Array) -> tuple[Plane, Pose]:
+    def place_legs(
+        self, posture: Posture, plane: Plane, height: Array, rolled: Array
+    ) -> tuple[Plane, Pose]:
         """Returns the shift of the feet due to rolling (C9) [m], and the pose of the legs.
 
         A tibia that pitches by dB rolls the sphere of its foot by -R dB along the outward direction
         of the leg. The shift s changes B itself: s = R (C + s dC/du) is solved by one Newton step.
 
-        plane, height: (..., 6) centres of the feet, walking frame [m].
+        Args:
+            posture: of the torso.
+            plane, height: (..., 6) centres of the feet, walking frame [m].
+            rolled: (6,) distances rolled that are no shift, because the feet aim at another
+                position than that of the stance [m].
         """
         legs = self.legs
         pose = legs.pose(*posture.see_place(plane, height))
         slope = legs.speeds(pose, pose.heading, 0.0)
         turns = slope[..., 2] - slope[..., 1]
-        shift = pose.heading * (legs.rolling(pose.angle) / (1.0 - legs.radius * turns))
+        rolls = legs.rolling(pose.angle) - rolled
+        shift = pose.heading * (rolls / (1.0 - legs.radius * turns))
         return shift, legs.pose(*posture.see_place(plane + shift, height))
 
     def _lay_out(self, value: Array, posture: Posture, feet: PlannedFeet) -> PlannedStep:
         """Computes the pose of the legs and the point masses for planned feet."""
         activation, lowering = self._lower(feet)
         height = feet.height - lowering
-        shift, pose = self.place_legs(posture, feet.plane, height)
+        shift, pose = self.place_legs(posture, feet.plane, height, feet.rolled)
         masses = None
         if self.compliant is not None:
             masses = self.compliant.dynamics.place(pose, feet.way, feet.turn, posture)
@@ -242,6 +253,11 @@ class Controller(Stateful):
         if self.compliant is not None:
             falling = self.paths.swinging & (self._now.feet.rise < 0.0)
             self.paths.met = falling & self.compliant.laws.meets()
+
+    def _narrow(self) -> None:
+        """Aims the steps of a commanded motion at the stance that the weight asks for (C53)."""
+        if self.compliant is not None and self.ramp.moves():
+            self.paths.narrowing = self.compliant.warmth.narrowing
 
     def _waits(self) -> bool:
         """Returns whether the gait clock waits for feet at the ends of their swings (C50)."""
@@ -276,6 +292,7 @@ class Controller(Stateful):
         """
         due = command_changed or self._after is None
         self._note_contacts()
+        self._narrow()
         if due or self.paths.held:
             waiting = self._waits()
             if due or not waiting:
@@ -369,7 +386,9 @@ class Controller(Stateful):
             overspeed=bool((np.abs(speed) >= self.legs.speed_max).any()),
         )
         climb = self.legs.speeds(now.pose, 0.0, 1.0)
-        return Stance(plan, climb, now.value, now.posture, now.feet.plane, now.height)
+        return Stance(
+            plan, climb, now.value, now.posture, now.feet.plane, now.height, now.feet.rolled
+        )
 
     # ---------------------------------------------------------------------------------- steps
 

@@ -1,6 +1,7 @@
 """Defines the switches of the parts of compliant control, and the weight of the squeeze.
 
-Each part can be switched off by itself, so that its effect can be measured.
+Each part can be switched by itself, so that its effect can be measured. Parts that better no figure
+of the course are off by default.
 """
 
 from __future__ import annotations
@@ -10,11 +11,12 @@ from dataclasses import dataclass, fields
 
 @dataclass(frozen=True, kw_only=True)
 class Parts:
-    """Switches, all on by default; they have no effect on kinematic control."""
+    """Switches; they have no effect on kinematic control."""
 
     support: bool = True  # servo torques that carry each leg's share of weight and acceleration
     slip_pid: bool = True  # feet yield to squeezing tangential forces
-    suspension: bool = True  # legs yield to normal forces above their share
+    suspension: bool = False  # legs yield to normal forces above their share
+    paper_suspension: bool = True  # of the paper's control: legs yield to normal forces
     touchdown: bool = True  # foot heights follow early and late touch-downs
     posture: bool = True  # roll, pitch and height are controlled
     path: bool = True  # the path walked is measured at the feet, and its deviation corrected
@@ -28,3 +30,4 @@ class Parts:
 
 
 SWITCHES = tuple(item.name for item in fields(Parts) if item.name != "squeeze")
+COMPLIANT_PARTS = tuple(name for name in SWITCHES if name != "paper_suspension")

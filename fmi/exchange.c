@@ -1,5 +1,5 @@
 /* exchange.c - model exchange and derivatives: continuous states, events, directional derivatives.
- */
+ * Instances of model exchange exist only where hx_continuous does. */
 #include "fmi/instance.h"
 
 #include <math.h>
@@ -19,8 +19,6 @@ static hxStatus check_count(hxInstance *instance, const char *what, size_t got, 
          expected);
   return HX_INVALID_ARGUMENT;
 }
-
-static size_t indicator_count(void) { return hx_continuous ? hx_continuous->indicators : 0; }
 
 /* ----------------------------------------------------------------------------------------------
  * states */
@@ -79,7 +77,6 @@ hxStatus hx_instance_get_nominals(hxInstance *instance, double nominal[], size_t
 }
 
 hxStatus hx_instance_completed_step(hxInstance *instance) {
-  if (!hx_continuous) return HX_OK;
   if (instance->state.model_stale && hx_instance_initialize(instance) != HX_OK)
     return HX_INVALID_ARGUMENT;
   hx_continuous->completed(instance->component, &instance->state.variables);
@@ -91,7 +88,7 @@ hxStatus hx_instance_completed_step(hxInstance *instance) {
  * events */
 
 hxStatus hx_instance_get_indicators(hxInstance *instance, double indicator[], size_t n) {
-  const hxStatus status = check_count(instance, "event indicators", n, indicator_count());
+  const hxStatus status = check_count(instance, "event indicators", n, hx_continuous->indicators);
   if (status != HX_OK || n == 0) return status;
   if (instance->state.model_stale && hx_instance_initialize(instance) != HX_OK)
     return HX_INVALID_ARGUMENT;
@@ -100,8 +97,7 @@ hxStatus hx_instance_get_indicators(hxInstance *instance, double indicator[], si
 }
 
 hxStatus hx_instance_update(hxInstance *instance, int *states_changed) {
-  *states_changed =
-      hx_continuous ? hx_continuous->update(instance->component, &instance->state.variables) : 0;
+  *states_changed = hx_continuous->update(instance->component, &instance->state.variables);
   hx_mark_stale(instance);
   return HX_OK;
 }

@@ -185,9 +185,12 @@ def friction_force(
 
 
 def _tanh_per_speed(friction: Friction, speed: float) -> float:
-    """Returns tanh(k_t v)/v [s/m] at a speed [m/s], at rest k_t; 0 for the law `none`."""
-    if friction.law == "none":
-        return 0.0
+    """Returns `regularised_direction`, 0 for the law `none`."""
+    return 0.0 if friction.law == "none" else regularised_direction(friction, speed)
+
+
+def regularised_direction(friction: Friction, speed: float) -> float:
+    """Returns tanh(k_t v)/v [s/m] at a speed [m/s], at rest k_t."""
     x = friction.slope * speed
     return math.tanh(x) / speed if x > 1e-5 else friction.slope * (1.0 - x * x / 3.0)
 

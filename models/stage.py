@@ -51,7 +51,12 @@ from hexapod_cosim.models.kinematics import (
 from hexapod_cosim.models.records import Array, Robot
 from hexapod_cosim.models.servos.gear import Rotors, gear_slopes, is_elastic, spin_inertia
 from hexapod_cosim.models.servos.motor import friction_drag, has_measured_friction
-from hexapod_cosim.models.soil.law import shear_limit, soil_normal_force, soil_normal_slopes
+from hexapod_cosim.models.soil.law import (
+    body_shear_drag,
+    shear_limit,
+    soil_normal_force,
+    soil_normal_slopes,
+)
 from hexapod_cosim.models.touch.forces import (
     Contacts,
     Held,
@@ -126,8 +131,7 @@ def keep_slopes(
     for k, spot, held, contact in closed_contacts(robot, body, contacts):
         turn = body[spot.sphere.body, 10:13]
         if held.is_soft:
-            plastic = float(contacts.plastic[spot.leg])
-            found[k] = soil_slopes(robot, held, plastic, contact, ahead)
+            found[k] = soil_slopes(robot, spot, held, float(contacts.sunk[k]), contact, ahead)
         else:
             deflection = bristle[spot.leg] if spot.is_sole else np.zeros(3)
             found[k] = rigid_slopes(robot, spot, held, contact, deflection, turn, ahead)
@@ -183,13 +187,19 @@ def rigid_slopes(
 
 
 def soil_slopes(
-    robot: Robot, held: Held, plastic: float, contact: FootContact, ahead: float
+    robot: Robot, spot: Spot, held: Held, plastic: float, contact: FootContact, ahead: float
 ) -> ContactSlopes:
-    """Returns the derivatives of a foot on soil at plastic depth z_p [m]; its moments have none."""
-    soil, foot, depth = held.soil, robot.foot, expected_depth(contact, ahead)
+    """Returns the derivatives of a sphere on soil at plastic depth z_p [m]; its moments have
+    none.
+    """
+    soil, foot, depth = held.soil, spot.shape(robot), expected_depth(contact, ahead)
     at = (soil, foot, plastic, depth, contact.approach_speed)
     limit = shear_limit(soil, foot, max(depth, plastic), soil_normal_force(*at))
-    yielding = float(np.linalg.norm(slip_velocity(contact))) / soil.shear_displacement
+    slip_speed = float(np.linalg.norm(slip_velocity(contact)))
+    if not spot.is_sole:
+        along = body_shear_drag(held.friction, limit, slip_speed)
+        return ContactSlopes(*soil_normal_slopes(*at), drag=along)
+    yielding = slip_speed / soil.shear_displacement
     shear = limit / soil.shear_displacement
     return ContactSlopes(*soil_normal_slopes(*at), drag=0.0, bristle=shear, beta=yielding)
 

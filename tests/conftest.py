@@ -32,25 +32,30 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
 # what takes longest begins, so that no process is left with it in the end
 LONGEST = (
     "test_docs",
-    "test_side_by_side",
-    "test_long_walk",
-    "test_walking",
-    "test_endurance",
-    "test_cli",
-    "test_controller_design",
-    "test_howto",
-    "test_batch",
-    "test_readme",
-    "test_control_benchmark",
-    "test_examples",
-    "test_laws_impact",
     "test_platforms",
-    "test_robot_package",
-    "test_cli_endings",
+    "test_platform_walks",
+    "test_cli",
     "test_study_cluster",
-    "test_study_store",
+    "test_readme",
+    "test_howto",
+    "test_live_browser",
+    "test_twin_motion",
+    "test_accuracy",
+    "test_batch",
+    "test_side_by_side",
     "test_study_workers",
     "test_random_robots",
+    "test_browser",
+    "test_browser_ground",
+    "test_cli_endings",
+    "test_controller_continuity",
+    "test_study_store",
+    "test_identify",
+    "test_export",
+    "test_fmi3_archive",
+    "test_control_benchmark",
+    "test_examples",
+    "test_plant_lanes",
 )
 # what builds the same binaries for other platforms stays together
 TOGETHER = dict.fromkeys(("test_platforms", "test_platform_walks", "test_cross_build"), "platforms")
@@ -157,6 +162,12 @@ def read_only() -> Iterator[Callable[[Path], None]]:
     yield protect
     for path in changed:
         path.chmod(path.stat().st_mode | 0o200)
+
+
+@pytest.fixture
+def undrawn(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Reports that this process writes have no figures, which take seconds to draw."""
+    monkeypatch.setattr("hexapod_cosim.cosim.report.plots.save_figures", lambda *_: ([], {}))
 
 
 @pytest.fixture

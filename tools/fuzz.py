@@ -2,17 +2,21 @@
 figures.
 
 usage: python -m tools.fuzz [--afl] SECONDS [TARGET ...]
+       python -m tools.fuzz [--afl] ledger
 
 Each target of tests/fuzz gets an equal share of the time; the readers (tests/fuzz/test_readers.py),
 which are the target "readers", get one share too. Inputs that reach new code are kept in
-build/fuzz/corpus, inputs that violate a rule are written to build/fuzz/findings, figures to
-build/fuzz/figures.json. With --afl the C targets alone are run, by AFL++, with all files in
-build/fuzz-afl. The exit code is 1 after a finding.
+build/fuzz/corpus, inputs that violate a rule are written to build/fuzz/findings. A line of figures
+is added to build/fuzz/ledger.jsonl after each target, so that the times of several runs add up;
+targets with the shortest time until now come first. `ledger` prints the sums as a table. With --afl
+the C targets alone are run, by AFL++, with all files in build/fuzz-afl. The exit code is 1 after a
+finding.
 """
 
 from __future__ import annotations
 
 import json
+import math
 import os
 import re
 import shutil
@@ -20,15 +24,18 @@ import subprocess
 import sys
 import time
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 ROOT = Path(__file__).resolve().parents[1]
 BUILD, AFL_BUILD = ROOT / "build" / "fuzz", ROOT / "build" / "fuzz-afl"
 SEEDS = ROOT / "tests" / "fuzz" / "seeds"
 READERS = "readers"
+LEDGER = "ledger.jsonl"
 READING = ("-q", "-n", "0", "--hypothesis-show-statistics", "tests/fuzz/test_readers.py")
 LONGEST_INPUT = 4096  # bytes
 LONGEST_CALL = 60  # s  an input that takes longer is a finding
@@ -180,37 +187,87 @@ def read(seconds: float) -> Figures:
     return Figures(READERS, inputs, 0, time.monotonic() - begin, found)
 
 
+# ---- the ledger ----
+
+
+def note(place: Path, one: Figures) -> None:
+    """Adds a target's figures, with the time and the commit, to the ledger."""
+    command = ["git", "describe", "--always", "--dirty"]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+    finished = datetime.now(UTC).isoformat(timespec="seconds")
+    line = {"finished": finished, "code": done.stdout.strip(), **asdict(one)}
+    place.mkdir(parents=True, exist_ok=True)
+    with (place / LEDGER).open("a", encoding="utf-8") as file:
+        file.write(json.dumps(line) + "\n")
+
+
+def noted(place: Path) -> list[dict[str, Any]]:
+    """Returns the lines of the ledger; one that a killed run left incomplete is skipped."""
+    lines = []
+    if (place / LEDGER).exists():
+        for line in (place / LEDGER).read_text(encoding="utf-8").splitlines():
+            with suppress(json.JSONDecodeError):
+                lines.append(json.loads(line))
+    return lines
+
+
+def seconds_of(place: Path, target: str) -> float:
+    """Returns for how long a target has run in all [s]."""
+    return math.fsum(line["seconds"] for line in noted(place) if line["target"] == target)
+
+
+def table(place: Path) -> str:
+    """Returns the sums of the ledger as a table in Markdown."""
+    lines = noted(place)
+    rows = [
+        "| target | runs | inputs | edges reached | s | findings |",
+        "|---|---|---|---|---|---|",
+    ]
+    for target in sorted({line["target"] for line in lines}):
+        of = [line for line in lines if line["target"] == target]
+        inputs, found = (sum(line[key] for line in of) for key in ("inputs", "found"))
+        edges = f"{max(line['covered'] for line in of):,}"
+        rows.append(
+            f"| {target} | {len(of)} | {inputs:,} | {'not measured' if edges == '0' else edges} "
+            f"| {seconds_of(place, target):,.0f} | {found} |"
+        )
+    if lines:
+        rows += ["", f"From {lines[0]['finished']} to {lines[-1]['finished']}."]
+    return "\n".join(rows)
+
+
 def main(arguments: Sequence[str]) -> int:
     """Runs the targets and returns the exit code."""
     by_afl = "--afl" in arguments
     arguments = [word for word in arguments if word != "--afl"]
+    place = AFL_BUILD if by_afl else BUILD
     known = [*sorted(folder.name for folder in SEEDS.iterdir()), *([] if by_afl else [READERS])]
+    if arguments == ["ledger"]:
+        print(table(place))
+        return 0
     if not arguments or not arguments[0].isdigit() or set(arguments[1:]) - set(known):
         print(
-            f"usage: python -m tools.fuzz [--afl] SECONDS [TARGET ...]; targets: {', '.join(known)}"
+            f"usage: python -m tools.fuzz [--afl] SECONDS [TARGET ...] | ledger; targets: "
+            f"{', '.join(known)}"
         )
         return 2
-    chosen = list(arguments[1:]) or known
+    chosen = sorted(arguments[1:] or known, key=partial(seconds_of, place))
     share = int(arguments[0]) / len(chosen)
-    place = AFL_BUILD if by_afl else BUILD
     if set(chosen) != {READERS}:
         build(place, [target for target in chosen if target != READERS])
-    figures = []
+    findings = 0
     for target in chosen:
         run = read if target == READERS else partial(fuzz_by_afl if by_afl else fuzz, target)
         one = run(share)
+        note(place, one)
+        findings += one.found
         said = "a finding" if one.found else "no finding"
         print(
             f"{target:30}{one.inputs:12,} inputs {one.covered:7,} edges",
             f"{one.seconds:7.0f} s  {said}",
             flush=True,
         )
-        figures.append(one)
-    place.mkdir(parents=True, exist_ok=True)
-    about = {"finished": datetime.now(UTC).isoformat(timespec="seconds")}
-    text = json.dumps({**about, "targets": [asdict(one) for one in figures]}, indent=1)
-    (place / "figures.json").write_text(text + "\n", encoding="utf-8")
-    return int(any(one.found for one in figures))
+    return int(findings > 0)
 
 
 if __name__ == "__main__":

@@ -1,5 +1,5 @@
 """Installs the emulators of `make test-platforms` from Debian's or Ubuntu's packages: Wine,
-qemu-user, an Arm C library.
+Maven, qemu-user, an Arm C library.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ from pathlib import Path
 
 PACKAGES = {  # by a program or file of the package
     "wine": ["wine", "wine64"],
+    "mvn": ["maven"],  # downloads the Python for Windows
     "qemu-aarch64": ["qemu-user"],
     "/usr/aarch64-linux-gnu/lib/libc.so.6": ["libc6-arm64-cross"],
 }

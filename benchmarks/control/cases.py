@@ -6,12 +6,12 @@ The cases vary one factor at a time around the judged walk, and gait and speed t
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from hexapod_cosim.controller import SWITCHES
+from hexapod_cosim.controller import COMPLIANT_PARTS, Parts
 from hexapod_cosim.cosim.scenario.records import Scenario
 from hexapod_cosim.cosim.scenario.scenario import load_scenario
 from hexapod_cosim.cosim.scenario.variation import STANDARD
@@ -56,42 +56,49 @@ def judged_walk(name: str = "judged", *settings: str) -> Case:
 
 
 def ablation() -> list[Case]:
-    """Returns cases with no part, each part alone, all but each part, and all parts.
+    """Returns cases with no part, the default, each part alone, and the default but one part.
 
     The squeeze belongs to the support, and so to the support alone.
     """
-    off = {part: f"{SWITCH}{part}=false" for part in SWITCHES}
-    nothing = judged_walk("no part", *off.values())
-    alone = [
-        judged_walk(f"{part} alone", *(text for other, text in off.items() if other != part))
-        for part in SWITCHES
+    default = {part for part in COMPLIANT_PARTS if getattr(Parts(), part)}
+    cases = [_with_parts("no part", set()), judged_walk("by default")]
+    cases += [_with_parts(f"{part} alone", {part}) for part in COMPLIANT_PARTS]
+    cases += [
+        _with_parts(f"without {part}", default - {part})
+        if part in default
+        else _with_parts(f"with {part}", default | {part})
+        for part in COMPLIANT_PARTS
     ]
-    off["squeeze"] = f"{SWITCH}squeeze=0"
-    without = [judged_walk(f"all but {part}", text) for part, text in off.items()]
-    return [nothing, *alone, *without, judged_walk("all parts")]
+    return [*cases, judged_walk("without squeeze", f"{SWITCH}squeeze=0")]
+
+
+def _with_parts(name: str, on: Collection[str]) -> Case:
+    """Returns the judged walk with these parts of compliant control and no others."""
+    switches = (f"{SWITCH}{part}={str(part in on).lower()}" for part in COMPLIANT_PARTS)
+    return judged_walk(name, *switches)
 
 
 def sticking() -> list[Case]:
     """Returns the judged walk on ground that holds a foot still.
 
-    One case has all parts, the other the slip PID alone.
+    One case has the parts of the default, the other the slip PID alone.
     """
     law = DATA["judged"]["sticking"]
     alone = next(case for case in ablation() if case.name == "slip_pid alone")
-    return [judged_walk("all parts", *law), judged_walk(alone.name, *law, *alone.settings)]
+    return [judged_walk("by default", *law), judged_walk(alone.name, *law, *alone.settings)]
 
 
 def model_errors() -> list[Case]:
     """Returns the judged walk on plants that differ from the controller's model.
 
-    Each has a case with all parts and one without the slip PID.
+    Each has a case with the parts of the default and one without the slip PID.
     """
     entries = [entry for entry in DATA["robustness"]["cases"] if entry.get("model_error")]
     off = f"{SWITCH}slip_pid=false"
     return [
         judged_walk(f"{entry['name']}, {name}", *entry["settings"], *settings)
         for entry in entries
-        for name, settings in (("all parts", ()), ("all but slip_pid", (off,)))
+        for name, settings in (("by default", ()), ("without slip_pid", (off,)))
     ]
 
 

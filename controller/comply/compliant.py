@@ -65,6 +65,7 @@ class Stance(NamedTuple):
     posture: Posture  # of the torso
     plane: Plane  # m    (6,) planned feet, walking frame
     height: Array  # m    (6,) to which they are lowered, walking frame
+    rolled: Array  # m    (6,) outwards from the stance to the positions that the feet aim at
 
 
 class Steering(NamedTuple):
@@ -124,6 +125,7 @@ class Compliant(Stateful):
         self.warmth = Warmth(
             rating=robot.servo.torque_continuous,
             squeeze=parts.squeeze if parts.support else 0.0,
+            narrows=parts.support and gait.narrowing > 0.0,
             cycle=gait.period,
             period=period,
         )
@@ -182,7 +184,8 @@ class Compliant(Stateful):
         w, x, y, z = measurement.quaternion.tolist()
         foot = legs.forward(angle)
         plane, height = stance.posture.turn(foot[:, 0] + 1j * foot[:, 1], foot[:, 2])
-        rolled = cis(legs.hip_yaw + angle[:, 0]) * legs.rolling(angle)
+        rolls = legs.rolling(angle) - stance.rolled
+        rolled = cis(legs.hip_yaw + angle[:, 0]) * rolls
         vx, vy, yaw_rate, commanded_height, roll, pitch = stance.value.tolist()
         roll_seen = atan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y))
         pitch_seen = asin(min(max(2.0 * (w * y - z * x), -1.0), 1.0))
@@ -228,6 +231,7 @@ class Compliant(Stateful):
         output.angle_ref[...] = self._correct(output.angle_ref, climb, raised)
         output.torque_ref[...] = laws.torque
         burden = laws.burden
+        self.warmth.weigh(burden.heft)
         self.warmth.step(laws.torque, burden.heft * burden.peak / burden.most, laws.held)
         if busy or self.moving:
             rise = (offset - self.offset) * self.per_second

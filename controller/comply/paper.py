@@ -86,5 +86,5 @@ class Paper(Stateful):
         """
         if self.parts.slip_pid:
             self._yield_sideways(force[:, 0] + 1j * force[:, 1], swinging)
-        if self.parts.suspension:
+        if self.parts.paper_suspension:
             self._yield_upwards(force[:, 2])

@@ -61,6 +61,7 @@ class Gait:
     offsets: tuple[float, ...]  # 1    (6,) phase of each leg at clock 0
     step_height: float  # m    the foot's lift above the ground
     touchdown_speed: float = 0.0  # m/s    vertical, at the end of a swing
+    narrowing: float = 0.0  # m    nearer to the hips under a load that the model does not have
 
     def __post_init__(self) -> None:
         for name, value, low, high in (
@@ -76,6 +77,14 @@ class Gait:
                     fix=f"change {name}",
                     where=self.name,
                 )
+        if not 0.0 <= self.narrowing < np.inf:
+            raise HexapodError(
+                "impossible gait",
+                got=self.narrowing,
+                expected="0 <= narrowing < inf",
+                fix="change narrowing",
+                where=self.name,
+            )
         if self.touchdown_speed < 0.0 or len(self.offsets) != len(AROUND_TO_LEGS):
             got = (self.touchdown_speed, len(self.offsets))
             raise HexapodError(

@@ -172,6 +172,7 @@ class PlannedFeet(NamedTuple):
     blend: Array  # 1    s of swinging feet, else 0
     goal: Plane  # m    landing point of a swinging foot, position of a standing one
     pull: Plane  # m    q of C5, (goal - foot)/(1 - s), of swinging feet; 0 of standing ones
+    rolled: Array  # m    outwards from the stance to the position that the foot aims at (C53)
     way: complex  # m    scalar: position of the walking frame, D of C3
     turn: float  # rad    scalar: heading of the walking frame, theta of C3
     twist: Twist  # of the body
@@ -196,17 +197,31 @@ class FootPaths(Stateful):
         held: the gait clock stands still until feet at the ends of their swings carry load
             (scalar).
         awaited: feet that it waits for.
+        narrowing: part of the way to the narrow stance that the steps aim at (scalar).
     """
 
     STATE = (
         "walking", "before", "swinging", "standing", "lifted", "stayed", "stays", "met", "held",
-        "awaited",
+        "awaited", "narrowing",
     )  # fmt: skip
 
-    def __init__(self, gait: Gait, home: Array, *, period: float) -> None:
+    def __init__(
+        self,
+        gait: Gait,
+        home: Array,
+        *,
+        period: float,
+        inward: Plane | None = None,
+        turned: Array | None = None,
+    ) -> None:
         """Puts all feet in the stance.
 
-        home: (6, 3) centres of the feet in the stance, torso frame [m]; period [s].
+        Args:
+            gait: of the robot.
+            home: (6, 3) centres of the feet in the stance, torso frame [m].
+            period: of the controller [s].
+            inward: (6,) from the stance to the narrow stance, torso frame [m]; by default 0.
+            turned: (6,) distances that the feet roll outwards on this way [m]; by default 0.
         """
         self.gait, self.period = gait, period
         self.swing_time = gait.period * (1.0 - gait.duty)
@@ -218,6 +233,8 @@ class FootPaths(Stateful):
         # the walk begins in the time of their swing
         self.late = first - np.floor(first) >= gait.duty
         self.home, self.home_height = home[:, 0] + 1j * home[:, 1], home[:, 2].copy()
+        self.inward = np.zeros(LEGS, dtype=np.complex128) if inward is None else inward
+        self.turned = np.zeros(LEGS) if turned is None else turned
         self.walking, self.before = False, 0
         self.swinging: Mask
         self.standing: Mask
@@ -227,6 +244,7 @@ class FootPaths(Stateful):
         self.met: Mask
         self.held = False
         self.awaited: Mask
+        self.narrowing = 0.0
         self.reset()
 
     def _phase_after(self, number: int) -> Array:
@@ -256,6 +274,7 @@ class FootPaths(Stateful):
             blend=nothing,
             goal=plane,
             pull=still,
+            rolled=self.narrowing * self.turned,
             way=0j,
             turn=0.0,
             twist=Twist(0j, 0.0),
@@ -263,6 +282,7 @@ class FootPaths(Stateful):
 
     def reset(self) -> PlannedFeet:
         """Puts all feet in the stance and stops the gait clock; returns the feet."""
+        self.narrowing = 0.0
         return self._rest(self.home)
 
     def _lift_off(self) -> None:
@@ -274,6 +294,10 @@ class FootPaths(Stateful):
         self.swinging = self.swinging & ~self.standing
         self.stays = np.zeros(LEGS, dtype=np.bool_)
 
+    def _aims(self) -> Plane:
+        """Returns the stance positions (6,) that the steps aim at, walking frame [m] (C53)."""
+        return np.asarray(self.home + self.narrowing * self.inward)
+
     def _come_home(self, swung: Mask, now: PlannedFeet) -> tuple[bool, Plane]:
         """Lets feet that are in their stance positions skip their steps.
 
@@ -283,7 +307,7 @@ class FootPaths(Stateful):
         """
         landed = swung & self.standing
         feet = np.where(landed, cis(-now.turn) * (now.goal - now.way), now.plane)
-        home = np.abs(feet - self.home) < HOME_TOLERANCE
+        home = np.abs(feet - self._aims()) < HOME_TOLERANCE
         self.lifted = self.lifted & ~home
         self.stays = home & ~self.swinging
         return bool(home.all() and not (self.swinging | self.lifted).any()), feet
@@ -390,9 +414,9 @@ class FootPaths(Stateful):
         return bool((stands == self.standing).all())
 
     def _landing(self, tau: Array, twist: Twist) -> Plane:
-        """Returns the landing points (6,) in the walking frame [m] (C4)."""
+        """Returns the landing points (6,) in the walking frame [m] (C4, C53)."""
         ahead = self.landing_lead - tau * self.swing_time
-        return np.asarray(cis(twist.yaw_rate * ahead) * self.home + travel(twist, ahead))
+        return np.asarray(cis(twist.yaw_rate * ahead) * self._aims() + travel(twist, ahead))
 
     def _odometry(self, before: PlannedFeet, twist: Twist) -> tuple[complex, float]:
         """Returns position [m] and heading [rad] of the walking frame in the ground frame (C3)."""
@@ -420,8 +444,13 @@ class FootPaths(Stateful):
         goal = np.where(free, way + cis(turn) * self._landing(tau, twist), before.goal)
         left = np.maximum(1.0 - before.blend, NEARLY_DONE)
         pull = before.pull + (goal - before.goal) / left
+        aim = self.narrowing * self.turned
+        rolls = aim - (aim - before.rolled) * (1.0 - blend(tau)[0]) / left
+        rolled = np.where(self.swinging & ~self.met, rolls, before.rolled)
         # a foot stays where it met the ground (C51)
         goal = np.where(self.met, self._ground_of(before), goal)
         pull = np.where(self.met, 0.0, pull)
-        feet = before._replace(phase=phase, goal=goal, pull=pull, way=way, turn=turn, twist=twist)
+        feet = before._replace(
+            phase=phase, goal=goal, pull=pull, rolled=rolled, way=way, turn=turn, twist=twist
+        )
         return self._place_feet(feet, self._ground_of(before))

@@ -450,6 +450,7 @@ static const hxVariable parameters[] = {
     {"gait.offset[6]", "1", -1.0, 1.0, offsetof(struct hxVariables, definition.gait.offset[5]), HX_REAL, 0},
     {"gait.step_height", "m", 1e-09, 10.0, offsetof(struct hxVariables, definition.gait.step_height), HX_REAL, 1},
     {"gait.touchdown_speed", "m/s", 0.0, 10.0, offsetof(struct hxVariables, definition.gait.touchdown_speed), HX_REAL, 1},
+    {"gait.narrowing", "m", 0.0, 10.0, offsetof(struct hxVariables, definition.gait.narrowing), HX_REAL, 1},
     {"gains.slip.kp", "1", -1000000.0, 1000000.0, offsetof(struct hxVariables, definition.gains.slip.kp), HX_REAL, 1},
     {"gains.slip.ki", "1/s", -1000000.0, 1000000.0, offsetof(struct hxVariables, definition.gains.slip.ki), HX_REAL, 1},
     {"gains.slip.kd", "s", -1000000.0, 1000000.0, offsetof(struct hxVariables, definition.gains.slip.kd), HX_REAL, 1},
@@ -477,6 +478,7 @@ static const hxVariable parameters[] = {
     {"parts.support", "", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, definition.parts.support), HX_BOOLEAN, 1},
     {"parts.slip_pid", "", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, definition.parts.slip_pid), HX_BOOLEAN, 1},
     {"parts.suspension", "", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, definition.parts.suspension), HX_BOOLEAN, 1},
+    {"parts.paper_suspension", "", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, definition.parts.paper_suspension), HX_BOOLEAN, 1},
     {"parts.touchdown", "", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, definition.parts.touchdown), HX_BOOLEAN, 1},
     {"parts.posture", "", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, definition.parts.posture), HX_BOOLEAN, 1},
     {"parts.path", "", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, definition.parts.path), HX_BOOLEAN, 1},
@@ -519,7 +521,7 @@ const char *const hx_log_category_names[] = {
 const hxStateRow *const hx_states = 0;
 const size_t hx_state_count = 0;
 
-const char hx_default_guid[] = "{efc6a438-3311-4919-9979-786de6df4023}";
+const char hx_default_guid[] = "{e364f1ea-9b15-44ce-8bd0-bfce8f850f00}";
 
 _Static_assert(HX_CONTROL_KINEMATIC == 1, "Control");
 _Static_assert(HX_CONTROL_COMPLIANT == 2, "Control");

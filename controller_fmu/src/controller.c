@@ -57,16 +57,17 @@ static void lower(const hxControllerModel *model, const hxFootPaths *paths, hxPl
 
 /* Computes by how far a foot's contact point shifts because its sphere rolls (C9). A tibia that
  * pitches by dB rolls the sphere by -R dB along the outward direction of the leg. The shift s
- * changes B itself: s = R (C + s dC/du) is solved by one Newton step. */
+ * changes B itself: s = R (C + s dC/du) is solved by one Newton step. rolled: distance rolled that
+ * is no shift, because the foot aims at another position than that of the stance [m]. */
 static void place_leg(const hxLegSolver *leg, const hxPosture *posture, hxPlane plane,
-                      double height, hxPlane *shift, hxPose *pose) {
+                      double height, double rolled, hxPlane *shift, hxPose *pose) {
   double slope[HX_JOINTS], z = height;
   hxPlane seen = plane;
   hx_posture_see_place(posture, &seen, &z);
   hx_leg_solver_pose(leg, seen, z, pose);
   hx_leg_solver_speeds(leg, pose, pose->heading, 0.0, slope);
-  *shift = hx_scaled(pose->heading, hx_leg_solver_rolling(leg, pose->angle) /
-                                        (1.0 - leg->radius * (slope[2] - slope[1])));
+  const double rolls = hx_leg_solver_rolling(leg, pose->angle) - rolled;
+  *shift = hx_scaled(pose->heading, rolls / (1.0 - leg->radius * (slope[2] - slope[1])));
   seen = hx_plane_add(plane, *shift);
   z = height;
   hx_posture_see_place(posture, &seen, &z);
@@ -77,8 +78,8 @@ static void place_leg(const hxLegSolver *leg, const hxPosture *posture, hxPlane 
 static void lay_out(const hxControllerModel *model, const hxFootPaths *paths, hxPlannedStep *step) {
   lower(model, paths, step);
   for (int k = 0; k < HX_LEGS; ++k)
-    place_leg(&model->leg[k], &step->posture, step->feet.plane[k], step->height[k], &step->shift[k],
-              &step->pose[k]);
+    place_leg(&model->leg[k], &step->posture, step->feet.plane[k], step->height[k],
+              step->feet.rolled[k], &step->shift[k], &step->pose[k]);
   if (model->compliant)
     hx_inverse_dynamics_place(&model->laws.dynamics, model->leg, step->pose, step->feet.way,
                               step->feet.turn, &step->posture, &step->masses);
@@ -101,6 +102,12 @@ static void note_contacts(const hxControllerModel *model, hxControllerState *sta
   for (int k = 0; k < HX_LEGS; ++k)
     paths->met[k] = model->compliant && paths->swinging[k] && feet->rise[k] < 0.0 &&
                     hx_compliance_meets(&model->laws.laws, k, &state->compliant.laws);
+}
+
+/* Aims the steps of a commanded motion at the stance that the weight asks for (C53). */
+static void narrow(const hxControllerModel *model, hxControllerState *state) {
+  if (model->compliant && hx_command_ramp_moves(&state->ramp))
+    state->paths.narrowing = state->compliant.warmth.narrowing;
 }
 
 /* Returns whether the gait clock waits for feet at the ends of their swings (C50). */
@@ -137,6 +144,7 @@ static void plan_afresh(const hxControllerModel *model, int waiting, hxControlle
 static void advance(const hxControllerModel *model, int told, hxControllerState *state) {
   const int due = told || !state->has_after;
   note_contacts(model, state);
+  narrow(model, state);
   if (due || state->paths.held) {
     const int waiting = waits(model, state);
     if (due || !waiting) plan_afresh(model, waiting, state);
@@ -267,6 +275,7 @@ static void ask(const hxControllerModel *model, hxControllerState *state, hxStan
   stance->posture = &now->posture;
   stance->plane = now->feet.plane;
   stance->height = now->height;
+  stance->rolled = now->feet.rolled;
 }
 
 /* -------------------------------------------------------------------------------------- ticks */

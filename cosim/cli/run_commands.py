@@ -33,6 +33,7 @@ from hexapod_cosim.cosim.cli.running import (
 )
 from hexapod_cosim.cosim.cli.terminal import Json, show_files, show_json, show_text, warn
 from hexapod_cosim.cosim.common.files import BENCHMARK, PARTS, STUDY
+from hexapod_cosim.cosim.common.installation import require_pyarrow
 from hexapod_cosim.cosim.report.accuracy import with_errors
 from hexapod_cosim.cosim.report.report import REPORT, metric_rows, write_report
 from hexapod_cosim.cosim.results.accuracy import Accuracy, halved_scenario
@@ -183,6 +184,7 @@ def report(
 def _report_again(folder: Path, facts: Mapping[str, Any]) -> list[Path]:
     """Writes the report of a folder again; `facts` are those of its run.json."""
     if facts.get("kind") == STUDY:
+        require_pyarrow("studies", "hexapod report")
         # imported only here because it is slow
         from hexapod_cosim.cosim.cli.study.studying import report_on, warn_of  # noqa: PLC0415
 

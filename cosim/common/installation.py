@@ -5,6 +5,11 @@ The package is installed from a clone or from a wheel file, since no package ind
 
 from __future__ import annotations
 
+from importlib.util import find_spec
+from pathlib import Path
+
+from hexapod_cosim.models import HexapodError
+
 
 def install_extra(extra: str) -> str:
     """Returns the instruction for installing an extra of pyproject.toml, for messages."""
@@ -12,3 +17,20 @@ def install_extra(extra: str) -> str:
         f"in the clone run `.venv/bin/python -m pip install -e '.[{extra}]'`, "
         f"or install the wheel with it: `python -m pip install 'WHEEL.whl[{extra}]'`"
     )
+
+
+def has_pyarrow() -> bool:
+    """Tells whether Parquet files can be written and read."""
+    return find_spec("pyarrow") is not None
+
+
+def require_pyarrow(extra: str, where: str | Path) -> None:
+    """Raises HexapodError, which names an extra that brings pyarrow, where pyarrow is missing."""
+    if not has_pyarrow():
+        raise HexapodError(
+            "Parquet files need a package that is not installed",
+            got="no pyarrow",
+            expected=f"the extra `{extra}`",
+            fix=install_extra(extra),
+            where=str(where),
+        )

@@ -19,10 +19,10 @@ from numpy.typing import NDArray
 
 from hexapod_cosim.cosim.export.export import export_fmu
 from hexapod_cosim.cosim.identify.experiment import Experiment
+from hexapod_cosim.cosim.identify.fitting.problem import Problem
 from hexapod_cosim.cosim.identify.identify import TOLD, TOLERANCE, Identified
 from hexapod_cosim.cosim.identify.log import Log
 from hexapod_cosim.cosim.identify.log_plant import LogPlant
-from hexapod_cosim.cosim.identify.output_error import Problem
 from hexapod_cosim.cosim.identify.unknowns import START
 from hexapod_cosim.cosim.interface.names import joint_names
 from hexapod_cosim.cosim.master.recorder import Recording

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
@@ -14,7 +15,7 @@ from hexapod_cosim.cosim.common.components import PLANT
 from hexapod_cosim.cosim.identify.log import ATTITUDE, CHANNELS, Log
 from hexapod_cosim.cosim.identify.log_plant import LogPlant
 from hexapod_cosim.cosim.identify.start import initial_state
-from hexapod_cosim.cosim.identify.unknowns import CURRENT, DELAY, Unknown, changed_robot
+from hexapod_cosim.cosim.identify.unknowns import CURRENT, DELAY, START, Unknown, changed_robot
 from hexapod_cosim.cosim.interface.names import joint_names, vector_names
 from hexapod_cosim.cosim.interface.start_values import parameter_values
 from hexapod_cosim.models import Robot
@@ -44,6 +45,11 @@ class Experiment:
         """The compared readings (rows, columns)."""
         return self.log.recording.columns(self.columns)
 
+    @property
+    def start_key(self) -> str:
+        """What the keys of its start values end in: "[1]" for the first log."""
+        return f"[{self.number + 1}]"
+
     def without(self, names: Sequence[str]) -> Experiment:
         """Returns the experiment without some columns."""
         return replace(self, columns=tuple(name for name in self.columns if name not in names))
@@ -55,14 +61,23 @@ class Experiment:
         return [keys[name] for name in self.columns]
 
 
-def first_part(experiment: Experiment, seconds: float) -> Experiment:
-    """Returns the first seconds of an experiment without held-out rows; itself if it is shorter."""
+def first_part(experiment: Experiment, seconds: float = math.inf) -> Experiment:
+    """Returns the first seconds of an experiment, without held-out rows.
+
+    Itself if nothing is left out.
+    """
     log = experiment.log
-    end = int(np.searchsorted(log.time, log.time[0] + seconds))
-    if end >= experiment.fitted.stop:
+    stop = experiment.fitted.indices(len(log.time))[1]
+    end = min(int(np.searchsorted(log.time, log.time[0] + seconds)), stop)
+    if end == len(log.time):
         return experiment
     part = slice(experiment.fitted.start, end)
     return replace(experiment, log=log.part(slice(0, end)), fitted=part, held_out=slice(end, end))
+
+
+def is_level(robot: Robot) -> bool:
+    """Returns whether a robot that starts elsewhere and turned about the vertical walks alike."""
+    return robot.terrain.kind == "flat" and robot.gravity[:2] == (0.0, 0.0)
 
 
 def robot_parameters(robot: Robot, base: Robot) -> dict[str, float]:
@@ -83,10 +98,11 @@ def simulated(
     base: Robot,
     rows: Sequence[Unknown],
     values: Mapping[str, float],
+    parameters: Mapping[str, float] | None = None,
 ) -> Array:
     """Simulates a log; returns the outputs of which its readings are made (rows, columns).
 
-    base: the robot of the plant's FMU; `values` replace its numbers.
+    base: the robot of the plant's FMU; `values` replace its numbers. parameters: further ones.
 
     Raises HexapodError when the FMU refuses a value or a step.
     """
@@ -100,8 +116,9 @@ def simulated(
         log,
         different,
         {
+            **(parameters or {}),
             **robot_parameters(robot, base),
-            **_start(log, robot, zero, experiment.number, values, offset),
+            **_start(experiment, robot, zero, {} if is_level(base) else values, offset),
         },
         offset=-zero if zero.any() else None,
         delay=values.get(DELAY, 0.0),
@@ -136,22 +153,62 @@ def _turned(attitude: Array, vector: Array) -> Array:
     return np.column_stack([cy * ahead - sy * left, sy * ahead + cy * left, up])
 
 
-def readings(experiment: Experiment, outputs: Array, values: Mapping[str, float]) -> Array:
-    """Returns what the sensors read (rows, columns) of the outputs of `simulated`."""
+def readings(
+    experiment: Experiment, outputs: Array, values: Mapping[str, float], robot: Robot
+) -> Array:
+    """Returns what the sensors read (rows, columns) of the outputs of `simulated`.
+
+    robot: on level ground the start values move the simulated path as a whole.
+    """
     found = outputs.copy()
     for k, name in enumerate(experiment.columns):
-        if name.endswith(".angle"):
-            found[:, k] += values.get(f"zero.{name.removesuffix('.angle')}", 0.0)
+        if name.endswith((".angle", ".motor_angle")):
+            found[:, k] += values.get(f"zero.{name.rpartition('.')[0]}", 0.0)
         elif name.endswith(".current"):
             found[:, k] /= values.get(CURRENT, 1.0)
         elif name == ATTITUDE[2]:
             found[:, k] = np.unwrap(found[:, k])
         found[:, k] += values.get(f"bias.{name}", 0.0)
+    if is_level(robot):
+        key = experiment.start_key
+        x, y, yaw = (values.get(f"start.{name}{key}", 0.0) for name in ("x", "y", "yaw"))
+        place_elsewhere(experiment, found, x, y, yaw)
     return found
 
 
-def needs_simulation(row: Unknown) -> bool:
+def place_elsewhere(experiment: Experiment, outputs: Array, x: float, y: float, yaw: float) -> None:
+    """Moves a path (rows, columns) by x and y [m] and turns it by a yaw [rad] about the place that
+    the first row of the log has.
+    """
+    columns = experiment.columns
+    places = [name for name in vector_names("torso.position") if name in columns]
+    if yaw:
+        if ATTITUDE[2] in columns:
+            outputs[:, columns.index(ATTITUDE[2])] += yaw
+        if places:
+            first = experiment.log.recording.columns(places)[0]
+            _turn(outputs, [columns.index(name) for name in places[:2]], yaw, first)
+        for name in columns:
+            if name.endswith(".force[1]"):
+                other = name.removesuffix("[1]") + "[2]"
+                if other in columns:
+                    _turn(outputs, [columns.index(name), columns.index(other)], yaw, np.zeros(2))
+    for name, own in zip(places, (x, y), strict=False):
+        outputs[:, columns.index(name)] += own
+
+
+def _turn(outputs: Array, pair: Sequence[int], yaw: float, about: Array) -> None:
+    """Turns two columns of outputs, x and y, about a point."""
+    cos, sin = math.cos(yaw), math.sin(yaw)
+    x, y = (outputs[:, k] - about[axis] for axis, k in enumerate(pair))
+    outputs[:, pair[0]] = about[0] + cos * x - sin * y
+    outputs[:, pair[1]] = about[1] + sin * x + cos * y
+
+
+def needs_simulation(row: Unknown, robot: Robot) -> bool:
     """Returns whether a number changes more than the reading of simulated outputs."""
+    if row.group == START and is_level(robot):
+        return False
     return not (row.key.startswith("bias.") or row.key == CURRENT)
 
 
@@ -166,10 +223,9 @@ def _source(name: str, robot: Robot) -> str:
 
 
 def _start(
-    log: Log,
+    experiment: Experiment,
     robot: Robot,
     zero: Array,
-    number: int,
     values: Mapping[str, float],
     offset: Array,
 ) -> dict[str, float]:
@@ -178,16 +234,17 @@ def _start(
 
     offset: from the centre of mass to the point whose position the log has (3,) [m].
     """
+    log, key = experiment.log, experiment.start_key
     found = initial_state(log, robot)
     for name, angle in zip(joint_names("angle"), zero.tolist(), strict=True):
         found[f"initial.{name}"] -= angle
     for axis, name in zip("xy", PLACE, strict=False):
-        found[name] += values.get(f"start.{axis}[{number + 1}]", 0.0)
+        found[name] += values.get(f"start.{axis}{key}", 0.0)
     if log.has(vector_names("torso.position")):
         turned = rotation_matrix(np.array([found[name] for name in TURN])) @ offset
         for name, value in zip(PLACE, turned.tolist(), strict=True):
             found[name] -= value
-    yaw = values.get(f"start.yaw[{number + 1}]", 0.0)
+    yaw = values.get(f"start.yaw{key}", 0.0)
     if yaw:
         turn = axis_quaternion(np.array([0.0, 0.0, 1.0]), yaw)
         old = np.array([found[name] for name in TURN])

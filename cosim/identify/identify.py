@@ -17,20 +17,22 @@ from hexapod_cosim.cosim.identify.comparison import (
     column_differences,
 )
 from hexapod_cosim.cosim.identify.experiment import Experiment
+from hexapod_cosim.cosim.identify.fitting.output_error import Fit, Progress, fit
+from hexapod_cosim.cosim.identify.fitting.problem import TO_DEVIATION, Problem
+from hexapod_cosim.cosim.identify.fitting.workers import simulating_workers
 from hexapod_cosim.cosim.identify.log import CHANNELS, Log, LogError, without_readings
 from hexapod_cosim.cosim.identify.log_plant import LogPlant
-from hexapod_cosim.cosim.identify.output_error import TO_DEVIATION, Fit, Problem, Progress, fit
 from hexapod_cosim.cosim.identify.rigid.linear_start import LinearStart, linear_start
 from hexapod_cosim.cosim.identify.screening import BadColumn, misfits, screened
 from hexapod_cosim.cosim.identify.start import rest_rows
 from hexapod_cosim.cosim.identify.unknowns import (
+    ELASTIC,
     GROUPS,
     START,
     Unknown,
     changed_robot,
     chosen_unknowns,
 )
-from hexapod_cosim.cosim.identify.workers import simulating_workers
 from hexapod_cosim.cosim.interface.names import vector_names
 from hexapod_cosim.cosim.run.worker_pool import processor_count
 from hexapod_cosim.models import Robot
@@ -41,6 +43,8 @@ QUANTILE = 1.959963985  # of a normal distribution, for 95 %
 NEAR = 0.8  # correlation of two numbers that is reported
 HELD_OUT = 0.25  # share of each log at its end that the fit does not see
 SETTLING = 0.1  # s    at the start of a log that is not compared: the first row has noise
+# Where in its play a gear stands at first is in no log; walking for this long decides it.
+MESHING = 0.5  # s    after the first change of a command
 LONG = 4000  # rows from which on worker processes save more time than they take to start
 TOLERANCE = {"solver.tolerance": 1e-5}  # differences of simulations need exact ones
 
@@ -159,7 +163,10 @@ def identify(
             LogPlant(path, TOLERANCE) as plant,
             simulating_workers(workers, path, robot, TOLERANCE, place) as pool,
         ):
-            experiments = [make_experiment(log, k, held_out) for k, log in enumerate(logs)]
+            experiments = [
+                make_experiment(log, k, held_out, elastic=ELASTIC(robot))
+                for k, log in enumerate(logs)
+            ]
             report("the columns of the log")
             experiments, bad = _screened(plant, robot, experiments, rows)
             report("linear least squares")
@@ -192,8 +199,10 @@ def usual_workers(logs: Sequence[Log]) -> int:
     return processor_count() if sum(len(log.time) for log in logs) >= LONG else 1
 
 
-def make_experiment(log: Log, number: int, held_out: float) -> Experiment:
+def make_experiment(log: Log, number: int, held_out: float, *, elastic: bool = False) -> Experiment:
     """Returns the comparison of a log, with the readings that the FMU predicts.
+
+    elastic: whether gears are; their rows until all teeth have met are not compared.
 
     Raises LogError for a log without readings.
     """
@@ -207,6 +216,9 @@ def make_experiment(log: Log, number: int, held_out: float) -> Experiment:
     begin = int(np.searchsorted(log.time, log.time[0] + SETTLING))
     if rest_rows(log) == 1:  # without a rest the joints need longer to forget the first row
         begin *= 3
+    if elastic:
+        moved = log.time[rest_rows(log) - 1] + MESHING
+        begin = max(begin, int(np.searchsorted(log.time, moved)))
     if not 0 < begin < end - 1:
         raise LogError(
             "a log that is too short",

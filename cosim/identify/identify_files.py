@@ -14,11 +14,12 @@ from hexapod_cosim.cosim.common.files import RUN_FILE, write_json, write_text
 from hexapod_cosim.cosim.identify.comparison import Difference
 from hexapod_cosim.cosim.identify.excitation import Proposal, scenario_text
 from hexapod_cosim.cosim.identify.figures import channel_figures, embedded
+from hexapod_cosim.cosim.identify.fitting.problem import EXPLAINED
 from hexapod_cosim.cosim.identify.identify import NEAR, Estimate, Identified
-from hexapod_cosim.cosim.identify.output_error import EXPLAINED
 from hexapod_cosim.cosim.identify.page import TITLES, Section, number, rendered
 from hexapod_cosim.cosim.identify.rigid.base_parameters import base_of, group_parameters
 from hexapod_cosim.cosim.identify.robot_file import SENSORS, sensors_table, write_robot
+from hexapod_cosim.cosim.identify.unknowns import GEAR
 
 BASE_KEYS = ("combination", "unit", "before", "least_squares", "deviation", "found")
 KIND, ROBOT_FILE, REPORT, RESULT = "identify", "robot.toml", "report.html", "identify.json"
@@ -142,6 +143,12 @@ def misfit_rows(found: Identified) -> list[list[str]]:
 def warnings(found: Identified) -> list[str]:
     """Returns what a user must know of the result, as sentences."""
     texts = [f"{column.name} is left out: {column.why}." for _, column in found.bad]
+    if _has_motor_angles(found) and found.file.servo.gear_stiffness == 0.0:
+        texts.append(
+            "The log has the angles of rotors, but the gears of the robot file are rigid: their "
+            "stiffness and play are not sought. Give a first servo.gear_stiffness, of about ten "
+            "times kp."
+        )
     worst = found.fit.unexplained
     if worst:
         named = ", ".join(f"{TITLES[key].lower()} ({value:.1f})" for key, value in worst.items())
@@ -200,7 +207,17 @@ def untold_text(found: Identified) -> str:
     )
     if not untold:
         return text + "They tell every number."
-    return text + f"They do not tell: {', '.join(untold)}."
+    text += f"They do not tell: {', '.join(untold)}."
+    if set(GEAR) & set(untold) and not _has_motor_angles(found):
+        text += (
+            " Elasticity and play of gears show most in the angles of rotors beside those of "
+            "links: record LF.coxa.motor_angle [rad], ..."
+        )
+    return text
+
+
+def _has_motor_angles(found: Identified) -> bool:
+    return any("motor_angle" in one.channels for one in found.experiments)
 
 
 def proposal_text(proposals: Sequence[Proposal]) -> str:

@@ -50,6 +50,7 @@ class Channel:
 
 CHANNELS = (
     Channel("angle", "Joint angles", "rad", tuple(joint_names("angle"))),
+    Channel("motor_angle", "Motor angles", "rad", tuple(joint_names("motor_angle"))),
     Channel("speed", "Joint speeds", "rad/s", tuple(joint_names("speed"))),
     Channel("torque", "Servo torques", "N.m", tuple(joint_names("torque"))),
     Channel("current", "Servo currents", "A", tuple(joint_names("current"))),

@@ -33,8 +33,8 @@ class LogPlant(Closing):
         self._outputs = set(self.fmu.names("output"))
 
     def known(self, names: Sequence[str]) -> list[str]:
-        """Returns those of some columns that are outputs of the FMU."""
-        return [name for name in names if name in self._outputs]
+        """Returns those of some columns that follow from outputs of the FMU."""
+        return [name for name in names if self._outputs.issuperset(_terms(name))]
 
     def simulate(
         self,
@@ -49,7 +49,7 @@ class LogPlant(Closing):
 
         Args:
             log: its commands are the FMU's inputs; each holds until the next row.
-            names: outputs of the FMU.
+            names: outputs of the FMU, or motor angles.
             parameters: initial state and further parameters.
             offset: added to the commanded angles (18,) [rad]; None: nothing.
             delay: how much older than its row a reading is [s].
@@ -58,7 +58,8 @@ class LogPlant(Closing):
         """
         commands, time = log.commands, log.time
         inputs = self.fmu.block(list(commands))
-        outputs = self.fmu.block(list(names))
+        sources = list(dict.fromkeys(term for name in names for term in _terms(name)))
+        outputs = self.fmu.block(sources)
         table = np.column_stack(list(commands.values()))
         if offset is not None:
             places = [k for k, name in enumerate(commands) if name.endswith(".angle_ref")]
@@ -67,7 +68,7 @@ class LogPlant(Closing):
         self.fmu.set_blocks(self._common)
         self.fmu.set_parameters(parameters)
         self.fmu.initialise(float(time[0]), float(time[-1]))
-        found = np.empty((len(time), len(outputs.names)))
+        found = np.empty((len(time), len(sources)))
         try:
             self._run(_events(time, delay), table, inputs, outputs, found)
         except FmuError as error:
@@ -78,7 +79,7 @@ class LogPlant(Closing):
                 fix="check the robot file and the units of the commands",
                 where=log.where,
             ) from error
-        return found
+        return _summed(found, sources, names)
 
     def _run(
         self, events: Sequence[Event], table: Array, inputs: Any, outputs: Any, found: Array
@@ -98,6 +99,23 @@ class LogPlant(Closing):
     def close(self) -> None:
         """Frees the FMU."""
         self.fmu.close()
+
+
+def _terms(name: str) -> tuple[str, ...]:
+    """Returns the outputs of the FMU whose sum a column is.
+
+    The angle of a rotor, seen at its joint, is the link's and the deflection of the gear.
+    """
+    stem, _, kind = name.rpartition(".")
+    return (f"{stem}.angle", f"{stem}.gear_deflection") if kind == "motor_angle" else (name,)
+
+
+def _summed(found: Array, sources: Sequence[str], names: Sequence[str]) -> Array:
+    """Returns the columns (rows, names) from outputs of the FMU (rows, sources)."""
+    if list(names) == list(sources):
+        return found
+    places = [[sources.index(term) for term in _terms(name)] for name in names]
+    return np.column_stack([found[:, own].sum(axis=1) for own in places])
 
 
 def _events(time: Array, delay: float) -> list[Event]:

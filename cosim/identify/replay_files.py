@@ -12,11 +12,13 @@ from hexapod_cosim.cosim.common.files import RUN_FILE, write_json, write_text
 from hexapod_cosim.cosim.identify.figures import channel_figures, embedded
 from hexapod_cosim.cosim.identify.page import COLUMNS, Section, difference_rows, rendered
 from hexapod_cosim.cosim.identify.replay import Replay
-from hexapod_cosim.cosim.results.recordings import write_parquet
+from hexapod_cosim.cosim.results.recordings import write_recording
+from hexapod_cosim.cosim.results.results import RESULTS
+from hexapod_cosim.cosim.scenario.records import default_formats
 from hexapod_cosim.models import Robot
 
 REPLAY, KIND = "replay.csv", "replay"
-REPORT, SIMULATED = "report.html", "results.parquet"
+REPORT = "report.html"
 CAPTION = (
     "Errors are simulated minus measured, over all rows; the spread is the root mean square of the "
     "readings about their mean."
@@ -38,10 +40,16 @@ def write_replay(
         "channels": channels,
     }
     write_text(folder / REPLAY, _table(done))
-    write_parquet(done.simulated, folder / SIMULATED, about={"log": done.log.where})
-    write_text(folder / REPORT, _page(done, robot, command))
+    (simulated,) = write_recording(
+        done.simulated,
+        folder,
+        RESULTS,
+        formats=default_formats()[:1],
+        about={"log": done.log.where},
+    )
+    write_text(folder / REPORT, _page(done, robot, command, simulated.name))
     write_json(folder / RUN_FILE, facts)
-    return [folder / name for name in (REPLAY, SIMULATED, REPORT, RUN_FILE)]
+    return [folder / REPLAY, simulated, folder / REPORT, folder / RUN_FILE]
 
 
 def _table(done: Replay) -> str:
@@ -54,7 +62,7 @@ def _table(done: Replay) -> str:
     return text.getvalue()
 
 
-def _page(done: Replay, robot: Robot, command: str) -> str:
+def _page(done: Replay, robot: Robot, command: str, simulated_file: str) -> str:
     time, simulated = done.log.time, done.simulated
     columns = {name: simulated.column(name) for name in done.names}
     figures = channel_figures(done.log, {"simulated": columns})
@@ -83,5 +91,5 @@ def _page(done: Replay, robot: Robot, command: str) -> str:
         warnings=[],
         command=command,
         facts={"log": done.log.where, "robot": robot.name, "SHA-256 of the robot": robot.hash},
-        source=f"{REPLAY} and {SIMULATED}",
+        source=f"{REPLAY} and {simulated_file}",
     )

@@ -23,6 +23,8 @@ START = "start"  # group of what the first row of a log leaves open
 ALWAYS: Callable[[Robot], bool] = lambda _robot: True  # noqa: E731
 LINE: Callable[[Robot], bool] = lambda robot: robot.servo.drive == "line"  # noqa: E731
 MOTOR: Callable[[Robot], bool] = lambda robot: robot.servo.drive == "motor"  # noqa: E731
+ELASTIC: Callable[[Robot], bool] = lambda robot: robot.servo.gear_stiffness > 0.0  # noqa: E731
+GEAR = ("servo.gear_stiffness", "servo.gear_damping", "servo.backlash")  # of elastic gears
 CURRENT = "sensor.torque_constant"
 DELAY = "sensor.delay"
 
@@ -143,6 +145,23 @@ def _com(joint: int | None, axis: int, prior: float) -> Unknown:
     )  # fmt: skip
 
 
+def _gyration() -> Unknown:
+    """Returns the row of the torso's radius of gyration: the root of the mean square distance of
+    its mass from its centre, sqrt(trace I / 2 m). The shape of the inertia stays.
+    """
+
+    def read(robot: Robot) -> float:
+        return math.sqrt(sum(robot.torso.inertia[:3]) / (2.0 * robot.torso.mass))
+
+    def write(robot: Robot, value: float) -> Robot:
+        factor = value / read(robot)
+        return _with_bodies(robot, None, lambda body: body.scaled(factor))
+
+    return Unknown(
+        key="torso.gyration_radius", unit="m", group="mass", prior=0.2, read=read, write=write
+    )
+
+
 def _body(robot: Robot, joint: int | None) -> Any:
     """Returns the torso or a link of the first leg."""
     return robot.torso if joint is None else robot.legs[0].links[joint]
@@ -178,8 +197,14 @@ ROBOT = (
     _motor("servo.stribeck_friction", "N m", 0.5),
     _motor("servo.motor_load_friction", "1", 0.5),
     _motor("servo.external_load_friction", "1", 0.5),
+    _section("servo.gear_stiffness", "N m/rad", "servo", 0.5, applies=ELASTIC),
+    _section("servo.gear_damping", "N m s/rad", "servo", 0.7, applies=ELASTIC),
+    _section(
+        "servo.backlash", "rad", "servo", 0.003, positive=False, low=0.0, high=1.0, applies=ELASTIC
+    ),
     _mass(None),
     *(_com(None, axis, 0.01) for axis in range(3)),
+    _gyration(),
     *(_mass(joint) for joint in range(3)),
     *(_com(joint, 0, 0.01) for joint in range(3)),
     _section("contact.stiffness", "N/m^1.5", "contact", 1.0),

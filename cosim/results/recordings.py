@@ -1,9 +1,10 @@
-"""Writes and reads recordings: Parquet, CSV for spreadsheets, MCAP for tools of robots, and the
-commands alone for importers.
+"""Writes and reads recordings: CSV for spreadsheets, Parquet, MCAP for tools of robots, and the
+commands alone for importers. RRD files, for the viewer Rerun, are written only.
 
-A Parquet file has a column of doubles per variable, with unit and description as metadata of each
-field and the run's facts as metadata of the schema. A CSV file has "name [unit]" above each column.
-An MCAP file has ROS 2 messages (cosim/logs). All hold the same numbers, bit for bit.
+CSV needs no package; Parquet, MCAP and RRD need the extras `parquet`, `logs` and `rerun`. A Parquet
+file has a column of doubles per variable, with unit and description as metadata of each field and
+the run's facts as metadata of the schema. A CSV file has "name [unit]" above each column. An MCAP
+file has ROS 2 messages (cosim/logs). All hold the same numbers, bit for bit.
 """
 
 from __future__ import annotations
@@ -11,23 +12,25 @@ from __future__ import annotations
 import csv
 import json
 import os
+import warnings
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, TextIO
 
 import numpy as np
 
 from hexapod_cosim.cosim.common.files import atomic_path
+from hexapod_cosim.cosim.common.installation import require_pyarrow
 from hexapod_cosim.cosim.logs.mcap_package import require_mcap
 from hexapod_cosim.cosim.logs.mcap_reader import read_mcap
 from hexapod_cosim.cosim.logs.mcap_writer import check_start, write_mcap
+from hexapod_cosim.cosim.logs.rrd_writer import require_rerun, write_rrd
 from hexapod_cosim.cosim.master.recorder import Recording
 from hexapod_cosim.cosim.results.columns import bare_name, heading, known_columns, plant_variables
-from hexapod_cosim.cosim.scenario.records import DEFAULT_FORMATS
-from hexapod_cosim.models import HexapodError
+from hexapod_cosim.cosim.scenario.records import default_formats
+from hexapod_cosim.models import HexapodError, Robot
 
 COMMANDS = "commands.csv"
-NAN_TEXTS = ["nan", "NaN", "-nan"]  # in CSV files
 
 
 def write_recording(
@@ -35,30 +38,36 @@ def write_recording(
     folder: Path,
     stem: str,
     *,
-    formats: Sequence[str] = DEFAULT_FORMATS,
+    formats: Sequence[str] | None = None,
     columns: Sequence[str] = ("*",),
     about: Mapping[str, Any] | None = None,
     torso_com: Sequence[float] = (0.0, 0.0, 0.0),
+    robot: Robot | None = None,
 ) -> list[Path]:
-    """Writes STEM.parquet and STEM.mcap with all columns and STEM.csv, as far as wanted; returns
-    the files.
+    """Writes STEM.parquet, STEM.mcap and STEM.rrd with all columns and STEM.csv, as far as wanted;
+    returns the files.
 
     Args:
         recording: what to write.
         folder: where to write it.
         stem: name of the files without suffix.
-        formats: which of "parquet", "csv" and "mcap" to write.
+        formats: which of "parquet", "csv", "mcap" and "rrd" to write; None: the default of
+            scenarios.
         columns: patterns of the columns of the CSV file.
-        about: facts of the run, texts or JSON values; metadata of Parquet and MCAP files.
-        torso_com: centre of mass in the torso's frame [m], for the transforms of an MCAP file.
+        about: facts of the run, texts or JSON values; metadata of all files but CSV.
+        torso_com: centre of mass in the torso's frame [m], for the transforms of MCAP and RRD.
+        robot: its lengths, for the 3D geometry of an RRD file.
     """
     facts = _texts(about or {})
-    files = [folder / f"{stem}.{kind}" for kind in formats]
+    chosen = default_formats() if formats is None else formats
+    files = [folder / f"{stem}.{kind}" for kind in chosen]
     for path in files:
         if path.suffix == ".parquet":
             write_parquet(recording, path, about=facts)
         elif path.suffix == ".mcap":
             write_mcap(recording, path, about=facts, torso_com=torso_com)
+        elif path.suffix == ".rrd":
+            write_rrd(recording, path, robot=robot, about=facts, torso_com=torso_com)
         else:
             write_csv(recording.chosen(columns), path, units=True)
     return files
@@ -69,9 +78,13 @@ def check_formats(formats: Sequence[str], *, start: float, where: str) -> None:
 
     It is called before a run, whose recording would be lost otherwise.
     """
+    if "parquet" in formats:
+        require_pyarrow("parquet", where)
     if "mcap" in formats:
         require_mcap(where)
         check_start(start, where)
+    if "rrd" in formats:
+        require_rerun(where)
 
 
 def _texts(facts: Mapping[str, Any]) -> dict[str, str]:
@@ -114,6 +127,7 @@ def write_parquet(recording: Recording, path: Path, *, about: Mapping[str, Any])
 
     about: texts or JSON values for the metadata.
     """
+    require_pyarrow("parquet", path)
     import pyarrow as pa  # noqa: PLC0415  slow to import
     import pyarrow.parquet as pq  # noqa: PLC0415
 
@@ -138,16 +152,19 @@ def write_parquet(recording: Recording, path: Path, *, about: Mapping[str, Any])
 
 def read_parquet(path: Path) -> Recording:
     """Reads a recording from a Parquet file. Raises HexapodError for a missing or damaged file."""
+    require_pyarrow("parquet", path)
     import pyarrow as pa  # noqa: PLC0415  slow to import
     import pyarrow.parquet as pq  # noqa: PLC0415
 
     try:
         table = pq.read_table(path)
-        return _recording(
-            table.cast(pa.schema([(name, pa.float64()) for name in table.column_names])), path
-        )
+        table = table.cast(pa.schema([(name, pa.float64()) for name in table.column_names]))
     except (OSError, ValueError, NotImplementedError) as error:
         raise _not_a_recording(path, error, "Parquet with columns of numbers") from error
+    columns = np.empty((table.num_columns, table.num_rows))
+    for column, values in zip(columns, table.columns, strict=True):
+        column[:] = values.to_numpy()
+    return _recording(table.column_names, columns.T, path)
 
 
 def write_csv(recording: Recording, path: Path, *, units: bool = False) -> None:
@@ -155,15 +172,17 @@ def write_csv(recording: Recording, path: Path, *, units: bool = False) -> None:
 
     A failed write leaves no partial file.
     """
-    import pyarrow as pa  # noqa: PLC0415  slow to import
-    from pyarrow.csv import write_csv as write  # noqa: PLC0415
-
     names = [heading(name) if units else name for name in recording.names]
-    table = pa.Table.from_arrays(
-        [pa.array(values) for values in np.ascontiguousarray(recording.data.T)], names=names
-    )
-    with atomic_path(path) as temporary:
-        write(table, temporary)
+    header = ",".join('"' + name.replace('"', '""') + '"' for name in names)
+    with atomic_path(path) as temporary, temporary.open("w", encoding="utf-8", newline="") as file:
+        file.write(header + "\n")
+        for row in recording.data:
+            file.write(_line(row))
+
+
+def _line(row: np.ndarray) -> str:
+    """Returns numbers as a line of a CSV file: the shortest texts that read back bit for bit."""
+    return (",".join(map(repr, row.tolist())) + "\n").replace(".0,", ",").replace(".0\n", "\n")
 
 
 def read_csv(path: Path) -> Recording:
@@ -171,24 +190,32 @@ def read_csv(path: Path) -> Recording:
 
     Raises HexapodError for a missing or damaged file.
     """
-    import pyarrow as pa  # noqa: PLC0415  slow to import
-    from pyarrow import csv as arrow  # noqa: PLC0415
-
     try:
         with path.open(encoding="utf-8", newline="") as file:
             names = next(csv.reader(file))
-        convert = arrow.ConvertOptions(
-            column_types={str(k): pa.float64() for k in range(len(names))}, null_values=NAN_TEXTS
-        )
-        read = arrow.ReadOptions(column_names=[str(k) for k in range(len(names))], skip_rows=1)
-        table = arrow.read_csv(path, read_options=read, convert_options=convert)
-        return _recording(table.rename_columns([bare_name(name) for name in names]), path)
+            rows = _rows(file, len(names))
     except (OSError, ValueError, StopIteration, csv.Error) as error:
         raise _not_a_recording(path, error, "a header and rows of numbers") from error
+    return _recording([bare_name(name) for name in names], rows, path)
 
 
-def _recording(table: Any, path: Path) -> Recording:
-    names = tuple(table.column_names)
+def _rows(file: TextIO, columns: int) -> np.ndarray:
+    """Returns the rows of numbers of a CSV file after its header, (rows, columns).
+
+    Raises ValueError for a text and for another number of columns.
+    """
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", "loadtxt: input contained no data", UserWarning)
+        rows = np.loadtxt(file, delimiter=",", comments=None, quotechar='"', ndmin=2)
+    if rows.size == 0:
+        return np.empty((0, columns))
+    if rows.shape[1] != columns:
+        raise ValueError(f"expected {columns} columns, got {rows.shape[1]}")
+    return rows
+
+
+def _recording(names: Sequence[str], rows: np.ndarray, path: Path) -> Recording:
+    """Returns the recording of a file's columns. Raises HexapodError unless time is the first."""
     if not names or names[0] != "time":
         raise HexapodError(
             "not a recording",
@@ -196,10 +223,7 @@ def _recording(table: Any, path: Path) -> Recording:
             expected="time first",
             where=str(path),
         )
-    data = np.empty((len(names), table.num_rows))
-    for row, column in zip(data, table.columns, strict=True):
-        row[:] = column.to_numpy()
-    return Recording(names, data.T)
+    return Recording(tuple(names), rows)
 
 
 def _not_a_recording(path: Path, error: Exception, expected: str) -> HexapodError:

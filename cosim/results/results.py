@@ -35,7 +35,7 @@ from hexapod_cosim.cosim.results.recordings import (
 from hexapod_cosim.cosim.results.result import Result
 from hexapod_cosim.cosim.results.walk import View
 from hexapod_cosim.cosim.scenario.controls import control_of
-from hexapod_cosim.models import HexapodError
+from hexapod_cosim.models import HexapodError, load_robot
 
 RESULTS, PARTIAL = "results", "results.partial"  # stems of recordings
 METRICS_FILE, SCENARIO = "metrics.json", "scenario.toml"
@@ -147,6 +147,7 @@ def write_result(result: Result, folder: Path) -> list[Path]:
         columns=columns,
         about=about,
         torso_com=[result.parameters.get(name, 0.0) for name in vector_names("torso.com")],
+        robot=load_robot(result.scenario.robot) if "rrd" in outputs.formats else None,
     )
     if result.completed and "csv" in outputs.formats and result.scenario.every == 1:
         files.append(folder / COMMANDS)

@@ -4,9 +4,10 @@ A scenario that names a gait (`gait.name`, `gait.period`, `gait.duty`) or a stan
 has chosen the walk of every control; what it leaves out is the robot's own. Otherwise kinematic and
 paper control and all controls of the user walk as the robot file says. Compliant control walks an
 amble at the height of the stance of least heat, with its feet a part of the way from the robot's
-own stance to that one: the whole way would give up too much footing on uneven ground. Where the
-legs do not reach the commands or the step height in this walk, or the joints are not fast enough,
-it keeps the robot's own gait, and then its own stance as well.
+own stance to that one: the whole way would give up too much footing on uneven ground. The feet step
+to the stance of least heat when the robot is heavier than its model (C53). Where the legs do not
+reach the commands or the step height in this walk, or the joints are not fast
+enough, it keeps the robot's own gait, and then its own stance as well.
 """
 
 from __future__ import annotations
@@ -58,6 +59,7 @@ class ChosenWalk:
             "stance": self.stance,
             "outward": self.outward,
             "deeper": self.deeper,
+            "narrowing": self.gait.narrowing,
             "chosen_by": self.chosen_by,
         }
 
@@ -133,14 +135,42 @@ def _chosen(scenario: Scenario, plain: ChosenWalk, settings: Mapping[str, Any]) 
         except (GainsError, ReachError):
             continue
         if _follows(walk, plain, scenario.commands):
-            return walk
+            return _narrowing(walk, begin, design, plain, scenario.commands)
     return plain
 
 
-def _follows(walk: ChosenWalk, plain: ChosenWalk, commands: Sequence[Command]) -> bool:
+def _narrowing(
+    walk: ChosenWalk,
+    begin: ChosenWalk,
+    design: StanceDesign,
+    plain: ChosenWalk,
+    commands: Sequence[Command],
+) -> ChosenWalk:
+    """Returns a walk whose feet can step to the stance of least heat, if the robot follows there.
+
+    In that stance feet can be lifted by half of the step height at least.
+
+    begin: the walk in the robot's own stance.
+    """
+    way = (FOOTING - 1.0) * design.outward
+    if way <= 0.0:
+        return walk
+    try:
+        narrow = _moved(begin, CHOSEN, design.outward, design.deeper)
+    except ReachError:
+        return walk
+    if not _follows(narrow, plain, commands, whole=False):
+        return walk
+    return replace(walk, gait=replace(walk.gait, narrowing=way))
+
+
+def _follows(
+    walk: ChosenWalk, plain: ChosenWalk, commands: Sequence[Command], *, whole: bool = True
+) -> bool:
     """Returns whether legs and joints follow the commands in a walk.
 
-    A joint may need SPEED_SHARE of its largest speed, or what the robot's own walk needs.
+    A joint may need SPEED_SHARE of its largest speed, or what the robot's own walk needs. whole:
+    the feet must follow the whole arc of a swing, as far as they do in the robot's own walk.
     """
     if not reaches(commands, walk.robot, walk.gait):
         return False
@@ -150,7 +180,7 @@ def _follows(walk: ChosenWalk, plain: ChosenWalk, commands: Sequence[Command]) -
         needed = _motion(walk.robot, walk.gait, command)  # its speed is at most `limit`
         if needed.speed > max(SPEED_SHARE * limit, own.speed) or needed.speed >= limit:
             return False
-        if needed.cut and not own.cut:
+        if whole and needed.cut and not own.cut:
             return False
     return True
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from hexapod_cosim.controller import BodyCommand, Controller, Gait
 from hexapod_cosim.controller.comply.posture import Posture
-from hexapod_cosim.controller.plane import cis
+from hexapod_cosim.controller.plane import LEGS, cis
 from hexapod_cosim.controller.walk.trajectory import Twist, travel
 from hexapod_cosim.cosim.scenario.records import Command
 from hexapod_cosim.models import Robot, ScenarioError
@@ -68,7 +68,8 @@ def _walks(values: Array, robot: Robot, gait: Gait) -> bool:
     way = travel(Twist(complex(vx, vy), yaw_rate), time)
     plane = cis(-yaw_rate * time) * (paths.home - way)
     height = np.broadcast_to(paths.home_height, plane.shape)
-    _, pose = controller.place_legs(Posture.of(values[3:], np.zeros(3)), plane, height)
+    posture = Posture.of(values[3:], np.zeros(3))
+    _, pose = controller.place_legs(posture, plane, height, np.zeros(LEGS))
     still = np.zeros_like(plane)
     unreachable = controller.legs.solve(pose, still, still.real).unreachable
     return not (unreachable & (phase < gait.duty)).any()

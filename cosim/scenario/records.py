@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, fields
 from typing import Annotated, Any
 
 from hexapod_cosim.controller import Parts
+from hexapod_cosim.cosim.common.installation import has_pyarrow
 from hexapod_cosim.models import (
     JOINT_NAMES,
     LEG_NAMES,
@@ -30,8 +31,7 @@ ANGLE, ATTITUDE = "angle", "attitude"  # sensors inside the robot
 SERVO_FAULTS = ("dead", "stuck")
 LOST = ("command", "step")
 DELAY = Number("s", at_least=0.0, at_most=1.0, default=0.0)  # of late readings
-FORMATS = ("parquet", "csv", "mcap")  # of recordings
-DEFAULT_FORMATS = ("parquet", "csv")
+FORMATS = ("parquet", "csv", "mcap", "rrd")  # of recordings
 SETTINGS: dict[str, type[Any]] = {
     "gait": Gait,
     "terrain": Terrain,
@@ -196,13 +196,18 @@ class Walk:
     stance: str | tuple[float, float] | None = None
 
 
+def default_formats() -> tuple[str, ...]:
+    """Returns the formats of recordings: CSV, and Parquet if the extra `parquet` is installed."""
+    return ("parquet", "csv") if has_pyarrow() else ("csv",)
+
+
 @dataclass(frozen=True, kw_only=True)
 class Outputs:
     """Which files and columns a run writes."""
 
     # patterns of variable names, for the columns of results.csv; Parquet has all columns
     csv: tuple[str, ...] = ("*",)
-    formats: tuple[str, ...] = DEFAULT_FORMATS
+    formats: tuple[str, ...] = field(default_factory=default_formats)
     plots: bool = True
     # time between two rows of the recording; 0: every macro-step. Metrics use all macro-steps
     interval: Annotated[float, Number("s", at_least=0.0, default=0.0)] = 0.0

@@ -30,7 +30,6 @@ from hexapod_cosim.cosim.scenario.records import (
     ANGLE,
     ATTITUDE,
     CONTROLS,
-    DEFAULT_FORMATS,
     FORMATS,
     GRAVITY,
     GRAVITY_NAMES,
@@ -58,6 +57,7 @@ from hexapod_cosim.cosim.scenario.records import (
     ServoFault,
     Variation,
     Walk,
+    default_formats,
 )
 from hexapod_cosim.models import (
     Robot,
@@ -462,7 +462,7 @@ def _read_outputs(table: Any, where: str) -> Outputs:
     plain = {key: table[key] for key in specs(Outputs) if key in table}
     return Outputs(
         csv=_patterns(table.get("csv", ["*"]), f"{where}.csv"),
-        formats=_formats(table.get("formats", DEFAULT_FORMATS), f"{where}.formats"),
+        formats=_formats(table.get("formats", default_formats()), f"{where}.formats"),
         plots=_boolean(table.get("plots", True), f"{where}.plots"),
         interval=_record(Outputs, plain, where).interval,
     )

@@ -1,11 +1,14 @@
 """Computes contacts of torso, knees and shanks with the ground.
 
 Each is a sphere with the normal law of the feet (eq. 14) and the friction of the tanh law (eq. 15),
-also where the feet have bristles. The torso has eight, around the corners of a box.
+also where the feet have bristles. The torso has eight, around the corners of a box. On soil knees
+and shanks sink as their spheres, a corner of the torso as a flat pad of a quarter of the box's
+upper side.
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from itertools import product
 
@@ -30,6 +33,7 @@ class BodySphere:
     body: int  # number of the body
     centre: Array  # (3,) from the body's centre of mass, body axes [m]
     radius: float  # m
+    pad_radius: float = 0.0  # m  on soil; 0: the sphere
 
 
 def body_spheres(robot: Robot) -> tuple[BodySphere, ...]:
@@ -46,7 +50,8 @@ def body_spheres(robot: Robot) -> tuple[BodySphere, ...]:
         offset = np.subtract(body.torso_centre, robot.torso.com)
         for z, y, x in product((-1.0, 1.0), repeat=3):
             corner = offset + np.array([x, y, z]) * body.torso_box
-            spheres.append(BodySphere("torso", 0, corner, body.corner_radius))
+            sphere = BodySphere("torso", 0, corner, body.corner_radius, corner_pad_radius(robot))
+            spheres.append(sphere)
     for name, radius, share in (
         ("knee", body.knee_radius, 0.0),
         ("shank", body.shank_radius, body.shank_position),
@@ -57,6 +62,17 @@ def body_spheres(robot: Robot) -> tuple[BodySphere, ...]:
             label = f"{robot.legs[leg].name}.{name}"
             spheres.append(BodySphere(label, JOINTS * (leg + 1), centre, radius))
     return tuple(spheres)
+
+
+def corner_pad_radius(robot: Robot) -> float:
+    """Returns the radius [m] of the pad as which a corner of the torso sinks into soil.
+
+    It is that of a disc of a quarter of the box's upper side; 0, the sphere, where that is not
+    larger.
+    """
+    body = robot.body
+    radius = math.sqrt(body.torso_box[0] * body.torso_box[1] / math.pi)
+    return radius if radius > body.corner_radius else 0.0
 
 
 def body_contact(robot: Robot, sphere: BodySphere, state: Array) -> FootContact:

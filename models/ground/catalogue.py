@@ -3,28 +3,25 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
 from hexapod_cosim.models.errors import RobotError, unknown_name
-from hexapod_cosim.models.ground import rough, steps
-from hexapod_cosim.models.ground.curriculum import curriculum
+from hexapod_cosim.models.ground.catalogue_blocks import BLOCK_SURFACES
+from hexapod_cosim.models.ground.catalogue_smooth import SMOOTH_SURFACES, SMOOTH_TILES
+from hexapod_cosim.models.ground.curriculum import EQUAL, TileMaker, curriculum
+from hexapod_cosim.models.ground.entries import Entry
 from hexapod_cosim.models.ground.height_map import heightfield
 from hexapod_cosim.models.ground.parameters import (
     HARD,
-    HORIZONTAL,
     PLATFORM,
     RANDOM_TILE,
-    SEED,
     SIZE,
-    TILE,
-    VERTICAL,
     Parameter,
-    Parameters,
     count,
     length,
     ratio,
@@ -38,152 +35,27 @@ from hexapod_cosim.models.schema import Number
 
 MOST_NODES = 1 << 24  # of a generated surface
 KEPT = 32  # surfaces in the cache
-
-
-@dataclass(frozen=True)
-class Entry:
-    """A surface of the catalogue."""
-
-    about: str
-    make: Callable[[SimpleNamespace], Surface]
-    parameters: Parameters
-
-
-# legged_gym's 0.05 + 0.18 difficulty, by half
-STEP_HEIGHT = length((0.025, 0.115), "height of a step")
-STEP_WIDTH = length(0.15, "depth of a step's tread", least=0.01, zero=True)
-DEPTH = length(0.3, "depth of the gaps")
-SLOPE = ratio((0.0, 0.4), "rise over run", least=-2.0, most=2.0)
-SOIL = text("dry_sand", "name of the soil everywhere")
-STEPS: Parameters = {**TILE, "step_height": STEP_HEIGHT, "step_width": STEP_WIDTH}
-ONE_STEP: Parameters = {**TILE, "step_height": STEP_HEIGHT}
 TILES = "pyramid_stairs inverted_pyramid_stairs discrete_obstacles stepping_stones"
 TILE_NAMES = (*TILES.split(), "stairs", "steps", "step_up", "step_down", "gaps", "rubble")
+SMOOTH_TILE_NAMES = ("pyramid_slope", "random_uniform", "wave", "ramp", "dune")
+# names of legged_gym
+TILE_ALIASES = {
+    "smooth_slope": "pyramid_slope",
+    "stairs_up": "inverted_pyramid_stairs",
+    "stairs_down": "pyramid_stairs",
+    "discrete": "discrete_obstacles",
+}
 
 
 def _curriculum(values: SimpleNamespace) -> Surface:
-    makers = {name: (CATALOGUE[name].make, CATALOGUE[name].parameters) for name in TILE_NAMES}
-    return curriculum(values, makers)
+    made = [(name, CATALOGUE[name], False) for name in TILE_NAMES]
+    made += [(name, CATALOGUE[name], True) for name in SMOOTH_TILE_NAMES]
+    made += [(name, entry, True) for name, entry in SMOOTH_TILES.items()]
+    makers = {name: TileMaker(entry.make, entry.parameters, flat) for name, entry, flat in made}
+    return curriculum(values, makers | {new: makers[old] for new, old in TILE_ALIASES.items()})
 
 
-CATALOGUE: dict[str, Entry] = {
-    "plane": Entry(
-        "Inclined plane as a grid",
-        rough.plane,
-        {
-            "size": SIZE,
-            "horizontal_scale": HORIZONTAL,
-            "slope_x": ratio(0.0, "rise along +x over run", least=-2.0, most=2.0),
-            "slope_y": ratio(0.0, "rise along +y over run", least=-2.0, most=2.0),
-        },
-    ),
-    "stairs": Entry(
-        "Stairs up along +x and a landing",
-        steps.stairs,
-        {**STEPS, "num_steps": count(5, "number of steps", most=1000)},
-    ),
-    "pyramid_stairs": Entry("Stairs down to all sides", steps.pyramid_stairs, STEPS),
-    "inverted_pyramid_stairs": Entry(
-        "Stairs up to all sides", steps.inverted_pyramid_stairs, STEPS
-    ),
-    "steps": Entry("Kerbs across x", steps.steps, STEPS),
-    "step_up": Entry("One step up along +x", steps.step_up, ONE_STEP),
-    "step_down": Entry("One step down along +x", steps.step_down, ONE_STEP),
-    "stepping_stones": Entry(
-        "Square stones with gaps between them",
-        steps.stepping_stones,
-        {
-            **RANDOM_TILE,
-            "stone_size": length((0.5, 0.1), "edge of a stone", least=0.01, zero=True),
-            "stone_distance": length(0.05, "width of the gaps"),
-            "max_height": length(0.0, "largest deviation of the tops", zero=True),
-            "depth": DEPTH,
-        },
-    ),
-    "gaps": Entry(
-        "Gaps across x",
-        steps.gaps,
-        {
-            **TILE,
-            "gap_size": length((0.02, 0.2), "width of a gap", least=0.01, zero=True),
-            "gap_distance": length(0.4, "ground between two gaps"),
-            "depth": DEPTH,
-        },
-    ),
-    "wave": Entry(
-        "Sine waves along x and y",
-        rough.wave,
-        {
-            **TILE,
-            "amplitude": length((0.02, 0.15), "largest height"),
-            "num_waves": ratio(4.0, "waves along an edge of the map", least=0.1, most=1000.0),
-        },
-    ),
-    "random_uniform": Entry(
-        "Smooth roughness from random heights",
-        rough.random_uniform,
-        {
-            **RANDOM_TILE,
-            "horizontal_scale": replace(HORIZONTAL, default=0.1),
-            "max_height": length((0.01, 0.05), "largest height above and below 0"),
-        },
-    ),
-    "discrete_obstacles": Entry(
-        "Flat rectangles above and below the ground",
-        steps.discrete_obstacles,
-        {
-            **RANDOM_TILE,
-            "max_height": length((0.025, 0.125), "largest height"),
-            "min_size": length(0.2, "shortest edge"),
-            "max_size": length(0.6, "longest edge"),
-            "num_rects": count(40, "number of rectangles"),
-        },
-    ),
-    "pyramid_slope": Entry(
-        "Slopes down to all sides", rough.pyramid_slope, {**TILE, "slope": SLOPE}
-    ),
-    "ramp": Entry(
-        "Ramp up and down along +x",
-        rough.ramp,
-        {**TILE, "slope": SLOPE, "ramp_length": length(0.5, "run of the ramp")},
-    ),
-    "dune": Entry(
-        "Dunes across x, steep on their far side",
-        rough.dune,
-        {
-            **TILE,
-            "dune_height": length((0.03, 0.2), "height of a crest"),
-            "dune_length": length(1.2, "from crest to crest", least=0.1, zero=True),
-        },
-    ),
-    "rubble": Entry(
-        "Square stones of random height",
-        steps.rubble,
-        {
-            **RANDOM_TILE,
-            "stone_size": length(0.2, "edge of a stone", least=0.01, zero=True),
-            "max_height": length((0.02, 0.1), "largest height of a stone"),
-        },
-    ),
-    "sand": Entry(
-        "Level soil",
-        rough.sand,
-        {"size": SIZE, "horizontal_scale": HORIZONTAL, "soil": SOIL},
-    ),
-    "course": Entry(
-        "5 m of rubble, kerbs, stones with gaps, stairs, along +x",
-        steps.course,
-        {
-            "size": replace(SIZE, default=2.0, about="width of the course"),
-            "horizontal_scale": HORIZONTAL,
-            "platform_size": PLATFORM,
-            "difficulty": HARD,
-            "step_height": length((0.015, 0.1), "height of kerbs, stairs and rubble"),
-            "depth": DEPTH,
-            "vertical_scale": VERTICAL,
-            "seed": SEED,
-        },
-    ),
+MAPS: dict[str, Entry] = {
     "curriculum": Entry(
         "Tiles of rising difficulty along +x, terrains in columns",
         _curriculum,
@@ -195,6 +67,7 @@ CATALOGUE: dict[str, Entry] = {
             "num_cols": count(4, "tiles along y", most=1000),
             "border_width": length(1.0, "level ground around the tiles", zero=True),
             "terrains": text(TILES, "names of the columns' terrains"),
+            "terrain_proportions": text(EQUAL, "columns' shares, one for each of terrains"),
         },
     ),
     "heightfield": Entry(
@@ -215,6 +88,33 @@ CATALOGUE: dict[str, Entry] = {
         },
     ),
 }  # fmt: skip
+
+# in the order of lists and of docs/ground.md
+ORDER = (
+    "plane",
+    "stairs",
+    "pyramid_stairs",
+    "inverted_pyramid_stairs",
+    "steps",
+    "step_up",
+    "step_down",
+    "stepping_stones",
+    "gaps",
+    "wave",
+    "random_uniform",
+    "discrete_obstacles",
+    "pyramid_slope",
+    "ramp",
+    "dune",
+    "rubble",
+    "sand",
+    "course",
+    "curriculum",
+    "heightfield",
+)
+CATALOGUE: dict[str, Entry] = {
+    name: (BLOCK_SURFACES | SMOOTH_SURFACES | MAPS)[name] for name in ORDER
+}
 
 
 def entry_of(name: str, *, where: str | None = None) -> Entry:

@@ -2,47 +2,101 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from types import SimpleNamespace
 
 import numpy as np
 
 from hexapod_cosim.models.errors import RobotError, unknown_name
-from hexapod_cosim.models.ground.blocks import block_height
+from hexapod_cosim.models.ground.blocks import block_heights
 from hexapod_cosim.models.ground.parameters import Parameters, with_defaults
+from hexapod_cosim.models.ground.rough import rounded
+from hexapod_cosim.models.ground.smooth import heights_at
 from hexapod_cosim.models.ground.surface import Array, Surface
 
 MOST_BLOCKS = 1 << 24
-Makers = Mapping[str, tuple[Callable[[SimpleNamespace], Surface], Parameters]]
+ROUGH_SCALE = 0.1  # m  least spacing of random heights of smooth tiles
+EQUAL = "equal"  # proportions: columns have the terrains by turns
+
+
+@dataclass(frozen=True)
+class TileMaker:
+    """A terrain that tiles may have."""
+
+    make: Callable[[SimpleNamespace], Surface]
+    parameters: Parameters
+    smooth: bool = False
+
+
+Makers = Mapping[str, TileMaker]
 
 
 def curriculum(values: SimpleNamespace, makers: Makers) -> Surface:
     """Returns num_rows tiles along +x, from difficulty 0 to `difficulty`, and num_cols along y.
 
-    Column j has the terrain j of `terrains`, which is repeated. The robot starts in the middle of
-    the first row, in the column num_cols // 2. The middle height of each tile's edge is that of
-    the border, so that tiles fit together; random tiles have different seeds.
+    Columns have the terrains of `column_names`. The robot starts in the middle of the first row, in
+    the column num_cols // 2. The middle height of each tile's edge is that of the border, so that
+    tiles fit together; random tiles have different seeds. The map is smooth if all its terrains
+    are; else it is made of blocks, with the heights of smooth tiles at the blocks' middles.
 
     Args:
         values: the parameters of the catalogue's surface.
-        makers: function and parameters of the terrains that tiles may have.
+        makers: the terrains that tiles may have.
 
     Raises RobotError.
     """
-    names, cell = tile_names(values.terrains, makers), values.horizontal_scale
+    names, cell = column_names(values, makers), values.horizontal_scale
     half, border = round(0.5 * values.size / cell), round(values.border_width / cell)
     _check_room(values, half, border)
-    shape = 2 * (half * values.num_cols + border), 2 * (half * values.num_rows + border)
+    smooth = all(makers[name].smooth for name in names)
+    extra = 1 if smooth else 0  # a map has a node more than cells along a line
+    shape = tuple(
+        2 * (half * count + border) + extra for count in (values.num_cols, values.num_rows)
+    )
     height, start = np.zeros(shape), values.num_cols // 2
+    places = cell * (np.arange(-half, half + extra) + (0.0 if smooth else 0.5))
     for row in range(values.num_rows):
         for column in range(values.num_cols):
-            tile = _tile(values, makers, names[column % len(names)], row, column)
+            tile = _tile(values, makers[names[column]], places, row, column)
             below, left = (border + 2 * half * place for place in (column, row))
-            height[below : below + 2 * half, left : left + 2 * half] = tile
+            height[below : below + len(places), left : left + len(places)] = tile
     first = border + half, border + (2 * start + 1) * half  # blocks before the robot's start
     height -= height[first[1], first[0]]
     x0, y0 = (-cell * count for count in first)
-    return Surface(kind="blocks", height=height, x0=x0, y0=y0, cell=cell, name="curriculum")
+    kind = "smooth" if smooth else "blocks"
+    return Surface(kind=kind, height=height, x0=x0, y0=y0, cell=cell, name="curriculum")
+
+
+def column_names(values: SimpleNamespace, makers: Makers) -> list[str]:
+    """Returns the terrain of each of num_cols columns, by `terrains` and `terrain_proportions`.
+
+    Raises RobotError.
+    """
+    names, columns = tile_names(values.terrains, makers), values.num_cols
+    if values.terrain_proportions.strip() == EQUAL:
+        return [names[column % len(names)] for column in range(columns)]
+    shares = np.cumsum(_proportions(values.terrain_proportions, names))
+    middles = (np.arange(columns) + 0.5) / columns * shares[-1]
+    return [names[k] for k in np.searchsorted(shares, middles, side="right")]
+
+
+def _proportions(text: str, names: list[str]) -> list[float]:
+    """Returns the share of each terrain. Raises RobotError."""
+    try:
+        shares = [float(word) for word in text.replace(",", " ").split()]
+    except ValueError:
+        shares = []
+    proper = all(math.isfinite(share) and share >= 0.0 for share in shares)
+    if len(shares) != len(names) or not proper or not sum(shares) > 0.0:
+        raise RobotError(
+            "proportions that do not fit the terrains",
+            got=text,
+            expected=f"{len(names)} numbers >= 0, one for each of {', '.join(names)}, or {EQUAL}",
+            fix="change terrain.terrain_proportions or terrain.terrains",
+        )
+    return shares
 
 
 def tile_names(text: str, makers: Makers) -> list[str]:
@@ -61,24 +115,27 @@ def tile_names(text: str, makers: Makers) -> list[str]:
     return names
 
 
-def _tile(values: SimpleNamespace, makers: Makers, name: str, row: int, column: int) -> Array:
-    """Returns the heights of a tile above the border [m]."""
-    make, parameters = makers[name]
+def _tile(values: SimpleNamespace, maker: TileMaker, places: Array, row: int, column: int) -> Array:
+    """Returns the heights of a tile above the border [m] at places along x and y [m]."""
     given = {
         "size": values.size,
         "horizontal_scale": values.horizontal_scale,
         "platform_size": values.platform_size,
         "difficulty": values.difficulty * row / max(values.num_rows - 1, 1),
     }
-    if "seed" in parameters:
+    if "seed" in maker.parameters:
         given |= {
             "seed": values.seed + row * values.num_cols + column,
             "vertical_scale": values.vertical_scale,
         }
-    tile = make(SimpleNamespace(**with_defaults(parameters, given, "terrain")))
-    half = round(0.5 * values.size / values.horizontal_scale)
-    places = values.horizontal_scale * (np.arange(-half, half) + 0.5)
-    heights = np.array([[block_height(tile, x, y) for x in places] for y in places])
+        if maker.smooth:
+            given["horizontal_scale"] = max(values.horizontal_scale, ROUGH_SCALE)
+    tile = maker.make(SimpleNamespace(**with_defaults(maker.parameters, given, "terrain")))
+    heights = (
+        rounded(heights_at(tile, places, places))  # sums differ between machines
+        if maker.smooth
+        else block_heights(tile, places, places)
+    )
     edges = np.concatenate([heights[0], heights[-1], heights[:, 0], heights[:, -1]])
     return np.asarray(heights - np.sort(edges)[len(edges) // 2])
 

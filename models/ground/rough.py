@@ -7,6 +7,7 @@ the last digits of a machine's sine do not appear in them; sums of products are 
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -73,6 +74,18 @@ def pyramid_slope(values: SimpleNamespace) -> Surface:
     x, y, cell = _nodes(values.size, values.size, values.horizontal_scale)
     outside = np.maximum(np.abs(x), np.abs(y)) - 0.5 * values.platform_size - FLAT_CELLS * cell
     return _surface("pyramid_slope", x, y, cell, -values.slope * np.maximum(outside, 0.0))
+
+
+def inverted_pyramid_slope(values: SimpleNamespace) -> Surface:
+    """Returns a hollow with a flat bottom at the start, whose sides have the pyramid's slope."""
+    pyramid = pyramid_slope(values)
+    return replace(pyramid, height=-pyramid.height, name="inverted_pyramid_slope")
+
+
+def rough_slope(values: SimpleNamespace) -> Surface:
+    """Returns the sum of a pyramid's slopes and random heights."""
+    pyramid, rough = pyramid_slope(values), random_uniform(values)
+    return replace(pyramid, height=pyramid.height + rough.height, name="rough_slope")
 
 
 def ramp(values: SimpleNamespace) -> Surface:

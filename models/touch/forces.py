@@ -31,9 +31,9 @@ from hexapod_cosim.models.contact import (
 from hexapod_cosim.models.friction import bristle_rate, friction_force, turning_moment
 from hexapod_cosim.models.ground.blocks import TOP, Cell
 from hexapod_cosim.models.kinematics import JOINTS, LEGS, cross, rotation_matrix
-from hexapod_cosim.models.records import BRISTLE_LAWS, Array, Contact, Friction, Robot, Soil
+from hexapod_cosim.models.records import BRISTLE_LAWS, Array, Contact, Foot, Friction, Robot, Soil
 from hexapod_cosim.models.soil.law import (
-    plastic_depth,
+    body_shear_drag,
     shear_force,
     shear_limit,
     shear_rate,
@@ -55,8 +55,19 @@ class Spot:
 
     @property
     def is_sole(self) -> bool:
-        """Whether this is a foot on the ground below it, which has bristles and may be on soil."""
+        """Whether this is a foot on the ground below it, which has bristles."""
         return self.face == TOP
+
+    @property
+    def may_sink(self) -> bool:
+        """Whether this may be on soil: all but walls."""
+        return self.is_sole or self.face == NEAREST
+
+    def shape(self, robot: Robot) -> Foot:
+        """Returns radius and pad radius of the sphere, as the laws of soil take them."""
+        if self.leg >= 0:
+            return robot.foot
+        return replace(robot.foot, radius=self.sphere.radius, pad_radius=self.sphere.pad_radius)
 
 
 @dataclass(frozen=True)
@@ -85,11 +96,16 @@ class Contacts:
     """State of all contacts. It changes at the ends of steps alone."""
 
     held: tuple[Held, ...]  # in the order of `spots`
-    plastic: Array  # (6,) m  depth at which feet touch soil: z_p, or that of a footprint; else 0
-    place: Array  # (6, 2) m  where feet lost contact with the bottom of their footprints
+    sunk: Array  # (n,) m  depth at which spheres touch soil: z_p, or that of a footprint; else 0
+    place: Array  # (n, 2) m  where they lost contact with the bottom of their footprints
     cell: tuple[Cell | None, ...]  # (6,) of blocks, held while a foot touches; None: not held
     footprints: Array  # (n, 4) m  x, y, depth, radius
     pairs: tuple[Held, ...] = ()  # contacts between legs, in the order of `leg_pairs`
+
+    @property
+    def plastic(self) -> Array:
+        """Depths (6,) at which the feet touch soil [m]."""
+        return self.sunk[:LEGS]
 
     @property
     def damping(self) -> Array:
@@ -117,8 +133,13 @@ def spots(robot: Robot) -> tuple[Spot, ...]:
 
 def own_ground(robot: Robot, spot: Spot) -> Held:
     """Returns an open contact with the ground of the robot file, without the surface's patches."""
-    soil = robot.soil if spot.is_sole else Soil()
+    soil = robot.soil if is_on_soil(spot) else Soil()
     return Held(robot.contact, _friction_of(robot.friction, spot), soil)
+
+
+def is_on_soil(spot: Spot) -> bool:
+    """Returns whether a sphere sinks where the ground is soil: points without size do not."""
+    return spot.may_sink and max(spot.sphere.radius, spot.sphere.pad_radius) > 0.0
 
 
 def _friction_of(friction: Friction, spot: Spot) -> Friction:
@@ -130,7 +151,8 @@ def open_contacts(robot: Robot) -> Contacts:
     """Returns the contacts of a robot in the air, over undisturbed ground."""
     held = tuple(own_ground(robot, spot) for spot in spots(robot))
     pairs = (open_pair(robot),) * len(leg_pairs(robot))
-    nothing = np.zeros(LEGS), np.zeros((LEGS, 2)), (None,) * LEGS, np.zeros((0, 4))
+    n = len(held)
+    nothing = np.zeros(n), np.zeros((n, 2)), (None,) * LEGS, np.zeros((0, 4))
     return Contacts(held, *nothing, pairs)
 
 
@@ -239,30 +261,41 @@ def _with_share(held: Held, share: float) -> Held:
 
 
 def contact_load(
-    robot: Robot, held: Held, plastic: float, depth: float, approach_speed: float
+    shape: Foot, held: Held, plastic: float, depth: float, approach_speed: float
 ) -> float:
     """Returns f_n [N] of a closed contact at a depth [m] and an approach speed [m/s] (eq. 14, 45).
 
-    plastic: z_p of a foot on soil [m].
+    shape: radius and pad radius of the sphere; plastic: z_p on soil [m].
     """
     if held.is_soft:
-        return soil_normal_force(held.soil, robot.foot, plastic, depth, approach_speed)
+        return soil_normal_force(held.soil, shape, plastic, depth, approach_speed)
     return normal_force(held.contact, held.damping, depth, approach_speed)
 
 
 def contact_force(
-    robot: Robot, held: Held, plastic: float, contact: FootContact, bristle: Array | None
+    shape: Foot,
+    held: Held,
+    plastic: float,
+    contact: FootContact,
+    bristle: Array | None,
+    has_bristle: bool = True,
 ) -> Array:
     """Returns the force (3,) of the ground on a sphere [N].
 
     bristle: deflection (3,) of a sole [m]. On soil the depth of shear is not below z_p, so that a
-    foot that leaves the ground within a step keeps its grip to the end of the step.
+    foot that leaves the ground within a step keeps its grip to the end of the step. Spheres without
+    a bristle, of torso, knees and shanks, have the whole shear against their slip.
     """
     depth = contact.penetration
-    load = contact_load(robot, held, plastic, depth, contact.approach_speed)
+    load = contact_load(shape, held, plastic, depth, contact.approach_speed)
     if held.is_soft:
-        limit = shear_limit(held.soil, robot.foot, max(depth, plastic), load)
-        sideways = shear_force(held.soil, limit, np.zeros(3) if bristle is None else bristle)
+        limit = shear_limit(held.soil, shape, max(depth, plastic), load)
+        if has_bristle:
+            sideways = shear_force(held.soil, limit, np.zeros(3) if bristle is None else bristle)
+        else:
+            slip = slip_velocity(contact)
+            drag = body_shear_drag(held.friction, limit, float(np.linalg.norm(slip)))
+            sideways = -drag * slip
     else:
         sideways = friction_force(held.friction, load, slip_velocity(contact), bristle)
     return load * contact.normal + sideways
@@ -276,15 +309,16 @@ def contact_wrenches(
     Torques are about the centres of mass. bristle: deflections (6, 3) [m], 0 by default.
     """
     g = np.zeros((len(body), 6))
-    for _, spot, held, contact in closed_contacts(robot, body, contacts):
+    for k, spot, held, contact in closed_contacts(robot, body, contacts):
         state = body[spot.sphere.body]
-        plastic = float(contacts.plastic[spot.leg]) if held.is_soft else 0.0
+        shape = spot.shape(robot) if held.is_soft else robot.foot
+        plastic = float(contacts.sunk[k]) if held.is_soft else 0.0
         deflection = bristle[spot.leg] if bristle is not None and spot.is_sole else None
-        force = contact_force(robot, held, plastic, contact, deflection)
+        force = contact_force(shape, held, plastic, contact, deflection, spot.is_sole)
         torque = cross(contact.point - state[0:3], force)
         if spot.leg >= 0:
             depth, speed = contact.penetration, contact.approach_speed
-            load = contact_load(robot, held, plastic, depth, speed)
+            load = contact_load(shape, held, plastic, depth, speed)
             friction, radius = held.friction, robot.foot.radius
             torque += turning_moment(friction, radius, load, contact.normal, state[10:13])
         g[spot.sphere.body] += np.concatenate([force, torque])
@@ -300,7 +334,7 @@ def pair_wrenches(robot: Robot, body: Array, contacts: Contacts) -> Array:
     for pair, held, contact in zip(leg_pairs(robot), contacts.pairs, found, strict=True):
         if held.is_open:
             continue
-        force = contact_force(robot, held, 0.0, contact, None)
+        force = contact_force(robot.foot, held, 0.0, contact, None)
         for number, sign in ((pair.body, 1.0), (pair.other_body, -1.0)):
             torque = cross(contact.point - body[number, 0:3], force)
             g[number] += sign * np.concatenate([force, torque])
@@ -320,13 +354,8 @@ def contact_bristle_rate(held: Held, contact: FootContact, bristle: Array) -> Ar
     return bristle_rate(held.friction, slip, bristle)
 
 
-def sunk_depth(robot: Robot, soil: Soil, depth: float) -> float:
-    """Returns z_p [m] of a foot that was pressed to a depth [m] into a soil; 0 on rigid ground."""
-    return plastic_depth(soil, robot.foot, depth) if soil.law != "none" and depth > 0.0 else 0.0
-
-
 def has_soil(robot: Robot) -> bool:
-    """Returns whether feet may touch soil, of the robot file or of a patch."""
+    """Returns whether the ground may be soil, of the robot file or of a patch."""
     return bristle_length_of_patches(robot) > 0.0 or robot.soil.law != "none"
 
 

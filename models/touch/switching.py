@@ -25,6 +25,7 @@ from hexapod_cosim.models.touch.forces import (
     Spot,
     contacts_at,
     has_soil,
+    is_on_soil,
     open_contacts,
     own_ground,
     shares_of_feet,
@@ -41,7 +42,7 @@ SAME_FACE = 1e-6  # m, 1  depth and normal of one contact at both sides of a bor
 class Depths:
     """Depths and approach speeds of all contacts, and how far feet have left their cells."""
 
-    delta: Array  # (n,) m  of soles above the depth at which they touch soil; legs' pairs last
+    delta: Array  # (n,) m  above the depth at which spheres touch soil; legs' pairs last
     ddelta: Array  # (n,) m/s
     outside: Array  # (6,) m  < 0: inside; -inf: no cell is held
 
@@ -56,7 +57,7 @@ def depths_of(robot: Robot, body: Array, contacts: Contacts) -> Depths:
     """Returns the depths of all contacts at bodies (19, 13)."""
     found = [*contacts_at(robot, body, contacts), *pair_contacts(robot, body)]
     delta = np.array([contact.penetration for contact in found])
-    delta[:LEGS] -= contacts.plastic
+    delta[: len(contacts.sunk)] -= contacts.sunk
     far = np.full(LEGS, -math.inf)
     surface = surface_of(robot.terrain)
     if surface is not None and has_cells(robot):
@@ -72,8 +73,8 @@ def depths_of(robot: Robot, body: Array, contacts: Contacts) -> Depths:
 def ground_under(robot: Robot, spot: Spot, centre: Array) -> Held:
     """Returns an open contact with the ground at a sphere's centre (3,), or with its patch.
 
-    A patch with a kinetic coefficient of its own has no static rise unless it gives one. Soil is
-    that of soles; walls, torso, knees and shanks meet rigid ground of the patch's friction.
+    A patch with a kinetic coefficient of its own has no static rise unless it gives one. Walls are
+    rigid, of the patch's friction.
     """
     held, surface = own_ground(robot, spot), surface_of(robot.terrain)
     if surface is None or surface.materials is None:
@@ -91,7 +92,7 @@ def ground_under(robot: Robot, spot: Spot, centre: Array) -> Held:
         held,
         friction=replace(held.friction, mu=mu, mu_static=mu_static),
         contact=replace(robot.contact, stiffness=stiffness),
-        soil=row_soil(row[LAW:]) if spot.is_sole else Soil(),
+        soil=row_soil(row[LAW:]) if is_on_soil(spot) else Soil(),
     )
 
 
@@ -103,19 +104,19 @@ def closed(robot: Robot, spot: Spot, centre: Array, impact_speed: float) -> Held
 
 def start_contacts(robot: Robot, body: Array) -> Contacts:
     """Returns the contacts of bodies (19, 13) at the start: spheres in the ground are closed, with
-    impact speed 0; feet in soil have been pressed into it.
+    impact speed 0; those in soil have been pressed into it.
     """
     contacts = open_contacts(robot)
     depths = depths_of(robot, body, contacts)
-    held, plastic = list(contacts.held), np.zeros(LEGS)
+    held, sunk = list(contacts.held), contacts.sunk.copy()
     for k, spot in enumerate(spots(robot)):
         if depths.delta[k] > 0.0:
             held[k] = closed(robot, spot, sphere_centre(spot, body), 0.0)
             if held[k].is_soft:
                 depth = float(depths.delta[k])
-                plastic[spot.leg] = plastic_depth(held[k].soil, robot.foot, depth)
+                sunk[k] = plastic_depth(held[k].soil, spot.shape(robot), depth)
     pairs = standing_pairs(robot, body)
-    contacts = replace(contacts, held=tuple(held), plastic=plastic, pairs=pairs)
+    contacts = replace(contacts, held=tuple(held), sunk=sunk, pairs=pairs)
     return hold_cells(robot, body, contacts)
 
 
@@ -216,47 +217,54 @@ def deepest(start: float, slope_start: float, end: float, slope_end: float) -> f
 
 
 def yield_soil(robot: Robot, contacts: Contacts, h: float, before: Depths, after: Depths) -> Array:
-    """Returns the plastic depths (6,) [m] at the end of a step of h [s] (eq. 44).
+    """Returns the plastic depths (n,) of all spheres [m] at the end of a step of h [s] (eq. 44).
 
     They follow from the largest depths between the steps' ends. before, after: at the ends, with
     the plastic depths of the step.
     """
-    plastic = contacts.plastic.copy()
-    for leg in range(LEGS):
-        held = contacts.held[leg]
+    sunk = contacts.sunk.copy()
+    for k, (spot, held) in enumerate(zip(spots(robot), contacts.held, strict=True)):
         if held.is_open or not held.is_soft:
             continue
-        from_, to = (float(ends.delta[leg] + plastic[leg]) for ends in (before, after))
-        slopes = (h * float(before.ddelta[leg]), h * float(after.ddelta[leg]))
+        from_, to = (float(ends.delta[k] + sunk[k]) for ends in (before, after))
+        slopes = (h * float(before.ddelta[k]), h * float(after.ddelta[k]))
         depth = deepest(from_, slopes[0], to, slopes[1])
-        plastic[leg] = max(plastic[leg], plastic_depth(held.soil, robot.foot, depth))
-    return plastic
+        sunk[k] = max(sunk[k], plastic_depth(held.soil, spot.shape(robot), depth))
+    return sunk
 
 
 def tread(robot: Robot, body: Array, contacts: Contacts, delta: Array) -> tuple[Contacts, Array]:
-    """Records the footprints that feet leave upwards, and finds those that feet enter from above.
+    """Records the prints that spheres leave upwards, and finds those that they enter from above.
 
-    An open foot below the undisturbed surface is above its footprint, whose bottom it may touch
-    again; the footprint is complete when the foot has left it upwards. Rigid ground beside a
+    An open sphere below the undisturbed surface is above its footprint, whose bottom it may touch
+    again; the footprint is complete when the sphere has left it upwards. Rigid ground beside a
     footprint has none. Depths (n,) follow the plastic depths to which they refer.
     """
-    delta, plastic, place = delta.copy(), contacts.plastic.copy(), contacts.place.copy()
+    delta, sunk, place = delta.copy(), contacts.sunk.copy(), contacts.place.copy()
     prints = contacts.footprints
-    for leg, centre in enumerate(foot_centres(robot, body)):
-        z, held = delta[leg] + plastic[leg], contacts.held[leg]
+    for k, spot in _in_order_of_prints(robot):
+        z, held, centre = delta[k] + sunk[k], contacts.held[k], sphere_centre(spot, body)
         if not held.is_open:
-            if delta[leg] <= 0.0:
-                place[leg] = centre[:2]
+            if delta[k] <= 0.0:
+                place[k] = centre[:2]
             continue
         if z <= 0.0:
-            if plastic[leg] >= LEAST_FOOTPRINT:
-                new = [*place[leg], plastic[leg], soil_radius(robot.foot)]
+            if sunk[k] >= LEAST_FOOTPRINT:
+                new = [*place[k], sunk[k], soil_radius(spot.shape(robot))]
                 prints = np.vstack([prints, new])
-            plastic[leg] = 0.0
-        elif plastic[leg] == 0.0 and ground_under(robot, spots(robot)[leg], centre).is_soft:
-            plastic[leg] = footprint_depth(prints, centre)
-        delta[leg] = z - plastic[leg]
-    return replace(contacts, plastic=plastic, place=place, footprints=prints), delta
+            sunk[k] = 0.0
+        elif sunk[k] == 0.0 and ground_under(robot, spot, centre).is_soft:
+            sunk[k] = footprint_depth(prints, centre)
+        delta[k] = z - sunk[k]
+    return replace(contacts, sunk=sunk, place=place, footprints=prints), delta
+
+
+def _in_order_of_prints(robot: Robot) -> list[tuple[int, Spot]]:
+    """Returns the spheres that may sink with their numbers, in the order in which the C plant
+    looks at them: feet, knees, shanks, corners of the torso.
+    """
+    spheres = [(k, spot) for k, spot in enumerate(spots(robot)) if spot.may_sink]
+    return sorted(spheres, key=lambda numbered: numbered[1].sphere.name == "torso")
 
 
 def footprint_depth(footprints: Array, centre: Array) -> float:
@@ -286,7 +294,7 @@ def cross_cells(robot: Robot, body: Array, contacts: Contacts, depths: Depths) -
     closed = [j for j, held in enumerate(contacts.held) if not held.is_open]
     placed = [(spots(robot)[j], contacts.held[j], before[j]) for j in closed]
     share = dict(zip(closed, shares_of_feet(robot, placed).tolist(), strict=True))
-    feet, held, plastic = spots(robot), list(contacts.held), contacts.plastic.copy()
+    feet, held, sunk = spots(robot), list(contacts.held), contacts.sunk.copy()
     for k, spot in enumerate(feet):
         if spot.leg not in gone:
             continue
@@ -297,8 +305,8 @@ def cross_cells(robot: Robot, body: Array, contacts: Contacts, depths: Depths) -
                 largest = share[j]
                 held[k] = taken_over(contacts.held[j], other, spot, held[k])
         if spot.is_sole and held[k].is_open:
-            plastic[spot.leg] = 0.0  # the new cell is undisturbed
-    return replace(moved, held=tuple(held), plastic=plastic)
+            sunk[k] = 0.0  # the new cell is undisturbed
+    return replace(moved, held=tuple(held), sunk=sunk)
 
 
 def is_same_face(a: FootContact, b: FootContact) -> bool:

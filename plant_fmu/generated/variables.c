@@ -1418,7 +1418,7 @@ const size_t hx_state_count = sizeof states / sizeof states[0];
 
 _Static_assert(sizeof states / sizeof states[0] == sizeof(hxCoordinates) / sizeof(double), "each state has its row");
 
-const char hx_default_guid[] = "{4663f9ca-0f67-458b-b023-29f57aa26f3d}";
+const char hx_default_guid[] = "{8bf69830-8d31-4c55-8b00-5e179aec98af}";
 
 _Static_assert(HX_CONTACT_EXACT_RESTITUTION == 1, "ContactLaw");
 _Static_assert(HX_CONTACT_FLORES == 2, "ContactLaw");

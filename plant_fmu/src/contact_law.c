@@ -80,18 +80,21 @@ static void set_ground(const hxModel *model, const double *material, int row, in
   contact->static_rise[row][slot] = material ? fmax(mu_static - mu, 0.0) : model->static_rise;
 }
 
-/* Sets the soil of a foot to that of a material, NULL: of the definition. */
-static void set_soil(const hxModel *model, const double *material, int slot,
+/* Sets the soil of a contact to that of a material, NULL: of the definition. */
+static void set_soil(const hxModel *model, const double *material, int row, int slot,
                      hxContactState *contact) {
+  const int soft = hx_soil_row(row);
   hxSoil soil;
   double numbers[HX_SOIL_SIZE];
   if (material)
-    hx_soil_from_row(material + HX_MATERIAL_SOIL, model->radius[HX_FOOT], model->pad_radius, &soil);
+    hx_soil_from_row(material + HX_MATERIAL_SOIL, model->radius[row], model->pad_radius[soft],
+                     &soil);
   else
-    memcpy(&soil, model->soil, sizeof soil);
-  contact->on_soil[slot] = (int)soil.law != HX_SOIL_NONE ? 1.0 : 0.0;
+    memcpy(&soil, model->soil[soft], sizeof soil);
+  /* a point without size meets rigid ground: soil has no pressure on it */
+  contact->on_soil[soft][slot] = (int)soil.law != HX_SOIL_NONE && soil.radius > 0.0 ? 1.0 : 0.0;
   memcpy(numbers, &soil, sizeof soil);
-  for (int i = 0; i < HX_SOIL_SIZE; ++i) contact->soil[i][slot] = numbers[i];
+  for (int i = 0; i < HX_SOIL_SIZE; ++i) contact->soil[soft][i][slot] = numbers[i];
 }
 
 /* Copies the centre of a row's sphere. */
@@ -114,7 +117,7 @@ static void close_contact(const hxModel *model, const hxDepths *depths, int row,
                           double impact_speed, hxContactState *contact) {
   const double *material = material_under(model, depths, row, slot);
   set_ground(model, material, row, slot, contact);
-  if (row == HX_FOOT && model->has_soil) set_soil(model, material, slot, contact);
+  if (model->has_soil && hx_may_sink(row)) set_soil(model, material, row, slot, contact);
   contact->closed[row][slot] = 1.0;
   contact->impact_speed[row][slot] = impact_speed;
   contact->damping[row][slot] = hx_contact(model->contact_law)->damping(model, impact_speed);
@@ -134,9 +137,9 @@ static void fill_contact_slots(hxContactState *contact, int row) {
   hx_fill_slots(contact->stiffness[row]);
   hx_fill_slots(contact->mu[row]);
   hx_fill_slots(contact->static_rise[row]);
-  if (row != HX_FOOT) return;
-  hx_fill_slots(contact->on_soil);
-  for (int i = 0; i < HX_SOIL_SIZE; ++i) hx_fill_slots(contact->soil[i]);
+  if (!hx_may_sink(row)) return;
+  hx_fill_slots(contact->on_soil[hx_soil_row(row)]);
+  for (int i = 0; i < HX_SOIL_SIZE; ++i) hx_fill_slots(contact->soil[hx_soil_row(row)][i]);
 }
 
 /* Holds the cells of feet that touch the ground, and releases those of others. */
@@ -163,17 +166,19 @@ void hx_contact_release(hxContactState *contact) {
     contact->cell[0][slot] = contact->cell[1][slot] = -1.0;
 }
 
-/* Sets the plastic depths of feet that begin in soil, as if they had been pressed into it. */
-static void start_in_soil(const hxDepths *depths, hxContactState *contact) {
-  for (int leg = 0; leg < HX_LEGS; ++leg) {
+/* Sets the plastic depths of contacts of a row that begin in soil, as if they had been pressed into
+ * it. */
+static void start_in_soil(const hxDepths *depths, int row, hxContactState *contact) {
+  const int soft = hx_soil_row(row);
+  for (int slot = 0; slot < hx_slots_of(row); ++slot) {
     hxSoil soil;
     double numbers[HX_SOIL_SIZE];
-    for (int i = 0; i < HX_SOIL_SIZE; ++i) numbers[i] = contact->soil[i][leg];
+    for (int i = 0; i < HX_SOIL_SIZE; ++i) numbers[i] = contact->soil[soft][i][slot];
     memcpy(&soil, numbers, sizeof soil);
-    if (contact->closed[HX_FOOT][leg] != 0.0 && contact->on_soil[leg] != 0.0)
-      contact->plastic[leg] = hx_soil_plastic_depth(&soil, depths->delta[HX_FOOT][leg]);
+    if (contact->closed[row][slot] != 0.0 && contact->on_soil[soft][slot] != 0.0)
+      contact->plastic[soft][slot] = hx_soil_plastic_depth(&soil, depths->delta[row][slot]);
   }
-  hx_fill_slots(contact->plastic);
+  if (row != HX_TORSO) hx_fill_slots(contact->plastic[soft]);
 }
 
 void hx_contact_start(const hxModel *model, const hxDepths *depths, hxContactState *contact) {
@@ -185,8 +190,8 @@ void hx_contact_start(const hxModel *model, const hxDepths *depths, hxContactSta
     for (int slot = 0; slot < hx_slots_of(row); ++slot)
       if (depths->delta[row][slot] > 0.0) close_contact(model, depths, row, slot, 0.0, contact);
     fill_contact_slots(contact, row);
+    if (model->has_soil && hx_may_sink(row)) start_in_soil(depths, row, contact);
   }
-  if (model->has_soil) start_in_soil(depths, contact);
   if (hx_has_cells(model)) hold_cells(model, depths, contact);
 }
 
@@ -280,7 +285,7 @@ static void copy_contact(const hxContactState *from, int row_from, int row_to, i
   to->mu[row_to][leg] = from->mu[row_from][leg];
   to->static_rise[row_to][leg] = from->static_rise[row_from][leg];
   if (row_to == HX_FOOT && row_from != HX_FOOT) /* walls are rigid */
-    to->on_soil[leg] = to->plastic[leg] = 0.0;
+    to->on_soil[0][leg] = to->plastic[0][leg] = 0.0;
 }
 
 int hx_contact_cross(const hxModel *model, const hxDepths *depths, hxContactState *contact) {
@@ -313,5 +318,5 @@ void hx_contact_hand_over(const hxMoment *before, const hxMoment *after, int cro
         }
     }
   for (int row = HX_FOOT; hx_is_of_foot(row); ++row) fill_contact_slots(contact, row);
-  hx_fill_slots(contact->plastic);
+  hx_fill_slots(contact->plastic[0]);
 }

@@ -24,7 +24,7 @@ typedef struct {
 } hxSavedPlant;
 
 static const uint64_t magic = 0x74616c5064507868u; /* "hxPdPlat" */
-static const uint64_t saved_version = 15;
+static const uint64_t saved_version = 16;
 
 /* Returns the checksum of a saved plant's bytes behind it, of the ring those of its footprints. */
 static uint64_t checksum(const unsigned char *bytes, int footprints) {
@@ -572,7 +572,7 @@ hxStatus hx_plant_tangent(hxPlant *plant, const hxInput *input, const hxInput *d
   point->x = x;
   point->dx = dx ? *dx : no_change;
   point->model = plant->model;
-  point->state = plant->state;
+  memcpy(&point->state, &plant->state, offsetof(hxState, moment));
   point->scale = scale > 0.0 ? scale : 1.0;
   hx_tangent(point, d_rate, d_output);
   return HX_OK;

@@ -199,12 +199,27 @@ static int has_friction_bristles(const hxDefinition *d) {
   return d->friction.law == HX_FRICTION_BRISTLE || d->friction.law == HX_FRICTION_LUGRE;
 }
 
+static const double pi = 3.14159265358979323846;
+
+/* Returns the radius of the pad as which a corner of the torso's box sinks into soil, m: a disc of
+ * a quarter of the box's upper side; 0, the sphere, where that is not larger. */
+static double corner_pad_radius(const hxDefinition *d) {
+  const double area = d->body.torso_box[0] * d->body.torso_box[1] / pi,
+               corner = d->body.corner_radius;
+  return area > corner * corner ? sqrt(area) : 0.0;
+}
+
 /* Computes the constants of the definition's soil; the terrain is known. */
 static void compile_soil(hxModel *model, const hxDefinition *d) {
-  hxSoil soil;
-  hx_soil_compile(&d->soil, d->foot_radius, d->foot_pad_radius, &soil);
-  memcpy(model->soil, &soil, sizeof soil);
-  model->pad_radius = d->foot_pad_radius;
+  const double radius[HX_SOIL_ROWS] = {d->foot_radius, d->body.knee_radius, d->body.shank_radius,
+                                       d->body.corner_radius};
+  model->pad_radius[0] = d->foot_pad_radius;
+  model->pad_radius[HX_SOIL_ROWS - 1] = corner_pad_radius(d);
+  for (int soft = 0; soft < HX_SOIL_ROWS; ++soft) {
+    hxSoil soil;
+    hx_soil_compile(&d->soil, radius[soft], model->pad_radius[soft], &soil);
+    memcpy(model->soil[soft], &soil, sizeof soil);
+  }
   const double on_grid = model->terrain ? hx_terrain_shear_displacement(model->terrain) : 0.0;
   model->has_soil = d->soil.law != HX_SOIL_NONE || on_grid > 0.0;
   model->bristle_length = d->friction.presliding;

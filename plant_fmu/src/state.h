@@ -42,8 +42,9 @@ enum {
   HX_TIBIA_ROWS = HX_TORSO
 };
 
-/* Numbers of hxSoil (ground/soil.h). */
-enum { HX_SOIL_SIZE = 16 };
+/* Numbers of hxSoil (ground/soil.h), and rows of contacts that may be on soil: those of feet with
+ * the ground below them, of knees, of shanks and of the torso (hx_soil_row). */
+enum { HX_SOIL_SIZE = 16, HX_SOIL_ROWS = 4 };
 
 /* Offsets of position, quaternion, velocity and angular velocity in a body state. */
 enum { HX_R = 0, HX_P = 3, HX_V = 7, HX_W = 10 };
@@ -101,7 +102,7 @@ typedef struct hxModel {
   int stribeck;                     /* 1: it has Stribeck terms */
   int elastic;                      /* 1: the gears are elastic; 2: and have play */
   int spin;                         /* 1: the rotors have angular momentum (eq. 57) */
-  int has_soil; /* 1: feet may touch soil, of the definition or of a material of the terrain */
+  int has_soil; /* 1: the ground may be soil, of the definition or of a material of the terrain */
   int rows, foot_rows, torso_rows; /* computed: on tibias, of these on feet, on the torso (0, 1) */
   int pair_rows, listed;           /* between legs (0 or HX_PAIR_ROWS); all together */
   int row[HX_ROWS];                /* rows that are computed: on feet, tibias, torso, of pairs */
@@ -133,9 +134,9 @@ typedef struct hxModel {
   hxHeat heat;
   double bus_period, command_step; /* s, rad  0 in kinematic mode */
   double ground_point[3], ground_normal[3];
-  double soil[HX_SOIL_SIZE]; /* an hxSoil, of the definition */
-  double bristle_length;     /* m  presliding, or shear displacement of the soil */
-  double pad_radius;         /* m  of feet on soil; 0: spheres */
+  double soil[HX_SOIL_ROWS][HX_SOIL_SIZE]; /* hxSoil of each row, of the definition */
+  double bristle_length;                   /* m  presliding, or shear displacement of the soil */
+  double pad_radius[HX_SOIL_ROWS];         /* m  on soil; 0: spheres */
   double step, tolerance, step_max;
   double load_threshold; /* N  a foot with a larger load counts its slip */
 } hxModel;
@@ -170,11 +171,12 @@ typedef struct hxContactState {
   double stiffness[HX_ROWS][HX_SLOTS];    /* N/m^1.5  K of the ground where it touched down */
   double mu[HX_ROWS][HX_SLOTS];           /* 1        friction of that ground */
   double static_rise[HX_ROWS][HX_SLOTS];  /* 1        mu_s - mu of eq. 18 */
-  double on_soil[HX_SLOTS];               /* 1    1: the foot touched down on soil */
-  double soil[HX_SOIL_SIZE][HX_SLOTS];    /* numbers of an hxSoil, where on_soil is 1 */
-  double plastic[HX_SLOTS];    /* m    depth at which feet touch soil: z_p, or that of the footprint
-                                *      above which a foot is; 0 on rigid ground */
-  double place[2][HX_SLOTS];   /* m    x and y where feet left the bottom of that footprint */
+  double on_soil[HX_SOIL_ROWS][HX_SLOTS]; /* 1    1: the sphere touched down on soil */
+  double soil[HX_SOIL_ROWS][HX_SOIL_SIZE][HX_SLOTS]; /* numbers of an hxSoil, where on_soil is 1 */
+  double plastic[HX_SOIL_ROWS]
+                [HX_SLOTS];                /* m  depth at which spheres touch soil: z_p, or that of
+                                            *    the footprint above which one is; 0 on rigid ground */
+  double place[HX_SOIL_ROWS][2][HX_SLOTS]; /* m  x and y where they left the bottom of that print */
   double cell[2][HX_SLOTS];    /* 1    blocks: column and row over which a foot is; < 0: not held */
   double nearest[2][HX_SLOTS]; /* m  smooth grids: x and y from a foot's centre to the point nearest
                                 *    to it at the start of a step, where the search for that point
@@ -324,14 +326,26 @@ static inline int hx_is_of_foot(int row) { return row < HX_KNEE; }
 /* Returns whether a row's contacts are those of feet with blocks beside them. */
 static inline int hx_is_wall(int row) { return row >= HX_WALL && row < HX_KNEE; }
 
-/* Makes the feet's penetrations relative to the depth at which they touch the ground. */
-static inline void hx_depths_on_soil(const hxContactState *contact, hxDepths *depths) {
-  for (int slot = 0; slot < HX_SLOTS; ++slot)
-    depths->delta[HX_FOOT][slot] -= contact->plastic[slot];
-}
-
 /* Returns whether a row's contacts are those of pairs of legs. */
 static inline int hx_is_of_pair(int row) { return row >= HX_PAIR; }
+
+/* Returns whether a row's contacts may be on soil; walls are rigid. */
+static inline int hx_may_sink(int row) {
+  return row == HX_FOOT || (row >= HX_KNEE && row <= HX_TORSO);
+}
+
+/* Returns the index of such a row in arrays of HX_SOIL_ROWS. */
+static inline int hx_soil_row(int row) { return row == HX_FOOT ? 0 : 1 + row - HX_KNEE; }
+
+/* Makes the penetrations of a model's rows relative to the depth at which they touch the ground. */
+static inline void hx_depths_on_soil(const hxModel *model, const hxContactState *contact,
+                                     hxDepths *depths) {
+  for (int k = 0; k < model->listed; ++k) {
+    const int row = model->row[k];
+    for (int slot = 0; hx_may_sink(row) && slot < HX_SLOTS; ++slot)
+      depths->delta[row][slot] -= contact->plastic[hx_soil_row(row)][slot];
+  }
+}
 
 /* Returns how many slots of a row of contacts hold one. */
 static inline int hx_slots_of(int row) { return row == HX_TORSO ? HX_SLOTS : HX_LEGS; }

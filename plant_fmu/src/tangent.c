@@ -37,7 +37,8 @@ enum {
   POINT_FIRST = NUMBERS(offsetof(hxTangentPoint, model.contact_law)),
   POINT_CHOICES = offsetof(hxTangentPoint, model.stiffness) -
       offsetof(hxTangentPoint, model.contact_law),
-  POINT_LAST = NUMBERS(sizeof(hxTangentPoint) - offsetof(hxTangentPoint, model.stiffness)),
+  POINT_END = offsetof(hxTangentPoint, state.moment),
+  POINT_LAST = NUMBERS(POINT_END - offsetof(hxTangentPoint, model.stiffness)),
   OUTPUT_FIRST = NUMBERS(offsetof(hxOutput, foot.contact)),
   OUTPUT_CONTACT = offsetof(hxOutput, torso) - offsetof(hxOutput, foot.contact),
   OUTPUT_LAST = NUMBERS(sizeof(hxOutput) - offsetof(hxOutput, torso))
@@ -78,13 +79,13 @@ static void output_to_derivatives(const hxOutput *output, double scale, void *re
 /* The work space; the real point is where the work is written later. */
 typedef struct {
   hxWork work;
-  hxTangentPoint point;
   hxRate all;
   hxOutput output;
+  hxTangentPoint point; /* to before its state's moment */
 } hxTangentScratch;
-_Static_assert(sizeof(hxWork) >= sizeof(hxTangentPoint) / 2, "the real point lies in the work");
+_Static_assert(sizeof(hxWork) >= POINT_END / 2, "the real point lies in the work");
 
-size_t hx_tangent_scratch(void) { return sizeof(hxTangentScratch); }
+size_t hx_tangent_scratch(void) { return offsetof(hxTangentScratch, point.state.moment); }
 
 void hx_tangent(void *memory, hxCoordinates *d_rate, hxOutput *d_output) {
   hxTangentScratch *scratch = memory;

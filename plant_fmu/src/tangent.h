@@ -18,9 +18,11 @@ HX_HIDDEN_BEGIN
 typedef struct hxTangentPoint {
   hxCommand command, d_command;
   hxCoordinates x, dx;
-  hxState state; /* contacts and time; the motion is that of x */
-  double scale;  /* > 0  magnitude of d_command and dx */
+  double scale; /* > 0  magnitude of d_command and dx */
   hxModel model;
+  /* contacts, time and measurements; the motion is that of x. Last, because the work space ends
+   * before its moment, which the physics does not read */
+  hxState state;
 } hxTangentPoint;
 
 /* Returns the size of the work space of hx_tangent, bytes. */

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from command import COMMAND, QUICK, Call
+from command import COMMAND, QUICK, Call, settings
 
 from hexapod_cosim.cosim.results.comparison import read_seeds
 from hexapod_cosim.cosim.results.metrics import METRICS
@@ -102,6 +102,7 @@ def test_compare_keeps_the_metrics_of_all_runs_and_the_recordings_of_the_first_s
         assert load_scenario(folder / control / "scenario.toml").variation == STANDARD
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_compare_with_one_seed_is_the_plain_walk_without_intervals(
     call: Call, tmp_path: Path
 ) -> None:
@@ -119,6 +120,7 @@ def test_compare_with_one_seed_is_the_plain_walk_without_intervals(
     assert "95 %" not in metric_table(tmp_path / "one")
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_compare_shows_intervals_and_keeps_the_scenarios_own_variation(
     call: Call, tmp_path: Path
 ) -> None:
@@ -224,6 +226,7 @@ def test_simulate_without_json_prints_a_table_and_the_files(call: Call, tmp_path
     assert f"wrote {tmp_path / 'out'}/" in out
 
 
+@pytest.mark.usefixtures("undrawn")
 @pytest.mark.parametrize(
     ("duration", "period", "message"),
     [
@@ -294,6 +297,7 @@ def test_both_engines_walk_the_same_walk_and_leave_the_same_files(
             folder,
             "--json",
             *CYCLES,
+            *settings("outputs.plots=false"),
         )
         assert code == 0
         assert (
@@ -351,7 +355,11 @@ def test_export_makes_an_fmu_that_validate_accepts(call: Call, tmp_path: Path) -
     assert json.loads(out) == {"fmu": str(path), "valid": True, "problems": []}
 
 
-def test_design_writes_gains_that_simulate_takes(call: Call, tmp_path: Path) -> None:
+def test_design_writes_gains_that_simulate_takes(
+    call: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # its figures are tested in tests/design/test_controller_design.py
+    monkeypatch.setattr("hexapod_cosim.controller.design.plot_design", lambda *_: [])
     code, out, _ = call("design", "-o", tmp_path / "design", "--json")
     assert code == 0
     assert all(Path(file).is_file() for file in json.loads(out)["files"])

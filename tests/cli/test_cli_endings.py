@@ -203,6 +203,7 @@ def test_a_torso_that_sinks_has_fallen(call: Call, tmp_path: Path) -> None:
     }
 
 
+@pytest.mark.usefixtures("undrawn")
 @pytest.mark.parametrize(
     ("upright", "code"),
     [((True, True), 0), ((False, True), 3), ((True, False), 3), ((False, False), 3)],

@@ -7,7 +7,7 @@ import shutil
 from pathlib import Path
 
 import pytest
-from command import Call, assert_refused
+from command import QUICK, Call, assert_refused
 
 from hexapod_cosim.cosim.results.comparison import read_seeds
 
@@ -15,7 +15,6 @@ EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 CPG = f"{EXAMPLES / 'controllers' / 'cpg.py'}:Cpg"
 SWAY = f"sway, by hand={EXAMPLES / '03_own_controller.py'}:Sway"
 CYCLES = ["--set", "duration=3", "--set", "gait.period=0.8"]
-PLAIN = [*CYCLES, "--set", "outputs.plots=false", "--set", "outputs.formats=['parquet']"]
 
 
 @pytest.fixture(scope="module")
@@ -29,7 +28,7 @@ def stride(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_four_controls_stand_in_one_table_and_one_report(
-    call: Call, tmp_path: Path, stride: Path
+    call: Call, tmp_path: Path, stride: Path, request: pytest.FixtureRequest
 ) -> None:
     controls = ["kinematic", CPG, f"{stride}", SWAY]
     words = [word for text in controls for word in ("--control", text)]
@@ -47,24 +46,26 @@ def test_four_controls_stand_in_one_table_and_one_report(
         assert f"gainst kinematic control, {label} " in page
         assert f"{label} against kinematic" in page
     assert "compliant walks" not in page
+    request.getfixturevalue("undrawn")
     code, _, _ = call("report", folder)
     assert code == 0
     assert "sway, by hand: change" in out
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_the_folders_of_earlier_labels_are_removed(call: Call, tmp_path: Path) -> None:
     folder = tmp_path / "out"
     first = ["--control", "kinematic", "--control", f"one={CPG}"]
     second = ["--control", "kinematic", "--control", f"two={CPG}"]
     for words in (first, second):
-        assert call("compare", "walk_flat", *words, "--seeds", "1", *PLAIN, "-o", folder)[0] == 0
+        assert call("compare", "walk_flat", *words, "--seeds", "1", *QUICK, "-o", folder)[0] == 0
     assert sorted(path.name for path in folder.iterdir() if path.is_dir()) == [
         "kinematic",
-        "plots",
         "two",
     ]
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_several_terrains_and_several_controls_make_one_table(call: Call, tmp_path: Path) -> None:
     words = ["--control", "kinematic", "--control", f"a b={CPG}", "--control", f"c={CPG}"]
     code, out, _ = call(

@@ -16,10 +16,10 @@ from hexapod_cosim.models import Robot, load_robot
 from hexapod_cosim.models.kinematics import foot_centres
 
 ROUND_OFF = 1e-9  # N
-NO_LIMITS = Parts(limits=False)
+NO_LIMITS = Parts(suspension=True, limits=False)
 ONLY_SLIP = Parts(suspension=False, support=False, touchdown=False, fallback=False, limits=False)
 ONLY_SUSPENSION = Parts(
-    slip_pid=False, support=False, touchdown=False, fallback=False, limits=False
+    suspension=True, slip_pid=False, support=False, touchdown=False, fallback=False, limits=False
 )
 
 

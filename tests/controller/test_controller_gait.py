@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -117,3 +118,9 @@ def test_an_unknown_gait_names_the_nearest() -> None:
 def test_an_impossible_gait_is_refused(change: dict[str, Any]) -> None:
     with pytest.raises(HexapodError, match="impossible gait"):
         make_gait(load_robot("athena"), **change)
+
+
+@pytest.mark.parametrize("narrowing", [-0.01, float("nan"), float("inf")])
+def test_an_impossible_narrowing_is_refused(narrowing: float) -> None:
+    with pytest.raises(HexapodError, match="0 <= narrowing < inf"):
+        replace(make_gait(load_robot("athena")), narrowing=narrowing)

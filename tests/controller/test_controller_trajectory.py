@@ -88,6 +88,44 @@ def test_standing_feet_move_against_the_body_command_exactly(name: str, twist: T
     assert np.abs(log["rise"][~log["swinging"]]).max() == 0.0
 
 
+INWARD = np.array([-0.020, -0.025j, 0.020, -0.020, 0.025j, 0.020], dtype=np.complex128)  # m
+TURNED = np.full(6, -4e-3)  # m
+
+
+def narrowing_walk() -> Walk:
+    """Returns a walk that is in the middle of the way to a narrow stance, in its amble."""
+    walk = Walk("amble")
+    home = LegSolver(load_robot("athena")).forward(load_robot("athena").stance)
+    walk.paths = FootPaths(walk.gait, home, period=PERIOD, inward=INWARD, turned=TURNED)
+    walk.feet = walk.paths.reset()
+    walk.paths.narrowing = 0.5
+    return walk
+
+
+def test_narrowed_steps_pass_the_middle_of_their_stance_at_the_narrow_position() -> None:
+    walk = narrowing_walk()
+    log = steady(walk, STRAIGHT, round(walk.gait.period / PERIOD))
+    standing = ~log["swinging"]
+    aims, step = walk.paths.home + 0.5 * INWARD, STRAIGHT.velocity.real * PERIOD
+    for leg in range(6):
+        way = log["plane"][standing[:, leg], leg]
+        assert 0.5 * (way.real.max() + way.real.min()) == pytest.approx(aims[leg].real, abs=step)
+        assert way.imag == pytest.approx(np.full(len(way), aims[leg].imag))
+    assert np.abs(ground_velocity(log, STRAIGHT)[standing]).max() < ROUND_OFF
+    assert log["rolled"] == pytest.approx(np.full_like(log["rolled"], 0.5 * TURNED[0]))
+
+
+def test_feet_that_come_home_stop_in_the_narrow_stance() -> None:
+    walk = narrowing_walk()
+    cycle = round(walk.gait.period / PERIOD)
+    record(advance(walk, STRAIGHT, cycle))
+    record(advance(walk, REST, 3 * cycle, going=False))
+    assert not walk.paths.walking
+    assert walk.feet.plane == pytest.approx(walk.paths.home + 0.5 * INWARD, abs=1e-9)
+    assert walk.feet.rolled == pytest.approx(0.5 * TURNED)
+    assert walk.paths.reset().plane == pytest.approx(walk.paths.home)
+
+
 @pytest.mark.parametrize("twist", [STRAIGHT, TWIST])
 def test_velocity_is_the_slope_of_position_and_nothing_jumps(twist: Twist) -> None:
     log = steady(Walk("ripple"), twist, 1000)

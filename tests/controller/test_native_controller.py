@@ -31,7 +31,8 @@ from hexapod_cosim.cosim.interface.controller_interface import ControllerSetup
 from hexapod_cosim.models import load_robot
 
 ROBOTS = ("athena", "phantomx_mk4")
-ALL_PARTS, NO_FALLBACK = Parts(), Parts(fallback=False)
+ALL_PARTS = Parts(suspension=True)
+NO_FALLBACK = replace(ALL_PARTS, fallback=False)
 ANGLE = 1e-12  # rad
 SPEED = 1e-12  # relative to a servo's largest speed
 # relative to a servo's largest torque. The last bits of the paths change second differences by
@@ -58,7 +59,7 @@ def setup_of(
     timing = gait if isinstance(gait, Gait) else make_gait(robot, gait)
     gains = make_gains(robot) if compliant else None
     return ControllerSetup(
-        robot=robot, gait=timing, period=PERIOD, gains=gains, parts=parts or Parts()
+        robot=robot, gait=timing, period=PERIOD, gains=gains, parts=parts or ALL_PARTS
     )
 
 
@@ -317,7 +318,7 @@ def test_each_part_can_be_switched_off(controller_core: ct.CDLL, part: str) -> N
     assert close(
         differences(
             controller_core,
-            setup_of(parts=replace(Parts(), **{part: False})),
+            setup_of(parts=replace(ALL_PARTS, **{part: False})),
             sense=sense,
             steps=900,
         )[0]
@@ -332,6 +333,21 @@ def test_walks_with_a_planned_squeeze_are_the_same(
     setup = setup_of(gait=gait, parts=Parts(squeeze=weight))
     worst, _ = differences(controller_core, setup, sense=Ground(), steps=1000)
     assert close(worst)
+
+
+def test_steps_of_a_robot_that_is_heavier_than_told_are_the_same(
+    controller_core: ct.CDLL,
+) -> None:
+    gait = replace(make_gait(load_robot("athena"), "amble"), narrowing=0.03)
+    ground, narrowing = Ground(), [0.0]
+
+    def heavy(controller: Controller, step: int, measurement: Measurement) -> None:
+        ground(controller, step, measurement)
+        measurement.foot_force[:] *= 1.4
+        narrowing.append(controller.paths.narrowing)
+
+    assert close(differences(controller_core, setup_of(gait=gait), sense=heavy)[0])
+    assert max(narrowing) == 1.0
 
 
 def test_another_period_gait_and_touch_down_speed_are_the_same_too(

@@ -10,7 +10,7 @@ import signal
 import subprocess
 import sys
 import time
-from contextlib import closing
+from contextlib import closing, suppress
 from dataclasses import replace
 from pathlib import Path
 
@@ -129,8 +129,23 @@ def start_comparison(folder: Path, *, long: str = "duration=20") -> subprocess.P
         done.exists() and json.loads(done.read_text())["status"] == COMPLETED
     ):
         time.sleep(0.05)
-    time.sleep(3.0)  # into the batch
+    while time.monotonic() < deadline and not is_in_batch(process.pid):
+        time.sleep(0.05)
     return process
+
+
+def is_in_batch(group: int) -> bool:
+    """Tells whether a worker has used a second of processor time: it has imported the package and
+    runs walks.
+    """
+    ticks = os.sysconf("SC_CLK_TCK")
+    for file in Path("/proc").glob("[0-9]*/stat"):
+        with suppress(OSError):  # the process has ended meanwhile
+            fields = file.read_text().rpartition(")")[2].split()
+            used = int(fields[11]) + int(fields[12])  # in user and system mode
+            if int(fields[2]) == group and int(file.parent.name) != group and used > ticks:
+                return True
+    return False
 
 
 def assert_none_left(group: int) -> None:

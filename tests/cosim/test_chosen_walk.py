@@ -35,6 +35,8 @@ def test_where_nothing_is_named_compliant_control_ambles_nearer_to_the_hips() ->
     assert chosen.gait.name == "amble"
     assert (chosen.outward, chosen.deeper) == pytest.approx((-0.01998, 0.0189))
     assert (chosen.stance, chosen.chosen_by) == ("chosen", "control")
+    # the rest of the way to the stance of least heat, for a load that is unknown
+    assert chosen.gait.narrowing == pytest.approx(0.02997)
 
 
 @pytest.mark.parametrize("control", ["kinematic", "paper", "law.py:Mine"])
@@ -53,6 +55,7 @@ def test_a_scenario_that_names_gait_or_stance_chooses_the_walk_of_every_control(
     kinematic, compliant = walk(setting, control="kinematic"), walk(setting)
     assert kinematic == compliant
     assert (compliant.chosen_by, compliant.robot) == ("scenario", ATHENA)
+    assert compliant.gait.narrowing == 0.0
 
 
 def test_the_step_height_is_no_choice_of_the_walk() -> None:
@@ -69,6 +72,7 @@ def test_joints_at_their_largest_speed_keep_the_robots_own_walk() -> None:
     """The PhantomX has little speed to spare: its joints could follow no other walk."""
     slow = walk("robot=phantomx_mk4", "command.vx=0.06")
     assert (slow.gait.name, slow.stance, slow.chosen_by) == ("tripod", "own", "control")
+    assert slow.gait.narrowing == 0.0
 
 
 def test_a_stance_is_given_as_two_lengths() -> None:

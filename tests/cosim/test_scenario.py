@@ -249,11 +249,13 @@ def test_faults_delays_switches_and_variations_are_read_and_written() -> None:
     )
 
 
-def test_every_part_of_the_compliance_is_a_switch_that_is_on() -> None:
-    assert asdict(load_scenario("walk_flat").compliance) == asdict(Parts())
+def test_every_part_of_the_compliance_is_a_switch_and_all_but_the_suspension_are_on() -> None:
+    default = asdict(load_scenario("walk_flat").compliance)
+    assert [key for key in SWITCHES if not default[key]] == ["suspension"]
     for name in SWITCHES:
-        parts = load_scenario("walk_flat", overrides=[f"compliance.{name}=false"]).compliance
-        assert [key for key in SWITCHES if not getattr(parts, key)] == [name]
+        other = str(not default[name]).lower()
+        parts = load_scenario("walk_flat", overrides=[f"compliance.{name}={other}"]).compliance
+        assert asdict(parts) == {**default, name: not default[name]}
 
 
 def test_the_weight_of_the_squeeze_is_a_number_from_0_to_below_1() -> None:

@@ -16,8 +16,8 @@ CYCLE = 1.0  # s
 LOST = 0.4  # share of the planned squeeze that is held on ground on which feet creep
 
 
-def make(squeeze: float = 0.4) -> Warmth:
-    return Warmth(rating=RATING, squeeze=squeeze, cycle=CYCLE, period=PERIOD)
+def make(squeeze: float = 0.4, *, narrows: bool = False) -> Warmth:
+    return Warmth(rating=RATING, squeeze=squeeze, narrows=narrows, cycle=CYCLE, period=PERIOD)
 
 
 def loaded(largest: float) -> np.ndarray:
@@ -55,6 +55,35 @@ def test_cool_servos_keep_the_weight_that_was_set_and_none_stays_none() -> None:
     nothing.heat = np.full((6, 3), 10.0)
     nothing.step(loaded(9.0), 2.0, 1.0)
     assert nothing.squeeze == 0.0
+
+
+def weighed(warmth: Warmth, heft: float, *, held: float = LOST) -> Warmth:
+    """Returns the warmth after ten cycles with cool servos and a constant weight."""
+    for _ in range(round(10.0 * CYCLE / PERIOD)):
+        warmth.weigh(heft)
+        warmth.step(loaded(0.1), 0.5, held)
+    return warmth
+
+
+@pytest.mark.parametrize(
+    ("heft", "narrowing", "squeeze"),
+    [(0.8, 0.0, 0.4), (1.1, 0.0, 0.4), (1.15, 0.5, 0.25), (1.2, 1.0, 0.1), (2.0, 1.0, 0.1)],
+)
+def test_a_weight_above_the_models_narrows_the_stance_and_spares_the_squeeze(
+    heft: float, narrowing: float, squeeze: float
+) -> None:
+    found = weighed(make(narrows=True), heft)
+    assert (found.narrowing, found.squeeze) == pytest.approx((narrowing, squeeze), abs=1e-3)
+
+
+def test_in_the_narrow_stance_ground_that_holds_does_not_raise_the_squeeze() -> None:
+    assert weighed(make(narrows=True), 1.0, held=1.0).squeeze == pytest.approx(0.95)
+    assert weighed(make(narrows=True), 1.4, held=1.0).squeeze == pytest.approx(0.1)
+
+
+def test_a_gait_without_a_narrow_stance_keeps_its_squeeze_under_any_weight() -> None:
+    found = weighed(make(), 2.0)
+    assert (found.narrowing, found.squeeze) == (0.0, 0.4)
 
 
 def test_a_saved_warmth_goes_on_the_same_and_a_reset_one_is_cool() -> None:

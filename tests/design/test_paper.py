@@ -67,7 +67,7 @@ def test_the_angles_are_the_inverse_kinematics_of_the_corrected_feet() -> None:
 
 
 def test_without_both_parts_it_is_kinematic_control() -> None:
-    off = controller(Parts(slip_pid=False, suspension=False))
+    off = controller(Parts(slip_pid=False, paper_suspension=False))
     plain = Controller(ATHENA, period=PERIOD, gait=make_gait(ATHENA))
     measurement = Measurement(foot_force=np.tile(WEIGHTED + 3.0, (6, 1)))
     for k in range(400):

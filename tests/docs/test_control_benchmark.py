@@ -25,7 +25,7 @@ from benchmarks.control.cases import (
 )
 from benchmarks.control.measure import Section, measure
 from benchmarks.control.tables import cell, changes_table, put_into, robustness_table, write_csv
-from hexapod_cosim.controller import SWITCHES, make_gait
+from hexapod_cosim.controller import COMPLIANT_PARTS, Parts, make_gait
 from hexapod_cosim.cosim.master.loop import COMPLETED
 from hexapod_cosim.cosim.results.comparison import Comparison, change_of, compare_runs
 from hexapod_cosim.cosim.results.metrics import METRICS
@@ -101,18 +101,20 @@ def test_the_judged_walk_is_the_bundled_one() -> None:
 
 def test_the_ablation_switches_each_part_alone_and_each_part_off() -> None:
     on = {
-        case.name: {name for name in SWITCHES if getattr(plan.compliance, name)}
+        case.name: {name for name in COMPLIANT_PARTS if getattr(plan.compliance, name)}
         for case, plan in zip(ablation(), plans(ablation()), strict=True)
     }
     assert on["no part"] == set()
-    assert on["all parts"] == set(SWITCHES)
-    for part in SWITCHES:
+    default = set(COMPLIANT_PARTS) - {"suspension"}
+    assert on["by default"] == on["without squeeze"] == default
+    assert on["with suspension"] == set(COMPLIANT_PARTS)
+    for part in COMPLIANT_PARTS:
         assert on[f"{part} alone"] == {part}
-        assert on[f"all but {part}"] == set(SWITCHES) - {part}
+        assert part == "suspension" or on[f"without {part}"] == default - {part}
 
 
 def test_the_slip_pid_is_judged_on_plants_that_are_not_its_model() -> None:
-    """Every plant once with all parts and once without the PID alone; what is set of the plant
+    """Every plant once with the default's parts and once without the PID; what is set of the plant
     is no setting of its controller.
     """
     cases = model_errors()
@@ -123,11 +125,10 @@ def test_the_slip_pid_is_judged_on_plants_that_are_not_its_model() -> None:
         zip(names[1::2], plans(cases[1::2]), strict=True),
         strict=True,
     ):
-        assert whole.removesuffix(", all parts") == without.removesuffix(", all but slip_pid")
+        assert whole.removesuffix(", by default") == without.removesuffix(", without slip_pid")
         assert plan.parameters == other.parameters
         assert plan.parameters
-        assert {name for name in SWITCHES if not getattr(other.compliance, name)} == {"slip_pid"}
-        assert all(getattr(plan.compliance, name) for name in SWITCHES)
+        assert (plan.compliance, other.compliance) == (Parts(), Parts(slip_pid=False))
 
 
 def test_switches_say_nothing_to_kinematic_control() -> None:
@@ -169,8 +170,8 @@ def test_what_cases_share_is_walked_once(monkeypatch: pytest.MonkeyPatch) -> Non
     assert runs == 3 * variants + 2 * 2  # the judged walk of the second section is the first's
     assert list(found) == ["a", "b"]
     assert list(found["a"]) == [case.name for case in ablation()]
-    assert found["a"]["all parts"].seeds == [0, 1, 2]
-    assert found["a"]["all parts"].changes["slip_per_metre"].before == 2.0
+    assert found["a"]["by default"].seeds == [0, 1, 2]
+    assert found["a"]["by default"].changes["slip_per_metre"].before == 2.0
     assert found["b"]["as judged"].changes["slip_per_metre"].before == 1.5
     assert found["b"]["as judged"].changes["slip_per_metre"].relative == pytest.approx(-0.5)
 

@@ -71,6 +71,7 @@ def test_a_bundle_begins_with_every_licence(licences: dict[str, str], name: str)
     assert code.lstrip().startswith('"use strict"')
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_a_report_holds_every_licence(licences: dict[str, str], call: Call, tmp_path: Path) -> None:
     code, _, errors = call("simulate", "stand", "--set", "duration=0.1", "-o", tmp_path)
     assert code == 0, errors

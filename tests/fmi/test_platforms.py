@@ -195,16 +195,14 @@ def plant_sources() -> list[Path]:
 
 
 def compiled(folder: Path, sources: list[Path], *command: str) -> Any:
-    """Compiles sources as importers do, with flags for a shared library and some
-    optimisation only.
-    """
+    """Compiles sources as importers do, with flags for a shared library and those given."""
     out = folder / "plain.so"
     plant, root = source_files()["component.c"].parent, source_files()["fmi/fmi2.c"].parents[1]
     folders = (root, plant, plant / "include")
     includes = [*(f"-I{folder}" for folder in folders), "-isystem", str(fmi_headers())]
     environment = cross_build.compiler_environment(folder, user_cache())
     subprocess.run(
-        [*command, "-O1", "-shared", "-fPIC", *includes, *map(str, sources), "-lm", "-o", str(out)],
+        [*command, "-shared", "-fPIC", *includes, *map(str, sources), "-lm", "-o", str(out)],
         check=True,
         env=environment,
     )
@@ -216,7 +214,7 @@ def test_internal_names_are_hidden_in_binaries_that_importers_compile(tmp_path: 
     assert compiler, "these tests need a C compiler"
     ours = {
         name
-        for name in exported(compiled(tmp_path, plant_sources(), compiler))
+        for name in exported(compiled(tmp_path, plant_sources(), compiler, "-O0"))
         if not name.startswith("_")
     }
     assert ours == STANDARD
@@ -237,7 +235,7 @@ def fused(binary: Any) -> int:
 
 
 def test_arm_compilers_do_not_fuse_our_arithmetic(tmp_path: Path) -> None:
-    command = (*find_compiler().command, "-target", TARGETS["aarch64-linux"].triple)
+    command = (*find_compiler().command, "-target", TARGETS["aarch64-linux"].triple, "-O1")
     eager = tmp_path / "eager.c"
     eager.write_text(
         "double f(double a, double b, double c) { return a * b + c; }\n", encoding="utf-8"
@@ -257,7 +255,7 @@ def test_the_same_sources_give_the_same_bytes_in_another_folder(
     cache = tmp_path / "cache"
     cache.mkdir()
     (cache / "zig").symlink_to(user_cache() / "zig")
-    for target in TARGETS if EVERYTHING else ("aarch64-linux", "aarch64-darwin"):
+    for target in TARGETS if EVERYTHING else ("aarch64-linux",):
         again = build_library(
             Library("hexapod", copied, (fmi_headers(),)), target, cache_folder=cache
         )

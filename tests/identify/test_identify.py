@@ -18,27 +18,22 @@ import tomlkit
 from command import Call, assert_refused
 from secret_robots import NOISE, Secret, secret_robot
 
-from benchmarks.identification.__main__ import GOAL_COVERED, GOAL_RATIO, ratios, summary
-from benchmarks.identification.__main__ import score as score_of
+from benchmarks.identification.campaign import GOAL_COVERED, GOAL_RATIO, summary, table_row
+from benchmarks.identification.campaign import score as score_of
 from hexapod_cosim.cosim.export.export import export_fmu
 from hexapod_cosim.cosim.identify import excitation
 from hexapod_cosim.cosim.identify.excitation import Proposal, propose, scenario_text
 from hexapod_cosim.cosim.identify.experiment import Experiment, of_point
+from hexapod_cosim.cosim.identify.fitting.output_error import Fit, _tried, remaining_step
+from hexapod_cosim.cosim.identify.fitting.problem import Problem, read_noise
+from hexapod_cosim.cosim.identify.fitting.workers import simulating_workers
 from hexapod_cosim.cosim.identify.identify import Identified, identify, make_experiment
 from hexapod_cosim.cosim.identify.log import Log
 from hexapod_cosim.cosim.identify.log_plant import LogPlant
-from hexapod_cosim.cosim.identify.output_error import (
-    Fit,
-    Problem,
-    _tried,
-    read_noise,
-    remaining_step,
-)
 from hexapod_cosim.cosim.identify.robot_file import write_robot
 from hexapod_cosim.cosim.identify.screening import screened
 from hexapod_cosim.cosim.identify.start import initial_state
 from hexapod_cosim.cosim.identify.unknowns import ROBOT, chosen_unknowns
-from hexapod_cosim.cosim.identify.workers import simulating_workers
 from hexapod_cosim.cosim.logs.mcap_writer import write_mcap
 from hexapod_cosim.cosim.master.recorder import Recording
 from hexapod_cosim.models import load_robot
@@ -65,7 +60,7 @@ def test_numbers_of_secret_robots_lie_within_their_intervals(
 ) -> None:
     """The campaign of 20 robots and all numbers is `make identify-campaign`."""
     scores = [score_of(*pair, 0.0) for pair in zip(secrets, found, strict=True)]
-    figures = summary(scores)
+    figures = summary([table_row(k, one, DURATION) for k, one in enumerate(scores)])
     assert figures["told"] == 16
     assert figures["covered"] >= GOAL_COVERED
 
@@ -75,7 +70,7 @@ def test_the_held_out_errors_of_torque_and_attitude_fall_to_a_tenth(
 ) -> None:
     """A second of walking shows little of the position, which the campaign judges."""
     for pair in zip(secrets, found, strict=True):
-        gains = ratios(*pair)
+        gains = score_of(*pair, 0.0).ratios
         assert gains["torque"] > GOAL_RATIO
         assert gains["attitude"] > GOAL_RATIO
 

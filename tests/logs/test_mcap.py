@@ -209,6 +209,7 @@ def test_a_run_that_begins_before_0_is_refused_before_it_is_run(call: Call, tmp_
     assert not folder.exists()
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_a_report_is_made_again_from_mcap_alone(call: Call, folder: Path, tmp_path: Path) -> None:
     place = tmp_path / "out"
     assert call("simulate", "walk_flat", "--format", "mcap", "-o", place, *QUICK)[0] == 0

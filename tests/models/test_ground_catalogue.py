@@ -9,6 +9,7 @@ import tomllib
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import mujoco
@@ -18,6 +19,7 @@ import pytest
 from hexapod_cosim.cosim.cli.terrain_command import value_text
 from hexapod_cosim.models import RobotError, load_robot, robot_from_table
 from hexapod_cosim.models.ground.catalogue import CATALOGUE, make_surface
+from hexapod_cosim.models.ground.curriculum import TileMaker, column_names
 from hexapod_cosim.models.ground.grid_file import (
     HEADER,
     grid_bytes,
@@ -189,6 +191,54 @@ def test_equal_terrains_of_a_curriculum_are_different_and_have_their_own_seeds()
     assert surface != make_surface("curriculum", given | {"seed": 1})
 
 
+def test_columns_of_a_curriculum_have_their_proportions_as_in_legged_gym() -> None:
+    """Its five terrains and their shares of 20 columns, by its names."""
+    names = ("smooth_slope", "rough_slope", "stairs_up", "stairs_down", "discrete")
+    maker = TileMaker(lambda values: make_surface("plane", {}), {})
+    values = SimpleNamespace(
+        terrains=" ".join(names), terrain_proportions="0.1, 0.1, 0.35, 0.25, 0.2", num_cols=20
+    )
+    found = column_names(values, dict.fromkeys(names, maker))
+    assert [found.count(name) for name in names] == [2, 2, 7, 5, 4]
+    values.terrain_proportions = "equal"
+    assert column_names(values, dict.fromkeys(names, maker))[:6] == [*names, names[0]]
+
+
+def test_a_curriculum_of_slopes_is_smooth_and_has_their_inclines() -> None:
+    given = {"terrains": "smooth_slope inverted_pyramid_slope", "num_rows": 3, "num_cols": 2}
+    surface = make_surface("curriculum", given)
+    assert surface.kind == "smooth"
+    assert height_and_slopes(surface, 0.0, 0.0)[0] == 0.0
+    for row, slope in enumerate((0.0, 0.2, 0.4)):  # difficulty 0, 0.5, 1
+        for y, sign in ((-4.0, -1.0), (0.0, 1.0)):
+            slopes = height_and_slopes(surface, 4.0 * row + 1.25, y)[1]
+            # heights are multiples of 60 nm, and their nodes 50 mm apart
+            assert slopes == pytest.approx([sign * slope, 0.0], abs=2e-6)
+
+
+def test_slopes_beside_stairs_become_blocks_of_the_same_height() -> None:
+    given = {"terrains": "stairs_up smooth_slope", "num_rows": 2, "num_cols": 2}
+    surface = make_surface("curriculum", given)
+    slope = make_surface("pyramid_slope", {"difficulty": 1.0})
+    assert surface.kind == "blocks"
+    heights = tile(surface, 1, 1, blocks=80, border=20)
+    places: Array = 0.05 * (np.arange(-40.0, 40.0) + 0.5)
+    expected = heights_at(slope, places, places)
+    assert heights - heights[40, 40] == pytest.approx(expected, abs=1e-6)
+    steps = np.abs(np.diff(heights, axis=1))
+    assert np.median(steps[steps > 1e-3]) == pytest.approx(0.4 * 0.05, abs=1e-6)
+
+
+def test_rough_slopes_have_the_slope_and_the_roughness() -> None:
+    given = {"terrains": "rough_slope", "num_rows": 2, "num_cols": 1, "horizontal_scale": 0.1}
+    heights = make_surface("curriculum", given).height[10:51, 50:91]
+    heights = heights - heights[20, 20]
+    places = 0.1 * np.arange(-20, 21)
+    away = np.maximum(np.abs(places[:, None]), np.abs(places[None, :])) - 0.4 - 0.2
+    rest = heights + 0.4 * np.maximum(away, 0.0)
+    assert 0.03 < np.abs(rest).max() <= 0.05 + 1e-6  # m  max_height at difficulty 1
+
+
 def test_random_heights_are_multiples_of_the_vertical_scale() -> None:
     surface = make_surface("rubble", {"vertical_scale": 0.004, "max_height": 0.04})
     levels = surface.height / 0.004
@@ -227,7 +277,10 @@ REFUSED: list[tuple[str, dict[str, Any], str]] = [
     ("dune", {"size": 2.0, "platform_size": 2.0}, "covers the whole map"),
     ("stairs", {"num_steps": 100}, r"on a map of 4 m', expected at most 11 steps; .*size=30\.8"),
     ("stairs", {"num_steps": 12}, "more steps than the map has room for"),
-    ("curriculum", {"terrains": "stairs wave"}, "unknown terrain of tiles"),
+    ("curriculum", {"terrains": "stairs plane"}, "unknown terrain of tiles"),
+    ("curriculum", {"terrain_proportions": "1 2"}, "4 numbers >= 0, one for each of pyramid_st"),
+    ("curriculum", {"terrain_proportions": "1 1 -1 1"}, "proportions that do not fit"),
+    ("curriculum", {"terrain_proportions": "0 0 0 0"}, "proportions that do not fit"),
     ("curriculum", {"terrains": " , "}, "a curriculum without terrains"),
     ("curriculum", {"size": 0.8}, "platforms cover their tiles"),
     ("curriculum", {"num_rows": 1000, "num_cols": 1000}, "the curriculum is too large"),

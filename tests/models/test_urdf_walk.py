@@ -130,6 +130,7 @@ def test_the_fmu_of_a_robot_and_of_its_urdf_are_the_same(
     assert hashes[0] == hashes[1] == load_robot(name).hash
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_a_scenario_finds_the_urdf_beside_it(call: Call, files: Path) -> None:
     (files / "walk.toml").write_text(
         'robot = "spider.urdf"\nduration = 0.05\n[outputs]\nplots = false\n', encoding="utf-8"

@@ -275,14 +275,19 @@ static void derivatives_of_other_variables_are_refused(void) {
   fmi2FreeInstance(fmu);
 }
 
+static size_t count_states(void) {
+  size_t n = 0;
+  for (const char *at = description; (at = strstr(at + 1, "derivative=\"")) != NULL;) ++n;
+  return n;
+}
+
 static void states_that_are_none_are_refused(void) {
   enum { MOST = 200 };
   static double state[MOST], other[MOST], row[MOST];
   fmi2Component fmu = running(fmi2ModelExchange);
   fmi2EventInfo event;
   fmi2Boolean enter, end;
-  size_t n = 0;
-  for (const char *at = description; (at = strstr(at + 1, "derivative=\"")) != NULL; ++n) continue;
+  const size_t n = count_states();
   CHECK(n > 0 && n <= MOST);
   CHECK(fmi2NewDiscreteStates(fmu, &event) == fmi2OK && fmi2EnterContinuousTimeMode(fmu) == fmi2OK);
   CHECK(fmi2GetContinuousStates(fmu, state, n) == fmi2OK);
@@ -304,6 +309,9 @@ static void states_that_are_none_are_refused(void) {
   CHECK(fmi2GetNominalsOfContinuousStates(fmu, row, n) == fmi2OK && row[0] > 0.0);
   CHECK(fmi2CompletedIntegratorStep(fmu, 1, &enter, &end) == fmi2OK && !enter && !end);
   CHECK(fmi2CompletedIntegratorStep(fmu, 1, NULL, &end) == fmi2Error);
+  CHECK(fmi2NewDiscreteStates(fmu, &event) == fmi2Error);
+  CHECK(fmi2EnterEventMode(fmu) == fmi2OK && fmi2NewDiscreteStates(fmu, NULL) == fmi2Error);
+  CHECK(fmi2NewDiscreteStates(fmu, &event) == fmi2OK);
   fmi2FreeInstance(fmu);
 }
 
@@ -321,8 +329,12 @@ static void robots_that_cannot_be_are_refused(void) {
     CHECK(fmi2GetDirectionalDerivative(fmu, &force, 1, &force, 0, row, row) == fmi2Error);
     said("friction.mu_static");
     if (type[k] == fmi2ModelExchange) {
-      CHECK(fmi2GetContinuousStates(fmu, row, 66) != fmi2OK);
-      CHECK(fmi2GetEventIndicators(fmu, row, 50) != fmi2OK);
+      CHECK(fmi2GetContinuousStates(fmu, row, count_states()) == fmi2Error);
+      said("friction.mu_static");
+      CHECK(fmi2GetDerivatives(fmu, row, count_states()) == fmi2Error);
+      said("friction.mu_static");
+      CHECK(fmi2GetEventIndicators(fmu, row, 50) == fmi2Error);
+      said("friction.mu_static");
     }
     CHECK(fmi2ExitInitializationMode(fmu) == fmi2Error);
     set(fmu, "friction.mu_static", 0.0);
@@ -390,6 +402,55 @@ static void a_state_on_a_grid_returns_to_it(void) {
   fmi2FreeInstance(fmu), fmi2FreeInstance(flat);
 }
 
+/* ---- the plant through FMI 3.0 ---- */
+
+/* Flags and times that the importer does not ask for are not written. */
+static void places_that_are_not_given_are_not_needed(void) {
+  fmi3Instance fmu = fmi3InstantiateModelExchange("robot", guid, resources, 0, 0, NULL, keep_three);
+  CHECK(fmu && fmi3EnterInitializationMode(fmu, 0, 0.0, 0.0, 0, 0.0) == fmi3OK);
+  CHECK(fmi3ExitInitializationMode(fmu) == fmi3OK);
+  CHECK(fmi3UpdateDiscreteStates(fmu, NULL, NULL, NULL, NULL, NULL, NULL) == fmi3OK);
+  CHECK(fmi3EnterContinuousTimeMode(fmu) == fmi3OK);
+  CHECK(fmi3CompletedIntegratorStep(fmu, 1, NULL, NULL) == fmi3OK);
+  fmi3FreeInstance(fmu);
+  fmu = fmi3InstantiateCoSimulation("robot", guid, resources, 0, 0, 1, 1, NULL, 0, NULL, keep_three,
+                                    NULL);
+  fmi3Boolean event = 1, early = 1;
+  fmi3Float64 reached = -1.0;
+  CHECK(fmu && fmi3EnterInitializationMode(fmu, 0, 0.0, 0.0, 0, 0.0) == fmi3OK);
+  CHECK(fmi3ExitInitializationMode(fmu) == fmi3OK);
+  CHECK(fmi3UpdateDiscreteStates(fmu, NULL, NULL, NULL, NULL, NULL, NULL) == fmi3OK);
+  CHECK(fmi3EnterStepMode(fmu) == fmi3OK);
+  CHECK(fmi3DoStep(fmu, 0.0, -1.0, 1, NULL, NULL, NULL, NULL) == fmi3Error);
+  said("communication step size: got -1 s");
+  CHECK(fmi3DoStep(fmu, -8e-16, 4e-16, 1, &event, NULL, &early, &reached) == fmi3OK);
+  CHECK(!event && !early && reached == 0.0); /* of rounding size: it stays */
+  fmi3FreeInstance(fmu);
+}
+
+/* The time is a Float64 that is read, and nothing else. */
+static void the_time_is_a_number_that_steps_move(void) {
+  fmi3Instance fmu = fmi3InstantiateCoSimulation("robot", guid, resources, 0, 0, 0, 0, NULL, 0,
+                                                 NULL, keep_three, NULL);
+  const fmi3ValueReference time = 9999;
+  fmi3Float64 t = -1.0;
+  fmi3Int64 number = -1;
+  const fmi3Int32 order = 1;
+  CHECK(fmu && fmi3GetFloat64(fmu, &time, 1, &t, 1) == fmi3OK && t == 0.0);
+  CHECK(fmi3GetInt64(fmu, &time, 1, &number, 1) == fmi3Error && number == -1);
+  said("value reference: got 9999");
+  CHECK(fmi3SetFloat64(fmu, &time, 1, &t, 1) == fmi3Error);
+  said("time: got a value, expected none, as steps move it");
+  CHECK(fmi3EnterInitializationMode(fmu, 0, 0.0, 0.0, 0, 0.0) == fmi3OK);
+  CHECK(fmi3GetDirectionalDerivative(fmu, &time, 1, &time, 1, &t, 1, &t, 1) == fmi3Error);
+  CHECK(fmi3GetDirectionalDerivative(fmu, &time, 1, &time, 1, &t, 1, &t, 2) == fmi3Error);
+  said("values: got room for 2, expected 1");
+  CHECK(fmi3ExitInitializationMode(fmu) == fmi3OK);
+  CHECK(fmi3GetOutputDerivatives(fmu, &time, 1, &order, &t, 3) == fmi3Error);
+  said("values: got room for 3, expected 1");
+  fmi3FreeInstance(fmu);
+}
+
 /* ---- the controller ---- */
 
 static void a_component_without_states_offers_no_derivatives(void) {
@@ -445,6 +506,8 @@ int main(int arguments, char *argument[]) {
     robots_that_cannot_be_are_refused();
     grids_that_are_not_there_are_refused();
     a_state_on_a_grid_returns_to_it();
+    places_that_are_not_given_are_not_needed();
+    the_time_is_a_number_that_steps_move();
   } else {
     a_component_without_states_offers_no_derivatives();
     a_component_without_states_has_no_events();

@@ -50,7 +50,21 @@ def bare(folder: Path) -> dict[str, str]:
 
 def run(hexapod: Path, cwd: Path, *arguments: str) -> str:
     """Runs the command outside the source tree and returns its output."""
-    process = subprocess.run(
+    process = called(hexapod, cwd, *arguments)
+    assert process.returncode == 0, process.stderr
+    return process.stdout
+
+
+def refused(hexapod: Path, cwd: Path, *arguments: str) -> str:
+    """Runs a command that must fail and returns its message."""
+    process = called(hexapod, cwd, *arguments)
+    assert process.returncode == 1
+    return process.stderr
+
+
+def called(hexapod: Path, cwd: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
+    """Runs the command outside the source tree, without a compiler on PATH."""
+    return subprocess.run(
         [str(hexapod), *arguments],
         cwd=cwd,
         env=bare(hexapod.parents[1]),
@@ -58,8 +72,6 @@ def run(hexapod: Path, cwd: Path, *arguments: str) -> str:
         text=True,
         check=False,
     )
-    assert process.returncode == 0, process.stderr
-    return process.stdout
 
 
 def test_there_is_a_wheel_for_each_platform_of_at_most_5_mb(wheels: Path) -> None:
@@ -108,3 +120,25 @@ def test_the_examples_come_out_of_the_wheel_and_run(hexapod: Path, tmp_path: Pat
     environment = bare(hexapod.parents[1])
     command = [str(hexapod.with_name("python")), "01_stand.py"]
     subprocess.run(command, cwd=tmp_path / "mine", env=environment, check=True)
+
+
+def test_an_installation_has_no_pyarrow_and_messages_name_the_extras(
+    hexapod: Path, tmp_path: Path
+) -> None:
+    assert not list(hexapod.parents[1].glob("lib*/python*/site-packages/pyarrow"))
+    run(hexapod, tmp_path, "simulate", "stand", "--set", "duration=0.2 s", "-o", "stood")
+    assert {path.name for path in (tmp_path / "stood").glob("results.*")} == {"results.csv"}
+    for command, extra in (
+        (["simulate", "stand", "--format", "parquet"], "parquet"),
+        (["study", "friction_speed"], "studies"),
+    ):
+        assert f"WHEEL.whl[{extra}]" in refused(hexapod, tmp_path, *command)
+
+
+def test_no_command_needs_cmake(hexapod: Path, tmp_path: Path) -> None:
+    """fmpy requires CMake, 86 MB, for compiling other FMUs; docs/install.md says how to save it."""
+    pip = [str(hexapod.with_name("python")), "-m", "pip"]
+    subprocess.run([*pip, "uninstall", "--yes", "--quiet", "cmake"], check=True)
+    run(hexapod, tmp_path, "compare", "walk_flat", "--set", "duration=2 s", "-o", "first")
+    run(hexapod, tmp_path, "export", "-o", "athena.fmu")
+    run(hexapod, tmp_path, "validate", "athena.fmu")

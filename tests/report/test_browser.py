@@ -355,6 +355,7 @@ def test_a_reader_who_wants_less_motion_gets_a_standing_picture(folder: Path, br
     moving.close()
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_a_single_run_and_one_that_recorded_little_have_pages_too(
     folder: Path, browser: Any, tmp_path: Path
 ) -> None:

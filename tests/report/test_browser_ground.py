@@ -24,6 +24,8 @@ from hexapod_cosim.models.ground.surface import Surface
 SUNK = 0.012  # m    that feet stand in the drawn ground
 PHONE = (390, 844)  # px
 
+pytestmark = pytest.mark.usefixtures("undrawn")
+
 
 @pytest.fixture(scope="module")
 def browser() -> Iterator[Any]:

@@ -209,6 +209,7 @@ def test_a_drop_is_described_by_its_restitution() -> None:
     assert part.text == "Drop, 3 s: restitution 0.493 delivered at 0.94 m/s."
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_without_the_viewer_a_report_has_its_tables_and_says_how_to_get_the_rest(
     call: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -257,6 +258,7 @@ def test_a_report_made_again_is_the_same_whatever_columns_the_csv_has(
     assert (folder / "report.html").read_bytes() == page
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_a_report_bears_the_name_of_the_walk_that_was_run(call: Call, tmp_path: Path) -> None:
     changed = ("--set", "duration=0.2", "--set", "robot=phantomx_mk4", "--set", "friction.mu=0.4")
     assert call("simulate", "stand", "-o", tmp_path / "out", *changed)[0] == 0

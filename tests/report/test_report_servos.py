@@ -6,6 +6,7 @@ import json
 import re
 from pathlib import Path
 
+import pytest
 from command import Call
 from walks import PARAMETERS, PERIOD, Walk
 
@@ -38,6 +39,7 @@ def test_a_run_too_short_for_metrics_has_no_table_of_servos() -> None:
     assert servo_rows({"kinematic": stored(Walk(cycles=2.5))}) == []
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_the_report_of_a_walk_shows_eighteen_loads_of_which_one_is_the_largest(
     call: Call, tmp_path: Path
 ) -> None:

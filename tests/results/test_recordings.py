@@ -194,7 +194,7 @@ def test_both_headers_are_read(tmp_path: Path, units: bool) -> None:
     [
         ("a.csv", "", "not a recording"),
         ("a.csv", "x,y\n1,2\n", "time first"),
-        ("a.csv", "time,x\n1\n", "Expected 2 columns, got 1"),
+        ("a.csv", "time,x\n1\n", "expected 2 columns, got 1"),
         ("a.csv", "time,x\n1,two\n", "two"),
         ("a.csv", "time,x\n1,\n", "not a recording"),
         ("a.parquet", "no table", "not a recording"),

@@ -68,24 +68,27 @@ def once(act: Callable[[], object]) -> Any:
     return lambda _total, _done: lambda _more, _lost: todo and todo.pop()()
 
 
-def assert_whole(folder: Path, fmu: Path) -> None:
-    """Asserts that the results are those of a run within this process."""
-    run_quietly(study_of(TABLE), folder.with_name("alone"), fmu=fmu, engine=SLOW)
-    assert digest(folder) == digest(folder.with_name("alone"))
+@pytest.fixture(scope="module")
+def alone(athena_fmu: Path, tmp_path_factory: pytest.TempPathFactory) -> str:
+    """Returns the digest of the study run within this process."""
+    folder = tmp_path_factory.mktemp("alone") / "out"
+    run_quietly(study_of(TABLE), folder, fmu=athena_fmu, engine=SLOW)
+    return digest(folder)
 
 
 def test_a_killed_worker_costs_no_run(
-    study_on: Callable[..., Any], scheduler: str, athena_fmu: Path, tmp_path: Path
+    study_on: Callable[..., Any], scheduler: str, alone: str, tmp_path: Path
 ) -> None:
     with mortal_workers(scheduler, 2, tmp_path) as workers:
         study_on(lambda: kill(workers[0]))
-    assert_whole(tmp_path / "out", athena_fmu)
+    assert digest(tmp_path / "out") == alone
 
 
 def test_without_workers_a_study_ends_with_what_is_stored_and_is_resumed_in_this_process(
     study_on: Callable[..., Any],
     scheduler: str,
     athena_fmu: Path,
+    alone: str,
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
@@ -104,11 +107,11 @@ def test_without_workers_a_study_ends_with_what_is_stored_and_is_resumed_in_this
             study_on(kill_all)
     assert list((tmp_path / "out" / "runs").glob("*.parquet"))
     run_quietly(study_of(TABLE), tmp_path / "out", fmu=athena_fmu, engine=SLOW)
-    assert_whole(tmp_path / "out", athena_fmu)
+    assert digest(tmp_path / "out") == alone
 
 
 def test_workers_that_join_when_all_are_gone_get_the_job_and_continue(
-    study_on: Callable[..., Any], scheduler: str, athena_fmu: Path, tmp_path: Path
+    study_on: Callable[..., Any], scheduler: str, alone: str, tmp_path: Path
 ) -> None:
     with ExitStack() as opened, mortal_workers(scheduler, 1, tmp_path) as workers:
 
@@ -118,11 +121,11 @@ def test_workers_that_join_when_all_are_gone_get_the_job_and_continue(
 
         events = study_on(replace)
     assert any("waiting for some" in text for text in events)
-    assert_whole(tmp_path / "out", athena_fmu)
+    assert digest(tmp_path / "out") == alone
 
 
 def test_a_scheduler_that_dies_ends_the_study_with_what_is_stored(
-    study_on: Callable[..., Any], athena_fmu: Path, tmp_path: Path
+    study_on: Callable[..., Any], athena_fmu: Path, alone: str, tmp_path: Path
 ) -> None:
     with (
         dask_scheduler(tmp_path) as (address, process),
@@ -131,7 +134,7 @@ def test_a_scheduler_that_dies_ends_the_study_with_what_is_stored(
     ):
         study_on(lambda: kill(process), address)
     run_quietly(study_of(TABLE), tmp_path / "out", fmu=athena_fmu, engine=SLOW)
-    assert_whole(tmp_path / "out", athena_fmu)
+    assert digest(tmp_path / "out") == alone
 
 
 def test_ctrl_c_ends_a_study_that_waits_for_workers(

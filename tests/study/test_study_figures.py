@@ -72,20 +72,22 @@ def point(
         case="walk_flat",
         values=values,
         held_out=False,
-        pairs=pairs,
+        pairs={"compliant": pairs},
         means=means,
         runs=dict.fromkeys(slips, runs),
         walked=dict.fromkeys(slips, walked),
         changes={
-            name: made_change(
-                name,
-                before=before,
-                after=after,
-                half_width=math.nan,
-                log_half_width=math.nan,
-                pairs=pairs,
-            )
-            for name in FIGURES
+            "compliant": {
+                name: made_change(
+                    name,
+                    before=before,
+                    after=after,
+                    half_width=math.nan,
+                    log_half_width=math.nan,
+                    pairs=pairs,
+                )
+                for name in FIGURES
+            }
         },
     )
 
@@ -217,7 +219,18 @@ def test_figures_of_all_designs_are_drawn_without_a_warning(
         item.draw().draw_without_rendering()
 
 
-def test_a_page_has_the_files_name_without_a_title_and_pairs_only_with_two_controls(
+def test_a_page_compares_each_control_with_the_first_one(folder: Any) -> None:
+    controls = ["kinematic", "paper", "compliant"]
+    page = folder({"controls": controls, "seeds": 2, **GRID})
+    assert "kinematic → paper, compliant, relative to the mean of kinematic" in page
+    over_all = page.partition("<h2>Over all runs</h2>")[2]
+    assert "over the 8 and 8 pairs in which both walked" in over_all
+    for control in controls[1:]:
+        assert re.search(rf'change to <span class="[\w-]+">{control}</span></th>', over_all)
+    assert "to kinematic" not in page
+
+
+def test_a_page_has_the_files_name_without_a_title_and_pairs_only_with_several_controls(
     folder: Any,
 ) -> None:
     page = folder({**KINEMATIC, "seeds": 2, "factors": {"friction.mu": [0.3, 0.19]}})

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import tracemalloc
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from itertools import pairwise
 from typing import Any
 
@@ -22,8 +23,16 @@ from hexapod_cosim.cosim.study.store.table import Overall, Point, Tally, point_a
 
 ROUNDING = 1e-11  # relative: some dozen sums of numbers of one size
 POINTS, SEEDS = 5, 7
+PAIR = ("point", "case", "seed", "control")
 TWO = study_of({"seeds": SEEDS, "factors": {"friction.mu": {"linspace": [0.3, 0.7, POINTS]}}})
 BOTH = TWO.run_controls
+THREE = study_of(
+    {
+        "seeds": SEEDS,
+        "controls": ["kinematic", "paper", "compliant"],
+        "factors": {"friction.mu": {"linspace": [0.3, 0.7, POINTS]}},
+    }
+)
 
 
 def made_rows(study: Study, points: Sequence[int], *, seed: int = 0) -> list[dict[str, Any]]:
@@ -80,17 +89,20 @@ def summed(
     return points, tally.overall()
 
 
-def by_hand(rows: Sequence[dict[str, Any]], name: str) -> Change:
-    """Returns the change over the pairs of which both runs walked, computed by pairs."""
+def by_hand(rows: Sequence[dict[str, Any]], name: str, other: str = "compliant") -> Change:
+    """Returns the change over the pairs of which both runs walked, computed by pairs.
+
+    other: the control that is compared with kinematic control.
+    """
     found = {
         (row["point"], row["case"], row["seed"], row["control"]): row[name]
         for row in rows
         if row["walked"]
     }
     pairs = [
-        (value, found[(*key[:3], BOTH[1])])
+        (value, found[(*key[:3], other)])
         for key, value in found.items()
-        if key[3] == BOTH[0] and (*key[:3], BOTH[1]) in found
+        if key[3] == "kinematic" and (*key[:3], other) in found
     ]
     return change_of(
         name, [(math.nan if a is None else a, math.nan if b is None else b) for a, b in pairs]
@@ -105,18 +117,39 @@ def assert_same(found: Change, expected: Change) -> None:
     assert (found.pairs, found.verdict) == (expected.pairs, expected.verdict)
 
 
-@pytest.mark.parametrize("share", [1.0, 0.8, 0.3])
-def test_changes_are_of_whole_pairs_whichever_runs_are_missing(share: float) -> None:
-    for seed in range(5):
-        rows = some_of(made_rows(TWO, range(POINTS), seed=seed), share=share, seed=seed)
-        points, overall = summed(rows)
+def assert_changes_of_pairs(
+    found: Overall | Point, rows: Sequence[dict[str, Any]], study: Study
+) -> None:
+    """Asserts the numbers of pairs and the changes from kinematic to each other control."""
+    assert list(found.changes) == list(found.pairs) == list(study.run_controls[1:])
+    for control, changes in found.changes.items():
+        walks = {tuple(row[key] for key in PAIR): row["walked"] for row in rows}
+        assert found.pairs[control] == sum(
+            walked and key[-1] == control and walks.get((*key[:-1], "kinematic"), False)
+            for key, walked in walks.items()
+        )
         for name in FIGURES:
-            assert_same(overall.changes[name], by_hand(rows, name))
-            for point in points:
-                assert_same(
-                    point.changes[name],
-                    by_hand([row for row in rows if row["point"] == point.number], name),
-                )
+            assert_same(changes[name], by_hand(rows, name, control))
+
+
+@pytest.mark.parametrize("study", [TWO, THREE], ids=["two controls", "three controls"])
+@pytest.mark.parametrize("share", [1.0, 0.8, 0.3])
+def test_changes_are_of_whole_pairs_whichever_runs_are_missing(share: float, study: Study) -> None:
+    for seed in range(3):
+        rows = some_of(made_rows(study, range(POINTS), seed=seed), share=share, seed=seed)
+        points, overall = summed(rows, study)
+        assert_changes_of_pairs(overall, rows, study)
+        for point in points:
+            own = [row for row in rows if row["point"] == point.number]
+            assert_changes_of_pairs(point, own, study)
+
+
+def test_a_single_control_has_no_pairs() -> None:
+    alone = replace(TWO, controls=("compliant",))
+    points, overall = summed(made_rows(alone, [0]), alone)
+    for found in (overall, points[0]):
+        assert not found.changes
+        assert not found.pairs
 
 
 @pytest.mark.parametrize("share", [1.0, 0.3])
@@ -154,28 +187,33 @@ def test_the_control_of_the_first_run_does_not_turn_a_change_round() -> None:
     del rows[0]  # a kinematic run
     (point,), overall = summed(rows)
     assert (
-        point.changes["peak_force"].before
-        == overall.changes["peak_force"].before
+        point.changes["compliant"]["peak_force"].before
+        == overall.changes["compliant"]["peak_force"].before
         == pytest.approx(by_hand(rows, "peak_force").before)
     )
-    assert point.pairs == overall.pairs == SEEDS - 1
+    assert point.pairs == overall.pairs == {"compliant": SEEDS - 1}
 
 
-def test_where_tables_are_cut_does_not_show() -> None:
-    rows = some_of(made_rows(TWO, range(POINTS)), share=0.9, seed=1)
-    points, overall = summed(rows)
+@pytest.mark.parametrize("study", [TWO, THREE], ids=["two controls", "three controls"])
+def test_where_tables_are_cut_does_not_show(study: Study) -> None:
+    rows = some_of(made_rows(study, range(POINTS)), share=0.9, seed=1)
+    points, overall = summed(rows, study)
     for cuts in ([1], [3, 4, 5, 17], list(range(1, len(rows)))):
-        others, again = summed(rows, cuts=cuts)
+        others, again = summed(rows, study, cuts=cuts)
         assert [(item.number, item.runs, item.pairs) for item in others] == [
             (item.number, item.runs, item.pairs) for item in points
         ]
-        for name in FIGURES:
-            assert_same(again.changes[name], overall.changes[name])
-            for one, other in zip(points, others, strict=True):
-                assert_same(other.changes[name], one.changes[name])
-                assert other.means[BOTH[1]][name].value == pytest.approx(
-                    one.means[BOTH[1]][name].value, rel=ROUNDING, nan_ok=True
-                )
+        pairs: list[tuple[Point | Overall, Point | Overall]] = [
+            *zip(points, others, strict=True),
+            (overall, again),
+        ]
+        for one, other in pairs:
+            for control, changes in one.changes.items():
+                for name in FIGURES:
+                    assert_same(other.changes[control][name], changes[name])
+                    assert other.means[control][name].value == pytest.approx(
+                        one.means[control][name].value, rel=ROUNDING, nan_ok=True
+                    )
 
 
 def test_falls_leave_no_figures_where_nothing_walked() -> None:
@@ -187,12 +225,10 @@ def test_falls_leave_no_figures_where_nothing_walked() -> None:
         for means in point.means.values()
         for mean in means.values()
     )
-    assert all(change.pairs == 0 and not change.verdict for change in overall.changes.values())
-    assert (overall.runs, overall.pairs, sum(overall.failures.values())) == (
-        len(rows),
-        0,
-        len(rows),
-    )
+    changes = overall.changes["compliant"].values()
+    assert all(change.pairs == 0 and not change.verdict for change in changes)
+    assert (overall.runs, sum(overall.failures.values())) == (len(rows), len(rows))
+    assert overall.pairs == {"compliant": 0}
 
 
 def test_sums_of_numbers_far_from_zero_keep_their_spread() -> None:
@@ -215,26 +251,25 @@ def test_sums_of_numbers_far_from_zero_keep_their_spread() -> None:
         )
 
 
-def test_a_columns_table_says_what_its_points_say() -> None:
-    rows = some_of(made_rows(TWO, range(POINTS)), share=0.7, seed=2)
-    (block, *_) = list(
-        blocks_of(
-            Rows(part, TWO)
-            for part in whole_pairs([pa.Table.from_pylist(rows, schema=schema_of(TWO))], BOTH)
-        )
-    )
-    for place, row in enumerate(points_table(block, TWO).to_pylist()):
-        point = point_at(block, place, TWO)
-        assert (row["point"], row["pairs"], row["compliant.walked"]) == (
-            point.number,
-            point.pairs,
-            point.walked["compliant"],
-        )
+@pytest.mark.parametrize("study", [TWO, THREE], ids=["two controls", "three controls"])
+def test_a_columns_table_says_what_its_points_say(study: Study) -> None:
+    rows = some_of(made_rows(study, range(POINTS)), share=0.7, seed=2)
+    table, controls = pa.Table.from_pylist(rows, schema=schema_of(study)), study.run_controls
+    (block, *_) = list(blocks_of(Rows(part, study) for part in whole_pairs([table], controls)))
+    for place, row in enumerate(points_table(block, study).to_pylist()):
+        point = point_at(block, place, study)
+        assert (row["point"], row["compliant.walked"]) == (point.number, point.walked["compliant"])
         for name in FIGURES:
-            assert (row[f"kinematic.{name}"] or math.nan) == pytest.approx(
-                point.means["kinematic"][name].value, nan_ok=True
-            )
-            assert row[f"change.{name}.verdict"] == point.changes[name].verdict
+            mean = point.means["kinematic"][name].value
+            assert (row[f"kinematic.{name}"] or math.nan) == pytest.approx(mean, nan_ok=True)
+        for control, changes in point.changes.items():
+            before = f"{control}." if study is THREE else ""
+            assert row[f"{before}pairs"] == point.pairs[control]
+            for name, change in changes.items():
+                assert row[f"{before}change.{name}.verdict"] == change.verdict
+                assert (row[f"{before}change.{name}"] or math.nan) == pytest.approx(
+                    change.after - change.before, nan_ok=True
+                )
 
 
 def test_memory_does_not_grow_with_the_runs_nor_with_the_kinds_of_failures(

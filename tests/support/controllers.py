@@ -22,7 +22,7 @@ def make(
         period=PERIOD,
         gait=make_gait(robot) if gait is None else gait,
         gains=make_gains(robot) if compliant else None,
-        parts=Parts() if parts is None else parts,
+        parts=Parts(suspension=True) if parts is None else parts,
     )
 
 

@@ -4,6 +4,7 @@ parameters, walking, read through sensors with noise, delay and bias.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
@@ -33,6 +34,7 @@ Array = NDArray[np.float64]
 # standard deviations: encoders of 12 bits, current sensing, load cells, a small IMU, mocap
 NOISE = {
     "angle": 1e-3,
+    "motor_angle": 2e-4,
     "speed": 0.02,
     "torque": 0.03,
     "current": 0.02,
@@ -133,9 +135,35 @@ def secret_robot(
     attitude = outputs[:, [columns.index(name) for name in ATTITUDE]]
     outputs = of_point(columns, outputs, attitude, offset)
     recorded = slice(round(BEFORE / PERIOD), None)
-    clean = readings(experiment, outputs, values)[recorded]
+    clean = readings(experiment, outputs, values, file)[recorded]
     noise = np.array([NOISE[key] for key in experiment.channels])
     noisy = clean + noise * rng.standard_normal(clean.shape)
     data = np.column_stack([commands.recording.data[recorded], noisy])
     log = log_of(Recording((*commands.recording.names, *columns), data), f"robot {seed}")
     return Secret(robot, values, log, clean, columns)
+
+
+DAMAGES: dict[str, Callable[[Array], Array]] = {
+    "dead": lambda column: np.full_like(column, column[0]),
+    "turned": lambda column: -column,
+    "in degrees": np.degrees,
+    "stuck": lambda column: np.where(
+        np.arange(len(column)) < len(column) // 2, column, column[len(column) // 2]
+    ),
+    "missing": lambda column: np.where(np.arange(len(column)) % 4 == 0, np.nan, column),
+}
+DAMAGED = (".coxa.angle", ".femur.angle", ".tibia.angle", ".femur.torque", ".tibia.torque",
+           ".tibia.speed", ".foot.normal_force")  # fmt: skip
+
+
+def damaged(log: Log, seed: int) -> dict[str, tuple[str, Log]]:
+    """Returns, for each kind of damage, a column drawn by a seed and the log with it damaged."""
+    rng = np.random.default_rng([seed, 1])
+    names = [name for name in log.measured if name.endswith(DAMAGED)]
+    found = {}
+    for kind, change in DAMAGES.items():
+        name = str(rng.choice(names))
+        data, place = log.recording.data.copy(), log.recording.names.index(name)
+        data[:, place] = change(data[:, place])
+        found[kind] = name, Log(Recording(log.recording.names, data), log.where)
+    return found

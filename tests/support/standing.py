@@ -54,7 +54,7 @@ def make_laws(
     gait, gains = make_gait(robot), make_gains(robot) if gains is None else gains
     return Laws(
         gains,
-        Parts() if parts is None else parts,
+        Parts(suspension=True) if parts is None else parts,
         weight=weight(robot),
         depth=DEPTH,
         cycle=gait.period,

@@ -56,6 +56,7 @@ typedef struct hxGait {
   double offset[HX_LEGS];  /* 1    phase of each leg at clock 0, of HX_PATTERN_CUSTOM */
   double step_height;      /* m    the foot's lift above the ground */
   double touchdown_speed;  /* m/s  vertical, at the end of a swing */
+  double narrowing;        /* m    nearer to the hips under a load that the model does not have */
 } hxGait;
 
 /* Contents of gains.toml, without the data that they were designed for. */
@@ -112,9 +113,9 @@ typedef struct hxGains {
   } paper_suspension;
 } hxGains;
 
-/* Switches, 1 or 0: enabled parts of the compliant control; and the weight of the squeeze. */
+/* Switches, 1 or 0: enabled parts of compliant and paper control; and the weight of the squeeze. */
 typedef struct hxParts {
-  int support, slip_pid, suspension, touchdown, posture, path, limits, fallback;
+  int support, slip_pid, suspension, paper_suspension, touchdown, posture, path, limits, fallback;
   /* 1  weight of the servos' torques against the feet's use of friction in the planned squeeze */
   double squeeze;
 } hxParts;

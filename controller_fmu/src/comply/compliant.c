@@ -99,8 +99,8 @@ static void look(const hxCompliantModel *model, const hxLegSolver leg[HX_LEGS],
     seen.plane[k] = hx_plane(foot[0], foot[1]);
     seen.height[k] = foot[2];
     hx_posture_turn(stance->posture, &seen.plane[k], &seen.height[k]);
-    const hxPlane rolled =
-        hx_scaled(hx_cis(leg[k].hip_yaw + angle[0]), hx_leg_solver_rolling(&leg[k], angle));
+    const double rolls = hx_leg_solver_rolling(&leg[k], angle) - stance->rolled[k];
+    const hxPlane rolled = hx_scaled(hx_cis(leg[k].hip_yaw + angle[0]), rolls);
     seen.plane[k] = hx_plane_sub(seen.plane[k], rolled);
     seen.height[k] += stance->value[3];
     seen.planned[k] = stance->plane[k];
@@ -157,6 +157,7 @@ void hx_compliant_step(const hxCompliantModel *model, const hxLegSolver leg[HX_L
   }
   if (busy || compliant->moving) compliant->moving = busy;
   const double needed = laws->burden.heft * laws->burden.peak / model->laws.most;
+  hx_warmth_weigh(&model->warmth, laws->burden.heft, &compliant->warmth);
   hx_warmth_step(&model->warmth, (const double (*)[HX_JOINTS])laws->torque, needed, laws->held,
                  &compliant->warmth);
 }

@@ -48,6 +48,7 @@ typedef struct hxStance {
   const hxPosture *posture;
   const hxPlane *plane; /* m  (6) planned feet, walking frame */
   const double *height; /* m, (6) heights of the lowered feet */
+  const double *rolled; /* m, (6) outwards from the stance to the positions that the feet aim at */
 } hxStance;
 
 /* Computes the foot forces in the walking frame (C22) [N]: f_K = R_KT R_TW f_W. */

@@ -61,6 +61,6 @@ void hx_paper_step(const hxPaperModel *model, const double force[HX_LEGS][3],
   for (int k = 0; k < HX_LEGS; ++k) {
     if (model->parts.slip_pid)
       yield_sideways(model, hx_plane(force[k][0], force[k][1]), swinging[k], k, paper);
-    if (model->parts.suspension) yield_upwards(model, force[k][2], k, paper);
+    if (model->parts.paper_suspension) yield_upwards(model, force[k][2], k, paper);
   }
 }

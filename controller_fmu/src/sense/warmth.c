@@ -15,20 +15,30 @@ static const double over = 1.0, far_over = 1.2;
 static const double creeps = 0.75, holds = 0.82;
 /* 1, weight of the torques when it costs nothing or servos need it */
 static const double most_squeeze = 0.95;
+static const double told = 1.1, heavier = 1.2; /* 1, measured over modelled weight */
+/* 1, of the set weight of the squeeze, in the narrow stance */
+static const double spared = 0.75;
 
 void hx_warmth_compile(const hxControllerDefinition *definition, hxWarmthModel *model) {
   const double rating = definition->servo.torque_continuous,
                squeeze = definition->parts.support ? definition->parts.squeeze : 0.0;
   model->rating = rating * rating;
   model->squeeze = squeeze;
-  model->more = squeeze > 0.0 ? fmax(most_squeeze - squeeze, 0.0) : 0.0;
+  model->narrows = definition->parts.support && definition->gait.narrowing > 0.0;
   model->follow_work = 1.0 - hx_decay(-definition->period / definition->gait.period);
   model->follow = 1.0 - hx_decay(-definition->period / heat_time);
 }
 
 void hx_warmth_reset(const hxWarmthModel *model, hxWarmth *warmth) {
   memset(warmth, 0, sizeof *warmth);
+  warmth->heft = 1.0;
   warmth->squeeze = model->squeeze;
+}
+
+void hx_warmth_weigh(const hxWarmthModel *model, double heft, hxWarmth *warmth) {
+  warmth->heft += model->follow_work * (heft - warmth->heft);
+  if (model->narrows)
+    warmth->narrowing = hx_clamp((warmth->heft - told) / (heavier - told), 0.0, 1.0);
 }
 
 void hx_warmth_step(const hxWarmthModel *model, const double torque[HX_LEGS][HX_JOINTS],
@@ -45,7 +55,10 @@ void hx_warmth_step(const hxWarmthModel *model, const double torque[HX_LEGS][HX_
     }
   const double warm = fmax((hottest / model->rating - cool) / (hot - cool),
                            (hardest / model->rating - over) / (far_over - over)),
-               part = fmax(
-                   warm, fmax((needed - easy) / (hard - easy), (held - creeps) / (holds - creeps)));
-  warmth->squeeze = model->squeeze + model->more * hx_clamp(part, 0.0, 1.0);
+               part =
+                   fmax(warm, fmax((needed - easy) / (hard - easy),
+                                   (held - creeps) / (holds - creeps) * (1.0 - warmth->narrowing)));
+  const double least = model->squeeze * (1.0 - spared * warmth->narrowing),
+               more = least > 0.0 ? fmax(most_squeeze - least, 0.0) : 0.0;
+  warmth->squeeze = least + more * hx_clamp(part, 0.0, 1.0);
 }

@@ -1,4 +1,4 @@
-/* warmth.h - heat of the servos, and the weight of the planned squeeze that follows. Python:
+/* warmth.h - squeeze and width of the stance by the load of the servos. Python:
  * controller/sense/warmth.py. */
 #ifndef HX_WARMTH_H
 #define HX_WARMTH_H
@@ -11,22 +11,27 @@ HX_HIDDEN_BEGIN
 typedef struct hxWarmthModel {
   double rating; /* N2 m2, square of the continuous torque of a servo */
   double squeeze; /* 1, weight on ground on which feet creep, while all servos are cool */
-  double more; /* 1, what is added when the ground holds or a servo is hot */
+  int narrows; /* the gait has a narrow stance */
   double follow_work, follow; /* 1, factors of the smoothings over a period */
 } hxWarmthModel;
 
 typedef struct hxWarmth {
   double work[HX_LEGS][HX_JOINTS]; /* N2 m2, squares of the torques, smoothed over a gait cycle */
   double heat[HX_LEGS][HX_JOINTS]; /* N2 m2, the same, smoothed over a minute */
+  double heft; /* 1, measured over modelled weight, smoothed over a gait cycle */
+  double narrowing; /* 1, part of the way to the narrow stance */
   double squeeze; /* 1, weight of the torques in the planned squeeze */
 } hxWarmth;
 
 void hx_warmth_compile(const hxControllerDefinition *definition, hxWarmthModel *model);
 void hx_warmth_reset(const hxWarmthModel *model, hxWarmth *warmth);
 
-/* Advances by one period (C45). torque: feed-forward torques [N m]; needed: largest torque that the
- * measured weight needs, over the largest that is allowed [1]; held: share of the planned squeeze
- * that the ground holds [1]. */
+/* Advances weight and narrowing by one period (C53). heft: measured over modelled weight [1]. */
+void hx_warmth_weigh(const hxWarmthModel *model, double heft, hxWarmth *warmth);
+
+/* Advances by one period, after hx_warmth_weigh (C45). torque: feed-forward torques [N m]; needed:
+ * largest torque that the measured weight needs, over the largest that is allowed [1]; held: share
+ * of the planned squeeze that the ground holds [1]. */
 void hx_warmth_step(const hxWarmthModel *model, const double torque[HX_LEGS][HX_JOINTS],
                     double needed, double held, hxWarmth *warmth);
 

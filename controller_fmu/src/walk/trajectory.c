@@ -117,6 +117,10 @@ void hx_foot_paths_compile(const hxControllerDefinition *definition, const hxLeg
     hx_leg_solver_forward(&leg[k], leg[k].stance, foot);
     model->home[k] = hx_plane(foot[0], foot[1]);
     model->home_height[k] = foot[2];
+    hxPose narrow;
+    model->inward[k] = hx_scaled(hx_cis(leg[k].hip_yaw + leg[k].stance[0]), -gait->narrowing);
+    hx_leg_solver_pose(&leg[k], hx_plane_add(model->home[k], model->inward[k]), foot[2], &narrow);
+    model->turned[k] = hx_leg_solver_rolling(&leg[k], narrow.angle);
   }
 }
 
@@ -134,19 +138,23 @@ static int64_t reached(const hxFootPaths *paths, int64_t number) {
 /* Stops with the feet at `plane` and resets the gait clock. */
 static void rest(const hxFootPathsModel *model, const hxPlane plane[HX_LEGS], hxFootPaths *paths,
                  hxPlannedFeet *feet) {
+  const double narrowing = paths->narrowing;
   hxPlane place[HX_LEGS];
   memcpy(place, plane, sizeof place); /* plane may point into feet */
   memset(paths, 0, sizeof *paths);
+  paths->narrowing = narrowing;
   memset(feet, 0, sizeof *feet);
   for (int leg = 0; leg < HX_LEGS; ++leg) {
     feet->plane[leg] = feet->goal[leg] = place[leg];
     feet->height[leg] = model->home_height[leg];
     feet->phase[leg] = phase_after(model, leg, 0);
+    feet->rolled[leg] = narrowing * model->turned[leg];
     paths->stayed[leg] = model->late[leg];
   }
 }
 
 void hx_foot_paths_reset(const hxFootPathsModel *model, hxFootPaths *paths, hxPlannedFeet *feet) {
+  paths->narrowing = 0.0;
   rest(model, model->home, paths, feet);
 }
 
@@ -166,6 +174,11 @@ static int lift_off(const hxFootPathsModel *model, const hxFootPaths *old, hxFoo
   return any;
 }
 
+/* Returns the stance position that the steps of a leg aim at, walking frame (C53). */
+static hxPlane aims(const hxFootPathsModel *model, const hxFootPaths *paths, int leg) {
+  return hx_plane_add(model->home[leg], hx_scaled(model->inward[leg], paths->narrowing));
+}
+
 /* Keeps feet in place that are at their stance positions. Returns whether all are there and on the
  * ground. place: positions of the feet; those that have just landed are at their goals. */
 static int come_home(const hxFootPathsModel *model, const hxFootPaths *old,
@@ -176,7 +189,8 @@ static int come_home(const hxFootPathsModel *model, const hxFootPaths *old,
     place[leg] = now->plane[leg];
     if (old->swinging[leg] && paths->standing[leg])
       place[leg] = hx_times(hx_cis(-now->turn), hx_plane_sub(now->goal[leg], now->way));
-    const int home = sqrt(hx_square(hx_plane_sub(place[leg], model->home[leg]))) < home_tolerance;
+    const hxPlane away = hx_plane_sub(place[leg], aims(model, paths, leg));
+    const int home = sqrt(hx_square(away)) < home_tolerance;
     paths->lifted[leg] &= !home;
     paths->stays[leg] = home && !paths->swinging[leg];
     all_home &= home;
@@ -230,6 +244,7 @@ static void set_out(const hxFootPathsModel *model, const hxFootPaths *paths,
     blend(progress(model, first->phase[leg]), &s, &slope);
     first->blend[leg] = paths->swinging[leg] ? s : 0.0;
     first->goal[leg] = present.goal[leg];
+    first->rolled[leg] = present.rolled[leg];
     first->pull[leg] = paths->swinging[leg] ? present.pull[leg] : hx_plane(0.0, 0.0);
     place_foot(model, paths, leg, back, ground_of(first, leg), first);
   }
@@ -284,10 +299,11 @@ int hx_foot_paths_reach(const hxFootPathsModel *model, const hxFootPaths *paths,
   return 1;
 }
 
-/* Returns the landing point (C4) in the walking frame. */
-static hxPlane landing(const hxFootPathsModel *model, int leg, double tau, hxTwist twist) {
+/* Returns the landing point (C4, C53) in the walking frame. */
+static hxPlane landing(const hxFootPathsModel *model, const hxFootPaths *paths, int leg, double tau,
+                       hxTwist twist) {
   const double ahead = model->landing_lead - tau * model->swing_time;
-  return hx_plane_add(hx_times(hx_cis(twist.yaw_rate * ahead), model->home[leg]),
+  return hx_plane_add(hx_times(hx_cis(twist.yaw_rate * ahead), aims(model, paths, leg)),
                       travel(twist, ahead));
 }
 
@@ -315,14 +331,20 @@ void hx_foot_paths_walk(const hxFootPathsModel *model, const hxFootPaths *paths,
     const double tau = progress(model, feet->phase[leg]);
     /* each foot gets its goal once */
     const int free = paths->swinging[leg] && (tau < freeze || (number == 1 && paths->lifted[leg]));
-    feet->goal[leg] = free
-                          ? hx_plane_add(feet->way, hx_times(turn, landing(model, leg, tau, twist)))
-                          : before->goal[leg];
+    feet->goal[leg] =
+        free ? hx_plane_add(feet->way, hx_times(turn, landing(model, paths, leg, tau, twist)))
+             : before->goal[leg];
     /* the distance to the landing point is proportional to 1 - s (C5) */
-    const double left = 1.0 - before->blend[leg];
-    const hxPlane moved = hx_scaled(hx_plane_sub(feet->goal[leg], before->goal[leg]),
-                                    1.0 / (left < nearly_done ? nearly_done : left));
+    const double left = fmax(1.0 - before->blend[leg], nearly_done);
+    const hxPlane moved = hx_scaled(hx_plane_sub(feet->goal[leg], before->goal[leg]), 1.0 / left);
     feet->pull[leg] = hx_plane_add(before->pull[leg], moved);
+    feet->rolled[leg] = before->rolled[leg];
+    if (paths->swinging[leg] && !paths->met[leg]) {
+      const double aim = paths->narrowing * model->turned[leg];
+      double s, slope;
+      blend(tau, &s, &slope);
+      feet->rolled[leg] = aim - (aim - before->rolled[leg]) * (1.0 - s) / left;
+    }
     if (paths->met[leg]) { /* the foot stays where it met the ground (C51) */
       feet->goal[leg] = ground_of(before, leg);
       feet->pull[leg] = hx_plane(0.0, 0.0);

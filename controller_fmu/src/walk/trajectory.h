@@ -45,6 +45,8 @@ typedef struct hxFootPathsModel {
   double swing_time; /* s */
   double landing_lead; /* s, from lift-off to the middle of the next stance */
   hxPlane home[HX_LEGS]; /* m   feet of the stance */
+  hxPlane inward[HX_LEGS]; /* m   from the stance to the narrow one */
+  double turned[HX_LEGS]; /* m   that the feet roll outwards on this way */
   double home_height[HX_LEGS]; /* m */
 } hxFootPathsModel;
 
@@ -66,6 +68,7 @@ typedef struct hxPlannedFeet {
   /* m, where a swinging foot will touch down, or where a standing foot stands */
   hxPlane goal[HX_LEGS];
   hxPlane pull[HX_LEGS]; /* m, (goal - foot)/(1 - s) of swinging feet, 0 of standing feet */
+  double rolled[HX_LEGS]; /* m, outwards from the stance to the position that the foot aims at */
   hxPlane way; /* m, displacement of the walking frame over the ground */
   double turn; /* rad  of the walking frame over the ground */
   hxTwist twist; /* of the body */
@@ -87,6 +90,7 @@ typedef struct hxFootPaths {
   int met[HX_LEGS]; /* the foot has met the ground on its way down, and stays where it is */
   int held; /* the gait clock stands still until feet at the ends of their swings carry load */
   int awaited[HX_LEGS]; /* the gait clock waits for this foot */
+  double narrowing; /* 1, part of the way to the narrow stance that the steps aim at */
 } hxFootPaths;
 
 void hx_foot_paths_compile(const hxControllerDefinition *definition, const hxLegSolver leg[HX_LEGS],

@@ -12,6 +12,7 @@ import typer
 from hexapod_cosim.cosim.cli.failures import FELL
 from hexapod_cosim.cosim.cli.running import ControlNames, FmuFile, GainsFile, given_gains
 from hexapod_cosim.cosim.cli.terminal import Json, warn
+from hexapod_cosim.cosim.common.installation import require_pyarrow
 from hexapod_cosim.cosim.study.execute.engines import DEFAULT_ENGINE, ENGINES
 from hexapod_cosim.cosim.study.plan.records import StudyError
 
@@ -74,6 +75,7 @@ def study(
     --control replaces the controls of the file. A study that was stopped resumes when the same
     command is started again.
     """
+    require_pyarrow("studies", "hexapod study")
     # imported here: it is slow, and no other command needs it
     from hexapod_cosim.cosim.cli.study.studying import run_and_report  # noqa: PLC0415
     from hexapod_cosim.cosim.study.execute.study import Options  # noqa: PLC0415

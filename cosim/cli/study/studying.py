@@ -143,14 +143,14 @@ def show_study(found: Results) -> None:
         "metric",
         "unit",
         *controls,
-        *(["change", "95 % interval", ""] if len(controls) == 2 else []),
+        *(text for control in controls[1:] for text in _change_titles(control, controls)),
     ]
     texts = [
         [
             row["name"],
             row["unit"],
             *row["values"],
-            *([row["change"], row["interval"], row["verdict"]] if len(controls) == 2 else []),
+            *(to[key] for to in row["changes"] for key in ("change", "interval", "verdict")),
         ]
         for row in rows
     ]
@@ -164,7 +164,7 @@ def show_study(found: Results) -> None:
         for control in controls
     )
     show_text(f"{overall.runs} runs at {found.of_points} points; walked to the end: {walked}")
-    if len(controls) == 2:
+    if len(controls) > 1:
         show_text(f"{METHOD}.")
     for (control, status, reason), count in list(overall.failures.items())[:MAX_REASONS]:
         show_text(f"{count:6d} x {control} {_ending(status)}: {reason}")
@@ -178,6 +178,11 @@ def show_study(found: Results) -> None:
             f"held out {' '.join(row['held_out'])}"
         )
     show_optimum_changes(found)
+
+
+def _change_titles(control: str, controls: Sequence[str]) -> tuple[str, str, str]:
+    """Returns the titles of a change, its interval and its verdict, from the first control."""
+    return ("change" if len(controls) == 2 else f"to {control}"), "95 % interval", ""
 
 
 def show_optimum_changes(found: Results) -> None:

@@ -42,7 +42,7 @@ class _Panel:
 
 
 def heat_map(points: Sequence[Point], first: Factor, second: Factor, study: Study) -> Figure:
-    """Draws the slip over two factors for each control, and the change over pairs."""
+    """Draws the slip over two factors for each control, and the changes from the first one."""
     cells = _Cells(points, first, second)
     controls = study.run_controls
     slips = [cells.mean(_slip(control)) for control in controls]
@@ -58,19 +58,17 @@ def heat_map(points: Sequence[Point], first: Factor, second: Factor, study: Stud
         )
         for control, values in zip(controls, slips, strict=True)
     ]
-    if len(controls) == 2:
-        change = 100.0 * (cells.mean(_change) - 1.0)
-        title = f"{controls[0]} → {controls[1]}, pairs [%]"
-        panels.append(
-            _Panel(
-                title,
-                change,
-                cells.total(_pairs_known),
-                cells.total(lambda point: point.pairs),
-                Normalize(-100.0, 100.0),
-                CHANGES,
-            )
+    panels += [
+        _Panel(
+            f"{controls[0]} → {control}, pairs [%]",
+            100.0 * (cells.mean(_change(control)) - 1.0),
+            cells.total(_pairs_known(controls[0], control)),
+            cells.total(_pairs(control)),
+            Normalize(-100.0, 100.0),
+            CHANGES,
         )
+        for control in controls[1:]
+    ]
     figure = Figure(
         figsize=(3.6 * len(panels) + 0.8, 0.42 * min(max(len(second.values), 3), 12) + 2.2)
     )
@@ -94,16 +92,20 @@ def _walked(control: str) -> Callable[[Point], int]:
     return lambda point: point.walked[control]
 
 
-def _pairs_known(point: Point) -> int:
-    """Returns > 0 when the point has pairs, or when it has none as one control never walked."""
-    return point.pairs or int(
-        any(point.runs[name] and not point.walked[name] for name in point.runs)
+def _pairs(control: str) -> Callable[[Point], int]:
+    return lambda point: point.pairs[control]
+
+
+def _pairs_known(*controls: str) -> Callable[[Point], int]:
+    """Returns > 0 when a point has pairs, or when it has none as one control never walked."""
+    return lambda point: (
+        point.pairs[controls[-1]]
+        or int(any(point.runs[name] and not point.walked[name] for name in controls))
     )
 
 
-def _change(point: Point) -> tuple[float, float]:
-    change = point.changes[SLIP]
-    return change.after, change.before
+def _change(control: str) -> Callable[[Point], tuple[float, float]]:
+    return lambda point: (point.changes[control][SLIP].after, point.changes[control][SLIP].before)
 
 
 class _Cells:

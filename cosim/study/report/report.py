@@ -112,7 +112,10 @@ def interval_meaning(results: Results) -> str:
 
 
 def overall_rows(results: Results) -> list[dict[str, Any]]:
-    """Returns a row per metric: means over all walks by control, and the change over all pairs."""
+    """Returns a row per metric: means over all walks by control, and the changes over all pairs.
+
+    There is a change for each control but the first, in their order.
+    """
     overall, rows = results.overall, []
     means = {
         control: {name: overall.means[control][name].value for name in FIGURES}
@@ -123,25 +126,33 @@ def overall_rows(results: Results) -> list[dict[str, Any]]:
         values = [
             shown_mean(name, overall.means[control][name]) for control in results.study.run_controls
         ]
-        change = overall.changes.get(name)
-        pairs = 0 if change is None else change.pairs
+        changes = [
+            {
+                "control": control,
+                "pairs": found[name].pairs,
+                **shown_change(found[name]),
+                "spread": spread(results, control, name),
+            }
+            for control, found in overall.changes.items()
+        ]
         rows.append(
             {
                 "name": name,
                 "unit": unit,
                 "meaning": meaning,
                 "values": values,
-                "pairs": pairs,
-                **shown_change(change),
-                "spread": spread(results, name),
+                "changes": changes,
             }
         )
     return rows
 
 
-def spread(results: Results, name: str) -> str:
-    """Returns the least and the largest relative change over the points, if there are two."""
-    found = [point.changes[name].relative for point in results.points if name in point.changes]
+def spread(results: Results, control: str, name: str) -> str:
+    """Returns the least and the largest relative change over the points, if there are two.
+
+    control: the one that is compared with the first.
+    """
+    found = [point.changes[control][name].relative for point in results.points]
     known = [value for value in found if math.isfinite(value)]
     return f"{min(known):+.0%} .. {max(known):+.0%}" if len(known) > 1 else ""
 
@@ -162,7 +173,7 @@ def _point_row(point: Point, results: Results) -> dict[str, Any]:
     cells = [
         {
             "values": [shown_mean(name, point.means[control][name]) for control in controls],
-            **shown_change(point.changes.get(name)),
+            "changes": [shown_change(found[name]) for found in point.changes.values()],
         }
         for name in POINT_METRICS
     ]
@@ -207,10 +218,10 @@ def short(value: float, digits: int) -> str:
     return f"{value:.0f}" if "e+" in text else text
 
 
-def shown_change(change: Change | None) -> dict[str, str]:
+def shown_change(change: Change) -> dict[str, str]:
     """Returns a change relative to the first control's mean, its interval and its verdict."""
-    if change is None or not change.pairs or not math.isfinite(change.relative):
-        return {"change": "", "interval": "", "verdict": "" if change is None else change.verdict}
+    if not change.pairs or not math.isfinite(change.relative):
+        return {"change": "", "interval": "", "verdict": change.verdict}
     return {
         "change": f"{change.relative:+.0%}",
         "interval": _shown_interval(*change.interval),

@@ -23,16 +23,7 @@ from hexapod_cosim.cosim.study.store.columns import FIGURES, WALL, result_schema
 from hexapod_cosim.cosim.study.store.manifest import MANIFEST, RESULTS, RUNS, TIMES, provenance
 from hexapod_cosim.cosim.study.store.moments import Array, ratio_half_widths
 from hexapod_cosim.cosim.study.store.store import ROWS_AT_ONCE, Store, write_durably, write_whole
-from hexapod_cosim.cosim.study.store.sums import (
-    AFTER,
-    BEFORE,
-    DIFFERENCE,
-    Block,
-    Rows,
-    Sums,
-    blocks_of,
-    whole_pairs,
-)
+from hexapod_cosim.cosim.study.store.sums import Block, Rows, Sums, blocks_of, whole_pairs
 from hexapod_cosim.cosim.study.store.table import Mean, Overall, Point, Tally, point_at
 from hexapod_cosim.cosim.study.store.trials import OPTIMUM, Trial, trials_of
 from hexapod_cosim.models import HexapodError
@@ -186,14 +177,27 @@ def summary_of(results: Results) -> dict[str, Any]:
         "points": results.of_points,
         "walked": dict(overall.walked),
         "run_by_control": dict(overall.total),
-        "pairs": overall.pairs,
+        **_shared_changes(overall),
         "means": {
             control: {name: _mean(item) for name, item in means.items()}
             for control, means in overall.means.items()
         },
-        "change": {name: change.as_table() for name, change in overall.changes.items()},
         "failures": failures,
         "optimum": results.optimum,
+    }
+
+
+def _shared_changes(overall: Overall) -> dict[str, Any]:
+    """Returns pairs and changes: with two controls as they are, with more by the other control."""
+    tables = {
+        control: {name: change.as_table() for name, change in changes.items()}
+        for control, changes in overall.changes.items()
+    }
+    if len(tables) > 1:
+        return {"pairs": dict(overall.pairs), "changes": tables}
+    return {
+        "pairs": sum(overall.pairs.values()),
+        "change": next(iter(tables.values()), {}),
     }
 
 
@@ -205,7 +209,8 @@ def points_schema(study: Study) -> pa.Schema:
     """Returns the schema of points.parquet.
 
     Its columns are the settings; for each control the numbers of runs and walks and the means of
-    the metrics with the half widths of their intervals; then the pairs and their changes.
+    the metrics with the half widths of their intervals; then the pairs and their changes. With more
+    than two controls the names of the latter begin with the other control.
     """
     runs = schema_of(study)
     fields = [runs.field(name) for name in ("point", "case")] + [
@@ -222,15 +227,21 @@ def points_schema(study: Study) -> pa.Schema:
             for name in FIGURES
             for part in ("", HALF_WIDTH)
         ]
-    if len(study.run_controls) == 2:
-        fields.append(pa.field("pairs", pa.int64()))
+    for before in _prefixes(study):
+        fields.append(pa.field(f"{before}pairs", pa.int64()))
         fields += [
-            runs.field(name).with_name(f"change.{name}{part}")
+            runs.field(name).with_name(f"{before}change.{name}{part}")
             for name in FIGURES
             for part in ("", HALF_WIDTH)
         ]
-        fields += [pa.field(f"change.{name}.verdict", pa.string()) for name in FIGURES]
+        fields += [pa.field(f"{before}change.{name}.verdict", pa.string()) for name in FIGURES]
     return pa.schema(fields)
+
+
+def _prefixes(study: Study) -> list[str]:
+    """Returns what the names of columns of changes begin with, by the other control."""
+    others = study.run_controls[1:]
+    return [""] if len(others) == 1 else [f"{control}." for control in others]
 
 
 def points_table(block: Block, study: Study) -> pa.Table:
@@ -244,8 +255,9 @@ def points_table(block: Block, study: Study) -> pa.Table:
         columns |= {f"{control}.runs": sums.runs[:, k], f"{control}.walked": sums.walked[:, k]}
         part = sums.moments[:, k]
         columns |= _by_metric(control, part.value, part.half_width)
-    if len(study.run_controls) == 2:
-        columns |= {"pairs": sums.pairs, **_change_columns(sums)}
+    for k, before in enumerate(_prefixes(study)):
+        changes = _change_columns(sums, k + 1)
+        columns |= {f"{before}{name}": values for name, values in changes.items()}
     arrays = [
         pa.array(item, schema.field(name).type, from_pandas=True)
         if isinstance(item, np.ndarray)
@@ -255,9 +267,12 @@ def points_table(block: Block, study: Study) -> pa.Table:
     return pa.table(arrays, schema=schema)
 
 
-def _change_columns(sums: Sums) -> dict[str, Any]:
-    """Returns the columns of the changes from the first control to the second."""
-    before, after, difference = (sums.moments[:, part] for part in (BEFORE, AFTER, DIFFERENCE))
+def _change_columns(sums: Sums, other: int) -> dict[str, Any]:
+    """Returns the columns of pairs and changes from the first control to another one.
+
+    other: number of the other control, from 1.
+    """
+    before, after, difference = sums.of_pairs(other)
     half_width, ratio = difference.half_width, ratio_half_widths(before, after, difference)
     columns = _by_metric("change", after.value - before.value, half_width)
     for k, name in enumerate(FIGURES):
@@ -265,7 +280,7 @@ def _change_columns(sums: Sums) -> dict[str, Any]:
             name, before.value[:, k], after.value[:, k], half_width[:, k], ratio[:, k]
         )
         columns[f"change.{name}.verdict"] = verdict.tolist()
-    return columns
+    return {"pairs": sums.pairs[:, other - 1], **columns}
 
 
 def _by_metric(prefix: str, values: Array, half_widths: Array) -> dict[str, Any]:

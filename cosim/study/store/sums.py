@@ -1,14 +1,16 @@
 """Sums over sorted runs: of each point and of all runs, with one block of rows in memory.
 
-A pair consists of two runs of the same point, scenario and seed, one under each control. In sorted
-runs they are next to each other. A run whose partner is missing counts in the means of its control
-and not in the changes.
+A pair consists of two runs of the same point, scenario and seed: one under the first control, which
+is the reference, and one under another control. In sorted runs all runs of a point, scenario and
+seed follow each other in the order of the controls. A run whose partner is missing counts in the
+means of its control and not in the changes.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from itertools import takewhile
 
 import numpy as np
 import pyarrow as pa
@@ -24,8 +26,7 @@ from hexapod_cosim.cosim.study.store.moments import (
     moments_of,
 )
 
-# indices of the samples of pairs, which follow those of each control
-BEFORE, AFTER, DIFFERENCE = -3, -2, -1
+SAMPLES = 3  # of a pair: the figures before and after, and their difference
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -34,8 +35,9 @@ class Sums:
 
     runs: Numbers  # (g, c)
     walked: Numbers  # (g, c)
-    pairs: Numbers  # (g,) pairs of which both runs walked to the end
-    moments: Moments  # (g, c + 3, metrics) of walks: by control, then of pairs
+    pairs: Numbers  # (g, c - 1) pairs of which both runs walked to the end, by the other control
+    # (g, c + SAMPLES (c - 1), metrics) of walks: by control, then of pairs by the other control
+    moments: Moments
 
     def __getitem__(self, place: slice) -> Sums:
         return Sums(
@@ -44,6 +46,15 @@ class Sums:
             pairs=self.pairs[place],
             moments=self.moments[place],
         )
+
+    def of_pairs(self, other: int) -> tuple[Moments, Moments, Moments]:
+        """Returns the moments (g, metrics) before, after and of the difference of pairs.
+
+        other: number of the other control, from 1.
+        """
+        first = self.runs.shape[1] + SAMPLES * (other - 1)
+        before, after, difference = (self.moments[:, first + k] for k in range(SAMPLES))
+        return before, after, difference
 
     def merged(self, other: Sums) -> Sums:
         """Merges each group with the other one at the same place."""
@@ -94,52 +105,59 @@ class Rows:
     def sums(self, starts: Numbers) -> Sums:
         """Returns the sums of groups of successive runs that begin at `starts` (g,)."""
         own = self._control[:, None] == np.arange(self._size)
-        first = self._first_of_pairs()
-        both = first & self._walked & np.append(self._walked[1:], False)
+        reference = self._references()
+        paired = (reference >= 0) & self._walked & self._walked[reference]
+        both = own[:, 1:] & paired[:, None]
         figures = np.column_stack(
             [self.table[name].to_numpy(zero_copy_only=False).astype(np.float64) for name in FIGURES]
         )
-        following = np.concatenate([figures[1:], figures[-1:]])
-        values = np.stack(
-            [*[figures] * self._size, figures, following, following - figures], axis=1
-        )
-        counted = np.column_stack([own & self._walked[:, None], both, both, both])
-        paired = np.isfinite(figures) & np.isfinite(following)
+        before, others = figures[reference], self._size - 1
+        samples = [before, figures, figures - before]
+        values = np.stack([*[figures] * self._size, *samples * others], axis=1)
+        counted = np.column_stack([own & self._walked[:, None], np.repeat(both, SAMPLES, axis=1)])
+        known = np.isfinite(figures)
+        known_pairs = known & np.isfinite(before)
         valid = counted[:, :, None] & np.stack(
-            [*[np.isfinite(figures)] * self._size, paired, paired, paired], axis=1
+            [*[known] * self._size, *[known_pairs] * (SAMPLES * others)], axis=1
         )
         return Sums(
             runs=np.add.reduceat(own, starts, axis=0, dtype=np.int64),
             walked=np.add.reduceat(own & self._walked[:, None], starts, axis=0, dtype=np.int64),
-            pairs=np.add.reduceat(both, starts, dtype=np.int64),
+            pairs=np.add.reduceat(both, starts, axis=0, dtype=np.int64),
             moments=moments_of(values, valid, starts),
         )
 
-    def _first_of_pairs(self) -> Truths:
-        """Returns which runs (n,) are followed by the same run under the second control."""
+    def _references(self) -> Numbers:
+        """Returns the index (n,) of each run's partner under the first control; -1 without one."""
+        count = len(self._control)
         case = pc.index_in(self.table["case"], value_set=pc.unique(self.table["case"])).to_numpy()
-        same = self._size == 2
+        new = np.arange(count) == 0
         for column in (self._point, case, self.table["seed"].to_numpy()):
-            same = same & (column[1:] == column[:-1])
-        return np.append(same & (self._control[:-1] == 0) & (self._control[1:] == 1), False)
+            new[1:] |= column[1:] != column[:-1]
+        first = np.maximum.accumulate(np.where(new, np.arange(count), 0))
+        return np.where((self._control[first] == 0) & (self._control > 0), first, -1)
 
 
 def whole_pairs(tables: Iterable[pa.Table], controls: Sequence[str]) -> Iterator[pa.Table]:
     """Yields the same rows in tables that separate no pair."""
-    left: pa.Table | None = None  # the last row of a table, when it may begin a pair
+    left: pa.Table | None = None  # the last rows of a table, when others may belong to them
     for part in tables:
         table = part if left is None else pa.concat_tables([left, part])
-        begins_pair = (
-            len(controls) == 2
-            and table.num_rows > 0
-            and table["control"][-1].as_py() == controls[0]
-        )
-        kept = table.num_rows - begins_pair
-        left = table.slice(kept) if begins_pair else None
+        kept = table.num_rows - _unfinished(table, controls)
+        left = table.slice(kept) if kept < table.num_rows else None
         if kept:
             yield table.slice(0, kept)
     if left is not None:
         yield left
+
+
+def _unfinished(table: pa.Table, controls: Sequence[str]) -> int:
+    """Returns the number of last rows that may have partners in the next table."""
+    if len(controls) < 2 or not table.num_rows or table["control"][-1].as_py() == controls[-1]:
+        return 0
+    last = table.slice(max(table.num_rows - len(controls), 0))
+    keys = last.select(["point", "case", "seed"]).to_pylist()
+    return sum(1 for _ in takewhile(lambda key: key == keys[-1], reversed(keys)))
 
 
 def blocks_of(parts: Iterable[Rows]) -> Iterator[Block]:

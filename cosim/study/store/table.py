@@ -22,7 +22,7 @@ from hexapod_cosim.cosim.results.metrics import OF_THE_RUN
 from hexapod_cosim.cosim.study.plan.records import SCENARIO_FACTOR, Study
 from hexapod_cosim.cosim.study.store.columns import FIGURES
 from hexapod_cosim.cosim.study.store.moments import no_moments, ratio_half_widths
-from hexapod_cosim.cosim.study.store.sums import AFTER, BEFORE, DIFFERENCE, Block, Rows, Sums
+from hexapod_cosim.cosim.study.store.sums import SAMPLES, Block, Rows, Sums
 
 Row = Mapping[str, Any]
 
@@ -46,9 +46,11 @@ class Point:
     held_out: bool
     runs: Mapping[str, int]  # numbers of runs by control
     walked: Mapping[str, int]  # numbers of walks by control
-    pairs: int  # of which both runs walked to the end
+    # numbers of pairs with the first control, of which both runs walked to the end, by the other
+    pairs: Mapping[str, int]
     means: Mapping[str, Mapping[str, Mean]]  # by control and metric
-    changes: Mapping[str, Change]  # by metric; empty for a single control
+    # from the first control to each other one, by the other one and metric
+    changes: Mapping[str, Mapping[str, Change]]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -58,10 +60,12 @@ class Overall:
     runs: int
     walked: Mapping[str, int]  # numbers of walks by control
     total: Mapping[str, int]  # numbers of runs by control
-    pairs: int  # of which both runs walked to the end
+    # numbers of pairs with the first control, of which both runs walked to the end, by the other
+    pairs: Mapping[str, int]
     # numbers of runs by control, status and reason, the largest first
     failures: Mapping[tuple[str, str, str], int]
-    changes: Mapping[str, Change]  # by metric, over all pairs
+    # over all pairs, from the first control to each other one, by the other one and metric
+    changes: Mapping[str, Mapping[str, Change]]
     means: Mapping[str, Mapping[str, Mean]]  # by control and metric
     # numbers of walks, and of walks with any metric, by scenario and control
     walks: Mapping[tuple[str, str], tuple[int, int]]
@@ -88,7 +92,7 @@ def point_at(block: Block, place: int, study: Study) -> Point:
         },
         runs=dict(zip(controls, sums.runs[0].tolist(), strict=True)),
         walked=dict(zip(controls, sums.walked[0].tolist(), strict=True)),
-        pairs=int(sums.pairs[0]),
+        pairs=dict(zip(controls[1:], sums.pairs[0].tolist(), strict=True)),
         means=_means(sums, study),
         changes=_changes(sums, study),
     )
@@ -112,11 +116,18 @@ def _means(sums: Sums, study: Study) -> dict[str, dict[str, Mean]]:
     return found
 
 
-def _changes(sums: Sums, study: Study) -> dict[str, Change]:
-    """Returns the changes of the first group by metric, as `hexapod compare` computes them."""
-    if len(study.run_controls) != 2:
-        return {}
-    before, after, difference = (sums.moments[0, part] for part in (BEFORE, AFTER, DIFFERENCE))
+def _changes(sums: Sums, study: Study) -> dict[str, dict[str, Change]]:
+    """Returns the changes of the first group, as `hexapod compare` computes them.
+
+    They are from the first control to each other one, by the other one and metric.
+    """
+    others = enumerate(study.run_controls[1:], start=1)
+    return {control: _changes_to(sums, k) for k, control in others}
+
+
+def _changes_to(sums: Sums, other: int) -> dict[str, Change]:
+    """Returns the changes of the first group by metric. other: number of the other control."""
+    before, after, difference = (part[0] for part in sums.of_pairs(other))
     ratio = ratio_half_widths(before, after, difference)
     parts = (before.value, after.value, difference.half_width, ratio, difference.count.astype(int))
     return {
@@ -140,7 +151,7 @@ class Tally:
         self._unbalanced = dict.fromkeys(study.run_controls, Unbalanced())
 
     def add(self, rows: Rows) -> None:
-        """Adds runs; both runs of a pair must be added together."""
+        """Adds runs; all runs of a point, scenario and seed must be added together."""
         sums = rows.sums(np.zeros(1, dtype=np.int64))
         self._sums = sums if self._sums is None else self._sums.merged(sums)
         for case, control, walked, figured in _walks(rows.table):
@@ -167,7 +178,7 @@ class Tally:
             runs=sum(runs),
             walked=dict(zip(controls, walked, strict=True)),
             total=dict(zip(controls, runs, strict=True)),
-            pairs=int(sums.pairs[0]),
+            pairs=dict(zip(controls[1:], sums.pairs[0].tolist(), strict=True)),
             failures=dict(self._failures.most_common(MAX_REASONS)),
             changes=_changes(sums, self._study),
             means=_means(sums, self._study),
@@ -191,10 +202,9 @@ def _walks(table: pa.Table) -> list[tuple[str, str, int, int]]:
 
 def _no_sums(study: Study) -> Sums:
     size = len(study.run_controls)
-    none = np.zeros((1, size), dtype=np.int64)
-    return Sums(
-        runs=none, walked=none, pairs=none[:, 0], moments=no_moments(1, size + 3, len(FIGURES))
-    )
+    none, others = np.zeros((1, size), dtype=np.int64), size - 1
+    moments = no_moments(1, size + SAMPLES * others, len(FIGURES))
+    return Sums(runs=none, walked=none, pairs=none[:, 1:], moments=moments)
 
 
 def _reason(row: Row) -> str:

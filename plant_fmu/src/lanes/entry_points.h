@@ -162,9 +162,7 @@ static void kernel_measure(const hxModel *model, const hxCommand *command, hxSta
   end->time = state->time;
   hx_dynamics_evaluate(model, &state->contact, command, state->time, &state->motion, NULL, NULL, 1,
                        &scratch->work, &scratch->rate);
-  if (model->has_soil)
-    hx_soil_yield(&state->contact, h, &state->moment.contact[HX_FOOT], &end->contact[HX_FOOT],
-                  path.plastic);
+  if (model->has_soil) hx_soil_yield(model, &state->contact, h, &state->moment, end, path.plastic);
   trapezoidal_impulses(model, &scratch->work, h, &state->completed, &impulses);
   if (!known)
     trapezoidal_impulses(

@@ -68,7 +68,7 @@ static inline int has_friction_bristles(const hxModel *model, int row) {
 
 /* Returns whether the contacts of a row stand on bristles, those of friction or of soil. */
 static inline int has_bristles(const hxModel *model, int row) {
-  return has_friction_bristles(model, row) || has_soil(model, row);
+  return has_friction_bristles(model, row) || (row == HX_FOOT && model->has_soil);
 }
 
 /* Returns whether the contacts of a row resist spin or rolling: feet do. */
@@ -273,13 +273,36 @@ static inline hxVec3 select3(hxMask mask, hxVec3 a, hxVec3 b) {
   return (hxVec3){hx_select(mask, a.x, b.x), hx_select(mask, a.y, b.y), hx_select(mask, a.z, b.z)};
 }
 
+/* Replaces the normal force of a row by that of soil where it touched down on it (eq. 44, 45). */
+HX_INLINE void soil_load(hxMask soft, const hxSoilPack *f, hxContactWork *contact) {
+  contact->stored = hx_select(
+      soft, f->stored, 0.4 * contact->normal.elastic * hx_max(contact->kin.delta, hx_splat(0.0)));
+  contact->normal.force = hx_select(soft, f->force, contact->normal.force);
+  contact->normal.elastic = hx_select(soft, f->held, contact->normal.elastic);
+}
+
+/* Replaces the forces on torso, knees and shanks by those of soil where they touched down on it:
+ * f_n along the normal and the whole shear -T_max tanh(k_t v)/v v_t across it (eq. 44-46). They
+ * have no bristles. */
+HX_RARE void replace_body_by_soil(const hxModel *model, const hxContactState *state, int row,
+                                  int slot, hxContactWork *contact) {
+  const hxMask soft = hx_on_soil(state, row, slot);
+  const hxContactKinematics *kin = &contact->kin;
+  const hxSoilPack f = hx_soil_pack(state, row, slot, kin->delta, kin->ddelta);
+  const hxReal drag = f.shear * hx_per_speed(model, contact->slip_speed);
+  soil_load(soft, &f, contact);
+  contact->drag = hx_select(soft, drag, contact->drag);
+  contact->force = select3(
+      soft, hx_add_scaled(hx_scale(f.force, kin->normal), -drag, contact->slip), contact->force);
+}
+
 /* Replaces the forces on feet by those of soil where they touched down on it: f_n along the normal
  * and the shear -(T_0 + f_n tan phi) b/K across it (eq. 44-47). */
 HX_RARE void replace_by_soil(const hxModel *model, const hxContactState *state, int slot,
                              const hxPlantMotion *motion, hxContactWork *contact) {
-  const hxMask soft = hx_on_soil(state, slot);
+  const hxMask soft = hx_on_soil(state, HX_FOOT, slot);
   const hxContactKinematics *kin = &contact->kin;
-  const hxSoilPack f = hx_soil_pack(state, slot, kin->delta, kin->ddelta);
+  const hxSoilPack f = hx_soil_pack(state, HX_FOOT, slot, kin->delta, kin->ddelta);
   const hxVec3 b = hx_load_vec3(motion->bristle, slot), none = hx_zero3();
   const hxReal zero = hx_splat(0.0), yield = f.per_displacement * contact->slip_speed;
   const hxBristle rigid = has_friction_bristles(model, HX_FOOT)
@@ -289,10 +312,7 @@ HX_RARE void replace_by_soil(const hxModel *model, const hxContactState *state, 
                rate = hx_scale(hx_load(&state->closed[HX_FOOT][slot]),
                                hx_add_scaled(contact->slip, -yield, b));
   const hxVec3 force = hx_add_scaled(hx_scale(f.force, hx_sub3(kin->normal, grip)), -f.hold, b);
-  contact->stored =
-      hx_select(soft, f.stored, 0.4 * contact->normal.elastic * hx_max(kin->delta, zero));
-  contact->normal.force = hx_select(soft, f.force, contact->normal.force);
-  contact->normal.elastic = hx_select(soft, f.held, contact->normal.elastic);
+  soil_load(soft, &f, contact);
   contact->hold = f.hold;
   contact->force = select3(soft, force, contact->force);
   contact->bristle = (hxBristle){.grip = select3(soft, grip, rigid.grip),
@@ -356,7 +376,7 @@ HX_RARE void hx_foot_shares(const hxModel *model, const hxContactState *state, i
   for (int row = HX_FOOT; row < HX_FOOT_ROWS; ++row) {
     share[row] = 1.0;
     if (hx_re(state->closed[row][slot]) == 0.0 || !(hx_re(face[row].delta) > 0.0) ||
-        (row == HX_FOOT && model->has_soil && hx_re(state->on_soil[slot]) != 0.0))
+        (row == HX_FOOT && model->has_soil && hx_re(state->on_soil[0][slot]) != 0.0))
       continue;
     row_of[of.count] = row;
     of.depth[of.count] = face[row].delta;
@@ -397,7 +417,11 @@ HX_INLINE void rigid_force(const hxModel *model, const hxContactState *state, in
 HX_INLINE void hx_contact_force(const hxModel *model, const hxContactState *state, int row,
                                 int slot, const hxPlantMotion *motion, hxContactWork *contact) {
   rigid_force(model, state, row, slot, motion, contact);
-  if (has_soil(model, row)) replace_by_soil(model, state, slot, motion, contact);
+  if (!has_soil(model, row)) return;
+  if (row == HX_FOOT)
+    replace_by_soil(model, state, slot, motion, contact);
+  else
+    replace_body_by_soil(model, state, row, slot, contact);
 }
 
 /* Computes the moment of spin and rolling friction on bodies that turn at w; the normal forces are

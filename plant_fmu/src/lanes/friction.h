@@ -35,14 +35,18 @@ HX_INLINE hxReal hx_sliding_mu(const hxModel *model, hxFrictionAt at, hxReal spe
   return at.mu + at.static_rise / (1.0 + x * x);
 }
 
-/* Returns g of f_t = -mu f_n g(|v_t|) v_t (eq. 15): tanh(k_t v) / v, whose limit at rest is k_t.
- * The series k_t (1 - (k_t v)^2 / 3) is exact below k_t v = 1e-5. */
-HX_INLINE hxReal hx_friction(const hxModel *model, hxReal speed) {
-  if (model->friction_law == HX_FRICTION_NONE) return hx_splat(0.0);
+/* Returns tanh(k_t v) / v, whose limit at rest is k_t. The series k_t (1 - (k_t v)^2 / 3) is exact
+ * below k_t v = 1e-5. */
+HX_INLINE hxReal hx_per_speed(const hxModel *model, hxReal speed) {
   const hxReal x = model->slope * speed;
   const hxMask slow = hx_less(x, hx_splat(1e-5));
   return model->slope * hx_select(slow, 1.0 - x * x * (1.0 / 3.0),
                                   hx_tanh_ratio(hx_select(slow, hx_splat(1.0), x)));
+}
+
+/* Returns g of f_t = -mu f_n g(|v_t|) v_t (eq. 15). */
+HX_INLINE hxReal hx_friction(const hxModel *model, hxReal speed) {
+  return model->friction_law == HX_FRICTION_NONE ? hx_splat(0.0) : hx_per_speed(model, speed);
 }
 
 /* Returns the tanh law's tangential force over load and slip speed, s/m (eq. 15, 35):

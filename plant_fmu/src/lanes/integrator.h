@@ -498,8 +498,7 @@ static void measure_step(const hxStart *start, const hxModel *seen, double h, co
     path.command[node] =
         command_at(start, start->t + h * ((double)node / INTERVALS), &command[node]);
   if (start->model->has_soil)
-    hx_soil_yield(start->contact, h, &state->moment.contact[HX_FOOT], &end->contact[HX_FOOT],
-                  path.plastic);
+    hx_soil_yield(start->pressed, start->contact, h, &state->moment, end, path.plastic);
   hx_step_works(&path, &trial->impulses, &works);
   hxMeasured *measured = &state->measured;
   hx_measure_path(&path, &trial->impulses, &works, measured);

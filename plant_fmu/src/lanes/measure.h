@@ -42,7 +42,7 @@ typedef struct {
   const hxCommand *command[INTERVALS + 1]; /* commands at its nodes */
   double t, h;                             /* s  start and length */
   const hxMoment *from, *to;
-  double plastic[HX_SLOTS]; /* m  plastic depths at its end; set where feet may touch soil */
+  double plastic[HX_SOIL_ROWS][HX_SLOTS]; /* m  plastic depths at its end; set with soil */
 } hxPath;
 
 /* ---- moments ---- */
@@ -280,7 +280,7 @@ static inline void hx_depths_of_moment(const hxModel *model, const hxContactStat
     memcpy(depths->delta[model->row[k]], contact->delta, sizeof contact->delta);
     memcpy(depths->ddelta[model->row[k]], contact->ddelta, sizeof contact->ddelta);
   }
-  if (model->has_soil) hx_depths_on_soil(state, depths);
+  if (model->has_soil) hx_depths_on_soil(model, state, depths);
   if (model->terrain) places_on_grid(model, state, moment, depths);
 }
 
@@ -341,13 +341,12 @@ static inline void start_landing(int slot, double t, hxMeasured *measured) {
 }
 
 /* Switches the contacts that are due at time t, records footprints and starts the measurement of
- * landings; returns whether contacts switched. Depths of feet are relative to those at which they
+ * landings; returns whether contacts switched. Depths are relative to those at which they
  * touch the ground; `at` is the moment of time t. */
 static inline int hx_switch_contacts(const hxModel *model, hxDepths *depths, double t,
                                      const hxMoment *at, hxFootprintLog *footprints,
                                      hxState *state) {
-  if (model->has_soil)
-    hx_soil_switch(model, &at->contact[HX_FOOT], depths, footprints, &state->contact);
+  if (model->has_soil) hx_soil_switch(model, at, depths, footprints, &state->contact);
   if (!hx_contact_is_due(model, depths, &state->contact)) return 0;
   int before[HX_SLOTS], after[HX_SLOTS];
   feet_on_ground(model, &state->contact, before);
@@ -377,7 +376,7 @@ HX_RARE void hx_cross_cells(const hxModel *model, hxDepths *depths, hxState *sta
   if (has_bristles(model, HX_FOOT)) hx_contact_slacken(&state->contact, &state->motion);
   for (int leg = 0; leg < HX_LEGS && model->has_soil; ++leg)
     if (crossed >> leg & 1 && state->contact.closed[HX_FOOT][leg] == 0.0)
-      state->contact.plastic[leg] = 0.0; /* the new cell is undisturbed */
+      state->contact.plastic[0][leg] = 0.0; /* the new cell is undisturbed */
   hx_depths_of_moment(model, &state->contact, &state->moment, depths);
 }
 
@@ -410,18 +409,19 @@ static inline hxVec3 approach_of(const hxContactMoment *moment, int slot) {
                   hx_load_vec3((const double (*)[HX_SLOTS])moment->normal, slot));
 }
 
-/* Returns the growth of the energy stored in contacts of feet, in soil where they touched down on
+/* Returns the growth of the energy stored in a row of contacts, in soil where they touched down on
  * it, J. */
-HX_RARE hxReal growth_with_soil(const hxPath *path, int slot, hxReal rigid) {
+HX_RARE hxReal growth_with_soil(const hxPath *path, int row, int slot, hxReal rigid) {
   const hxContactState *state = path->contact;
-  const hxMask in = hx_in_soil(state, slot);
+  const int soft = hx_soil_row(row);
+  const hxMask in = hx_in_soil(state, row, slot);
   if (!hx_any(in)) return rigid;
-  const hxSoils soil = hx_soils_under(state, slot);
-  const hxReal from = hx_load(&path->from->contact[HX_FOOT].delta[slot]),
-               to = hx_load(&path->to->contact[HX_FOOT].delta[slot]);
+  const hxSoils soil = hx_soils_under(state, row, slot);
+  const hxReal from = hx_load(&path->from->contact[row].delta[slot]),
+               to = hx_load(&path->to->contact[row].delta[slot]);
   return hx_select(in,
-                   hx_stored_energy(&soil, hx_load(&path->plastic[slot]), to) -
-                       hx_stored_energy(&soil, hx_load(&state->plastic[slot]), from),
+                   hx_stored_energy(&soil, hx_load(&path->plastic[soft][slot]), to) -
+                       hx_stored_energy(&soil, hx_load(&state->plastic[soft][slot]), from),
                    rigid);
 }
 
@@ -441,7 +441,7 @@ HX_INLINE void contact_works(const hxPath *path, int row, int slot, hxVec3 impul
     after *= hx_load(&path->to->share[row][slot]);
   }
   hxReal stored = after - before;
-  if (has_soil(path->model, row)) stored = growth_with_soil(path, slot, stored);
+  if (has_soil(path->model, row)) stored = growth_with_soil(path, row, slot, stored);
   *contact = taken - stored;
   *friction = -hx_dot(impulse, slip);
 }
@@ -787,15 +787,15 @@ HX_INLINE hxReal share_within(const hxPath *path, int row, int leg, hxReal x) {
   return from + x * (to - from);
 }
 
-/* Replaces the normal forces of a leg's contact by those of soil. */
-HX_RARE hxReal soil_within(const hxPath *path, int leg, const hxReal *depth, const hxReal *rate) {
-  const hxSoil soil = hx_soil_under(path->contact, leg);
+/* Returns the normal forces of a leg's contact with soil, N, samples in lanes. */
+HX_RARE hxReal soil_within(const hxPath *path, int row, int leg, const hxReal *depth,
+                           const hxReal *rate) {
+  const hxSoil soil = hx_soil_under(path->contact, row, leg);
+  const double plastic = path->contact->plastic[hx_soil_row(row)][leg];
   double delta[HX_LANES], slope[HX_LANES], force[HX_LANES];
   hx_store(delta, *depth), hx_store(slope, *rate);
   for (int lane = 0; lane < HX_LANES; ++lane)
-    force[lane] =
-        hx_soil_normal_force(&soil, path->contact->plastic[leg], delta[lane], slope[lane] / path->h)
-            .force;
+    force[lane] = hx_soil_normal_force(&soil, plastic, delta[lane], slope[lane] / path->h).force;
   return hx_load(force);
 }
 
@@ -806,8 +806,8 @@ HX_INLINE hxReal force_within(const hxPath *path, int row, int leg, hxReal x) {
   const hxCubic depth = cubic(hx_splat(delta), hx_splat(h * from->ddelta[leg]),
                               hx_splat(to->delta[leg] - delta), hx_splat(h * to->ddelta[leg]), x);
   const hxContactState *contact = path->contact;
-  if (has_soil(path->model, row) && is_in_soil(contact, leg))
-    return soil_within(path, leg, &depth.value, &depth.rate);
+  if (has_soil(path->model, row) && is_in_soil(contact, row, leg))
+    return soil_within(path, row, leg, &depth.value, &depth.rate);
   hxContactLawAt law = {hx_splat(contact->closed[row][leg]), hx_splat(contact->damping[row][leg]),
                         hx_splat(contact->stiffness[row][leg])};
   if (has_shares(path, row)) law.stiffness *= share_within(path, row, leg, x);
@@ -861,11 +861,11 @@ static inline int hx_has_cone(const hxModel *model) {
 
 /* Returns the largest impulse of friction, on soil of shear (eq. 46), under a normal impulse. */
 HX_RARE hxReal cone_with_soil(const hxPath *path, int slot, hxReal along, hxReal rigid) {
-  const hxMask in = hx_in_soil(path->contact, slot);
+  const hxMask in = hx_in_soil(path->contact, HX_FOOT, slot);
   if (!hx_any(in)) return rigid;
   const hxReal from = hx_load(&path->from->contact[HX_FOOT].delta[slot]),
                to = hx_load(&path->to->contact[HX_FOOT].delta[slot]);
-  const hxSoils soil = hx_soils_under(path->contact, slot);
+  const hxSoils soil = hx_soils_under(path->contact, HX_FOOT, slot);
   const hxReal z = hx_max(0.5 * (from + to), hx_splat(0.0));
   return hx_select(in, soil.friction * along + path->h * hx_shear_base(&soil, z).force, rigid);
 }

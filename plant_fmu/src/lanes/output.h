@@ -64,10 +64,15 @@ static hxReal elastic_energy(const hxContactWork *contact) {
   return 0.4 * contact->normal.elastic * hx_max(contact->kin.delta, hx_splat(0.0));
 }
 
-static hxNumber torso_elastic_energy(const hxWork *work) {
+/* Returns the energy that a row of contacts with the ground gives back, J. */
+static hxReal ground_energy(const hxModel *model, int row, const hxContactWork *contact) {
+  return has_soil(model, row) ? contact->stored : elastic_energy(contact);
+}
+
+static hxNumber torso_elastic_energy(const hxModel *model, const hxWork *work) {
   hxReal energy[HX_TORSO_PACKS];
   for (int pack = 0; pack < HX_TORSO_PACKS; ++pack)
-    energy[pack] = elastic_energy(&work->torso_contact[pack]);
+    energy[pack] = ground_energy(model, HX_TORSO, &work->torso_contact[pack]);
   return hx_sum_slots(energy);
 }
 
@@ -100,8 +105,9 @@ static hxNumber hx_potential_energy(const hxModel *model, const hxPlantMotion *m
   for (int pack = 0; pack < HX_PACKS; ++pack) {
     const hxContactWork *contact = work->pack[pack].contact;
     const int slot = pack * HX_LANES;
-    legs[pack] = model->has_soil ? contact[HX_FOOT].stored : elastic_energy(&contact[HX_FOOT]);
-    for (int k = 1; k < model->rows; ++k) legs[pack] += elastic_energy(&contact[model->row[k]]);
+    legs[pack] = ground_energy(model, HX_FOOT, &contact[HX_FOOT]);
+    for (int k = 1; k < model->rows; ++k)
+      legs[pack] += ground_energy(model, model->row[k], &contact[model->row[k]]);
     if (model->stops) legs[pack] += stop_energy(model, &work->pack[pack], slot);
     for (int joint = 0; model->elastic && joint < HX_JOINTS; ++joint)
       legs[pack] += hx_gear_energy(model, work->pack[pack].joint[joint].rotor.deflection);
@@ -111,7 +117,7 @@ static hxNumber hx_potential_energy(const hxModel *model, const hxPlantMotion *m
   }
   hxNumber sum =
       hx_lane(hx_sum_legs(legs) - model->torso_mass * hx_dot(g, hx_torso_vec3(motion, HX_R)), 0);
-  if (model->torso_rows) sum += torso_elastic_energy(work);
+  if (model->torso_rows) sum += torso_elastic_energy(model, work);
   return model->pair_rows ? sum + pair_elastic_energy(work) : sum;
 }
 
@@ -205,7 +211,7 @@ static void fill_foot(const hxModel *model, const hxState *state, const hxLegWor
   o->foot.peak_force_rate[leg] = state->measured.peak_rate[leg];
   o->foot.landing_rate[leg] = state->measured.landing_rate[leg];
   o->foot.landings[leg] = state->measured.landings[leg];
-  o->foot.sinkage[leg] = state->contact.plastic[leg];
+  o->foot.sinkage[leg] = state->contact.plastic[0][leg];
   o->foot.contact[leg] = state->contact.closed[HX_FOOT][leg] != 0.0;
   for (int k = 1; k < model->foot_rows; ++k)
     add_foot_row(model, state, &work->contact[model->row[k]], model->row[k], lane, leg, o);
@@ -359,8 +365,8 @@ static int cone_bin(double share) {
 static double cone_limit(const hxModel *model, const hxContactState *state,
                          const hxContactWork *foot, int row, int leg, int lane) {
   const double force = hx_lane(foot->normal.force, lane);
-  if (!has_soil(model, row) || !is_in_soil(state, leg)) return state->mu[row][leg] * force;
-  const hxSoil soil = hx_soil_under(state, leg);
+  if (!has_soil(model, row) || !is_in_soil(state, row, leg)) return state->mu[row][leg] * force;
+  const hxSoil soil = hx_soil_under(state, row, leg);
   return soil.friction * force + hx_lane(foot->hold, lane) / soil.per_displacement;
 }
 

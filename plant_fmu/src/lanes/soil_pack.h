@@ -1,4 +1,4 @@
-/* soil_pack.h - soil under packs of feet: forces on lanes from the scalar functions of soil.h
+/* soil_pack.h - soil under packs of contacts: forces on lanes from the scalar functions of soil.h
  *
  * The functions are out of line, so that rigid ground costs the same with and without them.
  */
@@ -16,29 +16,30 @@ _Static_assert(sizeof(hxSoil) == HX_SOIL_SIZE * sizeof(double), "a soil consists
 
 /* Returns whether a row of contacts may be on soil. */
 static inline int has_soil(const hxModel *model, int row) {
-  return row == HX_FOOT && model->has_soil;
+  return model->has_soil && hx_may_sink(row);
 }
 
-/* Returns which feet touched down on soil. */
-static inline hxMask hx_on_soil(const hxContactState *state, int slot) {
-  return hx_less(hx_splat(0.0), hx_load(&state->on_soil[slot]));
+/* Returns which contacts of a row touched down on soil. */
+static inline hxMask hx_on_soil(const hxContactState *state, int row, int slot) {
+  return hx_less(hx_splat(0.0), hx_load(&state->on_soil[hx_soil_row(row)][slot]));
 }
 
-/* Returns the soil on which a foot touched down. */
-static inline hxSoil hx_soil_under(const hxContactState *state, int slot) {
+/* Returns the soil on which a contact touched down. */
+static inline hxSoil hx_soil_under(const hxContactState *state, int row, int slot) {
   hxSoil soil;
   double numbers[HX_SOIL_SIZE];
-  for (int i = 0; i < HX_SOIL_SIZE; ++i) numbers[i] = hx_re(state->soil[i][slot]);
+  for (int i = 0; i < HX_SOIL_SIZE; ++i) numbers[i] = hx_re(state->soil[hx_soil_row(row)][i][slot]);
   memcpy(&soil, numbers, sizeof soil);
   return soil;
 }
 
-/* Returns whether a foot is in contact with soil. */
-static inline int is_in_soil(const hxContactState *state, int slot) {
-  return hx_re(state->closed[HX_FOOT][slot]) != 0.0 && hx_re(state->on_soil[slot]) != 0.0;
+/* Returns whether a contact is closed and on soil. */
+static inline int is_in_soil(const hxContactState *state, int row, int slot) {
+  return hx_re(state->closed[row][slot]) != 0.0 &&
+         hx_re(state->on_soil[hx_soil_row(row)][slot]) != 0.0;
 }
 
-/* Forces of soil on a pack of feet; 0 on feet that do not touch it. */
+/* Forces of soil on a pack of contacts; 0 on those that do not touch it. */
 typedef struct {
   hxReal force;                /* N      f_n */
   hxReal stiffness, viscosity; /* N/m, N s/m  its derivatives by depth and sinking speed */
@@ -46,60 +47,71 @@ typedef struct {
   hxReal stored;               /* J      that unloading gives back */
   hxReal hold, per_load;       /* N/m, 1/m  shear over the bristle: without load, of the load */
   hxReal per_displacement;     /* 1/m    1/K */
+  hxReal shear;                /* N      T_max */
 } hxSoilPack;
 
 #ifdef HX_TANGENT
-/* Returns the forces on feet at these depths and sinking speeds. */
-HX_RARE hxSoilPack hx_soil_pack(const hxContactState *state, int slot, hxReal delta,
+/* Returns the forces on a row at these depths and sinking speeds. */
+HX_RARE hxSoilPack hx_soil_pack(const hxContactState *state, int row, int slot, hxReal delta,
                                 hxReal ddelta) {
   const hxReal none = hx_splat(0.0);
-  if (!is_in_soil(state, slot)) return (hxSoilPack){none, none, none, none, none, none, none, none};
-  const hxSoil soil = hx_soil_under(state, slot);
-  const hxSoilContact f =
-      hx_soil_contact(&soil, hx_re(state->plastic[slot]), hx_re(delta), hx_re(ddelta));
+  if (!is_in_soil(state, row, slot))
+    return (hxSoilPack){none, none, none, none, none, none, none, none, none};
+  const hxSoil soil = hx_soil_under(state, row, slot);
+  const hxSoilContact f = hx_soil_contact(&soil, hx_re(state->plastic[hx_soil_row(row)][slot]),
+                                          hx_re(delta), hx_re(ddelta));
   const hxSoilForce *n = &f.normal;
-  return (hxSoilPack){.force = hx_with_slope(n->force, n->stiffness * hx_slope(delta) +
-                                                           n->viscosity * hx_slope(ddelta)),
+  const hxReal force =
+      hx_with_slope(n->force, n->stiffness * hx_slope(delta) + n->viscosity * hx_slope(ddelta));
+  return (hxSoilPack){.force = force,
                       .stiffness = n->stiffness,
                       .viscosity = n->viscosity,
                       .held = hx_chain(delta, f.held.force, f.held.slope),
                       .stored = hx_chain(delta, f.stored.force, f.stored.slope),
                       .hold = hx_chain(delta, f.hold.force, f.hold.slope),
                       .per_load = soil.friction * soil.per_displacement,
-                      .per_displacement = soil.per_displacement};
+                      .per_displacement = soil.per_displacement,
+                      .shear =
+                          soil.friction * force + (1.0 / soil.per_displacement) *
+                                                      hx_chain(delta, f.hold.force, f.hold.slope)};
 }
 #else
-/* Returns the soils on which feet touched down. */
-static inline hxSoils hx_soils_under(const hxContactState *state, int slot) {
+/* Returns the soils on which the contacts of a row touched down. */
+static inline hxSoils hx_soils_under(const hxContactState *state, int row, int slot) {
   hxSoils soils;
   hxReal numbers[HX_SOIL_SIZE];
-  for (int i = 0; i < HX_SOIL_SIZE; ++i) numbers[i] = hx_load(&state->soil[i][slot]);
+  const double (*of_row)[HX_SLOTS] = state->soil[hx_soil_row(row)];
+  for (int i = 0; i < HX_SOIL_SIZE; ++i) numbers[i] = hx_load(&of_row[i][slot]);
   memcpy(&soils, numbers, sizeof soils);
   return soils;
 }
 
-/* Returns which feet are in contact with soil. */
-static inline hxMask hx_in_soil(const hxContactState *state, int slot) {
-  return hx_on_soil(state, slot) & hx_less(hx_splat(0.0), hx_load(&state->closed[HX_FOOT][slot]));
+/* Returns which contacts of a row are closed and on soil. */
+static inline hxMask hx_in_soil(const hxContactState *state, int row, int slot) {
+  return hx_on_soil(state, row, slot) & hx_less(hx_splat(0.0), hx_load(&state->closed[row][slot]));
 }
 
-/* Returns the forces on feet at these depths and sinking speeds. */
-HX_RARE hxSoilPack hx_soil_pack(const hxContactState *state, int slot, hxReal delta,
+/* Returns the forces on a row at these depths and sinking speeds. */
+HX_RARE hxSoilPack hx_soil_pack(const hxContactState *state, int row, int slot, hxReal delta,
                                 hxReal ddelta) {
   const hxReal none = hx_splat(0.0);
-  const hxMask in = hx_in_soil(state, slot);
-  if (!hx_any(in)) return (hxSoilPack){none, none, none, none, none, none, none, none};
-  const hxSoils soil = hx_soils_under(state, slot);
+  const hxMask in = hx_in_soil(state, row, slot);
+  if (!hx_any(in)) return (hxSoilPack){none, none, none, none, none, none, none, none, none};
+  const hxSoils soil = hx_soils_under(state, row, slot);
   const hxReal z = hx_select(in, delta, none);
-  const hxSoilContacts f = hx_soil_contacts(&soil, hx_load(&state->plastic[slot]), z, ddelta);
-  return (hxSoilPack){.force = hx_select(in, f.normal.force, none),
-                      .stiffness = hx_select(in, f.normal.stiffness, none),
-                      .viscosity = hx_select(in, f.normal.viscosity, none),
-                      .held = hx_select(in, f.held.force, none),
-                      .stored = hx_select(in, f.stored.force, none),
-                      .hold = hx_select(in, f.hold.force, none),
-                      .per_load = hx_select(in, soil.friction * soil.per_displacement, none),
-                      .per_displacement = hx_select(in, soil.per_displacement, none)};
+  const hxSoilContacts f =
+      hx_soil_contacts(&soil, hx_load(&state->plastic[hx_soil_row(row)][slot]), z, ddelta);
+  return (hxSoilPack){
+      .force = hx_select(in, f.normal.force, none),
+      .stiffness = hx_select(in, f.normal.stiffness, none),
+      .viscosity = hx_select(in, f.normal.viscosity, none),
+      .held = hx_select(in, f.held.force, none),
+      .stored = hx_select(in, f.stored.force, none),
+      .hold = hx_select(in, f.hold.force, none),
+      .per_load = hx_select(in, soil.friction * soil.per_displacement, none),
+      .per_displacement = hx_select(in, soil.per_displacement, none),
+      .shear = hx_select(in, soil.friction * f.normal.force + f.hold.force / soil.per_displacement,
+                         none)};
 }
 #endif
 

@@ -11,8 +11,8 @@ static const double least_footprint = 1e-6; /* m  shallower ones are not kept */
  * they touched down on soil (eq. 44, 45). The elastic part is that whose power is stored. */
 HX_RARE hxNormalForce with_soil(const hxContactState *state, int slot, hxReal delta, hxReal ddelta,
                                 hxNormalForce rigid) {
-  const hxMask soft = hx_on_soil(state, slot);
-  const hxSoilPack f = hx_soil_pack(state, slot, delta, ddelta);
+  const hxMask soft = hx_on_soil(state, HX_FOOT, slot);
+  const hxSoilPack f = hx_soil_pack(state, HX_FOOT, slot, delta, ddelta);
   return (hxNormalForce){
       hx_select(soft, f.force, rigid.force), hx_select(soft, f.held, rigid.elastic),
       hx_select(soft, f.stiffness, rigid.stiffness), hx_select(soft, f.viscosity, rigid.viscosity)};
@@ -35,63 +35,100 @@ static inline double hx_deepest(double from, double slope_from, double to, doubl
   return fmax(from + low * (slope_from + low * (curve + low * bend)), fmax(from, to));
 }
 
-/* Computes the plastic depths at the end of a step of h, by the largest depth on its path (eq. 44).
- */
-HX_RARE void hx_soil_yield(const hxContactState *state, double h, const hxContactMoment *from,
-                           const hxContactMoment *to, double plastic[HX_SLOTS]) {
+/* Computes the plastic depths of a row at the end of a step of h, by the largest depth on its path
+ * (eq. 44). */
+HX_RARE void row_yield(const hxContactState *state, int row, double h, const hxContactMoment *from,
+                       const hxContactMoment *to, double plastic[HX_SLOTS]) {
   double deepest[HX_SLOTS] = {0.0};
-  for (int leg = 0; leg < HX_LEGS; ++leg)
-    if (is_in_soil(state, leg))
-      deepest[leg] =
-          hx_deepest(from->delta[leg], h * from->ddelta[leg], to->delta[leg], h * to->ddelta[leg]);
-  hx_fill_slots(deepest);
+  for (int i = 0; i < hx_slots_of(row); ++i)
+    if (is_in_soil(state, row, i))
+      deepest[i] = hx_deepest(from->delta[i], h * from->ddelta[i], to->delta[i], h * to->ddelta[i]);
+  if (row != HX_TORSO) hx_fill_slots(deepest);
   for (int slot = 0; slot < HX_SLOTS; slot += HX_LANES) {
-    const hxMask in = hx_in_soil(state, slot);
-    const hxSoils soil = hx_soils_under(state, slot);
-    const hxReal before = hx_load(&state->plastic[slot]),
+    const hxMask in = hx_in_soil(state, row, slot);
+    const hxSoils soil = hx_soils_under(state, row, slot);
+    const hxReal before = hx_load(&state->plastic[hx_soil_row(row)][slot]),
                  now = hx_any(in) ? hx_plastic_depth(&soil, hx_load(&deepest[slot])) : before;
     hx_store(&plastic[slot], hx_select(in, hx_max(before, now), before));
   }
-  hx_fill_slots(plastic);
+  if (row != HX_TORSO) hx_fill_slots(plastic);
 }
 
-/* Returns whether the ground at a foot's centre is soil. */
+/* Computes those of all rows of a model; the others keep theirs, because they are open. */
+HX_RARE void hx_soil_yield(const hxModel *model, const hxContactState *state, double h,
+                           const hxMoment *from, const hxMoment *to,
+                           double plastic[HX_SOIL_ROWS][HX_SLOTS]) {
+  memcpy(plastic, state->plastic, sizeof state->plastic);
+  for (int k = 0; k < model->listed; ++k) {
+    const int row = model->row[k];
+    if (has_soil(model, row))
+      row_yield(state, row, h, &from->contact[row], &to->contact[row], plastic[hx_soil_row(row)]);
+  }
+}
+
+/* Returns whether the ground at a sphere's centre is soil. */
 HX_RARE int is_over_soil(const hxModel *model, const double centre[3]) {
   const double *material = model->terrain ? hx_terrain_material(model->terrain, centre) : NULL;
   hxSoil own;
-  memcpy(&own, model->soil, sizeof own);
+  memcpy(&own, model->soil[0], sizeof own);
   return material ? material[HX_MATERIAL_SOIL] != 0.0 : (int)own.law != HX_SOIL_NONE;
 }
 
-/* Records the footprints that feet leave upwards, and looks up those that feet enter from above;
- * depths are relative to the plastic depths and follow them. An open foot under the undisturbed
- * surface is above its footprint, whose bottom it may touch again: a footprint is complete when
- * the foot has left it, and is where the foot lost contact with it last. Rigid ground beside a
- * footprint has none. */
-HX_RARE void hx_soil_switch(const hxModel *model, const hxContactMoment *feet, hxDepths *depths,
-                            hxFootprintLog *log, hxContactState *state) {
-  double *delta = depths->delta[HX_FOOT];
-  for (int leg = 0; leg < HX_LEGS; ++leg) {
-    double *plastic = &state->plastic[leg],
-           *place[2] = {&state->place[0][leg], &state->place[1][leg]};
-    const double z = delta[leg] + *plastic, x = feet->centre[0][leg], y = feet->centre[1][leg],
-                 centre[3] = {x, y, feet->centre[2][leg]};
-    if (state->closed[HX_FOOT][leg] != 0.0) {
-      if (delta[leg] <= 0.0) *place[0] = x, *place[1] = y;
+/* Records the footprint that a contact has left upwards, and removes it from the contact. */
+static inline void leave_footprint(int row, int slot, hxFootprintLog *log, hxContactState *state) {
+  const int soft = hx_soil_row(row);
+  if (state->plastic[soft][slot] >= least_footprint)
+    hx_footprints_add(log, &(hxFootprint){state->place[soft][0][slot], state->place[soft][1][slot],
+                                          state->plastic[soft][slot],
+                                          hx_soil_under(state, row, slot).radius});
+  state->plastic[soft][slot] = 0.0;
+}
+
+/* Records the footprints of a row, and looks up those that it enters. */
+HX_RARE void row_soil_switch(const hxModel *model, int row, const hxContactMoment *at,
+                             hxDepths *depths, hxFootprintLog *log, hxContactState *state) {
+  const int soft = hx_soil_row(row);
+  double *delta = depths->delta[row];
+  for (int slot = 0; slot < hx_slots_of(row); ++slot) {
+    double *plastic = &state->plastic[soft][slot];
+    const double z = delta[slot] + *plastic, x = at->centre[0][slot], y = at->centre[1][slot],
+                 centre[3] = {x, y, at->centre[2][slot]};
+    if (state->closed[row][slot] != 0.0) {
+      if (delta[slot] <= 0.0) state->place[soft][0][slot] = x, state->place[soft][1][slot] = y;
       continue;
     }
-    if (z <= 0.0 && *plastic >= least_footprint)
-      hx_footprints_add(
-          log, &(hxFootprint){*place[0], *place[1], *plastic, hx_soil_under(state, leg).radius});
-    if (z <= 0.0) *plastic = 0.0;
+    if (z <= 0.0) leave_footprint(row, slot, log, state);
     if (z > 0.0 && *plastic == 0.0 && is_over_soil(model, centre))
       *plastic = hx_footprints_depth(&log->kept, x, y);
-    delta[leg] = z - *plastic;
+    delta[slot] = z - *plastic;
   }
-  hx_fill_slots(state->plastic);
-  hx_fill_slots(state->place[0]);
-  hx_fill_slots(state->place[1]);
+  if (row == HX_TORSO) return;
+  hx_fill_slots(state->plastic[soft]);
+  hx_fill_slots(state->place[soft][0]);
+  hx_fill_slots(state->place[soft][1]);
   hx_fill_slots(delta);
+}
+
+/* Records the footprints that contacts leave upwards, and looks up those that they enter from
+ * above; depths are relative to the plastic depths and follow them. An open contact under the
+ * undisturbed surface is above its footprint, whose bottom it may touch again: a footprint is
+ * complete when the contact has left it, and is where it was lost last. Rigid ground beside a
+ * footprint has none. Rows that a model leaves out are above the ground. */
+HX_RARE void hx_soil_switch(const hxModel *model, const hxMoment *at, hxDepths *depths,
+                            hxFootprintLog *log, hxContactState *state) {
+  int seen = 0;
+  for (int k = 0; k < model->listed; ++k)
+    if (has_soil(model, model->row[k])) {
+      const int row = model->row[k];
+      row_soil_switch(model, row, &at->contact[row], depths, log, state);
+      seen |= 1 << row;
+    }
+  for (int row = HX_KNEE; row <= HX_TORSO; ++row)
+    for (int slot = 0; !(seen >> row & 1) && slot < HX_SLOTS; ++slot)
+      if (slot < hx_slots_of(row))
+        leave_footprint(row, slot, log, state);
+      else
+        state->plastic[hx_soil_row(row)][slot] = 0.0;
 }
 
 #endif

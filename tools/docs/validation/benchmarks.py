@@ -146,7 +146,7 @@ def _changes(path: Path) -> dict[tuple[str, str], float]:
     }
 
 
-PID, WITHOUT, ALL = "slip_pid alone", "all but slip_pid", "all parts"
+PID, WITHOUT, ALL = "slip_pid alone", "without slip_pid", "by default"
 ADDED = {  # effect of the PID beside the other parts
     "slip_per_metre": "PID added to the rest: slip [%]",
     "foot_error_stance": "the same: feet in stance [%]",
@@ -162,7 +162,7 @@ def slip_pid() -> Shown:
     plants = {"as modelled": _of_pid(known), "bristle law": _of_pid(sticking)}
     plants |= {error: _of_pid(wrong, before=f"{error}, ") for error in errors}
     titles = (
-        "slip [m/m]: kinematic", "PID alone", "all but the PID", "all parts",
+        "slip [m/m]: kinematic", "PID alone", "without the PID", "by default",
         "PID alone, against kinematic: slip [%]", *ADDED.values(),
     )  # fmt: skip
     rows = zip(titles, *plants.values(), strict=True)

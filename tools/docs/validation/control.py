@@ -11,7 +11,7 @@ from test_conditions import WORLDS
 from test_controller_continuity import LARGEST, steepest
 
 from benchmarks.control.cases import DATA, SWITCH, judged_walk, seeds
-from hexapod_cosim.controller import SWITCHES
+from hexapod_cosim.controller import COMPLIANT_PARTS
 from hexapod_cosim.controller.comply import compliance
 from hexapod_cosim.controller.comply.slip_pid import LOAD_FLOOR
 from hexapod_cosim.controller.plane import Array, Plane
@@ -141,14 +141,14 @@ def model_errors() -> Shown:
 def slip_pid() -> Shown:
     """Shows the judged walk of the first seed with different parts of compliant control.
 
-    These are none, the slip PID alone, all other parts, and all.
+    These are none, the slip PID alone, all others of the default, and the default.
     """
-    off = {part: f"{SWITCH}{part}=false" for part in SWITCHES}
+    off = {part: f"{SWITCH}{part}=false" for part in COMPLIANT_PARTS}
     others = tuple(text for part, text in off.items() if part != "slip_pid")
     cases = (tuple(off.values()), others, (off["slip_pid"],), ())
     columns = (
         "friction", "none of the parts: slip [m/m]", "PID alone", "by the PID alone [%]",
-        "all but the PID", "all parts", "by the PID added [%]",
+        "without the PID", "by default", "by the PID added [%]",
     )  # fmt: skip
     rows = []
     for law, settings in {"tanh": (), "bristle": tuple(DATA["judged"]["sticking"])}.items():

@@ -1,22 +1,13 @@
-"""Fits the unknown numbers to the readings of logs by output error.
+"""The residuals of logs and their derivatives, as functions of the unknown numbers.
 
-The numbers minimise the sum of squares of (predicted - measured) / noise over all readings, and of
-(number - number before) / prior over all numbers. The second sum keeps the robot file's value
-where the readings tell nothing. With white noise this is the most probable robot; the covariance is
-that of the linearised problem, plus the square of the step that the optimiser left. The noise of a
-channel is the typical size of its residuals, and residuals beyond three deviations count linearly
-(Huber's loss). Correlated residuals count as fewer readings. Residuals larger than the noise of the
-readings themselves say that the model does not explain the log: they widen all intervals.
-
-A search on the first seconds of long logs finds the valley of the best numbers, all rows its
-bottom. The numbers of contacts act at touch-downs alone, where gradients say little. So they are
-also tried one by one over their range, and the value with the least sum of squares over all rows is
-the next start.
+A residual is (predicted - measured) / noise of a reading. Numbers are distances z from the robot
+file's, in units of what was known of them beforehand (priors).
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+import math
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -29,47 +20,23 @@ from hexapod_cosim.cosim.identify.experiment import (
     readings,
     simulated,
 )
+from hexapod_cosim.cosim.identify.fitting.workers import Workers
 from hexapod_cosim.cosim.identify.log import CHANNELS, LogError
 from hexapod_cosim.cosim.identify.log_plant import LogPlant
 from hexapod_cosim.cosim.identify.unknowns import DELAY, Unknown, value_before
-from hexapod_cosim.cosim.identify.workers import Workers
 from hexapod_cosim.models import FmuError, Robot
 
 Array = NDArray[np.float64]
-Progress = Callable[[str], None]
-# Forces and accelerations have peaks at touch-downs. While the numbers are far off, these come at
-# wrong times, and a difference says nothing of the next touch-down. Torques jump when a command
-# comes, so that they are no smooth functions of the sensors' delay. Both are left out at first.
-SMOOTH = ("angle", "speed", "gyroscope", "position", "attitude")
+ALL = tuple(channel.key for channel in CHANNELS)
 STEP = 0.1  # of a difference, in priors: large against the integrator's errors
-ENOUGH = 1e-4  # relative change of the cost at which a stage ends
 TO_DEVIATION = 1.4826  # from the median of absolute values, of a normal distribution
-MOST_RESIDUALS = 150_000  # later ones are thinned evenly
+MOST_RESIDUALS = 150_000  # rows are thinned evenly where there would be more
 LONGEST_CORRELATION = 50  # rows
 # A reading is left out around a jump of the simulated signal: there a shift in time by a fraction
 # of a row, of which a difference tells nothing, is a large error.
 JUMP = 1.0  # second difference of a simulated signal [deviations]
 BESIDE = 6  # rows before and after a jump
 FLOOR = 1e-9  # smallest noise, in the units of the channels
-
-
-@dataclass(frozen=True)
-class Stage:
-    """One run of the optimiser."""
-
-    channels: tuple[str, ...]
-    share: float  # of the residuals before it, which counts as noise
-    scale: float  # of Huber's loss: larger residuals count linearly [deviations]
-    steps: int  # of the optimiser at most
-
-
-ALL = tuple(channel.key for channel in CHANNELS)
-SEARCH = (Stage(SMOOTH, 0.3, 1.0, 15), Stage(ALL, 1.0, 1.0, 25))
-REFINE = Stage(ALL, 1.0, 3.0, 25)
-SHORT = 6.0  # s    of each log on which the search is made
-TRIED = (-2.0, -1.0, -0.5, -0.25, -0.1, 0.1, 0.25, 0.5, 1.0, 2.0)  # priors from the present value
-BETTER = 1e-4  # share of the sum of squares by which another start must be better
-ROUNDS = 3  # of trying starts, at most
 CLIPPED = 5.0  # deviations    of a residual in the test whether the model explains the log
 # Largest mean square of residuals over that of the readings' noise, of many readings. That of the
 # noise has a relative deviation of about 3.8 over the root of their number.
@@ -90,46 +57,6 @@ class Misfit:
         return self.value <= EXPLAINED + DEVIATIONS * UNCERTAIN / float(np.sqrt(self.readings))
 
 
-@dataclass(frozen=True)
-class Fit:
-    """Holds the most probable numbers, with what their intervals are made of."""
-
-    rows: tuple[Unknown, ...]
-    before: Mapping[str, float]  # values of the robot file
-    z: Array  # (rows,)  distances from these, in priors
-    covariance: Array  # (rows, rows) of z
-    singular: Array  # singular values of the readings' sensitivity, in priors, largest first
-    noise: Mapping[str, float]  # by channel
-    correlated: Mapping[str, float]  # by channel: readings that count as one
-    predictions: tuple[Array, ...]  # (rows, columns) of each experiment
-    misfit: Mapping[str, Misfit]  # by channel
-    held_out: Mapping[str, Misfit]  # the same on held-out rows; empty without them
-
-    @property
-    def unexplained(self) -> dict[str, float]:
-        """Returns the channels that the model does not explain, with the larger mean square."""
-        both = [*self.misfit.items(), *self.held_out.items()]
-        found: dict[str, float] = {}
-        for key, one in both:
-            if not one.explained:
-                found[key] = max(one.value, found.get(key, 0.0))
-        return found
-
-    @property
-    def values(self) -> dict[str, float]:
-        """Returns the numbers by key."""
-        return {
-            row.key: row.value(z, self.before[row.key])
-            for row, z in zip(self.rows, self.z.tolist(), strict=True)
-        }
-
-    @property
-    def deviations(self) -> dict[str, float]:
-        """Standard deviations by key, in priors: 1 where the logs tell nothing."""
-        own = np.sqrt(np.diag(self.covariance))
-        return {row.key: float(value) for row, value in zip(self.rows, own, strict=True)}
-
-
 class Problem:
     """The residuals of experiments and their derivatives, as functions of z."""
 
@@ -140,8 +67,12 @@ class Problem:
         experiments: Sequence[Experiment],
         rows: Sequence[Unknown],
         workers: Workers | None = None,
+        parameters: Mapping[str, float] | None = None,
+        most: int = MOST_RESIDUALS,
     ) -> None:
+        """parameters: further ones of the FMU, by name. most: residuals, at most about."""
         self.plant, self.robot, self.workers = plant, robot, workers
+        self.parameters = dict(parameters or {})
         self.experiments, self.rows = tuple(experiments), tuple(rows)
         self.before = {row.key: value_before(row, robot) for row in rows}
         self.noise: dict[str, float] = {}
@@ -149,9 +80,11 @@ class Problem:
             len(range(*one.fitted.indices(len(one.log.time)))) * len(one.columns)
             for one in self.experiments
         )
-        self._thin = -(-count // MOST_RESIDUALS)
+        self._thin = -(-count // most)
         self._measured = [one.measured for one in self.experiments]
         self._outputs: tuple[bytes, list[Array]] | None = None
+        self._simulated = np.array([needs_simulation(row, robot) for row in rows], dtype=np.bool_)
+        self._slopes: tuple[Array, list[list[Array]]] | None = None  # at which z, of which numbers
         self._size = 0  # of the residuals
         self.counted = self.all_known()  # which readings count (fitted rows, columns)
 
@@ -164,12 +97,23 @@ class Problem:
         """Makes all readings count that are numbers."""
         self.counted = self.all_known()
 
-    def shortened(self, seconds: float) -> Problem:
-        """Returns the problem of the first seconds of the logs; itself where none is longer."""
+    def shortened(
+        self,
+        seconds: float = math.inf,
+        *,
+        parameters: Mapping[str, float],
+        most: int = MOST_RESIDUALS,
+    ) -> Problem:
+        """Returns the problem of the first seconds of the logs, without held-out rows.
+
+        parameters: further ones of the FMU, by name. most: residuals, at most about.
+        """
         parts = [first_part(one, seconds) for one in self.experiments]
-        if all(part is one for part, one in zip(parts, self.experiments, strict=True)):
-            return self
-        return Problem(self.plant, self.robot, parts, self.rows, self.workers)
+        return Problem(self.plant, self.robot, parts, self.rows, self.workers, parameters, most)
+
+    def use(self, parameters: Mapping[str, float]) -> None:
+        """Replaces the further parameters of the FMU. Simulated derivatives are kept."""
+        self.parameters, self._outputs = dict(parameters), None
 
     def misfit(self, z: Array, noise: Mapping[str, float], part: str) -> dict[str, Misfit]:
         """Returns the mean square of residuals over that of a noise, by channel.
@@ -199,21 +143,27 @@ class Problem:
 
     def outputs(self, z: Array) -> list[Array]:
         """Returns the simulated outputs of each experiment; those of the last z are kept."""
-        key = z.tobytes()
+        key = z[self._simulated].tobytes()
         if self._outputs is None or self._outputs[0] != key:
-            values = self.values(z)
-            found = [
-                simulated(self.plant, one, self.robot, self.rows, values)
-                for one in self.experiments
-            ]
-            self._outputs = key, found
+            self._outputs = key, self._simulate(z)
         return self._outputs[1]
+
+    def _simulate(self, z: Array) -> list[Array]:
+        """Returns the simulated outputs of each experiment."""
+        values, rows = self.values(z), self.rows
+        return [
+            simulated(self.plant, one, self.robot, rows, values, self.parameters)
+            for one in self.experiments
+        ]
 
     def predictions(self, z: Array) -> list[Array]:
         """Returns the readings of each experiment (rows, columns)."""
-        values = self.values(z)
-        pairs = zip(self.experiments, self.outputs(z), strict=True)
-        return [readings(one, outputs, values) for one, outputs in pairs]
+        return self._read(self.outputs(z), z)
+
+    def _read(self, outputs: Sequence[Array], z: Array) -> list[Array]:
+        """Returns what the sensors read of simulated outputs."""
+        values, pairs = self.values(z), zip(self.experiments, outputs, strict=True)
+        return [readings(one, own, values, self.robot) for one, own in pairs]
 
     def errors(self, z: Array) -> list[Array]:
         """Returns predicted - measured in the fitted rows; 0 where a reading does not count."""
@@ -284,32 +234,50 @@ class Problem:
         self._size = len(found)
         return found
 
-    def jacobian(self, z: Array) -> Array:
-        """Returns the derivatives of the residuals, by differences of simulations."""
-        base_outputs, base = self.outputs(z), self.residuals(z)
-        found = np.zeros((len(base), len(z)))
+    def jacobian(self, z: Array, *, near: float = 0.0) -> Array:
+        """Returns the residuals' derivatives (residuals, rows), by differences of simulations.
+
+        near: up to this distance from the last simulated differences these count [priors].
+        """
+        if self._slopes is None or np.max(np.abs(z - self._slopes[0])) > near:
+            self._slopes = z.copy(), self._differences(z)
+        scale = np.concatenate([
+            np.where(counted[:: self._thin], 1.0 / self._weights(one), 0.0).ravel()
+            for one, counted in zip(self.experiments, self.counted, strict=True)
+        ])  # fmt: skip
+        found = np.zeros((len(scale) + len(z), len(z)))
+        for k, slopes in enumerate(self._slopes[1]):
+            weighted = [slope * scale for slope in slopes]
+            if weighted:
+                # of the delay the smaller slope is the one within a period of the commands
+                found[: -len(z), k] = min(weighted, key=_size)
+        found[len(scale) :][np.diag_indices(len(z))] = 1.0
+        return found
+
+    def _differences(self, z: Array) -> list[list[Array]]:
+        """Returns the slopes of all predictions (predictions,) by each number: two of the delay,
+        none where the plant refuses the moved numbers.
+        """
+        base_outputs, base = self.outputs(z), self._flat(self.predictions(z))
         moves = [(k, step) for k in range(len(z)) for step in self._steps(k, z)]
         points = []
         for k, step in moves:
             moved = z.copy()
             moved[k] += step
             points.append(moved)
-        slopes: dict[int, Array] = {}
+        found: list[list[Array]] = [[] for _ in z]
         for (k, step), moved, outputs in zip(
             moves, points, self._all_outputs(points, moves, base_outputs), strict=True
         ):
-            if outputs is None:
-                continue
-            self._outputs = moved.tobytes(), outputs
-            slope = (self.residuals(moved) - base) / step
-            # of the delay the smaller slope is the one within a period of the commands
-            if k not in slopes or _size(slope) < _size(slopes[k]):
-                slopes[k] = slope
-        for k, slope in slopes.items():
-            found[:, k] = slope
-        self._outputs = z.tobytes(), base_outputs
-        found[~np.isfinite(found)] = 0.0
+            if outputs is not None:
+                slope = (self._flat(self._read(outputs, moved)) - base) / step
+                found[k].append(np.where(np.isfinite(slope), slope, 0.0))
         return found
+
+    def _flat(self, predictions: Sequence[Array]) -> Array:
+        """Returns the predictions of all fitted rows that are not thinned out, in one array."""
+        pairs = zip(self.experiments, predictions, strict=True)
+        return np.concatenate([own[one.fitted][:: self._thin].ravel() for one, own in pairs])
 
     def _steps(self, k: int, z: Array) -> list[float]:
         """Returns the steps of the differences of a number: one, of the delay both ways."""
@@ -325,15 +293,15 @@ class Problem:
 
         A number of sensors alone needs no simulation. Worker processes simulate all points first.
         """
-        needed = [needs_simulation(self.rows[k]) for k, _ in moves]
+        needed = [bool(self._simulated[k]) for k, _ in moves]
         if self.workers is not None:
             many = [self.values(point) for point, own in zip(points, needed, strict=True) if own]
-            found = iter(self.workers.outputs(self.experiments, many))
+            found = iter(self.workers.outputs(self.experiments, many, self.parameters))
             yield from (next(found) if own else base for own in needed)
             return
         for point, own in zip(points, needed, strict=True):
             try:
-                yield self.outputs(point) if own else base
+                yield self._simulate(point) if own else base
             except (LogError, FmuError):
                 yield None
 
@@ -377,16 +345,6 @@ def _size(slope: Array) -> float:
     return float(slope @ slope)
 
 
-def remaining_step(jacobian: Array, residuals: Array) -> Array:
-    """Returns the step (rows,) that Gauss and Newton's method would still take, in priors.
-
-    It is 0 at an optimum. Residuals beyond three deviations count as three.
-    """
-    bounded = np.clip(residuals, -REFINE.scale, REFINE.scale)
-    normal, right = jacobian.T @ jacobian, jacobian.T @ bounded
-    return np.asarray(-np.linalg.lstsq(normal, right, rcond=None)[0], dtype=np.float64)
-
-
 def _correlated(column: Array) -> float:
     """Returns how many readings of a column of residuals in a row count as one."""
     centred = column - np.mean(column)
@@ -413,146 +371,3 @@ def read_noise(problem: Problem) -> dict[str, float]:
             found.setdefault(key, []).append(column)
     scale = 0.6745 * np.sqrt(6.0)
     return {key: float(np.nanmedian(np.concatenate(own))) / scale for key, own in found.items()}
-
-
-def better_start(problem: Problem, start: Array | None) -> Array:
-    """Returns a start (rows,), or 0 where the robot file's numbers have smaller errors."""
-    zero = np.zeros(len(problem.rows))
-    before = problem.typical(problem.errors(zero))
-    if start is None:
-        return zero
-    try:
-        after = problem.typical(problem.errors(start))
-    except (LogError, FmuError):
-        return zero
-    own = [key for key, size in before.items() if size > 0.0]
-    own = [key for key in own if key in SMOOTH] or own
-    gains = [np.log(max(after[key], FLOOR) / before[key]) for key in own]
-    return start if sum(gains) < 0.0 else zero
-
-
-def fit(problem: Problem, *, start: Array | None = None, progress: Progress | None = None) -> Fit:
-    """Returns the most probable numbers.
-
-    start: z of another start than the robot file's numbers; the one with the smaller errors is
-    taken.
-
-    Raises HexapodError when the plant refuses the robot file's numbers.
-    """
-    report: Progress = progress or (lambda _text: None)
-    short = problem.shortened(SHORT)
-    z = better_start(short, start)
-    for number, stage in enumerate(SEARCH):
-        report(f"search, stage {number + 1} of {len(SEARCH)}")
-        z = _optimised(short, z, stage, read_noise(short))
-    report("other starts of the contacts")
-    z = _best_of_starts(short, z)
-    report("all rows")
-    least = read_noise(problem)
-    z = _optimised(problem, z, REFINE, least)
-    counted = list(problem.counted)
-    z = _optimised(problem, z, REFINE, least, jumps=True)
-    problem.counted = counted
-    return _judged(problem, z, least)
-
-
-def _optimised(
-    problem: Problem, z: Array, stage: Stage, least: Mapping[str, float], *, jumps: bool = False
-) -> Array:
-    """Returns the numbers of the least sum of squares near a start.
-
-    jumps: whether rows beside jumps of the simulated signals count too.
-    """
-    from scipy.optimize import least_squares  # noqa: PLC0415  slow to import
-
-    problem.set_noise(problem.errors(z), share=stage.share, least=least, channels=stage.channels)
-    if jumps:
-        problem.count_all()
-    else:
-        problem.leave_out_jumps(z)
-    found = least_squares(
-        problem.residuals,
-        z,
-        jac=problem.jacobian,
-        bounds=problem.bounds(),
-        loss="huber",
-        f_scale=stage.scale,
-        max_nfev=stage.steps,
-        ftol=ENOUGH,
-        xtol=1e-6,
-        gtol=1e-8,
-    )
-    return np.asarray(found.x, dtype=np.float64)
-
-
-def _best_of_starts(problem: Problem, z: Array) -> Array:
-    """Returns the best numbers that the optimiser finds from other values of the contacts."""
-    least = read_noise(problem)
-    z = _optimised(problem, z, REFINE, least)
-    best = _cost(problem, z)
-    for _ in range(ROUNDS):
-        moved = _tried(problem, z)
-        if np.array_equal(moved, z):
-            break
-        moved = _optimised(problem, moved, REFINE, least)
-        cost = _cost(problem, moved)
-        if cost > (1.0 - BETTER) * best:
-            break
-        z, best = moved, cost
-    return z
-
-
-def _tried(problem: Problem, z: Array) -> Array:
-    """Returns the numbers with those of the contacts at the best of some values, one by one."""
-    low, high = problem.bounds()
-    z, best = z.copy(), (1.0 - BETTER) * _cost(problem, z)
-    for k, row in enumerate(problem.rows):
-        own = z[k]
-        for step in TRIED if row.group == "contact" else ():
-            if low[k] <= own + step <= high[k]:
-                moved = z.copy()
-                moved[k] = own + step
-                cost = _cost(problem, moved)
-                if cost < best:
-                    z, best = moved, cost
-    return z
-
-
-def _cost(problem: Problem, z: Array) -> float:
-    """Returns the sum of squares over all rows by Huber's loss."""
-    counted, problem.counted = problem.counted, problem.all_known()
-    size = np.abs(problem.residuals(z))
-    problem.counted = counted
-    near = np.minimum(size, REFINE.scale)
-    return float(np.sum(near * (size - 0.5 * near)))
-
-
-def _judged(problem: Problem, z: Array, least: Mapping[str, float]) -> Fit:
-    """Returns the numbers with what the readings tell of them.
-
-    least: noise of the readings themselves, by channel.
-    """
-    errors = problem.errors(z)
-    problem.set_noise(errors)
-    correlated = problem.correlation(errors)
-    jacobian = problem.jacobian(z)
-    covariance, singular = problem.covariance(jacobian, correlated)
-    left = remaining_step(jacobian, problem.residuals(z))
-    misfit = problem.misfit(z, least, "fitted")
-    # errors of the model count as noise; at most the whole prior is unknown
-    worst = max(1.0, *(one.value for one in misfit.values()))
-    information = np.linalg.inv(covariance) - np.eye(len(z))
-    # where touch-downs make the sum of squares rough, the optimiser stops on the way
-    widened = np.linalg.inv(information / worst + np.eye(len(z))) + np.outer(left, left)
-    return Fit(
-        rows=problem.rows,
-        before=problem.before,
-        z=z,
-        covariance=np.asarray(widened, dtype=np.float64),
-        singular=singular / np.sqrt(worst),
-        noise=dict(problem.noise),
-        correlated=correlated,
-        predictions=tuple(problem.predictions(z)),
-        misfit=misfit,
-        held_out=problem.misfit(z, least, "held_out"),
-    )

@@ -31,6 +31,7 @@ class Task:
     number: int
     file: Path
     values: Mapping[str, float]
+    parameters: Mapping[str, float]  # further ones of the FMU
 
 
 class _Own:
@@ -53,7 +54,8 @@ def _simulate(task: Task) -> Outputs:
         _Own.file = task.file
     try:
         return [
-            simulated(_Own.plant, one, _Own.robot, ROBOT, task.values) for one in _Own.experiments
+            simulated(_Own.plant, one, _Own.robot, ROBOT, task.values, task.parameters)
+            for one in _Own.experiments
         ]
     except (LogError, FmuError):
         return None
@@ -67,15 +69,20 @@ class Workers:
         self._written: dict[int, tuple[tuple[Experiment, ...], Path]] = {}
 
     def outputs(
-        self, experiments: tuple[Experiment, ...], many: Sequence[Mapping[str, float]]
+        self,
+        experiments: tuple[Experiment, ...],
+        many: Sequence[Mapping[str, float]],
+        parameters: Mapping[str, float],
     ) -> list[Outputs]:
         """Returns the outputs of the experiments for each set of numbers.
+
+        parameters: further ones of the FMU, by name.
 
         Raises HexapodError when a worker process dies.
         """
         file = self._file(experiments)
         for number, values in enumerate(many):
-            self._pool.submit(Task(number, file, values))
+            self._pool.submit(Task(number, file, values, parameters))
         found: dict[int, Outputs] = {}
         while len(found) < len(many):
             for item in self._pool.wait():

@@ -1,0 +1,270 @@
+"""Fits the unknown numbers to the readings of logs by output error.
+
+The numbers minimise the sum of squares of (predicted - measured) / noise over all readings, and of
+(number - number before) / prior over all numbers. The second sum keeps the robot file's value
+where the readings tell nothing. With white noise this is the most probable robot; the covariance is
+that of the linearised problem, plus the square of the step that the optimiser left. The noise of a
+channel is the typical size of its residuals, and residuals beyond three deviations count linearly
+(Huber's loss). Correlated residuals count as fewer readings. Residuals larger than the noise of the
+readings themselves say that the model does not explain the log: they widen all intervals.
+
+A search on the first seconds of long logs finds the valley of the best numbers, all rows its
+bottom. The numbers of contacts act at touch-downs alone, and play at the meeting of teeth, where
+gradients say little. So these are also tried one by one over their range, and the value with the
+least sum of squares over all rows is the next start.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hexapod_cosim.cosim.identify.fitting.problem import (
+    ALL,
+    FLOOR,
+    STEP,
+    Misfit,
+    Problem,
+    read_noise,
+)
+from hexapod_cosim.cosim.identify.log import LogError
+from hexapod_cosim.cosim.identify.unknowns import GEAR, Unknown
+from hexapod_cosim.models import FmuError
+
+Array = NDArray[np.float64]
+Progress = Callable[[str], None]
+# Forces and accelerations have peaks at touch-downs. While the numbers are far off, these come at
+# wrong times, and a difference says nothing of the next touch-down. Torques jump when a command
+# comes, so that they are no smooth functions of the sensors' delay. Both are left out at first.
+SMOOTH = ("angle", "motor_angle", "speed", "gyroscope", "position", "attitude")
+# Simulated derivatives count up to this distance from where they were made [priors]. They are
+# differences over a step of the same length.
+NEAR = STEP
+
+
+@dataclass(frozen=True)
+class Stage:
+    """One run of the optimiser."""
+
+    channels: tuple[str, ...]
+    share: float  # of the residuals before it, which counts as noise
+    scale: float  # of Huber's loss: larger residuals count linearly [deviations]
+    steps: int  # of the optimiser at most
+    enough: float  # relative change of the cost at which the stage ends
+
+
+SEARCH = (Stage(SMOOTH, 0.3, 1.0, 15, 1e-2), Stage(ALL, 1.0, 1.0, 25, 1e-3))
+REFINE = Stage(ALL, 1.0, 3.0, 25, 1e-4)
+COARSE = {"solver.tolerance": 1e-4}  # of the search: its errors are far below the readings' noise
+SEARCHED = 40_000  # residuals of the search, about
+SHORT = 6.0  # s    of each log on which the search is made
+TRIED = (-2.0, -1.0, -0.5, -0.25, -0.1, 0.1, 0.25, 0.5, 1.0, 2.0)  # priors from the present value
+BETTER = 1e-4  # share of the sum of squares by which another start must be better
+ROUNDS = 3  # of trying starts, at most
+
+
+@dataclass(frozen=True)
+class Fit:
+    """Holds the most probable numbers, with what their intervals are made of."""
+
+    rows: tuple[Unknown, ...]
+    before: Mapping[str, float]  # values of the robot file
+    z: Array  # (rows,)  distances from these, in priors
+    covariance: Array  # (rows, rows) of z
+    singular: Array  # singular values of the readings' sensitivity, in priors, largest first
+    noise: Mapping[str, float]  # by channel
+    correlated: Mapping[str, float]  # by channel: readings that count as one
+    predictions: tuple[Array, ...]  # (rows, columns) of each experiment
+    misfit: Mapping[str, Misfit]  # by channel
+    held_out: Mapping[str, Misfit]  # the same on held-out rows; empty without them
+
+    @property
+    def unexplained(self) -> dict[str, float]:
+        """Returns the channels that the model does not explain, with the larger mean square."""
+        both = [*self.misfit.items(), *self.held_out.items()]
+        found: dict[str, float] = {}
+        for key, one in both:
+            if not one.explained:
+                found[key] = max(one.value, found.get(key, 0.0))
+        return found
+
+    @property
+    def values(self) -> dict[str, float]:
+        """Returns the numbers by key."""
+        return {
+            row.key: row.value(z, self.before[row.key])
+            for row, z in zip(self.rows, self.z.tolist(), strict=True)
+        }
+
+    @property
+    def deviations(self) -> dict[str, float]:
+        """Standard deviations by key, in priors: 1 where the logs tell nothing."""
+        own = np.sqrt(np.diag(self.covariance))
+        return {row.key: float(value) for row, value in zip(self.rows, own, strict=True)}
+
+
+def remaining_step(jacobian: Array, residuals: Array) -> Array:
+    """Returns the step (rows,) that Gauss and Newton's method would still take, in priors.
+
+    It is 0 at an optimum. Residuals beyond three deviations count as three.
+    """
+    bounded = np.clip(residuals, -REFINE.scale, REFINE.scale)
+    normal, right = jacobian.T @ jacobian, jacobian.T @ bounded
+    return np.asarray(-np.linalg.lstsq(normal, right, rcond=None)[0], dtype=np.float64)
+
+
+def better_start(problem: Problem, start: Array | None) -> Array:
+    """Returns a start (rows,), or 0 where the robot file's numbers have smaller errors."""
+    zero = np.zeros(len(problem.rows))
+    before = problem.typical(problem.errors(zero))
+    if start is None:
+        return zero
+    try:
+        after = problem.typical(problem.errors(start))
+    except (LogError, FmuError):
+        return zero
+    own = [key for key, size in before.items() if size > 0.0]
+    own = [key for key in own if key in SMOOTH] or own
+    gains = [np.log(max(after[key], FLOOR) / before[key]) for key in own]
+    return start if sum(gains) < 0.0 else zero
+
+
+def fit(problem: Problem, *, start: Array | None = None, progress: Progress | None = None) -> Fit:
+    """Returns the most probable numbers.
+
+    start: z of another start than the robot file's numbers; the one with the smaller errors is
+    taken.
+
+    Raises HexapodError when the plant refuses the robot file's numbers.
+    """
+    report: Progress = progress or (lambda _text: None)
+    short = problem.shortened(SHORT, parameters=COARSE, most=SEARCHED)
+    z = better_start(short, start)
+    for number, stage in enumerate(SEARCH):
+        report(f"search, stage {number + 1} of {len(SEARCH)}")
+        z = _optimised(short, z, stage, read_noise(short))
+    report("other starts of the contacts")
+    z = _best_of_starts(short, z)
+    report("all rows")
+    fitted = problem.shortened(parameters=COARSE)
+    least = read_noise(fitted)
+    z = _optimised(fitted, z, REFINE, least)
+    fitted.use({})
+    counted = list(fitted.counted)
+    z = _optimised(fitted, z, REFINE, least, jumps=True)
+    fitted.counted = counted
+    return _judged(problem, fitted, z, least)
+
+
+def _optimised(
+    problem: Problem, z: Array, stage: Stage, least: Mapping[str, float], *, jumps: bool = False
+) -> Array:
+    """Returns the numbers of the least sum of squares near a start.
+
+    jumps: whether rows beside jumps of the simulated signals count too.
+    """
+    from scipy.optimize import least_squares  # noqa: PLC0415  slow to import
+
+    problem.set_noise(problem.errors(z), share=stage.share, least=least, channels=stage.channels)
+    if jumps:
+        problem.count_all()
+    else:
+        problem.leave_out_jumps(z)
+    found = least_squares(
+        problem.residuals,
+        z,
+        jac=partial(problem.jacobian, near=NEAR),
+        bounds=problem.bounds(),
+        loss="huber",
+        f_scale=stage.scale,
+        max_nfev=stage.steps,
+        ftol=stage.enough,
+        xtol=1e-6,
+        gtol=1e-8,
+    )
+    return np.asarray(found.x, dtype=np.float64)
+
+
+def _best_of_starts(problem: Problem, z: Array) -> Array:
+    """Returns the best numbers that the optimiser finds from other values of the contacts."""
+    least = read_noise(problem)
+    z = _optimised(problem, z, REFINE, least)
+    best = _cost(problem, z)
+    for _ in range(ROUNDS):
+        moved = _tried(problem, z)
+        if np.array_equal(moved, z):
+            break
+        moved = _optimised(problem, moved, REFINE, least)
+        cost = _cost(problem, moved)
+        if cost > (1.0 - BETTER) * best:
+            break
+        z, best = moved, cost
+    return z
+
+
+def _tried(problem: Problem, z: Array) -> Array:
+    """Returns the numbers with those of contacts, and of elastic gears and their friction, at the
+    best of some values, one by one.
+    """
+    low, high = problem.bounds()
+    elastic = {row.key for row in problem.rows} & set(GEAR)
+    keys = {*GEAR, "servo.coulomb_friction"} if elastic else set()
+    z, best = z.copy(), (1.0 - BETTER) * _cost(problem, z)
+    for k, row in enumerate(problem.rows):
+        own = z[k]
+        for step in TRIED if row.group == "contact" or row.key in keys else ():
+            if low[k] <= own + step <= high[k]:
+                moved = z.copy()
+                moved[k] = own + step
+                cost = _cost(problem, moved)
+                if cost < best:
+                    z, best = moved, cost
+    return z
+
+
+def _cost(problem: Problem, z: Array) -> float:
+    """Returns the sum of squares over all rows by Huber's loss."""
+    counted, problem.counted = problem.counted, problem.all_known()
+    size = np.abs(problem.residuals(z))
+    problem.counted = counted
+    near = np.minimum(size, REFINE.scale)
+    return float(np.sum(near * (size - 0.5 * near)))
+
+
+def _judged(problem: Problem, fitted: Problem, z: Array, least: Mapping[str, float]) -> Fit:
+    """Returns the numbers with what the readings tell of them.
+
+    Args:
+        problem: of the whole logs.
+        fitted: of their fitted rows.
+        z: the numbers.
+        least: noise of the readings themselves, by channel.
+    """
+    errors = fitted.errors(z)
+    fitted.set_noise(errors)
+    correlated = fitted.correlation(errors)
+    jacobian = fitted.jacobian(z, near=NEAR)
+    covariance, singular = fitted.covariance(jacobian, correlated)
+    left = remaining_step(jacobian, fitted.residuals(z))
+    misfit = fitted.misfit(z, least, "fitted")
+    # errors of the model count as noise; at most the whole prior is unknown
+    worst = max(1.0, *(one.value for one in misfit.values()))
+    information = np.linalg.inv(covariance) - np.eye(len(z))
+    # where touch-downs make the sum of squares rough, the optimiser stops on the way
+    widened = np.linalg.inv(information / worst + np.eye(len(z))) + np.outer(left, left)
+    return Fit(
+        rows=problem.rows,
+        before=problem.before,
+        z=z,
+        covariance=np.asarray(widened, dtype=np.float64),
+        singular=singular / np.sqrt(worst),
+        noise=dict(fitted.noise),
+        correlated=correlated,
+        predictions=tuple(problem.predictions(z)),
+        misfit=misfit,
+        held_out=problem.misfit(z, least, "held_out"),
+    )

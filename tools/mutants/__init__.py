@@ -1,0 +1,1 @@
+"""Mutation testing: small changes of the code, one at a time, that the tests should find."""
