@@ -57,9 +57,9 @@ static int advance(void *self, const hxInput *input, double t_end) {
 }
 
 static void torso(void *self, double position[3]) {
-  double body[HX_BODIES][HX_BODY_STATE];
-  hx_plant_get_bodies(((Ours *)self)->plant, body);
-  memcpy(position, body[0], 3 * sizeof *position);
+  double state[HX_BODY_STATE];
+  hx_plant_get_torso(((Ours *)self)->plant, state);
+  memcpy(position, state, 3 * sizeof *position);
 }
 
 static double evaluations(void *self) {

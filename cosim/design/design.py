@@ -136,7 +136,7 @@ def level_fmu(robot: Robot) -> Iterator[Fmu]:
     level = replace(robot, gravity=down, terrain=replace(robot.terrain, kind="flat", height=0.0))
     with (
         TemporaryDirectory(prefix="hexapod-") as folder,
-        Fmu(export_fmu(level, Path(folder) / f"{robot.name}.fmu")) as fmu,
+        Fmu(export_fmu(level, Path(folder) / f"{robot.name}.fmu", bare=True)) as fmu,
     ):
         yield fmu
 

@@ -22,10 +22,13 @@ def export_controller(
     platforms: Iterable[str] | None = None,
     integers: bool = False,
     starts: Mapping[str, float] = MappingProxyType({}),
+    bare: bool = False,
 ) -> Path:
     """Writes a controller's FMU and returns its path.
 
     Arguments and errors are those of `export_fmu`; also raises the errors of `Controller`.
     """
     interface = with_starts(load_controller_interface(setup), starts)
-    return export_interface(interface, path, fmi=fmi, platforms=platforms, integers=integers)
+    return export_interface(
+        interface, path, fmi=fmi, platforms=platforms, integers=integers, bare=bare
+    )

@@ -11,6 +11,7 @@ from functools import reduce
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from types import MappingProxyType
+from zipfile import ZIP_DEFLATED, ZIP_STORED
 
 from hexapod_cosim.cosim.common.components import PLANT, Component
 from hexapod_cosim.cosim.common.files import atomic_path, not_writable
@@ -58,6 +59,7 @@ def export_fmu(
     terrains: Sequence[Surface] = (),
     integers: bool = False,
     starts: Mapping[str, float] = MappingProxyType({}),
+    bare: bool = False,
 ) -> Path:
     """Writes the plant's FMU of a robot and returns its path.
 
@@ -72,6 +74,9 @@ def export_fmu(
             stands on one. If it does not, the FMU starts on the first of them.
         integers: offer Integers instead of enumerations, for importers without enumerations.
         starts: of inputs and parameters by name, instead of the robot's.
+        bare: write only what a simulation reads: model description, start values, binary and
+            grids, without compression. Such a file is made in a tenth of the time, for use by this
+            process alone: documentation, pictures, sources and the licence are missing.
 
     Raises FmuError without a binary or cross compiler, for an unknown version or platform and for
     invalid start values; HexapodError when the path cannot be written.
@@ -90,6 +95,7 @@ def export_fmu(
         platforms=platforms,
         grids=grid_members(grids),
         integers=integers,
+        bare=bare,
     )
 
 
@@ -109,6 +115,7 @@ def export_interface(
     platforms: Iterable[str] | None = None,
     grids: Mapping[str, bytes] = NOTHING,
     integers: bool = False,
+    bare: bool = False,
 ) -> Path:
     """Writes the FMU of a component with this interface; arguments and errors as `export_fmu`.
 
@@ -126,6 +133,9 @@ def export_interface(
     else:
         binaries = build_binaries(component_library(component), chosen, fmi=fmi)
     complete = for_binaries(with_integers(interface) if integers else interface, binaries)
+    if bare:
+        description = _description(complete, fmi)[1]
+        return write_archive(Path(path), description | dict(binaries) | dict(grids), ZIP_STORED)
     members = _members(complete, dict(binaries) | dict(grids), fmi)
     if chosen is not None and WASM_FOLDER in chosen:
         members |= component_members(component, members)
@@ -139,20 +149,21 @@ def installed_binary(component: Component = PLANT, *, fmi: int = 2) -> dict[str,
     return {f"binaries/{folder}/{component.identifier}{library.suffix}": library.read_bytes()}
 
 
-def _members(interface: Interface, binaries: Mapping[str, bytes], fmi: int) -> dict[str, bytes]:
-    """Returns the contents of the archive by path."""
+def _description(interface: Interface, fmi: int) -> tuple[str, dict[str, bytes]]:
+    """Returns the text of modelDescription.xml, and it and the start values by path."""
     description = (render_fmi2 if fmi == 2 else render_fmi3)(interface)
-    members = {
+    return description.xml, {
         "modelDescription.xml": description.xml.encode(),
         "resources/start_values.txt": start_values(interface, description.guid).encode(),
     }
+
+
+def _members(interface: Interface, binaries: Mapping[str, bytes], fmi: int) -> dict[str, bytes]:
+    """Returns the contents of the archive by path."""
+    xml, members = _description(interface, fmi)
     members |= dict(binaries) | _sources(interface.component, fmi)
     reference = _reference(interface, members) if fmi == 2 else {}
-    return (
-        members
-        | extra_members(interface, description.xml, fmi=fmi, reference=bool(reference))
-        | reference
-    )
+    return members | extra_members(interface, xml, fmi=fmi, reference=bool(reference)) | reference
 
 
 def _sources(component: Component, fmi: int) -> dict[str, bytes]:
@@ -211,7 +222,9 @@ def checksum(seed: int, data: bytes) -> int:
     return (value ^ len(data)) * FNV_PRIME & MASK
 
 
-def write_archive(path: Path, members: Mapping[str, bytes]) -> Path:
+def write_archive(
+    path: Path, members: Mapping[str, bytes], compression: int = ZIP_DEFLATED
+) -> Path:
     """Writes a ZIP archive atomically; equal members give equal bytes.
 
     Raises HexapodError when it cannot be written.
@@ -222,14 +235,14 @@ def write_archive(path: Path, members: Mapping[str, bytes]) -> Path:
         raise not_writable(path, error) from error
     with atomic_path(path) as part, zipfile.ZipFile(part, "w") as archive:
         for name, content in members.items():
-            archive.writestr(_member(name), content)
+            archive.writestr(_member(name, compression), content)
     return path
 
 
-def _member(name: str) -> zipfile.ZipInfo:
+def _member(name: str, compression: int) -> zipfile.ZipInfo:
     """Returns the ZIP entry of a path."""
     info = zipfile.ZipInfo(name, TIMESTAMP)
-    info.compress_type = zipfile.ZIP_DEFLATED
+    info.compress_type = compression
     info.create_system = 3  # Unix, wherever it is packed
     info.external_attr = (0o755 if name.startswith("binaries/") else 0o644) << 16
     return info

@@ -249,7 +249,7 @@ class Walker(Closing):
         setup = plan.controller
         if self._controller is None:
             path = self._given_controller or export_controller(
-                setup, self._folder / "controller.fmu"
+                setup, self._folder / "controller.fmu", bare=True
             )
             self._controller = self._open.enter_context(Fmu(path, name="controller"))
         self._controller.reset()

@@ -593,6 +593,10 @@ void hx_plant_get_bodies(const hxPlant *plant, double body[HX_BODIES][HX_BODY_ST
   hx_bodies_from_motion(&plant->model, &plant->state.motion, body);
 }
 
+void hx_plant_get_torso(const hxPlant *plant, double torso[HX_BODY_STATE]) {
+  memcpy(torso, plant->state.motion.torso, sizeof plant->state.motion.torso);
+}
+
 hxStatus hx_plant_set_bodies(hxPlant *plant, const double body[HX_BODIES][HX_BODY_STATE]) {
   for (int b = 0; b < HX_BODIES; ++b)
     for (int i = 0; i < HX_BODY_STATE; ++i)

@@ -103,7 +103,7 @@ void hx_tangent(void *memory, hxCoordinates *d_rate, hxOutput *d_output) {
   hx_motion_from_coordinates(&point->model, &point->x, &point->state.motion);
   memset(all, 0, sizeof *all);
   hx_dynamics_evaluate(&point->model, &point->state.contact, &point->command,
-                       hx_re(point->state.time), &point->state.motion, NULL, 1, work, all);
+                       hx_re(point->state.time), &point->state.motion, NULL, NULL, 1, work, all);
   hx_coordinates_rate(&all->motion, work, &rate);
   hx_output_fill(&point->model, &point->state, work, output);
   if (d_rate)

@@ -67,6 +67,17 @@ def test_the_same_robot_makes_the_same_bytes(exported: Path, tmp_path: Path) -> 
     )
 
 
+def test_a_bare_fmu_has_the_description_starts_and_binary_of_the_whole_one_and_no_more(
+    exported: Path, tmp_path: Path
+) -> None:
+    whole = members(exported)
+    bare = members(export_fmu(load_robot("athena"), tmp_path / "bare.fmu", bare=True))
+    assert {name.partition("/")[0] for name in bare} == {
+        "binaries", "modelDescription.xml", "resources",
+    }  # fmt: skip
+    assert all(whole[name] == content for name, content in bare.items())
+
+
 def test_cmake_and_the_exporter_write_the_same_fmu(exported: Path, athena_fmu: Path) -> None:
     ours, cmakes = members(exported), members(athena_fmu)
     assert set(ours) == set(cmakes)

@@ -16,6 +16,7 @@
 #include "lanes/dynamics.h"
 #include "method.h"
 #include "robot.h"
+#include "step_size.h"
 
 #if defined(__GNUC__)
 #pragma GCC diagnostic ignored                                                                     \
@@ -478,7 +479,7 @@ static void evaluate(hxPlant *plant, const hxInput *input, double age, hxImplici
   hx_command_from_input(&command, input, plant->state.time - age);
   hx_command_supply(&command, &plant->model, &plant->state);
   hx_dynamics_evaluate(&plant->model, &plant->state.contact, &command, plant->state.time,
-                       &plant->state.motion, implicit, 1, work, rate);
+                       &plant->state.motion, NULL, implicit, 1, work, rate);
 }
 
 /* Computes a joint. out: Phi 5, dPhi 5, s, s_i^P, s_j^P, angle, speed, inertia xx yy zz xy xz yz.
@@ -604,6 +605,12 @@ HX_API const char *hx_probe_kernel(int i, hxPlant *plant, const hxInput *input,
   hx_kernels[i]->derivative(&plant->model, &plant->state, &command, 1, plant->scratch, &rate);
   hx_bodies_from_motion(&plant->model, &rate, body);
   return hx_kernels[i]->name;
+}
+
+/* Returns the step that may follow one of h with an error, between these limits, s. */
+HX_API double hx_probe_following_step(int method, double error, double h, double most,
+                                      double least) {
+  return following_step(hx_method(method), error, h, most, least);
 }
 
 /* Copies a row of the methods. shape: stages, order, error order; others as in hxMethodRow. */

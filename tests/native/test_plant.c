@@ -225,7 +225,7 @@ static void bad_input_changes_nothing(void) {
 /* ---- every law, method and mode ---- */
 
 static void moves(hxPlant *plant, const hxDefinition *robot) {
-  double body[HX_BODIES][HX_BODY_STATE];
+  double body[HX_BODIES][HX_BODY_STATE], torso[HX_BODY_STATE];
   CHECK(hx_plant_reset(plant, robot, 0.0) == HX_OK);
   walk_in_place(plant, 0.05);
   hxInput input;
@@ -235,6 +235,8 @@ static void moves(hxPlant *plant, const hxDefinition *robot) {
         isfinite(weight_on_feet(&seen)));
   CHECK(seen.solver.steps >= 10.0);
   hx_plant_get_bodies(plant, body);
+  hx_plant_get_torso(plant, torso);
+  CHECK(memcmp(torso, body[0], sizeof torso) == 0);
   CHECK(hx_plant_set_bodies(plant, (const double (*)[HX_BODY_STATE])body) == HX_OK);
 }
 

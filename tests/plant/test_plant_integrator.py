@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 from mirror import NOT_FINITE
-from plant import Plant, PlantError, inputs, probed
+from plant import Plant, PlantError, asked, inputs, probed
 from states import changed, random_command
 
 from hexapod_cosim.models import METHODS, Robot, load_robot
@@ -259,6 +259,42 @@ def test_an_error_estimate_above_the_tolerance_rejects_the_step(core: ct.CDLL) -
     worked = plant.output().solver
     assert worked.rejected > quiet.rejected
     assert worked.steps - quiet.steps > 20
+
+
+def unshortened_step(order: int, error: float, h: float, most: float, least: float) -> float:
+    """Returns h times 0.9 error^(-1/n), n = order + 1, within its limits, with the root by the
+    plant's Newton iteration in all cases.
+    """
+    n, small, large = order + 1, 1.0, 1.0
+    for _ in range(n):
+        small, large = small * (0.9 / 5.0), large * (0.9 / 0.2)
+    factor, root, before = 5.0 if error < small else 0.2, 0.1, 0.0
+    if small <= error < large:
+        while root > before:
+            power = error
+            for _ in range(n):
+                power *= root
+            before, root = root, root + root * (1.0 - power) / n
+        factor = 0.9 * root
+    return max(min(most, h * factor), least)
+
+
+@pytest.mark.parametrize("method", EMBEDDED)
+def test_the_root_of_the_error_is_left_out_without_a_change_of_bits(
+    core: ct.CDLL, method: str
+) -> None:
+    rng, number, order = np.random.default_rng(5), 1 + METHODS.index(method), ORDER[method] - 1
+    for _ in range(2000):
+        h = 10.0 ** rng.uniform(-6.0, -2.0)
+        error = 10.0 ** rng.uniform(-6.0, 0.0)
+        wanted = h * 0.9 * error ** (-1.0 / (order + 1))
+        # limits far from the step, within rounding of it, and equal to it
+        near = wanted * (1.0 + rng.choice([0.0, 1e-16, -1e-16, 3e-9, -3e-9]))
+        most, least = rng.choice([wanted * 10.0 ** rng.uniform(-2.0, 2.0), near, 1.0]), 0.0
+        if rng.random() < 0.7:
+            least = rng.choice([wanted * 10.0 ** rng.uniform(-2.0, 2.0), near])
+        got = asked(core.hx_probe_following_step, number, error, h, float(most), float(least))
+        assert got == unshortened_step(order, error, h, float(most), float(least))
 
 
 def test_the_step_length_ends_where_the_macro_step_ends_and_the_pieces_add_up(

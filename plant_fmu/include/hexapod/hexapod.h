@@ -462,6 +462,8 @@ HX_API void hx_plant_integral_rates(hxPlant *plant, const hxInput *input, hxOutp
 
 /* Full body states, in which joints may have drifted, and accelerations by eq. 1. */
 HX_API void hx_plant_get_bodies(const hxPlant *plant, double body[HX_BODIES][HX_BODY_STATE]);
+/* Copies the torso's state alone, which costs a few nanoseconds. */
+HX_API void hx_plant_get_torso(const hxPlant *plant, double torso[HX_BODY_STATE]);
 HX_API hxStatus hx_plant_set_bodies(hxPlant *plant, const double body[HX_BODIES][HX_BODY_STATE]);
 HX_API void hx_plant_accelerations(hxPlant *plant, const hxInput *input,
                                    double acceleration[HX_BODIES][6], /* m/s2 then rad/s2 */

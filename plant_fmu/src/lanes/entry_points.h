@@ -31,7 +31,7 @@ static void kernel_start(const hxModel *model, double t, hxState *state, void *s
   hx_contact_start(model, &depths, &state->contact);
   memset(state->motion.bristle, 0, sizeof state->motion.bristle);
   if (model->elastic) start_gears(model, state);
-  hx_dynamics_forces(model, &state->contact, &no_command, t, &state->motion, 0, 1, work);
+  hx_dynamics_forces(model, &state->contact, &no_command, t, &state->motion, NULL, 0, 1, work);
   hx_moment_update(model, state);
   memset(&state->completed, 0, sizeof state->completed);
   memset(&state->measured, 0, sizeof state->measured);
@@ -54,7 +54,7 @@ static void kernel_start(const hxModel *model, double t, hxState *state, void *s
 static void kernel_derivative(const hxModel *model, const hxState *state, const hxCommand *command,
                               int multipliers, void *memory, hxPlantMotion *rate) {
   hxScratch *scratch = memory;
-  hx_dynamics_evaluate(model, &state->contact, command, state->time, &state->motion, NULL,
+  hx_dynamics_evaluate(model, &state->contact, command, state->time, &state->motion, NULL, NULL,
                        multipliers, &scratch->work, &scratch->rate);
   *rate = scratch->rate.motion;
 }
@@ -64,7 +64,7 @@ static void kernel_coordinates(const hxModel *model, const hxState *state, const
   hxScratch *scratch = memory;
   hxPlantMotion *motion_rate = &scratch->rate.motion;
   memset(motion_rate->bristle, 0, sizeof motion_rate->bristle);
-  hx_dynamics_evaluate(model, &state->contact, command, state->time, &state->motion, NULL, 0,
+  hx_dynamics_evaluate(model, &state->contact, command, state->time, &state->motion, NULL, NULL, 0,
                        &scratch->work, &scratch->rate);
   if (x) hx_coordinates_of(&state->motion, &scratch->work, x);
   if (rate) hx_coordinates_rate(motion_rate, &scratch->work, rate);
@@ -160,7 +160,7 @@ static void kernel_measure(const hxModel *model, const hxCommand *command, hxSta
   for (int node = 0; node <= INTERVALS; ++node) path.command[node] = command;
   hx_moment_of(model, &state->contact, &state->motion, end);
   end->time = state->time;
-  hx_dynamics_evaluate(model, &state->contact, command, state->time, &state->motion, NULL, 1,
+  hx_dynamics_evaluate(model, &state->contact, command, state->time, &state->motion, NULL, NULL, 1,
                        &scratch->work, &scratch->rate);
   if (model->has_soil) hx_soil_yield(model, &state->contact, h, &state->moment, end, path.plastic);
   trapezoidal_impulses(model, &scratch->work, h, &state->completed, &impulses);
@@ -192,7 +192,7 @@ static void kernel_measure(const hxModel *model, const hxCommand *command, hxSta
 static void kernel_output(const hxModel *model, const hxState *state, const hxCommand *command,
                           void *memory, hxOutput *output) {
   hxScratch *scratch = memory;
-  hx_dynamics_evaluate(model, &state->contact, command, state->time, &state->motion, NULL, 1,
+  hx_dynamics_evaluate(model, &state->contact, command, state->time, &state->motion, NULL, NULL, 1,
                        &scratch->work, &scratch->rate);
   hx_output_fill(model, state, &scratch->work, output);
 }
@@ -200,7 +200,7 @@ static void kernel_output(const hxModel *model, const hxState *state, const hxCo
 static void kernel_integral_rates(const hxModel *model, const hxState *state,
                                   const hxCommand *command, void *memory, hxOutput *rate) {
   hxScratch *scratch = memory;
-  hx_dynamics_evaluate(model, &state->contact, command, state->time, &state->motion, NULL, 1,
+  hx_dynamics_evaluate(model, &state->contact, command, state->time, &state->motion, NULL, NULL, 1,
                        &scratch->work, &scratch->rate);
   hx_integral_rates_fill(model, &state->contact, &scratch->work, rate);
 }
@@ -211,7 +211,7 @@ static void kernel_accelerations(const hxModel *model, const hxState *state,
                                  double multiplier[HX_BODIES - 1][HX_MULTIPLIERS],
                                  double drive_torque[HX_BODIES - 1]) {
   hxScratch *scratch = memory;
-  hx_dynamics_evaluate(model, &state->contact, command, state->time, &state->motion, NULL, 1,
+  hx_dynamics_evaluate(model, &state->contact, command, state->time, &state->motion, NULL, NULL, 1,
                        &scratch->work, &scratch->rate);
   hx_accelerations_fill(&scratch->work, &scratch->rate.motion, acceleration, multiplier,
                         drive_torque);

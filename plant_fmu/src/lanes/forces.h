@@ -102,6 +102,13 @@ static inline void joint_pass(const hxModel *model, const hxCommand *command, do
   if (reactions) k->reaction.kin = kin;
 }
 
+/* Reads all joint angles from the moment of the motion. */
+static inline void known_angles(const hxMoment *moment, hxWork *work) {
+  for (int joint = 0; joint < HX_JOINTS; ++joint)
+    for (int pack = 0; pack < HX_PACKS; ++pack)
+      work->pack[pack].joint[joint].angle = hx_load(&moment->angle[joint][pack * HX_LANES]);
+}
+
 /* Computes all joint angles. All half-angles come first, so that their long chains of operations
  * overlap. */
 static inline void joint_angles(const hxModel *model, const hxPlantMotion *motion, hxWork *work) {
@@ -336,13 +343,17 @@ static inline void torso_pass(const hxModel *model, const hxPlantMotion *motion,
 }
 
 /* Computes positions, velocities and forces at (t, y). Fills work except for the sweeps; with
- * reactions it also keeps what the multipliers need. */
+ * reactions it also keeps what the multipliers need. The angles are those of the motion's moment,
+ * or computed where it is not known (NULL), with the same bits. */
 static inline void hx_dynamics_forces(const hxModel *model, const hxContactState *contact,
                                       const hxCommand *command, double t,
-                                      const hxPlantMotion *motion, int reactions, int all,
-                                      hxWork *work) {
+                                      const hxPlantMotion *motion, const hxMoment *moment,
+                                      int reactions, int all, hxWork *work) {
   torso_pass(model, motion, work);
-  joint_angles(model, motion, work);
+  if (moment)
+    known_angles(moment, work);
+  else
+    joint_angles(model, motion, work);
   for (int joint = 0; joint < HX_JOINTS; ++joint)
     for (int pack = 0; pack < HX_PACKS; ++pack)
       link_pass(model, motion, joint, pack * HX_LANES, &work->pack[pack].joint[joint]);

@@ -5,6 +5,7 @@
 
 #include "../contact_law.h"
 #include "../method.h"
+#include "../step_size.h"
 #include "hexapod/message.h"
 #include "measure.h"
 
@@ -310,8 +311,8 @@ static void try_step(const hxStart *start, double h, hxState *state, hxTrial *tr
     }
     const hxCommand *command = command_at(start, t, &now);
     hxImplicit *stage = m->gamma > 0.0 ? implicit : NULL;
-    hx_dynamics_evaluate(model, start->contact, command, t, i > 0 ? y : start->y, stage, 0, work,
-                         &k[i]);
+    hx_dynamics_evaluate(model, start->contact, command, t, i > 0 ? y : start->y,
+                         i > 0 ? NULL : &state->moment, stage, 0, work, &k[i]);
     hx_add_impulses(model, command, stage, work, h * m->b[i], &trial->impulses);
     state->evaluations += 1.0;
   }
@@ -431,30 +432,6 @@ static double find_touchdown(const hxStart *start, double h, hxState *state, hxT
 }
 
 /* ---- error control ---- */
-
-/* x^(-1/n) for x in about [1e-4, 1e4], in plain arithmetic: the same on every machine. Newton on
- * r^-n = x rises to its root. */
-static double inverse_root(double x, int n) {
-  double r = 0.1, before = 0.0;
-  for (int i = 0; i < 100 && r > before; ++i) {
-    double power = x;
-    for (int k = 0; k < n; ++k) power *= r;
-    before = r;
-    r += r * (1.0 - power) / n;
-  }
-  return r;
-}
-
-/* Factor by which the step may change, from the error of an attempt: 0.9 error^(-1/n), 0.2 to 5
- * (eq. 23). */
-static double step_factor(const hxMethodRow *method, double error) {
-  const int n = method->error_order + 1;
-  double large = 1.0, small = 1.0;
-  for (int i = 0; i < n; ++i) large *= 0.9 / 0.2, small *= 0.9 / 5.0;
-  if (!(error < large)) return 0.2;
-  if (error < small) return 5.0;
-  return 0.9 * inverse_root(error, n);
-}
 
 /* Returns the largest number of steps in a call over a time, s. */
 static double steps_allowed(const double limits[3], double time) {
@@ -583,9 +560,10 @@ static hxStatus advance(const hxStart *start, double h_max, double *next_step, h
       return step_failure(trial, start->t, h, message);
   }
   if (model->step == 0.0) {
-    const double next = fmin(model->step_max, h * step_factor(start->method, trial->error));
     /* a step limited by the end of the interval must not reduce the next step */
-    *next_step = state->next_step = h < h_max ? next : fmax(next, state->next_step);
+    const double least = h < h_max ? 0.0 : state->next_step;
+    *next_step = state->next_step =
+        following_step(start->method, trial->error, h, model->step_max, least);
   }
   /* shorten the step to the first touch-down, measure it, switch contacts */
   hxMoment *end = &start->scratch->end;
@@ -704,8 +682,12 @@ static hxStatus hx_integrate(const hxModel *model, const hxCommand *command, con
   const hxStatus status = (model->step == 0.0 ? run_to : run_fixed)(
       model, command, ramp, t_end, events, state, scratch, message);
   memset(state->contact.nearest, 0, sizeof state->contact.nearest);
-  fill_motion_slots(&state->motion);
-  hx_fill_measured_slots(model, state);
+  /* off grids, whose points are searched leg by leg, packs that cover all slots have filled them */
+  if (HX_PACKS * HX_LANES < HX_SLOTS || model->terrain) {
+    fill_motion_slots(&state->motion);
+    hx_fill_moment_slots(model, state);
+  }
+  hx_fill_integral_slots(state);
   return status;
 }
 

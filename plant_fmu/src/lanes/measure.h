@@ -302,13 +302,23 @@ static inline void fill_lines(void *structure, size_t lines) {
   for (size_t line = 0; line < lines; ++line) hx_fill_slots(&first[line * HX_SLOTS]);
 }
 
-/* Copies leg 0 into the unused slots of all measurements. */
-static inline void hx_fill_measured_slots(const hxModel *model, hxState *state) {
+/* Copies leg 0 into the unused slots of the last step's end. */
+static inline void hx_fill_moment_slots(const hxModel *model, hxState *state) {
   fill_lines(&state->moment, HX_MOMENT_LINES);
   for (int k = 0; k < model->listed; ++k)
     if (model->row[k] != HX_TORSO)
       fill_lines(&state->moment.contact[model->row[k]], HX_CONTACT_LINES);
+}
+
+/* Copies leg 0 into the unused slots of integrals and peaks. */
+static inline void hx_fill_integral_slots(hxState *state) {
   fill_lines(&state->measured, HX_MEASURED_LINES);
+}
+
+/* Copies leg 0 into the unused slots of all measurements. */
+static inline void hx_fill_measured_slots(const hxModel *model, hxState *state) {
+  hx_fill_moment_slots(model, state);
+  hx_fill_integral_slots(state);
 }
 
 /* Sets whether each foot touches the ground, by any of its rows. */
@@ -552,7 +562,7 @@ typedef struct {
 } hxCubic;
 
 static inline hxCubic cubic(hxReal from, hxReal slope_from, hxReal rise, hxReal slope_to,
-                            double x) {
+                            hxReal x) {
   const hxReal bend = slope_from + slope_to - 2.0 * rise, curve = rise - slope_from - bend;
   return (hxCubic){from + x * (slope_from + x * (curve + x * bend)),
                    slope_from + x * (2.0 * curve + (3.0 * x) * bend),
@@ -584,7 +594,7 @@ HX_RARE hxReal motor_rate(const hxPath *path, int joint, int slot, hxReal rise, 
   const hxReal deflected =
       hx_load(&path->to->deflection[joint][slot]) - hx_load(&path->from->deflection[joint][slot]);
   return cubic(hx_splat(0.0), h * hx_load(&path->from->motor_speed[joint][slot]), rise + deflected,
-               h * hx_load(&path->to->motor_speed[joint][slot]), x)
+               h * hx_load(&path->to->motor_speed[joint][slot]), hx_splat(x))
       .rate;
 }
 
@@ -601,7 +611,7 @@ static inline hxReal measure_joint(const hxPath *path, int joint, int slot, hxRe
   hxReal positive = zero, negative = zero, squared = zero;
   for (int node = 0; node <= INTERVALS; node += MOTOR_STRIDE) {
     const hxCommand *command = path->command[node];
-    const hxCubic q = cubic(angle, slope_from, rise, slope_to, (double)node / INTERVALS);
+    const hxCubic q = cubic(angle, slope_from, rise, slope_to, hx_splat((double)node / INTERVALS));
     const hxReal speed =
         per_step *
         (model->elastic ? motor_rate(path, joint, slot, rise, (double)node / INTERVALS) : q.rate);
@@ -715,7 +725,8 @@ typedef struct {
 HX_INLINE hxFootInstant foot_at(const hxPath *path, const hxFootPath *foot, double x) {
   const hxReal per_step = hx_splat(1.0 / path->h);
   const hxReal bends = path->h < shortest_bend ? hx_splat(0.0) : per_step * per_step;
-  const hxCubic depth = cubic(foot->delta, foot->slope_from, foot->rise, foot->slope_to, x);
+  const hxCubic depth =
+      cubic(foot->delta, foot->slope_from, foot->rise, foot->slope_to, hx_splat(x));
   const hxReal approach = per_step * depth.rate;
   hxContactLawAt law = foot->law;
   if (has_shares(path, foot->row)) law.stiffness *= foot->share + x * foot->share_rise;
@@ -770,47 +781,67 @@ HX_INLINE void measure_feet(const hxPath *path, int slot, hxMeasured *measured) 
   hx_store(&measured->slip_distance[slot], hx_load(&measured->slip_distance[slot]) + slipped);
 }
 
-/* Returns the share of a leg's contact at x in [0, 1] of a step. */
-static inline double share_within(const hxPath *path, int row, int leg, double x) {
-  if (!has_shares(path, row)) return 1.0;
+/* Returns the shares of a leg's contact at x in [0, 1] of a step, samples in lanes. */
+HX_INLINE hxReal share_within(const hxPath *path, int row, int leg, hxReal x) {
   const double from = path->from->share[row][leg], to = path->to->share[row][leg];
   return from + x * (to - from);
 }
 
-/* Returns the normal force of a leg's contact at x in [0, 1] of a step, N. */
-static inline double force_within(const hxPath *path, int row, int leg, double x) {
+/* Returns the normal forces of a leg's contact with soil, N, samples in lanes. */
+HX_RARE hxReal soil_within(const hxPath *path, int row, int leg, const hxReal *depth,
+                           const hxReal *rate) {
+  const hxSoil soil = hx_soil_under(path->contact, row, leg);
+  const double plastic = path->contact->plastic[hx_soil_row(row)][leg];
+  double delta[HX_LANES], slope[HX_LANES], force[HX_LANES];
+  hx_store(delta, *depth), hx_store(slope, *rate);
+  for (int lane = 0; lane < HX_LANES; ++lane)
+    force[lane] = hx_soil_normal_force(&soil, plastic, delta[lane], slope[lane] / path->h).force;
+  return hx_load(force);
+}
+
+/* Returns the normal forces of a leg's contact at x in [0, 1] of a step, N, samples in lanes. */
+HX_INLINE hxReal force_within(const hxPath *path, int row, int leg, hxReal x) {
   const hxContactMoment *from = &path->from->contact[row], *to = &path->to->contact[row];
   const double h = path->h, delta = from->delta[leg];
   const hxCubic depth = cubic(hx_splat(delta), hx_splat(h * from->ddelta[leg]),
                               hx_splat(to->delta[leg] - delta), hx_splat(h * to->ddelta[leg]), x);
   const hxContactState *contact = path->contact;
-  if (has_soil(path->model, row) && is_in_soil(contact, row, leg)) {
-    const hxSoil soil = hx_soil_under(contact, row, leg);
-    return hx_soil_normal_force(&soil, contact->plastic[hx_soil_row(row)][leg],
-                                hx_lane(depth.value, 0), hx_lane(depth.rate, 0) / h)
-        .force;
-  }
-  const hxContactLawAt law = {
-      hx_splat(contact->closed[row][leg]), hx_splat(contact->damping[row][leg]),
-      hx_splat(contact->stiffness[row][leg] * share_within(path, row, leg, x))};
-  return hx_lane(hx_normal_force(law, depth.value, hx_splat(1.0 / h) * depth.rate).force, 0);
+  if (has_soil(path->model, row) && is_in_soil(contact, row, leg))
+    return soil_within(path, row, leg, &depth.value, &depth.rate);
+  hxContactLawAt law = {hx_splat(contact->closed[row][leg]), hx_splat(contact->damping[row][leg]),
+                        hx_splat(contact->stiffness[row][leg])};
+  if (has_shares(path, row)) law.stiffness *= share_within(path, row, leg, x);
+  return hx_normal_force(law, depth.value, hx_splat(1.0 / h) * depth.rate).force;
 }
 
-/* Takes the samples of a leg's landing that lie within a step: forces at times t_n after
- * touch-down and their rise over the window that ends there (eq. 29). Forces before touch-down are
- * 0. */
+/* Takes one sample of a leg's landing: the force and its rise over the window that ends there. */
+HX_INLINE void take_landing_sample(int leg, int n, double force, hxMeasured *measured) {
+  double *oldest = &measured->landing_force[n % HX_RISE_SAMPLES][leg];
+  const double rate = (force - *oldest) / (HX_RISE_SAMPLES * landing_sample);
+  measured->landing_rate[leg] = fmax(measured->landing_rate[leg], rate);
+  measured->landing_left[leg] -= 1.0;
+  *oldest = force;
+}
+
+/* Takes the samples of a leg's landing that lie within a step, several at once in lanes: forces at
+ * times t_n after touch-down and their rise over the window that ends there (eq. 29). Forces before
+ * touch-down are 0. */
 static inline void measure_landing(const hxPath *path, int leg, hxMeasured *measured) {
-  for (; measured->landing_left[leg] > 0.0; measured->landing_left[leg] -= 1.0) {
-    const int n = LANDING_SAMPLES + 1 - (int)measured->landing_left[leg];
-    const double x = (measured->landed_at[leg] + n * landing_sample - path->t) / path->h;
-    if (x > 1.0) return;
-    double *oldest = &measured->landing_force[n % HX_RISE_SAMPLES][leg];
-    double force = 0.0;
+  while (measured->landing_left[leg] > 0.0) {
+    const int first = LANDING_SAMPLES + 1 - (int)measured->landing_left[leg];
+    double x[HX_LANES], sample[HX_LANES];
+    for (int lane = 0; lane < HX_LANES; ++lane)
+      x[lane] = (measured->landed_at[leg] + (first + lane) * landing_sample - path->t) / path->h;
+    if (x[0] > 1.0) return;
+    const hxReal at = hx_max(hx_load(x), hx_splat(0.0));
+    hxReal force = hx_splat(0.0);
     for (int k = 0; k < path->model->foot_rows; ++k)
-      force += force_within(path, path->model->row[k], leg, fmax(x, 0.0));
-    const double rate = (force - *oldest) / (HX_RISE_SAMPLES * landing_sample);
-    measured->landing_rate[leg] = fmax(measured->landing_rate[leg], rate);
-    *oldest = force;
+      force += force_within(path, path->model->row[k], leg, at);
+    hx_store(sample, force);
+    for (int lane = 0; lane < HX_LANES && measured->landing_left[leg] > 0.0; ++lane) {
+      if (x[lane] > 1.0) return;
+      take_landing_sample(leg, first + lane, sample[lane], measured);
+    }
   }
 }
 
