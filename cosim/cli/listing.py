@@ -16,7 +16,8 @@ from hexapod_cosim.cosim.interface.interface import load_interface
 from hexapod_cosim.cosim.scenario.scenario import list_scenarios
 from hexapod_cosim.cosim.study.plan.bundled import list_studies
 from hexapod_cosim.models import LEG_NAMES, Terrain, list_robots, load_robot, unknown_name
-from hexapod_cosim.models.ground.catalogue import CATALOGUE, Entry
+from hexapod_cosim.models.ground.catalogue import CATALOGUE
+from hexapod_cosim.models.ground.entries import Entry
 from hexapod_cosim.models.ground.parameters import DIFFICULTY
 from hexapod_cosim.models.ground.table import PLACED
 from hexapod_cosim.models.records import PLANES
