@@ -334,6 +334,33 @@ def test_a_foot_that_is_pushed_over_the_border_of_level_soft_blocks_moves_as_on_
     assert abs(here.energy.residual) < BALANCE * here.energy.dissipated
 
 
+@pytest.mark.parametrize("pad", [0.0, 0.025])
+def test_a_foot_that_is_dragged_in_its_print_over_an_edge_beside_level_ground_gets_no_energy(
+    core: ct.CDLL, pad: float
+) -> None:
+    """Two legs stand in a patch of sand, 3 mm before a rigid block of 40 mm, behind which the
+    ground is 30 mm lower. They keep their block until lift-off.
+    """
+    rigid = changed(load_robot("athena"), foot={"pad_radius": pad}, friction={"mu": 0.1})
+    rigid = changed(rigid, body={"contact": "off"})
+    pose, foot = standing(rigid), Plant(core, rigid).output().foot.position[0]
+    height, material = np.zeros((200, 200)), np.zeros((200, 200))
+    material[97:104, :101], height[96:105, 102:106] = 1.0, -0.03
+    row = np.concatenate([[np.nan] * 3, law.table_row(soil_preset("dry_sand").soil)])[None]
+    origin = (float(foot[0]) + 0.003 - 0.04 * 101, float(foot[1]) - 0.02 - 0.04 * 100)
+    file = grid_bytes(height, cell=0.04, origin=origin, kind=BLOCKS, material=material, table=row)
+    ground = Ground(core, file)
+    start: dict[str, Any] = {"quaternion": pose.quaternion, "angle": pose.angle}
+    plant = on_grid(core, rigid, ground, position=np.add(pose.position, (0, 0, 0.002)), **start)
+    for k in range(85):
+        aside = np.array([0.5 * rigid.weight if k > 30 else 0.0, 0.0, 0.0])
+        plant.step(0.01 * (k + 1), Command(angle_ref=rigid.stance, push_force=aside))
+    output = plant.output()
+    assert output.foot.position[0, 0] > foot[0] + 0.003 + 0.04
+    assert output.foot.sinkage[0] > 0.008
+    assert abs(output.energy.residual) < BALANCE * output.energy.dissipated
+
+
 def test_a_foot_may_start_deeper_than_its_radius_in_soil_and_not_in_rigid_ground(
     core: ct.CDLL,
 ) -> None:
