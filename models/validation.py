@@ -11,6 +11,7 @@ import math
 import numpy as np
 
 from hexapod_cosim.models.errors import RobotError
+from hexapod_cosim.models.ground.patches import check_own_soil
 from hexapod_cosim.models.ground.surface import Surface
 from hexapod_cosim.models.ground.valleys import tightest_valley
 from hexapod_cosim.models.kinematics import foot_positions, inertia_matrix
@@ -342,7 +343,8 @@ def _check_terrain(robot: Robot, where: str) -> None:
 
 
 def check_contact_surface(robot: Robot, surface: Surface, where: str) -> None:
-    """Checks that blocks and valleys of a surface are wide enough for the spheres that touch it.
+    """Checks that blocks and valleys of a surface are wide enough for the spheres that touch it,
+    and that blocks of the robot's own soil are level.
 
     A sphere touches one block of a row beside it at most. In a valley narrower than a sphere it
     touches at two places, of which the plant computes one: forces jump, and energy is not
@@ -358,6 +360,8 @@ def check_contact_surface(robot: Robot, surface: Surface, where: str) -> None:
             fix=f"enlarge terrain.horizontal_scale, or reduce {name}",
             where=where,
         )
+    if robot.soil.law != "none":
+        check_own_soil(surface, where)
     limit = VALLEY_MARGIN * radius
     valley = tightest_valley(surface, limit)
     if valley is None:

@@ -14,7 +14,7 @@ import numpy as np
 from hexapod_cosim.models.body.pairs import pair_contacts
 from hexapod_cosim.models.contact import FootContact, contact_damping
 from hexapod_cosim.models.ground.blocks import Cell, cell_at, outside
-from hexapod_cosim.models.ground.surface import LAW, MU, MU_STATIC, STIFFNESS
+from hexapod_cosim.models.ground.surface import LAW, MU, MU_STATIC, STIFFNESS, Surface
 from hexapod_cosim.models.kinematics import LEGS, foot_centres
 from hexapod_cosim.models.records import Array, Robot, Soil
 from hexapod_cosim.models.soil.law import plastic_depth, row_soil, soil_radius
@@ -63,8 +63,20 @@ def depths_of(robot: Robot, body: Array, contacts: Contacts) -> Depths:
     if surface is not None and has_cells(robot):
         for leg, (x, y, _) in enumerate(foot_centres(robot, body).tolist()):
             cell = contacts.cell[leg]
-            far[leg] = -math.inf if cell is None else outside(surface, x, y, cell)
+            if cell is not None and not keeps_block(surface, contacts, leg, cell_at(surface, x, y)):
+                far[leg] = outside(surface, x, y, cell)
     return Depths(delta, np.array([contact.approach_speed for contact in found]), far)
+
+
+def keeps_block(surface: Surface, contacts: Contacts, leg: int, below: Cell) -> bool:
+    """Returns whether a foot in soil is over a block (row, column) not level with its own.
+
+    It was dragged there in its print. It keeps its block until lift-off, as it keeps its material,
+    so that no edge meets it at the depth of its print.
+    """
+    held, own = contacts.held[leg], contacts.cell[leg]
+    in_soil = held.is_soft and not held.is_open
+    return in_soil and own is not None and surface.height[below] != surface.height[own]
 
 
 # touch-down and lift-off

@@ -10,16 +10,21 @@ from typing import Any
 
 import numpy as np
 import pytest
-from grids import BLOCKS, Ground, grid_bytes, on_grid
+from grids import BLOCKS, Ground, grid_bytes, on_grid, start_on_grid
+from mirror import INVALID_MODEL
 from plant import Plant, PlantError, pointer
 from states import changed
 
-from hexapod_cosim.models import Robot, load_robot
+from hexapod_cosim.models import Robot, RobotError, load_robot
 from hexapod_cosim.models.dynamics import Command
-from hexapod_cosim.models.records import Array
+from hexapod_cosim.models.ground.grid_file import grid_bytes as file_of
+from hexapod_cosim.models.ground.patches import material_row
+from hexapod_cosim.models.ground.surface import Surface
+from hexapod_cosim.models.records import Array, Terrain
 from hexapod_cosim.models.soil import law
 from hexapod_cosim.models.soil.presets import soil_preset
 from hexapod_cosim.models.statics import standing
+from hexapod_cosim.models.validation import check_settings
 
 REST = 1e-9  # relative: forces of the law at the plant's own depths
 SINKING = 1e-4  # relative: what is left to sink after three seconds
@@ -249,6 +254,111 @@ def test_soil_on_blocks_that_are_not_level_is_refused(core: ct.CDLL) -> None:
                 Ground(core, file)
         else:
             Ground(core, file)
+
+
+def stepped(row: int, column: int) -> Surface:
+    """Returns 5 x 5 blocks of 0.5 m, of which one is 0.1 m lower; (-1, -1): they are level."""
+    height = np.zeros((5, 5))
+    if row >= 0:
+        height[row, column] = -0.1
+    return Surface(kind="blocks", height=height, x0=-1.0, y0=-1.5, cell=0.5)
+
+
+@pytest.mark.parametrize(
+    ("place", "middle"),
+    [((0, 0), (-0.75, -1.25)), ((2, 3), (0.25, -0.75)), ((4, 4), (0.75, 0.25)), ((-1, -1), None)],
+)
+def test_soil_of_the_robot_on_blocks_with_an_edge_is_refused_with_the_words_of_robot_files(
+    core: ct.CDLL, place: tuple[int, int], middle: tuple[float, float] | None
+) -> None:
+    """A foot that has sunk beside an edge would meet it at a finite depth: a foot of 15 mm that was
+    pushed over an edge of 30 mm was thrown back by 11.8 J that no source gave.
+    """
+    robot, surface = on_soil("dry_sand"), stepped(*place)
+    ground = Ground(core, file_of(surface))
+    plant = Plant(core, robot)
+    before = plant.save()
+    there = replace(robot, terrain=Terrain(kind="grid", surface=surface))
+    if middle is None:
+        check_settings(there)
+        start_on_grid(plant, ground, position=(0.0, 0.0, 0.5))
+        return
+    with pytest.raises(RobotError) as twin:
+        check_settings(there)
+    with pytest.raises(PlantError) as refused:
+        start_on_grid(plant, ground, position=(0.0, 0.0, 0.5))
+    assert refused.value.status == INVALID_MODEL
+    assert plant.save() == before
+    words = [str(e.value).partition("soil with edges")[2].split() for e in (refused, twin)]
+    assert words[0] == [word.replace("'", "") for word in words[1]]
+    assert f"x = {middle[0]:g} m, y = {middle[1]:g} m" in str(refused.value)
+    rigid = replace(there, soil=load_robot("athena").soil)
+    check_settings(rigid)
+    carried = Plant(core, replace(rigid, terrain=Terrain(kind="flat")))
+    start_on_grid(carried, ground, position=(0.0, 0.0, 0.5))
+
+
+def test_soil_of_the_robot_may_lie_beside_rigid_patches_with_edges(core: ct.CDLL) -> None:
+    """The patch covers the lower block and its neighbours; the blocks around them are level."""
+    robot, surface = on_soil("dry_sand"), stepped(0, 0)
+    material = np.zeros((5, 5), dtype=np.uint8)
+    material[:2, :2] = 1
+    table = material_row({"mu": 0.5})[None]
+    surface = replace(surface, material=material, materials=table)
+    check_settings(replace(robot, terrain=Terrain(kind="grid", surface=surface)))
+    plant = Plant(core, robot)
+    start_on_grid(plant, Ground(core, file_of(surface)), position=(0.0, 0.0, 0.5))
+
+
+@pytest.mark.parametrize("pad", [0.0, 0.025])
+def test_a_foot_that_is_pushed_over_the_border_of_level_soft_blocks_moves_as_on_the_plane(
+    core: ct.CDLL, pad: float
+) -> None:
+    """All feet stand 3 mm before a border along y, deeper than their radius without pads."""
+    robot = on_soil("dry_sand", pad, body={"contact": "off"})
+    plane = placed(core, robot, 0.002)
+    foot = plane.output().foot.position
+    origin = (float(foot[0, 0]) + 0.003 - 2.0, -2.0)
+    ground = Ground(core, grid_bytes(np.zeros((40, 40)), cell=0.1, origin=origin, kind=BLOCKS))
+    pose = standing(robot)
+    start: dict[str, Any] = {"quaternion": pose.quaternion, "angle": pose.angle}
+    blocks = on_grid(core, robot, ground, position=np.add(pose.position, (0, 0, 0.002)), **start)
+    for plant in (plane, blocks):
+        for k in range(100):
+            aside = np.array([0.6 * robot.weight if k >= 40 else 0.0, 0.0, 0.0])
+            plant.step((k + 1) * STEP, Command(angle_ref=robot.stance, push_force=aside))
+    here, there = blocks.output(), plane.output()
+    assert here.foot.position[0, 0] > foot[0, 0] + 0.003
+    assert here.foot.sinkage.max() > (0.002 if pad else robot.foot.radius)
+    assert here.foot.position == pytest.approx(there.foot.position, abs=1e-5)
+    assert abs(here.energy.residual) < BALANCE * here.energy.dissipated
+
+
+@pytest.mark.parametrize("pad", [0.0, 0.025])
+def test_a_foot_that_is_dragged_in_its_print_over_an_edge_beside_level_ground_gets_no_energy(
+    core: ct.CDLL, pad: float
+) -> None:
+    """Two legs stand in a patch of sand, 3 mm before a rigid block of 40 mm, behind which the
+    ground is 30 mm lower. They keep their block until lift-off.
+    """
+    rigid = changed(load_robot("athena"), foot={"pad_radius": pad}, friction={"mu": 0.1})
+    rigid = changed(rigid, body={"contact": "off"})
+    pose, foot = standing(rigid), Plant(core, rigid).output().foot.position[0]
+    height, material = np.zeros((200, 200)), np.zeros((200, 200))
+    material[97:104, :101], height[96:105, 102:106] = 1.0, -0.03
+    row = np.concatenate([[np.nan] * 3, law.table_row(soil_preset("dry_sand").soil)])[None]
+    origin = (float(foot[0]) + 0.003 - 0.04 * 101, float(foot[1]) - 0.02 - 0.04 * 100)
+    file = grid_bytes(height, cell=0.04, origin=origin, kind=BLOCKS, material=material, table=row)
+    ground = Ground(core, file)
+    start: dict[str, Any] = {"quaternion": pose.quaternion, "angle": pose.angle}
+    plant = on_grid(core, rigid, ground, position=np.add(pose.position, (0, 0, 0.002)), **start)
+    for k in range(85):
+        aside = np.array([0.5 * rigid.weight if k > 30 else 0.0, 0.0, 0.0])
+        plant.step(0.01 * (k + 1), Command(angle_ref=rigid.stance, push_force=aside))
+    output = plant.output()
+    assert output.foot.position[0, 0] > foot[0] + 0.003 + 0.04
+    assert output.foot.sinkage[0] > 0.008
+    assert abs(output.energy.residual) < BALANCE * output.energy.dissipated
 
 
 def test_a_foot_may_start_deeper_than_its_radius_in_soil_and_not_in_rigid_ground(

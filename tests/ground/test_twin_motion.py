@@ -224,6 +224,33 @@ def test_patches_of_other_material_are_the_twins(core: ct.CDLL, law: str) -> Non
     assert state.touchdowns >= 6
 
 
+def test_a_foot_that_is_dragged_in_its_print_over_an_edge_moves_as_the_twins(
+    core: ct.CDLL,
+) -> None:
+    """It stands in sand, 1 mm before a rigid block of 31 mm, behind which the ground is lower."""
+    robot = changed(FEET, foot={"pad_radius": 0.025}, friction={"mu": 0.05})
+    body = stood(robot, height=-1e-3, velocity=(1.0, 0.0, 0.0))
+    foot = foot_centres(robot, body)[0]
+    height, material = np.zeros((40, 40)), np.zeros((40, 40), dtype=np.uint8)
+    height[17:24, 22:24], material[18:23, :21] = -0.03, 1
+    surface = Surface(
+        kind="blocks",
+        height=height,
+        x0=float(foot[0]) + 1e-3 - 0.031 * 21,
+        y0=float(foot[1]) - 0.031 * 20.5,
+        cell=0.031,
+        material=material,
+        materials=material_row({"soil": "dry_sand"})[None],
+    )
+    pair = Pair(core, on(surface, robot), body)
+    state = pair.move(0.045, lambda _: Command(angle_ref=robot.stance))
+    pair.assert_same()
+    assert foot_centres(robot, state.body)[0, 0] > foot[0] + 1e-3 + 0.031
+    assert state.contacts.cell[0] == (20, 21)
+    assert not state.contacts.held[0].is_open
+    assert state.contacts.held[0].is_soft
+
+
 def test_a_robot_that_lands_on_its_back_moves_as_the_twin(core: ct.CDLL) -> None:
     friction = {"law": "bristle", "mu_static": 0.8}
     robot = changed(ATHENA, body={"contact": "on"}, friction=friction)

@@ -112,11 +112,9 @@ static int check_materials(const hxTerrain *terrain, char *message) {
   return 1;
 }
 
-/* Returns whether a column is soil and not level with all its neighbours. */
-static int is_uneven_soil(const hxTerrain *terrain, int64_t row, int64_t col) {
+/* Returns whether a block is not level with all its neighbours. */
+static int is_uneven(const hxTerrain *terrain, int64_t row, int64_t col) {
   const int64_t rows = terrain->head.rows, cols = terrain->head.cols;
-  const unsigned char m = terrain->material[row * cols + col];
-  if (m == 0 || terrain->table[HX_MATERIAL_COLUMNS * (m - 1) + HX_MATERIAL_SOIL] == 0.0) return 0;
   const double height = terrain->height[row * cols + col];
   int found = 0;
   for (int64_t r = row - 1; r <= row + 1; ++r)
@@ -125,13 +123,20 @@ static int is_uneven_soil(const hxTerrain *terrain, int64_t row, int64_t col) {
   return found;
 }
 
+/* Returns the row of the table of a block's material, NULL for the definition's ground. */
+static const double *material_of_block(const hxTerrain *terrain, int64_t row, int64_t col) {
+  const int m = terrain->material ? terrain->material[row * terrain->head.cols + col] : 0;
+  return m > 0 ? terrain->table + HX_MATERIAL_COLUMNS * (m - 1) : NULL;
+}
+
 /* Returns whether soil of blocks is level: a foot that has sunk cannot pass an edge of soil without
  * a jump of the force, because the laws of soil are those of level ground. */
 static int check_soil_of_blocks(const hxTerrain *terrain, char *message) {
   if (terrain->head.kind != HX_SURFACE_BLOCKS || !terrain->material) return 1;
   for (int64_t row = 0; row < terrain->head.rows; ++row)
-    for (int64_t col = 0; col < terrain->head.cols; ++col)
-      if (is_uneven_soil(terrain, row, col)) {
+    for (int64_t col = 0; col < terrain->head.cols; ++col) {
+      const double *material = material_of_block(terrain, row, col);
+      if (material && material[HX_MATERIAL_SOIL] != 0.0 && is_uneven(terrain, row, col)) {
         hx_print(
             message, HX_MESSAGE_SIZE,
             "terrain grid: material[%lld][%lld]: got soil on a block that is higher or lower than "
@@ -139,7 +144,22 @@ static int check_soil_of_blocks(const hxTerrain *terrain, char *message) {
             (long long)row, (long long)col);
         return 0;
       }
+    }
   return 1;
+}
+
+/* Finds the first block of the definition's ground that is not level with all its neighbours. */
+static void find_uneven_block(hxTerrain *terrain) {
+  const hxGridHead *head = &terrain->head;
+  terrain->has_uneven_block = 0;
+  for (int64_t row = 0; head->kind == HX_SURFACE_BLOCKS && row < head->rows; ++row)
+    for (int64_t col = 0; col < head->cols; ++col)
+      if (!material_of_block(terrain, row, col) && is_uneven(terrain, row, col)) {
+        terrain->has_uneven_block = 1;
+        terrain->uneven[0] = head->x0 + ((double)col + 0.5) * head->cell;
+        terrain->uneven[1] = head->y0 + ((double)row + 0.5) * head->cell;
+        return;
+      }
 }
 
 /* Reach of a tile: m, and cells at least. Tiles have at least two cells along an edge. */
@@ -280,6 +300,7 @@ hxTerrain *hx_terrain_create(const void *bytes, size_t size, char *message) {
     hx_terrain_destroy(terrain);
     return NULL;
   }
+  find_uneven_block(terrain);
   return make_tops(terrain) ? terrain : refuse_memory(terrain, message);
 }
 
@@ -289,6 +310,9 @@ hxTerrainSurface hx_terrain_surface(const hxTerrain *terrain) {
   return (hxTerrainSurface)terrain->head.kind;
 }
 double hx_terrain_cell_size(const hxTerrain *terrain) { return terrain->head.cell; }
+const double *hx_terrain_uneven_block(const hxTerrain *terrain) {
+  return terrain->has_uneven_block ? terrain->uneven : NULL;
+}
 
 /* ---- the smooth surface ---- */
 

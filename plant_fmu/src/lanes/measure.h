@@ -254,6 +254,18 @@ static inline void hx_copy_moment(const hxModel *model, hxMoment *to, const hxMo
   if (model->elastic) hx_copy_gears(to, from);
 }
 
+/* Returns whether a foot in soil is over a block that is not level with its own: it was dragged
+ * there in its print. It keeps its block until lift-off, as it keeps its material, so that no edge
+ * meets it at the depth of its print. */
+HX_RARE int keeps_block(const hxModel *model, const hxContactState *state, int leg,
+                        const double centre[3]) {
+  double cell[2];
+  if (!is_in_soil(state, HX_FOOT, leg)) return 0;
+  hx_terrain_cell_at(model->terrain, centre, cell);
+  return hx_terrain_column(model->terrain, cell[0], cell[1]) !=
+         hx_terrain_column(model->terrain, state->cell[0][leg], state->cell[1][leg]);
+}
+
 /* Copies the places of feet, and of bodies where the ground has materials, and computes how far
  * feet are outside of their cells. */
 HX_RARE void places_on_grid(const hxModel *model, const hxContactState *state,
@@ -269,6 +281,8 @@ HX_RARE void places_on_grid(const hxModel *model, const hxContactState *state,
                  cell[2] = {state->cell[0][leg], state->cell[1][leg]};
     depths->outside[leg] =
         cells && cell[0] >= 0.0 ? hx_terrain_outside(model->terrain, centre, cell) : -hx_far;
+    if (depths->outside[leg] > 0.0 && model->has_soil && keeps_block(model, state, leg, centre))
+      depths->outside[leg] = -hx_far;
   }
 }
 
