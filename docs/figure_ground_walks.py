@@ -24,16 +24,16 @@ IMAGES = Path(__file__).parent / "images"
 # scenario -> time of the picture [s]
 SHOWN = {"stairs": 9.0, "rubble": 8.0, "stones": 9.0, "dune": 10.0}
 SHOWN |= {"sand": 9.0, "ramp": 8.0, "course": 42.0}
-SIZE = {"width": 1280, "height": 900}  # px
+SIZE = {"width": 1000, "height": 780}  # px    of the browser; the text keeps its size
 FLAGS = [
     "--no-sandbox",
     "--use-angle=swiftshader",
     "--enable-unsafe-swiftshader",
 ]  # WebGL without a graphics card
-COLOURS = 64  # of a picture's palette
-PICTURE_WIDTH = 800  # px
+COLOURS = 256  # of a picture's palette
 GAP = 8  # px    between replays
 PATIENCE = 120_000  # ms
+NAMED = "(labels, name) => labels.forEach(label => label.prepend(`${name}, `))"
 COLUMNS = {"walked": "walked", "slip": "slip [mm/m]", "peak": "peak [BW]"}
 COLUMNS |= {"tilt": "tilt [deg]", "path": "path error [mm/m]"}
 
@@ -49,7 +49,8 @@ def main() -> None:
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=chromium, args=FLAGS)
         replays = [
-            replay(browser, folder / name / "report.html", time) for name, time in SHOWN.items()
+            replay(browser, folder / name / "report.html", time, name)
+            for name, time in SHOWN.items()
         ]
         browser.close()
     height = sum(picture.height + GAP for picture in replays) - GAP
@@ -58,8 +59,6 @@ def main() -> None:
     for picture in replays:
         sheet.paste(picture, (0, top))
         top += picture.height + GAP
-    size = PICTURE_WIDTH, round(sheet.height * PICTURE_WIDTH / sheet.width)
-    sheet = sheet.resize(size, Image.Resampling.LANCZOS)
     reduced(sheet).save(IMAGES / "ground_viewer.png", optimize=True)
 
 
@@ -75,16 +74,19 @@ def table(path: Path) -> str:
 
 
 def _rounded(text: str) -> str:
-    """Returns a number with three digits, - for none."""
-    return f"{float(text):.3g}" if text else "-"
+    """Returns a number with three digits or more, - for none."""
+    if not text:
+        return "-"
+    return f"{float(text):.0f}" if abs(float(text)) >= 1000.0 else f"{float(text):.3g}"
 
 
-def replay(browser: Browser, report: Path, time: float) -> Image.Image:
-    """Returns the picture of a report's replay at a time [s]."""
+def replay(browser: Browser, report: Path, time: float, name: str) -> Image.Image:
+    """Returns the picture of a report's replay at a time [s], with the scenario's name in it."""
     page = browser.new_page(viewport=SIZE)  # type: ignore[arg-type]
     page.set_default_timeout(PATIENCE)
     page.goto(f"{report.as_uri()}#t={time}")
     page.wait_for_selector("html[data-ready]", state="attached")
+    page.locator(".names b").evaluate_all(NAMED, name)
     page.wait_for_timeout(500)
     picture = Image.open(io.BytesIO(page.locator("#stage").screenshot())).convert("RGB")
     page.close()
@@ -92,8 +94,13 @@ def replay(browser: Browser, report: Path, time: float) -> Image.Image:
 
 
 def reduced(picture: Image.Image) -> Image.Image:
-    """Returns a picture with a palette, which is a third of the size."""
-    return picture.convert("RGB").quantize(COLOURS)
+    """Returns a picture with a palette, which is a third of the size.
+
+    Without dithering, which makes plain surfaces rough and the file larger.
+    """
+    return picture.convert("RGB").quantize(
+        COLOURS, method=Image.Quantize.FASTOCTREE, dither=Image.Dither.NONE
+    )
 
 
 if __name__ == "__main__":

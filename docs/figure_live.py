@@ -37,9 +37,9 @@ STEP = 0.02  # s    by which the clock goes on: a state is sent as often
 SECONDS = "window.hexapod.poses.newest.seconds"
 SETTLE = 150  # ms
 END = 7.0  # s    of simulated time
-SIZE = {"width": 1280, "height": 740}  # px    of the browser
+SIZE = {"width": 1280, "height": 800}  # px    of the browser
 WIDTH = 800  # px    of the picture
-QUALITY = 45  # of WebP
+QUALITY = 42  # of WebP
 FLAGS = ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
 PATIENCE = 120_000  # ms
 HIDDEN = ".pills, .notes, .hint { visibility: hidden } * { caret-color: transparent }"

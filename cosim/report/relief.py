@@ -76,10 +76,15 @@ def _draw(axes: Axes, surface: Surface) -> ScalarMappable:
     levels = step * (np.arange(np.floor(lowest / step), np.ceil(highest / step) + 1.0) + 0.5)
     if surface.kind == "smooth" and highest > lowest:
         axes.contour(x, y, height, levels=levels, colors="0.15", linewidths=0.4)
-    text = f"{1e3 * lowest:.3g} to {1e3 * highest:.3g} mm"
+    text = f"{_digits(1e3 * lowest)} to {_digits(1e3 * highest)} mm"
     text += f", contour lines every {1e3 * step:g} mm" if surface.kind == "smooth" else ", blocks"
     axes.text(0.0, -0.14, text, transform=axes.transAxes, fontsize=6.5, va="top")
     return ScalarMappable(Normalize(1e3 * darkest, 1e3 * brightest), colours)
+
+
+def _digits(value: float) -> str:
+    """Returns a value with three digits or more, never as a power of ten."""
+    return f"{value:.0f}" if abs(value) >= 1000.0 else f"{value:.3g}"
 
 
 def sampled(surface: Surface) -> tuple[Array, Array, Array]:

@@ -86,20 +86,22 @@ function drawProfile(run: Run, profile: PackedProfile, clock: Clock): HTMLElemen
 /** Returns a frame in which heights are to scale or enlarged by a whole number. */
 function frameOf(profile: PackedProfile): Frame {
   const feet = profile.feet.map(([, , , height]) => height);
+  const ways = profile.feet.map(([, , way]) => way);
+  const [begin, end] = [Math.min(profile.begin, ...ways), Math.max(profile.end, ...ways)];
   const low = Math.min(TENTH * Math.min(...profile.low), ...feet);
   const high = Math.max(TENTH * Math.max(...profile.high), ...feet, low + LEAST);
-  const across = WIDTH / (profile.end - profile.begin);
+  const across = WIDTH / (end - begin);
   const fitting = Math.floor((HEIGHT - 2 * EDGE) / (across * (high - low)));
   const times = Math.min(Math.max(fitting, 1), LARGEST);
   const tall = times * across * (high - low) + 2 * EDGE;
   return {
     ends: [
-      [profile.begin, profile.end],
+      [begin, end],
       [low, high],
     ],
     tall,
     times,
-    across: (way) => across * (way - profile.begin),
+    across: (way) => across * (way - begin),
     up: (height) => tall - EDGE - times * across * (height - low),
   };
 }
