@@ -41,6 +41,7 @@ CALM_CYCLES = 0.5  # 1    gait cycles without sliding until the feet are trusted
 SLIDING_TIME = 0.04  # s    longer than a foot skids when it touches down
 SETTLED_SHARE = 0.5  # 1    of the weight: feet that carry less together have only just landed
 JOINTS_FOLLOW, JOINTS_DO_NOT = 0.35, 0.45  # 1    share of the time with too high joint speeds
+FEET_LATE = 0.2  # 1    the same, from which feet end their swings late whatever the ground
 GRIPPED = 0.99  # 1    of its share: a leg with more carries it
 LARGEST_LOAD = 2.0  # 1    in thirds of the weight: the margins of the design hold up to it
 LEAST_SCALE, LARGEST_SCALE = 0.5, 3.0  # 1    measured over modelled weight that is believed
@@ -412,9 +413,11 @@ class Compliance(Stateful):
     def waits(self, landing: Mask, *, held: bool) -> bool:
         """Returns whether the gait clock waits for the feet of legs that end their swing (C50).
 
+        It does not wait for joints that are too slow: their feet are late on level ground too.
+
         landing: (6,) these legs; held: it waits already.
         """
-        if not self.parts.touchdown or self.trust < 1.0:
+        if not self.parts.touchdown or self.trust < 1.0 or self.overspeed_share > FEET_LATE:
             return False
         found = self._carries() if held else self.touching
         hopeful = self.touchdown.offset > -REACH_LIMIT

@@ -512,3 +512,15 @@ def test_a_robot_that_outruns_its_joints_goes_over_to_kinematic_control() -> Non
                 laws.feel(force)
             assert cycle < 6 or laws.lagging is lagging
         assert bool(laws.fallback.all()) is lagging
+
+
+@pytest.mark.parametrize(("share", "awaited"), [(0.1, True), (0.3, False)])
+def test_a_foot_in_the_air_is_awaited_unless_joints_are_too_slow_for_a_fifth_of_the_time(
+    share: float, awaited: bool
+) -> None:
+    laws, force, landing = make_laws(), squeezing(), np.arange(6) == 2
+    force[2] = 0.0
+    for k in range(600):
+        plan(laws, standing="110111", overspeed=k % 10 < round(10 * share))
+        laws.feel(force)
+    assert laws.waits(landing, held=False) is awaited

@@ -271,26 +271,52 @@ def test_ground_that_is_met_early_is_answered_at_the_same_step(
     assert close(worst)
 
 
-@pytest.mark.parametrize("gait", ["tripod", "ripple", "amble"])
-def test_feet_that_find_no_ground_are_awaited_at_the_same_step(
-    controller_core: ct.CDLL, gait: str
-) -> None:
-    """Foot 2 finds the ground 12 mm lower than planned, foot 3 in some steps nowhere."""
-    ground, held = Ground(), []
+class LowGround:
+    """A sense() for which foot 2 finds the ground 12 mm lower than planned, foot 3 in some steps
+    nowhere.
 
-    def sense(controller: Controller, step: int, measurement: Measurement) -> None:
-        ground(controller, step, measurement)
+    Attributes:
+        held: whether the gait clock waited, for each period.
+    """
+
+    def __init__(self) -> None:
+        self.ground = Ground()
+        self.held: list[bool] = []
+
+    def __call__(self, controller: Controller, step: int, measurement: Measurement) -> None:
+        self.ground(controller, step, measurement)
         compliant = controller.compliant
         assert compliant is not None
         lowered, awaited = compliant.laws.touchdown.offset, controller.paths.awaited
         measurement.foot_force[:, 2] += 12.0 * (awaited & (lowered < -0.012))
         measurement.foot_force[2] *= not (controller.paths.swinging[2] and lowered[2] > -0.012)
         measurement.foot_force[3] *= step % 700 < 500
-        held.append(controller.paths.held)
+        self.held.append(controller.paths.held)
 
+
+@pytest.mark.parametrize("gait", ["tripod", "ripple", "amble"])
+def test_feet_that_find_no_ground_are_awaited_at_the_same_step(
+    controller_core: ct.CDLL, gait: str
+) -> None:
+    sense = LowGround()
     worst, _ = differences(controller_core, setup_of(gait=gait), sense=sense)
     assert close(worst)
-    assert 0.02 < np.mean(held) < 0.8
+    assert 0.02 < np.mean(sense.held) < 0.8
+
+
+@pytest.mark.parametrize(("speed_max", "least", "most"), [(3.0, 0.09, 0.11), (2.6, 0.0, 0.02)])
+def test_feet_of_joints_that_are_too_slow_are_hardly_awaited(
+    controller_core: ct.CDLL, speed_max: float, least: float, most: float
+) -> None:
+    """At 2.6 rad/s the plan needs more speed for more than a fifth of the time, at 3 rad/s for
+    less. The first waits are earlier than the share of the time is known.
+    """
+    sense, setup = LowGround(), setup_of()
+    slow = replace(setup.robot, servo=replace(setup.robot.servo, speed_max=speed_max))
+    robot = replace(setup, robot=slow, gains=make_gains(slow))
+    worst, _ = differences(controller_core, robot, sense=sense)
+    assert close(worst)
+    assert least <= np.mean(sense.held) < most
 
 
 def test_joints_that_are_outrun_fall_back_at_the_same_step(controller_core: ct.CDLL) -> None:

@@ -11,6 +11,7 @@ static const double sliding_time = 0.04; /* s, longer than a foot skids at touch
 static const double settled_share = 0.5;
 /* 1, share of the time in which joints would need more speed than a servo has */
 static const double joints_follow = 0.35, joints_do_not = 0.45;
+static const double feet_late = 0.2; /* 1, the same, from which feet end their swings late */
 static const double gripped = 0.99; /* 1, of its share: a leg that is given more carries it */
 /* 1, in thirds of the weight: the margins of the design hold up to this load */
 static const double largest_load = 2.0;
@@ -371,7 +372,7 @@ int hx_compliance_meets(const hxComplianceModel *model, int leg, const hxComplia
 int hx_compliance_waits(const hxComplianceModel *model, const int landing[HX_LEGS], int held,
                         const hxCompliance *laws) {
   int waits = 0;
-  if (!model->parts.touchdown || laws->trust < 1.0) return 0;
+  if (!model->parts.touchdown || laws->trust < 1.0 || laws->overspeed_share > feet_late) return 0;
   for (int leg = 0; leg < HX_LEGS; ++leg) {
     const int found = held ? carries(laws, leg) : laws->touching[leg];
     waits |= landing[leg] && !found && !laws->doubted[leg] &&
