@@ -21,6 +21,7 @@ typedef int64_t hxMask;
 
 static inline hxReal hx_load(const double *slots) { return *slots; }
 static inline void hx_store(double *slots, hxReal x) { *slots = x; }
+static inline hxReal hx_gather(const double *const *from, int64_t at) { return from[0][at]; }
 static inline hxReal hx_splat(double x) { return x; }
 static inline hxReal hx_sqrt(hxReal x) { return sqrt(x); }
 static inline hxMask hx_less(hxReal a, hxReal b) { return a < b ? -1 : 0; }

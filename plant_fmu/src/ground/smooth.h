@@ -69,19 +69,40 @@ HX_RARE void run_out(const hxGridPlace *at, hxReal per_cell, hxReal w[3][4]) {
   }
 }
 
+/* Returns whether a patch has nodes beyond the grid. */
+static inline int is_at_border(const hxTerrain *terrain, int64_t col, int64_t row) {
+  return col < 1 || row < 1 || col + 2 >= terrain->head.cols || row + 2 >= terrain->head.rows;
+}
+
 /* Copies the 4 x 4 nodes of a lane's patch. */
 static inline void copy_nodes(const hxTerrain *terrain, int lane, hxStencil *at) {
-  const int64_t rows = terrain->head.rows, cols = terrain->head.cols, c = (int64_t)at->col[lane],
-                r = (int64_t)at->row[lane];
+  const int64_t cols = terrain->head.cols, c = (int64_t)at->col[lane], r = (int64_t)at->row[lane];
   const double *first = terrain->height + (r - 1) * cols + (c - 1);
   double border[4][4];
   int64_t stride = cols;
-  if (c < 1 || r < 1 || c + 2 >= cols || r + 2 >= rows) {
+  if (is_at_border(terrain, c, r)) {
     hx_terrain_border_nodes(terrain, r, c, border);
     first = border[0], stride = 4;
   }
   for (int i = 0; i < 4; ++i)
     for (int k = 0; k < 4; ++k) at->node[i][k][lane] = first[i * stride + k];
+}
+
+/* Copies the nodes of all lanes, pack by pack: a pack that is stored as a whole is read without
+ * waiting for eight stores. */
+static inline void copy_all_nodes(const hxTerrain *terrain, hxStencil *at) {
+  const int64_t cols = terrain->head.cols;
+  const double *first[HX_LANES];
+  int borders = 0;
+  for (int lane = 0; lane < HX_LANES; ++lane) {
+    const int64_t c = (int64_t)at->col[lane], r = (int64_t)at->row[lane];
+    borders |= is_at_border(terrain, c, r);
+    first[lane] = terrain->height + (r * cols + c);
+  }
+  for (int i = 0; i < 4 && !borders; ++i)
+    for (int k = 0; k < 4; ++k)
+      hx_store(at->node[i][k], hx_gather(first, (i - 1) * cols + (k - 1)));
+  for (int lane = 0; borders && lane < HX_LANES; ++lane) copy_nodes(terrain, lane, at);
 }
 
 /* Moves the places of a stencil to (x, y). */
@@ -95,7 +116,7 @@ static inline void move_places(const hxTerrain *terrain, hxReal x, hxReal y, hxS
 static inline void set_stencil(const hxTerrain *terrain, hxReal x, hxReal y, hxStencil *at) {
   move_places(terrain, x, y, at);
   hx_store(at->col, at->x.node), hx_store(at->row, at->y.node);
-  for (int lane = 0; lane < HX_LANES; ++lane) copy_nodes(terrain, lane, at);
+  copy_all_nodes(terrain, at);
 }
 
 /* Moves it to (x, y), in the lanes `active` with its nodes. */

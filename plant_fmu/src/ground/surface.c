@@ -532,14 +532,9 @@ double hx_terrain_top_around(const hxTerrain *terrain, const double centre[3]) {
   return hx_terrain_top_between(terrain, ends);
 }
 
-/* Returns whether the blocks are so large that few of them are within the least reach. */
-static int has_large_blocks(const hxTerrain *terrain) {
-  return terrain->head.kind == HX_SURFACE_BLOCKS && terrain->head.cell >= least_reach;
-}
-
 double hx_terrain_depth_bound(const hxTerrain *terrain, const double centre[3], double radius) {
   const hxGridHead *head = &terrain->head;
-  if (has_large_blocks(terrain) && radius < 0.9 * least_reach) {
+  if (hx_has_large_blocks(terrain) && radius < 0.9 * least_reach) {
     const double above = centre[2] - hx_terrain_top_around(terrain, centre);
     return radius - (above < least_reach ? above : least_reach);
   }

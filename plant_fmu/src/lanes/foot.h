@@ -133,21 +133,56 @@ HX_INLINE void query_near_grid(const hxModel *model, const hxContactState *state
 }
 
 #ifndef HX_TANGENT
+/* Returns the heights of the highest blocks within 20 mm of points along x and y. */
+static inline hxReal tops_around(const hxTerrain *terrain, const hxVec3 *point) {
+  const double reach = HX_LEAST_REACH * terrain->per_cell;
+  const hxReal x = (point->x - terrain->head.x0) * terrain->per_cell,
+               y = (point->y - terrain->head.y0) * terrain->per_cell;
+  double low[2][HX_LANES], high[2][HX_LANES], top[HX_LANES];
+  hx_store(low[0], x - reach), hx_store(high[0], x + reach);
+  hx_store(low[1], y - reach), hx_store(high[1], y + reach);
+  for (int lane = 0; lane < HX_LANES; ++lane) {
+    const double ends[4] = {low[0][lane], high[0][lane], low[1][lane], high[1][lane]};
+    top[lane] = hx_terrain_top_between(terrain, ends);
+  }
+  return hx_load(top);
+}
+
+/* Returns the indices of hx_cell_index along a line of n cells. */
+static inline hxReal cell_index(hxReal u, int64_t n) {
+  const hxReal zero = hx_splat(0.0), last = hx_splat((double)(n - 1));
+  return whole_part(hx_select(hx_less(zero, u), hx_min(u, last), zero));
+}
+
+/* Returns the entries of a map of rows x cols at coordinates in its cells. */
+static inline hxReal entries_at(const double *map, int64_t rows, int64_t cols, hxReal u, hxReal v) {
+  const double *from[HX_LANES];
+  double place[HX_LANES];
+  hx_store(place, cell_index(v, rows) * (double)cols + cell_index(u, cols));
+  for (int lane = 0; lane < HX_LANES; ++lane) from[lane] = map + (int64_t)place[lane];
+  return hx_gather(from, 0);
+}
+
+/* Returns the heights of the tiles over which points are. */
+static inline hxReal tops_of_tiles(const hxTerrain *terrain, const hxVec3 *point) {
+  return entries_at(terrain->top, terrain->tile_rows, terrain->tile_cols,
+                    (point->x - terrain->head.x0) * terrain->per_tile,
+                    (point->y - terrain->head.y0) * terrain->per_tile);
+}
+
 /* Returns the largest depths that a row of contacts at these points may have, m; not positive: they
- * do not touch the grid. */
+ * do not touch the grid. The bits are those of hx_terrain_depth_bound. */
 HX_RARE hxReal hx_grid_depth_bound(const hxModel *model, int row, const hxVec3 *point) {
   const hxTerrain *terrain = model->terrain;
   const double radius = model->radius[row];
-  const hxReal z = point->z - model->ground_point[2], above = z - terrain->highest;
-  if (radius < terrain->reach && !hx_any(~hx_less(hx_splat(radius), above)))
-    return radius - hx_min(above, hx_splat(terrain->reach));
-  double at[3][HX_LANES], bound[HX_LANES];
-  hx_store(at[0], point->x), hx_store(at[1], point->y), hx_store(at[2], z);
-  for (int lane = 0; lane < HX_LANES; ++lane) {
-    const double p[3] = {at[0][lane], at[1][lane], at[2][lane]};
-    bound[lane] = hx_terrain_depth_bound(terrain, p, radius);
-  }
-  return hx_load(bound);
+  const hxReal z = point->z - model->ground_point[2], above_all = z - terrain->highest;
+  if (radius < terrain->reach && !hx_any(~hx_less(hx_splat(radius), above_all)))
+    return radius - hx_min(above_all, hx_splat(terrain->reach));
+  const int around = hx_has_large_blocks(terrain) && radius < 0.9 * HX_LEAST_REACH;
+  if (!around && !(radius < terrain->reach)) return hx_splat(radius); /* unknown */
+  const hxReal above = z - (around ? tops_around(terrain, point) : tops_of_tiles(terrain, point));
+  const hxReal reach = hx_splat(around ? HX_LEAST_REACH : terrain->reach);
+  return radius - hx_select(hx_less(above, reach), above, reach);
 }
 #endif
 
@@ -211,13 +246,11 @@ HX_RARE hxGround hx_grid(const hxModel *model, const hxContactState *state, int 
 HX_RARE hxGround hx_block_tops(const hxModel *model, const hxContactState *state, int slot,
                                const hxVec3 *point) {
   const hxReal zero = hx_splat(0.0), z = point->z - model->ground_point[2];
-  double top[HX_LANES];
-  for (int lane = 0; lane < HX_LANES; ++lane)
-    top[lane] =
-        hx_terrain_column(model->terrain, state->cell[0][slot + lane], state->cell[1][slot + lane]);
+  const hxGridHead *head = &model->terrain->head;
+  const hxReal top = entries_at(model->terrain->height, head->rows, head->cols,
+                                hx_load(&state->cell[0][slot]), hx_load(&state->cell[1][slot]));
   const hxMask closed = hx_less(zero, hx_load(&state->closed[HX_FOOT][slot]));
-  return (hxGround){hx_select(closed, z - hx_load(top), hx_splat(hx_far)),
-                    {zero, zero, hx_splat(1.0)}};
+  return (hxGround){hx_select(closed, z - top, hx_splat(hx_far)), {zero, zero, hx_splat(1.0)}};
 }
 #endif
 

@@ -68,6 +68,20 @@ static inline hxReal hx_load(const double *slots) {
 
 static inline void hx_store(double *slots, hxReal x) { memcpy(slots, &x, sizeof x); }
 
+/* Returns the numbers at an index from each lane's pointer. */
+static inline hxReal hx_gather(const double *const from[HX_LANES], int64_t at) {
+#if HX_LANES == 8
+  return (hxReal){from[0][at], from[1][at], from[2][at], from[3][at],
+                  from[4][at], from[5][at], from[6][at], from[7][at]};
+#elif HX_LANES == 4
+  return (hxReal){from[0][at], from[1][at], from[2][at], from[3][at]};
+#elif HX_LANES == 2
+  return (hxReal){from[0][at], from[1][at]};
+#else
+  return from[0][at];
+#endif
+}
+
 /* Numbers of complex_step.h have a real part and a derivative; these have no derivative. */
 enum { HX_HAS_SLOPES = 0 };
 static inline double hx_re(double x) { return x; }

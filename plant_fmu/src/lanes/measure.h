@@ -74,12 +74,27 @@ typedef struct {
   int below, beside, others;
 } hxSearch;
 
+/* Stores a row of walls that no foot touches: its face is far above the level one below the feet,
+ * so that all but the depth is that of the feet's first row. */
+static inline void far_row_moment(const hxModel *model, int row, int slot, hxMoment *moment) {
+  const double *from = (const double *)&moment->contact[HX_FOOT];
+  double *to = (double *)&moment->contact[row];
+  for (int line = 0; line < HX_CONTACT_LINES; ++line)
+    hx_store(&to[line * HX_SLOTS + slot], hx_load(&from[line * HX_SLOTS + slot]));
+  hx_store(&moment->contact[row].delta[slot], hx_splat(model->radius[row] - hx_far));
+}
+
 HX_RARE void further_moments(const hxModel *model, const hxContactState *state,
                              const hxPlantMotion *motion, int slot, const hxSearch *search,
                              const hxBody *tibia, hxMoment *moment) {
-  for (int k = 1; k < model->rows; ++k)
-    row_moment(model, state, motion, model->row[k], slot,
-               hx_is_of_foot(model->row[k]) ? search->beside : search->others, tibia, moment);
+  for (int k = 1; k < model->rows; ++k) {
+    const int row = model->row[k], is_of_foot = hx_is_of_foot(row);
+    if (is_of_foot && search->beside == HX_CLOSED && !is_used(state, row, slot))
+      far_row_moment(model, row, slot, moment);
+    else
+      row_moment(model, state, motion, row, slot, is_of_foot ? search->beside : search->others,
+                 tibia, moment);
+  }
 }
 
 /* Leaves out the search of contacts that feet on blocks certainly do not have: those of open feet
@@ -752,10 +767,11 @@ HX_INLINE hxFootInstant foot_at(const hxPath *path, const hxFootPath *foot, doub
                          hx_sqrt(hx_dot(slip, slip))};
 }
 
-/* Adds further contacts of the same feet; the sliding speed is that of the largest force. */
+/* Adds further closed contacts of the same feet; the sliding speed is that of the largest force. */
 HX_RARE hxFootInstant with_further_feet(const hxPath *path, int slot, double x, hxFootInstant sum) {
   hxReal largest = sum.force;
   for (int k = 1; k < path->model->foot_rows; ++k) {
+    if (!is_used(path->contact, path->model->row[k], slot)) continue;
     const hxFootPath foot = foot_path(path, path->model->row[k], slot);
     const hxFootInstant now = foot_at(path, &foot, x);
     sum.speed = hx_select(hx_less(largest, now.force), now.speed, sum.speed);
@@ -913,6 +929,13 @@ static inline void measure_cone(const hxPath *path, int row, const hxImpulses *i
 
 /* ---- the whole step ---- */
 
+/* Returns whether a row of feet has a closed contact. */
+static inline int is_row_used(const hxContactState *contact, int row) {
+  int used = 0;
+  for (int pack = 0; pack < HX_PACKS; ++pack) used |= is_used(contact, row, pack * HX_LANES);
+  return used;
+}
+
 /* Adds the measurements of a step. */
 static inline void hx_measure_path(const hxPath *path, const hxImpulses *impulse,
                                    const hxStepWorks *works, hxMeasured *measured) {
@@ -926,7 +949,8 @@ static inline void hx_measure_path(const hxPath *path, const hxImpulses *impulse
   }
   for (int leg = 0; leg < HX_LEGS; ++leg) measure_landing(path, leg, measured);
   for (int k = 0; k < path->model->foot_rows; ++k)
-    measure_cone(path, path->model->row[k], impulse, measured);
+    if (k == 0 || is_row_used(path->contact, path->model->row[k]))
+      measure_cone(path, path->model->row[k], impulse, measured);
   measured->contact_loss += hx_lane(hx_sum_legs(works->contact), 0) + works->torso_contact;
   measured->friction_loss += hx_lane(hx_sum_legs(works->friction), 0) + works->torso_friction;
   measured->gear_loss += hx_lane(hx_sum_legs(works->gear), 0);
