@@ -16,7 +16,6 @@
 #include "lanes/dynamics.h"
 #include "method.h"
 #include "robot.h"
-#include "step_size.h"
 
 #if defined(__GNUC__)
 #pragma GCC diagnostic ignored                                                                     \

@@ -5,7 +5,6 @@
 
 #include "../contact_law.h"
 #include "../method.h"
-#include "../step_size.h"
 #include "hexapod/message.h"
 #include "measure.h"
 
