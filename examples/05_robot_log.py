@@ -62,12 +62,14 @@ def robot_log(seed: int = 1) -> Recording:
 
 
 def main() -> None:
-    """Writes the log and prints how to identify the robot."""
+    """Writes the log, for good where a path is given, and prints how to identify the robot."""
     log = robot_log()
     with TemporaryDirectory() as folder:
         path = Path(sys.argv[1]) if len(sys.argv) > 1 else Path(folder) / "log.mcap"
         write_mcap(log, path)
         print(f"{path.name}: {len(log.time)} rows, {len(log.names) - 1} columns")
+    if len(sys.argv) < 2:
+        print("the log is deleted again; keep it: python examples/05_robot_log.py log.mcap")
     print("identify it with: hexapod identify log.mcap --robot athena -o out/identified")
 
 

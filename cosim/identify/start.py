@@ -1,7 +1,9 @@
 """Finds the state in which a log begins, as initial values of the FMU.
 
 A log should begin with the robot standing still: all rows before the first change of a command are
-averaged then. Unknown quantities are those of a robot at rest on level ground.
+averaged then. Unknown quantities are those of a robot at rest on level ground. A measured angle far
+from its command is not where the robot starts, so that a wrong column (in degrees, turned round,
+without numbers) is found by its comparison with the simulation instead of preventing it.
 """
 
 from __future__ import annotations
@@ -17,6 +19,8 @@ from hexapod_cosim.models.kinematics import rotation_matrix as rotation
 
 Array = NDArray[np.float64]
 LONGEST_REST = 0.5  # s    of rest that is averaged
+FARTHEST = 0.5  # rad    of a joint from its command; a servo under load sags by some 0.1 rad
+TURN = 2.0 * np.pi  # rad    a command beyond it is not in rad, and is refused when it is sent
 RATES = {  # quantity of the log: initial value of the FMU
     "torso.velocity": "initial.velocity",
     "torso.angular_velocity": "initial.angular_velocity",
@@ -43,7 +47,10 @@ def initial_state(log: Log, robot: Robot) -> dict[str, float]:
     angle = np.zeros((6, 3))
     commanded = joint_names("angle_ref")
     for k, name in enumerate(joint_names("angle")):
-        angle.flat[k] = mean(name if log.has([name]) else commanded[k])
+        wanted = mean(commanded[k])
+        measured = mean(name) if log.has([name]) else wanted
+        near = abs(measured - wanted) <= FARTHEST or abs(wanted) > TURN
+        angle.flat[k] = measured if near else wanted
         found[f"initial.{name}"] = float(angle.flat[k])
     for name in joint_names("speed"):
         found[f"initial.{name}"] = mean(name) if rest == 1 and log.has([name]) else 0.0

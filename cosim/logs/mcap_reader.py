@@ -9,6 +9,7 @@ sensors are interpolated linearly between their own times.
 from __future__ import annotations
 
 import json
+import struct
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -29,6 +30,7 @@ Array = NDArray[np.float64]
 COMMAND_WORDS = ("command", "desired", "reference")  # in the name of a topic
 UNIX_TIME = 10**15  # ns    later stamps are Unix times, which count from the first row
 FIELDS = ("position", "velocity", "effort")
+UNREADABLE = (ValueError, KeyError, IndexError, EOFError, struct.error)  # of damaged records
 MEASURED, COMMANDED = ("angle", "speed", "torque"), ("angle_ref", "speed_ref", "torque_ref")
 # lf_coxa -> 0: the joints are known with or without "_joint", in capitals or not
 PLACES = {label.lower().removesuffix("_joint"): k for k, label in enumerate(ros.JOINT_LABELS)}
@@ -62,7 +64,7 @@ def read_mcap(path: Path, *, torso_com: Sequence[float] = (0.0, 0.0, 0.0)) -> Re
         raise
     except FileNotFoundError as error:
         raise HexapodError("no recording", got=error.strerror, where=str(path)) from error
-    except (OSError, McapError, ValueError, KeyError, IndexError, EOFError) as error:
+    except (OSError, McapError, *UNREADABLE) as error:
         raise HexapodError(
             "not an MCAP file of a robot",
             got=f"{type(error).__name__}: {' '.join(str(error).split())}",

@@ -138,6 +138,23 @@ def test_degrees_are_refused_with_the_commands_name(log: Log, athena_fmu: Path) 
         replay(wrong, load_robot("athena"), fmu=athena_fmu)
 
 
+@pytest.mark.parametrize("wrong", [np.degrees, np.negative, lambda y: np.full_like(y, np.nan)])
+def test_a_joint_whose_angle_is_wrong_starts_where_it_is_commanded(
+    log: Log, wrong: Callable[[np.ndarray], np.ndarray]
+) -> None:
+    def change(data: np.ndarray, names: tuple[str, ...]) -> None:
+        place = names.index("LF.tibia.angle")
+        data[:, place] = wrong(data[:, place])
+
+    robot = load_robot("athena")
+    start = initial_state(log_of(edited(log, change), "x.csv"), robot)
+    sound = initial_state(log, robot)
+    commanded = log.recording.column("LF.tibia.angle_ref")[0]
+    assert start["initial.LF.tibia.angle"] == pytest.approx(commanded, abs=1e-9)
+    assert abs(sound["initial.LF.tibia.angle"] - commanded) > 1e-4
+    assert start["initial.LM.tibia.angle"] == sound["initial.LM.tibia.angle"]
+
+
 def test_the_command_writes_table_rows_and_report(
     call: Call, folder: Path, tmp_path: Path, athena_fmu: Path
 ) -> None:

@@ -178,7 +178,7 @@ def test_a_file_without_the_robots_joints_is_refused(tmp_path: Path) -> None:
         read_mcap(path)
 
 
-@pytest.mark.parametrize("content", [b"", b"time,a\n0,1\n", b"\x89MCAP0\r\n"])
+@pytest.mark.parametrize("content", [b"", b"junk\n", b"time,a\n0,1\n", b"\x89MCAP0\r\n"])
 def test_a_damaged_file_is_refused(tmp_path: Path, content: bytes) -> None:
     (tmp_path / "x.mcap").write_bytes(content)
     with pytest.raises(HexapodError, match="not an MCAP file of a robot"):
