@@ -119,11 +119,11 @@ def common_files(wheel: Path) -> dict[str, bytes]:
 
 def cross_compile() -> dict[tuple[str, str], bytes]:
     """Compiles all three FMUs' binaries and the loop for all targets, by library and target, and
-    the WebAssembly components of plant and controller; that of a policy would make the wheels
-    larger than 5 MB.
+    the WebAssembly component of the plant; those of the controllers would make the wheels larger
+    than 5 MB, and `hexapod export --platforms wasm` compiles them.
     """
-    components = (PLANT, CONTROLLER)
-    libraries = [*map(component_library, (*components, POLICY)), loop_library()]
+    components = (PLANT,)
+    libraries = [*map(component_library, (PLANT, CONTROLLER, POLICY)), loop_library()]
     jobs = [(library, target) for target in TARGETS for library in libraries]
     with ThreadPoolExecutor(os.cpu_count()) as pool:
         built = pool.map(lambda job: build_library(*job), jobs)
