@@ -60,8 +60,11 @@ def test_the_energy_balance_of_every_bundled_scenario_closes(
 
 
 def test_the_residual_of_a_standing_robot_vanishes_with_the_tolerance(walker: Walker) -> None:
+    """Touch-downs of feet that settle end steps early, so that it falls unevenly: over three decades
+    of the tolerance to a tenth at most.
+    """
     residual = []
-    for tolerance in ("1e-4", "1e-5"):
+    for tolerance in ("1e-4", "1e-7"):
         scenario = load_scenario(
             "stand", overrides=["control=compliant", f"solver.tolerance={tolerance}"]
         )
