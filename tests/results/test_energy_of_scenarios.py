@@ -60,8 +60,8 @@ def test_the_energy_balance_of_every_bundled_scenario_closes(
 
 
 def test_the_residual_of_a_standing_robot_vanishes_with_the_tolerance(walker: Walker) -> None:
-    """Touch-downs of feet that settle end steps early, so that it falls unevenly: over three decades
-    of the tolerance to a tenth at most.
+    """It falls unevenly, because touch-downs of feet that settle end steps early: over three
+    decades of the tolerance to a tenth at most.
     """
     residual = []
     for tolerance in ("1e-4", "1e-7"):
