@@ -19,9 +19,9 @@ from hexapod_cosim.cosim.common.files import atomic_path
 from hexapod_cosim.cosim.interface.names import joint_names, vector_names
 from hexapod_cosim.cosim.logs import messages as ros
 from hexapod_cosim.cosim.logs.mcap_package import require_mcap
+from hexapod_cosim.cosim.logs.places import torso_places
 from hexapod_cosim.cosim.master.recorder import Recording
 from hexapod_cosim.models import HexapodError
-from hexapod_cosim.models.kinematics import rotation_matrix
 
 Array = NDArray[np.float64]
 Message = dict[str, Any]
@@ -180,9 +180,7 @@ def _transform(recording: Recording, have: set[str], com: Array) -> Iterator[Sou
     place, turn = vector_names("torso.position"), vector_names("torso.quaternion", 4)
     if not {*place, *turn} <= have:
         return
-    positions, turns = recording.columns(place), recording.columns(turn)
-    if com.any():
-        positions = positions - np.array([rotation_matrix(turn) @ com for turn in turns])
+    positions, turns = torso_places(recording, com), recording.columns(turn)
 
     def message(row: int, stamp: Message) -> Message:
         transform = {"translation": _xyz(positions[row]), "rotation": _rotation(turns[row])}

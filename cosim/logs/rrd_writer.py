@@ -11,7 +11,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -19,11 +18,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hexapod_cosim.cosim.common.files import atomic_path
-from hexapod_cosim.cosim.common.installation import install_extra
+from hexapod_cosim.cosim.common.installation import install_extra, require_packages
 from hexapod_cosim.cosim.interface.names import joint_names, vector_names
+from hexapod_cosim.cosim.logs.places import torso_places
 from hexapod_cosim.cosim.master.recorder import Recording
-from hexapod_cosim.models import JOINT_NAMES, LEG_NAMES, HexapodError, Robot
-from hexapod_cosim.models.kinematics import rotation_matrix, unit_axis
+from hexapod_cosim.models import JOINT_NAMES, LEG_NAMES, Robot
+from hexapod_cosim.models.kinematics import unit_axis
 
 Array = NDArray[np.float64]
 EXTRA, PACKAGE = "rerun", "rerun"
@@ -35,14 +35,13 @@ LINE = 0.003  # m    radius of the lines of links
 
 def require_rerun(where: str | Path) -> None:
     """Raises HexapodError, which names the extra, unless RRD files can be written."""
-    if find_spec(PACKAGE) is None:
-        raise HexapodError(
-            "RRD files need a package that is not installed",
-            got=f"no {PACKAGE}",
-            expected="rerun-sdk (170 MB)",
-            fix=f"{install_extra(EXTRA)}; MCAP files need less, and Rerun opens them too",
-            where=str(where),
-        )
+    require_packages(
+        [PACKAGE],
+        "RRD files need a package that is not installed",
+        expected="rerun-sdk (170 MB)",
+        fix=f"{install_extra(EXTRA)}; MCAP files need less, and Rerun opens them too",
+        where=where,
+    )
 
 
 @dataclass(frozen=True)
@@ -132,16 +131,6 @@ def entity_of(name: str) -> str:
     for old, new in ((".", "/"), ("[", "/"), ("]", ""), ("(", "_"), (")", "")):
         name = name.replace(old, new)
     return name
-
-
-def torso_places(recording: Recording, com: Array) -> Array:
-    """Returns the positions (rows, 3) of the origin of the torso's frame in the world [m].
-
-    com: centre of mass in that frame (3,) [m].
-    """
-    turns = recording.vector("torso.quaternion", 4)
-    offsets = np.array([rotation_matrix(turn) @ com for turn in turns])
-    return np.asarray(recording.vector("torso.position") - offsets)
 
 
 def _write_robot(

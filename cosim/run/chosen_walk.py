@@ -6,8 +6,8 @@ paper control and all controls of the user walk as the robot file says. Complian
 amble at the height of the stance of least heat, with its feet a part of the way from the robot's
 own stance to that one: the whole way would give up too much footing on uneven ground. The feet step
 to the stance of least heat when the robot is heavier than its model (C53). Where the legs do not
-reach the commands or the step height in this walk, or the joints are not fast
-enough, it keeps the robot's own gait, and then its own stance as well.
+reach the commands or the step height in this walk, or the joints are not fast enough, it keeps the
+robot's own gait, and then its own stance as well.
 """
 
 from __future__ import annotations

@@ -92,8 +92,8 @@ static hxStatus check_valleys(hxPlant *plant, const hxDefinition *d, char *messa
 /* Fails if the definition's soil lies on blocks with edges: a foot that has sunk beside an edge
  * would meet it at a finite depth, with a jump of the force. */
 static hxStatus check_soil_of_blocks(const hxPlant *plant, const hxDefinition *d, char *message) {
-  const double *place = hx_terrain_uneven_block(plant->terrain);
-  if (d->soil.law == HX_SOIL_NONE || !place) return HX_OK;
+  double place[2];
+  if (d->soil.law == HX_SOIL_NONE || !hx_terrain_uneven_block(plant->terrain, place)) return HX_OK;
   hx_print(
       message, HX_MESSAGE_SIZE,
       "terrain.grid: soil with edges: got a soft block at x = %.4g m, y = %.4g m that is "

@@ -173,9 +173,9 @@ typedef struct hxContactState {
   double static_rise[HX_ROWS][HX_SLOTS];  /* 1        mu_s - mu of eq. 18 */
   double on_soil[HX_SOIL_ROWS][HX_SLOTS]; /* 1    1: the sphere touched down on soil */
   double soil[HX_SOIL_ROWS][HX_SOIL_SIZE][HX_SLOTS]; /* numbers of an hxSoil, where on_soil is 1 */
-  double plastic[HX_SOIL_ROWS]
-                [HX_SLOTS];                /* m  depth at which spheres touch soil: z_p, or that of
-                                            *    the footprint above which one is; 0 on rigid ground */
+  /* m  depth at which spheres touch soil: z_p, or that of the footprint above which one is; 0 on
+   *    rigid ground */
+  double plastic[HX_SOIL_ROWS][HX_SLOTS];
   double place[HX_SOIL_ROWS][2][HX_SLOTS]; /* m  x and y where they left the bottom of that print */
   double cell[2][HX_SLOTS];    /* 1    blocks: column and row over which a foot is; < 0: not held */
   double nearest[2][HX_SLOTS]; /* m  smooth grids: x and y from a foot's centre to the point nearest

@@ -345,6 +345,30 @@ class Plant:
         self.core.hx_plant_rates(self.handle, inputs(command or self.hold()), dx)
         return flat(dx)
 
+    def rates_of_kernels(self, command: Command) -> dict[str, Array]:
+        """Returns the rates of the bodies (19, 13) from every kernel of the build that runs on this
+        machine, by the kernel's name.
+        """
+        self.core.hx_probe_kernel.restype = ct.c_char_p
+        found = {}
+        for index in range(8):
+            rate = np.zeros((BODIES, BODY_STATE))
+            asked = ct.c_void_p(self.handle), ct.byref(inputs(command)), pointer(rate)
+            name = self.core.hx_probe_kernel(index, *asked)
+            if name:
+                found[name.decode()] = rate
+        return found
+
+    def rates_between(self, command: Command, dx: Array, h: float) -> Array:
+        """Returns the derivative of the rates (70,) along a change of the coordinates (70,), by
+        central differences of a step h. The plant is left at the last of their points.
+        """
+        x, sides = self.coordinates, []
+        for sign in (1.0, -1.0):
+            self.coordinates = x + sign * h * dx
+            sides.append(self.rates(command))
+        return np.asarray((sides[0] - sides[1]) / (2.0 * h))
+
     def tangent(self, command: Command, d_input: Array, dx: Array) -> tuple[Array, Any]:
         """Returns derivatives of the rates (70,) and of the HxOutput along a change of the input
         (60,) and of the coordinates (70,).

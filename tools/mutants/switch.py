@@ -37,8 +37,7 @@ TOKEN = re.compile(
 )
 LEVELS = ("||", "&&", "|", "^", "&", "== !=", "< <= > >=", "<< >>", "+ -", "* / %")
 PRECEDENCE = {mark: level for level, marks in enumerate(LEVELS) for mark in marks.split()}
-CLOSING = {"(": ")", "[": "]", "{": "}"}
-OPENING = {closing: opening for opening, closing in CLOSING.items()}
+OPENERS, CLOSERS = frozenset("([{"), frozenset(")]}")  # brackets
 ASSIGNMENTS = ("=", "+=", "-=", "*=", "/=", "%=", "&=", "|=", "^=", "<<=", ">>=")
 ENDS = frozenset((",", ";", "?", ":", *ASSIGNMENTS, "return", "case", "else", "do"))
 HEADS = frozenset(("if", "for", "while", "switch"))
@@ -114,11 +113,11 @@ def _first(tokens: list[Token], index: int) -> int:
     level, i = PRECEDENCE[tokens[index].text], index - 1
     while i >= 0:
         mark = tokens[i].text
-        if mark in OPENING and mark != "}":
-            i = _group_begin(tokens, i)
+        if mark in CLOSERS and mark != "}":
+            i = _partner(tokens, i)
             if i > 0 and tokens[i - 1].text in HEADS:
                 raise ValueError(f"a statement before the operator: {tokens[i - 1].text}")
-        elif mark in CLOSING or mark == "}" or mark in ENDS or _level(tokens[i], level) < level:
+        elif mark in OPENERS or mark == "}" or mark in ENDS or _level(tokens[i], level) < level:
             break
         i -= 1
     return i + 1
@@ -129,9 +128,9 @@ def _last(tokens: list[Token], index: int) -> int:
     level, i = PRECEDENCE[tokens[index].text], index + 1
     while i < len(tokens):
         mark = tokens[i].text
-        if mark in CLOSING:
-            i = _group_end(tokens, i)
-        elif mark in OPENING or mark in ENDS or _level(tokens[i], level + 1) <= level:
+        if mark in OPENERS:
+            i = _partner(tokens, i)
+        elif mark in CLOSERS or mark in ENDS or _level(tokens[i], level + 1) <= level:
             break
         i += 1
     return i - 1
@@ -149,7 +148,7 @@ def _after_operand(tokens: list[Token], i: int) -> int:
         mark = tokens[i].text
         if mark in ("(", "["):
             cast = mark == "(" and not cast
-            i = _group_end(tokens, i) + 1
+            i = _partner(tokens, i) + 1
         elif mark in (".", "->") or re.match(r"[\w.]", mark):
             i, cast = i + 1, False
         else:
@@ -157,24 +156,14 @@ def _after_operand(tokens: list[Token], i: int) -> int:
     return i
 
 
-def _group_begin(tokens: list[Token], i: int) -> int:
-    """Returns the index of the bracket that opens the group which token i closes."""
-    depth = 0
+def _partner(tokens: list[Token], i: int) -> int:
+    """Returns the index of the bracket that closes or opens the group of the bracket i."""
+    step, depth = (1 if tokens[i].text in OPENERS else -1), 0
     while True:
-        depth += (tokens[i].text in OPENING) - (tokens[i].text in CLOSING)
+        depth += (tokens[i].text in OPENERS) - (tokens[i].text in CLOSERS)
         if depth == 0:
             return i
-        i -= 1
-
-
-def _group_end(tokens: list[Token], i: int) -> int:
-    """Returns the index of the bracket that closes the group which token i opens."""
-    depth = 0
-    while True:
-        depth += (tokens[i].text in CLOSING) - (tokens[i].text in OPENING)
-        if depth == 0:
-            return i
-        i += 1
+        i += step
 
 
 def _written(text: str, places: list[Place], begin: int, end: int) -> str:

@@ -148,18 +148,16 @@ static int check_soil_of_blocks(const hxTerrain *terrain, char *message) {
   return 1;
 }
 
-/* Finds the first block of the definition's ground that is not level with all its neighbours. */
-static void find_uneven_block(hxTerrain *terrain) {
+int hx_terrain_uneven_block(const hxTerrain *terrain, double middle[2]) {
   const hxGridHead *head = &terrain->head;
-  terrain->has_uneven_block = 0;
   for (int64_t row = 0; head->kind == HX_SURFACE_BLOCKS && row < head->rows; ++row)
     for (int64_t col = 0; col < head->cols; ++col)
       if (!material_of_block(terrain, row, col) && is_uneven(terrain, row, col)) {
-        terrain->has_uneven_block = 1;
-        terrain->uneven[0] = head->x0 + ((double)col + 0.5) * head->cell;
-        terrain->uneven[1] = head->y0 + ((double)row + 0.5) * head->cell;
-        return;
+        middle[0] = head->x0 + ((double)col + 0.5) * head->cell;
+        middle[1] = head->y0 + ((double)row + 0.5) * head->cell;
+        return 1;
       }
+  return 0;
 }
 
 /* Reach of a tile: m, and cells at least. Tiles have at least two cells along an edge. */
@@ -300,7 +298,6 @@ hxTerrain *hx_terrain_create(const void *bytes, size_t size, char *message) {
     hx_terrain_destroy(terrain);
     return NULL;
   }
-  find_uneven_block(terrain);
   return make_tops(terrain) ? terrain : refuse_memory(terrain, message);
 }
 
@@ -310,9 +307,6 @@ hxTerrainSurface hx_terrain_surface(const hxTerrain *terrain) {
   return (hxTerrainSurface)terrain->head.kind;
 }
 double hx_terrain_cell_size(const hxTerrain *terrain) { return terrain->head.cell; }
-const double *hx_terrain_uneven_block(const hxTerrain *terrain) {
-  return terrain->has_uneven_block ? terrain->uneven : NULL;
-}
 
 /* ---- the smooth surface ---- */
 

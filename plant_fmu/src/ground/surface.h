@@ -26,8 +26,6 @@ struct hxTerrain {
   int64_t tile_rows, tile_cols;  /* of the map of heights below */
   double per_tile, reach;        /* 1/m, m */
   double highest;                /* m  of the tops */
-  int has_uneven_block;          /* 1: blocks of the definition's ground are not all level */
-  double uneven[2];              /* m  middle of the first one that is not */
   double *top;    /* m  [tile_rows][tile_cols]: no ground within the reach of a tile is higher */
   double bytes[]; /* the file after its head, then the map of tops */
 };
@@ -44,9 +42,9 @@ typedef struct hxFace {
 hxTerrainSurface hx_terrain_surface(const hxTerrain *terrain);
 double hx_terrain_cell_size(const hxTerrain *terrain);
 
-/* Returns the middle (x, y) of the first block of the definition's ground, row by row, that is
- * higher or lower than a neighbour, m; NULL: there is none, or the surface is smooth. */
-const double *hx_terrain_uneven_block(const hxTerrain *terrain);
+/* Finds the middle (x, y) of the first block of the definition's ground, row by row, that is higher
+ * or lower than a neighbour, m; returns whether there is one. Smooth surfaces have none. */
+int hx_terrain_uneven_block(const hxTerrain *terrain, double middle[2]);
 
 /* Returns the cell (column, row) of blocks over which a point is, and how far outside of a cell a
  * point is, m, < 0 inside; the border's cells have no outer edge. */

@@ -409,7 +409,8 @@ HX_RARE void hx_foot_shares(const hxModel *model, const hxContactState *state, i
   for (int row = HX_FOOT; row < HX_FOOT_ROWS; ++row) {
     share[row] = 1.0;
     if (hx_re(state->closed[row][slot]) == 0.0 || !(hx_re(face[row].delta) > 0.0) ||
-        (row == HX_FOOT && model->has_soil && hx_re(state->on_soil[0][slot]) != 0.0))
+        (row == HX_FOOT && model->has_soil &&
+         hx_re(state->on_soil[hx_soil_row(HX_FOOT)][slot]) != 0.0))
       continue;
     row_of[of.count] = row;
     of.depth[of.count] = face[row].delta;

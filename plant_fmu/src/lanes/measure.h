@@ -405,7 +405,7 @@ HX_RARE void hx_cross_cells(const hxModel *model, hxDepths *depths, hxState *sta
   if (has_bristles(model, HX_FOOT)) hx_contact_slacken(&state->contact, &state->motion);
   for (int leg = 0; leg < HX_LEGS && model->has_soil; ++leg)
     if (crossed >> leg & 1 && state->contact.closed[HX_FOOT][leg] == 0.0)
-      state->contact.plastic[0][leg] = 0.0; /* the new cell is undisturbed */
+      state->contact.plastic[hx_soil_row(HX_FOOT)][leg] = 0.0; /* the new cell is undisturbed */
   hx_depths_of_moment(model, &state->contact, &state->moment, depths);
 }
 

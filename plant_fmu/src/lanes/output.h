@@ -211,7 +211,7 @@ static void fill_foot(const hxModel *model, const hxState *state, const hxLegWor
   o->foot.peak_force_rate[leg] = state->measured.peak_rate[leg];
   o->foot.landing_rate[leg] = state->measured.landing_rate[leg];
   o->foot.landings[leg] = state->measured.landings[leg];
-  o->foot.sinkage[leg] = state->contact.plastic[0][leg];
+  o->foot.sinkage[leg] = state->contact.plastic[hx_soil_row(HX_FOOT)][leg];
   o->foot.contact[leg] = state->contact.closed[HX_FOOT][leg] != 0.0;
   for (int k = 1; k < model->foot_rows; ++k)
     add_foot_row(model, state, &work->contact[model->row[k]], model->row[k], lane, leg, o);

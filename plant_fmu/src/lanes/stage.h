@@ -401,7 +401,7 @@ static inline hxVec3 bristle_rate(const hxModel *model, const hxContactState *st
   const hxReal yield = implicit->slope[pack].contact[HX_FOOT].yield;
   hxReal closed = hx_load(&state->closed[HX_FOOT][pack * HX_LANES]);
   if (!has_friction_bristles(model, HX_FOOT)) /* rigid ground beside soil has no bristles */
-    closed *= hx_load(&state->on_soil[0][pack * HX_LANES]);
+    closed *= hx_load(&state->on_soil[hx_soil_row(HX_FOOT)][pack * HX_LANES]);
   rate = hx_add_scaled(rate, closed, hx_add_scaled(dv, -hx_dot(n, dv), n));
   if (implicit->change)
     rate = hx_add_scaled(rate, -yield,
