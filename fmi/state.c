@@ -26,6 +26,14 @@ typedef struct hxStateBlock {
 
 size_t hx_instance_state_size(void) { return sizeof(hxStateBlock) + hx_component_state_size(); }
 
+/* Marks what is calculated on demand as not calculated, so that a saved state does not depend on
+ * what the importer has read. */
+static void forget_results(hxInstanceState *state) {
+  char *first = (char *)&state->variables.output;
+  memset(first, 0, (size_t)((char *)(&state->variables + 1) - first));
+  state->output_stale = state->rate_stale = 1;
+}
+
 static void save(const hxInstance *instance, void *bytes) {
   hxStateBlock *block = bytes;
   memset(&block->header, 0, sizeof block->header);
@@ -34,6 +42,7 @@ static void save(const hxInstance *instance, void *bytes) {
   block->header.format = STATE_FORMAT;
   block->header.size = (uint32_t)hx_instance_state_size();
   memcpy(&block->instance, &instance->state, sizeof instance->state);
+  forget_results(&block->instance);
   hx_component_get_state(instance->component, block->component);
 }
 

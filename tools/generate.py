@@ -106,13 +106,12 @@ def render_structure(component: Component) -> str:
         "struct hxVariables {",
         f"  hx{kind}Definition definition; /* parameters */",
         "  hxInput input;",
-        f"  hx{kind}Output output;",
     ]
     if component is PLANT:
-        lines.append(
-            "  hxCoordinates state, rate; /* of model exchange: continuous states and their "
-            "derivatives */"
-        )
+        lines += ["  hxCoordinates state; /* of model exchange */"]
+    lines += [f"  hx{kind}Output output; /* this and what follows is calculated from the above */"]
+    if component is PLANT:
+        lines += ["  hxCoordinates rate;     /* of the continuous states */"]
         lines += ["  hxIndicators indicator; /* events are their changes of sign */"]
     return "\n".join([*lines, "};", "", "#endif", ""])
 

@@ -10,7 +10,7 @@ typedef hxControllerInput hxInput; /* what the FMI layer calls it */
 struct hxVariables {
   hxControllerDefinition definition; /* parameters */
   hxInput input;
-  hxControllerOutput output;
+  hxControllerOutput output; /* this and what follows is calculated from the above */
 };
 
 #endif

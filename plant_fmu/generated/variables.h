@@ -8,8 +8,9 @@
 struct hxVariables {
   hxDefinition definition; /* parameters */
   hxInput input;
-  hxOutput output;
-  hxCoordinates state, rate; /* of model exchange: continuous states and their derivatives */
+  hxCoordinates state; /* of model exchange */
+  hxOutput output; /* this and what follows is calculated from the above */
+  hxCoordinates rate;     /* of the continuous states */
   hxIndicators indicator; /* events are their changes of sign */
 };
 

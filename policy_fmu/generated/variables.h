@@ -10,7 +10,7 @@ typedef hxPolicyInput hxInput; /* what the FMI layer calls it */
 struct hxVariables {
   hxPolicyDefinition definition; /* parameters */
   hxInput input;
-  hxPolicyOutput output;
+  hxPolicyOutput output; /* this and what follows is calculated from the above */
 };
 
 #endif
