@@ -189,7 +189,7 @@ HX_RARE hxReal hx_grid_depth_bound(const hxModel *model, int row, const hxVec3 *
 #ifndef HX_TANGENT
 /* Returns distance and normal of a smooth grid at a row's points. */
 HX_RARE hxGround hx_smooth_grid(const hxModel *model, const hxContactState *state, int row,
-                                int slot, int all, const hxVec3 *point) {
+                                int slot, int all, const hxVec3 *point, hxPatchNodes *nodes) {
   const hxReal zero = hx_splat(0.0), one = hx_splat(1.0);
   const hxReal at[3] = {point->x, point->y, point->z - model->ground_point[2]};
   hxReal normal[3], distance = hx_splat(hx_far);
@@ -204,7 +204,12 @@ HX_RARE hxGround hx_smooth_grid(const hxModel *model, const hxContactState *stat
   const int is_foot = row == HX_FOOT;
   const hxReal from[2] = {is_foot ? hx_load(&state->nearest[0][slot]) : zero,
                           is_foot ? hx_load(&state->nearest[1][slot]) : zero};
-  const hxNearest nearest = hx_nearest_on_surface(model->terrain, wanted, at, from, 0);
+  hxPatchNodes own;
+  if (!nodes) {
+    hx_forget_nodes(&own);
+    nodes = &own;
+  }
+  const hxNearest nearest = hx_nearest_on_surface(model->terrain, wanted, at, from, 0, nodes);
   const hxReal exact = hx_distance_from_surface(&nearest, at, normal);
   return (hxGround){hx_select(wanted, exact, distance),
                     {hx_select(wanted, normal[0], zero), hx_select(wanted, normal[1], zero),
@@ -255,19 +260,20 @@ HX_RARE hxGround hx_block_tops(const hxModel *model, const hxContactState *state
 #endif
 
 /* Returns distance and normal of the ground at the points of a row of contacts. All other code is
- * independent of the terrain. */
+ * independent of the terrain. `nodes`: of feet, from an earlier search; NULL: none. */
 HX_INLINE hxGround hx_ground(const hxModel *model, const hxContactState *state, int row, int slot,
-                             int all, hxVec3 point) {
+                             int all, hxVec3 point, hxPatchNodes *nodes) {
   if (model->terrain_kind == HX_TERRAIN_FLAT)
     return (hxGround){point.z - model->ground_point[2],
                       {hx_splat(0.0), hx_splat(0.0), hx_splat(1.0)}};
 #ifndef HX_TANGENT
   if (model->terrain_kind == HX_TERRAIN_GRID &&
       hx_terrain_surface(model->terrain) == HX_SURFACE_SMOOTH)
-    return hx_smooth_grid(model, state, row, slot, all, &point);
+    return hx_smooth_grid(model, state, row, slot, all, &point, nodes);
   if (model->terrain_kind == HX_TERRAIN_GRID && row == HX_FOOT && all == HX_CLOSED)
     return hx_block_tops(model, state, slot, &point);
 #endif
+  (void)nodes;
   if (model->terrain_kind == HX_TERRAIN_GRID) return hx_grid(model, state, row, slot, all, &point);
   const hxVec3 n = hx_splat_vec3(model->ground_normal);
   return (hxGround){hx_dot(n, hx_sub3(point, hx_splat_vec3(model->ground_point))), n};
@@ -355,15 +361,35 @@ HX_RARE void replace_by_soil(const hxModel *model, const hxContactState *state, 
                                  .yield = hx_select(soft, yield, rigid.yield)};
 }
 
+/* What is known of the places of contacts on a grid: all of them, where a moment of the same motion
+ * is given, and the nodes around the feet of an earlier motion, pack by pack. NULL: not known. */
+typedef struct {
+  const hxMoment *moment;
+  hxPatchNodes *nodes;
+} hxKnown;
+
+/* Returns distance and normal of a grid at a row's points from the moment of the same motion. */
+HX_INLINE hxGround known_ground(const hxModel *model, const hxMoment *moment, int row, int slot) {
+  const hxContactMoment *contact = &moment->contact[row];
+  return (hxGround){model->radius[row] - hx_load(&contact->delta[slot]),
+                    hx_load_vec3(contact->normal, slot)};
+}
+
 /* Computes contact point, penetration and velocity of a row of contacts from the motion of their
  * bodies: centres of mass r, their velocities v, orientations and angular velocities. */
 HX_INLINE hxContactKinematics hx_contact_kinematics(const hxModel *model,
-                                                    const hxContactState *state, int row, int slot,
+                                                    const hxContactState *state,
+                                                    const hxKnown *known, int row, int slot,
                                                     int all, hxVec3 r, hxVec3 v,
                                                     const hxBody *body) {
   const hxNumber radius = model->radius[row];
   const hxVec3 to_centre = hx_mul(body->R_WB, hx_load_vec3(model->point[row], slot));
-  const hxGround ground = hx_ground(model, state, row, slot, all, hx_add3(r, to_centre));
+  const int is_known = known && known->moment && model->terrain_kind == HX_TERRAIN_GRID;
+  hxPatchNodes *nodes =
+      known && known->nodes && row == HX_FOOT ? &known->nodes[slot / HX_LANES] : NULL;
+  const hxGround ground =
+      is_known ? known_ground(model, known->moment, row, slot)
+               : hx_ground(model, state, row, slot, all, hx_add3(r, to_centre), nodes);
   const hxVec3 arm = hx_add_scaled(to_centre, hx_splat(-radius), ground.normal);
   const hxVec3 velocity = hx_add3(v, hx_cross(body->w, arm));
   return (hxContactKinematics){arm, ground.normal, radius - ground.distance,
@@ -372,9 +398,9 @@ HX_INLINE hxContactKinematics hx_contact_kinematics(const hxModel *model,
 
 /* Returns the kinematics of a row of contacts on the tibias. */
 HX_INLINE hxContactKinematics hx_tibia_contact(const hxModel *model, const hxContactState *state,
-                                               const hxPlantMotion *motion, int row, int slot,
-                                               int all, const hxBody *tibia) {
-  return hx_contact_kinematics(model, state, row, slot, all,
+                                               const hxPlantMotion *motion, const hxKnown *known,
+                                               int row, int slot, int all, const hxBody *tibia) {
+  return hx_contact_kinematics(model, state, known, row, slot, all,
                                hx_link_vec3(motion, HX_JOINTS - 1, HX_R, slot),
                                hx_link_vec3(motion, HX_JOINTS - 1, HX_V, slot), tibia);
 }
@@ -384,7 +410,7 @@ static inline hxContactKinematics hx_torso_contact(const hxModel *model,
                                                    const hxContactState *state,
                                                    const hxPlantMotion *motion, int slot, int all,
                                                    const hxBody *torso) {
-  return hx_contact_kinematics(model, state, HX_TORSO, slot, all, hx_torso_vec3(motion, HX_R),
+  return hx_contact_kinematics(model, state, NULL, HX_TORSO, slot, all, hx_torso_vec3(motion, HX_R),
                                hx_torso_vec3(motion, HX_V), torso);
 }
 

@@ -39,6 +39,7 @@ typedef struct {
   hxTrial trial, nearer;
   hxMoment end;
   hxModel tops;           /* the model with one row of feet */
+  hxPatchNodes nodes[HX_PACKS]; /* around the feet, of a call */
   double last_evaluation; /* number at which the call's limit is spent */
 } hxScratch;
 
@@ -61,7 +62,7 @@ typedef struct {
 static inline void hx_depths_of(const hxModel *model, const hxContactState *state,
                                 const hxPlantMotion *motion, hxDepths *depths) {
   hxMoment moment;
-  hx_moment_and_bound(model, NULL, state, motion, HX_ALL, &moment);
+  hx_moment_and_bound(model, NULL, state, motion, HX_ALL, NULL, &moment);
   hx_depths_of_moment(model, state, &moment, depths);
 }
 
@@ -310,8 +311,9 @@ static void try_step(const hxStart *start, double h, hxState *state, hxTrial *tr
     }
     const hxCommand *command = command_at(start, t, &now);
     hxImplicit *stage = m->gamma > 0.0 ? implicit : NULL;
+    const hxKnown known = {i > 0 ? NULL : &state->moment, start->scratch->nodes};
     hx_dynamics_evaluate(model, start->contact, command, t, i > 0 ? y : start->y,
-                         i > 0 ? NULL : &state->moment, stage, 0, work, &k[i]);
+                         &known, stage, 0, work, &k[i]);
     hx_add_impulses(model, command, stage, work, h * m->b[i], &trial->impulses);
     state->evaluations += 1.0;
   }
@@ -527,7 +529,8 @@ static const hxModel *end_of_step(const hxStart *start, const hxPlantMotion *y, 
                                   hxDepths *depths) {
   const hxModel *whole = start->model, *seen = start->near;
   if (seen != whole) {
-    const double bound = hx_moment_and_bound(seen, whole, start->contact, y, HX_NEAR, end);
+    const double bound = hx_moment_and_bound(seen, whole, start->contact, y, HX_NEAR,
+                                             start->scratch->nodes, end);
     hx_depths_of_moment(seen, start->contact, end, depths);
     if (!(bound > 0.0 || deepest_open(seen, start, depths) > 0.0)) return seen;
   }
@@ -674,6 +677,8 @@ static hxStatus hx_integrate(const hxModel *model, const hxCommand *command, con
                              char *message) {
   ((hxScratch *)scratch)->last_evaluation =
       state->evaluations + evaluations_allowed(model, t_end - command->time);
+  for (int pack = 0; pack < HX_PACKS; ++pack)
+    hx_forget_nodes(&((hxScratch *)scratch)->nodes[pack]);
   if (state->moment.stale != 0.0) hx_moment_update(model, state);
   keep_nearest_points(model, state);
   if (command->time == state->time && t_end > state->time && !events->continues)

@@ -61,9 +61,10 @@ HX_INLINE void store_contact_moment(const hxModel *model, const hxContactKinemat
 
 /* Stores a row of contacts on the tibias. */
 HX_INLINE void row_moment(const hxModel *model, const hxContactState *state,
-                          const hxPlantMotion *motion, int row, int slot, int all,
-                          const hxBody *tibia, hxMoment *moment) {
-  const hxContactKinematics kin = hx_tibia_contact(model, state, motion, row, slot, all, tibia);
+                          const hxPlantMotion *motion, const hxKnown *known, int row, int slot,
+                          int all, const hxBody *tibia, hxMoment *moment) {
+  const hxContactKinematics kin =
+      hx_tibia_contact(model, state, motion, known, row, slot, all, tibia);
   store_contact_moment(model, &kin, row, slot, hx_link_vec3(motion, HX_JOINTS - 1, HX_R, slot),
                        tibia->w, &moment->contact[row]);
 }
@@ -92,7 +93,7 @@ HX_RARE void further_moments(const hxModel *model, const hxContactState *state,
     if (is_of_foot && search->beside == HX_CLOSED && !is_used(state, row, slot))
       far_row_moment(model, row, slot, moment);
     else
-      row_moment(model, state, motion, row, slot, is_of_foot ? search->beside : search->others,
+      row_moment(model, state, motion, NULL, row, slot, is_of_foot ? search->beside : search->others,
                  tibia, moment);
   }
 }
@@ -129,7 +130,7 @@ HX_RARE void search_near_blocks(const hxModel *model, const hxContactState *stat
 HX_INLINE hxReal depth_bound(const hxModel *model, int row, int slot, hxVec3 r, const hxMat3 *R) {
   const hxVec3 point = hx_add3(r, hx_mul(*R, hx_load_vec3(model->point[row], slot)));
   if (model->terrain_kind == HX_TERRAIN_GRID) return hx_grid_depth_bound(model, row, &point);
-  return model->radius[row] - hx_ground(model, NULL, row, slot, 0, point).distance;
+  return model->radius[row] - hx_ground(model, NULL, row, slot, 0, point, NULL).distance;
 }
 
 /* Returns the largest of these of knees and shanks, from the centre of mass of their tibias. */
@@ -212,10 +213,11 @@ HX_RARE hxReal hx_deepest_pair(const hxModel *model, const hxPlantMotion *motion
 
 /* Computes angles, speeds and contacts of a motion, on a grid those that `all` says. With `whole`,
  * the model whose rows of bodies `model` leaves out, it returns the largest depth that one of their
- * contacts may have, m. */
+ * contacts may have, m. `nodes`: as in hxKnown. */
 static inline double hx_moment_and_bound(const hxModel *model, const hxModel *whole,
                                          const hxContactState *state, const hxPlantMotion *motion,
-                                         int all, hxMoment *moment) {
+                                         int all, hxPatchNodes *nodes, hxMoment *moment) {
+  const hxKnown known = {.nodes = nodes};
   const hxBody torso = hx_torso_body(motion);
   hxReal bound = hx_splat(-HUGE_VAL);
   for (int slot = 0; slot < HX_PACKS * HX_LANES; slot += HX_LANES) {
@@ -238,7 +240,7 @@ static inline double hx_moment_and_bound(const hxModel *model, const hxModel *wh
                                     hx_mul(j.R_WB, hx_load_vec3(model->point[HX_FOOT], slot)));
       search_near_blocks(model, state, slot, &centre, &search);
     }
-    row_moment(model, state, motion, HX_FOOT, slot, search.below, &j, moment);
+    row_moment(model, state, motion, &known, HX_FOOT, slot, search.below, &j, moment);
     if (model->rows > 1) further_moments(model, state, motion, slot, &search, &j, moment);
     if (whole) bound = tibia_depth_bound(whole, motion, slot, &j.R_WB, bound);
   }
@@ -258,7 +260,7 @@ static inline double hx_moment_and_bound(const hxModel *model, const hxModel *wh
 /* Computes the same without a bound. */
 static inline void hx_moment_of(const hxModel *model, const hxContactState *state,
                                 const hxPlantMotion *motion, hxMoment *moment) {
-  hx_moment_and_bound(model, NULL, state, motion, HX_NEAR, moment);
+  hx_moment_and_bound(model, NULL, state, motion, HX_NEAR, NULL, moment);
 }
 
 /* Copies a moment, of contacts those of the model's rows. */
