@@ -327,7 +327,7 @@ HX_RARE void replace_body_by_soil(const hxModel *model, const hxContactState *st
                                   int slot, hxContactWork *contact) {
   const hxMask soft = hx_on_soil(state, row, slot);
   const hxContactKinematics *kin = &contact->kin;
-  const hxSoilPack f = hx_soil_pack(state, row, slot, kin->delta, kin->ddelta);
+  const hxSoilPack f = hx_soil_pack(state, row, slot, kin->delta, kin->ddelta, NULL);
   const hxReal drag = f.shear * hx_per_speed(model, contact->slip_speed);
   soil_load(soft, &f, contact);
   contact->drag = hx_select(soft, drag, contact->drag);
@@ -338,10 +338,11 @@ HX_RARE void replace_body_by_soil(const hxModel *model, const hxContactState *st
 /* Replaces the forces on feet by those of soil where they touched down on it: f_n along the normal
  * and the shear -(T_0 + f_n tan phi) b/K across it (eq. 44-47). */
 HX_RARE void replace_by_soil(const hxModel *model, const hxContactState *state, int slot,
-                             const hxPlantMotion *motion, hxContactWork *contact) {
+                             const hxPlantMotion *motion, const hxSoilCurves *virgin,
+                             hxContactWork *contact) {
   const hxMask soft = hx_on_soil(state, HX_FOOT, slot);
   const hxContactKinematics *kin = &contact->kin;
-  const hxSoilPack f = hx_soil_pack(state, HX_FOOT, slot, kin->delta, kin->ddelta);
+  const hxSoilPack f = hx_soil_pack(state, HX_FOOT, slot, kin->delta, kin->ddelta, virgin);
   const hxVec3 b = hx_load_vec3(motion->bristle, slot), none = hx_zero3();
   const hxReal zero = hx_splat(0.0), yield = f.per_displacement * contact->slip_speed;
   const hxBristle rigid = has_friction_bristles(model, HX_FOOT)
@@ -361,11 +362,11 @@ HX_RARE void replace_by_soil(const hxModel *model, const hxContactState *state, 
                                  .yield = hx_select(soft, yield, rigid.yield)};
 }
 
-/* What is known of the places of contacts on a grid: all of them, where a moment of the same motion
- * is given, and the nodes around the feet of an earlier motion, pack by pack. NULL: not known. */
+/* What is known of contacts before they are computed; NULL: nothing. */
 typedef struct {
-  const hxMoment *moment;
-  hxPatchNodes *nodes;
+  const hxMoment *moment;     /* of the same motion: angles, and places of all contacts on a grid */
+  hxPatchNodes *nodes;        /* around the feet of an earlier motion, pack by pack */
+  const hxSoilCurves *virgin; /* under the feet at the same depths, pack by pack */
 } hxKnown;
 
 /* Returns distance and normal of a grid at a row's points from the moment of the same motion. */
@@ -475,11 +476,12 @@ HX_INLINE void rigid_force(const hxModel *model, const hxContactState *state, in
 
 /* Computes the force of the ground on a row of contacts. */
 HX_INLINE void hx_contact_force(const hxModel *model, const hxContactState *state, int row,
-                                int slot, const hxPlantMotion *motion, hxContactWork *contact) {
+                                int slot, const hxPlantMotion *motion, const hxSoilCurves *virgin,
+                                hxContactWork *contact) {
   rigid_force(model, state, row, slot, motion, contact);
   if (!has_soil(model, row)) return;
   if (row == HX_FOOT)
-    replace_by_soil(model, state, slot, motion, contact);
+    replace_by_soil(model, state, slot, motion, virgin, contact);
   else
     replace_body_by_soil(model, state, row, slot, contact);
 }

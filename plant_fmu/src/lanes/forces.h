@@ -230,10 +230,13 @@ HX_INLINE void leg_contact(const hxModel *model, const hxContactState *state,
 
 /* Computes the contact force of a row and applies it to the tibia. */
 HX_INLINE void push_leg(const hxModel *model, const hxContactState *state,
-                        const hxPlantMotion *motion, int row, int slot, hxLegWork *leg) {
+                        const hxPlantMotion *motion, const hxKnown *known, int row, int slot,
+                        hxLegWork *leg) {
   hxJointWork *tibia = &leg->joint[HX_JOINTS - 1];
   hxContactWork *contact = &leg->contact[row];
-  hx_contact_force(model, state, row, slot, motion, contact);
+  const hxSoilCurves *virgin =
+      known && known->virgin && row == HX_FOOT ? &known->virgin[slot / HX_LANES] : NULL;
+  hx_contact_force(model, state, row, slot, motion, virgin, contact);
   push_body(&tibia->p, contact_point(leg, contact), contact->force);
   if (has_turning_friction(model, row)) {
     hx_contact_moment(model, state, row, slot, &tibia->body.w, contact);
@@ -285,7 +288,7 @@ HX_RARE void further_contacts(const hxModel *model, const hxContactState *state,
 
 HX_RARE void push_further(const hxModel *model, const hxContactState *state,
                           const hxPlantMotion *motion, int slot, hxLegWork *leg) {
-  for (int k = 1; k < leg->rows; ++k) push_leg(model, state, motion, leg->row[k], slot, leg);
+  for (int k = 1; k < leg->rows; ++k) push_leg(model, state, motion, NULL, leg->row[k], slot, leg);
 }
 
 /* Computes the contact forces of a leg; without all, only those of rows with closed contacts. */
@@ -295,7 +298,7 @@ static inline void leg_contacts(const hxModel *model, const hxContactState *stat
   leg->rows = 1, leg->row[0] = HX_FOOT;
   leg_contact(model, state, motion, known, HX_FOOT, slot, all, leg);
   if (model->rows > 1) further_contacts(model, state, motion, known, slot, all, leg);
-  push_leg(model, state, motion, HX_FOOT, slot, leg);
+  push_leg(model, state, motion, known, HX_FOOT, slot, leg);
   if (leg->rows > 1) push_further(model, state, motion, slot, leg);
 }
 
@@ -310,7 +313,7 @@ HX_RARE void torso_contacts(const hxModel *model, const hxContactState *state,
     const int slot = pack * HX_LANES;
     contact->kin = hx_torso_contact(model, state, motion, slot, all, &work->torso);
     contact->law = hx_law_at(state, HX_TORSO, slot);
-    hx_contact_force(model, state, HX_TORSO, slot, motion, contact);
+    hx_contact_force(model, state, HX_TORSO, slot, motion, NULL, contact);
     work->torso_p[pack] = (hxForce6){hx_zero3(), hx_zero3()};
     push_body(&work->torso_p[pack], contact->kin.arm, contact->force);
   }
@@ -345,8 +348,8 @@ static inline void torso_pass(const hxModel *model, const hxPlantMotion *motion,
 }
 
 /* Computes positions, velocities and forces at (t, y). Fills work except for the sweeps; with
- * reactions it also keeps what the multipliers need. Angles, and on grids the places of contacts,
- * are those of the motion's moment, or computed where it is not known (NULL). */
+ * reactions it also keeps what the multipliers need. What is known of
+ * angles and contacts is not computed again. */
 static inline void hx_dynamics_forces(const hxModel *model, const hxContactState *contact,
                                       const hxCommand *command, double t,
                                       const hxPlantMotion *motion, const hxKnown *known,

@@ -43,6 +43,7 @@ typedef struct {
   double t, h;                             /* s  start and length */
   const hxMoment *from, *to;
   double plastic[HX_SOIL_ROWS][HX_SLOTS]; /* m  plastic depths at its end; set with soil */
+  const hxSoilEnds *ends;                 /* set with soil */
 } hxPath;
 
 /* ---- moments ---- */
@@ -450,10 +451,14 @@ HX_RARE hxReal growth_with_soil(const hxPath *path, int row, int slot, hxReal ri
   const hxSoils soil = hx_soils_under(state, row, slot);
   const hxReal from = hx_load(&path->from->contact[row].delta[slot]),
                to = hx_load(&path->to->contact[row].delta[slot]);
-  return hx_select(in,
-                   hx_stored_energy(&soil, hx_load(&path->plastic[soft][slot]), to) -
-                       hx_stored_energy(&soil, hx_load(&state->plastic[soft][slot]), from),
-                   rigid);
+  const int pack = slot / HX_LANES, is_foot = row == HX_FOOT;
+  const hxSoilCurves virgin_from = is_foot ? path->ends->from[pack] : hx_virgin(&soil, from),
+                     virgin_to = is_foot ? path->ends->to[pack] : hx_virgin(&soil, to);
+  return hx_select(
+      in,
+      hx_stored_energy(&soil, hx_load(&path->plastic[soft][slot]), to, virgin_to) -
+          hx_stored_energy(&soil, hx_load(&state->plastic[soft][slot]), from, virgin_from),
+      rigid);
 }
 
 /* Computes what a row of contacts and its friction lose in a step with these impulses (eq. 27). */
@@ -752,6 +757,13 @@ typedef struct {
   hxReal force, rate, speed;
 } hxFootInstant;
 
+/* Returns the virgin curves under feet at an end of a step, NULL within it. */
+static inline const hxSoilCurves *virgin_at(const hxPath *path, int slot, double x) {
+  return x == 0.0   ? &path->ends->from[slot / HX_LANES]
+         : x == 1.0 ? &path->ends->to[slot / HX_LANES]
+                    : NULL;
+}
+
 /* Computes them for a row of feet at x in [0, 1]. */
 HX_INLINE hxFootInstant foot_at(const hxPath *path, const hxFootPath *foot, double x) {
   const hxReal per_step = hx_splat(1.0 / path->h);
@@ -763,7 +775,8 @@ HX_INLINE hxFootInstant foot_at(const hxPath *path, const hxFootPath *foot, doub
   if (has_shares(path, foot->row)) law.stiffness *= foot->share + x * foot->share_rise;
   hxNormalForce f = hx_normal_force(law, depth.value, approach);
   if (has_soil(path->model, foot->row))
-    f = with_soil(path->contact, foot->slot, depth.value, approach, f);
+    f = with_soil(path->contact, foot->slot, depth.value, approach, virgin_at(path, foot->slot, x),
+                  f);
   const hxVec3 slip = sliding(foot->slip_from, foot->slip_to, foot->mean_slip, x);
   return (hxFootInstant){f.force, f.stiffness * approach + f.viscosity * (bends * depth.second),
                          hx_sqrt(hx_dot(slip, slip))};
@@ -822,13 +835,15 @@ HX_INLINE hxReal share_within(const hxPath *path, int row, int leg, hxReal x) {
 /* Returns the normal forces of a leg's contact with soil, N, samples in lanes. */
 HX_RARE hxReal soil_within(const hxPath *path, int row, int leg, const hxReal *depth,
                            const hxReal *rate) {
-  const hxSoil soil = hx_soil_under(path->contact, row, leg);
-  const double plastic = path->contact->plastic[hx_soil_row(row)][leg];
-  double delta[HX_LANES], slope[HX_LANES], force[HX_LANES];
-  hx_store(delta, *depth), hx_store(slope, *rate);
-  for (int lane = 0; lane < HX_LANES; ++lane)
-    force[lane] = hx_soil_normal_force(&soil, plastic, delta[lane], slope[lane] / path->h).force;
-  return hx_load(force);
+  hxSoils soil;
+  hxReal numbers[HX_SOIL_SIZE];
+  const int soft = hx_soil_row(row);
+  for (int i = 0; i < HX_SOIL_SIZE; ++i)
+    numbers[i] = hx_splat(path->contact->soil[soft][i][leg]);
+  memcpy(&soil, numbers, sizeof soil);
+  return hx_soil_forces(&soil, hx_splat(path->contact->plastic[soft][leg]), *depth,
+                        *rate / path->h, hx_virgin(&soil, *depth))
+      .force;
 }
 
 /* Returns the normal forces of a leg's contact at x in [0, 1] of a step, N, samples in lanes. */
