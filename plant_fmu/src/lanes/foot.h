@@ -247,15 +247,30 @@ HX_RARE hxGround hx_grid(const hxModel *model, const hxContactState *state, int 
 }
 
 #ifndef HX_TANGENT
-/* Returns the distances of closed feet from the tops of the columns on which they stand. */
-HX_RARE hxGround hx_block_tops(const hxModel *model, const hxContactState *state, int slot,
+/* Returns which open contacts of a pack the choice contains. */
+static inline hxMask listed_lanes(int all, int slot) {
+  double listed[HX_LANES];
+  for (int lane = 0; lane < HX_LANES; ++lane)
+    listed[lane] = hx_is_listed(all, slot == 0 && lane >= HX_LEGS ? 0 : lane) ? 1.0 : 0.0;
+  return hx_less(hx_splat(0.0), hx_load(listed));
+}
+
+/* Returns the distances of feet from the tops of the columns that are held for them, or below them;
+ * with the bits of hx_terrain_face. */
+HX_RARE hxGround hx_block_tops(const hxModel *model, const hxContactState *state, int slot, int all,
                                const hxVec3 *point) {
   const hxReal zero = hx_splat(0.0), z = point->z - model->ground_point[2];
   const hxGridHead *head = &model->terrain->head;
-  const hxReal top = entries_at(model->terrain->height, head->rows, head->cols,
-                                hx_load(&state->cell[0][slot]), hx_load(&state->cell[1][slot]));
-  const hxMask closed = hx_less(zero, hx_load(&state->closed[HX_FOOT][slot]));
-  return (hxGround){hx_select(closed, z - top, hx_splat(hx_far)), {zero, zero, hx_splat(1.0)}};
+  hxReal col = hx_load(&state->cell[0][slot]), row = hx_load(&state->cell[1][slot]);
+  hxMask wanted = hx_less(zero, hx_load(&state->closed[HX_FOOT][slot]));
+  if (all != HX_CLOSED) {
+    const hxMask below = hx_less(col, zero);
+    col = hx_select(below, (point->x - head->x0) / head->cell, col);
+    row = hx_select(below, (point->y - head->y0) / head->cell, row);
+    wanted |= listed_lanes(all, slot);
+  }
+  const hxReal top = entries_at(model->terrain->height, head->rows, head->cols, col, row);
+  return (hxGround){hx_select(wanted, z - top, hx_splat(hx_far)), {zero, zero, hx_splat(1.0)}};
 }
 #endif
 
@@ -270,8 +285,8 @@ HX_INLINE hxGround hx_ground(const hxModel *model, const hxContactState *state, 
   if (model->terrain_kind == HX_TERRAIN_GRID &&
       hx_terrain_surface(model->terrain) == HX_SURFACE_SMOOTH)
     return hx_smooth_grid(model, state, row, slot, all, &point, nodes);
-  if (model->terrain_kind == HX_TERRAIN_GRID && row == HX_FOOT && all == HX_CLOSED)
-    return hx_block_tops(model, state, slot, &point);
+  if (model->terrain_kind == HX_TERRAIN_GRID && row == HX_FOOT && all != HX_NEAR)
+    return hx_block_tops(model, state, slot, all, &point);
 #endif
   (void)nodes;
   if (model->terrain_kind == HX_TERRAIN_GRID) return hx_grid(model, state, row, slot, all, &point);
@@ -369,6 +384,26 @@ typedef struct {
   const hxSoilCurves *virgin; /* under the feet at the same depths, pack by pack */
 } hxKnown;
 
+#ifdef HX_TANGENT
+/* Points of numbers with derivatives are computed one by one. */
+static inline hxPatchNodes *known_nodes(const hxKnown *known, int row, int slot) {
+  (void)known, (void)row, (void)slot;
+  return NULL;
+}
+static inline const hxSoilCurves *known_virgin(const hxKnown *known, int row, int slot) {
+  (void)known, (void)row, (void)slot;
+  return NULL;
+}
+#else
+/* Returns what is known of a pack of a row; NULL: nothing. */
+static inline hxPatchNodes *known_nodes(const hxKnown *known, int row, int slot) {
+  return known && known->nodes && row == HX_FOOT ? &known->nodes[slot / HX_LANES] : NULL;
+}
+static inline const hxSoilCurves *known_virgin(const hxKnown *known, int row, int slot) {
+  return known && known->virgin && row == HX_FOOT ? &known->virgin[slot / HX_LANES] : NULL;
+}
+#endif
+
 /* Returns distance and normal of a grid at a row's points from the moment of the same motion. */
 HX_INLINE hxGround known_ground(const hxModel *model, const hxMoment *moment, int row, int slot) {
   const hxContactMoment *contact = &moment->contact[row];
@@ -386,11 +421,9 @@ HX_INLINE hxContactKinematics hx_contact_kinematics(const hxModel *model,
   const hxNumber radius = model->radius[row];
   const hxVec3 to_centre = hx_mul(body->R_WB, hx_load_vec3(model->point[row], slot));
   const int is_known = known && known->moment && model->terrain_kind == HX_TERRAIN_GRID;
-  hxPatchNodes *nodes =
-      known && known->nodes && row == HX_FOOT ? &known->nodes[slot / HX_LANES] : NULL;
-  const hxGround ground =
-      is_known ? known_ground(model, known->moment, row, slot)
-               : hx_ground(model, state, row, slot, all, hx_add3(r, to_centre), nodes);
+  const hxGround ground = is_known ? known_ground(model, known->moment, row, slot)
+                                   : hx_ground(model, state, row, slot, all, hx_add3(r, to_centre),
+                                               known_nodes(known, row, slot));
   const hxVec3 arm = hx_add_scaled(to_centre, hx_splat(-radius), ground.normal);
   const hxVec3 velocity = hx_add3(v, hx_cross(body->w, arm));
   return (hxContactKinematics){arm, ground.normal, radius - ground.distance,

@@ -234,9 +234,7 @@ HX_INLINE void push_leg(const hxModel *model, const hxContactState *state,
                         hxLegWork *leg) {
   hxJointWork *tibia = &leg->joint[HX_JOINTS - 1];
   hxContactWork *contact = &leg->contact[row];
-  const hxSoilCurves *virgin =
-      known && known->virgin && row == HX_FOOT ? &known->virgin[slot / HX_LANES] : NULL;
-  hx_contact_force(model, state, row, slot, motion, virgin, contact);
+  hx_contact_force(model, state, row, slot, motion, known_virgin(known, row, slot), contact);
   push_body(&tibia->p, contact_point(leg, contact), contact->force);
   if (has_turning_friction(model, row)) {
     hx_contact_moment(model, state, row, slot, &tibia->body.w, contact);
@@ -276,8 +274,8 @@ HX_RARE void share_feet(const hxModel *model, const hxContactState *state, int s
 }
 
 HX_RARE void further_contacts(const hxModel *model, const hxContactState *state,
-                              const hxPlantMotion *motion, const hxKnown *known, int slot,
-                              int all, hxLegWork *leg) {
+                              const hxPlantMotion *motion, const hxKnown *known, int slot, int all,
+                              hxLegWork *leg) {
   for (int k = 1; k < model->rows; ++k)
     if (all || is_used(state, model->row[k], slot)) {
       leg->row[leg->rows++] = model->row[k];

@@ -38,11 +38,11 @@ typedef struct {
   hxPlantMotion y;
   hxTrial trial, nearer;
   hxMoment end;
-  hxModel tops;           /* the model with one row of feet */
+  hxModel tops;                 /* the model with one row of feet */
   hxPatchNodes nodes[HX_PACKS]; /* around the feet, of a call */
   hxSoilEnds soil;              /* of the last step */
   int is_soil_known;            /* 1: soil.from belongs to the present depths of feet */
-  double last_evaluation; /* number at which the call's limit is spent */
+  double last_evaluation;       /* number at which the call's limit is spent */
 } hxScratch;
 
 /* Start of a step and the data that all its trials share. */
@@ -316,8 +316,8 @@ static void try_step(const hxStart *start, double h, hxState *state, hxTrial *tr
     const hxKnown known = {i > 0 ? NULL : &state->moment, start->scratch->nodes,
                            i == 0 && start->scratch->is_soil_known ? start->scratch->soil.from
                                                                    : NULL};
-    hx_dynamics_evaluate(model, start->contact, command, t, i > 0 ? y : start->y,
-                         &known, stage, 0, work, &k[i]);
+    hx_dynamics_evaluate(model, start->contact, command, t, i > 0 ? y : start->y, &known, stage, 0,
+                         work, &k[i]);
     hx_add_impulses(model, command, stage, work, h * m->b[i], &trial->impulses);
     state->evaluations += 1.0;
   }
@@ -539,8 +539,8 @@ static const hxModel *end_of_step(const hxStart *start, const hxPlantMotion *y, 
                                   hxDepths *depths) {
   const hxModel *whole = start->model, *seen = start->near;
   if (seen != whole) {
-    const double bound = hx_moment_and_bound(seen, whole, start->contact, y, HX_NEAR,
-                                             start->scratch->nodes, end);
+    const double bound =
+        hx_moment_and_bound(seen, whole, start->contact, y, HX_NEAR, start->scratch->nodes, end);
     hx_depths_of_moment(seen, start->contact, end, depths);
     if (!(bound > 0.0 || deepest_open(seen, start, depths) > 0.0)) return seen;
   }
@@ -688,8 +688,7 @@ static hxStatus hx_integrate(const hxModel *model, const hxCommand *command, con
                              char *message) {
   ((hxScratch *)scratch)->last_evaluation =
       state->evaluations + evaluations_allowed(model, t_end - command->time);
-  for (int pack = 0; pack < HX_PACKS; ++pack)
-    hx_forget_nodes(&((hxScratch *)scratch)->nodes[pack]);
+  for (int pack = 0; pack < HX_PACKS; ++pack) hx_forget_nodes(&((hxScratch *)scratch)->nodes[pack]);
   ((hxScratch *)scratch)->is_soil_known = 0;
   if (state->moment.stale != 0.0) hx_moment_update(model, state);
   keep_nearest_points(model, state);

@@ -94,8 +94,8 @@ HX_RARE void further_moments(const hxModel *model, const hxContactState *state,
     if (is_of_foot && search->beside == HX_CLOSED && !is_used(state, row, slot))
       far_row_moment(model, row, slot, moment);
     else
-      row_moment(model, state, motion, NULL, row, slot, is_of_foot ? search->beside : search->others,
-                 tibia, moment);
+      row_moment(model, state, motion, NULL, row, slot,
+                 is_of_foot ? search->beside : search->others, tibia, moment);
   }
 }
 
@@ -838,11 +838,10 @@ HX_RARE hxReal soil_within(const hxPath *path, int row, int leg, const hxReal *d
   hxSoils soil;
   hxReal numbers[HX_SOIL_SIZE];
   const int soft = hx_soil_row(row);
-  for (int i = 0; i < HX_SOIL_SIZE; ++i)
-    numbers[i] = hx_splat(path->contact->soil[soft][i][leg]);
+  for (int i = 0; i < HX_SOIL_SIZE; ++i) numbers[i] = hx_splat(path->contact->soil[soft][i][leg]);
   memcpy(&soil, numbers, sizeof soil);
-  return hx_soil_forces(&soil, hx_splat(path->contact->plastic[soft][leg]), *depth,
-                        *rate / path->h, hx_virgin(&soil, *depth))
+  return hx_soil_forces(&soil, hx_splat(path->contact->plastic[soft][leg]), *depth, *rate / path->h,
+                        hx_virgin(&soil, *depth))
       .force;
 }
 

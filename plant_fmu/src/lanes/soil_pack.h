@@ -95,8 +95,7 @@ static inline hxMask hx_in_soil(const hxContactState *state, int row, int slot) 
 }
 
 /* Returns the virgin curves under a row at these depths; 0 where it is not in soil. */
-HX_RARE hxSoilCurves hx_virgin_under(const hxContactState *state, int row, int slot,
-                                     hxReal delta) {
+HX_RARE hxSoilCurves hx_virgin_under(const hxContactState *state, int row, int slot, hxReal delta) {
   const hxReal none = hx_splat(0.0);
   const hxMask in = hx_in_soil(state, row, slot);
   if (!hx_any(in)) return (hxSoilCurves){none, none};
@@ -113,9 +112,8 @@ HX_RARE hxSoilPack hx_soil_pack(const hxContactState *state, int row, int slot, 
   if (!hx_any(in)) return (hxSoilPack){none, none, none, none, none, none, none, none, none};
   const hxSoils soil = hx_soils_under(state, row, slot);
   const hxReal z = hx_select(in, delta, none);
-  const hxSoilContacts f =
-      hx_soil_contacts(&soil, hx_load(&state->plastic[hx_soil_row(row)][slot]), z, ddelta,
-                       virgin ? *virgin : hx_virgin(&soil, z));
+  const hxSoilContacts f = hx_soil_contacts(&soil, hx_load(&state->plastic[hx_soil_row(row)][slot]),
+                                            z, ddelta, virgin ? *virgin : hx_virgin(&soil, z));
   return (hxSoilPack){
       .force = hx_select(in, f.normal.force, none),
       .stiffness = hx_select(in, f.normal.stiffness, none),

@@ -56,8 +56,8 @@ static inline double hx_deepest(double from, double slope_from, double to, doubl
   return fmax(from + x * (slope_from + x * (curve + x * bend)), fmax(from, to));
 }
 
-/* Returns the virgin curves at the largest depths on a step's path, which mostly are those of one of
- * its ends; ends NULL: not known. */
+/* Returns the virgin curves at the largest depths on a step's path, which mostly are those of one
+ * of its ends; ends NULL: not known. */
 HX_RARE hxSoilCurves deepest_virgin(const hxSoils *soil, hxMask in, const hxSoilEnds *ends,
                                     int slot, hxReal deepest, hxReal from, hxReal to) {
   const hxMask within = differ(deepest, from) & differ(deepest, to);
@@ -82,9 +82,8 @@ HX_RARE void row_yield(const hxContactState *state, int row, double h, const hxC
     const hxReal before = hx_load(&state->plastic[hx_soil_row(row)][slot]),
                  z = hx_load(&deepest[slot]);
     if (!hx_any(in)) continue; /* as it was */
-    const hxSoilCurves virgin = deepest_virgin(&soil, in, ends, slot, z,
-                                               hx_load(&from->delta[slot]),
-                                               hx_load(&to->delta[slot]));
+    const hxSoilCurves virgin = deepest_virgin(
+        &soil, in, ends, slot, z, hx_load(&from->delta[slot]), hx_load(&to->delta[slot]));
     hx_store(&plastic[slot],
              hx_select(in, hx_max(before, hx_plastic_depth(&soil, z, virgin)), before));
   }
@@ -99,8 +98,8 @@ HX_RARE void hx_soil_yield(const hxModel *model, const hxContactState *state, do
   for (int k = 0; k < model->listed; ++k) {
     const int row = model->row[k];
     if (has_soil(model, row))
-      row_yield(state, row, h, &from->contact[row], &to->contact[row],
-                row == HX_FOOT ? ends : NULL, plastic[hx_soil_row(row)]);
+      row_yield(state, row, h, &from->contact[row], &to->contact[row], row == HX_FOOT ? ends : NULL,
+                plastic[hx_soil_row(row)]);
   }
 }
 
