@@ -94,15 +94,6 @@ static inline hxMask hx_in_soil(const hxContactState *state, int row, int slot) 
   return hx_on_soil(state, row, slot) & hx_less(hx_splat(0.0), hx_load(&state->closed[row][slot]));
 }
 
-/* Returns the virgin curves under a row at these depths; 0 where it is not in soil. */
-HX_RARE hxSoilCurves hx_virgin_under(const hxContactState *state, int row, int slot, hxReal delta) {
-  const hxReal none = hx_splat(0.0);
-  const hxMask in = hx_in_soil(state, row, slot);
-  if (!hx_any(in)) return (hxSoilCurves){none, none};
-  const hxSoils soil = hx_soils_under(state, row, slot);
-  return hx_virgin(&soil, hx_select(in, delta, none));
-}
-
 /* Returns the forces on a row at these depths and sinking speeds; virgin: the virgin curves there,
  * NULL: not known. */
 HX_RARE hxSoilPack hx_soil_pack(const hxContactState *state, int row, int slot, hxReal delta,

@@ -7,6 +7,15 @@
 
 static const double least_footprint = 1e-6; /* m  shallower ones are not kept */
 
+/* Returns the virgin curves under a row at these depths; 0 where it is not in soil. */
+HX_RARE hxSoilCurves hx_virgin_under(const hxContactState *state, int row, int slot, hxReal delta) {
+  const hxReal none = hx_splat(0.0);
+  const hxMask in = hx_in_soil(state, row, slot);
+  if (!hx_any(in)) return (hxSoilCurves){none, none};
+  const hxSoils soil = hx_soils_under(state, row, slot);
+  return hx_virgin(&soil, hx_select(in, delta, none));
+}
+
 /* Virgin curves under the feet at both ends of a step. */
 typedef struct {
   hxSoilCurves from[HX_PACKS], to[HX_PACKS];
