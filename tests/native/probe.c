@@ -423,7 +423,7 @@ HX_API void hx_probe_servo(const hxPlant *plant, double angle, double speed,
 /* Computes the ground at a point. out: distance, normal. */
 HX_API void hx_probe_ground(const hxPlant *plant, const double point[3], double out[4]) {
   const hxGround ground =
-      hx_ground(&plant->model, &plant->state.contact, HX_FOOT, 0, 1, hx_splat_vec3(point));
+      hx_ground(&plant->model, &plant->state.contact, HX_FOOT, 0, 1, hx_splat_vec3(point), NULL);
   out[0] = hx_lane(ground.distance, 0);
   put3(ground.normal, 0, out + 1);
 }

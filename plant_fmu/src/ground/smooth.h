@@ -17,12 +17,22 @@ typedef struct {
   hxMask outside;
 } hxGridPlace;
 
-/* Places of points, and the 4 x 4 nodes around each. */
+/* Copies of the 4 x 4 nodes around the patches of a pack of points. */
+struct hxPatchNodes {
+  double col[HX_LANES], row[HX_LANES]; /* of the patches; -1: none */
+  double node[4][4][HX_LANES];
+};
+
+/* Places of points, and the nodes around each. */
 typedef struct {
   hxGridPlace x, y;
-  double col[HX_LANES], row[HX_LANES]; /* of the patches whose nodes these are */
-  double node[4][4][HX_LANES];
+  hxPatchNodes *of;
 } hxStencil;
+
+/* Marks copies of nodes as empty. */
+static inline void hx_forget_nodes(hxPatchNodes *nodes) {
+  for (int lane = 0; lane < HX_LANES; ++lane) nodes->col[lane] = nodes->row[lane] = -1.0;
+}
 
 /* Returns the largest whole number that is not larger than x, for x from 0 to 2^51. */
 static inline hxReal whole_part(hxReal x) {
@@ -75,7 +85,7 @@ static inline int is_at_border(const hxTerrain *terrain, int64_t col, int64_t ro
 }
 
 /* Copies the 4 x 4 nodes of a lane's patch. */
-static inline void copy_nodes(const hxTerrain *terrain, int lane, hxStencil *at) {
+static inline void copy_nodes(const hxTerrain *terrain, int lane, hxPatchNodes *at) {
   const int64_t cols = terrain->head.cols, c = (int64_t)at->col[lane], r = (int64_t)at->row[lane];
   const double *first = terrain->height + (r - 1) * cols + (c - 1);
   double border[4][4];
@@ -90,7 +100,7 @@ static inline void copy_nodes(const hxTerrain *terrain, int lane, hxStencil *at)
 
 /* Copies the nodes of all lanes, pack by pack: a pack that is stored as a whole is read without
  * waiting for eight stores. */
-static inline void copy_all_nodes(const hxTerrain *terrain, hxStencil *at) {
+static inline void copy_all_nodes(const hxTerrain *terrain, hxPatchNodes *at) {
   const int64_t cols = terrain->head.cols;
   const double *first[HX_LANES];
   int borders = 0;
@@ -112,31 +122,37 @@ static inline void move_places(const hxTerrain *terrain, hxReal x, hxReal y, hxS
   at->y = grid_place(y, head->y0, terrain->per_cell, head->rows);
 }
 
-/* Sets a stencil to (x, y). */
-static inline void set_stencil(const hxTerrain *terrain, hxReal x, hxReal y, hxStencil *at) {
-  move_places(terrain, x, y, at);
-  hx_store(at->col, at->x.node), hx_store(at->row, at->y.node);
-  copy_all_nodes(terrain, at);
+/* Returns where two numbers are different. */
+static inline hxMask differ(hxReal a, hxReal b) { return hx_less(a, b) | hx_less(b, a); }
+
+/* Copies the nodes of the lanes `moved`. */
+HX_RARE void change_nodes(const hxTerrain *terrain, hxMask active, hxMask moved, hxStencil *at) {
+  double has_moved[HX_LANES];
+  hxPatchNodes *of = at->of;
+  if (!hx_any(active & ~moved)) moved = hx_less(hx_splat(0.0), hx_splat(1.0));
+  hx_store(of->col, hx_select(moved, at->x.node, hx_load(of->col)));
+  hx_store(of->row, hx_select(moved, at->y.node, hx_load(of->row)));
+  if (!hx_any(~moved)) {
+    copy_all_nodes(terrain, of);
+    return;
+  }
+  hx_store(has_moved, hx_select(moved, hx_splat(1.0), hx_splat(0.0)));
+  for (int lane = 0; lane < HX_LANES; ++lane)
+    if (has_moved[lane] > 0.0) copy_nodes(terrain, lane, of);
 }
 
-/* Moves it to (x, y), in the lanes `active` with its nodes. */
+/* Moves a stencil to (x, y), in the lanes `active` with its nodes. */
 static inline void move_stencil(const hxTerrain *terrain, hxMask active, hxReal x, hxReal y,
                                 hxStencil *at) {
-  double col[HX_LANES], row[HX_LANES];
-  const hxReal unchanged[2] = {hx_load(at->col), hx_load(at->row)};
   move_places(terrain, x, y, at);
-  hx_store(col, hx_select(active, at->x.node, unchanged[0]));
-  hx_store(row, hx_select(active, at->y.node, unchanged[1]));
-  for (int lane = 0; lane < HX_LANES; ++lane)
-    if (col[lane] < at->col[lane] || col[lane] > at->col[lane] || row[lane] < at->row[lane] ||
-        row[lane] > at->row[lane]) {
-      at->col[lane] = col[lane], at->row[lane] = row[lane];
-      copy_nodes(terrain, lane, at);
-    }
+  const hxMask moved = active & (differ(at->x.node, hx_load(at->of->col)) |
+                                 differ(at->y.node, hx_load(at->of->row)));
+  if (hx_any(moved)) change_nodes(terrain, active, moved, at);
 }
 
 /* Computes the surface over the points of a stencil. */
 static inline hxPatch patch_at(const hxTerrain *terrain, const hxStencil *at) {
+  const hxPatchNodes *of = at->of;
   hxReal wx[3][4], wy[3][4], line[3][4], sum[3][3]; /* sum: [derivatives by y][by x] */
   cubic_weights(at->x.place, wx);
   cubic_weights(at->y.place, wy);
@@ -146,8 +162,8 @@ static inline hxPatch patch_at(const hxTerrain *terrain, const hxStencil *at) {
     run_out(&at->y, per_cell, wy);
   }
   for (int i = 0; i < 4; ++i) {
-    const hxReal a = hx_load(at->node[i][0]), b = hx_load(at->node[i][1]),
-                 c = hx_load(at->node[i][2]), d = hx_load(at->node[i][3]);
+    const hxReal a = hx_load(of->node[i][0]), b = hx_load(of->node[i][1]),
+                 c = hx_load(of->node[i][2]), d = hx_load(of->node[i][3]);
     for (int k = 0; k < 3; ++k)
       line[k][i] = (wx[k][0] * a + wx[k][1] * b) + (wx[k][2] * c + wx[k][3] * d);
   }
@@ -239,17 +255,19 @@ static inline void use_points_below(const hxTerrain *terrain, hxMask mask, const
 
 /* Computes the nearest points of a smooth surface to the lanes `wanted` by Newton's method on
  * their two parameters, from the points below moved by `start`. With `exactly`, also the second
- * derivatives belong to the nearest point. */
+ * derivatives belong to the nearest point. `nodes` are those of an earlier search on the same
+ * terrain, or empty. */
 static inline hxNearest hx_nearest_on_surface(const hxTerrain *terrain, hxMask wanted,
                                               const hxReal point[3], const hxReal start[2],
-                                              int exactly) {
+                                              int exactly, hxPatchNodes *nodes) {
   enum { MOST = 40 };
   const double area = terrain->head.cell * terrain->head.cell;
   hxReal x = point[0] + start[0], y = point[1] + start[1];
   hxMask active = wanted;
   hxStencil at;
   hxNearest found;
-  set_stencil(terrain, x, y, &at);
+  at.of = nodes;
+  move_stencil(terrain, wanted, x, y, &at);
   for (int i = 0;; ++i) {
     const hxPatch p = patch_at(terrain, &at);
     const hxReal rz = p.s - point[2];

@@ -88,17 +88,17 @@ hxSoilCurve hx_soil_virgin(const hxSoil *soil, double z) {
 
 double hx_soil_plastic_depth(const hxSoil *soil, double z) {
   const hxSoils soils = only(soil);
-  return hx_plastic_depth(&soils, z);
+  return hx_plastic_depth(&soils, z, hx_virgin(&soils, z));
 }
 
 hxSoilForce hx_soil_normal_force(const hxSoil *soil, double plastic, double z, double dz) {
   const hxSoils soils = only(soil);
-  return force_of(hx_soil_forces(&soils, plastic, z, dz));
+  return force_of(hx_soil_forces(&soils, plastic, z, dz, hx_virgin(&soils, z)));
 }
 
 double hx_soil_stored_energy(const hxSoil *soil, double plastic, double z) {
   const hxSoils soils = only(soil);
-  return hx_stored_energy(&soils, plastic, z);
+  return hx_stored_energy(&soils, plastic, z, hx_virgin(&soils, z));
 }
 
 hxSoilCurve hx_soil_shear_base(const hxSoil *soil, double z) {
@@ -108,7 +108,7 @@ hxSoilCurve hx_soil_shear_base(const hxSoil *soil, double z) {
 
 hxSoilContact hx_soil_contact(const hxSoil *soil, double plastic, double z, double dz) {
   const hxSoils soils = only(soil);
-  const hxSoilContacts at = hx_soil_contacts(&soils, plastic, z, dz);
+  const hxSoilContacts at = hx_soil_contacts(&soils, plastic, z, dz, hx_virgin(&soils, z));
   return (hxSoilContact){force_of(at.normal), curve_of(at.held), curve_of(at.stored),
                          curve_of(at.hold)};
 }

@@ -23,7 +23,7 @@ typedef struct {
 } hxSoils;
 
 /* Forces and their slopes by the depth, N and N/m. */
-typedef struct {
+typedef struct hxSoilCurves {
   hxReal force, slope;
 } hxSoilCurves;
 
@@ -101,15 +101,15 @@ static inline hxSoilCurves hx_virgin(const hxSoils *soil, hxReal z) {
 
 /* ---- unloading and damping ---- */
 
-/* Returns the depths that stay when z is unloaded (eq. 44). */
-static inline hxReal hx_plastic_depth(const hxSoils *soil, hxReal z) {
-  return hx_max(z - hx_virgin(soil, z).force / soil->unloading, hx_splat(0.0));
+/* Returns the depths that stay when z is unloaded, with the virgin curve there (eq. 44). */
+static inline hxReal hx_plastic_depth(const hxSoils *soil, hxReal z, hxSoilCurves virgin) {
+  return hx_max(z - virgin.force / soil->unloading, hx_splat(0.0));
 }
 
 /* Returns min(A Ke (z - z_p), F_v(z)) of feet deeper than z_p, and its slope. */
-static inline hxSoilCurves elastic(const hxSoils *soil, hxReal plastic, hxReal z) {
+static inline hxSoilCurves elastic(const hxSoils *soil, hxReal plastic, hxReal z,
+                                   hxSoilCurves virgin) {
   const hxSoilCurves line = {soil->unloading * (z - plastic), soil->unloading};
-  const hxSoilCurves virgin = hx_virgin(soil, z);
   return select_curves(hx_less(virgin.force, line.force), virgin, line);
 }
 
@@ -121,13 +121,13 @@ static inline hxSoilCurves contact_area(const hxSoils *soil, hxReal z) {
                        (hxSoilCurves){soil->area, zero});
 }
 
-/* Returns f_n and its derivatives, as hx_soil_normal_force does. */
-static inline hxSoilForces hx_soil_forces(const hxSoils *soil, hxReal plastic, hxReal z,
-                                          hxReal dz) {
+/* Returns f_n and its derivatives, as hx_soil_normal_force does, with the virgin curve at z. */
+static inline hxSoilForces hx_soil_forces(const hxSoils *soil, hxReal plastic, hxReal z, hxReal dz,
+                                          hxSoilCurves virgin) {
   const hxReal zero = hx_splat(0.0);
   const hxMask touches = hx_less(plastic, z);
   if (!hx_any(touches)) return (hxSoilForces){zero, zero, zero, zero, zero};
-  const hxSoilCurves spring = elastic(soil, plastic, z), area = contact_area(soil, z);
+  const hxSoilCurves spring = elastic(soil, plastic, z, virgin), area = contact_area(soil, z);
   const hxReal viscosity = soil->damping * area.force, force = spring.force + viscosity * dz;
   const hxMask pushes = touches & hx_less(zero, force);
   const hxReal slope = hx_select(touches, spring.slope, zero);
@@ -140,10 +140,11 @@ static inline hxSoilForces hx_soil_forces(const hxSoils *soil, hxReal plastic, h
 }
 
 /* Returns the energy that unloading gives back, J. */
-static inline hxReal hx_stored_energy(const hxSoils *soil, hxReal plastic, hxReal z) {
+static inline hxReal hx_stored_energy(const hxSoils *soil, hxReal plastic, hxReal z,
+                                      hxSoilCurves virgin) {
   const hxMask touches = hx_less(plastic, z);
   if (!hx_any(touches)) return hx_splat(0.0);
-  const hxReal force = elastic(soil, plastic, z).force;
+  const hxReal force = elastic(soil, plastic, z, virgin).force;
   return hx_select(touches, force * force / (2.0 * soil->unloading), hx_splat(0.0));
 }
 
@@ -193,9 +194,9 @@ typedef struct {
 
 /* Returns the forces on feet at these depths and sinking speeds. */
 static inline hxSoilContacts hx_soil_contacts(const hxSoils *soil, hxReal plastic, hxReal z,
-                                              hxReal dz) {
+                                              hxReal dz, hxSoilCurves virgin) {
   const hxReal zero = hx_splat(0.0);
-  const hxSoilForces f = hx_soil_forces(soil, plastic, z, dz);
+  const hxSoilForces f = hx_soil_forces(soil, plastic, z, dz, virgin);
   /* the depth of shear does not fall below z_p: a foot that leaves the ground within a step keeps
    * its grip to the end of the step */
   const hxMask above = hx_less(z, plastic);

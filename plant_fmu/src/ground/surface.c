@@ -349,7 +349,9 @@ static void set_bend(const hxPatch *p, const hxHessian *H, hxFace *face) {
 
 static void smooth_face(const hxTerrain *terrain, const double point[3], int bends, hxFace *face) {
   const double below[2] = {0.0, 0.0};
-  const hxNearest nearest = hx_nearest_on_surface(terrain, -1, point, below, bends);
+  hxPatchNodes nodes;
+  hx_forget_nodes(&nodes);
+  const hxNearest nearest = hx_nearest_on_surface(terrain, -1, point, below, bends, &nodes);
   face->distance = hx_distance_from_surface(&nearest, point, face->normal);
   if (bends) set_bend(&nearest.p, &nearest.H, face);
 }

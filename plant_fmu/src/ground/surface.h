@@ -30,6 +30,9 @@ struct hxTerrain {
   double bytes[]; /* the file after its head, then the map of tops */
 };
 
+/* Copies of nodes of a smooth surface (smooth.h). */
+typedef struct hxPatchNodes hxPatchNodes;
+
 /* The face of the ground nearest to a point. */
 typedef struct hxFace {
   double distance;  /* m    signed, > 0 outside */

@@ -229,7 +229,7 @@ HX_RARE void hx_pair_forces(const hxModel *model, const hxContactState *state,
       const int slot = pack * HX_LANES;
       contact->kin = pair_contact(model, &own, &next, row, slot, &next_arm[pack]);
       contact->law = hx_law_at(state, row, slot);
-      hx_contact_force(model, state, row, slot, motion, contact);
+      hx_contact_force(model, state, row, slot, motion, NULL, contact);
     }
     add_pair_forces(row, next_arm, work);
   }

@@ -525,12 +525,12 @@ static inline void hx_add_impulses(const hxModel *model, const hxCommand *comman
  * and always in kinematic mode. `moment` is that of the motion, or NULL where it is not known. */
 static void hx_dynamics_evaluate(const hxModel *model, const hxContactState *contact,
                                  const hxCommand *command, double t, const hxPlantMotion *motion,
-                                 const hxMoment *moment, hxImplicit *implicit, int multipliers,
+                                 const hxKnown *known, hxImplicit *implicit, int multipliers,
                                  hxWork *work, hxRate *rate) {
   hxInertia6 I[HX_PACKS];
   hxForce6 p[HX_PACKS];
   const int reactions = multipliers || model->servo_mode == HX_SERVO_KINEMATIC;
-  hx_dynamics_forces(model, contact, command, t, motion, moment, reactions, multipliers, work);
+  hx_dynamics_forces(model, contact, command, t, motion, known, reactions, multipliers, work);
   /* the stage's response to the shifts (eq. 20, 21) */
   for (int pack = 0; implicit && pack < HX_PACKS; ++pack) {
     if (!implicit->change) keep_slopes(model, contact, pack, &work->pack[pack], implicit);

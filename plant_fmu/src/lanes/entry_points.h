@@ -162,7 +162,11 @@ static void kernel_measure(const hxModel *model, const hxCommand *command, hxSta
   end->time = state->time;
   hx_dynamics_evaluate(model, &state->contact, command, state->time, &state->motion, NULL, NULL, 1,
                        &scratch->work, &scratch->rate);
-  if (model->has_soil) hx_soil_yield(model, &state->contact, h, &state->moment, end, path.plastic);
+  if (model->has_soil) {
+    path.ends = &scratch->soil;
+    hx_soil_ends(&state->contact, &state->moment, end, 0, &scratch->soil);
+    hx_soil_yield(model, &state->contact, h, &state->moment, end, path.ends, path.plastic);
+  }
   trapezoidal_impulses(model, &scratch->work, h, &state->completed, &impulses);
   if (!known)
     trapezoidal_impulses(

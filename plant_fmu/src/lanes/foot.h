@@ -189,7 +189,7 @@ HX_RARE hxReal hx_grid_depth_bound(const hxModel *model, int row, const hxVec3 *
 #ifndef HX_TANGENT
 /* Returns distance and normal of a smooth grid at a row's points. */
 HX_RARE hxGround hx_smooth_grid(const hxModel *model, const hxContactState *state, int row,
-                                int slot, int all, const hxVec3 *point) {
+                                int slot, int all, const hxVec3 *point, hxPatchNodes *nodes) {
   const hxReal zero = hx_splat(0.0), one = hx_splat(1.0);
   const hxReal at[3] = {point->x, point->y, point->z - model->ground_point[2]};
   hxReal normal[3], distance = hx_splat(hx_far);
@@ -204,7 +204,12 @@ HX_RARE hxGround hx_smooth_grid(const hxModel *model, const hxContactState *stat
   const int is_foot = row == HX_FOOT;
   const hxReal from[2] = {is_foot ? hx_load(&state->nearest[0][slot]) : zero,
                           is_foot ? hx_load(&state->nearest[1][slot]) : zero};
-  const hxNearest nearest = hx_nearest_on_surface(model->terrain, wanted, at, from, 0);
+  hxPatchNodes own;
+  if (!nodes) {
+    hx_forget_nodes(&own);
+    nodes = &own;
+  }
+  const hxNearest nearest = hx_nearest_on_surface(model->terrain, wanted, at, from, 0, nodes);
   const hxReal exact = hx_distance_from_surface(&nearest, at, normal);
   return (hxGround){hx_select(wanted, exact, distance),
                     {hx_select(wanted, normal[0], zero), hx_select(wanted, normal[1], zero),
@@ -242,32 +247,48 @@ HX_RARE hxGround hx_grid(const hxModel *model, const hxContactState *state, int 
 }
 
 #ifndef HX_TANGENT
-/* Returns the distances of closed feet from the tops of the columns on which they stand. */
-HX_RARE hxGround hx_block_tops(const hxModel *model, const hxContactState *state, int slot,
+/* Returns which open contacts of a pack the choice contains. */
+static inline hxMask listed_lanes(int all, int slot) {
+  double listed[HX_LANES];
+  for (int lane = 0; lane < HX_LANES; ++lane)
+    listed[lane] = hx_is_listed(all, slot == 0 && lane >= HX_LEGS ? 0 : lane) ? 1.0 : 0.0;
+  return hx_less(hx_splat(0.0), hx_load(listed));
+}
+
+/* Returns the distances of feet from the tops of the columns that are held for them, or below them;
+ * with the bits of hx_terrain_face. */
+HX_RARE hxGround hx_block_tops(const hxModel *model, const hxContactState *state, int slot, int all,
                                const hxVec3 *point) {
   const hxReal zero = hx_splat(0.0), z = point->z - model->ground_point[2];
   const hxGridHead *head = &model->terrain->head;
-  const hxReal top = entries_at(model->terrain->height, head->rows, head->cols,
-                                hx_load(&state->cell[0][slot]), hx_load(&state->cell[1][slot]));
-  const hxMask closed = hx_less(zero, hx_load(&state->closed[HX_FOOT][slot]));
-  return (hxGround){hx_select(closed, z - top, hx_splat(hx_far)), {zero, zero, hx_splat(1.0)}};
+  hxReal col = hx_load(&state->cell[0][slot]), row = hx_load(&state->cell[1][slot]);
+  hxMask wanted = hx_less(zero, hx_load(&state->closed[HX_FOOT][slot]));
+  if (all != HX_CLOSED) {
+    const hxMask below = hx_less(col, zero);
+    col = hx_select(below, (point->x - head->x0) / head->cell, col);
+    row = hx_select(below, (point->y - head->y0) / head->cell, row);
+    wanted |= listed_lanes(all, slot);
+  }
+  const hxReal top = entries_at(model->terrain->height, head->rows, head->cols, col, row);
+  return (hxGround){hx_select(wanted, z - top, hx_splat(hx_far)), {zero, zero, hx_splat(1.0)}};
 }
 #endif
 
 /* Returns distance and normal of the ground at the points of a row of contacts. All other code is
- * independent of the terrain. */
+ * independent of the terrain. `nodes`: of feet, from an earlier search; NULL: none. */
 HX_INLINE hxGround hx_ground(const hxModel *model, const hxContactState *state, int row, int slot,
-                             int all, hxVec3 point) {
+                             int all, hxVec3 point, hxPatchNodes *nodes) {
   if (model->terrain_kind == HX_TERRAIN_FLAT)
     return (hxGround){point.z - model->ground_point[2],
                       {hx_splat(0.0), hx_splat(0.0), hx_splat(1.0)}};
 #ifndef HX_TANGENT
   if (model->terrain_kind == HX_TERRAIN_GRID &&
       hx_terrain_surface(model->terrain) == HX_SURFACE_SMOOTH)
-    return hx_smooth_grid(model, state, row, slot, all, &point);
-  if (model->terrain_kind == HX_TERRAIN_GRID && row == HX_FOOT && all == HX_CLOSED)
-    return hx_block_tops(model, state, slot, &point);
+    return hx_smooth_grid(model, state, row, slot, all, &point, nodes);
+  if (model->terrain_kind == HX_TERRAIN_GRID && row == HX_FOOT && all != HX_NEAR)
+    return hx_block_tops(model, state, slot, all, &point);
 #endif
+  (void)nodes;
   if (model->terrain_kind == HX_TERRAIN_GRID) return hx_grid(model, state, row, slot, all, &point);
   const hxVec3 n = hx_splat_vec3(model->ground_normal);
   return (hxGround){hx_dot(n, hx_sub3(point, hx_splat_vec3(model->ground_point))), n};
@@ -321,7 +342,7 @@ HX_RARE void replace_body_by_soil(const hxModel *model, const hxContactState *st
                                   int slot, hxContactWork *contact) {
   const hxMask soft = hx_on_soil(state, row, slot);
   const hxContactKinematics *kin = &contact->kin;
-  const hxSoilPack f = hx_soil_pack(state, row, slot, kin->delta, kin->ddelta);
+  const hxSoilPack f = hx_soil_pack(state, row, slot, kin->delta, kin->ddelta, NULL);
   const hxReal drag = f.shear * hx_per_speed(model, contact->slip_speed);
   soil_load(soft, &f, contact);
   contact->drag = hx_select(soft, drag, contact->drag);
@@ -332,10 +353,11 @@ HX_RARE void replace_body_by_soil(const hxModel *model, const hxContactState *st
 /* Replaces the forces on feet by those of soil where they touched down on it: f_n along the normal
  * and the shear -(T_0 + f_n tan phi) b/K across it (eq. 44-47). */
 HX_RARE void replace_by_soil(const hxModel *model, const hxContactState *state, int slot,
-                             const hxPlantMotion *motion, hxContactWork *contact) {
+                             const hxPlantMotion *motion, const hxSoilCurves *virgin,
+                             hxContactWork *contact) {
   const hxMask soft = hx_on_soil(state, HX_FOOT, slot);
   const hxContactKinematics *kin = &contact->kin;
-  const hxSoilPack f = hx_soil_pack(state, HX_FOOT, slot, kin->delta, kin->ddelta);
+  const hxSoilPack f = hx_soil_pack(state, HX_FOOT, slot, kin->delta, kin->ddelta, virgin);
   const hxVec3 b = hx_load_vec3(motion->bristle, slot), none = hx_zero3();
   const hxReal zero = hx_splat(0.0), yield = f.per_displacement * contact->slip_speed;
   const hxBristle rigid = has_friction_bristles(model, HX_FOOT)
@@ -355,15 +377,53 @@ HX_RARE void replace_by_soil(const hxModel *model, const hxContactState *state, 
                                  .yield = hx_select(soft, yield, rigid.yield)};
 }
 
+/* What is known of contacts before they are computed; NULL: nothing. */
+typedef struct {
+  const hxMoment *moment;     /* of the same motion: angles, and places of all contacts on a grid */
+  hxPatchNodes *nodes;        /* around the feet of an earlier motion, pack by pack */
+  const hxSoilCurves *virgin; /* under the feet at the same depths, pack by pack */
+} hxKnown;
+
+#ifdef HX_TANGENT
+/* Points of numbers with derivatives are computed one by one. */
+static inline hxPatchNodes *known_nodes(const hxKnown *known, int row, int slot) {
+  (void)known, (void)row, (void)slot;
+  return NULL;
+}
+static inline const hxSoilCurves *known_virgin(const hxKnown *known, int row, int slot) {
+  (void)known, (void)row, (void)slot;
+  return NULL;
+}
+#else
+/* Returns what is known of a pack of a row; NULL: nothing. */
+static inline hxPatchNodes *known_nodes(const hxKnown *known, int row, int slot) {
+  return known && known->nodes && row == HX_FOOT ? &known->nodes[slot / HX_LANES] : NULL;
+}
+static inline const hxSoilCurves *known_virgin(const hxKnown *known, int row, int slot) {
+  return known && known->virgin && row == HX_FOOT ? &known->virgin[slot / HX_LANES] : NULL;
+}
+#endif
+
+/* Returns distance and normal of a grid at a row's points from the moment of the same motion. */
+HX_INLINE hxGround known_ground(const hxModel *model, const hxMoment *moment, int row, int slot) {
+  const hxContactMoment *contact = &moment->contact[row];
+  return (hxGround){model->radius[row] - hx_load(&contact->delta[slot]),
+                    hx_load_vec3(contact->normal, slot)};
+}
+
 /* Computes contact point, penetration and velocity of a row of contacts from the motion of their
  * bodies: centres of mass r, their velocities v, orientations and angular velocities. */
 HX_INLINE hxContactKinematics hx_contact_kinematics(const hxModel *model,
-                                                    const hxContactState *state, int row, int slot,
+                                                    const hxContactState *state,
+                                                    const hxKnown *known, int row, int slot,
                                                     int all, hxVec3 r, hxVec3 v,
                                                     const hxBody *body) {
   const hxNumber radius = model->radius[row];
   const hxVec3 to_centre = hx_mul(body->R_WB, hx_load_vec3(model->point[row], slot));
-  const hxGround ground = hx_ground(model, state, row, slot, all, hx_add3(r, to_centre));
+  const int is_known = known && known->moment && model->terrain_kind == HX_TERRAIN_GRID;
+  const hxGround ground = is_known ? known_ground(model, known->moment, row, slot)
+                                   : hx_ground(model, state, row, slot, all, hx_add3(r, to_centre),
+                                               known_nodes(known, row, slot));
   const hxVec3 arm = hx_add_scaled(to_centre, hx_splat(-radius), ground.normal);
   const hxVec3 velocity = hx_add3(v, hx_cross(body->w, arm));
   return (hxContactKinematics){arm, ground.normal, radius - ground.distance,
@@ -372,9 +432,9 @@ HX_INLINE hxContactKinematics hx_contact_kinematics(const hxModel *model,
 
 /* Returns the kinematics of a row of contacts on the tibias. */
 HX_INLINE hxContactKinematics hx_tibia_contact(const hxModel *model, const hxContactState *state,
-                                               const hxPlantMotion *motion, int row, int slot,
-                                               int all, const hxBody *tibia) {
-  return hx_contact_kinematics(model, state, row, slot, all,
+                                               const hxPlantMotion *motion, const hxKnown *known,
+                                               int row, int slot, int all, const hxBody *tibia) {
+  return hx_contact_kinematics(model, state, known, row, slot, all,
                                hx_link_vec3(motion, HX_JOINTS - 1, HX_R, slot),
                                hx_link_vec3(motion, HX_JOINTS - 1, HX_V, slot), tibia);
 }
@@ -384,7 +444,7 @@ static inline hxContactKinematics hx_torso_contact(const hxModel *model,
                                                    const hxContactState *state,
                                                    const hxPlantMotion *motion, int slot, int all,
                                                    const hxBody *torso) {
-  return hx_contact_kinematics(model, state, HX_TORSO, slot, all, hx_torso_vec3(motion, HX_R),
+  return hx_contact_kinematics(model, state, NULL, HX_TORSO, slot, all, hx_torso_vec3(motion, HX_R),
                                hx_torso_vec3(motion, HX_V), torso);
 }
 
@@ -449,11 +509,12 @@ HX_INLINE void rigid_force(const hxModel *model, const hxContactState *state, in
 
 /* Computes the force of the ground on a row of contacts. */
 HX_INLINE void hx_contact_force(const hxModel *model, const hxContactState *state, int row,
-                                int slot, const hxPlantMotion *motion, hxContactWork *contact) {
+                                int slot, const hxPlantMotion *motion, const hxSoilCurves *virgin,
+                                hxContactWork *contact) {
   rigid_force(model, state, row, slot, motion, contact);
   if (!has_soil(model, row)) return;
   if (row == HX_FOOT)
-    replace_by_soil(model, state, slot, motion, contact);
+    replace_by_soil(model, state, slot, motion, virgin, contact);
   else
     replace_body_by_soil(model, state, row, slot, contact);
 }

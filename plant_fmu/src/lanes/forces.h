@@ -220,20 +220,21 @@ static inline void turn_body(hxForce6 *p, hxVec3 moment) { p->ang = hx_sub3(p->a
 
 /* Computes kinematics and law of a row of contacts on the tibia. */
 HX_INLINE void leg_contact(const hxModel *model, const hxContactState *state,
-                           const hxPlantMotion *motion, int row, int slot, int all,
-                           hxLegWork *leg) {
+                           const hxPlantMotion *motion, const hxKnown *known, int row, int slot,
+                           int all, hxLegWork *leg) {
   hxContactWork *contact = &leg->contact[row];
-  contact->kin =
-      hx_tibia_contact(model, state, motion, row, slot, all, &leg->joint[HX_JOINTS - 1].body);
+  contact->kin = hx_tibia_contact(model, state, motion, known, row, slot, all,
+                                  &leg->joint[HX_JOINTS - 1].body);
   contact->law = hx_law_at(state, row, slot);
 }
 
 /* Computes the contact force of a row and applies it to the tibia. */
 HX_INLINE void push_leg(const hxModel *model, const hxContactState *state,
-                        const hxPlantMotion *motion, int row, int slot, hxLegWork *leg) {
+                        const hxPlantMotion *motion, const hxKnown *known, int row, int slot,
+                        hxLegWork *leg) {
   hxJointWork *tibia = &leg->joint[HX_JOINTS - 1];
   hxContactWork *contact = &leg->contact[row];
-  hx_contact_force(model, state, row, slot, motion, contact);
+  hx_contact_force(model, state, row, slot, motion, known_virgin(known, row, slot), contact);
   push_body(&tibia->p, contact_point(leg, contact), contact->force);
   if (has_turning_friction(model, row)) {
     hx_contact_moment(model, state, row, slot, &tibia->body.w, contact);
@@ -273,27 +274,29 @@ HX_RARE void share_feet(const hxModel *model, const hxContactState *state, int s
 }
 
 HX_RARE void further_contacts(const hxModel *model, const hxContactState *state,
-                              const hxPlantMotion *motion, int slot, int all, hxLegWork *leg) {
+                              const hxPlantMotion *motion, const hxKnown *known, int slot, int all,
+                              hxLegWork *leg) {
   for (int k = 1; k < model->rows; ++k)
     if (all || is_used(state, model->row[k], slot)) {
       leg->row[leg->rows++] = model->row[k];
-      leg_contact(model, state, motion, model->row[k], slot, all, leg);
+      leg_contact(model, state, motion, known, model->row[k], slot, all, leg);
     }
   if (model->foot_rows > 1 && leg->rows > 1) share_feet(model, state, slot, leg);
 }
 
 HX_RARE void push_further(const hxModel *model, const hxContactState *state,
                           const hxPlantMotion *motion, int slot, hxLegWork *leg) {
-  for (int k = 1; k < leg->rows; ++k) push_leg(model, state, motion, leg->row[k], slot, leg);
+  for (int k = 1; k < leg->rows; ++k) push_leg(model, state, motion, NULL, leg->row[k], slot, leg);
 }
 
 /* Computes the contact forces of a leg; without all, only those of rows with closed contacts. */
 static inline void leg_contacts(const hxModel *model, const hxContactState *state,
-                                const hxPlantMotion *motion, int slot, int all, hxLegWork *leg) {
+                                const hxPlantMotion *motion, const hxKnown *known, int slot,
+                                int all, hxLegWork *leg) {
   leg->rows = 1, leg->row[0] = HX_FOOT;
-  leg_contact(model, state, motion, HX_FOOT, slot, all, leg);
-  if (model->rows > 1) further_contacts(model, state, motion, slot, all, leg);
-  push_leg(model, state, motion, HX_FOOT, slot, leg);
+  leg_contact(model, state, motion, known, HX_FOOT, slot, all, leg);
+  if (model->rows > 1) further_contacts(model, state, motion, known, slot, all, leg);
+  push_leg(model, state, motion, known, HX_FOOT, slot, leg);
   if (leg->rows > 1) push_further(model, state, motion, slot, leg);
 }
 
@@ -308,7 +311,7 @@ HX_RARE void torso_contacts(const hxModel *model, const hxContactState *state,
     const int slot = pack * HX_LANES;
     contact->kin = hx_torso_contact(model, state, motion, slot, all, &work->torso);
     contact->law = hx_law_at(state, HX_TORSO, slot);
-    hx_contact_force(model, state, HX_TORSO, slot, motion, contact);
+    hx_contact_force(model, state, HX_TORSO, slot, motion, NULL, contact);
     work->torso_p[pack] = (hxForce6){hx_zero3(), hx_zero3()};
     push_body(&work->torso_p[pack], contact->kin.arm, contact->force);
   }
@@ -343,15 +346,15 @@ static inline void torso_pass(const hxModel *model, const hxPlantMotion *motion,
 }
 
 /* Computes positions, velocities and forces at (t, y). Fills work except for the sweeps; with
- * reactions it also keeps what the multipliers need. The angles are those of the motion's moment,
- * or computed where it is not known (NULL), with the same bits. */
+ * reactions it also keeps what the multipliers need. What is known of
+ * angles and contacts is not computed again. */
 static inline void hx_dynamics_forces(const hxModel *model, const hxContactState *contact,
                                       const hxCommand *command, double t,
-                                      const hxPlantMotion *motion, const hxMoment *moment,
+                                      const hxPlantMotion *motion, const hxKnown *known,
                                       int reactions, int all, hxWork *work) {
   torso_pass(model, motion, work);
-  if (moment)
-    known_angles(moment, work);
+  if (known && known->moment)
+    known_angles(known->moment, work);
   else
     joint_angles(model, motion, work);
   for (int joint = 0; joint < HX_JOINTS; ++joint)
@@ -364,7 +367,7 @@ static inline void hx_dynamics_forces(const hxModel *model, const hxContactState
     for (int pack = 0; pack < HX_PACKS; ++pack)
       joint_torque(model, command, motion, joint, pack * HX_LANES, &work->pack[pack].joint[joint]);
   for (int pack = 0; pack < HX_PACKS; ++pack)
-    leg_contacts(model, contact, motion, pack * HX_LANES, all, &work->pack[pack]);
+    leg_contacts(model, contact, motion, known, pack * HX_LANES, all, &work->pack[pack]);
   for (int pack = 0; model->spin && pack < HX_PACKS; ++pack)
     rotor_moments(model, &work->torso, &work->pack[pack]);
   work->pair_rows = 0;

@@ -38,8 +38,11 @@ typedef struct {
   hxPlantMotion y;
   hxTrial trial, nearer;
   hxMoment end;
-  hxModel tops;           /* the model with one row of feet */
-  double last_evaluation; /* number at which the call's limit is spent */
+  hxModel tops;                 /* the model with one row of feet */
+  hxPatchNodes nodes[HX_PACKS]; /* around the feet, of a call */
+  hxSoilEnds soil;              /* of the last step */
+  int is_soil_known;            /* 1: soil.from belongs to the present depths of feet */
+  double last_evaluation;       /* number at which the call's limit is spent */
 } hxScratch;
 
 /* Start of a step and the data that all its trials share. */
@@ -61,7 +64,7 @@ typedef struct {
 static inline void hx_depths_of(const hxModel *model, const hxContactState *state,
                                 const hxPlantMotion *motion, hxDepths *depths) {
   hxMoment moment;
-  hx_moment_and_bound(model, NULL, state, motion, HX_ALL, &moment);
+  hx_moment_and_bound(model, NULL, state, motion, HX_ALL, NULL, &moment);
   hx_depths_of_moment(model, state, &moment, depths);
 }
 
@@ -310,8 +313,11 @@ static void try_step(const hxStart *start, double h, hxState *state, hxTrial *tr
     }
     const hxCommand *command = command_at(start, t, &now);
     hxImplicit *stage = m->gamma > 0.0 ? implicit : NULL;
-    hx_dynamics_evaluate(model, start->contact, command, t, i > 0 ? y : start->y,
-                         i > 0 ? NULL : &state->moment, stage, 0, work, &k[i]);
+    const hxKnown known = {i > 0 ? NULL : &state->moment, start->scratch->nodes,
+                           i == 0 && start->scratch->is_soil_known ? start->scratch->soil.from
+                                                                   : NULL};
+    hx_dynamics_evaluate(model, start->contact, command, t, i > 0 ? y : start->y, &known, stage, 0,
+                         work, &k[i]);
     hx_add_impulses(model, command, stage, work, h * m->b[i], &trial->impulses);
     state->evaluations += 1.0;
   }
@@ -496,8 +502,12 @@ static void measure_step(const hxStart *start, const hxModel *seen, double h, co
   for (int node = 0; node <= INTERVALS; ++node)
     path.command[node] =
         command_at(start, start->t + h * ((double)node / INTERVALS), &command[node]);
-  if (start->model->has_soil)
-    hx_soil_yield(start->pressed, start->contact, h, &state->moment, end, path.plastic);
+  if (start->model->has_soil) {
+    hxSoilEnds *ends = &start->scratch->soil;
+    path.ends = ends;
+    hx_soil_ends(start->contact, &state->moment, end, start->scratch->is_soil_known, ends);
+    hx_soil_yield(start->pressed, start->contact, h, &state->moment, end, ends, path.plastic);
+  }
   hx_step_works(&path, &trial->impulses, &works);
   hxMeasured *measured = &state->measured;
   hx_measure_path(&path, &trial->impulses, &works, measured);
@@ -507,7 +517,9 @@ static void measure_step(const hxStart *start, const hxModel *seen, double h, co
   trial->y.push_work += push_work(&trial->impulses, start->y, &trial->y);
   trial->y.dissipated = (measured->contact_loss + measured->friction_loss) + measured->gear_loss;
   hx_copy_moment(seen, &state->moment, end);
-  if (start->model->has_soil) memcpy(state->contact.plastic, path.plastic, sizeof path.plastic);
+  if (!start->model->has_soil) return;
+  memcpy(state->contact.plastic, path.plastic, sizeof path.plastic);
+  memcpy(start->scratch->soil.from, start->scratch->soil.to, sizeof start->scratch->soil.to);
 }
 
 /* Keeps where the feet's nearest points on a smooth grid are. In the next step they have moved
@@ -527,7 +539,8 @@ static const hxModel *end_of_step(const hxStart *start, const hxPlantMotion *y, 
                                   hxDepths *depths) {
   const hxModel *whole = start->model, *seen = start->near;
   if (seen != whole) {
-    const double bound = hx_moment_and_bound(seen, whole, start->contact, y, HX_NEAR, end);
+    const double bound =
+        hx_moment_and_bound(seen, whole, start->contact, y, HX_NEAR, start->scratch->nodes, end);
     hx_depths_of_moment(seen, start->contact, end, depths);
     if (!(bound > 0.0 || deepest_open(seen, start, depths) > 0.0)) return seen;
   }
@@ -583,6 +596,7 @@ static hxStatus advance(const hxStart *start, double h_max, double *next_step, h
   *event = hx_switch_contacts(seen, &depths, start->t + *taken, &state->moment, start->footprints,
                               state);
   if (*event && model->foot_rows > 1) hx_moment_shares(model, &state->contact, &state->moment);
+  start->scratch->is_soil_known = model->has_soil && !*event && !hx_has_cells(model);
   return HX_OK;
 }
 
@@ -674,6 +688,8 @@ static hxStatus hx_integrate(const hxModel *model, const hxCommand *command, con
                              char *message) {
   ((hxScratch *)scratch)->last_evaluation =
       state->evaluations + evaluations_allowed(model, t_end - command->time);
+  for (int pack = 0; pack < HX_PACKS; ++pack) hx_forget_nodes(&((hxScratch *)scratch)->nodes[pack]);
+  ((hxScratch *)scratch)->is_soil_known = 0;
   if (state->moment.stale != 0.0) hx_moment_update(model, state);
   keep_nearest_points(model, state);
   if (command->time == state->time && t_end > state->time && !events->continues)

@@ -43,6 +43,7 @@ typedef struct {
   double t, h;                             /* s  start and length */
   const hxMoment *from, *to;
   double plastic[HX_SOIL_ROWS][HX_SLOTS]; /* m  plastic depths at its end; set with soil */
+  const hxSoilEnds *ends;                 /* set with soil */
 } hxPath;
 
 /* ---- moments ---- */
@@ -61,9 +62,10 @@ HX_INLINE void store_contact_moment(const hxModel *model, const hxContactKinemat
 
 /* Stores a row of contacts on the tibias. */
 HX_INLINE void row_moment(const hxModel *model, const hxContactState *state,
-                          const hxPlantMotion *motion, int row, int slot, int all,
-                          const hxBody *tibia, hxMoment *moment) {
-  const hxContactKinematics kin = hx_tibia_contact(model, state, motion, row, slot, all, tibia);
+                          const hxPlantMotion *motion, const hxKnown *known, int row, int slot,
+                          int all, const hxBody *tibia, hxMoment *moment) {
+  const hxContactKinematics kin =
+      hx_tibia_contact(model, state, motion, known, row, slot, all, tibia);
   store_contact_moment(model, &kin, row, slot, hx_link_vec3(motion, HX_JOINTS - 1, HX_R, slot),
                        tibia->w, &moment->contact[row]);
 }
@@ -92,8 +94,8 @@ HX_RARE void further_moments(const hxModel *model, const hxContactState *state,
     if (is_of_foot && search->beside == HX_CLOSED && !is_used(state, row, slot))
       far_row_moment(model, row, slot, moment);
     else
-      row_moment(model, state, motion, row, slot, is_of_foot ? search->beside : search->others,
-                 tibia, moment);
+      row_moment(model, state, motion, NULL, row, slot,
+                 is_of_foot ? search->beside : search->others, tibia, moment);
   }
 }
 
@@ -129,7 +131,7 @@ HX_RARE void search_near_blocks(const hxModel *model, const hxContactState *stat
 HX_INLINE hxReal depth_bound(const hxModel *model, int row, int slot, hxVec3 r, const hxMat3 *R) {
   const hxVec3 point = hx_add3(r, hx_mul(*R, hx_load_vec3(model->point[row], slot)));
   if (model->terrain_kind == HX_TERRAIN_GRID) return hx_grid_depth_bound(model, row, &point);
-  return model->radius[row] - hx_ground(model, NULL, row, slot, 0, point).distance;
+  return model->radius[row] - hx_ground(model, NULL, row, slot, 0, point, NULL).distance;
 }
 
 /* Returns the largest of these of knees and shanks, from the centre of mass of their tibias. */
@@ -212,10 +214,11 @@ HX_RARE hxReal hx_deepest_pair(const hxModel *model, const hxPlantMotion *motion
 
 /* Computes angles, speeds and contacts of a motion, on a grid those that `all` says. With `whole`,
  * the model whose rows of bodies `model` leaves out, it returns the largest depth that one of their
- * contacts may have, m. */
+ * contacts may have, m. `nodes`: as in hxKnown. */
 static inline double hx_moment_and_bound(const hxModel *model, const hxModel *whole,
                                          const hxContactState *state, const hxPlantMotion *motion,
-                                         int all, hxMoment *moment) {
+                                         int all, hxPatchNodes *nodes, hxMoment *moment) {
+  const hxKnown known = {.nodes = nodes};
   const hxBody torso = hx_torso_body(motion);
   hxReal bound = hx_splat(-HUGE_VAL);
   for (int slot = 0; slot < HX_PACKS * HX_LANES; slot += HX_LANES) {
@@ -238,7 +241,7 @@ static inline double hx_moment_and_bound(const hxModel *model, const hxModel *wh
                                     hx_mul(j.R_WB, hx_load_vec3(model->point[HX_FOOT], slot)));
       search_near_blocks(model, state, slot, &centre, &search);
     }
-    row_moment(model, state, motion, HX_FOOT, slot, search.below, &j, moment);
+    row_moment(model, state, motion, &known, HX_FOOT, slot, search.below, &j, moment);
     if (model->rows > 1) further_moments(model, state, motion, slot, &search, &j, moment);
     if (whole) bound = tibia_depth_bound(whole, motion, slot, &j.R_WB, bound);
   }
@@ -258,7 +261,7 @@ static inline double hx_moment_and_bound(const hxModel *model, const hxModel *wh
 /* Computes the same without a bound. */
 static inline void hx_moment_of(const hxModel *model, const hxContactState *state,
                                 const hxPlantMotion *motion, hxMoment *moment) {
-  hx_moment_and_bound(model, NULL, state, motion, HX_NEAR, moment);
+  hx_moment_and_bound(model, NULL, state, motion, HX_NEAR, NULL, moment);
 }
 
 /* Copies a moment, of contacts those of the model's rows. */
@@ -448,10 +451,14 @@ HX_RARE hxReal growth_with_soil(const hxPath *path, int row, int slot, hxReal ri
   const hxSoils soil = hx_soils_under(state, row, slot);
   const hxReal from = hx_load(&path->from->contact[row].delta[slot]),
                to = hx_load(&path->to->contact[row].delta[slot]);
-  return hx_select(in,
-                   hx_stored_energy(&soil, hx_load(&path->plastic[soft][slot]), to) -
-                       hx_stored_energy(&soil, hx_load(&state->plastic[soft][slot]), from),
-                   rigid);
+  const int pack = slot / HX_LANES, is_foot = row == HX_FOOT;
+  const hxSoilCurves virgin_from = is_foot ? path->ends->from[pack] : hx_virgin(&soil, from),
+                     virgin_to = is_foot ? path->ends->to[pack] : hx_virgin(&soil, to);
+  return hx_select(
+      in,
+      hx_stored_energy(&soil, hx_load(&path->plastic[soft][slot]), to, virgin_to) -
+          hx_stored_energy(&soil, hx_load(&state->plastic[soft][slot]), from, virgin_from),
+      rigid);
 }
 
 /* Computes what a row of contacts and its friction lose in a step with these impulses (eq. 27). */
@@ -750,6 +757,13 @@ typedef struct {
   hxReal force, rate, speed;
 } hxFootInstant;
 
+/* Returns the virgin curves under feet at an end of a step, NULL within it. */
+static inline const hxSoilCurves *virgin_at(const hxPath *path, int slot, double x) {
+  return x == 0.0   ? &path->ends->from[slot / HX_LANES]
+         : x == 1.0 ? &path->ends->to[slot / HX_LANES]
+                    : NULL;
+}
+
 /* Computes them for a row of feet at x in [0, 1]. */
 HX_INLINE hxFootInstant foot_at(const hxPath *path, const hxFootPath *foot, double x) {
   const hxReal per_step = hx_splat(1.0 / path->h);
@@ -761,7 +775,8 @@ HX_INLINE hxFootInstant foot_at(const hxPath *path, const hxFootPath *foot, doub
   if (has_shares(path, foot->row)) law.stiffness *= foot->share + x * foot->share_rise;
   hxNormalForce f = hx_normal_force(law, depth.value, approach);
   if (has_soil(path->model, foot->row))
-    f = with_soil(path->contact, foot->slot, depth.value, approach, f);
+    f = with_soil(path->contact, foot->slot, depth.value, approach, virgin_at(path, foot->slot, x),
+                  f);
   const hxVec3 slip = sliding(foot->slip_from, foot->slip_to, foot->mean_slip, x);
   return (hxFootInstant){f.force, f.stiffness * approach + f.viscosity * (bends * depth.second),
                          hx_sqrt(hx_dot(slip, slip))};
@@ -820,13 +835,14 @@ HX_INLINE hxReal share_within(const hxPath *path, int row, int leg, hxReal x) {
 /* Returns the normal forces of a leg's contact with soil, N, samples in lanes. */
 HX_RARE hxReal soil_within(const hxPath *path, int row, int leg, const hxReal *depth,
                            const hxReal *rate) {
-  const hxSoil soil = hx_soil_under(path->contact, row, leg);
-  const double plastic = path->contact->plastic[hx_soil_row(row)][leg];
-  double delta[HX_LANES], slope[HX_LANES], force[HX_LANES];
-  hx_store(delta, *depth), hx_store(slope, *rate);
-  for (int lane = 0; lane < HX_LANES; ++lane)
-    force[lane] = hx_soil_normal_force(&soil, plastic, delta[lane], slope[lane] / path->h).force;
-  return hx_load(force);
+  hxSoils soil;
+  hxReal numbers[HX_SOIL_SIZE];
+  const int soft = hx_soil_row(row);
+  for (int i = 0; i < HX_SOIL_SIZE; ++i) numbers[i] = hx_splat(path->contact->soil[soft][i][leg]);
+  memcpy(&soil, numbers, sizeof soil);
+  return hx_soil_forces(&soil, hx_splat(path->contact->plastic[soft][leg]), *depth, *rate / path->h,
+                        hx_virgin(&soil, *depth))
+      .force;
 }
 
 /* Returns the normal forces of a leg's contact at x in [0, 1] of a step, N, samples in lanes. */

@@ -51,10 +51,13 @@ typedef struct {
 } hxSoilPack;
 
 #ifdef HX_TANGENT
+typedef struct hxSoilCurves hxSoilCurves;
+
 /* Returns the forces on a row at these depths and sinking speeds. */
 HX_RARE hxSoilPack hx_soil_pack(const hxContactState *state, int row, int slot, hxReal delta,
-                                hxReal ddelta) {
+                                hxReal ddelta, const hxSoilCurves *virgin) {
   const hxReal none = hx_splat(0.0);
+  (void)virgin;
   if (!is_in_soil(state, row, slot))
     return (hxSoilPack){none, none, none, none, none, none, none, none, none};
   const hxSoil soil = hx_soil_under(state, row, slot);
@@ -91,16 +94,17 @@ static inline hxMask hx_in_soil(const hxContactState *state, int row, int slot) 
   return hx_on_soil(state, row, slot) & hx_less(hx_splat(0.0), hx_load(&state->closed[row][slot]));
 }
 
-/* Returns the forces on a row at these depths and sinking speeds. */
+/* Returns the forces on a row at these depths and sinking speeds; virgin: the virgin curves there,
+ * NULL: not known. */
 HX_RARE hxSoilPack hx_soil_pack(const hxContactState *state, int row, int slot, hxReal delta,
-                                hxReal ddelta) {
+                                hxReal ddelta, const hxSoilCurves *virgin) {
   const hxReal none = hx_splat(0.0);
   const hxMask in = hx_in_soil(state, row, slot);
   if (!hx_any(in)) return (hxSoilPack){none, none, none, none, none, none, none, none, none};
   const hxSoils soil = hx_soils_under(state, row, slot);
   const hxReal z = hx_select(in, delta, none);
-  const hxSoilContacts f =
-      hx_soil_contacts(&soil, hx_load(&state->plastic[hx_soil_row(row)][slot]), z, ddelta);
+  const hxSoilContacts f = hx_soil_contacts(&soil, hx_load(&state->plastic[hx_soil_row(row)][slot]),
+                                            z, ddelta, virgin ? *virgin : hx_virgin(&soil, z));
   return (hxSoilPack){
       .force = hx_select(in, f.normal.force, none),
       .stiffness = hx_select(in, f.normal.stiffness, none),

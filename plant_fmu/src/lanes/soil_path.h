@@ -7,15 +7,50 @@
 
 static const double least_footprint = 1e-6; /* m  shallower ones are not kept */
 
-/* Returns the normal force of feet, with that of soil in place of the force of rigid ground where
- * they touched down on soil (eq. 44, 45). The elastic part is that whose power is stored. */
+/* Returns the virgin curves under a row at these depths; 0 where it is not in soil. */
+HX_RARE hxSoilCurves hx_virgin_under(const hxContactState *state, int row, int slot, hxReal delta) {
+  const hxReal none = hx_splat(0.0);
+  const hxMask in = hx_in_soil(state, row, slot);
+  if (!hx_any(in)) return (hxSoilCurves){none, none};
+  const hxSoils soil = hx_soils_under(state, row, slot);
+  return hx_virgin(&soil, hx_select(in, delta, none));
+}
+
+/* Virgin curves under the feet at both ends of a step. */
+typedef struct {
+  hxSoilCurves from[HX_PACKS], to[HX_PACKS];
+} hxSoilEnds;
+
+/* Computes those of a step between two moments; those of its start may be known already. */
+HX_RARE void hx_soil_ends(const hxContactState *state, const hxMoment *from, const hxMoment *to,
+                          int is_start_known, hxSoilEnds *ends) {
+  for (int pack = 0; pack < HX_PACKS; ++pack) {
+    const int slot = pack * HX_LANES;
+    if (!is_start_known)
+      ends->from[pack] =
+          hx_virgin_under(state, HX_FOOT, slot, hx_load(&from->contact[HX_FOOT].delta[slot]));
+    ends->to[pack] =
+        hx_virgin_under(state, HX_FOOT, slot, hx_load(&to->contact[HX_FOOT].delta[slot]));
+  }
+}
+
+/* Returns the normal force of feet and its derivatives, with that of soil in place of the force of
+ * rigid ground where they touched down on soil (eq. 44, 45); virgin: as in hx_soil_pack. */
 HX_RARE hxNormalForce with_soil(const hxContactState *state, int slot, hxReal delta, hxReal ddelta,
-                                hxNormalForce rigid) {
-  const hxMask soft = hx_on_soil(state, HX_FOOT, slot);
-  const hxSoilPack f = hx_soil_pack(state, HX_FOOT, slot, delta, ddelta);
-  return (hxNormalForce){
-      hx_select(soft, f.force, rigid.force), hx_select(soft, f.held, rigid.elastic),
-      hx_select(soft, f.stiffness, rigid.stiffness), hx_select(soft, f.viscosity, rigid.viscosity)};
+                                const hxSoilCurves *virgin, hxNormalForce rigid) {
+  const hxReal none = hx_splat(0.0);
+  const hxMask soft = hx_on_soil(state, HX_FOOT, slot), in = hx_in_soil(state, HX_FOOT, slot);
+  hxSoilForces f = {none, none, none, none, none};
+  if (hx_any(in)) {
+    const hxSoils soil = hx_soils_under(state, HX_FOOT, slot);
+    const hxReal z = hx_select(in, delta, none);
+    f = hx_soil_forces(&soil, hx_load(&state->plastic[hx_soil_row(HX_FOOT)][slot]), z, ddelta,
+                       virgin ? *virgin : hx_virgin(&soil, z));
+  }
+  return (hxNormalForce){hx_select(soft, hx_select(in, f.force, none), rigid.force),
+                         hx_select(soft, hx_select(in, f.elastic, none), rigid.elastic),
+                         hx_select(soft, hx_select(in, f.stiffness, none), rigid.stiffness),
+                         hx_select(soft, hx_select(in, f.viscosity, none), rigid.viscosity)};
 }
 
 /* Returns the largest depth of the cubic through depths and sinking speeds (per step) at both ends
@@ -24,21 +59,27 @@ static inline double hx_deepest(double from, double slope_from, double to, doubl
   if (!(slope_from > 0.0 && slope_to < 0.0)) return fmax(from, to);
   const double rise = to - from, bend = slope_from + slope_to - 2.0 * rise,
                curve = rise - slope_from - bend;
-  double low = 0.0, high = 1.0;
-  for (int i = 0; i < 40; ++i) {
-    const double x = 0.5 * (low + high);
-    if (slope_from + x * (2.0 * curve + 3.0 * x * bend) > 0.0)
-      low = x;
-    else
-      high = x;
-  }
-  return fmax(from + low * (slope_from + low * (curve + low * bend)), fmax(from, to));
+  /* the root in [0, 1] of slope_from + 2 curve x + 3 bend x^2, without cancellation */
+  const double root = sqrt(fmax(curve * curve - 3.0 * slope_from * bend, 0.0));
+  const double x = curve > 0.0 ? (-curve - root) / (3.0 * bend) : slope_from / (root - curve);
+  return fmax(from + x * (slope_from + x * (curve + x * bend)), fmax(from, to));
+}
+
+/* Returns the virgin curves at the largest depths on a step's path, which mostly are those of one
+ * of its ends; ends NULL: not known. */
+HX_RARE hxSoilCurves deepest_virgin(const hxSoils *soil, hxMask in, const hxSoilEnds *ends,
+                                    int slot, hxReal deepest, hxReal from, hxReal to) {
+  const hxMask within = differ(deepest, from) & differ(deepest, to);
+  if (!ends || hx_any(in & within)) return hx_virgin(soil, deepest);
+  const int pack = slot / HX_LANES;
+  return select_curves(differ(deepest, to), ends->from[pack], ends->to[pack]);
 }
 
 /* Computes the plastic depths of a row at the end of a step of h, by the largest depth on its path
  * (eq. 44). */
 HX_RARE void row_yield(const hxContactState *state, int row, double h, const hxContactMoment *from,
-                       const hxContactMoment *to, double plastic[HX_SLOTS]) {
+                       const hxContactMoment *to, const hxSoilEnds *ends,
+                       double plastic[HX_SLOTS]) {
   double deepest[HX_SLOTS] = {0.0};
   for (int i = 0; i < hx_slots_of(row); ++i)
     if (is_in_soil(state, row, i))
@@ -48,21 +89,26 @@ HX_RARE void row_yield(const hxContactState *state, int row, double h, const hxC
     const hxMask in = hx_in_soil(state, row, slot);
     const hxSoils soil = hx_soils_under(state, row, slot);
     const hxReal before = hx_load(&state->plastic[hx_soil_row(row)][slot]),
-                 now = hx_any(in) ? hx_plastic_depth(&soil, hx_load(&deepest[slot])) : before;
-    hx_store(&plastic[slot], hx_select(in, hx_max(before, now), before));
+                 z = hx_load(&deepest[slot]);
+    if (!hx_any(in)) continue; /* as it was */
+    const hxSoilCurves virgin = deepest_virgin(
+        &soil, in, ends, slot, z, hx_load(&from->delta[slot]), hx_load(&to->delta[slot]));
+    hx_store(&plastic[slot],
+             hx_select(in, hx_max(before, hx_plastic_depth(&soil, z, virgin)), before));
   }
   if (row != HX_TORSO) hx_fill_slots(plastic);
 }
 
 /* Computes those of all rows of a model; the others keep theirs, because they are open. */
 HX_RARE void hx_soil_yield(const hxModel *model, const hxContactState *state, double h,
-                           const hxMoment *from, const hxMoment *to,
+                           const hxMoment *from, const hxMoment *to, const hxSoilEnds *ends,
                            double plastic[HX_SOIL_ROWS][HX_SLOTS]) {
   memcpy(plastic, state->plastic, sizeof state->plastic);
   for (int k = 0; k < model->listed; ++k) {
     const int row = model->row[k];
     if (has_soil(model, row))
-      row_yield(state, row, h, &from->contact[row], &to->contact[row], plastic[hx_soil_row(row)]);
+      row_yield(state, row, h, &from->contact[row], &to->contact[row], row == HX_FOOT ? ends : NULL,
+                plastic[hx_soil_row(row)]);
   }
 }
 

@@ -10,7 +10,7 @@ HX_RARE hxContactSlope with_soil_slope(const hxModel *model, const hxContactStat
                                        int slot, hxReal deeper, const hxContactWork *contact,
                                        const hxImplicit *implicit, hxContactSlope rigid) {
   const hxMask soft = hx_on_soil(state, row, slot);
-  const hxSoilPack ahead = hx_soil_pack(state, row, slot, deeper, contact->kin.ddelta);
+  const hxSoilPack ahead = hx_soil_pack(state, row, slot, deeper, contact->kin.ddelta, NULL);
   hxContactSlope slope = rigid;
   slope.stiffness = hx_select(soft, ahead.stiffness, rigid.stiffness);
   slope.viscosity = hx_select(soft, ahead.viscosity, rigid.viscosity);
