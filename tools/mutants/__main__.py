@@ -122,15 +122,16 @@ def main() -> int:
     parser.add_argument("--with", nargs="+", dest="others", default=[], help="further tests")
     parser.add_argument("--seconds", type=float, default=math.inf, help="of a group's tests")
     parser.add_argument("--survivors", action="store_true", help="judge survivors again")
+    parser.add_argument("--kernels", action="store_true", help="build all kernels")
     parser.add_argument("--groups", nargs="+", choices=[*GROUPS], default=[*GROUPS])
     given = parser.parse_args()
     BUILD.mkdir(parents=True, exist_ok=True)
     with FileLock(BUILD / "build.lock"):
-        copy_tree()
+        copy_tree(given.kernels)
         drawn = sample(TREE, given.seed, [*GROUPS])[: given.count]
         mutants = dict(enumerate(drawn, start=1))
         in_c = {number: one for number, one in mutants.items() if one.file.endswith((".c", ".h"))}
-        chosen = build_switched(in_c) | (mutants.keys() - in_c.keys())
+        chosen = build_switched(in_c, given.kernels) | (mutants.keys() - in_c.keys())
     judges = Judges(given, mutants)
     try:
         numbers = [*wanted(judges, given)]
