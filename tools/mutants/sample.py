@@ -36,6 +36,7 @@ GROUPS: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
         ("plant_fmu/src/contact_law.c", f"{LANES}/foot.h", f"{LANES}/friction.h"),
         (
             *TWINS,
+            f"{TESTS}plant_functions.py",
             *(f"{TESTS}laws_{law}.py" for law in ("impact", "bristle", "stribeck", "standing")),
             *(f"tests/friction/test_{name}.py" for name in ("friction_laws", "spin_and_rolling")),
             CHOICES,
@@ -48,7 +49,8 @@ GROUPS: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
         (
             f"{TESTS}plant_dynamics.py",
             *TWINS,
-            *(f"{TESTS}plant_{name}.py" for name in ("integrator", "events", "state")),
+            *(f"{TESTS}{name}.py" for name in ("plant_integrator", "plant_events", "plant_state")),
+            f"{TESTS}laws_servo.py",
             CHOICES,
         ),
     ),

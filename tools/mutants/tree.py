@@ -193,12 +193,13 @@ def _named(output: str, mutants: dict[int, Mutant]) -> Iterable[int]:
 
 @contextmanager
 def alone(mutant: Mutant) -> Iterator[tuple[bool, str]]:
-    """Builds the copy with one mutant; the file is restored, and built by the next build."""
+    """Builds the copy with one mutant. Its file stays changed for tests that build anew; then it is
+    restored, and built by the next build.
+    """
     SWITCHES.unlink(missing_ok=True)
     text = changed(mutant, (TREE / mutant.file).read_text(encoding="utf-8"))
     try:
         with written({mutant.file: text}):
-            result = build()
-        yield result
+            yield build()
     finally:
         os.utime(TREE / mutant.file)
