@@ -41,6 +41,7 @@ GROUPS: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
             *(f"tests/friction/test_{name}.py" for name in ("friction_laws", "spin_and_rolling")),
             CHOICES,
             *(f"tests/ground/test_{name}.py" for name in ("plant_soil", "grid_motion", "faces")),
+            "tests/ground/test_laws_soil.py",
             "tests/friction/test_plant_sticks_and_slips.py",
         ),
     ),
