@@ -100,7 +100,12 @@ class Ground:
 
 
 def differences(
-    core: ct.CDLL, setup: ControllerSetup, *, sense: Sense, steps: int = STEPS
+    core: ct.CDLL,
+    setup: ControllerSetup,
+    *,
+    sense: Sense,
+    steps: int = STEPS,
+    told: Callable[[float], BodyCommand] = program,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Returns the largest differences of angle, speed, torque and acceleration over a walk, in rad
     and relative to the servo, and the fallback (steps, 6). The walk ends where they are too large.
@@ -116,8 +121,8 @@ def differences(
     )
     for k in range(steps):
         t = k * setup.period
-        expected = reference.step(t, program(t), measurement)
-        out = native.step(t, program(t), measurement)
+        expected = reference.step(t, told(t), measurement)
+        out = native.step(t, told(t), measurement)
         gap = np.abs(commands(out) - [getattr(expected, name) for name in COMMANDS])
         worst = np.maximum(worst, gap.max(axis=(1, 2)) / scale)
         if not (worst <= LIMITS).all():
@@ -305,6 +310,19 @@ def test_feet_that_find_no_ground_are_awaited_at_the_same_step(
     worst, _ = differences(controller_core, setup_of(gait=gait), sense=sense)
     assert close(worst)
     assert 0.02 < np.mean(sense.held) < 0.8
+
+
+def test_stops_while_feet_are_awaited_are_the_same(controller_core: ct.CDLL) -> None:
+    """Every second command is to stand, given before the last one is reached."""
+    sense, stop = LowGround(), BodyCommand()
+
+    def told(t: float) -> BodyCommand:
+        return BodyCommand(0.04, 0.01, 0.05) if t % 1.7 < 1.2 else stop
+
+    worst, _ = differences(controller_core, setup_of(), sense=sense, steps=1400, told=told)
+    assert close(worst)
+    stands = [k for k, held in enumerate(sense.held) if held and told(0.005 * k) is stop]
+    assert len(stands) > 20
 
 
 @pytest.mark.parametrize(("speed_max", "least", "most"), [(3.0, 0.09, 0.11), (2.6, 0.0, 0.02)])
