@@ -54,12 +54,19 @@ def read_results() -> Results:
     return {one["number"]: one for one in stored}
 
 
+def changed_line(mutant: Mutant) -> str:
+    """Returns the line of a mutant with its change."""
+    text = changed(mutant, (TREE / mutant.file).read_text(encoding="utf-8"))
+    return text.splitlines()[mutant.line - 1].strip()
+
+
 class Judges:
     """Workers, and the results that they add to."""
 
     def __init__(self, given: argparse.Namespace, mutants: dict[int, Mutant]) -> None:
         """Starts workers and reads the results of earlier calls."""
         self.options, self.mutants = Options(tuple(given.others), given.seconds), mutants
+        self.lines = {number: changed_line(mutant) for number, mutant in mutants.items()}
         self.results = read_results()
         self.workers = [Worker(number) for number in range(given.jobs)]
         self.free: SimpleQueue[Worker] = SimpleQueue()
@@ -85,15 +92,9 @@ class Judges:
             else:
                 self.keep(number, {"fate": "does not build", "by": ""})
 
-    def changed_line(self, number: int) -> str:
-        """Returns the line of a mutant with its change."""
-        mutant = self.mutants[number]
-        text = changed(mutant, (TREE / mutant.file).read_text(encoding="utf-8"))
-        return text.splitlines()[mutant.line - 1].strip()
-
     def judge(self, number: int) -> None:
         """Judges a mutant by a free worker, unless no test can find it."""
-        reason = EQUIVALENT.get((self.mutants[number].file, self.changed_line(number)))
+        reason = EQUIVALENT.get((self.mutants[number].file, self.lines[number]))
         if reason:
             self.keep(number, {"fate": "equivalent", "by": reason})
             return
@@ -107,7 +108,7 @@ class Judges:
     def keep(self, number: int, fate: dict[str, Any]) -> None:
         """Stores and prints the fate of a mutant."""
         mutant = self.mutants[number]
-        line = self.changed_line(number)
+        line = self.lines[number]
         at = datetime.now(UTC).isoformat(timespec="seconds")
         one = {"number": number, **asdict(mutant), **fate, "text": line, "at": at}
         print(f"{one['fate']:10}{number:5} {mutant.file}:{mutant.line}: {line}  {one['by']}")
