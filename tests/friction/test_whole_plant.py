@@ -40,6 +40,7 @@ MORE: dict[str, Any] = {
     "spin_radius": 0.01,
     "rolling_radius": 0.004,
 }
+SLOPE = {"kind": "slope", "incline": 0.2, "heading": 0.5}
 STOPS = {"stop_stiffness": 80.0, "stop_damping": 0.3}
 
 
@@ -63,8 +64,7 @@ def everything(law: str, seed: int = 0, **sections: dict[str, Any]) -> Robot:
 @pytest.mark.parametrize("mode", ["position", "torque", "kinematic"])
 @pytest.mark.parametrize("law", ["tanh", "bristle", "lugre"])
 def test_accelerations_are_those_of_the_dense_system(core: ct.CDLL, law: str, mode: str) -> None:
-    terrain = {"kind": "slope", "incline": 0.2, "heading": 0.5}
-    robot = everything(law, servo={"mode": mode}, terrain=terrain)
+    robot = everything(law, servo={"mode": mode}, terrain=SLOPE)
     robot = changed(robot, contact={"impact_speed_floor": 2.0})
     body, command = random_bodies(robot, 3, drift=0.02), random_command(robot, 3)
     expected = accelerations(robot, body, command, standing_damping(robot, body))
@@ -79,7 +79,7 @@ def test_accelerations_are_those_of_the_dense_system(core: ct.CDLL, law: str, mo
 @pytest.mark.parametrize("law", ["tanh", "bristle", "lugre"])
 def test_steps_are_the_plants(core: ct.CDLL, name: str, law: str) -> None:
     h = STEP[name]
-    robot = everything(law, solver={"method": name, "step": h})
+    robot = everything(law, solver={"method": name, "step": h}, terrain=SLOPE)
     body, command = random_bodies(robot, 1), random_command(robot, 1)
     state = assert_same_steps(core, robot, body, command, [h, 2.0 * h])
     assert np.count_nonzero(~np.isnan(state.damping)) == 3

@@ -229,6 +229,29 @@ def test_derivatives_on_a_smooth_grid_are_those_of_differences(core: ct.CDLL) ->
     assert flat(d_output.foot.force).any()
 
 
+@pytest.mark.parametrize("axis", [0, 1])
+def test_a_force_on_a_smooth_grid_turns_with_the_normal(core: ct.CDLL, axis: int) -> None:
+    """The robot is moved along the ground under one foot, whose depth does not change then."""
+    ground = Ground(core, rough(6))
+    plant = on_grid(core, ATHENA, ground, position=(0.0, 0.0, HEIGHT))
+    march(plant, 0.3)
+    command, x, h = marching(ATHENA, 0.3), plant.coordinates, 1e-7
+    leg = int(np.argmax(plant.output(command).foot.normal_force))
+    no_input, way, up = np.zeros(ct.sizeof(HxInput) // 8), np.zeros(x.size), np.zeros(x.size)
+    way[axis], up[2] = 1.0, 1.0
+    along, above = (plant.tangent(command, no_input, dx)[1].foot for dx in (way, up))
+    share = along.penetration[leg] / above.penetration[leg]
+    exact = np.array(along.force[leg]) - share * np.array(above.force[leg])
+    sides = []
+    for sign in (1.0, -1.0):
+        plant.coordinates = x + sign * h * (way - share * up)
+        sides.append(np.array(plant.output(command).foot.force[leg]))
+    difference = (sides[0] - sides[1]) / (2.0 * h)
+    assert np.abs(difference).max() > 1.0  # N/m
+    # of forces of 1e5 N/m the differences have eight digits
+    assert exact == pytest.approx(difference, abs=1e-6 * np.abs(difference).max())
+
+
 def test_a_material_s_friction_and_stiffness_are_those_of_the_touch_down(core: ct.CDLL) -> None:
     table = np.full((1, 16), np.nan)
     table[0, 0], table[0, 2], table[0, 3:] = 0.0, 2e5, 0.0

@@ -73,8 +73,9 @@ def test_a_robot_without_contact_of_the_body_stands_with_its_torso_underground(
     assert np.all(output.torso.contact_force == 0.0)
 
 
-def test_a_kneeling_robot_rests_on_its_knees(core: ct.CDLL) -> None:
-    robot = athena()
+@pytest.mark.parametrize("body", [ON, ON | {"shank_radius": 0.0}], ids=["shanks", "knees alone"])
+def test_a_kneeling_robot_rests_on_its_knees(core: ct.CDLL, body: dict[str, Any]) -> None:
+    robot = athena(body=body)
     plant = dropped(core, robot, KNEELING, 0.07)
     output = settle(plant, KNEELING, 3.0)
     assert output.body.knee_force[:, 2].sum() == pytest.approx(54.936, rel=REST)

@@ -362,6 +362,10 @@ def test_the_exact_restitution_factor_is_the_twins(core: ct.CDLL, e: float) -> N
     )
 
 
+def test_a_contact_that_gives_back_all_energy_has_no_damping(core: ct.CDLL) -> None:
+    assert asked(core.hx_probe_exact_restitution_chi, 1.0) == 0.0
+
+
 # servos
 
 

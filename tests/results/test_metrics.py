@@ -15,6 +15,7 @@ from hexapod_cosim.cosim.common.files import to_json
 from hexapod_cosim.cosim.interface.names import foot_names, joint_names
 from hexapod_cosim.cosim.master.recorder import Recording
 from hexapod_cosim.cosim.report.report import metric_rows, number
+from hexapod_cosim.cosim.results.balance import Unbalanced
 from hexapod_cosim.cosim.results.metrics import FLOORS, METRICS, compute_metrics, shown_metrics
 from hexapod_cosim.cosim.results.walk import View, body_height, commanded_path, held_integral
 
@@ -101,9 +102,10 @@ def test_cumulative_figures_depend_on_no_row(h: float) -> None:
     assert metrics["path_error"] == pytest.approx(0.0, abs=1e-12)
 
 
+@pytest.mark.parametrize("load", [0.02, 0.3])
 @pytest.mark.parametrize("share", [0.1, 0.5, 0.9])
-def test_the_creep_of_the_tanh_law_is_no_net_slip(share: float) -> None:
-    mu, slope, normal = 0.7, 100.0, 0.3 * WEIGHT
+def test_the_creep_of_the_tanh_law_is_no_net_slip(share: float, load: float) -> None:
+    mu, slope, normal = 0.7, 100.0, load * WEIGHT
     walk = Walk()
     walk.set("LF.foot.normal_force", normal)
     walk.set("LF.foot.tangential_force", share * mu * normal)
@@ -647,6 +649,10 @@ def test_the_energy_residual_of_a_robot_at_rest_is_measured_by_a_lift_of_a_milli
     walk = Walk(speed=0.0)
     walk.set("energy.residual", np.where(walk.time > 0.0, 1e-3 * WEIGHT, 0.0))
     assert walk.metrics()["energy_residual"] == pytest.approx(1.0)
+
+
+def test_a_balance_warns_beyond_a_hundredth_of_the_work() -> None:
+    assert Unbalanced.among([0.01, 0.0101, 0.02, math.nan]) == Unbalanced(2, 0.02)
 
 
 def test_what_is_too_small_to_be_measured_is_stated_metric_by_metric() -> None:

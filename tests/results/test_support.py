@@ -43,6 +43,15 @@ def test_the_margin_is_the_distance_to_the_nearest_edge(
     assert got == pytest.approx([margin], nan_ok=True)
 
 
+@pytest.mark.parametrize(("apart", "margin"), [(1e-9, math.nan), (2e-9, -0.5)])
+def test_two_feet_within_a_nanometre_make_no_edge(apart: float, margin: float) -> None:
+    feet = np.zeros((6, 2, 1))
+    feet[1, 0] = apart
+    standing = np.array([[True, True, False, False, False, False]])
+    got = polygon_margins(feet, standing, np.array([[0.0], [0.5]]))
+    assert got == pytest.approx([margin], nan_ok=True)
+
+
 def test_the_margin_does_not_depend_on_the_order_of_the_feet() -> None:
     generator = np.random.default_rng(5)
     feet = generator.normal(size=(6, 2, 50))
@@ -90,6 +99,28 @@ def test_the_centre_of_mass_is_the_twins(name: str) -> None:
     np.testing.assert_allclose(centre_of_mass(recording, parameters), expected, atol=1e-12)
 
 
+MASSLESS = (  # but for the torso
+    PARAMETERS | {name: 0.0 for name in PARAMETERS if name.endswith(".mass")} | {"torso.mass": 1.0}
+)
+
+
+@pytest.mark.parametrize("up", [(0, 0, 1), (1, 0, 0), (0.95, 0.3, 0.1), (0.8, -0.6, 0)])
+def test_the_margin_does_not_depend_on_the_worlds_axes(up: tuple[float, float, float]) -> None:
+    way = np.array(up) / np.linalg.norm(up)
+    # the rows of the third factor are orthonormal; those after the first span the plane
+    across = np.linalg.svd(way[None])[2][1:]
+    walk = Walk(cycles=0)
+    for leg, place in zip(LEG_NAMES, SQUARE @ across, strict=True):
+        for name, x in zip(vector_names(f"{leg}.foot.position"), place, strict=True):
+            walk.set(name, x)
+        walk.set(f"{leg}.foot.contact", 1.0)
+    centre = way + np.array([0.4, 0.1]) @ across
+    for name, x in zip(vector_names("torso.position"), centre, strict=True):
+        walk.set(name, x)
+    gravity = dict(zip(vector_names("gravity"), -9.81 * way, strict=True))
+    assert stability_margins(walk.recording, MASSLESS | gravity) == pytest.approx([0.6])
+
+
 def test_a_robot_on_a_slope_is_judged_along_gravity() -> None:
     walk = Walk(cycles=0)
     for leg, (x, y) in zip(LEG_NAMES, SQUARE, strict=True):
@@ -97,13 +128,8 @@ def test_a_robot_on_a_slope_is_judged_along_gravity() -> None:
         walk.set(f"{leg}.foot.position[2]", y)
         walk.set(f"{leg}.foot.contact", 1.0)
     walk.set("torso.position[3]", 1.0)
-    massless = (
-        PARAMETERS
-        | {name: 0.0 for name in PARAMETERS if name.endswith(".mass")}
-        | {"torso.mass": 1.0}
-    )
-    tilted = massless | {"gravity[1]": 9.81 * math.sin(0.1), "gravity[3]": -9.81 * math.cos(0.1)}
-    assert stability_margins(walk.recording, massless) == pytest.approx([1.0])
+    tilted = MASSLESS | {"gravity[1]": 9.81 * math.sin(0.1), "gravity[3]": -9.81 * math.cos(0.1)}
+    assert stability_margins(walk.recording, MASSLESS) == pytest.approx([1.0])
     # the projection falls tan(0.1) ahead of the torso, and the square is seen foreshortened
     assert stability_margins(walk.recording, tilted) == pytest.approx(
         [(1.0 - math.tan(0.1)) * math.cos(0.1)]

@@ -15,7 +15,11 @@ that pass them are "open", and --survivors judges them again.
 The sample is drawn with a seed, from each group in turn, so that each part of it is a fair sample.
 Results are in build/mutants/results.json; a second call continues there until COUNT mutants are
 judged. --survivors judges the survivors again, after tests were added. A mutant that does not build
-is left out. The copy is build/mutants/tree. Delete build/mutants after a change of the code.
+is left out; one that no test can find is equivalent, with its reason (tools/mutants/explained.py).
+The copy is built with the baseline kernel alone, and with --kernels with all: wide lanes show some
+mutants that narrow ones hide. With --alone each mutant has a build of its own, whose sources keep
+the change, for tests that build anew. The copy is build/mutants/tree. Delete build/mutants after a
+change of the code.
 """
 
 from __future__ import annotations
@@ -34,6 +38,7 @@ from typing import Any
 
 from filelock import FileLock
 
+from tools.mutants.explained import EQUIVALENT
 from tools.mutants.sample import GROUPS, Mutant, changed, sample
 from tools.mutants.tree import BUILD, TREE, alone, build_switched, copy_tree
 from tools.mutants.worker import Options, Worker, judge
@@ -49,12 +54,19 @@ def read_results() -> Results:
     return {one["number"]: one for one in stored}
 
 
+def changed_line(mutant: Mutant) -> str:
+    """Returns the line of a mutant with its change."""
+    text = changed(mutant, (TREE / mutant.file).read_text(encoding="utf-8"))
+    return text.splitlines()[mutant.line - 1].strip()
+
+
 class Judges:
     """Workers, and the results that they add to."""
 
     def __init__(self, given: argparse.Namespace, mutants: dict[int, Mutant]) -> None:
         """Starts workers and reads the results of earlier calls."""
         self.options, self.mutants = Options(tuple(given.others), given.seconds), mutants
+        self.lines = {number: changed_line(mutant) for number, mutant in mutants.items()}
         self.results = read_results()
         self.workers = [Worker(number) for number in range(given.jobs)]
         self.free: SimpleQueue[Worker] = SimpleQueue()
@@ -81,7 +93,11 @@ class Judges:
                 self.keep(number, {"fate": "does not build", "by": ""})
 
     def judge(self, number: int) -> None:
-        """Judges a mutant by a free worker."""
+        """Judges a mutant by a free worker, unless no test can find it."""
+        reason = EQUIVALENT.get((self.mutants[number].file, self.lines[number]))
+        if reason:
+            self.keep(number, {"fate": "equivalent", "by": reason})
+            return
         worker = self.free.get()
         try:
             known = [*self.results.values()]
@@ -92,11 +108,10 @@ class Judges:
     def keep(self, number: int, fate: dict[str, Any]) -> None:
         """Stores and prints the fate of a mutant."""
         mutant = self.mutants[number]
-        text = changed(mutant, (TREE / mutant.file).read_text(encoding="utf-8"))
-        line = text.splitlines()[mutant.line - 1].strip()
+        line = self.lines[number]
         at = datetime.now(UTC).isoformat(timespec="seconds")
         one = {"number": number, **asdict(mutant), **fate, "text": line, "at": at}
-        print(f"{one['fate']:9}{number:4} {mutant.file}:{mutant.line}: {line}  {one['by']}")
+        print(f"{one['fate']:10}{number:5} {mutant.file}:{mutant.line}: {line}  {one['by']}")
         sys.stdout.flush()
         with FileLock(RESULTS.with_suffix(".lock")):  # two commands may judge different groups
             self.results = read_results() | {number: one}
@@ -122,15 +137,19 @@ def main() -> int:
     parser.add_argument("--with", nargs="+", dest="others", default=[], help="further tests")
     parser.add_argument("--seconds", type=float, default=math.inf, help="of a group's tests")
     parser.add_argument("--survivors", action="store_true", help="judge survivors again")
+    parser.add_argument("--alone", action="store_true", help="a build for each mutant")
+    parser.add_argument("--kernels", action="store_true", help="build all kernels")
     parser.add_argument("--groups", nargs="+", choices=[*GROUPS], default=[*GROUPS])
     given = parser.parse_args()
     BUILD.mkdir(parents=True, exist_ok=True)
     with FileLock(BUILD / "build.lock"):
-        copy_tree()
+        copy_tree(given.kernels)
         drawn = sample(TREE, given.seed, [*GROUPS])[: given.count]
         mutants = dict(enumerate(drawn, start=1))
         in_c = {number: one for number, one in mutants.items() if one.file.endswith((".c", ".h"))}
-        chosen = build_switched(in_c) | (mutants.keys() - in_c.keys())
+        chosen = mutants.keys() - in_c.keys()
+        if not given.alone:
+            chosen |= build_switched(in_c, given.kernels)
     judges = Judges(given, mutants)
     try:
         numbers = [*wanted(judges, given)]

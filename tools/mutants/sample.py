@@ -13,29 +13,54 @@ from random import Random
 
 LANES, TESTS = "plant_fmu/src/lanes", "tests/plant/test_"
 NATIVE = ("tests/controller/test_native_controller.py", "tests/controller/test_controller_twins.py")
-# group: files, and the tests that concern them
+TWINS = ("tests/models/test_twin_integrator.py", "tests/friction/test_whole_plant.py")
+CHOICES = "tests/trust/test_choices.py"
+# group: files, and the tests that concern them, fast ones first
 GROUPS: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     "dynamics": (
         (f"{LANES}/dynamics.h", f"{LANES}/stage.h", f"{LANES}/forces.h", f"{LANES}/spatial.h"),
-        (f"{TESTS}plant_dynamics.py", f"{TESTS}laws_motion.py", f"{TESTS}plant_stages.py"),
+        (
+            *(f"{TESTS}plant_{name}.py" for name in ("dynamics", "stages")),
+            *TWINS,
+            *(
+                f"tests/servos/test_{name}.py"
+                for name in ("elastic_gear", "rotor_spin", "measured_servos")
+            ),
+            *(f"tests/friction/test_{name}.py" for name in ("joint_stops", "spin_and_rolling")),
+            *(f"tests/ground/test_{name}.py" for name in ("laws_body", "self_contact", "faces")),
+            f"{TESTS}laws_motion.py",
+            CHOICES,
+        ),
     ),
     "contact": (
         ("plant_fmu/src/contact_law.c", f"{LANES}/foot.h", f"{LANES}/friction.h"),
         (
+            *TWINS,
+            f"{TESTS}plant_functions.py",
             *(f"{TESTS}laws_{law}.py" for law in ("impact", "bristle", "stribeck", "standing")),
-            "tests/friction",
+            *(f"tests/friction/test_{name}.py" for name in ("friction_laws", "spin_and_rolling")),
+            CHOICES,
+            *(f"tests/ground/test_{name}.py" for name in ("plant_soil", "grid_motion", "faces")),
+            "tests/ground/test_laws_soil.py",
+            "tests/friction/test_plant_sticks_and_slips.py",
         ),
     ),
     "integrator": (
         ("plant_fmu/src/method.c", f"{LANES}/integrator.h"),
-        (f"{TESTS}plant_integrator.py", f"{TESTS}plant_events.py", f"{TESTS}plant_state.py"),
+        (
+            f"{TESTS}plant_dynamics.py",
+            *TWINS,
+            *(f"{TESTS}{name}.py" for name in ("plant_integrator", "plant_events", "plant_state")),
+            f"{TESTS}laws_servo.py",
+            CHOICES,
+        ),
     ),
     "kinematics": (
         (f"{LANES}/kinematics.h", f"{LANES}/coordinates.h"),
         (
             *(f"{TESTS}{name}.py" for name in ("plant_functions", "plant_coordinates")),
+            TWINS[0],
             f"{TESTS}laws_motion.py",
-            "tests/models/test_twin_integrator.py",
         ),
     ),
     "control": (("controller_fmu/src/*/*.c", "controller_fmu/src/controller.c"), NATIVE),
@@ -43,10 +68,13 @@ GROUPS: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
         ("cosim/results/metrics.py", "cosim/results/support.py", "cosim/results/balance.py"),
         tuple(
             f"tests/results/test_{name}.py"
-            for name in ("metrics", "measured", "comparison", "footprints", "support")
+            for name in ("support", "metrics", "comparison", "footprints", "measured")
         ),
     ),
-    "controller": (("controller/*.py", "controller/[a-ce-z]*/*.py"), ("tests/controller",)),
+    "controller": (
+        ("controller/*.py", "controller/[a-ce-z]*/*.py"),
+        (NATIVE[1], NATIVE[0], "tests/controller"),
+    ),
 }
 SWAPS = {
     **{"+": "-", "-": "+", "*": "/", "/": "*", "<": "<=", "<=": "<", ">": ">=", ">=": ">"},

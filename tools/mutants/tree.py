@@ -1,9 +1,9 @@
 """Copies the repository to build/mutants/tree and builds it, with many mutants in one build or with
 one.
 
-The copy is built for speed of building: with -O1 and the baseline kernel alone, which gives the
-same bits. Sources with mutants are written, built and then restored with their old times, so that
-tests read the sources as they are, and the binaries do not count as stale.
+The copy is built for speed of building: with -O1, and with the baseline kernel alone unless all are
+asked for, which gives the same bits. Sources with mutants are written, built and then restored with
+their old times, so that tests read the sources as they are, and the binaries do not count as stale.
 """
 
 from __future__ import annotations
@@ -21,6 +21,7 @@ from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import asdict
 from pathlib import Path
+from typing import Any
 
 from tools.mutants.sample import Mutant, changed
 from tools.mutants.switch import HEADER, switched
@@ -29,23 +30,24 @@ ROOT = Path(__file__).resolve().parents[2]
 BUILD = ROOT / "build" / "mutants"
 TREE, SWITCHES = BUILD / "tree", BUILD / "switches.json"
 INCLUDED = BUILD / "switch.h"
-FLAGS = f"-O1 -DNDEBUG -DHX_BASELINE_ONLY -include {INCLUDED}"  # of the copy's C code
+FLAGS = f"-O1 -DNDEBUG -include {INCLUDED}"  # of the copy's C code
 SESSION = "mutants"  # tests do not build when the last build names this session
 PYTHON = TREE / ".venv" / "bin" / "python"
 
 
-def faster_presets(text: str) -> str:
+def faster_presets(text: str, kernels: bool) -> str:
     """Returns the presets with FLAGS."""
     table = json.loads(text)
     chosen = next(one for one in table["configurePresets"] if one["name"] == "test")
-    chosen["cacheVariables"]["CMAKE_C_FLAGS_RELEASE"] = FLAGS
+    flags = FLAGS if kernels else f"{FLAGS} -DHX_BASELINE_ONLY"
+    chosen["cacheVariables"]["CMAKE_C_FLAGS_RELEASE"] = flags
     return json.dumps(table)
 
 
 # files that are changed in the copy, for another build
-FASTER: dict[str, Callable[[str], str]] = {
+FASTER: dict[str, Callable[[str, bool], str]] = {
     "CMakePresets.json": faster_presets,
-    "plant_fmu/CMakeLists.txt": lambda text: text.replace("$<$<CONFIG:Release>:-O3>", ""),
+    "plant_fmu/CMakeLists.txt": lambda text, _: text.replace("$<$<CONFIG:Release>:-O3>", ""),
 }
 
 
@@ -55,8 +57,9 @@ def write_changed(path: Path, text: str) -> None:
         path.write_text(text, encoding="utf-8")
 
 
-def copy_tree() -> None:
-    """Copies the files of the repository that differ, with an environment that imports the copy.
+def copy_tree(kernels: bool = False) -> None:
+    """Copies the files of the repository that differ, with an environment that imports the copy,
+    and chooses the build of all kernels or of the baseline alone.
 
     Files that stay as they are keep their times, so that the build stays as it is.
     """
@@ -66,7 +69,7 @@ def copy_tree() -> None:
         given, copy = ROOT / name, TREE / name
         if name in FASTER:
             copy.parent.mkdir(parents=True, exist_ok=True)
-            write_changed(copy, FASTER[name](given.read_text(encoding="utf-8")))
+            write_changed(copy, FASTER[name](given.read_text(encoding="utf-8"), kernels))
         elif given.is_file() and not (copy.exists() and filecmp.cmp(given, copy, shallow=False)):
             copy.parent.mkdir(parents=True, exist_ok=True)
             shutil.copyfile(given, copy)
@@ -130,12 +133,13 @@ def written(texts: dict[str, str]) -> Iterator[None]:
             os.utime(TREE / name, ns=(times.st_atime_ns, times.st_mtime_ns))
 
 
-def build_switched(mutants: dict[int, Mutant]) -> set[int]:
+def build_switched(mutants: dict[int, Mutant], kernels: bool = False) -> set[int]:
     """Builds the copy with all mutants that can be switched; returns their numbers.
 
     A mutant is left out where the compiler refuses it. Raises SystemExit when it refuses the rest.
     """
-    wanted = {str(number): asdict(mutant) for number, mutant in mutants.items()}
+    wanted: dict[str, Any] = {"kernels": kernels}
+    wanted |= {str(number): asdict(mutant) for number, mutant in mutants.items()}
     if SWITCHES.exists():
         stored = json.loads(SWITCHES.read_text(encoding="utf-8"))
         if stored["wanted"] == wanted and build()[0] and stored["libraries"] == libraries():
@@ -189,12 +193,13 @@ def _named(output: str, mutants: dict[int, Mutant]) -> Iterable[int]:
 
 @contextmanager
 def alone(mutant: Mutant) -> Iterator[tuple[bool, str]]:
-    """Builds the copy with one mutant; the file is restored, and built by the next build."""
+    """Builds the copy with one mutant. Its file stays changed for tests that build anew; then it is
+    restored, and built by the next build.
+    """
     SWITCHES.unlink(missing_ok=True)
     text = changed(mutant, (TREE / mutant.file).read_text(encoding="utf-8"))
     try:
         with written({mutant.file: text}):
-            result = build()
-        yield result
+            yield build()
     finally:
         os.utime(TREE / mutant.file)

@@ -9,7 +9,7 @@ import shutil
 import signal
 import subprocess
 import threading
-from collections import Counter
+from collections import Counter, defaultdict
 from dataclasses import asdict, dataclass
 from itertools import accumulate
 from pathlib import Path
@@ -169,14 +169,19 @@ def _order(group: str, results: list[Told], left_out: Told, seconds: float) -> T
     fastest files, whole, as the tests of a file share fixtures. Files that do not end within the
     given seconds are left out.
     """
-    kills = Counter(one["by"] for one in results if one["group"] == group)
+    kills = Counter(str(one["by"]) for one in results if one["group"] == group)
     with _lock:
         durations: dict[str, float] = _read(DURATIONS)
-    worth = {test: (kills[test] + 0.1) / (time + 0.1) for test, time in durations.items()}
-    files = tuple(GROUPS[group][1])
-    tests = sorted(
-        (test for test in worth if test.startswith(files)), key=lambda test: -worth[test]
+    known = [test for test in durations if test.startswith(tuple(GROUPS[group][1]))]
+    of_file: dict[str, float] = defaultdict(float)
+    for test in known:
+        of_file[test.partition("::")[0]] += durations[test]
+    killers = sorted(
+        (test for test in known if kills[test]),
+        key=lambda test: -kills[test] / (durations[test] + 0.1),
     )
+    others = (test for test in known if not kills[test])
+    tests = killers + sorted(others, key=lambda test: of_file[test.partition("::")[0]])
     ends = accumulate(durations[test] for test in tests)
     beyond = {
         test.partition("::")[0] for test, end in zip(tests, ends, strict=True) if end > seconds
