@@ -24,6 +24,7 @@ from fmi_plant import Plant
 from xdist.scheduler import LoadScopeScheduling
 
 from hexapod_cosim.cosim.cli import main
+from hexapod_cosim.cosim.report.figures import Figures
 
 # A shell that runs the tests in the background lets them ignore Ctrl-C, and their children too.
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
@@ -167,7 +168,8 @@ def read_only() -> Iterator[Callable[[Path], None]]:
 @pytest.fixture
 def undrawn(monkeypatch: pytest.MonkeyPatch) -> None:
     """Reports that this process writes have no figures, which take seconds to draw."""
-    monkeypatch.setattr("hexapod_cosim.cosim.report.plots.save_figures", lambda *_: ([], {}))
+    none = Figures({}, {})
+    monkeypatch.setattr("hexapod_cosim.cosim.report.plots.draw_figures", lambda *_: none)
 
 
 @pytest.fixture

@@ -29,7 +29,8 @@ from typing import Any
 import numpy as np
 from secret_robots import GROUPS, Secret, damaged, secret_robot
 
-from hexapod_cosim.cosim.identify.identify import HELD_OUT, Identified, identify, make_experiment
+from hexapod_cosim.cosim.identify.identify import Identified, identify, make_experiment
+from hexapod_cosim.cosim.identify.log import HELD_OUT
 from hexapod_cosim.cosim.identify.screening import screened
 from hexapod_cosim.models import load_robot
 

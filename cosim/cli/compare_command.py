@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from contextlib import closing
+from contextlib import closing, nullcontext
 from dataclasses import dataclass, replace
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Annotated, Any
 
 import typer
@@ -42,7 +43,8 @@ from hexapod_cosim.cosim.cli.terminal import (
 from hexapod_cosim.cosim.common.files import write_json
 from hexapod_cosim.cosim.master.interrupts import deferred_interrupts
 from hexapod_cosim.cosim.report.accuracy import with_errors
-from hexapod_cosim.cosim.report.report import REPORT, about, comparison_rows, write_report
+from hexapod_cosim.cosim.report.figures import FigureThread
+from hexapod_cosim.cosim.report.report import about, comparison_rows, write_report
 from hexapod_cosim.cosim.results.accuracy import Accuracy, halved_scenario
 from hexapod_cosim.cosim.results.comparison import (
     SEEDS,
@@ -56,6 +58,7 @@ from hexapod_cosim.cosim.results.results import (
     ACCURACY,
     METRICS_FILE,
     ResultsFolder,
+    StoredResult,
     read_scenario,
     results_folder,
     stored_result,
@@ -63,7 +66,7 @@ from hexapod_cosim.cosim.results.results import (
 from hexapod_cosim.cosim.results.summary import Summary, summarise
 from hexapod_cosim.cosim.results.walking import different_walks
 from hexapod_cosim.cosim.run.batch import run_batch
-from hexapod_cosim.cosim.run.preparation import chosen_gains
+from hexapod_cosim.cosim.run.preparation import PlantFmus, chosen_gains
 from hexapod_cosim.cosim.scenario.controls import Control
 from hexapod_cosim.cosim.scenario.records import COMPARED, Scenario
 from hexapod_cosim.cosim.scenario.scenario import load_scenario
@@ -137,10 +140,12 @@ def compare(
         return _compare_many(works, names, output or Path("out") / TERRAINS, json=json)
     done = run_work(works[0], output or default_folder(names[0]))
     if json:
-        show_json({**_table(done.comparison, done.checked), "report": str(done.report)})
+        report = None if done.report is None else str(done.report)
+        show_json({**_table(done.comparison, done.checked), "report": report})
     else:
         _show(done.results, done.comparison, done.checked, done.files)
-        show_text("\n".join(filter(None, (about(done.comparison), f"report: {done.report}"))))
+        report = "" if done.report is None else f"report: {done.report}"
+        show_text("\n".join(filter(None, (about(done.comparison), report))))
     return FELL if done.comparison.losses else SUCCESS
 
 
@@ -162,6 +167,14 @@ class Work:
         for control in self.controls:
             chosen_gains(replace(self.plan, control=control.text), self.options.gains)
 
+    def with_fmu(self, folder: Path) -> Work:
+        """Returns this work with a plant FMU for all its runs, exported to a folder.
+
+        A given FMU stays. Raises HexapodError when none can be exported.
+        """
+        fmu = PlantFmus(folder, given=self.options.fmu).fmu(self.plan.robot)
+        return replace(self, options=replace(self.options, fmu=fmu))
+
     @property
     def labels(self) -> list[str]:
         """The labels of the controls."""
@@ -176,25 +189,34 @@ class Done:
     comparison: Comparisons
     checked: Mapping[str, Accuracy]
     files: list[Path]
-    report: Path
+    report: Path | None  # None: outputs.plots is false
 
 
 def run_work(work: Work, path: Path) -> Done:
-    """Runs a comparison into a folder and reports it. Raises HexapodError."""
-    plan = work.plan
-    with results_folder(path, work.labels) as folder:
+    """Runs a comparison into a folder and reports it. Raises HexapodError.
+
+    The figures are drawn in a thread while worker processes run the other seeds. Nothing is drawn
+    or reported where outputs.plots is false.
+    """
+    with results_folder(path, work.labels) as folder, TemporaryDirectory() as place:
+        work = work.with_fmu(Path(place))
         results, files = _first_seed(work, folder)
-        comparison = _all_seeds(work, results, folder.path)
-        files += [folder.path / SEEDS]
-        files += write_comparison(
-            folder.path, plan, comparison, labels=work.labels, command=work.command
-        )
-        checked: dict[str, Accuracy] = {}
-        if work.accuracy:
-            checked = _accuracies(work, comparison, folder.path)
-            write_json(folder.path / METRICS_FILE, _table(comparison, checked))
-        files += _draw(results, comparison, checked, folder.path, work.command)
-    return Done(results, comparison, checked, files, folder.path / REPORT)
+        stored = {control: stored_result(result) for control, result in results.items()}
+        views = {control: run.view for control, run in stored.items()}
+        with FigureThread(views) if work.plan.outputs.plots else nullcontext() as figures:
+            comparison = _all_seeds(work, results, folder.path)
+            files += [folder.path / SEEDS]
+            files += write_comparison(
+                folder.path, work.plan, comparison, labels=work.labels, command=work.command
+            )
+            checked: dict[str, Accuracy] = {}
+            if work.accuracy:
+                checked = _accuracies(work, comparison, folder.path)
+                write_json(folder.path / METRICS_FILE, _table(comparison, checked))
+            if figures is None:
+                return Done(results, comparison, checked, files, None)
+            files += _report(stored, figures, comparison, checked, folder.path, work.command)
+    return Done(results, comparison, checked, files, files[-1])
 
 
 def _compare_many(works: Sequence[Work], names: Sequence[str], path: Path, *, json: bool) -> int:
@@ -203,7 +225,7 @@ def _compare_many(works: Sequence[Work], names: Sequence[str], path: Path, *, js
     from hexapod_cosim.cosim.report import terrains  # noqa: PLC0415
 
     rows: list[terrains.Row] = []
-    reports = []
+    reports: list[Path] = []
     lost = False
     for work, name in zip(works, names, strict=True):
         place = Path(name).stem
@@ -214,7 +236,7 @@ def _compare_many(works: Sequence[Work], names: Sequence[str], path: Path, *, js
             lost = True
             continue
         rows += terrains.terrain_rows(place, done.comparison)
-        reports.append(done.report)
+        reports += [] if done.report is None else [done.report]
         lost = lost or bool(done.comparison.losses)
     files = terrains.write_terrains(rows, path) if rows else []
     if json:
@@ -225,27 +247,30 @@ def _compare_many(works: Sequence[Work], names: Sequence[str], path: Path, *, js
     columns = terrains.table_columns(rows)
     show_table(list(columns), zip(*columns.values(), strict=True), right=range(2, len(columns)))
     show_files(files)
-    show_text("\n".join(f"report: {report}" for report in reports))
+    if reports:
+        show_text("\n".join(f"report: {report}" for report in reports))
     return FELL if lost else SUCCESS
 
 
-def _draw(
-    results: Mapping[str, Result],
+def _report(
+    runs: Mapping[str, StoredResult],
+    figures: FigureThread,
     comparison: Comparisons,
     checked: Mapping[str, Accuracy],
     folder: Path,
     command: str,
 ) -> list[Path]:
-    """Writes figures and report; returns the files."""
+    """Writes figures and report; returns the files, the report last."""
     with drawing(folder):
         return write_report(
-            {control: stored_result(result) for control, result in results.items()},
+            runs,
             folder,
             warn=warn,
             comparison=comparison,
             scenario=read_scenario(folder),
             command=command,
             accuracies=checked,
+            figures=figures.result(),
         )
 
 

@@ -16,7 +16,6 @@ from hexapod_cosim.cosim.cli.export_command import DEFAULT_PERIOD, RobotName
 from hexapod_cosim.cosim.cli.terminal import Json, show_files, show_json, show_table, show_text
 from hexapod_cosim.cosim.common.files import not_writable
 from hexapod_cosim.cosim.export.robot_package import SUFFIX as PACKAGE_SUFFIX
-from hexapod_cosim.cosim.validate.validation import find_problems
 from hexapod_cosim.models import FmuError, HexapodError, load_robot
 from hexapod_cosim.models.robot import robot_path
 
@@ -66,6 +65,9 @@ def validate(
             f"unpack it (`unzip {fmu.name} -d package`) and validate the FMUs in package/resources"
         )
         raise FmuError("packages are not checked here", got=fmu.name, expected="an FMU", fix=fix)
+    # imported only here because lxml and fmpy's checks are slow to import
+    from hexapod_cosim.cosim.validate.validation import find_problems  # noqa: PLC0415
+
     try:
         problems = find_problems(fmu)
     except HexapodError as error:  # the FMU cannot be read

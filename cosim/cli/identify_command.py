@@ -5,7 +5,7 @@ from __future__ import annotations
 import shlex
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -19,24 +19,13 @@ from hexapod_cosim.cosim.cli.terminal import (
     waiting,
     warn,
 )
-from hexapod_cosim.cosim.identify.excitation import propose
-from hexapod_cosim.cosim.identify.identify import HELD_OUT, Identified, usual_workers
-from hexapod_cosim.cosim.identify.identify import identify as identify_robot
-from hexapod_cosim.cosim.identify.identify_files import (
-    ERRORS,
-    ESTIMATES,
-    error_rows,
-    estimate_rows,
-    proposal_text,
-    result_table,
-    untold_text,
-    warnings,
-    write_identified,
-)
-from hexapod_cosim.cosim.identify.log import read_log
+from hexapod_cosim.cosim.identify.log import HELD_OUT, read_log
 from hexapod_cosim.cosim.identify.unknowns import GROUPS
 from hexapod_cosim.cosim.results.results import results_folder
 from hexapod_cosim.models import HexapodError, load_robot, unknown_name
+
+if TYPE_CHECKING:
+    from hexapod_cosim.cosim.identify.identify import Identified
 
 FOUND = ("servo", "mass", "contact", "sensor")  # without --find
 Logs = Annotated[
@@ -85,6 +74,14 @@ def identify(
     json: Json = False,
 ) -> None:
     """Find a robot's masses, servos, contacts and sensors from its own logs."""
+    # imported only here because they are slow to import
+    from hexapod_cosim.cosim.identify import identify_files as files_of  # noqa: PLC0415
+    from hexapod_cosim.cosim.identify.excitation import propose  # noqa: PLC0415
+    from hexapod_cosim.cosim.identify.identify import (  # noqa: PLC0415
+        identify as identify_robot,
+    )
+    from hexapod_cosim.cosim.identify.identify import usual_workers  # noqa: PLC0415
+
     groups = _checked(find or list(FOUND), held_out)
     own = load_robot(robot)
     words = ["hexapod", "identify", *map(str, logs), "--robot", robot]
@@ -99,15 +96,18 @@ def identify(
         with waiting("searching for a walk that would tell more"):
             proposals = propose(found, robot) if search else []
         folder.begin()
-        files = write_identified(found, proposals, robot, folder.path, command=shlex.join(words))
-    for text in warnings(found):
+        command = shlex.join(words)
+        files = files_of.write_identified(found, proposals, robot, folder.path, command=command)
+    for text in files_of.warnings(found):
         warn(text.removesuffix("."))
     if json:
-        show_json({**result_table(found, proposals), "files": [str(path) for path in files]})
+        show_json(
+            {**files_of.result_table(found, proposals), "files": [str(path) for path in files]}
+        )
         return
     _show(found, files)
     if search:
-        show_text(proposal_text(proposals))
+        show_text(files_of.proposal_text(proposals))
 
 
 def _checked(names: Sequence[str], held_out: float) -> list[str]:
@@ -127,7 +127,11 @@ def _checked(names: Sequence[str], held_out: float) -> list[str]:
 
 
 def _show(found: Identified, files: Sequence[Path]) -> None:
-    show_table(ESTIMATES, estimate_rows(found.estimates), right=(2, 3, 4))
-    show_table(ERRORS, error_rows(found.held_out() or found.fitted()), right=(2, 3, 4))
-    show_text(untold_text(found))
+    """Prints the estimates, the errors, what the logs did not tell, and the files."""
+    from hexapod_cosim.cosim.identify import identify_files as files_of  # noqa: PLC0415
+
+    errors = files_of.error_rows(found.held_out() or found.fitted())
+    show_table(files_of.ESTIMATES, files_of.estimate_rows(found.estimates), right=(2, 3, 4))
+    show_table(files_of.ERRORS, errors, right=(2, 3, 4))
+    show_text(files_of.untold_text(found))
     show_files(files)

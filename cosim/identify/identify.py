@@ -20,7 +20,7 @@ from hexapod_cosim.cosim.identify.experiment import Experiment
 from hexapod_cosim.cosim.identify.fitting.output_error import Fit, Progress, fit
 from hexapod_cosim.cosim.identify.fitting.problem import TO_DEVIATION, Problem
 from hexapod_cosim.cosim.identify.fitting.workers import simulating_workers
-from hexapod_cosim.cosim.identify.log import CHANNELS, Log, LogError, without_readings
+from hexapod_cosim.cosim.identify.log import CHANNELS, HELD_OUT, Log, LogError, without_readings
 from hexapod_cosim.cosim.identify.log_plant import LogPlant
 from hexapod_cosim.cosim.identify.rigid.linear_start import LinearStart, linear_start
 from hexapod_cosim.cosim.identify.screening import BadColumn, misfits, screened
@@ -41,7 +41,6 @@ Array = NDArray[np.float64]
 TOLD = 0.5  # of the prior deviation: a number with less is told by the logs
 QUANTILE = 1.959963985  # of a normal distribution, for 95 %
 NEAR = 0.8  # correlation of two numbers that is reported
-HELD_OUT = 0.25  # share of each log at its end that the fit does not see
 SETTLING = 0.1  # s    at the start of a log that is not compared: the first row has noise
 # Where in its play a gear stands at first is in no log; walking for this long decides it.
 MESHING = 0.5  # s    after the first change of a command

@@ -29,6 +29,7 @@ from hexapod_cosim.models import HexapodError
 
 Array = NDArray[np.float64]
 LEAST_ROWS = 10
+HELD_OUT = 0.25  # share of each log at its end that a fit does not see
 LONGEST_STEP = 0.2  # s    between two rows
 ATTITUDE = ("torso.roll", "torso.pitch", "torso.yaw")
 QUATERNIONS = ("torso.quaternion", "imu.quaternion")  # the first one that a log has counts

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
-from pathlib import Path
+from io import BytesIO
 from typing import Any
 
 import matplotlib
@@ -15,8 +15,8 @@ from matplotlib.patches import Patch
 
 from hexapod_cosim.controller.figure_style import DPI, PALETTE, SETTINGS, UNDATED, WIDTH
 from hexapod_cosim.cosim.common.control_style import control_styles
-from hexapod_cosim.cosim.common.files import atomic_path
 from hexapod_cosim.cosim.master.recorder import ColumnError
+from hexapod_cosim.cosim.report.figures import Figures
 from hexapod_cosim.cosim.report.profile import find_stances, make_profile
 from hexapod_cosim.cosim.results.metrics import planned_feet, plans_feet
 from hexapod_cosim.cosim.results.walk import (
@@ -383,28 +383,26 @@ FIGURES: dict[str, Drawing] = {
 }
 
 
-def save_figures(views: Views, folder: Path) -> tuple[list[Path], dict[str, str]]:
-    """Draws FIGURES into a folder as PNG and SVG.
+def draw_figures(views: Views, is_stopped: Callable[[], bool] = lambda: False) -> Figures:
+    """Draws FIGURES as PNG and SVG into memory.
 
-    Returns the files and, by name, why a figure was not drawn; its file from an earlier report is
-    deleted.
+    is_stopped: asked before each figure; True leaves out this one and all after it.
     """
-    folder.mkdir(exist_ok=True)
-    saved: list[Path] = []
+    images: dict[str, bytes] = {}
     skipped: dict[str, str] = {}
     with matplotlib.rc_context(SETTINGS):
         for name, item in FIGURES.items():
+            if is_stopped():
+                break
             try:
                 figure = item.draw(views)
             except ColumnError as error:
                 skipped[name] = f"{error.got} was not recorded"
-                for kind in UNDATED:
-                    (folder / f"{name}.{kind}").unlink(missing_ok=True)
                 continue
             for kind, metadata in UNDATED.items():
-                saved.append(folder / f"{name}.{kind}")
-                with atomic_path(saved[-1]) as temporary:
-                    figure.savefig(temporary, format=kind, dpi=DPI, metadata=metadata)
+                content = BytesIO()
+                figure.savefig(content, format=kind, dpi=DPI, metadata=metadata)
+                images[f"{name}.{kind}"] = content.getvalue()
                 # one layout is enough: it takes as long as the drawing
                 figure.set_layout_engine("none")
-    return saved, skipped
+    return Figures(images, skipped)

@@ -20,6 +20,7 @@ from hexapod_cosim.cosim.report.accuracy import (
     effect_rows,
     with_errors,
 )
+from hexapod_cosim.cosim.report.figures import Figures, write_figures
 from hexapod_cosim.cosim.report.headline import cards, creep_note, headlines, plain_headline
 from hexapod_cosim.cosim.report.page import NO_VIEWER, render, viewer_script
 from hexapod_cosim.cosim.report.payload import as_json, make_payload
@@ -113,8 +114,9 @@ def write_report(
     scenario: str | None = None,
     command: str | None = None,
     accuracies: Mapping[str, Accuracy] = MappingProxyType({}),
+    figures: Figures | None = None,
 ) -> list[Path]:
-    """Draws the figures and writes report.html; returns the files, the report last.
+    """Writes the figures and report.html; returns the files, the report last.
 
     Args:
         runs: by control; of a comparison, those of the first seed.
@@ -123,11 +125,14 @@ def write_report(
         comparison: the metrics over all seeds; without it the report is of a single run.
         scenario, command: of a comparison; a single run has its own. The scenario is TOML.
         accuracies: by control, where they were checked.
+        figures: those of the runs; by default they are drawn now.
     """
     # imported only here because matplotlib is slow to import
-    from hexapod_cosim.cosim.report.plots import FIGURES, save_figures  # noqa: PLC0415
+    from hexapod_cosim.cosim.report.plots import FIGURES, draw_figures  # noqa: PLC0415
 
-    files, skipped = save_figures({label: run.view for label, run in runs.items()}, folder / PLOTS)
+    if figures is None:
+        figures = draw_figures({label: run.view for label, run in runs.items()})
+    files, skipped = write_figures(figures, folder / PLOTS), dict(figures.skipped)
     if all(run.view.surface is None for run in runs.values()):
         skipped[PROFILE] = ""  # a plane has none, which is no loss
     if not any(plans_feet(run.view.recording) for run in runs.values()):

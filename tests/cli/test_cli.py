@@ -19,6 +19,7 @@ from hexapod_cosim.cosim.scenario.records import Variation
 from hexapod_cosim.cosim.scenario.scenario import load_scenario
 from hexapod_cosim.cosim.scenario.variation import STANDARD
 
+SHORT = ["--set", "duration=0.2"]
 CYCLES = ["--set", "duration=3", "--set", "gait.period=0.8"]  # the shortest walk with figures
 RUN = {
     "commands.csv",
@@ -107,7 +108,7 @@ def test_compare_with_one_seed_is_the_plain_walk_without_intervals(
     call: Call, tmp_path: Path
 ) -> None:
     code, out, _ = call(
-        "compare", "walk_flat", "-o", tmp_path / "one", "--seeds", "1", "--json", *QUICK
+        "compare", "walk_flat", "-o", tmp_path / "one", "--seeds", "1", "--json", *SHORT
     )
     printed = json.loads(out)
     assert (code, printed["seeds"]) == (0, 1)
@@ -131,7 +132,7 @@ def test_compare_shows_intervals_and_keeps_the_scenarios_own_variation(
         tmp_path,
         "--seeds",
         "2",
-        *QUICK,
+        *SHORT,
         "--set",
         "variation.height=2 mm",
         "--set",
@@ -142,6 +143,22 @@ def test_compare_shows_intervals_and_keeps_the_scenarios_own_variation(
     assert "2 of 2" in out
     assert "2 seeds (5 to 6)" in out
     assert load_scenario(tmp_path / "scenario.toml").variation == Variation(height=0.002)
+
+
+def test_compare_without_plots_writes_all_but_figures_and_report(
+    call: Call, tmp_path: Path
+) -> None:
+    words = ("compare", "walk_flat", "-o", tmp_path / "out", "--seeds", "1", "--json", *QUICK)
+    code, out, _ = call(*words)
+    assert (code, json.loads(out)["report"]) == (0, None)
+    assert {path.name for path in (tmp_path / "out").iterdir()} == {
+        "kinematic",
+        "compliant",
+        "metrics.json",
+        "run.json",
+        "scenario.toml",
+        "seeds.csv",
+    }
 
 
 def test_compare_leaves_results_figures_report_and_the_scenario_as_run(
