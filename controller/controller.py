@@ -158,7 +158,14 @@ class Controller(Stateful):
         inward = -gait.narrowing * cis(self.legs.hip_yaw + self.stance[:, 0])
         narrow = self.legs.pose(home[:, 0] + 1j * home[:, 1] + inward, home[:, 2])
         turned = self.legs.rolling(narrow.angle)
-        self.paths = FootPaths(gait, home, period=period, inward=inward, turned=turned)
+        self.paths = FootPaths(
+            gait,
+            home,
+            period=period,
+            inward=inward,
+            turned=turned,
+            slow_landing=gains is not None and law == "compliant" and parts.slow_landing,
+        )
         self.compliant: Compliant | None = None
         self.paper: Paper | None = None
         if gains is not None and law == "paper":

@@ -1,7 +1,7 @@
 """Defines the switches of the parts of compliant control, and the weight of the squeeze.
 
-Each part can be switched by itself, so that its effect can be measured. Parts that better no figure
-of the course are off by default.
+Each part can be switched by itself, so that its effect can be measured. Parts that do not better
+their figure of the course by 10 % are off by default.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ class Parts:
     suspension: bool = False  # legs yield to normal forces above their share
     paper_suspension: bool = True  # of the paper's control: legs yield to normal forces
     touchdown: bool = True  # foot heights follow early and late touch-downs
+    slow_landing: bool = False  # feet rise faster and come down more slowly on the same paths
     posture: bool = True  # roll, pitch and height are controlled
     path: bool = True  # the path walked is measured at the feet, and its deviation corrected
     limits: bool = True  # corrections are limited in rate and torque

@@ -480,6 +480,7 @@ static const hxVariable parameters[] = {
     {"parts.suspension", "", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, definition.parts.suspension), HX_BOOLEAN, 1},
     {"parts.paper_suspension", "", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, definition.parts.paper_suspension), HX_BOOLEAN, 1},
     {"parts.touchdown", "", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, definition.parts.touchdown), HX_BOOLEAN, 1},
+    {"parts.slow_landing", "", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, definition.parts.slow_landing), HX_BOOLEAN, 1},
     {"parts.posture", "", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, definition.parts.posture), HX_BOOLEAN, 1},
     {"parts.path", "", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, definition.parts.path), HX_BOOLEAN, 1},
     {"parts.limits", "", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, definition.parts.limits), HX_BOOLEAN, 1},
@@ -521,7 +522,7 @@ const char *const hx_log_category_names[] = {
 const hxStateRow *const hx_states = 0;
 const size_t hx_state_count = 0;
 
-const char hx_default_guid[] = "{e364f1ea-9b15-44ce-8bd0-bfce8f850f00}";
+const char hx_default_guid[] = "{5479bbb2-a520-4dec-b7e0-3597d45e696a}";
 
 _Static_assert(HX_CONTROL_KINEMATIC == 1, "Control");
 _Static_assert(HX_CONTROL_COMPLIANT == 2, "Control");

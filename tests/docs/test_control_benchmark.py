@@ -105,12 +105,15 @@ def test_the_ablation_switches_each_part_alone_and_each_part_off() -> None:
         for case, plan in zip(ablation(), plans(ablation()), strict=True)
     }
     assert on["no part"] == set()
-    default = set(COMPLIANT_PARTS) - {"suspension"}
+    off = {"suspension", "slow_landing"}
+    default = set(COMPLIANT_PARTS) - off
     assert on["by default"] == on["without squeeze"] == default
-    assert on["with suspension"] == set(COMPLIANT_PARTS)
     for part in COMPLIANT_PARTS:
         assert on[f"{part} alone"] == {part}
-        assert part == "suspension" or on[f"without {part}"] == default - {part}
+        if part in off:
+            assert on[f"with {part}"] == default | {part}
+        else:
+            assert on[f"without {part}"] == default - {part}
 
 
 def test_the_slip_pid_is_judged_on_plants_that_are_not_its_model() -> None:

@@ -42,6 +42,7 @@ typedef struct hxFootPathsModel {
   double period, gait_period, duty, step_height, touchdown_speed;
   double offset[HX_LEGS]; /* cycles; phases at the start of the walk */
   int late[HX_LEGS]; /* the walk begins during the leg's swing */
+  double haste; /* 1, by which a swing begins faster and ends slower (C54) */
   double swing_time; /* s */
   double landing_lead; /* s, from lift-off to the middle of the next stance */
   hxPlane home[HX_LEGS]; /* m   feet of the stance */
