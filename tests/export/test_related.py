@@ -85,7 +85,9 @@ def test_an_fmu_of_fmi_3_has_whole_arrays_as_columns(plant_build: Path, tmp_path
     }  # fmt: skip
     assert reference["angle"].shape == (101, 18)
     options = fmpy.util.read_ref_opt_file(files[2])
-    found = stepped(fmu, tmp_path, inputs, reference.dtype.names[1:], options["StepSize"])
+    found = stepped(
+        fmu, tmp_path, inputs, tuple(reference.dtype.names or ())[1:], options["StepSize"]
+    )
     for name, values in found.items():
         expected = reference[name].reshape(len(reference), -1)
         np.testing.assert_allclose(values, expected, rtol=1e-10, atol=1e-10, err_msg=name)
@@ -114,7 +116,7 @@ def stepped(
     for row in inputs:
         for name in names:
             found[name].append(fmu.getFloat64([references[name]], sizes.get(name, 1)))
-        for name in inputs.dtype.names[1:]:
+        for name in (inputs.dtype.names or ())[1:]:
             fmu.setFloat64([references[name]], row[name].tolist())
         if len(found[names[0]]) < len(inputs):
             fmu.doStep(row["time"], step)
