@@ -4,6 +4,14 @@
 
 #include <string.h>
 
+/* A change of gait is rare: its functions are compiled for size, because wheels contain them for
+ * every platform. */
+#if defined(__GNUC__)
+#define HX_SELDOM __attribute__((cold, noinline))
+#else
+#define HX_SELDOM
+#endif
+
 /* 1, share of the swing at each end in which the foot moves vertically only */
 static const double dwell = 0.1;
 /* 1, part of the swing after which the landing point stays fixed on the ground */
@@ -112,7 +120,7 @@ static hxPlane travel(hxTwist twist, double time) {
 
 /* -------------------------------------------------------------------------------------- paths */
 
-static void start_at(hxFootPathsModel *model, const double begin[HX_LEGS]);
+HX_SELDOM static void start_at(hxFootPathsModel *model, const double begin[HX_LEGS]);
 
 void hx_foot_paths_compile(const hxControllerDefinition *definition, const hxLegSolver leg[HX_LEGS],
                            hxFootPathsModel *model) {
@@ -161,8 +169,8 @@ static int64_t reached(const hxFootPaths *paths, int64_t number) {
 }
 
 /* Stops with the feet at `plane` and resets the gait clock. */
-static void rest(const hxFootPathsModel *model, const hxPlane plane[HX_LEGS], hxFootPaths *paths,
-                 hxPlannedFeet *feet) {
+HX_SELDOM static void rest(const hxFootPathsModel *model, const hxPlane plane[HX_LEGS],
+                           hxFootPaths *paths, hxPlannedFeet *feet) {
   const double narrowing = paths->narrowing;
   hxPlane place[HX_LEGS];
   memcpy(place, plane, sizeof place); /* plane may point into feet */
@@ -226,7 +234,8 @@ static int come_home(const hxFootPathsModel *model, const hxFootPaths *old,
 
 /* Lets the legs skip their next steps that have not begun to give up their loads (C54). kept: legs
  * that were to skip them already. */
-static void keep_down(const hxFootPathsModel *model, const int kept[HX_LEGS], hxFootPaths *paths) {
+HX_SELDOM static void keep_down(const hxFootPathsModel *model, const int kept[HX_LEGS],
+                                hxFootPaths *paths) {
   const double unloads = model->duty - 0.5 * model->handover;
   for (int leg = 0; leg < HX_LEGS; ++leg) {
     const double phase = phase_after(model, leg, paths->before);
@@ -321,8 +330,8 @@ int hx_foot_paths_ended(const hxFootPaths *paths) {
 
 /* Returns how far the farthest foot will be from its stance position at its lift-off [m] (C54).
  * begin: phases at the begin of the walk [cycles]. */
-static double farthest(const hxFootPathsModel *model, const hxFootPaths *paths,
-                       const hxPlannedFeet *feet, const double begin[HX_LEGS]) {
+HX_SELDOM static double farthest(const hxFootPathsModel *model, const hxFootPaths *paths,
+                                 const hxPlannedFeet *feet, const double begin[HX_LEGS]) {
   const hxPlane v = feet->twist.velocity;
   const double w = feet->twist.yaw_rate;
   double largest = 0.0;
@@ -337,7 +346,8 @@ static double farthest(const hxFootPathsModel *model, const hxFootPaths *paths,
   return largest;
 }
 
-void hx_foot_paths_join(hxFootPathsModel *model, hxFootPaths *paths, hxPlannedFeet *feet) {
+HX_SELDOM void hx_foot_paths_join(hxFootPathsModel *model, hxFootPaths *paths,
+                                  hxPlannedFeet *feet) {
   const double unloads = model->duty - 0.5 * model->handover;
   const double *offset = model->gait_offset;
   double begin[HX_LEGS], least = INFINITY;
