@@ -110,6 +110,18 @@ class PlannedStep(NamedTuple):
     masses: Masses | None  # of the links; None under kinematic control
 
 
+def _check_period(period: float, gait: Gait) -> None:
+    """Raises ControllerError unless stance and swing of the gait are longer than the period [s]."""
+    shorter = gait.period * min(gait.duty, 1.0 - gait.duty)
+    if not 0.0 < period < shorter:
+        raise ControllerError(
+            "impossible controller period",
+            got=period,
+            expected=f"0 < period < {shorter:g} s, the gait's shorter phase",
+            fix="shorten the period or slow the gait",
+        )
+
+
 def gains_warnings(robot: Robot, gains: Gains | None, period: float) -> tuple[str, ...]:
     """Returns warnings of gains for another robot or period [s], and the caveats of the gains."""
     if gains is None:
@@ -128,7 +140,7 @@ class Controller(Stateful):
 
     STATE = (
         "ramp", "paths", "compliant", "paper", "_start", "_count", "_at", "_last", "_cut",
-        "_before", "_now", "_after", "_shown",
+        "_before", "_now", "_after", "_shown", "_next",
     )  # fmt: skip
 
     def __init__(
@@ -141,38 +153,13 @@ class Controller(Stateful):
         parts: Parts = ALL_PARTS,
         law: str = "compliant",
     ) -> None:
-        phases = (gait.duty * gait.period, (1.0 - gait.duty) * gait.period)
-        if not 0.0 < period < min(phases):
-            raise ControllerError(
-                "impossible controller period",
-                got=period,
-                expected=f"0 < period < {min(phases):g} s, the gait's shorter phase",
-                fix="shorten the period or slow the gait",
-            )
+        _check_period(period, gait)
         if law not in LAWS:
             raise unknown_name("law", law, LAWS)
-        self.period, self.gait, self.gains, self.parts = period, gait, gains, parts
-        self.legs, self.stance = LegSolver(robot), robot.stance
-        self.ramp = CommandRamp(gait.period, period=period)
-        home = self.legs.forward(self.stance)
-        inward = -gait.narrowing * cis(self.legs.hip_yaw + self.stance[:, 0])
-        narrow = self.legs.pose(home[:, 0] + 1j * home[:, 1] + inward, home[:, 2])
-        turned = self.legs.rolling(narrow.angle)
-        self.paths = FootPaths(
-            gait,
-            home,
-            period=period,
-            inward=inward,
-            turned=turned,
-            slow_landing=gains is not None and law == "compliant" and parts.slow_landing,
-        )
-        self.compliant: Compliant | None = None
-        self.paper: Paper | None = None
-        if gains is not None and law == "paper":
-            self.paper = Paper(gains, parts, period=period)
-        elif gains is not None:
-            legs = self.legs
-            self.compliant = Compliant(robot, gait, gains, parts, legs=legs, period=period)
+        self.robot, self.period, self.gains, self.parts = robot, period, gains, parts
+        self.legs, self.stance, self.law = LegSolver(robot), robot.stance, law
+        self._build(gait)
+        self._next: Gait | None = None  # that the legs change to
         self.warnings = gains_warnings(robot, gains, period)
         self._out = JointCommand()
         still, nothing = np.zeros(LEGS, dtype=np.complex128), np.zeros(LEGS)
@@ -186,6 +173,35 @@ class Controller(Stateful):
         self._now: PlannedStep
         self._after: PlannedStep | None = None
         self.reset()
+
+    def _build(self, gait: Gait) -> None:
+        """Builds the parts, whose constants depend on the gait."""
+        self.gait, period = gait, self.period
+        self.ramp = CommandRamp(gait.period, period=period)
+        home = self.legs.forward(self.stance)
+        inward = -gait.narrowing * cis(self.legs.hip_yaw + self.stance[:, 0])
+        narrow = self.legs.pose(home[:, 0] + 1j * home[:, 1] + inward, home[:, 2])
+        turned = self.legs.rolling(narrow.angle)
+        self.paths = FootPaths(
+            gait,
+            home,
+            period=period,
+            inward=inward,
+            turned=turned,
+            slow_landing=self._lands_slowly(),
+        )
+        self.compliant: Compliant | None = None
+        self.paper: Paper | None = None
+        if self.gains is not None and self.law == "paper":
+            self.paper = Paper(self.gains, self.parts, period=period)
+        elif self.gains is not None:
+            self.compliant = Compliant(
+                self.robot, gait, self.gains, self.parts, legs=self.legs, period=period
+            )
+            self.paths.handover = self.compliant.support.handover
+
+    def _lands_slowly(self) -> bool:
+        return self.gains is not None and self.law == "compliant" and self.parts.slow_landing
 
     # ------------------------------------------------------------------------------- planning
 
@@ -314,6 +330,36 @@ class Controller(Stateful):
         if reached and planned:
             self._after = self._plan_step(number, 1, self._now)
 
+    # ------------------------------------------------------------------------- change of gait
+
+    def _adopt(self) -> None:
+        """Continues in the next gait once all legs stand and carry their whole loads (C55)."""
+        full = bool((self._now.activation >= 1.0).all())
+        if self._next is None or (self.paths.walking and not (self.paths.ended() and full)):
+            return
+        before, law, state = self.ramp, self.compliant, super().save()
+        self._build(self._next)
+        offset, late = self.paths.offset, self.paths.late
+        super().restore(state)
+        if self.compliant is not None and law is not None:
+            self.compliant.stance = law.stance
+        self.ramp.carry(before)
+        self.paths.offset, self.paths.late = offset, late
+        self._now = self._now._replace(feet=self.paths.join(self._now.feet))
+        self._next, self._after, self._at, self._last, self._cut = None, None, 0, math.inf, True
+
+    def change_gait(self, gait: Gait) -> None:
+        """Changes the gait without a jump of the feet, while the robot walks (C55).
+
+        Legs in the air finish their steps, and no other leg lifts off. When all stand, the next
+        gait begins with the feet where they are. Raises ControllerError for a gait that is too fast
+        for the period, and then changes nothing.
+        """
+        _check_period(self.period, gait)
+        self._next, self._after = gait, None
+        self.paths.ending = self.paths.walking
+        self._adopt()
+
     # --------------------------------------------------------------------------------- joints
 
     def _rate_of(self, name: str) -> Any:
@@ -413,10 +459,17 @@ class Controller(Stateful):
         self._before, self._after = None, None
         self._now = self._lay_out(value, posture, feet)
         self._shown = np.zeros((LEGS, 3)), _flags()
+        self._next = None
         self._follow_paths()
+
+    def save(self) -> dict[str, Any]:
+        """Returns the state that restore() takes; it includes the gait."""
+        return super().save() | {"gait": self.gait}
 
     def restore(self, state: dict[str, Any]) -> None:
         """Restores a state returned by save(); the following steps repeat exactly."""
+        if state["gait"] != self.gait:
+            self._build(state["gait"])
         super().restore(state)
         self._follow_paths()
         self._show(*self._shown)
@@ -463,4 +516,5 @@ class Controller(Stateful):
             if self.compliant is not None:
                 shift = self.compliant.step(self._ask(self.compliant), measurement, self._out)
                 self._show(shift, self.compliant.laws.fallback)
+            self._adopt()
         return self._out

@@ -30,12 +30,30 @@ hxStatus hx_component_reset(hxComponent *component, const struct hxVariables *va
   return hx_controller_reset(controller_of(component), &variables->definition, t);
 }
 
+static int is_same_gait(const hxGait *a, const hxGait *b) {
+  int same = a->pattern == b->pattern && a->period == b->period && a->duty == b->duty &&
+             a->step_height == b->step_height && a->touchdown_speed == b->touchdown_speed &&
+             a->narrowing == b->narrowing;
+  for (int leg = 0; leg < HX_LEGS; ++leg) same &= a->offset[leg] == b->offset[leg];
+  return same;
+}
+
+/* Changes the gait to that of the parameters, which are tunable. */
+static hxStatus follow_gait(hxController *controller, const struct hxVariables *variables) {
+  const hxGait *wanted = &variables->definition.gait;
+  if (is_same_gait(wanted, hx_controller_gait(controller))) return HX_OK;
+  return hx_controller_change_gait(controller, wanted);
+}
+
 hxStatus hx_component_step(hxComponent *component, const struct hxVariables *variables,
                            const hxInput *rate, double t_end) {
+  const hxStatus status = follow_gait(controller_of(component), variables);
+  if (status != HX_OK) return status;
   return hx_controller_step(controller_of(component), &variables->input, rate, t_end);
 }
 
 void hx_component_output(hxComponent *component, struct hxVariables *variables) {
+  (void)follow_gait(controller_of(component), variables); /* a step reports a refusal */
   hx_controller_output(controller_of(component), &variables->input, &variables->output);
 }
 

@@ -186,6 +186,11 @@ static double value_at(hxType type, const void *value, size_t i) {
   return type == HX_REAL ? ((const double *)value)[i] : (double)((const int *)value)[i];
 }
 
+/* whether tunable parameters may be set, which the next step follows */
+static int is_between_steps(const hxInstance *instance) {
+  return (instance->state.mode & (HX_MODE_STEP | HX_MODE_EVENT)) != 0;
+}
+
 /* checks that one value may be set in the present mode */
 static hxStatus check_set(hxInstance *instance, const hxVariable *variable, hxCausality causality,
                           double value) {
@@ -196,7 +201,7 @@ static hxStatus check_set(hxInstance *instance, const hxVariable *variable, hxCa
            variable->name);
     return HX_INVALID_ARGUMENT;
   }
-  if (causality == HX_PARAMETER &&
+  if (causality == HX_PARAMETER && !(variable->tunable && is_between_steps(instance)) &&
       !(instance->state.mode & (HX_MODE_INSTANTIATED | HX_MODE_INITIALIZATION))) {
     hx_log(instance, HX_LOG_ERROR,
            "%s: got a value after initialisation, expected it before, as it is fixed; nothing was "
@@ -252,7 +257,7 @@ hxStatus hx_instance_set(hxInstance *instance, hxType type, const unsigned refer
     else
       memcpy(place, &stored, sizeof(int));
   }
-  instance->state.model_stale |= parameters;
+  instance->state.model_stale |= parameters && !is_between_steps(instance);
   hx_mark_stale(instance);
   return HX_OK;
 }

@@ -180,7 +180,7 @@ def _row(variable: Variable, array_rows: int) -> str:
     place = f"offsetof(struct hxVariables, {variable.field})"
     return (
         f'    {{"{variable.name}", "{variable.unit or ""}", {_limits(variable)}, {place}, '
-        f"{TYPES[variable.type]}, {array_rows}}},"
+        f"{TYPES[variable.type]}, {int(variable.variability == 'tunable')}, {array_rows}}},"
     )
 
 

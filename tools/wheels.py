@@ -18,6 +18,7 @@ from __future__ import annotations
 import hashlib
 import os
 import shutil
+import stat
 import subprocess
 import sys
 import tempfile
@@ -28,7 +29,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from rich.console import Console
-from wheel.wheelfile import WheelFile
+from wheel.wheelfile import WheelFile, get_zipinfo_datetime
 
 from hexapod_cosim.cosim.common.components import CONTROLLER, PLANT, POLICY
 from hexapod_cosim.cosim.common.plant_files import LOOP, fmi_headers
@@ -46,6 +47,7 @@ from hexapod_cosim.cosim.live.module import walker_module
 ROOT = Path(__file__).parents[1]
 BINARIES, LIBRARIES = "hexapod_cosim/plant/binaries/", "hexapod_cosim/plant/lib/"
 MODULE = "hexapod_cosim/plant/browser/walker.wasm"
+BEST = 9  # level of compression
 LARGEST = 5_000_000  # bytes of a wheel
 
 
@@ -173,8 +175,17 @@ def write_wheel(
     path.unlink(missing_ok=True)
     with WheelFile(path, "w") as wheel:
         for member in sorted(members, key=lambda name: (".dist-info/" in name, name)):
-            wheel.writestr(member, members[member], zipfile.ZIP_DEFLATED)
+            wheel.writestr(_entry(member), members[member])
     return path
+
+
+def _entry(name: str) -> zipfile.ZipInfo:
+    """Returns an entry as WheelFile makes it, with the best compression."""
+    entry = zipfile.ZipInfo(name, get_zipinfo_datetime())
+    entry.compress_type = zipfile.ZIP_DEFLATED
+    entry._compresslevel = BEST  # ZipFile.writestr takes it as an argument; WheelFile's does not
+    entry.external_attr = (0o664 | stat.S_IFREG) << 16
+    return entry
 
 
 def wheel_description(text: bytes, platform_tag: str) -> bytes:

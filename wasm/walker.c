@@ -9,10 +9,20 @@ static const double FADE = 0.4;         /* s    from the commands of one control
 static const double STILL = 0.02;       /* rad  joint commands that vary by less stand still */
 static const double PATIENCE = 4.0;     /* gait periods  until a change is made while moving */
 
+/* Stages of a change: of the control, or of the gait alone */
+typedef enum Stage {
+  NO_CHANGE,
+  STOPS,  /* the present controller stops the robot */
+  SLOWS,  /* the page has asked for a command that both gaits can follow; the ramp leads there */
+  STEPS,  /* legs in the air finish their steps */
+  SETTLES /* each leg makes its first step in the next gait */
+} Stage;
+
 typedef struct Change {
-  int waits;          /* for the robot to stand still */
+  Stage stage;
   hxWalk walk;        /* the control and gait that come */
-  double since;       /* s   time of the request */
+  double since;       /* s   time of the request, or the begin of the stage */
+  double swing;       /* s   of the gait before */
   double still_since; /* s   the joint commands have hardly changed since then */
   double reference[HX_LEGS][HX_JOINTS]; /* rad  joint commands at that time */
 } Change;
@@ -25,6 +35,7 @@ static struct {
   hxInput input;
   hxOutput output;
   hxControllerInput seen;
+  double commanded; /* s   time of the last change of the command */
   hxControllerOutput command;
   long steps; /* macro-steps since the start */
   hxWalk wanted; /* by the page */
@@ -62,7 +73,7 @@ static void show(void) {
   memcpy(frame->force, out->foot.force, sizeof frame->force);
   memcpy(frame->slip_speed, out->foot.slip_speed, sizeof frame->slip_speed);
   frame->largest_torque = largest;
-  frame->changing = walker.change.waits;
+  frame->changing = walker.change.stage == SETTLES ? 2.0 : walker.change.stage != NO_CHANGE;
 }
 
 static void read_plant(void) {
@@ -89,7 +100,7 @@ int hx_walker_start(double friction) {
   hx_input_default(&walker.input);
   hx_controller_input_default(&walker.seen);
   memset(&walker.change, 0, sizeof walker.change);
-  walker.fade_end = 0.0;
+  walker.fade_end = walker.commanded = 0.0;
   walker.steps = 0;
   walker.robot.friction.mu = friction;
   choose(&walker.wanted);
@@ -100,10 +111,13 @@ int hx_walker_start(double friction) {
 }
 
 void hx_walker_command(double forward, double left, double turn, double height) {
+  const hxControllerInput before = walker.seen;
   walker.seen.command.vx = forward;
   walker.seen.command.vy = left;
   walker.seen.command.yaw_rate = turn;
   walker.seen.command.height = height;
+  if (memcmp(&before.command, &walker.seen.command, sizeof before.command) != 0)
+    walker.commanded = walker.output.time;
 }
 
 void hx_walker_push(double x, double y, double z) {
@@ -113,7 +127,8 @@ void hx_walker_push(double x, double y, double z) {
 }
 
 void hx_walker_change(void) {
-  walker.change.waits = 1;
+  const int same_control = (int)walker.wanted.control == (int)walker.walk.control;
+  walker.change.stage = same_control && walker.change.stage != STOPS ? SLOWS : STOPS;
   walker.change.walk = walker.wanted;
   walker.change.since = walker.change.still_since = walker.output.time;
   memcpy(walker.change.reference, walker.command.angle_ref, sizeof walker.change.reference);
@@ -150,10 +165,33 @@ static int has_stopped(void) {
   return now - change->still_since >= 0.5 * period || now - change->since >= PATIENCE * period;
 }
 
+/* Goes through the stages of a change of gait, during which the robot walks on. */
+static int change_gait(void) {
+  Change *change = &walker.change;
+  const hxGait *gait = &walker.walk.gait;
+  const double now = walker.output.time;
+  /* the ramp to the last command takes a gait period; a command may change all the time */
+  const double slow = now - fmin(change->since, walker.commanded);
+  if (change->stage == SLOWS && slow >= gait->period) {
+    change->swing = gait->period * (1.0 - gait->duty);
+    choose(&change->walk);
+    change->stage = STEPS;
+    change->since = now;
+    return hx_controller_change_gait(walker.controller, gait);
+  }
+  if (change->stage == STEPS && now - change->since >= change->swing) {
+    change->stage = SETTLES;
+    change->since = now;
+  }
+  if (change->stage == SETTLES && now - change->since >= change->swing + gait->period)
+    change->stage = NO_CHANGE;
+  return HX_OK;
+}
+
 /* Lets the wanted controller begin in the stance, faded in from the last joint commands. */
 static int take_over(void) {
   choose(&walker.change.walk);
-  walker.change.waits = 0;
+  walker.change.stage = NO_CHANGE;
   memcpy(walker.from, walker.input.angle_ref, sizeof walker.from); /* perhaps while fading */
   walker.fade_end = walker.output.time + FADE;
   return hx_controller_reset(walker.controller, &walker.walk, walker.output.time);
@@ -187,7 +225,7 @@ static int control(double t_end) {
   memcpy(seen->angle, walker.output.angle, sizeof seen->angle);
   memcpy(seen->foot_force, walker.output.foot.force, sizeof seen->foot_force);
   memcpy(seen->quaternion, walker.output.torso.quaternion, sizeof seen->quaternion);
-  if (walker.change.waits) memset(&seen->command, 0, sizeof seen->command);
+  if (walker.change.stage == STOPS) memset(&seen->command, 0, sizeof seen->command);
   hx_controller_output(walker.controller, seen, &walker.command);
   const int status = hx_controller_step(walker.controller, seen, NULL, t_end);
   seen->command = asked.command;
@@ -196,8 +234,9 @@ static int control(double t_end) {
 
 static int macro_step(void) {
   const double t_end = (double)(walker.steps + 1) * MACRO_STEP;
-  int status = control(t_end);
-  if (status == HX_OK && walker.change.waits && has_stopped()) {
+  int status = change_gait();
+  if (status == HX_OK) status = control(t_end);
+  if (status == HX_OK && walker.change.stage == STOPS && has_stopped()) {
     status = take_over();
     if (status == HX_OK) status = control(t_end);
   }

@@ -29,7 +29,9 @@ typedef struct hxFrame {
   double force[HX_LEGS][3];           /* N    ground on foot */
   double slip_speed[HX_LEGS];         /* m/s */
   double largest_torque;              /* N m  of all servos */
-  double changing;                    /* 1: the robot stops to change its control or gait */
+  /* 1: control or gait are being changed; 2: the next gait has begun, and legs make their first
+   * steps in it */
+  double changing;
 } hxFrame;
 
 /* The control and gait of the next start or change: the page writes them here. */
@@ -45,8 +47,10 @@ HX_API void hx_walker_command(double forward, double left, double turn, double h
 /* Sets the force on the torso's centre of mass, world axes [N]. */
 HX_API void hx_walker_push(double x, double y, double z);
 
-/* Changes to the wanted control and gait. The present controller stops the robot first; the next
- * one begins in the stance, and the joint commands fade from the old to the new ones. */
+/* Changes to the wanted control and gait. Another control: the present controller stops the robot,
+ * the next one begins in the stance, and the joint commands fade from the old to the new ones.
+ * Another gait alone changes while the robot walks, once the command has been followed for a gait
+ * period; the page should give a command that both gaits can follow. */
 HX_API void hx_walker_change(void);
 
 /* Changes the friction coefficient: the plant begins again in its present pose and motion. */

@@ -27,6 +27,7 @@ from hexapod_cosim.models import HexapodError
 DWELL = 0.1  # 1    part of the swing at each end with vertical motion only, while the load changes
 HASTE = 0.25  # 1    by which a swing with a slow landing begins faster and ends slower (C54)
 FREEZE = 0.75  # 1    part of the swing after which the landing point stays fixed to the ground
+SAME_DISTANCE = 1e-6  # m    distances that differ by less are equal
 HOME_TOLERANCE = 1e-9  # m    a foot this close to its stance position need not step any more
 CLOCK_EPSILON = 1e-9  # cycles    the clock starts this much before the first lift-off
 NEARLY_DONE = 1e-12  # 1    floor of 1 - s
@@ -81,6 +82,11 @@ class CommandRamp(Stateful):
         target = self.target
         return (target.vx, target.vy, target.yaw_rate) != (0.0, 0.0, 0.0)
 
+    def _bend(self, value: Array, rate: Array) -> None:
+        """Sets the cubic from a value and rate (6,) to the goal at rest (C1)."""
+        gap, slope = self._goal - value, rate * self.duration
+        self._cubic = np.array([value, slope, 3.0 * gap - 2.0 * slope, slope - 2.0 * gap])
+
     def aim(self, target: BodyCommand) -> bool:
         """Starts a ramp to a command. Returns whether the command is a new one.
 
@@ -97,10 +103,19 @@ class CommandRamp(Stateful):
                 fix="check where the command comes from",
             )
         value, rate = self.ahead(0)
-        gap, slope = goal - value, rate * self.duration
-        self._cubic = np.array([value, slope, 3.0 * gap - 2.0 * slope, slope - 2.0 * gap])
         self.target, self._goal, self.steps = target, goal, 0
+        self._bend(value, rate)
         return True
+
+    def carry(self, before: CommandRamp) -> None:
+        """Continues the change of another ramp, from its present value and rate, in its own time.
+
+        before: a ramp of the same period whose present step is that of this one.
+        """
+        target, (value, rate) = before.target, before.ahead(0)
+        self.target, self._goal = target, before._goal
+        self.steps = self.end if before.settled() else 0
+        self._bend(value, rate)
 
     def ahead(self, steps: int) -> tuple[Array, Array]:
         """Returns the command `steps` periods ahead, and its rate per second.
@@ -198,12 +213,16 @@ class FootPaths(Stateful):
         held: the gait clock stands still until feet at the ends of their swings carry load
             (scalar).
         awaited: feet that it waits for.
+        ending: another gait follows: legs finish their steps and begin no other (scalar).
+        offset: phases at the begin of the walk [cycles].
+        late: legs that stand at the begin of the walk although the clock says that they swing, or
+            that they take up their loads.
         narrowing: part of the way to the narrow stance that the steps aim at (scalar).
     """
 
     STATE = (
         "walking", "before", "swinging", "standing", "lifted", "stayed", "stays", "met", "held",
-        "awaited", "narrowing",
+        "awaited", "ending", "offset", "late", "narrowing",
     )  # fmt: skip
 
     def __init__(
@@ -231,11 +250,10 @@ class FootPaths(Stateful):
         self.swing_time = gait.period * (1.0 - gait.duty)
         # from the lift-off to the middle of the next stance
         self.landing_lead = 0.5 * gait.period * gait.duty + self.swing_time
-        begin = np.array(gait.offsets) + gait.start_clock()
-        first = begin + CLOCK_EPSILON
-        self.offset = begin - CLOCK_EPSILON  # cycles    phases at the begin of the walk
-        # the walk begins in the time of their swing
-        self.late = first - np.floor(first) >= gait.duty
+        self.handover = 0.0  # cycles    in which a leg takes up or gives up its load (C18)
+        self.offset: Array
+        self.late: Mask
+        self._start_at(np.array(gait.offsets) + gait.start_clock())
         self.home, self.home_height = home[:, 0] + 1j * home[:, 1], home[:, 2].copy()
         self.inward = np.zeros(LEGS, dtype=np.complex128) if inward is None else inward
         self.turned = np.zeros(LEGS) if turned is None else turned
@@ -248,8 +266,17 @@ class FootPaths(Stateful):
         self.met: Mask
         self.held = False
         self.awaited: Mask
+        self.ending = False
         self.narrowing = 0.0
         self.reset()
+
+    def _start_at(self, begin: Array) -> None:
+        """Sets the phases (6,) at the begin of the walk [cycles]."""
+        first = begin + CLOCK_EPSILON
+        self.offset = begin - CLOCK_EPSILON
+        # the walk begins in the time of their swing, or while they take up their loads
+        phase = first - np.floor(first)
+        self.late = (phase >= self.gait.duty) | (phase < 0.5 * self.handover)
 
     def _phase_after(self, number: int) -> Array:
         """Returns the phases (6,) `number` periods after the begin of the walk (C2)."""
@@ -267,7 +294,7 @@ class FootPaths(Stateful):
         self.walking, self.before = False, 0
         self.swinging = self.standing = self.lifted = self.stays = none
         self.met = self.awaited = none
-        self.held = False
+        self.held = self.ending = False
         self.stayed = self.late
         return PlannedFeet(
             plane=plane,
@@ -315,6 +342,16 @@ class FootPaths(Stateful):
         self.lifted = self.lifted & ~home
         self.stays = home & ~self.swinging
         return bool(home.all() and not (self.swinging | self.lifted).any()), feet
+
+    def _keep_down(self, kept: Mask) -> None:
+        """Lets the legs skip their next steps that have not begun to give up their loads (C55).
+
+        kept: (6,) legs that were to skip them already.
+        """
+        phase, unloads = self._phase_after(self.before), self.gait.duty - 0.5 * self.handover
+        leaving = (phase >= unloads) & (phase < self.gait.duty) & ~kept
+        self.stays = ~self.swinging & ~leaving
+        self.lifted = self.lifted & ~self.stays
 
     def _progress(self, phase: Array) -> Array:
         """Returns the completed parts tau of the swings (6,) at these phases (C2)."""
@@ -384,9 +421,11 @@ class FootPaths(Stateful):
             return self._rest(now.plane)
         self.before = self._reached(number) if self.walking else 0
         self.held, self.awaited = False, np.zeros(LEGS, dtype=np.bool_)
-        swung = self.swinging
+        swung, kept = self.swinging, self.stays
         self._lift_off()
-        if not going:
+        if self.ending:
+            self._keep_down(kept)
+        elif not going:
             done, feet = self._come_home(swung, now)
             if done:
                 return self._rest(feet)
@@ -394,6 +433,43 @@ class FootPaths(Stateful):
         self.stayed = self.stayed & ~self.lifted
         self.walking = True
         return self._set_out(now, twist)
+
+    def ended(self) -> bool:
+        """Returns whether all legs stand and begin no other step, because another gait follows."""
+        return self.ending and not self.held and bool(self.stays.all())
+
+    def _farthest(self, feet: PlannedFeet, begin: Array) -> float:
+        """Returns how far a foot will be from its stance position at its lift-off [m] (C55).
+
+        It is that of the farthest foot. feet: that stand; begin: (6,) phases at the begin of the
+        walk [cycles].
+        """
+        left = self.gait.duty - begin + CLOCK_EPSILON
+        time = (left - np.floor(left)) * self.gait.period
+        motion = feet.twist.velocity + 1j * feet.twist.yaw_rate * feet.plane
+        return float(np.abs(feet.plane - motion * time - self._aims()).max())
+
+    def join(self, feet: PlannedFeet) -> PlannedFeet:
+        """Begins the walk anew with feet that stand under a moving body (C55).
+
+        One leg begins to give up its load: the first of those with which the farthest foot goes
+        least far.
+        """
+        if not self.walking:
+            return self._rest(feet.plane)
+        least = np.inf
+        unloads, offset = self.gait.duty - 0.5 * self.handover, np.array(self.gait.offsets)
+        for first in range(LEGS):
+            begin = unloads + (offset - offset[first])
+            far = self._farthest(feet, begin)
+            if far < least - SAME_DISTANCE:
+                least = far
+                self._start_at(begin)
+        none = np.zeros(LEGS, dtype=np.bool_)
+        self.before, self.held, self.ending = 0, False, False
+        self.swinging = self.lifted = self.stays = self.met = self.awaited = none
+        self.standing, self.stayed = self._phase_after(0) < self.gait.duty, self.late
+        return feet
 
     def landing(self, number: int) -> Mask:
         """Returns the legs (6,) whose swing ends at the present step.

@@ -10,7 +10,10 @@ void hx_controller_compile(const hxControllerDefinition *definition, hxControlle
   for (int k = 0; k < HX_LEGS; ++k) hx_leg_solver_compile(definition, k, &model->leg[k]);
   hx_command_ramp_compile(definition->gait.period, definition->period, &model->ramp);
   hx_foot_paths_compile(definition, model->leg, &model->paths);
-  if (model->compliant) hx_compliant_compile(definition, model->leg, &model->laws);
+  if (model->compliant) {
+    hx_compliant_compile(definition, model->leg, &model->laws);
+    model->paths.handover = model->laws.support.handover;
+  }
   if (model->paper) hx_paper_compile(definition, &model->corrections);
 }
 
@@ -158,6 +161,33 @@ static void advance(const hxControllerModel *model, int told, hxControllerState 
   state->has_after = reached && next <= state->last;
   state->cut = !reached && next <= state->last;
   if (state->has_after) plan_step(model, state, next, 1, step_at(state, 0), step_at(state, 1));
+}
+
+/* ----------------------------------------------------------------------------- change of gait */
+
+void hx_controller_adopt(hxControllerModel model[2], hxControllerState *state) {
+  hxControllerModel *next = &model[1 - state->model];
+  hxPlannedStep *now = step_at(state, 0);
+  int ready = state->changing;
+  if (state->paths.walking) {
+    ready &= hx_foot_paths_ended(&state->paths);
+    for (int k = 0; k < HX_LEGS; ++k) ready &= now->activation[k] >= 1.0;
+  }
+  if (!ready) return;
+  hx_command_ramp_carry(&next->ramp, &model[state->model].ramp, &state->ramp);
+  hx_foot_paths_join(&next->paths, &state->paths, &now->feet);
+  state->model = 1 - state->model;
+  state->changing = state->has_after = 0;
+  state->at = 0;
+  state->last = INT64_MAX;
+  state->cut = 1;
+}
+
+void hx_controller_change(hxControllerModel model[2], hxControllerState *state) {
+  state->changing = 1;
+  state->has_after = 0;
+  state->paths.ending = state->paths.walking;
+  hx_controller_adopt(model, state);
 }
 
 /* ------------------------------------------------------------------------------------- joints */

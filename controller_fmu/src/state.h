@@ -48,6 +48,8 @@ typedef struct hxControllerState {
   hxPlannedStep step[3];
   hxCompliant compliant;
   hxPaper paper;
+  int model; /* index of the present model; the other one is that of the next gait */
+  int changing; /* to the other model */
   hxControllerOutput output; /* of the last tick */
 } hxControllerState;
 
@@ -60,7 +62,8 @@ typedef struct hxAhead {
 } hxAhead;
 
 struct hxController {
-  hxControllerModel model;
+  hxControllerDefinition definition; /* with the gait that was asked for last */
+  hxControllerModel model[2]; /* of the present gait and of the next one */
   hxControllerState state;
   hxAhead ahead;
   char message[HX_MESSAGE_SIZE];
@@ -70,6 +73,13 @@ void hx_controller_compile(const hxControllerDefinition *definition, hxControlle
 
 /* Resets to standing in the stance, with all states of the laws cleared. */
 void hx_controller_begin(const hxControllerModel *model, double t, hxControllerState *state);
+
+/* Continues in the gait of the other model once all legs stand and carry their whole loads, when
+ * the gait is being changed (C55). The models differ in their gaits only. */
+void hx_controller_adopt(hxControllerModel model[2], hxControllerState *state);
+
+/* Begins a change to the gait of the other model (C55). */
+void hx_controller_change(hxControllerModel model[2], hxControllerState *state);
 
 /* Computes one tick; state->output then holds the commands for this input. */
 void hx_controller_tick(const hxControllerModel *model, const hxControllerInput *input,

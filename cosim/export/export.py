@@ -162,7 +162,7 @@ def _members(interface: Interface, binaries: Mapping[str, bytes], fmi: int) -> d
     """Returns the contents of the archive by path."""
     xml, members = _description(interface, fmi)
     members |= dict(binaries) | _sources(interface.component, fmi)
-    reference = _reference(interface, members) if fmi == 2 else {}
+    reference = _reference(interface, members, fmi)
     return members | extra_members(interface, xml, fmi=fmi, reference=bool(reference)) | reference
 
 
@@ -181,14 +181,23 @@ def _sources(component: Component, fmi: int) -> dict[str, bytes]:
     return members
 
 
-def _reference(interface: Interface, members: dict[str, bytes]) -> dict[str, bytes]:
+def _reference(interface: Interface, members: dict[str, bytes], fmi: int) -> dict[str, bytes]:
     """Returns reference results of the plant; none when the FMU has no binary for this machine."""
-    if interface.component is not PLANT or not any(
-        name.startswith(f"binaries/{fmi2_platform()}/") for name in members
-    ):
+    folders = {2: fmi2_platform(), 3: fmi3_platform()}
+    own = f"binaries/{folders[fmi]}/"
+    found = {name: data for name, data in members.items() if name.startswith(own)}
+    if interface.component is not PLANT or not found:
         return {}
+    trial = members
+    if fmi == 3:  # the same binary and start values as an FMU of FMI 2.0, which runs here
+        trial = {name: data for name, data in members.items() if name.startswith("resources/")}
+        trial |= _description(interface, 2)[1]
+        trial |= {
+            name.replace(own, f"binaries/{folders[2]}/"): data for name, data in found.items()
+        }
     with TemporaryDirectory(prefix="hexapod-export-") as folder:
-        return reference_members(interface, write_archive(Path(folder) / "trial.fmu", members))
+        fmu = write_archive(Path(folder) / "trial.fmu", trial)
+        return reference_members(interface, fmu, fmi=fmi)
 
 
 def start_values(interface: Interface, guid: str) -> str:

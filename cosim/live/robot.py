@@ -8,8 +8,10 @@ Changes while the robot walks:
 
 - friction: the plant begins again in its present pose and motion, on ground of the new friction.
   Bristles of the friction laws and the measures of work and slip begin at zero.
-- gait and control: the robot stops, as the present controller stops it, and the next controller
-  begins in the stance; over FADE the joint commands pass from the old ones to the new ones.
+- gait: the built-in controller changes it without a stop (`gait_change.py`).
+- control, and the gait of a user's control: the robot stops, as the present controller stops it,
+  and the next controller begins in the stance; over FADE the joint commands pass from the old ones
+  to the new ones.
 - ground: the robot is placed at its start on the new ground.
 
 A controller that raises an exception is replaced by one that holds the joints where they are.
@@ -17,23 +19,21 @@ A controller that raises an exception is replaced by one that holds the joints w
 
 from __future__ import annotations
 
-from collections import deque
 from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
-
-import numpy as np
-from numpy.typing import NDArray
 
 from hexapod_cosim.controller import BodyCommand, ControllerError, Gains, JointCommand
 from hexapod_cosim.cosim.common.closing import Closing
 from hexapod_cosim.cosim.control.controllers import make_controller
 from hexapod_cosim.cosim.export.controller_export import export_controller
 from hexapod_cosim.cosim.interface.controller_interface import controller_parameters
+from hexapod_cosim.cosim.live.gait_change import GaitChange, begin_change
 from hexapod_cosim.cosim.live.protocol import Change
 from hexapod_cosim.cosim.live.settings import Choices, Limits, Settings, find_limits, gait_of
 from hexapod_cosim.cosim.live.take import Force
+from hexapod_cosim.cosim.live.takeover import Stop, blend
 from hexapod_cosim.cosim.master.fmu import Fmu
 from hexapod_cosim.cosim.master.fmu_controller import FmuController
 from hexapod_cosim.cosim.master.loop import JointController
@@ -52,7 +52,6 @@ from hexapod_cosim.models import HexapodError
 
 HORIZON = 1e6  # s    stop time of the FMUs
 FADE = 0.4  # s    from the joint commands of one controller to those of the next
-STILL = 0.02  # rad    joint commands that vary by less for half a gait period stand still
 PATIENCE = 4.0  # gait periods    after which the controller is changed although the robot moves
 STATE = "initial."  # prefix of the plant's parameters for the state at the start
 MOST_WEIGHTS = 3.0  # body weights    largest push
@@ -85,6 +84,9 @@ class LiveRobot(Closing):
         self._law = self._open.enter_context(ExitStack())  # of a user's control
         self.wanted: Settings | None = None
         self._from = JointCommand()  # that the present controller is faded in from
+        self.limits: Limits
+        self._gait_change: GaitChange | None = None
+        self._command, self._since = REST, 0  # of the last macro-step, and the one it began at
         try:
             path = PlantFmus(self._folder).fmu(choices.scenario.robot)
             self._plant = self._open.enter_context(Fmu(path))
@@ -131,6 +133,7 @@ class LiveRobot(Closing):
         scenario = self.plan.scenario
         self.count, self.settings, self.wanted = 0, settings, None
         self.fault, self.stopped = "", False
+        self._gait_change, self._command, self._since = None, REST, 0
         self._plant.reset()
         apply_settings(self._plant, self.plan.robot)
         endless = replace(self.plan, scenario=replace(scenario, duration=HORIZON))
@@ -154,14 +157,61 @@ class LiveRobot(Closing):
             self.place(wanted)
         elif change.key == "friction":
             self._change_friction(wanted, plan)
-        else:
+        elif self._can_walk_on(wanted, plan):
             self.wanted, self._next = wanted, plan
-            self._stop = _Stop(self._steps_of(0.5 * self._period), self._steps_of(self._patience))
+            self._begin_gait_change()
+        else:
+            self.wanted, self._next, self._gait_change = wanted, plan, None
+            self._stop = Stop(self._steps_of(0.5 * self._period), self._steps_of(self._patience))
 
     def _plan_of(self, settings: Settings) -> RunPlan:
         scenario = self.choices.scenario_with(settings)
         built_in = control_of(scenario.control).is_builtin
         return make_plan(scenario, gains=self._gains if built_in else None)
+
+    def _can_walk_on(self, wanted: Settings, plan: RunPlan) -> bool:
+        """Whether the gait alone changes, and the controller FMU can change it."""
+        present, then = self.plan.controller, plan.controller
+        robot = replace(then.robot, friction=present.robot.friction)  # a change of friction is late
+        return (
+            wanted == replace(self.settings, gait=wanted.gait)
+            and control_of(self.plan.scenario.control).is_builtin
+            and not self.fault
+            and replace(then, gait=present.gait, robot=robot) == present
+        )
+
+    def _begin_gait_change(self) -> None:
+        """Slows down for the change to the gait of the next plan."""
+        now, then = self.plan.controller, self._next.controller
+        self._gait_change = begin_change(
+            now.gait,
+            then.gait,
+            limits=(
+                self.limits,
+                find_limits(now.robot, now.gait),
+                find_limits(then.robot, then.gait),
+            ),
+            command=self._command,
+            held=(self.count - self._since) * self._h,
+            h=self._h,
+        )
+        self.limits = self._gait_change.limits
+
+    def _go_on_with(self, change: GaitChange) -> None:
+        """Makes what is due of a change of gait."""
+        setup = self._next.controller
+        if change.tell == 0:
+            assert self._built_in is not None
+            given = controller_parameters(setup)
+            gait = {name: value for name, value in given.items() if name.startswith("gait.")}
+            self._built_in.set_parameters(gait)
+            self._period, self._patience = setup.gait.period, PATIENCE * setup.gait.period
+        if change.hold == 0:
+            assert self.wanted is not None
+            self.settings, self.wanted, self.plan = self.wanted, None, self._next
+        if change.end == 0:
+            self.limits, self._gait_change = find_limits(setup.robot, setup.gait), None
+        change.advance()
 
     def _change_friction(self, wanted: Settings, plan: RunPlan) -> None:
         """Starts the plant again in its present state with another friction."""
@@ -203,7 +253,7 @@ class LiveRobot(Closing):
     def _start_controller(self) -> None:
         """Makes the controller of the plan, which begins at the present time in the stance."""
         setup = self.plan.controller
-        self.limits: Limits = find_limits(setup.robot, setup.gait)
+        self.limits = find_limits(setup.robot, setup.gait)
         self._period = setup.gait.period
         self._patience = PATIENCE * self._period
         self._law.close()
@@ -236,7 +286,11 @@ class LiveRobot(Closing):
         if self.stopped:
             return
         scenario = self.plan.scenario
-        if self.wanted is not None:
+        if command != self._command:
+            self._command, self._since = command, self.count
+        if self._gait_change is not None and not self.fault:
+            self._go_on_with(self._gait_change)
+        elif self.wanted is not None:
             command = REST
             if self.fault or self._stop.reached(self._last.angle_ref):
                 self._take_over()
@@ -262,7 +316,7 @@ class LiveRobot(Closing):
         if self._fading > 0:
             share = 1.0 - self._fading / self._steps_of(FADE)
             self._fading -= 1
-            found = _blend(self._from, found, share, self._steps_of(FADE) * self._h)
+            found = blend(self._from, found, share, self._steps_of(FADE) * self._h)
         self._last = found  # what the joints were commanded, whatever comes next
         return found
 
@@ -280,6 +334,7 @@ class LiveRobot(Closing):
     def _take_over(self) -> None:
         """Lets the next controller begin, faded in from the last joint commands."""
         assert self.wanted is not None
+        self._gait_change = None
         self._from, self._fading = self._holding(), self._steps_of(FADE)
         self.settings, self.wanted, self.plan, self.fault = self.wanted, None, self._next, ""
         self._last = self._from
@@ -300,32 +355,3 @@ class LiveRobot(Closing):
 def _text_of(error: Exception) -> str:
     """Returns what happened, in a sentence."""
     return str(error) if isinstance(error, HexapodError) else f"{type(error).__name__}: {error}"
-
-
-class _Stop:
-    """Tells when joint commands have stood still for `window` macro-steps, or after `most`."""
-
-    def __init__(self, window: int, most: int) -> None:
-        self._angles: deque[NDArray[np.float64]] = deque(maxlen=window)
-        self._left = most
-
-    def reached(self, angle: NDArray[np.float64]) -> bool:
-        """Notes the joint angles (6, 3) [rad] of a macro-step."""
-        self._angles.append(angle.copy())
-        self._left -= 1
-        if len(self._angles) < (self._angles.maxlen or 0):
-            return False
-        return self._left <= 0 or bool(np.ptp(np.array(self._angles), axis=0).max() < STILL)
-
-
-def _blend(old: JointCommand, new: JointCommand, share: float, duration: float) -> JointCommand:
-    """Returns commands between two; the share runs from 0 to 1 in `duration` [s] as a cubic."""
-    part = share * share * (3.0 - 2.0 * share)
-    rate = 6.0 * share * (1.0 - share) / duration
-    gap = new.angle_ref - old.angle_ref
-    return JointCommand(
-        angle_ref=old.angle_ref + part * gap,
-        speed_ref=part * new.speed_ref + rate * gap,
-        torque_ref=(1.0 - part) * old.torque_ref + part * new.torque_ref,
-        acceleration_ref=part * new.acceleration_ref,
-    )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import astuple, dataclass, replace
 from functools import lru_cache
 from typing import Any
 
@@ -61,6 +61,20 @@ class Limits:
         vx, vy, yaw_rate = (shares * [self.vx, self.vy, self.yaw_rate]).tolist()
         height = drive.height * (self.up if drive.height > 0.0 else self.down)
         return BodyCommand(vx, vy, yaw_rate, height)
+
+    def share(self, command: BodyCommand) -> float:
+        """Returns the share of the reach that the velocities of a command take; 1 is all of it."""
+        parts = (command.vx / self.vx, command.vy / self.vy, command.yaw_rate / self.yaw_rate)
+        return sum(abs(part) for part in parts)
+
+    def least(self, other: Limits) -> Limits:
+        """Returns the smaller ones of two limits."""
+        mine, theirs = astuple(self), astuple(other)
+        return Limits(*(min(pair) for pair in zip(mine, theirs, strict=True)))
+
+    def times(self, share: float) -> Limits:
+        """Returns these limits with a share of the velocities and the whole heights."""
+        return replace(self, vx=share * self.vx, vy=share * self.vy, yaw_rate=share * self.yaw_rate)
 
 
 class Choices:

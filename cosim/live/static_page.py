@@ -13,6 +13,7 @@ from hexapod_cosim.controller import PATTERNS, Gait, make_gait
 from hexapod_cosim.cosim.common.components import CONTROLLER
 from hexapod_cosim.cosim.common.files import write_text
 from hexapod_cosim.cosim.interface.interface import enumerations_of, load_interface
+from hexapod_cosim.cosim.live.gait_change import SHARE
 from hexapod_cosim.cosim.live.module import walker_module
 from hexapod_cosim.cosim.live.page import describe, fill_page
 from hexapod_cosim.cosim.live.settings import FLAT, Choices, control_texts, find_limits
@@ -58,6 +59,7 @@ def _setup(choices: Choices, robot: Robot) -> dict[str, Any]:
         "first": vars(replace(choices.first(), ground=FLAT)),
         "grounds": [],
         "numbers": {name: types["Control"].number(name) for name in CONTROLS},
+        "share": SHARE,
         "walks": {
             name: _walk(make_gait(robot, name), types["GaitPattern"].number(name), robot)
             for name in PATTERNS

@@ -104,14 +104,24 @@ def _table_problems(path: str, data: bytes, names: Collection[str]) -> Iterator[
     unknown = [name for name in columns[1:] if name not in names]
     if unknown:
         yield f"{path}: these columns are no variables: {', '.join(unknown)}"
-    last = float("-inf")
+    last, sizes = float("-inf"), [1] * len(columns)
     for number, row in enumerate(rows, start=2):
         try:
-            values = [float(value) for value in row.split(",")]
+            cells = [[float(value) for value in cell.split()] for cell in row.split(",")]
         except ValueError:
             yield f"{path} line {number}: got {row!r}, expected numbers"
             return
-        if len(values) != len(columns) or not values[0] >= last:
-            yield f"{path} line {number}: expected {len(columns)} numbers, time not decreasing"
+        found = [len(cell) for cell in cells]
+        if number == 2 and len(found) == len(sizes) and min(found) > 0 and found[0] == 1:
+            sizes = found  # of arrays, as the first row has them
+        if found != sizes or not cells[0][0] >= last:
+            yield f"{path} line {number}: expected {_expected(sizes)}, time not decreasing"
             return
-        last = values[0]
+        last = cells[0][0]
+
+
+def _expected(sizes: list[int]) -> str:
+    """Returns what a row must have; sizes: numbers in each cell."""
+    if max(sizes) == 1:
+        return f"{len(sizes)} numbers"
+    return f"{len(sizes)} cells of {', '.join(map(str, sizes))} numbers"

@@ -1,16 +1,28 @@
 """Tests that torque references do not jump when feet touch down or lift off, nor when a walk begins
-or ends.
+or ends, and that the feet do not jump when the gait changes.
 """
 
 from __future__ import annotations
 
+import ctypes as ct
 from functools import cache
+from itertools import permutations
 
 import numpy as np
 import pytest
 from gains import make_gains
+from native_controller import NativeController
 
-from hexapod_cosim.controller import BodyCommand, Controller, Measurement, make_gait
+from hexapod_cosim.controller import (
+    PATTERNS,
+    BodyCommand,
+    Controller,
+    ControllerError,
+    Gait,
+    Measurement,
+    make_gait,
+)
+from hexapod_cosim.cosim.interface.controller_interface import ControllerSetup
 from hexapod_cosim.models import load_robot
 
 PERIODS = {"tripod": (0.002, 0.001), "ripple": (0.004, 0.002)}  # s
@@ -85,3 +97,113 @@ def test_no_torque_jumps_when_a_walk_begins_or_ends(gait: str) -> None:
     is how the other legs begin and end theirs.
     """
     assert np.abs(np.diff(torques("athena", gait, 0.002), axis=0)).max() < 0.8
+
+
+# ------------------------------------------------------------------------------ changes of gait
+
+STEP = 0.005  # s
+CURVE = BodyCommand(vx=0.015, yaw_rate=0.02)  # 0.28 of the largest commands of the wave
+MOMENTS = (0.1, 0.45, 0.8)  # of the gait period
+STANDS = Measurement(angle=load_robot("athena").stance.copy())
+
+
+def feet_over_a_change(core: ct.CDLL, first: Gait, then: Gait, moment: float) -> tuple[float, ...]:
+    """Returns the largest way of a foot in a period before and after a change of gait, and the
+    largest change of such ways [m].
+
+    Asserts that no leg reaches its limits.
+    """
+    robot = load_robot("athena")
+    controller = NativeController(core, ControllerSetup(robot=robot, gait=first, period=STEP))
+    change = round((1.5 + moment) * first.period / STEP)
+    feet = []
+    for k in range(change + round(2.5 * then.period / STEP)):
+        if k == change:
+            controller.change_gait(then)
+        out = controller.step(k * STEP, CURVE, STANDS)
+        assert not any(out.unreachable)
+        feet.append(np.array(np.ctypeslib.as_array(out.planned)))
+    ways = np.diff(feet, axis=0)
+    length = np.linalg.norm(ways, axis=2).max(axis=1)
+    jump = np.linalg.norm(np.diff(ways, axis=0), axis=2).max(axis=1)
+    here = change - 1
+    return tuple(
+        float(part.max()) for part in (length[:here], length[here:], jump, jump[: here - 1])
+    )
+
+
+@pytest.mark.parametrize("pair", list(permutations(PATTERNS, 2)), ids="-".join)
+def test_feet_do_not_jump_when_the_gait_changes(
+    controller_core: ct.CDLL, pair: tuple[str, str]
+) -> None:
+    first, then = (make_gait(load_robot("athena"), name) for name in pair)
+    found = [feet_over_a_change(controller_core, first, then, moment) for moment in MOMENTS]
+    before, after, jump, undisturbed = np.array(found).max(axis=0)
+    # m    the feet of all gaits move by 1.39 to 1.68 mm in a period, before and after
+    assert 1.3e-3 < before < 1.7e-3
+    assert 1.3e-3 < after < 1.7e-3
+    # m    no change of these ways is larger than those of a walk in one gait
+    assert undisturbed < 0.1e-3
+    assert jump < 0.1e-3
+
+
+def walk(controller: Controller, steps: range) -> list[np.ndarray]:
+    return [controller.step(k * STEP, CURVE, STANDS).angle_ref.copy() for k in steps]
+
+
+def test_a_change_of_gait_takes_a_swing_and_the_feet_then_step_in_the_new_gait() -> None:
+    robot = load_robot("athena")
+    tripod, wave = make_gait(robot, "tripod"), make_gait(robot, "wave")
+    controller = Controller(robot, period=STEP, gait=tripod)
+    walk(controller, range(420))
+    controller.change_gait(wave)
+    count = 420
+    while controller.gait is tripod:
+        walk(controller, range(count, count + 1))
+        count += 1
+    # the legs that lifted off at step 400 or 401 land half a second later
+    assert 500 <= count <= 503
+    assert controller.paths.walking
+    swinging = []
+    for k in range(count, count + 600):
+        walk(controller, range(k, k + 1))
+        swinging.append(tuple(controller.diagnostics.swinging.tolist()))
+    assert {sum(legs) for legs in swinging[1:]} == {1}  # one leg of the wave at a time
+    assert len(set(swinging[1:])) == 6
+
+
+def test_a_robot_that_stands_changes_its_gait_at_once() -> None:
+    robot = load_robot("athena")
+    ripple = make_gait(robot, "ripple")
+    controller = Controller(robot, period=STEP, gait=make_gait(robot))
+    expected = walk(Controller(robot, period=STEP, gait=ripple), range(100))
+    controller.change_gait(ripple)
+    assert controller.gait is ripple
+    np.testing.assert_array_equal(walk(controller, range(100)), expected)
+
+
+def test_a_state_saved_during_a_change_of_gait_continues_with_the_same_bits() -> None:
+    robot = load_robot("athena")
+    controller = Controller(robot, period=STEP, gait=make_gait(robot), gains=make_gains(robot))
+    walk(controller, range(420))
+    controller.change_gait(make_gait(robot, "amble"))
+    walk(controller, range(420, 450))
+    changing = controller.save()
+    first = walk(controller, range(450, 700))
+    changed = controller.save()
+    second = walk(controller, range(700, 800))
+    for state, steps, expected in (
+        (changing, range(450, 700), first),
+        (changed, range(700, 800), second),
+    ):
+        controller.restore(state)
+        np.testing.assert_array_equal(walk(controller, steps), expected)
+
+
+def test_a_gait_that_is_too_fast_is_refused_and_the_walk_goes_on() -> None:
+    robot = load_robot("athena")
+    controller, other = (Controller(robot, period=STEP, gait=make_gait(robot)) for _ in range(2))
+    walk(controller, range(300))
+    with pytest.raises(ControllerError, match="gait's shorter phase"):
+        controller.change_gait(make_gait(robot, "wave", period=0.02))
+    np.testing.assert_array_equal(walk(controller, range(300, 400)), walk(other, range(400))[300:])

@@ -35,6 +35,7 @@ ONE_LEG = {
     "limit_joint": "limit_joints",
     "begin": "reset",
     "tick": "step",
+    "change": "change_gait",
 }
 WITHOUT_TWIN = {"total_weight", "plane_acceleration", "step_at"}
 PREFIX = re.compile(

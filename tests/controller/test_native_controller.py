@@ -107,9 +107,12 @@ def differences(
     sense: Sense,
     steps: int = STEPS,
     told: Callable[[float], BodyCommand] = program,
+    changes: dict[int, Gait] | None = None,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Returns the largest differences of angle, speed, torque and acceleration over a walk, in rad
     and relative to the servo, and the fallback (steps, 6). The walk ends where they are too large.
+
+    changes: gaits that the walk changes to, by steps.
 
     Asserts that the diagnostics are the same at every step.
     """
@@ -122,6 +125,9 @@ def differences(
     )
     for k in range(steps):
         t = k * setup.period
+        if changes and k in changes:
+            reference.change_gait(changes[k])
+            native.change_gait(changes[k])
         expected = reference.step(t, told(t), measurement)
         out = native.step(t, told(t), measurement)
         gap = np.abs(commands(out) - [getattr(expected, name) for name in COMMANDS])
@@ -169,6 +175,51 @@ def test_a_walk_is_the_same(
     )
     assert close(worst)
     assert not fallback.any()
+
+
+@pytest.mark.parametrize("compliant", [True, False])
+def test_a_walk_that_changes_its_gait_is_the_same(
+    controller_core: ct.CDLL, compliant: bool
+) -> None:
+    """The second change is asked for again before it is made, the last one at the end of a stop."""
+    robot = load_robot("athena")
+    names = {200: "wave", 300: "ripple", 700: "wave", 740: "amble", 1620: "tripod"}
+    worst, fallback = differences(
+        controller_core,
+        setup_of(compliant=compliant),
+        sense=Ground(),
+        changes={step: make_gait(robot, name) for step, name in names.items()},
+    )
+    assert close(worst)
+    assert not fallback.any()
+
+
+def test_a_native_change_of_gait_is_saved_restored_and_refused(controller_core: ct.CDLL) -> None:
+    robot, measurement = load_robot("athena"), Measurement(angle=load_robot("athena").stance.copy())
+    native = NativeController(controller_core, setup_of(compliant=False))
+
+    def go(first: int, last: int) -> np.ndarray:
+        return np.array(
+            [
+                commands(native.step(k * PERIOD, program(0.0), measurement))
+                for k in range(first, last)
+            ]
+        )
+
+    go(0, 420)
+    native.change_gait(make_gait(robot, "amble"))
+    go(420, 450)
+    state = native.save()
+    expected = go(450, 700)
+    native.restore(state)
+    np.testing.assert_array_equal(go(450, 700), expected)
+    state = native.save()
+    # stance and swing of a wave of 20 ms are shorter than the period; setting it up is refused too
+    native.definition["gait.period"] = 0.006
+    gait = ct.addressof(native.definition.bytes) + native.definition.ranges["gait.pattern"].offset
+    with pytest.raises(NativeError, match="gait's shorter phase"):
+        native._checked(controller_core.hx_controller_change_gait(native._handle, gait))
+    assert native.save() == state
 
 
 @pytest.mark.parametrize("name", ROBOTS)

@@ -102,19 +102,50 @@ def test_the_robot_walks_as_fast_as_it_is_told(module: Module, control: float) -
     assert module.position()[0] == pytest.approx(0.37, abs=0.03)  # it begins after half a cycle
 
 
-def test_control_and_gait_change_when_the_robot_stands_still(module: Module) -> None:
+AMBLE = (4.0, 1.125, 2 / 3, 0.03, 0.0)
+FRAME = 8 * (1 + 3 + 4 + 3 + 3 + 18 + 6 + 18 + 6 + 1 + 1)  # bytes of hxFrame; `changing` is last
+
+
+def change(module: Module, *walk: float) -> None:
+    module.write(module.call("hx_walker_wanted"), np.array(walk).tobytes())
+    module.call("hx_walker_change")
+
+
+def changing(module: Module) -> float:
+    frame = module.read(module.call("hx_walker_frame"), FRAME)
+    return float(np.frombuffer(frame)[-1])
+
+
+def test_the_control_changes_when_the_robot_stands_still(module: Module) -> None:
     module.start(KINEMATIC)
     module.call("hx_walker_command", 0.08, 0.0, 0.0, 0.0)
     module.call("hx_walker_advance", 400)
     walked = module.position()[0]
-    wanted = np.array([COMPLIANT, 4.0, 0.75 * 0.5 / (1 / 3), 2 / 3, 0.03, 0.0])
-    module.write(module.call("hx_walker_wanted"), wanted.tobytes())
-    module.call("hx_walker_change")
+    change(module, COMPLIANT, *AMBLE)
     module.call("hx_walker_advance", 300)
     stood = module.position()[0]
     module.call("hx_walker_advance", 800)
     assert stood - walked < 0.06
     assert module.position()[0] - stood > 0.15
+    assert changing(module) == 0.0
+
+
+@pytest.mark.parametrize("control", [KINEMATIC, COMPLIANT])
+def test_the_gait_changes_while_the_robot_walks(module: Module, control: float) -> None:
+    module.start(control)
+    module.call("hx_walker_command", 0.04, 0.0, 0.0, 0.0)
+    module.call("hx_walker_advance", 400)
+    change(module, control, *AMBLE)
+    stages, places = [], [module.position()[0]]
+    for _ in range(500):
+        assert module.call("hx_walker_advance", 1) == 0
+        stages.append(changing(module))
+        places.append(module.position()[0])
+    # a swing of 0.375 s in the old gait, then a swing and a period of 1.125 s of the new one
+    assert [stages.count(stage) for stage in (1.0, 2.0)] == [75, 300]
+    assert stages[-1] == 0.0
+    speeds = (np.array(places)[50:] - np.array(places)[:-50]) / 0.25
+    assert speeds.min() > 0.03
 
 
 def test_a_start_that_is_no_walk_says_why(module: Module) -> None:

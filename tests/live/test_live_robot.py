@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +11,7 @@ import pytest
 from gains import make_gains
 from numpy.typing import NDArray
 
-from hexapod_cosim.controller import BodyCommand
+from hexapod_cosim.controller import BodyCommand, make_gait
 from hexapod_cosim.cosim.interface.names import joint_names, vector_names
 from hexapod_cosim.cosim.live import robot as live_robot
 from hexapod_cosim.cosim.live.protocol import Change, Drive
@@ -154,6 +155,73 @@ def test_gait_and_control_change_while_the_robot_walks_without_a_jump_of_the_joi
     assert place_of(placed)[0] > begin + 0.1  # it walks on by itself
     # rad    the swings of these gaits need up to 0.05 rad in a macro-step; a jump would be larger
     assert largest < 0.1
+    assert placed.fault == ""
+
+
+@pytest.mark.parametrize(
+    ("first", "then", "control"),
+    [
+        ("tripod", "wave", "compliant"),
+        ("wave", "tripod", "kinematic"),
+        ("amble", "ripple", "compliant"),
+        ("ripple", "amble", "paper"),
+    ],
+)
+def test_the_robot_walks_on_while_its_gait_changes(
+    placed: LiveRobot, first: str, then: str, control: str
+) -> None:
+    placed.place(replace(placed.choices.first(), gait=first, control=control))
+    fast = Drive(forward=1.0, speed=0.8)
+    for _ in range(700):
+        placed.step(placed.limits.command(fast), NO_FORCE)
+    before = placed.limits
+    placed.change(Change("gait", then))
+    slow = placed.limits
+    # 0.3 of the smaller limit of both gaits
+    robot = load_robot("athena")
+    gaits = [find_limits(robot, make_gait(robot, name)) for name in (first, then)]
+    assert slow.vx == pytest.approx(0.3 * min(limits.vx for limits in gaits))
+    angles, speeds = [value(placed, *joint_names("angle_ref"))], []
+    while placed.limits == slow:
+        placed.step(placed.limits.command(fast), NO_FORCE)
+        angles.append(value(placed, *joint_names("angle_ref")))
+        speeds.append(value(placed, "torso.velocity[1]")[0])
+    assert (placed.settings.gait, placed.wanted, placed.fault) == (then, None, "")
+    assert before != placed.limits == gaits[1]
+    # rad    a macro-step of an undisturbed walk at these speeds needs up to 0.05
+    assert np.abs(np.diff(angles, axis=0)).max() < 0.05
+    # the robot never stops: the mean over a quarter of a second
+    means = np.convolve(speeds, np.full(50, 0.02), mode="valid")
+    assert means.min() > 0.5 * 0.8 * slow.vx
+
+
+def test_a_slow_walk_changes_its_gait_at_once(placed: LiveRobot) -> None:
+    slow = BodyCommand(vx=0.02)
+    go(placed, 300, slow)
+    placed.change(Change("gait", "ripple"))
+    # the legs finish their swings of half a second
+    assert go_on(placed, slow) == 101
+    assert placed.settings.gait == "ripple"
+
+
+def test_another_wish_during_a_change_of_gait_is_followed(placed: LiveRobot) -> None:
+    slow = BodyCommand(vx=0.02)
+    go(placed, 300, slow)
+    for gait in ("wave", "amble"):
+        placed.change(Change("gait", gait))
+        go(placed, 30, slow)
+    placed.change(Change("friction", 0.5))
+    go_on(placed, slow)
+    assert (placed.settings.gait, placed.settings.friction) == ("amble", 0.5)
+    placed.change(Change("gait", "ripple"))
+    go(placed, 30, slow)
+    placed.change(Change("control", "compliant"))
+    go_on(placed, slow)
+    assert (placed.settings.gait, placed.settings.control) == ("ripple", "compliant")
+    assert placed.settings.friction == 0.5
+    begin = place_of(placed)[0]
+    go(placed, 600)
+    assert place_of(placed)[0] > begin + 0.1
     assert placed.fault == ""
 
 

@@ -46,6 +46,23 @@ def test_the_robot_walks_and_turns_by_keys_without_a_network(page: Any) -> None:
     assert [text for text in page.problems if not text.startswith("file:")] == []
 
 
+def test_the_gait_changes_while_the_robot_walks(page: Any) -> None:
+    page.keyboard.down("w")
+    page.wait_for_function(f"{FRAME}.command[0] > 0")
+    fast = page.evaluate(f"{FRAME}.command[0]")
+    page.evaluate(
+        "window.slowest = 1; window.hexapod.link.on('frame', (frame) => {"
+        "window.slowest = Math.min(window.slowest, frame.command[0]) })"
+    )
+    page.click("#gaits [data-value=ripple]")
+    page.wait_for_selector("#gaits [data-value=ripple][aria-pressed=true]")
+    page.wait_for_function(f"{FRAME}.command[0] > 1.5 * window.slowest")  # each leg has stepped
+    # 0.3 of the ripple's limit of 0.193 m/s, at the speed with which the page begins
+    slowest = page.evaluate("window.slowest")
+    assert 0.0 < slowest < 0.3 * fast
+    page.keyboard.up("w")
+
+
 def test_control_friction_and_place_answer(page: Any) -> None:
     page.click("#controls [data-value=paper]")
     page.wait_for_selector("#controls [data-value=paper][aria-pressed=true]")

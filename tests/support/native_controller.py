@@ -6,12 +6,13 @@ An instance has the interface of `Controller` and is set up through the C librar
 from __future__ import annotations
 
 import ctypes as ct
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from mirror import LEGS, OK, PerJoint, Real, record
 
-from hexapod_cosim.controller import BodyCommand, Measurement
+from hexapod_cosim.controller import BodyCommand, Gait, Measurement
 from hexapod_cosim.cosim.interface.controller_interface import (
     ControllerSetup,
     load_controller_interface,
@@ -69,6 +70,7 @@ def bound(core: ct.CDLL) -> ct.CDLL:
         "hx_controller_create": (controller, []),
         "hx_controller_destroy": (None, [controller]),
         "hx_controller_reset": (status, [controller, ct.c_void_p, Real]),
+        "hx_controller_change_gait": (status, [controller, ct.c_void_p]),
         "hx_controller_output": (
             None,
             [controller, ct.POINTER(HxControllerInput), ct.POINTER(HxControllerOutput)],
@@ -122,6 +124,7 @@ class NativeController:
             setup.period,
             Definition(core, setup),
         )
+        self._setup = setup
         self._handle = core.hx_controller_create()
         self.input, self.out = HxControllerInput(), HxControllerOutput()
         self.reset(start)
@@ -136,6 +139,19 @@ class NativeController:
     def reset(self, t: float = 0.0) -> None:
         """Resets the controller with the present definition."""
         self._checked(self._core.hx_controller_reset(self._handle, self.definition.bytes, t))
+
+    def change_gait(self, gait: Gait) -> None:
+        """Changes the gait while the robot walks."""
+        setup = replace(self._setup, gait=gait)
+        for variable in load_controller_interface(setup).of_causality("parameter"):
+            if variable.name.startswith("gait."):
+                self.definition[variable.name] = variable.start
+        place = self.definition.ranges["gait.pattern"].offset
+        self._checked(
+            self._core.hx_controller_change_gait(
+                self._handle, ct.addressof(self.definition.bytes) + place
+            )
+        )
 
     def output(self) -> Any:
         """Calculates the output for the present input and time."""

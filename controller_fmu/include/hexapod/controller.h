@@ -199,6 +199,12 @@ HX_API void hx_controller_destroy(hxController *controller);
 HX_API hxStatus hx_controller_reset(hxController *controller,
                                     const hxControllerDefinition *definition, double t);
 
+/* Changes the gait while the robot walks: legs in the air finish their steps, no other leg lifts
+ * off, and the next gait begins with the feet where they are (C55). On failure only the message
+ * changes. */
+HX_API hxStatus hx_controller_change_gait(hxController *controller, const hxGait *gait);
+HX_API const hxGait *hx_controller_gait(const hxController *controller); /* asked for last */
+
 /* Computes the joint commands at the present time: those of this input when a tick is due,
  * otherwise those of the last tick. The state does not change; the result is kept for the step that
  * follows under the same input. */

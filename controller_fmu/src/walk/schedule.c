@@ -9,20 +9,22 @@
 #include "../validation.h"
 #include "hexapod/message.h"
 
-/* A saved state: a header that identifies it, then the controller's model and state. */
+/* A saved state: a header that identifies it, then the controller's definition, models and state.
+ */
 typedef struct {
   uint64_t magic, version, size, checksum;
-  hxControllerModel model;
+  hxControllerDefinition definition;
+  hxControllerModel model[2];
   hxControllerState state;
 } hxSaved;
 
 static const uint64_t magic = 0x72746e6f43507868u; /* "hxPContr" */
-static const uint64_t saved_version = 2;
+static const uint64_t saved_version = 3;
 /* 1, of a period: a tick that is later than the present time by less than this is due */
 static const double clock_tolerance = 0.01;
 
 static uint64_t checksum(const hxSaved *saved) {
-  return hx_checksum(0, &saved->model, sizeof *saved - offsetof(hxSaved, model));
+  return hx_checksum(0, &saved->definition, sizeof *saved - offsetof(hxSaved, definition));
 }
 
 static hxStatus refuse(hxController *controller, hxStatus status, const char *text) {
@@ -52,15 +54,41 @@ hxStatus hx_controller_reset(hxController *controller, const hxControllerDefinit
                   "start time: got a number that is not finite, expected a finite time in s");
   const hxStatus status = hx_controller_definition_check(definition, message);
   if (status != HX_OK) return refuse(controller, status, message);
-  hx_controller_compile(definition, &controller->model);
-  hx_controller_begin(&controller->model, t, &controller->state);
+  controller->definition = *definition;
+  memset(controller->model, 0, sizeof controller->model);
+  hx_controller_compile(definition, &controller->model[0]);
+  hx_controller_begin(&controller->model[0], t, &controller->state);
   controller->ahead.known = 0;
   controller->message[0] = '\0';
   return HX_OK;
 }
 
+/* Returns the model of the present gait. */
+static const hxControllerModel *model_of(const hxController *controller) {
+  return &controller->model[controller->state.model];
+}
+
+const hxGait *hx_controller_gait(const hxController *controller) {
+  return &controller->definition.gait;
+}
+
+hxStatus hx_controller_change_gait(hxController *controller, const hxGait *gait) {
+  char message[HX_MESSAGE_SIZE];
+  const hxGait before = controller->definition.gait;
+  controller->definition.gait = *gait;
+  const hxStatus status = hx_controller_definition_check(&controller->definition, message);
+  if (status != HX_OK) {
+    controller->definition.gait = before;
+    return refuse(controller, status, message);
+  }
+  hx_controller_compile(&controller->definition, &controller->model[1 - controller->state.model]);
+  hx_controller_change(controller->model, &controller->state);
+  controller->ahead.known = 0;
+  return HX_OK;
+}
+
 static double next_tick(const hxController *controller) {
-  return controller->state.start + (double)controller->state.tick * controller->model.period;
+  return controller->state.start + (double)controller->state.tick * model_of(controller)->period;
 }
 
 static int is_finite(const hxControllerOutput *output) {
@@ -81,7 +109,8 @@ static int is_ahead(const hxController *controller, const hxControllerInput *inp
 void hx_controller_output(hxController *controller, const hxControllerInput *input,
                           hxControllerOutput *output) {
   hxAhead *ahead = &controller->ahead;
-  if (next_tick(controller) - controller->state.time > clock_tolerance * controller->model.period) {
+  if (next_tick(controller) - controller->state.time >
+      clock_tolerance * model_of(controller)->period) {
     *output = controller->state.output;
     return;
   }
@@ -89,7 +118,7 @@ void hx_controller_output(hxController *controller, const hxControllerInput *inp
     ahead->known = 1;
     ahead->input = *input;
     ahead->state = controller->state;
-    hx_controller_tick(&controller->model, input, &ahead->state);
+    hx_controller_tick(model_of(controller), input, &ahead->state);
   }
   *output = ahead->state.output;
 }
@@ -98,7 +127,8 @@ static void tick(hxController *controller, const hxControllerInput *input) {
   if (is_ahead(controller, input))
     controller->state = controller->ahead.state;
   else
-    hx_controller_tick(&controller->model, input, &controller->state);
+    hx_controller_tick(model_of(controller), input, &controller->state);
+  hx_controller_adopt(controller->model, &controller->state);
   controller->ahead.known = 0;
 }
 
@@ -124,7 +154,7 @@ hxStatus hx_controller_step(hxController *controller, const hxControllerInput *i
   }
   const hxStatus status = hx_controller_input_check(input, controller->message);
   if (status != HX_OK) return status;
-  while (t_end - next_tick(controller) > clock_tolerance * controller->model.period) {
+  while (t_end - next_tick(controller) > clock_tolerance * model_of(controller)->period) {
     if (rate) ramp_input(input, rate, fmax(next_tick(controller) - before.time, 0.0), &now);
     tick(controller, &now);
     if (is_finite(&controller->state.output)) continue;
@@ -145,7 +175,8 @@ void hx_controller_get_state(const hxController *controller, void *bytes) {
   saved.magic = magic;
   saved.version = saved_version;
   saved.size = sizeof saved;
-  memcpy(&saved.model, &controller->model, sizeof saved.model);
+  memcpy(&saved.definition, &controller->definition, sizeof saved.definition);
+  memcpy(saved.model, controller->model, sizeof saved.model);
   memcpy(&saved.state, &controller->state, sizeof saved.state);
   saved.checksum = checksum(&saved);
   memcpy(bytes, &saved, sizeof saved);
@@ -168,7 +199,8 @@ hxStatus hx_controller_set_state(hxController *controller, const void *bytes, si
     return refuse(
         controller, HX_BAD_STATE,
         "saved state: got a damaged one, expected one whose checksum is right; save it again");
-  memcpy(&controller->model, &saved.model, sizeof saved.model);
+  memcpy(&controller->definition, &saved.definition, sizeof saved.definition);
+  memcpy(controller->model, saved.model, sizeof saved.model);
   memcpy(&controller->state, &saved.state, sizeof saved.state);
   controller->ahead.known = 0;
   return HX_OK;

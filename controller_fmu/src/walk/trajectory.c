@@ -4,12 +4,21 @@
 
 #include <string.h>
 
+/* A change of gait is rare: its functions are compiled for size, because wheels contain them for
+ * every platform. */
+#if defined(__GNUC__)
+#define HX_SELDOM __attribute__((cold, noinline))
+#else
+#define HX_SELDOM
+#endif
+
 /* 1, share of the swing at each end in which the foot moves vertically only */
 static const double dwell = 0.1;
 /* 1, part of the swing after which the landing point stays fixed on the ground */
 static const double freeze = 0.75;
 /* 1, by which a swing with a slow landing begins faster and ends slower (C54) */
 static const double haste = 0.25;
+static const double same_distance = 1e-6; /* m, distances that differ by less are equal */
 /* m, a foot this close to its stance position makes no step */
 static const double home_tolerance = 1e-9;
 /* cycles by which the clock starts before the first lift-off */
@@ -39,6 +48,18 @@ int hx_command_ramp_moves(const hxCommandRamp *ramp) {
   return ramp->target[0] != 0.0 || ramp->target[1] != 0.0 || ramp->target[2] != 0.0;
 }
 
+/* Sets the cubic from a value and rate to the target at rest (C1). */
+static void bend(double duration, const double value[HX_COMMANDS], const double rate[HX_COMMANDS],
+                 hxCommandRamp *ramp) {
+  for (int i = 0; i < HX_COMMANDS; ++i) {
+    const double gap = ramp->target[i] - value[i], slope = rate[i] * duration;
+    ramp->cubic[0][i] = value[i];
+    ramp->cubic[1][i] = slope;
+    ramp->cubic[2][i] = 3.0 * gap - 2.0 * slope;
+    ramp->cubic[3][i] = slope - 2.0 * gap;
+  }
+}
+
 int hx_command_ramp_aim(const hxCommandRampModel *model, const double target[HX_COMMANDS],
                         hxCommandRamp *ramp) {
   double value[HX_COMMANDS], rate[HX_COMMANDS];
@@ -46,16 +67,18 @@ int hx_command_ramp_aim(const hxCommandRampModel *model, const double target[HX_
   for (int i = 0; i < HX_COMMANDS; ++i) same &= target[i] == ramp->target[i];
   if (same) return 0;
   hx_command_ramp_ahead(model, ramp, 0, value, rate);
-  for (int i = 0; i < HX_COMMANDS; ++i) {
-    const double gap = target[i] - value[i], slope = rate[i] * model->duration;
-    ramp->cubic[0][i] = value[i];
-    ramp->cubic[1][i] = slope;
-    ramp->cubic[2][i] = 3.0 * gap - 2.0 * slope;
-    ramp->cubic[3][i] = slope - 2.0 * gap;
-    ramp->target[i] = target[i];
-  }
+  memcpy(ramp->target, target, sizeof ramp->target);
+  bend(model->duration, value, rate, ramp);
   ramp->steps = 0;
   return 1;
+}
+
+void hx_command_ramp_carry(const hxCommandRampModel *model, const hxCommandRampModel *before,
+                           hxCommandRamp *ramp) {
+  double value[HX_COMMANDS], rate[HX_COMMANDS];
+  hx_command_ramp_ahead(before, ramp, 0, value, rate);
+  ramp->steps = hx_command_ramp_settled(before, ramp) ? model->end : 0;
+  bend(model->duration, value, rate, ramp);
 }
 
 void hx_command_ramp_ahead(const hxCommandRampModel *model, const hxCommandRamp *ramp,
@@ -99,10 +122,13 @@ static hxPlane travel(hxTwist twist, double time) {
 
 /* -------------------------------------------------------------------------------------- paths */
 
+HX_SELDOM static void start_at(hxFootPathsModel *model, const double begin[HX_LEGS]);
+
 void hx_foot_paths_compile(const hxControllerDefinition *definition, const hxLegSolver leg[HX_LEGS],
                            hxFootPathsModel *model) {
   const hxGait *gait = &definition->gait;
-  double offset[HX_LEGS], foot[3];
+  double begin[HX_LEGS], foot[3];
+  double *offset = model->gait_offset;
   hx_gait_offsets(gait, offset);
   model->period = definition->period;
   model->gait_period = gait->period;
@@ -114,10 +140,7 @@ void hx_foot_paths_compile(const hxControllerDefinition *definition, const hxLeg
   model->swing_time = gait->period * (1.0 - gait->duty);
   model->landing_lead = 0.5 * gait->period * gait->duty + model->swing_time;
   for (int k = 0; k < HX_LEGS; ++k) {
-    const double begin = offset[k] + hx_gait_start_clock(gait, offset),
-                 first = begin + clock_epsilon;
-    model->offset[k] = begin - clock_epsilon;
-    model->late[k] = first - floor(first) >= gait->duty;
+    begin[k] = offset[k] + hx_gait_start_clock(gait, offset);
     hx_leg_solver_forward(&leg[k], leg[k].stance, foot);
     model->home[k] = hx_plane(foot[0], foot[1]);
     model->home_height[k] = foot[2];
@@ -125,6 +148,16 @@ void hx_foot_paths_compile(const hxControllerDefinition *definition, const hxLeg
     model->inward[k] = hx_scaled(hx_cis(leg[k].hip_yaw + leg[k].stance[0]), -gait->narrowing);
     hx_leg_solver_pose(&leg[k], hx_plane_add(model->home[k], model->inward[k]), foot[2], &narrow);
     model->turned[k] = hx_leg_solver_rolling(&leg[k], narrow.angle);
+  }
+  start_at(model, begin);
+}
+
+/* Sets the phases of the legs at the begin of the walk [cycles]. */
+static void start_at(hxFootPathsModel *model, const double begin[HX_LEGS]) {
+  for (int leg = 0; leg < HX_LEGS; ++leg) {
+    const double first = begin[leg] + clock_epsilon, phase = first - floor(first);
+    model->offset[leg] = begin[leg] - clock_epsilon;
+    model->late[leg] = phase >= model->duty || phase < 0.5 * model->handover;
   }
 }
 
@@ -140,8 +173,8 @@ static int64_t reached(const hxFootPaths *paths, int64_t number) {
 }
 
 /* Stops with the feet at `plane` and resets the gait clock. */
-static void rest(const hxFootPathsModel *model, const hxPlane plane[HX_LEGS], hxFootPaths *paths,
-                 hxPlannedFeet *feet) {
+HX_SELDOM static void rest(const hxFootPathsModel *model, const hxPlane plane[HX_LEGS],
+                           hxFootPaths *paths, hxPlannedFeet *feet) {
   const double narrowing = paths->narrowing;
   hxPlane place[HX_LEGS];
   memcpy(place, plane, sizeof place); /* plane may point into feet */
@@ -201,6 +234,19 @@ static int come_home(const hxFootPathsModel *model, const hxFootPaths *old,
     any_lifted |= paths->lifted[leg];
   }
   return all_home && !any_swinging && !any_lifted;
+}
+
+/* Lets the legs skip their next steps that have not begun to give up their loads (C55). kept: legs
+ * that were to skip them already. */
+HX_SELDOM static void keep_down(const hxFootPathsModel *model, const int kept[HX_LEGS],
+                                hxFootPaths *paths) {
+  const double unloads = model->duty - 0.5 * model->handover;
+  for (int leg = 0; leg < HX_LEGS; ++leg) {
+    const double phase = phase_after(model, leg, paths->before);
+    const int leaving = phase >= unloads && phase < model->duty && !kept[leg];
+    paths->stays[leg] = !paths->swinging[leg] && !leaving;
+    paths->lifted[leg] &= !paths->stays[leg];
+  }
 }
 
 /* Returns the part tau of its swing that a leg at this phase has completed. */
@@ -275,7 +321,9 @@ void hx_foot_paths_plan(const hxFootPathsModel *model, const hxPlannedFeet *now,
   paths->held = 0;
   memset(paths->awaited, 0, sizeof paths->awaited);
   const int any = lift_off(model, &old, paths);
-  if (!going && come_home(model, &old, now, any, paths, place)) {
+  if (old.ending)
+    keep_down(model, old.stays, paths);
+  else if (!going && come_home(model, &old, now, any, paths, place)) {
     rest(model, place, paths, first);
     return;
   }
@@ -285,6 +333,56 @@ void hx_foot_paths_plan(const hxFootPathsModel *model, const hxPlannedFeet *now,
   }
   paths->walking = 1;
   set_out(model, paths, now, twist, first);
+}
+
+int hx_foot_paths_ended(const hxFootPaths *paths) {
+  int ended = paths->ending && !paths->held;
+  for (int leg = 0; leg < HX_LEGS; ++leg) ended &= paths->stays[leg];
+  return ended;
+}
+
+/* Returns how far the farthest foot will be from its stance position at its lift-off [m] (C55).
+ * begin: phases at the begin of the walk [cycles]. */
+HX_SELDOM static double farthest(const hxFootPathsModel *model, const hxFootPaths *paths,
+                                 const hxPlannedFeet *feet, const double begin[HX_LEGS]) {
+  const hxPlane v = feet->twist.velocity;
+  const double w = feet->twist.yaw_rate;
+  double largest = 0.0;
+  for (int leg = 0; leg < HX_LEGS; ++leg) {
+    const hxPlane p = feet->plane[leg], motion = hx_plane(v.x - w * p.y, v.y + w * p.x);
+    const double left = model->duty - begin[leg] + clock_epsilon,
+                 time = (left - floor(left)) * model->gait_period;
+    const hxPlane there = hx_plane_sub(p, hx_scaled(motion, time)),
+                  away = hx_plane_sub(there, aims(model, paths, leg));
+    largest = fmax(largest, sqrt(hx_square(away)));
+  }
+  return largest;
+}
+
+HX_SELDOM void hx_foot_paths_join(hxFootPathsModel *model, hxFootPaths *paths,
+                                  hxPlannedFeet *feet) {
+  const double unloads = model->duty - 0.5 * model->handover;
+  const double *offset = model->gait_offset;
+  double begin[HX_LEGS], least = INFINITY;
+  if (!paths->walking) {
+    rest(model, feet->plane, paths, feet);
+    return;
+  }
+  for (int first = 0; first < HX_LEGS; ++first) {
+    for (int leg = 0; leg < HX_LEGS; ++leg) begin[leg] = unloads + (offset[leg] - offset[first]);
+    const double far = farthest(model, paths, feet, begin);
+    if (far >= least - same_distance) continue;
+    least = far;
+    start_at(model, begin);
+  }
+  const double narrowing = paths->narrowing;
+  memset(paths, 0, sizeof *paths);
+  paths->walking = 1;
+  paths->narrowing = narrowing;
+  for (int leg = 0; leg < HX_LEGS; ++leg) {
+    paths->standing[leg] = phase_after(model, leg, 0) < model->duty;
+    paths->stayed[leg] = model->late[leg];
+  }
 }
 
 void hx_foot_paths_landing(const hxFootPathsModel *model, const hxFootPaths *paths, int64_t number,

@@ -31,6 +31,11 @@ int hx_command_ramp_settled(const hxCommandRampModel *model, const hxCommandRamp
 int hx_command_ramp_aim(const hxCommandRampModel *model, const double target[HX_COMMANDS],
                         hxCommandRamp *ramp);
 
+/* Continues the change of another ramp, from its present value and rate, in the model's own time.
+ */
+void hx_command_ramp_carry(const hxCommandRampModel *model, const hxCommandRampModel *before,
+                           hxCommandRamp *ramp);
+
 /* Computes the command a number of periods ahead, and its rate per second. */
 void hx_command_ramp_ahead(const hxCommandRampModel *model, const hxCommandRamp *ramp,
                            int64_t steps, double value[HX_COMMANDS], double rate[HX_COMMANDS]);
@@ -40,8 +45,11 @@ int hx_command_ramp_moves(const hxCommandRamp *ramp);
 
 typedef struct hxFootPathsModel {
   double period, gait_period, duty, step_height, touchdown_speed;
+  double gait_offset[HX_LEGS]; /* cycles; phases at clock 0 */
   double offset[HX_LEGS]; /* cycles; phases at the start of the walk */
-  int late[HX_LEGS]; /* the walk begins during the leg's swing */
+  /* the walk begins during the leg's swing, or while it takes up its load */
+  int late[HX_LEGS];
+  double handover; /* cycles in which a leg takes up or gives up its load (C18) */
   double haste; /* 1, by which a swing begins faster and ends slower (C54) */
   double swing_time; /* s */
   double landing_lead; /* s, from lift-off to the middle of the next stance */
@@ -91,6 +99,7 @@ typedef struct hxFootPaths {
   int met[HX_LEGS]; /* the foot has met the ground on its way down, and stays where it is */
   int held; /* the gait clock stands still until feet at the ends of their swings carry load */
   int awaited[HX_LEGS]; /* the gait clock waits for this foot */
+  int ending; /* another gait follows: legs finish their steps and begin no other */
   double narrowing; /* 1, part of the way to the narrow stance that the steps aim at */
 } hxFootPaths;
 
@@ -105,6 +114,14 @@ void hx_foot_paths_reset(const hxFootPathsModel *model, hxFootPaths *paths, hxPl
  * otherwise the feet step to their stance positions and the gait clock stops. */
 void hx_foot_paths_plan(const hxFootPathsModel *model, const hxPlannedFeet *now, int64_t number,
                         int going, hxTwist twist, hxFootPaths *paths, hxPlannedFeet *first);
+
+/* Returns whether all legs stand and begin no other step, because another gait follows. */
+int hx_foot_paths_ended(const hxFootPaths *paths);
+
+/* Begins the walk anew with feet that stand under a moving body (C55): sets the phases of the legs
+ * in the model so that one leg begins to give up its load, the first of those with which the
+ * farthest foot goes least far. */
+void hx_foot_paths_join(hxFootPathsModel *model, hxFootPaths *paths, hxPlannedFeet *feet);
 
 /* Finds the legs whose swing ends at the present step, or ended at the step at which the gait clock
  * was stopped. number: periods since the section began. */

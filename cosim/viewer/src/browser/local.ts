@@ -16,6 +16,8 @@ export interface StaticSetup extends Setup {
   readonly walks: Readonly<
     Record<string, { readonly gait: readonly number[]; readonly limits: Limits }>
   >;
+  /** Part of the speeds that both gaits allow, for a change between them. */
+  readonly share: number;
 }
 
 interface Drive {
@@ -33,6 +35,7 @@ export class LocalLoop implements Connection {
   readonly state: State = "open";
   private readonly listeners: { [K in Kind]?: ((message: Received[K]) => void)[] } = {};
   private settings: Settings;
+  private limits: Limits;
   private wanted: Settings | null = null;
   private drive: Drive = { forward: 0, left: 0, turn: 0, height: 0, speed: 1 };
   private push: readonly number[] = [0, 0, 0];
@@ -51,6 +54,7 @@ export class LocalLoop implements Connection {
     private readonly setup: StaticSetup,
   ) {
     this.settings = setup.first;
+    this.limits = setup.walks[setup.first.gait].limits;
     setTimeout(() => this.begin());
   }
 
@@ -117,11 +121,7 @@ export class LocalLoop implements Connection {
     const [w, x, y, z] = state.quaternion;
     const own = (v: readonly number[]) => turned([w, -x, -y, -z], v);
     const [forward, left] = own(state.velocity);
-    const { wanted } = this;
-    if (wanted && state.changing[0] === 0) {
-      [this.settings, this.wanted] = [wanted, null];
-      this.tellStatus();
-    }
+    this.followChange(state.changing[0]);
     const frame: Frame = {
       ...state,
       time: state.time[0],
@@ -148,6 +148,30 @@ export class LocalLoop implements Connection {
     this.tell("frame", frame);
   }
 
+  /** Notes which settings and limits hold; changing: as in hxFrame. */
+  private followChange(changing: number): void {
+    if (changing === 1) return;
+    const { limits } = this.setup.walks[(this.wanted ?? this.settings).gait];
+    if (!this.wanted && (changing === 2 || this.limits === limits)) return;
+    if (this.wanted) [this.settings, this.wanted] = [this.wanted, null];
+    if (changing === 0) this.setLimits(limits);
+    this.tellStatus();
+  }
+
+  private setLimits(limits: Limits): void {
+    this.limits = limits;
+    this.command();
+  }
+
+  /** Returns the speeds for a change from one gait to another (cosim/live/gait_change.py). */
+  private slowed(gait: string, next: string): Limits {
+    const [a, b] = [gait, next].map((name) => this.setup.walks[name].limits);
+    const { share } = this.setup;
+    const least = (key: "vx" | "vy" | "yaw_rate") =>
+      Math.min(share * Math.min(a[key], b[key]), this.limits[key]);
+    return { ...this.limits, vx: least("vx"), vy: least("vy"), yaw_rate: least("yaw_rate") };
+  }
+
   /** Simulated time over wall time of the last second. */
   private factor(): number {
     const [[then, before], [now, after]] = [this.paces[0], this.paces[this.paces.length - 1]];
@@ -157,7 +181,7 @@ export class LocalLoop implements Connection {
   /** Returns forward, left [m/s], turn [rad/s], height [m], which share the reach of the legs. */
   private asked(): number[] {
     const { forward, left, turn, height, speed } = this.drive;
-    const { limits } = this.setup.walks[this.settings.gait];
+    const { limits } = this;
     const shares = [forward, left, turn].map((share) => share * speed);
     const sum = shares.reduce((total, share) => total + Math.abs(share), 0);
     const room = Math.min((1 - Math.abs(height)) / Math.max(sum, 1e-9), 1);
@@ -185,8 +209,10 @@ export class LocalLoop implements Connection {
       this.settings = { ...this.settings, friction: value as number };
       if (this.wanted) this.wanted = next;
     } else if (key === "control" || key === "gait") {
+      const before = (this.wanted ?? this.settings).gait;
       this.wanted = next;
       this.walker.change(this.walkOf(next));
+      if (next.control === this.settings.control) this.setLimits(this.slowed(before, next.gait));
     }
     this.tellStatus();
   }
@@ -206,7 +232,7 @@ export class LocalLoop implements Connection {
     this.wanted = null;
     this.walker.start(this.walkOf(this.settings), this.settings.friction);
     this.setPush([0, 0, 0]);
-    this.command();
+    this.setLimits(this.setup.walks[this.settings.gait].limits);
     [this.fault, this.paused, this.owed] = ["", false, 0];
     this.placed += 1;
     this.paces = [[performance.now(), this.steps]];
@@ -222,7 +248,7 @@ export class LocalLoop implements Connection {
     const status: Status = {
       settings: this.settings,
       wanted: this.wanted,
-      limits: this.setup.walks[this.settings.gait].limits,
+      limits: this.limits,
       fault: this.fault,
       stopped: this.fault !== "",
       paused: this.paused,

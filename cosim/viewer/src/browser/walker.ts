@@ -67,7 +67,7 @@ export class Walker {
     this.check(this.exports.hx_walker_start(friction));
   }
 
-  /** Changes control and gait as soon as the robot stands still. */
+  /** Changes control and gait: another control at a stand, another gait while the robot walks. */
   change(walk: Walk): void {
     this.want(walk);
     this.exports.hx_walker_change();
