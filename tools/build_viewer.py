@@ -1,5 +1,5 @@
-"""Builds the viewers of reports, of live robots and of robots without a server, a JavaScript file
-each, from cosim/viewer.
+"""Builds the viewers of reports and of live robots (by a server or in the page), a file each, from
+cosim/viewer.
 
 usage: python3 tools/build_viewer.py [OUTPUT]     builds; copies bundles and licences to OUTPUT
        python3 tools/build_viewer.py --check      runs TypeScript's and Biome's checks
@@ -28,7 +28,6 @@ BUNDLE = ROOT / "build" / "viewer" / "viewer.js"  # of reports
 ENTRIES = {  # by bundle
     "viewer.js": "src/main.ts",
     "live.js": "src/live/main.ts",
-    "browser.js": "src/browser/main.ts",
 }
 METAFILE = BUNDLE.with_name("metafile.json")  # esbuild's list of bundled files
 LICENCES = BUNDLE.with_name("LICENSES.txt")

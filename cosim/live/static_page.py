@@ -15,7 +15,7 @@ from hexapod_cosim.cosim.common.files import write_text
 from hexapod_cosim.cosim.interface.interface import enumerations_of, load_interface
 from hexapod_cosim.cosim.live.gait_change import SHARE
 from hexapod_cosim.cosim.live.module import walker_module
-from hexapod_cosim.cosim.live.page import describe, fill_page
+from hexapod_cosim.cosim.live.page import BUNDLE, describe, fill_page
 from hexapod_cosim.cosim.live.settings import FLAT, Choices, control_texts, find_limits
 from hexapod_cosim.cosim.report.geometry import describe_ground, describe_shape
 from hexapod_cosim.cosim.results.walk import robot_weight
@@ -23,7 +23,6 @@ from hexapod_cosim.cosim.scenario.records import CONTROLS
 from hexapod_cosim.cosim.scenario.scenario import load_scenario
 from hexapod_cosim.models import Robot, load_robot
 
-BUNDLE = "browser.js"
 SCENARIO = "walk_flat"
 
 

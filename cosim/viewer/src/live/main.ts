@@ -1,6 +1,25 @@
-import { byId } from "../dom";
+import { LocalLoop, type StaticSetup } from "../browser/local";
+import { Walker } from "../browser/walker";
+import { byId, element } from "../dom";
 import { Link } from "./link";
 import type { Setup } from "./messages";
 import { start } from "./page";
 
-start(JSON.parse(byId("setup")!.textContent!) as Setup, new Link());
+/** Starts the robot of a page that holds plant and controller, or says why it cannot walk here. */
+async function walkHere(setup: StaticSetup, code: string): Promise<void> {
+  try {
+    const walker = await Walker.load(code);
+    start(setup, new LocalLoop(walker, setup));
+  } catch (error) {
+    const reason = error instanceof Error ? error.message : String(error);
+    byId("stage")?.append(element("p", "refusal", `This browser cannot run the robot: ${reason}`));
+  }
+}
+
+const setup: unknown = JSON.parse(byId("setup")!.textContent!);
+const module = byId("module"); // absent from the page of a server
+if (module) {
+  void walkHere(setup as StaticSetup, module.textContent!.trim());
+} else {
+  start(setup as Setup, new Link());
+}
