@@ -24,8 +24,13 @@ from hexapod_cosim.models.schema import require
 from hexapod_cosim.models.servos.presets import measured_servo, servo_table
 
 ROD = Rod()
+SMALL = Rod(mass=0.04, rod=0.02, length=0.1)  # for servos of 0.2 to 0.7 N m
 TIMES = np.arange(0.0, 1.51, 0.05)
-SERVOS = ["mx64_m1", "mx64_m2", "mx64_m3", "mx64_m5", "mx64_m6", "mx106_m6", "sts3215_m1"]
+SERVOS = {
+    **dict.fromkeys(("mx64_m1", "mx64_m2", "mx64_m3", "mx64_m4", "mx64_m5", "mx64_m6"), ROD),
+    **dict.fromkeys(("mx106_m4", "mx106_m6", "sts3215_m1"), ROD),
+    **dict.fromkeys(("xl320_m4", "xl320_m6", "xl330_m1", "xl330_m4"), SMALL),
+}
 # rad  the plant's walls give way by 1e-7 of the rod's motion, and its error control allows 1e-9
 AGREES = 1e-6
 EULER = 1e-4  # rad  of the published scheme, of order 1, with its step of 10 us
@@ -36,16 +41,16 @@ def target(t: float) -> float:
     return 0.8 if t < 0.5 else (-0.4 if t < 1.0 else 0.1)
 
 
-def bench(name: str, **settings: Any) -> Robot:
-    """Returns a robot on a wall whose tibias are rods turned by a measured servo."""
+def bench(name: str, rod: Rod, **settings: Any) -> Robot:
+    """Returns a robot on a wall whose tibias are a rod each, turned by a measured servo."""
     robot = walled(coulomb_friction=0.0)
     servo = Servo(**require(Servo, dict(servo_table({"model": name}, "")), ""))
     robot = replace(robot, servo=replace(servo, **settings), gravity=(0.0, 0.0, -GRAVITY))
     wall = HEAVY | {"inertia": (1e9, 1e9, 1e9, 0.0, 0.0, 0.0)}
     robot = with_links(with_links(robot, 0, **wall), 1, **wall)
-    mass = ROD.mass + ROD.rod
-    middle = (ROD.mass + 0.5 * ROD.rod) * ROD.length / mass
-    about = ROD.inertia - mass * middle**2
+    mass = rod.mass + rod.rod
+    middle = (rod.mass + 0.5 * rod.rod) * rod.length / mass
+    about = rod.inertia - mass * middle**2
     inertia = (1e-9, about, about, 0.0, 0.0, 0.0)
     return with_links(robot, 2, mass=mass, com=(middle, 0.0, 0.0), inertia=inertia)
 
@@ -65,9 +70,10 @@ def swung(core: ct.CDLL, robot: Robot) -> Array:
 
 @pytest.mark.parametrize("name", SERVOS)
 def test_the_plant_follows_the_published_equations(core: ct.CDLL, name: str) -> None:
-    robot, measured = bench(name, friction_speed=0.02), measured_servo(name)
+    rod, measured = SERVOS[name], measured_servo(name)
+    robot = bench(name, rod, friction_speed=0.02)
     gain = measured.about.duty_gain
-    theirs = smooth_swing(measured.fields, gain, ROD, target, TIMES, 0.02)
+    theirs = smooth_swing(measured.fields, gain, rod, target, TIMES, 0.02)
     ours = swung(core, robot)
     assert np.ptp(theirs[0]) > 0.8
     assert ours == pytest.approx(theirs[0], abs=AGREES)
