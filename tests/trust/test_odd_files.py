@@ -194,6 +194,6 @@ def test_an_error_of_the_system_is_one_paragraph(
     def full(*_: object, **__: object) -> None:
         raise OSError(28, "No space left on device", "somewhere")
 
-    monkeypatch.setattr("hexapod_cosim.cosim.cli.fmu_commands.find_problems", full)
+    monkeypatch.setattr("hexapod_cosim.cosim.validate.validation.find_problems", full)
     text = refused("validate", "x.fmu")
     assert "somewhere: the system refused an operation: got 'No space left on device'" in text

@@ -85,7 +85,7 @@ HX_RARE void row_yield(const hxContactState *state, int row, double h, const hxC
     if (is_in_soil(state, row, i))
       deepest[i] = hx_deepest(from->delta[i], h * from->ddelta[i], to->delta[i], h * to->ddelta[i]);
   if (row != HX_TORSO) hx_fill_slots(deepest);
-  for (int slot = 0; slot < HX_SLOTS; slot += HX_LANES) {
+  for (int slot = 0; slot < hx_slots_of(row); slot += HX_LANES) {
     const hxMask in = hx_in_soil(state, row, slot);
     const hxSoils soil = hx_soils_under(state, row, slot);
     const hxReal before = hx_load(&state->plastic[hx_soil_row(row)][slot]),
