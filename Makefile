@@ -146,7 +146,7 @@ fuzz: setup
 	$(BIN)/python -m tools.fuzz $(FUZZ_SECONDS)
 
 fuzz-short: setup
-	$(BIN)/python -m tools.fuzz 60
+	$(BIN)/python -m tools.fuzz --seed 1 60
 
 fuzz-afl: setup
 	$(BIN)/python -m tools.fuzz --afl $(FUZZ_SECONDS)

@@ -54,8 +54,9 @@ typedef struct hxContinuous {
   size_t state, rate; /* offsets in struct hxVariables of hx_state_count doubles each */
   size_t indicators;  /* number of event indicators; events are where one changes its sign */
 
-  /* Returns whether the states are the component's whole state, as model exchange needs. */
-  hxStatus (*check)(hxComponent *component);
+  /* Returns whether, with the parameters in the variables, the states are the component's whole
+   * state, as model exchange and derivatives need. */
+  hxStatus (*check)(hxComponent *component, const struct hxVariables *variables);
 
   /* Copies the states to the variables; sets the component to the variables' states at time t. */
   void (*get)(const hxComponent *component, struct hxVariables *variables);

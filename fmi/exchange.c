@@ -26,10 +26,11 @@ static hxStatus check_count(hxInstance *instance, const char *what, size_t got, 
 /* sets the component to the states in the variables, at time t [s] */
 static hxStatus set_component(hxInstance *instance, double t) {
   const hxStatus status = hx_continuous->set(instance->component, &instance->state.variables, t);
-  if (status != HX_OK)
+  if (status == HX_OK)
+    hx_mark_stale(instance);
+  else
     hx_log(instance, HX_LOG_DISCARD, "continuous states: %s; nothing was set, try a smaller step",
            hx_component_message(instance->component));
-  hx_mark_stale(instance);
   return status;
 }
 
@@ -174,21 +175,45 @@ static hxStatus need_states(hxInstance *instance, const char *what) {
   return HX_INVALID_ARGUMENT;
 }
 
-/* All references are checked before parameters that were set initialize the component. */
+/* Checks that parameters which were set and are not in force yet allow derivatives. */
+static hxStatus check_parameters(hxInstance *instance) {
+  const hxStatus status =
+      instance->state.model_stale
+          ? hx_continuous->check(instance->component, &instance->state.variables)
+          : HX_OK;
+  if (status != HX_OK)
+    hx_log(instance, HX_LOG_ERROR, "%s; nothing was done",
+           hx_component_message(instance->component));
+  return status;
+}
+
+/* Sums the changes of the knowns; refuses unknown ones and sums that are not finite. */
+static hxStatus sum_changes(hxInstance *instance, const unsigned known[], size_t n,
+                            const double change[], struct hxVariables *direction) {
+  memset(direction, 0, sizeof *direction);
+  for (size_t i = 0; i < n; i++) {
+    double *place = known_place(instance, known[i], direction);
+    if (!place) return HX_INVALID_ARGUMENT;
+    *place += change[i];
+    if (isfinite(*place)) continue;
+    hx_log(instance, HX_LOG_ERROR,
+           "derivatives: got a direction that is not finite, expected finite numbers; nothing was "
+           "done");
+    return HX_INVALID_ARGUMENT;
+  }
+  return HX_OK;
+}
+
+/* All arguments are checked before parameters that were set initialize the component. */
 hxStatus hx_instance_directional(hxInstance *instance, const unsigned unknown[], size_t n_unknown,
                                  const unsigned known[], size_t n_known, const double change[],
                                  double result[]) {
   struct hxVariables direction;
   hxStatus status = need_states(instance, "directional derivative");
   if (status == HX_OK) status = check_unknowns(instance, unknown, n_unknown);
-  if (status != HX_OK) return status;
-  memset(&direction, 0, sizeof direction);
-  for (size_t i = 0; i < n_known; i++) {
-    double *place = known_place(instance, known[i], &direction);
-    if (!place) return HX_INVALID_ARGUMENT;
-    *place += change[i];
-  }
-  status = hx_instance_refresh(instance, 0, 0);
+  if (status == HX_OK) status = sum_changes(instance, known, n_known, change, &direction);
+  if (status == HX_OK) status = check_parameters(instance);
+  if (status == HX_OK) status = hx_instance_refresh(instance, 0, 0);
   return status == HX_OK ? differentiate(instance, &direction, 0, unknown, n_unknown, result)
                          : status;
 }
@@ -199,6 +224,7 @@ hxStatus hx_instance_get_output_rates(hxInstance *instance, const unsigned refer
   struct hxVariables flow;
   hxStatus status = need_states(instance, "derivatives of outputs");
   if (status == HX_OK) status = check_unknowns(instance, reference, n);
+  if (status == HX_OK) status = check_parameters(instance);
   if (status == HX_OK) status = hx_instance_refresh(instance, 0, 1);
   if (status != HX_OK) return status;
   memset(&flow, 0, sizeof flow);

@@ -300,18 +300,20 @@ int hx_instance_check_tolerance(hxInstance *instance, const char *call, int defi
 }
 
 hxStatus hx_instance_initialize(hxInstance *instance) {
-  hxStatus status = hx_component_reset(instance->component, &instance->state.variables,
-                                       instance->state.start_time);
-  if (status == HX_OK && hx_continuous && instance->state.interface == HX_MODEL_EXCHANGE)
-    status = hx_continuous->check(instance->component);
+  hxInstanceState *state = &instance->state;
+  hxStatus status = HX_OK;
+  if (hx_continuous && state->interface == HX_MODEL_EXCHANGE)
+    status = hx_continuous->check(instance->component, &state->variables);
+  if (status == HX_OK)
+    status = hx_component_reset(instance->component, &state->variables, state->start_time);
   if (status != HX_OK) {
     hx_log(instance, HX_LOG_ERROR,
            "parameters: %s; nothing was initialised, correct them and try again",
            hx_component_message(instance->component));
     return status;
   }
-  instance->state.model_stale = 0;
-  if (hx_continuous) hx_continuous->get(instance->component, &instance->state.variables);
+  state->model_stale = 0;
+  if (hx_continuous) hx_continuous->get(instance->component, &state->variables);
   hx_mark_stale(instance);
   return HX_OK;
 }

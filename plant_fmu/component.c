@@ -198,8 +198,8 @@ hxStatus hx_component_set_state(hxComponent *component, const void *bytes) {
 
 /* ---- model exchange ---- */
 
-static hxStatus check_states(hxComponent *component) {
-  return hx_plant_check_coordinates(plant_of(component));
+static hxStatus check_states(hxComponent *component, const struct hxVariables *variables) {
+  return hx_definition_check_coordinates(&variables->definition, component->message);
 }
 
 static void get_state(const hxComponent *component, struct hxVariables *variables) {

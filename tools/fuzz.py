@@ -1,7 +1,7 @@
 """Fuzzes the C code by libFuzzer or AFL++ and the Python readers by Hypothesis; prints and writes
 figures.
 
-usage: python -m tools.fuzz [--afl] SECONDS [TARGET ...]
+usage: python -m tools.fuzz [--afl | --seed N] SECONDS [TARGET ...]
        python -m tools.fuzz [--afl] ledger
 
 Each target of tests/fuzz gets an equal share of the time; the readers (tests/fuzz/test_readers.py),
@@ -9,8 +9,9 @@ which are the target "readers", get one share too. Inputs that reach new code ar
 build/fuzz/corpus, inputs that violate a rule are written to build/fuzz/findings. A line of figures
 is added to build/fuzz/ledger.jsonl after each target, so that the times of several runs add up;
 targets with the shortest time until now come first. `ledger` prints the sums as a table. With --afl
-the C targets alone are run, by AFL++, with all files in build/fuzz-afl. The exit code is 1 after a
-finding.
+the C targets alone are run, by AFL++, with all files in build/fuzz-afl. With --seed libFuzzer draws
+its mutations from that seed (a positive number), so that runs from an empty corpus begin with the
+same inputs. The exit code is 1 after a finding.
 """
 
 from __future__ import annotations
@@ -99,8 +100,11 @@ def build(folder: Path, targets: Sequence[str]) -> None:
             raise SystemExit(f"fuzz: {' '.join(command)} failed\n{done.stdout}{done.stderr}")
 
 
-def fuzz(target: str, seconds: float) -> Figures:
-    """Runs one libFuzzer target; prints what it says when it found something."""
+def fuzz(target: str, seconds: float, seed: int = 0) -> Figures:
+    """Runs one libFuzzer target; prints what it says when it found something.
+
+    Mutations are drawn from the seed; 0 stands for one that libFuzzer chooses.
+    """
     corpus, findings = BUILD / "corpus" / target, BUILD / "findings" / target
     for folder in (corpus, findings):
         folder.mkdir(parents=True, exist_ok=True)
@@ -109,6 +113,7 @@ def fuzz(target: str, seconds: float) -> Figures:
         "max_len": LONGEST_INPUT,
         "timeout": LONGEST_CALL,
         "print_final_stats": 1,
+        "seed": seed,
         "artifact_prefix": f"{findings}/",
     }
     begin = time.monotonic()
@@ -239,7 +244,10 @@ def table(place: Path) -> str:
 def main(arguments: Sequence[str]) -> int:
     """Runs the targets and returns the exit code."""
     by_afl = "--afl" in arguments
+    seed = 0
     arguments = [word for word in arguments if word != "--afl"]
+    if arguments[:1] == ["--seed"] and len(arguments) > 1 and arguments[1].isdigit():
+        seed, arguments = int(arguments[1]), arguments[2:]
     place = AFL_BUILD if by_afl else BUILD
     known = [*sorted(folder.name for folder in SEEDS.iterdir()), *([] if by_afl else [READERS])]
     if arguments == ["ledger"]:
@@ -247,8 +255,8 @@ def main(arguments: Sequence[str]) -> int:
         return 0
     if not arguments or not arguments[0].isdigit() or set(arguments[1:]) - set(known):
         print(
-            f"usage: python -m tools.fuzz [--afl] SECONDS [TARGET ...] | ledger; targets: "
-            f"{', '.join(known)}"
+            "usage: python -m tools.fuzz [--afl | --seed N] SECONDS [TARGET ...] | ledger; "
+            f"targets: {', '.join(known)}"
         )
         return 2
     chosen = sorted(arguments[1:] or known, key=partial(seconds_of, place))
@@ -257,7 +265,8 @@ def main(arguments: Sequence[str]) -> int:
         build(place, [target for target in chosen if target != READERS])
     findings = 0
     for target in chosen:
-        run = read if target == READERS else partial(fuzz_by_afl if by_afl else fuzz, target)
+        by_clang = partial(fuzz_by_afl, target) if by_afl else partial(fuzz, target, seed=seed)
+        run = read if target == READERS else by_clang
         one = run(share)
         note(place, one)
         findings += one.found

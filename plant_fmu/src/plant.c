@@ -493,14 +493,6 @@ static void switch_walls(hxPlant *plant) {
   hx_kernel()->switch_contacts(model, &depths, &plant->footprints, &plant->state);
 }
 
-hxStatus hx_plant_check_coordinates(hxPlant *plant) {
-  if (!plant->model.elastic) return HX_OK;
-  return fail(plant, HX_INVALID_ARGUMENT,
-              "servo.gear_stiffness: got an elastic gear, whose rotors are no continuous states; "
-              "expected 0 (rigid gears) in model exchange and for derivatives; set it to 0, or use "
-              "co-simulation and differences");
-}
-
 void hx_plant_completed_step(hxPlant *plant, const hxInput *input) {
   hxCommand command;
   hx_command_from_input(&command, input, plant->state.time);
@@ -573,8 +565,7 @@ hxStatus hx_plant_tangent(hxPlant *plant, const hxInput *input, const hxInput *d
   static const hxCoordinates no_change;
   const double scale =
       largest(largest(0.0, d_input, sizeof *d_input / sizeof(double)), dx, HX_COORDINATES);
-  const hxStatus status = hx_plant_check_coordinates(plant);
-  if (status != HX_OK) return status;
+  if (plant->model.elastic) return hx_refuse_elastic_gears(plant->message);
   if (!isfinite(scale))
     return fail(plant, HX_INVALID_ARGUMENT,
                 "derivatives: got a direction that is not finite, expected finite numbers");

@@ -7,6 +7,7 @@
 #include "elementary.h"
 #include "ground/soil.h"
 #include "ground/surface.h"
+#include "validation.h"
 
 static void cross(const double a[3], const double b[3], double out[3]) {
   out[0] = a[1] * b[2] - a[2] * b[1];
@@ -316,7 +317,7 @@ static void compile_rotor(hxModel *model, const hxDefinition *d) {
   const double edge = 0.1; /* 1  of half of the play: half of the way on which the teeth engage */
   model->spin = d->servo.gear_ratio != 0.0;
   if (model->spin) model->spin_inertia = d->servo.rotor_inertia / d->servo.gear_ratio;
-  if (d->servo.mode == HX_SERVO_KINEMATIC || !(d->servo.gear_stiffness > 0.0)) return;
+  if (!hx_has_elastic_gears(d)) return;
   model->elastic = d->servo.backlash > 0.0 ? 2 : 1;
   model->gear_stiffness = d->servo.gear_stiffness, model->gear_damping = d->servo.gear_damping;
   model->half_play = 0.5 * d->servo.backlash;

@@ -2,6 +2,7 @@
 
 #include <math.h>
 
+#include "hexapod/message.h"
 #include "hexapod/range_check.h"
 #include "method.h"
 
@@ -148,6 +149,23 @@ hxStatus hx_definition_check(const hxDefinition *d, char *message) {
   hx_check_ranges(&c, d, range, n);
   if (c.status == HX_OK) check_relations(&c, d);
   return c.status;
+}
+
+int hx_has_elastic_gears(const hxDefinition *d) {
+  return d->servo.mode != HX_SERVO_KINEMATIC && d->servo.gear_stiffness > 0.0;
+}
+
+hxStatus hx_refuse_elastic_gears(char *message) {
+  if (message)
+    hx_print(message, HX_MESSAGE_SIZE,
+             "servo.gear_stiffness: got an elastic gear, whose rotors are no continuous states; "
+             "expected 0 (rigid gears) in model exchange and for derivatives; set it to 0, or use "
+             "co-simulation and differences");
+  return HX_INVALID_ARGUMENT;
+}
+
+hxStatus hx_definition_check_coordinates(const hxDefinition *d, char *message) {
+  return hx_has_elastic_gears(d) ? hx_refuse_elastic_gears(message) : HX_OK;
 }
 
 hxStatus hx_input_check(const hxInput *input, char *message) {

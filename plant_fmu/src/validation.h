@@ -11,6 +11,11 @@ HX_HIDDEN_BEGIN
  * NULL. */
 hxStatus hx_input_check(const hxInput *input, char *message);
 
+int hx_has_elastic_gears(const hxDefinition *definition);
+
+/* Writes why coordinates are not the state of a robot with elastic gears; message as above. */
+hxStatus hx_refuse_elastic_gears(char *message);
+
 HX_HIDDEN_END
 
 #endif

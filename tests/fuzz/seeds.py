@@ -41,6 +41,15 @@ def walks(call: dict[str, int]) -> dict[str, bytes]:
     }
 
 
+# inputs that fuzzing found (test_findings.py)
+FOUND = {
+    "refused_states": "01021b00081f00001f01001f02001f03001e00010800648c1a010101"
+    "0900001f012400081f00001f1a010900648c1a",
+    "refused_direction": "000000000628150004ec9001000000000098d8041400ff00921b0008"
+    "1f00001f01001f021b04001c1c1c1c1c0300",
+}
+
+
 def grid(rows: int, columns: int, kind: int, table: list[float] | None = None) -> bytes:
     """Returns a grid file (plant_fmu/include/hexapod/terrain.h), with one material or none."""
     heights = [0.01 * ((3 * i) % 5) for i in range(rows * columns)]
@@ -59,7 +68,9 @@ def seeds() -> dict[str, dict[str, bytes]]:
     found = {}
     for part in PARTS:
         found[f"fuzz_fmi2_{part}"] = walks(FMI2)
-        found[f"fuzz_fmi3_{part}"] = walks(FMI3)
+        found[f"fuzz_fmi3_{part}"] = walks(FMI3) | {
+            name: bytes.fromhex(digits) for name, digits in FOUND.items()
+        }
         found[f"fuzz_start_values_{part}"] = {
             "valid": bytes([0, 16]),
             "changed_value": bytes([1, 16, 3, 0, 1, 100, 140]),

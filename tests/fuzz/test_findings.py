@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import ctypes
 import struct
+from pathlib import Path
 
 import pytest
 from fmi3_plant import ARRAYS, Plant3
-from fmi_plant import ATHENA, ERROR, OK, Plant
+from fmi_plant import ATHENA, DISCARD, ERROR, MODEL_EXCHANGE, OK, Plant
 
 HEADER, CHECKSUM_AT = 64, 16  # bytes of a saved state (fmi/state.c)
 INITIALIZATION, STEP = 2, 4
@@ -40,6 +41,38 @@ def test_a_refused_derivative_does_not_initialize(plant: Plant, call: str) -> No
     assert whole_state(plant) == before
 
 
+@pytest.mark.parametrize(
+    ("gear_stiffness", "change", "message"),
+    [(0.0, float("inf"), "not finite"), (100.0, 1.0, "an elastic gear")],
+)
+def test_a_derivative_refused_for_its_numbers_does_not_initialize(
+    plant: Plant, gear_stiffness: float, change: float, message: str
+) -> None:
+    plant.set_reals({"servo.gear_stiffness": gear_stiffness, "servo.rotor_inertia": 1e-4})
+    assert plant.call("fmi2EnterInitializationMode") == OK
+    before = whole_state(plant)
+    unknown = ctypes.c_uint(ATHENA.variable("LF.coxa.angle").reference)
+    known = ctypes.c_uint(ATHENA.variable("LF.coxa.angle_ref").reference)
+    seed, result, one = ctypes.c_double(change), ctypes.c_double(0.0), ctypes.c_size_t(1)
+    places = [ctypes.byref(number) for number in (unknown, known, seed, result)]
+    status = plant.call(
+        "fmi2GetDirectionalDerivative", places[0], one, places[1], one, places[2], places[3]
+    )
+    assert status == ERROR
+    assert message in plant.last_message
+    assert whole_state(plant) == before
+
+
+def test_model_exchange_refused_for_elastic_gears_changes_nothing(plant_library: Path) -> None:
+    with Plant(plant_library, kind=MODEL_EXCHANGE) as plant:
+        plant.set_reals({"servo.gear_stiffness": 100.0, "servo.rotor_inertia": 1e-4})
+        assert plant.call("fmi2EnterInitializationMode") == OK
+        before = whole_state(plant)
+        assert plant.call("fmi2ExitInitializationMode") == ERROR
+        assert "an elastic gear" in plant.last_message
+        assert whole_state(plant) == before
+
+
 def test_a_refused_read_of_arrays_calculates_nothing(plant3: Plant3) -> None:
     before = whole_state(plant3)
     force, integer = ARRAYS["foot.force"], ARRAYS["terrain.kind"]
@@ -49,6 +82,21 @@ def test_a_refused_read_of_arrays_calculates_nothing(plant3: Plant3) -> None:
     assert plant3.call("fmi3GetFloat64", references, sizes[0], values, sizes[1]) == ERROR
     assert "terrain.kind" in plant3.messages[-1][2]
     assert whole_state(plant3) == before
+
+
+def test_refused_continuous_states_change_nothing(plant_library: Path) -> None:
+    n = len(ATHENA.states)
+    count, x, rates = ctypes.c_size_t(n), (ctypes.c_double * n)(), (ctypes.c_double * n)()
+    with Plant(plant_library, kind=MODEL_EXCHANGE) as plant:
+        plant.initialize()
+        assert plant.call("fmi2EnterContinuousTimeMode") == OK
+        assert plant.call("fmi2GetContinuousStates", x, count) == OK
+        assert plant.call("fmi2GetDerivatives", rates, count) == OK
+        before = whole_state(plant)
+        x[0] = 1e300
+        assert plant.call("fmi2SetContinuousStates", x, count) == DISCARD
+        assert "nothing was set" in plant.last_message
+        assert whole_state(plant) == before
 
 
 def forged(data: bytes, place: int, new: bytes, core: ctypes.CDLL) -> bytes:

@@ -379,6 +379,11 @@ HX_API size_t hx_input_ranges(const hxRange **range);
  * was got and what was expected. */
 HX_API hxStatus hx_definition_check(const hxDefinition *definition, char *message);
 
+/* Returns HX_OK if hxCoordinates are the whole state of the robot. With elastic gears they are not:
+ * model exchange and derivatives are then refused with HX_INVALID_ARGUMENT and a message as above.
+ */
+HX_API hxStatus hx_definition_check_coordinates(const hxDefinition *definition, char *message);
+
 /* Allocates a plant with the default robot in its initial state; NULL when out of memory. */
 HX_API hxPlant *hx_plant_create(void);
 HX_API void hx_plant_destroy(hxPlant *plant);
@@ -430,10 +435,6 @@ HX_API hxStatus hx_plant_set_state(hxPlant *plant, const void *bytes, size_t siz
 HX_API void hx_plant_get_coordinates(const hxPlant *plant, hxCoordinates *x);
 HX_API hxStatus hx_plant_set_coordinates(hxPlant *plant, double t,
                                          const hxCoordinates *x); /* contacts stay */
-
-/* Returns HX_OK if the coordinates are the whole state. With elastic gears they are not: model
- * exchange and derivatives are then refused with HX_INVALID_ARGUMENT. */
-HX_API hxStatus hx_plant_check_coordinates(hxPlant *plant);
 
 /* Reports that the importer's solver has completed its step to the present coordinates. Peaks,
  * integrals and losses of hxOutput belong to the path between two such calls and do not change
