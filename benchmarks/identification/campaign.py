@@ -29,9 +29,11 @@ from typing import Any
 import numpy as np
 from secret_robots import GROUPS, Secret, damaged, secret_robot
 
-from hexapod_cosim.cosim.identify.identify import Identified, identify, make_experiment
-from hexapod_cosim.cosim.identify.log import HELD_OUT
-from hexapod_cosim.cosim.identify.screening import screened
+from hexapod_cosim.cosim.export.export import export_fmu
+from hexapod_cosim.cosim.identify.command_screening import WrongCommandsError
+from hexapod_cosim.cosim.identify.identify import TOLERANCE, Identified, identify, screen
+from hexapod_cosim.cosim.identify.log import Log
+from hexapod_cosim.cosim.identify.log_plant import LogPlant
 from hexapod_cosim.models import load_robot
 
 JUDGED = ("torque", "position", "attitude")  # channels of the goal: torque and pose
@@ -85,18 +87,28 @@ def held_out_errors(secret: Secret, found: Identified, predicted: np.ndarray) ->
     }
 
 
-def with_screening(one: Score, secret: Secret, simulated: np.ndarray, seed: int) -> Score:
-    """Returns the score with what is found of damaged columns.
-
-    simulated: what the robot file predicts (rows, columns).
-    """
-    named, wrong = 0, set(one.good_named)
+def with_screening(one: Score, secret: Secret, seed: int) -> Score:
+    """Returns the score with what `identify` says of damaged columns before it fits."""
+    robot, named, wrong = load_robot("athena"), 0, set(one.good_named)
     logs = damaged(secret.log, seed)
-    for column, log in logs.values():
-        bad = {each.name for each in screened(make_experiment(log, 0, HELD_OUT), simulated)}
-        named += column in bad
-        wrong |= bad - {column}
+    with (
+        TemporaryDirectory(prefix="hexapod-screen-") as folder,
+        LogPlant(export_fmu(robot, Path(folder) / "athena.fmu"), TOLERANCE) as plant,
+    ):
+        for column, log in logs.values():
+            bad = named_columns(plant, log)
+            named += column in bad
+            wrong |= bad - {column}
     return replace(one, damaged=len(logs), named=named, good_named=tuple(sorted(wrong)))
+
+
+def named_columns(plant: LogPlant, log: Log) -> set[str]:
+    """Returns the columns that the screening of `identify` names."""
+    try:
+        _, bad = screen(plant, load_robot("athena"), [log], groups=GROUPS)
+    except WrongCommandsError as error:
+        return {each.name for each in error.columns}
+    return {each.name for _, each in bad}
 
 
 def identified(seed: int, *, seconds: float) -> Score:
@@ -106,7 +118,7 @@ def identified(seed: int, *, seconds: float) -> Score:
     begin = process_time()
     found = identify([secret.log], load_robot("athena"), groups=GROUPS)
     one = score(secret, found, process_time() - begin)
-    return one if found.bad else with_screening(one, secret, found.before[0], seed)
+    return one if found.bad else with_screening(one, secret, seed)
 
 
 def run(seeds: Sequence[int], *, workers: int, seconds: float) -> Iterator[tuple[int, Score]]:

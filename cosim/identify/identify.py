@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hexapod_cosim.cosim.export.export import export_fmu
+from hexapod_cosim.cosim.identify.command_screening import check_commands
 from hexapod_cosim.cosim.identify.comparison import (
     Difference,
     channel_differences,
@@ -29,7 +30,6 @@ from hexapod_cosim.cosim.identify.unknowns import (
     ELASTIC,
     GROUPS,
     START,
-    Unknown,
     changed_robot,
     chosen_unknowns,
 )
@@ -42,8 +42,6 @@ TOLD = 0.5  # of the prior deviation: a number with less is told by the logs
 QUANTILE = 1.959963985  # of a normal distribution, for 95 %
 NEAR = 0.8  # correlation of two numbers that is reported
 SETTLING = 0.1  # s    at the start of a log that is not compared: the first row has noise
-# Where in its play a gear stands at first is in no log; walking for this long decides it.
-MESHING = 0.5  # s    after the first change of a command
 LONG = 4000  # rows from which on worker processes save more time than they take to start
 TOLERANCE = {"solver.tolerance": 1e-5}  # differences of simulations need exact ones
 
@@ -162,12 +160,8 @@ def identify(
             LogPlant(path, TOLERANCE) as plant,
             simulating_workers(workers, path, robot, TOLERANCE, place) as pool,
         ):
-            experiments = [
-                make_experiment(log, k, held_out, elastic=ELASTIC(robot))
-                for k, log in enumerate(logs)
-            ]
             report("the columns of the log")
-            experiments, bad = _screened(plant, robot, experiments, rows)
+            experiments, bad = screen(plant, robot, logs, groups=groups, held_out=held_out)
             report("linear least squares")
             linear, lacking = linear_start(experiments, robot, rows)
             start = linear.z(rows, robot) if linear else None
@@ -198,10 +192,21 @@ def usual_workers(logs: Sequence[Log]) -> int:
     return processor_count() if sum(len(log.time) for log in logs) >= LONG else 1
 
 
-def make_experiment(log: Log, number: int, held_out: float, *, elastic: bool = False) -> Experiment:
+def forgetting(robot: Robot, groups: Sequence[str]) -> float:
+    """Returns how long a walk takes to forget what no log shows of its start [s].
+
+    Elastic gears stand somewhere in their play. With zeros of the angles unknown, so are the forces
+    by which standing feet push against each other. Both are so until each foot was lifted once,
+    within a period of the gait.
+    """
+    return robot.gait.period if ELASTIC(robot) or "zero" in groups else 0.0
+
+
+def make_experiment(log: Log, number: int, held_out: float, *, forget: float = 0.0) -> Experiment:
     """Returns the comparison of a log, with the readings that the FMU predicts.
 
-    elastic: whether gears are; their rows until all teeth have met are not compared.
+    forget: how long rows from the first change of a command on are not compared, and none before
+    [s]; 0: from the rest on.
 
     Raises LogError for a log without readings.
     """
@@ -215,8 +220,8 @@ def make_experiment(log: Log, number: int, held_out: float, *, elastic: bool = F
     begin = int(np.searchsorted(log.time, log.time[0] + SETTLING))
     if rest_rows(log) == 1:  # without a rest the joints need longer to forget the first row
         begin *= 3
-    if elastic:
-        moved = log.time[rest_rows(log) - 1] + MESHING
+    if forget > 0.0:
+        moved = log.time[rest_rows(log) - 1] + forget
         begin = max(begin, int(np.searchsorted(log.time, moved)))
     if not 0 < begin < end - 1:
         raise LogError(
@@ -235,10 +240,25 @@ def make_experiment(log: Log, number: int, held_out: float, *, elastic: bool = F
     )
 
 
-def _screened(
-    plant: LogPlant, robot: Robot, experiments: list[Experiment], rows: Sequence[Unknown]
+def screen(
+    plant: LogPlant,
+    robot: Robot,
+    logs: Sequence[Log],
+    *,
+    groups: Sequence[str] = GROUPS,
+    held_out: float = HELD_OUT,
 ) -> tuple[list[Experiment], list[tuple[int, BadColumn]]]:
-    """Returns the experiments without dead and wrong columns, and these."""
+    """Returns the comparisons of logs without dead and wrong columns of readings, and these.
+
+    plant: of the robot file's robot. groups, held_out: as of `identify`.
+
+    Raises WrongCommandsError for dead and wrong commands, LogError where no reading is left.
+    """
+    for log in logs:
+        check_commands(log)
+    forget = forgetting(robot, groups)
+    experiments = [make_experiment(log, k, held_out, forget=forget) for k, log in enumerate(logs)]
+    rows = chosen_unknowns(robot, logs, groups)
     problem = Problem(plant, robot, experiments, rows)
     simulated = problem.predictions(np.zeros(len(rows)))
     bad = [

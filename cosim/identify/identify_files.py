@@ -71,6 +71,7 @@ def result_table(found: Identified, proposals: Sequence[Proposal]) -> dict[str, 
         "rank": found.rank,
         "unknowns": len(found.fit.rows),
         "noise": dict(found.fit.noise),
+        "deviations_from_optimum": found.fit.decrement,
         "readings_that_count_as_one": dict(found.fit.correlated),
         "mean_square_over_noise": {
             "fitted": {key: one.value for key, one in found.fit.misfit.items()},
@@ -148,6 +149,12 @@ def warnings(found: Identified) -> list[str]:
             "The log has the angles of rotors, but the gears of the robot file are rigid: their "
             "stiffness and play are not sought. Give a first servo.gear_stiffness, of about ten "
             "times kp."
+        )
+    if found.fit.decrement > 1.0:
+        texts.append(
+            f"The search ended {found.fit.decrement:.1f} deviations before the optimum of the "
+            "linearised problem. The intervals contain this step, but are a guess: give a longer "
+            "log, or begin again from the robot file that was written."
         )
     worst = found.fit.unexplained
     if worst:

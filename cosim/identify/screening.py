@@ -1,4 +1,4 @@
-"""Finds columns of a log that are dead or wrong, so that they are named and not fitted."""
+"""Finds readings of a log that are dead or wrong, so that they are named and not fitted."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def screened(experiment: Experiment, simulated: Array) -> list[BadColumn]:
     found = []
     measured, time = experiment.measured, experiment.log.time
     follows = {
-        name: _correlation(measured[:, k], simulated[:, k])
+        name: correlation(measured[:, k], simulated[:, k])
         for k, name in enumerate(experiment.columns)
     }
     for k, name in enumerate(experiment.columns):
@@ -61,7 +61,7 @@ def _by_itself(measured: Array, simulated: Array, time: Array) -> str | None:
         return f"no number in {missing} of {len(measured)} rows"
     if np.ptp(measured[known]) == 0.0 and np.ptp(simulated) > 0.0:
         return f"dead: {measured[known][0]:g} in every row"
-    begin, end = _longest_run(measured)
+    begin, end = longest_run(measured)
     moved = float(np.ptp(simulated[begin:end]))
     if end - begin > LONGEST_STUCK * len(measured) and moved > MOVES * float(np.ptp(simulated)):
         return f"stuck at {measured[begin]:g} from {time[begin]:.3g} s to {time[end - 1]:.3g} s"
@@ -70,7 +70,7 @@ def _by_itself(measured: Array, simulated: Array, time: Array) -> str | None:
 
 def _against(experiment: Experiment, k: int, measured: Array, simulated: Array) -> str | None:
     """Returns why a column does not follow the simulation as its siblings do; None if it does."""
-    own = _correlation(measured, simulated[:, k])
+    own = correlation(measured, simulated[:, k])
     scale = float(np.nanstd(measured) / np.std(simulated[:, k]))
     if own < AGAINST:
         return f"wrong sign: its correlation with the simulation is {own:.2f}"
@@ -81,7 +81,7 @@ def _against(experiment: Experiment, k: int, measured: Array, simulated: Array) 
     name = experiment.columns[k]
     kind = name.partition(".")[2]
     others = {
-        other: _correlation(measured, simulated[:, j])
+        other: correlation(measured, simulated[:, j])
         for j, other in enumerate(experiment.columns)
         if j != k and other.rpartition(".")[2] == kind.rpartition(".")[2]
     }
@@ -116,15 +116,17 @@ def _siblings(name: str, columns: Sequence[str]) -> list[str]:
     ]
 
 
-def _correlation(a: Array, b: Array) -> float:
-    """Returns the coefficient of correlation; NaN of a constant."""
+def correlation(a: Array, b: Array) -> float:
+    """Returns the coefficient of correlation of readings and a column without gaps; NaN of a
+    constant.
+    """
     known = np.isfinite(a)
     x, y = a[known] - np.mean(a[known]) if known.any() else a, b[known] - np.mean(b[known])
     size = float(np.sqrt((x @ x) * (y @ y)))
     return float(x @ y) / size if size > 0.0 else float("nan")
 
 
-def _longest_run(values: Array) -> tuple[int, int]:
+def longest_run(values: Array) -> tuple[int, int]:
     """Returns begin and end of the longest run of equal values."""
     edges = np.flatnonzero(np.diff(values) != 0.0) + 1
     bounds = np.concatenate([[0], edges, [len(values)]])

@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 import tomlkit
 from command import Call, assert_refused
-from secret_robots import NOISE, Secret, secret_robot
+from secret_robots import NOISE, Secret, secret_robot, with_column
 
 from benchmarks.identification.campaign import GOAL_COVERED, GOAL_RATIO, summary, table_row
 from benchmarks.identification.campaign import score as score_of
@@ -28,14 +28,12 @@ from hexapod_cosim.cosim.identify.fitting.output_error import Fit, _tried, remai
 from hexapod_cosim.cosim.identify.fitting.problem import Problem, read_noise
 from hexapod_cosim.cosim.identify.fitting.workers import simulating_workers
 from hexapod_cosim.cosim.identify.identify import Identified, identify, make_experiment
-from hexapod_cosim.cosim.identify.log import Log
 from hexapod_cosim.cosim.identify.log_plant import LogPlant
 from hexapod_cosim.cosim.identify.robot_file import write_robot
 from hexapod_cosim.cosim.identify.screening import screened
 from hexapod_cosim.cosim.identify.start import initial_state
 from hexapod_cosim.cosim.identify.unknowns import ROBOT, chosen_unknowns
 from hexapod_cosim.cosim.logs.mcap_writer import write_mcap
-from hexapod_cosim.cosim.master.recorder import Recording
 from hexapod_cosim.models import load_robot
 from hexapod_cosim.models.robot import robot_path
 
@@ -241,13 +239,6 @@ def test_numbers_of_a_measured_servo_are_written_and_read_back(
     again = load_robot(tmp_path / "robot.toml").servo
     assert again == changed.servo
     assert again.torque_constant == pytest.approx(1.1 * file.servo.torque_constant, rel=1e-12)
-
-
-def with_column(log: Log, name: str, change: Callable[[np.ndarray], np.ndarray]) -> Log:
-    """Returns a log with one column changed."""
-    data, place = log.recording.data.copy(), log.recording.names.index(name)
-    data[:, place] = change(data[:, place])
-    return Log(Recording(log.recording.names, data), log.where)
 
 
 WRONG: dict[str, tuple[Callable[[np.ndarray], np.ndarray], str]] = {

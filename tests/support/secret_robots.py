@@ -152,18 +152,31 @@ DAMAGES: dict[str, Callable[[Array], Array]] = {
     ),
     "missing": lambda column: np.where(np.arange(len(column)) % 4 == 0, np.nan, column),
 }
+COMMANDED = (".coxa.angle_ref", ".femur.angle_ref", ".tibia.angle_ref")
 DAMAGED = (".coxa.angle", ".femur.angle", ".tibia.angle", ".femur.torque", ".tibia.torque",
            ".tibia.speed", ".foot.normal_force")  # fmt: skip
 
 
 def damaged(log: Log, seed: int) -> dict[str, tuple[str, Log]]:
-    """Returns, for each kind of damage, a column drawn by a seed and the log with it damaged."""
+    """Returns, for each kind of damage, a column drawn by a seed and the log with it damaged: of
+    readings, and of commands, in which no number can be missing.
+    """
     rng = np.random.default_rng([seed, 1])
-    names = [name for name in log.measured if name.endswith(DAMAGED)]
     found = {}
-    for kind, change in DAMAGES.items():
-        name = str(rng.choice(names))
-        data, place = log.recording.data.copy(), log.recording.names.index(name)
-        data[:, place] = change(data[:, place])
-        found[kind] = name, Log(Recording(log.recording.names, data), log.where)
+    for what, names, ends in (
+        ("reading", log.measured, DAMAGED),
+        ("command", tuple(log.commands), COMMANDED),
+    ):
+        own = [name for name in names if name.endswith(ends)]
+        for kind, change in DAMAGES.items():
+            if (what, kind) != ("command", "missing"):
+                name = str(rng.choice(own))
+                found[f"{what} {kind}"] = name, with_column(log, name, change)
     return found
+
+
+def with_column(log: Log, name: str, change: Callable[[Array], Array]) -> Log:
+    """Returns a log with one column changed."""
+    data, place = log.recording.data.copy(), log.recording.names.index(name)
+    data[:, place] = change(data[:, place])
+    return Log(Recording(log.recording.names, data), log.where)

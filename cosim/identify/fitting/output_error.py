@@ -2,11 +2,12 @@
 
 The numbers minimise the sum of squares of (predicted - measured) / noise over all readings, and of
 (number - number before) / prior over all numbers. The second sum keeps the robot file's value
-where the readings tell nothing. With white noise this is the most probable robot; the covariance is
-that of the linearised problem, plus the square of the step that the optimiser left. The noise of a
+where the readings tell nothing. With white noise this is the most probable robot. The noise of a
 channel is the typical size of its residuals, and residuals beyond three deviations count linearly
-(Huber's loss). Correlated residuals count as fewer readings. Residuals larger than the noise of the
-readings themselves say that the model does not explain the log: they widen all intervals.
+(Huber's loss). The covariance is that of the linearised problem with the spectra of the residuals
+(see covariance.py), plus the square of the step that the search left. Residuals larger than the
+noise of the readings themselves say that the model does not explain the log: they widen all
+intervals.
 
 A search on the first seconds of long logs finds the valley of the best numbers, all rows its
 bottom. The numbers of contacts act at touch-downs alone, and play at the meeting of teeth, where
@@ -18,15 +19,18 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
+from hexapod_cosim.cosim.identify.fitting.covariance import (
+    coloured_information,
+    readings_as_one,
+)
 from hexapod_cosim.cosim.identify.fitting.problem import (
     ALL,
+    FINE,
     FLOOR,
-    STEP,
     Misfit,
     Problem,
     read_noise,
@@ -41,9 +45,6 @@ Progress = Callable[[str], None]
 # wrong times, and a difference says nothing of the next touch-down. Torques jump when a command
 # comes, so that they are no smooth functions of the sensors' delay. Both are left out at first.
 SMOOTH = ("angle", "motor_angle", "speed", "gyroscope", "position", "attitude")
-# Simulated derivatives count up to this distance from where they were made [priors]. They are
-# differences over a step of the same length.
-NEAR = STEP
 
 
 @dataclass(frozen=True)
@@ -59,6 +60,12 @@ class Stage:
 
 SEARCH = (Stage(SMOOTH, 0.3, 1.0, 15, 1e-2), Stage(ALL, 1.0, 1.0, 25, 1e-3))
 REFINE = Stage(ALL, 1.0, 3.0, 25, 1e-4)
+# The last search ends where Gauss and Newton's next step is this long [deviations]. A relative
+# change of the sum of squares is no measure: of a log of 60 s it is some 100,000, and a number that
+# is wrong by a deviation adds 1.
+ENOUGH = 0.1
+FINISHING = 12  # steps of the last search, at most
+SHORTENED = (1.0, 0.5, 0.25, 0.1, 0.03)  # of a step, until the sum of squares falls
 COARSE = {"solver.tolerance": 1e-4}  # of the search: its errors are far below the readings' noise
 SEARCHED = 40_000  # residuals of the search, about
 SHORT = 6.0  # s    of each log on which the search is made
@@ -81,6 +88,7 @@ class Fit:
     predictions: tuple[Array, ...]  # (rows, columns) of each experiment
     misfit: Mapping[str, Misfit]  # by channel
     held_out: Mapping[str, Misfit]  # the same on held-out rows; empty without them
+    decrement: float  # length of the step that the optimiser left, in deviations
 
     @property
     def unexplained(self) -> dict[str, float]:
@@ -110,11 +118,53 @@ class Fit:
 def remaining_step(jacobian: Array, residuals: Array) -> Array:
     """Returns the step (rows,) that Gauss and Newton's method would still take, in priors.
 
-    It is 0 at an optimum. Residuals beyond three deviations count as three.
+    It is 0 at an optimum. Residuals beyond three deviations count linearly (Huber's loss).
     """
     bounded = np.clip(residuals, -REFINE.scale, REFINE.scale)
-    normal, right = jacobian.T @ jacobian, jacobian.T @ bounded
+    share = np.sqrt(REFINE.scale / np.maximum(np.abs(residuals), REFINE.scale))
+    weighted = jacobian * share[:, None]
+    normal, right = weighted.T @ weighted, jacobian.T @ bounded
     return np.asarray(-np.linalg.lstsq(normal, right, rcond=None)[0], dtype=np.float64)
+
+
+def bounded_step(problem: Problem, z: Array, jacobian: Array, residuals: Array) -> Array:
+    """Returns the remaining step (rows,) of the numbers that it does not lead out of their limits.
+
+    The others stay.
+    """
+    low, high = problem.bounds()
+    free = np.ones(len(z), dtype=np.bool_)
+    step = np.zeros(len(z))
+    for _ in z:
+        step = np.zeros(len(z))
+        step[free] = remaining_step(jacobian[:, free], residuals)
+        out = free & (((z <= low) & (step < 0.0)) | ((z >= high) & (step > 0.0)))
+        if not out.any():
+            break
+        free &= ~out
+    return step
+
+
+def _finished(problem: Problem, z: Array, report: Progress) -> Array:
+    """Returns the numbers near a start at which the remaining step is short.
+
+    The noise of a channel is the typical size of its residuals at each step.
+    """
+    low, high = problem.bounds()
+    for number in range(FINISHING):
+        report(f"all rows, step {number + 1}")
+        problem.set_noise(problem.errors(z))
+        jacobian, residuals = problem.jacobian(z, FINE), problem.residuals(z)
+        step = bounded_step(problem, z, jacobian, residuals)
+        if float(np.linalg.norm(jacobian @ step)) < ENOUGH:
+            break
+        cost = _huber(residuals)
+        tried = (np.clip(z + share * step, low, high) for share in SHORTENED)
+        better = next((own for own in tried if _huber(problem.residuals(own)) < cost), None)
+        if better is None:
+            break
+        z = better
+    return z
 
 
 def better_start(problem: Problem, start: Array | None) -> Array:
@@ -154,9 +204,8 @@ def fit(problem: Problem, *, start: Array | None = None, progress: Progress | No
     least = read_noise(fitted)
     z = _optimised(fitted, z, REFINE, least)
     fitted.use({})
-    counted = list(fitted.counted)
-    z = _optimised(fitted, z, REFINE, least, jumps=True)
-    fitted.counted = counted
+    fitted.count_all()
+    z = _finished(fitted, z, report)
     return _judged(problem, fitted, z, least)
 
 
@@ -177,7 +226,7 @@ def _optimised(
     found = least_squares(
         problem.residuals,
         z,
-        jac=partial(problem.jacobian, near=NEAR),
+        jac=problem.jacobian,
         bounds=problem.bounds(),
         loss="huber",
         f_scale=stage.scale,
@@ -229,8 +278,14 @@ def _tried(problem: Problem, z: Array) -> Array:
 def _cost(problem: Problem, z: Array) -> float:
     """Returns the sum of squares over all rows by Huber's loss."""
     counted, problem.counted = problem.counted, problem.all_known()
-    size = np.abs(problem.residuals(z))
+    residuals = problem.residuals(z)
     problem.counted = counted
+    return _huber(residuals)
+
+
+def _huber(residuals: Array) -> float:
+    """Returns half the sum of squares; residuals beyond three deviations count linearly."""
+    size = np.abs(residuals)
     near = np.minimum(size, REFINE.scale)
     return float(np.sum(near * (size - 0.5 * near)))
 
@@ -244,26 +299,26 @@ def _judged(problem: Problem, fitted: Problem, z: Array, least: Mapping[str, flo
         z: the numbers.
         least: noise of the readings themselves, by channel.
     """
-    errors = fitted.errors(z)
-    fitted.set_noise(errors)
-    correlated = fitted.correlation(errors)
-    jacobian = fitted.jacobian(z, near=NEAR)
-    covariance, singular = fitted.covariance(jacobian, correlated)
-    left = remaining_step(jacobian, fitted.residuals(z))
+    fitted.set_noise(fitted.errors(z))
+    jacobian, residuals = fitted.jacobian(z, FINE), fitted.residuals(z)
+    series = fitted.series(jacobian, np.clip(residuals, -REFINE.scale, REFINE.scale))
     misfit = fitted.misfit(z, least, "fitted")
     # errors of the model count as noise; at most the whole prior is unknown
     worst = max(1.0, *(one.value for one in misfit.values()))
-    information = np.linalg.inv(covariance) - np.eye(len(z))
+    information = coloured_information(series) / worst
+    own: Array = np.asarray(np.linalg.inv(information + np.eye(len(z))), dtype=np.float64)
     # where touch-downs make the sum of squares rough, the optimiser stops on the way
-    widened = np.linalg.inv(information / worst + np.eye(len(z))) + np.outer(left, left)
+    left = bounded_step(fitted, z, jacobian, residuals)
+    eigenvalues = np.linalg.eigvalsh(information)[::-1]
     return Fit(
         rows=problem.rows,
         before=problem.before,
         z=z,
-        covariance=np.asarray(widened, dtype=np.float64),
-        singular=singular / np.sqrt(worst),
+        covariance=np.asarray(own + np.outer(left, left), dtype=np.float64),
+        singular=np.sqrt(np.maximum(eigenvalues, 0.0)),
         noise=dict(fitted.noise),
-        correlated=correlated,
+        correlated=readings_as_one(series, own),
+        decrement=float(np.sqrt(left @ np.linalg.solve(own, left))),
         predictions=tuple(problem.predictions(z)),
         misfit=misfit,
         held_out=problem.misfit(z, least, "held_out"),

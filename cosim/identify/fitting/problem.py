@@ -20,6 +20,7 @@ from hexapod_cosim.cosim.identify.experiment import (
     readings,
     simulated,
 )
+from hexapod_cosim.cosim.identify.fitting.covariance import Series
 from hexapod_cosim.cosim.identify.fitting.workers import Workers
 from hexapod_cosim.cosim.identify.log import CHANNELS, LogError
 from hexapod_cosim.cosim.identify.log_plant import LogPlant
@@ -28,10 +29,8 @@ from hexapod_cosim.models import FmuError, Robot
 
 Array = NDArray[np.float64]
 ALL = tuple(channel.key for channel in CHANNELS)
-STEP = 0.1  # of a difference, in priors: large against the integrator's errors
 TO_DEVIATION = 1.4826  # from the median of absolute values, of a normal distribution
 MOST_RESIDUALS = 150_000  # rows are thinned evenly where there would be more
-LONGEST_CORRELATION = 50  # rows
 # A reading is left out around a jump of the simulated signal: there a shift in time by a fraction
 # of a row, of which a difference tells nothing, is a large error.
 JUMP = 1.0  # second difference of a simulated signal [deviations]
@@ -42,6 +41,22 @@ CLIPPED = 5.0  # deviations    of a residual in the test whether the model expla
 # noise has a relative deviation of about 3.8 over the root of their number.
 EXPLAINED = 1.1
 UNCERTAIN, DEVIATIONS = 3.8, 3.0
+
+
+@dataclass(frozen=True)
+class Slopes:
+    """How derivatives are made of simulations."""
+
+    step: float  # priors
+    both: bool  # whether from both sides
+    near: float  # priors: up to this distance from where they were made they count
+
+
+# A long step is what the search needs while sums of squares are rough. But its error of second
+# order hides combinations of numbers that the readings hardly tell: with it, the deviation of the
+# torso's mass came out five times too small. Short central differences have converged there.
+ROUGH = Slopes(0.1, both=False, near=0.1)
+FINE = Slopes(0.01, both=True, near=0.0)
 
 
 @dataclass(frozen=True)
@@ -84,7 +99,8 @@ class Problem:
         self._measured = [one.measured for one in self.experiments]
         self._outputs: tuple[bytes, list[Array]] | None = None
         self._simulated = np.array([needs_simulation(row, robot) for row in rows], dtype=np.bool_)
-        self._slopes: tuple[Array, list[list[Array]]] | None = None  # at which z, of which numbers
+        # at which z, how made, of which numbers
+        self._slopes: tuple[Array, Slopes, list[list[Array]]] | None = None
         self._size = 0  # of the residuals
         self.counted = self.all_known()  # which readings count (fitted rows, columns)
 
@@ -234,57 +250,58 @@ class Problem:
         self._size = len(found)
         return found
 
-    def jacobian(self, z: Array, *, near: float = 0.0) -> Array:
-        """Returns the residuals' derivatives (residuals, rows), by differences of simulations.
-
-        near: up to this distance from the last simulated differences these count [priors].
-        """
-        if self._slopes is None or np.max(np.abs(z - self._slopes[0])) > near:
-            self._slopes = z.copy(), self._differences(z)
+    def jacobian(self, z: Array, slopes: Slopes = ROUGH) -> Array:
+        """Returns the residuals' derivatives (residuals, rows), by differences of simulations."""
+        known = self._slopes
+        if known is None or known[1] != slopes or np.max(np.abs(z - known[0])) > slopes.near:
+            self._slopes = known = z.copy(), slopes, self._differences(z, slopes)
         scale = np.concatenate([
             np.where(counted[:: self._thin], 1.0 / self._weights(one), 0.0).ravel()
             for one, counted in zip(self.experiments, self.counted, strict=True)
         ])  # fmt: skip
         found = np.zeros((len(scale) + len(z), len(z)))
-        for k, slopes in enumerate(self._slopes[1]):
-            weighted = [slope * scale for slope in slopes]
+        for k, own in enumerate(known[2]):
+            weighted = [slope * scale for slope in own]
             if weighted:
                 # of the delay the smaller slope is the one within a period of the commands
                 found[: -len(z), k] = min(weighted, key=_size)
         found[len(scale) :][np.diag_indices(len(z))] = 1.0
         return found
 
-    def _differences(self, z: Array) -> list[list[Array]]:
+    def _differences(self, z: Array, slopes: Slopes) -> list[list[Array]]:
         """Returns the slopes of all predictions (predictions,) by each number: two of the delay,
         none where the plant refuses the moved numbers.
         """
         base_outputs, base = self.outputs(z), self._flat(self.predictions(z))
-        moves = [(k, step) for k in range(len(z)) for step in self._steps(k, z)]
+        moves = [(k, step) for k in range(len(z)) for step in self._steps(k, z, slopes)]
         points = []
         for k, step in moves:
             moved = z.copy()
             moved[k] += step
             points.append(moved)
-        found: list[list[Array]] = [[] for _ in z]
+        found: list[list[tuple[float, Array]]] = [[] for _ in z]  # moves and changes
         for (k, step), moved, outputs in zip(
             moves, points, self._all_outputs(points, moves, base_outputs), strict=True
         ):
             if outputs is not None:
-                slope = (self._flat(self._read(outputs, moved)) - base) / step
-                found[k].append(np.where(np.isfinite(slope), slope, 0.0))
-        return found
+                found[k].append((step, self._flat(self._read(outputs, moved)) - base))
+        return [
+            _slopes(changes, one_sided=row.key == DELAY)
+            for row, changes in zip(self.rows, found, strict=True)
+        ]
 
     def _flat(self, predictions: Sequence[Array]) -> Array:
         """Returns the predictions of all fitted rows that are not thinned out, in one array."""
         pairs = zip(self.experiments, predictions, strict=True)
         return np.concatenate([own[one.fitted][:: self._thin].ravel() for one, own in pairs])
 
-    def _steps(self, k: int, z: Array) -> list[float]:
-        """Returns the steps of the differences of a number: one, of the delay both ways."""
+    def _steps(self, k: int, z: Array, slopes: Slopes) -> list[float]:
+        """Returns the steps of the differences of a number within its limits."""
         row = self.rows[k]
         low, high = row.bounds(self.before[row.key])
-        steps = [step for step in (STEP, -STEP) if low <= z[k] + step <= high]
-        return steps if row.key == DELAY else steps[:1]
+        both = (slopes.step, -slopes.step)
+        steps = [step for step in both if low <= z[k] + step <= high]
+        return steps if slopes.both or row.key == DELAY else steps[:1]
 
     def _all_outputs(
         self, points: Sequence[Array], moves: Sequence[tuple[int, float]], base: list[Array]
@@ -313,49 +330,38 @@ class Problem:
     def _weights(self, experiment: Experiment) -> Array:
         return np.array([self.noise[key] for key in experiment.channels])
 
-    def correlation(self, errors: Sequence[Array]) -> dict[str, float]:
-        """Returns, for each channel, how many readings in a row count as one.
+    def series(self, jacobian: Array, residuals: Array) -> list[Series]:
+        """Returns residuals and derivatives of each channel of each log, without the priors."""
+        found, start = [], 0
+        for one, counted in zip(self.experiments, self.counted, strict=True):
+            own = counted[:: self._thin]
+            part = slice(start, start + own.size)
+            start += own.size
+            error = residuals[part].reshape(own.shape)
+            slopes = jacobian[part].reshape(*own.shape, -1)
+            channels = np.array(one.channels)
+            for key in dict.fromkeys(one.channels):
+                at = channels == key
+                share = float(np.mean(own[:, at]))
+                found.append(Series(key, error[:, at], slopes[:, at], share))
+        return found
 
-        That is 1 + 2 sum of the autocorrelations up to the first that is not positive, as a mean
-        over the channel's columns.
-        """
-        found: dict[str, list[float]] = {}
-        for one, error in zip(self.experiments, errors, strict=True):
-            for key, column in zip(one.channels, error[:: self._thin].T, strict=True):
-                found.setdefault(key, []).append(_correlated(column))
-        return {key: float(np.mean(parts)) for key, parts in found.items()}
 
-    def covariance(self, jacobian: Array, correlated: Mapping[str, float]) -> tuple[Array, Array]:
-        """Returns the covariance of z and the singular values of the readings' sensitivity."""
-        scales = [
-            np.tile(
-                [1.0 / np.sqrt(correlated[key]) for key in one.channels],
-                len(range(*one.fitted.indices(len(one.log.time)))[:: self._thin]),
-            )
-            for one in self.experiments
-        ]
-        weighted = jacobian[: -len(self.rows)] * np.concatenate(scales)[:, None]
-        information = weighted.T @ weighted
-        eigenvalues = np.linalg.eigvalsh(information)[::-1]
-        covariance = np.linalg.inv(information + np.eye(len(self.rows)))
-        return covariance, np.sqrt(np.maximum(eigenvalues, 0.0))
+def _slopes(changes: Sequence[tuple[float, Array]], *, one_sided: bool) -> list[Array]:
+    """Returns the slopes that changes of predictions over steps give.
+
+    one_sided: one for each step, else one for all.
+    """
+    if one_sided or len(changes) < 2:
+        found = [change / step for step, change in changes]
+    else:
+        (step, change), (other, changed) = changes
+        found = [(change - changed) / (step - other)]
+    return [np.where(np.isfinite(slope), slope, 0.0) for slope in found]
 
 
 def _size(slope: Array) -> float:
     return float(slope @ slope)
-
-
-def _correlated(column: Array) -> float:
-    """Returns how many readings of a column of residuals in a row count as one."""
-    centred = column - np.mean(column)
-    power = float(centred @ centred)
-    total = 1.0
-    for lag in range(1, min(LONGEST_CORRELATION, len(column) // 4)):
-        share = float(centred[lag:] @ centred[:-lag]) / power if power > 0.0 else 0.0
-        if share <= 0.0:
-            break
-        total += 2.0 * share
-    return total
 
 
 def read_noise(problem: Problem) -> dict[str, float]:

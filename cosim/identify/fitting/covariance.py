@@ -1,0 +1,110 @@
+"""Computes what readings tell of numbers from derivatives and from the spectra of the residuals.
+
+White residuals of variance 1 give the information A = J' J of linear least squares. Coloured ones
+change the covariance of the estimate to A^-1 M A^-1 with M = sum over frequencies f of
+S(f) j(f)* j(f), where j is the discrete Fourier transform of the derivatives and S the spectrum of
+the residuals (White, Econometrica 48, 1980; Newey and West, Econometrica 55, 1987, in the frequency
+domain). The information is then A M^-1 A. So slow residuals widen the intervals of numbers with
+slow effects, as zeros and biases, and leave those of numbers with fast ones.
+
+The spectrum of a channel is its periodogram, averaged over its columns and over neighbouring
+frequencies. The fit takes a part of the residuals away, which is the leverage of a frequency; the
+periodogram is divided by what is left.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+ORDINATES = 40  # of periodograms, at least about, whose mean is the spectrum at a frequency
+LEAST_LEFT = 0.1  # share of a frequency that the fit is taken to leave, at least
+NEGLIGIBLE = 1e-6  # information [1/prior^2]
+
+
+@dataclass(frozen=True)
+class Series:
+    """Residuals of one channel of a log at equal steps of time, and their derivatives.
+
+    Readings that do not count are 0, with their derivatives.
+    """
+
+    key: str  # of the channel
+    residuals: Array  # (rows, columns)  in deviations
+    slopes: Array  # (rows, columns, numbers)  by z
+    counted: float  # share of the readings that count
+
+
+def white_information(series: Sequence[Series]) -> Array:
+    """Returns J' J (numbers, numbers): what readings with white residuals tell, in 1/prior^2."""
+    flat = [one.slopes.reshape(-1, one.slopes.shape[-1]) for one in series]
+    return np.asarray(sum(own.T @ own for own in flat))
+
+
+def coloured_information(series: Sequence[Series]) -> Array:
+    """Returns A M^-1 A (numbers, numbers): what the readings tell with the residuals' spectra."""
+    white = white_information(series)
+    covariance: Array = np.asarray(np.linalg.inv(white + np.eye(len(white))), dtype=np.float64)
+    scores = np.zeros_like(white)
+    for one in series:
+        waves, weights = _waves(one.slopes)
+        weights = np.multiply(weights, spectrum(one, covariance))
+        scores += np.einsum("f,fci,fcj->ij", weights, waves.conj(), waves, optimize=True).real
+    values, vectors = np.linalg.eigh(scores)
+    across = vectors.T @ white
+    kept = np.maximum(values, 0.0) + NEGLIGIBLE
+    return np.asarray(across.T @ (across / kept[:, None]))
+
+
+def spectrum(series: Series, covariance: Array) -> Array:
+    """Returns the spectrum of a channel's residuals at the frequencies of `rfft`: 1 of white ones.
+
+    covariance: of the numbers, for the leverage (numbers, numbers).
+    """
+    waves, _ = _waves(series.slopes)
+    residuals, _ = _waves(series.residuals)
+    columns = residuals.shape[1]
+    power = np.sum(np.abs(residuals) ** 2, axis=1)
+    leverage = np.einsum("fci,ij,fcj->f", waves, covariance, waves.conj(), optimize=True).real
+    whole = columns * series.counted
+    left = np.maximum(whole - leverage, LEAST_LEFT * whole)
+    half = max(1, round(0.5 * (ORDINATES / columns - 1.0)))
+    return _smoothed(power, half) / np.maximum(_smoothed(left, half), NEGLIGIBLE)
+
+
+def readings_as_one(series: Sequence[Series], covariance: Array) -> dict[str, float]:
+    """Returns, by channel, how many readings in a row count as one for a slow effect.
+
+    That is the spectrum of the residuals at frequency 0 over its mean; the mean over logs.
+    """
+    found: dict[str, list[float]] = {}
+    for one in series:
+        own = spectrum(one, covariance)
+        mean = float(np.mean(own))
+        found.setdefault(one.key, []).append(float(own[0]) / mean if mean > 0.0 else 1.0)
+    return {key: float(np.mean(parts)) for key, parts in found.items()}
+
+
+def _waves(values: Array) -> tuple[NDArray[np.complex128], Array]:
+    """Returns the Fourier transform along the rows and how often each frequency counts, so that
+    the weighted sum of squares is that of the values.
+    """
+    rows = len(values)
+    waves = np.fft.rfft(values, axis=0) / np.sqrt(rows)
+    weights = np.full(len(waves), 2.0)
+    weights[0] = 1.0
+    if rows % 2 == 0:
+        weights[-1] = 1.0
+    return waves, weights
+
+
+def _smoothed(values: Array, half: int) -> Array:
+    """Returns means over 2 half + 1 neighbours; beyond its ends a spectrum is mirrored."""
+    half = min(half, len(values) - 1)
+    padded = np.pad(values, half, mode="reflect")
+    kernel = np.full(2 * half + 1, 1.0 / (2 * half + 1))
+    return np.convolve(padded, kernel, mode="valid")
