@@ -1,5 +1,5 @@
 """Drives a robot live: plant and controller in real time in a process of their own, and a server
 for pages in a browser.
 
-Imports `common` to `run` and `report`. Only `server.py` needs the packages of the extra `live`.
+Imports `common` to `run` and `report`.
 """

@@ -13,14 +13,12 @@ import socket
 from collections.abc import AsyncIterator, Callable, Mapping
 from contextlib import asynccontextmanager, suppress
 from dataclasses import dataclass
-from importlib.util import find_spec
 from multiprocessing import get_context
 from multiprocessing.connection import Connection
 from types import MappingProxyType
 from typing import Any
 
 from hexapod_cosim.controller import Gains
-from hexapod_cosim.cosim.common.installation import install_extra
 from hexapod_cosim.cosim.live.hub import Client, Hub, LoopLink
 from hexapod_cosim.cosim.live.loop import run_process
 from hexapod_cosim.cosim.live.page import render_page
@@ -30,7 +28,6 @@ from hexapod_cosim.models import HexapodError
 
 HOST = "127.0.0.1"
 NAMES = (HOST, "localhost")  # hosts that a browser may have asked for
-PACKAGES = ("starlette", "uvicorn", "websockets")  # of the extra `live`
 TOKEN_BYTES = 16
 POLICY = 1008  # WebSocket: closed because of what the page sent
 BUSY = 1013  # WebSocket: try again later
@@ -134,14 +131,14 @@ class Pages:
 def _answer(
     text: str, code: int = 200, *, kind: str = "text/plain", headers: Mapping[str, str] = NONE
 ) -> Any:
-    from starlette.responses import Response  # noqa: PLC0415  an extra
+    from starlette.responses import Response  # noqa: PLC0415  slow to import
 
     return Response(text, code, headers={**HEADERS, **headers}, media_type=kind)
 
 
 def make_app(pages: Pages, on_start: Callable[[], None]) -> Any:
     """Returns the ASGI application; it calls `on_start` in its event loop."""
-    from starlette.applications import Starlette  # noqa: PLC0415  an extra
+    from starlette.applications import Starlette  # noqa: PLC0415  slow to import
     from starlette.routing import Route, WebSocketRoute  # noqa: PLC0415
 
     @asynccontextmanager
@@ -197,7 +194,7 @@ class LiveServer:
         port: 0 for a free one.
         process: what the loop's process runs.
 
-    Raises LiveError without the extra `live` and for a port that is taken.
+    Raises LiveError for a port that is taken.
     """
 
     def __init__(
@@ -208,7 +205,6 @@ class LiveServer:
         port: int = 0,
         process: Callable[[Connection, Choices, Gains | None], None] = run_process,
     ) -> None:
-        require_extra()
         self._socket = _bound(port)
         self.address = Address(self._socket.getsockname()[1], secrets.token_urlsafe(TOKEN_BYTES))
         context = get_context("spawn")
@@ -229,7 +225,7 @@ class LiveServer:
 
         Raises LiveError when the loop ends by itself.
         """
-        import uvicorn  # noqa: PLC0415  an extra
+        import uvicorn  # noqa: PLC0415  slow to import
 
         app = make_app(Pages(self.address, self.hub, self._page), self._started)
         config = uvicorn.Config(app, **UVICORN)
@@ -288,18 +284,6 @@ class LiveServer:
                 self._process.join()
         self._connection.close()
         self._socket.close()
-
-
-def require_extra() -> None:
-    """Raises LiveError when a package of the extra `live` is missing."""
-    for name in PACKAGES:
-        if find_spec(name) is None:
-            raise LiveError(
-                "`hexapod live` needs packages that are not installed",
-                got=f"no {name}",
-                expected="the extra `live`",
-                fix=install_extra("live"),
-            )
 
 
 def _bound(port: int) -> socket.socket:

@@ -20,7 +20,6 @@ import pytest
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import connect
 
-from hexapod_cosim.cosim.live import server as live_server
 from hexapod_cosim.cosim.live.hub import BURST, MOST_CLIENTS, MOST_DROPPED, MOST_REFUSED, Hub
 from hexapod_cosim.cosim.live.pacing import MOST_LAG
 from hexapod_cosim.cosim.live.server import LiveError, LiveServer
@@ -319,12 +318,6 @@ def test_a_loop_that_dies_ends_the_server_which_says_so() -> None:
         closing(opened)
     running.end()
     assert "the loop's process has ended by itself" in str(running.error)
-
-
-def test_without_the_extra_a_message_names_it(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(live_server, "find_spec", lambda name: None)
-    with pytest.raises(LiveError, match=r"got 'no starlette'.*the extra `live`.*\[live\]"):
-        LiveServer(choices(), None)
 
 
 def test_a_port_that_is_taken_is_refused(running: Running) -> None:

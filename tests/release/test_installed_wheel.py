@@ -6,8 +6,11 @@ Runs with HEXAPOD_WHEELS=FOLDER (`make test-wheels`), because it downloads the d
 from __future__ import annotations
 
 import os
+import re
+import signal
 import subprocess
 import sys
+import urllib.request
 import zipfile
 from pathlib import Path
 
@@ -99,6 +102,27 @@ def test_the_linux_wheel_keeps_what_its_tag_promises(wheels: Path) -> None:
 def test_the_first_report_comes_out_of_the_wheel(hexapod: Path, tmp_path: Path) -> None:
     run(hexapod, tmp_path, "compare", "walk_flat", "--set", "duration=2 s", "-o", "first")
     assert (tmp_path / "first" / "report.html").stat().st_size > 100_000
+
+
+def test_the_page_of_a_live_robot_comes_out_of_the_wheel(hexapod: Path, tmp_path: Path) -> None:
+    process = subprocess.Popen(
+        [str(hexapod), "live", "walk_flat", "--no-browser"],
+        cwd=tmp_path,
+        env=bare(hexapod.parents[1]),
+        stdout=subprocess.PIPE,
+        text=True,
+    )
+    assert process.stdout is not None
+    match = re.search(r"http://\S+", process.stdout.readline())
+    try:
+        assert match is not None
+        with urllib.request.urlopen(match[0]) as answer:
+            page = answer.read().decode()
+    finally:
+        process.send_signal(signal.SIGINT)
+        process.communicate(timeout=60.0)
+    assert len(page) > 500_000
+    assert process.returncode == 0
 
 
 def test_an_fmu_for_all_platforms_needs_no_compiler(hexapod: Path, tmp_path: Path) -> None:

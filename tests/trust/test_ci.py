@@ -117,6 +117,6 @@ def test_the_lock_file_has_the_pinned_versions_and_all_that_the_package_needs() 
     table = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
     optional = table["project"]["optional-dependencies"]
     needed = [*table["project"]["dependencies"], *table["build-system"]["requires"]]
-    needed += [*optional["test"], *optional["release"], *optional["live"], *optional["docs"]]
+    needed += [*optional["test"], *optional["release"], *optional["docs"]]
     names = {normal(match[0]) for text in needed if (match := NAME.match(text))}
     assert names - packages.keys() - {"hexapod-cosim"} == set()

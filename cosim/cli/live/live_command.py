@@ -50,10 +50,9 @@ def live(
     if page is not None:
         _write_page(page, json=json)
         return
-    from hexapod_cosim.cosim.live.server import LiveServer, require_extra  # noqa: PLC0415  an extra
+    from hexapod_cosim.cosim.live.server import LiveServer  # noqa: PLC0415  slow to import
     from hexapod_cosim.cosim.live.settings import Choices, control_texts  # noqa: PLC0415
 
-    require_extra()
     plan = load_scenario(scenario, overrides=settings or [])
     given = parse_controls(control or [plan.control], where="--control")
     check_control(plan, given)
