@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -40,6 +41,7 @@ from hexapod_cosim.models import Robot
 Array = NDArray[np.float64]
 TOLD = 0.5  # of the prior deviation: a number with less is told by the logs
 QUANTILE = 1.959963985  # of a normal distribution, for 95 %
+FEWEST_DIGITS = 5  # of a value and its interval in texts
 NEAR = 0.8  # correlation of two numbers that is reported
 SETTLING = 0.1  # s    at the start of a log that is not compared: the first row has noise
 LONG = 4000  # rows from which on worker processes save more time than they take to start
@@ -65,6 +67,21 @@ class Estimate:
     def told(self) -> bool:
         """Whether the logs tell the number: they at least halve what was unknown of it."""
         return self.deviation < TOLD
+
+    @property
+    def interval(self) -> str:
+        """The 95 % interval as a text, with the digits in which its ends differ, and one more."""
+        return f"{self._text(self.low)} to {self._text(self.high)}"
+
+    @property
+    def found(self) -> str:
+        """The value as a text, with the digits of the interval."""
+        return self._text(self.value)
+
+    def _text(self, value: float) -> str:
+        largest, width = max(abs(self.low), abs(self.high)), self.high - self.low
+        digits = math.ceil(math.log10(largest / width)) + 2 if width > 0.0 else FEWEST_DIGITS
+        return f"{value:.{max(FEWEST_DIGITS, digits)}g}"
 
 
 @dataclass(frozen=True)

@@ -182,8 +182,8 @@ def estimate_rows(estimates: Sequence[Estimate]) -> list[list[str]]:
             one.key,
             one.unit,
             number(one.before),
-            f"{one.value:.5g}",
-            f"{one.low:.5g} to {one.high:.5g}",
+            one.found,
+            one.interval,
             "yes" if one.told else "no",
             f"{one.partner} {one.correlation:+.2f}" if abs(one.correlation) > NEAR else "",
         ]

@@ -77,7 +77,7 @@ def _relative(path: Path, folder: Path) -> str:
 
 def _sentence(one: Estimate) -> str:
     """Returns where a number comes from."""
-    interval = f"95 % interval {one.low:.6g} to {one.high:.6g} {one.unit}"
+    interval = f"95 % interval {one.interval} {one.unit}"
     if one.told:
         return f"identified from the log: {interval}; before {one.before:.6g}"
     return f"not told by the log: {interval} with what was known; before {one.before:.6g}"

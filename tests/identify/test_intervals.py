@@ -22,7 +22,7 @@ from hexapod_cosim.cosim.identify.fitting.covariance import (
     white_information,
 )
 from hexapod_cosim.cosim.identify.fitting.output_error import ENOUGH, bounded_step
-from hexapod_cosim.cosim.identify.identify import Identified, identify
+from hexapod_cosim.cosim.identify.identify import Estimate, Identified, identify
 from hexapod_cosim.cosim.identify.identify_files import warnings
 from hexapod_cosim.models import load_robot
 
@@ -134,3 +134,11 @@ def test_the_search_ends_a_tenth_of_a_deviation_from_the_optimum(
     assert warnings(zeros[1]) == []
     stopped = replace(zeros[1], fit=replace(zeros[1].fit, decrement=3.0))
     assert "ended 3.0 deviations before the optimum" in warnings(stopped)[0]
+
+
+def test_an_interval_is_printed_with_the_digits_in_which_its_ends_differ() -> None:
+    one = Estimate("servo.kp", "N m/rad", "servo", 50.0, 40.0, 39.999998, 40.000002, 1e-8, "", 0.0)
+    assert one.interval == "39.999998 to 40.000002"
+    assert one.found == "40"
+    wide = Estimate("torso.mass", "kg", "mass", 2.6, 2.9, 2.85072, 3.28554, 0.1, "", 0.0)
+    assert wide.interval == "2.8507 to 3.2855"
