@@ -5,7 +5,7 @@ python docs/figure_live.py
 The loop's clock goes on from picture to picture, however long the browser takes to draw one. So the
 figures of real time and latency would say nothing, and are left out.
 
-Needs what docs/figure_report.py needs, and the extra `live`.
+Needs what docs/figure_report.py needs.
 """
 
 from __future__ import annotations

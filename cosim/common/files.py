@@ -142,7 +142,7 @@ def without_none(content: Any) -> Any:
 
 def not_writable(path: Path, error: OSError) -> HexapodError:
     """Returns the error for a path that cannot be written."""
-    fix = "choose another place with -o"
+    fix = "choose another place"
     if isinstance(error, FileExistsError | NotADirectoryError):
         return HexapodError(
             "cannot write",

@@ -151,7 +151,9 @@ def make_app(pages: Pages, on_start: Callable[[], None]) -> Any:
         Route("/{token:str}/scenario.toml", pages.scenario),
         WebSocketRoute("/{token:str}/socket", pages.talk),
     ]
-    return Starlette(routes=routes, lifespan=lifespan)
+    app = Starlette(routes=routes, lifespan=lifespan)
+    app.router.redirect_slashes = False  # a redirection would be answered before any check
+    return app
 
 
 async def _serve_socket(connection: Any, hub: Hub) -> None:

@@ -115,6 +115,7 @@ def test_another_token_host_or_origin_is_refused(running: Running) -> None:
     assert running.get("/")[0] == 404
     assert running.get("/wrong/")[0] == 404
     assert running.get(f"/{running.token[:-1]}/")[0] == 404
+    assert running.get("/wrong", host="evil.example")[0] == 404  # no redirection
     assert running.get(page, host="robot.example.org")[0] == 403
     assert running.get(page, host=f"robot.example.org:{running.port}")[0] == 403
     assert running.get(page, origin="http://example.org")[0] == 403

@@ -8,6 +8,7 @@ from typing import Any
 
 import pytest
 from browser import FLAGS, PATIENCE, launcher
+from command import Call, assert_refused
 
 from hexapod_cosim.cosim.live.static_page import write_static_page
 
@@ -34,6 +35,19 @@ def page(written: Path) -> Iterator[Any]:
 
 def test_the_page_is_one_file_of_at_most_2_mb(written: Path) -> None:
     assert written.stat().st_size < 2e6
+
+
+@pytest.mark.parametrize(
+    "words", [["stairs"], ["--control", "kinematic"], ["--set", "gait.period=0.8"], ["--port", "1"]]
+)
+def test_what_has_no_effect_on_the_page_is_refused(
+    call: Call, tmp_path: Path, words: list[str]
+) -> None:
+    page = tmp_path / "walk.html"
+    assert_refused(
+        call("live", "--page", page, *words), "do nothing for the page", "leave them out"
+    )
+    assert not page.exists()
 
 
 def test_the_robot_walks_and_turns_by_keys_without_a_network(page: Any) -> None:

@@ -92,11 +92,16 @@ def test_the_descriptions_are_what_the_index_accepts(wheels: Path) -> None:
     subprocess.run([sys.executable, "-m", "twine", "check", "--strict", *files], check=True)
 
 
-def test_the_linux_wheel_keeps_what_its_tag_promises(wheels: Path) -> None:
-    (wheel,) = wheels.glob("*manylinux_2_17_x86_64*.whl")
+@pytest.mark.parametrize("machine", ["x86_64", "aarch64"])
+def test_the_linux_wheel_keeps_what_its_tag_promises(wheels: Path, machine: str) -> None:
+    (wheel,) = wheels.glob(f"*manylinux_2_17_{machine}*.whl")
     command = [sys.executable, "-m", "auditwheel", "show", str(wheel)]
     shown = subprocess.run(command, capture_output=True, text=True, check=True).stdout
-    assert "manylinux_2_17_x86_64" in " ".join(shown.split())
+    text = " ".join(shown.split())
+    tag = re.search(r'the following platform tag: "manylinux_2_(\d+)_(\w+)"', text)
+    assert tag is not None, text
+    assert int(tag[1]) <= 17
+    assert tag[2] == machine
 
 
 def test_the_first_report_comes_out_of_the_wheel(hexapod: Path, tmp_path: Path) -> None:
