@@ -51,7 +51,7 @@ def show_files(files: Iterable[Path]) -> None:
 
 def show_text(text: str) -> None:
     """Prints sentences, wrapped between words on a terminal."""
-    print(fitted(text, sys.stdout))
+    print(fitted(text, sys.stdout), flush=True)  # a program may wait for the line
 
 
 def show_table(
