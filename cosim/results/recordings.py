@@ -118,7 +118,7 @@ def read_recording(folder: Path, stem: str) -> Recording:
         "no recording",
         got=str(folder),
         expected=f"a folder with {expected}",
-        fix="record the run or the log again",
+        fix="record it again, by `hexapod simulate` or from the robot",
     )
 
 
@@ -227,7 +227,7 @@ def _recording(names: Sequence[str], rows: np.ndarray, path: Path) -> Recording:
 
 
 def _not_a_recording(path: Path, error: Exception, expected: str) -> HexapodError:
-    fix = "record the run or the log again"
+    fix = "record it again, by `hexapod simulate` or from the robot"
     if isinstance(error, FileNotFoundError | IsADirectoryError | PermissionError):
         got = os.strerror(error.errno) if error.errno else type(error).__name__
         return HexapodError(
