@@ -10,7 +10,14 @@ import typer
 
 from hexapod_cosim.cosim.cli import completion
 from hexapod_cosim.cosim.cli.running import GainsFile, given_gains
-from hexapod_cosim.cosim.cli.terminal import Json, is_given, show_files, show_json, waiting, warn
+from hexapod_cosim.cosim.cli.terminal import (
+    Json,
+    refuse_unused,
+    show_files,
+    show_json,
+    waiting,
+    warn,
+)
 from hexapod_cosim.cosim.cli.terrain_command import surfaces_from
 from hexapod_cosim.cosim.export.controller_export import export_controller
 from hexapod_cosim.cosim.export.export import export_fmu
@@ -260,18 +267,11 @@ def _refuse_unused_options(context: typer.Context, written: str) -> None:
     """Raises HexapodError for options on the command line that have no effect on what is
     written.
     """
-    given = [f"--{name}" for name in UNUSED_OPTIONS[written] if is_given(context, name)]
-    if not given:
-        return
     fix = "leave them out"
     if written == PLANT_FMU:
         fix += ", or add --controller kinematic or compliant"
-    raise HexapodError(
-        f"options that do nothing for {written}",
-        got=" ".join(given),
-        expected="none of them",
-        fix=fix,
-    )
+    names = {name: f"--{name}" for name in UNUSED_OPTIONS[written]}
+    refuse_unused(context, names, written=written, fix=fix)
 
 
 def _fmu_path(output: Path | None, name: str) -> Path:

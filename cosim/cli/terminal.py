@@ -19,6 +19,7 @@ from rich.text import Text
 from hexapod_cosim.cosim.cli.width import columns_of, fitted
 from hexapod_cosim.cosim.common.files import to_json
 from hexapod_cosim.cosim.master import loop as master
+from hexapod_cosim.models import HexapodError
 
 PIPE = 160  # width of tables where there is no terminal, in characters
 GAP = 2  # between columns, in characters
@@ -32,6 +33,23 @@ def is_given(context: typer.Context, name: str) -> bool:
     """Returns whether an option was given on the command line."""
     source = context.get_parameter_source(name)
     return source is not None and source.name == "COMMANDLINE"
+
+
+def refuse_unused(
+    context: typer.Context, names: Mapping[str, str], *, written: str, fix: str
+) -> None:
+    """Raises HexapodError for words of the command line that have no effect on what is written.
+
+    names: what the user writes, by the name of the parameter.
+    """
+    given = [word for name, word in names.items() if is_given(context, name)]
+    if given:
+        raise HexapodError(
+            f"options that do nothing for {written}",
+            got=" ".join(given),
+            expected="none of them",
+            fix=fix,
+        )
 
 
 def show_json(content: Mapping[str, Any] | Sequence[Any]) -> None:

@@ -86,11 +86,8 @@ class _Joint:
         self.speed_ref = _optional(log, f"{name}.speed_ref")
         self._speed = _optional(log, f"{name}.speed")
         self.follows = float("nan") if self.angle is None else correlation(self.angle, self.command)
-
-    @property
-    def moves(self) -> bool:
-        """Whether the measured angle moves by more than a load bends a joint."""
-        return self.angle is not None and _range(self.angle) > LEAST_MOTION
+        # whether the measured angle moves by more than a load bends a joint
+        self.moves = self.angle is not None and _range(self.angle) > LEAST_MOTION
 
     def dead(self) -> str | None:
         """Returns why the command does not come from the robot's control; None if it may."""
@@ -142,19 +139,20 @@ class _Joint:
         unknown.
         """
         if self._speed is not None:
-            way = _integral(self._speed, self.time)
-            return _aligned(angle, way, self.time) > max(
-                FOLLOWS, _aligned(self.command, way, self.time)
-            )
+            return self._is_nearer(angle, self._speed)
         if self.torque is not None and command is not None and other is not None:
             wrong = correlation(self.torque, command - angle)
             return wrong > max(WEAK, correlation(self.torque, self.command - other))
         if self.speed_ref is not None and np.ptp(self.speed_ref) > 0.0:
-            way = _integral(self.speed_ref, self.time)
-            return _aligned(angle, way, self.time) > max(
-                FOLLOWS, _aligned(self.command, way, self.time)
-            )
+            return self._is_nearer(angle, self.speed_ref)
         return False
+
+    def _is_nearer(self, angle: Array, speed: Array) -> bool:
+        """Returns whether the integral of a speed follows the angle, and more than the command."""
+        way = _integral(speed, self.time)
+        return _aligned(angle, way, self.time) > max(
+            FOLLOWS, _aligned(self.command, way, self.time)
+        )
 
 
 def _exchanged(one: _Joint, joints: Sequence[_Joint]) -> str | None:
@@ -184,11 +182,11 @@ def _wrong_speeds(joints: Sequence[_Joint], time: Array) -> list[BadColumn]:
             follows = float("nan") if dead else correlation(one.speed_ref, rate)
             columns[f"{one.name}.speed_ref"] = follows, scale
     typical = np.median([np.nan_to_num(follows) for follows, _ in columns.values()] or [0.0])
+    if typical <= FOLLOWS:
+        return []
     found = []
     for name, (follows, scale) in columns.items():
         stem = name.removesuffix(".speed_ref")
-        if typical <= FOLLOWS:
-            break
         if not np.isfinite(follows):
             found.append(BadColumn(name, f"dead, while {stem}.angle_ref moves"))
         elif follows < WEAK:

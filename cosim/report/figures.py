@@ -8,6 +8,7 @@ from pathlib import Path
 from threading import Event
 from typing import NamedTuple
 
+from hexapod_cosim.controller.figure_style import UNDATED
 from hexapod_cosim.cosim.common.closing import Closing
 from hexapod_cosim.cosim.common.files import atomic_path
 from hexapod_cosim.cosim.results.walk import View
@@ -27,8 +28,8 @@ def write_figures(figures: Figures, folder: Path) -> list[Path]:
     """
     folder.mkdir(exist_ok=True)
     for name in figures.skipped:
-        for path in (folder / f"{name}.png", folder / f"{name}.svg"):
-            path.unlink(missing_ok=True)
+        for kind in UNDATED:
+            (folder / f"{name}.{kind}").unlink(missing_ok=True)
     files = [folder / name for name in figures.images]
     for path, content in zip(files, figures.images.values(), strict=True):
         with atomic_path(path) as temporary:

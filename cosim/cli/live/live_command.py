@@ -15,7 +15,7 @@ from hexapod_cosim.controller import Gains, GainsError
 from hexapod_cosim.cosim.cli.running import ControlNames, GainsFile, Name, Settings, given_gains
 from hexapod_cosim.cosim.cli.terminal import (
     Json,
-    is_given,
+    refuse_unused,
     show_files,
     show_json,
     show_text,
@@ -25,7 +25,6 @@ from hexapod_cosim.cosim.control.controllers import check_control
 from hexapod_cosim.cosim.scenario.controls import parse_controls
 from hexapod_cosim.cosim.scenario.records import CONTROLS, Scenario
 from hexapod_cosim.cosim.scenario.scenario import load_scenario
-from hexapod_cosim.models import HexapodError
 
 Port = Annotated[
     int,
@@ -43,6 +42,14 @@ Page = Annotated[
     ),
 ]
 
+UNUSED = {  # what has no effect on the page without a server
+    "scenario": "SCENARIO",
+    "control": "--control",
+    "settings": "--set",
+    "gains": "--gains",
+    "port": "--port",
+}
+
 
 def live(
     context: typer.Context,
@@ -57,7 +64,11 @@ def live(
 ) -> None:
     """Drive the robot in a browser, in real time: keys, gamepad or touch. Ctrl-C ends it."""
     if page is not None:
-        _refuse_unused(context)
+        fix = (
+            "leave them out: the page has the default robot on flat ground; others need a server, "
+            "`hexapod live` without --page"
+        )
+        refuse_unused(context, UNUSED, written="the page without a server", fix=fix)
         _write_page(page, json=json)
         return
     from hexapod_cosim.cosim.live.server import LiveServer  # noqa: PLC0415  slow to import
@@ -77,21 +88,6 @@ def live(
         server.run(lambda url: _announce(url, browser=browser, json=json))
     if not json:
         show_text("stopped")
-
-
-def _refuse_unused(context: typer.Context) -> None:
-    """Raises HexapodError for what has no effect on the page without a server."""
-    options = {"control": "--control", "settings": "--set", "gains": "--gains", "port": "--port"}
-    given = ["SCENARIO"] if is_given(context, "scenario") else []
-    given += [option for name, option in options.items() if is_given(context, name)]
-    if given:
-        raise HexapodError(
-            "options that do nothing for the page without a server",
-            got=" ".join(given),
-            expected="none of them",
-            fix="leave them out: the page has the default robot on flat ground; others need a "
-            "server, `hexapod live` without --page",
-        )
 
 
 def _write_page(path: Path, *, json: bool) -> None:

@@ -522,7 +522,7 @@ static inline void hx_add_impulses(const hxModel *model, const hxCommand *comman
 
 /* Evaluates the equations of motion at (t, y): fills work, and stores dy/dt in rate. With
  * implicit, rate is k/h of that stage (eq. 19) instead. The multipliers are computed on request,
- * and always in kinematic mode. `moment` is that of the motion, or NULL where it is not known. */
+ * and always in kinematic mode. `known`: what is known of the motion, or NULL. */
 static void hx_dynamics_evaluate(const hxModel *model, const hxContactState *contact,
                                  const hxCommand *command, double t, const hxPlantMotion *motion,
                                  const hxKnown *known, hxImplicit *implicit, int multipliers,

@@ -346,8 +346,8 @@ static inline void torso_pass(const hxModel *model, const hxPlantMotion *motion,
 }
 
 /* Computes positions, velocities and forces at (t, y). Fills work except for the sweeps; with
- * reactions it also keeps what the multipliers need. What is known of
- * angles and contacts is not computed again. */
+ * reactions it also keeps what the multipliers need. What is known of angles and contacts is not
+ * computed again. */
 static inline void hx_dynamics_forces(const hxModel *model, const hxContactState *contact,
                                       const hxCommand *command, double t,
                                       const hxPlantMotion *motion, const hxKnown *known,
