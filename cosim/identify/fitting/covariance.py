@@ -16,6 +16,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,6 +39,11 @@ class Series:
     slopes: Array  # (rows, columns, numbers)  by z
     counted: float  # share of the readings that count
 
+    @cached_property
+    def waves(self) -> tuple[NDArray[np.complex128], Array]:
+        """The Fourier transform of the derivatives, and how often each frequency counts."""
+        return _waves(self.slopes)
+
 
 def white_information(series: Sequence[Series]) -> Array:
     """Returns J' J (numbers, numbers): what readings with white residuals tell, in 1/prior^2."""
@@ -51,7 +57,7 @@ def coloured_information(series: Sequence[Series]) -> Array:
     covariance: Array = np.asarray(np.linalg.inv(white + np.eye(len(white))), dtype=np.float64)
     scores = np.zeros_like(white)
     for one in series:
-        waves, weights = _waves(one.slopes)
+        waves, weights = one.waves
         weights = np.multiply(weights, spectrum(one, covariance))
         scores += np.einsum("f,fci,fcj->ij", weights, waves.conj(), waves, optimize=True).real
     values, vectors = np.linalg.eigh(scores)
@@ -65,7 +71,7 @@ def spectrum(series: Series, covariance: Array) -> Array:
 
     covariance: of the numbers, for the leverage (numbers, numbers).
     """
-    waves, _ = _waves(series.slopes)
+    waves, _ = series.waves
     residuals, _ = _waves(series.residuals)
     columns = residuals.shape[1]
     power = np.sum(np.abs(residuals) ** 2, axis=1)
