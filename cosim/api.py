@@ -39,11 +39,8 @@ from hexapod_cosim.cosim.scenario.controls import (
     table_with_control,
 )
 from hexapod_cosim.cosim.scenario.records import Scenario
-from hexapod_cosim.cosim.scenario.scenario import (
-    read_tables,
-    scenario_from_table,
-    with_values,
-)
+from hexapod_cosim.cosim.scenario.scenario import scenario_from_table
+from hexapod_cosim.cosim.scenario.tables import read_tables, with_values
 
 
 def simulate(

@@ -15,7 +15,7 @@ from hexapod_cosim.controller import PATTERNS, Requirements
 from hexapod_cosim.cosim.results.columns import Column, plant_variables
 from hexapod_cosim.cosim.scenario.checks import setting_names
 from hexapod_cosim.cosim.scenario.records import CONTROLS, KEYS, SECTIONS
-from hexapod_cosim.cosim.scenario.scenario import list_scenarios
+from hexapod_cosim.cosim.scenario.tables import list_scenarios
 from hexapod_cosim.models import list_robots
 from hexapod_cosim.models.ground.catalogue import CATALOGUE
 

@@ -17,7 +17,7 @@ from hexapod_cosim.cosim.identify.page import COLUMNS, difference_rows
 from hexapod_cosim.cosim.identify.replay import replay as replay_log
 from hexapod_cosim.cosim.identify.replay_files import write_replay
 from hexapod_cosim.cosim.results.results import results_folder
-from hexapod_cosim.cosim.scenario.scenario import with_overrides
+from hexapod_cosim.cosim.scenario.tables import with_overrides
 from hexapod_cosim.models import load_robot
 
 LogFile = Annotated[

@@ -10,7 +10,8 @@ import typer
 
 from hexapod_cosim.cosim.cli import completion
 from hexapod_cosim.cosim.cli.terminal import Json, show_files, show_json, show_table, show_text
-from hexapod_cosim.cosim.scenario.scenario import parse_value, read_terrain_keys
+from hexapod_cosim.cosim.scenario.sections import read_terrain_keys
+from hexapod_cosim.cosim.scenario.tables import parse_value
 from hexapod_cosim.models import HexapodError, load_robot, unknown_name
 from hexapod_cosim.models.ground.catalogue import CATALOGUE
 from hexapod_cosim.models.ground.parameters import DIFFICULTY, Parameter

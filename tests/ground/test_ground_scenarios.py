@@ -21,12 +21,8 @@ from hexapod_cosim.cosim.results.warnings import (
     overlap_warnings,
     unused_settings,
 )
-from hexapod_cosim.cosim.scenario.scenario import (
-    load_scenario,
-    scenario_from_table,
-    scenario_robot,
-    with_overrides,
-)
+from hexapod_cosim.cosim.scenario.scenario import load_scenario, scenario_from_table, scenario_robot
+from hexapod_cosim.cosim.scenario.tables import with_overrides
 from hexapod_cosim.models import LEG_NAMES, RobotError, ScenarioError
 from hexapod_cosim.models.ground.catalogue import make_surface
 from hexapod_cosim.models.ground.grid_file import grid_bytes, surface_from_bytes

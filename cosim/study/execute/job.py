@@ -20,7 +20,8 @@ from hexapod_cosim.cosim.export.controller_export import export_controller
 from hexapod_cosim.cosim.run.controller_setup import make_setup
 from hexapod_cosim.cosim.run.preparation import PlantFmus, chosen_gains, design_key
 from hexapod_cosim.cosim.scenario.controls import table_with_control
-from hexapod_cosim.cosim.scenario.scenario import scenario_from_table, with_values
+from hexapod_cosim.cosim.scenario.scenario import scenario_from_table
+from hexapod_cosim.cosim.scenario.tables import with_values
 from hexapod_cosim.cosim.study.execute.engines import find_engine
 from hexapod_cosim.cosim.study.plan.factors import samples
 from hexapod_cosim.cosim.study.plan.records import Case, Factor, Study, StudyError

@@ -21,7 +21,8 @@ from hexapod_cosim.cosim.results.summary import NO_FIGURES, REFUSED, Summary
 from hexapod_cosim.cosim.run.preparation import chosen_gains
 from hexapod_cosim.cosim.scenario.controls import PYTHON, control_of, table_with_control
 from hexapod_cosim.cosim.scenario.records import Scenario
-from hexapod_cosim.cosim.scenario.scenario import scenario_from_table, with_values
+from hexapod_cosim.cosim.scenario.scenario import scenario_from_table
+from hexapod_cosim.cosim.scenario.tables import with_values
 from hexapod_cosim.cosim.study.execute.engines import Engine, find_engine
 from hexapod_cosim.cosim.study.execute.job import Job, environment
 from hexapod_cosim.cosim.study.plan.identity import canonical, settings_of

@@ -13,7 +13,8 @@ from hexapod_cosim.cosim.interface.interface import Interface, load_interface
 from hexapod_cosim.cosim.scenario.controls import LAW
 from hexapod_cosim.cosim.scenario.quantities import QUANTITY
 from hexapod_cosim.cosim.scenario.records import Scenario
-from hexapod_cosim.cosim.scenario.scenario import scenario_from_table, with_values
+from hexapod_cosim.cosim.scenario.scenario import scenario_from_table
+from hexapod_cosim.cosim.scenario.tables import with_values
 from hexapod_cosim.cosim.study.plan.factors import PARAMETERS, samples
 from hexapod_cosim.cosim.study.plan.held_out import check_held_out_scenarios
 from hexapod_cosim.cosim.study.plan.points import check_design

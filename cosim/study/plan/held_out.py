@@ -14,13 +14,8 @@ from typing import Any
 
 from hexapod_cosim.cosim.interface.interface import load_interface
 from hexapod_cosim.cosim.scenario.records import Outputs
-from hexapod_cosim.cosim.scenario.scenario import (
-    list_scenarios,
-    read_tables,
-    scenario_from_table,
-    scenario_robot,
-    with_values,
-)
+from hexapod_cosim.cosim.scenario.scenario import scenario_from_table, scenario_robot
+from hexapod_cosim.cosim.scenario.tables import list_scenarios, read_tables, with_values
 from hexapod_cosim.cosim.study.plan.factors import samples
 from hexapod_cosim.cosim.study.plan.keys import flat
 from hexapod_cosim.cosim.study.plan.records import (

@@ -10,7 +10,8 @@ from typing import Any
 
 from hexapod_cosim.cosim.scenario.controls import Control, control_beside, parse_controls
 from hexapod_cosim.cosim.scenario.records import COMPARED
-from hexapod_cosim.cosim.scenario.scenario import read_tables, scenario_from_table, with_values
+from hexapod_cosim.cosim.scenario.scenario import scenario_from_table
+from hexapod_cosim.cosim.scenario.tables import read_tables, with_values
 from hexapod_cosim.cosim.scenario.variation import STANDARD
 from hexapod_cosim.cosim.study.plan.bundled import list_studies
 from hexapod_cosim.cosim.study.plan.checks import check_scenario, check_settable, check_study

@@ -14,7 +14,8 @@ from hexapod_cosim.cosim.master.recorder import Recording
 from hexapod_cosim.cosim.run.run import simulate
 from hexapod_cosim.cosim.run.walker import Walker
 from hexapod_cosim.cosim.scenario.records import COMPARED
-from hexapod_cosim.cosim.scenario.scenario import list_scenarios, load_scenario
+from hexapod_cosim.cosim.scenario.scenario import load_scenario
+from hexapod_cosim.cosim.scenario.tables import list_scenarios
 from hexapod_cosim.models import load_robot
 from tools.docs.validation.shown import PALETTE, Shown, short
 from tools.docs.validation.walked import changed

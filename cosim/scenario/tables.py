@@ -1,0 +1,136 @@
+"""Finds and reads the tables of scenario files, and changes their keys by name, as --set does.
+
+Nothing is checked here but that the file is TOML and that the keys exist.
+"""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from collections.abc import Iterable, Mapping
+from copy import deepcopy
+from pathlib import Path
+from typing import Any
+
+from hexapod_cosim.cosim.scenario.controls import LAW, control_beside
+from hexapod_cosim.cosim.scenario.records import KEYS, SECTIONS
+from hexapod_cosim.models import ScenarioError, unknown_name
+from hexapod_cosim.models.errors import refuse_path
+from hexapod_cosim.models.ground.table import beside
+from hexapod_cosim.models.schema import parse_toml
+
+POINTED = re.compile(r"[+-]?(?:\d+\.|\.\d+)(?:[eE][+-]?\d+)?")  # .1 or 1.
+
+
+def list_scenarios() -> dict[str, Path]:
+    """Returns the bundled scenarios by name."""
+    found = {path.stem: path for path in (Path(__file__).parent / "scenarios").rglob("*.toml")}
+    return dict(sorted(found.items()))
+
+
+def read_tables(path_or_name: str | Path) -> tuple[dict[str, Any], str]:
+    """Returns the unchecked tables of a scenario file, or of a bundled one by name.
+
+    The second value is the file's name for messages. Raises ScenarioError.
+    """
+    refuse_path(path_or_name, "the scenario", ScenarioError)
+    path = _scenario_path(path_or_name)
+    try:
+        table = parse_toml(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        fix = "give the path of a scenario file, or one of: " + ", ".join(list_scenarios())
+        raise ScenarioError(
+            "cannot read the scenario", got=error.strerror, fix=fix, where=str(path)
+        ) from error
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise ScenarioError(
+            "not a TOML file",
+            got=str(error),
+            expected="TOML 1.0 in UTF-8",
+            fix="correct that line",
+            where=str(path),
+        ) from error
+    if isinstance(table.get("terrain"), dict):
+        table["terrain"] = beside(table["terrain"], path.parent)
+    refuse_path(str(table.get("robot", "")), "the robot file", ScenarioError)
+    if "control" in table:
+        table["control"] = control_beside(table["control"], path.parent)
+    near = path.parent / str(table.get("robot", ""))
+    if "robot" in table and near.is_file():  # a robot file beside the scenario
+        table["robot"] = str(near.resolve())
+    return table, path.name if path in list_scenarios().values() else str(path)
+
+
+def _scenario_path(path_or_name: str | Path) -> Path:
+    path, bundled = Path(path_or_name), list_scenarios()
+    if path.suffix or len(path.parts) != 1 or path.is_file():
+        return path
+    if str(path_or_name) not in bundled:
+        raise unknown_name("scenario", str(path_or_name), bundled, error=ScenarioError)
+    return bundled[str(path_or_name)]
+
+
+def with_overrides(table: Mapping[str, Any], overrides: Iterable[str]) -> dict[str, Any]:
+    """Returns a copy of the tables with each "NAME=VALUE" set.
+
+    NAME is a key of the scenario or else an FMU parameter. Raises ScenarioError.
+    """
+    values: dict[str, Any] = {}
+    for text in overrides:
+        name, equals, value = (part.strip() for part in text.partition("="))
+        if not equals or not name or not value:
+            fix = "write --set gait.period=0.8"
+            raise ScenarioError(
+                "not a setting", got=text, expected="NAME=VALUE", fix=fix, where="--set"
+            )
+        values[name] = parse_value(value)
+    return with_values(table, values)
+
+
+def with_values(table: Mapping[str, Any], values: Mapping[str, Any]) -> dict[str, Any]:
+    """Returns a copy of the tables with each value set by name, as --set does.
+
+    Raises ScenarioError.
+    """
+    changed = deepcopy(dict(table))
+    for name, value in values.items():
+        _set(changed, name, value)
+    return changed
+
+
+def parse_value(value: str) -> Any:
+    """Returns the value as TOML reads it; other text is a string, so names need no quotes.
+
+    Numbers may begin or end with their point, as .1 and 1., which TOML refuses.
+    """
+    try:
+        return parse_toml(f"value = {value}")["value"]
+    except tomllib.TOMLDecodeError:
+        return float(value) if POINTED.fullmatch(value) else value
+
+
+def _set(table: dict[str, Any], name: str, value: Any) -> None:
+    """Sets a key of the scenario or an FMU parameter by its dotted name, in place."""
+    section, dot, key = name.partition(".")
+    if name == "control" and isinstance(table.get(name), dict):
+        table[name] = {**table[name], LAW: value}  # another law, with the same parameters
+    elif dot and section in SECTIONS:
+        if section == "control" and isinstance(table.get(section), str):
+            table[section] = {LAW: table[section]}
+        inner = table.setdefault(section, {})
+        if not isinstance(inner, dict):
+            fix = f"set the whole list: --set '{section}=[...]'"
+            raise ScenarioError(
+                "the scenario has a list here",
+                got=name,
+                expected=f"a table [{section}]",
+                fix=fix,
+                where="--set",
+            )
+        inner[key] = value
+    elif dot or "[" in name:
+        table.setdefault("parameters", {})[name] = value
+    elif name in KEYS:
+        table[name] = value
+    else:
+        raise unknown_name("setting", name, KEYS, where="--set", error=ScenarioError)
