@@ -61,9 +61,7 @@ class PlannedSqueeze:
         part = n / (xx * yy - xy * xy)
         return part * yy, -part * xy, part * xx
 
-    def _wanted(
-        self, demand: Demand, counts: Array, normal: Array, yielding: Yielding
-    ) -> Plane:
+    def _wanted(self, demand: Demand, counts: Array, normal: Array, yielding: Yielding) -> Plane:
         """Returns the horizontal forces (6,) [N] that each leg by itself would choose."""
         lever, (xx, xy, yy) = demand.lever, yielding
         left = demand.torque - lever[:, :, 2] * normal[:, None]  # for the horizontal forces

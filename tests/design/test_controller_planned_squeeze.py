@@ -158,9 +158,7 @@ def bounded(standing: str) -> tuple[float, float]:
     """
     shares, base = shares_of(standing), inner(standing)
     free = torque(shares).ravel()
-    turn = [
-        torque(shares._replace(push=shares.push + one)).ravel() - free for one in base
-    ]
+    turn = [torque(shares._replace(push=shares.push + one)).ravel() - free for one in base]
     rows = np.column_stack([*turn, -np.ones(18)])
     other = np.column_stack([*(-one for one in turn), -np.ones(18)])
     found = linprog(

@@ -100,8 +100,8 @@ static void best(const hxArch *arch, const double count[HX_LEGS][HX_JOINTS],
   balance(arch->arm, (const double (*)[3])B, change);
 }
 
-/* Computes the weights of the servos under changed forces (C56): the sixth power of each torque over
- * the 8-norm of all. */
+/* Computes the weights of the servos under changed forces (C56): the sixth power of each torque
+ * over the 8-norm of all. */
 static void weigh(const hxArch *arch, const hxPlane change[HX_LEGS],
                   double count[HX_LEGS][HX_JOINTS]) {
   /* three equal torques, those of a tripod's femurs, count as much as in the sum of squares */
@@ -133,8 +133,7 @@ static void lower_largest(const hxArch *arch, hxPlane change[HX_LEGS]) {
     weigh(arch, (const hxPlane *)change, count);
     best(arch, (const double (*)[HX_JOINTS])count, nearer);
     for (int k = 0; k < HX_LEGS; ++k)
-      change[k] =
-          hx_plane_add(change[k], hx_scaled(hx_plane_sub(nearer[k], change[k]), step));
+      change[k] = hx_plane_add(change[k], hx_scaled(hx_plane_sub(nearer[k], change[k]), step));
   }
 }
 

@@ -17,7 +17,8 @@ typedef struct hxPlannedSqueeze {
 void hx_planned_squeeze_compile(const hxControllerDefinition *definition, double weight,
                                 double depth, hxPlannedSqueeze *model);
 
-/* Adds the squeeze to shares without one (C42, C43, C56). squeeze: weight of the torques, in [0, 1). */
+/* Adds the squeeze to shares without one (C42, C43, C56).
+ * squeeze: weight of the torques, in [0, 1). */
 void hx_planned_squeeze_add(const hxPlannedSqueeze *model, const hxPlane feet[HX_LEGS],
                             const hxDemand *demand, double squeeze, hxShares *shares);
 

@@ -44,9 +44,9 @@ void hx_touchdown_step(double period, const int touching[HX_LEGS], const double 
     const int misses = loaded[leg] && !touching[leg] && !doubted[leg];
     const double offset = touchdown->offset[leg];
     touchdown->late[leg] = misses ? touchdown->late[leg] + period : 0.0;
-    touchdown->offset[leg] =
-        doubted[leg] ? faded(offset, period)
-                     : moved(offset, touchdown->late[leg], period, touching[leg], falling[leg],
-                             swinging[leg], searching[leg]);
+    touchdown->offset[leg] = doubted[leg]
+                                 ? faded(offset, period)
+                                 : moved(offset, touchdown->late[leg], period, touching[leg],
+                                         falling[leg], swinging[leg], searching[leg]);
   }
 }
