@@ -28,6 +28,8 @@ class Parts:
     # weight of the servos' torques against the feet's use of friction in the planned squeeze, in
     # [0, 1), on ground on which feet creep: a part of `support`
     squeeze: float = 0.6
+    # the squeeze lowers the largest torques of all servos instead of the sum of their squares
+    minmax_torque: bool = False
 
 
 SWITCHES = tuple(item.name for item in fields(Parts) if item.name != "squeeze")

@@ -229,7 +229,9 @@ class Compliance(Stateful):
         early = self.landings.early(met, plan.height)
         falling = np.where(early, plan.falling, 0.0)
         searching = plan.awaited & ~self.doubted & ~self._carries()
-        self.touchdown.step(self.touching, falling, plan.swinging, plan.standing, searching)
+        self.touchdown.step(
+            self.touching, falling, plan.swinging, plan.standing, searching, self.doubted
+        )
 
     def _examine_contacts(self, plan: Plan, force: Array) -> Array:
         """Decides between a wrong sensor and an early or late contact.

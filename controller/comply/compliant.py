@@ -109,7 +109,10 @@ class Compliant(Stateful):
         self.dynamics = InverseDynamics(robot, legs, period=period)
         self.support = Support(robot, gait, gains.support, rest=self.dynamics.rest())
         self.squeeze = PlannedSqueeze(
-            friction=robot.friction.mu, weight=robot.weight, depth=-self.dynamics.floor
+            friction=robot.friction.mu,
+            weight=robot.weight,
+            depth=-self.dynamics.floor,
+            minmax=parts.minmax_torque,
         )
         self.laws = Compliance(
             gains,

@@ -6,20 +6,31 @@ its friction slips more. The planned squeeze minimises a weighted sum of both, t
 of all servos and the squared use of friction (C42), which has a closed form. `squeeze` in [0, 1) is
 the weight: 0 plans no squeeze, and towards 1 the torques alone count. No foot is planned to use
 more than a share of its friction (C43).
+
+With `minmax_torque` the largest torques count instead of the sum of squares. The 8-norm of the
+torques is at most 1.43 times the largest of 18, and of three equal torques 1.15 times, but is
+smooth, so that the forces do not jump when another servo becomes the most loaded one. Its least is
+found by C42 with weights on the servos, repeated a fixed number of times (C56).
 """
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from hexapod_cosim.controller.comply.support import Shares, solve
-from hexapod_cosim.controller.plane import Array, Plane, across, square
+from hexapod_cosim.controller.plane import LEGS, Array, Plane, across, square
 from hexapod_cosim.controller.walk.inverse_dynamics import Demand
 
 MOST_FRICTION = 0.7  # 1    share of its friction that a foot is planned to use at most
 TRIPOD_SHARE = 1.0 / 3.0  # 1    of the weight: the load at which both sums are compared
 LEAST_PUSH = 1e-12  # N    floor of a change of a force that a factor is divided by
 LEAST_LOAD = 1e-6  # N    a foot with less takes no part; floor of the sum of loads
+REPEATS, STEP = 12, 0.25  # 1    of C42 with new weights, and the part of each change that is made
+LEAST_NORM = 1e-9  # N m    floor of the norm of all torques that they are divided by
+# 1    three equal torques, those of a tripod's femurs, count as much as in the sum of squares
+LIKE_SQUARES = math.sqrt(math.sqrt(27.0))
 Yielding = tuple[Array, Array, Array]  # xx, xy, yy of symmetric matrices, (6,) each
 
 
@@ -27,29 +38,34 @@ class PlannedSqueeze:
     """Computes the squeeze of one robot.
 
     friction: the coefficient of friction that is believed; weight: of the robot [N]; depth: of the
-    ground below the torso's origin in the stance [m].
+    ground below the torso's origin in the stance [m]; minmax: the largest torques count instead of
+    the sum of squares.
     """
 
-    def __init__(self, *, friction: float, weight: float, depth: float) -> None:
-        self.friction = friction
+    def __init__(
+        self, *, friction: float, weight: float, depth: float, minmax: bool = False
+    ) -> None:
+        self.friction, self.minmax = friction, minmax
         self.torque = depth * TRIPOD_SHARE * weight  # N m    of a tripod's load at this arm
 
-    def _yielding(self, lever: Array, normal: Array, price: float) -> Yielding:
+    def _yielding(self, lever: Array, counts: Array, normal: Array, price: float) -> Yielding:
         """Returns (J J^T + price/f_n^2)^-1 [1/m2], 0 without a load (C42).
 
-        lever: (6, 3, 3) J^T [m]; normal: (6,) [N]; price [N2 m2].
+        lever: (6, 3, 3) J^T [m]; counts: (6, 3) weights of the servos [1]; normal: (6,) [N]; price
+        [N2 m2].
         """
         x, y, n = lever[:, :, 0], lever[:, :, 1], normal * normal
-        xx = n * (x * x).sum(axis=1) + price
-        xy = n * (x * y).sum(axis=1)
-        yy = n * (y * y).sum(axis=1) + price
+        xx = n * (counts * x * x).sum(axis=1) + price
+        xy = n * (counts * x * y).sum(axis=1)
+        yy = n * (counts * y * y).sum(axis=1) + price
         part = n / (xx * yy - xy * xy)
         return part * yy, -part * xy, part * xx
 
-    def _wanted(self, demand: Demand, normal: Array, yielding: Yielding) -> Plane:
+    def _wanted(self, demand: Demand, counts: Array, normal: Array, yielding: Yielding) -> Plane:
         """Returns the horizontal forces (6,) [N] that each leg by itself would choose."""
         lever, (xx, xy, yy) = demand.lever, yielding
         left = demand.torque - lever[:, :, 2] * normal[:, None]  # for the horizontal forces
+        left = counts * left
         gx, gy = (lever[:, :, 0] * left).sum(axis=1), (lever[:, :, 1] * left).sum(axis=1)
         return np.asarray(xx * gx + xy * gy + 1j * (xy * gx + yy * gy))
 
@@ -79,6 +95,16 @@ class PlannedSqueeze:
         factor = room / np.maximum(np.sqrt(square(change)), LEAST_PUSH)
         return max(float(factor[normal > LEAST_LOAD].min(initial=1.0)), 0.0)
 
+    def _counts(self, demand: Demand, shares: Shares, change: Plane) -> Array:
+        """Returns the weights (6, 3) of the servos under changed forces (C56) [1]."""
+        forces = shares._replace(push=shares.push + change).forces()
+        torque = demand.torque - (demand.lever @ forces[:, :, None])[:, :, 0]
+        square = torque * torque
+        fourth = square * square
+        norm = math.sqrt(math.sqrt(math.sqrt(float((fourth * fourth).sum()))))
+        part = square / max(norm * norm, LEAST_NORM * LEAST_NORM)
+        return np.asarray(LIKE_SQUARES * part * part * part)
+
     def add(self, feet: Plane, demand: Demand, shares: Shares, squeeze: float) -> Shares:
         """Returns shares with the squeeze added; the sums of forces and moments stay.
 
@@ -91,9 +117,17 @@ class PlannedSqueeze:
         if not squeeze > 0.0 or not self.friction > 0.0:
             return shares
         normal, used = shares.normal, self.torque / self.friction
-        yielding = self._yielding(demand.lever, normal, (1.0 / squeeze - 1.0) * used * used)
+        price = (1.0 / squeeze - 1.0) * used * used
         arm = feet - (normal @ feet) / max(normal.sum(), LEAST_LOAD)
-        change = self._wanted(demand, normal, yielding) - shares.push
-        change = self._balance(change, arm, yielding)
+
+        def best(counts: Array) -> Plane:
+            yielding = self._yielding(demand.lever, counts, normal, price)
+            wanted = self._wanted(demand, counts, normal, yielding)
+            return self._balance(wanted - shares.push, arm, yielding)
+
+        change = best(np.ones((LEGS, 3)))
+        for _ in range(REPEATS if self.minmax else 0):
+            nearer = best(self._counts(demand, shares, change))
+            change = change + STEP * (nearer - change)
         change = self._limit(shares, change) * change
         return shares._replace(push=shares.push + change, squeeze=change)

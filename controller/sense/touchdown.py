@@ -4,6 +4,8 @@ A foot that meets the ground before its path ends keeps the height of its contac
 stance. A foot that finds no ground at the end of its path moves down at a fixed speed to a limit.
 In the next swing these offsets decay.
 A foot for which the gait clock waits searches at the same speed (C50).
+A foot whose sensor is doubted follows its path: what its sensor said, or did not say, was the
+reason for its offset, which decays at once.
 """
 
 from __future__ import annotations
@@ -20,7 +22,7 @@ REACH_SPEED = 0.08  # m/s    downwards
 REACH_LIMIT = 0.040  # m
 HOLD_LIMIT = 0.030  # m    upwards: the robots' step height
 GRACE = 0.040  # s    after the planned touch-down, in which a foot may be late
-RETURN_TIME = 0.060  # s    time constant with which an offset vanishes in the swing
+RETURN_TIME = 0.060  # s    time constant with which an offset vanishes in the swing, or in doubt
 NEGLIGIBLE = 1e-5  # m    a smaller offset is set to 0
 
 
@@ -46,18 +48,27 @@ class Touchdown(Stateful):
         """Returns whether some foot has an offset or lacks its planned contact."""
         return bool(self.offset.any() or self.late.any())
 
+    def _faded(self) -> Array:
+        """Returns the next offsets (6,) of feet that return to their paths [m]."""
+        faded = self.offset * math.exp(-self.period / RETURN_TIME)
+        return np.where(np.abs(self.offset) > NEGLIGIBLE, faded, 0.0)
+
     def _moved(self, touching: Mask, falling: Array, swinging: Mask, searching: Mask) -> Array:
         """Returns the next offsets (6,) [m]. Arguments are those of step()."""
         reached = np.maximum(self.offset - REACH_SPEED * self.period, -REACH_LIMIT)
         held = np.minimum(self.offset + falling, HOLD_LIMIT)
-        faded = self.offset * math.exp(-self.period / RETURN_TIME)
-        faded = np.where(np.abs(self.offset) > NEGLIGIBLE, faded, 0.0)
-        in_swing = np.where(touching, np.where(falling > 0.0, held, self.offset), faded)
+        in_swing = np.where(touching, np.where(falling > 0.0, held, self.offset), self._faded())
         moved = np.where(swinging, in_swing, self.offset)
         return np.where(searching | (self.late > GRACE), reached, moved)
 
     def step(
-        self, touching: Mask, falling: Array, swinging: Mask, loaded: Mask, searching: Mask
+        self,
+        touching: Mask,
+        falling: Array,
+        swinging: Mask,
+        loaded: Mask,
+        searching: Mask,
+        doubted: Mask,
     ) -> None:
         """Advances the offsets by one period (C36).
 
@@ -68,6 +79,8 @@ class Touchdown(Stateful):
             swinging: (6,) legs planned in the air.
             loaded: (6,) legs planned to carry their whole share.
             searching: (6,) feet that the gait clock waits for.
+            doubted: (6,) feet whose sensors are not trusted.
         """
-        self.late = np.where(loaded & ~touching, self.late + self.period, 0.0)
-        self.offset = self._moved(touching, falling, swinging, searching)
+        self.late = np.where(loaded & ~touching & ~doubted, self.late + self.period, 0.0)
+        moved = self._moved(touching, falling, swinging, searching)
+        self.offset = np.where(doubted, self._faded(), moved)

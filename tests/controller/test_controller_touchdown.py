@@ -28,7 +28,7 @@ def test_a_foot_that_meets_the_ground_early_keeps_the_height_at_which_it_touched
     for _ in range(15):
         fall = 0.001
         height -= fall
-        down.step(only(2), np.full(6, fall), YES, NO, NO)
+        down.step(only(2), np.full(6, fall), YES, NO, NO, NO)
         total += fall
         heights.append(height + down.offset[2])
     np.testing.assert_allclose(heights, 0.02, atol=1e-12)
@@ -38,22 +38,22 @@ def test_a_foot_that_meets_the_ground_early_keeps_the_height_at_which_it_touched
 
 def test_only_a_foot_that_swings_is_held_up() -> None:
     down = Touchdown(period=PERIOD)
-    down.step(YES, np.full(6, 0.002), NO, NO, NO)
+    down.step(YES, np.full(6, 0.002), NO, NO, NO, NO)
     assert not down.offset.any()
 
 
 def test_it_keeps_it_through_its_stance_and_gives_it_up_in_the_next_swing() -> None:
     down = Touchdown(period=PERIOD)
     for _ in range(5):
-        down.step(only(2), np.full(6, 0.002), YES, NO, NO)
+        down.step(only(2), np.full(6, 0.002), YES, NO, NO, NO)
     for _ in range(100):
-        down.step(YES, STILL, NO, YES, NO)
+        down.step(YES, STILL, NO, YES, NO, NO)
     assert down.offset[2] == pytest.approx(0.01)
     for k in range(1, 40):
-        down.step(NO, STILL, YES, NO, NO)
+        down.step(NO, STILL, YES, NO, NO, NO)
         assert down.offset[2] == pytest.approx(0.01 * math.exp(-k * PERIOD / 0.06))
     for _ in range(60):
-        down.step(NO, STILL, YES, NO, NO)
+        down.step(NO, STILL, YES, NO, NO, NO)
     assert down.offset[2] == 0.0
     assert not down.busy()
 
@@ -61,7 +61,7 @@ def test_it_keeps_it_through_its_stance_and_gives_it_up_in_the_next_swing() -> N
 def test_a_foot_is_held_no_higher_than_it_may() -> None:
     down = Touchdown(period=PERIOD)
     for _ in range(30):
-        down.step(only(2), np.full(6, 0.002), YES, NO, NO)
+        down.step(only(2), np.full(6, 0.002), YES, NO, NO, NO)
     assert down.offset[2] == 0.03
 
 
@@ -69,7 +69,7 @@ def test_a_foot_that_finds_no_ground_reaches_down_after_the_grace_time_to_the_li
     down, missing = Touchdown(period=PERIOD), ~only(2)
     offsets = []
     for _ in range(150):
-        down.step(missing, STILL, NO, YES, NO)
+        down.step(missing, STILL, NO, YES, NO, NO)
         offsets.append(down.offset[2])
     begun = next(k for k, offset in enumerate(offsets) if offset)
     assert begun in {8, 9}  # 40 ms are 8 periods; times are sums, so it may be the 9th
@@ -80,14 +80,14 @@ def test_a_foot_that_finds_no_ground_reaches_down_after_the_grace_time_to_the_li
 def test_it_stops_where_it_finds_the_ground() -> None:
     down, missing = Touchdown(period=PERIOD), ~only(2)
     for _ in range(20):
-        down.step(missing, STILL, NO, YES, NO)
+        down.step(missing, STILL, NO, YES, NO, NO)
     found = down.offset[2]
     assert -0.02 < found < 0.0
     for _ in range(50):
-        down.step(YES, STILL, NO, YES, NO)
+        down.step(YES, STILL, NO, YES, NO, NO)
     assert down.offset[2] == found
     for _ in range(7):
-        down.step(missing, STILL, NO, YES, NO)  # a short loss of contact does not move the foot
+        down.step(missing, STILL, NO, YES, NO, NO)  # a short loss of contact does not move the foot
     assert down.offset[2] == found
 
 
@@ -101,6 +101,7 @@ def test_on_flat_ground_nothing_happens() -> None:
             YES if swings else NO,
             NO if swings else YES,
             NO,
+            NO,
         )
         assert not down.busy()
         assert not down.offset.any()
@@ -109,30 +110,48 @@ def test_on_flat_ground_nothing_happens() -> None:
 def test_an_awaited_foot_searches_at_once_at_a_set_speed_and_stops_within_a_period() -> None:
     down = Touchdown(period=PERIOD)
     for k in range(1, 21):
-        down.step(NO, STILL, YES, NO, only(2))
+        down.step(NO, STILL, YES, NO, only(2), NO)
         assert down.offset[2] == pytest.approx(-0.08 * PERIOD * k)
     assert np.count_nonzero(down.offset) == 1
     found = down.offset[2]
-    down.step(only(2), STILL, YES, NO, NO)
+    down.step(only(2), STILL, YES, NO, NO, NO)
     assert down.offset[2] == found
     for _ in range(200):
-        down.step(NO, STILL, YES, NO, only(2))
+        down.step(NO, STILL, YES, NO, only(2), NO)
     assert down.offset[2] == -0.04
+
+
+@pytest.mark.parametrize("height", [0.012, -0.012])
+@pytest.mark.parametrize("swings", [True, False])
+def test_a_foot_whose_sensor_is_doubted_returns_to_its_path_in_its_stance_too(
+    height: float, swings: bool
+) -> None:
+    down = Touchdown(period=PERIOD)
+    down.restore({"offset": np.full(6, height), "late": np.full(6, 0.05)})
+    swinging, loaded = (YES, NO) if swings else (NO, YES)
+    for k in range(1, 20):
+        down.step(YES, STILL, swinging, loaded, only(3), only(2))
+        assert down.offset[2] == pytest.approx(height * math.exp(-k * PERIOD / 0.06))
+    assert down.offset[1] == height
+    for _ in range(100):
+        down.step(NO, np.full(6, 0.001), swinging, loaded, only(2), only(2))
+    assert down.offset[2] == 0.0
+    assert down.late[2] == 0.0
 
 
 def test_what_is_negligible_goes_at_once() -> None:
     down = Touchdown(period=PERIOD)
     for size, goes in ((0.99e-5, True), (1.01e-5, False)):
         down.restore({"offset": np.full(6, size), "late": STILL})
-        down.step(NO, STILL, YES, NO, NO)
+        down.step(NO, STILL, YES, NO, NO, NO)
         assert (down.offset == 0.0).all() == goes
 
 
 def test_a_saved_state_does_not_change() -> None:
     down = Touchdown(period=PERIOD)
-    down.step(only(2), np.full(6, 0.002), YES, NO, NO)
+    down.step(only(2), np.full(6, 0.002), YES, NO, NO, NO)
     state = down.save()
-    down.step(only(2), np.full(6, 0.002), YES, NO, NO)
+    down.step(only(2), np.full(6, 0.002), YES, NO, NO, NO)
     down.restore(state)
     assert down.offset[2] == 0.002
 

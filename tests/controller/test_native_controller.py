@@ -32,7 +32,7 @@ from hexapod_cosim.models import load_robot
 
 ROBOTS = ("athena", "phantomx_mk4")
 ALL_PARTS = Parts(suspension=True)
-EVERY_PART = replace(ALL_PARTS, slow_landing=True)
+EVERY_PART = replace(ALL_PARTS, slow_landing=True, minmax_torque=True)
 NO_FALLBACK = replace(ALL_PARTS, fallback=False)
 ANGLE = 1e-12  # rad
 SPEED = 1e-12  # relative to a servo's largest speed
@@ -424,12 +424,13 @@ def test_each_part_can_be_switched_off(controller_core: ct.CDLL, part: str) -> N
     )
 
 
+@pytest.mark.parametrize("minmax", [False, True])
 @pytest.mark.parametrize("gait", ["tripod", "amble"])
 @pytest.mark.parametrize("weight", [0.0, 0.1, 0.5, 0.99])
 def test_walks_with_a_planned_squeeze_are_the_same(
-    controller_core: ct.CDLL, weight: float, gait: str
+    controller_core: ct.CDLL, weight: float, gait: str, minmax: bool
 ) -> None:
-    setup = setup_of(gait=gait, parts=Parts(squeeze=weight))
+    setup = setup_of(gait=gait, parts=Parts(squeeze=weight, minmax_torque=minmax))
     worst, _ = differences(controller_core, setup, sense=Ground(), steps=1000)
     assert close(worst)
 

@@ -115,6 +115,20 @@ def test_with_a_dead_sensor_it_walks_on_by_the_plan_of_that_leg() -> None:
 
 
 @pytest.mark.usefixtures("plant_build")
+@pytest.mark.parametrize("leg", ["LF", "RM"])
+def test_a_dead_sensor_makes_no_foot_land_harder_on_level_ground(leg: str) -> None:
+    """The foot whose sensor is silent is lowered until the sensor is doubted, and not for longer:
+    otherwise it lifts a corner of the torso, which posture levels, and lands too high.
+    """
+    whole, hurt = (
+        walk("athena", "compliant", f"events=[{event}]", duration=7.0)
+        for event in ("", f'{{time=3.3, leg="{leg}", fault="dead"}}')
+    )
+    assert hurt.facts["walk"]["fallback"] > 0.4
+    assert hurt.metrics["peak_force"] < 1.1 * whole.metrics["peak_force"]
+
+
+@pytest.mark.usefixtures("plant_build")
 def test_a_walk_that_leans_and_turns_completes_and_holds_what_is_commanded() -> None:
     command = "command={vx=0.04, yaw_rate=0.15, height=0.008, roll=0.04, pitch=-0.03}"
     recording = walk("athena", "compliant", command, duration=3.0).outcome.recording

@@ -144,7 +144,7 @@ static void meet_ground(const hxComplianceModel *model, const hxPlan *plan,
     searching[leg] = plan->awaited[leg] && !laws->doubted[leg] && !carries(laws, leg);
   }
   hx_touchdown_step(model->period, laws->touching, falling, plan->swinging, plan->standing,
-                    searching, &laws->touchdown);
+                    searching, laws->doubted, &laws->touchdown);
 }
 
 /* Decides between a wrong sensor and ground that is met early or late. */

@@ -47,7 +47,7 @@ void hx_compliant_compile(const hxControllerDefinition *definition, const hxLegS
   hx_inverse_dynamics_demand(&model->dynamics, leg, &motion, still, &level, &rest);
   hx_support_compile(definition, &rest, &model->support);
   hx_compliance_compile(definition, -model->dynamics.floor, &model->laws);
-  hx_planned_squeeze_compile(definition->friction, model->laws.weight, -model->dynamics.floor,
+  hx_planned_squeeze_compile(definition, model->laws.weight, -model->dynamics.floor,
                              &model->squeeze);
   hx_hold_compile(definition, &model->hold);
   hx_warmth_compile(definition, &model->warmth);

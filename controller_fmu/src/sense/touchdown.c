@@ -22,23 +22,31 @@ int hx_touchdown_busy(const hxTouchdown *touchdown) {
   return busy;
 }
 
+/* Returns the next offset of a foot that returns to its path. */
+static double faded(double offset, double period) {
+  return fabs(offset) > negligible ? offset * hx_decay(-period / return_time) : 0.0;
+}
+
 /* Returns the next offset of a foot that has missed the ground for a time [s]. */
 static double moved(double offset, double late, double period, int touching, double falling,
                     int swinging, int searching) {
   if (searching || late > grace) return fmax(offset - reach_speed * period, -hx_reach_limit);
   if (swinging && touching && falling > 0.0) return fmin(offset + falling, hold_limit);
-  if (swinging && !touching)
-    return fabs(offset) > negligible ? offset * hx_decay(-period / return_time) : 0.0;
+  if (swinging && !touching) return faded(offset, period);
   return offset;
 }
 
 void hx_touchdown_step(double period, const int touching[HX_LEGS], const double falling[HX_LEGS],
                        const int swinging[HX_LEGS], const int loaded[HX_LEGS],
-                       const int searching[HX_LEGS], hxTouchdown *touchdown) {
+                       const int searching[HX_LEGS], const int doubted[HX_LEGS],
+                       hxTouchdown *touchdown) {
   for (int leg = 0; leg < HX_LEGS; ++leg) {
-    const int misses = loaded[leg] && !touching[leg];
+    const int misses = loaded[leg] && !touching[leg] && !doubted[leg];
+    const double offset = touchdown->offset[leg];
     touchdown->late[leg] = misses ? touchdown->late[leg] + period : 0.0;
-    touchdown->offset[leg] = moved(touchdown->offset[leg], touchdown->late[leg], period,
-                                   touching[leg], falling[leg], swinging[leg], searching[leg]);
+    touchdown->offset[leg] = doubted[leg]
+                                 ? faded(offset, period)
+                                 : moved(offset, touchdown->late[leg], period, touching[leg],
+                                         falling[leg], swinging[leg], searching[leg]);
   }
 }

@@ -24,10 +24,11 @@ int hx_touchdown_busy(const hxTouchdown *touchdown);
 /* Advances by one period [s] (C36). touching: feet that report a force; falling: distance by which
  * the path of a foot that met the ground early moves down in this period [m], 0 for the others;
  * swinging: legs planned in the air; loaded: legs planned to carry their whole share; searching:
- * feet that the gait clock waits for. */
+ * feet that the gait clock waits for; doubted: feet whose sensors are not trusted. */
 void hx_touchdown_step(double period, const int touching[HX_LEGS], const double falling[HX_LEGS],
                        const int swinging[HX_LEGS], const int loaded[HX_LEGS],
-                       const int searching[HX_LEGS], hxTouchdown *touchdown);
+                       const int searching[HX_LEGS], const int doubted[HX_LEGS],
+                       hxTouchdown *touchdown);
 
 HX_HIDDEN_END
 
