@@ -19,6 +19,7 @@ from hexapod_cosim.cosim.identify.identify import NEAR, Estimate, Identified
 from hexapod_cosim.cosim.identify.page import TITLES, Section, number, rendered
 from hexapod_cosim.cosim.identify.rigid.base_parameters import base_of, group_parameters
 from hexapod_cosim.cosim.identify.robot_file import SENSORS, sensors_table, write_robot
+from hexapod_cosim.cosim.identify.screening import left_out
 from hexapod_cosim.cosim.identify.unknowns import GEAR
 
 BASE_KEYS = ("combination", "unit", "before", "least_squares", "deviation", "found")
@@ -143,7 +144,11 @@ def misfit_rows(found: Identified) -> list[list[str]]:
 
 def warnings(found: Identified) -> list[str]:
     """Returns what a user must know of the result, as sentences."""
-    texts = [f"{column.name} is left out: {column.why}." for _, column in found.bad]
+    texts = [
+        text
+        for one in found.experiments
+        for text in left_out([column for number, column in found.bad if number == one.number])
+    ]
     if _has_motor_angles(found) and found.file.servo.gear_stiffness == 0.0:
         texts.append(
             "The log has the angles of rotors, but the gears of the robot file are rigid: their "
