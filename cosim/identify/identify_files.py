@@ -20,6 +20,7 @@ from hexapod_cosim.cosim.identify.page import TITLES, Section, number, rendered
 from hexapod_cosim.cosim.identify.rigid.base_parameters import base_of, group_parameters
 from hexapod_cosim.cosim.identify.robot_file import SENSORS, sensors_table, write_robot
 from hexapod_cosim.cosim.identify.screening import left_out
+from hexapod_cosim.cosim.identify.start import moving_at_rest
 from hexapod_cosim.cosim.identify.unknowns import GEAR
 
 BASE_KEYS = ("combination", "unit", "before", "least_squares", "deviation", "found")
@@ -149,6 +150,14 @@ def warnings(found: Identified) -> list[str]:
         for one in found.experiments
         for text in left_out([column for number, column in found.bad if number == one.number])
     ]
+    for one in found.experiments:
+        moving = moving_at_rest(one.log)
+        if moving:
+            texts.append(
+                f"The robot still moves at the start of {one.log.where}, where its commands stand "
+                f"still ({moving}). The simulation begins with the mean of these rows, at rest: "
+                "let the robot stand longer before the recording, or cut the first rows off."
+            )
     if _has_motor_angles(found) and found.file.servo.gear_stiffness == 0.0:
         texts.append(
             "The log has the angles of rotors, but the gears of the robot file are rigid: their "

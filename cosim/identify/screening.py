@@ -89,6 +89,8 @@ def _by_itself(measured: Array, simulated: Array, time: Array) -> str | None:
 def _against(experiment: Experiment, k: int, measured: Array, simulated: Array) -> str | None:
     """Returns why a column does not follow the simulation as its siblings do; None if it does."""
     own = correlation(measured, simulated[:, k])
+    if not np.isfinite(own):  # of a foot in the air in all rows
+        return None
     scale = float(np.nanstd(measured) / np.std(simulated[:, k]))
     if own < AGAINST:
         return f"wrong sign: its correlation with the simulation is {own:.2f}"

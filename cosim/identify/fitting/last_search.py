@@ -24,6 +24,8 @@ BOUND = 3.0  # deviations    of residuals; larger ones count linearly (Huber's l
 # is wrong by a deviation adds 1.
 ENOUGH = 0.1
 FINISHING = 12  # steps of the last search, at most
+# Readings that jump come and go near the optimum, so that a step is left, if a short one.
+NEAR, SHORTER = 1.0, 0.5  # deviations; of the step before
 SHORTENED = (1.0, 0.5, 0.25, 0.1, 0.03)  # of a step, until the sum of squares falls
 SUFFICIENT = 0.1  # share of the fall that derivatives say
 # A longer step changes residuals otherwise than derivatives say where nothing jumps, too.
@@ -72,36 +74,40 @@ def finished(problem: Problem, z: Array, report: Progress) -> Array:
 
     The noise of a channel is the typical size of its residuals at each step.
     """
+    before = np.inf
     for number in range(FINISHING):
         report(f"all rows, step {number + 1}")
         problem.count_all()
         problem.set_noise(problem.errors(z))
         problem.leave_out_bent(z)
-        better = _stepped(problem, z)
-        if better is None:
+        better, length = _stepped(problem, z)
+        if better is None or (length < NEAR and length > SHORTER * before):
             break
-        z = better
+        z, before = better, length
     return z
 
 
-def _stepped(problem: Problem, z: Array) -> Array | None:
-    """Returns the numbers after a step; None where it is short or no part of it is better."""
+def _stepped(problem: Problem, z: Array) -> tuple[Array | None, float]:
+    """Returns the numbers after a step, and its length in deviations.
+
+    None where it is short or no part of it is better.
+    """
     low, high = problem.bounds()
     while True:
         jacobian, residuals = problem.jacobian(z, FINE), problem.residuals(z)
         step = bounded_step(problem, z, jacobian, residuals)
         length = float(np.linalg.norm(jacobian @ step))
         if length < ENOUGH:
-            return None
+            return None, length
         cost = huber(residuals)
         for share in SHORTENED:
             moved = np.clip(z + share * step, low, high)
             change = problem.residuals(moved) - residuals
             if huber(residuals + change) < cost - SUFFICIENT * share * length**2:
-                return moved
+                return moved, length
             if share == 1.0 and length < LINEAR and np.isfinite(change).all():
                 linear = jacobian @ (moved - z)
                 if problem.leave_out_nonlinear(change, linear):
                     break  # again without these
         else:
-            return None
+            return None, length
