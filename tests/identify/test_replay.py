@@ -138,18 +138,6 @@ def test_degrees_are_refused_with_the_commands_name(log: Log, athena_fmu: Path) 
         replay(wrong, load_robot("athena"), fmu=athena_fmu)
 
 
-def test_a_replay_names_wrong_commands_and_simulates_them(log: Log, athena_fmu: Path) -> None:
-    def turned(data: np.ndarray, names: tuple[str, ...]) -> None:
-        place = names.index("RM.coxa.angle_ref")
-        data[:, place] = -data[:, place]
-
-    done = replay(log_of(edited(log, turned), "x.csv"), load_robot("athena"), fmu=athena_fmu)
-    assert [one.name for one in done.commands] == ["RM.coxa.angle_ref"]
-    assert done.readings == ()
-    (text,) = done.warnings
-    assert "cannot have got RM.coxa.angle_ref: wrong sign" in text
-
-
 def test_a_replay_names_wrong_readings_and_no_others(log: Log, athena_fmu: Path) -> None:
     def dead(data: np.ndarray, names: tuple[str, ...]) -> None:
         data[:, names.index("LM.femur.torque")] = 0.3

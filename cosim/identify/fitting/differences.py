@@ -29,6 +29,7 @@ class Slopes:
 # A long step is what the search needs while sums of squares are rough. But its error of second
 # order hides combinations of numbers that the readings hardly tell: with it, the deviation of the
 # torso's mass came out five times too small. Short central differences have converged there.
+UNLIKE = 0.5  # difference of slopes to both sides, in the smaller one, beyond which one jumps
 ROUGH = Slopes(0.1, both=False, near=0.1)
 FINE = Slopes(0.01, both=True, near=0.0)
 
@@ -72,26 +73,31 @@ def differences(
             second = np.abs(forth + back)
             np.maximum(bend, np.where(np.isfinite(second), second, 0.0), out=bend)
     slopes = [
-        _slopes(own, one_sided=delay, limited=made == FINE)
+        _slopes(own, long_delay=delay and made != FINE)
         for own, delay in zip(changes, delays, strict=True)
     ]
     return Differences(z, made, slopes, bend)
 
 
-def _slopes(changes: Sequence[Change], *, one_sided: bool, limited: bool) -> list[Array]:
+def _slopes(changes: Sequence[Change], *, long_delay: bool) -> list[Array]:
     """Returns the slopes that changes of predictions over steps give.
 
-    one_sided: one for each step, else one for all. limited: of one-sided slopes the smaller one of
-    each prediction, which does not jump.
+    long_delay: one for each of two long steps of a delay, else one for all.
     """
-    if one_sided or len(changes) < 2:
-        found = [change / step for step, change in changes]
-        if limited and len(found) == 2:
-            found = [np.where(np.abs(found[0]) < np.abs(found[1]), *found)]
-    else:
-        (step, change), (other, changed) = changes
-        found = [(change - changed) / (step - other)]
+    found = [change / step for step, change in changes]
+    if len(found) == 2 and not long_delay:
+        found = [_central(*found)]
     return [np.where(np.isfinite(slope), slope, 0.0) for slope in found]
+
+
+def _central(forth: Array, back: Array) -> Array:
+    """Returns the means of slopes to both sides; where they differ, the smaller one.
+
+    Over a jump a slope is too large, by so much more the shorter the step is.
+    """
+    smaller = np.where(np.abs(forth) < np.abs(back), forth, back)
+    differ = np.abs(forth - back) > UNLIKE * np.abs(smaller)
+    return np.where(differ, smaller, 0.5 * (forth + back))
 
 
 def size_of(slope: Array) -> float:
