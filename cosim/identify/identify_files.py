@@ -21,7 +21,7 @@ from hexapod_cosim.cosim.identify.rigid.base_parameters import base_of, group_pa
 from hexapod_cosim.cosim.identify.robot_file import SENSORS, sensors_table, write_robot
 from hexapod_cosim.cosim.identify.screening import left_out
 from hexapod_cosim.cosim.identify.start import moving_at_rest
-from hexapod_cosim.cosim.identify.unknowns import GEAR
+from hexapod_cosim.cosim.identify.unknowns import BIAS, GEAR
 
 BASE_KEYS = ("combination", "unit", "before", "least_squares", "deviation", "found")
 KIND, ROBOT_FILE, REPORT, RESULT = "identify", "robot.toml", "report.html", "identify.json"
@@ -205,6 +205,16 @@ def estimate_rows(estimates: Sequence[Estimate]) -> list[list[str]]:
     ]
 
 
+def shown_estimates(estimates: Sequence[Estimate]) -> tuple[list[Estimate], int]:
+    """Returns the estimates for a terminal, without biases that may be 0, and how many these are."""
+    shown = [
+        one
+        for one in estimates
+        if not (one.key.startswith(BIAS) and one.low <= 0.0 <= one.high and one.told)
+    ]
+    return shown, len(estimates) - len(shown)
+
+
 def error_rows(pairs: Sequence[tuple[Difference, Difference]]) -> list[list[str]]:
     """Returns the rows of a table with ERRORS."""
     return [
@@ -243,7 +253,9 @@ def _has_motor_angles(found: Identified) -> bool:
 
 def proposal_text(proposals: Sequence[Proposal]) -> str:
     """Returns which experiment would tell more, as a sentence."""
-    if not proposals or not proposals[0].tells:
+    if not proposals:
+        return "No walk was tried."
+    if not proposals[0].tells:
         return "None of the walks that were tried would tell more."
     best = proposals[0]
     return f"{best.title} would tell: {', '.join(best.tells)}."

@@ -80,7 +80,7 @@ def test_a_difference_over_a_jump_is_bent_and_one_of_a_curve_is_not() -> None:
     back = np.array([-0.01, 1e-4, -0.01])
     found = differences(np.zeros(1), FINE, [[(0.01, forth), (-0.01, back)]], [False], 3)
     assert found.bend == pytest.approx([0.0, 2e-4, 1.0], abs=1e-12)
-    assert found.slopes[0][0] == pytest.approx([1.0, 0.01, 1.0], abs=1e-12)
+    assert found.slopes[0][0] == pytest.approx([1.0, -0.01, 1.0], abs=1e-12)
 
 
 def test_the_slope_by_a_delay_is_that_of_the_side_without_a_jump() -> None:
