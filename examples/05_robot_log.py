@@ -2,8 +2,9 @@
 
 usage: python examples/05_robot_log.py [log.mcap]
 
-A plant FMU with other servos, friction and payload stands for the real robot. It stands still for
-half a second and walks; sensors with noise read it. The log holds what a robot could record.
+A plant FMU with other servos, friction and payload stands for the real robot. It stands until it
+has sagged under its payload, then the log begins: half a second of standing still, and a walk.
+Sensors with noise read it. The log holds what a robot could record.
 """
 
 import sys
@@ -18,10 +19,11 @@ from hexapod_cosim.cosim.master.recorder import Recording
 
 SECRET = {"servo.kp": 34.0, "servo.coulomb_friction": 0.08, "friction.mu": 0.55, "torso.mass": 2.9}
 EXACT = {"solver.tolerance": 1e-6}
+BEFORE = 1.5  # s    of standing before the log begins
 WALK = [
-    {"time": 0.5, "vx": 0.08},
-    {"time": 1.5, "vx": 0.05, "yaw_rate": 0.25},
-    {"time": 2.5, "vx": 0.05, "vy": 0.04, "pitch": 0.06},
+    {"time": BEFORE + 0.5, "vx": 0.08},
+    {"time": BEFORE + 1.5, "vx": 0.05, "yaw_rate": 0.25},
+    {"time": BEFORE + 2.5, "vx": 0.05, "vy": 0.04, "pitch": 0.06},
 ]
 NOISE = {  # standard deviations of the sensors, by the end of the columns' names
     ".angle": 1e-3,  # rad
@@ -46,10 +48,11 @@ COMMANDS = (".angle_ref", ".speed_ref")
 
 def robot_log(seed: int = 1) -> Recording:
     """Returns the log of four seconds: commands as they were sent, readings with noise."""
-    settings = {"duration": 4, "command": WALK, **SECRET, **EXACT}
-    recording = hexapod_cosim.simulate("walk_flat", "kinematic", settings=settings).recording
+    settings = {"duration": BEFORE + 4.0, "command": WALK, **SECRET, **EXACT}
+    whole = hexapod_cosim.simulate("walk_flat", "kinematic", settings=settings).recording
+    recording = whole.rows(slice(int(np.searchsorted(whole.time, BEFORE - 1e-9)), None))
     rng = np.random.default_rng(seed)
-    names, columns = ["time"], [recording.time]
+    names, columns = ["time"], [recording.time - BEFORE]
     for name in recording.names:
         noise = next((size for end, size in NOISE.items() if name.endswith(end)), None)
         if noise is not None and not name.startswith("controller."):

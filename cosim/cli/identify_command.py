@@ -131,7 +131,10 @@ def _show(found: Identified, files: Sequence[Path]) -> None:
     from hexapod_cosim.cosim.identify import identify_files as files_of  # noqa: PLC0415
 
     errors = files_of.error_rows(found.held_out() or found.fitted())
-    show_table(files_of.ESTIMATES, files_of.estimate_rows(found.estimates), right=(2, 3, 4))
+    shown, zero = files_of.shown_estimates(found.estimates)
+    show_table(files_of.ESTIMATES, files_of.estimate_rows(shown), right=(2, 3, 4))
+    if zero:
+        show_text(f"{zero} biases of sensors may be 0; sensors.toml and the report have them.")
     show_table(files_of.ERRORS, errors, right=(2, 3, 4))
     show_text(files_of.untold_text(found))
     show_files(files)

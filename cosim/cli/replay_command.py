@@ -11,7 +11,7 @@ import typer
 
 from hexapod_cosim.cosim.cli.export_command import RobotName
 from hexapod_cosim.cosim.cli.running import FmuFile
-from hexapod_cosim.cosim.cli.terminal import Json, show_files, show_json, show_table, waiting
+from hexapod_cosim.cosim.cli.terminal import Json, show_files, show_json, show_table, waiting, warn
 from hexapod_cosim.cosim.identify.log import read_log
 from hexapod_cosim.cosim.identify.page import COLUMNS, difference_rows
 from hexapod_cosim.cosim.identify.replay import replay as replay_log
@@ -56,9 +56,12 @@ def replay(
             done = replay_log(recorded, own, fmu=fmu, parameters=parameters)
         folder.begin()
         files = write_replay(done, own, folder.path, command=shlex.join(words), settings=parameters)
+    for text in done.warnings:
+        warn(text.removesuffix("."))
     if json:
         channels = [one.as_table() for one in done.channels]
-        show_json({"channels": channels, "files": [str(path) for path in files]})
+        written = [str(path) for path in files]
+        show_json({"channels": channels, "warnings": done.warnings, "files": written})
         return
     show_table(COLUMNS, difference_rows(done.channels), right=(2, 3, 4, 5))
     show_files(files)

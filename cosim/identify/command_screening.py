@@ -45,8 +45,12 @@ class WrongCommandsError(LogError):
 def check_commands(log: Log) -> None:
     """Raises WrongCommandsError for a log with commands that the servos cannot have got."""
     bad = wrong_commands(log)
-    if not bad:
-        return
+    if bad:
+        raise wrong_commands_error(log, bad)
+
+
+def wrong_commands_error(log: Log, bad: Sequence[BadColumn]) -> WrongCommandsError:
+    """Returns the error for a log with wrong commands, which are given."""
     more = f", and {', '.join(one.name for one in bad[1:])}" if len(bad) > 1 else ""
     error = WrongCommandsError(
         "the robot cannot have got the commands of the log",
@@ -57,7 +61,7 @@ def check_commands(log: Log) -> None:
         where=log.where,
     )
     error.columns = tuple(bad)
-    raise error
+    return error
 
 
 def wrong_commands(log: Log) -> list[BadColumn]:

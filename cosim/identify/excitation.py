@@ -19,7 +19,8 @@ from numpy.typing import NDArray
 
 from hexapod_cosim.cosim.export.export import export_fmu
 from hexapod_cosim.cosim.identify.experiment import Experiment
-from hexapod_cosim.cosim.identify.fitting.problem import FINE, Problem
+from hexapod_cosim.cosim.identify.fitting.differences import FINE
+from hexapod_cosim.cosim.identify.fitting.problem import Problem
 from hexapod_cosim.cosim.identify.identify import TOLD, TOLERANCE, Identified
 from hexapod_cosim.cosim.identify.log import Log
 from hexapod_cosim.cosim.identify.log_plant import LogPlant
@@ -118,6 +119,7 @@ def _judged(
     keep = [k for k, row in enumerate(found.fit.rows) if row.group != START]
     z = found.fit.z[keep]
     problem.leave_out_jumps(z)
+    problem.leave_out_bent(z)
     sensitivity = problem.jacobian(z, FINE)[: -len(own)]
     known = np.linalg.inv(found.fit.covariance[np.ix_(keep, keep)])
     both = np.linalg.inv(known + sensitivity.T @ sensitivity)

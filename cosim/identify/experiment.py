@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import cache, lru_cache
 from types import SimpleNamespace
 
 import numpy as np
@@ -15,7 +15,7 @@ from hexapod_cosim.cosim.common.components import PLANT
 from hexapod_cosim.cosim.identify.log import ATTITUDE, CHANNELS, Log
 from hexapod_cosim.cosim.identify.log_plant import LogPlant
 from hexapod_cosim.cosim.identify.start import initial_state
-from hexapod_cosim.cosim.identify.unknowns import CURRENT, DELAY, START, Unknown, changed_robot
+from hexapod_cosim.cosim.identify.unknowns import CURRENT, DELAYS, START, Unknown, changed_robot
 from hexapod_cosim.cosim.interface.names import joint_names, vector_names
 from hexapod_cosim.cosim.interface.start_values import parameter_values
 from hexapod_cosim.models import Robot
@@ -59,6 +59,17 @@ class Experiment:
         """The channel of each column."""
         keys = {name: channel.key for channel in CHANNELS for name in channel.names}
         return [keys[name] for name in self.columns]
+
+    @property
+    def sensors(self) -> list[str]:
+        """The sensors of each column."""
+        return [sensors_of(name) for name in self.columns]
+
+
+@cache
+def sensors_of(name: str) -> str:
+    """Returns the sensors that a column is of: of "joints", "currents", "forces", "imu", "pose"."""
+    return next(channel.sensors for channel in CHANNELS if name in channel.names)
 
 
 def first_part(experiment: Experiment, seconds: float = math.inf) -> Experiment:
@@ -111,20 +122,23 @@ def simulated(
     # the pose in the log is that of the point which the robot file has as the centre of mass
     offset = np.array(base.torso.com) - np.array(robot.torso.com)
     names = [_source(name, base) for name in experiment.columns]
-    different = list(dict.fromkeys([*names, *ATTITUDE]))
+    delays = [values.get(DELAYS[one], 0.0) for one in experiment.sensors]
+    # a position is turned by the attitude of the same time
+    turned = [(name, values.get(DELAYS["pose"], 0.0)) for name in ATTITUDE]
+    pairs = list(dict.fromkeys([*zip(names, delays, strict=True), *turned]))
     found = plant.simulate(
         log,
-        different,
+        [name for name, _ in pairs],
         {
             **(parameters or {}),
             **robot_parameters(robot, base),
             **_start(experiment, robot, zero, {} if is_level(base) else values, offset),
         },
         offset=-zero if zero.any() else None,
-        delay=values.get(DELAY, 0.0),
+        delay=[delay for _, delay in pairs],
     )
-    own = found[:, [different.index(name) for name in names]]
-    attitude = found[:, [different.index(name) for name in ATTITUDE]]
+    own = found[:, [pairs.index(pair) for pair in zip(names, delays, strict=True)]]
+    attitude = found[:, [pairs.index(pair) for pair in turned]]
     return of_point(experiment.columns, own, attitude, offset)
 
 

@@ -19,7 +19,9 @@ from hexapod_cosim.cosim.identify.identify import NEAR, Estimate, Identified
 from hexapod_cosim.cosim.identify.page import TITLES, Section, number, rendered
 from hexapod_cosim.cosim.identify.rigid.base_parameters import base_of, group_parameters
 from hexapod_cosim.cosim.identify.robot_file import SENSORS, sensors_table, write_robot
-from hexapod_cosim.cosim.identify.unknowns import GEAR
+from hexapod_cosim.cosim.identify.screening import left_out
+from hexapod_cosim.cosim.identify.start import moving_at_rest
+from hexapod_cosim.cosim.identify.unknowns import BIAS, GEAR
 
 BASE_KEYS = ("combination", "unit", "before", "least_squares", "deviation", "found")
 KIND, ROBOT_FILE, REPORT, RESULT = "identify", "robot.toml", "report.html", "identify.json"
@@ -143,7 +145,19 @@ def misfit_rows(found: Identified) -> list[list[str]]:
 
 def warnings(found: Identified) -> list[str]:
     """Returns what a user must know of the result, as sentences."""
-    texts = [f"{column.name} is left out: {column.why}." for _, column in found.bad]
+    texts = [
+        text
+        for one in found.experiments
+        for text in left_out([column for number, column in found.bad if number == one.number])
+    ]
+    for one in found.experiments:
+        moving = moving_at_rest(one.log)
+        if moving:
+            texts.append(
+                f"The robot still moves at the start of {one.log.where}, where its commands stand "
+                f"still ({moving}). The simulation begins with the mean of these rows, at rest: "
+                "let the robot stand longer before the recording, or cut the first rows off."
+            )
     if _has_motor_angles(found) and found.file.servo.gear_stiffness == 0.0:
         texts.append(
             "The log has the angles of rotors, but the gears of the robot file are rigid: their "
@@ -191,6 +205,16 @@ def estimate_rows(estimates: Sequence[Estimate]) -> list[list[str]]:
     ]
 
 
+def shown_estimates(estimates: Sequence[Estimate]) -> tuple[list[Estimate], int]:
+    """Returns the estimates for a terminal, without biases that may be 0, and the number of these."""
+    shown = [
+        one
+        for one in estimates
+        if not (one.key.startswith(BIAS) and one.low <= 0.0 <= one.high and one.told)
+    ]
+    return shown, len(estimates) - len(shown)
+
+
 def error_rows(pairs: Sequence[tuple[Difference, Difference]]) -> list[list[str]]:
     """Returns the rows of a table with ERRORS."""
     return [
@@ -229,7 +253,9 @@ def _has_motor_angles(found: Identified) -> bool:
 
 def proposal_text(proposals: Sequence[Proposal]) -> str:
     """Returns which experiment would tell more, as a sentence."""
-    if not proposals or not proposals[0].tells:
+    if not proposals:
+        return "No walk was tried."
+    if not proposals[0].tells:
         return "None of the walks that were tried would tell more."
     best = proposals[0]
     return f"{best.title} would tell: {', '.join(best.tells)}."

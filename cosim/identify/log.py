@@ -41,27 +41,38 @@ class LogError(HexapodError):
 
 @dataclass(frozen=True)
 class Channel:
-    """Describes the readings of one kind: key, title, unit and names of the columns."""
+    """Describes the readings of one kind: key, title, unit, sensors and names of the columns.
+
+    Readings of the same sensors are late by the same delay.
+    """
 
     key: str
     title: str
     unit: str
+    sensors: str
     names: tuple[str, ...]
 
 
 CHANNELS = (
-    Channel("angle", "Joint angles", "rad", tuple(joint_names("angle"))),
-    Channel("motor_angle", "Motor angles", "rad", tuple(joint_names("motor_angle"))),
-    Channel("speed", "Joint speeds", "rad/s", tuple(joint_names("speed"))),
-    Channel("torque", "Servo torques", "N.m", tuple(joint_names("torque"))),
-    Channel("current", "Servo currents", "A", tuple(joint_names("current"))),
-    Channel("normal_force", "Normal forces of feet", "N", tuple(foot_names("normal_force"))),
-    Channel("force", "Forces of feet", "N", tuple(foot_vector_names("force"))),
-    Channel("gyroscope", "Gyroscope", "rad/s", tuple(vector_names("imu.angular_velocity"))),
-    Channel("accelerometer", "Accelerometer", "m/s2", tuple(vector_names("imu.specific_force"))),
-    Channel("position", "Position of the torso", "m", tuple(vector_names("torso.position"))),
-    Channel("attitude", "Attitude of the torso", "rad", ATTITUDE),
+    Channel("angle", "Joint angles", "rad", "joints", tuple(joint_names("angle"))),
+    Channel("motor_angle", "Motor angles", "rad", "joints", tuple(joint_names("motor_angle"))),
+    Channel("speed", "Joint speeds", "rad/s", "joints", tuple(joint_names("speed"))),
+    Channel("torque", "Servo torques", "N.m", "currents", tuple(joint_names("torque"))),
+    Channel("current", "Servo currents", "A", "currents", tuple(joint_names("current"))),
+    Channel(
+        "normal_force", "Normal forces of feet", "N", "forces", tuple(foot_names("normal_force"))
+    ),
+    Channel("force", "Forces of feet", "N", "forces", tuple(foot_vector_names("force"))),
+    Channel("gyroscope", "Gyroscope", "rad/s", "imu", tuple(vector_names("imu.angular_velocity"))),
+    Channel(
+        "accelerometer", "Accelerometer", "m/s2", "imu", tuple(vector_names("imu.specific_force"))
+    ),
+    Channel(
+        "position", "Position of the torso", "m", "pose", tuple(vector_names("torso.position"))
+    ),
+    Channel("attitude", "Attitude of the torso", "rad", "pose", ATTITUDE),
 )
+SENSORS = tuple(dict.fromkeys(channel.sensors for channel in CHANNELS))
 COMMANDS = tuple(joint_names("angle_ref"))
 
 

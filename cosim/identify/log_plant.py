@@ -15,7 +15,8 @@ from hexapod_cosim.cosim.master.fmu import Fmu
 from hexapod_cosim.models import FmuError
 
 Array = NDArray[np.float64]
-Event = tuple[float, bool, int]  # time [s], whether it is a command, row of the log
+# time [s], whether it is a command, row of the log, which of the delays
+Event = tuple[float, bool, int, int]
 SAME_TIME = 1e-9  # s    events closer than this are one
 
 
@@ -43,7 +44,7 @@ class LogPlant(Closing):
         parameters: Mapping[str, float],
         *,
         offset: Array | None = None,
-        delay: float = 0.0,
+        delay: float | Sequence[float] = 0.0,
     ) -> Array:
         """Simulates a log and returns outputs at the times of its rows (rows, names).
 
@@ -52,14 +53,23 @@ class LogPlant(Closing):
             names: outputs of the FMU, or motor angles.
             parameters: initial state and further parameters.
             offset: added to the commanded angles (18,) [rad]; None: nothing.
-            delay: how much older than its row a reading is [s].
+            delay: how much older than its row a reading is [s]; one for all, or one for each name.
 
         Raises FmuError for a parameter that is refused, LogError for a refused command or step.
         """
         commands, time = log.commands, log.time
         inputs = self.fmu.block(list(commands))
-        sources = list(dict.fromkeys(term for name in names for term in _terms(name)))
-        outputs = self.fmu.block(sources)
+        late = [delay] * len(names) if isinstance(delay, float | int) else list(delay)
+        delays = list(dict.fromkeys(late))
+        # outputs that are read at the same time, one block for each delay
+        sources = [
+            list(dict.fromkeys(
+                term for name, own in zip(names, late, strict=True) if own == one
+                for term in _terms(name)
+            ))
+            for one in delays
+        ]  # fmt: skip
+        outputs = [self.fmu.block(own) for own in sources]
         table = np.column_stack(list(commands.values()))
         if offset is not None:
             places = [k for k, name in enumerate(commands) if name.endswith(".angle_ref")]
@@ -68,9 +78,9 @@ class LogPlant(Closing):
         self.fmu.set_blocks(self._common)
         self.fmu.set_parameters(parameters)
         self.fmu.initialise(float(time[0]), float(time[-1]))
-        found = np.empty((len(time), len(sources)))
+        found = [np.empty((len(time), len(own))) for own in sources]
         try:
-            self._run(_events(time, delay), table, inputs, outputs, found)
+            self._run(_events(time, delays), table, inputs, outputs, found)
         except FmuError as error:
             raise LogError(
                 "the plant cannot follow the log",
@@ -79,13 +89,23 @@ class LogPlant(Closing):
                 fix="check the robot file and the units of the commands",
                 where=log.where,
             ) from error
-        return _summed(found, sources, names)
+        columns = {
+            (one, term): values[:, k]
+            for one, own, values in zip(delays, sources, found, strict=True)
+            for k, term in enumerate(own)
+        }
+        return _summed(columns, names, late)
 
     def _run(
-        self, events: Sequence[Event], table: Array, inputs: Any, outputs: Any, found: Array
+        self,
+        events: Sequence[Event],
+        table: Array,
+        inputs: Any,
+        outputs: Sequence[Any],
+        found: Sequence[Array],
     ) -> None:
         now = events[0][0]
-        for time, is_command, row in events:
+        for time, is_command, row, which in events:
             if time - now > SAME_TIME:
                 self.fmu.step(now, time - now)
                 now = time
@@ -93,8 +113,8 @@ class LogPlant(Closing):
                 inputs.values[:] = table[row]
                 inputs.set()
             else:
-                outputs.get()
-                found[row] = outputs.values
+                outputs[which].get()
+                found[which][row] = outputs[which].values
 
     def close(self) -> None:
         """Frees the FMU."""
@@ -110,19 +130,25 @@ def _terms(name: str) -> tuple[str, ...]:
     return (f"{stem}.angle", f"{stem}.gear_deflection") if kind == "motor_angle" else (name,)
 
 
-def _summed(found: Array, sources: Sequence[str], names: Sequence[str]) -> Array:
-    """Returns the columns (rows, names) from outputs of the FMU (rows, sources)."""
-    if list(names) == list(sources):
-        return found
-    places = [[sources.index(term) for term in _terms(name)] for name in names]
-    return np.column_stack([found[:, own].sum(axis=1) for own in places])
+def _summed(
+    columns: Mapping[tuple[float, str], Array], names: Sequence[str], delays: Sequence[float]
+) -> Array:
+    """Returns columns (rows, names) from outputs of the FMU, by their delay and name."""
+    found = []
+    for name, delay in zip(names, delays, strict=True):
+        first, *more = (columns[delay, term] for term in _terms(name))
+        found.append(sum(more, start=first))
+    return np.column_stack(found)
 
 
-def _events(time: Array, delay: float) -> list[Event]:
+def _events(time: Array, delays: Sequence[float]) -> list[Event]:
     """Returns all readings and commands in order of time; a reading comes before the command of
     the same time, as the master reads. Readings from before the first row are of the first row.
     """
-    readings = np.maximum(time - delay, time[0]).tolist()
-    events = [(t, False, k) for k, t in enumerate(readings)]
-    events += [(t, True, k) for k, t in enumerate(time[:-1].tolist())]
+    events = [
+        (t, False, k, which)
+        for which, delay in enumerate(delays)
+        for k, t in enumerate(np.maximum(time - delay, time[0]).tolist())
+    ]
+    events += [(t, True, k, 0) for k, t in enumerate(time[:-1].tolist())]
     return sorted(events)

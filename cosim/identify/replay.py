@@ -11,13 +11,19 @@ from typing import Any
 import numpy as np
 
 from hexapod_cosim.cosim.export.export import export_fmu
+from hexapod_cosim.cosim.identify.command_screening import (
+    wrong_commands,
+    wrong_commands_error,
+)
 from hexapod_cosim.cosim.identify.comparison import (
     Difference,
     channel_differences,
     column_differences,
 )
-from hexapod_cosim.cosim.identify.log import Log, without_readings
+from hexapod_cosim.cosim.identify.experiment import Experiment
+from hexapod_cosim.cosim.identify.log import Log, LogError, without_readings
 from hexapod_cosim.cosim.identify.log_plant import LogPlant
+from hexapod_cosim.cosim.identify.screening import BadColumn, screened
 from hexapod_cosim.cosim.identify.start import initial_state
 from hexapod_cosim.cosim.master.recorder import Recording
 from hexapod_cosim.models import Robot
@@ -31,6 +37,20 @@ class Replay:
     simulated: Recording  # time, commands and the outputs of the log's columns
     names: tuple[str, ...]  # the columns that are compared
     columns: tuple[Difference, ...]
+    commands: tuple[BadColumn, ...]  # that the servos cannot have got
+    readings: tuple[BadColumn, ...]  # dead or wrong; none are named where commands are wrong
+
+    @property
+    def warnings(self) -> list[str]:
+        """What a user must know of the columns, as sentences."""
+        return [
+            *(
+                f"The robot cannot have got {one.name}: {one.why}. The simulated robot got it, so "
+                "that the differences are not those of the robot file."
+                for one in self.commands
+            ),
+            *(f"{one.name} cannot be the robot's: {one.why}." for one in self.readings),
+        ]
 
     @property
     def channels(self) -> list[Difference]:
@@ -53,16 +73,36 @@ def replay(
         fmu: its FMU; by default it is exported.
         parameters: further parameters of the FMU, by name.
 
+    Wrong commands are simulated all the same, and named in the result.
+
     Raises HexapodError for a log without readings and where the plant cannot follow the commands.
     """
+    wrong = wrong_commands(log)
     with TemporaryDirectory(prefix="hexapod-replay-") as folder:
         path = fmu or export_fmu(robot, Path(folder) / "robot.fmu")
         with LogPlant(path, parameters) as plant:
             names = plant.known(log.measured)
             if not names:
                 raise without_readings(log)
-            found = plant.simulate(log, names, initial_state(log, robot))
+            try:
+                found = plant.simulate(log, names, initial_state(log, robot))
+            except LogError as error:
+                raise (wrong_commands_error(log, wrong) if wrong else error) from error
     inputs = log.commands
     data = np.column_stack([log.time, *inputs.values(), found])
     simulated = Recording(("time", *inputs, *names), data)
-    return Replay(log, simulated, tuple(names), tuple(column_differences(log, names, found)))
+    whole = Experiment(
+        log=log,
+        number=0,
+        columns=tuple(names),
+        fitted=slice(0, len(log.time)),
+        held_out=slice(len(log.time), len(log.time)),
+    )
+    return Replay(
+        log=log,
+        simulated=simulated,
+        names=tuple(names),
+        columns=tuple(column_differences(log, names, found)),
+        commands=tuple(wrong),
+        readings=() if wrong else tuple(screened(whole, found)),
+    )

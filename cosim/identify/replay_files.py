@@ -38,6 +38,7 @@ def write_replay(
         "settings": dict(settings),
         "command": command,
         "channels": channels,
+        "warnings": done.warnings,
     }
     write_text(folder / REPLAY, _table(done))
     (simulated,) = write_recording(
@@ -88,7 +89,7 @@ def _page(done: Replay, robot: Robot, command: str, simulated_file: str) -> str:
         title=f"Replay of {Path(done.log.where).name}",
         headline=f"Robot {robot.name}, {time[-1] - time[0]:.2f} s, {len(time)} rows",
         lead="The plant FMU was driven with the commands of the log, from its first row on.",
-        warnings=[],
+        warnings=done.warnings,
         command=command,
         facts={"log": done.log.where, "robot": robot.name, "SHA-256 of the robot": robot.hash},
         source=f"{REPLAY} and {simulated_file}",

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hexapod_cosim.cosim.identify.experiment import Experiment
+from hexapod_cosim.cosim.identify.log import CHANNELS
 from hexapod_cosim.models import LEG_NAMES
 
 Array = NDArray[np.float64]
@@ -27,6 +28,23 @@ class BadColumn:
 
     name: str
     why: str
+
+
+def left_out(bad: Sequence[BadColumn]) -> list[str]:
+    """Returns sentences on columns that are left out; one for a channel whose columns are all so
+    for the same reason, as currents of servos that do not measure them.
+    """
+    texts = []
+    whole: set[str] = set()
+    why = {column.name: column.why for column in bad}
+    for channel in CHANNELS:
+        reasons = {why.get(name) for name in channel.names}
+        if len(reasons) == 1 and None not in reasons:
+            whole |= set(channel.names)
+            text = f"{channel.title} are left out, all {len(channel.names)} columns"
+            texts.append(f"{text}: {why[channel.names[0]]}.")
+    own = [column for column in bad if column.name not in whole]
+    return texts + [f"{column.name} is left out: {column.why}." for column in own]
 
 
 def screened(experiment: Experiment, simulated: Array) -> list[BadColumn]:
@@ -71,6 +89,8 @@ def _by_itself(measured: Array, simulated: Array, time: Array) -> str | None:
 def _against(experiment: Experiment, k: int, measured: Array, simulated: Array) -> str | None:
     """Returns why a column does not follow the simulation as its siblings do; None if it does."""
     own = correlation(measured, simulated[:, k])
+    if not np.isfinite(own):  # of a foot in the air in all rows
+        return None
     scale = float(np.nanstd(measured) / np.std(simulated[:, k]))
     if own < AGAINST:
         return f"wrong sign: its correlation with the simulation is {own:.2f}"

@@ -21,6 +21,10 @@ Array = NDArray[np.float64]
 LONGEST_REST = 0.5  # s    of rest that is averaged
 FARTHEST = 0.5  # rad    of a joint from its command; a servo under load sags by some 0.1 rad
 TURN = 2.0 * np.pi  # rad    a command beyond it is not in rad, and is refused when it is sent
+LEAST_THIRD = 10  # rows of a third of the rest, of which means are compared
+LARGEST_CHANGE = 6.0  # of a mean, in its deviations: one of 21 is larger in one of 10^7 logs
+SECOND = 0.6745 * np.sqrt(6.0)  # median of second differences of white noise over its deviation
+RESOLUTION = 1e-5  # rad    less is no motion
 RATES = {  # quantity of the log: initial value of the FMU
     "torso.velocity": "initial.velocity",
     "torso.angular_velocity": "initial.angular_velocity",
@@ -33,6 +37,27 @@ def rest_rows(log: Log) -> int:
     moved = np.flatnonzero((table != table[0]).any(axis=1))
     end = int(moved[0]) if moved.size else len(table)
     return max(1, min(end, int(np.searchsorted(log.time, log.time[0] + LONGEST_REST))))
+
+
+def moving_at_rest(log: Log) -> str:
+    """Returns the reading that changes most while the commands at the start stand still, and by how
+    much, as words; empty where none changes by more than its noise.
+
+    The noise of a reading is that of its second differences.
+    """
+    count = rest_rows(log) // 3
+    if count < LEAST_THIRD:
+        return ""
+    names = [name for name in (*joint_names("angle"), *ATTITUDE) if log.has([name])]
+    found, largest = "", LARGEST_CHANGE
+    for name in names:
+        own = log.recording.column(name)[: 3 * count]
+        noise = float(np.nanmedian(np.abs(np.diff(own, n=2)))) / SECOND
+        change = float(np.nanmean(own[2 * count :]) - np.nanmean(own[:count]))
+        size = abs(change) / max(noise * np.sqrt(2.0 / count), RESOLUTION)
+        if size > largest:
+            found, largest = f"{name} by {change:.2g} rad", size
+    return found
 
 
 def initial_state(log: Log, robot: Robot) -> dict[str, float]:

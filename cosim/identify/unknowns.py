@@ -12,8 +12,8 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from hexapod_cosim.cosim.identify.inertia import body_inertia
-from hexapod_cosim.cosim.identify.log import CHANNELS, Log
-from hexapod_cosim.cosim.interface.names import joint_names, vector_names
+from hexapod_cosim.cosim.identify.log import CHANNELS, SENSORS, Log
+from hexapod_cosim.cosim.interface.names import joint_names
 from hexapod_cosim.models import JOINT_NAMES, Robot
 from hexapod_cosim.models.records import BRISTLE_LAWS
 from hexapod_cosim.models.servos.presets import followed
@@ -26,7 +26,8 @@ MOTOR: Callable[[Robot], bool] = lambda robot: robot.servo.drive == "motor"  # n
 ELASTIC: Callable[[Robot], bool] = lambda robot: robot.servo.gear_stiffness > 0.0  # noqa: E731
 GEAR = ("servo.gear_stiffness", "servo.gear_damping", "servo.backlash")  # of elastic gears
 CURRENT = "sensor.torque_constant"
-DELAY = "sensor.delay"
+DELAYS = {name: f"delay.{name}" for name in SENSORS}  # keys by sensors
+BIAS = "bias."
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -220,18 +221,35 @@ ROBOT = (
         applies=lambda robot: robot.friction.law in BRISTLE_LAWS,
     ),
 )  # fmt: skip
-SENSORS = (
-    Unknown(key=DELAY, unit="s", group="sensor", prior=0.004, positive=False, start=0.004, low=0.0),
+# prior of the bias of each reading, by channel, in its unit
+BIASES = {
+    "gyroscope": 0.02,
+    "accelerometer": 0.2,
+    "torque": 0.05,
+    "current": 0.05,
+    "normal_force": 1.0,
+    "force": 1.0,
+}
+READINGS = (
     *(
-        Unknown(key=f"bias.{name}", unit="rad/s", group="sensor", prior=0.02, positive=False)
-        for name in vector_names("imu.angular_velocity")
+        Unknown(
+            key=key, unit="s", group="sensor", prior=0.01 if name == "pose" else 0.004,
+            positive=False, start=0.004, low=0.0,
+        )
+        for name, key in DELAYS.items()
     ),
     *(
-        Unknown(key=f"bias.{name}", unit="m/s2", group="sensor", prior=0.2, positive=False)
-        for name in vector_names("imu.specific_force")
+        Unknown(
+            key=f"{BIAS}{name}", unit=channel.unit.replace(".", " "), group="sensor",
+            prior=BIASES[channel.key], positive=False,
+        )
+        for key in BIASES
+        for channel in CHANNELS
+        if channel.key == key
+        for name in channel.names
     ),
     Unknown(key=CURRENT, unit="N m/A", group="sensor", prior=0.3, start=1.5),
-)
+)  # fmt: skip
 ZEROS = tuple(
     Unknown(key=f"zero.{name}", unit="rad", group="zero", prior=0.02, positive=False)
     for name in (stem.removesuffix(".angle") for stem in joint_names("angle"))
@@ -247,10 +265,12 @@ STARTS = (
 def chosen_unknowns(robot: Robot, logs: Sequence[Log], groups: Sequence[str]) -> list[Unknown]:
     """Returns the rows of some groups that the robot has and the logs may tell of."""
     have = {name for log in logs for name in log.measured}
-    rows = [row for row in (*ROBOT, *SENSORS, *ZEROS) if row.group in groups]
+    rows = [row for row in (*ROBOT, *READINGS, *ZEROS) if row.group in groups]
     found = []
     for row in rows:
-        if row.key.startswith("bias.") and row.key.removeprefix("bias.") not in have:
+        if row.key.startswith(BIAS) and row.key.removeprefix(BIAS) not in have:
+            continue
+        if is_delay(row) and not have & _read_by(row.key):
             continue
         # the currents of a servo with a motor follow from its torque constant
         if row.key == CURRENT and (MOTOR(robot) or not have & set(_channel("current"))):
@@ -264,6 +284,16 @@ def chosen_unknowns(robot: Robot, logs: Sequence[Log], groups: Sequence[str]) ->
             for row in STARTS
         ]
     return found
+
+
+def is_delay(row: Unknown) -> bool:
+    """Returns whether a row is the delay of sensors."""
+    return row.key in DELAYS.values()
+
+
+def _read_by(delay: str) -> set[str]:
+    """Returns the columns that are late by a delay, given by its key."""
+    return {name for one in CHANNELS if DELAYS[one.sensors] == delay for name in one.names}
 
 
 def _channel(key: str) -> tuple[str, ...]:

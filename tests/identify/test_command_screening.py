@@ -19,8 +19,10 @@ from hexapod_cosim.cosim.identify.command_screening import (
     wrong_commands,
 )
 from hexapod_cosim.cosim.identify.log import Log
+from hexapod_cosim.cosim.identify.replay import replay
 from hexapod_cosim.cosim.logs.mcap_writer import write_mcap
 from hexapod_cosim.cosim.master.recorder import Recording
+from hexapod_cosim.models import load_robot
 
 Change = Callable[[np.ndarray], np.ndarray]
 
@@ -140,3 +142,13 @@ def test_the_command_refuses_wrong_commands_with_the_way_out(
         "correct name, unit or sign",
     )
     assert not (tmp_path / "out").exists()
+
+
+def test_a_replay_names_a_wrong_command_and_simulates_it(log: Log, athena_fmu: Path) -> None:
+    name = "RM.coxa.angle_ref"
+    done = replay(with_column(log, name, DAMAGES["turned"]), load_robot("athena"), fmu=athena_fmu)
+    assert [one.name for one in done.commands] == [name]
+    assert done.readings == ()
+    (text,) = done.warnings
+    assert "cannot have got RM.coxa.angle_ref: wrong sign" in text
+    assert np.array_equal(done.simulated.column(name), -log.recording.column(name))

@@ -24,17 +24,18 @@ from hexapod_cosim.cosim.export.export import export_fmu
 from hexapod_cosim.cosim.identify import excitation
 from hexapod_cosim.cosim.identify.excitation import Proposal, propose, scenario_text
 from hexapod_cosim.cosim.identify.experiment import Experiment, of_point
-from hexapod_cosim.cosim.identify.fitting.output_error import Fit, _tried, remaining_step
+from hexapod_cosim.cosim.identify.fitting.last_search import remaining_step
+from hexapod_cosim.cosim.identify.fitting.output_error import Fit, _tried
 from hexapod_cosim.cosim.identify.fitting.problem import Problem, read_noise
 from hexapod_cosim.cosim.identify.fitting.workers import simulating_workers
 from hexapod_cosim.cosim.identify.identify import Identified, identify, make_experiment
 from hexapod_cosim.cosim.identify.log_plant import LogPlant
 from hexapod_cosim.cosim.identify.robot_file import write_robot
-from hexapod_cosim.cosim.identify.screening import screened
+from hexapod_cosim.cosim.identify.screening import BadColumn, left_out, screened
 from hexapod_cosim.cosim.identify.start import initial_state
 from hexapod_cosim.cosim.identify.unknowns import ROBOT, chosen_unknowns
 from hexapod_cosim.cosim.logs.mcap_writer import write_mcap
-from hexapod_cosim.models import load_robot
+from hexapod_cosim.models import LEG_NAMES, load_robot
 from hexapod_cosim.models.robot import robot_path
 
 DURATION = 1.8  # s
@@ -269,6 +270,18 @@ def test_a_dead_or_wrong_column_is_named_and_no_other(name: str, secrets: list[S
     assert re.search(why, bad.why), bad.why
 
 
+def test_a_channel_that_is_dead_as_a_whole_is_one_sentence() -> None:
+    """Ideal servos report no currents."""
+    joints = [f"{leg}.{joint}" for leg in LEG_NAMES for joint in ("coxa", "femur", "tibia")]
+    bad = [BadColumn(f"{joint}.current", "dead: 0 in every row") for joint in joints]
+    own = BadColumn("LF.coxa.angle", "wrong sign")
+    assert left_out([*bad, own]) == [
+        "Servo currents are left out, all 18 columns: dead: 0 in every row.",
+        "LF.coxa.angle is left out: wrong sign.",
+    ]
+    assert len(left_out(bad[:17])) == 17
+
+
 def test_the_columns_of_a_good_log_are_all_kept(found: list[Identified]) -> None:
     assert [one.bad for one in found] == [(), ()]
 
@@ -280,7 +293,10 @@ def test_a_delay_of_whole_rows_shifts_the_readings(secrets: list[Secret], athena
         now = plant.simulate(log, names, start)
         later = plant.simulate(log, names, start, delay=0.01)
         between = plant.simulate(log, names, start, delay=0.0025)
+        each = plant.simulate(log, [*names, names[0]], start, delay=[0.0, 0.01, 0.0025])
     assert later[2:] == pytest.approx(now[:-2], abs=1e-12)
+    expected = np.column_stack([now[:, 0], later[:, 1], between[:, 0]])
+    assert each == pytest.approx(expected, abs=1e-3)  # the integrator stops at other times
     # half a row later an angle is half-way to the row before, but for its curvature
     middle = 0.5 * (now[1:, 0] + now[:-1, 0])
     assert between[1:, 0] == pytest.approx(middle, abs=1e-3)
@@ -372,13 +388,13 @@ def test_the_command_writes_robot_sensors_and_report(
         "robot.toml", "sensors.toml", "identify.json", "report.html", "run.json"
     }  # fmt: skip
     result = json.loads(out)
-    assert [one["key"] for one in result["estimates"]][:2] == [
-        "sensor.delay", "bias.imu.angular_velocity[1]"
+    assert [one["key"] for one in result["estimates"]][:3] == [
+        "delay.joints", "delay.imu", "bias.imu.angular_velocity[1]"
     ]  # fmt: skip
     assert result["bad_columns"][0]["name"] == "LF.femur.angle"
     assert "LF.femur.angle is left out" in (place / "report.html").read_text(encoding="utf-8")
     sensors = tomllib.loads((place / "sensors.toml").read_text(encoding="utf-8"))
-    assert sensors["sensor.delay"]["unit"] == "s"
+    assert sensors["delay.joints"]["unit"] == "s"
 
 
 def test_misuse_is_refused_and_leaves_nothing(call: Call, tmp_path: Path) -> None:

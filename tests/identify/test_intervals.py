@@ -21,7 +21,7 @@ from hexapod_cosim.cosim.identify.fitting.covariance import (
     spectrum,
     white_information,
 )
-from hexapod_cosim.cosim.identify.fitting.output_error import ENOUGH, bounded_step
+from hexapod_cosim.cosim.identify.fitting.last_search import ENOUGH, bounded_step
 from hexapod_cosim.cosim.identify.identify import Estimate, Identified, identify
 from hexapod_cosim.cosim.identify.identify_files import warnings
 from hexapod_cosim.models import load_robot

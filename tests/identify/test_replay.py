@@ -134,8 +134,18 @@ def test_degrees_are_refused_with_the_commands_name(log: Log, athena_fmu: Path) 
         data[:, names.index("LF.tibia.angle_ref")] *= 57.3
 
     wrong = log_of(edited(log, degrees), "x.csv")
-    with pytest.raises(LogError, match=r"LF\.tibia\.angle_ref"):
+    with pytest.raises(LogError, match=r"LF\.tibia\.angle_ref: not in rad"):
         replay(wrong, load_robot("athena"), fmu=athena_fmu)
+
+
+def test_a_replay_names_wrong_readings_and_no_others(log: Log, athena_fmu: Path) -> None:
+    def dead(data: np.ndarray, names: tuple[str, ...]) -> None:
+        data[:, names.index("LM.femur.torque")] = 0.3
+
+    robot = load_robot("athena")
+    assert replay(log, robot, fmu=athena_fmu).warnings == []
+    done = replay(log_of(edited(log, dead), "x.csv"), robot, fmu=athena_fmu)
+    assert done.warnings == ["LM.femur.torque cannot be the robot's: dead: 0.3 in every row."]
 
 
 @pytest.mark.parametrize("wrong", [np.degrees, np.negative, lambda y: np.full_like(y, np.nan)])
@@ -159,10 +169,12 @@ def test_the_command_writes_table_rows_and_report(
     call: Call, folder: Path, tmp_path: Path, athena_fmu: Path
 ) -> None:
     place = tmp_path / "out"
-    code, out, _ = call(
+    code, out, err = call(
         "replay", folder / "results.mcap", "-o", place, "--fmu", athena_fmu, "--json"
     )
     assert code == 0
+    assert json.loads(out)["warnings"] == []
+    assert "warning" not in err
     assert {path.name for path in place.iterdir()} == {
         "replay.csv", "results.parquet", "report.html", "run.json"
     }  # fmt: skip

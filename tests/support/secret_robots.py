@@ -18,11 +18,12 @@ from hexapod_cosim.cosim.identify.experiment import JOINTS, Experiment, of_point
 from hexapod_cosim.cosim.identify.log import ATTITUDE, CHANNELS, Log, log_of
 from hexapod_cosim.cosim.identify.log_plant import LogPlant
 from hexapod_cosim.cosim.identify.unknowns import (
-    DELAY,
+    DELAYS,
     START,
     Unknown,
     changed_robot,
     chosen_unknowns,
+    is_delay,
     value_before,
 )
 from hexapod_cosim.cosim.interface.interface import plant_roots
@@ -93,7 +94,7 @@ def drawn(rows: list[Unknown], robot: Robot, rng: np.random.Generator) -> dict[s
         z = float(np.clip(rng.normal(), -SPREAD, SPREAD))
         if row.group != START:
             values[row.key] = row.value(z, value_before(row, robot))
-        if row.key == DELAY:
+        if is_delay(row):
             values[row.key] = float(rng.uniform(0.001, 0.009))
     return values
 
@@ -124,12 +125,11 @@ def secret_robot(
         log=commands, number=0, columns=columns, fitted=slice(None), held_out=slice(0, 0)
     )
     zero = np.array([values.get(f"zero.{name}", 0.0) for name in JOINTS])
+    delays = [values.get(DELAYS[one], 0.0) for one in experiment.sensors]
     pose = plant_roots(robot).settled
     start = dict(zip(vector_names("initial.position"), pose.position, strict=True))
     with LogPlant(export_fmu(robot, folder / f"secret{seed}.fmu"), EXACT) as plant:
-        outputs = plant.simulate(
-            commands, columns, start, offset=-zero, delay=values.get(DELAY, 0.0)
-        )
+        outputs = plant.simulate(commands, columns, start, offset=-zero, delay=delays)
     # cameras see a point of the torso, not the centre of mass
     offset = np.array(file.torso.com) - np.array(robot.torso.com)
     attitude = outputs[:, [columns.index(name) for name in ATTITUDE]]

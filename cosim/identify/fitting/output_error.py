@@ -17,7 +17,7 @@ least sum of squares over all rows is the next start.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -27,16 +27,22 @@ from hexapod_cosim.cosim.identify.fitting.covariance import (
     coloured_information,
     readings_as_one,
 )
+from hexapod_cosim.cosim.identify.fitting.differences import FINE
+from hexapod_cosim.cosim.identify.fitting.last_search import (
+    BOUND,
+    bounded_step,
+    finished,
+    huber,
+)
 from hexapod_cosim.cosim.identify.fitting.problem import (
     ALL,
-    FINE,
     FLOOR,
     Misfit,
     Problem,
     read_noise,
 )
 from hexapod_cosim.cosim.identify.log import LogError
-from hexapod_cosim.cosim.identify.unknowns import GEAR, Unknown
+from hexapod_cosim.cosim.identify.unknowns import DELAYS, GEAR, Unknown
 from hexapod_cosim.models import FmuError
 
 Array = NDArray[np.float64]
@@ -59,19 +65,18 @@ class Stage:
 
 
 SEARCH = (Stage(SMOOTH, 0.3, 1.0, 15, 1e-2), Stage(ALL, 1.0, 1.0, 25, 1e-3))
-REFINE = Stage(ALL, 1.0, 3.0, 25, 1e-4)
-# The last search ends where Gauss and Newton's next step is this long [deviations]. A relative
-# change of the sum of squares is no measure: of a log of 60 s it is some 100,000, and a number that
-# is wrong by a deviation adds 1.
-ENOUGH = 0.1
-FINISHING = 12  # steps of the last search, at most
-SHORTENED = (1.0, 0.5, 0.25, 0.1, 0.03)  # of a step, until the sum of squares falls
+REFINE = Stage(ALL, 1.0, BOUND, 25, 1e-4)
 COARSE = {"solver.tolerance": 1e-4}  # of the search: its errors are far below the readings' noise
 SEARCHED = 40_000  # residuals of the search, about
 SHORT = 6.0  # s    of each log on which the search is made
 TRIED = (-2.0, -1.0, -0.5, -0.25, -0.1, 0.1, 0.25, 0.5, 1.0, 2.0)  # priors from the present value
 BETTER = 1e-4  # share of the sum of squares by which another start must be better
 ROUNDS = 3  # of trying starts, at most
+# Torques jump when a command comes, so that their sum of squares has a valley between each two
+# commands; the delay of currents and of forces is tried over these values.
+DELAYS_TRIED = 0.001 * np.arange(21.0)  # s
+# Forces and accelerations have peaks at touch-downs, and so several valleys near each other.
+NEAR_DELAYS = 1e-5 * np.array([-80.0, -40.0, -20.0, -10.0, -5.0, 5.0, 10.0, 20.0, 40.0, 80.0])  # s
 
 
 @dataclass(frozen=True)
@@ -115,58 +120,6 @@ class Fit:
         return {row.key: float(value) for row, value in zip(self.rows, own, strict=True)}
 
 
-def remaining_step(jacobian: Array, residuals: Array) -> Array:
-    """Returns the step (rows,) that Gauss and Newton's method would still take, in priors.
-
-    It is 0 at an optimum. Residuals beyond three deviations count linearly (Huber's loss).
-    """
-    bounded = np.clip(residuals, -REFINE.scale, REFINE.scale)
-    share = np.sqrt(REFINE.scale / np.maximum(np.abs(residuals), REFINE.scale))
-    weighted = jacobian * share[:, None]
-    normal, right = weighted.T @ weighted, jacobian.T @ bounded
-    return np.asarray(-np.linalg.lstsq(normal, right, rcond=None)[0], dtype=np.float64)
-
-
-def bounded_step(problem: Problem, z: Array, jacobian: Array, residuals: Array) -> Array:
-    """Returns the remaining step (rows,) of the numbers that it does not lead out of their limits.
-
-    The others stay.
-    """
-    low, high = problem.bounds()
-    free = np.ones(len(z), dtype=np.bool_)
-    step = np.zeros(len(z))
-    for _ in z:
-        step = np.zeros(len(z))
-        step[free] = remaining_step(jacobian[:, free], residuals)
-        out = free & (((z <= low) & (step < 0.0)) | ((z >= high) & (step > 0.0)))
-        if not out.any():
-            break
-        free &= ~out
-    return step
-
-
-def _finished(problem: Problem, z: Array, report: Progress) -> Array:
-    """Returns the numbers near a start at which the remaining step is short.
-
-    The noise of a channel is the typical size of its residuals at each step.
-    """
-    low, high = problem.bounds()
-    for number in range(FINISHING):
-        report(f"all rows, step {number + 1}")
-        problem.set_noise(problem.errors(z))
-        jacobian, residuals = problem.jacobian(z, FINE), problem.residuals(z)
-        step = bounded_step(problem, z, jacobian, residuals)
-        if float(np.linalg.norm(jacobian @ step)) < ENOUGH:
-            break
-        cost = _huber(residuals)
-        tried = (np.clip(z + share * step, low, high) for share in SHORTENED)
-        better = next((own for own in tried if _huber(problem.residuals(own)) < cost), None)
-        if better is None:
-            break
-        z = better
-    return z
-
-
 def better_start(problem: Problem, start: Array | None) -> Array:
     """Returns a start (rows,), or 0 where the robot file's numbers have smaller errors."""
     zero = np.zeros(len(problem.rows))
@@ -197,6 +150,8 @@ def fit(problem: Problem, *, start: Array | None = None, progress: Progress | No
     for number, stage in enumerate(SEARCH):
         report(f"search, stage {number + 1} of {len(SEARCH)}")
         z = _optimised(short, z, stage, read_noise(short))
+        if number == 0:
+            z = _with_delays(short, z, ("currents", "forces"), lambda _own: DELAYS_TRIED)
     report("other starts of the contacts")
     z = _best_of_starts(short, z)
     report("all rows")
@@ -204,8 +159,10 @@ def fit(problem: Problem, *, start: Array | None = None, progress: Progress | No
     least = read_noise(fitted)
     z = _optimised(fitted, z, REFINE, least)
     fitted.use({})
+    short.use({})
+    z = _with_delays(short, z, ("joints", "forces", "imu"), lambda own: own + NEAR_DELAYS)
     fitted.count_all()
-    z = _finished(fitted, z, report)
+    z = finished(fitted, z, report)
     return _judged(problem, fitted, z, least)
 
 
@@ -255,6 +212,27 @@ def _best_of_starts(problem: Problem, z: Array) -> Array:
     return z
 
 
+def _with_delays(
+    problem: Problem, z: Array, sensors: Sequence[str], values: Callable[[float], Array]
+) -> Array:
+    """Returns the numbers with the delays of some sensors at the best of some values, one by one.
+
+    values: to be tried instead of a delay [s].
+    """
+    problem.set_noise(problem.errors(z), least=read_noise(problem))
+    keys = [DELAYS[name] for name in sensors]
+    for k, row in enumerate(problem.rows):
+        if row.key in keys:
+            before = problem.before[row.key]
+            points = [z]
+            for delay in values(row.value(float(z[k]), before)).tolist():
+                moved = z.copy()
+                moved[k] = row.distance(delay, before)
+                points.append(moved)
+            z = min(points, key=lambda one: _cost(problem, one))
+    return z
+
+
 def _tried(problem: Problem, z: Array) -> Array:
     """Returns the numbers with those of contacts, and of elastic gears and their friction, at the
     best of some values, one by one.
@@ -280,14 +258,7 @@ def _cost(problem: Problem, z: Array) -> float:
     counted, problem.counted = problem.counted, problem.all_known()
     residuals = problem.residuals(z)
     problem.counted = counted
-    return _huber(residuals)
-
-
-def _huber(residuals: Array) -> float:
-    """Returns half the sum of squares; residuals beyond three deviations count linearly."""
-    size = np.abs(residuals)
-    near = np.minimum(size, REFINE.scale)
-    return float(np.sum(near * (size - 0.5 * near)))
+    return huber(residuals)
 
 
 def _judged(problem: Problem, fitted: Problem, z: Array, least: Mapping[str, float]) -> Fit:
@@ -300,6 +271,7 @@ def _judged(problem: Problem, fitted: Problem, z: Array, least: Mapping[str, flo
         least: noise of the readings themselves, by channel.
     """
     fitted.set_noise(fitted.errors(z))
+    fitted.leave_out_bent(z)
     jacobian, residuals = fitted.jacobian(z, FINE), fitted.residuals(z)
     series = fitted.series(jacobian, np.clip(residuals, -REFINE.scale, REFINE.scale))
     misfit = fitted.misfit(z, least, "fitted")

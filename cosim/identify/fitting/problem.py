@@ -21,10 +21,18 @@ from hexapod_cosim.cosim.identify.experiment import (
     simulated,
 )
 from hexapod_cosim.cosim.identify.fitting.covariance import Series
+from hexapod_cosim.cosim.identify.fitting.differences import (
+    FINE,
+    ROUGH,
+    Differences,
+    Slopes,
+    differences,
+    size_of,
+)
 from hexapod_cosim.cosim.identify.fitting.workers import Workers
 from hexapod_cosim.cosim.identify.log import CHANNELS, LogError
 from hexapod_cosim.cosim.identify.log_plant import LogPlant
-from hexapod_cosim.cosim.identify.unknowns import DELAY, Unknown, value_before
+from hexapod_cosim.cosim.identify.unknowns import Unknown, is_delay, value_before
 from hexapod_cosim.models import FmuError, Robot
 
 Array = NDArray[np.float64]
@@ -35,28 +43,15 @@ MOST_RESIDUALS = 150_000  # rows are thinned evenly where there would be more
 # of a row, of which a difference tells nothing, is a large error.
 JUMP = 1.0  # second difference of a simulated signal [deviations]
 BESIDE = 6  # rows before and after a jump
+# A reading whose second difference over the numbers' short steps is larger jumps with a number; see
+# `Problem.leave_out_bent`.
+BENT = 0.05  # deviations
 FLOOR = 1e-9  # smallest noise, in the units of the channels
 CLIPPED = 5.0  # deviations    of a residual in the test whether the model explains the log
 # Largest mean square of residuals over that of the readings' noise, of many readings. That of the
 # noise has a relative deviation of about 3.8 over the root of their number.
 EXPLAINED = 1.1
 UNCERTAIN, DEVIATIONS = 3.8, 3.0
-
-
-@dataclass(frozen=True)
-class Slopes:
-    """How derivatives are made of simulations."""
-
-    step: float  # priors
-    both: bool  # whether from both sides
-    near: float  # priors: up to this distance from where they were made they count
-
-
-# A long step is what the search needs while sums of squares are rough. But its error of second
-# order hides combinations of numbers that the readings hardly tell: with it, the deviation of the
-# torso's mass came out five times too small. Short central differences have converged there.
-ROUGH = Slopes(0.1, both=False, near=0.1)
-FINE = Slopes(0.01, both=True, near=0.0)
 
 
 @dataclass(frozen=True)
@@ -99,8 +94,8 @@ class Problem:
         self._measured = [one.measured for one in self.experiments]
         self._outputs: tuple[bytes, list[Array]] | None = None
         self._simulated = np.array([needs_simulation(row, robot) for row in rows], dtype=np.bool_)
-        # at which z, how made, of which numbers
-        self._slopes: tuple[Array, Slopes, list[list[Array]]] | None = None
+        self._differences: Differences | None = None  # the last ones
+        self._nonlinear: NDArray[np.bool_] | None = None  # (predictions,)  see leave_out_nonlinear
         self._size = 0  # of the residuals
         self.counted = self.all_known()  # which readings count (fitted rows, columns)
 
@@ -252,26 +247,67 @@ class Problem:
 
     def jacobian(self, z: Array, slopes: Slopes = ROUGH) -> Array:
         """Returns the residuals' derivatives (residuals, rows), by differences of simulations."""
-        known = self._slopes
-        if known is None or known[1] != slopes or np.max(np.abs(z - known[0])) > slopes.near:
-            self._slopes = known = z.copy(), slopes, self._differences(z, slopes)
+        known = self._known(z, slopes)
         scale = np.concatenate([
             np.where(counted[:: self._thin], 1.0 / self._weights(one), 0.0).ravel()
             for one, counted in zip(self.experiments, self.counted, strict=True)
         ])  # fmt: skip
         found = np.zeros((len(scale) + len(z), len(z)))
-        for k, own in enumerate(known[2]):
+        for k, own in enumerate(known.slopes):
             weighted = [slope * scale for slope in own]
             if weighted:
                 # of the delay the smaller slope is the one within a period of the commands
-                found[: -len(z), k] = min(weighted, key=_size)
+                found[: -len(z), k] = min(weighted, key=size_of)
         found[len(scale) :][np.diag_indices(len(z))] = 1.0
         return found
 
-    def _differences(self, z: Array, slopes: Slopes) -> list[list[Array]]:
-        """Returns the slopes of all predictions (predictions,) by each number: two of the delay,
-        none where the plant refuses the moved numbers.
+    def leave_out_bent(self, z: Array) -> None:
+        """Makes readings not count that jump between the numbers at which derivatives are made, nor
+        those that jumped on the way there.
         """
+        jump = self._known(z, FINE).bend / self._flat_weights() > BENT
+        self.leave_out(jump if self._nonlinear is None else jump | self._nonlinear)
+
+    def leave_out_nonlinear(self, change: Array, linear: Array) -> bool:
+        """Makes readings not count from now on that change otherwise than derivatives say.
+
+        Args:
+            change: of all residuals.
+            linear: what derivatives say of it.
+
+        Returns whether any reading is new among these.
+        """
+        count = sum(own[:: self._thin].size for own in self.counted)
+        flags = np.abs(change - linear)[:count] > BENT
+        self._nonlinear = flags if self._nonlinear is None else flags | self._nonlinear
+        return self.leave_out(flags)
+
+    def leave_out(self, flags: NDArray[np.bool_]) -> bool:
+        """Makes flagged ones (predictions,) not count; returns whether any of them did."""
+        start, new = 0, False
+        for counted in self.counted:
+            own = counted[:: self._thin]
+            flagged = flags[start : start + own.size].reshape(own.shape)
+            start += own.size
+            new |= bool(np.any(own & flagged))
+            own &= ~flagged
+        return new
+
+    def _flat_weights(self) -> Array:
+        parts = zip(self.experiments, self.counted, strict=True)
+        return np.concatenate(
+            [np.tile(self._weights(one), len(own[:: self._thin])) for one, own in parts]
+        )
+
+    def _known(self, z: Array, slopes: Slopes) -> Differences:
+        """Returns the differences at z, or those near it that count there."""
+        known = self._differences
+        if known is None or not known.hold(z, slopes):
+            self._differences = known = self._made(z, slopes)
+        return known
+
+    def _made(self, z: Array, slopes: Slopes) -> Differences:
+        """Returns the differences of all predictions by each number."""
         base_outputs, base = self.outputs(z), self._flat(self.predictions(z))
         moves = [(k, step) for k in range(len(z)) for step in self._steps(k, z, slopes)]
         points = []
@@ -285,10 +321,8 @@ class Problem:
         ):
             if outputs is not None:
                 found[k].append((step, self._flat(self._read(outputs, moved)) - base))
-        return [
-            _slopes(changes, one_sided=row.key == DELAY)
-            for row, changes in zip(self.rows, found, strict=True)
-        ]
+        delays = [is_delay(row) for row in self.rows]
+        return differences(z.copy(), slopes, found, delays, len(base))
 
     def _flat(self, predictions: Sequence[Array]) -> Array:
         """Returns the predictions of all fitted rows that are not thinned out, in one array."""
@@ -301,7 +335,7 @@ class Problem:
         low, high = row.bounds(self.before[row.key])
         both = (slopes.step, -slopes.step)
         steps = [step for step in both if low <= z[k] + step <= high]
-        return steps if slopes.both or row.key == DELAY else steps[:1]
+        return steps if slopes.both or is_delay(row) else steps[:1]
 
     def _all_outputs(
         self, points: Sequence[Array], moves: Sequence[tuple[int, float]], base: list[Array]
@@ -345,23 +379,6 @@ class Problem:
                 share = float(np.mean(own[:, at]))
                 found.append(Series(key, error[:, at], slopes[:, at], share))
         return found
-
-
-def _slopes(changes: Sequence[tuple[float, Array]], *, one_sided: bool) -> list[Array]:
-    """Returns the slopes that changes of predictions over steps give.
-
-    one_sided: one for each step, else one for all.
-    """
-    if one_sided or len(changes) < 2:
-        found = [change / step for step, change in changes]
-    else:
-        (step, change), (other, changed) = changes
-        found = [(change - changed) / (step - other)]
-    return [np.where(np.isfinite(slope), slope, 0.0) for slope in found]
-
-
-def _size(slope: Array) -> float:
-    return float(slope @ slope)
 
 
 def read_noise(problem: Problem) -> dict[str, float]:

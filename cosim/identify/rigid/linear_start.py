@@ -35,7 +35,7 @@ from hexapod_cosim.cosim.identify.rigid.regressor import (
     regressor,
 )
 from hexapod_cosim.cosim.identify.rigid.samples import Samples, lacking, samples_of
-from hexapod_cosim.cosim.identify.unknowns import CURRENT, DELAY, Unknown, value_before
+from hexapod_cosim.cosim.identify.unknowns import CURRENT, DELAYS, Unknown, value_before
 from hexapod_cosim.models import Robot
 from hexapod_cosim.models.servos.motor import (
     back_emf_damping,
@@ -107,7 +107,7 @@ def linear_start(
     for k in usable:
         shift = best_shift(logs[k], experiments[k].fitted, robot)
         found.append(samples_of(logs[k], experiments[k].fitted, robot, shift=shift))
-        values[DELAY] = (shift - 0.5) * found[-1].period
+        values |= dict.fromkeys(DELAYS.values(), (shift - 0.5) * found[-1].period)
         values |= found[-1].biases
     values |= servo_law(found, robot)
     equations = joined([rigid_equations(one, robot) for one in found])

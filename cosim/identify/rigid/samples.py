@@ -14,17 +14,20 @@ from numpy.typing import NDArray
 from hexapod_cosim.cosim.identify.log import ATTITUDE, Log
 from hexapod_cosim.cosim.identify.rigid.regressor import Motion
 from hexapod_cosim.cosim.identify.start import rest_rows
+from hexapod_cosim.cosim.identify.unknowns import BIAS
 from hexapod_cosim.cosim.interface.names import (
     foot_names,
     foot_vector_names,
     joint_names,
     vector_names,
 )
-from hexapod_cosim.models import Robot
+from hexapod_cosim.models import LEG_NAMES, Robot
 
 Array = NDArray[np.float64]
 SMOOTH = 40.0  # Hz    cut-off of the readings: beyond it encoders have noise alone
 LEAST_RATE = 2.5  # cut-offs: rows below this rate are not smoothed
+IN_AIR = 0.15  # of the rows: each foot of a walk is in the air for longer
+LARGEST_BIAS = 0.2  # of the range of a foot's force
 
 
 @dataclass(frozen=True)
@@ -40,7 +43,7 @@ class Samples:
     error: Array  # (samples, 6, 3)  commanded less measured angle [rad]
     speed_error: Array  # (samples, 6, 3) [rad/s]
     torque_ref: Array  # (samples, 6, 3) N m
-    biases: dict[str, float]  # of the IMU, by the key of the table of unknowns
+    biases: dict[str, float]  # of IMU and forces, by the key of the table of unknowns
 
 
 def lacking(log: Log) -> str:
@@ -122,15 +125,15 @@ def samples_of(log: Log, rows: slice, robot: Robot, *, shift: int) -> Samples:
     is_current = not log.has(joint_names("torque"))
     motor = reader.smooth(joint_names("current" if is_current else "torque"))
     turn = _turns(reader.smooth(list(ATTITUDE)))
-    biases = imu_biases(log, robot)
+    biases = imu_biases(log, robot) | force_biases(log.part(rows))
     spin = reader.smooth(vector_names("imu.angular_velocity"))
-    spin = spin - [biases[f"bias.{name}"] for name in vector_names("imu.angular_velocity")]
+    spin = spin - [biases[f"{BIAS}{name}"] for name in vector_names("imu.angular_velocity")]
     specific = reader.smooth(vector_names("imu.specific_force"))
-    specific = specific - [biases[f"bias.{name}"] for name in vector_names("imu.specific_force")]
+    specific = specific - [biases[f"{BIAS}{name}"] for name in vector_names("imu.specific_force")]
     rate = slope(spin, period)
     arm = np.broadcast_to(-np.array(robot.torso.com), spin.shape)
     lift = specific + np.cross(rate, arm) + np.cross(spin, np.cross(spin, arm))
-    force, tangential = _forces(reader)
+    force, tangential = _forces(reader, biases)
     # references hold over a row and are compared with readings that are not smoothed
     error = reader.held(joint_names("angle_ref"), shift) - reader.raw(joint_names("angle"))
     speed_now = reader.raw(speeds) if log.has(speeds) else speed
@@ -157,14 +160,42 @@ def samples_of(log: Log, rows: slice, robot: Robot, *, shift: int) -> Samples:
     )
 
 
-def _forces(reader: _Reader) -> tuple[Array, bool]:
+def _forces(reader: _Reader, biases: dict[str, float]) -> tuple[Array, bool]:
     """Returns the forces of the feet (samples, 6, 3), and whether all their parts are known."""
     names = foot_vector_names("force")
     if reader.log.has(names):
-        return reader.smooth(names).reshape(-1, 6, 3), True
+        own = [biases[f"{BIAS}{name}"] for name in names]
+        return (reader.smooth(names) - own).reshape(-1, 6, 3), True
+    names = foot_names("normal_force")
+    own = [biases[f"{BIAS}{name}"] for name in names]
     force = np.zeros((len(reader.time), 6, 3))
-    force[:, :, 2] = reader.smooth(foot_names("normal_force"))
+    force[:, :, 2] = reader.smooth(names) - own
     return force, False
+
+
+def force_biases(log: Log) -> dict[str, float]:
+    """Returns what the force sensors read of feet in the air; 0 of feet that are never there.
+
+    Readings in the air are all alike, so that they are those in the shortest interval which has a
+    given share of them. Keys are those of the table of unknowns.
+    """
+    found = {}
+    for leg in LEG_NAMES:
+        vector = vector_names(f"{leg}.foot.force")
+        names = vector if log.has(vector) else [f"{leg}.foot.normal_force"]
+        if not log.has(names):
+            continue
+        table = log.recording.columns(names)
+        upward = table[:, -1]
+        known = np.sort(upward[np.isfinite(upward)])
+        share = max(int(IN_AIR * len(known)), 1)
+        first = int(np.argmin(known[share:] - known[:-share])) if share < len(known) else 0
+        low, high = known[first], known[min(first + share, len(known) - 1)]
+        own = np.nanmean(table[(upward >= low) & (upward <= high)], axis=0)
+        there = abs(own[-1]) < LARGEST_BIAS * float(known[-1] - known[0])
+        for name, value in zip(names, own if there else np.zeros(len(names)), strict=True):
+            found[f"{BIAS}{name}"] = float(value)
+    return found
 
 
 def _turns(angles: Array) -> Array:
@@ -186,10 +217,10 @@ def imu_biases(log: Log, robot: Robot) -> dict[str, float]:
     rates, forces = vector_names("imu.angular_velocity"), vector_names("imu.specific_force")
     count = rest_rows(log)
     if count == 1:
-        return {f"bias.{name}": 0.0 for name in (*rates, *forces)}
+        return {f"{BIAS}{name}": 0.0 for name in (*rates, *forces)}
     part = log.part(slice(0, count)).recording
     turn = _turns(np.nanmean(part.columns(ATTITUDE), axis=0)[None])[0]
     own = -np.array(robot.gravity) @ turn
     found = dict(zip(rates, np.nanmean(part.columns(rates), axis=0), strict=True))
     found |= dict(zip(forces, np.nanmean(part.columns(forces), axis=0) - own, strict=True))
-    return {f"bias.{name}": float(value) for name, value in found.items()}
+    return {f"{BIAS}{name}": float(value) for name, value in found.items()}
