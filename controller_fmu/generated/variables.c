@@ -183,7 +183,7 @@ static const hxVariable outputs[] = {
 };
 
 static const hxVariable parameters[] = {
-    {"control", "", 1, 3, offsetof(struct hxVariables, definition.control), HX_INTEGER, 0, 1},
+    {"control", "", 1, 3, offsetof(struct hxVariables, definition.control), HX_INTEGER, 1, 1},
     {"period", "s", 0.0001, 10.0, offsetof(struct hxVariables, definition.period), HX_REAL, 0, 1},
     {"torso.mass", "kg", 1e-09, 1000000000.0, offsetof(struct hxVariables, definition.torso.mass), HX_REAL, 0, 1},
     {"torso.com[1]", "m", -100.0, 100.0, offsetof(struct hxVariables, definition.torso.com[0]), HX_REAL, 0, 3},
@@ -522,7 +522,7 @@ const char *const hx_log_category_names[] = {
 const hxStateRow *const hx_states = 0;
 const size_t hx_state_count = 0;
 
-const char hx_default_guid[] = "{dd20c6e2-8df4-41f2-87de-95e16ee33a24}";
+const char hx_default_guid[] = "{de5bcdad-9731-44c2-8fd6-427f7049f936}";
 
 _Static_assert(HX_CONTROL_KINEMATIC == 1, "Control");
 _Static_assert(HX_CONTROL_COMPLIANT == 2, "Control");

@@ -395,7 +395,7 @@ def test_the_gait_is_tunable_while_the_robot_walks(tmp_path: Path) -> None:
         tunable = [
             name for name, variable in fmu.variables.items() if variable.variability == "tunable"
         ]
-        assert tunable == list(gait_parameters(amble))
+        assert tunable == ["control", *gait_parameters(amble)]
 
 
 def test_a_gait_that_is_too_fast_is_refused_and_the_next_one_is_taken(tmp_path: Path) -> None:
