@@ -31,6 +31,7 @@ SILENCE = 1.0  # s    after which a drive or push that was not renewed ends
 IDLE = 0.05  # s    between two looks for messages while the loop pauses
 MOST_MESSAGES = 200  # that are read before a macro-step
 MOST_NOTES = 5  # sentences for pages that are kept
+HALTS = "only built-in controls hand the walk over."
 FREE, RECORDING, REPLAYING = "free", "recording", "replaying"
 
 
@@ -114,6 +115,9 @@ class Loop:
 
     def step(self) -> None:
         """Makes one macro-step under the present inputs."""
+        if self._mode == REPLAYING:
+            for change in self._take.changes_at(self.robot.count):
+                self.robot.change(change)
         command, force = self._inputs()
         self._command = astuple(command)[:4]
         before = self.robot.fault
@@ -170,7 +174,7 @@ class Loop:
         self._echo[client] = ping.stamp
 
     def _on_set(self, client: int, change: Change) -> None:
-        """Changes a setting; a recording or replay ends, because its settings are constant."""
+        """Changes a setting; a recording goes on, a replay ends."""
         self._attempt(client, lambda: self._change(change))
 
     def _change(self, change: Change) -> None:
@@ -179,8 +183,14 @@ class Loop:
             return
         count = self.robot.count
         self.robot.change(change)
+        placed = self.robot.count < count or change.key == "ground"
+        if self.robot.halts and change.key in {"control", "gait"}:
+            self._tell(f"The robot stops, and walks on with {change.value}: {HALTS}")
+        if self._mode == RECORDING and not placed:
+            self._take.note_change(change)
+            return
         self._end_take()
-        if self.robot.count < count or change.key == "ground":
+        if placed:
             self._note_placed()
 
     def _on_do(self, client: int, action: Action) -> None:
