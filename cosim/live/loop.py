@@ -32,6 +32,7 @@ IDLE = 0.05  # s    between two looks for messages while the loop pauses
 MOST_MESSAGES = 200  # that are read before a macro-step
 MOST_NOTES = 5  # sentences for pages that are kept
 HALTS = "only built-in controls hand the walk over."
+UNCHANGED = "before the first change of gait, control or friction."
 FREE, RECORDING, REPLAYING = "free", "recording", "replaying"
 
 
@@ -227,8 +228,11 @@ class Loop:
     def _end_take(self) -> None:
         """Ends a recording or a replay; a recording is given to the server as a scenario."""
         if self._mode == RECORDING and self._take.steps > 0:
-            self._put("take", self._take.as_toml())
+            kept = self._take.kept * self._take.scenario.macro_step
+            self._put("take", self._take.as_toml() if kept else "")
             self._tell(f"Recorded {self._take.duration:.1f} s.")
+            if self._take.changes:
+                self._tell(f"Replay repeats all of it, Save gives the {kept:.1f} s {UNCHANGED}")
         elif self._mode == REPLAYING:
             self._tell("The replay has ended.")
         self._mode = FREE

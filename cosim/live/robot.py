@@ -10,9 +10,9 @@ Changes while the robot walks:
   Bristles of the friction laws and the measures of work and slip begin at zero.
 - gait: the built-in controller changes it without a stop (`gait_change.py`).
 - control, from a built-in one to another: it goes on in the present phase of the walk at once.
-- control, from or to a user's one, and the gait of a user's control: the robot stops, as the present
-  controller stops it, and the next controller begins in the stance; over FADE the joint commands
-  pass from the old ones to the new ones.
+- control, from or to a user's one, and the gait of a user's control: the robot stops, as the
+  present controller stops it, and the next controller begins in the stance; over FADE the joint
+  commands pass from the old ones to the new ones.
 - ground: the robot is placed at its start on the new ground.
 
 A controller that raises an exception is replaced by one that holds the joints where they are.
@@ -302,7 +302,7 @@ class LiveRobot(Closing):
         self._controller = controller
 
     def _built_in_controller(self) -> FmuController:
-        """Returns the controller FMU with the parameters of the plan, and gains for each control."""
+        """Returns the controller FMU with the plan's parameters, and gains for each control."""
         setup = self.plan.controller
         known = replace(setup, gains=setup.gains or self._gains)
         control = {"control": controller_parameters(setup)["control"]}

@@ -1,8 +1,8 @@
 """Records what a live robot was told, so that it can be repeated and saved as a scenario.
 
 A take begins with a robot at its start and holds the command and the push of each macro-step, equal
-ones once, and the changes of gait, control and friction. A plant and a controller that get the same inputs at the same macro-steps repeat the walk
-bit for bit.
+ones once, and the changes of gait, control and friction. A plant and a controller that get the same
+inputs at the same macro-steps repeat the walk bit for bit.
 """
 
 from __future__ import annotations
@@ -61,6 +61,11 @@ class Take:
         return self.steps * self.scenario.macro_step
 
     @property
+    def kept(self) -> int:
+        """Macro-steps before the first change, which a scenario can repeat."""
+        return self.changes[0][0] if self.changes else self.steps
+
+    @property
     def full(self) -> bool:
         """Whether the take is as long as one may be."""
         changes = len(self.commands) + len(self.forces) + len(self.changes)
@@ -71,10 +76,15 @@ class Take:
         return _value(self.commands, step, BodyCommand()), _value(self.forces, step, NO_FORCE)
 
     def as_scenario(self) -> Scenario:
-        """Returns the scenario that repeats the take; `hexapod simulate` runs it."""
-        h = self.scenario.macro_step
-        commands = [Command(time=k * h, **_fields(command)) for k, command in self.commands]
-        ends = [*self.forces, (self.steps, NO_FORCE)]
+        """Returns the scenario that repeats the take up to its first change.
+
+        `hexapod simulate` runs it; it has one gait, control and friction.
+        """
+        h, last = self.scenario.macro_step, self.kept
+        commands = [
+            Command(time=k * h, **_fields(command)) for k, command in self.commands if k < last
+        ]
+        ends = [*((k, force) for k, force in self.forces if k < last), (last, NO_FORCE)]
         pushes = [
             records.Push(time=k * h, duration=(end - k) * h, force=force)
             for (k, force), (end, _) in pairwise(ends)
@@ -83,7 +93,7 @@ class Take:
         return replace(
             self.scenario,
             title=f"{self.scenario.title}, driven by hand",
-            duration=self.duration,
+            duration=last * h,
             commands=tuple(commands),
             events=tuple(pushes),
         )

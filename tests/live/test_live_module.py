@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from mirror import HxOutput
 from numpy.typing import NDArray
 
 from hexapod_cosim.cosim.live.module import walker_module
@@ -18,7 +19,7 @@ wasmtime = pytest.importorskip("wasmtime")
 
 LEGS, JOINTS = ("LF", "LM", "LR", "RF", "RM", "RR"), ("coxa", "femur", "tibia")
 COMMANDS = ("angle_ref", "speed_ref", "torque_ref")  # the first 54 numbers of hxInput
-OUTPUT = 2000  # bytes of hxOutput that are compared: time to the feet's forces
+OUTPUT = 5384  # bytes of hxOutput, all of which are compared
 TRIPOD = (1.0, 0.75, 0.5, 0.03, 0.0)  # pattern, period, duty, step height, touch-down speed
 AMBLE = (4.0, 1.125, 2 / 3, 0.03, 0.0)
 KINEMATIC, COMPLIANT, PAPER = 1.0, 2.0, 3.0
@@ -83,6 +84,7 @@ def test_the_plant_has_the_bits_of_the_native_one(
     assert core.hx_plant_reset(plant, definition, 0.0) == 0
     module.start(KINEMATIC)
     different = 0
+    assert ct.sizeof(HxOutput) == OUTPUT
     assert commands.shape == (300, 54)
     for step, row in enumerate(commands, start=1):
         ct.memmove(given, row.tobytes(), row.nbytes)
@@ -138,10 +140,11 @@ def test_the_control_changes_while_the_robot_walks(
             assert changing(module) == 0.0
             angles.append(angles_of(module))
             places.append(module.position())
-        # rad    in a macro-step; walks at this speed without a change need up to 0.02
-        assert np.abs(np.diff(angles, axis=0)).max() < 0.022
+        # rad    in a macro-step: walks at this speed need up to 0.021, and compliant control adds
+        # up to 0.004 when it lifts a foot that meets the ground early
+        assert np.abs(np.diff(angles, axis=0)).max() < 0.03
         ways = np.array(places)[50:, 0] - np.array(places)[:-50, 0]
-        assert ways.min() > 0.8 * 0.25 * 0.08  # m    in a quarter of a second
+        assert ways.min() > 0.5 * 0.25 * 0.08  # m    in a quarter of a second: it never stops
         assert np.array(places)[:, 2].min() > 0.12
 
 

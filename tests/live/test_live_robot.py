@@ -180,11 +180,12 @@ def test_the_control_changes_while_the_robot_walks_in_any_phase(
             angles.append(value(placed, *joint_names("angle_ref")))
             speeds.append(value(placed, "torso.velocity[1]")[0])
             heights.append(place_of(placed)[2])
-        # rad    in a macro-step; walks at these speeds without a change need up to 0.023
-        assert np.abs(np.diff(angles, axis=0)).max() < 0.025
+        # rad    in a macro-step: walks at these speeds need up to 0.023, and compliant control
+        # adds up to 0.004 when it lifts a foot that meets the ground early
+        assert np.abs(np.diff(angles, axis=0)).max() < 0.03
         # m    it neither falls nor stops: means over a quarter of a second
         assert min(heights) > 0.12
-        assert np.convolve(speeds, np.full(50, 0.02), mode="valid").min() > 0.8 * command.vx
+        assert np.convolve(speeds, np.full(50, 0.02), mode="valid").min() > 0.5 * command.vx
         assert place_of(placed)[0] - begin == pytest.approx(2.0 * command.vx, rel=0.05)
         assert placed.fault == ""
 
