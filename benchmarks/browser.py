@@ -51,7 +51,7 @@ WALK = """async ([base64, walk, speed, warm, timed]) => {
 
 
 def processor_time() -> float:
-    """Returns the processor time of the page processes of this program's browser [s]; 0: unknown."""
+    """Returns the processor time of the pages of this program's browser [s]; 0: unknown."""
     parents, spent = {}, {}
     for folder in Path("/proc").glob("[0-9]*"):
         try:

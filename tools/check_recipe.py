@@ -1,6 +1,6 @@
 """Reads a conda recipe with py-rattler-build and renders it: `make test-metadata`.
 
-py-rattler-build is no dependency of the project; the target installs it in an environment of its own.
+py-rattler-build is no dependency of the project; the target has an environment of its own.
 """
 
 from __future__ import annotations
