@@ -292,6 +292,36 @@ def test_another_ground_ends_a_recording(loop: Loop, side: Side) -> None:
     assert [note for _, note in side.last("status")["notes"]] == ["Recorded 0.1 s."]
 
 
+STANDS = """
+import numpy as np
+
+
+class Stands:
+    def __init__(self, robot):
+        self.stance = np.array(robot.stance)
+
+    def step(self, t, command, measurement):
+        return self.stance
+"""
+
+
+def test_a_change_that_needs_a_stand_is_told_to_all_pages(side: Side, tmp_path: Path) -> None:
+    (tmp_path / "law.py").write_text(STANDS, encoding="utf-8")
+    scenario = load_scenario("walk_flat")
+    texts = control_texts(scenario, ("kinematic",)) | {"Stands": f"{tmp_path / 'law.py'}:Stands"}
+    with LiveRobot(Choices(scenario, texts, {})) as robot:
+        loop = Loop(robot, side, now=lambda: side.time, pause=side.pause)
+        side.post("clients", 0, 1)
+        side.post("set", 1, Change("gait", "ripple"))
+        turn(loop, 10)
+        assert side.last("status")["notes"] == []  # it walks on
+        side.post("set", 1, Change("control", "Stands"))
+        turn(loop, 10)
+        assert [note for _, note in side.last("status")["notes"]] == [
+            "The robot stops, and walks on with Stands: only built-in controls hand the walk over."
+        ]
+
+
 FAILING = """
 import numpy as np
 
