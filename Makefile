@@ -23,7 +23,11 @@ SANITIZED_SHORT := $(patsubst %,tests/fmi/test_%.py,fmi fmi3 fmi3_order fmi_stat
 	$(patsubst %,tests/plant/test_plant_%.py,events coordinates misuse)
 SANITIZED := $(SANITIZED_SHORT) tests/fmi/test_fmi_importers.py tests/fmi/test_endurance.py
 
-.PHONY: help setup demo test test-docs test-browser test-rerun test-importers test-platforms test-endurance test-native test-native-sanitize test-sanitize test-sanitize-short test-robots test-wheels wheels test-compilers fuzz fuzz-short mutants soak lint-c check bench bench-quick bench-batch bench-gym bench-opening control study-demo format generate fmu typing clean docs identify-campaign coverage lock audit fuzz-afl
+.PHONY: help setup demo test test-docs test-browser test-rerun test-importers test-platforms \
+	test-endurance test-native test-native-sanitize test-sanitize test-sanitize-short test-robots \
+	test-wheels test-metadata wheels test-compilers fuzz fuzz-short mutants soak lint-c check bench \
+	bench-quick bench-batch bench-gym bench-browser bench-opening control study-demo format generate \
+	fmu typing clean docs identify-campaign coverage lock audit fuzz-afl
 
 help:
 	@echo "make setup     the hexapod command in $(BIN)"
@@ -41,6 +45,7 @@ help:
 	@echo "make test-robots  30 robots drawn at random, 0.5 to 30 kg: all designed for, all walk (3 min)"
 	@echo "make wheels    wheels for Linux, Windows and macOS, source distribution and SHA-256 list in dist/ (5 min)"
 	@echo "make test-wheels  these: sizes, tags, and the Linux wheel in an empty environment without a compiler (3 min)"
+	@echo "make test-metadata  citation, conda recipe and release workflow, by the tools of their kinds (1 min)"
 	@echo "make test-compilers  the plant built by gcc, clang and zig at -O0 to -O3: the same bits (3 min)"
 	@echo "make fuzz      libFuzzer on calls, states, start values and grids, Hypothesis on every reader: FUZZ_SECONDS, 3600 in all"
 	@echo "make fuzz-short  the same for a minute in all"
@@ -53,6 +58,7 @@ help:
 	@echo "make bench     speed and accuracy against the engines people would pick instead (15 min); bench-quick: 1.5 min"
 	@echo "make bench-batch  walks a minute on one core and on all, cost of a run beside its loop, memory (5 min)"
 	@echo "make bench-gym  environment steps a second of the learning environments and of mujoco.rollout (1 min)"
+	@echo "make bench-browser  walks of the page without a server in Chromium, against real time (1 min)"
 	@echo "make study-demo  500 walks, killed twice and completed; the same uninterrupted and on a Dask cluster: the same bytes (5 min)"
 	@echo "make control   what each part of the compliant control is worth, where, and what it survives: docs/control.md (5 min)"
 	@echo "make identify-campaign  20 robots with secret numbers, identified from logs of 6 s (10 min); ROBOTS, SECONDS, AT_A_TIME; goes on with out/identification_SECONDS.csv"
@@ -128,6 +134,19 @@ wheels: setup $(RELEASE)
 
 test-wheels: wheels
 	HEXAPOD_WHEELS=$(WHEELS) $(BIN)/python -m pytest -v tests/release
+
+METADATA := build/metadata
+ACTIONLINT := github.com/rhysd/actionlint/cmd/actionlint@v1.7.12
+
+# tools of an environment of their own, which the project does not depend on
+test-metadata:
+	$(PYTHON) -m venv $(METADATA)
+	$(METADATA)/bin/python -m pip install --quiet check-jsonschema py-rattler-build
+	$(METADATA)/bin/check-jsonschema --builtin-schema vendor.citation-file-format CITATION.cff
+	$(METADATA)/bin/check-jsonschema --builtin-schema vendor.github-workflows .github/workflows/*.yml
+	$(METADATA)/bin/python tools/check_recipe.py packaging/conda/recipe.yaml
+	@if command -v go >/dev/null; then go run $(ACTIONLINT) .github/workflows/*.yml && echo "actionlint: no findings"; \
+	else echo "test-metadata: skipped actionlint: no go is installed (Debian, Ubuntu: apt-get install golang)"; fi
 
 # programs in C, run by ctest
 test-native: setup
@@ -208,6 +227,9 @@ bench-opening: setup
 
 bench-batch: setup
 	$(BIN)/python -m benchmarks.batch
+
+bench-browser: setup
+	PYTHONPATH=tests/support $(BIN)/python -m benchmarks.browser
 
 bench-gym: setup
 	$(BIN)/python -m benchmarks.learning

@@ -27,6 +27,7 @@ from hexapod_cosim.controller.gains import Gains
 from hexapod_cosim.controller.memory import Stateful
 from hexapod_cosim.controller.parts import Parts
 from hexapod_cosim.controller.plane import LEGS, Array, Mask, Plane, cis, rows_of
+from hexapod_cosim.controller.walk.fade import Fade
 from hexapod_cosim.controller.walk.gait import Gait
 from hexapod_cosim.controller.walk.inverse_dynamics import Masses, Neighbours
 from hexapod_cosim.controller.walk.kinematics import Feet, LegSolver, Pose
@@ -122,6 +123,12 @@ def _check_period(period: float, gait: Gait) -> None:
         )
 
 
+def _check_law(law: str) -> None:
+    """Raises HexapodError for an unknown name."""
+    if law not in LAWS:
+        raise unknown_name("law", law, LAWS)
+
+
 def gains_warnings(robot: Robot, gains: Gains | None, period: float) -> tuple[str, ...]:
     """Returns warnings of gains for another robot or period [s], and the caveats of the gains."""
     if gains is None:
@@ -139,7 +146,7 @@ class Controller(Stateful):
     """
 
     STATE = (
-        "ramp", "paths", "compliant", "paper", "_start", "_count", "_at", "_last", "_cut",
+        "ramp", "paths", "compliant", "paper", "fade", "_start", "_count", "_at", "_last", "_cut",
         "_before", "_now", "_after", "_shown", "_next",
     )  # fmt: skip
 
@@ -154,10 +161,10 @@ class Controller(Stateful):
         law: str = "compliant",
     ) -> None:
         _check_period(period, gait)
-        if law not in LAWS:
-            raise unknown_name("law", law, LAWS)
+        _check_law(law)
         self.robot, self.period, self.gains, self.parts = robot, period, gains, parts
         self.legs, self.stance, self.law = LegSolver(robot), robot.stance, law
+        self.fade = Fade(period=period)
         self._build(gait)
         self._next: Gait | None = None  # that the legs change to
         self.warnings = gains_warnings(robot, gains, period)
@@ -341,7 +348,7 @@ class Controller(Stateful):
         self._build(self._next)
         offset, late = self.paths.offset, self.paths.late
         super().restore(state)
-        if self.compliant is not None and law is not None:
+        if self.compliant is not None and hasattr(law, "stance"):
             self.compliant.stance = law.stance
         self.ramp.carry(before)
         self.paths.offset, self.paths.late = offset, late
@@ -359,6 +366,38 @@ class Controller(Stateful):
         self._next, self._after = gait, None
         self.paths.ending = self.paths.walking
         self._adopt()
+
+    # ----------------------------------------------------------------------- change of control
+
+    def _exchange(self) -> None:
+        """Goes on under the control of the present gains and law in the phase of the walk."""
+        state = super().save()
+        del state["compliant"], state["paper"]  # the laws begin anew
+        self._build(self.gait)
+        super().restore(state)
+        self.fade.begin(self._out)
+        self.paths.carry()
+        if self.compliant is None:
+            self.paths.narrowing = 0.0
+        self._show(np.zeros((LEGS, 3)), _flags())
+        self._after, self._cut = None, True
+
+    def change_control(self, gains: Gains | None, law: str = "compliant") -> None:
+        """Changes the control while the robot walks: arguments as for the constructor.
+
+        The plan of the feet goes on in its phase, under its command; the laws begin anew, and the
+        joint commands fade over to those of the next control (fade.py). Before the first step the
+        next control begins as after reset(). Raises HexapodError for an unknown law, and then
+        changes nothing.
+        """
+        _check_law(law)
+        self.gains, self.law = gains, law
+        self.warnings = gains_warnings(self.robot, gains, self.period)
+        if self._start is not None:
+            self._exchange()
+            return
+        self._build(self.gait)
+        self.reset()
 
     # --------------------------------------------------------------------------------- joints
 
@@ -452,6 +491,7 @@ class Controller(Stateful):
             self.compliant.reset()
         if self.paper is not None:
             self.paper.reset()
+        self.fade.reset()
         self._start = None
         self._count, self._at, self._last, self._cut = 0, 0, math.inf, True
         feet = self.paths.reset()
@@ -463,14 +503,17 @@ class Controller(Stateful):
         self._follow_paths()
 
     def save(self) -> dict[str, Any]:
-        """Returns the state that restore() takes; it includes the gait."""
-        return super().save() | {"gait": self.gait}
+        """Returns the state that restore() takes; it includes gait and control."""
+        return super().save() | {"gait": self.gait, "control": (self.gains, self.law)}
 
     def restore(self, state: dict[str, Any]) -> None:
         """Restores a state returned by save(); the following steps repeat exactly."""
-        if state["gait"] != self.gait:
+        control = self.gains, self.law
+        if (state["gait"], state["control"]) != (self.gait, control):
+            self.gains, self.law = state["control"]
             self._build(state["gait"])
-        super().restore(state)
+        own = {name: value for name, value in state.items() if name in self.STATE}
+        super().restore(own)
         self._follow_paths()
         self._show(*self._shown)
 
@@ -516,5 +559,6 @@ class Controller(Stateful):
             if self.compliant is not None:
                 shift = self.compliant.step(self._ask(self.compliant), measurement, self._out)
                 self._show(shift, self.compliant.laws.fallback)
+            self.fade.step(self.legs, self._out)
             self._adopt()
         return self._out

@@ -38,22 +38,27 @@ static int is_same_gait(const hxGait *a, const hxGait *b) {
   return same;
 }
 
-/* Changes the gait to that of the parameters, which are tunable. */
-static hxStatus follow_gait(hxController *controller, const struct hxVariables *variables) {
+/* Changes control and gait to those of the parameters, which are tunable. */
+static hxStatus follow(hxController *controller, const struct hxVariables *variables) {
   const hxGait *wanted = &variables->definition.gait;
+  const int control = variables->definition.control;
+  if (control != hx_controller_control(controller)) {
+    const hxStatus status = hx_controller_change_control(controller, control);
+    if (status != HX_OK) return status;
+  }
   if (is_same_gait(wanted, hx_controller_gait(controller))) return HX_OK;
   return hx_controller_change_gait(controller, wanted);
 }
 
 hxStatus hx_component_step(hxComponent *component, const struct hxVariables *variables,
                            const hxInput *rate, double t_end) {
-  const hxStatus status = follow_gait(controller_of(component), variables);
+  const hxStatus status = follow(controller_of(component), variables);
   if (status != HX_OK) return status;
   return hx_controller_step(controller_of(component), &variables->input, rate, t_end);
 }
 
 void hx_component_output(hxComponent *component, struct hxVariables *variables) {
-  (void)follow_gait(controller_of(component), variables); /* a step reports a refusal */
+  (void)follow(controller_of(component), variables); /* a step reports a refusal */
   hx_controller_output(controller_of(component), &variables->input, &variables->output);
 }
 

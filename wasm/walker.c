@@ -5,14 +5,10 @@
 #include <string.h>
 
 static const double MACRO_STEP = 0.005; /* s    that of the scenarios */
-static const double FADE = 0.4;         /* s    from the commands of one controller to the next */
-static const double STILL = 0.02;       /* rad  joint commands that vary by less stand still */
-static const double PATIENCE = 4.0;     /* gait periods  until a change is made while moving */
 
-/* Stages of a change: of the control, or of the gait alone */
+/* Stages of a change of gait */
 typedef enum Stage {
   NO_CHANGE,
-  STOPS,  /* the present controller stops the robot */
   SLOWS,  /* the page has asked for a command that both gaits can follow; the ramp leads there */
   STEPS,  /* legs in the air finish their steps */
   SETTLES /* each leg makes its first step in the next gait */
@@ -20,11 +16,9 @@ typedef enum Stage {
 
 typedef struct Change {
   Stage stage;
-  hxWalk walk;        /* the control and gait that come */
-  double since;       /* s   time of the request, or the begin of the stage */
-  double swing;       /* s   of the gait before */
-  double still_since; /* s   the joint commands have hardly changed since then */
-  double reference[HX_LEGS][HX_JOINTS]; /* rad  joint commands at that time */
+  hxWalk walk;  /* with the gait that comes */
+  double since; /* s   time of the request, or the begin of the stage */
+  double swing; /* s   of the gait before */
 } Change;
 
 static struct {
@@ -40,8 +34,6 @@ static struct {
   long steps; /* macro-steps since the start */
   hxWalk wanted; /* by the page */
   Change change;
-  double from[HX_LEGS][HX_JOINTS]; /* rad  joint commands from which the present ones fade in */
-  double fade_end;                 /* s */
   hxFrame frame;
 } walker;
 
@@ -100,7 +92,7 @@ int hx_walker_start(double friction) {
   hx_input_default(&walker.input);
   hx_controller_input_default(&walker.seen);
   memset(&walker.change, 0, sizeof walker.change);
-  walker.fade_end = walker.commanded = 0.0;
+  walker.commanded = 0.0;
   walker.steps = 0;
   walker.robot.friction.mu = friction;
   choose(&walker.wanted);
@@ -126,12 +118,33 @@ void hx_walker_push(double x, double y, double z) {
   walker.input.push_force[2] = z;
 }
 
-void hx_walker_change(void) {
-  const int same_control = (int)walker.wanted.control == (int)walker.walk.control;
-  walker.change.stage = same_control && walker.change.stage != STOPS ? SLOWS : STOPS;
+/* Returns the walk in the gait that holds or comes. */
+static hxWalk next_walk(void) {
+  const hxGait *gait = &walker.walk.gait;
+  if (walker.change.stage == SLOWS) return walker.change.walk;
+  return (hxWalk){walker.walk.control, gait->pattern,     gait->period,
+                  gait->duty,          gait->step_height, gait->touchdown_speed};
+}
+
+static int is_same_gait(const hxWalk *a, const hxWalk *b) {
+  return a->pattern == b->pattern && a->period == b->period && a->duty == b->duty &&
+         a->step_height == b->step_height && a->touchdown_speed == b->touchdown_speed;
+}
+
+int hx_walker_change(void) {
+  const int control = (int)walker.wanted.control;
+  const hxWalk next = next_walk();
+  if (control != walker.walk.control) {
+    const int status = hx_controller_change_control(walker.controller, control);
+    if (status != HX_OK) return status;
+    walker.walk.control = control;
+  }
+  if (!is_same_gait(&walker.wanted, &next)) {
+    walker.change.stage = SLOWS;
+    walker.change.since = walker.output.time;
+  }
   walker.change.walk = walker.wanted;
-  walker.change.since = walker.change.still_since = walker.output.time;
-  memcpy(walker.change.reference, walker.command.angle_ref, sizeof walker.change.reference);
+  return HX_OK;
 }
 
 int hx_walker_set_friction(double friction) {
@@ -147,22 +160,6 @@ int hx_walker_set_friction(double friction) {
   const int status = hx_plant_reset(walker.plant, &next, walker.output.time);
   if (status == HX_OK) walker.robot = next;
   return status;
-}
-
-/* Notes whether the joint commands have stood still for half a gait period, or PATIENCE is over. */
-static int has_stopped(void) {
-  Change *change = &walker.change;
-  const double now = walker.output.time, period = walker.walk.gait.period;
-  double largest = 0.0;
-  for (int leg = 0; leg < HX_LEGS; ++leg)
-    for (int joint = 0; joint < HX_JOINTS; ++joint)
-      largest =
-          fmax(largest, fabs(walker.command.angle_ref[leg][joint] - change->reference[leg][joint]));
-  if (largest > STILL) {
-    change->still_since = now;
-    memcpy(change->reference, walker.command.angle_ref, sizeof change->reference);
-  }
-  return now - change->still_since >= 0.5 * period || now - change->since >= PATIENCE * period;
 }
 
 /* Goes through the stages of a change of gait, during which the robot walks on. */
@@ -188,58 +185,27 @@ static int change_gait(void) {
   return HX_OK;
 }
 
-/* Lets the wanted controller begin in the stance, faded in from the last joint commands. */
-static int take_over(void) {
-  choose(&walker.change.walk);
-  walker.change.stage = NO_CHANGE;
-  memcpy(walker.from, walker.input.angle_ref, sizeof walker.from); /* perhaps while fading */
-  walker.fade_end = walker.output.time + FADE;
-  return hx_controller_reset(walker.controller, &walker.walk, walker.output.time);
-}
-
-/* Returns the share of the old joint commands, from 1 to 0 as a cubic, and its rate [1/s]. */
-static double old_share(double *rate) {
-  const double left = fmax((walker.fade_end - walker.output.time) / FADE, 0.0);
-  *rate = -6.0 * left * (1.0 - left) / FADE;
-  return left * left * (3.0 - 2.0 * left);
-}
-
 /* Writes the joint commands to the plant's input. */
 static void drive(void) {
-  double rate;
-  const double old = old_share(&rate);
-  for (int leg = 0; leg < HX_LEGS; ++leg)
-    for (int joint = 0; joint < HX_JOINTS; ++joint) {
-      const double gap = walker.from[leg][joint] - walker.command.angle_ref[leg][joint];
-      walker.input.angle_ref[leg][joint] = walker.command.angle_ref[leg][joint] + old * gap;
-      walker.input.speed_ref[leg][joint] =
-          (1.0 - old) * walker.command.speed_ref[leg][joint] + rate * gap;
-      walker.input.torque_ref[leg][joint] = (1.0 - old) * walker.command.torque_ref[leg][joint];
-    }
+  memcpy(walker.input.angle_ref, walker.command.angle_ref, sizeof walker.input.angle_ref);
+  memcpy(walker.input.speed_ref, walker.command.speed_ref, sizeof walker.input.speed_ref);
+  memcpy(walker.input.torque_ref, walker.command.torque_ref, sizeof walker.input.torque_ref);
 }
 
 /* Calculates the joint commands of this macro-step. */
 static int control(double t_end) {
   hxControllerInput *seen = &walker.seen;
-  const hxControllerInput asked = *seen;
   memcpy(seen->angle, walker.output.angle, sizeof seen->angle);
   memcpy(seen->foot_force, walker.output.foot.force, sizeof seen->foot_force);
   memcpy(seen->quaternion, walker.output.torso.quaternion, sizeof seen->quaternion);
-  if (walker.change.stage == STOPS) memset(&seen->command, 0, sizeof seen->command);
   hx_controller_output(walker.controller, seen, &walker.command);
-  const int status = hx_controller_step(walker.controller, seen, NULL, t_end);
-  seen->command = asked.command;
-  return status;
+  return hx_controller_step(walker.controller, seen, NULL, t_end);
 }
 
 static int macro_step(void) {
   const double t_end = (double)(walker.steps + 1) * MACRO_STEP;
   int status = change_gait();
   if (status == HX_OK) status = control(t_end);
-  if (status == HX_OK && walker.change.stage == STOPS && has_stopped()) {
-    status = take_over();
-    if (status == HX_OK) status = control(t_end);
-  }
   if (status != HX_OK) return status;
   drive();
   status = hx_plant_step(walker.plant, &walker.input, t_end);

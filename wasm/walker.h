@@ -29,7 +29,7 @@ typedef struct hxFrame {
   double force[HX_LEGS][3];           /* N    ground on foot */
   double slip_speed[HX_LEGS];         /* m/s */
   double largest_torque;              /* N m  of all servos */
-  /* 1: control or gait are being changed; 2: the next gait has begun, and legs make their first
+  /* 1: the gait is being changed; 2: the next gait has begun, and legs make their first
    * steps in it */
   double changing;
 } hxFrame;
@@ -47,11 +47,11 @@ HX_API void hx_walker_command(double forward, double left, double turn, double h
 /* Sets the force on the torso's centre of mass, world axes [N]. */
 HX_API void hx_walker_push(double x, double y, double z);
 
-/* Changes to the wanted control and gait. Another control: the present controller stops the robot,
- * the next one begins in the stance, and the joint commands fade from the old to the new ones.
- * Another gait alone changes while the robot walks, once the command has been followed for a gait
- * period; the page should give a command that both gaits can follow. */
-HX_API void hx_walker_change(void);
+/* Changes to the wanted control and gait while the robot walks; HX_OK, or the status of a refusal.
+ * Another control goes on in the present phase at once, and the joint commands fade over. Another
+ * gait follows once the command has been followed for a gait period; the page should give a command
+ * that both gaits can follow. */
+HX_API int hx_walker_change(void);
 
 /* Changes the friction coefficient: the plant begins again in its present pose and motion. */
 HX_API int hx_walker_set_friction(double friction);

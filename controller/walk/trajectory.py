@@ -471,6 +471,10 @@ class FootPaths(Stateful):
         self.standing, self.stayed = self._phase_after(0) < self.gait.duty, self.late
         return feet
 
+    def carry(self) -> None:
+        """Goes on in the present phases under another control, in the same gait."""
+        self.met = np.zeros(LEGS, dtype=np.bool_)
+
     def landing(self, number: int) -> Mask:
         """Returns the legs (6,) whose swing ends at the present step.
 

@@ -5,6 +5,7 @@
 void hx_controller_compile(const hxControllerDefinition *definition, hxControllerModel *model) {
   memset(model, 0, sizeof *model);
   model->period = definition->period;
+  model->gait = definition->gait;
   model->compliant = definition->control == HX_CONTROL_COMPLIANT;
   model->paper = definition->control == HX_CONTROL_PAPER;
   for (int k = 0; k < HX_LEGS; ++k) hx_leg_solver_compile(definition, k, &model->leg[k]);
@@ -15,6 +16,7 @@ void hx_controller_compile(const hxControllerDefinition *definition, hxControlle
     model->paths.handover = model->laws.support.handover;
   }
   if (model->paper) hx_paper_compile(definition, &model->corrections);
+  hx_fade_compile(definition->period, &model->fade);
 }
 
 /* ----------------------------------------------------------------------------------- planning */
@@ -190,6 +192,26 @@ void hx_controller_change(hxControllerModel model[2], hxControllerState *state) 
   hx_controller_adopt(model, state);
 }
 
+/* -------------------------------------------------------------------------- change of control */
+
+void hx_controller_exchange(hxControllerModel model[2], const hxFootPathsModel *before,
+                            hxControllerState *state) {
+  hxControllerModel *now = &model[state->model];
+  hxControllerOutput *output = &state->output;
+  hx_fade_begin(&now->fade, output, &state->fade);
+  hx_foot_paths_carry(&now->paths, before, &state->paths);
+  if (now->compliant)
+    hx_compliant_reset(&now->laws, &state->compliant);
+  else
+    state->paths.narrowing = 0.0;
+  memset(&state->paper, 0, sizeof state->paper);
+  memset(output->shift, 0, sizeof output->shift);
+  memset(output->lift, 0, sizeof output->lift);
+  memset(output->fallback, 0, sizeof output->fallback);
+  state->has_after = 0;
+  state->cut = 1;
+}
+
 /* ------------------------------------------------------------------------------------- joints */
 
 /* Returns the rate of a quantity at the present step, one-sided at the end of a section. */
@@ -229,6 +251,7 @@ static void follow_paths(const hxControllerModel *model, hxControllerState *stat
   const hxPlannedStep *before = step_at(state, -1), *now = step_at(state, 0),
                       *after = step_at(state, 1);
   hxControllerOutput *output = &state->output;
+  memset(output->torque_ref, 0, sizeof output->torque_ref);
   for (int k = 0; k < HX_LEGS; ++k) {
     hxPlane plane, velocity;
     double height, rise;
@@ -336,7 +359,9 @@ void hx_controller_tick(const hxControllerModel *model, const hxControllerInput 
   ++state->tick;
   follow_paths(model, state);
   if (model->paper) correct_paths(model, input, state);
-  if (!model->compliant) return;
-  ask(model, state, &stance);
-  hx_compliant_step(&model->laws, model->leg, &stance, input, &state->compliant, &state->output);
+  if (model->compliant) {
+    ask(model, state, &stance);
+    hx_compliant_step(&model->laws, model->leg, &stance, input, &state->compliant, &state->output);
+  }
+  hx_fade_step(&model->fade, model->leg, &state->fade, &state->output);
 }

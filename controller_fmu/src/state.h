@@ -7,17 +7,20 @@
 #include "comply/compliant.h"
 #include "comply/paper.h"
 #include "hexapod/inside.h"
+#include "walk/fade.h"
 
 HX_HIDDEN_BEGIN
 
 typedef struct hxControllerModel {
   double period; /* s */
   int compliant, paper; /* this control, otherwise kinematic control */
+  hxGait gait;
   hxLegSolver leg[HX_LEGS];
   hxCommandRampModel ramp;
   hxFootPathsModel paths;
   hxCompliantModel laws;
   hxPaperModel corrections; /* of the paper's control */
+  hxFadeModel fade;
 } hxControllerModel;
 
 /* One planned step. It depends on the command alone. Feet are in the walking frame. */
@@ -48,6 +51,7 @@ typedef struct hxControllerState {
   hxPlannedStep step[3];
   hxCompliant compliant;
   hxPaper paper;
+  hxFade fade; /* from the control before */
   int model; /* index of the present model; the other one is that of the next gait */
   int changing; /* to the other model */
   hxControllerOutput output; /* of the last tick */
@@ -80,6 +84,12 @@ void hx_controller_adopt(hxControllerModel model[2], hxControllerState *state);
 
 /* Begins a change to the gait of the other model (C55). */
 void hx_controller_change(hxControllerModel model[2], hxControllerState *state);
+
+/* Goes on under another control, which both models have been compiled for, in the present phase of
+ * the walk: the plan keeps its state, the laws begin anew, and the joint commands fade over from
+ * the last ones. before: the paths' model of the present gait under the control before. */
+void hx_controller_exchange(hxControllerModel model[2], const hxFootPathsModel *before,
+                            hxControllerState *state);
 
 /* Computes one tick; state->output then holds the commands for this input. */
 void hx_controller_tick(const hxControllerModel *model, const hxControllerInput *input,

@@ -29,8 +29,10 @@ from hexapod_cosim.models import HexapodError
 MOST_CLIENTS = 8
 RATE, BURST = 100.0, 200.0  # messages per second and at once, of a page
 ACTION_RATE, ACTION_BURST = 10.0, 20.0  # of settings and actions among them
-MOST_DROPPED = 2000  # messages above the rate, after which a page is closed
-MOST_REFUSED = 20  # messages that are none, after which a page is closed
+# messages above the rate and messages that are none, after which a page is closed: so many at once,
+# and the rates [1/s] at which they are forgotten
+MOST_DROPPED, DROPPED_RATE = 2000, 20.0
+MOST_REFUSED, REFUSED_RATE = 20, 0.1
 MOST_ACTIONS = 64  # settings and actions that wait for the loop
 FLOOD, NONSENSE = "too many messages", "too many messages that are none"
 
@@ -58,11 +60,13 @@ class Client:
 
     def __init__(self, number: int, now: Callable[[], float]) -> None:
         self.number = number
-        self.dropped = self.refused = 0
+        self.dropped = 0  # messages, as long as the page is connected
         self._slots: dict[str, str] = {}
         self._ready = asyncio.Event()
         self.messages = Bucket(RATE, BURST, now)
         self.actions = Bucket(ACTION_RATE, ACTION_BURST, now)
+        self.drops = Bucket(DROPPED_RATE, MOST_DROPPED, now)
+        self.refusals = Bucket(REFUSED_RATE, MOST_REFUSED, now)
 
     def offer(self, kind: str, text: str) -> None:
         """Replaces what is to be sent of a kind."""
@@ -139,13 +143,12 @@ class Hub:
         """
         if not client.messages.allows():
             client.dropped += 1
-            return FLOOD if client.dropped > MOST_DROPPED else None
+            return None if client.drops.allows() else FLOOD
         try:
             message = read_message(text)
         except HexapodError as error:
-            client.refused += 1
             client.offer("refused", json.dumps({"type": "refused", "reason": str(error)}))
-            return NONSENSE if client.refused > MOST_REFUSED else None
+            return None if client.refusals.allows() else NONSENSE
         if isinstance(message, Change | Action) and not client.actions.allows():
             client.dropped += 1
             return None

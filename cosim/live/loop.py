@@ -31,6 +31,8 @@ SILENCE = 1.0  # s    after which a drive or push that was not renewed ends
 IDLE = 0.05  # s    between two looks for messages while the loop pauses
 MOST_MESSAGES = 200  # that are read before a macro-step
 MOST_NOTES = 5  # sentences for pages that are kept
+HALTS = "only built-in controls hand the walk over."
+UNCHANGED = "before the first change of gait, control or friction."
 FREE, RECORDING, REPLAYING = "free", "recording", "replaying"
 
 
@@ -114,6 +116,9 @@ class Loop:
 
     def step(self) -> None:
         """Makes one macro-step under the present inputs."""
+        if self._mode == REPLAYING:
+            for change in self._take.changes_at(self.robot.count):
+                self.robot.change(change)
         command, force = self._inputs()
         self._command = astuple(command)[:4]
         before = self.robot.fault
@@ -170,7 +175,7 @@ class Loop:
         self._echo[client] = ping.stamp
 
     def _on_set(self, client: int, change: Change) -> None:
-        """Changes a setting; a recording or replay ends, because its settings are constant."""
+        """Changes a setting; a recording goes on, a replay ends."""
         self._attempt(client, lambda: self._change(change))
 
     def _change(self, change: Change) -> None:
@@ -179,8 +184,14 @@ class Loop:
             return
         count = self.robot.count
         self.robot.change(change)
+        placed = self.robot.count < count or change.key == "ground"
+        if self.robot.halts and change.key in {"control", "gait"}:
+            self._tell(f"The robot stops, and walks on with {change.value}: {HALTS}")
+        if self._mode == RECORDING and not placed:
+            self._take.note_change(change)
+            return
         self._end_take()
-        if self.robot.count < count or change.key == "ground":
+        if placed:
             self._note_placed()
 
     def _on_do(self, client: int, action: Action) -> None:
@@ -217,8 +228,11 @@ class Loop:
     def _end_take(self) -> None:
         """Ends a recording or a replay; a recording is given to the server as a scenario."""
         if self._mode == RECORDING and self._take.steps > 0:
-            self._put("take", self._take.as_toml())
+            kept = self._take.kept * self._take.scenario.macro_step
+            self._put("take", self._take.as_toml() if kept else "")
             self._tell(f"Recorded {self._take.duration:.1f} s.")
+            if self._take.changes:
+                self._tell(f"Replay repeats all of it, Save gives the {kept:.1f} s {UNCHANGED}")
         elif self._mode == REPLAYING:
             self._tell("The replay has ended.")
         self._mode = FREE

@@ -9,9 +9,10 @@ Changes while the robot walks:
 - friction: the plant begins again in its present pose and motion, on ground of the new friction.
   Bristles of the friction laws and the measures of work and slip begin at zero.
 - gait: the built-in controller changes it without a stop (`gait_change.py`).
-- control, and the gait of a user's control: the robot stops, as the present controller stops it,
-  and the next controller begins in the stance; over FADE the joint commands pass from the old ones
-  to the new ones.
+- control, from a built-in one to another: it goes on in the present phase of the walk at once.
+- control, from or to a user's one, and the gait of a user's control: the robot stops, as the
+  present controller stops it, and the next controller begins in the stance; over FADE the joint
+  commands pass from the old ones to the new ones.
 - ground: the robot is placed at its start on the new ground.
 
 A controller that raises an exception is replaced by one that holds the joints where they are.
@@ -157,6 +158,8 @@ class LiveRobot(Closing):
             self.place(wanted)
         elif change.key == "friction":
             self._change_friction(wanted, plan)
+        elif change.key == "control" and self._can_exchange(plan):
+            self._exchange(wanted, plan)
         elif self._can_walk_on(wanted, plan):
             self.wanted, self._next = wanted, plan
             self._begin_gait_change()
@@ -164,10 +167,43 @@ class LiveRobot(Closing):
             self.wanted, self._next, self._gait_change = wanted, plan, None
             self._stop = Stop(self._steps_of(0.5 * self._period), self._steps_of(self._patience))
 
+    @property
+    def halts(self) -> bool:
+        """Whether the robot stops, because a change needs a stand."""
+        return self.wanted is not None and self._gait_change is None
+
     def _plan_of(self, settings: Settings) -> RunPlan:
         scenario = self.choices.scenario_with(settings)
         built_in = control_of(scenario.control).is_builtin
         return make_plan(scenario, gains=self._gains if built_in else None)
+
+    def _can_exchange(self, plan: RunPlan) -> bool:
+        """Whether the controller FMU can go on under the control of a plan.
+
+        It can from one built-in control to another, while no other change needs a stand.
+        """
+        present, then = self.plan.controller, plan.controller
+        robot = replace(then.robot, friction=present.robot.friction)
+        same = replace(present, gains=then.gains, law=then.law, gait=then.gait)
+        scenarios = self.plan.scenario, plan.scenario
+        return (
+            all(control_of(scenario.control).is_builtin for scenario in scenarios)
+            and (self.wanted is None or self._gait_change is not None)
+            and not self.fault
+            and replace(then, robot=robot) == same
+        )
+
+    def _exchange(self, wanted: Settings, plan: RunPlan) -> None:
+        """Lets the controller FMU go on under another control."""
+        assert self._built_in is not None
+        number = controller_parameters(plan.controller)["control"]
+        self._built_in.set_parameters({"control": number})
+        self.settings = replace(self.settings, control=wanted.control)
+        if self.wanted is None:
+            self.plan = plan
+            return
+        self.wanted, self._next = wanted, plan
+        self.plan = self._plan_of(self.settings)
 
     def _can_walk_on(self, wanted: Settings, plan: RunPlan) -> bool:
         """Whether the gait alone changes, and the controller FMU can change it."""
@@ -266,13 +302,15 @@ class LiveRobot(Closing):
         self._controller = controller
 
     def _built_in_controller(self) -> FmuController:
-        """Returns the controller FMU with the parameters of the plan."""
+        """Returns the controller FMU with the plan's parameters, and gains for each control."""
         setup = self.plan.controller
+        known = replace(setup, gains=setup.gains or self._gains)
+        control = {"control": controller_parameters(setup)["control"]}
         if self._built_in is None:
             path = export_controller(setup, self._folder / "controller.fmu")
             self._built_in = self._open.enter_context(Fmu(path, name="controller"))
         self._built_in.reset()
-        self._built_in.set_parameters(controller_parameters(setup))
+        self._built_in.set_parameters(controller_parameters(known) | control)
         self._built_in.initialise(self.time, HORIZON)
         return FmuController(self._built_in, period=setup.period)
 

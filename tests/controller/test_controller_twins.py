@@ -42,7 +42,7 @@ PREFIX = re.compile(
     r"^hx_((burden|compliance|compliant|contact_detector|sensor_watch|controller|foot_law|gait"
     r"|hold|inverse_dynamics|leg_solver|landings"
     r"|paper|planned_squeeze|posture|slip_pid|suspension|support|touchdown|warmth"
-    r"|command_ramp|foot_paths)_)?"
+    r"|command_ramp|fade|foot_paths)_)?"
 )
 FUNCTION = re.compile(r"^(?:static )?(?:const )?\w+ \*?(\w+)\([^;]*?\) \{", re.MULTILINE)
 CONSTANT = re.compile(r"(\w+) = (-?[\d.e+-]+)(?=[,;])")

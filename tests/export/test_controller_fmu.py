@@ -395,7 +395,31 @@ def test_the_gait_is_tunable_while_the_robot_walks(tmp_path: Path) -> None:
         tunable = [
             name for name, variable in fmu.variables.items() if variable.variability == "tunable"
         ]
-        assert tunable == list(gait_parameters(amble))
+        assert tunable == ["control", *gait_parameters(amble)]
+
+
+def test_the_control_is_tunable_while_the_robot_walks(tmp_path: Path) -> None:
+    """The FMU changes its control as the Python controller does, also together with the gait."""
+    robot, measurement = load_robot("athena"), Measurement(angle=load_robot("athena").stance.copy())
+    gains = make_gains(robot)
+    setup = ControllerSetup(robot=robot, gait=make_gait(robot), period=PERIOD, gains=gains)
+    amble = replace(setup, gait=make_gait(robot, "amble"))
+    command, lead = BodyCommand(vx=0.03), setup.build()
+    with packed(setup, tmp_path) as fmu:
+        walker, worst = FmuController(fmu, period=PERIOD), 0.0
+        for k in range(800):
+            if k == 330:
+                fmu.set_parameters({"control": 3.0})
+                lead.change_control(gains, "paper")
+            if k == 500:
+                fmu.set_parameters({**gait_parameters(amble), "control": 1.0})
+                lead.change_control(None)
+                lead.change_gait(amble.gait)
+            ours = lead.step(k * PERIOD, command, measurement)
+            theirs = walker.step(k * PERIOD, command, measurement)
+            worst = max(worst, float(np.abs(ours.angle_ref - theirs.angle_ref).max()))
+        assert (lead.gait, lead.gains) == (amble.gait, None)
+    assert worst < ANGLE
 
 
 def test_a_gait_that_is_too_fast_is_refused_and_the_next_one_is_taken(tmp_path: Path) -> None:

@@ -235,18 +235,91 @@ def test_what_was_recorded_is_replayed_and_saved_as_the_same_walk(loop: Loop, si
     assert side.last("status")["mode"] == "free"
 
 
-def test_a_change_of_the_settings_ends_a_recording(loop: Loop, side: Side) -> None:
+def test_a_recording_goes_on_over_changes_and_its_replay_repeats_them(
+    loop: Loop, side: Side
+) -> None:
     side.post("do", 1, Action("record"))
-    turn(loop, 100)
-    side.post("set", 1, Change("gait", "tripod"))  # it is already: nothing changes
-    turn(loop, 20)
+    for step, change in enumerate(
+        [None, Change("gait", "tripod"), Change("gait", "ripple"), Change("friction", 0.4)]
+    ):
+        if change is not None:  # the gait is a tripod already: nothing changes
+            side.post("set", 1, change)
+        for _ in range((25, 25, 150, 50)[step]):
+            side.post("drive", 1, FORWARD)
+            turn(loop, 2)
     assert side.last("status")["mode"] == "recording"
-    side.post("set", 1, Change("friction", 0.4))
+    side.post("do", 1, Action("stop"))
+    first, pose = loop.robot.settings, loop.robot.signals.values.copy()
+    assert (first.gait, first.friction) == ("ripple", 0.4)
     turn(loop, 4)
-    status = side.last("status")
-    assert status["mode"] == "free"
-    assert status["settings"]["friction"] == 0.4
-    assert [note for _, note in status["notes"]] == ["Recorded 0.6 s."]
+    notes = [note for _, note in side.last("status")["notes"]]
+    assert notes == [
+        "Recorded 2.5 s.",
+        "Replay repeats all of it, Save gives the 0.5 s before the first change of gait, control or"
+        " friction.",
+    ]
+    scenario = scenario_from_table(parse_toml(side.last("take")), where="driven.toml")
+    assert scenario.duration == pytest.approx(0.5)
+    side.post("do", 1, Action("replay"))
+    turn(loop, 500)
+    assert (loop.robot.signals.values == pose).all()
+    assert loop.robot.settings == first
+    turn(loop, 4)
+    assert side.last("status")["mode"] == "free"
+
+
+def test_a_recording_that_begins_with_a_change_is_replayed_and_gives_no_scenario(
+    loop: Loop, side: Side
+) -> None:
+    side.post("do", 1, Action("record"))
+    side.post("set", 1, Change("friction", 0.4))
+    turn(loop, 60)
+    side.post("do", 1, Action("stop"))
+    turn(loop, 4)
+    assert side.last("take") == ""
+    assert side.last("status")["recorded"]
+    side.post("do", 1, Action("replay"))
+    turn(loop, 10)
+    assert loop.robot.settings.friction == 0.4
+
+
+def test_another_ground_ends_a_recording(loop: Loop, side: Side) -> None:
+    side.post("do", 1, Action("record"))
+    turn(loop, 20)
+    side.post("set", 1, Change("ground", "flat"))
+    turn(loop, 4)
+    assert side.last("status")["mode"] == "free"
+    assert [note for _, note in side.last("status")["notes"]] == ["Recorded 0.1 s."]
+
+
+STANDS = """
+import numpy as np
+
+
+class Stands:
+    def __init__(self, robot):
+        self.stance = np.array(robot.stance)
+
+    def step(self, t, command, measurement):
+        return self.stance
+"""
+
+
+def test_a_change_that_needs_a_stand_is_told_to_all_pages(side: Side, tmp_path: Path) -> None:
+    (tmp_path / "law.py").write_text(STANDS, encoding="utf-8")
+    scenario = load_scenario("walk_flat")
+    texts = control_texts(scenario, ("kinematic",)) | {"Stands": f"{tmp_path / 'law.py'}:Stands"}
+    with LiveRobot(Choices(scenario, texts, {})) as robot:
+        loop = Loop(robot, side, now=lambda: side.time, pause=side.pause)
+        side.post("clients", 0, 1)
+        side.post("set", 1, Change("gait", "ripple"))
+        turn(loop, 10)
+        assert side.last("status")["notes"] == []  # it walks on
+        side.post("set", 1, Change("control", "Stands"))
+        turn(loop, 10)
+        assert [note for _, note in side.last("status")["notes"]] == [
+            "The robot stops, and walks on with Stands: only built-in controls hand the walk over."
+        ]
 
 
 FAILING = """

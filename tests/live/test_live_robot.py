@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
+from itertools import permutations
 from pathlib import Path
 
 import numpy as np
@@ -156,6 +157,53 @@ def test_gait_and_control_change_while_the_robot_walks_without_a_jump_of_the_joi
     # rad    the swings of these gaits need up to 0.05 rad in a macro-step; a jump would be larger
     assert largest < 0.1
     assert placed.fault == ""
+
+
+@pytest.mark.parametrize("gait", ["tripod", "amble"])
+@pytest.mark.parametrize(
+    ("first", "then"), list(permutations(("kinematic", "compliant", "paper"), 2))
+)
+def test_the_control_changes_while_the_robot_walks_in_any_phase(
+    placed: LiveRobot, first: str, then: str, gait: str
+) -> None:
+    for phase in (0.1, 0.35, 0.6, 0.85):
+        placed.place(replace(placed.choices.first(), gait=gait, control=first))
+        period = {"tripod": 0.75, "amble": 1.125}[gait]
+        command = replace(WALK, vx=0.6 * placed.limits.vx)
+        go(placed, round((2.0 + phase) * period / 0.005), command)
+        angles, speeds = [value(placed, *joint_names("angle_ref"))], []
+        heights, begin = [], place_of(placed)[0]
+        placed.change(Change("control", then))
+        assert (placed.settings.control, placed.wanted) == (then, None)
+        for _ in range(400):
+            placed.step(command, NO_FORCE)
+            angles.append(value(placed, *joint_names("angle_ref")))
+            speeds.append(value(placed, "torso.velocity[1]")[0])
+            heights.append(place_of(placed)[2])
+        # rad    in a macro-step: walks at these speeds need up to 0.023, and compliant control
+        # adds up to 0.004 when it lifts a foot that meets the ground early
+        assert np.abs(np.diff(angles, axis=0)).max() < 0.03
+        # m    it neither falls nor stops: means over a quarter of a second
+        assert min(heights) > 0.12
+        assert np.convolve(speeds, np.full(50, 0.02), mode="valid").min() > 0.5 * command.vx
+        assert place_of(placed)[0] - begin == pytest.approx(2.0 * command.vx, rel=0.05)
+        assert placed.fault == ""
+
+
+@pytest.mark.parametrize("then", ["kinematic", "paper"])
+def test_a_standing_robot_changes_its_control_at_once_and_then_walks(
+    placed: LiveRobot, then: str
+) -> None:
+    placed.place(replace(placed.choices.first(), control="compliant"))
+    go(placed, 100, BodyCommand())
+    height = place_of(placed)[2]
+    placed.change(Change("control", then))
+    assert placed.settings.control == then
+    go(placed, 200, BodyCommand())
+    # m    kinematic control lets the servos sag by 2 mm, the paper's control yields by 4 mm more
+    assert place_of(placed)[2] == pytest.approx(height, abs=0.008)
+    go(placed, 400)
+    assert place_of(placed)[0] > 0.08
 
 
 @pytest.mark.parametrize(

@@ -351,6 +351,33 @@ def test_a_hub_drops_what_exceeds_the_rate_of_a_page() -> None:
     assert [kind for kind, _, _ in poster.posted].count("ping") == BURST + 1
 
 
+@pytest.mark.parametrize(
+    ("text", "at_once", "rate", "reason"),
+    [
+        ("nonsense", 20, 0.1, "too many messages that are none"),
+        ('{"type": "ping", "stamp": 1}', 2200, 20.0, "too many messages"),
+    ],
+)
+def test_what_a_page_did_wrong_is_forgotten_in_time(
+    text: str, at_once: int, rate: float, reason: str
+) -> None:
+    clock = [0.0]
+    hub = Hub(Poster(), now=lambda: clock[0])
+    steady, sudden = hub.join(), hub.join()
+    assert steady is not None
+    assert sudden is not None
+    for _ in range(at_once):
+        assert hub.from_page(sudden, text) is None
+    assert hub.from_page(sudden, text) == reason
+    # half as often as it is forgotten, for a day
+    allowed = 100.0 if reason == "too many messages" else 0.0
+    for _ in range(1000):
+        clock[0] += 1.0 / rate
+        for _ in range(int(allowed / rate)):
+            assert hub.from_page(steady, text) is None
+        assert hub.from_page(steady, text) is None
+
+
 def test_a_page_that_reads_nothing_holds_the_newest_state_alone() -> None:
     hub = Hub(Poster())
     client = hub.join()

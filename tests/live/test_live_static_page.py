@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -21,16 +22,30 @@ def written(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def page(written: Path) -> Iterator[Any]:
+def browser() -> Iterator[Any]:
     with launcher() as launch:
-        found = launch(*FLAGS).new_context(offline=True).new_page()
-        found.set_default_timeout(PATIENCE)
-        found.problems = []
-        found.on("pageerror", lambda error: found.problems.append(str(error)))
-        found.on("request", lambda request: found.problems.append(request.url))
-        found.goto(written.as_uri())
-        found.wait_for_function(f"window.hexapod && {FRAME}")
-        yield found
+        yield launch(*FLAGS)
+
+
+def opened(browser: Any, written: Path, **options: Any) -> Any:
+    """Returns the page from the disk, without a network; `problems` are errors and requests."""
+    found = browser.new_context(offline=True, **options).new_page()
+    found.set_default_timeout(PATIENCE)
+    found.problems = []
+    found.on("pageerror", lambda error: found.problems.append(str(error)))
+    found.on("request", lambda request: found.problems.append(request.url))
+    found.goto(written.as_uri())
+    found.wait_for_function(f"window.hexapod && {FRAME}")
+    return found
+
+
+@pytest.fixture(scope="module")
+def page(browser: Any, written: Path) -> Any:
+    return opened(browser, written)
+
+
+def problems(page: Any) -> list[str]:
+    return [text for text in page.problems if not text.startswith("file:")]
 
 
 def test_the_page_is_one_file_of_at_most_2_mb(written: Path) -> None:
@@ -57,7 +72,7 @@ def test_the_robot_walks_and_turns_by_keys_without_a_network(page: Any) -> None:
     page.wait_for_function(f"{FRAME}.quaternion[3] > 0.03")
     page.keyboard.up("a")
     page.keyboard.up("w")
-    assert [text for text in page.problems if not text.startswith("file:")] == []
+    assert problems(page) == []
 
 
 def test_the_gait_changes_while_the_robot_walks(page: Any) -> None:
@@ -75,6 +90,52 @@ def test_the_gait_changes_while_the_robot_walks(page: Any) -> None:
     slowest = page.evaluate("window.slowest")
     assert 0.0 < slowest < 0.3 * fast
     page.keyboard.up("w")
+
+
+def test_the_control_changes_while_the_robot_walks(page: Any) -> None:
+    page.keyboard.down("w")
+    page.wait_for_function(f"{FRAME}.command[0] > 0")
+    page.evaluate(
+        "window.slowest = 1; window.hexapod.link.on('frame', (frame) => {"
+        "window.slowest = Math.min(window.slowest, frame.command[0]) })"
+    )
+    for control in ("compliant", "paper", "kinematic"):
+        page.click(f"#controls [data-value={control}]")
+        page.wait_for_selector(f"#controls [data-value={control}][aria-pressed=true]")
+        begin = page.evaluate(f"{FRAME}.position[0]")
+        page.wait_for_function(f"{FRAME}.position[0] > {begin} + 0.02")
+    assert page.evaluate("window.slowest") > 0.0  # the command has held all the time
+    page.keyboard.up("w")
+    assert problems(page) == []
+
+
+PHONE = {"viewport": {"width": 390, "height": 844}, "has_touch": True, "is_mobile": True}
+
+
+@pytest.mark.parametrize("theme", ["light", "dark"])
+def test_on_a_phone_all_fits_its_width_and_a_stick_walks_the_robot(
+    browser: Any, written: Path, theme: str
+) -> None:
+    phone = opened(browser, written, color_scheme=theme, **PHONE)
+    assert phone.evaluate("document.documentElement.scrollWidth") == 390
+    for name in ("controls", "gaits", "friction"):
+        box = phone.locator(f"#{name}").bounding_box()
+        assert box["x"] >= 0.0
+        assert box["x"] + box["width"] <= 390.0
+    colour = phone.evaluate("getComputedStyle(document.body).backgroundColor")
+    brightness = sum(int(part) for part in re.findall(r"\d+", colour)[:3]) / 3
+    assert brightness > 200 if theme == "light" else brightness < 60
+    phone.evaluate("scrollTo(0, 0)")
+    box = phone.locator("#stick-walk").bounding_box()
+    middle = box["x"] + 0.5 * box["width"], box["y"] + 0.5 * box["height"]
+    phone.mouse.move(*middle)
+    phone.mouse.down()
+    phone.mouse.move(middle[0], middle[1] - 40, steps=3)
+    phone.wait_for_function(f"{FRAME}.position[0] > 0.02")
+    phone.mouse.up()
+    phone.wait_for_function(f"{FRAME}.command[0] === 0")
+    assert problems(phone) == []
+    phone.context.close()
 
 
 def test_control_friction_and_place_answer(page: Any) -> None:

@@ -36,11 +36,14 @@ def wheels() -> Path:
 
 @pytest.fixture(scope="module")
 def hexapod(wheels: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The command of a new environment in which this machine's wheel alone is installed."""
+    """The command of a new environment in which this machine's wheel alone is installed.
+
+    The folder has wheels of five platforms; pip chooses the one that fits, as docs/install.md says.
+    """
     folder = tmp_path_factory.mktemp("environment")
     subprocess.run([sys.executable, "-m", "venv", folder], check=True)
     options = ["--quiet", "--only-binary=:all:", "--find-links", str(wheels)]
-    command = [str(folder / "bin/python"), "-m", "pip", "install", *options, "hexapod-cosim"]
+    command = [str(folder / "bin/python"), "-m", "pip", "install", *options, "hexapod-cosim==0.1.0"]
     subprocess.run(command, check=True, env=bare(folder))
     return folder / "bin" / "hexapod"
 
@@ -128,6 +131,24 @@ def test_the_page_of_a_live_robot_comes_out_of_the_wheel(hexapod: Path, tmp_path
         process.communicate(timeout=60.0)
     assert len(page) > 500_000
     assert process.returncode == 0
+
+
+def test_pipx_runs_a_comparison_without_an_environment_of_its_own(
+    wheels: Path, tmp_path: Path
+) -> None:
+    folder = tmp_path / "pipx"
+    subprocess.run([sys.executable, "-m", "venv", folder], check=True)
+    python = str(folder / "bin/python")
+    subprocess.run([python, "-m", "pip", "install", "--quiet", "pipx"], check=True)
+    (wheel,) = wheels.glob("*manylinux_2_17_x86_64*.whl")
+    command = [python, "-m", "pipx", "run", "--spec", str(wheel), "hexapod", "compare"]
+    subprocess.run(
+        [*command, "walk_flat", "--set", "duration=2 s", "-o", "first"],
+        cwd=tmp_path,
+        env=bare(folder) | {"PIPX_HOME": str(folder / "home")},
+        check=True,
+    )
+    assert (tmp_path / "first" / "report.html").stat().st_size > 100_000
 
 
 def test_an_fmu_for_all_platforms_needs_no_compiler(hexapod: Path, tmp_path: Path) -> None:

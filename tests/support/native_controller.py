@@ -71,6 +71,7 @@ def bound(core: ct.CDLL) -> ct.CDLL:
         "hx_controller_destroy": (None, [controller]),
         "hx_controller_reset": (status, [controller, ct.c_void_p, Real]),
         "hx_controller_change_gait": (status, [controller, ct.c_void_p]),
+        "hx_controller_change_control": (status, [controller, ct.c_int]),
         "hx_controller_output": (
             None,
             [controller, ct.POINTER(HxControllerInput), ct.POINTER(HxControllerOutput)],
@@ -152,6 +153,12 @@ class NativeController:
                 self._handle, ct.addressof(self.definition.bytes) + place
             )
         )
+
+    def change_control(self, control: str) -> None:
+        """Changes the control by name while the robot walks."""
+        number = {"kinematic": 1, "compliant": 2, "paper": 3}[control]
+        self.definition["control"] = number
+        self._checked(self._core.hx_controller_change_control(self._handle, number))
 
     def output(self) -> Any:
         """Calculates the output for the present input and time."""

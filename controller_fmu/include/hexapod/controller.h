@@ -205,6 +205,12 @@ HX_API hxStatus hx_controller_reset(hxController *controller,
 HX_API hxStatus hx_controller_change_gait(hxController *controller, const hxGait *gait);
 HX_API const hxGait *hx_controller_gait(const hxController *controller); /* asked for last */
 
+/* Changes the control (hxControl) while the robot walks: the next one goes on in the present phase
+ * of the walk, its laws begin anew, and the joint commands fade over in 0.4 s. Before the first
+ * tick it begins as after a reset. On failure only the message changes. */
+HX_API hxStatus hx_controller_change_control(hxController *controller, int control);
+HX_API int hx_controller_control(const hxController *controller);
+
 /* Computes the joint commands at the present time: those of this input when a tick is due,
  * otherwise those of the last tick. The state does not change; the result is kept for the step that
  * follows under the same input. */

@@ -19,7 +19,7 @@ typedef struct {
 } hxSaved;
 
 static const uint64_t magic = 0x72746e6f43507868u; /* "hxPContr" */
-static const uint64_t saved_version = 3;
+static const uint64_t saved_version = 4;
 /* 1, of a period: a tick that is later than the present time by less than this is due */
 static const double clock_tolerance = 0.01;
 
@@ -83,6 +83,39 @@ hxStatus hx_controller_change_gait(hxController *controller, const hxGait *gait)
   }
   hx_controller_compile(&controller->definition, &controller->model[1 - controller->state.model]);
   hx_controller_change(controller->model, &controller->state);
+  controller->ahead.known = 0;
+  return HX_OK;
+}
+
+int hx_controller_control(const hxController *controller) { return controller->definition.control; }
+
+/* Compiles a model again, under the definition's control and in the model's own gait. */
+static void compile_again(const hxController *controller, hxControllerModel *model) {
+  hxControllerDefinition definition = controller->definition;
+  definition.gait = model->gait;
+  hx_controller_compile(&definition, model);
+}
+
+hxStatus hx_controller_change_control(hxController *controller, int control) {
+  char message[HX_MESSAGE_SIZE];
+  hxControllerState *state = &controller->state;
+  const hxFootPathsModel paths = model_of(controller)->paths;
+  const int before = controller->definition.control;
+  controller->definition.control = control;
+  const hxStatus status = hx_controller_definition_check(&controller->definition, message);
+  if (status != HX_OK) {
+    controller->definition.control = before;
+    return refuse(controller, status, message);
+  }
+  compile_again(controller, &controller->model[state->model]);
+  if (state->changing) compile_again(controller, &controller->model[1 - state->model]);
+  if (state->tick > 0) {
+    hx_controller_exchange(controller->model, &paths, state);
+  } else {
+    const int model = state->model;
+    hx_controller_begin(model_of(controller), state->start, state);
+    state->model = model;
+  }
   controller->ahead.known = 0;
   return HX_OK;
 }

@@ -385,6 +385,13 @@ HX_SELDOM void hx_foot_paths_join(hxFootPathsModel *model, hxFootPaths *paths,
   }
 }
 
+HX_SELDOM void hx_foot_paths_carry(hxFootPathsModel *model, const hxFootPathsModel *before,
+                                   hxFootPaths *paths) {
+  memcpy(model->offset, before->offset, sizeof model->offset);
+  memcpy(model->late, before->late, sizeof model->late);
+  memset(paths->met, 0, sizeof paths->met);
+}
+
 void hx_foot_paths_landing(const hxFootPathsModel *model, const hxFootPaths *paths, int64_t number,
                            int landing[HX_LEGS]) {
   const int64_t next = reached(paths, number) + 1;

@@ -123,6 +123,11 @@ int hx_foot_paths_ended(const hxFootPaths *paths);
  * farthest foot goes least far. */
 void hx_foot_paths_join(hxFootPathsModel *model, hxFootPaths *paths, hxPlannedFeet *feet);
 
+/* Goes on in the phases of the paths of another control, in the same gait. before: the model of
+ * these paths. */
+void hx_foot_paths_carry(hxFootPathsModel *model, const hxFootPathsModel *before,
+                         hxFootPaths *paths);
+
 /* Finds the legs whose swing ends at the present step, or ended at the step at which the gait clock
  * was stopped. number: periods since the section began. */
 void hx_foot_paths_landing(const hxFootPathsModel *model, const hxFootPaths *paths, int64_t number,

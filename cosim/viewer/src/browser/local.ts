@@ -208,11 +208,15 @@ export class LocalLoop implements Connection {
       this.walker.setFriction(value as number);
       this.settings = { ...this.settings, friction: value as number };
       if (this.wanted) this.wanted = next;
-    } else if (key === "control" || key === "gait") {
+    } else if (key === "control") {
+      this.walker.change(this.walkOf(next));
+      this.settings = { ...this.settings, control: next.control };
+      if (this.wanted) this.wanted = next;
+    } else if (key === "gait") {
       const before = (this.wanted ?? this.settings).gait;
       this.wanted = next;
       this.walker.change(this.walkOf(next));
-      if (next.control === this.settings.control) this.setLimits(this.slowed(before, next.gait));
+      this.setLimits(this.slowed(before, next.gait));
     }
     this.tellStatus();
   }

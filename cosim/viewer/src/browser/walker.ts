@@ -33,7 +33,7 @@ interface Exports extends WebAssembly.Exports {
   hx_walker_start(friction: number): number;
   hx_walker_command(forward: number, left: number, turn: number, height: number): void;
   hx_walker_push(x: number, y: number, z: number): void;
-  hx_walker_change(): void;
+  hx_walker_change(): number;
   hx_walker_set_friction(friction: number): number;
   hx_walker_advance(steps: number): number;
   hx_walker_macro_step(): number;
@@ -67,10 +67,10 @@ export class Walker {
     this.check(this.exports.hx_walker_start(friction));
   }
 
-  /** Changes control and gait: another control at a stand, another gait while the robot walks. */
+  /** Changes control and gait while the robot walks: the control at once. Throws WalkerError. */
   change(walk: Walk): void {
     this.want(walk);
-    this.exports.hx_walker_change();
+    this.check(this.exports.hx_walker_change());
   }
 
   setFriction(friction: number): void {

@@ -4,7 +4,7 @@ import type { Connection, State } from "./link";
 import type { Frame, Settings, Setup, Status } from "./messages";
 
 const SHOWN = 7000; // ms    that a note stays
-const SMOOTH = 0.06; // weight of a frame in the mean of the last ones
+const SPAN = 0.33; // s    time constant of the speeds' means
 const SLOW = 0.98; // real-time factor below which it is marked
 const STATES: Record<State, string> = {
   connecting: "connecting",
@@ -20,8 +20,9 @@ export class Panel {
   private status: Status | undefined;
   private noted = 0;
   private pages = 1;
-  private forward = 0; // m/s    mean of the last frames
+  private forward = 0; // m/s    mean of the last time
   private turn = 0; // rad/s
+  private time = 0; // s    of the last frame
 
   constructor(
     private readonly setup: Setup,
@@ -82,8 +83,11 @@ export class Panel {
     const { latency } = this.link;
     text("latency", latency === undefined ? "–" : `${latency.toFixed(0)} ms`);
     text("seconds", `${frame.seconds.toFixed(1)} s`);
-    this.forward += SMOOTH * (frame.speed[0] - this.forward);
-    this.turn += SMOOTH * (frame.speed[2] - this.turn);
+    // frames may be far apart on a slow computer
+    const weight = 1 - Math.exp(-Math.max(frame.time - this.time, 0) / SPAN);
+    this.time = frame.time;
+    this.forward += weight * (frame.speed[0] - this.forward);
+    this.turn += weight * (frame.speed[2] - this.turn);
     text("speed-now", `${whole(1e3 * this.forward)} mm/s`);
     text("turn-now", `${whole((180 / Math.PI) * this.turn)} °/s`);
     const others = this.pages > 1;
