@@ -125,7 +125,7 @@ def _enable_interrupts() -> None:
     signal.signal(signal.SIGINT, signal.SIG_DFL)
 
 
-def start_comparison(folder: Path, *, long: str = "duration=20") -> subprocess.Popen[str]:
+def start_comparison(folder: Path, *, long: str = "duration=4") -> subprocess.Popen[str]:
     """Starts a comparison in a process group of its own and waits until its batch runs."""
     plain = settings(long, "gait.period=0.4", "outputs.csv=['torso.roll']")
     command = [*COMMAND, "compare", "walk_flat", "-o", str(folder), "--seeds", "200", *plain]
