@@ -31,6 +31,7 @@ TESTS = (
     "tests/friction",
     "tests/ground",
     "tests/servos",
+    "tests/trust/test_grid_refusals.py",
 )
 # gcc's own counters are exported functions too
 LEFT_OUT = ("--deselect", "tests/fmi/test_fmi.py::test_only_the_standard_is_exported")

@@ -27,7 +27,7 @@ from hexapod_cosim.cosim.scenario.scenario import load_scenario
 from hexapod_cosim.cosim.scenario.variation import STANDARD
 from hexapod_cosim.models import HexapodError
 
-TIMEOUT = 60.0  # s    for what takes a second or two on an idle machine
+TIMEOUT = 180.0  # s    for what takes a second or two on an idle machine
 
 
 def short(*changes: str) -> Scenario:
