@@ -99,6 +99,11 @@ static void an_impossible_definition_is_refused_by_its_name(void) {
     CHECK(strstr(hx_controller_message(controller), "LF.femur.stance: got"));
     femur->stance = stance;
   }
+  femur->stance = femur->angle_max + 0.01; /* of two problems the first one is told */
+  definition.leg[HX_LEGS - 1].link[1].stance = femur->stance;
+  CHECK(hx_controller_reset(controller, &definition, 0.0) == HX_INVALID_MODEL);
+  CHECK(strstr(hx_controller_message(controller), "LF.femur.stance: got"));
+  hx_controller_definition_default(&definition);
   femur->length = femur->offset_z = 0.0;
   CHECK(hx_controller_reset(controller, &definition, 0.0) == HX_INVALID_MODEL);
   CHECK(strstr(hx_controller_message(controller), "LF.femur.length: got 0"));
