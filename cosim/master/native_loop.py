@@ -40,6 +40,7 @@ from hexapod_cosim.cosim.master.wiring import (
 from hexapod_cosim.cosim.scenario.schedule import Schedule
 from hexapod_cosim.models import LEG_NAMES, FmuError
 
+LAYOUT = 1  # of the structures below, HX_MASTER_LAYOUT in C
 STEPS_PER_CALL = 500  # macro-steps between two checks for interrupts, about 10 ms
 FORCE = MEASURED["foot_force"]
 
@@ -142,13 +143,28 @@ def _library() -> ct.CDLL:
     """
     path = shared_library(LOOP)
     library = ct.CDLL(str(path))
-    library.hx_master_size.restype = _Size
-    if library.hx_master_size() != ct.sizeof(_Master):
-        raise FmuError("the co-simulation library is another version's", got=str(path), fix=BUILD)
+    _check_layout(library, str(path))
     library.hx_master_begin.argtypes = library.hx_master_record.argtypes = [ct.POINTER(_Master)]
     library.hx_master_run.argtypes = [ct.POINTER(_Master), _Size]
     library.hx_master_record.restype = None
     return library
+
+
+def _check_layout(library: ct.CDLL, path: str) -> None:
+    """Raises FmuError when the library has another layout of hxMaster than this module."""
+    old = not hasattr(library, "hx_master_layout")  # or no co-simulation library
+    layout = 0 if old else int(library.hx_master_layout())
+    if not old:
+        library.hx_master_size.restype = _Size
+    size = 0 if old else int(library.hx_master_size())
+    if (layout, size) != (LAYOUT, ct.sizeof(_Master)):
+        raise FmuError(
+            "the co-simulation library is another version's",
+            got=f"layout {layout} of {size} bytes",
+            expected=f"layout {LAYOUT} of {ct.sizeof(_Master)} bytes",
+            fix=BUILD,
+            where=path,
+        )
 
 
 class NativeMaster:

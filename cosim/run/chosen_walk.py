@@ -21,11 +21,11 @@ from hexapod_cosim.controller import BodyCommand, Gains, GainsError, Gait, make_
 from hexapod_cosim.cosim.design.stance import (
     SPEED_SHARE,
     Motion,
-    StanceDesign,
     find_stance,
     settled_motion,
     with_stance,
 )
+from hexapod_cosim.cosim.run.kept_stance import Stance, kept_stance
 from hexapod_cosim.cosim.scenario.controls import control_of
 from hexapod_cosim.cosim.scenario.reach import reaches
 from hexapod_cosim.cosim.scenario.records import DESIGNED, OWN, Command, Scenario
@@ -142,7 +142,7 @@ def _chosen(scenario: Scenario, plain: ChosenWalk, settings: Mapping[str, Any]) 
 def _narrowing(
     walk: ChosenWalk,
     begin: ChosenWalk,
-    design: StanceDesign,
+    design: Stance,
     plain: ChosenWalk,
     commands: Sequence[Command],
 ) -> ChosenWalk:
@@ -201,9 +201,16 @@ def _designed_for(gains: Gains | None, own: Robot, chosen: Robot) -> bool:
 
 
 @lru_cache(maxsize=64)
-def _design(robot: Robot, gait: Gait) -> StanceDesign:
-    """Returns the stance of least heat of a robot file; a process designs it once."""
-    return find_stance(robot, gait=gait)
+def _design(robot: Robot, gait: Gait) -> Stance:
+    """Returns the stance of least heat of a robot file, designed once and kept in the user's
+    cache.
+    """
+    return kept_stance(robot, gait, _found)
+
+
+def _found(robot: Robot, gait: Gait) -> Stance:
+    design = find_stance(robot, gait=gait)
+    return Stance(design.outward, design.deeper)
 
 
 def known_robot(scenario: Scenario, own: Robot | None = None) -> Robot:

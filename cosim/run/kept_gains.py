@@ -17,7 +17,7 @@ from hexapod_cosim.cosim.common.plant_files import binary, fmi2_platform
 from hexapod_cosim.cosim.export.cross_build import user_cache
 from hexapod_cosim.models import HexapodError, Robot
 
-# whose sources make gains
+# whose sources make designs
 PACKAGES = ("hexapod_cosim.controller", "hexapod_cosim.cosim.design", "hexapod_cosim.models")
 
 
@@ -53,13 +53,13 @@ def kept_gains(
 
 def _key(robot: Robot, period: float) -> str:
     """Returns the hash of a design's inputs in hexadecimal."""
-    parts = [robot.hash, repr(period), _tools()]
+    parts = [robot.hash, repr(period), tools_hash()]
     return hashlib.sha256("\n".join(parts).encode()).hexdigest()
 
 
 @cache
-def _tools() -> str:
-    """Returns a hash of the plant's binary, the sources and the libraries that make gains."""
+def tools_hash() -> str:
+    """Returns a hash of the plant's binary, the sources and the libraries that make designs."""
     digest = hashlib.sha256(binary(fmi2_platform(), PLANT).read_bytes())
     for package in PACKAGES:
         spec = find_spec(package)

@@ -6,8 +6,11 @@ from __future__ import annotations
 
 from functools import lru_cache
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 from hexapod_cosim.controller import Gains
+from hexapod_cosim.cosim.common.components import PLANT
+from hexapod_cosim.cosim.common.plant_files import binary, fmi2_platform
 from hexapod_cosim.cosim.export.export import export_fmu
 from hexapod_cosim.cosim.run.chosen_walk import choose_walk
 from hexapod_cosim.cosim.run.kept_gains import kept_gains
@@ -15,6 +18,7 @@ from hexapod_cosim.cosim.scenario.controls import control_of
 from hexapod_cosim.cosim.scenario.records import Scenario
 from hexapod_cosim.models import Robot, load_robot
 
+MAX_FMUS = 8  # of 1 MB that a process keeps; the least recently used one goes first
 MAX_DESIGNS = 64  # sets of gains that are kept; the least recently used one goes first
 
 
@@ -64,11 +68,18 @@ def design_key(scenario: Scenario) -> tuple[Robot, float]:
     return choose_walk(scenario).robot, scenario.macro_step
 
 
+@lru_cache(maxsize=MAX_FMUS)
+def _content(robot: Robot, _binary: Path, _changed: int) -> bytes:
+    """Returns the plant FMU of a robot with a binary, which was changed at that time [ns]."""
+    with TemporaryDirectory(prefix="hexapod-") as folder:
+        return export_fmu(robot, Path(folder) / f"{robot.name}.fmu").read_bytes()
+
+
 class PlantFmus:
     """Plant FMUs, exported when they are first asked for and kept for later runs.
 
-    They are kept by the robot file's content: a run sets the laws and settings of its scenario
-    itself.
+    A process packs each of them once. They are kept by the robot file's content: a run sets the
+    laws and settings of its scenario itself.
 
     Args:
         folder: where FMUs are exported to.
@@ -86,5 +97,9 @@ class PlantFmus:
         own = load_robot(robot)
         if own.hash not in self._exported:
             path = self._folder / str(len(self._exported)) / f"{own.name}.fmu"
-            self._exported[own.hash] = export_fmu(own, path)
+            packed = binary(fmi2_platform(), PLANT)
+            content = _content(own, packed, packed.stat().st_mtime_ns)
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_bytes(content)
+            self._exported[own.hash] = path
         return self._exported[own.hash]

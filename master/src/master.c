@@ -164,6 +164,8 @@ static int macro_step(hxMaster *master) {
 /* ----------------------------------------------------------------------------------------------
  * runs */
 
+int hx_master_layout(void) { return HX_MASTER_LAYOUT; }
+
 size_t hx_master_size(void) { return sizeof(hxMaster); }
 
 int hx_master_begin(hxMaster *master) {

@@ -287,6 +287,7 @@ def test_recorded_columns_can_be_chosen(call: Call, tmp_path: Path) -> None:
     )
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_a_folder_of_an_earlier_run_is_written_anew(call: Call, tmp_path: Path) -> None:
     folder = tmp_path / "out"
     assert call("simulate", "stand", "-o", folder, "--set", "duration=0.2")[0] == 0

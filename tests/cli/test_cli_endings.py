@@ -98,11 +98,11 @@ def test_ctrl_c_keeps_what_was_recorded_under_another_name(
         command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True
     )
     try:
-        deadline = time.monotonic() + 60.0
+        deadline = time.monotonic() + 180.0
         while not (tmp_path / "began").exists() and time.monotonic() < deadline:
             time.sleep(0.05)
         os.killpg(process.pid, signal.SIGINT)
-        out, err = process.communicate(timeout=120.0)
+        out, err = process.communicate(timeout=180.0)
     finally:
         process.kill()
     assert process.returncode == 130

@@ -138,13 +138,10 @@ def differences(
             assert [bool(value) for value in getattr(out, flag)] == getattr(shown, flag).tolist(), (
                 f"{flag} at step {k}"
             )
-        np.testing.assert_allclose(
-            np.ctypeslib.as_array(out.shift),
-            np.column_stack([shown.shift.real, shown.shift.imag]),
-            atol=1e-12,
-        )
-        np.testing.assert_allclose(np.ctypeslib.as_array(out.lift), shown.lift, atol=1e-12)
-        np.testing.assert_allclose(np.ctypeslib.as_array(out.planned), shown.planned, atol=1e-12)
+        got = [np.ctypeslib.as_array(field).ravel() for field in (out.shift, out.lift, out.planned)]
+        wanted = np.concatenate([shown.shift.view(float), shown.lift, np.ravel(shown.planned)])
+        gap = np.abs(np.concatenate(got) - wanted)  # assert_allclose takes a sixth of a walk's time
+        assert (gap <= 1e-12 + 1e-7 * np.abs(wanted)).all(), f"diagnostics at step {k}: {gap}"
         fallback.append(shown.fallback.copy())
         sense(reference, k, measurement)
     return worst, np.array(fallback)

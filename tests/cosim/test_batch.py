@@ -27,7 +27,7 @@ from hexapod_cosim.cosim.scenario.scenario import load_scenario
 from hexapod_cosim.cosim.scenario.variation import STANDARD
 from hexapod_cosim.models import HexapodError
 
-TIMEOUT = 60.0  # s    for what takes a second or two on an idle machine
+TIMEOUT = 180.0  # s    for what takes a second or two on an idle machine
 
 
 def short(*changes: str) -> Scenario:
@@ -125,10 +125,12 @@ def _enable_interrupts() -> None:
     signal.signal(signal.SIGINT, signal.SIG_DFL)
 
 
-def start_comparison(folder: Path, *, long: str = "duration=20") -> subprocess.Popen[str]:
+def start_comparison(folder: Path, *, engine: str) -> subprocess.Popen[str]:
     """Starts a comparison in a process group of its own and waits until its batch runs."""
+    long = {"python": "duration=4", "compiled": "duration=20"}[engine]  # 400 such runs take minutes
     plain = settings(long, "gait.period=0.4", "outputs.csv=['torso.roll']")
     command = [*COMMAND, "compare", "walk_flat", "-o", str(folder), "--seeds", "200", *plain]
+    command += ["--engine", engine]
     process = subprocess.Popen(
         command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True,
         preexec_fn=_enable_interrupts,  # noqa: PLW1509  no other thread runs here
@@ -165,12 +167,14 @@ def assert_none_left(group: int) -> None:
     assert not alive(group)
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize(
+    ("number", "engine"), [(signal.SIGINT, "python"), (signal.SIGTERM, "compiled")]
+)
 def test_an_interrupted_comparison_keeps_whole_runs_and_leaves_no_process(
-    plant_build: Path, tmp_path: Path, number: signal.Signals
+    plant_build: Path, tmp_path: Path, number: signal.Signals, engine: str
 ) -> None:
     folder = tmp_path / "out"
-    process = start_comparison(folder)
+    process = start_comparison(folder, engine=engine)
     try:
         os.killpg(process.pid, number) if number == signal.SIGINT else process.send_signal(number)
         out, err = process.communicate(timeout=TIMEOUT)
@@ -201,7 +205,7 @@ def test_a_worker_that_dies_is_reported_with_its_run(plant_build: Path) -> None:
 
 @pytest.mark.skipif(sys.platform == "win32", reason="no such signal")
 def test_workers_end_when_the_command_is_killed(plant_build: Path, tmp_path: Path) -> None:
-    process = start_comparison(tmp_path / "out")
+    process = start_comparison(tmp_path / "out", engine="compiled")
     process.kill()
     process.communicate(timeout=TIMEOUT)
     assert_none_left(process.pid)

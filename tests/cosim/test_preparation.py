@@ -1,4 +1,4 @@
-"""Gains and FMUs that runs share: each is made once for everything it depends on."""
+"""Gains, stances and FMUs that runs share: each is made once for everything it depends on."""
 
 from __future__ import annotations
 
@@ -9,9 +9,13 @@ from pathlib import Path
 import pytest
 from gains import make_gains
 
-from hexapod_cosim.controller import Gains
+from hexapod_cosim.controller import Gains, Gait, make_gait
+from hexapod_cosim.cosim.design.stance import StanceDesign, find_stance
+from hexapod_cosim.cosim.export.export import export_fmu
+from hexapod_cosim.cosim.run import chosen_walk, preparation
 from hexapod_cosim.cosim.run.controller_setup import make_setup
 from hexapod_cosim.cosim.run.kept_gains import kept_gains
+from hexapod_cosim.cosim.run.kept_stance import Stance, kept_stance
 from hexapod_cosim.cosim.run.preparation import (
     PlantFmus,
     chosen_gains,
@@ -125,3 +129,82 @@ def test_an_fmu_is_exported_once_for_a_robot(plant_build: Path, tmp_path: Path) 
     assert PlantFmus(tmp_path, given=first).fmu("phantomx_mk4") == first
     with pytest.raises(HexapodError, match=r"nowhere\.toml"):
         fmus.fmu("nowhere.toml")
+
+
+def test_a_process_packs_the_fmu_of_a_robot_once_and_a_new_binary_anew(
+    plant_build: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    packed: list[str] = []
+
+    def export(robot: Robot, path: Path) -> Path:
+        packed.append(robot.name)
+        return export_fmu(robot, path)
+
+    monkeypatch.setattr(preparation, "export_fmu", export)
+    preparation._content.cache_clear()
+    first, second = (PlantFmus(tmp_path / name).fmu("athena") for name in ("a", "b"))
+    assert packed == ["athena"]
+    whole = export_fmu(load_robot("athena"), tmp_path / "athena.fmu").read_bytes()
+    assert first.read_bytes() == second.read_bytes() == whole
+    library = tmp_path / "hexapod.so"
+    library.write_bytes(b"built later")
+    monkeypatch.setattr(preparation, "binary", lambda *_: library)
+    PlantFmus(tmp_path / "c").fmu("athena")
+    assert packed == ["athena", "athena"]
+
+
+def test_a_kept_stance_has_the_bits_of_the_designed_one(tmp_path: Path) -> None:
+    robot, gait = load_robot("athena"), make_gait(load_robot("athena"), "amble")
+    stance = Stance(-1.0 / 3.0, 0.1 + 0.2)
+    found = [kept_stance(robot, gait, lambda *_: stance, tmp_path)]
+    found.append(kept_stance(robot, gait, lambda *_: Stance(0.0, 0.0), tmp_path))
+    assert found == [stance, stance]
+
+
+def test_another_robot_or_gait_has_another_stance(tmp_path: Path) -> None:
+    robots = load_robot("athena"), load_robot("phantomx_mk4")
+    gait = make_gait(robots[0], "amble")
+    for number, (robot, own) in enumerate(
+        [(robots[0], gait), (robots[1], gait), (robots[0], replace(gait, period=gait.period * 1.1))]
+    ):
+        new = Stance(float(number), 0.0)
+        assert kept_stance(robot, own, lambda *_, new=new: new, tmp_path) == new
+
+
+@pytest.mark.parametrize("damage", ["", "[]", "{", '{"outward": 1e999, "deeper": 0}', "{}"])
+def test_a_damaged_stance_of_the_cache_is_replaced(tmp_path: Path, damage: str) -> None:
+    robot, gait = load_robot("athena"), make_gait(load_robot("athena"), "amble")
+    stance = Stance(0.01, -0.02)
+    kept_stance(robot, gait, lambda *_: Stance(0.0, 0.0), tmp_path)
+    (path,) = tmp_path.glob("stances/*.json")
+    path.write_text(damage, encoding="utf-8")
+    assert kept_stance(robot, gait, lambda *_: stance, tmp_path) == stance
+    assert kept_stance(robot, gait, lambda *_: Stance(0.0, 0.0), tmp_path) == stance
+
+
+def test_without_a_cache_that_can_be_written_stances_are_designed(tmp_path: Path) -> None:
+    (tmp_path / "stances").write_text("no folder", encoding="utf-8")
+    robot, gait = load_robot("athena"), make_gait(load_robot("athena"), "amble")
+    assert kept_stance(robot, gait, lambda *_: Stance(0.01, 0.0), tmp_path) == (0.01, 0.0)
+
+
+def test_a_walk_of_an_earlier_process_is_not_designed_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    designs: list[str] = []
+
+    def find(robot: Robot, *, gait: Gait) -> StanceDesign:
+        designs.append(gait.name)
+        return find_stance(robot, gait=gait)
+
+    monkeypatch.setattr(chosen_walk, "find_stance", find)
+    monkeypatch.setattr("hexapod_cosim.cosim.run.kept_stance.user_cache", lambda: tmp_path)
+    plan = load_scenario("stand", overrides=["control=compliant"])
+    walks = []
+    for _ in range(2):
+        chosen_walk._design.cache_clear()
+        walks.append(chosen_walk.choose_walk(plan))
+    chosen_walk._design.cache_clear()
+    assert designs == ["amble"]
+    assert walks[0] == walks[1]
+    assert walks[0].outward < 0.0

@@ -37,6 +37,8 @@ from hexapod_cosim.models.urdf.writer import robot_to_urdf
 ALL = os.environ.get("HEXAPOD_ROBOTS") == "all"
 # 1: rests late; 4: its margins lie at a resonance; 7: under 1 kg, light loads used to tip it
 NUMBERS = range(COUNT) if ALL else (1, 4, 7)
+# of its first ten, 0, 7 and 9 weigh under 1 kg, 1 and 5 over 20 kg
+RULED = range(COUNT if ALL else 10)
 pytestmark = pytest.mark.usefixtures("plant_build")
 
 
@@ -126,7 +128,7 @@ def test_an_odd_robot_walks(
 
 
 def test_the_robots_are_drawn_by_their_rule(tmp_path: Path) -> None:
-    robots = [draw_robot(number, tmp_path)[1] for number in range(COUNT)]
+    robots = [draw_robot(number, tmp_path)[1] for number in RULED]
     masses = [robot.total_mass for robot in robots]
     assert 0.5 <= min(masses) < 1.0
     assert 20.0 < max(masses) <= 30.0

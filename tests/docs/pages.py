@@ -4,11 +4,15 @@ what these do in a folder.
 
 from __future__ import annotations
 
+import io
 import os
 import re
 import subprocess
 import sys
+from contextlib import chdir, redirect_stderr, redirect_stdout
 from pathlib import Path
+
+from hexapod_cosim.cosim.cli import main
 
 
 def blocks(page: Path) -> list[tuple[str, str]]:
@@ -26,6 +30,21 @@ def commands(page: Path, program: str) -> list[str]:
         for line in text.splitlines()
     ]
     return [line for line in lines if line.startswith(program + " ")]
+
+
+def typed(folder: Path, program: str, *words: str) -> str:
+    """Runs a command in a folder and returns its output; fails with what it printed.
+
+    The hexapod command runs in this process, which has imported and exported already what each
+    process of its own would import and export again.
+    """
+    if program != "hexapod":
+        return run(folder, program, *words)
+    out, err = io.StringIO(), io.StringIO()
+    with chdir(folder), redirect_stdout(out), redirect_stderr(err):
+        code = main(words)
+    assert code == 0, err.getvalue() + out.getvalue()
+    return out.getvalue()
 
 
 def run(folder: Path, *arguments: str) -> str:

@@ -22,7 +22,7 @@ from urllib.parse import unquote
 
 import numpy as np
 import pytest
-from pages import blocks, commands, run
+from pages import blocks, commands, run, typed
 
 from hexapod_cosim.models import JOINT_NAMES, load_robot
 from hexapod_cosim.models.kinematics import foot_positions
@@ -233,7 +233,7 @@ def test_the_tutorial_works_as_typed_from_top_to_bottom(reader: Path) -> None:
             for line in text.splitlines():
                 # the figures of one walk are enough
                 plain = PLAIN if re.match("hexapod simulate(?!.*compliant)", line) else []
-                run(reader, *shlex.split(line.replace("--show-plot", "")), *plain)
+                typed(reader, *shlex.split(line.replace("--show-plot", "")), *plain)
                 done += 1
     assert done >= 11
 
@@ -296,7 +296,7 @@ def test_the_five_minutes_of_the_page_on_controllers_work_as_typed(reader: Path)
     assert len(lines) == 3
     more = {"compare": ["--seeds", "2"], "simulate": PLAIN}
     for line in lines:
-        run(reader, *shlex.split(line), *more.get(line.split()[1], []))
+        typed(reader, *shlex.split(line), *more.get(line.split()[1], []))
     assert (reader / "out" / "mine" / "report.html").is_file()
     code = next(text for kind, text in page if kind == "python")
     said = run(reader, sys.executable, "-c", code).strip().splitlines()
@@ -304,10 +304,14 @@ def test_the_five_minutes_of_the_page_on_controllers_work_as_typed(reader: Path)
     assert said[-1] == str(Path("out") / "both" / "report.html")
 
 
-def test_designed_gains_walk_and_serve_a_task_of_many(reader: Path) -> None:
+def test_designed_gains_walk_and_serve_a_task_of_many(
+    reader: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """The pages on controllers and on clusters, whose designs go to the same place: once is
     enough.
     """
+    # the figures of a design are drawn in tests/docs/test_readme.py
+    monkeypatch.setattr("hexapod_cosim.controller.design.plot_design", lambda *_: [])
     done = [
         line
         for page in ("my-controller.md", "cluster.md")
@@ -316,7 +320,7 @@ def test_designed_gains_walk_and_serve_a_task_of_many(reader: Path) -> None:
     assert len(done) == 4
     for command in [line for line in done if line != "hexapod design -o out/gains"]:
         plain = PLAIN if " simulate " in command else []
-        run(reader, *shlex.split(re.sub("duration=[0-9]+", SHORT, command)), *plain)
+        typed(reader, *shlex.split(re.sub("duration=[0-9]+", SHORT, command)), *plain)
     _, task = (text for kind, text in blocks(DOCS / "howto" / "cluster.md") if kind == "python")
     assert (
         run(reader, sys.executable, "-c", task.replace("duration=5", SHORT)).count("completed") == 2

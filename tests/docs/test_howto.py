@@ -9,7 +9,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from pages import blocks, commands, run
+from pages import blocks, commands, run, typed
 
 from hexapod_cosim.cosim.logs.mcap_writer import write_mcap
 from hexapod_cosim.cosim.results.recordings import read_parquet
@@ -25,8 +25,8 @@ SHORTER = ["--set", f"duration={SHORT}", "--set", "outputs.plots=false"]
 def folder(plant_build: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Where the reader is: the FMU and a recorded walk are there."""
     folder = tmp_path_factory.mktemp("reader")
-    run(folder, "hexapod", "export", "-o", "athena.fmu")
-    run(folder, "hexapod", "simulate", "walk_flat", *SHORTER, "-o", "out/walk")
+    typed(folder, "hexapod", "export", "-o", "athena.fmu")
+    typed(folder, "hexapod", "simulate", "walk_flat", *SHORTER, "-o", "out/walk")
     return folder
 
 
@@ -65,7 +65,7 @@ def test_the_code_of_the_page_on_fmpy_walks(folder: Path) -> None:
 def robots(folder: Path) -> Path:
     """Where a reader with a robot of one's own is: it lies there as a robot file and as a URDF."""
     shutil.copy(Path(__file__).parents[2] / "models" / "athena.toml", folder / "my.toml")
-    run(folder, "hexapod", "export", "-o", "my.urdf")
+    typed(folder, "hexapod", "export", "-o", "my.urdf")
     walk = read_parquet(folder / "out" / "walk" / "results.parquet")
     write_mcap(walk.chosen(["*.angle_ref", "*.speed_ref", "*.coxa.angle"]), folder / "log.mcap")
     return folder
@@ -84,7 +84,11 @@ def test_the_pages_on_robots_and_packages_have_commands() -> None:
         for line in commands(PAGES / page, "hexapod")
     ],
 )
-def test_a_command_of_the_pages_on_robots_and_packages_works(robots: Path, command: str) -> None:
+def test_a_command_of_the_pages_on_robots_and_packages_works(
+    robots: Path, command: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # the figures of a design are drawn in tests/docs/test_readme.py
+    monkeypatch.setattr("hexapod_cosim.controller.design.plot_design", lambda *_: [])
     shorter = [*SHORTER] if "simulate" in command else []
     shorter += ["--find", "servo", "--no-propose"] if "identify" in command else []
-    assert run(robots, *shlex.split(command), *shorter)
+    assert typed(robots, *shlex.split(command), *shorter)

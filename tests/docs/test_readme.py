@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pages
 import pytest
-from pages import blocks, run
+from pages import blocks, run, typed
 
 from hexapod_cosim.cosim.scenario.scenario import load_scenario
 
@@ -27,7 +27,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """
     folder = tmp_path_factory.mktemp("reader")
     run(folder, *shlex.split(commands("hexapod export")[0]))
-    run(folder, "hexapod", "export", "-o", "my.urdf")
+    typed(folder, "hexapod", "export", "-o", "my.urdf")
     return folder
 
 
@@ -40,7 +40,7 @@ def test_the_readme_exports_every_kind_of_file() -> None:
 
 @pytest.mark.parametrize("command", commands("hexapod export")[1:])
 def test_an_export_of_the_readme_writes_its_file(folder: Path, command: str) -> None:
-    assert shlex.split(command)[-1] in run(folder, *shlex.split(command))
+    assert shlex.split(command)[-1] in typed(folder, *shlex.split(command))
     assert zipfile.is_zipfile(folder / shlex.split(command)[-1])
 
 
@@ -54,7 +54,7 @@ def test_an_export_of_the_readme_writes_its_file(folder: Path, command: str) -> 
 )
 def test_a_command_of_the_readme_works(folder: Path, command: str) -> None:
     shorter = ["--set", "duration=4", "--set", "outputs.plots=false"]
-    assert run(folder, *shlex.split(command), *(shorter if "simulate" in command else []))
+    assert typed(folder, *shlex.split(command), *(shorter if "simulate" in command else []))
 
 
 def test_the_readme_compares_and_simulates_the_bare_fmu_too() -> None:

@@ -26,7 +26,7 @@ from hexapod_cosim.cosim.live.server import LiveError, LiveServer
 from hexapod_cosim.cosim.live.settings import Choices, control_texts
 from hexapod_cosim.cosim.scenario.scenario import load_scenario
 
-PATIENCE = 60.0  # s    for a loaded machine; nothing is asserted about it
+PATIENCE = 180.0  # s    for a loaded machine; nothing is asserted about it
 
 
 def choices() -> Choices:

@@ -83,9 +83,98 @@ static void bad_input_changes_nothing(void) {
   hx_controller_destroy(controller);
 }
 
+/* ---- refusals ---- */
+
+static void an_impossible_definition_is_refused_by_its_name(void) {
+  hxController *controller = hx_controller_create();
+  hxControllerDefinition definition;
+  hx_controller_definition_default(&definition);
+  CHECK(hx_controller_reset(controller, &definition, nan("")) == HX_INVALID_ARGUMENT);
+  CHECK(strstr(hx_controller_message(controller), "start time: got a number that is not finite"));
+  hxKnownLink *femur = &definition.leg[0].link[1];
+  for (int side = -1; side <= 1; side += 2) {
+    const double stance = femur->stance;
+    femur->stance = side < 0 ? femur->angle_min - 0.01 : femur->angle_max + 0.01;
+    CHECK(hx_controller_reset(controller, &definition, 0.0) == HX_INVALID_MODEL);
+    CHECK(strstr(hx_controller_message(controller), "LF.femur.stance: got"));
+    femur->stance = stance;
+  }
+  femur->stance = femur->angle_max + 0.01; /* of two problems the first one is told */
+  definition.leg[HX_LEGS - 1].link[1].stance = femur->stance;
+  CHECK(hx_controller_reset(controller, &definition, 0.0) == HX_INVALID_MODEL);
+  CHECK(strstr(hx_controller_message(controller), "LF.femur.stance: got"));
+  hx_controller_definition_default(&definition);
+  femur->length = femur->offset_z = 0.0;
+  CHECK(hx_controller_reset(controller, &definition, 0.0) == HX_INVALID_MODEL);
+  CHECK(strstr(hx_controller_message(controller), "LF.femur.length: got 0"));
+  hx_controller_destroy(controller);
+}
+
+/* Magic, version and size are in the first 16 bytes. */
+static void a_state_of_another_version_is_refused(void) {
+  hxController *controller = hx_controller_create();
+  const size_t size = hx_controller_state_size();
+  unsigned char *before = malloc(size), *after = malloc(size);
+  CHECK(before && after);
+  tick(controller, 0.05, 10);
+  hx_controller_get_state(controller, before);
+  for (size_t place = 0; place < 16; ++place) {
+    before[place] ^= 1;
+    CHECK(hx_controller_set_state(controller, before, size) == HX_BAD_STATE);
+    before[place] ^= 1;
+  }
+  CHECK(hx_controller_set_state(controller, before, size - 1) == HX_BAD_STATE);
+  hx_controller_get_state(controller, after);
+  CHECK(memcmp(before, after, size) == 0);
+  free(before), free(after);
+  hx_controller_destroy(controller);
+}
+
+/* ---- parts and gaits ---- */
+
+/* Walks with forces on the feet and returns the last joint commands. */
+static hxControllerOutput walked(hxController *controller,
+                                 const hxControllerDefinition *definition) {
+  hxControllerInput input;
+  hxControllerOutput told;
+  hx_controller_input_default(&input);
+  input.command.vx = 0.05;
+  for (int leg = 0; leg < HX_LEGS; ++leg)
+    for (int axis = 0; axis < 3; ++axis) input.foot_force[leg][axis] = axis == 2 ? 12.0 : 3.0;
+  CHECK(hx_controller_reset(controller, definition, 0.0) == HX_OK);
+  for (int k = 1; k <= 150; ++k)
+    CHECK(hx_controller_step(controller, &input, NULL, 0.005 * k) == HX_OK);
+  hx_controller_output(controller, &input, &told);
+  return told;
+}
+
+static int is_same_command(const hxControllerOutput *a, const hxControllerOutput *b) {
+  return memcmp(a->angle_ref, b->angle_ref, sizeof a->angle_ref) == 0;
+}
+
+static void without_its_parts_the_paper_s_control_is_the_kinematic_one(void) {
+  hxController *controller = hx_controller_create();
+  hxControllerDefinition definition;
+  hx_controller_definition_default(&definition);
+  definition.control = HX_CONTROL_KINEMATIC;
+  const hxControllerOutput kinematic = walked(controller, &definition);
+  definition.control = HX_CONTROL_PAPER;
+  definition.gains.paper_slip.kp = 1e-3;
+  for (int parts = 0; parts < 4; ++parts) {
+    definition.parts.slip_pid = parts & 1;
+    definition.parts.paper_suspension = parts >> 1;
+    const hxControllerOutput paper = walked(controller, &definition);
+    CHECK(is_same_command(&paper, &kinematic) == (parts == 0));
+  }
+  hx_controller_destroy(controller);
+}
+
 int main(void) {
   without_a_command_it_holds_the_stance();
   a_saved_state_goes_on_as_it_would_have();
   bad_input_changes_nothing();
+  an_impossible_definition_is_refused_by_its_name();
+  a_state_of_another_version_is_refused();
+  without_its_parts_the_paper_s_control_is_the_kinematic_one();
   return failures;
 }

@@ -248,6 +248,45 @@ static void a_status_is_what_a_step_left(void) {
   fmi2FreeInstance(fmu);
 }
 
+static void an_instance_without_a_name_or_guid_is_refused(void) {
+  complaints = 0;
+  CHECK(!fmi2Instantiate("", fmi2CoSimulation, guid, NULL, &callbacks, fmi2False, fmi2False));
+  CHECK(!fmi2Instantiate("robot", fmi2CoSimulation, NULL, NULL, &callbacks, fmi2False, fmi2False));
+  CHECK(complaints == 2);
+}
+
+/* More variables than the component remembers the places of from its check of them. */
+static void long_lists_of_variables_are_set_in_their_order(void) {
+  enum { MANY = 1500 };
+  static fmi2ValueReference reference[MANY];
+  static fmi2Real value[MANY];
+  fmi2Component fmu = initialised(fmi2CoSimulation);
+  for (int i = 0; i < MANY; ++i)
+    reference[i] = reference_of(i % 2 ? "torso.push_force[2]" : "torso.push_force[1]");
+  for (int i = 0; i < MANY; ++i) value[i] = 0.01 * i;
+  CHECK(fmi2SetReal(fmu, reference, MANY, value) == fmi2OK);
+  CHECK(fmi2GetReal(fmu, reference, MANY, value) == fmi2OK);
+  for (int i = 0; i < MANY; ++i) NEAR(value[i], i % 2 ? 14.99 : 14.98, 0.0);
+  reference[MANY - 1] = 77777777; /* the last one alone is unknown: none is set */
+  for (int i = 0; i < MANY; ++i) value[i] = 1.0;
+  CHECK(fmi2SetReal(fmu, reference, MANY, value) == fmi2Error);
+  NEAR(real(fmu, "torso.push_force[1]"), 14.98, 0.0);
+  fmi2FreeInstance(fmu);
+}
+
+static void missing_arrays_of_directions_and_states_are_refused_or_nothing(void) {
+  fmi2Component fmu = initialised(fmi2CoSimulation);
+  const fmi2ValueReference unknown = reference_of("LF.coxa.angle"),
+                           known = reference_of("LF.coxa.angle_ref");
+  const fmi2Real one = 1.0;
+  fmi2Real found = 0.0;
+  CHECK(fmi2GetDirectionalDerivative(fmu, &unknown, 1, NULL, 1, &one, &found) == fmi2Error);
+  CHECK(fmi2GetDirectionalDerivative(fmu, &unknown, 1, &known, 1, NULL, &found) == fmi2Error);
+  CHECK(fmi2GetDirectionalDerivative(fmu, &unknown, 1, &known, 1, &one, &found) == fmi2OK);
+  CHECK(fmi2FreeFMUstate(fmu, NULL) == fmi2OK && fmi2FreeFMUstate(NULL, NULL) == fmi2Error);
+  fmi2FreeInstance(fmu);
+}
+
 int main(int count, char **arguments) {
   if (count != 2) return EXIT_FAILURE;
   open_description(arguments[1]);
@@ -258,5 +297,8 @@ int main(int count, char **arguments) {
   calls_without_arguments_are_refused_and_change_nothing();
   calls_of_the_other_interface_are_refused();
   a_status_is_what_a_step_left();
+  an_instance_without_a_name_or_guid_is_refused();
+  long_lists_of_variables_are_set_in_their_order();
+  missing_arrays_of_directions_and_states_are_refused_or_nothing();
   return failures;
 }

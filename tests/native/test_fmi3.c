@@ -192,6 +192,25 @@ static void calls_of_the_other_interface_are_refused(void) {
   fmi3FreeInstance(fmu);
 }
 
+static void what_is_not_offered_is_refused_with_and_without_an_instance(void) {
+  fmi3Instance fmu = instantiated(fmi3False);
+  const fmi3ValueReference unknown = reference_of("LF.foot.normal_force"), none = 77777777;
+  const fmi3Int32 order = 1;
+  fmi3Float64 number[18] = {0.0};
+  initialise(fmu);
+  for (int k = 0; k < 2; ++k) {
+    fmi3Instance to = k ? NULL : fmu;
+    CHECK(fmi3GetAdjointDerivative(to, &unknown, 1, &unknown, 1, number, 1, number, 1) ==
+          fmi3Error);
+    CHECK(fmi3GetDirectionalDerivative(to, &unknown, 1, NULL, 1, number, 1, number, 18) ==
+          fmi3Error);
+    CHECK(fmi3GetOutputDerivatives(to, &none, 1, &order, number, 1) == fmi3Error);
+  }
+  CHECK(fmi3GetOutputDerivatives(fmu, &unknown, 1, &order, number, 5) == fmi3Error);
+  CHECK(fmi3FreeFMUState(fmu, NULL) == fmi3OK && fmi3FreeFMUState(NULL, NULL) == fmi3Error);
+  fmi3FreeInstance(fmu);
+}
+
 int main(int count, char **arguments) {
   if (count != 2) return EXIT_FAILURE;
   open_description(arguments[1]);
@@ -200,5 +219,6 @@ int main(int count, char **arguments) {
   a_saved_state_goes_on();
   calls_without_arguments_are_refused_and_change_nothing();
   calls_of_the_other_interface_are_refused();
+  what_is_not_offered_is_refused_with_and_without_an_instance();
   return failures;
 }

@@ -222,6 +222,109 @@ static void bad_input_changes_nothing(void) {
   hx_plant_destroy(plant);
 }
 
+/* Magic, version and size are in the first 16 bytes. */
+static void a_state_of_another_version_is_refused(void) {
+  hxPlant *plant = hx_plant_create();
+  const size_t size = hx_plant_state_size();
+  unsigned char *before = malloc(size), *after = malloc(size);
+  CHECK(before && after);
+  walk_in_place(plant, 0.02);
+  hx_plant_get_state(plant, before);
+  for (size_t place = 0; place < 16; ++place) {
+    before[place] ^= 1;
+    CHECK(hx_plant_set_state(plant, before, size) == HX_BAD_STATE);
+    CHECK(strstr(hx_plant_message(plant), "saved state: got"));
+    before[place] ^= 1;
+  }
+  hx_plant_get_state(plant, after);
+  CHECK(memcmp(before, after, size) == 0);
+  free(before), free(after);
+  hx_plant_destroy(plant);
+}
+
+static void coordinates_that_are_no_state_of_the_robot_are_refused(void) {
+  hxPlant *plant = hx_plant_create();
+  hxCoordinates good, x;
+  hx_plant_get_coordinates(plant, &good);
+  CHECK(hx_plant_set_coordinates(plant, nan(""), &good) == HX_NOT_FINITE);
+  x = good, x.angle[RR][TIBIA] = 1.1e5;
+  CHECK(hx_plant_set_coordinates(plant, 0.0, &x) == HX_NOT_FINITE);
+  x = good, x.angle[LF][COXA] = nan("");
+  CHECK(hx_plant_set_coordinates(plant, 0.0, &x) == HX_NOT_FINITE);
+  x = good, x.position[0] = 1.1e9;
+  CHECK(hx_plant_set_coordinates(plant, 0.0, &x) == HX_NOT_FINITE);
+  x = good, memset(x.quaternion, 0, sizeof x.quaternion);
+  CHECK(hx_plant_set_coordinates(plant, 0.0, &x) == HX_NOT_FINITE);
+  CHECK(strstr(hx_plant_message(plant), "a quaternion near 0, expected a state of the robot"));
+  CHECK(hx_plant_set_coordinates(plant, 0.0, &good) == HX_OK);
+  hx_plant_destroy(plant);
+}
+
+static void directions_that_are_not_finite_are_refused_and_missing_ones_are_zero(void) {
+  hxPlant *plant = hx_plant_create();
+  hxInput input, d_input;
+  hxCoordinates dx, rate, other;
+  hxOutput output;
+  hx_input_default(&input);
+  memset(&d_input, 0, sizeof d_input), memset(&dx, 0, sizeof dx);
+  dx.angle[LF][COXA] = INFINITY;
+  CHECK(hx_plant_tangent(plant, &input, &d_input, &dx, &rate, &output) == HX_INVALID_ARGUMENT);
+  CHECK(strstr(hx_plant_message(plant), "derivatives: got a direction that is not finite"));
+  dx.angle[LF][COXA] = 1.0;
+  CHECK(hx_plant_tangent(plant, &input, &d_input, &dx, &rate, &output) == HX_OK);
+  CHECK(hx_plant_tangent(plant, &input, NULL, &dx, &other, NULL) == HX_OK);
+  CHECK(memcmp(&rate, &other, sizeof rate) == 0);
+  CHECK(hx_plant_tangent(plant, &input, NULL, NULL, &rate, &output) == HX_OK);
+  double number[sizeof rate / sizeof(double)];
+  memcpy(number, &rate, sizeof number);
+  for (size_t i = 0; i < sizeof number / sizeof *number; ++i) NEAR(number[i], 0.0, 0.0);
+  CHECK(hx_plant_tangent(plant, &input, &d_input, NULL, NULL, &output) == HX_OK);
+  NEAR(output.torso.position[2], 0.0, 0.0);
+  hx_plant_destroy(plant);
+}
+
+static void impossible_inertias_are_refused(void) {
+  /* xx, yy, zz, xy, xz, yz: each breaks another condition of a body's inertia */
+  static const double inertia[][6] = {
+      {0, 1, 1, 0, 0, 0},   {1, 0, 1, 0, 0, 0},   {1, 1, 0, 0, 0, 0},
+      {3, 1, 1, 0, 0, 0},   {1, 3, 1, 0, 0, 0},   {1, 1, 3, 0, 0, 0},
+      {1, 1, 1, 0.6, 0, 0}, {1, 1, 1, 0, 0.6, 0}, {1, 1, 1, 0.4, 0.4, 0.4}};
+  hxDefinition robot;
+  char message[HX_MESSAGE_SIZE];
+  for (size_t k = 0; k < sizeof inertia / sizeof *inertia; ++k) {
+    hx_definition_default(&robot);
+    for (int i = 0; i < 6; ++i) robot.leg[RF].link[FEMUR].inertia[i] = 1e-3 * inertia[k][i];
+    CHECK(hx_definition_check(&robot, message) == HX_INVALID_MODEL);
+    CHECK(strstr(message, "RF.femur.inertia_"));
+  }
+  for (int i = 0; i < 6; ++i) robot.leg[RF].link[FEMUR].inertia[i] = i < 3 ? 1e-3 : 0.0;
+  CHECK(hx_definition_check(&robot, message) == HX_OK);
+}
+
+static void impossible_legs_are_refused(void) {
+  hxDefinition robot;
+  char message[HX_MESSAGE_SIZE];
+  hx_definition_default(&robot);
+  hxLink *link = &robot.leg[LM].link[TIBIA];
+  const hxLink good = *link;
+  link->angle_min = link->angle_max;
+  CHECK(hx_definition_check(&robot, message) == HX_INVALID_MODEL);
+  CHECK(strstr(message, "LM.tibia.angle_min: got") && strstr(message, "below the joint's"));
+  *link = good, memset(link->axis, 0, sizeof link->axis);
+  CHECK(hx_definition_check(&robot, message) == HX_INVALID_MODEL);
+  CHECK(strstr(message, "LM.tibia.axis: got 0, expected a direction"));
+  *link = good, link->length = link->offset_y = link->offset_z = 0.0;
+  CHECK(hx_definition_check(&robot, message) == HX_INVALID_MODEL);
+  CHECK(strstr(message, "LM.tibia.length: got 0, expected a tip away from the joint"));
+  link->offset_z = -0.1;
+  CHECK(hx_definition_check(&robot, message) == HX_OK);
+  link->offset_z = 0.0, link->offset_y = 0.1;
+  CHECK(hx_definition_check(&robot, message) == HX_OK);
+  *link = good, memset(robot.initial.quaternion, 0, sizeof robot.initial.quaternion);
+  CHECK(hx_definition_check(&robot, message) == HX_INVALID_MODEL);
+  CHECK(strstr(message, "initial.quaternion: got 0, expected a quaternion"));
+}
+
 /* ---- every law, method and mode ---- */
 
 static void moves(hxPlant *plant, const hxDefinition *robot) {
@@ -285,6 +388,11 @@ int main(void) {
   a_saved_state_goes_on_as_it_would_have();
   stops_at_touch_downs_leave_no_trace();
   bad_input_changes_nothing();
+  a_state_of_another_version_is_refused();
+  coordinates_that_are_no_state_of_the_robot_are_refused();
+  directions_that_are_not_finite_are_refused_and_missing_ones_are_zero();
+  impossible_inertias_are_refused();
+  impossible_legs_are_refused();
   every_law_method_and_drive_moves();
   ranges_cover_what_they_name();
   return failures;

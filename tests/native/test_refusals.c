@@ -490,6 +490,68 @@ static void a_component_without_states_has_no_events(void) {
   fmi3FreeInstance(fmu);
 }
 
+/* Walks on from a saved state, with another value of a Real parameter unless name is NULL; writes
+ * the commanded joint angles after half a second. */
+static void walk_on(fmi2Component fmu, fmi2FMUstate begin, const char *name, double value,
+                    fmi2Real angle[HX_LEGS * HX_JOINTS]) {
+  fmi2ValueReference reference[HX_LEGS * HX_JOINTS];
+  for (unsigned i = 0; i < HX_LEGS * HX_JOINTS; ++i)
+    reference[i] = reference_of("LF.coxa.angle_ref") + i;
+  CHECK(fmi2SetFMUstate(fmu, begin) == fmi2OK);
+  if (name && strcmp(name, "gait.pattern") == 0)
+    choose(fmu, name, (int)value);
+  else if (name)
+    set(fmu, name, value);
+  for (int k = 0; k < 50; ++k) CHECK(fmi2DoStep(fmu, 0.5 + 0.01 * k, 0.01, fmi2True) == fmi2OK);
+  CHECK(fmi2GetReal(fmu, reference, HX_LEGS * HX_JOINTS, angle) == fmi2OK);
+}
+
+static void each_parameter_of_the_gait_changes_a_walk_that_is_under_way(void) {
+  static const struct {
+    const char *name;
+    double same, other;
+  } gait[] = {{"gait.period", 1.0, 1.1},
+              {"gait.duty", 0.5, 0.6},
+              {"gait.step_height", 0.04, 0.05},
+              {"gait.touchdown_speed", 0.0, 0.1}};
+  fmi2Component fmu = running(fmi2CoSimulation);
+  fmi2FMUstate begin = NULL;
+  fmi2Real before[HX_LEGS * HX_JOINTS], after[HX_LEGS * HX_JOINTS];
+  set(fmu, "command.vx", 0.05);
+  for (int k = 0; k < 50; ++k) CHECK(fmi2DoStep(fmu, 0.01 * k, 0.01, fmi2True) == fmi2OK);
+  CHECK(fmi2GetFMUstate(fmu, &begin) == fmi2OK);
+  walk_on(fmu, begin, NULL, 0.0, before);
+  for (size_t k = 0; k < sizeof gait / sizeof *gait; ++k) {
+    walk_on(fmu, begin, gait[k].name, gait[k].same, after);
+    CHECK(memcmp(before, after, sizeof before) == 0);
+    walk_on(fmu, begin, gait[k].name, gait[k].other, after);
+    CHECK(memcmp(before, after, sizeof before) != 0);
+  }
+  /* custom with the phases of the tripod, and a narrowing for loads that are not there: changes to
+   * the same steps, which are led over alike */
+  walk_on(fmu, begin, "gait.pattern", 5.0, before);
+  walk_on(fmu, begin, "gait.narrowing", 0.01, after);
+  CHECK(memcmp(before, after, sizeof before) == 0);
+  CHECK(fmi2FreeFMUstate(fmu, &begin) == fmi2OK);
+  fmi2FreeInstance(fmu);
+}
+
+static void a_gait_faster_than_the_controller_is_refused_by_the_next_step(void) {
+  fmi2Component fmu = running(fmi2CoSimulation);
+  size_t size;
+  CHECK(fmi2DoStep(fmu, 0.0, 0.02, fmi2True) == fmi2OK);
+  set(fmu, "gait.period", 0.005);
+  fmi2Byte *before = bytes_of(fmu, &size);
+  CHECK(fmi2DoStep(fmu, 0.02, 0.02, fmi2True) == fmi2Error);
+  said("expected less than 0.0025 s, the gait's shorter phase");
+  fmi2Byte *after = bytes_of(fmu, &size);
+  CHECK(memcmp(before, after, size) == 0);
+  set(fmu, "gait.period", 1.0);
+  CHECK(fmi2DoStep(fmu, 0.02, 0.02, fmi2True) == fmi2OK);
+  free(before), free(after);
+  fmi2FreeInstance(fmu);
+}
+
 int main(int arguments, char *argument[]) {
   if (arguments != 3) return 2;
   open_description(argument[1]);
@@ -511,6 +573,8 @@ int main(int arguments, char *argument[]) {
   } else {
     a_component_without_states_offers_no_derivatives();
     a_component_without_states_has_no_events();
+    each_parameter_of_the_gait_changes_a_walk_that_is_under_way();
+    a_gait_faster_than_the_controller_is_refused_by_the_next_step();
   }
   return failures != 0;
 }

@@ -4,17 +4,20 @@ a more exact solver.
 
 from __future__ import annotations
 
+import io
 import json
 import math
-import subprocess
 from collections.abc import Mapping
+from contextlib import redirect_stdout
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
-from command import COMMAND, Call, assert_refused, settings
+from command import Call, assert_refused, settings
 
+from hexapod_cosim.cosim.cli import main
+from hexapod_cosim.cosim.report.figures import Figures
 from hexapod_cosim.cosim.results.accuracy import (
     accuracy_from_table,
     compare_accuracy,
@@ -150,23 +153,15 @@ def test_a_reference_without_figures_leaves_errors_open_and_is_reported() -> Non
 def checked(
     plant_build: Path, tmp_path_factory: pytest.TempPathFactory
 ) -> tuple[Path, Mapping[str, Any]]:
-    """Runs a comparison of one seed with --check-accuracy."""
+    """Runs a comparison of one seed with --check-accuracy; its report has no figures."""
     folder = tmp_path_factory.mktemp("checked") / "out"
-    command = [
-        *COMMAND,
-        "compare",
-        "walk_flat",
-        "-o",
-        str(folder),
-        "--seeds",
-        "1",
-        "--check-accuracy",
-        "--json",
-        *settings(*CYCLES),
-    ]
-    return folder, json.loads(
-        subprocess.run(command, capture_output=True, text=True, check=True).stdout
-    )
+    words = ["compare", "walk_flat", "-o", str(folder), "--seeds", "1", "--check-accuracy"]
+    draw = "hexapod_cosim.cosim.report.plots.draw_figures"
+    with pytest.MonkeyPatch.context() as patch, redirect_stdout(io.StringIO()) as out:
+        patch.setattr(draw, lambda *_: Figures({}, {}))
+        code = main([*words, "--json", *settings(*CYCLES)])
+    assert code == 0
+    return folder, json.loads(out.getvalue())
 
 
 @pytest.mark.parametrize("control", ["kinematic", "compliant"])

@@ -101,13 +101,13 @@ def test_rows_hold_the_settings_the_figures_and_how_a_run_ended(small: Callable[
 
 REAL = """
 controls = ["kinematic"]
-seeds = 50
+seeds = 35
 [set]
 duration = 0.4
 [factors]
 friction.mu = {linspace = [0.3, 0.9, 20]}
 """
-REAL_RUNS = 1000
+REAL_RUNS = 700
 
 
 def command(folder: Path, fmu: Path, *more: str, study: Path) -> subprocess.Popen[str]:
@@ -143,7 +143,7 @@ def test_real_walks_killed_twice_at_any_point_and_completed_are_the_uninterrupte
     file = tmp_path / "study.toml"
     file.write_text(REAL)
     whole, killed = tmp_path / "whole", tmp_path / "killed"
-    for least in (1, random.randint(50, 250)):
+    for least in (1, random.randint(50, 150)):
         process = command(killed, athena_fmu, study=file)
         deadline = time.monotonic() + TIMEOUT
         while (

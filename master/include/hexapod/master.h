@@ -120,7 +120,12 @@ typedef struct hxMaster {
   int status; /* fmi2Status    of the failed call */
 } hxMaster;
 
-/* Size of hxMaster, with which callers check their own layout of it. */
+/* Number of the layout of hxMaster and of the structures in it. Every change of their members, or of
+ * what a member means, increases it. */
+#define HX_MASTER_LAYOUT 1
+
+/* Layout and size of hxMaster in this library, with which callers check their own. */
+HX_API int hx_master_layout(void);
 HX_API size_t hx_master_size(void);
 
 /* Reads the plant at the start. Returns 1; 0 when a call failed, which call and status show. */
