@@ -412,7 +412,7 @@ def _files(figure: Figure) -> Iterator[tuple[str, bytes]]:
     """
     figure.set_dpi(DPI)
     engine = figure.get_layout_engine()
-    if engine is not None:
+    if engine is not None and figure.axes:
         engine.execute(figure)
     with matplotlib.rc_context({"figure.constrained_layout.use": False}):
         figure.set_layout_engine(None)

@@ -61,7 +61,7 @@ def stepped(plant: Plant, step: int, angle: float) -> list[float]:
 
 
 def test_the_work_space_is_two_thirds_of_an_instance(work: Work) -> None:
-    assert 190_000 < work.size < 240_000
+    assert 200_000 < work.size < 210_000
 
 
 @pytest.mark.parametrize("byte", [0x00, 0xFF])
