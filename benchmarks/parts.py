@@ -82,8 +82,8 @@ def _counted(words: Sequence[str], function: str) -> float:
 
 
 def instances(tools: Tools, walk: Path) -> list[dict[str, Any]]:
-    """Returns, by number of plants stepped in turn: time of a macro-step [us], bytes of an
-    instance, allocations.
+    """Returns, by number of plants stepped in turn: time of a macro-step with own work spaces and
+    with a shared one [us], bytes of an instance, allocations.
     """
     results = []
     for count in COUNTS:
@@ -93,8 +93,10 @@ def instances(tools: Tools, walk: Path) -> list[dict[str, Any]]:
 
 
 def crowding(results: Sequence[dict[str, Any]]) -> float:
-    """Returns the time of a macro-step among the most plants over that of a plant alone."""
-    alone, crowd = (each["microseconds_per_step"] for each in (results[0], results[-1]))
+    """Returns the time of a macro-step among the most plants, which share a work space, over that
+    of a plant alone.
+    """
+    alone, crowd = (each["shared_microseconds_per_step"] for each in (results[0], results[-1]))
     return float(crowd / alone)
 
 

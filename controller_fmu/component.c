@@ -57,7 +57,8 @@ hxStatus hx_component_step(hxComponent *component, const struct hxVariables *var
   return hx_controller_step(controller_of(component), &variables->input, rate, t_end);
 }
 
-void hx_component_output(hxComponent *component, struct hxVariables *variables) {
+void hx_component_output(hxComponent *component, struct hxVariables *variables, unsigned groups) {
+  (void)groups; /* there is one */
   (void)follow(controller_of(component), variables); /* a step reports a refusal */
   hx_controller_output(controller_of(component), &variables->input, &variables->output);
 }

@@ -37,8 +37,9 @@ hxStatus hx_component_reset(hxComponent *component, const struct hxVariables *va
 hxStatus hx_component_step(hxComponent *component, const struct hxVariables *variables,
                            const hxInput *rate, double t_end);
 
-/* Calculates the output at the present time under the input. */
-void hx_component_output(hxComponent *component, struct hxVariables *variables);
+/* Calculates groups of the output (hx_output_groups) at the present time under the input; may
+ * calculate others too. */
+void hx_component_output(hxComponent *component, struct hxVariables *variables, unsigned groups);
 
 double hx_component_time(const hxComponent *component);
 const char *hx_component_message(const hxComponent *component); /* of the last failure */
@@ -88,6 +89,10 @@ typedef struct hxContinuous {
    * of state and input. */
   void (*integrals)(hxComponent *component, const struct hxVariables *variables,
                     struct hxVariables *result);
+
+  /* Size of a work space, and use of the caller's; see hexapod/shared_work.h. */
+  size_t (*work_size)(void);
+  hxStatus (*use_work)(hxComponent *component, void *memory, size_t size);
 } hxContinuous;
 
 /* NULL for a component without continuous states. */

@@ -83,16 +83,25 @@ void hx_instance_free(hxInstance *instance) {
 /* ----------------------------------------------------------------------------------------------
  * values */
 
-hxStatus hx_instance_refresh(hxInstance *instance, int output, int rate) {
+/* Updates groups of outputs. An importer that has read others at this time, and so reads in
+ * several calls, gets all: two calculations are enough for any number of calls. */
+static void refresh_output(hxInstance *instance, unsigned groups) {
+  hxInstanceState *state = &instance->state;
+  if (state->output_stale) instance->fresh = 0;
+  if (!(groups & ~instance->fresh)) return;
+  if (instance->fresh) groups = HX_ALL_GROUPS;
+  hx_component_output(instance->component, &state->variables, groups & ~instance->fresh);
+  instance->fresh |= groups;
+  state->output_stale = 0;
+}
+
+hxStatus hx_instance_refresh(hxInstance *instance, unsigned groups, int rate) {
   hxInstanceState *state = &instance->state;
   if (state->model_stale) {
     const hxStatus status = hx_instance_initialize(instance);
     if (status != HX_OK) return status;
   }
-  if (output && state->output_stale) {
-    hx_component_output(instance->component, &state->variables);
-    state->output_stale = 0;
-  }
+  if (groups) refresh_output(instance, groups);
   if (rate && state->rate_stale) {
     hx_continuous->rates(instance->component, &state->variables);
     state->rate_stale = 0;
@@ -131,20 +140,25 @@ typedef struct {
   unsigned offset[KNOWN_PLACES];
 } hxPlaces;
 
+/* the groups of an output */
+static unsigned groups_of(unsigned reference) {
+  return hx_output_groups[reference - hx_sections[HX_OUTPUT].first];
+}
+
 /* checks the references and updates the outputs or rates that are asked for */
 static hxStatus prepare_get(hxInstance *instance, hxType type, const unsigned reference[], size_t n,
                             hxPlaces *places) {
   hxCausality causality = HX_OUTPUT;
-  int needs_output = 0, needs_rate = 0;
+  unsigned groups = 0;
+  int needs_rate = 0;
   for (size_t i = 0; i < n; i++) {
     const hxVariable *variable = row_of(instance, type, reference[i], &causality);
     if (!variable) return HX_INVALID_ARGUMENT;
     if (i < KNOWN_PLACES) places->offset[i] = (unsigned)variable->offset;
-    needs_output |= causality == HX_OUTPUT;
+    if (causality == HX_OUTPUT) groups |= groups_of(reference[i]);
     needs_rate |= causality == HX_LOCAL;
   }
-  return needs_output || needs_rate ? hx_instance_refresh(instance, needs_output, needs_rate)
-                                    : HX_OK;
+  return groups || needs_rate ? hx_instance_refresh(instance, groups, needs_rate) : HX_OK;
 }
 
 /* the place of a valid reference in the variables */

@@ -3,7 +3,7 @@
  *
  * The files of fmi/ in layers; each calls the layers below it only:
  *
- *   fmi2.c  fmi3.c               the functions of the standard
+ *   fmi2.c  fmi3.c  work.c       the functions of the standard; an extension
  *   call.c  arrays.c             legal order and calls of both versions; FMI 3's arrays
  *   step.c  exchange.c  state.c  co-simulation, model exchange, saved states
  *   instance.c                   opening, values, initialization, reset
@@ -56,7 +56,7 @@ typedef void hxLogSink(hxInstance *instance, hxLogCategory category, const char 
 typedef struct hxInstanceState {
   int mode;           /* hxMode */
   int model_stale;    /* parameters were set since the component was reset */
-  int output_stale;   /* variables.output is not that of the present time and input */
+  int output_stale;   /* nothing of variables.output is of the present time and input */
   int rate_stale;     /* the rates of the states are not those of the present time and input */
   int interface;      /* hxInterface */
   int ramped;         /* 1: input_rate belongs to the next step; 0: to the last one */
@@ -72,6 +72,7 @@ struct hxInstance {
   struct hxVariables start; /* values after a reset: compiled in or from the resources */
   char guid[HX_GUID_SIZE];
   char name[HX_NAME_SIZE];
+  unsigned fresh;      /* groups of outputs that are up to date, unless state.output_stale */
   int uses_event_mode; /* co-simulation: the importer handles events */
   int may_return_early; /* co-simulation: a step may end where discrete variables change */
   unsigned logged;     /* bit k: category k is passed on */
@@ -143,9 +144,9 @@ hxStatus hx_instance_set(hxInstance *instance, hxType type, const unsigned refer
 hxStatus hx_instance_check_set(hxInstance *instance, hxType type, const unsigned reference[],
                                size_t n, const void *value);
 
-/* Updates output or rates to the present time and input, after initializing a component whose
- * parameters were set. */
-hxStatus hx_instance_refresh(hxInstance *instance, int output, int rate);
+/* Updates groups of outputs or the rates to the present time and input, after initializing a
+ * component whose parameters were set. */
+hxStatus hx_instance_refresh(hxInstance *instance, unsigned groups, int rate);
 
 /* Returns HX_NOT_FINITE, so that a solver tries a smaller step, unless all numbers are finite. */
 hxStatus hx_instance_check_finite(hxInstance *instance, const double number[], size_t n,

@@ -39,6 +39,11 @@ typedef struct hxSection {
 
 extern const hxSection hx_sections[HX_CAUSALITIES];
 
+/* Groups of outputs that a component calculates together, as bits: of each output, in the order of
+ * their references. Outputs with all bits need all groups. */
+enum { HX_ALL_GROUPS = 0xff };
+extern const unsigned char hx_output_groups[];
+
 /* A continuous state of model exchange: its variable and its nominal value. */
 typedef struct hxStateRow {
   unsigned reference;

@@ -61,6 +61,7 @@ CALLS = (
     *("Instantiate", "FreeInstance", "Reset", "SetupExperiment", "EnterInitializationMode"),
     *("ExitInitializationMode", "GetReal", "SetReal", "DoStep"),
 )
+WORK = ("hx_shared_work_size", "hx_shared_work_use")  # which a foreign FMU does not have
 
 Array = NDArray[Any]
 _Pointer, _Size = ct.c_void_p, ct.c_size_t
@@ -73,6 +74,7 @@ class _Fmu(ct.Structure):
         *((name, _Pointer) for name in CALLS),
         ("guid", ct.c_char_p),
         ("resources", ct.c_char_p),
+        *((name, _Pointer) for name in WORK),
     ]
 
 
@@ -246,6 +248,7 @@ class Batch(Closing):
     def _fmu(self, fmu: Fmu) -> _Fmu:
         """Returns the functions of an FMU and what its instances are made with."""
         calls = {name: fmu.address(f"fmi2{name}") for name in CALLS}
+        calls |= {name: fmu.address(name) for name in WORK}
         texts = {"guid": fmu.description.guid.encode(), "resources": fmu.resources.encode()}
         self._kept.append(texts)
         return _Fmu(**calls, **texts)

@@ -163,8 +163,9 @@ hxStatus hx_component_step(hxComponent *component, const struct hxVariables *var
   return hx_plant_step_ramp(plant_of(component), &variables->input, rate, t_end);
 }
 
-void hx_component_output(hxComponent *component, struct hxVariables *variables) {
-  hx_plant_output(plant_of(component), &variables->input, &variables->output);
+void hx_component_output(hxComponent *component, struct hxVariables *variables, unsigned groups) {
+  hx_plant_output_groups(plant_of(component), &variables->input, groups & HX_OUTPUT_ALL,
+                         &variables->output);
 }
 
 double hx_component_time(const hxComponent *component) {
@@ -252,6 +253,12 @@ static void integrals(hxComponent *component, const struct hxVariables *variable
   hx_plant_integral_rates(plant_of(component), &variables->input, &result->output);
 }
 
+static hxStatus use_work(hxComponent *component, void *memory, size_t size) {
+  const hxStatus status = hx_plant_use_work(component->plant, memory, size);
+  component->message[0] = '\0';
+  return status;
+}
+
 static const hxContinuous continuous = {
     .state = offsetof(struct hxVariables, state),
     .rate = offsetof(struct hxVariables, rate),
@@ -266,6 +273,8 @@ static const hxContinuous continuous = {
     .update = update,
     .tangent = tangent,
     .integrals = integrals,
+    .work_size = hx_work_size,
+    .use_work = use_work,
 };
 
 const hxContinuous *const hx_continuous = &continuous;

@@ -33,7 +33,8 @@ hxStatus hx_component_step(hxComponent *component, const struct hxVariables *var
   return hx_policy_step(policy_of(component), &variables->input, rate, t_end);
 }
 
-void hx_component_output(hxComponent *component, struct hxVariables *variables) {
+void hx_component_output(hxComponent *component, struct hxVariables *variables, unsigned groups) {
+  (void)groups; /* there is one */
   hx_policy_output(policy_of(component), &variables->input, &variables->output);
 }
 

@@ -143,6 +143,8 @@ def render_variables(interface: Interface, guid: str) -> str:
             else f"{first}, 0, 0"
         )
         lines += [f"    [HX_{causality.upper()}] = {{{row}}},"]
+    lines += ["};", "", "const unsigned char hx_output_groups[] = {"]
+    lines += [f"    {_groups(output)}," for output in interface.of_causality("output")]
     lines += [
         "};",
         "",
@@ -182,6 +184,11 @@ def _row(variable: Variable, array_rows: int) -> str:
         f'    {{"{variable.name}", "{variable.unit or ""}", {_limits(variable)}, {place}, '
         f"{TYPES[variable.type]}, {int(variable.variability == 'tunable')}, {array_rows}}},"
     )
+
+
+def _groups(output: Variable) -> str:
+    """Returns the groups of outputs that an output belongs to, in C."""
+    return f"HX_OUTPUT_{output.group.upper()}" if output.group else "HX_ALL_GROUPS"
 
 
 def _limits(variable: Variable) -> str:

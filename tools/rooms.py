@@ -26,6 +26,7 @@ SHARED = (
     "inside.h",
     "legs.h",
     "status.h",
+    "shared_work.h",
 )  # the headers that all C rooms share
 HEADERS = "shared headers (C)"  # their box
 INCLUDE = re.compile(r'^\s*#\s*include\s+"([^"]+)"', re.MULTILINE)

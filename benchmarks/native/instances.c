@@ -2,10 +2,10 @@
  *
  *     instances WALK TOLERANCE COUNT
  *
- * It prints a JSON line: "microseconds_per_step" of one plant, "bytes_per_instance" of its
- * structure, "resident_per_instance", the growth of the process (null if the system does not report
- * it), and "allocations" in all steps. All plants run the same walk; only the used memory grows
- * with COUNT.
+ * It prints a JSON line: "microseconds_per_step" of one plant that has its own work space, and
+ * "shared_microseconds_per_step" of plants that share one; "bytes_per_instance" of its structure,
+ * "resident_per_instance", the growth of the process (null if the system does not report it), and
+ * "allocations" in all steps. All plants run the same walk; only the used memory grows with COUNT.
  */
 #include <unistd.h>
 
@@ -51,6 +51,23 @@ static int step_all(hxPlant **plant, int count, const Walk *walk, int64_t k) {
   return 0;
 }
 
+/* Steps all plants through the walk; returns the time of a step [s], < 0 on failure. */
+static double step_time(hxPlant **plant, int count, const Walk *walk) {
+  const double begin = seconds_now();
+  for (int64_t k = 0; k < walk->n; ++k)
+    if (step_all(plant, count, walk, k)) return -1.0;
+  return (seconds_now() - begin) / ((double)walk->n * count);
+}
+
+/* Resets all plants and makes them use one work space. */
+static int share_work(hxPlant **plant, int count, const hxDefinition *definition, void *work) {
+  for (int i = 0; i < count; ++i)
+    if (!work || hx_plant_use_work(plant[i], work, hx_work_size()) != HX_OK ||
+        hx_plant_reset(plant[i], definition, 0.0) != HX_OK)
+      return 1;
+  return 0;
+}
+
 int main(int argc, char **argv) {
   Walk walk;
   if (argc != 4) {
@@ -65,15 +82,18 @@ int main(int argc, char **argv) {
   const double before = resident();
   if (!plant || create(plant, count, &walk.definition)) return 1;
   const long before_steps = allocations;
-  const double begin = seconds_now();
-  for (int64_t k = 0; k < walk.n; ++k)
-    if (step_all(plant, count, &walk, k)) return 1;
-  const double seconds = seconds_now() - begin;
-  printf("{\"microseconds_per_step\": %.6f, \"bytes_per_instance\": %zu, \"allocations\": %ld, "
-         "\"resident_per_instance\": ",
-         1e6 * seconds / ((double)walk.n * count), sizeof(hxPlant), allocations - before_steps);
+  const double seconds = step_time(plant, count, &walk);
+  const double grown = resident() - before;
+  const long allocated = allocations - before_steps;
+  const size_t size = hx_work_size() + HX_WORK_ALIGNMENT - hx_work_size() % HX_WORK_ALIGNMENT;
+  if (share_work(plant, count, &walk.definition, aligned_alloc(HX_WORK_ALIGNMENT, size))) return 1;
+  const double shared = step_time(plant, count, &walk);
+  if (seconds < 0.0 || shared < 0.0) return 1;
+  printf("{\"microseconds_per_step\": %.6f, \"shared_microseconds_per_step\": %.6f, "
+         "\"bytes_per_instance\": %zu, \"allocations\": %ld, \"resident_per_instance\": ",
+         1e6 * seconds, 1e6 * shared, sizeof(hxPlant), allocated);
   if (before > 0.0)
-    printf("%.0f}\n", (resident() - before) / count);
+    printf("%.0f}\n", grown / count);
   else
     printf("null}\n");
   return 0;

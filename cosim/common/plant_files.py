@@ -19,7 +19,10 @@ DISTRIBUTION = "hexapod-cosim"
 GENERATED_SOURCES = ("variables.h", "variables.c", "defaults.c")
 # files of the plant that every component contains
 SHARED_SOURCES = ("status.c", "checksum.c", "range_check.c", "message.c")
-SHARED_HEADERS = ("status.h", "legs.h", "inside.h", "range_check.h", "message.h")
+SHARED_HEADERS = (
+    *("status.h", "legs.h", "inside.h", "range_check.h", "message.h"),
+    "shared_work.h",
+)
 LOOP = "hexapod_master"  # the shared library of the co-simulation loop
 # each needs the headers of its version of the standard only
 FMI2_SOURCE, FMI3_SOURCE = "fmi/fmi2.c", "fmi/fmi3.c"

@@ -165,7 +165,7 @@ def _matching(pattern: Pattern, variables: Iterable[Variable]) -> list[Variable]
         lambda match: f"(?:{'|'.join(map(re.escape, labels[match[1]]))})",
         expression,
     )
-    matches = re.compile(expression).fullmatch
+    matches = re.compile(expression).fullmatch  # once: there are thousands of pairs
     return [variable for variable in variables if matches(variable.name)]
 
 

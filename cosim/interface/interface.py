@@ -81,6 +81,7 @@ class Variable:
 
     depends: states and inputs that an output or local variable is a direct function of; None: all.
     initial: parameters that its initial value depends on, besides those of its states; None: all.
+    group: of the outputs that are computed together; None: all.
     """
 
     name: str
@@ -97,6 +98,7 @@ class Variable:
     field: str  # lvalue in struct hxVariables
     depends: tuple[str, ...] | None
     initial: tuple[str, ...] | None
+    group: str | None
     description: str
 
 
@@ -355,6 +357,7 @@ def _variable(
         description=entry["description"].format(**labels),
         depends=expand_names(entry.get("depends"), labels, table),
         initial=expand_names(entry.get("initial"), labels, table),
+        group=entry.get("group"),
     )
     _check_start(variable)
     return variable

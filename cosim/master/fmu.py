@@ -177,8 +177,9 @@ class Fmu(Closing):
         return int(self._slave.component)
 
     def address(self, name: str) -> int:
-        """Returns the address of a C function of the FMU."""
-        return int(ctypes.cast(getattr(self._slave.dll, name), ctypes.c_void_p).value or 0)
+        """Returns the address of a C function of the FMU, 0 if its binary does not have it."""
+        function = getattr(self._slave.dll, name, None)
+        return int(ctypes.cast(function, ctypes.c_void_p).value or 0) if function else 0
 
     def bind(self, name: str, *arguments: Any) -> Callable[[], int]:
         """Returns a call of a C function of the FMU with fixed arguments; it returns the status.

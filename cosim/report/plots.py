@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from io import BytesIO
 from typing import Any
@@ -399,10 +399,24 @@ def draw_figures(views: Views, is_stopped: Callable[[], bool] = lambda: False) -
             except ColumnError as error:
                 skipped[name] = f"{error.got} was not recorded"
                 continue
-            for kind, metadata in UNDATED.items():
-                content = BytesIO()
-                figure.savefig(content, format=kind, dpi=DPI, metadata=metadata)
-                images[f"{name}.{kind}"] = content.getvalue()
-                # one layout is enough: it takes as long as the drawing
-                figure.set_layout_engine("none")
+            for kind, content in _files(figure):
+                images[f"{name}.{kind}"] = content
     return Figures(images, skipped)
+
+
+def _files(figure: Figure) -> Iterator[tuple[str, bytes]]:
+    """Yields a figure's file in each format, as (format, content).
+
+    The axes are placed once, for the PNG: savefig() would do so for each format, and before each
+    would draw everything once more.
+    """
+    figure.set_dpi(DPI)
+    engine = figure.get_layout_engine()
+    if engine is not None and figure.axes:
+        engine.execute(figure)
+    with matplotlib.rc_context({"figure.constrained_layout.use": False}):
+        figure.set_layout_engine(None)
+        for kind, metadata in UNDATED.items():
+            content = BytesIO()
+            figure.savefig(content, format=kind, dpi=DPI, metadata=metadata)
+            yield kind, content.getvalue()

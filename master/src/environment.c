@@ -56,6 +56,26 @@ void hx_environment_close(hxEnvironment *environment) {
   environment->plant = environment->controller = NULL;
 }
 
+hxEnvWork hx_environment_work(const hxEnvSettings *settings) {
+  const hxEnvFmu *fmu = &settings->plant;
+  hxEnvWork work = {NULL, NULL, 0};
+  if (!fmu->work_size || !fmu->work_use) return work;
+  work.size = fmu->work_size();
+  if (work.size) work.block = malloc(work.size + HX_SHARED_WORK_ALIGNMENT);
+  if (!work.block) return work;
+  work.memory = (char *)work.block + (0 - (uintptr_t)work.block) % HX_SHARED_WORK_ALIGNMENT;
+  return work;
+}
+
+void hx_environment_use(hxEnvironment *environment, const hxEnvWork *work) {
+  const hxEnvFmu *fmu = &environment->settings->plant;
+  if (!fmu->work_use) return;
+  if (!work)
+    fmu->work_use(environment->plant, NULL, 0);
+  else if (work->memory)
+    fmu->work_use(environment->plant, work->memory, work->size);
+}
+
 static int accept(fmi2Status status) { return status <= fmi2Warning; }
 
 /* Initialises an instance with its parameters. */

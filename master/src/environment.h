@@ -31,6 +31,18 @@ typedef struct hxEnvironment {
 int hx_environment_open(hxEnvironment *environment, const hxEnvSettings *settings, double *drawn);
 void hx_environment_close(hxEnvironment *environment);
 
+/* Memory that plants use as their work space (shared_work.h). */
+typedef struct hxEnvWork {
+  void *block, *memory; /* NULL: the plants use their own */
+  size_t size;          /* B  of the memory */
+} hxEnvWork;
+
+/* Allocates memory if the plant can use it; without, or out of memory, there is none. */
+hxEnvWork hx_environment_work(const hxEnvSettings *settings);
+
+/* Makes the environment's plant use the memory; with NULL its own again. */
+void hx_environment_use(hxEnvironment *environment, const hxEnvWork *work);
+
 /* Starts the episode `episode` of the seed. */
 void hx_environment_reset(hxEnvironment *environment);
 

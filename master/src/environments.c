@@ -16,6 +16,7 @@ struct hxEnvironments {
   hxEnvironment *environment;
   double *drawn;
   hxPool pool;
+  hxEnvWork work; /* of the thread that calls reset or step */
   const uint8_t *mask;  /* of the present reset */
   const uint64_t *seed; /* of the present reset */
 };
@@ -28,6 +29,7 @@ size_t hx_environments_settings_size(void) { return sizeof(hxEnvSettings); }
 static void free_memory(hxEnvironments *all) {
   free(all->environment);
   free(all->drawn);
+  free(all->work.block);
   free(all);
 }
 
@@ -49,6 +51,7 @@ hxEnvironments *hx_environments_create(const hxEnvSettings *settings, const hxEn
   all->settings = *settings;
   all->arrays = *arrays;
   all->size = hx_environments_observed(settings);
+  all->work = hx_environment_work(settings);
   hx_pool_open(&all->pool);
   for (; all->count < n; ++all->count) {
     hxEnvironment *environment = &all->environment[all->count];
@@ -90,8 +93,7 @@ static void begin_next_episode(const hxEnvironments *all, size_t i) {
   hx_environment_observe(environment, observation_of(all, i));
 }
 
-static void reset_one(void *owner, size_t i) {
-  const hxEnvironments *all = owner;
+static void reset_one(const hxEnvironments *all, size_t i) {
   hxEnvironment *environment = &all->environment[i];
   if (all->mask && !all->mask[i]) return;
   if (all->seed) {
@@ -130,8 +132,7 @@ static void step_going(const hxEnvironments *all, size_t i, const float *action)
   begin_next_episode(all, i);
 }
 
-static void step_one(void *owner, size_t i) {
-  const hxEnvironments *all = owner;
+static void step_one(const hxEnvironments *all, size_t i) {
   hxEnvironment *environment = &all->environment[i];
   const float *action = all->arrays.action + i * HX_ENV_JOINTS;
   clear_results(all, i);
@@ -150,17 +151,35 @@ static void step_one(void *owner, size_t i) {
 /* ----------------------------------------------------------------------------------------------
  * work on all */
 
+/* Does something with an environment whose plant uses the work space of this thread meanwhile. */
+static void with_work(hxEnvironments *all, size_t i, const hxEnvWork *work,
+                      void (*act)(const hxEnvironments *all, size_t i)) {
+  hxEnvironment *environment = &all->environment[i];
+  hx_environment_use(environment, work);
+  act(all, i);
+  hx_environment_use(environment, NULL);
+}
+
+static void reset_item(void *owner, size_t i, void *own) { with_work(owner, i, own, reset_one); }
+
+static void step_item(void *owner, size_t i, void *own) { with_work(owner, i, own, step_one); }
+
 void hx_environments_reset(hxEnvironments *all, const uint8_t *mask, const uint64_t *seed) {
   all->mask = mask;
   all->seed = seed;
-  hx_pool_run(&all->pool, reset_one, all, all->count);
+  hx_pool_run(&all->pool, reset_item, all, all->count, &all->work);
 }
 
 void hx_environments_step(hxEnvironments *all) {
-  hx_pool_run(&all->pool, step_one, all, all->count);
+  hx_pool_run(&all->pool, step_item, all, all->count, &all->work);
 }
 
-void hx_environments_serve(hxEnvironments *all) { hx_pool_serve(&all->pool); }
+void hx_environments_serve(hxEnvironments *all) {
+  hxEnvWork work = hx_environment_work(&all->settings);
+  hx_pool_serve(&all->pool, &work);
+  free(work.block);
+}
+
 void hx_environments_stop(hxEnvironments *all) { hx_pool_stop(&all->pool); }
 
 /* ----------------------------------------------------------------------------------------------

@@ -44,20 +44,20 @@ void hx_pool_close(hxPool *pool) {
 }
 
 /* Takes and does items while there are any; the lock is held at entry and at return. */
-static void work_off(hxPool *pool) {
+static void work_off(hxPool *pool, void *own) {
   while (pool->next < pool->count) {
     const size_t first = pool->next, left = pool->count - first;
     const size_t taken = left < pool->chunk ? left : pool->chunk;
     pool->next += taken;
     release(&pool->lock);
-    for (size_t i = first; i < first + taken; ++i) pool->work(pool->owner, i);
+    for (size_t i = first; i < first + taken; ++i) pool->work(pool->owner, i, own);
     take(&pool->lock);
     pool->done += taken;
   }
   if (pool->done == pool->count) notify(&pool->end);
 }
 
-void hx_pool_run(hxPool *pool, hxWork *work, void *owner, size_t count) {
+void hx_pool_run(hxPool *pool, hxWork *work, void *owner, size_t count, void *own) {
   take(&pool->lock);
   pool->work = work;
   pool->owner = owner;
@@ -66,15 +66,15 @@ void hx_pool_run(hxPool *pool, hxWork *work, void *owner, size_t count) {
   /* small enough that no thread waits long for the last one, large enough to lock rarely */
   pool->chunk = count / 64 + 1;
   notify(&pool->begin);
-  work_off(pool);
+  work_off(pool, own);
   while (pool->done < count) await(&pool->end, &pool->lock);
   release(&pool->lock);
 }
 
-void hx_pool_serve(hxPool *pool) {
+void hx_pool_serve(hxPool *pool, void *own) {
   take(&pool->lock);
   while (!pool->stopped) {
-    work_off(pool);
+    work_off(pool, own);
     if (!pool->stopped && pool->next >= pool->count) await(&pool->begin, &pool->lock);
   }
   release(&pool->lock);

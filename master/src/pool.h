@@ -15,8 +15,8 @@ typedef pthread_mutex_t hxLock;
 typedef pthread_cond_t hxSignal;
 #endif
 
-/* Does item `index` of the work. */
-typedef void hxWork(void *owner, size_t index);
+/* Does item `index` of the work in a thread that has memory of its own. */
+typedef void hxWork(void *owner, size_t index, void *own);
 
 typedef struct hxPool {
   hxLock lock;
@@ -31,11 +31,12 @@ typedef struct hxPool {
 void hx_pool_open(hxPool *pool);
 void hx_pool_close(hxPool *pool);
 
-/* Does all items in this thread and in those that serve; returns when the last one is done. */
-void hx_pool_run(hxPool *pool, hxWork *work, void *owner, size_t count);
+/* Does all items in this thread and in those that serve; returns when the last one is done. own:
+ * passed to the work that this thread does. */
+void hx_pool_run(hxPool *pool, hxWork *work, void *owner, size_t count, void *own);
 
 /* Takes part in all calls of hx_pool_run until hx_pool_stop. */
-void hx_pool_serve(hxPool *pool);
+void hx_pool_serve(hxPool *pool, void *own);
 void hx_pool_stop(hxPool *pool);
 
 #endif

@@ -1,7 +1,9 @@
 #include "kernel.h"
 
 #include <stddef.h>
+#include <stdint.h>
 
+#include "hexapod/message.h"
 #include "tangent.h"
 
 const hxKernel *const hx_kernels[] = {
@@ -24,4 +26,31 @@ size_t hx_scratch_size(void) {
   for (const hxKernel *const *kernel = hx_kernels; *kernel; ++kernel)
     if ((*kernel)->scratch > size) size = (*kernel)->scratch;
   return size;
+}
+
+/* Returns the bytes from an address to the next one that is aligned to HX_WORK_ALIGNMENT. */
+static size_t padding(uintptr_t address) { return (0 - address) % HX_WORK_ALIGNMENT; }
+
+/* Returns the part of a work space that holds the state before a call, bytes. */
+static size_t before_size(void) { return sizeof(hxState) + padding(sizeof(hxState)); }
+
+size_t hx_work_size(void) { return before_size() + hx_scratch_size(); }
+
+size_t hx_plant_size(void) { return sizeof(hxPlant) + HX_WORK_ALIGNMENT + hx_work_size(); }
+
+hxStatus hx_plant_use_work(hxPlant *plant, void *memory, size_t size) {
+  unsigned char *own = (unsigned char *)plant + sizeof *plant, *work = memory;
+  if (!work) work = own + padding((uintptr_t)own);
+  if (memory && (size < hx_work_size() || padding((uintptr_t)memory))) {
+    hx_print(plant->message, HX_MESSAGE_SIZE,
+             "work space: got %zu bytes at an address that is %zu bytes above a multiple of %d, "
+             "expected at least %zu bytes at a multiple; nothing was changed, allocate aligned "
+             "memory of hx_work_size() bytes",
+             size, (size_t)((uintptr_t)memory % HX_WORK_ALIGNMENT), HX_WORK_ALIGNMENT,
+             hx_work_size());
+    return HX_INVALID_ARGUMENT;
+  }
+  plant->state_before = (hxState *)(void *)work;
+  plant->scratch = work + before_size();
+  return HX_OK;
 }

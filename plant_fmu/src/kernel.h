@@ -58,9 +58,9 @@ typedef struct hxKernel {
   /* Measures the path since the last moment, when an importer's solver has completed its step. */
   void (*measure)(const hxModel *model, const hxCommand *command, hxState *state, void *scratch);
 
-  /* Computes all outputs. */
+  /* Computes groups of outputs, hxOutputGroup. */
   void (*output)(const hxModel *model, const hxState *state, const hxCommand *command,
-                 void *scratch, hxOutput *output);
+                 unsigned groups, void *scratch, hxOutput *output);
 
   /* Computes the rates of those outputs that are integrals since the start. */
   void (*integral_rates)(const hxModel *model, const hxState *state, const hxCommand *command,
@@ -91,12 +91,13 @@ extern const hxKernel *const hx_kernels[];
 /* Returns the fastest kernel that this processor supports. */
 const hxKernel *hx_kernel(void);
 
-/* Work space in the memory of an instance, aligned to HX_SCRATCH_ALIGNMENT. Every call may use all
- * of it, and none reads what another one has left there. */
-enum { HX_SCRATCH_ALIGNMENT = 64 };
-
-/* Returns the size of the work space that every kernel and hx_tangent can do with, bytes. */
+/* Returns the size of the scratch that every kernel and hx_tangent can do with, bytes. It is aligned
+ * to HX_WORK_ALIGNMENT. Every call may use all of it, and none reads what another one has left
+ * there. */
 size_t hx_scratch_size(void);
+
+/* Returns the size of a plant with its own work space behind it, bytes. */
+size_t hx_plant_size(void);
 
 HX_HIDDEN_END
 

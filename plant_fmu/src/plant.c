@@ -44,11 +44,10 @@ const char *hx_plant_message(const hxPlant *plant) { return plant->message; }
 double hx_plant_time(const hxPlant *plant) { return plant->state.time; }
 
 hxPlant *hx_plant_create(void) {
-  hxPlant *plant = calloc(1, sizeof *plant + HX_SCRATCH_ALIGNMENT + hx_scratch_size());
+  hxPlant *plant = calloc(1, hx_plant_size());
   hxDefinition definition;
   if (!plant) return NULL;
-  unsigned char *behind = (unsigned char *)plant + sizeof *plant;
-  plant->scratch = behind + (0 - (uintptr_t)behind) % HX_SCRATCH_ALIGNMENT;
+  hx_plant_use_work(plant, NULL, 0);
   hx_definition_default(&definition);
   hx_plant_reset(plant, &definition, 0.0);
   return plant;
@@ -185,7 +184,7 @@ hxStatus hx_plant_reset(hxPlant *plant, const hxDefinition *definition, double t
   if (status == HX_OK) status = check_terrain(plant, definition, message);
   if (status != HX_OK) return fail(plant, status, message);
   plant->feet = plant->model;
-  plant->state_before = plant->state;
+  *plant->state_before = plant->state;
   memset(&plant->model, 0, sizeof plant->model);
   memset(&plant->state, 0, sizeof plant->state);
   hx_model_compile(&plant->model, definition, plant->terrain);
@@ -196,7 +195,7 @@ hxStatus hx_plant_reset(hxPlant *plant, const hxDefinition *definition, double t
   if (status == HX_OK) status = check_start_overlap(plant, message);
   if (status != HX_OK) {
     plant->model = plant->feet;
-    plant->state = plant->state_before;
+    plant->state = *plant->state_before;
     derive_feet(plant);
     return fail(plant, status, message);
   }
@@ -316,7 +315,7 @@ static hxStatus advance_part(hxPlant *plant, const hxStepCall *call, double t_en
 /* Advances the plant. */
 static hxStatus advance(hxPlant *plant, const hxInput *input, const hxInput *rate, double t_end,
                         hxEvents *events) {
-  hxState *before = &plant->state_before;
+  hxState *before = plant->state_before;
   hxCommand change;
   int finite;
   const hxCommand *ramp = ramp_from_rate(rate, &change, &finite);
@@ -360,13 +359,19 @@ hxStatus hx_plant_step_to_event(hxPlant *plant, const hxInput *input, double t_e
   return status;
 }
 
-void hx_plant_output(hxPlant *plant, const hxInput *input, hxOutput *output) {
+void hx_plant_output_groups(hxPlant *plant, const hxInput *input, unsigned groups,
+                            hxOutput *output) {
   hxCommand command;
   present_command(plant, input, &command);
-  hx_kernel()->output(&plant->model, &plant->state, &command, plant->scratch, output);
+  hx_kernel()->output(&plant->model, &plant->state, &command, groups, plant->scratch, output);
+  if (!(groups & HX_OUTPUT_MOTION)) return;
   output->footprints = plant->footprints.kept.count;
   if (plant->model.servo_drive == HX_DRIVE_MOTOR)
     output->supply_voltage = command.supply * plant->model.voltage;
+}
+
+void hx_plant_output(hxPlant *plant, const hxInput *input, hxOutput *output) {
+  hx_plant_output_groups(plant, input, HX_OUTPUT_ALL, output);
 }
 
 size_t hx_plant_footprints(const hxPlant *plant, hxFootprint *footprint, size_t capacity) {

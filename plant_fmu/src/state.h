@@ -283,8 +283,8 @@ struct hxPlant {
   double valley_limit;      /* m  its valleys are not narrower; 0: not searched yet */
   char message[HX_MESSAGE_SIZE];
   hxFootprintLog footprints; /* outside the state, which every call copies */
-  hxState state_before;      /* that before a call, which one that fails restores */
-  void *scratch;             /* work space behind the plant, see kernel.h */
+  hxState *state_before;     /* that before a call, which one that fails restores: in the work space */
+  void *scratch;             /* of the kernels, see kernel.h: the rest of the work space */
 };
 
 /* Copies the elastic gears of a moment. */
@@ -293,7 +293,15 @@ static inline void hx_copy_gears(hxMoment *to, const hxMoment *from) {
   memcpy(to->motor_speed, from->motor_speed, sizeof to->motor_speed);
 }
 
-/* Copies the state of the first row of contacts: nothing else of it changes on rigid planes. */
+/* Copies the state of contacts on rigid ground: nothing else of it changes there. */
+static inline void hx_copy_rigid_contacts(hxContactState *to, const hxContactState *from) {
+  memcpy(to, from, offsetof(hxContactState, on_soil));
+  memcpy(to->cell, from->cell, sizeof to->cell);
+  memcpy(to->nearest, from->nearest, sizeof to->nearest);
+}
+
+/* Copies the state of the first row of contacts: nothing else of it changes on rigid planes if the
+ * model has no other rows. */
 static inline void hx_copy_foot_contacts(hxContactState *to, const hxContactState *from) {
   memcpy(to->closed, from->closed, sizeof to->closed[0]);
   memcpy(to->damping, from->damping, sizeof to->damping[0]);
@@ -311,6 +319,8 @@ static inline void hx_copy_state(const hxModel *model, hxState *to, const hxStat
          model->elastic ? offsetof(hxState, contact) : offsetof(hxState, motion.deflection));
   if (plain)
     hx_copy_foot_contacts(&to->contact, &from->contact);
+  else if (!model->has_soil)
+    hx_copy_rigid_contacts(&to->contact, &from->contact);
   else
     to->contact = from->contact;
   memcpy((char *)to + rest, (const char *)from + rest, offsetof(hxState, moment.contact[1]) - rest);

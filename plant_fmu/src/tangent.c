@@ -105,7 +105,7 @@ void hx_tangent(void *memory, hxCoordinates *d_rate, hxOutput *d_output) {
   hx_dynamics_evaluate(&point->model, &point->state.contact, &point->command,
                        hx_re(point->state.time), &point->state.motion, NULL, NULL, 1, work, all);
   hx_coordinates_rate(&all->motion, work, &rate);
-  hx_output_fill(&point->model, &point->state, work, output);
+  hx_output_fill(&point->model, &point->state, work, HX_OUTPUT_ALL, output);
   if (d_rate)
     to_derivatives((const hxComplex *)&rate, NUMBERS(sizeof rate), scale, (double *)d_rate);
   if (d_output) output_to_derivatives(output, scale, d_output);

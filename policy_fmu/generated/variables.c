@@ -891,6 +891,45 @@ const hxSection hx_sections[HX_CAUSALITIES] = {
     [HX_LOCAL] = {8000, 0, 0},
 };
 
+const unsigned char hx_output_groups[] = {
+    HX_ALL_GROUPS,
+    HX_ALL_GROUPS,
+    HX_ALL_GROUPS,
+    HX_ALL_GROUPS,
+    HX_ALL_GROUPS,
+    HX_ALL_GROUPS,
+    HX_ALL_GROUPS,
+    HX_ALL_GROUPS,
+    HX_ALL_GROUPS,
+    HX_ALL_GROUPS,
+    HX_ALL_GROUPS,
+    HX_ALL_GROUPS,
+    HX_ALL_GROUPS,
+    HX_ALL_GROUPS,
+    HX_ALL_GROUPS,
+    HX_ALL_GROUPS,
+    HX_ALL_GROUPS,
+    HX_ALL_GROUPS,
+    HX_ALL_GROUPS,
+    HX_ALL_GROUPS,
+    HX_ALL_GROUPS,
+    HX_ALL_GROUPS,
+    HX_ALL_GROUPS,
+    HX_ALL_GROUPS,
+    HX_ALL_GROUPS,
+    HX_ALL_GROUPS,
+    HX_ALL_GROUPS,
+    HX_ALL_GROUPS,
+    HX_ALL_GROUPS,
+    HX_ALL_GROUPS,
+    HX_ALL_GROUPS,
+    HX_ALL_GROUPS,
+    HX_ALL_GROUPS,
+    HX_ALL_GROUPS,
+    HX_ALL_GROUPS,
+    HX_ALL_GROUPS,
+};
+
 const unsigned hx_time_reference = 9999;
 
 const char *const hx_log_category_names[] = {
@@ -904,5 +943,5 @@ const char *const hx_log_category_names[] = {
 const hxStateRow *const hx_states = 0;
 const size_t hx_state_count = 0;
 
-const char hx_default_guid[] = "{b5702436-b2d8-49b4-be6e-460181610ff8}";
+const char hx_default_guid[] = "{681fd727-a18f-4af0-bde8-7eab595c2c22}";
 

@@ -18,7 +18,7 @@ LAYERS = (
     ("instance",),
     ("step", "exchange", "state"),
     ("call", "arrays"),
-    ("fmi2", "fmi3"),
+    ("fmi2", "fmi3", "work"),
 )
 LAYER_OF = {name: index for index, layer in enumerate(LAYERS) for name in layer}
 DEFINITION = re.compile(r"^(?!static|extern)[\w *]*\b(hx_\w+)\([^;{]*\) \{", re.MULTILINE)

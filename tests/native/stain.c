@@ -14,5 +14,5 @@ HX_API void hx_probe_stain(hxPlant *plant, int byte) {
   volatile char stain[300000];
   for (size_t i = 0; i < sizeof stain; ++i) stain[i] = (char)byte;
   memset(plant->scratch, byte, hx_scratch_size());
-  memset(&plant->state_before, byte, sizeof plant->state_before);
+  memset(plant->state_before, byte, sizeof *plant->state_before);
 }

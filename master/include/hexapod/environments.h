@@ -6,6 +6,10 @@
  * only. Environments share nothing: what one does depends on its seed, its episode and its actions
  * alone, so that results are the same bits for any number of threads, any batch and any order.
  *
+ * An FMU whose binary has the functions of shared_work.h uses the work space of the thread that
+ * steps it, from just before to just after the step. The memory belongs to the library: that of the
+ * thread that calls reset or step to the environments, that of a serving thread to its call.
+ *
  * The library creates no threads. A caller that wants n threads lets n - 1 threads of its own call
  * hx_environments_serve, which work whenever a call of reset or step runs.
  *
@@ -19,6 +23,7 @@
 
 #include "fmi2FunctionTypes.h"
 
+#include "hexapod/shared_work.h"
 #include "hexapod/status.h"
 
 #ifdef __cplusplus
@@ -111,6 +116,8 @@ typedef struct hxEnvFmu {
   fmi2DoStepTYPE *do_step;
   const char *guid;
   const char *resources; /* URI of the unpacked resources */
+  hxSharedWorkSize *work_size; /* NULL, like the next: the binary does not have it */
+  hxSharedWorkUse *work_use;
 } hxEnvFmu;
 
 /* Parameters of the plant that are drawn anew for each episode, uniformly. Draws of one group get

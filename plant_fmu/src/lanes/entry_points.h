@@ -193,12 +193,26 @@ static void kernel_measure(const hxModel *model, const hxCommand *command, hxSta
     for (int i = 0; i < 3; ++i) hx_fill_slots(state->completed.moment[row][i]);
 }
 
+/* Returns whether a group of outputs depends on accelerations. */
+static int needs_accelerations(const hxModel *model, unsigned groups) {
+  if (groups & HX_OUTPUT_REACTIONS) return 1;
+  return (groups & ~(unsigned)HX_OUTPUT_MOTION) &&
+         (model->servo_mode == HX_SERVO_KINEMATIC || model->elastic || model->spin);
+}
+
 static void kernel_output(const hxModel *model, const hxState *state, const hxCommand *command,
-                          void *memory, hxOutput *output) {
+                          unsigned groups, void *memory, hxOutput *output) {
   hxScratch *scratch = memory;
-  hx_dynamics_evaluate(model, &state->contact, command, state->time, &state->motion, NULL, NULL, 1,
-                       &scratch->work, &scratch->rate);
-  hx_output_fill(model, state, &scratch->work, output);
+  hxWork *work = &scratch->work;
+  if (needs_accelerations(model, groups))
+    hx_dynamics_evaluate(model, &state->contact, command, state->time, &state->motion, NULL, NULL,
+                         1, work, &scratch->rate);
+  else if (groups & ~(unsigned)HX_OUTPUT_MOTION)
+    hx_dynamics_forces(model, &state->contact, command, state->time, &state->motion, NULL, 0, 1,
+                       work);
+  else
+    torso_pass(model, &state->motion, work);
+  hx_output_fill(model, state, work, groups, output);
 }
 
 static void kernel_integral_rates(const hxModel *model, const hxState *state,

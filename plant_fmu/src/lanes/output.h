@@ -132,17 +132,16 @@ static void fill_heat(const hxModel *model, const hxState *state, int leg, int j
       hx_lane(hx_clip(hx_splat(left), hx_splat(0.0), hx_splat(1.0)), 0);
 }
 
-/* Fills a joint's outputs. The reaction on the child is the force -lambda and, about the joint's
- * point, the torque -(u1 lambda_4 + u2 lambda_5); the motor's torque is not included. */
-static void fill_joint(const hxModel *model, const hxState *state, const hxJointWork *k, int lane,
-                       int leg, int joint, hxOutput *o) {
-  const hxVec3 s = k->reaction.kin.s, u1 = hx_cross(k->body.R_WB.x, s),
-               u2 = hx_cross(k->body.R_WB.y, s);
-  const hxVec3 couple =
-      hx_add_scaled(hx_scale(k->reaction.lambda[0], u1), k->reaction.lambda[1], u2);
+/* Fills what a joint's force depends on, and the motor's torque. */
+static void fill_joint(const hxJointWork *k, int lane, int leg, int joint, hxOutput *o) {
   o->angle[leg][joint] = hx_lane(k->angle, lane);
   o->speed[leg][joint] = hx_lane(k->speed, lane);
   o->torque[leg][joint] = hx_lane(k->servo.torque, lane);
+}
+
+/* Fills the other outputs of a joint's servo. */
+static void fill_servo(const hxModel *model, const hxState *state, const hxJointWork *k, int lane,
+                       int leg, int joint, hxOutput *o) {
   o->current[leg][joint] = hx_lane(hx_motor_current(model, k->servo.torque), lane);
   o->electrical_power[leg][joint] =
       hx_lane(hx_electrical_power(model, k->servo.torque, k->motor_speed), lane);
@@ -151,6 +150,16 @@ static void fill_joint(const hxModel *model, const hxState *state, const hxJoint
   o->positive_work[leg][joint] = state->measured.positive_work[joint][leg];
   o->negative_work[leg][joint] = state->measured.negative_work[joint][leg];
   o->torque_squared[leg][joint] = state->measured.torque_squared[joint][leg];
+  fill_heat(model, state, leg, joint, o);
+}
+
+/* Fills the reaction on a joint's child: the force -lambda and, about the joint's point, the torque
+ * -(u1 lambda_4 + u2 lambda_5); the motor's torque is not included. */
+static void fill_reaction(const hxJointWork *k, int lane, int leg, int joint, hxOutput *o) {
+  const hxVec3 s = k->reaction.kin.s, u1 = hx_cross(k->body.R_WB.x, s),
+               u2 = hx_cross(k->body.R_WB.y, s);
+  const hxVec3 couple =
+      hx_add_scaled(hx_scale(k->reaction.lambda[0], u1), k->reaction.lambda[1], u2);
   get3(hx_neg(k->reaction.lambda_lin), lane, o->reaction_force[leg][joint]);
   get3(hx_neg(couple), lane, o->reaction_torque[leg][joint]);
 }
@@ -272,7 +281,7 @@ static void fill_depths(const hxModel *model, const hxWork *work, hxIndicators *
   }
 }
 
-/* Fills the outputs of torso and IMU. */
+/* Fills the motion of the torso. */
 static void fill_torso(const hxPlantMotion *motion, const hxWork *work, hxOutput *o) {
   const hxNumber *m = motion->torso;
   const hxMat3 R = work->torso.R_WB;
@@ -287,7 +296,6 @@ static void fill_torso(const hxPlantMotion *motion, const hxWork *work, hxOutput
   o->torso.roll = hx_atan2(y[2], z[2]);
   o->torso.pitch = hx_asin(-x[2]);
   o->torso.yaw = hx_atan2(x[1], x[0]);
-  get3(hx_tmul(R, work->torso_acceleration.lin), 0, o->imu.specific_force);
   get3(hx_tmul(R, work->torso.w), 0, o->imu.angular_velocity);
 }
 
@@ -323,35 +331,63 @@ static void fill_energy(const hxModel *model, const hxState *state, const hxWork
                        m->actuator_work - m->push_work + m->dissipated;
 }
 
-/* Fills all outputs. */
-static void hx_output_fill(const hxModel *model, const hxState *state, const hxWork *work,
-                           hxOutput *o) {
-  o->time = state->time;
+/* Fills the outputs of all joints that belong to the groups. */
+static void fill_joints(const hxModel *model, const hxState *state, const hxWork *work,
+                        unsigned groups, hxOutput *o) {
+  for (int leg = 0; leg < HX_LEGS; ++leg)
+    for (int joint = 0; joint < HX_JOINTS; ++joint) {
+      int lane;
+      const hxJointWork *k = &leg_work(work, leg, &lane)->joint[joint];
+      if (groups & HX_OUTPUT_FORCES) fill_joint(k, lane, leg, joint, o);
+      if (groups & HX_OUTPUT_SERVOS) fill_servo(model, state, k, lane, leg, joint, o);
+      if (groups & HX_OUTPUT_REACTIONS) fill_reaction(k, lane, leg, joint, o);
+    }
+}
+
+/* Fills the forces on feet, legs and torso. */
+static void fill_forces(const hxModel *model, const hxState *state, const hxWork *work,
+                        hxOutput *o) {
   for (int leg = 0; leg < HX_LEGS; ++leg) {
     int lane;
     const hxLegWork *w = leg_work(work, leg, &lane);
-    for (int joint = 0; joint < HX_JOINTS; ++joint)
-      fill_joint(model, state, &w->joint[joint], lane, leg, joint, o),
-          fill_heat(model, state, leg, joint, o);
     const hxVec3 tibia = hx_link_vec3(&state->motion, HX_JOINTS - 1, HX_R, leg - lane);
     fill_foot(model, state, w, tibia, lane, leg, o);
     fill_body_row(model, w, HX_KNEE, lane, o->body.knee_force[leg]);
     fill_body_row(model, w, HX_SHANK, lane, o->body.shank_force[leg]);
     fill_neighbour_force(model, w, lane, o->body.neighbour_force[leg]);
   }
-  fill_torso(&state->motion, work, o);
   fill_torso_contact(model, work, o->torso.contact_force);
-  hx_clearances(model, &state->motion, work, o->body.clearance);
-  fill_depths(model, work, &o->depth);
-  o->supply_voltage = 0.0; /* likewise: it belongs to the command */
-  o->footprints = 0.0;     /* hx_plant_output() counts them: they are outside the state */
+}
+
+/* Fills what needs no forces. */
+static void fill_motion(const hxState *state, const hxWork *work, hxOutput *o) {
+  o->time = state->time;
+  fill_torso(&state->motion, work, o);
+  o->supply_voltage = 0.0; /* hx_plant_output_groups() sets both: it belongs to the command, */
+  o->footprints = 0.0;     /* and they are outside the state */
   for (int i = 0; i < HX_CONE_BINS; ++i) o->cone_time[i] = state->measured.cone_time[i];
-  fill_energy(model, state, work, o);
-  fill_constraint(model, &state->motion, o);
   o->solver.evaluations = state->evaluations;
   o->solver.steps = state->steps;
   o->solver.rejected = state->rejected;
   o->solver.touchdowns = state->touchdowns;
+}
+
+/* Fills groups of outputs, hxOutputGroup. */
+static void hx_output_fill(const hxModel *model, const hxState *state, const hxWork *work,
+                           unsigned groups, hxOutput *o) {
+  if (groups & HX_OUTPUT_MOTION) fill_motion(state, work, o);
+  fill_joints(model, state, work, groups, o);
+  if (groups & HX_OUTPUT_FORCES) fill_forces(model, state, work, o);
+  if (groups & HX_OUTPUT_REACTIONS)
+    get3(hx_tmul(work->torso.R_WB, work->torso_acceleration.lin), 0, o->imu.specific_force);
+  if (groups & HX_OUTPUT_DISTANCES) {
+    hx_clearances(model, &state->motion, work, o->body.clearance);
+    fill_depths(model, work, &o->depth);
+  }
+  if (groups & HX_OUTPUT_AUDIT) {
+    fill_energy(model, state, work, o);
+    fill_constraint(model, &state->motion, o);
+  }
 }
 
 #ifndef HX_TANGENT /* measurements are not functions of state and input, so they have no           \
