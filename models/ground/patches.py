@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 
 from hexapod_cosim.models.errors import RobotError
-from hexapod_cosim.models.ground.steps import Mask
 from hexapod_cosim.models.ground.surface import (
     LAW,
     MATERIAL_COLUMNS,

@@ -139,7 +139,9 @@ def spots(robot: Robot) -> tuple[Spot, ...]:
 
 def own_ground(robot: Robot, spot: Spot) -> Held:
     """Returns an open contact with the ground of the robot file, without the surface's patches."""
-    return Held(robot.contact, _friction_of(robot.friction, spot), soil_for(robot.soil, robot, spot))
+    return Held(
+        robot.contact, _friction_of(robot.friction, spot), soil_for(robot.soil, robot, spot)
+    )
 
 
 def soil_for(soil: Soil, robot: Robot, spot: Spot, side: int = 2) -> Soil:

@@ -34,8 +34,13 @@ from hexapod_cosim.models.touch.forces import (
     spots,
     standing_pairs,
 )
+from hexapod_cosim.models.touch.prints import (
+    LEAST_FOOTPRINT,
+    deepest,
+    footprint_depth,
+    place_of_print,
+)
 
-LEAST_FOOTPRINT = 1e-6  # m  shallower ones are not kept
 SAME_FACE = 1e-6  # m, 1  depth and normal of one contact at both sides of a border between cells
 
 
@@ -143,7 +148,7 @@ def start_contacts(robot: Robot, body: Array) -> Contacts:
 
 
 def hold_cells(robot: Robot, body: Array, contacts: Contacts) -> Contacts:
-    """Holds the cells of feet that touch blocks or are in their prints; releases those of others."""
+    """Holds the cells of feet that touch blocks or are in their prints, and releases others."""
     surface = surface_of(robot.terrain)
     if surface is None or not has_cells(robot):
         return contacts
@@ -226,21 +231,6 @@ def _continued(
 # soil
 
 
-def deepest(start: float, slope_start: float, end: float, slope_end: float) -> float:
-    """Returns the largest value on [0, 1] of the cubic with these ends and slopes (eq. 28)."""
-    if not (slope_start > 0.0 and slope_end < 0.0):
-        return max(start, end)
-    bend = slope_start + slope_end - 2.0 * (end - start)
-    curve = end - start - slope_start - bend
-    low, high = 0.0, 1.0
-    for _ in range(60):
-        x = 0.5 * (low + high)
-        rises = slope_start + x * (2.0 * curve + 3.0 * x * bend) > 0.0
-        low, high = (x, high) if rises else (low, x)
-    top = start + low * (slope_start + low * (curve + low * bend))
-    return max(top, start, end)
-
-
 def yield_soil(robot: Robot, contacts: Contacts, h: float, before: Depths, after: Depths) -> Array:
     """Returns the plastic depths (n,) of all spheres [m] at the end of a step of h [s] (eq. 44).
 
@@ -291,35 +281,6 @@ def _in_order_of_prints(robot: Robot) -> list[tuple[int, Spot]]:
     """
     spheres = [(k, spot) for k, spot in enumerate(spots(robot)) if spot.may_sink]
     return sorted(spheres, key=lambda numbered: numbered[1].sphere.name == "torso")
-
-
-def place_of_print(robot: Robot, contacts: Contacts, spot: Spot, centre: Array) -> Array:
-    """Returns where (2,) [m] a sphere loses its print's bottom; of a foot that keeps its block, the
-    nearest place over that block.
-    """
-    surface, place = surface_of(robot.terrain), centre[:2]
-    cell = contacts.cell[spot.leg] if spot.leg >= 0 else None
-    if surface is None or cell is None:
-        return place
-    if surface.height[cell_at(surface, *place.tolist())] == surface.height[cell]:
-        return place
-    corner = np.array([surface.x0, surface.y0]) + surface.cell * np.array(cell[::-1])
-    rim = 1e-6 * surface.cell
-    return np.clip(place, corner + rim, corner + surface.cell - rim)
-
-
-def footprint_depth(footprints: Array, centre: Array, surface: Surface | None = None) -> float:
-    """Returns the depth [m] of the deepest footprint around a point; 0 outside of all.
-
-    On blocks those on blocks of another height do not count.
-    """
-    away = np.hypot(footprints[:, 0] - centre[0], footprints[:, 1] - centre[1])
-    inside = footprints[away <= footprints[:, 3]]
-    if surface is not None and surface.kind == "blocks":
-        own = surface.height[cell_at(surface, float(centre[0]), float(centre[1]))]
-        level = [surface.height[cell_at(surface, x, y)] == own for x, y in inside[:, :2].tolist()]
-        inside = inside[np.array(level, dtype=bool)]
-    return float(np.max(inside[:, 2], initial=0.0))
 
 
 # blocks

@@ -99,8 +99,11 @@ def test_an_upturned_robot_sinks_to_the_closed_form(core: ct.CDLL, soil: str, de
 @pytest.mark.parametrize("soil", ["sandy_loam", "lete_sand"])
 @pytest.mark.parametrize(
     ("turned", "area", "breadth"),
-    [((0.0, 1.0), 0.70 * 0.60 / 4.0, 0.60), ((1.0, 0.0), 1.00 * 0.60 / 4.0, 0.60),
-     (None, 0.70 * 1.00 / 4.0, 0.70)],
+    [
+        ((0.0, 1.0), 0.70 * 0.60 / 4.0, 0.60),
+        ((1.0, 0.0), 1.00 * 0.60 / 4.0, 0.60),
+        (None, 0.70 * 1.00 / 4.0, 0.70),
+    ],
 )
 def test_a_box_sinks_with_the_area_and_the_smaller_edge_of_the_side_on_which_it_lies(
     core: ct.CDLL, soil: str, turned: tuple[float, float] | None, area: float, breadth: float

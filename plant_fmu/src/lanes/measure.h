@@ -117,12 +117,13 @@ HX_RARE void search_near_blocks(const hxModel *model, const hxContactState *stat
   int below = 0, beside = 0;
   for (int lane = 0; lane < HX_LANES && slot + lane < HX_LEGS; ++lane) {
     const double ends[4] = {low[0][lane], high[0][lane], low[1][lane], high[1][lane]};
-    const double top = hx_terrain_top_between(terrain, ends), col = state->cell[0][slot + lane];
-    if (z[lane] - top >= HX_LEAST_REACH) continue;
+    const double around = hx_terrain_top_between(terrain, ends), col = state->cell[0][slot + lane],
+                 own = col >= 0.0
+                           ? hx_terrain_column(terrain, col, state->cell[1][slot + lane])
+                           : around; /* a foot may have left its block in its print */
+    if (z[lane] - hx_higher_of(around, own) >= HX_LEAST_REACH) continue;
     below |= (state->closed[HX_FOOT][slot + lane] == 0.0) << lane;
-    beside |= !(col >= 0.0) || top > hx_terrain_column(terrain, col, state->cell[1][slot + lane])
-                  ? 1 << lane
-                  : 0;
+    beside |= !(col >= 0.0) || around > own ? 1 << lane : 0;
   }
   search->below = hx_listed(below), search->beside = hx_listed(beside);
 }
@@ -285,14 +286,14 @@ HX_RARE int keeps_block(const hxModel *model, const hxContactState *state, int l
          hx_terrain_column(model->terrain, state->cell[0][leg], state->cell[1][leg]);
 }
 
-/* Copies the places of feet, and of bodies where the ground has materials, and computes how far
- * feet are outside of their cells. */
+/* Copies the places of feet, and of bodies where the ground has materials or soil, and computes how
+ * far feet are outside of their cells. */
 HX_RARE void places_on_grid(const hxModel *model, const hxContactState *state,
                             const hxMoment *moment, hxDepths *depths) {
-  const int cells = hx_has_cells(model);
+  const int cells = hx_has_cells(model), materials = model->terrain->material || model->has_soil;
   const hxNumber(*foot)[HX_SLOTS] = moment->contact[HX_FOOT].centre;
   memcpy(depths->centre[HX_FOOT], foot, sizeof depths->centre[HX_FOOT]);
-  for (int k = 1; model->terrain->material && k < model->rows + model->torso_rows; ++k)
+  for (int k = 1; materials && k < model->rows + model->torso_rows; ++k)
     memcpy(depths->centre[model->row[k]], moment->contact[model->row[k]].centre,
            sizeof depths->centre[HX_FOOT]);
   for (int leg = 0; leg < HX_LEGS; ++leg) {
