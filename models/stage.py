@@ -192,7 +192,7 @@ def soil_slopes(
     """Returns the derivatives of a sphere on soil at plastic depth z_p [m]; its moments have
     none.
     """
-    soil, foot, depth = held.soil, spot.shape(robot), expected_depth(contact, ahead)
+    soil, foot, depth = held.soil, spot.shape(robot, held.side), expected_depth(contact, ahead)
     at = (soil, foot, plastic, depth, contact.approach_speed)
     limit = shear_limit(soil, foot, max(depth, plastic), soil_normal_force(*at))
     slip_speed = float(np.linalg.norm(slip_velocity(contact)))

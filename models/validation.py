@@ -11,7 +11,6 @@ import math
 import numpy as np
 
 from hexapod_cosim.models.errors import RobotError
-from hexapod_cosim.models.ground.patches import check_own_soil
 from hexapod_cosim.models.ground.surface import Surface
 from hexapod_cosim.models.ground.valleys import tightest_valley
 from hexapod_cosim.models.kinematics import foot_positions, inertia_matrix
@@ -360,8 +359,6 @@ def check_contact_surface(robot: Robot, surface: Surface, where: str) -> None:
             fix=f"enlarge terrain.horizontal_scale, or reduce {name}",
             where=where,
         )
-    if robot.soil.law != "none":
-        check_own_soil(surface, where)
     limit = VALLEY_MARGIN * radius
     valley = tightest_valley(surface, limit)
     if valley is None:

@@ -2,8 +2,8 @@
 
 Each is a sphere with the normal law of the feet (eq. 14) and the friction of the tanh law (eq. 15),
 also where the feet have bristles. The torso has eight, around the corners of a box. On soil knees
-and shanks sink as their spheres, a corner of the torso as a flat pad of a quarter of the box's
-upper side.
+and shanks sink as their spheres, a corner of the torso as a flat pad of a quarter of the side with
+which the box touches down.
 """
 
 from __future__ import annotations
@@ -26,6 +26,14 @@ from hexapod_cosim.models.terrain import ground
 
 
 @dataclass(frozen=True)
+class Pad:
+    """A flat pad as which a corner of the torso sinks into soil."""
+
+    radius: float  # m  of a disc of its area; 0: the sphere
+    breadth: float  # m  b of eq. 40, the smaller edge of its side
+
+
+@dataclass(frozen=True)
 class BodySphere:
     """A sphere of a body that may touch the ground."""
 
@@ -33,7 +41,7 @@ class BodySphere:
     body: int  # number of the body
     centre: Array  # (3,) from the body's centre of mass, body axes [m]
     radius: float  # m
-    pad_radius: float = 0.0  # m  on soil; 0: the sphere
+    pads: tuple[Pad, ...] = ()  # on soil, of the sides along x, y and z; none: the sphere
 
 
 def body_spheres(robot: Robot) -> tuple[BodySphere, ...]:
@@ -50,8 +58,7 @@ def body_spheres(robot: Robot) -> tuple[BodySphere, ...]:
         offset = np.subtract(body.torso_centre, robot.torso.com)
         for z, y, x in product((-1.0, 1.0), repeat=3):
             corner = offset + np.array([x, y, z]) * body.torso_box
-            sphere = BodySphere("torso", 0, corner, body.corner_radius, corner_pad_radius(robot))
-            spheres.append(sphere)
+            spheres.append(BodySphere("torso", 0, corner, body.corner_radius, corner_pads(robot)))
     for name, radius, share in (
         ("knee", body.knee_radius, 0.0),
         ("shank", body.shank_radius, body.shank_position),
@@ -64,15 +71,28 @@ def body_spheres(robot: Robot) -> tuple[BodySphere, ...]:
     return tuple(spheres)
 
 
-def corner_pad_radius(robot: Robot) -> float:
-    """Returns the radius [m] of the pad as which a corner of the torso sinks into soil.
+def corner_pads(robot: Robot) -> tuple[Pad, ...]:
+    """Returns the pads as which a corner of the torso sinks into soil, on the sides of the box
+    along x, y and z.
 
-    It is that of a disc of a quarter of the box's upper side; 0, the sphere, where that is not
-    larger.
+    Each is a disc of a quarter of its side; the sphere, where that is not smaller.
     """
-    body = robot.body
-    radius = math.sqrt(body.torso_box[0] * body.torso_box[1] / math.pi)
-    return radius if radius > body.corner_radius else 0.0
+    pads = []
+    for axis in range(3):
+        edges = np.delete(robot.body.torso_box, axis)
+        radius = math.sqrt(float(np.prod(edges)) / math.pi)
+        is_pad = radius > robot.body.corner_radius
+        pads.append(Pad(radius, 2.0 * float(edges.min())) if is_pad else Pad(0.0, 0.0))
+    return tuple(pads)
+
+
+def side_on_ground(robot: Robot, sphere: BodySphere, state: Array) -> int:
+    """Returns the axis (0 to 2) of a body to which its side that faces the ground is normal.
+
+    state: (13,) of the sphere's body.
+    """
+    normal = body_contact(robot, sphere, state).normal
+    return int(np.argmax(np.abs(rotation_matrix(state[3:7]).T @ normal)))
 
 
 def body_contact(robot: Robot, sphere: BodySphere, state: Array) -> FootContact:

@@ -55,6 +55,15 @@ def cell_at(surface: Surface, x: float, y: float) -> Cell:
     )
 
 
+def is_uneven(surface: Surface, x: float, y: float) -> bool:
+    """Returns whether the block below a place [m] is higher or lower than a neighbour."""
+    if surface.kind != "blocks":
+        return False
+    row, column = cell_at(surface, x, y)
+    around = surface.height[max(row - 1, 0) : row + 2, max(column - 1, 0) : column + 2]
+    return float(np.ptp(around)) > 0.0
+
+
 def outside(surface: Surface, x: float, y: float, cell: Cell) -> float:
     """Returns how far (x, y) is outside of a cell [m], negative inside; border cells have no outer
     end.

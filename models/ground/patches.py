@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 
 from hexapod_cosim.models.errors import RobotError
-from hexapod_cosim.models.ground.steps import Mask
 from hexapod_cosim.models.ground.surface import (
     LAW,
     MATERIAL_COLUMNS,
@@ -135,64 +134,7 @@ def with_patches(surface: Surface, patches: Sequence[Mapping[str, Any]], *, wher
     for k, patch in enumerate(patches):
         table.append(material_row(patch))
         _lay(material, surface, patch, len(table), f"{where}[{k}]")
-    found = replace(surface, material=material, materials=np.array(table))
-    check_soil_of_blocks(found, where)
-    return found
-
-
-def check_soil_of_blocks(surface: Surface, where: str) -> None:
-    """Raises RobotError for soil on blocks that are higher or lower than a neighbour.
-
-    The laws of soil are those of level ground: a foot that has sunk cannot pass an edge of soil
-    without a jump of the force.
-    """
-    if surface.kind != "blocks" or surface.material is None or surface.materials is None:
-        return
-    soft = np.concatenate([[False], surface.materials[:, LAW] > 0.0])[surface.material]
-    uneven = int(np.count_nonzero(soft & uneven_blocks(surface)))
-    if uneven:
-        raise RobotError(
-            "soil with edges",
-            got=f"{uneven} blocks of soil that are higher or lower than a neighbour",
-            expected="soil on a smooth surface or on level blocks",
-            fix="move the patch, or give it mu and stiffness instead of a soil",
-            where=where,
-        )
-
-
-def uneven_blocks(surface: Surface) -> Mask:
-    """Returns which blocks (rows, columns) are higher or lower than one of their neighbours."""
-    padded = np.pad(surface.height, 1, mode="edge")
-    shape = surface.rows, surface.columns
-    around = [padded[r : r + shape[0], c : c + shape[1]] for r in range(3) for c in range(3)]
-    return np.asarray(np.ptp(around, axis=0) > 0.0)
-
-
-def check_own_soil(surface: Surface, where: str) -> None:
-    """Raises RobotError for blocks with edges under a robot whose own ground is soil.
-
-    The robot's own ground is where the surface has no patch. A foot that has sunk beside an edge
-    would meet it at a finite depth, with a jump of the force.
-    """
-    if surface.kind != "blocks":
-        return
-    soft = uneven_blocks(surface)
-    if surface.material is not None:
-        soft &= surface.material == 0
-    if not soft.any():
-        return
-    row, column = np.argwhere(soft)[0]
-    x = surface.x0 + (column + 0.5) * surface.cell
-    y = surface.y0 + (row + 0.5) * surface.cell
-    place = f"x = {x:.4g} m, y = {y:.4g} m"
-    raise RobotError(
-        "soil with edges",
-        got=f"a soft block at {place} that is higher or lower than a neighbour",
-        expected="soil on a smooth surface or on level blocks",
-        fix="choose a smooth or level surface, or set soil.law to none and lay patches of soil on "
-        "level blocks",
-        where=where,
-    )
+    return replace(surface, material=material, materials=np.array(table))
 
 
 def _lay(

@@ -21,6 +21,7 @@ import numpy as np
 from hexapod_cosim.models.friction import regularised_direction
 from hexapod_cosim.models.records import Array, Foot, Friction, Soil
 
+REACHED = 1e-8  # m  short of the virgin curve: links are off their joints by less
 BISECTIONS = 200  # halvings of an interval, more than doubles resolve
 
 
@@ -182,6 +183,16 @@ def soil_normal_force(soil: Soil, foot: Foot, plastic: float, z: float, dz: floa
         return 0.0
     viscous = soil.damping * contact_area(foot, z) * dz
     return max(elastic_force(soil, foot, plastic, z) + viscous, 0.0)
+
+
+def is_yielding(soil: Soil, foot: Foot, plastic: float, z: float, dz: float) -> bool:
+    """Returns whether a foot that sinks at dz [m/s] presses the soil further.
+
+    At the end of each step that does, the line reaches the curve (eq. 44), so that rounding decides
+    which of them is less.
+    """
+    line = unloading_stiffness(soil, foot) * (z - plastic + REACHED)
+    return dz > 0.0 and virgin_force(soil, foot, z) <= line
 
 
 def soil_normal_slopes(

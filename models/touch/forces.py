@@ -38,6 +38,7 @@ from hexapod_cosim.models.soil.law import (
     shear_limit,
     shear_rate,
     soil_normal_force,
+    soil_radius,
 )
 from hexapod_cosim.models.terrain import faces_of_feet, ground_face, surface_of
 from hexapod_cosim.models.touch.sharing import contact_shares
@@ -63,11 +64,15 @@ class Spot:
         """Whether this may be on soil: all but walls."""
         return self.is_sole or self.face == NEAREST
 
-    def shape(self, robot: Robot) -> Foot:
-        """Returns radius and pad radius of the sphere, as the laws of soil take them."""
+    def shape(self, robot: Robot, side: int) -> Foot:
+        """Returns radius and pad radius of the sphere, as the laws of soil take them.
+
+        side: axis of the torso whose side lies on the soil.
+        """
         if self.leg >= 0:
             return robot.foot
-        return replace(robot.foot, radius=self.sphere.radius, pad_radius=self.sphere.pad_radius)
+        pad = self.sphere.pads[side].radius if self.sphere.pads else 0.0
+        return replace(robot.foot, radius=self.sphere.radius, pad_radius=pad)
 
 
 @dataclass(frozen=True)
@@ -79,6 +84,7 @@ class Held:
     soil: Soil
     damping: float = math.nan  # s/m  d of eq. 14; nan: open
     impact_speed: float = 0.0  # m/s  at the last touch-down
+    side: int = 2  # axis of the torso whose side faced the ground at the last touch-down
 
     @property
     def is_open(self) -> bool:
@@ -133,13 +139,24 @@ def spots(robot: Robot) -> tuple[Spot, ...]:
 
 def own_ground(robot: Robot, spot: Spot) -> Held:
     """Returns an open contact with the ground of the robot file, without the surface's patches."""
-    soil = robot.soil if is_on_soil(spot) else Soil()
-    return Held(robot.contact, _friction_of(robot.friction, spot), soil)
+    return Held(
+        robot.contact, _friction_of(robot.friction, spot), soil_for(robot.soil, robot, spot)
+    )
 
 
-def is_on_soil(spot: Spot) -> bool:
-    """Returns whether a sphere sinks where the ground is soil: points without size do not."""
-    return spot.may_sink and max(spot.sphere.radius, spot.sphere.pad_radius) > 0.0
+def soil_for(soil: Soil, robot: Robot, spot: Spot, side: int = 2) -> Soil:
+    """Returns the soil as a sphere meets it, on a side of the torso; rigid for points without size.
+
+    The laws take b of eq. 40 from the radius of a pad. For the pad of a side of the torso's box,
+    whose b is the side's smaller edge, the cohesive modulus has the ratio of both as a factor.
+    """
+    size = soil_radius(spot.shape(robot, side))
+    if not spot.may_sink or size <= 0.0:
+        return Soil()
+    if soil.law != "bekker" or not spot.sphere.pads or spot.sphere.pads[side].breadth <= 0.0:
+        return soil
+    factor = size / spot.sphere.pads[side].breadth
+    return replace(soil, cohesive_modulus=factor * soil.cohesive_modulus)
 
 
 def _friction_of(friction: Friction, spot: Spot) -> Friction:
@@ -311,7 +328,7 @@ def contact_wrenches(
     g = np.zeros((len(body), 6))
     for k, spot, held, contact in closed_contacts(robot, body, contacts):
         state = body[spot.sphere.body]
-        shape = spot.shape(robot) if held.is_soft else robot.foot
+        shape = spot.shape(robot, held.side) if held.is_soft else robot.foot
         plastic = float(contacts.sunk[k]) if held.is_soft else 0.0
         deflection = bristle[spot.leg] if bristle is not None and spot.is_sole else None
         force = contact_force(shape, held, plastic, contact, deflection, spot.is_sole)

@@ -11,9 +11,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from hexapod_cosim.models.body.contacts import side_on_ground
 from hexapod_cosim.models.body.pairs import pair_contacts
 from hexapod_cosim.models.contact import FootContact, contact_damping
-from hexapod_cosim.models.ground.blocks import Cell, cell_at, outside
+from hexapod_cosim.models.ground.blocks import Cell, cell_at, is_uneven, outside
 from hexapod_cosim.models.ground.surface import LAW, MU, MU_STATIC, STIFFNESS, Surface
 from hexapod_cosim.models.kinematics import LEGS, foot_centres
 from hexapod_cosim.models.records import Array, Robot, Soil
@@ -25,16 +26,21 @@ from hexapod_cosim.models.touch.forces import (
     Spot,
     contacts_at,
     has_soil,
-    is_on_soil,
     open_contacts,
     own_ground,
     shares_of_feet,
+    soil_for,
     sphere_centre,
     spots,
     standing_pairs,
 )
+from hexapod_cosim.models.touch.prints import (
+    LEAST_FOOTPRINT,
+    deepest,
+    footprint_depth,
+    place_of_print,
+)
 
-LEAST_FOOTPRINT = 1e-6  # m  shallower ones are not kept
 SAME_FACE = 1e-6  # m, 1  depth and normal of one contact at both sides of a border between cells
 
 
@@ -69,29 +75,36 @@ def depths_of(robot: Robot, body: Array, contacts: Contacts) -> Depths:
 
 
 def keeps_block(surface: Surface, contacts: Contacts, leg: int, below: Cell) -> bool:
-    """Returns whether a foot in soil is over a block (row, column) not level with its own.
+    """Returns whether a foot in soil or above the bottom of its print is over a block (row, column)
+    not level with its own.
 
-    It was dragged there in its print. It keeps its block until lift-off, as it keeps its material,
-    so that no edge meets it at the depth of its print.
+    It was dragged there in its print. It keeps its block until it has left the print upwards, so
+    that no edge meets it at the depth of its print.
     """
     held, own = contacts.held[leg], contacts.cell[leg]
-    in_soil = held.is_soft and not held.is_open
-    return in_soil and own is not None and surface.height[below] != surface.height[own]
+    in_print = contacts.sunk[leg] > 0.0 or (held.is_soft and not held.is_open)
+    return in_print and own is not None and surface.height[below] != surface.height[own]
 
 
 # touch-down and lift-off
 
 
-def ground_under(robot: Robot, spot: Spot, centre: Array) -> Held:
+def ground_under(robot: Robot, spot: Spot, centre: Array, side: int = 2) -> Held:
     """Returns an open contact with the ground at a sphere's centre (3,), or with its patch.
 
+    side: axis of the torso whose side faces the ground.
+
     A patch with a kinetic coefficient of its own has no static rise unless it gives one. Walls are
-    rigid, of the patch's friction.
+    rigid, of the patch's friction, and for torso, knees and shanks blocks with edges.
     """
-    held, surface = own_ground(robot, spot), surface_of(robot.terrain)
+    surface = surface_of(robot.terrain)
+    x, y = float(centre[0]), float(centre[1])
+    sinks = spot.leg >= 0 or surface is None or not is_uneven(surface, x, y)
+    own = soil_for(robot.soil, robot, spot, side) if sinks else Soil()
+    held = replace(own_ground(robot, spot), soil=own, side=side)
     if surface is None or surface.materials is None:
         return held
-    number = surface.material_at(float(centre[0]), float(centre[1]))
+    number = surface.material_at(x, y)
     if number == 0:
         return held
     row = surface.materials[number - 1]
@@ -104,13 +117,15 @@ def ground_under(robot: Robot, spot: Spot, centre: Array) -> Held:
         held,
         friction=replace(held.friction, mu=mu, mu_static=mu_static),
         contact=replace(robot.contact, stiffness=stiffness),
-        soil=row_soil(row[LAW:]) if is_on_soil(spot) else Soil(),
+        soil=soil_for(row_soil(row[LAW:]), robot, spot, side) if sinks else Soil(),
     )
 
 
-def closed(robot: Robot, spot: Spot, centre: Array, impact_speed: float) -> Held:
-    """Returns the contact of a sphere that touches down at a speed [m/s]."""
-    held, damping = ground_under(robot, spot, centre), contact_damping(robot.contact, impact_speed)
+def closed(robot: Robot, spot: Spot, body: Array, impact_speed: float) -> Held:
+    """Returns the contact of a sphere that touches down at a speed [m/s], at bodies (19, 13)."""
+    sphere, damping = spot.sphere, contact_damping(robot.contact, impact_speed)
+    side = side_on_ground(robot, sphere, body[sphere.body]) if sphere.pads else 2
+    held = ground_under(robot, spot, sphere_centre(spot, body), side)
     return replace(held, damping=damping, impact_speed=impact_speed)
 
 
@@ -123,23 +138,23 @@ def start_contacts(robot: Robot, body: Array) -> Contacts:
     held, sunk = list(contacts.held), contacts.sunk.copy()
     for k, spot in enumerate(spots(robot)):
         if depths.delta[k] > 0.0:
-            held[k] = closed(robot, spot, sphere_centre(spot, body), 0.0)
+            held[k] = closed(robot, spot, body, 0.0)
             if held[k].is_soft:
                 depth = float(depths.delta[k])
-                sunk[k] = plastic_depth(held[k].soil, spot.shape(robot), depth)
+                sunk[k] = plastic_depth(held[k].soil, spot.shape(robot, held[k].side), depth)
     pairs = standing_pairs(robot, body)
     contacts = replace(contacts, held=tuple(held), sunk=sunk, pairs=pairs)
     return hold_cells(robot, body, contacts)
 
 
 def hold_cells(robot: Robot, body: Array, contacts: Contacts) -> Contacts:
-    """Holds the cells of feet that touch blocks, and releases those of others."""
+    """Holds the cells of feet that touch blocks or are in their prints, and releases others."""
     surface = surface_of(robot.terrain)
     if surface is None or not has_cells(robot):
         return contacts
     cells: list[Cell | None] = []
     for leg, (x, y, _) in enumerate(foot_centres(robot, body).tolist()):
-        touches = any(
+        touches = contacts.sunk[leg] > 0.0 or any(
             spot.leg == leg and not held.is_open
             for spot, held in zip(spots(robot), contacts.held, strict=True)
         )
@@ -156,13 +171,16 @@ def switch_contacts(
     """
     delta = depths.delta
     if has_soil(robot):
+        before = contacts.sunk[:LEGS] > 0.0
         contacts, delta = tread(robot, body, contacts, delta)
+        if np.any(before != (contacts.sunk[:LEGS] > 0.0)):
+            contacts = hold_cells(robot, body, contacts)
     held, touchdowns = list(contacts.held), 0
     walls = has_cells(robot)
     found = contacts_at(robot, body, contacts) if walls else []
     for k, spot in enumerate(spots(robot)):
         if held[k].is_open and delta[k] > 0.0:
-            now = closed(robot, spot, sphere_centre(spot, body), float(depths.ddelta[k]))
+            now = closed(robot, spot, body, float(depths.ddelta[k]))
             held[k] = _continued(robot, contacts, k, found, now) if walls else now
             touchdowns += 1
         elif not held[k].is_open and delta[k] <= 0.0:
@@ -213,21 +231,6 @@ def _continued(
 # soil
 
 
-def deepest(start: float, slope_start: float, end: float, slope_end: float) -> float:
-    """Returns the largest value on [0, 1] of the cubic with these ends and slopes (eq. 28)."""
-    if not (slope_start > 0.0 and slope_end < 0.0):
-        return max(start, end)
-    bend = slope_start + slope_end - 2.0 * (end - start)
-    curve = end - start - slope_start - bend
-    low, high = 0.0, 1.0
-    for _ in range(60):
-        x = 0.5 * (low + high)
-        rises = slope_start + x * (2.0 * curve + 3.0 * x * bend) > 0.0
-        low, high = (x, high) if rises else (low, x)
-    top = start + low * (slope_start + low * (curve + low * bend))
-    return max(top, start, end)
-
-
 def yield_soil(robot: Robot, contacts: Contacts, h: float, before: Depths, after: Depths) -> Array:
     """Returns the plastic depths (n,) of all spheres [m] at the end of a step of h [s] (eq. 44).
 
@@ -241,7 +244,8 @@ def yield_soil(robot: Robot, contacts: Contacts, h: float, before: Depths, after
         from_, to = (float(ends.delta[k] + sunk[k]) for ends in (before, after))
         slopes = (h * float(before.ddelta[k]), h * float(after.ddelta[k]))
         depth = deepest(from_, slopes[0], to, slopes[1])
-        sunk[k] = max(sunk[k], plastic_depth(held.soil, spot.shape(robot), depth))
+        shape = spot.shape(robot, held.side)
+        sunk[k] = max(sunk[k], plastic_depth(held.soil, shape, depth))
     return sunk
 
 
@@ -258,15 +262,15 @@ def tread(robot: Robot, body: Array, contacts: Contacts, delta: Array) -> tuple[
         z, held, centre = delta[k] + sunk[k], contacts.held[k], sphere_centre(spot, body)
         if not held.is_open:
             if delta[k] <= 0.0:
-                place[k] = centre[:2]
+                place[k] = place_of_print(robot, contacts, spot, centre)
             continue
         if z <= 0.0:
             if sunk[k] >= LEAST_FOOTPRINT:
-                new = [*place[k], sunk[k], soil_radius(spot.shape(robot))]
+                new = [*place[k], sunk[k], soil_radius(spot.shape(robot, held.side))]
                 prints = np.vstack([prints, new])
             sunk[k] = 0.0
         elif sunk[k] == 0.0 and ground_under(robot, spot, centre).is_soft:
-            sunk[k] = footprint_depth(prints, centre)
+            sunk[k] = footprint_depth(prints, centre, surface_of(robot.terrain))
         delta[k] = z - sunk[k]
     return replace(contacts, sunk=sunk, place=place, footprints=prints), delta
 
@@ -277,12 +281,6 @@ def _in_order_of_prints(robot: Robot) -> list[tuple[int, Spot]]:
     """
     spheres = [(k, spot) for k, spot in enumerate(spots(robot)) if spot.may_sink]
     return sorted(spheres, key=lambda numbered: numbered[1].sphere.name == "torso")
-
-
-def footprint_depth(footprints: Array, centre: Array) -> float:
-    """Returns the depth [m] of the deepest footprint around a point; 0 outside of all."""
-    away = np.hypot(footprints[:, 0] - centre[0], footprints[:, 1] - centre[1])
-    return float(np.max(footprints[away <= footprints[:, 3], 2], initial=0.0))
 
 
 # blocks
@@ -306,7 +304,7 @@ def cross_cells(robot: Robot, body: Array, contacts: Contacts, depths: Depths) -
     closed = [j for j, held in enumerate(contacts.held) if not held.is_open]
     placed = [(spots(robot)[j], contacts.held[j], before[j]) for j in closed]
     share = dict(zip(closed, shares_of_feet(robot, placed).tolist(), strict=True))
-    feet, held, sunk = spots(robot), list(contacts.held), contacts.sunk.copy()
+    feet, held = spots(robot), list(contacts.held)
     for k, spot in enumerate(feet):
         if spot.leg not in gone:
             continue
@@ -316,9 +314,7 @@ def cross_cells(robot: Robot, body: Array, contacts: Contacts, depths: Depths) -
             if same and j in share and share[j] > largest:
                 largest = share[j]
                 held[k] = taken_over(contacts.held[j], other, spot, held[k])
-        if spot.is_sole and held[k].is_open:
-            sunk[k] = 0.0  # the new cell is undisturbed
-    return replace(moved, held=tuple(held), sunk=sunk)
+    return replace(moved, held=tuple(held))
 
 
 def is_same_face(a: FootContact, b: FootContact) -> bool:

@@ -81,16 +81,16 @@ static void set_ground(const hxModel *model, const double *material, int row, in
 }
 
 /* Sets the soil of a contact to that of a material, NULL: of the definition. */
-static void set_soil(const hxModel *model, const double *material, int row, int slot,
+static void set_soil(const hxModel *model, const double *material, int row, int slot, int shape,
                      hxContactState *contact) {
   const int soft = hx_soil_row(row);
+  const hxSoilShape is = {model->radius[row], model->pad_radius[shape], model->breadth[shape]};
   hxSoil soil;
   double numbers[HX_SOIL_SIZE];
   if (material)
-    hx_soil_from_row(material + HX_MATERIAL_SOIL, model->radius[row], model->pad_radius[soft],
-                     &soil);
+    hx_soil_from_row(material + HX_MATERIAL_SOIL, &is, &soil);
   else
-    memcpy(&soil, model->soil[soft], sizeof soil);
+    memcpy(&soil, model->soil[shape], sizeof soil);
   /* a point without size meets rigid ground: soil has no pressure on it */
   contact->on_soil[soft][slot] = (int)soil.law != HX_SOIL_NONE && soil.radius > 0.0 ? 1.0 : 0.0;
   memcpy(numbers, &soil, sizeof soil);
@@ -112,12 +112,30 @@ static const double *material_under(const hxModel *model, const hxDepths *depths
   return hx_terrain_material(model->terrain, centre);
 }
 
+int hx_may_sink_at(const hxModel *model, int row, const double centre[3]) {
+  return hx_may_sink(row) &&
+         (row == HX_FOOT || !model->terrain || !hx_terrain_is_uneven(model->terrain, centre));
+}
+
+/* Sets whether a contact is on soil, and on which. */
+static void choose_soil(const hxModel *model, const hxDepths *depths, const double *material,
+                        int row, int slot, hxContactState *contact) {
+  double centre[3] = {0.0};
+  if (model->terrain) centre_of(depths, row, slot, centre);
+  if (hx_may_sink_at(model, row, centre))
+    set_soil(model, material, row, slot,
+             hx_soil_shape(row, row == HX_TORSO ? depths->side[slot] : 0), contact);
+  else
+    contact->on_soil[hx_soil_row(row)][slot] = 0.0;
+}
+
 /* Closes a contact: fixes its damping by the impact speed, m/s, and its ground by its place. */
 static void close_contact(const hxModel *model, const hxDepths *depths, int row, int slot,
                           double impact_speed, hxContactState *contact) {
   const double *material = material_under(model, depths, row, slot);
   set_ground(model, material, row, slot, contact);
-  if (model->has_soil && hx_may_sink(row)) set_soil(model, material, row, slot, contact);
+  if (model->has_soil && hx_may_sink(row))
+    choose_soil(model, depths, material, row, slot, contact);
   contact->closed[row][slot] = 1.0;
   contact->impact_speed[row][slot] = impact_speed;
   contact->damping[row][slot] = hx_contact(model->contact_law)->damping(model, impact_speed);
@@ -142,11 +160,13 @@ static void fill_contact_slots(hxContactState *contact, int row) {
   for (int i = 0; i < HX_SOIL_SIZE; ++i) hx_fill_slots(contact->soil[hx_soil_row(row)][i]);
 }
 
-/* Holds the cells of feet that touch the ground, and releases those of others. */
+/* Holds the cells of feet that touch the ground or are in their prints, and releases those of
+ * others. */
 static void hold_cells(const hxModel *model, const hxDepths *depths, hxContactState *contact) {
   for (int leg = 0; leg < HX_LEGS; ++leg) {
     int touches = 0;
     for (int row = HX_FOOT; hx_is_of_foot(row); ++row) touches |= contact->closed[row][leg] != 0.0;
+    touches |= contact->plastic[hx_soil_row(HX_FOOT)][leg] > 0.0;
     double centre[3];
     centre_of(depths, HX_FOOT, leg, centre);
     double cell[2] = {contact->cell[0][leg], contact->cell[1][leg]};

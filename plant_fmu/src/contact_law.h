@@ -29,6 +29,10 @@ void hx_contact_start(const hxModel *model, const hxDepths *depths, hxContactSta
 /* Returns whether feet stand on cells of blocks. */
 int hx_has_cells(const hxModel *model);
 
+/* Returns whether a row's contact sinks where the ground at its centre is soil: on blocks with
+ * edges feet alone do. */
+int hx_may_sink_at(const hxModel *model, int row, const double centre[3]);
+
 /* Moves the held cells of feet that have left them to those that they are over; returns a bit for
  * each leg that did. */
 int hx_contact_cross(const hxModel *model, const hxDepths *depths, hxContactState *contact);

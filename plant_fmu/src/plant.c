@@ -88,21 +88,6 @@ static hxStatus check_valleys(hxPlant *plant, const hxDefinition *d, char *messa
   return HX_INVALID_MODEL;
 }
 
-/* Fails if the definition's soil lies on blocks with edges: a foot that has sunk beside an edge
- * would meet it at a finite depth, with a jump of the force. */
-static hxStatus check_soil_of_blocks(const hxPlant *plant, const hxDefinition *d, char *message) {
-  double place[2];
-  if (d->soil.law == HX_SOIL_NONE || !hx_terrain_uneven_block(plant->terrain, place)) return HX_OK;
-  hx_print(
-      message, HX_MESSAGE_SIZE,
-      "terrain.grid: soil with edges: got a soft block at x = %.4g m, y = %.4g m that is "
-      "higher or lower than a neighbour, expected soil on a smooth surface or on level blocks; "
-      "choose a smooth or level surface, or set soil.law to none and lay patches of soil on "
-      "level blocks",
-      place[0], place[1]);
-  return HX_INVALID_MODEL;
-}
-
 /* Returns whether a definition's ground is there and suits its contacts; else writes why not. */
 static hxStatus check_terrain(hxPlant *plant, const hxDefinition *d, char *message) {
   if (d->terrain.kind != HX_TERRAIN_GRID) return HX_OK;
@@ -117,7 +102,7 @@ static hxStatus check_terrain(hxPlant *plant, const hxDefinition *d, char *messa
   const double cell = hx_terrain_cell_size(plant->terrain);
   if (hx_terrain_surface(plant->terrain) == HX_SURFACE_SMOOTH)
     return check_valleys(plant, d, message);
-  if (cell >= 2.0 * radius) return check_soil_of_blocks(plant, d, message);
+  if (cell >= 2.0 * radius) return HX_OK;
   hx_print(message, HX_MESSAGE_SIZE,
            "terrain.grid: got blocks with cells of %.9g m, expected at least %.9g m, twice the "
            "largest radius that touches them; resample the grid, or reduce foot.radius",

@@ -46,6 +46,10 @@ enum {
  * the ground below them, of knees, of shanks and of the torso (hx_soil_row). */
 enum { HX_SOIL_SIZE = 16, HX_SOIL_ROWS = 4 };
 
+/* Shapes in soil: one of each row, of the torso's corners one for each axis to which the side of
+ * the box that lies on the soil is normal. */
+enum { HX_SOIL_SHAPES = HX_SOIL_ROWS + 2 };
+
 /* Offsets of position, quaternion, velocity and angular velocity in a body state. */
 enum { HX_R = 0, HX_P = 3, HX_V = 7, HX_W = 10 };
 
@@ -134,9 +138,10 @@ typedef struct hxModel {
   hxHeat heat;
   double bus_period, command_step; /* s, rad  0 in kinematic mode */
   double ground_point[3], ground_normal[3];
-  double soil[HX_SOIL_ROWS][HX_SOIL_SIZE]; /* hxSoil of each row, of the definition */
+  double soil[HX_SOIL_SHAPES][HX_SOIL_SIZE]; /* hxSoil of each shape, of the definition */
   double bristle_length;                   /* m  presliding, or shear displacement of the soil */
-  double pad_radius[HX_SOIL_ROWS];         /* m  on soil; 0: spheres */
+  double pad_radius[HX_SOIL_SHAPES];       /* m  of discs of the pads' areas; 0: spheres */
+  double breadth[HX_SOIL_SHAPES];          /* m  b of eq. 40; 0: the radius */
   double step, tolerance, step_max;
   double load_threshold; /* N  a foot with a larger load counts its slip */
 } hxModel;
@@ -189,6 +194,8 @@ typedef struct hxDepths {
   /* on a grid only */
   double centre[HX_GROUND_ROWS][3][HX_SLOTS]; /* m  of spheres, world axes; of feet in HX_FOOT */
   double outside[HX_SLOTS]; /* m  how far a foot is outside of the cell that is held for it */
+  /* where contacts close on soil only */
+  int side[HX_SLOTS]; /* axis (0 to 2) of the torso whose side faces the ground at a corner */
 } hxDepths;
 
 /* A row of contacts at one end of a step. World axes; for pairs of legs the next leg is the ground.
@@ -346,6 +353,11 @@ static inline int hx_may_sink(int row) {
 
 /* Returns the index of such a row in arrays of HX_SOIL_ROWS. */
 static inline int hx_soil_row(int row) { return row == HX_FOOT ? 0 : 1 + row - HX_KNEE; }
+
+/* Returns the shape of a row, of the torso that on a side. */
+static inline int hx_soil_shape(int row, int side) {
+  return hx_soil_row(row) + (row == HX_TORSO ? side : 0);
+}
 
 /* Makes the penetrations of a model's rows relative to the depth at which they touch the ground. */
 static inline void hx_depths_on_soil(const hxModel *model, const hxContactState *contact,

@@ -82,18 +82,49 @@ def depths(plant: Plant) -> Array:
 
 
 @pytest.mark.parametrize(
-    ("soil", "depth"), [("dry_sand", 1.14538e-3), ("lunar", 1.06855e-3), ("granular", 8.9765e-4)]
+    ("soil", "depth"), [("dry_sand", 1.15128e-3), ("lunar", 1.08441e-3), ("granular", 8.97647e-4)]
 )
 def test_an_upturned_robot_sinks_to_the_closed_form(core: ct.CDLL, soil: str, depth: float) -> None:
-    """Each of four corners bears a quarter of the weight, on a pad of a quarter of the box."""
+    """Each of four corners bears a quarter of the weight, on a pad of a quarter of the box, with b
+    the smaller edge of the box of 0.34 m x 0.18 m.
+    """
     robot = changed(on_soil(soil), soil={"damping": 3e4})
     plant = dropped(core, robot, FOLDED, 0.0401, quaternion=UPTURNED)
     output = lowered(plant, FOLDED)
     assert output.torso.contact_force[2] == pytest.approx(WEIGHT, rel=1e-5)
-    expected = law.sinkage(robot.soil, shaped(0.01, PAD), WEIGHT / 4.0)
     found = depths(plant)
-    assert found[found > 0.0] == pytest.approx(np.full(4, expected), rel=1e-4)
-    assert expected == pytest.approx(depth, rel=1e-3)
+    assert found[found > 0.0] == pytest.approx(np.full(4, depth), rel=1e-4)
+
+
+@pytest.mark.parametrize("soil", ["sandy_loam", "lete_sand"])
+@pytest.mark.parametrize(
+    ("turned", "area", "breadth"),
+    [
+        ((0.0, 1.0), 0.70 * 0.60 / 4.0, 0.60),
+        ((1.0, 0.0), 1.00 * 0.60 / 4.0, 0.60),
+        (None, 0.70 * 1.00 / 4.0, 0.70),
+    ],
+)
+def test_a_box_sinks_with_the_area_and_the_smaller_edge_of_the_side_on_which_it_lies(
+    core: ct.CDLL, soil: str, turned: tuple[float, float] | None, area: float, breadth: float
+) -> None:
+    """A box of 1.0 m x 0.7 m x 0.6 m around the robot, on each of three sides: its corners bear
+    the weight by the law of Bekker at their own depths.
+    """
+    robot = changed(on_soil(soil), soil={"damping": 1e5})
+    robot = changed(robot, body={"torso_box": (0.5, 0.35, 0.3), "torso_centre": (0.0, 0.0, 0.0)})
+    half = math.sqrt(0.5)
+    quaternion = UPTURNED if turned is None else np.array([half, *np.multiply(half, turned), 0.0])
+    edge = 0.3 if turned is None else 0.5 if turned[1] else 0.35
+    plant = dropped(core, robot, FOLDED, edge + 0.010001, quaternion=quaternion)
+    output = lowered(plant, FOLDED)
+    assert output.torso.contact_force[2] == pytest.approx(WEIGHT, rel=1e-4)
+    found = depths(plant)
+    pressed = found[found > 0.0]
+    bekker = robot.soil.cohesive_modulus / breadth + robot.soil.frictional_modulus
+    assert len(pressed) == 4
+    carried = area * bekker * float(np.sum(pressed**robot.soil.exponent))
+    assert carried == pytest.approx(WEIGHT, rel=2e-4)
 
 
 def test_a_kneeling_robot_sinks_on_its_knees_as_spheres(core: ct.CDLL) -> None:

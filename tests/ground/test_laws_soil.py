@@ -10,22 +10,16 @@ from typing import Any
 
 import numpy as np
 import pytest
-from grids import BLOCKS, Ground, grid_bytes, on_grid, start_on_grid
-from mirror import INVALID_MODEL
+from grids import BLOCKS, Ground, grid_bytes, on_grid
 from plant import Plant, PlantError, pointer
 from states import changed
 
-from hexapod_cosim.models import Robot, RobotError, load_robot
-from hexapod_cosim.models.actuator import gear_friction
+from hexapod_cosim.models import Robot, load_robot
 from hexapod_cosim.models.dynamics import Command
-from hexapod_cosim.models.ground.grid_file import grid_bytes as file_of
-from hexapod_cosim.models.ground.patches import material_row
-from hexapod_cosim.models.ground.surface import Surface
-from hexapod_cosim.models.records import Array, Terrain
+from hexapod_cosim.models.records import Array
 from hexapod_cosim.models.soil import law
 from hexapod_cosim.models.soil.presets import soil_preset
 from hexapod_cosim.models.statics import standing
-from hexapod_cosim.models.validation import check_settings
 
 REST = 1e-9  # relative: forces of the law at the plant's own depths
 SINKING = 1e-4  # relative: what is left to sink after three seconds
@@ -136,25 +130,6 @@ def test_the_forces_on_feet_are_those_of_the_model(core: ct.CDLL, name: str) -> 
     assert pressed > 40
 
 
-@pytest.mark.parametrize("name", ["dry_sand", "mud"])
-def test_the_power_lost_is_what_shear_and_gears_take(core: ct.CDLL, name: str) -> None:
-    """The torso is pushed to the side. What sinking feet lose is at most f_n times their speed."""
-    plant, lost = placed(core, on_soil(name), 0.0), 51
-    side = Command(angle_ref=plant.robot.stance, push_force=np.array([0.0, 30.0, 0.0]))
-    for k in range(1, 101):
-        plant.step(0.01 * k, Command(angle_ref=plant.robot.stance))
-    for k in range(1, 6):
-        plant.step(1.0 + 0.01 * k, side)
-        out = plant.output(side)
-        force, velocity = np.array(out.foot.force), np.array(out.foot.velocity)
-        shear = -float(np.sum(force[:, :2] * velocity[:, :2]))
-        gears = -float(np.sum(gear_friction(plant.robot.servo, out.speed) * out.speed))
-        sinking = float(np.sum(np.abs(force[:, 2] * velocity[:, 2])))
-        assert abs(plant.rates(side)[lost] - shear - gears) <= sinking + 1e-9
-        assert shear > sinking
-    assert shear > 0.01  # W
-
-
 @pytest.mark.parametrize("name", ["dry_sand", "clay", "lunar", "poppy_seed_close", "mud"])
 def test_the_energy_balance_of_a_walk_on_soil_holds(core: ct.CDLL, name: str) -> None:
     residuals = []
@@ -259,75 +234,6 @@ def test_a_soil_of_a_grids_table_is_the_same_as_that_of_the_definition(core: ct.
     assert there.torso.position == pytest.approx(here.torso.position, abs=1e-9)
     assert there.foot.sinkage == pytest.approx(here.foot.sinkage, abs=1e-9)
     assert np.max(there.foot.sinkage) > 0.001
-
-
-def test_soil_on_blocks_that_are_not_level_is_refused(core: ct.CDLL) -> None:
-    row = np.concatenate([[np.nan] * 3, law.table_row(soil_preset("dry_sand").soil)])
-    height, soft = np.zeros((5, 5)), np.zeros((5, 5))
-    soft[2, 2] = 1.0
-    for place, refused in ((0, False), (1, True), (3, True), (4, False)):
-        stepped = height.copy()
-        stepped[2, place] = -0.1
-        file = grid_bytes(stepped, cell=0.5, kind=BLOCKS, material=soft, table=row[None])
-        if refused:
-            with pytest.raises(ValueError, match=r"material\[2\]\[2\].*level blocks"):
-                Ground(core, file)
-        else:
-            Ground(core, file)
-
-
-def stepped(row: int, column: int) -> Surface:
-    """Returns 5 x 5 blocks of 0.5 m, of which one is 0.1 m lower; (-1, -1): they are level."""
-    height = np.zeros((5, 5))
-    if row >= 0:
-        height[row, column] = -0.1
-    return Surface(kind="blocks", height=height, x0=-1.0, y0=-1.5, cell=0.5)
-
-
-@pytest.mark.parametrize(
-    ("place", "middle"),
-    [((0, 0), (-0.75, -1.25)), ((2, 3), (0.25, -0.75)), ((4, 4), (0.75, 0.25)), ((-1, -1), None)],
-)
-def test_soil_of_the_robot_on_blocks_with_an_edge_is_refused_with_the_words_of_robot_files(
-    core: ct.CDLL, place: tuple[int, int], middle: tuple[float, float] | None
-) -> None:
-    """A foot that has sunk beside an edge would meet it at a finite depth: a foot of 15 mm that was
-    pushed over an edge of 30 mm was thrown back by 11.8 J that no source gave.
-    """
-    robot, surface = on_soil("dry_sand"), stepped(*place)
-    ground = Ground(core, file_of(surface))
-    plant = Plant(core, robot)
-    before = plant.save()
-    there = replace(robot, terrain=Terrain(kind="grid", surface=surface))
-    if middle is None:
-        check_settings(there)
-        start_on_grid(plant, ground, position=(0.0, 0.0, 0.5))
-        return
-    with pytest.raises(RobotError) as twin:
-        check_settings(there)
-    with pytest.raises(PlantError) as refused:
-        start_on_grid(plant, ground, position=(0.0, 0.0, 0.5))
-    assert refused.value.status == INVALID_MODEL
-    assert plant.save() == before
-    words = [str(e.value).partition("soil with edges")[2].split() for e in (refused, twin)]
-    assert words[0] == [word.replace("'", "") for word in words[1]]
-    assert f"x = {middle[0]:g} m, y = {middle[1]:g} m" in str(refused.value)
-    rigid = replace(there, soil=load_robot("athena").soil)
-    check_settings(rigid)
-    carried = Plant(core, replace(rigid, terrain=Terrain(kind="flat")))
-    start_on_grid(carried, ground, position=(0.0, 0.0, 0.5))
-
-
-def test_soil_of_the_robot_may_lie_beside_rigid_patches_with_edges(core: ct.CDLL) -> None:
-    """The patch covers the lower block and its neighbours; the blocks around them are level."""
-    robot, surface = on_soil("dry_sand"), stepped(0, 0)
-    material = np.zeros((5, 5), dtype=np.uint8)
-    material[:2, :2] = 1
-    table = material_row({"mu": 0.5})[None]
-    surface = replace(surface, material=material, materials=table)
-    check_settings(replace(robot, terrain=Terrain(kind="grid", surface=surface)))
-    plant = Plant(core, robot)
-    start_on_grid(plant, Ground(core, file_of(surface)), position=(0.0, 0.0, 0.5))
 
 
 @pytest.mark.parametrize("pad", [0.0, 0.025])

@@ -269,7 +269,6 @@ REFUSED: list[tuple[str, dict[str, Any], str]] = [
     ("rubble", {"patch": [{"x": 1.9, "y": 0.0, "size": 1.0, "mu": 0.1}]}, "leaves the map"),
     ("rubble", {"patch": [{"x": 0.0, "y": 0.0, "size": 0.01, "mu": 0.1}]}, "smaller than"),
     ("rubble", {"patch": [{"x": 0.0, "y": 0.0, "size": 1.0, "soil": "dry_send"}]}, "'dry_sand'"),
-    ("rubble", {"patch": [{"x": 0.0, "y": 0.0, "size": 1.0, "soil": "dry_sand"}]}, "with edges"),
     ("sand", {"soil": "moon"}, "unknown soil"),
     ("heightfield", {}, "file"),
     ("stairs", {"size": 0.2}, r"covers the whole map: got 'size 0\.2 m.*at least 0\.9 m"),

@@ -244,11 +244,12 @@ HX_API void hx_probe_power(const double *x, const double *y, double *power, doub
  * base and its slope; row NULL: from the definition. */
 HX_API void hx_probe_soil(const hxSoilDefinition *definition, const double *row, double radius,
                           double pad, double plastic, double z, double dz, double out[11]) {
+  const hxSoilShape shape = {radius, pad, 0.0};
   hxSoil soil;
   if (row)
-    hx_soil_from_row(row, radius, pad, &soil);
+    hx_soil_from_row(row, &shape, &soil);
   else
-    hx_soil_compile(definition, radius, pad, &soil);
+    hx_soil_compile(definition, &shape, &soil);
   const hxSoilCurve virgin = hx_soil_virgin(&soil, z), base = hx_soil_shear_base(&soil, z);
   const hxSoilForce force = hx_soil_normal_force(&soil, plastic, z, dz);
   out[0] = virgin.force, out[1] = virgin.slope, out[2] = hx_soil_plastic_depth(&soil, z);
@@ -267,11 +268,11 @@ HX_API void hx_probe_footprints(double depth[3][4]) {
   for (int k = 0; k < 1500; ++k)
     hx_footprints_add(&log, &(hxFootprint){k, 0.0, 1e-3 * (k + 1), 0.4});
   hx_footprints_begin(&log);
-  for (int i = 0; i < 4; ++i) depth[0][i] = hx_footprints_depth(&log.kept, place[i], 0.0);
+  for (int i = 0; i < 4; ++i) depth[0][i] = hx_footprints_depth(&log.kept, NULL, place[i], 0.0);
   for (int k = 0; k < 100; ++k) hx_footprints_add(&log, &(hxFootprint){k, 0.0, 2.0, 0.4});
-  for (int i = 0; i < 4; ++i) depth[1][i] = hx_footprints_depth(&log.kept, place[i], 0.0);
+  for (int i = 0; i < 4; ++i) depth[1][i] = hx_footprints_depth(&log.kept, NULL, place[i], 0.0);
   hx_footprints_take_back(&log);
-  for (int i = 0; i < 4; ++i) depth[2][i] = hx_footprints_depth(&log.kept, place[i], 0.0);
+  for (int i = 0; i < 4; ++i) depth[2][i] = hx_footprints_depth(&log.kept, NULL, place[i], 0.0);
 }
 
 HX_API double hx_probe_atan2(double y, double x) { return hx_atan2(y, x); }

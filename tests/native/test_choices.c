@@ -147,7 +147,9 @@ static const hxChoice choices[] = {{"nothing", nothing, 0, 0.01},
                                    {"soil on a grid", soil_on_grid, 1, 0.01},
                                    {"soil on level blocks", soil_on_grid, 4, 0.01},
                                    {"bekker on a grid", bekker_on_grid, 1, 0.01},
-                                   {"bekker on level blocks", bekker_on_grid, 4, 0.01}};
+                                   {"bekker on level blocks", bekker_on_grid, 4, 0.01},
+                                   {"soil on blocks", soil_on_grid, 2, 0.01},
+                                   {"bekker on blocks", bekker_on_grid, 2, 0.01}};
 
 /* ---- walks ---- */
 
@@ -408,23 +410,6 @@ static void contradictions_are_refused_by_name(void) {
   hx_plant_destroy(plant);
 }
 
-/* Soil on blocks that are higher or lower than a neighbour is refused at the reset. */
-static void soil_with_edges_is_refused_by_name(void) {
-  hxPlant *plant = hx_plant_create();
-  hxDefinition d;
-  hx_definition_default(&d);
-  on_grid(&d);
-  for (int grid = 1; grid < FILES; ++grid) {
-    hx_plant_set_terrain(plant, terrain[grid]);
-    d.soil.law = HX_SOIL_NONE;
-    CHECK(hx_plant_reset(plant, &d, 0.0) == HX_OK);
-    bekker(&d);
-    CHECK(hx_plant_reset(plant, &d, 0.0) == HX_INVALID_MODEL);
-    CHECK(strstr(hx_plant_message(plant), "soil with edges") != NULL);
-  }
-  hx_plant_destroy(plant);
-}
-
 /* Creates a copy of a grid file with all heights 0. */
 static hxTerrain *levelled(unsigned char *bytes, size_t size) {
   enum { HEAD = 128 };
@@ -458,7 +443,6 @@ int main(int arguments, char *argument[]) {
   grids_may_be_raised();
   long_steps_are_stable();
   contradictions_are_refused_by_name();
-  soil_with_edges_is_refused_by_name();
   for (int k = 0; k < GRIDS; ++k) hx_terrain_destroy(terrain[k]);
   return failures != 0;
 }

@@ -10,15 +10,15 @@
 
 _Static_assert(sizeof(hxSoils) == sizeof(hxSoil), "a soil consists of the same numbers");
 
-void hx_soil_compile(const hxSoilDefinition *d, double foot_radius, double pad_radius,
-                     hxSoil *soil) {
+void hx_soil_compile(const hxSoilDefinition *d, const hxSoilShape *shape, hxSoil *soil) {
   double sine, cosine;
   memset(soil, 0, sizeof *soil);
   soil->law = d->law;
-  soil->pad = pad_radius > 0.0 ? 1.0 : 0.0;
-  soil->radius = pad_radius > 0.0 ? pad_radius : foot_radius;
+  soil->pad = shape->pad_radius > 0.0 ? 1.0 : 0.0;
+  soil->radius = shape->pad_radius > 0.0 ? shape->pad_radius : shape->radius;
+  const double breadth = shape->breadth > 0.0 ? shape->breadth : soil->radius;
   soil->area = pi * (soil->radius * soil->radius);
-  soil->modulus = d->cohesive_modulus / soil->radius + d->frictional_modulus;
+  soil->modulus = d->cohesive_modulus / breadth + d->frictional_modulus;
   soil->exponent = d->exponent;
   soil->down = d->resistance * d->alpha_down;
   soil->side = d->resistance * d->alpha_side;
@@ -31,7 +31,7 @@ void hx_soil_compile(const hxSoilDefinition *d, double foot_radius, double pad_r
   soil->damping = d->damping;
 }
 
-void hx_soil_from_row(const double row[13], double foot_radius, double pad_radius, hxSoil *soil) {
+void hx_soil_from_row(const double row[13], const hxSoilShape *shape, hxSoil *soil) {
   const int law = HX_SOIL_NONE + (int)row[0];
   const hxSoilDefinition d = {.law = law,
                               .frictional_modulus = row[1],
@@ -52,7 +52,7 @@ void hx_soil_from_row(const double row[13], double foot_radius, double pad_radiu
     soil->law = law;
     return;
   }
-  hx_soil_compile(&d, foot_radius, pad_radius, soil);
+  hx_soil_compile(&d, shape, soil);
   soil->friction = row[5];
 }
 
@@ -106,9 +106,36 @@ hxSoilCurve hx_soil_shear_base(const hxSoil *soil, double z) {
   return curve_of(hx_shear_base(&soils, z));
 }
 
+/* Returns the second derivative of the integral of eq. 41, times a pressure modulus, z > 0. */
+static double bend_of_columns(const hxSoil *soil, double modulus, double n, double z) {
+  const double R = soil->radius, p = hx_pow(z, n);
+  if (soil->pad > 0.0) return modulus * soil->area * n * (n - 1.0) * p / (z * z);
+  const double above = z > R ? hx_pow(z - R, n) : 0.0;
+  return 2.0 * pi * modulus * (p * (n * R / z - 1.0) + above);
+}
+
+/* Returns the second derivative of F_v, N/m2, z > 0. */
+static double virgin_bend(const hxSoil *soil, double z) {
+  const double R = soil->radius, rest = fmax(1.0 - z / R, 0.0);
+  if ((int)soil->law == HX_SOIL_BEKKER)
+    return bend_of_columns(soil, soil->modulus, soil->exponent, z);
+  if ((int)soil->law == HX_SOIL_MUD)
+    return bend_of_columns(soil, soil->yield, 0.0, z) +
+           bend_of_columns(soil, soil->hardening, 1.0, z);
+  if (soil->pad > 0.0 || rest == 0.0) return 0.0;
+  return 2.0 * pi * R * (soil->side + (soil->down - soil->side) * (rest * rest));
+}
+
 hxSoilContact hx_soil_contact(const hxSoil *soil, double plastic, double z, double dz) {
   const hxSoils soils = only(soil);
-  const hxSoilContacts at = hx_soil_contacts(&soils, plastic, z, dz, hx_virgin(&soils, z));
-  return (hxSoilContact){force_of(at.normal), curve_of(at.held), curve_of(at.stored),
-                         curve_of(at.hold)};
+  const hxSoilCurves virgin = hx_virgin(&soils, z);
+  const hxSoilContacts at = hx_soil_contacts(&soils, plastic, z, dz, virgin);
+  hxSoilForce normal = force_of(at.normal);
+  hxSoilCurve held = curve_of(at.held);
+  if (plastic < z && hx_is_yielding(&soils, plastic, z, dz, virgin.force)) {
+    held.slope += normal.elastic * virgin_bend(soil, z) / soil->unloading;
+    if (normal.force > 0.0)
+      normal.stiffness += normal.slope - elastic(&soils, plastic, z, virgin).slope;
+  }
+  return (hxSoilContact){normal, held, curve_of(at.stored), curve_of(at.hold)};
 }

@@ -16,8 +16,8 @@ HX_HIDDEN_BEGIN
 typedef struct hxSoil {
   double law;                /* hxSoilLaw */
   double pad;                /* 1       1: flat pad; 0: sphere */
-  double radius;             /* m       b: of the pad or the sphere */
-  double area;               /* m2      A = pi b^2 */
+  double radius;             /* m       of the pad or the sphere */
+  double area;               /* m2      A = pi radius^2 */
   double modulus, exponent;  /* bekker: k, n */
   double down, side, ahead;  /* N/m3    granular: resistances per depth */
   double yield, hardening;   /* Pa, Pa/m  mud */
@@ -26,6 +26,13 @@ typedef struct hxSoil {
   double unloading;          /* N/m     A Ke */
   double damping;            /* Pa s/m  R */
 } hxSoil;
+
+/* Shape of what sinks. */
+typedef struct {
+  double radius;     /* m  of the sphere */
+  double pad_radius; /* m  of a flat round pad in its place, or of a disc of a pad's area; 0: none */
+  double breadth;    /* m  b of eq. 40; 0: the radius */
+} hxSoilShape;
 
 /* A force and its slope by the depth, N and N/m. */
 typedef struct {
@@ -49,13 +56,12 @@ typedef struct {
   hxSoilCurve hold;   /* N/m   shear over the bristle without load */
 } hxSoilContact;
 
-/* Computes the constants of a soil under feet of this radius and pad radius (0: sphere). */
-void hx_soil_compile(const hxSoilDefinition *definition, double foot_radius, double pad_radius,
-                     hxSoil *soil);
+/* Computes the constants of a soil under a shape. */
+void hx_soil_compile(const hxSoilDefinition *definition, const hxSoilShape *shape, hxSoil *soil);
 
 /* Does the same from columns 3 to 15 of a material of a grid's table (table_row of
  * models/soil/law.py). */
-void hx_soil_from_row(const double row[13], double foot_radius, double pad_radius, hxSoil *soil);
+void hx_soil_from_row(const double row[13], const hxSoilShape *shape, hxSoil *soil);
 
 /* Returns the first of these columns that is not in its range, -1 if there is none. */
 int hx_soil_row_error(const double row[13]);

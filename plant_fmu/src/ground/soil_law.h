@@ -113,6 +113,15 @@ static inline hxSoilCurves elastic(const hxSoils *soil, hxReal plastic, hxReal z
   return select_curves(hx_less(virgin.force, line.force), virgin, line);
 }
 
+/* Returns which feet that sink at dz press the soil further. At the end of each step that does, the
+ * line reaches the curve (eq. 44), so that rounding decides which of them is less. */
+static inline hxMask hx_is_yielding(const hxSoils *soil, hxReal plastic, hxReal z, hxReal dz,
+                                    hxReal virgin) {
+  const double margin = 1e-8; /* m: links are off their joints by less */
+  const hxReal line = soil->unloading * (z - plastic + margin);
+  return hx_less(hx_splat(0.0), dz) & ~hx_less(line, virgin);
+}
+
 /* Returns the area of the foot's cross-section at the surface, m2, and its slope by z, m. */
 static inline hxSoilCurves contact_area(const hxSoils *soil, hxReal z) {
   const hxReal zero = hx_splat(0.0), R = soil->radius;
@@ -130,10 +139,11 @@ static inline hxSoilForces hx_soil_forces(const hxSoils *soil, hxReal plastic, h
   const hxSoilCurves spring = elastic(soil, plastic, z, virgin), area = contact_area(soil, z);
   const hxReal viscosity = soil->damping * area.force, force = spring.force + viscosity * dz;
   const hxMask pushes = touches & hx_less(zero, force);
-  const hxReal slope = hx_select(touches, spring.slope, zero);
+  const hxReal along = hx_select(hx_is_yielding(soil, plastic, z, dz, virgin.force), virgin.slope,
+                                 spring.slope);
   return (hxSoilForces){.force = hx_select(pushes, force, zero),
                         .elastic = hx_select(touches, spring.force, zero),
-                        .slope = slope,
+                        .slope = hx_select(touches, along, zero),
                         .stiffness =
                             hx_select(pushes, spring.slope + soil->damping * area.slope * dz, zero),
                         .viscosity = hx_select(pushes, viscosity, zero)};

@@ -112,54 +112,6 @@ static int check_materials(const hxTerrain *terrain, char *message) {
   return 1;
 }
 
-/* Returns whether a block is not level with all its neighbours. */
-static int is_uneven(const hxTerrain *terrain, int64_t row, int64_t col) {
-  const int64_t rows = terrain->head.rows, cols = terrain->head.cols;
-  const double height = terrain->height[row * cols + col];
-  int found = 0;
-  for (int64_t r = row - 1; r <= row + 1; ++r)
-    for (int64_t c = col - 1; c <= col + 1; ++c)
-      found |= r >= 0 && r < rows && c >= 0 && c < cols && terrain->height[r * cols + c] != height;
-  return found;
-}
-
-/* Returns the row of the table of a block's material, NULL for the definition's ground. */
-static const double *material_of_block(const hxTerrain *terrain, int64_t row, int64_t col) {
-  const int m = terrain->material ? terrain->material[row * terrain->head.cols + col] : 0;
-  return m > 0 ? terrain->table + HX_MATERIAL_COLUMNS * (m - 1) : NULL;
-}
-
-/* Returns whether soil of blocks is level: a foot that has sunk cannot pass an edge of soil without
- * a jump of the force, because the laws of soil are those of level ground. */
-static int check_soil_of_blocks(const hxTerrain *terrain, char *message) {
-  if (terrain->head.kind != HX_SURFACE_BLOCKS || !terrain->material) return 1;
-  for (int64_t row = 0; row < terrain->head.rows; ++row)
-    for (int64_t col = 0; col < terrain->head.cols; ++col) {
-      const double *material = material_of_block(terrain, row, col);
-      if (material && material[HX_MATERIAL_SOIL] != 0.0 && is_uneven(terrain, row, col)) {
-        hx_print(
-            message, HX_MESSAGE_SIZE,
-            "terrain grid: material[%lld][%lld]: got soil on a block that is higher or lower than "
-            "its neighbour, expected soil on level blocks; move it, or make the surface smooth",
-            (long long)row, (long long)col);
-        return 0;
-      }
-    }
-  return 1;
-}
-
-int hx_terrain_uneven_block(const hxTerrain *terrain, double middle[2]) {
-  const hxGridHead *head = &terrain->head;
-  for (int64_t row = 0; head->kind == HX_SURFACE_BLOCKS && row < head->rows; ++row)
-    for (int64_t col = 0; col < head->cols; ++col)
-      if (!material_of_block(terrain, row, col) && is_uneven(terrain, row, col)) {
-        middle[0] = head->x0 + ((double)col + 0.5) * head->cell;
-        middle[1] = head->y0 + ((double)row + 0.5) * head->cell;
-        return 1;
-      }
-  return 0;
-}
-
 /* Reach of a tile: m, and cells at least. Tiles have at least two cells along an edge. */
 static const double least_reach = HX_LEAST_REACH;
 
@@ -293,8 +245,7 @@ hxTerrain *hx_terrain_create(const void *bytes, size_t size, char *message) {
   }
   hxTerrain *terrain = copy_file(&head, bytes, size);
   if (!terrain) return refuse_memory(NULL, message);
-  if (!(check_heights(terrain, message) && check_materials(terrain, message) &&
-        check_soil_of_blocks(terrain, message))) {
+  if (!(check_heights(terrain, message) && check_materials(terrain, message))) {
     hx_terrain_destroy(terrain);
     return NULL;
   }
@@ -378,6 +329,35 @@ double hx_terrain_outside(const hxTerrain *terrain, const double point[3], const
   const hxGridHead *head = &terrain->head;
   return fmax(outside_along(point[0], head->x0, head->cell, cell[0], head->cols),
               outside_along(point[1], head->y0, head->cell, cell[1], head->rows));
+}
+
+void hx_terrain_move_into(const hxTerrain *terrain, const double cell[2], double *x, double *y) {
+  const hxGridHead *head = &terrain->head;
+  const double rim = 1e-6 * head->cell;
+  const double left = head->x0 + cell[0] * head->cell, low = head->y0 + cell[1] * head->cell;
+  *x = fmin(fmax(*x, left + rim), left + head->cell - rim);
+  *y = fmin(fmax(*y, low + rim), low + head->cell - rim);
+}
+
+int hx_terrain_is_uneven(const hxTerrain *terrain, const double point[3]) {
+  double cell[2];
+  int found = 0;
+  if (terrain->head.kind != HX_SURFACE_BLOCKS) return 0;
+  hx_terrain_cell_at(terrain, point, cell);
+  const double height = hx_terrain_column(terrain, cell[0], cell[1]);
+  for (int i = -1; i <= 1; ++i)
+    for (int j = -1; j <= 1; ++j)
+      found |= hx_terrain_column(terrain, cell[0] + i, cell[1] + j) != height;
+  return found;
+}
+
+int hx_terrain_is_level(const hxTerrain *terrain, const double a[2], const double b[2]) {
+  const double points[2][3] = {{a[0], a[1], 0.0}, {b[0], b[1], 0.0}};
+  double cell[2][2];
+  if (terrain->head.kind != HX_SURFACE_BLOCKS) return 1;
+  for (int i = 0; i < 2; ++i) hx_terrain_cell_at(terrain, points[i], cell[i]);
+  return hx_terrain_column(terrain, cell[0][0], cell[0][1]) ==
+         hx_terrain_column(terrain, cell[1][0], cell[1][1]);
 }
 
 /* A cell: its column and row, the height of its top, and the ways to those beside it, 0 at the

@@ -45,14 +45,19 @@ typedef struct hxFace {
 hxTerrainSurface hx_terrain_surface(const hxTerrain *terrain);
 double hx_terrain_cell_size(const hxTerrain *terrain);
 
-/* Finds the middle (x, y) of the first block of the definition's ground, row by row, that is higher
- * or lower than a neighbour, m; returns whether there is one. Smooth surfaces have none. */
-int hx_terrain_uneven_block(const hxTerrain *terrain, double middle[2]);
+/* Returns whether the block below a point is higher or lower than a neighbour. */
+int hx_terrain_is_uneven(const hxTerrain *terrain, const double point[3]);
+
+/* Returns whether the ground is level between two points: smooth, or of blocks of one height. */
+int hx_terrain_is_level(const hxTerrain *terrain, const double a[2], const double b[2]);
 
 /* Returns the cell (column, row) of blocks over which a point is, and how far outside of a cell a
  * point is, m, < 0 inside; the border's cells have no outer edge. */
 void hx_terrain_cell_at(const hxTerrain *terrain, const double point[3], double cell[2]);
 double hx_terrain_outside(const hxTerrain *terrain, const double point[3], const double cell[2]);
+
+/* Moves x and y to the nearest place over a cell. */
+void hx_terrain_move_into(const hxTerrain *terrain, const double cell[2], double *x, double *y);
 
 /* Returns the index along a line of n cells of a coordinate in cells, of the border's beyond it. */
 static inline int64_t hx_cell_index(double u, int64_t n) {

@@ -28,6 +28,10 @@ static void kernel_start(const hxModel *model, double t, hxState *state, void *s
   hxDepths depths;
   hx_contact_release(&state->contact);
   hx_depths_of(model, &state->contact, &state->motion, &depths);
+  if (model->has_soil && model->torso_rows) {
+    hx_moment_update(model, state);
+    hx_torso_sides(&state->motion, &state->moment, &depths);
+  }
   hx_contact_start(model, &depths, &state->contact);
   memset(state->motion.bristle, 0, sizeof state->motion.bristle);
   if (model->elastic) start_gears(model, state);

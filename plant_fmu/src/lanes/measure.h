@@ -117,12 +117,13 @@ HX_RARE void search_near_blocks(const hxModel *model, const hxContactState *stat
   int below = 0, beside = 0;
   for (int lane = 0; lane < HX_LANES && slot + lane < HX_LEGS; ++lane) {
     const double ends[4] = {low[0][lane], high[0][lane], low[1][lane], high[1][lane]};
-    const double top = hx_terrain_top_between(terrain, ends), col = state->cell[0][slot + lane];
-    if (z[lane] - top >= HX_LEAST_REACH) continue;
+    const double around = hx_terrain_top_between(terrain, ends), col = state->cell[0][slot + lane],
+                 own = col >= 0.0
+                           ? hx_terrain_column(terrain, col, state->cell[1][slot + lane])
+                           : around; /* a foot may have left its block in its print */
+    if (z[lane] - hx_higher_of(around, own) >= HX_LEAST_REACH) continue;
     below |= (state->closed[HX_FOOT][slot + lane] == 0.0) << lane;
-    beside |= !(col >= 0.0) || top > hx_terrain_column(terrain, col, state->cell[1][slot + lane])
-                  ? 1 << lane
-                  : 0;
+    beside |= !(col >= 0.0) || around > own ? 1 << lane : 0;
   }
   search->below = hx_listed(below), search->beside = hx_listed(beside);
 }
@@ -272,26 +273,27 @@ static inline void hx_copy_moment(const hxModel *model, hxMoment *to, const hxMo
   if (model->elastic) hx_copy_gears(to, from);
 }
 
-/* Returns whether a foot in soil is over a block that is not level with its own: it was dragged
- * there in its print. It keeps its block until lift-off, as it keeps its material, so that no edge
- * meets it at the depth of its print. */
+/* Returns whether a foot in soil or above the bottom of its print is over a block that is not level
+ * with its own: it was dragged there in its print. It keeps its block until it has left the print
+ * upwards, so that no edge meets it at the depth of its print. */
 HX_RARE int keeps_block(const hxModel *model, const hxContactState *state, int leg,
                         const double centre[3]) {
   double cell[2];
-  if (!is_in_soil(state, HX_FOOT, leg)) return 0;
+  if (!is_in_soil(state, HX_FOOT, leg) && !(state->plastic[hx_soil_row(HX_FOOT)][leg] > 0.0))
+    return 0;
   hx_terrain_cell_at(model->terrain, centre, cell);
   return hx_terrain_column(model->terrain, cell[0], cell[1]) !=
          hx_terrain_column(model->terrain, state->cell[0][leg], state->cell[1][leg]);
 }
 
-/* Copies the places of feet, and of bodies where the ground has materials, and computes how far
- * feet are outside of their cells. */
+/* Copies the places of feet, and of bodies where the ground has materials or soil, and computes how
+ * far feet are outside of their cells. */
 HX_RARE void places_on_grid(const hxModel *model, const hxContactState *state,
                             const hxMoment *moment, hxDepths *depths) {
-  const int cells = hx_has_cells(model);
+  const int cells = hx_has_cells(model), materials = model->terrain->material || model->has_soil;
   const hxNumber(*foot)[HX_SLOTS] = moment->contact[HX_FOOT].centre;
   memcpy(depths->centre[HX_FOOT], foot, sizeof depths->centre[HX_FOOT]);
-  for (int k = 1; model->terrain->material && k < model->rows + model->torso_rows; ++k)
+  for (int k = 1; materials && k < model->rows + model->torso_rows; ++k)
     memcpy(depths->centre[model->row[k]], moment->contact[model->row[k]].centre,
            sizeof depths->centre[HX_FOOT]);
   for (int leg = 0; leg < HX_LEGS; ++leg) {
@@ -372,6 +374,20 @@ static inline void start_landing(int slot, double t, hxMeasured *measured) {
   for (int i = 0; i < HX_RISE_SAMPLES; ++i) measured->landing_force[i][slot] = 0.0;
 }
 
+/* Finds the side of the torso's box that faces the ground at each corner. */
+HX_RARE void hx_torso_sides(const hxPlantMotion *motion, const hxMoment *at, hxDepths *depths) {
+  const hxMat3 R_WB = hx_torso_body(motion).R_WB;
+  const hxNumber(*normal)[HX_SLOTS] = at->contact[HX_TORSO].normal;
+  for (int slot = 0; slot < HX_SLOTS; ++slot) {
+    const hxVec3 n = hx_splat_vec3((hxNumber[]){normal[0][slot], normal[1][slot], normal[2][slot]});
+    const hxVec3 n_B = hx_tmul(R_WB, n);
+    const double x = fabs(hx_re(hx_lane(n_B.x, 0))), y = fabs(hx_re(hx_lane(n_B.y, 0))),
+                 z = fabs(hx_re(hx_lane(n_B.z, 0)));
+    const int side = y > x ? 1 : 0;
+    depths->side[slot] = z > fmax(x, y) ? 2 : side;
+  }
+}
+
 /* Switches the contacts that are due at time t, records footprints and starts the measurement of
  * landings; returns whether contacts switched. Depths are relative to those at which they
  * touch the ground; `at` is the moment of time t. */
@@ -380,6 +396,7 @@ static inline int hx_switch_contacts(const hxModel *model, hxDepths *depths, dou
                                      hxState *state) {
   if (model->has_soil) hx_soil_switch(model, at, depths, footprints, &state->contact);
   if (!hx_contact_is_due(model, depths, &state->contact)) return 0;
+  if (model->has_soil && model->torso_rows) hx_torso_sides(&state->motion, at, depths);
   int before[HX_SLOTS], after[HX_SLOTS];
   feet_on_ground(model, &state->contact, before);
   if (model->foot_rows > 1) {
@@ -406,9 +423,6 @@ HX_RARE void hx_cross_cells(const hxModel *model, hxDepths *depths, hxState *sta
   hx_contact_hand_over(&before, &state->moment, crossed, &state->contact);
   hx_moment_shares(model, &state->contact, &state->moment);
   if (has_bristles(model, HX_FOOT)) hx_contact_slacken(&state->contact, &state->motion);
-  for (int leg = 0; leg < HX_LEGS && model->has_soil; ++leg)
-    if (crossed >> leg & 1 && state->contact.closed[HX_FOOT][leg] == 0.0)
-      state->contact.plastic[hx_soil_row(HX_FOOT)][leg] = 0.0; /* the new cell is undisturbed */
   hx_depths_of_moment(model, &state->contact, &state->moment, depths);
 }
 

@@ -3,6 +3,7 @@
 #ifndef HX_SOIL_PATH_H
 #define HX_SOIL_PATH_H
 
+#include "../contact_law.h"
 #include "foot.h"
 
 static const double least_footprint = 1e-6; /* m  shallower ones are not kept */
@@ -112,8 +113,9 @@ HX_RARE void hx_soil_yield(const hxModel *model, const hxContactState *state, do
   }
 }
 
-/* Returns whether the ground at a sphere's centre is soil. */
-HX_RARE int is_over_soil(const hxModel *model, const double centre[3]) {
+/* Returns whether the ground at a sphere's centre is soil for a row. */
+HX_RARE int is_over_soil(const hxModel *model, int row, const double centre[3]) {
+  if (!hx_may_sink_at(model, row, centre)) return 0;
   const double *material = model->terrain ? hx_terrain_material(model->terrain, centre) : NULL;
   hxSoil own;
   memcpy(&own, model->soil[0], sizeof own);
@@ -130,6 +132,35 @@ static inline void leave_footprint(int row, int slot, hxFootprintLog *log, hxCon
   state->plastic[soft][slot] = 0.0;
 }
 
+/* Holds the cell below a foot that enters a print, and releases that of one that leaves its print
+ * and touches nothing. */
+HX_RARE void hold_block_of_print(const hxModel *model, int row, int slot, const double centre[3],
+                                 hxContactState *state) {
+  if (row != HX_FOOT || !hx_has_cells(model)) return;
+  int touches = state->plastic[hx_soil_row(HX_FOOT)][slot] > 0.0;
+  for (int k = HX_FOOT; hx_is_of_foot(k); ++k) touches |= state->closed[k][slot] != 0.0;
+  double cell[2] = {state->cell[0][slot], state->cell[1][slot]};
+  if (touches && cell[0] < 0.0) hx_terrain_cell_at(model->terrain, centre, cell);
+  for (int i = 0; i < 2; ++i) {
+    state->cell[i][slot] = touches ? cell[i] : -1.0;
+    hx_fill_slots(state->cell[i]);
+  }
+}
+
+/* Keeps where a contact has lost its print's bottom; a foot that keeps its block, over that. */
+HX_RARE void keep_place(const hxModel *model, int row, int slot, const double centre[3],
+                        hxContactState *state) {
+  double *x = &state->place[hx_soil_row(row)][0][slot], *y = &state->place[hx_soil_row(row)][1][slot];
+  const double cell[2] = {state->cell[0][slot], state->cell[1][slot]};
+  *x = centre[0], *y = centre[1];
+  if (row != HX_FOOT || !hx_has_cells(model) || cell[0] < 0.0) return;
+  double below[2];
+  hx_terrain_cell_at(model->terrain, centre, below);
+  if (hx_terrain_column(model->terrain, below[0], below[1]) !=
+      hx_terrain_column(model->terrain, cell[0], cell[1]))
+    hx_terrain_move_into(model->terrain, cell, x, y);
+}
+
 /* Records the footprints of a row, and looks up those that it enters. */
 HX_RARE void row_soil_switch(const hxModel *model, int row, const hxContactMoment *at,
                              hxDepths *depths, hxFootprintLog *log, hxContactState *state) {
@@ -140,12 +171,14 @@ HX_RARE void row_soil_switch(const hxModel *model, int row, const hxContactMomen
     const double z = delta[slot] + *plastic, x = at->centre[0][slot], y = at->centre[1][slot],
                  centre[3] = {x, y, at->centre[2][slot]};
     if (state->closed[row][slot] != 0.0) {
-      if (delta[slot] <= 0.0) state->place[soft][0][slot] = x, state->place[soft][1][slot] = y;
+      if (delta[slot] <= 0.0) keep_place(model, row, slot, centre, state);
       continue;
     }
+    const double before = *plastic;
     if (z <= 0.0) leave_footprint(row, slot, log, state);
-    if (z > 0.0 && *plastic == 0.0 && is_over_soil(model, centre))
-      *plastic = hx_footprints_depth(&log->kept, x, y);
+    if (z > 0.0 && before == 0.0 && is_over_soil(model, row, centre))
+      *plastic = hx_footprints_depth(&log->kept, model->terrain, x, y);
+    if (*plastic != before) hold_block_of_print(model, row, slot, centre, state);
     delta[slot] = z - *plastic;
   }
   if (row == HX_TORSO) return;
