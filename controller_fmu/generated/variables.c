@@ -183,7 +183,7 @@ static const hxVariable outputs[] = {
 };
 
 static const hxVariable parameters[] = {
-    {"control", "", 1, 3, offsetof(struct hxVariables, definition.control), HX_INTEGER, 0, 1},
+    {"control", "", 1, 3, offsetof(struct hxVariables, definition.control), HX_INTEGER, 1, 1},
     {"period", "s", 0.0001, 10.0, offsetof(struct hxVariables, definition.period), HX_REAL, 0, 1},
     {"torso.mass", "kg", 1e-09, 1000000000.0, offsetof(struct hxVariables, definition.torso.mass), HX_REAL, 0, 1},
     {"torso.com[1]", "m", -100.0, 100.0, offsetof(struct hxVariables, definition.torso.com[0]), HX_REAL, 0, 3},
@@ -498,6 +498,7 @@ static const hxVariable parameters[] = {
     {"gains.paper_suspension.stiffness", "N/m", 1e-09, 1000000000000.0, offsetof(struct hxVariables, definition.gains.paper_suspension.stiffness), HX_REAL, 0, 1},
     {"gains.paper_suspension.limit", "m", 1e-09, 10.0, offsetof(struct hxVariables, definition.gains.paper_suspension.limit), HX_REAL, 0, 1},
     {"parts.squeeze", "1", 0.0, 0.99, offsetof(struct hxVariables, definition.parts.squeeze), HX_REAL, 0, 1},
+    {"parts.minmax_torque", "", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, definition.parts.minmax_torque), HX_BOOLEAN, 0, 1},
     {"friction.mu", "1", 0.0, 100.0, offsetof(struct hxVariables, definition.friction), HX_REAL, 0, 1},
     {"servo.torque_continuous", "N.m", 1e-09, 100000000.0, offsetof(struct hxVariables, definition.servo.torque_continuous), HX_REAL, 0, 1},
 };
@@ -651,7 +652,7 @@ const char *const hx_log_category_names[] = {
 const hxStateRow *const hx_states = 0;
 const size_t hx_state_count = 0;
 
-const char hx_default_guid[] = "{8db02ac1-1e28-4034-9fc8-c51963f50d9c}";
+const char hx_default_guid[] = "{dd6fb2c6-2e83-4e03-88c6-5e2aabdea5e4}";
 
 _Static_assert(HX_CONTROL_KINEMATIC == 1, "Control");
 _Static_assert(HX_CONTROL_COMPLIANT == 2, "Control");
