@@ -3,9 +3,9 @@
 static const double fade_time = 0.4; /* s, duration of a transition */
 
 void hx_fade_compile(double period, hxFadeModel *model) {
-  const double steps = nearbyint(fade_time / period);
+  const double steps = fmax(nearbyint(fade_time / period), 1.0);
   model->period = period;
-  model->steps = (int64_t)fmax(steps, 1.0);
+  model->steps = (int64_t)steps;
 }
 
 void hx_fade_begin(const hxFadeModel *model, const hxControllerOutput *last, hxFade *fade) {
