@@ -348,7 +348,7 @@ class Controller(Stateful):
         self._build(self._next)
         offset, late = self.paths.offset, self.paths.late
         super().restore(state)
-        if self.compliant is not None and hasattr(law, "stance"):
+        if self.compliant is not None and law is not None and hasattr(law, "stance"):
             self.compliant.stance = law.stance
         self.ramp.carry(before)
         self.paths.offset, self.paths.late = offset, late

@@ -363,5 +363,5 @@ void hx_controller_tick(const hxControllerModel *model, const hxControllerInput 
     ask(model, state, &stance);
     hx_compliant_step(&model->laws, model->leg, &stance, input, &state->compliant, &state->output);
   }
-  hx_fade_step(&model->fade, model->leg, &state->fade, &state->output);
+  if (state->fade.left) hx_fade_step(&model->fade, model->leg, &state->fade, &state->output);
 }

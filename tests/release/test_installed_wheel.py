@@ -43,7 +43,10 @@ def hexapod(wheels: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("environment")
     subprocess.run([sys.executable, "-m", "venv", folder], check=True)
     options = ["--quiet", "--only-binary=:all:", "--find-links", str(wheels)]
-    command = [str(folder / "bin/python"), "-m", "pip", "install", *options, "hexapod-cosim==0.1.0"]
+    (source,) = wheels.glob("hexapod_cosim-*.tar.gz")
+    version = source.name.removesuffix(".tar.gz").split("-")[1]
+    wanted = f"hexapod-cosim=={version}"
+    command = [str(folder / "bin/python"), "-m", "pip", "install", *options, wanted]
     subprocess.run(command, check=True, env=bare(folder))
     return folder / "bin" / "hexapod"
 

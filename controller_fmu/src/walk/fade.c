@@ -3,12 +3,13 @@
 static const double fade_time = 0.4; /* s, duration of a transition */
 
 void hx_fade_compile(double period, hxFadeModel *model) {
-  const double steps = nearbyint(fade_time / period);
+  const double steps = fmax(nearbyint(fade_time / period), 1.0);
   model->period = period;
-  model->steps = (int64_t)fmax(steps, 1.0);
+  model->steps = (int64_t)steps;
 }
 
-void hx_fade_begin(const hxFadeModel *model, const hxControllerOutput *last, hxFade *fade) {
+HX_SELDOM void hx_fade_begin(const hxFadeModel *model, const hxControllerOutput *last,
+                             hxFade *fade) {
   fade->left = model->steps;
   for (int leg = 0; leg < HX_LEGS; ++leg)
     for (int joint = 0; joint < HX_JOINTS; ++joint) {
@@ -20,7 +21,7 @@ void hx_fade_begin(const hxFadeModel *model, const hxControllerOutput *last, hxF
 }
 
 /* Computes the distances of the commands of the control before from those of the present one. */
-static void compare(const hxControllerOutput *output, hxFade *fade) {
+HX_SELDOM static void compare(const hxControllerOutput *output, hxFade *fade) {
   for (int leg = 0; leg < HX_LEGS; ++leg)
     for (int joint = 0; joint < HX_JOINTS; ++joint) {
       fade->angle[leg][joint] -= output->angle_ref[leg][joint];
@@ -29,9 +30,8 @@ static void compare(const hxControllerOutput *output, hxFade *fade) {
     }
 }
 
-void hx_fade_step(const hxFadeModel *model, const hxLegSolver leg[HX_LEGS], hxFade *fade,
-                  hxControllerOutput *output) {
-  if (fade->left == 0) return;
+HX_SELDOM void hx_fade_step(const hxFadeModel *model, const hxLegSolver leg[HX_LEGS], hxFade *fade,
+                            hxControllerOutput *output) {
   if (fade->left == model->steps) compare(output, fade);
   /* the cubic of C1 from a distance and its rate to 0, and its derivatives */
   const double time = (double)model->steps * model->period,

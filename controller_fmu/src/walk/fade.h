@@ -26,7 +26,8 @@ void hx_fade_compile(double period, hxFadeModel *model);
 /* Begins a transition from the commands of the last step, continued by a period. */
 void hx_fade_begin(const hxFadeModel *model, const hxControllerOutput *last, hxFade *fade);
 
-/* Adds to the commands of a step what is left of their distance from those of the control before. */
+/* Adds to the commands of a step what is left of their distance from those of the control before,
+ * during a transition. */
 void hx_fade_step(const hxFadeModel *model, const hxLegSolver leg[HX_LEGS], hxFade *fade,
                   hxControllerOutput *output);
 

@@ -4,14 +4,6 @@
 
 #include <string.h>
 
-/* A change of gait is rare: its functions are compiled for size, because wheels contain them for
- * every platform. */
-#if defined(__GNUC__)
-#define HX_SELDOM __attribute__((cold, noinline))
-#else
-#define HX_SELDOM
-#endif
-
 /* 1, share of the swing at each end in which the foot moves vertically only */
 static const double dwell = 0.1;
 /* 1, part of the swing after which the landing point stays fixed on the ground */
