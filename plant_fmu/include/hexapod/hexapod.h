@@ -442,7 +442,7 @@ typedef enum hxOutputGroup {
 } hxOutputGroup;
 
 /* Computes some groups of outputs, hxOutputGroup, with the same bits as hx_plant_output, and leaves
- * the others as they are. Without reactions it takes about half of the time. */
+ * the others as they are. Motion and forces take half of the time of all, motion a twelfth. */
 HX_API void hx_plant_output_groups(hxPlant *plant, const hxInput *input, unsigned groups,
                                    hxOutput *output);
 
