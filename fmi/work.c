@@ -1,4 +1,5 @@
-/* work.c - an extension: instances use a work space of the importer's, see hexapod/shared_work.h. */
+/* work.c - an extension: instances use a work space of the importer's, see hexapod/shared_work.h.
+ */
 #include "fmi/instance.h"
 
 #include "hexapod/shared_work.h"

@@ -91,9 +91,9 @@ extern const hxKernel *const hx_kernels[];
 /* Returns the fastest kernel that this processor supports. */
 const hxKernel *hx_kernel(void);
 
-/* Returns the size of the scratch that every kernel and hx_tangent can do with, bytes. It is aligned
- * to HX_WORK_ALIGNMENT. Every call may use all of it, and none reads what another one has left
- * there. */
+/* Returns the size of the scratch that every kernel and hx_tangent can do with, bytes. It is
+ * aligned to HX_WORK_ALIGNMENT. Every call may use all of it, and none reads what another one has
+ * left there. */
 size_t hx_scratch_size(void);
 
 /* Returns the size of a plant with its own work space behind it, bytes. */

@@ -290,8 +290,8 @@ struct hxPlant {
   double valley_limit;      /* m  its valleys are not narrower; 0: not searched yet */
   char message[HX_MESSAGE_SIZE];
   hxFootprintLog footprints; /* outside the state, which every call copies */
-  hxState *state_before;     /* that before a call, which one that fails restores: in the work space */
-  void *scratch;             /* of the kernels, see kernel.h: the rest of the work space */
+  hxState *state_before; /* that before a call, which one that fails restores: in the work space */
+  void *scratch;         /* of the kernels, see kernel.h: the rest of the work space */
 };
 
 /* Copies the elastic gears of a moment. */

@@ -11,7 +11,6 @@ HEADERS = (
     "plant_fmu/include/hexapod/hexapod.h",
     "controller_fmu/include/hexapod/controller.h",
     "plant_fmu/include/hexapod/status.h",
-    "plant_fmu/include/hexapod/shared_work.h",
     "plant_fmu/include/hexapod/legs.h",
     "plant_fmu/include/hexapod/range_check.h",
     "plant_fmu/include/hexapod/message.h",

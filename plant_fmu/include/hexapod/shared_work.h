@@ -9,8 +9,9 @@
  * instances of both versions of FMI, in any mode.
  *
  * Ownership: the caller allocates and frees the memory. An instance uses it in all later calls, but
- * never frees it, reads nothing from it that an earlier call has left, and keeps its address outside
- * of saved states. The memory must live until each of its instances uses another one or is freed.
+ * never frees it, reads nothing from it that an earlier call has left, and keeps its address
+ * outside of saved states. The memory must live until each of its instances uses another one or is
+ * freed.
  *
  * Threads: two calls must not use the same memory at the same time. One thread may call all
  * instances with one memory, or lend each instance its own memory just before it calls it.
@@ -30,8 +31,8 @@ enum { HX_SHARED_WORK_ALIGNMENT = 64 }; /* B  of the memory's address */
 typedef size_t hxSharedWorkSize(void);
 
 /* hx_shared_work_use: makes an instance use the memory of `size` bytes; NULL: its own again.
- * Returns 0, or another number when the instance is NULL or has no work space, or when the memory is
- * too small or not aligned: then nothing changes and the instance logs why. */
+ * Returns 0, or another number when the instance is NULL or has no work space, or when the memory
+ * is too small or not aligned: then nothing changes and the instance logs why. */
 typedef int hxSharedWorkUse(void *instance, void *memory, size_t size);
 
 #ifdef __cplusplus
