@@ -206,7 +206,7 @@ def estimate_rows(estimates: Sequence[Estimate]) -> list[list[str]]:
 
 
 def shown_estimates(estimates: Sequence[Estimate]) -> tuple[list[Estimate], int]:
-    """Returns the estimates for a terminal, without biases that may be 0, and the number of these."""
+    """Returns the estimates for a terminal without biases that may be 0, and how many those are."""
     shown = [
         one
         for one in estimates

@@ -26,7 +26,7 @@ from hexapod_cosim.cosim.identify.log_plant import LogPlant
 from hexapod_cosim.cosim.identify.screening import BadColumn, screened
 from hexapod_cosim.cosim.identify.start import initial_state
 from hexapod_cosim.cosim.master.recorder import Recording
-from hexapod_cosim.models import Robot
+from hexapod_cosim.models import FmuError, Robot
 
 
 @dataclass(frozen=True)
@@ -86,8 +86,10 @@ def replay(
                 raise without_readings(log)
             try:
                 found = plant.simulate(log, names, initial_state(log, robot))
-            except LogError as error:
-                raise (wrong_commands_error(log, wrong) if wrong else error) from error
+            except (LogError, FmuError) as error:
+                if wrong:
+                    raise wrong_commands_error(log, wrong) from error
+                raise
     inputs = log.commands
     data = np.column_stack([log.time, *inputs.values(), found])
     simulated = Recording(("time", *inputs, *names), data)

@@ -24,7 +24,7 @@ TURN = 2.0 * np.pi  # rad    a command beyond it is not in rad, and is refused w
 LEAST_THIRD = 10  # rows of a third of the rest, of which means are compared
 LARGEST_CHANGE = 6.0  # of a mean, in its deviations: one of 21 is larger in one of 10^7 logs
 SECOND = 0.6745 * np.sqrt(6.0)  # median of second differences of white noise over its deviation
-RESOLUTION = 1e-5  # rad    less is no motion
+LEAST_CHANGE = 0.003  # rad    feet that push against each other creep by less
 RATES = {  # quantity of the log: initial value of the FMU
     "torso.velocity": "initial.velocity",
     "torso.angular_velocity": "initial.angular_velocity",
@@ -54,8 +54,8 @@ def moving_at_rest(log: Log) -> str:
         own = log.recording.column(name)[: 3 * count]
         noise = float(np.nanmedian(np.abs(np.diff(own, n=2)))) / SECOND
         change = float(np.nanmean(own[2 * count :]) - np.nanmean(own[:count]))
-        size = abs(change) / max(noise * np.sqrt(2.0 / count), RESOLUTION)
-        if size > largest:
+        size = abs(change) / max(noise * np.sqrt(2.0 / count), 1e-12)
+        if size > largest and abs(change) > LEAST_CHANGE:
             found, largest = f"{name} by {change:.2g} rad", size
     return found
 

@@ -52,7 +52,7 @@ def test_delays_and_biases_lie_within_their_intervals(secret: Secret, found: Ide
 
 def test_the_bias_of_a_force_is_what_a_foot_in_the_air_reads(secret: Secret) -> None:
     """The readings' noise is 0.3 N; the most frequent of them are a tenth of it off."""
-    biases = force_biases(secret.log.part(slice(100, None)))
+    biases = force_biases(secret.log, slice(20, None))
     for leg in LEG_NAMES:
         key = f"bias.{leg}.foot.normal_force"
         assert biases[key] == pytest.approx(secret.values[key], abs=0.15), leg
@@ -60,18 +60,18 @@ def test_the_bias_of_a_force_is_what_a_foot_in_the_air_reads(secret: Secret) -> 
 
 def test_the_force_of_a_robot_that_stands_is_no_bias(secret: Secret) -> None:
     standing = secret.log.part(slice(0, 100))
-    assert set(force_biases(standing).values()) == {0.0}
+    assert set(force_biases(standing, slice(0, None)).values()) == {0.0}
 
 
 def test_a_robot_that_moves_at_the_start_is_named(secret: Secret, found: Identified) -> None:
-    """Its joint sags by 5 mrad in 0.5 s, which is 3.3 mrad from the first third to the last."""
+    """Its joint sags by 10 mrad in 0.5 s, which is 6.7 mrad from the first third to the last."""
     assert moving_at_rest(secret.log) == ""
     sagging = with_column(
-        secret.log, "LM.femur.angle", lambda y: y + 0.01 * np.maximum(0.5 - secret.log.time, 0.0)
+        secret.log, "LM.femur.angle", lambda y: y + 0.02 * np.maximum(0.5 - secret.log.time, 0.0)
     )
     name, _, change = moving_at_rest(sagging).partition(" by ")
     assert name == "LM.femur.angle"
-    assert float(change.removesuffix(" rad")) == pytest.approx(-0.0033, abs=0.0008)
+    assert float(change.removesuffix(" rad")) == pytest.approx(-0.0067, abs=0.0008)
     (experiment,) = found.experiments
     moved = replace(found, experiments=(replace(experiment, log=sagging),))
     assert "still moves at the start of robot 4" in warnings(moved)[0]

@@ -27,7 +27,8 @@ Array = NDArray[np.float64]
 SMOOTH = 40.0  # Hz    cut-off of the readings: beyond it encoders have noise alone
 LEAST_RATE = 2.5  # cut-offs: rows below this rate are not smoothed
 IN_AIR = 0.15  # of the rows: each foot of a walk is in the air for longer
-LARGEST_BIAS = 0.2  # of the range of a foot's force
+LEAST_IN_AIR = 10  # rows
+LARGEST_BIAS = 0.3  # of the force of a foot of the standing robot
 
 
 @dataclass(frozen=True)
@@ -125,7 +126,7 @@ def samples_of(log: Log, rows: slice, robot: Robot, *, shift: int) -> Samples:
     is_current = not log.has(joint_names("torque"))
     motor = reader.smooth(joint_names("current" if is_current else "torque"))
     turn = _turns(reader.smooth(list(ATTITUDE)))
-    biases = imu_biases(log, robot) | force_biases(log.part(rows))
+    biases = imu_biases(log, robot) | force_biases(log, rows)
     spin = reader.smooth(vector_names("imu.angular_velocity"))
     spin = spin - [biases[f"{BIAS}{name}"] for name in vector_names("imu.angular_velocity")]
     specific = reader.smooth(vector_names("imu.specific_force"))
@@ -173,12 +174,15 @@ def _forces(reader: _Reader, biases: dict[str, float]) -> tuple[Array, bool]:
     return force, False
 
 
-def force_biases(log: Log) -> dict[str, float]:
+def force_biases(log: Log, rows: slice) -> dict[str, float]:
     """Returns what the force sensors read of feet in the air; 0 of feet that are never there.
 
     Readings in the air are all alike, so that they are those in the shortest interval which has a
-    given share of them. Keys are those of the table of unknowns.
+    given share of them. Rows in which the robot stands do not count. Keys are those of the table of
+    unknowns.
     """
+    begin, end, _ = rows.indices(len(log.time))
+    rest = rest_rows(log)
     found = {}
     for leg in LEG_NAMES:
         vector = vector_names(f"{leg}.foot.force")
@@ -186,16 +190,26 @@ def force_biases(log: Log) -> dict[str, float]:
         if not log.has(names):
             continue
         table = log.recording.columns(names)
-        upward = table[:, -1]
-        known = np.sort(upward[np.isfinite(upward)])
-        share = max(int(IN_AIR * len(known)), 1)
-        first = int(np.argmin(known[share:] - known[:-share])) if share < len(known) else 0
-        low, high = known[first], known[min(first + share, len(known) - 1)]
-        own = np.nanmean(table[(upward >= low) & (upward <= high)], axis=0)
-        there = abs(own[-1]) < LARGEST_BIAS * float(known[-1] - known[0])
-        for name, value in zip(names, own if there else np.zeros(len(names)), strict=True):
-            found[f"{BIAS}{name}"] = float(value)
+        load = float(np.nanmean(table[:rest, -1] if rest > 1 else table[:, -1]))
+        own = _most_frequent(table[max(begin, rest) : end])
+        there = own is not None and abs(own[-1]) < LARGEST_BIAS * abs(load)
+        for k, name in enumerate(names):
+            found[f"{BIAS}{name}"] = float(own[k]) if own is not None and there else 0.0
     return found
+
+
+def _most_frequent(table: Array) -> Array | None:
+    """Returns the means (columns,) of the rows in which the last column has its most frequent
+    readings; None of few rows.
+    """
+    upward = table[:, -1]
+    known = np.sort(upward[np.isfinite(upward)])
+    share = int(IN_AIR * len(known))
+    if share < LEAST_IN_AIR:
+        return None
+    first = int(np.argmin(known[share:] - known[:-share]))
+    there = (upward >= known[first]) & (upward <= known[first + share])
+    return np.asarray(np.nanmean(table[there], axis=0))
 
 
 def _turns(angles: Array) -> Array:
