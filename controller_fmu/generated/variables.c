@@ -498,9 +498,9 @@ static const hxVariable parameters[] = {
     {"gains.paper_suspension.stiffness", "N/m", 1e-09, 1000000000000.0, offsetof(struct hxVariables, definition.gains.paper_suspension.stiffness), HX_REAL, 0, 1},
     {"gains.paper_suspension.limit", "m", 1e-09, 10.0, offsetof(struct hxVariables, definition.gains.paper_suspension.limit), HX_REAL, 0, 1},
     {"parts.squeeze", "1", 0.0, 0.99, offsetof(struct hxVariables, definition.parts.squeeze), HX_REAL, 0, 1},
-    {"parts.minmax_torque", "", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, definition.parts.minmax_torque), HX_BOOLEAN, 0, 1},
     {"friction.mu", "1", 0.0, 100.0, offsetof(struct hxVariables, definition.friction), HX_REAL, 0, 1},
     {"servo.torque_continuous", "N.m", 1e-09, 100000000.0, offsetof(struct hxVariables, definition.servo.torque_continuous), HX_REAL, 0, 1},
+    {"parts.minmax_torque", "", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, definition.parts.minmax_torque), HX_BOOLEAN, 0, 1},
 };
 
 const hxSection hx_sections[HX_CAUSALITIES] = {
@@ -523,7 +523,7 @@ const char *const hx_log_category_names[] = {
 const hxStateRow *const hx_states = 0;
 const size_t hx_state_count = 0;
 
-const char hx_default_guid[] = "{f7170c9b-9a7b-4fd7-ad5d-cc4c804f06b0}";
+const char hx_default_guid[] = "{77a0dc48-4cdf-47c5-8873-27757addc6da}";
 
 _Static_assert(HX_CONTROL_KINEMATIC == 1, "Control");
 _Static_assert(HX_CONTROL_COMPLIANT == 2, "Control");
