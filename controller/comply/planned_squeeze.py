@@ -16,6 +16,7 @@ found by C42 with weights on the servos, repeated a fixed number of times (C56).
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
@@ -32,6 +33,15 @@ LEAST_NORM = 1e-9  # N m    floor of the norm of all torques that they are divid
 # 1    three equal torques, those of a tripod's femurs, count as much as in the sum of squares
 LIKE_SQUARES = math.sqrt(math.sqrt(27.0))
 Yielding = tuple[Array, Array, Array]  # xx, xy, yy of symmetric matrices, (6,) each
+
+
+class Arch(NamedTuple):
+    """Forces and geometry of one plan."""
+
+    demand: Demand
+    shares: Shares
+    price: float  # N2 m2    of the use of friction
+    arm: Plane  # m    (6,) of the feet about the centre of load
 
 
 class PlannedSqueeze:
@@ -88,15 +98,19 @@ class PlannedSqueeze:
         held = xx * a + xy * b + tx * c + 1j * (xy * a + yy * b + ty * c)
         return np.asarray(change - held)
 
-    def _limit(self, shares: Shares, change: Plane) -> float:
-        """Returns the factor on all changes (6,) that keeps each foot within its friction (C43)."""
-        normal = shares.normal
-        room = MOST_FRICTION * self.friction * normal - np.sqrt(square(shares.push))
-        factor = room / np.maximum(np.sqrt(square(change)), LEAST_PUSH)
-        return max(float(factor[normal > LEAST_LOAD].min(initial=1.0)), 0.0)
+    def _best(self, arch: Arch, counts: Array) -> Plane:
+        """Returns the changes of the forces (6,) of C42 [N]. counts: (6, 3) of the servos [1]."""
+        demand, normal = arch.demand, arch.shares.normal
+        yielding = self._yielding(demand.lever, counts, normal, arch.price)
+        wanted = self._wanted(demand, counts, normal, yielding)
+        return self._balance(wanted - arch.shares.push, arch.arm, yielding)
 
-    def _counts(self, demand: Demand, shares: Shares, change: Plane) -> Array:
-        """Returns the weights (6, 3) of the servos under changed forces (C56) [1]."""
+    def _weigh(self, arch: Arch, change: Plane) -> Array:
+        """Returns the weights (6, 3) of the servos under changed forces (C56) [1].
+
+        They are the sixth power of each torque over the 8-norm of all.
+        """
+        demand, shares = arch.demand, arch.shares
         forces = shares._replace(push=shares.push + change).forces()
         torque = demand.torque - (demand.lever @ forces[:, :, None])[:, :, 0]
         square = torque * torque
@@ -104,6 +118,23 @@ class PlannedSqueeze:
         norm = math.sqrt(math.sqrt(math.sqrt(float((fourth * fourth).sum()))))
         part = square / max(norm * norm, LEAST_NORM * LEAST_NORM)
         return np.asarray(LIKE_SQUARES * part * part * part)
+
+    def _lower_largest(self, arch: Arch, change: Plane) -> Plane:
+        """Returns the changes (6,) that lower the largest torques (C56) [N].
+
+        change: (6,) those of the least sum of squares [N].
+        """
+        for _ in range(REPEATS):
+            nearer = self._best(arch, self._weigh(arch, change))
+            change = change + STEP * (nearer - change)
+        return change
+
+    def _limit(self, shares: Shares, change: Plane) -> float:
+        """Returns the factor on all changes (6,) that keeps each foot within its friction (C43)."""
+        normal = shares.normal
+        room = MOST_FRICTION * self.friction * normal - np.sqrt(square(shares.push))
+        factor = room / np.maximum(np.sqrt(square(change)), LEAST_PUSH)
+        return max(float(factor[normal > LEAST_LOAD].min(initial=1.0)), 0.0)
 
     def add(self, feet: Plane, demand: Demand, shares: Shares, squeeze: float) -> Shares:
         """Returns shares with the squeeze added; the sums of forces and moments stay.
@@ -119,15 +150,9 @@ class PlannedSqueeze:
         normal, used = shares.normal, self.torque / self.friction
         price = (1.0 / squeeze - 1.0) * used * used
         arm = feet - (normal @ feet) / max(normal.sum(), LEAST_LOAD)
-
-        def best(counts: Array) -> Plane:
-            yielding = self._yielding(demand.lever, counts, normal, price)
-            wanted = self._wanted(demand, counts, normal, yielding)
-            return self._balance(wanted - shares.push, arm, yielding)
-
-        change = best(np.ones((LEGS, 3)))
-        for _ in range(REPEATS if self.minmax else 0):
-            nearer = best(self._counts(demand, shares, change))
-            change = change + STEP * (nearer - change)
+        arch = Arch(demand, shares, price, arm)
+        change = self._best(arch, np.ones((LEGS, 3)))
+        if self.minmax:
+            change = self._lower_largest(arch, change)
         change = self._limit(shares, change) * change
         return shares._replace(push=shares.push + change, squeeze=change)

@@ -320,9 +320,9 @@ static const hxControllerDefinition default_definition = {
     .gains.paper_suspension.stiffness = 6104.0,
     .gains.paper_suspension.limit = 0.015,
     .parts.squeeze = 0.6,
-    .parts.minmax_torque = 0,
     .friction = 0.7,
     .servo.torque_continuous = 1.2,
+    .parts.minmax_torque = 0,
 };
 
 void hx_controller_definition_default(hxControllerDefinition *definition) {
@@ -702,9 +702,9 @@ static const hxRange definition_ranges[] = {
     {"gains.paper_suspension.stiffness", "N/m", 1e-09, 1000000000000.0, offsetof(hxControllerDefinition, gains.paper_suspension.stiffness), 0},
     {"gains.paper_suspension.limit", "m", 1e-09, 10.0, offsetof(hxControllerDefinition, gains.paper_suspension.limit), 0},
     {"parts.squeeze", "", 0.0, 0.99, offsetof(hxControllerDefinition, parts.squeeze), 0},
-    {"parts.minmax_torque", "", -DBL_MAX, DBL_MAX, offsetof(hxControllerDefinition, parts.minmax_torque), 1},
     {"friction.mu", "", 0.0, 100.0, offsetof(hxControllerDefinition, friction), 0},
     {"servo.torque_continuous", "N.m", 1e-09, 100000000.0, offsetof(hxControllerDefinition, servo.torque_continuous), 0},
+    {"parts.minmax_torque", "", -DBL_MAX, DBL_MAX, offsetof(hxControllerDefinition, parts.minmax_torque), 1},
 };
 
 size_t hx_controller_definition_ranges(const hxRange **range) {

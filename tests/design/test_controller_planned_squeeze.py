@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 from gains import PERIOD, make_gains
@@ -146,9 +148,9 @@ def minmax_cost(shares: Shares, push: Plane, squeeze: float) -> float:
     loaded = shares.normal > 0.0
     use = np.abs(push[loaded]) / (FRICTION * shares.normal[loaded])
     largest = DEPTH * WEIGHT / 3.0
-    effort = float((np.abs(torque(shares._replace(push=push))) ** 8).sum()) ** 0.25
+    effort = math.sqrt(math.sqrt(float((torque(shares._replace(push=push)) ** 8).sum())))
     price = (1.0 / squeeze - 1.0) * largest**2 * float((use**2).sum())
-    return 27.0**0.25 * effort + price
+    return math.sqrt(math.sqrt(27.0)) * effort + price
 
 
 def bounded(standing: str) -> tuple[float, float]:
