@@ -30,6 +30,7 @@ TESTS = (
     "tests/fuzz/test_findings.py",
     "tests/friction",
     "tests/ground",
+    "tests/soil",
     "tests/servos",
 )
 # gcc's own counters are exported functions too
