@@ -30,6 +30,7 @@ TESTS = (
     "tests/fuzz/test_findings.py",
     "tests/friction",
     "tests/ground",
+    "tests/soil",
     "tests/servos",
     "tests/trust/test_grid_refusals.py",
 )

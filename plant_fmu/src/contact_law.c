@@ -134,8 +134,7 @@ static void close_contact(const hxModel *model, const hxDepths *depths, int row,
                           double impact_speed, hxContactState *contact) {
   const double *material = material_under(model, depths, row, slot);
   set_ground(model, material, row, slot, contact);
-  if (model->has_soil && hx_may_sink(row))
-    choose_soil(model, depths, material, row, slot, contact);
+  if (model->has_soil && hx_may_sink(row)) choose_soil(model, depths, material, row, slot, contact);
   contact->closed[row][slot] = 1.0;
   contact->impact_speed[row][slot] = impact_speed;
   contact->damping[row][slot] = hx_contact(model->contact_law)->damping(model, impact_speed);

@@ -139,9 +139,9 @@ typedef struct hxModel {
   double bus_period, command_step; /* s, rad  0 in kinematic mode */
   double ground_point[3], ground_normal[3];
   double soil[HX_SOIL_SHAPES][HX_SOIL_SIZE]; /* hxSoil of each shape, of the definition */
-  double bristle_length;                   /* m  presliding, or shear displacement of the soil */
-  double pad_radius[HX_SOIL_SHAPES];       /* m  of discs of the pads' areas; 0: spheres */
-  double breadth[HX_SOIL_SHAPES];          /* m  b of eq. 40; 0: the radius */
+  double bristle_length;                     /* m  presliding, or shear displacement of the soil */
+  double pad_radius[HX_SOIL_SHAPES];         /* m  of discs of the pads' areas; 0: spheres */
+  double breadth[HX_SOIL_SHAPES];            /* m  b of eq. 40; 0: the radius */
   double step, tolerance, step_max;
   double load_threshold; /* N  a foot with a larger load counts its slip */
 } hxModel;

@@ -3,8 +3,8 @@
  * push adds to the accelerations is the derivative by it, and the energy balance closes.
  * Definitions that contradict themselves are refused by name.
  *
- * usage: test_choices FOLDER; of grid files: smooth, blocks, material. Soil lies on the blocks with
- * all heights 0, because soil on uneven blocks is refused.
+ * usage: test_choices FOLDER; of grid files: smooth, blocks, material. Soil lies on the blocks and
+ * on the same blocks with all heights 0.
  */
 #include <stdlib.h>
 #include <string.h>

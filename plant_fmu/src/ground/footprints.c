@@ -43,8 +43,8 @@ void hx_footprints_add(hxFootprintLog *log, const hxFootprint *print) {
 
 /* Returns whether a footprint is on ground of the height of a point. */
 static int is_level(const hxTerrain *terrain, const hxFootprint *print, double x, double y) {
-  return !terrain || hx_terrain_is_level(terrain, (const double[]){print->x, print->y},
-                                         (const double[]){x, y});
+  return !terrain ||
+         hx_terrain_is_level(terrain, (const double[]){print->x, print->y}, (const double[]){x, y});
 }
 
 double hx_footprints_depth(const hxFootprints *footprints, const hxTerrain *terrain, double x,

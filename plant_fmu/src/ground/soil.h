@@ -29,9 +29,10 @@ typedef struct hxSoil {
 
 /* Shape of what sinks. */
 typedef struct {
-  double radius;     /* m  of the sphere */
-  double pad_radius; /* m  of a flat round pad in its place, or of a disc of a pad's area; 0: none */
-  double breadth;    /* m  b of eq. 40; 0: the radius */
+  double radius; /* m  of the sphere */
+  double
+      pad_radius; /* m  of a flat round pad in its place, or of a disc of a pad's area; 0: none */
+  double breadth; /* m  b of eq. 40; 0: the radius */
 } hxSoilShape;
 
 /* A force and its slope by the depth, N and N/m. */

@@ -139,8 +139,8 @@ static inline hxSoilForces hx_soil_forces(const hxSoils *soil, hxReal plastic, h
   const hxSoilCurves spring = elastic(soil, plastic, z, virgin), area = contact_area(soil, z);
   const hxReal viscosity = soil->damping * area.force, force = spring.force + viscosity * dz;
   const hxMask pushes = touches & hx_less(zero, force);
-  const hxReal along = hx_select(hx_is_yielding(soil, plastic, z, dz, virgin.force), virgin.slope,
-                                 spring.slope);
+  const hxReal along =
+      hx_select(hx_is_yielding(soil, plastic, z, dz, virgin.force), virgin.slope, spring.slope);
   return (hxSoilForces){.force = hx_select(pushes, force, zero),
                         .elastic = hx_select(touches, spring.force, zero),
                         .slope = hx_select(touches, along, zero),

@@ -99,6 +99,11 @@ HX_RARE void further_moments(const hxModel *model, const hxContactState *state,
   }
 }
 
+/* Returns whether a place, in cells from a cell's corner, is not over the cell. */
+static inline int is_off_cell(double x, double y) {
+  return x < 0.0 || x > 1.0 || y < 0.0 || y > 1.0;
+}
+
 /* Leaves out the search of contacts that feet on blocks certainly do not have: those of open feet
  * that are higher than the ground around them, and walls where no block around a foot is higher
  * than that on which it stands. */
@@ -118,12 +123,15 @@ HX_RARE void search_near_blocks(const hxModel *model, const hxContactState *stat
   for (int lane = 0; lane < HX_LANES && slot + lane < HX_LEGS; ++lane) {
     const double ends[4] = {low[0][lane], high[0][lane], low[1][lane], high[1][lane]};
     const double around = hx_terrain_top_between(terrain, ends), col = state->cell[0][slot + lane],
-                 own = col >= 0.0
-                           ? hx_terrain_column(terrain, col, state->cell[1][slot + lane])
-                           : around; /* a foot may have left its block in its print */
+                 own = col >= 0.0 ? hx_terrain_column(terrain, col, state->cell[1][slot + lane])
+                                  : around; /* a foot may have left its block in its print */
     if (z[lane] - hx_higher_of(around, own) >= HX_LEAST_REACH) continue;
     below |= (state->closed[HX_FOOT][slot + lane] == 0.0) << lane;
-    beside |= !(col >= 0.0) || around > own ? 1 << lane : 0;
+    /* the walls of a block go on beside it for a foot that was dragged off it */
+    const int is_off =
+        model->has_soil &&
+        is_off_cell(low[0][lane] + reach - col, low[1][lane] + reach - state->cell[1][slot + lane]);
+    beside |= !(col >= 0.0) || around > own || is_off ? 1 << lane : 0;
   }
   search->below = hx_listed(below), search->beside = hx_listed(beside);
 }

@@ -150,7 +150,8 @@ HX_RARE void hold_block_of_print(const hxModel *model, int row, int slot, const 
 /* Keeps where a contact has lost its print's bottom; a foot that keeps its block, over that. */
 HX_RARE void keep_place(const hxModel *model, int row, int slot, const double centre[3],
                         hxContactState *state) {
-  double *x = &state->place[hx_soil_row(row)][0][slot], *y = &state->place[hx_soil_row(row)][1][slot];
+  double *x = &state->place[hx_soil_row(row)][0][slot],
+         *y = &state->place[hx_soil_row(row)][1][slot];
   const double cell[2] = {state->cell[0][slot], state->cell[1][slot]};
   *x = centre[0], *y = centre[1];
   if (row != HX_FOOT || !hx_has_cells(model) || cell[0] < 0.0) return;

@@ -123,8 +123,10 @@ def test_the_stored_power_is_the_growth_of_the_stored_energy(name: str, foot: Fo
             assert got == pytest.approx(line * dz, rel=1e-9)
 
 
-@pytest.mark.parametrize("pad", [0.0, 0.025])
-@pytest.mark.parametrize("name", ["dry_sand", "granular", "mud"])
+@pytest.mark.parametrize(
+    ("name", "pad"),
+    [("dry_sand", 0.0), ("dry_sand", 0.025), ("granular", 0.0), ("granular", 0.025), ("mud", 0.0)],
+)
 def test_the_derivative_of_the_rate_of_sinking_feet_is_that_of_its_differences(
     core: ct.CDLL, name: str, pad: float
 ) -> None:
@@ -138,7 +140,8 @@ def test_the_derivative_of_the_rate_of_sinking_feet_is_that_of_its_differences(
     for k in range(25):
         plant.step(0.004 * (k + 1), command)
         feet = depths(plant.output(command))
-        if len(feet) < 6 or min(dz for _, _, dz in feet) < 1e-3:
+        yields = [law.is_yielding(robot.soil, robot.foot, *foot) for foot in feet]
+        if len(feet) < 6 or not all(yields) or min(dz for _, _, dz in feet) < 1e-3:
             continue
         sinking += 1
         d_rate, _ = plant.tangent(command, np.zeros(ct.sizeof(HxInput) // 8), down)
