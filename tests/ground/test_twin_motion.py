@@ -227,7 +227,10 @@ def test_patches_of_other_material_are_the_twins(core: ct.CDLL, law: str) -> Non
 def test_a_foot_that_is_dragged_in_its_print_over_an_edge_moves_as_the_twins(
     core: ct.CDLL,
 ) -> None:
-    """It stands in sand, 1 mm before a rigid block of 31 mm, behind which the ground is lower."""
+    """It stands in sand, 1 mm before a rigid block of 31 mm, behind which the ground is lower.
+
+    It sinks at first: whether soil yields at a foot that moves level depends on the last bits.
+    """
     robot = changed(FEET, foot={"pad_radius": 0.025}, friction={"mu": 0.05})
     body = stood(robot, height=-1e-3, velocity=(1.0, 0.0, -0.02))
     foot = foot_centres(robot, body)[0]

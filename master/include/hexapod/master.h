@@ -120,7 +120,7 @@ typedef struct hxMaster {
   int status; /* fmi2Status    of the failed call */
 } hxMaster;
 
-/* Number of the layout of hxMaster and of the structures in it. Every change of their members, or of
+/* Number of the layout of hxMaster and of the structures in it. A change of their members, or of
  * what a member means, increases it. */
 #define HX_MASTER_LAYOUT 1
 
