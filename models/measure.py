@@ -3,7 +3,7 @@
 
 A step of h [s] leads from one set of body states (19, 13) to another. The integrator supplies the
 impulses of its stage forces; all other quantities follow from both ends.
-plant_fmu/src/lanes/measure.h is the fast form.
+plant_fmu/src/measure is the fast form.
 """
 
 from __future__ import annotations

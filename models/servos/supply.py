@@ -1,7 +1,7 @@
 """Computes what motors get from their supply: the heat of winding and housing with the duty limit
 of hot motors (eq. 52), and the voltage of a battery under load (eq. 53); and what servos get from
 their bus. The fast forms are in
-plant_fmu/src/lanes/measure.h and plant_fmu/src/robot.c.
+plant_fmu/src/measure/measure.h and plant_fmu/src/robot.c.
 """
 
 from __future__ import annotations

@@ -6,7 +6,7 @@
 #include "../contact_law.h"
 #include "../method.h"
 #include "hexapod/message.h"
-#include "measure.h"
+#include "../measure/measure.h"
 
 static const double step_floor = 1e-11; /* s  the error control fails below this step */
 /* 1, 1/s, 1  limits of a call's steps, so that every call ends: base, per second, highest; of fixed

@@ -5,7 +5,7 @@
 #include "clearance.h"
 #include "dynamics.h"
 #ifndef HX_TANGENT
-#include "measure.h"
+#include "../measure/measure.h"
 #endif
 
 /* Copies one lane of a vector. */

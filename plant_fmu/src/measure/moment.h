@@ -1,0 +1,399 @@
+/* moment.h - what is measured at the end of a step (hxMoment): angles, speeds and contacts;
+ * switches contacts and begins the measurement of landings */
+#ifndef HX_MOMENT_H
+#define HX_MOMENT_H
+
+#include "../contact_law.h"
+#include "../lanes/clearance.h"
+#include "../lanes/dynamics.h"
+#include "../lanes/soil_path.h"
+
+enum { LANDING_SAMPLES = 200 }; /* samples of a landing, which lasts 20 ms */
+
+/* Stores a row of contacts of bodies with centres of mass r and angular velocities w. */
+HX_INLINE void store_contact_moment(const hxModel *model, const hxContactKinematics *kin, int row,
+                                    int slot, hxVec3 r, hxVec3 w, hxContactMoment *moment) {
+  const hxVec3 to_point = hx_scale(hx_splat(-model->radius[row]), kin->normal);
+  hx_store_vec3(moment->centre, slot, hx_add3(r, hx_sub3(kin->arm, to_point)));
+  hx_store_vec3(moment->normal, slot, kin->normal);
+  hx_store_vec3(moment->slip, slot, hx_add_scaled(kin->velocity, kin->ddelta, kin->normal));
+  hx_store_vec3(moment->roll, slot, hx_cross(w, to_point));
+  hx_store(&moment->delta[slot], kin->delta);
+  hx_store(&moment->ddelta[slot], kin->ddelta);
+}
+
+/* Stores a row of contacts on the tibias. */
+HX_INLINE void row_moment(const hxModel *model, const hxContactState *state,
+                          const hxPlantMotion *motion, const hxKnown *known, int row, int slot,
+                          int all, const hxBody *tibia, hxMoment *moment) {
+  const hxContactKinematics kin =
+      hx_tibia_contact(model, state, motion, known, row, slot, all, tibia);
+  store_contact_moment(model, &kin, row, slot, hx_link_vec3(motion, HX_JOINTS - 1, HX_R, slot),
+                       tibia->w, &moment->contact[row]);
+}
+
+/* Contacts whose place on a grid is computed, of a pack of feet: with the ground below them, and
+ * with walls beside them; of the tibia's other points. */
+typedef struct {
+  int below, beside, others;
+} hxSearch;
+
+/* Stores a row of walls that no foot touches: its face is far above the level one below the feet,
+ * so that all but the depth is that of the feet's first row. */
+static inline void far_row_moment(const hxModel *model, int row, int slot, hxMoment *moment) {
+  const double *from = (const double *)&moment->contact[HX_FOOT];
+  double *to = (double *)&moment->contact[row];
+  for (int line = 0; line < HX_CONTACT_LINES; ++line)
+    hx_store(&to[line * HX_SLOTS + slot], hx_load(&from[line * HX_SLOTS + slot]));
+  hx_store(&moment->contact[row].delta[slot], hx_splat(model->radius[row] - hx_far));
+}
+
+HX_RARE void further_moments(const hxModel *model, const hxContactState *state,
+                             const hxPlantMotion *motion, int slot, const hxSearch *search,
+                             const hxBody *tibia, hxMoment *moment) {
+  for (int k = 1; k < model->rows; ++k) {
+    const int row = model->row[k], is_of_foot = hx_is_of_foot(row);
+    if (is_of_foot && search->beside == HX_CLOSED && !is_used(state, row, slot))
+      far_row_moment(model, row, slot, moment);
+    else
+      row_moment(model, state, motion, NULL, row, slot,
+                 is_of_foot ? search->beside : search->others, tibia, moment);
+  }
+}
+
+/* Returns whether a place, in cells from a cell's corner, is not over the cell. */
+static inline int is_off_cell(double x, double y) {
+  return x < 0.0 || x > 1.0 || y < 0.0 || y > 1.0;
+}
+
+/* Leaves out the search of contacts that feet on blocks certainly do not have: those of open feet
+ * that are higher than the ground around them, and walls where no block around a foot is higher
+ * than that on which it stands. */
+HX_RARE void search_near_blocks(const hxModel *model, const hxContactState *state, int slot,
+                                const hxVec3 *centre, hxSearch *search) {
+  const hxTerrain *terrain = model->terrain;
+  const double per_cell = terrain->per_cell, reach = HX_LEAST_REACH * per_cell;
+  const hxReal x = (centre->x - terrain->head.x0) * per_cell,
+               y = (centre->y - terrain->head.y0) * per_cell;
+  double low[2][HX_LANES], high[2][HX_LANES], z[HX_LANES];
+  if (!(model->radius[HX_FOOT] < 0.9 * HX_LEAST_REACH && terrain->head.cell >= HX_LEAST_REACH))
+    return;
+  hx_store(low[0], x - reach), hx_store(high[0], x + reach);
+  hx_store(low[1], y - reach), hx_store(high[1], y + reach);
+  hx_store(z, centre->z - model->ground_point[2]);
+  int below = 0, beside = 0;
+  for (int lane = 0; lane < HX_LANES && slot + lane < HX_LEGS; ++lane) {
+    const double ends[4] = {low[0][lane], high[0][lane], low[1][lane], high[1][lane]};
+    const double around = hx_terrain_top_between(terrain, ends), col = state->cell[0][slot + lane],
+                 own = col >= 0.0 ? hx_terrain_column(terrain, col, state->cell[1][slot + lane])
+                                  : around; /* a foot may have left its block in its print */
+    if (z[lane] - hx_higher_of(around, own) >= HX_LEAST_REACH) continue;
+    below |= (state->closed[HX_FOOT][slot + lane] == 0.0) << lane;
+    /* the walls of a block go on beside it for a foot that was dragged off it */
+    const int is_off =
+        model->has_soil &&
+        is_off_cell(low[0][lane] + reach - col, low[1][lane] + reach - state->cell[1][slot + lane]);
+    beside |= !(col >= 0.0) || around > own || is_off ? 1 << lane : 0;
+  }
+  search->below = hx_listed(below), search->beside = hx_listed(beside);
+}
+
+/* Returns the depths of a row of contacts of bodies with centres of mass r, on a grid at most. */
+HX_INLINE hxReal depth_bound(const hxModel *model, int row, int slot, hxVec3 r, const hxMat3 *R) {
+  const hxVec3 point = hx_add3(r, hx_mul(*R, hx_load_vec3(model->point[row], slot)));
+  if (model->terrain_kind == HX_TERRAIN_GRID) return hx_grid_depth_bound(model, row, &point);
+  return model->radius[row] - hx_ground(model, NULL, row, slot, 0, point, NULL).distance;
+}
+
+/* Returns the largest of these of knees and shanks, from the centre of mass of their tibias. */
+HX_INLINE hxReal tibia_depth_bound(const hxModel *model, const hxPlantMotion *motion, int slot,
+                                   const hxMat3 *R, hxReal largest) {
+  const hxVec3 r = hx_link_vec3(motion, HX_JOINTS - 1, HX_R, slot);
+  for (int k = model->foot_rows; k < model->rows; ++k)
+    largest = hx_max(largest, depth_bound(model, model->row[k], slot, r, R));
+  return largest;
+}
+
+/* Returns the largest of these of the torso's points. */
+HX_INLINE hxReal torso_depth_bound(const hxModel *model, const hxPlantMotion *motion,
+                                   const hxMat3 *R, hxReal largest) {
+  const hxVec3 r = hx_torso_vec3(motion, HX_R);
+  for (int slot = 0; slot < HX_SLOTS; slot += HX_LANES)
+    largest = hx_max(largest, depth_bound(model, HX_TORSO, slot, r, R));
+  return largest;
+}
+
+/* Stores the torso's contacts. */
+HX_RARE void torso_moment(const hxModel *model, const hxContactState *state,
+                          const hxPlantMotion *motion, int all, const hxBody *torso,
+                          hxMoment *moment) {
+  for (int slot = 0; slot < HX_SLOTS; slot += HX_LANES) {
+    const hxContactKinematics kin = hx_torso_contact(model, state, motion, slot, all, torso);
+    store_contact_moment(model, &kin, HX_TORSO, slot, hx_torso_vec3(motion, HX_R), torso->w,
+                         &moment->contact[HX_TORSO]);
+  }
+}
+
+/* Computes the shares of feet on blocks. */
+HX_RARE void hx_moment_shares(const hxModel *model, const hxContactState *state, hxMoment *moment) {
+  hxNumber share[HX_FOOT_ROWS];
+  for (int row = HX_FOOT; row < HX_FOOT_ROWS; ++row)
+    for (int slot = 0; slot < HX_SLOTS; ++slot) moment->share[row][slot] = 1.0;
+  for (int slot = 0; slot < HX_SLOTS; ++slot) {
+    hxFootFace face[HX_FOOT_ROWS];
+    if (!hx_has_several(state, slot)) continue;
+    for (int row = HX_FOOT; row < HX_FOOT_ROWS; ++row) {
+      const hxContactMoment *at = &moment->contact[row];
+      face[row] = (hxFootFace){at->delta[slot],
+                               {at->normal[0][slot], at->normal[1][slot], at->normal[2][slot]}};
+    }
+    hx_foot_shares(model, state, slot < HX_LEGS ? slot : 0, face, share);
+    for (int row = HX_FOOT; row < HX_FOOT_ROWS; ++row) moment->share[row][slot] = share[row];
+  }
+}
+
+/* Stores the contacts between legs at one end of a step. */
+HX_RARE void hx_pair_moments(const hxModel *model, const hxPlantMotion *motion, hxMoment *moment) {
+  hxLegLines own, next;
+  leg_lines(model, motion, &own, &next);
+  for (int row = HX_PAIR; row < HX_ROWS; ++row)
+    for (int slot = 0; slot < HX_PACKS * HX_LANES; slot += HX_LANES) {
+      hxContactMoment *to = &moment->contact[row];
+      hxVec3 next_arm;
+      const hxContactKinematics kin = pair_contact(model, &own, &next, row, slot, &next_arm);
+      hx_store_vec3(to->centre, slot, hx_add3(chain_point(own.r[own_line(row)], slot), kin.arm));
+      hx_store_vec3(to->normal, slot, kin.normal);
+      hx_store_vec3(to->slip, slot, hx_add_scaled(kin.velocity, kin.ddelta, kin.normal));
+      hx_store_vec3(to->roll, slot, hx_zero3());
+      hx_store(&to->delta[slot], kin.delta);
+      hx_store(&to->ddelta[slot], kin.ddelta);
+    }
+}
+
+/* Returns the largest depths of contacts between legs, m, legs in lanes. */
+HX_RARE hxReal hx_deepest_pair(const hxModel *model, const hxPlantMotion *motion) {
+  hxLegLines own, next;
+  hxReal deepest = hx_splat(-HUGE_VAL);
+  leg_lines(model, motion, &own, &next);
+  for (int row = HX_PAIR; row < HX_ROWS; ++row)
+    for (int slot = 0; slot < HX_PACKS * HX_LANES; slot += HX_LANES) {
+      hxVec3 next_arm;
+      deepest = hx_max(deepest, pair_contact(model, &own, &next, row, slot, &next_arm).delta);
+    }
+  return deepest;
+}
+
+/* Computes angles, speeds and contacts of a motion, on a grid those that `all` says. With `whole`,
+ * the model whose rows of bodies `model` leaves out, it returns the largest depth that one of their
+ * contacts may have, m. `nodes`: as in hxKnown. */
+static inline double hx_moment_and_bound(const hxModel *model, const hxModel *whole,
+                                         const hxContactState *state, const hxPlantMotion *motion,
+                                         int all, hxPatchNodes *nodes, hxMoment *moment) {
+  const hxKnown known = {.nodes = nodes};
+  const hxBody torso = hx_torso_body(motion);
+  hxReal bound = hx_splat(-HUGE_VAL);
+  for (int slot = 0; slot < HX_PACKS * HX_LANES; slot += HX_LANES) {
+    hxBody i = torso, j = torso;
+    for (int joint = 0; joint < HX_JOINTS; ++joint) {
+      const hxJointModel *m = &model->joint[joint];
+      hxReal sine, cosine;
+      i = j;
+      j = hx_link_body(motion, joint, slot);
+      hx_joint_half_angle(m, slot, hx_parent_quat(motion, joint, slot),
+                          hx_link_quat(motion, joint, slot), &sine, &cosine);
+      hx_store(&moment->angle[joint][slot], hx_angle_from_half(sine, cosine));
+      const hxVec3 s = hx_mul(i.R_WB, hx_load_vec3(m->s_i, slot));
+      hx_store(&moment->speed[joint][slot], hx_dot(s, hx_sub3(j.w, i.w)));
+    }
+    hx_store_vec3(moment->turn, slot, j.w);
+    hxSearch search = {all, all, all};
+    if (all == HX_NEAR && model->foot_rows > 1) {
+      const hxVec3 centre = hx_add3(hx_link_vec3(motion, HX_JOINTS - 1, HX_R, slot),
+                                    hx_mul(j.R_WB, hx_load_vec3(model->point[HX_FOOT], slot)));
+      search_near_blocks(model, state, slot, &centre, &search);
+    }
+    row_moment(model, state, motion, &known, HX_FOOT, slot, search.below, &j, moment);
+    if (model->rows > 1) further_moments(model, state, motion, slot, &search, &j, moment);
+    if (whole) bound = tibia_depth_bound(whole, motion, slot, &j.R_WB, bound);
+  }
+  if (model->foot_rows > 1) hx_moment_shares(model, state, moment);
+  if (model->torso_rows) torso_moment(model, state, motion, all, &torso, moment);
+  if (whole && whole->torso_rows) bound = torso_depth_bound(whole, motion, &torso.R_WB, bound);
+  if (model->pair_rows) hx_pair_moments(model, motion, moment);
+  if (whole && whole->pair_rows) bound = hx_max(bound, hx_deepest_pair(whole, motion));
+  moment->stale = 0.0;
+  if (model->elastic) {
+    memcpy(moment->deflection, motion->deflection, sizeof moment->deflection);
+    memcpy(moment->motor_speed, motion->motor_speed, sizeof moment->motor_speed);
+  }
+  return hx_largest_lane(bound);
+}
+
+/* Computes the same without a bound. */
+static inline void hx_moment_of(const hxModel *model, const hxContactState *state,
+                                const hxPlantMotion *motion, hxMoment *moment) {
+  hx_moment_and_bound(model, NULL, state, motion, HX_NEAR, NULL, moment);
+}
+
+/* Copies a moment, of contacts those of the model's rows. */
+static inline void hx_copy_moment(const hxModel *model, hxMoment *to, const hxMoment *from) {
+  memcpy(to, from, offsetof(hxMoment, contact[1]));
+  for (int k = 1; k < model->listed; ++k) to->contact[model->row[k]] = from->contact[model->row[k]];
+  if (model->foot_rows > 1) memcpy(to->share, from->share, sizeof to->share);
+  if (model->elastic) hx_copy_gears(to, from);
+}
+
+/* Returns whether a foot in soil or above the bottom of its print is over a block that is not level
+ * with its own: it was dragged there in its print. It keeps its block until it has left the print
+ * upwards, so that no edge meets it at the depth of its print. */
+HX_RARE int keeps_block(const hxModel *model, const hxContactState *state, int leg,
+                        const double centre[3]) {
+  double cell[2];
+  if (!is_in_soil(state, HX_FOOT, leg) && !(state->plastic[hx_soil_row(HX_FOOT)][leg] > 0.0))
+    return 0;
+  hx_terrain_cell_at(model->terrain, centre, cell);
+  return hx_terrain_column(model->terrain, cell[0], cell[1]) !=
+         hx_terrain_column(model->terrain, state->cell[0][leg], state->cell[1][leg]);
+}
+
+/* Copies the places of feet, and of bodies where the ground has materials or soil, and computes how
+ * far feet are outside of their cells. */
+HX_RARE void places_on_grid(const hxModel *model, const hxContactState *state,
+                            const hxMoment *moment, hxDepths *depths) {
+  const int cells = hx_has_cells(model), materials = model->terrain->material || model->has_soil;
+  const hxNumber(*foot)[HX_SLOTS] = moment->contact[HX_FOOT].centre;
+  memcpy(depths->centre[HX_FOOT], foot, sizeof depths->centre[HX_FOOT]);
+  for (int k = 1; materials && k < model->rows + model->torso_rows; ++k)
+    memcpy(depths->centre[model->row[k]], moment->contact[model->row[k]].centre,
+           sizeof depths->centre[HX_FOOT]);
+  for (int leg = 0; leg < HX_LEGS; ++leg) {
+    const double centre[3] = {foot[0][leg], foot[1][leg], foot[2][leg]},
+                 cell[2] = {state->cell[0][leg], state->cell[1][leg]};
+    depths->outside[leg] =
+        cells && cell[0] >= 0.0 ? hx_terrain_outside(model->terrain, centre, cell) : -hx_far;
+    if (depths->outside[leg] > 0.0 && model->has_soil && keeps_block(model, state, leg, centre))
+      depths->outside[leg] = -hx_far;
+  }
+}
+
+/* Copies penetration and approach speed of all contacts. */
+static inline void hx_depths_of_moment(const hxModel *model, const hxContactState *state,
+                                       const hxMoment *moment, hxDepths *depths) {
+  for (int k = 0; k < model->listed; ++k) {
+    const hxContactMoment *contact = &moment->contact[model->row[k]];
+    memcpy(depths->delta[model->row[k]], contact->delta, sizeof contact->delta);
+    memcpy(depths->ddelta[model->row[k]], contact->ddelta, sizeof contact->ddelta);
+  }
+  if (model->has_soil) hx_depths_on_soil(model, state, depths);
+  if (model->terrain) places_on_grid(model, state, moment, depths);
+}
+
+/* Sets the state's moment from its motion and time. */
+static inline void hx_moment_update(const hxModel *model, hxState *state) {
+  hx_moment_of(model, &state->contact, &state->motion, &state->moment);
+  state->moment.time = state->time;
+}
+
+/* Resets the peaks, which are those of one call. */
+static inline void hx_reset_peaks(hxMeasured *measured) {
+  memset(measured->peak_force, 0, sizeof measured->peak_force);
+  memset(measured->peak_rate, 0, sizeof measured->peak_rate);
+}
+
+/* Copies leg 0 into the unused slots of the first lines of a structure. */
+static inline void fill_lines(void *structure, size_t lines) {
+  double *first = structure;
+  for (size_t line = 0; line < lines; ++line) hx_fill_slots(&first[line * HX_SLOTS]);
+}
+
+/* Copies leg 0 into the unused slots of the last step's end. */
+static inline void hx_fill_moment_slots(const hxModel *model, hxState *state) {
+  fill_lines(&state->moment, HX_MOMENT_LINES);
+  for (int k = 0; k < model->listed; ++k)
+    if (model->row[k] != HX_TORSO)
+      fill_lines(&state->moment.contact[model->row[k]], HX_CONTACT_LINES);
+}
+
+/* Copies leg 0 into the unused slots of integrals and peaks. */
+static inline void hx_fill_integral_slots(hxState *state) {
+  fill_lines(&state->measured, HX_MEASURED_LINES);
+}
+
+/* Copies leg 0 into the unused slots of all measurements. */
+static inline void hx_fill_measured_slots(const hxModel *model, hxState *state) {
+  hx_fill_moment_slots(model, state);
+  hx_fill_integral_slots(state);
+}
+
+/* Sets whether each foot touches the ground, by any of its rows. */
+static inline void feet_on_ground(const hxModel *model, const hxContactState *contact,
+                                  int touches[HX_SLOTS]) {
+  for (int slot = 0; slot < HX_SLOTS; ++slot) {
+    touches[slot] = 0;
+    for (int k = 0; k < model->foot_rows; ++k)
+      touches[slot] |= contact->closed[model->row[k]][slot] != 0.0;
+  }
+}
+
+/* Starts the measurement of a landing at time t. */
+static inline void start_landing(int slot, double t, hxMeasured *measured) {
+  measured->landings[slot] += 1.0;
+  measured->landed_at[slot] = t;
+  measured->landing_left[slot] = LANDING_SAMPLES;
+  measured->landing_rate[slot] = 0.0;
+  for (int i = 0; i < HX_RISE_SAMPLES; ++i) measured->landing_force[i][slot] = 0.0;
+}
+
+/* Finds the side of the torso's box that faces the ground at each corner. */
+HX_RARE void hx_torso_sides(const hxPlantMotion *motion, const hxMoment *at, hxDepths *depths) {
+  const hxMat3 R_WB = hx_torso_body(motion).R_WB;
+  const hxNumber(*normal)[HX_SLOTS] = at->contact[HX_TORSO].normal;
+  for (int slot = 0; slot < HX_SLOTS; ++slot) {
+    const hxVec3 n = hx_splat_vec3((hxNumber[]){normal[0][slot], normal[1][slot], normal[2][slot]});
+    const hxVec3 n_B = hx_tmul(R_WB, n);
+    const double x = fabs(hx_re(hx_lane(n_B.x, 0))), y = fabs(hx_re(hx_lane(n_B.y, 0))),
+                 z = fabs(hx_re(hx_lane(n_B.z, 0)));
+    const int side = y > x ? 1 : 0;
+    depths->side[slot] = z > fmax(x, y) ? 2 : side;
+  }
+}
+
+/* Switches the contacts that are due at time t, records footprints and starts the measurement of
+ * landings; returns whether contacts switched. Depths are relative to those at which they
+ * touch the ground; `at` is the moment of time t. */
+static inline int hx_switch_contacts(const hxModel *model, hxDepths *depths, double t,
+                                     const hxMoment *at, hxFootprintLog *footprints,
+                                     hxState *state) {
+  if (model->has_soil) hx_soil_switch(model, at, depths, footprints, &state->contact);
+  if (!hx_contact_is_due(model, depths, &state->contact)) return 0;
+  if (model->has_soil && model->torso_rows) hx_torso_sides(&state->motion, at, depths);
+  int before[HX_SLOTS], after[HX_SLOTS];
+  feet_on_ground(model, &state->contact, before);
+  if (model->foot_rows > 1) {
+    const hxContactState was = state->contact;
+    state->touchdowns += hx_contact_switch(model, depths, &state->contact);
+    hx_contact_continue_impacts(model, at, &was, &state->contact);
+  } else {
+    state->touchdowns += hx_contact_switch(model, depths, &state->contact);
+  }
+  feet_on_ground(model, &state->contact, after);
+  for (int slot = 0; slot < HX_SLOTS; ++slot)
+    if (after[slot] && !before[slot]) start_landing(slot, t, &state->measured);
+  if (has_bristles(model, HX_FOOT)) hx_contact_slacken(&state->contact, &state->motion);
+  return 1;
+}
+
+/* Hands the contacts of feet that have left their cells over to the rows that they continue in;
+ * depths and moment become those over the new cells. */
+HX_RARE void hx_cross_cells(const hxModel *model, hxDepths *depths, hxState *state) {
+  const int crossed = hx_contact_cross(model, depths, &state->contact);
+  if (!crossed) return;
+  const hxMoment before = state->moment;
+  hx_moment_of(model, &state->contact, &state->motion, &state->moment);
+  hx_contact_hand_over(&before, &state->moment, crossed, &state->contact);
+  hx_moment_shares(model, &state->contact, &state->moment);
+  if (has_bristles(model, HX_FOOT)) hx_contact_slacken(&state->contact, &state->motion);
+  hx_depths_of_moment(model, &state->contact, &state->moment, depths);
+}
+
+#endif
