@@ -26,7 +26,7 @@ ENOUGH = 0.1
 FINISHING = 12  # steps of the last search, at most
 # Readings that jump come and go near the optimum, so that a step is left, if a short one.
 NEAR, SHORTER = 1.0, 0.5  # deviations; of the step before
-# At the first steps all readings count anew. From then on those that were left out stay so: a search
+# At the first steps all readings count anew. From then on those left out stay so: a search
 # would go back and forth between two points at which different readings count.
 ANEW = 2
 SHORTENED = (1.0, 0.5, 0.25, 0.1, 0.03)  # of a step, until the sum of squares falls
