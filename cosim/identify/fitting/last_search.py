@@ -26,6 +26,9 @@ ENOUGH = 0.1
 FINISHING = 12  # steps of the last search, at most
 # Readings that jump come and go near the optimum, so that a step is left, if a short one.
 NEAR, SHORTER = 1.0, 0.5  # deviations; of the step before
+# At the first steps all readings count anew. From then on those left out stay so: a search
+# would go back and forth between two points at which different readings count.
+ANEW = 2
 SHORTENED = (1.0, 0.5, 0.25, 0.1, 0.03)  # of a step, until the sum of squares falls
 SUFFICIENT = 0.1  # share of the fall that derivatives say
 # A longer step changes residuals otherwise than derivatives say where nothing jumps, too.
@@ -77,7 +80,8 @@ def finished(problem: Problem, z: Array, report: Progress) -> Array:
     before = np.inf
     for number in range(FINISHING):
         report(f"all rows, step {number + 1}")
-        problem.count_all()
+        if number < ANEW:
+            problem.count_all()
         problem.set_noise(problem.errors(z))
         problem.leave_out_bent(z)
         better, length = _stepped(problem, z)
