@@ -2,6 +2,9 @@
 
     python -m tools.wheels [FOLDER]                 all of them, in dist/ by default
 
+The folder has the source distribution and the one wheel that fits this machine, so that
+`pip install dist/*.whl` works; the wheels of other machines are in its folder other_platforms.
+
 Every wheel is made of the same files: those of the wheel that this machine builds from the source
 distribution, without its binaries and C libraries, and the cross-compiled binaries of all FMUs
 for all platforms. A wheel differs from another one by its co-simulation loop and its tag alone, so
@@ -28,6 +31,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 
+from packaging.tags import platform_tags
 from rich.console import Console
 from wheel.wheelfile import WheelFile, get_zipinfo_datetime
 
@@ -49,6 +53,7 @@ BINARIES, LIBRARIES = "hexapod_cosim/plant/binaries/", "hexapod_cosim/plant/lib/
 MODULE = "hexapod_cosim/plant/browser/walker.wasm"
 BEST = 9  # level of compression
 LARGEST = 5_000_000  # bytes of a wheel
+OTHERS = "other_platforms"  # folder of the wheels that do not fit this machine
 
 
 @dataclass(frozen=True)
@@ -57,6 +62,11 @@ class Platform:
 
     target: str
     tag: str
+
+    @property
+    def fits(self) -> bool:
+        """Whether this machine can install the wheel."""
+        return not set(self.tag.split(".")).isdisjoint(platform_tags())
 
 
 LINUX = "manylinux_2_17_{0}.manylinux2014_{0}.musllinux_1_1_{0}"
@@ -73,13 +83,18 @@ def main(folder: Path) -> None:
     """Builds the release into a folder and reports the size of each file."""
     console = Console()
     folder.mkdir(parents=True, exist_ok=True)
+    for old in folder.rglob("*.whl"):  # a release before may have put them elsewhere
+        old.unlink()
     os.environ.setdefault("SOURCE_DATE_EPOCH", commit_time())
     with console.status("building the wheel of this machine and the source distribution"):
         source, base = build_source(folder)
     with console.status("compiling for all platforms (minutes, the first time)"):
         binaries = cross_compile()
     base[MODULE] = walker_module()
-    wheels = [write_wheel(base, platform, binaries, folder) for platform in PLATFORMS]
+    wheels = [
+        write_wheel(base, platform, binaries, folder if platform.fits else folder / OTHERS)
+        for platform in PLATFORMS
+    ]
     write_hashes(folder, [source, *wheels])
     for path in (source, *wheels):
         console.print(f"{path.stat().st_size / 1e6:5.2f} MB  {path.name}", highlight=False)
@@ -198,7 +213,8 @@ def wheel_description(text: bytes, platform_tag: str) -> bytes:
 def write_hashes(folder: Path, files: Iterable[Path]) -> Path:
     """Writes SHA256SUMS, which `sha256sum --check` reads, and returns its path."""
     lines = [
-        f"{hashlib.sha256(path.read_bytes()).hexdigest()}  {path.name}\n" for path in sorted(files)
+        f"{hashlib.sha256(path.read_bytes()).hexdigest()}  {path.relative_to(folder).as_posix()}\n"
+        for path in sorted(files)
     ]
     path = folder / "SHA256SUMS"
     path.write_text("".join(lines), encoding="utf-8")

@@ -38,15 +38,13 @@ def wheels() -> Path:
 def hexapod(wheels: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The command of a new environment in which this machine's wheel alone is installed.
 
-    The folder has wheels of five platforms; pip chooses the one that fits, as docs/install.md says.
+    It is the only one of the folder, as docs/install.md says.
     """
     folder = tmp_path_factory.mktemp("environment")
     subprocess.run([sys.executable, "-m", "venv", folder], check=True)
-    options = ["--quiet", "--only-binary=:all:", "--find-links", str(wheels)]
-    (source,) = wheels.glob("hexapod_cosim-*.tar.gz")
-    version = source.name.removesuffix(".tar.gz").split("-")[1]
-    wanted = f"hexapod-cosim=={version}"
-    command = [str(folder / "bin/python"), "-m", "pip", "install", *options, wanted]
+    (wheel,) = wheels.glob("*.whl")
+    options = ["--quiet", "--only-binary=:all:"]
+    command = [str(folder / "bin/python"), "-m", "pip", "install", *options, str(wheel)]
     subprocess.run(command, check=True, env=bare(folder))
     return folder / "bin" / "hexapod"
 
@@ -84,7 +82,7 @@ def called(hexapod: Path, cwd: Path, *arguments: str) -> subprocess.CompletedPro
 
 
 def test_there_is_a_wheel_for_each_platform_of_at_most_5_mb(wheels: Path) -> None:
-    found = {path.stem.split("-py3-none-")[1]: path for path in wheels.glob("*.whl")}
+    found = {path.stem.split("-py3-none-")[1]: path for path in wheels.rglob("*.whl")}
     assert found.keys() == FAMILIES
     assert max(path.stat().st_size for path in found.values()) < 5e6
 
@@ -94,13 +92,13 @@ def test_the_hashes_are_those_of_the_files(wheels: Path) -> None:
 
 
 def test_the_descriptions_are_what_the_index_accepts(wheels: Path) -> None:
-    files = [str(path) for path in (*wheels.glob("*.whl"), *wheels.glob("*.tar.gz"))]
+    files = [str(path) for path in (*wheels.rglob("*.whl"), *wheels.glob("*.tar.gz"))]
     subprocess.run([sys.executable, "-m", "twine", "check", "--strict", *files], check=True)
 
 
 @pytest.mark.parametrize("machine", ["x86_64", "aarch64"])
 def test_the_linux_wheel_keeps_what_its_tag_promises(wheels: Path, machine: str) -> None:
-    (wheel,) = wheels.glob(f"*manylinux_2_17_{machine}*.whl")
+    (wheel,) = wheels.rglob(f"*manylinux_2_17_{machine}*.whl")
     command = [sys.executable, "-m", "auditwheel", "show", str(wheel)]
     shown = subprocess.run(command, capture_output=True, text=True, check=True).stdout
     text = " ".join(shown.split())
@@ -143,7 +141,7 @@ def test_pipx_runs_a_comparison_without_an_environment_of_its_own(
     subprocess.run([sys.executable, "-m", "venv", folder], check=True)
     python = str(folder / "bin/python")
     subprocess.run([python, "-m", "pip", "install", "--quiet", "pipx"], check=True)
-    (wheel,) = wheels.glob("*manylinux_2_17_x86_64*.whl")
+    (wheel,) = wheels.glob("*.whl")
     command = [python, "-m", "pipx", "run", "--spec", str(wheel), "hexapod", "compare"]
     subprocess.run(
         [*command, "walk_flat", "--set", "duration=2 s", "-o", "first"],

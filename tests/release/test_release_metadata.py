@@ -56,9 +56,3 @@ def test_citation_and_zenodo_name_the_same_title_and_licence() -> None:
     citation = read_yaml("CITATION.cff")
     assert zenodo["title"] == citation["title"]
     assert zenodo["license"].upper() == citation["license"] == PROJECT["license"]
-
-
-def test_the_page_on_installation_names_this_version() -> None:
-    page = (ROOT / "docs/install.md").read_text(encoding="utf-8")
-    named = re.findall(r"hexapod-cosim==(\S+)", page)
-    assert named == [PROJECT["version"]] * 2

@@ -81,3 +81,9 @@ def test_the_list_of_hashes_is_what_sha256sum_reads(tmp_path: Path) -> None:
     assert path.read_text(encoding="utf-8") == (
         "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad  a.whl\n"
     )
+
+
+def test_one_wheel_fits_a_machine(monkeypatch: pytest.MonkeyPatch) -> None:
+    tags = ["manylinux_2_36_aarch64", "manylinux_2_17_aarch64", "linux_aarch64"]
+    monkeypatch.setattr(wheels, "platform_tags", lambda: iter(tags))
+    assert [one.target for one in wheels.PLATFORMS if one.fits] == ["aarch64-linux"]

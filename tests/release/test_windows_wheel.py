@@ -59,7 +59,7 @@ class Windows:
 @pytest.fixture(scope="module")
 def windows(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Windows]:
     """A Python for Windows in which the wheel and its dependencies are installed."""
-    (wheel,) = WHEELS.glob("*win_amd64.whl")
+    (wheel,) = WHEELS.rglob("*win_amd64.whl")
     assert shutil.which("wine"), "needs Wine: tools/install_emulators.py"
     CACHE.mkdir(parents=True, exist_ok=True)
     running = Windows(prepare(wheel.resolve(), CACHE), tmp_path_factory.mktemp("wine"))
