@@ -4,9 +4,9 @@
 #define HX_INTEGRATOR_H
 
 #include "../contact_law.h"
+#include "../measure/measure.h"
 #include "../method.h"
 #include "hexapod/message.h"
-#include "../measure/measure.h"
 
 static const double step_floor = 1e-11; /* s  the error control fails below this step */
 /* 1, 1/s, 1  limits of a call's steps, so that every call ends: base, per second, highest; of fixed
