@@ -12,13 +12,13 @@ _CELL = "of a cell that is not there only the sign of the first number is read"
 
 # (file, changed line): reason
 EQUIVALENT: dict[tuple[str, str], str] = {
-    (f"{LANES}/integrator.h", "case 5:"): "the default case computes the same sum",
+    (f"{LANES}/step.h", "case 5:"): "the default case computes the same sum",
     (
-        f"{LANES}/integrator.h",
+        f"{LANES}/step.h",
         "return step_of_n(model, from, h, m, 5, estimates, k, y);",
     ): "the fifth rate of a method with four stages has the weight 0",
     (
-        f"{LANES}/integrator.h",
+        f"{LANES}/step.h",
         "if (estimates && slot <= HX_PACKS * HX_LANES)",
     ): "the slots after the last leg hold copies of leg 0, which have its error",
     (

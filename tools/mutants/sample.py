@@ -46,7 +46,7 @@ GROUPS: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
         ),
     ),
     "integrator": (
-        ("plant_fmu/src/method.c", f"{LANES}/integrator.h"),
+        ("plant_fmu/src/method.c", f"{LANES}/integrator.h", f"{LANES}/step.h"),
         (
             f"{TESTS}plant_dynamics.py",
             *TWINS,
