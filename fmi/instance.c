@@ -83,8 +83,8 @@ void hx_instance_free(hxInstance *instance) {
 /* ----------------------------------------------------------------------------------------------
  * values */
 
-/* Updates groups of outputs. An importer that has read others at this time, and so reads in
- * several calls, gets all: two calculations are enough for any number of calls. */
+/* Updates groups of outputs. When an importer has read other groups at this time, all that are left
+ * are calculated, so that two calculations are enough for any number of its calls. */
 static void refresh_output(hxInstance *instance, unsigned groups) {
   hxInstanceState *state = &instance->state;
   if (state->output_stale) instance->fresh = 0;

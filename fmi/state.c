@@ -159,6 +159,7 @@ hxStatus hx_instance_restore(hxInstance *instance, const void *bytes) {
   if (hx_component_set_state(instance->component, block->component) != HX_OK)
     return refuse(instance, "a damaged component");
   memcpy(&instance->state, &block->instance, sizeof instance->state);
+  instance->state.output_stale = instance->state.rate_stale = 1;
   /* the state was saved by an instance with event mode, which this one does not use */
   if (instance->state.interface == HX_CO_SIMULATION && instance->state.mode == HX_MODE_EVENT &&
       !instance->uses_event_mode)

@@ -1,10 +1,11 @@
 """Calculates the reference results inside an FMU, which importers can compare with.
 
 The files are those of the FMI cross-check: NAME_in.csv, NAME_ref.csv, NAME_ref.opt. They are where
-the layered standard fmi-ls-ref (1.0.0-alpha.1) has related files, with its manifest. The inputs (a
-force on the torso, two moving joints) are sampled at every communication step, so that results do
-not depend on the importer's interpolation. The outputs depend on the state only, so that they may
-be read before or after the next inputs are set.
+the layered standard fmi-ls-ref (1.0.0-alpha.1, the version that the text of its tag v1.0.0-beta.1
+gives) has related files, with its manifest. The inputs (a force on the torso, two moving joints)
+are sampled at every communication step, so that results do not depend on the importer's
+interpolation. The outputs depend on the state only, so that they may be read before or after the
+next inputs are set.
 
 An FMU of FMI 3.0 has arrays: a column is a whole array, with its elements in a cell, separated by
 spaces, as fmpy and the Reference FMUs read and write them. Its binary is that of FMI 2.0 and gives

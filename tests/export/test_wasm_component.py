@@ -165,6 +165,8 @@ def test_the_plant_has_the_bits_of_the_native_one_over_a_walk(
         assert getattr(result, "last-successful-time") == number * STEP + STEP
         found.append(component.do("get-float64", seen))
     assert outputs.shape == (300, OUTPUTS)
+    page = Path(__file__).parents[2] / "docs/platforms.md"
+    assert f"300 steps with {OUTPUTS} real outputs" in page.read_text(encoding="utf-8")
     assert np.array_equal(np.array(found).view(np.int64), outputs.view(np.int64))
     assert np.ptp(outputs, axis=0).max() > 0.1
 

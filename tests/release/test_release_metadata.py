@@ -47,6 +47,8 @@ def test_the_release_workflow_runs_targets_that_exist_and_publishes_nothing() ->
     makefile = (ROOT / "Makefile").read_text(encoding="utf-8")
     for target in re.findall(r"make ([\w-]+)", commands):
         assert re.search(rf"^{target}:", makefile, re.MULTILINE), target
+    used = {step["uses"].partition("@")[0] for step in job["steps"] if "uses" in step}
+    assert used == {"actions/checkout", "actions/setup-python", "actions/upload-artifact"}
     assert "upload " not in commands
     assert "publish" not in commands
 

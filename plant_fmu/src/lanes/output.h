@@ -363,8 +363,8 @@ static void fill_forces(const hxModel *model, const hxState *state, const hxWork
 static void fill_motion(const hxState *state, const hxWork *work, hxOutput *o) {
   o->time = state->time;
   fill_torso(&state->motion, work, o);
-  o->supply_voltage = 0.0; /* hx_plant_output_groups() sets both: it belongs to the command, */
-  o->footprints = 0.0;     /* and they are outside the state */
+  /* hx_plant_output_groups() sets both afterwards: they are not in the state */
+  o->supply_voltage = o->footprints = 0.0;
   for (int i = 0; i < HX_CONE_BINS; ++i) o->cone_time[i] = state->measured.cone_time[i];
   o->solver.evaluations = state->evaluations;
   o->solver.steps = state->steps;
