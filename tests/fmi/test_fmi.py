@@ -46,7 +46,7 @@ def test_the_fmu_stands_still_in_fmpy(athena_fmu: Path) -> None:
     assert abs(result["torso.position[3]"] - result["torso.position[3]"][0]).max() < settled
 
 
-def test_the_standard_and_the_shared_work_space_alone_are_exported(plant_library: Path) -> None:
+def test_no_other_function_is_exported(plant_library: Path) -> None:
     nm = shutil.which("nm")
     assert nm is not None
     listing = subprocess.run(
