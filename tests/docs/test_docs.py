@@ -22,6 +22,7 @@ from urllib.parse import unquote
 
 import numpy as np
 import pytest
+from browser import FLAGS, PATIENCE, launcher
 from pages import blocks, commands, run, typed
 
 from hexapod_cosim.models import JOINT_NAMES, load_robot
@@ -114,6 +115,20 @@ def test_the_site_needs_no_network(site: Path) -> None:
     fetched = re.compile("|".join(f"""{kind}["']?https?:""" for kind in kinds))
     for path in [*site.rglob("*.html"), *site.rglob("*.css")]:
         assert not fetched.search(path.read_text(encoding="utf-8")), path
+
+
+@of_the_site
+def test_the_front_page_of_the_site_walks(site: Path) -> None:
+    """Its robot is a page in a frame, opened from the disk without a network."""
+    with launcher() as launch:
+        page = launch(*FLAGS).new_context(offline=True).new_page()
+        page.set_default_timeout(PATIENCE)
+        page.goto((site / "index.html").as_uri())
+        frame = page.wait_for_selector("iframe.walk").content_frame()
+        frame.wait_for_function("window.hexapod && window.hexapod.poses.newest")
+        frame.locator("canvas").first.click()
+        page.keyboard.down("w")
+        frame.wait_for_function("window.hexapod.poses.newest.position[0] > 0.03")
 
 
 @of_the_site
