@@ -1,6 +1,10 @@
 /* component.c - the controller as an FMU's component */
 #include "fmi/component.h"
 
+#include <string.h>
+
+#include "src/state.h"
+
 static hxController *controller_of(hxComponent *component) { return (hxController *)component; }
 static const hxController *const_controller(const hxComponent *component) {
   return (const hxController *)component;
@@ -38,7 +42,14 @@ static int is_same_gait(const hxGait *a, const hxGait *b) {
   return same;
 }
 
-/* Changes control and gait to those of the parameters, which are tunable. */
+/* Returns whether the controller has the control and the gait of the parameters, which are tunable.
+ */
+static int is_same_walk(const hxController *controller, const struct hxVariables *variables) {
+  return variables->definition.control == hx_controller_control(controller) &&
+         is_same_gait(&variables->definition.gait, hx_controller_gait(controller));
+}
+
+/* Changes control and gait to those of the parameters. */
 static hxStatus follow(hxController *controller, const struct hxVariables *variables) {
   const hxGait *wanted = &variables->definition.gait;
   const int control = variables->definition.control;
@@ -50,17 +61,43 @@ static hxStatus follow(hxController *controller, const struct hxVariables *varia
   return hx_controller_change_gait(controller, wanted);
 }
 
+/* Changes the walk and steps, on a copy, so that a refusal of either change or of the step leaves
+ * the controller as it was. */
+static hxStatus step_in_another_walk(hxController *controller, const struct hxVariables *variables,
+                                     const hxInput *rate, double t_end) {
+  hxController next = *controller;
+  hxStatus status = follow(&next, variables);
+  if (status == HX_OK) status = hx_controller_step(&next, &variables->input, rate, t_end);
+  if (status == HX_OK)
+    *controller = next;
+  else
+    memcpy(controller->message, next.message, sizeof next.message);
+  return status;
+}
+
 hxStatus hx_component_step(hxComponent *component, const struct hxVariables *variables,
                            const hxInput *rate, double t_end) {
-  const hxStatus status = follow(controller_of(component), variables);
-  if (status != HX_OK) return status;
-  return hx_controller_step(controller_of(component), &variables->input, rate, t_end);
+  hxController *controller = controller_of(component);
+  if (is_same_walk(controller, variables))
+    return hx_controller_step(controller, &variables->input, rate, t_end);
+  return step_in_another_walk(controller, variables, rate, t_end);
+}
+
+/* Calculates the output after a change of the walk, which only a step makes: on a copy, so that no
+ * reading changes the controller. A refused change is not shown; the step reports it. */
+static void output_in_another_walk(const hxController *controller, struct hxVariables *variables) {
+  hxController next = *controller;
+  if (follow(&next, variables) != HX_OK) next = *controller;
+  hx_controller_output(&next, &variables->input, &variables->output);
 }
 
 void hx_component_output(hxComponent *component, struct hxVariables *variables, unsigned groups) {
+  hxController *controller = controller_of(component);
   (void)groups; /* there is one */
-  (void)follow(controller_of(component), variables); /* a step reports a refusal */
-  hx_controller_output(controller_of(component), &variables->input, &variables->output);
+  if (is_same_walk(controller, variables))
+    hx_controller_output(controller, &variables->input, &variables->output);
+  else
+    output_in_another_walk(controller, variables);
 }
 
 double hx_component_time(const hxComponent *component) {

@@ -194,14 +194,13 @@ void hx_controller_change(hxControllerModel model[2], hxControllerState *state) 
 
 /* -------------------------------------------------------------------------- change of control */
 
-void hx_controller_exchange(hxControllerModel model[2], const hxFootPathsModel *before,
+void hx_controller_exchange(hxControllerModel *model, const hxFootPathsModel *before,
                             hxControllerState *state) {
-  hxControllerModel *now = &model[state->model];
   hxControllerOutput *output = &state->output;
-  hx_fade_begin(&now->fade, output, &state->fade);
-  hx_foot_paths_carry(&now->paths, before, &state->paths);
-  if (now->compliant)
-    hx_compliant_reset(&now->laws, &state->compliant);
+  hx_fade_begin(&model->fade, output, &state->fade);
+  hx_foot_paths_carry(&model->paths, before, &state->paths);
+  if (model->compliant)
+    hx_compliant_reset(&model->laws, &state->compliant);
   else
     state->paths.narrowing = 0.0;
   memset(&state->paper, 0, sizeof state->paper);

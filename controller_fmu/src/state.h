@@ -85,10 +85,11 @@ void hx_controller_adopt(hxControllerModel model[2], hxControllerState *state);
 /* Begins a change to the gait of the other model (C55). */
 void hx_controller_change(hxControllerModel model[2], hxControllerState *state);
 
-/* Goes on under another control, which both models have been compiled for, in the present phase of
- * the walk: the plan keeps its state, the laws begin anew, and the joint commands fade over from
- * the last ones. before: the paths' model of the present gait under the control before. */
-void hx_controller_exchange(hxControllerModel model[2], const hxFootPathsModel *before,
+/* Goes on under another control, which the present model has been compiled for, in the present
+ * phase of the walk: the plan keeps its state, the laws begin anew, and the joint commands fade
+ * over from the last ones. before: the paths' model of the present gait under the control before.
+ */
+void hx_controller_exchange(hxControllerModel *model, const hxFootPathsModel *before,
                             hxControllerState *state);
 
 /* Computes one tick; state->output then holds the commands for this input. */

@@ -96,6 +96,16 @@ static void compile_again(const hxController *controller, hxControllerModel *mod
   hx_controller_compile(&definition, model);
 }
 
+/* Begins the walk anew under the present model, at the present time. */
+static void begin_again(hxController *controller) {
+  hxControllerState *state = &controller->state;
+  const int model = state->model;
+  const double time = state->time; /* steps that were too short for a tick may have passed */
+  hx_controller_begin(model_of(controller), state->start, state);
+  state->time = time;
+  state->model = model;
+}
+
 hxStatus hx_controller_change_control(hxController *controller, int control) {
   char message[HX_MESSAGE_SIZE];
   hxControllerState *state = &controller->state;
@@ -110,11 +120,9 @@ hxStatus hx_controller_change_control(hxController *controller, int control) {
   compile_again(controller, &controller->model[state->model]);
   if (state->changing) compile_again(controller, &controller->model[1 - state->model]);
   if (state->tick > 0) {
-    hx_controller_exchange(controller->model, &paths, state);
+    hx_controller_exchange(&controller->model[state->model], &paths, state);
   } else {
-    const int model = state->model;
-    hx_controller_begin(model_of(controller), state->start, state);
-    state->model = model;
+    begin_again(controller);
   }
   controller->ahead.known = 0;
   return HX_OK;
