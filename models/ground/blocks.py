@@ -109,6 +109,14 @@ def block_face(surface: Surface, point: Array, kind: str, cell: Cell) -> tuple[f
     return min(faces, key=lambda face: face[0]) if faces else None
 
 
+def depth_beside(surface: Surface, centre: Array, radius: float, cell: Cell) -> float:
+    """Returns the depth [m] of a sphere at (3,) in the walls, edges and corners around a cell, 0
+    where it touches none.
+    """
+    faces = [block_face(surface, centre, kind, cell) for kind in FACES[1:]]
+    return max(0.0, *(radius - (math.inf if face is None else face[0]) for face in faces))
+
+
 def _column(surface: Surface, row: int, column: int) -> float:
     """Returns the height [m] of a column, of the border's beyond the map."""
     r, c = min(max(row, 0), surface.rows - 1), min(max(column, 0), surface.columns - 1)

@@ -14,7 +14,7 @@ import numpy as np
 from hexapod_cosim.models.body.contacts import side_on_ground
 from hexapod_cosim.models.body.pairs import pair_contacts
 from hexapod_cosim.models.contact import FootContact, contact_damping
-from hexapod_cosim.models.ground.blocks import Cell, cell_at, is_uneven, outside
+from hexapod_cosim.models.ground.blocks import Cell, cell_at, depth_beside, is_uneven, outside
 from hexapod_cosim.models.ground.surface import LAW, MU, MU_STATIC, STIFFNESS, Surface
 from hexapod_cosim.models.kinematics import LEGS, foot_centres
 from hexapod_cosim.models.records import Array, Robot, Soil
@@ -42,6 +42,7 @@ from hexapod_cosim.models.touch.prints import (
 )
 
 SAME_FACE = 1e-6  # m, 1  depth and normal of one contact at both sides of a border between cells
+FAR = 1e3  # m  within its cell is a foot that has none or keeps it
 
 
 @dataclass(frozen=True)
@@ -50,7 +51,7 @@ class Depths:
 
     delta: Array  # (n,) m  above the depth at which spheres touch soil; legs' pairs last
     ddelta: Array  # (n,) m/s
-    outside: Array  # (6,) m  < 0: inside; -inf: no cell is held
+    outside: Array  # (6,) m  < 0: inside; -FAR: no cell is held, or it is kept
 
 
 def has_cells(robot: Robot) -> bool:
@@ -64,26 +65,35 @@ def depths_of(robot: Robot, body: Array, contacts: Contacts) -> Depths:
     found = [*contacts_at(robot, body, contacts), *pair_contacts(robot, body)]
     delta = np.array([contact.penetration for contact in found])
     delta[: len(contacts.sunk)] -= contacts.sunk
-    far = np.full(LEGS, -math.inf)
+    far = np.full(LEGS, -FAR)
     surface = surface_of(robot.terrain)
     if surface is not None and has_cells(robot):
-        for leg, (x, y, _) in enumerate(foot_centres(robot, body).tolist()):
+        for leg, at in enumerate(foot_centres(robot, body)):
             cell = contacts.cell[leg]
-            if cell is not None and not keeps_block(surface, contacts, leg, cell_at(surface, x, y)):
-                far[leg] = outside(surface, x, y, cell)
+            way = -FAR if cell is None else outside(surface, float(at[0]), float(at[1]), cell)
+            far[leg] = -FAR if way > 0.0 and keeps_block(robot, contacts, leg, at) else way
     return Depths(delta, np.array([contact.approach_speed for contact in found]), far)
 
 
-def keeps_block(surface: Surface, contacts: Contacts, leg: int, below: Cell) -> bool:
-    """Returns whether a foot in soil or above the bottom of its print is over a block (row, column)
-    not level with its own.
+def keeps_block(robot: Robot, contacts: Contacts, leg: int, at: Array) -> bool:
+    """Returns whether a foot in soil or above the bottom of its print, which was dragged off its
+    block, keeps it. at: centre of the foot (3,) [m].
 
-    It was dragged there in its print. It keeps its block until it has left the print upwards, so
-    that no edge meets it at the depth of its print.
+    It changes to a level block beside its own alone, and not while it is deeper in the faces around
+    that block than in those around its own: it may have passed through others, and no face may
+    begin at a depth.
     """
     held, own = contacts.held[leg], contacts.cell[leg]
     in_print = contacts.sunk[leg] > 0.0 or (held.is_soft and not held.is_open)
-    return in_print and own is not None and surface.height[below] != surface.height[own]
+    surface = surface_of(robot.terrain)
+    if not in_print or own is None or surface is None:
+        return False
+    below = cell_at(surface, float(at[0]), float(at[1]))
+    is_near = max(abs(below[0] - own[0]), abs(below[1] - own[1])) <= 1
+    if not is_near or surface.height[below] != surface.height[own]:
+        return True
+    new, old = (depth_beside(surface, at, robot.foot.radius, cell) for cell in (below, own))
+    return new > old + SAME_FACE
 
 
 # touch-down and lift-off

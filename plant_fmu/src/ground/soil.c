@@ -109,7 +109,10 @@ hxSoilCurve hx_soil_shear_base(const hxSoil *soil, double z) {
 /* Returns the second derivative of the integral of eq. 41, times a pressure modulus, z > 0. */
 static double bend_of_columns(const hxSoil *soil, double modulus, double n, double z) {
   const double R = soil->radius, p = hx_pow(z, n);
-  if (soil->pad > 0.0) return modulus * soil->area * n * (n - 1.0) * p / (z * z);
+  if (soil->pad > 0.0) {
+    const double bend = n * (n - 1.0); /* 0: z * z may be 0, too */
+    return bend == 0.0 ? 0.0 : modulus * soil->area * bend * p / (z * z);
+  }
   const double above = z > R ? hx_pow(z - R, n) : 0.0;
   return 2.0 * pi * modulus * (p * (n * R / z - 1.0) + above);
 }

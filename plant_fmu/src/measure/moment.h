@@ -10,6 +10,8 @@
 
 enum { LANDING_SAMPLES = 200 }; /* samples of a landing, which lasts 20 ms */
 
+static const double same_depth = 1e-6; /* m  of a foot in the faces around two blocks */
+
 /* Stores a row of contacts of bodies with centres of mass r and angular velocities w. */
 HX_INLINE void store_contact_moment(const hxModel *model, const hxContactKinematics *kin, int row,
                                     int slot, hxVec3 r, hxVec3 w, hxContactMoment *moment) {
@@ -243,17 +245,34 @@ static inline void hx_copy_moment(const hxModel *model, hxMoment *to, const hxMo
   if (model->elastic) hx_copy_gears(to, from);
 }
 
-/* Returns whether a foot in soil or above the bottom of its print is over a block that is not level
- * with its own: it was dragged there in its print. It keeps its block until it has left the print
- * upwards, so that no edge meets it at the depth of its print. */
+/* Returns the depth of a foot in the walls, edges and corners around a cell, 0: none touched. */
+HX_RARE double depth_beside(const hxModel *model, const double cell[2], const double centre[3]) {
+  static const hxFaceKind beside[] = {HX_FACE_WALL, HX_FACE_SIDE, HX_FACE_CORNER};
+  double depth = 0.0;
+  for (size_t k = 0; k < sizeof beside / sizeof beside[0]; ++k) {
+    hxFace face;
+    hx_terrain_face(model->terrain, beside[k], cell, centre, 0, &face);
+    depth = fmax(depth, model->radius[HX_FOOT] - face.distance);
+  }
+  return depth;
+}
+
+/* Returns whether a foot in soil or above the bottom of its print, which was dragged off its block,
+ * keeps it. It changes to a level block beside its own alone, and not while it is deeper in the
+ * faces around that block than in those around its own: it may have passed through others, and no
+ * face may begin at a depth. */
 HX_RARE int keeps_block(const hxModel *model, const hxContactState *state, int leg,
                         const double centre[3]) {
+  const hxTerrain *terrain = model->terrain;
+  const double own[2] = {state->cell[0][leg], state->cell[1][leg]};
   double cell[2];
   if (!is_in_soil(state, HX_FOOT, leg) && !(state->plastic[hx_soil_row(HX_FOOT)][leg] > 0.0))
     return 0;
-  hx_terrain_cell_at(model->terrain, centre, cell);
-  return hx_terrain_column(model->terrain, cell[0], cell[1]) !=
-         hx_terrain_column(model->terrain, state->cell[0][leg], state->cell[1][leg]);
+  hx_terrain_cell_at(terrain, centre, cell);
+  if (fabs(cell[0] - own[0]) > 1.0 || fabs(cell[1] - own[1]) > 1.0 ||
+      hx_terrain_column(terrain, cell[0], cell[1]) != hx_terrain_column(terrain, own[0], own[1]))
+    return 1;
+  return depth_beside(model, cell, centre) > depth_beside(model, own, centre) + same_depth;
 }
 
 /* Copies the places of feet, and of bodies where the ground has materials or soil, and computes how

@@ -1,0 +1,100 @@
+"""A foot that is dragged in its print through blocks of other heights meets no face at a depth: it
+changes to a level block beside its own alone, where the faces around both agree.
+"""
+
+from __future__ import annotations
+
+import ctypes as ct
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from states import changed
+from test_twin_motion import FEET, Pair, stood
+
+from hexapod_cosim.models.dynamics import Command
+from hexapod_cosim.models.ground.patches import material_row
+from hexapod_cosim.models.ground.surface import Surface
+from hexapod_cosim.models.kinematics import foot_centres
+from hexapod_cosim.models.records import Array, Terrain
+
+CELL = 0.031  # m
+SLIPPERY = changed(FEET, foot={"pad_radius": 0.025}, friction={"mu": 0.05})
+
+
+def dragged(
+    core: ct.CDLL, height: Array, velocity: tuple[float, float], before: tuple[float, float]
+) -> Pair:
+    """Returns plant and twin, whose first foot is in sand on block (20, 20).
+
+    height: (40, 40) m, of the blocks. velocity: of the robot along x and y [m/s]. before: the ways
+    of the foot to the upper ends of its block along x and y [m].
+
+    It sinks at first: whether soil yields at a foot that moves level depends on the last bits.
+    """
+    body = stood(SLIPPERY, height=-1e-3, velocity=(*velocity, -0.02))
+    foot = foot_centres(SLIPPERY, body)[0]
+    material = np.zeros((40, 40), dtype=np.uint8)
+    material[18:23, :21] = 1
+    surface = Surface(
+        kind="blocks",
+        height=height,
+        x0=float(foot[0]) + before[0] - CELL * 21,
+        y0=float(foot[1]) + before[1] - CELL * 21,
+        cell=CELL,
+        material=material,
+        materials=material_row({"soil": "dry_sand"})[None],
+    )
+    return Pair(core, replace(SLIPPERY, terrain=Terrain(kind="grid", surface=surface)), body)
+
+
+def still(_: float) -> Command:
+    return Command(angle_ref=SLIPPERY.stance)
+
+
+def block_below(pair: Pair) -> tuple[int, int]:
+    """Returns row and column of the block below the first foot."""
+    surface = pair.robot.terrain.surface
+    assert surface is not None
+    x, y, _ = foot_centres(pair.robot, pair.state.body)[0].tolist()
+    return int((y - surface.y0) // CELL), int((x - surface.x0) // CELL)
+
+
+def assert_closed(pair: Pair) -> None:
+    """Asserts that the books close: a wall at the depth of a radius would give 12 J."""
+    energy = pair.plant.output().energy
+    assert abs(energy.residual) < 1e-3 * energy.dissipated
+
+
+def test_a_foot_that_was_dragged_through_a_higher_block_meets_no_wall_behind_it(
+    core: ct.CDLL,
+) -> None:
+    """Along x: its own block, a trench, a block that is 10 mm higher, level ones."""
+    height = np.zeros((40, 40))
+    height[17:24, 21], height[17:24, 22] = -0.03, 0.01
+    pair = dragged(core, height, (1.6, 0.0), (1e-3, 0.5 * CELL))
+    state = pair.move(0.06, still)
+    assert_closed(pair)
+    pair.assert_same()
+    assert block_below(pair) == (20, 23)
+    assert state.contacts.cell[0] == (20, 20)
+    assert state.contacts.held[0].is_soft
+
+
+def test_a_foot_that_comes_over_a_trench_to_a_level_block_meets_no_corner_at_a_depth(
+    core: ct.CDLL,
+) -> None:
+    """Along the diagonal: its own block, a trench beside a block that is 10 mm higher, a level
+    block. It changes to level ground when it is no longer in the corner of the higher block.
+    """
+    height = np.zeros((40, 40))
+    height[20, 21], height[20, 22] = -0.03, 0.01
+    pair = dragged(core, height, (0.7, 0.7), (1e-3, 0.024))
+    kept = pair.move(0.05, still)
+    assert_closed(pair)
+    assert block_below(pair) == (21, 21)
+    assert kept.contacts.cell[0] == (20, 20)
+    left = pair.move(0.08, still)
+    assert_closed(pair)
+    pair.assert_same()
+    assert left.contacts.cell[0] == block_below(pair) == (21, 22)
