@@ -280,7 +280,7 @@ def test_nonsense_is_answered_and_after_a_while_ends_the_connection(running: Run
             opened.send(b"\xff\x00")
         end = closing(opened)
         assert end.rcvd is not None
-        assert end.rcvd.reason == "too many messages that are none"
+        assert end.rcvd.reason == "too many messages were not valid"
 
 
 def test_too_large_a_message_ends_the_connection(running: Running) -> None:
@@ -354,7 +354,7 @@ def test_a_hub_drops_what_exceeds_the_rate_of_a_page() -> None:
 @pytest.mark.parametrize(
     ("text", "at_once", "rate", "reason"),
     [
-        ("nonsense", 20, 0.1, "too many messages that are none"),
+        ("nonsense", 20, 0.1, "too many messages were not valid"),
         ('{"type": "ping", "stamp": 1}', 2200, 20.0, "too many messages"),
     ],
 )

@@ -115,7 +115,7 @@ function makeStage(runs: readonly Run[]): Stage | undefined {
   } catch {
     showReason(
       host,
-      "The replay needs WebGL, which this browser does not offer. Plots and tables do without.",
+      "This browser has no WebGL, which the replay needs. Plots and tables work.",
     );
     return undefined;
   }

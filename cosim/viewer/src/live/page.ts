@@ -67,7 +67,7 @@ function makeView(): View | undefined {
     return new View(byId("stage")!);
   } catch {
     const text =
-      "The robot is drawn with WebGL, which this browser does not offer. Keys and plots do without.";
+      "This browser has no WebGL, so the robot is not drawn. Keys and plots work.";
     byId("stage")?.append(element("p", "refusal", text));
     return undefined;
   }
