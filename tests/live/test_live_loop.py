@@ -318,7 +318,8 @@ def test_a_change_that_needs_a_stand_is_told_to_all_pages(side: Side, tmp_path: 
         side.post("set", 1, Change("control", "Stands"))
         turn(loop, 10)
         assert [note for _, note in side.last("status")["notes"]] == [
-            "The robot stops, and walks on with Stands: only built-in controls take over a walk without a stop."
+            "The robot stops, and walks on with Stands: only built-in controls take over a walk "
+            "without a stop."
         ]
 
 
