@@ -1,4 +1,4 @@
-"""Gains that `hexapod live` and `hexapod realtime` design for the robot as it walks."""
+"""What `hexapod live` and `hexapod realtime` design gains for: the robot as it walks there."""
 
 from __future__ import annotations
 
@@ -6,26 +6,41 @@ from typing import Any
 
 import pytest
 from command import Call
+from gains import make_gains
 
 from hexapod_cosim.controller import Gains
 from hexapod_cosim.cosim.live import realtime, server
 from hexapod_cosim.cosim.live.settings import Choices
-from hexapod_cosim.cosim.run.preparation import chosen_gains
+from hexapod_cosim.cosim.run import preparation
 from hexapod_cosim.cosim.scenario.scenario import load_scenario
-from hexapod_cosim.models import HexapodError
+from hexapod_cosim.models import HexapodError, Robot
 
-NAMED = ["control=compliant", "gait.name=tripod"]  # what a recording on rubble names
+Keys = list[tuple[Robot, float]]
+# a recording on rubble names the gait, so compliant control does not choose another stance in it
+NAMED = ["control=compliant", "gait.name=tripod"]
+
+
+@pytest.fixture
+def designed(monkeypatch: pytest.MonkeyPatch) -> Keys:
+    """Robots and periods [s] that gains are designed for."""
+    keys: Keys = []
+
+    def design(robot: Robot, period: float) -> Gains:
+        keys.append((robot, period))
+        return make_gains(robot, period=period)
+
+    monkeypatch.setattr(preparation, "designed_gains", design)
+    return keys
 
 
 def test_live_designs_gains_for_the_walk_that_a_recording_names(
-    call: Call, monkeypatch: pytest.MonkeyPatch
+    call: Call, monkeypatch: pytest.MonkeyPatch, designed: Keys
 ) -> None:
-    given: list[Gains | None] = []
-
     class Server:
         def __init__(self, choices: Choices, gains: Gains | None, *, port: int) -> None:
-            assert (choices.first().control, choices.first().gait) == ("compliant", "tripod")
-            given.append(gains)
+            first = choices.first()
+            assert (first.control, first.gait, port) == ("compliant", "tripod", 0)
+            assert gains is not None
 
         def run(self, ready: Any) -> None:
             ready("http://127.0.0.1:1/token/")
@@ -33,19 +48,15 @@ def test_live_designs_gains_for_the_walk_that_a_recording_names(
     monkeypatch.setattr(server, "LiveServer", Server)
     code, out, _ = call("live", "rubble", "--control", "compliant", "--no-browser")
     assert (code, "stopped" in out) == (0, True)
-    assert given == [chosen_gains(load_scenario("rubble", overrides=NAMED))]
-    assert given != [chosen_gains(load_scenario("rubble", overrides=NAMED[:1]))]
+    assert designed == [preparation.design_key(load_scenario("rubble", overrides=NAMED))]
 
 
 def test_realtime_designs_gains_for_the_walk_that_it_measures(
-    call: Call, monkeypatch: pytest.MonkeyPatch
+    call: Call, monkeypatch: pytest.MonkeyPatch, designed: Keys
 ) -> None:
-    given: list[Gains | None] = []
-
-    def measure(scenario: Any, *, gains: Gains | None, **_options: Any) -> None:
-        given.append(gains)
+    def measure(*_scenario: Any, **_options: Any) -> None:
         raise HexapodError("enough")
 
     monkeypatch.setattr(realtime, "measure", measure)
     assert call("realtime", "rubble", "--control", "compliant", "--step", "0.005")[0] == 1
-    assert given == [chosen_gains(load_scenario("rubble", overrides=NAMED))]
+    assert designed == [preparation.design_key(load_scenario("rubble", overrides=NAMED))]
