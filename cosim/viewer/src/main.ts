@@ -113,10 +113,7 @@ function makeStage(runs: readonly Run[]): Stage | undefined {
       ),
     );
   } catch {
-    showReason(
-      host,
-      "This browser has no WebGL, which the replay needs. Plots and tables work.",
-    );
+    showReason(host, "This browser has no WebGL, which the replay needs. Plots and tables work.");
     return undefined;
   }
 }
