@@ -153,7 +153,8 @@ def test_control_friction_and_place_answer(page: Any) -> None:
 
 def test_an_error_of_any_kind_is_shown_as_the_fault_and_ends_with_a_new_start(page: Any) -> None:
     page.evaluate(
-        "window.hexapod.link.walker.advance = () => { throw new RangeError('no memory left') }"
+        "() => { window.hexapod.link.walker.advance ="
+        " () => { throw new RangeError('no memory left') } }"
     )
     page.wait_for_selector("#fault:not([hidden])")
     assert page.inner_text("#fault-text") == "RangeError: no memory left"
@@ -164,7 +165,7 @@ def test_an_error_of_any_kind_is_shown_as_the_fault_and_ends_with_a_new_start(pa
     page.wait_for_function(f"{FRAME}.time > 0.2")
     # an error of what a page asks for is shown as well
     page.evaluate(
-        "window.hexapod.link.walker.change = () => { throw new Error('no such control') }"
+        "() => { window.hexapod.link.walker.change = () => { throw new Error('no such control') } }"
     )
     page.click("#controls [data-value=compliant]")
     page.wait_for_selector("#fault:not([hidden])")
