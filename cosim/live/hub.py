@@ -29,12 +29,12 @@ from hexapod_cosim.models import HexapodError
 MOST_CLIENTS = 8
 RATE, BURST = 100.0, 200.0  # messages per second and at once, of a page
 ACTION_RATE, ACTION_BURST = 10.0, 20.0  # of settings and actions among them
-# messages above the rate and messages that are none, after which a page is closed: so many at once,
-# and the rates [1/s] at which they are forgotten
+# messages above the rate and messages that are not valid, after which a page is closed: so many
+# at once, and the rates [1/s] at which they are forgotten
 MOST_DROPPED, DROPPED_RATE = 2000, 20.0
 MOST_REFUSED, REFUSED_RATE = 20, 0.1
 MOST_ACTIONS = 64  # settings and actions that wait for the loop
-FLOOD, NONSENSE = "too many messages", "too many messages that are none"
+FLOOD, NONSENSE = "too many messages", "too many messages were not valid"
 
 
 class Bucket:

@@ -31,7 +31,7 @@ SILENCE = 1.0  # s    after which a drive or push that was not renewed ends
 IDLE = 0.05  # s    between two looks for messages while the loop pauses
 MOST_MESSAGES = 200  # that are read before a macro-step
 MOST_NOTES = 5  # sentences for pages that are kept
-HALTS = "only built-in controls hand the walk over."
+HALTS = "only built-in controls take over a walk without a stop."
 UNCHANGED = "before the first change of gait, control or friction."
 FREE, RECORDING, REPLAYING = "free", "recording", "replaying"
 

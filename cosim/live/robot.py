@@ -15,7 +15,8 @@ Changes while the robot walks:
   commands pass from the old ones to the new ones.
 - ground: the robot is placed at its start on the new ground.
 
-A controller that raises an exception is replaced by one that holds the joints where they are.
+A controller that raises an exception, ends the program or commands a value that the plant refuses
+is replaced by one that holds the joints where they were commanded to be last.
 """
 
 from __future__ import annotations
@@ -30,6 +31,7 @@ from hexapod_cosim.cosim.common.closing import Closing
 from hexapod_cosim.cosim.control.controllers import make_controller
 from hexapod_cosim.cosim.export.controller_export import export_controller
 from hexapod_cosim.cosim.interface.controller_interface import controller_parameters
+from hexapod_cosim.cosim.live.fault import text_of
 from hexapod_cosim.cosim.live.gait_change import GaitChange, begin_change
 from hexapod_cosim.cosim.live.protocol import Change
 from hexapod_cosim.cosim.live.settings import Choices, Limits, Settings, find_limits, gait_of
@@ -49,7 +51,7 @@ from hexapod_cosim.cosim.run.run import (
     make_sensor,
 )
 from hexapod_cosim.cosim.scenario.controls import control_of
-from hexapod_cosim.models import HexapodError
+from hexapod_cosim.models import FmuError, HexapodError
 
 HORIZON = 1e6  # s    stop time of the FMUs
 FADE = 0.4  # s    from the joint commands of one controller to those of the next
@@ -283,8 +285,8 @@ class LiveRobot(Closing):
         """Starts the controller; one that cannot start is a fault, and the joints hold."""
         try:
             self._start_controller()
-        except Exception as error:  # of a user's controller
-            self.fault = _text_of(error)
+        except BaseException as error:  # of a user's controller
+            self.fault = text_of(error)
 
     def _start_controller(self) -> None:
         """Makes the controller of the plan, which begins at the present time in the stance."""
@@ -333,13 +335,27 @@ class LiveRobot(Closing):
             if self.fault or self._stop.reached(self._last.angle_ref):
                 self._take_over()
         self._signals.push[:3] = force
-        self._signals.write(self._joints(command))
         try:
+            self._write(self._joints(command))
             self.advance(self.time, scenario.macro_step)
             self.count += 1
             self._signals.read()
         except HexapodError as error:
             self.fault, self.stopped = str(error), True
+
+    def _write(self, joints: JointCommand) -> None:
+        """Writes joint commands, or those that hold if the plant refuses them. Raises FmuError."""
+        try:
+            self._signals.write(joints)
+        except FmuError as error:
+            if self.fault:
+                raise
+            self.fault = str(error)
+            joints = self._holding()
+            self._signals.write(joints)
+        # copies, because a controller may write its next commands into the same arrays
+        angle, torque = joints.angle_ref.copy(), joints.torque_ref.copy()
+        self._last = JointCommand(angle_ref=angle, torque_ref=torque)
 
     def _joints(self, command: BodyCommand) -> JointCommand:
         """Returns the joint commands of the controller; after a fault, those that hold."""
@@ -347,15 +363,13 @@ class LiveRobot(Closing):
             return self._last
         try:
             found = self._controller.step(self.time, command, self._signals.measurement)
-        except Exception as error:  # a user's controller may raise anything
-            self.fault = _text_of(error)
-            self._last = self._holding()
-            return self._last
+        except BaseException as error:  # a user's controller may raise anything
+            self.fault = text_of(error)
+            return self._holding()
         if self._fading > 0:
             share = 1.0 - self._fading / self._steps_of(FADE)
             self._fading -= 1
             found = blend(self._from, found, share, self._steps_of(FADE) * self._h)
-        self._last = found  # what the joints were commanded, whatever comes next
         return found
 
     def _holding(self) -> JointCommand:
@@ -388,8 +402,3 @@ class LiveRobot(Closing):
     def close(self) -> None:
         """Frees the FMUs."""
         self._open.close()
-
-
-def _text_of(error: Exception) -> str:
-    """Returns what happened, in a sentence."""
-    return str(error) if isinstance(error, HexapodError) else f"{type(error).__name__}: {error}"

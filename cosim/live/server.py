@@ -260,11 +260,12 @@ class LiveServer:
     def _received(self, kind: str, content: Any) -> None:
         """Takes a message of the loop, in the link's thread."""
         loop = self._loop
-        if kind == "lost":
+        if kind in ("lost", "refused"):
             if self._server is not None and not self._server.should_exit:
-                self.lost = LiveError(
+                ended = LiveError(
                     "the loop's process has ended by itself", fix="start `hexapod live` again"
                 )
+                self.lost = content if kind == "refused" else ended
                 self._server.should_exit = True
             return
         if loop is not None and not loop.is_closed():

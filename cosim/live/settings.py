@@ -136,6 +136,15 @@ class Choices:
         return scenario_from_table(still.to_table(), where=base.where)
 
 
+def live_scenario(scenario: Scenario) -> Scenario:
+    """Returns the scenario that a live robot begins with, for which its gains are designed.
+
+    It names the gait, so compliant control does not choose gait and stance.
+    """
+    choices = Choices(scenario, control_texts(scenario, ()), {})
+    return choices.scenario_with(choices.first())
+
+
 def shown_speed(choices: Choices) -> float:
     """Returns the speed (0 to 1) with which a page begins: that of the scenario's fastest walk."""
     scenario = choices.scenario

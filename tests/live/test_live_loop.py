@@ -8,12 +8,14 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from gains import make_gains
 
 from hexapod_cosim.cosim.live.loop import Loop
 from hexapod_cosim.cosim.live.protocol import Action, Change, Drive, Ping, Push
 from hexapod_cosim.cosim.live.robot import LiveRobot
 from hexapod_cosim.cosim.live.settings import Choices, control_texts
 from hexapod_cosim.cosim.scenario.scenario import load_scenario, scenario_from_table
+from hexapod_cosim.models import load_robot
 from hexapod_cosim.models.schema import parse_toml
 
 FORWARD = Drive(forward=1.0, speed=0.3, stamp=5.0)
@@ -57,7 +59,8 @@ class Side:
 @pytest.fixture(scope="module")
 def robot() -> Iterator[LiveRobot]:
     scenario = load_scenario("walk_flat")
-    with LiveRobot(Choices(scenario, control_texts(scenario, ("kinematic",)), {})) as made:
+    choices = Choices(scenario, control_texts(scenario), {})
+    with LiveRobot(choices, gains=make_gains(load_robot("athena"))) as made:
         yield made
 
 
@@ -240,28 +243,37 @@ def test_a_recording_goes_on_over_changes_and_its_replay_repeats_them(
 ) -> None:
     side.post("do", 1, Action("record"))
     for step, change in enumerate(
-        [None, Change("gait", "tripod"), Change("gait", "ripple"), Change("friction", 0.4)]
+        [
+            None,
+            Change("gait", "tripod"),  # it is a tripod already: nothing changes
+            Change("gait", "ripple"),
+            Change("control", "compliant"),
+            Change("friction", 0.4),
+            Change("control", "paper"),
+        ]
     ):
-        if change is not None:  # the gait is a tripod already: nothing changes
+        if change is not None:
             side.post("set", 1, change)
-        for _ in range((25, 25, 150, 50)[step]):
+        for _ in range((25, 25, 150, 50, 50, 50)[step]):
             side.post("drive", 1, FORWARD)
             turn(loop, 2)
     assert side.last("status")["mode"] == "recording"
     side.post("do", 1, Action("stop"))
     first, pose = loop.robot.settings, loop.robot.signals.values.copy()
-    assert (first.gait, first.friction) == ("ripple", 0.4)
+    assert (first.gait, first.control, first.friction) == ("ripple", "paper", 0.4)
     turn(loop, 4)
     notes = [note for _, note in side.last("status")["notes"]]
     assert notes == [
-        "Recorded 2.5 s.",
+        "Recorded 3.5 s.",
         "Replay repeats all of it, Save gives the 0.5 s before the first change of gait, control or"
         " friction.",
     ]
     scenario = scenario_from_table(parse_toml(side.last("take")), where="driven.toml")
     assert scenario.duration == pytest.approx(0.5)
     side.post("do", 1, Action("replay"))
-    turn(loop, 500)
+    turn(loop, 1)
+    assert loop.robot.settings.control == "kinematic"
+    turn(loop, 699)
     assert (loop.robot.signals.values == pose).all()
     assert loop.robot.settings == first
     turn(loop, 4)
@@ -318,7 +330,8 @@ def test_a_change_that_needs_a_stand_is_told_to_all_pages(side: Side, tmp_path: 
         side.post("set", 1, Change("control", "Stands"))
         turn(loop, 10)
         assert [note for _, note in side.last("status")["notes"]] == [
-            "The robot stops, and walks on with Stands: only built-in controls hand the walk over."
+            "The robot stops, and walks on with Stands: only built-in controls take over a walk "
+            "without a stop."
         ]
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 from collections.abc import Iterator
 from dataclasses import replace
 from itertools import permutations
@@ -22,9 +23,11 @@ from hexapod_cosim.cosim.live.settings import (
     control_texts,
     find_limits,
     gait_of,
+    live_scenario,
 )
 from hexapod_cosim.cosim.live.take import NO_FORCE, Take
 from hexapod_cosim.cosim.master.fmu import Fmu
+from hexapod_cosim.cosim.run.preparation import chosen_gains
 from hexapod_cosim.cosim.run.run import RunPlan, initialise_plant
 from hexapod_cosim.cosim.run.walker import Walker
 from hexapod_cosim.cosim.scenario.reach import check_commands
@@ -335,6 +338,25 @@ def test_a_take_saved_as_a_scenario_is_the_same_walk(placed: LiveRobot) -> None:
     np.testing.assert_allclose(end, place_of(placed), rtol=0.0, atol=1e-9)
 
 
+def test_a_take_under_compliant_control_on_rubble_repeats_bit_for_bit() -> None:
+    # rubble names no gait, so compliant control alone would choose gait and stance
+    scenario = load_scenario("rubble", overrides=["control=compliant"])
+    designed = chosen_gains(live_scenario(scenario))
+    with LiveRobot(Choices(scenario, control_texts(scenario), {}), gains=designed) as robot:
+        take = Take(robot.plan.scenario)
+        turn = robot.limits.command(Drive(forward=0.4, turn=0.6, speed=0.4))
+        for command in [WALK] * 200 + [turn] * 200 + [BodyCommand()] * 50:
+            take.note(command, NO_FORCE)
+            robot.step(command, NO_FORCE)
+        names = [*vector_names("torso.position"), *joint_names("angle"), *joint_names("speed")]
+        end, settings = value(robot, *names), robot.settings
+    assert (settings.control, settings.gait) == ("compliant", "tripod")
+    saved = scenario_from_table(parse_toml(take.as_toml()), where="driven.toml")
+    with Walker(everything=True) as walker:
+        recording = walker.simulate(saved).outcome.recording
+    np.testing.assert_array_equal(recording.columns(names)[-1], end)
+
+
 def test_a_controller_that_raises_is_replaced_by_joints_that_hold(tmp_path: Path) -> None:
     (tmp_path / "law.py").write_text(FAILING, encoding="utf-8")
     scenario = load_scenario("stand", overrides=[f"control={tmp_path / 'law.py'}:Fails"])
@@ -359,6 +381,64 @@ def test_a_controller_that_raises_is_replaced_by_joints_that_hold(tmp_path: Path
         go_on(robot)
         go(robot, 200, BodyCommand())
         assert "no legs left" in robot.fault
+
+
+REFUSED = """
+import sys
+import numpy as np
+from hexapod_cosim.controller import JointCommand
+
+
+class Refused:
+    def __init__(self, robot):
+        self.command, self.count = JointCommand(angle_ref=np.array(robot.stance)), 0
+
+    def step(self, t, command, measurement):
+        self.count += 1
+        if self.count == 20:
+            {act}
+        return self.command
+"""
+REFUSALS = {
+    "angle": ("self.command.angle_ref[4, 1] = 7.0", "RM.femur.angle_ref"),
+    "torque": ("self.command.torque_ref[:] = 1e9", "LF.coxa.torque_ref"),
+    "exit": ("sys.exit(3)", "line 14, in step: SystemExit: 3; a controller must not end"),
+    "interrupt": ("raise KeyboardInterrupt", "line 14, in step: KeyboardInterrupt; a controller"),
+}
+
+
+@pytest.mark.parametrize("case", REFUSALS)
+def test_a_controller_that_commands_nonsense_or_ends_the_program_is_replaced_by_joints_that_hold(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, case: str
+) -> None:
+    act, told = REFUSALS[case]
+    monkeypatch.setattr(signal, "getsignal", lambda number: signal.SIG_IGN)  # as in its process
+    (tmp_path / "law.py").write_text(REFUSED.format(act=act), encoding="utf-8")
+    scenario = load_scenario("stand", overrides=[f"control={tmp_path / 'law.py'}:Refused"])
+    choices = Choices(scenario, control_texts(scenario, ("kinematic",)), {})
+    with LiveRobot(choices) as robot:
+        go(robot, 19, BodyCommand())
+        assert robot.fault == ""
+        held = value(robot, *joint_names("angle_ref"))
+        go(robot, 100, BodyCommand())
+        assert told in robot.fault
+        assert (robot.stopped, robot.count) == (False, 119)
+        np.testing.assert_array_equal(value(robot, *joint_names("angle_ref")), held)
+        np.testing.assert_array_equal(value(robot, *joint_names("torque_ref")), np.zeros(18))
+        robot.change(Change("control", "kinematic"))
+        go(robot, 500)
+        assert robot.fault == ""
+        assert place_of(robot)[0] > 0.05
+
+
+def test_an_interrupt_of_the_user_is_no_fault_of_the_controller(tmp_path: Path) -> None:
+    act = REFUSALS["interrupt"][0]
+    (tmp_path / "law.py").write_text(REFUSED.format(act=act), encoding="utf-8")
+    scenario = load_scenario("stand", overrides=[f"control={tmp_path / 'law.py'}:Refused"])
+    with LiveRobot(Choices(scenario, control_texts(scenario, ()), {})) as robot:
+        go(robot, 19, BodyCommand())
+        with pytest.raises(KeyboardInterrupt):
+            go(robot, 1, BodyCommand())
 
 
 LEANING = """

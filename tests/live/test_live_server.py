@@ -13,6 +13,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
+from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any
 
@@ -20,12 +21,16 @@ import pytest
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import connect
 
+from hexapod_cosim.controller import Gains
 from hexapod_cosim.cosim.live.hub import BURST, MOST_CLIENTS, MOST_DROPPED, MOST_REFUSED, Hub
+from hexapod_cosim.cosim.live.loop import run_process
 from hexapod_cosim.cosim.live.pacing import MOST_LAG
 from hexapod_cosim.cosim.live.server import LiveError, LiveServer
 from hexapod_cosim.cosim.live.settings import Choices, control_texts
 from hexapod_cosim.cosim.scenario.scenario import load_scenario
+from hexapod_cosim.models import HexapodError
 
+Process = Callable[[Connection, Choices, Gains | None], None]
 PATIENCE = 180.0  # s    for a loaded machine; nothing is asserted about it
 
 
@@ -37,9 +42,9 @@ def choices() -> Choices:
 class Running:
     """A server in a thread, and what its `run` raised."""
 
-    def __init__(self) -> None:
-        self.server = LiveServer(choices(), None)
-        self.error: LiveError | None = None
+    def __init__(self, process: Process = run_process) -> None:
+        self.server = LiveServer(choices(), None, process=process)
+        self.error: HexapodError | None = None
         self.ready = threading.Event()
         self._thread = threading.Thread(target=self._run, daemon=True)
         self._thread.start()
@@ -49,7 +54,7 @@ class Running:
     def _run(self) -> None:
         try:
             self.server.run(lambda url: self.ready.set())
-        except LiveError as error:
+        except HexapodError as error:
             self.error = error
 
     def get(self, path: str, **headers: str) -> tuple[int, str, dict[str, str]]:
@@ -280,7 +285,7 @@ def test_nonsense_is_answered_and_after_a_while_ends_the_connection(running: Run
             opened.send(b"\xff\x00")
         end = closing(opened)
         assert end.rcvd is not None
-        assert end.rcvd.reason == "too many messages that are none"
+        assert end.rcvd.reason == "too many messages were not valid"
 
 
 def test_too_large_a_message_ends_the_connection(running: Running) -> None:
@@ -321,6 +326,22 @@ def test_a_loop_that_dies_ends_the_server_which_says_so() -> None:
     assert "the loop's process has ended by itself" in str(running.error)
 
 
+def refuse_later(link: Connection, _choices: Choices, _gains: Gains | None) -> None:
+    """Runs a loop that cannot go on as soon as it has a page."""
+    link.send(("ready", None))
+    while link.recv() != ("clients", 0, 1):
+        pass
+    link.send(("refused", HexapodError("the robot has gone", fix="fetch it")))
+
+
+def test_a_loop_that_cannot_go_on_ends_the_server_which_says_why() -> None:
+    running = Running(refuse_later)
+    with running.socket() as opened:
+        closing(opened)
+    running.end()
+    assert str(running.error) == "the robot has gone; fetch it"
+
+
 def test_a_port_that_is_taken_is_refused(running: Running) -> None:
     with pytest.raises(LiveError, match="cannot listen on this port"):
         LiveServer(choices(), None, port=running.port)
@@ -354,7 +375,7 @@ def test_a_hub_drops_what_exceeds_the_rate_of_a_page() -> None:
 @pytest.mark.parametrize(
     ("text", "at_once", "rate", "reason"),
     [
-        ("nonsense", 20, 0.1, "too many messages that are none"),
+        ("nonsense", 20, 0.1, "too many messages were not valid"),
         ('{"type": "ping", "stamp": 1}', 2200, 20.0, "too many messages"),
     ],
 )

@@ -72,13 +72,17 @@ def live(
         _write_page(page, json=json)
         return
     from hexapod_cosim.cosim.live.server import LiveServer  # noqa: PLC0415  slow to import
-    from hexapod_cosim.cosim.live.settings import Choices, control_texts  # noqa: PLC0415
+    from hexapod_cosim.cosim.live.settings import (  # noqa: PLC0415
+        Choices,
+        control_texts,
+        live_scenario,
+    )
 
     plan = load_scenario(scenario, overrides=settings or [])
     given = parse_controls(control or [plan.control], where="--control")
     check_control(plan, given)
     plan = replace(plan, control=given[0].text)
-    found, refusal = _gains_of(plan, given_gains(gains))
+    found, refusal = _gains_of(live_scenario(plan), given_gains(gains))
     able = CONTROLS if found is not None else ("kinematic",)
     texts = {one.label: one.text for one in given} | control_texts(plan, able)
     refused = {name: refusal for name in CONTROLS if name not in able}
@@ -105,6 +109,7 @@ def _write_page(path: Path, *, json: bool) -> None:
 def _gains_of(plan: Scenario, given: Gains | None) -> tuple[Gains | None, str]:
     """Returns the gains of the built-in controls, or None and why there are none.
 
+    plan: as the live robot walks it.
     Raises GainsError when the scenario's own control needs them.
     """
     from hexapod_cosim.cosim.run.preparation import chosen_gains  # noqa: PLC0415  a slow import

@@ -42,13 +42,14 @@ def realtime(
 ) -> None:
     """Measure doStep of the plant in a walk: quantiles and histogram, touch-downs apart."""
     from hexapod_cosim.cosim.live import realtime as live  # noqa: PLC0415  draws with Matplotlib
+    from hexapod_cosim.cosim.live.settings import live_scenario  # noqa: PLC0415
     from hexapod_cosim.cosim.run.preparation import chosen_gains  # noqa: PLC0415
 
     text = parse_control(control, where="--control").text
     plan = load_scenario(scenario, overrides=[*(settings or []), f"macro_step={step!r}"])
     plan = replace(plan, control=text)
     with waiting("designing the gains"):
-        gains = chosen_gains(plan)
+        gains = chosen_gains(live_scenario(plan))
     with progress_bar("doStep", steps * step) as progress:
         times = live.measure(plan, step=step, count=steps, gains=gains, progress=progress)
     facts, files = live.facts_of(times), live.write(times, output)

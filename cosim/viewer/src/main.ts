@@ -113,10 +113,7 @@ function makeStage(runs: readonly Run[]): Stage | undefined {
       ),
     );
   } catch {
-    showReason(
-      host,
-      "The replay needs WebGL, which this browser does not offer. Plots and tables do without.",
-    );
+    showReason(host, "This browser has no WebGL, which the replay needs. Plots and tables work.");
     return undefined;
   }
 }

@@ -69,6 +69,10 @@ export class LocalLoop implements Connection {
 
   /** Does what a message asks for; those of the page are the only ones. */
   send(message: Record<string, unknown>): void {
+    this.attempt(() => this.answer(message));
+  }
+
+  private answer(message: Record<string, unknown>): void {
     if (message.type === "drive") {
       this.drive = message as unknown as Drive;
       this.command();
@@ -79,13 +83,25 @@ export class LocalLoop implements Connection {
   }
 
   private begin(): void {
-    this.tell("world", this.setup.world);
-    this.place();
+    this.attempt(() => {
+      this.tell("world", this.setup.world);
+      this.place();
+    });
     const picture = (): void => {
-      this.advance();
       requestAnimationFrame(picture);
+      this.attempt(() => this.advance());
     };
     requestAnimationFrame(picture);
+  }
+
+  /** Does something; an error of any kind stops the robot, and the page shows it. */
+  private attempt(act: () => void): void {
+    try {
+      act();
+    } catch (error) {
+      this.fault = error instanceof WalkerError ? error.message : String(error);
+      this.tellStatus();
+    }
   }
 
   /** Simulates the time that has passed since the last picture. */
@@ -101,14 +117,7 @@ export class LocalLoop implements Connection {
     const due = Math.floor(this.owed / this.walker.step);
     if (due === 0) return;
     this.owed -= due * this.walker.step;
-    try {
-      this.walker.advance(due);
-    } catch (error) {
-      if (!(error instanceof WalkerError)) throw error;
-      this.fault = error.message;
-      this.tellStatus();
-      return;
-    }
+    this.walker.advance(due);
     this.steps += due;
     this.paces.push([now, this.steps]);
     while (now - this.paces[0][0] > SPAN) this.paces.shift();

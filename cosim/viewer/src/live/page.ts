@@ -66,8 +66,7 @@ function makeView(): View | undefined {
   try {
     return new View(byId("stage")!);
   } catch {
-    const text =
-      "The robot is drawn with WebGL, which this browser does not offer. Keys and plots do without.";
+    const text = "This browser has no WebGL, so the robot is not drawn. Keys and plots work.";
     byId("stage")?.append(element("p", "refusal", text));
     return undefined;
   }
