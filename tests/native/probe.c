@@ -243,7 +243,7 @@ HX_API void hx_probe_power(const double *x, const double *y, double *power, doub
 /* Writes F_v, its slope, plastic depth, f_n, its elastic part and derivatives, stored energy, shear
  * base and its slope; row NULL: from the definition. */
 HX_API void hx_probe_soil(const hxSoilDefinition *definition, const double *row, double radius,
-                          double pad, double plastic, double z, double dz, double out[11]) {
+                          double pad, double plastic, double z, double dz, double out[12]) {
   const hxSoilShape shape = {radius, pad, 0.0};
   hxSoil soil;
   if (row)
@@ -256,6 +256,7 @@ HX_API void hx_probe_soil(const hxSoilDefinition *definition, const double *row,
   out[3] = force.force, out[4] = force.elastic, out[5] = force.stiffness, out[6] = force.viscosity;
   out[7] = hx_soil_stored_energy(&soil, plastic, z);
   out[8] = base.force, out[9] = base.slope, out[10] = soil.friction;
+  out[11] = hx_soil_contact(&soil, plastic, z, dz).held.slope;
 }
 
 /* Adds 1500 footprints at x = 0, 1, ... of depths 1, 2, ... mm, then in a call 100 of 2 m at the

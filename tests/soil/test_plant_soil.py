@@ -44,7 +44,7 @@ def definition(soil: Soil) -> Any:
 def computed(
     core: ct.CDLL, soil: Soil, foot: Foot, motion: tuple[float, float, float], row: bool = False
 ) -> list[float]:
-    out = np.full(11, np.nan)
+    out = np.full(12, np.nan)
     columns = np.array(law.table_row(soil)) if row else None
     core.hx_probe_soil(
         ct.byref(definition(soil)),
@@ -104,3 +104,12 @@ def test_the_shear_base_has_its_slope(core: ct.CDLL) -> None:
 def test_above_the_ground_there_is_no_force(core: ct.CDLL) -> None:
     got = computed(core, soil_preset("dry_sand").soil, SPHERE, (0.0, -0.001, 0.2))
     assert got[:8] == [0.0] * 8
+
+
+def test_a_law_that_is_linear_in_the_depth_has_finite_slopes_under_a_pad_that_just_touches(
+    core: ct.CDLL,
+) -> None:
+    """The square of such a depth is 0 in floating point."""
+    linear = replace(soil_preset("dry_sand").soil, exponent=1.0)
+    for soil in (soil_preset("mud").soil, linear):
+        assert np.isfinite(computed(core, soil, FEET[1], (0.0, 1e-170, 0.1))).all()
