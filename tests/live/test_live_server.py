@@ -373,6 +373,31 @@ def test_a_hub_drops_what_exceeds_the_rate_of_a_page() -> None:
 
 
 @pytest.mark.parametrize(
+    ("kind", "text"),
+    [
+        ("set", '{"type": "set", "key": "friction", "value": 0.5}'),
+        ("do", '{"type": "do", "action": "pause"}'),
+    ],
+)
+def test_settings_and_actions_above_their_rate_are_dropped_and_never_close_a_page(
+    kind: str, text: str
+) -> None:
+    poster, clock = Poster(), [0.0]
+    hub = Hub(poster, now=lambda: clock[0])
+    client = hub.join()
+    assert client is not None
+    for _ in range(30):
+        assert hub.from_page(client, text) is None
+    assert [one for one, _, _ in poster.posted].count(kind) == 20
+    # then 50 in each second for 400 s, which is below the rate of all messages
+    for _ in range(20_000):
+        clock[0] += 0.02
+        assert hub.from_page(client, text) is None
+    assert [one for one, _, _ in poster.posted].count(kind) == pytest.approx(4020, abs=1)
+    assert client.dropped == pytest.approx(16_010, abs=1)
+
+
+@pytest.mark.parametrize(
     ("text", "at_once", "rate", "reason"),
     [
         ("nonsense", 20, 0.1, "too many messages were not valid"),
