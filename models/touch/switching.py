@@ -15,7 +15,7 @@ from hexapod_cosim.models.body.contacts import side_on_ground
 from hexapod_cosim.models.body.pairs import pair_contacts
 from hexapod_cosim.models.contact import FootContact, contact_damping
 from hexapod_cosim.models.ground.blocks import Cell, cell_at, depth_beside, is_uneven, outside
-from hexapod_cosim.models.ground.surface import LAW, MU, MU_STATIC, STIFFNESS, Surface
+from hexapod_cosim.models.ground.surface import LAW, MU, MU_STATIC, STIFFNESS
 from hexapod_cosim.models.kinematics import LEGS, foot_centres
 from hexapod_cosim.models.records import Array, Robot, Soil
 from hexapod_cosim.models.soil.law import plastic_depth, row_soil, soil_radius

@@ -8,7 +8,6 @@ import ctypes as ct
 from dataclasses import replace
 
 import numpy as np
-import pytest
 from states import changed
 from test_twin_motion import FEET, Pair, stood
 
