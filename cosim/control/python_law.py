@@ -203,16 +203,19 @@ def file_of(law: type[Any]) -> Path | None:
 
 @contextmanager
 def users_errors(path: Path | None) -> Iterator[None]:
-    """Turns any exception of the block into a ControllerError with the user's file and line."""
+    """Turns any exception of the block into a ControllerError with the user's file and line.
+
+    This includes SystemExit: a user's code does not end the program that calls it.
+    """
     try:
         yield
     except ControllerError:
         raise
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         raise _told(error, path) from error
 
 
-def _told(error: Exception, path: Path | None) -> ControllerError:
+def _told(error: Exception | SystemExit, path: Path | None) -> ControllerError:
     """Returns the error of a user's code as one sentence: where it arose, what it is, the line."""
     text = " ".join(str(error).split())
     if isinstance(error, SyntaxError) and error.filename:
@@ -225,4 +228,6 @@ def _told(error: Exception, path: Path | None) -> ControllerError:
         where, line = f"{frame.filename}, line {frame.lineno}, in {frame.name}", frame.line or ""
     what = f"{type(error).__name__}: {text}" if text else type(error).__name__
     fix = f"correct the line `{line.strip()}`" if line.strip() else "correct the controller"
+    if isinstance(error, SystemExit):
+        fix = "a controller must not end the program: raise an exception instead"
     return ControllerError(what, fix=fix, where=where)

@@ -77,6 +77,10 @@ def test_a_class_without_step_is_refused(tmp_path: Path) -> None:
             "class Law:\n    def __init__(self):\n        raise ValueError('two\\nlines')\n",
             "line 3, in __init__: ValueError: two lines; correct the line `raise ValueError(",
         ),
+        (
+            "import sys\nsys.exit(0)\n",
+            "line 2, in <module>: SystemExit: 0; a controller must not end the program",
+        ),
     ],
 )
 def test_an_exception_is_told_in_one_line_with_the_users_line(
