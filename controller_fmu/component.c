@@ -1,20 +1,31 @@
 /* component.c - the controller as an FMU's component */
 #include "fmi/component.h"
 
+#include <stdlib.h>
 #include <string.h>
 
 #include "src/state.h"
 
-static hxController *controller_of(hxComponent *component) { return (hxController *)component; }
+struct hxComponent {
+  hxController controller;
+  hxController next; /* memory of a call that changes the walk; threads may have small stacks */
+};
+
+static hxController *controller_of(hxComponent *component) { return &component->controller; }
 static const hxController *const_controller(const hxComponent *component) {
-  return (const hxController *)component;
+  return &component->controller;
 }
 
-hxComponent *hx_component_create(void) { return (hxComponent *)hx_controller_create(); }
-
-void hx_component_destroy(hxComponent *component) {
-  hx_controller_destroy(controller_of(component));
+hxComponent *hx_component_create(void) {
+  hxControllerDefinition definition;
+  hxComponent *component = calloc(1, sizeof *component);
+  if (!component) return NULL;
+  hx_controller_definition_default(&definition);
+  hx_controller_reset(&component->controller, &definition, 0.0);
+  return component;
 }
+
+void hx_component_destroy(hxComponent *component) { free(component); }
 
 hxStatus hx_component_set_resources(hxComponent *component, const char *folder) {
   (void)component, (void)folder; /* the controller reads no files */
@@ -63,41 +74,43 @@ static hxStatus follow(hxController *controller, const struct hxVariables *varia
 
 /* Changes the walk and steps, on a copy, so that a refusal of either change or of the step leaves
  * the controller as it was. */
-static hxStatus step_in_another_walk(hxController *controller, const struct hxVariables *variables,
+static hxStatus step_in_another_walk(hxComponent *component, const struct hxVariables *variables,
                                      const hxInput *rate, double t_end) {
-  hxController next = *controller;
-  hxStatus status = follow(&next, variables);
-  if (status == HX_OK) status = hx_controller_step(&next, &variables->input, rate, t_end);
+  hxController *controller = &component->controller, *next = &component->next;
+  *next = *controller;
+  hxStatus status = follow(next, variables);
+  if (status == HX_OK) status = hx_controller_step(next, &variables->input, rate, t_end);
   if (status == HX_OK)
-    *controller = next;
+    *controller = *next;
   else
-    memcpy(controller->message, next.message, sizeof next.message);
+    memcpy(controller->message, next->message, sizeof next->message);
   return status;
 }
 
 hxStatus hx_component_step(hxComponent *component, const struct hxVariables *variables,
                            const hxInput *rate, double t_end) {
-  hxController *controller = controller_of(component);
+  hxController *controller = &component->controller;
   if (is_same_walk(controller, variables))
     return hx_controller_step(controller, &variables->input, rate, t_end);
-  return step_in_another_walk(controller, variables, rate, t_end);
+  return step_in_another_walk(component, variables, rate, t_end);
 }
 
 /* Calculates the output after a change of the walk, which only a step makes: on a copy, so that no
  * reading changes the controller. A refused change is not shown; the step reports it. */
-static void output_in_another_walk(const hxController *controller, struct hxVariables *variables) {
-  hxController next = *controller;
-  if (follow(&next, variables) != HX_OK) next = *controller;
-  hx_controller_output(&next, &variables->input, &variables->output);
+static void output_in_another_walk(hxComponent *component, struct hxVariables *variables) {
+  hxController *next = &component->next;
+  *next = component->controller;
+  if (follow(next, variables) != HX_OK) *next = component->controller;
+  hx_controller_output(next, &variables->input, &variables->output);
 }
 
 void hx_component_output(hxComponent *component, struct hxVariables *variables, unsigned groups) {
-  hxController *controller = controller_of(component);
+  hxController *controller = &component->controller;
   (void)groups; /* there is one */
   if (is_same_walk(controller, variables))
     hx_controller_output(controller, &variables->input, &variables->output);
   else
-    output_in_another_walk(controller, variables);
+    output_in_another_walk(component, variables);
 }
 
 double hx_component_time(const hxComponent *component) {

@@ -77,6 +77,19 @@ static void step_two(void *given) {
   two->t += 0.02;
 }
 
+/* Another control and another gait, with the outputs read before the step. */
+static void change_walk_two(void *given) {
+  Two *two = given;
+  const fmi2ValueReference control = reference_of("control"), period = reference_of("gait.period");
+  const fmi2Integer compliant = 2;
+  const fmi2Real seconds = 1.2;
+  CHECK(fmi2SetInteger(two->fmu, &control, 1, &compliant) == fmi2OK);
+  CHECK(fmi2SetReal(two->fmu, &period, 1, &seconds) == fmi2OK);
+  CHECK(fmi2GetReal(two->fmu, output, n_outputs, value) == fmi2OK);
+  CHECK(fmi2DoStep(two->fmu, two->t, 0.02, fmi2True) == fmi2OK);
+  two->t += 0.02;
+}
+
 static void read_two(void *given) {
   Two *two = given;
   CHECK(fmi2GetReal(two->fmu, output, n_outputs, value) == fmi2OK);
@@ -222,6 +235,8 @@ static void co_simulation(int has_derivatives) {
   in_small_stack("FMI 2.0: instantiate, initialise", open_two, &two);
   in_small_stack("FMI 2.0: inputs, step", step_two, &two);
   in_small_stack("FMI 2.0: outputs", read_two, &two);
+  if (strstr(description, "name=\"gait.period\"")) /* a controller, whose walk is tunable */
+    in_small_stack("FMI 2.0: another walk", change_walk_two, &two);
   in_small_stack("FMI 2.0: states", restore_two, &two);
   if (has_derivatives) in_small_stack("FMI 2.0: derivatives", derive_two, &two);
   in_small_stack("FMI 2.0: refused value", refuse_two, &two);
