@@ -391,7 +391,7 @@ def test_without_webgl_the_plots_remain(folder: Path, chromium: Launcher) -> Non
     page = Opened(
         chromium("--no-sandbox", "--disable-3d-apis"), folder / "report.html", address="#t=1"
     )
-    assert "needs WebGL" in page.page.locator("#stage").inner_text()
+    assert "This browser has no WebGL" in page.page.locator("#stage").inner_text()
     assert len(page.playheads()) == PLOTS
     page.close()
 
