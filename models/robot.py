@@ -15,7 +15,6 @@ override its data (urdf/). records.py defines the records.
 from __future__ import annotations
 
 import math
-import tomllib
 from collections.abc import Mapping
 from functools import lru_cache
 from pathlib import Path
@@ -61,6 +60,7 @@ from hexapod_cosim.models.schema import (
     expect_table,
     parse_toml,
     read_given,
+    reading_toml,
     refuse_unknown_keys,
     require,
 )
@@ -122,22 +122,11 @@ def load_robot(path_or_name: str | Path) -> Robot:
     path = robot_path(path_or_name)
     if path.suffix.lower() == ".urdf":
         return _robot_from_urdf(urdf_table(path), str(path))
-    try:
+    with reading_toml(
+        path, kind="robot", name="the robot file", names=list_robots, error=RobotError
+    ):
         text = path.read_text(encoding="utf-8")
         alone = _robot_from_text(text, str(path))
-    except OSError as error:
-        fix = "give the path of a robot file, or one of: " + ", ".join(list_robots())
-        raise RobotError(
-            "cannot read the robot file", got=error.strerror, fix=fix, where=str(path)
-        ) from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise RobotError(
-            "not a TOML file",
-            got=str(error),
-            expected="TOML 1.0 in UTF-8",
-            fix="correct that line",
-            where=str(path),
-        ) from error
     if alone is not None:
         return alone
     table = _terrain_beside(parse_toml(text), path.parent)

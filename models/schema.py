@@ -7,13 +7,15 @@ from __future__ import annotations
 
 import math
 import tomllib
-from collections.abc import Hashable, Mapping
+from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from copy import deepcopy
 from dataclasses import dataclass
 from functools import cache
+from pathlib import Path
 from typing import Any, cast, get_type_hints
 
-from hexapod_cosim.models.errors import RobotError, unknown_name
+from hexapod_cosim.models.errors import HexapodError, RobotError, unknown_name
 
 DEEPEST = 64  # the most tables and arrays inside each other in a TOML file
 LARGEST = 2**63 - 1  # the largest integer of TOML 1.0
@@ -35,6 +37,39 @@ def parse_toml(text: str) -> dict[str, Any]:
     except ValueError as error:  # thousands of digits
         raise tomllib.TOMLDecodeError("an integer of more than 64 bits") from error
     return table
+
+
+@contextmanager
+def reading_toml(
+    path: Path,
+    *,
+    kind: str,
+    name: str,
+    names: Callable[[], Iterable[str]],
+    error: type[HexapodError],
+) -> Iterator[None]:
+    """Turns errors of reading a TOML file, of its encoding and of parse_toml() into one class.
+
+    Args:
+        path: the file.
+        kind: of the file, as in "the path of a robot file".
+        name: of what is read, with its article.
+        names: returns the bundled files, which a message lists.
+        error: the class.
+    """
+    try:
+        yield
+    except OSError as cause:
+        fix = f"give the path of a {kind} file, or one of: " + ", ".join(names())
+        raise error(f"cannot read {name}", got=cause.strerror, fix=fix, where=str(path)) from cause
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as cause:
+        raise error(
+            "not a TOML file",
+            got=str(cause),
+            expected="TOML 1.0 in UTF-8",
+            fix="correct that line",
+            where=str(path),
+        ) from cause
 
 
 def _check_size(value: Any, depth: int) -> None:

@@ -151,7 +151,7 @@ class Interface:
 
     @cached_property
     def by_name(self) -> Mapping[str, Variable]:
-        """Variables by name."""
+        """The variables by name."""
         return {variable.name: variable for variable in self.variables}
 
     @cached_property

@@ -106,7 +106,7 @@ class LiveRobot(Closing):
 
     @property
     def time(self) -> float:
-        """Simulated time [s]."""
+        """The simulated time [s]."""
         scenario = self.plan.scenario
         return scenario.start + scenario.macro_step * self.count
 
@@ -190,7 +190,7 @@ class LiveRobot(Closing):
         scenarios = self.plan.scenario, plan.scenario
         return (
             all(control_of(scenario.control).is_builtin for scenario in scenarios)
-            and (self.wanted is None or self._gait_change is not None)
+            and not self.halts
             and not self.fault
             and replace(then, robot=robot) == same
         )

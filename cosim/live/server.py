@@ -63,7 +63,7 @@ class LiveError(HexapodError):
 
 @dataclass(frozen=True)
 class Address:
-    """Where the page is."""
+    """The port and the token of the page's address."""
 
     port: int
     token: str

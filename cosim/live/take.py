@@ -40,7 +40,7 @@ class Take:
     steps: int = 0
 
     def note(self, command: BodyCommand, force: Force) -> None:
-        """Adds a macro-step."""
+        """Adds a macro-step, with the command and the force [N] that hold in it."""
         if not self.commands or self.commands[-1][1] != command:
             self.commands.append((self.steps, command))
         if force != (self.forces[-1][1] if self.forces else NO_FORCE):

@@ -36,25 +36,32 @@ def kept_gains(
 
     folder: of the cache; by default the user's.
     """
-    folder = (folder or user_cache()) / "gains"
-    path = folder / f"{robot.name}-{_key(robot, period)[:32]}.toml"
+    path = (folder or user_cache()) / "gains" / f"{design_name(robot, period)}.toml"
     try:
         return load_gains(path)
     except GainsError:  # absent, damaged, or of another version
         gains = make(robot, period)
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        with atomic_path(path) as part:
-            save_gains(gains, part)
-    except (OSError, HexapodError):
-        pass
+    keep(path, lambda part: save_gains(gains, part))
     return gains
 
 
-def _key(robot: Robot, period: float) -> str:
-    """Returns the hash of a design's inputs in hexadecimal."""
-    parts = [robot.hash, repr(period), tools_hash()]
-    return hashlib.sha256("\n".join(parts).encode()).hexdigest()
+def design_name(robot: Robot, given: object) -> str:
+    """Returns the name of what is designed for a robot and a period or gait: the robot's, and a
+    hash of all that the design depends on.
+    """
+    parts = [robot.hash, repr(given), tools_hash()]
+    digest = hashlib.sha256("\n".join(parts).encode()).hexdigest()
+    return f"{robot.name}-{digest[:32]}"
+
+
+def keep(path: Path, write: Callable[[Path], object]) -> None:
+    """Lets `write` make a file of the cache; a cache that cannot be written is left alone."""
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with atomic_path(path) as part:
+            write(part)
+    except (OSError, HexapodError):
+        pass
 
 
 @cache

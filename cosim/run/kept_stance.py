@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
 import math
 from collections.abc import Callable
@@ -10,10 +9,9 @@ from pathlib import Path
 from typing import NamedTuple
 
 from hexapod_cosim.controller import Gait
-from hexapod_cosim.cosim.common.files import atomic_path
 from hexapod_cosim.cosim.export.cross_build import user_cache
-from hexapod_cosim.cosim.run.kept_gains import tools_hash
-from hexapod_cosim.models import HexapodError, Robot
+from hexapod_cosim.cosim.run.kept_gains import design_name, keep
+from hexapod_cosim.models import Robot
 
 
 class Stance(NamedTuple):
@@ -33,23 +31,16 @@ def kept_stance(
 
     Otherwise `make` designs it, and it is written to the cache; a cache that cannot be written is
     left alone. The name of a file holds a hash of the robot, the gait and of what makes designs
-    (`tools_hash`): stances of the same hash have the same bits. Raises what `make` raises.
+    (`design_name`): stances of the same hash have the same bits. Raises what `make` raises.
 
     folder: of the cache; by default the user's.
     """
-    folder = (folder or user_cache()) / "stances"
-    key = hashlib.sha256("\n".join([robot.hash, repr(gait), tools_hash()]).encode()).hexdigest()
-    path = folder / f"{robot.name}-{key[:32]}.json"
+    path = (folder or user_cache()) / "stances" / f"{design_name(robot, gait)}.json"
     found = _read(path)
     if found is not None:
         return found
     stance = make(robot, gait)
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        with atomic_path(path) as part:
-            part.write_text(json.dumps(stance._asdict()), encoding="utf-8")
-    except (OSError, HexapodError):
-        pass
+    keep(path, lambda part: part.write_text(json.dumps(stance._asdict()), encoding="utf-8"))
     return stance
 
 

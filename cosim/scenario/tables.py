@@ -17,7 +17,7 @@ from hexapod_cosim.cosim.scenario.records import KEYS, SECTIONS
 from hexapod_cosim.models import ScenarioError, unknown_name
 from hexapod_cosim.models.errors import refuse_path
 from hexapod_cosim.models.ground.table import beside
-from hexapod_cosim.models.schema import parse_toml
+from hexapod_cosim.models.schema import parse_toml, reading_toml
 
 POINTED = re.compile(r"[+-]?(?:\d+\.|\.\d+)(?:[eE][+-]?\d+)?")  # .1 or 1.
 
@@ -35,21 +35,10 @@ def read_tables(path_or_name: str | Path) -> tuple[dict[str, Any], str]:
     """
     refuse_path(path_or_name, "the scenario", ScenarioError)
     path = _scenario_path(path_or_name)
-    try:
+    with reading_toml(
+        path, kind="scenario", name="the scenario", names=list_scenarios, error=ScenarioError
+    ):
         table = parse_toml(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        fix = "give the path of a scenario file, or one of: " + ", ".join(list_scenarios())
-        raise ScenarioError(
-            "cannot read the scenario", got=error.strerror, fix=fix, where=str(path)
-        ) from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise ScenarioError(
-            "not a TOML file",
-            got=str(error),
-            expected="TOML 1.0 in UTF-8",
-            fix="correct that line",
-            where=str(path),
-        ) from error
     if isinstance(table.get("terrain"), dict):
         table["terrain"] = beside(table["terrain"], path.parent)
     refuse_path(str(table.get("robot", "")), "the robot file", ScenarioError)

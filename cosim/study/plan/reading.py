@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -40,7 +39,7 @@ from hexapod_cosim.cosim.study.plan.records import (
 )
 from hexapod_cosim.models import HexapodError, unknown_name
 from hexapod_cosim.models.errors import refuse_path
-from hexapod_cosim.models.schema import parse_toml
+from hexapod_cosim.models.schema import parse_toml, reading_toml
 
 KEYS = (
     "title",
@@ -75,21 +74,8 @@ def load_study(path_or_name: str | Path, *, controls: Sequence[str] = ()) -> Stu
         if str(path_or_name) not in bundled:
             raise unknown_name("study", str(path_or_name), bundled, error=StudyError)
         path = bundled[str(path_or_name)]
-    try:
+    with reading_toml(path, kind="study", name="the study", names=list_studies, error=StudyError):
         table = parse_toml(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        fix = "give the path of a study file, or one of: " + ", ".join(bundled)
-        raise StudyError(
-            "cannot read the study", got=error.strerror, fix=fix, where=str(path)
-        ) from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise StudyError(
-            "not a TOML file",
-            got=str(error),
-            expected="TOML 1.0 in UTF-8",
-            fix="correct that line",
-            where=str(path),
-        ) from error
     if controls:
         table = _with_controls(table, controls)
     return study_from_table(
