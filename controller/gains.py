@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-import tomllib
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, fields
 from pathlib import Path
@@ -12,7 +11,7 @@ from typing import Any, TypeVar
 
 from hexapod_cosim.models import HexapodError, Robot, nearest_name
 from hexapod_cosim.models.errors import refuse_path
-from hexapod_cosim.models.schema import parse_toml
+from hexapod_cosim.models.schema import decoding_toml, parse_toml
 
 FORMAT = 3
 TRIPOD_LEGS = 3  # legs that share the weight in a tripod gait: the unit of load is weight / 3
@@ -252,20 +251,13 @@ def load_gains(path: str | Path) -> Gains:
     where = str(path)
     refuse_path(path, "the gains file", GainsError)
     try:
-        table = parse_toml(Path(path).read_text(encoding="utf-8"))
+        with decoding_toml(Path(path), error=GainsError):
+            table = parse_toml(Path(path).read_text(encoding="utf-8"))
     except OSError as error:
         raise GainsError(
             "cannot read the gains file",
             got=error.strerror,
             fix="make one with `hexapod design`",
-            where=where,
-        ) from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise GainsError(
-            "not a TOML file",
-            got=str(error),
-            expected="TOML 1.0",
-            fix="correct that line",
             where=where,
         ) from error
     if table.pop("format", None) != FORMAT:

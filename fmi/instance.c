@@ -225,9 +225,10 @@ static hxStatus check_set(hxInstance *instance, const hxVariable *variable, hxCa
   }
   if (!hx_variable_in_range(variable, value)) {
     hx_log(instance, HX_LOG_ERROR,
-           "%s: got %.17g, expected a finite number in [%g, %g] %s; nothing was set, correct the "
-           "value",
-           variable->name, value, variable->min, variable->max, variable->unit);
+           "%s: got %.17g, expected a finite number in [%g, %g]%s%s; nothing was set, correct "
+           "the value",
+           variable->name, value, variable->min, variable->max, hx_unit_gap(variable->unit),
+           variable->unit);
     return HX_INVALID_ARGUMENT;
   }
   return HX_OK;

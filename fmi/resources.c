@@ -235,8 +235,9 @@ static hxStatus read_variables(hxInstance *instance, hxReader *reader,
       char *text = next_line(reader);
       if (text) strcpy(shown, text);
       if (!read_variable(variables, variable, section->first + i, text)) {
-        hx_print(expected, sizeof expected, "'%u VALUE %s' with a value in [%g, %g] %s",
-                 section->first + i, variable->name, variable->min, variable->max, variable->unit);
+        hx_print(expected, sizeof expected, "'%u VALUE %s' with a value in [%g, %g]%s%s",
+                 section->first + i, variable->name, variable->min, variable->max,
+                 hx_unit_gap(variable->unit), variable->unit);
         return refuse(instance, reader, text ? shown : NULL, expected);
       }
     }

@@ -5,6 +5,8 @@
 #include <math.h>
 #include <string.h>
 
+#include "hexapod/message.h"
+
 /* ----------------------------------------------------------------------------------------------
  * rates of inputs */
 
@@ -50,10 +52,10 @@ static hxStatus ramp_end(hxInstance *instance, double h, hxInput *end) {
     *hx_variable_place(&after, variable) += h * rate;
     if (!hx_variable_in_range(variable, *hx_variable_place(&after, variable))) {
       hx_log(instance, HX_LOG_ERROR,
-             "%s: got a derivative that takes it to %g, expected one that leaves it in [%g, %g] "
-             "%s; the state is unchanged",
+             "%s: got a derivative that takes it to %g, expected one that leaves it in [%g, "
+             "%g]%s%s; the state is unchanged",
              variable->name, *hx_variable_place(&after, variable), variable->min, variable->max,
-             variable->unit);
+             hx_unit_gap(variable->unit), variable->unit);
       return HX_INVALID_ARGUMENT;
     }
   }

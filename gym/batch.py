@@ -20,10 +20,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hexapod_cosim.cosim.common.closing import Closing
-from hexapod_cosim.cosim.common.plant_files import BUILD, LOOP, shared_library
 from hexapod_cosim.cosim.interface.names import foot_names, joint_names, vector_names
 from hexapod_cosim.cosim.master.fmu import Fmu
 from hexapod_cosim.cosim.master.fmu_controller import COMMANDS, SENSED
+from hexapod_cosim.cosim.master.loop_library import load_loop
 from hexapod_cosim.cosim.master.signals import MEASURED, PUSH
 from hexapod_cosim.cosim.master.wiring import JOINT_COMMANDS
 from hexapod_cosim.gym.plants import (
@@ -39,6 +39,7 @@ from hexapod_cosim.gym.scan import SPACING, GroundMaps, ground_maps
 from hexapod_cosim.gym.settings import BLOCKS, JOINTS, RATE, REASONS, TERMS, EnvSettings
 from hexapod_cosim.models import FmuError, HexapodError, Robot
 
+LAYOUT = 1  # of the structures below, HX_ENVIRONMENTS_LAYOUT in C
 AUTORESET = ("next_step", "same_step", "disabled")  # hxAutoreset in C
 FAILED = REASONS.index("failed")
 MESSAGE_SIZE = 512
@@ -132,14 +133,14 @@ class _Arrays(ct.Structure):
 
 @cache
 def _library() -> ct.CDLL:
-    """Loads the C loop and declares its functions. Raises FmuError."""
-    path = shared_library(LOOP)
-    library = ct.CDLL(str(path))
-    if not hasattr(library, "hx_environments_settings_size"):
-        raise FmuError("the co-simulation library is another version's", got=str(path), fix=BUILD)
-    library.hx_environments_settings_size.restype = _Size
-    if library.hx_environments_settings_size() != ct.sizeof(_Settings):
-        raise FmuError("the co-simulation library is another version's", got=str(path), fix=BUILD)
+    """Loads the C loop and declares its functions.
+
+    Raises FmuError when the library is missing or has another version.
+    """
+    library = load_loop(
+        ("hx_environments_layout", LAYOUT),
+        ("hx_environments_settings_size", ct.sizeof(_Settings)),
+    )
     library.hx_environments_create.restype = _Pointer
     library.hx_environments_create.argtypes = [_Pointer, _Pointer, _Size, ct.c_char_p]
     library.hx_environments_message.restype = ct.c_char_p

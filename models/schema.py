@@ -40,6 +40,21 @@ def parse_toml(text: str) -> dict[str, Any]:
 
 
 @contextmanager
+def decoding_toml(path: Path, *, error: type[HexapodError]) -> Iterator[None]:
+    """Turns errors of a TOML file's encoding and of parse_toml() into the class `error`."""
+    try:
+        yield
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as cause:
+        raise error(
+            "not a TOML file",
+            got=str(cause),
+            expected="TOML 1.0 in UTF-8",
+            fix="correct that line",
+            where=str(path),
+        ) from cause
+
+
+@contextmanager
 def reading_toml(
     path: Path,
     *,
@@ -58,18 +73,11 @@ def reading_toml(
         error: the class.
     """
     try:
-        yield
+        with decoding_toml(path, error=error):
+            yield
     except OSError as cause:
         fix = f"give the path of a {kind} file, or one of: " + ", ".join(names())
         raise error(f"cannot read {name}", got=cause.strerror, fix=fix, where=str(path)) from cause
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as cause:
-        raise error(
-            "not a TOML file",
-            got=str(cause),
-            expected="TOML 1.0 in UTF-8",
-            fix="correct that line",
-            where=str(path),
-        ) from cause
 
 
 def _check_size(value: Any, depth: int) -> None:

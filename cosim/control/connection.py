@@ -13,7 +13,6 @@ the FMU's:
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
@@ -24,7 +23,7 @@ from hexapod_cosim.cosim.interface.names import foot_names, foot_vector_names, v
 from hexapod_cosim.cosim.master.fmu_controller import COMMANDS, FLAGS
 from hexapod_cosim.cosim.master.signals import ACCELERATION, COMMANDED, CONTACT, MEASURED
 from hexapod_cosim.models import JOINT_NAMES, LEG_NAMES, FmuError, nearest_name
-from hexapod_cosim.models.schema import parse_toml
+from hexapod_cosim.models.schema import decoding_toml, parse_toml
 
 MOST_SHOWN = 12  # names in a message
 # sources of inputs, in the order of the vector that source_vector() fills
@@ -186,12 +185,8 @@ def read_map(path: Path) -> dict[str, Any]:
     place = path.with_suffix(".toml")
     if not place.is_file():
         return {}
-    try:
+    with decoding_toml(place, error=FmuError):
         table = parse_toml(place.read_text(encoding="utf-8"))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise FmuError(
-            "not a TOML file", got=str(error), expected="a table [map]", where=str(place)
-        ) from error
     found = table.get("map", {})
     return dict(found) if isinstance(found, Mapping) else {"map": found}
 

@@ -408,7 +408,7 @@ def _check_start(variable: Variable) -> None:
         raise HexapodError(
             "start value out of range",
             got=variable.start,
-            expected=f"{low} to {high} {variable.unit}",
+            expected=f"{low:g} to {high:g} {variable.unit or ''}".rstrip(),
             fix="correct the robot",
             where=variable.name,
         )

@@ -16,12 +16,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hexapod_cosim.cosim.common.plant_files import BUILD, LOOP, shared_library
 from hexapod_cosim.cosim.master.fmu import Fmu
 from hexapod_cosim.cosim.master.fmu_controller import COMMANDS
 from hexapod_cosim.cosim.master.force_sensor import SensorSettings, noise_factors
 from hexapod_cosim.cosim.master.interrupts import interruptible
 from hexapod_cosim.cosim.master.loop import COMPLETED, FAILED, INTERRUPTED, Outcome, Progress
+from hexapod_cosim.cosim.master.loop_library import load_loop
 from hexapod_cosim.cosim.master.recorder import COMMAND_COLUMNS, Peaks, Recording, kept_moments
 from hexapod_cosim.cosim.master.signals import (
     ACCELERATION,
@@ -141,30 +141,11 @@ def _library() -> ct.CDLL:
 
     Raises FmuError when the library is missing or has another version.
     """
-    path = shared_library(LOOP)
-    library = ct.CDLL(str(path))
-    _check_layout(library, str(path))
+    library = load_loop(("hx_master_layout", LAYOUT), ("hx_master_size", ct.sizeof(_Master)))
     library.hx_master_begin.argtypes = library.hx_master_record.argtypes = [ct.POINTER(_Master)]
     library.hx_master_run.argtypes = [ct.POINTER(_Master), _Size]
     library.hx_master_record.restype = None
     return library
-
-
-def _check_layout(library: ct.CDLL, path: str) -> None:
-    """Raises FmuError when the library has another layout of hxMaster than this module."""
-    old = not hasattr(library, "hx_master_layout")  # or no co-simulation library
-    layout = 0 if old else int(library.hx_master_layout())
-    if not old:
-        library.hx_master_size.restype = _Size
-    size = 0 if old else int(library.hx_master_size())
-    if (layout, size) != (LAYOUT, ct.sizeof(_Master)):
-        raise FmuError(
-            "the co-simulation library is another version's",
-            got=f"layout {layout} of {size} bytes",
-            expected=f"layout {LAYOUT} of {ct.sizeof(_Master)} bytes",
-            fix=BUILD,
-            where=path,
-        )
 
 
 class NativeMaster:

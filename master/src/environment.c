@@ -63,7 +63,7 @@ hxEnvWork hx_environment_work(const hxEnvSettings *settings) {
   work.size = fmu->work_size();
   if (work.size) work.block = malloc(work.size + HX_SHARED_WORK_ALIGNMENT);
   if (!work.block) return work;
-  work.memory = (char *)work.block + (0 - (uintptr_t)work.block) % HX_SHARED_WORK_ALIGNMENT;
+  work.memory = (char *)work.block + hx_shared_work_padding((uintptr_t)work.block);
   return work;
 }
 

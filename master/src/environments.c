@@ -24,6 +24,8 @@ struct hxEnvironments {
 /* ----------------------------------------------------------------------------------------------
  * creation */
 
+int hx_environments_layout(void) { return HX_ENVIRONMENTS_LAYOUT; }
+
 size_t hx_environments_settings_size(void) { return sizeof(hxEnvSettings); }
 
 static void free_memory(hxEnvironments *all) {

@@ -4,6 +4,7 @@
 #include <stdint.h>
 
 #include "hexapod/message.h"
+#include "hexapod/shared_work.h"
 #include "tangent.h"
 
 const hxKernel *const hx_kernels[] = {
@@ -28,11 +29,13 @@ size_t hx_scratch_size(void) {
   return size;
 }
 
-/* Returns the bytes from an address to the next one that is aligned to HX_WORK_ALIGNMENT. */
-static size_t padding(uintptr_t address) { return (0 - address) % HX_WORK_ALIGNMENT; }
+_Static_assert((int)HX_WORK_ALIGNMENT == (int)HX_SHARED_WORK_ALIGNMENT,
+               "importers and users of hexapod.h allocate the same work space");
 
 /* Returns the part of a work space that holds the state before a call, bytes. */
-static size_t before_size(void) { return sizeof(hxState) + padding(sizeof(hxState)); }
+static size_t before_size(void) {
+  return sizeof(hxState) + hx_shared_work_padding(sizeof(hxState));
+}
 
 size_t hx_work_size(void) { return before_size() + hx_scratch_size(); }
 
@@ -40,8 +43,8 @@ size_t hx_plant_size(void) { return sizeof(hxPlant) + HX_WORK_ALIGNMENT + hx_wor
 
 hxStatus hx_plant_use_work(hxPlant *plant, void *memory, size_t size) {
   unsigned char *own = (unsigned char *)plant + sizeof *plant, *work = memory;
-  if (!work) work = own + padding((uintptr_t)own);
-  if (memory && (size < hx_work_size() || padding((uintptr_t)memory))) {
+  if (!work) work = own + hx_shared_work_padding((uintptr_t)own);
+  if (memory && (size < hx_work_size() || hx_shared_work_padding((uintptr_t)memory))) {
     hx_print(plant->message, HX_MESSAGE_SIZE,
              "work space: got %zu bytes at an address that is %zu bytes above a multiple of %d, "
              "expected at least %zu bytes at a multiple; nothing was changed, allocate aligned "

@@ -103,3 +103,5 @@ void hx_print(char *text, size_t size, const char *format, ...) {
   hx_print_list(text, size, format, arguments);
   va_end(arguments);
 }
+
+const char *hx_unit_gap(const char *unit) { return *unit ? " " : ""; }

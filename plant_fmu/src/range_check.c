@@ -41,7 +41,8 @@ void hx_check_ranges(hxChecker *checker, const void *structure, const hxRange *r
   char expected[96];
   const size_t i = first_outside(structure, range, n);
   if (i == n) return;
-  hx_print(expected, sizeof expected, "%.9g to %.9g %s", range[i].min, range[i].max, range[i].unit);
+  hx_print(expected, sizeof expected, "%.9g to %.9g%s%s", range[i].min, range[i].max,
+           hx_unit_gap(range[i].unit), range[i].unit);
   hx_check_fail(checker, range[i].name, number_at(structure, &range[i]), expected);
 }
 

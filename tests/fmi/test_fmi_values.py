@@ -46,7 +46,8 @@ def test_a_value_out_of_range_is_refused_with_the_range(
     assert plant.set_reals({name: value}) == ERROR
     assert f"got {value:.17g}" in plant.last_message
     variable = ATHENA.variable(name)
-    assert f"in [{variable.minimum:g}, {variable.maximum:g}]" in plant.last_message
+    unit = f" {variable.unit}" if variable.unit else ""
+    assert f"in [{variable.minimum:g}, {variable.maximum:g}]{unit}; nothing" in plant.last_message
 
 
 LIMITED = [
@@ -155,6 +156,7 @@ def test_an_enumeration_takes_its_numbers_only(plant: Plant) -> None:
     law = ATHENA.references(["contact.law"])
     for value, status in ((0, ERROR), (6, OK), (7, ERROR)):
         assert plant.set_references("fmi2SetInteger", law, [value]) == status
+    assert "expected a finite number in [1, 6]; nothing was set" in plant.last_message
     assert plant.get_references("fmi2GetInteger", law) == (OK, [6])
 
 

@@ -194,7 +194,7 @@ static void other_lines_are_refused(void) {
   for (size_t k = 0; k < sizeof integer / sizeof *integer; ++k) {
     snprintf(first, sizeof first, "%u %s terrain.kind", reference_of("terrain.kind"), integer[k]);
     const hxEdit edit = {{first}, {"terrain.kind"}, 0, NULL, NULL};
-    refused(&edit, "VALUE terrain.kind' with a value in [1, 3]");
+    refused(&edit, "VALUE terrain.kind' with a value in [1, 3];");
   }
 }
 

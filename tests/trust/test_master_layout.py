@@ -1,4 +1,6 @@
-"""The Python package and the co-simulation library agree on hxMaster, or the library is refused."""
+"""The Python package and the co-simulation library agree on their structures, or the library is
+refused.
+"""
 
 from __future__ import annotations
 
@@ -7,74 +9,164 @@ import hashlib
 import re
 import shutil
 import subprocess
+from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
 
-from hexapod_cosim.cosim.master import native_loop
+from hexapod_cosim.cosim.master import loop_library, native_loop
+from hexapod_cosim.gym import batch
+from hexapod_cosim.gym.settings import BLOCKS, REASONS, TERMS
 from hexapod_cosim.models import FmuError
 
-HEADER = Path(__file__).parents[2] / "master" / "include" / "hexapod" / "master.h"
-# what the header's structures were under each number of the layout
-DIGESTS = {1: "ea97c6a35bdb3694"}
-STRUCTURES = {
-    "hxMasterFmu": native_loop._Fmu,
-    "hxMasterBlock": native_loop._Block,
-    "hxMasterSensor": native_loop._Sensor,
-    "hxMasterTable": native_loop._Table,
-    "hxMasterPeaks": native_loop._Peaks,
-    "hxMaster": native_loop._Master,
-}
 STRUCTURE = re.compile(r"typedef struct (\w+) \{(.*?)\} \1;", re.DOTALL)
+LIST = re.compile(r"enum \w* ?\{(.*?)\}", re.DOTALL)
 
 
-def code() -> str:
-    """Returns the header without its comments."""
-    return re.sub(r"/\*.*?\*/", "", HEADER.read_text(encoding="utf-8"), flags=re.DOTALL)
+@dataclass(frozen=True)
+class Interface:
+    """A header of the library and what Python declares of it."""
+
+    name: str
+    constant: str  # the number of the layout in C
+    layout: int  # and in Python
+    size: str  # function that returns the size of the largest structure
+    digests: dict[int, str]  # of structures and lists of names under each number of the layout
+    structures: dict[str, type[ctypes.Structure]]
+    load: Callable[[], ctypes.CDLL]
+
+    def code(self) -> str:
+        """Returns the header without its comments."""
+        root = Path(__file__).parents[2] / "master" / "include" / "hexapod"
+        text = (root / f"{self.name}.h").read_text(encoding="utf-8")
+        return re.sub(r"/\*.*?\*/", "", text, flags=re.DOTALL)
+
+    def lists(self) -> list[str]:
+        """Returns the names of each enumeration, with their values where these are given."""
+        return [" ".join(body.split()) for body in LIST.findall(self.code())]
+
+    def members(self) -> dict[str, list[str]]:
+        """Returns the structures of the header and the names of their members."""
+        found = {}
+        for name, body in STRUCTURE.findall(self.code()):
+            words = [word for line in body.split(";") for word in line.split(",")]
+            names = [re.search(r"(\w+)(?:\[\w+\])*$", word.strip()) for word in words]
+            found[name] = [name[1] for name in names if name]
+        return found
+
+    def digest(self) -> str:
+        """Returns the digest of structures and lists."""
+        bodies = [" ".join(body.split()) for _, body in STRUCTURE.findall(self.code())]
+        return hashlib.sha256("\n".join(bodies + self.lists()).encode()).hexdigest()[:16]
 
 
-def structures() -> dict[str, list[str]]:
-    """Returns the structures of the header and the names of their members."""
-    found = {}
-    for name, body in STRUCTURE.findall(code()):
-        members = [word for line in body.split(";") for word in line.split(",")]
-        found[name] = [re.findall(r"\w+", word)[-1] for word in members if word.strip()]
-    return found
+MASTER = Interface(
+    name="master",
+    constant="HX_MASTER_LAYOUT",
+    layout=native_loop.LAYOUT,
+    size="hx_master_size",
+    digests={1: "0a73ce69c526a2a0"},
+    structures={
+        "hxMasterFmu": native_loop._Fmu,
+        "hxMasterBlock": native_loop._Block,
+        "hxMasterSensor": native_loop._Sensor,
+        "hxMasterTable": native_loop._Table,
+        "hxMasterPeaks": native_loop._Peaks,
+        "hxMaster": native_loop._Master,
+    },
+    load=native_loop._library.__wrapped__,
+)
+ENVIRONMENTS = Interface(
+    name="environments",
+    constant="HX_ENVIRONMENTS_LAYOUT",
+    layout=batch.LAYOUT,
+    size="hx_environments_settings_size",
+    digests={1: "787e21bea40beaa2"},
+    structures={
+        "hxEnvFmu": batch._Fmu,
+        "hxEnvDraws": batch._Draws,
+        "hxEnvGround": batch._Ground,
+        "hxEnvSettings": batch._Settings,
+        "hxEnvArrays": batch._Arrays,
+    },
+    load=batch._library.__wrapped__,
+)
+INTERFACES = pytest.mark.parametrize(
+    "interface", [MASTER, ENVIRONMENTS], ids=lambda interface: interface.name
+)
+# members that have the name of their type in Python, and another one in C
+RENAMED = {
+    **dict(zip(
+        ("instantiate", "free_instance", "reset", "setup", "enter", "leave", "get_real",
+         "set_real", "do_step"),
+        batch.CALLS, strict=True,
+    )),
+    "work_size": batch.WORK[0],
+    "work_use": batch.WORK[1],
+}  # fmt: skip
 
 
-def test_a_changed_structure_has_a_new_number_of_the_layout() -> None:
-    number = re.search(r"#define HX_MASTER_LAYOUT (\d+)", code())
+@INTERFACES
+def test_a_changed_structure_has_a_new_number_of_the_layout(interface: Interface) -> None:
+    number = re.search(rf"#define {interface.constant} (\d+)", interface.code())
     assert number
-    text = " ".join(" ".join(body.split()) for _, body in STRUCTURE.findall(code()))
-    said = "increase HX_MASTER_LAYOUT and LAYOUT of native_loop.py, and add the digest here"
-    assert hashlib.sha256(text.encode()).hexdigest()[:16] == DIGESTS[int(number[1])], said
-    assert int(number[1]) == max(DIGESTS)
+    said = f"increase {interface.constant} and LAYOUT in Python, and add the digest here"
+    assert interface.digest() == interface.digests[int(number[1])], said
+    assert int(number[1]) == max(interface.digests) == interface.layout
 
 
-def test_python_declares_the_members_of_the_header_in_their_order() -> None:
-    assert structures().keys() == STRUCTURES.keys()
-    for name, members in structures().items():
-        assert [field[0] for field in STRUCTURES[name]._fields_] == members, name
+@INTERFACES
+def test_python_declares_the_members_of_the_header_in_their_order(interface: Interface) -> None:
+    found = interface.members()
+    assert found.keys() == interface.structures.keys()
+    for name, members in found.items():
+        declared = [field[0] for field in interface.structures[name]._fields_]
+        renamed = RENAMED if name == "hxEnvFmu" else {}
+        assert declared == [renamed.get(member, member) for member in members], name
 
 
+def test_functions_of_an_environments_fmu_have_the_types_of_their_names() -> None:
+    assert tuple(re.findall(r"fmi2(\w+)TYPE \*", ENVIRONMENTS.code())) == batch.CALLS
+
+
+def test_python_lists_the_names_of_the_header_in_their_order() -> None:
+    names = {
+        "HX_SEE_": tuple(BLOCKS),
+        "HX_TERM_": TERMS,
+        "HX_END_": ("none", *REASONS[1:]),
+        "HX_AUTORESET_": batch.AUTORESET,
+    }
+    for prefix, expected in names.items():
+        found = re.findall(rf"\b{prefix}(\w+)", " ".join(ENVIRONMENTS.lists()))
+        assert tuple(name.lower() for name in found) == expected
+
+
+@INTERFACES
 def test_a_library_with_another_layout_is_refused(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    interface: Interface, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     compiler = shutil.which("cc")
     if compiler is None:
         pytest.skip("no C compiler")
-    size = ctypes.sizeof(native_loop._Master)
-    sized = f"unsigned long hx_master_size(void) {{ return {size}; }}"
+    size = max(ctypes.sizeof(structure) for structure in interface.structures.values())
+    layout = interface.constant.lower()
+    sized = f"unsigned long {interface.size}(void) {{ return {size}; }}"
     cases = {
         "layout 0 of 0 bytes": sized,  # as before the layout had a number
-        f"layout 7 of {size} bytes": f"{sized} int hx_master_layout(void) {{ return 7; }}",
+        f"layout 7 of {size} bytes": f"{sized} int {layout}(void) {{ return 7; }}",
+        f"layout {interface.layout} of 8 bytes": (
+            f"unsigned long {interface.size}(void) {{ return 8; }}"
+            f"int {layout}(void) {{ return {interface.layout}; }}"
+        ),
     }
     for place, (said, text) in enumerate(cases.items()):
         source, library = tmp_path / "stale.c", tmp_path / f"stale{place}.so"
         source.write_text(text)
         subprocess.run([compiler, "-shared", "-fPIC", "-o", library, source], check=True)
-        monkeypatch.setattr(native_loop, "shared_library", lambda _, found=library: found)
+        monkeypatch.setattr(loop_library, "shared_library", lambda _, found=library: found)
         with pytest.raises(FmuError, match="another version's") as caught:
-            native_loop._library.__wrapped__()
-        assert f"got {said!r}, expected layout 1 of {size} bytes" in str(caught.value)
+            interface.load()
+        expected = f"layout {interface.layout} of {size} bytes"
+        assert f"got {said!r}, expected {expected}" in str(caught.value)
         assert "pip install" in str(caught.value)

@@ -191,6 +191,12 @@ typedef struct hxEnvArrays {
 
 typedef struct hxEnvironments hxEnvironments;
 
+/* Number of the layout of hxEnvSettings, hxEnvArrays, the structures in them and the lists of names
+ * above. A change of their members, or of what a member means, increases it. */
+#define HX_ENVIRONMENTS_LAYOUT 1
+
+/* Layout and size of hxEnvSettings in this library, with which callers check their own. */
+HX_API int hx_environments_layout(void);
 HX_API size_t hx_environments_settings_size(void);
 
 /* Returns the number of values in an observation. */

@@ -22,6 +22,9 @@ __attribute__((format(printf, 3, 0)))
 #endif
 void hx_print_list(char *text, size_t size, const char *format, va_list arguments);
 
+/* Returns the blank between a number and its unit, "" where the unit is "". */
+const char *hx_unit_gap(const char *unit);
+
 HX_HIDDEN_END
 
 #endif

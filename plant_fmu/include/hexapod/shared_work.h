@@ -20,12 +20,18 @@
 #define HEXAPOD_SHARED_WORK_H
 
 #include <stddef.h>
+#include <stdint.h>
 
 #ifdef __cplusplus
 extern "C" {
 #endif
 
 enum { HX_SHARED_WORK_ALIGNMENT = 64 }; /* B  of the memory's address */
+
+/* Returns the bytes from an address to the next one at which a work space may begin. */
+static inline size_t hx_shared_work_padding(uintptr_t address) {
+  return (size_t)((0 - address) % HX_SHARED_WORK_ALIGNMENT);
+}
 
 /* hx_shared_work_size: returns the size of a work space, B; 0: instances have none. */
 typedef size_t hxSharedWorkSize(void);
