@@ -33,7 +33,8 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
 # what takes longest begins, so that no process is left with it in the end
 LONGEST = (
     "test_docs",
-    "test_native_controller",
+    "test_native_walks",
+    "test_native_faults",
     "test_platforms",
     "test_platform_walks",
     "test_cli",

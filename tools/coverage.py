@@ -23,10 +23,11 @@ ROOT = Path(__file__).resolve().parents[1]
 BUILD = ROOT / "build" / "coverage"
 TESTS = (
     *(f"tests/fmi/test_{name}.py" for name in ("fmi", "fmi3", "fmi3_order", "fmi_state")),
-    *(f"tests/fmi/test_{name}.py" for name in ("fmi_values", "fmi_exchange")),
+    "tests/fmi/test_fmi_values.py",
+    "tests/exchange",
     *(f"tests/plant/test_plant_{name}.py" for name in ("misuse", "coordinates", "functions")),
     *(f"tests/plant/test_plant_{name}.py" for name in ("events", "state", "measure")),
-    "tests/controller/test_native_controller.py",
+    "tests/native_control",
     "tests/fuzz/test_findings.py",
     "tests/friction",
     "tests/ground",

@@ -13,7 +13,7 @@ from hexapod_cosim.cosim.common.components import Component
 from hexapod_cosim.cosim.common.plant_files import DISTRIBUTION, FMI3_SOURCE, source_files
 from hexapod_cosim.cosim.interface.interface import Enumeration, Interface, Unit, Variable
 
-# capabilities, each tested by tests/fmi/test_fmi.py or tests/fmi/test_fmi_exchange.py
+# capabilities, each tested by tests/fmi/test_fmi.py or in tests/exchange
 BOTH = {
     "canBeInstantiatedOnlyOncePerProcess": "false",
     "canNotUseMemoryManagementFunctions": "true",

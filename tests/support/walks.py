@@ -26,7 +26,8 @@ PARAMETERS = {
 }
 SERVO = replace(ROBOT.servo, torque_continuous=1.2, motor_constant=0.8)
 WEIGHT = robot_weight(PARAMETERS)
-DISTANCE = SPEED * PERIOD * (CYCLES - 2)  # m    in the cycles of the metrics
+JUDGED = PERIOD * (CYCLES - 2)  # s    of the cycles of the metrics
+DISTANCE = SPEED * JUDGED  # m    in these
 
 
 class Walk:

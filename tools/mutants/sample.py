@@ -12,7 +12,10 @@ from pathlib import Path
 from random import Random
 
 LANES, TESTS = "plant_fmu/src/lanes", "tests/plant/test_"
-NATIVE = ("tests/controller/test_native_controller.py", "tests/controller/test_controller_twins.py")
+NATIVE = (
+    *(f"tests/native_control/test_native_{name}.py" for name in ("functions", "walks", "faults")),
+    "tests/controller/test_controller_twins.py",
+)
 TWINS = ("tests/models/test_twin_integrator.py", "tests/friction/test_whole_plant.py")
 CHOICES = "tests/trust/test_choices.py"
 # group: files, and the tests that concern them, fast ones first
@@ -66,14 +69,18 @@ GROUPS: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     "control": (("controller_fmu/src/*/*.c", "controller_fmu/src/controller.c"), NATIVE),
     "metrics": (
         ("cosim/results/metrics.py", "cosim/results/support.py", "cosim/results/balance.py"),
-        tuple(
-            f"tests/results/test_{name}.py"
-            for name in ("support", "metrics", "comparison", "footprints", "measured")
+        (
+            "tests/results/test_support.py",
+            *(
+                f"tests/results/test_metrics{subject}.py"
+                for subject in ("", "_of_slip", "_of_motion")
+            ),
+            *(f"tests/results/test_{name}.py" for name in ("comparison", "footprints", "measured")),
         ),
     ),
     "controller": (
         ("controller/*.py", "controller/[a-ce-z]*/*.py"),
-        (NATIVE[1], NATIVE[0], "tests/controller"),
+        (NATIVE[-1], *NATIVE[:-1], "tests/controller"),
     ),
 }
 SWAPS = {

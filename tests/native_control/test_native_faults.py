@@ -1,0 +1,179 @@
+"""Compares the C controller with the Python controller where sensors lie, where the ground is
+missing, met early or slides, and where joints are too slow.
+"""
+
+from __future__ import annotations
+
+import ctypes as ct
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from gains import make_gains
+from native_walks import ALL_PARTS, ROBOTS, Ground, close, differences, program, setup_of, uneven
+
+from hexapod_cosim.controller import (
+    BodyCommand,
+    Controller,
+    Measurement,
+    Parts,
+)
+
+NO_FALLBACK = replace(ALL_PARTS, fallback=False)
+
+
+def dead_and_stuck(force: np.ndarray, step: int) -> None:
+    force[1] *= not 400 <= step < 900  # the sensor reads nothing
+    if 700 <= step < 1100:
+        force[3] = [1.0, -2.0, 15.0]  # another sensor reads the same all the time
+    if 1150 <= step < 1300:
+        force[[0, 2, 4]] = 0.0
+
+
+def dragged(force: np.ndarray, step: int) -> None:
+    if 500 <= step < 560 or 900 <= step < 1000:
+        force[:, 0] += 0.8 * force[:, 2]  # the whole robot slides
+    if 1200 <= step < 1300:
+        force[:, 0] += 0.8 * force[:, 2]
+        force *= 0.4  # and has hardly met the ground
+
+
+def barely_met(force: np.ndarray, step: int) -> None:
+    """Lets the whole robot slide on feet that carry 0.4, then 0.6 of its weight."""
+    for begin, share in ((500, 0.4), (900, 0.6)):
+        if begin <= step < begin + 40:
+            force *= share
+            force[:, 0] += 0.8 * force[:, 2]
+
+
+def heavy(force: np.ndarray, step: int) -> None:
+    if step >= 300:
+        force *= (
+            2.1 if step < 900 else 4.2 if step < 1250 else 1.0
+        )  # more than the servos carry, then far more, then the planned load
+
+
+@pytest.mark.parametrize("spoil", [dead_and_stuck, dragged, barely_met, uneven, heavy])
+@pytest.mark.parametrize("name", ROBOTS)
+def test_sensors_that_lie_ground_that_is_missing_and_slides_are_answered_at_the_same_step(
+    controller_core: ct.CDLL, name: str, spoil: Callable[[np.ndarray, int], None]
+) -> None:
+    ground = Ground()
+
+    def sense(controller: Controller, step: int, measurement: Measurement) -> None:
+        ground(controller, step, measurement)
+        spoil(measurement.foot_force, step)
+
+    # with a planned squeeze even four times the weight does not ask too much of the second robot
+    setup = setup_of(name, parts=Parts(squeeze=0.0))
+    worst, fallback = differences(controller_core, setup, sense=sense)
+    assert close(worst)
+    assert fallback.any() or spoil is uneven
+
+
+@pytest.mark.parametrize(
+    ("gait", "bump", "parts"),
+    [("tripod", 0.02, ALL_PARTS), ("wave", 0.02, ALL_PARTS), ("tripod", 0.039, NO_FALLBACK)],
+)
+def test_ground_that_is_met_early_is_answered_at_the_same_step(
+    controller_core: ct.CDLL, gait: str, bump: float, parts: Parts
+) -> None:
+    """The ground is met by all feet at 12 mm, by one foot higher, then by none: soft ground with a
+    bump, and a torso that has risen again.
+
+    Without fallback the bump is as high as the largest offset of a foot.
+    """
+    ground = Ground()
+
+    def sense(controller: Controller, step: int, measurement: Measurement) -> None:
+        ground(controller, step, measurement)
+        compliant, met = (
+            controller.compliant,
+            np.where(np.arange(6) == 2, bump, 0.012 if parts is ALL_PARTS else 0.0),
+        )
+        assert compliant is not None
+        height = compliant.stance.plan.height
+        if step < 1200:
+            measurement.foot_force[(height > 0.0) & (height < met), 2] = 4.0
+
+    worst, _ = differences(controller_core, setup_of(gait=gait, parts=parts), sense=sense)
+    assert close(worst)
+
+
+class LowGround:
+    """A sense() for which foot 2 finds the ground 12 mm lower than planned, foot 3 in some steps
+    nowhere.
+
+    Attributes:
+        held: whether the gait clock waited, for each period.
+    """
+
+    def __init__(self) -> None:
+        self.ground = Ground()
+        self.held: list[bool] = []
+
+    def __call__(self, controller: Controller, step: int, measurement: Measurement) -> None:
+        self.ground(controller, step, measurement)
+        compliant = controller.compliant
+        assert compliant is not None
+        lowered, awaited = compliant.laws.touchdown.offset, controller.paths.awaited
+        measurement.foot_force[:, 2] += 12.0 * (awaited & (lowered < -0.012))
+        measurement.foot_force[2] *= not (controller.paths.swinging[2] and lowered[2] > -0.012)
+        measurement.foot_force[3] *= step % 700 < 500
+        self.held.append(controller.paths.held)
+
+
+@pytest.mark.parametrize("gait", ["tripod", "ripple", "amble"])
+def test_feet_that_find_no_ground_are_awaited_at_the_same_step(
+    controller_core: ct.CDLL, gait: str
+) -> None:
+    sense = LowGround()
+    worst, _ = differences(controller_core, setup_of(gait=gait), sense=sense)
+    assert close(worst)
+    assert 0.02 < np.mean(sense.held) < 0.8
+
+
+def test_stops_while_feet_are_awaited_are_the_same(controller_core: ct.CDLL) -> None:
+    """Every second command is to stand, given before the last one is reached."""
+    sense, stop = LowGround(), BodyCommand()
+
+    def told(t: float) -> BodyCommand:
+        return BodyCommand(0.04, 0.01, 0.05) if t % 1.7 < 1.2 else stop
+
+    worst, _ = differences(controller_core, setup_of(), sense=sense, steps=1400, told=told)
+    assert close(worst)
+    stands = [k for k, held in enumerate(sense.held) if held and told(0.005 * k) is stop]
+    assert len(stands) > 20
+
+
+@pytest.mark.parametrize(("speed_max", "least", "most"), [(3.0, 0.09, 0.11), (2.6, 0.0, 0.02)])
+def test_feet_of_joints_that_are_too_slow_are_hardly_awaited(
+    controller_core: ct.CDLL, speed_max: float, least: float, most: float
+) -> None:
+    """At 2.6 rad/s the plan needs more speed for more than a fifth of the time, at 3 rad/s for
+    less. The first waits are earlier than the share of the time is known: a longer walk makes
+    them count less.
+    """
+    sense, setup = LowGround(), setup_of()
+    slow = replace(setup.robot, servo=replace(setup.robot.servo, speed_max=speed_max))
+    robot = replace(setup, robot=slow, gains=make_gains(slow))
+    worst, _ = differences(
+        controller_core, robot, sense=sense, told=lambda t: program(0.7 * t), steps=2000
+    )
+    assert close(worst)
+    assert least <= np.mean(sense.held) < most
+
+
+def test_joints_that_are_outrun_fall_back_at_the_same_step(controller_core: ct.CDLL) -> None:
+    setup = setup_of()
+    slow = replace(setup.robot, servo=replace(setup.robot.servo, speed_max=1.2))
+    worst, fallback = differences(
+        controller_core,
+        replace(setup, robot=slow, gains=make_gains(slow)),
+        sense=Ground(),
+        steps=2100,
+    )
+    assert close(worst)
+    assert fallback.all(axis=1).any()
+    assert not fallback[-1].any()

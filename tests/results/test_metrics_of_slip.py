@@ -1,0 +1,166 @@
+"""Metrics of slip and of the friction cone on synthetic walks for which they are known."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from walks import DISTANCE, JUDGED, PERIOD, SPEED, WEIGHT, Walk
+
+Array = NDArray[np.float64]
+
+
+def test_slip_is_what_the_plant_counted_per_metre_walked() -> None:
+    walk = Walk()
+    walk.grow("LF.foot.slip_distance", 0.010)
+    walk.grow("RM.foot.slip_distance", 0.005)
+    walk.set("LF.foot.slip_speed", 5.0)  # what the rows show at their moments does not count
+    walk.set("LF.foot.normal_force", 0.3 * WEIGHT)
+    assert walk.metrics()["slip_per_metre"] == pytest.approx(0.015 * JUDGED / DISTANCE)
+
+
+@pytest.mark.parametrize("h", [0.005, 0.02, 0.03])  # of 0.03 s no row is at 2 s
+def test_cumulative_figures_depend_on_no_row(h: float) -> None:
+    """Steady growth gives the same in the measured time, whether or not rows lie at its ends."""
+    walk = Walk(h=h)
+    walk.grow("LF.foot.slip_distance", 0.010)
+    walk.grow("LF.femur.positive_work", 3.0)
+    walk.grow("LF.femur.torque_squared", 4.0)
+    metrics = walk.metrics()
+    assert metrics["slip_per_metre"] == pytest.approx(0.010 / 0.08)
+    assert metrics["cost_of_transport"] == pytest.approx(3.0 / (0.08 * WEIGHT))
+    assert metrics["torque_rms"] == pytest.approx(2.0 / math.sqrt(18.0))
+    assert metrics["path_error"] == pytest.approx(0.0, abs=1e-12)
+
+
+@pytest.mark.parametrize("load", [0.02, 0.3])
+@pytest.mark.parametrize("share", [0.1, 0.5, 0.9])
+def test_the_creep_of_the_tanh_law_is_no_net_slip(share: float, load: float) -> None:
+    mu, slope, normal = 0.7, 100.0, load * WEIGHT
+    walk = Walk()
+    walk.set("LF.foot.normal_force", normal)
+    walk.set("LF.foot.tangential_force", share * mu * normal)
+    walk.set("LF.foot.slip_speed", math.atanh(share) / slope)
+    assert walk.metrics(friction__mu=mu, friction__slope=slope)[
+        "slip_net_per_metre"
+    ] == pytest.approx(0.0, abs=1e-12)
+
+
+def test_net_slip_is_what_exceeds_the_largest_creep() -> None:
+    mu, slope, normal = 0.7, 100.0, 0.3 * WEIGHT
+    walk = Walk()
+    walk.set("LF.foot.normal_force", normal)
+    walk.set("LF.foot.tangential_force", mu * normal)
+    walk.set("LF.foot.slip_speed", 0.5)
+    walk.set("RM.foot.slip_speed", 0.5)  # in the air
+    net = 0.5 - math.atanh(0.999) / slope
+    assert walk.metrics(friction__mu=mu, friction__slope=slope)[
+        "slip_net_per_metre"
+    ] == pytest.approx(net / SPEED)
+
+
+@pytest.mark.parametrize(
+    ("stretched", "turn", "net"),
+    [(0.5, 1.0, 0.0), (1.0, 1.0, 1.0), (1.0, -1.0, 0.0), (0.0, 1.0, 0.0)],
+)
+def test_net_slip_of_bristles_is_what_they_do_not_give_back(
+    stretched: float, turn: float, net: float
+) -> None:
+    """A bristle is a spring below break-away, slides when full, and springs back.
+
+    Velocity along the normal is no slip.
+    """
+    walk = Walk()
+    walk.set("LF.foot.normal_force", 0.3 * WEIGHT)
+    for axis, part in (("1", 0.6), ("2", 0.8)):
+        walk.set(f"LF.foot.velocity[{axis}]", turn * part * 0.05)
+        walk.set(f"LF.foot.bristle[{axis}]", part * stretched * 5e-4)
+    walk.set("LF.foot.velocity[3]", 0.4)
+    metrics = walk.metrics(friction__law=3.0, friction__presliding=5e-4)
+    assert metrics["slip_net_per_metre"] == pytest.approx(net * 0.05 / SPEED, abs=1e-12)
+
+
+def use_cone(walk: Walk, share: float, rate: Array | float = 1.0) -> None:
+    """Adds loaded feet that use this share of the cone, `rate` of them at a time (rows,).
+
+    A bin begins at 0.9 (i/30)^2.
+    """
+    bins = [0.9 * (i / 30.0) ** 2 for i in range(31)]
+    walk.grow(f"feet.cone_time[{sum(share >= begin for begin in bins)}]", rate)
+
+
+def test_cone_use_is_what_the_plant_counted_over_time() -> None:
+    """At 11 % for the most, at 20 %, and at 95 % of the cone for a tenth of the time.
+
+    What rows show at their moments does not count.
+    """
+    walk = Walk()
+    high = np.where(walk.time % PERIOD < 0.25, 1.0, 0.0)
+    use_cone(walk, 0.11, 1.5)
+    use_cone(walk, 0.20, 1.0 - high)
+    use_cone(walk, 0.95, high)
+    walk.set("LF.foot.normal_force", 0.3 * WEIGHT)
+    walk.set("LF.foot.tangential_force", 0.3 * WEIGHT)
+    metrics = walk.metrics(friction__mu=0.7)
+    assert metrics["cone_use_over_90"] == pytest.approx(0.10, abs=1e-3)
+    assert 0.9 < metrics["cone_use_p95"] < 1.0
+    assert 0.10 <= metrics["cone_use_p50"] <= 0.13
+
+
+def test_cone_use_before_the_judged_cycles_does_not_count() -> None:
+    walk = Walk()
+    use_cone(walk, 0.5, np.where(walk.time > 2.0, 1.0, 0.0))
+    use_cone(walk, 0.95, np.where(walk.time > 2.0, 0.0, 100.0))
+    metrics = walk.metrics(friction__mu=0.7)
+    assert metrics["cone_use_p50"] == pytest.approx(0.50, abs=0.03)
+
+
+@pytest.mark.parametrize(
+    ("largest", "p50", "p95", "bin_width"), [(0.80, 0.40, 0.76, 0.056), (0.10, 0.05, 0.095, 0.021)]
+)
+def test_cone_use_is_told_by_percentiles_over_time(
+    largest: float, p50: float, p95: float, bin_width: float
+) -> None:
+    """From nothing to the largest share, evenly in time: within half a bin at the last
+    percentile, much less in between.
+    """
+    walk = Walk()
+    for i in range(30):
+        begin, end = 0.9 * (i / 30.0) ** 2, 0.9 * ((i + 1) / 30.0) ** 2
+        within = max(min(end, largest) - begin, 0.0) / largest
+        if within > 0.0:
+            use_cone(walk, 0.5 * (begin + end), within)
+    metrics = walk.metrics(friction__mu=0.7)
+    assert metrics["cone_use_p50"] == pytest.approx(p50, rel=0.03)
+    assert metrics["cone_use_p95"] == pytest.approx(p95, abs=0.5 * bin_width)
+    assert metrics["cone_use_over_90"] == 0.0
+
+
+@pytest.mark.parametrize(("share", "over"), [(0.89, 0.0), (0.91, 1.0)])
+def test_nearly_sliding_is_over_nine_tenths_of_the_cone(share: float, over: float) -> None:
+    walk = Walk()
+    use_cone(walk, share)
+    assert walk.metrics(friction__mu=0.7)["cone_use_over_90"] == pytest.approx(over)
+
+
+@pytest.mark.parametrize(("load", "counts"), [(0.0095, False), (0.0105, True)])
+def test_a_foot_stands_on_a_hundredth_of_the_weight(load: float, counts: bool) -> None:
+    walk = Walk()
+    walk.set("LF.foot.normal_force", load * WEIGHT)
+    metrics = walk.metrics(friction__mu=0.7)
+    assert math.isfinite(metrics["force_p95"]) == counts
+    assert math.isnan(metrics["cone_use_p95"])  # the plant counted no time
+
+
+@pytest.mark.parametrize(
+    "ground", [{"friction__mu": 0.0}, {"friction__law": 2.0}], ids=["no friction", "no law"]
+)
+def test_a_cone_that_is_not_there_is_not_used(ground: dict[str, float]) -> None:
+    walk = Walk()
+    use_cone(walk, 0.3)
+    metrics = walk.metrics(**ground)
+    assert all(
+        math.isnan(metrics[name]) for name in ("cone_use_p50", "cone_use_p95", "cone_use_over_90")
+    )
