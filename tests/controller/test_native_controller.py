@@ -32,7 +32,7 @@ from hexapod_cosim.models import load_robot
 
 ROBOTS = ("athena", "phantomx_mk4")
 ALL_PARTS = Parts(suspension=True)
-EVERY_PART = replace(ALL_PARTS, slow_landing=True, minmax_torque=True)
+EVERY_PART = replace(ALL_PARTS, slow_landing=True, sway=True, minmax_torque=True)
 NO_FALLBACK = replace(ALL_PARTS, fallback=False)
 ANGLE = 1e-12  # rad
 SPEED = 1e-12  # relative to a servo's largest speed
