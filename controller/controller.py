@@ -103,6 +103,9 @@ class PlannedStep(NamedTuple):
     value: Array  # (6,) commanded vx vy yaw_rate height roll pitch
     posture: Posture
     feet: PlannedFeet
+    sway: complex  # m    way of the torso against the swinging legs (C57)
+    sway_rate: complex  # m/s
+    plane: Plane  # m    of the feet from the torso that sways
     activation: Array  # 1    of the legs
     lowering: Array  # m    lowering of the feet by the indentation of the ground (C21)
     height: Array  # m    of the lowered feet
@@ -225,8 +228,11 @@ class Controller(Stateful):
             twist = Twist(twist.velocity + added.velocity, twist.yaw_rate + added.yaw_rate)
         return value, Posture.of(value[3:], rate[3:]), twist
 
-    def _lower(self, feet: PlannedFeet) -> tuple[Array, Array]:
-        """Returns the activations of the legs (6,) and the lowering of their feet (6,) [m]."""
+    def _lower(self, feet: PlannedFeet, plane: Plane) -> tuple[Array, Array]:
+        """Returns the activations of the legs (6,) and the lowering of their feet (6,) [m].
+
+        plane: (6,) of the feet from the torso that sways [m].
+        """
         if self.compliant is None:
             return np.ones(LEGS), np.zeros(LEGS)
         support, paths = self.compliant.support, self.paths
@@ -236,7 +242,7 @@ class Controller(Stateful):
         activation = np.where(paths.awaited, 0.0, activation)
         if not self.parts.support:
             return activation, np.zeros(LEGS)
-        return activation, support.lowering(feet.plane, activation)
+        return activation, support.lowering(plane, activation)
 
     def place_legs(
         self, posture: Posture, plane: Plane, height: Array, rolled: Array
@@ -262,13 +268,31 @@ class Controller(Stateful):
 
     def _lay_out(self, value: Array, posture: Posture, feet: PlannedFeet) -> PlannedStep:
         """Computes the pose of the legs and the point masses for planned feet."""
-        activation, lowering = self._lower(feet)
+        sway, sway_rate = 0j, 0j
+        if self.compliant is not None:
+            sway, sway_rate = self.compliant.sway.of(feet)
+        plane = feet.plane - sway
+        activation, lowering = self._lower(feet, plane)
         height = feet.height - lowering
-        shift, pose = self.place_legs(posture, feet.plane, height, feet.rolled)
+        shift, pose = self.place_legs(posture, plane, height, feet.rolled)
         masses = None
         if self.compliant is not None:
-            masses = self.compliant.dynamics.place(pose, feet.way, feet.turn, posture)
-        return PlannedStep(value, posture, feet, activation, lowering, height, shift, pose, masses)
+            way = feet.way + cis(feet.turn) * sway
+            masses = self.compliant.dynamics.place(pose, way, feet.turn, posture)
+        return PlannedStep(
+            value=value,
+            posture=posture,
+            feet=feet,
+            sway=sway,
+            sway_rate=sway_rate,
+            plane=plane,
+            activation=activation,
+            lowering=lowering,
+            height=height,
+            shift=shift,
+            pose=pose,
+            masses=masses,
+        )
 
     def _plan_step(self, number: int, ahead: int, before: PlannedStep) -> PlannedStep:
         """Plans the step `number` periods after the section began.
@@ -416,16 +440,16 @@ class Controller(Stateful):
         They are those of the paths with the shift due to rolling, without the lowering.
         """
         now = self._now
-        plane, height = now.posture.see_place(now.feet.plane + now.shift, now.feet.height)
+        plane, height = now.posture.see_place(now.plane + now.shift, now.feet.height)
         return rows_of(plane.real, plane.imag, height)
 
     def _planned_feet(self) -> Feet:
         """Returns the feet of the present step with rolling and lowering, walking frame."""
         now = self._now
         return Feet(
-            plane=now.feet.plane + now.shift,
+            plane=now.plane + now.shift,
             height=now.height,
-            velocity=now.feet.velocity + self._rate_of("shift"),
+            velocity=now.feet.velocity - now.sway_rate + self._rate_of("shift"),
             rise=now.feet.rise - self._rate_of("lowering"),
         )
 
@@ -466,7 +490,7 @@ class Controller(Stateful):
                 (before.masses, now.masses, after.masses), (before.pose, now.pose, after.pose)
             )
         demand = compliant.dynamics.demand(motion, speed, now.posture)
-        feet = now.feet.plane + now.shift
+        feet = now.plane + now.shift
         plan = compliant.laws.plan(
             demand,
             compliant.shares(feet, now.activation, demand),
@@ -479,7 +503,14 @@ class Controller(Stateful):
         )
         climb = self.legs.speeds(now.pose, 0.0, 1.0)
         return Stance(
-            plan, climb, now.value, now.posture, now.feet.plane, now.height, now.feet.rolled
+            plan=plan,
+            climb=climb,
+            value=now.value,
+            posture=now.posture,
+            plane=now.feet.plane,
+            sway=now.sway,
+            height=now.height,
+            rolled=now.feet.rolled,
         )
 
     # ---------------------------------------------------------------------------------- steps

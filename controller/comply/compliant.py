@@ -23,6 +23,7 @@ from hexapod_cosim.controller.comply.compliance import Compliance, Plan
 from hexapod_cosim.controller.comply.planned_squeeze import PlannedSqueeze
 from hexapod_cosim.controller.comply.posture import Posture
 from hexapod_cosim.controller.comply.support import Shares, Support
+from hexapod_cosim.controller.comply.sway import Sway
 from hexapod_cosim.controller.gains import Gains
 from hexapod_cosim.controller.memory import Stateful
 from hexapod_cosim.controller.parts import Parts
@@ -64,6 +65,7 @@ class Stance(NamedTuple):
     value: Array  # (6,) commanded vx vy yaw_rate height roll pitch
     posture: Posture  # of the torso
     plane: Plane  # m    (6,) planned feet, walking frame
+    sway: complex  # m    of the torso in the walking frame
     height: Array  # m    (6,) to which they are lowered, walking frame
     rolled: Array  # m    (6,) outwards from the stance to the positions that the feet aim at
 
@@ -107,6 +109,7 @@ class Compliant(Stateful):
     ) -> None:
         self.legs, self.per_second, self.leading = legs, 1.0 / period, STEERING_TIME / period
         self.dynamics = InverseDynamics(robot, legs, period=period)
+        self.sway = Sway(self.dynamics, legs, active=parts.sway)
         self.support = Support(robot, gait, gains.support, rest=self.dynamics.rest())
         self.squeeze = PlannedSqueeze(
             friction=robot.friction.mu,
@@ -194,7 +197,7 @@ class Compliant(Stateful):
         pitch_seen = asin(min(max(2.0 * (w * y - z * x), -1.0), 1.0))
         self.hold.look(
             Sight(
-                plane=plane - rolled,
+                plane=plane - rolled + stance.sway,
                 height=height + commanded_height,
                 planned=stance.plane,
                 planned_height=stance.height,

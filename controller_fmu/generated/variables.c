@@ -482,6 +482,7 @@ static const hxVariable parameters[] = {
     {"parts.touchdown", "", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, definition.parts.touchdown), HX_BOOLEAN, 0, 1},
     {"parts.slow_landing", "", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, definition.parts.slow_landing), HX_BOOLEAN, 0, 1},
     {"parts.posture", "", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, definition.parts.posture), HX_BOOLEAN, 0, 1},
+    {"parts.sway", "", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, definition.parts.sway), HX_BOOLEAN, 0, 1},
     {"parts.path", "", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, definition.parts.path), HX_BOOLEAN, 0, 1},
     {"parts.limits", "", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, definition.parts.limits), HX_BOOLEAN, 0, 1},
     {"parts.fallback", "", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, definition.parts.fallback), HX_BOOLEAN, 0, 1},
@@ -652,7 +653,7 @@ const char *const hx_log_category_names[] = {
 const hxStateRow *const hx_states = 0;
 const size_t hx_state_count = 0;
 
-const char hx_default_guid[] = "{9d55ac1c-1623-4f11-866e-c2ef5db30e5c}";
+const char hx_default_guid[] = "{d8faaec9-82c5-44ac-a94b-20f997bea590}";
 
 _Static_assert(HX_CONTROL_KINEMATIC == 1, "Control");
 _Static_assert(HX_CONTROL_COMPLIANT == 2, "Control");

@@ -42,7 +42,7 @@ static hxTwist look_ahead(const hxControllerModel *model, const hxControllerStat
 }
 
 /* Computes the activations of the legs, and lowers the feet by the depth to which the ground will
- * deform under their loads. */
+ * deform under their loads. The feet are seen from the torso that sways. */
 static void lower(const hxControllerModel *model, const hxFootPaths *paths, hxPlannedStep *step) {
   const hxSupport *support = &model->laws.support;
   for (int k = 0; k < HX_LEGS; ++k) {
@@ -56,7 +56,7 @@ static void lower(const hxControllerModel *model, const hxFootPaths *paths, hxPl
       step->activation[k] = 1.0;
   }
   if (model->compliant && model->laws.laws.parts.support)
-    hx_support_lowering(support, step->feet.plane, step->activation, step->lowering);
+    hx_support_lowering(support, step->plane, step->activation, step->lowering);
   for (int k = 0; k < HX_LEGS; ++k) step->height[k] = step->feet.height[k] - step->lowering[k];
 }
 
@@ -81,13 +81,18 @@ static void place_leg(const hxLegSolver *leg, const hxPosture *posture, hxPlane 
 
 /* Computes the poses of the legs and the point masses for planned feet. */
 static void lay_out(const hxControllerModel *model, const hxFootPaths *paths, hxPlannedStep *step) {
+  step->sway = step->sway_rate = hx_plane(0.0, 0.0);
+  if (model->compliant) hx_sway_of(&model->laws.sway, &step->feet, &step->sway, &step->sway_rate);
+  for (int k = 0; k < HX_LEGS; ++k) step->plane[k] = hx_plane_sub(step->feet.plane[k], step->sway);
   lower(model, paths, step);
   for (int k = 0; k < HX_LEGS; ++k)
-    place_leg(&model->leg[k], &step->posture, step->feet.plane[k], step->height[k],
-              step->feet.rolled[k], &step->shift[k], &step->pose[k]);
+    place_leg(&model->leg[k], &step->posture, step->plane[k], step->height[k], step->feet.rolled[k],
+              &step->shift[k], &step->pose[k]);
   if (model->compliant)
-    hx_inverse_dynamics_place(&model->laws.dynamics, model->leg, step->pose, step->feet.way,
-                              step->feet.turn, &step->posture, &step->masses);
+    hx_inverse_dynamics_place(
+        &model->laws.dynamics, model->leg, step->pose,
+        hx_plane_add(step->feet.way, hx_times(hx_cis(step->feet.turn), step->sway)),
+        step->feet.turn, &step->posture, &step->masses);
 }
 
 /* Plans the step a number of periods after the section began; `ahead`: periods after the present
@@ -222,7 +227,7 @@ static double rate_of(const hxControllerState *state, double before, double now,
 
 /* Computes the centre of a foot as the command plans it: on its path, rolling, not lowered. */
 static void show_planned(const hxPlannedStep *now, int k, double planned[3]) {
-  hxPlane plane = hx_plane_add(now->feet.plane[k], now->shift[k]);
+  hxPlane plane = hx_plane_add(now->plane[k], now->shift[k]);
   double height = now->feet.height[k];
   hx_posture_see_place(&now->posture, &plane, &height);
   planned[0] = plane.x;
@@ -238,8 +243,8 @@ static void planned_foot(const hxControllerModel *model, hxControllerState *stat
   const hxPlane *old = &before->shift[k], *here = &now->shift[k], *next = &after->shift[k];
   const hxPlane rolling = {rate_of(state, old->x, here->x, next->x, model->period),
                            rate_of(state, old->y, here->y, next->y, model->period)};
-  *plane = hx_plane_add(now->feet.plane[k], *here);
-  *velocity = hx_plane_add(now->feet.velocity[k], rolling);
+  *plane = hx_plane_add(now->plane[k], *here);
+  *velocity = hx_plane_add(hx_plane_sub(now->feet.velocity[k], now->sway_rate), rolling);
   *height = now->height[k];
   *rise = now->feet.rise[k] -
           rate_of(state, before->lowering[k], now->lowering[k], after->lowering[k], model->period);
@@ -309,7 +314,7 @@ static void ask(const hxControllerModel *model, hxControllerState *state, hxStan
                              &now->posture, &demand);
   plan->overspeed = 0;
   for (int k = 0; k < HX_LEGS; ++k) {
-    feet[k] = hx_plane_add(now->feet.plane[k], now->shift[k]);
+    feet[k] = hx_plane_add(now->plane[k], now->shift[k]);
     height[k] = now->feet.height[k] - model->paths.home_height[k];
     plan->shares.activation[k] = now->activation[k];
     plan->swinging[k] = state->paths.swinging[k];
@@ -326,6 +331,7 @@ static void ask(const hxControllerModel *model, hxControllerState *state, hxStan
   stance->value = now->value;
   stance->posture = &now->posture;
   stance->plane = now->feet.plane;
+  stance->sway = now->sway;
   stance->height = now->height;
   stance->rolled = now->feet.rolled;
 }

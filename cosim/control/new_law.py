@@ -10,7 +10,7 @@ from hexapod_cosim.cosim.common.files import write_text
 from hexapod_cosim.models import HexapodError
 
 TEMPLATE = Path(__file__).parent / "template"
-LAW, TEST, README = "pattern_generator.py", "test_of_law.txt", "readme.txt"
+LAW, TEST, README = "supported_walk.py", "test_of_law.txt", "readme.txt"
 NAME = re.compile(r"[^\W\d]\w*")
 
 
@@ -38,7 +38,7 @@ def write_law(name: str, folder: Path) -> list[Path]:
                 fix="choose another name, or another folder with -o",
             )
     folder.mkdir(parents=True, exist_ok=True)
-    words = {"@CLASS@": kind, "@STEM@": stem, "@FILE@": test.name, "PatternGenerator": kind}
+    words = {"@CLASS@": kind, "@STEM@": stem, "@FILE@": test.name, "SupportedWalk": kind}
     write_text(law, _filled(LAW, words))
     write_text(test, _filled(TEST, words))
     before = readme.read_text(encoding="utf-8") if readme.is_file() else ""

@@ -14,6 +14,7 @@ from hexapod_cosim.cosim.course.table import ALL, CaseFigures, ClassFigures, Tab
 
 NUMBER = re.compile(r"[0-9.]*[0-9]")
 NONE = "-"  # where there is no value
+LEAST_SHOWN = 5e-3  # of an effect: a smaller change is 0 %
 LEAST_HALF = 5e-4  # of a mean: a narrower interval is not shown
 SCALES: Mapping[str, tuple[float, str]] = {  # shown value over the metric's, and its unit
     "slip": (1e3, "mm/m"),
@@ -170,11 +171,15 @@ def _alike(figures: CaseFigures) -> Iterator[tuple[str, int]]:
 
 
 def part_rows(table: Table) -> tuple[list[str], list[list[str]]]:
-    """Returns the table of parts: their best and worst effects, and whether they pay."""
+    """Returns the table of parts: their best and worst effects, and whether they pay.
+
+    A part that betters or worsens nothing, in whole per cent, has "none" there.
+    """
     rows = [
         [
             each.label,
-            *map(_effect, (each.best, each.worst)),
+            _effect(each.best) if each.best.change < -LEAST_SHOWN else "none",
+            _effect(each.worst) if each.worst.change > LEAST_SHOWN else "none",
             "pays" if each.pays else "does not pay",
         ]
         for each in judge_parts(table)

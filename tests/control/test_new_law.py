@@ -1,4 +1,4 @@
-"""`hexapod controller new`: the files it writes, and that the controller walks."""
+"""`hexapod controller new`: the files it writes, and that its controller and an example walk."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import pytest
 from command import Call, assert_refused
 
 import hexapod_cosim
-from hexapod_cosim.cosim.control.new_law import class_name, module_name
+from hexapod_cosim.cosim.control.new_law import class_name, module_name, write_law
 
 EXAMPLE = Path(__file__).resolve().parents[2] / "examples" / "controllers" / "cpg.py"
 
@@ -39,13 +39,26 @@ def test_it_overwrites_nothing(call: Call, tmp_path: Path) -> None:
     assert_refused(call("controller", "new", "my-walk", "-o", tmp_path), "not a name")
 
 
-def test_the_example_is_what_the_command_writes(call: Call, tmp_path: Path) -> None:
-    assert call("controller", "new", "cpg", "-o", tmp_path)[0] == 0
-    assert EXAMPLE.read_text() == (tmp_path / "cpg.py").read_text()
+@pytest.mark.parametrize("robot", ["athena", "phantomx_mk4"])
+def test_the_controller_walks_and_turns_and_slips_less_than_kinematic_control(
+    robot: str, tmp_path: Path, plant_build: Path
+) -> None:
+    law = f"{write_law('my_walk', tmp_path)[0]}:MyWalk"
+    settings = {"duration": 4, "robot": robot}
+    ahead = hexapod_cosim.simulate("walk_flat", law, settings=settings)
+    assert ahead.facts["walk"]["upright"]
+    # 0.08 m/s for 4 s, less the ramp of one second
+    assert ahead.recording.vector("torso.position")[-1, 0] == pytest.approx(0.28, rel=0.05)
+    ours = hexapod_cosim.simulate("walk_flat", "kinematic", settings=settings)
+    assert ahead.metrics["slip_per_metre"] < 0.6 * ours.metrics["slip_per_metre"]
+    turning = hexapod_cosim.simulate(
+        "walk_flat", law, settings={**settings, "command.yaw_rate": 0.2}
+    )
+    assert turning.recording.column("torso.yaw")[-1] == pytest.approx(0.7, rel=0.05)
 
 
 @pytest.mark.parametrize("robot", ["athena", "phantomx_mk4"])
-def test_the_controller_walks_forward_and_turns(robot: str, plant_build: Path) -> None:
+def test_the_pattern_generator_walks_forward_and_turns(robot: str, plant_build: Path) -> None:
     settings = {"duration": 4, "robot": robot}
     ahead = hexapod_cosim.simulate("walk_flat", f"{EXAMPLE}:Cpg", settings=settings)
     assert ahead.facts["walk"]["upright"]

@@ -210,6 +210,24 @@ def test_a_part_does_not_pay_otherwise(values: Mapping[str, float], success: int
     assert not found.pays
 
 
+@pytest.mark.parametrize(
+    ("heat", "effects"),
+    [
+        (1.04, ["-15 % slip, flat", "+4 % heat, flat"]),
+        (1.004, ["-15 % slip, flat", "none"]),
+        (0.98, ["-15 % slip, flat", "none"]),
+    ],
+)
+def test_a_part_that_worsens_nothing_has_no_worst_effect(heat: float, effects: list[str]) -> None:
+    _, (row,) = texts.part_rows(part_table({"slip": 0.85, "heat": heat}))
+    assert row[1:3] == effects
+
+
+def test_a_part_that_betters_nothing_has_no_best_effect() -> None:
+    _, (row,) = texts.part_rows(part_table({"heat": 1.04}))
+    assert row[1:] == ["none", "+4 % heat, flat", "does not pay"]
+
+
 def test_tables_have_a_cell_for_every_column() -> None:
     table = sweep_table({"stairs_25": 4}, {"rubble_40": 1})
     for columns, rows in (

@@ -23,7 +23,7 @@ from hexapod_cosim.controller import (
 from hexapod_cosim.cosim.interface.controller_interface import ControllerSetup
 from hexapod_cosim.models import load_robot
 
-EVERY_PART = replace(ALL_PARTS, slow_landing=True, minmax_torque=True)
+EVERY_PART = replace(ALL_PARTS, slow_landing=True, sway=True, minmax_torque=True)
 
 
 WALKS = [

@@ -45,6 +45,7 @@ void hx_compliant_compile(const hxControllerDefinition *definition, const hxLegS
   hx_inverse_dynamics_place(&model->dynamics, leg, pose, hx_plane(0.0, 0.0), 0.0, &level, &masses);
   const hxNeighbours motion = {{NULL, &masses, NULL}, {NULL, pose, NULL}};
   hx_inverse_dynamics_demand(&model->dynamics, leg, &motion, still, &level, &rest);
+  hx_sway_compile(definition, leg, &model->dynamics, &model->sway);
   hx_support_compile(definition, &rest, &model->support);
   hx_compliance_compile(definition, -model->dynamics.floor, &model->laws);
   hx_planned_squeeze_compile(definition, model->laws.weight, -model->dynamics.floor,
@@ -101,7 +102,7 @@ static void look(const hxCompliantModel *model, const hxLegSolver leg[HX_LEGS],
     hx_posture_turn(stance->posture, &seen.plane[k], &seen.height[k]);
     const double rolls = hx_leg_solver_rolling(&leg[k], angle) - stance->rolled[k];
     const hxPlane rolled = hx_scaled(hx_cis(leg[k].hip_yaw + angle[0]), rolls);
-    seen.plane[k] = hx_plane_sub(seen.plane[k], rolled);
+    seen.plane[k] = hx_plane_add(hx_plane_sub(seen.plane[k], rolled), stance->sway);
     seen.height[k] += stance->value[3];
     seen.planned[k] = stance->plane[k];
     seen.planned_height[k] = stance->height[k];

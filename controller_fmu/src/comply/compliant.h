@@ -9,6 +9,7 @@
 #include "compliance.h"
 #include "hexapod/inside.h"
 #include "planned_squeeze.h"
+#include "sway.h"
 
 HX_HIDDEN_BEGIN
 
@@ -16,6 +17,7 @@ typedef struct hxCompliantModel {
   double per_second; /* 1/s   one over the period */
   double leading; /* steps of the transition of the added velocity */
   hxInverseDynamics dynamics;
+  hxSway sway;
   hxSupport support;
   hxPlannedSqueeze squeeze;
   hxComplianceModel laws;
@@ -47,6 +49,7 @@ typedef struct hxStance {
   const double *value; /* (6) commanded vx vy yaw_rate height roll pitch */
   const hxPosture *posture;
   const hxPlane *plane; /* m  (6) planned feet, walking frame */
+  hxPlane sway; /* m, of the torso in the walking frame */
   const double *height; /* m, (6) heights of the lowered feet */
   const double *rolled; /* m, (6) outwards from the stance to the positions that the feet aim at */
 } hxStance;

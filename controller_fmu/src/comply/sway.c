@@ -1,0 +1,62 @@
+#include "sway.h"
+
+/* m, by which all feet are moved to find the mass that moves with them */
+static const double reach = 1e-3;
+
+/* Returns the sum of m p of all links with all feet moved from the stance [kg m]. */
+static hxPlane moment_of(const hxInverseDynamics *dynamics, const hxLegSolver leg[HX_LEGS],
+                         hxPlane step) {
+  const double zero[3] = {0.0};
+  hxPlane sum = {0.0, 0.0};
+  hxPose pose[HX_LEGS];
+  hxPosture level;
+  hxMasses masses;
+  double foot[3];
+  for (int k = 0; k < HX_LEGS; ++k) {
+    hx_leg_solver_forward(&leg[k], leg[k].stance, foot);
+    hx_leg_solver_pose(&leg[k], hx_plane_add(hx_plane(foot[0], foot[1]), step), foot[2], &pose[k]);
+  }
+  hx_posture_of(&level, zero, zero);
+  hx_inverse_dynamics_place(dynamics, leg, pose, hx_plane(0.0, 0.0), 0.0, &level, &masses);
+  for (int k = 0; k < HX_LEGS; ++k)
+    for (int link = 0; link < HX_JOINTS; ++link)
+      sum = hx_plane_add(sum, hx_scaled(masses.place[k][link], dynamics->mass[k][link]));
+  return sum;
+}
+
+/* Returns the way of the torso over that of a foot in the direction `way` of length `reach`. */
+static double share_of(const hxInverseDynamics *dynamics, const hxLegSolver leg[HX_LEGS],
+                       hxPlane way) {
+  const hxPlane moved =
+      hx_plane_sub(moment_of(dynamics, leg, way), moment_of(dynamics, leg, hx_scaled(way, -1.0)));
+  const double carried = hx_along(way, moved) / (2.0 * reach * reach);
+  double total = dynamics->torso_mass;
+  for (int k = 0; k < HX_LEGS; ++k)
+    for (int link = 0; link < HX_JOINTS; ++link) total += dynamics->mass[k][link];
+  return carried / (HX_LEGS * (total - carried));
+}
+
+void hx_sway_compile(const hxControllerDefinition *definition, const hxLegSolver leg[HX_LEGS],
+                     const hxInverseDynamics *dynamics, hxSway *model) {
+  double foot[3];
+  model->home = hx_plane(0.0, 0.0);
+  for (int k = 0; k < HX_LEGS; ++k) {
+    hx_leg_solver_forward(&leg[k], leg[k].stance, foot);
+    model->home = hx_plane_add(model->home, hx_plane(foot[0], foot[1]));
+  }
+  model->forward = model->aside = 0.0;
+  if (!definition->parts.sway) return;
+  model->forward = share_of(dynamics, leg, hx_plane(reach, 0.0));
+  model->aside = share_of(dynamics, leg, hx_plane(0.0, reach));
+}
+
+void hx_sway_of(const hxSway *model, const hxPlannedFeet *feet, hxPlane *way, hxPlane *rate) {
+  hxPlane away = {0.0, 0.0}, speed = {0.0, 0.0};
+  for (int k = 0; k < HX_LEGS; ++k) {
+    away = hx_plane_add(away, feet->plane[k]);
+    speed = hx_plane_add(speed, feet->velocity[k]);
+  }
+  away = hx_plane_sub(away, model->home);
+  *way = hx_plane(-model->forward * away.x, -model->aside * away.y);
+  *rate = hx_plane(-model->forward * speed.x, -model->aside * speed.y);
+}

@@ -1,0 +1,113 @@
+"""The torso that sways against the swinging legs: laws of momentum."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from gains import PERIOD, make_gains
+
+from hexapod_cosim.controller import (
+    BodyCommand,
+    Controller,
+    LegSolver,
+    Measurement,
+    Parts,
+    make_gait,
+)
+from hexapod_cosim.controller.comply.posture import Posture
+from hexapod_cosim.controller.comply.sway import Sway
+from hexapod_cosim.controller.walk.inverse_dynamics import InverseDynamics, Neighbours
+from hexapod_cosim.models import load_robot
+
+ROBOTS = ["athena", "phantomx_mk4"]
+ROUND_OFF = 1e-12  # m
+
+
+def walk(name: str, *, sway: bool) -> Controller:
+    """Returns a controller of an amble whose feet feel nothing."""
+    robot = load_robot(name)
+    return Controller(
+        robot,
+        period=PERIOD,
+        gait=make_gait(robot, "amble"),
+        gains=make_gains(robot),
+        parts=Parts(sway=sway),
+    )
+
+
+def pushes(controller: Controller, steps: int) -> np.ndarray:
+    """Returns the forces along x (n,) that the ground must exert on the planned walk [N].
+
+    Steps at the ends of sections, at which no acceleration is known, are left out.
+    """
+    found, measurement = [], Measurement(angle=controller.stance.copy())
+    assert controller.compliant is not None
+    dynamics = controller.compliant.dynamics
+    for step in range(steps):
+        out = controller.step(step * PERIOD, BodyCommand(vx=0.06), measurement)
+        before, now, after = controller._before, controller._now, controller._after
+        if before is not None and after is not None:
+            three = (before, now, after)
+            masses, poses = tuple(x.masses for x in three), tuple(x.pose for x in three)
+            motion = Neighbours(masses, poses)  # type: ignore[arg-type]
+            found.append(dynamics.demand(motion, out.speed_ref, now.posture).push.real)
+    return np.array(found)
+
+
+@pytest.mark.parametrize("name", ROBOTS)
+@pytest.mark.parametrize("step", [2e-3 + 0j, 2e-3j])
+def test_the_centre_of_mass_stays_when_feet_move_and_the_torso_sways(
+    name: str, step: complex
+) -> None:
+    robot = load_robot(name)
+    legs = LegSolver(robot)
+    dynamics = InverseDynamics(robot, legs, period=PERIOD)
+    sway = Sway(dynamics, legs, active=True)
+    x, y, z = dynamics.stance.T
+    home, level = x + 1j * y, Posture.of(np.zeros(3), np.zeros(3))
+
+    def moment(feet: np.ndarray, torso: complex) -> complex:
+        """The sum of m p in the walking frame, of feet in it and a torso that has moved."""
+        masses = dynamics.place(legs.pose(feet - torso, z), torso, 0.0, level)
+        links = (dynamics.mass * masses.ground).sum()
+        return complex(links + dynamics.torso_mass * masses.torso_ground)
+
+    moved = complex(sway.forward * step.real, sway.aside * step.imag) * -6.0
+    left = moment(home + step, moved) - moment(home, 0j)
+    without = moment(home + step, 0j) - moment(home, 0j)
+    assert abs(left) < 5e-3 * abs(without)
+
+
+def test_a_walk_with_sway_needs_a_quarter_of_the_push_at_most() -> None:
+    still, swaying = (pushes(walk("athena", sway=on), 900)[300:] for on in (False, True))
+    assert np.sqrt((swaying**2).mean()) < 0.25 * np.sqrt((still**2).mean())
+
+
+@pytest.mark.parametrize("sway", [False, True])
+def test_a_standing_foot_keeps_its_place_on_the_ground(sway: bool) -> None:
+    """Seen from the torso that sways it moves, but the torso moves by as much."""
+    controller, measurement = walk("athena", sway=sway), Measurement()
+    last, ways = None, []
+    for step in range(900):
+        controller.step(step * PERIOD, BodyCommand(vx=0.06, yaw_rate=0.1), measurement)
+        now = controller._now
+        ways.append(abs(now.sway))
+        turn = np.exp(1j * now.feet.turn)
+        ground = now.feet.way + turn * (now.sway + now.plane)
+        stands = controller.paths.standing & (controller._at > 0)
+        if last is not None:
+            assert np.abs(np.where(stands, ground - last, 0.0)).max() < ROUND_OFF
+        last = ground
+    assert (max(ways) > 1e-3) == sway
+    assert max(ways) < 5e-3  # m
+
+
+def test_the_torso_does_not_sway_without_the_part_and_under_other_controls() -> None:
+    robot = load_robot("athena")
+    for controller in (
+        walk("athena", sway=False),
+        Controller(robot, period=PERIOD, gait=make_gait(robot)),
+    ):
+        for step in range(300):
+            controller.step(step * PERIOD, BodyCommand(vx=0.06), Measurement())
+            assert controller._now.sway == controller._now.sway_rate == 0.0
