@@ -25,7 +25,7 @@ from hexapod_cosim.cosim.results.results import results_folder
 from hexapod_cosim.models import HexapodError, load_robot, unknown_name
 
 if TYPE_CHECKING:
-    from hexapod_cosim.cosim.identify.identify import Identified
+    from hexapod_cosim.cosim.identify.identified import Identified
 
 FOUND = ("servo", "mass", "contact", "sensor")  # without --find
 Logs = Annotated[
@@ -75,12 +75,16 @@ def identify(
 ) -> None:
     """Find a robot's masses, servos, contacts and sensors from its own logs."""
     # imported only here because they are slow to import
-    from hexapod_cosim.cosim.identify import identify_files as files_of  # noqa: PLC0415
+    from hexapod_cosim.cosim.identify import identify_tables as tables  # noqa: PLC0415
     from hexapod_cosim.cosim.identify.excitation import propose  # noqa: PLC0415
     from hexapod_cosim.cosim.identify.identify import (  # noqa: PLC0415
         identify as identify_robot,
     )
     from hexapod_cosim.cosim.identify.identify import usual_workers  # noqa: PLC0415
+    from hexapod_cosim.cosim.identify.identify_files import (  # noqa: PLC0415
+        result_table,
+        write_identified,
+    )
 
     groups = _checked(find or list(FOUND), held_out)
     own = load_robot(robot)
@@ -97,17 +101,15 @@ def identify(
             proposals = propose(found, robot) if search else []
         folder.begin()
         command = shlex.join(words)
-        files = files_of.write_identified(found, proposals, robot, folder.path, command=command)
-    for text in files_of.warnings(found):
+        files = write_identified(found, proposals, robot, folder.path, command=command)
+    for text in tables.warnings(found):
         warn(text.removesuffix("."))
     if json:
-        show_json(
-            {**files_of.result_table(found, proposals), "files": [str(path) for path in files]}
-        )
+        show_json({**result_table(found, proposals), "files": [str(path) for path in files]})
         return
     _show(found, files)
     if search:
-        show_text(files_of.proposal_text(proposals))
+        show_text(tables.proposal_text(proposals))
 
 
 def _checked(names: Sequence[str], held_out: float) -> list[str]:
@@ -128,13 +130,13 @@ def _checked(names: Sequence[str], held_out: float) -> list[str]:
 
 def _show(found: Identified, files: Sequence[Path]) -> None:
     """Prints the estimates, the errors, what the logs did not tell, and the files."""
-    from hexapod_cosim.cosim.identify import identify_files as files_of  # noqa: PLC0415
+    from hexapod_cosim.cosim.identify import identify_tables as tables  # noqa: PLC0415
 
-    errors = files_of.error_rows(found.held_out() or found.fitted())
-    shown, zero = files_of.shown_estimates(found.estimates)
-    show_table(files_of.ESTIMATES, files_of.estimate_rows(shown), right=(2, 3, 4))
+    errors = tables.error_rows(found.held_out() or found.fitted())
+    shown, zero = tables.shown_estimates(found.estimates)
+    show_table(tables.ESTIMATES, tables.estimate_rows(shown), right=(2, 3, 4))
     if zero:
         show_text(f"{zero} biases of sensors may be 0; sensors.toml and the report have them.")
-    show_table(files_of.ERRORS, errors, right=(2, 3, 4))
-    show_text(files_of.untold_text(found))
+    show_table(tables.ERRORS, errors, right=(2, 3, 4))
+    show_text(tables.untold_text(found))
     show_files(files)

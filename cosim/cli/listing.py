@@ -10,7 +10,7 @@ from typing import Annotated, Any
 import typer
 
 from hexapod_cosim.controller import PATTERNS
-from hexapod_cosim.cosim.cli.terminal import Json, show_json, show_table
+from hexapod_cosim.cosim.cli.terminal import Json, show_json, show_table, show_text
 from hexapod_cosim.cosim.cli.terrain_command import value_text
 from hexapod_cosim.cosim.interface.interface import load_interface
 from hexapod_cosim.cosim.scenario.tables import list_scenarios
@@ -165,7 +165,23 @@ def list_what(what: What, json: Json = False) -> None:
     if json:
         show_json(rows)
         return
+    if what == "servos":
+        _show_servos(rows)
+        return
     show_table(list(rows[0]), [[_text(value) for value in row.values()] for row in rows])
+
+
+def _show_servos(rows: Rows) -> None:
+    """Prints the servos, and under the table each source once with the servos that have it."""
+    names: dict[str, list[str]] = {}
+    for row in rows:
+        # the files of the friction models of a servo have one source
+        source = str(row["source"]).replace(f"/{row['friction']}.json", "/*.json")
+        names.setdefault(source, []).append(str(row["name"]))
+    shown = [{key: value for key, value in row.items() if key != "source"} for row in rows]
+    show_table(list(shown[0]), [[_text(value) for value in row.values()] for row in shown])
+    for source, own in names.items():
+        show_text(f"{', '.join(own)}: {source}")
 
 
 def _text(value: str | float) -> str:

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -12,25 +10,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hexapod_cosim.cosim.export.export import export_fmu
+from hexapod_cosim.cosim.identify.channel_screening import screened, turned_after_the_fit
 from hexapod_cosim.cosim.identify.command_screening import check_commands
-from hexapod_cosim.cosim.identify.comparison import (
-    Difference,
-    channel_differences,
-    column_differences,
-)
 from hexapod_cosim.cosim.identify.experiment import Experiment
 from hexapod_cosim.cosim.identify.fitting.output_error import Fit, Progress, fit
 from hexapod_cosim.cosim.identify.fitting.problem import TO_DEVIATION, Problem
 from hexapod_cosim.cosim.identify.fitting.workers import simulating_workers
-from hexapod_cosim.cosim.identify.log import CHANNELS, HELD_OUT, Log, LogError, without_readings
+from hexapod_cosim.cosim.identify.identified import Identified
+from hexapod_cosim.cosim.identify.log import HELD_OUT, Log, LogError, without_readings
 from hexapod_cosim.cosim.identify.log_plant import LogPlant
-from hexapod_cosim.cosim.identify.rigid.linear_start import LinearStart, linear_start
-from hexapod_cosim.cosim.identify.screening import BadColumn, misfits, screened
+from hexapod_cosim.cosim.identify.rigid.linear_start import linear_start
+from hexapod_cosim.cosim.identify.screening import BadColumn, misfits
 from hexapod_cosim.cosim.identify.start import rest_rows
 from hexapod_cosim.cosim.identify.unknowns import (
     ELASTIC,
     GROUPS,
-    START,
     changed_robot,
     chosen_unknowns,
 )
@@ -39,107 +33,9 @@ from hexapod_cosim.cosim.run.worker_pool import processor_count
 from hexapod_cosim.models import Robot
 
 Array = NDArray[np.float64]
-TOLD = 0.5  # of the prior deviation: a number with less is told by the logs
-QUANTILE = 1.959963985  # of a normal distribution, for 95 %
-FEWEST_DIGITS = 5  # of a value and its interval in texts
-NEAR = 0.8  # correlation of two numbers that is reported
 SETTLING = 0.1  # s    at the start of a log that is not compared: the first row has noise
 LONG = 4000  # rows from which on worker processes save more time than they take to start
 TOLERANCE = {"solver.tolerance": 1e-5}  # differences of simulations need exact ones
-
-
-@dataclass(frozen=True)
-class Estimate:
-    """What was found of one number."""
-
-    key: str
-    unit: str
-    group: str
-    before: float
-    value: float
-    low: float  # of the 95 % interval
-    high: float
-    deviation: float  # over that of what was known before: 1 where the logs tell nothing
-    partner: str  # the number with which it is correlated most
-    correlation: float
-
-    @property
-    def told(self) -> bool:
-        """Whether the logs tell the number: they at least halve what was unknown of it."""
-        return self.deviation < TOLD
-
-    @property
-    def interval(self) -> str:
-        """The 95 % interval as a text, with the digits in which its ends differ, and one more."""
-        return f"{self._text(self.low)} to {self._text(self.high)}"
-
-    @property
-    def found(self) -> str:
-        """The value as a text, with the digits of the interval."""
-        return self._text(self.value)
-
-    def _text(self, value: float) -> str:
-        largest, width = max(abs(self.low), abs(self.high)), self.high - self.low
-        digits = math.ceil(math.log10(largest / width)) + 2 if width > 0.0 else FEWEST_DIGITS
-        return f"{value:.{max(FEWEST_DIGITS, digits)}g}"
-
-
-@dataclass(frozen=True)
-class Identified:
-    """A robot identified from logs."""
-
-    file: Robot  # as the robot file has it
-    robot: Robot  # with the numbers found
-    fit: Fit
-    experiments: tuple[Experiment, ...]
-    bad: tuple[tuple[int, BadColumn], ...]  # number of the log and column left out
-    before: tuple[Array, ...]  # readings that the robot file predicts (rows, columns)
-    linear: LinearStart | None  # what linear least squares tell
-    lacking: str  # what the logs lack for these
-
-    @property
-    def estimates(self) -> list[Estimate]:
-        """The numbers of robot and sensors, in the order of the table of unknowns."""
-        found, deviations = [], self.fit.deviations
-        own = np.sqrt(np.diag(self.fit.covariance))
-        correlation = self.fit.covariance / np.outer(own, own) - np.eye(len(own))
-        for k, row in enumerate(self.fit.rows):
-            if row.group == START:
-                continue
-            value, deviation = self.fit.values[row.key], deviations[row.key]
-            low, high = row.interval(value, QUANTILE * deviation)
-            other = int(np.argmax(np.abs(correlation[k])))
-            found.append(
-                Estimate(
-                    row.key, row.unit, row.group, self.fit.before[row.key], value,
-                    max(low, row.low), min(high, row.high), deviation,
-                    self.fit.rows[other].key, float(correlation[k, other]),
-                )
-            )  # fmt: skip
-        return found
-
-    @property
-    def rank(self) -> int:
-        """Number of independent combinations that the logs tell better than was known before."""
-        return int(np.sum(self.fit.singular > 1.0))
-
-    def held_out(self) -> list[tuple[Difference, Difference]]:
-        """Returns the difference of each channel on the held-out rows, before and after."""
-        return self._differences("held_out")
-
-    def fitted(self) -> list[tuple[Difference, Difference]]:
-        """Returns the difference of each channel on the fitted rows, before and after."""
-        return self._differences("fitted")
-
-    def _differences(self, part: str) -> list[tuple[Difference, Difference]]:
-        sides = []
-        for predictions in (self.before, self.fit.predictions):
-            columns: list[Difference] = []
-            for one, own in zip(self.experiments, predictions, strict=True):
-                rows = getattr(one, part)
-                columns += column_differences(one.log.part(rows), one.columns, own[rows])
-            sides.append(channel_differences(columns))
-        return list(zip(*sides, strict=True))
 
 
 def identify(
@@ -311,13 +207,12 @@ def _misfits(problem: Problem, found: Fit) -> list[tuple[int, BadColumn]]:
     """Returns the columns that the fit leaves far from the simulation."""
     bad = []
     errors = problem.errors(found.z)
-    for one, error, counted in zip(problem.experiments, errors, problem.counted, strict=True):
+    sides = zip(problem.experiments, errors, problem.counted, found.predictions, strict=True)
+    for one, error, counted, predicted in sides:
         typical = [
             TO_DEVIATION * float(np.median(np.abs(column[own]))) if own.any() else 0.0
             for column, own in zip(error.T, counted.T, strict=True)
         ]
-        bad += [(one.number, column) for column in misfits(one, np.array(typical))]
+        wrong = misfits(one, np.array(typical)) + turned_after_the_fit(one, predicted)
+        bad += [(one.number, column) for column in wrong]
     return bad
-
-
-CHANNEL_TITLES = {channel.key: channel.title for channel in CHANNELS}

@@ -23,14 +23,16 @@ from hexapod_cosim.cosim.interface.names import (
 )
 from hexapod_cosim.cosim.logs.mcap_reader import read_mcap
 from hexapod_cosim.cosim.master.recorder import Recording
-from hexapod_cosim.cosim.results.columns import plant_variables
+from hexapod_cosim.cosim.results.columns import known_columns, plant_variables
 from hexapod_cosim.cosim.results.recordings import read_csv, read_parquet
 from hexapod_cosim.models import HexapodError
+from hexapod_cosim.models.errors import nearest_name
 
 Array = NDArray[np.float64]
 LEAST_ROWS = 10
 HELD_OUT = 0.25  # share of each log at its end that a fit does not see
 LONGEST_STEP = 0.2  # s    between two rows
+MOST_NAMED = 5  # unknown columns in a warning
 ATTITUDE = ("torso.roll", "torso.pitch", "torso.yaw")
 QUATERNIONS = ("torso.quaternion", "imu.quaternion")  # the first one that a log has counts
 
@@ -85,6 +87,7 @@ class Log:
 
     recording: Recording  # time, commands and known readings
     where: str
+    unknown: tuple[str, ...] = ()  # columns of the file that no robot records, left out
 
     @property
     def time(self) -> Array:
@@ -113,13 +116,23 @@ class Log:
 
     def part(self, rows: slice) -> Log:
         """Returns some rows of the log."""
-        return Log(self.recording.rows(rows), self.where)
+        return Log(self.recording.rows(rows), self.where, self.unknown)
 
     def without(self, names: Sequence[str]) -> Log:
         """Returns the log without some columns."""
         keep = [k for k, name in enumerate(self.recording.names) if name not in names]
         kept = tuple(self.recording.names[k] for k in keep)
-        return Log(Recording(kept, self.recording.data[:, keep]), self.where)
+        return Log(Recording(kept, self.recording.data[:, keep]), self.where, self.unknown)
+
+    @property
+    def warnings(self) -> list[str]:
+        """What a user must know of the columns' names, as sentences."""
+        if not self.unknown:
+            return []
+        named = [f"{name}{_meant(name)}" for name in self.unknown[:MOST_NAMED]]
+        more = len(self.unknown) - len(named)
+        text = ", ".join(named) + (f" and {more} more" if more else "")
+        return [f"Columns of {self.where} with unknown names are left out: {text}."]
 
 
 @cache
@@ -161,7 +174,8 @@ def log_of(recording: Recording, where: str) -> Log:
             got=f"no column {missing[0]!r}"
             + (f" and {len(missing) - 1} more" * (len(missing) > 1)),
             expected="the commanded angles of all 18 joints",
-            fix="name the columns as the FMU's inputs: LF.coxa.angle_ref [rad], ...",
+            fix="name the columns as the FMU's inputs: LF.coxa.angle_ref [rad], ..."
+            + _similar(missing[0], recording.names),
             where=where,
         )
     _check_times(recording.time, where)
@@ -169,8 +183,11 @@ def log_of(recording: Recording, where: str) -> Log:
     wanted = {*input_names(), *(name for one in CHANNELS for name in one.names)}
     wanted |= {*vector_names("torso.velocity"), *vector_names("torso.angular_velocity")}
     wanted |= set(vector_names(QUATERNIONS[0], 4))
+    valid = known_columns().keys() | wanted
+    unknown = tuple(name for name in recording.names if name not in valid)
     keep = [0, *(k for k, name in enumerate(known.names) if name in wanted)]
-    log = Log(Recording(tuple(known.names[k] for k in keep), known.data[:, keep]), where)
+    kept = Recording(tuple(known.names[k] for k in keep), known.data[:, keep])
+    log = Log(kept, where, unknown)
     for name, values in log.commands.items():
         if not np.isfinite(values).all():
             raise LogError(
@@ -183,6 +200,19 @@ def log_of(recording: Recording, where: str) -> Log:
     return log
 
 
+def _similar(name: str, names: Sequence[str]) -> str:
+    """Returns the column of a file that may have been meant by a missing one, as words."""
+    near = nearest_name(name, [one for one in names if one not in known_columns()])
+    return f" (the file has {near!r})" if near else ""
+
+
+def _meant(name: str) -> str:
+    """Returns the known column that an unknown one may mean, as words."""
+    valid = [*COMMANDS, *(one for channel in CHANNELS for one in channel.names)]
+    near = nearest_name(name, valid)
+    return f" (did you mean {near}?)" if near else ""
+
+
 def _check_times(time: Array, where: str) -> None:
     steps = np.diff(time)
     if len(time) < LEAST_ROWS:
@@ -191,6 +221,15 @@ def _check_times(time: Array, where: str) -> None:
             got=f"{len(time)} rows",
             expected=f"{LEAST_ROWS} at least",
             fix="record a longer one",
+            where=where,
+        )
+    usual = float(np.median(steps))
+    if usual > LONGEST_STEP and (steps > 0.0).all():
+        raise LogError(
+            "times of a log",
+            got=f"{usual:g} s from row to row",
+            expected=f"times in seconds, at most {LONGEST_STEP} s apart",
+            fix="divide milliseconds by 1000, or record more often",
             where=where,
         )
     bad = ~((steps > 0.0) & (steps <= LONGEST_STEP))

@@ -32,6 +32,9 @@ class LogPlant(Closing):
         self.fmu = Fmu(fmu)
         self._common = self.fmu.parameter_blocks(parameters or {})
         self._outputs = set(self.fmu.names("output"))
+        # of the log that was simulated last: its commands, and the events of some delays
+        self._last: tuple[Log, list[str], Array] | None = None
+        self._ordered: tuple[Log, tuple[float, ...], list[Event]] | None = None
 
     def known(self, names: Sequence[str]) -> list[str]:
         """Returns those of some columns that follow from outputs of the FMU."""
@@ -57,8 +60,9 @@ class LogPlant(Closing):
 
         Raises FmuError for a parameter that is refused, LogError for a refused command or step.
         """
-        commands, time = log.commands, log.time
-        inputs = self.fmu.block(list(commands))
+        time = log.time
+        commands, table = self._commands(log)
+        inputs = self.fmu.block(commands)
         late = [delay] * len(names) if isinstance(delay, float | int) else list(delay)
         delays = list(dict.fromkeys(late))
         # outputs that are read at the same time, one block for each delay
@@ -70,8 +74,8 @@ class LogPlant(Closing):
             for one in delays
         ]  # fmt: skip
         outputs = [self.fmu.block(own) for own in sources]
-        table = np.column_stack(list(commands.values()))
         if offset is not None:
+            table = table.copy()
             places = [k for k, name in enumerate(commands) if name.endswith(".angle_ref")]
             table[:, places] += offset
         self.fmu.reset()
@@ -80,7 +84,7 @@ class LogPlant(Closing):
         self.fmu.initialise(float(time[0]), float(time[-1]))
         found = [np.empty((len(time), len(own))) for own in sources]
         try:
-            self._run(_events(time, delays), table, inputs, outputs, found)
+            self._run(self._in_order(log, delays), table, inputs, outputs, found)
         except FmuError as error:
             raise LogError(
                 "the plant cannot follow the log",
@@ -96,6 +100,21 @@ class LogPlant(Closing):
         }
         return _summed(columns, names, late)
 
+    def _commands(self, log: Log) -> tuple[list[str], Array]:
+        """Returns names and rows of a log's commands (rows, names), which nobody may change."""
+        if self._last is None or self._last[0] is not log:
+            commands = log.commands
+            self._last = log, list(commands), np.column_stack(list(commands.values()))
+        return self._last[1], self._last[2]
+
+    def _in_order(self, log: Log, delays: Sequence[float]) -> list[Event]:
+        """Returns the events of a log with some delays; those of the last ones are kept."""
+        key = tuple(delays)
+        last = self._ordered
+        if last is None or last[0] is not log or last[1] != key:
+            self._ordered = last = log, key, _events(log.time, delays)
+        return last[2]
+
     def _run(
         self,
         events: Sequence[Event],
@@ -104,17 +123,19 @@ class LogPlant(Closing):
         outputs: Sequence[Any],
         found: Sequence[Array],
     ) -> None:
+        step, rows = self.fmu.step, [(one.get, one.values) for one in outputs]
         now = events[0][0]
         for time, is_command, row, which in events:
             if time - now > SAME_TIME:
-                self.fmu.step(now, time - now)
+                step(now, time - now)
                 now = time
             if is_command:
                 inputs.values[:] = table[row]
                 inputs.set()
             else:
-                outputs[which].get()
-                found[which][row] = outputs[which].values
+                get, values = rows[which]
+                get()
+                found[which][row] = values
 
     def close(self) -> None:
         """Frees the FMU."""

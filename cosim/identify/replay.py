@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from hexapod_cosim.cosim.export.export import export_fmu
+from hexapod_cosim.cosim.identify.channel_screening import screened
 from hexapod_cosim.cosim.identify.command_screening import (
     wrong_commands,
     wrong_commands_error,
@@ -23,7 +24,7 @@ from hexapod_cosim.cosim.identify.comparison import (
 from hexapod_cosim.cosim.identify.experiment import Experiment
 from hexapod_cosim.cosim.identify.log import Log, LogError, without_readings
 from hexapod_cosim.cosim.identify.log_plant import LogPlant
-from hexapod_cosim.cosim.identify.screening import BadColumn, screened
+from hexapod_cosim.cosim.identify.screening import BadColumn, left_out
 from hexapod_cosim.cosim.identify.start import initial_state
 from hexapod_cosim.cosim.master.recorder import Recording
 from hexapod_cosim.models import FmuError, Robot
@@ -44,12 +45,13 @@ class Replay:
     def warnings(self) -> list[str]:
         """What a user must know of the columns, as sentences."""
         return [
+            *self.log.warnings,
             *(
                 f"The robot cannot have got {one.name}: {one.why}. The simulated robot got it, so "
                 "that the differences are not those of the robot file."
                 for one in self.commands
             ),
-            *(f"{one.name} cannot be the robot's: {one.why}." for one in self.readings),
+            *left_out(self.readings, *2 * ("cannot be the robot's",)),
         ]
 
     @property

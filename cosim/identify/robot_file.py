@@ -15,7 +15,7 @@ from typing import Any
 import tomlkit
 
 from hexapod_cosim.cosim.common.files import write_text
-from hexapod_cosim.cosim.identify.identify import Estimate, Identified
+from hexapod_cosim.cosim.identify.identified import Estimate, Identified
 from hexapod_cosim.models import JOINT_NAMES, HexapodError, Robot, load_robot
 from hexapod_cosim.models.robot import robot_path
 

@@ -30,9 +30,13 @@ class BadColumn:
     why: str
 
 
-def left_out(bad: Sequence[BadColumn]) -> list[str]:
-    """Returns sentences on columns that are left out; one for a channel whose columns are all so
-    for the same reason, as currents of servos that do not measure them.
+def left_out(
+    bad: Sequence[BadColumn], one: str = "is left out", many: str = "are left out"
+) -> list[str]:
+    """Returns sentences on bad columns; a single one for a channel whose columns are all bad for
+    the same reason, as currents of servos that do not measure them.
+
+    one, many: the predicate of the sentences.
     """
     texts = []
     whole: set[str] = set()
@@ -41,14 +45,14 @@ def left_out(bad: Sequence[BadColumn]) -> list[str]:
         reasons = {why.get(name) for name in channel.names}
         if len(reasons) == 1 and None not in reasons:
             whole |= set(channel.names)
-            text = f"{channel.title} are left out, all {len(channel.names)} columns"
+            text = f"All {len(channel.names)} columns of {channel.title!r} {many}"
             texts.append(f"{text}: {why[channel.names[0]]}.")
     own = [column for column in bad if column.name not in whole]
-    return texts + [f"{column.name} is left out: {column.why}." for column in own]
+    return texts + [f"{column.name} {one}: {column.why}." for column in own]
 
 
-def screened(experiment: Experiment, simulated: Array) -> list[BadColumn]:
-    """Returns the columns whose readings cannot be the robot's.
+def screened_columns(experiment: Experiment, simulated: Array) -> list[BadColumn]:
+    """Returns the columns whose readings cannot be the robot's, each judged by itself and its leg.
 
     simulated: what the robot file predicts (rows, columns). It need not be right: a column is
     judged by itself, or against the columns of the other legs, which follow the simulation.

@@ -20,6 +20,8 @@ from hexapod_cosim.models.kinematics import rotation_matrix as rotation
 Array = NDArray[np.float64]
 LONGEST_REST = 0.5  # s    of rest that is averaged
 FARTHEST = 0.5  # rad    of a joint from its command; a servo under load sags by some 0.1 rad
+HIGHEST = 0.1  # m    of the torso above or below the place where the feet carry it
+LEANS = 0.3  # rad    roll or pitch of a robot that stands on level ground
 TURN = 2.0 * np.pi  # rad    a command beyond it is not in rad, and is refused when it is sent
 LEAST_THIRD = 10  # rows of a third of the rest, of which means are compared
 LARGEST_CHANGE = 6.0  # of a mean, in its deviations: one of 21 is larger in one of 10^7 logs
@@ -66,7 +68,10 @@ def initial_state(log: Log, robot: Robot) -> dict[str, float]:
     rows = log.recording.rows(slice(0, rest))
 
     def mean(name: str) -> float:
-        return float(np.mean(rows.column(name)))
+        return _mean(rows.column(name))
+
+    def rate(name: str) -> float:
+        return float(np.nan_to_num(mean(name)))
 
     found: dict[str, float] = {}
     angle = np.zeros((6, 3))
@@ -78,30 +83,56 @@ def initial_state(log: Log, robot: Robot) -> dict[str, float]:
         angle.flat[k] = measured if near else wanted
         found[f"initial.{name}"] = float(angle.flat[k])
     for name in joint_names("speed"):
-        found[f"initial.{name}"] = mean(name) if rest == 1 and log.has([name]) else 0.0
-    turn = _quaternion(log, rows.data, rest)
+        found[f"initial.{name}"] = rate(name) if rest == 1 and log.has([name]) else 0.0
+    turn = _quaternion(log, rows.data, rest, is_flat=robot.terrain.kind == "flat")
     found |= dict(zip(vector_names("initial.quaternion", 4), turn.tolist(), strict=True))
     place = vector_names("torso.position")
-    position = [mean(name) for name in place] if log.has(place) else _resting(robot, angle, turn)
+    position = _resting(robot, angle, turn)
+    if log.has(place):
+        position = _credible([mean(name) for name in place], position, robot)
     found |= dict(zip(vector_names("initial.position"), position, strict=True))
     for stem, target in RATES.items():
         names = vector_names(stem)
         known = rest == 1 and log.has(names)
-        values = [mean(name) if known else 0.0 for name in names]
+        values = [rate(name) if known else 0.0 for name in names]
         found |= dict(zip(vector_names(target), values, strict=True))
     return found
 
 
-def _quaternion(log: Log, rows: Array, rest: int) -> Array:
-    """Returns the attitude (4,) in the first row, or its mean over the rows at rest."""
+def _mean(values: Array) -> float:
+    """Returns the mean of the numbers of a column; NaN where it has none."""
+    known = np.isfinite(values)
+    if known.all():
+        return float(np.mean(values))
+    return float(np.mean(values[known])) if known.any() else float("nan")
+
+
+def _credible(measured: list[float], resting: list[float], robot: Robot) -> list[float]:
+    """Returns a measured position, with that of standing legs for what it lacks. On flat ground a
+    height far from theirs is not where the robot starts.
+    """
+    found = [one if np.isfinite(one) else own for one, own in zip(measured, resting, strict=True)]
+    if robot.terrain.kind == "flat" and abs(found[2] - resting[2]) > HIGHEST:
+        found[2] = resting[2]
+    return found
+
+
+def _quaternion(log: Log, rows: Array, rest: int, *, is_flat: bool) -> Array:
+    """Returns the attitude (4,) in the first row, or its mean over the rows at rest; the level one
+    where the log has no numbers, or on flat ground more than a standing robot leans.
+    """
     names = vector_names("torso.quaternion", 4)
     if rest == 1 and log.has(names):
         first: Array = log.recording.columns(names)[0]
-        return first
+        if np.isfinite(first).all():
+            return first
     if not log.has(ATTITUDE):
         return np.array([1.0, 0.0, 0.0, 0.0])
-    places = [log.recording.names.index(name) for name in ATTITUDE]
-    roll, pitch, yaw = rows[:, places].mean(axis=0).tolist()
+    angles = rows[:, [log.recording.names.index(name) for name in ATTITUDE]]
+    known = np.isfinite(angles).all(axis=1)
+    roll, pitch, yaw = (angles[known].mean(axis=0) if known.any() else np.zeros(3)).tolist()
+    if is_flat and max(abs(roll), abs(pitch)) > LEANS:
+        roll, pitch = 0.0, 0.0
     turn = axis_quaternion(np.array([0.0, 0.0, 1.0]), yaw)
     turn = quaternion_product(turn, axis_quaternion(np.array([0.0, 1.0, 0.0]), pitch))
     return quaternion_product(turn, axis_quaternion(np.array([1.0, 0.0, 0.0]), roll))

@@ -170,9 +170,13 @@ def _body(robot: Robot, joint: int | None) -> Any:
 
 def _with_bodies(robot: Robot, joint: int | None, change: Callable[[Any], Any]) -> Robot:
     """Returns the robot with the torso, or a link of every leg, changed as a possible body."""
+    found: dict[Any, Any] = {}  # links of most legs are alike
 
     def changed(body: Any) -> Any:
-        new = change(body_inertia(body.mass, body.com, body.inertia))
+        key = body.mass, tuple(body.com), tuple(body.inertia)
+        if key not in found:
+            found[key] = change(body_inertia(*key))
+        new = found[key]
         return replace(body, mass=new.mass, com=new.com, inertia=new.inertia)
 
     if joint is None:

@@ -34,6 +34,7 @@ from hexapod_cosim.cosim.master.recorder import Recorder, chosen_columns
 from hexapod_cosim.cosim.master.signals import Signals
 from hexapod_cosim.cosim.results.drop import describe_drop
 from hexapod_cosim.cosim.results.ground import is_on_surface, surface_of_grid
+from hexapod_cosim.cosim.results.heat import heat_warnings
 from hexapod_cosim.cosim.results.metrics import MEASURED_BY_PLANT, compute_metrics, metric_columns
 from hexapod_cosim.cosim.results.result import Result
 from hexapod_cosim.cosim.results.walk import View
@@ -261,6 +262,7 @@ def make_result(
             *unused_settings(scenario, setup.robot),
             *walk_warnings(view, setup.robot),
             *off_map_warnings(view.recording, surface_of(plan.robot.terrain)),
+            *heat_warnings(view.recording, plan.robot.servo),
             *missing,
         ],
         "gains": None if setup.gains is None else asdict(setup.gains),

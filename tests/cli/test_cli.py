@@ -353,7 +353,7 @@ def test_an_unknown_engine_is_refused_with_the_valid_names(
     assert not (tmp_path / "none").exists()
 
 
-@pytest.mark.parametrize("what", ["robots", "scenarios", "gaits", "terrains", "laws"])
+@pytest.mark.parametrize("what", ["robots", "scenarios", "gaits", "terrains", "laws", "servos"])
 def test_list_names_what_there_is(call: Call, what: str) -> None:
     code, out, _ = call("list", what, "--json")
     rows = json.loads(out)

@@ -22,16 +22,18 @@ from benchmarks.identification.campaign import GOAL_COVERED, GOAL_RATIO, summary
 from benchmarks.identification.campaign import score as score_of
 from hexapod_cosim.cosim.export.export import export_fmu
 from hexapod_cosim.cosim.identify import excitation
+from hexapod_cosim.cosim.identify.channel_screening import screened
 from hexapod_cosim.cosim.identify.excitation import Proposal, propose, scenario_text
 from hexapod_cosim.cosim.identify.experiment import Experiment, of_point
 from hexapod_cosim.cosim.identify.fitting.last_search import remaining_step
 from hexapod_cosim.cosim.identify.fitting.output_error import Fit, _tried
 from hexapod_cosim.cosim.identify.fitting.problem import Problem, read_noise
 from hexapod_cosim.cosim.identify.fitting.workers import simulating_workers
-from hexapod_cosim.cosim.identify.identify import Identified, identify, make_experiment
+from hexapod_cosim.cosim.identify.identified import Identified
+from hexapod_cosim.cosim.identify.identify import identify, make_experiment
 from hexapod_cosim.cosim.identify.log_plant import LogPlant
 from hexapod_cosim.cosim.identify.robot_file import write_robot
-from hexapod_cosim.cosim.identify.screening import BadColumn, left_out, screened
+from hexapod_cosim.cosim.identify.screening import BadColumn, left_out
 from hexapod_cosim.cosim.identify.start import initial_state
 from hexapod_cosim.cosim.identify.unknowns import ROBOT, chosen_unknowns
 from hexapod_cosim.cosim.logs.mcap_writer import write_mcap
@@ -276,7 +278,7 @@ def test_a_channel_that_is_dead_as_a_whole_is_one_sentence() -> None:
     bad = [BadColumn(f"{joint}.current", "dead: 0 in every row") for joint in joints]
     own = BadColumn("LF.coxa.angle", "wrong sign")
     assert left_out([*bad, own]) == [
-        "Servo currents are left out, all 18 columns: dead: 0 in every row.",
+        "All 18 columns of 'Servo currents' are left out: dead: 0 in every row.",
         "LF.coxa.angle is left out: wrong sign.",
     ]
     assert len(left_out(bad[:17])) == 17

@@ -22,8 +22,9 @@ from hexapod_cosim.cosim.identify.fitting.covariance import (
     white_information,
 )
 from hexapod_cosim.cosim.identify.fitting.last_search import ENOUGH, bounded_step
-from hexapod_cosim.cosim.identify.identify import Estimate, Identified, identify
-from hexapod_cosim.cosim.identify.identify_files import warnings
+from hexapod_cosim.cosim.identify.identified import Estimate, Identified
+from hexapod_cosim.cosim.identify.identify import identify
+from hexapod_cosim.cosim.identify.identify_tables import warnings
 from hexapod_cosim.models import load_robot
 
 Array = NDArray[np.float64]

@@ -266,9 +266,7 @@ def test_what_a_urdf_has_wrong_or_lacks_a_side_file_may_give(tmp_path: Path) -> 
 
 
 def test_the_side_file_of_the_documentation_works(tmp_path: Path) -> None:
-    text = (Path(__file__).parents[2] / "docs" / "howto" / "my-robot.md").read_text(
-        encoding="utf-8"
-    )
+    text = (Path(__file__).parents[2] / "docs" / "howto" / "urdf.md").read_text(encoding="utf-8")
     side = re.findall(r"```toml\n(.*?)```", text, flags=re.DOTALL)[0]
     (tmp_path / "my.urdf").write_text(spider_urdf(), encoding="utf-8")
     (tmp_path / "mine.toml").write_text(
