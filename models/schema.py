@@ -5,6 +5,7 @@ Example of a field: `mass: Annotated[float, Number("kg", above=0.0)]`.
 
 from __future__ import annotations
 
+import codecs
 import math
 import tomllib
 from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping
@@ -63,13 +64,26 @@ def reading_toml(
         fix = f"give the path of a {kind} file, or one of: " + ", ".join(names())
         raise error(f"cannot read {name}", got=cause.strerror, fix=fix, where=str(path)) from cause
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as cause:
+        other = _other_format(path)
+        fix = "correct that line" if other is None else f"give the path of a {kind} file"
         raise error(
             "not a TOML file",
-            got=str(cause),
+            got=other or str(cause),
             expected="TOML 1.0 in UTF-8",
-            fix="correct that line",
+            fix=fix,
             where=str(path),
         ) from cause
+
+
+def _other_format(path: Path) -> str | None:
+    """Returns the format of a file that is often given by mistake, by its first bytes, or None."""
+    with path.open("rb") as file:
+        start = file.read(256).removeprefix(codecs.BOM_UTF8).lstrip()
+    if start.startswith(b"PK\x03\x04"):
+        return "a ZIP file, such as an FMU"
+    if start.startswith(b"<"):
+        return "an XML file, such as a URDF without the ending .urdf or a MuJoCo model"
+    return "a binary file" if b"\0" in start else None
 
 
 def _check_size(value: Any, depth: int) -> None:
