@@ -10,7 +10,7 @@ from typing import Annotated, Any
 import typer
 
 from hexapod_cosim.controller import PATTERNS
-from hexapod_cosim.cosim.cli.terminal import Json, show_json, show_table
+from hexapod_cosim.cosim.cli.terminal import Json, show_json, show_table, show_text
 from hexapod_cosim.cosim.cli.terrain_command import value_text
 from hexapod_cosim.cosim.interface.interface import load_interface
 from hexapod_cosim.cosim.scenario.tables import list_scenarios
@@ -165,7 +165,10 @@ def list_what(what: What, json: Json = False) -> None:
     if json:
         show_json(rows)
         return
-    show_table(list(rows[0]), [[_text(value) for value in row.values()] for row in rows])
+    shown = [{key: value for key, value in row.items() if key != "source"} for row in rows]
+    show_table(list(shown[0]), [[_text(value) for value in row.values()] for row in shown])
+    if shown != rows:
+        show_text(f"`hexapod list {what} --json` has the sources of the numbers")
 
 
 def _text(value: str | float) -> str:
