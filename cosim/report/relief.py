@@ -71,8 +71,15 @@ def _draw(axes: Axes, surface: Surface) -> ScalarMappable:
         axes.contour(x, y, height, levels=levels, colors="0.15", linewidths=0.4)
     text = f"{_digits(1e3 * lowest)} to {_digits(1e3 * highest)} mm"
     text += f", contour lines every {1e3 * step:g} mm" if surface.kind == "smooth" else ", blocks"
-    below = {"xytext": (0.0, BELOW), "textcoords": "offset points"}
-    axes.annotate(text, (0.0, 0.0), xycoords="axes fraction", fontsize=6.5, va="top", **below)
+    axes.annotate(
+        text,
+        (0.0, 0.0),
+        xycoords="axes fraction",
+        xytext=(0.0, BELOW),
+        textcoords="offset points",
+        fontsize=6.5,
+        va="top",
+    )
     return ScalarMappable(Normalize(1e3 * darkest, 1e3 * brightest), colours)
 
 
