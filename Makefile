@@ -82,6 +82,7 @@ $(STAMP): $(SOURCES)
 	echo "no usable Python: got $$($(PYTHON) --version 2>&1), expected Python 3.11 or later with its venv module;" \
 	"install it (Debian, Ubuntu: apt-get install python3 python3-venv) or name another one with PYTHON=..." >&2; exit 1; }
 	@$(BIN)/python -m pip --version >/dev/null 2>&1 || $(PYTHON) -m venv --clear $(VENV)
+	@echo "pip loads packages and compiles the C code: a few minutes without output"
 	$(if $(LOCK),PIP_CONSTRAINT= $(BIN)/python -m pip install --quiet --require-hashes --requirement $(LOCK))
 	$(BIN)/python -m pip install --quiet $(if $(LOCK),--no-deps --no-build-isolation --editable .,--editable '.[test]')
 	@touch $@

@@ -251,7 +251,7 @@ def load_gains(path: str | Path) -> Gains:
     where = str(path)
     refuse_path(path, "the gains file", GainsError)
     try:
-        with decoding_toml(Path(path), error=GainsError):
+        with decoding_toml(Path(path), kind="gains", error=GainsError):
             table = parse_toml(Path(path).read_text(encoding="utf-8"))
     except OSError as error:
         raise GainsError(

@@ -5,6 +5,7 @@ Example of a field: `mass: Annotated[float, Number("kg", above=0.0)]`.
 
 from __future__ import annotations
 
+import codecs
 import math
 import tomllib
 from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping
@@ -40,16 +41,23 @@ def parse_toml(text: str) -> dict[str, Any]:
 
 
 @contextmanager
-def decoding_toml(path: Path, *, error: type[HexapodError]) -> Iterator[None]:
-    """Turns errors of a TOML file's encoding and of parse_toml() into the class `error`."""
+def decoding_toml(path: Path, *, kind: str, error: type[HexapodError]) -> Iterator[None]:
+    """Turns errors of a TOML file's encoding and of parse_toml() into the class `error`.
+
+    Args:
+        path: the file.
+        kind: of the file, as in "the path of a robot file".
+        error: the class.
+    """
     try:
         yield
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as cause:
+        other = _other_format(path)
         raise error(
             "not a TOML file",
-            got=str(cause),
+            got=other or str(cause),
             expected="TOML 1.0 in UTF-8",
-            fix="correct that line",
+            fix="correct that line" if other is None else f"give the path of a {kind} file",
             where=str(path),
         ) from cause
 
@@ -73,11 +81,22 @@ def reading_toml(
         error: the class.
     """
     try:
-        with decoding_toml(path, error=error):
+        with decoding_toml(path, kind=kind, error=error):
             yield
     except OSError as cause:
         fix = f"give the path of a {kind} file, or one of: " + ", ".join(names())
         raise error(f"cannot read {name}", got=cause.strerror, fix=fix, where=str(path)) from cause
+
+
+def _other_format(path: Path) -> str | None:
+    """Returns the format of a file that is often given by mistake, by its first bytes, or None."""
+    with path.open("rb") as file:
+        start = file.read(256).removeprefix(codecs.BOM_UTF8).lstrip()
+    if start.startswith(b"PK\x03\x04"):
+        return "a ZIP file, such as an FMU"
+    if start.startswith(b"<"):
+        return "an XML file, such as a URDF without the ending .urdf or a MuJoCo model"
+    return "a binary file" if b"\0" in start else None
 
 
 def _check_size(value: Any, depth: int) -> None:

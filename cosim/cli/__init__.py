@@ -11,7 +11,14 @@ import traceback
 from collections.abc import Sequence
 from typing import Any
 
-from hexapod_cosim.cosim.cli.failures import FAILURE, INTERRUPT, SUCCESS, USAGE, report_failure
+from hexapod_cosim.cosim.cli.failures import (
+    FAILURE,
+    INTERRUPT,
+    SUCCESS,
+    USAGE,
+    report_failure,
+    usage_parts,
+)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -99,15 +106,6 @@ def _usage(error: Any, given: Sequence[str]) -> int:
     if not given:
         print(error.format_message(), file=sys.stderr)
         return USAGE
-    context = error.ctx  # None for an option without its value
-    path, usage = "hexapod", ""
-    if context:
-        path, usage = context.command_path, context.command.get_usage(context)
-    expected = " ".join(usage.removeprefix("Usage: ").split())
-    failure = HexapodError(
-        "not understood",
-        got=" ".join(error.format_message().rstrip(".").split()),
-        expected=expected or "a value after it",
-        fix=f"`{path} --help` explains it",
-    )
+    got, expected, fix = usage_parts(error, given)
+    failure = HexapodError("not understood", got=got, expected=expected, fix=fix)
     return report_failure(str(failure), USAGE, error=failure, as_json=_wants_json(given))

@@ -7,8 +7,9 @@ from __future__ import annotations
 
 import json
 import math
+import re
 import sys
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from hexapod_cosim.cosim.cli.width import fitted
@@ -25,6 +26,22 @@ EPILOG = (
     "Exit codes: " + "; ".join(f"{code} {meaning}" for code, meaning in EXIT_CODES.items()) + "."
 )
 OF_ERRORS = ("what", "got", "expected", "fix", "where")  # attributes of a HexapodError
+
+# option that people expect -> setting that does what it would do
+SETTINGS = {
+    "--robot": "robot=athena",
+    "--duration": "duration=4",
+    "--seed": "seed=1",
+    "--gravity": "gravity=1.62",
+    "--macro-step": "macro_step=0.005",
+    "--gait": "gait.name=ripple",
+    "--period": "gait.period=0.8",
+    "--terrain": "terrain.kind=rubble",
+    "--friction": "friction.mu=0.4",
+    "--mu": "friction.mu=0.4",
+    "--vx": "command.vx=0.12",
+}
+OF_SCENARIOS = ("simulate", "compare", "live", "benchmark")  # commands whose --set takes them
 
 
 def report_failure(
@@ -60,3 +77,40 @@ def _plain(value: Any) -> Any:
     if isinstance(value, Mapping):
         return {str(key): _plain(item) for key, item in value.items()}
     return [_plain(item) for item in value] if isinstance(value, list | tuple) else repr(value)
+
+
+def usage_parts(error: Any, given: Sequence[str]) -> tuple[str, str, str]:
+    """Returns what was got and expected, and the fix, for a command line that is not understood.
+
+    Args:
+        error: the exception of the parser; its `ctx` is None for an option without its value.
+        given: the words of the command line.
+    """
+    context, message = error.ctx, " ".join(error.format_message().rstrip(".").split())
+    if not context:
+        return message, "a value after it", "`hexapod --help` explains it"
+    path, fix = context.command_path, f"`{context.command_path} --help` explains it"
+    usage = " ".join([path, *context.command.collect_usage_pieces(context)])
+    setting = SETTINGS.get(getattr(error, "option_name", "").replace("_", "-"))
+    if setting and path.split()[-1] in OF_SCENARIOS:
+        fix = f"write --set {setting}; {fix}"
+    wrong = re.search(r"'(--?[\w-]+)'.*: Input should be a valid (integer|number)", message)
+    if wrong:
+        option, kind = wrong.groups()
+        return (
+            f"{option} {_value_after(option, given)}",
+            f"{option} with {'an' if kind == 'integer' else 'a'} {kind}",
+            fix,
+        )
+    return message, usage, fix
+
+
+def _value_after(option: str, given: Sequence[str]) -> str:
+    """Returns the last value that the words give to an option, or an empty text."""
+    found = ""
+    for word, following in zip(given, [*given[1:], ""], strict=True):
+        if word == option:
+            found = following
+        elif word.startswith(f"{option}="):
+            found = word.removeprefix(f"{option}=")
+    return found

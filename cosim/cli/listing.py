@@ -165,23 +165,10 @@ def list_what(what: What, json: Json = False) -> None:
     if json:
         show_json(rows)
         return
-    if what == "servos":
-        _show_servos(rows)
-        return
-    show_table(list(rows[0]), [[_text(value) for value in row.values()] for row in rows])
-
-
-def _show_servos(rows: Rows) -> None:
-    """Prints the servos, and under the table each source once with the servos that have it."""
-    names: dict[str, list[str]] = {}
-    for row in rows:
-        # the files of the friction models of a servo have one source
-        source = str(row["source"]).replace(f"/{row['friction']}.json", "/*.json")
-        names.setdefault(source, []).append(str(row["name"]))
     shown = [{key: value for key, value in row.items() if key != "source"} for row in rows]
     show_table(list(shown[0]), [[_text(value) for value in row.values()] for row in shown])
-    for source, own in names.items():
-        show_text(f"{', '.join(own)}: {source}")
+    if shown != rows:
+        show_text(f"`hexapod list {what} --json` has the sources of the numbers")
 
 
 def _text(value: str | float) -> str:

@@ -116,9 +116,11 @@ def _facts(surface: Surface) -> dict[str, Any]:
         "kind": surface.kind,
         "rows": surface.rows,
         "columns": surface.columns,
-        "cell [m]": surface.cell,
+        "cell [m]": round(surface.cell, 9),
         "x, y [m]": [round(edge, 6) for edge in surface.extent],
-        "heights [m]": [float(surface.height.min()), float(surface.height.max())],
+        "heights [m]": [
+            round(float(height), 9) for height in (surface.height.min(), surface.height.max())
+        ],
         "materials": 0 if surface.materials is None else len(surface.materials),
         "sha256": surface.digest,
     }

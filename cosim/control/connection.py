@@ -185,7 +185,7 @@ def read_map(path: Path) -> dict[str, Any]:
     place = path.with_suffix(".toml")
     if not place.is_file():
         return {}
-    with decoding_toml(place, error=FmuError):
+    with decoding_toml(place, kind="TOML", error=FmuError):
         table = parse_toml(place.read_text(encoding="utf-8"))
     found = table.get("map", {})
     return dict(found) if isinstance(found, Mapping) else {"map": found}

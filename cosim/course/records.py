@@ -71,6 +71,14 @@ def read_entries(controls: Sequence[str], without: Sequence[str] = ()) -> tuple[
     for part in without:
         if part not in parts:
             raise unknown_name("part", part, parts, where="--without", error=CourseError)
+    if without and not (found[-1].is_builtin and found[-1].name != "kinematic"):
+        raise CourseError(
+            "a control without parts",
+            got=found[-1].label,
+            expected="compliant or paper as the last --control",
+            fix="add --control compliant",
+            where="--without",
+        )
     entries = [Entry(control.label, control) for control in found]
     entries += [Entry(f"without {part}", found[-1], (part,)) for part in dict.fromkeys(without)]
     return tuple(entries)

@@ -28,6 +28,7 @@ STANCES: Mapping[str, Sequence[str]] = {
 }
 OWN_WEIGHT = 1.0
 LOADS = (0.1, OWN_WEIGHT, 2.0)  # 1    mean load of the standing legs, in thirds of the weight
+NO_MARGIN = 180.0  # deg    phase margin that no loop with a crossing has
 
 
 def design_for(robot: Robot, period: float, requirements: Requirements | None = None) -> Gains:
@@ -161,4 +162,12 @@ def read_requirements(settings: Sequence[str], robot: Robot) -> Requirements:
                 fix="give a number in SI units",
                 where=name,
             ) from error
+    if not 0.0 <= values.get("phase_margin", 0.0) < NO_MARGIN:
+        raise GainsError(
+            "value not allowed",
+            got=values["phase_margin"],
+            expected=f"a number >= 0 and < {NO_MARGIN:g} [deg]",
+            fix="write --set phase_margin=50",
+            where="phase_margin",
+        )
     return requirements_for(robot, **values)

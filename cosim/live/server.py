@@ -13,6 +13,7 @@ import socket
 from collections.abc import AsyncIterator, Callable, Mapping
 from contextlib import asynccontextmanager, suppress
 from dataclasses import dataclass
+from errno import EADDRINUSE
 from multiprocessing import get_context
 from multiprocessing.connection import Connection
 from types import MappingProxyType
@@ -27,6 +28,7 @@ from hexapod_cosim.cosim.live.settings import Choices
 from hexapod_cosim.models import HexapodError
 
 HOST = "127.0.0.1"
+PORTS = 65536  # numbers of ports, from 0, which asks for a free one
 NAMES = (HOST, "localhost")  # hosts that a browser may have asked for
 TOKEN_BYTES = 16
 POLICY = 1008  # WebSocket: closed because of what the page sent
@@ -298,8 +300,11 @@ def _bound(port: int) -> socket.socket:
         bound.listen()  # a browser that comes before the server is ready waits
     except (OSError, OverflowError) as error:
         bound.close()
+        in_use = "another program uses it" if getattr(error, "errno", 0) == EADDRINUSE else None
         raise LiveError(
-            "cannot listen on this port", got=port, expected="a free port",
-            fix="leave out --port", where=HOST,
+            "cannot listen on this port",
+            got=port if in_use is None else f"{port}: {in_use}",
+            expected=f"a free port from 1 to {PORTS - 1}",
+            fix="leave out --port for a free one", where=HOST,
         ) from error  # fmt: skip
     return bound

@@ -21,6 +21,7 @@ from hexapod_cosim.models.ground.surface import Array, Surface
 from hexapod_cosim.models.terrain import surface_heights
 
 WIDTH = 5.0  # in
+BELOW = -28.0  # pt    of the text below the labels of the x axis
 LIGHT = LightSource(azdeg=315.0, altdeg=40.0)
 EXAGGERATION = 1.5  # of slopes in the shading
 SAMPLES = 4  # drawn per cell and direction of a small map
@@ -59,16 +60,8 @@ def _draw(axes: Axes, surface: Surface) -> ScalarMappable:
     span = max(highest - lowest, 1e-6)
     darkest, brightest = lowest - 0.3 * span, highest + 0.1 * span
     colours = matplotlib.colormaps["cividis"]
-    shaded = LIGHT.shade(
-        height,
-        cmap=colours,
-        vmin=darkest,
-        vmax=brightest,
-        blend_mode="soft",
-        vert_exag=EXAGGERATION,
-        dx=pitch[0],
-        dy=pitch[1],
-    )
+    plain = colours(Normalize(darkest, brightest)(height))[..., :3]
+    shaded = LIGHT.blend_soft_light(plain, _light(height, pitch)[..., np.newaxis])
     left, right, low, high = surface.extent
     axes.imshow(shaded, origin="lower", extent=(left, right, low, high), interpolation="nearest")
     step = next((step for step in STEPS if span / step <= CONTOURS), STEPS[-1])
@@ -78,8 +71,27 @@ def _draw(axes: Axes, surface: Surface) -> ScalarMappable:
         axes.contour(x, y, height, levels=levels, colors="0.15", linewidths=0.4)
     text = f"{_digits(1e3 * lowest)} to {_digits(1e3 * highest)} mm"
     text += f", contour lines every {1e3 * step:g} mm" if surface.kind == "smooth" else ", blocks"
-    axes.text(0.0, -0.14, text, transform=axes.transAxes, fontsize=6.5, va="top")
+    axes.annotate(
+        text,
+        (0.0, 0.0),
+        xycoords="axes fraction",
+        xytext=(0.0, BELOW),
+        textcoords="offset points",
+        fontsize=6.5,
+        va="top",
+    )
     return ScalarMappable(Normalize(1e3 * darkest, 1e3 * brightest), colours)
+
+
+def _light(height: Array, pitch: tuple[float, float]) -> Array:
+    """Returns the light (rows, columns) on slopes, from 0 to 1.
+
+    Level ground has 0.5, by which colours keep the values of their scale.
+    """
+    along_y, along_x = np.gradient(EXAGGERATION * height, pitch[1], pitch[0])
+    normals = np.stack([-along_x, -along_y, np.ones_like(height)], axis=-1)
+    normals /= np.linalg.norm(normals, axis=-1, keepdims=True)
+    return np.asarray(np.clip(0.5 * normals @ LIGHT.direction / LIGHT.direction[2], 0.0, 1.0))
 
 
 def _digits(value: float) -> str:

@@ -237,6 +237,7 @@ def _recording(names: Sequence[str], rows: np.ndarray, path: Path) -> Recording:
             "not a recording",
             got=f"first column {names[0] if names else ''!r}",
             expected="time first",
+            fix="name the column of the times `time` [s] and put it first",
             where=str(path),
         )
     return Recording(tuple(names), rows)

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Iterable
 from typing import Any
 
 from hexapod_cosim.models.errors import ScenarioError
@@ -48,8 +49,16 @@ def to_si(value: Any, spec: Spec, where: str) -> Any:
         raise ScenarioError(
             "wrong unit" if unit else "number without unit in quotes",
             got=value,
-            expected=f"a value in {' or '.join(scales)}",
-            fix=f"a plain number, without quotes, is in {spec.unit}",
+            expected=_with_units(scales),
+            fix=f"a plain number, without quotes, is in {spec.unit}"
+            if spec.unit != "1"
+            else "write a plain number, without quotes",
             where=where,
         )
     return float(match[1]) * scales[unit]
+
+
+def _with_units(units: Iterable[str]) -> str:
+    """Returns the words for a value in one of these units; 1 is the unit of ratios."""
+    words = " or ".join(units)
+    return "a number without a unit" if words == "1" else f"a value in {words}"

@@ -40,6 +40,20 @@ from hexapod_cosim.cosim.cli import main
         (["compare", "walk_flt"], ["unknown scenario"]),
         (["compare", "--seeds", "0"], ["--seeds: ", "got 0", "1 to"]),
         (
+            ["simulate", "--set", "friction.mu=0.4mm"],
+            ["got '0.4mm'", "a number without a unit", "write a plain number"],
+        ),
+        (["live", "--no-browser", "--port", "99999"], ["got 99999", "from 1 to 65535"]),
+        (
+            ["study", "friction_speed", "--scheduler", "localhost"],
+            ["not an address of a scheduler", "got 'localhost'", "tcp://HOST:8786"],
+        ),
+        (
+            ["benchmark", "--control", "kinematic", "--without", "slip_pid"],
+            ["--without: ", "got 'kinematic'", "add --control compliant"],
+        ),
+        (["design", "--set", "phase_margin=500"], ["got 500", "< 180 [deg]", "phase_margin=50"]),
+        (
             ["report", "."],
             [
                 "not a results folder",
@@ -104,6 +118,20 @@ def test_a_mistake_gets_one_clear_paragraph(
     assert_refused(call(*arguments), *parts)
     assert not list(tmp_path.rglob("results*"))
     assert not list(tmp_path.rglob("*.fmu"))
+
+
+def test_a_file_of_another_format_is_named_with_its_format(
+    call: Call, tmp_path: Path, athena_fmu: Path
+) -> None:
+    (tmp_path / "arm.xml").write_text("<mujoco/>")
+    expected = "a ZIP file, such as an FMU"
+    assert_refused(call("simulate", athena_fmu), expected, "give the path of a scenario file")
+    assert_refused(call("study", athena_fmu), expected, "give the path of a study file")
+    assert_refused(
+        call("export", "--robot", tmp_path / "arm.xml"),
+        "got 'an XML file, such as a URDF without the ending .urdf or a MuJoCo model'",
+        "give the path of a robot file",
+    )
 
 
 def test_an_unwritable_place_is_refused_before_the_run(call: Call, tmp_path: Path) -> None:
@@ -204,6 +232,16 @@ def test_an_unexpected_error_is_one_line_with_a_hint(
             {"fmu": "missing.fmu", "valid": False, "what": "no such FMU"},
         ),
         (["simulat"], 2, {"what": "not understood"}),
+        (
+            ["compare", "--seeds", "ten"],
+            2,
+            {"got": "--seeds ten", "expected": "--seeds with an integer"},
+        ),
+        (
+            ["simulate", "--robot", "my.toml"],
+            2,
+            {"fix": "write --set robot=athena; `hexapod simulate --help` explains it"},
+        ),
     ],
     ids=lambda value: " ".join(value) if isinstance(value, list) else "",
 )

@@ -87,3 +87,23 @@ def test_a_controllers_fmu_has_no_ground(call: Call, tmp_path: Path) -> None:
     assert code == 1
     assert "options that do nothing" in err
     assert not path.exists()
+
+
+def test_level_ground_has_the_colour_of_its_height_on_the_scale(call: Call, tmp_path: Path) -> None:
+    code, out, _ = call("terrain", "stairs", "-o", tmp_path / "stairs.png")
+    assert code == 0
+    assert "cell [m]: 0.05\n" in out
+    with Image.open(tmp_path / "stairs.png") as picture:
+        counts = {colour: count for count, colour in picture.convert("RGB").getcolors(1 << 24)}
+    # cividis at 0.3 / 1.4, the lowest height; half of the picture is ground before the stairs
+    ground = max((colour for colour in counts if colour != (255, 255, 255)), key=counts.__getitem__)
+    assert np.abs(np.subtract(ground, (57, 72, 107))).max() <= 2
+
+
+def test_a_table_of_presets_leaves_their_sources_to_json(call: Call) -> None:
+    for what in ("servos", "soils"):
+        code, out, _ = call("list", what)
+        assert code == 0
+        assert max(map(len, out.splitlines())) < 140
+        assert f"`hexapod list {what} --json` has the sources of the numbers" in out
+        assert all(row["source"] for row in json.loads(call("list", what, "--json")[1]))

@@ -8,6 +8,7 @@ its worker costs as many workers as on one machine.
 from __future__ import annotations
 
 import logging
+import re
 from collections import deque
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
@@ -28,6 +29,7 @@ from hexapod_cosim.cosim.study.plan.records import StudyError
 from hexapod_cosim.models import HexapodError
 
 CONNECT_TIMEOUT = "10s"
+ADDRESS = re.compile(r"[a-z]+://\S+")  # PROTOCOL://HOST:PORT, as Dask writes it
 NO_WORKER_TIMEOUT = 60.0  # s    without any worker, after which the study stops
 # s    between requests for the list of workers: the scheduler announces changes as well, but a
 # message may be lost
@@ -311,14 +313,19 @@ def _connect(address: str) -> Any:
         raise StudyError(
             "Dask is not installed", fix=install_extra("cluster"), where="--scheduler"
         ) from error
+    if not ADDRESS.fullmatch(address):
+        raise _no_scheduler("not an address of a scheduler", address)
     try:
         return Client(address, timeout=CONNECT_TIMEOUT, set_as_default=False)
     except (OSError, ValueError, TypeError) as error:
-        fix = "start one: dask scheduler; it says its address"
-        raise StudyError(
-            "no scheduler answers",
-            got=address,
-            expected="tcp://HOST:8786 of a Dask scheduler",
-            fix=fix,
-            where="--scheduler",
-        ) from error
+        raise _no_scheduler("no scheduler answers", address) from error
+
+
+def _no_scheduler(what: str, address: str) -> StudyError:
+    return StudyError(
+        what,
+        got=address,
+        expected="tcp://HOST:8786 of a Dask scheduler",
+        fix="start one with `dask scheduler`, which prints its address",
+        where="--scheduler",
+    )

@@ -145,7 +145,7 @@ function frameOf(ways: readonly Way[], planned: Way | undefined): Frame {
   const scales = bends ? [Math.min(across, tall), Math.min(across, tall)] : [across, tall];
   const [middle, level] = [0.5 * (left + right), 0.5 * (low + high)];
   const size = `${length.toFixed(2)} m from left to right`;
-  const height = (1e3 * Math.max(high - low, LEAST)).toPrecision(2);
+  const height = Number((1e3 * Math.max(high - low, LEAST)).toPrecision(2)); // no power of ten
   const times = Math.round(scales[1] / scales[0]);
   const note = bends
     ? `To scale, ${size}.`

@@ -42,7 +42,9 @@ export class Panel {
     const figure = element("figure", "panel");
     const heading = element("figcaption", "panel-title");
     this.readouts = options.curves.map((curve) => readout(curve));
-    heading.append(titleOf(options), ...this.readouts.map((value) => value.parentElement!));
+    const values = element("div", "readouts"); // which wrap into a row of their own together
+    values.append(...this.readouts.map((value) => value.parentElement!));
+    heading.append(titleOf(options), values);
     figure.append(heading);
     options.host.append(figure);
     const box = element("div", "panel-box");
