@@ -157,6 +157,13 @@ class Gains:
     margins: Margins
     caveats: tuple[str, ...] = ()  # stances that are left out, and why; what was not reached
 
+    def as_facts(self) -> dict[str, Any]:
+        """Returns the gains as nested dictionaries, as dataclasses.asdict() does in more time."""
+        return {
+            name: dict(vars(value)) if name in PARTS else value
+            for name, value in vars(self).items()
+        }
+
     def mismatch(self, robot: Robot, *, period: float) -> str | None:
         """Returns why these gains are not for this robot and period [s]; None when they are."""
         if self.robot_hash != robot.hash:

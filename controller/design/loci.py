@@ -32,6 +32,7 @@ Response = NDArray[np.complex128]
 Plants = Mapping[str, StandingPlant]
 FindLoci = Callable[[Robot, StandingPlant, Array], tuple[Response, Response]]
 SLOWEST = 0.1  # rad/s    lowest frequency of a grid
+AT_ONCE = 32  # frequencies whose matrices are in the processor's cache together
 RANK = 1e-6  # 1    smaller singular values count as 0
 
 
@@ -42,10 +43,19 @@ def frequencies(period: float, count: int, *, slowest: float = SLOWEST) -> Array
 
 def response(system: control.StateSpace, omega: Array) -> Response:
     """Returns C (z I - A)^-1 B + D at z = e^(i omega h): (frequencies, outputs, inputs)."""
-    z = np.exp(1j * omega * system.dt)[:, None, None]
-    states = system.nstates
-    right = np.broadcast_to(system.B.astype(np.complex128), (len(omega), *system.B.shape))
-    return np.asarray(system.C @ np.linalg.solve(z * np.eye(states) - system.A, right) + system.D)
+    parts = [omega[k : k + AT_ONCE] for k in range(0, len(omega), AT_ONCE)]
+    return np.concatenate([_response_at(system, np.exp(1j * part * system.dt)) for part in parts])
+
+
+def _response_at(system: control.StateSpace, z: NDArray[np.complex128]) -> Response:
+    """Returns C (z I - A)^-1 B + D at several z: (len(z), outputs, inputs)."""
+    matrices = np.zeros((len(z), *system.A.shape), dtype=np.complex128)
+    matrices -= system.A
+    diagonal = np.arange(system.nstates)
+    matrices[:, diagonal, diagonal] += z[:, None]
+    right = np.broadcast_to(system.B.astype(np.complex128), (len(z), *system.B.shape))
+    left = system.C.astype(np.complex128)
+    return np.asarray(left @ np.linalg.solve(matrices, right) + system.D)
 
 
 def eigenloci(robot: Robot, plant: StandingPlant, omega: Array) -> tuple[Response, Response]:

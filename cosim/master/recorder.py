@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from fnmatch import fnmatchcase
+from functools import lru_cache
 from itertools import pairwise
 from types import MappingProxyType
 from typing import Any
@@ -49,10 +50,10 @@ class Recording:
 
     names: tuple[str, ...]  # the first is "time" [s]
     data: Array  # (rows, names)
-    _index: dict[str, int] = field(init=False, repr=False, compare=False)
+    _index: Mapping[str, int] = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "_index", {name: k for k, name in enumerate(self.names)})
+        object.__setattr__(self, "_index", _index_of(self.names))
 
     @property
     def time(self) -> Array:
@@ -64,7 +65,10 @@ class Recording:
         return self.columns([name])[:, 0]
 
     def columns(self, names: Sequence[str]) -> Array:
-        """Returns several variables (rows, names). Raises ColumnError for one not recorded."""
+        """Returns several variables (rows, names). Raises ColumnError for one not recorded.
+
+        Those that adjoin in memory are returned as a view that cannot be written.
+        """
         for name in names:
             if name not in self._index:
                 near = nearest_name(name, self.names)
@@ -72,7 +76,13 @@ class Recording:
                 if near:
                     fix = f"did you mean {near!r}?"
                 raise ColumnError("no such column in the recording", got=name, fix=fix)
-        return self.data[:, [self._index[name] for name in names]]
+        places = [self._index[name] for name in names]
+        adjoin = bool(places) and places == list(range(places[0], places[0] + len(places)))
+        if not adjoin or self.data.strides[0] != self.data.itemsize:
+            return self.data[:, places]
+        view = self.data[:, places[0] : places[-1] + 1]
+        view.flags.writeable = False
+        return view
 
     def joints(self, quantity: str) -> Array:
         """Returns a quantity of all joints (rows, 6, 3)."""
@@ -103,6 +113,12 @@ class Recording:
         if len(keep) == len(self.names):
             return self
         return Recording(tuple(self.names[k] for k in keep), self.data[:, keep])
+
+
+@lru_cache(maxsize=64)
+def _index_of(names: tuple[str, ...]) -> Mapping[str, int]:
+    """Returns the place of each column; recordings of the same columns share the mapping."""
+    return {name: k for k, name in enumerate(names)}
 
 
 def chosen_columns(
@@ -228,7 +244,8 @@ class ThinnedRows:
 
 def kept_moments(rows: int, every: int) -> NDArray[np.intp]:
     """Returns the indices of the kept rows: the first, every `every`-th after it, and the last."""
-    return np.unique(np.append(np.arange(0, rows, every), rows - 1))
+    moments = np.arange(0, rows, every)
+    return moments if moments[-1] == rows - 1 else np.append(moments, rows - 1)
 
 
 class Peaks:

@@ -34,14 +34,12 @@ from hexapod_cosim.cosim.results.walk import (
     body_height,
     commanded_path,
     real_feet,
-    robot_weight,
 )
 from hexapod_cosim.models import FRICTION_LAWS, LEG_NAMES, Friction, Servo
 from hexapod_cosim.models.friction import yielding_velocity
 
 TANH_LIMIT = 0.999  # limits atanh: a larger share is sliding, not creep
 NEARLY_SLIDING = 0.9  # of the friction cone
-LIFT = 1e-3  # m    lifting the robot by it is the least work that the residual is compared with
 
 
 class Metric(NamedTuple):
@@ -202,7 +200,7 @@ def metric_columns(*, bristles: bool) -> tuple[str, ...]:
 def compute_metrics(view: View, *, servo: Servo, realtime_factor: float) -> dict[str, float]:
     """Computes all METRICS of a run; the servo gives continuous rating and motor constant."""
     walk = view.walk
-    of_the_run = {"energy_residual": energy_residual(view), "realtime_factor": realtime_factor}
+    of_the_run = {"energy_residual": view.energy_residual, "realtime_factor": realtime_factor}
     if walk is None:
         return dict.fromkeys(METRICS, np.nan) | of_the_run
     parameters = view.parameters
@@ -236,18 +234,6 @@ def shown_metrics(runs: Mapping[str, Mapping[str, float | None]], *, net_slip: b
 def has_net_slip(parameters: Mapping[str, float]) -> bool:
     """Returns whether slip_net_per_metre is meaningful: under the tanh law it only inverts it."""
     return parameters.get("friction.law", TANH) != TANH
-
-
-def energy_residual(view: View) -> float:
-    """Returns the largest |energy.residual| over the work of the motors; NaN without rows."""
-    recording = view.recording
-    if not len(recording.time):
-        return np.nan
-    residual = recording.column("energy.residual")
-    works = recording.columns([*joint_names("positive_work"), *joint_names("negative_work")])
-    work = float((works[-1] - works[0]).sum())
-    missing = float(np.abs(residual - residual[0]).max())
-    return missing / max(work, LIFT * robot_weight(view.parameters)) if missing else 0.0
 
 
 def _per(walk: Walk, amount: float, name: str) -> dict[str, float]:

@@ -58,11 +58,10 @@ def polygon_margins(feet: Array, standing: Mask, centre: Array) -> Array:
     """
     margin = np.full(len(standing), np.nan)
     codes = standing @ (1 << np.arange(standing.shape[1]))  # one bit per leg
-    patterns, pattern_of = np.unique(codes, return_inverse=True)
-    for number, pattern in enumerate(patterns.tolist()):
+    for pattern in np.flatnonzero(np.bincount(codes)).tolist():
         legs = [leg for leg in range(standing.shape[1]) if pattern >> leg & 1]
         if len(legs) > 1:
-            rows = np.flatnonzero(pattern_of == number)
+            rows = np.flatnonzero(codes == pattern)
             margin[rows] = _hull_margins(feet[legs].take(rows, axis=2), centre.take(rows, axis=1))
     return margin
 

@@ -9,7 +9,7 @@ from functools import cached_property, lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from hexapod_cosim.cosim.interface.names import vector_names
+from hexapod_cosim.cosim.interface.names import joint_names, vector_names
 from hexapod_cosim.cosim.master.recorder import COMMAND_COLUMNS, Recording
 from hexapod_cosim.cosim.results.feet import feet_of_angles
 from hexapod_cosim.models import FRICTION_LAWS, TERRAINS
@@ -19,6 +19,7 @@ Array = NDArray[np.float64]
 
 SKIPPED_CYCLES = 2  # the start is not yet a steady walk
 CONTACT_SHARE = 0.01  # of the weight: a foot with less load does not stand
+LIFT = 1e-3  # m    lifting the robot by it is the least work that the residual is compared with
 LEAST_DISTANCE = 0.01  # m    less is standing, not walking
 LEAST_TURN = 0.05  # rad    less is standing, not turning
 SHOWN_CYCLES = 3  # in plots of what happens within a gait cycle
@@ -43,6 +44,18 @@ class View:
     def walk(self) -> Walk | None:
         """Whole gait cycles after the first two; None when there is none."""
         return _cut_walk(self)
+
+    @cached_property
+    def energy_residual(self) -> float:
+        """Largest |energy.residual| over the work of the motors; NaN without rows."""
+        recording = self.recording
+        if not len(recording.time):
+            return np.nan
+        residual = recording.column("energy.residual")
+        works = recording.columns([*joint_names("positive_work"), *joint_names("negative_work")])
+        work = float((works[-1] - works[0]).sum())
+        missing = float(np.abs(residual - residual[0]).max())
+        return missing / max(work, LIFT * robot_weight(self.parameters)) if missing else 0.0
 
     def last_cycles(self) -> View:
         """Returns the last SHOWN_CYCLES gait cycles of the run."""

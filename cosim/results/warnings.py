@@ -26,7 +26,6 @@ from hexapod_cosim.cosim.interface.names import joint_names, vector_names
 from hexapod_cosim.cosim.master.recorder import Recording
 from hexapod_cosim.cosim.results.balance import run_balance_warnings
 from hexapod_cosim.cosim.results.footprints import sinkage_warnings
-from hexapod_cosim.cosim.results.metrics import energy_residual
 from hexapod_cosim.cosim.results.walk import LEAST_DISTANCE, SKIPPED_CYCLES, View, body_height
 from hexapod_cosim.cosim.scenario.records import Scenario
 from hexapod_cosim.models import FRICTION_LAWS, LEG_NAMES, TERRAINS, Robot, Terrain
@@ -40,7 +39,7 @@ SUNK = 0.5  # 1
 SUNK_TIME = 0.5  # s    longer than the legs stay bent after a landing
 
 
-def describe_walk(view: View, robot: Robot) -> dict[str, Any]:
+def describe_walk(view: View, *, upright: bool) -> dict[str, Any]:
     """Returns the facts of the walk for run.json.
 
     They are the distance [m] and mean speed [m/s] over the measured cycles (NaN when there is no
@@ -55,7 +54,7 @@ def describe_walk(view: View, robot: Robot) -> dict[str, Any]:
     return {
         "distance": distance,
         "mean_speed": distance / lasted,
-        "upright": not describe_fall(view, robot),
+        "upright": upright,
     } | fallback
 
 
@@ -183,11 +182,10 @@ def unused_settings(scenario: Scenario, robot: Robot) -> list[str]:
 
 
 def walk_warnings(view: View, robot: Robot) -> list[str]:
-    """Warns of a fall, weak friction, legs out of reach, lost feedback, overloaded servos, legs
-    that overlap, feet that sink too deep and missing energy.
+    """Warns of weak friction, legs out of reach, lost feedback, overloaded servos, legs that
+    overlap, feet that sink too deep and missing energy.
     """
-    recording, fallen = view.recording, describe_fall(view, robot)
-    found = [*([fallen] if fallen else []), *friction_warnings(view.parameters)]
+    recording, found = view.recording, friction_warnings(view.parameters)
     unreachable = [f"controller.{leg}.unreachable" for leg in LEG_NAMES]
     if len(recording.time) and set(unreachable) <= set(recording.names):
         share = float(np.mean(recording.columns(unreachable).max(axis=1)))
@@ -277,7 +275,7 @@ def servo_warnings(recording: Recording, robot: Robot) -> list[str]:
 
 def energy_warnings(view: View) -> list[str]:
     """Warns where the energy balance misses more than metrics of energy can tolerate."""
-    return run_balance_warnings(energy_residual(view))
+    return run_balance_warnings(view.energy_residual)
 
 
 def short_run_warnings(view: View) -> list[str]:

@@ -83,27 +83,29 @@ def choose_walk(
         ScenarioError: a named stance is beyond the legs' reach.
         GainsError: no stance can be designed where the scenario asks for it.
     """
-    robot = known_robot(scenario, own)
+    bare = load_robot(scenario.robot)
+    own = own or scenario_robot(scenario)
+    robot = _with_servo(bare, own.servo, own.gravity)
     settings = dict(scenario.settings.get("gait", {}))
     plain = ChosenWalk(robot=robot, gait=make_gait(robot, **settings), stance=OWN)
     if scenario.names_walk:
-        return _named(scenario, plain)
+        return _named(scenario, plain, bare)
     control = control_of(scenario.control)
     if not control.is_builtin or control.name != "compliant":
         return replace(plain, chosen_by=BY_ROBOT)
-    chosen = _chosen(scenario, replace(plain, chosen_by=BY_CONTROL), settings)
+    chosen = _chosen(scenario, replace(plain, chosen_by=BY_CONTROL), bare, settings)
     if _designed_for(gains, plain.robot, chosen.robot):
         return replace(plain, chosen_by=BY_CONTROL)
     return chosen
 
 
-def _named(scenario: Scenario, plain: ChosenWalk) -> ChosenWalk:
-    """Returns the walk with the stance that the scenario names."""
+def _named(scenario: Scenario, plain: ChosenWalk, bare: Robot) -> ChosenWalk:
+    """Returns the walk with the stance that the scenario names; `bare` is the robot file's."""
     stance = scenario.walk.stance
     if stance is None or stance == OWN:
         return plain
     if isinstance(stance, str):
-        design = _design(load_robot(scenario.robot), plain.gait)
+        design = _design(bare, plain.gait)
         stance, name = (design.outward, design.deeper), DESIGNED
     else:
         name = GIVEN
@@ -125,11 +127,16 @@ def _moved(walk: ChosenWalk, name: str, outward: float, deeper: float) -> Chosen
     return replace(walk, robot=moved, stance=name, outward=outward, deeper=deeper)
 
 
-def _chosen(scenario: Scenario, plain: ChosenWalk, settings: Mapping[str, Any]) -> ChosenWalk:
-    """Returns the first walk of compliant control that the robot can follow."""
+def _chosen(
+    scenario: Scenario, plain: ChosenWalk, bare: Robot, settings: Mapping[str, Any]
+) -> ChosenWalk:
+    """Returns the first walk of compliant control that the robot can follow.
+
+    bare: the robot of the robot file, for which stances are designed.
+    """
     for gait in (make_gait(plain.robot, CHOSEN_GAIT, **settings), plain.gait):
         try:
-            design = _design(load_robot(scenario.robot), gait)
+            design = _design(bare, gait)
             begin = replace(plain, gait=gait)
             walk = _moved(begin, CHOSEN, FOOTING * design.outward, design.deeper)
         except (GainsError, ReachError):
@@ -213,15 +220,13 @@ def _found(robot: Robot, gait: Gait) -> Stance:
     return Stance(design.outward, design.deeper)
 
 
-def known_robot(scenario: Scenario, own: Robot | None = None) -> Robot:
+def known_robot(scenario: Scenario) -> Robot:
     """Returns the robot as its controller knows it: the robot file with the scenario's servos and
     gravity.
 
     The controller has to find out ground, contact and payload by itself.
-
-    own: the scenario's robot, if the caller has it already.
     """
-    own = own or scenario_robot(scenario)
+    own = scenario_robot(scenario)
     return _with_servo(load_robot(scenario.robot), own.servo, own.gravity)
 
 

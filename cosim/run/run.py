@@ -7,7 +7,7 @@ import platform
 import sys
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from functools import cache
 from importlib.metadata import version
 from pathlib import Path
@@ -40,6 +40,7 @@ from hexapod_cosim.cosim.results.result import Result
 from hexapod_cosim.cosim.results.walk import View
 from hexapod_cosim.cosim.results.walking import WALKING
 from hexapod_cosim.cosim.results.warnings import (
+    describe_fall,
     describe_walk,
     missing_metrics_warnings,
     off_map_warnings,
@@ -251,6 +252,7 @@ def make_result(
     scenario, setup, drawn = plan.scenario, plan.controller, plan.drawn
     view = View(outcome.judged, parameters, setup.gait.period)
     missing, drop = list[str](), describe_drop(replace(view, recording=outcome.recording))
+    fall = describe_fall(view, setup.robot)
     if outcome.status == COMPLETED:
         missing = short_run_warnings(view)
         # a drop neither walks nor swings a foot, and has the metrics of a drop
@@ -260,13 +262,14 @@ def make_result(
         "warnings": [
             *facts["warnings"],
             *unused_settings(scenario, setup.robot),
+            *([fall] if fall else []),
             *walk_warnings(view, setup.robot),
             *off_map_warnings(view.recording, surface_of(plan.robot.terrain)),
             *heat_warnings(view.recording, plan.robot.servo),
             *missing,
         ],
-        "gains": None if setup.gains is None else asdict(setup.gains),
-        "walk": describe_walk(view, setup.robot),
+        "gains": None if setup.gains is None else setup.gains.as_facts(),
+        "walk": describe_walk(view, upright=not fall),
         "drop": None if drop is None else drop.as_facts(),
         "drawn": None if drawn is None else drawn.as_facts(),
         WALKING: plan.walk.as_facts(),

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -154,8 +155,14 @@ def scenario_robot(scenario: Scenario) -> Robot:
         return own
     if scenario.gravity is not None:
         _check_gravity(robot, where=f"{scenario.where}: gravity")
-    check_settings(robot, where=f"{scenario.where} with robot {robot.name}")
+    _check_settings(robot, f"{scenario.where} with robot {robot.name}")
     return robot
+
+
+@lru_cache(maxsize=64)
+def _check_settings(robot: Robot, where: str) -> None:
+    """Checks a robot's settings once for the many runs of a batch. Raises RobotError."""
+    check_settings(robot, where=where)
 
 
 def scenario_terrain(scenario: Scenario, own: Robot) -> Terrain:

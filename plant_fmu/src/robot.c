@@ -541,18 +541,14 @@ void hx_bodies_from_motion(const hxModel *model, const hxPlantMotion *motion,
 }
 
 void hx_command_from_input(hxCommand *command, const hxInput *input, double time) {
-  for (int joint = 0; joint < HX_JOINTS; ++joint) {
-    for (int leg = 0; leg < HX_LEGS; ++leg) {
-      command->angle[joint][leg] = input->angle_ref[leg][joint];
-      command->speed[joint][leg] = input->speed_ref[leg][joint];
-      command->torque[joint][leg] = input->torque_ref[leg][joint];
-      command->acceleration[joint][leg] = input->acceleration_ref[leg][joint];
+  for (int joint = 0; joint < HX_JOINTS; ++joint)
+    for (int slot = 0; slot < HX_SLOTS; ++slot) {
+      const int leg = slot < HX_LEGS ? slot : 0;
+      command->angle[joint][slot] = input->angle_ref[leg][joint];
+      command->speed[joint][slot] = input->speed_ref[leg][joint];
+      command->torque[joint][slot] = input->torque_ref[leg][joint];
+      command->acceleration[joint][slot] = input->acceleration_ref[leg][joint];
     }
-    hx_fill_slots(command->angle[joint]);
-    hx_fill_slots(command->speed[joint]);
-    hx_fill_slots(command->torque[joint]);
-    hx_fill_slots(command->acceleration[joint]);
-  }
   for (int i = 0; i < 3; ++i) {
     command->push_force[i] = input->push_force[i];
     command->push_torque[i] = input->push_torque[i];

@@ -5,6 +5,7 @@ from __future__ import annotations
 import zipfile
 from dataclasses import replace
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 import pytest
@@ -184,7 +185,7 @@ def test_the_share_of_time_in_which_a_controller_fell_back_is_recorded_and_repor
     ).recording
     assert recording.column("controller.RM.fallback").tolist() == [0.0] * 15 + [1.0] * 6
     assert not recording.column("controller.LM.fallback").any()
-    measured = describe_walk(View(recording, FakePlant().parameters(), 1.0), load_robot("athena"))
+    measured = describe_walk(View(recording, FakePlant().parameters(), 1.0), upright=True)
     assert measured["fallback"] == pytest.approx(6 / 21)
 
 
@@ -284,6 +285,27 @@ def test_a_recording_survives_its_csv_file_bit_for_bit(tmp_path: Path) -> None:
     assert again.names == recording.names
     assert again.data.tobytes() == data.tobytes()
     assert [path.name for path in tmp_path.iterdir()] == ["results.csv"]
+
+
+@pytest.mark.parametrize("order", ["C", "F"])
+@pytest.mark.parametrize("names", [["b", "c"], ["c", "b"], ["a", "c"], ["d"], []])
+def test_columns_are_those_named_and_adjoin_in_memory(
+    names: list[str], order: Literal["C", "F"]
+) -> None:
+    """Sums over rows depend on the layout in their last bits, so that it must not vary."""
+    data = np.arange(12.0).reshape(3, 4)
+    found = Recording(("a", "b", "c", "d"), np.array(data, order=order)).columns(names)
+    assert found.tolist() == data[:, ["abcd".index(name) for name in names]].tolist()
+    assert found.flags.f_contiguous
+
+
+def test_columns_do_not_give_write_access_to_the_recording() -> None:
+    data = np.arange(6.0).reshape(3, 2, order="F")
+    found = Recording(("a", "b"), data).columns(["a", "b"])
+    with pytest.raises(ValueError, match="read-only"):
+        found[0, 0] = 7.0
+    assert data[0, 0] == 0.0
+    data[0, 0] = 1.0  # whoever has the recording's own array may still write it
 
 
 def test_columns_are_chosen_by_pattern_and_a_misspelt_one_is_refused() -> None:

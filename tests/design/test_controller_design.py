@@ -5,7 +5,7 @@ ones.
 from __future__ import annotations
 
 import re
-from dataclasses import replace
+from dataclasses import asdict, replace
 from functools import cache
 from pathlib import Path
 
@@ -327,6 +327,10 @@ def test_a_stiffer_robot_gets_gains_of_its_own() -> None:
 def test_saved_gains_are_loaded_to_the_last_bit(gains: Gains, tmp_path: Path) -> None:
     assert load_gains(save_gains(gains, tmp_path / "gains.toml")) == gains
     assert [path.name for path in tmp_path.iterdir()] == ["gains.toml"]
+
+
+def test_the_facts_of_gains_are_all_their_fields(gains: Gains) -> None:
+    assert gains.as_facts() == asdict(gains)
 
 
 def test_caveats_are_kept_and_warned_about(tmp_path: Path) -> None:

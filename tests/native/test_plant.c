@@ -1,5 +1,6 @@
 /* test_plant.c - tests the plant through hexapod.h: laws of motion, equal bits after repeating and
  * restoring, refusals, and every choice of law. */
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -380,6 +381,25 @@ static void ranges_cover_what_they_name(void) {
     CHECK(strlen(hx_status_name(status)) > 0);
 }
 
+/* The first input that a step refuses is the one next to the end of its range. */
+static void inputs_are_accepted_up_to_the_ends_of_their_ranges(void) {
+  hxPlant *plant = hx_plant_create();
+  const hxRange *range;
+  const size_t count = hx_input_ranges(&range);
+  for (size_t k = 0; k < count; ++k)
+    for (int end = 0; end < 2; ++end) {
+      hxInput input;
+      hx_input_default(&input);
+      double *x = (double *)&input + k;
+      *x = end ? range[k].max : range[k].min;
+      CHECK(hx_plant_step(plant, &input, 0.0) == HX_OK);
+      *x = nextafter(*x, end ? INFINITY : -INFINITY);
+      CHECK(hx_plant_step(plant, &input, 0.0) == HX_INVALID_ARGUMENT);
+      CHECK(strstr(hx_plant_message(plant), range[k].name) != NULL);
+    }
+  hx_plant_destroy(plant);
+}
+
 int main(void) {
   standing_feet_carry_the_weight();
   everything_falls_at_the_same_rate();
@@ -395,5 +415,6 @@ int main(void) {
   impossible_legs_are_refused();
   every_law_method_and_drive_moves();
   ranges_cover_what_they_name();
+  inputs_are_accepted_up_to_the_ends_of_their_ranges();
   return failures;
 }
