@@ -7,6 +7,7 @@ changed. The reason says why no input gives another result.
 from __future__ import annotations
 
 LANES = "plant_fmu/src/lanes"
+GRID_ROWS = "plant_fmu/src/ground/grid_rows.h"
 _COPIES = "the slots after the last leg are set to copies of leg 0 afterwards"
 _CELL = "of a cell that is not there only the sign of the first number is read"
 
@@ -34,10 +35,10 @@ EQUIVALENT: dict[tuple[str, str], str] = {
         f"{LANES}/coordinates.h",
         "for (int i = 0; i <= HX_BODY_STATE; ++i) hx_fill_slots(motion->link[joint][i]);",
     ): f"what follows a link's state is the next one, and {_COPIES}",
-    (f"{LANES}/foot.h", "none[2] = {-1.0, -1.5},"): _CELL,
-    (f"{LANES}/foot.h", "none[2] = {-1.5, -1.0},"): _CELL,
+    (GRID_ROWS, "none[2] = {-1.0, -1.5},"): _CELL,
+    (GRID_ROWS, "none[2] = {-1.5, -1.0},"): _CELL,
     (
-        f"{LANES}/foot.h",
+        GRID_ROWS,
         "hxNumber at[3][HX_LANES], distance[HX_LANES], normal[4][HX_LANES];",
     ): "an array that is longer than needed",
     (

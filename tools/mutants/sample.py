@@ -36,7 +36,12 @@ GROUPS: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
         ),
     ),
     "contact": (
-        ("plant_fmu/src/contact_law.c", f"{LANES}/foot.h", f"{LANES}/friction.h"),
+        (
+            "plant_fmu/src/contact_law.c",
+            "plant_fmu/src/ground/grid_rows.h",
+            f"{LANES}/foot.h",
+            f"{LANES}/friction.h",
+        ),
         (
             *TWINS,
             f"{TESTS}plant_functions.py",

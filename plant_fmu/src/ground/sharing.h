@@ -21,6 +21,7 @@ static inline hxNumber number_root(hxNumber x) { return hx_lane(hx_sqrt(hx_splat
 static inline hxNumber sharing_overlap(const hxNumber a[3], const hxNumber b[3], hxNumber reach) {
   hxNumber square = 0.0;
   for (int i = 0; i < 3; ++i) square += (a[i] - b[i]) * (a[i] - b[i]);
+  if (hx_re(square * reach) >= 1.0) return 0.0;
   const hxNumber rest = 1.0 - number_root(square * reach), two = rest * rest;
   if (hx_re(rest) <= 0.0) return 0.0;
   return (1.0 - 0.5 * square) * (two * two) * (5.0 - 4.0 * rest);

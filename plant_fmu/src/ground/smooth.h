@@ -17,10 +17,14 @@ typedef struct {
   hxMask outside;
 } hxGridPlace;
 
-/* Copies of the 4 x 4 nodes around the patches of a pack of points. */
+/* Copies of the 4 x 4 nodes around the patches of a pack of points; of blocks the tops of cells.
+ * The patches that were evaluated last are kept at their places. */
 struct hxPatchNodes {
-  double col[HX_LANES], row[HX_LANES]; /* of the patches; -1: none */
+  double col[HX_LANES], row[HX_LANES]; /* of the patches; less than -1: none */
   double node[4][4][HX_LANES];
+  double is_kept[HX_LANES]; /* 1: the next lines are set */
+  double x[HX_LANES], y[HX_LANES];
+  double patch[6][HX_LANES];
 };
 
 /* Places of points, and the nodes around each. */
@@ -29,9 +33,15 @@ typedef struct {
   hxPatchNodes *of;
 } hxStencil;
 
-/* Marks copies of nodes as empty. */
+/* Marks patches as not kept. */
+static inline void hx_forget_patches(hxPatchNodes *nodes) {
+  hx_store(nodes->is_kept, hx_splat(0.0));
+}
+
+/* Marks copies of nodes as empty, and patches as not kept. */
 static inline void hx_forget_nodes(hxPatchNodes *nodes) {
-  for (int lane = 0; lane < HX_LANES; ++lane) nodes->col[lane] = nodes->row[lane] = -1.0;
+  hx_store(nodes->col, hx_splat(-2.0)), hx_store(nodes->row, hx_splat(-2.0));
+  hx_forget_patches(nodes);
 }
 
 /* Returns the largest whole number that is not larger than x, for x from 0 to 2^51. */
@@ -244,6 +254,52 @@ static const double close = 1e-7, closest = 1e-14;
 /* Newton's method that still moves by this share of a cell, squared, has not found a point. */
 static const double not_found = 1e-4;
 
+/* A step of Newton's method from a place with this patch, and its square. */
+typedef struct {
+  hxReal dx, dy, square;
+  hxHessian H;
+} hxMove;
+
+static inline hxMove move_from(const hxPatch *p, hxReal x, hxReal y, const hxReal point[3]) {
+  const hxReal rz = p->s - point[2];
+  const hxReal gx = (x - point[0]) + p->sx * rz, gy = (y - point[1]) + p->sy * rz;
+  const hxHessian H = hessian_of(p, rz);
+  const hxReal dx = H.per_det * (H.xy * gy - H.yy * gx), dy = H.per_det * (H.xy * gx - H.xx * gy);
+  return (hxMove){dx, dy, dx * dx + dy * dy, H};
+}
+
+/* Keeps the patches of some lanes, except beyond the grid. */
+static inline void keep_patches(hxMask mask, const hxStencil *at, hxReal x, hxReal y,
+                                const hxPatch *p) {
+  const hxReal entry[6] = {p->s, p->sx, p->sy, p->sxx, p->sxy, p->syy};
+  hxPatchNodes *of = at->of;
+  mask &= ~(at->x.outside | at->y.outside);
+  hx_store(of->is_kept, hx_select(mask, hx_splat(1.0), hx_load(of->is_kept)));
+  hx_store(of->x, hx_select(mask, x, hx_load(of->x)));
+  hx_store(of->y, hx_select(mask, y, hx_load(of->y)));
+  for (int i = 0; i < 6; ++i)
+    hx_store(of->patch[i], hx_select(mask, entry[i], hx_load(of->patch[i])));
+}
+
+/* Finds nearest points by the expansions of patches that are kept, and returns in which of the
+ * lanes `wanted` they are so close that this is as exact as Newton's last step. */
+static inline hxMask find_by_kept_patches(const hxTerrain *terrain, hxMask wanted,
+                                          const hxReal point[3], const hxPatchNodes *of,
+                                          hxNearest *found) {
+  const hxGridHead *head = &terrain->head;
+  const hxReal zero = hx_splat(0.0), one = hx_splat(1.0), x = hx_load(of->x), y = hx_load(of->y);
+  const hxMask kept = wanted & hx_less(zero, hx_load(of->is_kept));
+  if (!hx_any(kept)) return kept;
+  const hxPatch p = {hx_load(of->patch[0]), hx_load(of->patch[1]), hx_load(of->patch[2]),
+                     hx_load(of->patch[3]), hx_load(of->patch[4]), hx_load(of->patch[5])};
+  const hxMove move = move_from(&p, x, y, point);
+  *found = (hxNearest){x + move.dx, y + move.dy, moved_patch(&p, move.dx, move.dy), move.H};
+  const hxReal u = (found->x - head->x0) * terrain->per_cell - hx_load(of->col),
+               v = (found->y - head->y0) * terrain->per_cell - hx_load(of->row);
+  return kept & ~hx_less(hx_splat(close * (head->cell * head->cell)), move.square) &
+         hx_less(u, one) & hx_less(v, one) & ~(hx_less(u, zero) | hx_less(v, zero));
+}
+
 /* Sets the nearest points of some lanes to those below. Far above a rough surface, beyond the
  * centres of its curvature, Newton's method may find none; the distance is then that of the plane
  * at the point below, which is far, too. */
@@ -253,6 +309,38 @@ static inline void use_points_below(const hxTerrain *terrain, hxMask mask, const
   replace_nearest(mask, (hxNearest){point[0], point[1], patch_at(terrain, at), found->H}, found);
 }
 
+/* Replaces the nearest points of the lanes `active` by those of Newton's method from (x, y). */
+static inline void search_nearest(const hxTerrain *terrain, hxMask active, const hxReal point[3],
+                                  hxReal x, hxReal y, int exactly, hxPatchNodes *nodes,
+                                  hxNearest *found) {
+  enum { MOST = 40 };
+  const double area = terrain->head.cell * terrain->head.cell;
+  hxStencil at;
+  at.of = nodes;
+  move_stencil(terrain, active, x, y, &at);
+  for (int i = 0;; ++i) {
+    const hxPatch p = patch_at(terrain, &at);
+    const hxMove move = move_from(&p, x, y, point);
+    hxMask done = ~hx_less(hx_splat(closest * area), move.square);
+    if (!exactly) {
+      keep_patches(active, &at, x, y, &p);
+      done |= ~hx_less(hx_splat(close * area), move.square) &
+              stays_in_patch(terrain, &at, move.dx, move.dy);
+    }
+    if (i == MOST) done = active;
+    const hxNearest end = {x + move.dx, y + move.dy, moved_patch(&p, move.dx, move.dy), move.H};
+    replace_nearest(done & active, end, found);
+    const hxMask none =
+        i == MOST ? active & hx_less(hx_splat(not_found * area), move.square) : active ^ active;
+    if (hx_any(none)) use_points_below(terrain, none, point, &at, found);
+    active &= ~done;
+    if (!hx_any(active)) return;
+    const hxReal share = share_of_move(terrain, move.square);
+    x += share * move.dx, y += share * move.dy;
+    move_stencil(terrain, active, x, y, &at);
+  }
+}
+
 /* Computes the nearest points of a smooth surface to the lanes `wanted` by Newton's method on
  * their two parameters, from the points below moved by `start`. With `exactly`, also the second
  * derivatives belong to the nearest point. `nodes` are those of an earlier search on the same
@@ -260,39 +348,14 @@ static inline void use_points_below(const hxTerrain *terrain, hxMask mask, const
 static inline hxNearest hx_nearest_on_surface(const hxTerrain *terrain, hxMask wanted,
                                               const hxReal point[3], const hxReal start[2],
                                               int exactly, hxPatchNodes *nodes) {
-  enum { MOST = 40 };
-  const double area = terrain->head.cell * terrain->head.cell;
-  hxReal x = point[0] + start[0], y = point[1] + start[1];
-  hxMask active = wanted;
-  hxStencil at;
-  hxNearest found;
-  at.of = nodes;
-  move_stencil(terrain, wanted, x, y, &at);
-  for (int i = 0;; ++i) {
-    const hxPatch p = patch_at(terrain, &at);
-    const hxReal rz = p.s - point[2];
-    const hxReal gx = (x - point[0]) + p.sx * rz, gy = (y - point[1]) + p.sy * rz;
-    const hxHessian H = hessian_of(&p, rz);
-    const hxReal dx = H.per_det * (H.xy * gy - H.yy * gx), dy = H.per_det * (H.xy * gx - H.xx * gy);
-    const hxReal square = dx * dx + dy * dy;
-    hxMask done = ~hx_less(hx_splat(closest * area), square);
-    if (!exactly)
-      done |= ~hx_less(hx_splat(close * area), square) & stays_in_patch(terrain, &at, dx, dy);
-    if (i == MOST) done = active;
-    const hxNearest end = {x + dx, y + dy, moved_patch(&p, dx, dy), H};
-    if (i == 0)
-      found = end;
-    else
-      replace_nearest(done & active, end, &found);
-    const hxMask none =
-        i == MOST ? active & hx_less(hx_splat(not_found * area), square) : active ^ active;
-    if (hx_any(none)) use_points_below(terrain, none, point, &at, &found);
-    active &= ~done;
-    if (!hx_any(active)) return found;
-    const hxReal share = share_of_move(terrain, square);
-    x += share * dx, y += share * dy;
-    move_stencil(terrain, active, x, y, &at);
-  }
+  const hxReal zero = hx_splat(0.0);
+  hxNearest found = {zero, zero, {zero, zero, zero, zero, zero, zero}, {zero, zero, zero, zero}};
+  const hxMask known = find_by_kept_patches(terrain, wanted, point, nodes, &found),
+               unknown = wanted & ~known;
+  if (hx_any(unknown))
+    search_nearest(terrain, unknown, point, point[0] + start[0], point[1] + start[1], exactly,
+                   nodes, &found);
+  return found;
 }
 
 /* Returns the signed distance of points from the surface at their nearest points, and sets the

@@ -3,20 +3,11 @@
 #ifndef HX_FOOT_H
 #define HX_FOOT_H
 
+#include "../ground/grid_rows.h"
 #include "../ground/sharing.h"
 #include "friction.h"
 #include "kinematics.h"
 #include "soil_pack.h"
-
-#ifndef HX_TANGENT
-#include "../ground/smooth.h" /* behind lanes.h */
-#endif
-
-/* Distance of a point from the ground, and the ground's normal. */
-typedef struct {
-  hxReal distance; /* m  signed, > 0 above the ground */
-  hxVec3 normal;   /* 1  out of the ground, world axes */
-} hxGround;
 
 /* Kinematics of the contact. */
 typedef struct {
@@ -74,224 +65,6 @@ static inline int has_bristles(const hxModel *model, int row) {
 /* Returns whether the contacts of a row resist spin or rolling: feet do. */
 static inline int has_turning_friction(const hxModel *model, int row) {
   return row < HX_FOOT_ROWS && (model->spin_friction || model->roll_friction);
-}
-
-/* Copies distance and normal of a grid at one lane's point. The derivative of both by the point
- * belongs to numbers that carry one. */
-static inline void put_face(const hxFace *face, const hxNumber point[3], hxNumber distance[1],
-                            hxNumber normal[3]) {
-  const double *n = face->normal, *m = face->bend;
-  const double d[3] = {hx_slope(point[0]), hx_slope(point[1]), hx_slope(point[2])};
-  if (!HX_HAS_SLOPES) {
-    *distance = face->distance;
-    for (int i = 0; i < 3; ++i) normal[i] = n[i];
-    return;
-  }
-  distance[0] = hx_with_slope(face->distance, n[0] * d[0] + n[1] * d[1] + n[2] * d[2]);
-  normal[0] = hx_with_slope(n[0], m[0] * d[0] + m[3] * d[1] + m[4] * d[2]);
-  normal[1] = hx_with_slope(n[1], m[3] * d[0] + m[1] * d[1] + m[5] * d[2]);
-  normal[2] = hx_with_slope(n[2], m[4] * d[0] + m[5] * d[1] + m[2] * d[2]);
-}
-
-/* Computes a face of a grid at a point; feet keep the cell that is held for them. */
-static inline void query_grid(const hxModel *model, const hxContactState *state, hxFaceKind kind,
-                              int slot, const hxNumber point[3], hxFace *face) {
-  const double real[3] = {hx_re(point[0]), hx_re(point[1]), hx_re(point[2])},
-               none[2] = {-1.0, -1.0},
-               held[2] = {hx_re(state->cell[0][slot]), hx_re(state->cell[1][slot])};
-  hx_terrain_face(model->terrain, kind, kind == HX_FACE_NEAREST ? none : held, real, HX_HAS_SLOPES,
-                  face);
-}
-
-/* Contacts whose place on a grid is computed. Others are left above the ground. */
-enum {
-  HX_CLOSED, /* those that are closed */
-  HX_ALL,
-  HX_NEAR,  /* those that are closed, and open ones that may touch the ground */
-  HX_LISTED /* those that are closed, and open ones of lanes whose bits follow these two */
-};
-
-/* Returns the choice of closed contacts, and of open ones in these lanes. */
-static inline int hx_listed(int lanes) { return lanes ? HX_LISTED | lanes << 2 : HX_CLOSED; }
-
-/* Returns whether the choice contains the open contacts of a lane. */
-static inline int hx_is_listed(int all, int lane) {
-  return all == HX_ALL || ((all & 3) == HX_LISTED && (all >> (2 + lane) & 1));
-}
-
-/* Computes the face of a grid under the sphere of an open contact, or, where the ground around it
- * is lower, the least distance that it may have. */
-HX_INLINE void query_near_grid(const hxModel *model, const hxContactState *state, hxFaceKind kind,
-                               int row, int slot, const hxNumber point[3], hxFace *face) {
-  const double real[3] = {hx_re(point[0]), hx_re(point[1]), hx_re(point[2])},
-               radius = hx_re(model->radius[row]),
-               bound = hx_terrain_depth_bound(model->terrain, real, radius);
-  if (bound <= 0.0)
-    face->distance = radius - bound;
-  else
-    query_grid(model, state, kind, slot, point, face);
-}
-
-#ifndef HX_TANGENT
-/* Returns the heights of the highest blocks within 20 mm of points along x and y. */
-static inline hxReal tops_around(const hxTerrain *terrain, const hxVec3 *point) {
-  const double reach = HX_LEAST_REACH * terrain->per_cell;
-  const hxReal x = (point->x - terrain->head.x0) * terrain->per_cell,
-               y = (point->y - terrain->head.y0) * terrain->per_cell;
-  double low[2][HX_LANES], high[2][HX_LANES], top[HX_LANES];
-  hx_store(low[0], x - reach), hx_store(high[0], x + reach);
-  hx_store(low[1], y - reach), hx_store(high[1], y + reach);
-  for (int lane = 0; lane < HX_LANES; ++lane) {
-    const double ends[4] = {low[0][lane], high[0][lane], low[1][lane], high[1][lane]};
-    top[lane] = hx_terrain_top_between(terrain, ends);
-  }
-  return hx_load(top);
-}
-
-/* Returns the indices of hx_cell_index along a line of n cells. */
-static inline hxReal cell_index(hxReal u, int64_t n) {
-  const hxReal zero = hx_splat(0.0), last = hx_splat((double)(n - 1));
-  return whole_part(hx_select(hx_less(zero, u), hx_min(u, last), zero));
-}
-
-/* Returns the entries of a map of rows x cols at coordinates in its cells. */
-static inline hxReal entries_at(const double *map, int64_t rows, int64_t cols, hxReal u, hxReal v) {
-  const double *from[HX_LANES];
-  double place[HX_LANES];
-  hx_store(place, cell_index(v, rows) * (double)cols + cell_index(u, cols));
-  for (int lane = 0; lane < HX_LANES; ++lane) from[lane] = map + (int64_t)place[lane];
-  return hx_gather(from, 0);
-}
-
-/* Returns the heights of the tiles over which points are. */
-static inline hxReal tops_of_tiles(const hxTerrain *terrain, const hxVec3 *point) {
-  return entries_at(terrain->top, terrain->tile_rows, terrain->tile_cols,
-                    (point->x - terrain->head.x0) * terrain->per_tile,
-                    (point->y - terrain->head.y0) * terrain->per_tile);
-}
-
-/* Returns the largest depths that a row of contacts at these points may have, m; not positive: they
- * do not touch the grid. The bits are those of hx_terrain_depth_bound. */
-HX_RARE hxReal hx_grid_depth_bound(const hxModel *model, int row, const hxVec3 *point) {
-  const hxTerrain *terrain = model->terrain;
-  const double radius = model->radius[row];
-  const hxReal z = point->z - model->ground_point[2], above_all = z - terrain->highest;
-  if (radius < terrain->reach && !hx_any(~hx_less(hx_splat(radius), above_all)))
-    return radius - hx_min(above_all, hx_splat(terrain->reach));
-  const int around = hx_has_large_blocks(terrain) && radius < 0.9 * HX_LEAST_REACH;
-  if (!around && !(radius < terrain->reach)) return hx_splat(radius); /* unknown */
-  const hxReal above = z - (around ? tops_around(terrain, point) : tops_of_tiles(terrain, point));
-  const hxReal reach = hx_splat(around ? HX_LEAST_REACH : terrain->reach);
-  return radius - hx_select(hx_less(above, reach), above, reach);
-}
-#endif
-
-#ifndef HX_TANGENT
-/* Returns distance and normal of a smooth grid at a row's points. */
-HX_RARE hxGround hx_smooth_grid(const hxModel *model, const hxContactState *state, int row,
-                                int slot, int all, const hxVec3 *point, hxPatchNodes *nodes) {
-  const hxReal zero = hx_splat(0.0), one = hx_splat(1.0);
-  const hxReal at[3] = {point->x, point->y, point->z - model->ground_point[2]};
-  hxReal normal[3], distance = hx_splat(hx_far);
-  hxMask wanted = hx_less(zero, hx_load(&state->closed[row][slot]));
-  if (all == HX_ALL) wanted = hx_less(zero, one);
-  if (all == HX_NEAR) {
-    const hxReal bound = hx_grid_depth_bound(model, row, point);
-    wanted |= hx_less(zero, bound);
-    distance = model->radius[row] - bound;
-  }
-  if (!hx_any(wanted)) return (hxGround){distance, {zero, zero, one}};
-  const int is_foot = row == HX_FOOT;
-  const hxReal from[2] = {is_foot ? hx_load(&state->nearest[0][slot]) : zero,
-                          is_foot ? hx_load(&state->nearest[1][slot]) : zero};
-  hxPatchNodes own;
-  if (!nodes) {
-    hx_forget_nodes(&own);
-    nodes = &own;
-  }
-  const hxNearest nearest = hx_nearest_on_surface(model->terrain, wanted, at, from, 0, nodes);
-  const hxReal exact = hx_distance_from_surface(&nearest, at, normal);
-  return (hxGround){hx_select(wanted, exact, distance),
-                    {hx_select(wanted, normal[0], zero), hx_select(wanted, normal[1], zero),
-                     hx_select(wanted, normal[2], one)}};
-}
-#endif
-
-/* Returns distance and normal of a grid at a row's points, lane by lane. */
-HX_RARE hxGround hx_grid(const hxModel *model, const hxContactState *state, int row, int slot,
-                         int all, const hxVec3 *point) {
-  static const hxFaceKind kind[HX_ROWS] = {HX_FACE_TOP,    HX_FACE_WALL,    HX_FACE_SIDE,
-                                           HX_FACE_CORNER, HX_FACE_NEAREST, HX_FACE_NEAREST,
-                                           HX_FACE_NEAREST};
-  hxNumber at[3][HX_LANES], distance[HX_LANES], normal[3][HX_LANES];
-  hx_store(at[0], point->x), hx_store(at[1], point->y), hx_store(at[2], point->z);
-  for (int lane = 0; lane < HX_LANES; ++lane) {
-    const int place = slot + lane, mirrors = row != HX_TORSO && place >= HX_LEGS && slot == 0;
-    const hxNumber p[3] = {at[0][lane], at[1][lane], at[2][lane] - model->ground_point[2]};
-    hxNumber n[3];
-    if (mirrors) {
-      distance[lane] = distance[0];
-      for (int i = 0; i < 3; ++i) normal[i][lane] = normal[i][0];
-      continue;
-    }
-    hxFace face = {.distance = hx_far, .normal = {0.0, 0.0, 1.0}};
-    if (hx_is_listed(all, lane) || hx_re(state->closed[row][place]) != 0.0)
-      query_grid(model, state, kind[row], place, p, &face);
-    else if (all == HX_NEAR)
-      query_near_grid(model, state, kind[row], row, place, p, &face);
-    put_face(&face, p, &distance[lane], n);
-    for (int i = 0; i < 3; ++i) normal[i][lane] = n[i];
-  }
-  return (hxGround){hx_load(distance),
-                    {hx_load(normal[0]), hx_load(normal[1]), hx_load(normal[2])}};
-}
-
-#ifndef HX_TANGENT
-/* Returns which open contacts of a pack the choice contains. */
-static inline hxMask listed_lanes(int all, int slot) {
-  double listed[HX_LANES];
-  for (int lane = 0; lane < HX_LANES; ++lane)
-    listed[lane] = hx_is_listed(all, slot == 0 && lane >= HX_LEGS ? 0 : lane) ? 1.0 : 0.0;
-  return hx_less(hx_splat(0.0), hx_load(listed));
-}
-
-/* Returns the distances of feet from the tops of the columns that are held for them, or below them;
- * with the bits of hx_terrain_face. */
-HX_RARE hxGround hx_block_tops(const hxModel *model, const hxContactState *state, int slot, int all,
-                               const hxVec3 *point) {
-  const hxReal zero = hx_splat(0.0), z = point->z - model->ground_point[2];
-  const hxGridHead *head = &model->terrain->head;
-  hxReal col = hx_load(&state->cell[0][slot]), row = hx_load(&state->cell[1][slot]);
-  hxMask wanted = hx_less(zero, hx_load(&state->closed[HX_FOOT][slot]));
-  if (all != HX_CLOSED) {
-    const hxMask below = hx_less(col, zero);
-    col = hx_select(below, (point->x - head->x0) / head->cell, col);
-    row = hx_select(below, (point->y - head->y0) / head->cell, row);
-    wanted |= listed_lanes(all, slot);
-  }
-  const hxReal top = entries_at(model->terrain->height, head->rows, head->cols, col, row);
-  return (hxGround){hx_select(wanted, z - top, hx_splat(hx_far)), {zero, zero, hx_splat(1.0)}};
-}
-#endif
-
-/* Returns distance and normal of the ground at the points of a row of contacts. All other code is
- * independent of the terrain. `nodes`: of feet, from an earlier search; NULL: none. */
-HX_INLINE hxGround hx_ground(const hxModel *model, const hxContactState *state, int row, int slot,
-                             int all, hxVec3 point, hxPatchNodes *nodes) {
-  if (model->terrain_kind == HX_TERRAIN_FLAT)
-    return (hxGround){point.z - model->ground_point[2],
-                      {hx_splat(0.0), hx_splat(0.0), hx_splat(1.0)}};
-#ifndef HX_TANGENT
-  if (model->terrain_kind == HX_TERRAIN_GRID &&
-      hx_terrain_surface(model->terrain) == HX_SURFACE_SMOOTH)
-    return hx_smooth_grid(model, state, row, slot, all, &point, nodes);
-  if (model->terrain_kind == HX_TERRAIN_GRID && row == HX_FOOT && all != HX_NEAR)
-    return hx_block_tops(model, state, slot, all, &point);
-#endif
-  (void)nodes;
-  if (model->terrain_kind == HX_TERRAIN_GRID) return hx_grid(model, state, row, slot, all, &point);
-  const hxVec3 n = hx_splat_vec3(model->ground_normal);
-  return (hxGround){hx_dot(n, hx_sub3(point, hx_splat_vec3(model->ground_point))), n};
 }
 
 /* Returns the constants of a row of contacts, without shares. */
@@ -397,7 +170,7 @@ static inline const hxSoilCurves *known_virgin(const hxKnown *known, int row, in
 #else
 /* Returns what is known of a pack of a row; NULL: nothing. */
 static inline hxPatchNodes *known_nodes(const hxKnown *known, int row, int slot) {
-  return known && known->nodes && row == HX_FOOT ? &known->nodes[slot / HX_LANES] : NULL;
+  return known && known->nodes && row < HX_FOOT_ROWS ? &known->nodes[slot / HX_LANES] : NULL;
 }
 static inline const hxSoilCurves *known_virgin(const hxKnown *known, int row, int slot) {
   return known && known->virgin && row == HX_FOOT ? &known->virgin[slot / HX_LANES] : NULL;

@@ -243,11 +243,17 @@ HX_INLINE void push_leg(const hxModel *model, const hxContactState *state,
 }
 
 /* Returns whether a row has a closed contact in a pack. */
+#ifdef HX_TANGENT
 static inline int is_used(const hxContactState *state, int row, int slot) {
   int used = 0;
   for (int lane = 0; lane < HX_LANES; ++lane) used |= hx_re(state->closed[row][slot + lane]) != 0.0;
   return used;
 }
+#else
+static inline int is_used(const hxContactState *state, int row, int slot) {
+  return hx_any(hx_less(hx_splat(0.0), hx_load(&state->closed[row][slot])));
+}
+#endif
 
 /* Multiplies the stiffness of feet on blocks by the shares of their contacts. */
 HX_RARE void share_feet(const hxModel *model, const hxContactState *state, int slot,

@@ -170,7 +170,7 @@ static void measure_step(const hxStart *start, const hxModel *seen, double h, co
   hxStepWorks works;
   hxCommand command[INTERVALS + 1];
   hxReal work[HX_PACKS];
-  hxPath path = {.model = start->pressed,
+  hxPath path = {.model = start->near,
                  .contact = start->contact,
                  .t = start->t,
                  .h = h,
@@ -183,7 +183,7 @@ static void measure_step(const hxStart *start, const hxModel *seen, double h, co
     hxSoilEnds *ends = &start->scratch->soil;
     path.ends = ends;
     hx_soil_ends(start->contact, &state->moment, end, start->scratch->is_soil_known, ends);
-    hx_soil_yield(start->pressed, start->contact, h, &state->moment, end, ends, path.plastic);
+    hx_soil_yield(start->near, start->contact, h, &state->moment, end, ends, path.plastic);
   }
   hx_step_works(&path, &trial->impulses, &works);
   hxMeasured *measured = &state->measured;
@@ -286,15 +286,6 @@ static int is_pressed(const hxModel *model, const hxContactState *contact, int f
   return closed > 0.0;
 }
 
-/* Returns the model with its first row of feet only, of those on blocks. Open contacts exert no
- * force, so steps without their rows have the same bits. */
-HX_RARE const hxModel *first_row(const hxModel *model, hxModel *first) {
-  *first = *model;
-  first->rows = first->foot_rows = first->listed = 1;
-  first->torso_rows = first->pair_rows = 0;
-  return first;
-}
-
 /* Advances from state->time to t_end; the last step ends on t_end exactly. A call that an event
  * interrupted continues with the same steps. */
 static hxStatus run_to(const hxModel *model, const hxCommand *command, const hxCommand *ramp,
@@ -309,8 +300,7 @@ static hxStatus run_to(const hxModel *model, const hxCommand *command, const hxC
                    .footprints = events->footprints,
                    .scratch = scratch};
   const int rows = model->listed, foot_rows = model->foot_rows;
-  const hxModel *all_feet = rows > foot_rows ? events->feet : model,
-                *first_feet = foot_rows > 1 ? first_row(model, &scratch->tops) : all_feet;
+  const hxModel *feet = rows > foot_rows ? events->feet : model;
   start.touch = fmax(touch_depth[0], touch_depth[1] * model->tolerance);
   double first = fmin(state->first_step,
                       state->next_step); /* new inputs cause a larger error than the last step's */
@@ -320,17 +310,15 @@ static hxStatus run_to(const hxModel *model, const hxCommand *command, const hxC
     double taken;
     int event = 0;
     start.t = state->time;
-    start.near = start.pressed = model;
-    if (!is_pressed(model, &state->contact, foot_rows, rows)) {
-      start.near = all_feet;
-      start.pressed = is_pressed(model, &state->contact, 1, foot_rows) ? all_feet : first_feet;
-    }
+    start.near = is_pressed(model, &state->contact, foot_rows, rows) ? model : feet;
     const hxStatus status = advance(&start, left, next_step, state, &taken, &event, message);
     if (status != HX_OK) return status;
     if (next_step == &first) state->first_step = first, next_step = &state->next_step;
     const double t = state->time + taken;
     state->time = taken >= left || t_end - t < step_floor ? t_end : t;
     events->found |= event;
+    /* a call that is interrupted here continues without patches: the whole call does so, too */
+    for (int pack = 0; event && pack < HX_PACKS; ++pack) hx_forget_patches(&scratch->nodes[pack]);
   }
   return HX_OK;
 }

@@ -30,7 +30,6 @@ typedef struct {
   hxPlantMotion y;
   hxTrial trial, nearer;
   hxMoment end;
-  hxModel tops;                 /* the model with one row of feet */
   hxPatchNodes nodes[HX_PACKS]; /* around the feet, of a call */
   hxSoilEnds soil;              /* of the last step */
   int is_soil_known;            /* 1: soil.from belongs to the present depths of feet */
@@ -39,9 +38,8 @@ typedef struct {
 
 /* Start of a step and the data that all its trials share. */
 typedef struct {
-  const hxModel *model;   /* with all rows of contacts */
-  const hxModel *near;    /* without the rows of bodies and pairs while none of them touches */
-  const hxModel *pressed; /* the same with one row of feet while no other touches the ground */
+  const hxModel *model; /* with all rows of contacts */
+  const hxModel *near;  /* without the rows of bodies and pairs while none of them touches */
   const hxCommand *command, *ramp; /* command and its change per second; ramp NULL: constant */
   const hxContactState *contact;
   const hxMethodRow *method;
@@ -286,7 +284,7 @@ static const hxCommand *command_at(const hxStart *start, double t, hxCommand *no
 /* Computes one step of the method and its error; the state changes only in its counters. */
 static void try_step(const hxStart *start, double h, hxState *state, hxTrial *trial) {
   const hxMethodRow *m = start->method;
-  const hxModel *model = start->pressed;
+  const hxModel *model = start->near;
   hxImplicit *implicit = &start->scratch->implicit;
   hxRate *k = start->scratch->k, *change = &start->scratch->change;
   hxPlantMotion *y = &start->scratch->y;

@@ -96,13 +96,24 @@ HX_INLINE hxFootInstant foot_at(const hxPath *path, const hxFootPath *foot, doub
                          hx_sqrt(hx_dot(slip, slip))};
 }
 
-/* Adds further closed contacts of the same feet; the sliding speed is that of the largest force. */
-HX_RARE hxFootInstant with_further_feet(const hxPath *path, int slot, double x, hxFootInstant sum) {
+/* The paths of further closed contacts of a pack of feet. */
+typedef struct {
+  int count;
+  hxFootPath foot[HX_FOOT_ROWS - 1];
+} hxFurtherPaths;
+
+HX_RARE void further_paths(const hxPath *path, int slot, hxFurtherPaths *further) {
+  for (int k = 1; k < path->model->foot_rows; ++k)
+    if (is_used(path->contact, path->model->row[k], slot))
+      further->foot[further->count++] = foot_path(path, path->model->row[k], slot);
+}
+
+/* Adds them to the first row's; the sliding speed is that of the largest force. */
+HX_RARE hxFootInstant with_further_feet(const hxPath *path, const hxFurtherPaths *further, double x,
+                                        hxFootInstant sum) {
   hxReal largest = sum.force;
-  for (int k = 1; k < path->model->foot_rows; ++k) {
-    if (!is_used(path->contact, path->model->row[k], slot)) continue;
-    const hxFootPath foot = foot_path(path, path->model->row[k], slot);
-    const hxFootInstant now = foot_at(path, &foot, x);
+  for (int k = 0; k < further->count; ++k) {
+    const hxFootInstant now = foot_at(path, &further->foot[k], x);
     sum.speed = hx_select(hx_less(largest, now.force), now.speed, sum.speed);
     largest = hx_max(largest, now.force);
     sum.force += now.force, sum.rate += now.rate;
@@ -119,11 +130,14 @@ HX_INLINE void measure_feet(const hxPath *path, int slot, hxMeasured *measured) 
          steepest = hx_load(&measured->peak_rate[slot]);
   hxReal impulse = zero, slipped = zero;
   hxReal last_force = zero, last_speed = zero;
+  hxFurtherPaths further;
+  further.count = 0;
+  if (model->foot_rows > 1) further_paths(path, slot, &further);
   /* impulse, peaks and slip under load by Simpson's rule (eq. 28) */
   for (int node = 0; node <= INTERVALS; ++node) {
     const double x = (double)node / INTERVALS;
     hxFootInstant now = foot_at(path, &foot, x);
-    if (model->foot_rows > 1) now = with_further_feet(path, slot, x, now);
+    if (further.count) now = with_further_feet(path, &further, x, now);
     peak = hx_max(peak, now.force);
     steepest = hx_max(steepest, now.rate);
     impulse += hx_splat(path->h * foot_weight[node]) * now.force;
@@ -196,7 +210,8 @@ static inline void measure_landing(const hxPath *path, int leg, hxMeasured *meas
     const hxReal at = hx_max(hx_load(x), hx_splat(0.0));
     hxReal force = hx_splat(0.0);
     for (int k = 0; k < path->model->foot_rows; ++k)
-      force += force_within(path, path->model->row[k], leg, at);
+      if (k == 0 || path->contact->closed[path->model->row[k]][leg] != 0.0)
+        force += force_within(path, path->model->row[k], leg, at);
     hx_store(sample, force);
     for (int lane = 0; lane < HX_LANES && measured->landing_left[leg] > 0.0; ++lane) {
       if (x[lane] > 1.0) return;

@@ -51,14 +51,14 @@ static inline void far_row_moment(const hxModel *model, int row, int slot, hxMom
 }
 
 HX_RARE void further_moments(const hxModel *model, const hxContactState *state,
-                             const hxPlantMotion *motion, int slot, const hxSearch *search,
-                             const hxBody *tibia, hxMoment *moment) {
+                             const hxPlantMotion *motion, const hxKnown *known, int slot,
+                             const hxSearch *search, const hxBody *tibia, hxMoment *moment) {
   for (int k = 1; k < model->rows; ++k) {
     const int row = model->row[k], is_of_foot = hx_is_of_foot(row);
     if (is_of_foot && search->beside == HX_CLOSED && !is_used(state, row, slot))
       far_row_moment(model, row, slot, moment);
     else
-      row_moment(model, state, motion, NULL, row, slot,
+      row_moment(model, state, motion, known, row, slot,
                  is_of_foot ? search->beside : search->others, tibia, moment);
   }
 }
@@ -215,7 +215,7 @@ static inline double hx_moment_and_bound(const hxModel *model, const hxModel *wh
       search_near_blocks(model, state, slot, &centre, &search);
     }
     row_moment(model, state, motion, &known, HX_FOOT, slot, search.below, &j, moment);
-    if (model->rows > 1) further_moments(model, state, motion, slot, &search, &j, moment);
+    if (model->rows > 1) further_moments(model, state, motion, &known, slot, &search, &j, moment);
     if (whole) bound = tibia_depth_bound(whole, motion, slot, &j.R_WB, bound);
   }
   if (model->foot_rows > 1) hx_moment_shares(model, state, moment);

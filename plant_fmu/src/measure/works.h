@@ -88,6 +88,7 @@ HX_RARE void add_further_works(const hxPath *path, int pack, const hxImpulses *i
   for (int k = 1; k < path->model->rows; ++k) {
     const int row = path->model->row[k];
     hxReal contact, friction;
+    if (!is_used(path->contact, row, pack * HX_LANES)) continue;
     contact_works(path, row, pack * HX_LANES, impulse->contact[row][pack], &contact, &friction);
     works->contact[pack] += contact, works->friction[pack] += friction;
   }
