@@ -43,6 +43,7 @@ LONGEST = (
     "test_howto",
     "test_live_browser",
     "test_twin_motion",
+    "test_every_terrain",
     "test_accuracy",
     "test_batch",
     "test_side_by_side",

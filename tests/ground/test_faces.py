@@ -7,6 +7,7 @@ import ctypes as ct
 import numpy as np
 import pytest
 from grids import BLOCKS, CORNER, NEAREST, SIDE, SMOOTH, TOP, WALL, Ground, grid_bytes, sampled
+from plant import probed
 
 from hexapod_cosim.models.ground.smooth import height_and_slopes, smooth_distance
 from hexapod_cosim.models.ground.surface import Surface
@@ -199,3 +200,45 @@ BAD = {
 def test_a_bad_grid_is_refused_by_name(core: ct.CDLL, message: str) -> None:
     with pytest.raises(ValueError, match=message):
         Ground(core, BAD[message])
+
+
+def after_a_search(ground: Ground, first: Array, second: Array) -> Array:
+    """Returns distance [m] and normal at the second point (3, 4): after a search at the first one,
+    after one whose patch was forgotten, and without one.
+    """
+    handle, find = ct.c_void_p(ground.handle), ground.core.hx_probe_kept_patch
+    found = probed(find, handle, first, second, size=13)
+    assert found[12] == 1.0
+    return found[:12].reshape(3, 4)
+
+
+def rough_ground(core: ct.CDLL) -> tuple[Ground, Array]:
+    """Returns heights up to 20 mm at nodes every 50 mm, and points above them (300, 3) [m]."""
+    rng = np.random.default_rng(8)
+    ground = Ground(core, grid_bytes(rng.uniform(0.0, 0.02, (60, 60)), cell=0.05))
+    return ground, rng.uniform([0.5, 0.5, 0.02], [2.2, 2.2, 0.04], (300, 3))
+
+
+def test_a_kept_patch_finds_the_nearest_point_within_its_expansion_s_error(core: ct.CDLL) -> None:
+    """Both searches end with a move of d = 3e-4 cells = 16 um at most, by an expansion without the
+    third derivatives, s = 12 (20 mm) / (50 mm)^3 at most. By their Taylor terms a slope errs by
+    s (|dx| + |dy|)^2/2 = s d^2, the distance by s (|dx| + |dy|)^3/6 = 0.5 s d^3. Twice that is
+    1e-6 and 8e-12 m.
+    """
+    ground, above = rough_ground(core)
+    moves, uses = np.random.default_rng(9).uniform(-5e-6, 5e-6, above.shape), 0
+    for point, move in zip(above, moves, strict=True):
+        kept, forgotten, without = after_a_search(ground, point, point + move)
+        assert np.array_equal(forgotten, without)
+        assert kept[0] == pytest.approx(without[0], abs=8e-12)
+        assert np.abs(kept[1:] - without[1:]).max() < 1e-6
+        uses += not np.array_equal(kept, without)
+    assert uses > 250
+
+
+def test_a_kept_patch_is_not_used_farther_than_its_expansion_is_exact(core: ct.CDLL) -> None:
+    ground, above = rough_ground(core)
+    moves = np.random.default_rng(10).choice([-1e-3, 1e-3], above.shape)
+    for point, move in zip(above, moves, strict=True):
+        kept, _forgotten, without = after_a_search(ground, point, point + move)
+        assert np.array_equal(kept, without)

@@ -111,18 +111,22 @@ static inline hxReal tops_of_tiles(const hxTerrain *terrain, const hxVec3 *point
 }
 
 /* Returns the largest depths that a row of contacts at these points may have, m; not positive: they
- * do not touch the grid. The bits are those of hx_terrain_depth_bound. */
+ * do not touch the grid. Each lane is bounded by itself, so that the bits do not depend on the
+ * others of its pack: by the grid's highest place where it is above that, else by those around it,
+ * which are looked up only if a lane needs them. */
 HX_RARE hxReal hx_grid_depth_bound(const hxModel *model, int row, const hxVec3 *point) {
   const hxTerrain *terrain = model->terrain;
   const double radius = model->radius[row];
   const hxReal z = point->z - model->ground_point[2], above_all = z - terrain->highest;
-  if (radius < terrain->reach && !hx_any(~hx_less(hx_splat(radius), above_all)))
-    return radius - hx_min(above_all, hx_splat(terrain->reach));
   const int around = hx_has_large_blocks(terrain) && radius < 0.9 * HX_LEAST_REACH;
-  if (!around && !(radius < terrain->reach)) return hx_splat(radius); /* unknown */
+  const int is_bounded = radius < terrain->reach;
+  const hxMask is_high = hx_less(hx_splat(is_bounded ? radius : HUGE_VAL), above_all);
+  const hxReal highest = radius - hx_min(above_all, hx_splat(terrain->reach));
+  if (!hx_any(~is_high)) return highest;
+  if (!around && !is_bounded) return hx_splat(radius); /* unknown */
   const hxReal above = z - (around ? tops_around(terrain, point) : tops_of_tiles(terrain, point));
   const hxReal reach = hx_splat(around ? HX_LEAST_REACH : terrain->reach);
-  return radius - hx_select(hx_less(above, reach), above, reach);
+  return hx_select(is_high, highest, radius - hx_select(hx_less(above, reach), above, reach));
 }
 #endif
 

@@ -84,7 +84,8 @@ HX_RARE void search_near_blocks(const hxModel *model, const hxContactState *stat
   hx_store(low[1], y - reach), hx_store(high[1], y + reach);
   hx_store(z, centre->z - model->ground_point[2]);
   int below = 0, beside = 0;
-  for (int lane = 0; lane < HX_LANES && slot + lane < HX_LEGS; ++lane) {
+  /* slots past the last leg are those of leg 0: in a pack with it they are listed by its bit */
+  for (int lane = 0; lane < HX_LANES && (slot > 0 || lane < HX_LEGS); ++lane) {
     const double ends[4] = {low[0][lane], high[0][lane], low[1][lane], high[1][lane]};
     const double around = hx_terrain_top_between(terrain, ends), col = state->cell[0][slot + lane],
                  own = col >= 0.0 ? hx_terrain_column(terrain, col, state->cell[1][slot + lane])
