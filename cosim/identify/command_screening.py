@@ -31,7 +31,10 @@ from hexapod_cosim.cosim.identify.start import TURN
 from hexapod_cosim.cosim.interface.names import joint_names
 
 Array = NDArray[np.float64]
-LEAST_MOTION = 0.15  # rad    a joint that moves by less need not follow: its load bends it
+# Loads bend a joint: one that moves by less than this, or by less than BENDING times what the same
+# joint of the other legs differs from its command, need not follow its command.
+LEAST_MOTION = 0.15  # rad
+BENDING = 2.0
 # two commands are exchanged where the mean squares of command less angle fall by this factor
 NEARER = 4.0
 
@@ -70,6 +73,8 @@ def wrong_commands(log: Log) -> list[BadColumn]:
     joints = [_Joint(log, name) for name in names]
     found = []
     for one in joints:
+        one.compare([other for other in joints if other is not one and other.kind == one.kind])
+    for one in joints:
         why = one.dead() or _exchanged(one, joints) or one.turned() or one.astray(joints)
         if why:
             found.append(BadColumn(f"{one.name}.angle_ref", why))
@@ -84,14 +89,26 @@ class _Joint:
 
     def __init__(self, log: Log, name: str) -> None:
         self.name, self.time = name, log.time
+        self.kind = name.rpartition(".")[2]  # coxa, femur or tibia
         self.command = log.recording.column(f"{name}.angle_ref")
         self.angle = _optional(log, f"{name}.angle")
         self.torque = _optional(log, f"{name}.torque", f"{name}.current")
         self.speed_ref = _optional(log, f"{name}.speed_ref")
         self._speed = _optional(log, f"{name}.speed")
         self.follows = float("nan") if self.angle is None else correlation(self.angle, self.command)
-        # whether the measured angle moves by more than a load bends a joint
-        self.moves = self.angle is not None and _range(self.angle) > LEAST_MOTION
+        self.least = LEAST_MOTION  # rad    by how much loads may bend it
+        self.moves = False
+
+    def compare(self, alike: Sequence[_Joint]) -> None:
+        """Sets `least` and whether the measured angle moves by more, from the same joint of the
+        other legs.
+        """
+        if self.angle is None:
+            return
+        ranges = [_range(one.command - one.angle) for one in alike if one.angle is not None]
+        if ranges:
+            self.least = min(LEAST_MOTION, BENDING * float(np.median(ranges)))
+        self.moves = _range(self.angle) > self.least
 
     def dead(self) -> str | None:
         """Returns why the command does not come from the robot's control; None if it may."""
@@ -101,16 +118,25 @@ class _Joint:
         if self.angle is None or not self.moves:
             return None
         begin, end = longest_run(self.command)
-        moved = _range(self.angle[begin:end])
-        if end - begin <= LONGEST_STUCK * len(self.command) or moved <= LEAST_MOTION:
+        run = slice(begin, end)
+        moved = _range(self.angle[run])
+        if end - begin <= LONGEST_STUCK * len(self.command) or moved <= MOVES * _range(self.angle):
             return None
-        if moved <= MOVES * _range(self.angle):
+        if moved <= self.least or (moved <= LEAST_MOTION and self._is_bent(run)):
             return None
         value = f"{self.command[begin]:g}"
         if end - begin == len(self.command):
             return f"dead: {value} in every row, while {self.name}.angle moves by {moved:.2g} rad"
         span = f"{self.time[begin]:.3g} s to {self.time[end - 1]:.3g} s"
         return f"stuck at {value} from {span}, while {self.name}.angle moves by {moved:.2g} rad"
+
+    def _is_bent(self, run: slice) -> bool:
+        """Returns whether the torque may have moved the joint in rows with a constant command: a
+        servo's torque is about proportional to command less angle.
+        """
+        if self.angle is None or self.torque is None:
+            return True
+        return correlation(self.torque[run], -self.angle[run]) > FOLLOWS
 
     def turned(self) -> str | None:
         """Returns why the command has the wrong sign or unit; None if it has not."""
@@ -126,7 +152,9 @@ class _Joint:
     def astray(self, joints: Sequence[_Joint]) -> str | None:
         """Returns why the joint does not follow its command while others do; None if it does."""
         others = [one.follows for one in joints if one is not self and np.isfinite(one.follows)]
-        if self.angle is None or not self.moves or not others or np.median(others) <= FOLLOWS:
+        if self.angle is None or not others or np.median(others) <= FOLLOWS:
+            return None
+        if _range(self.angle) <= LEAST_MOTION:
             return None
         weak = not self.follows > WEAK
         if not weak or not self.is_right(self.angle, None, None):

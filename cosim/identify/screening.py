@@ -16,6 +16,7 @@ Array = NDArray[np.float64]
 MOST_MISSING = 0.1  # of the rows
 LONGEST_STUCK = 0.1  # of the rows
 MOVES = 0.2  # of a column's spread: what a simulation changes while a reading is stuck
+RESOLVED = 10.0  # of an angle's resolution: likewise
 FOLLOWS, WEAK, AGAINST = 0.8, 0.4, -0.5  # correlations of readings with the simulation
 DEGREES = (30.0, 110.0)  # readings over simulation: 57.3 within a factor of 1.9
 FAR = 5.0  # error of a column over the median of its channel
@@ -64,7 +65,7 @@ def screened_columns(experiment: Experiment, simulated: Array) -> list[BadColumn
         for k, name in enumerate(experiment.columns)
     }
     for k, name in enumerate(experiment.columns):
-        why = _by_itself(measured[:, k], simulated[:, k], time)
+        why = _by_itself(name, measured[:, k], simulated[:, k], time)
         if why is None:
             siblings = _siblings(name, experiment.columns)
             others = [follows[other] for other in siblings if np.isfinite(follows[other])]
@@ -75,7 +76,7 @@ def screened_columns(experiment: Experiment, simulated: Array) -> list[BadColumn
     return found
 
 
-def _by_itself(measured: Array, simulated: Array, time: Array) -> str | None:
+def _by_itself(name: str, measured: Array, simulated: Array, time: Array) -> str | None:
     """Returns why a column is dead; None if it is not."""
     known = np.isfinite(measured)
     missing = int(np.sum(~known))
@@ -85,9 +86,18 @@ def _by_itself(measured: Array, simulated: Array, time: Array) -> str | None:
         return f"dead: {measured[known][0]:g} in every row"
     begin, end = longest_run(measured)
     moved = float(np.ptp(simulated[begin:end]))
-    if end - begin > LONGEST_STUCK * len(measured) and moved > MOVES * float(np.ptp(simulated)):
+    least = MOVES * float(np.ptp(simulated))
+    if name.endswith(".angle"):  # other readings are zero for long, such as forces in the air
+        least = min(least, RESOLVED * _resolution(measured))
+    if end - begin > LONGEST_STUCK * len(measured) and moved > least:
         return f"stuck at {measured[begin]:g} from {time[begin]:.3g} s to {time[end - 1]:.3g} s"
     return None
+
+
+def _resolution(measured: Array) -> float:
+    """Returns the median size of the changes from row to row, which noise and quantisation set."""
+    changes = np.abs(np.diff(measured[np.isfinite(measured)]))
+    return float(np.median(changes[changes > 0.0])) if np.any(changes > 0.0) else 0.0
 
 
 def _against(experiment: Experiment, k: int, measured: Array, simulated: Array) -> str | None:

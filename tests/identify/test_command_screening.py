@@ -61,6 +61,32 @@ def test_a_dead_or_wrong_command_is_named_and_no_other(log: Log, name: str, kind
     assert re.search(WHY[kind], bad.why), bad.why
 
 
+def slowly(log: Log, joint: str, factor: float) -> Log:
+    """Returns a log in which a joint moves by a part of its way, with the same torque."""
+    for quantity in ("angle", "angle_ref", "speed", "speed_ref"):
+        name = f"{joint}.{quantity}"
+        log = with_column(log, name, lambda y: y[0] + factor * (y - y[0]))
+    return log
+
+
+@pytest.mark.parametrize("kind", ["dead", "turned", "stuck"])
+def test_commands_of_a_joint_that_moves_little_are_named(log: Log, kind: str) -> None:
+    small = slowly(log, "LF.coxa", 0.4)
+    assert 0.08 < np.ptp(small.recording.column("LF.coxa.angle")) < 0.15  # rad
+    assert wrong_commands(small) == []
+    (bad,) = wrong_commands(with_column(small, "LF.coxa.angle_ref", DAMAGES[kind]))
+    assert bad.name == "LF.coxa.angle_ref"
+
+
+def test_a_joint_that_a_load_bends_under_a_constant_command_is_right(log: Log) -> None:
+    small = slowly(log, "LF.coxa", 0.4)
+    held = with_column(small, "LF.coxa.angle_ref", DAMAGES["dead"])
+    held = with_column(held, "LF.coxa.speed_ref", np.zeros_like)
+    angle = held.recording.column("LF.coxa.angle")
+    bent = with_column(held, "LF.coxa.torque", lambda _: -20.0 * (angle - angle[0]))
+    assert wrong_commands(bent) == []
+
+
 @pytest.mark.parametrize("missing", [(".speed",), (".speed", ".torque")])
 def test_torques_or_commanded_speeds_tell_which_of_two_columns_is_turned(
     log: Log, missing: tuple[str, ...]
