@@ -16,6 +16,7 @@ from hexapod_cosim.cosim.cli.terminal import (
     show_json,
     show_table,
     show_text,
+    stages_bar,
     waiting,
     warn,
 )
@@ -85,6 +86,7 @@ def identify(
         result_table,
         write_identified,
     )
+    from hexapod_cosim.cosim.identify.progress import MOST_STEPS  # noqa: PLC0415
 
     groups = _checked(find or list(FOUND), held_out)
     own = load_robot(robot)
@@ -95,9 +97,16 @@ def identify(
     recorded = [read_log(path, torso_com=own.torso.com) for path in logs]
     size = workers or usual_workers(recorded)
     with results_folder(output or Path("out") / "identify") as folder:
-        with waiting("identifying the robot"):
-            found = identify_robot(recorded, own, groups=groups, held_out=held_out, workers=size)
-        with waiting("searching for a walk that would tell more"):
+        with stages_bar(MOST_STEPS, shown=not json) as show:
+            found = identify_robot(
+                recorded,
+                own,
+                groups=groups,
+                held_out=held_out,
+                workers=size,
+                progress=lambda done: show(done.text, done.step, done.simulations),
+            )
+        with waiting(None if json else "searching for a walk that would tell more"):
             proposals = propose(found, robot) if search else []
         folder.begin()
         command = shlex.join(words)

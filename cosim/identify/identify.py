@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -13,12 +13,13 @@ from hexapod_cosim.cosim.export.export import export_fmu
 from hexapod_cosim.cosim.identify.channel_screening import screened, turned_after_the_fit
 from hexapod_cosim.cosim.identify.command_screening import check_commands
 from hexapod_cosim.cosim.identify.experiment import Experiment
-from hexapod_cosim.cosim.identify.fitting.output_error import Fit, Progress, fit
+from hexapod_cosim.cosim.identify.fitting.output_error import Fit, fit
 from hexapod_cosim.cosim.identify.fitting.problem import TO_DEVIATION, Problem
 from hexapod_cosim.cosim.identify.fitting.workers import simulating_workers
 from hexapod_cosim.cosim.identify.identified import Identified
 from hexapod_cosim.cosim.identify.log import HELD_OUT, Log, LogError, without_readings
 from hexapod_cosim.cosim.identify.log_plant import LogPlant
+from hexapod_cosim.cosim.identify.progress import AGAIN, COLUMNS, LINEAR, Progress, Reporter
 from hexapod_cosim.cosim.identify.rigid.linear_start import linear_start
 from hexapod_cosim.cosim.identify.screening import BadColumn, misfits
 from hexapod_cosim.cosim.identify.start import rest_rows
@@ -56,14 +57,14 @@ def identify(
         held_out: share of the rows at the end of each log that only judges the result.
         workers: number of processes, on which the result does not depend. With more than one, the
             calling script needs `if __name__ == "__main__"`.
-        progress: called with what is being done.
+        progress: called when a step begins and after each simulation.
 
     Raises HexapodError for logs without readings and where the plant cannot follow them.
     """
     # imported here: the command's help starts sooner
     from threadpoolctl import threadpool_limits  # noqa: PLC0415
 
-    report: Callable[[str], None] = progress or (lambda _text: None)
+    report = Reporter(progress)
     rows = chosen_unknowns(robot, logs, groups)
     # small matrices: threads of linear algebra would wait for each other
     with threadpool_limits(1), TemporaryDirectory(prefix="hexapod-identify-") as folder:
@@ -73,20 +74,23 @@ def identify(
             LogPlant(path, TOLERANCE) as plant,
             simulating_workers(workers, path, robot, TOLERANCE, place) as pool,
         ):
-            report("the columns of the log")
+            plant.watch = report.simulated
+            if pool is not None:
+                pool.watch = report.simulated
+            report.begin(COLUMNS)
             experiments, bad = screen(plant, robot, logs, groups=groups, held_out=held_out)
-            report("linear least squares")
+            report.begin(LINEAR)
             linear, lacking = linear_start(experiments, robot, rows)
             start = linear.z(rows, robot) if linear else None
             problem = Problem(plant, robot, experiments, rows, pool)
-            found = fit(problem, start=start, progress=report)
+            found = fit(problem, start=start, progress=report.begin)
             late = _misfits(problem, found)
             if late:
                 bad += late
-                report("again, without columns that do not fit")
+                report.begin(AGAIN)
                 experiments = _without(experiments, late)
                 problem = Problem(plant, robot, experiments, rows, pool)
-                found = fit(problem, start=start, progress=report)
+                found = fit(problem, start=start, progress=report.begin)
             before = problem.predictions(np.zeros(len(rows)))
     return Identified(
         file=robot,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -31,6 +31,7 @@ class LogPlant(Closing):
     def __init__(self, fmu: Path, parameters: Mapping[str, Any] | None = None) -> None:
         self.fmu = Fmu(fmu)
         self._common = self.fmu.parameter_blocks(parameters or {})
+        self.watch: Callable[[], None] = lambda: None  # called after each simulation
         self._outputs = set(self.fmu.names("output"))
         # of the log that was simulated last: its commands, and the events of some delays
         self._last: tuple[Log, list[str], Array] | None = None
@@ -98,6 +99,7 @@ class LogPlant(Closing):
             for one, own, values in zip(delays, sources, found, strict=True)
             for k, term in enumerate(own)
         }
+        self.watch()
         return _summed(columns, names, late)
 
     def _commands(self, log: Log) -> tuple[list[str], Array]:

@@ -79,7 +79,7 @@ def finished(problem: Problem, z: Array, report: Progress) -> Array:
     """
     before = np.inf
     for number in range(FINISHING):
-        report(f"all rows, step {number + 1}")
+        report(f"all rows again, step {number + 1} of at most {FINISHING}")
         if number < ANEW:
             problem.count_all()
         problem.set_noise(problem.errors(z))

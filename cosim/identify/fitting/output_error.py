@@ -148,7 +148,7 @@ def fit(problem: Problem, *, start: Array | None = None, progress: Progress | No
     short = problem.shortened(SHORT, parameters=COARSE, most=SEARCHED)
     z = better_start(short, start)
     for number, stage in enumerate(SEARCH):
-        report(f"search, stage {number + 1} of {len(SEARCH)}")
+        report(f"search on the first seconds, part {number + 1} of {len(SEARCH)}")
         z = _optimised(short, z, stage, read_noise(short))
         if number == 0:
             z = _with_delays(short, z, ("currents", "forces"), lambda _own: DELAYS_TRIED)
@@ -163,6 +163,7 @@ def fit(problem: Problem, *, start: Array | None = None, progress: Progress | No
     z = _with_delays(short, z, ("joints", "forces", "imu"), lambda own: own + NEAR_DELAYS)
     fitted.count_all()
     z = finished(fitted, z, report)
+    report("what the log tells")
     return _judged(problem, fitted, z, least)
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pickle
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import partial
@@ -66,6 +66,7 @@ class Workers:
 
     def __init__(self, pool: WorkerPool[Task, Outputs], folder: Path) -> None:
         self._pool, self._folder = pool, folder
+        self.watch: Callable[[], None] = lambda: None  # called after each simulation of all logs
         self._written: dict[int, tuple[tuple[Experiment, ...], Path]] = {}
 
     def outputs(
@@ -94,6 +95,7 @@ class Workers:
                         fix="give --workers 1, which needs less memory",
                     )
                 found[item.task.number] = item.result
+                self.watch()
         return [found[number] for number in range(len(many))]
 
     def _file(self, experiments: tuple[Experiment, ...]) -> Path:
