@@ -109,11 +109,14 @@ def block_face(surface: Surface, point: Array, kind: str, cell: Cell) -> tuple[f
     return min(faces, key=lambda face: face[0]) if faces else None
 
 
-def depth_beside(surface: Surface, centre: Array, radius: float, cell: Cell) -> float:
-    """Returns the depth [m] of a sphere at (3,) in the walls, edges and corners around a cell, 0
-    where it touches none.
+def depth_around(
+    surface: Surface, centre: Array, radius: float, cell: Cell, *, with_top: bool = False
+) -> float:
+    """Returns the depth [m] of a sphere at (3,) in the walls, edges and corners around a cell, and
+    with_top in its top, 0 where it touches none.
     """
-    faces = [block_face(surface, centre, kind, cell) for kind in FACES[1:]]
+    kinds = FACES if with_top else FACES[1:]
+    faces = [block_face(surface, centre, kind, cell) for kind in kinds]
     return max(0.0, *(radius - (math.inf if face is None else face[0]) for face in faces))
 
 

@@ -14,7 +14,7 @@ import numpy as np
 from hexapod_cosim.models.body.contacts import side_on_ground
 from hexapod_cosim.models.body.pairs import pair_contacts
 from hexapod_cosim.models.contact import FootContact, contact_damping
-from hexapod_cosim.models.ground.blocks import Cell, cell_at, depth_beside, is_uneven, outside
+from hexapod_cosim.models.ground.blocks import Cell, cell_at, depth_around, is_uneven, outside
 from hexapod_cosim.models.ground.surface import LAW, MU, MU_STATIC, STIFFNESS
 from hexapod_cosim.models.kinematics import LEGS, foot_centres
 from hexapod_cosim.models.records import Array, Robot, Soil
@@ -76,24 +76,48 @@ def depths_of(robot: Robot, body: Array, contacts: Contacts) -> Depths:
 
 
 def keeps_block(robot: Robot, contacts: Contacts, leg: int, at: Array) -> bool:
-    """Returns whether a foot in soil or above the bottom of its print, which was dragged off its
-    block, keeps it. at: centre of the foot (3,) [m].
+    """Returns whether a foot that was dragged off its block in soil keeps it. at: centre of the
+    foot (3,) [m].
 
-    It changes to a level block beside its own alone, and not while it is deeper in the faces around
-    that block than in those around its own: it may have passed through others, and no face may
-    begin at a depth.
+    It may have passed through other blocks, and no face may begin at a depth: it does not change to
+    a block in whose faces it is deeper than in those around its own. In soil or above the bottom of
+    its print it changes to a level block beside its own alone.
     """
     held, own = contacts.held[leg], contacts.cell[leg]
-    in_print = contacts.sunk[leg] > 0.0 or (held.is_soft and not held.is_open)
     surface = surface_of(robot.terrain)
-    if not in_print or own is None or surface is None:
+    if own is None or surface is None or not has_soil(robot):
         return False
+    in_print = contacts.sunk[leg] > 0.0 or (held.is_soft and not held.is_open)
     below = cell_at(surface, float(at[0]), float(at[1]))
     is_near = max(abs(below[0] - own[0]), abs(below[1] - own[1])) <= 1
-    if not is_near or surface.height[below] != surface.height[own]:
+    if in_print and not (is_near and surface.height[below] == surface.height[own]):
         return True
-    new, old = (depth_beside(surface, at, robot.foot.radius, cell) for cell in (below, own))
+    above, radius = at - np.array([0.0, 0.0, robot.terrain.height]), robot.foot.radius
+    new, old = (
+        depth_around(surface, above, radius, cell, with_top=not in_print) for cell in (below, own)
+    )
     return new > old + SAME_FACE
+
+
+def touches_ground(robot: Robot, contacts: Contacts, leg: int) -> bool:
+    """Returns whether a foot has a contact."""
+    return any(
+        spot.leg == leg and not held.is_open
+        for spot, held in zip(spots(robot), contacts.held, strict=True)
+    )
+
+
+def is_inside_blocks(robot: Robot, contacts: Contacts, leg: int, at: Array) -> bool:
+    """Returns whether a foot that holds a block of soil is in the faces around another one.
+    Released there, it would meet them at a depth. at: centre of the foot (3,) [m].
+    """
+    own, surface = contacts.cell[leg], surface_of(robot.terrain)
+    if own is None or surface is None or not has_soil(robot):
+        return False
+    below = cell_at(surface, float(at[0]), float(at[1]))
+    above = at - np.array([0.0, 0.0, robot.terrain.height])
+    radius = robot.foot.radius
+    return below != own and depth_around(surface, above, radius, below, with_top=True) > 0.0
 
 
 # touch-down and lift-off
@@ -158,17 +182,21 @@ def start_contacts(robot: Robot, body: Array) -> Contacts:
 
 
 def hold_cells(robot: Robot, body: Array, contacts: Contacts) -> Contacts:
-    """Holds the cells of feet that touch blocks or are in their prints, and releases others."""
+    """Holds the cells of feet that touch blocks, are in their prints or in other blocks, and
+    releases those of others.
+    """
     surface = surface_of(robot.terrain)
     if surface is None or not has_cells(robot):
         return contacts
     cells: list[Cell | None] = []
-    for leg, (x, y, _) in enumerate(foot_centres(robot, body).tolist()):
-        touches = contacts.sunk[leg] > 0.0 or any(
-            spot.leg == leg and not held.is_open
-            for spot, held in zip(spots(robot), contacts.held, strict=True)
+    for leg, at in enumerate(foot_centres(robot, body)):
+        holds = (
+            contacts.sunk[leg] > 0.0
+            or touches_ground(robot, contacts, leg)
+            or is_inside_blocks(robot, contacts, leg, at)
         )
-        cells.append((contacts.cell[leg] or cell_at(surface, x, y)) if touches else None)
+        below = cell_at(surface, float(at[0]), float(at[1]))
+        cells.append((contacts.cell[leg] or below) if holds else None)
     return replace(contacts, cell=tuple(cells))
 
 
@@ -181,10 +209,8 @@ def switch_contacts(
     """
     delta = depths.delta
     if has_soil(robot):
-        before = contacts.sunk[:LEGS] > 0.0
         contacts, delta = tread(robot, body, contacts, delta)
-        if np.any(before != (contacts.sunk[:LEGS] > 0.0)):
-            contacts = hold_cells(robot, body, contacts)
+        contacts = hold_cells(robot, body, contacts)
     held, touchdowns = list(contacts.held), 0
     walls = has_cells(robot)
     found = contacts_at(robot, body, contacts) if walls else []

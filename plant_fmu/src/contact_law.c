@@ -159,8 +159,29 @@ static void fill_contact_slots(hxContactState *contact, int row) {
   for (int i = 0; i < HX_SOIL_SIZE; ++i) hx_fill_slots(contact->soil[hx_soil_row(row)][i]);
 }
 
-/* Holds the cells of feet that touch the ground or are in their prints, and releases those of
- * others. */
+double hx_depth_around(const hxModel *model, const double cell[2], const double centre[3],
+                       int with_top) {
+  const double point[3] = {centre[0], centre[1], centre[2] - model->ground_point[2]};
+  double depth = 0.0;
+  for (int kind = with_top ? HX_FACE_TOP : HX_FACE_WALL; kind <= HX_FACE_CORNER; ++kind) {
+    hxFace face;
+    hx_terrain_face(model->terrain, (hxFaceKind)kind, cell, point, 0, &face);
+    depth = fmax(depth, model->radius[HX_FOOT] - face.distance);
+  }
+  return depth;
+}
+
+int hx_is_inside_blocks(const hxModel *model, const hxContactState *contact, int leg,
+                        const double centre[3]) {
+  double below[2];
+  if (!model->has_soil || contact->cell[0][leg] < 0.0) return 0;
+  hx_terrain_cell_at(model->terrain, centre, below);
+  if (below[0] == contact->cell[0][leg] && below[1] == contact->cell[1][leg]) return 0;
+  return hx_depth_around(model, below, centre, 1) > 0.0;
+}
+
+/* Holds the cells of feet that touch the ground, are in their prints or in other blocks, and
+ * releases those of others. */
 static void hold_cells(const hxModel *model, const hxDepths *depths, hxContactState *contact) {
   for (int leg = 0; leg < HX_LEGS; ++leg) {
     int touches = 0;
@@ -168,6 +189,7 @@ static void hold_cells(const hxModel *model, const hxDepths *depths, hxContactSt
     touches |= contact->plastic[hx_soil_row(HX_FOOT)][leg] > 0.0;
     double centre[3];
     centre_of(depths, HX_FOOT, leg, centre);
+    touches = touches || hx_is_inside_blocks(model, contact, leg, centre);
     double cell[2] = {contact->cell[0][leg], contact->cell[1][leg]};
     if (touches && cell[0] < 0.0) hx_terrain_cell_at(model->terrain, centre, cell);
     for (int i = 0; i < 2; ++i) contact->cell[i][leg] = touches ? cell[i] : -1.0;

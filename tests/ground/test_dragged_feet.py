@@ -1,5 +1,6 @@
 """A foot that is dragged in its print through blocks of other heights meets no face at a depth: it
-changes to a level block beside its own alone, where the faces around both agree.
+changes to a level block beside its own alone, where the faces around both agree, and keeps its own
+until it is out of the others.
 """
 
 from __future__ import annotations
@@ -8,7 +9,9 @@ import ctypes as ct
 from dataclasses import replace
 
 import numpy as np
+import pytest
 from states import changed
+from test_soil_on_blocks import ATHENA, on, pushed, put, soft
 from test_twin_motion import FEET, Pair, stood
 
 from hexapod_cosim.models.dynamics import Command
@@ -97,3 +100,54 @@ def test_a_foot_that_comes_over_a_trench_to_a_level_block_meets_no_corner_at_a_d
     assert_closed(pair)
     pair.assert_same()
     assert left.contacts.cell[0] == block_below(pair) == (21, 22)
+
+
+def lifted(_: float) -> Command:
+    """Raises the first foot."""
+    angle = np.array(SLIPPERY.stance)
+    angle[0, 1] += 0.6
+    return Command(angle_ref=angle)
+
+
+def test_a_foot_that_leaves_its_print_within_a_higher_block_meets_it_from_outside_alone(
+    core: ct.CDLL,
+) -> None:
+    """Along x: its own block, a trench, blocks that are 10 mm higher, in which it is lifted. It
+    keeps its block, without a force, until it has left them.
+    """
+    height = np.zeros((40, 40))
+    height[17:24, 21], height[17:24, 22:] = -0.03, 0.01
+    pair = dragged(core, height, (1.6, 0.0), (1e-3, 0.5 * CELL))
+    pair.move(0.03, still)
+    inside = pair.move(0.055, lifted)
+    assert_closed(pair)
+    assert block_below(pair)[1] > 21
+    assert inside.contacts.cell[0] == (20, 20)
+    assert inside.contacts.held[0].is_open
+    assert inside.contacts.sunk[0] == 0.0
+    outside = pair.move(0.09, lifted)
+    assert_closed(pair)
+    pair.assert_same()
+    assert outside.contacts.cell[0] is None
+
+
+@pytest.mark.parametrize("seed", [1042, 1151, 1157])
+def test_feet_that_are_dragged_over_random_blocks_get_no_energy(core: ct.CDLL, seed: int) -> None:
+    """A push drags the robot by 0.2 to 0.5 m: feet leave their prints in higher blocks, or there
+    touch the walls beside their own.
+    """
+    rng = np.random.default_rng(seed)
+    step, push, pad = rng.choice([0.01, 0.02]), rng.choice([0.7, 1.3]), rng.choice([0.0, 0.025])
+    mu, down = rng.choice([0.05, 0.1, 0.5]), rng.choice([0.0, 0.3, 0.7, 1.3])
+    heading, levels, end = rng.uniform(0.0, 6.28), int(rng.integers(2, 4)), rng.choice([30, 60, 90])
+    height = step * rng.integers(0, levels, (40, 40)).astype(float)
+    x0, y0 = -2.0 - rng.uniform(0.0, 0.1), -1.97 - rng.uniform(0.0, 0.1)
+    surface = Surface(kind="blocks", height=height, x0=x0, y0=y0, cell=0.1)
+    soil = str(rng.choice(["clay", "dry_sand", "mud"]))
+    robot = on(surface, soft(changed(ATHENA, friction={"mu": float(mu)}), soil, float(pad)))
+    plant, _ground = put(core, robot, height=(levels - 1) * step + 0.002)
+    shares = (push * np.cos(heading), push * np.sin(heading), -down)
+    for k in range(60):
+        plant.step(0.01 * (k + 1), pushed(robot, *(shares if 10 < k < end else (0.0, 0.0, 0.0))))
+    energy = plant.output().energy
+    assert energy.residual < 1e-3 * energy.dissipated

@@ -132,13 +132,14 @@ static inline void leave_footprint(int row, int slot, hxFootprintLog *log, hxCon
   state->plastic[soft][slot] = 0.0;
 }
 
-/* Holds the cell below a foot that enters a print, and releases that of one that leaves its print
- * and touches nothing. */
+/* Holds the cell below a foot that enters a print, and releases that of one that has left its
+ * print, touches nothing and is in no other block. */
 HX_RARE void hold_block_of_print(const hxModel *model, int row, int slot, const double centre[3],
                                  hxContactState *state) {
   if (row != HX_FOOT || !hx_has_cells(model)) return;
   int touches = state->plastic[hx_soil_row(HX_FOOT)][slot] > 0.0;
   for (int k = HX_FOOT; hx_is_of_foot(k); ++k) touches |= state->closed[k][slot] != 0.0;
+  touches = touches || hx_is_inside_blocks(model, state, slot, centre);
   double cell[2] = {state->cell[0][slot], state->cell[1][slot]};
   if (touches && cell[0] < 0.0) hx_terrain_cell_at(model->terrain, centre, cell);
   for (int i = 0; i < 2; ++i) {
@@ -179,7 +180,8 @@ HX_RARE void row_soil_switch(const hxModel *model, int row, const hxContactMomen
     if (z <= 0.0) leave_footprint(row, slot, log, state);
     if (z > 0.0 && before == 0.0 && is_over_soil(model, row, centre))
       *plastic = hx_footprints_depth(&log->kept, model->terrain, x, y);
-    if (*plastic != before) hold_block_of_print(model, row, slot, centre, state);
+    const int holds = row == HX_FOOT && state->cell[0][slot] >= 0.0 && *plastic == 0.0;
+    if (*plastic != before || holds) hold_block_of_print(model, row, slot, centre, state);
     delta[slot] = z - *plastic;
   }
   if (row == HX_TORSO) return;

@@ -246,34 +246,30 @@ static inline void hx_copy_moment(const hxModel *model, hxMoment *to, const hxMo
   if (model->elastic) hx_copy_gears(to, from);
 }
 
-/* Returns the depth of a foot in the walls, edges and corners around a cell, 0: none touched. */
-HX_RARE double depth_beside(const hxModel *model, const double cell[2], const double centre[3]) {
-  static const hxFaceKind beside[] = {HX_FACE_WALL, HX_FACE_SIDE, HX_FACE_CORNER};
-  double depth = 0.0;
-  for (size_t k = 0; k < sizeof beside / sizeof beside[0]; ++k) {
-    hxFace face;
-    hx_terrain_face(model->terrain, beside[k], cell, centre, 0, &face);
-    depth = fmax(depth, model->radius[HX_FOOT] - face.distance);
-  }
-  return depth;
+/* Returns whether a foot off its block would be deeper in the faces around another cell. */
+HX_RARE int is_deeper_in(const hxModel *model, const hxContactState *state, int leg,
+                         const double cell[2], const double centre[3], int with_top) {
+  const double own[2] = {state->cell[0][leg], state->cell[1][leg]};
+  return hx_depth_around(model, cell, centre, with_top) >
+         hx_depth_around(model, own, centre, with_top) + same_depth;
 }
 
-/* Returns whether a foot in soil or above the bottom of its print, which was dragged off its block,
- * keeps it. It changes to a level block beside its own alone, and not while it is deeper in the
- * faces around that block than in those around its own: it may have passed through others, and no
- * face may begin at a depth. */
+/* Returns whether a foot that was dragged off its block in soil keeps it. It may have passed
+ * through others, and no face may begin at a depth: it does not change to a block in whose faces it
+ * is deeper than in those around its own. In soil or above the bottom of its print it changes to a
+ * level block beside its own alone. */
 HX_RARE int keeps_block(const hxModel *model, const hxContactState *state, int leg,
                         const double centre[3]) {
   const hxTerrain *terrain = model->terrain;
   const double own[2] = {state->cell[0][leg], state->cell[1][leg]};
   double cell[2];
-  if (!is_in_soil(state, HX_FOOT, leg) && !(state->plastic[hx_soil_row(HX_FOOT)][leg] > 0.0))
-    return 0;
   hx_terrain_cell_at(terrain, centre, cell);
+  if (!is_in_soil(state, HX_FOOT, leg) && !(state->plastic[hx_soil_row(HX_FOOT)][leg] > 0.0))
+    return is_deeper_in(model, state, leg, cell, centre, 1);
   if (fabs(cell[0] - own[0]) > 1.0 || fabs(cell[1] - own[1]) > 1.0 ||
       hx_terrain_column(terrain, cell[0], cell[1]) != hx_terrain_column(terrain, own[0], own[1]))
     return 1;
-  return depth_beside(model, cell, centre) > depth_beside(model, own, centre) + same_depth;
+  return is_deeper_in(model, state, leg, cell, centre, 0);
 }
 
 /* Copies the places of feet, and of bodies where the ground has materials or soil, and computes how

@@ -7,9 +7,7 @@ const hxKernel *hx_kernel(void);
 
 static int first = 0; /* place of the first kernel that may be chosen */
 
-const hxKernel *hx_kernel(void) {
-  return first > 0 ? hx_kernels[first] : hx_fastest_kernel();
-}
+const hxKernel *hx_kernel(void) { return first > 0 ? hx_kernels[first] : hx_fastest_kernel(); }
 
 /* Makes all plants use the i-th kernel, 0: the fastest. Returns its name, or NULL without a change
  * where there is none or the processor does not support it. */
