@@ -130,7 +130,9 @@ def _quaternion(log: Log, rows: Array, rest: int, *, is_flat: bool) -> Array:
         return np.array([1.0, 0.0, 0.0, 0.0])
     angles = rows[:, [log.recording.names.index(name) for name in ATTITUDE]]
     known = np.isfinite(angles).all(axis=1)
-    roll, pitch, yaw = (angles[known].mean(axis=0) if known.any() else np.zeros(3)).tolist()
+    if not known.all():
+        angles = angles[known] if known.any() else np.zeros((1, 3))
+    roll, pitch, yaw = angles.mean(axis=0).tolist()
     if is_flat and max(abs(roll), abs(pitch)) > LEANS:
         roll, pitch = 0.0, 0.0
     turn = axis_quaternion(np.array([0.0, 0.0, 1.0]), yaw)

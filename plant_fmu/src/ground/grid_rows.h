@@ -1,9 +1,8 @@
 /* grid_rows.h - distance and normal of the ground under a row of contacts (eq. 31-34): the kernels
- * include it behind lanes.h */
+ * include it behind vec3.h */
 #ifndef HX_GRID_ROWS_H
 #define HX_GRID_ROWS_H
 
-#include "../lanes/vec3.h"
 #include "surface.h"
 
 #ifndef HX_TANGENT

@@ -1,6 +1,7 @@
 /* patches.c - nearest points of a smooth grid by patches that are kept, for the tests */
+#include "lanes/vec3.h"
+
 #include "ground/grid_rows.h"
-#include "lanes/lanes.h"
 
 #if defined(__GNUC__)
 #pragma GCC diagnostic ignored                                                                     \
