@@ -78,6 +78,7 @@ def identify(
     # imported only here because they are slow to import
     from hexapod_cosim.cosim.identify import identify_tables as tables  # noqa: PLC0415
     from hexapod_cosim.cosim.identify.excitation import propose  # noqa: PLC0415
+    from hexapod_cosim.cosim.identify.fitting.progress import MOST_STEPS  # noqa: PLC0415
     from hexapod_cosim.cosim.identify.identify import (  # noqa: PLC0415
         identify as identify_robot,
     )
@@ -86,7 +87,6 @@ def identify(
         result_table,
         write_identified,
     )
-    from hexapod_cosim.cosim.identify.progress import MOST_STEPS  # noqa: PLC0415
 
     groups = _checked(find or list(FOUND), held_out)
     own = load_robot(robot)

@@ -15,11 +15,11 @@ from hexapod_cosim.cosim.identify.command_screening import check_commands
 from hexapod_cosim.cosim.identify.experiment import Experiment
 from hexapod_cosim.cosim.identify.fitting.output_error import Fit, fit
 from hexapod_cosim.cosim.identify.fitting.problem import TO_DEVIATION, Problem
+from hexapod_cosim.cosim.identify.fitting.progress import AGAIN, COLUMNS, LINEAR, Progress, Reporter
 from hexapod_cosim.cosim.identify.fitting.workers import simulating_workers
 from hexapod_cosim.cosim.identify.identified import Identified
 from hexapod_cosim.cosim.identify.log import HELD_OUT, Log, LogError, without_readings
 from hexapod_cosim.cosim.identify.log_plant import LogPlant
-from hexapod_cosim.cosim.identify.progress import AGAIN, COLUMNS, LINEAR, Progress, Reporter
 from hexapod_cosim.cosim.identify.rigid.linear_start import linear_start
 from hexapod_cosim.cosim.identify.screening import BadColumn, misfits
 from hexapod_cosim.cosim.identify.start import rest_rows
