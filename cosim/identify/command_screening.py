@@ -31,8 +31,9 @@ from hexapod_cosim.cosim.identify.start import TURN
 from hexapod_cosim.cosim.interface.names import joint_names
 
 Array = NDArray[np.float64]
-# Loads bend a joint: one that moves by less than this, or by less than BENDING times what the same
-# joint of the other legs differs from its command, need not follow its command.
+# Loads bend a joint: one that moves by less than this need not follow its command. A constant
+# command is wrong also where its joint moves by more than BENDING times what the same joint of the
+# other legs differs from its command, if its torque does not say that a load bends it.
 LEAST_MOTION = 0.15  # rad
 BENDING = 2.0
 # two commands are exchanged where the mean squares of command less angle fall by this factor
@@ -97,25 +98,22 @@ class _Joint:
         self._speed = _optional(log, f"{name}.speed")
         self.follows = float("nan") if self.angle is None else correlation(self.angle, self.command)
         self.least = LEAST_MOTION  # rad    by how much loads may bend it
-        self.moves = False
+        self.moves = self.angle is not None and _range(self.angle) > LEAST_MOTION
 
     def compare(self, alike: Sequence[_Joint]) -> None:
-        """Sets `least` and whether the measured angle moves by more, from the same joint of the
-        other legs.
-        """
+        """Sets `least` from the same joint of the other legs."""
         if self.angle is None:
             return
         ranges = [_range(one.command - one.angle) for one in alike if one.angle is not None]
         if ranges:
             self.least = min(LEAST_MOTION, BENDING * float(np.median(ranges)))
-        self.moves = _range(self.angle) > self.least
 
     def dead(self) -> str | None:
         """Returns why the command does not come from the robot's control; None if it may."""
         largest = float(np.max(np.abs(self.command)))
         if largest > TURN:
             return f"not in rad: {largest:.3g} is more than a turn"
-        if self.angle is None or not self.moves:
+        if self.angle is None:
             return None
         begin, end = longest_run(self.command)
         run = slice(begin, end)
