@@ -74,9 +74,12 @@ def wrong_commands(log: Log) -> list[BadColumn]:
     joints = [_Joint(log, name) for name in names]
     found = []
     for one in joints:
-        one.compare([other for other in joints if other is not one and other.kind == one.kind])
-    for one in joints:
-        why = one.dead() or _exchanged(one, joints) or one.turned() or one.astray(joints)
+        why = (
+            one.dead(_least_motion(one, joints))
+            or _exchanged(one, joints)
+            or one.turned()
+            or one.astray(joints)
+        )
         if why:
             found.append(BadColumn(f"{one.name}.angle_ref", why))
     wrong = {column.name for column in found}
@@ -90,26 +93,19 @@ class _Joint:
 
     def __init__(self, log: Log, name: str) -> None:
         self.name, self.time = name, log.time
-        self.kind = name.rpartition(".")[2]  # coxa, femur or tibia
         self.command = log.recording.column(f"{name}.angle_ref")
         self.angle = _optional(log, f"{name}.angle")
         self.torque = _optional(log, f"{name}.torque", f"{name}.current")
         self.speed_ref = _optional(log, f"{name}.speed_ref")
         self._speed = _optional(log, f"{name}.speed")
         self.follows = float("nan") if self.angle is None else correlation(self.angle, self.command)
-        self.least = LEAST_MOTION  # rad    by how much loads may bend it
         self.moves = self.angle is not None and _range(self.angle) > LEAST_MOTION
 
-    def compare(self, alike: Sequence[_Joint]) -> None:
-        """Sets `least` from the same joint of the other legs."""
-        if self.angle is None:
-            return
-        ranges = [_range(one.command - one.angle) for one in alike if one.angle is not None]
-        if ranges:
-            self.least = min(LEAST_MOTION, BENDING * float(np.median(ranges)))
+    def dead(self, least: float) -> str | None:
+        """Returns why the command does not come from the robot's control; None if it may.
 
-    def dead(self) -> str | None:
-        """Returns why the command does not come from the robot's control; None if it may."""
+        least: by how much loads may bend the joint [rad].
+        """
         largest = float(np.max(np.abs(self.command)))
         if largest > TURN:
             return f"not in rad: {largest:.3g} is more than a turn"
@@ -120,7 +116,7 @@ class _Joint:
         moved = _range(self.angle[run])
         if end - begin <= LONGEST_STUCK * len(self.command) or moved <= MOVES * _range(self.angle):
             return None
-        if moved <= self.least or (moved <= LEAST_MOTION and self._is_bent(run)):
+        if moved <= least or (moved <= LEAST_MOTION and self._is_bent(run)):
             return None
         value = f"{self.command[begin]:g}"
         if end - begin == len(self.command):
@@ -183,6 +179,19 @@ class _Joint:
         return _aligned(angle, way, self.time) > max(
             FOLLOWS, _aligned(self.command, way, self.time)
         )
+
+
+def _least_motion(one: _Joint, joints: Sequence[_Joint]) -> float:
+    """Returns by how much loads may bend a joint, from the same joint of the other legs [rad]."""
+    kind = one.name.rpartition(".")[2]  # coxa, femur or tibia
+    ranges = [
+        _range(other.command - other.angle)
+        for other in joints
+        if other is not one and other.name.endswith(kind) and other.angle is not None
+    ]
+    if not ranges:
+        return LEAST_MOTION
+    return min(LEAST_MOTION, BENDING * float(np.median(ranges)))
 
 
 def _exchanged(one: _Joint, joints: Sequence[_Joint]) -> str | None:
