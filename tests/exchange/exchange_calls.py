@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 from fmi_plant import ATHENA, OK, Plant
+from fmpy import simulate_fmu
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
@@ -80,3 +83,19 @@ def output_rates(plant: Plant, names: Sequence[str]) -> Array:
         == OK
     )
     return np.array(result)
+
+
+def solved_by_cvode(fmu: Path, tolerance: float, **asked: Any) -> NDArray[Any]:
+    """Returns fmpy's result (rows,) with named fields of a run in model exchange with CVode.
+
+    tolerance: relative, of the solver. asked: further arguments of fmpy's simulate_fmu.
+    """
+    result: NDArray[Any] = simulate_fmu(
+        str(fmu),
+        fmi_type="ModelExchange",
+        solver="CVode",
+        relative_tolerance=tolerance,
+        record_events=False,
+        **asked,
+    )
+    return result

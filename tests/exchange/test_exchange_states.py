@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from exchange_calls import LEGS, ROUNDING, STATES, fetched, put_states
+from exchange_calls import LEGS, ROUNDING, STATES, fetched, put_states, solved_by_cvode
 from fmi_plant import ATHENA, DISCARD, ERROR, MODEL_EXCHANGE, OK, Plant
 from fmpy import simulate_fmu
 
@@ -132,14 +132,7 @@ def test_feet_at_the_ground_s_surface_stand_on_it(
         "output": ["torso.position[3]"],
     }
     ours = simulate_fmu(str(athena_fmu), fmi_type="CoSimulation", **asked)
-    theirs = simulate_fmu(
-        str(athena_fmu),
-        fmi_type="ModelExchange",
-        solver="CVode",
-        relative_tolerance=1e-8,
-        record_events=False,
-        **asked,
-    )
+    theirs = solved_by_cvode(athena_fmu, 1e-8, **asked)
     np.testing.assert_allclose(
         theirs["torso.position[3]"], ours["torso.position[3]"], atol=1e-5
     )  # co-simulation at its default tolerance

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from exchange_calls import LEGS, STATES
+from exchange_calls import LEGS, STATES, solved_by_cvode
 from fmpy import simulate_fmu
 
 THROWN = {
@@ -28,14 +28,7 @@ def test_another_solver_finds_the_same_motion(athena_fmu: Path, law: str) -> Non
     start = THROWN | {"solver.tolerance": 1e-10, "friction.law": {"tanh": 1, "bristle": 3}[law]}
     asked = {"start_values": start, "stop_time": 0.12, "output_interval": 0.01, "output": names}
     ours = simulate_fmu(str(athena_fmu), fmi_type="CoSimulation", **asked)
-    theirs = simulate_fmu(
-        str(athena_fmu),
-        fmi_type="ModelExchange",
-        solver="CVode",
-        relative_tolerance=1e-10,
-        record_events=False,
-        **asked,
-    )
+    theirs = solved_by_cvode(athena_fmu, 1e-10, **asked)
     assert ours["solver.touchdowns"][-1] == theirs["solver.touchdowns"][-1] >= 8
     for name in names[:-1]:
         np.testing.assert_allclose(theirs[name], ours[name], atol=CONVERGED, err_msg=name)
@@ -104,14 +97,7 @@ def test_the_commands_of_a_walk_give_the_same_path_with_another_solver(athena_fm
         "output": STATES[:7],
         "start_values": {"solver.tolerance": 1e-9},
     }
-    theirs = simulate_fmu(
-        str(athena_fmu),
-        fmi_type="ModelExchange",
-        solver="CVode",
-        relative_tolerance=1e-7,
-        record_events=False,
-        **asked,
-    )
+    theirs = solved_by_cvode(athena_fmu, 1e-7, **asked)
     ours = simulate_fmu(
         str(athena_fmu), fmi_type="CoSimulation", **(asked | {"output_interval": 0.0005})
     )
