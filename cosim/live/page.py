@@ -11,37 +11,34 @@ from markupsafe import Markup
 
 from hexapod_cosim.cosim.common.control_style import all_styles
 from hexapod_cosim.cosim.live.settings import FLAT, OWN, Choices, shown_speed
-from hexapod_cosim.cosim.report.page import viewer_script
+from hexapod_cosim.cosim.report.page import VIEWER, viewer_script
 from hexapod_cosim.cosim.report.payload import as_json
 from hexapod_cosim.cosim.scenario.controls import control_of
 from hexapod_cosim.models import HexapodError
 from hexapod_cosim.models.ground.catalogue import CATALOGUE
 
-TEMPLATE, BUNDLE = "live.html.jinja", "live.js"
+TEMPLATE = "live.html.jinja"
 
 
 def render_page(choices: Choices) -> str:
     """Returns the page of a loop. Raises HexapodError when the viewer was not built."""
-    return fill_page(choices, describe(choices), BUNDLE)
+    return fill_page(choices, describe(choices))
 
 
-def fill_page(
-    choices: Choices, setup: Mapping[str, Any], bundle: str, module: bytes | None = None
-) -> str:
+def fill_page(choices: Choices, setup: Mapping[str, Any], module: bytes | None = None) -> str:
     """Returns the page with its viewer.
 
     Args:
         choices: the scenario and the controls, for titles and colours.
         setup: what the viewer reads, as JSON.
-        bundle: the viewer's file.
         module: the robot as WebAssembly, for a page that needs no loop elsewhere.
 
     Raises HexapodError when the viewer was not built.
     """
-    script = viewer_script(bundle)
+    script = viewer_script()
     if script is None:
         raise HexapodError(
-            "the page needs the viewer, which is not installed", got=f"no {bundle}",
+            "the page needs the viewer, which is not installed", got=f"no {VIEWER}",
             fix="install the package without HX_VIEWER=OFF",
         )  # fmt: skip
     return (

@@ -15,7 +15,7 @@ from hexapod_cosim.cosim.common.files import write_text
 from hexapod_cosim.cosim.interface.interface import enumerations_of, load_interface
 from hexapod_cosim.cosim.live.gait_change import SHARE
 from hexapod_cosim.cosim.live.module import walker_module
-from hexapod_cosim.cosim.live.page import BUNDLE, describe, fill_page
+from hexapod_cosim.cosim.live.page import describe, fill_page
 from hexapod_cosim.cosim.live.settings import FLAT, Choices, control_texts, find_limits
 from hexapod_cosim.cosim.report.geometry import describe_ground, describe_shape
 from hexapod_cosim.cosim.results.walk import robot_weight
@@ -40,7 +40,7 @@ def render_static_page() -> str:
     scenario = load_scenario(SCENARIO)
     choices = Choices(scenario, control_texts(scenario), {})
     robot = load_robot(scenario.robot)
-    return fill_page(choices, _setup(choices, robot), BUNDLE, walker_module())
+    return fill_page(choices, _setup(choices, robot), walker_module())
 
 
 def _setup(choices: Choices, robot: Robot) -> dict[str, Any]:

@@ -13,8 +13,8 @@ from markupsafe import Markup
 from hexapod_cosim.cosim.common.control_style import all_styles
 from hexapod_cosim.cosim.common.plant_files import plant_folders
 
-FOLDER = Path("viewer")  # in the plant's folder, where CMake installs the bundles
-VIEWER = "viewer.js"  # the bundle of reports
+FOLDER = Path("viewer")  # in the plant's folder, where CMake installs the bundle
+VIEWER = "viewer.js"
 NO_VIEWER = (
     "Replay and plots are left out: "
     "this installation was built without the viewer (HX_VIEWER=OFF). "
@@ -40,9 +40,9 @@ def render(template: str, *, controls: Iterable[str] = (), **content: Any) -> st
     return environment().get_template(template).render(styles=styles, **content)
 
 
-def viewer_script(bundle: str = VIEWER) -> Markup | None:
-    """Returns the newest installed bundle's JavaScript for a <script>; None if there is none."""
-    places = [folder / FOLDER / bundle for folder in plant_folders()]
+def viewer_script() -> Markup | None:
+    """Returns the newest installed viewer's JavaScript for a <script>; None if there is none."""
+    places = [folder / FOLDER / VIEWER for folder in plant_folders()]
     found = [path for path in places if path.is_file()]
     if not found:
         return None

@@ -16,10 +16,13 @@ async function walkHere(setup: StaticSetup, code: string): Promise<void> {
   }
 }
 
-const setup: unknown = JSON.parse(byId("setup")!.textContent!);
-const module = byId("module"); // absent from the page of a server
-if (module) {
-  void walkHere(setup as StaticSetup, module.textContent!.trim());
-} else {
-  start(setup as Setup, new Link());
+/** Connects this page to its robot: a server's, or the one that the page itself holds. */
+export function startLive(): void {
+  const setup: unknown = JSON.parse(byId("setup")!.textContent!);
+  const module = byId("module"); // absent from the page of a server
+  if (module) {
+    void walkHere(setup as StaticSetup, module.textContent!.trim());
+  } else {
+    start(setup as Setup, new Link());
+  }
 }
