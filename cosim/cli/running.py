@@ -49,10 +49,24 @@ FolderName = Annotated[
     Path | None,
     typer.Option("-o", "--output", metavar="DIR", help="Where to write; default out/SCENARIO."),
 ]
+
+
+def _tried_fmu(path: Path | None) -> Path | None:
+    """Returns the path of an FMU that does not end the process which loads it."""
+    from hexapod_cosim.cosim.control.trial import refuse_crashing  # noqa: PLC0415
+
+    if path is not None:
+        refuse_crashing(path)
+    return path
+
+
 FmuFile = Annotated[
     Path | None,
     typer.Option(
-        "--fmu", metavar="FILE", help="Use this FMU instead of exporting the robot's own."
+        "--fmu",
+        metavar="FILE",
+        help="Use this FMU instead of exporting the robot's own.",
+        callback=_tried_fmu,
     ),
 ]
 GainsFile = Annotated[

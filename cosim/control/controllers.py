@@ -26,6 +26,7 @@ from hexapod_cosim.cosim.control.python_law import (
     load_class,
     parameters_of,
 )
+from hexapod_cosim.cosim.control.trial import refuse_crashing
 from hexapod_cosim.cosim.interface.controller_interface import ControllerSetup
 from hexapod_cosim.cosim.interface.descriptions import open_description
 from hexapod_cosim.cosim.scenario.controls import (
@@ -106,6 +107,7 @@ def make_controller(
     elif chosen.kind == PYTHON and chosen.path is not None:
         yield _python_law(chosen, chosen.path, setup, plan.scenario)
     elif chosen.kind == FMU and chosen.path is not None:
+        refuse_crashing(chosen.path)
         fmu = open_controller_fmu(chosen.path)
         try:
             fmu.set_parameters(fmu_parameters_of(chosen, fmu.described, plan.scenario))

@@ -7,14 +7,16 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import chdir, suppress
 from functools import partial
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any, Protocol
 
 import numpy as np
-from fmpy import extract
+from fmpy import platform_tuple
 from fmpy.fmi3 import FMU3Slave
 from numpy.typing import NDArray
 
+from hexapod_cosim.cosim.common.archives import unpack
+from hexapod_cosim.cosim.common.binaries import refuse_incomplete
+from hexapod_cosim.cosim.common.unpacked import UnpackedFolder
 from hexapod_cosim.cosim.control.connection import FmuVariable
 from hexapod_cosim.cosim.interface.descriptions import open_description
 from hexapod_cosim.cosim.master.fmu import Fmu, StepError
@@ -152,21 +154,23 @@ class ControllerFmu3:
         self._event_mode = bool(getattr(description.coSimulation, "hasEventMode", False))
         self._messages: list[str] = []
         self._initialised = False
-        self._directory = TemporaryDirectory(prefix="hexapod-fmu-")
+        self._directory = UnpackedFolder()
         self.slave: Any = None
         try:
-            extract(path, self._directory.name)
+            unpack(path, self._directory.path)
             identifier = description.coSimulation.modelIdentifier
+            for library in (self._directory.path / "binaries" / platform_tuple).glob("*"):
+                refuse_incomplete(library)
             with chdir(Path.cwd()):
                 slave = FMU3Slave(
                     guid=description.guid,
                     modelIdentifier=identifier,
-                    unzipDirectory=self._directory.name,
+                    unzipDirectory=str(self._directory.path),
                     instanceName="controller",
                 )
             slave.instantiate(logMessage=self._log, loggingOn=True)
         except Exception as error:
-            self._directory.cleanup()
+            self._directory.close()
             raise FmuError("the FMU cannot be loaded", got=str(error), where=str(path)) from error
         self.slave = slave
 
@@ -260,4 +264,4 @@ class ControllerFmu3:
                     slave.terminate()
             with suppress(Exception):
                 slave.freeInstance()
-        self._directory.cleanup()
+        self._directory.close()

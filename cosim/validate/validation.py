@@ -32,6 +32,7 @@ from hexapod_cosim.cosim.validate.archive import (
 from hexapod_cosim.cosim.validate.description import description_problems, schema_problems
 from hexapod_cosim.cosim.validate.description3 import description_problems3
 from hexapod_cosim.cosim.validate.start_value import START_VALUES, start_value_problems
+from hexapod_cosim.cosim.validate.trial import problems_of_a_trial
 from hexapod_cosim.cosim.validate.validation3 import find_own_problems3
 from hexapod_cosim.models import FmuError, HexapodError
 
@@ -109,7 +110,12 @@ def find_own_problems(path: Path) -> list[str]:
         data = archive.read(START_VALUES) if START_VALUES in names else None
         problems += start_value_problems(data, description.guid, description)
         runs_here = any(name.startswith(f"binaries/{fmi2_platform()}/") for name in names)
-    return problems + (_run_problems(path) + _guid_problems(path, description) if runs_here else [])
+    return problems + (problems_of_a_trial(binary_problems, path) if runs_here else [])
+
+
+def binary_problems(path: Path) -> list[str]:
+    """Returns the problems that show when the FMU runs in this process."""
+    return _run_problems(path) + _guid_problems(path, read_description(path))
 
 
 def _run_problems(path: Path) -> list[str]:

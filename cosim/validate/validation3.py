@@ -14,6 +14,7 @@ from fmpy.fmi3 import FMU3Slave
 
 from hexapod_cosim.cosim.common.archives import unpack
 from hexapod_cosim.cosim.common.binaries import refuse_incomplete
+from hexapod_cosim.cosim.interface.descriptions import open_description
 from hexapod_cosim.cosim.validate.archive import (
     BUILD_DESCRIPTION,
     DESCRIPTION,
@@ -24,6 +25,7 @@ from hexapod_cosim.cosim.validate.archive import (
 from hexapod_cosim.cosim.validate.description import schema_problems
 from hexapod_cosim.cosim.validate.description3 import description_problems3, variables3
 from hexapod_cosim.cosim.validate.start_value import START_VALUES, start_value_problems
+from hexapod_cosim.cosim.validate.trial import problems_of_a_trial
 
 SCHEMAS = {
     DESCRIPTION: "fmi3ModelDescription",
@@ -55,7 +57,7 @@ def find_own_problems3(path: Path, description: Any) -> list[str]:
     problems += start_value_problems(
         found.get(START_VALUES), description.instantiationToken, description
     )
-    return problems or _run_problems(path, description)
+    return problems or problems_of_a_trial(binary_problems3, path)
 
 
 def _source_problems(found: dict[str, bytes]) -> Iterator[str]:
@@ -72,11 +74,11 @@ def _source_problems(found: dict[str, bytes]) -> Iterator[str]:
         yield f"{name} is not listed by {BUILD_DESCRIPTION}"
 
 
-def _run_problems(path: Path, description: Any) -> list[str]:
-    """Loads, initializes and steps the FMU, and checks that it refuses another token.
-
-    Returns no problems for an FMU without a binary for this machine.
+def binary_problems3(path: Path) -> list[str]:
+    """Loads, initializes and steps the FMU in this process, and checks that it refuses another
+    token; returns the problems. An FMU without a binary for this machine has none.
     """
+    description = open_description(path)
     with TemporaryDirectory(prefix="hexapod-validate-") as folder:
         unpack(path, Path(folder))
         binaries = Path(folder) / "binaries" / platform_tuple
