@@ -214,7 +214,8 @@ def run_into(
                 run = partial(stack.enter_context(Walker(everything=True)).simulate, plan)
             result = run(fmu=options.fmu, gains=options.gains, progress=progress, begin=begin)
         result = replace(result, facts={**result.facts, "command": command})
-        files = write_result(result, folders[-1].path)
+        with waiting("writing the results"):
+            files = write_result(result, folders[-1].path)
     for warning in result.facts["warnings"]:
         warn(f"{label}: {warning}")
     outcome = result.outcome

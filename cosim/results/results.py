@@ -186,14 +186,7 @@ def read_result(folder: Path) -> StoredResult:
     """
     facts = read_facts(folder)
     if facts["status"] != COMPLETED:
-        got = f"{facts['status']}: {facts['reason']}" if facts.get("reason") else facts["status"]
-        raise HexapodError(
-            "the run did not complete",
-            got=got,
-            expected="a completed run",
-            fix="run it again",
-            where=str(folder),
-        )
+        raise _incomplete(folder, facts)
     missing = [name for name in NEEDED if name not in facts]
     if missing:
         raise _damaged(folder / RUN_FILE, f"no {', '.join(missing)}", "all facts of a run")
@@ -212,6 +205,24 @@ def read_result(folder: Path) -> StoredResult:
     if checked is not None:
         accuracy = accuracy_from_table(checked, where=str(folder / METRICS_FILE))
     return StoredResult(view, metrics, facts, read_scenario(folder), accuracy)
+
+
+def _incomplete(folder: Path, facts: Mapping[str, Any]) -> HexapodError:
+    """Returns the error for a run that goes on, failed, or was interrupted or killed."""
+    status, reason = facts["status"], facts.get("reason")
+    if status == RUNNING:
+        got = "running: it goes on, or its process was killed"
+    else:
+        got = f"{status}: {reason}" if reason not in (None, "", status) else status
+    recorded = sorted(path.name for path in folder.glob(f"{PARTIAL}.*"))
+    rest = f"; what was recorded until then is in {' and '.join(recorded)}" if recorded else ""
+    return HexapodError(
+        "the run did not complete",
+        got=got,
+        expected="a completed run",
+        fix=f"run it again{rest}",
+        where=str(folder),
+    )
 
 
 @contextmanager

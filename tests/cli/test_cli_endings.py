@@ -46,7 +46,13 @@ def test_a_run_that_ends_early_keeps_what_was_recorded_under_another_name(
     assert {path.name for path in folder.iterdir()} == PARTIAL
     assert read_csv(folder / "results.partial.csv").time[-1] == pytest.approx(float(ended[1]))
     assert json.loads((folder / "run.json").read_text())["status"] == "failed"
-    assert_refused(call("report", folder), "the run did not complete")
+    assert_refused(
+        call("report", folder),
+        "the run did not complete",
+        "what was recorded until then is in results.partial.csv and results.partial.parquet",
+    )
+    (folder / "run.json").write_text('{"status": "running"}', encoding="utf-8")
+    assert_refused(call("report", folder), "it goes on, or its process was killed")
 
 
 def test_a_comparison_that_ends_early_says_so_in_both_folders(call: Call, tmp_path: Path) -> None:
