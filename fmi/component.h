@@ -8,9 +8,15 @@
 #ifndef HEXAPOD_FMI_COMPONENT_H
 #define HEXAPOD_FMI_COMPONENT_H
 
+#include <stdio.h>
+
 #include "fmi/variables.h"
 
 HX_HIDDEN_BEGIN
+
+/* Opens a file of the resources for reading, whose path is UTF-8; NULL when it cannot be opened.
+ * fmi/resources.c defines it for its own files and for the component's. */
+FILE *hx_open_resource(const char *path);
 
 typedef struct hxComponent hxComponent;
 

@@ -96,11 +96,14 @@ static char *start_values_path(const char *resources, int decode) {
   return path;
 }
 
-/* opens a file whose name is UTF-8 */
-static FILE *open_file(const char *path) {
+FILE *hx_open_resource(const char *path) {
 #ifdef _WIN32
-  wchar_t wide[32768];
-  return MultiByteToWideChar(CP_UTF8, 0, path, -1, wide, 32768) > 0 ? _wfopen(wide, L"rb") : NULL;
+  const int size = MultiByteToWideChar(CP_UTF8, 0, path, -1, NULL, 0); /* 0 for wrong UTF-8 */
+  wchar_t *wide = size > 0 ? malloc((size_t)size * sizeof *wide) : NULL;
+  const int converted = wide && MultiByteToWideChar(CP_UTF8, 0, path, -1, wide, size) == size;
+  FILE *file = converted ? _wfopen(wide, L"rb") : NULL;
+  free(wide);
+  return file;
 #else
   return fopen(path, "rb");
 #endif
@@ -299,7 +302,7 @@ static hxStatus open_resources(hxInstance *instance, const char *resources, FILE
       hx_log(instance, HX_LOG_ERROR, "resources: out of memory; free some and try again");
       return HX_OUT_OF_MEMORY;
     }
-    *file = open_file(path);
+    *file = hx_open_resource(path);
     free(path);
   }
   return HX_OK;
@@ -314,10 +317,10 @@ hxStatus hx_resources_folder(const char *resources, char **folder) {
     free(path);
     return HX_OUT_OF_MEMORY;
   }
-  FILE *file = open_file(path);
+  FILE *file = hx_open_resource(path);
   const int decoded = file != NULL;
   if (file) fclose(file);
-  file = decoded ? NULL : open_file(plain);
+  file = decoded ? NULL : hx_open_resource(plain);
   if (file) { /* the path was never percent-encoded */
     fclose(file);
     free(path);

@@ -9,11 +9,6 @@
 
 #include "hexapod/message.h"
 
-#ifdef _WIN32
-#define WIN32_LEAN_AND_MEAN
-#include <windows.h>
-#endif
-
 struct hxComponent {
   hxPlant *plant;
   hxTerrain *terrain; /* of the grid below; NULL: none was read */
@@ -51,20 +46,10 @@ hxStatus hx_component_set_resources(hxComponent *component, const char *folder) 
 
 /* ---- grids ---- */
 
-/* Opens a file whose name is UTF-8. */
-static FILE *open_file(const char *path) {
-#ifdef _WIN32
-  wchar_t wide[32768];
-  return MultiByteToWideChar(CP_UTF8, 0, path, -1, wide, 32768) > 0 ? _wfopen(wide, L"rb") : NULL;
-#else
-  return fopen(path, "rb");
-#endif
-}
-
 /* Returns the bytes of a file, to be freed by the caller; NULL when it cannot be read, or when out
  * of memory, which *short_of_memory tells. */
 static void *read_bytes(const char *path, size_t *size, int *short_of_memory) {
-  FILE *file = open_file(path);
+  FILE *file = hx_open_resource(path);
   char *bytes = NULL;
   *short_of_memory = 0;
   if (!file) return NULL;
