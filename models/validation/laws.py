@@ -1,0 +1,95 @@
+"""Checks settings of laws that concern more than one number: contact, friction, solver, bodies."""
+
+from __future__ import annotations
+
+from hexapod_cosim.models.errors import RobotError
+from hexapod_cosim.models.records import STATIC_LAWS, BodyContact, Friction, Robot
+from hexapod_cosim.models.validation.ground import check_soil, check_terrain
+from hexapod_cosim.models.validation.servos import check_servo
+
+DISSIPATIVE_LAWS = ("exact_restitution", "flores", "lankarani_nikravesh", "hunt_crossley")
+
+
+def check_laws(robot: Robot, at: str) -> None:
+    """Checks the settings of all laws of a robot. Raises RobotError."""
+    contact, solver = robot.contact, robot.solver
+    if contact.law in DISSIPATIVE_LAWS and contact.restitution <= 0.0:
+        fix = "give a positive value, or choose the hertz or constant_damping law"
+        raise RobotError(
+            "no finite damping for this law",
+            got=contact.restitution,
+            expected="restitution > 0",
+            fix=fix,
+            where=at + "contact.restitution",
+        )
+    if solver.method == "rk4" and solver.step <= 0.0:
+        raise RobotError(
+            "rk4 has no error control",
+            got=solver.step,
+            expected="a fixed step > 0 s",
+            fix="set solver.step",
+            where=at + "solver.step",
+        )
+    check_soil(robot, at)
+    check_servo(robot.servo, at)
+    check_static_friction(robot.friction, at + "friction.mu_static")
+    check_terrain(robot, at + "terrain")
+    check_body_contact(robot.body, at + "body")
+
+
+def check_static_friction(friction: Friction, where: str) -> None:
+    """Checks that static friction is not below kinetic friction and that the law uses it.
+
+    Raises RobotError.
+    """
+    static, mu = friction.mu_static, friction.mu
+    if static in (0.0, mu):
+        return
+    if static < mu:
+        raise RobotError(
+            "static friction below kinetic",
+            got=static,
+            expected=f"at least mu = {mu:g}",
+            fix="raise it or leave it out",
+            where=where,
+        )
+    if friction.law not in STATIC_LAWS:
+        laws = " or ".join(STATIC_LAWS)
+        raise RobotError(
+            "static friction that has no effect",
+            got=f"{static:g} with the law {friction.law}",
+            expected=f"friction.law = {laws}" if laws else f"mu = {mu:g}: no law uses another",
+            fix="leave it out" + (f", or choose the law {laws}" if laws else ""),
+            where=where,
+        )
+
+
+def check_body_contact(body: BodyContact, where: str) -> None:
+    """Checks that the box has no negative edges, and that a body with contact has a sphere.
+
+    Raises RobotError.
+    """
+    if min(body.torso_box) < 0.0:
+        raise RobotError(
+            "a box with negative edges",
+            got=list(body.torso_box),
+            expected="half edges >= 0 m",
+            fix="correct them; all 0: the torso touches nothing",
+            where=where + ".torso_box",
+        )
+    if body.contact == "on" and not any((*body.torso_box, body.knee_radius, body.shank_radius)):
+        raise RobotError(
+            "body contact without a body",
+            got="torso_box, knee_radius and shank_radius of 0",
+            expected="at least one of them > 0 m",
+            fix="give the robot's sizes, or leave body.contact off",
+            where=where + ".contact",
+        )
+    if body.self_contact == "force" and not any((body.knee_radius, body.shank_radius)):
+        raise RobotError(
+            "forces between legs without a radius",
+            got="knee_radius and shank_radius of 0",
+            expected="at least one of them > 0 m: they are those of femurs and tibias",
+            fix="give the robot's radii, or set body.self_contact to off or warn",
+            where=where + ".self_contact",
+        )

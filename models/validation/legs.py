@@ -1,0 +1,141 @@
+"""Checks the legs of a robot: links, limits of joints, rotors and stance."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from hexapod_cosim.models.errors import RobotError
+from hexapod_cosim.models.kinematics import foot_positions, inertia_matrix
+from hexapod_cosim.models.records import JOINT_NAMES, LEG_NAMES, Array, Leg, Link, Robot
+from hexapod_cosim.models.schema import check_record
+from hexapod_cosim.models.validation.inertia import check_com, check_inertia
+
+# a short bracket may carry a servo longer than itself; real links stay below 0.8
+GYRATION_PER_EXTENT = 2.0
+# m  distance of a stance foot from the plane of all six; legs sag under load by about as much
+STANCE_PLANE_TOLERANCE = 0.01
+AXIS_TOLERANCE = 1e-6
+
+
+def check_leg(leg: Leg, where: str) -> None:
+    """Checks the links of a leg, and that its stance is within the joints' limits.
+
+    Raises RobotError.
+    """
+    check_record(leg, where)
+    for link, joint, stance in zip(leg.links, JOINT_NAMES, leg.stance, strict=True):
+        _check_link(link, f"{where}.{joint}")
+        if not link.angle_min <= stance <= link.angle_max:
+            expected = f"{link.angle_min:.4g} to {link.angle_max:.4g} rad"
+            raise RobotError(
+                "stance outside the joint's limits",
+                got=stance,
+                expected=expected,
+                fix="change the pose or the limits",
+                where=f"{where}.{joint}.stance",
+            )
+
+
+def _check_link(link: Link, where: str) -> None:
+    check_record(link, where)
+    extent = math.hypot(*link.tip)
+    if extent <= 0.0:
+        raise RobotError(
+            "link without extent",
+            got=link.tip,
+            expected="a tip away from the joint",
+            fix="give a length",
+            where=where + ".length",
+        )
+    check_inertia(link.mass, link.inertia, GYRATION_PER_EXTENT * extent, where)
+    check_com(link.com, GYRATION_PER_EXTENT * extent, where)
+    if abs(math.hypot(*link.axis) - 1.0) > AXIS_TOLERANCE:
+        raise RobotError(
+            "axis not of unit length",
+            got=link.axis,
+            expected="a unit vector",
+            fix="normalise it",
+            where=where + ".axis",
+        )
+    if link.angle_min >= link.angle_max:
+        got = [link.angle_min, link.angle_max]
+        raise RobotError(
+            "limits not ordered",
+            got=got,
+            expected="angle_min < angle_max",
+            fix="swap or correct them (rad)",
+            where=where + ".angle_min",
+        )
+
+
+def check_rotors(robot: Robot, at: str) -> None:
+    """Raises RobotError for rotors that are heavier than the bodies which contain them.
+
+    The inertia of each about its own axis is J_r/n^2, and the torso has six.
+    """
+    ratio, compliance = robot.servo.gear_ratio, 0.0
+    if ratio == 0.0:
+        return
+    for leg in robot.legs:
+        c, s = math.cos(leg.hip_yaw), math.sin(leg.hip_yaw)
+        hip = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]]) @ leg.links[0].axis
+        carriers = [(robot.torso.inertia, hip, len(robot.legs))]
+        carriers += [(leg.links[k].inertia, np.array(leg.links[k + 1].axis), 1) for k in range(2)]
+        for inertia, axis, count in carriers:
+            form = float(axis @ np.linalg.solve(inertia_matrix(inertia), axis))
+            compliance = max(compliance, count * form)
+    if robot.servo.rotor_inertia * compliance >= ratio**2:
+        least = math.sqrt(robot.servo.rotor_inertia * compliance)
+        raise RobotError(
+            "rotors heavier than the bodies that contain them",
+            got=ratio,
+            expected=f"0, or a size above {least:.3g}: rotor_inertia/gear_ratio^2 is a rotor's "
+            "inertia about its own axis",
+            fix="give servo.gear_ratio as turns of the rotor for one of the joint",
+            where=at + "servo.gear_ratio",
+        )
+
+
+def check_stance(robot: Robot, at: str) -> None:
+    """Checks that all feet of the stance reach one plane below the hips. Raises RobotError."""
+    feet = foot_positions(robot, robot.stance)
+    distance, slope = _plane_fit(feet)
+    worst = int(np.argmax(np.abs(distance)))
+    where = f"{at}legs.{LEG_NAMES[worst]}.stance"
+    if abs(distance[worst]) > STANCE_PLANE_TOLERANCE:
+        got = f"{distance[worst]:.4g} m off the plane of the other feet"
+        raise RobotError(
+            "a stance foot does not reach the ground",
+            got=got,
+            expected=f"at most {STANCE_PLANE_TOLERANCE} m",
+            fix="adapt this leg's stance",
+            where=where,
+        )
+    if slope > 0.5:
+        raise RobotError(
+            "the stance feet do not lie below the torso",
+            got=f"slope {slope:.3g}",
+            expected="at most 0.5",
+            fix="adapt the stance",
+            where=at + "legs",
+        )
+    hips = np.array([leg.hip_position for leg in robot.legs])
+    high = int(np.argmax(feet[:, 2] - hips[:, 2]))
+    if feet[high, 2] - robot.foot.radius >= hips[high, 2]:
+        got = f"{feet[high, 2] - hips[high, 2]:.4g} m above the hip"
+        raise RobotError(
+            "a stance foot is above its hip",
+            got=got,
+            expected="below",
+            fix="adapt this leg's stance",
+            where=f"{at}legs.{LEG_NAMES[high]}.stance",
+        )
+
+
+def _plane_fit(points: Array) -> tuple[Array, float]:
+    """Returns heights above the least-squares plane z = c + ax + by, and that plane's slope."""
+    columns = np.column_stack([np.ones(len(points)), points[:, :2]])
+    plane = np.linalg.lstsq(columns, points[:, 2], rcond=None)[0]
+    return points[:, 2] - columns @ plane, float(np.hypot(plane[1], plane[2]))
