@@ -1,9 +1,8 @@
-/* fmi3.c - every function of FMI 3.0, model exchange and co-simulation, in the standard's order. */
-#include "fmi/instance.h"
+/* fmi3.c - FMI 3.0: legal order, log and instances. The other functions of the standard are in
+ * fmi3_values.c and fmi3_simulation.c, in its order. */
+#include "fmi/fmi3_calls.h"
 
 #include <stdint.h>
-
-#include "fmi3Functions.h"
 
 typedef struct fmi3InstanceData {
   hxInstance base; /* first: a pointer to it is a pointer to this */
@@ -27,48 +26,9 @@ enum {
   EITHER = HX_CO_SIMULATION | HX_MODEL_EXCHANGE
 };
 
-typedef enum fmi3Call {
-  SET_DEBUG_LOGGING,
-  ENTER_INITIALIZATION_MODE,
-  EXIT_INITIALIZATION_MODE,
-  ENTER_EVENT_MODE,
-  TERMINATE,
-  RESET,
-  GET_FLOAT64,
-  GET_INT64,
-  GET_BOOLEAN,
-  GET_OTHER,
-  SET_FLOAT64,
-  SET_INT64,
-  SET_BOOLEAN,
-  SET_OTHER,
-  GET_STATE,
-  SET_STATE,
-  FREE_STATE,
-  SERIALIZED_SIZE,
-  SERIALIZE,
-  DESERIALIZE,
-  DIRECTIONAL_DERIVATIVE,
-  CLOCKS,
-  UPDATE_DISCRETE_STATES,
-  ENTER_CONTINUOUS_TIME_MODE,
-  COMPLETED_INTEGRATOR_STEP,
-  SET_TIME,
-  SET_CONTINUOUS_STATES,
-  GET_RATES,
-  GET_EVENT_INDICATORS,
-  GET_CONTINUOUS_STATES,
-  GET_NOMINALS,
-  GET_NUMBER,
-  ENTER_STEP_MODE,
-  GET_OUTPUT_DERIVATIVES,
-  DO_STEP,
-  UNSUPPORTED
-} fmi3Call;
-
 /* The standard's tables of allowed calls (sections 2.3, 3.2 and 4.2), and the further calls that
  * fmi2.c allows. */
-static const hxCall calls[] = {
+const hxCall hx_fmi3_calls[] = {
     [SET_DEBUG_LOGGING] = {"fmi3SetDebugLogging", ANY_MODE, EITHER},
     [ENTER_INITIALIZATION_MODE] = {"fmi3EnterInitializationMode", HX_MODE_INSTANTIATED, EITHER},
     [EXIT_INITIALIZATION_MODE] = {"fmi3ExitInitializationMode", HX_MODE_INITIALIZATION, EITHER},
@@ -110,32 +70,28 @@ static const hxCall calls[] = {
     [UNSUPPORTED] = {"a function that is not offered", ANY_MODE, EITHER},
 };
 
-/* the instance if the call is legal now; otherwise logs and returns NULL */
-static hxInstance *enter(fmi3Instance c, fmi3Call call) {
-  return hx_call_is_legal(c, &calls[call]) ? c : NULL;
+hxInstance *hx_fmi3_enter(fmi3Instance c, fmi3Call call) {
+  return hx_call_is_legal(c, &hx_fmi3_calls[call]) ? c : NULL;
 }
 
-static fmi3Status status_of(hxStatus status) {
+fmi3Status hx_fmi3_status(hxStatus status) {
   if (status == HX_OK) return fmi3OK;
   return status == HX_STEP_TOO_SMALL || status == HX_NOT_FINITE ? fmi3Discard : fmi3Error;
 }
 
-/* Refuses a function that the FMU does not offer. It exists because importers load every function
- * of the standard. */
-static fmi3Status not_supported(fmi3Instance c, const char *name) {
-  hxInstance *instance = enter(c, UNSUPPORTED);
+fmi3Status hx_fmi3_not_supported(fmi3Instance c, const char *name) {
+  hxInstance *instance = hx_fmi3_enter(c, UNSUPPORTED);
   if (instance)
     hx_log(instance, HX_LOG_ERROR,
            "%s: got a call, expected none, as the model description does not offer it", name);
   return fmi3Error;
 }
 
-/* for types that no variable has, and for clocks */
-static fmi3Status no_variables(fmi3Instance c, fmi3Call call, size_t n) {
-  return status_of(hx_call_no_variables(c, &calls[call], n, ""));
+fmi3Status hx_fmi3_no_variables(fmi3Instance c, fmi3Call call, size_t n) {
+  return hx_fmi3_status(hx_call_no_variables(c, &hx_fmi3_calls[call], n, ""));
 }
 
-static void set_flag(fmi3Boolean *place, int value) {
+void hx_fmi3_set_flag(fmi3Boolean *place, int value) {
   if (place) *place = value != 0;
 }
 
@@ -151,8 +107,8 @@ static void log_sink(hxInstance *base, hxLogCategory category, const char *text)
 
 fmi3Status fmi3SetDebugLogging(fmi3Instance c, fmi3Boolean loggingOn, size_t nCategories,
                                const fmi3String categories[]) {
-  return status_of(
-      hx_call_log_select(c, &calls[SET_DEBUG_LOGGING], loggingOn, nCategories, categories));
+  return hx_fmi3_status(
+      hx_call_log_select(c, &hx_fmi3_calls[SET_DEBUG_LOGGING], loggingOn, nCategories, categories));
 }
 
 /* ----------------------------------------------------------------------------------------------
@@ -242,8 +198,8 @@ void fmi3FreeInstance(fmi3Instance c) { hx_instance_free(c); }
 fmi3Status fmi3EnterInitializationMode(fmi3Instance c, fmi3Boolean toleranceDefined,
                                        fmi3Float64 tolerance, fmi3Float64 startTime,
                                        fmi3Boolean stopTimeDefined, fmi3Float64 stopTime) {
-  hxInstance *instance = enter(c, ENTER_INITIALIZATION_MODE);
-  const char *name = calls[ENTER_INITIALIZATION_MODE].name;
+  hxInstance *instance = hx_fmi3_enter(c, ENTER_INITIALIZATION_MODE);
+  const char *name = hx_fmi3_calls[ENTER_INITIALIZATION_MODE].name;
   if (!instance ||
       hx_instance_set_experiment(instance, name, startTime, stopTimeDefined, stopTime) != HX_OK)
     return fmi3Error;
@@ -253,11 +209,11 @@ fmi3Status fmi3EnterInitializationMode(fmi3Instance c, fmi3Boolean toleranceDefi
 }
 
 fmi3Status fmi3ExitInitializationMode(fmi3Instance c) {
-  return status_of(hx_call_exit_initialization(c, &calls[EXIT_INITIALIZATION_MODE]));
+  return hx_fmi3_status(hx_call_exit_initialization(c, &hx_fmi3_calls[EXIT_INITIALIZATION_MODE]));
 }
 
 fmi3Status fmi3EnterEventMode(fmi3Instance c) {
-  hxInstance *instance = enter(c, ENTER_EVENT_MODE);
+  hxInstance *instance = hx_fmi3_enter(c, ENTER_EVENT_MODE);
   if (!instance) return fmi3Error;
   if (instance->state.mode == HX_MODE_STEP && !instance->uses_event_mode) {
     hx_log(instance, HX_LOG_ERROR,
@@ -270,335 +226,9 @@ fmi3Status fmi3EnterEventMode(fmi3Instance c) {
 }
 
 fmi3Status fmi3Terminate(fmi3Instance c) {
-  return status_of(hx_call_terminate(c, &calls[TERMINATE]));
+  return hx_fmi3_status(hx_call_terminate(c, &hx_fmi3_calls[TERMINATE]));
 }
 
-fmi3Status fmi3Reset(fmi3Instance c) { return status_of(hx_call_reset(c, &calls[RESET])); }
-
-/* ----------------------------------------------------------------------------------------------
- * values */
-
-static fmi3Status get_values(fmi3Instance c, fmi3Call call, hxType type,
-                             const fmi3ValueReference vr[], size_t nvr, void *value, size_t n) {
-  if (!hx_call_is_legal_with(c, &calls[call], nvr, vr, value)) return fmi3Error;
-  return status_of(hx_arrays_get(c, type, vr, nvr, value, n));
-}
-
-static fmi3Status set_values(fmi3Instance c, fmi3Call call, hxType type,
-                             const fmi3ValueReference vr[], size_t nvr, const void *value,
-                             size_t n) {
-  if (!hx_call_is_legal_with(c, &calls[call], nvr, vr, value)) return fmi3Error;
-  return status_of(hx_arrays_set(c, type, vr, nvr, value, n));
-}
-
-fmi3Status fmi3GetFloat64(fmi3Instance c, const fmi3ValueReference vr[], size_t nvr,
-                          fmi3Float64 value[], size_t n) {
-  return get_values(c, GET_FLOAT64, HX_REAL, vr, nvr, value, n);
-}
-
-/* enumerations are Int64 */
-fmi3Status fmi3GetInt64(fmi3Instance c, const fmi3ValueReference vr[], size_t nvr,
-                        fmi3Int64 value[], size_t n) {
-  return get_values(c, GET_INT64, HX_INTEGER, vr, nvr, value, n);
-}
-
-fmi3Status fmi3GetBoolean(fmi3Instance c, const fmi3ValueReference vr[], size_t nvr,
-                          fmi3Boolean value[], size_t n) {
-  return get_values(c, GET_BOOLEAN, HX_BOOLEAN, vr, nvr, value, n);
-}
-
-fmi3Status fmi3SetFloat64(fmi3Instance c, const fmi3ValueReference vr[], size_t nvr,
-                          const fmi3Float64 value[], size_t n) {
-  return set_values(c, SET_FLOAT64, HX_REAL, vr, nvr, value, n);
-}
-
-fmi3Status fmi3SetInt64(fmi3Instance c, const fmi3ValueReference vr[], size_t nvr,
-                        const fmi3Int64 value[], size_t n) {
-  return set_values(c, SET_INT64, HX_INTEGER, vr, nvr, value, n);
-}
-
-fmi3Status fmi3SetBoolean(fmi3Instance c, const fmi3ValueReference vr[], size_t nvr,
-                          const fmi3Boolean value[], size_t n) {
-  return set_values(c, SET_BOOLEAN, HX_BOOLEAN, vr, nvr, value, n);
-}
-
-/* types that no variable has */
-#define NO_VARIABLES_OF(Type)                                                                      \
-  fmi3Status fmi3Get##Type(fmi3Instance c, const fmi3ValueReference vr[], size_t nvr,              \
-                           fmi3##Type value[], size_t n) {                                         \
-    (void)vr, (void)value, (void)n;                                                                \
-    return no_variables(c, GET_OTHER, nvr);                                                        \
-  }                                                                                                \
-  fmi3Status fmi3Set##Type(fmi3Instance c, const fmi3ValueReference vr[], size_t nvr,              \
-                           const fmi3##Type value[], size_t n) {                                   \
-    (void)vr, (void)value, (void)n;                                                                \
-    return no_variables(c, SET_OTHER, nvr);                                                        \
-  }
-
-NO_VARIABLES_OF(Float32)
-NO_VARIABLES_OF(Int8)
-NO_VARIABLES_OF(UInt8)
-NO_VARIABLES_OF(Int16)
-NO_VARIABLES_OF(UInt16)
-NO_VARIABLES_OF(Int32)
-NO_VARIABLES_OF(UInt32)
-NO_VARIABLES_OF(UInt64)
-NO_VARIABLES_OF(String)
-
-fmi3Status fmi3GetBinary(fmi3Instance c, const fmi3ValueReference vr[], size_t nvr, size_t size[],
-                         fmi3Binary value[], size_t n) {
-  (void)vr, (void)size, (void)value, (void)n;
-  return no_variables(c, GET_OTHER, nvr);
-}
-
-fmi3Status fmi3SetBinary(fmi3Instance c, const fmi3ValueReference vr[], size_t nvr,
-                         const size_t size[], const fmi3Binary value[], size_t n) {
-  (void)vr, (void)size, (void)value, (void)n;
-  return no_variables(c, SET_OTHER, nvr);
-}
-
-/* ----------------------------------------------------------------------------------------------
- * dependencies */
-
-/* Dependencies of single elements are not offered: see providesPerElementDependencies. */
-fmi3Status fmi3GetNumberOfVariableDependencies(fmi3Instance c, fmi3ValueReference vr, size_t *n) {
-  (void)vr, (void)n;
-  return not_supported(c, "fmi3GetNumberOfVariableDependencies");
-}
-
-fmi3Status fmi3GetVariableDependencies(fmi3Instance c, fmi3ValueReference dependent,
-                                       size_t elementIndicesOfDependent[],
-                                       fmi3ValueReference independents[],
-                                       size_t elementIndicesOfIndependents[],
-                                       fmi3DependencyKind dependencyKinds[], size_t nDependencies) {
-  (void)dependent, (void)elementIndicesOfDependent, (void)independents,
-      (void)elementIndicesOfIndependents, (void)dependencyKinds;
-  (void)nDependencies;
-  return not_supported(c, "fmi3GetVariableDependencies");
-}
-
-/* ----------------------------------------------------------------------------------------------
- * saved states */
-
-fmi3Status fmi3GetFMUState(fmi3Instance c, fmi3FMUState *state) {
-  return status_of(hx_call_save(c, &calls[GET_STATE], state));
-}
-
-fmi3Status fmi3SetFMUState(fmi3Instance c, fmi3FMUState state) {
-  return status_of(hx_call_restore(c, &calls[SET_STATE], state));
-}
-
-fmi3Status fmi3FreeFMUState(fmi3Instance c, fmi3FMUState *state) {
-  return status_of(hx_call_free_state(c, &calls[FREE_STATE], state));
-}
-
-fmi3Status fmi3SerializedFMUStateSize(fmi3Instance c, fmi3FMUState state, size_t *size) {
-  return status_of(hx_call_state_size(c, &calls[SERIALIZED_SIZE], state, size));
-}
-
-fmi3Status fmi3SerializeFMUState(fmi3Instance c, fmi3FMUState state, fmi3Byte bytes[],
-                                 size_t size) {
-  return status_of(hx_call_serialize(c, &calls[SERIALIZE], state, bytes, size));
-}
-
-fmi3Status fmi3DeserializeFMUState(fmi3Instance c, const fmi3Byte bytes[], size_t size,
-                                   fmi3FMUState *state) {
-  return status_of(hx_call_deserialize(c, &calls[DESERIALIZE], bytes, size, state));
-}
-
-/* ----------------------------------------------------------------------------------------------
- * derivatives */
-
-fmi3Status fmi3GetDirectionalDerivative(fmi3Instance c, const fmi3ValueReference unknowns[],
-                                        size_t nUnknowns, const fmi3ValueReference knowns[],
-                                        size_t nKnowns, const fmi3Float64 seed[], size_t nSeed,
-                                        fmi3Float64 sensitivity[], size_t nSensitivity) {
-  if (!hx_call_is_legal_with(c, &calls[DIRECTIONAL_DERIVATIVE], nUnknowns, unknowns, sensitivity))
-    return fmi3Error;
-  if (!hx_call_has_arrays(c, &calls[DIRECTIONAL_DERIVATIVE], nKnowns, knowns, seed))
-    return fmi3Error;
-  return status_of(hx_arrays_directional(c, unknowns, nUnknowns, knowns, nKnowns, seed, nSeed,
-                                         sensitivity, nSensitivity));
-}
-
-fmi3Status fmi3GetAdjointDerivative(fmi3Instance c, const fmi3ValueReference unknowns[],
-                                    size_t nUnknowns, const fmi3ValueReference knowns[],
-                                    size_t nKnowns, const fmi3Float64 seed[], size_t nSeed,
-                                    fmi3Float64 sensitivity[], size_t nSensitivity) {
-  (void)unknowns, (void)nUnknowns, (void)knowns, (void)nKnowns, (void)seed, (void)nSeed,
-      (void)sensitivity, (void)nSensitivity;
-  return not_supported(c, "fmi3GetAdjointDerivative");
-}
-
-/* ----------------------------------------------------------------------------------------------
- * configuration, clocks */
-
-/* There are no structural parameters. */
-fmi3Status fmi3EnterConfigurationMode(fmi3Instance c) {
-  return not_supported(c, "fmi3EnterConfigurationMode");
-}
-
-fmi3Status fmi3ExitConfigurationMode(fmi3Instance c) {
-  return not_supported(c, "fmi3ExitConfigurationMode");
-}
-
-fmi3Status fmi3GetIntervalDecimal(fmi3Instance c, const fmi3ValueReference vr[], size_t nvr,
-                                  fmi3Float64 interval[], fmi3IntervalQualifier qualifier[]) {
-  (void)vr, (void)interval, (void)qualifier;
-  return no_variables(c, CLOCKS, nvr);
-}
-
-fmi3Status fmi3GetIntervalFraction(fmi3Instance c, const fmi3ValueReference vr[], size_t nvr,
-                                   fmi3UInt64 counter[], fmi3UInt64 resolution[],
-                                   fmi3IntervalQualifier qualifier[]) {
-  (void)vr, (void)counter, (void)resolution, (void)qualifier;
-  return no_variables(c, CLOCKS, nvr);
-}
-
-fmi3Status fmi3ActivateModelPartition(fmi3Instance c, fmi3ValueReference clockReference,
-                                      fmi3Float64 activationTime) {
-  (void)clockReference, (void)activationTime;
-  return not_supported(c, "fmi3ActivateModelPartition");
-}
-
-#define NO_CLOCKS(Name, Type)                                                                      \
-  fmi3Status fmi3##Name(fmi3Instance c, const fmi3ValueReference vr[], size_t nvr, Type value[]) { \
-    (void)vr, (void)value;                                                                         \
-    return no_variables(c, CLOCKS, nvr);                                                           \
-  }
-#define NO_CLOCK_FRACTIONS(Name, Type)                                                             \
-  fmi3Status fmi3##Name(fmi3Instance c, const fmi3ValueReference vr[], size_t nvr, Type counter[], \
-                        Type resolution[]) {                                                       \
-    (void)vr, (void)counter, (void)resolution;                                                     \
-    return no_variables(c, CLOCKS, nvr);                                                           \
-  }
-
-NO_CLOCKS(GetClock, fmi3Clock)
-NO_CLOCKS(SetClock, const fmi3Clock)
-NO_CLOCKS(GetShiftDecimal, fmi3Float64)
-NO_CLOCKS(SetIntervalDecimal, const fmi3Float64)
-NO_CLOCKS(SetShiftDecimal, const fmi3Float64)
-NO_CLOCK_FRACTIONS(GetShiftFraction, fmi3UInt64)
-NO_CLOCK_FRACTIONS(SetIntervalFraction, const fmi3UInt64)
-NO_CLOCK_FRACTIONS(SetShiftFraction, const fmi3UInt64)
-
-/* ----------------------------------------------------------------------------------------------
- * events */
-
-fmi3Status fmi3EvaluateDiscreteStates(fmi3Instance c) {
-  return not_supported(c, "fmi3EvaluateDiscreteStates");
-}
-
-/* Model exchange: handles touch-downs and lift-offs; one iteration is enough. Co-simulation: the
- * last step has already handled them. There are no time events. */
-fmi3Status fmi3UpdateDiscreteStates(fmi3Instance c, fmi3Boolean *discreteStatesNeedUpdate,
-                                    fmi3Boolean *terminateSimulation,
-                                    fmi3Boolean *nominalsOfContinuousStatesChanged,
-                                    fmi3Boolean *valuesOfContinuousStatesChanged,
-                                    fmi3Boolean *nextEventTimeDefined, fmi3Float64 *nextEventTime) {
-  hxInstance *instance = enter(c, UPDATE_DISCRETE_STATES);
-  int changed = 0;
-  if (!instance) return fmi3Error;
-  const int exchange = instance->state.interface == HX_MODEL_EXCHANGE;
-  const hxStatus status = exchange ? hx_instance_update(instance, &changed) : HX_OK;
-  set_flag(discreteStatesNeedUpdate, 0);
-  set_flag(terminateSimulation, 0);
-  set_flag(nominalsOfContinuousStatesChanged, 0);
-  set_flag(valuesOfContinuousStatesChanged, changed);
-  set_flag(nextEventTimeDefined, 0);
-  if (nextEventTime) *nextEventTime = 0.0;
-  return status_of(status);
-}
-
-/* ----------------------------------------------------------------------------------------------
- * model exchange */
-
-fmi3Status fmi3EnterContinuousTimeMode(fmi3Instance c) {
-  return status_of(hx_call_enter_mode(c, &calls[ENTER_CONTINUOUS_TIME_MODE], HX_MODE_CONTINUOUS));
-}
-
-fmi3Status fmi3CompletedIntegratorStep(fmi3Instance c, fmi3Boolean noSetFMUStatePriorToCurrentPoint,
-                                       fmi3Boolean *enterEventMode,
-                                       fmi3Boolean *terminateSimulation) {
-  (void)noSetFMUStatePriorToCurrentPoint;
-  hxInstance *instance = enter(c, COMPLETED_INTEGRATOR_STEP);
-  if (!instance) return fmi3Error;
-  set_flag(enterEventMode, 0);
-  set_flag(terminateSimulation, 0);
-  return status_of(hx_instance_completed_step(instance));
-}
-
-fmi3Status fmi3SetTime(fmi3Instance c, fmi3Float64 time) {
-  return status_of(hx_call_set_time(c, &calls[SET_TIME], time));
-}
-
-fmi3Status fmi3SetContinuousStates(fmi3Instance c, const fmi3Float64 x[], size_t n) {
-  return status_of(hx_call_set_states(c, &calls[SET_CONTINUOUS_STATES], x, n));
-}
-
-fmi3Status fmi3GetContinuousStateDerivatives(fmi3Instance c, fmi3Float64 dx[], size_t n) {
-  return status_of(hx_call_get_row(c, &calls[GET_RATES], hx_instance_get_rates, dx, n));
-}
-
-fmi3Status fmi3GetEventIndicators(fmi3Instance c, fmi3Float64 z[], size_t n) {
-  return status_of(
-      hx_call_get_row(c, &calls[GET_EVENT_INDICATORS], hx_instance_get_indicators, z, n));
-}
-
-fmi3Status fmi3GetContinuousStates(fmi3Instance c, fmi3Float64 x[], size_t n) {
-  return status_of(hx_call_get_row(c, &calls[GET_CONTINUOUS_STATES], hx_instance_get_states, x, n));
-}
-
-fmi3Status fmi3GetNominalsOfContinuousStates(fmi3Instance c, fmi3Float64 nominal[], size_t n) {
-  return status_of(hx_call_get_row(c, &calls[GET_NOMINALS], hx_instance_get_nominals, nominal, n));
-}
-
-static fmi3Status get_number(fmi3Instance c, size_t *place, size_t number) {
-  if (!hx_call_is_legal_with(c, &calls[GET_NUMBER], 1, place, place)) return fmi3Error;
-  *place = number;
-  return fmi3OK;
-}
-
-fmi3Status fmi3GetNumberOfEventIndicators(fmi3Instance c, size_t *n) {
-  return get_number(c, n, hx_continuous ? hx_continuous->indicators : 0);
-}
-
-fmi3Status fmi3GetNumberOfContinuousStates(fmi3Instance c, size_t *n) {
-  return get_number(c, n, hx_state_count);
-}
-
-/* ----------------------------------------------------------------------------------------------
- * co-simulation */
-
-fmi3Status fmi3EnterStepMode(fmi3Instance c) {
-  return status_of(hx_call_enter_mode(c, &calls[ENTER_STEP_MODE], HX_MODE_STEP));
-}
-
-fmi3Status fmi3GetOutputDerivatives(fmi3Instance c, const fmi3ValueReference vr[], size_t nvr,
-                                    const fmi3Int32 order[], fmi3Float64 value[], size_t n) {
-  if (!hx_call_is_first_order(c, &calls[GET_OUTPUT_DERIVATIVES], nvr, vr, order, value))
-    return fmi3Error;
-  return status_of(hx_arrays_get_output_rates(c, vr, nvr, value, n));
-}
-
-/* Returns early where discrete variables change, if the importer allows it; requests event mode, if
- * the importer uses it. */
-fmi3Status fmi3DoStep(fmi3Instance c, fmi3Float64 currentCommunicationPoint,
-                      fmi3Float64 communicationStepSize,
-                      fmi3Boolean noSetFMUStatePriorToCurrentPoint,
-                      fmi3Boolean *eventHandlingNeeded, fmi3Boolean *terminateSimulation,
-                      fmi3Boolean *earlyReturn, fmi3Float64 *lastSuccessfulTime) {
-  hxInstance *instance = enter(c, DO_STEP);
-  const double t = currentCommunicationPoint, h = communicationStepSize;
-  int event = 0;
-  (void)noSetFMUStatePriorToCurrentPoint;
-  if (!instance) return fmi3Error;
-  const hxStatus status =
-      hx_instance_step_to_event(instance, t, h, instance->may_return_early, &event);
-  const double reached = hx_instance_time(instance);
-  set_flag(eventHandlingNeeded, event && instance->uses_event_mode);
-  set_flag(terminateSimulation, 0);
-  set_flag(earlyReturn, event && reached < t + h);
-  if (lastSuccessfulTime) *lastSuccessfulTime = reached;
-  return status_of(status);
+fmi3Status fmi3Reset(fmi3Instance c) {
+  return hx_fmi3_status(hx_call_reset(c, &hx_fmi3_calls[RESET]));
 }

@@ -3,7 +3,7 @@
  *
  * The files of fmi/ in layers; each calls the layers below it only:
  *
- *   fmi2.c  fmi3.c  work.c       the functions of the standard; an extension
+ *   fmi2.c  fmi3*.c  work.c      the functions of the standard; an extension
  *   call.c  arrays.c             legal order and calls of both versions; FMI 3's arrays
  *   step.c  exchange.c  state.c  co-simulation, model exchange, saved states
  *   instance.c                   opening, values, initialization, reset

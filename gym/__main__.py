@@ -7,6 +7,7 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
+from hexapod_cosim.cosim.common.files import atomic_path
 from hexapod_cosim.gym.bench import bench
 from hexapod_cosim.gym.export import export_policy
 from hexapod_cosim.gym.policy import load_policy
@@ -31,7 +32,7 @@ def parser() -> argparse.ArgumentParser:
     measured = commands.add_parser("bench", help="measures environment steps per second")
     measured.add_argument("--envs", type=int, default=64, help="robots in the vector (64)")
     measured.add_argument("--seconds", type=float, default=10.0, help="of robot time (10)")
-    trained = commands.add_parser("train", help="trains a policy with an evolution strategy")
+    trained = commands.add_parser("train", help="trains a policy; Ctrl-C ends it early")
     trained.add_argument("-o", "--output", type=Path, required=True, help="the policy's .npz file")
     trained.add_argument("--env", default=DEFAULT, help=f"environment ({DEFAULT})")
     trained.add_argument("--minutes", type=float, default=8.0, help="of training (8)")
@@ -69,7 +70,8 @@ def run(given: argparse.Namespace) -> None:
         print(bench(count=given.envs, duration=given.seconds))
     elif given.command == "train":
         how = TrainSettings(minutes=given.minutes, generations=given.generations, seed=given.seed)
-        train(training_settings(task(given.env)), how, show).save(given.output)
+        with atomic_path(given.output) as part:  # refuses a bad place before the training
+            train(training_settings(task(given.env)), how, show).save(part)
         print(f"wrote {given.output}")
     else:
         policy = load_policy(given.policy)

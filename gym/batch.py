@@ -11,7 +11,7 @@ import ctypes as ct
 import os
 import threading
 from collections.abc import Mapping, Sequence
-from functools import cache, cached_property
+from functools import cached_property
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -23,9 +23,20 @@ from hexapod_cosim.cosim.common.closing import Closing
 from hexapod_cosim.cosim.interface.names import foot_names, joint_names, vector_names
 from hexapod_cosim.cosim.master.fmu import Fmu
 from hexapod_cosim.cosim.master.fmu_controller import COMMANDS, SENSED
-from hexapod_cosim.cosim.master.loop_library import load_loop
 from hexapod_cosim.cosim.master.signals import MEASURED, PUSH
 from hexapod_cosim.cosim.master.wiring import JOINT_COMMANDS
+from hexapod_cosim.gym.checks import check_count, check_names, check_seeds, checked_mask
+from hexapod_cosim.gym.native import (
+    ARRAYS,
+    CALLS,
+    WORK,
+    NativeArrays,
+    NativeDraws,
+    NativeFmu,
+    NativeGround,
+    NativeSettings,
+    environments_library,
+)
 from hexapod_cosim.gym.plants import (
     CONTROL_PERIOD,
     export_base,
@@ -39,7 +50,6 @@ from hexapod_cosim.gym.scan import SPACING, GroundMaps, ground_maps
 from hexapod_cosim.gym.settings import BLOCKS, JOINTS, RATE, REASONS, TERMS, EnvSettings
 from hexapod_cosim.models import FmuError, HexapodError, Robot
 
-LAYOUT = 1  # of the structures below, HX_ENVIRONMENTS_LAYOUT in C
 AUTORESET = ("next_step", "same_step", "disabled")  # hxAutoreset in C
 FAILED = REASONS.index("failed")
 MESSAGE_SIZE = 512
@@ -57,102 +67,7 @@ OUTPUTS = [
     *vector_names("torso.contact_force"),
     *foot_names("slip_distance"),
 ]
-# functions of an FMU in the order of hxEnvFmu
-CALLS = (
-    *("Instantiate", "FreeInstance", "Reset", "SetupExperiment", "EnterInitializationMode"),
-    *("ExitInitializationMode", "GetReal", "SetReal", "DoStep"),
-)
-WORK = ("hx_shared_work_size", "hx_shared_work_use")  # which a foreign FMU does not have
-
 Array = NDArray[Any]
-_Pointer, _Size = ct.c_void_p, ct.c_size_t
-
-
-class _Fmu(ct.Structure):
-    """hxEnvFmu in C."""
-
-    _fields_ = [
-        *((name, _Pointer) for name in CALLS),
-        ("guid", ct.c_char_p),
-        ("resources", ct.c_char_p),
-        *((name, _Pointer) for name in WORK),
-    ]
-
-
-class _Draws(ct.Structure):
-    """hxEnvDraws in C."""
-
-    _fields_ = [
-        *((name, _Pointer) for name in ("reference", "low", "high", "whole", "group")),
-        ("count", _Size),
-    ]
-
-
-class _Ground(ct.Structure):
-    """hxEnvGround in C."""
-
-    _fields_ = [
-        ("height", _Pointer), ("place", _Pointer),
-        *((name, _Size) for name in ("count", "rows", "columns", "points", "draw")),
-        *((name, ct.c_double) for name in ("x0", "y0", "spacing", "clearance")),
-    ]  # fmt: skip
-
-
-class _Settings(ct.Structure):
-    """hxEnvSettings in C."""
-
-    _fields_ = [
-        ("plant", _Fmu), ("controller", _Fmu),
-        *((name, _Pointer) for name in (
-            "plant_output", "plant_input", "controller_input", "controller_output")),
-        ("draws", _Draws), ("ground", _Ground),
-        ("h", ct.c_double), ("substeps", _Size), ("length", _Size),
-        ("stance", ct.c_double * JOINTS), ("action_scale", ct.c_double * JOINTS),
-        ("action_limit", ct.c_double), ("observed", ct.c_double * 3 * len(BLOCKS)),
-        ("clock", ct.c_double),
-        ("command_low", ct.c_double * 3), ("command_high", ct.c_double * 3),
-        ("command_interval", _Size),
-        ("push_interval", _Size), ("push_length", _Size), ("push_force", ct.c_double),
-        ("upright", ct.c_double), ("belly_force", ct.c_double),
-        ("weight", ct.c_double * len(TERMS)), ("width", ct.c_double * 2),
-        ("autoreset", ct.c_int),
-    ]  # fmt: skip
-
-
-ARRAYS = (  # of hxEnvArrays in C
-    *("action", "observation", "last", "reward", "term"),
-    *("terminated", "truncated", "refused", "reason"),
-)
-
-
-class _Arrays(ct.Structure):
-    """hxEnvArrays in C."""
-
-    _fields_ = [(name, _Pointer) for name in ARRAYS]
-
-
-@cache
-def _library() -> ct.CDLL:
-    """Loads the C loop and declares its functions.
-
-    Raises FmuError when the library is missing or has another version.
-    """
-    library = load_loop(
-        ("hx_environments_layout", LAYOUT),
-        ("hx_environments_settings_size", ct.sizeof(_Settings)),
-    )
-    library.hx_environments_create.restype = _Pointer
-    library.hx_environments_create.argtypes = [_Pointer, _Pointer, _Size, ct.c_char_p]
-    library.hx_environments_message.restype = ct.c_char_p
-    library.hx_environments_message.argtypes = [_Pointer, _Size]
-    library.hx_environments_reset.argtypes = [_Pointer] * 3
-    for name in ("drawn", "values"):
-        getattr(library, f"hx_environments_{name}").argtypes = [_Pointer, _Size, _Pointer]
-    for name in ("step", "serve", "stop", "destroy"):
-        getattr(library, f"hx_environments_{name}").argtypes = [_Pointer]
-    for name in ("reset", "step", "serve", "stop", "destroy", "drawn", "values"):
-        getattr(library, f"hx_environments_{name}").restype = None
-    return library
 
 
 class Batch(Closing):
@@ -180,15 +95,11 @@ class Batch(Closing):
         threads: int | None = None,
         autoreset: str = "next_step",
     ) -> None:
-        _check_count("environments", count)
+        check_count("number of environments", count)
         cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
         self.threads = min(cores or 1, count) if threads is None else threads
-        _check_count("threads", self.threads)
-        if autoreset not in AUTORESET:
-            expected = " or ".join(AUTORESET)
-            raise HexapodError(
-                "no such autoreset mode", got=autoreset, expected=expected, fix="name one of these"
-            )
+        check_count("number of threads", self.threads)
+        check_names([autoreset], "autoreset mode", AUTORESET)
         self.settings, self.count, self.autoreset = settings, count, autoreset
         self._all, self._servers, self._fmus = None, list[threading.Thread](), list[Fmu]()
         self._kept: list[Any] = []
@@ -208,9 +119,9 @@ class Batch(Closing):
                 self._fmus.append(Fmu(export_base(self.settings, self.robot, Path(folder))))
         self._allocate()
         native = self._native_settings(robots)
-        arrays = _Arrays(**{name: getattr(self, name).ctypes.data for name in ARRAYS})
+        arrays = NativeArrays(**{name: getattr(self, name).ctypes.data for name in ARRAYS})
         message = ct.create_string_buffer(MESSAGE_SIZE)
-        self._library = _library()
+        self._library = environments_library()
         self._all = self._library.hx_environments_create(
             ct.byref(native), ct.byref(arrays), self.count, message
         )
@@ -246,20 +157,20 @@ class Batch(Closing):
     def _references(self, fmu: Fmu, names: Sequence[str]) -> int:
         return self._keep(fmu.references(names), np.uint32)
 
-    def _fmu(self, fmu: Fmu) -> _Fmu:
+    def _fmu(self, fmu: Fmu) -> NativeFmu:
         """Returns the functions of an FMU and what its instances are made with."""
         calls = {name: fmu.address(f"fmi2{name}") for name in CALLS}
         calls |= {name: fmu.address(name) for name in WORK}
         texts = {"guid": fmu.description.guid.encode(), "resources": fmu.resources.encode()}
         self._kept.append(texts)
-        return _Fmu(**calls, **texts)
+        return NativeFmu(**calls, **texts)
 
-    def _native_settings(self, robots: Sequence[Robot]) -> _Settings:
+    def _native_settings(self, robots: Sequence[Robot]) -> NativeSettings:
         """Returns the settings as C reads them."""
         given, plant = self.settings, self._fmus[0]
         stance = np.array([leg.stance for leg in self.robot.legs])
         commands = (given.command_vx, given.command_vy, given.command_yaw_rate)
-        native = _Settings(
+        native = NativeSettings(
             plant=self._fmu(plant),
             plant_output=self._references(plant, OUTPUTS),
             plant_input=self._references(plant, [*JOINT_COMMANDS, *PUSH[:3]]),
@@ -295,12 +206,12 @@ class Batch(Closing):
     def _maps(self) -> GroundMaps:
         return ground_maps(self.settings, self._robots)
 
-    def _ground(self) -> _Ground:
+    def _ground(self) -> NativeGround:
         """Returns the heights that robots observe, as C reads them."""
         maps, places = self._maps, self.settings.places
         names, number = self.drawn_names, GROUND
         count, rows, columns = maps.height.shape
-        return _Ground(
+        return NativeGround(
             height=self._keep(maps.height, np.float32),
             place=self._keep(places, float),
             count=count,
@@ -314,7 +225,7 @@ class Batch(Closing):
             clearance=maps.clearance,
         )
 
-    def _add_controller(self, native: _Settings) -> None:
+    def _add_controller(self, native: NativeSettings) -> None:
         """Adds the controller to the settings as C reads them."""
         controller = self._fmus[1]
         native.controller = self._fmu(controller)
@@ -324,7 +235,7 @@ class Batch(Closing):
         native.substeps = round(1.0 / (RATE * CONTROL_PERIOD))
         native.h = CONTROL_PERIOD
 
-    def _draws(self, robots: Sequence[Robot]) -> _Draws:
+    def _draws(self, robots: Sequence[Robot]) -> NativeDraws:
         """Returns the parameters that are drawn for each episode, as C reads them."""
         drawn: dict[str, tuple[float, float, bool]] = {
             name: (low, high, False) for name, (low, high) in self.settings.randomise.items()
@@ -338,7 +249,7 @@ class Batch(Closing):
         for name in drawn:
             self._check_parameter(name)
         low, high, whole = ([ends[place] for ends in drawn.values()] for place in range(3))
-        return _Draws(
+        return NativeDraws(
             reference=self._references(self._fmus[0], self.drawn_names),
             low=self._keep(low, float),
             high=self._keep(high, float),
@@ -371,12 +282,10 @@ class Batch(Closing):
         seeds: one for each environment, from which its episodes begin again; None: the next
         episodes. Raises FmuError when a plant refuses its start.
         """
+        if seeds is not None:
+            check_seeds(seeds, self.count)
         numbers = None if seeds is None else np.array(seeds, dtype=np.uint64)
-        chosen = None if mask is None else np.ascontiguousarray(mask, dtype=np.uint8)
-        if numbers is not None and numbers.shape != (self.count,):
-            raise HexapodError("seeds", got=numbers.shape, expected=f"{self.count} numbers")
-        if chosen is not None and chosen.shape != (self.count,):
-            raise HexapodError("mask", got=chosen.shape, expected=f"{self.count} flags")
+        chosen = None if mask is None else checked_mask(mask, self.count)
         self._library.hx_environments_reset(
             self._handle(),
             None if chosen is None else chosen.ctypes.data,
@@ -432,8 +341,3 @@ class Batch(Closing):
         for fmu in self._fmus:
             fmu.close()
         self._fmus.clear()
-
-
-def _check_count(what: str, count: int) -> None:
-    if count < 1:
-        raise HexapodError(f"number of {what}", got=count, expected="1 or more", fix="give one")

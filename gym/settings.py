@@ -5,12 +5,20 @@ numbers, as data.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
 from types import MappingProxyType
 from typing import Any
 
-from hexapod_cosim.models import HexapodError, unknown_name
+from hexapod_cosim.gym.checks import (
+    check_count,
+    check_names,
+    check_number,
+    check_range,
+    check_scale,
+    check_widths,
+    refused,
+)
 
 JOINTS = 18
 RATE = 50  # Hz  of actions
@@ -51,6 +59,14 @@ TERMS = (
 )
 # Reasons for the end of an episode (hxEnvReason in C).
 REASONS = ("", "time", "tilted", "belly", "failed")
+
+# Settings by what their numbers may be.
+POSITIVE = ("action_scale", "tolerance", "step_max", "scan_spacing", "max_tilt")
+NOT_NEGATIVE = (
+    *("clock", "scan_length", "scan_width", "command_interval"),
+    *("push_force", "belly_force", "pad_radius"),
+)
+TIMES = ("duration", "push_interval", "push_duration")  # at least one step
 
 Range = tuple[float, float]
 Scale = float | tuple[float, float, float]
@@ -142,27 +158,35 @@ class EnvSettings:
 
     def __post_init__(self) -> None:
         """Checks names and numbers."""
-        _check_names(self.rewards, "term of the reward", TERMS)
-        _check_names(self.observation, "block of the observation", BLOCKS)
-        _check_names([self.base], "base of actions", BASES)
+        check_names(self.rewards, "term of the reward", TERMS)
+        check_names(self.observation, "block of the observation", BLOCKS)
+        check_names([self.base], "base of actions", BASES)
+        for name in POSITIVE:
+            check_number(name, getattr(self, name), above=0.0)
+        for name in NOT_NEGATIVE:
+            check_number(name, getattr(self, name), least=0.0)
+        for name in TIMES:
+            check_number(name, getattr(self, name), least=1.0 / RATE)
+        if self.command_interval:
+            check_number("command_interval", self.command_interval, least=1.0 / RATE)
+        check_count("terrain_seeds", self.terrain_seeds)
         for name in ("command_vx", "command_vy", "command_yaw_rate"):
             check_range(name, getattr(self, name))
         for name, given in self.randomise.items():
             check_range(f"randomise: {name}", given)
-        if not all(math.isfinite(weight) for weight in self.rewards.values()):
-            raise _refused("a weight of the reward", dict(self.rewards), "finite numbers")
-        for name in ("action_scale", "duration", "tolerance", "push_interval", "scan_spacing"):
-            value = getattr(self, name)
-            if not (math.isfinite(value) and value > 0.0):
-                raise _refused(name, value, "a finite number above 0")
-        for name in ("command_interval", "scan_length", "scan_width"):
-            value = getattr(self, name)
-            if not (math.isfinite(value) and value >= 0.0):
-                raise _refused(name, value, "a finite number, 0 or above")
-        if "heights" in self.observation and len(self.places) > MOST_PLACES:
-            raise _refused("scan_spacing", self.scan_spacing, f"at most {MOST_PLACES} places")
+        for name, weight in self.rewards.items():
+            check_number(f"rewards: {name}", weight)
+        check_widths("tracking_width", self.tracking_width)
+        self._check_observation()
+
+    def _check_observation(self) -> None:
+        """Checks the scales of the observed blocks, and the number of scanned places."""
         if not self.observation:
-            raise _refused("observation", "no blocks", f"some of {', '.join(BLOCKS)}")
+            raise refused("observation", "no blocks", f"some of {', '.join(BLOCKS)}")
+        for name, scale in self.observation.items():
+            check_scale(f"observation: {name}", scale, axes=BLOCKS[name] == 3)
+        if "heights" in self.observation and len(self.places) > MOST_PLACES:
+            raise refused("scan_spacing", self.scan_spacing, f"at most {MOST_PLACES} places")
 
     @property
     def size(self) -> int:
@@ -183,7 +207,7 @@ class EnvSettings:
     @property
     def steps(self) -> int:
         """Number of steps in a whole episode."""
-        return max(round(self.duration * RATE), 1)
+        return round(self.duration * RATE)
 
 
 def symmetric(extent: float, spacing: float) -> list[float]:
@@ -192,31 +216,15 @@ def symmetric(extent: float, spacing: float) -> list[float]:
     return [spacing * number for number in range(-half, half + 1)]
 
 
-def check_range(name: str, given: Range) -> None:
-    """Raises HexapodError for a range that is not finite or whose ends are exchanged."""
-    if len(given) != 2 or not all(map(math.isfinite, given)) or given[0] > given[1]:
-        raise _refused(name, given, "a range (lowest, highest) of finite numbers")
-
-
 def changed(settings: EnvSettings, changes: Mapping[str, Any]) -> EnvSettings:
     """Returns settings with changes by name. Raises HexapodError for an unknown name.
 
-    An observation may be given by its name: legged_gym or measurable.
+    An observation may be given by its name, one of OBSERVATIONS.
     """
     known = [item.name for item in fields(EnvSettings)]
-    _check_names(changes, "setting of the environment", known)
+    check_names(changes, "setting of the environment", known)
     given = dict(changes)
     if isinstance(given.get("observation"), str):
-        _check_names([given["observation"]], "observation", OBSERVATIONS)
+        check_names([given["observation"]], "observation", OBSERVATIONS)
         given["observation"] = OBSERVATIONS[given["observation"]]
     return replace(settings, **given)
-
-
-def _check_names(names: Iterable[str], what: str, valid: Iterable[str]) -> None:
-    for name in names:
-        if name not in valid:
-            raise unknown_name(what, name, list(valid))
-
-
-def _refused(what: str, got: object, expected: str) -> HexapodError:
-    return HexapodError(what, got=got, expected=expected, fix="change this setting")

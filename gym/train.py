@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hexapod_cosim.gym.batch import Batch
+from hexapod_cosim.gym.checks import check_count, check_number, check_seeds
 from hexapod_cosim.gym.policy import FREE, FREE_SIZE, INPUTS, Policy, symmetric_weights
 from hexapod_cosim.gym.settings import MEASURABLE, EnvSettings
 
@@ -49,6 +50,14 @@ class TrainSettings:
     rate: float = 0.03  # of Adam
     seed: int = 0
 
+    def __post_init__(self) -> None:
+        """Checks the numbers. Raises HexapodError."""
+        for name in ("minutes", "size", "rate"):
+            check_number(name, getattr(self, name), above=0.0)
+        for name in ("generations", "pairs"):
+            check_count(name, getattr(self, name))
+        check_seeds([self.seed], 1)
+
 
 @dataclass(frozen=True, kw_only=True)
 class Progress:
@@ -57,8 +66,19 @@ class Progress:
     generation: int
     mean: float
     best: float
-    distance: float  # m  mean way along the command of an episode
+    distance: float  # m  mean way forward in an episode
     seconds: float
+
+    @classmethod
+    def of(cls, generation: int, returns: Array, way: float, seconds: float) -> Progress:
+        """Returns the progress of a generation from the returns of its policies."""
+        return cls(
+            generation=generation,
+            mean=float(returns.mean()),
+            best=float(returns.max()),
+            distance=way,
+            seconds=seconds,
+        )
 
 
 Report = Callable[[Progress], None]
@@ -138,29 +158,26 @@ def ranks(values: Array) -> Array:
 def train(settings: EnvSettings, how: TrainSettings, report: Report) -> Policy:
     """Trains a policy until the time is over or all generations are done, and returns it.
 
-    Raises HexapodError for impossible settings of the environment.
+    Ctrl-C ends the training with the policy of the last whole generation; KeyboardInterrupt is
+    raised before the first one. Raises HexapodError for impossible settings of the environment.
     """
     begin, rng = time.monotonic(), np.random.default_rng(how.seed)
     free, ascent = first_parameters(rng), Adam(how.rate)
     with Batch(settings, 2 * how.pairs, autoreset="disabled") as batch:
-        for generation in range(how.generations):
-            changes = rng.standard_normal((how.pairs, FREE_SIZE))
-            policies = free + how.size * np.concatenate([changes, -changes])
-            found, way = returns(batch, policies, seed=generation)
-            weight = ranks(found)
-            free += ascent.step((weight[: how.pairs] - weight[how.pairs :]) @ changes)
-            seconds = time.monotonic() - begin
-            report(
-                Progress(
-                    generation=generation,
-                    mean=float(found.mean()),
-                    best=float(found.max()),
-                    distance=way,
-                    seconds=seconds,
-                )
-            )
-            if seconds > 60.0 * how.minutes:
-                break
+        try:
+            for generation in range(how.generations):
+                changes = rng.standard_normal((how.pairs, FREE_SIZE))
+                policies = free + how.size * np.concatenate([changes, -changes])
+                found, way = returns(batch, policies, seed=generation)
+                weight = ranks(found)
+                free = free + ascent.step((weight[: how.pairs] - weight[how.pairs :]) @ changes)
+                seconds = time.monotonic() - begin
+                report(Progress.of(generation, found, way, seconds))
+                if seconds > 60.0 * how.minutes:
+                    break
+        except KeyboardInterrupt:
+            if not ascent.count:
+                raise
         return Policy(
             **symmetric_weights(free),
             robot=batch.robot.name,

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from numbers import Integral
 from typing import Any
 
+import gymnasium
 import numpy as np
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
 from hexapod_cosim.gym.batch import Batch
+from hexapod_cosim.gym.checks import check_count, check_names, checked_mask
 from hexapod_cosim.gym.environment import (
     LARGEST_SEED,
     RENDER_MODES,
@@ -21,7 +24,6 @@ from hexapod_cosim.gym.environment import (
 )
 from hexapod_cosim.gym.settings import JOINTS, RATE, REASONS, TERMS, changed
 from hexapod_cosim.gym.tasks import task as task_settings
-from hexapod_cosim.models import HexapodError
 
 MODES = {
     AutoresetMode.NEXT_STEP: "next_step",
@@ -31,6 +33,13 @@ MODES = {
 Result = tuple[
     NDArray[np.float32], NDArray[np.float64], NDArray[np.bool_], NDArray[np.bool_], dict[str, Any]
 ]
+
+
+def checked_mode(mode: AutoresetMode | str) -> AutoresetMode:
+    """Returns an autoreset mode. Raises HexapodError for an unknown one."""
+    names = [one.value for one in AutoresetMode]
+    check_names([mode.value if isinstance(mode, AutoresetMode) else mode], "autoreset mode", names)
+    return AutoresetMode(mode)
 
 
 class HexapodVectorEnv(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[Any]]):
@@ -47,7 +56,9 @@ class HexapodVectorEnv(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDArr
 
     A robot whose action is not finite does not step: `info["refused"]` marks it, its observation
     stays and its reward is 0. The info of a step also has `terms`, the weighted terms of the reward
-    by name, and `reason` of the episodes that ended.
+    by name; of the episodes that ended `reason` and `message` (of those that failed); of those that
+    began `drawn`. With the mode same step, `final_obs` and `final_info` are those of the ends.
+    Where a key applies to some of the robots, `_` and the key is their mask.
     """
 
     def __init__(
@@ -61,7 +72,8 @@ class HexapodVectorEnv(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDArr
         render_mode: str | None = None,
         **changes: Any,
     ) -> None:
-        mode = AutoresetMode(autoreset_mode)
+        mode = checked_mode(autoreset_mode)
+        check_count("number of environments", num_envs)
         self.settings = changed(task_settings(task), changes)
         self.num_envs, self._copy, self._mode = num_envs, copy, mode
         self.render_mode = checked_render_mode(render_mode)
@@ -76,6 +88,8 @@ class HexapodVectorEnv(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDArr
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self._batch = Batch(self.settings, num_envs, threads=threads, autoreset=MODES[mode])
         self._seeded = False
+        self._begun = np.zeros(num_envs, bool)
+        self._ended = np.zeros(num_envs, bool)  # by the last step
 
     def reset(
         self,
@@ -88,34 +102,44 @@ class HexapodVectorEnv(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDArr
         seed: one for each environment, or a number s: environment i has the seed s + i.
         """
         mask = None if options is None else options.get("reset_mask")
+        chosen = slice(None) if mask is None else checked_mask(mask, self.num_envs) > 0
         first = seed is None and not self._seeded
-        super().reset(seed=seed if isinstance(seed, int) else None)
+        super().reset(seed=int(seed) if isinstance(seed, Integral) else None)
         if first:
-            self._seeded, seed = True, int(self.np_random.integers(LARGEST_SEED))
+            seed = int(self.np_random.integers(LARGEST_SEED))
         self._batch.reset(seeds=None if seed is None else self._seeds(seed), mask=mask)
-        self._seeded = True
-        drawn = [self._batch.drawn(index) for index in range(self.num_envs)]
-        names = self._batch.drawn_names
-        values = {name: np.array([one[name] for one in drawn]) for name in names}
-        return self._given(self._batch.observation), {"drawn": values}
+        self._seeded, self._begun[chosen], self._ended[chosen] = True, True, False
+        every = range(self.num_envs)
+        return self._given(self._batch.observation), {"drawn": self._drawn(every)}
+
+    def _drawn(self, indices: Iterable[int]) -> dict[str, NDArray[np.float64]]:
+        """Returns the drawn parameters of environments by name, 0 for the others."""
+        values = {name: np.zeros(self.num_envs) for name in self._batch.drawn_names}
+        if values:
+            for index in indices:
+                for name, value in self._batch.drawn(index).items():
+                    values[name][index] = value
+        return values
 
     def _seeds(self, seed: int | Sequence[int | None]) -> list[int]:
-        """Returns the seeds of all environments. Raises HexapodError."""
-        if isinstance(seed, int):
-            return [seed + index for index in range(self.num_envs)]
-        if len(seed) != self.num_envs:
-            raise HexapodError(
-                "seeds", got=f"{len(seed)} of them", expected=f"{self.num_envs}, one for each"
-            )
+        """Returns the seeds of all environments."""
+        if isinstance(seed, (int, Integral)):
+            return [int(seed) + index for index in range(self.num_envs)]
         draw = self.np_random.integers
         return [int(draw(LARGEST_SEED)) if one is None else one for one in seed]
 
     def step(self, actions: NDArray[np.float32]) -> Result:
         """Steps all environments by 20 ms under actions (num_envs, 18) in [-1, 1].
 
-        Raises InvalidAction for another shape.
+        Raises InvalidAction for another shape, ResetNeeded before the first reset of each
+        environment.
         """
         batch = self._batch
+        if not self._begun.all():
+            raise gymnasium.error.ResetNeeded(
+                f"step: got a call before the reset of {np.count_nonzero(~self._begun)} "
+                "environments, expected one after it; call reset"
+            )
         batch.action[...] = checked(actions, (self.num_envs, JOINTS))
         batch.step()
         return (
@@ -128,18 +152,35 @@ class HexapodVectorEnv(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDArr
 
     def _info(self) -> dict[str, Any]:
         batch = self._batch
-        info: dict[str, Any] = {
-            "terms": dict(zip(TERMS, self._given(batch.term).T, strict=True)),
-            "refused": self._given(batch.refused),
-        }
+        own: dict[str, Any] = {"terms": dict(zip(TERMS, self._given(batch.term).T, strict=True))}
+        info: dict[str, Any] = {"refused": self._given(batch.refused)}
         ended = batch.terminated | batch.truncated
         if ended.any():
-            info["reason"] = np.array([REASONS[reason] for reason in batch.reason], dtype=object)
-            info["_reason"] = ended
+            own |= self._ends(ended)
             if self._mode is AutoresetMode.SAME_STEP:
-                info["final_obs"] = self._given(batch.last)
-                info["_final_obs"] = ended
-        return info
+                info |= {"final_obs": self._given(batch.last), "_final_obs": ended}
+                info |= {"final_info": own, "_final_info": ended}
+        began = {
+            AutoresetMode.NEXT_STEP: self._ended,
+            AutoresetMode.SAME_STEP: ended,
+            AutoresetMode.DISABLED: np.zeros_like(ended),
+        }[self._mode]
+        if began.any():
+            info |= {"drawn": self._drawn(np.flatnonzero(began)), "_drawn": began}
+        self._ended = ended
+        return info | own
+
+    def _ends(self, ended: NDArray[np.bool_]) -> dict[str, Any]:
+        """Returns why episodes ended, with the messages of the plants that failed."""
+        reason = [REASONS[number] for number in self._batch.reason]
+        found = {"reason": np.array(reason, dtype=object), "_reason": ended}
+        failed = np.array([one == "failed" for one in reason])
+        if failed.any():
+            message = np.full(self.num_envs, "", dtype=object)
+            for index in np.flatnonzero(failed):
+                message[index] = self._batch.message(int(index))
+            found |= {"message": message, "_message": failed}
+        return found
 
     def render(self) -> tuple[NDArray[np.uint8], ...] | None:
         """Returns a picture (360, 480, 3) of each robot, None without a render mode."""

@@ -10,9 +10,9 @@
  */
 #include <string.h>
 
+#include "command/command.h"
 #include "driver.h"
 #include "kernel.h"
-#include "robot.h"
 
 enum { VISITS = 400, ROUNDS = 25 };
 

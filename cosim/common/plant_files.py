@@ -25,7 +25,7 @@ SHARED_HEADERS = (
 )
 LOOP = "hexapod_master"  # the shared library of the co-simulation loop
 # each needs the headers of its version of the standard only
-FMI2_SOURCE, FMI3_SOURCE = "fmi/fmi2.c", "fmi/fmi3.c"
+FMI2_SOURCES, FMI3_SOURCES = "fmi/fmi2", "fmi/fmi3"  # beginnings of the names
 BUILD = "run `pip install -e .` in the source tree, or `pip install .` (both need a C compiler)"
 # values of platform.machine() in lower case
 X86 = {"x86_64", "amd64", "i386", "i486", "i586", "i686", "x86"}

@@ -16,8 +16,8 @@ from zipfile import ZIP_DEFLATED, ZIP_STORED
 from hexapod_cosim.cosim.common.components import PLANT, Component
 from hexapod_cosim.cosim.common.files import atomic_path, not_writable
 from hexapod_cosim.cosim.common.plant_files import (
-    FMI2_SOURCE,
-    FMI3_SOURCE,
+    FMI2_SOURCES,
+    FMI3_SOURCES,
     binary,
     fmi2_platform,
     fmi3_platform,
@@ -167,11 +167,13 @@ def _members(interface: Interface, binaries: Mapping[str, bytes], fmi: int) -> d
 
 
 def _sources(component: Component, fmi: int) -> dict[str, bytes]:
-    """Returns the binary's sources without the file for the other version of the standard, whose
+    """Returns the binary's sources without the files for the other version of the standard, whose
     headers an importer may not have.
     """
-    other = FMI3_SOURCE if fmi == 2 else FMI2_SOURCE
-    files = {name: path for name, path in source_files(component).items() if name != other}
+    other = FMI3_SOURCES if fmi == 2 else FMI2_SOURCES
+    files = {
+        name: path for name, path in source_files(component).items() if not name.startswith(other)
+    }
     members = {f"sources/{name}": path.read_bytes() for name, path in files.items()}
     if fmi == 3:
         description = render_build_description(

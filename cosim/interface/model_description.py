@@ -10,7 +10,7 @@ from xml.etree import ElementTree
 from xml.etree.ElementTree import Element, SubElement
 
 from hexapod_cosim.cosim.common.components import Component
-from hexapod_cosim.cosim.common.plant_files import DISTRIBUTION, FMI3_SOURCE, source_files
+from hexapod_cosim.cosim.common.plant_files import DISTRIBUTION, FMI3_SOURCES, source_files
 from hexapod_cosim.cosim.interface.interface import Enumeration, Interface, Unit, Variable
 
 # capabilities, each tested by tests/fmi/test_fmi.py or in tests/exchange
@@ -102,7 +102,7 @@ def _add_sources(element: Element, component: Component) -> None:
     """Adds the list of the component's C files."""
     files = SubElement(element, "SourceFiles")
     for name in source_files(component):
-        if name.endswith(".c") and name != FMI3_SOURCE:
+        if name.endswith(".c") and not name.startswith(FMI3_SOURCES):
             SubElement(files, "File", name=name)
 
 

@@ -28,9 +28,13 @@ from tempfile import TemporaryDirectory
 
 from hexapod_cosim.controller import BodyCommand, ControllerError, Gains, JointCommand
 from hexapod_cosim.cosim.common.closing import Closing
-from hexapod_cosim.cosim.control.controllers import make_controller
-from hexapod_cosim.cosim.export.controller_export import export_controller
-from hexapod_cosim.cosim.interface.controller_interface import controller_parameters
+from hexapod_cosim.cosim.live.controls import (
+    HORIZON,
+    REST,
+    Controls,
+    differ_in_control,
+    differ_in_gait,
+)
 from hexapod_cosim.cosim.live.fault import text_of
 from hexapod_cosim.cosim.live.gait_change import GaitChange, begin_change
 from hexapod_cosim.cosim.live.protocol import Change
@@ -38,7 +42,6 @@ from hexapod_cosim.cosim.live.settings import Choices, Limits, Settings, find_li
 from hexapod_cosim.cosim.live.take import Force
 from hexapod_cosim.cosim.live.takeover import Stop, blend
 from hexapod_cosim.cosim.master.fmu import Fmu
-from hexapod_cosim.cosim.master.fmu_controller import FmuController
 from hexapod_cosim.cosim.master.loop import JointController
 from hexapod_cosim.cosim.master.signals import Signals
 from hexapod_cosim.cosim.results.walk import robot_weight
@@ -53,12 +56,10 @@ from hexapod_cosim.cosim.run.run import (
 from hexapod_cosim.cosim.scenario.controls import control_of
 from hexapod_cosim.models import FmuError, HexapodError
 
-HORIZON = 1e6  # s    stop time of the FMUs
 FADE = 0.4  # s    from the joint commands of one controller to those of the next
 PATIENCE = 4.0  # gait periods    after which the controller is changed although the robot moves
 STATE = "initial."  # prefix of the plant's parameters for the state at the start
 MOST_WEIGHTS = 3.0  # body weights    largest push
-REST = BodyCommand()
 
 
 class LiveRobot(Closing):
@@ -83,8 +84,7 @@ class LiveRobot(Closing):
         self.choices, self._gains = choices, gains
         self._open = ExitStack()
         self._folder = Path(self._open.enter_context(TemporaryDirectory(prefix="hexapod-live-")))
-        self._built_in: Fmu | None = None
-        self._law = self._open.enter_context(ExitStack())  # of a user's control
+        self._controls = self._open.enter_context(Controls(self._folder, gains))
         self.wanted: Settings | None = None
         self._from = JointCommand()  # that the present controller is faded in from
         self.limits: Limits
@@ -184,22 +184,11 @@ class LiveRobot(Closing):
 
         It can from one built-in control to another, while no other change needs a stand.
         """
-        present, then = self.plan.controller, plan.controller
-        robot = replace(then.robot, friction=present.robot.friction)
-        same = replace(present, gains=then.gains, law=then.law, gait=then.gait)
-        scenarios = self.plan.scenario, plan.scenario
-        return (
-            all(control_of(scenario.control).is_builtin for scenario in scenarios)
-            and not self.halts
-            and not self.fault
-            and replace(then, robot=robot) == same
-        )
+        return not self.halts and not self.fault and differ_in_control(self.plan, plan)
 
     def _exchange(self, wanted: Settings, plan: RunPlan) -> None:
         """Lets the controller FMU go on under another control."""
-        assert self._built_in is not None
-        number = controller_parameters(plan.controller)["control"]
-        self._built_in.set_parameters({"control": number})
+        self._controls.change_control(plan.controller)
         self.settings = replace(self.settings, control=wanted.control)
         if self.wanted is None:
             self.plan = plan
@@ -209,14 +198,8 @@ class LiveRobot(Closing):
 
     def _can_walk_on(self, wanted: Settings, plan: RunPlan) -> bool:
         """Whether the gait alone changes, and the controller FMU can change it."""
-        present, then = self.plan.controller, plan.controller
-        robot = replace(then.robot, friction=present.robot.friction)  # a change of friction is late
-        return (
-            wanted == replace(self.settings, gait=wanted.gait)
-            and control_of(self.plan.scenario.control).is_builtin
-            and not self.fault
-            and replace(then, gait=present.gait, robot=robot) == present
-        )
+        alone = wanted == replace(self.settings, gait=wanted.gait)
+        return alone and not self.fault and differ_in_gait(self.plan, plan)
 
     def _begin_gait_change(self) -> None:
         """Slows down for the change to the gait of the next plan."""
@@ -239,10 +222,7 @@ class LiveRobot(Closing):
         """Makes what is due of a change of gait."""
         setup = self._next.controller
         if change.tell == 0:
-            assert self._built_in is not None
-            given = controller_parameters(setup)
-            gait = {name: value for name, value in given.items() if name.startswith("gait.")}
-            self._built_in.set_parameters(gait)
+            self._controls.change_gait(setup)
             self._period, self._patience = setup.gait.period, PATIENCE * setup.gait.period
         if change.hold == 0:
             assert self.wanted is not None
@@ -294,27 +274,9 @@ class LiveRobot(Closing):
         self.limits = find_limits(setup.robot, setup.gait)
         self._period = setup.gait.period
         self._patience = PATIENCE * self._period
-        self._law.close()
-        self._controller: JointController
-        if control_of(self.plan.scenario.control).is_builtin:
-            self._controller = self._built_in_controller()
-            return
-        controller = self._law.enter_context(make_controller(self.plan))
-        controller.start(self.time, HORIZON, REST, self._signals.measurement)
-        self._controller = controller
-
-    def _built_in_controller(self) -> FmuController:
-        """Returns the controller FMU with the plan's parameters, and gains for each control."""
-        setup = self.plan.controller
-        known = replace(setup, gains=setup.gains or self._gains)
-        control = {"control": controller_parameters(setup)["control"]}
-        if self._built_in is None:
-            path = export_controller(setup, self._folder / "controller.fmu")
-            self._built_in = self._open.enter_context(Fmu(path, name="controller"))
-        self._built_in.reset()
-        self._built_in.set_parameters(controller_parameters(known) | control)
-        self._built_in.initialise(self.time, HORIZON)
-        return FmuController(self._built_in, period=setup.period)
+        self._controller: JointController = self._controls.start(
+            self.plan, self.time, self._signals.measurement
+        )
 
     # ------------------------------------------------------------------------------- steps
 

@@ -123,31 +123,33 @@ static void show_end(const hxEnvironments *all, size_t i) {
   to->terminated[i] = environment->ended && !to->truncated[i];
 }
 
+/* Starts the next episode in the same step and keeps the last observation of the one before. */
+static void renew(const hxEnvironments *all, size_t i) {
+  memcpy(all->arrays.last + i * all->size, observation_of(all, i),
+         all->size * sizeof *all->arrays.last);
+  begin_next_episode(all, i);
+}
+
 static void step_going(const hxEnvironments *all, size_t i, const float *action) {
   const hxEnvArrays *to = &all->arrays;
   hxEnvironment *environment = &all->environment[i];
   to->reward[i] = hx_environment_step(environment, action, to->term + i * HX_ENV_TERMS);
   hx_environment_observe(environment, observation_of(all, i));
-  show_end(all, i);
-  if (!environment->ended || all->settings.autoreset != HX_AUTORESET_SAME_STEP) return;
-  memcpy(to->last + i * all->size, observation_of(all, i), all->size * sizeof *to->last);
-  begin_next_episode(all, i);
 }
 
 static void step_one(const hxEnvironments *all, size_t i) {
   hxEnvironment *environment = &all->environment[i];
   const float *action = all->arrays.action + i * HX_ENV_JOINTS;
   clear_results(all, i);
-  if (environment->ended && all->settings.autoreset == HX_AUTORESET_NEXT_STEP) {
+  if (environment->ended && all->settings.autoreset == HX_AUTORESET_NEXT_STEP)
     begin_next_episode(all, i);
-    return;
-  }
-  if (environment->ended)
-    show_end(all, i);
-  else if (is_finite_action(action))
+  else if (!environment->ended && is_finite_action(action))
     step_going(all, i, action);
-  else
+  else if (!environment->ended)
     all->arrays.refused[i] = 1;
+  if (!environment->ended) return;
+  show_end(all, i); /* also of an episode whose start failed */
+  if (all->settings.autoreset == HX_AUTORESET_SAME_STEP) renew(all, i);
 }
 
 /* ----------------------------------------------------------------------------------------------

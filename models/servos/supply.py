@@ -1,7 +1,6 @@
 """Computes what motors get from their supply: the heat of winding and housing with the duty limit
 of hot motors (eq. 52), and the voltage of a battery under load (eq. 53); and what servos get from
-their bus. The fast forms are in
-plant_fmu/src/measure/measure.h and plant_fmu/src/robot.c.
+their bus. The fast forms are in plant_fmu/src/measure/measure.h and in plant_fmu/src/command.
 """
 
 from __future__ import annotations

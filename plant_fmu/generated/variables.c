@@ -2046,7 +2046,7 @@ const size_t hx_state_count = sizeof states / sizeof states[0];
 
 _Static_assert(sizeof states / sizeof states[0] == sizeof(hxCoordinates) / sizeof(double), "each state has its row");
 
-const char hx_default_guid[] = "{5864bb39-bbb3-466f-ba0b-33a1ea7abdcd}";
+const char hx_default_guid[] = "{28669989-12ff-484d-bdb0-23c9f2e87a7a}";
 
 _Static_assert(HX_CONTACT_EXACT_RESTITUTION == 1, "ContactLaw");
 _Static_assert(HX_CONTACT_FLORES == 2, "ContactLaw");

@@ -146,7 +146,7 @@ DAMAGED_DESCRIPTIONS = [
         replaced("src/plant.c", "src/robots.c"),
         "lists the source src/robots.c, which is not in the archive",
     ),
-    (replaced("src/plant.c", "src/robot.c"), "lists the source src/robot.c more than once"),
+    (replaced("src/plant.c", "src/kernel.c"), "lists the source src/kernel.c more than once"),
 ]
 
 

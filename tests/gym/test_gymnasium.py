@@ -91,6 +91,116 @@ def test_wrong_settings_are_refused_by_name() -> None:
         HexapodEnv(randomise={"friction.nu": (0.4, 0.5)})
 
 
+@pytest.mark.parametrize(
+    ("setting", "value", "expected"),
+    [
+        ("max_tilt", -1.0, "a finite number above 0"),
+        ("clock", float("inf"), "a finite number, 0 or above"),
+        ("command_interval", 0.001, "a finite number, 0.02 or above"),
+        ("push_interval", 0.001, "a finite number, 0.02 or above"),
+        ("action_scale", "a", "a finite number above 0"),
+        ("terrain_seeds", 0, "a whole number, 1 or more"),
+        ("tracking_width", (0.0, 1.0), "two finite numbers above 0"),
+        ("command_vx", 0.1, "a range"),
+        ("rewards", {"alive": float("inf")}, "a finite number"),
+        # a block that is left out would move the others to wrong places
+        ("observation", {"velocity": 0.0, "angle": 1.0}, "a finite scale other than 0"),
+        ("observation", {"angle": (1.0, 1.0, 1.0)}, "a finite scale other than 0"),
+        ("observation", {"velocity": float("nan")}, "a finite scale other than 0"),
+    ],
+)
+def test_impossible_numbers_are_refused_before_anything_is_made(
+    setting: str, value: object, expected: str
+) -> None:
+    with pytest.raises(HexapodError, match=f"{setting}.*expected {expected}"):
+        HexapodEnv(**{setting: value})
+
+
+@pytest.mark.parametrize(
+    ("arguments", "expected"),
+    [
+        ({"num_envs": -1}, "a whole number, 1 or more"),
+        ({"num_envs": 2.5}, "a whole number, 1 or more"),
+        ({"threads": 0}, "a whole number, 1 or more"),
+        ({"autoreset_mode": "next"}, "one of NextStep, SameStep, Disabled"),
+    ],
+)
+def test_impossible_vectors_are_refused(arguments: dict[str, Any], expected: str) -> None:
+    with pytest.raises(HexapodError, match=f"expected {expected}"):
+        HexapodVectorEnv(**arguments)
+
+
+def test_wrong_seeds_and_masks_are_refused() -> None:
+    envs = HexapodVectorEnv(2)
+    try:
+        for seed in ([1], [1, -1], [1.5, 2], 2**64 - 1):
+            with pytest.raises(HexapodError, match="seed"):
+                envs.reset(seed=seed)  # type: ignore[arg-type]
+        for mask in ([True], [0.5, 1.0], "x"):
+            with pytest.raises(HexapodError, match=r"mask of environments.*an array of 2 bool"):
+                envs.reset(options={"reset_mask": mask})
+        numbers, whole = np.arange(3, 5), np.int64(3)
+        first = envs.reset(seed=numbers)[0]  # type: ignore[arg-type]
+        assert first.tobytes() == envs.reset(seed=whole)[0].tobytes()  # type: ignore[arg-type]
+    finally:
+        envs.close()
+
+
+def test_a_vector_steps_after_the_reset_of_all_its_robots_only() -> None:
+    envs = HexapodVectorEnv(2, autoreset_mode="SameStep")
+    try:
+        still = np.zeros((2, 18), np.float32)
+        with pytest.raises(gymnasium.error.ResetNeeded, match="the reset of 2 environments"):
+            envs.step(still)
+        envs.reset(options={"reset_mask": np.array([True, False])})
+        with pytest.raises(gymnasium.error.ResetNeeded, match="the reset of 1 environments"):
+            envs.step(still)
+        envs.reset(options={"reset_mask": np.array([False, True])})
+        assert not envs.step(still)[2].any()
+    finally:
+        envs.close()
+
+
+@pytest.mark.parametrize("mode", ["NextStep", "SameStep"])
+def test_infos_of_an_autoreset_have_the_end_and_what_was_drawn(mode: str) -> None:
+    envs = HexapodVectorEnv(2, task="HexapodPush-v0", autoreset_mode=mode, duration=0.04)
+    still = np.zeros((2, 18), np.float32)
+    try:
+        drawn = envs.reset(seed=1)[1]["drawn"]["friction.mu"]
+        infos = [envs.step(still)[4] for _ in range(3)]
+        assert infos[1]["reason"].tolist() == ["time", "time"]
+        assert ("final_info" in infos[1]) == (mode == "SameStep")
+        place = 1 if mode == "SameStep" else 2
+        assert [place for place in range(3) if "drawn" in infos[place]] == [place]
+        assert infos[place]["_drawn"].all()
+        again = infos[place]["drawn"]["friction.mu"]
+        assert ((again >= 0.5) & (again <= 0.9) & (again != drawn)).all()
+    finally:
+        envs.close()
+
+
+@pytest.mark.parametrize("mode", ["NextStep", "SameStep"])
+def test_an_episode_that_cannot_start_ends_with_its_message_and_is_followed_by_another(
+    mode: str,
+) -> None:
+    # some of the heights are so low that the plant refuses to start with feet deep in the ground
+    low = {"initial.position[3]": (0.02, 0.2)}
+    envs = HexapodVectorEnv(1, autoreset_mode=mode, duration=0.02, randomise=low, max_tilt=3.0)
+    still = np.zeros((1, 18), np.float32)
+    try:
+        envs.reset(seed=1)
+        infos = [envs.step(still)[4] for _ in range(12)]
+    finally:
+        envs.close()
+    failed = [place for place, info in enumerate(infos) if "message" in info]
+    assert failed
+    for place in failed:
+        assert infos[place]["reason"].tolist() == ["failed"]
+        assert "deep in the ground" in infos[place]["message"][0]
+    later = [info["reason"][0] for info in infos[failed[0] + 1 :] if "reason" in info]
+    assert "time" in later
+
+
 def test_the_examples_of_the_page_work_as_typed(capsys: pytest.CaptureFixture[str]) -> None:
     page = (ROOT / "docs" / "learning.md").read_text(encoding="utf-8")
     names: dict[str, Any] = {}

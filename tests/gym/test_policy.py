@@ -25,7 +25,7 @@ from hexapod_cosim.gym.policy import (
     symmetric_weights,
 )
 from hexapod_cosim.gym.tasks import task
-from hexapod_cosim.gym.train import TrainSettings, train, training_settings
+from hexapod_cosim.gym.train import Progress, TrainSettings, train, training_settings
 from hexapod_cosim.models import HexapodError, load_robot
 
 pytestmark = pytest.mark.usefixtures("plant_build")
@@ -150,3 +150,34 @@ def test_the_command_trains_and_exports(tmp_path: Path, capsys: pytest.CaptureFi
     assert fmu.is_file()
     assert main(["export", str(fmu), "-o", str(fmu)]) == 2
     assert "not a policy" in capsys.readouterr().err
+
+
+def test_the_command_refuses_before_it_trains(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    wrong = {
+        "minutes": "nan",
+        "generations": "0",
+        "seed": "-1",
+        "output": str(tmp_path / "none" / "policy.npz"),
+    }
+    for name, value in wrong.items():
+        options = {"output": str(tmp_path / "policy.npz"), "minutes": "0.001"} | {name: value}
+        given = [text for key, one in options.items() for text in (f"--{key}", one)]
+        assert main(["train", *given]) == 2
+        said = capsys.readouterr()
+        assert "expected" in said.err
+        assert "generation " not in said.out
+    assert not list(tmp_path.iterdir())
+
+
+def test_an_interrupted_training_keeps_the_policy_of_its_last_generation() -> None:
+    settings = replace(training_settings(task("Hexapod-v0")), duration=0.1)
+
+    def interrupt(progress: Progress) -> None:
+        if progress.generation == 1:
+            raise KeyboardInterrupt
+
+    kept = train(settings, TrainSettings(pairs=2, seed=4), interrupt)
+    whole = train(settings, TrainSettings(pairs=2, seed=4, generations=2), lambda _: None)
+    assert kept.action_weight.tobytes() == whole.action_weight.tobytes()

@@ -96,7 +96,8 @@ typedef enum hxEnvReason {
   HX_END_FAILED /* an FMU refused a step or its start, see the message: terminated */
 } hxEnvReason;
 
-/* What follows the end of an episode, as in Gymnasium. */
+/* What follows the end of an episode, as in Gymnasium. An episode whose start fails has ended, with
+ * HX_END_FAILED, and is followed by the next one like others. */
 typedef enum hxAutoreset {
   HX_AUTORESET_NEXT_STEP, /* the next step resets, whatever its action */
   HX_AUTORESET_SAME_STEP, /* the same step resets; the last observation is in `last` */

@@ -6,6 +6,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "command/command.h"
 #include "contact_law.h"
 #include "elementary.h"
 #include "ground/soil.h"
@@ -14,7 +15,8 @@
 #include "kernel.h"
 #include "lanes/dynamics.h"
 #include "method.h"
-#include "robot.h"
+#include "robot/frames.h"
+#include "robot/robot.h"
 
 #if defined(__GNUC__)
 #pragma GCC diagnostic ignored                                                                     \

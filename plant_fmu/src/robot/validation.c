@@ -2,9 +2,9 @@
 
 #include <math.h>
 
+#include "../method.h"
 #include "hexapod/message.h"
 #include "hexapod/range_check.h"
-#include "method.h"
 
 /* Returns whether a body can have the inertia I: I and (tr I / 2) 1 - I, its second moments of
  * mass, are positive (semi-)definite, which is the triangle inequality of the principal moments in

@@ -1,0 +1,62 @@
+#include "command.h"
+
+#include <math.h>
+#include <string.h>
+
+void hx_command_from_input(hxCommand *command, const hxInput *input, double time) {
+  for (int joint = 0; joint < HX_JOINTS; ++joint)
+    for (int slot = 0; slot < HX_SLOTS; ++slot) {
+      const int leg = slot < HX_LEGS ? slot : 0;
+      command->angle[joint][slot] = input->angle_ref[leg][joint];
+      command->speed[joint][slot] = input->speed_ref[leg][joint];
+      command->torque[joint][slot] = input->torque_ref[leg][joint];
+      command->acceleration[joint][slot] = input->acceleration_ref[leg][joint];
+    }
+  for (int i = 0; i < 3; ++i) {
+    command->push_force[i] = input->push_force[i];
+    command->push_torque[i] = input->push_torque[i];
+  }
+  command->supply = 0.0;
+  memset(command->duty, 0, sizeof command->duty);
+  command->time = time;
+}
+
+/* Returns the duty of a leg's motor under a command at the last moment, and in *speed the speed of
+ * its joint. */
+static double motor_duty(const hxCommand *command, const hxModel *model, const hxState *state,
+                         int joint, int leg, double *speed) {
+  const double angle = state->moment.angle[joint][leg], w = state->moment.speed[joint][leg];
+  const double limit = model->duty_max * command->duty[joint][leg];
+  double wanted = model->kp * (command->angle[joint][leg] - angle) +
+                  model->kd * (command->speed[joint][leg] - w) + command->torque[joint][leg];
+  if (model->servo_mode == HX_SERVO_TORQUE) wanted += model->back_emf * w;
+  *speed = w;
+  return fmax(-limit, fmin(limit, wanted * model->duty_max / model->stall_torque));
+}
+
+/* Returns the voltage of the supply over servo.voltage, at most 1 (eq. 53): with the duties d, the
+ * current is the sum of d (d V - k_t w)/R. */
+static double supply_share(const hxCommand *command, const hxModel *model, const hxState *state) {
+  const double ratio = model->supply_resistance / model->resistance;
+  double squares = 0.0, back = 0.0, speed;
+  for (int leg = 0; leg < HX_LEGS; ++leg)
+    for (int joint = 0; joint < HX_JOINTS; ++joint) {
+      const double duty = motor_duty(command, model, state, joint, leg, &speed);
+      squares += duty * duty, back += duty * speed;
+    }
+  const double emf = model->torque_constant * back / model->voltage;
+  return fmin(1.0, (1.0 + ratio * emf) / (1.0 + ratio * squares));
+}
+
+void hx_command_supply(hxCommand *command, const hxModel *model, const hxState *state) {
+  const hxHeat *heat = &model->heat;
+  const double per_kelvin = 1.0 / (heat->max - heat->derate);
+  for (int joint = 0; joint < HX_JOINTS; ++joint)
+    for (int slot = 0; slot < HX_SLOTS; ++slot) {
+      const double left = (heat->max - state->measured.winding[joint][slot]) * per_kelvin;
+      command->duty[joint][slot] = heat->winding > 0.0 ? fmax(0.0, fmin(1.0, left)) : 1.0;
+    }
+  const int sags = model->supply_resistance > 0.0 && model->servo_drive == HX_DRIVE_MOTOR &&
+                   model->servo_mode != HX_SERVO_KINEMATIC;
+  command->supply = sags ? supply_share(command, model, state) : 1.0;
+}

@@ -1,0 +1,149 @@
+#include <float.h>
+#include <math.h>
+#include <string.h>
+
+#include "../command/command.h"
+#include "../kernel.h"
+#include "../robot/validation.h"
+#include "hexapod/message.h"
+#include "hexapod/status.h"
+#include "parts.h"
+
+/* Returns the command of a rate, NULL for a rate of zero; *finite: all its numbers are finite. */
+static const hxCommand *ramp_from_rate(const hxInput *rate, hxCommand *command, int *finite) {
+  const double size = hx_largest(0.0, rate, sizeof *rate / sizeof(double));
+  *finite = isfinite(size);
+  if (!rate || size == 0.0) return NULL;
+  hx_command_from_input(command, rate, 0.0);
+  return command;
+}
+
+/* Returns a fingerprint of an input: 52 bits of a checksum, never 0. */
+static double input_fingerprint(const hxInput *input) {
+  return 1.0 + (double)(hx_checksum(1, input, sizeof *input) >> 12);
+}
+
+/* Sets what the motors get in a call's command; a call that resumes another has what that had. */
+static void supply_motors(hxPlant *plant, int resumes, hxCommand *command) {
+  hxState *state = &plant->state;
+  if (!resumes) {
+    hx_command_supply(command, &plant->model, state);
+    state->supply = command->supply;
+    memcpy(state->duty, command->duty, sizeof state->duty);
+  }
+  command->supply = state->supply;
+  memcpy(command->duty, state->duty, sizeof command->duty);
+}
+
+static const double most_parts = 1e6; /* 1  transmissions of the bus within a call */
+
+/* Returns whether a call to t_end is possible, else writes why not. */
+static hxStatus check_end(hxPlant *plant, double t_end) {
+  const double time = plant->state.time, period = plant->model.bus_period;
+  if (!(t_end >= time && t_end <= DBL_MAX)) {
+    hx_print(plant->message, HX_MESSAGE_SIZE,
+             "end of step: got %.17g s, expected a finite time of at least %.17g s", t_end, time);
+    return HX_INVALID_ARGUMENT;
+  }
+  if (!(period > 0.0 && (t_end - time) / period > most_parts)) return HX_OK;
+  hx_print(plant->message, HX_MESSAGE_SIZE,
+           "servo.bus_period: got %.3g s, which makes %.3g transmissions in this call, expected at "
+           "most %.3g; raise servo.bus_period or make shorter calls",
+           period, (t_end - time) / period, most_parts);
+  return HX_INVALID_ARGUMENT;
+}
+
+/* A call: its inputs, their fingerprint or 0, and its start, s. */
+typedef struct {
+  const hxInput *input;
+  const hxCommand *ramp; /* NULL: constant */
+  double fingerprint, start;
+} hxStepCall;
+
+/* Sets a part's command, and in *ramp its change per second; servos on a bus hold theirs. */
+static void part_command(hxPlant *plant, const hxStepCall *call, int resumes, hxCommand *command,
+                         hxCommand *ramp) {
+  enum { SIZE = sizeof(hxCommand) / sizeof(double) };
+  hxState *state = &plant->state;
+  const double elapsed = state->time - call->start;
+  hx_command_from_input(command, call->input, resumes ? state->call_start : state->time);
+  if (hx_has_bus(&plant->model)) {
+    double *to = (double *)command;
+    const double time = command->time, *rate = (const double *)call->ramp;
+    for (int i = 0; call->ramp && i < SIZE; ++i) to[i] += elapsed * rate[i];
+    command->time = time;
+    hx_bus_send(command, &plant->model, state);
+    memset(ramp->angle, 0, sizeof ramp->angle);
+    memset(ramp->speed, 0, sizeof ramp->speed);
+    memset(ramp->torque, 0, sizeof ramp->torque);
+  }
+  supply_motors(plant, resumes, command);
+}
+
+/* Advances the plant by a part of a call: to its end, or to the next transmission of the bus. If an
+ * event interrupted the last part and the input is the same, the step sequence of that part
+ * continues, so that the motion does not depend on the interruption. */
+static hxStatus advance_part(hxPlant *plant, const hxStepCall *call, double t_end,
+                             hxEvents *events) {
+  hxState *state = &plant->state;
+  hxCommand command, ramp;
+  const int resumes = state->call_input != 0.0 && state->call_input == call->fingerprint &&
+                      state->call_start < state->time;
+  if (call->ramp) ramp = *call->ramp;
+  part_command(plant, call, resumes, &command, &ramp);
+  const double end = hx_bus_end(&plant->model, state, t_end);
+  const hxStatus status =
+      hx_kernel()->integrate(&plant->model, &command, call->ramp ? &ramp : NULL, end, events, state,
+                             plant->scratch, plant->message);
+  const int interrupted = state->time < end;
+  state->call_input = interrupted ? call->fingerprint : 0.0;
+  state->call_start = interrupted ? command.time : 0.0;
+  return status;
+}
+
+/* Advances the plant. */
+static hxStatus advance(hxPlant *plant, const hxInput *input, const hxInput *rate, double t_end,
+                        hxEvents *events) {
+  hxState *before = plant->state_before;
+  hxCommand change;
+  int finite;
+  const hxCommand *ramp = ramp_from_rate(rate, &change, &finite);
+  if (!finite)
+    return hx_plant_fail(
+        plant, HX_INVALID_ARGUMENT,
+        "rates of inputs: got a number that is not finite, expected finite rates per second");
+  hxStatus status = check_end(plant, t_end);
+  if (status == HX_OK) status = hx_input_check(input, plant->message);
+  if (status != HX_OK) return status;
+  hx_copy_state(&plant->model, before, &plant->state);
+  const int told = !ramp && (events->stop || before->call_input != 0.0);
+  const hxStepCall call = {input, ramp, told ? input_fingerprint(input) : 0.0, before->time};
+  hx_footprints_begin(&plant->footprints);
+  events->footprints = &plant->footprints;
+  events->feet = &plant->feet;
+  do {
+    status = advance_part(plant, &call, t_end, events);
+    events->continues = 1;
+  } while (status == HX_OK && plant->state.time < t_end && !(events->stop && events->found));
+  if (status == HX_OK) return HX_OK;
+  hx_copy_state(&plant->model, &plant->state, before);
+  hx_footprints_take_back(&plant->footprints);
+  return status;
+}
+
+hxStatus hx_plant_step(hxPlant *plant, const hxInput *input, double t_end) {
+  return hx_plant_step_ramp(plant, input, NULL, t_end);
+}
+
+hxStatus hx_plant_step_ramp(hxPlant *plant, const hxInput *input, const hxInput *rate,
+                            double t_end) {
+  return advance(plant, input, rate, t_end, &(hxEvents){.stop = 0});
+}
+
+hxStatus hx_plant_step_to_event(hxPlant *plant, const hxInput *input, double t_end, int stop,
+                                int *event) {
+  hxEvents events = {.stop = stop};
+  const hxStatus status = advance(plant, input, NULL, t_end, &events);
+  *event = events.found && status == HX_OK;
+  return status;
+}

@@ -1,0 +1,87 @@
+#include <string.h>
+
+#include "../elementary.h"
+#include "frames.h"
+#include "robot.h"
+
+/* Computes the child's state from the parent's: p_j = p_i zero turn(angle), velocities by
+ * rigid-body motion. */
+static void place_child(const hxDefinition *d, int leg, int joint,
+                        const double parent[HX_BODY_STATE], double child[HX_BODY_STATE]) {
+  const hxLink *link = &d->leg[leg].link[joint];
+  const double half = 0.5 * d->initial.angle[leg][joint], speed = d->initial.speed[leg][joint];
+  double axis[3], zero[4], turned[4], p[4], s[3], point_i[3], point_j[3], sP_i[3], sP_j[3],
+      dsP_i[3], dsP_j[3], sine, cosine;
+  hx_vector_normalise(link->axis, 3, axis);
+  hx_sin_cos(half, &sine, &cosine);
+  const double turn[4] = {cosine, sine * axis[0], sine * axis[1], sine * axis[2]};
+  hx_zero_turn(d, leg, joint, zero);
+  hx_quaternion_product(parent + HX_P, zero, turned);
+  hx_quaternion_product(turned, turn, p);
+  hx_vector_normalise(p, 4, child + HX_P);
+  hx_vector_rotate(child + HX_P, axis, s);
+  hx_joint_on_parent(d, leg, joint, point_i);
+  hx_vector_rotate(parent + HX_P, point_i, sP_i);
+  for (int i = 0; i < 3; ++i) point_j[i] = -link->com[i];
+  hx_vector_rotate(child + HX_P, point_j, sP_j);
+  hx_vector_cross(parent + HX_W, sP_i, dsP_i);
+  for (int i = 0; i < 3; ++i) child[HX_W + i] = parent[HX_W + i] + speed * s[i];
+  hx_vector_cross(child + HX_W, sP_j, dsP_j);
+  for (int i = 0; i < 3; ++i) {
+    child[HX_R + i] = parent[HX_R + i] + sP_i[i] - sP_j[i];
+    child[HX_V + i] = parent[HX_V + i] + dsP_i[i] - dsP_j[i];
+  }
+}
+
+void hx_initial_bodies(const hxDefinition *d, double body[HX_BODIES][HX_BODY_STATE]) {
+  for (int i = 0; i < 3; ++i) {
+    body[0][HX_R + i] = d->initial.position[i];
+    body[0][HX_V + i] = d->initial.velocity[i];
+    body[0][HX_W + i] = d->initial.angular_velocity[i];
+  }
+  hx_vector_normalise(d->initial.quaternion, 4, &body[0][HX_P]);
+  for (int leg = 0; leg < HX_LEGS; ++leg) {
+    const double *parent = body[0];
+    for (int joint = 0; joint < HX_JOINTS; ++joint) {
+      double *child = body[1 + HX_JOINTS * leg + joint];
+      place_child(d, leg, joint, parent, child);
+      parent = child;
+    }
+  }
+}
+
+/* Copies the rotation from a link's axes to its joint's. */
+static void frame_of(const hxModel *model, int leg, int joint, double p[4]) {
+  for (int i = 0; i < 4; ++i) p[i] = model->joint[joint].frame[i][leg];
+}
+
+void hx_motion_from_bodies(const hxModel *model, const double body[HX_BODIES][HX_BODY_STATE],
+                           hxPlantMotion *motion) {
+  memcpy(motion->torso, body[0], sizeof motion->torso);
+  for (int joint = 0; joint < HX_JOINTS; ++joint) {
+    double (*to)[HX_SLOTS] = motion->link[joint];
+    for (int leg = 0; leg < HX_LEGS; ++leg) {
+      const double *from = body[1 + HX_JOINTS * leg + joint];
+      double frame[4], p[4];
+      frame_of(model, leg, joint, frame);
+      hx_quaternion_product(from + HX_P, frame, p);
+      for (int i = 0; i < HX_BODY_STATE; ++i) to[i][leg] = from[i];
+      for (int i = 0; i < 4; ++i) to[HX_P + i][leg] = p[i];
+    }
+    for (int i = 0; i < HX_BODY_STATE; ++i) hx_fill_slots(to[i]);
+  }
+}
+
+void hx_bodies_from_motion(const hxModel *model, const hxPlantMotion *motion,
+                           double body[HX_BODIES][HX_BODY_STATE]) {
+  memcpy(body[0], motion->torso, sizeof motion->torso);
+  for (int joint = 0; joint < HX_JOINTS; ++joint)
+    for (int leg = 0; leg < HX_LEGS; ++leg) {
+      double *to = body[1 + HX_JOINTS * leg + joint], frame[4], back[4], p[4];
+      for (int i = 0; i < HX_BODY_STATE; ++i) to[i] = motion->link[joint][i][leg];
+      frame_of(model, leg, joint, frame);
+      hx_quaternion_conjugate(frame, back);
+      hx_quaternion_product(to + HX_P, back, p);
+      memcpy(to + HX_P, p, sizeof p);
+    }
+}

@@ -1,0 +1,45 @@
+/* frames.h - vectors and quaternions, and the frames of a definition's joints */
+#ifndef HX_FRAMES_H
+#define HX_FRAMES_H
+
+#include "hexapod/hexapod.h"
+#include "hexapod/inside.h"
+
+HX_HIDDEN_BEGIN
+
+/* Computes out = a x b. */
+void hx_vector_cross(const double a[3], const double b[3], double out[3]);
+
+/* Computes out = a/|a| of n numbers and returns |a|. */
+double hx_vector_normalise(const double *a, int n, double *out);
+
+/* Computes the product out = a b of quaternions. */
+void hx_quaternion_product(const double a[4], const double b[4], double out[4]);
+
+/* Computes the conjugate of a quaternion. */
+void hx_quaternion_conjugate(const double p[4], double out[4]);
+
+/* Computes out = R(p) a, p of unit length: a + 2 w (u x a) + 2 u x (u x a). */
+void hx_vector_rotate(const double p[4], const double a[3], double out[3]);
+
+/* Computes two unit normals of a unit axis: a = axis x e with the coordinate direction e of the
+ * axis's smallest component (the first of equal ones), b = axis x a. */
+void hx_axis_normals(const double axis[3], double a[3], double b[3]);
+
+/* Copies the position of the next joint or the foot in link axes. */
+void hx_link_tip(const hxLink *link, double tip[3]);
+
+/* Computes the joint's point from the parent's centre of mass, in the parent link's axes. */
+void hx_joint_on_parent(const hxDefinition *d, int leg, int joint, double point[3]);
+
+/* Computes the rotation from the parent's to the child's axes at angle 0: the hip's yaw for the
+ * coxa, identity for the others. */
+void hx_zero_turn(const hxDefinition *d, int leg, int joint, double p[4]);
+
+/* Computes the rotation from a link's axes to its joint's (x = a, y = b, z = axis); identity for
+ * the torso. */
+void hx_joint_frame(const hxDefinition *d, int leg, int joint, double p[4]);
+
+HX_HIDDEN_END
+
+#endif

@@ -1,0 +1,178 @@
+#include "laws.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "../contact_law.h"
+#include "../ground/soil.h"
+#include "../ground/surface.h"
+#include "validation.h"
+
+static const double load_share =
+    0.01; /* 1  of the robot's weight; feet with a larger load count their slip */
+
+/* Returns the weight of all bodies, N. */
+static double weight_of(const hxDefinition *d) {
+  double mass = d->torso.mass;
+  for (int leg = 0; leg < HX_LEGS; ++leg)
+    for (int joint = 0; joint < HX_JOINTS; ++joint) mass += d->leg[leg].link[joint].mass;
+  return mass * sqrt(d->gravity[0] * d->gravity[0] + d->gravity[1] * d->gravity[1] +
+                     d->gravity[2] * d->gravity[2]);
+}
+
+/* Copies friction and its choices. Feet without friction resist neither spin nor rolling. */
+static void compile_friction(hxModel *model, const hxDefinition *d) {
+  const int rubs = d->friction.law != HX_FRICTION_NONE;
+  model->friction_law = d->friction.law, model->mu = d->friction.mu,
+  model->slope = d->friction.slope;
+  model->presliding = d->friction.presliding, model->bristle_damping = d->friction.bristle_damping;
+  model->static_rise = fmax(d->friction.mu_static - d->friction.mu, 0.0),
+  model->per_stribeck = 1.0 / d->friction.stribeck_speed;
+  model->viscous = rubs ? d->friction.viscous : 0.0;
+  model->spin_radius = d->friction.spin_radius, model->rolling_radius = d->friction.rolling_radius;
+  /* materials of a grid may have static friction of their own */
+  model->velocity_terms = rubs && (model->static_rise > 0.0 || model->viscous > 0.0 ||
+                                   d->terrain.kind == HX_TERRAIN_GRID);
+  model->spin_friction = rubs && model->spin_radius > 0.0;
+  model->roll_friction = rubs && model->rolling_radius > 0.0;
+}
+
+/* Returns whether bristles of friction hold the feet on rigid ground. */
+static int has_friction_bristles(const hxDefinition *d) {
+  return d->friction.law == HX_FRICTION_BRISTLE || d->friction.law == HX_FRICTION_LUGRE;
+}
+
+static const double pi = 3.14159265358979323846;
+
+/* Sets the pads as which a corner of the torso's box sinks into soil on the box's sides along x, y
+ * and z: a disc of a quarter of the side, whose b of eq. 40 is the side's smaller edge; the sphere,
+ * where that is not smaller. */
+static void set_corner_pads(hxModel *model, const hxDefinition *d) {
+  const double *half = d->body.torso_box, corner = d->body.corner_radius;
+  for (int side = 0; side < 3; ++side) {
+    const double a = half[side == 0 ? 1 : 0], b = half[side == 2 ? 1 : 2], square = a * b / pi;
+    const int shape = hx_soil_shape(HX_TORSO, side), is_pad = square > corner * corner;
+    model->pad_radius[shape] = is_pad ? sqrt(square) : 0.0;
+    model->breadth[shape] = is_pad ? 2.0 * fmin(a, b) : 0.0;
+  }
+}
+
+/* Computes the constants of the definition's soil; the terrain is known. */
+static void compile_soil(hxModel *model, const hxDefinition *d) {
+  const double corner = d->body.corner_radius;
+  const double radius[HX_SOIL_SHAPES] = {
+      d->foot_radius, d->body.knee_radius, d->body.shank_radius, corner, corner, corner};
+  model->pad_radius[0] = d->foot_pad_radius;
+  set_corner_pads(model, d);
+  for (int shape = 0; shape < HX_SOIL_SHAPES; ++shape) {
+    const hxSoilShape is = {radius[shape], model->pad_radius[shape], model->breadth[shape]};
+    hxSoil soil;
+    hx_soil_compile(&d->soil, &is, &soil);
+    memcpy(model->soil[shape], &soil, sizeof soil);
+  }
+  const double on_grid = model->terrain ? hx_terrain_shear_displacement(model->terrain) : 0.0;
+  model->has_soil = d->soil.law != HX_SOIL_NONE || on_grid > 0.0;
+  model->bristle_length = d->friction.presliding;
+  if (d->soil.law != HX_SOIL_NONE)
+    model->bristle_length = d->soil.shear_displacement;
+  else if (on_grid > 0.0 && !has_friction_bristles(d))
+    model->bristle_length = on_grid;
+}
+
+/* Copies the constants of the motors' heat and supply. */
+static void compile_supply(hxModel *model, const hxDefinition *d) {
+  model->heat =
+      (hxHeat){.winding = d->servo.drive == HX_DRIVE_MOTOR ? d->servo.winding_capacity : 0.0,
+               .housing = d->servo.housing_capacity,
+               .to_housing = 1.0 / d->servo.winding_to_housing,
+               .to_air = 1.0 / d->servo.housing_to_air,
+               .air = d->servo.air_temperature,
+               .start = d->servo.start_temperature,
+               .derate = d->servo.derate_temperature,
+               .max = d->servo.temperature_max};
+  model->voltage = d->servo.voltage, model->duty_max = d->servo.duty_max;
+  model->supply_resistance = d->servo.supply_resistance;
+  if (d->servo.mode == HX_SERVO_KINEMATIC) return;
+  model->bus_period = d->servo.bus_period, model->command_step = d->servo.command_step;
+}
+
+/* Computes the constants of the servos' motors, and of the joints' stops. */
+static void compile_servo(hxModel *model, const hxDefinition *d) {
+  const int follows = d->servo.mode == HX_SERVO_POSITION, motor = d->servo.drive == HX_DRIVE_MOTOR;
+  model->servo_mode = d->servo.mode, model->servo_drive = d->servo.drive;
+  model->kp = follows ? d->servo.kp : 0.0, model->kd = follows ? d->servo.kd : 0.0;
+  model->torque_max = d->servo.torque_max, model->speed_max = d->servo.speed_max;
+  model->free_damping = model->kd, model->limit_damping = model->torque_max / model->speed_max;
+  model->torque_constant = d->servo.torque_constant, model->resistance = d->servo.resistance;
+  model->rotor_inertia = d->servo.rotor_inertia;
+  if (motor) {
+    const double per_volt = d->servo.torque_constant / d->servo.resistance;
+    model->stall_torque = per_volt * d->servo.duty_max * d->servo.voltage;
+    model->back_emf = d->servo.torque_constant * per_volt;
+    model->limit_damping = model->back_emf;
+    if (follows) model->free_damping = model->kd + model->back_emf;
+  }
+  compile_supply(model, d);
+  model->stop_stiffness = d->servo.stop_stiffness, model->stop_damping = d->servo.stop_damping;
+  model->stops = d->servo.mode != HX_SERVO_KINEMATIC && d->servo.stop_stiffness > 0.0;
+}
+
+/* Copies the constants of elastic gears and of the rotors' angular momentum (eq. 54-57). Kinematic
+ * drives move their joints themselves: their gears are rigid. */
+static void compile_rotor(hxModel *model, const hxDefinition *d) {
+  const double edge = 0.1; /* 1  of half of the play: half of the way on which the teeth engage */
+  model->spin = d->servo.gear_ratio != 0.0;
+  if (model->spin) model->spin_inertia = d->servo.rotor_inertia / d->servo.gear_ratio;
+  if (!hx_has_elastic_gears(d)) return;
+  model->elastic = d->servo.backlash > 0.0 ? 2 : 1;
+  model->gear_stiffness = d->servo.gear_stiffness, model->gear_damping = d->servo.gear_damping;
+  model->half_play = 0.5 * d->servo.backlash;
+  model->tooth_edge = edge * model->half_play;
+}
+
+/* Returns whether the gears have Stribeck terms, and in *measured whether they have more than
+ * Coulomb friction. */
+static int gear_terms(const hxDefinition *d, int *measured) {
+  const int stribeck =
+      d->servo.stribeck_friction > 0.0 || d->servo.stribeck_motor_load_friction > 0.0 ||
+      d->servo.stribeck_external_load_friction > 0.0 || d->servo.quadratic_motor_friction > 0.0 ||
+      d->servo.quadratic_external_friction > 0.0;
+  *measured = stribeck || d->servo.viscous_friction > 0.0 || d->servo.motor_load_friction > 0.0 ||
+              d->servo.external_load_friction > 0.0;
+  return stribeck;
+}
+
+/* Copies the constants of the gears' friction (eq. 49, 50). */
+static void compile_gear(hxModel *model, const hxDefinition *d) {
+  model->stribeck = gear_terms(d, &model->measured_friction);
+  model->coulomb_friction = d->servo.coulomb_friction;
+  model->gear_speed = d->servo.friction_speed, model->per_gear_speed = 1.0 / model->gear_speed;
+  model->gear_viscous = d->servo.viscous_friction;
+  model->gear_stribeck = d->servo.stribeck_friction;
+  model->motor_load = d->servo.motor_load_friction;
+  model->external_load = d->servo.external_load_friction;
+  model->stribeck_motor = d->servo.stribeck_motor_load_friction;
+  model->stribeck_external = d->servo.stribeck_external_load_friction;
+  model->quadratic_motor = d->servo.quadratic_motor_friction;
+  model->quadratic_external = d->servo.quadratic_external_friction;
+  model->per_stribeck_speed = 1.0 / d->servo.stribeck_speed;
+  model->stribeck_exponent = d->servo.stribeck_exponent;
+}
+
+void hx_laws_compile(hxModel *model, const hxDefinition *d) {
+  model->contact_law = d->contact.law, model->stiffness = d->contact.stiffness;
+  model->damping_scale = hx_contact(d->contact.law)->scale(d);
+  model->impact_speed_floor = d->contact.impact_speed_floor;
+  for (int i = 0; i < 3; ++i) model->gravity[i] = d->gravity[i];
+  model->alpha = d->baumgarte.alpha, model->beta = d->baumgarte.beta;
+  compile_friction(model, d);
+  compile_servo(model, d);
+  compile_gear(model, d);
+  compile_rotor(model, d);
+  model->terrain_kind = d->terrain.kind;
+  model->method = d->solver.method, model->step = d->solver.step;
+  model->tolerance = d->solver.tolerance, model->step_max = d->solver.step_max,
+  model->projection = d->solver.projection;
+  compile_soil(model, d);
+  model->load_threshold = load_share * weight_of(d);
+}
