@@ -270,7 +270,7 @@ class Controller(Stateful):
         """Computes the pose of the legs and the point masses for planned feet."""
         sway, sway_rate = 0j, 0j
         if self.compliant is not None:
-            sway, sway_rate = self.compliant.sway.of(feet)
+            sway, sway_rate = self.compliant.sway.of(feet, self.compliant.warmth)
         plane = feet.plane - sway
         activation, lowering = self._lower(feet, plane)
         height = feet.height - lowering
@@ -489,7 +489,8 @@ class Controller(Stateful):
             motion = Neighbours(
                 (before.masses, now.masses, after.masses), (before.pose, now.pose, after.pose)
             )
-        demand = compliant.dynamics.demand(motion, speed, now.posture)
+        laden = compliant.sway.laden(compliant.warmth)
+        demand = compliant.dynamics.demand(motion, speed, now.posture, laden)
         feet = now.plane + now.shift
         plan = compliant.laws.plan(
             demand,

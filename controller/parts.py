@@ -20,7 +20,8 @@ class Parts:
     touchdown: bool = True  # foot heights follow early and late touch-downs
     slow_landing: bool = False  # feet rise faster and come down more slowly on the same paths
     posture: bool = True  # roll, pitch and height are controlled
-    sway: bool = False  # the torso moves against the swinging legs: feet need not push for them
+    # under a payload the torso moves against the swinging legs: feet need not push for them
+    sway: bool = True
     path: bool = True  # the path walked is measured at the feet, and its deviation corrected
     limits: bool = True  # corrections are limited in rate and torque
     # no feedback from a sensor that contradicts the plan; kinematic control while the robot slides,

@@ -98,9 +98,13 @@ class FmuError(HexapodError):
     """An FMU is missing, invalid or damaged, or a call of it failed."""
 
 
+# of difflib, in [0, 1]: below it names share some letters by chance, such as "foo" and "robot"
+LEAST_SIMILARITY = 0.52
+
+
 def nearest_name(name: str, valid: Iterable[str]) -> str | None:
     """Returns the valid name most similar to `name`, or None when none is similar."""
-    match = get_close_matches(name, list(valid), n=1, cutoff=0.5)
+    match = get_close_matches(name, list(valid), n=1, cutoff=LEAST_SIMILARITY)
     return match[0] if match else None
 
 

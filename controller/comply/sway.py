@@ -4,6 +4,9 @@ A swinging leg takes its mass forwards and stops it again. Under a torso of cons
 feet that stand must push for that, forwards and backwards in every swing. The torso instead moves
 so that the centre of mass of the whole robot keeps its velocity (C57). Then these feet need no push
 for the swinging legs. The sway is a few millimetres.
+
+The torso sways only as far as the stance is narrowed, under a payload (C53): on uneven ground a
+robot without a payload loses more of its path by the sway than it gains.
 """
 
 from __future__ import annotations
@@ -12,6 +15,7 @@ import numpy as np
 
 from hexapod_cosim.controller.comply.posture import Posture
 from hexapod_cosim.controller.plane import LEGS, along
+from hexapod_cosim.controller.sense.warmth import Warmth
 from hexapod_cosim.controller.walk.inverse_dynamics import InverseDynamics
 from hexapod_cosim.controller.walk.kinematics import LegSolver
 from hexapod_cosim.controller.walk.trajectory import PlannedFeet
@@ -28,11 +32,10 @@ def _moment_of(dynamics: InverseDynamics, legs: LegSolver, step: complex) -> com
 
 
 def _share_of(dynamics: InverseDynamics, legs: LegSolver, way: complex) -> float:
-    """Returns the way of the torso over that of a foot in the direction `way` of length REACH."""
+    """Returns the share of the mass that moves with all feet, in a direction of length REACH."""
     moved = _moment_of(dynamics, legs, way) - _moment_of(dynamics, legs, -way)
-    carried = along(way, moved) / (2.0 * REACH * REACH)  # kg    moves with all feet
-    total = dynamics.torso_mass + float(dynamics.mass.sum())
-    return float(carried / (LEGS * (total - carried)))
+    carried = along(way, moved) / (2.0 * REACH * REACH)  # kg
+    return float(carried / dynamics.total_mass)
 
 
 class Sway:
@@ -40,15 +43,23 @@ class Sway:
 
     def __init__(self, dynamics: InverseDynamics, legs: LegSolver, *, active: bool) -> None:
         self.home = complex(dynamics.stance[:, 0].sum(), dynamics.stance[:, 1].sum())  # m
-        self.forward, self.aside = 0.0, 0.0  # 1    way of the torso over that of a foot, x and y
+        self.active = active
+        self.forward, self.aside = 0.0, 0.0  # 1    share of the mass that moves with all feet
         if active:
             self.forward = _share_of(dynamics, legs, complex(REACH, 0.0))
             self.aside = _share_of(dynamics, legs, complex(0.0, REACH))
 
-    def of(self, feet: PlannedFeet) -> tuple[complex, complex]:
-        """Returns the way of the torso in the walking frame [m], x + i y, and its rate [m/s]."""
+    def laden(self, warmth: Warmth) -> float:
+        """Returns the weight that sways over the modelled one [1]."""
+        return warmth.laden() if self.active else 1.0
+
+    def of(self, feet: PlannedFeet, warmth: Warmth) -> tuple[complex, complex]:
+        """Returns the way of the torso in the walking frame [m], x + i y, and its rate [m/s].
+
+        The rate is that under a constant weight, which changes slowly.
+        """
         away, speed = complex(feet.plane.sum()) - self.home, complex(feet.velocity.sum())
-        return (
-            complex(-self.forward * away.real, -self.aside * away.imag),
-            complex(-self.forward * speed.real, -self.aside * speed.imag),
-        )
+        part, laden = warmth.narrowing / LEGS, warmth.laden()
+        x = part * self.forward / (laden - self.forward)
+        y = part * self.aside / (laden - self.aside)
+        return complex(-x * away.real, -y * away.imag), complex(-x * speed.real, -y * speed.imag)

@@ -74,6 +74,10 @@ class Warmth(Stateful):
         if self.narrows:
             self.narrowing = min(max((self.heft - TOLD) / (HEAVIER - TOLD), 0.0), 1.0)
 
+    def laden(self) -> float:
+        """Returns measured over modelled weight, 1 in the wide stance [1] (C53)."""
+        return 1.0 + self.narrowing * (self.heft - 1.0)
+
     def step(self, torque: Array, needed: float, held: float) -> None:
         """Advances by one period, after weigh() (C45).
 

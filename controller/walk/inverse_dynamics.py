@@ -71,6 +71,7 @@ class InverseDynamics:
         offset = np.array([[link.offset_y for link in leg] for leg in links])
         inertia = np.array([[link.inertia[:3] for link in leg] for leg in links])
         self.mass = np.array([[link.mass for link in leg] for leg in links])  # kg    (6, 3)
+        self.total_mass = self.torso_mass + float(self.mass.sum())  # kg
         self.joint = legs.coxa_length + 1j * legs.coxa_height  # m    (6,) U of the femur's joint
         self.com = com[..., 0] + 1j * com[..., 2]  # m    (6, 3) from the joint, plane of the leg
         self.side = com[..., 1] + np.cumsum(offset, axis=1) - offset  # m    (6, 3) Y
@@ -134,9 +135,9 @@ class InverseDynamics:
         )
 
     def _demand_torso(
-        self, total: Wrench, masses: tuple[Masses | None, Masses, Masses | None]
+        self, total: Wrench, masses: tuple[Masses | None, Masses, Masses | None], laden: float
     ) -> Wrench:
-        """Adds the forces that the torso needs to push, weight, moment and twist (C16)."""
+        """Adds the forces that the torso needs to push, weight, moment and twist (C16, C58)."""
         before, now, after = masses
         acceleration, up, spin = 0j, 0.0, 0j
         if before is not None and after is not None:
@@ -145,7 +146,8 @@ class InverseDynamics:
             )
             up = self._acceleration(before.torso_height, now.torso_height, after.torso_height)
             spin = self._acceleration(before.turn, now.turn, after.turn)
-        push = self.torso_mass * acceleration * now.turn.conjugate()
+        pushed = (self.torso_mass + (laden - 1.0) * self.total_mass) / laden
+        push = pushed * acceleration * now.turn.conjugate()
         lift = self.torso_mass * (up + self.gravity)
         place, height = now.torso_place, now.torso_height
         push, weight, moment, twist = self._add_force(total, push, lift, place, height)
@@ -199,18 +201,22 @@ class InverseDynamics:
         row, up = posture.turn(row, up)
         return np.array((row.real, row.imag, up)).transpose(1, 2, 0)
 
-    def demand(self, motion: Neighbours, speed: Array, posture: Posture) -> Demand:
+    def demand(
+        self, motion: Neighbours, speed: Array, posture: Posture, laden: float = 1.0
+    ) -> Demand:
         """Returns the demand of the middle one of three steps.
 
         Args:
             motion: the steps.
             speed: (6, 3) joint speeds [rad/s].
             posture: of the torso in the walking frame.
+            laden: measured over modelled weight [1]. The planned loads are scaled by it (C30), but
+                a payload needs no push for the legs, and more for the torso (C58).
         """
         now = motion.masses[1]
         push, lift = self._demand_links(motion.masses)
-        legs = self._add_force((0j, 0.0, 0j, 0.0), push, lift, now.place, now.height)
-        total, weight, moment, twist = self._demand_torso(legs, motion.masses)
+        legs = self._add_force((0j, 0.0, 0j, 0.0), push / laden, lift, now.place, now.height)
+        total, weight, moment, twist = self._demand_torso(legs, motion.masses, laden)
         push, lift = posture.turn_back(push, lift)
         torque = self._demand_torques(motion, push, lift, speed)
         lever = self._lever_of(motion.pose[1], posture)

@@ -80,11 +80,14 @@ static void place_leg(const hxLegSolver *leg, const hxPosture *posture, hxPlane 
 }
 
 /* Computes the poses of the legs and the point masses for planned feet. */
-static void lay_out(const hxControllerModel *model, const hxFootPaths *paths, hxPlannedStep *step) {
+static void lay_out(const hxControllerModel *model, const hxControllerState *state,
+                    hxPlannedStep *step) {
   step->sway = step->sway_rate = hx_plane(0.0, 0.0);
-  if (model->compliant) hx_sway_of(&model->laws.sway, &step->feet, &step->sway, &step->sway_rate);
+  if (model->compliant)
+    hx_sway_of(&model->laws.sway, &step->feet, &state->compliant.warmth, &step->sway,
+               &step->sway_rate);
   for (int k = 0; k < HX_LEGS; ++k) step->plane[k] = hx_plane_sub(step->feet.plane[k], step->sway);
-  lower(model, paths, step);
+  lower(model, &state->paths, step);
   for (int k = 0; k < HX_LEGS; ++k)
     place_leg(&model->leg[k], &step->posture, step->plane[k], step->height[k], step->feet.rolled[k],
               &step->shift[k], &step->pose[k]);
@@ -102,7 +105,7 @@ static void plan_step(const hxControllerModel *model, const hxControllerState *s
                       hxPlannedStep *step) {
   const hxTwist twist = look_ahead(model, state, ahead, number, step);
   hx_foot_paths_walk(&model->paths, &state->paths, number, twist, &before->feet, &step->feet);
-  lay_out(model, &state->paths, step);
+  lay_out(model, state, step);
 }
 
 /* Notes which feet have met the ground on their way down (C51). */
@@ -143,7 +146,7 @@ static void plan_afresh(const hxControllerModel *model, int waiting, hxControlle
   else
     hx_foot_paths_plan(&model->paths, &now, state->at, moves || !settled, twist, &state->paths,
                        &first->feet);
-  lay_out(model, &state->paths, first);
+  lay_out(model, state, first);
   state->last = moves || settled ? INT64_MAX : model->ramp.end - state->ramp.steps;
   state->at = 0;
   plan_step(model, state, 1, 1, first, step_at(state, 1));
@@ -311,7 +314,8 @@ static void ask(const hxControllerModel *model, hxControllerState *state, hxStan
   double height[HX_LEGS];
   hxDemand demand;
   hx_inverse_dynamics_demand(&model->laws.dynamics, model->leg, &motion, output->speed_ref,
-                             &now->posture, &demand);
+                             &now->posture,
+                             hx_sway_laden(&model->laws.sway, &state->compliant.warmth), &demand);
   plan->overspeed = 0;
   for (int k = 0; k < HX_LEGS; ++k) {
     feet[k] = hx_plane_add(now->plane[k], now->shift[k]);
@@ -348,7 +352,7 @@ void hx_controller_begin(const hxControllerModel *model, double t, hxControllerS
   step = step_at(state, 0);
   hx_foot_paths_reset(&model->paths, &state->paths, &step->feet);
   look_ahead(model, state, 0, 0, step);
-  lay_out(model, &state->paths, step);
+  lay_out(model, state, step);
   follow_paths(model, state);
 }
 

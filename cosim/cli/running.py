@@ -14,10 +14,11 @@ import typer
 
 from hexapod_cosim.controller import Gains, load_gains
 from hexapod_cosim.cosim.cli import completion
-from hexapod_cosim.cosim.cli.terminal import progress_bar, show_table, waiting, warn
+from hexapod_cosim.cosim.cli.terminal import progress_bar, show_table, show_text, waiting, warn
 from hexapod_cosim.cosim.control.controllers import check_control
 from hexapod_cosim.cosim.master.interrupts import deferred_interrupts
 from hexapod_cosim.cosim.master.loop import INTERRUPTED
+from hexapod_cosim.cosim.results.metrics import OF_THE_RUN
 from hexapod_cosim.cosim.results.recordings import check_formats
 from hexapod_cosim.cosim.results.result import Result
 from hexapod_cosim.cosim.results.results import ResultsFolder, write_result
@@ -253,8 +254,23 @@ def default_folder(scenario: str) -> Path:
     return Path("out") / Path(scenario).stem
 
 
+def _has_value(row: Mapping[str, Any]) -> bool:
+    """Returns whether some control has a number in a row of a report's table."""
+    return any(text not in ("", "-") for text in row["values"])
+
+
 def show_rows(rows: Sequence[Mapping[str, Any]], controls: Sequence[str]) -> None:
-    """Prints the rows of a report's table without its empty columns."""
+    """Prints the rows of a report's table without its empty columns.
+
+    Where no control has a metric of its walk, a sentence takes the place of the empty rows.
+    """
+    walks = [row for row in rows if row["name"] not in ("walked", *OF_THE_RUN)]
+    if walks and not any(_has_value(row) for row in walks):
+        rows = [row for row in rows if row not in walks]
+        show_text(
+            f"No run is long enough for the {len(walks)} metrics of a walk, or none ended upright: "
+            "the warnings say which, and what to change."
+        )
     columns = {"metric": [row["name"] for row in rows], "unit": [row["unit"] for row in rows]}
     columns |= {control: [row["values"][k] for row in rows] for k, control in enumerate(controls)}
     for k, control in enumerate(controls[1:] if rows and rows[0]["changes"] else []):

@@ -237,10 +237,25 @@ def test_simulate_prints_metrics_and_what_it_wrote(call: Call, tmp_path: Path) -
 
 
 def test_simulate_without_json_prints_a_table_and_the_files(call: Call, tmp_path: Path) -> None:
-    code, out, _ = call("simulate", "stand", "-o", tmp_path / "out", *QUICK)
+    enough = settings("duration=2.4", "gait.period=0.8", "outputs.plots=false")
+    code, out, _ = call("simulate", "walk_flat", "-o", tmp_path / "out", *enough)
     assert code == 0
     assert all(name in out for name in SHOWN)
+    assert "No run is long enough" not in out
     assert f"wrote {tmp_path / 'out'}/" in out
+
+
+@pytest.mark.parametrize("command", ["simulate", "compare"])
+def test_a_run_too_short_for_metrics_prints_a_sentence_instead_of_a_table_of_dashes(
+    call: Call, tmp_path: Path, command: str
+) -> None:
+    seeds = ["--seeds", "1"] if command == "compare" else []
+    code, out, err = call(command, "walk_flat", "-o", tmp_path / "out", *QUICK, *seeds)
+    assert code == 0
+    assert "No run is long enough for the 20 metrics of a walk" in out
+    assert "slip_per_metre" not in out
+    assert "energy_residual" in out
+    assert "too short for metrics" in err
 
 
 @pytest.mark.usefixtures("undrawn")

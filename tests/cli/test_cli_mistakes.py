@@ -23,6 +23,7 @@ from hexapod_cosim.cosim.cli import main
         (["simulate", "--set", "macro_step=-0.005"], ["macro_step", "got -0.005", "> 0"]),
         (["simulate", "--control", "complaint"], ["'complaint'", "did you mean 'compliant'"]),
         (["simulate", "--set", "torso.mas=3"], ["'torso.mas'", "did you mean 'torso.mass'"]),
+        (["simulate", "--set", "foo=1"], ["unknown setting", "choose one of the 25 valid names"]),
         (["simulate", "--set", "torso.mass=-3"], ["torso.mass", "-3"]),
         (
             ["simulate", "--set", "torso.push_force[1]=100"],

@@ -1,4 +1,4 @@
-"""The torso that sways against the swinging legs: laws of momentum."""
+"""The torso that sways against the swinging legs under a payload: laws of momentum."""
 
 from __future__ import annotations
 
@@ -16,27 +16,44 @@ from hexapod_cosim.controller import (
 )
 from hexapod_cosim.controller.comply.posture import Posture
 from hexapod_cosim.controller.comply.sway import Sway
+from hexapod_cosim.controller.sense.warmth import Warmth
 from hexapod_cosim.controller.walk.inverse_dynamics import InverseDynamics, Neighbours
 from hexapod_cosim.models import load_robot
 
 ROBOTS = ["athena", "phantomx_mk4"]
 ROUND_OFF = 1e-12  # m
+HEAVIER = 1.4  # 1    weight over that of the model
 
 
-def walk(name: str, *, sway: bool) -> Controller:
+class Weighed(Warmth):
+    """Knows the weight of a payload and keeps it."""
+
+    def __init__(self, heft: float, narrowing: float) -> None:
+        super().__init__(rating=1.0, squeeze=0.6, narrows=True, cycle=1.0, period=PERIOD)
+        self.heft, self.narrowing = heft, narrowing
+
+    def weigh(self, heft: float) -> None:
+        """Leaves the weight as it is."""
+
+
+def walk(name: str, *, sway: bool, heft: float = HEAVIER, narrowing: float = 1.0) -> Controller:
     """Returns a controller of an amble whose feet feel nothing."""
     robot = load_robot(name)
-    return Controller(
+    controller = Controller(
         robot,
         period=PERIOD,
         gait=make_gait(robot, "amble"),
         gains=make_gains(robot),
         parts=Parts(sway=sway),
     )
+    assert controller.compliant is not None
+    controller.compliant.warmth = Weighed(heft, narrowing)
+    return controller
 
 
 def pushes(controller: Controller, steps: int) -> np.ndarray:
-    """Returns the forces along x (n,) that the ground must exert on the planned walk [N].
+    """Returns the forces along x (n,) that the ground must exert on the planned walk of a robot
+    whose torso carries the payload [N].
 
     Steps at the ends of sections, at which no acceleration is known, are left out.
     """
@@ -50,19 +67,23 @@ def pushes(controller: Controller, steps: int) -> np.ndarray:
             three = (before, now, after)
             masses, poses = tuple(x.masses for x in three), tuple(x.pose for x in three)
             motion = Neighbours(masses, poses)  # type: ignore[arg-type]
-            found.append(dynamics.demand(motion, out.speed_ref, now.posture).push.real)
+            demand = dynamics.demand(motion, out.speed_ref, now.posture, HEAVIER)
+            found.append(HEAVIER * demand.push.real)
     return np.array(found)
 
 
 @pytest.mark.parametrize("name", ROBOTS)
+@pytest.mark.parametrize("heft", [1.2, 2.0])
 @pytest.mark.parametrize("step", [2e-3 + 0j, 2e-3j])
-def test_the_centre_of_mass_stays_when_feet_move_and_the_torso_sways(
-    name: str, step: complex
+def test_the_centre_of_mass_stays_when_feet_move_and_a_torso_with_a_payload_sways(
+    name: str, step: complex, heft: float
 ) -> None:
     robot = load_robot(name)
     legs = LegSolver(robot)
     dynamics = InverseDynamics(robot, legs, period=PERIOD)
-    sway = Sway(dynamics, legs, active=True)
+    payload = (heft - 1.0) * dynamics.total_mass  # kg
+    controller = walk(name, sway=True)
+    sway, feet = Sway(dynamics, legs, active=True), controller._now.feet
     x, y, z = dynamics.stance.T
     home, level = x + 1j * y, Posture.of(np.zeros(3), np.zeros(3))
 
@@ -70,15 +91,16 @@ def test_the_centre_of_mass_stays_when_feet_move_and_the_torso_sways(
         """The sum of m p in the walking frame, of feet in it and a torso that has moved."""
         masses = dynamics.place(legs.pose(feet - torso, z), torso, 0.0, level)
         links = (dynamics.mass * masses.ground).sum()
-        return complex(links + dynamics.torso_mass * masses.torso_ground)
+        return complex(links + (dynamics.torso_mass + payload) * masses.torso_ground)
 
-    moved = complex(sway.forward * step.real, sway.aside * step.imag) * -6.0
+    moved, _ = sway.of(feet._replace(plane=home + step), Weighed(heft, 1.0))
     left = moment(home + step, moved) - moment(home, 0j)
     without = moment(home + step, 0j) - moment(home, 0j)
     assert abs(left) < 5e-3 * abs(without)
 
 
 def test_a_walk_with_sway_needs_a_quarter_of_the_push_at_most() -> None:
+    """Of a robot with a payload."""
     still, swaying = (pushes(walk("athena", sway=on), 900)[300:] for on in (False, True))
     assert np.sqrt((swaying**2).mean()) < 0.25 * np.sqrt((still**2).mean())
 
@@ -102,10 +124,26 @@ def test_a_standing_foot_keeps_its_place_on_the_ground(sway: bool) -> None:
     assert max(ways) < 5e-3  # m
 
 
-def test_the_torso_does_not_sway_without_the_part_and_under_other_controls() -> None:
+@pytest.mark.parametrize("narrowing", [0.0, 0.25, 1.0])
+def test_the_sway_grows_with_the_way_to_the_narrow_stance(narrowing: float) -> None:
+    """Under one weight, so that the part of it that counts is set as well."""
+    robot = load_robot("athena")
+    legs = LegSolver(robot)
+    sway = Sway(InverseDynamics(robot, legs, period=PERIOD), legs, active=True)
+    feet = walk("athena", sway=True)._now.feet
+    feet = feet._replace(plane=feet.plane + 0.01, velocity=feet.velocity + 0.1)
+    whole, rate = sway.of(feet, Weighed(HEAVIER, 1.0))
+    part, part_rate = sway.of(feet, Weighed(1.0 + (HEAVIER - 1.0) / max(narrowing, 0.1), narrowing))
+    assert abs(whole) > 1e-3  # m
+    assert part == pytest.approx(narrowing * whole, rel=1e-12)
+    assert part_rate == pytest.approx(narrowing * rate, rel=1e-12)
+
+
+def test_the_torso_does_not_sway_without_payload_or_part_and_under_other_controls() -> None:
     robot = load_robot("athena")
     for controller in (
         walk("athena", sway=False),
+        walk("athena", sway=True, heft=1.09, narrowing=0.0),
         Controller(robot, period=PERIOD, gait=make_gait(robot)),
     ):
         for step in range(300):

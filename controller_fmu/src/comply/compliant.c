@@ -44,7 +44,7 @@ void hx_compliant_compile(const hxControllerDefinition *definition, const hxLegS
   hx_posture_of(&level, zero, zero);
   hx_inverse_dynamics_place(&model->dynamics, leg, pose, hx_plane(0.0, 0.0), 0.0, &level, &masses);
   const hxNeighbours motion = {{NULL, &masses, NULL}, {NULL, pose, NULL}};
-  hx_inverse_dynamics_demand(&model->dynamics, leg, &motion, still, &level, &rest);
+  hx_inverse_dynamics_demand(&model->dynamics, leg, &motion, still, &level, 1.0, &rest);
   hx_sway_compile(definition, leg, &model->dynamics, &model->sway);
   hx_support_compile(definition, &rest, &model->support);
   hx_compliance_compile(definition, -model->dynamics.floor, &model->laws);

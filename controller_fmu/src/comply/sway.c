@@ -24,16 +24,13 @@ static hxPlane moment_of(const hxInverseDynamics *dynamics, const hxLegSolver le
   return sum;
 }
 
-/* Returns the way of the torso over that of a foot in the direction `way` of length `reach`. */
+/* Returns the share of the mass that moves with all feet, in a direction of length `reach`. */
 static double share_of(const hxInverseDynamics *dynamics, const hxLegSolver leg[HX_LEGS],
                        hxPlane way) {
   const hxPlane moved =
       hx_plane_sub(moment_of(dynamics, leg, way), moment_of(dynamics, leg, hx_scaled(way, -1.0)));
   const double carried = hx_along(way, moved) / (2.0 * reach * reach);
-  double total = dynamics->torso_mass;
-  for (int k = 0; k < HX_LEGS; ++k)
-    for (int link = 0; link < HX_JOINTS; ++link) total += dynamics->mass[k][link];
-  return carried / (HX_LEGS * (total - carried));
+  return carried / dynamics->total_mass;
 }
 
 void hx_sway_compile(const hxControllerDefinition *definition, const hxLegSolver leg[HX_LEGS],
@@ -44,19 +41,28 @@ void hx_sway_compile(const hxControllerDefinition *definition, const hxLegSolver
     hx_leg_solver_forward(&leg[k], leg[k].stance, foot);
     model->home = hx_plane_add(model->home, hx_plane(foot[0], foot[1]));
   }
+  model->active = definition->parts.sway;
   model->forward = model->aside = 0.0;
   if (!definition->parts.sway) return;
   model->forward = share_of(dynamics, leg, hx_plane(reach, 0.0));
   model->aside = share_of(dynamics, leg, hx_plane(0.0, reach));
 }
 
-void hx_sway_of(const hxSway *model, const hxPlannedFeet *feet, hxPlane *way, hxPlane *rate) {
+double hx_sway_laden(const hxSway *model, const hxWarmth *warmth) {
+  return model->active ? hx_warmth_laden(warmth) : 1.0;
+}
+
+void hx_sway_of(const hxSway *model, const hxPlannedFeet *feet, const hxWarmth *warmth,
+                hxPlane *way, hxPlane *rate) {
+  const double part = warmth->narrowing / HX_LEGS, laden = hx_warmth_laden(warmth),
+               x = part * model->forward / (laden - model->forward),
+               y = part * model->aside / (laden - model->aside);
   hxPlane away = {0.0, 0.0}, speed = {0.0, 0.0};
   for (int k = 0; k < HX_LEGS; ++k) {
     away = hx_plane_add(away, feet->plane[k]);
     speed = hx_plane_add(speed, feet->velocity[k]);
   }
   away = hx_plane_sub(away, model->home);
-  *way = hx_plane(-model->forward * away.x, -model->aside * away.y);
-  *rate = hx_plane(-model->forward * speed.x, -model->aside * speed.y);
+  *way = hx_plane(-x * away.x, -y * away.y);
+  *rate = hx_plane(-x * speed.x, -y * speed.y);
 }

@@ -2,6 +2,7 @@
 #ifndef HX_SWAY_H
 #define HX_SWAY_H
 
+#include "../sense/warmth.h"
 #include "../walk/inverse_dynamics.h"
 #include "../walk/trajectory.h"
 #include "hexapod/inside.h"
@@ -9,15 +10,21 @@
 HX_HIDDEN_BEGIN
 
 typedef struct hxSway {
-  double forward, aside; /* 1    way of the torso over that of a foot; 0 where the part is off */
+  int active; /* the part is on */
+  double forward, aside; /* 1    share of the mass that moves with all feet; 0 without the part */
   hxPlane home; /* m    sum of the feet in the stance */
 } hxSway;
 
 void hx_sway_compile(const hxControllerDefinition *definition, const hxLegSolver leg[HX_LEGS],
                      const hxInverseDynamics *dynamics, hxSway *model);
 
-/* Computes the way of the torso in the walking frame, and its rate [m, m/s]. */
-void hx_sway_of(const hxSway *model, const hxPlannedFeet *feet, hxPlane *way, hxPlane *rate);
+/* Returns the weight that sways over the modelled one [1]. */
+double hx_sway_laden(const hxSway *model, const hxWarmth *warmth);
+
+/* Computes the way of the torso in the walking frame, and its rate under a constant weight, which
+ * changes slowly [m, m/s]. */
+void hx_sway_of(const hxSway *model, const hxPlannedFeet *feet, const hxWarmth *warmth,
+                hxPlane *way, hxPlane *rate);
 
 HX_HIDDEN_END
 

@@ -41,6 +41,10 @@ void hx_warmth_weigh(const hxWarmthModel *model, double heft, hxWarmth *warmth) 
     warmth->narrowing = hx_clamp((warmth->heft - told) / (heavier - told), 0.0, 1.0);
 }
 
+double hx_warmth_laden(const hxWarmth *warmth) {
+  return 1.0 + warmth->narrowing * (warmth->heft - 1.0);
+}
+
 void hx_warmth_step(const hxWarmthModel *model, const double torque[HX_LEGS][HX_JOINTS],
                     double needed, double held, hxWarmth *warmth) {
   double hottest = 0.0, hardest = 0.0;

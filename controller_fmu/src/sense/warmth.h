@@ -29,6 +29,9 @@ void hx_warmth_reset(const hxWarmthModel *model, hxWarmth *warmth);
 /* Advances weight and narrowing by one period (C53). heft: measured over modelled weight [1]. */
 void hx_warmth_weigh(const hxWarmthModel *model, double heft, hxWarmth *warmth);
 
+/* Returns measured over modelled weight, 1 in the wide stance [1] (C53). */
+double hx_warmth_laden(const hxWarmth *warmth);
+
 /* Advances by one period, after hx_warmth_weigh (C45). torque: feed-forward torques [N m]; needed:
  * largest torque that the measured weight needs, over the largest that is allowed [1]; held: share
  * of the planned squeeze that the ground holds [1]. */

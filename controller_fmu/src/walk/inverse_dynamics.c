@@ -13,7 +13,7 @@ void hx_inverse_dynamics_compile(const hxControllerDefinition *definition,
   model->gravity = sqrt(g[0] * g[0] + g[1] * g[1] + g[2] * g[2]);
   model->rotor = definition->servo.rotor_inertia;
   model->friction = definition->servo.coulomb_friction;
-  model->torso_mass = definition->torso.mass;
+  model->torso_mass = model->total_mass = definition->torso.mass;
   model->torso_inertia = definition->torso.inertia_zz;
   model->torso_com = hx_plane(definition->torso.com[0], definition->torso.com[1]);
   model->torso_com_z = definition->torso.com[2];
@@ -25,6 +25,7 @@ void hx_inverse_dynamics_compile(const hxControllerDefinition *definition,
     for (int joint = 0; joint < HX_JOINTS; ++joint) {
       const hxKnownLink *link = &definition->leg[k].link[joint];
       model->mass[k][joint] = link->mass;
+      model->total_mass += link->mass;
       model->com[k][joint] = hx_plane(link->com[0], link->com[2]);
       model->side[k][joint] = link->com[1] + offset;
       model->yaw_inertia[k] += link->inertia_zz;
@@ -91,7 +92,8 @@ static void add_force(hxPlane push, double lift, hxPlane place, double height, d
   demand->twist += hx_across(place, push);
 }
 
-static void demand_torso(const hxInverseDynamics *model, const hxNeighbours *motion,
+/* Adds the forces that the torso needs to the demand (C16, C58). */
+static void demand_torso(const hxInverseDynamics *model, const hxNeighbours *motion, double laden,
                          hxDemand *demand) {
   const hxMasses *now = motion->masses[1], *before = motion->masses[0], *after = motion->masses[2];
   hxPlane a = {0.0, 0.0}, spin = {0.0, 0.0};
@@ -102,16 +104,18 @@ static void demand_torso(const hxInverseDynamics *model, const hxNeighbours *mot
     up = acceleration(before->torso_height, now->torso_height, after->torso_height, model->period);
     spin = plane_acceleration(before->turn, now->turn, after->turn, model->period);
   }
-  const hxPlane push = hx_times(hx_scaled(a, model->torso_mass), hx_conj(now->turn));
+  const double pushed = (model->torso_mass + (laden - 1.0) * model->total_mass) / laden;
+  const hxPlane push = hx_times(hx_scaled(a, pushed), hx_conj(now->turn));
   add_force(push, model->torso_mass * (up + model->gravity), now->torso_place, now->torso_height,
             model->floor, demand);
   demand->twist += model->torso_inertia * hx_across(now->turn, spin);
 }
 
-/* Adds m (a + g) of the links of a leg to the demand (C16), and returns it in the torso frame. */
+/* Adds m (a + g) of the links of a leg to the demand (C16, C58), and returns it in the torso
+ * frame. */
 static void demand_links(const hxInverseDynamics *model, const hxNeighbours *motion, int leg,
-                         const hxPosture *posture, hxPlane push[HX_JOINTS], double lift[HX_JOINTS],
-                         hxDemand *demand) {
+                         const hxPosture *posture, double laden, hxPlane push[HX_JOINTS],
+                         double lift[HX_JOINTS], hxDemand *demand) {
   const hxMasses *now = motion->masses[1], *before = motion->masses[0], *after = motion->masses[2];
   for (int link = 0; link < HX_JOINTS; ++link) {
     const double mass = model->mass[leg][link];
@@ -125,8 +129,8 @@ static void demand_links(const hxInverseDynamics *model, const hxNeighbours *mot
     }
     push[link] = hx_times(hx_scaled(a, mass), hx_conj(now->turn));
     lift[link] = mass * (up + model->gravity);
-    add_force(push[link], lift[link], now->place[leg][link], now->height[leg][link], model->floor,
-              demand);
+    add_force(hx_scaled(push[link], 1.0 / laden), lift[link], now->place[leg][link],
+              now->height[leg][link], model->floor, demand);
     hx_posture_turn_back(posture, &push[link], &lift[link]);
   }
 }
@@ -182,14 +186,14 @@ static void lever_of(const hxLegSolver *leg, const hxPose *pose, const hxPosture
 
 void hx_inverse_dynamics_demand(const hxInverseDynamics *model, const hxLegSolver leg[HX_LEGS],
                                 const hxNeighbours *motion, const double speed[HX_LEGS][HX_JOINTS],
-                                const hxPosture *posture, hxDemand *demand) {
+                                const hxPosture *posture, double laden, hxDemand *demand) {
   hxPlane push[HX_JOINTS];
   double lift[HX_JOINTS];
   memset(demand, 0, sizeof *demand);
   for (int k = 0; k < HX_LEGS; ++k) {
-    demand_links(model, motion, k, posture, push, lift, demand);
+    demand_links(model, motion, k, posture, laden, push, lift, demand);
     demand_torques(model, &leg[k], motion, k, push, lift, speed[k], demand->torque[k]);
     lever_of(&leg[k], &motion->pose[1][k], posture, demand->lever[k]);
   }
-  demand_torso(model, motion, demand);
+  demand_torso(model, motion, laden, demand);
 }

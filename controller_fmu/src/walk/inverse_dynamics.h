@@ -14,6 +14,7 @@ typedef struct hxInverseDynamics {
   double rotor, friction; /* kg m2, N m  of servo and gear */
   double floor; /* m, height of the ground below the stance, torso frame */
   double torso_mass, torso_inertia;
+  double total_mass; /* kg, of torso and links */
   hxPlane torso_com;
   double torso_com_z;
   double mass[HX_LEGS][HX_JOINTS];
@@ -60,9 +61,11 @@ void hx_inverse_dynamics_place(const hxInverseDynamics *model, const hxLegSolver
                                const hxPose pose[HX_LEGS], hxPlane way, double turn,
                                const hxPosture *posture, hxMasses *masses);
 
+/* laden: measured over modelled weight [1]. The planned loads are scaled by it (C30), but a payload
+ * needs no push for the legs, and more for the torso (C58). */
 void hx_inverse_dynamics_demand(const hxInverseDynamics *model, const hxLegSolver leg[HX_LEGS],
                                 const hxNeighbours *motion, const double speed[HX_LEGS][HX_JOINTS],
-                                const hxPosture *posture, hxDemand *demand);
+                                const hxPosture *posture, double laden, hxDemand *demand);
 
 HX_HIDDEN_END
 
