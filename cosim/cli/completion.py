@@ -18,6 +18,7 @@ from hexapod_cosim.cosim.scenario.records import CONTROLS, KEYS, SECTIONS
 from hexapod_cosim.cosim.scenario.tables import list_scenarios
 from hexapod_cosim.models import list_robots
 from hexapod_cosim.models.ground.catalogue import CATALOGUE
+from hexapod_cosim.models.records import PLANES
 
 Offers = list[tuple[str, str]]  # word, meaning
 Complete = Callable[[str], Offers]
@@ -58,7 +59,13 @@ def _meaning(column: Column) -> str:
 
 scenario = _offering(_scenarios)
 setting = _offering(_settings)
-terrain = _offering(lambda: ((name, entry.about) for name, entry in CATALOGUE.items()))
+surface = _offering(lambda: ((name, entry.about) for name, entry in CATALOGUE.items()))
+terrain = _offering(
+    lambda: (
+        *((name, "plane without edges") for name in PLANES),
+        *((name, entry.about) for name, entry in CATALOGUE.items()),
+    )
+)
 robot = _offering(lambda: ((name, "") for name in list_robots()))
 gait = _offering(
     lambda: ((name, f"duty factor {pattern.duty:.3g}") for name, pattern in PATTERNS.items())

@@ -104,7 +104,7 @@ Terrains = Annotated[
         metavar="NAME[:KEY=VALUE,...]",
         help="Pack a surface of `hexapod list terrains` into the plant's FMU; repeat it for "
         "several, between which the parameter terrain.grid chooses.",
-        autocompletion=completion.terrain,
+        autocompletion=completion.surface,
     ),
 ]
 ControllerName = Annotated[

@@ -1,32 +1,36 @@
-"""`hexapod terrain`: shows a surface of the catalogue, and reads surfaces from options."""
+"""`hexapod terrain`: shows a kind of ground, and reads surfaces from options."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Annotated, Any
 
+import numpy as np
 import typer
 
 from hexapod_cosim.cosim.cli import completion
 from hexapod_cosim.cosim.cli.terminal import Json, show_files, show_json, show_table, show_text
 from hexapod_cosim.cosim.scenario.sections import read_terrain_keys
 from hexapod_cosim.cosim.scenario.tables import parse_value
-from hexapod_cosim.models import HexapodError, load_robot, unknown_name
+from hexapod_cosim.models import HexapodError, Terrain, load_robot, unknown_name
 from hexapod_cosim.models.ground.catalogue import CATALOGUE
 from hexapod_cosim.models.ground.parameters import DIFFICULTY, Parameter
 from hexapod_cosim.models.ground.surface import Surface
-from hexapod_cosim.models.ground.table import read_terrain
+from hexapod_cosim.models.ground.table import NAMES, PLACED, read_terrain
+from hexapod_cosim.models.records import PLANES
 from hexapod_cosim.models.schema import Number
 
 PICTURES = (".png", ".svg")
 PREFIX = "terrain."
+SHOWN_EDGE, SHOWN_CELL = 4.0, 0.05  # m    of the part of a plane that is drawn
 
 TerrainName = Annotated[
     str,
     typer.Argument(
         metavar="NAME",
-        help="A surface of `hexapod list terrains`.",
+        help="A ground of `hexapod list terrains`.",
         autocompletion=completion.terrain,
     ),
 ]
@@ -63,27 +67,29 @@ def terrain(
     robot: RobotName = "athena",
     json: Json = False,
 ) -> None:
-    """Show a surface of the ground: its size and parameters, its picture, its height map."""
+    """Show a kind of ground: its size and parameters, its picture, its height map."""
     # Matplotlib takes a moment to import
     from hexapod_cosim.cosim.report.relief import draw_relief, write_heights  # noqa: PLC0415
 
-    surface = surface_from(name, values or [])
+    ground = ground_from(name, values or [])
+    surface = ground.surface or _part_of_plane(ground)
     written, keys = list[Path](), dict[str, float]()
     if output is not None:
         written.append(draw_relief(surface, load_robot(robot), _picture(output)))
     if heights is not None:
         keys = write_heights(surface, _with_suffix(heights, (".png",)))
         written.append(heights)
-    facts = _facts(surface)
+    facts = _facts(surface) if ground.surface else _facts_of_plane(ground)
     if json:
         read = {"heights": {"file": str(heights), **keys}} if heights is not None else {}
         show_json({**facts, "written": [str(path) for path in written], **read})
         return
     for key, value in facts.items():
         show_text(f"{key}: {value}")
-    shown = surface.recipe
-    rows = [[key, _value(shown, key, one), one.about] for key, one in parameters(name).items()]
-    show_table(["parameter", "value", "about"], rows)
+    if ground.surface:
+        shown = surface.recipe
+        rows = [[key, _value(shown, key, one), one.about] for key, one in parameters(name).items()]
+        show_table(["parameter", "value", "about"], rows)
     show_files(written)
     if keys:
         listed = ", ".join(f"{key} = {value!r}" for key, value in keys.items())
@@ -126,10 +132,45 @@ def _facts(surface: Surface) -> dict[str, Any]:
     }
 
 
+def _facts_of_plane(ground: Terrain) -> dict[str, Any]:
+    """Returns what a plane is: it has no edges, and is in every FMU."""
+    placed = PLACED if ground.kind == "slope" else PLACED[:1]
+    units = {"height": "m", "incline": "rad", "heading": "rad"}
+    found: dict[str, Any] = {"name": ground.name, "kind": "plane without edges"}
+    return found | {f"{key} [{units[key]}]": getattr(ground, key) for key in placed}
+
+
+def _part_of_plane(ground: Terrain) -> Surface:
+    """Returns the part of a plane around the origin, above its height there, as a grid."""
+    line = np.linspace(-0.5 * SHOWN_EDGE, 0.5 * SHOWN_EDGE, round(SHOWN_EDGE / SHOWN_CELL) + 1)
+    x, y = np.meshgrid(line, line)
+    rise = x * math.cos(ground.heading) + y * math.sin(ground.heading)
+    height = math.tan(ground.incline) * rise
+    return Surface(
+        kind="smooth", height=height, x0=line[0], y0=line[0], cell=SHOWN_CELL, name=ground.name
+    )
+
+
 def surface_from(name: str, values: Iterable[str]) -> Surface:
     """Returns a surface by its name and texts KEY=VALUE. Raises HexapodError."""
+    if name in PLANES:
+        raise HexapodError(
+            "a plane is no surface",
+            got=name,
+            expected=f"one of {', '.join(CATALOGUE)}",
+            fix=f"leave it out: every FMU has planes, which terrain.kind = {name} chooses",
+        )
     if name not in CATALOGUE:
         raise unknown_name("surface", name, CATALOGUE)
+    surface = ground_from(name, values).surface
+    assert surface is not None  # each entry of the catalogue has one
+    return surface
+
+
+def ground_from(name: str, values: Iterable[str]) -> Terrain:
+    """Returns a kind of ground by its name and texts KEY=VALUE. Raises HexapodError."""
+    if name not in NAMES:
+        raise unknown_name("terrain", name, NAMES)
     table: dict[str, Any] = {"kind": name}
     for text in values:
         key, equals, value = (part.strip() for part in text.partition("="))
@@ -142,9 +183,16 @@ def surface_from(name: str, values: Iterable[str]) -> Surface:
                 where=name,
             )
         table[key.removeprefix(PREFIX)] = parse_value(value)
-    surface = read_terrain(read_terrain_keys(table, "terrain"), "terrain").surface
-    assert surface is not None  # each entry of the catalogue has one
-    return surface
+    ground = read_terrain(read_terrain_keys(table, "terrain"), "terrain")
+    if ground.kind == "flat" and (ground.incline or ground.heading):
+        raise HexapodError(
+            "level ground with a slope",
+            got=", ".join(f"{key} = {getattr(ground, key):g}" for key in PLACED[1:]),
+            expected="height alone",
+            fix="show `slope` instead",
+            where=name,
+        )
+    return ground
 
 
 def surfaces_from(texts: Iterable[str]) -> list[Surface]:

@@ -2,7 +2,8 @@
 
 A robot that flies freely comes back to the height at which its feet left the ground with the speed
 at which they left it. So the speed of an impact over that of the impact before is the restitution
-that the ground delivered, without any error of sampling.
+that the ground delivered, without any error of sampling. The peaks of the force are those that the
+plant tracks, which do not depend on sampling either.
 """
 
 from __future__ import annotations
@@ -14,11 +15,12 @@ from typing import Any
 import numpy as np
 
 from hexapod_cosim.cosim.interface.names import foot_names
-from hexapod_cosim.cosim.master.recorder import COMMAND_COLUMNS
-from hexapod_cosim.cosim.results.walk import View
+from hexapod_cosim.cosim.master.recorder import Recording
+from hexapod_cosim.cosim.results.walk import View, is_drop, robot_weight
 from hexapod_cosim.models import CONTACT_LAWS
 from hexapod_cosim.models.contact import CHI, achieved_restitution
 
+MEASURED = ("impact_speed", "landings", "peak_force")  # outputs of the plant, of each foot
 MOST = 5  # impacts that are reported
 
 
@@ -28,6 +30,7 @@ class Bounce:
 
     time: float  # s    of the first row with contact
     speed: float  # m/s    of the impact, mean over the feet
+    peak: float  # BW    largest normal force of a foot before the next impact
     restitution: float  # 1
 
 
@@ -51,26 +54,40 @@ def describe_drop(view: View) -> Drop | None:
     `contact.impact_speed_floor` are left out: there the law does not deliver what it is asked for.
     """
     recording = view.recording
-    needed = {*COMMAND_COLUMNS, *foot_names("contact"), *foot_names("impact_speed")}
-    if len(recording.time) < 2 or not needed <= set(recording.names):
+    needed = {name for each in MEASURED for name in foot_names(each)}
+    if not is_drop(recording) or not needed <= set(recording.names):
         return None
-    if recording.columns(list(COMMAND_COLUMNS)).any():
-        return None
-    touching = np.asarray((recording.feet("contact") > 0.5).any(axis=1))
-    if touching[0]:
-        return None
+    touching = _touching(recording)
     begins = np.flatnonzero(touching[1:] & ~touching[:-1]) + 1
     # all feet have touched down by the end of a landing, which is the row before the next flight
     ends = [_end(touching, begin) for begin in begins.tolist()]
     speeds = recording.feet("impact_speed")[ends].mean(axis=1)
+    peaks = recording.feet("peak_force").max(axis=1) / robot_weight(view.parameters)
     floor = view.parameters.get("contact.impact_speed_floor", 0.0)
     bounces = [
-        Bounce(float(recording.time[begin]), float(before), float(after / before))
-        for begin, before, after in zip(begins, speeds[:-1], speeds[1:], strict=False)
+        Bounce(
+            time=float(recording.time[begin]),
+            speed=float(before),
+            peak=float(peaks[begin:following].max()),
+            restitution=float(after / before),
+        )
+        for begin, following, before, after in zip(
+            begins[:-1], begins[1:], speeds[:-1], speeds[1:], strict=True
+        )
         if before > floor
     ]
     asked, law = asked_restitution(view.parameters)
     return Drop(asked, law, tuple(bounces[:MOST])) if bounces else None
+
+
+def _touching(recording: Recording) -> np.ndarray[Any, np.dtype[np.bool_]]:
+    """Returns whether a foot is in contact at a row, or was between the row before and it (rows,).
+
+    On stiff ground an impact may be shorter than the time between two rows.
+    """
+    counts = recording.feet("landings").sum(axis=1)
+    landed = np.diff(counts, prepend=counts[0]) > 0.0
+    return np.asarray((recording.feet("contact") > 0.5).any(axis=1) | landed)
 
 
 def _end(touching: np.ndarray[Any, np.dtype[np.bool_]], begin: int) -> int:
@@ -93,6 +110,12 @@ def drop_text(drop: Mapping[str, Any]) -> str:
     asked = "no restitution" if drop["asked"] is None else f"restitution {drop['asked']:.3g}"
     law = "" if drop["of_the_law"] is None else f", the law gives {drop['of_the_law']:.4f}"
     delivered = ", ".join(
-        f"{bounce['restitution']:.4f} at {bounce['speed']:.3g} m/s" for bounce in drop["bounces"]
+        f"{bounce['restitution']:.4f} at {bounce['speed']:.3g} m/s{_peak_text(bounce)}"
+        for bounce in drop["bounces"]
     )
     return f"Asked for {asked}{law}; delivered {delivered}."
+
+
+def _peak_text(bounce: Mapping[str, Any]) -> str:
+    """Returns the peak of an impact's force; "" for results of earlier versions, without it."""
+    return f" (peak {bounce['peak']:.3g} BW)" if "peak" in bounce else ""

@@ -1,4 +1,7 @@
-"""Cuts out the part of a run that metrics use: whole gait cycles after the first two."""
+"""Cuts out the part of a run that metrics use: whole gait cycles after the first two.
+
+Of a drop it is the whole run.
+"""
 
 from __future__ import annotations
 
@@ -9,7 +12,7 @@ from functools import cached_property, lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from hexapod_cosim.cosim.interface.names import joint_names, vector_names
+from hexapod_cosim.cosim.interface.names import foot_names, joint_names, vector_names
 from hexapod_cosim.cosim.master.recorder import COMMAND_COLUMNS, Recording
 from hexapod_cosim.cosim.results.feet import feet_of_angles
 from hexapod_cosim.models import FRICTION_LAWS, TERRAINS
@@ -42,8 +45,8 @@ class View:
 
     @cached_property
     def walk(self) -> Walk | None:
-        """Whole gait cycles after the first two; None when there is none."""
-        return _cut_walk(self)
+        """Whole gait cycles after the first two; None when there is none. A drop is whole."""
+        return _whole_drop(self) if is_drop(self.recording) else _cut_walk(self)
 
     @cached_property
     def energy_residual(self) -> float:
@@ -140,6 +143,27 @@ def _cut_walk(view: View) -> Walk | None:
     heading = float(time_shares(part.time[first]) @ (yaw - turned)[first])
     weight = robot_weight(view.parameters)
     return Walk(recording, part, begin, end, period, distance, angle, weight, turned, heading)
+
+
+def is_drop(recording: Recording) -> bool:
+    """Returns whether a run begins with all feet in the air and has no command."""
+    needed = {*COMMAND_COLUMNS, *foot_names("contact")}
+    if len(recording.time) < 2 or not needed <= set(recording.names):
+        return False
+    return not (
+        recording.columns(list(COMMAND_COLUMNS)).any() or recording.feet("contact")[0].any()
+    )
+
+
+def _whole_drop(view: View) -> Walk:
+    """Returns all of a drop, whose impacts come first; it has no figures per metre or radian."""
+    recording, nowhere = view.recording, float("nan")
+    time, turned = recording.time, np.zeros_like(recording.time)
+    weight, heading = robot_weight(view.parameters), float(recording.column("torso.yaw")[0])
+    begin, end = float(time[0]), float(time[-1])
+    return Walk(
+        recording, recording, begin, end, view.period, nowhere, nowhere, weight, turned, heading
+    )
 
 
 def _between(recording: Recording, begin: float, end: float) -> Recording:

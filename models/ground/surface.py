@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import hashlib
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
@@ -172,15 +172,20 @@ def _check_place(surface: Surface) -> None:
         )
 
 
-def check_heights(height: Array, name: str) -> None:
-    """Raises RobotError for heights [m] that are not finite or enormous."""
+def check_heights(height: Array, name: str, place: Callable[[int, int], str] | None = None) -> None:
+    """Raises RobotError for heights [m] that are not finite or enormous.
+
+    place: returns where (row, column) is in the file that the heights are from; None: row and
+    column from 0 on, row 0 at the smallest y.
+    """
     bad = np.argwhere(~np.isfinite(height))
     if len(bad):
-        row, column = (int(place) for place in bad[0])
+        row, column = (int(index) for index in bad[0])
+        at = place(row, column) if place else f"in row {row}, column {column}"
         more = f", and {len(bad) - 1} more" if len(bad) > 1 else ""
         raise RobotError(
             "a height that is no number",
-            got=f"{height[row, column]} in row {row}, column {column}{more}",
+            got=f"{height[row, column]} {at}{more}",
             expected="finite heights",
             fix="fill the holes of the map first",
             where=name,

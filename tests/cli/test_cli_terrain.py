@@ -65,7 +65,9 @@ def test_the_facts_of_a_surface_are_shown(call: Call) -> None:
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["stiars"], "unknown surface: got 'stiars'"),
+        (["stiars"], "unknown terrain: got 'stiars'"),
+        (["flat", "--set", "step_height=0.1"], "unknown key"),
+        (["flat", "--set", "incline=0.1"], "level ground with a slope"),
         (["stairs", "--set", "hight=1"], "unknown key"),
         (["stairs", "--set", "step_height"], "not a setting"),
         (["stairs", "-o", "stairs.bmp"], "ends in .png or .svg"),
@@ -79,6 +81,40 @@ def test_a_wrong_call_is_refused(
     code, _, err = call("terrain", *arguments)
     assert code == 1
     assert message in " ".join(err.split())
+
+
+def test_every_listed_terrain_can_be_shown(call: Call, tmp_path: Path) -> None:
+    """But a height map, which needs a file."""
+    listed = json.loads(call("list", "terrains", "--json")[1])
+    for name in (row["name"] for row in listed if row["name"] != "heightfield"):
+        code, out, err = call("terrain", name, "--json")
+        assert (code, err) == (0, "")
+        assert json.loads(out)["name"] == name
+
+
+def test_a_plane_is_shown_with_its_place_and_slope(call: Call, tmp_path: Path) -> None:
+    picture, heights = tmp_path / "slope.png", tmp_path / "heights.png"
+    given = ("--set", "incline=0.3", "--set", "heading=90 deg", "-o", picture)
+    code, out, _ = call("terrain", "slope", *given, "--heights", heights, "--json")
+    facts = json.loads(out)
+    assert code == 0
+    assert facts["kind"] == "plane without edges"
+    assert [facts[key] for key in ("height [m]", "incline [rad]")] == [0.0, 0.3]
+    assert facts["heading [rad]"] == pytest.approx(1.5707963267948966)
+    again = make_surface(
+        "heightfield", {k: v for k, v in facts["heights"].items() if k != "height"}
+    )
+    rise = 1e3 * (again.height[-1, 0] - again.height[0, 0])
+    assert rise == pytest.approx(1237.345, abs=0.05)  # mm over 4 m: 4 tan(0.3)
+    assert picture.stat().st_size > 1000
+    code, out, _ = call("terrain", "flat")
+    assert (code, out) == (0, "name: flat\nkind: plane without edges\nheight [m]: 0.0\n")
+
+
+def test_a_plane_is_not_packed_as_a_surface(call: Call, tmp_path: Path) -> None:
+    code, _, err = call("export", "--terrain", "flat", "-o", tmp_path / "a.fmu")
+    assert code == 1
+    assert "every FMU has planes, which terrain.kind = flat chooses" in " ".join(err.split())
 
 
 def test_a_controllers_fmu_has_no_ground(call: Call, tmp_path: Path) -> None:

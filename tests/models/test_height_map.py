@@ -138,16 +138,28 @@ REFUSED: list[tuple[str, Callable[[Path], Path], dict[str, float], str]] = [
     ("map.png", png, {**SCALES, "horizontal_scale": -1.0}, "horizontal_scale.*got -1.0"),
     ("map.png", png, {**SCALES, "horizontal_scale": 99.0, "x": 1e5}, "place of the height map"),
     ("map.png", png, {**SCALES, "vertical_scale": 50.0}, "enormous heights.*correct vertical"),
-    ("map.npy", array(NAN), {"horizontal_scale": 0.1}, "row 0, column 1"),
+    ("map.npy", array(NAN), {"horizontal_scale": 0.1}, r"got 'nan at \[0, 1\]'"),
     ("map.npy", array([[0.0, 1.0]]), {"horizontal_scale": 0.1}, "at least 2 rows"),
     ("map.npy", array([0.0, 1.0]), SCALES, "1 axes"),
     ("map.npy", array([["a"]]), SCALES, "real numbers"),
     ("map.npy", array(HEIGHTS), {"horizontal_scale": 0.1}, "without vertical_scale"),
     ("map.npy", text(b"no array"), SCALES, "not a height map"),
     ("map.npy", text(b""), SCALES, "not a height map"),
-    ("map.asc", text(ASC.encode() + b"0 1 2\n3 4 -9999\n"), {}, "a height that is no number"),
-    ("map.asc", text(ASC.encode() + b"0 1 2\n3 4\n"), {}, "5 heights for 2 rows of 3"),
-    ("map.asc", text(ASC.encode() + b"0 1 2\n3 4 five\n"), {}, "five"),
+    ("map.asc", text(ASC.encode() + b"0 1 2\n3 4 -9999\n"), {}, "nan in line 8 .*, number 3'"),
+    ("map.asc", text(ASC.encode() + b"0 1 nan\n3 4 5\n"), {}, "nan in line 7 .*, number 3'"),
+    (
+        "map.asc",
+        text(ASC.encode() + b"0 1 2\n3 4\n"),
+        {},
+        "5 heights for 2 rows of 3; line 8 .* 2 num",
+    ),
+    (
+        "map.asc",
+        text(ASC.encode() + b"0 1 2 3 4\n"),
+        {},
+        "5 heights for 2 rows of 3; line 7 .* 5 num",
+    ),
+    ("map.asc", text(ASC.encode() + b"0 1 2\n3 4 five\n"), {}, "'five' in line 8 .*, number 3"),
     ("map.asc", text(b"width 3\n0 1 2\n"), {}, "width"),
     ("map.asc", text(ASC.replace("cellsize 0.1", "").encode() + b"0 0 0 0 0 0"), {}, "horizontal"),
     ("map.asc", text(ASC.replace("0.1", "-0.1").encode() + b"0 0 0 0 0 0"), {}, "cellsize"),
@@ -166,6 +178,32 @@ def test_a_wrong_map_is_refused_with_its_name(
 ) -> None:
     with pytest.raises(RobotError, match=message):
         read(write(tmp_path / name), **given)
+
+
+@pytest.mark.parametrize("bytes_less", [1, 4, 5, 12, 13, 16, 20])
+def test_a_picture_that_is_cut_is_refused(bytes_less: int, tmp_path: Path) -> None:
+    """Pillow reads it as long as the pixels are there: the chunk IEND takes the last 12 bytes."""
+    path = png(tmp_path / "map.png")
+    path.write_bytes(path.read_bytes()[:-bytes_less])
+    with pytest.raises(RobotError, match=r"map\.png.*a file that is cut"):
+        read(path, **SCALES)
+
+
+@pytest.mark.parametrize("from_end", [1, 13])
+def test_a_picture_with_a_wrong_checksum_is_refused(from_end: int, tmp_path: Path) -> None:
+    path = png(tmp_path / "map.png")
+    content = bytearray(path.read_bytes())
+    content[-from_end] ^= 1  # in the checksum of IEND, or in that of the pixels
+    path.write_bytes(content)
+    with pytest.raises(RobotError, match=r"the checksum of the chunk I(END|DAT) is wrong"):
+        read(path, **SCALES)
+
+
+def test_a_picture_of_another_kind_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "map.png"
+    Image.fromarray(HEIGHTS.astype(np.uint16)).save(path, format="TIFF")
+    with pytest.raises(RobotError, match="another kind"):
+        read(path, **SCALES)
 
 
 def test_a_missing_map_is_refused_with_its_path(tmp_path: Path) -> None:

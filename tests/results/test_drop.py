@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from hexapod_cosim.cosim.results.drop import drop_text
@@ -27,6 +28,39 @@ def test_a_stiff_ground_delivers_what_the_law_promises(law: str, delivered: floa
 
 
 @pytest.mark.usefixtures("plant_build")
+@pytest.mark.parametrize("stiffness", [1e7, 1e8, 1e9])
+def test_the_peak_of_a_drop_is_that_of_a_hertz_impact(stiffness: float) -> None:
+    """A sphere of a sixth of the mass stores its energy at its depth: 2/5 K d^(5/2) = E.
+
+    The ground gives all of it back, and the peak is neither rounded nor missed where the impact is
+    shorter than a macro-step of 2 ms (0.7 ms at 1e9 N/m^1.5).
+    """
+    law = ["contact.law=hertz", f"contact.stiffness={stiffness}", "duration=0.4"]
+    result = simulate(load_scenario("drop", overrides=law))
+    weight, mass, g = 54.936, 5.6 / 6, 9.81  # N of the robot, kg on a foot, m/s2
+    first = result.facts["drop"]["bounces"][0]
+    depth = (first["peak"] * weight / stiffness) ** (2.0 / 3.0)
+    energy = 0.5 * mass * first["speed"] ** 2 + mass * g * depth
+    assert 0.4 * stiffness * depth**2.5 == pytest.approx(energy, rel=1e-4)
+    assert first["restitution"] == pytest.approx(1.0, abs=1e-4)
+    assert result.metrics["peak_force"] == pytest.approx(first["peak"], rel=1e-4)
+
+
+@pytest.mark.usefixtures("plant_build")
+def test_the_metrics_of_a_drop_are_of_all_of_it() -> None:
+    """The peak is in the first 0.1 s; in its last second the robot stands."""
+    result = simulate(load_scenario("drop"))
+    bounces = result.facts["drop"]["bounces"]
+    peaks = [bounce["peak"] for bounce in bounces]
+    assert peaks == sorted(peaks, reverse=True)
+    assert result.metrics["peak_force"] == peaks[0] > 20.0  # BW
+    assert np.isnan(result.metrics["slip_per_metre"])
+    times = np.diff([bounce["time"] for bounce in bounces])
+    flights = [2.0 * bounce["speed"] / 9.81 for bounce in bounces[1:]]  # s    at its speed
+    assert times == pytest.approx(flights, abs=4e-3)  # two macro-steps
+
+
+@pytest.mark.usefixtures("plant_build")
 def test_a_drop_is_not_warned_of_figures_of_walks() -> None:
     facts = simulate(load_scenario("drop")).facts
     assert facts["drop"] is not None
@@ -39,8 +73,9 @@ def test_a_walk_reports_no_drop() -> None:
 
 
 def test_the_text_of_a_drop_tells_asked_and_delivered(tmp_path: Path) -> None:
-    bounces = [{"time": 0.1, "speed": 0.94, "restitution": 0.4926}]
-    facts = {"asked": 0.5, "of_the_law": 0.5, "bounces": bounces}
+    bounce = {"time": 0.1, "speed": 0.94, "peak": 51.2, "restitution": 0.4926}
+    facts = {"asked": 0.5, "of_the_law": 0.5, "bounces": [bounce]}
     assert drop_text(facts) == (
-        "Asked for restitution 0.5, the law gives 0.5000; delivered 0.4926 at 0.94 m/s."
+        "Asked for restitution 0.5, the law gives 0.5000; "
+        "delivered 0.4926 at 0.94 m/s (peak 51.2 BW)."
     )
