@@ -46,6 +46,9 @@ BESIDE = 6  # rows before and after a jump
 # A reading whose second difference over the numbers' short steps is larger jumps with a number; see
 # `Problem.leave_out_bent`.
 BENT = 0.05  # deviations
+# A larger share of readings that change otherwise than derivatives say does not jump: the valley of
+# the sum of squares is curved, and a shorter step follows it.
+CURVED = 0.1
 FLOOR = 1e-9  # smallest noise, in the units of the channels
 CLIPPED = 5.0  # deviations    of a residual in the test whether the model explains the log
 # Largest mean square of residuals over that of the readings' noise, of many readings. That of the
@@ -279,6 +282,8 @@ class Problem:
         """
         count = sum(own[:: self._thin].size for own in self.counted)
         flags = np.abs(change - linear)[:count] > BENT
+        if float(np.mean(flags)) > CURVED:
+            return False
         self._nonlinear = flags if self._nonlinear is None else flags | self._nonlinear
         return self.leave_out(flags)
 
