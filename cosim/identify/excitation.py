@@ -21,7 +21,8 @@ from hexapod_cosim.cosim.export.export import export_fmu
 from hexapod_cosim.cosim.identify.experiment import Experiment
 from hexapod_cosim.cosim.identify.fitting.differences import FINE
 from hexapod_cosim.cosim.identify.fitting.problem import Problem
-from hexapod_cosim.cosim.identify.identified import TOLD, Identified
+from hexapod_cosim.cosim.identify.fitting.rank import TOLD
+from hexapod_cosim.cosim.identify.identified import Identified
 from hexapod_cosim.cosim.identify.identify import TOLERANCE
 from hexapod_cosim.cosim.identify.log import Log
 from hexapod_cosim.cosim.identify.log_plant import LogPlant

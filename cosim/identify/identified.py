@@ -14,15 +14,14 @@ from hexapod_cosim.cosim.identify.comparison import (
     column_differences,
 )
 from hexapod_cosim.cosim.identify.experiment import Experiment
-from hexapod_cosim.cosim.identify.fitting.output_error import Fit
+from hexapod_cosim.cosim.identify.fitting.judging import Fit
+from hexapod_cosim.cosim.identify.fitting.rank import QUANTILE, TOLD, combination_text
 from hexapod_cosim.cosim.identify.rigid.linear_start import LinearStart
 from hexapod_cosim.cosim.identify.screening import BadColumn
-from hexapod_cosim.cosim.identify.unknowns import START
+from hexapod_cosim.cosim.identify.unknowns import START, Unknown
 from hexapod_cosim.models import Robot
 
 Array = NDArray[np.float64]
-TOLD = 0.5  # of the prior deviation: a number with less is told by the logs
-QUANTILE = 1.959963985  # of a normal distribution, for 95 %
 FEWEST_DIGITS = 5  # of a value and its interval in texts
 NEAR = 0.8  # correlation of two numbers that is reported
 
@@ -41,11 +40,13 @@ class Estimate:
     deviation: float  # over that of what was known before: 1 where the logs tell nothing
     partner: str  # the number with which it is correlated most
     correlation: float
+    alone: bool = True  # whether the logs tell it without a number that they do not tell
+    combination: str = ""  # that the logs tell instead, as a formula with its value and interval
 
     @property
     def told(self) -> bool:
         """Whether the logs tell the number: they at least halve what was unknown of it."""
-        return self.deviation < TOLD
+        return self.alone and self.deviation < TOLD
 
     @property
     def interval(self) -> str:
@@ -77,25 +78,40 @@ class Identified:
     lacking: str  # what the logs lack for these
 
     @property
+    def rejected(self) -> bool:
+        """Whether the logs reject the model, so that the robot is the file's."""
+        return bool(self.fit.rejected)
+
+    @property
     def estimates(self) -> list[Estimate]:
         """The numbers of robot and sensors, in the order of the table of unknowns."""
-        found, deviations = [], self.fit.deviations
         own = np.sqrt(np.diag(self.fit.covariance))
         correlation = self.fit.covariance / np.outer(own, own) - np.eye(len(own))
-        for k, row in enumerate(self.fit.rows):
-            if row.group == START:
-                continue
-            value, deviation = self.fit.values[row.key], deviations[row.key]
-            low, high = row.interval(value, QUANTILE * deviation)
-            other = int(np.argmax(np.abs(correlation[k])))
-            found.append(
-                Estimate(
-                    row.key, row.unit, row.group, self.fit.before[row.key], value,
-                    max(low, row.low), min(high, row.high), deviation,
-                    self.fit.rows[other].key, float(correlation[k, other]),
-                )
-            )  # fmt: skip
-        return found
+        values = self.fit.values
+        together = {
+            one.key: combination_text(one, self.fit.rows, values) for one in self.fit.combinations
+        }
+        return [
+            self._estimate(k, row, correlation[k], together.get(row.key, ""))
+            for k, row in enumerate(self.fit.rows)
+            if row.group != START
+        ]
+
+    def _estimate(self, k: int, row: Unknown, correlation: Array, combination: str) -> Estimate:
+        """Returns what was found of a number; nothing of a model that the logs reject."""
+        before, rejected = self.fit.before[row.key], self.rejected
+        # z = 0 is the file's value to the last digit
+        value = before if self.fit.stay[k] or rejected else self.fit.values[row.key]
+        deviation = 1.0 if rejected else self.fit.deviations[row.key]
+        low, high = row.interval(value, QUANTILE * deviation)
+        other = int(np.argmax(np.abs(correlation)))
+        return Estimate(
+            row.key, row.unit, row.group, before, value,
+            max(low, row.low), min(high, row.high), deviation,
+            self.fit.rows[other].key, float(correlation[other]),
+            bool(self.fit.alone[k]) and not self.fit.stay[k] and not rejected,
+            "" if rejected else combination,
+        )  # fmt: skip
 
     @property
     def rank(self) -> int:

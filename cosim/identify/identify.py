@@ -13,7 +13,8 @@ from hexapod_cosim.cosim.export.export import export_fmu
 from hexapod_cosim.cosim.identify.channel_screening import screened, turned_after_the_fit
 from hexapod_cosim.cosim.identify.command_screening import check_commands
 from hexapod_cosim.cosim.identify.experiment import Experiment
-from hexapod_cosim.cosim.identify.fitting.output_error import Fit, fit
+from hexapod_cosim.cosim.identify.fitting.judging import Fit
+from hexapod_cosim.cosim.identify.fitting.output_error import fit
 from hexapod_cosim.cosim.identify.fitting.problem import TO_DEVIATION, Problem
 from hexapod_cosim.cosim.identify.fitting.progress import AGAIN, COLUMNS, LINEAR, Progress, Reporter
 from hexapod_cosim.cosim.identify.fitting.workers import simulating_workers
@@ -94,7 +95,7 @@ def identify(
             before = problem.predictions(np.zeros(len(rows)))
     return Identified(
         file=robot,
-        robot=changed_robot(robot, rows, found.values),
+        robot=robot if found.rejected else changed_robot(robot, rows, found.values),
         fit=found,
         experiments=tuple(experiments),
         bad=tuple(bad),

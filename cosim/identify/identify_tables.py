@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 from hexapod_cosim.cosim.identify.comparison import Difference
 from hexapod_cosim.cosim.identify.excitation import Proposal
+from hexapod_cosim.cosim.identify.fitting.problem import REJECTED
 from hexapod_cosim.cosim.identify.identified import NEAR, Estimate, Identified
 from hexapod_cosim.cosim.identify.page import TITLES, number
 from hexapod_cosim.cosim.identify.rigid.base_parameters import base_of, group_parameters
@@ -13,6 +14,7 @@ from hexapod_cosim.cosim.identify.screening import left_out
 from hexapod_cosim.cosim.identify.start import moving_at_rest
 from hexapod_cosim.cosim.identify.unknowns import BIAS, GEAR
 
+MOTOR = {"servo.torque_constant", "servo.resistance"}
 ESTIMATES = ("number", "unit", "before", "found", "95 % interval", "told", "nearest partner")
 BASE = ("base parameter", "unit", "before", "least squares", "deviation", "found")
 MISFIT = ("channel", "noise", "fitted", "held out")
@@ -78,7 +80,7 @@ def warnings(found: Identified) -> list[str]:
                 f"still ({moving}). The simulation begins with the mean of these rows, at rest: "
                 "let the robot stand longer before the recording, or cut the first rows off."
             )
-    if _has_motor_angles(found) and found.file.servo.gear_stiffness == 0.0:
+    if _has(found, "motor_angle") and found.file.servo.gear_stiffness == 0.0:
         texts.append(
             "The log has the angles of rotors, but the gears of the robot file are rigid: their "
             "stiffness and play are not sought. Give a first servo.gear_stiffness, of about ten "
@@ -91,7 +93,18 @@ def warnings(found: Identified) -> list[str]:
             "log, or begin again from the robot file that was written."
         )
     worst = found.fit.unexplained
-    if worst:
+    if found.rejected:
+        named = ", ".join(
+            f"{TITLES[key].lower()} ({value:.1f})" for key, value in found.fit.rejected.items()
+        )
+        texts.append(
+            "The logs reject the model: mean squares of residuals over those of the readings' "
+            f"noise are {REJECTED:g} and more in {named}. A fit of a wrong model has wrong "
+            "numbers, so none is told and all stay as in the robot file: find all groups of "
+            "numbers, look at the curves of these channels, or choose another model of servo or "
+            "ground."
+        )
+    elif worst:
         named = ", ".join(f"{TITLES[key].lower()} ({value:.1f})" for key, value in worst.items())
         texts.append(
             "The model does not explain this log: mean squares of residuals over those of the "
@@ -111,7 +124,7 @@ def estimate_rows(estimates: Sequence[Estimate]) -> list[list[str]]:
             number(one.before),
             one.found,
             one.interval,
-            "yes" if one.told else "no",
+            "yes" if one.told else "in part" if one.combination else "no",
             f"{one.partner} {one.correlation:+.2f}" if abs(one.correlation) > NEAR else "",
         ]
         for one in estimates
@@ -144,7 +157,9 @@ def error_rows(pairs: Sequence[tuple[Difference, Difference]]) -> list[list[str]
 
 def untold_text(found: Identified) -> str:
     """Returns what the logs cannot tell, as a sentence."""
-    untold = [one.key for one in found.estimates if not one.told]
+    if found.rejected:
+        return "The logs reject the model, so they tell no number."
+    untold = [one.key for one in found.estimates if not one.told and not one.combination]
     text = (
         f"The logs tell {found.rank} independent combinations of {len(found.fit.rows)} numbers "
         "better than the robot file. "
@@ -152,7 +167,13 @@ def untold_text(found: Identified) -> str:
     if not untold:
         return text + "They tell every number."
     text += f"They do not tell: {', '.join(untold)}."
-    if set(GEAR) & set(untold) and not _has_motor_angles(found):
+    text += "".join(_together(one) for one in found.estimates if one.combination)
+    if MOTOR & {one.key for one in found.estimates if not one.told} and not _has(found, "current"):
+        text += (
+            " Currents would tell both the motor's torque constant and its resistance: record "
+            "LF.coxa.current [A], ..."
+        )
+    if set(GEAR) & set(untold) and not _has(found, "motor_angle"):
         text += (
             " Elasticity and play of gears show most in the angles of rotors beside those of "
             "links: record LF.coxa.motor_angle [rad], ..."
@@ -160,8 +181,17 @@ def untold_text(found: Identified) -> str:
     return text
 
 
-def _has_motor_angles(found: Identified) -> bool:
-    return any("motor_angle" in one.channels for one in found.experiments)
+def _together(one: Estimate) -> str:
+    """Returns which combination is told instead of a number, as a sentence."""
+    return (
+        f" Of {one.key} they tell only {one.combination}: its value {one.found} holds as long as "
+        "the other numbers are the file's."
+    )
+
+
+def _has(found: Identified, channel: str) -> bool:
+    """Returns whether readings of a channel are compared."""
+    return any(channel in one.channels for one in found.experiments)
 
 
 def proposal_text(proposals: Sequence[Proposal]) -> str:

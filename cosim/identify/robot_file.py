@@ -1,7 +1,7 @@
 """Writes the robot file of an identified robot: the file it came from with the new numbers.
 
-Comments and all other keys stay. [source] says which numbers come from which log, with their
-intervals. Of a URDF a robot file is written that refers to it.
+The comment beside a new number says from which log it is, with its interval, and so does [source];
+other comments and all other keys stay. Of a URDF a robot file is written that refers to it.
 """
 
 from __future__ import annotations
@@ -13,15 +13,18 @@ from pathlib import Path
 from typing import Any
 
 import tomlkit
+import tomlkit.items
 
 from hexapod_cosim.cosim.common.files import write_text
 from hexapod_cosim.cosim.identify.identified import Estimate, Identified
+from hexapod_cosim.cosim.identify.unknowns import OF_FILE
 from hexapod_cosim.models import JOINT_NAMES, HexapodError, Robot, load_robot
 from hexapod_cosim.models.robot import robot_path
 
 SECTIONS = ("servo", "contact", "friction")
 BODY_KEYS = ("mass", "com", "inertia")
 SENSORS = "sensors.toml"
+FOLLOWS = "follows from identified numbers"  # comment beside a number that does
 
 
 def robot_text(found: Identified, file: str, folder: Path, logs: Sequence[str]) -> str:
@@ -39,13 +42,15 @@ def robot_text(found: Identified, file: str, folder: Path, logs: Sequence[str]) 
     document = _document(path, folder)
     document["name"] = f"{found.robot.name}-identified"
     source = document.setdefault("source", tomlkit.table())
-    source["identified"] = f"hexapod identify {' '.join(Path(log).name for log in logs)}"
-    for one in found.estimates:
-        if one.group in ("servo", "mass", "contact"):
-            source[one.key] = _sentence(one)
+    names = " ".join(Path(log).name for log in logs)
+    source["identified"] = f"hexapod identify {names}"
+    own = [one for one in found.estimates if one.group in OF_FILE]
+    for one in own:
+        source[one.key] = _sentence(one, names, rejected=found.rejected)
+    said = _comments(own, names)
     for name in SECTIONS:
-        _set_changed(document, name, getattr(found.file, name), getattr(found.robot, name))
-    _set_bodies(document, found.file, found.robot)
+        _set_changed(document, name, getattr(found.file, name), getattr(found.robot, name), said)
+    _set_bodies(document, found.file, found.robot, said)
     _set_defaults(document, found.robot)
     return tomlkit.dumps(document)
 
@@ -75,16 +80,49 @@ def _relative(path: Path, folder: Path) -> str:
     return Path(os.path.relpath(path.resolve(), folder.resolve())).as_posix()
 
 
-def _sentence(one: Estimate) -> str:
+def _sentence(one: Estimate, logs: str, *, rejected: bool) -> str:
     """Returns where a number comes from."""
-    interval = f"95 % interval {one.interval} {one.unit}"
     if one.told:
-        return f"identified from the log: {interval}; before {one.before:.6g}"
-    return f"not told by the log: {interval} with what was known; before {one.before:.6g}"
+        interval = f"95 % interval {one.interval} {one.unit}"
+        return f"identified from {logs}: {interval}; before {one.before:.6g}"
+    if one.combination:
+        return f"not told alone by {logs}: it tells {one.combination}; before {one.before:.6g}"
+    why = ", which rejects the model" if rejected else ""
+    return f"not told by {logs}{why}: as before"
 
 
-def _set_changed(document: Any, name: str, before: Any, after: Any) -> None:
-    """Sets the keys of a section that have changed."""
+def _comments(estimates: Sequence[Estimate], logs: str) -> dict[str, str]:
+    """Returns the comments beside numbers that are new, by the keys of the file."""
+    said: dict[str, list[str]] = {}
+    units = {}
+    for one in estimates:
+        key, _, axis = one.key.partition("[")
+        if one.told:
+            text = f"{one.interval}"
+        elif one.combination:
+            text = f"only {one.combination}"
+        else:
+            continue
+        units[key] = one.unit
+        said.setdefault(key, []).append(f"[{axis} {text}" if axis else text)
+    return {
+        key: f"{units[key]}    identified from {logs}, 95 % interval {', '.join(texts)}"
+        for key, texts in said.items()
+    }
+
+
+def _put(table: Any, key: str, value: Any, comment: str) -> None:
+    """Sets a number of a table with a comment, which replaces the one beside the old number."""
+    item = tomlkit.item(value)
+    if not isinstance(table, tomlkit.items.InlineTable):
+        item.comment(comment)
+    table[key] = item
+
+
+def _set_changed(
+    document: Any, name: str, before: Any, after: Any, said: Mapping[str, str]
+) -> None:
+    """Sets the keys of a section that have changed. said: comments, by key of the file."""
     changed = [
         item.name
         for item in fields(after)
@@ -94,7 +132,7 @@ def _set_changed(document: Any, name: str, before: Any, after: Any) -> None:
         return
     section = document.setdefault(name, tomlkit.table())
     for key in changed:
-        section[key] = getattr(after, key)
+        _put(section, key, getattr(after, key), said.get(f"{name}.{key}", FOLLOWS))
 
 
 def _set_defaults(document: Any, after: Robot) -> None:
@@ -105,33 +143,43 @@ def _set_defaults(document: Any, after: Robot) -> None:
             table[key] = getattr(getattr(after, section), key)
 
 
-def _set_bodies(document: Any, before: Robot, after: Robot) -> None:
-    """Sets mass, centre of mass and inertia of the bodies that have changed."""
-    if before.torso != after.torso:
-        torso = document.setdefault("torso", tomlkit.table())
-        for key in BODY_KEYS:
-            torso[key] = _plain(getattr(after.torso, key))
+def _set_bodies(document: Any, before: Robot, after: Robot, said: Mapping[str, str]) -> None:
+    """Sets mass, centre of mass and inertia of the bodies where they have changed.
+
+    said: comments, by key of the file.
+    """
+    for key in BODY_KEYS:
+        if getattr(before.torso, key) != getattr(after.torso, key):
+            torso = document.setdefault("torso", tomlkit.table())
+            comment = said.get(f"torso.{key}", FOLLOWS)
+            _put(torso, key, _plain(getattr(after.torso, key)), comment)
     for joint, name in enumerate(JOINT_NAMES):
-        pairs = [
-            (leg.name, old.links[joint], leg.links[joint])
-            for old, leg in zip(before.legs, after.legs, strict=True)
-        ]
-        if all(old == new for _, old, new in pairs):
-            continue
-        links = document.setdefault("links", tomlkit.table())
-        shared = links.setdefault(name, tomlkit.table())
         for key in BODY_KEYS:
-            common = _plain(getattr(pairs[0][2], key))
-            shared[key] = common
-            for leg, _, new in pairs:
-                own = _leg_table(document, leg, name)
-                value = _plain(getattr(new, key))
-                if value != common:
-                    own = document.setdefault("legs", tomlkit.table())
-                    own = own.setdefault(leg, tomlkit.table()).setdefault(name, tomlkit.table())
-                    own[key] = value
-                elif own is not None and key in own:
-                    own[key] = value
+            old, new = (
+                {leg.name: _plain(getattr(leg.links[joint], key)) for leg in robot.legs}
+                for robot in (before, after)
+            )
+            if old != new:
+                comment = said.get(f"links.{name}.{key}", FOLLOWS)
+                _set_links(document, name, key, new, comment)
+
+
+def _set_links(document: Any, name: str, key: str, values: Mapping[str, Any], comment: str) -> None:
+    """Sets a key of the links of all legs.
+
+    values: by name of the leg. Of a leg that has its own value, or needs one, its own table is set.
+    """
+    links = document.setdefault("links", tomlkit.table())
+    common = next(iter(values.values()))
+    _put(links.setdefault(name, tomlkit.table()), key, common, comment)
+    for leg, value in values.items():
+        own = _leg_table(document, leg, name)
+        if value != common:
+            own = document.setdefault("legs", tomlkit.table())
+            own = own.setdefault(leg, tomlkit.table()).setdefault(name, tomlkit.table())
+            _put(own, key, value, comment)
+        elif own is not None and key in own:
+            _put(own, key, value, comment)
 
 
 def _leg_table(document: Any, leg: str, joint: str) -> Any:

@@ -84,7 +84,11 @@ def initial_state(log: Log, robot: Robot) -> dict[str, float]:
         found[f"initial.{name}"] = float(angle.flat[k])
     for name in joint_names("speed"):
         found[f"initial.{name}"] = rate(name) if rest == 1 and log.has([name]) else 0.0
-    turn = _quaternion(log, rows.data, rest, is_flat=robot.terrain.kind == "flat")
+    is_flat = robot.terrain.kind == "flat"
+    if is_flat and not log.has(ATTITUDE):
+        turn = standing_attitude(robot, angle)
+    else:
+        turn = _quaternion(log, rows.data, rest, is_flat=is_flat)
     found |= dict(zip(vector_names("initial.quaternion", 4), turn.tolist(), strict=True))
     place = vector_names("torso.position")
     position = _resting(robot, angle, turn)
@@ -137,6 +141,23 @@ def _quaternion(log: Log, rows: Array, rest: int, *, is_flat: bool) -> Array:
         roll, pitch = 0.0, 0.0
     turn = axis_quaternion(np.array([0.0, 0.0, 1.0]), yaw)
     turn = quaternion_product(turn, axis_quaternion(np.array([0.0, 1.0, 0.0]), pitch))
+    return quaternion_product(turn, axis_quaternion(np.array([1.0, 0.0, 0.0]), roll))
+
+
+def standing_attitude(robot: Robot, angle: Array) -> Array:
+    """Returns the attitude (4,) of a robot whose feet stand on level ground, with a yaw of 0.
+
+    angle: of the joints (6, 3) [rad]. The ground is the plane nearest to the feet; the attitude is
+    level where they lie in none that a standing robot may have.
+    """
+    feet = foot_positions(robot, angle)
+    offset = feet - feet.mean(axis=0)
+    slopes, *_ = np.linalg.lstsq(offset[:, :2], offset[:, 2], rcond=None)
+    up = np.array([-slopes[0], -slopes[1], 1.0]) / np.sqrt(1.0 + float(slopes @ slopes))
+    pitch, roll = -float(np.arcsin(up[0])), float(np.arctan2(up[1], up[2]))
+    if max(abs(roll), abs(pitch)) > LEANS:
+        roll = pitch = 0.0
+    turn = axis_quaternion(np.array([0.0, 1.0, 0.0]), pitch)
     return quaternion_product(turn, axis_quaternion(np.array([1.0, 0.0, 0.0]), roll))
 
 

@@ -11,7 +11,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-from hexapod_cosim.cosim.identify.inertia import body_inertia
+from hexapod_cosim.cosim.identify.inertia import BodyInertia, body_inertia
 from hexapod_cosim.cosim.identify.log import CHANNELS, SENSORS, Log
 from hexapod_cosim.cosim.interface.names import joint_names
 from hexapod_cosim.models import JOINT_NAMES, Robot
@@ -19,6 +19,7 @@ from hexapod_cosim.models.records import BRISTLE_LAWS
 from hexapod_cosim.models.servos.presets import followed
 
 GROUPS = ("servo", "mass", "contact", "sensor", "zero")  # that a user can choose
+OF_FILE = ("servo", "mass", "contact")  # of the robot file, not of sensors
 START = "start"  # group of what the first row of a log leaves open
 ALWAYS: Callable[[Robot], bool] = lambda _robot: True  # noqa: E731
 LINE: Callable[[Robot], bool] = lambda robot: robot.servo.drive == "line"  # noqa: E731
@@ -175,9 +176,9 @@ def _with_bodies(robot: Robot, joint: int | None, change: Callable[[Any], Any]) 
     def changed(body: Any) -> Any:
         key = body.mass, tuple(body.com), tuple(body.inertia)
         if key not in found:
-            found[key] = change(body_inertia(*key))
-        new = found[key]
-        return replace(body, mass=new.mass, com=new.com, inertia=new.inertia)
+            found[key] = _changed_body(key, change)
+        mass, com, inertia = found[key]
+        return replace(body, mass=mass, com=com, inertia=inertia)
 
     if joint is None:
         return replace(robot, torso=changed(robot.torso))
@@ -187,6 +188,17 @@ def _with_bodies(robot: Robot, joint: int | None, change: Callable[[Any], Any]) 
         links[joint] = changed(links[joint])
         legs.append(replace(leg, links=(links[0], links[1], links[2])))
     return replace(robot, legs=tuple(legs))
+
+
+def _changed_body(body: Any, change: Callable[[BodyInertia], BodyInertia]) -> Any:
+    """Returns mass, centre of mass and inertia of a changed body; what does not change keeps every
+    digit.
+    """
+    old = body_inertia(*body)
+    new = change(old)
+    mass = body[0] if new.size == old.size else new.mass
+    alike = mass == body[0] and (new.widths, new.shears) == (old.widths, old.shears)
+    return mass, new.com, body[2] if alike else new.inertia
 
 
 ROBOT = (
@@ -310,8 +322,9 @@ def value_before(row: Unknown, robot: Robot) -> float:
 
 
 def changed_robot(robot: Robot, rows: Sequence[Unknown], values: Mapping[str, float]) -> Robot:
-    """Returns the robot with the values of its rows."""
+    """Returns the robot with the values of its rows; one that does not change keeps every digit."""
     for row in rows:
-        if row.write is not None and row.key in values:
-            robot = row.write(robot, values[row.key])
+        if row.write is not None and row.read is not None and row.key in values:
+            value = values[row.key]
+            robot = robot if value == row.read(robot) else row.write(robot, value)
     return robot

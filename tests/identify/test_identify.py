@@ -25,8 +25,9 @@ from hexapod_cosim.cosim.identify import excitation
 from hexapod_cosim.cosim.identify.channel_screening import screened
 from hexapod_cosim.cosim.identify.excitation import Proposal, propose, scenario_text
 from hexapod_cosim.cosim.identify.experiment import Experiment, of_point
+from hexapod_cosim.cosim.identify.fitting.judging import Fit
 from hexapod_cosim.cosim.identify.fitting.last_search import remaining_step
-from hexapod_cosim.cosim.identify.fitting.output_error import Fit, _tried
+from hexapod_cosim.cosim.identify.fitting.output_error import _tried
 from hexapod_cosim.cosim.identify.fitting.problem import Problem, read_noise
 from hexapod_cosim.cosim.identify.fitting.workers import simulating_workers
 from hexapod_cosim.cosim.identify.identified import Identified
@@ -89,8 +90,9 @@ def test_a_log_tells_nothing_of_limits_that_the_servos_do_not_reach(
         assert set(limits) == {"servo.torque_max", "servo.speed_max"}
         assert not any(each.told for each in limits.values())
         assert [each.deviation for each in limits.values()] == pytest.approx([1.0, 1.0], abs=0.01)
+        assert [each.value for each in limits.values()] == [6.0, 6.6]
         assert one.rank == 11  # all but the limits, and three of the start
-        assert one.robot.servo.torque_max == pytest.approx(6.0, rel=1e-3)
+        assert one.robot.servo.torque_max == 6.0
 
 
 def test_the_robot_file_is_the_identified_robot(found: list[Identified], tmp_path: Path) -> None:
@@ -99,9 +101,18 @@ def test_the_robot_file_is_the_identified_robot(found: list[Identified], tmp_pat
     again, source = load_robot(path), tomllib.loads(path.read_text(encoding="utf-8"))["source"]
     assert again.servo == found[0].robot.servo
     assert (again.name, source["identified"]) == ("athena-identified", "hexapod identify log.mcap")
-    assert source["servo.kp"].startswith("identified from the log: 95 % interval")
-    assert source["servo.torque_max"].startswith("not told by the log")
-    assert "# N m/rad    assumed" in path.read_text(encoding="utf-8")  # comments stay
+    assert source["servo.kp"].startswith("identified from log.mcap: 95 % interval")
+    assert source["servo.torque_max"] == "not told by log.mcap: as before"
+    lines = path.read_text(encoding="utf-8").splitlines()
+    kp = next(one for one in found[0].estimates if one.key == "servo.kp")
+    (line,) = [line for line in lines if line.startswith("kp = ")]
+    assert line.startswith(f"kp = {kp.value!r} ")
+    assert line.endswith(f"# N m/rad    identified from log.mcap, 95 % interval {kp.interval}")
+    assert "torque_max = 6.0" in [each.partition("#")[0].strip() for each in lines]
+    before = robot_path("athena").read_text(encoding="utf-8").splitlines()
+    kept = [each for each in before if each.startswith(("mass =", "length =", "speed_max ="))]
+    assert kept
+    assert set(kept) <= set(lines)  # comments of other numbers stay
 
 
 def test_masses_of_all_bodies_are_written_and_read_back(
@@ -369,7 +380,9 @@ def test_without_open_numbers_no_walk_is_proposed(found: list[Identified]) -> No
 
 def all_told(one: Identified) -> Fit:
     """Returns the fit with a small covariance."""
-    return replace(one.fit, covariance=1e-6 * np.eye(len(one.fit.rows)))
+    count = len(one.fit.rows)
+    alone, stay = np.ones(count, dtype=np.bool_), np.zeros(count, dtype=np.bool_)
+    return replace(one.fit, covariance=1e-6 * np.eye(count), alone=alone, stay=stay)
 
 
 def test_the_command_writes_robot_sensors_and_report(

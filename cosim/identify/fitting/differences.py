@@ -31,7 +31,7 @@ class Slopes:
 # torso's mass came out five times too small. Short central differences have converged there.
 UNLIKE = 0.5  # difference of slopes to both sides, in the smaller one, beyond which one jumps
 ROUGH = Slopes(0.1, both=False, near=0.1)
-FINE = Slopes(0.01, both=True, near=0.0)
+FINE = Slopes(0.01, both=True, near=1e-6)
 
 
 @dataclass(frozen=True)

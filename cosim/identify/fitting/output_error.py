@@ -4,10 +4,7 @@ The numbers minimise the sum of squares of (predicted - measured) / noise over a
 (number - number before) / prior over all numbers. The second sum keeps the robot file's value
 where the readings tell nothing. With white noise this is the most probable robot. The noise of a
 channel is the typical size of its residuals, and residuals beyond three deviations count linearly
-(Huber's loss). The covariance is that of the linearised problem with the spectra of the residuals
-(see covariance.py), plus the square of the step that the search left. Residuals larger than the
-noise of the readings themselves say that the model does not explain the log: they widen all
-intervals.
+(Huber's loss). judging.py says what the readings tell of the numbers.
 
 A search on the first seconds of long logs finds the valley of the best numbers, all rows its
 bottom. The numbers of contacts act at touch-downs alone, and play at the meeting of teeth, where
@@ -23,26 +20,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from hexapod_cosim.cosim.identify.fitting.covariance import (
-    coloured_information,
-    readings_as_one,
-)
-from hexapod_cosim.cosim.identify.fitting.differences import FINE
-from hexapod_cosim.cosim.identify.fitting.last_search import (
-    BOUND,
-    bounded_step,
-    finished,
-    huber,
-)
-from hexapod_cosim.cosim.identify.fitting.problem import (
-    ALL,
-    FLOOR,
-    Misfit,
-    Problem,
-    read_noise,
-)
+from hexapod_cosim.cosim.identify.fitting.judging import Fit, judged
+from hexapod_cosim.cosim.identify.fitting.last_search import BOUND, finished, huber
+from hexapod_cosim.cosim.identify.fitting.problem import ALL, FLOOR, Problem, read_noise
 from hexapod_cosim.cosim.identify.log import LogError
-from hexapod_cosim.cosim.identify.unknowns import DELAYS, GEAR, Unknown
+from hexapod_cosim.cosim.identify.unknowns import DELAYS, GEAR
 from hexapod_cosim.models import FmuError
 
 Array = NDArray[np.float64]
@@ -77,47 +59,6 @@ ROUNDS = 3  # of trying starts, at most
 DELAYS_TRIED = 0.001 * np.arange(21.0)  # s
 # Forces and accelerations have peaks at touch-downs, and so several valleys near each other.
 NEAR_DELAYS = 1e-5 * np.array([-80.0, -40.0, -20.0, -10.0, -5.0, 5.0, 10.0, 20.0, 40.0, 80.0])  # s
-
-
-@dataclass(frozen=True)
-class Fit:
-    """Holds the most probable numbers, with what their intervals are made of."""
-
-    rows: tuple[Unknown, ...]
-    before: Mapping[str, float]  # values of the robot file
-    z: Array  # (rows,)  distances from these, in priors
-    covariance: Array  # (rows, rows) of z
-    singular: Array  # singular values of the readings' sensitivity, in priors, largest first
-    noise: Mapping[str, float]  # by channel
-    correlated: Mapping[str, float]  # by channel: readings that count as one
-    predictions: tuple[Array, ...]  # (rows, columns) of each experiment
-    misfit: Mapping[str, Misfit]  # by channel
-    held_out: Mapping[str, Misfit]  # the same on held-out rows; empty without them
-    decrement: float  # length of the step that the optimiser left, in deviations
-
-    @property
-    def unexplained(self) -> dict[str, float]:
-        """Returns the channels that the model does not explain, with the larger mean square."""
-        both = [*self.misfit.items(), *self.held_out.items()]
-        found: dict[str, float] = {}
-        for key, one in both:
-            if not one.explained:
-                found[key] = max(one.value, found.get(key, 0.0))
-        return found
-
-    @property
-    def values(self) -> dict[str, float]:
-        """Returns the numbers by key."""
-        return {
-            row.key: row.value(z, self.before[row.key])
-            for row, z in zip(self.rows, self.z.tolist(), strict=True)
-        }
-
-    @property
-    def deviations(self) -> dict[str, float]:
-        """Standard deviations by key, in priors: 1 where the logs tell nothing."""
-        own = np.sqrt(np.diag(self.covariance))
-        return {row.key: float(value) for row, value in zip(self.rows, own, strict=True)}
 
 
 def better_start(problem: Problem, start: Array | None) -> Array:
@@ -163,8 +104,7 @@ def fit(problem: Problem, *, start: Array | None = None, progress: Progress | No
     z = _with_delays(short, z, ("joints", "forces", "imu"), lambda own: own + NEAR_DELAYS)
     fitted.count_all()
     z = finished(fitted, z, report)
-    report("what the log tells")
-    return _judged(problem, fitted, z, least)
+    return judged(problem, fitted, z, least, report)
 
 
 def _optimised(
@@ -260,39 +200,3 @@ def _cost(problem: Problem, z: Array) -> float:
     residuals = problem.residuals(z)
     problem.counted = counted
     return huber(residuals)
-
-
-def _judged(problem: Problem, fitted: Problem, z: Array, least: Mapping[str, float]) -> Fit:
-    """Returns the numbers with what the readings tell of them.
-
-    Args:
-        problem: of the whole logs.
-        fitted: of their fitted rows.
-        z: the numbers.
-        least: noise of the readings themselves, by channel.
-    """
-    fitted.set_noise(fitted.errors(z))
-    fitted.leave_out_bent(z)
-    jacobian, residuals = fitted.jacobian(z, FINE), fitted.residuals(z)
-    series = fitted.series(jacobian, np.clip(residuals, -REFINE.scale, REFINE.scale))
-    misfit = fitted.misfit(z, least, "fitted")
-    # errors of the model count as noise; at most the whole prior is unknown
-    worst = max(1.0, *(one.value for one in misfit.values()))
-    information = coloured_information(series) / worst
-    own: Array = np.asarray(np.linalg.inv(information + np.eye(len(z))), dtype=np.float64)
-    # where touch-downs make the sum of squares rough, the optimiser stops on the way
-    left = bounded_step(fitted, z, jacobian, residuals)
-    eigenvalues = np.linalg.eigvalsh(information)[::-1]
-    return Fit(
-        rows=problem.rows,
-        before=problem.before,
-        z=z,
-        covariance=np.asarray(own + np.outer(left, left), dtype=np.float64),
-        singular=np.sqrt(np.maximum(eigenvalues, 0.0)),
-        noise=dict(fitted.noise),
-        correlated=readings_as_one(series, own),
-        decrement=float(np.sqrt(left @ np.linalg.solve(own, left))),
-        predictions=tuple(problem.predictions(z)),
-        misfit=misfit,
-        held_out=problem.misfit(z, least, "held_out"),
-    )

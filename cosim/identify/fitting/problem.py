@@ -46,11 +46,15 @@ BESIDE = 6  # rows before and after a jump
 # A reading whose second difference over the numbers' short steps is larger jumps with a number; see
 # `Problem.leave_out_bent`.
 BENT = 0.05  # deviations
+# A larger share of readings that change otherwise than derivatives say does not jump: the valley of
+# the sum of squares is curved, and a shorter step follows it.
+CURVED = 0.1
 FLOOR = 1e-9  # smallest noise, in the units of the channels
 CLIPPED = 5.0  # deviations    of a residual in the test whether the model explains the log
 # Largest mean square of residuals over that of the readings' noise, of many readings. That of the
 # noise has a relative deviation of about 3.8 over the root of their number.
 EXPLAINED = 1.1
+REJECTED = 2.0  # likewise: errors of the model are as large as the noise, and move all numbers
 UNCERTAIN, DEVIATIONS = 3.8, 3.0
 
 
@@ -64,7 +68,16 @@ class Misfit:
     @property
     def explained(self) -> bool:
         """Whether the noise of the readings may be all of it."""
-        return self.value <= EXPLAINED + DEVIATIONS * UNCERTAIN / float(np.sqrt(self.readings))
+        return self.value <= EXPLAINED + self._uncertain
+
+    @property
+    def rejected(self) -> bool:
+        """Whether errors of the model are as large as the noise."""
+        return self.value > REJECTED + self._uncertain
+
+    @property
+    def _uncertain(self) -> float:
+        return DEVIATIONS * UNCERTAIN / float(np.sqrt(self.readings))
 
 
 class Problem:
@@ -97,6 +110,7 @@ class Problem:
         self._differences: Differences | None = None  # the last ones
         self._nonlinear: NDArray[np.bool_] | None = None  # (predictions,)  see leave_out_nonlinear
         self._size = 0  # of the residuals
+        self._held: NDArray[np.bool_] | None = None  # (rows,)  see `hold`
         self.counted = self.all_known()  # which readings count (fitted rows, columns)
 
     def all_known(self) -> list[NDArray[np.bool_]]:
@@ -279,6 +293,8 @@ class Problem:
         """
         count = sum(own[:: self._thin].size for own in self.counted)
         flags = np.abs(change - linear)[:count] > BENT
+        if float(np.mean(flags)) > CURVED:
+            return False
         self._nonlinear = flags if self._nonlinear is None else flags | self._nonlinear
         return self.leave_out(flags)
 
@@ -357,9 +373,15 @@ class Problem:
                 yield None
 
     def bounds(self) -> tuple[Array, Array]:
-        """Returns the limits of z."""
+        """Returns the limits of z, which are 0 of numbers that are held."""
         low, high = zip(*(row.bounds(self.before[row.key]) for row in self.rows), strict=True)
-        return np.array(low), np.array(high)
+        if self._held is None:
+            return np.array(low), np.array(high)
+        return np.where(self._held, 0.0, low), np.where(self._held, 0.0, high)
+
+    def hold(self, numbers: NDArray[np.bool_] | None) -> None:
+        """Keeps some numbers (rows,) at the robot file's values, z = 0, from now on; None: none."""
+        self._held = numbers
 
     def _weights(self, experiment: Experiment) -> Array:
         return np.array([self.noise[key] for key in experiment.channels])
