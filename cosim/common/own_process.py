@@ -22,7 +22,7 @@ TIME_LIMIT = 120.0  # s
 LAST_WORDS = 300  # characters of the process's messages that an error quotes
 
 
-class ProcessEnded(Exception):
+class ProcessEndedError(Exception):
     """The process ended before the function returned; the message says how."""
 
 
@@ -36,7 +36,7 @@ def call_in_process(
         path: its argument.
         limit: longest time of the call [s].
 
-    Raises ProcessEnded when the process crashes, takes longer or raises an exception.
+    Raises ProcessEndedError when the process crashes, takes longer or raises an exception.
     """
     with TemporaryDirectory(prefix="hexapod-process-") as folder:
         result = Path(folder) / "result.json"
@@ -47,10 +47,10 @@ def call_in_process(
                 command, capture_output=True, stdin=subprocess.DEVNULL, timeout=limit, check=False
             )
         except subprocess.TimeoutExpired:
-            raise ProcessEnded(f"no result after {limit:g} s") from None
+            raise ProcessEndedError(f"no result after {limit:g} s") from None
         with suppress(OSError, ValueError):
             return json.loads(result.read_text(encoding="utf-8"))
-    raise ProcessEnded(_how(done.returncode, done.stderr.decode(errors="replace")))
+    raise ProcessEndedError(_how(done.returncode, done.stderr.decode(errors="replace")))
 
 
 def _how(code: int, errors: str) -> str:

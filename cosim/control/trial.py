@@ -10,7 +10,7 @@ from contextlib import suppress
 from functools import lru_cache
 from pathlib import Path
 
-from hexapod_cosim.cosim.common.own_process import ProcessEnded, call_in_process
+from hexapod_cosim.cosim.common.own_process import ProcessEndedError, call_in_process
 from hexapod_cosim.cosim.control.fmu_instance import open_controller_fmu
 from hexapod_cosim.cosim.interface.descriptions import open_description
 from hexapod_cosim.cosim.master.fmu import Fmu
@@ -48,13 +48,13 @@ def _try_once(path: Path, _changed: int, _size: int) -> str | None:
     """Returns how a process ended that instantiated the FMU; None if it went on."""
     try:
         call_in_process(instantiate, path)
-    except ProcessEnded as error:
+    except ProcessEndedError as error:
         return str(error)
     return None
 
 
 def instantiate(path: Path) -> None:
-    """Instantiates a plant's or controller's FMU and frees it; ignores the errors that it reports."""
+    """Instantiates an FMU of a plant or controller and frees it; ignores errors that it reports."""
     with suppress(FmuError):
         if open_description(path).fmiVersion == "2.0":
             Fmu(path).close()

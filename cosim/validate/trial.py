@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
-from hexapod_cosim.cosim.common.own_process import ProcessEnded, call_in_process
+from hexapod_cosim.cosim.common.own_process import ProcessEndedError, call_in_process
 
 
 def problems_of_a_trial(run: Callable[[Path], list[str]], path: Path) -> list[str]:
@@ -15,7 +15,7 @@ def problems_of_a_trial(run: Callable[[Path], list[str]], path: Path) -> list[st
     """
     try:
         return [str(problem) for problem in call_in_process(run, path)]
-    except ProcessEnded as error:
+    except ProcessEndedError as error:
         return [
             f"binaries: loading the FMU and stepping it ended the process: got {error}, expected "
             "a step; fix: the binary is damaged or made for another system, export the FMU again"

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 
-from hexapod_cosim.cosim.common.own_process import ProcessEnded, call_in_process
+from hexapod_cosim.cosim.common.own_process import ProcessEndedError, call_in_process
 from hexapod_cosim.cosim.control.fmu_instance import open_controller_fmu
 from hexapod_cosim.cosim.control.trial import refuse_crashing
 from hexapod_cosim.cosim.export.controller_export import export_controller
@@ -135,9 +135,9 @@ def test_a_process_returns_what_the_function_does_or_says_how_it_ended(
     functions = importlib.import_module("functions_of_a_test")
     place = tmp_path / "a file"
     assert call_in_process(functions.name_of, place) == ["a file"]
-    with pytest.raises(ProcessEnded, match="SIGABRT"):
+    with pytest.raises(ProcessEndedError, match="SIGABRT"):
         call_in_process(functions.crash, place)
-    with pytest.raises(ProcessEnded, match=r"exit code 1 \(ValueError: no a file\)"):
+    with pytest.raises(ProcessEndedError, match=r"exit code 1 \(ValueError: no a file\)"):
         call_in_process(functions.fail, place)
-    with pytest.raises(ProcessEnded, match=r"no result after 0\.2 s"):
+    with pytest.raises(ProcessEndedError, match=r"no result after 0\.2 s"):
         call_in_process(functions.wait, place, limit=0.2)
