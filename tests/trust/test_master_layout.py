@@ -66,7 +66,7 @@ MASTER = Interface(
     constant="HX_MASTER_LAYOUT",
     layout=native_loop.LAYOUT,
     size="hx_master_size",
-    digests={1: "0a73ce69c526a2a0"},
+    digests={1: "0a73ce69c526a2a0", 2: "aa70e431f9fe618e"},
     structures={
         "hxMasterFmu": native_loop._Fmu,
         "hxMasterBlock": native_loop._Block,
@@ -128,6 +128,10 @@ def test_python_declares_the_members_of_the_header_in_their_order(interface: Int
 
 def test_functions_of_an_environments_fmu_have_the_types_of_their_names() -> None:
     assert tuple(re.findall(r"fmi2(\w+)TYPE \*", ENVIRONMENTS.code())) == native.CALLS
+
+
+def test_python_allocates_as_many_rows_as_c_writes_together() -> None:
+    assert re.findall(r"HX_MASTER_BLOCK = (\d+)", MASTER.code()) == [str(native_loop.BLOCK_ROWS)]
 
 
 def test_python_lists_the_names_of_the_header_in_their_order() -> None:
