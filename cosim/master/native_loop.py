@@ -40,7 +40,8 @@ from hexapod_cosim.cosim.master.wiring import (
 from hexapod_cosim.cosim.scenario.schedule import Schedule
 from hexapod_cosim.models import LEG_NAMES, FmuError
 
-LAYOUT = 1  # of the structures below, HX_MASTER_LAYOUT in C
+LAYOUT = 2  # of the structures below, HX_MASTER_LAYOUT in C
+BLOCK_ROWS = 8  # HX_MASTER_BLOCK in C
 STEPS_PER_CALL = 500  # macro-steps between two checks for interrupts, about 10 ms
 FORCE = MEASURED["foot_force"]
 
@@ -79,6 +80,8 @@ class _Table(ct.Structure):
         ("first", _Pointer),
         ("stride", _Size),
         ("rows", _Size),
+        ("block", _Pointer),
+        ("waiting", _Size),
     ]
 
 
@@ -239,12 +242,8 @@ class NativeMaster:
             sensed_count=len(sensed),
             push_count=len(PUSH),
             push_place=self._places[PUSH[0]],
-            kept=_Table(
-                self._indices([self._places[name] for name in self.columns]), len(self.columns)
-            ),
-            judged=_Table(
-                self._indices([self._places[name] for name in self._judged]), len(self._judged)
-            ),
+            kept=self._table(self.columns),
+            judged=self._table(self._judged),
             peaks=_Peaks(
                 self._indices(peaks.places),
                 len(peaks.places),
@@ -258,6 +257,14 @@ class NativeMaster:
         """Returns the address of an array and keeps the array alive as long as this object."""
         self._arrays.append(array)
         return int(array.ctypes.data)
+
+    def _table(self, columns: Sequence[str]) -> _Table:
+        """Returns a table without rows."""
+        return _Table(
+            column=self._indices([self._places[name] for name in columns]),
+            columns=len(columns),
+            block=self._keep(np.zeros((BLOCK_ROWS, len(columns)))),
+        )
 
     def _indices(self, places: Sequence[int]) -> int:
         return self._keep(np.array(places, dtype=np.uintp))

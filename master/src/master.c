@@ -109,11 +109,21 @@ static int step_plant(hxMaster *master) {
                                       fmi2True));
 }
 
+/* writes the waiting rows; one by one, each of their numbers would be in a page of its own */
+static void write_waiting(hxMasterTable *table) {
+  for (size_t j = 0; table->first && j < table->columns; ++j) {
+    double *to = table->first + j * table->stride + table->rows;
+    for (size_t i = 0; i < table->waiting; ++i) to[i] = table->block[i * table->columns + j];
+  }
+  table->rows += table->waiting;
+  table->waiting = 0;
+}
+
 static void write_row(hxMasterTable *table, const double *value) {
   if (!table->first) return;
-  double *row = table->first + table->rows;
-  for (size_t j = 0; j < table->columns; ++j) row[j * table->stride] = value[table->column[j]];
-  ++table->rows;
+  double *row = table->block + table->waiting * table->columns;
+  for (size_t j = 0; j < table->columns; ++j) row[j] = value[table->column[j]];
+  if (++table->waiting == HX_MASTER_BLOCK) write_waiting(table);
 }
 
 /* updates the largest value of each peak since the last recorded row */
@@ -148,7 +158,15 @@ static void record(hxMaster *master, int due) {
   write_row(&master->kept, master->value);
 }
 
-void hx_master_record(hxMaster *master) { record(master, 1); }
+static void write_tables(hxMaster *master) {
+  write_waiting(&master->judged);
+  write_waiting(&master->kept);
+}
+
+void hx_master_record(hxMaster *master) {
+  record(master, 1);
+  write_tables(master);
+}
 
 static int macro_step(hxMaster *master) {
   if (master->push)
@@ -170,6 +188,7 @@ size_t hx_master_size(void) { return sizeof(hxMaster); }
 
 int hx_master_begin(hxMaster *master) {
   master->step = master->kept.rows = master->judged.rows = 0;
+  master->kept.waiting = master->judged.waiting = 0;
   memset(master->peaks.largest, 0, master->peaks.places * sizeof *master->peaks.largest);
   memset(master->peaks.seen, 0, master->peaks.counts * sizeof *master->peaks.seen);
   memset(master->peaks.kept, 0, master->peaks.counts * sizeof *master->peaks.kept);
@@ -179,7 +198,8 @@ int hx_master_begin(hxMaster *master) {
 }
 
 int hx_master_run(hxMaster *master, size_t end) {
-  while (master->step < end)
-    if (!macro_step(master)) return 0;
-  return 1;
+  int going = 1;
+  while (going && master->step < end) going = macro_step(master);
+  write_tables(master);
+  return going;
 }

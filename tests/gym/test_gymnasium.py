@@ -110,10 +110,11 @@ def test_wrong_settings_are_refused_by_name() -> None:
     ],
 )
 def test_impossible_numbers_are_refused_before_anything_is_made(
-    setting: str, value: object, expected: str
+    setting: str, value: Any, expected: str
 ) -> None:
+    changes: dict[str, Any] = {setting: value}
     with pytest.raises(HexapodError, match=f"{setting}.*expected {expected}"):
-        HexapodEnv(**{setting: value})
+        HexapodEnv(**changes)
 
 
 @pytest.mark.parametrize(

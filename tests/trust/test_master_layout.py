@@ -16,7 +16,7 @@ from pathlib import Path
 import pytest
 
 from hexapod_cosim.cosim.master import loop_library, native_loop
-from hexapod_cosim.gym import batch
+from hexapod_cosim.gym import batch, native
 from hexapod_cosim.gym.settings import BLOCKS, REASONS, TERMS
 from hexapod_cosim.models import FmuError
 
@@ -66,7 +66,7 @@ MASTER = Interface(
     constant="HX_MASTER_LAYOUT",
     layout=native_loop.LAYOUT,
     size="hx_master_size",
-    digests={1: "0a73ce69c526a2a0"},
+    digests={1: "0a73ce69c526a2a0", 2: "aa70e431f9fe618e"},
     structures={
         "hxMasterFmu": native_loop._Fmu,
         "hxMasterBlock": native_loop._Block,
@@ -80,17 +80,17 @@ MASTER = Interface(
 ENVIRONMENTS = Interface(
     name="environments",
     constant="HX_ENVIRONMENTS_LAYOUT",
-    layout=batch.LAYOUT,
+    layout=native.LAYOUT,
     size="hx_environments_settings_size",
     digests={1: "787e21bea40beaa2"},
     structures={
-        "hxEnvFmu": batch._Fmu,
-        "hxEnvDraws": batch._Draws,
-        "hxEnvGround": batch._Ground,
-        "hxEnvSettings": batch._Settings,
-        "hxEnvArrays": batch._Arrays,
+        "hxEnvFmu": native.NativeFmu,
+        "hxEnvDraws": native.NativeDraws,
+        "hxEnvGround": native.NativeGround,
+        "hxEnvSettings": native.NativeSettings,
+        "hxEnvArrays": native.NativeArrays,
     },
-    load=batch._library.__wrapped__,
+    load=native.environments_library.__wrapped__,
 )
 INTERFACES = pytest.mark.parametrize(
     "interface", [MASTER, ENVIRONMENTS], ids=lambda interface: interface.name
@@ -100,10 +100,10 @@ RENAMED = {
     **dict(zip(
         ("instantiate", "free_instance", "reset", "setup", "enter", "leave", "get_real",
          "set_real", "do_step"),
-        batch.CALLS, strict=True,
+        native.CALLS, strict=True,
     )),
-    "work_size": batch.WORK[0],
-    "work_use": batch.WORK[1],
+    "work_size": native.WORK[0],
+    "work_use": native.WORK[1],
 }  # fmt: skip
 
 
@@ -127,7 +127,11 @@ def test_python_declares_the_members_of_the_header_in_their_order(interface: Int
 
 
 def test_functions_of_an_environments_fmu_have_the_types_of_their_names() -> None:
-    assert tuple(re.findall(r"fmi2(\w+)TYPE \*", ENVIRONMENTS.code())) == batch.CALLS
+    assert tuple(re.findall(r"fmi2(\w+)TYPE \*", ENVIRONMENTS.code())) == native.CALLS
+
+
+def test_python_allocates_as_many_rows_as_c_writes_together() -> None:
+    assert re.findall(r"HX_MASTER_BLOCK = (\d+)", MASTER.code()) == [str(native_loop.BLOCK_ROWS)]
 
 
 def test_python_lists_the_names_of_the_header_in_their_order() -> None:

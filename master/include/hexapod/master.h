@@ -72,13 +72,19 @@ typedef enum hxMasterCall {
   HX_CALL_CONTROLLER_STEP
 } hxMasterCall;
 
-/* Rows of a recording: columns of `value` and the memory they are written to, column by column. */
+/* Rows that are written to a table together: a cache line of each column. */
+enum { HX_MASTER_BLOCK = 8 };
+
+/* Rows of a recording: columns of `value` and the memory they are written to, column by column. All
+ * rows are there when a function returns. */
 typedef struct hxMasterTable {
   const size_t *column; /* 1     [columns] indices in `value` */
   size_t columns;
   double *first; /*       the first row's first number; NULL: none are written */
   size_t stride; /* 1     numbers from a column to the next; those of a column adjoin */
   size_t rows;   /* 1     number of rows written */
+  double *block; /*       [HX_MASTER_BLOCK][columns] rows that are not written yet */
+  size_t waiting; /* 1     number of these */
 } hxMasterTable;
 
 /* Peak values in recordings that leave out rows: the largest value since the last recorded row.
@@ -122,7 +128,7 @@ typedef struct hxMaster {
 
 /* Number of the layout of hxMaster and of the structures in it. A change of their members, or of
  * what a member means, increases it. */
-#define HX_MASTER_LAYOUT 1
+#define HX_MASTER_LAYOUT 2
 
 /* Layout and size of hxMaster in this library, with which callers check their own. */
 HX_API int hx_master_layout(void);
