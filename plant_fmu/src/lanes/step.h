@@ -292,6 +292,8 @@ static void try_step(const hxStart *start, double h, hxState *state, hxTrial *tr
   hxCommand now;
   implicit->z = h * m->gamma, implicit->ahead = h;
   implicit->change = NULL; /* the first stage sets all slopes that later stages read */
+  hxMergedFeet merged[HX_PACKS];
+  const int is_merged = model->foot_rows > 1 && hx_merge_feet(model, start->contact, merged);
   hx_clear_impulses(model, &trial->impulses);
   /* stages: y_i = y_0 + sum a_ij k_j, k_i by eq. 19 */
   for (int i = 0; i < m->stages; ++i) {
@@ -305,12 +307,14 @@ static void try_step(const hxStart *start, double h, hxState *state, hxTrial *tr
     hxImplicit *stage = m->gamma > 0.0 ? implicit : NULL;
     const hxKnown known = {i > 0 ? NULL : &state->moment, start->scratch->nodes,
                            i == 0 && start->scratch->is_soil_known ? start->scratch->soil.from
-                                                                   : NULL};
+                                                                   : NULL,
+                           is_merged ? merged : NULL};
     hx_dynamics_evaluate(model, start->contact, command, t, i > 0 ? y : start->y, &known, stage, 0,
                          work, &k[i]);
     hx_add_impulses(model, command, stage, work, h * m->b[i], &trial->impulses);
     state->evaluations += 1.0;
   }
+  if (is_merged) hx_part_impulses(merged, trial->impulses.contact);
   /* y_1 = y_0 + sum b_i k_i, error = |sum e_i k_i| */
   const int estimates = m->error_order > 0 && model->step == 0.0;
   hxStepEnd end = end_step(model, start->y, h, m, estimates, k, &trial->y);
