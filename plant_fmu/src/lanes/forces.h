@@ -8,9 +8,6 @@
 #define HX_FORCES_H
 
 #include "clearance.h"
-#ifndef HX_TANGENT
-#include "merged_feet.h"
-#endif
 #include "work.h"
 
 /* ---- root to leaf: kinematics and forces ---- */
