@@ -104,7 +104,6 @@ class PlannedStep(NamedTuple):
     posture: Posture
     feet: PlannedFeet
     sway: complex  # m    way of the torso against the swinging legs (C57)
-    sway_rate: complex  # m/s
     plane: Plane  # m    of the feet from the torso that sways
     activation: Array  # 1    of the legs
     lowering: Array  # m    lowering of the feet by the indentation of the ground (C21)
@@ -266,11 +265,13 @@ class Controller(Stateful):
         shift = pose.heading * (rolls / (1.0 - legs.radius * turns))
         return shift, legs.pose(*posture.see_place(plane + shift, height))
 
-    def _lay_out(self, value: Array, posture: Posture, feet: PlannedFeet) -> PlannedStep:
-        """Computes the pose of the legs and the point masses for planned feet."""
-        sway, sway_rate = 0j, 0j
-        if self.compliant is not None:
-            sway, sway_rate = self.compliant.sway.of(feet, self.compliant.warmth)
+    def _stand(
+        self, value: Array, posture: Posture, feet: PlannedFeet, sway: complex
+    ) -> PlannedStep:
+        """Computes the pose of the legs and the point masses for a torso that has moved by `sway`.
+
+        sway: in the walking frame [m].
+        """
         plane = feet.plane - sway
         activation, lowering = self._lower(feet, plane)
         height = feet.height - lowering
@@ -284,7 +285,6 @@ class Controller(Stateful):
             posture=posture,
             feet=feet,
             sway=sway,
-            sway_rate=sway_rate,
             plane=plane,
             activation=activation,
             lowering=lowering,
@@ -293,6 +293,16 @@ class Controller(Stateful):
             pose=pose,
             masses=masses,
         )
+
+    def _lay_out(self, value: Array, posture: Posture, feet: PlannedFeet) -> PlannedStep:
+        """Computes sway, pose of the legs and point masses for planned feet."""
+        sway, compliant = 0j, self.compliant
+        if compliant is not None and compliant.sway.acts(compliant.warmth):
+            guess = compliant.sway.guess(feet, compliant.warmth)
+            masses = self._stand(value, posture, feet, guess).masses
+            assert masses is not None
+            sway = compliant.sway.of(guess, masses, compliant.warmth)
+        return self._stand(value, posture, feet, sway)
 
     def _plan_step(self, number: int, ahead: int, before: PlannedStep) -> PlannedStep:
         """Plans the step `number` periods after the section began.
@@ -449,7 +459,7 @@ class Controller(Stateful):
         return Feet(
             plane=now.plane + now.shift,
             height=now.height,
-            velocity=now.feet.velocity - now.sway_rate + self._rate_of("shift"),
+            velocity=now.feet.velocity - self._rate_of("sway") + self._rate_of("shift"),
             rise=now.feet.rise - self._rate_of("lowering"),
         )
 

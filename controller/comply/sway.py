@@ -3,7 +3,8 @@
 A swinging leg takes its mass forwards and stops it again. Under a torso of constant velocity the
 feet that stand must push for that, forwards and backwards in every swing. The torso instead moves
 so that the centre of mass of the whole robot keeps its velocity (C57). Then these feet need no push
-for the swinging legs. The sway is a few millimetres.
+for the swinging legs. The sway is a few millimetres. It is guessed by the shares of the mass that
+move with the feet, the legs are placed for the guess, and their masses tell what is left.
 
 The torso sways only as far as the stance is narrowed, under a payload (C53): on uneven ground a
 robot without a payload loses more of its path by the sway than it gains.
@@ -16,7 +17,7 @@ import numpy as np
 from hexapod_cosim.controller.comply.posture import Posture
 from hexapod_cosim.controller.plane import LEGS, along
 from hexapod_cosim.controller.sense.warmth import Warmth
-from hexapod_cosim.controller.walk.inverse_dynamics import InverseDynamics
+from hexapod_cosim.controller.walk.inverse_dynamics import InverseDynamics, Masses
 from hexapod_cosim.controller.walk.kinematics import LegSolver
 from hexapod_cosim.controller.walk.trajectory import PlannedFeet
 
@@ -42,24 +43,40 @@ class Sway:
     """Computes the sway of one robot. active: the part is on; otherwise there is no sway."""
 
     def __init__(self, dynamics: InverseDynamics, legs: LegSolver, *, active: bool) -> None:
+        self.dynamics, self.active = dynamics, active
         self.home = complex(dynamics.stance[:, 0].sum(), dynamics.stance[:, 1].sum())  # m
-        self.active = active
         self.forward, self.aside = 0.0, 0.0  # 1    share of the mass that moves with all feet
+        self.rest = 0j  # kg m    sum of m p of all links in the stance
         if active:
             self.forward = _share_of(dynamics, legs, complex(REACH, 0.0))
             self.aside = _share_of(dynamics, legs, complex(0.0, REACH))
+            self.rest = _moment_of(dynamics, legs, 0j)
+
+    def acts(self, warmth: Warmth) -> bool:
+        """Returns whether the torso sways."""
+        return self.active and warmth.narrowing > 0.0
 
     def laden(self, warmth: Warmth) -> float:
         """Returns the weight that sways over the modelled one [1]."""
         return warmth.laden() if self.active else 1.0
 
-    def of(self, feet: PlannedFeet, warmth: Warmth) -> tuple[complex, complex]:
-        """Returns the way of the torso in the walking frame [m], x + i y, and its rate [m/s].
+    def _yield_to(self, moment: complex, warmth: Warmth) -> complex:
+        """Returns the way of the torso that gives the robot another sum of m p [kg m]."""
+        mass, laden = self.dynamics.total_mass, warmth.laden()
+        x = moment.real / (mass * (laden - self.forward))
+        return complex(x, moment.imag / (mass * (laden - self.aside)))
 
-        The rate is that under a constant weight, which changes slowly.
+    def guess(self, feet: PlannedFeet, warmth: Warmth) -> complex:
+        """Returns nearly the whole way of the torso, by the shares [m] x + i y, walking frame."""
+        away, mass = complex(feet.plane.sum()) - self.home, self.dynamics.total_mass / LEGS
+        moment = complex(self.forward * mass * away.real, self.aside * mass * away.imag)
+        return -self._yield_to(moment, warmth)
+
+    def of(self, guess: complex, masses: Masses, warmth: Warmth) -> complex:
+        """Returns the way of the torso in the walking frame [m], x + i y (C57).
+
+        masses: of a torso that has moved by the guess.
         """
-        away, speed = complex(feet.plane.sum()) - self.home, complex(feet.velocity.sum())
-        part, laden = warmth.narrowing / LEGS, warmth.laden()
-        x = part * self.forward / (laden - self.forward)
-        y = part * self.aside / (laden - self.aside)
-        return complex(-x * away.real, -y * away.imag), complex(-x * speed.real, -y * speed.imag)
+        moved = complex((self.dynamics.mass * masses.place).sum()) - self.rest
+        moved += warmth.laden() * self.dynamics.total_mass * guess
+        return warmth.narrowing * (guess - self._yield_to(moved, warmth))

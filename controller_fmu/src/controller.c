@@ -79,13 +79,9 @@ static void place_leg(const hxLegSolver *leg, const hxPosture *posture, hxPlane 
   hx_leg_solver_pose(leg, seen, z, pose);
 }
 
-/* Computes the poses of the legs and the point masses for planned feet. */
-static void lay_out(const hxControllerModel *model, const hxControllerState *state,
-                    hxPlannedStep *step) {
-  step->sway = step->sway_rate = hx_plane(0.0, 0.0);
-  if (model->compliant)
-    hx_sway_of(&model->laws.sway, &step->feet, &state->compliant.warmth, &step->sway,
-               &step->sway_rate);
+/* Computes the poses of the legs and the point masses for a torso that has moved by its sway. */
+static void stand(const hxControllerModel *model, const hxControllerState *state,
+                  hxPlannedStep *step) {
   for (int k = 0; k < HX_LEGS; ++k) step->plane[k] = hx_plane_sub(step->feet.plane[k], step->sway);
   lower(model, &state->paths, step);
   for (int k = 0; k < HX_LEGS; ++k)
@@ -96,6 +92,20 @@ static void lay_out(const hxControllerModel *model, const hxControllerState *sta
         &model->laws.dynamics, model->leg, step->pose,
         hx_plane_add(step->feet.way, hx_times(hx_cis(step->feet.turn), step->sway)),
         step->feet.turn, &step->posture, &step->masses);
+}
+
+/* Computes sway, poses of the legs and point masses for planned feet. */
+static void lay_out(const hxControllerModel *model, const hxControllerState *state,
+                    hxPlannedStep *step) {
+  const hxSway *sway = &model->laws.sway;
+  const hxWarmth *warmth = &state->compliant.warmth;
+  step->sway = hx_plane(0.0, 0.0);
+  if (model->compliant && hx_sway_acts(sway, warmth)) {
+    step->sway = hx_sway_guess(sway, &step->feet, warmth);
+    stand(model, state, step);
+    step->sway = hx_sway_of(sway, &model->laws.dynamics, step->sway, &step->masses, warmth);
+  }
+  stand(model, state, step);
 }
 
 /* Plans the step a number of periods after the section began; `ahead`: periods after the present
@@ -245,9 +255,12 @@ static void planned_foot(const hxControllerModel *model, hxControllerState *stat
                       *after = step_at(state, 1);
   const hxPlane *old = &before->shift[k], *here = &now->shift[k], *next = &after->shift[k];
   const hxPlane rolling = {rate_of(state, old->x, here->x, next->x, model->period),
-                           rate_of(state, old->y, here->y, next->y, model->period)};
+                           rate_of(state, old->y, here->y, next->y, model->period)},
+                swaying = {
+                    rate_of(state, before->sway.x, now->sway.x, after->sway.x, model->period),
+                    rate_of(state, before->sway.y, now->sway.y, after->sway.y, model->period)};
   *plane = hx_plane_add(now->plane[k], *here);
-  *velocity = hx_plane_add(hx_plane_sub(now->feet.velocity[k], now->sway_rate), rolling);
+  *velocity = hx_plane_add(hx_plane_sub(now->feet.velocity[k], swaying), rolling);
   *height = now->height[k];
   *rise = now->feet.rise[k] -
           rate_of(state, before->lowering[k], now->lowering[k], after->lowering[k], model->period);

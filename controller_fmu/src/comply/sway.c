@@ -36,33 +36,49 @@ static double share_of(const hxInverseDynamics *dynamics, const hxLegSolver leg[
 void hx_sway_compile(const hxControllerDefinition *definition, const hxLegSolver leg[HX_LEGS],
                      const hxInverseDynamics *dynamics, hxSway *model) {
   double foot[3];
-  model->home = hx_plane(0.0, 0.0);
+  model->active = definition->parts.sway;
+  model->mass = dynamics->total_mass;
+  model->home = model->rest = hx_plane(0.0, 0.0);
   for (int k = 0; k < HX_LEGS; ++k) {
     hx_leg_solver_forward(&leg[k], leg[k].stance, foot);
     model->home = hx_plane_add(model->home, hx_plane(foot[0], foot[1]));
   }
-  model->active = definition->parts.sway;
   model->forward = model->aside = 0.0;
-  if (!definition->parts.sway) return;
+  if (!model->active) return;
   model->forward = share_of(dynamics, leg, hx_plane(reach, 0.0));
   model->aside = share_of(dynamics, leg, hx_plane(0.0, reach));
+  model->rest = moment_of(dynamics, leg, hx_plane(0.0, 0.0));
+}
+
+int hx_sway_acts(const hxSway *model, const hxWarmth *warmth) {
+  return model->active && warmth->narrowing > 0.0;
 }
 
 double hx_sway_laden(const hxSway *model, const hxWarmth *warmth) {
   return model->active ? hx_warmth_laden(warmth) : 1.0;
 }
 
-void hx_sway_of(const hxSway *model, const hxPlannedFeet *feet, const hxWarmth *warmth,
-                hxPlane *way, hxPlane *rate) {
-  const double part = warmth->narrowing / HX_LEGS, laden = hx_warmth_laden(warmth),
-               x = part * model->forward / (laden - model->forward),
-               y = part * model->aside / (laden - model->aside);
-  hxPlane away = {0.0, 0.0}, speed = {0.0, 0.0};
-  for (int k = 0; k < HX_LEGS; ++k) {
-    away = hx_plane_add(away, feet->plane[k]);
-    speed = hx_plane_add(speed, feet->velocity[k]);
-  }
-  away = hx_plane_sub(away, model->home);
-  *way = hx_plane(-x * away.x, -y * away.y);
-  *rate = hx_plane(-x * speed.x, -y * speed.y);
+/* Returns the way of the torso that gives the robot another sum of m p [kg m]. */
+static hxPlane yield_to(const hxSway *model, hxPlane moment, const hxWarmth *warmth) {
+  const double laden = hx_warmth_laden(warmth);
+  return hx_plane(moment.x / (model->mass * (laden - model->forward)),
+                  moment.y / (model->mass * (laden - model->aside)));
+}
+
+hxPlane hx_sway_guess(const hxSway *model, const hxPlannedFeet *feet, const hxWarmth *warmth) {
+  const double mass = model->mass / HX_LEGS;
+  hxPlane away = hx_scaled(model->home, -1.0);
+  for (int k = 0; k < HX_LEGS; ++k) away = hx_plane_add(away, feet->plane[k]);
+  away = hx_plane(model->forward * mass * away.x, model->aside * mass * away.y);
+  return hx_scaled(yield_to(model, away, warmth), -1.0);
+}
+
+hxPlane hx_sway_of(const hxSway *model, const hxInverseDynamics *dynamics, hxPlane guess,
+                   const hxMasses *masses, const hxWarmth *warmth) {
+  hxPlane moved =
+      hx_plane_sub(hx_scaled(guess, hx_warmth_laden(warmth) * model->mass), model->rest);
+  for (int k = 0; k < HX_LEGS; ++k)
+    for (int link = 0; link < HX_JOINTS; ++link)
+      moved = hx_plane_add(moved, hx_scaled(masses->place[k][link], dynamics->mass[k][link]));
+  return hx_scaled(hx_plane_sub(guess, yield_to(model, moved, warmth)), warmth->narrowing);
 }

@@ -19,7 +19,7 @@ typedef struct {
 } hxSaved;
 
 static const uint64_t magic = 0x72746e6f43507868u; /* "hxPContr" */
-static const uint64_t saved_version = 5;
+static const uint64_t saved_version = 6;
 /* 1, of a period: a tick that is later than the present time by less than this is due */
 static const double clock_tolerance = 0.01;
 
