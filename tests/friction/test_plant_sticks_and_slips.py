@@ -16,6 +16,8 @@ import pytest
 from plant import Plant
 from states import changed
 
+from hexapod_cosim.cosim.run.run import simulate
+from hexapod_cosim.cosim.scenario.scenario import load_scenario
 from hexapod_cosim.models import Leg, Link, Robot, load_robot
 from hexapod_cosim.models.dynamics import Command
 
@@ -87,3 +89,26 @@ def test_the_plant_sticks_and_slips_by_coulombs_closed_form(core: ct.CDLL) -> No
     slip, stick = np.diff(switched)[:2]
     assert robot.total_mass == pytest.approx(1.0, rel=1e-12)
     assert [slip, stick] == pytest.approx([0.408432, 0.392400], rel=STICK_SLIP)
+
+
+def creep(**friction: float | str) -> float:
+    """Returns the speed [m/s] at which a robot that stands on a slope of 0.3 rad slides down it."""
+    settings = [f"friction.{key}={value}" for key, value in friction.items()]
+    slope = ["terrain.kind=slope", "terrain.incline=0.3", "duration=4", "outputs.plots=false"]
+    recording = simulate(load_scenario("stand", overrides=[*slope, *settings])).outcome.recording
+    feet = recording.foot_vectors("position").mean(axis=1)
+    late = recording.time >= 2.0
+    way = float(np.linalg.norm(feet[late][-1] - feet[late][0]))
+    return way / float(np.ptp(recording.time[late]))
+
+
+@pytest.mark.usefixtures("plant_build")
+def test_feet_creep_down_a_slope_under_the_tanh_law_alone() -> None:
+    """By artanh(tan(0.3)/0.7) over 100 s/m. The laws with bristles hold, with and without a static
+    friction above the kinetic one, which makes the tanh law slower and no more.
+    """
+    assert creep() == pytest.approx(4.7460e-3, rel=1e-3)
+    assert 4e-3 < creep(mu_static=0.8) < 4.6e-3
+    for law in ("bristle", "lugre"):
+        for mu_static in (0.0, 0.8):
+            assert creep(law=law, mu_static=mu_static) < 1e-9

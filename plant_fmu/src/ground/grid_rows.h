@@ -130,6 +130,26 @@ HX_RARE hxReal hx_grid_depth_bound(const hxModel *model, int row, const hxVec3 *
 #endif
 
 #ifndef HX_TANGENT
+/* Finds the distances of points from patches that are kept and level, and returns in which of the
+ * lanes `wanted` they are those of find_by_kept_patches. */
+static inline hxMask level_patches(const hxTerrain *terrain, hxMask wanted, const hxReal point[3],
+                                   const hxPatchNodes *of, hxReal *distance, hxReal normal[3]) {
+  const hxGridHead *head = &terrain->head;
+  const hxReal zero = hx_splat(0.0), one = hx_splat(1.0);
+  if (hx_any(wanted & ~hx_less(zero, hx_load(of->is_kept)))) return wanted ^ wanted;
+  const hxReal sx = hx_load(of->patch[1]), sy = hx_load(of->patch[2]);
+  const hxReal bend = (hx_abs(hx_load(of->patch[3])) + hx_abs(hx_load(of->patch[4]))) +
+                      hx_abs(hx_load(of->patch[5]));
+  if (hx_any(wanted & hx_less(zero, (hx_abs(sx) + hx_abs(sy)) + bend))) return wanted ^ wanted;
+  const hxReal dx = point[0] - hx_load(of->x), dy = point[1] - hx_load(of->y);
+  const hxReal u = (point[0] - head->x0) * terrain->per_cell - hx_load(of->col),
+               v = (point[1] - head->y0) * terrain->per_cell - hx_load(of->row);
+  *distance = point[2] - hx_load(of->patch[0]);
+  normal[0] = -sx, normal[1] = -sy, normal[2] = one;
+  return wanted & ~hx_less(hx_splat(close * (head->cell * head->cell)), dx * dx + dy * dy) &
+         hx_less(u, one) & hx_less(v, one) & ~(hx_less(u, zero) | hx_less(v, zero));
+}
+
 /* Returns distance and normal of a smooth grid at a row's points. */
 HX_RARE hxGround hx_smooth_grid(const hxModel *model, const hxContactState *state, int row,
                                 int slot, int all, const hxVec3 *point, hxPatchNodes *nodes) {
@@ -152,8 +172,11 @@ HX_RARE hxGround hx_smooth_grid(const hxModel *model, const hxContactState *stat
     hx_forget_nodes(&own);
     nodes = &own;
   }
-  const hxNearest nearest = hx_nearest_on_surface(model->terrain, wanted, at, from, 0, nodes);
-  const hxReal exact = hx_distance_from_surface(&nearest, at, normal);
+  hxReal exact = zero;
+  if (hx_any(wanted & ~level_patches(model->terrain, wanted, at, nodes, &exact, normal))) {
+    const hxNearest nearest = hx_nearest_on_surface(model->terrain, wanted, at, from, 0, nodes);
+    exact = hx_distance_from_surface(&nearest, at, normal);
+  }
   return (hxGround){hx_select(wanted, exact, distance),
                     {hx_select(wanted, normal[0], zero), hx_select(wanted, normal[1], zero),
                      hx_select(wanted, normal[2], one)}};
@@ -216,11 +239,23 @@ HX_RARE void copy_cells(const hxTerrain *terrain, hxReal col, hxReal row, hxPatc
   }
 }
 
-/* Copies them unless they are those of an earlier look-up. */
-static inline void hold_cells_of(const hxTerrain *terrain, hxReal col, hxReal row,
+/* Copies them in the lanes `wanted`, unless they are those of an earlier look-up. */
+static inline void hold_cells_of(const hxTerrain *terrain, hxMask wanted, hxReal col, hxReal row,
                                  hxPatchNodes *nodes) {
-  if (hx_any(differ(col, hx_load(nodes->col)) | differ(row, hx_load(nodes->row))))
-    copy_cells(terrain, col, row, nodes);
+  const hxReal from_col = hx_load(nodes->col), from_row = hx_load(nodes->row);
+  const hxMask changed = wanted & (differ(col, from_col) | differ(row, from_row));
+  if (hx_any(changed))
+    copy_cells(terrain, hx_select(changed, col, from_col), hx_select(changed, row, from_row),
+               nodes);
+}
+
+/* Replaces the cells of lanes that hold none by those below the points. */
+static inline void cells_below(const hxTerrain *terrain, const hxVec3 *point, hxReal *col,
+                               hxReal *row) {
+  const hxGridHead *head = &terrain->head;
+  const hxMask below = hx_less(*col, hx_splat(0.0));
+  *col = hx_select(below, cell_index((point->x - head->x0) / head->cell, head->cols), *col);
+  *row = hx_select(below, cell_index((point->y - head->y0) / head->cell, head->rows), *row);
 }
 
 /* Returns which contacts of a pack of feet the choice contains. */
@@ -239,13 +274,11 @@ HX_RARE hxGround hx_block_tops(const hxModel *model, const hxContactState *state
   const hxReal zero = hx_splat(0.0), z = point->z - model->ground_point[2];
   const hxMask wanted = wanted_lanes(state, HX_FOOT, slot, all);
   hxReal col = hx_load(&state->cell[0][slot]), row = hx_load(&state->cell[1][slot]), top;
-  if (nodes && !hx_any(wanted & hx_less(col, zero))) {
-    hold_cells_of(terrain, col, row, nodes);
+  if (hx_any(wanted & hx_less(col, zero))) cells_below(terrain, point, &col, &row);
+  if (nodes) {
+    hold_cells_of(terrain, wanted, col, row, nodes);
     top = hx_load(nodes->node[1][1]);
   } else {
-    const hxMask below = hx_less(col, zero);
-    col = hx_select(below, (point->x - head->x0) / head->cell, col);
-    row = hx_select(below, (point->y - head->y0) / head->cell, row);
     top = entries_at(terrain->height, head->rows, head->cols, col, row);
   }
   return (hxGround){hx_select(wanted, z - top, hx_splat(hx_far)), {zero, zero, hx_splat(1.0)}};
@@ -299,16 +332,13 @@ HX_RARE hxGround hx_block_sides(const hxModel *model, const hxContactState *stat
   const hxReal zero = hx_splat(0.0), one = hx_splat(1.0), z = point->z - model->ground_point[2];
   const hxMask wanted = wanted_lanes(state, row, slot, all);
   hxReal col = hx_load(&state->cell[0][slot]), line = hx_load(&state->cell[1][slot]);
-  const hxMask below = hx_less(col, zero);
-  hxPatchNodes under;
-  if (!nodes || hx_any(wanted & below)) {
-    col = hx_select(below, cell_index((point->x - head->x0) / head->cell, head->cols), col);
-    line = hx_select(below, cell_index((point->y - head->y0) / head->cell, head->rows), line);
-    copy_cells(terrain, col, line, &under);
-    nodes = &under;
-  } else {
-    hold_cells_of(terrain, col, line, nodes);
+  hxPatchNodes own_nodes;
+  if (!nodes) {
+    nodes = &own_nodes;
+    hx_forget_nodes(nodes);
   }
+  if (hx_any(wanted & hx_less(col, zero))) cells_below(terrain, point, &col, &line);
+  hold_cells_of(terrain, wanted, col, line, nodes);
   const hxReal low_x = head->x0 + head->cell * col, low_y = head->y0 + head->cell * line,
                gap_x[2] = {point->x - low_x, low_x + head->cell - point->x},
                gap_y[2] = {point->y - low_y, low_y + head->cell - point->y},

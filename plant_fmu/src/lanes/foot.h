@@ -152,11 +152,14 @@ HX_RARE void replace_by_soil(const hxModel *model, const hxContactState *state, 
                                  .yield = hx_select(soft, yield, rigid.yield)};
 }
 
+typedef struct hxMergedFeet hxMergedFeet;
+
 /* What is known of contacts before they are computed; NULL: nothing. */
 typedef struct {
   const hxMoment *moment;     /* of the same motion: angles, and places of all contacts on a grid */
   hxPatchNodes *nodes;        /* around the feet of an earlier motion, pack by pack */
   const hxSoilCurves *virgin; /* under the feet at the same depths, pack by pack */
+  const hxMergedFeet *merged; /* the feet's contacts in one row, pack by pack */
 } hxKnown;
 
 #ifdef HX_TANGENT
@@ -186,6 +189,24 @@ HX_INLINE hxGround known_ground(const hxModel *model, const hxMoment *moment, in
                     hx_load_vec3(contact->normal, slot)};
 }
 
+/* Returns distance and normal of the ground at a row's points: as known, or searched. */
+HX_INLINE hxGround hx_known_or_searched(const hxModel *model, const hxContactState *state,
+                                        const hxKnown *known, int row, int slot, int all,
+                                        hxVec3 point) {
+  const int is_known = known && known->moment && model->terrain_kind == HX_TERRAIN_GRID;
+  return is_known ? known_ground(model, known->moment, row, slot)
+                  : hx_ground(model, state, row, slot, all, point, known_nodes(known, row, slot));
+}
+
+/* Computes contact point, penetration and velocity of contacts over this ground. */
+HX_INLINE hxContactKinematics hx_kinematics_over(const hxGround *ground, hxNumber radius,
+                                                 hxVec3 to_centre, hxVec3 v, const hxBody *body) {
+  const hxVec3 arm = hx_add_scaled(to_centre, hx_splat(-radius), ground->normal);
+  const hxVec3 velocity = hx_add3(v, hx_cross(body->w, arm));
+  return (hxContactKinematics){arm, ground->normal, radius - ground->distance,
+                               -hx_dot(velocity, ground->normal), velocity};
+}
+
 /* Computes contact point, penetration and velocity of a row of contacts from the motion of their
  * bodies: centres of mass r, their velocities v, orientations and angular velocities. */
 HX_INLINE hxContactKinematics hx_contact_kinematics(const hxModel *model,
@@ -193,16 +214,10 @@ HX_INLINE hxContactKinematics hx_contact_kinematics(const hxModel *model,
                                                     const hxKnown *known, int row, int slot,
                                                     int all, hxVec3 r, hxVec3 v,
                                                     const hxBody *body) {
-  const hxNumber radius = model->radius[row];
   const hxVec3 to_centre = hx_mul(body->R_WB, hx_load_vec3(model->point[row], slot));
-  const int is_known = known && known->moment && model->terrain_kind == HX_TERRAIN_GRID;
-  const hxGround ground = is_known ? known_ground(model, known->moment, row, slot)
-                                   : hx_ground(model, state, row, slot, all, hx_add3(r, to_centre),
-                                               known_nodes(known, row, slot));
-  const hxVec3 arm = hx_add_scaled(to_centre, hx_splat(-radius), ground.normal);
-  const hxVec3 velocity = hx_add3(v, hx_cross(body->w, arm));
-  return (hxContactKinematics){arm, ground.normal, radius - ground.distance,
-                               -hx_dot(velocity, ground.normal), velocity};
+  const hxGround ground =
+      hx_known_or_searched(model, state, known, row, slot, all, hx_add3(r, to_centre));
+  return hx_kinematics_over(&ground, model->radius[row], to_centre, v, body);
 }
 
 /* Returns the kinematics of a row of contacts on the tibias. */
@@ -259,15 +274,14 @@ HX_RARE void hx_foot_shares(const hxModel *model, const hxContactState *state, i
 
 /* Computes the force of rigid ground on a row of contacts: f_n along the normal, and across it f_t
  * = -mu f_n g(|v_t|) v_t or the bristles' force. All friction laws are chosen by this function. */
-HX_INLINE void rigid_force(const hxModel *model, const hxContactState *state, int row, int slot,
-                           const hxPlantMotion *motion, hxContactWork *contact) {
+HX_INLINE void rigid_force(const hxModel *model, int row, int slot, const hxPlantMotion *motion,
+                           hxFrictionAt at, hxContactWork *contact) {
   const hxContactKinematics *kin = &contact->kin;
   contact->normal = hx_normal_force(contact->law, kin->delta, kin->ddelta);
   contact->slip = hx_add_scaled(kin->velocity, kin->ddelta, kin->normal);
   contact->slip_speed = hx_sqrt(hx_dot(contact->slip, contact->slip));
   if (has_friction_bristles(model, row)) {
-    const hxFrictionAt at = hx_friction_at(state, row, slot);
-    const hxReal closed = hx_load(&state->closed[row][slot]);
+    const hxReal closed = contact->law.closed;
     const hxVec3 b = hx_load_vec3(motion->bristle, slot);
     contact->bristle = model->friction_law == HX_FRICTION_LUGRE
                            ? hx_lugre(model, at, closed, b, contact->slip)
@@ -275,8 +289,7 @@ HX_INLINE void rigid_force(const hxModel *model, const hxContactState *state, in
     contact->force = hx_scale(contact->normal.force, hx_sub3(kin->normal, contact->bristle.grip));
     return;
   }
-  contact->drag_per_load =
-      hx_friction_drag(model, hx_friction_at(state, row, slot), contact->slip_speed);
+  contact->drag_per_load = hx_friction_drag(model, at, contact->slip_speed);
   contact->drag = contact->normal.force * contact->drag_per_load;
   contact->force =
       hx_add_scaled(hx_scale(contact->normal.force, kin->normal), -contact->drag, contact->slip);
@@ -286,13 +299,57 @@ HX_INLINE void rigid_force(const hxModel *model, const hxContactState *state, in
 HX_INLINE void hx_contact_force(const hxModel *model, const hxContactState *state, int row,
                                 int slot, const hxPlantMotion *motion, const hxSoilCurves *virgin,
                                 hxContactWork *contact) {
-  rigid_force(model, state, row, slot, motion, contact);
+  rigid_force(model, row, slot, motion, hx_friction_at(state, row, slot), contact);
   if (!has_soil(model, row)) return;
   if (row == HX_FOOT)
     replace_by_soil(model, state, slot, motion, virgin, contact);
   else
     replace_body_by_soil(model, state, row, slot, contact);
 }
+
+#ifndef HX_TANGENT
+/* While some feet stand on tops and others at walls, edges or corners, an evaluation computes a row
+ * of contacts for each of these faces, in which most lanes have no contact. If no foot has two, the
+ * lanes of one row are enough. Their numbers are those of the rows, to the last bit. */
+
+/* Contacts of a pack of feet; those of no contact are the first row's. */
+struct hxMergedFeet {
+  hxMask on[HX_FOOT_ROWS]; /* lanes whose contact is of a row */
+  int used[HX_FOOT_ROWS];  /* 1: there are some */
+  hxContactLawAt law;
+  hxFrictionAt friction;
+};
+
+/* Returns distance and normal of the faces that feet touch. */
+static inline hxGround merged_ground(const hxModel *model, const hxContactState *state,
+                                     const hxKnown *known, int slot, const hxMergedFeet *merged,
+                                     hxVec3 point) {
+  hxGround ground;
+  for (int row = HX_FOOT; row < HX_FOOT_ROWS; ++row) {
+    if (row != HX_FOOT && !merged->used[row]) continue;
+    const hxGround of_row = hx_known_or_searched(model, state, known, row, slot, HX_CLOSED, point);
+    const hxMask on = merged->on[row];
+    ground = row == HX_FOOT ? of_row
+                            : (hxGround){hx_select(on, of_row.distance, ground.distance),
+                                         select3(on, of_row.normal, ground.normal)};
+  }
+  return ground;
+}
+
+/* Computes kinematics, law and force of the feet's only contacts, as those of the first row. */
+HX_RARE void hx_merged_contact(const hxModel *model, const hxContactState *state,
+                               const hxPlantMotion *motion, const hxKnown *known, int slot,
+                               const hxBody *tibia, hxContactWork *contact) {
+  const hxMergedFeet *merged = &known->merged[slot / HX_LANES];
+  const hxVec3 r = hx_link_vec3(motion, HX_JOINTS - 1, HX_R, slot),
+               v = hx_link_vec3(motion, HX_JOINTS - 1, HX_V, slot),
+               to_centre = hx_mul(tibia->R_WB, hx_load_vec3(model->point[HX_FOOT], slot));
+  const hxGround ground = merged_ground(model, state, known, slot, merged, hx_add3(r, to_centre));
+  contact->kin = hx_kinematics_over(&ground, model->radius[HX_FOOT], to_centre, v, tibia);
+  contact->law = merged->law;
+  rigid_force(model, HX_FOOT, slot, motion, merged->friction, contact);
+}
+#endif
 
 /* Computes the moment of spin and rolling friction on bodies that turn at w; the normal forces are
  * known. */

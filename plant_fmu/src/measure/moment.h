@@ -87,16 +87,18 @@ HX_RARE void search_near_blocks(const hxModel *model, const hxContactState *stat
   /* slots past the last leg are those of leg 0: in a pack with it they are listed by its bit */
   for (int lane = 0; lane < HX_LANES && (slot > 0 || lane < HX_LEGS); ++lane) {
     const double ends[4] = {low[0][lane], high[0][lane], low[1][lane], high[1][lane]};
-    const double around = hx_terrain_top_between(terrain, ends), col = state->cell[0][slot + lane],
-                 own = col >= 0.0 ? hx_terrain_column(terrain, col, state->cell[1][slot + lane])
-                                  : around; /* a foot may have left its block in its print */
+    const double around = hx_terrain_top_between(terrain, ends), col = state->cell[0][slot + lane];
+    const int is_held = col >= 0.0; /* a foot may have left its block in its print */
+    const double own =
+        is_held ? hx_terrain_column(terrain, col, state->cell[1][slot + lane])
+                : hx_terrain_column(terrain, 0.5 * (ends[0] + ends[1]), 0.5 * (ends[2] + ends[3]));
     if (z[lane] - hx_higher_of(around, own) >= HX_LEAST_REACH) continue;
     below |= (state->closed[HX_FOOT][slot + lane] == 0.0) << lane;
     /* the walls of a block go on beside it for a foot that was dragged off it */
     const int is_off =
         model->has_soil &&
         is_off_cell(low[0][lane] + reach - col, low[1][lane] + reach - state->cell[1][slot + lane]);
-    beside |= !(col >= 0.0) || around > own || is_off ? 1 << lane : 0;
+    beside |= (model->has_soil && !is_held) || around > own || is_off ? 1 << lane : 0;
   }
   search->below = hx_listed(below), search->beside = hx_listed(beside);
 }
