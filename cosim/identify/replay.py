@@ -25,6 +25,7 @@ from hexapod_cosim.cosim.identify.experiment import Experiment
 from hexapod_cosim.cosim.identify.log import Log, LogError, without_readings
 from hexapod_cosim.cosim.identify.log_plant import LogPlant
 from hexapod_cosim.cosim.identify.screening import BadColumn, left_out
+from hexapod_cosim.cosim.identify.speed_references import with_speed_references
 from hexapod_cosim.cosim.identify.start import initial_state
 from hexapod_cosim.cosim.master.recorder import Recording
 from hexapod_cosim.models import FmuError, Robot
@@ -80,6 +81,7 @@ def replay(
     Raises HexapodError for a log without readings and where the plant cannot follow the commands.
     """
     wrong = wrong_commands(log)
+    log = with_speed_references(log, robot)
     with TemporaryDirectory(prefix="hexapod-replay-") as folder:
         path = fmu or export_fmu(robot, Path(folder) / "robot.fmu")
         with LogPlant(path, parameters) as plant:
