@@ -14,9 +14,9 @@ from hexapod_cosim.cosim.identify.comparison import (
     column_differences,
 )
 from hexapod_cosim.cosim.identify.experiment import Experiment
+from hexapod_cosim.cosim.identify.fitting.friction_search import FrictionTrial
 from hexapod_cosim.cosim.identify.fitting.judging import Fit
 from hexapod_cosim.cosim.identify.fitting.rank import QUANTILE, TOLD, combination_text
-from hexapod_cosim.cosim.identify.friction_search import FrictionTrial
 from hexapod_cosim.cosim.identify.numbers.unknown import Unknown
 from hexapod_cosim.cosim.identify.rigid.linear_start import LinearStart
 from hexapod_cosim.cosim.identify.screening import BadColumn

@@ -12,8 +12,10 @@ from numpy.typing import NDArray
 
 from hexapod_cosim.cosim.export.export import export_fmu
 from hexapod_cosim.cosim.identify.channel_screening import screened, turned_after_the_fit
-from hexapod_cosim.cosim.identify.command_screening import check_commands
+from hexapod_cosim.cosim.identify.commands.command_screening import check_commands
+from hexapod_cosim.cosim.identify.commands.speed_references import with_speed_references
 from hexapod_cosim.cosim.identify.experiment import Experiment
+from hexapod_cosim.cosim.identify.fitting.friction_search import tried_models
 from hexapod_cosim.cosim.identify.fitting.judging import Fit
 from hexapod_cosim.cosim.identify.fitting.output_error import fit
 from hexapod_cosim.cosim.identify.fitting.problem import TO_DEVIATION, Problem
@@ -26,7 +28,6 @@ from hexapod_cosim.cosim.identify.fitting.progress import (
     Reporter,
 )
 from hexapod_cosim.cosim.identify.fitting.workers import simulating_workers
-from hexapod_cosim.cosim.identify.friction_search import tried_models
 from hexapod_cosim.cosim.identify.identified import Identified
 from hexapod_cosim.cosim.identify.log import HELD_OUT, Log, LogError, without_readings
 from hexapod_cosim.cosim.identify.log_plant import LogPlant
@@ -34,7 +35,6 @@ from hexapod_cosim.cosim.identify.numbers.friction_models import BEST, with_fric
 from hexapod_cosim.cosim.identify.numbers.servo import ELASTIC
 from hexapod_cosim.cosim.identify.rigid.linear_start import linear_start
 from hexapod_cosim.cosim.identify.screening import BadColumn, misfits
-from hexapod_cosim.cosim.identify.speed_references import with_speed_references
 from hexapod_cosim.cosim.identify.start import rest_rows
 from hexapod_cosim.cosim.identify.unknowns import GROUPS, changed_robot, chosen_unknowns
 from hexapod_cosim.cosim.interface.names import vector_names

@@ -164,6 +164,15 @@ def read_log(path: Path, *, torso_com: Sequence[float] = (0.0, 0.0, 0.0)) -> Log
             fix="name the log's file, not its folder" if path.is_dir() else "convert it",
             where=str(path),
         )
+    if not path.exists():
+        raise LogError(
+            "no recording of a robot",
+            got=f"{path.name}, which does not exist",
+            expected="a file with commands and readings",
+            fix="name your robot's log; without a robot, `python examples/05_robot_log.py "
+            f"{path.with_suffix('.mcap').as_posix()}` writes that of a simulated one",
+            where=str(path),
+        )
     return log_of(readers[path.suffix.lower()](), str(path))
 
 

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from secret_robots import SEEN, Secret, secret_robot
 
-from hexapod_cosim.cosim.identify.friction_search import FrictionTrial, tried_models
+from hexapod_cosim.cosim.identify.fitting.friction_search import FrictionTrial, tried_models
 from hexapod_cosim.cosim.identify.identified import Identified
 from hexapod_cosim.cosim.identify.identify import identify, make_experiment
 from hexapod_cosim.cosim.identify.identify_tables import friction_text, untold_text, warnings

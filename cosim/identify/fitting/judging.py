@@ -27,6 +27,7 @@ from hexapod_cosim.cosim.identify.fitting.problem import Misfit, Problem
 from hexapod_cosim.cosim.identify.fitting.rank import (
     Combination,
     combinations,
+    measured_information,
     sharpened,
     told,
     untold,
@@ -100,12 +101,7 @@ class _Told:
     series: Sequence[Series]
     misfit: Mapping[str, Misfit]
     information: Array  # (rows, rows)  [1/prior^2]
-
-    @property
-    def covariance(self) -> Array:
-        """The covariance of the numbers with what was known before (rows, rows)."""
-        own = np.linalg.inv(self.information + np.eye(len(self.information)))
-        return np.asarray(own, dtype=np.float64)
+    covariance: Array  # (rows, rows)  with what was known before
 
 
 def judged(
@@ -168,7 +164,20 @@ def _told(fitted: Problem, z: Array, least: Mapping[str, float]) -> _Told:
     # errors of the model count as noise; at most the whole prior is unknown
     worst = max(1.0, *(one.value for one in misfit.values()))
     series = fitted.series(jacobian, bounded)
+    information = coloured_information(series) / worst
+    first = _covariance(measured_information(fitted, z, jacobian, information))
     for most in WEAK:
-        jacobian = sharpened(fitted, z, jacobian, coloured_information(series) / worst, most)
+        jacobian = sharpened(fitted, z, jacobian, information, most)
         series = fitted.series(jacobian, bounded)
-    return _Told(jacobian, residuals, series, misfit, coloured_information(series) / worst)
+        information = coloured_information(series) / worst
+    # both are estimates, and intervals that are too narrow are worse than wide ones
+    second = _covariance(information)
+    wider = np.sqrt(np.maximum(np.diag(second) / np.diag(first), 1.0))
+    covariance = first * np.outer(wider, wider)
+    return _Told(jacobian, residuals, series, misfit, information, covariance)
+
+
+def _covariance(information: Array) -> Array:
+    """Returns the covariance of numbers with what was known before (rows, rows)."""
+    own = np.linalg.inv(information + np.eye(len(information)))
+    return np.asarray(own, dtype=np.float64)

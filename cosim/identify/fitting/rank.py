@@ -29,7 +29,8 @@ QUANTILE = 1.959963985  # of a normal distribution, for 95 %
 TOLD = 0.5  # of the prior deviation: a number with less is told by the logs
 NEARLY_NULL = 1.0  # information [1/prior^2] of a combination: less than what was known before
 # deviation of a number by nearly null combinations alone, from which on it is not told
-BY_NULL = 0.15  # priors
+BY_NULL = 1.0 / 3.0  # priors
+MOST = 100.0  # information [1/prior^2] of a combination that is moved as a whole
 LEAST = 0.05  # information [1/prior^2] of a combination that is not told whatever its errors are
 LONGEST = 0.5  # priors    of such a move
 PART = 0.05  # slope of a number by another one, from which on it takes part in a combination
@@ -77,7 +78,36 @@ def sharpened(
         linear = jacobian[:count] @ (forth - back)
         smaller = np.where(np.abs(change) < np.abs(linear), change, linear)
         differ = np.abs(change - linear) > UNLIKE * np.abs(smaller)
-        found[:count] += np.outer((np.where(differ, smaller, change) - linear) / way, vector)
+        shown = np.where(differ, smaller, change)
+        if shown @ shown < linear @ linear:  # more is what bends or jumps over the long step
+            found[:count] += np.outer((shown - linear) / way, vector)
+    return found
+
+
+def measured_information(problem: Problem, z: Array, jacobian: Array, information: Array) -> Array:
+    """Returns the information (rows, rows) with what simulations of combinations say.
+
+    Args:
+        problem: its readings that count.
+        z: the numbers (rows,).
+        jacobian: derivatives of the residuals, with the priors behind them.
+        information: what these derivatives tell.
+    """
+    found = information.copy()
+    slopes = jacobian[: -len(z)]
+    low, high = problem.bounds()
+    values, vectors = np.linalg.eigh(information)
+    for value, vector in zip(values.tolist(), vectors.T, strict=True):
+        if not LEAST < value < MOST:
+            continue
+        step = min(LONGEST, value**-0.5) * vector
+        ends = [np.clip(z + sign * step, low, high) for sign in (1.0, -1.0)]
+        forth, back = (problem.residuals(end)[: -len(z)] for end in ends)
+        change, expected = forth - back, slopes @ (ends[0] - ends[1])
+        if not np.isfinite(change).all():
+            continue
+        share = float(change @ change) / max(float(expected @ expected), 1e-300)
+        found -= (1.0 - min(share, 1.0)) * value * np.outer(vector, vector)
     return found
 
 

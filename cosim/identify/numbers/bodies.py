@@ -7,7 +7,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
-from hexapod_cosim.cosim.identify.inertia import BodyInertia, body_inertia
+from hexapod_cosim.cosim.identify.numbers.inertia import BodyInertia, body_inertia
 from hexapod_cosim.cosim.identify.numbers.unknown import Unknown
 from hexapod_cosim.models import JOINT_NAMES, Robot
 

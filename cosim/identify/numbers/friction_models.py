@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 from hexapod_cosim.cosim.identify.numbers.servo import (
     DRY,
@@ -52,7 +53,7 @@ def with_friction_model(robot: Robot, model: str) -> Robot:
             where="--friction",
         )
     servo, typical = robot.servo, _typical(robot.servo)
-    values = dict.fromkeys(typical, 0.0)
+    values: dict[str, Any] = dict.fromkeys(typical, 0.0)
     for key in ("coulomb_friction", "viscous_friction", *TERMS[model]):
         own = getattr(servo, key)
         values[key] = own if own > LEAST * typical[key] else FIRST * typical[key]
