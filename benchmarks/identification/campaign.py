@@ -30,7 +30,7 @@ import numpy as np
 from secret_robots import GROUPS, Secret, damaged, secret_robot
 
 from hexapod_cosim.cosim.export.export import export_fmu
-from hexapod_cosim.cosim.identify.command_screening import WrongCommandsError
+from hexapod_cosim.cosim.identify.commands.command_screening import WrongCommandsError
 from hexapod_cosim.cosim.identify.identified import Identified
 from hexapod_cosim.cosim.identify.identify import TOLERANCE, identify, screen
 from hexapod_cosim.cosim.identify.log import Log

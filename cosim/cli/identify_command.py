@@ -21,6 +21,7 @@ from hexapod_cosim.cosim.cli.terminal import (
     warn,
 )
 from hexapod_cosim.cosim.identify.log import HELD_OUT, read_log
+from hexapod_cosim.cosim.identify.numbers.friction_models import CHOICES
 from hexapod_cosim.cosim.identify.unknowns import GROUPS
 from hexapod_cosim.cosim.results.results import results_folder
 from hexapod_cosim.models import HexapodError, load_robot, unknown_name
@@ -48,6 +49,15 @@ HeldOut = Annotated[
     float,
     typer.Option("--held-out", metavar="SHARE", help="Part of each log that only judges."),
 ]
+Friction = Annotated[
+    str | None,
+    typer.Option(
+        "--friction",
+        metavar="|".join(CHOICES),
+        help="Friction model of measured servos; best: the one that explains the logs best. "
+        "Default: the terms of the robot file.",
+    ),
+]
 Propose = Annotated[
     bool,
     typer.Option("--propose/--no-propose", help="Search for a walk that would tell more."),
@@ -68,6 +78,7 @@ def identify(
     logs: Logs,
     robot: RobotName = "athena",
     find: Find = None,
+    friction: Friction = None,
     held_out: HeldOut = HELD_OUT,
     search: Propose = True,
     workers: Workers = None,
@@ -89,9 +100,12 @@ def identify(
     )
 
     groups = _checked(find or list(FOUND), held_out)
+    if friction is not None and friction not in CHOICES:
+        raise unknown_name("friction model", friction, CHOICES, where="--friction")
     own = load_robot(robot)
     words = ["hexapod", "identify", *map(str, logs), "--robot", robot]
     words += [word for name in find or [] for word in ("--find", name)]
+    words += ["--friction", friction] if friction else []
     words += ["--held-out", str(held_out)] if held_out != HELD_OUT else []
     words += [] if search else ["--no-propose"]
     recorded = [read_log(path, torso_com=own.torso.com) for path in logs]
@@ -104,6 +118,7 @@ def identify(
                 groups=groups,
                 held_out=held_out,
                 workers=size,
+                friction=friction,
                 progress=lambda done: show(done.text, done.step, done.simulations),
             )
         with waiting(None if json else "searching for a walk that would tell more"):
@@ -147,5 +162,7 @@ def _show(found: Identified, files: Sequence[Path]) -> None:
     if zero:
         show_text(f"{zero} biases of sensors may be 0; sensors.toml and the report have them.")
     show_table(tables.ERRORS, errors, right=(2, 3, 4))
+    if found.trials:
+        show_text(tables.friction_text(found.trials))
     show_text(tables.untold_text(found))
     show_files(files)

@@ -14,8 +14,9 @@ from numpy.typing import NDArray
 from hexapod_cosim.cosim.common.components import PLANT
 from hexapod_cosim.cosim.identify.log import ATTITUDE, CHANNELS, Log
 from hexapod_cosim.cosim.identify.log_plant import LogPlant
+from hexapod_cosim.cosim.identify.numbers.unknown import Unknown
 from hexapod_cosim.cosim.identify.start import initial_state
-from hexapod_cosim.cosim.identify.unknowns import CURRENT, DELAYS, START, Unknown, changed_robot
+from hexapod_cosim.cosim.identify.unknowns import CURRENT, DELAYS, START, changed_robot
 from hexapod_cosim.cosim.interface.names import joint_names, vector_names
 from hexapod_cosim.cosim.interface.start_values import parameter_values
 from hexapod_cosim.models import Robot

@@ -14,11 +14,13 @@ from hexapod_cosim.cosim.identify.comparison import (
     column_differences,
 )
 from hexapod_cosim.cosim.identify.experiment import Experiment
+from hexapod_cosim.cosim.identify.fitting.friction_search import FrictionTrial
 from hexapod_cosim.cosim.identify.fitting.judging import Fit
 from hexapod_cosim.cosim.identify.fitting.rank import QUANTILE, TOLD, combination_text
+from hexapod_cosim.cosim.identify.numbers.unknown import Unknown
 from hexapod_cosim.cosim.identify.rigid.linear_start import LinearStart
 from hexapod_cosim.cosim.identify.screening import BadColumn
-from hexapod_cosim.cosim.identify.unknowns import START, Unknown
+from hexapod_cosim.cosim.identify.unknowns import START
 from hexapod_cosim.models import Robot
 
 Array = NDArray[np.float64]
@@ -68,7 +70,7 @@ class Estimate:
 class Identified:
     """A robot identified from logs."""
 
-    file: Robot  # as the robot file has it
+    file: Robot  # from which the search begins: as the robot file has it
     robot: Robot  # with the numbers found
     fit: Fit
     experiments: tuple[Experiment, ...]
@@ -76,6 +78,14 @@ class Identified:
     before: tuple[Array, ...]  # readings that the robot file predicts (rows, columns)
     linear: LinearStart | None  # what linear least squares tell
     lacking: str  # what the logs lack for these
+    # the robot file's robot where `file` has another friction model than it
+    given: Robot | None = None
+    trials: tuple[FrictionTrial, ...] = ()  # of friction models, the best one first
+
+    @property
+    def origin(self) -> Robot:
+        """The robot file's robot."""
+        return self.given or self.file
 
     @property
     def rejected(self) -> bool:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -11,28 +12,35 @@ from numpy.typing import NDArray
 
 from hexapod_cosim.cosim.export.export import export_fmu
 from hexapod_cosim.cosim.identify.channel_screening import screened, turned_after_the_fit
-from hexapod_cosim.cosim.identify.command_screening import check_commands
+from hexapod_cosim.cosim.identify.commands.command_screening import check_commands
+from hexapod_cosim.cosim.identify.commands.speed_references import with_speed_references
 from hexapod_cosim.cosim.identify.experiment import Experiment
+from hexapod_cosim.cosim.identify.fitting.friction_search import tried_models
 from hexapod_cosim.cosim.identify.fitting.judging import Fit
 from hexapod_cosim.cosim.identify.fitting.output_error import fit
 from hexapod_cosim.cosim.identify.fitting.problem import TO_DEVIATION, Problem
-from hexapod_cosim.cosim.identify.fitting.progress import AGAIN, COLUMNS, LINEAR, Progress, Reporter
+from hexapod_cosim.cosim.identify.fitting.progress import (
+    AGAIN,
+    COLUMNS,
+    LINEAR,
+    MODELS,
+    Progress,
+    Reporter,
+)
 from hexapod_cosim.cosim.identify.fitting.workers import simulating_workers
 from hexapod_cosim.cosim.identify.identified import Identified
 from hexapod_cosim.cosim.identify.log import HELD_OUT, Log, LogError, without_readings
 from hexapod_cosim.cosim.identify.log_plant import LogPlant
+from hexapod_cosim.cosim.identify.numbers.friction_models import BEST, with_friction_model
+from hexapod_cosim.cosim.identify.numbers.servo import ELASTIC
 from hexapod_cosim.cosim.identify.rigid.linear_start import linear_start
 from hexapod_cosim.cosim.identify.screening import BadColumn, misfits
 from hexapod_cosim.cosim.identify.start import rest_rows
-from hexapod_cosim.cosim.identify.unknowns import (
-    ELASTIC,
-    GROUPS,
-    changed_robot,
-    chosen_unknowns,
-)
+from hexapod_cosim.cosim.identify.unknowns import GROUPS, changed_robot, chosen_unknowns
 from hexapod_cosim.cosim.interface.names import vector_names
 from hexapod_cosim.cosim.run.worker_pool import processor_count
 from hexapod_cosim.models import Robot
+from hexapod_cosim.models.servos.presets import FRICTION_MODELS
 
 Array = NDArray[np.float64]
 SETTLING = 0.1  # s    at the start of a log that is not compared: the first row has noise
@@ -48,6 +56,7 @@ def identify(
     held_out: float = HELD_OUT,
     workers: int = 1,
     progress: Progress | None = None,
+    friction: str | None = None,
 ) -> Identified:
     """Finds a robot's numbers from logs.
 
@@ -59,9 +68,14 @@ def identify(
         workers: number of processes, on which the result does not depend. With more than one, the
             calling script needs `if __name__ == "__main__"`.
         progress: called when a step begins and after each simulation.
+        friction: friction model of measured servos, "m1" to "m6", or "best" for the one that
+            explains the logs best; None: the terms that the robot file has.
 
-    Raises HexapodError for logs without readings and where the plant cannot follow them.
+    Raises HexapodError for logs without readings, where the plant cannot follow them, and for a
+    friction model of a servo without a motor.
     """
+    if friction is not None:
+        return _with_friction(logs, robot, friction, groups, held_out, workers, progress)
     # imported here: the command's help starts sooner
     from threadpoolctl import threadpool_limits  # noqa: PLC0415
 
@@ -103,6 +117,38 @@ def identify(
         linear=linear,
         lacking=lacking,
     )
+
+
+def _with_friction(
+    logs: Sequence[Log],
+    robot: Robot,
+    friction: str,
+    groups: Sequence[str],
+    held_out: float,
+    workers: int,
+    progress: Progress | None,
+) -> Identified:
+    """Finds a robot's numbers with a friction model, or the best of all; see `identify`."""
+    report, trials = Reporter(progress), []
+    variant = with_friction_model(robot, FRICTION_MODELS[0] if friction == BEST else friction)
+    with TemporaryDirectory(prefix="hexapod-identify-") as folder:
+        path = export_fmu(robot, Path(folder) / "robot.fmu")
+        with LogPlant(path, TOLERANCE) as plant:
+            plant.watch = report.simulated
+            if friction == BEST:
+                report.begin(MODELS)
+                experiments, _ = screen(plant, robot, logs, groups=groups, held_out=held_out)
+                trials = tried_models(experiments, robot, groups, report.simulated)
+                variant = with_friction_model(robot, trials[0].model)
+            found = identify(
+                logs, variant, groups=groups, held_out=held_out, workers=workers, progress=progress
+            )
+            # what the robot file says, with its own friction
+            rows = chosen_unknowns(robot, logs, groups)
+            own = Problem(plant, robot, found.experiments, rows)
+            before = tuple(own.predictions(np.zeros(len(rows))))
+    kept = robot if found.rejected else found.robot
+    return replace(found, robot=kept, before=before, given=robot, trials=tuple(trials))
 
 
 def usual_workers(logs: Sequence[Log]) -> int:
@@ -174,6 +220,7 @@ def screen(
     """
     for log in logs:
         check_commands(log)
+    logs = [with_speed_references(log, robot) for log in logs]
     forget = forgetting(robot, groups)
     experiments = [make_experiment(log, k, held_out, forget=forget) for k, log in enumerate(logs)]
     rows = chosen_unknowns(robot, logs, groups)

@@ -20,12 +20,15 @@ from hexapod_cosim.cosim.identify.identify_tables import (
     ERRORS,
     ESTIMATES,
     MISFIT,
+    TRIALS,
     base_rows,
     base_values,
     error_rows,
     estimate_rows,
+    friction_text,
     misfit_rows,
     proposal_text,
+    trial_rows,
     untold_text,
     warnings,
 )
@@ -64,7 +67,7 @@ def write_identified(
         "kind": KIND,
         "status": "completed",
         "logs": logs,
-        "robot": {"name": found.file.name, "hash": found.file.hash},
+        "robot": {"name": found.origin.name, "hash": found.origin.hash},
         "command": command,
     }
     write_json(folder / RUN_FILE, facts)
@@ -85,6 +88,8 @@ def result_table(found: Identified, proposals: Sequence[Proposal]) -> dict[str, 
             "held_out": {key: one.value for key, one in found.fit.held_out.items()},
         },
         "unexplained": found.fit.unexplained,
+        "rejected": found.fit.rejected,
+        "friction_models": [asdict(one) for one in found.trials],
         "base_parameters": [dict(zip(BASE_KEYS, row, strict=True)) for row in base_values(found)],
         "no_base_parameters": found.lacking,
         "bad_columns": [
@@ -143,6 +148,19 @@ def _page(found: Identified, proposals: Sequence[Proposal], command: str) -> str
             columns=MISFIT,
             rows=misfit_rows(found),
             left=1,
+        ),
+        *(
+            [
+                Section(
+                    title="Which friction model?",
+                    caption=friction_text(found.trials),
+                    columns=TRIALS,
+                    rows=trial_rows(found),
+                    left=1,
+                )
+            ]
+            if found.trials
+            else []
         ),
         Section(
             title="Base parameters",

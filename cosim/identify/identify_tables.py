@@ -6,18 +6,21 @@ from collections.abc import Sequence
 
 from hexapod_cosim.cosim.identify.comparison import Difference
 from hexapod_cosim.cosim.identify.excitation import Proposal
+from hexapod_cosim.cosim.identify.fitting.friction_search import FrictionTrial
 from hexapod_cosim.cosim.identify.fitting.problem import REJECTED
 from hexapod_cosim.cosim.identify.identified import NEAR, Estimate, Identified
+from hexapod_cosim.cosim.identify.numbers.servo import GEAR
 from hexapod_cosim.cosim.identify.page import TITLES, number
 from hexapod_cosim.cosim.identify.rigid.base_parameters import base_of, group_parameters
 from hexapod_cosim.cosim.identify.screening import left_out
 from hexapod_cosim.cosim.identify.start import moving_at_rest
-from hexapod_cosim.cosim.identify.unknowns import BIAS, GEAR
+from hexapod_cosim.cosim.identify.unknowns import BIAS
 
 MOTOR = {"servo.torque_constant", "servo.resistance"}
 ESTIMATES = ("number", "unit", "before", "found", "95 % interval", "told", "nearest partner")
 BASE = ("base parameter", "unit", "before", "least squares", "deviation", "found")
 MISFIT = ("channel", "noise", "fitted", "held out")
+TRIALS = ("friction model", "numbers", "sum of squares", "criterion, over the best one's")
 ERRORS = ("channel", "unit", "before", "after", "ratio")
 
 
@@ -102,7 +105,7 @@ def warnings(found: Identified) -> list[str]:
             f"noise are {REJECTED:g} and more in {named}. A fit of a wrong model has wrong "
             "numbers, so none is told and all stay as in the robot file: find all groups of "
             "numbers, look at the curves of these channels, or choose another model of servo or "
-            "ground."
+            "ground." + _other_friction(found)
         )
     elif worst:
         named = ", ".join(f"{TITLES[key].lower()} ({value:.1f})" for key, value in worst.items())
@@ -113,6 +116,13 @@ def warnings(found: Identified) -> list[str]:
             "channels, or choose another model of servo or ground."
         )
     return texts
+
+
+def _other_friction(found: Identified) -> str:
+    """Returns how other friction models are tried, where the servo has one, as a sentence."""
+    if found.trials or found.file.servo.drive != "motor":
+        return ""
+    return " --friction best tries the friction models M1 to M6 of the gears."
 
 
 def estimate_rows(estimates: Sequence[Estimate]) -> list[list[str]]:
@@ -192,6 +202,27 @@ def _together(one: Estimate) -> str:
 def _has(found: Identified, channel: str) -> bool:
     """Returns whether readings of a channel are compared."""
     return any(channel in one.channels for one in found.experiments)
+
+
+def friction_text(trials: Sequence[FrictionTrial]) -> str:
+    """Returns which friction model explains the logs best, as a sentence; empty without trials."""
+    if not trials:
+        return ""
+    best, *others = trials
+    text = f"Of the friction models M1 to M6, {best.model.upper()} explains the logs best"
+    if others:
+        more = others[0].criterion - best.criterion
+        text += f"; the next one, {others[0].model.upper()}, has a criterion larger by {more:.1f}"
+    return text + " (BIC: sum of squares over the noise, and log(readings) for each number)."
+
+
+def trial_rows(found: Identified) -> list[list[str]]:
+    """Returns the rows of a table with TRIALS."""
+    least = min((one.criterion for one in found.trials), default=0.0)
+    return [
+        [one.model, str(one.numbers), f"{one.cost:.1f}", f"{one.criterion - least:.1f}"]
+        for one in found.trials
+    ]
 
 
 def proposal_text(proposals: Sequence[Proposal]) -> str:

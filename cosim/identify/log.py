@@ -8,7 +8,7 @@ and yaw, which are made from a quaternion.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 
@@ -88,6 +88,7 @@ class Log:
     recording: Recording  # time, commands and known readings
     where: str
     unknown: tuple[str, ...] = ()  # columns of the file that no robot records, left out
+    derived: str = ""  # which commands were made from others, as a sentence
 
     @property
     def time(self) -> Array:
@@ -116,23 +117,24 @@ class Log:
 
     def part(self, rows: slice) -> Log:
         """Returns some rows of the log."""
-        return Log(self.recording.rows(rows), self.where, self.unknown)
+        return replace(self, recording=self.recording.rows(rows))
 
     def without(self, names: Sequence[str]) -> Log:
         """Returns the log without some columns."""
         keep = [k for k, name in enumerate(self.recording.names) if name not in names]
         kept = tuple(self.recording.names[k] for k in keep)
-        return Log(Recording(kept, self.recording.data[:, keep]), self.where, self.unknown)
+        return replace(self, recording=Recording(kept, self.recording.data[:, keep]))
 
     @property
     def warnings(self) -> list[str]:
-        """What a user must know of the columns' names, as sentences."""
+        """What a user must know of the columns, as sentences."""
+        derived = [self.derived] if self.derived else []
         if not self.unknown:
-            return []
+            return derived
         named = [f"{name}{_meant(name)}" for name in self.unknown[:MOST_NAMED]]
         more = len(self.unknown) - len(named)
         text = ", ".join(named) + (f" and {more} more" if more else "")
-        return [f"Columns of {self.where} with unknown names are left out: {text}."]
+        return [f"Columns of {self.where} with unknown names are left out: {text}.", *derived]
 
 
 @cache
@@ -160,6 +162,15 @@ def read_log(path: Path, *, torso_com: Sequence[float] = (0.0, 0.0, 0.0)) -> Log
             got=path.name,
             expected="a file that ends in " + ", ".join(readers),
             fix="name the log's file, not its folder" if path.is_dir() else "convert it",
+            where=str(path),
+        )
+    if not path.exists():
+        raise LogError(
+            "no recording of a robot",
+            got=f"{path.name}, which does not exist",
+            expected="a file with commands and readings",
+            fix="name your robot's log; without a robot, `python examples/05_robot_log.py "
+            f"{path.with_suffix('.mcap').as_posix()}` writes that of a simulated one",
             where=str(path),
         )
     return log_of(readers[path.suffix.lower()](), str(path))

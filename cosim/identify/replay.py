@@ -12,10 +12,11 @@ import numpy as np
 
 from hexapod_cosim.cosim.export.export import export_fmu
 from hexapod_cosim.cosim.identify.channel_screening import screened
-from hexapod_cosim.cosim.identify.command_screening import (
+from hexapod_cosim.cosim.identify.commands.command_screening import (
     wrong_commands,
     wrong_commands_error,
 )
+from hexapod_cosim.cosim.identify.commands.speed_references import with_speed_references
 from hexapod_cosim.cosim.identify.comparison import (
     Difference,
     channel_differences,
@@ -24,6 +25,7 @@ from hexapod_cosim.cosim.identify.comparison import (
 from hexapod_cosim.cosim.identify.experiment import Experiment
 from hexapod_cosim.cosim.identify.log import Log, LogError, without_readings
 from hexapod_cosim.cosim.identify.log_plant import LogPlant
+from hexapod_cosim.cosim.identify.other_robot import other_robot
 from hexapod_cosim.cosim.identify.screening import BadColumn, left_out
 from hexapod_cosim.cosim.identify.start import initial_state
 from hexapod_cosim.cosim.master.recorder import Recording
@@ -40,12 +42,14 @@ class Replay:
     columns: tuple[Difference, ...]
     commands: tuple[BadColumn, ...]  # that the servos cannot have got
     readings: tuple[BadColumn, ...]  # dead or wrong; none are named where commands are wrong
+    other: str = ""  # why the log is another robot's, as a sentence
 
     @property
     def warnings(self) -> list[str]:
         """What a user must know of the columns, as sentences."""
         return [
             *self.log.warnings,
+            *([self.other] if self.other else []),
             *(
                 f"The robot cannot have got {one.name}: {one.why}. The simulated robot got it, so "
                 "that the differences are not those of the robot file."
@@ -80,6 +84,7 @@ def replay(
     Raises HexapodError for a log without readings and where the plant cannot follow the commands.
     """
     wrong = wrong_commands(log)
+    log = with_speed_references(log, robot)
     with TemporaryDirectory(prefix="hexapod-replay-") as folder:
         path = fmu or export_fmu(robot, Path(folder) / "robot.fmu")
         with LogPlant(path, parameters) as plant:
@@ -109,4 +114,5 @@ def replay(
         columns=tuple(column_differences(log, names, found)),
         commands=tuple(wrong),
         readings=() if wrong else tuple(screened(whole, found)),
+        other=other_robot(log, robot),
     )

@@ -17,6 +17,7 @@ import tomlkit.items
 
 from hexapod_cosim.cosim.common.files import write_text
 from hexapod_cosim.cosim.identify.identified import Estimate, Identified
+from hexapod_cosim.cosim.identify.numbers.servo import TIED
 from hexapod_cosim.cosim.identify.unknowns import OF_FILE
 from hexapod_cosim.models import JOINT_NAMES, HexapodError, Robot, load_robot
 from hexapod_cosim.models.robot import robot_path
@@ -24,6 +25,8 @@ from hexapod_cosim.models.robot import robot_path
 SECTIONS = ("servo", "contact", "friction")
 BODY_KEYS = ("mass", "com", "inertia")
 SENSORS = "sensors.toml"
+# coefficients of M3 and M4, with their keys in a robot file
+TIED_KEYS = {name: [f"servo.{key}" for key in keys] for name, keys in TIED.items()}
 FOLLOWS = "follows from identified numbers"  # comment beside a number that does
 
 
@@ -49,8 +52,8 @@ def robot_text(found: Identified, file: str, folder: Path, logs: Sequence[str]) 
         source[one.key] = _sentence(one, names, rejected=found.rejected)
     said = _comments(own, names)
     for name in SECTIONS:
-        _set_changed(document, name, getattr(found.file, name), getattr(found.robot, name), said)
-    _set_bodies(document, found.file, found.robot, said)
+        _set_changed(document, name, getattr(found.origin, name), getattr(found.robot, name), said)
+    _set_bodies(document, found.origin, found.robot, said)
     _set_defaults(document, found.robot)
     return tomlkit.dumps(document)
 
@@ -103,8 +106,9 @@ def _comments(estimates: Sequence[Estimate], logs: str) -> dict[str, str]:
             text = f"only {one.combination}"
         else:
             continue
-        units[key] = one.unit
-        said.setdefault(key, []).append(f"[{axis} {text}" if axis else text)
+        for own in TIED_KEYS.get(key, (key,)):
+            units[own] = one.unit
+            said.setdefault(own, []).append(f"[{axis} {text}" if axis else text)
     return {
         key: f"{units[key]}    identified from {logs}, 95 % interval {', '.join(texts)}"
         for key, texts in said.items()

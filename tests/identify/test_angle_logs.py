@@ -11,7 +11,7 @@ import pytest
 from scipy.optimize import root
 from secret_robots import GROUPS, secret_robot
 
-from hexapod_cosim.cosim.identify.identified import QUANTILE
+from hexapod_cosim.cosim.identify.fitting.rank import QUANTILE
 from hexapod_cosim.cosim.identify.identify import identify
 from hexapod_cosim.cosim.identify.start import standing_attitude
 from hexapod_cosim.models import Robot, load_robot

@@ -13,7 +13,7 @@ import pytest
 from command import Call, assert_refused
 from secret_robots import DAMAGES, Secret, secret_robot, with_column
 
-from hexapod_cosim.cosim.identify.command_screening import (
+from hexapod_cosim.cosim.identify.commands.command_screening import (
     WrongCommandsError,
     check_commands,
     wrong_commands,

@@ -13,10 +13,12 @@ from hexapod_cosim.cosim.export.export import export_fmu
 from hexapod_cosim.cosim.identify.experiment import Experiment
 from hexapod_cosim.cosim.identify.fitting.output_error import fit
 from hexapod_cosim.cosim.identify.fitting.problem import Problem
-from hexapod_cosim.cosim.identify.identified import TOLD
+from hexapod_cosim.cosim.identify.fitting.rank import TOLD
 from hexapod_cosim.cosim.identify.identify import TOLERANCE, make_experiment
 from hexapod_cosim.cosim.identify.log_plant import LogPlant
-from hexapod_cosim.cosim.identify.unknowns import GEAR, ROBOT, Unknown, chosen_unknowns
+from hexapod_cosim.cosim.identify.numbers.servo import GEAR
+from hexapod_cosim.cosim.identify.numbers.unknown import Unknown
+from hexapod_cosim.cosim.identify.unknowns import ROBOT, chosen_unknowns
 from hexapod_cosim.models import JOINT_NAMES, Robot, load_robot
 
 DURATION = 1.8  # s

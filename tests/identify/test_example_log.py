@@ -12,13 +12,13 @@ from pathlib import Path
 from command import Call
 
 EXAMPLE = Path(__file__).resolve().parents[2] / "examples" / "05_robot_log.py"
+WIDE = 3.0 / 1.96  # three deviations over those of an interval of 95 %
 SECRET = {
     "servo.kp": 34.0,
     "servo.coulomb_friction": 0.08,
     "friction.mu": 0.55,
     "torso.mass": 2.9,
     "contact.stiffness": 1.074e6,  # as in the robot file
-    "links.femur.mass": 0.2,
 }
 
 
@@ -36,8 +36,13 @@ def test_the_robot_of_the_example_is_identified(
     for key, value in SECRET.items():
         assert own[key]["told"], key
         assert own[key]["low"] <= value <= own[key]["high"], key
+    # of the legs' masses a walk of this length tells combinations alone
+    legs = [own[f"links.{joint}.mass"] for joint in ("coxa", "femur", "tibia")]
+    assert [one["told"] for one in legs] == [False, False, False]
     off = [one for one in own.values() if one["key"].startswith("delay.")]
-    assert [one["key"] for one in off if one["low"] > 0.0] == []  # the example's sensors have none
+    # the example's sensors have none; of five intervals of 95 % one misses in a quarter of logs
+    far = [one for one in off if one["value"] > WIDE * (one["value"] - one["low"])]
+    assert [one["key"] for one in far] == []
     before, after = (
         {one["channel"]: one[side] for one in result["held_out"]} for side in ("before", "after")
     )

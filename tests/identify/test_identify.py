@@ -418,6 +418,13 @@ def test_misuse_is_refused_and_leaves_nothing(call: Call, tmp_path: Path) -> Non
         call("identify", "x.csv", "-o", place, "--find", "servos"), "servos", "servo", "--find"
     )
     assert_refused(call("identify", "x.csv", "-o", place), "no recording", "x.csv")
+    assert_refused(
+        call("identify", "examples/log.mcap", "-o", place),
+        "does not exist", "python examples/05_robot_log.py examples/log.mcap",
+    )  # fmt: skip
+    assert_refused(
+        call("identify", "x.csv", "-o", place, "--friction", "m7"), "m7", "m6", "--friction"
+    )
     assert_refused(call("identify", "x.bag", "-o", place), "not a log", ".mcap")
     assert_refused(
         call("identify", "x.csv", "-o", place, "--held-out", "2"), "not a share", "--held-out"

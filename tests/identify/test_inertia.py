@@ -5,7 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from hexapod_cosim.cosim.identify.inertia import BodyInertia, body_inertia
+from hexapod_cosim.cosim.identify.numbers.inertia import BodyInertia, body_inertia
+from hexapod_cosim.cosim.identify.unknowns import chosen_unknowns
+from hexapod_cosim.models import load_robot
 
 
 def tensor(inertia: tuple[float, ...]) -> np.ndarray:
@@ -46,3 +48,13 @@ def test_the_mass_scales_the_inertia_and_the_size_its_square() -> None:
 def test_an_impossible_inertia_is_refused() -> None:
     with pytest.raises(ValueError, match="no body has the inertia"):
         body_inertia(1.0, (0.0, 0.0, 0.0), (1.0, 1.0, 3.0, 0.0, 0.0, 0.0))
+
+
+def test_the_centre_of_mass_of_a_link_stays_along_it() -> None:
+    """From a quarter of the length before its joint to a quarter beyond the next: 0.10 m long."""
+    robot = load_robot("athena")
+    rows = {row.key: row for row in chosen_unknowns(robot, [], ("mass",))}
+    row = rows["links.femur.com[1]"]
+    assert row.value(-100.0, 0.065) == pytest.approx(-0.025, abs=1e-15)
+    assert row.value(100.0, 0.065) == pytest.approx(0.125, abs=1e-15)
+    assert row.bounds(0.065) == pytest.approx((-8.0, 6.0), abs=1e-12)

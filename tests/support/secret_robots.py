@@ -17,10 +17,10 @@ from hexapod_cosim.cosim.export.export import export_fmu
 from hexapod_cosim.cosim.identify.experiment import JOINTS, Experiment, of_point, readings
 from hexapod_cosim.cosim.identify.log import ATTITUDE, CHANNELS, Log, log_of
 from hexapod_cosim.cosim.identify.log_plant import LogPlant
+from hexapod_cosim.cosim.identify.numbers.unknown import Unknown
 from hexapod_cosim.cosim.identify.unknowns import (
     DELAYS,
     START,
-    Unknown,
     changed_robot,
     chosen_unknowns,
     is_delay,

@@ -28,13 +28,18 @@ from hexapod_cosim.cosim.identify.fitting.rank import (
     Combination,
     combinations,
     measured_information,
+    sharpened,
     told,
     untold,
 )
-from hexapod_cosim.cosim.identify.unknowns import OF_FILE, Unknown
+from hexapod_cosim.cosim.identify.numbers.unknown import Unknown
+from hexapod_cosim.cosim.identify.unknowns import OF_FILE
 
 Array = NDArray[np.float64]
 Progress = Callable[[str], None]
+# Combinations with less information [1/prior^2] are simulated as a whole; where the first errors of
+# derivatives hide the weakest ones in others, the second time shows them.
+WEAK = (100.0, 10.0)
 ROUNDS = 3  # of keeping numbers at the file's values, at most
 
 
@@ -96,12 +101,7 @@ class _Told:
     series: Sequence[Series]
     misfit: Mapping[str, Misfit]
     information: Array  # (rows, rows)  [1/prior^2]
-
-    @property
-    def covariance(self) -> Array:
-        """The covariance of the numbers with what was known before (rows, rows)."""
-        own = np.linalg.inv(self.information + np.eye(len(self.information)))
-        return np.asarray(own, dtype=np.float64)
+    covariance: Array  # (rows, rows)  with what was known before
 
 
 def judged(
@@ -127,7 +127,7 @@ def judged(
         stay, z = more, np.where(more, 0.0, z)
         if float(np.max(np.abs(z - best))) > FINE.near:
             fitted.hold(stay)
-            z = finished(fitted, z, report)
+            z = finished(fitted, z, lambda _text: None)  # a part of this step
             fitted.hold(None)
         own = _told(fitted, z, least)
     fitted.hold(stay)
@@ -159,10 +159,25 @@ def _told(fitted: Problem, z: Array, least: Mapping[str, float]) -> _Told:
     fitted.set_noise(fitted.errors(z))
     fitted.leave_out_bent(z)
     jacobian, residuals = fitted.jacobian(z, FINE), fitted.residuals(z)
-    series = fitted.series(jacobian, np.clip(residuals, -BOUND, BOUND))
+    bounded = np.clip(residuals, -BOUND, BOUND)
     misfit = fitted.misfit(z, least, "fitted")
     # errors of the model count as noise; at most the whole prior is unknown
     worst = max(1.0, *(one.value for one in misfit.values()))
+    series = fitted.series(jacobian, bounded)
     information = coloured_information(series) / worst
-    information = measured_information(fitted, z, jacobian, information)
-    return _Told(jacobian, residuals, series, misfit, information)
+    first = _covariance(measured_information(fitted, z, jacobian, information))
+    for most in WEAK:
+        jacobian = sharpened(fitted, z, jacobian, information, most)
+        series = fitted.series(jacobian, bounded)
+        information = coloured_information(series) / worst
+    # both are estimates, and intervals that are too narrow are worse than wide ones
+    second = _covariance(information)
+    wider = np.sqrt(np.maximum(np.diag(second) / np.diag(first), 1.0))
+    covariance = first * np.outer(wider, wider)
+    return _Told(jacobian, residuals, series, misfit, information, covariance)
+
+
+def _covariance(information: Array) -> Array:
+    """Returns the covariance of numbers with what was known before (rows, rows)."""
+    own = np.linalg.inv(information + np.eye(len(information)))
+    return np.asarray(own, dtype=np.float64)

@@ -24,7 +24,8 @@ from hexapod_cosim.cosim.identify.fitting.judging import Fit, judged
 from hexapod_cosim.cosim.identify.fitting.last_search import BOUND, finished, huber
 from hexapod_cosim.cosim.identify.fitting.problem import ALL, FLOOR, Problem, read_noise
 from hexapod_cosim.cosim.identify.log import LogError
-from hexapod_cosim.cosim.identify.unknowns import DELAYS, GEAR
+from hexapod_cosim.cosim.identify.numbers.servo import GEAR
+from hexapod_cosim.cosim.identify.unknowns import DELAYS
 from hexapod_cosim.models import FmuError
 
 Array = NDArray[np.float64]
@@ -87,12 +88,7 @@ def fit(problem: Problem, *, start: Array | None = None, progress: Progress | No
     """
     report: Progress = progress or (lambda _text: None)
     short = problem.shortened(SHORT, parameters=COARSE, most=SEARCHED)
-    z = better_start(short, start)
-    for number, stage in enumerate(SEARCH):
-        report(f"search on the first seconds, part {number + 1} of {len(SEARCH)}")
-        z = _optimised(short, z, stage, read_noise(short))
-        if number == 0:
-            z = _with_delays(short, z, ("currents", "forces"), lambda _own: DELAYS_TRIED)
+    z = searched(short, start, report)
     report("other starts of the contacts")
     z = _best_of_starts(short, z)
     report("all rows")
@@ -105,6 +101,26 @@ def fit(problem: Problem, *, start: Array | None = None, progress: Progress | No
     fitted.count_all()
     z = finished(fitted, z, report)
     return judged(problem, fitted, z, least, report)
+
+
+def searched(short: Problem, start: Array | None, report: Progress) -> Array:
+    """Returns numbers from the first seconds of logs, without those of contacts tried one by one.
+
+    short: the problem of these rows. start, report: as of `fit`.
+    """
+    z = better_start(short, start)
+    for number, stage in enumerate(SEARCH):
+        report(f"search on the first seconds, part {number + 1} of {len(SEARCH)}")
+        z = _optimised(short, z, stage, read_noise(short))
+        if number == 0:
+            z = _with_delays(short, z, ("currents", "forces"), lambda _own: DELAYS_TRIED)
+    return z
+
+
+def misfit_cost(problem: Problem, z: Array) -> float:
+    """Returns the sum of squares of all rows over the readings' own noise, by Huber's loss."""
+    problem.set_noise([np.zeros_like(one) for one in problem.errors(z)], least=read_noise(problem))
+    return 2.0 * _cost(problem, z)
 
 
 def _optimised(

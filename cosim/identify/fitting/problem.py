@@ -32,7 +32,8 @@ from hexapod_cosim.cosim.identify.fitting.differences import (
 from hexapod_cosim.cosim.identify.fitting.workers import Workers
 from hexapod_cosim.cosim.identify.log import CHANNELS, LogError
 from hexapod_cosim.cosim.identify.log_plant import LogPlant
-from hexapod_cosim.cosim.identify.unknowns import Unknown, is_delay, value_before
+from hexapod_cosim.cosim.identify.numbers.unknown import Unknown
+from hexapod_cosim.cosim.identify.unknowns import is_delay, value_before
 from hexapod_cosim.models import FmuError, Robot
 
 Array = NDArray[np.float64]

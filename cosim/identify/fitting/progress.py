@@ -9,6 +9,7 @@ from hexapod_cosim.cosim.identify.fitting.last_search import FINISHING
 from hexapod_cosim.cosim.identify.fitting.output_error import SEARCH
 
 COLUMNS, LINEAR = "the columns of the log", "linear least squares"
+MODELS = "friction models M1 to M6"  # a step before all others
 AGAIN = "again, without columns that do not fit"
 BEFORE_FIT = 2  # steps
 # of a fit: searches, other starts, all rows, the last search, what the log tells

@@ -5,7 +5,7 @@ eigenvectors are combinations of numbers. A derivative by differences of simulat
 the integrator, which look like information where there is none: of the currents' constant k_t and
 the resistance R a log without currents tells k_t^2/R alone, and errors of 0.001 deviations in each
 of 10,000 readings told both within a tenth. So each combination of which readings seem to tell
-little is moved as a whole over a long step, and counts what the readings change by.
+little is moved as a whole over a long step, whose derivatives have smaller errors.
 
 A number with a large share in a combination of which the readings tell less than what was known
 before is not told, however small its deviation is: what was known of the others makes it so.
@@ -20,18 +20,18 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from hexapod_cosim.cosim.identify.fitting.differences import UNLIKE
 from hexapod_cosim.cosim.identify.fitting.problem import Problem
-from hexapod_cosim.cosim.identify.unknowns import Unknown
+from hexapod_cosim.cosim.identify.numbers.unknown import Unknown
 
 Array = NDArray[np.float64]
 QUANTILE = 1.959963985  # of a normal distribution, for 95 %
 TOLD = 0.5  # of the prior deviation: a number with less is told by the logs
 NEARLY_NULL = 1.0  # information [1/prior^2] of a combination: less than what was known before
 # deviation of a number by nearly null combinations alone, from which on it is not told
-BY_NULL = 0.15  # priors
-# information [1/prior^2] of combinations that are moved as a whole; others are told or not told
-# whatever the errors of derivatives are
-LEAST, MOST = 0.05, 100.0
+BY_NULL = 1.0 / 3.0  # priors
+MOST = 100.0  # information [1/prior^2] of a combination that is moved as a whole
+LEAST = 0.05  # information [1/prior^2] of a combination that is not told whatever its errors are
 LONGEST = 0.5  # priors    of such a move
 PART = 0.05  # slope of a number by another one, from which on it takes part in a combination
 SIMPLE = 4  # exponents in names are fractions with numerators and denominators up to this
@@ -46,6 +46,42 @@ class Combination:
     others: tuple[str, ...]
     slopes: tuple[float, ...]  # of z of `key` by z of the others along what readings do not tell
     deviation: float  # of z of `key` while the others stay
+
+
+def sharpened(
+    problem: Problem, z: Array, jacobian: Array, information: Array, most: float
+) -> Array:
+    """Returns the derivatives with those by weak combinations from simulations over long steps.
+
+    Over a long step readings may jump: where both derivatives differ, the smaller one counts.
+
+    Args:
+        problem: its readings that count.
+        z: the numbers (rows,).
+        jacobian: derivatives of the residuals, with the priors behind them.
+        information: what these derivatives tell (rows, rows).
+        most: information of a weak combination, at most [1/prior^2].
+    """
+    found = jacobian.copy()
+    count = len(jacobian) - len(z)
+    low, high = problem.bounds()
+    values, vectors = np.linalg.eigh(information)
+    for value, vector in zip(values.tolist(), vectors.T, strict=True):
+        if not LEAST < value < most:
+            continue
+        step = min(LONGEST, value**-0.5) * vector
+        forth, back = (np.clip(z + sign * step, low, high) for sign in (1.0, -1.0))
+        way = float((forth - back) @ vector)
+        change = (problem.residuals(forth) - problem.residuals(back))[:count]
+        if way <= 0.0 or not np.isfinite(change).all():
+            continue
+        linear = jacobian[:count] @ (forth - back)
+        smaller = np.where(np.abs(change) < np.abs(linear), change, linear)
+        differ = np.abs(change - linear) > UNLIKE * np.abs(smaller)
+        shown = np.where(differ, smaller, change)
+        if shown @ shown < linear @ linear:  # more is what bends or jumps over the long step
+            found[:count] += np.outer((shown - linear) / way, vector)
+    return found
 
 
 def measured_information(problem: Problem, z: Array, jacobian: Array, information: Array) -> Array:

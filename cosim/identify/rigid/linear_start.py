@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from hexapod_cosim.cosim.identify.experiment import Experiment
 from hexapod_cosim.cosim.identify.log import Log
+from hexapod_cosim.cosim.identify.numbers.unknown import Unknown
 from hexapod_cosim.cosim.identify.rigid.base_parameters import (
     BaseEstimate,
     base_of,
@@ -35,7 +36,7 @@ from hexapod_cosim.cosim.identify.rigid.regressor import (
     regressor,
 )
 from hexapod_cosim.cosim.identify.rigid.samples import Samples, lacking, samples_of
-from hexapod_cosim.cosim.identify.unknowns import CURRENT, DELAYS, Unknown, value_before
+from hexapod_cosim.cosim.identify.unknowns import CURRENT, DELAYS, value_before
 from hexapod_cosim.models import Robot
 from hexapod_cosim.models.servos.motor import (
     back_emf_damping,
