@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from difflib import get_close_matches
+from difflib import SequenceMatcher, get_close_matches
 from os import PathLike, fspath
 from typing import Any
 
@@ -98,14 +98,17 @@ class FmuError(HexapodError):
     """An FMU is missing, invalid or damaged, or a call of it failed."""
 
 
-# of difflib, in [0, 1]: below it names share some letters by chance, such as "foo" and "robot"
-LEAST_SIMILARITY = 0.52
+LEAST_SIMILARITY = 0.5  # of difflib, in [0, 1]
+# up to this similarity, names with different first letters share letters by chance: "foo", "robot"
+CHANCE = 0.52
 
 
 def nearest_name(name: str, valid: Iterable[str]) -> str | None:
     """Returns the valid name most similar to `name`, or None when none is similar."""
-    match = get_close_matches(name, list(valid), n=1, cutoff=LEAST_SIMILARITY)
-    return match[0] if match else None
+    for match in get_close_matches(name, list(valid), cutoff=LEAST_SIMILARITY):
+        if match[:1] == name[:1] or SequenceMatcher(None, match, name).ratio() > CHANCE:
+            return match
+    return None
 
 
 def unknown_name(

@@ -8,6 +8,7 @@ from typing import Annotated
 
 import typer
 
+from hexapod_cosim.controller import Gait
 from hexapod_cosim.cosim.cli import completion
 from hexapod_cosim.cosim.cli.running import GainsFile, given_gains
 from hexapod_cosim.cosim.cli.terminal import (
@@ -34,9 +35,10 @@ from hexapod_cosim.cosim.export.robot_package import (
     read_values,
 )
 from hexapod_cosim.cosim.interface.controller_interface import ControllerSetup
+from hexapod_cosim.cosim.run.chosen_walk import chosen_walk
 from hexapod_cosim.cosim.run.controller_setup import make_setup
 from hexapod_cosim.cosim.scenario.records import CONTROLS
-from hexapod_cosim.models import HexapodError, Robot, load_robot
+from hexapod_cosim.models import HexapodError, Robot, load_robot, unknown_name
 from hexapod_cosim.models.ground.surface import Surface
 
 RobotName = Annotated[
@@ -124,16 +126,34 @@ GaitName = Annotated[
         autocompletion=completion.gait,
     ),
 ]
+StanceName = Annotated[
+    str,
+    typer.Option(
+        "--stance",
+        metavar="own|chosen",
+        help="own: stance and gait of the robot file. chosen: those in which compliant control "
+        "walks; export plant and controller in the same.",
+    ),
+]
 Period = Annotated[float, typer.Option("--period", help="Of the controller [s].")]
 
 DEFAULT_PERIOD = 0.005  # s, the default macro-step
 DEFAULT_CONTROL = "compliant"  # of a package
 CONTROLLER_OPTIONS = ("gait", "gains", "period")
+OWN_STANCE, CHOSEN_STANCE = "own", "chosen"
 DESCRIPTION, PLANT_FMU = "a robot's description", "the plant's FMU"
 CONTROLLER_FMU, PACKAGE = "a controller's FMU", "a package"
 # options without effect, by what is written
 UNUSED_OPTIONS = {
-    DESCRIPTION: ("fmi", "platforms", "integers", "terrain", "controller", *CONTROLLER_OPTIONS),
+    DESCRIPTION: (
+        "fmi",
+        "platforms",
+        "integers",
+        "terrain",
+        "stance",
+        "controller",
+        *CONTROLLER_OPTIONS,
+    ),
     PLANT_FMU: CONTROLLER_OPTIONS,
     CONTROLLER_FMU: ("terrain",),
     PACKAGE: ("terrain", "integers"),
@@ -145,7 +165,7 @@ class ControllerOptions:
     """The options of a controller, as given on the command line."""
 
     control: str
-    gait: str | None
+    gait: str | Gait | None
     gains: Path | None
     period: float  # s
 
@@ -164,6 +184,7 @@ def export(
     terrain: Terrains = None,
     controller: ControllerName = None,
     gait: GaitName = None,
+    stance: StanceName = OWN_STANCE,
     gains: GainsFile = None,
     period: Period = DEFAULT_PERIOD,
     json: Json = False,
@@ -175,6 +196,7 @@ def export(
     package = chosen_package(output, wanted=ssp, described=form is not None, values=values)
     control = DEFAULT_CONTROL if package and controller is None else controller
     chosen = None if platforms is None else [name.strip() for name in platforms.split(",")]
+    loaded, walked = _in_stance(loaded, stance)
     if form is not None:
         _refuse_unused_options(context, DESCRIPTION)
         path = _export_description(loaded, output, form)
@@ -190,7 +212,9 @@ def export(
         )
     else:
         _refuse_unused_options(context, PACKAGE if package else CONTROLLER_FMU)
-        options = ControllerOptions(control=control, gait=gait, gains=gains, period=period)
+        options = ControllerOptions(
+            control=control, gait=gait or walked, gains=gains, period=period
+        )
         if package:
             path = _export_package(
                 loaded, output, options, fmi=fmi, values=values or [], platforms=chosen
@@ -201,6 +225,20 @@ def export(
             )
     kind = form.name if form is not None else "ssp" if package else "fmu"
     _show_written(path, loaded, kind, json=json)
+
+
+def _in_stance(robot: Robot, stance: str) -> tuple[Robot, Gait | None]:
+    """Returns the robot in a stance, and the gait that belongs to it; None: the robot file's.
+
+    Raises HexapodError for an unknown stance.
+    """
+    if stance not in (OWN_STANCE, CHOSEN_STANCE):
+        raise unknown_name("stance", stance, (OWN_STANCE, CHOSEN_STANCE))
+    if stance == OWN_STANCE:
+        return robot, None
+    with waiting("choosing the stance"):
+        walk = chosen_walk(robot)
+    return walk.robot, walk.gait
 
 
 def _export_description(robot: Robot, output: Path | None, form: Format) -> Path:

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 WALKING = "walking"  # key of run.json: gait and stance
+OF_FMU = "controller FMU"  # a stance that is read from such an FMU
 LEAST_LENGTH = 5e-4  # m    a smaller change of the stance is not told
 
 
@@ -24,7 +25,9 @@ def walking_text(facts: Mapping[str, Any], *, brief: bool = False) -> str:
 
 
 def _stance(walking: Mapping[str, Any]) -> str:
-    """Returns the stance against the robot file's."""
+    """Returns the stance against the robot file's, or that it is a controller FMU's."""
+    if walking.get("stance") == OF_FMU:
+        return f"the stance of the {OF_FMU}"
     parts = [
         f"{1e3 * abs(walking[key]):.0f} mm {more if walking[key] > 0.0 else less}"
         for key, more, less in (

@@ -2,8 +2,9 @@
 
 A scenario that names a gait (`gait.name`, `gait.period`, `gait.duty`) or a stance (`walk.stance`)
 has chosen the walk of every control; what it leaves out is the robot's own. Otherwise kinematic and
-paper control and all controls of the user walk as the robot file says. Compliant control walks an
-amble at the height of the stance of least heat, with its feet a part of the way from the robot's
+paper control and all controls of the user walk as the robot file says, but the plant stands in the
+stance of a controller FMU that has one (parameters `{leg}.{joint}.stance`). Compliant control walks
+an amble at the height of the stance of least heat, with its feet a part of the way from the robot's
 own stance to that one: the whole way would give up too much footing on uneven ground. The feet step
 to the stance of least heat when the robot is heavier than its model (C53). Where the legs do not
 reach the commands or the step height in this walk, or the joints are not fast enough, it keeps the
@@ -17,7 +18,10 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any
 
+import numpy as np
+
 from hexapod_cosim.controller import BodyCommand, Gains, GainsError, Gait, make_gait
+from hexapod_cosim.cosim.control.fmu_stance import stance_of_fmu
 from hexapod_cosim.cosim.design.stance import (
     SPEED_SHARE,
     Motion,
@@ -25,17 +29,19 @@ from hexapod_cosim.cosim.design.stance import (
     settled_motion,
     with_stance,
 )
+from hexapod_cosim.cosim.results.walking import OF_FMU
 from hexapod_cosim.cosim.run.kept_stance import Stance, kept_stance
-from hexapod_cosim.cosim.scenario.controls import control_of
+from hexapod_cosim.cosim.scenario.controls import FMU, control_of
 from hexapod_cosim.cosim.scenario.reach import reaches
 from hexapod_cosim.cosim.scenario.records import DESIGNED, OWN, Command, Scenario
 from hexapod_cosim.cosim.scenario.scenario import scenario_robot
 from hexapod_cosim.models import ReachError, Robot, ScenarioError, Servo, load_robot
-from hexapod_cosim.models.records import Vector3
+from hexapod_cosim.models.records import Array, Vector3
 
 CHOSEN_GAIT = "amble"  # of compliant control
 FOOTING = 0.4  # 1    of the way to the stance of least heat by which feet move to the hips
 GIVEN, CHOSEN = "given", "chosen"  # stances besides those that a scenario names
+EXPORT_SPEED = 0.08  # m/s  for which the walk of exported FMUs is chosen, as packages walk
 BY_SCENARIO, BY_CONTROL, BY_ROBOT = "scenario", "control", "robot file"
 
 
@@ -45,8 +51,9 @@ class ChosenWalk:
 
     robot: Robot  # as the controller knows it, in the stance
     gait: Gait
-    stance: str  # OWN, DESIGNED, GIVEN as two lengths, or CHOSEN by the control
-    outward: float = 0.0  # m    by which the feet stand further out from the hips than the robot's
+    stance: str  # OWN, DESIGNED, GIVEN as two lengths, CHOSEN by the control, or OF_FMU
+    # m  by which the feet stand further out from the hips than the robot's; 0 for OF_FMU
+    outward: float = 0.0
     deeper: float = 0.0  # m    and deeper below them
     chosen_by: str = BY_SCENARIO
 
@@ -91,12 +98,35 @@ def choose_walk(
     if scenario.names_walk:
         return _named(scenario, plain, bare)
     control = control_of(scenario.control)
+    if control.kind == FMU and control.path is not None:
+        return _of_fmu(plain, stance_of_fmu(control.path))
     if not control.is_builtin or control.name != "compliant":
         return replace(plain, chosen_by=BY_ROBOT)
-    chosen = _chosen(scenario, replace(plain, chosen_by=BY_CONTROL), bare, settings)
-    if _designed_for(gains, plain.robot, chosen.robot):
-        return replace(plain, chosen_by=BY_CONTROL)
-    return chosen
+    plain = replace(plain, chosen_by=BY_CONTROL)
+    chosen = _chosen(scenario.commands, plain, bare, settings)
+    return plain if _designed_for(gains, plain.robot, chosen.robot) else chosen
+
+
+def chosen_walk(robot: Robot) -> ChosenWalk:
+    """Returns the walk that compliant control chooses for a robot at EXPORT_SPEED straight ahead.
+
+    Exported FMUs can have it (`hexapod export --stance chosen`).
+    """
+    plain = ChosenWalk(robot=robot, gait=make_gait(robot), stance=OWN, chosen_by=BY_CONTROL)
+    return _chosen([Command(vx=EXPORT_SPEED)], plain, robot, {})
+
+
+def _of_fmu(plain: ChosenWalk, stance: Array | None) -> ChosenWalk:
+    """Returns the walk with the stance of a controller FMU, if it has one."""
+    own = replace(plain, chosen_by=BY_ROBOT)
+    if stance is None or np.array_equal(stance, plain.robot.stance):
+        return own
+    legs = tuple(
+        replace(leg, stance=tuple(angles))
+        for leg, angles in zip(plain.robot.legs, stance.tolist(), strict=True)
+    )
+    moved = replace(plain.robot, legs=legs)
+    return replace(own, robot=moved, stance=OF_FMU, chosen_by=BY_CONTROL)
 
 
 def _named(scenario: Scenario, plain: ChosenWalk, bare: Robot) -> ChosenWalk:
@@ -128,7 +158,7 @@ def _moved(walk: ChosenWalk, name: str, outward: float, deeper: float) -> Chosen
 
 
 def _chosen(
-    scenario: Scenario, plain: ChosenWalk, bare: Robot, settings: Mapping[str, Any]
+    commands: Sequence[Command], plain: ChosenWalk, bare: Robot, settings: Mapping[str, Any]
 ) -> ChosenWalk:
     """Returns the first walk of compliant control that the robot can follow.
 
@@ -141,8 +171,8 @@ def _chosen(
             walk = _moved(begin, CHOSEN, FOOTING * design.outward, design.deeper)
         except (GainsError, ReachError):
             continue
-        if _follows(walk, plain, scenario.commands):
-            return _narrowing(walk, begin, design, plain, scenario.commands)
+        if _follows(walk, plain, commands):
+            return _narrowing(walk, begin, design, plain, commands)
     return plain
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from hexapod_cosim.controller import Gains, GainsError, make_gait
+from hexapod_cosim.controller import Gains, GainsError, Gait, make_gait
 from hexapod_cosim.cosim.interface.controller_interface import ControllerSetup
 from hexapod_cosim.cosim.run.preparation import designed_gains
 from hexapod_cosim.cosim.scenario.records import CONTROLS
@@ -16,7 +16,7 @@ def make_setup(
     *,
     control: str,
     period: float,
-    gait: str | None = None,
+    gait: str | Gait | None = None,
     gains: Gains | None = None,
 ) -> ControllerSetup:
     """Returns the controller's set-up as `simulate` would make it.
@@ -24,7 +24,7 @@ def make_setup(
     Args:
         control: "kinematic", "paper" or "compliant".
         period: controller period [s].
-        gait: name of a gait; by default the gait of the robot file.
+        gait: a gait or its name; by default the gait of the robot file.
         gains: gains of paper or compliant control; by default they are designed for the robot.
 
     Raises:
@@ -33,7 +33,8 @@ def make_setup(
     """
     if control not in CONTROLS:
         raise unknown_name("control", control, CONTROLS)
-    setup = ControllerSetup(robot=robot, gait=make_gait(robot, gait), period=period)
+    walked = gait if isinstance(gait, Gait) else make_gait(robot, gait)
+    setup = ControllerSetup(robot=robot, gait=walked, period=period)
     setup.build()  # refuses an impossible set-up before gains are designed
     if control == "kinematic":
         if gains is not None:

@@ -19,6 +19,7 @@ LAYERS = (
     ("step", "exchange", "state"),
     ("call", "arrays"),
     ("fmi2", "fmi3", "work"),
+    ("fmi3_values", "fmi3_simulation"),
 )
 LAYER_OF = {name: index for index, layer in enumerate(LAYERS) for name in layer}
 DEFINITION = re.compile(r"^(?!static|extern)[\w *]*\b(hx_\w+)\([^;{]*\) \{", re.MULTILINE)
