@@ -3,7 +3,8 @@
  *
  * The files of fmi/ in layers; each calls the layers below it only:
  *
- *   fmi2.c  fmi3*.c  work.c      the functions of the standard; an extension
+ *   fmi3_values.c  fmi3_simulation.c   most functions of FMI 3.0
+ *   fmi2.c  fmi3.c  work.c       the functions of FMI 2.0; the others of FMI 3.0; an extension
  *   call.c  arrays.c             legal order and calls of both versions; FMI 3's arrays
  *   step.c  exchange.c  state.c  co-simulation, model exchange, saved states
  *   instance.c                   opening, values, initialization, reset

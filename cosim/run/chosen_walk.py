@@ -3,12 +3,13 @@
 A scenario that names a gait (`gait.name`, `gait.period`, `gait.duty`) or a stance (`walk.stance`)
 has chosen the walk of every control; what it leaves out is the robot's own. Otherwise kinematic and
 paper control and all controls of the user walk as the robot file says, but the plant stands in the
-stance of a controller FMU that has one (parameters `{leg}.{joint}.stance`). Compliant control walks
-an amble at the height of the stance of least heat, with its feet a part of the way from the robot's
-own stance to that one: the whole way would give up too much footing on uneven ground. The feet step
-to the stance of least heat when the robot is heavier than its model (C53). Where the legs do not
-reach the commands or the step height in this walk, or the joints are not fast enough, it keeps the
-robot's own gait, and then its own stance as well.
+stance of a controller FMU that has one (parameters `{leg}.{joint}.stance`), and its gait is that of
+the FMU's parameters. Compliant control walks an amble at the height of the stance of least heat,
+with its feet a part of the way from the robot's own stance to that one: the whole way would give up
+too much footing on uneven ground. The feet step to the stance of least heat when the robot is
+heavier than its model (C53). Where the legs do not reach the commands or the step height in this
+walk, or the joints are not fast enough, it keeps the robot's own gait, and then its own stance as
+well.
 """
 
 from __future__ import annotations
@@ -16,12 +17,13 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from hexapod_cosim.controller import BodyCommand, Gains, GainsError, Gait, make_gait
-from hexapod_cosim.cosim.control.fmu_stance import stance_of_fmu
+from hexapod_cosim.cosim.control.fmu_walk import walk_of_fmu
 from hexapod_cosim.cosim.design.stance import (
     SPEED_SHARE,
     Motion,
@@ -36,7 +38,7 @@ from hexapod_cosim.cosim.scenario.reach import reaches
 from hexapod_cosim.cosim.scenario.records import DESIGNED, OWN, Command, Scenario
 from hexapod_cosim.cosim.scenario.scenario import scenario_robot
 from hexapod_cosim.models import ReachError, Robot, ScenarioError, Servo, load_robot
-from hexapod_cosim.models.records import Array, Vector3
+from hexapod_cosim.models.records import Vector3
 
 CHOSEN_GAIT = "amble"  # of compliant control
 FOOTING = 0.4  # 1    of the way to the stance of least heat by which feet move to the hips
@@ -99,7 +101,7 @@ def choose_walk(
         return _named(scenario, plain, bare)
     control = control_of(scenario.control)
     if control.kind == FMU and control.path is not None:
-        return _of_fmu(plain, stance_of_fmu(control.path))
+        return _of_fmu(plain, control.path)
     if not control.is_builtin or control.name != "compliant":
         return replace(plain, chosen_by=BY_ROBOT)
     plain = replace(plain, chosen_by=BY_CONTROL)
@@ -116,17 +118,18 @@ def chosen_walk(robot: Robot) -> ChosenWalk:
     return _chosen([Command(vx=EXPORT_SPEED)], plain, robot, {})
 
 
-def _of_fmu(plain: ChosenWalk, stance: Array | None) -> ChosenWalk:
-    """Returns the walk with the stance of a controller FMU, if it has one."""
-    own = replace(plain, chosen_by=BY_ROBOT)
-    if stance is None or np.array_equal(stance, plain.robot.stance):
+def _of_fmu(plain: ChosenWalk, path: Path) -> ChosenWalk:
+    """Returns the walk with stance and gait of a controller FMU, as far as it has them."""
+    found = walk_of_fmu(path)
+    gait = make_gait(plain.robot, **found.gait) if found.gait else plain.gait
+    own = replace(plain, gait=gait, chosen_by=BY_CONTROL if found.gait else BY_ROBOT)
+    if found.stance is None or np.array_equal(found.stance, plain.robot.stance):
         return own
     legs = tuple(
-        replace(leg, stance=tuple(angles))
-        for leg, angles in zip(plain.robot.legs, stance.tolist(), strict=True)
+        replace(leg, stance=angles)
+        for leg, angles in zip(plain.robot.legs, found.stance, strict=True)
     )
-    moved = replace(plain.robot, legs=legs)
-    return replace(own, robot=moved, stance=OF_FMU, chosen_by=BY_CONTROL)
+    return replace(own, robot=replace(plain.robot, legs=legs), stance=OF_FMU, chosen_by=BY_CONTROL)
 
 
 def _named(scenario: Scenario, plain: ChosenWalk, bare: Robot) -> ChosenWalk:
