@@ -41,8 +41,8 @@ def test_an_exported_controller_walks_as_the_built_in_one(
     walking = by_fmu.facts["walking"]
     assert (walking["gait"], walking["stance"]) == ("amble", "controller FMU")
     assert walking["period"] == pytest.approx(1.5)
-    paths = [run.outcome.recording.columns(TORSO) for run in (built_in, by_fmu)]
-    np.testing.assert_allclose(*paths, rtol=0.0, atol=1e-9)
+    expected, found = (run.outcome.recording.columns(TORSO) for run in (built_in, by_fmu))
+    np.testing.assert_allclose(found, expected, rtol=0.0, atol=1e-9)
 
 
 def test_the_plant_is_exported_in_the_same_stance(
@@ -51,9 +51,9 @@ def test_the_plant_is_exported_in_the_same_stance(
     controller = exported(
         call, tmp_path / "c.fmu", "--controller", "compliant", "--stance", "chosen"
     )
-    stance = walk_of_fmu(controller).stance
+    stance = np.array(walk_of_fmu(controller).stance)
     own = np.array(load_robot("athena").stance)
-    assert np.abs(np.array(stance) - own).max() > 0.05  # rad
+    assert np.abs(stance - own).max() > 0.05  # rad
     with Fmu(exported(call, tmp_path / "p.fmu", "--stance", "chosen")) as plant:
         plant.initialise(0.0, 1.0)
         angles = plant.block(joint_names("angle"))
