@@ -23,7 +23,8 @@ from hexapod_cosim.cosim.identify.fitting.covariance import (
 )
 from hexapod_cosim.cosim.identify.fitting.differences import FINE
 from hexapod_cosim.cosim.identify.fitting.last_search import BOUND, bounded_step, finished
-from hexapod_cosim.cosim.identify.fitting.problem import Misfit, Problem
+from hexapod_cosim.cosim.identify.fitting.misfit import Misfit
+from hexapod_cosim.cosim.identify.fitting.problem import Problem
 from hexapod_cosim.cosim.identify.fitting.rank import (
     Combination,
     combinations,
