@@ -169,9 +169,10 @@ def _told(fitted: Problem, z: Array, least: Mapping[str, float]) -> _Told:
     series = fitted.series(jacobian, bounded)
     information = coloured_information(series) / worst
     first = _covariance(measured_information(fitted, z, jacobian, information))
+    far = jacobian  # over deviations; the step that the search left is by its own derivatives
     for most in WEAK:
-        jacobian = sharpened(fitted, z, jacobian, information, most)
-        series = fitted.series(jacobian, bounded)
+        far = sharpened(fitted, z, far, information, most)
+        series = fitted.series(far, bounded)
         information = coloured_information(series) / worst
     # both are estimates, and intervals that are too narrow are worse than wide ones
     second = _covariance(information)
