@@ -13,7 +13,7 @@ from hexapod_cosim.cosim.common.files import RUN_FILE, write_json, write_text
 from hexapod_cosim.cosim.identify.comparison import Difference
 from hexapod_cosim.cosim.identify.excitation import Proposal, scenario_text
 from hexapod_cosim.cosim.identify.figures import channel_figures, embedded
-from hexapod_cosim.cosim.identify.fitting.problem import EXPLAINED
+from hexapod_cosim.cosim.identify.fitting.misfit import EXPLAINED
 from hexapod_cosim.cosim.identify.identified import NEAR, Identified
 from hexapod_cosim.cosim.identify.identify_tables import (
     BASE,

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from hexapod_cosim.cosim.identify.comparison import Difference
 from hexapod_cosim.cosim.identify.excitation import Proposal
 from hexapod_cosim.cosim.identify.fitting.friction_search import FrictionTrial
-from hexapod_cosim.cosim.identify.fitting.problem import REJECTED
+from hexapod_cosim.cosim.identify.fitting.misfit import REJECTED
 from hexapod_cosim.cosim.identify.identified import NEAR, Estimate, Identified
 from hexapod_cosim.cosim.identify.numbers.servo import GEAR
 from hexapod_cosim.cosim.identify.page import TITLES, number

@@ -4,10 +4,14 @@ right one is named, and a term that is 0 in the robot file moves.
 
 from __future__ import annotations
 
+import json
+import tomllib
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
+import tomlkit
+from command import Call
 from secret_robots import SEEN, Secret, secret_robot
 
 from hexapod_cosim.cosim.identify.fitting.friction_search import FrictionTrial, tried_models
@@ -16,7 +20,9 @@ from hexapod_cosim.cosim.identify.identify import identify, make_experiment
 from hexapod_cosim.cosim.identify.identify_tables import friction_text, untold_text, warnings
 from hexapod_cosim.cosim.identify.numbers.friction_models import with_friction_model
 from hexapod_cosim.cosim.identify.unknowns import chosen_unknowns
+from hexapod_cosim.cosim.logs.mcap_writer import write_mcap
 from hexapod_cosim.models import HexapodError, Robot, load_robot
+from hexapod_cosim.models.robot import robot_path
 from hexapod_cosim.models.servos.presets import measured_servo
 
 DURATION = 2.2  # s
@@ -71,6 +77,33 @@ def test_the_criterion_counts_numbers() -> None:
         "Of the friction models M1 to M6, M4 explains the logs best; the next one, M6, has a "
         "criterion larger by 15.0"
     )
+
+
+def test_the_command_writes_the_friction_model_that_it_tried(
+    call: Call, secret: Secret, tmp_path: Path
+) -> None:
+    """Of the log of an M6 servo, from a file with M1."""
+    log, file, place = tmp_path / "log.mcap", tmp_path / "m1.toml", tmp_path / "out"
+    write_mcap(secret.log.recording, log)
+    document = tomlkit.parse(robot_path("athena").read_text(encoding="utf-8"))
+    document["servo"] = {"model": "mx64_m1"}
+    file.write_text(tomlkit.dumps(document), encoding="utf-8")
+    code, out, err = call(
+        "identify", log, "--robot", file, "--find", "servo", "--friction", "best",
+        "--no-propose", "--workers", 1, "-o", place, "--json",
+    )  # fmt: skip
+    assert code == 0, err
+    assert "reject the model" not in err
+    trials = json.loads(out)["friction_models"]
+    assert trials[0]["model"] in ("m5", "m6")
+    servo = load_robot(place / "robot.toml").servo
+    # terms that the file's M1 does not have
+    assert servo.external_load_friction == pytest.approx(
+        secret.robot.servo.external_load_friction, rel=0.1
+    )
+    assert (servo.motor_load_friction, servo.stribeck_friction) != (0.0, 0.0)
+    written = tomllib.loads((place / "robot.toml").read_text(encoding="utf-8"))
+    assert "log.mcap" in written["source"]["servo.external_load_friction"]
 
 
 def test_a_term_near_0_moves() -> None:

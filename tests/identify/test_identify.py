@@ -27,8 +27,9 @@ from hexapod_cosim.cosim.identify.excitation import Proposal, propose, scenario_
 from hexapod_cosim.cosim.identify.experiment import Experiment, of_point
 from hexapod_cosim.cosim.identify.fitting.judging import Fit
 from hexapod_cosim.cosim.identify.fitting.last_search import remaining_step
+from hexapod_cosim.cosim.identify.fitting.misfit import read_noise
 from hexapod_cosim.cosim.identify.fitting.output_error import _tried
-from hexapod_cosim.cosim.identify.fitting.problem import Problem, read_noise
+from hexapod_cosim.cosim.identify.fitting.problem import Problem
 from hexapod_cosim.cosim.identify.fitting.workers import simulating_workers
 from hexapod_cosim.cosim.identify.identified import Identified
 from hexapod_cosim.cosim.identify.identify import identify, make_experiment
@@ -149,7 +150,7 @@ def test_a_channel_that_the_model_does_not_explain_is_named(
     robot, one = load_robot("athena"), found[0]
     with LogPlant(athena_fmu) as plant:
         problem = Problem(plant, robot, [make_experiment(log, 0, 0.25)], one.fit.rows)
-        noise = read_noise(problem)
+        noise = read_noise(problem.experiments)
         misfit = problem.misfit(one.fit.z, noise, "fitted")
     assert noise["torque"] == pytest.approx(NOISE["torque"], rel=0.1)
     assert misfit["torque"].value == pytest.approx(1.0 + 0.00125 / 0.0009, rel=0.2)

@@ -22,7 +22,8 @@ from numpy.typing import NDArray
 
 from hexapod_cosim.cosim.identify.fitting.judging import Fit, judged
 from hexapod_cosim.cosim.identify.fitting.last_search import BOUND, finished, huber
-from hexapod_cosim.cosim.identify.fitting.problem import ALL, FLOOR, Problem, read_noise
+from hexapod_cosim.cosim.identify.fitting.misfit import read_noise
+from hexapod_cosim.cosim.identify.fitting.problem import ALL, FLOOR, Problem
 from hexapod_cosim.cosim.identify.log import LogError
 from hexapod_cosim.cosim.identify.numbers.servo import GEAR
 from hexapod_cosim.cosim.identify.unknowns import DELAYS
@@ -93,7 +94,7 @@ def fit(problem: Problem, *, start: Array | None = None, progress: Progress | No
     z = _best_of_starts(short, z)
     report("all rows")
     fitted = problem.shortened(parameters=COARSE)
-    least = read_noise(fitted)
+    least = read_noise(fitted.experiments)
     z = _optimised(fitted, z, REFINE, least)
     fitted.use({})
     short.use({})
@@ -111,7 +112,7 @@ def searched(short: Problem, start: Array | None, report: Progress) -> Array:
     z = better_start(short, start)
     for number, stage in enumerate(SEARCH):
         report(f"search on the first seconds, part {number + 1} of {len(SEARCH)}")
-        z = _optimised(short, z, stage, read_noise(short))
+        z = _optimised(short, z, stage, read_noise(short.experiments))
         if number == 0:
             z = _with_delays(short, z, ("currents", "forces"), lambda _own: DELAYS_TRIED)
     return z
@@ -119,7 +120,9 @@ def searched(short: Problem, start: Array | None, report: Progress) -> Array:
 
 def misfit_cost(problem: Problem, z: Array) -> float:
     """Returns the sum of squares of all rows over the readings' own noise, by Huber's loss."""
-    problem.set_noise([np.zeros_like(one) for one in problem.errors(z)], least=read_noise(problem))
+    problem.set_noise(
+        [np.zeros_like(one) for one in problem.errors(z)], least=read_noise(problem.experiments)
+    )
     return 2.0 * _cost(problem, z)
 
 
@@ -154,7 +157,7 @@ def _optimised(
 
 def _best_of_starts(problem: Problem, z: Array) -> Array:
     """Returns the best numbers that the optimiser finds from other values of the contacts."""
-    least = read_noise(problem)
+    least = read_noise(problem.experiments)
     z = _optimised(problem, z, REFINE, least)
     best = _cost(problem, z)
     for _ in range(ROUNDS):
@@ -176,7 +179,7 @@ def _with_delays(
 
     values: to be tried instead of a delay [s].
     """
-    problem.set_noise(problem.errors(z), least=read_noise(problem))
+    problem.set_noise(problem.errors(z), least=read_noise(problem.experiments))
     keys = [DELAYS[name] for name in sensors]
     for k, row in enumerate(problem.rows):
         if row.key in keys:

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,6 +28,7 @@ from hexapod_cosim.cosim.identify.fitting.differences import (
     differences,
     size_of,
 )
+from hexapod_cosim.cosim.identify.fitting.misfit import CLIPPED, Misfit
 from hexapod_cosim.cosim.identify.fitting.workers import Workers
 from hexapod_cosim.cosim.identify.log import CHANNELS, LogError
 from hexapod_cosim.cosim.identify.log_plant import LogPlant
@@ -51,34 +51,6 @@ BENT = 0.05  # deviations
 # the sum of squares is curved, and a shorter step follows it.
 CURVED = 0.1
 FLOOR = 1e-9  # smallest noise, in the units of the channels
-CLIPPED = 5.0  # deviations    of a residual in the test whether the model explains the log
-# Largest mean square of residuals over that of the readings' noise, of many readings. That of the
-# noise has a relative deviation of about 3.8 over the root of their number.
-EXPLAINED = 1.1
-REJECTED = 2.0  # likewise: errors of the model are as large as the noise, and move all numbers
-UNCERTAIN, DEVIATIONS = 3.8, 3.0
-
-
-@dataclass(frozen=True)
-class Misfit:
-    """How large residuals of a channel are."""
-
-    value: float  # mean square of residuals over that of the noise
-    readings: int
-
-    @property
-    def explained(self) -> bool:
-        """Whether the noise of the readings may be all of it."""
-        return self.value <= EXPLAINED + self._uncertain
-
-    @property
-    def rejected(self) -> bool:
-        """Whether errors of the model are as large as the noise."""
-        return self.value > REJECTED + self._uncertain
-
-    @property
-    def _uncertain(self) -> float:
-        return DEVIATIONS * UNCERTAIN / float(np.sqrt(self.readings))
 
 
 class Problem:
@@ -402,18 +374,3 @@ class Problem:
                 share = float(np.mean(own[:, at]))
                 found.append(Series(key, error[:, at], slopes[:, at], share))
         return found
-
-
-def read_noise(problem: Problem) -> dict[str, float]:
-    """Returns the noise of each channel from the readings alone.
-
-    It is a robust estimate from second differences, in which slow motions cancel:
-    median |y[k-1] - 2 y[k] + y[k+1]| / (0.6745 sqrt 6).
-    """
-    found: dict[str, list[Array]] = {}
-    for one in problem.experiments:
-        second = np.abs(np.diff(one.measured[one.fitted], n=2, axis=0))
-        for key, column in zip(one.channels, second.T, strict=True):
-            found.setdefault(key, []).append(column)
-    scale = 0.6745 * np.sqrt(6.0)
-    return {key: float(np.nanmedian(np.concatenate(own))) / scale for key, own in found.items()}
