@@ -17,7 +17,7 @@ from warnings import warn
 
 from hexapod_cosim.controller import Gains, load_gains
 from hexapod_cosim.cosim.control.controllers import check_control
-from hexapod_cosim.cosim.master.loop import Progress
+from hexapod_cosim.cosim.master.loop import FAILED, Progress
 from hexapod_cosim.cosim.report.report import write_report
 from hexapod_cosim.cosim.results.comparison import SEEDS, write_seeds
 from hexapod_cosim.cosim.results.comparisons import compare_all, write_comparison
@@ -70,6 +70,9 @@ def simulate(
     Raises:
         HexapodError: the run cannot start. A run that has started always returns, and
             `Result.outcome` tells how it ended.
+
+    Warns:
+        RuntimeWarning: the run ended early, with the reason: its metrics are NaN.
     """
     text = controller if isinstance(controller, str) else None
     if isinstance(controller, Control):
@@ -81,7 +84,7 @@ def simulate(
         plan = replace(plan, control=parse_control(f"{label}={plain}", where="label").text)
     if law is None:
         check_control(plan, [control_of(plan.control)])
-    return run_scenario(
+    result = run_scenario(
         plan,
         fmu=None if fmu is None else Path(fmu),
         gains=load_gains(gains) if isinstance(gains, str | Path) else gains,
@@ -89,6 +92,10 @@ def simulate(
         law=law,
         label=label,
     )
+    if result.outcome.status == FAILED:
+        text = f"the run ended early, without metrics: {result.outcome.reason}"
+        warn(text, RuntimeWarning, stacklevel=2)
+    return result
 
 
 def _scenario(

@@ -19,6 +19,7 @@ from hexapod_cosim.cosim.cli.failures import (
     report_failure,
     usage_parts,
 )
+from hexapod_cosim.cosim.cli.json_output import json_alone
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -81,8 +82,9 @@ def _run(given: list[str]) -> int:
     from hexapod_cosim.models import HexapodError  # noqa: PLC0415
 
     usage_error: Any = typer.BadParameter.__mro__[1]  # typer does not export it
+    json = _wants_json(given) and "--help" not in given
     try:
-        with termination_as_interrupt():
+        with termination_as_interrupt(), json_alone(wanted=json):
             code = app(args=given, prog_name="hexapod", standalone_mode=False)
     except usage_error as error:
         return _usage(error, given)

@@ -308,11 +308,12 @@ def _controls(texts: Sequence[str], plan: Scenario) -> tuple[Control, ...]:
     """Returns the controls to compare. Raises HexapodError for fewer than two."""
     controls = chosen_controls(texts, plan)
     if len(controls) < 2:
+        other = next(name for name in COMPARED if name != controls[0].label)
         raise ScenarioError(
             "nothing to compare with",
             got=controls[0].label,
             expected="two or more controls, the reference first",
-            fix=f"write --control kinematic --control {controls[0].label}, or use simulate",
+            fix=f"write --control {other} --control {texts[0]}, or use simulate",
             where="--control",
         )
     return controls

@@ -16,6 +16,7 @@ from rich.progress import BarColumn, Progress, ProgressColumn, Task, TextColumn
 from rich.table import Column, Table
 from rich.text import Text
 
+from hexapod_cosim.cosim.cli.json_output import restore_output
 from hexapod_cosim.cosim.cli.width import columns_of, fitted
 from hexapod_cosim.cosim.common.files import to_json
 from hexapod_cosim.cosim.master import loop as master
@@ -53,7 +54,8 @@ def refuse_unused(
 
 
 def show_json(content: Mapping[str, Any] | Sequence[Any]) -> None:
-    """Prints JSON; NaN becomes null."""
+    """Prints JSON on standard output; NaN becomes null."""
+    restore_output()
     print(to_json(content), flush=True)
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Generator, Iterator, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass
@@ -10,6 +9,7 @@ from dataclasses import dataclass
 from hexapod_cosim.controller import Gains
 from hexapod_cosim.cosim.course.reading import run_scenario
 from hexapod_cosim.cosim.course.records import QUANTITIES, Case, Course, Entry
+from hexapod_cosim.cosim.results.arrival import missed_end
 from hexapod_cosim.cosim.results.balance import UNBALANCED
 from hexapod_cosim.cosim.results.summary import Summary
 from hexapod_cosim.cosim.run.batch import run_batch
@@ -79,17 +79,9 @@ def failure_of(summary: Summary, *, arrive: float) -> str:
     """Returns why a run is no success; "" for a success."""
     if not summary.walked:
         return summary.reason or "; ".join(summary.warnings[:1]) or "the robot fell"
-    metrics = summary.metrics
-    if metrics["energy_residual"] > UNBALANCED:
+    if summary.metrics["energy_residual"] > UNBALANCED:
         return f"not valid: the energy balance misses over {100.0 * UNBALANCED:g} % of the work"
-    missed, unit = metrics["path_error"], "m per metre walked"
-    if math.isnan(missed):
-        missed, unit = metrics["yaw_drift_per_radian"], "rad per radian turned"
-    if math.isnan(missed):
-        return "the robot did not get ahead"
-    if missed > arrive:
-        return f"the robot did not arrive: it missed the end by {missed:.2g} {unit}"
-    return ""
+    return missed_end(summary.metrics, arrive=arrive)
 
 
 def run_count(course: Course, entries: Sequence[Entry]) -> int:

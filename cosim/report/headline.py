@@ -78,7 +78,7 @@ def headline(comparison: Comparison) -> list[Part]:
     first, second = comparison.labels
     falls = _falls(comparison)
     pairs = zip(comparison.first, comparison.second, strict=True)
-    if falls and not any(a.walked and b.walked for a, b in pairs):
+    if falls and not any(a.success and b.success for a, b in pairs):
         return [*falls, Part(". No pair of walks can be compared.")]
     begin = f"Against {first} control, {second}"
     if falls:

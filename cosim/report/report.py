@@ -340,7 +340,7 @@ def comparison_rows(comparison: Comparison | Comparisons, *, net_slip: bool = Fa
     first = {
         "name": "walked",
         "unit": "runs",
-        "meaning": "runs in which the robot walked to the end",
+        "meaning": "runs in which the robot walked upright to the end and arrived",
         "values": [f"{number} of {count}" for number in walked],
         **counted[0],
         "changes": counted,

@@ -62,9 +62,9 @@ def terrain_rows(name: str, comparison: Comparisons) -> list[Row]:
 
 
 def _row(name: str, control: str, runs: tuple[Summary, ...]) -> Row:
-    walked = [run.metrics for run in runs if run.walked]
-    lost = [run for run in runs if not run.walked]
-    reason = next((run.reason or "; ".join(run.warnings[:1]) for run in lost), "")
+    walked = [run.metrics for run in runs if run.success]
+    lost = [run for run in runs if not run.success]
+    reason = next((run.failure for run in lost), "")
     values = {
         "walked": 100.0 * len(walked) / len(runs),
         "slip": 1e3 * _mean([run["slip_per_metre"] for run in walked]),

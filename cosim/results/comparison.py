@@ -110,8 +110,8 @@ class Change:
 class Comparison:
     """Pairs of runs of the same seed and the changes between them.
 
-    Changes use the pairs in which both robots walked to the end; where there is none, all pairs
-    that have metrics.
+    Changes use the pairs in which both robots walked to the end and arrived; where there is none,
+    all pairs that have metrics.
     """
 
     first: tuple[Summary, ...]
@@ -130,9 +130,9 @@ class Comparison:
 
     @property
     def walked(self) -> dict[str, int]:
-        """Number of runs, by control, that completed with the robot upright."""
+        """Number of runs, by control, in which the robot walked upright to the end and arrived."""
         return {
-            label: sum(run.walked for run in runs)
+            label: sum(run.success for run in runs)
             for label, runs in zip(self.labels, (self.first, self.second), strict=True)
         }
 
@@ -154,12 +154,11 @@ class Comparison:
 
     @property
     def losses(self) -> list[str]:
-        """Describes the runs in which the robot did not walk to the end."""
+        """Describes the runs in which the robot did not walk to the end or did not arrive."""
         return [
-            f"{run.control}, seed {run.seed}: "
-            + (run.reason or "; ".join(run.warnings) or "the robot fell")
+            f"{run.control}, seed {run.seed}: {run.failure}"
             for run in (*self.first, *self.second)
-            if not run.walked
+            if not run.success
         ]
 
     @property
@@ -206,9 +205,9 @@ def compare_runs(first: Sequence[Summary], second: Sequence[Summary]) -> Compari
 def judged_pairs(
     first: Sequence[Summary], second: Sequence[Summary]
 ) -> list[tuple[Summary, Summary]]:
-    """Returns the pairs in which both robots walked to the end; where there is none, all pairs."""
+    """Returns the pairs in which both robots arrived; where there is none, all pairs."""
     pairs = list(zip(first, second, strict=True))
-    return [pair for pair in pairs if pair[0].walked and pair[1].walked] or pairs
+    return [pair for pair in pairs if pair[0].success and pair[1].success] or pairs
 
 
 def change_of(name: str, pairs: Sequence[tuple[float, float]]) -> Change:
@@ -366,7 +365,8 @@ def _summary(row: Mapping[str, str]) -> Summary:
         upright=row["upright"] == str(True),
         fallback=_number(row["fallback"]) if row["fallback"] else None,
         warnings=tuple(filter(None, row["warnings"].split(SEPARATOR))),
-        # files of earlier versions have fewer metrics
+        # files of earlier versions do not tell who arrived, and have fewer metrics
+        missed=row.get("missed") or "",
         metrics={name: _number(row.get(name) or "") for name in METRICS},
     )
 

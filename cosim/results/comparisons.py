@@ -1,7 +1,7 @@
 """Compares runs under any number of controls: each with the first one, seed by seed.
 
 The first control is the reference. Every other control makes a `Comparison` with it, whose changes
-use the pairs in which both robots walked to the end.
+use the pairs in which both robots walked upright to the end and arrived.
 """
 
 from __future__ import annotations
@@ -48,8 +48,8 @@ class Comparisons:
 
     @property
     def walked(self) -> dict[str, int]:
-        """Number of runs, by control, that completed with the robot upright."""
-        return {label: sum(run.walked for run in runs) for label, runs in self.runs.items()}
+        """Number of runs, by control, in which the robot walked upright to the end and arrived."""
+        return {label: sum(run.success for run in runs) for label, runs in self.runs.items()}
 
     @property
     def judged(self) -> dict[str, list[Summary]]:
@@ -61,7 +61,7 @@ class Comparisons:
         if len(self.pairs) == 1:
             return dict(zip(self.labels, self.pairs[0].judged, strict=True))
         return {
-            label: [run for run in runs if run.walked] or list(runs)
+            label: [run for run in runs if run.success] or list(runs)
             for label, runs in self.runs.items()
         }
 
@@ -77,13 +77,12 @@ class Comparisons:
 
     @property
     def losses(self) -> list[str]:
-        """Describes the runs in which the robot did not walk to the end."""
+        """Describes the runs in which the robot did not walk to the end or did not arrive."""
         return [
-            f"{run.control}, seed {run.seed}: "
-            + (run.reason or "; ".join(run.warnings) or "the robot fell")
+            f"{run.control}, seed {run.seed}: {run.failure}"
             for runs in self.runs.values()
             for run in runs
-            if not run.walked
+            if not run.success
         ]
 
     @property

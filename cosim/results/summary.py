@@ -28,6 +28,7 @@ class Summary:
     upright: bool = False  # to the end
     # share of time in which the controller fell back to kinematic control; None: unknown
     fallback: float | None = None
+    missed: str = ""  # how it missed the end of its commanded path; "" when it arrived
     warnings: tuple[str, ...] = ()
     metrics: Mapping[str, float]  # NaN where undefined, and everywhere unless completed
 
@@ -35,6 +36,18 @@ class Summary:
     def walked(self) -> bool:
         """Whether the run completed with the robot upright."""
         return self.status == COMPLETED and self.upright
+
+    @property
+    def success(self) -> bool:
+        """Whether the robot walked upright to the end and arrived, see `arrival`."""
+        return self.walked and not self.missed
+
+    @property
+    def failure(self) -> str:
+        """Why the run is no success; "" for a success."""
+        if self.walked:
+            return self.missed
+        return self.reason or "; ".join(self.warnings) or "the robot fell"
 
 
 def summarise(result: Result) -> Summary:
@@ -47,6 +60,7 @@ def summarise(result: Result) -> Summary:
         reason=result.outcome.reason,
         upright=walk["upright"],
         fallback=walk.get("fallback"),
+        missed=walk.get("missed", ""),
         warnings=tuple(result.facts["warnings"]),
         metrics=dict(result.metrics) if result.completed else NO_FIGURES,
     )

@@ -32,6 +32,7 @@ from hexapod_cosim.cosim.master.force_sensor import ForceSensor, SensorSettings
 from hexapod_cosim.cosim.master.loop import COMPLETED, Outcome, Progress, diagnostic_columns, run
 from hexapod_cosim.cosim.master.recorder import Recorder, chosen_columns
 from hexapod_cosim.cosim.master.signals import Signals
+from hexapod_cosim.cosim.results.arrival import is_sent_ahead, missed_end
 from hexapod_cosim.cosim.results.drop import describe_drop
 from hexapod_cosim.cosim.results.ground import is_on_surface, surface_of_grid
 from hexapod_cosim.cosim.results.heat import heat_warnings
@@ -257,6 +258,9 @@ def make_result(
         missing = short_run_warnings(view)
         # a drop neither walks nor swings a foot, and has the metrics of a drop
         missing += missing_metrics_warnings(view) if drop is None else []
+    metrics = compute_metrics(view, servo=plan.robot.servo, realtime_factor=outcome.realtime_factor)
+    arrives = outcome.status != COMPLETED or not is_sent_ahead(view)
+    missed = "" if arrives else missed_end(metrics)
     found = {
         "events": event_log(scenario, outcome.simulated),
         "warnings": [
@@ -269,12 +273,11 @@ def make_result(
             *missing,
         ],
         "gains": None if setup.gains is None else setup.gains.as_facts(),
-        "walk": describe_walk(view, upright=not fall),
+        "walk": {**describe_walk(view, upright=not fall), "missed": missed},
         "drop": None if drop is None else drop.as_facts(),
         "drawn": None if drawn is None else drawn.as_facts(),
         WALKING: plan.walk.as_facts(),
     }
-    metrics = compute_metrics(view, servo=plan.robot.servo, realtime_factor=outcome.realtime_factor)
     return Result(
         scenario=scenario,
         outcome=outcome,

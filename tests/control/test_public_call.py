@@ -44,6 +44,11 @@ def test_a_built_in_control_gives_recording_metrics_and_facts() -> None:
     assert set(result.metrics) == set(METRICS)
     assert result.recording.time[-1] == 3.0
     assert result.facts["controller"] == {"kind": "builtin", "text": "kinematic"}
+    assert f"{result!r}".startswith(
+        f"Result({result.scenario.title!r}, control='kinematic', status='completed', simulated=3, "
+        "slip_per_metre="
+    )
+    assert len(f"{result!r}") < 300
 
 
 def test_a_class_and_an_object_of_it_give_the_same_run() -> None:
@@ -67,7 +72,8 @@ def hexapod_athena() -> Robot:
 
 
 def test_a_controller_that_raises_ends_the_run_with_what_was_recorded() -> None:
-    result = hexapod_cosim.simulate("walk_flat", Fails, settings=SHORT)
+    with pytest.warns(RuntimeWarning, match="ended early, without metrics: .*: no idea"):
+        result = hexapod_cosim.simulate("walk_flat", Fails, settings=SHORT)
     assert result.outcome.status == "failed"
     assert result.recording.time[-1] == pytest.approx(0.1)  # the step at 0.105 s fails
     assert f"{Path(__file__).resolve()}, line 37, in step: RuntimeError: no idea" in (
