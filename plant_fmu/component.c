@@ -67,13 +67,15 @@ static void *read_bytes(const char *path, size_t *size, int *short_of_memory) {
   return bytes;
 }
 
-/* Writes what is wrong with a grid to the component's message; returns NULL. */
-static hxTerrain *refuse_grid(hxComponent *component, double grid, const char *what) {
+/* Writes what is wrong with a grid to the component's message; returns NULL. file: that of the
+ * grid in the resources, their folder where the number names none. */
+static hxTerrain *refuse_grid(hxComponent *component, double grid, const char *file,
+                              const char *what) {
   const char *folder = component->resources ? component->resources : "(no resources)/";
   hx_print(component->message, HX_MESSAGE_SIZE,
            "terrain.grid: got %.9g, expected the number of a grid in the FMU's resources "
-           "(%.160sterrain/%.0f.terrain); %.200s",
-           grid, folder, grid, what);
+           "(%.160s%s); %.200s",
+           grid, folder, file, what);
   return NULL;
 }
 
@@ -82,26 +84,25 @@ static hxTerrain *read_grid(hxComponent *component, double grid) {
   char name[48], message[HX_MESSAGE_SIZE];
   size_t size = 0;
   int short_of_memory;
-  if (!component->resources || grid != floor(grid))
-    return refuse_grid(component, grid,
-                       component->resources ? "give a whole number"
-                                            : "instantiate the FMU with the path of its resources");
+  if (grid != floor(grid)) return refuse_grid(component, grid, "terrain/", "give a whole number");
   hx_print(name, sizeof name, "terrain/%.0f.terrain", grid);
+  if (!component->resources)
+    return refuse_grid(component, grid, name, "instantiate the FMU with the path of its resources");
   char *path = malloc(strlen(component->resources) + strlen(name) + 1);
-  if (!path) return refuse_grid(component, grid, "out of memory; free some and try again");
+  if (!path) return refuse_grid(component, grid, name, "out of memory; free some and try again");
   strcpy(path, component->resources);
   strcat(path, name);
   void *bytes = read_bytes(path, &size, &short_of_memory);
   free(path);
   if (!bytes)
     return refuse_grid(
-        component, grid,
+        component, grid, name,
         short_of_memory
             ? "out of memory; free some and try again"
             : "the file is missing or cannot be read; export the FMU with that terrain");
   hxTerrain *terrain = hx_terrain_create(bytes, size, message);
   free(bytes);
-  return terrain ? terrain : refuse_grid(component, grid, message);
+  return terrain ? terrain : refuse_grid(component, grid, name, message);
 }
 
 /* Sets *terrain to a grid: the one that is there, or one read from the resources. */

@@ -12,9 +12,15 @@ from numpy.typing import NDArray
 
 from hexapod_cosim.cosim.interface.names import JOINTS, LEGS, joint_names, vector_names
 from hexapod_cosim.cosim.scenario.records import Command, Variation
-from hexapod_cosim.models import LEG_NAMES, Robot, ScenarioError
-from hexapod_cosim.models.kinematics import foot_positions, quaternion_product, rotation_matrix
+from hexapod_cosim.models import Robot, ScenarioError
+from hexapod_cosim.models.kinematics import (
+    body_states,
+    foot_positions,
+    quaternion_product,
+    rotation_matrix,
+)
 from hexapod_cosim.models.terrain import ground
+from hexapod_cosim.models.touch.start import deepest_start
 
 Array = NDArray[np.float64]
 
@@ -93,21 +99,23 @@ def initial_values(robot: Robot, parameters: Mapping[str, float], drawn: Drawn) 
 
 
 def check_start_depth(robot: Robot, parameters: Mapping[str, float], *, where: str) -> None:
-    """Raises ScenarioError if a foot starts deeper in the ground than its radius.
+    """Raises ScenarioError if a foot or a part of the body starts too deep in the ground.
 
     parameters: the FMU's parameters initial.* of the robot's start.
     """
     position, quaternion, angle = (
         np.array([parameters[name] for name in names]) for names in (POSITION, QUATERNION, ANGLE)
     )
-    depth = _depths(robot, position, quaternion, angle)
-    leg, radius = int(np.argmax(depth)), robot.foot.radius
-    if depth[leg] > radius:
+    still = np.zeros(3)
+    joints = angle.reshape(LEGS, JOINTS)
+    body = body_states(robot, position, quaternion, still, still, joints, np.zeros_like(joints))
+    sunk = deepest_start(robot, body)
+    if sunk is not None:
         raise ScenarioError(
-            "a foot starts deep in the ground",
-            got=f"{LEG_NAMES[leg]} {depth[leg]:.4g} m deep",
-            expected=f"at most the foot's radius, {radius:g} m",
-            fix=f"raise initial.position[3] by {depth[leg] - radius:.4g} m or more",
+            f"a {sunk.name.partition(' ')[0]} starts deep in the ground",
+            got=f"{sunk.name} {sunk.depth:.4g} m deep",
+            expected=f"at most {sunk.bound:.4g} m, {sunk.reason}",
+            fix=f"raise initial.position[3] by {sunk.depth - sunk.bound:.4g} m or more",
             where=where,
         )
 

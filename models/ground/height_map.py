@@ -52,7 +52,11 @@ def heightfield(values: SimpleNamespace) -> Surface:
     height = read.units.astype(np.float64) * scale
     _check_size(path, height)
     check_heights(height, str(path), read.place)
-    return _surface(path, height, cell, values)
+    try:
+        return _surface(path, height, cell, values)
+    except RobotError as error:
+        error.where = str(path)  # the surface knows the map's name alone
+        raise
 
 
 def _chosen(key: str, unit: str, given: float, own: float, path: Path) -> float:

@@ -19,6 +19,13 @@ from hexapod_cosim.models.ground.surface import Array
 
 LEVELS = "PNG with 16 bits of grey per pixel"
 PNG_BEGIN = b"\x89PNG\r\n\x1a\n"
+PNG_KINDS = {
+    0: "grey",
+    2: "colours",
+    3: "a palette of colours",
+    4: "grey with transparency",
+    6: "colours with transparency",
+}
 ASC_KEYS = ("ncols", "nrows", "xllcorner", "yllcorner", "xllcenter", "yllcenter", "cellsize")
 
 
@@ -36,21 +43,28 @@ def _read_png(path: Path) -> HeightFile:
     # Pillow takes a moment to import, and few robots have height maps
     from PIL import Image, UnidentifiedImageError  # noqa: PLC0415
 
-    if damage := _damage(path.read_bytes()):
+    content = path.read_bytes()
+    if damage := _damage(content):
         raise _wrong_picture(path, damage)
     with path.open("rb") as file:
         try:
             picture = Image.open(file, formats=("PNG",))
-            mode = picture.mode
-            if mode in ("I;16", "I;16B", "I"):
+            if picture.mode in ("I;16", "I;16B", "I"):
                 levels = np.asarray(picture).astype(np.float64)[::-1]
                 return HeightFile(levels, 0.0, 0.0, _place_in_picture(len(levels)))
         except UnidentifiedImageError as error:
             raise _wrong_picture(path, "a file of another kind") from error
         except Exception as error:  # Pillow's readers raise errors of many kinds
             raise _wrong_picture(path, f"a damaged file ({error})") from error
-    bits = {"1": "1 bit of grey", "L": "8 bits of grey", "P": "a palette of colours"}
-    raise _wrong_picture(path, bits.get(mode, f"colours or transparency ({mode})"))
+    raise _wrong_picture(path, _pixels(content))
+
+
+def _pixels(content: bytes) -> str:
+    """Returns what a PNG file's pixels are, by its header (PNG specification, 11.2.2), because
+    Pillow gives 16 bits of grey with transparency as colours.
+    """
+    depth, kind = content[24], content[25]
+    return f"{depth} bit{'s' if depth > 1 else ''} of {PNG_KINDS.get(kind, f'kind {kind}')}"
 
 
 def _place_in_picture(rows: int) -> Callable[[int, int], str]:

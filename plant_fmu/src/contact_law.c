@@ -207,15 +207,20 @@ void hx_contact_release(hxContactState *contact) {
     contact->cell[0][slot] = contact->cell[1][slot] = -1.0;
 }
 
+hxSoil hx_contact_soil(const hxContactState *contact, int row, int slot) {
+  hxSoil soil;
+  double numbers[HX_SOIL_SIZE];
+  for (int i = 0; i < HX_SOIL_SIZE; ++i) numbers[i] = contact->soil[hx_soil_row(row)][i][slot];
+  memcpy(&soil, numbers, sizeof soil);
+  return soil;
+}
+
 /* Sets the plastic depths of contacts of a row that begin in soil, as if they had been pressed into
  * it. */
 static void start_in_soil(const hxDepths *depths, int row, hxContactState *contact) {
   const int soft = hx_soil_row(row);
   for (int slot = 0; slot < hx_slots_of(row); ++slot) {
-    hxSoil soil;
-    double numbers[HX_SOIL_SIZE];
-    for (int i = 0; i < HX_SOIL_SIZE; ++i) numbers[i] = contact->soil[soft][i][slot];
-    memcpy(&soil, numbers, sizeof soil);
+    const hxSoil soil = hx_contact_soil(contact, row, slot);
     if (contact->closed[row][slot] != 0.0 && contact->on_soil[soft][slot] != 0.0)
       contact->plastic[soft][slot] = hx_soil_plastic_depth(&soil, depths->delta[row][slot]);
   }

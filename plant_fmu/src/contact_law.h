@@ -3,6 +3,7 @@
 #ifndef HX_CONTACT_LAW_H
 #define HX_CONTACT_LAW_H
 
+#include "ground/soil.h"
 #include "state.h"
 
 HX_HIDDEN_BEGIN
@@ -25,6 +26,9 @@ void hx_contact_release(hxContactState *contact);
 /* Sets the contacts at the start of a motion: those in the ground are closed, with impact speed 0.
  */
 void hx_contact_start(const hxModel *model, const hxDepths *depths, hxContactState *contact);
+
+/* Returns the soil on which a contact touched down. */
+hxSoil hx_contact_soil(const hxContactState *contact, int row, int slot);
 
 /* Returns whether feet stand on cells of blocks. */
 int hx_has_cells(const hxModel *model);

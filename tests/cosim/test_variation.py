@@ -134,8 +134,8 @@ def test_a_start_with_a_foot_deeper_than_its_radius_is_refused_with_the_height_m
     check_start_depth(ROBOT, PARAMETERS, where="walk: initial")
     lower = PARAMETERS | {POSITION[2]: PARAMETERS[POSITION[2]] - 0.02}
     message = (
-        r"walk: initial: a foot starts deep in the ground: got '.. 0\.020\d* m deep', "
-        r"expected at most the foot's radius, 0\.015 m; raise initial\.position\[3\] by 0\.005"
+        r"walk: initial: a foot starts deep in the ground: got 'foot .. 0\.020\d* m "
+        r"deep', expected at most 0\.015 m, its radius; raise initial\.position\[3\] by 0\.005"
     )
     with pytest.raises(ScenarioError, match=message):
         check_start_depth(ROBOT, lower, where="walk: initial")

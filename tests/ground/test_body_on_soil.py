@@ -100,22 +100,22 @@ def test_an_upturned_robot_sinks_to_the_closed_form(core: ct.CDLL, soil: str, de
 @pytest.mark.parametrize(
     ("turned", "area", "breadth"),
     [
-        ((0.0, 1.0), 0.70 * 0.60 / 4.0, 0.60),
+        ((0.0, 1.0), 0.84 * 0.60 / 4.0, 0.60),
         ((1.0, 0.0), 1.00 * 0.60 / 4.0, 0.60),
-        (None, 0.70 * 1.00 / 4.0, 0.70),
+        (None, 0.84 * 1.00 / 4.0, 0.84),
     ],
 )
 def test_a_box_sinks_with_the_area_and_the_smaller_edge_of_the_side_that_touches_down(
     core: ct.CDLL, soil: str, turned: tuple[float, float] | None, area: float, breadth: float
 ) -> None:
-    """A box of 1.0 m x 0.7 m x 0.6 m around the robot falls on each of three sides. As long as its
+    """A box of 1.0 m x 0.84 m x 0.6 m around the robot falls on each of three sides. As long as its
     corners sink, their forces are those of Bekker's law and of the damping at their own depths.
     """
     robot = on_soil(soil)
-    robot = changed(robot, body={"torso_box": (0.5, 0.35, 0.3), "torso_centre": (0.0, 0.0, 0.0)})
+    robot = changed(robot, body={"torso_box": (0.5, 0.42, 0.3), "torso_centre": (0.0, 0.0, 0.0)})
     half = math.sqrt(0.5)
     quaternion = UPTURNED if turned is None else np.array([half, *np.multiply(half, turned), 0.0])
-    edge = 0.3 if turned is None else 0.5 if turned[1] else 0.35
+    edge = 0.3 if turned is None else 0.5 if turned[1] else 0.42
     plant = dropped(core, robot, FOLDED, edge + 0.0102, quaternion=quaternion)
     bekker = robot.soil.cohesive_modulus / breadth + robot.soil.frictional_modulus
     sinking, deepest, command = 0, np.zeros(8), Command(angle_ref=FOLDED)

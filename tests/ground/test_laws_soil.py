@@ -5,17 +5,21 @@ energy balance, and the same bits after a restore.
 from __future__ import annotations
 
 import ctypes as ct
+from contextlib import nullcontext
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
-from grids import BLOCKS, Ground, grid_bytes, on_grid
+from grids import BLOCKS, Ground, grid_bytes, on_grid, start_on_grid
 from plant import Plant, PlantError, pointer
 from states import changed
 
 from hexapod_cosim.models import Robot, load_robot
 from hexapod_cosim.models.dynamics import Command
+from hexapod_cosim.models.ground import grid_file
+from hexapod_cosim.models.ground.catalogue import make_surface
+from hexapod_cosim.models.ground.patches import with_soil
 from hexapod_cosim.models.records import Array
 from hexapod_cosim.models.soil import law
 from hexapod_cosim.models.soil.presets import soil_preset
@@ -205,7 +209,7 @@ def test_soil_on_a_slope_creeps_less_than_it_shears(core: ct.CDLL) -> None:
     b/K = tan(alpha)/(tan(phi) + A c/F_n) of the shear curve.
     """
     robot = on_soil("dry_sand", terrain={"kind": "slope", "incline": 0.2})
-    plant = Plant(core, robot, position=(0.0, 0.0, 0.13))
+    plant = Plant(core, robot, position=(0.0, 0.0, 0.16))
     for k in range(1, 1001):
         plant.step(k * STEP)
     out = plant.output()
@@ -302,6 +306,29 @@ def test_a_foot_may_start_deeper_than_its_radius_in_soil_and_not_in_rigid_ground
     rigid = replace(soft, soil=load_robot("athena").soil)
     with pytest.raises(PlantError, match="deep in the ground"):
         Plant(core, rigid, position=np.subtract(standing(rigid).position, (0, 0, 0.02)), **start)
+
+
+@pytest.mark.parametrize(
+    ("soil", "pad", "bound"),
+    [("dry_sand", 0.0, "0.06914"), ("dry_sand", 0.025, "0.02573"), ("clay", 0.0, "0.015")],
+)
+@pytest.mark.parametrize("patch", [False, True])
+def test_a_foot_may_start_as_deep_as_where_the_soil_carries_the_robot_on_it(
+    core: ct.CDLL, soil: str, pad: float, bound: str, patch: bool
+) -> None:
+    """The weight is 54.936 N. Clay carries it at 7.9 mm, so that the radius holds there."""
+    robot, ground = on_soil(soil, pad), None
+    if patch:
+        robot = replace(robot, soil=load_robot("athena").soil)
+        data = with_soil(make_surface("plane", {}), soil)
+        ground = Ground(core, grid_file.grid_bytes(data))
+    plant = Plant(core, robot)
+    for depth in (float(bound) - 1e-4, float(bound) + 1e-4, 1.0):
+        height = 0.12 + 0.015 - depth  # m: the stance's feet are 0.12 m below
+        start: dict[str, Any] = {"position": (0.0, 0.0, height), "angle": robot.stance}
+        accepted, message = depth < float(bound), f"deep in the ground, expected at most {bound} m"
+        with nullcontext() if accepted else pytest.raises(PlantError, match=message):
+            start_on_grid(plant, ground, **start) if ground else Plant(core, robot, **start)
 
 
 def test_the_soil_law_does_not_describe_the_spheres_of_the_torso() -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import struct
+import zlib
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -112,6 +114,18 @@ def image(mode: str) -> Callable[[Path], Path]:
     return write
 
 
+def grey_with_transparency(path: Path) -> Path:
+    """Writes 2 x 2 pixels of 16 bits of grey and of transparency, which Pillow cannot write."""
+    pixels = zlib.compress(2 * (b"\0" + 8 * b"\1"))
+    header = struct.pack(">IIBBBBB", 2, 2, 16, 4, 0, 0, 0)
+    content = b"\x89PNG\r\n\x1a\n"
+    for kind, body in ((b"IHDR", header), (b"IDAT", pixels), (b"IEND", b"")):
+        content += struct.pack(">I", len(body)) + kind + body
+        content += struct.pack(">I", zlib.crc32(kind + body))
+    path.write_bytes(content)
+    return path
+
+
 def text(content: bytes) -> Callable[[Path], Path]:
     def write(path: Path) -> Path:
         path.write_bytes(content)
@@ -128,7 +142,8 @@ NAN = [[0.0, np.nan], [0.0, 0.0]]
 REFUSED: list[tuple[str, Callable[[Path], Path], dict[str, float], str]] = [
     ("map.png", image("L"), SCALES, "8 bits of grey"),
     ("map.png", image("RGB"), SCALES, "colours"),
-    ("map.png", image("LA"), SCALES, "transparency"),
+    ("map.png", image("LA"), SCALES, "8 bits of grey with transparency"),
+    ("map.png", grey_with_transparency, SCALES, "got '16 bits of grey with transparency'"),
     ("map.png", image("P"), SCALES, "palette"),
     ("map.png", image("1"), SCALES, "1 bit"),
     ("map.png", text(b"no picture"), SCALES, "another kind"),
@@ -163,6 +178,7 @@ REFUSED: list[tuple[str, Callable[[Path], Path], dict[str, float], str]] = [
     ("map.asc", text(b"width 3\n0 1 2\n"), {}, "width"),
     ("map.asc", text(ASC.replace("cellsize 0.1", "").encode() + b"0 0 0 0 0 0"), {}, "horizontal"),
     ("map.asc", text(ASC.replace("0.1", "-0.1").encode() + b"0 0 0 0 0 0"), {}, "cellsize"),
+    ("map.asc", text(ASC.replace("0.1", "1e-9").encode() + b"0 0 0 0 0 0"), {}, r"map\.asc: scale"),
     ("map.asc", text(b"\xff\xfe"), {}, "no text"),
     ("map.tif", text(b""), SCALES, "ends in .png, .npy, .asc"),
 ]

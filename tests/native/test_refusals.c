@@ -367,7 +367,7 @@ static void grids_that_are_not_there_are_refused(void) {
   CHECK(!on_grid(9.0, 0.0));
   said("terrain/9.terrain); the file is missing or cannot be read");
   CHECK(!on_grid(1.5, 0.0));
-  said("give a whole number");
+  said("terrain/); give a whole number");
   CHECK(!on_grid(2.0, 0.0));
   said("(");
   CHECK(!on_grid(3.0, 0.0));

@@ -23,9 +23,10 @@ double hx_largest(double so_far, const void *first, size_t n);
 /* Returns whether a definition's ground is there and suits its contacts; else writes why not. */
 hxStatus hx_plant_check_terrain(hxPlant *plant, const hxDefinition *d, char *message);
 
-/* Fails if feet, or lines of two legs, start so deep in the ground or in each other that the
- * contact law does not hold. The kernel has started the state. */
-hxStatus hx_plant_check_start(const hxPlant *plant, char message[HX_MESSAGE_SIZE]);
+/* Fails if feet, torso, knees, shanks, or lines of two legs, start so deep in the ground or in each
+ * other that the contact law does not hold. The kernel has started the state. */
+hxStatus hx_plant_check_start(const hxPlant *plant, const hxDefinition *d,
+                              char message[HX_MESSAGE_SIZE]);
 
 HX_HIDDEN_END
 

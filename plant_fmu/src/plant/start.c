@@ -1,8 +1,11 @@
 #include <math.h>
 
+#include "../contact_law.h"
+#include "../ground/soil.h"
 #include "../ground/surface.h"
 #include "../ground/valleys.h"
 #include "../kernel.h"
+#include "../robot/laws.h"
 #include "hexapod/message.h"
 #include "hexapod/range_check.h"
 #include "parts.h"
@@ -56,23 +59,79 @@ hxStatus hx_plant_check_terrain(hxPlant *plant, const hxDefinition *d, char *mes
   return HX_INVALID_MODEL;
 }
 
-/* Fails if the centre of a foot lies in the ground: the contact law does not hold at such depths,
- * and its force would throw the robot up. On soil the depth is what unloading gives back, so that
- * feet that have sunk into it are accepted, also below their radius. */
-static hxStatus check_start_depth(const hxPlant *plant, char message[HX_MESSAGE_SIZE]) {
+/* A sphere that starts in the ground. */
+typedef struct {
+  int row, slot;
+  double depth, bound; /* m  of its lowest point, largest one that is accepted */
+  int is_in_soil;
+} hxSunk;
+
+/* Returns the depth at which soil carries a load, m, between two depths. */
+static double depth_of_load(const hxSoil *soil, double load, double low, double high) {
+  for (int i = 0; i < 100; ++i) {
+    const double middle = 0.5 * (low + high);
+    if (hx_soil_virgin(soil, middle).force <= load)
+      low = middle;
+    else
+      high = middle;
+  }
+  return low;
+}
+
+/* Returns how deep a sphere is in the ground, and how deep it may be: its radius, where its centre
+ * reaches the surface, or in soil the depth at which the soil carries the robot's weight on it
+ * alone, if that is deeper. Points have the bound of feet, because the force that the law has at a
+ * depth is the same. */
+static hxSunk sunk(const hxModel *model, const hxContactState *contact, const hxDepths *depths,
+                   double weight, int row, int slot) {
+  const double radius = model->radius[row] > 0.0 ? model->radius[row] : model->radius[HX_FOOT];
+  const int soft = hx_soil_row(row), is_in_soil = contact->on_soil[soft][slot] != 0.0;
+  hxSunk sphere = {row, slot, depths->delta[row][slot] + contact->plastic[soft][slot], radius, 0};
+  if (sphere.depth <= radius || !is_in_soil) return sphere;
+  const hxSoil soil = hx_contact_soil(contact, row, slot);
+  if (hx_soil_virgin(&soil, radius).force > weight) return sphere;
+  sphere.is_in_soil = 1;
+  sphere.bound = hx_soil_virgin(&soil, sphere.depth).force <= weight
+                     ? sphere.depth
+                     : depth_of_load(&soil, weight, radius, sphere.depth);
+  return sphere;
+}
+
+/* Writes the name of a sphere. */
+static void name_sphere(const hxSunk *sphere, char name[32]) {
+  static const char *row[] = {[HX_FOOT] = "foot", [HX_KNEE] = "knee", [HX_SHANK] = "shank"};
+  const int slot = sphere->slot;
+  if (sphere->row == HX_TORSO)
+    hx_print(name, 32, "torso corner (%s%s%s)", slot & 1 ? "+x" : "-x", slot & 2 ? " +y" : " -y",
+             slot & 4 ? " +z" : " -z");
+  else
+    hx_print(name, 32, "%s %s", row[sphere->row], hx_leg_name(slot));
+}
+
+/* Fails if a foot, a knee, a shank or a corner of the torso starts deeper in the ground than it
+ * may: the contact law does not hold at such depths, and its force would throw the robot up. */
+static hxStatus check_start_depth(const hxPlant *plant, double weight,
+                                  char message[HX_MESSAGE_SIZE]) {
+  const hxModel *model = &plant->model;
+  const hxContactState *contact = &plant->state.contact;
   hxDepths depths;
-  const double radius = plant->model.radius[HX_FOOT], *delta = depths.delta[HX_FOOT];
-  hx_kernel()->depths(&plant->model, &plant->state.contact, &plant->state.motion, &depths);
-  for (int leg = 0; leg < HX_LEGS; ++leg)
-    if (delta[leg] > radius) {
-      hx_print(message, HX_MESSAGE_SIZE,
-               "initial.position: got foot %s %.4g m deep in the ground, expected at most its "
-               "radius, %.4g m; raise initial.position[3] by %.4g m or more, or lower "
-               "terrain.height",
-               hx_leg_name(leg), delta[leg], radius, delta[leg] - radius);
-      return HX_INVALID_MODEL;
+  hxSunk worst = {0};
+  char name[32];
+  hx_kernel()->depths(model, contact, &plant->state.motion, &depths);
+  for (int k = 0; k < model->listed; ++k)
+    for (int slot = 0; hx_may_sink(model->row[k]) && slot < hx_slots_of(model->row[k]); ++slot) {
+      const hxSunk sphere = sunk(model, contact, &depths, weight, model->row[k], slot);
+      if (sphere.depth - sphere.bound > worst.depth - worst.bound) worst = sphere;
     }
-  return HX_OK;
+  if (!(worst.depth > worst.bound)) return HX_OK;
+  name_sphere(&worst, name);
+  const char *reason = model->radius[worst.row] > 0.0 ? "its radius" : "the radius of a foot";
+  if (worst.is_in_soil) reason = "where the soil carries the robot's weight on it";
+  hx_print(message, HX_MESSAGE_SIZE,
+           "initial.position: got %s %.4g m deep in the ground, expected at most %.4g m, %s; raise "
+           "initial.position[3] by %.4g m or more, or lower terrain.height",
+           name, worst.depth, worst.bound, reason, worst.depth - worst.bound);
+  return HX_INVALID_MODEL;
 }
 
 /* Fails if lines of two legs are so near to each other that the contact law does not hold. */
@@ -98,7 +157,8 @@ static hxStatus check_start_overlap(const hxPlant *plant, char message[HX_MESSAG
   return HX_OK;
 }
 
-hxStatus hx_plant_check_start(const hxPlant *plant, char message[HX_MESSAGE_SIZE]) {
-  const hxStatus status = check_start_depth(plant, message);
+hxStatus hx_plant_check_start(const hxPlant *plant, const hxDefinition *d,
+                              char message[HX_MESSAGE_SIZE]) {
+  const hxStatus status = check_start_depth(plant, hx_weight(d), message);
   return status == HX_OK ? check_start_overlap(plant, message) : status;
 }

@@ -11,8 +11,7 @@
 static const double load_share =
     0.01; /* 1  of the robot's weight; feet with a larger load count their slip */
 
-/* Returns the weight of all bodies, N. */
-static double weight_of(const hxDefinition *d) {
+double hx_weight(const hxDefinition *d) {
   double mass = d->torso.mass;
   for (int leg = 0; leg < HX_LEGS; ++leg)
     for (int joint = 0; joint < HX_JOINTS; ++joint) mass += d->leg[leg].link[joint].mass;
@@ -174,5 +173,5 @@ void hx_laws_compile(hxModel *model, const hxDefinition *d) {
   model->tolerance = d->solver.tolerance, model->step_max = d->solver.step_max,
   model->projection = d->solver.projection;
   compile_soil(model, d);
-  model->load_threshold = load_share * weight_of(d);
+  model->load_threshold = load_share * hx_weight(d);
 }

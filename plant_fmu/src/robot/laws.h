@@ -10,6 +10,9 @@ HX_HIDDEN_BEGIN
  * The model's terrain is known. */
 void hx_laws_compile(hxModel *model, const hxDefinition *d);
 
+/* Returns the weight of all bodies, N. */
+double hx_weight(const hxDefinition *d);
+
 HX_HIDDEN_END
 
 #endif
