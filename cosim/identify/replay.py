@@ -96,6 +96,9 @@ def replay(
             except (LogError, FmuError) as error:
                 if wrong:
                     raise wrong_commands_error(log, wrong) from error
+                other = other_robot(log, robot)
+                if other:
+                    raise LogError(other, got=str(error), where=log.where) from error
                 raise
     inputs = log.commands
     data = np.column_stack([log.time, *inputs.values(), found])

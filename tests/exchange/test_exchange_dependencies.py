@@ -16,7 +16,8 @@ VARIANTS: tuple[dict[str, float], ...] = (
     {"servo.mode": 3, "terrain.kind": 2, "terrain.incline": 0.1},
     # torso, knees and shanks are in the ground
     {
-        "body.torso_box[3]": 0.3,
+        "body.torso_box[3]": 0.15,
+        "body.corner_radius": 0.35,
         "body.knee_radius": 0.35,
         "body.shank_radius": 0.35,
         "terrain.kind": 2,
