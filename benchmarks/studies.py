@@ -26,7 +26,7 @@ CONTROL = "compliant"
 
 @dataclass(frozen=True)
 class Studies:
-    """Figures of studies."""
+    """Holds what was measured of studies."""
 
     per_minute: Mapping[str, float]  # compliant walks of 10 s on all cores, by solver setting
     comparison: float  # s    `hexapod compare`, 20 walks of 10 s, after set-up

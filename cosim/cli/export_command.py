@@ -196,12 +196,11 @@ def export(
     package = chosen_package(output, wanted=ssp, described=form is not None, values=values)
     control = DEFAULT_CONTROL if package and controller is None else controller
     chosen = None if platforms is None else [name.strip() for name in platforms.split(",")]
+    _refuse_unused_options(context, _written(form, package=package, control=control))
     loaded, walked = _in_stance(loaded, stance)
     if form is not None:
-        _refuse_unused_options(context, DESCRIPTION)
         path = _export_description(loaded, output, form)
     elif control is None:
-        _refuse_unused_options(context, PLANT_FMU)
         path = _export_plant(
             loaded,
             output,
@@ -211,7 +210,6 @@ def export(
             integers=integers,
         )
     else:
-        _refuse_unused_options(context, PACKAGE if package else CONTROLLER_FMU)
         options = ControllerOptions(
             control=control, gait=gait or walked, gains=gains, period=period
         )
@@ -225,6 +223,15 @@ def export(
             )
     kind = form.name if form is not None else "ssp" if package else "fmu"
     _show_written(path, loaded, kind, json=json)
+
+
+def _written(form: Format | None, *, package: bool, control: str | None) -> str:
+    """Returns what is written, a key of UNUSED_OPTIONS."""
+    if form is not None:
+        return DESCRIPTION
+    if package:
+        return PACKAGE
+    return PLANT_FMU if control is None else CONTROLLER_FMU
 
 
 def _in_stance(robot: Robot, stance: str) -> tuple[Robot, Gait | None]:

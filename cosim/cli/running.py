@@ -52,11 +52,14 @@ FolderName = Annotated[
 ]
 
 
-def _tried_fmu(path: Path | None) -> Path | None:
-    """Returns the path of an FMU that does not end the process which loads it."""
+def _tried_fmu(context: typer.Context, path: Path | None) -> Path | None:
+    """Returns the path of an FMU that does not end the process which loads it.
+
+    The completion of a command line does not try it.
+    """
     from hexapod_cosim.cosim.control.trial import refuse_crashing  # noqa: PLC0415
 
-    if path is not None:
+    if path is not None and not context.resilient_parsing:
         refuse_crashing(path)
     return path
 

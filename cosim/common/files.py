@@ -82,6 +82,14 @@ def atomic_path(path: Path) -> Iterator[Path]:
         temporary.unlink(missing_ok=True)
 
 
+def file_stamp(path: Path) -> tuple[int, int]:
+    """Returns the time of the last change [ns] and the size [byte] of a file: a cache whose key has
+    them reads a changed file again. Raises OSError without the file.
+    """
+    facts = path.stat()
+    return facts.st_mtime_ns, facts.st_size
+
+
 def flush_file(path: Path) -> None:
     """Flushes a file's content to the disk, so that a loss of power cannot take it."""
     with path.open("rb+") as file:

@@ -107,7 +107,6 @@ def make_controller(
     elif chosen.kind == PYTHON and chosen.path is not None:
         yield _python_law(chosen, chosen.path, setup, plan.scenario)
     elif chosen.kind == FMU and chosen.path is not None:
-        refuse_crashing(chosen.path)
         fmu = open_controller_fmu(chosen.path)
         try:
             fmu.set_parameters(fmu_parameters_of(chosen, fmu.described, plan.scenario))
@@ -228,12 +227,17 @@ def taken_parameters(control: Control) -> Taken:
 
 
 def check_control(scenario: Scenario, controls: Iterable[Control]) -> None:
-    """Checks, before any run, that the files of controls can be read and take all parameters.
+    """Checks, before any run, that the files of controls can be read and take all parameters, and
+    that no FMU ends the process which loads it.
 
     A plain key of [control] must be a parameter of one of the controls, a key of [control.LABEL]
     one of that label. Raises HexapodError.
     """
-    found = {control.label: taken_parameters(control) for control in controls}
+    found: dict[str, Taken] = {}
+    for control in controls:
+        if control.kind == FMU and control.path is not None:
+            refuse_crashing(control.path)
+        found[control.label] = taken_parameters(control)
     table = scenario.control_settings
     plain = [key for key, value in table.items() if not isinstance(value, Mapping)]
     _check_taken(plain, list(found.values()), f"{scenario.where}: control")

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from hexapod_cosim.controller import PATTERNS
+from hexapod_cosim.cosim.common.files import file_stamp
 from hexapod_cosim.cosim.interface.descriptions import open_description
 from hexapod_cosim.models import JOINT_NAMES, LEG_NAMES
 from hexapod_cosim.models.records import Vector3
@@ -31,19 +32,16 @@ class FmuWalk:
 def walk_of_fmu(path: Path) -> FmuWalk:
     """Returns the walk of a controller FMU.
 
-    The stance are the start values of its parameters `{leg}.{joint}.stance`, or of the array
-    `stance` of an FMU of FMI 3.0; the gait those of gait.pattern, gait.period and gait.duty. Raises
-    FmuError for a file that is no FMU.
+    The angles of the stance are the start values of its parameters `{leg}.{joint}.stance`, or of
+    the array `stance` of an FMU of FMI 3.0. The gait is read from those of gait.pattern,
+    gait.period and gait.duty. Raises FmuError for a file that is no FMU.
     """
-    if not path.is_file():
-        return _read(path, 0, 0)
-    status = path.stat()
-    return _read(path, status.st_mtime_ns, status.st_size)
+    return _read(path, *(file_stamp(path) if path.is_file() else (0, 0)))
 
 
 @lru_cache(maxsize=MAX_READ)
 def _read(path: Path, _changed: int, _size: int) -> FmuWalk:
-    """Returns the walk of a file that was changed at that time [ns]."""
+    """Returns the walk of a file with this stamp."""
     starts = {
         variable.name: variable.start
         for variable in open_description(path).modelVariables

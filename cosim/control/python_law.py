@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hexapod_cosim.controller import BodyCommand, ControllerError, JointCommand, Measurement
+from hexapod_cosim.cosim.common.files import file_stamp
 from hexapod_cosim.models import JOINT_NAMES, LEG_NAMES, nearest_name
 
 if TYPE_CHECKING:
@@ -39,8 +40,7 @@ def load_class(path: Path, name: str) -> type[Any]:
             expected=f"a Python file with the class {name}",
             fix="`hexapod controller new NAME` writes one",
         )
-    facts = path.stat()
-    module = _module(path, facts.st_mtime_ns, facts.st_size)
+    module = _module(path, *file_stamp(path))
     found = getattr(module, name, None)
     if not isinstance(found, type):
         classes = [

@@ -10,6 +10,7 @@ from contextlib import suppress
 from functools import lru_cache
 from pathlib import Path
 
+from hexapod_cosim.cosim.common.files import file_stamp
 from hexapod_cosim.cosim.common.own_process import ProcessEndedError, call_in_process
 from hexapod_cosim.cosim.control.fmu_instance import open_controller_fmu
 from hexapod_cosim.cosim.interface.descriptions import open_description
@@ -25,22 +26,15 @@ def refuse_crashing(path: Path) -> None:
     An FMU that cannot be read is not judged: whoever opens it says why. A file is tried once in
     a process unless it changes.
     """
-    with suppress(OSError, ValueError):  # no such file, or no path
-        status = path.stat()
-        how = _try_once(path.absolute(), status.st_mtime_ns, status.st_size)
-        if how is not None:
-            raise crash_error(path, how)
-
-
-def crash_error(path: Path, how: str) -> FmuError:
-    """Returns the error for an FMU whose binary ended a process with a signal or exit code."""
-    return FmuError(
-        "the FMU's binary ends the process that loads it",
-        got=how,
-        expected="an instance",
-        fix="the binary is damaged or made for another system: export the FMU again",
-        where=str(path),
-    )
+    how = _try_once(path.absolute(), *file_stamp(path)) if path.is_file() else None
+    if how is not None:
+        raise FmuError(
+            "the FMU's binary ends the process that loads it",
+            got=how,
+            expected="an instance",
+            fix="the binary is damaged or made for another system: export the FMU again",
+            where=str(path),
+        )
 
 
 @lru_cache(maxsize=MAX_TRIED)

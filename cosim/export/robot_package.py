@@ -27,9 +27,8 @@ from hexapod_cosim.models import FmuError, HexapodError, unknown_name
 PLANT, CONTROLLER = "plant", "controller"  # in the order of calculation
 SUFFIX = ".ssp"
 STOP = 10.0  # s
-WALK: Mapping[str, float] = MappingProxyType(
-    {"command.vx": 0.08}
-)  # m/s    as in the paper's experiment
+SPEED = 0.08  # m/s    straight ahead, as in the paper's experiment
+WALK: Mapping[str, float] = MappingProxyType({"command.vx": SPEED})
 
 Values = Mapping[str, Mapping[str, float]]  # by component and name
 

@@ -84,7 +84,7 @@ class Identified:
 
     @property
     def origin(self) -> Robot:
-        """The robot file's robot."""
+        """Returns the robot of the robot file, with its own friction model."""
         return self.given or self.file
 
     @property

@@ -106,7 +106,7 @@ class LiveRobot(Closing):
 
     @property
     def time(self) -> float:
-        """The simulated time [s]."""
+        """Returns the simulated time [s]."""
         scenario = self.plan.scenario
         return scenario.start + scenario.macro_step * self.count
 

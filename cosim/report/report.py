@@ -47,7 +47,7 @@ REPORT, PLOTS, PROFILE = "report.html", "plots", "profile"
 
 
 class Section(NamedTuple):
-    """A group of plots."""
+    """Holds a group of plots of the report."""
 
     name: str  # of the static figure that shows the same
     title: str

@@ -33,7 +33,7 @@ from numpy.typing import NDArray
 from hexapod_cosim.cosim.common.files import atomic_text
 from hexapod_cosim.cosim.results.balance import Unbalanced
 from hexapod_cosim.cosim.results.metrics import FLOORS, METRICS
-from hexapod_cosim.cosim.results.summary import Summary
+from hexapod_cosim.cosim.results.summary import Summary, described_losses
 from hexapod_cosim.models import HexapodError
 
 Array = NDArray[np.float64]
@@ -120,7 +120,7 @@ class Comparison:
 
     @property
     def labels(self) -> tuple[str, str]:
-        """The two controls."""
+        """Returns the labels of the two controls."""
         return self.first[0].control, self.second[0].control
 
     @property
@@ -155,11 +155,7 @@ class Comparison:
     @property
     def losses(self) -> list[str]:
         """Describes the runs in which the robot did not walk to the end or did not arrive."""
-        return [
-            f"{run.control}, seed {run.seed}: {run.failure}"
-            for run in (*self.first, *self.second)
-            if not run.success
-        ]
+        return described_losses((*self.first, *self.second))
 
     @property
     def unbalanced(self) -> list[str]:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +21,7 @@ from hexapod_cosim.cosim.results.balance import Unbalanced
 from hexapod_cosim.cosim.results.comparison import Comparison, compare_runs
 from hexapod_cosim.cosim.results.metrics import METRICS
 from hexapod_cosim.cosim.results.results import METRICS_FILE, SCENARIO
-from hexapod_cosim.cosim.results.summary import Summary
+from hexapod_cosim.cosim.results.summary import Summary, described_losses
 from hexapod_cosim.cosim.scenario.records import Scenario
 
 
@@ -33,7 +34,7 @@ class Comparisons:
 
     @property
     def labels(self) -> tuple[str, ...]:
-        """The controls."""
+        """Returns the labels of the controls."""
         return tuple(self.runs)
 
     @property
@@ -78,12 +79,7 @@ class Comparisons:
     @property
     def losses(self) -> list[str]:
         """Describes the runs in which the robot did not walk to the end or did not arrive."""
-        return [
-            f"{run.control}, seed {run.seed}: {run.failure}"
-            for runs in self.runs.values()
-            for run in runs
-            if not run.success
-        ]
+        return described_losses(chain.from_iterable(self.runs.values()))
 
     @property
     def unbalanced(self) -> list[str]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 from hexapod_cosim.cosim.master.loop import COMPLETED
@@ -48,6 +48,11 @@ class Summary:
         if self.walked:
             return self.missed
         return self.reason or "; ".join(self.warnings) or "the robot fell"
+
+
+def described_losses(runs: Iterable[Summary]) -> list[str]:
+    """Describes the runs in which the robot did not walk to the end or did not arrive."""
+    return [f"{run.control}, seed {run.seed}: {run.failure}" for run in runs if not run.success]
 
 
 def summarise(result: Result) -> Summary:

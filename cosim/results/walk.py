@@ -89,7 +89,7 @@ class Walk:
 
     @property
     def duration(self) -> float:
-        """Measured time [s]."""
+        """Returns the length of the measured part [s]."""
         return self.end - self.begin
 
     def gained(self, names: list[str]) -> Array:

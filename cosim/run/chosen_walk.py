@@ -31,6 +31,7 @@ from hexapod_cosim.cosim.design.stance import (
     settled_motion,
     with_stance,
 )
+from hexapod_cosim.cosim.export.robot_package import SPEED
 from hexapod_cosim.cosim.results.walking import OF_FMU
 from hexapod_cosim.cosim.run.kept_stance import Stance, kept_stance
 from hexapod_cosim.cosim.scenario.controls import FMU, control_of
@@ -43,7 +44,6 @@ from hexapod_cosim.models.records import Vector3
 CHOSEN_GAIT = "amble"  # of compliant control
 FOOTING = 0.4  # 1    of the way to the stance of least heat by which feet move to the hips
 GIVEN, CHOSEN = "given", "chosen"  # stances besides those that a scenario names
-EXPORT_SPEED = 0.08  # m/s  for which the walk of exported FMUs is chosen, as packages walk
 BY_SCENARIO, BY_CONTROL, BY_ROBOT = "scenario", "control", "robot file"
 
 
@@ -110,12 +110,12 @@ def choose_walk(
 
 
 def chosen_walk(robot: Robot) -> ChosenWalk:
-    """Returns the walk that compliant control chooses for a robot at EXPORT_SPEED straight ahead.
+    """Returns the walk that compliant control chooses for a robot at the speed of packages.
 
     Exported FMUs can have it (`hexapod export --stance chosen`).
     """
     plain = ChosenWalk(robot=robot, gait=make_gait(robot), stance=OWN, chosen_by=BY_CONTROL)
-    return _chosen([Command(vx=EXPORT_SPEED)], plain, robot, {})
+    return _chosen([Command(vx=SPEED)], plain, robot, {})
 
 
 def _of_fmu(plain: ChosenWalk, path: Path) -> ChosenWalk:

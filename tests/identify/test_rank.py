@@ -14,7 +14,6 @@ import pytest
 from numpy.typing import NDArray
 from secret_robots import secret_robot
 
-from hexapod_cosim.cosim.identify.fitting.judging import WEAK
 from hexapod_cosim.cosim.identify.fitting.rank import (
     Combination,
     combination_text,
@@ -22,6 +21,7 @@ from hexapod_cosim.cosim.identify.fitting.rank import (
     sharpened,
     told,
     untold,
+    weak_moves,
 )
 from hexapod_cosim.cosim.identify.identify import identify
 from hexapod_cosim.cosim.identify.identify_tables import untold_text
@@ -107,7 +107,7 @@ def test_errors_of_derivatives_are_no_information() -> None:
     problem: Any = Noisy()
     false = problem.slopes.T @ problem.slopes
     jacobian = np.vstack([problem.slopes, np.eye(3)])
-    found = sharpened(problem, np.zeros(3), jacobian, false, 100.0)[:-3]
+    found = sharpened(jacobian, weak_moves(problem, np.zeros(3), false, 100.0))[:-3]
     assert np.linalg.eigvalsh(false)[0] == pytest.approx(1.0, rel=0.1)  # 10^4 errors of 0.01
     assert np.linalg.eigvalsh(found.T @ found)[0] < 1e-3
     expected = np.linalg.eigvalsh(false)[1:]
@@ -139,9 +139,9 @@ def test_slopes_that_end_within_the_deviation_are_no_information() -> None:
     jacobian = (problem.residuals(z + step) - problem.residuals(z - step))[:, None] / (2.0 * step)
     steep = float(jacobian[:-1, 0] @ jacobian[:-1, 0])
     assert steep == pytest.approx(40.0 + 100.0 * 1.3**2)
-    for most in WEAK:
+    for _ in range(2):
         slopes = jacobian[:-1]
-        jacobian = sharpened(problem, z, jacobian, slopes.T @ slopes, most)
+        jacobian = sharpened(jacobian, weak_moves(problem, z, slopes.T @ slopes, 1000.0))
     found = float(jacobian[:-1, 0] @ jacobian[:-1, 0])
     assert 40.0 <= found < 45.0
 

@@ -29,15 +29,11 @@ def with_speed_references(log: Log, robot: Robot) -> Log:
         return log
     rates = [np.gradient(log.recording.column(angle), log.time) for angle in missing.values()]
     data = np.column_stack([log.recording.data, *rates])
-    count = (
-        "speed commands"
-        if len(missing) == len(joint_names("speed_ref"))
-        else (f"speed commands of {len(missing)} joints")
-    )
+    some = "" if len(missing) == len(joint_names("speed_ref")) else f" of {len(missing)} joints"
     note = (
-        f"{log.where} has no {count} ({next(iter(missing))} [rad/s], ...), which the servo's kd "
-        "needs: the rates of the commanded angles are taken. Give the columns; 0 in each row is "
-        "right where the servo damps the measured speed alone."
+        f"{log.where} has no speed commands{some} ({next(iter(missing))} [rad/s], ...), which the "
+        "servo's kd needs: the rates of the commanded angles are taken. Give the columns; 0 in "
+        "each row is right where the servo damps the measured speed alone."
     )
     recording = Recording((*log.recording.names, *missing), data)
     return replace(log, recording=recording, derived=note)

@@ -32,6 +32,7 @@ from hexapod_cosim.cosim.identify.fitting.rank import (
     sharpened,
     told,
     untold,
+    weak_moves,
 )
 from hexapod_cosim.cosim.identify.numbers.unknown import Unknown
 from hexapod_cosim.cosim.identify.unknowns import OF_FILE
@@ -42,7 +43,7 @@ Progress = Callable[[str], None]
 # a foot that barely lifts, slopes by short steps are steep and do not hold as far as the interval
 # reaches. Where the first errors of derivatives hide combinations in others, the second time shows
 # them.
-WEAK = (1000.0, 1000.0)
+WEAK, PASSES = 1000.0, 2
 ROUNDS = 3  # of keeping numbers at the file's values, at most
 
 
@@ -129,14 +130,12 @@ def judged(
             break
         stay, z = more, np.where(more, 0.0, z)
         if float(np.max(np.abs(z - best))) > FINE.near:
-            fitted.hold(stay)
-            z = finished(fitted, z, lambda _text: None)  # a part of this step
-            fitted.hold(None)
+            with fitted.holding(stay):
+                z = finished(fitted, z, lambda _text: None)  # a part of this step
         own = _told(fitted, z, least)
-    fitted.hold(stay)
-    # where touch-downs make the sum of squares rough, the optimiser stops on the way
-    left = bounded_step(fitted, z, own.jacobian, own.residuals)
-    fitted.hold(None)
+    with fitted.holding(stay):
+        # where touch-downs make the sum of squares rough, the optimiser stops on the way
+        left = bounded_step(fitted, z, own.jacobian, own.residuals)
     moved, covariance = z - best, own.covariance
     eigenvalues = np.linalg.eigvalsh(own.information)[::-1]
     return Fit(
@@ -168,10 +167,12 @@ def _told(fitted: Problem, z: Array, least: Mapping[str, float]) -> _Told:
     worst = max(1.0, *(one.value for one in misfit.values()))
     series = fitted.series(jacobian, bounded)
     information = coloured_information(series) / worst
-    first = _covariance(measured_information(fitted, z, jacobian, information))
+    moves = weak_moves(fitted, z, information, WEAK)
+    first = _covariance(measured_information(information, jacobian, moves))
     far = jacobian  # over deviations; the step that the search left is by its own derivatives
-    for most in WEAK:
-        far = sharpened(fitted, z, far, information, most)
+    for again in range(PASSES):
+        moves = weak_moves(fitted, z, information, WEAK) if again else moves
+        far = sharpened(far, moves)
         series = fitted.series(far, bounded)
         information = coloured_information(series) / worst
     # both are estimates, and intervals that are too narrow are worse than wide ones

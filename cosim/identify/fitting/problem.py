@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 
 import numpy as np
 from numpy.typing import NDArray
@@ -83,7 +84,7 @@ class Problem:
         self._differences: Differences | None = None  # the last ones
         self._nonlinear: NDArray[np.bool_] | None = None  # (predictions,)  see leave_out_nonlinear
         self._size = 0  # of the residuals
-        self._held: NDArray[np.bool_] | None = None  # (rows,)  see `hold`
+        self._held: NDArray[np.bool_] | None = None  # (rows,)  see `holding`
         self.counted = self.all_known()  # which readings count (fitted rows, columns)
 
     def all_known(self) -> list[NDArray[np.bool_]]:
@@ -352,9 +353,14 @@ class Problem:
             return np.array(low), np.array(high)
         return np.where(self._held, 0.0, low), np.where(self._held, 0.0, high)
 
-    def hold(self, numbers: NDArray[np.bool_] | None) -> None:
-        """Keeps some numbers (rows,) at the robot file's values, z = 0, from now on; None: none."""
+    @contextmanager
+    def holding(self, numbers: NDArray[np.bool_]) -> Iterator[None]:
+        """Keeps some numbers (rows,) at the robot file's values, z = 0, within the block."""
         self._held = numbers
+        try:
+            yield
+        finally:
+            self._held = None
 
     def _weights(self, experiment: Experiment) -> Array:
         return np.array([self.noise[key] for key in experiment.channels])

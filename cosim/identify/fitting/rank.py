@@ -30,7 +30,7 @@ TOLD = 0.5  # of the prior deviation: a number with less is told by the logs
 NEARLY_NULL = 1.0  # information [1/prior^2] of a combination: less than what was known before
 # deviation of a number by nearly null combinations alone, from which on it is not told
 BY_NULL = 1.0 / 3.0  # priors
-MOST = 100.0  # information [1/prior^2] of a combination that is moved as a whole
+MOST = 100.0  # information [1/prior^2] of a combination that `measured_information` corrects
 LEAST = 0.05  # information [1/prior^2] of a combination that is not told whatever its errors are
 LONGEST = 0.5  # priors    of such a move
 PART = 0.05  # slope of a number by another one, from which on it takes part in a combination
@@ -48,22 +48,28 @@ class Combination:
     deviation: float  # of z of `key` while the others stay
 
 
-def sharpened(
-    problem: Problem, z: Array, jacobian: Array, information: Array, most: float
-) -> Array:
-    """Returns the derivatives with those by weak combinations from simulations over long steps.
+@dataclass(frozen=True)
+class Move:
+    """A weak combination that simulations have moved as a whole, forth and back."""
 
-    Over a long step readings may jump: where both derivatives differ, the smaller one counts.
+    vector: Array  # (rows,) the combination, of length 1
+    information: float  # [1/prior^2] that derivatives say
+    way: Array  # (rows,) z forth less z back
+    change: Array  # (readings,) of the residuals, forth less back
+
+
+def weak_moves(problem: Problem, z: Array, information: Array, most: float) -> list[Move]:
+    """Returns the weak combinations, each moved over its deviation, at most LONGEST.
 
     Args:
         problem: its readings that count.
         z: the numbers (rows,).
-        jacobian: derivatives of the residuals, with the priors behind them.
-        information: what these derivatives tell (rows, rows).
+        information: what derivatives of the residuals tell (rows, rows).
         most: information of a weak combination, at most [1/prior^2].
+
+    A combination whose simulation fails is left out.
     """
-    found = jacobian.copy()
-    count = len(jacobian) - len(z)
+    found = []
     low, high = problem.bounds()
     values, vectors = np.linalg.eigh(information)
     for value, vector in zip(values.tolist(), vectors.T, strict=True):
@@ -71,43 +77,51 @@ def sharpened(
             continue
         step = min(LONGEST, value**-0.5) * vector
         forth, back = (np.clip(z + sign * step, low, high) for sign in (1.0, -1.0))
-        way = float((forth - back) @ vector)
-        change = (problem.residuals(forth) - problem.residuals(back))[:count]
-        if way <= 0.0 or not np.isfinite(change).all():
+        change = (problem.residuals(forth) - problem.residuals(back))[: -len(z)]
+        if np.isfinite(change).all():
+            found.append(Move(vector, value, forth - back, change))
+    return found
+
+
+def sharpened(jacobian: Array, moves: Sequence[Move]) -> Array:
+    """Returns the derivatives with those by weak combinations from simulations over long steps.
+
+    Over a long step readings may jump: where both derivatives differ, the smaller one counts.
+
+    jacobian: derivatives of the residuals, with the priors behind them.
+    """
+    found = jacobian.copy()
+    count = len(jacobian) - jacobian.shape[1]
+    for move in moves:
+        length = float(move.way @ move.vector)
+        if length <= 0.0:
             continue
-        linear = jacobian[:count] @ (forth - back)
+        change, linear = move.change, jacobian[:count] @ move.way
         smaller = np.where(np.abs(change) < np.abs(linear), change, linear)
         differ = np.abs(change - linear) > UNLIKE * np.abs(smaller)
         shown = np.where(differ, smaller, change)
         if shown @ shown < linear @ linear:  # more is what bends or jumps over the long step
-            found[:count] += np.outer((shown - linear) / way, vector)
+            found[:count] += np.outer((shown - linear) / length, move.vector)
     return found
 
 
-def measured_information(problem: Problem, z: Array, jacobian: Array, information: Array) -> Array:
+def measured_information(information: Array, jacobian: Array, moves: Sequence[Move]) -> Array:
     """Returns the information (rows, rows) with what simulations of combinations say.
 
     Args:
-        problem: its readings that count.
-        z: the numbers (rows,).
+        information: what the derivatives tell.
         jacobian: derivatives of the residuals, with the priors behind them.
-        information: what these derivatives tell.
+        moves: of the combinations of this information.
     """
     found = information.copy()
-    slopes = jacobian[: -len(z)]
-    low, high = problem.bounds()
-    values, vectors = np.linalg.eigh(information)
-    for value, vector in zip(values.tolist(), vectors.T, strict=True):
-        if not LEAST < value < MOST:
+    slopes = jacobian[: -len(information)]
+    for move in moves:
+        if move.information >= MOST:
             continue
-        step = min(LONGEST, value**-0.5) * vector
-        ends = [np.clip(z + sign * step, low, high) for sign in (1.0, -1.0)]
-        forth, back = (problem.residuals(end)[: -len(z)] for end in ends)
-        change, expected = forth - back, slopes @ (ends[0] - ends[1])
-        if not np.isfinite(change).all():
-            continue
-        share = float(change @ change) / max(float(expected @ expected), 1e-300)
-        found -= (1.0 - min(share, 1.0)) * value * np.outer(vector, vector)
+        expected = slopes @ move.way
+        share = float(move.change @ move.change) / max(float(expected @ expected), 1e-300)
+        less = (1.0 - min(share, 1.0)) * move.information
+        found -= less * np.outer(move.vector, move.vector)
     return found
 
 

@@ -110,17 +110,15 @@ static void name_sphere(const hxSunk *sphere, char name[32]) {
 
 /* Fails if a foot, a knee, a shank or a corner of the torso starts deeper in the ground than it
  * may: the contact law does not hold at such depths, and its force would throw the robot up. */
-static hxStatus check_start_depth(const hxPlant *plant, double weight,
+static hxStatus check_start_depth(const hxPlant *plant, const hxDepths *depths, double weight,
                                   char message[HX_MESSAGE_SIZE]) {
   const hxModel *model = &plant->model;
   const hxContactState *contact = &plant->state.contact;
-  hxDepths depths;
   hxSunk worst = {0};
   char name[32];
-  hx_kernel()->depths(model, contact, &plant->state.motion, &depths);
   for (int k = 0; k < model->listed; ++k)
     for (int slot = 0; hx_may_sink(model->row[k]) && slot < hx_slots_of(model->row[k]); ++slot) {
-      const hxSunk sphere = sunk(model, contact, &depths, weight, model->row[k], slot);
+      const hxSunk sphere = sunk(model, contact, depths, weight, model->row[k], slot);
       if (sphere.depth - sphere.bound > worst.depth - worst.bound) worst = sphere;
     }
   if (!(worst.depth > worst.bound)) return HX_OK;
@@ -135,21 +133,18 @@ static hxStatus check_start_depth(const hxPlant *plant, double weight,
 }
 
 /* Fails if lines of two legs are so near to each other that the contact law does not hold. */
-static hxStatus check_start_overlap(const hxPlant *plant, char message[HX_MESSAGE_SIZE]) {
+static hxStatus check_start_overlap(const hxModel *model, const hxDepths *depths,
+                                    char message[HX_MESSAGE_SIZE]) {
   static const char *part[] = {"femur", "tibia"};
-  hxDepths depths;
-  const hxModel *model = &plant->model;
-  if (!model->pair_rows) return HX_OK;
-  hx_kernel()->depths(model, &plant->state.contact, &plant->state.motion, &depths);
-  for (int pair = 0; pair < HX_PAIR_ROWS; ++pair) {
+  for (int pair = 0; model->pair_rows && pair < HX_PAIR_ROWS; ++pair) {
     const double allowed = 0.5 * model->radius[HX_PAIR + pair];
     for (int leg = 0; leg < HX_LEGS; ++leg)
-      if (depths.delta[HX_PAIR + pair][leg] > allowed && allowed > 0.0) {
+      if (depths->delta[HX_PAIR + pair][leg] > allowed && allowed > 0.0) {
         hx_print(message, HX_MESSAGE_SIZE,
                  "initial.%s: got its %s %.4g m inside the %s of leg %s, expected at most %.4g m, "
                  "half the sum of their radii; move the legs apart, or reduce body.knee_radius or "
                  "body.shank_radius",
-                 hx_leg_name(leg), part[pair / 2], depths.delta[HX_PAIR + pair][leg],
+                 hx_leg_name(leg), part[pair / 2], depths->delta[HX_PAIR + pair][leg],
                  part[pair % 2], hx_leg_name(hx_next_leg(leg)), allowed);
         return HX_INVALID_MODEL;
       }
@@ -159,6 +154,8 @@ static hxStatus check_start_overlap(const hxPlant *plant, char message[HX_MESSAG
 
 hxStatus hx_plant_check_start(const hxPlant *plant, const hxDefinition *d,
                               char message[HX_MESSAGE_SIZE]) {
-  const hxStatus status = check_start_depth(plant, hx_weight(d), message);
-  return status == HX_OK ? check_start_overlap(plant, message) : status;
+  hxDepths depths;
+  hx_kernel()->depths(&plant->model, &plant->state.contact, &plant->state.motion, &depths);
+  const hxStatus status = check_start_depth(plant, &depths, hx_weight(d), message);
+  return status == HX_OK ? check_start_overlap(&plant->model, &depths, message) : status;
 }
