@@ -8,10 +8,10 @@ Each target of tests/fuzz gets an equal share of the time; the readers (tests/fu
 which are the target "readers", get one share too. Inputs that reach new code are kept in
 build/fuzz/corpus, inputs that violate a rule are written to build/fuzz/findings. A line of figures
 is added to build/fuzz/ledger.jsonl after each target, so that the times of several runs add up;
-targets with the shortest time until now come first. `ledger` prints the sums as a table. With --afl
-the C targets alone are run, by AFL++, with all files in build/fuzz-afl. With --seed libFuzzer draws
-its mutations from that seed (a positive number), so that runs from an empty corpus begin with the
-same inputs. The exit code is 1 after a finding.
+targets with the least processor time until now come first. `ledger` prints the sums as a table.
+With --afl the C targets alone are run, by AFL++, with all files in build/fuzz-afl. With --seed
+libFuzzer draws its mutations from that seed (a positive number), so that runs from an empty corpus
+begin with the same inputs. The exit code is 1 after a finding.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ import json
 import math
 import os
 import re
+import resource
 import shutil
 import subprocess
 import sys
@@ -63,8 +64,31 @@ class Figures:
     target: str
     inputs: int
     covered: int  # edges of the control flow; 0: not measured
-    seconds: float
+    seconds: float  # wall time
+    processor: float  # s  of the target's processes
     found: bool
+
+
+class Clock:
+    """Measures the wall time, and the processor time of processes that have ended, from now on."""
+
+    def __init__(self) -> None:
+        self._begin, self._used = time.monotonic(), _used_by_children()
+
+    @property
+    def seconds(self) -> float:
+        """The wall time [s]."""
+        return time.monotonic() - self._begin
+
+    @property
+    def processor(self) -> float:
+        """The processor time [s]."""
+        return _used_by_children() - self._used
+
+
+def _used_by_children() -> float:
+    usage = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return usage.ru_utime + usage.ru_stime
 
 
 def build(folder: Path, targets: Sequence[str]) -> None:
@@ -116,7 +140,7 @@ def fuzz(target: str, seconds: float, seed: int = 0) -> Figures:
         "seed": seed,
         "artifact_prefix": f"{findings}/",
     }
-    begin = time.monotonic()
+    clock = Clock()
     done = subprocess.run(
         [
             str(BUILD / "tests" / "fuzz" / target),
@@ -137,7 +161,8 @@ def fuzz(target: str, seconds: float, seed: int = 0) -> Figures:
         target,
         int(inputs[1]) if inputs else 0,
         int(covered[-1]) if covered else 0,
-        time.monotonic() - begin,
+        clock.seconds,
+        clock.processor,
         found,
     )
 
@@ -165,7 +190,7 @@ def fuzz_by_afl(target: str, seconds: float) -> Figures:
     """Runs one target by AFL++; prints what it says when it could not run."""
     out = AFL_BUILD / "runs" / target
     out.mkdir(parents=True, exist_ok=True)
-    begin = time.monotonic()
+    clock = Clock()
     done = subprocess.run(
         [
             *("afl-fuzz", "-V", str(max(1, round(seconds))), "-t", str(1000 * LONGEST_CALL)),
@@ -181,20 +206,20 @@ def fuzz_by_afl(target: str, seconds: float) -> Figures:
     told = out / "default" / "fuzzer_stats"
     if done.returncode != 0 or not told.exists():
         print((done.stdout + done.stderr)[-6000:], file=sys.stderr)
-        return Figures(target, 0, 0, time.monotonic() - begin, found=True)
+        return Figures(target, 0, 0, clock.seconds, clock.processor, found=True)
     lines = told.read_text(encoding="utf-8").splitlines()
     value = {key.strip(): text.strip() for key, _, text in (line.partition(":") for line in lines)}
     found = int(value["saved_crashes"]) + int(value["saved_hangs"]) > 0
     if found:
         print(f"{target}: see {out / 'default'}", file=sys.stderr)
     inputs, edges = int(value["execs_done"]), int(value["edges_found"])
-    return Figures(target, inputs, edges, time.monotonic() - begin, found)
+    return Figures(target, inputs, edges, clock.seconds, clock.processor, found)
 
 
 def read(seconds: float) -> Figures:
     """Draws files for the readers by Hypothesis, a new seed each time, until the time is over."""
-    begin, inputs, found = time.monotonic(), 0, False
-    while not found and (inputs == 0 or time.monotonic() - begin < seconds):
+    clock, inputs, found = Clock(), 0, False
+    while not found and (inputs == 0 or clock.seconds < seconds):
         done = subprocess.run(
             [sys.executable, "-m", "pytest", *READING],
             cwd=ROOT,
@@ -209,7 +234,7 @@ def read(seconds: float) -> Figures:
         inputs += sum(map(int, DRAWN.findall(done.stdout)))
         if inputs == 0:
             break
-    return Figures(READERS, inputs, 0, time.monotonic() - begin, found)
+    return Figures(READERS, inputs, 0, clock.seconds, clock.processor, found)
 
 
 # ---- the ledger ----
@@ -236,16 +261,16 @@ def noted(place: Path) -> list[dict[str, Any]]:
     return lines
 
 
-def seconds_of(place: Path, target: str) -> float:
-    """Returns for how long a target has run in all [s]."""
-    return math.fsum(line["seconds"] for line in noted(place) if line["target"] == target)
+def processor_time_of(place: Path, target: str) -> float:
+    """Returns the processor time that a target has had in all [s]."""
+    return math.fsum(line["processor"] for line in noted(place) if line["target"] == target)
 
 
 def table(place: Path) -> str:
     """Returns the sums of the ledger as a table in Markdown."""
     lines = noted(place)
     rows = [
-        "| target | runs | inputs | edges reached | s | findings |",
+        "| target | runs | inputs | edges reached | processor time, s | findings |",
         "|---|---|---|---|---|---|",
     ]
     for target in sorted({line["target"] for line in lines}):
@@ -254,7 +279,7 @@ def table(place: Path) -> str:
         edges = f"{max(line['covered'] for line in of):,}"
         rows.append(
             f"| {target} | {len(of)} | {inputs:,} | {'not measured' if edges == '0' else edges} "
-            f"| {seconds_of(place, target):,.0f} | {found} |"
+            f"| {processor_time_of(place, target):,.0f} | {found} |"
         )
     if lines:
         rows += ["", f"From {lines[0]['finished']} to {lines[-1]['finished']}."]
@@ -279,7 +304,7 @@ def main(arguments: Sequence[str]) -> int:
             f"targets: {', '.join(known)}"
         )
         return 2
-    chosen = sorted(arguments[1:] or known, key=partial(seconds_of, place))
+    chosen = sorted(arguments[1:] or known, key=partial(processor_time_of, place))
     share = int(arguments[0]) / len(chosen)
     if set(chosen) != {READERS}:
         build(place, [target for target in chosen if target != READERS])
