@@ -3,6 +3,7 @@
 
 #include <float.h>
 #include <math.h>
+#include <stddef.h>
 #include <string.h>
 
 #include "hexapod/message.h"
@@ -10,14 +11,20 @@
 /* ----------------------------------------------------------------------------------------------
  * rates of inputs */
 
+/* The number of a Real input. */
+static double *number_of(hxInput *input, const hxVariable *variable) {
+  const size_t offset = variable->offset - offsetof(struct hxVariables, input);
+  return (double *)(void *)((char *)input + offset);
+}
+
 hxStatus hx_instance_set_input_rates(hxInstance *instance, const unsigned reference[], size_t n,
                                      const double rate[]) {
-  struct hxVariables ramp;
+  hxInput ramp;
   hxCausality causality;
   if (instance->state.ramped)
-    ramp.input = instance->state.input_rate;
+    ramp = instance->state.input_rate;
   else
-    memset(&ramp.input, 0, sizeof ramp.input);
+    memset(&ramp, 0, sizeof ramp);
   for (size_t i = 0; i < n; i++) {
     const hxVariable *variable = hx_variable_of_type(instance, HX_REAL, reference[i], &causality);
     if (!variable) return HX_INVALID_ARGUMENT;
@@ -27,9 +34,9 @@ hxStatus hx_instance_set_input_rates(hxInstance *instance, const unsigned refere
              variable->name, rate[i]);
       return HX_INVALID_ARGUMENT;
     }
-    *hx_variable_place(&ramp, variable) = rate[i];
+    *number_of(&ramp, variable) = rate[i];
   }
-  instance->state.input_rate = ramp.input;
+  instance->state.input_rate = ramp;
   instance->state.ramped = 1;
   return HX_OK;
 }
@@ -37,29 +44,25 @@ hxStatus hx_instance_set_input_rates(hxInstance *instance, const unsigned refere
 /* Calculates the input at the end of the next step of size h. Refuses rates that take an input out
  * of its range. */
 static hxStatus ramp_end(hxInstance *instance, double h, hxInput *end) {
-  struct hxVariables *variables = &instance->state.variables, ramp, after;
   const hxSection *inputs = &hx_sections[HX_INPUT];
-  if (!instance->state.ramped) {
-    *end = variables->input;
-    return HX_OK;
-  }
-  ramp.input = instance->state.input_rate;
-  after.input = variables->input;
+  *end = instance->state.variables.input;
+  if (!instance->state.ramped) return HX_OK;
   for (unsigned i = 0; i < inputs->count; i++) {
     const hxVariable *variable = &inputs->variable[i];
-    const double rate = variable->type == HX_REAL ? *hx_variable_place(&ramp, variable) : 0.0;
+    if (variable->type != HX_REAL) continue;
+    const double rate = *number_of(&instance->state.input_rate, variable);
+    double *value = number_of(end, variable);
     if (rate == 0.0) continue;
-    *hx_variable_place(&after, variable) += h * rate;
-    if (!hx_variable_in_range(variable, *hx_variable_place(&after, variable))) {
+    *value += h * rate;
+    if (!hx_variable_in_range(variable, *value)) {
       hx_log(instance, HX_LOG_ERROR,
              "%s: got a derivative that takes it to %g, expected one that leaves it in [%g, "
              "%g]%s%s; the state is unchanged",
-             variable->name, *hx_variable_place(&after, variable), variable->min, variable->max,
-             hx_unit_gap(variable->unit), variable->unit);
+             variable->name, *value, variable->min, variable->max, hx_unit_gap(variable->unit),
+             variable->unit);
       return HX_INVALID_ARGUMENT;
     }
   }
-  *end = after.input;
   return HX_OK;
 }
 

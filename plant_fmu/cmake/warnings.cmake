@@ -8,13 +8,18 @@ else()
   set(HX_WARNINGS -Wall -Wextra -Wpedantic -Wconversion -Wno-sign-conversion -Wshadow
     -Wstrict-prototypes -Wmissing-prototypes -Wvla
     -Werror=implicit-function-declaration) # else C takes the result for an int, whatever it is
+  if(CMAKE_C_COMPILER_ID MATCHES "Clang")
+    list(APPEND HX_WARNINGS
+      -Wno-unknown-warning-option      # names that older compilers lack
+      -Wno-enum-float-conversion       # sizes are enumerators, and a mean is a sum over a size
+      -Wno-keyword-macro)              # src/tangent.c defines double as complex
+  endif()
 endif()
 
 if(HX_LINT)
   list(APPEND HX_WARNINGS -Werror)
   if(CMAKE_C_COMPILER_ID MATCHES "Clang")
     list(APPEND HX_WARNINGS -Weverything
-      -Wno-unknown-warning-option      # names below that older compilers lack
       # about other languages and standards: this is C11
       -Wno-declaration-after-statement # C89
       -Wno-pre-c11-compat              # C99
@@ -26,9 +31,7 @@ if(HX_LINT)
       -Wno-padded                      # structures are ordered for readers
       -Wno-comma                       # short assignments that belong together stand on one line
       -Wno-float-equal                 # compared values were assigned, not calculated; 0: none
-      -Wno-anon-enum-enum-conversion   # sizes are enumerators, products of sizes too
-      -Wno-enum-float-conversion       # and a mean is a sum over a size
-      -Wno-keyword-macro               # src/tangent.c defines double as complex
+      -Wno-anon-enum-enum-conversion   # products of sizes are enumerators, too
       # about correct code that cannot be written otherwise
       -Wno-conditional-uninitialized   # vectors that loops over constant bounds fill
       -Wno-double-promotion            # the C library's NAN and INFINITY are floats

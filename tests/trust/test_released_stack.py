@@ -1,0 +1,42 @@
+"""The stack that calls of the cross-compiled binaries take, which are those of a release: zig
+inlines other functions than the compiler of this machine, with which tests/native are built.
+"""
+
+from __future__ import annotations
+
+import platform
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from hexapod_cosim.cosim.common.components import CONTROLLER, PLANT, Component
+from hexapod_cosim.cosim.common.plant_files import fmi_headers
+from hexapod_cosim.cosim.export.cross_build import build_library
+from hexapod_cosim.cosim.export.platforms import component_library
+
+ROOT = Path(__file__).parents[2]
+
+
+@pytest.mark.skipif(
+    sys.platform != "linux" or platform.machine() != "x86_64",
+    reason="the program that measures is for Linux on x86-64",
+)
+@pytest.mark.skipif(shutil.which("cc") is None, reason="needs a C compiler")
+@pytest.mark.parametrize(
+    ("component", "folder"), [(PLANT, "plant_fmu"), (CONTROLLER, "controller_fmu")]
+)
+def test_no_call_of_a_released_binary_takes_more_than_48_kb_of_stack(
+    component: Component, folder: str, tmp_path: Path
+) -> None:
+    library, program = tmp_path / "library.so", tmp_path / "measure"
+    library.write_bytes(build_library(component_library(component), "x86_64-linux"))
+    source = ROOT / "tests" / "native" / "test_stack_fmi.c"
+    command = ["cc", "-O1", f"-I{fmi_headers()}", "-o", program, source, library, "-lpthread", "-lm"]
+    subprocess.run([*command, f"-Wl,-rpath,{tmp_path}"], check=True)
+    description = ROOT / folder / "generated" / "modelDescription.xml"
+    done = subprocess.run([program, description], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "FMI 2.0: inputs, step" in done.stdout
