@@ -1,7 +1,7 @@
 """A change of gait while the robot walks: when the controller is told, and how fast the robot walks
 meanwhile.
 
-Feet stand longer during a change than in either gait and need more reach (docs/control.md, C55). So
+Feet stand longer during a change than in either gait and need more reach (docs/control/gait.md, C55). So
 the robot walks slowly from the request until every leg has made a step in the next gait.
 """
 
@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from hexapod_cosim.controller import BodyCommand, Gait
 from hexapod_cosim.cosim.live.settings import Limits
 
-SHARE = 0.3  # of the commands that both gaits allow: no leg reaches its limits (docs/control.md)
+SHARE = 0.3  # of the commands that both gaits allow: no leg reaches its limits (docs/control/gait.md)
 ROUNDING = 1e-9
 
 
