@@ -250,7 +250,8 @@ def test_the_robustness_table_shows_both_figures_and_the_fallback() -> None:
 def test_tables_take_their_place_in_the_pages_and_the_rest_stays(tmp_path: Path) -> None:
     pages = [tmp_path / "one.md", tmp_path / "two.md"]
     for page, name in zip(pages, "ab", strict=True):
-        page.write_text(f"Before.\n<!-- control:{name} -->\nold\n<!-- /control:{name} -->\nAfter.\n")
+        place = f"<!-- control:{name} -->\nold\n<!-- /control:{name} -->"
+        page.write_text(f"Before.\n{place}\nAfter.\n")
     for table in ("new", "newer"):
         put_into(pages, {name: f"| {table} {name} |" for name in "ab"})
     texts = [
