@@ -28,13 +28,14 @@ from benchmarks.control.measure import Measured, Section, measure
 from benchmarks.control.tables import changes_table, put_into, refused, robustness_table, write_csv
 from hexapod_cosim.models import HexapodError
 
-PAGE, RESULTS = ROOT / "docs" / "control.md", ROOT / "benchmarks" / "results" / "control"
+PAGES = tuple(ROOT / "docs" / "control" / name for name in ("parts.md", "results.md"))
+RESULTS = ROOT / "benchmarks" / "results" / "control"
 QUICK_SEEDS, QUICK_CYCLES = 2, 3.0  # the smallest numbers that give metrics
 QUICK_CASES = 8  # every n-th case of a section, counted from the last
 
 
 def sections() -> list[Section]:
-    """Returns the sections of the page, one for each table."""
+    """Returns the sections of the pages, one for each table."""
     judged = seeds("judged")
     grids = [
         Section(name=f"grid {robot}", cases=grid(robot), seeds=judged)
@@ -107,7 +108,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             quick(chosen) if given.quick else chosen, QUICK_CYCLES if given.quick else None
         )
         expect_walks(measured)
-        kept = write(measured, page=None if given.quick or given.tuning else PAGE)
+        kept = write(measured, pages=() if given.quick or given.tuning else PAGES)
     except HexapodError as error:
         print(f"benchmarks.control: {error}", file=sys.stderr)
         return 1
@@ -140,16 +141,16 @@ def walked(chosen: Sequence[Section], cycles: float | None) -> Measured:
         )
 
 
-def write(measured: Measured, *, page: Path | None) -> Path:
-    """Writes CSV files, and the tables into the page if given; returns the folder of the CSV
+def write(measured: Measured, *, pages: Sequence[Path]) -> Path:
+    """Writes CSV files, and the tables into the pages if given; returns the folder of the CSV
     files.
     """
-    folder = BUILD / "control" if page is None else RESULTS
+    folder = RESULTS if pages else BUILD / "control"
     folder.mkdir(parents=True, exist_ok=True)
     for name, cases in measured.items():
         write_csv(folder / f"{name.replace(' ', '_')}.csv", cases)
-    if page is not None:
-        put_into(page, tables(measured))
+    if pages:
+        put_into(pages, tables(measured))
     return folder
 
 

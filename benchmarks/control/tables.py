@@ -1,4 +1,4 @@
-"""Writes the measurements as Markdown between the markers of docs/control.md, and as CSV."""
+"""Writes the measurements as Markdown between the markers of pages in docs/control, and as CSV."""
 
 from __future__ import annotations
 
@@ -151,25 +151,27 @@ def _markdown(headings: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
     )
 
 
-def put_into(page: Path, tables: Mapping[str, str]) -> None:
-    """Replaces what stands between the markers of each table; the rest of the page stays. Raises
-    HexapodError for a missing marker.
+def put_into(pages: Sequence[Path], tables: Mapping[str, str]) -> None:
+    """Replaces what stands between the markers of each table, on the page that has them; the rest
+    of the pages stays. Raises HexapodError for a missing marker; then no page is changed.
     """
-    text = page.read_text(encoding="utf-8")
+    texts = {page: page.read_text(encoding="utf-8") for page in pages}
     for name, table in tables.items():
         begin, end = BEGIN.format(name), END.format(name)
-        head, found, rest = text.partition(begin)
+        page = next((page for page, text in texts.items() if begin in text), pages[0])
+        head, found, rest = texts[page].partition(begin)
         _, closed, tail = rest.partition(end)
         if not found or not closed:
             missing = end if found else begin
             raise HexapodError(
-                "the page has no place for a table",
+                "the pages have no place for a table",
                 expected=f"a line {missing}",
                 fix="add it",
-                where=str(page),
+                where=str(page) if found else ", ".join(map(str, pages)),
             )
-        text = f"{head}{begin}\n\n{table}\n\n{end}{tail}"
-    write_text(page, text)
+        texts[page] = f"{head}{begin}\n\n{table}\n\n{end}{tail}"
+    for page, text in texts.items():
+        write_text(page, text)
 
 
 def write_csv(path: Path, cases: Cases) -> None:

@@ -1,8 +1,8 @@
 """A change of gait while the robot walks: when the controller is told, and how fast the robot walks
 meanwhile.
 
-Feet stand longer during a change than in either gait and need more reach (docs/control.md, C55). So
-the robot walks slowly from the request until every leg has made a step in the next gait.
+Feet stand longer during a change than in either gait and need more reach (docs/control/gait.md,
+C55). So the robot walks slowly from the request until every leg has made a step in the next gait.
 """
 
 from __future__ import annotations
@@ -12,7 +12,8 @@ from dataclasses import dataclass
 from hexapod_cosim.controller import BodyCommand, Gait
 from hexapod_cosim.cosim.live.settings import Limits
 
-SHARE = 0.3  # of the commands that both gaits allow: no leg reaches its limits (docs/control.md)
+# of the commands that both gaits allow: no leg reaches its limits (docs/control/gait.md)
+SHARE = 0.3
 ROUNDING = 1e-9
 
 

@@ -48,7 +48,7 @@ def test_the_squeeze_follows_the_hottest_servo(share: float, expected: float) ->
 
 
 def test_the_weight_of_the_squeeze_is_no_steeper_than_the_design_page_says() -> None:
-    """The margins of its loops, which docs/control.md gives, follow from these slopes."""
+    """The margins of its loops, which docs/control/design.md gives, follow from these slopes."""
     held, work = [], []
     for share in np.linspace(0.7, 0.9, 401):
         warmth = make(0.6)

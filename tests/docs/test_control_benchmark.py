@@ -247,24 +247,28 @@ def test_the_robustness_table_shows_both_figures_and_the_fallback() -> None:
     assert "Left out: a giant. legs too short" in table
 
 
-def test_tables_take_their_place_in_the_page_and_the_rest_stays(tmp_path: Path) -> None:
-    page = tmp_path / "page.md"
-    page.write_text("Before.\n<!-- control:a -->\nold\n<!-- /control:a -->\nAfter.\n")
-    for table in ("| new |", "| newer |"):
-        put_into(page, {"a": table})
-    assert (
-        page.read_text()
-        == "Before.\n<!-- control:a -->\n\n| newer |\n\n<!-- /control:a -->\nAfter.\n"
-    )
-    with pytest.raises(HexapodError, match="<!-- control:b -->"):
-        put_into(page, {"b": "| new |"})
+def test_tables_take_their_place_in_the_pages_and_the_rest_stays(tmp_path: Path) -> None:
+    pages = [tmp_path / "one.md", tmp_path / "two.md"]
+    for page, name in zip(pages, "ab", strict=True):
+        place = f"<!-- control:{name} -->\nold\n<!-- /control:{name} -->"
+        page.write_text(f"Before.\n{place}\nAfter.\n")
+    for table in ("new", "newer"):
+        put_into(pages, {name: f"| {table} {name} |" for name in "ab"})
+    texts = [
+        "Before.\n<!-- control:a -->\n\n| newer a |\n\n<!-- /control:a -->\nAfter.\n",
+        "Before.\n<!-- control:b -->\n\n| newer b |\n\n<!-- /control:b -->\nAfter.\n",
+    ]
+    assert [page.read_text() for page in pages] == texts
+    with pytest.raises(HexapodError, match="<!-- control:c -->"):
+        put_into(pages, {"a": "| newest |", "c": "| new |"})
+    assert [page.read_text() for page in pages] == texts
 
 
-def test_the_page_has_a_place_for_every_table() -> None:
-    text = command.PAGE.read_text(encoding="utf-8")
+def test_the_pages_have_one_place_for_every_table() -> None:
+    text = "".join(page.read_text(encoding="utf-8") for page in command.PAGES)
     for section in command.sections():
-        assert f"<!-- control:{section.name} -->" in text
-        assert f"<!-- /control:{section.name} -->" in text
+        assert text.count(f"<!-- control:{section.name} -->") == 1
+        assert text.count(f"<!-- /control:{section.name} -->") == 1
 
 
 def test_the_csv_has_a_line_per_case_and_figure_of_merit(tmp_path: Path) -> None:
@@ -280,14 +284,14 @@ def test_the_csv_has_a_line_per_case_and_figure_of_merit(tmp_path: Path) -> None
     assert lines[-1].startswith("two,2,0,0,slip_per_radian,,,")
 
 
-def test_the_command_walks_a_quick_section_without_touching_the_page(
+def test_the_command_walks_a_quick_section_without_touching_the_pages(
     plant_build: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    before = command.PAGE.read_bytes()
+    before = [page.read_bytes() for page in command.PAGES]
     assert command.main(["--quick", "--only", "robustness"]) == 0
     out = capsys.readouterr().out
     assert "| slope of 10 degrees, upwards | 2 → 2 of 2 |" in out
-    assert command.PAGE.read_bytes() == before
+    assert [page.read_bytes() for page in command.PAGES] == before
 
 
 def test_an_unknown_section_is_refused_with_the_names_there_are(

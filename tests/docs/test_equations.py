@@ -1,7 +1,7 @@
 """Equations of docs/equations.md: numbered in the order of the page, and every citation names one.
 
 A citation is `eq. N`, `eq. N-M`, or a list of these. The source's own equations are cited as
-`paper eq. N`, control laws of docs/control.md as `eq. CN`.
+`paper eq. N`, control laws of docs/control/ as `eq. CN`.
 """
 
 from __future__ import annotations
