@@ -34,8 +34,8 @@ def test_no_call_of_a_released_binary_takes_more_than_48_kb_of_stack(
     library, program = tmp_path / "library.so", tmp_path / "measure"
     library.write_bytes(build_library(component_library(component), "x86_64-linux"))
     source = ROOT / "tests" / "native" / "test_stack_fmi.c"
-    command = ["cc", "-O1", f"-I{fmi_headers()}", "-o", program, source, library, "-lpthread", "-lm"]
-    subprocess.run([*command, f"-Wl,-rpath,{tmp_path}"], check=True)
+    options = [f"-I{fmi_headers()}", f"-Wl,-rpath,{tmp_path}", "-lpthread", "-lm"]
+    subprocess.run(["cc", "-o", program, source, library, *options], check=True)
     description = ROOT / folder / "generated" / "modelDescription.xml"
     done = subprocess.run([program, description], capture_output=True, text=True, check=False)
     assert (done.returncode, done.stderr) == (0, "")
