@@ -68,7 +68,7 @@ def test_environments_without_a_seed_differ_though_their_generator_was_used_befo
 def test_a_vector_has_no_picture_before_its_reset() -> None:
     envs = HexapodVectorEnv(2, render_mode="rgb_array")
     try:
-        with pytest.raises(gymnasium.error.ResetNeeded, match="render: .*reset of 2 environments"):
+        with pytest.raises(gymnasium.error.ResetNeeded, match=r"render: .*reset of 2 environments"):
             envs.render()
     finally:
         envs.close()
