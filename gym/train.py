@@ -34,7 +34,7 @@ WALKING = {
     "power": -0.02,
     "torques": -0.01,
     "action_rate": -0.05,
-    "feet_slip": -2.0,
+    "feet_slip": -3.5,
     "termination": -5.0,
 }
 
