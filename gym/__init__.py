@@ -6,6 +6,16 @@ Importing this package registers `Hexapod-v0`, `HexapodRough-v0`, `HexapodSoil-v
 
 from __future__ import annotations
 
+from importlib.util import find_spec
+
+from hexapod_cosim.cosim.common.installation import install_extra
+
+if find_spec("gymnasium") is None:
+    raise ModuleNotFoundError(
+        f"hexapod_cosim.gym needs gymnasium, which is not installed; {install_extra('gym')}",
+        name="gymnasium",
+    )
+
 from hexapod_cosim.gym.registration import register_all
 
 register_all()

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from hexapod_cosim.cosim.common.files import atomic_path
@@ -35,6 +36,7 @@ def parser() -> argparse.ArgumentParser:
     trained = commands.add_parser("train", help="trains a policy; Ctrl-C ends it early")
     trained.add_argument("-o", "--output", type=Path, required=True, help="the policy's .npz file")
     trained.add_argument("--env", default=DEFAULT, help=f"environment ({DEFAULT})")
+    trained.add_argument("--robot", default="athena", help="name or file of the robot (athena)")
     trained.add_argument("--minutes", type=float, default=8.0, help="of training (8)")
     trained.add_argument("--generations", type=int, default=100_000, help="at most")
     trained.add_argument("--seed", type=int, default=0, help="of the random numbers (0)")
@@ -70,8 +72,9 @@ def run(given: argparse.Namespace) -> None:
         print(bench(count=given.envs, duration=given.seconds))
     elif given.command == "train":
         how = TrainSettings(minutes=given.minutes, generations=given.generations, seed=given.seed)
+        settings = replace(training_settings(task(given.env)), robot=given.robot)
         with atomic_path(given.output) as part:  # refuses a bad place before the training
-            train(training_settings(task(given.env)), how, show).save(part)
+            train(settings, how, show).save(part)
         print(f"wrote {given.output}")
     else:
         policy = load_policy(given.policy)

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import ctypes as ct
 import os
-import threading
+import weakref
 from collections.abc import Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
@@ -37,6 +37,7 @@ from hexapod_cosim.gym.native import (
     NativeSettings,
     environments_library,
 )
+from hexapod_cosim.gym.owned import Owned
 from hexapod_cosim.gym.plants import (
     CONTROL_PERIOD,
     export_base,
@@ -53,6 +54,7 @@ from hexapod_cosim.models import FmuError, HexapodError, Robot
 AUTORESET = ("next_step", "same_step", "disabled")  # hxAutoreset in C
 FAILED = REASONS.index("failed")
 MESSAGE_SIZE = 512
+STARTS = 20  # episodes in a row that a plant may refuse to start before a reset is an error
 GROUND = "terrain.grid"  # the parameter that chooses one of several grounds, from 1
 # outputs of the plant in the order of hxEnvPlace
 OUTPUTS = [
@@ -101,7 +103,8 @@ class Batch(Closing):
         check_count("number of threads", self.threads)
         check_names([autoreset], "autoreset mode", AUTORESET)
         self.settings, self.count, self.autoreset = settings, count, autoreset
-        self._all, self._servers, self._fmus = None, list[threading.Thread](), list[Fmu]()
+        self._owned = Owned()
+        self._end = weakref.finalize(self, self._owned.free)  # for those who do not close
         self._kept: list[Any] = []
         try:
             self._open()
@@ -114,26 +117,22 @@ class Batch(Closing):
         robots = grounds(self.settings)
         self.robot, self._robots = robots[0], robots
         with TemporaryDirectory(prefix="hexapod-gym-") as folder:
-            self._fmus.append(Fmu(export_plant(robots, Path(folder))))
+            fmus = self._owned.fmus
+            fmus.append(Fmu(export_plant(robots, Path(folder))))
             if self.settings.base != "stance":
-                self._fmus.append(Fmu(export_base(self.settings, self.robot, Path(folder))))
+                fmus.append(Fmu(export_base(self.settings, self.robot, Path(folder))))
         self._allocate()
         native = self._native_settings(robots)
         arrays = NativeArrays(**{name: getattr(self, name).ctypes.data for name in ARRAYS})
         message = ct.create_string_buffer(MESSAGE_SIZE)
         self._library = environments_library()
-        self._all = self._library.hx_environments_create(
+        self._owned.handle = self._library.hx_environments_create(
             ct.byref(native), ct.byref(arrays), self.count, message
         )
-        if not self._all:
+        if not self._owned.handle:
             got = message.value.decode(errors="replace")
             raise FmuError("the environments cannot be created", got=got, fix="use fewer")
-        for _ in range(self.threads - 1):
-            server = threading.Thread(
-                target=self._library.hx_environments_serve, args=(self._all,), daemon=True
-            )
-            server.start()
-            self._servers.append(server)
+        self._owned.serve(self.threads - 1)
 
     def _allocate(self) -> None:
         """Allocates the arrays that are exchanged with C."""
@@ -167,7 +166,7 @@ class Batch(Closing):
 
     def _native_settings(self, robots: Sequence[Robot]) -> NativeSettings:
         """Returns the settings as C reads them."""
-        given, plant = self.settings, self._fmus[0]
+        given, plant = self.settings, self._owned.fmus[0]
         stance = np.array([leg.stance for leg in self.robot.legs])
         commands = (given.command_vx, given.command_vy, given.command_yaw_rate)
         native = NativeSettings(
@@ -198,7 +197,7 @@ class Batch(Closing):
             native.observed[place][:] = np.broadcast_to(given.observation.get(name, 0.0), 3)
         if "heights" in given.observation:
             native.ground = self._ground()
-        if len(self._fmus) > 1:
+        if len(self._owned.fmus) > 1:
             self._add_controller(native)
         return native
 
@@ -227,7 +226,7 @@ class Batch(Closing):
 
     def _add_controller(self, native: NativeSettings) -> None:
         """Adds the controller to the settings as C reads them."""
-        controller = self._fmus[1]
+        controller = self._owned.fmus[1]
         native.controller = self._fmu(controller)
         sensed = [name for key in SENSED for name in MEASURED[key]]
         native.controller_input = self._references(controller, [*COMMANDS, *sensed])
@@ -250,7 +249,7 @@ class Batch(Closing):
             self._check_parameter(name)
         low, high, whole = ([ends[place] for ends in drawn.values()] for place in range(3))
         return NativeDraws(
-            reference=self._references(self._fmus[0], self.drawn_names),
+            reference=self._references(self._owned.fmus[0], self.drawn_names),
             low=self._keep(low, float),
             high=self._keep(high, float),
             whole=self._keep(whole, np.int32),
@@ -265,8 +264,8 @@ class Batch(Closing):
         ends = self.settings.randomise.get(name)
         if ends is not None:
             for value in ends:
-                self._fmus[0].set_parameters({name: float(value)})
-        if name not in self._fmus[0].names("parameter"):
+                self._owned.fmus[0].set_parameters({name: float(value)})
+        if name not in self._owned.fmus[0].names("parameter"):
             raise FmuError(
                 "a parameter that cannot be drawn",
                 got=name,
@@ -279,22 +278,27 @@ class Batch(Closing):
     ) -> None:
         """Starts an episode in all environments, or in those of a mask (count,).
 
+        An episode whose start the plant refuses is followed by the next one.
+
         seeds: one for each environment, from which its episodes begin again; None: the next
-        episodes. Raises FmuError when a plant refuses its start.
+        episodes. Raises FmuError when a plant refuses STARTS episodes in a row.
         """
         if seeds is not None:
             check_seeds(seeds, self.count)
         numbers = None if seeds is None else np.array(seeds, dtype=np.uint64)
-        chosen = None if mask is None else checked_mask(mask, self.count)
-        self._library.hx_environments_reset(
-            self._handle(),
-            None if chosen is None else chosen.ctypes.data,
-            None if numbers is None else numbers.ctypes.data,
-        )
-        failed = np.flatnonzero(self.reason == FAILED)
-        if failed.size:
-            got = self.message(int(failed[0]))
-            raise FmuError(f"environment {failed[0]} cannot start", got=got)
+        starting = np.ones(self.count, np.uint8) if mask is None else checked_mask(mask, self.count)
+        for _ in range(STARTS):
+            self._library.hx_environments_reset(
+                self._handle(),
+                starting.ctypes.data,
+                None if numbers is None else numbers.ctypes.data,
+            )
+            starting = np.where(self.reason == FAILED, starting, np.uint8(0))
+            if not starting.any():
+                return
+            numbers = None
+        failed = int(np.flatnonzero(starting)[0])
+        raise FmuError(f"environment {failed} cannot start", got=self.message(failed))
 
     def step(self) -> None:
         """Steps all environments under `action`.
@@ -326,18 +330,10 @@ class Batch(Closing):
         return frame(self.robot, self._maps, number, self.values(index))
 
     def _handle(self) -> int:
-        if self._all is None:
+        if self._owned.handle is None:
             raise HexapodError("the environments are closed", fix="create new ones")
-        return int(self._all)
+        return self._owned.handle
 
     def close(self) -> None:
         """Ends the threads and frees the environments; may be called twice."""
-        handle, self._all = self._all, None
-        if handle:
-            self._library.hx_environments_stop(handle)
-            for server in self._servers:
-                server.join()
-            self._library.hx_environments_destroy(handle)
-        for fmu in self._fmus:
-            fmu.close()
-        self._fmus.clear()
+        self._end()

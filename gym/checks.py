@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from numbers import Integral, Real
 from typing import Any
 
@@ -35,6 +35,12 @@ def check_names(names: Iterable[str], what: str, valid: Iterable[str]) -> None:
     for name in names:
         if name not in valid:
             raise unknown_name(what, name, list(valid))
+
+
+def check_mapping(name: str, given: object) -> None:
+    """Checks that a value is a table whose keys are names."""
+    if not isinstance(given, Mapping) or not all(isinstance(key, str) for key in given):
+        raise refused(name, given, "a table (a dict) from names to values")
 
 
 def check_number(

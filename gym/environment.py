@@ -46,22 +46,22 @@ class HexapodEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         self.action_space = action_space()
         self.observation_space = observation_space(self.settings)
         self._batch = Batch(self.settings, 1, threads=1, autoreset="disabled")
-        self._going = False
+        self._seeded = self._going = False
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[NDArray[np.float32], dict[str, Any]]:
         """Starts an episode; returns the observation and the drawn parameters.
 
-        Episodes after a seed are the same for the same seed. Raises FmuError when the plant refuses
-        its start.
+        Episodes after a seed are the same for the same seed. An episode whose start the plant
+        refuses is followed by the next one. Raises FmuError when it refuses 20 in a row.
         """
-        first = seed is None and self._np_random is None
         super().reset(seed=seed)
-        if first:
+        if seed is None and not self._seeded:
             seed = int(self.np_random.integers(LARGEST_SEED))
+        self._going = False
         self._batch.reset(seeds=None if seed is None else [seed])
-        self._going = True
+        self._seeded = self._going = True
         return self._batch.observation[0].copy(), {"drawn": self._batch.drawn(0)}
 
     def step(
@@ -101,7 +101,7 @@ class HexapodEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         if self.render_mode is None:
             gymnasium.logger.warn('render: pass render_mode="rgb_array" to gymnasium.make')
             return None
-        if self._np_random is None:
+        if not self._seeded:
             raise gymnasium.error.ResetNeeded("render: the robot has no state yet; call reset")
         return self._batch.frame(0)
 

@@ -12,6 +12,7 @@ from typing import Any
 
 from hexapod_cosim.gym.checks import (
     check_count,
+    check_mapping,
     check_names,
     check_number,
     check_range,
@@ -66,6 +67,7 @@ NOT_NEGATIVE = (
     *("clock", "scan_length", "scan_width", "command_interval"),
     *("push_force", "belly_force", "pad_radius"),
 )
+MAPPINGS = ("terrain", "observation", "rewards", "randomise")
 TIMES = ("duration", "push_interval", "push_duration")  # at least one step
 
 Range = tuple[float, float]
@@ -153,11 +155,13 @@ class EnvSettings:
     # plant parameters drawn for each episode, as factors of a study: name -> (lowest, highest)
     randomise: Mapping[str, Range] = field(default_factory=dict)
     solver: str = "ros2"
-    tolerance: float = 0.005  # 0.6 mm of path error in 10 s of a tripod gait
+    tolerance: float = 0.005  # 0.85 mm of path error in 10 s of a tripod gait
     step_max: float = 0.02  # s
 
     def __post_init__(self) -> None:
         """Checks names and numbers."""
+        for name in MAPPINGS:
+            check_mapping(name, getattr(self, name))
         check_names(self.rewards, "term of the reward", TERMS)
         check_names(self.observation, "block of the observation", BLOCKS)
         check_names([self.base], "base of actions", BASES)

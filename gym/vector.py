@@ -100,6 +100,9 @@ class HexapodVectorEnv(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDArr
         """Starts an episode in all environments, or in those of options["reset_mask"].
 
         seed: one for each environment, or a number s: environment i has the seed s + i.
+
+        An episode whose start the plant refuses is followed by the next one. Raises FmuError when
+        it refuses 20 in a row.
         """
         mask = None if options is None else options.get("reset_mask")
         chosen = slice(None) if mask is None else checked_mask(mask, self.num_envs) > 0
@@ -135,11 +138,7 @@ class HexapodVectorEnv(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDArr
         environment.
         """
         batch = self._batch
-        if not self._begun.all():
-            raise gymnasium.error.ResetNeeded(
-                f"step: got a call before the reset of {np.count_nonzero(~self._begun)} "
-                "environments, expected one after it; call reset"
-            )
+        self._check_begun("step")
         batch.action[...] = checked(actions, (self.num_envs, JOINTS))
         batch.step()
         return (
@@ -149,6 +148,14 @@ class HexapodVectorEnv(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDArr
             self._given(batch.truncated),
             self._info(),
         )
+
+    def _check_begun(self, call: str) -> None:
+        """Raises ResetNeeded unless each environment has been reset."""
+        if not self._begun.all():
+            raise gymnasium.error.ResetNeeded(
+                f"{call}: got a call before the reset of {np.count_nonzero(~self._begun)} "
+                "environments, expected one after it; call reset"
+            )
 
     def _info(self) -> dict[str, Any]:
         batch = self._batch
@@ -183,9 +190,13 @@ class HexapodVectorEnv(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDArr
         return found
 
     def render(self) -> tuple[NDArray[np.uint8], ...] | None:
-        """Returns a picture (360, 480, 3) of each robot, None without a render mode."""
+        """Returns a picture (360, 480, 3) of each robot, None without a render mode.
+
+        Raises ResetNeeded before the first reset of each environment.
+        """
         if self.render_mode is None:
             return None
+        self._check_begun("render")
         return tuple(self._batch.frame(index) for index in range(self.num_envs))
 
     def _given(self, array: NDArray[Any]) -> NDArray[Any]:

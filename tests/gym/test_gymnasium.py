@@ -13,6 +13,7 @@ from gymnasium.utils.env_checker import check_env
 from gymnasium.vector import AutoresetMode
 
 from hexapod_cosim.gym.environment import HexapodEnv
+from hexapod_cosim.gym.settings import BLOCKS, LEGGED_GYM
 from hexapod_cosim.gym.tasks import TASKS
 from hexapod_cosim.gym.vector import HexapodVectorEnv
 from hexapod_cosim.models import HexapodError
@@ -200,6 +201,19 @@ def test_an_episode_that_cannot_start_ends_with_its_message_and_is_followed_by_a
         assert "deep in the ground" in infos[place]["message"][0]
     later = [info["reason"][0] for info in infos[failed[0] + 1 :] if "reason" in info]
     assert "time" in later
+
+
+def test_the_page_has_the_places_and_scales_of_the_observation() -> None:
+    page = (ROOT / "docs" / "learning.md").read_text(encoding="utf-8")
+    rows = re.findall(r"\| (\d+)-(\d+) \| `(\w+)`.*\| ([\d., ]+) \|$", page, flags=re.MULTILINE)
+    assert [row[2] for row in rows] == list(LEGGED_GYM)
+    begin = 0
+    for first, last, name, scale in rows:
+        assert (int(first), int(last)) == (begin, begin + BLOCKS[name] - 1)
+        begin += BLOCKS[name]
+        wanted = np.broadcast_to(LEGGED_GYM[name], 3)
+        assert np.broadcast_to([float(one) for one in scale.split(",")], 3) == pytest.approx(wanted)
+    assert begin == 66
 
 
 def test_the_examples_of_the_page_work_as_typed(capsys: pytest.CaptureFixture[str]) -> None:

@@ -141,6 +141,33 @@ def test_training_is_repeatable_and_leaves_the_standing_policy() -> None:
     assert np.abs(first - standing_policy("athena")(np.ones(INPUTS))).max() > 0.01
 
 
+def test_training_pays_a_standing_robot_little_for_a_commanded_speed() -> None:
+    settings = replace(
+        training_settings(task("Hexapod-v0")),
+        command_vx=(0.1, 0.1),
+        rewards={"tracking_lin_vel": 1},
+    )
+    with Batch(settings, 1, threads=1) as batch:
+        batch.reset(seeds=[1])
+        batch.step()
+        # exp(-(0.1 / 0.05)^2) = 0.018 of the whole, less or more with the first movements
+        assert batch.reward[0] / 0.02 < 0.05
+
+
+def test_the_command_trains_another_robot(tmp_path: Path) -> None:
+    policy, fmu = tmp_path / "policy.npz", tmp_path / "policy.fmu"
+    robot = ["--robot", "phantomx_mk4"]
+    assert main(["train", "-o", str(policy), "--minutes", "0.001", *robot]) == 0
+    assert load_policy(policy).robot == "phantomx_mk4"
+    assert main(["export", str(policy), "-o", str(fmu), *robot]) == 0
+    assert fmu.is_file()
+
+
+def test_the_bench_refuses_a_time_below_a_step(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["bench", "--seconds", "-1"]) == 2
+    assert "seconds: got -1.0" in capsys.readouterr().err
+
+
 def test_the_command_trains_and_exports(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     policy, fmu = tmp_path / "policy.npz", tmp_path / "policy.fmu"
     assert main(["list"]) == 0
