@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-import hashlib
-import tempfile
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import tomlkit
-from filelock import FileLock, Timeout
 
 from hexapod_cosim.cosim.common.files import (
     RUN_FILE,
@@ -22,6 +19,7 @@ from hexapod_cosim.cosim.common.files import (
     write_json,
     write_text,
 )
+from hexapod_cosim.cosim.common.locks import lock_folder
 from hexapod_cosim.cosim.interface.names import vector_names
 from hexapod_cosim.cosim.master.loop import COMPLETED, FAILED, INTERRUPTED
 from hexapod_cosim.cosim.results.accuracy import Accuracy, accuracy_from_table
@@ -83,7 +81,7 @@ def results_folder(path: Path, parts: Sequence[str] = ()) -> Iterator[ResultsFol
     """
     made = claim_folder(path)
     folder = ResultsFolder(path, parts)
-    lock = _lock(path)
+    release = _lock(path)
     try:
         yield folder
     except BaseException as error:
@@ -95,35 +93,24 @@ def results_folder(path: Path, parts: Sequence[str] = ()) -> Iterator[ResultsFol
             write_json(path / RUN_FILE, {**facts, "status": status, "reason": reason})
         raise
     finally:
-        lock.release()
+        release()
         for place in () if folder.begun else made:
             with suppress(OSError):  # no longer empty
                 place.rmdir()
 
 
-def _lock(folder: Path) -> FileLock:
-    """Locks a folder against other processes. Raises HexapodError when one of them has it.
-
-    The lock's file is in the temporary folder, so that results hold nothing else; the system
-    releases the lock of a killed process. On a file system without locks nothing is locked.
+def _lock(folder: Path) -> Callable[[], object]:
+    """Locks a folder and returns what releases it. Raises HexapodError when another process has
+    it.
     """
-    name = hashlib.sha256(str(folder.resolve()).encode("utf-8", "surrogatepass")).hexdigest()[:32]
-    lock = FileLock(
-        Path(tempfile.gettempdir()) / f"hexapod-results-{name}.lock",
-        blocking=False,
-        fallback_to_soft=False,
-    )
-    try:
-        lock.acquire()
-    except Timeout as error:
+    release = lock_folder(folder)
+    if release is None:
         raise HexapodError(
             "another process writes its results into this folder",
             fix="wait for it, or choose another with -o",
             where=str(folder),
-        ) from error
-    except OSError:
-        pass
-    return lock
+        )
+    return release
 
 
 def write_result(result: Result, folder: Path) -> list[Path]:
