@@ -34,6 +34,7 @@ from hexapod_cosim.cosim.results.result import Result
 from hexapod_cosim.cosim.results.walk import View
 from hexapod_cosim.cosim.scenario.controls import control_of
 from hexapod_cosim.models import HexapodError, load_robot
+from hexapod_cosim.models.files import read_text
 
 RESULTS, PARTIAL = "results", "results.partial"  # stems of recordings
 METRICS_FILE, SCENARIO = "metrics.json", "scenario.toml"
@@ -238,7 +239,7 @@ def read_facts(folder: Path) -> Mapping[str, Any]:
 def read_scenario(folder: Path) -> str:
     """Reads the TOML text of the scenario of a run or a comparison. Raises HexapodError."""
     try:
-        return (folder / SCENARIO).read_text(encoding="utf-8")
+        return read_text(folder / SCENARIO)
     except (OSError, UnicodeDecodeError) as error:
         raise _damaged(folder / SCENARIO, str(error), "the scenario that was run") from error
 

@@ -87,11 +87,11 @@ def binary_problems3(path: Path) -> list[str]:
         try:
             for library in binaries.iterdir():
                 refuse_incomplete(library)
-            _run_step(folder, description, description.instantiationToken)
+            _run_step(str(folder), description, description.instantiationToken)
         except Exception as error:  # fmpy's errors have no common type
             return [f"binaries: {error}"]
         with suppress(Exception):  # the binary refuses the token
-            _run_step(folder, description, FOREIGN_TOKEN)
+            _run_step(str(folder), description, FOREIGN_TOKEN)
             return [
                 (
                     f"binaries: it takes the token {FOREIGN_TOKEN}, expected that of "
