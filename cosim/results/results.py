@@ -215,11 +215,19 @@ def _incomplete(folder: Path, facts: Mapping[str, Any]) -> HexapodError:
 
 @contextmanager
 def damage_reported(folder: Path) -> Iterator[None]:
-    """Raises HexapodError for any exception inside, which then is due to damaged results."""
+    """Raises HexapodError for any exception inside: of the system, or due to damaged results."""
     try:
         yield
-    except HexapodError:
+    except (HexapodError, MemoryError):
         raise
+    except OSError as error:
+        raise HexapodError(
+            "the results cannot be read or written",
+            got=error.strerror or str(error),
+            expected="files and folders that can be",
+            fix="check the place, its rights and the room on the disk",
+            where=str(error.filename or folder),
+        ) from error
     except Exception as error:  # facts of wrong types fail anywhere in a report
         got = f"{type(error).__name__}: {error}"
         raise _damaged(folder, got, "results as `hexapod` wrote them") from error

@@ -194,6 +194,17 @@ def test_a_recording_cut_short_is_named(results: Path, tmp_path: Path, share: fl
     assert "results.parquet" in refused("report", str(copy))
 
 
+def test_a_report_into_a_folder_that_takes_no_files_names_the_place(
+    results: Path, tmp_path: Path
+) -> None:
+    copy = damaged(results, tmp_path, "other", b"")
+    shutil.rmtree(copy / "plots")
+    (copy / "plots").write_text("a file", encoding="utf-8")
+    text = refused("report", str(copy))
+    assert f"{tmp_path}/copy/plots: the results cannot be read or written: got 'File exists" in text
+    assert "run the scenario again" not in text
+
+
 def test_an_error_of_the_system_is_one_paragraph(
     plant_build: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
