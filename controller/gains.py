@@ -11,6 +11,7 @@ from typing import Any, TypeVar
 
 from hexapod_cosim.models import HexapodError, Robot, nearest_name
 from hexapod_cosim.models.errors import refuse_path
+from hexapod_cosim.models.files import read_text
 from hexapod_cosim.models.schema import decoding_toml, parse_toml
 
 FORMAT = 3
@@ -259,7 +260,7 @@ def load_gains(path: str | Path) -> Gains:
     refuse_path(path, "the gains file", GainsError)
     try:
         with decoding_toml(Path(path), kind="gains", error=GainsError):
-            table = parse_toml(Path(path).read_text(encoding="utf-8"))
+            table = parse_toml(read_text(Path(path)))
     except OSError as error:
         raise GainsError(
             "cannot read the gains file",

@@ -12,14 +12,13 @@ import os
 import weakref
 from collections.abc import Mapping, Sequence
 from functools import cached_property
-from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from hexapod_cosim.cosim.common.closing import Closing
+from hexapod_cosim.cosim.common.temporary import TemporaryFolder
 from hexapod_cosim.cosim.interface.names import foot_names, joint_names, vector_names
 from hexapod_cosim.cosim.master.fmu import Fmu
 from hexapod_cosim.cosim.master.fmu_controller import COMMANDS, SENSED
@@ -116,11 +115,11 @@ class Batch(Closing):
         """Exports and loads the FMUs, creates the environments and starts the threads."""
         robots = grounds(self.settings)
         self.robot, self._robots = robots[0], robots
-        with TemporaryDirectory(prefix="hexapod-gym-") as folder:
+        with TemporaryFolder("gym") as folder:
             fmus = self._owned.fmus
-            fmus.append(Fmu(export_plant(robots, Path(folder))))
+            fmus.append(Fmu(export_plant(robots, folder)))
             if self.settings.base != "stance":
-                fmus.append(Fmu(export_base(self.settings, self.robot, Path(folder))))
+                fmus.append(Fmu(export_base(self.settings, self.robot, folder)))
         self._allocate()
         native = self._native_settings(robots)
         arrays = NativeArrays(**{name: getattr(self, name).ctypes.data for name in ARRAYS})

@@ -21,6 +21,7 @@ from pathlib import Path
 from typing import Any
 
 from hexapod_cosim.models.errors import RobotError, refuse_path, unknown_name
+from hexapod_cosim.models.files import read_text
 from hexapod_cosim.models.ground.table import beside, read_terrain
 from hexapod_cosim.models.records import (
     BODY_CONTACTS,
@@ -125,7 +126,7 @@ def load_robot(path_or_name: str | Path) -> Robot:
     with reading_toml(
         path, kind="robot", name="the robot file", names=list_robots, error=RobotError
     ):
-        text = path.read_text(encoding="utf-8")
+        text = read_text(path)
         alone = _robot_from_text(text, str(path))
     if alone is not None:
         return alone

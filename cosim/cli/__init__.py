@@ -21,6 +21,11 @@ from hexapod_cosim.cosim.cli.failures import (
 )
 from hexapod_cosim.cosim.cli.json_output import json_alone
 
+NO_MEMORY = (
+    "the memory is full; give a smaller file or fewer rows, or run `hexapod --debug ...` to see "
+    "where"
+)
+
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Runs the command line and returns the exit code."""
@@ -34,6 +39,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
             return report_failure("interrupted", INTERRUPT, as_json=_wants_json(given))
         if "--debug" in given:
             raise
+        if isinstance(error, MemoryError):
+            return report_failure(NO_MEMORY, FAILURE, as_json=_wants_json(given))
         if isinstance(error, OSError):
             return report_failure(_refused_by_system(error), FAILURE, as_json=_wants_json(given))
         text = f"unexpected {type(error).__name__}: {error}; run `hexapod --debug ...` to see where"

@@ -6,7 +6,6 @@ from collections.abc import Mapping, Sequence
 from contextlib import closing, nullcontext
 from dataclasses import dataclass, replace
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Annotated, Any
 
 import typer
@@ -41,6 +40,7 @@ from hexapod_cosim.cosim.cli.terminal import (
     warn,
 )
 from hexapod_cosim.cosim.common.files import write_json
+from hexapod_cosim.cosim.common.temporary import TemporaryFolder
 from hexapod_cosim.cosim.master.interrupts import deferred_interrupts
 from hexapod_cosim.cosim.report.accuracy import with_errors
 from hexapod_cosim.cosim.report.figures import FigureThread
@@ -198,8 +198,8 @@ def run_work(work: Work, path: Path) -> Done:
     The figures are drawn in a thread while worker processes run the other seeds. Nothing is drawn
     or reported where outputs.plots is false.
     """
-    with results_folder(path, work.labels) as folder, TemporaryDirectory() as place:
-        work = work.with_fmu(Path(place))
+    with results_folder(path, work.labels) as folder, TemporaryFolder("compare") as place:
+        work = work.with_fmu(place)
         results, files = _first_seed(work, folder)
         stored = {control: stored_result(result) for control, result in results.items()}
         views = {control: run.view for control, run in stored.items()}

@@ -12,6 +12,7 @@ import typer
 
 from hexapod_cosim.cosim.cli import completion
 from hexapod_cosim.cosim.cli.terminal import Json, show_files, show_json, show_table, show_text
+from hexapod_cosim.cosim.common.files import named
 from hexapod_cosim.cosim.scenario.sections import read_terrain_keys
 from hexapod_cosim.cosim.scenario.tables import parse_value
 from hexapod_cosim.models import HexapodError, Terrain, load_robot, unknown_name
@@ -215,6 +216,6 @@ def _with_suffix(path: Path, suffixes: tuple[str, ...]) -> Path:
             "not a picture's name",
             got=str(path),
             expected="a file that ends in " + " or ".join(suffixes),
-            fix=f"write {path.with_suffix(suffixes[0])}",
+            fix=f"write {named(path, suffixes[0], 'ground')}",
         )
     return path

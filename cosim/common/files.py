@@ -15,6 +15,7 @@ from uuid import uuid4
 
 from hexapod_cosim.models import HexapodError
 from hexapod_cosim.models.errors import refuse_path
+from hexapod_cosim.models.files import read_text
 
 RUN_FILE = "run.json"  # marks a folder as written by this package
 RUNNING = "running"
@@ -82,6 +83,11 @@ def atomic_path(path: Path) -> Iterator[Path]:
         temporary.unlink(missing_ok=True)
 
 
+def named(path: Path, suffix: str, name: str = "robot") -> Path:
+    """Returns a path with a suffix, for a message; a folder such as "." or "/" gets a file too."""
+    return path.with_suffix(suffix) if path.name else path / f"{name}{suffix}"
+
+
 def file_stamp(path: Path) -> tuple[int, int]:
     """Returns the time of the last change [ns] and the size [byte] of a file: a cache whose key has
     them reads a changed file again. Raises OSError without the file.
@@ -108,12 +114,24 @@ def flush_folder(folder: Path) -> None:
 
 @contextmanager
 def atomic_text(path: Path) -> Iterator[TextIO]:
-    """Yields a text file (UTF-8) that replaces `path` when the block succeeds."""
-    with (
-        atomic_path(path) as temporary,
-        temporary.open("w", encoding="utf-8", newline="\n") as file,
-    ):
-        yield file
+    """Yields a text file (UTF-8) that replaces `path` when the block succeeds.
+
+    Raises HexapodError for text with the name of a file whose bytes are no UTF-8.
+    """
+    try:
+        with (
+            atomic_path(path) as temporary,
+            temporary.open("w", encoding="utf-8", newline="\n") as file,
+        ):
+            yield file
+    except UnicodeEncodeError as error:
+        raise HexapodError(
+            "cannot write",
+            got=f"the character {error.object[error.start]!r}",
+            expected="names of files in UTF-8",
+            fix="rename the file that has it, or set LC_ALL=C.UTF-8",
+            where=str(path),
+        ) from error
 
 
 def write_text(path: Path, text: str) -> None:
@@ -239,8 +257,16 @@ def _remove(path: Path) -> None:
 def read_json(path: Path) -> Any:
     """Reads a JSON file of a results folder. Raises HexapodError when it is missing or damaged."""
     try:
-        return json.loads(path.read_text(encoding="utf-8"))
+        return json.loads(read_text(path))
     except OSError as error:
+        if not isinstance(error, FileNotFoundError | NotADirectoryError):
+            raise HexapodError(
+                "cannot read a file of the results",
+                got=error.strerror,
+                expected="a file that `hexapod` wrote",
+                fix="check its rights, or run the scenario again",
+                where=str(path),
+            ) from error
         fix = "give a folder written by `hexapod simulate`, `hexapod compare` or `hexapod study`"
         raise HexapodError(
             "not a results folder",

@@ -15,8 +15,9 @@ from collections.abc import Callable
 from contextlib import suppress
 from importlib import import_module
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any
+
+from hexapod_cosim.cosim.common.temporary import TemporaryFolder
 
 TIME_LIMIT = 120.0  # s
 LAST_WORDS = 300  # characters of the process's messages that an error quotes
@@ -38,8 +39,8 @@ def call_in_process(
 
     Raises ProcessEndedError when the process crashes, takes longer or raises an exception.
     """
-    with TemporaryDirectory(prefix="hexapod-process-") as folder:
-        result = Path(folder) / "result.json"
+    with TemporaryFolder("process") as folder:
+        result = folder / "result.json"
         place = [function.__module__, function.__name__, str(path.absolute()), str(result)]
         command = [sys.executable, "-m", __spec__.name, *place]
         try:

@@ -23,6 +23,7 @@ from hexapod_cosim.cosim.interface.names import foot_names, foot_vector_names, v
 from hexapod_cosim.cosim.master.fmu_controller import COMMANDS, FLAGS
 from hexapod_cosim.cosim.master.signals import ACCELERATION, COMMANDED, CONTACT, MEASURED
 from hexapod_cosim.models import JOINT_NAMES, LEG_NAMES, FmuError, nearest_name
+from hexapod_cosim.models.files import read_text
 from hexapod_cosim.models.schema import decoding_toml, parse_toml
 
 MOST_SHOWN = 12  # names in a message
@@ -186,7 +187,7 @@ def read_map(path: Path) -> dict[str, Any]:
     if not place.is_file():
         return {}
     with decoding_toml(place, kind="TOML", error=FmuError):
-        table = parse_toml(place.read_text(encoding="utf-8"))
+        table = parse_toml(read_text(place))
     found = table.get("map", {})
     return dict(found) if isinstance(found, Mapping) else {"map": found}
 

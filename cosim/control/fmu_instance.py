@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from hexapod_cosim.cosim.common.archives import unpack
 from hexapod_cosim.cosim.common.binaries import refuse_incomplete
-from hexapod_cosim.cosim.common.unpacked import UnpackedFolder
+from hexapod_cosim.cosim.common.temporary import TemporaryFolder
 from hexapod_cosim.cosim.control.connection import FmuVariable
 from hexapod_cosim.cosim.interface.descriptions import open_description
 from hexapod_cosim.cosim.master.fmu import Fmu, StepError
@@ -154,7 +154,7 @@ class ControllerFmu3:
         self._event_mode = bool(getattr(description.coSimulation, "hasEventMode", False))
         self._messages: list[str] = []
         self._initialised = False
-        self._directory = UnpackedFolder()
+        self._directory = TemporaryFolder("fmu")
         self.slave: Any = None
         try:
             unpack(path, self._directory.path)

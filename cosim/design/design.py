@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import fields, replace
-from pathlib import Path
-from tempfile import TemporaryDirectory
 
 import numpy as np
 from threadpoolctl import threadpool_limits
@@ -14,6 +12,7 @@ from threadpoolctl import threadpool_limits
 from hexapod_cosim.controller import Gains, GainsError, Requirements
 from hexapod_cosim.controller.design import StandingPlant, design_gains
 from hexapod_cosim.controller.size import requirements_for
+from hexapod_cosim.cosim.common.temporary import TemporaryFolder
 from hexapod_cosim.cosim.design.linearise import Motion, linearise
 from hexapod_cosim.cosim.design.standing import StanceError, rest
 from hexapod_cosim.cosim.export.export import export_fmu
@@ -136,8 +135,8 @@ def level_fmu(robot: Robot) -> Iterator[Fmu]:
     down = (0.0, 0.0, -float(np.linalg.norm(robot.gravity)))
     level = replace(robot, gravity=down, terrain=replace(robot.terrain, kind="flat", height=0.0))
     with (
-        TemporaryDirectory(prefix="hexapod-") as folder,
-        Fmu(export_fmu(level, Path(folder) / f"{robot.name}.fmu", bare=True)) as fmu,
+        TemporaryFolder("export") as folder,
+        Fmu(export_fmu(level, folder / f"{robot.name}.fmu", bare=True)) as fmu,
     ):
         yield fmu
 

@@ -10,7 +10,6 @@ from __future__ import annotations
 import hashlib
 import os
 import subprocess
-import tempfile
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache
@@ -21,6 +20,7 @@ import platformdirs
 
 from hexapod_cosim.cosim.common.files import atomic_path
 from hexapod_cosim.cosim.common.installation import install_extra
+from hexapod_cosim.cosim.common.temporary import TemporaryFolder
 from hexapod_cosim.models.errors import FmuError, HexapodError
 
 PACKAGE = "ziglang"
@@ -183,8 +183,8 @@ def _flags(library: Library, target: str) -> tuple[str, ...]:
 
 def _compile(library: Library, command: Sequence[str], target: str, cache_folder: Path) -> bytes:
     """Copies the sources into a folder, compiles them there and returns the library's bytes."""
-    with tempfile.TemporaryDirectory(prefix="hexapod-build-") as name:
-        root, out = Path(name), library.name + ALL_TARGETS[target].suffix
+    with TemporaryFolder("build") as name:
+        root, out = name, library.name + ALL_TARGETS[target].suffix
         for path, source in library.sources.items():
             (root / "in" / path).parent.mkdir(parents=True, exist_ok=True)
             (root / "in" / path).write_bytes(source.read_bytes())

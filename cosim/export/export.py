@@ -9,7 +9,6 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import reduce
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from types import MappingProxyType
 from zipfile import ZIP_DEFLATED, ZIP_STORED
 
@@ -23,6 +22,7 @@ from hexapod_cosim.cosim.common.plant_files import (
     fmi3_platform,
     source_files,
 )
+from hexapod_cosim.cosim.common.temporary import TemporaryFolder
 from hexapod_cosim.cosim.export.extras import extra_members
 from hexapod_cosim.cosim.export.platforms import (
     WASM_FOLDER,
@@ -197,8 +197,8 @@ def _reference(interface: Interface, members: dict[str, bytes], fmi: int) -> dic
         trial |= {
             name.replace(own, f"binaries/{folders[2]}/"): data for name, data in found.items()
         }
-    with TemporaryDirectory(prefix="hexapod-export-") as folder:
-        fmu = write_archive(Path(folder) / "trial.fmu", trial)
+    with TemporaryFolder("export") as folder:
+        fmu = write_archive(folder / "trial.fmu", trial)
         return reference_members(interface, fmu, fmi=fmi)
 
 

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from hexapod_cosim.cosim.common.files import not_writable, write_text
+from hexapod_cosim.cosim.common.files import named, not_writable, write_text
 from hexapod_cosim.models import HexapodError, Robot
 from hexapod_cosim.models.mjcf import robot_to_mjcf
 from hexapod_cosim.models.records import Servo
@@ -78,7 +78,7 @@ def export_description(robot: Robot, path: str | Path, form: Format) -> Path:
             f"not {form.title}'s name",
             got=path.name,
             expected=expected,
-            fix=f"write -o {path.with_suffix(form.suffix)}",
+            fix=f"write -o {named(path, form.suffix)}",
         )
     text = form.write(robot)
     try:

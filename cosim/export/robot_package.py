@@ -8,9 +8,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from types import MappingProxyType
 
+from hexapod_cosim.cosim.common.temporary import TemporaryFolder
 from hexapod_cosim.cosim.export.controller_export import export_controller
 from hexapod_cosim.cosim.export.export import export_fmu
 from hexapod_cosim.cosim.export.platforms import choose_platforms
@@ -71,8 +71,8 @@ def export_package(
         CONTROLLER: {**WALK, **values.get(CONTROLLER, NOTHING)},
     }
     _refuse_driven(setup, given)
-    with TemporaryDirectory(prefix="hexapod-package-") as folder:
-        files = {name: Path(folder) / f"{name}.fmu" for name in given}
+    with TemporaryFolder("package") as folder:
+        files = {name: folder / f"{name}.fmu" for name in given}
         export_fmu(setup.robot, files[PLANT], platforms=chosen, fmi=fmi, starts=given[PLANT])
         export_controller(
             setup, files[CONTROLLER], platforms=chosen, fmi=fmi, starts=given[CONTROLLER]

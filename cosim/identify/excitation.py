@@ -9,14 +9,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
 import tomlkit
 from numpy.typing import NDArray
 
+from hexapod_cosim.cosim.common.temporary import TemporaryFolder
 from hexapod_cosim.cosim.export.export import export_fmu
 from hexapod_cosim.cosim.identify.experiment import Experiment
 from hexapod_cosim.cosim.identify.fitting.differences import FINE
@@ -91,8 +90,8 @@ def propose(found: Identified, file: str) -> list[Proposal]:
     """
     untold = [one.key for one in found.estimates if not one.told]
     proposals = []
-    with TemporaryDirectory(prefix="hexapod-propose-") as folder:
-        path = export_fmu(found.file, Path(folder) / "robot.fmu")
+    with TemporaryFolder("propose") as folder:
+        path = export_fmu(found.file, folder / "robot.fmu")
         with LogPlant(path, TOLERANCE) as plant:
             for walk in walks(found.robot) if untold else ():
                 try:

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from pathlib import Path
-from tempfile import TemporaryDirectory
 
 import numpy as np
 from numpy.typing import NDArray
 
+from hexapod_cosim.cosim.common.temporary import TemporaryFolder
 from hexapod_cosim.cosim.export.export import export_fmu
 from hexapod_cosim.cosim.identify.channel_screening import screened, turned_after_the_fit
 from hexapod_cosim.cosim.identify.commands.command_screening import check_commands
@@ -82,9 +81,9 @@ def identify(
     report = Reporter(progress)
     rows = chosen_unknowns(robot, logs, groups)
     # small matrices: threads of linear algebra would wait for each other
-    with threadpool_limits(1), TemporaryDirectory(prefix="hexapod-identify-") as folder:
-        path = export_fmu(robot, Path(folder) / "robot.fmu")
-        place = Path(folder) / "workers"
+    with threadpool_limits(1), TemporaryFolder("identify") as folder:
+        path = export_fmu(robot, folder / "robot.fmu")
+        place = folder / "workers"
         with (
             LogPlant(path, TOLERANCE) as plant,
             simulating_workers(workers, path, robot, TOLERANCE, place) as pool,
@@ -131,8 +130,8 @@ def _with_friction(
     """Finds a robot's numbers with a friction model, or the best of all; see `identify`."""
     report, trials = Reporter(progress), []
     variant = with_friction_model(robot, FRICTION_MODELS[0] if friction == BEST else friction)
-    with TemporaryDirectory(prefix="hexapod-identify-") as folder:
-        path = export_fmu(robot, Path(folder) / "robot.fmu")
+    with TemporaryFolder("identify") as folder:
+        path = export_fmu(robot, folder / "robot.fmu")
         with LogPlant(path, TOLERANCE) as plant:
             plant.watch = report.simulated
             if friction == BEST:

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
 
+from hexapod_cosim.cosim.common.temporary import TemporaryFolder
 from hexapod_cosim.cosim.export.export import export_fmu
 from hexapod_cosim.cosim.identify.channel_screening import screened
 from hexapod_cosim.cosim.identify.commands.command_screening import (
@@ -85,8 +85,8 @@ def replay(
     """
     wrong = wrong_commands(log)
     log = with_speed_references(log, robot)
-    with TemporaryDirectory(prefix="hexapod-replay-") as folder:
-        path = fmu or export_fmu(robot, Path(folder) / "robot.fmu")
+    with TemporaryFolder("replay") as folder:
+        path = fmu or export_fmu(robot, folder / "robot.fmu")
         with LogPlant(path, parameters) as plant:
             names = plant.known(log.measured)
             if not names:

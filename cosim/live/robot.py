@@ -23,11 +23,10 @@ from __future__ import annotations
 
 from contextlib import ExitStack
 from dataclasses import replace
-from pathlib import Path
-from tempfile import TemporaryDirectory
 
 from hexapod_cosim.controller import BodyCommand, ControllerError, Gains, JointCommand
 from hexapod_cosim.cosim.common.closing import Closing
+from hexapod_cosim.cosim.common.temporary import TemporaryFolder
 from hexapod_cosim.cosim.live.controls import (
     HORIZON,
     REST,
@@ -83,7 +82,7 @@ class LiveRobot(Closing):
     def __init__(self, choices: Choices, *, gains: Gains | None = None) -> None:
         self.choices, self._gains = choices, gains
         self._open = ExitStack()
-        self._folder = Path(self._open.enter_context(TemporaryDirectory(prefix="hexapod-live-")))
+        self._folder = self._open.enter_context(TemporaryFolder("live"))
         self._controls = self._open.enter_context(Controls(self._folder, gains))
         self.wanted: Settings | None = None
         self._from = JointCommand()  # that the present controller is faded in from

@@ -22,7 +22,7 @@ from hexapod_cosim.cosim.common.archives import unpack
 from hexapod_cosim.cosim.common.binaries import refuse_incomplete
 from hexapod_cosim.cosim.common.closing import Closing
 from hexapod_cosim.cosim.common.plant_files import packed_binary
-from hexapod_cosim.cosim.common.unpacked import UnpackedFolder
+from hexapod_cosim.cosim.common.temporary import TemporaryFolder
 from hexapod_cosim.cosim.interface.descriptions import read_description
 from hexapod_cosim.cosim.interface.variants import listed_items
 from hexapod_cosim.cosim.master.fmu_log import STATUS, WARNING, FmuLog
@@ -120,7 +120,7 @@ class Fmu(Closing):
         self._logged = FmuLog()
         self._log = self._logged.messages
         self.clear_log = self._log.clear  # called before each call: errors quote new messages only
-        self._directory = UnpackedFolder()
+        self._directory = TemporaryFolder("fmu")
         self._slave: Any = None
         self._grids: dict[str, int] | None = None  # numbers of grid files by their digest
         try:

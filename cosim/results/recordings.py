@@ -149,10 +149,11 @@ def write_parquet(recording: Recording, path: Path, *, about: Mapping[str, Any])
     ]
     columns = [pa.array(values) for values in np.ascontiguousarray(recording.data.T)]
     table = pa.Table.from_arrays(columns, schema=pa.schema(fields, metadata=_texts(about)))
-    with atomic_path(path) as temporary:
+    # a file object: pyarrow takes no path with bytes that are no UTF-8
+    with atomic_path(path) as temporary, temporary.open("wb") as file:
         # byte-stream split halves the size of dictionary encoding, in a quarter of its time
         pq.write_table(
-            table, temporary, compression="zstd", use_dictionary=False, use_byte_stream_split=True
+            table, file, compression="zstd", use_dictionary=False, use_byte_stream_split=True
         )
 
 
@@ -163,7 +164,8 @@ def read_parquet(path: Path) -> Recording:
     import pyarrow.parquet as pq  # noqa: PLC0415
 
     try:
-        table = pq.read_table(path)
+        with path.open("rb") as file:
+            table = pq.read_table(file)
         table = table.cast(pa.schema([(name, pa.float64()) for name in table.column_names]))
     except (OSError, ValueError, NotImplementedError) as error:
         raise _not_a_recording(path, error, "Parquet with columns of numbers") from error

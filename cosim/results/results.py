@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-import hashlib
-import tempfile
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import tomlkit
-from filelock import FileLock, Timeout
 
 from hexapod_cosim.cosim.common.files import (
     RUN_FILE,
@@ -22,6 +19,7 @@ from hexapod_cosim.cosim.common.files import (
     write_json,
     write_text,
 )
+from hexapod_cosim.cosim.common.locks import lock_folder
 from hexapod_cosim.cosim.interface.names import vector_names
 from hexapod_cosim.cosim.master.loop import COMPLETED, FAILED, INTERRUPTED
 from hexapod_cosim.cosim.results.accuracy import Accuracy, accuracy_from_table
@@ -36,6 +34,7 @@ from hexapod_cosim.cosim.results.result import Result
 from hexapod_cosim.cosim.results.walk import View
 from hexapod_cosim.cosim.scenario.controls import control_of
 from hexapod_cosim.models import HexapodError, load_robot
+from hexapod_cosim.models.files import read_text
 
 RESULTS, PARTIAL = "results", "results.partial"  # stems of recordings
 METRICS_FILE, SCENARIO = "metrics.json", "scenario.toml"
@@ -83,7 +82,7 @@ def results_folder(path: Path, parts: Sequence[str] = ()) -> Iterator[ResultsFol
     """
     made = claim_folder(path)
     folder = ResultsFolder(path, parts)
-    lock = _lock(path)
+    release = _lock(path)
     try:
         yield folder
     except BaseException as error:
@@ -95,35 +94,24 @@ def results_folder(path: Path, parts: Sequence[str] = ()) -> Iterator[ResultsFol
             write_json(path / RUN_FILE, {**facts, "status": status, "reason": reason})
         raise
     finally:
-        lock.release()
+        release()
         for place in () if folder.begun else made:
             with suppress(OSError):  # no longer empty
                 place.rmdir()
 
 
-def _lock(folder: Path) -> FileLock:
-    """Locks a folder against other processes. Raises HexapodError when one of them has it.
-
-    The lock's file is in the temporary folder, so that results hold nothing else; the system
-    releases the lock of a killed process. On a file system without locks nothing is locked.
+def _lock(folder: Path) -> Callable[[], object]:
+    """Locks a folder and returns what releases it. Raises HexapodError when another process has
+    it.
     """
-    name = hashlib.sha256(str(folder.resolve()).encode("utf-8", "surrogatepass")).hexdigest()[:32]
-    lock = FileLock(
-        Path(tempfile.gettempdir()) / f"hexapod-results-{name}.lock",
-        blocking=False,
-        fallback_to_soft=False,
-    )
-    try:
-        lock.acquire()
-    except Timeout as error:
+    release = lock_folder(folder)
+    if release is None:
         raise HexapodError(
             "another process writes its results into this folder",
             fix="wait for it, or choose another with -o",
             where=str(folder),
-        ) from error
-    except OSError:
-        pass
-    return lock
+        )
+    return release
 
 
 def write_result(result: Result, folder: Path) -> list[Path]:
@@ -227,11 +215,19 @@ def _incomplete(folder: Path, facts: Mapping[str, Any]) -> HexapodError:
 
 @contextmanager
 def damage_reported(folder: Path) -> Iterator[None]:
-    """Raises HexapodError for any exception inside, which then is due to damaged results."""
+    """Raises HexapodError for any exception inside: of the system, or due to damaged results."""
     try:
         yield
-    except HexapodError:
+    except (HexapodError, MemoryError):
         raise
+    except OSError as error:
+        raise HexapodError(
+            "the results cannot be read or written",
+            got=error.strerror or str(error),
+            expected="files and folders that can be",
+            fix="check the place, its rights and the room on the disk",
+            where=str(error.filename or folder),
+        ) from error
     except Exception as error:  # facts of wrong types fail anywhere in a report
         got = f"{type(error).__name__}: {error}"
         raise _damaged(folder, got, "results as `hexapod` wrote them") from error
@@ -251,7 +247,7 @@ def read_facts(folder: Path) -> Mapping[str, Any]:
 def read_scenario(folder: Path) -> str:
     """Reads the TOML text of the scenario of a run or a comparison. Raises HexapodError."""
     try:
-        return (folder / SCENARIO).read_text(encoding="utf-8")
+        return read_text(folder / SCENARIO)
     except (OSError, UnicodeDecodeError) as error:
         raise _damaged(folder / SCENARIO, str(error), "the scenario that was run") from error
 

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 from functools import cache, partial
 from multiprocessing.util import Finalize
 from pathlib import Path
-from tempfile import TemporaryDirectory
 
 from hexapod_cosim.controller import Gains
+from hexapod_cosim.cosim.common.temporary import TemporaryFolder
 from hexapod_cosim.cosim.master.loop import INTERRUPTED
 from hexapod_cosim.cosim.results.summary import Summary, refused_summary, summarise
 from hexapod_cosim.cosim.run.preparation import PlantFmus, chosen_gains
@@ -65,8 +65,8 @@ def run_batch(
         compiled: whether the controller FMU replaces the Python controller. It is some ten times
             as fast, and the figures agree to its last digits.
     """
-    with TemporaryDirectory(prefix="hexapod-batch-") as folder:
-        fmus = PlantFmus(Path(folder), given=fmu)
+    with TemporaryFolder("batch") as folder:
+        fmus = PlantFmus(folder, given=fmu)
         tasks = [_prepare(k, scenario, fmus, gains) for k, scenario in enumerate(scenarios)]
         count = min(processor_count() if workers is None else workers, len(tasks))
         if count <= 1:

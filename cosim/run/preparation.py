@@ -6,11 +6,11 @@ from __future__ import annotations
 
 from functools import lru_cache
 from pathlib import Path
-from tempfile import TemporaryDirectory
 
 from hexapod_cosim.controller import Gains
 from hexapod_cosim.cosim.common.components import PLANT
 from hexapod_cosim.cosim.common.plant_files import binary, fmi2_platform
+from hexapod_cosim.cosim.common.temporary import TemporaryFolder
 from hexapod_cosim.cosim.export.export import export_fmu
 from hexapod_cosim.cosim.run.chosen_walk import choose_walk
 from hexapod_cosim.cosim.run.kept_gains import kept_gains
@@ -71,8 +71,8 @@ def design_key(scenario: Scenario) -> tuple[Robot, float]:
 @lru_cache(maxsize=MAX_FMUS)
 def _content(robot: Robot, _binary: Path, _changed: int) -> bytes:
     """Returns the plant FMU of a robot with a binary, which was changed at that time [ns]."""
-    with TemporaryDirectory(prefix="hexapod-") as folder:
-        return export_fmu(robot, Path(folder) / f"{robot.name}.fmu").read_bytes()
+    with TemporaryFolder("export") as folder:
+        return export_fmu(robot, folder / f"{robot.name}.fmu").read_bytes()
 
 
 class PlantFmus:

@@ -11,12 +11,12 @@ from dataclasses import dataclass, replace
 from functools import cache
 from importlib.metadata import version
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any
 
 from hexapod_cosim.controller import Gains
 from hexapod_cosim.cosim.common.components import PLANT
 from hexapod_cosim.cosim.common.plant_files import package_version
+from hexapod_cosim.cosim.common.temporary import TemporaryFolder
 from hexapod_cosim.cosim.control.controllers import (
     RunController,
     control_facts,
@@ -319,8 +319,8 @@ def open_plant(
 
     robot: the scenario's robot in the stance of its walk; by default in its own stance.
     """
-    with TemporaryDirectory(prefix="hexapod-") as folder:
-        fmus = PlantFmus(Path(folder), given=path)
+    with TemporaryFolder("export") as folder:
+        fmus = PlantFmus(folder, given=path)
         with Fmu(fmus.fmu(scenario.robot)) as plant:
             apply_settings(plant, scenario_robot(scenario) if robot is None else robot)
             yield plant

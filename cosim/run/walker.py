@@ -8,11 +8,11 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack, closing
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from time import thread_time
 
 from hexapod_cosim.controller import Gains
 from hexapod_cosim.cosim.common.closing import Closing
+from hexapod_cosim.cosim.common.temporary import TemporaryFolder
 from hexapod_cosim.cosim.control.connection import Connection
 from hexapod_cosim.cosim.control.controllers import (
     connection_of,
@@ -74,7 +74,7 @@ class Walker(Closing):
     ) -> None:
         self._given_controller, self._everything = controller, everything
         self._open = ExitStack()
-        self._folder = Path(self._open.enter_context(TemporaryDirectory(prefix="hexapod-walker-")))
+        self._folder = self._open.enter_context(TemporaryFolder("walker"))
         self._fmus = PlantFmus(self._folder, given=fmu)
         # by plant FMU and recorded columns, of the built-in controls
         self._masters: dict[tuple[Path, tuple[str, ...] | None], NativeMaster] = {}

@@ -23,6 +23,7 @@ NAMES = tuple(item.name for item in fields(BodyCommand))
 UNITS = ("m/s", "m/s", "rad/s", "m", "rad", "rad")
 MOTION = (1.0, 1.0, 1.0, 0.0, 0.0, 0.0)  # selects the velocities; the other entries are posture
 STEPS_PER_CYCLE = 50  # in a gait period that are looked at: enough to see every phase
+MOST_STEPS = 1000  # of a gait whose feet stand or swing for less than 0.4 % of the period
 RESOLUTION = 0.005  # relative, of the limit in the message
 
 
@@ -58,7 +59,8 @@ def _walks(values: Array, robot: Robot, gait: Gait) -> bool:
     A foot stands under its stance position half-way through its stance (C4); before and after that
     it is where the motion of the body over the ground puts it (C3, C5).
     """
-    count = max(STEPS_PER_CYCLE, math.ceil(4.0 / min(gait.duty, 1.0 - gait.duty)))
+    least = min(gait.duty, 1.0 - gait.duty)
+    count = max(STEPS_PER_CYCLE, math.ceil(min(4.0 / least, MOST_STEPS)))
     controller = Controller(robot, period=gait.period / count, gait=gait)
     paths = controller.paths
     clock = paths.offset + np.arange(count)[:, None] / count  # cycles    (count, 6)

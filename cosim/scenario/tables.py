@@ -16,6 +16,7 @@ from hexapod_cosim.cosim.scenario.controls import LAW, control_beside
 from hexapod_cosim.cosim.scenario.records import KEYS, SECTIONS
 from hexapod_cosim.models import ScenarioError, unknown_name
 from hexapod_cosim.models.errors import refuse_path
+from hexapod_cosim.models.files import read_text
 from hexapod_cosim.models.ground.table import beside
 from hexapod_cosim.models.schema import parse_toml, reading_toml
 
@@ -38,7 +39,7 @@ def read_tables(path_or_name: str | Path) -> tuple[dict[str, Any], str]:
     with reading_toml(
         path, kind="scenario", name="the scenario", names=list_scenarios, error=ScenarioError
     ):
-        table = parse_toml(path.read_text(encoding="utf-8"))
+        table = parse_toml(read_text(path))
     if isinstance(table.get("terrain"), dict):
         table["terrain"] = beside(table["terrain"], path.parent)
     refuse_path(str(table.get("robot", "")), "the robot file", ScenarioError)
@@ -72,8 +73,18 @@ def with_overrides(table: Mapping[str, Any], overrides: Iterable[str]) -> dict[s
             raise ScenarioError(
                 "not a setting", got=text, expected="NAME=VALUE", fix=fix, where="--set"
             )
+        if not _is_unicode(text):
+            fix = "set LC_ALL=C.UTF-8"
+            raise ScenarioError(
+                "not a setting", got=text, expected="characters in UTF-8", fix=fix, where="--set"
+            )
         values[name] = parse_value(value)
     return with_values(table, values)
+
+
+def _is_unicode(text: str) -> bool:
+    """Returns whether a word of the command line had no bytes that its encoding lacks."""
+    return not any(0xD800 <= ord(letter) < 0xE000 for letter in text)
 
 
 def with_values(table: Mapping[str, Any], values: Mapping[str, Any]) -> dict[str, Any]:

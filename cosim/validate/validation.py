@@ -5,7 +5,6 @@ from __future__ import annotations
 import zipfile
 from contextlib import chdir
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any
 from xml.etree import ElementTree
 
@@ -16,6 +15,7 @@ from hexapod_cosim.cosim.common.archives import unpack, unsafe_members
 from hexapod_cosim.cosim.common.binaries import incomplete
 from hexapod_cosim.cosim.common.components import CONTROLLER, POLICY
 from hexapod_cosim.cosim.common.plant_files import fmi2_platform, packed_binary
+from hexapod_cosim.cosim.common.temporary import TemporaryFolder
 from hexapod_cosim.cosim.interface.descriptions import (
     forbidden_markup,
     open_description,
@@ -137,8 +137,8 @@ def _run_problems(path: Path) -> list[str]:
 def _guid_problems(path: Path, description: Any) -> list[str]:
     """Checks that the binary refuses another model description's GUID."""
     callbacks = fmi2CallbackFunctions()
-    with TemporaryDirectory(prefix="hexapod-validate-") as folder:
-        unpack(path, Path(folder))
+    with TemporaryFolder("validate") as folder:
+        unpack(path, folder)
         identifier = description.coSimulation.modelIdentifier
         library = packed_binary(folder, identifier)
         if library is not None and incomplete(Path(library).read_bytes()):

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import chdir, suppress
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any
 from xml.etree import ElementTree
 
@@ -14,6 +13,7 @@ from fmpy.fmi3 import FMU3Slave
 
 from hexapod_cosim.cosim.common.archives import unpack
 from hexapod_cosim.cosim.common.binaries import refuse_incomplete
+from hexapod_cosim.cosim.common.temporary import TemporaryFolder
 from hexapod_cosim.cosim.interface.descriptions import open_description
 from hexapod_cosim.cosim.validate.archive import (
     BUILD_DESCRIPTION,
@@ -79,19 +79,19 @@ def binary_problems3(path: Path) -> list[str]:
     token; returns the problems. An FMU without a binary for this machine has none.
     """
     description = open_description(path)
-    with TemporaryDirectory(prefix="hexapod-validate-") as folder:
-        unpack(path, Path(folder))
-        binaries = Path(folder) / "binaries" / platform_tuple
+    with TemporaryFolder("validate") as folder:
+        unpack(path, folder)
+        binaries = folder / "binaries" / platform_tuple
         if not binaries.is_dir():
             return []
         try:
             for library in binaries.iterdir():
                 refuse_incomplete(library)
-            _run_step(folder, description, description.instantiationToken)
+            _run_step(str(folder), description, description.instantiationToken)
         except Exception as error:  # fmpy's errors have no common type
             return [f"binaries: {error}"]
         with suppress(Exception):  # the binary refuses the token
-            _run_step(folder, description, FOREIGN_TOKEN)
+            _run_step(str(folder), description, FOREIGN_TOKEN)
             return [
                 (
                     f"binaries: it takes the token {FOREIGN_TOKEN}, expected that of "

@@ -16,6 +16,7 @@ from pathlib import Path
 import numpy as np
 
 from hexapod_cosim.models.errors import RobotError
+from hexapod_cosim.models.files import MAP_SIZE, read_bytes
 from hexapod_cosim.models.ground.surface import (
     KINDS,
     LARGEST_MAP,
@@ -93,7 +94,7 @@ def write_grid(surface: Surface, path: Path) -> Path:
 def read_grid(path: Path) -> Surface:
     """Reads a grid file. Raises RobotError for a file that is none."""
     try:
-        content = path.read_bytes()
+        content = read_bytes(path, MAP_SIZE)
     except OSError as error:
         raise RobotError(
             "cannot read the grid file",

@@ -15,6 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from hexapod_cosim.models.errors import RobotError
+from hexapod_cosim.models.files import MAP_SIZE, read_bytes
 from hexapod_cosim.models.ground.surface import Array
 
 LEVELS = "PNG with 16 bits of grey per pixel"
@@ -43,7 +44,7 @@ def _read_png(path: Path) -> HeightFile:
     # Pillow takes a moment to import, and few robots have height maps
     from PIL import Image, UnidentifiedImageError  # noqa: PLC0415
 
-    content = path.read_bytes()
+    content = read_bytes(path, MAP_SIZE)
     if damage := _damage(content):
         raise _wrong_picture(path, damage)
     with path.open("rb") as file:
@@ -131,7 +132,7 @@ def _wrong_array(path: Path, got: str) -> RobotError:
 def _read_asc(path: Path) -> HeightFile:
     """Returns the heights of an ESRI ASCII grid in metres, and its cellsize [m]."""
     try:
-        text = path.read_text(encoding="ascii")
+        text = read_bytes(path, MAP_SIZE).decode("ascii")
     except UnicodeDecodeError as error:
         raise _wrong_grid(path, "bytes that are no text") from error
     words = text.split()

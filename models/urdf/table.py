@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from hexapod_cosim.models.errors import RobotError, unknown_name
+from hexapod_cosim.models.files import read_bytes
 from hexapod_cosim.models.ground.table import beside, patch_specs, read_keys, terrain_specs
 from hexapod_cosim.models.kinematics import axis_rotation
 from hexapod_cosim.models.records import (
@@ -201,7 +202,7 @@ def _terrain_beside(own: Table, folder: Path) -> Table:
 
 def _read(path: Path) -> bytes:
     try:
-        return path.read_bytes()
+        return read_bytes(path)
     except OSError as error:
         raise RobotError(
             "cannot read the URDF",

@@ -14,6 +14,10 @@ from pathlib import Path
 import pytest
 
 from hexapod_cosim.cosim.cli import main
+from hexapod_cosim.cosim.common.files import write_text
+from hexapod_cosim.models import HexapodError
+from hexapod_cosim.models.files import LARGEST_FILE, MAP_SIZE
+from hexapod_cosim.models.ground import map_files
 from hexapod_cosim.models.schema import parse_toml
 
 MODELS = Path(__file__).resolve().parents[2] / "models"
@@ -190,6 +194,17 @@ def test_a_recording_cut_short_is_named(results: Path, tmp_path: Path, share: fl
     assert "results.parquet" in refused("report", str(copy))
 
 
+def test_a_report_into_a_folder_that_takes_no_files_names_the_place(
+    results: Path, tmp_path: Path
+) -> None:
+    copy = damaged(results, tmp_path, "other", b"")
+    shutil.rmtree(copy / "plots")
+    (copy / "plots").write_text("a file", encoding="utf-8")
+    text = refused("report", str(copy))
+    assert f"{tmp_path}/copy/plots: the results cannot be read or written: got 'File exists" in text
+    assert "run the scenario again" not in text
+
+
 def test_an_error_of_the_system_is_one_paragraph(
     plant_build: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -199,3 +214,106 @@ def test_an_error_of_the_system_is_one_paragraph(
     monkeypatch.setattr("hexapod_cosim.cosim.validate.validation.find_problems", full)
     text = refused("validate", "x.fmu")
     assert "somewhere: the system refused an operation: got 'No space left on device'" in text
+
+
+ENDLESS = [
+    ("simulate", "PATH.toml", "-o", "o"),
+    ("export", "--robot", "PATH.toml", "-o", "o.fmu"),
+    ("export", "--robot", "PATH.urdf", "-o", "o.fmu"),
+    ("study", "PATH.toml", "-o", "o"),
+    ("export", "--controller", "compliant", "--gains", "PATH.toml", "-o", "o.fmu"),
+    ("report", "folder"),
+    ("simulate", "walk_flat", "--set", "robot=PATH.toml", "-o", "o"),
+]
+
+
+@pytest.mark.skipif(not Path("/dev/zero").exists(), reason="a file without an end")
+@pytest.mark.parametrize("command", ENDLESS)
+def test_a_file_without_an_end_is_refused(
+    plant_build: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    command: tuple[str, ...],
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "folder").mkdir()
+    for name in ("PATH.toml", "PATH.urdf", "folder/run.json"):
+        (tmp_path / name).symlink_to("/dev/zero")
+    assert "a file of more than 64 MiB" in refused(*command)
+
+
+def test_the_limits_of_files_are_those_of_the_page() -> None:
+    assert (LARGEST_FILE, MAP_SIZE) == (67_108_864, 536_870_912)
+
+
+def test_a_height_map_without_an_end_is_refused(
+    plant_build: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(map_files, "MAP_SIZE", 1000)
+    (tmp_path / "map.asc").write_text("1 " * 1000, encoding="utf-8")
+    kind = ("--set", "terrain.kind=heightfield")
+    file = ("--set", f"terrain.file={tmp_path / 'map.asc'}")
+    text = refused("simulate", "walk_flat", *kind, *file, "-o", str(tmp_path / "o"))
+    assert "a file of more than 0 MiB" in text
+
+
+def test_a_full_memory_is_one_paragraph(plant_build: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def full(*_: object, **__: object) -> None:
+        raise MemoryError
+
+    monkeypatch.setattr("hexapod_cosim.cosim.validate.validation.find_problems", full)
+    assert "the memory is full" in refused("validate", "x.fmu")
+
+
+@pytest.mark.parametrize("duty", ["5e-324", "1e-6", "0.9999999999999999"])
+def test_a_gait_without_stance_or_swing_is_refused(
+    plant_build: Path, tmp_path: Path, duty: str
+) -> None:
+    sets = ("--set", f"gait.duty={duty}", "--set", "duration=0.02")
+    text = refused("simulate", "walk_flat", *sets, "-o", str(tmp_path / "o"))
+    assert "the gait's shorter phase" in text
+
+
+@pytest.mark.parametrize("path", [".", "/", "", "folder", "..", "./"])
+@pytest.mark.parametrize(
+    "command",
+    [
+        ("export", "-o"),
+        ("export", "--mjcf", "-o"),
+        ("export", "--urdf", "-o"),
+        ("export", "--ssp", "-o"),
+        ("terrain", "stairs", "-o"),
+    ],
+)
+def test_a_folder_is_no_file_to_write(
+    plant_build: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    command: tuple[str, ...],
+    path: str,
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "folder").mkdir()
+    refused(*command, path)
+
+
+def test_a_folder_whose_name_is_no_utf_8_gets_results(
+    plant_build: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder = Path(f"{tmp_path}/out \udcff\udcc3")
+    code, text = said("simulate", "walk_flat", "--set", "duration=0.02", "-o", str(folder))
+    assert code == 0, text
+    assert (folder / "report.html").is_file()
+    assert said("report", str(folder))[0] == 0
+
+
+def test_a_text_that_is_no_utf_8_is_not_written(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("before", encoding="utf-8")
+    with pytest.raises(HexapodError, match="expected names of files in UTF-8"):
+        write_text(tmp_path / "file", "a\udcff")
+    assert (tmp_path / "file").read_text(encoding="utf-8") == "before"
+
+
+def test_a_setting_that_is_no_utf_8_is_refused(plant_build: Path, tmp_path: Path) -> None:
+    text = refused("simulate", "walk_flat", "--set", "title=a\udcff", "-o", str(tmp_path / "o"))
+    assert "expected characters in UTF-8" in text

@@ -3,24 +3,28 @@
 from __future__ import annotations
 
 import os
+import re
 import signal
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import pytest
 
+from hexapod_cosim import cosim, gym
 from hexapod_cosim.cosim.cli import main
-from hexapod_cosim.cosim.common import files, unpacked
+from hexapod_cosim.cosim.common import files
+from hexapod_cosim.cosim.common import temporary as temporaries
 from hexapod_cosim.cosim.results.results import results_folder
 from hexapod_cosim.models import HexapodError
 
 HOLD = """
 import sys
 from pathlib import Path
-from hexapod_cosim.cosim.common.unpacked import UnpackedFolder
+from hexapod_cosim.cosim.common.temporary import TemporaryFolder
 from hexapod_cosim.cosim.results.results import results_folder
-folder = UnpackedFolder()
+folder = TemporaryFolder("fmu")
 with results_folder(Path(sys.argv[1])):
     print(folder.path, flush=True)
     sys.stdin.read()
@@ -66,6 +70,25 @@ def test_a_second_process_is_refused_and_the_lock_of_a_killed_one_is_free(
     process.stdout.close()
 
 
+def test_the_lock_is_of_the_folder_and_leaves_no_file(tmp_path: Path, temporary: Path) -> None:
+    folder, elsewhere = tmp_path / "out", tmp_path / "elsewhere"
+    elsewhere.mkdir()
+    process = holder(folder, elsewhere)  # with another temporary folder
+    assert process.stdout is not None
+    process.stdout.readline()
+    with (
+        pytest.raises(HexapodError, match="another process writes its results into this folder"),
+        results_folder(folder),
+    ):
+        pass
+    process.communicate()
+    with results_folder(folder):
+        pass
+    assert list(temporary.iterdir()) == []
+    assert not list(elsewhere.glob("*.lock"))
+    process.stdout.close()
+
+
 def test_the_unpacked_folder_of_a_killed_process_is_deleted_by_the_next(
     tmp_path: Path, temporary: Path
 ) -> None:
@@ -73,11 +96,11 @@ def test_the_unpacked_folder_of_a_killed_process_is_deleted_by_the_next(
     assert process.stdout is not None
     left = Path(process.stdout.readline().strip())
     later = left.stat().st_mtime + 1000.0
-    assert unpacked.sweep(now=later) == []  # in use
+    assert temporaries.sweep(now=later) == []  # in use
     process.send_signal(signal.SIGKILL)
     process.wait()
-    assert unpacked.sweep(now=left.stat().st_mtime) == []  # may not have its lock yet
-    assert unpacked.sweep(now=later) == [left]
+    assert temporaries.sweep(now=left.stat().st_mtime) == []  # may not have its lock yet
+    assert temporaries.sweep(now=later) == [left]
     assert not left.exists()
     process.stdout.close()
 
@@ -87,8 +110,66 @@ def test_a_folder_that_is_no_unpacked_fmu_is_not_deleted(temporary: Path) -> Non
     (temporary / "hexapod-fmu-notes" / "text").write_text("mine", encoding="utf-8")
     (temporary / "hexapod-fmu-link").symlink_to(temporary / "hexapod-fmu-notes")
     later = temporary.stat().st_mtime + 1000.0
-    assert unpacked.sweep(now=later) == []
+    assert temporaries.sweep(now=later) == []
     assert (temporary / "hexapod-fmu-notes" / "text").exists()
+
+
+def test_what_is_not_closed_is_deleted_when_its_process_ends(temporary: Path) -> None:
+    code = """
+from hexapod_cosim.cosim.common.temporary import TemporaryFolder
+kept = TemporaryFolder("fmu")
+print(kept.path)
+raise KeyboardInterrupt
+"""
+    done = subprocess.run(
+        [sys.executable, "-c", code],
+        env=os.environ | {"TMPDIR": str(temporary)},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert "hexapod-fmu-" in done.stdout
+    assert list(temporary.iterdir()) == []
+
+
+COMMANDS = {
+    "simulate": ("simulate", "walk_flat", "--set", "duration=1000"),
+    "compare": ("compare", "walk_flat", "--set", "duration=1000"),
+}
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_a_killed_command_leaves_nothing_that_the_next_does_not_delete(
+    plant_build: Path, tmp_path: Path, temporary: Path, name: str
+) -> None:
+    process = subprocess.Popen(
+        [sys.executable, "-m", "hexapod_cosim.cosim.cli", *COMMANDS[name], "-o", "out"],
+        cwd=tmp_path,
+        env=os.environ | {"TMPDIR": str(temporary)},
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+    )
+    recording = f"*/{files.RUN_FILE}" if name == "compare" else files.RUN_FILE
+    while process.poll() is None and not list((tmp_path / "out").glob(recording)):
+        time.sleep(0.01)
+    process.kill()
+    assert process.wait() == -signal.SIGKILL
+    left = [path for path in temporary.iterdir() if path.name.startswith("hexapod-")]
+    assert left
+    assert temporaries.sweep(now=time.time() + 1000.0)
+    assert list(temporary.iterdir()) == []
+
+
+def test_every_temporary_folder_is_one_that_is_swept() -> None:
+    """scratch.py has a lock of its own, which workers of its process wait for."""
+    rooms = [Path(cosim.__file__).parent, Path(gym.__file__).parent]
+    made = {
+        path.name
+        for room in rooms
+        for path in room.rglob("*.py")
+        if re.search(r"TemporaryDirectory|mkdtemp", path.read_text(encoding="utf-8"))
+    }
+    assert made == {"temporary.py", "scratch.py"}
 
 
 def test_files_are_flushed_before_they_replace_others(

@@ -10,11 +10,10 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from pathlib import Path
-from tempfile import TemporaryDirectory
 
 import numpy as np
 
+from hexapod_cosim.cosim.common.temporary import TemporaryFolder
 from hexapod_cosim.cosim.export.export import export_fmu
 from hexapod_cosim.cosim.identify.experiment import Experiment
 from hexapod_cosim.cosim.identify.fitting.output_error import (
@@ -69,8 +68,8 @@ def tried_models(
         start = np.array([
             row.distance(known.get(row.key, before[row.key]), before[row.key]) for row in rows
         ])  # fmt: skip
-        with TemporaryDirectory(prefix="hexapod-friction-") as folder:
-            path = export_fmu(variant, Path(folder) / "robot.fmu")
+        with TemporaryFolder("friction") as folder:
+            path = export_fmu(variant, folder / "robot.fmu")
             with LogPlant(path) as plant:
                 plant.watch = watch
                 whole = Problem(plant, variant, experiments, rows)

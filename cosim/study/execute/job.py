@@ -9,12 +9,12 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from importlib.metadata import version
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any
 from uuid import uuid4
 
 from hexapod_cosim.controller import Gains
 from hexapod_cosim.cosim.common.plant_files import code_hash, package_version
+from hexapod_cosim.cosim.common.temporary import TemporaryFolder
 from hexapod_cosim.cosim.control.controllers import check_control
 from hexapod_cosim.cosim.export.controller_export import export_controller
 from hexapod_cosim.cosim.run.controller_setup import make_setup
@@ -72,14 +72,14 @@ def make_job(
             where="--fmu",
         )
     files = {name: _read(Path(name)) for name in names if name not in list_robots()}
-    with TemporaryDirectory(prefix="hexapod-study-") as folder:
-        plants = PlantFmus(Path(folder), given=fmu)
+    with TemporaryFolder("study") as folder:
+        plants = PlantFmus(folder, given=fmu)
         return Job(
             name=uuid4().hex,
             cases=study.cases,
             factors=study.factors,
             fmus={name: _read(plants.fmu(name)) for name in names},
-            controller=_controller(Path(folder)),
+            controller=_controller(folder),
             robots=files,
             controls=study.texts,
             laws=_laws(study),

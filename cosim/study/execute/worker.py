@@ -9,12 +9,13 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
-from tempfile import TemporaryDirectory, gettempdir
+from tempfile import gettempdir
 from threading import Lock
 from time import perf_counter
 from typing import Any
 
 from hexapod_cosim.controller import Gains
+from hexapod_cosim.cosim.common.temporary import TemporaryFolder
 from hexapod_cosim.cosim.master.loop import FAILED, INTERRUPTED, Progress
 from hexapod_cosim.cosim.results.metrics import METRICS
 from hexapod_cosim.cosim.results.summary import NO_FIGURES, REFUSED, Summary
@@ -65,11 +66,11 @@ class JobContext:
         self._known: OrderedDict[bytes, Summary] = OrderedDict()
 
     def _unpack(self, name: str, suffix: str, content: bytes) -> Path:
-        path = Path(self._folder.name) / f"{name}{suffix}"
+        path = self._folder.path / f"{name}{suffix}"
         try:
             path.write_bytes(content)
         except OSError as error:
-            raise _no_room(error, self._folder.name) from error
+            raise _no_room(error, str(self._folder.path)) from error
         return path
 
     def _local(self, label: str, text: str) -> str:
@@ -82,7 +83,7 @@ class JobContext:
             return text
         if control.path.is_file() and control.path.read_bytes() == content:
             return text
-        folder = Path(self._folder.name) / f"law{len(list(Path(self._folder.name).iterdir()))}"
+        folder = self._folder.path / f"law{len(list(self._folder.path.iterdir()))}"
         folder.mkdir()
         copy = self._unpack(
             str(Path(folder.name) / control.path.stem), control.path.suffix, content
@@ -136,7 +137,7 @@ class JobContext:
 
     def _portable(self, summary: Summary) -> Summary:
         """Returns the summary without the path of this process' folder in its reason."""
-        place = str(Path(self._folder.name) / " ").rstrip()
+        place = str(self._folder.path / " ").rstrip()
         return (
             replace(summary, reason=summary.reason.replace(place, ""))
             if place in summary.reason
@@ -182,7 +183,7 @@ class JobContext:
     def close(self) -> None:
         """Closes the engines and removes the unpacked files."""
         self._close_engines()
-        self._folder.cleanup()
+        self._folder.close()
 
 
 def _check_environment(job: Job) -> None:
@@ -200,9 +201,9 @@ def _check_environment(job: Job) -> None:
         )
 
 
-def _folder() -> TemporaryDirectory[str]:
+def _folder() -> TemporaryFolder:
     try:
-        return TemporaryDirectory(prefix="hexapod-job-")
+        return TemporaryFolder("job")
     except OSError as error:
         raise _no_room(error, gettempdir()) from error
 

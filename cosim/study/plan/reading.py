@@ -39,6 +39,7 @@ from hexapod_cosim.cosim.study.plan.records import (
 )
 from hexapod_cosim.models import HexapodError, unknown_name
 from hexapod_cosim.models.errors import refuse_path
+from hexapod_cosim.models.files import read_text
 from hexapod_cosim.models.schema import parse_toml, reading_toml
 
 KEYS = (
@@ -75,7 +76,7 @@ def load_study(path_or_name: str | Path, *, controls: Sequence[str] = ()) -> Stu
             raise unknown_name("study", str(path_or_name), bundled, error=StudyError)
         path = bundled[str(path_or_name)]
     with reading_toml(path, kind="study", name="the study", names=list_studies, error=StudyError):
-        table = parse_toml(path.read_text(encoding="utf-8"))
+        table = parse_toml(read_text(path))
     if controls:
         table = _with_controls(table, controls)
     return study_from_table(

@@ -6,30 +6,52 @@ import os
 import shutil
 import tempfile
 import time
+import weakref
 from contextlib import suppress
 from pathlib import Path
 
 from filelock import FileLock, Timeout
 
-PREFIX = "hexapod-fmu-"
+PREFIX = "hexapod-"
 LOCK = ".lock"  # held as long as the folder is in use; the system releases a killed process's
 SETTLED = 60.0  # s  a younger folder may not have its lock yet
 
 
-class UnpackedFolder:
-    """A folder in the system's temporary one. Creating it deletes those of killed processes."""
+class TemporaryFolder:
+    """A folder in the system's temporary one. Creating it deletes those of killed processes.
 
-    def __init__(self) -> None:
+    As a context manager it returns the folder's path. What is not closed is deleted when the
+    process ends.
+
+    Args:
+        use: a word for the folder's name.
+    """
+
+    def __init__(self, use: str) -> None:
         sweep()
-        self.path = Path(tempfile.mkdtemp(prefix=PREFIX))
-        self._lock = FileLock(self.path / LOCK, blocking=False, fallback_to_soft=False)
-        with suppress(OSError, Timeout):  # a file system without locks: the folder is not swept
-            self._lock.acquire()
+        self.path = Path(tempfile.mkdtemp(prefix=f"{PREFIX}{use}-"))
+        lock = FileLock(
+            self.path / LOCK, blocking=False, fallback_to_soft=False, thread_local=False
+        )
+        with suppress(OSError):  # a file system without locks: the folder is not swept
+            lock.acquire()
+        self._delete = weakref.finalize(self, _delete, self.path, lock)
 
     def close(self) -> None:
         """Deletes the folder; may be called twice."""
-        self._lock.release()
-        shutil.rmtree(self.path, ignore_errors=True)
+        self._delete()
+
+    def __enter__(self) -> Path:
+        return self.path
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+
+def _delete(folder: Path, lock: FileLock) -> None:
+    """Releases a folder's lock, because Windows deletes no open file, and deletes the folder."""
+    lock.release()
+    shutil.rmtree(folder, ignore_errors=True)
 
 
 def sweep(*, now: float | None = None) -> list[Path]:
