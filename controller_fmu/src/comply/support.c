@@ -9,10 +9,7 @@ static const double least_spread = 1e-4;
 static const double least_load = 1e-6;     /* N, a smaller load is not shared */
 
 /* Returns the depth [m] by which the ground deforms under a load [N] (C21). */
-static double indentation(double load, double stiffness) {
-  const double root = cbrt(load / stiffness);
-  return root * root;
-}
+static double indentation(double load, double stiffness) { return hx_two_thirds(load / stiffness); }
 
 /* Returns a transition from 0 to 1 over [0, 1] with continuous rate and acceleration. */
 static double smooth(double x) {

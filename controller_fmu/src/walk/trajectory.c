@@ -108,8 +108,9 @@ static void hop(double tau, double top, double down, double *lift, double *climb
  */
 static hxPlane travel(hxTwist twist, double time) {
   const double half = 0.5 * twist.yaw_rate * time;
-  const double chord = fabs(half) > small_angle ? sin(half) / half : 1.0;
-  return hx_times(hx_scaled(twist.velocity, time * chord), hx_cis(half));
+  const hxPlane turned = hx_cis(half);
+  const double chord = fabs(half) > small_angle ? turned.y / half : 1.0;
+  return hx_times(hx_scaled(twist.velocity, time * chord), turned);
 }
 
 /* -------------------------------------------------------------------------------------- paths */
