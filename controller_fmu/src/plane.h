@@ -55,4 +55,15 @@ static inline double hx_clamp(double x, double low, double high) {
   return x < low ? low : x > high ? high : x;
 }
 
+/* Return the larger and the smaller of x and a bound; the bound if x is not a number. Not by fmax
+ * and fmin, which are calls. */
+static inline double hx_larger(double x, double bound) { return x > bound ? x : bound; }
+static inline double hx_smaller(double x, double bound) { return x < bound ? x : bound; }
+
+/* Returns x - floor(x), for |x| < 2^51. Not by floor, which is a call. */
+static inline double hx_fraction(double x) {
+  const double rounding = 6755399441055744.0, whole = (x + rounding) - rounding;
+  return x - (whole > x ? whole - 1.0 : whole);
+}
+
 #endif

@@ -66,7 +66,7 @@ void hx_compliant_reset(const hxCompliantModel *model, hxCompliant *compliant) {
 hxTwist hx_compliant_addition(const hxCompliantModel *model, const hxCompliant *compliant,
                               int64_t steps) {
   const hxSteering *s = &compliant->steering;
-  const double part = fmin((double)(s->past + steps) / model->leading, 1.0);
+  const double part = hx_smaller((double)(s->past + steps) / model->leading, 1.0);
   return (hxTwist){hx_plane_add(s->begin.velocity,
                                 hx_scaled(hx_plane_sub(s->goal.velocity, s->begin.velocity), part)),
                    s->begin.yaw_rate + (s->goal.yaw_rate - s->begin.yaw_rate) * part};
