@@ -2,6 +2,7 @@
 #include "fmi/instance.h"
 
 #include <math.h>
+#include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -133,67 +134,102 @@ static inline const hxVariable *row_of(hxInstance *instance, hxType type, unsign
   return hx_variable_of_type(instance, type, reference, causality);
 }
 
-/* Places of the first variables of a call. The table of variables is larger than the fastest
- * memory, so each row is looked up once. */
-enum { KNOWN_PLACES = 512 };
-typedef struct {
-  unsigned offset[KNOWN_PLACES];
-} hxPlaces;
-
 /* the groups of an output */
 static unsigned groups_of(unsigned reference) {
   return hx_output_groups[reference - hx_sections[HX_OUTPUT].first];
 }
 
-/* checks the references and updates the outputs or rates that are asked for */
-static hxStatus prepare_get(hxInstance *instance, hxType type, const unsigned reference[], size_t n,
-                            hxPlaces *places) {
+/* the place of a valid reference in the variables */
+static void *place_of(hxInstance *instance, hxType type, unsigned reference) {
   hxCausality causality = HX_OUTPUT;
-  unsigned groups = 0;
-  int needs_rate = 0;
+  return (char *)&instance->state.variables + row_of(instance, type, reference, &causality)->offset;
+}
+
+/* checks references, and finds the groups of outputs that they need, and whether they need rates */
+static hxStatus look_up(hxInstance *instance, hxType type, const unsigned reference[], size_t n,
+                        unsigned *groups, int *needs_rate) {
+  hxCausality causality = HX_OUTPUT;
+  *groups = 0, *needs_rate = 0;
   for (size_t i = 0; i < n; i++) {
-    const hxVariable *variable = row_of(instance, type, reference[i], &causality);
-    if (!variable) return HX_INVALID_ARGUMENT;
-    if (i < KNOWN_PLACES) places->offset[i] = (unsigned)variable->offset;
-    if (causality == HX_OUTPUT) groups |= groups_of(reference[i]);
-    needs_rate |= causality == HX_LOCAL;
+    if (!row_of(instance, type, reference[i], &causality)) return HX_INVALID_ARGUMENT;
+    if (causality == HX_OUTPUT) *groups |= groups_of(reference[i]);
+    *needs_rate |= causality == HX_LOCAL;
   }
+  return HX_OK;
+}
+
+/* The same of Reals, at most HX_KNOWN_OUTPUTS. */
+static hxStatus look_up_reals(hxInstance *instance, const unsigned reference[], size_t n) {
+  hxKnownOutputs *known = &instance->outputs;
+  if (known->n == n && memcmp(known->reference, reference, n * sizeof *reference) == 0)
+    return HX_OK;
+  known->n = 0;
+  const hxStatus status =
+      look_up(instance, HX_REAL, reference, n, &known->groups, &known->needs_rate);
+  if (status != HX_OK) return status;
+  hxCausality causality = HX_OUTPUT;
+  for (size_t i = 0; i < n; i++) {
+    known->reference[i] = reference[i];
+    known->offset[i] = row_of(instance, HX_REAL, reference[i], &causality)->offset;
+  }
+  known->n = n;
+  return HX_OK;
+}
+
+/* copies the values of known outputs; none when one of them is not finite */
+static hxStatus get_known(hxInstance *instance, double value[]) {
+  const hxKnownOutputs *known = &instance->outputs;
+  const char *variables = (const char *)&instance->state.variables;
+  const uint64_t one = (uint64_t)1
+                       << 52; /* of the exponent, which has all bits set in NaN and inf */
+  uint64_t found = 0;
+  for (size_t i = 0; i < known->n; i++) {
+    uint64_t bits;
+    memcpy(&bits, variables + known->offset[i], sizeof bits);
+    found |= (bits & INT64_MAX) + one;
+  }
+  for (size_t i = 0; found >> 63 && i < known->n; i++) {
+    const double *number = place_of(instance, HX_REAL, known->reference[i]);
+    hxCausality causality = HX_OUTPUT;
+    const hxStatus status = hx_instance_check_finite(
+        instance, number, 1, row_of(instance, HX_REAL, known->reference[i], &causality)->name);
+    if (status != HX_OK) return status;
+  }
+  for (size_t i = 0; i < known->n; i++)
+    memcpy(value + i, variables + known->offset[i], sizeof *value);
+  return HX_OK;
+}
+
+/* updates what is asked for */
+static hxStatus update(hxInstance *instance, unsigned groups, int needs_rate) {
   return groups || needs_rate ? hx_instance_refresh(instance, groups, needs_rate) : HX_OK;
 }
 
-/* the place of a valid reference in the variables */
-static void *place_of(hxInstance *instance, hxType type, const unsigned reference[], size_t i,
-                      const hxPlaces *places) {
-  hxCausality causality = HX_OUTPUT;
-  const size_t offset = i < KNOWN_PLACES ? places->offset[i]
-                                         : row_of(instance, type, reference[i], &causality)->offset;
-  return (char *)&instance->state.variables + offset;
-}
-
-/* copies values of valid references; none when one of them is not finite */
+/* reads Reals, at most HX_KNOWN_OUTPUTS of them */
 static hxStatus get_reals(hxInstance *instance, const unsigned reference[], size_t n,
-                          const hxPlaces *places, double value[]) {
-  hxCausality causality = HX_OUTPUT;
-  for (size_t i = 0; i < n; i++) {
-    const double *number = place_of(instance, HX_REAL, reference, i, places);
-    if (!isfinite(*number))
-      return hx_instance_check_finite(instance, number, 1,
-                                      row_of(instance, HX_REAL, reference[i], &causality)->name);
-  }
-  for (size_t i = 0; i < n; i++)
-    memcpy(value + i, place_of(instance, HX_REAL, reference, i, places), sizeof *value);
-  return HX_OK;
+                          double value[]) {
+  hxStatus status = look_up_reals(instance, reference, n);
+  if (status == HX_OK)
+    status = update(instance, instance->outputs.groups, instance->outputs.needs_rate);
+  return status == HX_OK ? get_known(instance, value) : status;
 }
 
 hxStatus hx_instance_get(hxInstance *instance, hxType type, const unsigned reference[], size_t n,
                          void *value) {
-  hxPlaces places;
-  const hxStatus status = prepare_get(instance, type, reference, n, &places);
-  if (status != HX_OK) return status;
-  if (type == HX_REAL) return get_reals(instance, reference, n, &places, value);
-  for (size_t i = 0; i < n; i++)
-    memcpy((int *)value + i, place_of(instance, type, reference, i, &places), sizeof(int));
-  return HX_OK;
+  unsigned groups;
+  int needs_rate;
+  if (type == HX_REAL && n <= HX_KNOWN_OUTPUTS) return get_reals(instance, reference, n, value);
+  hxStatus status = look_up(instance, type, reference, n, &groups, &needs_rate);
+  if (status == HX_OK) status = update(instance, groups, needs_rate);
+  for (size_t i = 0; status == HX_OK && type == HX_REAL && i < n; i++) {
+    hxCausality causality = HX_OUTPUT;
+    status = hx_instance_check_finite(instance, place_of(instance, HX_REAL, reference[i]), 1,
+                                      row_of(instance, HX_REAL, reference[i], &causality)->name);
+  }
+  const size_t size = type == HX_REAL ? sizeof(double) : sizeof(int);
+  for (size_t i = 0; status == HX_OK && i < n; i++)
+    memcpy((char *)value + i * size, place_of(instance, type, reference[i]), size);
+  return status;
 }
 
 static double value_at(hxType type, const void *value, size_t i) {
@@ -234,37 +270,65 @@ static hxStatus check_set(hxInstance *instance, const hxVariable *variable, hxCa
   return HX_OK;
 }
 
-/* checks all references and values; sets the places, and *parameters if one is a parameter */
+/* checks all references and values; sets *causalities to a mask of those of the variables */
 static hxStatus check_all(hxInstance *instance, hxType type, const unsigned reference[], size_t n,
-                          const void *value, hxPlaces *places, int *parameters) {
+                          const void *value, unsigned *causalities) {
   hxCausality causality = HX_INPUT;
-  *parameters = 0;
+  *causalities = 0;
   for (size_t i = 0; i < n; i++) {
     const hxVariable *variable = row_of(instance, type, reference[i], &causality);
     if (!variable) return HX_INVALID_ARGUMENT;
     const hxStatus status = check_set(instance, variable, causality, value_at(type, value, i));
     if (status != HX_OK) return status;
-    if (i < KNOWN_PLACES) places->offset[i] = (unsigned)variable->offset;
-    *parameters |= causality == HX_PARAMETER;
+    *causalities |= 1u << causality;
   }
   return HX_OK;
 }
 
 hxStatus hx_instance_check_set(hxInstance *instance, hxType type, const unsigned reference[],
                                size_t n, const void *value) {
-  hxPlaces places;
-  int parameters;
-  return check_all(instance, type, reference, n, value, &places, &parameters);
+  unsigned causalities;
+  return check_all(instance, type, reference, n, value, &causalities);
+}
+
+/* sets Real inputs that are known if all values are in range; returns whether it did */
+static int set_known(hxInstance *instance, const unsigned reference[], size_t n,
+                     const double value[]) {
+  const hxKnownInputs *known = &instance->inputs;
+  char *variables = (char *)&instance->state.variables;
+  int outside = 0;
+  if (known->n != n || n == 0 || memcmp(known->reference, reference, n * sizeof *reference) != 0)
+    return 0;
+  for (size_t i = 0; i < n; i++)
+    outside |= !(value[i] >= known->min[i]) | !(value[i] <= known->max[i]);
+  if (outside) return 0;
+  for (size_t i = 0; i < n; i++) memcpy(variables + known->offset[i], value + i, sizeof *value);
+  hx_mark_stale(instance);
+  return 1;
+}
+
+/* keeps what the table says of Real inputs */
+static void keep_inputs(hxInstance *instance, const unsigned reference[], size_t n) {
+  hxKnownInputs *known = &instance->inputs;
+  hxCausality causality = HX_INPUT;
+  known->n = n;
+  for (size_t i = 0; i < n; i++) {
+    const hxVariable *variable = row_of(instance, HX_REAL, reference[i], &causality);
+    known->reference[i] = reference[i];
+    known->offset[i] = variable->offset;
+    known->min[i] = variable->min;
+    known->max[i] = variable->max;
+  }
 }
 
 hxStatus hx_instance_set(hxInstance *instance, hxType type, const unsigned reference[], size_t n,
                          const void *value) {
-  hxPlaces places;
-  int parameters;
-  const hxStatus status = check_all(instance, type, reference, n, value, &places, &parameters);
+  unsigned causalities;
+  if (type == HX_REAL && set_known(instance, reference, n, value)) return HX_OK;
+  const hxStatus status = check_all(instance, type, reference, n, value, &causalities);
   if (status != HX_OK || n == 0) return status;
   for (size_t i = 0; i < n; i++) {
-    void *place = place_of(instance, type, reference, i, &places);
+    void *place = place_of(instance, type, reference[i]);
     const int number = type == HX_REAL ? 0 : ((const int *)value)[i],
               stored = type == HX_BOOLEAN ? number != 0 : number; /* true may be -1 */
     if (type == HX_REAL)
@@ -272,7 +336,9 @@ hxStatus hx_instance_set(hxInstance *instance, hxType type, const unsigned refer
     else
       memcpy(place, &stored, sizeof(int));
   }
-  instance->state.model_stale |= parameters && !is_between_steps(instance);
+  if (type == HX_REAL && n <= HX_KNOWN_INPUTS && causalities == 1u << HX_INPUT)
+    keep_inputs(instance, reference, n);
+  instance->state.model_stale |= (causalities & 1u << HX_PARAMETER) && !is_between_steps(instance);
   hx_mark_stale(instance);
   return HX_OK;
 }

@@ -67,6 +67,25 @@ typedef struct hxInstanceState {
   struct hxVariables variables;
 } hxInstanceState;
 
+/* The references of the last call that read Reals, and of the last one that set Real inputs, which
+ * were valid, with what the table of variables says of them: importers repeat such calls at every
+ * communication point, and the table is larger than the fastest memory. Calls for more are not
+ * kept. */
+enum { HX_KNOWN_OUTPUTS = 512, HX_KNOWN_INPUTS = 128 };
+typedef struct hxKnownOutputs {
+  size_t n;
+  unsigned groups; /* of outputs */
+  int needs_rate;
+  unsigned reference[HX_KNOWN_OUTPUTS];
+  unsigned short offset[HX_KNOWN_OUTPUTS];
+} hxKnownOutputs;
+typedef struct hxKnownInputs {
+  size_t n;
+  unsigned reference[HX_KNOWN_INPUTS];
+  unsigned short offset[HX_KNOWN_INPUTS];
+  double min[HX_KNOWN_INPUTS], max[HX_KNOWN_INPUTS];
+} hxKnownInputs;
+
 struct hxInstance {
   hxInstanceState state;
   hxComponent *component;
@@ -78,6 +97,8 @@ struct hxInstance {
   int may_return_early; /* co-simulation: a step may end where discrete variables change */
   unsigned logged;     /* bit k: category k is passed on */
   hxLogSink *sink;
+  hxKnownOutputs outputs;
+  hxKnownInputs inputs;
 };
 
 /* ----------------------------------------------------------------------------------------------

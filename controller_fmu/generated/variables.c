@@ -653,7 +653,7 @@ const char *const hx_log_category_names[] = {
 const hxStateRow *const hx_states = 0;
 const size_t hx_state_count = 0;
 
-const char hx_default_guid[] = "{796261ef-0e7d-405d-822c-e887bdc43672}";
+const char hx_default_guid[] = "{a2388160-03c5-4798-ae9b-838cf3a1d864}";
 
 _Static_assert(HX_CONTROL_KINEMATIC == 1, "Control");
 _Static_assert(HX_CONTROL_COMPLIANT == 2, "Control");

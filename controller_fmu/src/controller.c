@@ -60,23 +60,35 @@ static void lower(const hxControllerModel *model, const hxFootPaths *paths, hxPl
   for (int k = 0; k < HX_LEGS; ++k) step->height[k] = step->feet.height[k] - step->lowering[k];
 }
 
-/* Computes by how far a foot's contact point shifts because its sphere rolls (C9). A tibia that
- * pitches by dB rolls the sphere by -R dB along the outward direction of the leg. The shift s
- * changes B itself: s = R (C + s dC/du) is solved by one Newton step. rolled: distance rolled that
- * is no shift, because the foot aims at another position than that of the stance [m]. */
-static void place_leg(const hxLegSolver *leg, const hxPosture *posture, hxPlane plane,
-                      double height, double rolled, hxPlane *shift, hxPose *pose) {
-  double slope[HX_JOINTS], z = height;
-  hxPlane seen = plane;
-  hx_posture_see_place(posture, &seen, &z);
-  hx_leg_solver_pose(leg, seen, z, pose);
-  hx_leg_solver_speeds(leg, pose, pose->heading, 0.0, slope);
-  const double rolls = hx_leg_solver_rolling(leg, pose->angle) - rolled;
-  *shift = hx_scaled(pose->heading, rolls / (1.0 - leg->radius * (slope[2] - slope[1])));
-  seen = hx_plane_add(plane, *shift);
-  z = height;
-  hx_posture_see_place(posture, &seen, &z);
-  hx_leg_solver_pose(leg, seen, z, pose);
+/* Computes the poses of legs whose contact points are shifted from the planned feet. */
+static void reach_all(const hxLegSolver leg[HX_LEGS], const hxPlane shift[HX_LEGS],
+                      hxPlannedStep *step) {
+  hxPlane seen[HX_LEGS];
+  double z[HX_LEGS];
+  for (int k = 0; k < HX_LEGS; ++k) {
+    seen[k] = hx_plane_add(step->plane[k], shift[k]);
+    z[k] = step->height[k];
+    hx_posture_see_place(&step->posture, &seen[k], &z[k]);
+  }
+  hx_leg_solver_poses(leg, (const hxPlane *)seen, (const double *)z, step->pose);
+}
+
+/* Computes by how far the feet's contact points shift because their spheres roll (C9), and the
+ * poses of the legs. A tibia that pitches by dB rolls the sphere by -R dB along the outward
+ * direction of the leg. The shift s changes B itself: s = R (C + s dC/du) is solved by one Newton
+ * step. What is rolled on the way to another position than that of the stance is no shift. */
+static void place_legs(const hxLegSolver leg[HX_LEGS], hxPlannedStep *step) {
+  const hxPlane none[HX_LEGS] = {{0.0, 0.0}};
+  reach_all(leg, none, step);
+  for (int k = 0; k < HX_LEGS; ++k) {
+    const hxPose *pose = &step->pose[k];
+    double slope[HX_JOINTS];
+    hx_leg_solver_speeds(&leg[k], pose, pose->heading, 0.0, slope);
+    const double rolls = hx_leg_solver_rolling(&leg[k], pose->angle) - step->feet.rolled[k];
+    step->shift[k] =
+        hx_scaled(pose->heading, rolls / (1.0 - leg[k].radius * (slope[2] - slope[1])));
+  }
+  reach_all(leg, (const hxPlane *)step->shift, step);
 }
 
 /* Computes the poses of the legs and the point masses for a torso that has moved by its sway. */
@@ -84,14 +96,12 @@ static void stand(const hxControllerModel *model, const hxControllerState *state
                   hxPlannedStep *step) {
   for (int k = 0; k < HX_LEGS; ++k) step->plane[k] = hx_plane_sub(step->feet.plane[k], step->sway);
   lower(model, &state->paths, step);
-  for (int k = 0; k < HX_LEGS; ++k)
-    place_leg(&model->leg[k], &step->posture, step->plane[k], step->height[k], step->feet.rolled[k],
-              &step->shift[k], &step->pose[k]);
-  if (model->compliant)
-    hx_inverse_dynamics_place(
-        &model->laws.dynamics, model->leg, step->pose,
-        hx_plane_add(step->feet.way, hx_times(hx_cis(step->feet.turn), step->sway)),
-        step->feet.turn, &step->posture, &step->masses);
+  place_legs(model->leg, step);
+  if (!model->compliant) return;
+  const hxPlane turn = hx_cis(step->feet.turn);
+  hx_inverse_dynamics_place(&model->laws.dynamics, model->leg, step->pose,
+                            hx_plane_add(step->feet.way, hx_times(turn, step->sway)), turn,
+                            &step->posture, &step->masses);
 }
 
 /* Computes sway, poses of the legs and point masses for planned feet. */

@@ -6,6 +6,7 @@
 #include <math.h>
 
 #include "hexapod/inside.h"
+#include "transcendental.h"
 
 /* Changes of gait and control are rare: their functions are compiled for size, because wheels
  * contain them for every platform. */
@@ -32,8 +33,8 @@ static inline double hx_square(hxPlane a) { return a.x * a.x + a.y * a.y; }
 /* Returns the length of a vector. Not by hypot, which would need glibc 2.35. */
 static inline double hx_length(hxPlane a) { return sqrt(hx_square(a)); }
 
-/* Returns e^x for x <= 0, to 1e-16. Not by exp, which would need glibc 2.29. */
-static inline double hx_decay(double x) { return 1.0 + expm1(x); }
+/* Returns e^x for x <= 0, to 1e-16. */
+static inline double hx_decay(double x) { return 1.0 + hx_growth(x); }
 
 /* Return Re(a^* b) and Im(a^* b), the dot and the cross product of two vectors. */
 static inline double hx_along(hxPlane a, hxPlane b) { return a.x * b.x + a.y * b.y; }
@@ -44,10 +45,25 @@ static inline hxPlane hx_over(hxPlane a, hxPlane b) {
 }
 
 /* Returns e^(i angle). */
-static inline hxPlane hx_cis(double angle) { return (hxPlane){cos(angle), sin(angle)}; }
+static inline hxPlane hx_cis(double angle) {
+  hxPlane a;
+  hx_sine_cosine(angle, &a.y, &a.x);
+  return a;
+}
 
 static inline double hx_clamp(double x, double low, double high) {
   return x < low ? low : x > high ? high : x;
+}
+
+/* Return the larger and the smaller of x and a bound; the bound if x is not a number. Not by fmax
+ * and fmin, which are calls. */
+static inline double hx_larger(double x, double bound) { return x > bound ? x : bound; }
+static inline double hx_smaller(double x, double bound) { return x < bound ? x : bound; }
+
+/* Returns x - floor(x), for |x| < 2^51. Not by floor, which is a call. */
+static inline double hx_fraction(double x) {
+  const double rounding = 6755399441055744.0, whole = (x + rounding) - rounding;
+  return x - (whole > x ? whole - 1.0 : whole);
 }
 
 #endif

@@ -59,19 +59,15 @@ typedef struct hxControllerState {
   hxControllerOutput output; /* of the last tick */
 } hxControllerState;
 
-/* The next tick, computed early for its outputs. The tick uses it if the input is still the same.
- * It is not part of the state. */
-typedef struct hxAhead {
-  int known;
-  hxControllerInput input;
-  hxControllerState state;
-} hxAhead;
-
 struct hxController {
   hxControllerDefinition definition; /* with the gait that was asked for last */
   hxControllerModel model[2]; /* of the present gait and of the next one */
-  hxControllerState state;
-  hxAhead ahead;
+  /* the present state, and the other one: the next tick's, computed early for its outputs, or that
+   * before a step, which one that fails restores. It is not part of the controller's state */
+  hxControllerState state[2];
+  int now; /* index of the present state */
+  int is_ahead; /* the other state is that after the next tick under `input` */
+  hxControllerInput input;
   char message[HX_MESSAGE_SIZE];
 };
 

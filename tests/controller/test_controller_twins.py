@@ -22,14 +22,13 @@ def files_below(folder: Path, suffix: str) -> set[str]:
 
 
 PAIRS = sorted(files_below(C, ".c") & files_below(PYTHON, ".py"))
-# C has functions around the controller for tick times, saved states and refusals; Python has the
-# constructor and `step`
-ONLY_C = {"walk/schedule", "validation"}
+# C has functions around the controller for tick times, saved states and refusals, and its own
+# transcendental ones; Python has the constructor and `step`
+ONLY_C = {"walk/schedule", "validation", "transcendental"}
 # state.h declares what controller.c defines, and contains all types of the state
-HEADERS = {"plane", "state"}
+HEADERS = {"plane", "state", "transcendental"}
 # numpy does for all legs what C does in a function for one leg, in a loop or as a sum
 ONE_LEG = {
-    "place_leg": "place_legs",
     "place_foot": "place_feet",
     "planned_foot": "planned_feet",
     "limit_joint": "limit_joints",
@@ -37,7 +36,10 @@ ONE_LEG = {
     "tick": "step",
     "change": "change_gait",
 }
-WITHOUT_TWIN = {"total_weight", "plane_acceleration", "step_at"}
+WITHOUT_TWIN = {
+    *("total_weight", "plane_acceleration", "step_at"),
+    *("linkage", "give_angles", "poses", "reach_all"),  # poses of one leg or of all at once
+}
 PREFIX = re.compile(
     r"^hx_((burden|compliance|compliant|contact_detector|sensor_watch|controller|foot_law|gait"
     r"|hold|inverse_dynamics|leg_solver|landings"

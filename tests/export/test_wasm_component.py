@@ -33,8 +33,7 @@ from hexapod_cosim.models.ground.table import read_terrain
 
 STEP = 0.005  # s
 OUTPUTS = 619  # Reals of the plant
-# rad  of joint angles: libm's functions differ between C libraries in the last bit; each derivative
-# is a difference over one step
+# rad  of joint angles; each derivative is a difference over one step
 ROUND_OFF = 1e-14
 MEMORY = 2_500_000  # bytes that a component may have
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes as ct
+import math
 
 import numpy as np
 import pytest
@@ -95,3 +96,76 @@ def test_the_suspension_is_the_matrix_exponential_whatever_its_damping(
         np.array(found[:4]).reshape(2, 2) / scale, expected[:2, :2] / scale, atol=1e-12
     )
     np.testing.assert_allclose(found[4:], expected[:2, 2], rtol=1e-9, atol=1e-12 / stiffness)
+
+
+def transcendental(core: ct.CDLL, x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, ...]:
+    """Returns sine, cosine, e^x - 1, tanh x, x^(2/3) and the angles of the points (x, y)."""
+    out = [np.zeros_like(x) for _ in range(6)]
+    core.hx_probe_transcendental(*pointers(x, y), (ct.c_void_p * 6)(*pointers(*out)), len(x))
+    return tuple(out)
+
+
+ULP = 2.3e-16  # relative to 1
+
+
+def test_the_controllers_sines_and_cosines_are_exact_to_one_unit_in_the_last_place_of_1(
+    controller_core: ct.CDLL,
+) -> None:
+    rng = np.random.default_rng(8)
+    quarters = np.arange(-8, 9) * (0.5 * math.pi)
+    x = np.concatenate(
+        [quarters, rng.uniform(-7.0, 7.0, 5000), 10.0 ** rng.uniform(-300.0, 4.0, 2000)]
+    )
+    sine, cosine, *_ = transcendental(controller_core, x, x)
+    assert np.max(np.abs(sine - np.sin(x))) <= ULP
+    assert np.max(np.abs(cosine - np.cos(x))) <= ULP
+    small = (np.abs(x) < 3.0) & (x != 0.0)
+    assert np.max(np.abs(sine[small] / np.sin(x[small]) - 1.0)) <= 2 * ULP
+
+
+def test_the_controllers_exponential_is_exact_and_ends_at_minus_one(
+    controller_core: ct.CDLL,
+) -> None:
+    rng = np.random.default_rng(9)
+    x = np.concatenate(
+        [rng.uniform(-39.0, 39.0, 5000), 10.0 ** rng.uniform(-300.0, 0.0, 500), [0.0]]
+    )
+    *_, growth, tanh, _, _ = transcendental(controller_core, x, x)
+    for found, expected in ((growth, np.expm1(x)), (tanh, np.tanh(x))):
+        np.testing.assert_allclose(found, expected, rtol=4 * ULP, atol=0.0)
+    far = np.array([-41.0, -1e9, -1e300])
+    assert list(transcendental(controller_core, far, far)[2]) == [-1.0, -1.0, -1.0]
+    ends = np.array([-1e300, 1e300])
+    assert list(transcendental(controller_core, ends, ends)[3]) == [-1.0, 1.0]
+
+
+def test_the_controllers_power_of_two_thirds_is_exact(controller_core: ct.CDLL) -> None:
+    x = np.concatenate([10.0 ** np.random.default_rng(10).uniform(-190.0, 190.0, 5000), [8.0]])
+    found = transcendental(controller_core, x, x)[4]
+    np.testing.assert_allclose(found, np.cbrt(x) ** 2, rtol=5 * ULP, atol=0.0)
+    assert found[-1] == pytest.approx(4.0, rel=5 * ULP)
+    assert list(transcendental(controller_core, np.zeros(1), np.zeros(1))[4]) == [0.0]
+
+
+def test_the_controllers_arc_tangent_is_that_of_the_quadrant(controller_core: ct.CDLL) -> None:
+    rng = np.random.default_rng(11)
+    axes = [(x, y) for y in (0.0, -0.0, 1.0, -1.0, 1e-9) for x in (1.0, -1.0, 1e-9, -1e-9)]
+    diagonals = [(1.0, 1.0), (-1.0, 1.0), (1.0, -1.0), (-3.0, -3.0)]
+    points = np.concatenate(
+        [
+            rng.normal(size=(3000, 2)),
+            rng.normal(size=(1000, 2)) * 10.0 ** rng.uniform(-250.0, 250.0, (1000, 2)),
+            np.array(axes + diagonals),
+        ]
+    )
+    x, y = np.ascontiguousarray(points.T)
+    *_, found = transcendental(controller_core, x, y)
+    np.testing.assert_allclose(found, np.arctan2(y, x), rtol=3 * ULP, atol=0.0)
+    assert list(transcendental(controller_core, np.zeros(1), np.zeros(1))[5]) == [0.0]
+
+
+def test_what_is_no_number_has_no_sine_or_angle(controller_core: ct.CDLL) -> None:
+    x, y = np.array([math.nan, 1.0]), np.array([1.0, math.nan])
+    found = transcendental(controller_core, x, y)
+    assert all(np.isnan(values[0]) for values in found)
+    assert np.isnan(found[5][1])

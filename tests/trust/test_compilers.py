@@ -1,4 +1,4 @@
-"""The plant has the same bits from every compiler and at every level of optimisation.
+"""Plant and controller have the same bits from every compiler and level of optimisation.
 
 HEXAPOD_COMPILERS=all (`make test-compilers`) builds with gcc, clang and zig at -O0 to -O3; without
 it one build stands for them. tests/plant/test_plant_lanes.py compares -O0 and all widths of lanes.
@@ -14,13 +14,20 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
+from gains import make_gains
+from native_controller import NativeController
 from plant import Plant
 from states import landing, random_command
 
+from hexapod_cosim.controller import BodyCommand, Measurement, Parts, make_gait
+from hexapod_cosim.cosim.interface.controller_interface import ControllerSetup
 from hexapod_cosim.models import load_robot
 
 PLANT = Path(__file__).parents[2] / "plant_fmu"
+CONTROLLER = PLANT.parent / "controller_fmu"
+SHARED = ("status", "checksum", "range_check", "message")  # sources of the plant in the controller
 COMPILERS = {"gcc": ["gcc"], "clang": ["clang"], "zig": [sys.executable, "-m", "ziglang", "cc"]}
 FEW = [("clang", "-O1")]  # clang shares no optimiser with gcc
 ALL = [(name, f"-O{level}") for name in COMPILERS for level in range(4)]
@@ -34,19 +41,34 @@ def is_there(compiler: str) -> bool:
     return shutil.which(compiler) is not None
 
 
-def compiled(compiler: str, level: str, folder: Path) -> ct.CDLL:
-    """Returns the plant as the build's options make it, but for the level of optimisation, without
-    the kernels for other instruction sets.
-    """
-    file = folder / "plant.so"
-    sources = [*sorted((PLANT / "src").rglob("*.c")), PLANT / "generated" / "defaults.c"]
+def built_with(
+    compiler: str, level: str, file: Path, sources: list[Path], folders: list[Path]
+) -> ct.CDLL:
+    """Returns a library as the build's options make it, but for the level of optimisation."""
     flags = [
         *("-std=c11", level, "-shared", "-fPIC", "-ffp-contract=off", "-fno-math-errno"),
-        *("-fno-trapping-math", "-DHX_SHARED", "-DHX_BASELINE_ONLY", f"-I{PLANT / 'include'}"),
+        *("-fno-trapping-math", "-DHX_SHARED", "-DHX_BASELINE_ONLY"),
+        *(f"-I{folder}" for folder in folders),
     ]
     command = [*COMPILERS[compiler], *flags, *map(str, sources), "-lm", "-o", str(file)]
     subprocess.run(command, check=True, capture_output=True)
     return ct.CDLL(str(file))
+
+
+def compiled(compiler: str, level: str, folder: Path) -> ct.CDLL:
+    """Returns the plant without the kernels for other instruction sets."""
+    sources = [*sorted((PLANT / "src").rglob("*.c")), PLANT / "generated" / "defaults.c"]
+    return built_with(compiler, level, folder / "plant.so", sources, [PLANT / "include"])
+
+
+def compiled_controller(compiler: str, level: str, folder: Path) -> ct.CDLL:
+    sources = [
+        *sorted((CONTROLLER / "src").rglob("*.c")),
+        CONTROLLER / "generated" / "defaults.c",
+        *(PLANT / "src" / f"{name}.c" for name in SHARED),
+    ]
+    folders = [CONTROLLER / "include", PLANT / "include"]
+    return built_with(compiler, level, folder / "controller.so", sources, folders)
 
 
 def walk(core: ct.CDLL) -> tuple[bytes, bytes]:
@@ -71,3 +93,38 @@ def test_every_compiler_and_level_gives_the_same_bits(
     )
     assert state == expected_state
     assert output == expected_output
+
+
+def control(core: ct.CDLL, law: str) -> list[bytes]:
+    """Returns the commands of a controller that turns, leans and feels forces."""
+    robot, rng = load_robot("athena"), np.random.default_rng(5)
+    setup = ControllerSetup(
+        robot=robot,
+        gait=make_gait(robot),
+        period=H,
+        gains=make_gains(robot),
+        parts=Parts(suspension=True),
+        law=law,
+    )
+    controller, found = NativeController(core, setup), []
+    body = BodyCommand(vx=0.05, vy=0.02, yaw_rate=0.3, height=0.01, roll=0.05, pitch=-0.04)
+    for k in range(10 * STEPS):
+        attitude = np.array([1.0, *rng.normal(scale=0.05, size=3)])
+        measurement = Measurement(
+            angle=robot.stance + rng.normal(scale=0.1, size=(6, 3)),
+            foot_force=rng.normal([0.0, 0.0, 10.0], 5.0, size=(6, 3)),
+            quaternion=attitude / np.sqrt((attitude * attitude).sum()),
+        )
+        found.append(bytes(controller.step(k * H, body, measurement)))
+    return found
+
+
+@pytest.mark.parametrize("law", ["compliant", "paper"])
+@pytest.mark.parametrize(("compiler", "level"), BUILDS)
+def test_every_compiler_and_level_gives_the_same_commands(
+    controller_core: ct.CDLL, tmp_path: Path, compiler: str, level: str, law: str
+) -> None:
+    if not is_there(compiler):
+        pytest.skip(f"no {compiler} is installed")
+    core = compiled_controller(compiler, level, tmp_path)
+    assert control(core, law) == control(controller_core, law)

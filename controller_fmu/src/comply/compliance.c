@@ -51,7 +51,7 @@ void hx_compliance_compile(const hxControllerDefinition *definition, double dept
   hx_burden_compile(definition, &model->burden);
   model->softness = 1.0 / definition->servo.kp;
   model->high = high_share * definition->gait.step_height;
-  model->tracking = fmin(period / gains->slip.tracking_time, 1.0);
+  model->tracking = hx_smaller(period / gains->slip.tracking_time, 1.0);
   model->memory = hx_decay(-period / gains->slip.load_time);
   model->follow_load = 1.0 - model->memory;
   model->follow_cycle = 1.0 - hx_decay(-period / cycle);
@@ -84,13 +84,13 @@ void hx_compliance_plan(const hxComplianceModel *model, const hxDemand *demand,
       for (int i = 0; i < 3; ++i) plan->lever[leg][joint][i] = lever[i];
       plan->own[leg][joint] = supports * demand->torque[leg][joint];
       plan->carry[leg][joint] = -supports * (lever[0] * f[0] + lever[1] * f[1] + lever[2] * f[2]);
-      plan->needed = fmax(plan->needed, fabs(plan->carry[leg][joint]));
+      plan->needed = hx_larger(fabs(plan->carry[leg][joint]), plan->needed);
     }
     plan->weight += plan->shares.normal[leg];
     plan->standing[leg] = plan->shares.activation[leg] >= 1.0;
     plan->well_up[leg] = height[leg] > hx_early;
     plan->height[leg] = height[leg];
-    plan->falling[leg] = plan->well_up[leg] ? fmax(-model->period * rise[leg], 0.0) : 0.0;
+    plan->falling[leg] = plan->well_up[leg] ? hx_larger(-model->period * rise[leg], 0.0) : 0.0;
   }
 }
 
@@ -240,7 +240,7 @@ static void update_lean(const hxComplianceModel *model, const hxPlan *plan,
  * the weight that the servos carry. normal: measured normal forces [N]; total: their sum [N]. */
 static void update_weight(const hxComplianceModel *model, const hxPlan *plan,
                           const double normal[HX_LEGS], double total, hxCompliance *laws) {
-  const double ratio = total / fmax(plan->weight, hx_load_floor),
+  const double ratio = total / hx_larger(plan->weight, hx_load_floor),
                scale = hx_clamp(ratio, least_scale, largest_scale);
   int doubted = 0;
   for (int leg = 0; leg < HX_LEGS; ++leg) doubted |= laws->doubted[leg];
@@ -267,7 +267,7 @@ static void limit_answers(const hxComplianceModel *model, hxCompliance *laws) {
   for (int leg = 0; leg < HX_LEGS; ++leg) {
     hxFootLaw *law = &laws->law[leg];
     const hxPlane wanted = law->answer;
-    law->answer = hx_scaled(wanted, model->largest / fmax(hx_length(wanted), model->largest));
+    law->answer = hx_scaled(wanted, model->largest / hx_larger(hx_length(wanted), model->largest));
     law->x.integral += model->tracking * (law->answer.x - wanted.x);
     law->y.integral += model->tracking * (law->answer.y - wanted.y);
   }
@@ -305,7 +305,7 @@ static void step_laws(const hxComplianceModel *model, const hxPlan *plan,
     const double (*lever)[3] = plan->lever[leg];
     const double vertical =
         lever[0][2] * lever[0][2] + lever[1][2] * lever[1][2] + lever[2][2] * lever[2][2];
-    const hxPlane given = hx_scaled(law->answer, freedom * fmin(law->load, largest_load));
+    const hxPlane given = hx_scaled(law->answer, freedom * hx_smaller(law->load, largest_load));
     answer[leg][0] = given.x;
     answer[leg][1] = given.y;
     answer[leg][2] = law->deflection / (model->softness * vertical); /* z/C_zz, C = J kp^-1 J^T */

@@ -42,7 +42,8 @@ void hx_compliant_compile(const hxControllerDefinition *definition, const hxLegS
     hx_leg_solver_pose(&leg[k], hx_plane(foot[0], foot[1]), foot[2], &pose[k]);
   }
   hx_posture_of(&level, zero, zero);
-  hx_inverse_dynamics_place(&model->dynamics, leg, pose, hx_plane(0.0, 0.0), 0.0, &level, &masses);
+  hx_inverse_dynamics_place(&model->dynamics, leg, pose, hx_plane(0.0, 0.0), hx_plane(1.0, 0.0),
+                            &level, &masses);
   const hxNeighbours motion = {{NULL, &masses, NULL}, {NULL, pose, NULL}};
   hx_inverse_dynamics_demand(&model->dynamics, leg, &motion, still, &level, 1.0, &rest);
   hx_sway_compile(definition, leg, &model->dynamics, &model->sway);
@@ -65,7 +66,7 @@ void hx_compliant_reset(const hxCompliantModel *model, hxCompliant *compliant) {
 hxTwist hx_compliant_addition(const hxCompliantModel *model, const hxCompliant *compliant,
                               int64_t steps) {
   const hxSteering *s = &compliant->steering;
-  const double part = fmin((double)(s->past + steps) / model->leading, 1.0);
+  const double part = hx_smaller((double)(s->past + steps) / model->leading, 1.0);
   return (hxTwist){hx_plane_add(s->begin.velocity,
                                 hx_scaled(hx_plane_sub(s->goal.velocity, s->begin.velocity), part)),
                    s->begin.yaw_rate + (s->goal.yaw_rate - s->begin.yaw_rate) * part};
@@ -108,9 +109,10 @@ static void look(const hxCompliantModel *model, const hxLegSolver leg[HX_LEGS],
     seen.planned_height[k] = stance->height[k];
     seen.load[k] = compliant->laws.law[k].load;
   }
-  seen.tilt[0] = atan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y)) - stance->value[4];
-  seen.tilt[1] = asin(hx_clamp(2.0 * (w * y - z * x), -1.0, 1.0)) - stance->value[5];
-  seen.yaw = atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z));
+  const double rise = hx_clamp(2.0 * (w * y - z * x), -1.0, 1.0);
+  seen.tilt[0] = hx_arc(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y)) - stance->value[4];
+  seen.tilt[1] = hx_arc(rise, sqrt((1.0 - rise) * (1.0 + rise))) - stance->value[5];
+  seen.yaw = hx_arc(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z));
   seen.velocity = hx_plane(stance->value[0], stance->value[1]);
   seen.yaw_rate = stance->value[2];
   hx_hold_look(&model->hold, &seen, &compliant->hold);

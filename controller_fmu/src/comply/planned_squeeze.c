@@ -117,7 +117,7 @@ static void weigh(const hxArch *arch, const hxPlane change[HX_LEGS],
       sum += square * square * (square * square);
     }
   }
-  const double norm = sqrt(sqrt(sqrt(sum))), unit = fmax(norm * norm, least_norm * least_norm);
+  const double norm = sqrt(sqrt(sqrt(sum))), unit = hx_larger(norm * norm, least_norm * least_norm);
   for (int k = 0; k < HX_LEGS; ++k)
     for (int joint = 0; joint < HX_JOINTS; ++joint) {
       const double part = count[k][joint] / unit;
@@ -144,10 +144,10 @@ static double limit(const hxPlannedSqueeze *model, const hxShares *shares,
   for (int k = 0; k < HX_LEGS; ++k) {
     const double most = most_friction * model->friction * shares->normal[k];
     if (shares->normal[k] > least_load)
-      factor = fmin(factor,
-                    (most - hx_length(shares->push[k])) / fmax(hx_length(change[k]), least_push));
+      factor = hx_smaller(factor, (most - hx_length(shares->push[k])) /
+                                      hx_larger(hx_length(change[k]), least_push));
   }
-  return fmax(factor, 0.0);
+  return hx_larger(factor, 0.0);
 }
 
 void hx_planned_squeeze_add(const hxPlannedSqueeze *model, const hxPlane feet[HX_LEGS],
@@ -161,7 +161,7 @@ void hx_planned_squeeze_add(const hxPlannedSqueeze *model, const hxPlane feet[HX
     total += shares->normal[k];
     centre = hx_plane_add(centre, hx_scaled(feet[k], shares->normal[k]));
   }
-  centre = hx_scaled(centre, 1.0 / fmax(total, least_load));
+  centre = hx_scaled(centre, 1.0 / hx_larger(total, least_load));
   for (int k = 0; k < HX_LEGS; ++k) {
     arch.arm[k] = hx_plane_sub(feet[k], centre);
     for (int joint = 0; joint < HX_JOINTS; ++joint) equal[k][joint] = 1.0;

@@ -1,7 +1,9 @@
 #include "posture.h"
 
 void hx_posture_of(hxPosture *posture, const double value[3], const double rate[3]) {
-  const double cr = cos(value[1]), sr = sin(value[1]), cp = cos(value[2]), sp = sin(value[2]);
+  double cr, sr, cp, sp;
+  hx_sine_cosine(value[1], &sr, &cr);
+  hx_sine_cosine(value[2], &sp, &cp);
   const double rotation[3][3] = {{cp, sp * sr, sp * cr}, {0.0, cr, -sr}, {-sp, cp * sr, cp * cr}};
   for (int i = 0; i < 3; ++i)
     for (int j = 0; j < 3; ++j) posture->rotation[i][j] = rotation[i][j];

@@ -9,10 +9,7 @@ static const double least_spread = 1e-4;
 static const double least_load = 1e-6;     /* N, a smaller load is not shared */
 
 /* Returns the depth [m] by which the ground deforms under a load [N] (C21). */
-static double indentation(double load, double stiffness) {
-  const double root = cbrt(load / stiffness);
-  return root * root;
-}
+static double indentation(double load, double stiffness) { return hx_two_thirds(load / stiffness); }
 
 /* Returns a transition from 0 to 1 over [0, 1] with continuous rate and acceleration. */
 static double smooth(double x) {
@@ -36,7 +33,7 @@ void hx_support_compile(const hxControllerDefinition *definition, const hxDemand
   const hxGait *gait = &definition->gait;
   const double handover = definition->gains.support.handover_time / gait->period;
   model->duty = gait->duty;
-  model->handover = fmin(handover, fmin(gait->duty, 1.0 - gait->duty));
+  model->handover = hx_smaller(handover, hx_smaller(gait->duty, 1.0 - gait->duty));
   model->stiffness = definition->contact_stiffness;
   model->rest_weight = rest->weight;
   model->rest_moment = rest->moment;
@@ -48,10 +45,10 @@ double hx_support_activation(const hxSupport *model, double phase, int stayed, i
   /* a leg that stayed at its position has not given up its load and does not take it up again */
   if (!walking || (stayed && phase >= model->duty)) return 1.0;
   const double half = 0.5 * model->handover,
-               since = fmod(phase + half, 1.0); /* cycles since the activation began to rise */
+               since = hx_fraction(phase + half); /* cycles since the activation began to rise */
   const double rising = stayed ? 1.0 : smooth(since / model->handover);
   const double falling = stays ? 1.0 : smooth((model->duty + 2.0 * half - since) / model->handover);
-  return fmin(rising, falling);
+  return hx_smaller(rising, falling);
 }
 
 /* Computes the vertical shares (C19): the sums of f_n and of p f_n are weight and moment; no share

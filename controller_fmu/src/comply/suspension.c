@@ -16,11 +16,13 @@ void hx_suspension_discretise(double mass, double damping, double stiffness, dou
   const double mu = sqrt(fabs(mu2)), x = mu * period, decay = hx_decay(-sigma * period);
   double even, odd; /* e^(-sigma t) cosh mu t, e^(-sigma t) sinh(mu t)/mu [s] */
   if (mu2 < 0.0) {
-    even = decay * cos(x);
-    odd = decay * sin(x) / mu;
+    const hxPlane turned = hx_cis(x);
+    even = decay * turned.x;
+    odd = decay * turned.y / mu;
   } else if (x < 1.0) {
-    even = decay * cosh(x);
-    odd = decay * (x > 0.0 ? sinh(x) / mu : period);
+    const double e = hx_growth(x), shrunk = e / (1.0 + e); /* e^x - 1, 1 - e^-x */
+    even = decay * (1.0 + 0.5 * e * shrunk);
+    odd = decay * (x > 0.0 ? 0.5 * (e + shrunk) / mu : period);
   } else { /* strongly damped: neither exponential may overflow */
     const double slow = hx_decay(-omega2 / (sigma + mu) * period),
                  fast = hx_decay(-(mu + sigma) * period);

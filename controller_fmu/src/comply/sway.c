@@ -17,7 +17,8 @@ static hxPlane moment_of(const hxInverseDynamics *dynamics, const hxLegSolver le
     hx_leg_solver_pose(&leg[k], hx_plane_add(hx_plane(foot[0], foot[1]), step), foot[2], &pose[k]);
   }
   hx_posture_of(&level, zero, zero);
-  hx_inverse_dynamics_place(dynamics, leg, pose, hx_plane(0.0, 0.0), 0.0, &level, &masses);
+  hx_inverse_dynamics_place(dynamics, leg, pose, hx_plane(0.0, 0.0), hx_plane(1.0, 0.0), &level,
+                            &masses);
   for (int k = 0; k < HX_LEGS; ++k)
     for (int link = 0; link < HX_JOINTS; ++link)
       sum = hx_plane_add(sum, hx_scaled(masses.place[k][link], dynamics->mass[k][link]));

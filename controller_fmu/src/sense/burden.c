@@ -28,12 +28,12 @@ void hx_burden_weigh(const hxBurdenModel *model, double ratio, hxBurden *burden)
 }
 
 void hx_burden_step(const hxBurdenModel *model, double needed, double scale, hxBurden *burden) {
-  burden->peak = fmax(needed, model->fade * burden->peak);
+  burden->peak = hx_larger(needed, model->fade * burden->peak);
   burden->overburdened = burden->heft * burden->peak >
                          model->most * (burden->overburdened ? support_helps : support_fails);
-  const double allowed = model->most / fmax(scale * burden->peak, model->most);
-  const double carried = model->most / fmax(burden->heft * burden->peak, model->most);
-  burden->strength =
-      fmin(allowed, fmax(full_support * (allowed - no_support) / (full_support - no_support), 0.0));
+  const double allowed = model->most / hx_larger(scale * burden->peak, model->most);
+  const double carried = model->most / hx_larger(burden->heft * burden->peak, model->most);
+  burden->strength = hx_smaller(
+      allowed, hx_larger(full_support * (allowed - no_support) / (full_support - no_support), 0.0));
   burden->freedom = hx_clamp((carried - arch_stays) / (arch_goes - arch_stays), 0.0, 1.0);
 }

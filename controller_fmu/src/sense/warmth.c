@@ -54,15 +54,15 @@ void hx_warmth_step(const hxWarmthModel *model, const double torque[HX_LEGS][HX_
       double *work = &warmth->work[leg][joint], *heat = &warmth->heat[leg][joint];
       *work += model->follow_work * (square - *work);
       *heat += model->follow * (square - *heat);
-      hardest = fmax(hardest, *work);
-      hottest = fmax(hottest, *heat);
+      hardest = hx_larger(*work, hardest);
+      hottest = hx_larger(*heat, hottest);
     }
-  const double warm = fmax((hottest / model->rating - cool) / (hot - cool),
-                           (hardest / model->rating - over) / (far_over - over)),
-               part =
-                   fmax(warm, fmax((needed - easy) / (hard - easy),
+  const double warm = hx_larger((hottest / model->rating - cool) / (hot - cool),
+                                (hardest / model->rating - over) / (far_over - over)),
+               part = hx_larger(
+                   warm, hx_larger((needed - easy) / (hard - easy),
                                    (held - creeps) / (holds - creeps) * (1.0 - warmth->narrowing)));
   const double least = model->squeeze * (1.0 - spared * warmth->narrowing),
-               more = least > 0.0 ? fmax(most_squeeze - least, 0.0) : 0.0;
+               more = least > 0.0 ? hx_larger(most_squeeze - least, 0.0) : 0.0;
   warmth->squeeze = least + more * hx_clamp(part, 0.0, 1.0);
 }

@@ -39,9 +39,9 @@ void hx_inverse_dynamics_compile(const hxControllerDefinition *definition,
 /* ------------------------------------------------------------------------------------- places */
 
 void hx_inverse_dynamics_place(const hxInverseDynamics *model, const hxLegSolver leg[HX_LEGS],
-                               const hxPose pose[HX_LEGS], hxPlane way, double turn,
+                               const hxPose pose[HX_LEGS], hxPlane way, hxPlane turn,
                                const hxPosture *posture, hxMasses *masses) {
-  masses->turn = hx_cis(turn);
+  masses->turn = turn;
   for (int k = 0; k < HX_LEGS; ++k) {
     const hxPose *p = &pose[k];
     const hxPlane joint = hx_plane(leg[k].coxa_length, leg[k].coxa_height),
@@ -135,10 +135,11 @@ static void demand_links(const hxInverseDynamics *model, const hxNeighbours *mot
   }
 }
 
-/* Computes the joint torques of a leg (C15) from the forces on its links, torso frame. */
+/* Computes the joint torques of a leg (C15) from the forces on its links, torso frame. rubs: share
+ * of the gears' dry friction that acts. */
 static void demand_torques(const hxInverseDynamics *model, const hxLegSolver *leg,
                            const hxNeighbours *motion, int k, const hxPlane push[HX_JOINTS],
-                           const double lift[HX_JOINTS], const double speed[HX_JOINTS],
+                           const double lift[HX_JOINTS], const double rubs[HX_JOINTS],
                            double torque[HX_JOINTS]) {
   const hxPose *now = &motion->pose[1][k];
   const hxPlane *point = motion->masses[1]->point[k],
@@ -148,7 +149,7 @@ static void demand_torques(const hxInverseDynamics *model, const hxLegSolver *le
     if (motion->pose[0] && motion->pose[2])
       turning[i] = acceleration(motion->pose[0][k].angle[i], now->angle[i],
                                 motion->pose[2][k].angle[i], model->period);
-    torque[i] = model->rotor * turning[i] + model->friction * tanh(speed[i] / gear_speed);
+    torque[i] = model->rotor * turning[i] + model->friction * rubs[i];
   }
   hxPlane inner[HX_JOINTS];
   for (int i = 0; i < HX_JOINTS; ++i) {
@@ -189,10 +190,14 @@ void hx_inverse_dynamics_demand(const hxInverseDynamics *model, const hxLegSolve
                                 const hxPosture *posture, double laden, hxDemand *demand) {
   hxPlane push[HX_JOINTS];
   double lift[HX_JOINTS];
+  double rubs[HX_LEGS * HX_JOINTS];
   memset(demand, 0, sizeof *demand);
+  for (int i = 0; i < HX_LEGS * HX_JOINTS; ++i)
+    rubs[i] = speed[i / HX_JOINTS][i % HX_JOINTS] / gear_speed;
+  hx_saturations(HX_LEGS * HX_JOINTS, rubs, rubs);
   for (int k = 0; k < HX_LEGS; ++k) {
     demand_links(model, motion, k, posture, laden, push, lift, demand);
-    demand_torques(model, &leg[k], motion, k, push, lift, speed[k], demand->torque[k]);
+    demand_torques(model, &leg[k], motion, k, push, lift, &rubs[k * HX_JOINTS], demand->torque[k]);
     lever_of(&leg[k], &motion->pose[1][k], posture, demand->lever[k]);
   }
   demand_torso(model, motion, laden, demand);

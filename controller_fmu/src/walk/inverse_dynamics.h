@@ -58,7 +58,7 @@ void hx_inverse_dynamics_compile(const hxControllerDefinition *definition,
                                  const hxLegSolver leg[HX_LEGS], hxInverseDynamics *model);
 
 void hx_inverse_dynamics_place(const hxInverseDynamics *model, const hxLegSolver leg[HX_LEGS],
-                               const hxPose pose[HX_LEGS], hxPlane way, double turn,
+                               const hxPose pose[HX_LEGS], hxPlane way, hxPlane turn,
                                const hxPosture *posture, hxMasses *masses);
 
 /* laden: measured over modelled weight [1]. The planned loads are scaled by it (C30), but a payload

@@ -1,5 +1,7 @@
 #include "kinematics.h"
 
+#include <string.h>
+
 /* rad or 1, tolerance for round-off at the edge of the reach */
 static const double flag_tolerance = 1e-9;
 /* 1, floor of sin(gamma), because a straight leg has no finite joint speed */
@@ -19,8 +21,8 @@ void hx_leg_solver_compile(const hxControllerDefinition *definition, int leg, hx
   model->offset_y = coxa->offset_y + femur->offset_y + tibia->offset_y;
   model->femur = hx_length(hx_plane(femur->length, femur->offset_z));
   model->tibia = hx_length(hx_plane(tibia->length, tibia->offset_z));
-  model->femur_tilt = atan2(femur->offset_z, femur->length);
-  model->tibia_tilt = atan2(tibia->offset_z, tibia->length);
+  model->femur_tilt = hx_arc(femur->offset_z, femur->length);
+  model->tibia_tilt = hx_arc(tibia->offset_z, tibia->length);
   model->femur_zero = hx_conj(hx_cis(model->femur_tilt));
   model->tibia_zero = hx_conj(hx_cis(model->tibia_tilt));
   for (int joint = 0; joint < HX_JOINTS; ++joint) {
@@ -36,8 +38,9 @@ void hx_leg_solver_compile(const hxControllerDefinition *definition, int leg, hx
 void hx_leg_solver_forward(const hxLegSolver *model, const double angle[HX_JOINTS],
                            double foot[3]) {
   const double a = angle[1] + model->femur_tilt, b = angle[1] - angle[2] + model->tibia_tilt;
-  const double x = model->coxa_length + model->femur * cos(a) + model->tibia * cos(b);
-  const double z = model->coxa_height + model->femur * sin(a) + model->tibia * sin(b);
+  const hxPlane femur = hx_cis(a), tibia = hx_cis(b);
+  const double x = model->coxa_length + model->femur * femur.x + model->tibia * tibia.x;
+  const double z = model->coxa_height + model->femur * femur.y + model->tibia * tibia.y;
   const hxPlane heading = hx_cis(model->hip_yaw + angle[0]);
   foot[0] = heading.x * x - heading.y * model->offset_y + model->hip[0];
   foot[1] = heading.y * x + heading.x * model->offset_y + model->hip[1];
@@ -48,7 +51,14 @@ double hx_leg_solver_rolling(const hxLegSolver *model, const double angle[HX_JOI
   return model->radius * (angle[2] - angle[1] - model->stance_pitch);
 }
 
-void hx_leg_solver_pose(const hxLegSolver *model, hxPlane plane, double height, hxPose *pose) {
+/* Cosine and sine of the angles of a leg's joints, before tilts are added. */
+typedef struct hxBends {
+  double x[HX_JOINTS], y[HX_JOINTS];
+} hxBends;
+
+/* Computes a pose without its angles. */
+static void linkage(const hxLegSolver *model, hxPlane plane, double height, hxPose *pose,
+                    hxBends *bends) {
   const double a = model->femur, b = model->tibia, side = model->offset_y;
   const hxPlane point = hx_plane_sub(plane, hx_plane(model->hip[0], model->hip[1]));
   /* rho^2 = x^2 + y^2 - Y^2;  e^(i psi) = (x + i y)/(rho + i Y) */
@@ -65,10 +75,37 @@ void hx_leg_solver_pose(const hxLegSolver *model, hxPlane plane, double height, 
   pose->femur = hx_times(pose->tibia, knee);
   const hxPlane coxa = hx_times(pose->heading, model->upright),
                 femur = hx_times(pose->femur, model->femur_zero);
-  pose->angle[0] = atan2(coxa.y, coxa.x);
-  pose->angle[1] = atan2(femur.y, femur.x);
-  pose->angle[2] = acos(cosine) - model->femur_tilt + model->tibia_tilt;
+  *bends = (hxBends){{coxa.x, femur.x, cosine},
+                     {coxa.y, femur.y, sqrt((1.0 - cosine) * (1.0 + cosine))}};
   pose->lost = !(square >= radius_floor && fabs(wanted - cosine) <= flag_tolerance);
+}
+
+/* Sets the angles of a pose. */
+static void give_angles(const hxLegSolver *model, const double angle[HX_JOINTS], hxPose *pose) {
+  pose->angle[0] = angle[0];
+  pose->angle[1] = angle[1];
+  pose->angle[2] = angle[2] - model->femur_tilt + model->tibia_tilt;
+}
+
+void hx_leg_solver_pose(const hxLegSolver *model, hxPlane plane, double height, hxPose *pose) {
+  double angle[HX_JOINTS];
+  hxBends bends;
+  linkage(model, plane, height, pose, &bends);
+  hx_arcs(HX_JOINTS, bends.y, bends.x, angle);
+  give_angles(model, angle, pose);
+}
+
+void hx_leg_solver_poses(const hxLegSolver model[HX_LEGS], const hxPlane plane[HX_LEGS],
+                         const double height[HX_LEGS], hxPose pose[HX_LEGS]) {
+  double x[HX_LEGS][HX_JOINTS], y[HX_LEGS][HX_JOINTS], angle[HX_LEGS][HX_JOINTS];
+  for (int k = 0; k < HX_LEGS; ++k) {
+    hxBends bends;
+    linkage(&model[k], plane[k], height[k], &pose[k], &bends);
+    memcpy(x[k], bends.x, sizeof bends.x);
+    memcpy(y[k], bends.y, sizeof bends.y);
+  }
+  hx_arcs(HX_LEGS * HX_JOINTS, y[0], x[0], angle[0]);
+  for (int k = 0; k < HX_LEGS; ++k) give_angles(&model[k], angle[k], &pose[k]);
 }
 
 void hx_leg_solver_speeds(const hxLegSolver *model, const hxPose *pose, hxPlane velocity,

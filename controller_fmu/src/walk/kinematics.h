@@ -47,6 +47,10 @@ double hx_leg_solver_rolling(const hxLegSolver *model, const double angle[HX_JOI
 /* Solves the inverse kinematics without joint limits (C12). Every target gives a pose. */
 void hx_leg_solver_pose(const hxLegSolver *model, hxPlane plane, double height, hxPose *pose);
 
+/* The same of all legs at once, which is faster. */
+void hx_leg_solver_poses(const hxLegSolver model[HX_LEGS], const hxPlane plane[HX_LEGS],
+                         const double height[HX_LEGS], hxPose pose[HX_LEGS]);
+
 /* Computes the joint speeds [rad/s] of a foot with this velocity, torso frame [m/s] (C13). */
 void hx_leg_solver_speeds(const hxLegSolver *model, const hxPose *pose, hxPlane velocity,
                           double rise, double speed[HX_JOINTS]);

@@ -32,8 +32,15 @@ static hxStatus refuse(hxController *controller, hxStatus status, const char *te
   return status;
 }
 
+static hxControllerState *present(hxController *controller) {
+  return &controller->state[controller->now];
+}
+static const hxControllerState *state_of(const hxController *controller) {
+  return &controller->state[controller->now];
+}
+
 const char *hx_controller_message(const hxController *controller) { return controller->message; }
-double hx_controller_time(const hxController *controller) { return controller->state.time; }
+double hx_controller_time(const hxController *controller) { return state_of(controller)->time; }
 
 hxController *hx_controller_create(void) {
   hxController *controller = calloc(1, sizeof *controller);
@@ -57,15 +64,15 @@ hxStatus hx_controller_reset(hxController *controller, const hxControllerDefinit
   controller->definition = *definition;
   memset(controller->model, 0, sizeof controller->model);
   hx_controller_compile(definition, &controller->model[0]);
-  hx_controller_begin(&controller->model[0], t, &controller->state);
-  controller->ahead.known = 0;
+  hx_controller_begin(&controller->model[0], t, present(controller));
+  controller->is_ahead = 0;
   controller->message[0] = '\0';
   return HX_OK;
 }
 
 /* Returns the model of the present gait. */
 static const hxControllerModel *model_of(const hxController *controller) {
-  return &controller->model[controller->state.model];
+  return &controller->model[state_of(controller)->model];
 }
 
 const hxGait *hx_controller_gait(const hxController *controller) {
@@ -81,9 +88,10 @@ hxStatus hx_controller_change_gait(hxController *controller, const hxGait *gait)
     controller->definition.gait = before;
     return refuse(controller, status, message);
   }
-  hx_controller_compile(&controller->definition, &controller->model[1 - controller->state.model]);
-  hx_controller_change(controller->model, &controller->state);
-  controller->ahead.known = 0;
+  hxControllerState *state = present(controller);
+  hx_controller_compile(&controller->definition, &controller->model[1 - state->model]);
+  hx_controller_change(controller->model, state);
+  controller->is_ahead = 0;
   return HX_OK;
 }
 
@@ -98,7 +106,7 @@ static void compile_again(const hxController *controller, hxControllerModel *mod
 
 /* Begins the walk anew under the present model, at the present time. */
 static void begin_again(hxController *controller) {
-  hxControllerState *state = &controller->state;
+  hxControllerState *state = present(controller);
   const int model = state->model;
   const double time = state->time; /* steps that were too short for a tick may have passed */
   hx_controller_begin(model_of(controller), state->start, state);
@@ -108,7 +116,7 @@ static void begin_again(hxController *controller) {
 
 hxStatus hx_controller_change_control(hxController *controller, int control) {
   char message[HX_MESSAGE_SIZE];
-  hxControllerState *state = &controller->state;
+  hxControllerState *state = present(controller);
   const hxFootPathsModel paths = model_of(controller)->paths;
   const int before = controller->definition.control;
   controller->definition.control = control;
@@ -124,12 +132,13 @@ hxStatus hx_controller_change_control(hxController *controller, int control) {
   } else {
     begin_again(controller);
   }
-  controller->ahead.known = 0;
+  controller->is_ahead = 0;
   return HX_OK;
 }
 
 static double next_tick(const hxController *controller) {
-  return controller->state.start + (double)controller->state.tick * model_of(controller)->period;
+  const hxControllerState *state = state_of(controller);
+  return state->start + (double)state->tick * model_of(controller)->period;
 }
 
 static int is_finite(const hxControllerOutput *output) {
@@ -141,36 +150,36 @@ static int is_finite(const hxControllerOutput *output) {
   return sum == 0.0;
 }
 
-/* Returns whether the next tick under this input has been computed. Inputs consist of doubles only.
- */
-static int is_ahead(const hxController *controller, const hxControllerInput *input) {
-  return controller->ahead.known && memcmp(&controller->ahead.input, input, sizeof *input) == 0;
+/* Computes the state after the next tick under an input in the place of the other state, unless it
+ * is there, and returns it. Inputs consist of doubles only. */
+static const hxControllerState *look_ahead(hxController *controller,
+                                           const hxControllerInput *input) {
+  hxControllerState *next = &controller->state[1 - controller->now];
+  if (controller->is_ahead && memcmp(&controller->input, input, sizeof *input) == 0) return next;
+  controller->is_ahead = 1;
+  controller->input = *input;
+  *next = *state_of(controller);
+  hx_controller_tick(model_of(controller), input, next);
+  return next;
 }
 
 void hx_controller_output(hxController *controller, const hxControllerInput *input,
                           hxControllerOutput *output) {
-  hxAhead *ahead = &controller->ahead;
-  if (next_tick(controller) - controller->state.time >
-      clock_tolerance * model_of(controller)->period) {
-    *output = controller->state.output;
-    return;
-  }
-  if (!is_ahead(controller, input)) {
-    ahead->known = 1;
-    ahead->input = *input;
-    ahead->state = controller->state;
-    hx_controller_tick(model_of(controller), input, &ahead->state);
-  }
-  *output = ahead->state.output;
+  const hxControllerState *state = state_of(controller);
+  const int due =
+      next_tick(controller) - state->time <= clock_tolerance * model_of(controller)->period;
+  *output = due ? look_ahead(controller, input)->output : state->output;
 }
 
-static void tick(hxController *controller, const hxControllerInput *input) {
-  if (is_ahead(controller, input))
-    controller->state = controller->ahead.state;
-  else
-    hx_controller_tick(model_of(controller), input, &controller->state);
-  hx_controller_adopt(controller->model, &controller->state);
-  controller->ahead.known = 0;
+/* Executes the next tick; the first one of a step leaves the state before it as the other one. */
+static void tick(hxController *controller, const hxControllerInput *input, int first) {
+  if (first) {
+    look_ahead(controller, input);
+    controller->now = 1 - controller->now;
+  } else {
+    hx_controller_tick(model_of(controller), input, present(controller));
+  }
+  controller->is_ahead = 0;
 }
 
 /* Computes the input some time after it was set, with its rate of change. */
@@ -185,26 +194,29 @@ static void ramp_input(const hxControllerInput *input, const hxControllerInput *
 
 hxStatus hx_controller_step(hxController *controller, const hxControllerInput *input,
                             const hxControllerInput *rate, double t_end) {
-  const hxControllerState before = controller->state;
-  hxControllerInput now = *input;
-  if (!(t_end >= before.time && t_end <= DBL_MAX)) {
+  const int before = controller->now;
+  const double start = state_of(controller)->time;
+  if (!(t_end >= start && t_end <= DBL_MAX)) {
     hx_print(controller->message, HX_MESSAGE_SIZE,
-             "end of step: got %.17g s, expected a finite time of at least %.17g s", t_end,
-             before.time);
+             "end of step: got %.17g s, expected a finite time of at least %.17g s", t_end, start);
     return HX_INVALID_ARGUMENT;
   }
   const hxStatus status = hx_controller_input_check(input, controller->message);
   if (status != HX_OK) return status;
   while (t_end - next_tick(controller) > clock_tolerance * model_of(controller)->period) {
-    if (rate) ramp_input(input, rate, fmax(next_tick(controller) - before.time, 0.0), &now);
-    tick(controller, &now);
-    if (is_finite(&controller->state.output)) continue;
-    controller->state = before;
+    hxControllerInput ramped;
+    if (rate) ramp_input(input, rate, fmax(next_tick(controller) - start, 0.0), &ramped);
+    tick(controller, rate ? &ramped : input, controller->now == before);
+    if (is_finite(&state_of(controller)->output)) {
+      hx_controller_adopt(controller->model, present(controller));
+      continue;
+    }
+    controller->now = before;
     return refuse(
         controller, HX_NOT_FINITE,
         "joint commands: got numbers that are not finite, expected a command that legs can follow");
   }
-  controller->state.time = t_end;
+  present(controller)->time = t_end;
   return HX_OK;
 }
 
@@ -218,7 +230,7 @@ void hx_controller_get_state(const hxController *controller, void *bytes) {
   saved.size = sizeof saved;
   memcpy(&saved.definition, &controller->definition, sizeof saved.definition);
   memcpy(saved.model, controller->model, sizeof saved.model);
-  memcpy(&saved.state, &controller->state, sizeof saved.state);
+  memcpy(&saved.state, state_of(controller), sizeof saved.state);
   saved.checksum = checksum(&saved);
   memcpy(bytes, &saved, sizeof saved);
 }
@@ -242,7 +254,7 @@ hxStatus hx_controller_set_state(hxController *controller, const void *bytes, si
         "saved state: got a damaged one, expected one whose checksum is right; save it again");
   memcpy(&controller->definition, &saved.definition, sizeof saved.definition);
   memcpy(controller->model, saved.model, sizeof saved.model);
-  memcpy(&controller->state, &saved.state, sizeof saved.state);
-  controller->ahead.known = 0;
+  memcpy(present(controller), &saved.state, sizeof saved.state);
+  controller->is_ahead = 0;
   return HX_OK;
 }

@@ -108,8 +108,9 @@ static void hop(double tau, double top, double down, double *lift, double *climb
  */
 static hxPlane travel(hxTwist twist, double time) {
   const double half = 0.5 * twist.yaw_rate * time;
-  const double chord = fabs(half) > small_angle ? sin(half) / half : 1.0;
-  return hx_times(hx_scaled(twist.velocity, time * chord), hx_cis(half));
+  const hxPlane turned = hx_cis(half);
+  const double chord = fabs(half) > small_angle ? turned.y / half : 1.0;
+  return hx_times(hx_scaled(twist.velocity, time * chord), turned);
 }
 
 /* -------------------------------------------------------------------------------------- paths */
@@ -147,7 +148,7 @@ void hx_foot_paths_compile(const hxControllerDefinition *definition, const hxLeg
 /* Sets the phases of the legs at the begin of the walk [cycles]. */
 static void start_at(hxFootPathsModel *model, const double begin[HX_LEGS]) {
   for (int leg = 0; leg < HX_LEGS; ++leg) {
-    const double first = begin[leg] + clock_epsilon, phase = first - floor(first);
+    const double first = begin[leg] + clock_epsilon, phase = hx_fraction(first);
     model->offset[leg] = begin[leg] - clock_epsilon;
     model->late[leg] = phase >= model->duty || phase < 0.5 * model->handover;
   }
@@ -156,7 +157,7 @@ static void start_at(hxFootPathsModel *model, const double begin[HX_LEGS]) {
 /* Returns the phase of a leg a number of periods after the start of the walk (C2). */
 static double phase_after(const hxFootPathsModel *model, int leg, int64_t number) {
   const double clock = model->offset[leg] + (double)number * model->period / model->gait_period;
-  return clock - floor(clock);
+  return hx_fraction(clock);
 }
 
 /* Returns the periods on the gait clock `number` periods after the section began (C50). */
@@ -343,10 +344,10 @@ HX_SELDOM static double farthest(const hxFootPathsModel *model, const hxFootPath
   for (int leg = 0; leg < HX_LEGS; ++leg) {
     const hxPlane p = feet->plane[leg], motion = hx_plane(v.x - w * p.y, v.y + w * p.x);
     const double left = model->duty - begin[leg] + clock_epsilon,
-                 time = (left - floor(left)) * model->gait_period;
+                 time = hx_fraction(left) * model->gait_period;
     const hxPlane there = hx_plane_sub(p, hx_scaled(motion, time)),
                   away = hx_plane_sub(there, aims(model, paths, leg));
-    largest = fmax(largest, sqrt(hx_square(away)));
+    largest = hx_larger(largest, sqrt(hx_square(away)));
   }
   return largest;
 }
@@ -445,7 +446,7 @@ void hx_foot_paths_walk(const hxFootPathsModel *model, const hxFootPaths *paths,
         free ? hx_plane_add(feet->way, hx_times(turn, landing(model, paths, leg, tau, twist)))
              : before->goal[leg];
     /* the distance to the landing point is proportional to 1 - s (C5) */
-    const double left = fmax(1.0 - before->blend[leg], nearly_done);
+    const double left = hx_larger(1.0 - before->blend[leg], nearly_done);
     const hxPlane moved = hx_scaled(hx_plane_sub(feet->goal[leg], before->goal[leg]), 1.0 / left);
     feet->pull[leg] = hx_plane_add(before->pull[leg], moved);
     feet->rolled[leg] = before->rolled[leg];

@@ -4,11 +4,13 @@
 #include "comply/slip_pid.h"
 #include "comply/support.h"
 #include "comply/suspension.h"
+#include "transcendental.h"
 
 HX_API void hx_probe_suspension(double mass, double damping, double stiffness, double period,
                                 hxSuspension *suspension);
 HX_API void hx_probe_squeeze(const double normal[HX_LEGS], const hxPlane feet[HX_LEGS],
                              hxPlane push[HX_LEGS]);
+HX_API void hx_probe_transcendental(const double *x, const double *y, double *result[6], int n);
 HX_API void hx_probe_shares(const hxPlane feet[HX_LEGS], const double activation[HX_LEGS],
                             const double asked[6], double force[HX_LEGS][3]);
 
@@ -20,6 +22,17 @@ void hx_probe_suspension(double mass, double damping, double stiffness, double p
 void hx_probe_squeeze(const double normal[HX_LEGS], const hxPlane feet[HX_LEGS],
                       hxPlane push[HX_LEGS]) {
   hx_squeeze(normal, feet, push);
+}
+
+/* Computes sine, cosine, e^x - 1, tanh x and x^(2/3), and the angle of (y, x). */
+void hx_probe_transcendental(const double *x, const double *y, double *result[6], int n) {
+  for (int i = 0; i < n; ++i) {
+    hx_sine_cosine(x[i], &result[0][i], &result[1][i]);
+    result[2][i] = hx_growth(x[i]);
+    result[4][i] = hx_two_thirds(x[i]);
+  }
+  hx_saturations(n, x, result[3]);
+  hx_arcs(n, y, x, result[5]);
 }
 
 /* Computes the feet's shares. asked: push x y, weight, moment x y, twist. */
