@@ -218,6 +218,7 @@ hxStatus hx_instance_get(hxInstance *instance, hxType type, const unsigned refer
                          void *value) {
   unsigned groups;
   int needs_rate;
+  if (n == 0) return HX_OK; /* the arrays may be NULL */
   if (type == HX_REAL && n <= HX_KNOWN_OUTPUTS) return get_reals(instance, reference, n, value);
   hxStatus status = look_up(instance, type, reference, n, &groups, &needs_rate);
   if (status == HX_OK) status = update(instance, groups, needs_rate);
