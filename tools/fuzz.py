@@ -262,8 +262,12 @@ def noted(place: Path) -> list[dict[str, Any]]:
 
 
 def processor_time_of(place: Path, target: str) -> float:
-    """Returns the processor time that a target has had in all [s]."""
-    return math.fsum(line["processor"] for line in noted(place) if line["target"] == target)
+    """Returns the processor time that a target has had in all [s].
+
+    Lines of older versions have none and count as 0.
+    """
+    lines = [line for line in noted(place) if line["target"] == target]
+    return math.fsum(line.get("processor", 0.0) for line in lines)
 
 
 def table(place: Path) -> str:
