@@ -176,28 +176,34 @@ static hxStatus look_up_reals(hxInstance *instance, const unsigned reference[], 
   return HX_OK;
 }
 
+/* checks that Reals with valid references are finite */
+static hxStatus check_finite(hxInstance *instance, const unsigned reference[], size_t n) {
+  hxStatus status = HX_OK;
+  for (size_t i = 0; i < n && status == HX_OK; i++) {
+    hxCausality causality = HX_OUTPUT;
+    const char *name = row_of(instance, HX_REAL, reference[i], &causality)->name;
+    const double *number = place_of(instance, HX_REAL, reference[i]);
+    status = hx_instance_check_finite(instance, number, 1, name);
+  }
+  return status;
+}
+
 /* copies the values of known outputs; none when one of them is not finite */
 static hxStatus get_known(hxInstance *instance, double value[]) {
   const hxKnownOutputs *known = &instance->outputs;
   const char *variables = (const char *)&instance->state.variables;
-  const uint64_t one = (uint64_t)1
-                       << 52; /* of the exponent, which has all bits set in NaN and inf */
+  /* all bits of the exponent are set in NaN and inf: adding 1 to it carries into the sign */
+  const uint64_t one = (uint64_t)1 << 52;
   uint64_t found = 0;
   for (size_t i = 0; i < known->n; i++) {
     uint64_t bits;
     memcpy(&bits, variables + known->offset[i], sizeof bits);
     found |= (bits & INT64_MAX) + one;
   }
-  for (size_t i = 0; found >> 63 && i < known->n; i++) {
-    const double *number = place_of(instance, HX_REAL, known->reference[i]);
-    hxCausality causality = HX_OUTPUT;
-    const hxStatus status = hx_instance_check_finite(
-        instance, number, 1, row_of(instance, HX_REAL, known->reference[i], &causality)->name);
-    if (status != HX_OK) return status;
-  }
-  for (size_t i = 0; i < known->n; i++)
+  const hxStatus status = found >> 63 ? check_finite(instance, known->reference, known->n) : HX_OK;
+  for (size_t i = 0; status == HX_OK && i < known->n; i++)
     memcpy(value + i, variables + known->offset[i], sizeof *value);
-  return HX_OK;
+  return status;
 }
 
 /* updates what is asked for */
@@ -222,11 +228,7 @@ hxStatus hx_instance_get(hxInstance *instance, hxType type, const unsigned refer
   if (type == HX_REAL && n <= HX_KNOWN_OUTPUTS) return get_reals(instance, reference, n, value);
   hxStatus status = look_up(instance, type, reference, n, &groups, &needs_rate);
   if (status == HX_OK) status = update(instance, groups, needs_rate);
-  for (size_t i = 0; status == HX_OK && type == HX_REAL && i < n; i++) {
-    hxCausality causality = HX_OUTPUT;
-    status = hx_instance_check_finite(instance, place_of(instance, HX_REAL, reference[i]), 1,
-                                      row_of(instance, HX_REAL, reference[i], &causality)->name);
-  }
+  if (status == HX_OK && type == HX_REAL) status = check_finite(instance, reference, n);
   const size_t size = type == HX_REAL ? sizeof(double) : sizeof(int);
   for (size_t i = 0; status == HX_OK && i < n; i++)
     memcpy((char *)value + i * size, place_of(instance, type, reference[i]), size);

@@ -59,7 +59,7 @@ DRAWN = re.compile(r"- (\d+) passing")
 
 @dataclass(frozen=True)
 class Figures:
-    """What one target did."""
+    """Holds what a run of one target drew, reached and took."""
 
     target: str
     inputs: int
@@ -77,12 +77,12 @@ class Clock:
 
     @property
     def seconds(self) -> float:
-        """The wall time [s]."""
+        """Returns the wall time [s]."""
         return time.monotonic() - self._begin
 
     @property
     def processor(self) -> float:
-        """The processor time [s]."""
+        """Returns the processor time [s]."""
         return _used_by_children() - self._used
 
 

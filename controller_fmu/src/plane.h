@@ -62,7 +62,7 @@ static inline double hx_smaller(double x, double bound) { return x < bound ? x :
 
 /* Returns x - floor(x), for |x| < 2^51. Not by floor, which is a call. */
 static inline double hx_fraction(double x) {
-  const double rounding = 6755399441055744.0, whole = (x + rounding) - rounding;
+  const double whole = (x + hx_rounding) - hx_rounding;
   return x - (whole > x ? whole - 1.0 : whole);
 }
 

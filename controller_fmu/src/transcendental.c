@@ -4,9 +4,6 @@
 #include <stdint.h>
 #include <string.h>
 
-/* 1.5 * 2^52: adding and subtracting it rounds to a whole number, which the sum's last bits are */
-static const double rounding = 6755399441055744.0;
-
 static inline int64_t bits_of(double x) {
   int64_t bits;
   memcpy(&bits, &x, sizeof bits);
@@ -24,7 +21,7 @@ static inline double from_bits(int64_t bits) {
 void hx_sine_cosine(double x, double *sine, double *cosine) {
   /* pi/2 in three pieces, the first two of 33 bits: k times them is exact */
   const double high = 0x1.921fb544p+0, mid = 0x1.0b4611a6p-34, low = 0x1.3198a2e037073p-69;
-  const double shifted = x * 0.6366197723675814 + rounding, k = shifted - rounding;
+  const double shifted = x * 0.6366197723675814 + hx_rounding, k = shifted - hx_rounding;
   const double r = ((x - k * high) - k * mid) - k * low;
   const double z = r * r, z2 = z * z, z4 = z2 * z2;
   const double odd = ((-1.0 / 6) + z * (1.0 / 120)) + z2 * ((-1.0 / 5040) + z * (1.0 / 362880)),
@@ -76,7 +73,7 @@ static inline double growth(double x) {
   const double ln2_high = 6.93147180369123816490e-01,
                ln2_low = 1.90821492927058770002e-10; /* ln 2 in two pieces */
   const double least = x < -40.0 ? -40.0 : x;
-  const double shifted = least * 1.4426950408889634 + rounding, k = shifted - rounding;
+  const double shifted = least * 1.4426950408889634 + hx_rounding, k = shifted - hx_rounding;
   const double r = (least - k * ln2_high) - k * ln2_low;
   const double r2 = r * r, r4 = r2 * r2;
   const double low = (1.0 + r * (1.0 / 2)) + r2 * ((1.0 / 6) + r * (1.0 / 24));

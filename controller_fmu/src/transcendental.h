@@ -7,6 +7,9 @@
 
 HX_HIDDEN_BEGIN
 
+/* 1.5 * 2^52: adding and subtracting it rounds to a whole number, which the sum's last bits are */
+static const double hx_rounding = 6755399441055744.0;
+
 /* Computes sine and cosine to an error below one unit in the last place of 1, for |x| < 1e5. */
 void hx_sine_cosine(double x, double *sine, double *cosine);
 

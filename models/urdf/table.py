@@ -111,7 +111,7 @@ class Options:
 
     @classmethod
     def read(cls, table: Mapping[str, Any], where: str) -> Options:
-        """Checked. Raises RobotError."""
+        """Returns the options of a table. Raises RobotError for keys and values not allowed."""
         refuse_unknown_keys(table, ["file", "forward", "ignore", "keep_frames"], where)
         forward, ignore, keep = (
             table.get("forward", "x"),

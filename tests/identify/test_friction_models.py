@@ -88,6 +88,8 @@ def test_the_command_writes_the_friction_model_that_it_tried(
     assert criteria == sorted(criteria)
     of_m1 = next(one["criterion"] for one in trials if one["model"] == "m1")
     assert of_m1 > criteria[0] + 100.0
+    told = friction_text([FrictionTrial(**one) for one in trials])
+    assert f"{trials[0]['model'].upper()} explains" in told
     servo = load_robot(place / "robot.toml").servo
     # terms that the file's M1 does not have
     assert servo.external_load_friction == pytest.approx(

@@ -159,7 +159,7 @@ def test_a_stated_size_bounds_what_is_unpacked(tmp_path: Path) -> None:
     assert (tmp_path / "zeros").stat().st_size <= 1000
 
 
-@pytest.mark.parametrize("share", [0.001, 0.9])
+@pytest.mark.parametrize("share", [0.001, 0.1, 0.9])
 def test_a_binary_cut_short_is_a_finding_and_ends_no_process(
     members: dict[str, bytes], tmp_path: Path, share: float
 ) -> None:
