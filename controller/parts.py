@@ -18,7 +18,6 @@ class Parts:
     suspension: bool = False  # legs yield to normal forces above their share
     paper_suspension: bool = True  # of the paper's control: legs yield to normal forces
     touchdown: bool = True  # foot heights follow early and late touch-downs
-    slow_landing: bool = False  # feet rise faster and come down more slowly on the same paths
     posture: bool = True  # roll, pitch and height are controlled
     # under a payload the torso moves against the swinging legs: feet need not push for them
     sway: bool = True
@@ -30,8 +29,6 @@ class Parts:
     # weight of the servos' torques against the feet's use of friction in the planned squeeze, in
     # [0, 1), on ground on which feet creep: a part of `support`
     squeeze: float = 0.6
-    # the squeeze lowers the largest torques of all servos instead of the sum of their squares
-    minmax_torque: bool = False
 
 
 SWITCHES = tuple(item.name for item in fields(Parts) if item.name != "squeeze")

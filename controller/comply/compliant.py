@@ -112,10 +112,7 @@ class Compliant(Stateful):
         self.sway = Sway(self.dynamics, legs, active=parts.sway)
         self.support = Support(robot, gait, gains.support, rest=self.dynamics.rest())
         self.squeeze = PlannedSqueeze(
-            friction=robot.friction.mu,
-            weight=robot.weight,
-            depth=-self.dynamics.floor,
-            minmax=parts.minmax_torque,
+            friction=robot.friction.mu, weight=robot.weight, depth=-self.dynamics.floor
         )
         self.laws = Compliance(
             gains,

@@ -302,7 +302,6 @@ static const hxControllerDefinition default_definition = {
     .parts.suspension = 0,
     .parts.paper_suspension = 1,
     .parts.touchdown = 1,
-    .parts.slow_landing = 0,
     .parts.posture = 1,
     .parts.sway = 1,
     .parts.path = 1,
@@ -323,7 +322,6 @@ static const hxControllerDefinition default_definition = {
     .parts.squeeze = 0.6,
     .friction = 0.7,
     .servo.torque_continuous = 1.2,
-    .parts.minmax_torque = 0,
 };
 
 void hx_controller_definition_default(hxControllerDefinition *definition) {
@@ -685,7 +683,6 @@ static const hxRange definition_ranges[] = {
     {"parts.suspension", "", -DBL_MAX, DBL_MAX, offsetof(hxControllerDefinition, parts.suspension), 1},
     {"parts.paper_suspension", "", -DBL_MAX, DBL_MAX, offsetof(hxControllerDefinition, parts.paper_suspension), 1},
     {"parts.touchdown", "", -DBL_MAX, DBL_MAX, offsetof(hxControllerDefinition, parts.touchdown), 1},
-    {"parts.slow_landing", "", -DBL_MAX, DBL_MAX, offsetof(hxControllerDefinition, parts.slow_landing), 1},
     {"parts.posture", "", -DBL_MAX, DBL_MAX, offsetof(hxControllerDefinition, parts.posture), 1},
     {"parts.sway", "", -DBL_MAX, DBL_MAX, offsetof(hxControllerDefinition, parts.sway), 1},
     {"parts.path", "", -DBL_MAX, DBL_MAX, offsetof(hxControllerDefinition, parts.path), 1},
@@ -706,7 +703,6 @@ static const hxRange definition_ranges[] = {
     {"parts.squeeze", "", 0.0, 0.99, offsetof(hxControllerDefinition, parts.squeeze), 0},
     {"friction.mu", "", 0.0, 100.0, offsetof(hxControllerDefinition, friction), 0},
     {"servo.torque_continuous", "N.m", 1e-09, 100000000.0, offsetof(hxControllerDefinition, servo.torque_continuous), 0},
-    {"parts.minmax_torque", "", -DBL_MAX, DBL_MAX, offsetof(hxControllerDefinition, parts.minmax_torque), 1},
 };
 
 size_t hx_controller_definition_ranges(const hxRange **range) {

@@ -480,7 +480,6 @@ static const hxVariable parameters[] = {
     {"parts.suspension", "", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, definition.parts.suspension), HX_BOOLEAN, 0, 1},
     {"parts.paper_suspension", "", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, definition.parts.paper_suspension), HX_BOOLEAN, 0, 1},
     {"parts.touchdown", "", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, definition.parts.touchdown), HX_BOOLEAN, 0, 1},
-    {"parts.slow_landing", "", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, definition.parts.slow_landing), HX_BOOLEAN, 0, 1},
     {"parts.posture", "", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, definition.parts.posture), HX_BOOLEAN, 0, 1},
     {"parts.sway", "", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, definition.parts.sway), HX_BOOLEAN, 0, 1},
     {"parts.path", "", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, definition.parts.path), HX_BOOLEAN, 0, 1},
@@ -501,7 +500,6 @@ static const hxVariable parameters[] = {
     {"parts.squeeze", "1", 0.0, 0.99, offsetof(struct hxVariables, definition.parts.squeeze), HX_REAL, 0, 1},
     {"friction.mu", "1", 0.0, 100.0, offsetof(struct hxVariables, definition.friction), HX_REAL, 0, 1},
     {"servo.torque_continuous", "N.m", 1e-09, 100000000.0, offsetof(struct hxVariables, definition.servo.torque_continuous), HX_REAL, 0, 1},
-    {"parts.minmax_torque", "", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, definition.parts.minmax_torque), HX_BOOLEAN, 0, 1},
 };
 
 const hxSection hx_sections[HX_CAUSALITIES] = {
@@ -653,7 +651,7 @@ const char *const hx_log_category_names[] = {
 const hxStateRow *const hx_states = 0;
 const size_t hx_state_count = 0;
 
-const char hx_default_guid[] = "{a2388160-03c5-4798-ae9b-838cf3a1d864}";
+const char hx_default_guid[] = "{5853d9f0-b6d5-4335-b7e9-c43fe2b6c549}";
 
 _Static_assert(HX_CONTROL_KINEMATIC == 1, "Control");
 _Static_assert(HX_CONTROL_COMPLIANT == 2, "Control");

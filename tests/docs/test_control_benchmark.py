@@ -105,7 +105,7 @@ def test_the_ablation_switches_each_part_alone_and_each_part_off() -> None:
         for case, plan in zip(ablation(), plans(ablation()), strict=True)
     }
     assert on["no part"] == set()
-    off = {"suspension", "slow_landing", "minmax_torque"}
+    off = {"suspension"}
     default = set(COMPLIANT_PARTS) - off
     assert on["by default"] == on["without squeeze"] == default
     for part in COMPLIANT_PARTS:

@@ -115,8 +115,8 @@ typedef struct hxGains {
 
 /* Switches, 1 or 0: enabled parts of compliant and paper control; and the weight of the squeeze. */
 typedef struct hxParts {
-  int support, slip_pid, suspension, paper_suspension, touchdown, slow_landing, posture, sway, path,
-      limits, fallback, minmax_torque;
+  int support, slip_pid, suspension, paper_suspension, touchdown, posture, sway, path, limits,
+      fallback;
   /* 1  weight of the servos' torques against the feet's use of friction in the planned squeeze */
   double squeeze;
 } hxParts;
