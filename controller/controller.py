@@ -595,8 +595,9 @@ class Controller(Stateful):
             if self.paper is not None:
                 self._correct_paths(self.paper, measurement)
             if self.compliant is not None:
-                shift = self.compliant.step(self._ask(self.compliant), measurement, self._out)
-                self._show(shift, self.compliant.laws.fallback)
+                raised = self.compliant.step(self._ask(self.compliant), measurement, self._out)
+                still = np.zeros(LEGS)
+                self._show(rows_of(still, still, raised), self.compliant.laws.fallback)
             self.fade.step(self.legs, self._out)
             self._adopt()
         return self._out

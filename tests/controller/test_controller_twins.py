@@ -41,7 +41,7 @@ WITHOUT_TWIN = {
     *("linkage", "give_angles", "poses", "reach_all"),  # poses of one leg or of all at once
 }
 PREFIX = re.compile(
-    r"^hx_((burden|compliance|compliant|contact_detector|sensor_watch|controller|foot_law|gait"
+    r"^hx_((burden|compliance|compliant|contact_detector|sensor_watch|controller|gait"
     r"|hold|inverse_dynamics|leg_solver|landings"
     r"|paper|planned_squeeze|posture|slip_pid|suspension|support|sway|touchdown|warmth"
     r"|command_ramp|fade|foot_paths)_)?"

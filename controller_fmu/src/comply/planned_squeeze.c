@@ -88,8 +88,7 @@ static double limit(const hxPlannedSqueeze *model, const hxShares *shares,
 void hx_planned_squeeze_add(const hxPlannedSqueeze *model, const hxPlane feet[HX_LEGS],
                             const hxDemand *demand, double squeeze, hxShares *shares) {
   if (!(squeeze > 0.0) || !(model->friction > 0.0)) return;
-  const double used = model->torque / model->friction,
-               price = (1.0 / squeeze - 1.0) * used * used;
+  const double used = model->torque / model->friction, price = (1.0 / squeeze - 1.0) * used * used;
   double B[HX_LEGS][3], total = 0.0;
   hxPlane arm[HX_LEGS], change[HX_LEGS], centre = {0.0, 0.0};
   for (int k = 0; k < HX_LEGS; ++k) {
