@@ -21,8 +21,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from hexapod_cosim.controller.comply.compliant import Compliant, Stance, sense
-from hexapod_cosim.controller.comply.paper import Paper
-from hexapod_cosim.controller.comply.posture import Posture
+from hexapod_cosim.controller.comply.paper import Paper, Step
+from hexapod_cosim.controller.comply.posture import LEVEL, Posture
 from hexapod_cosim.controller.gains import Gains
 from hexapod_cosim.controller.memory import Stateful
 from hexapod_cosim.controller.parts import Parts
@@ -201,7 +201,9 @@ class Controller(Stateful):
         self.compliant: Compliant | None = None
         self.paper: Paper | None = None
         if self.gains is not None and self.law == "paper":
-            self.paper = Paper(self.gains, self.parts, period=period)
+            self.paper = Paper(
+                self.robot, gait, self.gains, self.parts, legs=self.legs, period=period
+            )
         elif self.gains is not None:
             self.compliant = Compliant(
                 self.robot, gait, self.gains, self.parts, legs=self.legs, period=period
@@ -479,8 +481,19 @@ class Controller(Stateful):
     def _correct_paths(self, paper: Paper, measurement: Measurement) -> None:
         """Corrects the paths by the foot forces, and the joint commands with them (C47 to C49)."""
         now, out, shown = self._now, self._out, self.diagnostics
-        paper.step(sense(measurement, now.posture), self.paths.swinging)
-        joints = paper.actuate(self.legs, self._planned_feet(), now.posture)
+        feet = now.posture.see(self._planned_feet())
+        paper.step(
+            Step(
+                pose=now.pose,
+                planned=shown.planned,
+                height=now.feet.height - self.paths.home_height,
+                rise=feet.rise,
+                swinging=self.paths.swinging,
+                angle=measurement.angle,
+                force=sense(measurement, LEVEL),
+            )
+        )
+        joints = paper.actuate(feet)
         out.angle_ref[...], out.speed_ref[...] = joints.angle, joints.speed
         shown.unreachable[...] = joints.unreachable
         shift = paper.shift

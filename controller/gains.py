@@ -14,7 +14,7 @@ from hexapod_cosim.models.errors import refuse_path
 from hexapod_cosim.models.files import read_text
 from hexapod_cosim.models.schema import decoding_toml, parse_toml
 
-FORMAT = 4
+FORMAT = 5
 TRIPOD_LEGS = 3  # legs that share the weight in a tripod gait: the unit of load is weight / 3
 
 
@@ -23,39 +23,19 @@ class GainsError(HexapodError):
 
 
 @dataclass(frozen=True, kw_only=True)
-class SlipGains:
-    """PID of the tangential force of a foot (C25).
+class PaperGains:
+    """Corrections of the feet by the paper's control (C47 to C49)."""
 
-    In continuous time: (kp + ki/s + kd s/(derivative_time s + 1)) / (filter_time s + 1).
-    """
-
-    kp: float  # 1
-    ki: float  # 1/s
-    kd: float  # s
-    derivative_time: float  # s    filter of the derivative, > 0
-    filter_time: float  # s    force filter, > 0
-    load_time: float  # s    decay of the integral of a swinging foot, > 0
-    tracking_time: float  # s    anti-windup: the integral follows the limited value, > 0
-    limit: float  # largest value, in the unit of kp times force
-
-
-@dataclass(frozen=True, kw_only=True)
-class SuspensionGains:
-    """Virtual m z'' + b z' + k z = f_n; z lifts the foot (C26)."""
-
-    mass: float  # kg
-    damping: float  # N s/m
-    stiffness: float  # N/m
-    limit: float  # m    largest deflection
-
-
-@dataclass(frozen=True, kw_only=True)
-class PaperSlipGains(SlipGains):
-    """PID of the paper's control, from the tangential force [N] to the shift of the foot (C47).
-
-    The fields are those of SlipGains with other units: kp [m/N], ki [m/(N s)], kd [m s/N], limit
-    [m]; load_time is the time constant with which the shift of a swinging foot decays.
-    """
+    share: float  # 1    of the deviation along the ground that is taken back, at duty 1/2
+    height_share: float  # 1    the same of the deviation upwards
+    share_limit: float  # 1    largest share at any duty
+    yield_share: float  # 1    P part: yield to a force over the softness of the leg
+    return_rate: float  # 1/s    I part: return of all feet
+    filter_time: float  # s    smoothing of the measured forces, > 0
+    damping: float  # N s/m    of the suspension, > 0
+    return_time: float  # s    of the suspension of a standing foot, > 0
+    sag_limit: float  # m    largest lift of a foot in the air by the torso's sag
+    limit: float  # m    largest deflection of the suspension and return of the feet, > 0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -92,16 +72,22 @@ class LimitGains:
 class Requirements:
     """Requirements of a design. The defaults suit legs of 0.22 to 0.44 m; for others: size.py."""
 
-    phase_margin: float = 60.0  # deg    of the paper's control: at least, both loops
-    gain_margin: float = 8.0  # dB    at least, the same
+    phase_margin: float = 60.0  # deg    of the paper's control, at least
+    gain_margin: float = 5.0  # dB    the same
     delay_periods: float = 1.0  # 1    computing delay in controller periods
     force_delay: float = 0.010  # s    of the force sensors
-    filter_time: float = 0.010  # s    force filter of the tangential loop
+    filter_time: float = 0.005  # s    smoothing of the forces
+    share: float = 0.38  # 1    of the paper's control: of the deviations along the ground
+    height_share: float = 0.55  # 1    of the deviations upwards, at most
+    share_limit: float = 0.75  # 1    of both, in gaits with more standing legs
+    yield_share: float = 0.3  # 1
+    return_rate: float = 3.0  # 1/s
+    # m/s    at which the suspension yields, at most, to a sixth of the weight beyond the share
+    landing_speed: float = 0.9
     load_time: float = 0.030  # s    smoothing of the load: the time of real hand-overs
-    deflection: float = 0.003  # m    of the suspension under a third of the weight
-    frequency: float = 5.0  # Hz    natural frequency of the suspension, at most
-    damping_ratio: float = 1.0  # 1
-    deflection_limit: float = 0.015  # m    largest corrections of the paper's control
+    return_time: float = 3.0  # s    of the suspension
+    sag_limit: float = 0.003  # m    largest lift of feet in the air
+    deflection_limit: float = 0.030  # m    largest deflection of the suspension
     handover_time: float = 0.065  # s
     weight_time: float = 0.5  # s
     attitude_rate: float = 2.0  # 1/s
@@ -120,8 +106,8 @@ class Margins:
     """Margins of a design: the worst over stances, loads and eigenvalues of the sampled loop."""
 
     support_torque: float  # N m    largest torque of a servo in a standing tripod
-    # of the paper's control: the worst of its loops, tangential and vertical
-    binding: str  # the requirement that limited the gain of the tangential loop
+    # of the paper's control: the worst of its loops
+    binding: str  # what limited the shares
     paper_phase_margin: float = math.inf  # deg
     paper_gain_margin: float = math.inf  # dB
     paper_spectral_radius: float = 0.0  # 1    of its whole closed loop, < 1
@@ -138,8 +124,7 @@ class Gains:
     support: SupportGains
     hold: HoldGains
     limits: LimitGains
-    paper_slip: PaperSlipGains
-    paper_suspension: SuspensionGains
+    paper: PaperGains
     margins: Margins
     caveats: tuple[str, ...] = ()  # stances that are left out, and why; what was not reached
 
@@ -168,23 +153,21 @@ PARTS: dict[str, type[Any]] = {
     "support": SupportGains,
     "hold": HoldGains,
     "limits": LimitGains,
-    "paper_slip": PaperSlipGains,
-    "paper_suspension": SuspensionGains,
+    "paper": PaperGains,
     "margins": Margins,
 }
 POSITIVE = {
     "support": ("handover_time", "weight_time", "load_time"),
     "hold": ("ground_time",),
     "limits": ("torque",),
-    "paper_slip": ("derivative_time", "filter_time", "load_time", "tracking_time", "limit"),
-    "paper_suspension": ("mass", "damping", "stiffness", "limit"),
+    "paper": ("filter_time", "damping", "return_time", "limit"),
     "requirements": (
         "phase_margin",
         "filter_time",
         "load_time",
-        "deflection",
-        "frequency",
-        "damping_ratio",
+        "landing_speed",
+        "return_time",
+        "deflection_limit",
         "handover_time",
     ),
     "margins": (),

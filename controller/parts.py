@@ -13,8 +13,11 @@ class Parts:
     """Switches; they have no effect on kinematic control."""
 
     support: bool = True  # servo torques that carry each leg's share of weight and acceleration
-    slip_pid: bool = True  # of the paper's control: feet yield to tangential forces
-    paper_suspension: bool = True  # of the paper's control: legs yield to normal forces
+    # of the paper's control: a share of the deviations of the feet is taken back
+    paper_share: bool = True
+    paper_pid: bool = True  # of the paper's control: feet yield to forces, and return to the plan
+    # of the paper's control: a foot yields where it meets the ground early, extends where late
+    paper_suspension: bool = True
     touchdown: bool = True  # foot heights follow early and late touch-downs
     posture: bool = True  # roll, pitch and height are controlled
     # under a payload the torso moves against the swinging legs: feet need not push for them
@@ -30,4 +33,4 @@ class Parts:
 
 
 SWITCHES = tuple(item.name for item in fields(Parts) if item.name != "squeeze")
-COMPLIANT_PARTS = tuple(name for name in SWITCHES if name not in ("slip_pid", "paper_suspension"))
+COMPLIANT_PARTS = tuple(name for name in SWITCHES if not name.startswith("paper_"))

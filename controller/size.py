@@ -9,21 +9,23 @@ rates are scaled.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, fields
+from typing import Any, TypeVar
 
 import numpy as np
 
-from hexapod_cosim.controller.gains import TRIPOD_LEGS, Requirements
+from hexapod_cosim.controller.gains import LimitGains, PaperGains, Requirements
+from hexapod_cosim.controller.plane import LEGS
 from hexapod_cosim.controller.walk.kinematics import LegSolver
 from hexapod_cosim.models import Robot
 
 SHORTEST, LONGEST = 0.22, 0.44  # m    coxa, femur and tibia of legs that the figures suit
-YIELD = 1.5  # 1    deflection of the suspension over the sag of its leg's servos, at most
-LENGTHS = ("deflection", "deflection_limit", "height_limit")
-TIMES = ("load_time", "handover_time", "weight_time", "ground_time")
-RATES = ("frequency", "attitude_rate", "height_rate", "path_rate", "turn_limit")
-SPEEDS = ("speed_limit",)
+LENGTHS = ("sag_limit", "deflection_limit", "height_limit")
+TIMES = ("load_time", "handover_time", "weight_time", "ground_time", "return_time")
+RATES = ("return_rate", "attitude_rate", "height_rate", "path_rate", "turn_limit")
+SPEEDS = ("landing_speed", "speed_limit")
+
+Section = TypeVar("Section")
 
 
 @dataclass(frozen=True)
@@ -51,11 +53,7 @@ def size_of(robot: Robot) -> Size:
 
 
 def requirements_for(robot: Robot, **given: Any) -> Requirements:
-    """Returns the requirements for a robot's size and servos; given values are used unchanged.
-
-    The deflection of the suspension is limited to YIELD times that of the servos: their ratio is
-    the gain of the suspension's loop, which would have no margins otherwise.
-    """
+    """Returns the requirements for a robot's size; given values are used unchanged."""
     size, usual = size_of(robot), Requirements()
     factors = (
         (LENGTHS, size.length),
@@ -64,16 +62,21 @@ def requirements_for(robot: Robot, **given: Any) -> Requirements:
         (SPEEDS, size.speed),
     )
     asked = {name: getattr(usual, name) * factor for names, factor in factors for name in names}
-    if robot.servo.kp > 0.0:
-        asked["deflection"] = min(asked["deflection"], YIELD * sag(robot))
     return Requirements(**{**asked, **given})
 
 
-def sag(robot: Robot) -> float:
-    """Returns the sag [m] of a leg on its servos in the stance under a third of the weight.
+def taken(kind: type[Section], needs: Requirements, **given: float) -> Section:
+    """Returns a section of the gains whose values are those of the requirements, or given ones."""
+    names = [entry.name for entry in fields(kind) if entry.name not in given]  # type: ignore[arg-type]
+    return kind(**{name: getattr(needs, name) for name in names}, **given)
 
-    It is the mean over the legs.
-    """
-    vertical = LegSolver(robot).jacobian(robot.stance)[:, 2]
-    softness = float((vertical**2).sum(axis=1).mean() / robot.servo.kp)
-    return softness * robot.weight / TRIPOD_LEGS
+
+def paper_gains(robot: Robot, needs: Requirements) -> PaperGains:
+    """Returns the gains of the paper's control before the design limits its shares."""
+    damping = robot.weight / (LEGS * needs.landing_speed)
+    return taken(PaperGains, needs, damping=damping, limit=needs.deflection_limit)
+
+
+def limit_gains(robot: Robot, needs: Requirements) -> LimitGains:
+    """Returns the limit of commanded torques [N m]."""
+    return LimitGains(torque=needs.torque_share * robot.servo.torque_max)

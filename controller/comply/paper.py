@@ -1,90 +1,217 @@
-"""Corrects the foot trajectories by the forces on the feet, as the paper describes it. C: paper.c.
+"""Corrects the foot trajectories by the deviations that the ground causes. C: paper.c.
 
-Section 3 of the paper adds a correction of the foot position to the trajectory of each leg and
-computes the joint angles again by inverse kinematics. The tangential correction is a PID of the
-tangential contact force (C47); the normal one is the deflection of a virtual suspension under the
-normal contact force (C48). There is nothing else: no plan of the loads, no torques, no posture.
-The paper states these laws in words only, so that C47 to C49 are their plainest form.
+Section 3 of the paper: kinematic control neglects the deviations of the feet during stance; a PID
+on the tangential force and a virtual suspension on the normal force correct the foot positions, the
+correction is added to the trajectory, and inverse kinematics is done again. The paper gives no
+equations; C47 to C49 are ours. They use joint angles and foot forces, and command angles only:
+
+1. Deviations (C47). Under its load a leg yields like a spring. The force and the softness of the
+   leg give the deviation of a standing foot at once; the measured joint angles give it with the
+   friction of the gears, which a force does not show. Feet in the air deviate with the torso.
+2. Correction along the ground (C48). A share of the deviation under the load is taken back. The P
+   part yields to the force that makes a foot slip, the I part returns all standing feet to their
+   planned places together, so that it makes no leg pull against another.
+3. Correction upwards (C49). A share of the deviation under the load is taken back, feet in the air
+   are lifted by what the torso sags, and a suspension yields where the ground is met early and
+   extends where it is met late.
 """
 
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
-from hexapod_cosim.controller.comply.posture import Posture
-from hexapod_cosim.controller.comply.slip_pid import SlipPid
-from hexapod_cosim.controller.comply.suspension import discretise
+from hexapod_cosim.controller.comply.support import indentation
 from hexapod_cosim.controller.gains import Gains
 from hexapod_cosim.controller.memory import Stateful
 from hexapod_cosim.controller.parts import Parts
-from hexapod_cosim.controller.plane import LEGS, Array, Mask, Plane, clamp
-from hexapod_cosim.controller.walk.kinematics import Feet, Joints, LegSolver
+from hexapod_cosim.controller.plane import LEGS, Array, Mask, Plane, along, clamp, square
+from hexapod_cosim.controller.walk.gait import Gait
+from hexapod_cosim.controller.walk.kinematics import Feet, Joints, LegSolver, Pose
+from hexapod_cosim.models import Robot
+
+LEAST_LOAD = 1e-6  # N    a smaller sum of loads cannot be divided by
+LARGEST_PART = 0.5  # 1    of all loads: what a foot carries beyond is not taken back
+TOUCHING = 0.02  # 1    of all loads: a foot with more is on the ground
+EVENING = 0.15  # 1    added to the spread of the standing feet, for the tilt of the torso
+LANDED_TIME = 0.05  # s    in which a landed foot gives back the lift that it had in the air
+EARLY = 0.003  # m    a foot that is planned higher above the ground meets it early
+LATE_TIME = 0.04  # s    after the planned touch-down, in which a foot may be late
+SEARCH_SPEED = 0.08  # m/s    at most, of a foot that extends
+AIR_TIME = 0.06  # s    in which the suspension of a foot in the air returns
+
+
+class Softness(NamedTuple):
+    """Softness of the legs, C = J J^T / kp, along outward, sideward and upward (6,) [m/N]."""
+
+    outward: Array
+    sideward: Array
+    up: Array
+    splay: Array  # outward under an upward force
+
+
+class Step(NamedTuple):
+    """Plan and measurements of a period, torso frame, six legs."""
+
+    pose: Pose  # planned
+    planned: Array  # m    (6, 3) planned centres of the feet
+    height: Array  # m    (6,) of the planned feet above the ground
+    rise: Array  # m/s    (6,) of the planned feet
+    swinging: Mask  # planned in the air
+    angle: Array  # rad    (6, 3) measured
+    force: Array  # N    (6, 3) measured, ground on foot
+
+
+def softness(legs: LegSolver, pose: Pose, kp: float) -> Softness:
+    """Returns the softness of legs whose servos have the stiffness kp [N m/rad] (C47)."""
+    # rates of the foot, outward + i up, by the femur's and by the tibia's joint
+    femur, tibia = 1j * pose.foot, -1j * legs.tibia * pose.tibia
+    return Softness(
+        outward=(femur.real**2 + tibia.real**2 + legs.offset_y**2) / kp,
+        sideward=(pose.foot.real + legs.coxa_length) ** 2 / kp,
+        up=(femur.imag**2 + tibia.imag**2) / kp,
+        splay=(femur.real * femur.imag + tibia.real * tibia.imag) / kp,
+    )
 
 
 class Paper(Stateful):
-    """PID on the tangential and virtual suspension on the normal force of each foot.
+    """The paper's control of one robot in one gait.
 
-    Attributes, (6,) each:
-        pid: the PIDs, from forces [N] to shifts [m].
-        shift: horizontal correction of the foot, x + i y, walking frame [m].
-        lift, rate: vertical correction of the foot and its rate [m, m/s].
+    Attributes:
+        force: (6, 3) smoothed forces on the feet, torso axes [N].
+        back: common return of all feet, x + i y [m].
+        sag: height by which the torso sags at its centre, and its slope, x + i y [m, 1].
+        lifted: (6,) lift by the torso's sag [m].
+        yielded: (6,) deflection of the suspensions; positive: the leg is shorter [m].
+        late: (6,) time without force since the planned touch-down [s].
+        shift, lift: (6,) corrections of the feet, torso frame, x + i y and z [m].
     """
 
-    STATE = ("pid", "shift", "lift", "rate")
+    STATE = ("force", "back", "sag", "lifted", "yielded", "late", "shift", "lift")
 
-    def __init__(self, gains: Gains, parts: Parts, *, period: float) -> None:
-        slip = gains.paper_slip
-        self.parts, self.pid = parts, SlipPid(slip, period=period)
-        self.a, self.b = discretise(gains.paper_suspension, period=period)
-        self.memory = math.exp(-period / slip.load_time)
-        self.tracking = min(period / slip.tracking_time, 1.0)
-        self.farthest, self.deepest = slip.limit, gains.paper_suspension.limit  # m
+    def __init__(
+        self,
+        robot: Robot,
+        gait: Gait,
+        gains: Gains,
+        parts: Parts,
+        *,
+        legs: LegSolver,
+        period: float,
+    ) -> None:
+        self.gains, self.parts, self.legs, self.period = gains.paper, parts, legs, period
+        self.kp, self.ground = robot.servo.kp, robot.contact.stiffness
+        # what a leg gives up by a share grows with the square of its load, W/(6 duty) on average
+        lighter = (2.0 * gait.duty) ** 2 if parts.paper_share else 0.0
+        self.share = min(lighter * self.gains.share, self.gains.share_limit)
+        self.height_share = min(lighter * self.gains.height_share, self.gains.share_limit)
+        self.smoothing = 1.0 - math.exp(-period / self.gains.filter_time)
+        self.landed = math.exp(-period / LANDED_TIME)
+        self.in_air = math.exp(-period / AIR_TIME)
+        self.on_ground = math.exp(-period / self.gains.return_time)
         self.reset()
 
     def reset(self) -> None:
-        """Sets all shifts, deflections and integrals to zero."""
-        self.pid.reset()
+        """Sets all forces, deviations and corrections to zero."""
+        self.force = np.zeros((LEGS, 3))
+        self.back, self.sag = 0j, (0.0, 0j)
+        self.lifted, self.yielded, self.late, self.lift = np.zeros((4, LEGS))
         self.shift: Plane = np.zeros(LEGS, dtype=np.complex128)
-        self.lift, self.rate = np.zeros((2, LEGS))
 
-    def _yield_sideways(self, force: Plane, swinging: Mask) -> None:
-        """Updates the shifts for tangential forces (6,) [N] (C47).
+    # -------------------------------------------------------------------------- deviations
 
-        The length of a shift is limited, and its integral follows the limited value. The integral
-        of a swinging foot decays, so that the foot lands where its trajectory ends.
+    def _see_torso(self, step: Step, load: Array) -> None:
+        """Updates the torso's sag and the return of the feet by the standing feet (C47, C48).
+
+        load: (6,) smoothed normal forces [N].
         """
-        wanted = self.pid.step(force)
-        scale = self.farthest / np.maximum(np.abs(wanted), self.farthest)
-        self.shift = wanted * scale
-        kept = np.where(swinging, self.memory, 1.0)
-        self.pid.integral = kept * (self.pid.integral + self.tracking * (self.shift - wanted))
+        weight = np.where(step.swinging, 0.0, load)
+        total = float(weight.sum())
+        if total <= LEAST_LOAD:
+            return
+        found = self.legs.forward(step.angle) - step.planned
+        feet, part = step.planned[:, 0] + 1j * step.planned[:, 1], weight / total
+        sunk = found[:, 2] - self.yielded + indentation(load, self.ground)
+        centre, mean = part @ feet, float(part @ sunk)
+        # least squares: slope g of sum part (Re(arm^* g) - (sunk - mean))^2
+        arm = feet - centre
+        spread, skew = float(part @ square(arm)), 0.5 * complex(part @ (arm * arm))
+        even = (0.5 + EVENING) * spread
+        moment = complex(part @ (arm * (sunk - mean)))
+        size = even * even - square(skew)
+        slope = (even * moment - skew * moment.conjugate()) / size if spread > 0.0 else 0j
+        height, old = self.sag
+        now = mean - along(centre, slope)
+        self.sag = (
+            height + self.smoothing * (now - height),
+            old + self.smoothing * (slope - old),
+        )
+        if self.parts.paper_pid:
+            astray = complex(part @ (found[:, 0] + 1j * found[:, 1]))
+            back = self.back - self.period * self.gains.return_rate * astray
+            self.back = back * (self.gains.limit / max(abs(back), self.gains.limit))
 
-    def _yield_upwards(self, force: Array) -> None:
-        """Updates the deflections of the suspensions for normal forces (6,) [N] (C48)."""
-        z, rate, a, b = self.lift, self.rate, self.a, self.b
-        lift = a[0, 0] * z + a[0, 1] * rate + b[0] * force
-        self.rate = a[1, 0] * z + a[1, 1] * rate + b[1] * force
-        self.rate = np.where(np.abs(lift) > self.deepest, 0.0, self.rate)
-        self.lift = clamp(lift, -self.deepest, self.deepest)
+    # ------------------------------------------------------------------------- corrections
 
-    def actuate(self, legs: LegSolver, feet: Feet, posture: Posture) -> Joints:
+    def _along_ground(self, step: Step, soft: Softness, borne: Array) -> Plane:
+        """Returns the correction along the ground (6,) x + i y [m] (C48).
+
+        borne: (6,) normal forces whose deviation is taken back [N].
+        """
+        heading = step.pose.heading
+        shift = -self.share * soft.splay * borne * heading
+        if self.parts.paper_pid:
+            pull = (self.force[:, 0] + 1j * self.force[:, 1]) * heading.conj()
+            # a standing foot keeps the outward force, which carries a part of the weight
+            outward = np.where(step.swinging, soft.outward * pull.real, 0.0)
+            sideward = soft.sideward * pull.imag
+            shift = shift + self.gains.yield_share * (outward + 1j * sideward) * heading
+        return np.asarray(shift + self.back)
+
+    def _lift_swinging(self, step: Step) -> None:
+        """Updates the lift of the feet in the air by the torso's sag (C49)."""
+        height, slope = self.sag
+        sunk = height + along(step.planned[:, 0] + 1j * step.planned[:, 1], slope)
+        wanted = clamp(sunk, -self.gains.sag_limit, self.gains.sag_limit)
+        rising = self.lifted + self.smoothing * (wanted - self.lifted)
+        self.lifted = np.where(step.swinging, rising, self.landed * self.lifted)
+
+    def _suspend(self, step: Step, load: Array) -> None:
+        """Updates the deflections of the suspensions (C49). load: as in _see_torso()."""
+        total, h = float(load.sum()), self.period
+        touching = step.force[:, 2] > max(TOUCHING * total, LEAST_LOAD)
+        missing = ~touching & ~step.swinging
+        self.late = np.where(missing, self.late + h, 0.0)
+        # the damper yields to the force beyond a foot's share of all loads
+        rate = (step.force[:, 2] - total / LEGS) / self.gains.damping
+        descent = np.where(step.height > EARLY, np.maximum(-step.rise, 0.0), 0.0)
+        met = self.yielded + h * clamp(rate, 0.0, descent)
+        sought = self.yielded + h * clamp(rate, -SEARCH_SPEED, 0.0)
+        kept = np.where(step.swinging & ~touching, self.in_air, self.on_ground)
+        moved = np.where(step.swinging & touching, met, kept * self.yielded)
+        moved = np.where(self.late > LATE_TIME, sought, moved)
+        self.yielded = clamp(moved, -self.gains.limit, self.gains.limit)
+
+    def step(self, step: Step) -> None:
+        """Advances the corrections by one period."""
+        self.force = self.force + self.smoothing * (step.force - self.force)
+        load = np.maximum(self.force[:, 2], 0.0)
+        soft = softness(self.legs, step.pose, self.kp)
+        borne = np.minimum(load, LARGEST_PART * load.sum())
+        self._see_torso(step, load)
+        if self.parts.paper_share:
+            self._lift_swinging(step)
+        if self.parts.paper_suspension:
+            self._suspend(step, load)
+        self.shift = self._along_ground(step, soft, borne)
+        self.lift = self.lifted + self.yielded - self.height_share * soft.up * borne
+
+    def actuate(self, feet: Feet) -> Joints:
         """Returns the joints that put the feet on their corrected trajectories (C49).
 
-        feet: planned ones in the walking frame; posture: of the torso.
+        feet: planned ones, torso frame.
         """
-        plane, height = posture.see_place(feet.plane + self.shift, feet.height + self.lift)
-        seen = posture.see(feet)
-        return legs.solve(legs.pose(plane, height), seen.velocity, seen.rise)
-
-    def step(self, force: Array, swinging: Mask) -> None:
-        """Advances the corrections by one period.
-
-        force: (6, 3) of the ground on the feet, walking frame [N]; swinging: (6,) legs planned in
-        the air.
-        """
-        if self.parts.slip_pid:
-            self._yield_sideways(force[:, 0] + 1j * force[:, 1], swinging)
-        if self.parts.paper_suspension:
-            self._yield_upwards(force[:, 2])
+        pose = self.legs.pose(feet.plane + self.shift, feet.height + self.lift)
+        return self.legs.solve(pose, feet.velocity, feet.rise)

@@ -1,14 +1,13 @@
-"""Computes the eigenloci of plants with many feet, and the margins of loops (generalised Nyquist).
+"""Computes frequency responses and the eigenloci of loops with many feet, and their margins.
 
-All feet and directions have the same law l(z), so det(1 + l P) = product of (1 + l lambda_i) over
-the eigenvalues lambda_i of the plant's response P. Each eigenlocus times the law is therefore a
-loop of one input and one output, and has margins.
+The loop of n feet is a matrix L(z). Its eigenvalues over frequency, the eigenloci, are loops of one
+input and one output: det(1 + L) = product of (1 + locus). So each of them has margins, which hold
+for a change of gain or phase that is the same for all feet (generalised Nyquist criterion).
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
@@ -18,13 +17,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
-from hexapod_cosim.controller.design.standing import StandingPlant
 from hexapod_cosim.controller.plane import Array
-from hexapod_cosim.models import Robot
 
 Response = NDArray[np.complex128]
-Plants = Mapping[str, StandingPlant]
-FindLoci = Callable[[Robot, StandingPlant, Array], tuple[Response, Response]]
 SLOWEST = 0.1  # rad/s    lowest frequency of a grid
 AT_ONCE = 32  # frequencies whose matrices are in the processor's cache together
 
@@ -63,49 +58,11 @@ def tracked(values: NDArray[Any]) -> Response:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Loci:
-    """Eigenloci of plants on one grid of frequencies."""
-
-    omega: Array  # rad/s
-    names: tuple[str, ...]  # of the plant, for each locus
-    values: Response  # (loci, frequencies)
-
-    def finer(self, times: int) -> Loci:
-        """Returns the loci on a grid with `times` as many frequencies, by linear interpolation."""
-        places = np.arange(len(self.omega))
-        between = np.linspace(0.0, places[-1], times * len(self.omega))
-        values = np.array([np.interp(between, places, locus) for locus in self.values])
-        return Loci(
-            omega=np.exp(np.interp(between, places, np.log(self.omega))),
-            names=self.names,
-            values=values,
-        )
-
-
-def all_loci(robot: Robot, plants: Plants, omega: Array, *, of: FindLoci) -> tuple[Loci, Loci]:
-    """Returns the tangential and vertical eigenloci of all plants, without the laws.
-
-    of: the function that computes those of one plant.
-    """
-    found = {name: of(robot, plant, omega) for name, plant in plants.items()}
-    tangential, vertical = (
-        Loci(
-            omega=omega, names=tuple(name for name, loci in found.items() for _ in loci[which]),
-            values=np.concatenate([loci[which] for loci in found.values()]),
-        )
-        for which in (0, 1)
-    )  # fmt: skip
-    return tangential, vertical
-
-
-@dataclass(frozen=True, kw_only=True)
 class LoopMargins:
-    """Margins of one loop; inf where it has no crossing."""
+    """Margins of loops; inf where they have no crossing."""
 
     gain: float  # dB
     phase: float  # deg
-    delay: float  # s
-    crossover: float  # rad/s    the highest; 0: none
 
 
 def critical_size(loops: Response) -> Array:
@@ -121,33 +78,23 @@ def critical_size(loops: Response) -> Array:
     )
 
 
-def quick_margins(loop: Response, omega: Array) -> LoopMargins:
-    """Estimates the margins of a loop (frequencies,) by linear interpolation."""
-    size, gap, critical = np.abs(loop), np.abs(np.angle(-loop)), float(critical_size(loop[None])[0])
-    unity = np.flatnonzero((size[:-1] - 1.0) * (size[1:] - 1.0) < 0.0)
-    part = np.log(size[unity]) / (np.log(size[unity]) - np.log(size[unity + 1]))
-    phase, at = (
-        gap[unity] + part * (gap[unity + 1] - gap[unity]),
-        omega[unity] * (omega[unity + 1] / omega[unity]) ** part,
-    )
-    lag = np.mod(np.angle(loop[unity]) + math.pi, 2.0 * math.pi)
-    return LoopMargins(
-        gain=-20.0 * math.log10(critical) if critical else math.inf,
-        phase=math.degrees(phase.min(initial=math.inf)),
-        delay=float((lag / at).min(initial=math.inf)),
-        crossover=float(at.max(initial=0.0)),
-    )
+def worst_margins(loops: Response, omega: Array) -> LoopMargins:
+    """Returns the margins of the worst of the loops (n, frequencies).
+
+    python-control computes them for two loops: the one that crosses the negative real axis furthest
+    out, and the one that is largest somewhere.
+    """
+    chosen = {int(critical_size(loops).argmax()), int(np.abs(loops).max(axis=1).argmax())}
+    found = [loop_margins(loops[number], omega) for number in sorted(chosen)]
+    return LoopMargins(gain=min(m.gain for m in found), phase=min(m.phase for m in found))
 
 
 def loop_margins(loop: Response, omega: Array) -> LoopMargins:
-    """Returns the margins of one loop, as python-control computes them."""
+    """Returns the margins of one loop (frequencies,), as python-control computes them."""
     data = control.frd(loop, omega, smooth=True)
-    gains, phases, _, _, crossings, _ = control.stability_margins(data, returnall=True)
-    more = [g for g in gains if g > 1.0]  # factors by which the gain may grow
-    delays = np.radians(np.mod(phases, 360.0)) / crossings
+    gains, phases, *_ = control.stability_margins(data, returnall=True)
+    more = [gain for gain in gains if gain > 1.0]  # factors by which the gain may grow
     return LoopMargins(
         gain=20.0 * math.log10(min(more)) if more else math.inf,
         phase=float(np.abs(phases).min(initial=math.inf)),
-        delay=float(delays.min(initial=math.inf)),
-        crossover=float(crossings.max(initial=0.0)),
     )

@@ -1,28 +1,44 @@
-"""Designs the laws of the paper's control with the same loops and margins as the compliant one's.
+"""Designs the shares of the paper's control: the largest that keep the required margins.
 
-The laws shift a foot [m] by the force on it [N], and inverse kinematics turns shifts into angles.
-The plant is therefore the standing robot from shifts to forces. All feet share both laws, so that
-its eigenloci times a law are the loops. Nothing is subtracted from the forces: a common push or
-twist of the feet has loci too.
+To take back a share of a foot's deviation under its load is a positive feedback of the force on the
+foot: a share of 1 would make the leg infinitely stiff. The plant is the standing robot, linearised,
+from shifts of the feet to the forces on them; the law is a smoothed, delayed matrix of the leg's
+softness (C47 to C49). The torso's sag, the return of the feet and the suspension act on feet in the
+air, on all feet together, or by events, and are no part of this loop.
 """
 
 from __future__ import annotations
 
-from dataclasses import asdict, replace
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 
 import control
 import numpy as np
 
+from hexapod_cosim.controller.comply.paper import softness
 from hexapod_cosim.controller.design.closed import parallel, spectral_radius
-from hexapod_cosim.controller.design.laws import Laws, delay
-from hexapod_cosim.controller.design.loci import Plants, Response, response, tracked
-from hexapod_cosim.controller.design.standing import ANGLES, FORCES, JOINTS, StandingPlant, axes_of
-from hexapod_cosim.controller.gains import PaperSlipGains, Requirements
+from hexapod_cosim.controller.design.loci import (
+    SLOWEST,
+    LoopMargins,
+    Response,
+    critical_size,
+    frequencies,
+    response,
+    tracked,
+    worst_margins,
+)
+from hexapod_cosim.controller.design.standing import ANGLES, FORCES, JOINTS, StandingPlant
+from hexapod_cosim.controller.gains import TRIPOD_LEGS, PaperGains, Requirements
 from hexapod_cosim.controller.plane import Array
+from hexapod_cosim.controller.size import paper_gains, size_of
 from hexapod_cosim.controller.walk.kinematics import LegSolver
 from hexapod_cosim.models import Robot
 
-GIVE_IN, ATTEMPTS = 0.8, 24  # 1    factor on gain and frequency while a whole loop is unstable
+Plants = Mapping[str, StandingPlant]
+JUDGED = 200  # frequencies
+ROUNDING = 1e-9  # 1    of a period
+BACK_OFF, BACK_OFFS = 0.95, 60  # 1    reduction of the shares at a missed margin, and attempts
 
 
 def shifted(robot: Robot, plant: StandingPlant) -> control.StateSpace:
@@ -39,60 +55,123 @@ def shifted(robot: Robot, plant: StandingPlant) -> control.StateSpace:
     return control.ss(system.A, inputs, system.C[:FORCES][chosen], 0, system.dt)
 
 
-def paper_loci(robot: Robot, plant: StandingPlant, omega: Array) -> tuple[Response, Response]:
-    """Returns the tangential (2 n, frequencies) and vertical (n, frequencies) eigenloci [N/m].
+def law_matrix(robot: Robot, plant: StandingPlant, gains: PaperGains) -> Array:
+    """Returns the shifts (3 n) of the standing feet by steady forces on them: (3 n, 3 n) [m/N].
 
-    They are those of a plant on n standing feet, for negative feedback. omega: (frequencies,)
-    [rad/s].
+    The shares are those of a gait with as many standing legs.
     """
-    answer = response(shifted(robot, plant), omega)
-    flat, up = axes_of(int(plant.standing.sum()))
-    along, above = answer[:, flat][:, :, flat], answer[:, up][:, :, up]
-    return tracked(np.linalg.eigvals(-along)), tracked(np.linalg.eigvals(-above))
+    legs, count = LegSolver(robot), int(plant.standing.sum())
+    feet = legs.forward(plant.angle)
+    pose = legs.pose(feet[:, 0] + 1j * feet[:, 1], feet[:, 2])
+    soft = softness(legs, pose, robot.servo.kp)
+    lighter = (count / TRIPOD_LEGS) ** 2
+    share = min(lighter * gains.share, gains.share_limit)
+    height_share = min(lighter * gains.height_share, gains.share_limit)
+    matrix = np.zeros((3 * count, 3 * count))
+    for place, leg in enumerate(np.flatnonzero(plant.standing)):
+        heading = pose.heading[leg]
+        out, side = [heading.real, heading.imag, 0.0], [-heading.imag, heading.real, 0.0]
+        up = [0.0, 0.0, 1.0]
+        block = (
+            gains.yield_share * soft.sideward[leg] * np.outer(side, side)
+            - share * soft.splay[leg] * np.outer(out, up)
+            - height_share * soft.up[leg] * np.outer(up, up)
+        )
+        matrix[3 * place : 3 * place + 3, 3 * place : 3 * place + 3] = block
+    return matrix
 
 
-def paper_loop(robot: Robot, plant: StandingPlant, laws: Laws) -> control.StateSpace:
-    """Returns the loop from disturbing shifts (3 n) to forces of the standing feet (3 n)."""
-    count = int(plant.standing.sum())
-    flat, up = axes_of(count)
-    order = np.eye(3 * count)[[*flat, *up]]
-    pid, spring = laws.systems
-    both = control.append(parallel(pid, 2 * count), parallel(spring, count))
-    law = control.ss(
-        both.A, both.B @ order, order.T @ both.C, order.T @ both.D @ order, laws.period
+def delay_steps(needs: Requirements, *, period: float) -> int:
+    """Returns the delay from a force to the command that responds to it, in whole periods."""
+    return math.ceil(needs.delay_periods - ROUNDING) + math.ceil(
+        needs.force_delay / period - ROUNDING
     )
-    late = parallel(delay(laws.delays, period=laws.period), 3 * count)
-    return control.feedback(shifted(robot, plant), law * late, sign=1)
 
 
-def stable(robot: Robot, plants: Plants, laws: Laws) -> tuple[Laws, float]:
-    """Reduces gain and frequency of the laws until every whole loop is stable.
+def late_filter(gains: PaperGains, *, period: float, delays: int) -> control.StateSpace:
+    """Returns the smoothing of a force as the controller runs it, after a delay of periods."""
+    kept = math.exp(-period / gains.filter_time)
+    smooth = control.ss(kept, 1.0 - kept, kept, 1.0 - kept, period)
+    if not delays:
+        return smooth
+    chain = np.eye(delays, k=-1)
+    late = control.ss(chain, np.eye(delays)[:, :1], np.eye(delays)[-1:], 0, period)
+    return smooth * late
 
-    Returns the laws and the largest spectral radius of the loops, at least 1 when no attempt
-    succeeded.
-    """
-    radius = 1.0
-    for _ in range(ATTEMPTS):
-        radius = max(
-            spectral_radius(paper_loop(robot, plant, laws), feet=int(plant.standing.sum()))
-            for plant in plants.values()
+
+def closed_loop(
+    robot: Robot, plant: StandingPlant, gains: PaperGains, *, delays: int
+) -> control.StateSpace:
+    """Returns the loop from disturbing shifts (3 n) to forces of the standing feet (3 n)."""
+    matrix, period = law_matrix(robot, plant, gains), plant.system.dt
+    smooth = parallel(late_filter(gains, period=period, delays=delays), len(matrix))
+    law = control.ss(smooth.A, smooth.B, matrix @ smooth.C, matrix @ smooth.D, period)
+    return control.feedback(shifted(robot, plant), law, sign=1)
+
+
+@dataclass(frozen=True, kw_only=True)
+class PaperDesign:
+    """Gains of the paper's control, and the margins of their worst loop."""
+
+    gains: PaperGains
+    margins: LoopMargins
+    radius: float  # 1    largest spectral radius of the closed loops
+    binding: str  # what limited the shares
+
+
+class PaperLoops:
+    """The loops of all plants, whose responses are computed once."""
+
+    def __init__(self, robot: Robot, plants: Plants, needs: Requirements, *, period: float) -> None:
+        self.robot, self.plants, self.period = robot, plants, period
+        self.delays = delay_steps(needs, period=period)
+        self.omega = frequencies(period, JUDGED, slowest=SLOWEST / size_of(robot).time)
+        self._responses = {
+            name: response(shifted(robot, plant), self.omega) for name, plant in plants.items()
+        }
+
+    def loci(self, name: str, gains: PaperGains) -> Response:
+        """Returns the eigenloci (3 n, frequencies) of a plant's loop."""
+        late = response(late_filter(gains, period=self.period, delays=self.delays), self.omega)
+        matrix = law_matrix(self.robot, self.plants[name], gains)
+        return tracked(np.linalg.eigvals(-late[:, :1, :1] * (self._responses[name] @ matrix)))
+
+    def worst(self, gains: PaperGains) -> tuple[LoopMargins, str]:
+        """Returns the least margins of all loops, and the plant with the least gain margin."""
+        found = {name: self.loci(name, gains) for name in self.plants}
+        names = [name for name, loci in found.items() for _ in loci]
+        loci = np.concatenate(list(found.values()))
+        return worst_margins(loci, self.omega), names[int(critical_size(loci).argmax())]
+
+    def radius(self, gains: PaperGains) -> float:
+        """Returns the largest spectral radius of the closed loops [1]."""
+        return max(
+            spectral_radius(
+                closed_loop(self.robot, plant, gains, delays=self.delays),
+                feet=int(plant.standing.sum()),
+            )
+            for plant in self.plants.values()
         )
-        if radius < 1.0:
+
+
+def design_paper(
+    robot: Robot, plants: Plants, needs: Requirements, *, period: float
+) -> PaperDesign:
+    """Returns the gains with the asked shares, or smaller ones that keep the required margins."""
+    loops = PaperLoops(robot, plants, needs, period=period)
+    gains, binding = paper_gains(robot, needs), "the shares asked for"
+    for _ in range(BACK_OFFS):
+        margins, name = loops.worst(gains)
+        radius = loops.radius(gains)
+        kept = margins.gain >= needs.gain_margin and margins.phase >= needs.phase_margin
+        if kept and radius < 1.0:
             break
-        slip, spring = laws.slip, laws.suspension
-        laws = replace(
-            laws,
-            slip=replace(slip, kp=GIVE_IN * slip.kp, ki=GIVE_IN * slip.ki, kd=GIVE_IN * slip.kd),
-            suspension=replace(
-                spring, mass=spring.mass / GIVE_IN**2, damping=spring.damping / GIVE_IN
-            ),
+        binding = f"the margins ({name})"
+        gains = replace(
+            gains,
+            share=BACK_OFF * gains.share,
+            height_share=BACK_OFF * gains.height_share,
+            share_limit=BACK_OFF * gains.share_limit,
+            yield_share=BACK_OFF * gains.yield_share,
         )
-    return laws, radius
-
-
-def paper_slip(laws: Laws, needs: Requirements) -> PaperSlipGains:
-    """Returns the PID of a design as gains of the paper's control.
-
-    The largest shift is that of the suspension.
-    """
-    return PaperSlipGains(**asdict(laws.slip) | {"limit": needs.deflection_limit})
+    return PaperDesign(gains=gains, margins=margins, radius=radius, binding=binding)

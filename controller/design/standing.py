@@ -6,14 +6,10 @@ from dataclasses import dataclass
 
 import control
 import numpy as np
-from numpy.typing import NDArray
 
 from hexapod_cosim.controller.gains import TRIPOD_LEGS
 from hexapod_cosim.controller.plane import LEGS, Array, Mask
-from hexapod_cosim.controller.walk.kinematics import LegSolver
 from hexapod_cosim.models import Robot
-
-Places = NDArray[np.int_]
 
 JOINTS = 3
 ANGLES = FORCES = 3 * LEGS
@@ -42,24 +38,3 @@ class StandingPlant:
 def weight_share(robot: Robot) -> float:
     """Returns a third of the robot's weight [N], one leg's share while three legs stand."""
     return robot.weight / TRIPOD_LEGS
-
-
-def relieved(robot: Robot, plant: StandingPlant) -> control.StateSpace:
-    """Returns the plant as a system from forces G (3 n) to forces of the standing feet (3 n) [N].
-
-    The foot is the slowest index of both.
-    """
-    chosen, bends = np.repeat(plant.standing, 3), np.zeros((ANGLES, FORCES))
-    for leg, jacobian in enumerate(LegSolver(robot).jacobian(plant.angle)):
-        rows = slice(JOINTS * leg, JOINTS * (leg + 1))
-        bends[rows, rows] = jacobian.T / robot.servo.kp
-    system = plant.system
-    return control.ss(
-        system.A, system.B[:, :ANGLES] @ bends[:, chosen], system.C[:FORCES][chosen], 0, system.dt
-    )
-
-
-def axes_of(count: int) -> tuple[Places, Places]:
-    """Returns the indices of the horizontal (2 n) and vertical (n) entries in vectors (3 n)."""
-    places = np.arange(3 * count).reshape(count, 3)
-    return places[:, :2].reshape(-1), places[:, 2]

@@ -1,65 +1,32 @@
-"""Designs gains that meet requirements, with python-control.
+"""Designs the gains of a robot, with python-control for the loops of the paper's control.
 
-Compliant control has no fast loop: its values are those of the requirements. The PID of the
-paper's control gets the largest integral gain at which every eigenlocus of every plant keeps its
-margins, its suspension the required deflection, frequency and damping, or a lower frequency where
-the margins need it.
+Compliant control has no fast loop: its values are those of the requirements. The paper's control
+gets the largest shares, up to those asked for, that keep the margins of its loops (paper.py).
 """
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, fields, replace
-from typing import Any
+from dataclasses import fields
 
 import numpy as np
 
-from hexapod_cosim.controller.design.laws import (
-    Laws,
-    delay_response,
-    delay_steps,
-    sampled_suspension,
-    slip_response,
-)
-from hexapod_cosim.controller.design.loci import (
-    SLOWEST,
-    Loci,
-    Plants,
-    Response,
-    all_loci,
-    critical_size,
-    frequencies,
-    quick_margins,
-    response,
-)
-from hexapod_cosim.controller.design.paper import paper_loci, paper_slip, stable
-from hexapod_cosim.controller.design.standing import StandingPlant, weight_share
-from hexapod_cosim.controller.design.verify import MarginFinder, nominal, support_torque
+from hexapod_cosim.controller.design.paper import PaperDesign, Plants, design_paper
+from hexapod_cosim.controller.design.standing import StandingPlant
 from hexapod_cosim.controller.gains import (
     POSITIVE,
     Gains,
     GainsError,
     HoldGains,
-    LimitGains,
     Margins,
     Requirements,
-    SlipGains,
     SupportGains,
-    SuspensionGains,
 )
-from hexapod_cosim.controller.size import requirements_for, size_of
+from hexapod_cosim.controller.size import limit_gains, requirements_for, taken
 from hexapod_cosim.models import LEG_NAMES, Robot
 
-LEADS = (0.0, 0.001, 0.003, 0.01, 0.1)  # s    candidates of kp/ki, scaled by the robot's size
-CURVATURES = (0.0, 1e-5, 2e-5, 5e-5, 2e-4, 5e-4)  # s2    candidates of kd/ki, by its square
-DERIVATIVE_PERIODS = 2.0  # 1    filter of the derivative in controller periods
-SEARCHED, FINER = 100, 4  # frequencies of the plants' loci; factor for loops, which turn faster
-FREQUENCY_STEPS, FREQUENCY_FACTOR = 24, 0.85  # 1    attempts with a lower suspension frequency
-SAFETY, SPARE = 0.98, 0.5  # 1, deg    reserve, as the grid may miss the worst frequency
-BACK_OFF, BACK_OFFS = 0.95, 40  # 1    reduction of the gain at a missed margin, and attempts
-TINY = 1e-9  # 1    floor of a loop's magnitude
+NOMINAL = (0.8, 1.25)  # 1    range of mean loads that are about the robot's own
 SAME = 1e-9  # 1    relative tolerance of periods
 
 
@@ -91,77 +58,45 @@ def design_gains(
         robot_hash=robot.hash,
         period=period,
         requirements=needs,
-        paper_slip=paper_slip(paper.laws, needs),
-        paper_suspension=paper.laws.suspension,
+        support=taken(SupportGains, needs),
+        hold=taken(HoldGains, needs),
+        limits=limit_gains(robot, needs),
+        paper=paper.gains,
         margins=Margins(
             support_torque=support_torque(robot, plants),
             binding=paper.binding,
-            paper_phase_margin=paper.phase,
-            paper_gain_margin=paper.gain,
+            paper_phase_margin=paper.margins.phase,
+            paper_gain_margin=paper.margins.gain,
             paper_spectral_radius=paper.radius,
         ),
         caveats=(
             *(f"the design leaves out {text}" for text in (*left_out, *too_heavy)),
-            *paper.shortfalls,
+            *_shortfalls(paper, needs),
         ),
-        support=_taken(SupportGains, needs),
-        hold=_taken(HoldGains, needs),
-        limits=_limits(robot, needs),
     )
 
 
-@dataclass(frozen=True, kw_only=True)
-class PaperDesign:
-    """Laws of the paper's control and the margins of their worst loops."""
-
-    laws: Laws
-    phase: float  # deg
-    gain: float  # dB
-    radius: float  # 1    spectral radius of the whole loop
-    binding: str  # the requirement that limited the gain of the tangential loop
-    shortfalls: tuple[str, ...]  # texts on requirements that are missed
-
-
-def design_paper(
-    robot: Robot, plants: Plants, needs: Requirements, *, period: float
-) -> PaperDesign:
-    """Designs the laws of the paper's control by the same requirements, search and margins."""
-    time = size_of(robot).time
-    omega = frequencies(period, SEARCHED, slowest=SLOWEST / time)
-    found = all_loci(robot, plants, omega, of=paper_loci)
-    tangential, vertical = (loci.finer(FINER) for loci in found)
-    slip, binding = design_slip(tangential, needs, period=period, time=time)
-    suspension = design_suspension(robot, vertical, needs, period=period)
-    finder = MarginFinder(robot, plants, period=period, of=paper_loci)
-    late = delay_steps(needs, period=period)
-    laws = Laws(slip=slip, suspension=suspension, period=period, delays=late)
-    laws = _backed_off(finder, tangential, laws, needs)
-    laws, radius = stable(robot, plants, laws)
-    margins = finder.worst(tangential, 0, laws), finder.worst(vertical, 1, laws)
-    phase, gain = min(m.phase for m in margins), min(m.gain for m in margins)
-    missed = phase < needs.phase_margin or gain < needs.gain_margin or radius >= 1.0
-    text = (
+def _shortfalls(paper: PaperDesign, needs: Requirements) -> tuple[str, ...]:
+    """Returns a text on margins of the paper's control that are missed, or nothing."""
+    gain, phase = paper.margins.gain, paper.margins.phase
+    if gain >= needs.gain_margin and phase >= needs.phase_margin and paper.radius < 1.0:
+        return ()
+    return (
         f"the paper's control has {phase:.3g} deg and {gain:.3g} dB of margin and a spectral "
-        f"radius of {radius:.6g} on these legs"
-    )
-    return PaperDesign(
-        laws=laws,
-        phase=phase,
-        gain=gain,
-        radius=radius,
-        binding=binding,
-        shortfalls=(text,) * missed,
+        f"radius of {paper.radius:.6g} on these legs",
     )
 
 
-def _taken(kind: type[Any], needs: Requirements) -> Any:
-    """Returns a section of the gains whose values are those of the requirements."""
-    return kind(**{entry.name: getattr(needs, entry.name) for entry in fields(kind)})
+def support_torque(robot: Robot, plants: Plants) -> float:
+    """Returns the largest feed-forward torque of a servo in stances near the nominal load [N m]."""
+    return max(
+        float(np.abs(plant.torque).max()) for plant in plants.values() if nominal(robot, plant)
+    )
 
 
-def _limits(robot: Robot, needs: Requirements) -> LimitGains:
-    """Returns the limit of commanded torques [N m]."""
-    return LimitGains(torque=needs.torque_share * robot.servo.torque_max)
+def nominal(robot: Robot, plant: StandingPlant) -> bool:
+    """Returns whether the feet of a plant carry about the robot's own weight."""
+    return bool(NOMINAL[0] <= plant.load(robot).mean() <= NOMINAL[1])
 
 
 def _check(robot: Robot, needs: Requirements, plants: Plants, *, period: float) -> None:
@@ -201,23 +136,6 @@ def _check(robot: Robot, needs: Requirements, plants: Plants, *, period: float) 
             )
 
 
-def _backed_off(finder: MarginFinder, loci: Loci, laws: Laws, needs: Requirements) -> Laws:
-    """Reduces the gain until the tangential loops keep their margins by python-control.
-
-    The search's grid may miss a resonance.
-    """
-    for _ in range(BACK_OFFS):
-        found = finder.worst(loci, 0, laws)
-        if found.phase >= needs.phase_margin and found.gain >= needs.gain_margin:
-            return laws
-        slip = laws.slip
-        laws = replace(
-            laws,
-            slip=replace(slip, kp=BACK_OFF * slip.kp, ki=BACK_OFF * slip.ki, kd=BACK_OFF * slip.kd),
-        )
-    return laws
-
-
 def carried(robot: Robot, plants: Plants, needs: Requirements) -> tuple[Plants, tuple[str, ...]]:
     """Returns the plants whose servos carry the robot within torque_share, and texts on the others.
 
@@ -254,104 +172,4 @@ def carried(robot: Robot, plants: Plants, needs: Requirements) -> tuple[Plants, 
 def _legs(plant: StandingPlant) -> str:
     return "standing on " + " ".join(
         leg for leg, stands in zip(LEG_NAMES, plant.standing, strict=True) if stands
-    )
-
-
-def design_slip(
-    loci: Loci, needs: Requirements, *, period: float, time: float = 1.0
-) -> tuple[SlipGains, str]:
-    """Returns the gains with the largest ki at which every locus keeps its margins.
-
-    All candidates of kp/ki and kd/ki are tried; time: scales them by the robot's size (size.py).
-    Also returns the name of the margin and the plant that limit ki.
-    """
-    late = delay_response(delay_steps(needs, period=period), loci.omega, period=period)
-    best, binding = (
-        slip_gains(0.0, 0.0, 0.0, needs, period=period),
-        "no integral action is possible",
-    )
-    leads, curvatures = [time * lead for lead in LEADS], [time * time * bend for bend in CURVATURES]
-    for lead, curvature in itertools.product(leads, curvatures):
-        shape = slip_gains(1.0, lead, curvature, needs, period=period)
-        loops = loci.values * slip_response(shape, loci.omega, period=period) * late
-        most, stopped = _largest_gain(loops, needs, loci)
-        if SAFETY * most > best.ki:
-            best, binding = (
-                slip_gains(SAFETY * most, lead, curvature, needs, period=period),
-                stopped,
-            )
-    return best, binding
-
-
-def slip_gains(
-    ki: float, lead: float, curvature: float, needs: Requirements, *, period: float
-) -> SlipGains:
-    """Returns the gains for ki, kp/ki (lead) and kd/ki (curvature).
-
-    The filter of the derivative follows the period, the anti-windup period and force filter.
-    """
-    return SlipGains(
-        kp=ki * lead,
-        ki=ki,
-        kd=ki * curvature,
-        derivative_time=DERIVATIVE_PERIODS * period,
-        filter_time=needs.filter_time,
-        load_time=needs.load_time,
-        tracking_time=2.0 * max(needs.filter_time, period),
-        limit=needs.deflection_limit,
-    )
-
-
-def _largest_gain(loops: Response, needs: Requirements, loci: Loci) -> tuple[float, str]:
-    """Returns the largest factor on unit-gain loops that keeps all margins, and what limits it.
-
-    A loop may not enter the sector of the phase margin with a gain above 1 at any frequency, which
-    is more than the phase margin at the crossings requires.
-    """
-    inside = np.abs(np.angle(-loops)) < math.radians(needs.phase_margin + SPARE)
-    near = np.where(inside, np.abs(loops), TINY).max(axis=1)
-    critical = np.maximum(critical_size(loops), TINY)
-    allowed = {
-        "phase_margin": 1.0 / near,
-        "gain_margin": 10.0 ** (-needs.gain_margin / 20.0) / critical,
-    }
-    name = min(allowed, key=lambda margin: float(allowed[margin].min()))
-    worst = int(allowed[name].argmin())
-    return float(allowed[name][worst]), f"{name} ({loci.names[worst]})"
-
-
-def design_suspension(
-    robot: Robot, loci: Loci, needs: Requirements, *, period: float
-) -> SuspensionGains:
-    """Returns the suspension for the required deflection, frequency and damping ratio.
-
-    The stiffness follows from the deflection under a third of the weight. The frequency is lowered
-    until the loops of stiff legs keep their margins.
-    """
-    stiffness = weight_share(robot) / needs.deflection
-    late = delay_response(delay_steps(needs, period=period), loci.omega, period=period)
-    gains = suspension_gains(stiffness, needs.frequency, needs)
-    for step in range(FREQUENCY_STEPS):
-        gains = suspension_gains(stiffness, needs.frequency * FREQUENCY_FACTOR**step, needs)
-        law = response(sampled_suspension(gains, period=period), loci.omega)[:, 0, 0] * late
-        found = [quick_margins(locus * law, loci.omega) for locus in loci.values]
-        if (
-            min(m.gain for m in found) > needs.gain_margin / SAFETY
-            and min(m.phase for m in found) > needs.phase_margin / SAFETY
-        ):
-            break
-    return gains
-
-
-def suspension_gains(stiffness: float, frequency: float, needs: Requirements) -> SuspensionGains:
-    """Returns the suspension for a stiffness [N/m] and a natural frequency [Hz].
-
-    The damping ratio is that of the requirements.
-    """
-    mass = stiffness / (2.0 * math.pi * frequency) ** 2
-    return SuspensionGains(
-        mass=mass,
-        damping=2.0 * needs.damping_ratio * math.sqrt(stiffness * mass),
-        stiffness=stiffness,
-        limit=needs.deflection_limit,
     )

@@ -4,22 +4,14 @@ controller.
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from functools import lru_cache
 from types import SimpleNamespace
 
 from hexapod_cosim.controller import Controller, Gains, Gait, Parts
 from hexapod_cosim.controller.controller import gains_warnings
-from hexapod_cosim.controller.gains import (
-    TRIPOD_LEGS,
-    HoldGains,
-    LimitGains,
-    PaperSlipGains,
-    SupportGains,
-    SuspensionGains,
-)
-from hexapod_cosim.controller.size import requirements_for
+from hexapod_cosim.controller.gains import HoldGains, SupportGains
+from hexapod_cosim.controller.size import limit_gains, paper_gains, requirements_for, taken
 from hexapod_cosim.cosim.common.components import CONTROLLER
 from hexapod_cosim.cosim.interface.interface import Interface, expand_interface
 from hexapod_cosim.cosim.interface.start_values import parameter_values
@@ -100,47 +92,12 @@ def _build_kinematic(robot: Robot, gait: Gait, period: float) -> None:
 def passive_gains(robot: Robot) -> SimpleNamespace:
     """Returns start values of the gains' parameters for kinematic control, which does not use them.
 
-    The gains of the paper's PID are zero; the other values follow from the requirements.
+    They follow from the requirements.
     """
-    wanted = requirements_for(robot)
-    stiffness = robot.weight / TRIPOD_LEGS / wanted.deflection
-    omega = 2.0 * math.pi * wanted.frequency
-    slip = PaperSlipGains(
-        kp=0.0,
-        ki=0.0,
-        kd=0.0,
-        derivative_time=wanted.filter_time,
-        filter_time=wanted.filter_time,
-        load_time=wanted.load_time,
-        tracking_time=wanted.filter_time,
-        limit=wanted.deflection_limit,
-    )
-    suspension = SuspensionGains(
-        mass=stiffness / omega**2,
-        damping=2.0 * wanted.damping_ratio * stiffness / omega,
-        stiffness=stiffness,
-        limit=wanted.deflection_limit,
-    )
-    hold = HoldGains(
-        attitude_rate=wanted.attitude_rate,
-        height_rate=wanted.height_rate,
-        ground_time=wanted.ground_time,
-        angle_limit=wanted.angle_limit,
-        height_limit=wanted.height_limit,
-        path_rate=wanted.path_rate,
-        speed_limit=wanted.speed_limit,
-        turn_limit=wanted.turn_limit,
-    )
-    support = SupportGains(
-        handover_time=wanted.handover_time,
-        weight_time=wanted.weight_time,
-        load_time=wanted.load_time,
-    )
-    limits = LimitGains(torque=wanted.torque_share * robot.servo.torque_max)
+    needs = requirements_for(robot)
     return SimpleNamespace(
-        support=support,
-        hold=hold,
-        limits=limits,
-        paper_slip=slip,
-        paper_suspension=suspension,
+        support=taken(SupportGains, needs),
+        hold=taken(HoldGains, needs),
+        limits=limit_gains(robot, needs),
+        paper=paper_gains(robot, needs),
     )
