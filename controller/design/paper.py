@@ -81,6 +81,12 @@ def law_matrix(robot: Robot, plant: StandingPlant, gains: PaperGains) -> Array:
     return matrix
 
 
+def scaled(gains: PaperGains, factor: float) -> PaperGains:
+    """Returns gains whose law_matrix() is multiplied by a factor."""
+    shares = ("share", "height_share", "share_limit", "yield_share")
+    return replace(gains, **{name: factor * getattr(gains, name) for name in shares})
+
+
 def delay_steps(needs: Requirements, *, period: float) -> int:
     """Returns the delay from a force to the command that responds to it, in whole periods."""
     return math.ceil(needs.delay_periods - ROUNDING) + math.ceil(
@@ -167,11 +173,5 @@ def design_paper(
         if kept and radius < 1.0:
             break
         binding = f"the margins ({name})"
-        gains = replace(
-            gains,
-            share=BACK_OFF * gains.share,
-            height_share=BACK_OFF * gains.height_share,
-            share_limit=BACK_OFF * gains.share_limit,
-            yield_share=BACK_OFF * gains.yield_share,
-        )
+        gains = scaled(gains, BACK_OFF)
     return PaperDesign(gains=gains, margins=margins, radius=radius, binding=binding)

@@ -1,45 +1,38 @@
-"""Draws figures of the paper's laws: Bode and Nyquist diagrams, responses to shifts, margins.
+"""Draws the loops of the paper's control: Bode and Nyquist diagrams, responses to shifts, margins.
 
-The diagrams show all eigenloci; margins are drawn over delay and load.
+The diagrams show all eigenloci; margins are drawn over delay and over the shares.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-import control
 import numpy as np
 
-from hexapod_cosim.controller.design.closed import disturbed, splay
-from hexapod_cosim.controller.design.laws import Laws, delay, delay_response, delay_steps
-from hexapod_cosim.controller.design.loci import (
-    Loci,
+from hexapod_cosim.controller.design.closed import disturbed, spectral_radius, splay
+from hexapod_cosim.controller.design.loci import Response, critical_size
+from hexapod_cosim.controller.design.paper import (
+    PaperLoops,
     Plants,
-    Response,
-    all_loci,
-    critical_size,
-    frequencies,
-    quick_margins,
+    closed_loop,
+    scaled,
+    shifted,
 )
-from hexapod_cosim.controller.design.paper import paper_loci, paper_loop, shifted
 from hexapod_cosim.controller.design.standing import StandingPlant, weight_share
 from hexapod_cosim.controller.figure_style import DPI, PALETTE, SETTINGS, UNDATED, WIDTH
 from hexapod_cosim.controller.gains import Gains, GainsError
 from hexapod_cosim.controller.plane import Array
 from hexapod_cosim.models import Robot
 
-DRAWN = 200  # frequencies
-STEP_TIME = 0.6  # s    shown of an answer
+STEP_TIME = 0.6  # s    shown of a response
 SHIFT = 0.001  # m    of the feet
 MOST_DELAY, DELAYS = 0.05, 21  # s    further delay shown, and in how many points
-DECIBELS = (-40.0, 30.0)
-SCALES = (40.0, 180.0)  # dB, deg    ends of the margins' scales
+FACTORS = np.linspace(0.5, 2.0, 16)  # 1    on the shares
+DECIBELS = (-40.0, 10.0)
 COLOURS = {"worst": PALETTE[3], "others": "0.75", "asked": PALETTE[0], "without": PALETTE[1]}
-LAWS = {"tangential PID": (PALETTE[2], "o"), "suspension": (PALETTE[4], "s")}
-TITLES = tuple(LAWS)
-NAMES = ("bode", "nyquist", "step", "margins")
 
 
 def plot_design(robot: Robot, gains: Gains, plants: Plants, directory: str | Path) -> list[Path]:
@@ -56,30 +49,22 @@ def plot_design(robot: Robot, gains: Gains, plants: Plants, directory: str | Pat
             expected=gains.robot_hash[:12],
             fix=fix,
         )
-    laws = Laws(
-        slip=gains.paper_slip,
-        suspension=gains.paper_suspension,
-        period=gains.period,
-        delays=delay_steps(gains.requirements, period=gains.period),
-    )
-    loci = all_loci(robot, plants, frequencies(gains.period, DRAWN), of=paper_loci)
-    loops = [one.values * law for one, law in zip(loci, laws.responses(loci[0].omega), strict=True)]
+    loops = PaperLoops(robot, plants, gains.requirements, period=gains.period)
+    loci = np.concatenate([loops.loci(name, gains.paper) for name in plants])
     from matplotlib import rc_context  # noqa: PLC0415  slow to import
 
     folder = Path(directory)
     try:
         folder.mkdir(parents=True, exist_ok=True)
         with rc_context(SETTINGS):
-            figures = (
-                _bode(loops, loci[0].omega, gains),
-                _nyquist(loops, loci[0].omega, gains),
-                _step(robot, plants, laws, gains),
-                _margins(robot, plants, loci, loops, gains),
-            )
+            figures = {
+                "bode": _bode(loci, loops.omega, gains),
+                "nyquist": _nyquist(loci, gains),
+                "step": _step(loops, gains),
+                "margins": _margins(loci, loops, gains),
+            }
             return [
-                path
-                for name, figure in zip(NAMES, figures, strict=True)
-                for path in _save(figure, folder, name)
+                path for name, figure in figures.items() for path in _save(figure, folder, name)
             ]
     except OSError as error:
         raise GainsError(
@@ -117,124 +102,91 @@ def _legend_below(figure: Any, *of: Any) -> None:
     figure.legend(list(found.values()), list(found), loc="outside lower center", ncols=len(found))
 
 
-def _each(loops: Response, draw: Callable[..., Any]) -> None:
+def _each(loci: Response, draw: Callable[..., Any]) -> None:
     """Draws all loci; the one that comes nearest to -1 is drawn last, on top."""
-    worst = int(np.abs(1.0 + loops).min(axis=1).argmin())
-    for k, loop in enumerate(loops):
+    worst = int(np.abs(1.0 + loci).min(axis=1).argmin())
+    for k, locus in enumerate(loci):
         if k != worst:
-            draw(loop, color=COLOURS["others"], lw=0.5, label="_")
-    draw(loops[worst], color=COLOURS["worst"], lw=1.4, label="nearest to -1")
+            draw(locus, color=COLOURS["others"], lw=0.5, label="_")
+    draw(loci[worst], color=COLOURS["worst"], lw=1.4, label="nearest to -1")
 
 
-def _bode(loops: list[Response], omega: Array, gains: Gains) -> Any:
-    figure, grid = _figure(2, 2, gains, sharex=True)
+def _bode(loci: Response, omega: Array, gains: Gains) -> Any:
+    figure, ((size,), (angle,)) = _figure(2, 1, gains, sharex=True)
     needs = gains.requirements
-    for (size, angle), all_of, title in zip(grid.T, loops, TITLES, strict=True):
-        _each(
-            all_of,
-            lambda loop, axes=size, **style: axes.semilogx(
-                omega, 20.0 * np.log10(np.abs(loop)), **style
-            ),
-        )
-        _each(
-            all_of, lambda loop, axes=angle, **style: axes.semilogx(omega, _degrees(loop), **style)
-        )
-        size.axhline(0.0, color="k", lw=0.6)
-        size.axhline(
-            -needs.gain_margin,
-            color=COLOURS["asked"],
-            ls="--",
-            lw=1.0,
-            label=f"gain margin asked: {needs.gain_margin:g} dB",
-        )
-        angle.axhline(-180.0, color="k", lw=0.6)
-        label = f"phase margin asked: {needs.phase_margin:g} deg"
-        angle.axhline(
-            needs.phase_margin - 180.0, color=COLOURS["asked"], ls="--", lw=1.0, label=label
-        )
-        size.set(title=f"loops of the {title}", ylabel="gain [dB]", ylim=DECIBELS)
-        angle.set(
-            xlabel="frequency [rad/s]",
-            ylabel="phase [deg]",
-            ylim=(-540.0, 180.0),
-            yticks=range(-540, 181, 90),
-        )
-    _legend_below(figure, *grid[:, 0])
+    _each(loci, lambda locus, **how: size.semilogx(omega, 20.0 * np.log10(np.abs(locus)), **how))
+    _each(
+        loci,
+        lambda locus, **how: angle.semilogx(omega, np.degrees(np.unwrap(np.angle(locus))), **how),
+    )
+    for axes, limit, asked, label in (
+        (size, 0.0, -needs.gain_margin, f"gain margin asked: {needs.gain_margin:g} dB"),
+        (
+            angle,
+            -180.0,
+            needs.phase_margin - 180.0,
+            f"phase margin asked: {needs.phase_margin:g} deg",
+        ),
+    ):
+        axes.axhline(limit, color="k", lw=0.6)
+        axes.axhline(asked, color=COLOURS["asked"], ls="--", lw=1.0, label=label)
+    size.set(ylabel="gain [dB]", ylim=DECIBELS)
+    angle.set(
+        xlabel="frequency [rad/s]",
+        ylabel="phase [deg]",
+        ylim=(-540.0, 180.0),
+        yticks=range(-540, 181, 180),
+    )
+    _legend_below(figure, size, angle)
     return figure
 
 
-def _degrees(loop: Response) -> Array:
-    return np.degrees(np.unwrap(np.angle(loop)))
-
-
-def _nyquist(loops: list[Response], omega: Array, gains: Gains) -> Any:
-    figure, grid = _figure(1, 2, gains)
+def _nyquist(loci: Response, gains: Gains) -> Any:
+    figure, ((axes,),) = _figure(1, 1, gains)
     figure.set_figheight(4.4)
     needs, turn = gains.requirements, np.linspace(0.0, 2.0 * np.pi, 200)
-    edge = np.radians(needs.phase_margin)
-    for axes, all_of, title in zip(grid[0], loops, TITLES, strict=True):
-        _each(all_of, lambda loop, axes=axes, **style: axes.plot(loop.real, loop.imag, **style))
-        axes.plot(np.cos(turn), np.sin(turn), color="k", lw=0.5)
-        arc = np.pi + np.linspace(-edge, edge, 60)
-        axes.plot(
-            np.cos(arc),
-            np.sin(arc),
-            color=COLOURS["asked"],
-            lw=2.0,
-            label="margins asked: not through here",
-        )
-        axes.plot(
-            [-1.0, -(10.0 ** (-needs.gain_margin / 20.0))],
-            [0.0, 0.0],
-            color=COLOURS["asked"],
-            lw=2.0,
-        )
-        axes.plot([-1.0], [0.0], "k+", ms=10)
-        axes.set(
-            title=f"loops of the {title}",
-            xlabel="real part [1]",
-            ylabel="imaginary part [1]",
-            aspect="equal",
-        )
-        axes.set(xlim=(-1.6, 1.6), ylim=(-1.6, 1.6), xticks=range(-1, 2), yticks=range(-1, 2))
-    _legend_below(figure, grid[0, 0])
+    edge = math.radians(needs.phase_margin)
+    arc = np.pi + np.linspace(-edge, edge, 60)
+    _each(loci, lambda locus, **how: axes.plot(locus.real, locus.imag, **how))
+    axes.plot(np.cos(turn), np.sin(turn), color="k", lw=0.5)
+    asked = {"color": COLOURS["asked"], "lw": 2.0}
+    axes.plot(np.cos(arc), np.sin(arc), label="margins asked: not through here", **asked)
+    axes.plot([-1.0, -(10.0 ** (-needs.gain_margin / 20.0))], [0.0, 0.0], **asked)
+    axes.plot([-1.0], [0.0], "k+", ms=10)
+    axes.set(xlabel="real part [1]", ylabel="imaginary part [1]", aspect="equal")
+    axes.set(xlim=(-1.3, 1.3), ylim=(-1.3, 1.3), xticks=range(-1, 2), yticks=range(-1, 2))
+    _legend_below(figure, axes)
     return figure
 
 
 def _nominal(robot: Robot, plants: Plants) -> StandingPlant:
     """Returns the plant on the most legs whose mean load is nearest to a third of the weight."""
-    most = max(plant.standing.sum() for plant in plants.values())
-    return min(
-        (plant for plant in plants.values() if plant.standing.sum() == most),
-        key=lambda p: abs(p.load(robot).mean() - 1.0),
-    )
+    return min(plants.values(), key=lambda p: (-p.standing.sum(), abs(p.load(robot).mean() - 1.0)))
 
 
-def _step(robot: Robot, plants: Plants, laws: Laws, gains: Gains) -> Any:
-    figure, (row,) = _figure(1, 3, gains)
-    plant = _nominal(robot, plants)
-    with_laws, without = paper_loop(robot, plant, laws), shifted(robot, plant)
+def _step(loops: PaperLoops, gains: Gains) -> Any:
+    """Draws the forces on feet that are spread, and on a foot on a bump, with and without law."""
+    figure, (row,) = _figure(1, 2, gains)
+    robot, plant = loops.robot, _nominal(loops.robot, loops.plants)
     spread, share = splay(robot, plant), weight_share(robot)
     bump = np.zeros(len(spread))
-    bump[2] = -SHIFT
+    bump[2] = -1.0
     for system, label, colour, dashes in (
-        (without, "without the laws", COLOURS["without"], "--"),
-        (with_laws, "with both laws", COLOURS["worst"], "-"),
+        (shifted(robot, plant), "without the law", COLOURS["without"], "--"),
+        (
+            closed_loop(robot, plant, gains.paper, delays=loops.delays),
+            "with the law",
+            COLOURS["worst"],
+            "-",
+        ),
     ):
-        time, forces = disturbed(system, SHIFT * spread, duration=STEP_TIME)
-        row[0].step(
-            time, -spread @ forces / share, where="post", color=colour, ls=dashes, label=label
-        )
-        time, forces = disturbed(system, bump, duration=STEP_TIME)
-        row[1].step(time, forces[2] / share, where="post", color=colour, ls=dashes, label=label)
-    late = laws.systems[1] * delay(laws.delays, period=laws.period)
-    deflection = np.asarray(control.forced_response(late, time, forces[2][None]).outputs)
-    row[2].step(
-        time, 1e3 * deflection.reshape(-1), where="post", color=COLOURS["worst"], label="suspension"
-    )
+        for axes, shift in zip(row, (spread, bump), strict=True):
+            time, forces = disturbed(system, SHIFT * shift, duration=STEP_TIME)
+            axes.step(
+                time, -shift @ forces / share, where="post", color=colour, ls=dashes, label=label
+            )
     row[0].set(title=f"feet spread by {1e3 * SHIFT:g} mm", ylabel="squeeze [weight / 3]")
     row[1].set(title=f"a foot on a bump of {1e3 * SHIFT:g} mm", ylabel="excess load [weight / 3]")
-    row[2].set(title="the same bump", ylabel="suspension's deflection [mm]")
     for axes in row:
         axes.axhline(0.0, color="k", lw=0.6)
         axes.set(xlabel="time [s]")
@@ -242,57 +194,30 @@ def _step(robot: Robot, plants: Plants, laws: Laws, gains: Gains) -> Any:
     return figure
 
 
-def _margins(
-    robot: Robot, plants: Plants, loci: tuple[Loci, Loci], loops: list[Response], gains: Gains
-) -> Any:
-    """Draws the least margins of all loops over further delay, and over the load."""
-    figure, grid = _figure(2, 2, gains, sharey="row", sharex="col")
-    needs, load = (
-        gains.requirements,
-        {name: round(float(plant.load(robot).mean()), 2) for name, plant in plants.items()},
+def _margins(loci: Response, loops: PaperLoops, gains: Gains) -> Any:
+    """Draws the least gain margin over further delay, and the poles over the shares."""
+    figure, ((late, more),) = _figure(1, 2, gains)
+    colour, needs = COLOURS["worst"], gains.requirements
+    delays = np.linspace(0.0, MOST_DELAY, DELAYS)
+    sizes = [critical_size(loci * np.exp(-1j * loops.omega * delay)).max() for delay in delays]
+    late.plot(1e3 * delays, -20.0 * np.log10(sizes), color=colour, marker="o", ms=3, lw=1.0)
+    late.axhline(
+        needs.gain_margin, color=COLOURS["asked"], ls="--", lw=1.0, label="asked without it"
     )
-    delays, loads, omega = (
-        np.linspace(0.0, MOST_DELAY, DELAYS),
-        sorted(set(load.values())),
-        loci[0].omega,
-    )
-    for all_of, one, (title, (colour, marker)) in zip(loops, loci, LAWS.items(), strict=True):
-        late = [
-            _least(all_of * delay_response(1, omega, period=float(more)), omega) for more in delays
-        ]
-        borne = [
-            _least(all_of[[load[name] == value for name in one.names]], omega) for value in loads
-        ]
-        for column, x, found in ((0, 1e3 * delays, late), (1, loads, borne)):
-            for axes, values in zip(grid[:, column], np.array(found).T, strict=True):
-                axes.plot(
-                    x, values, color=colour, marker=marker, ms=3, lw=1.0, clip_on=False, label=title
-                )
-    for axes, asked, label in zip(
-        grid,
-        (needs.gain_margin, needs.phase_margin),
-        ("gain margin [dB]", "phase margin [deg]"),
-        strict=True,
-    ):
-        axes[0].set(ylabel=label)
-        for one_of in axes:
-            one_of.axhline(asked, color=COLOURS["asked"], ls="--", lw=1.0, label="asked for")
-            one_of.axhline(0.0, color="k", lw=0.6)
-    grid[1, 0].set(xlabel="further delay [ms]", title=f"{SCALES[1]:g} deg: no crossing")
-    grid[1, 1].set(xlabel="mean load of the standing feet [weight / 3]")
-    figure.align_ylabels(grid[:, 0])
-    _legend_below(figure, grid[0, 0])
+    late.axhline(0.0, color="k", lw=0.6)
+    late.set(xlabel="further delay [ms]", ylabel="gain margin [dB]")
+    margins, name = loops.worst(gains.paper)
+    plant, critical = loops.plants[name], 10.0 ** (margins.gain / 20.0)
+    radii = [
+        spectral_radius(
+            closed_loop(loops.robot, plant, scaled(gains.paper, factor), delays=loops.delays),
+            feet=int(plant.standing.sum()),
+        )
+        for factor in FACTORS
+    ]
+    more.plot(FACTORS, radii, color=colour, marker="o", ms=3, lw=1.0, label="worst plant")
+    more.axvline(critical, color=COLOURS["without"], ls="--", lw=1.0, label="by the gain margin")
+    more.axhline(1.0, color="k", lw=0.6)
+    more.set(xlabel="factor on the shares [1]", ylabel="spectral radius [1]")
+    _legend_below(figure, late, more)
     return figure
-
-
-def _least(loops: Response, omega: Array) -> tuple[float, float]:
-    """Returns the least gain [dB] and phase [deg] margins of loops; negative: unstable.
-
-    Without a crossing it is the end of the figure's scale.
-    """
-    critical, phase = (
-        float(critical_size(loops).max()),
-        min(quick_margins(loop, omega).phase for loop in loops),
-    )
-    gain = -20.0 * np.log10(critical) if critical else np.inf
-    return min(float(gain), SCALES[0]), float(np.copysign(min(phase, SCALES[1]), gain))

@@ -195,13 +195,13 @@ def _show_design(gains: Gains, deviation: float) -> None:
 
 def design_rows(gains: Gains) -> list[tuple[str, str, str]]:
     """Returns the rows of the table of requirements: name, required value, reached value."""
-    needs, reached, spring = gains.requirements, gains.margins, gains.paper_suspension
-    frequency = math.sqrt(spring.stiffness / spring.mass) / (2.0 * math.pi)
+    needs, reached, paper = gains.requirements, gains.margins, gains.paper
     rows = (
         ("phase margin, paper [deg]", f">= {needs.phase_margin:g}", reached.paper_phase_margin),
         ("gain margin, paper [dB]", f">= {needs.gain_margin:g}", reached.paper_gain_margin),
-        ("frequency, suspension of paper [Hz]", f"<= {needs.frequency:g}", frequency),
         ("spectral radius, paper, all feet [1]", "< 1", reached.paper_spectral_radius),
+        ("share taken back, along the ground [1]", f"<= {needs.share:g}", paper.share),
+        ("share taken back, upwards [1]", f"<= {needs.height_share:g}", paper.height_share),
         (
             "torque of a standing tripod's servo [N m]",
             f"<= {gains.limits.torque:g}",

@@ -50,7 +50,7 @@ from hexapod_cosim.cosim.cli import main
             ["not an address of a scheduler", "got 'localhost'", "tcp://HOST:8786"],
         ),
         (
-            ["benchmark", "--control", "kinematic", "--without", "slip_pid"],
+            ["benchmark", "--control", "kinematic", "--without", "posture"],
             ["--without: ", "got 'kinematic'", "add --control compliant"],
         ),
         (["design", "--set", "phase_margin=500"], ["got 500", "< 180 [deg]", "phase_margin=50"]),

@@ -223,7 +223,7 @@ EVERYTHING = [
     "events=[{time=1, leg='LM', fault='stuck'}, "
     "{time=2, leg='RF', fault='dead', duration='20 ms'}, {time=3, duration=1, force=[1, 2, 3]}]",
     "sensors.foot_force_delay=7 ms",
-    "compliance.slip_pid=false",
+    "compliance.paper_pid=false",
     "variation.attitude=1 deg",
     "variation.command_delay=50 ms",
 ]
@@ -237,7 +237,7 @@ def test_faults_delays_switches_and_variations_are_read_and_written() -> None:
     ]
     assert [event.force for event in scenario.pushes] == [(1.0, 2.0, 3.0)]
     assert scenario.sensors.foot_force_delay == 0.007
-    assert scenario.compliance == Parts(slip_pid=False)
+    assert scenario.compliance == Parts(paper_pid=False)
     assert scenario.variation == Variation(attitude=math.radians(1.0), command_delay=0.05)
     assert (
         scenario_from_table(tomllib.loads(tomlkit.dumps(scenario.to_table())), where=scenario.where)
@@ -329,11 +329,11 @@ MISTAKES = {
     "events=[3]": ["events[0]", "got 3", "table"],
     "sensors.foot_force_delay=-0.01": ["foot_force_delay", ">= 0"],
     "sensors.foot_force_delay=10 mm": ["foot_force_delay", "'10 mm'", "ms"],
-    "compliance.slip_pd=false": ["compliance", "did you mean 'slip_pid'"],
-    "compliance.slip_pid=0": ["compliance.slip_pid", "got 0", "true or false"],
-    "complaince.slip_pid=false": [
-        "--set complaince.slip_pid: ",
-        "did you mean 'compliance.slip_pid'",
+    "compliance.paper_pd=false": ["compliance", "did you mean 'paper_pid'"],
+    "compliance.paper_pid=0": ["compliance.paper_pid", "got 0", "true or false"],
+    "complaince.paper_pid=false": [
+        "--set complaince.paper_pid: ",
+        "did you mean 'compliance.paper_pid'",
     ],
     "compliance=3": ["compliance", "got 3", "table"],
     "variation.height=-1 mm": ["variation.height", ">= 0"],

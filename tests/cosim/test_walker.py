@@ -184,7 +184,7 @@ def test_a_study_may_bring_its_own_fmus(tmp_path: Path) -> None:
         setup,
         gains=None,
         gait=replace(setup.gait, period=2.0),
-        parts=replace(setup.parts, slip_pid=False),
+        parts=replace(setup.parts, paper_pid=False),
     )
     plant, controller = (
         export_fmu(load_robot("athena"), tmp_path / "a.fmu"),

@@ -142,15 +142,15 @@ def test_a_sweep_rises_and_differs_in_the_height_alone() -> None:
 
 
 def test_an_entry_switches_its_part_off_and_no_other() -> None:
-    reference, last, without = read_entries(["kinematic", "compliant"], ["slip_pid"])
+    reference, last, without = read_entries(["kinematic", "compliant"], ["posture"])
     assert [reference.label, last.label, without.label] == [
         "kinematic",
         "compliant",
-        "without slip_pid",
+        "without posture",
     ]
     base = JUDGED.cases[0].scenario
     assert last.scenario(base).compliance == base.compliance
-    assert without.scenario(base).compliance == replace(base.compliance, slip_pid=False)
+    assert without.scenario(base).compliance == replace(base.compliance, posture=False)
     assert without.scenario(base).control == "compliant"
 
 

@@ -100,7 +100,7 @@ def test_an_interrupt_writes_the_table_of_the_completed_runs(
 @pytest.mark.parametrize(
     ("words", "parts"),
     [
-        (["--without", "slip"], ["unknown part", "slip_pid"]),
+        (["--without", "paper_pd"], ["unknown part", "paper_pid"]),
         (["--control", "kinematc"], ["unknown control", "kinematic"]),
         ([*KINEMATIC, *KINEMATIC], ["two controls with one label"]),
         (["--split", "train"], ["unknown split", "judge"]),

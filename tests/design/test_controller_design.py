@@ -16,42 +16,34 @@ import pytest
 from hexapod_cosim.controller import (
     Gains,
     GainsError,
+    LegSolver,
     Requirements,
-    SuspensionGains,
     load_gains,
+    make_gait,
     save_gains,
 )
+from hexapod_cosim.controller.comply.paper import Paper, Step
 from hexapod_cosim.controller.controller import gains_warnings
 from hexapod_cosim.controller.design import StandingPlant, design_gains, plot_design
 from hexapod_cosim.controller.design.closed import FREE_COORDINATES, disturbed, spectral_radius
-from hexapod_cosim.controller.design.laws import (
-    Laws,
-    delay,
-    delay_response,
+from hexapod_cosim.controller.design.loci import critical_size, loop_margins, response
+from hexapod_cosim.controller.design.paper import (
+    PaperLoops,
+    closed_loop,
     delay_steps,
-    sampled_slip_law,
-    slip_law,
-    slip_response,
+    late_filter,
+    law_matrix,
+    scaled,
+    shifted,
 )
-from hexapod_cosim.controller.design.loci import (
-    all_loci,
-    critical_size,
-    frequencies,
-    loop_margins,
-    quick_margins,
-    response,
-)
-from hexapod_cosim.controller.design.paper import paper_loci, paper_loop, shifted
-from hexapod_cosim.controller.design.standing import axes_of
+from hexapod_cosim.controller.parts import Parts
 from hexapod_cosim.cosim.design.design import design_for, read_requirements, standing_plants
 from hexapod_cosim.models import load_robot
 
 PERIOD = 0.005  # s
 ROBOTS = ("athena", "phantomx_mk4")
-MARGIN_ERROR = (0.3, 1.0)  # dB, deg    between two interpolations of a frequency grid
 NOMINAL = "tripod LF LR RM, load 1, gears slip"
-AT_ONE = 1e-4  # 1    ninefold eigenvalues are found to 3e-6, the next are 2e-2 away
-FINE = 400  # frequencies
+AT_ONE = 1e-4  # 1    ninefold eigenvalues are found to 3e-6, the next are further away
 pytestmark = pytest.mark.usefixtures("plant_build")
 
 
@@ -65,17 +57,17 @@ def designed(name: str) -> Gains:
     return design_gains(load_robot(name), PERIOD, plants=plants_of(name))
 
 
-def laws_of(gains: Gains) -> Laws:
-    delays = delay_steps(gains.requirements, period=gains.period)
-    return Laws(
-        slip=gains.paper_slip, suspension=gains.paper_suspension, period=gains.period, delays=delays
+def redesigned(**given: float) -> Gains:
+    """Returns gains of athena with other requirements."""
+    needs = Requirements(**given)
+    return design_gains(
+        load_robot("athena"), PERIOD, plants=plants_of("athena"), requirements=needs
     )
 
 
-def scaled(gains: Gains, by: float) -> Gains:
-    slip = gains.paper_slip
-    slip = replace(slip, kp=by * slip.kp, ki=by * slip.ki, kd=by * slip.kd)
-    return replace(gains, paper_slip=slip)
+def loops_of(gains: Gains, **given: float) -> PaperLoops:
+    needs = replace(gains.requirements, **given)
+    return PaperLoops(load_robot(gains.robot), plants_of(gains.robot), needs, period=PERIOD)
 
 
 @pytest.fixture(scope="module", params=ROBOTS)
@@ -84,161 +76,125 @@ def gains(request: pytest.FixtureRequest, plant_build: Path) -> Gains:
 
 
 def test_every_loop_of_every_plant_keeps_the_margins_asked_for(gains: Gains) -> None:
-    omega = frequencies(PERIOD, FINE)
-    for loci, law in zip(
-        all_loci(load_robot(gains.robot), plants_of(gains.robot), omega, of=paper_loci),
-        laws_of(gains).responses(omega),
-        strict=True,
-    ):
-        for locus in loci.values:
-            found = quick_margins(locus * law, omega)
+    loops = loops_of(gains)
+    for name in plants_of(gains.robot):
+        for locus in loops.loci(name, gains.paper):
+            found = loop_margins(locus, loops.omega)
             assert found.gain >= gains.requirements.gain_margin
             assert found.phase >= gains.requirements.phase_margin
 
 
-def test_the_quick_margins_are_python_controls(gains: Gains) -> None:
-    omega = frequencies(PERIOD, 2 * FINE)
-    for loci, law in zip(
-        paper_loci(load_robot(gains.robot), plants_of(gains.robot)[NOMINAL], omega),
-        laws_of(gains).responses(omega),
-        strict=True,
-    ):
-        for locus in loci:
-            mine, theirs = quick_margins(locus * law, omega), loop_margins(locus * law, omega)
-            for name, error in zip(("gain", "phase"), MARGIN_ERROR, strict=True):
-                assert (
-                    getattr(mine, name) == getattr(theirs, name)
-                    or abs(getattr(mine, name) - getattr(theirs, name)) < error
-                )
-            assert mine.crossover == pytest.approx(theirs.crossover, rel=0.02)
-            assert mine.delay == pytest.approx(theirs.delay, rel=0.02)
-
-
 def test_margins_of_a_loop_known_in_closed_form() -> None:
-    """The loop k / s with a delay T has crossover k and phase margin 90 deg - k T.
-
-    Its gain margin is pi / (2 k T) and its delay margin (pi/2)/k - T.
-    """
+    """The loop k / s with a delay T has phase margin 90 deg - k T and gain margin pi / (2 k T)."""
     k, late, omega = 10.0, 0.02, np.geomspace(0.1, 300.0, 600)
     loop = k / (1j * omega) * np.exp(-1j * omega * late)
-    for found in (quick_margins(loop, omega), loop_margins(loop, omega)):
-        assert found.crossover == pytest.approx(k, rel=1e-3)
-        assert found.phase == pytest.approx(90.0 - np.degrees(k * late), rel=1e-3)
-        assert found.gain == pytest.approx(20.0 * np.log10(np.pi / (2.0 * k * late)), rel=1e-2)
-        assert found.delay == pytest.approx(np.pi / 2.0 / k - late, rel=2e-3)
+    found = loop_margins(loop, omega)
+    assert found.phase == pytest.approx(90.0 - np.degrees(k * late), rel=1e-3)
+    assert found.gain == pytest.approx(20.0 * np.log10(np.pi / (2.0 * k * late)), rel=1e-2)
+    assert critical_size(loop[None])[0] == pytest.approx(2.0 * k * late / np.pi, rel=1e-2)
 
 
 def test_the_eigenloci_are_the_characteristic_function_of_all_feet(gains: Gains) -> None:
-    """det(1 - l P) over all feet is the product of all 1 + l locus, for any l."""
+    """det(1 - P M F) over all feet, with law matrix M and filter F, is the product of 1 + locus."""
+    robot, plant, loops = load_robot(gains.robot), plants_of(gains.robot)[NOMINAL], loops_of(gains)
+    matrix = law_matrix(robot, plant, gains.paper)
+    late = late_filter(gains.paper, period=PERIOD, delays=loops.delays)
+    loci = loops.loci(NOMINAL, gains.paper)
+    for k in (0, 80, 150):
+        z = np.exp(1j * loops.omega[k] * PERIOD)
+        whole = control.evalfr(shifted(robot, plant), z) @ matrix * control.evalfr(late, z)
+        expected = np.linalg.det(np.eye(9) - whole)
+        assert np.prod(1.0 + loci[:, k]) == pytest.approx(expected, rel=1e-6)
+
+
+def test_the_law_of_the_design_is_the_one_that_runs(gains: Gains) -> None:
+    """A change of steady forces shifts the standing feet as the design's matrix says."""
     robot, plant = load_robot(gains.robot), plants_of(gains.robot)[NOMINAL]
-    omega, (flat, _) = np.array([1.0, 30.0, 200.0]), axes_of(3)
-    whole = response(shifted(robot, plant), omega)[:, flat][:, :, flat]
-    for law in (1e-4, (2.0 - 3.0j) * 1e-4):
-        expected = np.linalg.det(np.eye(6) - law * whole)
-        found = np.prod(1.0 + law * paper_loci(robot, plant, omega)[0], axis=0)
-        np.testing.assert_allclose(found, expected, rtol=1e-9)
+    legs, gait = LegSolver(robot), replace(make_gait(robot), duty=0.5)
+    planned = legs.forward(plant.angle)
+    pose = legs.pose(planned[:, 0] + 1j * planned[:, 1], planned[:, 2])
+    change = np.random.default_rng(1).standard_normal((6, 3)) * plant.standing[:, None]
+
+    def shifts(force: np.ndarray) -> np.ndarray:
+        law = Paper(robot, gait, gains, Parts(), legs=legs, period=PERIOD)
+        step = Step(pose, planned, np.zeros(6), np.zeros(6), ~plant.standing, plant.angle, force)
+        for _ in range(40):
+            law.step(step)
+        return np.column_stack([law.shift.real, law.shift.imag, law.lift])[plant.standing]
+
+    found = shifts(plant.force + change) - shifts(plant.force)
+    expected = law_matrix(robot, plant, gains.paper) @ change[plant.standing].reshape(-1)
+    np.testing.assert_allclose(found.reshape(-1), expected, rtol=1e-6, atol=1e-9)
 
 
-def test_all_feet_and_both_laws_together_are_stable(gains: Gains) -> None:
-    robot, laws = load_robot(gains.robot), laws_of(gains)
+def test_all_feet_together_are_stable(gains: Gains) -> None:
+    robot, delays = load_robot(gains.robot), loops_of(gains).delays
     for name, plant in plants_of(gains.robot).items():
         feet = int(plant.standing.sum())
-        loop = paper_loop(robot, plant, laws)
+        loop = closed_loop(robot, plant, gains.paper, delays=delays)
         assert spectral_radius(loop, feet=feet) < 1.0, name
         held = np.abs(np.linalg.eigvals(loop.A) - 1.0) < AT_ONE
         # what nothing holds is exactly 1, and nothing else is
-        assert held.sum() == FREE_COORDINATES + 2 * feet
+        assert held.sum() == FREE_COORDINATES + 2 * feet, name
 
 
-def test_the_gain_margin_is_where_the_closed_loop_becomes_unstable(gains: Gains) -> None:
-    """Compares the generalised Nyquist criterion with the eigenvalues of the loop without the
-    suspension.
-    """
-    robot, name = load_robot(gains.robot), "six legs, load 2, gears slip"
-    plant, omega = plants_of(gains.robot)[name], frequencies(PERIOD, FINE)
-    critical = (
-        1.0
-        / critical_size(
-            paper_loci(robot, plant, omega)[0] * laws_of(gains).responses(omega)[0]
-        ).max()
-    )
-    spring = gains.paper_suspension
-    rigid = replace(
-        gains,
-        paper_suspension=SuspensionGains(
-            limit=1.0,
-            **{key: 1e6 * getattr(spring, key) for key in ("mass", "damping", "stiffness")},
-        ),
-    )
-    for by, stable in ((0.97 * critical, True), (1.03 * critical, False)):
-        radius = spectral_radius(paper_loop(robot, plant, laws_of(scaled(rigid, by))), feet=6)
-        assert (radius < 1.0) is stable
+def test_the_gain_margin_is_where_the_closed_loops_become_unstable(gains: Gains) -> None:
+    """The eigenvalues of the whole loops agree with the margin on their frequency responses."""
+    loops = loops_of(gains)
+    critical = 10.0 ** (gains.margins.paper_gain_margin / 20.0)
+    assert loops.radius(scaled(gains.paper, 0.97 * critical)) < 1.0
+    assert loops.radius(scaled(gains.paper, 1.03 * critical)) > 1.0
 
 
-def test_the_design_uses_the_margin_it_has(gains: Gains) -> None:
-    """A gain larger by a tenth violates the margin that is reported as binding."""
-    omega = frequencies(PERIOD, FINE)
-    law, needs = laws_of(scaled(gains, 1.1)).responses(omega)[0], gains.requirements
-    margin, name = gains.margins.binding.removesuffix(")").split(" (", 1)
-    found = [
-        quick_margins(locus * law, omega)
-        for locus in paper_loci(load_robot(gains.robot), plants_of(gains.robot)[name], omega)[0]
-    ]
-    least = min(m.gain for m in found) if margin == "gain_margin" else min(m.phase for m in found)
-    assert least < getattr(needs, margin)
-
-
-def test_less_delay_or_less_margin_allows_more_integral_action() -> None:
-    robot, plants = load_robot("athena"), plants_of("athena")
-    for needs in (
-        Requirements(force_delay=0.0),
-        Requirements(delay_periods=0.0),
-        Requirements(phase_margin=40.0, gain_margin=5.0),
-    ):
-        assert (
-            design_gains(robot, PERIOD, plants=plants, requirements=needs).paper_slip.ki
-            > 1.1 * designed("athena").paper_slip.ki
-        )
-
-
-def test_the_laws_closed_form_response_is_its_systems(gains: Gains) -> None:
-    omega = frequencies(PERIOD, FINE)
-    system = sampled_slip_law(gains.paper_slip, period=PERIOD)
+def test_gains_scaled_by_a_factor_scale_the_law_and_the_loci(gains: Gains) -> None:
+    robot, plant, loops = load_robot(gains.robot), plants_of(gains.robot)[NOMINAL], loops_of(gains)
+    twice = scaled(gains.paper, 2.0)
     np.testing.assert_allclose(
-        slip_response(gains.paper_slip, omega, period=PERIOD),
-        response(system, omega)[:, 0, 0],
-        rtol=1e-6,
+        law_matrix(robot, plant, twice), 2.0 * law_matrix(robot, plant, gains.paper), rtol=1e-12
     )
-    assert response(system, omega)[40, 0, 0] == pytest.approx(
-        control.evalfr(system, np.exp(1j * omega[40] * PERIOD)), rel=1e-9
+    assert loops.worst(gains.paper)[0].gain - loops.worst(twice)[0].gain == pytest.approx(
+        20.0 * np.log10(2.0), abs=0.01
     )
-    late = delay(3, period=PERIOD)
-    np.testing.assert_allclose(
-        delay_response(3, omega, period=PERIOD), response(late, omega)[:, 0, 0], rtol=1e-9
-    )
-    slow = np.array([1.0, 3.0])
-    s = [slip_law(gains.paper_slip)(1j * w) for w in slow]
-    # at 1 % of the Nyquist frequency
-    np.testing.assert_allclose(slip_response(gains.paper_slip, slow, period=PERIOD), s, rtol=1e-3)
 
 
-def test_the_law_is_the_difference_equations_that_run() -> None:
-    """Filter, integral and derivative are discretised by Tustin, each with its own last value."""
-    gains, h = replace(designed("athena").paper_slip, kp=0.7, kd=0.003), PERIOD
+def test_a_larger_margin_makes_the_shares_smaller_and_a_smaller_one_no_larger_than_asked() -> None:
+    usual, wide = designed("athena").paper, redesigned(gain_margin=8.0)
+    assert wide.margins.paper_gain_margin >= 8.0
+    assert wide.margins.binding.startswith("the margins (")
+    assert 0.6 < wide.paper.share / usual.share < 0.8  # 8 dB beside 5.6 dB
+    assert wide.paper.height_share / usual.height_share == pytest.approx(
+        wide.paper.share / usual.share
+    )
+    narrow = redesigned(gain_margin=3.0)
+    assert narrow.paper == usual
+    assert narrow.margins.binding == "the shares asked for"
+
+
+def test_forces_delayed_by_30_ms_keep_the_loops_stable(gains: Gains) -> None:
+    late = loops_of(gains, force_delay=0.030)
+    assert late.delays == 7
+    assert 4.0 < late.worst(gains.paper)[0].gain < gains.margins.paper_gain_margin
+    assert late.radius(gains.paper) < 1.0
+
+
+def test_the_late_filter_smooths_a_delayed_force_as_the_controller_does() -> None:
+    gains = designed("athena").paper
     force = np.random.default_rng(2).standard_normal(80)
-    e, smooth, total, slope, expected = 0.0, 0.0, 0.0, 0.0, []
-    for f in force:
-        new = (h * (f + e) + (2.0 * gains.filter_time - h) * smooth) / (2.0 * gains.filter_time + h)
-        total += 0.5 * gains.ki * h * (new + smooth)
-        slope = (2.0 * gains.kd * (new - smooth) + (2.0 * gains.derivative_time - h) * slope) / (
-            2.0 * gains.derivative_time + h
-        )
-        e, smooth = f, new
-        expected.append(gains.kp * smooth + total + slope)
-    found = control.forced_response(
-        sampled_slip_law(gains, period=h), np.arange(80) * h, force
-    ).outputs
-    np.testing.assert_allclose(found, expected, rtol=1e-9)
+    kept, smooth, expected = np.exp(-PERIOD / gains.filter_time), 0.0, []
+    for f in np.concatenate([np.zeros(3), force[:-3]]):
+        smooth += (1.0 - kept) * (f - smooth)
+        expected.append(smooth)
+    system = late_filter(gains, period=PERIOD, delays=3)
+    found = control.forced_response(system, np.arange(80) * PERIOD, force).outputs
+    np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-12)
+
+
+def test_a_response_is_python_controls() -> None:
+    omega = np.array([1.0, 30.0, 200.0])
+    system = shifted(load_robot("athena"), plants_of("athena")[NOMINAL])
+    for w, found in zip(omega, response(system, omega), strict=True):
+        expected = control.evalfr(system, np.exp(1j * w * PERIOD))
+        np.testing.assert_allclose(found, expected, rtol=1e-6, atol=1e-6 * np.abs(expected).max())
 
 
 def test_delays_count_whole_periods() -> None:
@@ -253,8 +209,8 @@ def test_sections_that_need_no_design_come_from_the_requirements(gains: Gains) -
     assert gains.support.handover_time == needs.handover_time
     assert gains.limits.torque == needs.torque_share * robot.servo.torque_max
     assert gains.support.load_time == needs.load_time
-    assert gains.paper_slip.limit == needs.deflection_limit
-    assert gains.paper_slip.derivative_time == 0.010  # s    two periods
+    assert gains.paper.limit == needs.deflection_limit
+    assert gains.paper.damping == pytest.approx(robot.weight / 6.0 / 0.9)
 
 
 def test_gains_are_for_their_robot(gains: Gains) -> None:
@@ -269,7 +225,8 @@ def test_a_stiffer_robot_gets_gains_of_its_own() -> None:
     stiffer = replace(robot, servo=replace(robot.servo, kp=2.0 * robot.servo.kp))
     found = design_for(stiffer, PERIOD)
     assert found.robot_hash == stiffer.hash
-    assert found.paper_slip.ki != designed("athena").paper_slip.ki
+    usual = designed("athena").margins
+    assert found.margins.paper_gain_margin != usual.paper_gain_margin
 
 
 def test_saved_gains_are_loaded_to_the_last_bit(gains: Gains, tmp_path: Path) -> None:
@@ -306,15 +263,15 @@ def test_caveats_are_kept_and_warned_about(tmp_path: Path) -> None:
     ("old", "new", "message"),
     [
         (
-            "tracking_time = ",
-            "traking_time = ",
-            "unknown key.*traking_time.*did you mean 'tracking_time'",
+            "height_share = ",
+            "hight_share = ",
+            "unknown key.*hight_share.*did you mean 'height_share'",
         ),
         ("\n[hold]", "\n[hald]", "missing section.*\\[hold\\]"),
-        ("stiffness = ", "stiffness = -", "paper_suspension.stiffness: impossible value"),
-        ("format = 4", "format = 3", "unknown format"),
+        ("damping = ", "damping = -", "paper.damping: impossible value"),
+        ("format = 5", "format = 4", "unknown format"),
         ("limit = ", "limit = true # ", "requirements.deflection_limit: wrong type"),
-        ("format = 4", "format = ", "not a TOML file"),
+        ("format = 5", "format = ", "not a TOML file"),
     ],
 )
 def test_a_damaged_gains_file_is_refused(old: str, new: str, message: str, tmp_path: Path) -> None:
@@ -336,7 +293,7 @@ def test_a_missing_file_or_folder_is_reported(gains: Gains, tmp_path: Path) -> N
 @pytest.mark.parametrize(
     ("setting", "message"),
     [
-        ("frequency=0", "frequency: impossible requirement"),
+        ("filter_time=0", "filter_time: impossible requirement: got 0.0, expected a number > 0"),
         ("force_delay=-1", "force_delay: impossible requirement: got -1.0, expected a number >= 0"),
         ("phase_margn=50", "unknown requirement.*did you mean 'phase_margin'"),
         ("phase_margin=steep", "not a number: got 'steep'"),

@@ -239,14 +239,22 @@ def test_similar_robots_beyond_the_usual_sizes_get_similar_gains() -> None:
         found.append(design_for(robot, period * time, needs))
     small, large = found
     length, time, force = 2.0, 2.0**0.5, 8.0
-    slip, spring, compliance = small.paper_slip, small.paper_suspension, length / force
-    assert large.paper_slip.ki * time == pytest.approx(slip.ki * compliance, rel=1e-4)
-    assert large.paper_slip.kp == pytest.approx(slip.kp * compliance, rel=1e-4)
-    assert large.paper_slip.kd == pytest.approx(slip.kd * compliance * time, rel=1e-4)
-    assert large.paper_slip.limit == pytest.approx(slip.limit * length)
-    assert large.paper_suspension.stiffness == pytest.approx(spring.stiffness / compliance)
-    assert large.paper_suspension.mass == pytest.approx(spring.mass / compliance * time**2)
-    assert large.paper_suspension.limit == pytest.approx(spring.limit * length)
+    for name, by in (
+        ("share", 1.0),
+        ("height_share", 1.0),
+        ("share_limit", 1.0),
+        ("yield_share", 1.0),
+        ("return_rate", 1.0 / time),
+        ("filter_time", time),
+        ("damping", force / (length / time)),
+        ("return_time", time),
+        ("sag_limit", length),
+        ("limit", length),
+    ):
+        assert getattr(large.paper, name) == pytest.approx(by * getattr(small.paper, name)), name
+    assert large.margins.paper_gain_margin == pytest.approx(
+        small.margins.paper_gain_margin, rel=1e-4
+    )
     for name, by in (
         ("attitude_rate", 1.0 / time),
         ("height_rate", 1.0 / time),
@@ -273,13 +281,3 @@ def test_figures_are_those_of_the_package_for_legs_of_22_to_44_cm() -> None:
     assert double.height_limit == pytest.approx(0.010 * 0.64 / 0.44)
     assert double.handover_time == pytest.approx(0.065 * (0.64 / 0.44) ** 0.5)
     assert requirements_for(scaled_robot(robot, 2.0), handover_time=0.04).handover_time == 0.04
-
-
-def test_the_suspension_of_stiff_servos_yields_at_most_one_and_a_half_times_what_they_do() -> None:
-    """Six feet bear a third of the weight each, without feed-forward torque of the servos."""
-    robot = soft(400.0)
-    vertical = (LegSolver(robot).jacobian(robot.stance)[:, 2] ** 2).sum(axis=1) / 400.0  # m/N
-    assert requirements_for(robot).deflection == pytest.approx(
-        1.5 * vertical.mean() * robot.weight / 3.0
-    )
-    assert requirements_for(robot, deflection=0.003).deflection == 0.003

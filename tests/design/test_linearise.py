@@ -9,14 +9,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from hexapod_cosim.controller import LegSolver
 from hexapod_cosim.controller.design.closed import disturbed
-from hexapod_cosim.controller.design.paper import paper_loci
-from hexapod_cosim.controller.design.standing import ANGLES, axes_of, relieved, weight_share
+from hexapod_cosim.controller.design.loci import response
+from hexapod_cosim.controller.design.paper import shifted
+from hexapod_cosim.controller.design.standing import ANGLES, StandingPlant, weight_share
 from hexapod_cosim.cosim.design.design import STANCES, level_fmu
 from hexapod_cosim.cosim.design.linearise import STATES, Bench, linearise
 from hexapod_cosim.cosim.design.standing import StanceError, rest
 from hexapod_cosim.cosim.interface.names import foot_vector_names
-from hexapod_cosim.models import load_robot
+from hexapod_cosim.models import Robot, load_robot
 
 PERIOD = 0.005  # s
 ROBOTS = ("athena", "phantomx_mk4")
@@ -42,6 +44,13 @@ SLOW, STIFFENED = (
 )
 BALANCE = 1e-4  # 1    of the force: rest is reached to 1e-3 m/s
 pytestmark = pytest.mark.usefixtures("plant_build")
+
+
+def yielded(robot: Robot, plant: StandingPlant, force: np.ndarray) -> np.ndarray:
+    """Returns by how much the servos yield at the standing feet (3 n) [m] to forces (3 n) [N]."""
+    jacobian = LegSolver(robot).jacobian(plant.angle)[plant.standing]
+    soft = jacobian @ jacobian.transpose(0, 2, 1) / robot.servo.kp
+    return np.einsum("nij,nj->ni", soft, force.reshape(-1, 3)).reshape(-1)
 
 
 @pytest.mark.parametrize("name", ROBOTS)
@@ -99,8 +108,10 @@ def test_small_inputs_move_the_fmu_as_predicted(stance: str, friction: float) ->
     np.testing.assert_allclose(found, state, rtol=0.0, atol=PREDICTED * np.abs(state).max())
 
 
-def test_a_stuck_foot_answers_a_relief_with_minus_it() -> None:
-    """Six legs work against each other: three components of each force, without sum and moment."""
+def test_a_foot_shifted_by_what_its_leg_yields_to_a_force_is_pushed_by_minus_that_force() -> None:
+    """So a share of 1 would cancel the softness of the legs. Six stuck feet work against each
+    other: three components of each force, without sum and moment.
+    """
     robot = load_robot("athena")
     hard = replace(robot.contact, stiffness=HARD * robot.contact.stiffness)
     point = replace(robot.foot, radius=1e-4)  # a round foot rolls, so that its centre gives way
@@ -127,9 +138,10 @@ def test_a_stuck_foot_answers_a_relief_with_minus_it() -> None:
     ).reshape(6, 2, 3, 3)
     balance = rows.transpose(1, 2, 0, 3).reshape(6, 18)
     inner = np.linalg.svd(balance)[2][6:]
-    for relief in inner:
-        _, forces = disturbed(relieved(sticky, plant), relief, duration=0.3)
-        np.testing.assert_allclose(forces[:, -1], -relief, atol=YIELDED)
+    for force in inner:
+        shift = yielded(sticky, plant, force)
+        _, forces = disturbed(shifted(sticky, plant), shift, duration=0.3)
+        np.testing.assert_allclose(forces[:, -1], -force, atol=YIELDED)
 
 
 @pytest.mark.parametrize("stance", list(STANCES))
@@ -146,8 +158,8 @@ def test_the_feet_carry_the_load_asked_for_and_do_not_squeeze(stance: str, load:
     assert np.abs(plant.force[:, :2]).max() < 1e-3 * total
 
 
-def test_no_relief_carries_less_than_the_weight_for_long() -> None:
-    """After a constant vertical relief the foot forces add up to the weight again.
+def test_no_shift_carries_less_than_the_weight_for_long() -> None:
+    """After constant upward shifts the foot forces add up to the weight again.
 
     No force along the ground remains.
     """
@@ -155,9 +167,10 @@ def test_no_relief_carries_less_than_the_weight_for_long() -> None:
     with level_fmu(robot) as fmu:
         motion, inputs = rest(fmu, robot, standing=STANCES["tripod LF LR RM"], load=1.0)
         plant = linearise(fmu, robot, motion, inputs, period=PERIOD, coulomb_friction=0.0)
-    relief = np.zeros(9)
-    relief[axes_of(3)[1]] = 1.0, 2.0, -0.5
-    _, forces = disturbed(relieved(robot, plant), relief, duration=4.0)
+    force = np.zeros(9)
+    force[2::3] = 1.0, 2.0, -0.5
+    shift = yielded(robot, plant, force)
+    _, forces = disturbed(shifted(robot, plant), shift, duration=4.0)
     sums = forces.reshape(3, 3, -1).sum(axis=0)
     assert np.abs(sums).max() > 0.1
     np.testing.assert_allclose(sums[:, -1], 0.0, atol=1e-3)
@@ -173,7 +186,9 @@ def test_slow_squeezing_meets_friction_as_a_damper_that_goes_with_the_load() -> 
         for load in (0.5, 1.0):
             motion, inputs = rest(fmu, robot, standing=STANCES["six legs"], load=load)
             plant = linearise(fmu, robot, motion, inputs, period=PERIOD, coulomb_friction=0.0)
-            loci.append(np.sort(np.abs(paper_loci(robot, plant, np.array([SLOW]))[0][:, 0]))[4:])
+            flat = response(shifted(robot, plant), np.array([SLOW]))[0].reshape(6, 3, 6, 3)
+            along = flat[:, :2, :, :2].reshape(12, 12)
+            loci.append(np.sort(np.abs(np.linalg.eigvals(along)))[4:])
     np.testing.assert_allclose(loci[1] / loci[0], 2.0, rtol=STIFFENED)
 
 
