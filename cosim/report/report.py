@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, NamedTuple
@@ -40,7 +40,7 @@ from hexapod_cosim.cosim.results.metrics import (
     shown_metrics,
 )
 from hexapod_cosim.cosim.results.results import StoredResult
-from hexapod_cosim.cosim.results.walking import different_walks, walking_text
+from hexapod_cosim.cosim.results.walking import walking_text
 from hexapod_cosim.models import JOINT_NAMES
 
 REPORT, PLOTS, PROFILE = "report.html", "plots", "profile"
@@ -113,6 +113,7 @@ def write_report(
     comparison: Comparison | Comparisons | None = None,
     scenario: str | None = None,
     command: str | None = None,
+    walks: Sequence[str] = (),
     accuracies: Mapping[str, Accuracy] = MappingProxyType({}),
     figures: Figures | None = None,
 ) -> list[Path]:
@@ -124,6 +125,7 @@ def write_report(
         warn: called with a message for each figure that cannot be drawn.
         comparison: the metrics over all seeds; without it the report is of a single run.
         scenario, command: of a comparison; a single run has its own. The scenario is TOML.
+        walks: sentences on the gait and stance of each control of a comparison, if they differ.
         accuracies: by control, where they were checked.
         figures: those of the runs; by default they are drawn now.
     """
@@ -167,7 +169,7 @@ def write_report(
         joints=JOINT_NAMES,
         creep=creep_note(first.facts, first.view.surface),
         walks={label: walking_text(run.facts) for label, run in runs.items()},
-        differences=different_walks({label: run.facts for label, run in runs.items()}),
+        differences=walks,
         terrain=describe_terrain(first.view.surface, first.facts["parameters"]),
         materials=_materials(runs),
         **content | _accuracy(content["rows"], accuracies, metrics),
@@ -232,6 +234,8 @@ def _one_run(run: StoredResult) -> dict[str, Any]:
     return {
         "headline": plain_headline(run.metrics, run.facts),
         "cards": [],
+        "columns": list(metrics),
+        "compared": [],
         "rows": rows,
         "about": "",
         "overall": [],
@@ -246,10 +250,13 @@ def _comparison(comparison: Comparisons, facts: Mapping[str, Any]) -> dict[str, 
     means = notes.partition(f"; {METHOD}")[0]
     means = f"{means}; 95 % intervals in brackets." if means else "One run of each control."
     lead = f"Robot {facts['robot']['name']}. {means}"
-    single = len(comparison.pairs) == 1
+    main = comparison.main
     return {
         "headline": headlines(comparison),
-        "cards": cards(comparison.pairs[0]) if single else [],
+        "cards": cards(main),
+        "carded": main.title,
+        "columns": comparison.labels,
+        "compared": [pair.title for pair in comparison.pairs],
         "rows": rows,
         "about": notes,
         "overall": comparison.warnings if len(comparison.seeds) > 1 else comparison.losses,
@@ -319,11 +326,10 @@ def as_comparisons(comparison: Comparison | Comparisons | None) -> Comparisons |
 
 
 def comparison_rows(comparison: Comparison | Comparisons, *, net_slip: bool = False) -> Rows:
-    """Returns the rows of the means, with the changes from the first control to each other one.
+    """Returns the rows of the means, with the changes from the reference of each other control.
 
-    `changes` of a row has an entry for each other control; `change`, `interval` and `verdict` are
-    those of the first entry. Over several seeds, the first row tells how many runs walked to the
-    end.
+    `changes` of a row has an entry for each pair; `change`, `interval` and `verdict` are those of
+    the first entry. Over several seeds, the first row tells how many runs walked to the end.
     """
     whole = as_comparisons(comparison)
     assert whole is not None
@@ -331,17 +337,18 @@ def comparison_rows(comparison: Comparison | Comparisons, *, net_slip: bool = Fa
     for row in rows:
         changes = [_shown_change(pair.changes[row["name"]]) for pair in whole.pairs]
         row |= {**changes[0], "changes": changes}
-    count, walked = len(whole.seeds), list(whole.walked.values())
+    count, walked = len(whole.seeds), whole.walked
     if count == 1:
         return rows
     counted = [
-        {"change": "", "interval": "", "verdict": _more(walked[0], other)} for other in walked[1:]
+        {"change": "", "interval": "", "verdict": _more(*(walked[label] for label in pair.labels))}
+        for pair in whole.pairs
     ]
     first = {
         "name": "walked",
         "unit": "runs",
         "meaning": "runs in which the robot walked upright to the end and arrived",
-        "values": [f"{number} of {count}" for number in walked],
+        "values": [f"{number} of {count}" for number in walked.values()],
         **counted[0],
         "changes": counted,
     }
@@ -367,8 +374,7 @@ def about(comparison: Comparison | Comparisons) -> str:
     if len(whole.pairs) > 1:
         return (
             f"Means over those of {n} seeds ({seeds[0]} to {seeds[-1]}) on which the control "
-            f"walked to the end; changes are against {whole.reference}, over the pairs in which "
-            f"both walked; {METHOD}."
+            f"walked to the end; changes are over the pairs in which both walked; {METHOD}."
         )
     judged = max(change.pairs for change in whole.pairs[0].changes.values())
     part = f" of the {judged} in which both walked to the end" if judged < n else ""

@@ -124,6 +124,12 @@ class Comparison:
         return self.first[0].control, self.second[0].control
 
     @property
+    def title(self) -> str:
+        """Returns the heading of the changes."""
+        first, second = self.labels
+        return f"{second} against {first}"
+
+    @property
     def seeds(self) -> list[int]:
         """The seeds of the pairs."""
         return [run.seed for run in self.first]

@@ -1,7 +1,8 @@
-"""Compares runs under any number of controls: each with the first one, seed by seed.
+"""Compares runs under any number of controls, seed by seed, each control with its reference.
 
-The first control is the reference. Every other control makes a `Comparison` with it, whose changes
-use the pairs in which both robots walked upright to the end and arrived.
+The reference is the first control; of a control in another walk it is the first control in that
+walk (`reference_of`). Each pair makes a `Comparison`, whose changes use the pairs of runs in which
+both robots walked upright to the end and arrived.
 """
 
 from __future__ import annotations
@@ -22,7 +23,10 @@ from hexapod_cosim.cosim.results.comparison import Comparison, compare_runs
 from hexapod_cosim.cosim.results.metrics import METRICS
 from hexapod_cosim.cosim.results.results import METRICS_FILE, SCENARIO
 from hexapod_cosim.cosim.results.summary import Summary, described_losses
+from hexapod_cosim.cosim.scenario.controls import AT, reference_of
 from hexapod_cosim.cosim.scenario.records import Scenario
+
+WALKS = "walks"  # key of run.json
 
 
 @dataclass(frozen=True)
@@ -30,7 +34,7 @@ class Comparisons:
     """Runs of the same seeds under two or more controls, by label; the first is the reference."""
 
     runs: Mapping[str, tuple[Summary, ...]]
-    pairs: tuple[Comparison, ...]  # the reference with each of the others, in their order
+    pairs: tuple[Comparison, ...]  # each but the first control with its reference, in their order
 
     @property
     def labels(self) -> tuple[str, ...]:
@@ -39,8 +43,15 @@ class Comparisons:
 
     @property
     def reference(self) -> str:
-        """The control that the others are compared with."""
+        """The first control, with which those in its walk are compared."""
         return self.labels[0]
+
+    @property
+    def main(self) -> Comparison:
+        """The comparison of the last control that is in the walk of the first one."""
+        walks = [label.partition(AT)[2] for label in self.labels]
+        same = [pair for pair, walk in zip(self.pairs, walks[1:], strict=True) if walk == walks[0]]
+        return (same or self.pairs)[-1]
 
     @property
     def seeds(self) -> list[int]:
@@ -109,19 +120,22 @@ class Comparisons:
             for pair in self.pairs
         }
         counts = {"seeds": len(self.seeds), "walked": self.walked}
+        references = {pair.labels[1]: pair.labels[0] for pair in self.pairs}
         return {
-            **self.means, "reference": self.reference, "changes": changes, **counts,
-            "warnings": self.warnings,
+            **self.means, "reference": self.reference, "references": references,
+            "changes": changes, **counts, "warnings": self.warnings,
         }  # fmt: skip
 
 
 def compare_all(runs: Mapping[str, Sequence[Summary]]) -> Comparisons:
-    """Compares the runs of each control with those of the first one.
+    """Compares the runs of each control with those of its reference.
 
     Raises HexapodError when their seeds differ.
     """
-    first, *others = runs.values()
-    pairs = tuple(compare_runs(first, second) for second in others)
+    labels = list(runs)
+    pairs = tuple(
+        compare_runs(runs[reference_of(label, labels)], runs[label]) for label in labels[1:]
+    )
     return Comparisons({label: tuple(some) for label, some in runs.items()}, pairs)
 
 
@@ -132,10 +146,16 @@ def write_comparison(
     *,
     labels: Sequence[str],
     command: str = "",
+    walks: Sequence[str] = (),
 ) -> list[Path]:
     """Writes scenario.toml, metrics.json and run.json of a comparison; returns the files.
 
     The scenario has no control, since several were run; the parameters of [control] stay.
+
+    Args:
+        labels: of the controls that have recordings.
+        command: that makes the comparison.
+        walks: a sentence on the gait and stance of each control, where they differ.
     """
     table = {key: value for key, value in scenario.to_table().items() if key != "control"}
     if scenario.control_settings:
@@ -143,7 +163,7 @@ def write_comparison(
     write_text(folder / SCENARIO, tomlkit.dumps(table))
     write_json(folder / METRICS_FILE, comparison.as_table())
     facts = {"kind": "compare", "status": COMPLETED, "title": scenario.title, "command": command}
-    write_json(folder / RUN_FILE, {**facts, PARTS: list(labels)})
+    write_json(folder / RUN_FILE, {**facts, PARTS: list(labels), WALKS: list(walks)})
     return [folder / name for name in (SCENARIO, METRICS_FILE, RUN_FILE)]
 
 
