@@ -1,6 +1,7 @@
 """Makes the table and the pictures of walks on uneven ground for docs/ground.md.
 
-hexapod compare stairs rubble stones sand dune ramp course -o out/terrains
+hexapod compare stairs rubble stones sand dune ramp course --control kinematic \
+    --control kinematic@chosen --control compliant@chosen -o out/terrains
 python docs/figure_ground_walks.py out/terrains
 
 Prints the table in Markdown, and writes docs/images/ground_walks.png, the figure of the table, and

@@ -69,7 +69,7 @@ from hexapod_cosim.cosim.run.batch import run_batch
 from hexapod_cosim.cosim.run.chosen_walk import choose_walk
 from hexapod_cosim.cosim.run.preparation import PlantFmus, chosen_gains
 from hexapod_cosim.cosim.scenario.controls import CHOOSER, Control
-from hexapod_cosim.cosim.scenario.records import CHOSEN, CONTROLS, OWN, Scenario
+from hexapod_cosim.cosim.scenario.records import CHOSEN, COMPARED, CONTROLS, OWN, Scenario
 from hexapod_cosim.cosim.scenario.scenario import load_scenario
 from hexapod_cosim.cosim.scenario.variation import STANDARD
 from hexapod_cosim.models import ScenarioError
@@ -335,7 +335,7 @@ def _controls(texts: Sequence[str], plan: Scenario) -> tuple[Control, ...]:
     """
     controls = chosen_controls(texts, plan)
     if len(controls) < 2:
-        other = next(name for name in CONTROLS if name != controls[0].label)
+        other = next(name for name in COMPARED if name != controls[0].label)
         raise ScenarioError(
             "nothing to compare with",
             got=controls[0].label,
