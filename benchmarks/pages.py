@@ -8,12 +8,13 @@ The folder is that of `hexapod benchmark`; the walks of the other tables are run
 from __future__ import annotations
 
 import math
-import shutil
 import sys
 from collections.abc import Mapping, Sequence
 from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
+
+from PIL import Image
 
 from benchmarks import ROOT
 from benchmarks.control.tables import markdown, put_into
@@ -53,6 +54,7 @@ ROWS = {
     "path_error": ("path error", 1e3, "mm/m"),
     "slip_per_metre": ("slip per metre", 1e3, "mm/m"),
 }
+COLOURS = 64  # of the picture
 HARDLY = 0.07  # a smaller change for the worse of a case is not listed
 EFFORT = ("electrical", "heat", "load")  # worse in nearly all cases; the classes show by how much
 
@@ -136,7 +138,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     put_into(PAGES, tables)
     demo = compared("demo_course", [*OWN, CHOSEN[0], CHOSEN[-1]])
     put_into((ROOT / "README.md",), {"demo": metrics_table(demo)})
-    shutil.copy(folder / FOLDER / f"{STEM}-light.png", ROOT / "docs" / "images" / f"{STEM}.png")
+    with Image.open(folder / FOLDER / f"{STEM}-light.png") as picture:
+        small = picture.convert("RGB").quantize(COLOURS, dither=Image.Dither.NONE)
+    small.save(ROOT / "docs" / "images" / f"{STEM}.png", optimize=True)
     return 0
 
 

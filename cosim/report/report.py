@@ -27,7 +27,7 @@ from hexapod_cosim.cosim.report.payload import as_json, make_payload
 from hexapod_cosim.cosim.report.servos import servo_rows
 from hexapod_cosim.cosim.report.surface import material_legend
 from hexapod_cosim.cosim.results.accuracy import Accuracy
-from hexapod_cosim.cosim.results.comparison import BETTER, METHOD, SAME, WORSE, Change, Comparison
+from hexapod_cosim.cosim.results.comparison import BETTER, METHOD, SAME, WORSE, Change
 from hexapod_cosim.cosim.results.comparisons import Comparisons
 from hexapod_cosim.cosim.results.drop import drop_text
 from hexapod_cosim.cosim.results.ground import describe_terrain
@@ -110,7 +110,7 @@ def write_report(
     folder: Path,
     *,
     warn: Callable[[str], None],
-    comparison: Comparison | Comparisons | None = None,
+    comparison: Comparisons | None = None,
     scenario: str | None = None,
     command: str | None = None,
     walks: Sequence[str] = (),
@@ -147,8 +147,7 @@ def write_report(
     for text in missing:
         warn(text)
     first = next(iter(runs.values()))
-    whole = as_comparisons(comparison)
-    content = _one_run(first) if whole is None else _comparison(whole, first.facts)
+    content = _one_run(first) if comparison is None else _comparison(comparison, first.facts)
     content["warnings"] = [
         f"{label}: {text}" for label, run in runs.items() for text in run.facts["warnings"]
     ] + content.pop("overall")
@@ -157,7 +156,7 @@ def write_report(
     ]
     content["scenario"] = first.scenario if scenario is None else scenario
     content["command"] = first.facts.get("command", "") if command is None else command
-    metrics = _metrics(runs, whole)
+    metrics = _metrics(runs, comparison)
     page = render(
         "report.html.jinja",
         controls=runs,
@@ -316,33 +315,22 @@ def metric_rows(metrics: Metrics, *, net_slip: bool) -> Rows:
     ]
 
 
-def as_comparisons(comparison: Comparison | Comparisons | None) -> Comparisons | None:
-    """Returns a pair of controls as a comparison of any number."""
-    if isinstance(comparison, Comparison):
-        first, second = comparison.labels
-        runs = {first: comparison.first, second: comparison.second}
-        return Comparisons(runs, (comparison,))
-    return comparison
-
-
-def comparison_rows(comparison: Comparison | Comparisons, *, net_slip: bool = False) -> Rows:
+def comparison_rows(comparison: Comparisons, *, net_slip: bool = False) -> Rows:
     """Returns the rows of the means, with the changes from the reference of each other control.
 
     `changes` of a row has an entry for each pair; `change`, `interval` and `verdict` are those of
     the first entry. Over several seeds, the first row tells how many runs walked to the end.
     """
-    whole = as_comparisons(comparison)
-    assert whole is not None
-    rows = metric_rows(whole.means, net_slip=net_slip)
+    rows = metric_rows(comparison.means, net_slip=net_slip)
     for row in rows:
-        changes = [_shown_change(pair.changes[row["name"]]) for pair in whole.pairs]
+        changes = [_shown_change(pair.changes[row["name"]]) for pair in comparison.pairs]
         row |= {**changes[0], "changes": changes}
-    count, walked = len(whole.seeds), whole.walked
+    count, walked = len(comparison.seeds), comparison.walked
     if count == 1:
         return rows
     counted = [
         {"change": "", "interval": "", "verdict": _more(*(walked[label] for label in pair.labels))}
-        for pair in whole.pairs
+        for pair in comparison.pairs
     ]
     first = {
         "name": "walked",
@@ -364,19 +352,17 @@ def _more(before: int, after: int) -> str:
     return SAME if before == after else BETTER if after > before else WORSE
 
 
-def about(comparison: Comparison | Comparisons) -> str:
+def about(comparison: Comparisons) -> str:
     """Returns a sentence on what the table's values are; "" for a single seed."""
-    whole = as_comparisons(comparison)
-    assert whole is not None
-    seeds, n = whole.seeds, len(whole.seeds)
+    seeds, n = comparison.seeds, len(comparison.seeds)
     if n == 1:
         return ""
-    if len(whole.pairs) > 1:
+    if len(comparison.pairs) > 1:
         return (
             f"Means over those of {n} seeds ({seeds[0]} to {seeds[-1]}) on which the control "
             f"walked to the end; changes are over the pairs in which both walked; {METHOD}."
         )
-    judged = max(change.pairs for change in whole.pairs[0].changes.values())
+    judged = max(change.pairs for change in comparison.pairs[0].changes.values())
     part = f" of the {judged} in which both walked to the end" if judged < n else ""
     return (
         f"Means over {n} seeds ({seeds[0]} to {seeds[-1]}){part}, both controls on each; {METHOD}."

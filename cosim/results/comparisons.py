@@ -19,7 +19,7 @@ import tomlkit
 from hexapod_cosim.cosim.common.files import PARTS, RUN_FILE, write_json, write_text
 from hexapod_cosim.cosim.master.loop import COMPLETED
 from hexapod_cosim.cosim.results.balance import Unbalanced
-from hexapod_cosim.cosim.results.comparison import Comparison, compare_runs
+from hexapod_cosim.cosim.results.comparison import Comparison, compare_runs, judged_pairs
 from hexapod_cosim.cosim.results.metrics import METRICS
 from hexapod_cosim.cosim.results.results import METRICS_FILE, SCENARIO
 from hexapod_cosim.cosim.results.summary import Summary, described_losses
@@ -71,7 +71,8 @@ class Comparisons:
         that walked, or all where none did.
         """
         if len(self.pairs) == 1:
-            return dict(zip(self.labels, self.pairs[0].judged, strict=True))
+            pairs = judged_pairs(self.pairs[0].first, self.pairs[0].second)
+            return dict(zip(self.labels, map(list, zip(*pairs, strict=True)), strict=True))
         return {
             label: [run for run in runs if run.success] or list(runs)
             for label, runs in self.runs.items()
@@ -80,8 +81,6 @@ class Comparisons:
     @property
     def means(self) -> dict[str, dict[str, float]]:
         """Mean of each metric, by control and metric."""
-        if len(self.pairs) == 1:
-            return self.pairs[0].means
         return {
             label: {name: _mean([run.metrics[name] for run in runs]) for name in METRICS}
             for label, runs in self.judged.items()
@@ -113,18 +112,19 @@ class Comparisons:
 
         With two controls the changes are under `change`, with more under `changes` by label.
         """
-        if len(self.pairs) == 1:
-            return self.pairs[0].as_table()
         changes = {
             pair.labels[1]: {name: item.as_table() for name, item in pair.changes.items()}
             for pair in self.pairs
         }
+        compared: dict[str, Any] = {
+            "reference": self.reference,
+            "references": {pair.labels[1]: pair.labels[0] for pair in self.pairs},
+            "changes": changes,
+        }
+        if len(self.pairs) == 1:
+            compared = {"change": changes[self.labels[1]]}
         counts = {"seeds": len(self.seeds), "walked": self.walked}
-        references = {pair.labels[1]: pair.labels[0] for pair in self.pairs}
-        return {
-            **self.means, "reference": self.reference, "references": references,
-            "changes": changes, **counts, "warnings": self.warnings,
-        }  # fmt: skip
+        return {**self.means, **compared, **counts, "warnings": self.warnings}
 
 
 def compare_all(runs: Mapping[str, Sequence[Summary]]) -> Comparisons:
