@@ -21,7 +21,7 @@ from hexapod_cosim.cosim.report.accuracy import (
     with_errors,
 )
 from hexapod_cosim.cosim.report.figures import Figures, write_figures
-from hexapod_cosim.cosim.report.headline import cards, creep_note, headlines, plain_headline
+from hexapod_cosim.cosim.report.headline import cards, creep_note, headline, plain_headline
 from hexapod_cosim.cosim.report.page import NO_VIEWER, render, viewer_script
 from hexapod_cosim.cosim.report.payload import as_json, make_payload
 from hexapod_cosim.cosim.report.servos import servo_rows
@@ -251,9 +251,9 @@ def _comparison(comparison: Comparisons, facts: Mapping[str, Any]) -> dict[str, 
     lead = f"Robot {facts['robot']['name']}. {means}"
     main = comparison.main
     return {
-        "headline": headlines(comparison),
+        "headline": headline(main),
+        "headlines": [headline(pair) for pair in comparison.pairs if pair is not main],
         "cards": cards(main),
-        "carded": main.title,
         "columns": comparison.labels,
         "compared": [pair.title for pair in comparison.pairs],
         "rows": rows,

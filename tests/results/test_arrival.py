@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from hexapod_cosim.cosim.master.loop import COMPLETED
-from hexapod_cosim.cosim.report.headline import headlines
+from hexapod_cosim.cosim.report.headline import headline
 from hexapod_cosim.cosim.report.report import comparison_rows
 from hexapod_cosim.cosim.results.arrival import missed_end
 from hexapod_cosim.cosim.results.comparison import compare_runs, read_seeds, write_seeds
@@ -50,7 +50,7 @@ def test_a_stuck_robot_has_not_walked_and_is_not_praised() -> None:
     assert comparison.walked == {"kinematic": 3, "mine": 0}
     assert comparison.losses[0] == f"mine, seed 0: {STUCK}"
     assert comparison_rows(comparison)[0]["values"] == ["3 of 3", "0 of 3"]
-    said = "".join(part.text for part in headlines(comparison))
+    said = "".join(part.text for part in headline(comparison.main))
     assert "less" not in said
     assert said.endswith("No pair of walks can be compared.")
 
