@@ -58,7 +58,6 @@ from hexapod_cosim.cosim.results.results import (
     ACCURACY,
     METRICS_FILE,
     ResultsFolder,
-    StoredResult,
     read_scenario,
     results_folder,
     stored_result,
@@ -241,7 +240,18 @@ def run_work(work: Work, path: Path) -> Done:
                 write_json(folder.path / METRICS_FILE, _table(comparison, checked))
             if figures is None:
                 return Done(results, comparison, checked, files, None)
-            files += _report(work, stored, figures, comparison, checked, folder.path)
+            with drawing(folder.path):
+                files += write_report(
+                    stored,
+                    folder.path,
+                    warn=warn,
+                    comparison=comparison,
+                    scenario=read_scenario(folder.path),
+                    command=work.command,
+                    walks=work.walks,
+                    accuracies=checked,
+                    figures=figures.result(),
+                )
     return Done(results, comparison, checked, files, files[-1])
 
 
@@ -276,29 +286,6 @@ def _compare_many(works: Sequence[Work], names: Sequence[str], path: Path, *, js
     if reports:
         show_text("\n".join(f"report: {report}" for report in reports))
     return FELL if lost else SUCCESS
-
-
-def _report(
-    work: Work,
-    runs: Mapping[str, StoredResult],
-    figures: FigureThread,
-    comparison: Comparisons,
-    checked: Mapping[str, Accuracy],
-    folder: Path,
-) -> list[Path]:
-    """Writes figures and report; returns the files, the report last."""
-    with drawing(folder):
-        return write_report(
-            runs,
-            folder,
-            warn=warn,
-            comparison=comparison,
-            scenario=read_scenario(folder),
-            command=work.command,
-            walks=work.walks,
-            accuracies=checked,
-            figures=figures.result(),
-        )
 
 
 def _show(done: Done, walks: Sequence[str]) -> None:

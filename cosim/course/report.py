@@ -5,7 +5,6 @@ from __future__ import annotations
 import base64
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -16,22 +15,10 @@ from hexapod_cosim.cosim.common.files import write_text
 from hexapod_cosim.cosim.course import texts
 from hexapod_cosim.cosim.course.goals import verdicts
 from hexapod_cosim.cosim.course.picture import STEM, THEMES, write_picture
-from hexapod_cosim.cosim.course.records import SHOWN
 from hexapod_cosim.cosim.course.table import ALL, Table
 from hexapod_cosim.cosim.report.page import environment
-from hexapod_cosim.cosim.results.comparison import BETTER, SAME, WORSE
 
 REPORT, TEMPLATE = "report.html", "course.html.jinja"
-
-
-@dataclass(frozen=True)
-class Card:
-    """A figure at the top of the report, as texts."""
-
-    name: str
-    change: str
-    interval: str
-    verdict: str
 
 
 def write_course_report(table: Table, content: Mapping[str, Any], folder: Path) -> list[Path]:
@@ -47,7 +34,6 @@ def write_course_report(table: Table, content: Mapping[str, Any], folder: Path) 
         headline=headline(table),
         lead=lead(table),
         warnings=[] if content["complete"] else ["The course was stopped before its end."],
-        cards=cards(table),
         picture=_pictures(files),
         goals=texts.goal_rows(found) if found else None,
         parts=texts.part_rows(table),
@@ -97,29 +83,6 @@ def lead(table: Table) -> str:
         f"Changes are from {table.reference} unless the tables name another control. "
         "A success walks upright to the end and arrives."
     )
-
-
-def cards(table: Table) -> list[Card]:
-    """Returns the medians over all cases of the last column; none without a second control."""
-    last = list(table.columns)[-1]
-    if last == table.reference or (ALL, last) not in table.classes:
-        return []
-    figures = table.classes[ALL, last]
-    found = []
-    for quantity in SHOWN:
-        ratio = figures.ratio(quantity.name)
-        if math.isnan(ratio.value):
-            continue
-        side = (ratio.low > 1.0) - (ratio.high < 1.0)
-        found.append(
-            Card(
-                f"{quantity.title}, {figures.control}",
-                f"{100.0 * (ratio.value - 1.0):+.0f} %",
-                f"{figures.counted(quantity.name)} cases, median",
-                {-1: BETTER, 0: SAME, 1: WORSE}[side],
-            )
-        )
-    return found
 
 
 def _pictures(files: Sequence[Path]) -> dict[str, str] | None:
