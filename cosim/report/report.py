@@ -232,6 +232,7 @@ def _one_run(run: StoredResult) -> dict[str, Any]:
     rows = metric_rows(metrics, net_slip=has_net_slip(run.facts["parameters"]))
     return {
         "headline": plain_headline(run.metrics, run.facts),
+        "headlines": [],
         "cards": [],
         "columns": list(metrics),
         "compared": [],
