@@ -66,8 +66,8 @@ def compared(
 def test_compare_prints_the_shape_of_the_contract(compared: tuple[Path, dict[str, Any]]) -> None:
     folder, printed = compared
     counts = ["seeds", "walked", "warnings"]
-    compared = ["reference", "references", "changes"]
-    assert list(printed) == [*CONTROLS, *compared, *counts, "report"]
+    about = ["reference", "references", "changes"]
+    assert list(printed) == [*CONTROLS, *about, *counts, "report"]
     assert printed["warnings"] == []
     for control in CONTROLS:
         assert list(printed[control]) == list(METRICS)
