@@ -104,7 +104,8 @@ ControlNames = Annotated[
     typer.Option(
         "--control",
         metavar="CONTROL",
-        help=f"{', '.join(CONTROLS)}, law.py:Class or controller.fmu; LABEL=CONTROL names it. "
+        help=f"{', '.join(CONTROLS)}, law.py:Class or controller.fmu; LABEL=CONTROL names it, "
+        "CONTROL@chosen walks in the gait and stance that compliant control chooses. "
         "Repeat it for more.",
         show_default=False,
         autocompletion=completion.control,

@@ -166,7 +166,9 @@ def _named(text: str, *, where: str, base: Path | None) -> tuple[str, str, Path 
     if text not in CONTROLS:
         near = nearest_name(text, CONTROLS)
         fix = f"did you mean {near!r}?" if near else "name a class as law.py:Class"
-        expected = f"one of {', '.join(CONTROLS)}, or law.py:Class, or controller.fmu"
+        walks = " or ".join(f"{AT}{walk}" for walk in WALKS)
+        expected = f"one of {', '.join(CONTROLS)}, or law.py:Class, with {walks} or without, "
+        expected += "or controller.fmu"
         raise ScenarioError("unknown control", got=text, expected=expected, fix=fix, where=where)
     return BUILTIN, text, None
 

@@ -41,7 +41,7 @@ def test_a_text_names_a_control(
     [
         ("complaint", "did you mean 'compliant'?"),
         ("law.py", "name its class: law.py:MyController"),
-        ("kinematic@amble", "unknown control"),
+        ("kinematic@amble", "with @own or @chosen or without"),
         ("ctrl.fmu@chosen", "unknown control"),
         ("=compliant", "not a label"),
         ("a/b=compliant", "not a label"),
