@@ -118,7 +118,7 @@ def compare(
     All walk in the gait and stance of the scenario, or else of the robot file; kinematic@chosen
     walks in those that compliant control chooses, and compliant@chosen is compared with it. Without
     --control these are kinematic, paper and compliant. Where one scenario is given that names
-    neither gait nor stance, these two are in the tables as well, without recordings.
+    neither gait nor stance, and no gains, these two are in the tables too, without recordings.
     """
     names = scenarios or ["walk_flat"]
     options = RunOptions.read(fmu=fmu, gains=gains, engine=engine, runs=seeds)
@@ -137,7 +137,7 @@ def compare(
         )
         plan = _plan(name, settings or [], seeds)
         controls = _controls(control or CONTROLS, plan)
-        alike = control or plan.names_walk or len(names) > 1
+        alike = control or gains or plan.names_walk or len(names) > 1
         chosen = () if alike else chosen_controls(CHOSEN_WALK, plan)
         works.append(Work(plan, controls, chosen, seeds, command, options, accuracy))
     for work in works:
@@ -195,10 +195,12 @@ class Work:
     @property
     def walks(self) -> list[str]:
         """A sentence for each control, if they walk differently."""
-        plans = {one.label: replace(self.plan, control=one.text) for one in self.compared}
-        return different_walks(
-            {label: {WALKING: choose_walk(plan).as_facts()} for label, plan in plans.items()}
-        )
+        found = {}
+        for control in self.compared:
+            plan = replace(self.plan, control=control.text)
+            walk = choose_walk(plan, gains=chosen_gains(plan, self.options.gains))
+            found[control.label] = {WALKING: walk.as_facts()}
+        return different_walks(found)
 
 
 @dataclass(frozen=True)

@@ -156,7 +156,11 @@ def write_report(
     ]
     content["scenario"] = first.scenario if scenario is None else scenario
     content["command"] = first.facts.get("command", "") if command is None else command
-    metrics = _metrics(runs, comparison)
+    metrics = (
+        {label: run.metrics for label, run in runs.items()}
+        if comparison is None
+        else comparison.means
+    )
     page = render(
         "report.html.jinja",
         controls=runs,
@@ -188,13 +192,6 @@ def _materials(runs: Mapping[str, StoredResult]) -> list[dict[str, str]]:
         for entry in material_legend(run.view.surface, run.view.parameters)
     ]
     return [entry for k, entry in enumerate(found) if entry not in found[:k]]
-
-
-def _metrics(runs: Mapping[str, StoredResult], comparison: Comparisons | None) -> Metrics:
-    """Returns the metrics of the table: means of a comparison, or those of a single run."""
-    if comparison is None:
-        return {label: run.metrics for label, run in runs.items()}
-    return comparison.means
 
 
 def _accuracy(
