@@ -1,8 +1,8 @@
 """Writes the tables of README.md and docs/ that compare controls: `make figures`.
 
-usage: python -m benchmarks.pages FOLDER
+usage: python -m benchmarks.pages [FOLDER]
 
-The folder is that of `hexapod benchmark`; the walks of the other tables are run here.
+The folder is that of `hexapod benchmark`, out/benchmark; the other tables' walks are run here.
 """
 
 from __future__ import annotations
@@ -129,7 +129,7 @@ def worse_rows(table: Table) -> list[list[str]]:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Writes the tables into the pages, and the picture of the course beside them."""
-    folder = Path((arguments or sys.argv[1:])[0])
+    folder = Path(*(arguments or sys.argv[1:] or ["out/benchmark"]))
     table, _ = read_table(folder)
     tables = dict(course_tables(table))
     for law in ("tanh", "bristle"):
