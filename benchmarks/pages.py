@@ -54,6 +54,7 @@ ROWS = {
     "path_error": ("path error", 1e3, "mm/m"),
     "slip_per_metre": ("slip per metre", 1e3, "mm/m"),
 }
+DETAILS = ("foot_error_swing", "height_rms", "pitch_rms")
 COLOURS = 64  # of the picture
 HARDLY = 0.07  # a smaller change for the worse of a case is not listed
 EFFORT = ("electrical", "heat", "load")  # worse in nearly all cases; the classes show by how much
@@ -77,11 +78,16 @@ def compared(scenario: str, controls: Sequence[str], *settings: str) -> Comparis
     )
 
 
-def metrics_table(comparison: Comparisons) -> str:
-    """Returns a row for each metric: means, and in brackets the change from the reference."""
+def metrics_table(comparison: Comparisons, *, brief: bool = False) -> str:
+    """Returns a row for each metric: means, and in brackets the change from the reference.
+
+    brief: without the metrics of DETAILS.
+    """
     pairs = {pair.labels[1]: pair for pair in comparison.pairs}
     rows = [["walked to the end", *(f"{n} of {len(SEEDS)}" for n in comparison.walked.values())]]
     for name, (title, scale, unit) in ROWS.items():
+        if brief and name in DETAILS:
+            continue
         cells = [title]
         for label, means in comparison.means.items():
             shown = f"{scale * means[name]:.3g} {unit}".strip()
@@ -106,7 +112,6 @@ def course_tables(table: Table) -> Mapping[str, str]:
         "all": markdown(headings[1:], [row[1:] for row in rows if row[0] == "all"]),
         "gait": classes(GAIT),
         "compliant": classes(TWIN),
-        "paper": classes("paper"),
         "heights": markdown(*texts.sweep_rows(table)),
         "goals": markdown(*texts.goal_rows(judged)),
         "worse": markdown(["case", "worse"], worse_rows(table)),
@@ -137,7 +142,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         tables[f"flat {law}"] = metrics_table(flat)
     put_into(PAGES, tables)
     demo = compared("demo_course", [*OWN, CHOSEN[0], CHOSEN[-1]])
-    put_into((ROOT / "README.md",), {"demo": metrics_table(demo)})
+    put_into((ROOT / "README.md",), {"demo": metrics_table(demo, brief=True)})
     with Image.open(folder / FOLDER / f"{STEM}-light.png") as picture:
         small = picture.convert("RGB").quantize(COLOURS, dither=Image.Dither.NONE)
     small.save(ROOT / "docs" / "images" / f"{STEM}.png", optimize=True)
