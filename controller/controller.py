@@ -103,7 +103,7 @@ class PlannedStep(NamedTuple):
     value: Array  # (6,) commanded vx vy yaw_rate height roll pitch
     posture: Posture
     feet: PlannedFeet
-    sway: complex  # m    way of the torso against the swinging legs (C57)
+    sway: complex  # m    way of the torso against the swinging legs (C54)
     plane: Plane  # m    of the feet from the torso that sways
     activation: Array  # 1    of the legs
     lowering: Array  # m    lowering of the feet by the indentation of the ground (C21)
@@ -197,7 +197,6 @@ class Controller(Stateful):
             period=period,
             inward=inward,
             turned=turned,
-            slow_landing=self._lands_slowly(),
         )
         self.compliant: Compliant | None = None
         self.paper: Paper | None = None
@@ -208,9 +207,6 @@ class Controller(Stateful):
                 self.robot, gait, self.gains, self.parts, legs=self.legs, period=period
             )
             self.paths.handover = self.compliant.support.handover
-
-    def _lands_slowly(self) -> bool:
-        return self.gains is not None and self.law == "compliant" and self.parts.slow_landing
 
     # ------------------------------------------------------------------------------- planning
 
@@ -599,8 +595,9 @@ class Controller(Stateful):
             if self.paper is not None:
                 self._correct_paths(self.paper, measurement)
             if self.compliant is not None:
-                shift = self.compliant.step(self._ask(self.compliant), measurement, self._out)
-                self._show(shift, self.compliant.laws.fallback)
+                raised = self.compliant.step(self._ask(self.compliant), measurement, self._out)
+                still = np.zeros(LEGS)
+                self._show(rows_of(still, still, raised), self.compliant.laws.fallback)
             self.fade.step(self.legs, self._out)
             self._adopt()
         return self._out

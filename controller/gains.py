@@ -14,7 +14,7 @@ from hexapod_cosim.models.errors import refuse_path
 from hexapod_cosim.models.files import read_text
 from hexapod_cosim.models.schema import decoding_toml, parse_toml
 
-FORMAT = 3
+FORMAT = 4
 TRIPOD_LEGS = 3  # legs that share the weight in a tripod gait: the unit of load is weight / 3
 
 
@@ -24,9 +24,8 @@ class GainsError(HexapodError):
 
 @dataclass(frozen=True, kw_only=True)
 class SlipGains:
-    """PID from the tangential force [N] to the force [N] by which a leg yields (C25).
+    """PID of the tangential force of a foot (C25).
 
-    The shift of the foot is C times that force (C28).
     In continuous time: (kp + ki/s + kd s/(derivative_time s + 1)) / (filter_time s + 1).
     """
 
@@ -35,14 +34,14 @@ class SlipGains:
     kd: float  # s
     derivative_time: float  # s    filter of the derivative, > 0
     filter_time: float  # s    force filter, > 0
-    load_time: float  # s    smoothing of the measured load that scales the force, > 0
-    tracking_time: float  # s    anti-windup: the integral follows the limited force, > 0
-    limit: float  # 1    largest force, in thirds of the weight
+    load_time: float  # s    decay of the integral of a swinging foot, > 0
+    tracking_time: float  # s    anti-windup: the integral follows the limited value, > 0
+    limit: float  # largest value, in the unit of kp times force
 
 
 @dataclass(frozen=True, kw_only=True)
 class SuspensionGains:
-    """Virtual m z'' + b z' + k z = f_n - the share of the leg; z lifts the foot (C26)."""
+    """Virtual m z'' + b z' + k z = f_n; z lifts the foot (C26)."""
 
     mass: float  # kg
     damping: float  # N s/m
@@ -65,6 +64,7 @@ class SupportGains:
 
     handover_time: float  # s    duration of the change of load between two sets of legs, > 0
     weight_time: float  # s    smoothing of the measured weight that the plan is scaled by, > 0
+    load_time: float  # s    smoothing of the measured loads, grip and trust, > 0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -83,9 +83,8 @@ class HoldGains:
 
 @dataclass(frozen=True, kw_only=True)
 class LimitGains:
-    """Limits of the corrections that compliant control adds to the commands."""
+    """Limits of what compliant control adds to the commands."""
 
-    speed: float  # rad/s    fastest change of a joint angle's correction
     torque: float  # N m    largest feed-forward torque
 
 
@@ -93,19 +92,16 @@ class LimitGains:
 class Requirements:
     """Requirements of a design. The defaults suit legs of 0.22 to 0.44 m; for others: size.py."""
 
-    phase_margin: float = 60.0  # deg    at least, both loops
+    phase_margin: float = 60.0  # deg    of the paper's control: at least, both loops
     gain_margin: float = 8.0  # dB    at least, the same
-    bandwidth: float = 5.0  # rad/s    crossover of the tangential loop, at least
-    slip_rejection: float = 0.6  # 1    steady slip with the law over that without
     delay_periods: float = 1.0  # 1    computing delay in controller periods
     force_delay: float = 0.010  # s    of the force sensors
     filter_time: float = 0.010  # s    force filter of the tangential loop
     load_time: float = 0.030  # s    smoothing of the load: the time of real hand-overs
-    slip_limit: float = 1.0  # 1    clamp of the tangential answer, in thirds of the weight
-    deflection: float = 0.003  # m    of the suspension under a third of the weight beyond the share
+    deflection: float = 0.003  # m    of the suspension under a third of the weight
     frequency: float = 5.0  # Hz    natural frequency of the suspension, at most
     damping_ratio: float = 1.0  # 1
-    deflection_limit: float = 0.015  # m    clamp of the suspension
+    deflection_limit: float = 0.015  # m    largest corrections of the paper's control
     handover_time: float = 0.065  # s
     weight_time: float = 0.5  # s
     attitude_rate: float = 2.0  # 1/s
@@ -116,7 +112,6 @@ class Requirements:
     path_rate: float = 1.0  # 1/s
     speed_limit: float = 0.02  # m/s
     turn_limit: float = 0.05  # rad/s
-    speed_share: float = 0.5  # 1    of the servo's largest speed at which corrections may change
     torque_share: float = 0.9  # 1    of the servo's largest torque: a tripod must stand within it
 
 
@@ -124,17 +119,9 @@ class Requirements:
 class Margins:
     """Margins of a design: the worst over stances, loads and eigenvalues of the sampled loop."""
 
-    slip_crossover: float  # rad/s
-    slip_phase_margin: float  # deg
-    slip_gain_margin: float  # dB
-    slip_delay_margin: float  # s    further delay at which the loop becomes unstable
-    slip_rejection: float  # 1    steady slip speed with the law over without it
-    suspension_phase_margin: float  # deg
-    suspension_gain_margin: float  # dB
     support_torque: float  # N m    largest torque of a servo in a standing tripod
-    spectral_radius: float  # 1    of the whole closed loop, all feet and both laws together, < 1
-    binding: str  # the requirement that limited the gain of the tangential loop
     # of the paper's control: the worst of its loops, tangential and vertical
+    binding: str  # the requirement that limited the gain of the tangential loop
     paper_phase_margin: float = math.inf  # deg
     paper_gain_margin: float = math.inf  # dB
     paper_spectral_radius: float = 0.0  # 1    of its whole closed loop, < 1
@@ -148,8 +135,6 @@ class Gains:
     robot_hash: str
     period: float  # s
     requirements: Requirements
-    slip: SlipGains
-    suspension: SuspensionGains
     support: SupportGains
     hold: HoldGains
     limits: LimitGains
@@ -180,8 +165,6 @@ class Gains:
 
 PARTS: dict[str, type[Any]] = {
     "requirements": Requirements,
-    "slip": SlipGains,
-    "suspension": SuspensionGains,
     "support": SupportGains,
     "hold": HoldGains,
     "limits": LimitGains,
@@ -190,11 +173,9 @@ PARTS: dict[str, type[Any]] = {
     "margins": Margins,
 }
 POSITIVE = {
-    "slip": ("derivative_time", "filter_time", "load_time", "tracking_time", "limit"),
-    "suspension": ("mass", "damping", "stiffness", "limit"),
-    "support": ("handover_time", "weight_time"),
+    "support": ("handover_time", "weight_time", "load_time"),
     "hold": ("ground_time",),
-    "limits": ("speed", "torque"),
+    "limits": ("torque",),
     "paper_slip": ("derivative_time", "filter_time", "load_time", "tracking_time", "limit"),
     "paper_suspension": ("mass", "damping", "stiffness", "limit"),
     "requirements": (
@@ -224,7 +205,7 @@ def save_gains(gains: Gains, path: str | Path) -> Path:
         "period": gains.period,
     }
     head |= {"caveats": list(gains.caveats)} if gains.caveats else {}
-    lines = ["# Gains of the compliant control, SI units; made by `hexapod design`."]
+    lines = ["# Gains of compliant and paper control, SI units; made by `hexapod design`."]
     lines += _toml_lines(head)
     for part in PARTS:
         lines += ["", f"[{part}]", *_toml_lines(asdict(getattr(gains, part)))]

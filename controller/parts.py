@@ -1,7 +1,6 @@
-"""Defines the switches of the parts of compliant control, and the weight of the squeeze.
+"""Defines the switches of the parts of both force controls, and the weight of the squeeze.
 
-Each part can be switched by itself, so that its effect can be measured. Parts that do not better
-their figure of the course by 10 % are off by default.
+Each part can be switched by itself, so that its effect can be measured.
 """
 
 from __future__ import annotations
@@ -14,25 +13,21 @@ class Parts:
     """Switches; they have no effect on kinematic control."""
 
     support: bool = True  # servo torques that carry each leg's share of weight and acceleration
-    slip_pid: bool = True  # feet yield to squeezing tangential forces
-    suspension: bool = False  # legs yield to normal forces above their share
+    slip_pid: bool = True  # of the paper's control: feet yield to tangential forces
     paper_suspension: bool = True  # of the paper's control: legs yield to normal forces
     touchdown: bool = True  # foot heights follow early and late touch-downs
-    slow_landing: bool = False  # feet rise faster and come down more slowly on the same paths
     posture: bool = True  # roll, pitch and height are controlled
     # under a payload the torso moves against the swinging legs: feet need not push for them
     sway: bool = True
     path: bool = True  # the path walked is measured at the feet, and its deviation corrected
-    limits: bool = True  # corrections are limited in rate and torque
+    limits: bool = True  # torques are limited
     # no feedback from a sensor that contradicts the plan; kinematic control while the robot slides,
     # its joints cannot follow, or it is far too heavy for them
     fallback: bool = True
     # weight of the servos' torques against the feet's use of friction in the planned squeeze, in
     # [0, 1), on ground on which feet creep: a part of `support`
-    squeeze: float = 0.6
-    # the squeeze lowers the largest torques of all servos instead of the sum of their squares
-    minmax_torque: bool = False
+    squeeze: float = 0.3
 
 
 SWITCHES = tuple(item.name for item in fields(Parts) if item.name != "squeeze")
-COMPLIANT_PARTS = tuple(name for name in SWITCHES if name != "paper_suspension")
+COMPLIANT_PARTS = tuple(name for name in SWITCHES if name not in ("slip_pid", "paper_suspension"))

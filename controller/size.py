@@ -22,7 +22,7 @@ SHORTEST, LONGEST = 0.22, 0.44  # m    coxa, femur and tibia of legs that the fi
 YIELD = 1.5  # 1    deflection of the suspension over the sag of its leg's servos, at most
 LENGTHS = ("deflection", "deflection_limit", "height_limit")
 TIMES = ("load_time", "handover_time", "weight_time", "ground_time")
-RATES = ("bandwidth", "frequency", "attitude_rate", "height_rate", "path_rate", "turn_limit")
+RATES = ("frequency", "attitude_rate", "height_rate", "path_rate", "turn_limit")
 SPEEDS = ("speed_limit",)
 
 

@@ -18,7 +18,6 @@ from benchmarks.control.cases import (
     DATA,
     ablation,
     grid,
-    model_errors,
     robustness,
     seeds,
     sticking,
@@ -44,7 +43,6 @@ def sections() -> list[Section]:
     return [
         Section(name="ablation", cases=ablation(), seeds=judged), *grids,
         Section(name="sticking", cases=sticking(), seeds=judged),
-        Section(name="model errors", cases=model_errors(), seeds=seeds("robustness")),
         Section(name="robustness", cases=robustness(), seeds=seeds("robustness")),
     ]  # fmt: skip
 

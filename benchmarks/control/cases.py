@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from hexapod_cosim.controller import COMPLIANT_PARTS, Parts
+from hexapod_cosim.controller import COMPLIANT_PARTS
 from hexapod_cosim.cosim.scenario.records import Scenario
 from hexapod_cosim.cosim.scenario.scenario import load_scenario
 from hexapod_cosim.cosim.scenario.variation import STANDARD
@@ -60,14 +60,10 @@ def ablation() -> list[Case]:
 
     The squeeze belongs to the support, and so to the support alone.
     """
-    default = {part for part in COMPLIANT_PARTS if getattr(Parts(), part)}
     cases = [_with_parts("no part", set()), judged_walk("by default")]
     cases += [_with_parts(f"{part} alone", {part}) for part in COMPLIANT_PARTS]
     cases += [
-        _with_parts(f"without {part}", default - {part})
-        if part in default
-        else _with_parts(f"with {part}", default | {part})
-        for part in COMPLIANT_PARTS
+        _with_parts(f"without {part}", {*COMPLIANT_PARTS} - {part}) for part in COMPLIANT_PARTS
     ]
     return [*cases, judged_walk("without squeeze", f"{SWITCH}squeeze=0")]
 
@@ -79,27 +75,8 @@ def _with_parts(name: str, on: Collection[str]) -> Case:
 
 
 def sticking() -> list[Case]:
-    """Returns the judged walk on ground that holds a foot still.
-
-    One case has the parts of the default, the other the slip PID alone.
-    """
-    law = DATA["judged"]["sticking"]
-    alone = next(case for case in ablation() if case.name == "slip_pid alone")
-    return [judged_walk("by default", *law), judged_walk(alone.name, *law, *alone.settings)]
-
-
-def model_errors() -> list[Case]:
-    """Returns the judged walk on plants that differ from the controller's model.
-
-    Each has a case with the parts of the default and one without the slip PID.
-    """
-    entries = [entry for entry in DATA["robustness"]["cases"] if entry.get("model_error")]
-    off = f"{SWITCH}slip_pid=false"
-    return [
-        judged_walk(f"{entry['name']}, {name}", *entry["settings"], *settings)
-        for entry in entries
-        for name, settings in (("by default", ()), ("without slip_pid", (off,)))
-    ]
+    """Returns the judged walk on ground that holds a foot still."""
+    return [judged_walk("by default", *DATA["judged"]["sticking"])]
 
 
 def robustness() -> list[Case]:

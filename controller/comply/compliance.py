@@ -1,15 +1,13 @@
-"""Applies the force laws: turns planned load and measured foot forces into joint corrections.
+"""Applies the force laws: turns planned load and measured foot forces into servo torques.
 
 C: compliance.c. Every period consists of these steps:
 
 1. Contacts. The detector decides which feet touch the ground (C23). If a contact contradicts the
    plan, a sensor may be wrong (C34) or the ground may be higher or lower than planned (C35, C36).
-2. Inputs. The planned forces are subtracted from the measured ones. The slip PID responds to the
-   squeeze (C24), the virtual suspension to the normal force above the planned share (C26).
+2. Deviations. The planned forces are subtracted from the measured ones (C24). They tell whether the
+   robot slides (C33) and how much of the planned squeeze the ground holds (C46, C52).
 3. Weight. The plan is scaled by the measured weight (C30), so that a payload is carried too.
-4. Laws. PID and suspension compute correcting forces (C25 to C27).
-5. Joints. The angles are corrected by the deflection of the servos under these forces (C28); the
-   torques are those of the planned load (C29).
+4. Torques. They are those of the planned load (C29).
 
 When the whole robot slides, its joints cannot follow or it is far too heavy, `trust` goes to 0 and
 the robot walks under kinematic control (C33).
@@ -22,13 +20,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hexapod_cosim.controller.comply.foot_law import FootLaw
-from hexapod_cosim.controller.comply.slip_pid import LOAD_FLOOR, missing_share, squeeze
 from hexapod_cosim.controller.comply.support import Shares
 from hexapod_cosim.controller.gains import TRIPOD_LEGS, Gains
 from hexapod_cosim.controller.memory import Stateful
 from hexapod_cosim.controller.parts import Parts
-from hexapod_cosim.controller.plane import LEGS, Array, Mask, Plane, clamp, rows_of, square
+from hexapod_cosim.controller.plane import LEGS, Array, Mask, Plane, along, clamp, square
 from hexapod_cosim.controller.sense.burden import Burden
 from hexapod_cosim.controller.sense.contact_detection import ContactDetector, SensorWatch
 from hexapod_cosim.controller.sense.landing import Landings
@@ -43,7 +39,7 @@ SETTLED_SHARE = 0.5  # 1    of the weight: feet that carry less together have on
 JOINTS_FOLLOW, JOINTS_DO_NOT = 0.35, 0.45  # 1    share of the time with too high joint speeds
 FEET_LATE = 0.2  # 1    the same, from which feet end their swings late whatever the ground
 GRIPPED = 0.99  # 1    of its share: a leg with more carries it
-LARGEST_LOAD = 2.0  # 1    in thirds of the weight: the margins of the design hold up to it
+LOAD_FLOOR = 1e-6  # N    a smaller sum of loads cannot be divided by
 LEAST_SCALE, LARGEST_SCALE = 0.5, 3.0  # 1    measured over modelled weight that is believed
 CARRYING = 0.1  # 1    in thirds of the weight: an awaited foot with more stands
 LARGEST_LEAN = 0.4  # 1    of the depth of the ground: distance of the centre of mass, each axis
@@ -55,7 +51,6 @@ class Plan(NamedTuple):
 
     own: Array  # N m    (6, 3) torques for the legs' own weight and motion
     carry: Array  # N m    (6, 3) torques for the planned load
-    lever: Array  # m    (6, 3, 3) J^T of the contact points
     shares: Shares
     feet: Plane  # m    contact points, x + i y
     weight: float  # N    scalar: of all shares
@@ -73,10 +68,9 @@ class Compliance(Stateful):
     """Force laws of all feet.
 
     Attributes, (6,) unless stated otherwise:
-        law, detector, watch, touchdown, landings, burden: components with a state of their own.
-        bend: (6, 3) corrections of the joint angles [rad].
+        detector, watch, touchdown, landings, burden: components with a state of their own.
+        load: smoothed load of the feet in thirds of the weight [1].
         torque: (6, 3) feed-forward torques of the servos [N m].
-        shift: (6, 3) displacement of the feet due to `bend`, walking frame [m].
         doubted: sensors that are replaced by the plan.
         fallback: legs that walk without feedback.
         grip: factor on the planned load of a leg that is regaining contact [1].
@@ -85,7 +79,7 @@ class Compliance(Stateful):
         lean: horizontal distance of the measured centre of mass from the modelled one, walking
             frame, x + i y (scalar) [m].
         held: share of the planned squeeze that the ground holds, smoothed (scalar) [1].
-        trust: factor on all corrections and torques (scalar) [1].
+        trust: factor on all torques (scalar) [1].
         lagging: the joints cannot follow the plan (scalar).
         overspeed_share: share of the time in which the plan exceeds a speed limit (scalar) [1].
         slide_periods: periods for which the robot has been sliding (scalar).
@@ -93,9 +87,9 @@ class Compliance(Stateful):
     """
 
     STATE = (
-        "law", "detector", "watch", "touchdown", "landings", "burden", "bend", "torque", "shift",
-        "doubted", "fallback", "grip", "regaining", "scale", "lean", "held", "trust",
-        "lagging", "overspeed_share", "slide_periods", "recovery_periods",
+        "detector", "watch", "touchdown", "landings", "burden", "load", "torque", "doubted",
+        "fallback", "grip", "regaining", "scale", "lean", "held", "trust", "lagging",
+        "overspeed_share", "slide_periods", "recovery_periods",
     )  # fmt: skip
 
     def __init__(
@@ -106,43 +100,37 @@ class Compliance(Stateful):
         weight: float,
         depth: float,
         cycle: float,
-        kp: float,
         step_height: float,
         period: float,
     ) -> None:
         """Computes the constants of the laws and resets their state.
 
         weight: of the robot [N]; depth: of the ground below the torso's origin [m]; cycle,
-        step_height: of its gait [s, m]; kp: of its servos [N m/rad]; period [s].
+        step_height: of its gait [s, m]; period [s].
         """
         self.parts, self.period = parts, period
         self.share = weight / TRIPOD_LEGS  # N
         self.settled = SETTLED_SHARE * weight  # N
         self.most_lean = LARGEST_LEAN * depth  # m
-        self.softness = 1.0 / kp  # rad/N m
         self.high = HIGH_SHARE * step_height  # m
-        self.law, self.landings = FootLaw(gains, period=period), Landings()
+        self.landings = Landings()
         self.detector = ContactDetector(weight)
         self.watch = SensorWatch(weight, cycle=cycle, period=period)
         self.touchdown = Touchdown(period=period)
         time = gains.support.weight_time
         self.burden = Burden(most=gains.limits.torque, cycle=cycle, period=period, weight_time=time)
-        self.tracking = min(period / gains.slip.tracking_time, 1.0)
-        self.memory = math.exp(-period / gains.slip.load_time)
-        self.follow_load = 1.0 - self.memory
+        self.follow_load = 1.0 - math.exp(-period / gains.support.load_time)
         self.follow_cycle = 1.0 - math.exp(-period / cycle)
         self.follow_weight = 1.0 - math.exp(-period / gains.support.weight_time)
         self.calm = round(CALM_CYCLES * cycle / period)  # periods
-        self.largest, self.deepest = gains.slip.limit * self.share, gains.suspension.limit  # N, m
-        self.most, self.fastest = gains.limits.torque, gains.limits.speed * period  # N m, rad
+        self.most = gains.limits.torque  # N m
         self.reset()
 
     def reset(self) -> None:
-        """Puts all laws to rest: no corrections, all sensors trusted, no offsets."""
-        for part in (self.law, self.detector, self.watch, self.touchdown, self.landings):
+        """Puts all laws to rest: no torques, all sensors trusted, no offsets."""
+        for part in (self.detector, self.watch, self.touchdown, self.landings, self.burden):
             part.reset()
-        self.burden.reset()
-        self.bend, self.torque, self.shift = np.zeros((3, LEGS, 3))
+        self.load, self.torque = np.zeros(LEGS), np.zeros((LEGS, 3))
         self.doubted, self.fallback = np.zeros((2, LEGS), dtype=np.bool_)
         self.grip, self.regaining = np.ones(LEGS), False
         self.scale, self.lean, self.held, self.trust = 0.0, 0j, 1.0, 1.0
@@ -183,7 +171,6 @@ class Compliance(Stateful):
         return Plan(
             own=supports * demand.torque,
             carry=carry,
-            lever=demand.lever,
             shares=shares,
             feet=feet,
             weight=float(shares.normal.sum()),
@@ -221,7 +208,7 @@ class Compliance(Stateful):
 
     def _carries(self) -> Mask:
         """Returns the feet (6,) that carry so much that the gait clock need not wait for them."""
-        return self.touching & (self.law.load > CARRYING)
+        return self.touching & (self.load > CARRYING)
 
     def _meet_ground(self, plan: Plan, met: Array) -> None:
         """Adapts the foot heights to early and late contacts (C36). met: as in _judge_sensors()."""
@@ -276,25 +263,35 @@ class Compliance(Stateful):
             self.trust = goal
         self.fallback = self.doubted | (goal == 0.0)
 
-    def _law_inputs(self, plan: Plan, force: Array) -> tuple[Plane, Array, float]:
-        """Returns the squeeze (6,), the normal forces (6,) and their sum [N] (C24, C46).
+    def _missing_share(self, plan: Plan, deviation: Plane) -> float:
+        """Returns the share of the planned squeeze that creep has taken away, in [0, 1] (C46).
 
-        It updates the share of the planned squeeze that is held (C52).
+        deviation: (6,) of the tangential forces from the planned ones [N]. Without planned squeeze
+        it is 0.
+        """
+        planned = np.where(self.touching, self.scale * plan.shares.squeeze, 0.0)
+        whole = float(square(planned).sum())
+        if whole <= LOAD_FLOOR:
+            return 0.0
+        return min(max(-float(along(planned, deviation).sum()) / whole, 0.0), 1.0)
+
+    def _feel(self, plan: Plan, force: Array) -> tuple[Array, float]:
+        """Returns the normal forces (6,) and their sum [N].
+
+        It updates trust (C33), the smoothed loads (C27) and the share of the planned squeeze that
+        is held (C52) by the deviations of the tangential forces (C24).
         """
         horizontal = force[:, 0] + 1j * force[:, 1]
-        felt = np.where(self.touching, horizontal - self.scale * plan.shares.push, 0.0)
+        deviation = np.where(self.touching, horizontal - self.scale * plan.shares.push, 0.0)
         normal = np.where(self.touching, force[:, 2], 0.0)
         total = float(normal.sum())
         if self.parts.fallback:
-            drag = abs(felt.sum()) / total if total > max(self.settled, LOAD_FLOOR) else 0.0
+            drag = abs(deviation.sum()) / total if total > max(self.settled, LOAD_FLOOR) else 0.0
             self._update_trust(plan, drag)
-        found = squeeze(felt, normal, plan.feet)
-        planned = np.where(self.touching, self.scale * plan.shares.squeeze, 0.0)
-        missing = missing_share(found, planned)
+        self.load = self.load + self.follow_load * (normal / self.share - self.load)
+        missing = self._missing_share(plan, deviation)
         self.held += self.follow_cycle * (1.0 - missing - self.held)
-        if not self.parts.slip_pid:
-            return np.zeros(LEGS, dtype=np.complex128), normal, total
-        return np.asarray(found + missing * planned), normal, total
+        return normal, total
 
     def _update_lean(self, plan: Plan, normal: Array, total: float) -> None:
         """Updates the distance of the centre of mass from the modelled one (C44).
@@ -324,53 +321,10 @@ class Compliance(Stateful):
             self._update_lean(plan, normal, total)
         self.burden.step(plan.needed, self.scale)
 
-    def _excess(self, plan: Plan, normal: Array) -> Array:
-        """Returns the normal forces (6,) above the planned shares [N]; 0 without a share (C26)."""
-        live = self.parts.suspension & (plan.shares.activation > 0.0)
-        return np.where(live, normal - self.scale * plan.shares.normal, 0.0)
-
-    # ------------------------------------------------------------------------------------ laws
-
-    def _limit_answers(self) -> None:
-        """Limits the PID's forces without turning them; the integrals follow (C27)."""
-        law = self.law
-        wanted = law.answer
-        law.answer = wanted * (self.largest / np.maximum(np.abs(wanted), self.largest))
-        law.pid.integral = law.pid.integral + self.tracking * (law.answer - wanted)
-
-    def _limit_deflections(self) -> None:
-        """Limits the deflections of the suspensions; beyond the limit their rate is 0."""
-        law = self.law
-        law.rate = np.where(np.abs(law.deflection) > self.deepest, 0.0, law.rate)
-        law.deflection = clamp(law.deflection, -self.deepest, self.deepest)
-
-    def _step_laws(self, plan: Plan, push: Plane, normal: Array, excess: Array) -> Array:
-        """Advances the laws by one period and returns the correcting forces (6, 3) [N].
-
-        They are those of C25 to C27. push, normal, excess: (6,) [N].
-        """
-        law = self.law
-        law.step(push, excess, normal * (1.0 / self.share))
-        # the sum of squares bounds each of them: usually no limit is reached
-        if square(law.answer).sum() > self.largest**2:
-            self._limit_answers()
-        if (law.deflection * law.deflection).sum() > self.deepest**2:
-            self._limit_deflections()
-        freedom = self.burden.freedom if self.parts.support else 1.0
-        given = law.answer * (freedom * np.minimum(law.load, LARGEST_LOAD))
-        vertical = (plan.lever[:, :, 2] ** 2).sum(axis=1)
-        lift = law.deflection / (self.softness * vertical)  # z/C_zz, C = J kp^-1 J^T
-        # the integral of a foot in the air decays with the time constant of the load; all
-        # integrals decay by the part of the squeeze that must remain (C32)
-        kept = 1.0 - (1.0 - freedom) * self.follow_load
-        forgets = plan.swinging & ~self.touching
-        law.pid.integral = law.pid.integral * np.where(forgets, kept * self.memory, kept)
-        return rows_of(given.real, given.imag, lift)
-
     # ---------------------------------------------------------------------------------- joints
 
     def _restore_grip(self, plan: Plan, torque: Array) -> Array:
-        """Scales the planned load of each leg by its grip, which grows as the leg loads (C29).
+        """Scales the planned load of each leg by its grip, which grows as the leg loads (C28).
 
         A leg that should stand and does not touch the ground has grip 0. torque: (6, 3) for the
         planned load [N m]. Returns the scaled torques (6, 3) [N m].
@@ -380,28 +334,14 @@ class Compliance(Stateful):
         self.regaining = bool((self.grip < GRIPPED).any())
         return torque * self.grip[:, None]
 
-    def _limit_joints(self, wanted: Array, torque: Array) -> None:
-        """Moves the angle corrections to the wanted ones and sets the torques, both limited (C28,
-        C29).
-        """
-        if not self.parts.limits:
-            self.bend, self.torque = wanted, torque
-            return
-        self.bend = self.bend + clamp(wanted - self.bend, -self.fastest, self.fastest)
-        self.torque = clamp(torque, -self.most, self.most)
-
-    def _actuate(self, plan: Plan, answer: Array) -> None:
-        """Turns the forces of the laws (6, 3) [N] and the planned load into angles and torques.
-
-        bend = J^T f/kp (C28); torque = trust (own + grip strength scale carry) (C29).
-        """
+    def _actuate(self, plan: Plan) -> None:
+        """Sets the torques of the planned load: trust (own + grip strength scale carry) (C29)."""
         strength = self.burden.strength if self.parts.limits else 1.0
         torque = plan.carry * (strength * self.scale)
         if self.regaining:
             torque = self._restore_grip(plan, torque)
-        bend = self.softness * (plan.lever @ answer[:, :, None])[:, :, 0]
-        self.shift = (bend[:, None, :] @ plan.lever)[:, 0, :]  # J bend
-        self._limit_joints(bend * self.trust, (torque + plan.own) * self.trust)
+        torque = (torque + plan.own) * self.trust
+        self.torque = clamp(torque, -self.most, self.most) if self.parts.limits else torque
 
     def meets(self) -> Mask:
         """Returns the feet (6,) that have met the ground on their way down (C51).
@@ -434,7 +374,6 @@ class Compliance(Stateful):
         self.landings.look(self.touching, plan.height, plan.swinging)
         if self._contacts_differ(plan):
             force = self._examine_contacts(plan, force)
-        push, normal, total = self._law_inputs(plan, force)
+        normal, total = self._feel(plan, force)
         self._update_weight(plan, normal, total)
-        answer = self._step_laws(plan, push, normal, self._excess(plan, normal))
-        self._actuate(plan, answer)
+        self._actuate(plan)

@@ -3,13 +3,13 @@
 Every period controller.py provides a plan of the present step: joint angles, the forces on the
 feet, and the torques for these forces. Compliant control corrects the plan by the measurements:
 
-    foot forces -- sense (C22) --> force laws (compliance.py, C23 to C36) --> bend, torque, offset
+    foot forces -- sense (C22) --> force laws (compliance.py, C23 to C36) --> torque, offset
     joint angles, attitude -- look, every 40 ms --> slow loops (hold.py, C37 to C40) --> lift, v, w
-    planned angles + bend + climb (offset + lift) ---> angle_ref (C41)
+    planned angles + climb (offset + lift) ---> angle_ref (C41)
 
-The force laws act in the same period, on joint angles and torques. Of the slow loops, posture lifts
-the feet in the same period; path adds to the commanded velocity with which the next steps are
-planned.
+The force laws act in the same period, on torques and heights of the feet. Of the slow loops,
+posture lifts the feet in the same period; path adds to the commanded velocity with which the next
+steps are planned.
 """
 
 from __future__ import annotations
@@ -112,10 +112,7 @@ class Compliant(Stateful):
         self.sway = Sway(self.dynamics, legs, active=parts.sway)
         self.support = Support(robot, gait, gains.support, rest=self.dynamics.rest())
         self.squeeze = PlannedSqueeze(
-            friction=robot.friction.mu,
-            weight=robot.weight,
-            depth=-self.dynamics.floor,
-            minmax=parts.minmax_torque,
+            friction=robot.friction.mu, weight=robot.weight, depth=-self.dynamics.floor
         )
         self.laws = Compliance(
             gains,
@@ -123,7 +120,6 @@ class Compliant(Stateful):
             weight=robot.weight,
             depth=-self.dynamics.floor,
             cycle=gait.period,
-            kp=robot.servo.kp,
             step_height=gait.step_height,
             period=period,
         )
@@ -201,7 +197,7 @@ class Compliant(Stateful):
                 height=height + commanded_height,
                 planned=stance.plane,
                 planned_height=stance.height,
-                load=self.laws.law.load,
+                load=self.laws.load,
                 tilt=np.array([roll_seen - roll, pitch_seen - pitch]),
                 yaw=atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z)),
                 velocity=complex(vx, vy),
@@ -212,17 +208,17 @@ class Compliant(Stateful):
     # ----------------------------------------------------------------------------------- step
 
     def _correct(self, angle: Array, climb: Array, raised: Array) -> Array:
-        """Returns the joint angles (6, 3) [rad] with the laws' corrections and raised feet (C41).
+        """Returns the joint angles (6, 3) [rad] with raised feet (C41).
 
         climb: (6, 3) motion of the joints as a foot rises [rad/m]; raised: (6,) [m].
         """
-        corrected = angle + self.laws.bend + climb * raised[:, None]
+        corrected = angle + climb * raised[:, None]
         return np.asarray(clamp(corrected, self.legs.angle_min, self.legs.angle_max))
 
     def step(self, stance: Stance, measurement: Measurement, output: JointCommand) -> Array:
         """Advances compliant control by one period and corrects `output` in place (C41).
 
-        Returns the shift of the feet by all corrections, walking frame (6, 3) [m].
+        Returns by how much the feet are raised (6,) [m].
         """
         laws, self.stance = self.laws, stance
         laws.step(stance.plan, sense(measurement, stance.posture))
@@ -243,6 +239,4 @@ class Compliant(Stateful):
             rise = (offset - self.offset) * self.per_second
             output.speed_ref[...] += climb * rise[:, None]
             self.offset, self.moving = offset, busy
-        shift = laws.shift.copy()
-        shift[:, 2] += raised
-        return shift
+        return raised

@@ -6,76 +6,50 @@ its friction slips more. The planned squeeze minimises a weighted sum of both, t
 of all servos and the squared use of friction (C42), which has a closed form. `squeeze` in [0, 1) is
 the weight: 0 plans no squeeze, and towards 1 the torques alone count. No foot is planned to use
 more than a share of its friction (C43).
-
-With `minmax_torque` the largest torques count instead of the sum of squares. The 8-norm of the
-torques is at most 1.43 times the largest of 18, and of three equal torques 1.15 times, but is
-smooth, so that the forces do not jump when another servo becomes the most loaded one. Its least is
-found by C42 with weights on the servos, repeated a fixed number of times (C56).
 """
 
 from __future__ import annotations
 
-import math
-from typing import NamedTuple
-
 import numpy as np
 
 from hexapod_cosim.controller.comply.support import Shares, solve
-from hexapod_cosim.controller.plane import LEGS, Array, Plane, across, square
+from hexapod_cosim.controller.plane import Array, Plane, across, square
 from hexapod_cosim.controller.walk.inverse_dynamics import Demand
 
 MOST_FRICTION = 0.7  # 1    share of its friction that a foot is planned to use at most
 TRIPOD_SHARE = 1.0 / 3.0  # 1    of the weight: the load at which both sums are compared
 LEAST_PUSH = 1e-12  # N    floor of a change of a force that a factor is divided by
 LEAST_LOAD = 1e-6  # N    a foot with less takes no part; floor of the sum of loads
-REPEATS, STEP = 12, 0.25  # 1    of C42 with new weights, and the part of each change that is made
-LEAST_NORM = 1e-9  # N m    floor of the norm of all torques that they are divided by
-# 1    three equal torques, those of a tripod's femurs, count as much as in the sum of squares
-LIKE_SQUARES = math.sqrt(math.sqrt(27.0))
 Yielding = tuple[Array, Array, Array]  # xx, xy, yy of symmetric matrices, (6,) each
-
-
-class Arch(NamedTuple):
-    """Forces and geometry of one plan."""
-
-    demand: Demand
-    shares: Shares
-    price: float  # N2 m2    of the use of friction
-    arm: Plane  # m    (6,) of the feet about the centre of load
 
 
 class PlannedSqueeze:
     """Computes the squeeze of one robot.
 
     friction: the coefficient of friction that is believed; weight: of the robot [N]; depth: of the
-    ground below the torso's origin in the stance [m]; minmax: the largest torques count instead of
-    the sum of squares.
+    ground below the torso's origin in the stance [m].
     """
 
-    def __init__(
-        self, *, friction: float, weight: float, depth: float, minmax: bool = False
-    ) -> None:
-        self.friction, self.minmax = friction, minmax
+    def __init__(self, *, friction: float, weight: float, depth: float) -> None:
+        self.friction = friction
         self.torque = depth * TRIPOD_SHARE * weight  # N m    of a tripod's load at this arm
 
-    def _yielding(self, lever: Array, counts: Array, normal: Array, price: float) -> Yielding:
+    def _yielding(self, lever: Array, normal: Array, price: float) -> Yielding:
         """Returns (J J^T + price/f_n^2)^-1 [1/m2], 0 without a load (C42).
 
-        lever: (6, 3, 3) J^T [m]; counts: (6, 3) weights of the servos [1]; normal: (6,) [N]; price
-        [N2 m2].
+        lever: (6, 3, 3) J^T [m]; normal: (6,) [N]; price: of the use of friction [N2 m2].
         """
         x, y, n = lever[:, :, 0], lever[:, :, 1], normal * normal
-        xx = n * (counts * x * x).sum(axis=1) + price
-        xy = n * (counts * x * y).sum(axis=1)
-        yy = n * (counts * y * y).sum(axis=1) + price
+        xx = n * (x * x).sum(axis=1) + price
+        xy = n * (x * y).sum(axis=1)
+        yy = n * (y * y).sum(axis=1) + price
         part = n / (xx * yy - xy * xy)
         return part * yy, -part * xy, part * xx
 
-    def _wanted(self, demand: Demand, counts: Array, normal: Array, yielding: Yielding) -> Plane:
+    def _wanted(self, demand: Demand, normal: Array, yielding: Yielding) -> Plane:
         """Returns the horizontal forces (6,) [N] that each leg by itself would choose."""
         lever, (xx, xy, yy) = demand.lever, yielding
         left = demand.torque - lever[:, :, 2] * normal[:, None]  # for the horizontal forces
-        left = counts * left
         gx, gy = (lever[:, :, 0] * left).sum(axis=1), (lever[:, :, 1] * left).sum(axis=1)
         return np.asarray(xx * gx + xy * gy + 1j * (xy * gx + yy * gy))
 
@@ -98,37 +72,6 @@ class PlannedSqueeze:
         held = xx * a + xy * b + tx * c + 1j * (xy * a + yy * b + ty * c)
         return np.asarray(change - held)
 
-    def _best(self, arch: Arch, counts: Array) -> Plane:
-        """Returns the changes of the forces (6,) of C42 [N]. counts: (6, 3) of the servos [1]."""
-        demand, normal = arch.demand, arch.shares.normal
-        yielding = self._yielding(demand.lever, counts, normal, arch.price)
-        wanted = self._wanted(demand, counts, normal, yielding)
-        return self._balance(wanted - arch.shares.push, arch.arm, yielding)
-
-    def _weigh(self, arch: Arch, change: Plane) -> Array:
-        """Returns the weights (6, 3) of the servos under changed forces (C56) [1].
-
-        They are the sixth power of each torque over the 8-norm of all.
-        """
-        demand, shares = arch.demand, arch.shares
-        forces = shares._replace(push=shares.push + change).forces()
-        torque = demand.torque - (demand.lever @ forces[:, :, None])[:, :, 0]
-        square = torque * torque
-        fourth = square * square
-        norm = math.sqrt(math.sqrt(math.sqrt(float((fourth * fourth).sum()))))
-        part = square / max(norm * norm, LEAST_NORM * LEAST_NORM)
-        return np.asarray(LIKE_SQUARES * part * part * part)
-
-    def _lower_largest(self, arch: Arch, change: Plane) -> Plane:
-        """Returns the changes (6,) that lower the largest torques (C56) [N].
-
-        change: (6,) those of the least sum of squares [N].
-        """
-        for _ in range(REPEATS):
-            nearer = self._best(arch, self._weigh(arch, change))
-            change = change + STEP * (nearer - change)
-        return change
-
     def _limit(self, shares: Shares, change: Plane) -> float:
         """Returns the factor on all changes (6,) that keeps each foot within its friction (C43)."""
         normal = shares.normal
@@ -150,9 +93,8 @@ class PlannedSqueeze:
         normal, used = shares.normal, self.torque / self.friction
         price = (1.0 / squeeze - 1.0) * used * used
         arm = feet - (normal @ feet) / max(normal.sum(), LEAST_LOAD)
-        arch = Arch(demand, shares, price, arm)
-        change = self._best(arch, np.ones((LEGS, 3)))
-        if self.minmax:
-            change = self._lower_largest(arch, change)
+        yielding = self._yielding(demand.lever, normal, price)
+        wanted = self._wanted(demand, normal, yielding)
+        change = self._balance(wanted - shares.push, arm, yielding)
         change = self._limit(shares, change) * change
         return shares._replace(push=shares.push + change, squeeze=change)

@@ -1,10 +1,6 @@
-"""Computes the slip PID: tangential forces on the feet to forces by which the legs yield.
+"""Computes the slip PID of the paper's control (C25), the same for every foot and direction.
 
-C: slip_pid.c. Standing legs squeeze each other through the ground. A leg that yields reduces the
-tangential force f on its foot, and with it the creep f/(mu f_n k_t). Forces that move the body must
-remain. So the PID acts on the squeeze alone (C24): the part of the tangential forces above the plan
-whose sum and moment about the vertical are zero. The PID is the same for every foot and direction
-(C25) and is discretised by Tustin's rule. Equation C28 turns its force into joint angles.
+C: slip_pid.c. The PID is discretised by Tustin's rule.
 """
 
 from __future__ import annotations
@@ -13,44 +9,7 @@ import numpy as np
 
 from hexapod_cosim.controller.gains import SlipGains
 from hexapod_cosim.controller.memory import Stateful
-from hexapod_cosim.controller.plane import LEGS, Array, Plane, along, square
-
-LOAD_FLOOR = 1e-6  # N    a smaller sum of loads cannot be divided by
-LEAST_SPREAD = 1e-4  # m2    mean square distance of the feet from their centre: below it no twist
-
-
-def squeeze(push: Plane, normal: Array, feet: Plane) -> Plane:
-    """Subtracts the common push and twist, shared by load, from tangential forces (C24).
-
-    Args:
-        push: (n,) tangential forces x + i y beyond the planned ones [N].
-        normal: (n,) normal forces on the feet [N].
-        feet: (n,) places of the feet, x + i y [m].
-
-    Returns:
-        (n,) the squeeze e, x + i y [N].
-    """
-    total = normal.sum()
-    if total <= LOAD_FLOOR:
-        return push
-    share = normal / total
-    arm = feet - share @ feet
-    carried = share * arm
-    spread = np.vdot(arm, carried).real
-    turn = np.vdot(arm, push).imag / spread if spread >= LEAST_SPREAD else 0.0
-    return np.asarray(push - (push.sum() * share + 1j * turn * carried))
-
-
-def missing_share(found: Plane, planned: Plane) -> float:
-    """Returns the share of the planned squeeze that creep has taken away, in [0, 1] (C46).
-
-    found: (6,) squeeze above the planned one [N]; planned: (6,) [N]. Without planned squeeze it is
-    0.
-    """
-    whole = float(square(planned).sum())
-    if whole <= LOAD_FLOOR:
-        return 0.0
-    return min(max(-float(along(planned, found).sum()) / whole, 0.0), 1.0)
+from hexapod_cosim.controller.plane import LEGS, Plane
 
 
 class SlipPid(Stateful):

@@ -1,7 +1,7 @@
 """Discretises the virtual suspension m z'' + b z' + k z = f of a foot (C26). C: suspension.c.
 
-f is the normal force above the share of the leg, z lifts the foot towards the torso. The force is
-constant over a period, so that the discretisation by the matrix exponential is exact.
+f is the normal force, z lifts the foot towards the torso. The force is constant over a period, so
+that the discretisation by the matrix exponential is exact.
 """
 
 from __future__ import annotations

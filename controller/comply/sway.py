@@ -2,7 +2,7 @@
 
 A swinging leg takes its mass forwards and stops it again. Under a torso of constant velocity the
 feet that stand must push for that, forwards and backwards in every swing. The torso instead moves
-so that the centre of mass of the whole robot keeps its velocity (C57). Then these feet need no push
+so that the centre of mass of the whole robot keeps its velocity (C54). Then these feet need no push
 for the swinging legs. The sway is a few millimetres. It is guessed by the shares of the mass that
 move with the feet, the legs are placed for the guess, and their masses tell what is left.
 
@@ -73,7 +73,7 @@ class Sway:
         return -self._yield_to(moment, warmth)
 
     def of(self, guess: complex, masses: Masses, warmth: Warmth) -> complex:
-        """Returns the way of the torso in the walking frame [m], x + i y (C57).
+        """Returns the way of the torso in the walking frame [m], x + i y (C54).
 
         masses: of a torso that has moved by the guess.
         """

@@ -1,19 +1,11 @@
-"""Builds the closed loop of a standing plant as one discrete system, with both laws and delays."""
+"""Builds and disturbs discrete systems of many feet, and finds how fast closed loops settle."""
 
 from __future__ import annotations
 
 import control
 import numpy as np
-from scipy.linalg import block_diag
 
-from hexapod_cosim.controller.design.laws import Laws, delay
-from hexapod_cosim.controller.design.standing import (
-    StandingPlant,
-    answers,
-    axes_of,
-    relieved,
-    squeeze_matrix,
-)
+from hexapod_cosim.controller.design.standing import StandingPlant
 from hexapod_cosim.controller.plane import Array
 from hexapod_cosim.controller.walk.kinematics import LegSolver
 from hexapod_cosim.models import Robot
@@ -30,44 +22,13 @@ def parallel(system: control.StateSpace, count: int) -> control.StateSpace:
     )
 
 
-def compliant_law(robot: Robot, plant: StandingPlant, laws: Laws) -> control.StateSpace:
-    """Returns the laws as a system from foot forces (3 n) to the forces (3 n) by which legs yield.
-
-    Both are those of the standing feet.
-    """
-    loads, vertical = answers(robot, plant)
-    count, period = len(loads), laws.period
-    flat, up = axes_of(count)
-    order = np.eye(3 * count)[[*flat, *up]]
-    inputs = block_diag(squeeze_matrix(robot, plant), np.eye(count)) @ order
-    outputs = order.T * np.concatenate([np.repeat(loads, 2), vertical])
-    pid, spring = laws.systems
-    both = control.append(parallel(pid, 2 * count), parallel(spring, count))
-    late = parallel(delay(laws.delays, period=period), 3 * count)
-    through = outputs @ both.D @ inputs
-    return control.ss(both.A, both.B @ inputs, outputs @ both.C, through, period) * late
-
-
-def closed_loop(robot: Robot, plant: StandingPlant, laws: Laws) -> control.StateSpace:
-    """Returns the loop from disturbances (3 n) to forces of the standing feet (3 n), both closed.
-
-    A disturbance is added to the forces by which the legs yield.
-    """
-    return control.feedback(relieved(robot, plant), compliant_law(robot, plant, laws), sign=1)
-
-
 def splay(robot: Robot, plant: StandingPlant) -> Array:
-    """Returns the forces (3 n) of unit length by which the standing legs push each other outwards.
-
-    They are horizontal and contain no common push or twist.
-    """
+    """Returns shifts (3 n) of unit length that spread the standing feet, without a common one."""
     feet = LegSolver(robot).forward(plant.angle)[plant.standing]
-    flat, _ = axes_of(len(feet))
-    forces = np.zeros(feet.size)
-    forces[flat] = squeeze_matrix(robot, plant) @ (
-        feet[:, :2] / np.linalg.norm(feet[:, :2], axis=1)[:, None]
-    ).reshape(-1)
-    return np.asarray(forces / np.linalg.norm(forces))
+    outwards = feet[:, :2] / np.linalg.norm(feet[:, :2], axis=1)[:, None]
+    shifts = np.zeros_like(feet)
+    shifts[:, :2] = outwards - outwards.mean(axis=0)
+    return np.asarray(shifts.reshape(-1) / np.linalg.norm(shifts))
 
 
 def rising(time: Array) -> Array:

@@ -18,13 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
-from hexapod_cosim.controller.design.standing import (
-    StandingPlant,
-    answers,
-    axes_of,
-    relieved,
-    squeeze_matrix,
-)
+from hexapod_cosim.controller.design.standing import StandingPlant
 from hexapod_cosim.controller.plane import Array
 from hexapod_cosim.models import Robot
 
@@ -33,7 +27,6 @@ Plants = Mapping[str, StandingPlant]
 FindLoci = Callable[[Robot, StandingPlant, Array], tuple[Response, Response]]
 SLOWEST = 0.1  # rad/s    lowest frequency of a grid
 AT_ONCE = 32  # frequencies whose matrices are in the processor's cache together
-RANK = 1e-6  # 1    smaller singular values count as 0
 
 
 def frequencies(period: float, count: int, *, slowest: float = SLOWEST) -> Array:
@@ -56,24 +49,6 @@ def _response_at(system: control.StateSpace, z: NDArray[np.complex128]) -> Respo
     right = np.broadcast_to(system.B.astype(np.complex128), (len(z), *system.B.shape))
     left = system.C.astype(np.complex128)
     return np.asarray(left @ np.linalg.solve(matrices, right) + system.D)
-
-
-def eigenloci(robot: Robot, plant: StandingPlant, omega: Array) -> tuple[Response, Response]:
-    """Returns the tangential (2 n - 3, frequencies) and vertical (n, frequencies) eigenloci.
-
-    They are those of a plant on n standing feet, for negative feedback. The common push and twist
-    of all feet are no squeeze and have no locus. omega: (frequencies,) [rad/s].
-    """
-    answer = response(relieved(robot, plant), omega)
-    loads, vertical = answers(robot, plant)
-    flat, up = axes_of(len(loads))
-    squeezing = squeeze_matrix(robot, plant)
-    left, size, _ = np.linalg.svd(squeezing)
-    basis = left[:, size > RANK]
-    tangential = basis.T @ squeezing @ answer[:, flat][:, :, flat] * np.repeat(loads, 2) @ basis
-    return tracked(np.linalg.eigvals(-tangential)), tracked(
-        np.linalg.eigvals(-answer[:, up][:, :, up] * vertical)
-    )
 
 
 def tracked(values: NDArray[Any]) -> Response:
@@ -107,9 +82,7 @@ class Loci:
         )
 
 
-def all_loci(
-    robot: Robot, plants: Plants, omega: Array, *, of: FindLoci = eigenloci
-) -> tuple[Loci, Loci]:
+def all_loci(robot: Robot, plants: Plants, omega: Array, *, of: FindLoci) -> tuple[Loci, Loci]:
     """Returns the tangential and vertical eigenloci of all plants, without the laws.
 
     of: the function that computes those of one plant.

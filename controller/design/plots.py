@@ -1,4 +1,4 @@
-"""Draws figures of a design: Bode and Nyquist diagrams, disturbance responses, margins.
+"""Draws figures of the paper's laws: Bode and Nyquist diagrams, responses to shifts, margins.
 
 The diagrams show all eigenloci; margins are drawn over delay and load.
 """
@@ -12,7 +12,7 @@ from typing import Any
 import control
 import numpy as np
 
-from hexapod_cosim.controller.design.closed import closed_loop, disturbed, splay
+from hexapod_cosim.controller.design.closed import disturbed, splay
 from hexapod_cosim.controller.design.laws import Laws, delay, delay_response, delay_steps
 from hexapod_cosim.controller.design.loci import (
     Loci,
@@ -23,7 +23,8 @@ from hexapod_cosim.controller.design.loci import (
     frequencies,
     quick_margins,
 )
-from hexapod_cosim.controller.design.standing import StandingPlant, answers, relieved, weight_share
+from hexapod_cosim.controller.design.paper import paper_loci, paper_loop, shifted
+from hexapod_cosim.controller.design.standing import StandingPlant, weight_share
 from hexapod_cosim.controller.figure_style import DPI, PALETTE, SETTINGS, UNDATED, WIDTH
 from hexapod_cosim.controller.gains import Gains, GainsError
 from hexapod_cosim.controller.plane import Array
@@ -31,7 +32,7 @@ from hexapod_cosim.models import Robot
 
 DRAWN = 200  # frequencies
 STEP_TIME = 0.6  # s    shown of an answer
-BUMP = 0.001  # m    under one foot
+SHIFT = 0.001  # m    of the feet
 MOST_DELAY, DELAYS = 0.05, 21  # s    further delay shown, and in how many points
 DECIBELS = (-40.0, 30.0)
 SCALES = (40.0, 180.0)  # dB, deg    ends of the margins' scales
@@ -56,12 +57,12 @@ def plot_design(robot: Robot, gains: Gains, plants: Plants, directory: str | Pat
             fix=fix,
         )
     laws = Laws(
-        slip=gains.slip,
-        suspension=gains.suspension,
+        slip=gains.paper_slip,
+        suspension=gains.paper_suspension,
         period=gains.period,
         delays=delay_steps(gains.requirements, period=gains.period),
     )
-    loci = all_loci(robot, plants, frequencies(gains.period, DRAWN))
+    loci = all_loci(robot, plants, frequencies(gains.period, DRAWN), of=paper_loci)
     loops = [one.values * law for one, law in zip(loci, laws.responses(loci[0].omega), strict=True)]
     from matplotlib import rc_context  # noqa: PLC0415  slow to import
 
@@ -212,19 +213,18 @@ def _nominal(robot: Robot, plants: Plants) -> StandingPlant:
 def _step(robot: Robot, plants: Plants, laws: Laws, gains: Gains) -> Any:
     figure, (row,) = _figure(1, 3, gains)
     plant = _nominal(robot, plants)
-    with_laws, without = closed_loop(robot, plant, laws), relieved(robot, plant)
-    squeezed, bump, share = (
-        splay(robot, plant),
-        np.zeros(3 * int(plant.standing.sum())),
-        weight_share(robot),
-    )
-    bump[2] = -BUMP * answers(robot, plant)[1][0]
+    with_laws, without = paper_loop(robot, plant, laws), shifted(robot, plant)
+    spread, share = splay(robot, plant), weight_share(robot)
+    bump = np.zeros(len(spread))
+    bump[2] = -SHIFT
     for system, label, colour, dashes in (
         (without, "without the laws", COLOURS["without"], "--"),
         (with_laws, "with both laws", COLOURS["worst"], "-"),
     ):
-        time, forces = disturbed(system, squeezed, duration=STEP_TIME)
-        row[0].step(time, -squeezed @ forces, where="post", color=colour, ls=dashes, label=label)
+        time, forces = disturbed(system, SHIFT * spread, duration=STEP_TIME)
+        row[0].step(
+            time, -spread @ forces / share, where="post", color=colour, ls=dashes, label=label
+        )
         time, forces = disturbed(system, bump, duration=STEP_TIME)
         row[1].step(time, forces[2] / share, where="post", color=colour, ls=dashes, label=label)
     late = laws.systems[1] * delay(laws.delays, period=laws.period)
@@ -232,8 +232,8 @@ def _step(robot: Robot, plants: Plants, laws: Laws, gains: Gains) -> Any:
     row[2].step(
         time, 1e3 * deflection.reshape(-1), where="post", color=COLOURS["worst"], label="suspension"
     )
-    row[0].set(title="a squeeze of 1", ylabel="squeezing force left [1]")
-    row[1].set(title=f"a foot on a bump of {1e3 * BUMP:g} mm", ylabel="excess load [weight / 3]")
+    row[0].set(title=f"feet spread by {1e3 * SHIFT:g} mm", ylabel="squeeze [weight / 3]")
+    row[1].set(title=f"a foot on a bump of {1e3 * SHIFT:g} mm", ylabel="excess load [weight / 3]")
     row[2].set(title="the same bump", ylabel="suspension's deflection [mm]")
     for axes in row:
         axes.axhline(0.0, color="k", lw=0.6)

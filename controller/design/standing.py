@@ -1,9 +1,4 @@
-"""Defines the plant that the gains are designed for: the standing robot as a linear system.
-
-The laws respond with a force G (3,) [N] at each foot. The joint angles are corrected by J^T G / kp,
-which shifts the foot's target by C G, C = J J^T / kp. The force on a sticking foot then changes by
--G.
-"""
+"""Defines the plant that the gains are designed for: the standing robot as a linear system."""
 
 from __future__ import annotations
 
@@ -13,8 +8,6 @@ import control
 import numpy as np
 from numpy.typing import NDArray
 
-from hexapod_cosim.controller.comply.compliance import LARGEST_LOAD
-from hexapod_cosim.controller.comply.slip_pid import squeeze
 from hexapod_cosim.controller.gains import TRIPOD_LEGS
 from hexapod_cosim.controller.plane import LEGS, Array, Mask
 from hexapod_cosim.controller.walk.kinematics import LegSolver
@@ -64,33 +57,6 @@ def relieved(robot: Robot, plant: StandingPlant) -> control.StateSpace:
     return control.ss(
         system.A, system.B[:, :ANGLES] @ bends[:, chosen], system.C[:FORCES][chosen], 0, system.dt
     )
-
-
-def squeeze_matrix(robot: Robot, plant: StandingPlant) -> Array:
-    """Returns S (2 n, 2 n) of e = S f: f without the common push and twist of the standing feet.
-
-    f are their horizontal forces. S is computed by squeeze(), the function that the controller
-    runs.
-    """
-    normal = plant.force[plant.standing, 2]
-    feet = LegSolver(robot).forward(plant.angle)[plant.standing]
-    places = feet[:, 0] + 1j * feet[:, 1]
-    columns = [
-        squeeze(unit[::2] + 1j * unit[1::2], normal, places) for unit in np.eye(2 * len(normal))
-    ]
-    return np.column_stack(
-        [np.column_stack([column.real, column.imag]).reshape(-1) for column in columns]
-    )
-
-
-def answers(robot: Robot, plant: StandingPlant) -> tuple[Array, Array]:
-    """Returns the factors from the outputs of the laws to G of the standing feet (C27).
-
-    They are the loads (n,) of the PID's force [1], and 1/C_zz (n,) of the suspension's z [N/m].
-    """
-    jacobian = LegSolver(robot).jacobian(plant.angle)[plant.standing]
-    vertical = (jacobian[:, 2] ** 2).sum(axis=1) / robot.servo.kp
-    return np.minimum(plant.load(robot), LARGEST_LOAD), 1.0 / vertical
 
 
 def axes_of(count: int) -> tuple[Places, Places]:

@@ -1,8 +1,9 @@
 """Designs gains that meet requirements, with python-control.
 
-The slip PID gets the largest integral gain at which every eigenlocus of every plant keeps its
-margins. The suspension gets the required deflection, frequency and damping, or a lower frequency
-where the margins need it.
+Compliant control has no fast loop: its values are those of the requirements. The PID of the
+paper's control gets the largest integral gain at which every eigenlocus of every plant keeps its
+margins, its suspension the required deflection, frequency and damping, or a lower frequency where
+the margins need it.
 """
 
 from __future__ import annotations
@@ -25,7 +26,6 @@ from hexapod_cosim.controller.design.laws import (
 from hexapod_cosim.controller.design.loci import (
     SLOWEST,
     Loci,
-    LoopMargins,
     Plants,
     Response,
     all_loci,
@@ -36,13 +36,14 @@ from hexapod_cosim.controller.design.loci import (
 )
 from hexapod_cosim.controller.design.paper import paper_loci, paper_slip, stable
 from hexapod_cosim.controller.design.standing import StandingPlant, weight_share
-from hexapod_cosim.controller.design.verify import MarginFinder, nominal, support_torque, verify
+from hexapod_cosim.controller.design.verify import MarginFinder, nominal, support_torque
 from hexapod_cosim.controller.gains import (
     POSITIVE,
     Gains,
     GainsError,
     HoldGains,
     LimitGains,
+    Margins,
     Requirements,
     SlipGains,
     SupportGains,
@@ -84,36 +85,23 @@ def design_gains(
     needs = requirements_for(robot) if requirements is None else requirements
     _check(robot, needs, plants, period=period)
     plants, too_heavy = carried(robot, plants, needs)
-    time = size_of(robot).time
-    omega = frequencies(period, SEARCHED, slowest=SLOWEST / time)
-    tangential, vertical = (loci.finer(FINER) for loci in all_loci(robot, plants, omega))
-    slip, binding = design_slip(tangential, needs, period=period, time=time)
-    suspension = design_suspension(robot, vertical, needs, period=period)
-    finder, late = MarginFinder(robot, plants, period=period), delay_steps(needs, period=period)
-    laws = Laws(slip=slip, suspension=suspension, period=period, delays=late)
-    laws, reached = _backed_off(finder, tangential, laws, needs)
-    margins, shortfalls = verify(
-        robot, plants, finder, vertical, laws, needs, slip=reached, binding=binding
-    )
     paper = design_paper(robot, plants, needs, period=period)
     return Gains(
         robot=robot.name,
         robot_hash=robot.hash,
         period=period,
         requirements=needs,
-        slip=laws.slip,
-        suspension=suspension,
         paper_slip=paper_slip(paper.laws, needs),
         paper_suspension=paper.laws.suspension,
-        margins=replace(
-            margins,
+        margins=Margins(
+            support_torque=support_torque(robot, plants),
+            binding=paper.binding,
             paper_phase_margin=paper.phase,
             paper_gain_margin=paper.gain,
             paper_spectral_radius=paper.radius,
         ),
         caveats=(
             *(f"the design leaves out {text}" for text in (*left_out, *too_heavy)),
-            *shortfalls,
             *paper.shortfalls,
         ),
         support=_taken(SupportGains, needs),
@@ -130,6 +118,7 @@ class PaperDesign:
     phase: float  # deg
     gain: float  # dB
     radius: float  # 1    spectral radius of the whole loop
+    binding: str  # the requirement that limited the gain of the tangential loop
     shortfalls: tuple[str, ...]  # texts on requirements that are missed
 
 
@@ -141,12 +130,12 @@ def design_paper(
     omega = frequencies(period, SEARCHED, slowest=SLOWEST / time)
     found = all_loci(robot, plants, omega, of=paper_loci)
     tangential, vertical = (loci.finer(FINER) for loci in found)
-    slip, _ = design_slip(tangential, needs, period=period, time=time)
+    slip, binding = design_slip(tangential, needs, period=period, time=time)
     suspension = design_suspension(robot, vertical, needs, period=period)
     finder = MarginFinder(robot, plants, period=period, of=paper_loci)
     late = delay_steps(needs, period=period)
     laws = Laws(slip=slip, suspension=suspension, period=period, delays=late)
-    laws, _ = _backed_off(finder, tangential, laws, needs)
+    laws = _backed_off(finder, tangential, laws, needs)
     laws, radius = stable(robot, plants, laws)
     margins = finder.worst(tangential, 0, laws), finder.worst(vertical, 1, laws)
     phase, gain = min(m.phase for m in margins), min(m.gain for m in margins)
@@ -156,7 +145,12 @@ def design_paper(
         f"radius of {radius:.6g} on these legs"
     )
     return PaperDesign(
-        laws=laws, phase=phase, gain=gain, radius=radius, shortfalls=(text,) * missed
+        laws=laws,
+        phase=phase,
+        gain=gain,
+        radius=radius,
+        binding=binding,
+        shortfalls=(text,) * missed,
     )
 
 
@@ -166,11 +160,8 @@ def _taken(kind: type[Any], needs: Requirements) -> Any:
 
 
 def _limits(robot: Robot, needs: Requirements) -> LimitGains:
-    """Returns the limits of commanded speeds [rad/s] and torques [N m]."""
-    return LimitGains(
-        speed=needs.speed_share * robot.servo.speed_max,
-        torque=needs.torque_share * robot.servo.torque_max,
-    )
+    """Returns the limit of commanded torques [N m]."""
+    return LimitGains(torque=needs.torque_share * robot.servo.torque_max)
 
 
 def _check(robot: Robot, needs: Requirements, plants: Plants, *, period: float) -> None:
@@ -210,23 +201,21 @@ def _check(robot: Robot, needs: Requirements, plants: Plants, *, period: float) 
             )
 
 
-def _backed_off(
-    finder: MarginFinder, loci: Loci, laws: Laws, needs: Requirements
-) -> tuple[Laws, LoopMargins]:
+def _backed_off(finder: MarginFinder, loci: Loci, laws: Laws, needs: Requirements) -> Laws:
     """Reduces the gain until the tangential loops keep their margins by python-control.
 
-    The search's grid may miss a resonance. Returns the laws and the margins of their loops.
+    The search's grid may miss a resonance.
     """
     for _ in range(BACK_OFFS):
         found = finder.worst(loci, 0, laws)
         if found.phase >= needs.phase_margin and found.gain >= needs.gain_margin:
-            return laws, found
+            return laws
         slip = laws.slip
         laws = replace(
             laws,
             slip=replace(slip, kp=BACK_OFF * slip.kp, ki=BACK_OFF * slip.ki, kd=BACK_OFF * slip.kd),
         )
-    return laws, finder.worst(loci, 0, laws)
+    return laws
 
 
 def carried(robot: Robot, plants: Plants, needs: Requirements) -> tuple[Plants, tuple[str, ...]]:
@@ -309,7 +298,7 @@ def slip_gains(
         filter_time=needs.filter_time,
         load_time=needs.load_time,
         tracking_time=2.0 * max(needs.filter_time, period),
-        limit=needs.slip_limit,
+        limit=needs.deflection_limit,
     )
 
 

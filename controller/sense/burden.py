@@ -1,11 +1,11 @@
-"""Limits support and slip PID to the weight that the servos can carry. C: burden.c.
+"""Limits the support to the weight that the servos can carry. C: burden.c.
 
 Legs that squeeze each other support the torso like an arch: kinematic control needs only 0.6 of the
 torque of the planned shares, which contain no squeeze. If a robot is too heavy for its servos
 without the arch, the arch must remain. All legs get the same part of their planned loads (C31), so
 that no leg yields before the others; below FULL_SUPPORT this part is smaller than the servos allow,
-because the torques of the arch are added. The slip PID is reduced as well (C32). A robot that is
-far too heavy walks under kinematic control (C33).
+because the torques of the arch are added. A robot that is far too heavy walks under kinematic
+control (C33).
 """
 
 from __future__ import annotations
@@ -14,9 +14,8 @@ import math
 
 from hexapod_cosim.controller.memory import Stateful
 
-QUICK = 0.2  # 1    of the support's time constant: heft must act before the PID removes the arch
+QUICK = 0.2  # 1    of the support's time constant, for the measured weight
 NO_SUPPORT, FULL_SUPPORT = 0.54, 0.84  # 1    part of the torque needed that the servos may give
-ARCH_STAYS, ARCH_GOES = 0.8, 0.95  # 1    part of the weight that the servos carry without the arch
 SUPPORT_HELPS, SUPPORT_FAILS = 1.35, 1.5  # 1    torque needed over torque allowed
 LIGHTEST, HEAVIEST = 0.5, 4.0  # 1    limits of measured over modelled weight
 
@@ -28,11 +27,10 @@ class Burden(Stateful):
         heft: measured over modelled weight, smoothed [1].
         peak: recent peak of the torque that a joint needs for the modelled weight [N m].
         strength: factor on the planned support [1].
-        freedom: factor on the slip PID [1].
         overburdened: the robot is far too heavy for its servos.
     """
 
-    STATE = ("heft", "peak", "strength", "freedom", "overburdened")
+    STATE = ("heft", "peak", "strength", "overburdened")
 
     def __init__(self, *, most: float, cycle: float, period: float, weight_time: float) -> None:
         """Computes the filter coefficients and resets the state.
@@ -45,16 +43,16 @@ class Burden(Stateful):
         self.reset()
 
     def reset(self) -> None:
-        """Sets the weight to the modelled one, with full support and a full slip PID."""
-        self.heft, self.peak, self.strength, self.freedom = 1.0, 0.0, 1.0, 1.0
+        """Sets the weight to the modelled one, with full support."""
+        self.heft, self.peak, self.strength = 1.0, 0.0, 1.0
         self.overburdened = False
 
     def weigh(self, ratio: float) -> None:
-        """Filters the ratio of measured to modelled weight of this period (C31)."""
+        """Filters the ratio of measured to modelled weight of this period (C32)."""
         self.heft += self.follow * (min(max(ratio, LIGHTEST), HEAVIEST) - self.heft)
 
     def step(self, needed: float, scale: float) -> None:
-        """Advances strength and freedom by one period (C31, C32).
+        """Advances the strength by one period (C31, C32).
 
         needed: largest torque that the plan needs for the modelled weight [N m]; scale: measured
         over modelled weight, by which the support is scaled [1].
@@ -63,7 +61,5 @@ class Burden(Stateful):
         limit = SUPPORT_HELPS if self.overburdened else SUPPORT_FAILS
         self.overburdened = self.heft * self.peak > self.most * limit
         allowed = self.most / max(scale * self.peak, self.most)
-        carried = self.most / max(self.heft * self.peak, self.most)
         part = FULL_SUPPORT * (allowed - NO_SUPPORT) / (FULL_SUPPORT - NO_SUPPORT)
         self.strength = min(allowed, max(part, 0.0))
-        self.freedom = min(max((carried - ARCH_STAYS) / (ARCH_GOES - ARCH_STAYS), 0.0), 1.0)

@@ -137,7 +137,7 @@ class InverseDynamics:
     def _demand_torso(
         self, total: Wrench, masses: tuple[Masses | None, Masses, Masses | None], laden: float
     ) -> Wrench:
-        """Adds the forces that the torso needs to push, weight, moment and twist (C16, C58)."""
+        """Adds the forces that the torso needs to push, weight, moment and twist (C16, C56)."""
         before, now, after = masses
         acceleration, up, spin = 0j, 0.0, 0j
         if before is not None and after is not None:
@@ -211,7 +211,7 @@ class InverseDynamics:
             speed: (6, 3) joint speeds [rad/s].
             posture: of the torso in the walking frame.
             laden: measured over modelled weight [1]. The planned loads are scaled by it (C30), but
-                a payload needs no push for the legs, and more for the torso (C58).
+                a payload needs no push for the legs, and more for the torso (C56).
         """
         now = motion.masses[1]
         push, lift = self._demand_links(motion.masses)

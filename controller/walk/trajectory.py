@@ -25,7 +25,6 @@ from hexapod_cosim.controller.walk.gait import Gait
 from hexapod_cosim.models import HexapodError
 
 DWELL = 0.1  # 1    part of the swing at each end with vertical motion only, while the load changes
-HASTE = 0.25  # 1    by which a swing with a slow landing begins faster and ends slower (C54)
 FREEZE = 0.75  # 1    part of the swing after which the landing point stays fixed to the ground
 SAME_DISTANCE = 1e-6  # m    distances that differ by less are equal
 HOME_TOLERANCE = 1e-9  # m    a foot this close to its stance position need not step any more
@@ -233,7 +232,6 @@ class FootPaths(Stateful):
         period: float,
         inward: Plane | None = None,
         turned: Array | None = None,
-        slow_landing: bool = False,
     ) -> None:
         """Puts all feet in the stance.
 
@@ -243,10 +241,8 @@ class FootPaths(Stateful):
             period: of the controller [s].
             inward: (6,) from the stance to the narrow stance, torso frame [m]; by default 0.
             turned: (6,) distances that the feet roll outwards on this way [m]; by default 0.
-            slow_landing: feet rise faster and come down more slowly on the same path (C54).
         """
         self.gait, self.period = gait, period
-        self.haste = HASTE if slow_landing else 0.0
         self.swing_time = gait.period * (1.0 - gait.duty)
         # from the lift-off to the middle of the next stance
         self.landing_lead = 0.5 * gait.period * gait.duty + self.swing_time
@@ -357,13 +353,6 @@ class FootPaths(Stateful):
         """Returns the completed parts tau of the swings (6,) at these phases (C2)."""
         return (phase - self.gait.duty) / (1.0 - self.gait.duty)
 
-    def _path_of(self, tau: Array) -> Array:
-        """Returns the parts (6,) of their paths at which feet are at these parts of a swing (C54).
-
-        They are in place of tau in C6 and C7.
-        """
-        return tau + self.haste * tau * (1.0 - tau)
-
     def _ground_of(self, feet: PlannedFeet) -> Plane:
         """Returns the feet (6,) in the ground frame [m] (C5)."""
         return feet.goal - feet.pull * (1.0 - feet.blend)
@@ -374,17 +363,16 @@ class FootPaths(Stateful):
         carried: (6,) feet at the step before, ground frame [m].
         """
         back, tau = cis(-feet.turn), self._progress(feet.phase)
-        part = self._path_of(tau)
-        s, slope = blend(part)
+        s, slope = blend(tau)
         feet = feet._replace(blend=np.where(self.swinging, s, 0.0))
         lift, climb = hop(
-            part,
+            tau,
             top=self.gait.step_height,
-            down=self.gait.touchdown_speed * self.swing_time / (1.0 - self.haste),
+            down=self.gait.touchdown_speed * self.swing_time,
         )
         was = back * (carried - feet.way)
         # 1/s    at which the feet pass through their paths
-        pace = 0.0 if self.held else (1.0 + self.haste * (1.0 - 2.0 * tau)) / self.swing_time
+        pace = 0.0 if self.held else 1.0 / self.swing_time
         pulled = back * feet.pull * (slope * pace)
         # a foot on the ground: dp/dt = -(v + i w p)
         velocity = pulled - (feet.twist.velocity + 1j * feet.twist.yaw_rate * was)
@@ -398,8 +386,7 @@ class FootPaths(Stateful):
     def _set_out(self, now: PlannedFeet, twist: Twist) -> PlannedFeet:
         """Computes the present step again, with the legs that swing in the new section."""
         phase = self._phase_after(self.before)
-        part = self._path_of(self._progress(phase))
-        s = np.where(self.swinging, blend(part)[0], 0.0)
+        s = np.where(self.swinging, blend(self._progress(phase))[0], 0.0)
         pull = np.where(self.swinging, now.pull, 0.0)
         feet = now._replace(phase=phase, blend=s, pull=pull, twist=twist)
         return self._place_feet(feet, self._ground_of(feet))
@@ -539,7 +526,7 @@ class FootPaths(Stateful):
         left = np.maximum(1.0 - before.blend, NEARLY_DONE)
         pull = before.pull + (goal - before.goal) / left
         aim = self.narrowing * self.turned
-        rolls = aim - (aim - before.rolled) * (1.0 - blend(self._path_of(tau))[0]) / left
+        rolls = aim - (aim - before.rolled) * (1.0 - blend(tau)[0]) / left
         rolled = np.where(self.swinging & ~self.met, rolls, before.rolled)
         # a foot stays where it met the ground (C51)
         goal = np.where(self.met, self._ground_of(before), goal)

@@ -451,20 +451,9 @@ static const hxVariable parameters[] = {
     {"gait.step_height", "m", 1e-09, 10.0, offsetof(struct hxVariables, definition.gait.step_height), HX_REAL, 1, 1},
     {"gait.touchdown_speed", "m/s", 0.0, 10.0, offsetof(struct hxVariables, definition.gait.touchdown_speed), HX_REAL, 1, 1},
     {"gait.narrowing", "m", 0.0, 10.0, offsetof(struct hxVariables, definition.gait.narrowing), HX_REAL, 1, 1},
-    {"gains.slip.kp", "1", -1000000.0, 1000000.0, offsetof(struct hxVariables, definition.gains.slip.kp), HX_REAL, 0, 1},
-    {"gains.slip.ki", "1/s", -1000000.0, 1000000.0, offsetof(struct hxVariables, definition.gains.slip.ki), HX_REAL, 0, 1},
-    {"gains.slip.kd", "s", -1000000.0, 1000000.0, offsetof(struct hxVariables, definition.gains.slip.kd), HX_REAL, 0, 1},
-    {"gains.slip.derivative_time", "s", 1e-09, 1000000.0, offsetof(struct hxVariables, definition.gains.slip.derivative_time), HX_REAL, 0, 1},
-    {"gains.slip.filter_time", "s", 1e-09, 1000000.0, offsetof(struct hxVariables, definition.gains.slip.filter_time), HX_REAL, 0, 1},
-    {"gains.slip.load_time", "s", 1e-09, 1000000.0, offsetof(struct hxVariables, definition.gains.slip.load_time), HX_REAL, 0, 1},
-    {"gains.slip.tracking_time", "s", 1e-09, 1000000.0, offsetof(struct hxVariables, definition.gains.slip.tracking_time), HX_REAL, 0, 1},
-    {"gains.slip.limit", "1", 1e-09, 1000000.0, offsetof(struct hxVariables, definition.gains.slip.limit), HX_REAL, 0, 1},
-    {"gains.suspension.mass", "kg", 1e-09, 1000000000.0, offsetof(struct hxVariables, definition.gains.suspension.mass), HX_REAL, 0, 1},
-    {"gains.suspension.damping", "N.s/m", 0.0, 1000000000.0, offsetof(struct hxVariables, definition.gains.suspension.damping), HX_REAL, 0, 1},
-    {"gains.suspension.stiffness", "N/m", 1e-09, 1000000000000.0, offsetof(struct hxVariables, definition.gains.suspension.stiffness), HX_REAL, 0, 1},
-    {"gains.suspension.limit", "m", 1e-09, 10.0, offsetof(struct hxVariables, definition.gains.suspension.limit), HX_REAL, 0, 1},
     {"gains.support.handover_time", "s", 1e-09, 1000000.0, offsetof(struct hxVariables, definition.gains.support.handover_time), HX_REAL, 0, 1},
     {"gains.support.weight_time", "s", 1e-09, 1000000.0, offsetof(struct hxVariables, definition.gains.support.weight_time), HX_REAL, 0, 1},
+    {"gains.support.load_time", "s", 1e-09, 1000000.0, offsetof(struct hxVariables, definition.gains.support.load_time), HX_REAL, 0, 1},
     {"gains.hold.attitude_rate", "1/s", 0.0, 1000000.0, offsetof(struct hxVariables, definition.gains.hold.attitude_rate), HX_REAL, 0, 1},
     {"gains.hold.height_rate", "1/s", 0.0, 1000000.0, offsetof(struct hxVariables, definition.gains.hold.height_rate), HX_REAL, 0, 1},
     {"gains.hold.ground_time", "s", 1e-09, 1000000.0, offsetof(struct hxVariables, definition.gains.hold.ground_time), HX_REAL, 0, 1},
@@ -473,14 +462,11 @@ static const hxVariable parameters[] = {
     {"gains.hold.path_rate", "1/s", 0.0, 1000000.0, offsetof(struct hxVariables, definition.gains.hold.path_rate), HX_REAL, 0, 1},
     {"gains.hold.speed_limit", "m/s", 1e-09, 1000000.0, offsetof(struct hxVariables, definition.gains.hold.speed_limit), HX_REAL, 0, 1},
     {"gains.hold.turn_limit", "rad/s", 0.0, 1000000.0, offsetof(struct hxVariables, definition.gains.hold.turn_limit), HX_REAL, 0, 1},
-    {"gains.limits.speed", "rad/s", 1e-09, 1000000000.0, offsetof(struct hxVariables, definition.gains.limits.speed), HX_REAL, 0, 1},
     {"gains.limits.torque", "N.m", 1e-09, 100000000.0, offsetof(struct hxVariables, definition.gains.limits.torque), HX_REAL, 0, 1},
     {"parts.support", "", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, definition.parts.support), HX_BOOLEAN, 0, 1},
     {"parts.slip_pid", "", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, definition.parts.slip_pid), HX_BOOLEAN, 0, 1},
-    {"parts.suspension", "", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, definition.parts.suspension), HX_BOOLEAN, 0, 1},
     {"parts.paper_suspension", "", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, definition.parts.paper_suspension), HX_BOOLEAN, 0, 1},
     {"parts.touchdown", "", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, definition.parts.touchdown), HX_BOOLEAN, 0, 1},
-    {"parts.slow_landing", "", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, definition.parts.slow_landing), HX_BOOLEAN, 0, 1},
     {"parts.posture", "", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, definition.parts.posture), HX_BOOLEAN, 0, 1},
     {"parts.sway", "", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, definition.parts.sway), HX_BOOLEAN, 0, 1},
     {"parts.path", "", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, definition.parts.path), HX_BOOLEAN, 0, 1},
@@ -501,7 +487,6 @@ static const hxVariable parameters[] = {
     {"parts.squeeze", "1", 0.0, 0.99, offsetof(struct hxVariables, definition.parts.squeeze), HX_REAL, 0, 1},
     {"friction.mu", "1", 0.0, 100.0, offsetof(struct hxVariables, definition.friction), HX_REAL, 0, 1},
     {"servo.torque_continuous", "N.m", 1e-09, 100000000.0, offsetof(struct hxVariables, definition.servo.torque_continuous), HX_REAL, 0, 1},
-    {"parts.minmax_torque", "", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, definition.parts.minmax_torque), HX_BOOLEAN, 0, 1},
 };
 
 const hxSection hx_sections[HX_CAUSALITIES] = {
@@ -653,7 +638,7 @@ const char *const hx_log_category_names[] = {
 const hxStateRow *const hx_states = 0;
 const size_t hx_state_count = 0;
 
-const char hx_default_guid[] = "{a2388160-03c5-4798-ae9b-838cf3a1d864}";
+const char hx_default_guid[] = "{8c2c27f0-f655-4afd-a772-69805b39ed9f}";
 
 _Static_assert(HX_CONTROL_KINEMATIC == 1, "Control");
 _Static_assert(HX_CONTROL_COMPLIANT == 2, "Control");

@@ -29,7 +29,7 @@ typedef struct hxPlannedStep {
       rate[HX_COMMANDS]; /* vx vy yaw_rate height roll pitch, and per second */
   hxPosture posture;
   hxPlannedFeet feet;
-  hxPlane sway; /* m, of the torso against the swinging legs (C57) */
+  hxPlane sway; /* m, of the torso against the swinging legs (C54) */
   hxPlane plane[HX_LEGS]; /* m, of the feet from the torso that sways */
   double activation[HX_LEGS]; /* 1 */
   double lowering[HX_LEGS]; /* m, deformation of the ground */

@@ -1,4 +1,4 @@
-"""Checks a design on the FMU: the response to a small squeeze against the linear prediction."""
+"""Checks a design on the FMU: the response to a small spread against the linear prediction."""
 
 from __future__ import annotations
 
@@ -9,11 +9,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from hexapod_cosim.controller import Gains, LegSolver
-from hexapod_cosim.controller.comply.compliance import LARGEST_LOAD
-from hexapod_cosim.controller.comply.slip_pid import squeeze
-from hexapod_cosim.controller.design.closed import closed_loop, disturbed, rising, splay
+from hexapod_cosim.controller.design.closed import disturbed, rising, splay
 from hexapod_cosim.controller.design.laws import Laws, delay_steps
-from hexapod_cosim.controller.design.standing import Places, weight_share
+from hexapod_cosim.controller.design.paper import paper_loop
+from hexapod_cosim.controller.design.standing import Places
 from hexapod_cosim.controller.size import size_of
 from hexapod_cosim.cosim.design.design import STANCES, level_fmu
 from hexapod_cosim.cosim.design.linearise import ANGLES, Bench, Motion, linearise
@@ -23,16 +22,16 @@ from hexapod_cosim.models import Robot
 from hexapod_cosim.models.records import Array
 
 DURATION = 0.6  # s    for a robot of the usual size
-SQUEEZE = 0.03  # 1    of a third of the weight
+SPREAD = 1e-4  # m    shift of the feet, which friction answers linearly
 
 
 @dataclass(frozen=True, kw_only=True)
 class DesignCheck:
-    """The squeezing force that remains over time, relative to the initial one."""
+    """The squeezing force over time, per metre by which the feet are spread."""
 
     time: Array  # s    (steps,)
-    predicted: Array  # 1    (steps,) by the linear closed loop
-    simulated: Array  # 1    (steps,) by the FMU
+    predicted: Array  # N/m    (steps,) by the linear closed loop
+    simulated: Array  # N/m    (steps,) by the FMU
 
     @property
     def error(self) -> float:
@@ -41,92 +40,66 @@ class DesignCheck:
 
 
 class FeetLaws:
-    """Both control laws of the standing feet, with present loads and angles and delayed forces."""
+    """Both laws of the paper's control for the standing feet, with delayed forces."""
 
-    def __init__(
-        self, robot: Robot, laws: Laws, standing: Places, force: Array, factors: Array | float
-    ) -> None:
-        """standing: indices of the standing legs (n,); force: at rest (n, 3) [N]; factors: on the
-        answers of the feet, (n,) or one for all.
-        """
-        self._factors = np.broadcast_to(factors, len(standing))[:, None]
-        self._legs, self._kp = LegSolver(robot), robot.servo.kp
-        self._share, self._standing = weight_share(robot), standing
-        self._rest, (self._pid, self._spring) = force[:, 2], laws.systems
+    def __init__(self, robot: Robot, laws: Laws, standing: Places, force: Array) -> None:
+        """standing: indices of the standing legs (n,); force: at rest (n, 3) [N]."""
+        self._legs, self._standing, self._rest = LegSolver(robot), standing, force
+        self._pid, self._spring = laws.systems
         self._forces = deque([force] * (laws.delays + 1), maxlen=laws.delays + 1)
         self._slip = np.zeros((self._pid.nstates, 2 * len(standing)))
         self._bounce = np.zeros((self._spring.nstates, len(standing)))
 
-    def step(self, force: Array, angle: Array) -> Array:
-        """Returns by how much the servos are relieved (n, 3) [N].
-
-        force: (n, 3) [N] of the standing feet; angle: (6, 3) [rad] of the joints.
-        """
+    def step(self, force: Array) -> Array:
+        """Returns by how much the feet are shifted (n, 3) [m] for forces (n, 3) [N] on them."""
         self._forces.append(force)
-        late = self._forces[0]
-        feet = self._legs.forward(angle)[self._standing]
-        left = squeeze(late[:, 0] + 1j * late[:, 1], late[:, 2], feet[:, 0] + 1j * feet[:, 1])
-        squeezed = np.column_stack([left.real, left.imag])
-        pid, spring = self._pid, self._spring
-        answer = pid.C @ self._slip + pid.D * squeezed.reshape(-1)
-        self._slip = pid.A @ self._slip + pid.B * squeezed.reshape(-1)
-        excess = late[:, 2] - self._rest
-        lift = spring.C @ self._bounce + spring.D * excess
-        self._bounce = spring.A @ self._bounce + spring.B * excess
-        load = np.minimum(force[:, 2] / self._share, LARGEST_LOAD)
-        vertical = (self.jacobian(angle)[:, 2] ** 2).sum(axis=1) / self._kp
-        yielded = np.column_stack([load[:, None] * answer.reshape(-1, 2), lift[0] / vertical])
-        return np.asarray(self._factors * yielded)
+        excess, pid, spring = self._forces[0] - self._rest, self._pid, self._spring
+        flat, up = excess[:, :2].reshape(-1), excess[:, 2]
+        shift = pid.C @ self._slip + pid.D * flat
+        self._slip = pid.A @ self._slip + pid.B * flat
+        lift = spring.C @ self._bounce + spring.D * up
+        self._bounce = spring.A @ self._bounce + spring.B * up
+        return np.column_stack([shift.reshape(-1, 2), lift[0]])
 
-    def jacobian(self, angle: Array) -> Array:
-        """Returns the Jacobians of the standing legs (n, 3, 3)."""
-        return np.asarray(self._legs.jacobian(angle)[self._standing])
-
-    def shift(self, relief: Array, angle: Array) -> Array:
-        """Returns the shift of the joint commands (6, 3) [rad] for a relief (n, 3) [N]."""
-        shift = np.zeros_like(angle)
-        shift[self._standing] = np.einsum("lji,lj->li", self.jacobian(angle), relief) / self._kp
-        return shift
+    def bend(self, shift: Array, angle: Array) -> Array:
+        """Returns the changes of the joint commands (6, 3) [rad] for shifts (n, 3) [m]."""
+        bend = np.zeros_like(angle)
+        jacobian = self._legs.jacobian(angle)[self._standing]
+        bend[self._standing] = np.linalg.solve(jacobian, shift[:, :, None])[:, :, 0]
+        return bend
 
 
 def check_design(
-    robot: Robot,
-    gains: Gains,
-    *,
-    stance: str | None = None,
-    squeeze: float | None = None,
-    factors: Array | float = 1.0,
+    robot: Robot, gains: Gains, *, stance: str | None = None, spread: float = SPREAD
 ) -> DesignCheck:
-    """Simulates how both control laws remove a squeeze, in the FMU and in the linear closed loop.
+    """Simulates how the laws of the paper's control answer to feet that are spread.
 
-    A force makes the standing legs splay. stance: by default the first in which the robot stands;
-    squeeze [N]: by default SQUEEZE times a third of the weight; factors: on the answers of the
-    standing feet in the FMU, which the prediction does not have.
+    They run in the FMU and in the linear closed loop. stance: by default the first in which the
+    robot stands; spread: of the feet [m].
     """
     period = gains.period
     laws = Laws(
-        slip=gains.slip,
-        suspension=gains.suspension,
+        slip=gains.paper_slip,
+        suspension=gains.paper_suspension,
         period=period,
         delays=delay_steps(gains.requirements, period=period),
     )
-    force = SQUEEZE * weight_share(robot) if squeeze is None else squeeze
     friction = robot.servo.coulomb_friction
     with level_fmu(robot) as fmu:
         motion, inputs = _rest(fmu, robot, stance)
         plant = linearise(fmu, robot, motion, inputs, period=period, coulomb_friction=friction)
         push, places = splay(robot, plant), np.flatnonzero(plant.standing)
         time, forces = disturbed(
-            closed_loop(robot, plant, laws), push, duration=DURATION * size_of(robot).time
+            paper_loop(robot, plant, laws), push, duration=DURATION * size_of(robot).time
         )
         bench = Bench(
             fmu, robot, coulomb_friction=friction, slope=robot.friction.slope, period=period
         )
         bench.start(motion, inputs)
-        feet = FeetLaws(robot, laws, places, plant.force[places], factors)
-        disturbance = np.outer(force * rising(time), push).reshape(len(time), -1, 3)
+        feet = FeetLaws(robot, laws, places, plant.force[places])
+        disturbance = np.outer(spread * rising(time), push).reshape(len(time), -1, 3)
         simulated = _run(bench, feet, inputs, disturbance, places)
-    seen = (simulated - simulated[0]).reshape(len(time), -1) @ push / -force
+    seen = (simulated - simulated[0]).reshape(len(time), -1) @ push / -spread
     return DesignCheck(time=time, predicted=-push @ forces, simulated=seen)
 
 
@@ -145,8 +118,8 @@ def _run(bench: Bench, feet: FeetLaws, inputs: Array, disturbance: Array, places
     for k, extra in enumerate(disturbance):
         force, angle = bench.force().reshape(6, 3)[places], bench.motion().angle
         found.append(force)
-        shift = feet.shift(feet.step(force, angle) + extra, angle)
-        commanded[:ANGLES] = inputs[:ANGLES] + shift.reshape(-1)
+        bend = feet.bend(feet.step(force) + extra, angle)
+        commanded[:ANGLES] = inputs[:ANGLES] + bend.reshape(-1)
         bench.set_inputs(commanded)
         bench.step(k)
     return np.array(found)

@@ -179,7 +179,11 @@ def _loads(robot: Robot, gait: Gait) -> tuple[Array, float]:
     """Returns the servo torques (PHASES, 6, 3) [N m] and the least firmness (`Walked`)."""
     legs, needs = LegSolver(robot), requirements_for(robot)
     dynamics = InverseDynamics(robot, legs, period=1.0)  # the period is not used without motion
-    timing = SupportGains(handover_time=needs.handover_time, weight_time=needs.weight_time)
+    timing = SupportGains(
+        handover_time=needs.handover_time,
+        weight_time=needs.weight_time,
+        load_time=needs.load_time,
+    )
     support = Support(robot, gait, timing, rest=dynamics.rest())
     planned = PlannedSqueeze(friction=robot.friction.mu, weight=robot.weight, depth=-dynamics.floor)
     home, level = legs.forward(robot.stance), Posture.of(np.zeros(3), np.zeros(3))

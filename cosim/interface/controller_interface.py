@@ -5,7 +5,7 @@ controller.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import lru_cache
 from types import SimpleNamespace
 
@@ -15,7 +15,7 @@ from hexapod_cosim.controller.gains import (
     TRIPOD_LEGS,
     HoldGains,
     LimitGains,
-    SlipGains,
+    PaperSlipGains,
     SupportGains,
     SuspensionGains,
 )
@@ -100,12 +100,12 @@ def _build_kinematic(robot: Robot, gait: Gait, period: float) -> None:
 def passive_gains(robot: Robot) -> SimpleNamespace:
     """Returns start values of the gains' parameters for kinematic control, which does not use them.
 
-    The slip law's gains are zero; the other values follow from the requirements.
+    The gains of the paper's PID are zero; the other values follow from the requirements.
     """
-    wanted, servo = requirements_for(robot), robot.servo
+    wanted = requirements_for(robot)
     stiffness = robot.weight / TRIPOD_LEGS / wanted.deflection
     omega = 2.0 * math.pi * wanted.frequency
-    slip = SlipGains(
+    slip = PaperSlipGains(
         kp=0.0,
         ki=0.0,
         kd=0.0,
@@ -113,7 +113,7 @@ def passive_gains(robot: Robot) -> SimpleNamespace:
         filter_time=wanted.filter_time,
         load_time=wanted.load_time,
         tracking_time=wanted.filter_time,
-        limit=wanted.slip_limit,
+        limit=wanted.deflection_limit,
     )
     suspension = SuspensionGains(
         mass=stiffness / omega**2,
@@ -131,16 +131,16 @@ def passive_gains(robot: Robot) -> SimpleNamespace:
         speed_limit=wanted.speed_limit,
         turn_limit=wanted.turn_limit,
     )
-    support = SupportGains(handover_time=wanted.handover_time, weight_time=wanted.weight_time)
-    limits = LimitGains(
-        speed=wanted.speed_share * servo.speed_max, torque=wanted.torque_share * servo.torque_max
+    support = SupportGains(
+        handover_time=wanted.handover_time,
+        weight_time=wanted.weight_time,
+        load_time=wanted.load_time,
     )
+    limits = LimitGains(torque=wanted.torque_share * robot.servo.torque_max)
     return SimpleNamespace(
-        slip=slip,
-        suspension=suspension,
         support=support,
         hold=hold,
         limits=limits,
-        paper_slip=replace(slip, limit=wanted.deflection_limit),
+        paper_slip=slip,
         paper_suspension=suspension,
     )

@@ -1,7 +1,6 @@
 """Tests the control of a robot that is heavier than its servos can carry.
 
-The support is reduced and the squeeze between the legs stays; a robot that is far too heavy walks
-under kinematic control.
+The support is reduced; a robot that is far too heavy walks under kinematic control.
 """
 
 from __future__ import annotations
@@ -12,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from gains import PERIOD
-from standing import GAINS, ROBOT, make_laws, plan, rest, shared, squeezing
+from standing import GAINS, ROBOT, make_laws, plan, rest, shared
 
 from hexapod_cosim.controller import Parts
 from hexapod_cosim.controller.sense.burden import Burden
@@ -55,23 +54,6 @@ def test_no_servo_is_asked_for_more_than_it_may_and_for_less_where_the_arch_has_
     burden.step(needed, scale)
     assert burden.strength == pytest.approx(strength, abs=1e-9)
     assert burden.strength * scale * needed <= MOST * (1.0 + 1e-12)
-
-
-@pytest.mark.parametrize(
-    ("heft", "freedom"),
-    [(0.6, 1.0), (1.0, 1.0), (1.0 / 0.95, 1.0), (1.0 / 0.875, 0.5), (1.25, 0.0), (2.0, 0.0)],
-)
-def test_the_arch_may_go_as_far_as_servos_carry_the_measured_weight_without_it(
-    heft: float, freedom: float
-) -> None:
-    """The slip PID may remove all of the squeeze where the servos carry 95 % of the measured
-    weight, and none below 80 %.
-
-    The weight that the support assumes has no influence.
-    """
-    burden = of_weight(heft)
-    burden.step(MOST, 0.3)
-    assert burden.freedom == pytest.approx(freedom, abs=1e-9)
 
 
 def test_far_too_heavy_is_half_more_than_servos_carry_and_stays_so_down_to_a_third() -> None:
@@ -134,24 +116,6 @@ def carried() -> np.ndarray:
     laws = make_laws()
     plan(laws)
     return laws.planned.carry
-
-
-def test_the_squeeze_of_a_robot_too_heavy_for_its_servos_is_left_to_it() -> None:
-    """Under the same squeeze the feet give way where the servos carry the weight, and do not where
-    they carry 3/4 of it.
-    """
-    bends = []
-    for share in (1.1, 0.75):
-        weak = replace(
-            GAINS, limits=replace(GAINS.limits, torque=share * float(np.abs(carried()).max()))
-        )
-        laws = make_laws(gains=weak, parts=Parts(fallback=False, suspension=False, touchdown=False))
-        plan(laws)
-        for _ in range(2000):
-            laws.feel(squeezing())
-        bends.append(float(np.abs(laws.bend).max()))
-    assert bends[0] > 1e-3
-    assert bends[1] == 0.0
 
 
 def test_a_robot_far_too_heavy_goes_over_to_kinematic_control_and_back() -> None:

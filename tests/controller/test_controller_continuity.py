@@ -60,7 +60,7 @@ def torques(name: str, gait: str, period: float) -> np.ndarray:
         )
         found.append(out.torque_ref.copy())
         measurement.foot_force[:] = compliant.stance.plan.shares.forces()
-        measurement.angle[:] = out.angle_ref - compliant.laws.bend
+        measurement.angle[:] = out.angle_ref
     assert not controller.paths.walking
     return np.array(found)
 

@@ -122,7 +122,7 @@ STARTS = [0.1, 0.45, 0.77]
 def test_push_and_twist_under_a_measured_weight_are_those_of_a_payload_on_the_torso(
     name: str, laden: float
 ) -> None:
-    """Its loads are the planned ones times the weight (C30); joint torques of legs stay (C58)."""
+    """Its loads are the planned ones times the weight (C30); joint torques of legs stay (C56)."""
     robot = points(load_robot(name))
     payload = (laden - 1.0) * float(masses(robot).sum())  # kg
     heavier = changed(robot, torso={"mass": robot.torso.mass + payload})

@@ -16,7 +16,7 @@ from hexapod_cosim.controller.sense.landing import Landings
 LOW = np.zeros(6)
 ALL, NONE = np.ones(6, dtype=bool), np.zeros(6, dtype=bool)
 FIRST = np.array([True, False, True, False, True, False])  # a tripod
-ONLY_TOUCHDOWN = Parts(slip_pid=False, suspension=False, support=False, fallback=False)
+ONLY_TOUCHDOWN = Parts(support=False, fallback=False)
 
 
 def step(landings: Landings, swinging: np.ndarray, heights: list[float]) -> None:

@@ -71,7 +71,7 @@ def test_reaching_for_missing_ground_is_told_to_the_servos_as_speed() -> None:
     """Foot 1 measures no force, the other feet carry its load."""
     controller = make(
         compliant=True,
-        parts=Parts(slip_pid=False, suspension=False, support=False, posture=False, path=False),
+        parts=Parts(support=False, posture=False, path=False),
     )
     measurement = Measurement(angle=controller.stance.copy())
     measurement.foot_force[:, 2] = 11.0

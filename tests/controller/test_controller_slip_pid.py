@@ -7,11 +7,21 @@ from dataclasses import replace
 import control
 import numpy as np
 import pytest
-from gains import PERIOD, SLIP
+from gains import PERIOD
 
 from hexapod_cosim.controller import SlipGains
-from hexapod_cosim.controller.comply.slip_pid import SlipPid, missing_share, squeeze
+from hexapod_cosim.controller.comply.slip_pid import SlipPid
 
+SLIP = SlipGains(
+    kp=0.2,
+    ki=20.0,
+    kd=0.0,
+    derivative_time=0.01,
+    filter_time=0.01,
+    load_time=0.03,
+    tracking_time=0.02,
+    limit=1.0,
+)
 STATES = ("force", "smooth", "integral", "slope")
 FREQUENCIES = np.geomspace(0.1, 0.99 * np.pi / PERIOD, 50)  # rad/s
 RELATIVE = 1e-9  # relative to the response: round-off of python-control's polynomials of order 3
@@ -83,72 +93,3 @@ def test_a_steady_force_is_answered_by_kp_and_an_integral_that_lacks_the_filters
     assert answer[0] == pytest.approx(
         force * (SLIP.kp + SLIP.ki * (lasted - SLIP.filter_time)), rel=1e-9
     )
-
-
-def test_the_squeeze_is_what_is_left_beside_the_best_push_and_twist_of_the_body() -> None:
-    """Compares with weighted least squares: the smallest sum of |e|^2/n over all pushes and twists
-    shared by load, n (D + i w (p - c))/N.
-    """
-    generator = np.random.default_rng(5)
-    for count in (3, 4, 6):
-        push, feet = (
-            generator.normal(size=count) + 1j * generator.normal(size=count) for _ in range(2)
-        )
-        normal = generator.uniform(0.5, 2.0, count)
-        moved = normal * np.stack(
-            [np.ones(count), 1j * np.ones(count), 1j * feet]
-        )  # of a push along x, a push along y, and a twist
-        weighted = moved / np.sqrt(normal)
-        base, target = (
-            np.concatenate([rows.real, rows.imag], axis=-1)
-            for rows in (weighted, push / np.sqrt(normal))
-        )
-        expected = push - np.linalg.lstsq(base.T, target, rcond=None)[0] @ moved
-        found = squeeze(push, normal, feet)
-        np.testing.assert_allclose(found, expected, atol=1e-12)
-        assert abs(found.sum()) < 1e-12
-        assert abs((feet.conj() * found).imag.sum()) < 1e-12
-        np.testing.assert_allclose(squeeze(found, normal, feet), found, atol=1e-12)
-        np.testing.assert_allclose(
-            squeeze(np.asarray(generator.normal(size=3) @ moved), normal, feet), 0.0, atol=1e-12
-        )
-
-
-def test_of_two_feet_only_what_is_along_their_line_is_squeeze_and_of_one_nothing() -> None:
-    feet, normal = np.array([0.1 + 0.2j, -0.1 - 0.2j]), np.array([10.0, 20.0])
-    line = (1.0 + 2.0j) / np.sqrt(5.0)
-    np.testing.assert_allclose(
-        squeeze(np.array([3.0 * line, -3.0 * line]), normal, feet),
-        [3.0 * line, -3.0 * line],
-        atol=1e-12,
-    )
-    np.testing.assert_allclose(
-        squeeze(np.array([1j * line, 2j * line]), normal, feet), 0.0, atol=1e-12
-    )
-    np.testing.assert_allclose(
-        squeeze(np.array([1.0 + 1.0j]), normal[:1], feet[:1]), 0.0, atol=1e-12
-    )
-
-
-def test_feet_within_a_centimetre_take_no_moment_and_feet_without_load_keep_their_forces() -> None:
-    for reach, left in ((0.0099, 1.0), (0.0101, 0.0)):
-        feet = np.array([reach, -reach]) + 0.3j
-        np.testing.assert_allclose(
-            squeeze(np.array([1j, -1j]), np.ones(2), feet), [1j * left, -1j * left], atol=1e-12
-        )
-    np.testing.assert_array_equal(
-        squeeze(np.array([1.0, 2.0j]), np.full(2, 0.4e-6), np.array([1.0, 0.0])), [1.0, 2.0j]
-    )
-    np.testing.assert_allclose(
-        squeeze(np.array([1.0, 1.0]), np.full(2, 0.6e-6), np.array([1.0, 0.0])), 0.0, atol=1e-12
-    )
-
-
-def test_the_missing_share_of_the_planned_squeeze_does_not_depend_on_other_squeeze() -> None:
-    draw = np.random.default_rng(8)
-    planned, other = draw.normal(size=(2, 6)) + 1j * draw.normal(size=(2, 6))
-    other = other - planned * np.vdot(planned, other).real / np.vdot(planned, planned).real
-    for missing, share in ((0.0, 0.0), (0.4, 0.4), (1.0, 1.0), (1.5, 1.0), (-0.3, 0.0)):
-        found = missing_share(other - missing * planned, planned)
-        assert found == pytest.approx(share, abs=1e-12)
-    assert missing_share(other, np.zeros(6, dtype=np.complex128)) == 0.0

@@ -30,7 +30,7 @@ def make(
     gains = (
         make_gains(robot).support
         if handover is None
-        else SupportGains(handover_time=handover, weight_time=0.5)
+        else SupportGains(handover_time=handover, weight_time=0.5, load_time=0.03)
     )
     return Support(
         robot,

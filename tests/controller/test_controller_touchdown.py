@@ -15,7 +15,7 @@ from hexapod_cosim.controller.sense.touchdown import Touchdown
 
 PERIOD = 0.005  # s
 YES, NO, STILL = np.ones(6, dtype=bool), np.zeros(6, dtype=bool), np.zeros(6)
-ONLY_TOUCHDOWN = Parts(slip_pid=False, suspension=False, support=False, fallback=False)
+ONLY_TOUCHDOWN = Parts(support=False, fallback=False)
 
 
 def only(leg: int) -> np.ndarray:

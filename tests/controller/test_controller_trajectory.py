@@ -30,12 +30,11 @@ class Walk:
         *,
         period: float = PERIOD,
         touchdown_speed: float = 0.0,
-        slow_landing: bool = False,
     ) -> None:
         robot = load_robot("athena")
         self.gait = make_gait(robot, name, touchdown_speed=touchdown_speed)
         home = LegSolver(robot).forward(robot.stance)
-        self.paths = FootPaths(self.gait, home, period=period, slow_landing=slow_landing)
+        self.paths = FootPaths(self.gait, home, period=period)
         self.feet, self.at = self.paths.reset(), 0
 
     def step(self, twist: Twist, *, going: bool = True, afresh: bool = False) -> None:
@@ -132,12 +131,9 @@ def test_feet_that_come_home_stop_in_the_narrow_stance() -> None:
     assert walk.paths.reset().plane == pytest.approx(walk.paths.home)
 
 
-@pytest.mark.parametrize("slow_landing", [False, True])
 @pytest.mark.parametrize("twist", [STRAIGHT, TWIST])
-def test_velocity_is_the_slope_of_position_and_nothing_jumps(
-    twist: Twist, slow_landing: bool
-) -> None:
-    log = steady(Walk("ripple", slow_landing=slow_landing), twist, 1000)
+def test_velocity_is_the_slope_of_position_and_nothing_jumps(twist: Twist) -> None:
+    log = steady(Walk("ripple"), twist, 1000)
     largest = (
         30.0 * PERIOD
     )  # m/s; velocities change by 30 m/s2 in a step; a jump would be of order 0.1
@@ -177,27 +173,11 @@ def test_a_foot_moves_along_the_ground_between_a_tenth_and_nine_tenths_of_its_sw
     assert bool(np.abs(ground_velocity(log, STRAIGHT)[there]).min() > 1e-4) is moves
 
 
-@pytest.mark.parametrize("slow_landing", [False, True])
-def test_the_optional_touch_down_speed_is_reached(slow_landing: bool) -> None:
-    log = steady(Walk(touchdown_speed=0.05, slow_landing=slow_landing), STRAIGHT, 1000)
+def test_the_optional_touch_down_speed_is_reached() -> None:
+    log = steady(Walk(touchdown_speed=0.05), STRAIGHT, 1000)
     last = log["progress"] > 0.9975
     assert last.any()
     np.testing.assert_allclose(log["rise"][last], -0.05, atol=2e-3)
-
-
-def test_a_slow_landing_follows_the_same_path_faster_at_first_and_slower_at_the_end() -> None:
-    plain = steady(Walk(), STRAIGHT, 1000)
-    slow = steady(Walk(slow_landing=True), STRAIGHT, 1000)
-    tau = slow["progress"][:, 0]
-    swung = slow["swinging"][:, 0] & (tau > 0.0)
-    order = np.argsort(plain["progress"][:, 0])
-    part = tau[swung] + 0.25 * tau[swung] * (1.0 - tau[swung])  # C54
-    lift = np.interp(part, plain["progress"][order, 0], plain["height"][order, 0])
-    np.testing.assert_allclose(slow["height"][swung, 0], lift, atol=1e-6)
-    down = tau > 0.5
-    late = plain["progress"][:, 0] > 0.5
-    ratio = slow["rise"][down, 0].min() / plain["rise"][late, 0].min()
-    assert 0.87 < ratio < 0.95  # 1 + 0.25 (1 - 2 tau) is 0.916 where the descent is fastest
 
 
 def test_the_foot_rises_by_the_step_height() -> None:

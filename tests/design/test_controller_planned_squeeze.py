@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 import pytest
 from gains import PERIOD, make_gains
-from scipy.optimize import linprog, minimize
 
 from hexapod_cosim.controller import LegSolver, make_gait
 from hexapod_cosim.controller.comply.planned_squeeze import MOST_FRICTION, PlannedSqueeze
@@ -38,9 +35,8 @@ def squeezed(
     *,
     friction: float = FRICTION,
     asked: Demand = REST,
-    minmax: bool = False,
 ) -> Shares:
-    planned = PlannedSqueeze(friction=friction, weight=WEIGHT, depth=DEPTH, minmax=minmax)
+    planned = PlannedSqueeze(friction=friction, weight=WEIGHT, depth=DEPTH)
     return planned.add(HOME, asked, shares, squeeze)
 
 
@@ -141,89 +137,3 @@ def test_feet_are_pulled_towards_each_other_so_that_the_femurs_carry_less() -> N
     for k in (0, 2, 4):
         assert (after.push[k].conjugate() * HOME[k]).real < 0.0  # the ground pushes inwards
         assert abs(torque(after)[k, 1]) < 0.8 * abs(torque(before)[k, 1])
-
-
-def minmax_cost(shares: Shares, push: Plane, squeeze: float) -> float:
-    """Returns the sum that the squeeze minimises with `minmax_torque` (C56) [N2 m2]."""
-    loaded = shares.normal > 0.0
-    use = np.abs(push[loaded]) / (FRICTION * shares.normal[loaded])
-    largest = DEPTH * WEIGHT / 3.0
-    effort = math.sqrt(math.sqrt(float((torque(shares._replace(push=push)) ** 8).sum())))
-    price = (1.0 / squeeze - 1.0) * largest**2 * float((use**2).sum())
-    return math.sqrt(math.sqrt(27.0)) * effort + price
-
-
-def bounded(standing: str) -> tuple[float, float]:
-    """Returns the largest torque without inner forces, and the least that any inner forces leave.
-
-    The second one is the optimum of a linear programme, without a limit of friction [N m].
-    """
-    shares, base = shares_of(standing), inner(standing)
-    free = torque(shares).ravel()
-    turn = [torque(shares._replace(push=shares.push + one)).ravel() - free for one in base]
-    rows = np.column_stack([*turn, -np.ones(18)])
-    other = np.column_stack([*(-one for one in turn), -np.ones(18)])
-    found = linprog(
-        [0.0] * len(base) + [1.0],
-        A_ub=np.vstack([rows, other]),
-        b_ub=np.concatenate([-free, free]),
-        bounds=[(None, None)] * len(base) + [(0.0, None)],
-    )
-    assert found.success
-    return float(np.abs(free).max()), float(found.x[-1])
-
-
-@pytest.mark.parametrize("standing", ["111111", "101010", "011110"])
-@pytest.mark.parametrize("squeeze", [0.3, 0.6, 0.95])
-def test_minmax_torque_finds_the_least_that_a_general_solver_finds(
-    standing: str, squeeze: float
-) -> None:
-    """The closed form is repeated 12 times and not to the end: 0.1 % of the least are left."""
-    before, base = shares_of(standing), inner(standing)
-    after = squeezed(before, squeeze, minmax=True)
-    found = minimize(
-        lambda part: minmax_cost(before, before.push + part @ base, squeeze),
-        np.zeros(len(base)),
-        method="BFGS",
-        options={"gtol": 1e-6},
-    )
-    reached = minmax_cost(before, after.push, squeeze)
-    assert reached == pytest.approx(float(found.fun), rel=1e-3)
-    plain = squeezed(before, squeeze)
-    assert reached < minmax_cost(before, plain.push, squeeze)
-    assert abs((after.push - before.push).sum()) < RIDGED
-    assert abs(across(HOME, after.push - before.push).sum()) < RIDGED
-
-
-@pytest.mark.parametrize("standing", ["101010", "010101", "011110"])
-def test_minmax_torque_comes_close_to_the_linear_programme_where_friction_is_free(
-    standing: str,
-) -> None:
-    """The 8-norm of some torques is more than the largest of them."""
-    before = shares_of(standing)
-    unsqueezed, least = bounded(standing)
-    largest, plain = (
-        float(np.abs(torque(squeezed(before, 0.99, minmax=minmax))).max())
-        for minmax in (True, False)
-    )
-    assert least < largest < 1.1 * least
-    assert largest < plain < unsqueezed
-
-
-def test_minmax_torque_moves_the_forces_as_little_as_the_loads_move() -> None:
-    """An optimum of a linear programme jumps from corner to corner; this one does not."""
-    pushes = []
-    for part in np.linspace(0.0, 1.0, 101):
-        lean = 0.03 * WEIGHT * complex(part, 1.0 - part)
-        asked = REST._replace(moment=REST.moment + lean)
-        pushes.append(squeezed(shares_of("011110", asked), 0.95, asked=asked, minmax=True).push)
-    steps = np.abs(np.diff(np.array(pushes), axis=0))
-    assert steps.max() < 0.01 * WEIGHT
-    assert steps.max() < 20.0 * np.median(steps[:, [0, 1, 3, 4]])
-
-
-def test_mirrored_legs_lower_the_largest_torques_mirrored() -> None:
-    left, right = (
-        squeezed(shares_of(text), 0.5, minmax=True).push for text in ("101010", "010101")
-    )
-    np.testing.assert_allclose(left[MIRRORED], right.conj(), atol=1e-9)

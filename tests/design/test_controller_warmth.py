@@ -51,17 +51,17 @@ def test_the_weight_of_the_squeeze_is_no_steeper_than_the_design_page_says() -> 
     """The margins of its loops, which docs/control/design.md gives, follow from these slopes."""
     held, work = [], []
     for share in np.linspace(0.7, 0.9, 401):
-        warmth = make(0.6)
+        warmth = make(0.3)
         warmth.step(loaded(0.1), 0.5, share)
         held.append(warmth.squeeze)
     for part in np.linspace(0.9, 1.3, 401):
-        warmth = make(0.6)
+        warmth = make(0.3)
         warmth.work = np.full((6, 3), part * RATING**2)
         warmth.follow_work = 0.0
         warmth.step(loaded(0.1), 0.5, LOST)
         work.append(warmth.squeeze)
-    assert np.diff(held).max() / 0.0005 == pytest.approx(5.0, rel=1e-6)
-    assert np.diff(work).max() / 0.001 == pytest.approx(1.75, rel=1e-6)
+    assert np.diff(held).max() / 0.0005 == pytest.approx(65.0 / 7.0, rel=1e-6)
+    assert np.diff(work).max() / 0.001 == pytest.approx(3.25, rel=1e-6)
 
 
 def test_cool_servos_keep_the_weight_that_was_set_and_none_stays_none() -> None:

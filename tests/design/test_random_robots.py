@@ -69,7 +69,7 @@ def walk(robot: Robot, scenario: Scenario, walks: dict[str, tuple[Summary, Summa
     walks[robot.name] = kinematic, compliant
     print(
         f"\n{robot.name}: {robot.total_mass:.2f} kg, "
-        f"hips {1000.0 * hip_height(robot):.0f} mm high, ki {gains.slip.ki:.3g}/s, "
+        f"hips {1000.0 * hip_height(robot):.0f} mm high, ki {gains.paper_slip.ki:.3g} m/(N s), "
         + ", ".join(
             f"{name} {kinematic.metrics[key]:.3g} -> {compliant.metrics[key]:.3g}"
             for name, key in (

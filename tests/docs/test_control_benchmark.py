@@ -18,7 +18,6 @@ from benchmarks.control.cases import (
     ablation,
     grid,
     judged_walk,
-    model_errors,
     robustness,
     seeds,
     sticking,
@@ -34,7 +33,7 @@ from benchmarks.control.tables import (
     robustness_table,
     write_csv,
 )
-from hexapod_cosim.controller import COMPLIANT_PARTS, Parts, make_gait
+from hexapod_cosim.controller import COMPLIANT_PARTS, make_gait
 from hexapod_cosim.cosim.master.loop import COMPLETED
 from hexapod_cosim.cosim.results.comparison import Comparison, change_of, compare_runs
 from hexapod_cosim.cosim.results.metrics import METRICS
@@ -114,33 +113,11 @@ def test_the_ablation_switches_each_part_alone_and_each_part_off() -> None:
         for case, plan in zip(ablation(), plans(ablation()), strict=True)
     }
     assert on["no part"] == set()
-    off = {"suspension", "slow_landing", "minmax_torque"}
-    default = set(COMPLIANT_PARTS) - off
+    default = set(COMPLIANT_PARTS)
     assert on["by default"] == on["without squeeze"] == default
     for part in COMPLIANT_PARTS:
         assert on[f"{part} alone"] == {part}
-        if part in off:
-            assert on[f"with {part}"] == default | {part}
-        else:
-            assert on[f"without {part}"] == default - {part}
-
-
-def test_the_slip_pid_is_judged_on_plants_that_are_not_its_model() -> None:
-    """Every plant once with the default's parts and once without the PID; what is set of the plant
-    is no setting of its controller.
-    """
-    cases = model_errors()
-    names = [case.name for case in cases]
-    assert len(set(names)) == len(names) == 6
-    for (whole, plan), (without, other) in zip(
-        zip(names[::2], plans(cases[::2]), strict=True),
-        zip(names[1::2], plans(cases[1::2]), strict=True),
-        strict=True,
-    ):
-        assert whole.removesuffix(", by default") == without.removesuffix(", without slip_pid")
-        assert plan.parameters == other.parameters
-        assert plan.parameters
-        assert (plan.compliance, other.compliance) == (Parts(), Parts(slip_pid=False))
+        assert on[f"without {part}"] == default - {part}
 
 
 def test_every_table_of_make_figures_has_its_place_on_a_page() -> None:

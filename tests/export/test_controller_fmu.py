@@ -190,7 +190,7 @@ def test_communication_steps_of_any_length_end_at_the_same_walk(compliant_fmu: P
     ("values", "said"),
     [
         ({"gait.duty": 1.0}, "gait.duty: got 1, expected a finite number in"),
-        ({"gains.suspension.mass": 0.0}, "gains.suspension.mass"),
+        ({"gains.limits.torque": 0.0}, "gains.limits.torque"),
         ({"control": "manual"}, "choice for control"),
     ],
 )

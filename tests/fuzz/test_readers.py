@@ -140,7 +140,7 @@ def test_a_study_is_read_or_refused(tmp_path: Path, content: bytes) -> None:
 
 
 @MODES
-@given(content=toml_files(STUDIES / "tune_slip_pid.toml"))
+@given(content=toml_files(STUDIES / "tune_squeeze.toml"))
 def test_an_optimisation_is_read_or_refused(tmp_path: Path, content: bytes) -> None:
     path = written(tmp_path, "study.toml", content)
     reads(lambda: load_study(path))

@@ -14,7 +14,6 @@ from hexapod_cosim.controller import (
     LegSolver,
     make_gait,
 )
-from hexapod_cosim.controller.comply.slip_pid import squeeze
 from hexapod_cosim.controller.comply.support import Support
 from hexapod_cosim.controller.walk.inverse_dynamics import Demand, InverseDynamics
 from hexapod_cosim.models import load_robot
@@ -28,25 +27,6 @@ def scattered(generator: np.random.Generator, reach: float) -> np.ndarray:
 
 def pointers(*arrays: np.ndarray) -> list[ct.c_void_p]:
     return [array.ctypes.data_as(ct.c_void_p) for array in arrays]
-
-
-@pytest.mark.parametrize("load", [1.0, 0.3e-6, 0.12e-6, 0.0])
-@pytest.mark.parametrize("reach", [0.2, 0.0101, 0.0099])
-def test_the_squeeze_is_the_same_down_to_feet_without_load_or_that_stand_together(
-    controller_core: ct.CDLL, load: float, reach: float
-) -> None:
-    generator = np.random.default_rng(6)
-    for _ in range(10):
-        found, feet, normal = (
-            generator.normal(size=(6, 2)),
-            scattered(generator, reach),
-            np.full(6, load),
-        )
-        expected = squeeze(
-            np.asarray(found @ [1.0, 1.0j], dtype=np.complex128), normal, feet @ [1.0, 1.0j]
-        )
-        controller_core.hx_probe_squeeze(*pointers(normal, feet, found))
-        np.testing.assert_allclose(found @ [1.0, 1.0j], expected, atol=1e-12)
 
 
 @pytest.mark.parametrize(

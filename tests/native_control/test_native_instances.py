@@ -185,7 +185,7 @@ def test_a_clock_that_is_off_by_round_off_ticks_all_the_same(
         ("period", 0.6, "period: got 0.6, expected less than 0.5 s, the gait's shorter phase"),
         ("servo.kp", 0.0, "servo.kp: got 0"),
         ("LM.femur.stance", 3.0, "LM.femur.stance: got 3, expected an angle between"),
-        ("gains.slip.kp", np.nan, "gains.slip.kp: got"),
+        ("gains.hold.path_rate", np.nan, "gains.hold.path_rate: got"),
         ("control", 4, "control: got 4, expected 1 to 3"),
         ("gait.pattern", 0, "gait.pattern: got 0, expected 1 to 5"),
     ],

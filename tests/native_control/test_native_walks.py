@@ -23,9 +23,6 @@ from hexapod_cosim.controller import (
 from hexapod_cosim.cosim.interface.controller_interface import ControllerSetup
 from hexapod_cosim.models import load_robot
 
-EVERY_PART = replace(ALL_PARTS, slow_landing=True, minmax_torque=True)
-
-
 WALKS = [
     *((name, gait, True) for name in ROBOTS for gait in ("tripod", "ripple", "wave")),
     ("athena", "amble", True),
@@ -92,20 +89,19 @@ def test_each_part_can_be_switched_off(controller_core: ct.CDLL, part: str) -> N
     assert close(
         differences(
             controller_core,
-            setup_of(parts=replace(EVERY_PART, **{part: False})),
+            setup_of(parts=replace(ALL_PARTS, **{part: False})),
             sense=sense,
             steps=700,
         )[0]
     )
 
 
-@pytest.mark.parametrize("minmax", [False, True])
 @pytest.mark.parametrize("gait", ["tripod", "amble"])
 @pytest.mark.parametrize("weight", [0.0, 0.1, 0.5, 0.99])
 def test_walks_with_a_planned_squeeze_are_the_same(
-    controller_core: ct.CDLL, weight: float, gait: str, minmax: bool
+    controller_core: ct.CDLL, weight: float, gait: str
 ) -> None:
-    setup = setup_of(gait=gait, parts=Parts(squeeze=weight, minmax_torque=minmax))
+    setup = setup_of(gait=gait, parts=Parts(squeeze=weight))
     worst, _ = differences(controller_core, setup, sense=Ground(), steps=700)
     assert close(worst)
 

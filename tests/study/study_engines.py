@@ -68,7 +68,7 @@ class Fake:
             progress(0.0)
         except KeyboardInterrupt:
             return Summary(control=control, seed=seed, status=INTERRUPTED, metrics=NO_FIGURES)
-        kp = 1.0 if gains is None else gains.slip.kp
+        kp = 1.0 if gains is None else gains.hold.path_rate
         metrics = {
             name: figure(seed, mu, control, place) * kp for place, name in enumerate(METRICS)
         }

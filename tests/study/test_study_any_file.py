@@ -92,9 +92,9 @@ NAMES = [
     "friction.mu",
     "friction",
     "mu",
-    "gains.slip.kp",
+    "gains.hold.path_rate",
     "gains.",
-    "gains.slip",
+    "gains.hold",
     "gains.margins.binding",
     "parameters",
     "parameters.torso.mass",
@@ -138,7 +138,7 @@ BEGUN: list[dict[str, Any]] = [
         "set": {"duration": 2.0, "torso": {"mass": 2.5}},
         "factors": {
             "friction.mu": {"uniform": [0.3, 0.9]},
-            "gains.slip.kp": {"loguniform": [0.5, 2.0], "relative": True},
+            "gains.hold.path_rate": {"loguniform": [0.5, 2.0], "relative": True},
         },
     },
     {

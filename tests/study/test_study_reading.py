@@ -16,7 +16,7 @@ from hexapod_cosim.models import HexapodError, load_robot
 
 TRAINING = {"scenarios": ["walk_flat"], "seeds": {"first": 10, "count": 3}}
 JUDGED = {"training": TRAINING, "held_out": {"scenarios": ["ripple"], "seeds": 10}}
-GAIN = {"gains.slip.kp": {"uniform": [0.5, 2.0], "relative": True}}
+GAIN = {"gains.hold.path_rate": {"uniform": [0.5, 2.0], "relative": True}}
 
 
 def optimisation(**changes: Any) -> dict[str, Any]:
@@ -98,9 +98,9 @@ def test_several_seeds_differ_by_the_standard_variation_and_one_seed_is_the_plai
         ({"factors": {"seed": [1]}}, ["not a factor", "seeds = 10"]),
         ({"factors": {"gait.nmae": ["tripod"]}}, ["factors.gait.nmae", "did you mean 'name'"]),
         ({"factors": {"torso.maas": [2.0]}}, ["factors.torso.maas", "torso.mass"]),
-        ({"factors": {"gains.slip.kq": [1.0]}}, ["unknown gain", "gains.slip.k"]),
+        ({"factors": {"gains.hold.path_rat": [1.0]}}, ["unknown gain", "gains.hold.p"]),
         (
-            {"factors": {"gains.slip.kp": [1.0]}, "controls": ["kinematic"]},
+            {"factors": {"gains.hold.path_rate": [1.0]}, "controls": ["kinematic"]},
             ["a gain that no run has", 'add "compliant"'],
         ),
         (
@@ -113,7 +113,7 @@ def test_several_seeds_differ_by_the_standard_variation_and_one_seed_is_the_plai
         ),
         ({"variation": "yes"}, ["variation", "got 'yes'", "write variation = true"]),
         (
-            {"factors": {"gains.slip.kp": {"values": [1.0], "unit": "s"}}},
+            {"factors": {"gains.hold.path_rate": {"values": [1.0], "unit": "s"}}},
             ["not a gain's value", "leave the unit out"],
         ),
         (
@@ -142,7 +142,7 @@ def test_several_seeds_differ_by_the_standard_variation_and_one_seed_is_the_plai
             ["not a constraint", "at_most = 1.0"],
         ),
         (
-            optimisation(variables={"gains.slip.kp": {"normal": [1, 1]}}),
+            optimisation(variables={"gains.hold.path_rate": {"normal": [1, 1]}}),
             ["a variable without bounds"],
         ),
         (
@@ -158,15 +158,15 @@ def test_several_seeds_differ_by_the_standard_variation_and_one_seed_is_the_plai
             ["trained on", "got 'walk_flat'", 'scenarios = ["amble", "course"'],
         ),
         (
-            {"factors": {"gains.slip.kp": [math.nan]}},
-            ["factors.gains.slip.kp[0]", "got nan", "finite number"],
+            {"factors": {"gains.hold.path_rate": [math.nan]}},
+            ["factors.gains.hold.path_rate[0]", "got nan", "finite number"],
         ),
         (
-            {"factors": {"gains.slip.kp": {"uniform": [0.5, math.inf]}}},
-            ["factors.gains.slip.kp.uniform[1]", "got inf"],
+            {"factors": {"gains.hold.path_rate": {"uniform": [0.5, math.inf]}}},
+            ["factors.gains.hold.path_rate.uniform[1]", "got inf"],
         ),
-        ({"factors": {"gains.slip.kp": [-1.0]}}, ["not a gain's value", "got -1.0", ">= 0"]),
-        ({"factors": {"gains.slip.filter_time": [0.0]}}, ["not a gain's value", "got 0.0", "> 0"]),
+        ({"factors": {"gains.hold.path_rate": [-1.0]}}, ["not a gain's value", "got -1.0", ">= 0"]),
+        ({"factors": {"gains.hold.ground_time": [0.0]}}, ["not a gain's value", "got 0.0", "> 0"]),
         ({"seeds": 1e20}, ["seeds", "whole number"]),
         ({"seeds": [10**20]}, ["seeds[0]", "64 bits"]),
         ({"seeds": {"first": 2**63 - 2, "count": 5}}, ["seeds.first", "<="]),

@@ -213,7 +213,7 @@ def optimisation(**changes: Any) -> dict[str, Any]:
         "sampler": "random",
         "variables": {
             "friction.mu": {"uniform": [0.3, 0.9]},
-            "gains.slip.kp": {"uniform": [0.5, 2.0], "relative": True},
+            "gains.hold.path_rate": {"uniform": [0.5, 2.0], "relative": True},
         },
         "training": {"scenarios": ["walk_flat", "push"], "seeds": {"first": 10, "count": 2}},
         "held_out": {"scenarios": ["ripple", "turn"], "seeds": 3},

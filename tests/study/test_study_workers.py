@@ -36,7 +36,7 @@ from hexapod_cosim.models import load_robot
 
 WALK: dict[str, Any] = {
     "set": {"duration": 1.2, "gait.period": 0.4},
-    "factors": {"friction.mu": [0.5, 0.8], "gains.slip.kp": [0.1, 0.3]},
+    "factors": {"friction.mu": [0.5, 0.8], "gains.hold.path_rate": [0.1, 0.3]},
 }
 
 TIMEOUT = 120.0  # s    for what takes some seconds on an idle machine
@@ -317,7 +317,10 @@ def test_errors_in_an_engine_are_results_and_the_study_continues(
 def test_a_run_with_equal_settings_is_not_repeated(
     athena_fmu: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    table = {"seeds": 2, "factors": {"gains.slip.kp": [0.1, 0.2, 0.3], "friction.mu": [0.3, 0.5]}}
+    table = {
+        "seeds": 2,
+        "factors": {"gains.hold.path_rate": [0.1, 0.2, 0.3], "friction.mu": [0.3, 0.5]},
+    }
     options = {
         "engine": "study_engines:Counting",
         "fmu": athena_fmu,

@@ -22,7 +22,7 @@ def make(
         period=PERIOD,
         gait=make_gait(robot) if gait is None else gait,
         gains=make_gains(robot) if compliant else None,
-        parts=Parts(suspension=True) if parts is None else parts,
+        parts=parts or Parts(),
     )
 
 
@@ -69,5 +69,5 @@ def obey(controller: Controller, command: BodyCommand, steps: int) -> np.ndarray
         found.append(np.stack([out.angle_ref, out.speed_ref, out.torque_ref]))
         if compliant is not None:
             measurement.foot_force[:] = compliant.stance.plan.shares.forces()
-            measurement.angle[:] = out.angle_ref - compliant.laws.bend
+            measurement.angle[:] = out.angle_ref
     return np.array(found)

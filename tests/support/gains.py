@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from hexapod_cosim.controller import Gains, Margins, Requirements, SlipGains, SuspensionGains
+from hexapod_cosim.controller import Gains, Margins, Requirements, SuspensionGains
 from hexapod_cosim.controller.gains import (
     TRIPOD_LEGS,
     HoldGains,
@@ -16,29 +16,11 @@ from hexapod_cosim.models import Robot
 
 PERIOD = 0.005  # s
 MARGINS = Margins(
-    slip_crossover=20.0,
-    slip_phase_margin=60.0,
-    slip_gain_margin=8.0,
-    slip_delay_margin=0.02,
-    slip_rejection=0.1,
-    suspension_phase_margin=60.0,
-    suspension_gain_margin=8.0,
     support_torque=0.0,
-    spectral_radius=0.99,
     binding="none",
     paper_phase_margin=60.0,
     paper_gain_margin=8.0,
     paper_spectral_radius=0.99,
-)
-SLIP = SlipGains(
-    kp=0.2,
-    ki=20.0,
-    kd=0.0,
-    derivative_time=0.01,
-    filter_time=0.01,
-    load_time=0.03,
-    tracking_time=0.02,
-    limit=1.0,
 )
 PAPER_SLIP = PaperSlipGains(
     kp=1e-4,
@@ -81,17 +63,14 @@ def suspension(
 
 def make_gains(robot: Robot, *, period: float = PERIOD) -> Gains:
     """Returns plausible gains for a robot and period."""
-    servo = robot.servo
     return Gains(
         robot=robot.name,
         robot_hash=robot.hash,
         period=period,
         requirements=Requirements(),
-        slip=SLIP,
-        suspension=suspension(robot),
-        support=SupportGains(handover_time=0.05, weight_time=0.5),
+        support=SupportGains(handover_time=0.05, weight_time=0.5, load_time=0.03),
         hold=HOLD,
-        limits=LimitGains(speed=0.5 * servo.speed_max, torque=0.9 * servo.torque_max),
+        limits=LimitGains(torque=0.9 * robot.servo.torque_max),
         paper_slip=PAPER_SLIP,
         paper_suspension=suspension(robot),
         margins=MARGINS,

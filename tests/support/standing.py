@@ -36,16 +36,6 @@ class Laws(Compliance):
         """Advances the laws by one period under forces (6, 3) on the feet."""
         self.step(self.planned, force)
 
-    @property
-    def answer(self) -> np.ndarray:
-        """Returns the output of the slip PID (6, 2) [N]."""
-        return np.column_stack([self.law.answer.real, self.law.answer.imag])
-
-    @property
-    def integral(self) -> np.ndarray:
-        """Returns the integral of the slip PID (6, 2) [N]."""
-        return np.column_stack([self.law.pid.integral.real, self.law.pid.integral.imag])
-
 
 def make_laws(
     robot: Robot = ROBOT, *, gains: Gains | None = None, parts: Parts | None = None
@@ -54,11 +44,10 @@ def make_laws(
     gait, gains = make_gait(robot), make_gains(robot) if gains is None else gains
     return Laws(
         gains,
-        Parts(suspension=True) if parts is None else parts,
+        parts or Parts(),
         weight=weight(robot),
         depth=DEPTH,
         cycle=gait.period,
-        kp=robot.servo.kp,
         step_height=gait.step_height,
         period=PERIOD,
     )

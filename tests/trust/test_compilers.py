@@ -103,7 +103,7 @@ def control(core: ct.CDLL, law: str) -> list[bytes]:
         gait=make_gait(robot),
         period=H,
         gains=make_gains(robot),
-        parts=Parts(suspension=True),
+        parts=Parts(),
         law=law,
     )
     controller, found = NativeController(core, setup), []

@@ -13,7 +13,7 @@ from hexapod_cosim.models import load_robot
 HEADINGS = {"input": "Inputs", "output": "Outputs", "parameter": "Parameters", "local": "Locals"}
 PERIOD = 0.005  # s, the default macro-step
 # `hexapod design` computes these start values for each robot
-DESIGNED, DESIGNED_NAMES = "designed", ("gains.slip.", "gains.suspension.")
+DESIGNED, DESIGNED_NAMES = "designed", ("gains.paper_slip.", "gains.paper_suspension.")
 COLUMNS = ("variable", "unit", "number", "range", "start", "meaning")
 
 

@@ -62,24 +62,9 @@ typedef struct hxGait {
 /* Contents of gains.toml, without the data that they were designed for. */
 typedef struct hxGains {
   struct {
-    double kp;               /* 1 */
-    double ki;               /* 1/s */
-    double kd;               /* s */
-    double derivative_time;  /* s    filter of the derivative */
-    double filter_time;      /* s    force filter */
-    double load_time;        /* s    smoothing of the measured load */
-    double tracking_time;    /* s    anti-windup */
-    double limit;            /* 1    largest answer, in thirds of the weight */
-  } slip;
-  struct {
-    double mass;       /* kg */
-    double damping;    /* N s/m */
-    double stiffness;  /* N/m */
-    double limit;      /* m    largest deflection */
-  } suspension;
-  struct {
     double handover_time;  /* s   in which one set of legs hands its load over to the next */
     double weight_time;    /* s   smoothing of the measured weight */
+    double load_time;      /* s   smoothing of the measured loads, grip and trust */
   } support;
   struct {
     double attitude_rate;  /* 1/s    integral of roll and pitch */
@@ -92,7 +77,6 @@ typedef struct hxGains {
     double turn_limit;     /* rad/s  largest change of the yaw rate */
   } hold;
   struct {
-    double speed;   /* rad/s  fastest change of an angle's correction */
     double torque;  /* N m    largest feed-forward torque */
   } limits;
   struct {
@@ -115,8 +99,7 @@ typedef struct hxGains {
 
 /* Switches, 1 or 0: enabled parts of compliant and paper control; and the weight of the squeeze. */
 typedef struct hxParts {
-  int support, slip_pid, suspension, paper_suspension, touchdown, slow_landing, posture, sway, path,
-      limits, fallback, minmax_torque;
+  int support, slip_pid, paper_suspension, touchdown, posture, sway, path, limits, fallback;
   /* 1  weight of the servos' torques against the feet's use of friction in the planned squeeze */
   double squeeze;
 } hxParts;

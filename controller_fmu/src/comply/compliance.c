@@ -13,8 +13,7 @@ static const double settled_share = 0.5;
 static const double joints_follow = 0.35, joints_do_not = 0.45;
 static const double feet_late = 0.2; /* 1, the same, from which feet end their swings late */
 static const double gripped = 0.99; /* 1, of its share: a leg that is given more carries it */
-/* 1, in thirds of the weight: the margins of the design hold up to this load */
-static const double largest_load = 2.0;
+static const double load_floor = 1e-6; /* N, a smaller sum of loads cannot be divided by */
 /* 1, measured over modelled weight, range that the support accepts */
 static const double least_scale = 0.5, largest_scale = 3.0;
 /* 1, of the depth of the ground: distance of the centre of mass, each axis */
@@ -41,7 +40,6 @@ void hx_compliance_compile(const hxControllerDefinition *definition, double dept
   const hxGains *gains = &definition->gains;
   const double period = definition->period, cycle = definition->gait.period;
   model->parts = definition->parts;
-  hx_foot_law_compile(definition, &model->law);
   model->period = period;
   model->weight = total_weight(definition);
   model->share = model->weight / HX_TRIPOD_LEGS;
@@ -49,19 +47,13 @@ void hx_compliance_compile(const hxControllerDefinition *definition, double dept
   model->most_lean = largest_lean * depth;
   hx_sensor_watch_compile(model->weight, cycle, period, &model->watch);
   hx_burden_compile(definition, &model->burden);
-  model->softness = 1.0 / definition->servo.kp;
   model->high = high_share * definition->gait.step_height;
-  model->tracking = hx_smaller(period / gains->slip.tracking_time, 1.0);
-  model->memory = hx_decay(-period / gains->slip.load_time);
-  model->follow_load = 1.0 - model->memory;
+  model->follow_load = 1.0 - hx_decay(-period / gains->support.load_time);
   model->follow_cycle = 1.0 - hx_decay(-period / cycle);
   model->follow_weight = 1.0 - hx_decay(-period / gains->support.weight_time);
   const double calm = nearbyint(calm_cycles * cycle / period);
   model->calm = (int64_t)calm;
-  model->largest = gains->slip.limit * model->share;
-  model->deepest = gains->suspension.limit;
   model->most = gains->limits.torque;
-  model->fastest = gains->limits.speed * period;
 }
 
 void hx_compliance_reset(hxCompliance *laws) {
@@ -81,7 +73,6 @@ void hx_compliance_plan(const hxComplianceModel *model, const hxDemand *demand,
                          plan->shares.normal[leg]};
     for (int joint = 0; joint < HX_JOINTS; ++joint) {
       const double *lever = demand->lever[leg][joint];
-      for (int i = 0; i < 3; ++i) plan->lever[leg][joint][i] = lever[i];
       plan->own[leg][joint] = supports * demand->torque[leg][joint];
       plan->carry[leg][joint] = -supports * (lever[0] * f[0] + lever[1] * f[1] + lever[2] * f[2]);
       plan->needed = hx_larger(fabs(plan->carry[leg][joint]), plan->needed);
@@ -129,7 +120,7 @@ static void judge_sensors(const hxComplianceModel *model, const hxPlan *plan,
 
 /* Returns whether a foot carries so much that the gait clock need not wait for it. */
 static int carries(const hxCompliance *laws, int leg) {
-  return laws->touching[leg] && laws->law[leg].load > carrying;
+  return laws->touching[leg] && laws->load[leg] > carrying;
 }
 
 /* Adapts the paths to ground that is met early or late (C36). */
@@ -190,32 +181,43 @@ static void update_trust(const hxComplianceModel *model, const hxPlan *plan, dou
   for (int leg = 0; leg < HX_LEGS; ++leg) laws->fallback[leg] = laws->doubted[leg] || goal == 0.0;
 }
 
-/* Computes the measured squeeze and normal forces (C24, C46) and updates the share of the planned
- * squeeze that is held (C52); returns the sum of the normal forces [N]. */
-static double law_inputs(const hxComplianceModel *model, const hxPlan *plan,
-                         const double force[HX_LEGS][3], hxPlane push[HX_LEGS],
-                         double normal[HX_LEGS], hxCompliance *laws) {
-  hxPlane common = {0.0, 0.0}, planned[HX_LEGS];
+/* Returns the share of the planned squeeze that creep has taken away, in [0, 1] (C46); 0 without
+ * planned squeeze. deviation: of the tangential forces from the planned ones [N]. */
+static double missing_share(const hxPlan *plan, const hxPlane deviation[HX_LEGS],
+                            const hxCompliance *laws) {
+  double whole = 0.0, present = 0.0;
+  for (int leg = 0; leg < HX_LEGS; ++leg) {
+    if (!laws->touching[leg]) continue;
+    const hxPlane planned = hx_scaled(plan->shares.squeeze[leg], laws->scale);
+    whole += hx_square(planned);
+    present += hx_along(planned, deviation[leg]);
+  }
+  return whole <= load_floor ? 0.0 : hx_clamp(-present / whole, 0.0, 1.0);
+}
+
+/* Computes the normal forces and returns their sum [N]. Updates trust (C33), the smoothed loads
+ * (C27) and the share of the planned squeeze that is held (C52) by the deviations of the tangential
+ * forces (C24). */
+static double feel(const hxComplianceModel *model, const hxPlan *plan,
+                   const double force[HX_LEGS][3], double normal[HX_LEGS], hxCompliance *laws) {
+  hxPlane common = {0.0, 0.0}, deviation[HX_LEGS];
   double total = 0.0;
   for (int leg = 0; leg < HX_LEGS; ++leg) {
     const double touching = laws->touching[leg] ? 1.0 : 0.0;
-    push[leg].x = (force[leg][0] - laws->scale * plan->shares.push[leg].x) * touching;
-    push[leg].y = (force[leg][1] - laws->scale * plan->shares.push[leg].y) * touching;
+    const hxPlane planned = hx_scaled(plan->shares.push[leg], laws->scale);
+    deviation[leg] =
+        hx_scaled(hx_plane_sub(hx_plane(force[leg][0], force[leg][1]), planned), touching);
     normal[leg] = force[leg][2] * touching;
-    common = hx_plane_add(common, push[leg]);
+    common = hx_plane_add(common, deviation[leg]);
     total += normal[leg];
   }
-  const double share = total > hx_load_floor ? 1.0 / total : 0.0;
+  const double share = total > load_floor ? 1.0 / total : 0.0;
   if (model->parts.fallback)
     update_trust(model, plan, total > model->settled ? hx_length(common) * share : 0.0, laws);
-  hx_squeeze(normal, plan->feet, push);
   for (int leg = 0; leg < HX_LEGS; ++leg)
-    planned[leg] = hx_scaled(plan->shares.squeeze[leg], laws->touching[leg] ? laws->scale : 0.0);
-  const double missing = hx_missing_share((const hxPlane *)push, (const hxPlane *)planned);
+    laws->load[leg] += model->follow_load * (normal[leg] / model->share - laws->load[leg]);
+  const double missing = missing_share(plan, (const hxPlane *)deviation, laws);
   laws->held += model->follow_cycle * (1.0 - missing - laws->held);
-  for (int leg = 0; leg < HX_LEGS; ++leg)
-    push[leg] = model->parts.slip_pid ? hx_plane_add(push[leg], hx_scaled(planned[leg], missing))
-                                      : hx_plane(0.0, 0.0);
   return total;
 }
 
@@ -240,7 +242,7 @@ static void update_lean(const hxComplianceModel *model, const hxPlan *plan,
  * the weight that the servos carry. normal: measured normal forces [N]; total: their sum [N]. */
 static void update_weight(const hxComplianceModel *model, const hxPlan *plan,
                           const double normal[HX_LEGS], double total, hxCompliance *laws) {
-  const double ratio = total / hx_larger(plan->weight, hx_load_floor),
+  const double ratio = total / hx_larger(plan->weight, load_floor),
                scale = hx_clamp(ratio, least_scale, largest_scale);
   int doubted = 0;
   for (int leg = 0; leg < HX_LEGS; ++leg) doubted |= laws->doubted[leg];
@@ -252,75 +254,10 @@ static void update_weight(const hxComplianceModel *model, const hxPlan *plan,
   hx_burden_step(&model->burden, plan->needed, laws->scale, &laws->burden);
 }
 
-/* Returns the normal force of a foot beyond its share [N], 0 for feet without a share (C26). */
-static double excess(const hxComplianceModel *model, const hxPlan *plan, int leg, double normal,
-                     const hxCompliance *laws) {
-  const int live = model->parts.suspension && plan->shares.activation[leg] > 0.0;
-  return live ? normal - laws->scale * plan->shares.normal[leg] : 0.0;
-}
-
-/* --------------------------------------------------------------------------------------- laws */
-
-/* Limits the lengths of the PID's answers and keeps their directions; reduces the integrals
- * accordingly (C27). */
-static void limit_answers(const hxComplianceModel *model, hxCompliance *laws) {
-  for (int leg = 0; leg < HX_LEGS; ++leg) {
-    hxFootLaw *law = &laws->law[leg];
-    const hxPlane wanted = law->answer;
-    law->answer = hx_scaled(wanted, model->largest / hx_larger(hx_length(wanted), model->largest));
-    law->x.integral += model->tracking * (law->answer.x - wanted.x);
-    law->y.integral += model->tracking * (law->answer.y - wanted.y);
-  }
-}
-
-/* Limits the deflections of the suspensions; at the limit the rate is 0. */
-static void limit_deflections(const hxComplianceModel *model, hxCompliance *laws) {
-  for (int leg = 0; leg < HX_LEGS; ++leg) {
-    hxFootLaw *law = &laws->law[leg];
-    if (fabs(law->deflection) > model->deepest) law->rate = 0.0;
-    law->deflection = hx_clamp(law->deflection, -model->deepest, model->deepest);
-  }
-}
-
-/* Advances the laws by one period, limits them, and computes the forces by which they react (C25 to
- * C27). */
-static void step_laws(const hxComplianceModel *model, const hxPlan *plan,
-                      const hxPlane push[HX_LEGS], const double normal[HX_LEGS],
-                      double answer[HX_LEGS][3], hxCompliance *laws) {
-  const double freedom = model->parts.support ? laws->burden.freedom : 1.0,
-               kept = 1.0 - (1.0 - freedom) * model->follow_load;
-  double answers = 0.0, deflections = 0.0;
-  for (int leg = 0; leg < HX_LEGS; ++leg) {
-    const double beyond = excess(model, plan, leg, normal[leg], laws);
-    hx_foot_law_step(&model->law, push[leg], beyond, normal[leg] * (1.0 / model->share),
-                     &laws->law[leg]);
-    answers += hx_square(laws->law[leg].answer);
-    deflections += laws->law[leg].deflection * laws->law[leg].deflection;
-  }
-  /* when the root of the sum of squares is within a limit, so is each value */
-  if (answers > model->largest * model->largest) limit_answers(model, laws);
-  if (deflections > model->deepest * model->deepest) limit_deflections(model, laws);
-  for (int leg = 0; leg < HX_LEGS; ++leg) {
-    hxFootLaw *law = &laws->law[leg];
-    const double (*lever)[3] = plan->lever[leg];
-    const double vertical =
-        lever[0][2] * lever[0][2] + lever[1][2] * lever[1][2] + lever[2][2] * lever[2][2];
-    const hxPlane given = hx_scaled(law->answer, freedom * hx_smaller(law->load, largest_load));
-    answer[leg][0] = given.x;
-    answer[leg][1] = given.y;
-    answer[leg][2] = law->deflection / (model->softness * vertical); /* z/C_zz, C = J kp^-1 J^T */
-    /* a foot in the air forgets, within the time in which a leg gives up its load; and all
-     * forget what they may not take away */
-    const double left = plan->swinging[leg] && !laws->touching[leg] ? kept * model->memory : kept;
-    law->x.integral *= left;
-    law->y.integral *= left;
-  }
-}
-
 /* ------------------------------------------------------------------------------------- joints */
 
 /* Takes its share from a leg that does not touch the ground where it should stand, and gives it
- * back gradually once the leg touches (C29). */
+ * back gradually once the leg touches (C28). */
 static void restore_grip(const hxComplianceModel *model, const hxPlan *plan, hxCompliance *laws) {
   laws->regaining = 0;
   for (int leg = 0; leg < HX_LEGS; ++leg) {
@@ -331,38 +268,19 @@ static void restore_grip(const hxComplianceModel *model, const hxPlan *plan, hxC
   }
 }
 
-/* Moves the bend of a joint towards the wanted one and limits its torque (C28, C29). */
-static void limit_joint(const hxComplianceModel *model, double wanted, double *bend,
-                        double *torque) {
-  if (!model->parts.limits) {
-    *bend = wanted;
-    return;
-  }
-  *bend += hx_clamp(wanted - *bend, -model->fastest, model->fastest);
-  *torque = hx_clamp(*torque, -model->most, model->most);
-}
-
-/* Converts the forces of the laws and the planned load into angles and torques: bend = J^T f/kp
- * (C28); torque = trust (own + grip strength scale carry) (C29). */
-static void actuate(const hxComplianceModel *model, const hxPlan *plan,
-                    const double answer[HX_LEGS][3], hxCompliance *laws) {
-  const double strength = model->parts.limits ? laws->burden.strength : 1.0;
+/* Sets the torques of the planned load: trust (own + grip strength scale carry) (C29). */
+static void actuate(const hxComplianceModel *model, const hxPlan *plan, hxCompliance *laws) {
+  const int limited = model->parts.limits;
+  const double strength = limited ? laws->burden.strength : 1.0;
   for (int leg = 0; leg < HX_LEGS; ++leg)
     for (int joint = 0; joint < HX_JOINTS; ++joint)
       laws->torque[leg][joint] = plan->carry[leg][joint] * (strength * laws->scale);
   if (laws->regaining) restore_grip(model, plan, laws);
-  for (int leg = 0; leg < HX_LEGS; ++leg) {
-    const double *f = answer[leg];
-    double *shift = laws->shift[leg];
-    shift[0] = shift[1] = shift[2] = 0.0;
+  for (int leg = 0; leg < HX_LEGS; ++leg)
     for (int joint = 0; joint < HX_JOINTS; ++joint) {
-      const double *lever = plan->lever[leg][joint];
-      const double bend = model->softness * (lever[0] * f[0] + lever[1] * f[1] + lever[2] * f[2]);
-      for (int i = 0; i < 3; ++i) shift[i] += lever[i] * bend;
-      laws->torque[leg][joint] = (laws->torque[leg][joint] + plan->own[leg][joint]) * laws->trust;
-      limit_joint(model, bend * laws->trust, &laws->bend[leg][joint], &laws->torque[leg][joint]);
+      const double torque = (laws->torque[leg][joint] + plan->own[leg][joint]) * laws->trust;
+      laws->torque[leg][joint] = limited ? hx_clamp(torque, -model->most, model->most) : torque;
     }
-  }
 }
 
 int hx_compliance_meets(const hxComplianceModel *model, int leg, const hxCompliance *laws) {
@@ -383,14 +301,12 @@ int hx_compliance_waits(const hxComplianceModel *model, const int landing[HX_LEG
 
 void hx_compliance_step(const hxComplianceModel *model, const hxPlan *plan,
                         double force[HX_LEGS][3], hxCompliance *laws) {
-  hxPlane push[HX_LEGS];
-  double normal[HX_LEGS], felt[HX_LEGS], answer[HX_LEGS][3];
+  double normal[HX_LEGS];
   for (int leg = 0; leg < HX_LEGS; ++leg) normal[leg] = force[leg][2];
   hx_contact_detector_step(model->weight, normal, laws->touching);
   hx_landings_look(laws->touching, plan->height, plan->swinging, &laws->landings);
   if (contacts_differ(plan, laws)) examine_contacts(model, plan, force, laws);
-  const double total = law_inputs(model, plan, (const double (*)[3])force, push, felt, laws);
-  update_weight(model, plan, felt, total, laws);
-  step_laws(model, plan, push, felt, answer, laws);
-  actuate(model, plan, (const double (*)[3])answer, laws);
+  const double total = feel(model, plan, (const double (*)[3])force, normal, laws);
+  update_weight(model, plan, normal, total, laws);
+  actuate(model, plan, laws);
 }

@@ -1,5 +1,5 @@
 /* compliance.h - the force laws of compliant control: from planned load and measured foot forces to
- * the joints. Python: controller/comply/compliance.py. */
+ * the servos' torques. Python: controller/comply/compliance.py. */
 #ifndef HX_COMPLIANCE_H
 #define HX_COMPLIANCE_H
 
@@ -7,7 +7,6 @@
 #include "../sense/contact_detection.h"
 #include "../sense/landing.h"
 #include "../sense/touchdown.h"
-#include "foot_law.h"
 #include "hexapod/inside.h"
 #include "support.h"
 
@@ -15,27 +14,23 @@ HX_HIDDEN_BEGIN
 
 typedef struct hxComplianceModel {
   hxParts parts;
-  hxFootLawModel law;
   hxSensorWatchModel watch;
   hxBurdenModel burden;
   double period; /* s */
   /* N, of the robot; a third of it; load of all feet from which on they have settled */
   double weight, share, settled;
   double most_lean; /* m, limit of the distance of the centre of mass, each axis */
-  double softness; /* rad/N m of the servos */
   double high; /* m, a foot that is planned higher is in the air for certain */
   /* 1, factors of the smoothings over a period */
-  double tracking, memory, follow_load, follow_cycle, follow_weight;
+  double follow_load, follow_cycle, follow_weight;
   int64_t calm; /* steps without sliding until feet are trusted again */
-  double largest, deepest; /* N, m, limits of the laws' reactions */
-  double most, fastest; /* N m, rad, limits of the torque and of the bend's change in a period */
+  double most; /* N m, limit of the torque */
 } hxComplianceModel;
 
 /* What a planned step requires of the laws. */
 typedef struct hxPlan {
   double own[HX_LEGS][HX_JOINTS]; /* N m  torques for the legs' own weight and motion */
   double carry[HX_LEGS][HX_JOINTS]; /* N m, torques for the planned load */
-  double lever[HX_LEGS][HX_JOINTS][3]; /* m    J^T of the contact points */
   hxShares shares;
   hxPlane feet[HX_LEGS]; /* m    contact points */
   double weight; /* N, sum of all shares */
@@ -50,15 +45,13 @@ typedef struct hxPlan {
 } hxPlan;
 
 typedef struct hxCompliance {
-  hxFootLaw law[HX_LEGS];
   hxSensorWatch watch;
   hxTouchdown touchdown;
   hxLandings landings;
   hxBurden burden;
   int touching[HX_LEGS];
-  double bend[HX_LEGS][HX_JOINTS]; /* rad  corrections of the joints' angles */
+  double load[HX_LEGS]; /* 1    smoothed, in thirds of the weight */
   double torque[HX_LEGS][HX_JOINTS]; /* N m, for the servos */
-  double shift[HX_LEGS][3]; /* m, of the feet, caused by bend */
   int doubted[HX_LEGS]; /* the foot's sensor is not trusted */
   /* walks without feedback, because the sensor is not trusted, the robot slides, or its joints do
    * not follow */

@@ -107,7 +107,7 @@ static void look(const hxCompliantModel *model, const hxLegSolver leg[HX_LEGS],
     seen.height[k] += stance->value[3];
     seen.planned[k] = stance->plane[k];
     seen.planned_height[k] = stance->height[k];
-    seen.load[k] = compliant->laws.law[k].load;
+    seen.load[k] = compliant->laws.load[k];
   }
   const double rise = hx_clamp(2.0 * (w * y - z * x), -1.0, 1.0);
   seen.tilt[0] = hx_arc(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y)) - stance->value[4];
@@ -120,12 +120,12 @@ static void look(const hxCompliantModel *model, const hxLegSolver leg[HX_LEGS],
 
 /* --------------------------------------------------------------------------------------- step */
 
-/* Computes the joint angles of a leg, bent by the laws and with the foot raised (C41). */
-static void correct(const hxLegSolver *leg, const double climb[HX_JOINTS],
-                    const double bend[HX_JOINTS], double raised, double angle[HX_JOINTS]) {
+/* Computes the joint angles of a leg with the foot raised (C41). */
+static void correct(const hxLegSolver *leg, const double climb[HX_JOINTS], double raised,
+                    double angle[HX_JOINTS]) {
   for (int joint = 0; joint < HX_JOINTS; ++joint)
-    angle[joint] = hx_clamp(angle[joint] + bend[joint] + climb[joint] * raised,
-                            leg->angle_min[joint], leg->angle_max[joint]);
+    angle[joint] = hx_clamp(angle[joint] + climb[joint] * raised, leg->angle_min[joint],
+                            leg->angle_max[joint]);
 }
 
 void hx_compliant_step(const hxCompliantModel *model, const hxLegSolver leg[HX_LEGS],
@@ -145,7 +145,7 @@ void hx_compliant_step(const hxCompliantModel *model, const hxLegSolver leg[HX_L
   const int busy = hx_touchdown_busy(&laws->touchdown);
   for (int k = 0; k < HX_LEGS; ++k) {
     const double offset = laws->touchdown.offset[k], raised = offset + compliant->hold.lift[k];
-    correct(&leg[k], stance->climb[k], laws->bend[k], raised, output->angle_ref[k]);
+    correct(&leg[k], stance->climb[k], raised, output->angle_ref[k]);
     for (int joint = 0; joint < HX_JOINTS; ++joint) {
       if (busy || compliant->moving)
         output->speed_ref[k][joint] +=
@@ -154,9 +154,8 @@ void hx_compliant_step(const hxCompliantModel *model, const hxLegSolver leg[HX_L
     }
     if (busy || compliant->moving) compliant->offset[k] = offset;
     output->fallback[k] = laws->fallback[k];
-    output->shift[k][0] = laws->shift[k][0];
-    output->shift[k][1] = laws->shift[k][1];
-    output->lift[k] = laws->shift[k][2] + raised;
+    output->shift[k][0] = output->shift[k][1] = 0.0;
+    output->lift[k] = raised;
   }
   if (busy || compliant->moving) compliant->moving = busy;
   const double needed = laws->burden.heft * laws->burden.peak / model->laws.most;

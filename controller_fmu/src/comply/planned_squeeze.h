@@ -10,14 +10,13 @@ HX_HIDDEN_BEGIN
 typedef struct hxPlannedSqueeze {
   double friction; /* 1, coefficient that is believed */
   double torque; /* N m, of a tripod's load at the arm of the torso's height */
-  int minmax; /* the largest torques count instead of the sum of squares */
 } hxPlannedSqueeze;
 
 /* weight: of the robot [N]; depth: of the ground below the torso's origin in the stance [m]. */
 void hx_planned_squeeze_compile(const hxControllerDefinition *definition, double weight,
                                 double depth, hxPlannedSqueeze *model);
 
-/* Adds the squeeze to shares without one (C42, C43, C56).
+/* Adds the squeeze to shares without one (C42, C43).
  * squeeze: weight of the torques, in [0, 1). */
 void hx_planned_squeeze_add(const hxPlannedSqueeze *model, const hxPlane feet[HX_LEGS],
                             const hxDemand *demand, double squeeze, hxShares *shares);

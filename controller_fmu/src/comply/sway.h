@@ -1,4 +1,4 @@
-/* sway.h - sway of the torso against the swinging legs (C57). Python: controller/comply/sway.py. */
+/* sway.h - sway of the torso against the swinging legs (C54). Python: controller/comply/sway.py. */
 #ifndef HX_SWAY_H
 #define HX_SWAY_H
 
@@ -29,7 +29,7 @@ double hx_sway_laden(const hxSway *model, const hxWarmth *warmth);
 /* Returns nearly the whole way of the torso in the walking frame, by the shares [m]. */
 hxPlane hx_sway_guess(const hxSway *model, const hxPlannedFeet *feet, const hxWarmth *warmth);
 
-/* Returns the way of the torso in the walking frame [m] (C57). masses: of a torso that has moved by
+/* Returns the way of the torso in the walking frame [m] (C54). masses: of a torso that has moved by
  * the guess. */
 hxPlane hx_sway_of(const hxSway *model, const hxInverseDynamics *dynamics, hxPlane guess,
                    const hxMasses *masses, const hxWarmth *warmth);

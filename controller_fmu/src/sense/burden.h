@@ -20,14 +20,13 @@ typedef struct hxBurden {
   double peak;
   /* 1, factor of the support, below 1 so that no servo exceeds its torque limit */
   double strength;
-  double freedom; /* 1, part of the squeeze that the slip PID may remove */
   int overburdened; /* the robot is far too heavy: kinematic control */
 } hxBurden;
 
 void hx_burden_compile(const hxControllerDefinition *definition, hxBurdenModel *model);
 void hx_burden_reset(hxBurden *burden);
 
-/* Takes the measured over the modelled weight of this period (C31). */
+/* Takes the measured over the modelled weight of this period (C32). */
 void hx_burden_weigh(const hxBurdenModel *model, double ratio, hxBurden *burden);
 
 /* Advances by one period (C31, C32). needed: largest torque to carry the model's weight [N m];

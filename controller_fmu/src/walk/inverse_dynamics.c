@@ -92,7 +92,7 @@ static void add_force(hxPlane push, double lift, hxPlane place, double height, d
   demand->twist += hx_across(place, push);
 }
 
-/* Adds the forces that the torso needs to the demand (C16, C58). */
+/* Adds the forces that the torso needs to the demand (C16, C56). */
 static void demand_torso(const hxInverseDynamics *model, const hxNeighbours *motion, double laden,
                          hxDemand *demand) {
   const hxMasses *now = motion->masses[1], *before = motion->masses[0], *after = motion->masses[2];
@@ -111,7 +111,7 @@ static void demand_torso(const hxInverseDynamics *model, const hxNeighbours *mot
   demand->twist += model->torso_inertia * hx_across(now->turn, spin);
 }
 
-/* Adds m (a + g) of the links of a leg to the demand (C16, C58), and returns it in the torso
+/* Adds m (a + g) of the links of a leg to the demand (C16, C56), and returns it in the torso
  * frame. */
 static void demand_links(const hxInverseDynamics *model, const hxNeighbours *motion, int leg,
                          const hxPosture *posture, double laden, hxPlane push[HX_JOINTS],

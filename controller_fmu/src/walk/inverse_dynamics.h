@@ -62,7 +62,7 @@ void hx_inverse_dynamics_place(const hxInverseDynamics *model, const hxLegSolver
                                const hxPosture *posture, hxMasses *masses);
 
 /* laden: measured over modelled weight [1]. The planned loads are scaled by it (C30), but a payload
- * needs no push for the legs, and more for the torso (C58). */
+ * needs no push for the legs, and more for the torso (C56). */
 void hx_inverse_dynamics_demand(const hxInverseDynamics *model, const hxLegSolver leg[HX_LEGS],
                                 const hxNeighbours *motion, const double speed[HX_LEGS][HX_JOINTS],
                                 const hxPosture *posture, double laden, hxDemand *demand);

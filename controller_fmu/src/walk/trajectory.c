@@ -8,8 +8,6 @@
 static const double dwell = 0.1;
 /* 1, part of the swing after which the landing point stays fixed on the ground */
 static const double freeze = 0.75;
-/* 1, by which a swing with a slow landing begins faster and ends slower (C54) */
-static const double haste = 0.25;
 static const double same_distance = 1e-6; /* m, distances that differ by less are equal */
 /* m, a foot this close to its stance position makes no step */
 static const double home_tolerance = 1e-9;
@@ -128,8 +126,6 @@ void hx_foot_paths_compile(const hxControllerDefinition *definition, const hxLeg
   model->duty = gait->duty;
   model->step_height = gait->step_height;
   model->touchdown_speed = gait->touchdown_speed;
-  const int slow = definition->control == HX_CONTROL_COMPLIANT && definition->parts.slow_landing;
-  model->haste = slow ? haste : 0.0;
   model->swing_time = gait->period * (1.0 - gait->duty);
   model->landing_lead = 0.5 * gait->period * gait->duty + model->swing_time;
   for (int k = 0; k < HX_LEGS; ++k) {
@@ -247,12 +243,6 @@ static double progress(const hxFootPathsModel *model, double phase) {
   return (phase - model->duty) / (1.0 - model->duty);
 }
 
-/* Returns the part of its path at which a foot is at a part of its swing, which replaces tau in C6
- * and C7 (C54). */
-static double path_of(const hxFootPathsModel *model, double tau) {
-  return tau + model->haste * tau * (1.0 - tau);
-}
-
 /* Returns the position of a foot on the ground (C5). */
 static hxPlane ground_of(const hxPlannedFeet *feet, int leg) {
   return hx_plane_sub(feet->goal[leg], hx_scaled(feet->pull[leg], 1.0 - feet->blend[leg]));
@@ -262,21 +252,18 @@ static hxPlane ground_of(const hxPlannedFeet *feet, int leg) {
  * carried: its position on the ground at the previous step; back: e^(-i turn). */
 static void place_foot(const hxFootPathsModel *model, const hxFootPaths *paths, int leg,
                        hxPlane back, hxPlane carried, hxPlannedFeet *feet) {
-  const double tau = progress(model, feet->phase[leg]), part = path_of(model, tau),
-               w = feet->twist.yaw_rate;
+  const double tau = progress(model, feet->phase[leg]), w = feet->twist.yaw_rate;
   double s, slope, lift, climb;
-  blend(part, &s, &slope);
+  blend(tau, &s, &slope);
   feet->blend[leg] = paths->swinging[leg] ? s : 0.0;
   const hxPlane was = hx_times(back, hx_plane_sub(carried, feet->way)), v = feet->twist.velocity;
   feet->plane[leg] = hx_times(back, hx_plane_sub(ground_of(feet, leg), feet->way));
   /* a foot on the ground: dp/dt = -(v + i w p) */
   /* 1/s, at which the foot passes through its path */
-  const double pace =
-      paths->held ? 0.0 : (1.0 + model->haste * (1.0 - 2.0 * tau)) / model->swing_time;
+  const double pace = paths->held ? 0.0 : 1.0 / model->swing_time;
   const hxPlane pulled = hx_scaled(hx_times(back, feet->pull[leg]), slope * pace);
   feet->velocity[leg] = hx_plane(pulled.x - (v.x - w * was.y), pulled.y - (v.y + w * was.x));
-  const double down = model->touchdown_speed * model->swing_time / (1.0 - model->haste);
-  hop(part, model->step_height, down, &lift, &climb);
+  hop(tau, model->step_height, model->touchdown_speed * model->swing_time, &lift, &climb);
   feet->height[leg] = model->home_height[leg] + (paths->swinging[leg] ? lift : 0.0);
   feet->rise[leg] = paths->swinging[leg] ? climb * pace : 0.0;
 }
@@ -293,7 +280,7 @@ static void set_out(const hxFootPathsModel *model, const hxFootPaths *paths,
   for (int leg = 0; leg < HX_LEGS; ++leg) {
     double s, slope;
     first->phase[leg] = phase_after(model, leg, paths->before);
-    blend(path_of(model, progress(model, first->phase[leg])), &s, &slope);
+    blend(progress(model, first->phase[leg]), &s, &slope);
     first->blend[leg] = paths->swinging[leg] ? s : 0.0;
     first->goal[leg] = present.goal[leg];
     first->rolled[leg] = present.rolled[leg];
@@ -453,7 +440,7 @@ void hx_foot_paths_walk(const hxFootPathsModel *model, const hxFootPaths *paths,
     if (paths->swinging[leg] && !paths->met[leg]) {
       const double aim = paths->narrowing * model->turned[leg];
       double s, slope;
-      blend(path_of(model, tau), &s, &slope);
+      blend(tau, &s, &slope);
       feet->rolled[leg] = aim - (aim - before->rolled[leg]) * (1.0 - s) / left;
     }
     if (paths->met[leg]) { /* the foot stays where it met the ground (C51) */

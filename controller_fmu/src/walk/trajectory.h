@@ -50,7 +50,6 @@ typedef struct hxFootPathsModel {
   /* the walk begins during the leg's swing, or while it takes up its load */
   int late[HX_LEGS];
   double handover; /* cycles in which a leg takes up or gives up its load (C18) */
-  double haste; /* 1, by which a swing begins faster and ends slower (C54) */
   double swing_time; /* s */
   double landing_lead; /* s, from lift-off to the middle of the next stance */
   hxPlane home[HX_LEGS]; /* m   feet of the stance */

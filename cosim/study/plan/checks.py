@@ -121,7 +121,7 @@ def _check_size(study: Study) -> None:
 
 
 def gain_names() -> list[str]:
-    """Returns the names of all gains as factors have them, for instance gains.slip.kp."""
+    """Returns the names of all gains as factors have them, for instance gains.hold.path_rate."""
     hints = get_type_hints(Gains)
     parts = {
         name: kind

@@ -16,7 +16,7 @@ last integer:
 A unit, and a factor of the designed gain:
 
     "terrain.incline" = { linspace = [0, 10, 6], unit = "deg" }
-    "gains.slip.kp" = { loguniform = [0.3, 3.0], relative = true }
+    "gains.hold.path_rate" = { loguniform = [0.3, 3.0], relative = true }
 """
 
 from __future__ import annotations

@@ -6,7 +6,7 @@
     trials = 60
     batch = 4                   # trials that run at the same time
     [optimise.variables]
-    gains.slip.kp = { loguniform = [0.3, 3.0], relative = true }
+    gains.hold.path_rate = { loguniform = [0.3, 3.0], relative = true }
     [optimise.training]
     scenarios = ["walk_flat"]
     seeds = { first = 100, count = 4 }

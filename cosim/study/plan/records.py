@@ -41,7 +41,7 @@ class StudyError(HexapodError):
 class Factor:
     """A quantity that a study varies: a setting, a gain, or the scenario.
 
-    Settings have the names that --set accepts; gains have names like gains.slip.kp.
+    Settings have the names that --set accepts; gains have names like gains.hold.path_rate.
     """
 
     name: str

@@ -1,15 +1,12 @@
 /* controller_probe.c - exports the controller's internal functions for the tests. */
 #include <string.h>
 
-#include "comply/slip_pid.h"
 #include "comply/support.h"
 #include "comply/suspension.h"
 #include "transcendental.h"
 
 HX_API void hx_probe_suspension(double mass, double damping, double stiffness, double period,
                                 hxSuspension *suspension);
-HX_API void hx_probe_squeeze(const double normal[HX_LEGS], const hxPlane feet[HX_LEGS],
-                             hxPlane push[HX_LEGS]);
 HX_API void hx_probe_transcendental(const double *x, const double *y, double *result[6], int n);
 HX_API void hx_probe_shares(const hxPlane feet[HX_LEGS], const double activation[HX_LEGS],
                             const double asked[6], double force[HX_LEGS][3]);
@@ -17,11 +14,6 @@ HX_API void hx_probe_shares(const hxPlane feet[HX_LEGS], const double activation
 void hx_probe_suspension(double mass, double damping, double stiffness, double period,
                          hxSuspension *suspension) {
   hx_suspension_discretise(mass, damping, stiffness, period, suspension);
-}
-
-void hx_probe_squeeze(const double normal[HX_LEGS], const hxPlane feet[HX_LEGS],
-                      hxPlane push[HX_LEGS]) {
-  hx_squeeze(normal, feet, push);
 }
 
 /* Computes sine, cosine, e^x - 1, tanh x and x^(2/3), and the angle of (y, x). */

@@ -56,7 +56,6 @@ READ: Mapping[str, Callable[[], Shown]] = {
     "peers": benchmarks.peers,
     "speed": benchmarks.speed,
     "control": benchmarks.control,
-    "slip-pid": benchmarks.slip_pid,
 }
 
 

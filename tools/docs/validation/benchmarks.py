@@ -13,7 +13,6 @@ from matplotlib.figure import Figure
 
 from tools.docs.stage import ROOT
 from tools.docs.validation.shown import Shown, short
-from tools.docs.validation.walked import shown
 
 RESULTS = ROOT / "benchmarks" / "results"
 ENGINES = {
@@ -144,44 +143,3 @@ def _changes(path: Path) -> dict[tuple[str, str], float]:
         for row in _rows(path)
         if row["relative"]
     }
-
-
-PID, WITHOUT, ALL = "slip_pid alone", "without slip_pid", "by default"
-ADDED = {  # effect of the PID beside the other parts
-    "slip_per_metre": "PID added to the rest: slip [%]",
-    "foot_error_stance": "the same: feet in stance [%]",
-    "roll_rms": "the same: roll [%]",
-}
-Cases = Mapping[tuple[str, str], Mapping[str, str]]  # by case and metric
-
-
-def slip_pid() -> Shown:
-    """Shows the slip PID by itself and beside the other parts, for several model errors."""
-    known, sticking, wrong = map(_cases, ("ablation", "sticking", "model_errors"))
-    errors = sorted({case.rpartition(", ")[0] for case, _ in wrong})
-    plants = {"as modelled": _of_pid(known), "bristle law": _of_pid(sticking)}
-    plants |= {error: _of_pid(wrong, before=f"{error}, ") for error in errors}
-    titles = (
-        "slip [m/m]: kinematic", "PID alone", "without the PID", "by default",
-        "PID alone, against kinematic: slip [%]", *ADDED.values(),
-    )  # fmt: skip
-    rows = zip(titles, *plants.values(), strict=True)
-    return Shown(columns=("the plant", *plants), rows=list(rows))
-
-
-def _cases(name: str) -> Cases:
-    rows = _rows(RESULTS / "control" / f"{name}.csv")
-    return {(row["case"], row["metric"]): row for row in rows}
-
-
-def _of_pid(cells: Cases, before: str = "") -> list[str]:
-    def value(part: str, metric: str = "slip_per_metre") -> float:
-        row = cells.get((before + part, metric))
-        return float("nan") if row is None else float(row["compliant"])
-
-    kinematic = float(cells[before + ALL, "slip_per_metre"]["kinematic"])
-    slips = [kinematic, *(value(part) for part in (PID, WITHOUT, ALL))]
-    gains = [(slips[1], kinematic), *((value(ALL, name), value(WITHOUT, name)) for name in ADDED)]
-    changes = [100.0 * (after / plain - 1.0) for after, plain in gains]
-    texts = (f"{each:+.1f}" if np.isfinite(each) else "-" for each in changes)
-    return [*map(shown, slips), *texts]

@@ -3,23 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from unittest.mock import patch
 
 import numpy as np
 from matplotlib.figure import Figure
 from test_conditions import WORLDS
 from test_controller_continuity import LARGEST, steepest
 
-from benchmarks.control.cases import DATA, SWITCH, judged_walk, seeds
-from hexapod_cosim.controller import COMPLIANT_PARTS
-from hexapod_cosim.controller.comply import compliance
-from hexapod_cosim.controller.comply.slip_pid import LOAD_FLOOR
-from hexapod_cosim.controller.plane import Array, Plane
 from hexapod_cosim.cosim.master.signals import COMMANDED
 from hexapod_cosim.cosim.results.result import Result
-from hexapod_cosim.cosim.run.run import simulate
 from hexapod_cosim.cosim.scenario.records import COMPARED
-from hexapod_cosim.cosim.scenario.scenario import load_scenario
 from tools.docs.validation.shown import PALETTE, Shown
 from tools.docs.validation.walked import (
     MILLI,
@@ -27,14 +19,12 @@ from tools.docs.validation.walked import (
     judged,
     shown,
     under_both,
-    walker,
 )
 
 PERIODS = (0.001, 0.002, 0.005)  # s
 LEG, JOINT = "LM", "femur"  # the most loaded joint of a tripod
 BY_HAND = tuple(LARGEST)  # robots of the tests
 TURN = "command={yaw_rate=0.3}"
-TWISTED = "compliant, its PID answering to the common twist too"
 PUSH = "events=[{time=4, duration=0.5, torque=[0, 0, 8]}]"
 UNKNOWN = {  # what the plant has and its controller does not know -> settings
     "as modelled": (),
@@ -106,24 +96,9 @@ def yaw() -> Shown:
         ("walking, pushed by 8 N m for 0.5 s: peak force [BW]", "peak_force", 1.0, (PUSH,)),
         ("walking, not pushed: peak force [BW]", "peak_force", 1.0, ()),
     ):
-        runs = (*under_both(*settings), _twisted(*settings))
+        runs = under_both(*settings)
         rows.append((title, *(shown(scale * run.metrics[metric]) for run in runs)))
-    return Shown(columns=("", *COMPARED, TWISTED), rows=rows)
-
-
-def _twisted(*settings: str) -> Result:
-    """Runs compliant control whose PID acts on the feet's common twist, not on their common
-    push.
-    """
-    plan = load_scenario("walk_flat", overrides=["control=compliant", *settings])
-    with patch.object(compliance, "squeeze", _with_twist):
-        return simulate(plan)
-
-
-def _with_twist(push: Plane, normal: Array, feet: Plane) -> Plane:
-    """Replaces `squeeze` of controller/comply/slip_pid.py; removes the common push only."""
-    total = normal.sum()
-    return push if total <= LOAD_FLOOR else np.asarray(push - push.sum() * normal / total)
+    return Shown(columns=("", *COMPARED), rows=rows)
 
 
 def model_errors() -> Shown:
@@ -136,36 +111,6 @@ def model_errors() -> Shown:
     shares = (pair[1].facts["walk"]["fallback"] for pair in pairs)
     rows.append(("fallback, compliant [%]", *(f"{100.0 * share:.0f}" for share in shares)))
     return Shown(columns=("the plant", *UNKNOWN), rows=rows)
-
-
-def slip_pid() -> Shown:
-    """Shows the judged walk of the first seed with different parts of compliant control.
-
-    These are none, the slip PID alone, all others of the default, and the default.
-    """
-    off = {part: f"{SWITCH}{part}=false" for part in COMPLIANT_PARTS}
-    others = tuple(text for part, text in off.items() if part != "slip_pid")
-    cases = (tuple(off.values()), others, (off["slip_pid"],), ())
-    columns = (
-        "friction", "none of the parts: slip [m/m]", "PID alone", "by the PID alone [%]",
-        "without the PID", "by default", "by the PID added [%]",
-    )  # fmt: skip
-    rows = []
-    for law, settings in {"tanh": (), "bristle": tuple(DATA["judged"]["sticking"])}.items():
-        none, alone, without, every = (_seeded_slip(*settings, *parts) for parts in cases)
-        pairs = ((none, alone), (without, every))
-        cells = [(*map(shown, pair), f"{100.0 * (pair[1] / pair[0] - 1.0):+.1f}") for pair in pairs]
-        rows.append((law, *cells[0], *cells[1]))
-    return Shown(columns=columns, rows=rows)
-
-
-def _seeded_slip(*settings: str) -> float:
-    """Returns the slip of the judged walk of the first seed under compliant control [m/m]."""
-    plan = judged_walk("one seed", *settings).plan("compliant", seeds("judged")[0])
-    result = walker().simulate(plan)
-    if not (result.completed and result.facts["walk"]["upright"]):
-        raise RuntimeError(f"{settings}: {result.outcome.reason or 'fell'}")
-    return result.metrics["slip_per_metre"]
 
 
 def worlds() -> Shown:
@@ -182,5 +127,4 @@ def worlds() -> Shown:
 
 RESULTS: Mapping[str, Callable[[], Shown]] = {
     "touch-down": touch_down, "yaw": yaw, "model-errors": model_errors, "worlds": worlds,
-    "slip-pid-walked": slip_pid,
 }  # fmt: skip
