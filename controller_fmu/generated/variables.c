@@ -637,7 +637,7 @@ const char *const hx_log_category_names[] = {
 const hxStateRow *const hx_states = 0;
 const size_t hx_state_count = 0;
 
-const char hx_default_guid[] = "{1608e76b-3b88-4da3-9791-dc3c632a6478}";
+const char hx_default_guid[] = "{65d06045-e772-4c0c-9c73-492551cea064}";
 
 _Static_assert(HX_CONTROL_KINEMATIC == 1, "Control");
 _Static_assert(HX_CONTROL_COMPLIANT == 2, "Control");

@@ -113,9 +113,9 @@ def test_the_shares_grow_with_the_duty_of_the_gait_to_their_limit() -> None:
     tripod, amble, wave = (
         law(with_parts(paper_share=True), gait=g) for g in ("tripod", "amble", "wave")
     )
-    assert (tripod.share, tripod.height_share) == (0.4, 0.45)
-    assert amble.share == pytest.approx(0.7)  # 0.4 (4/3)^2 = 0.711 is limited
-    assert wave.height_share == 0.7
+    assert (tripod.share, tripod.height_share) == (0.38, 0.5)
+    assert amble.share == pytest.approx(0.66)  # 0.38 (4/3)^2 = 0.676 is limited
+    assert wave.height_share == 0.66
 
 
 def test_what_a_foot_carries_beyond_half_of_the_weight_is_not_taken_back() -> None:
