@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from hexapod_cosim.controller.design.closed import disturbed, spectral_radius, splay
-from hexapod_cosim.controller.design.loci import Response, critical_size
+from hexapod_cosim.controller.design.loci import Response, critical_size, static_margin
 from hexapod_cosim.controller.design.paper import (
     PaperLoops,
     Plants,
@@ -206,18 +206,29 @@ def _margins(loci: Response, loops: PaperLoops, gains: Gains) -> Any:
     )
     late.axhline(0.0, color="k", lw=0.6)
     late.set(xlabel="further delay [ms]", ylabel="gain margin [dB]")
-    margins, name = loops.worst(gains.paper)
-    plant, critical = loops.plants[name], 10.0 ** (margins.gain / 20.0)
-    radii = [
-        spectral_radius(
-            closed_loop(loops.robot, plant, scaled(gains.paper, factor), delays=loops.delays),
-            feet=int(plant.standing.sum()),
-        )
-        for factor in FACTORS
-    ]
-    more.plot(FACTORS, radii, color=colour, marker="o", ms=3, lw=1.0, label="worst plant")
-    more.axvline(critical, color=COLOURS["without"], ls="--", lw=1.0, label="by the gain margin")
+    loci_of = {name: loops.loci(name, gains.paper) for name in loops.plants}
+    shaking = max(loci_of, key=lambda name: critical_size(loci_of[name]).max())
+    pushing = min(loci_of, key=lambda name: static_margin(loci_of[name]))
+    critical = -loci_of[pushing][:, 0].real.min(), critical_size(loci_of[shaking]).max()
+    for name, size, colour in zip((pushing, shaking), critical, PALETTE[3:5], strict=True):
+        radii = [
+            spectral_radius(
+                closed_loop(
+                    loops.robot,
+                    loops.plants[name],
+                    scaled(gains.paper, factor),
+                    delays=loops.delays,
+                )
+            )
+            for factor in FACTORS
+        ]
+        more.plot(FACTORS, radii, color=colour, marker="o", ms=3, lw=1.0, label=name)
+        more.axvline(1.0 / size, color=colour, ls="--", lw=1.0)
     more.axhline(1.0, color="k", lw=0.6)
-    more.set(xlabel="factor on the shares [1]", ylabel="spectral radius [1]")
+    more.set(
+        xlabel="factor on the shares [1]",
+        ylabel="spectral radius [1]",
+        title="dashed: by the margins",
+    )
     _legend_below(figure, late, more)
     return figure
