@@ -479,7 +479,7 @@ class Controller(Stateful):
         shown.planned[...] = self._show_planned()
 
     def _correct_paths(self, paper: Paper, measurement: Measurement) -> None:
-        """Corrects the paths by the foot forces, and the joint commands with them (C47 to C49)."""
+        """Corrects the paths by the deviations of the feet, and the commands with them (C49)."""
         now, out, shown = self._now, self._out, self.diagnostics
         feet = now.posture.see(self._planned_feet())
         paper.step(

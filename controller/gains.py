@@ -24,7 +24,7 @@ class GainsError(HexapodError):
 
 @dataclass(frozen=True, kw_only=True)
 class PaperGains:
-    """Corrections of the feet by the paper's control (C47 to C49)."""
+    """Corrections of the feet by the paper's control (C25, C26, C47 to C49)."""
 
     share: float  # 1    of the deviation along the ground that is taken back, at duty 1/2
     height_share: float  # 1    the same of the deviation upwards
@@ -77,16 +77,16 @@ class Requirements:
     delay_periods: float = 1.0  # 1    computing delay in controller periods
     force_delay: float = 0.010  # s    of the force sensors
     filter_time: float = 0.005  # s    smoothing of the forces
-    share: float = 0.38  # 1    of the paper's control: of the deviations along the ground
-    height_share: float = 0.55  # 1    of the deviations upwards, at most
-    share_limit: float = 0.75  # 1    of both, in gaits with more standing legs
+    share: float = 0.4  # 1    of the paper's control: of the deviations along the ground
+    height_share: float = 0.45  # 1    of the deviations upwards, at most
+    share_limit: float = 0.7  # 1    of both, in gaits with more standing legs
     yield_share: float = 0.3  # 1
     return_rate: float = 3.0  # 1/s
     # m/s    at which the suspension yields, at most, to a sixth of the weight beyond the share
     landing_speed: float = 0.9
     load_time: float = 0.030  # s    smoothing of the load: the time of real hand-overs
     return_time: float = 3.0  # s    of the suspension
-    sag_limit: float = 0.003  # m    largest lift of feet in the air
+    sag_limit: float = 0.002  # m    largest lift of feet in the air
     deflection_limit: float = 0.030  # m    largest deflection of the suspension
     handover_time: float = 0.065  # s
     weight_time: float = 0.5  # s

@@ -3,17 +3,17 @@
 Section 3 of the paper: kinematic control neglects the deviations of the feet during stance; a PID
 on the tangential force and a virtual suspension on the normal force correct the foot positions, the
 correction is added to the trajectory, and inverse kinematics is done again. The paper gives no
-equations; C47 to C49 are ours. They use joint angles and foot forces, and command angles only:
+equations, these are ours. They use joint angles and foot forces, and command angles only:
 
-1. Deviations (C47). Under its load a leg yields like a spring. The force and the softness of the
-   leg give the deviation of a standing foot at once; the measured joint angles give it with the
-   friction of the gears, which a force does not show. Feet in the air deviate with the torso.
-2. Correction along the ground (C48). A share of the deviation under the load is taken back. The P
-   part yields to the force that makes a foot slip, the I part returns all standing feet to their
-   planned places together, so that it makes no leg pull against another.
-3. Correction upwards (C49). A share of the deviation under the load is taken back, feet in the air
-   are lifted by what the torso sags, and a suspension yields where the ground is met early and
-   extends where it is met late.
+1. Deviations. Under its load a leg yields like a spring: force and softness of the leg give the
+   deviation of a standing foot at once (C25). The measured joint angles give it with the friction
+   of the gears, for feet in the air, which deviate with the torso (C26).
+2. Along the ground (C47). A share of the deviation under the load is taken back. The P part yields
+   to the force that makes a foot slip; the I part returns all feet to their planned places, all by
+   the same way, so that no leg pulls against another.
+3. Upwards (C48, C49). A share of the deviation under the load is taken back, feet in the air are
+   lifted by what the torso sags, and a suspension yields where a foot meets the ground early, and
+   extends it where it is late.
 """
 
 from __future__ import annotations
@@ -33,8 +33,9 @@ from hexapod_cosim.controller.walk.kinematics import Feet, Joints, LegSolver, Po
 from hexapod_cosim.models import Robot
 
 LEAST_LOAD = 1e-6  # N    a smaller sum of loads cannot be divided by
-LARGEST_PART = 0.5  # 1    of all loads: what a foot carries beyond is not taken back
-TOUCHING = 0.02  # 1    of all loads: a foot with more is on the ground
+LARGEST_PART = 0.5  # 1    of the weight: what a foot carries beyond is not taken back
+TOUCH_PART = 0.02  # 1    of the weight: a foot with more is on the ground
+WEIGHT_TIME = 0.5  # s    smoothing of the sum of all loads
 EVENING = 0.15  # 1    added to the spread of the standing feet, for the tilt of the torso
 LANDED_TIME = 0.05  # s    in which a landed foot gives back the lift that it had in the air
 EARLY = 0.003  # m    a foot that is planned higher above the ground meets it early
@@ -65,7 +66,7 @@ class Step(NamedTuple):
 
 
 def softness(legs: LegSolver, pose: Pose, kp: float) -> Softness:
-    """Returns the softness of legs whose servos have the stiffness kp [N m/rad] (C47)."""
+    """Returns the softness of legs whose servos have the stiffness kp [N m/rad] (C25)."""
     # rates of the foot, outward + i up, by the femur's and by the tibia's joint
     femur, tibia = 1j * pose.foot, -1j * legs.tibia * pose.tibia
     return Softness(
@@ -81,6 +82,7 @@ class Paper(Stateful):
 
     Attributes:
         force: (6, 3) smoothed forces on the feet, torso axes [N].
+        weight: smoothed sum of the normal forces [N].
         back: common return of all feet, x + i y [m].
         sag: height by which the torso sags at its centre, and its slope, x + i y [m, 1].
         lifted: (6,) lift by the torso's sag [m].
@@ -89,7 +91,7 @@ class Paper(Stateful):
         shift, lift: (6,) corrections of the feet, torso frame, x + i y and z [m].
     """
 
-    STATE = ("force", "back", "sag", "lifted", "yielded", "late", "shift", "lift")
+    STATE = ("force", "weight", "back", "sag", "lifted", "yielded", "late", "shift", "lift")
 
     def __init__(
         self,
@@ -107,6 +109,7 @@ class Paper(Stateful):
         lighter = (2.0 * gait.duty) ** 2 if parts.paper_share else 0.0
         self.share = min(lighter * self.gains.share, self.gains.share_limit)
         self.height_share = min(lighter * self.gains.height_share, self.gains.share_limit)
+        self.weighing = 1.0 - math.exp(-period / WEIGHT_TIME)
         self.smoothing = 1.0 - math.exp(-period / self.gains.filter_time)
         self.landed = math.exp(-period / LANDED_TIME)
         self.in_air = math.exp(-period / AIR_TIME)
@@ -116,14 +119,14 @@ class Paper(Stateful):
     def reset(self) -> None:
         """Sets all forces, deviations and corrections to zero."""
         self.force = np.zeros((LEGS, 3))
-        self.back, self.sag = 0j, (0.0, 0j)
+        self.weight, self.back, self.sag = 0.0, 0j, (0.0, 0j)
         self.lifted, self.yielded, self.late, self.lift = np.zeros((4, LEGS))
         self.shift: Plane = np.zeros(LEGS, dtype=np.complex128)
 
     # -------------------------------------------------------------------------- deviations
 
     def _see_torso(self, step: Step, load: Array) -> None:
-        """Updates the torso's sag and the return of the feet by the standing feet (C47, C48).
+        """Updates the torso's sag and the return of the feet by the standing feet (C26, C47).
 
         load: (6,) smoothed normal forces [N].
         """
@@ -156,7 +159,7 @@ class Paper(Stateful):
     # ------------------------------------------------------------------------- corrections
 
     def _along_ground(self, step: Step, soft: Softness, borne: Array) -> Plane:
-        """Returns the correction along the ground (6,) x + i y [m] (C48).
+        """Returns the correction along the ground (6,) x + i y [m] (C47).
 
         borne: (6,) normal forces whose deviation is taken back [N].
         """
@@ -171,21 +174,21 @@ class Paper(Stateful):
         return np.asarray(shift + self.back)
 
     def _lift_swinging(self, step: Step) -> None:
-        """Updates the lift of the feet in the air by the torso's sag (C49)."""
+        """Updates the lift of the feet in the air by the torso's sag (C48)."""
         height, slope = self.sag
         sunk = height + along(step.planned[:, 0] + 1j * step.planned[:, 1], slope)
         wanted = clamp(sunk, -self.gains.sag_limit, self.gains.sag_limit)
         rising = self.lifted + self.smoothing * (wanted - self.lifted)
         self.lifted = np.where(step.swinging, rising, self.landed * self.lifted)
 
-    def _suspend(self, step: Step, load: Array) -> None:
-        """Updates the deflections of the suspensions (C49). load: as in _see_torso()."""
-        total, h = float(load.sum()), self.period
-        touching = step.force[:, 2] > max(TOUCHING * total, LEAST_LOAD)
+    def _suspend(self, step: Step) -> None:
+        """Updates the deflections of the suspensions (C48)."""
+        h = self.period
+        touching = step.force[:, 2] > max(TOUCH_PART * self.weight, LEAST_LOAD)
         missing = ~touching & ~step.swinging
         self.late = np.where(missing, self.late + h, 0.0)
-        # the damper yields to the force beyond a foot's share of all loads
-        rate = (step.force[:, 2] - total / LEGS) / self.gains.damping
+        # the damper yields to the force beyond the share of a foot
+        rate = (step.force[:, 2] - self.weight / LEGS) / self.gains.damping
         descent = np.where(step.height > EARLY, np.maximum(-step.rise, 0.0), 0.0)
         met = self.yielded + h * clamp(rate, 0.0, descent)
         sought = self.yielded + h * clamp(rate, -SEARCH_SPEED, 0.0)
@@ -199,12 +202,13 @@ class Paper(Stateful):
         self.force = self.force + self.smoothing * (step.force - self.force)
         load = np.maximum(self.force[:, 2], 0.0)
         soft = softness(self.legs, step.pose, self.kp)
-        borne = np.minimum(load, LARGEST_PART * load.sum())
+        self.weight += self.weighing * (float(load.sum()) - self.weight)
+        borne = np.minimum(load, LARGEST_PART * self.weight)
         self._see_torso(step, load)
         if self.parts.paper_share:
             self._lift_swinging(step)
         if self.parts.paper_suspension:
-            self._suspend(step, load)
+            self._suspend(step)
         self.shift = self._along_ground(step, soft, borne)
         self.lift = self.lifted + self.yielded - self.height_share * soft.up * borne
 

@@ -3,8 +3,8 @@
 To take back a share of a foot's deviation under its load is a positive feedback of the force on the
 foot: a share of 1 would make the leg infinitely stiff. The plant is the standing robot, linearised,
 from shifts of the feet to the forces on them; the law is a smoothed, delayed matrix of the leg's
-softness (C47 to C49). The torso's sag, the return of the feet and the suspension act on feet in the
-air, on all feet together, or by events, and are no part of this loop.
+softness (C25, C47, C49). The torso's sag, the return of the feet and the suspension are no part of
+this loop: they act on feet in the air, on all feet together, or by events.
 """
 
 from __future__ import annotations

@@ -464,7 +464,8 @@ static const hxVariable parameters[] = {
     {"gains.hold.turn_limit", "rad/s", 0.0, 1000000.0, offsetof(struct hxVariables, definition.gains.hold.turn_limit), HX_REAL, 0, 1},
     {"gains.limits.torque", "N.m", 1e-09, 100000000.0, offsetof(struct hxVariables, definition.gains.limits.torque), HX_REAL, 0, 1},
     {"parts.support", "", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, definition.parts.support), HX_BOOLEAN, 0, 1},
-    {"parts.slip_pid", "", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, definition.parts.slip_pid), HX_BOOLEAN, 0, 1},
+    {"parts.paper_share", "", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, definition.parts.paper_share), HX_BOOLEAN, 0, 1},
+    {"parts.paper_pid", "", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, definition.parts.paper_pid), HX_BOOLEAN, 0, 1},
     {"parts.paper_suspension", "", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, definition.parts.paper_suspension), HX_BOOLEAN, 0, 1},
     {"parts.touchdown", "", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, definition.parts.touchdown), HX_BOOLEAN, 0, 1},
     {"parts.posture", "", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, definition.parts.posture), HX_BOOLEAN, 0, 1},
@@ -472,18 +473,16 @@ static const hxVariable parameters[] = {
     {"parts.path", "", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, definition.parts.path), HX_BOOLEAN, 0, 1},
     {"parts.limits", "", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, definition.parts.limits), HX_BOOLEAN, 0, 1},
     {"parts.fallback", "", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, definition.parts.fallback), HX_BOOLEAN, 0, 1},
-    {"gains.paper_slip.kp", "m/N", -1000000.0, 1000000.0, offsetof(struct hxVariables, definition.gains.paper_slip.kp), HX_REAL, 0, 1},
-    {"gains.paper_slip.ki", "m/(N.s)", -1000000.0, 1000000.0, offsetof(struct hxVariables, definition.gains.paper_slip.ki), HX_REAL, 0, 1},
-    {"gains.paper_slip.kd", "m.s/N", -1000000.0, 1000000.0, offsetof(struct hxVariables, definition.gains.paper_slip.kd), HX_REAL, 0, 1},
-    {"gains.paper_slip.derivative_time", "s", 1e-09, 1000000.0, offsetof(struct hxVariables, definition.gains.paper_slip.derivative_time), HX_REAL, 0, 1},
-    {"gains.paper_slip.filter_time", "s", 1e-09, 1000000.0, offsetof(struct hxVariables, definition.gains.paper_slip.filter_time), HX_REAL, 0, 1},
-    {"gains.paper_slip.load_time", "s", 1e-09, 1000000.0, offsetof(struct hxVariables, definition.gains.paper_slip.load_time), HX_REAL, 0, 1},
-    {"gains.paper_slip.tracking_time", "s", 1e-09, 1000000.0, offsetof(struct hxVariables, definition.gains.paper_slip.tracking_time), HX_REAL, 0, 1},
-    {"gains.paper_slip.limit", "m", 1e-09, 10.0, offsetof(struct hxVariables, definition.gains.paper_slip.limit), HX_REAL, 0, 1},
-    {"gains.paper_suspension.mass", "kg", 1e-09, 1000000000.0, offsetof(struct hxVariables, definition.gains.paper_suspension.mass), HX_REAL, 0, 1},
-    {"gains.paper_suspension.damping", "N.s/m", 0.0, 1000000000.0, offsetof(struct hxVariables, definition.gains.paper_suspension.damping), HX_REAL, 0, 1},
-    {"gains.paper_suspension.stiffness", "N/m", 1e-09, 1000000000000.0, offsetof(struct hxVariables, definition.gains.paper_suspension.stiffness), HX_REAL, 0, 1},
-    {"gains.paper_suspension.limit", "m", 1e-09, 10.0, offsetof(struct hxVariables, definition.gains.paper_suspension.limit), HX_REAL, 0, 1},
+    {"gains.paper.share", "1", 0.0, 10.0, offsetof(struct hxVariables, definition.gains.paper.share), HX_REAL, 0, 1},
+    {"gains.paper.height_share", "1", 0.0, 10.0, offsetof(struct hxVariables, definition.gains.paper.height_share), HX_REAL, 0, 1},
+    {"gains.paper.share_limit", "1", 0.0, 10.0, offsetof(struct hxVariables, definition.gains.paper.share_limit), HX_REAL, 0, 1},
+    {"gains.paper.yield_share", "1", -10.0, 10.0, offsetof(struct hxVariables, definition.gains.paper.yield_share), HX_REAL, 0, 1},
+    {"gains.paper.return_rate", "1/s", 0.0, 1000000.0, offsetof(struct hxVariables, definition.gains.paper.return_rate), HX_REAL, 0, 1},
+    {"gains.paper.filter_time", "s", 1e-09, 1000000.0, offsetof(struct hxVariables, definition.gains.paper.filter_time), HX_REAL, 0, 1},
+    {"gains.paper.damping", "N.s/m", 1e-09, 1000000000.0, offsetof(struct hxVariables, definition.gains.paper.damping), HX_REAL, 0, 1},
+    {"gains.paper.return_time", "s", 1e-09, 1000000.0, offsetof(struct hxVariables, definition.gains.paper.return_time), HX_REAL, 0, 1},
+    {"gains.paper.sag_limit", "m", 0.0, 10.0, offsetof(struct hxVariables, definition.gains.paper.sag_limit), HX_REAL, 0, 1},
+    {"gains.paper.limit", "m", 1e-09, 10.0, offsetof(struct hxVariables, definition.gains.paper.limit), HX_REAL, 0, 1},
     {"parts.squeeze", "1", 0.0, 0.99, offsetof(struct hxVariables, definition.parts.squeeze), HX_REAL, 0, 1},
     {"friction.mu", "1", 0.0, 100.0, offsetof(struct hxVariables, definition.friction), HX_REAL, 0, 1},
     {"servo.torque_continuous", "N.m", 1e-09, 100000000.0, offsetof(struct hxVariables, definition.servo.torque_continuous), HX_REAL, 0, 1},
@@ -638,7 +637,7 @@ const char *const hx_log_category_names[] = {
 const hxStateRow *const hx_states = 0;
 const size_t hx_state_count = 0;
 
-const char hx_default_guid[] = "{8c2c27f0-f655-4afd-a772-69805b39ed9f}";
+const char hx_default_guid[] = "{1608e76b-3b88-4da3-9791-dc3c632a6478}";
 
 _Static_assert(HX_CONTROL_KINEMATIC == 1, "Control");
 _Static_assert(HX_CONTROL_COMPLIANT == 2, "Control");

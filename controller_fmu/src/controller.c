@@ -300,21 +300,34 @@ static void follow_paths(const hxControllerModel *model, hxControllerState *stat
   }
 }
 
-/* Corrects the paths by the foot forces, and the joint commands with them (C47 to C49). */
+/* Corrects the paths by the deviations of the feet, and the commands with them (C49). */
 static void correct_paths(const hxControllerModel *model, const hxControllerInput *input,
                           hxControllerState *state) {
-  const hxPosture *posture = &step_at(state, 0)->posture;
+  const hxPlannedStep *now = step_at(state, 0);
   hxControllerOutput *output = &state->output;
   hxPaper *paper = &state->paper;
-  double force[HX_LEGS][3];
-  hx_sense(input, posture, force);
-  hx_paper_step(&model->corrections, (const double (*)[3])force, state->paths.swinging, paper);
+  hxPosture level;
+  hxPaperStep step = {now->pose,
+                      (const double (*)[3])output->planned,
+                      {0.0},
+                      {0.0},
+                      state->paths.swinging,
+                      input->angle,
+                      {{0.0}}};
+  hxPlane plane[HX_LEGS], velocity[HX_LEGS];
+  double height[HX_LEGS];
+  memset(&level, 0, sizeof level);
+  level.level = 1;
+  hx_sense(input, &level, step.force);
   for (int k = 0; k < HX_LEGS; ++k) {
-    hxPlane plane, velocity;
-    double height, rise;
-    planned_foot(model, state, k, &plane, &height, &velocity, &rise);
+    planned_foot(model, state, k, &plane[k], &height[k], &velocity[k], &step.rise[k]);
+    hx_posture_see(&now->posture, &plane[k], &height[k], &velocity[k], &step.rise[k]);
+    step.height[k] = now->feet.height[k] - model->paths.home_height[k];
+  }
+  hx_paper_step(&model->corrections, model->leg, &step, paper);
+  for (int k = 0; k < HX_LEGS; ++k) {
     output->unreachable[k] =
-        hx_paper_actuate(paper, &model->leg[k], k, posture, plane, height, velocity, rise,
+        hx_paper_actuate(paper, &model->leg[k], k, plane[k], height[k], velocity[k], step.rise[k],
                          output->angle_ref[k], output->speed_ref[k]);
     output->shift[k][0] = paper->shift[k].x;
     output->shift[k][1] = paper->shift[k].y;

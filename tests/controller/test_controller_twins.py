@@ -43,7 +43,7 @@ WITHOUT_TWIN = {
 PREFIX = re.compile(
     r"^hx_((burden|compliance|compliant|contact_detector|sensor_watch|controller|gait"
     r"|hold|inverse_dynamics|leg_solver|landings"
-    r"|paper|planned_squeeze|posture|slip_pid|suspension|support|sway|touchdown|warmth"
+    r"|paper|planned_squeeze|posture|support|sway|touchdown|warmth"
     r"|command_ramp|fade|foot_paths)_)?"
 )
 FUNCTION = re.compile(r"^(?:static )?(?:const )?\w+ \*?(\w+)\([^;]*?\) \{", re.MULTILINE)
@@ -94,9 +94,8 @@ def test_each_function_in_c_has_its_twin_in_python_in_the_same_order(stem: str) 
     ours, theirs = c_functions(stem), python_functions(stem)
     if stem in {
         "sense/contact_detection",
-        "comply/slip_pid",
         "controller",
-        # C compiles no models of the detector and of the PID; reset and step are last
+        # C compiles no model of the detector; reset and step are last
     }:
         assert sorted(set(ours) - {"compile"}) == sorted(set(ours) & set(theirs) - {"compile"})
         return

@@ -151,7 +151,7 @@ def test_on_ground_100_times_softer_or_with_2_3_times_the_weight_it_is_no_worse_
     )
     for name in FIGURES:
         assert compliant.metrics[name] < kinematic.metrics[name], name
-    assert compliant.metrics["slip_per_metre"] < 0.6 * kinematic.metrics["slip_per_metre"]
+    assert compliant.metrics["slip_per_metre"] < 0.7 * kinematic.metrics["slip_per_metre"]
     assert compliant.facts["walk"]["fallback"] == 0.0
 
 
@@ -169,7 +169,7 @@ def test_with_three_times_the_weight_and_no_squeeze_it_is_kinematic_control() ->
 
 @pytest.mark.usefixtures("plant_build")
 def test_turning_on_the_spot_asks_no_pitch_of_the_torso() -> None:
-    """A slip PID that reacted to the feet's common twist would oppose the turn: 0.6 mrad."""
+    """A law that answered to the feet's common twist would oppose the turn."""
     turning = walk(
         "athena", "compliant", "command={yaw_rate=0.3}", "compliance.squeeze=0", duration=6.0
     )

@@ -159,10 +159,10 @@ static void without_its_parts_the_paper_s_control_is_the_kinematic_one(void) {
   definition.control = HX_CONTROL_KINEMATIC;
   const hxControllerOutput kinematic = walked(controller, &definition);
   definition.control = HX_CONTROL_PAPER;
-  definition.gains.paper_slip.kp = 1e-3;
-  for (int parts = 0; parts < 4; ++parts) {
-    definition.parts.slip_pid = parts & 1;
-    definition.parts.paper_suspension = parts >> 1;
+  for (int parts = 0; parts < 8; ++parts) {
+    definition.parts.paper_share = parts & 1;
+    definition.parts.paper_pid = parts >> 1 & 1;
+    definition.parts.paper_suspension = parts >> 2;
     const hxControllerOutput paper = walked(controller, &definition);
     CHECK(is_same_command(&paper, &kinematic) == (parts == 0));
   }

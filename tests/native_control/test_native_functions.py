@@ -8,7 +8,6 @@ import math
 import numpy as np
 import pytest
 from gains import PERIOD, make_gains
-from scipy.linalg import expm
 
 from hexapod_cosim.controller import (
     LegSolver,
@@ -57,25 +56,6 @@ def test_shares_are_the_same_down_to_no_load_or_feet_that_stand_together(
         np.testing.assert_allclose(
             found / scale, expected / scale, atol=1e-9
         )  # the system's condition number is at most 1e6
-
-
-@pytest.mark.parametrize("ratio", [0.05, 0.999999, 1.0, 1.000001, 3.0, 1e4])
-def test_the_suspension_is_the_matrix_exponential_whatever_its_damping(
-    controller_core: ct.CDLL, ratio: float
-) -> None:
-    mass, stiffness, period = 1.7, 4100.0, 0.005
-    damping, system = 2.0 * ratio * np.sqrt(stiffness * mass), np.zeros((3, 3))
-    system[0, 1], system[1] = 1.0, np.array([-stiffness, -damping, 1.0]) / mass
-    found = (ct.c_double * 6)()
-    controller_core.hx_probe_suspension(
-        *(ct.c_double(value) for value in (mass, damping, stiffness, period)), found
-    )
-    expected = expm(system * period)
-    scale = np.array([[1.0, period], [1.0 / period, 1.0]])
-    np.testing.assert_allclose(
-        np.array(found[:4]).reshape(2, 2) / scale, expected[:2, :2] / scale, atol=1e-12
-    )
-    np.testing.assert_allclose(found[4:], expected[:2, 2], rtol=1e-9, atol=1e-12 / stiffness)
 
 
 def transcendental(core: ct.CDLL, x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, ...]:

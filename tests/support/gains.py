@@ -17,15 +17,15 @@ MARGINS = Margins(
     paper_spectral_radius=0.99,
 )
 PAPER = PaperGains(
-    share=0.38,
-    height_share=0.55,
-    share_limit=0.75,
+    share=0.4,
+    height_share=0.45,
+    share_limit=0.7,
     yield_share=0.3,
     return_rate=3.0,
     filter_time=0.005,
     damping=10.0,
     return_time=3.0,
-    sag_limit=0.003,
+    sag_limit=0.002,
     limit=0.03,
 )
 HOLD = HoldGains(

@@ -80,26 +80,23 @@ typedef struct hxGains {
     double torque;  /* N m    largest feed-forward torque */
   } limits;
   struct {
-    double kp;               /* m/N */
-    double ki;               /* m/(N s) */
-    double kd;               /* m s/N */
-    double derivative_time;  /* s    filter of the derivative */
-    double filter_time;      /* s    force filter */
-    double load_time;        /* s    decay of the shift of a swinging foot */
-    double tracking_time;    /* s    anti-windup */
-    double limit;            /* m    largest shift */
-  } paper_slip;
-  struct {
-    double mass;       /* kg */
-    double damping;    /* N s/m */
-    double stiffness;  /* N/m */
-    double limit;      /* m    largest deflection */
-  } paper_suspension;
+    double share; /* 1    of the deviation along the ground that is taken back, at duty 1/2 */
+    double height_share; /* 1    the same upwards */
+    double share_limit; /* 1    largest share at any duty */
+    double yield_share; /* 1    P part: yield to a force over the softness of the leg */
+    double return_rate; /* 1/s  I part: return of all feet */
+    double filter_time; /* s    smoothing of the measured forces */
+    double damping; /* N s/m  of the suspension */
+    double return_time; /* s    of the suspension of a standing foot */
+    double sag_limit; /* m    largest lift of a foot in the air by the torso's sag */
+    double limit; /* m    largest deflection of the suspension and return of the feet */
+  } paper;
 } hxGains;
 
 /* Switches, 1 or 0: enabled parts of compliant and paper control; and the weight of the squeeze. */
 typedef struct hxParts {
-  int support, slip_pid, paper_suspension, touchdown, posture, sway, path, limits, fallback;
+  int support, paper_share, paper_pid, paper_suspension, touchdown, posture, sway, path, limits,
+      fallback;
   /* 1  weight of the servos' torques against the feet's use of friction in the planned squeeze */
   double squeeze;
 } hxParts;
@@ -107,25 +104,25 @@ typedef struct hxParts {
 /* The controller's model of the robot, the gait and the laws. hx_controller_definition_default sets
  * the ATHENA-like robot. */
 typedef struct hxControllerDefinition {
-  double period;  /* s    between two steps of the controller */
-  int control;    /* hxControl */
+  double period; /* s    between two steps of the controller */
+  int control; /* hxControl */
   struct {
-    double mass;        /* kg */
-    double com[3];      /* m      from the torso's origin, torso axes */
-    double inertia_zz;  /* kg m2  about the centre of mass */
+    double mass; /* kg */
+    double com[3]; /* m      from the torso's origin, torso axes */
+    double inertia_zz; /* kg m2  about the centre of mass */
   } torso;
   hxKnownLeg leg[HX_LEGS];
-  double foot_radius;        /* m */
-  double contact_stiffness;  /* N/m^1.5  of a foot on the ground */
-  double friction;           /* 1        coefficient of friction that is believed */
+  double foot_radius; /* m */
+  double contact_stiffness; /* N/m^1.5  of a foot on the ground */
+  double friction; /* 1        coefficient of friction that is believed */
   struct {
-    double kp;                /* N m/rad */
-    double speed_max;         /* rad/s */
-    double rotor_inertia;     /* kg m2  seen at the joint */
-    double coulomb_friction;  /* N m    in the gear */
+    double kp; /* N m/rad */
+    double speed_max; /* rad/s */
+    double rotor_inertia; /* kg m2  seen at the joint */
+    double coulomb_friction; /* N m    in the gear */
     double torque_continuous; /* N m    that it can give for ever */
   } servo;
-  double gravity[3];  /* m/s2 */
+  double gravity[3]; /* m/s2 */
   hxGait gait;
   hxGains gains;
   hxParts parts;
@@ -134,23 +131,23 @@ typedef struct hxControllerDefinition {
 /* Command and measurements of the controller. */
 typedef struct hxControllerInput {
   struct {
-    double vx, vy;       /* m/s    forward, to the left */
-    double yaw_rate;     /* rad/s  to the left */
-    double height;       /* m      above the stance */
-    double roll, pitch;  /* rad    z-y-x */
+    double vx, vy; /* m/s    forward, to the left */
+    double yaw_rate; /* rad/s  to the left */
+    double height; /* m      above the stance */
+    double roll, pitch; /* rad    z-y-x */
   } command;
-  double angle[HX_LEGS][HX_JOINTS];  /* rad */
-  double foot_force[HX_LEGS][3];     /* N   ground on foot, world axes */
-  double quaternion[4];              /* 1   torso to world, w x y z */
+  double angle[HX_LEGS][HX_JOINTS]; /* rad */
+  double foot_force[HX_LEGS][3]; /* N   ground on foot, world axes */
+  double quaternion[4]; /* 1   torso to world, w x y z */
 } hxControllerInput;
 
 typedef struct hxControllerOutput {
-  double angle_ref[HX_LEGS][HX_JOINTS];   /* rad */
-  double speed_ref[HX_LEGS][HX_JOINTS];   /* rad/s */
-  double torque_ref[HX_LEGS][HX_JOINTS];  /* N m */
-  int swinging[HX_LEGS];                  /* planned to be in the air */
-  int unreachable[HX_LEGS];               /* the joints cannot follow */
-  int fallback[HX_LEGS];                  /* walks without feedback */
+  double angle_ref[HX_LEGS][HX_JOINTS]; /* rad */
+  double speed_ref[HX_LEGS][HX_JOINTS]; /* rad/s */
+  double torque_ref[HX_LEGS][HX_JOINTS]; /* N m */
+  int swinging[HX_LEGS]; /* planned to be in the air */
+  int unreachable[HX_LEGS]; /* the joints cannot follow */
+  int fallback[HX_LEGS]; /* walks without feedback */
   double shift[HX_LEGS][2]; /* m  horizontal correction of the foot, walking frame */
   double lift[HX_LEGS]; /* m  vertical correction of the foot */
   double planned[HX_LEGS][3]; /* m  the foot's centre as the command plans it, torso frame, without

@@ -1,66 +1,174 @@
 #include "paper.h"
 
 #include "../plane.h"
+#include "support.h"
+
+static const double least_load = 1e-6; /* N, a smaller sum of loads cannot be divided by */
+/* 1, of the weight: what a foot carries beyond is not taken back */
+static const double largest_part = 0.5;
+static const double weight_time = 0.5; /* s, smoothing of the sum of all loads */
+static const double touch_part = 0.02; /* 1, of the weight: a foot with more stands */
+/* 1, added to the spread of the standing feet, for the tilt of the torso */
+static const double evening = 0.15;
+/* s, in which a landed foot gives back the lift that it had in the air */
+static const double landed_time = 0.05;
+/* m, a foot that is planned higher above the ground meets it early */
+static const double early = 0.003;
+static const double late_time = 0.04; /* s, after the planned touch-down: a foot may be late */
+static const double search_speed = 0.08; /* m/s, at most, of a foot that extends */
+static const double air_time = 0.06; /* s, in which the suspension of a foot in the air returns */
+
+hxSoftness hx_softness(const hxLegSolver *leg, const hxPose *pose, double kp) {
+  /* rates of the foot, outward + i up, by the femur's and by the tibia's joint */
+  const hxPlane femur = {-pose->foot.y, pose->foot.x},
+                tibia = {leg->tibia * pose->tibia.y, -leg->tibia * pose->tibia.x};
+  const double reach = pose->foot.x + leg->coxa_length;
+  return (hxSoftness){
+      .outward = (femur.x * femur.x + tibia.x * tibia.x + leg->offset_y * leg->offset_y) / kp,
+      .sideward = reach * reach / kp,
+      .up = (femur.y * femur.y + tibia.y * tibia.y) / kp,
+      .splay = (femur.x * femur.y + tibia.x * tibia.y) / kp,
+  };
+}
 
 void hx_paper_compile(const hxControllerDefinition *definition, hxPaperModel *model) {
-  const hxGains *gains = &definition->gains;
-  model->parts = definition->parts;
-  model->pid = (hxSlipPidModel){.h = definition->period,
-                                .kp = gains->paper_slip.kp,
-                                .ki = gains->paper_slip.ki,
-                                .kd = gains->paper_slip.kd,
-                                .filter = gains->paper_slip.filter_time,
-                                .derivative = gains->paper_slip.derivative_time};
-  hx_suspension_discretise(gains->paper_suspension.mass, gains->paper_suspension.damping,
-                           gains->paper_suspension.stiffness, definition->period,
-                           &model->suspension);
-  model->memory = hx_decay(-definition->period / gains->paper_slip.load_time);
-  model->tracking = fmin(definition->period / gains->paper_slip.tracking_time, 1.0);
-  model->farthest = gains->paper_slip.limit;
-  model->deepest = gains->paper_suspension.limit;
+  const double h = definition->period, duty = definition->gait.duty;
+  /* what a leg gives up by a share grows with the square of its load, W/(6 duty) on average */
+  const double lighter = definition->parts.paper_share ? (2.0 * duty) * (2.0 * duty) : 0.0;
+  model->period = h;
+  model->servo_stiffness = definition->servo.kp;
+  model->ground_stiffness = definition->contact_stiffness;
+  model->pid = definition->parts.paper_pid;
+  model->suspension = definition->parts.paper_suspension;
+  model->lifts = definition->parts.paper_share;
+  model->share = fmin(lighter * definition->gains.paper.share, definition->gains.paper.share_limit);
+  model->height_share =
+      fmin(lighter * definition->gains.paper.height_share, definition->gains.paper.share_limit);
+  model->yield_share = definition->gains.paper.yield_share;
+  model->return_rate = definition->gains.paper.return_rate;
+  model->damping = definition->gains.paper.damping;
+  model->sag_limit = definition->gains.paper.sag_limit;
+  model->limit = definition->gains.paper.limit;
+  model->weighing = -hx_growth(-h / weight_time);
+  model->smoothing = -hx_growth(-h / definition->gains.paper.filter_time);
+  model->landed = hx_decay(-h / landed_time);
+  model->in_air = hx_decay(-h / air_time);
+  model->on_ground = hx_decay(-h / definition->gains.paper.return_time);
 }
 
-/* Updates the shift of a foot for a tangential force [N] (C47). The length of the shift is limited,
- * and its integral follows the limited value; that of a swinging foot decays. */
-static void yield_sideways(const hxPaperModel *model, hxPlane force, int swinging, int k,
-                           hxPaper *paper) {
-  const hxPlane wanted = {hx_slip_pid_step(&model->pid, force.x, &paper->x[k]),
-                          hx_slip_pid_step(&model->pid, force.y, &paper->y[k])};
-  const double kept = swinging ? model->memory : 1.0;
-  const hxPlane shift =
-      hx_scaled(wanted, model->farthest / fmax(hx_length(wanted), model->farthest));
-  paper->shift[k] = shift;
-  paper->x[k].integral = kept * (paper->x[k].integral + model->tracking * (shift.x - wanted.x));
-  paper->y[k].integral = kept * (paper->y[k].integral + model->tracking * (shift.y - wanted.y));
-}
-
-/* Updates the deflection of a suspension for a normal force [N] (C48). */
-static void yield_upwards(const hxPaperModel *model, double force, int k, hxPaper *paper) {
-  const hxSuspension *s = &model->suspension;
-  const double z = paper->lift[k], rate = paper->rate[k],
-               lift = s->a[0][0] * z + s->a[0][1] * rate + s->b[0] * force;
-  paper->rate[k] = s->a[1][0] * z + s->a[1][1] * rate + s->b[1] * force;
-  if (fabs(lift) > model->deepest) paper->rate[k] = 0.0;
-  paper->lift[k] = hx_clamp(lift, -model->deepest, model->deepest);
-}
-
-int hx_paper_actuate(const hxPaper *paper, const hxLegSolver *leg, int k, const hxPosture *posture,
-                     hxPlane plane, double height, hxPlane velocity, double rise,
-                     double angle[HX_JOINTS], double speed[HX_JOINTS]) {
-  hxPlane corrected = hx_plane_add(plane, paper->shift[k]);
-  double raised = height + paper->lift[k];
-  hxPose pose;
-  hx_posture_see_place(posture, &corrected, &raised);
-  hx_leg_solver_pose(leg, corrected, raised, &pose);
-  hx_posture_see(posture, &plane, &height, &velocity, &rise);
-  return hx_leg_solver_solve(leg, &pose, velocity, rise, angle, speed);
-}
-
-void hx_paper_step(const hxPaperModel *model, const double force[HX_LEGS][3],
-                   const int swinging[HX_LEGS], hxPaper *paper) {
+/* Updates the torso's sag and the return of the feet by the standing feet (C26, C47). load:
+ * smoothed normal forces [N]. */
+static void see_torso(const hxPaperModel *model, const hxLegSolver leg[HX_LEGS],
+                      const hxPaperStep *step, const double load[HX_LEGS], hxPaper *paper) {
+  double part[HX_LEGS], sunk[HX_LEGS], total = 0.0, mean = 0.0, spread = 0.0;
+  hxPlane feet[HX_LEGS], centre = {0.0, 0.0}, astray = {0.0, 0.0};
+  hxPlane skew = {0.0, 0.0}, moment = {0.0, 0.0}, slope = {0.0, 0.0};
+  for (int k = 0; k < HX_LEGS; ++k) total += step->swinging[k] ? 0.0 : load[k];
+  if (total <= least_load) return;
   for (int k = 0; k < HX_LEGS; ++k) {
-    if (model->parts.slip_pid)
-      yield_sideways(model, hx_plane(force[k][0], force[k][1]), swinging[k], k, paper);
-    if (model->parts.paper_suspension) yield_upwards(model, force[k][2], k, paper);
+    const double *planned = step->planned[k];
+    double foot[3];
+    hx_leg_solver_forward(&leg[k], step->angle[k], foot);
+    part[k] = (step->swinging[k] ? 0.0 : load[k]) / total;
+    sunk[k] =
+        foot[2] - planned[2] - paper->yielded[k] + hx_indentation(load[k], model->ground_stiffness);
+    feet[k] = hx_plane(planned[0], planned[1]);
+    centre = hx_plane_add(centre, hx_scaled(feet[k], part[k]));
+    mean += part[k] * sunk[k];
+    astray = hx_plane_add(astray,
+                          hx_scaled(hx_plane(foot[0] - planned[0], foot[1] - planned[1]), part[k]));
   }
+  /* least squares: slope g of sum part (Re(arm^* g) - (sunk - mean))^2 */
+  for (int k = 0; k < HX_LEGS; ++k) {
+    const hxPlane arm = hx_plane_sub(feet[k], centre);
+    spread += part[k] * hx_square(arm);
+    skew = hx_plane_add(skew, hx_scaled(hx_times(arm, arm), 0.5 * part[k]));
+    moment = hx_plane_add(moment, hx_scaled(arm, part[k] * (sunk[k] - mean)));
+  }
+  if (spread > 0.0) {
+    const double even = (0.5 + evening) * spread;
+    slope = hx_scaled(hx_plane_sub(hx_scaled(moment, even), hx_times(skew, hx_conj(moment))),
+                      1.0 / (even * even - hx_square(skew)));
+  }
+  paper->sag += model->smoothing * (mean - hx_along(centre, slope) - paper->sag);
+  paper->slope =
+      hx_plane_add(paper->slope, hx_scaled(hx_plane_sub(slope, paper->slope), model->smoothing));
+  if (!model->pid) return;
+  const hxPlane back =
+      hx_plane_sub(paper->back, hx_scaled(astray, model->period * model->return_rate));
+  paper->back = hx_scaled(back, model->limit / fmax(hx_length(back), model->limit));
+}
+
+/* Returns the correction of a foot along the ground [m] (C47). borne: normal force whose deviation
+ * is taken back [N]. */
+static hxPlane along_ground(const hxPaperModel *model, const hxPaper *paper, const hxPose *pose,
+                            const hxSoftness *soft, int swinging, int k, double borne) {
+  hxPlane shift = hx_scaled(pose->heading, -model->share * soft->splay * borne);
+  if (model->pid) {
+    const hxPlane pull =
+        hx_times(hx_plane(paper->force[k][0], paper->force[k][1]), hx_conj(pose->heading));
+    /* a standing foot keeps the outward force, which carries a part of the weight */
+    const hxPlane yield = {swinging ? soft->outward * pull.x : 0.0, soft->sideward * pull.y};
+    shift = hx_plane_add(shift, hx_scaled(hx_times(yield, pose->heading), model->yield_share));
+  }
+  return hx_plane_add(shift, paper->back);
+}
+
+/* Updates the lift of a foot in the air by the torso's sag (C48). */
+static void lift_swinging(const hxPaperModel *model, const double planned[3], int swinging, int k,
+                          hxPaper *paper) {
+  const double sunk = paper->sag + hx_along(hx_plane(planned[0], planned[1]), paper->slope);
+  const double wanted = hx_clamp(sunk, -model->sag_limit, model->sag_limit);
+  if (swinging)
+    paper->lifted[k] += model->smoothing * (wanted - paper->lifted[k]);
+  else
+    paper->lifted[k] *= model->landed;
+}
+
+/* Updates the deflection of a suspension (C48). */
+static void suspend(const hxPaperModel *model, const hxPaperStep *step, int k, hxPaper *paper) {
+  const double h = model->period, force = step->force[k][2];
+  const int touching = force > fmax(touch_part * paper->weight, least_load);
+  const int swinging = step->swinging[k];
+  /* the damper yields to the force beyond the share of a foot */
+  const double rate = (force - paper->weight / HX_LEGS) / model->damping;
+  paper->late[k] = !touching && !swinging ? paper->late[k] + h : 0.0;
+  if (paper->late[k] > late_time)
+    paper->yielded[k] += h * hx_clamp(rate, -search_speed, 0.0);
+  else if (swinging && touching)
+    paper->yielded[k] +=
+        h * hx_clamp(rate, 0.0, step->height[k] > early ? fmax(-step->rise[k], 0.0) : 0.0);
+  else
+    paper->yielded[k] *= swinging ? model->in_air : model->on_ground;
+  paper->yielded[k] = hx_clamp(paper->yielded[k], -model->limit, model->limit);
+}
+
+void hx_paper_step(const hxPaperModel *model, const hxLegSolver leg[HX_LEGS],
+                   const hxPaperStep *step, hxPaper *paper) {
+  double load[HX_LEGS], total = 0.0;
+  for (int k = 0; k < HX_LEGS; ++k) {
+    for (int i = 0; i < 3; ++i)
+      paper->force[k][i] += model->smoothing * (step->force[k][i] - paper->force[k][i]);
+    load[k] = fmax(paper->force[k][2], 0.0);
+    total += load[k];
+  }
+  paper->weight += model->weighing * (total - paper->weight);
+  see_torso(model, leg, step, load, paper);
+  for (int k = 0; k < HX_LEGS; ++k) {
+    const int swinging = step->swinging[k];
+    const hxSoftness soft = hx_softness(&leg[k], &step->pose[k], model->servo_stiffness);
+    const double borne = fmin(load[k], largest_part * paper->weight);
+    if (model->lifts) lift_swinging(model, step->planned[k], swinging, k, paper);
+    if (model->suspension) suspend(model, step, k, paper);
+    paper->shift[k] = along_ground(model, paper, &step->pose[k], &soft, swinging, k, borne);
+    paper->lift[k] = paper->lifted[k] + paper->yielded[k] - model->height_share * soft.up * borne;
+  }
+}
+
+int hx_paper_actuate(const hxPaper *paper, const hxLegSolver *leg, int k, hxPlane plane,
+                     double height, hxPlane velocity, double rise, double angle[HX_JOINTS],
+                     double speed[HX_JOINTS]) {
+  hxPose pose;
+  hx_leg_solver_pose(leg, hx_plane_add(plane, paper->shift[k]), height + paper->lift[k], &pose);
+  return hx_leg_solver_solve(leg, &pose, velocity, rise, angle, speed);
 }

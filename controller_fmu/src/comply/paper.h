@@ -1,43 +1,71 @@
-/* paper.h - the paper's control: foot trajectories corrected by the forces on the feet. Python:
- * controller/comply/paper.py. */
+/* paper.h - the paper's control: foot trajectories corrected by the deviations that the ground
+ * causes. Python: controller/comply/paper.py. */
 #ifndef HX_PAPER_H
 #define HX_PAPER_H
 
 #include "../walk/kinematics.h"
 #include "hexapod/inside.h"
-#include "posture.h"
-#include "slip_pid.h"
-#include "suspension.h"
 
 HX_HIDDEN_BEGIN
 
 typedef struct hxPaperModel {
-  hxParts parts;
-  hxSlipPidModel pid; /* from N to m */
-  hxSuspension suspension;
-  double memory; /* 1, factor of the integral of a swinging foot over a period */
-  double tracking; /* 1 */
-  double farthest, deepest; /* m, largest shift and deflection */
+  double period; /* s */
+  double servo_stiffness; /* N m/rad  kp of the servos */
+  double ground_stiffness; /* N/m^1.5 */
+  int pid, suspension, lifts; /* enabled parts; feet in the air are lifted */
+  double share, height_share; /* 1, of this gait */
+  double yield_share; /* 1 */
+  double return_rate; /* 1/s */
+  double damping; /* N s/m */
+  double sag_limit, limit; /* m */
+  double weighing, smoothing; /* 1, part of a new sum of loads and of a new force, per period */
+  double landed, in_air, on_ground; /* 1, factors of a decay over a period */
 } hxPaperModel;
 
 typedef struct hxPaper {
-  hxSlipPid x[HX_LEGS], y[HX_LEGS];
-  hxPlane shift[HX_LEGS]; /* m, horizontal correction of a foot, walking frame */
-  double lift[HX_LEGS], rate[HX_LEGS]; /* m, m/s, vertical correction */
+  double force[HX_LEGS][3]; /* N, smoothed, torso axes */
+  double weight; /* N, smoothed sum of the normal forces */
+  hxPlane back; /* m, common return of all feet */
+  double sag; /* m, height by which the torso sags at its centre */
+  hxPlane slope; /* 1, of the sag */
+  double lifted[HX_LEGS]; /* m, lift by the torso's sag */
+  double yielded[HX_LEGS]; /* m, deflection of the suspensions; positive: the leg is shorter */
+  double late[HX_LEGS]; /* s, time without force since the planned touch-down */
+  hxPlane shift[HX_LEGS]; /* m, correction of a foot along the ground, torso axes */
+  double lift[HX_LEGS]; /* m, correction upwards */
 } hxPaper;
+
+/* Softness of a leg, C = J J^T / kp, along outward, sideward and upward [m/N] (C25). */
+typedef struct hxSoftness {
+  double outward, sideward, up;
+  double splay; /* outward under an upward force */
+} hxSoftness;
+
+/* Plan and measurements of a period, torso frame. */
+typedef struct hxPaperStep {
+  const hxPose *pose; /* (6) planned */
+  const double (*planned)[3]; /* m (6, 3) planned centres of the feet */
+  double height[HX_LEGS]; /* m, of the planned feet above the ground */
+  double rise[HX_LEGS]; /* m/s, of the planned feet */
+  const int *swinging; /* (6) planned in the air */
+  const double (*angle)[HX_JOINTS]; /* rad (6, 3) measured */
+  double force[HX_LEGS][3]; /* N, measured, ground on foot */
+} hxPaperStep;
 
 void hx_paper_compile(const hxControllerDefinition *definition, hxPaperModel *model);
 
-/* Computes the joint angles [rad] and speeds [rad/s] that put a foot on its corrected trajectory
- * (C49), and returns whether the foot misses it. The planned foot is in the walking frame. */
-int hx_paper_actuate(const hxPaper *paper, const hxLegSolver *leg, int k, const hxPosture *posture,
-                     hxPlane plane, double height, hxPlane velocity, double rise,
-                     double angle[HX_JOINTS], double speed[HX_JOINTS]);
+/* Returns the softness of a leg whose servos have the stiffness kp [N m/rad] (C25). */
+hxSoftness hx_softness(const hxLegSolver *leg, const hxPose *pose, double kp);
 
-/* Advances the corrections by one period (C47, C48). force: of the ground on the feet, walking
- * frame [N]; swinging: legs planned in the air. */
-void hx_paper_step(const hxPaperModel *model, const double force[HX_LEGS][3],
-                   const int swinging[HX_LEGS], hxPaper *paper);
+/* Advances the corrections by one period (C25, C26, C47 to C49). */
+void hx_paper_step(const hxPaperModel *model, const hxLegSolver leg[HX_LEGS],
+                   const hxPaperStep *step, hxPaper *paper);
+
+/* Computes the joint angles [rad] and speeds [rad/s] that put a foot on its corrected trajectory
+ * (C49), and returns whether the foot misses it. The planned foot is in the torso frame. */
+int hx_paper_actuate(const hxPaper *paper, const hxLegSolver *leg, int k, hxPlane plane,
+                     double height, hxPlane velocity, double rise, double angle[HX_JOINTS],
+                     double speed[HX_JOINTS]);
 
 HX_HIDDEN_END
 

@@ -9,7 +9,7 @@ static const double least_spread = 1e-4;
 static const double least_load = 1e-6;     /* N, a smaller load is not shared */
 
 /* Returns the depth [m] by which the ground deforms under a load [N] (C21). */
-static double indentation(double load, double stiffness) { return hx_two_thirds(load / stiffness); }
+double hx_indentation(double load, double stiffness) { return hx_two_thirds(load / stiffness); }
 
 /* Returns a transition from 0 to 1 over [0, 1] with continuous rate and acceleration. */
 static double smooth(double x) {
@@ -37,7 +37,7 @@ void hx_support_compile(const hxControllerDefinition *definition, const hxDemand
   model->stiffness = definition->contact_stiffness;
   model->rest_weight = rest->weight;
   model->rest_moment = rest->moment;
-  model->rest_depth = indentation(rest->weight / HX_LEGS, model->stiffness);
+  model->rest_depth = hx_indentation(rest->weight / HX_LEGS, model->stiffness);
 }
 
 double hx_support_activation(const hxSupport *model, double phase, int stayed, int stays,
@@ -78,7 +78,7 @@ void hx_support_lowering(const hxSupport *model, const hxPlane feet[HX_LEGS],
   double normal[HX_LEGS];
   share_normal(feet, activation, model->rest_weight, model->rest_moment, normal);
   for (int k = 0; k < HX_LEGS; ++k)
-    lowering[k] = indentation(normal[k], model->stiffness) - model->rest_depth;
+    lowering[k] = hx_indentation(normal[k], model->stiffness) - model->rest_depth;
 }
 
 void hx_support_shares(const hxPlane feet[HX_LEGS], const hxDemand *demand, hxShares *shares) {

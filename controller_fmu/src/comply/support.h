@@ -36,6 +36,9 @@ void hx_support_compile(const hxControllerDefinition *definition, const hxDemand
 double hx_support_activation(const hxSupport *model, double phase, int stayed, int stays,
                              int walking);
 
+/* Returns the indentation [m] of the ground under a load [N], (f_n/K)^(2/3) (C21). */
+double hx_indentation(double load, double stiffness);
+
 /* Returns by how much the feet must be lower than planned, so that the torso keeps its height over
  * ground that deforms (C21) [m]. */
 void hx_support_lowering(const hxSupport *model, const hxPlane feet[HX_LEGS],

@@ -2,19 +2,11 @@
 #include <string.h>
 
 #include "comply/support.h"
-#include "comply/suspension.h"
 #include "transcendental.h"
 
-HX_API void hx_probe_suspension(double mass, double damping, double stiffness, double period,
-                                hxSuspension *suspension);
 HX_API void hx_probe_transcendental(const double *x, const double *y, double *result[6], int n);
 HX_API void hx_probe_shares(const hxPlane feet[HX_LEGS], const double activation[HX_LEGS],
                             const double asked[6], double force[HX_LEGS][3]);
-
-void hx_probe_suspension(double mass, double damping, double stiffness, double period,
-                         hxSuspension *suspension) {
-  hx_suspension_discretise(mass, damping, stiffness, period, suspension);
-}
 
 /* Computes sine, cosine, e^x - 1, tanh x and x^(2/3), and the angle of (y, x). */
 void hx_probe_transcendental(const double *x, const double *y, double *result[6], int n) {
