@@ -1,4 +1,4 @@
-# make demo   set-up, both controls from flat ground into rubble, and where the report is
+# make demo   set-up, the controls from flat ground into rubble, and where the report is
 # make test   set-up and every test
 
 PYTHON ?= python3
@@ -26,12 +26,12 @@ SANITIZED := $(SANITIZED_SHORT) tests/fmi/test_fmi_importers.py tests/fmi/test_e
 .PHONY: help setup demo test test-docs test-browser test-rerun test-importers test-platforms \
 	test-endurance test-native test-native-sanitize test-sanitize test-sanitize-short test-robots \
 	test-wheels test-metadata wheels test-compilers fuzz fuzz-short mutants soak lint-c check bench \
-	bench-quick bench-batch bench-gym bench-browser bench-opening control study-demo format generate \
+	bench-quick bench-batch bench-gym bench-browser bench-opening control figures study-demo format generate \
 	fmu typing clean docs identify-campaign coverage lock audit fuzz-afl
 
 help:
 	@echo "make setup     the hexapod command in $(BIN)"
-	@echo "make demo      both controls from flat ground into rubble; says where the report is"
+	@echo "make demo      the controls from flat ground into rubble; says where the report is"
 	@echo "make test      the tests"
 	@echo "make test-docs  the site with its notebooks run and its validation computed (5 min)"
 	@echo "make test-browser  the report in Chromium, at full length, and how long it takes to open (1 min)"
@@ -61,6 +61,7 @@ help:
 	@echo "make bench-browser  walks of the page without a server in Chromium, against real time (1 min)"
 	@echo "make study-demo  500 walks, killed twice and completed; the same uninterrupted and on a Dask cluster: the same bytes (5 min)"
 	@echo "make control   what each part of the compliant control is worth, where, and what it survives: docs/control/ (5 min)"
+	@echo "make figures   the course, and the tables of the pages that compare controls: README.md, docs/ (10 min)"
 	@echo "make identify-campaign  20 robots with secret numbers, identified from logs of 6 s (10 min); ROBOTS, SECONDS, AT_A_TIME; goes on with out/identification_SECONDS.csv"
 	@echo "make docs      the documentation's site: build/docs/index.html (1 min)"
 	@echo "make format    formats C and Python"
@@ -243,6 +244,10 @@ study-demo: setup
 
 control: setup
 	$(BIN)/python -m benchmarks.control
+
+figures: setup
+	$(BIN)/hexapod benchmark -o out/benchmark
+	$(BIN)/python -m benchmarks.pages out/benchmark
 
 ROBOTS ?= 20
 SECONDS ?= 6

@@ -30,6 +30,7 @@ from hexapod_cosim.cosim.results.results import (
     write_result,
 )
 from hexapod_cosim.cosim.results.summary import summarise
+from hexapod_cosim.cosim.results.walking import different_walks
 from hexapod_cosim.cosim.run.run import simulate as run_scenario
 from hexapod_cosim.cosim.scenario.controls import (
     Control,
@@ -142,12 +143,14 @@ def report(results: Result | Sequence[Result], folder: str | Path) -> Path:
         by_label = dict(zip(labels, runs, strict=True))
         comparison = compare_all({label: [summarise(run)] for label, run in by_label.items()})
         write_seeds(path / SEEDS, [summarise(run) for run in runs])
-        write_comparison(path, runs[0].scenario, comparison, labels=labels)
+        walks = different_walks({label: run.facts for label, run in by_label.items()})
+        write_comparison(path, runs[0].scenario, comparison, labels=labels, walks=walks)
         files = write_report(
             {label: stored_result(run) for label, run in by_label.items()},
             path,
             warn=warn,
             comparison=comparison,
+            walks=walks,
             scenario=read_scenario(path),
         )
     return files[-1]

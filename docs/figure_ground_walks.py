@@ -1,6 +1,7 @@
 """Makes the table and the pictures of walks on uneven ground for docs/ground.md.
 
-hexapod compare stairs rubble stones sand dune ramp course -o out/terrains
+hexapod compare stairs rubble stones sand dune ramp course --control kinematic \
+    --control kinematic@chosen --control compliant@chosen -o out/terrains
 python docs/figure_ground_walks.py out/terrains
 
 Prints the table in Markdown, and writes docs/images/ground_walks.png, the figure of the table, and
@@ -24,7 +25,7 @@ IMAGES = Path(__file__).parent / "images"
 # scenario -> time of the picture [s]
 SHOWN = {"stairs": 9.0, "rubble": 8.0, "stones": 9.0, "dune": 10.0}
 SHOWN |= {"sand": 9.0, "ramp": 8.0, "course": 42.0}
-SIZE = {"width": 1000, "height": 780}  # px    of the browser; the text keeps its size
+SIZE = {"width": 1200, "height": 780}  # px    of the browser; the text keeps its size
 FLAGS = [
     "--no-sandbox",
     "--use-angle=swiftshader",
@@ -87,6 +88,7 @@ def replay(browser: Browser, report: Path, time: float, name: str) -> Image.Imag
     page.goto(f"{report.as_uri()}#t={time}")
     page.wait_for_selector("html[data-ready]", state="attached")
     page.locator(".names b").evaluate_all(NAMED, name)
+    page.locator(".keys").evaluate("keys => keys.remove()")
     page.wait_for_timeout(500)
     picture = Image.open(io.BytesIO(page.locator("#stage").screenshot())).convert("RGB")
     page.close()

@@ -60,7 +60,7 @@ def changes_table(cases: Cases) -> str:
         filter(
             None,
             [
-                _markdown(["case", "walked", *COLUMNS.values()], rows),
+                markdown(["case", "walked", *COLUMNS.values()], rows),
                 _legend(cases),
                 _left_out(cases),
             ],
@@ -83,7 +83,7 @@ def robustness_table(cases: Cases) -> str:
         " Fallback: share of the time in which a leg walked without feedback."
     )
     return "\n\n".join(
-        filter(None, [_markdown(headings, rows), _legend(cases, note), _left_out(cases)])
+        filter(None, [markdown(headings, rows), _legend(cases, note), _left_out(cases)])
     )
 
 
@@ -144,7 +144,7 @@ def _left_out(cases: Cases) -> str:
     return "\n".join(f"- Left out: {name}. {reason}" for name, reason in lost.items())
 
 
-def _markdown(headings: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+def markdown(headings: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
     lines = [headings, ["---"] * len(headings), *rows]
     return "\n".join(
         "| " + " | ".join(text.replace("|", "/") for text in line) + " |" for line in lines

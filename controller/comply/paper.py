@@ -202,7 +202,9 @@ class Paper(Stateful):
         self.force = self.force + self.smoothing * (step.force - self.force)
         load = np.maximum(self.force[:, 2], 0.0)
         soft = softness(self.legs, step.pose, self.kp)
-        self.weight += self.weighing * (float(load.sum()) - self.weight)
+        total = float(np.maximum(step.force[:, 2], 0.0).sum())
+        started = self.weight > 0.0
+        self.weight += (self.weighing if started else 1.0) * (total - self.weight)
         borne = np.minimum(load, LARGEST_PART * self.weight)
         self._see_torso(step, load)
         if self.parts.paper_share:

@@ -43,13 +43,16 @@ from hexapod_cosim.cosim.course.table import Table
 from hexapod_cosim.cosim.master.interrupts import deferred_interrupts
 from hexapod_cosim.cosim.master.loop import COMPLETED
 from hexapod_cosim.cosim.results.results import ResultsFolder, results_folder
-from hexapod_cosim.cosim.scenario.records import CONTROLS
+from hexapod_cosim.cosim.scenario.controls import AT, CHOOSER
+from hexapod_cosim.cosim.scenario.records import CHOSEN, CONTROLS
 
 EPILOG = (
     "A robot that falls or gets stuck is a result: it counts as a failure and is in no mean. "
     "Ctrl-C writes the table of the runs that are done."
 )
 MAX_SEEDS = 1000
+OTHERS = tuple(name for name in CONTROLS if name != CHOOSER)
+DEFAULT = (*OTHERS, *(f"{name}{AT}{CHOSEN}" for name in OTHERS), CHOOSER)
 Without = Annotated[
     list[str] | None,
     typer.Option(
@@ -91,9 +94,11 @@ def benchmark(
 ) -> int:
     """Judge controls on the course: ground, payload, sensors, pushes, commands, robots.
 
-    Without --control these are all built-in ones; the first control is the reference.
+    Without --control these are all built-in ones, and kinematic and paper control in the gait and
+    stance that compliant control chooses (kinematic@chosen). The first control is the reference; a
+    control in that walk is compared with the first one in it, and compliant control with both.
     """
-    entries = read_entries(controls or CONTROLS, without or ())
+    entries = read_entries(controls or DEFAULT, without or ())
     _check_number(seeds, MAX_SEEDS, "--seeds")
     _check_number(workers, MAX_SEEDS, "--workers")
     course = load_course(

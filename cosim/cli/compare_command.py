@@ -58,17 +58,17 @@ from hexapod_cosim.cosim.results.results import (
     ACCURACY,
     METRICS_FILE,
     ResultsFolder,
-    StoredResult,
     read_scenario,
     results_folder,
     stored_result,
 )
 from hexapod_cosim.cosim.results.summary import Summary, summarise
-from hexapod_cosim.cosim.results.walking import different_walks
+from hexapod_cosim.cosim.results.walking import WALKING, different_walks
 from hexapod_cosim.cosim.run.batch import run_batch
+from hexapod_cosim.cosim.run.chosen_walk import choose_walk
 from hexapod_cosim.cosim.run.preparation import PlantFmus, chosen_gains
-from hexapod_cosim.cosim.scenario.controls import Control
-from hexapod_cosim.cosim.scenario.records import COMPARED, Scenario
+from hexapod_cosim.cosim.scenario.controls import CHOOSER, Control
+from hexapod_cosim.cosim.scenario.records import CHOSEN, COMPARED, CONTROLS, OWN, Scenario
 from hexapod_cosim.cosim.scenario.scenario import load_scenario
 from hexapod_cosim.cosim.scenario.variation import STANDARD
 from hexapod_cosim.models import ScenarioError
@@ -79,6 +79,7 @@ EPILOG = (
     "and compares the seeds on which both walked."
 )
 MAX_SEEDS = 10_000
+CHOSEN_WALK = (f"{CONTROLS[0]}@{CHOSEN}", f"{CHOOSER}@{CHOSEN}")
 TERRAINS = "terrains"  # folder in out/ of a comparison over several scenarios
 Names = Annotated[
     list[str] | None,
@@ -114,7 +115,10 @@ def compare(
 ) -> int:
     """Run one or several walks under several controls, and report each against the first.
 
-    Without --control these are kinematic and compliant.
+    All walk in the gait and stance of the scenario, or else of the robot file; kinematic@chosen
+    walks in those that compliant control chooses, and compliant@chosen is compared with it. Without
+    --control these are kinematic, paper and compliant. Where one scenario is given that names
+    neither gait nor stance, and no gains, these two are in the tables too, without recordings.
     """
     names = scenarios or ["walk_flat"]
     options = RunOptions.read(fmu=fmu, gains=gains, engine=engine, runs=seeds)
@@ -132,8 +136,10 @@ def compare(
             accuracy=accuracy,
         )
         plan = _plan(name, settings or [], seeds)
-        controls = _controls(control or COMPARED, plan)
-        works.append(Work(plan, controls, seeds, command, options, accuracy))
+        controls = _controls(control or CONTROLS, plan)
+        alike = control or gains or plan.names_walk or len(names) > 1
+        chosen = () if alike else chosen_controls(CHOSEN_WALK, plan)
+        works.append(Work(plan, controls, chosen, seeds, command, options, accuracy))
     for work in works:
         work.check()
     if len(works) > 1:
@@ -143,7 +149,7 @@ def compare(
         report = None if done.report is None else str(done.report)
         show_json({**_table(done.comparison, done.checked), "report": report})
     else:
-        _show(done.results, done.comparison, done.checked, done.files)
+        _show(done, works[0].walks)
         report = "" if done.report is None else f"report: {done.report}"
         show_text("\n".join(filter(None, (about(done.comparison), report))))
     return FELL if done.comparison.losses else SUCCESS
@@ -154,7 +160,8 @@ class Work:
     """A comparison to run: its scenario, controls, number of seeds and options."""
 
     plan: Scenario
-    controls: tuple[Control, ...]
+    controls: tuple[Control, ...]  # whose first seed is recorded and drawn
+    chosen: tuple[Control, ...]  # of CHOSEN_WALK: what gait and stance give, in the tables alone
     seeds: int
     command: str
     options: RunOptions
@@ -164,7 +171,7 @@ class Work:
         """Designs the gains of all runs, or raises errors before anything is run."""
         if self.accuracy:
             halved_scenario(self.plan)
-        for control in self.controls:
+        for control in self.compared:
             chosen_gains(replace(self.plan, control=control.text), self.options.gains)
 
     def with_fmu(self, folder: Path) -> Work:
@@ -176,9 +183,24 @@ class Work:
         return replace(self, options=replace(self.options, fmu=fmu))
 
     @property
+    def compared(self) -> tuple[Control, ...]:
+        """All controls of the tables."""
+        return (*self.controls, *self.chosen)
+
+    @property
     def labels(self) -> list[str]:
-        """The labels of the controls."""
+        """The labels of the controls that are recorded."""
         return [control.label for control in self.controls]
+
+    @property
+    def walks(self) -> list[str]:
+        """A sentence for each control, if they walk differently."""
+        found = {}
+        for control in self.compared:
+            plan = replace(self.plan, control=control.text)
+            walk = choose_walk(plan, gains=chosen_gains(plan, self.options.gains))
+            found[control.label] = {WALKING: walk.as_facts()}
+        return different_walks(found)
 
 
 @dataclass(frozen=True)
@@ -207,7 +229,12 @@ def run_work(work: Work, path: Path) -> Done:
             comparison = _all_seeds(work, results, folder.path)
             files += [folder.path / SEEDS]
             files += write_comparison(
-                folder.path, work.plan, comparison, labels=work.labels, command=work.command
+                folder.path,
+                work.plan,
+                comparison,
+                labels=work.labels,
+                command=work.command,
+                walks=work.walks,
             )
             checked: dict[str, Accuracy] = {}
             if work.accuracy:
@@ -215,7 +242,18 @@ def run_work(work: Work, path: Path) -> Done:
                 write_json(folder.path / METRICS_FILE, _table(comparison, checked))
             if figures is None:
                 return Done(results, comparison, checked, files, None)
-            files += _report(stored, figures, comparison, checked, folder.path, work.command)
+            with drawing(folder.path):
+                files += write_report(
+                    stored,
+                    folder.path,
+                    warn=warn,
+                    comparison=comparison,
+                    scenario=read_scenario(folder.path),
+                    command=work.command,
+                    walks=work.walks,
+                    accuracies=checked,
+                    figures=figures.result(),
+                )
     return Done(results, comparison, checked, files, files[-1])
 
 
@@ -252,42 +290,17 @@ def _compare_many(works: Sequence[Work], names: Sequence[str], path: Path, *, js
     return FELL if lost else SUCCESS
 
 
-def _report(
-    runs: Mapping[str, StoredResult],
-    figures: FigureThread,
-    comparison: Comparisons,
-    checked: Mapping[str, Accuracy],
-    folder: Path,
-    command: str,
-) -> list[Path]:
-    """Writes figures and report; returns the files, the report last."""
-    with drawing(folder):
-        return write_report(
-            runs,
-            folder,
-            warn=warn,
-            comparison=comparison,
-            scenario=read_scenario(folder),
-            command=command,
-            accuracies=checked,
-            figures=figures.result(),
-        )
-
-
-def _show(
-    results: Mapping[str, Result],
-    comparison: Comparisons,
-    checked: Mapping[str, Accuracy],
-    files: Sequence[Path],
-) -> None:
-    """Prints the metrics of all controls, their accuracy if it was checked, and the files."""
-    net_slip = has_net_slip(next(iter(results.values())).parameters)
+def _show(done: Done, walks: Sequence[str]) -> None:
+    """Prints the metrics of all controls, their accuracy if it was checked, walks and files."""
+    comparison, checked = done.comparison, done.checked
+    net_slip = has_net_slip(next(iter(done.results.values())).parameters)
     rows = comparison_rows(comparison, net_slip=net_slip)
-    show_rows(with_errors(rows, checked), comparison.labels)
+    compared = [pair.title for pair in comparison.pairs]
+    show_rows(with_errors(rows, checked), comparison.labels, compared)
     show_accuracy(rows, checked, comparison.means)
-    for text in different_walks({label: result.facts for label, result in results.items()}):
+    for text in walks:
         show_text(text)
-    show_files(files)
+    show_files(done.files)
 
 
 def _plan(scenario: str, settings: Sequence[str], seeds: int) -> Scenario:
@@ -305,7 +318,10 @@ def _plan(scenario: str, settings: Sequence[str], seeds: int) -> Scenario:
 
 
 def _controls(texts: Sequence[str], plan: Scenario) -> tuple[Control, ...]:
-    """Returns the controls to compare. Raises HexapodError for fewer than two."""
+    """Returns the controls to compare, all in one walk unless they are named with another one.
+
+    Raises HexapodError for fewer than two.
+    """
     controls = chosen_controls(texts, plan)
     if len(controls) < 2:
         other = next(name for name in COMPARED if name != controls[0].label)
@@ -316,7 +332,7 @@ def _controls(texts: Sequence[str], plan: Scenario) -> tuple[Control, ...]:
             fix=f"write --control {other} --control {texts[0]}, or use simulate",
             where="--control",
         )
-    return controls
+    return controls if plan.names_walk else tuple(one.walking(OWN) for one in controls)
 
 
 def _first_seed(work: Work, folder: ResultsFolder) -> tuple[dict[str, Result], list[Path]]:
@@ -335,11 +351,11 @@ def _first_seed(work: Work, folder: ResultsFolder) -> tuple[dict[str, Result], l
 
 def _all_seeds(work: Work, results: Mapping[str, Result], folder: Path) -> Comparisons:
     """Runs the other seeds; an interrupt or error keeps the completed runs in SEEDS_PARTIAL."""
-    plan, options, count = work.plan, work.options, len(work.controls)
+    plan, options, count = work.plan, work.options, len(work.compared)
     scenarios = [
         replace(plan, control=control.text, seed=seed)
-        for seed in range(plan.seed + 1, plan.seed + work.seeds)
-        for control in work.controls
+        for seed in range(plan.seed, plan.seed + work.seeds)
+        for control in (work.compared if seed > plan.seed else work.chosen)
     ]
     done: list[Summary] = [summarise(results[label]) for label in work.labels]
     try:
@@ -356,8 +372,9 @@ def _all_seeds(work: Work, results: Mapping[str, Result], folder: Path) -> Compa
             warn(f"the completed runs are in {folder / SEEDS_PARTIAL}")
         raise
     write_seeds(folder / SEEDS, done)
+    labels = [control.label for control in work.compared]
     comparison = compare_all(
-        {label: [run for run in done if run.control == label] for label in work.labels}
+        {label: [run for run in done if run.control == label] for label in labels}
     )
     for text in comparison.warnings if work.seeds > 1 else comparison.losses:
         warn(text)
@@ -367,7 +384,7 @@ def _all_seeds(work: Work, results: Mapping[str, Result], folder: Path) -> Compa
 def _accuracies(work: Work, comparison: Comparisons, folder: Path) -> dict[str, Accuracy]:
     """Returns the accuracies, by control, of the means over the compared seeds."""
     found = {}
-    for control in work.controls:
+    for control in work.compared:
         runs = comparison.judged[control.label]
         plans = [replace(work.plan, control=control.text, seed=run.seed) for run in runs]
         found[control.label] = check_accuracy(plans, runs, folder, work.options)

@@ -37,7 +37,7 @@ from hexapod_cosim.cosim.export.robot_package import (
 from hexapod_cosim.cosim.interface.controller_interface import ControllerSetup
 from hexapod_cosim.cosim.run.chosen_walk import chosen_walk
 from hexapod_cosim.cosim.run.controller_setup import make_setup
-from hexapod_cosim.cosim.scenario.records import CONTROLS
+from hexapod_cosim.cosim.scenario.records import CHOSEN, CONTROLS, OWN
 from hexapod_cosim.models import HexapodError, Robot, load_robot, unknown_name
 from hexapod_cosim.models.ground.surface import Surface
 
@@ -140,7 +140,6 @@ Period = Annotated[float, typer.Option("--period", help="Of the controller [s]."
 DEFAULT_PERIOD = 0.005  # s, the default macro-step
 DEFAULT_CONTROL = "compliant"  # of a package
 CONTROLLER_OPTIONS = ("gait", "gains", "period")
-OWN_STANCE, CHOSEN_STANCE = "own", "chosen"
 DESCRIPTION, PLANT_FMU = "a robot's description", "the plant's FMU"
 CONTROLLER_FMU, PACKAGE = "a controller's FMU", "a package"
 # options without effect, by what is written
@@ -184,7 +183,7 @@ def export(
     terrain: Terrains = None,
     controller: ControllerName = None,
     gait: GaitName = None,
-    stance: StanceName = OWN_STANCE,
+    stance: StanceName = OWN,
     gains: GainsFile = None,
     period: Period = DEFAULT_PERIOD,
     json: Json = False,
@@ -239,9 +238,9 @@ def _in_stance(robot: Robot, stance: str) -> tuple[Robot, Gait | None]:
 
     Raises HexapodError for an unknown stance.
     """
-    if stance not in (OWN_STANCE, CHOSEN_STANCE):
-        raise unknown_name("stance", stance, (OWN_STANCE, CHOSEN_STANCE))
-    if stance == OWN_STANCE:
+    if stance not in (OWN, CHOSEN):
+        raise unknown_name("stance", stance, (OWN, CHOSEN))
+    if stance == OWN:
         return robot, None
     with waiting("choosing the stance"):
         walk = chosen_walk(robot)

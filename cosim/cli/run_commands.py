@@ -38,7 +38,7 @@ from hexapod_cosim.cosim.report.accuracy import with_errors
 from hexapod_cosim.cosim.report.report import REPORT, metric_rows, write_report
 from hexapod_cosim.cosim.results.accuracy import Accuracy, halved_scenario
 from hexapod_cosim.cosim.results.comparison import SEEDS, read_seeds
-from hexapod_cosim.cosim.results.comparisons import compare_all
+from hexapod_cosim.cosim.results.comparisons import WALKS, compare_all
 from hexapod_cosim.cosim.results.drop import drop_text
 from hexapod_cosim.cosim.results.metrics import has_net_slip
 from hexapod_cosim.cosim.results.result import Result
@@ -56,7 +56,7 @@ from hexapod_cosim.cosim.results.results import (
 from hexapod_cosim.cosim.results.summary import summarise
 from hexapod_cosim.cosim.results.walking import WALKING, walking_text
 from hexapod_cosim.cosim.scenario.controls import control_of
-from hexapod_cosim.cosim.scenario.records import COMPARED, Scenario
+from hexapod_cosim.cosim.scenario.records import Scenario
 from hexapod_cosim.cosim.scenario.scenario import load_scenario
 from hexapod_cosim.models import HexapodError
 
@@ -211,16 +211,15 @@ def _report_again(folder: Path, facts: Mapping[str, Any]) -> list[Path]:
 
 def _report_comparison(folder: Path, facts: Mapping[str, Any]) -> list[Path]:
     """Writes the report of a comparison's folder again; `facts` are those of its run.json."""
-    seeds = read_seeds(folder / SEEDS)
-    # comparisons of earlier versions do not name their controls
-    labels = [str(label) for label in facts.get(PARTS, COMPARED)]
+    seeds, labels = read_seeds(folder / SEEDS), facts[PARTS]
     return write_report(
         {label: read_result(folder / label) for label in labels},
         folder,
         warn=warn,
-        comparison=compare_all({label: seeds.get(label, []) for label in labels}),
+        comparison=compare_all({label: seeds.get(label, []) for label in (*labels, *seeds)}),
         scenario=read_scenario(folder),
         command=facts.get("command", ""),
+        walks=facts.get(WALKS, ()),
         accuracies=read_accuracies(folder),
     )
 

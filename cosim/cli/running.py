@@ -104,7 +104,8 @@ ControlNames = Annotated[
     typer.Option(
         "--control",
         metavar="CONTROL",
-        help=f"{', '.join(CONTROLS)}, law.py:Class or controller.fmu; LABEL=CONTROL names it. "
+        help=f"{', '.join(CONTROLS)}, law.py:Class or controller.fmu; LABEL=CONTROL names it, "
+        "CONTROL@chosen walks in the gait and stance that compliant control chooses. "
         "Repeat it for more.",
         show_default=False,
         autocompletion=completion.control,
@@ -262,9 +263,12 @@ def _has_value(row: Mapping[str, Any]) -> bool:
     return any(text not in ("", "-") for text in row["values"])
 
 
-def show_rows(rows: Sequence[Mapping[str, Any]], controls: Sequence[str]) -> None:
+def show_rows(
+    rows: Sequence[Mapping[str, Any]], controls: Sequence[str], compared: Sequence[str] = ()
+) -> None:
     """Prints the rows of a report's table without its empty columns.
 
+    compared: the headings of the changes.
     Where no control has a metric of its walk, a sentence takes the place of the empty rows.
     """
     walks = [row for row in rows if row["name"] not in ("walked", *OF_THE_RUN)]
@@ -276,15 +280,16 @@ def show_rows(rows: Sequence[Mapping[str, Any]], controls: Sequence[str]) -> Non
         )
     columns = {"metric": [row["name"] for row in rows], "unit": [row["unit"] for row in rows]}
     columns |= {control: [row["values"][k] for row in rows] for k, control in enumerate(controls)}
-    for k, control in enumerate(controls[1:] if rows and rows[0]["changes"] else []):
+    for k, title in enumerate(compared):
         changes = [row["changes"][k] for row in rows]
-        alone = len(controls) == 2
-        columns["change" if alone else f"{control}: change"] = [one["change"] for one in changes]
-        if alone:  # of more controls, metrics.json and the report have the intervals
+        if len(compared) == 1:
+            columns["change"] = [one["change"] for one in changes]
             columns["95 % interval"] = [one["interval"] for one in changes]
-        columns["" if alone else f"{control}: verdict"] = [one["verdict"] for one in changes]
+            columns[""] = [one["verdict"] for one in changes]
+        else:  # of more controls, metrics.json and the report have the intervals
+            columns[title] = [f"{one['change']} {one['verdict']}".strip() for one in changes]
     shown = {name: texts for name, texts in columns.items() if any(texts)}
-    left = {"metric", "unit", "", *(name for name in shown if name.endswith(": verdict"))}
+    left = {"metric", "unit", ""}
     right = [k for k, name in enumerate(shown) if name not in left]
     show_table(list(shown), zip(*shown.values(), strict=True), right=right)
 

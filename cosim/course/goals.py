@@ -218,9 +218,8 @@ GOALS = (
 
 
 def verdicts(table: Table) -> tuple[Verdict, ...]:
-    """Returns all goals with what was measured, of each control but the reference."""
+    """Returns all goals with what was measured, of each column but that of the reference."""
+    columns = [column for column in table.columns if column != table.reference]
     return tuple(
-        Verdict(goal, control, goal.measure(table, control))
-        for control in table.controls[1:]
-        for goal in GOALS
+        Verdict(goal, column, goal.measure(table, column)) for goal in GOALS for column in columns
     )

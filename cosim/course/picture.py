@@ -1,4 +1,4 @@
-"""Draws the picture of a course: cases by figures, each as its ratio to the reference.
+"""Draws the picture of a course: cases by figures, each as its ratio to the control's reference.
 
 Green is better than the reference and orange is worse; pale is the same, as far as the runs tell.
 """
@@ -94,9 +94,13 @@ def rows_of(table: Table) -> list[str]:
 
 
 def draw_course(table: Table, theme: Theme) -> Figure:
-    """Draws a panel for each control but the reference; for the reference where it is alone."""
+    """Draws a panel for each column, but one column of a control that is compared with two.
+
+    That with another walk is left out. The reference has a panel where it is alone.
+    """
     rows = rows_of(table)
-    controls = table.controls[1:] or table.controls
+    panels = {table.columns[one][0]: one for one in table.columns if one != table.reference}
+    controls = list(panels.values()) or [table.reference]
     width = LABELS + len(controls) * (len(COLUMNS) + 0.6) * CELL
     height = HEAD + ROW * len(rows) + FOOT
     figure = Figure(figsize=(width, height))
@@ -119,7 +123,7 @@ def _draw_panel(axes: Axes, table: Table, control: str, rows: Sequence[str], the
     axes.set_ylim(len(rows), 0.0)
     for place, heading in enumerate(HEADINGS):
         _write(axes, place + 0.5, -0.35, heading, theme.muted, va="bottom", fontsize=6.5)
-    beside = f"{control} against {table.reference}" if len(table.controls) > 1 else control
+    beside = " against ".join(dict.fromkeys(table.columns[control]))
     _write(axes, 0.0, -1.9, beside, theme.ink, ha="left", va="bottom", fontsize=9.0, weight="bold")
     for number, row in enumerate(rows):
         case = table.cases.get((row, control))
@@ -181,7 +185,7 @@ def _draw_key(figure: Figure, table: Table, theme: Theme, *, width: float, heigh
     for place, text, side in ends:
         _write(axes, place, -0.9, text, theme.muted, transform=axes.transAxes, ha=side)
     note = (
-        f"Change of the means from {table.reference} in %, over seeds on which both succeeded; "
+        "Change of the means in %, over seeds on which both succeeded; "
         "pale: not sure; –: fewer than half of them did."
     )
     figure.text(

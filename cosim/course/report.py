@@ -5,7 +5,6 @@ from __future__ import annotations
 import base64
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -14,24 +13,12 @@ from jinja2 import ChoiceLoader, PackageLoader
 from hexapod_cosim.cosim.common.control_style import all_styles
 from hexapod_cosim.cosim.common.files import write_text
 from hexapod_cosim.cosim.course import texts
-from hexapod_cosim.cosim.course.goals import Verdict, verdicts
+from hexapod_cosim.cosim.course.goals import verdicts
 from hexapod_cosim.cosim.course.picture import STEM, THEMES, write_picture
-from hexapod_cosim.cosim.course.records import SHOWN
 from hexapod_cosim.cosim.course.table import ALL, Table
 from hexapod_cosim.cosim.report.page import environment
-from hexapod_cosim.cosim.results.comparison import BETTER, SAME, WORSE
 
 REPORT, TEMPLATE = "report.html", "course.html.jinja"
-
-
-@dataclass(frozen=True)
-class Card:
-    """A figure at the top of the report, as texts."""
-
-    name: str
-    change: str
-    interval: str
-    verdict: str
 
 
 def write_course_report(table: Table, content: Mapping[str, Any], folder: Path) -> list[Path]:
@@ -41,19 +28,14 @@ def write_course_report(table: Table, content: Mapping[str, Any], folder: Path) 
     """
     files = write_picture(table, folder) if table.cases else []
     found = [verdict for verdict in verdicts(table) if verdict.was_run]
-    columns, rows = texts.goal_rows(found)
     page = _environment().get_template(TEMPLATE).render(
         styles=all_styles(table.controls),
         title=title_of(table),
         headline=headline(table),
         lead=lead(table),
         warnings=[] if content["complete"] else ["The course was stopped before its end."],
-        cards=cards(table),
         picture=_pictures(files),
-        reference=table.reference,
-        goals={"columns": columns, "rows": list(zip(rows, map(_badge, found), strict=True))}
-        if found
-        else None,
+        goals=texts.goal_rows(found) if found else None,
         parts=texts.part_rows(table),
         classes=texts.class_rows(table),
         cases=texts.case_rows(table),
@@ -98,37 +80,9 @@ def lead(table: Table) -> str:
     course = table.course
     return (
         f"{len(course.cases)} cases, {len(course.seeds)} seeds from {course.seeds[0]}. "
-        f"Changes are from {table.reference}. A success walks upright to the end and arrives."
+        f"Changes are from {table.reference} unless the tables name another control. "
+        "A success walks upright to the end and arrives."
     )
-
-
-def cards(table: Table) -> list[Card]:
-    """Returns the medians over all cases of the last control; none without a second control."""
-    if len(table.controls) < 2 or (ALL, table.controls[-1]) not in table.classes:
-        return []
-    figures = table.classes[ALL, table.controls[-1]]
-    found = []
-    for quantity in SHOWN:
-        ratio = figures.ratio(quantity.name)
-        if math.isnan(ratio.value):
-            continue
-        side = (ratio.low > 1.0) - (ratio.high < 1.0)
-        found.append(
-            Card(
-                f"{quantity.title}, {figures.control}",
-                f"{100.0 * (ratio.value - 1.0):+.0f} %",
-                f"{figures.counted(quantity.name)} cases, median",
-                {-1: BETTER, 0: SAME, 1: WORSE}[side],
-            )
-        )
-    return found
-
-
-def _badge(verdict: Verdict) -> str:
-    """Returns the look of a verdict."""
-    if verdict.reached is None:
-        return SAME
-    return BETTER if verdict.reached else WORSE
 
 
 def _pictures(files: Sequence[Path]) -> dict[str, str] | None:

@@ -17,6 +17,8 @@ from hexapod_cosim.cosim.course.runs import Run
 from hexapod_cosim.cosim.course.statistics import Interval, Rate, median_ratio
 from hexapod_cosim.cosim.results.comparison import Change, change_of, half_width_of
 from hexapod_cosim.cosim.results.metrics import FLOORS
+from hexapod_cosim.cosim.scenario.controls import AT, CHOOSER, reference_of
+from hexapod_cosim.cosim.scenario.records import CHOSEN
 
 Array = NDArray[np.float64]
 
@@ -26,10 +28,10 @@ LEAST_SHARE = 0.5  # of the pairs of a case that must be successes for its ratio
 
 @dataclass(frozen=True)
 class CaseFigures:
-    """The runs of a case under a control, beside those under the reference."""
+    """The runs of a case under a control, beside those under the control's reference."""
 
     case: Case
-    control: str
+    control: str  # name of the column
     runs: tuple[Run, ...]
     reference: tuple[Run, ...]  # of the same seeds
 
@@ -118,45 +120,58 @@ class ClassFigures:
 
 @dataclass(frozen=True)
 class Table:
-    """All figures of a course; the first control is the reference."""
+    """All figures of a course, in columns that each compare a control with its reference."""
 
     course: Course
-    controls: tuple[str, ...]
+    controls: tuple[str, ...]  # the first one is the reference of those in its walk
     runs: tuple[Run, ...]
     # columns that lack a part: their label -> that of the control with all its parts
     parts: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def reference(self) -> str:
-        """The label of the first control, with which all others are compared."""
+        """The label of the first control."""
         return self.controls[0]
 
     @cached_property
+    def columns(self) -> Mapping[str, tuple[str, str]]:
+        """Controls and their references by the name of a column, which is the control's label.
+
+        Compliant control, which walks in a gait and stance of its own choice, has a second column:
+        against the reference in that gait and stance, if this was run.
+        """
+        found = {label: (label, reference_of(label, self.controls)) for label in self.controls}
+        twin = f"{self.reference}{AT}{CHOSEN}"
+        if {CHOOSER, twin} <= set(self.controls):
+            found[f"{CHOOSER} against {twin}"] = CHOOSER, twin
+        return found
+
+    @cached_property
     def cases(self) -> Mapping[tuple[str, str], CaseFigures]:
-        """Figures by case and control, of the cases that were run."""
+        """Figures by case and column, of the cases that were run."""
         by_place: dict[tuple[str, str], list[Run]] = {}
         for run in whole_seeds(self.runs, len(self.controls)):
             by_place.setdefault((run.case, run.control), []).append(run)
         return {
-            (case.name, control): CaseFigures(
+            (case.name, column): CaseFigures(
                 case,
-                control,
+                column,
                 tuple(by_place[case.name, control]),
-                tuple(by_place[case.name, self.reference]),
+                tuple(by_place[case.name, reference]),
             )
             for case in self.course.cases
-            for control in self.controls
+            for column, (control, reference) in self.columns.items()
             if (case.name, control) in by_place
         }
 
     @cached_property
     def classes(self) -> Mapping[tuple[str, str], ClassFigures]:
-        """Figures by class and control, those of all cases last."""
+        """Figures by class and column, those of all cases last."""
         kinds = [*dict.fromkeys(case.case.kind for case in self.cases.values()), ALL]
         return {
-            (kind, control): ClassFigures(kind, control, self.cases_of(kind, control))
+            (kind, column): ClassFigures(kind, column, self.cases_of(kind, column))
             for kind in kinds
-            for control in self.controls
+            for column in self.columns
         }
 
     def cases_of(self, kind: str, control: str) -> tuple[CaseFigures, ...]:

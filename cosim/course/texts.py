@@ -84,14 +84,20 @@ def _percent(ratio: float) -> str:
 
 def class_rows(table: Table) -> tuple[list[str], list[list[str]]]:
     """Returns the table of classes: success, and changes of the medians from the reference."""
-    columns = ["class, control", "cases", "success %", *(f"{item.short} %" for item in SHOWN)]
+    columns = ["class", "control", "against", "success %", *(f"{item.short} %" for item in SHOWN)]
     rows = [
-        [f"{name}, {control}", str(len(figures.cases)), shown_rate_interval(figures.success)]
+        [name, *_compared(table, column), shown_rate_interval(figures.success)]
         + [_class_cell(table, figures, item) for item in SHOWN]
-        for (name, control), figures in table.classes.items()
-        if name != ALL or len(table.classes) > 2 * len(table.controls)
+        for (name, column), figures in table.classes.items()
+        if name != ALL or len(table.classes) > 2 * len(table.columns)
     ]
     return columns, rows
+
+
+def _compared(table: Table, column: str) -> tuple[str, str]:
+    """Returns control and reference of a column; "" for that of the reference."""
+    control, reference = table.columns[column]
+    return control, reference if reference != control else ""
 
 
 def _class_cell(table: Table, figures: ClassFigures, quantity: Quantity) -> str:
@@ -107,33 +113,35 @@ def case_rows(table: Table) -> tuple[list[str], list[list[str]]]:
         [f"{name}, {control}", shown_rate(figures.success)]
         + [shown_mean(item, figures.mean(item.name)) for item in SHOWN]
         for (name, control), figures in table.cases.items()
+        if control in table.controls
     ]
     return columns, rows
 
 
 def goal_rows(found: Sequence[Verdict]) -> tuple[list[str], list[list[str]]]:
-    """Returns the table of goals."""
-    columns = ["goal", "control", "value", "95 % interval", "bound", "", "of"]
-    return columns, [_goal_row(verdict) for verdict in found]
-
-
-def _goal_row(verdict: Verdict) -> list[str]:
-    goal, value = verdict.goal, verdict.measured.value
-    sign = "≥" if goal.at_least else "≤"
-    interval = (
-        f"{_goal_value(verdict, value.low)} .. {_goal_value(verdict, value.high)}"
-        if math.isfinite(value.low)
-        else NONE
-    )
-    return [
-        goal.text,
-        verdict.control,
-        _goal_value(verdict, value.value),
-        interval,
-        f"{sign} {_goal_value(verdict, goal.bound)}",
-        reached_text(verdict),
-        verdict.measured.note,
+    """Returns the table of goals: a row for each goal, what was measured of each control."""
+    controls = list(dict.fromkeys(verdict.control for verdict in found))
+    goals: dict[str, list[Verdict]] = {}
+    for verdict in found:
+        goals.setdefault(verdict.goal.name, []).append(verdict)
+    rows = [
+        [one[0].goal.text, _bound(one[0]), *map(_goal_cell, one), one[-1].measured.note]
+        for one in goals.values()
     ]
+    return ["goal", "bound", *controls, "of"], rows
+
+
+def _bound(verdict: Verdict) -> str:
+    sign = "≥" if verdict.goal.at_least else "≤"
+    return f"{sign} {_goal_value(verdict, verdict.goal.bound)}"
+
+
+def _goal_cell(verdict: Verdict) -> str:
+    """Returns a value with its interval where it shows, and whether the goal is reached."""
+    value = verdict.measured.value
+    shown = [_goal_value(verdict, each) for each in (value.value, value.low, value.high)]
+    interval = f" ({shown[1]} .. {shown[2]})" if len({*shown, NONE}) > 2 else ""
+    return f"{shown[0]}{interval} {reached_text(verdict)}"
 
 
 def _goal_value(verdict: Verdict, value: float) -> str:
@@ -155,6 +163,7 @@ def failure_rows(table: Table) -> tuple[list[str], list[list[str]]]:
     rows = [
         [name, control, str(count), reason]
         for (name, control), figures in table.cases.items()
+        if control in table.controls
         for reason, count in _alike(figures)
     ]
     return ["case", "control", "runs", "reason"], rows
@@ -213,8 +222,8 @@ def tables(
         ("Parts: best and worst effect on a class, and whether the part pays", part_rows(table)),
         ("Goals", goal_rows([verdict for verdict in found if verdict.was_run])),
         (
-            f"Classes: success, and medians over cases of the change from {table.reference} "
-            "(95 % interval)",
+            "Classes: success, and medians over cases of the change from the control that is named "
+            "beside it (95 % interval)",
             class_rows(table),
         ),
         ("Success over the height of stones and stairs", sweep_rows(table)),

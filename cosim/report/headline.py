@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 
 from hexapod_cosim.cosim.results.comparison import BETTER, WORSE, Change, Comparison
-from hexapod_cosim.cosim.results.comparisons import Comparisons
 from hexapod_cosim.cosim.results.metrics import METRICS, PER_RADIAN
 from hexapod_cosim.cosim.results.walk import TANH
 from hexapod_cosim.cosim.scenario.records import CONTROLS
@@ -96,14 +95,6 @@ def headline(comparison: Comparison) -> list[Part]:
     if gains and losses:
         parts += [Part(", and costs "), *_listed(losses)]
     return [*parts, Part(".")]
-
-
-def headlines(comparison: Comparisons) -> list[Part]:
-    """Returns the headlines of all controls against the first one, one after the other."""
-    parts: list[Part] = []
-    for pair in comparison.pairs:
-        parts += [Part(" ")] * bool(parts) + headline(pair)
-    return parts
 
 
 def _shown(comparison: Comparison) -> dict[str, tuple[str, str]]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, NamedTuple
@@ -21,13 +21,13 @@ from hexapod_cosim.cosim.report.accuracy import (
     with_errors,
 )
 from hexapod_cosim.cosim.report.figures import Figures, write_figures
-from hexapod_cosim.cosim.report.headline import cards, creep_note, headlines, plain_headline
+from hexapod_cosim.cosim.report.headline import cards, creep_note, headline, plain_headline
 from hexapod_cosim.cosim.report.page import NO_VIEWER, render, viewer_script
 from hexapod_cosim.cosim.report.payload import as_json, make_payload
 from hexapod_cosim.cosim.report.servos import servo_rows
 from hexapod_cosim.cosim.report.surface import material_legend
 from hexapod_cosim.cosim.results.accuracy import Accuracy
-from hexapod_cosim.cosim.results.comparison import BETTER, METHOD, SAME, WORSE, Change, Comparison
+from hexapod_cosim.cosim.results.comparison import BETTER, METHOD, SAME, WORSE, Change
 from hexapod_cosim.cosim.results.comparisons import Comparisons
 from hexapod_cosim.cosim.results.drop import drop_text
 from hexapod_cosim.cosim.results.ground import describe_terrain
@@ -40,7 +40,7 @@ from hexapod_cosim.cosim.results.metrics import (
     shown_metrics,
 )
 from hexapod_cosim.cosim.results.results import StoredResult
-from hexapod_cosim.cosim.results.walking import different_walks, walking_text
+from hexapod_cosim.cosim.results.walking import walking_text
 from hexapod_cosim.models import JOINT_NAMES
 
 REPORT, PLOTS, PROFILE = "report.html", "plots", "profile"
@@ -110,9 +110,10 @@ def write_report(
     folder: Path,
     *,
     warn: Callable[[str], None],
-    comparison: Comparison | Comparisons | None = None,
+    comparison: Comparisons | None = None,
     scenario: str | None = None,
     command: str | None = None,
+    walks: Sequence[str] = (),
     accuracies: Mapping[str, Accuracy] = MappingProxyType({}),
     figures: Figures | None = None,
 ) -> list[Path]:
@@ -124,6 +125,7 @@ def write_report(
         warn: called with a message for each figure that cannot be drawn.
         comparison: the metrics over all seeds; without it the report is of a single run.
         scenario, command: of a comparison; a single run has its own. The scenario is TOML.
+        walks: sentences on the gait and stance of each control of a comparison, if they differ.
         accuracies: by control, where they were checked.
         figures: those of the runs; by default they are drawn now.
     """
@@ -145,8 +147,7 @@ def write_report(
     for text in missing:
         warn(text)
     first = next(iter(runs.values()))
-    whole = as_comparisons(comparison)
-    content = _one_run(first) if whole is None else _comparison(whole, first.facts)
+    content = _one_run(first) if comparison is None else _comparison(comparison, first.facts)
     content["warnings"] = [
         f"{label}: {text}" for label, run in runs.items() for text in run.facts["warnings"]
     ] + content.pop("overall")
@@ -155,7 +156,11 @@ def write_report(
     ]
     content["scenario"] = first.scenario if scenario is None else scenario
     content["command"] = first.facts.get("command", "") if command is None else command
-    metrics = _metrics(runs, whole)
+    metrics = (
+        {label: run.metrics for label, run in runs.items()}
+        if comparison is None
+        else comparison.means
+    )
     page = render(
         "report.html.jinja",
         controls=runs,
@@ -167,7 +172,7 @@ def write_report(
         joints=JOINT_NAMES,
         creep=creep_note(first.facts, first.view.surface),
         walks={label: walking_text(run.facts) for label, run in runs.items()},
-        differences=different_walks({label: run.facts for label, run in runs.items()}),
+        differences=walks,
         terrain=describe_terrain(first.view.surface, first.facts["parameters"]),
         materials=_materials(runs),
         **content | _accuracy(content["rows"], accuracies, metrics),
@@ -187,13 +192,6 @@ def _materials(runs: Mapping[str, StoredResult]) -> list[dict[str, str]]:
         for entry in material_legend(run.view.surface, run.view.parameters)
     ]
     return [entry for k, entry in enumerate(found) if entry not in found[:k]]
-
-
-def _metrics(runs: Mapping[str, StoredResult], comparison: Comparisons | None) -> Metrics:
-    """Returns the metrics of the table: means of a comparison, or those of a single run."""
-    if comparison is None:
-        return {label: run.metrics for label, run in runs.items()}
-    return comparison.means
 
 
 def _accuracy(
@@ -231,7 +229,10 @@ def _one_run(run: StoredResult) -> dict[str, Any]:
     rows = metric_rows(metrics, net_slip=has_net_slip(run.facts["parameters"]))
     return {
         "headline": plain_headline(run.metrics, run.facts),
+        "headlines": [],
         "cards": [],
+        "columns": list(metrics),
+        "compared": [],
         "rows": rows,
         "about": "",
         "overall": [],
@@ -246,10 +247,13 @@ def _comparison(comparison: Comparisons, facts: Mapping[str, Any]) -> dict[str, 
     means = notes.partition(f"; {METHOD}")[0]
     means = f"{means}; 95 % intervals in brackets." if means else "One run of each control."
     lead = f"Robot {facts['robot']['name']}. {means}"
-    single = len(comparison.pairs) == 1
+    main = comparison.main
     return {
-        "headline": headlines(comparison),
-        "cards": cards(comparison.pairs[0]) if single else [],
+        "headline": headline(main),
+        "headlines": [headline(pair) for pair in comparison.pairs if pair is not main],
+        "cards": cards(main),
+        "columns": comparison.labels,
+        "compared": [pair.title for pair in comparison.pairs],
         "rows": rows,
         "about": notes,
         "overall": comparison.warnings if len(comparison.seeds) > 1 else comparison.losses,
@@ -309,39 +313,28 @@ def metric_rows(metrics: Metrics, *, net_slip: bool) -> Rows:
     ]
 
 
-def as_comparisons(comparison: Comparison | Comparisons | None) -> Comparisons | None:
-    """Returns a pair of controls as a comparison of any number."""
-    if isinstance(comparison, Comparison):
-        first, second = comparison.labels
-        runs = {first: comparison.first, second: comparison.second}
-        return Comparisons(runs, (comparison,))
-    return comparison
+def comparison_rows(comparison: Comparisons, *, net_slip: bool = False) -> Rows:
+    """Returns the rows of the means, with the changes from the reference of each other control.
 
-
-def comparison_rows(comparison: Comparison | Comparisons, *, net_slip: bool = False) -> Rows:
-    """Returns the rows of the means, with the changes from the first control to each other one.
-
-    `changes` of a row has an entry for each other control; `change`, `interval` and `verdict` are
-    those of the first entry. Over several seeds, the first row tells how many runs walked to the
-    end.
+    `changes` of a row has an entry for each pair; `change`, `interval` and `verdict` are those of
+    the first entry. Over several seeds, the first row tells how many runs walked to the end.
     """
-    whole = as_comparisons(comparison)
-    assert whole is not None
-    rows = metric_rows(whole.means, net_slip=net_slip)
+    rows = metric_rows(comparison.means, net_slip=net_slip)
     for row in rows:
-        changes = [_shown_change(pair.changes[row["name"]]) for pair in whole.pairs]
+        changes = [_shown_change(pair.changes[row["name"]]) for pair in comparison.pairs]
         row |= {**changes[0], "changes": changes}
-    count, walked = len(whole.seeds), list(whole.walked.values())
+    count, walked = len(comparison.seeds), comparison.walked
     if count == 1:
         return rows
     counted = [
-        {"change": "", "interval": "", "verdict": _more(walked[0], other)} for other in walked[1:]
+        {"change": "", "interval": "", "verdict": _more(*(walked[label] for label in pair.labels))}
+        for pair in comparison.pairs
     ]
     first = {
         "name": "walked",
         "unit": "runs",
         "meaning": "runs in which the robot walked upright to the end and arrived",
-        "values": [f"{number} of {count}" for number in walked],
+        "values": [f"{number} of {count}" for number in walked.values()],
         **counted[0],
         "changes": counted,
     }
@@ -357,20 +350,17 @@ def _more(before: int, after: int) -> str:
     return SAME if before == after else BETTER if after > before else WORSE
 
 
-def about(comparison: Comparison | Comparisons) -> str:
+def about(comparison: Comparisons) -> str:
     """Returns a sentence on what the table's values are; "" for a single seed."""
-    whole = as_comparisons(comparison)
-    assert whole is not None
-    seeds, n = whole.seeds, len(whole.seeds)
+    seeds, n = comparison.seeds, len(comparison.seeds)
     if n == 1:
         return ""
-    if len(whole.pairs) > 1:
+    if len(comparison.pairs) > 1:
         return (
             f"Means over those of {n} seeds ({seeds[0]} to {seeds[-1]}) on which the control "
-            f"walked to the end; changes are against {whole.reference}, over the pairs in which "
-            f"both walked; {METHOD}."
+            f"walked to the end; changes are over the pairs in which both walked; {METHOD}."
         )
-    judged = max(change.pairs for change in whole.pairs[0].changes.values())
+    judged = max(change.pairs for change in comparison.pairs[0].changes.values())
     part = f" of the {judged} in which both walked to the end" if judged < n else ""
     return (
         f"Means over {n} seeds ({seeds[0]} to {seeds[-1]}){part}, both controls on each; {METHOD}."

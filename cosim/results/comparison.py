@@ -31,9 +31,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hexapod_cosim.cosim.common.files import atomic_text
-from hexapod_cosim.cosim.results.balance import Unbalanced
 from hexapod_cosim.cosim.results.metrics import FLOORS, METRICS
-from hexapod_cosim.cosim.results.summary import Summary, described_losses
+from hexapod_cosim.cosim.results.summary import Summary
 from hexapod_cosim.models import HexapodError
 
 Array = NDArray[np.float64]
@@ -124,6 +123,12 @@ class Comparison:
         return self.first[0].control, self.second[0].control
 
     @property
+    def title(self) -> str:
+        """Returns the heading of the changes."""
+        first, second = self.labels
+        return f"{second} against {first}"
+
+    @property
     def seeds(self) -> list[int]:
         """The seeds of the pairs."""
         return [run.seed for run in self.first]
@@ -135,49 +140,6 @@ class Comparison:
             label: sum(run.success for run in runs)
             for label, runs in zip(self.labels, (self.first, self.second), strict=True)
         }
-
-    @property
-    def judged(self) -> tuple[list[Summary], list[Summary]]:
-        """The runs that the changes are computed from, in pairs."""
-        pairs = judged_pairs(self.first, self.second)
-        return [first for first, _ in pairs], [second for _, second in pairs]
-
-    @property
-    def means(self) -> dict[str, dict[str, float]]:
-        """Mean of each metric, by control and metric."""
-        first, second = self.labels
-        changes = self.changes.items()
-        return {
-            first: {name: item.before for name, item in changes},
-            second: {name: item.after for name, item in changes},
-        }
-
-    @property
-    def losses(self) -> list[str]:
-        """Describes the runs in which the robot did not walk to the end or did not arrive."""
-        return described_losses((*self.first, *self.second))
-
-    @property
-    def unbalanced(self) -> list[str]:
-        """Warns, in one line per control, of runs whose energy balance does not close."""
-        return [
-            text
-            for control, runs in zip(self.labels, (self.first, self.second), strict=True)
-            for text in Unbalanced.among([run.metrics["energy_residual"] for run in runs]).warnings(
-                control, runs=len(runs)
-            )
-        ]
-
-    @property
-    def warnings(self) -> list[str]:
-        """Describes the falls and the energy balances that do not close, over all seeds."""
-        return [*self.losses, *self.unbalanced]
-
-    def as_table(self) -> dict[str, Any]:
-        """Returns a table for JSON: means, changes, numbers of seeds and walks, warnings."""
-        changes = {name: item.as_table() for name, item in self.changes.items()}
-        counts = {"seeds": len(self.first), "walked": self.walked}
-        return {**self.means, "change": changes, **counts, "warnings": self.warnings}
 
 
 def compare_runs(first: Sequence[Summary], second: Sequence[Summary]) -> Comparison:

@@ -1,7 +1,8 @@
-"""Compares runs under any number of controls: each with the first one, seed by seed.
+"""Compares runs under any number of controls, seed by seed, each control with its reference.
 
-The first control is the reference. Every other control makes a `Comparison` with it, whose changes
-use the pairs in which both robots walked upright to the end and arrived.
+The reference is the first control; of a control in another walk it is the first control in that
+walk (`reference_of`). Each pair makes a `Comparison`, whose changes use the pairs of runs in which
+both robots walked upright to the end and arrived.
 """
 
 from __future__ import annotations
@@ -18,11 +19,14 @@ import tomlkit
 from hexapod_cosim.cosim.common.files import PARTS, RUN_FILE, write_json, write_text
 from hexapod_cosim.cosim.master.loop import COMPLETED
 from hexapod_cosim.cosim.results.balance import Unbalanced
-from hexapod_cosim.cosim.results.comparison import Comparison, compare_runs
+from hexapod_cosim.cosim.results.comparison import Comparison, compare_runs, judged_pairs
 from hexapod_cosim.cosim.results.metrics import METRICS
 from hexapod_cosim.cosim.results.results import METRICS_FILE, SCENARIO
 from hexapod_cosim.cosim.results.summary import Summary, described_losses
+from hexapod_cosim.cosim.scenario.controls import AT, reference_of
 from hexapod_cosim.cosim.scenario.records import Scenario
+
+WALKS = "walks"  # key of run.json
 
 
 @dataclass(frozen=True)
@@ -30,7 +34,7 @@ class Comparisons:
     """Runs of the same seeds under two or more controls, by label; the first is the reference."""
 
     runs: Mapping[str, tuple[Summary, ...]]
-    pairs: tuple[Comparison, ...]  # the reference with each of the others, in their order
+    pairs: tuple[Comparison, ...]  # each but the first control with its reference, in their order
 
     @property
     def labels(self) -> tuple[str, ...]:
@@ -39,8 +43,15 @@ class Comparisons:
 
     @property
     def reference(self) -> str:
-        """The control that the others are compared with."""
+        """The first control, with which those in its walk are compared."""
         return self.labels[0]
+
+    @property
+    def main(self) -> Comparison:
+        """The comparison of the last control that is in the walk of the first one."""
+        walks = [label.partition(AT)[2] for label in self.labels]
+        same = [pair for pair, walk in zip(self.pairs, walks[1:], strict=True) if walk == walks[0]]
+        return (same or self.pairs)[-1]
 
     @property
     def seeds(self) -> list[int]:
@@ -60,7 +71,8 @@ class Comparisons:
         that walked, or all where none did.
         """
         if len(self.pairs) == 1:
-            return dict(zip(self.labels, self.pairs[0].judged, strict=True))
+            pairs = judged_pairs(self.pairs[0].first, self.pairs[0].second)
+            return dict(zip(self.labels, map(list, zip(*pairs, strict=True)), strict=True))
         return {
             label: [run for run in runs if run.success] or list(runs)
             for label, runs in self.runs.items()
@@ -69,8 +81,6 @@ class Comparisons:
     @property
     def means(self) -> dict[str, dict[str, float]]:
         """Mean of each metric, by control and metric."""
-        if len(self.pairs) == 1:
-            return self.pairs[0].means
         return {
             label: {name: _mean([run.metrics[name] for run in runs]) for name in METRICS}
             for label, runs in self.judged.items()
@@ -102,26 +112,30 @@ class Comparisons:
 
         With two controls the changes are under `change`, with more under `changes` by label.
         """
-        if len(self.pairs) == 1:
-            return self.pairs[0].as_table()
         changes = {
             pair.labels[1]: {name: item.as_table() for name, item in pair.changes.items()}
             for pair in self.pairs
         }
+        compared: dict[str, Any] = {
+            "reference": self.reference,
+            "references": {pair.labels[1]: pair.labels[0] for pair in self.pairs},
+            "changes": changes,
+        }
+        if len(self.pairs) == 1:
+            compared = {"change": changes[self.labels[1]]}
         counts = {"seeds": len(self.seeds), "walked": self.walked}
-        return {
-            **self.means, "reference": self.reference, "changes": changes, **counts,
-            "warnings": self.warnings,
-        }  # fmt: skip
+        return {**self.means, **compared, **counts, "warnings": self.warnings}
 
 
 def compare_all(runs: Mapping[str, Sequence[Summary]]) -> Comparisons:
-    """Compares the runs of each control with those of the first one.
+    """Compares the runs of each control with those of its reference.
 
     Raises HexapodError when their seeds differ.
     """
-    first, *others = runs.values()
-    pairs = tuple(compare_runs(first, second) for second in others)
+    labels = list(runs)
+    pairs = tuple(
+        compare_runs(runs[reference_of(label, labels)], runs[label]) for label in labels[1:]
+    )
     return Comparisons({label: tuple(some) for label, some in runs.items()}, pairs)
 
 
@@ -132,10 +146,16 @@ def write_comparison(
     *,
     labels: Sequence[str],
     command: str = "",
+    walks: Sequence[str] = (),
 ) -> list[Path]:
     """Writes scenario.toml, metrics.json and run.json of a comparison; returns the files.
 
     The scenario has no control, since several were run; the parameters of [control] stay.
+
+    Args:
+        labels: of the controls that have recordings.
+        command: that makes the comparison.
+        walks: a sentence on the gait and stance of each control, where they differ.
     """
     table = {key: value for key, value in scenario.to_table().items() if key != "control"}
     if scenario.control_settings:
@@ -143,7 +163,7 @@ def write_comparison(
     write_text(folder / SCENARIO, tomlkit.dumps(table))
     write_json(folder / METRICS_FILE, comparison.as_table())
     facts = {"kind": "compare", "status": COMPLETED, "title": scenario.title, "command": command}
-    write_json(folder / RUN_FILE, {**facts, PARTS: list(labels)})
+    write_json(folder / RUN_FILE, {**facts, PARTS: list(labels), WALKS: list(walks)})
     return [folder / name for name in (SCENARIO, METRICS_FILE, RUN_FILE)]
 
 

@@ -12,6 +12,7 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from hexapod_cosim.cosim.interface.names import (
     foot_names,
@@ -382,8 +383,9 @@ def _force(walk: Walk) -> dict[str, float]:
 def landing_rates(walk: Walk) -> Array:
     """Returns the largest rise of the force over 1 ms [N/s] in the 20 ms after each landing.
 
-    Landings of all feet between begin and end count. A foot that touches down again within half a
-    gait cycle has bounced: both are one landing, with the steeper rise.
+    Landings of all feet between begin and end count. A landing is the first contact of a foot after
+    its swing: a touch-down within half a gait cycle of it is a bounce of the same landing, which
+    has the steepest rise of all; a later one begins the next landing.
     """
     found: list[float] = []
     steps = walk.steps()
@@ -394,7 +396,7 @@ def landing_rates(walk: Walk) -> Array:
     )
     for count, rate in zip(counts.T, rates.T, strict=True):
         touched = 1 + np.flatnonzero(np.diff(count) > 0.0)
-        begins = touched[np.diff(time[touched], prepend=-np.inf) > 0.5 * walk.period]
+        begins = _first_contacts(touched, time, apart=0.5 * walk.period)
         ends = np.append(begins[1:], len(time))
         judged = (begins >= steps.start) & (begins < steps.stop)
         found += [
@@ -402,6 +404,15 @@ def landing_rates(walk: Walk) -> Array:
             for first, last in zip(begins[judged], ends[judged], strict=True)
         ]
     return np.array(found)
+
+
+def _first_contacts(touched: NDArray[np.intp], time: Array, *, apart: float) -> NDArray[np.intp]:
+    """Returns the rows of touch-downs that come later than `apart` [s] after the one before."""
+    found: list[np.intp] = []
+    for row in touched:
+        if not found or time[row] - time[found[-1]] > apart:
+            found.append(row)
+    return np.array(found, dtype=np.intp)
 
 
 def _effort(walk: Walk, servo: Servo) -> dict[str, float]:

@@ -40,8 +40,15 @@ def _stance(walking: Mapping[str, Any]) -> str:
 
 
 def different_walks(facts: Mapping[str, Mapping[str, Any]]) -> list[str]:
-    """Returns a sentence for each control, by label, if the controls walk differently."""
-    texts = {label: walking_text(one, brief=True) for label, one in facts.items()}
-    if len(set(texts.values())) < 2:
+    """Returns a sentence for each walk, with its controls by label, if there are several walks."""
+    walks: dict[str, list[str]] = {}
+    for label, one in facts.items():
+        walks.setdefault(walking_text(one, brief=True), []).append(label)
+    if len(walks) < 2:
         return []
-    return [f"{label} walks {walking_text(facts[label])}" for label in texts if texts[label]]
+    return [
+        f"{', '.join(labels)} {'walks' if len(labels) == 1 else 'walk'} "
+        f"{walking_text(facts[labels[0]])}"
+        for text, labels in walks.items()
+        if text
+    ]

@@ -9,7 +9,8 @@ with its feet a part of the way from the robot's own stance to that one: the who
 too much footing on uneven ground. The feet step to the stance of least heat when the robot is
 heavier than its model (C53). Where the legs do not reach the commands or the step height in this
 walk, or the joints are not fast enough, it keeps the robot's own gait, and then its own stance as
-well.
+well. Any control can be asked to walk so, by `walk.stance = "chosen"` or as kinematic@chosen, and
+compliant control to walk as the robot file says (compliant@own).
 """
 
 from __future__ import annotations
@@ -36,14 +37,14 @@ from hexapod_cosim.cosim.results.walking import OF_FMU
 from hexapod_cosim.cosim.run.kept_stance import Stance, kept_stance
 from hexapod_cosim.cosim.scenario.controls import FMU, control_of
 from hexapod_cosim.cosim.scenario.reach import reaches
-from hexapod_cosim.cosim.scenario.records import DESIGNED, OWN, Command, Scenario
+from hexapod_cosim.cosim.scenario.records import CHOSEN, DESIGNED, OWN, Command, Scenario
 from hexapod_cosim.cosim.scenario.scenario import scenario_robot
 from hexapod_cosim.models import ReachError, Robot, ScenarioError, Servo, load_robot
 from hexapod_cosim.models.records import Vector3
 
 CHOSEN_GAIT = "amble"  # of compliant control
 FOOTING = 0.4  # 1    of the way to the stance of least heat by which feet move to the hips
-GIVEN, CHOSEN = "given", "chosen"  # stances besides those that a scenario names
+GIVEN = "given"  # a stance that a scenario gives as two lengths
 BY_SCENARIO, BY_CONTROL, BY_ROBOT = "scenario", "control", "robot file"
 
 
@@ -97,16 +98,19 @@ def choose_walk(
     robot = _with_servo(bare, own.servo, own.gravity)
     settings = dict(scenario.settings.get("gait", {}))
     plain = ChosenWalk(robot=robot, gait=make_gait(robot, **settings), stance=OWN)
-    if scenario.names_walk:
-        return _named(scenario, plain, bare)
-    control = control_of(scenario.control)
-    if control.kind == FMU and control.path is not None:
-        return _of_fmu(plain, control.path)
-    if not control.is_builtin or control.name != "compliant":
-        return replace(plain, chosen_by=BY_ROBOT)
-    plain = replace(plain, chosen_by=BY_CONTROL)
+    if scenario.walk.stance != CHOSEN:
+        if scenario.names_walk:
+            return _named(scenario, plain, bare)
+        control = control_of(scenario.control)
+        if control.kind == FMU and control.path is not None:
+            return _of_fmu(plain, control.path)
+        if not control.chooses:
+            return replace(plain, chosen_by=BY_ROBOT)
+        plain = replace(plain, chosen_by=BY_CONTROL)
     chosen = _chosen(scenario.commands, plain, bare, settings)
-    return plain if _designed_for(gains, plain.robot, chosen.robot) else chosen
+    if plain.chosen_by == BY_CONTROL and _designed_for(gains, plain.robot, chosen.robot):
+        return plain
+    return chosen
 
 
 def chosen_walk(robot: Robot) -> ChosenWalk:
@@ -165,9 +169,11 @@ def _chosen(
 ) -> ChosenWalk:
     """Returns the first walk of compliant control that the robot can follow.
 
-    bare: the robot of the robot file, for which stances are designed.
+    bare: the robot of the robot file, for which stances are designed. settings: those of [gait],
+    whose gait is the only one if they name one.
     """
-    for gait in (make_gait(plain.robot, CHOSEN_GAIT, **settings), plain.gait):
+    amble = make_gait(plain.robot, **{"name": CHOSEN_GAIT, **settings})
+    for gait in (amble, plain.gait):
         try:
             design = _design(bare, gait)
             begin = replace(plain, gait=gait)

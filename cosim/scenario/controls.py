@@ -4,22 +4,25 @@
     law.py:Cpg              the class Cpg of a Python file
     controller.fmu          a controller FMU
     fast=law.py:Cpg         the same class under the label "fast"
+    kinematic@chosen        in the gait and stance that compliant control chooses
+    compliant@own           in those of the robot file
 
 The label is the name of a run's column in tables, figures and reports. Without one it is the name
-of the built-in control, the name of the class, or the file name of the FMU without ".fmu".
+of the built-in control or of the class with what follows "@", or the file name of the FMU without
+".fmu". What follows "@" holds where the scenario names neither gait nor stance.
 """
 
 from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
 from hexapod_cosim.cosim.common.files import RESERVED_NAMES
-from hexapod_cosim.cosim.scenario.records import CONTROLS
+from hexapod_cosim.cosim.scenario.records import CHOSEN, CONTROLS, OWN
 from hexapod_cosim.models import ScenarioError, nearest_name
 from hexapod_cosim.models.errors import refuse_path
 
@@ -32,6 +35,9 @@ CLASS = re.compile(r"(?P<path>.+\.py):(?P<name>[^\W\d]\w*)")
 FORBIDDEN = re.compile(r'[\x00-\x1f\x7f/\\:*?"<>|=]')  # in a label: it becomes a folder's name
 MAX_LABEL = 60  # characters
 FORMS = "a built-in control, law.py:Class or controller.fmu"
+AT = "@"  # between a control and its walk
+WALKS = (OWN, CHOSEN)
+CHOOSER = "compliant"  # the control that chooses a walk
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -44,18 +50,32 @@ class Control:
     # of the Python file or the FMU; None for a built-in control and for an object in memory
     path: Path | None
     name: str  # of the built-in control, of the class, or of the FMU without ".fmu"
+    walk: str = ""  # of WALKS: gait and stance where the scenario names none; "": its own choice
 
     @property
     def is_builtin(self) -> bool:
         """Whether the control belongs to this package."""
         return self.kind == BUILTIN
 
+    @property
+    def chooses(self) -> bool:
+        """Whether it walks as compliant control chooses, where the scenario names no walk."""
+        own = CHOSEN if self.is_builtin and self.name == CHOOSER else OWN
+        return (self.walk or own) == CHOSEN
+
+    def walking(self, walk: str) -> Control:
+        """Returns this control under its label in one of WALKS; an FMU has a walk of its own."""
+        if self.walk or self.kind == FMU:
+            return self
+        text = f"{self.label}={self.text.split('=', 1)[-1]}{AT}{walk}"
+        return replace(self, text=text, walk=walk)
+
 
 def parse_control(text: str, *, where: str, base: Path | None = None) -> Control:
     """Returns the control that a text names.
 
     Args:
-        text: `[LABEL=]NAME`, `[LABEL=]law.py:Class` or `[LABEL=]controller.fmu`.
+        text: `[LABEL=]NAME[@WALK]`, `[LABEL=]law.py:Class[@WALK]` or `[LABEL=]controller.fmu`.
         where: place of the text, for messages.
         base: folder that a relative path starts from; None: the current folder.
 
@@ -66,12 +86,35 @@ def parse_control(text: str, *, where: str, base: Path | None = None) -> Control
     label, plain = (
         (None, text.strip()) if match is None else (match["label"].strip(), match["text"])
     )
-    kind, name, path = _named(plain.strip(), where=where, base=base)
-    target = plain.strip() if path is None else f"{path}:{name}" if kind == PYTHON else str(path)
-    full = target if label is None else f"{label}={target}"
-    own = name if label is None else label
+    plain, at = split_walk(plain.strip())
+    kind, name, path = _named(plain, where=where, base=base)
+    target = plain if path is None else f"{path}:{name}" if kind == PYTHON else str(path)
+    full = f"{target}{at}" if label is None else f"{label}={target}{at}"
+    own = f"{name}{at}" if label is None else label
     _check_label(own, where=where)
-    return Control(label=own, kind=kind, text=full, path=path, name=name)
+    walk = at.removeprefix(AT)
+    return Control(label=own, kind=kind, text=full, path=path, name=name, walk=walk)
+
+
+def split_walk(text: str) -> tuple[str, str]:
+    """Returns the text of a control without its walk, and "@" with the walk or "".
+
+    A controller FMU has a walk of its own, so that no other can be asked for.
+    """
+    plain, at, walk = text.rpartition(AT)
+    named = walk in WALKS and not plain.endswith(".fmu")
+    return (plain, at + walk) if named else (text, "")
+
+
+def reference_of(label: str, labels: Sequence[str]) -> str:
+    """Returns which of several controls, by label, one of them is compared with.
+
+    It is the first one in the walk of the label: kinematic@chosen for compliant@chosen. Where that
+    is missing, and for the first control in another walk, it is the first one itself.
+    """
+    first, at, walk = labels[0].partition(AT)[0], *label.partition(AT)[1:]
+    twin = f"{first}{at}{walk}"
+    return twin if twin in labels and twin != label else labels[0]
 
 
 @lru_cache(maxsize=256)
@@ -123,7 +166,9 @@ def _named(text: str, *, where: str, base: Path | None) -> tuple[str, str, Path 
     if text not in CONTROLS:
         near = nearest_name(text, CONTROLS)
         fix = f"did you mean {near!r}?" if near else "name a class as law.py:Class"
-        expected = f"one of {', '.join(CONTROLS)}, or law.py:Class, or controller.fmu"
+        walks = " or ".join(f"{AT}{walk}" for walk in WALKS)
+        expected = f"one of {', '.join(CONTROLS)}, or law.py:Class, with {walks} or without, "
+        expected += "or controller.fmu"
         raise ScenarioError("unknown control", got=text, expected=expected, fix=fix, where=where)
     return BUILTIN, text, None
 
@@ -187,7 +232,8 @@ def control_beside(value: Any, folder: Path) -> Any:
     if not isinstance(value, str):
         return value
     label, equals, text = value.rpartition("=")
+    text, at = split_walk(text)
     path, colon, name = text.rpartition(":") if CLASS.fullmatch(text) else (text, "", "")
     near = folder / path
     refuse_path(near, "a control", ScenarioError)
-    return f"{label}{equals}{near.resolve()}{colon}{name}" if near.is_file() else value
+    return f"{label}{equals}{near.resolve()}{colon}{name}{at}" if near.is_file() else value

@@ -181,8 +181,8 @@ class Variation:
     command_delay: Annotated[float, Number("s", at_least=0.0, default=0.0)] = 0.0
 
 
-OWN, DESIGNED = "own", "designed"
-STANCES = (OWN, DESIGNED)  # or two lengths
+OWN, DESIGNED, CHOSEN = "own", "designed", "chosen"
+STANCES = (OWN, DESIGNED, CHOSEN)  # or two lengths
 STANCE_CHANGE = Vector("m", 2)
 WALK_KEYS = ("stance",)
 
@@ -191,8 +191,9 @@ WALK_KEYS = ("stance",)
 class Walk:
     """The stance that a scenario names: what the walk is, besides the gait in [gait]."""
 
-    # OWN: of the robot file. DESIGNED: that of `hexapod design --stance` for the gait. Two lengths:
-    # by which the feet stand further out from the hips, and deeper below them [m]. None: not named
+    # OWN: of the robot file. DESIGNED: that of `hexapod design --stance` for the gait. CHOSEN: that
+    # which compliant control chooses, with its gait unless [gait] names one. Two lengths: by which
+    # the feet stand further out from the hips, and deeper below them [m]. None: not named
     stance: str | tuple[float, float] | None = None
 
 

@@ -38,6 +38,7 @@ TWINS = {
     "cost_per_radian",
     "electrical_cost_per_radian",
 }
+CONTROLS = ["kinematic", "paper", "compliant"]
 SHOWN = set(METRICS) - TWINS - {"slip_net_per_metre"}
 FIGURES = {"foot_forces", "slip", "feet", "posture", "path", "torques", "energy", "footfall"}
 
@@ -65,18 +66,19 @@ def compared(
 def test_compare_prints_the_shape_of_the_contract(compared: tuple[Path, dict[str, Any]]) -> None:
     folder, printed = compared
     counts = ["seeds", "walked", "warnings"]
-    assert list(printed) == ["kinematic", "compliant", "change", *counts, "report"]
+    about = ["reference", "references", "changes"]
+    assert list(printed) == [*CONTROLS, *about, *counts, "report"]
     assert printed["warnings"] == []
-    for control in ("kinematic", "compliant"):
+    for control in CONTROLS:
         assert list(printed[control]) == list(METRICS)
         assert {name for name, value in printed[control].items() if value is None} == TWINS
         assert all(
             isinstance(printed[control][name], float) for name in METRICS if name not in TWINS
         )
-    assert list(printed["change"]) == list(METRICS)
-    assert (printed["seeds"], printed["walked"]) == (2, {"kinematic": 2, "compliant": 2})
+    assert printed["references"] == {"paper": "kinematic", "compliant": "kinematic"}
+    assert (printed["seeds"], printed["walked"]) == (2, dict.fromkeys(CONTROLS, 2))
     for name in METRICS:
-        change = printed["change"][name]
+        change = printed["changes"]["compliant"][name]
         assert change["pairs"] == (0 if name in TWINS else 2)
         if name not in TWINS:
             assert change["difference"] == pytest.approx(
@@ -90,7 +92,7 @@ def test_compare_keeps_the_metrics_of_all_runs_and_the_recordings_of_the_first_s
 ) -> None:
     folder, printed = compared
     runs = read_seeds(folder / "seeds.csv")
-    for control in ("kinematic", "compliant"):
+    for control in CONTROLS:
         assert [run.seed for run in runs[control]] == [0, 1]
         stored = json.loads((folder / control / "metrics.json").read_text())
         assert {
@@ -103,6 +105,37 @@ def test_compare_keeps_the_metrics_of_all_runs_and_the_recordings_of_the_first_s
         assert load_scenario(folder / control / "scenario.toml").variation == STANDARD
 
 
+def walked(path: Path) -> tuple[str, str]:
+    """Gait and stance of a run."""
+    facts = json.loads((path / "run.json").read_text())["walking"]
+    return facts["gait"], facts["stance"]
+
+
+@pytest.mark.usefixtures("undrawn")
+def test_compare_shows_all_controls_in_one_walk_and_what_gait_and_stance_give_by_themselves(
+    call: Call, tmp_path: Path
+) -> None:
+    (tmp_path / "level.toml").write_text("duration = 5\n[command]\nvx = 0.08\n")
+    words = ("compare", tmp_path / "level.toml", "-o", tmp_path / "out", "--seeds", "1")
+    code, out, _ = call(*words)
+    assert code == 0
+    for control in CONTROLS:
+        assert walked(tmp_path / "out" / control) == ("tripod", "own")
+    table = json.loads((tmp_path / "out" / "metrics.json").read_text())
+    assert table["references"] == {
+        "paper": "kinematic",
+        "compliant": "kinematic",
+        "kinematic@chosen": "kinematic",
+        "compliant@chosen": "kinematic@chosen",
+    }
+    assert table["compliant@chosen"]["slip_per_metre"] < table["compliant"]["slip_per_metre"]
+    page = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
+    for shown in (out, page):
+        assert "compliant@chosen against kinematic@chosen" in shown
+        assert "kinematic, paper, compliant walk tripod, period 1 s" in shown
+        assert "kinematic@chosen, compliant@chosen walk amble, period 1.5 s" in shown
+
+
 @pytest.mark.usefixtures("undrawn")
 def test_compare_with_one_seed_is_the_plain_walk_without_intervals(
     call: Call, tmp_path: Path
@@ -112,7 +145,7 @@ def test_compare_with_one_seed_is_the_plain_walk_without_intervals(
     )
     printed = json.loads(out)
     assert (code, printed["seeds"]) == (0, 1)
-    assert printed["change"]["realtime_factor"]["low"] is None
+    assert printed["changes"]["compliant"]["realtime_factor"]["low"] is None
     assert load_scenario(tmp_path / "one" / "scenario.toml").variation is None
     assert call("simulate", "walk_flat", "-o", tmp_path / "plain", *QUICK)[0] == 0
     assert (tmp_path / "one" / "kinematic" / "results.csv").read_bytes() == (
@@ -139,7 +172,7 @@ def test_compare_shows_intervals_and_keeps_the_scenarios_own_variation(
         "seed=5",
     )
     assert code == 0
-    assert "95 % interval" in out
+    assert "compliant against kinematic" in out
     assert "2 of 2" in out
     assert "2 seeds (5 to 6)" in out
     assert load_scenario(tmp_path / "scenario.toml").variation == Variation(height=0.002)
@@ -152,8 +185,7 @@ def test_compare_without_plots_writes_all_but_figures_and_report(
     code, out, _ = call(*words)
     assert (code, json.loads(out)["report"]) == (0, None)
     assert {path.name for path in (tmp_path / "out").iterdir()} == {
-        "kinematic",
-        "compliant",
+        *CONTROLS,
         "metrics.json",
         "run.json",
         "scenario.toml",
@@ -166,8 +198,7 @@ def test_compare_leaves_results_figures_report_and_the_scenario_as_run(
 ) -> None:
     folder, printed = compared
     assert {path.name for path in folder.iterdir()} == {
-        "kinematic",
-        "compliant",
+        *CONTROLS,
         "plots",
         "metrics.json",
         "report.html",
@@ -178,7 +209,7 @@ def test_compare_leaves_results_figures_report_and_the_scenario_as_run(
     assert {path.name for path in (folder / "plots").iterdir()} == {
         f"{name}.{kind}" for name in FIGURES for kind in ("png", "svg")
     }
-    for control in ("kinematic", "compliant"):
+    for control in CONTROLS:
         assert {path.name for path in (folder / control).iterdir()} == RUN
         assert load_scenario(folder / control / "scenario.toml").control == control
     assert json.loads((folder / "run.json").read_text())["status"] == "completed"

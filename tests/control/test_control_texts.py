@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from hexapod_cosim.cosim.control import parse_control
-from hexapod_cosim.cosim.scenario.controls import parse_controls
+from hexapod_cosim.cosim.scenario.controls import parse_controls, reference_of
 from hexapod_cosim.cosim.scenario.scenario import load_scenario, scenario_from_table
 from hexapod_cosim.models import ScenarioError
 
@@ -24,6 +24,8 @@ HERE = Path("/laws")
         ("/x/ctrl.fmu", "ctrl", "fmu", "ctrl", Path("/x/ctrl.fmu")),
         ("mine = ctrl.fmu", "mine", "fmu", "ctrl", HERE / "ctrl.fmu"),
         ("object:Cpg", "Cpg", "python", "Cpg", None),
+        ("paper@chosen", "paper@chosen", "builtin", "paper", None),
+        ("mine=law.py:Cpg@own", "mine", "python", "Cpg", HERE / "law.py"),
     ],
 )
 def test_a_text_names_a_control(
@@ -39,6 +41,8 @@ def test_a_text_names_a_control(
     [
         ("complaint", "did you mean 'compliant'?"),
         ("law.py", "name its class: law.py:MyController"),
+        ("kinematic@amble", "with @own or @chosen or without"),
+        ("ctrl.fmu@chosen", "unknown control"),
         ("=compliant", "not a label"),
         ("a/b=compliant", "not a label"),
         ("plots=compliant", "not a label"),
@@ -50,6 +54,34 @@ def test_any_other_text_is_refused_with_what_to_write(text: str, message: str) -
     with pytest.raises(ScenarioError, match="--control: ") as caught:
         parse_control(text, where="--control")
     assert message in str(caught.value)
+
+
+def test_a_control_has_its_own_walk_or_the_one_it_is_named_with() -> None:
+    chooses = {
+        text: parse_control(text, where="test").chooses
+        for text in ("kinematic", "kinematic@chosen", "compliant", "compliant@own")
+    }
+    assert chooses == {
+        "kinematic": False,
+        "kinematic@chosen": True,
+        "compliant": True,
+        "compliant@own": False,
+    }
+    own = parse_control("compliant", where="test").walking("own")
+    assert (own.label, own.text) == ("compliant", "compliant=compliant@own")
+
+
+@pytest.mark.parametrize(
+    ("label", "reference"),
+    [
+        ("compliant", "kinematic"),
+        ("kinematic@chosen", "kinematic"),
+        ("compliant@chosen", "kinematic@chosen"),
+        ("paper@own", "kinematic"),
+    ],
+)
+def test_a_control_is_compared_with_the_first_one_in_its_walk(label: str, reference: str) -> None:
+    assert reference_of(label, ["kinematic", "kinematic@chosen", label]) == reference
 
 
 def test_two_controls_of_a_command_have_two_labels() -> None:
@@ -79,9 +111,9 @@ def test_settings_reach_the_table_of_the_control() -> None:
 
 def test_a_relative_path_in_a_scenario_file_starts_at_the_file(tmp_path: Path) -> None:
     (tmp_path / "law.py").write_text("class Cpg: ...\n")
-    (tmp_path / "walk.toml").write_text('control = "x=law.py:Cpg"\n')
+    (tmp_path / "walk.toml").write_text('control = "x=law.py:Cpg@chosen"\n')
     plan = load_scenario(tmp_path / "walk.toml")
-    assert plan.control == f"x={tmp_path / 'law.py'}:Cpg"
+    assert plan.control == f"x={tmp_path / 'law.py'}:Cpg@chosen"
 
 
 def test_a_control_that_is_no_text_is_refused() -> None:

@@ -51,7 +51,7 @@ def test_four_controls_stand_in_one_table_and_one_report(
     request.getfixturevalue("undrawn")
     code, _, _ = call("report", folder)
     assert code == 0
-    assert "sway, by hand: change" in out
+    assert "sway, by hand against kinematic" in out
 
 
 @pytest.mark.usefixtures("undrawn")

@@ -47,6 +47,21 @@ def test_all_other_controls_walk_as_the_robot_file_says(control: str) -> None:
     assert plain.robot == ATHENA
 
 
+@pytest.mark.parametrize("control", ["kinematic", "paper", "law.py:Mine"])
+def test_any_control_can_walk_as_compliant_control_chooses(control: str) -> None:
+    chosen = walk()
+    assert walk(control=f"{control}@chosen") == chosen
+    named = walk("walk.stance=chosen", control=control)
+    assert replace(named, chosen_by="control") == chosen
+    assert walk(control="compliant@own") == walk(control="kinematic")
+
+
+def test_a_gait_that_is_named_beside_the_chosen_stance_stays() -> None:
+    named = walk("walk.stance=chosen", "gait.name=tripod", control="kinematic")
+    assert (named.gait.name, named.stance, named.chosen_by) == ("tripod", "chosen", "scenario")
+    assert walk("gait.name=ripple", control="kinematic@chosen").stance == "own"
+
+
 @pytest.mark.parametrize(
     "setting", ["gait.name=ripple", "gait.period=0.9", "gait.duty=0.55", "walk.stance=own"]
 )

@@ -131,6 +131,29 @@ def test_a_seed_that_not_every_control_has_run_is_left_out() -> None:
     assert [run.seed for run in part.cases["flat_tanh", "after"].runs] == [0, 1]
 
 
+def test_compliant_control_is_compared_in_the_tripod_and_in_its_own_walk() -> None:
+    controls = ("kinematic", "kinematic@chosen", "compliant")
+    course = replace(COURSE, cases=(case_of("flat_tanh"),))
+    runs = tuple(
+        run_of("flat_tanh", control, seed, {"slip": slip})
+        for seed in course.seeds
+        for control, slip in zip(controls, (4.0, 2.0, 1.0), strict=True)
+    )
+    table = Table(course, controls, runs)
+    _, rows = texts.class_rows(table)
+    assert [row[1:5] for row in rows] == [
+        ["kinematic", "", "100 (51..100)", "ref."],
+        ["kinematic@chosen", "kinematic", "100 (51..100)", "-50"],
+        ["compliant", "kinematic", "100 (51..100)", "-75"],
+        ["compliant", "kinematic@chosen", "100 (51..100)", "-50"],
+    ]
+    assert len(texts.case_rows(table)[1]) == 3
+    columns, goals = texts.goal_rows([one for one in verdicts(table) if one.was_run])
+    assert columns[2:-1] == ["kinematic@chosen", "compliant", "compliant against kinematic@chosen"]
+    slip = next(row for row in goals if row[0] == "flat, tanh law: slip to reference")
+    assert slip[2:-1] == ["50 % missed", "25 % reached", "50 % missed"]
+
+
 def verdict_of(table: Table, name: str) -> Verdict:
     return next(verdict for verdict in verdicts(table) if verdict.goal.name == name)
 

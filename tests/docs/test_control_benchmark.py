@@ -10,6 +10,7 @@ from typing import Any
 
 import pytest
 
+from benchmarks import ROOT, pages
 from benchmarks.control import __main__ as command
 from benchmarks.control.cases import (
     DATA,
@@ -23,7 +24,15 @@ from benchmarks.control.cases import (
     tuning,
 )
 from benchmarks.control.measure import Section, measure
-from benchmarks.control.tables import cell, changes_table, put_into, robustness_table, write_csv
+from benchmarks.control.tables import (
+    BEGIN,
+    END,
+    cell,
+    changes_table,
+    put_into,
+    robustness_table,
+    write_csv,
+)
 from hexapod_cosim.controller import COMPLIANT_PARTS, make_gait
 from hexapod_cosim.cosim.master.loop import COMPLETED
 from hexapod_cosim.cosim.results.comparison import Comparison, change_of, compare_runs
@@ -109,6 +118,15 @@ def test_the_ablation_switches_each_part_alone_and_each_part_off() -> None:
     for part in COMPLIANT_PARTS:
         assert on[f"{part} alone"] == {part}
         assert on[f"without {part}"] == default - {part}
+
+
+def test_every_table_of_make_figures_has_its_place_on_a_page() -> None:
+    names = ["all", "gait", "compliant", "heights", "goals", "worse"]
+    places = dict.fromkeys((*names, "flat tanh", "flat bristle"), pages.PAGES)
+    places["demo"] = (ROOT / "README.md",)
+    for name, files in places.items():
+        text = "".join(page.read_text(encoding="utf-8") for page in files)
+        assert text.count(BEGIN.format(name)) == text.count(END.format(name)) == 1, name
 
 
 def test_switches_say_nothing_to_kinematic_control() -> None:

@@ -44,6 +44,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
             [
                 "compare",
                 "walk_flat",
+                *("--control", "kinematic", "--control", "compliant"),
                 "--seeds",
                 "1",
                 "--set",

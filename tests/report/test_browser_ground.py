@@ -58,10 +58,7 @@ def opened(
         data[:, recording.names.index(f"{leg}.foot.sinkage")] = sunk * contact
     parameters = {**walk.view.parameters, "terrain.kind": float(GRID)}
     view = replace(
-        walk.view,
-        recording=replace(recording, data=data),
-        parameters=parameters,
-        surface=surface,
+        walk.view, recording=replace(recording, data=data), parameters=parameters, surface=surface
     )
     write_report({"kinematic": replace(walk, view=view)}, folder, warn=lambda _: None)
     return Opened(browser, folder / "report.html", address="#t=2.9", **how)

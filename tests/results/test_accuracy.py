@@ -223,7 +223,7 @@ def test_files_and_report_have_the_errors_and_the_report_can_be_made_again(
     assert all(f"<code>{name}</code>" in table for name in SHOWN)
     assert "solver.tolerance=1e-06" in table
     main_table = page.partition("<h2>Metrics</h2>")[2].partition("</table>")[0]
-    assert main_table.count(" ± ") == 2 * len(SHOWN)
+    assert main_table.count(" ± ") == 3 * len(SHOWN)
     assert call("report", folder)[0] == 0
     assert accuracy_table(folder) == table
 

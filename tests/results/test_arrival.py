@@ -13,6 +13,7 @@ from hexapod_cosim.cosim.report.headline import headline
 from hexapod_cosim.cosim.report.report import comparison_rows
 from hexapod_cosim.cosim.results.arrival import missed_end
 from hexapod_cosim.cosim.results.comparison import compare_runs, read_seeds, write_seeds
+from hexapod_cosim.cosim.results.comparisons import compare_all
 from hexapod_cosim.cosim.results.metrics import METRICS
 from hexapod_cosim.cosim.results.summary import Summary
 
@@ -45,11 +46,11 @@ def test_a_robot_arrives_within_half_of_its_way(path: float, turn: float, text: 
 def test_a_stuck_robot_has_not_walked_and_is_not_praised() -> None:
     before = [run("kinematic", seed) for seed in range(3)]
     after = [run("mine", seed, missed=STUCK) for seed in range(3)]
-    comparison = compare_runs(before, after)
+    comparison = compare_all({"kinematic": before, "mine": after})
     assert comparison.walked == {"kinematic": 3, "mine": 0}
     assert comparison.losses[0] == f"mine, seed 0: {STUCK}"
     assert comparison_rows(comparison)[0]["values"] == ["3 of 3", "0 of 3"]
-    said = "".join(part.text for part in headline(comparison))
+    said = "".join(part.text for part in headline(comparison.main))
     assert "less" not in said
     assert said.endswith("No pair of walks can be compared.")
 

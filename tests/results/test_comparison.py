@@ -23,6 +23,7 @@ from hexapod_cosim.cosim.results.comparison import (
     read_seeds,
     write_seeds,
 )
+from hexapod_cosim.cosim.results.comparisons import Comparisons, compare_all
 from hexapod_cosim.cosim.results.metrics import METRICS
 from hexapod_cosim.cosim.results.summary import NO_FIGURES, REFUSED, Summary
 from hexapod_cosim.models import HexapodError
@@ -220,6 +221,10 @@ def test_a_metric_that_a_pair_lacks_is_judged_on_the_others() -> None:
     assert change.after == pytest.approx(0.6)
 
 
+def compared(first: list[Summary], second: list[Summary]) -> Comparisons:
+    return compare_all({"kinematic": first, "compliant": second})
+
+
 def row_of(rows: list[dict[str, object]], name: str) -> dict[str, object]:
     return next(row for row in rows if row["name"] == name)
 
@@ -227,8 +232,8 @@ def row_of(rows: list[dict[str, object]], name: str) -> dict[str, object]:
 def test_a_fall_is_counted_and_reported_and_its_figures_left_out() -> None:
     first, second = runs("kinematic", [1.0, 1.0, 1.0]), runs("compliant", [0.5, 0.6, 90.0])
     second[2] = replace(second[2], upright=False, warnings=("the robot fell at 3 s",))
-    comparison = compare_runs(first, second)
-    assert comparison.changes["slip_per_metre"].after == pytest.approx(0.55)
+    comparison = compared(first, second)
+    assert comparison.pairs[0].changes["slip_per_metre"].after == pytest.approx(0.55)
     assert comparison.walked == {"kinematic": 3, "compliant": 2}
     assert comparison.losses == ["compliant, seed 2: the robot fell at 3 s"]
     walked = comparison_rows(comparison)[0]
@@ -246,7 +251,7 @@ def test_a_run_without_figures_is_counted_and_reported(status: str) -> None:
         reason="the step is too long",
         metrics=NO_FIGURES,
     )
-    comparison = compare_runs(first, second)
+    comparison = compared(first, second)
     assert comparison.means["compliant"]["slip_per_metre"] == 0.6
     assert comparison.losses == ["kinematic, seed 0: the step is too long"]
     assert comparison.as_table()["walked"] == {"kinematic": 1, "compliant": 2}
@@ -257,13 +262,13 @@ def test_where_no_pair_walked_the_figures_are_of_all_that_have_any() -> None:
         runs("kinematic", [1.0]),
         [replace(run, upright=False) for run in runs("compliant", [0.5])],
     )
-    comparison = compare_runs(first, second)
-    assert comparison.changes["slip_per_metre"].relative == pytest.approx(-0.5)
+    comparison = compared(first, second)
+    assert comparison.pairs[0].changes["slip_per_metre"].relative == pytest.approx(-0.5)
     assert comparison.losses
 
 
 def test_a_single_seed_has_changes_and_no_intervals() -> None:
-    rows = comparison_rows(compare_runs(runs("kinematic", [0.3]), runs("compliant", [0.1])))
+    rows = comparison_rows(compared(runs("kinematic", [0.3]), runs("compliant", [0.1])))
     # of the tanh law
     assert [row["name"] for row in rows] == [
         name for name in METRICS if name != "slip_net_per_metre"
@@ -274,9 +279,7 @@ def test_a_single_seed_has_changes_and_no_intervals() -> None:
 
 
 def test_several_seeds_show_the_interval() -> None:
-    rows = comparison_rows(
-        compare_runs(runs("kinematic", [1.0, 1.0]), runs("compliant", [0.5, 0.5]))
-    )
+    rows = comparison_rows(compared(runs("kinematic", [1.0, 1.0]), runs("compliant", [0.5, 0.5])))
     slip = row_of(rows, "slip_per_metre")
     assert (slip["change"], slip["interval"]) == ("-50.0 %", "-50.0 to -50.0 %")
 

@@ -11,7 +11,7 @@ from command import Call
 from walks import PARAMETERS, PERIOD, ROBOT, Walk
 
 from hexapod_cosim.cosim.master.loop import COMPLETED
-from hexapod_cosim.cosim.results.comparison import compare_runs
+from hexapod_cosim.cosim.results.comparisons import compare_all
 from hexapod_cosim.cosim.results.metrics import METRICS
 from hexapod_cosim.cosim.results.summary import Summary
 from hexapod_cosim.cosim.results.walk import View
@@ -98,7 +98,7 @@ def seeds_of(control: str, residuals: list[float]) -> list[Summary]:
 def test_a_comparison_counts_the_runs_of_each_control_whose_energy_balance_misses() -> None:
     kinematic = seeds_of("kinematic", [0.0099, 0.023, 0.0101])
     compliant = seeds_of("compliant", [0.0099, 0.001, float("nan")])
-    (text,) = compare_runs(kinematic, compliant).unbalanced
+    (text,) = compare_all({"kinematic": kinematic, "compliant": compliant}).unbalanced
     expected = "kinematic: the energy balance of 2 of 3 runs misses more than 1 %, at most 2.3 %"
     assert text.startswith(f"{expected}: tighten solver.tolerance")
 

@@ -248,10 +248,7 @@ def test_level_ground_without_friction_is_warned_of(changes: dict[str, float]) -
         ({"friction__mu": 0.0}, "at 4.7 m/s2, without friction"),  # g sin 0.5
         ({"friction__law": 2.0}, "at 4.7 m/s2, without friction"),
         # g (sin 0.5 - 0.3 cos 0.5)
-        (
-            {"friction__mu": 0.3},
-            "at 2.12 m/s2, which friction (mu = 0.3) does not hold",
-        ),
+        ({"friction__mu": 0.3}, "at 2.12 m/s2, which friction (mu = 0.3) does not hold"),
     ],
 )
 def test_a_slope_that_friction_does_not_hold_is_warned_of_with_the_acceleration(

@@ -113,6 +113,15 @@ def test_touch_downs_more_than_half_a_cycle_apart_are_two_landings(
     assert walk.metrics()["loading_rate"] == pytest.approx(rate)
 
 
+def test_bounces_do_not_chain_the_landings_of_several_steps() -> None:
+    """Landings begin at 2.5, 3.3 and 4.1 s: each later than half a cycle of 1 s after the first
+    contact of the one before, though no two touch-downs are half a cycle apart.
+    """
+    walk = Walk()
+    landings(walk, "LF", [2.5, 2.9, 3.3, 3.7, 4.1], [40.0, 10.0, 20.0, 60.0, 30.0])
+    assert walk.metrics()["loading_rate"] == pytest.approx(58.0)  # of 30, 40 and 60
+
+
 def test_a_landing_that_begins_before_the_judged_cycles_does_not_count() -> None:
     walk = Walk()
     landings(walk, "LF", [1.99, 2.03, 4.5], [1000.0, 1000.0, 30.0])

@@ -142,11 +142,7 @@ def test_bounces_between_two_rows_leave_the_steepest_landing() -> None:
     peaks = Peaks(("time", "RM.foot.landing_rate", "RM.foot.landings"))
     row = np.zeros(3)
     # before them the rate of an older landing was 90
-    for rate, count in (
-        (80.0, 1),
-        (50.0, 2),
-        (10.0, 3),
-    ):
+    for rate, count in ((80.0, 1), (50.0, 2), (10.0, 3)):
         row[:] = 0.0, rate, count
         peaks.update(row)
     peaks.write(row)

@@ -168,20 +168,20 @@ def driven(samples: Samples) -> float:
 def landing_rates(samples: Samples, *, apart: float, after: float) -> list[float]:
     """Returns the largest rise [N/s] over 1 ms of each landing in the 20 ms after its touch-downs.
 
-    Only landings after a time [s] are returned. Touch-downs of a foot less than `apart` [s] apart
-    are one landing. Before a touch-down there is no force.
+    Only landings after a time [s] are returned. Touch-downs of a foot less than `apart` [s] after
+    the first one of a landing belong to it. Before a touch-down there is no force.
     """
     found: list[float] = []
     for begin, end in samples.normal.transpose(2, 0, 1):
-        last, judged = -np.inf, False
+        first, judged = -np.inf, False
         for k in np.flatnonzero((end > 0.0) & (begin == 0.0)):
             steepest = _steepest(samples.time + FINE, end, int(k))
-            if samples.time[k] - last > apart:
+            if samples.time[k] - first > apart:
+                first = samples.time[k]
                 judged = bool(samples.time[k] > after)
                 found += [steepest] if judged else []
             elif judged:
                 found[-1] = max(found[-1], steepest)
-            last = samples.time[k]
     return found
 
 

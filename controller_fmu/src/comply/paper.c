@@ -150,9 +150,9 @@ void hx_paper_step(const hxPaperModel *model, const hxLegSolver leg[HX_LEGS],
     for (int i = 0; i < 3; ++i)
       paper->force[k][i] += model->smoothing * (step->force[k][i] - paper->force[k][i]);
     load[k] = fmax(paper->force[k][2], 0.0);
-    total += load[k];
+    total += fmax(step->force[k][2], 0.0);
   }
-  paper->weight += model->weighing * (total - paper->weight);
+  paper->weight += (paper->weight > 0.0 ? model->weighing : 1.0) * (total - paper->weight);
   see_torso(model, leg, step, load, paper);
   for (int k = 0; k < HX_LEGS; ++k) {
     const int swinging = step->swinging[k];

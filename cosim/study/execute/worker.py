@@ -20,7 +20,12 @@ from hexapod_cosim.cosim.master.loop import FAILED, INTERRUPTED, Progress
 from hexapod_cosim.cosim.results.metrics import METRICS
 from hexapod_cosim.cosim.results.summary import NO_FIGURES, REFUSED, Summary
 from hexapod_cosim.cosim.run.preparation import chosen_gains
-from hexapod_cosim.cosim.scenario.controls import PYTHON, control_of, table_with_control
+from hexapod_cosim.cosim.scenario.controls import (
+    PYTHON,
+    control_of,
+    split_walk,
+    table_with_control,
+)
 from hexapod_cosim.cosim.scenario.records import Scenario
 from hexapod_cosim.cosim.scenario.scenario import scenario_from_table
 from hexapod_cosim.cosim.scenario.tables import with_values
@@ -88,7 +93,8 @@ class JobContext:
         copy = self._unpack(
             str(Path(folder.name) / control.path.stem), control.path.suffix, content
         )
-        return f"{label}={copy}:{control.name}" if control.kind == PYTHON else f"{label}={copy}"
+        at = split_walk(control.text)[1]
+        return f"{label}={copy}:{control.name}{at}" if control.kind == PYTHON else f"{label}={copy}"
 
     def run(self, orders: Sequence[Order], progress: Progress) -> Iterator[RunResult]:
         """Yields the result of each order.

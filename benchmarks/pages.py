@@ -1,0 +1,153 @@
+"""Writes the tables of README.md and docs/ that compare controls: `make figures`.
+
+usage: python -m benchmarks.pages [FOLDER]
+
+The folder is that of `hexapod benchmark`, out/benchmark; the other tables' walks are run here.
+"""
+
+from __future__ import annotations
+
+import math
+import sys
+from collections.abc import Mapping, Sequence
+from contextlib import closing
+from dataclasses import replace
+from pathlib import Path
+
+from PIL import Image
+
+from benchmarks import ROOT
+from benchmarks.control.tables import markdown, put_into
+from hexapod_cosim.cosim.course import texts
+from hexapod_cosim.cosim.course.goals import verdicts
+from hexapod_cosim.cosim.course.picture import FOLDER, STEM
+from hexapod_cosim.cosim.course.records import SHOWN
+from hexapod_cosim.cosim.course.store import read_table
+from hexapod_cosim.cosim.course.table import Table
+from hexapod_cosim.cosim.results.comparison import WORSE
+from hexapod_cosim.cosim.results.comparisons import Comparisons, compare_all
+from hexapod_cosim.cosim.run.batch import run_batch
+from hexapod_cosim.cosim.scenario.controls import parse_controls
+from hexapod_cosim.cosim.scenario.scenario import load_scenario
+from hexapod_cosim.cosim.scenario.variation import STANDARD
+
+PAGES = tuple(ROOT / "docs" / name for name in ("comparison.md", "control.md", "course.md"))
+SEEDS = range(10)
+WALKED = ("kinematic", "paper", "compliant")
+OWN = [f"{name}={name}@own" for name in WALKED]
+CHOSEN = [f"{name}@chosen" for name in WALKED]
+TWIN = "compliant against kinematic@chosen"
+GAIT = "kinematic@chosen"
+# metric -> its row, and factor and unit of its values
+ROWS = {
+    "foot_error_stance": ("feet from their plan in stance, RMS", 1e3, "mm"),
+    "foot_error_swing": ("feet from their plan in swing, RMS", 1e3, "mm"),
+    "height_rms": ("height RMS", 1e3, "mm"),
+    "roll_rms": ("roll RMS", 1e3, "mrad"),
+    "pitch_rms": ("pitch RMS", 1e3, "mrad"),
+    "loading_rate": ("loading rate at touch-down", 1.0, "BW/s"),
+    "peak_force": ("peak normal force", 1.0, "BW"),
+    "torque_rms": ("torque RMS", 1.0, "N m"),
+    "cost_of_transport": ("cost of transport, mechanical", 1.0, ""),
+    "electrical_cost": ("electrical cost, with copper loss", 1.0, ""),
+    "servo_load_max": ("hottest servo, torque RMS of its rating", 1.0, ""),
+    "path_error": ("path error", 1e3, "mm/m"),
+    "slip_per_metre": ("slip per metre", 1e3, "mm/m"),
+}
+DETAILS = ("foot_error_swing", "height_rms", "pitch_rms")
+COLOURS = 64  # of the picture
+HARDLY = 0.07  # a smaller change for the worse of a case is not listed
+EFFORT = ("electrical", "heat", "load")  # worse in nearly all cases; the classes show by how much
+
+
+def compared(scenario: str, controls: Sequence[str], *settings: str) -> Comparisons:
+    """Returns the comparison of controls over SEEDS, in a scenario without its gait."""
+    plan = replace(load_scenario(scenario, overrides=settings), variation=STANDARD)
+    named = {key: value for key, value in plan.settings.items() if key != "gait"}
+    found = parse_controls(controls, where="benchmarks.pages")
+    plans = [
+        replace(plan, settings=named, control=control.text, seed=seed)
+        for control in found
+        for seed in SEEDS
+    ]
+    with closing(run_batch(plans, compiled=True)) as runs:
+        done = list(runs)
+    count = len(SEEDS)
+    return compare_all(
+        {control.label: done[k * count : (k + 1) * count] for k, control in enumerate(found)}
+    )
+
+
+def metrics_table(comparison: Comparisons, *, brief: bool = False) -> str:
+    """Returns a row for each metric: means, and in brackets the change from the reference.
+
+    brief: without the metrics of DETAILS.
+    """
+    pairs = {pair.labels[1]: pair for pair in comparison.pairs}
+    rows = [["walked to the end", *(f"{n} of {len(SEEDS)}" for n in comparison.walked.values())]]
+    for name, (title, scale, unit) in ROWS.items():
+        if brief and name in DETAILS:
+            continue
+        cells = [title]
+        for label, means in comparison.means.items():
+            shown = f"{scale * means[name]:.3g} {unit}".strip()
+            change = pairs[label].changes[name].relative if label in pairs else math.nan
+            cells.append(f"{shown} ({100.0 * change:+.0f} %)" if math.isfinite(change) else shown)
+        rows.append(cells)
+    return markdown(["", *comparison.labels], rows)
+
+
+def course_tables(table: Table) -> Mapping[str, str]:
+    """Returns the tables of a course by their names."""
+    headings, rows = texts.class_rows(table)
+    keep = [k for k, heading in enumerate(headings) if heading not in ("control", "against")]
+
+    def classes(column: str) -> str:
+        chosen = [row for row in rows if tuple(row[1:3]) == table.columns[column]]
+        return markdown([headings[k] for k in keep], [[row[k] for k in keep] for row in chosen])
+
+    found = verdicts(table)
+    judged = [each for each in found if each.control in (GAIT, "compliant", TWIN)]
+    return {
+        "all": markdown(headings[1:], [row[1:] for row in rows if row[0] == "all"]),
+        "gait": classes(GAIT),
+        "compliant": classes(TWIN),
+        "heights": markdown(*texts.sweep_rows(table)),
+        "goals": markdown(*texts.goal_rows(judged)),
+        "worse": markdown(["case", "worse"], worse_rows(table)),
+    }
+
+
+def worse_rows(table: Table) -> list[list[str]]:
+    """Returns the cases in which compliant control is worse than kinematic in the same walk."""
+    rows = []
+    for case in table.cases_of("all", TWIN):
+        changes = {one: case.change(one.name) for one in SHOWN if one.name not in EFFORT}
+        told = [
+            f"{one.short} {100.0 * change.relative:+.0f} %"
+            for one, change in changes.items()
+            if change.verdict == WORSE and change.relative >= HARDLY
+        ]
+        rows += [[case.case.name, ", ".join(told)]] if told else []
+    return rows
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Writes the tables into the pages, and the picture of the course beside them."""
+    folder = Path(*(arguments or sys.argv[1:] or ["out/benchmark"]))
+    table, _ = read_table(folder)
+    tables = dict(course_tables(table))
+    for law in ("tanh", "bristle"):
+        flat = compared("walk_flat", [*OWN, *CHOSEN], f"friction.law={law}")
+        tables[f"flat {law}"] = metrics_table(flat)
+    put_into(PAGES, tables)
+    demo = compared("demo_course", [*OWN, CHOSEN[0], CHOSEN[-1]])
+    put_into((ROOT / "README.md",), {"demo": metrics_table(demo, brief=True)})
+    with Image.open(folder / FOLDER / f"{STEM}-light.png") as picture:
+        small = picture.convert("RGB").quantize(COLOURS, dither=Image.Dither.NONE)
+    small.save(ROOT / "docs" / "images" / f"{STEM}.png", optimize=True)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
