@@ -237,4 +237,4 @@ def _margins(loci: Response, loops: PaperLoops, gains: Gains) -> Any:
 
 def _edge(loci: Response) -> float:
     """Returns the inverse of the factor on the shares at which a plant becomes unstable."""
-    return max(float(critical_size(loci).max()), 10.0 ** (-static_margin(loci) / 20.0))
+    return max(float(critical_size(loci).max()), float(10.0 ** (-static_margin(loci) / 20.0)))
