@@ -109,7 +109,8 @@ class Margins:
     # of the paper's control: the worst of its loops
     binding: str  # what limited the shares
     paper_phase_margin: float = math.inf  # deg
-    paper_gain_margin: float = math.inf  # dB
+    paper_gain_margin: float = math.inf  # dB    of oscillations
+    paper_static_margin: float = math.inf  # dB    of feet that push against each other, at rest
     paper_spectral_radius: float = 0.0  # 1    of its whole closed loop, < 1
 
 
