@@ -171,7 +171,7 @@ def front(seeds: range) -> Mapping[str, Sequence[Walked]]:
                     "paper",
                     settings_of(walk, law),
                     seeds,
-                    {"share": share, "height_share": HEIGHT * share, "share_limit": 0.95},
+                    {"share": share, "height_share": HEIGHT * share},
                 )
                 for share in SHARES
             ]
