@@ -126,7 +126,7 @@ WHEELS := dist
 RELEASE := $(VENV)/.release
 
 $(RELEASE): $(STAMP)
-	$(BIN)/python -m pip install --quiet build wheel twine auditwheel ziglang wasmtime
+	$(BIN)/python -m pip install --quiet build wheel twine auditwheel ziglang
 	@touch $@
 
 wheels: setup $(RELEASE)

@@ -25,14 +25,12 @@ from hexapod_cosim.cosim.common.plant_files import (
 from hexapod_cosim.cosim.common.temporary import TemporaryFolder
 from hexapod_cosim.cosim.export.extras import extra_members
 from hexapod_cosim.cosim.export.platforms import (
-    WASM_FOLDER,
     build_binaries,
     choose_platforms,
     component_library,
 )
 from hexapod_cosim.cosim.export.reference import reference_members
 from hexapod_cosim.cosim.export.starts import with_starts
-from hexapod_cosim.cosim.export.wasm_component import component_members
 from hexapod_cosim.cosim.interface.interface import Interface, Variable, load_interface
 from hexapod_cosim.cosim.interface.model_description import render_fmi2
 from hexapod_cosim.cosim.interface.model_description3 import render_build_description, render_fmi3
@@ -67,9 +65,8 @@ def export_fmu(
         robot: the robot whose values the FMU starts with.
         path: the file to write, atomically. Its folder is created if need be.
         fmi: version of the standard.
-        platforms: names such as linux64 or "all", to cross-compile binaries; "wasm", of FMI 3.0,
-            for a WebAssembly component; "sources" for no binary. By default the installed binary
-            of this machine.
+        platforms: names such as linux64 or "all", to cross-compile binaries; "sources" for no
+            binary. By default the installed binary of this machine.
         terrains: surfaces to pack as grid files, numbered from 1; after the robot's own, if it
             stands on one. If it does not, the FMU starts on the first of them.
         integers: offer Integers instead of enumerations, for importers without enumerations.
@@ -136,10 +133,7 @@ def export_interface(
     if bare:
         description = _description(complete, fmi)[1]
         return write_archive(Path(path), description | dict(binaries) | dict(grids), ZIP_STORED)
-    members = _members(complete, dict(binaries) | dict(grids), fmi)
-    if chosen is not None and WASM_FOLDER in chosen:
-        members |= component_members(component, members)
-    return write_archive(Path(path), members)
+    return write_archive(Path(path), _members(complete, dict(binaries) | dict(grids), fmi))
 
 
 def installed_binary(component: Component = PLANT, *, fmi: int = 2) -> dict[str, bytes]:
