@@ -63,7 +63,7 @@ help:
 	@echo "make identify-campaign  20 robots with secret numbers, identified from logs of 6 s (10 min); ROBOTS, SECONDS, AT_A_TIME; goes on with out/identification_SECONDS.csv"
 	@echo "make docs      the documentation's site: build/docs/index.html (1 min)"
 	@echo "make format    formats C and Python"
-	@echo "make generate  generated/ of plant_fmu and controller_fmu from their interface.toml, and the picture of the rooms"
+	@echo "make generate  generated/ of the FMUs from their interface.toml, and the picture of the rooms"
 	@echo "make fmu       out/athena.fmu and out/phantomx_mk4.fmu"
 	@echo "make lock      .ci/requirements.txt: the versions of .ci/constraints.txt with the hashes of all files"
 	@echo "make audit     known vulnerabilities of these versions; needs the network"

@@ -20,8 +20,9 @@ import pytest
 from fmi_plant import ATHENA, GUID, OK, Plant
 
 from hexapod_cosim.cosim.common import plant_files
-from hexapod_cosim.cosim.export.export import checksum, export_fmu, start_values
+from hexapod_cosim.cosim.export.export import export_fmu
 from hexapod_cosim.cosim.export.reference import FOLDER, MANIFEST
+from hexapod_cosim.cosim.export.start_values import checksum, start_values
 from hexapod_cosim.cosim.interface.interface import load_interface
 from hexapod_cosim.cosim.interface.model_description import render_fmi2
 from hexapod_cosim.models.errors import HexapodError
