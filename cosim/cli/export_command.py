@@ -65,8 +65,7 @@ Platforms = Annotated[
     typer.Option(
         "--platforms",
         help="Cross-compile for these, separated by commas (linux64, win64, darwin64, "
-        "aarch64-linux, or FMI 3's names of them) or all; wasm, with --fmi 3: a WebAssembly "
-        "component, after a draft standard; sources: no binary. "
+        "aarch64-linux, or FMI 3's names of them) or all; sources: no binary. "
         "Default: this machine's installed one.",
     ),
 ]

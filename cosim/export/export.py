@@ -7,7 +7,6 @@ from __future__ import annotations
 import zipfile
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
-from functools import reduce
 from pathlib import Path
 from types import MappingProxyType
 from zipfile import ZIP_DEFLATED, ZIP_STORED
@@ -25,15 +24,14 @@ from hexapod_cosim.cosim.common.plant_files import (
 from hexapod_cosim.cosim.common.temporary import TemporaryFolder
 from hexapod_cosim.cosim.export.extras import extra_members
 from hexapod_cosim.cosim.export.platforms import (
-    WASM_FOLDER,
     build_binaries,
     choose_platforms,
     component_library,
 )
 from hexapod_cosim.cosim.export.reference import reference_members
+from hexapod_cosim.cosim.export.start_values import start_values
 from hexapod_cosim.cosim.export.starts import with_starts
-from hexapod_cosim.cosim.export.wasm_component import component_members
-from hexapod_cosim.cosim.interface.interface import Interface, Variable, load_interface
+from hexapod_cosim.cosim.interface.interface import Interface, load_interface
 from hexapod_cosim.cosim.interface.model_description import render_fmi2
 from hexapod_cosim.cosim.interface.model_description3 import render_build_description, render_fmi3
 from hexapod_cosim.cosim.interface.variants import for_binaries, with_integers
@@ -45,7 +43,6 @@ from hexapod_cosim.models.terrain import surface_of
 from hexapod_cosim.models.validation import check_contact_surface, check_settings
 
 FMI_VERSIONS = (2, 3)
-FNV_BASIS, FNV_PRIME, MASK, WORD = 0xCBF29CE484222325, 0x100000001B3, (1 << 64) - 1, 8
 NOTHING: Mapping[str, bytes] = MappingProxyType({})
 TIMESTAMP = (1980, 1, 1, 0, 0, 0)  # of every member, so that archives are reproducible
 
@@ -67,9 +64,8 @@ def export_fmu(
         robot: the robot whose values the FMU starts with.
         path: the file to write, atomically. Its folder is created if need be.
         fmi: version of the standard.
-        platforms: names such as linux64 or "all", to cross-compile binaries; "wasm", of FMI 3.0,
-            for a WebAssembly component; "sources" for no binary. By default the installed binary
-            of this machine.
+        platforms: names such as linux64 or "all", to cross-compile binaries; "sources" for no
+            binary. By default the installed binary of this machine.
         terrains: surfaces to pack as grid files, numbered from 1; after the robot's own, if it
             stands on one. If it does not, the FMU starts on the first of them.
         integers: offer Integers instead of enumerations, for importers without enumerations.
@@ -136,10 +132,7 @@ def export_interface(
     if bare:
         description = _description(complete, fmi)[1]
         return write_archive(Path(path), description | dict(binaries) | dict(grids), ZIP_STORED)
-    members = _members(complete, dict(binaries) | dict(grids), fmi)
-    if chosen is not None and WASM_FOLDER in chosen:
-        members |= component_members(component, members)
-    return write_archive(Path(path), members)
+    return write_archive(Path(path), _members(complete, dict(binaries) | dict(grids), fmi))
 
 
 def installed_binary(component: Component = PLANT, *, fmi: int = 2) -> dict[str, bytes]:
@@ -200,37 +193,6 @@ def _reference(interface: Interface, members: dict[str, bytes], fmi: int) -> dic
     with TemporaryFolder("export") as folder:
         fmu = write_archive(folder / "trial.fmu", trial)
         return reference_members(interface, fmu, fmi=fmi)
-
-
-def start_values(interface: Interface, guid: str) -> str:
-    """Returns start_values.txt, which the binary reads at instantiation (fmi/resources.c).
-
-    It holds the GUID, a line "reference value name" for every input and parameter, and a checksum.
-    """
-    lines = [guid, *map(_start_line, interface.of_causality("input", "parameter"))]
-    total = reduce(checksum, (line.encode() for line in lines), 0)
-    return "\n".join([*lines, f"checksum {total:016x}"]) + "\n"
-
-
-def _start_line(variable: Variable) -> str:
-    """Returns the line "reference value name"; Reals are hexadecimal, so exact."""
-    value = (
-        float(variable.start or 0.0).hex()
-        if variable.type == "Real"
-        else str(int(variable.start or 0))
-    )
-    return f"{variable.reference} {value} {variable.name}"
-
-
-def checksum(seed: int, data: bytes) -> int:
-    """Returns hx_checksum of the plant: FNV-1a over little-endian words of 64 bits, with its high
-    bits mixed into the low ones.
-    """
-    value = seed ^ FNV_BASIS
-    for place in range(0, len(data), WORD):
-        value = (value ^ int.from_bytes(data[place : place + WORD], "little")) * FNV_PRIME & MASK
-        value ^= value >> 32
-    return (value ^ len(data)) * FNV_PRIME & MASK
 
 
 def write_archive(

@@ -17,7 +17,6 @@ import fmpy
 
 from hexapod_cosim.cosim.common.binaries import incomplete
 from hexapod_cosim.cosim.export.extras import LICENCE, PICTURES
-from hexapod_cosim.cosim.export.platforms import WASM_FOLDER
 from hexapod_cosim.cosim.interface.terminals import FOLDER, ICON
 from hexapod_cosim.cosim.validate.description import (
     description_problems,
@@ -27,7 +26,6 @@ from hexapod_cosim.cosim.validate.description import (
 from hexapod_cosim.cosim.validate.grids import grid_problems
 from hexapod_cosim.cosim.validate.related import related_problems
 from hexapod_cosim.cosim.validate.variable import INTERFACES
-from hexapod_cosim.cosim.validate.web_assembly import component_problems
 
 DESCRIPTION, PAGE = "modelDescription.xml", "documentation/index.html"
 TERMINALS = f"{FOLDER}/terminalsAndIcons.xml"
@@ -212,9 +210,6 @@ def binary_problems(root: Element, found: dict[str, bytes], fmi: int) -> Iterato
     if not platforms and not any(name.startswith("sources/") for name in found):
         yield "neither binaries nor sources are there"
     for platform in platforms:
-        if platform == WASM_FOLDER:
-            yield from component_problems(identifiers, found, fmi)
-            continue
         if platform not in PLATFORMS:
             yield f"binaries/{platform} is no platform of the standard: {', '.join(PLATFORMS)}"
             continue

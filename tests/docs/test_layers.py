@@ -132,7 +132,7 @@ def test_each_room_says_what_it_is_for_and_what_it_may_import() -> None:
 
 def test_no_folder_holds_more_files_than_a_reader_can_survey() -> None:
     python = ("models", "controller", "cosim", "gym", "tests", "benchmarks", "tools", "examples")
-    names = (*python, "fmi", *COMPONENTS, "master")
+    names = (*python, "fmi", *COMPONENTS)
     kinds = {".py", ".c", ".h", ".ts"}
     counts: dict[Path, int] = {}
     for path in (path for name in names for path in (ROOT / name).rglob("*.*")):
@@ -235,7 +235,7 @@ def test_the_ground_knows_nothing_of_legs_in_lanes() -> None:
 
 
 def test_the_masters_loop_sees_the_standard_and_nothing_of_the_fmus_it_drives() -> None:
-    files = c_files("src", "include/hexapod", component="master")
+    files = c_files("src", "include/hexapod", component="cosim/master")
     assert files
     own = {path.name for path in files if path.suffix == ".h"}
     own |= {
@@ -268,7 +268,7 @@ DEFINED = re.compile(r"^\}\s*(hx[A-Z]\w*);|^\w[\w ]*?[ *]+(hx_\w+)\([^;{]*\)\s*\
 
 def test_no_two_types_or_functions_of_c_share_a_name() -> None:
     places: dict[str, set[str]] = {}  # within a file alternatives stand behind #if
-    for component in (*COMPONENTS, "master", "fmi"):
+    for component in (*COMPONENTS, "cosim/master", "fmi"):
         folders = ("", "src", "include/hexapod")
         for path in c_files(*folders, component=component):
             text = re.sub(r"/\*.*?\*/", "", path.read_text(encoding="utf-8"), flags=re.DOTALL)

@@ -22,6 +22,8 @@ from hypothesis import strategies as st
 from PIL import Image
 
 from hexapod_cosim.cosim.control.connection import read_map
+from hexapod_cosim.cosim.interface.controller_interface import load_controller_interface
+from hexapod_cosim.cosim.interface.model_description import render_fmi2
 from hexapod_cosim.cosim.master.recorder import Recording
 from hexapod_cosim.cosim.results.recordings import (
     read_csv,
@@ -30,6 +32,7 @@ from hexapod_cosim.cosim.results.recordings import (
     write_parquet,
 )
 from hexapod_cosim.cosim.results.results import read_result
+from hexapod_cosim.cosim.run.controller_setup import make_setup
 from hexapod_cosim.cosim.scenario.scenario import load_scenario
 from hexapod_cosim.cosim.study.plan.reading import load_study
 from hexapod_cosim.cosim.validate.validation import find_problems
@@ -259,7 +262,9 @@ def test_a_folder_of_results_is_read_or_refused(
     reads(lambda: read_result(tmp_path))
 
 
-DESCRIPTION = (ROOT / "controller_fmu" / "generated" / "modelDescription.xml").read_bytes()
+DESCRIPTION = render_fmi2(
+    load_controller_interface(make_setup(load_robot("athena"), control="kinematic", period=0.005))
+).xml.encode()
 
 
 def archive(description: bytes) -> bytes:
