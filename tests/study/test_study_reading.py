@@ -340,7 +340,10 @@ name = "tripod"
         ("", {}),
         ("[variation]\nheight = 0.001\n[solver]\ntolerance = 0.01\n[outputs]\nplots = false\n", {}),
         ("[friction]\nmu = 0.4\n", {"set": {"friction": {"mu": 0.5}}}),
-        ("[compliance]\npaper_pid = false\n", {"variables": {"compliance.paper_pid": [True, False]}}),
+        (
+            "[compliance]\npaper_pid = false\n",
+            {"variables": {"compliance.paper_pid": [True, False]}},
+        ),
         ('[parameters]\n"torso.mass" = 2.6\n', {}),
     ],
 )
