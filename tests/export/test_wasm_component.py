@@ -22,12 +22,11 @@ from hexapod_cosim.cosim.export import wit
 from hexapod_cosim.cosim.export.controller_export import export_controller
 from hexapod_cosim.cosim.export.export import export_fmu
 from hexapod_cosim.cosim.export.platforms import choose_platforms
-from hexapod_cosim.cosim.export.wasm_component import MANIFEST, manifest, resource_module
+from hexapod_cosim.cosim.export.wasm_component import resource_module
 from hexapod_cosim.cosim.interface.controller_interface import ControllerSetup
 from hexapod_cosim.cosim.master.fmu import Fmu
 from hexapod_cosim.cosim.run.run import simulate
 from hexapod_cosim.cosim.scenario.scenario import load_scenario
-from hexapod_cosim.cosim.validate.web_assembly import component_problems
 from hexapod_cosim.models import FmuError, load_robot
 from hexapod_cosim.models.ground.table import read_terrain
 
@@ -290,33 +289,6 @@ def test_the_fmu_is_valid_and_names_the_draft(call: Call, plant: Path, tmp_path:
     assert [name for name in names if name.startswith("binaries/")] == [
         "binaries/wasm32-wasip2/hexapod.wasm"
     ]
-
-
-BINARY = "binaries/wasm32-wasip2/hexapod.wasm"
-HEADER = b"\0asm\x0d\0\x01\0"
-INTERFACES = f"{wit.COMMON} {wit.CO_SIMULATION}".encode()
-
-
-@pytest.mark.parametrize(
-    ("changes", "fmi", "said"),
-    [
-        ({}, 3, []),
-        ({}, 2, ["binaries/wasm32-wasip2 is for FMUs of FMI 3"]),
-        ({MANIFEST: None}, 3, [f"{MANIFEST} is missing: importers look there"]),
-        ({MANIFEST: b"<a/>"}, 3, [f"{MANIFEST} line 1: "]),
-        ({BINARY: None}, 3, [f"{BINARY} is missing: importers look for the modelIdentifier"]),
-        ({BINARY: b""}, 3, [f"{BINARY} is no WebAssembly component"]),
-        ({BINARY: HEADER + wit.COMMON.encode()}, 3, [f"{BINARY} does not export fmi:fmi3/co-sim"]),
-    ],
-)
-def test_what_is_wrong_with_a_component_is_named(
-    changes: dict[str, bytes | None], fmi: int, said: list[str]
-) -> None:
-    members: dict[str, bytes | None] = {MANIFEST: manifest(), BINARY: HEADER + INTERFACES}
-    found = {name: data for name, data in (members | changes).items() if data is not None}
-    problems = list(component_problems(["hexapod"], found, fmi))
-    assert len(problems) == len(said)
-    assert all(map(str.startswith, problems, said))
 
 
 def test_without_the_assembler_the_error_says_how_to_get_it(
