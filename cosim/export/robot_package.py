@@ -20,7 +20,7 @@ from hexapod_cosim.cosim.interface.controller_interface import (
     ControllerSetup,
     load_controller_interface,
 )
-from hexapod_cosim.cosim.interface.interface import load_interface
+from hexapod_cosim.cosim.interface.plant_interface import load_interface
 from hexapod_cosim.cosim.scenario.records import GRAVITY_NAMES
 from hexapod_cosim.models import FmuError, HexapodError, unknown_name
 

@@ -21,7 +21,7 @@ from hexapod_cosim.controller.gains import (
 )
 from hexapod_cosim.controller.size import requirements_for
 from hexapod_cosim.cosim.common.components import CONTROLLER
-from hexapod_cosim.cosim.interface.interface import Interface, expand_interface
+from hexapod_cosim.cosim.interface.plant_interface import Interface, expand_interface
 from hexapod_cosim.cosim.interface.start_values import parameter_values
 from hexapod_cosim.models import Robot
 

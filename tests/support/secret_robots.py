@@ -26,8 +26,8 @@ from hexapod_cosim.cosim.identify.unknowns import (
     is_delay,
     value_before,
 )
-from hexapod_cosim.cosim.interface.interface import plant_roots
 from hexapod_cosim.cosim.interface.names import joint_names, vector_names
+from hexapod_cosim.cosim.interface.plant_interface import plant_roots
 from hexapod_cosim.cosim.master.recorder import Recording
 from hexapod_cosim.models import Robot, load_robot
 
