@@ -30,7 +30,7 @@ import numpy as np
 from benchmarks import RESULTS, machine
 from hexapod_cosim.controller import Gains
 from hexapod_cosim.cosim.common.files import atomic_text, write_text
-from hexapod_cosim.cosim.export.export import export_fmu
+from hexapod_cosim.cosim.export.plant_export import export_fmu
 from hexapod_cosim.cosim.master.loop import COMPLETED, Progress
 from hexapod_cosim.cosim.results.metrics import METRICS
 from hexapod_cosim.cosim.results.summary import Summary

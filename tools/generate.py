@@ -16,8 +16,8 @@ from pathlib import Path
 from hexapod_cosim.controller import make_gait
 from hexapod_cosim.cosim.common.components import PLANT, Component
 from hexapod_cosim.cosim.export.documentation import render_html
-from hexapod_cosim.cosim.export.export import start_values
 from hexapod_cosim.cosim.export.extras import PICTURES
+from hexapod_cosim.cosim.export.plant_export import start_values
 from hexapod_cosim.cosim.interface.arrays import arrays
 from hexapod_cosim.cosim.interface.controller_interface import (
     ControllerSetup,

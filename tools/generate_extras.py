@@ -18,8 +18,8 @@ from tempfile import TemporaryDirectory
 import numpy as np
 from PIL import Image
 
-from hexapod_cosim.cosim.export.export import export_fmu
 from hexapod_cosim.cosim.export.extras import pictures
+from hexapod_cosim.cosim.export.plant_export import export_fmu
 from hexapod_cosim.cosim.export.reference import TOLERANCE, read_csv, reference_members
 from hexapod_cosim.cosim.interface.plant_interface import load_interface
 from hexapod_cosim.models.robot import load_robot

@@ -16,7 +16,7 @@ import tomlkit
 from numpy.typing import NDArray
 
 from hexapod_cosim.cosim.common.temporary import TemporaryFolder
-from hexapod_cosim.cosim.export.export import export_fmu
+from hexapod_cosim.cosim.export.plant_export import export_fmu
 from hexapod_cosim.cosim.identify.experiment import Experiment
 from hexapod_cosim.cosim.identify.fitting.differences import FINE
 from hexapod_cosim.cosim.identify.fitting.problem import Problem

@@ -11,7 +11,7 @@ from gains import make_gains
 
 from hexapod_cosim.controller import Gains, Gait, make_gait
 from hexapod_cosim.cosim.design.stance import StanceDesign, find_stance
-from hexapod_cosim.cosim.export.export import export_fmu
+from hexapod_cosim.cosim.export.plant_export import export_fmu
 from hexapod_cosim.cosim.run import chosen_walk, preparation
 from hexapod_cosim.cosim.run.controller_setup import make_setup
 from hexapod_cosim.cosim.run.kept_gains import kept_gains

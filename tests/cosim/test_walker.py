@@ -14,7 +14,7 @@ from memory import resident
 
 from hexapod_cosim.controller import Gains
 from hexapod_cosim.cosim.export.controller_export import export_controller
-from hexapod_cosim.cosim.export.export import export_fmu
+from hexapod_cosim.cosim.export.plant_export import export_fmu
 from hexapod_cosim.cosim.master import native_loop as native_master
 from hexapod_cosim.cosim.master.fmu import Fmu
 from hexapod_cosim.cosim.master.fmu_controller import FmuController

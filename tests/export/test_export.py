@@ -20,7 +20,7 @@ import pytest
 from fmi_plant import ATHENA, GUID, OK, Plant
 
 from hexapod_cosim.cosim.common import plant_files
-from hexapod_cosim.cosim.export.export import checksum, export_fmu, start_values
+from hexapod_cosim.cosim.export.plant_export import checksum, export_fmu, start_values
 from hexapod_cosim.cosim.export.reference import FOLDER, MANIFEST
 from hexapod_cosim.cosim.interface.model_description import render_fmi2
 from hexapod_cosim.cosim.interface.plant_interface import load_interface

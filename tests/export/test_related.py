@@ -13,7 +13,7 @@ import numpy as np
 from fmpy.fmi3 import FMU3Slave
 from numpy.typing import NDArray
 
-from hexapod_cosim.cosim.export.export import export_fmu
+from hexapod_cosim.cosim.export.plant_export import export_fmu
 from hexapod_cosim.cosim.export.reference import FOLDER, MANIFEST, OUTPUTS, manifest
 from hexapod_cosim.cosim.validate.validation import find_problems
 from hexapod_cosim.models import load_robot

@@ -20,7 +20,7 @@ from wasmtime import component as model
 from hexapod_cosim.controller import make_gait
 from hexapod_cosim.cosim.export import wit
 from hexapod_cosim.cosim.export.controller_export import export_controller
-from hexapod_cosim.cosim.export.export import export_fmu
+from hexapod_cosim.cosim.export.plant_export import export_fmu
 from hexapod_cosim.cosim.export.platforms import choose_platforms
 from hexapod_cosim.cosim.export.wasm_component import resource_module
 from hexapod_cosim.cosim.interface.controller_interface import ControllerSetup

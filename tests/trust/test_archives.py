@@ -18,7 +18,7 @@ import pytest
 
 from hexapod_cosim.cosim.common import archives
 from hexapod_cosim.cosim.common.binaries import missing_bytes
-from hexapod_cosim.cosim.export.export import export_fmu
+from hexapod_cosim.cosim.export.plant_export import export_fmu
 from hexapod_cosim.cosim.master.fmu import Fmu
 from hexapod_cosim.cosim.validate.validation import find_problems
 from hexapod_cosim.models import FmuError, load_robot

@@ -12,7 +12,7 @@ import fmpy
 import numpy as np
 from numpy.typing import NDArray
 
-from hexapod_cosim.cosim.export.export import export_fmu
+from hexapod_cosim.cosim.export.plant_export import export_fmu
 from hexapod_cosim.cosim.interface.descriptions import read_description
 from hexapod_cosim.cosim.master.fmu import Fmu
 from hexapod_cosim.cosim.master.recorder import Recording

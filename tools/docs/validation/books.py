@@ -8,7 +8,7 @@ from tempfile import TemporaryDirectory
 import numpy as np
 from matplotlib.figure import Figure
 
-from hexapod_cosim.cosim.export.export import export_fmu
+from hexapod_cosim.cosim.export.plant_export import export_fmu
 from hexapod_cosim.cosim.interface.names import joint_names
 from hexapod_cosim.cosim.master.recorder import Recording
 from hexapod_cosim.cosim.run.run import simulate
