@@ -11,7 +11,7 @@ from time import perf_counter
 
 from benchmarks.toolchain import Tools
 from hexapod_cosim.controller import BodyCommand, JointCommand, Measurement
-from hexapod_cosim.cosim.design.design import design_for
+from hexapod_cosim.cosim.design.gain_design import design_for
 from hexapod_cosim.cosim.export.controller_export import export_controller
 from hexapod_cosim.cosim.master.fmu import Fmu
 from hexapod_cosim.cosim.master.loop import run

@@ -17,7 +17,7 @@ from hexapod_cosim.controller import (
     Measurement,
     make_gait,
 )
-from hexapod_cosim.cosim.design.design import design_for
+from hexapod_cosim.cosim.design.gain_design import design_for
 from hexapod_cosim.cosim.export.plant_export import export_fmu
 from hexapod_cosim.cosim.master.fmu import Fmu
 from hexapod_cosim.cosim.master.loop import run

@@ -15,7 +15,7 @@ from hexapod_cosim.controller.design.closed import closed_loop, disturbed, risin
 from hexapod_cosim.controller.design.laws import Laws, delay_steps
 from hexapod_cosim.controller.design.standing import Places, weight_share
 from hexapod_cosim.controller.size import size_of
-from hexapod_cosim.cosim.design.design import STANCES, level_fmu
+from hexapod_cosim.cosim.design.gain_design import STANCES, level_fmu
 from hexapod_cosim.cosim.design.linearise import ANGLES, Bench, Motion, linearise
 from hexapod_cosim.cosim.design.standing import StanceError, rest
 from hexapod_cosim.cosim.master.fmu import Fmu

@@ -34,7 +34,7 @@ def designed_gains(robot: Robot, period: float) -> Gains:
 
 def _designed(robot: Robot, period: float) -> Gains:
     """Designs gains; python-control takes a second to import."""
-    from hexapod_cosim.cosim.design.design import design_for  # noqa: PLC0415
+    from hexapod_cosim.cosim.design.gain_design import design_for  # noqa: PLC0415
 
     return design_for(robot, period)
 

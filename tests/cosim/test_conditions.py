@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from hexapod_cosim.controller import GainsError
-from hexapod_cosim.cosim.design.design import design_for
+from hexapod_cosim.cosim.design.gain_design import design_for
 from hexapod_cosim.cosim.export.robot_package import read_values
 from hexapod_cosim.cosim.interface.controller_interface import controller_parameters
 from hexapod_cosim.cosim.results.result import Result

@@ -45,7 +45,7 @@ def designs(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Iterator[list[De
         calls.append((robot, period))
         return make_gains(load_robot("athena"), period=period)
 
-    monkeypatch.setattr("hexapod_cosim.cosim.design.design.design_for", design)
+    monkeypatch.setattr("hexapod_cosim.cosim.design.gain_design.design_for", design)
     monkeypatch.setattr("hexapod_cosim.cosim.run.kept_gains.user_cache", lambda: tmp_path)
     designed_gains.cache_clear()
     yield calls

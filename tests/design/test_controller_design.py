@@ -50,7 +50,7 @@ from hexapod_cosim.controller.design.loci import (
     response,
 )
 from hexapod_cosim.controller.design.standing import answers, axes_of, relieved, squeeze_matrix
-from hexapod_cosim.cosim.design.design import design_for, read_requirements, standing_plants
+from hexapod_cosim.cosim.design.gain_design import design_for, read_requirements, standing_plants
 from hexapod_cosim.models import load_robot
 
 PERIOD = 0.005  # s

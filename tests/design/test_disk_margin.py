@@ -10,8 +10,8 @@ from hexapod_cosim.controller import Gains
 from hexapod_cosim.controller.design.disk import DiskMargin, all_feet, disk_margin, scaled_norm
 from hexapod_cosim.controller.design.laws import Laws, delay_steps
 from hexapod_cosim.controller.design.loci import response
-from hexapod_cosim.cosim.design.design import design_for, examine_stances
 from hexapod_cosim.cosim.design.design_check import check_design
+from hexapod_cosim.cosim.design.gain_design import design_for, examine_stances
 from hexapod_cosim.models import load_robot
 
 ROBOT, PERIOD = load_robot("athena"), 0.005

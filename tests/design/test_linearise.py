@@ -12,7 +12,7 @@ import pytest
 from hexapod_cosim.controller.design.closed import disturbed
 from hexapod_cosim.controller.design.loci import eigenloci
 from hexapod_cosim.controller.design.standing import ANGLES, axes_of, relieved, weight_share
-from hexapod_cosim.cosim.design.design import STANCES, level_fmu
+from hexapod_cosim.cosim.design.gain_design import STANCES, level_fmu
 from hexapod_cosim.cosim.design.linearise import STATES, Bench, linearise
 from hexapod_cosim.cosim.design.standing import StanceError, rest
 from hexapod_cosim.cosim.interface.names import foot_vector_names
