@@ -17,7 +17,7 @@ from hexapod_cosim.cosim.master.fmu import Fmu
 from hexapod_cosim.cosim.master.loop import run
 from hexapod_cosim.cosim.master.recorder import Recorder
 from hexapod_cosim.cosim.master.signals import Signals
-from hexapod_cosim.cosim.run.run import make_plan, simulate
+from hexapod_cosim.cosim.run.single_run import make_plan, simulate
 from hexapod_cosim.cosim.run.walker import Walker
 from hexapod_cosim.cosim.scenario.scenario import load_scenario
 from hexapod_cosim.cosim.scenario.schedule import make_schedule

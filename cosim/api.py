@@ -30,7 +30,7 @@ from hexapod_cosim.cosim.results.results import (
     write_result,
 )
 from hexapod_cosim.cosim.results.summary import summarise
-from hexapod_cosim.cosim.run.run import simulate as run_scenario
+from hexapod_cosim.cosim.run.single_run import simulate as run_scenario
 from hexapod_cosim.cosim.scenario.controls import (
     Control,
     control_of,

@@ -22,7 +22,7 @@ from hexapod_cosim.cosim.run.preparation import (
     design_key,
     designed_gains,
 )
-from hexapod_cosim.cosim.run.run import make_plan
+from hexapod_cosim.cosim.run.single_run import make_plan
 from hexapod_cosim.cosim.scenario.records import Scenario
 from hexapod_cosim.cosim.scenario.scenario import load_scenario
 from hexapod_cosim.models import HexapodError, Robot, load_robot

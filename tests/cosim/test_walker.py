@@ -32,7 +32,7 @@ from hexapod_cosim.cosim.master.signals import Signals
 from hexapod_cosim.cosim.results.result import Result
 from hexapod_cosim.cosim.results.summary import REFUSED, Summary, summarise
 from hexapod_cosim.cosim.run.batch import run_batch
-from hexapod_cosim.cosim.run.run import (
+from hexapod_cosim.cosim.run.single_run import (
     initialise_plant,
     make_plan,
     make_result,

@@ -10,7 +10,7 @@ from gains import PERIOD, make_gains
 
 from hexapod_cosim.controller import BodyCommand, Controller, Measurement, Parts, make_gait
 from hexapod_cosim.cosim.run.preparation import designed_gains
-from hexapod_cosim.cosim.run.run import simulate
+from hexapod_cosim.cosim.run.single_run import simulate
 from hexapod_cosim.cosim.scenario.scenario import load_scenario
 from hexapod_cosim.models import HexapodError, load_robot
 

@@ -25,7 +25,7 @@ from hexapod_cosim.cosim.export.platforms import choose_platforms
 from hexapod_cosim.cosim.export.wasm_component import resource_module
 from hexapod_cosim.cosim.interface.controller_interface import ControllerSetup
 from hexapod_cosim.cosim.master.fmu import Fmu
-from hexapod_cosim.cosim.run.run import simulate
+from hexapod_cosim.cosim.run.single_run import simulate
 from hexapod_cosim.cosim.scenario.scenario import load_scenario
 from hexapod_cosim.models import FmuError, load_robot
 from hexapod_cosim.models.ground.table import read_terrain

@@ -17,7 +17,7 @@ from hexapod_cosim.controller.comply.slip_pid import LOAD_FLOOR
 from hexapod_cosim.controller.plane import Array, Plane
 from hexapod_cosim.cosim.master.signals import COMMANDED
 from hexapod_cosim.cosim.results.result import Result
-from hexapod_cosim.cosim.run.run import simulate
+from hexapod_cosim.cosim.run.single_run import simulate
 from hexapod_cosim.cosim.scenario.records import COMPARED
 from hexapod_cosim.cosim.scenario.scenario import load_scenario
 from tools.docs.validation.shown import PALETTE, Shown
