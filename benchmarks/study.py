@@ -1,8 +1,8 @@
 """Measures a study: overhead per run, scaling to two workers, bytes and memory per run.
 
-usage: python -m benchmarks.study [--page]
+usage: python -m benchmarks.study
 
-Writes benchmarks/results/<machine>/study.csv; with --page the table in docs/studies.md too.
+Writes benchmarks/results/<machine>/study.csv.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ import numpy as np
 from benchmarks import RESULTS, machine
 from hexapod_cosim.controller import Gains
 from hexapod_cosim.cosim.common.files import atomic_text, write_text
-from hexapod_cosim.cosim.export.export import export_fmu
+from hexapod_cosim.cosim.export.plant_export import export_fmu
 from hexapod_cosim.cosim.master.loop import COMPLETED, Progress
 from hexapod_cosim.cosim.results.metrics import METRICS
 from hexapod_cosim.cosim.results.summary import Summary
@@ -61,7 +61,6 @@ RUNS, LARGE, BY_DASK, TASKS, FEW, WALKS, PYTHON_WALKS, REPEATS = (
     60,
     3,
 )
-CORES, MILLION = 100, 1e6  # of the extrapolated study
 DEFAULT: dict[str, Any] = {}
 # settings of the solver by name: docs/studies.md says what they cost in accuracy
 SOLVERS: dict[str, dict[str, Any]] = {
@@ -124,8 +123,6 @@ AIMS = {
     "overhead_dask": "< 5 ms",
 }
 # all other figures are the overhead of the study
-SPEEDS = [name for name in MEANINGS if name.startswith(("rate", "walk", "scaling"))]
-OWN = [name for name in MEANINGS if name not in SPEEDS]
 Figures = dict[str, tuple[float, str, str]]  # by name: value, unit, what it is
 
 
@@ -372,10 +369,8 @@ def cluster() -> Iterator[str]:
                 process.wait()
 
 
-def write(figures: Figures, *, page: bool) -> Path:
-    """Writes the CSV file and, with `page`, the tables of docs/studies.md; returns the CSV's
-    path.
-    """
+def write(figures: Figures) -> Path:
+    """Writes the CSV file and returns its path."""
     path = RESULTS / machine() / "study.csv"
     path.parent.mkdir(parents=True, exist_ok=True)
     with atomic_text(path) as file:
@@ -384,10 +379,6 @@ def write(figures: Figures, *, page: bool) -> Path:
         writer.writerows(
             [name, f"{value:.4g}", unit, meaning]
             for name, (value, unit, meaning) in figures.items()
-        )
-    if page:
-        put_in_page(
-            {"speed": table(figures, SPEEDS), "own": table(figures, OWN), "plan": plan(figures)}
         )
     return path
 
@@ -414,54 +405,6 @@ def table(figures: Mapping[str, tuple[float, str, str]], names: Sequence[str]) -
     return "\n".join(lines)
 
 
-def plan(figures: Mapping[str, tuple[float, str, str]]) -> str:
-    """Extrapolates to a million walks of 10 s on a hundred such cores; returns Markdown.
-
-    Half of the walks are under each control.
-    """
-    values = {name: value for name, (value, _, _) in figures.items()}
-    walk, exact = (
-        1e-3 * 0.5 * sum(values[f"walk_{control}{key}"] for control in BOTH)
-        for key in ("", "_default")
-    )  # s
-    hours = MILLION * walk / 3600.0
-    per_second = CORES / walk
-    tasks = CORES / dispatch.chunk_time(CORES)
-    rows = [
-        (
-            f"processor time, {SOLVER_NAMES['']}",
-            f"{hours:.1f} core hours; with the default solver {MILLION * exact / 3600.0:.1f}",
-        ),
-        (
-            f"on {CORES} cores",
-            f"{60.0 * hours / CORES:.0f} min at {per_second:.0f} walks per second;"
-            f" {60.0 * MILLION * exact / 3600.0 / CORES:.0f} min",
-        ),
-        (
-            "of what one program hands out and stores",
-            f"{100.0 * per_second / values['handed_out']:.0f} %",
-        ),
-        (
-            "to put in order, add up and report at the end, on one core",
-            f"{1e-3 * MILLION * values['finish'] / 60.0:.1f} min",
-        ),
-        ("results.parquet", f"{values['bytes'] * MILLION / 1e6:.0f} MB"),
-        ("memory of the program for its runs", f"{values['memory'] * MILLION / 1e6:.0f} MB"),
-        (
-            "tasks on a Dask cluster",
-            f"{tasks:.0f} per second, {100.0 * tasks * 1e-3 * values['task_dask']:.0f} % of one"
-            " core for all that handle them",
-        ),
-    ]
-    return "\n".join(
-        [
-            f"| 10⁶ walks of 10 s, {CORES} such cores | |",
-            "|---|---|",
-            *(f"| {name} | {value} |" for name, value in rows),
-        ]
-    )
-
-
 def main() -> None:
     """Measures, prints and writes all figures."""
     with TemporaryDirectory(prefix="hexapod-bench-") as folder:
@@ -470,7 +413,7 @@ def main() -> None:
         assert gains is not None
         figures = measured(fmu, gains)
     print(table(figures, list(MEANINGS)))
-    print(f"wrote {write(figures, page='--page' in sys.argv[1:])}")
+    print(f"wrote {write(figures)}")
 
 
 if __name__ == "__main__":

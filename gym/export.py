@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from pathlib import Path
 
-from hexapod_cosim.cosim.export.export import export_interface
+from hexapod_cosim.cosim.export.plant_export import export_interface
 from hexapod_cosim.gym.interface import load_policy_interface
 from hexapod_cosim.gym.policy import Policy
 from hexapod_cosim.models import Robot

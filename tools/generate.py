@@ -24,8 +24,13 @@ from hexapod_cosim.cosim.interface.controller_interface import (
     ControllerSetup,
     load_controller_interface,
 )
-from hexapod_cosim.cosim.interface.interface import CAUSALITIES, Interface, Variable, load_interface
 from hexapod_cosim.cosim.interface.model_description import render_fmi2
+from hexapod_cosim.cosim.interface.plant_interface import (
+    CAUSALITIES,
+    Interface,
+    Variable,
+    load_interface,
+)
 from hexapod_cosim.gym.interface import load_policy_interface, standing_policy
 from hexapod_cosim.models.robot import load_robot
 

@@ -21,7 +21,7 @@ from hexapod_cosim.cosim.cli.terminal import (
 )
 from hexapod_cosim.cosim.cli.terrain_command import surfaces_from
 from hexapod_cosim.cosim.export.controller_export import export_controller
-from hexapod_cosim.cosim.export.export import export_fmu
+from hexapod_cosim.cosim.export.plant_export import export_fmu
 from hexapod_cosim.cosim.export.robot_files import (
     Format,
     chosen_format,

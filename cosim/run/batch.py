@@ -14,7 +14,7 @@ from hexapod_cosim.cosim.common.temporary import TemporaryFolder
 from hexapod_cosim.cosim.master.loop import INTERRUPTED
 from hexapod_cosim.cosim.results.summary import Summary, refused_summary, summarise
 from hexapod_cosim.cosim.run.preparation import PlantFmus, chosen_gains
-from hexapod_cosim.cosim.run.run import simulate
+from hexapod_cosim.cosim.run.single_run import simulate
 from hexapod_cosim.cosim.run.walker import Walker
 from hexapod_cosim.cosim.run.worker_pool import (
     TASKS_PER_WORKER,

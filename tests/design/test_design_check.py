@@ -8,8 +8,8 @@ import pytest
 
 from hexapod_cosim.controller import Gains
 from hexapod_cosim.controller.design.paper import scaled
-from hexapod_cosim.cosim.design.design import design_for
 from hexapod_cosim.cosim.design.design_check import check_design
+from hexapod_cosim.cosim.design.gain_design import design_for
 from hexapod_cosim.models import load_robot
 
 PERIOD = 0.005  # s

@@ -34,7 +34,7 @@ ROOMS = {
     "export": LOW,
     "logs": LOW,
     "results": [*LOW, "logs"],
-    "validate": [*LOW, "export"],
+    "validate": LOW,
     "design": [*LOW, "export"],
     "report": [*LOW, "export", "results"],
     "run": RUNNING,

@@ -10,7 +10,7 @@ from typing import Protocol, cast
 from hexapod_cosim.controller import Gains
 from hexapod_cosim.cosim.master.loop import Progress
 from hexapod_cosim.cosim.results.summary import Summary, refused_summary, summarise
-from hexapod_cosim.cosim.run.run import simulate
+from hexapod_cosim.cosim.run.single_run import simulate
 from hexapod_cosim.cosim.run.walker import Walker
 from hexapod_cosim.cosim.scenario.records import Scenario
 from hexapod_cosim.cosim.study.plan.records import StudyError

@@ -9,7 +9,7 @@ from typing import Any, get_type_hints
 
 from hexapod_cosim.controller import Gains
 from hexapod_cosim.controller.gains import POSITIVE
-from hexapod_cosim.cosim.interface.interface import Interface, load_interface
+from hexapod_cosim.cosim.interface.plant_interface import Interface, load_interface
 from hexapod_cosim.cosim.scenario.controls import LAW
 from hexapod_cosim.cosim.scenario.quantities import QUANTITY
 from hexapod_cosim.cosim.scenario.records import Scenario

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
-from hexapod_cosim.cosim.interface.interface import load_interface
+from hexapod_cosim.cosim.interface.plant_interface import load_interface
 from hexapod_cosim.cosim.scenario.records import Outputs
 from hexapod_cosim.cosim.scenario.scenario import scenario_from_table, scenario_robot
 from hexapod_cosim.cosim.scenario.tables import list_scenarios, read_tables, with_values

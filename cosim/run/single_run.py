@@ -24,7 +24,7 @@ from hexapod_cosim.cosim.control.controllers import (
     text_of_law,
 )
 from hexapod_cosim.cosim.interface.controller_interface import ControllerSetup
-from hexapod_cosim.cosim.interface.interface import plant_roots
+from hexapod_cosim.cosim.interface.plant_interface import plant_roots
 from hexapod_cosim.cosim.interface.start_values import parameter_values
 from hexapod_cosim.cosim.master.faulty_sensors import InnerSensors
 from hexapod_cosim.cosim.master.fmu import Fmu
