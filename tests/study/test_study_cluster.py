@@ -23,11 +23,11 @@ from studies import KINEMATIC, SLOW, digest, quiet, rows, run_quietly, study_of
 from hexapod_cosim.cosim.study.execute import cluster
 from hexapod_cosim.cosim.study.execute.chunk import Chunk
 from hexapod_cosim.cosim.study.execute.cluster_worker import run_chunk
-from hexapod_cosim.cosim.study.execute.job import make_job
-from hexapod_cosim.cosim.study.execute.study import Options, run_study
-from hexapod_cosim.cosim.study.plan.points import Sweep
-from hexapod_cosim.cosim.study.plan.reading import load_study
-from hexapod_cosim.cosim.study.plan.records import StudyError
+from hexapod_cosim.cosim.study.job import make_job
+from hexapod_cosim.cosim.study.reading import load_study
+from hexapod_cosim.cosim.study.records import StudyError
+from hexapod_cosim.cosim.study.runs import Sweep
+from hexapod_cosim.cosim.study.study import Options, run_study
 
 TABLE: dict[str, Any] = {**KINEMATIC, "seeds": 60, "factors": {"friction.mu": [0.3, 0.5]}}
 REAL: dict[str, Any] = {

@@ -15,7 +15,7 @@ from command import COMMAND, Call, assert_refused
 from dask_cluster import HELPERS
 from studies import BRIEF, FAKE, LEAKY, digest, run_quietly
 
-from hexapod_cosim.cosim.study.plan.reading import load_study
+from hexapod_cosim.cosim.study.reading import load_study
 
 HERE = Path(__file__).resolve().parent
 MANY = "seeds = 3000\n"  # parts of 1024 runs

@@ -16,14 +16,12 @@ from studies import KINEMATIC, replace_stored, run_quietly, study_of
 
 from hexapod_cosim.cosim.cli.study.studying import report_on
 from hexapod_cosim.cosim.results.comparison import made_change
-from hexapod_cosim.cosim.study.plan.records import Study
-from hexapod_cosim.cosim.study.report import heat
-from hexapod_cosim.cosim.study.report.curves import history
-from hexapod_cosim.cosim.study.report.figures import drawings
-from hexapod_cosim.cosim.study.store.columns import FIGURES
-from hexapod_cosim.cosim.study.store.results import read_results
-from hexapod_cosim.cosim.study.store.table import Mean, Point
-from hexapod_cosim.cosim.study.store.trials import Trial
+from hexapod_cosim.cosim.study import heat
+from hexapod_cosim.cosim.study.figures import drawings, history
+from hexapod_cosim.cosim.study.groups import Mean, Point
+from hexapod_cosim.cosim.study.records import Study
+from hexapod_cosim.cosim.study.store import FIGURES
+from hexapod_cosim.cosim.study.summary import Trial, read_results
 from hexapod_cosim.models import load_robot
 
 GRID = {"factors": {"friction.mu": [0.3, 0.5], "command.vx": [0.05, 0.08]}}
@@ -177,9 +175,7 @@ def folder(athena_fmu: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) ->
 
     def made(table: Mapping[str, Any], *, lost: int = 0, pictures: bool = False) -> str:
         if not pictures:
-            monkeypatch.setattr(
-                "hexapod_cosim.cosim.study.report.report.drawings", lambda *_, **__: {}
-            )
+            monkeypatch.setattr("hexapod_cosim.cosim.study.report.drawings", lambda *_, **__: {})
         out = tmp_path / "out"
         run_quietly(study_of(table), out, fmu=athena_fmu, gains=make_gains(load_robot("athena")))
         if lost:

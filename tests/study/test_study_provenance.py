@@ -16,9 +16,9 @@ import pytest
 from gains import make_gains
 from studies import FAKE, digest, run_quietly, study_of
 
-from hexapod_cosim.cosim.study.plan.reading import study_from_table
-from hexapod_cosim.cosim.study.store.manifest import RESULTS, RUNS
-from hexapod_cosim.cosim.study.store.results import POINTS, read_results
+from hexapod_cosim.cosim.study.folder import RESULTS, RUNS
+from hexapod_cosim.cosim.study.reading import study_from_table
+from hexapod_cosim.cosim.study.summary import POINTS, read_results
 from hexapod_cosim.models import load_robot
 
 TABLE: dict[str, Any] = {

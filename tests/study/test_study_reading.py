@@ -9,9 +9,9 @@ from typing import Any
 import pytest
 from studies import study_of
 
-from hexapod_cosim.cosim.study.plan.bundled import list_studies
-from hexapod_cosim.cosim.study.plan.reading import load_study
-from hexapod_cosim.cosim.study.plan.records import Study, StudyError
+from hexapod_cosim.cosim.study.bundled import list_studies
+from hexapod_cosim.cosim.study.reading import load_study
+from hexapod_cosim.cosim.study.records import Study, StudyError
 from hexapod_cosim.models import HexapodError, load_robot
 
 TRAINING = {"scenarios": ["walk_flat"], "seeds": {"first": 10, "count": 3}}

@@ -17,10 +17,9 @@ from studies import FAKE, KINEMATIC, replace_stored, rows, run_quietly, study_of
 
 from hexapod_cosim.controller import save_gains
 from hexapod_cosim.cosim.cli.study.studying import report_on
-from hexapod_cosim.cosim.study.report.curves import front
-from hexapod_cosim.cosim.study.report.report import optimum_changes
-from hexapod_cosim.cosim.study.store.results import POINTS, SUMMARY, read_results
-from hexapod_cosim.cosim.study.store.trials import OPTIMUM
+from hexapod_cosim.cosim.study.figures import front
+from hexapod_cosim.cosim.study.report import optimum_changes
+from hexapod_cosim.cosim.study.summary import OPTIMUM, POINTS, SUMMARY, read_results
 from hexapod_cosim.models import load_robot
 
 METRIC = "cost_of_transport"

@@ -24,14 +24,14 @@ from study_engines import DEATHS_FILE, Counting
 from hexapod_cosim.cosim.master.loop import FAILED
 from hexapod_cosim.cosim.run.batch import run_batch
 from hexapod_cosim.cosim.scenario.scenario import load_scenario
+from hexapod_cosim.cosim.study.dispatch import DIED
 from hexapod_cosim.cosim.study.execute.chunk import MAX_DEATHS
-from hexapod_cosim.cosim.study.execute.dispatch import DIED
 from hexapod_cosim.cosim.study.execute.engines import ENGINES
-from hexapod_cosim.cosim.study.execute.job import make_job
 from hexapod_cosim.cosim.study.execute.scratch import JOB, LOCK, PREFIX, scratch_folder
-from hexapod_cosim.cosim.study.execute.study import Options, run_study
-from hexapod_cosim.cosim.study.plan.records import StudyError
-from hexapod_cosim.cosim.study.store.columns import FIGURES
+from hexapod_cosim.cosim.study.job import make_job
+from hexapod_cosim.cosim.study.records import StudyError
+from hexapod_cosim.cosim.study.store import FIGURES
+from hexapod_cosim.cosim.study.study import Options, run_study
 from hexapod_cosim.models import load_robot
 
 WALK: dict[str, Any] = {
@@ -257,7 +257,7 @@ def _children() -> set[int]:
 def test_workers_that_only_die_end_the_study(
     athena_fmu: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("hexapod_cosim.cosim.study.execute.dispatch.MAX_DEATHS_IN_A_ROW", 1)
+    monkeypatch.setattr("hexapod_cosim.cosim.study.dispatch.MAX_DEATHS_IN_A_ROW", 1)
     study = study_of({**KINEMATIC, "factors": {"friction.mu": [0.13]}, "seeds": 9})
     with pytest.raises(StudyError, match="every worker dies before it has finished a run"):
         run_quietly(study, tmp_path / "out", fmu=athena_fmu, workers=2)
@@ -281,7 +281,7 @@ def test_a_worker_with_other_versions_is_refused(
     athena_fmu: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     # in this process, not in the worker
-    monkeypatch.setattr("hexapod_cosim.cosim.study.execute.job.package_version", lambda: "9.9")
+    monkeypatch.setattr("hexapod_cosim.cosim.study.job.package_version", lambda: "9.9")
     with pytest.raises(
         StudyError, match=r"differs from the machine that sends.*hexapod-cosim 9.9, here"
     ):
@@ -329,7 +329,7 @@ def test_a_run_with_equal_settings_is_not_repeated(
         "compliant": 3 * 2 * 2,
     }
     Counting.asked.clear()
-    monkeypatch.setattr("hexapod_cosim.cosim.study.execute.worker.MAX_KNOWN", 0)
+    monkeypatch.setattr("hexapod_cosim.cosim.study.worker.MAX_KNOWN", 0)
     assert run_quietly(study_of(table), tmp_path / "made", **options) == kept
     assert len(Counting.asked) == 24
     assert digest(tmp_path / "kept") == digest(tmp_path / "made")
