@@ -1,5 +1,5 @@
-"""Runs studies: many runs of scenarios that differ by factors, seeds and control. Imports control,
-export and run.
+"""Runs studies: many runs of scenarios that differ by factors, seeds and control. Imports
+every folder of `cosim` above it but `validate`, `report`, `identify`, `course` and `live`.
 
 The data flow, in the order of the modules:
 

@@ -110,7 +110,7 @@ def read_results(folder: Path) -> Results:
             overall=groups.overall,
             points=groups.points,
             of_points=groups.count,
-            failures=_failures(store),
+            failures=failure_counts(store),
             walks=_walks(store),
             unbalanced=_unbalanced(store),
             trials=trials_of(study, groups.points),
@@ -121,7 +121,7 @@ def read_results(folder: Path) -> Results:
     return results
 
 
-def _failures(store: Store) -> dict[tuple[str, str, str], int]:
+def failure_counts(store: Store) -> dict[tuple[str, str, str], int]:
     """Returns the numbers of runs that did not walk, by control, status and reason."""
     store.database.create_function("kind", 2, _reason, deterministic=True)
     rows = store.select(

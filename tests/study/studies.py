@@ -8,9 +8,11 @@ from pathlib import Path
 from typing import Any
 
 import pyarrow.parquet as pq
+import pytest
 from study_runners import Fake
 
 from hexapod_cosim.cosim.study.folder import RESULTS
+from hexapod_cosim.cosim.study.job import Job, make_job
 from hexapod_cosim.cosim.study.reading import study_from_table
 from hexapod_cosim.cosim.study.records import Study
 from hexapod_cosim.cosim.study.store import RUNS, Store, quoted
@@ -76,3 +78,12 @@ def write_rows(study: Study, folder: Path, found: Iterable[Row]) -> None:
             f"({', '.join('?' * len(names))})",
             [[row.get(name) for name in names] for row in found],
         )
+
+
+def use_runner(monkeypatch: pytest.MonkeyPatch, runner: type) -> None:
+    """Makes commands run studies with a runner of the tests."""
+
+    def make(*arguments: Any, **options: Any) -> Job:
+        return make_job(*arguments, **{**options, "runner": runner})
+
+    monkeypatch.setattr("hexapod_cosim.cosim.study.study.make_job", make)

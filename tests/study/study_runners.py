@@ -116,7 +116,6 @@ class SourError(Exception):
 
 ERRORS: dict[float, Callable[[], object]] = {
     0.21: lambda: np.linalg.inv(np.zeros((2, 2))),
-    0.22: lambda: np.zeros(2) + np.zeros(3),
     0.23: lambda: _raise(MemoryError("no more")),
     0.24: lambda: _raise(SourError(f"nobody can send {object()}")),
     0.25: lambda: sys.exit("enough"),

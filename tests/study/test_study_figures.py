@@ -18,10 +18,11 @@ from hexapod_cosim.cosim.cli.study.studying import report_on
 from hexapod_cosim.cosim.results.comparison import made_change
 from hexapod_cosim.cosim.study import heat
 from hexapod_cosim.cosim.study.figures import drawings, history
-from hexapod_cosim.cosim.study.groups import Mean, Point
+from hexapod_cosim.cosim.study.groups import Point
+from hexapod_cosim.cosim.study.moments import Figures, Mean
 from hexapod_cosim.cosim.study.records import Study
 from hexapod_cosim.cosim.study.store import FIGURES
-from hexapod_cosim.cosim.study.summary import Trial, read_results
+from hexapod_cosim.cosim.study.summary import Results, Trial, read_results
 from hexapod_cosim.models import load_robot
 
 GRID = {"factors": {"friction.mu": [0.3, 0.5], "command.vx": [0.05, 0.08]}}
@@ -65,28 +66,42 @@ def point(
     before, after = (
         slips.get(name, math.nan) if pairs else math.nan for name in ("kinematic", "compliant")
     )
-    return Point(
-        number=number,
-        case="walk_flat",
-        values=values,
-        held_out=False,
+    changes = {
+        name: made_change(
+            name,
+            before=before,
+            after=after,
+            half_width=math.nan,
+            log_half_width=math.nan,
+            pairs=pairs,
+        )
+        for name in FIGURES
+    }
+    figures = Figures(
         pairs={"compliant": pairs},
         means=means,
         runs=dict.fromkeys(slips, runs),
         walked=dict.fromkeys(slips, walked),
-        changes={
-            "compliant": {
-                name: made_change(
-                    name,
-                    before=before,
-                    after=after,
-                    half_width=math.nan,
-                    log_half_width=math.nan,
-                    pairs=pairs,
-                )
-                for name in FIGURES
-            }
-        },
+        changes={"compliant": changes},
+    )
+    return Point(number=number, case="walk_flat", values=values, held_out=False, figures=figures)
+
+
+def results_of(study: Study, points: list[Point]) -> Results:
+    """Returns results of which the figures need the points only."""
+    return Results(
+        study=study,
+        manifest={},
+        facts={},
+        overall=points[0].figures,
+        points=points,
+        of_points=len(points),
+        failures={},
+        walks={},
+        unbalanced={},
+        trials=[],
+        optimum=None,
+        wall=0.0,
     )
 
 
@@ -111,11 +126,8 @@ def test_only_grids_have_a_heat_map() -> None:
     ]
     for table, name in ((GRID, "heat_map"), (LIST, "effects"), (DRAWN, "effects")):
         study = study_of(table)
-        assert set(drawings(study, walked_points(study, settings), [])) == {
-            name,
-            "parallel",
-            "pareto",
-        }
+        found = drawings(results_of(study, walked_points(study, settings)))
+        assert set(found) == {name, "pareto"}
 
 
 def test_the_mark_of_a_cell_without_a_value_shows_the_reason() -> None:
@@ -209,7 +221,7 @@ def test_figures_of_all_designs_are_drawn_without_a_warning(
         study_of(table), tmp_path / "out", fmu=athena_fmu, gains=make_gains(load_robot("athena"))
     )
     results = read_results(tmp_path / "out")
-    found = drawings(results.study, results.points, results.trials)
+    found = drawings(results)
     assert len(found) >= 2
     for item in found.values():
         item.draw().draw_without_rendering()
