@@ -39,7 +39,7 @@ from hexapod_cosim.cosim.scenario.variation import STANDARD
 from hexapod_cosim.cosim.study import dispatch
 from hexapod_cosim.cosim.study.folder import RESULTS as RESULTS_FILE
 from hexapod_cosim.cosim.study.reading import study_from_table
-from hexapod_cosim.cosim.study.report import write_study_report
+from hexapod_cosim.cosim.study.report.page import write_study_report
 from hexapod_cosim.cosim.study.study import Options, run_study
 from hexapod_cosim.cosim.study.summary import read_results
 from hexapod_cosim.models import load_robot

@@ -8,5 +8,5 @@ The data flow, in the order of the modules:
     Study -> job: what every worker needs -> folder: the manifest
     orders -> dispatch -> workers (an executor) -> worker -> Summary -> store (SQLite, a row a run)
     an optimisation asks Optuna for its orders: search
-    store -> summary (GROUP BY) -> report, figures, heat; store -> folder: results.parquet
+    store -> groups (GROUP BY, moments) -> summary -> report; store -> folder: results.parquet
 """

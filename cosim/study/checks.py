@@ -47,7 +47,7 @@ ELSEWHERE = {
 }
 MAX_TRIED = 200  # values of a factor that are tried, evenly chosen, with both extremes
 MAX_RUNS = 10**8
-MAX_STRATA = 10**7  # of all factors of a Latin hypercube
+MAX_STRATA = 10**8  # points times factors that are held in memory
 UNBOUNDED = 1e30  # bounds of this size are not shown in messages
 
 
@@ -56,7 +56,8 @@ def check_study(study: Study) -> None:
     if study.optimise is None:
         _check_design(study)
     count, fix = count_runs(study), "take fewer points, seeds or trials, or split it by seeds"
-    got, expected = f"{float(count):.3g} runs", f"at most {MAX_RUNS:,} runs"
+    got = f"{count:,} runs" if count < MAX_RUNS**2 else f"{float(count):.3g} runs"
+    expected = f"at most {MAX_RUNS:,} runs"
     require(count <= MAX_RUNS, got, expected, study.where, what="too many runs", fix=fix)
     table = "factors" if study.optimise is None else "optimise.variables"
     for factor in study.factors:
@@ -78,9 +79,10 @@ def _check_design(study: Study) -> None:
     fix = f'make them as long as each other, or write design = "{GRID}" for all combinations'
     expected, what = "one value of each factor per point", "lists of different lengths"
     require(alike, lengths, expected, where, what=what, fix=fix)
-    small = study.design != LATIN_HYPERCUBE or study.points * len(lengths) <= MAX_STRATA
-    got, fix = f"{study.points} points", f'write design = "{SOBOL}", which holds none'
-    expected, what = f"at most {MAX_STRATA:,} points times factors", "too large a Latin hypercube"
+    held = study.design in (LATIN_HYPERCUBE, SOBOL)
+    got, fix = f"{study.points} points", f'write design = "{RANDOM}", which holds none'
+    expected, what = f"at most {MAX_STRATA:,} points times factors", f"too large a {study.design}"
+    small = not held or study.points * len(lengths) <= MAX_STRATA
     require(small, got, expected, f"{study.where}: points", what=what, fix=fix)
     some = study.design == GRID or len(lengths) > 0
     fix, got = "leave design out to run the seeds alone", f"design {study.design!r}"

@@ -237,7 +237,7 @@ def _refuse_twice(name: str, study: Study) -> None:
     For a variable of an optimiser the setting is allowed: it is the value before the optimisation.
     """
     twice = study.optimise is None and plain_name(name) in {item.name for item in study.factors}
-    what, fix = "set and varied", "take one away: the factor would replace it in every run"
+    what, fix = "set and varied", "take one of them away: the factor would replace it"
     expected, place = "each name in [set] or [factors]", f"{study.where}: set.{name}"
     require(not twice, name, expected, place, what=what, fix=fix)
 

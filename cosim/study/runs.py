@@ -1,7 +1,7 @@
 """Numbers the runs of a study and makes the order of each from its number.
 
-There is no list of all points in memory. The Latin hypercube is the exception: it is held as a
-whole, with 8 bytes per point and factor.
+There is no list of all points in memory. Latin hypercubes and Sobol sequences are the exception:
+they are held as a whole, with 8 bytes per point and factor.
 """
 
 from __future__ import annotations
@@ -9,6 +9,7 @@ from __future__ import annotations
 import hashlib
 import json
 import math
+import warnings
 from collections.abc import Callable, Iterator, Sequence
 from itertools import product
 
@@ -72,38 +73,16 @@ def _count(study: Study) -> int:
 
 def _shares(study: Study) -> Shares:
     """Returns a function from a point's number to the quantiles (factors,) of its values."""
-    size = len(study.factors)
+    size, seed = len(study.factors), np.random.default_rng([study.seed, STREAM])
     if study.design == LATIN_HYPERCUBE and size:
-        cube = qmc.LatinHypercube(size, seed=np.random.default_rng([study.seed, STREAM])).random(
-            study.points
-        )
+        cube = qmc.LatinHypercube(size, seed=seed).random(study.points)
         return lambda index: cube[index]
     if study.design == SOBOL and size:
-        return _Sobol(size, study.seed)
+        with warnings.catch_warnings():  # of points that are no power of two: the report notes it
+            warnings.simplefilter("ignore", UserWarning)
+            sequence = qmc.Sobol(size, scramble=True, seed=seed).random(study.points)
+        return lambda index: sequence[index]
     return lambda index: np.random.default_rng([study.seed, STREAM, index]).random(size)
-
-
-class _Sobol:
-    """Scrambled Sobol points; a smaller number than the last one restarts the sequence."""
-
-    def __init__(self, size: int, seed: int) -> None:
-        self._size, self._seed = size, seed
-        self._restart()
-
-    def _restart(self) -> None:
-        self._engine = qmc.Sobol(
-            self._size, scramble=True, seed=np.random.default_rng([self._seed, STREAM])
-        )
-        self._next = 0
-
-    def __call__(self, index: int) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
-        if index < self._next:
-            self._restart()
-        if index > self._next:
-            self._engine.fast_forward(index - self._next)
-        self._next = index + 1
-        point: np.ndarray[tuple[int], np.dtype[np.float64]] = self._engine.random(1)[0]
-        return point
 
 
 class Sweep:

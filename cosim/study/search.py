@@ -31,7 +31,7 @@ from hexapod_cosim.cosim.study.records import (
     Study,
     StudyError,
 )
-from hexapod_cosim.cosim.study.runs import Optimisation, identity
+from hexapod_cosim.cosim.study.runs import Optimisation
 from hexapod_cosim.cosim.study.summary import OPTIMUM, Trial, feasible
 from hexapod_cosim.cosim.study.workers import Workers
 
@@ -44,11 +44,8 @@ def optimise(sink: ResultSink, workers: Workers, folder: Path) -> None:
     trials = list(_search(plan, sink, workers))
     (start,) = _rows(sink, workers, [plan.training(plan.asked.trials, plan.unset)])
     chosen = best_of(trials, plan.asked)
-    picked = [plan.unset, *(trial.values for trial in chosen)]
-    points = [plan.asked.trials, *(trial.number for trial in chosen)]
-    sets = [
-        plan.held_out(place, *pair) for place, pair in enumerate(zip(points, picked, strict=True))
-    ]
+    pairs = [(plan.asked.trials, plan.unset), *((one.number, one.values) for one in chosen)]
+    sets = [plan.held_out(place, *pair) for place, pair in enumerate(pairs)]
     start_held, *held = _rows(sink, workers, sets)
     trained = _rows(sink, workers, [plan.training(item.number, item.values) for item in chosen])
     names = [factor.name for factor in plan.study.factors]
@@ -129,17 +126,14 @@ def distributions(variables: Sequence[Factor]) -> dict[str, Any]:
     """Returns Optuna's distributions of the variables, by name."""
     from optuna.distributions import CategoricalDistribution, FloatDistribution, IntDistribution  # noqa: PLC0415
 
-    found: dict[str, Any] = {}
-    for factor in variables:
+    def distribution(factor: Factor) -> Any:
         if factor.kind == VALUES:
-            found[factor.name] = CategoricalDistribution(factor.values)
-        elif factor.kind == INTEGERS:
-            found[factor.name] = IntDistribution(int(factor.low), int(factor.high))
-        else:
-            found[factor.name] = FloatDistribution(
-                factor.low, factor.high, log=factor.kind == LOGUNIFORM
-            )
-    return found
+            return CategoricalDistribution(factor.values)
+        if factor.kind == INTEGERS:
+            return IntDistribution(int(factor.low), int(factor.high))
+        return FloatDistribution(factor.low, factor.high, log=factor.kind == LOGUNIFORM)
+
+    return {factor.name: distribution(factor) for factor in variables}
 
 
 def _tell_sampler(study: Any, handle: Any, trial: Trial, question: Optimise) -> None:
@@ -158,25 +152,10 @@ def _rows(
     """Returns the stored rows of sets of orders, after running those that are not stored."""
     orders = [order for part in sets for order in part]
     stored = sink.store.rows([order.run for order in orders])
-    for order in orders:
-        if order.run in stored:
-            _check_identity(order, stored[order.run], sink.study)
     missing = [order for order in orders if order.run not in stored]
     dispatch(sink, workers, missing)
     stored |= sink.store.rows([order.run for order in missing])
     return [[stored[order.run] for order in part] for part in sets]
-
-
-def _check_identity(order: Order, row: Mapping[str, Any], study: Study) -> None:
-    """Raises StudyError when the stored row is of another order."""
-    if row["identity"] != identity(order, study.factors):
-        raise StudyError(
-            "the optimiser asks something else than before",
-            got=f"run {order.run}",
-            expected="the run that is stored under this number",
-            fix="choose another folder with -o",
-            where=study.where,
-        )
 
 
 def _means(rows: Sequence[Mapping[str, Any]], asked: Optimise) -> dict[str, float]:

@@ -91,31 +91,35 @@ class _JobContext:
 
     def __init__(self, job: Job) -> None:
         _check_environment(job)
-        self._job = job
+        self._job, self._known = job, OrderedDict[bytes, Summary]()
         try:
             self._folder = TemporaryFolder("job")
+            self._files = {
+                name: self._unpack(f"robot{k}{Path(name).suffix}", data)
+                for k, (name, data) in enumerate(job.robots.items())
+            }
+            self._fmus = {
+                name: self._unpack(f"fmu{k}.fmu", data)
+                for k, (name, data) in enumerate(job.fmus.items())
+            }
+            self._controls = {
+                label: self._local(label, text) for label, text in job.controls.items()
+            }
+            self._controller = self._unpack("controller.fmu", job.controller)
         except OSError as error:
-            raise _no_room(error, gettempdir()) from error
-        self._files = {
-            name: self._unpack(f"robot{k}{Path(name).suffix}", data)
-            for k, (name, data) in enumerate(job.robots.items())
-        }
-        self._fmus = {
-            name: self._unpack(f"fmu{k}.fmu", data)
-            for k, (name, data) in enumerate(job.fmus.items())
-        }
-        self._controls = {label: self._local(label, text) for label, text in job.controls.items()}
-        self._controller = self._unpack("controller.fmu", job.controller)
+            raise StudyError(
+                "a worker cannot unpack its job",
+                got=error.strerror,
+                expected="room for temporary files",
+                fix="make room there, or name another folder with TMPDIR",
+                where=gettempdir(),
+            ) from error
         self._runner = job.runner(controller=self._controller)
-        self._known: OrderedDict[bytes, Summary] = OrderedDict()
 
     def _unpack(self, name: str, content: bytes) -> Path:
         path = self._folder.path / name
-        try:
-            path.parent.mkdir(exist_ok=True)
-            path.write_bytes(content)
-        except OSError as error:
-            raise _no_room(error, str(self._folder.path)) from error
+        path.parent.mkdir(exist_ok=True)
+        path.write_bytes(content)
         return path
 
     def _local(self, label: str, text: str) -> str:
@@ -211,16 +215,6 @@ def _check_environment(job: Job) -> None:
             got="; ".join(differences),
             fix="install the same versions on all machines of the cluster",
         )
-
-
-def _no_room(error: OSError, where: str) -> StudyError:
-    return StudyError(
-        "a worker cannot unpack its job",
-        got=error.strerror,
-        expected="room for temporary files",
-        fix="make room there, or name another folder with TMPDIR",
-        where=where,
-    )
 
 
 def _settings_key(order: Order, factors: Sequence[Factor]) -> bytes:

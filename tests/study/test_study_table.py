@@ -18,8 +18,8 @@ from study_runners import Fake
 
 from hexapod_cosim.controller import save_gains
 from hexapod_cosim.cosim.cli.study.studying import report_on
-from hexapod_cosim.cosim.study.figures import front
-from hexapod_cosim.cosim.study.report import optimum_changes
+from hexapod_cosim.cosim.study.report.figures import front
+from hexapod_cosim.cosim.study.report.page import optimum_changes
 from hexapod_cosim.cosim.study.summary import OPTIMUM, POINTS, SUMMARY, read_results
 from hexapod_cosim.models import load_robot
 

@@ -23,9 +23,9 @@ from hexapod_cosim.cosim.master.loop import COMPLETED
 from hexapod_cosim.cosim.results.comparison import METHOD
 from hexapod_cosim.cosim.study.dispatch import ProgressSink
 from hexapod_cosim.cosim.study.folder import TIMES
-from hexapod_cosim.cosim.study.notes import NO_WALK, notes
 from hexapod_cosim.cosim.study.reading import load_study
-from hexapod_cosim.cosim.study.report import (
+from hexapod_cosim.cosim.study.report.notes import NO_WALK, notes
+from hexapod_cosim.cosim.study.report.page import (
     optimum_changes,
     optimum_rows,
     overall_rows,

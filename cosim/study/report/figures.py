@@ -24,7 +24,8 @@ from hexapod_cosim.cosim.common.control_style import ControlStyle, control_style
 from hexapod_cosim.cosim.common.files import atomic_path
 from hexapod_cosim.cosim.results.metrics import METRICS
 from hexapod_cosim.cosim.study.groups import Point
-from hexapod_cosim.cosim.study.heat import (
+from hexapod_cosim.cosim.study.records import GRID, VALUES, Factor, Study
+from hexapod_cosim.cosim.study.report.heat import (
     SLIP,
     Array,
     heat_map,
@@ -32,7 +33,6 @@ from hexapod_cosim.cosim.study.heat import (
     mean_of,
     ticks_of,
 )
-from hexapod_cosim.cosim.study.records import GRID, VALUES, Factor, Study
 from hexapod_cosim.cosim.study.summary import Results, Trial
 from hexapod_cosim.models import HexapodError
 
@@ -41,10 +41,6 @@ NAMES = {SLIP: "slip [m/m]", COST: "cost of transport [1]"}
 MAX_MARKS, MAX_CELLS = 1500, 40  # more make a figure slower and no clearer
 MAX_PANELS, COLUMNS = 9, 3  # panels, and panels side by side
 LOG_RATIO = 10.0  # largest over least value beyond which an axis is logarithmic
-EMPTY_CELLS = (
-    "A dot: no run (no pair) there yet; a cross: none walked; "
-    "a dash: walked, too short for a figure."
-)
 _Item = TypeVar("_Item")
 
 
@@ -97,7 +93,7 @@ def _of_factors(study: Study, points: Sequence[Point]) -> dict[str, Drawing]:
     ]
     if study.design == GRID and len(axes) >= 2:
         averaged = ", averaged over the others" if len(study.factors) > 2 else ""
-        caption = f"Mean slip per metre{averaged}. {EMPTY_CELLS}"
+        caption = f"Mean slip per metre{averaged}. Grey: no run (no pair) with a figure."
         draw = partial(heat_map, points, axes[0], axes[1], study)
         return {"heat_map": Drawing(f"{axes[0].name} and {axes[1].name}", caption, draw)}
     bars = "; bars: Student's 95 % intervals over seeds" if len(study.seeds) > 1 else ""

@@ -15,12 +15,12 @@ from hexapod_cosim.cosim.common.control_style import control_styles
 from hexapod_cosim.cosim.common.files import without_none, write_text
 from hexapod_cosim.cosim.results.comparison import METHOD, Change
 from hexapod_cosim.cosim.results.metrics import DUST, FLOORS, METRICS, shown_metrics
-from hexapod_cosim.cosim.study.figures import drawings, save
 from hexapod_cosim.cosim.study.groups import Point
 from hexapod_cosim.cosim.study.moments import Mean
-from hexapod_cosim.cosim.study.notes import notes
 from hexapod_cosim.cosim.study.objective import WALKED
 from hexapod_cosim.cosim.study.records import DRAWN
+from hexapod_cosim.cosim.study.report.figures import drawings, save
+from hexapod_cosim.cosim.study.report.notes import notes
 from hexapod_cosim.cosim.study.store import FIGURES
 from hexapod_cosim.cosim.study.summary import POINTS, SUMMARY, Results
 
@@ -46,7 +46,7 @@ def write_study_report(results: Results, folder: Path) -> list[Path]:
         for name, item in found.items()
     ]
     environment = Environment(
-        loader=PackageLoader("hexapod_cosim.cosim", "study"),
+        loader=PackageLoader("hexapod_cosim.cosim.study", "report"),
         autoescape=True,
         undefined=StrictUndefined,
     )
@@ -87,25 +87,13 @@ def _toml(results: Results) -> dict[str, str]:
 
 def interval_meaning(results: Results) -> str:
     """Returns what the intervals of the table over all runs are over."""
-    study = results.study
-    if study.optimise is not None:
-        return (
-            "over all trials, training and held-out runs together: how much trials differ, "
-            "not how certain the optimum is"
-        )
+    if results.study.optimise is not None:
+        return "over all trials, training and held-out runs: how much trials differ"
     if results.of_points == 1:
         return "over seeds"
-    seeds = (
-        "; runs of one point share it, so with several seeds the interval is on the narrow side"
-        if len(study.seeds) > 1
-        else ""
-    )
-    if study.design in DRAWN:
-        return f"over points drawn from the factors' distributions{seeds}"
-    return (
-        "as if the points had been drawn at random: mostly how much they differ. "
-        "The table of points has intervals over seeds alone"
-    )
+    if results.study.design in DRAWN:
+        return "over points drawn from the factors' distributions and their seeds"
+    return "over points and seeds: mostly how much the points differ"
 
 
 def overall_rows(results: Results) -> list[dict[str, Any]]:
