@@ -14,7 +14,6 @@ from collections.abc import Callable, Iterator, Sequence
 from itertools import product
 
 import numpy as np
-from scipy.stats import qmc
 
 from hexapod_cosim.cosim.study.factors import at_quantile
 from hexapod_cosim.cosim.study.records import (
@@ -73,6 +72,8 @@ def _count(study: Study) -> int:
 
 def _shares(study: Study) -> Shares:
     """Returns a function from a point's number to the quantiles (factors,) of its values."""
+    from scipy.stats import qmc  # noqa: PLC0415  slow to import, and workers draw no points
+
     size, seed = len(study.factors), np.random.default_rng([study.seed, STREAM])
     if study.design == LATIN_HYPERCUBE and size:
         cube = qmc.LatinHypercube(size, seed=seed).random(study.points)
