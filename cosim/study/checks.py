@@ -148,10 +148,7 @@ def _check_setting(factor: Factor, study: Study, where: str) -> None:
     values = _spread(samples(factor))
     for value in values:
         number = isinstance(value, str) and factor.name != "robot" and QUANTITY.fullmatch(value)
-        expected, fix = (
-            "numbers, and their unit beside them",
-            'write { values = [5], unit = "deg" }',
-        )
+        expected, fix = "numbers, with a unit beside them", 'write { values = [5], unit = "deg" }'
         require(not number, value, expected, where, what="a number in a text", fix=fix)
     for k, case in enumerate(study.cases.values()):
         for value in values if k == 0 else (values[0], values[-1]):

@@ -22,6 +22,7 @@ from hexapod_cosim.cosim.study.moments import (
     Numbers,
     Sums,
     figures_of,
+    merged,
 )
 from hexapod_cosim.cosim.study.records import SCENARIO_FACTOR, Study
 from hexapod_cosim.cosim.study.runs import count_runs
@@ -63,7 +64,7 @@ class Groups:
         """Yields the points, some at a time, in the order of their runs."""
         for begin, end in _ranges(self._study):
             points, sums = self._block(begin, end)
-            self._sums = sums.merged(self._sums)
+            self._sums = merged([sums] if self._sums is None else [self._sums, sums])
             self.count += len(points)
             self.points += [point for point in points if point.number % self._step == 0]
             if points:

@@ -27,7 +27,7 @@ from hexapod_cosim.cosim.scenario.records import Scenario
 from hexapod_cosim.cosim.scenario.scenario import scenario_from_table
 from hexapod_cosim.cosim.scenario.tables import with_values
 from hexapod_cosim.cosim.study.factors import samples
-from hexapod_cosim.cosim.study.records import Case, Factor, Study, StudyError
+from hexapod_cosim.cosim.study.records import Study, StudyError
 from hexapod_cosim.models import HexapodError, list_robots, load_robot
 
 CONTROLLER_PERIOD = 0.005  # s    of the exported FMU; each run sets its own
@@ -58,12 +58,10 @@ class Job:
     """Everything that a worker needs except the orders."""
 
     name: str  # unique: studies share the workers of a cluster
-    cases: Mapping[str, Case]
-    factors: tuple[Factor, ...]
+    study: Study
     fmus: Mapping[str, bytes]  # plant FMUs by robot, as scenarios name it
     controller: bytes  # the controller FMU, whose parameters each run sets
     robots: Mapping[str, bytes]  # robot files that are not part of the package, by path
-    controls: Mapping[str, str]  # texts of the controls by label
     laws: Mapping[str, bytes]  # files of the users' controls, by label
     gains: Gains | None  # of all compliant runs; None: workers design them
     environment: Mapping[str, str]  # versions, see environment()
@@ -98,12 +96,10 @@ def make_job(
         plants = PlantFmus(folder, given=fmu)
         return Job(
             name=uuid4().hex,
-            cases=study.cases,
-            factors=study.factors,
+            study=study,
             fmus={name: _read(plants.fmu(name)) for name in names},
             controller=_controller(folder),
             robots=files,
-            controls=study.texts,
             laws=_laws(study),
             gains=gains or _common_gains(study),
             environment=environment(study),
@@ -182,23 +178,21 @@ def environment(study: Study | None = None) -> dict[str, str]:
     }
 
 
-def manifest_of(study: Study, job: Job, *, runs: int) -> dict[str, Any]:
-    """Returns the content of manifest.json.
+def manifest_of(job: Job, *, runs: int) -> dict[str, Any]:
+    """Returns the content of manifest.json, for a number of runs.
 
     It holds the study as its tables, the scenarios in full, seeds, versions, SHA-256 of the FMUs
     and robot files, and gains.
-
-    Args:
-        runs: number of runs of the study.
     """
+    study, asked = job.study, job.study.optimise
     return {
         "format": FORMAT,
         "title": study.title,
         "study": study.source,
         "runs": runs,
         "seeds": [study.seeds[0], study.seeds[-1], len(study.seeds)]
-        if study.optimise is None
-        else _optimiser_seeds(study),
+        if asked is None
+        else {"training": list(asked.training.seeds), "held_out": list(asked.held_out.seeds)},
         "scenarios": {name: case.table for name, case in study.cases.items()},
         "environment": job.environment,
         "fmus": _hashes(job.fmus),
@@ -211,11 +205,3 @@ def manifest_of(study: Study, job: Job, *, runs: int) -> dict[str, Any]:
 def _hashes(contents: Mapping[str, bytes]) -> dict[str, str]:
     """Returns the SHA-256 of files by name."""
     return {name: hashlib.sha256(content).hexdigest() for name, content in contents.items()}
-
-
-def _optimiser_seeds(study: Study) -> dict[str, list[int]]:
-    assert study.optimise is not None
-    return {
-        "training": list(study.optimise.training.seeds),
-        "held_out": list(study.optimise.held_out.seeds),
-    }

@@ -61,31 +61,26 @@ class Sums:
     means: Moments  # (g, c, metrics) of walks
     changes: Moments  # (g, c - 1, SAMPLES, metrics) of pairs
 
-    def merged(self, other: Sums | None) -> Sums:
-        """Returns the sums of one group: all of these, and the other's."""
-        sums = self if other is None else self._joined(other)
-        return Sums(
-            runs=sums.runs.sum(axis=0, keepdims=True),
-            walked=sums.walked.sum(axis=0, keepdims=True),
-            pairs=sums.pairs.sum(axis=0, keepdims=True),
-            means=sums.means.merged(),
-            changes=sums.changes.merged(),
-        )
 
-    def _joined(self, other: Sums) -> Sums:
-        def joined(first: Moments, second: Moments) -> Moments:
-            names = ("count", "mean", "square")
-            return Moments(
-                *(np.concatenate([getattr(first, name), getattr(second, name)]) for name in names)
-            )
+def merged(parts: Sequence[Sums]) -> Sums:
+    """Returns the sums of one group, which consists of all groups of the parts."""
 
-        return Sums(
-            runs=np.concatenate([self.runs, other.runs]),
-            walked=np.concatenate([self.walked, other.walked]),
-            pairs=np.concatenate([self.pairs, other.pairs]),
-            means=joined(self.means, other.means),
-            changes=joined(self.changes, other.changes),
-        )
+    def numbers(name: str) -> Numbers:
+        found = np.concatenate([getattr(part, name) for part in parts])
+        return np.asarray(found.sum(axis=0, keepdims=True))
+
+    def moments(name: str) -> Moments:
+        found = [getattr(part, name) for part in parts]
+        names = ("count", "mean", "square")
+        return Moments(*(np.concatenate([getattr(one, key) for one in found]) for key in names))
+
+    return Sums(
+        runs=numbers("runs"),
+        walked=numbers("walked"),
+        pairs=numbers("pairs"),
+        means=moments("means").merged(),
+        changes=moments("changes").merged(),
+    )
 
 
 @dataclass(frozen=True)

@@ -115,7 +115,10 @@ def study_from_table(
         read_optimise(table["optimise"], f"{where}: optimise") if "optimise" in table else None
     )
     if optimise is not None:
-        _refuse_keys(table, ("factors", "design", "points", "seeds", "controls"), where)
+        fix = "leave it out: [optimise] says what is run"
+        for key in ("factors", "design", "points", "seeds", "controls"):
+            what = "not a key of an optimisation"
+            require(key not in table, key, "[optimise] alone", where, what=what, fix=fix)
     controls = _controls(table, optimise, folder, where)
     if optimise is not None:
         optimise = replace(optimise[0], control=controls[0].label), optimise[1]
@@ -123,7 +126,7 @@ def study_from_table(
         title=text_of(table, "title", Path(where).stem, where),
         cases={},
         factors=factors if optimise is None else optimise[1],
-        design=_design(table, where),
+        design=names_of([table.get("design", GRID)], DESIGNS, f"{where}: design")[0],
         points=_points(table, where),
         seeds=read_seeds(table.get("seeds", 1), f"{where}: seeds", most=MAX_SEEDS),
         controls=tuple(control.label for control in controls),
@@ -158,18 +161,6 @@ def _controls(
     fix = 'write controls = ["kinematic", "law.py:Class"]'
     require(listed and len(texts) > 0, texts, "a list of controls", place, fix=fix)
     return parse_controls([control_beside(text, folder) for text in texts], where=place)
-
-
-def _refuse_keys(table: Mapping[str, Any], keys: Sequence[str], where: str) -> None:
-    """Raises StudyError for keys that an optimisation does not have."""
-    fix = "leave it out: the variables, training and held_out of [optimise] say what is run"
-    for key in keys:
-        what = "not a key of an optimisation"
-        require(key not in table, key, "[optimise] alone", where, what=what, fix=fix)
-
-
-def _design(table: Mapping[str, Any], where: str) -> str:
-    return names_of([table.get("design", GRID)], DESIGNS, f"{where}: design")[0]
 
 
 def _points(table: Mapping[str, Any], where: str) -> int:

@@ -56,11 +56,8 @@ class Design:
 
 def _of_grid(factors: tuple[Factor, ...], index: int) -> tuple[Value, ...]:
     """Returns a point of a grid, in which the last factor changes fastest."""
-    values: list[Value] = []
-    for factor in reversed(factors):
-        index, place = divmod(index, len(factor.values))
-        values.append(factor.values[place])
-    return tuple(reversed(values))
+    places = np.unravel_index(index, [len(factor.values) for factor in factors])
+    return tuple(factor.values[place] for factor, place in zip(factors, places, strict=True))
 
 
 def _count(study: Study) -> int:

@@ -66,7 +66,7 @@ def run_study(study: Study, folder: Path, *, options: Options, start: StartProgr
     count = count_runs(study)
     with locked(folder):
         job = make_job(study, fmu=options.fmu, gains=options.gains, runner=options.runner)
-        begin_folder(folder, manifest_of(study, job, runs=count), command=options.command)
+        begin_folder(folder, manifest_of(job, runs=count), command=options.command)
         with closing(Store(folder, study)) as store:
             done = store.done(count)
             sink = ResultSink(study, store, start(count, int(np.count_nonzero(done))))

@@ -103,7 +103,7 @@ class _JobContext:
                 for k, (name, data) in enumerate(job.fmus.items())
             }
             self._controls = {
-                label: self._local(label, text) for label, text in job.controls.items()
+                label: self._local(label, text) for label, text in job.study.texts.items()
             }
             self._controller = self._unpack("controller.fmu", job.controller)
         except OSError as error:
@@ -151,7 +151,7 @@ class _JobContext:
 
         A run with equal settings is not repeated: kinematic control, for instance, has no gains.
         """
-        key = _settings_key(order, self._job.factors)
+        key = _settings_key(order, self._job.study.factors)
         if key in self._known:
             self._known.move_to_end(key)
             return self._known[key]
@@ -175,7 +175,7 @@ class _JobContext:
         scenario = self._scenario(order)
         name, gains = scenario.robot, chosen_gains(scenario, self._job.gains)
         if gains is not None:
-            gains = changed_gains(gains, settings_of(order, self._job.factors))
+            gains = changed_gains(gains, settings_of(order, self._job.study.factors))
         scenario = replace(scenario, robot=str(self._files.get(name, name)))
         return self._runner.summary(
             scenario, fmu=self._fmus[name], gains=gains, progress=raise_if_stopped
@@ -183,10 +183,10 @@ class _JobContext:
 
     def _scenario(self, order: Order) -> Scenario:
         """Returns the scenario of an order, with the values of the factors."""
-        case = self._job.cases[order.case]
+        case = self._job.study.cases[order.case]
         settings = {
             factor.name: factor.setting(value)
-            for factor, value in settings_of(order, self._job.factors)
+            for factor, value in settings_of(order, self._job.study.factors)
             if factor.name != SCENARIO_FACTOR and not factor.name.startswith(GAINS)
         }
         table = with_values(case.table, settings)

@@ -112,23 +112,12 @@ def overall_rows(results: Results) -> list[dict[str, Any]]:
             shown_mean(name, overall.means[control][name]) for control in results.study.run_controls
         ]
         changes = [
-            {
-                "control": control,
-                "pairs": found[name].pairs,
-                **shown_change(found[name]),
-                "spread": spread(results, control, name),
-            }
+            {"control": control, "pairs": found[name].pairs, **shown_change(found[name])}
+            | {"spread": spread(results, control, name)}
             for control, found in overall.changes.items()
         ]
-        rows.append(
-            {
-                "name": name,
-                "unit": unit,
-                "meaning": meaning,
-                "values": values,
-                "changes": changes,
-            }
-        )
+        facts = {"name": name, "unit": unit, "meaning": meaning}
+        rows.append({**facts, "values": values, "changes": changes})
     return rows
 
 
@@ -144,11 +133,7 @@ def spread(results: Results, control: str, name: str) -> str:
 
 def point_rows(results: Results) -> list[dict[str, Any]]:
     """Returns rows of at most about SHOWN_POINTS evenly chosen points."""
-    points = (
-        [point for point in results.points if not point.held_out]
-        if results.study.optimise is None
-        else results.points
-    )
+    points = results.points
     step = max(math.ceil(len(points) / SHOWN_POINTS), 1)
     return [_point_row(point, results) for point in points[::step]]
 
@@ -245,9 +230,7 @@ def optimum_changes(results: Results) -> list[dict[str, Any]]:
         }
         for item in (results.optimum or {"best": []})["best"]
         for part in ("held_out", "training")
-        for name, table in item.get("change", {})
-        .get(part, {})
-        .items()  # folders of earlier versions have none
+        for name, table in item["change"][part].items()
     ]
 
 
