@@ -48,7 +48,7 @@ class Groups:
     """Computes the figures of all points and of all runs."""
 
     def __init__(self, study: Study, store: Store) -> None:
-        self._study, self._store, self._controls = study, store, study.run_controls
+        self._study, self._store, self._controls = study, store, study.controls
         self._sums: Sums | None = None  # of all runs
         self._step = _point_step(study, store.select("SELECT count(*) FROM runs")[0][0])
         self.points: list[Point] = []  # every step-th one
@@ -197,5 +197,5 @@ def _point_step(study: Study, runs: int) -> int:
     """Returns every how many points one is kept, for a study of a number of runs."""
     if study.optimise is not None:
         return 1
-    points = runs / (len(study.seeds) * len(study.run_controls))
+    points = runs / (len(study.seeds) * len(study.controls))
     return max(math.ceil(points / MAX_POINTS), 1)

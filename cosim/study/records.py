@@ -132,7 +132,7 @@ class Study:
     design: str
     points: int  # of a drawn design
     seeds: Sequence[int]
-    controls: tuple[str, ...]  # labels
+    controls: tuple[str, ...]  # labels; an optimisation has one
     texts: Mapping[str, str]  # of all controls, by label; see scenario.controls
     seed: int  # of the design and the optimiser
     optimise: Optimise | None
@@ -140,14 +140,9 @@ class Study:
     where: str
 
     @property
-    def run_controls(self) -> tuple[str, ...]:
-        """The controls of its runs."""
-        return self.controls if self.optimise is None else (self.optimise.control,)
-
-    @property
     def chosen_controls(self) -> tuple[Control, ...]:
         """The controls of its runs, as records."""
-        return tuple(control_of(self.texts[label]) for label in self.run_controls)
+        return tuple(control_of(self.texts[label]) for label in self.controls)
 
     @property
     def gains_text(self) -> str | None:

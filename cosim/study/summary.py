@@ -232,10 +232,10 @@ def point_columns(study: Study) -> list[Column]:
     settings = {factor.name for factor in study.factors} | {"point", "case"}
     columns = [item for item in columns_of(study) if item.name in settings]
     columns.append(Column("held_out", BOOLEAN))
-    for control in study.run_controls:
+    for control in study.controls:
         columns += [Column(f"{control}.{name}", INTEGER) for name in ("runs", "walked")]
         columns += _figure_columns(control)
-    others = study.run_controls[1:]
+    others = study.controls[1:]
     for before in [""] if len(others) == 1 else [f"{control}." for control in others]:
         columns.append(Column(f"{before}pairs", INTEGER))
         columns += _figure_columns(f"{before}change")

@@ -114,7 +114,7 @@ def shown(figure: Figure, panel: int = 2) -> np.ndarray[Any, Any]:
 
 def walked_points(study: Study, settings: Sequence[Mapping[str, Any]]) -> list[Point]:
     return [
-        point(k, values, dict.fromkeys(study.run_controls, 0.1 * (k + 1)))
+        point(k, values, dict.fromkeys(study.controls, 0.1 * (k + 1)))
         for k, values in enumerate(settings)
     ]
 

@@ -24,7 +24,7 @@ ROUNDING = 1e-11  # relative: some dozen sums of numbers of one size
 POINTS, SEEDS = 5, 7
 PAIR = ("point", "case", "seed", "control")
 TWO = study_of({"seeds": SEEDS, "factors": {"friction.mu": {"linspace": [0.3, 0.7, POINTS]}}})
-BOTH = TWO.run_controls
+BOTH = TWO.controls
 THREE = study_of(
     {
         "seeds": SEEDS,
@@ -40,13 +40,13 @@ def made_rows(study: Study, points: Sequence[int], *, seed: int = 0) -> list[Row
     found = []
     for point in points:
         for k in range(len(study.seeds)):
-            for c, control in enumerate(study.run_controls):
+            for c, control in enumerate(study.controls):
                 figures = {
                     name: 1.0 + point + 0.3 * drawn.standard_normal() - 0.5 * c for name in FIGURES
                 }
                 found.append(
                     {
-                        "run": len(study.run_controls) * (point * len(study.seeds) + k) + c,
+                        "run": len(study.controls) * (point * len(study.seeds) + k) + c,
                         "point": point,
                         "case": "walk_flat",
                         "friction.mu": 0.3,
@@ -115,7 +115,7 @@ def assert_same(found: Change, expected: Change) -> None:
 
 def assert_changes_of_pairs(found: Figures, rows: Sequence[Row], study: Study) -> None:
     """Asserts the numbers of pairs and the changes from kinematic to each other control."""
-    assert list(found.changes) == list(found.pairs) == list(study.run_controls[1:])
+    assert list(found.changes) == list(found.pairs) == list(study.controls[1:])
     for control, changes in found.changes.items():
         walks = {tuple(row[key] for key in PAIR): row["walked"] for row in rows}
         assert found.pairs[control] == sum(

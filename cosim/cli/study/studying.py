@@ -134,7 +134,7 @@ def progress(*, plain: bool) -> Iterator[StartProgress]:
 
 def show_study(found: Results) -> None:
     """Prints the table of all runs, totals, failures by reason and the optimum."""
-    overall, controls = found.overall, found.study.run_controls
+    overall, controls = found.overall, found.study.controls
     rows = overall_rows(found)
     columns = [
         "metric",

@@ -71,10 +71,10 @@ def drawings(results: Results, *, before: float = math.nan) -> dict[str, Drawing
     elif any(
         math.isfinite(mean_of(point, control, SLIP))
         for point in points
-        for control in study.run_controls
+        for control in study.controls
     ):
         found |= _of_factors(study, points)
-    if any(len(slip_and_cost(points, control)) for control in study.run_controls):
+    if any(len(slip_and_cost(points, control)) for control in study.controls):
         caption = (
             "A mark per point and control, means over its walks; "
             "line: the points that no other point betters in both."
@@ -139,7 +139,7 @@ def over_factors(
     figure = Figure(figsize=(width * columns + 0.6, 2.7 * rows + 0.5))
     axes = figure.subplots(rows, columns, squeeze=False).ravel()
     for one, (factor, metric) in zip(axes, panels, strict=False):
-        for control, style in control_styles(study.run_controls).items():
+        for control, style in control_styles(study.controls).items():
             _marks(one, some_of(points), factor, (control, metric), style)
         if _named(factor):
             names = ticks_of(factor)
@@ -197,7 +197,7 @@ def pareto(points: Sequence[Point], study: Study) -> Figure:
     """Draws slip against cost of transport with the Pareto front of each control."""
     figure = Figure(figsize=(6.4, 4.2))
     axes = figure.subplots()
-    for control, style in control_styles(study.run_controls).items():
+    for control, style in control_styles(study.controls).items():
         pairs = slip_and_cost(points, control)
         if not len(pairs):
             continue

@@ -55,8 +55,8 @@ def heat_map(points: Sequence[Point], first: Factor, second: Factor, study: Stud
 
         return 100.0 * (_cells(points, first, second, slips) - 1.0)
 
-    before, *others = study.run_controls
-    slips = {control: slip(control) for control in study.run_controls}
+    before, *others = study.controls
+    slips = {control: slip(control) for control in study.controls}
     norm = _logarithmic(np.concatenate(list(slips.values()), axis=None))
     panels: list[tuple[str, Array, Normalize, str]]
     panels = [(f"{name}, slip [m/m]", values, norm, COLOURMAP) for name, values in slips.items()]

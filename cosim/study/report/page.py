@@ -51,7 +51,7 @@ def write_study_report(results: Results, folder: Path) -> list[Path]:
         undefined=StrictUndefined,
     )
     page = environment.get_template("study.html.jinja").render(
-        styles=control_styles(results.study.run_controls),
+        styles=control_styles(results.study.controls),
         results=results,
         overall=overall_rows(results),
         points=point_rows(results),
@@ -104,12 +104,12 @@ def overall_rows(results: Results) -> list[dict[str, Any]]:
     overall, rows = results.overall, []
     means = {
         control: {name: overall.means[control][name].value for name in FIGURES}
-        for control in results.study.run_controls
+        for control in results.study.controls
     }
     for name in (each for each in shown_metrics(means, net_slip=False) if each in FIGURES):
         unit, _, meaning = METRICS[name]
         values = [
-            shown_mean(name, overall.means[control][name]) for control in results.study.run_controls
+            shown_mean(name, overall.means[control][name]) for control in results.study.controls
         ]
         changes = [
             {"control": control, "pairs": found[name].pairs, **shown_change(found[name])}
@@ -139,7 +139,7 @@ def point_rows(results: Results) -> list[dict[str, Any]]:
 
 
 def _point_row(point: Point, results: Results) -> dict[str, Any]:
-    controls, figures = results.study.run_controls, point.figures
+    controls, figures = results.study.controls, point.figures
     cells = [
         {
             "values": [shown_mean(name, figures.means[control][name]) for control in controls],
