@@ -58,7 +58,7 @@ help:
 	@echo "make bench-batch  walks a minute on one core and on all, cost of a run beside its loop, memory (5 min)"
 	@echo "make bench-gym  environment steps a second of the learning environments and of mujoco.rollout (1 min)"
 	@echo "make bench-browser  walks of the page without a server in Chromium, against real time (1 min)"
-	@echo "make study-demo  500 walks, killed twice and completed; the same uninterrupted and on a Dask cluster: the same bytes (5 min)"
+	@echo "make study-demo  500 walks, killed twice and completed; the same uninterrupted and on a Dask cluster: the same rows (5 min)"
 	@echo "make control   what each part of the compliant control is worth, where, and what it survives: docs/control/ (5 min)"
 	@echo "make figures   the course, and the tables of the pages that compare controls: README.md, docs/ (10 min)"
 	@echo "make identify-campaign  20 robots with secret numbers, identified from logs of 6 s (10 min); ROBOTS, SECONDS, AT_A_TIME; goes on with out/identification_SECONDS.csv"

@@ -89,7 +89,7 @@ def python_room(parts: tuple[str, ...]) -> str | None:
         return parts[0]
     if len(parts) < 3 or parts[-1] == "__init__":
         return None
-    return f"study/{parts[2]}" if parts[1] == "study" and len(parts) > 3 else parts[1]
+    return parts[1]
 
 
 def imported_rooms(path: Path) -> Iterator[str]:

@@ -26,7 +26,6 @@ from hexapod_cosim.cosim.run.single_run import simulate as run_scenario
 from hexapod_cosim.cosim.run.walker import Walker
 from hexapod_cosim.cosim.scenario.controls import Control, control_of, parse_controls
 from hexapod_cosim.cosim.scenario.records import CONTROLS, FORMATS, Scenario
-from hexapod_cosim.cosim.study.execute.engines import ENGINES
 from hexapod_cosim.models import HexapodError, unknown_name
 
 Name = Annotated[
@@ -90,6 +89,7 @@ Formats = Annotated[
     ),
 ]
 
+ENGINES = ("compiled", "python")
 Engine = Annotated[
     str | None,
     typer.Option(

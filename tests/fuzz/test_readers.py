@@ -34,7 +34,7 @@ from hexapod_cosim.cosim.results.recordings import (
 from hexapod_cosim.cosim.results.results import read_result
 from hexapod_cosim.cosim.run.controller_setup import make_setup
 from hexapod_cosim.cosim.scenario.scenario import load_scenario
-from hexapod_cosim.cosim.study.plan.reading import load_study
+from hexapod_cosim.cosim.study.reading import load_study
 from hexapod_cosim.cosim.validate.validation import find_problems
 from hexapod_cosim.models import HexapodError, load_robot
 from hexapod_cosim.models.ground.grid_file import surface_from_bytes
@@ -117,7 +117,7 @@ def toml_files(path: Path) -> st.SearchStrategy[bytes]:
 
 ROBOT = ROOT / "models" / "athena.toml"
 SCENARIOS = ROOT / "cosim" / "scenario" / "scenarios"
-STUDIES = ROOT / "cosim" / "study" / "plan" / "studies"
+STUDIES = ROOT / "cosim" / "study" / "studies"
 
 
 @MODES
