@@ -50,7 +50,8 @@ def yielded(robot: Robot, plant: StandingPlant, force: np.ndarray) -> np.ndarray
     """Returns by how much the servos yield at the standing feet (3 n) [m] to forces (3 n) [N]."""
     jacobian = LegSolver(robot).jacobian(plant.angle)[plant.standing]
     soft = jacobian @ jacobian.transpose(0, 2, 1) / robot.servo.kp
-    return np.einsum("nij,nj->ni", soft, force.reshape(-1, 3)).reshape(-1)
+    moved: np.ndarray = np.einsum("nij,nj->ni", soft, force.reshape(-1, 3))
+    return moved.reshape(-1)
 
 
 @pytest.mark.parametrize("name", ROBOTS)

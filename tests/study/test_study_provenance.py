@@ -73,8 +73,8 @@ def test_a_file_by_itself_names_versions_fmus_and_gains(
     }
     assert len(facts["controller"]) == 64
     assert json.loads(facts["environment"])["numpy"] == version("numpy") == np.__version__
-    slip = asdict(make_gains(load_robot("athena")))["slip"]
-    assert json.loads(facts["gains"])["slip"] == slip
+    hold = asdict(make_gains(load_robot("athena")))["hold"]
+    assert json.loads(facts["gains"])["hold"] == hold
     assert facts["gains_sha256"] == hashlib.sha256(facts["gains"].encode()).hexdigest()
 
 
