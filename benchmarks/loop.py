@@ -11,13 +11,13 @@ from time import perf_counter
 
 from benchmarks.toolchain import Tools
 from hexapod_cosim.controller import BodyCommand, JointCommand, Measurement
-from hexapod_cosim.cosim.design.design import design_for
+from hexapod_cosim.cosim.design.gain_design import design_for
 from hexapod_cosim.cosim.export.controller_export import export_controller
 from hexapod_cosim.cosim.master.fmu import Fmu
 from hexapod_cosim.cosim.master.loop import run
 from hexapod_cosim.cosim.master.recorder import Recorder
 from hexapod_cosim.cosim.master.signals import Signals
-from hexapod_cosim.cosim.run.run import make_plan, simulate
+from hexapod_cosim.cosim.run.single_run import make_plan, simulate
 from hexapod_cosim.cosim.run.walker import Walker
 from hexapod_cosim.cosim.scenario.scenario import load_scenario
 from hexapod_cosim.cosim.scenario.schedule import make_schedule

@@ -21,7 +21,7 @@ from xml.etree import ElementTree
 import fmpy
 from fmpy.fmi2 import FMU2Slave
 
-from hexapod_cosim.cosim.export.export import export_fmu
+from hexapod_cosim.cosim.export.plant_export import export_fmu
 from hexapod_cosim.models import load_robot
 
 REPETITIONS = 30

@@ -1,8 +1,8 @@
 """Measures a study: overhead per run, scaling to two workers, bytes and memory per run.
 
-usage: python -m benchmarks.study [--page]
+usage: python -m benchmarks.study
 
-Writes benchmarks/results/<machine>/study.csv; with --page the table in docs/studies.md too.
+Writes benchmarks/results/<machine>/study.csv.
 """
 
 from __future__ import annotations
@@ -28,40 +28,26 @@ from unittest.mock import patch
 import numpy as np
 
 from benchmarks import RESULTS, machine
+from benchmarks.instant import Instant
 from hexapod_cosim.controller import Gains
 from hexapod_cosim.cosim.common.files import atomic_text, write_text
-from hexapod_cosim.cosim.export.export import export_fmu
-from hexapod_cosim.cosim.master.loop import COMPLETED, Progress
-from hexapod_cosim.cosim.results.metrics import METRICS
-from hexapod_cosim.cosim.results.summary import Summary
+from hexapod_cosim.cosim.export.plant_export import export_fmu
 from hexapod_cosim.cosim.run.preparation import chosen_gains
 from hexapod_cosim.cosim.run.walker import Walker
-from hexapod_cosim.cosim.scenario.records import Scenario
 from hexapod_cosim.cosim.scenario.scenario import load_scenario
 from hexapod_cosim.cosim.scenario.variation import STANDARD
-from hexapod_cosim.cosim.study.execute import dispatch
-from hexapod_cosim.cosim.study.execute.study import Options, run_study
-from hexapod_cosim.cosim.study.plan.reading import study_from_table
-from hexapod_cosim.cosim.study.report.report import write_study_report
-from hexapod_cosim.cosim.study.store.manifest import RESULTS as RESULTS_FILE
-from hexapod_cosim.cosim.study.store.results import read_results
+from hexapod_cosim.cosim.study import dispatch
+from hexapod_cosim.cosim.study.folder import RESULTS as RESULTS_FILE
+from hexapod_cosim.cosim.study.reading import study_from_table
+from hexapod_cosim.cosim.study.report.page import write_study_report
+from hexapod_cosim.cosim.study.study import Options, run_study
+from hexapod_cosim.cosim.study.summary import read_results
 from hexapod_cosim.models import load_robot
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGE = ROOT / "docs" / "studies.md"
-INSTANT = "benchmarks.study:Instant"
 BOTH = ("kinematic", "compliant")
-RUNS, LARGE, BY_DASK, TASKS, FEW, WALKS, PYTHON_WALKS, REPEATS = (
-    20_000,
-    50_000,
-    2000,
-    600,
-    20,
-    360,
-    60,
-    3,
-)
-CORES, MILLION = 100, 1e6  # of the extrapolated study
+RUNS, LARGE, BY_DASK, TASKS, FEW, WALKS, REPEATS = 20_000, 50_000, 2000, 600, 20, 360, 3
 DEFAULT: dict[str, Any] = {}
 # settings of the solver by name: docs/studies.md says what they cost in accuracy
 SOLVERS: dict[str, dict[str, Any]] = {
@@ -80,10 +66,6 @@ MEANINGS = {
         for key, name in SOLVER_NAMES.items()
     },
     "rate_median": ("1/min", "the median of those of the first row"),
-    "rate_python": (
-        "1/min",
-        f"the same with the Python controller and master (`--engine python`), {SOLVER_NAMES['']}",
-    ),
     **{
         f"walk_{control}{key}": (
             "ms",
@@ -118,36 +100,12 @@ MEANINGS = {
 AIMS = {
     "rate": "3,000",
     "rate_coarse": "3,000",
-    "rate_python": "300",
     "scaling": "0.9",
     "overhead": "< 5 ms",
     "overhead_dask": "< 5 ms",
 }
 # all other figures are the overhead of the study
-SPEEDS = [name for name in MEANINGS if name.startswith(("rate", "walk", "scaling"))]
-OWN = [name for name in MEANINGS if name not in SPEEDS]
 Figures = dict[str, tuple[float, str, str]]  # by name: value, unit, what it is
-
-
-class Instant:
-    """An engine whose walks take no time, so that only the overhead of the study remains."""
-
-    def __init__(self, fmu: Path, controller: Path) -> None:
-        self._metrics = {name: 0.123456789 * place for place, name in enumerate(METRICS)}
-
-    def summary(self, scenario: Scenario, *, gains: Gains | None, progress: Progress) -> Summary:
-        """Returns invented metrics at once; see Engine.summary."""
-        metrics = {name: value * (1.0 + scenario.seed) for name, value in self._metrics.items()}
-        return Summary(
-            control=scenario.control,
-            seed=scenario.seed,
-            status=COMPLETED,
-            upright=True,
-            metrics=metrics,
-        )
-
-    def close(self) -> None:
-        """Releases nothing, because this engine holds no files or FMUs."""
 
 
 class Timed:
@@ -254,8 +212,7 @@ def _rates(common: dict[str, Any]) -> dict[str, float]:
     Rates are the best of all repeats, because noise only lowers them; ratios are medians.
     """
     rates: dict[str, list[float]] = {
-        name: []
-        for name in (*(f"rate{key}" for key in SOLVERS), "rate_python", "scaling", "scaling_free")
+        name: [] for name in (*(f"rate{key}" for key in SOLVERS), "scaling", "scaling_free")
     }
     for _ in range(REPEATS):
         for key, settings in SOLVERS.items():
@@ -265,17 +222,6 @@ def _rates(common: dict[str, Any]) -> dict[str, float]:
         alone = 60.0 * Timed(WALKS, controls=BOTH, workers=1, settings=SOLVERS[""], **common).rate
         rates["scaling"].append(rates["rate"][-1] / (2.0 * alone))
         rates["scaling_free"].append(free_rate(2, common) / (2.0 * free_rate(1, common)))
-        rates["rate_python"].append(
-            60.0
-            * Timed(
-                PYTHON_WALKS,
-                controls=BOTH,
-                workers=2,
-                engine="python",
-                settings=SOLVERS[""],
-                **common,
-            ).rate
-        )
     best = {name: max(values) for name, values in rates.items() if name.startswith("rate")}
     return (
         {name: statistics.median(values) for name, values in rates.items()}
@@ -324,7 +270,7 @@ def walk_alone(fmu: Path, gains: Gains) -> float:
 
 def _measured_memory(runs: int, common: dict[str, Any]) -> tuple[Timed, float]:
     """Measures runs of no duration; returns them and the peak memory after their report [B]."""
-    return Timed(runs, engine=INSTANT, workers=2, report=True, **common), peak_memory()
+    return Timed(runs, runner=Instant, workers=2, report=True, **common), peak_memory()
 
 
 def through_cluster(runs: int, common: dict[str, Any]) -> float:
@@ -334,7 +280,7 @@ def through_cluster(runs: int, common: dict[str, Any]) -> float:
     """
     begin = processor_time()
     with cluster() as address:
-        Timed(runs, engine=INSTANT, scheduler=address, **common)
+        Timed(runs, runner=Instant, scheduler=address, **common)
     return processor_time() - begin
 
 
@@ -372,10 +318,8 @@ def cluster() -> Iterator[str]:
                 process.wait()
 
 
-def write(figures: Figures, *, page: bool) -> Path:
-    """Writes the CSV file and, with `page`, the tables of docs/studies.md; returns the CSV's
-    path.
-    """
+def write(figures: Figures) -> Path:
+    """Writes the CSV file and returns its path."""
     path = RESULTS / machine() / "study.csv"
     path.parent.mkdir(parents=True, exist_ok=True)
     with atomic_text(path) as file:
@@ -384,10 +328,6 @@ def write(figures: Figures, *, page: bool) -> Path:
         writer.writerows(
             [name, f"{value:.4g}", unit, meaning]
             for name, (value, unit, meaning) in figures.items()
-        )
-    if page:
-        put_in_page(
-            {"speed": table(figures, SPEEDS), "own": table(figures, OWN), "plan": plan(figures)}
         )
     return path
 
@@ -414,54 +354,6 @@ def table(figures: Mapping[str, tuple[float, str, str]], names: Sequence[str]) -
     return "\n".join(lines)
 
 
-def plan(figures: Mapping[str, tuple[float, str, str]]) -> str:
-    """Extrapolates to a million walks of 10 s on a hundred such cores; returns Markdown.
-
-    Half of the walks are under each control.
-    """
-    values = {name: value for name, (value, _, _) in figures.items()}
-    walk, exact = (
-        1e-3 * 0.5 * sum(values[f"walk_{control}{key}"] for control in BOTH)
-        for key in ("", "_default")
-    )  # s
-    hours = MILLION * walk / 3600.0
-    per_second = CORES / walk
-    tasks = CORES / dispatch.chunk_time(CORES)
-    rows = [
-        (
-            f"processor time, {SOLVER_NAMES['']}",
-            f"{hours:.1f} core hours; with the default solver {MILLION * exact / 3600.0:.1f}",
-        ),
-        (
-            f"on {CORES} cores",
-            f"{60.0 * hours / CORES:.0f} min at {per_second:.0f} walks per second;"
-            f" {60.0 * MILLION * exact / 3600.0 / CORES:.0f} min",
-        ),
-        (
-            "of what one program hands out and stores",
-            f"{100.0 * per_second / values['handed_out']:.0f} %",
-        ),
-        (
-            "to put in order, add up and report at the end, on one core",
-            f"{1e-3 * MILLION * values['finish'] / 60.0:.1f} min",
-        ),
-        ("results.parquet", f"{values['bytes'] * MILLION / 1e6:.0f} MB"),
-        ("memory of the program for its runs", f"{values['memory'] * MILLION / 1e6:.0f} MB"),
-        (
-            "tasks on a Dask cluster",
-            f"{tasks:.0f} per second, {100.0 * tasks * 1e-3 * values['task_dask']:.0f} % of one"
-            " core for all that handle them",
-        ),
-    ]
-    return "\n".join(
-        [
-            f"| 10⁶ walks of 10 s, {CORES} such cores | |",
-            "|---|---|",
-            *(f"| {name} | {value} |" for name, value in rows),
-        ]
-    )
-
-
 def main() -> None:
     """Measures, prints and writes all figures."""
     with TemporaryDirectory(prefix="hexapod-bench-") as folder:
@@ -470,7 +362,7 @@ def main() -> None:
         assert gains is not None
         figures = measured(fmu, gains)
     print(table(figures, list(MEANINGS)))
-    print(f"wrote {write(figures, page='--page' in sys.argv[1:])}")
+    print(f"wrote {write(figures)}")
 
 
 if __name__ == "__main__":

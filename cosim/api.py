@@ -31,7 +31,7 @@ from hexapod_cosim.cosim.results.results import (
 )
 from hexapod_cosim.cosim.results.summary import summarise
 from hexapod_cosim.cosim.results.walking import different_walks
-from hexapod_cosim.cosim.run.run import simulate as run_scenario
+from hexapod_cosim.cosim.run.single_run import simulate as run_scenario
 from hexapod_cosim.cosim.scenario.controls import (
     Control,
     control_of,

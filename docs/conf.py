@@ -4,10 +4,20 @@ Sphinx with this file.
 
 import sys
 from importlib.metadata import version as version_of
+from importlib.util import find_spec
 from pathlib import Path
+from typing import Any
+
+from docutils import nodes
 
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
+
+# MathJax in one file, fonts included: pages show formulas without a network, also from a disk
+SPEC = find_spec("sphinx-mathjax-offline")
+assert SPEC is not None
+assert SPEC.origin is not None
+MATHJAX = Path(SPEC.origin).parent / "static" / "mathjax" / "tex-svg.js"
 
 project = "hexapod-cosim"
 author = "The hexapod-cosim developers"
@@ -19,8 +29,8 @@ extensions = [
     "sphinx.ext.autodoc",
     "sphinx_copybutton",
     "sphinx_design",
+    "sphinx.ext.mathjax",
     "tools.docs.docstrings",
-    "tools.docs.mathml",
 ]
 
 # Markdown as GitHub shows it: ```math fences, $...$, anchors of headings
@@ -48,9 +58,10 @@ suppress_warnings = ["misc.highlighting_failure"]  # lines of other languages in
 templates_path = ["_templates"]
 html_theme = "furo"
 html_title = "hexapod-cosim"
-html_static_path = ["_static"]
+html_static_path = ["_static", str(MATHJAX)]
 html_css_files = ["site.css"]
-html_math_renderer = "mathml"
+mathjax_path = MATHJAX.name
+mathjax3_config = {"svg": {"scale": 0.9}}
 html_copy_source = False
 html_show_sphinx = False
 html_favicon = "_static/favicon.svg"
@@ -61,3 +72,17 @@ html_theme_options = {
     "light_css_variables": {"color-brand-primary": "#00568f", "color-brand-content": "#0072b2"},
     "dark_css_variables": {"color-brand-primary": "#7cc4f2", "color-brand-content": "#8ccbf5"},
 }
+
+
+def keep_formulas(_app: Any, page: nodes.document) -> None:
+    r"""Leaves displayed formulas to MathJax as they are. Sphinx would put those with several lines
+    into an environment in which \tag is not allowed.
+    """
+    for formula in page.findall(nodes.math_block):
+        formula["no-wrap"] = True
+        formula[:] = [nodes.Text(rf"\[{formula.astext()}\]")]
+
+
+def setup(app: Any) -> None:
+    """Connects the function above with Sphinx."""
+    app.connect("doctree-read", keep_formulas)

@@ -1,17 +1,16 @@
-"""Makes the table and the pictures of walks on uneven ground for docs/ground.md.
+"""Makes the pictures of walks on uneven ground for docs/ground.md.
 
 hexapod compare stairs rubble stones sand dune ramp course --control kinematic \
     --control kinematic@chosen --control compliant@chosen -o out/terrains
 python docs/figure_ground_walks.py out/terrains
 
-Prints the table in Markdown, and writes docs/images/ground_walks.png, the figure of the table, and
+Writes docs/images/ground_walks.png, the figure of the comparison, and
 docs/images/ground_viewer.png, the replays as a browser shows them. Needs Playwright for Python
 (`pip install -e .[test]` brings it) and a Chromium, as docs/figure_report.py does.
 """
 
 from __future__ import annotations
 
-import csv
 import io
 import os
 import shutil
@@ -35,14 +34,11 @@ COLOURS = 256  # of a picture's palette
 GAP = 8  # px    between replays
 PATIENCE = 120_000  # ms
 NAMED = "(labels, name) => labels.forEach(label => label.prepend(`${name}, `))"
-COLUMNS = {"walked": "walked", "slip": "slip [mm/m]", "peak": "peak [BW]"}
-COLUMNS |= {"tilt": "tilt [deg]", "path": "path error [mm/m]"}
 
 
 def main() -> None:
-    """Prints the table and writes the pictures."""
+    """Writes the pictures."""
     folder = Path(sys.argv[1]).resolve()
-    print(table(folder / "terrains.csv"))
     reduced(Image.open(folder / "terrains.png")).save(IMAGES / "ground_walks.png", optimize=True)
     chromium = os.environ.get("HEXAPOD_CHROMIUM") or shutil.which("chromium")
     if chromium is None:
@@ -61,24 +57,6 @@ def main() -> None:
         sheet.paste(picture, (0, top))
         top += picture.height + GAP
     reduced(sheet).save(IMAGES / "ground_viewer.png", optimize=True)
-
-
-def table(path: Path) -> str:
-    """Returns the table of a comparison over scenarios in Markdown."""
-    lines = [f"| scenario | control | {' | '.join(COLUMNS.values())} |", "|---" * 7 + "|"]
-    with path.open(encoding="utf-8", newline="") as file:
-        for row in csv.DictReader(file):
-            values = [_rounded(row[name]) for name in COLUMNS if name != "walked"]
-            cells = [row["scenario"], row["control"], f"{row['walked']} of {row['runs']}", *values]
-            lines.append(f"| {' | '.join(cells)} |")
-    return "\n".join(lines)
-
-
-def _rounded(text: str) -> str:
-    """Returns a number with three digits or more, - for none."""
-    if not text:
-        return "-"
-    return f"{float(text):.0f}" if abs(float(text)) >= 1000.0 else f"{float(text):.3g}"
 
 
 def replay(browser: Browser, report: Path, time: float, name: str) -> Image.Image:

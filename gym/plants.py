@@ -10,7 +10,7 @@ from pathlib import Path
 
 from hexapod_cosim.controller import make_gait
 from hexapod_cosim.cosim.export.controller_export import export_controller
-from hexapod_cosim.cosim.export.export import export_fmu
+from hexapod_cosim.cosim.export.plant_export import export_fmu
 from hexapod_cosim.cosim.interface.controller_interface import ControllerSetup
 from hexapod_cosim.cosim.run.controller_setup import make_setup
 from hexapod_cosim.gym.settings import EnvSettings

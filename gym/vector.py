@@ -107,7 +107,7 @@ class HexapodVectorEnv(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDArr
         mask = None if options is None else options.get("reset_mask")
         chosen = slice(None) if mask is None else checked_mask(mask, self.num_envs) > 0
         first = seed is None and not self._seeded
-        super().reset(seed=int(seed) if isinstance(seed, Integral) else None)
+        super().reset(seed=int(seed) if isinstance(seed, int | np.integer) else None)
         if first:
             seed = int(self.np_random.integers(LARGEST_SEED))
         self._batch.reset(seeds=None if seed is None else self._seeds(seed), mask=mask)

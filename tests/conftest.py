@@ -17,14 +17,17 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from building import BuildError, built, shared_library
+from building import PACKED, BuildError, built, shared_library
 from command import Call
 from fmi3_plant import Plant3
 from fmi_plant import Plant
 from xdist.scheduler import LoadScopeScheduling
 
 from hexapod_cosim.cosim.cli import main
+from hexapod_cosim.cosim.common import plant_files
+from hexapod_cosim.cosim.export.plant_export import export_fmu
 from hexapod_cosim.cosim.report.figures import Figures
+from hexapod_cosim.models import load_robot
 
 # A shell that runs the tests in the background lets them ignore Ctrl-C, and their children too.
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
@@ -102,9 +105,12 @@ def plant_build() -> Path:
 
 
 @pytest.fixture(scope="session")
-def athena_fmu(plant_build: Path) -> Path:
-    """The default robot's FMU as CMake packs it."""
-    return plant_build / "athena.fmu"
+def athena_fmu(plant_build: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The default robot's FMU with the binary of this build, which may have sanitizers."""
+    path = tmp_path_factory.mktemp("athena") / "athena.fmu"
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(plant_files, "plant_folders", lambda: [PACKED])
+        return export_fmu(load_robot("athena"), path)
 
 
 @pytest.fixture(scope="session")

@@ -3,6 +3,9 @@ models/athena.toml and pyproject.toml's version.
 
 usage: python tools/generate.py [--check]
 
+The repository has only defaults.c of plant and controller, which the C libraries need; a build of
+the FMUs writes the other files (tools/generate_sources.py).
+
 --check writes nothing, lists the files that are not up to date and exits with 1 if there are any.
 """
 
@@ -10,23 +13,25 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 from hexapod_cosim.controller import make_gait
 from hexapod_cosim.cosim.common.components import PLANT, Component
-from hexapod_cosim.cosim.export.documentation import render_html
-from hexapod_cosim.cosim.export.export import start_values
-from hexapod_cosim.cosim.export.extras import PICTURES
+from hexapod_cosim.cosim.export.start_values import start_values
 from hexapod_cosim.cosim.interface.arrays import arrays
 from hexapod_cosim.cosim.interface.controller_interface import (
     ControllerSetup,
     load_controller_interface,
 )
-from hexapod_cosim.cosim.interface.interface import CAUSALITIES, Interface, Variable, load_interface
 from hexapod_cosim.cosim.interface.model_description import render_fmi2
-from hexapod_cosim.cosim.interface.terminals import render_terminals
-from hexapod_cosim.gym.export import load_policy_interface, standing_policy
+from hexapod_cosim.cosim.interface.plant_interface import (
+    CAUSALITIES,
+    Interface,
+    Variable,
+    load_interface,
+)
+from hexapod_cosim.gym.interface import load_policy_interface, standing_policy
 from hexapod_cosim.models.robot import load_robot
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -44,51 +49,68 @@ def main() -> int:
         "--check", action="store_true", help="write nothing; exit with 1 if a file is stale"
     )
     check = parser.parse_args().check
-    stale = stale_files()
+    stale = stale_files(render_all())
     for path, text in stale.items():
         print(f"{path}: {'stale; run tools/generate.py' if check else 'written'}")
         if not check:
-            path.parent.mkdir(parents=True, exist_ok=True)
-            path.write_text(text, encoding="utf-8", newline="\n")
+            write(path, text)
     return 1 if check and stale else 0
 
 
-def stale_files() -> dict[Path, str]:
+def stale_files(files: Mapping[Path, str]) -> dict[Path, str]:
     """Returns path and new text of the files that are missing or not up to date."""
     return {
         path: text
-        for path, text in render_all().items()
+        for path, text in files.items()
         if not path.is_file() or path.read_text(encoding="utf-8") != text
     }
 
 
+def write(path: Path, text: str) -> None:
+    """Writes a file and creates its folder if need be."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(text, encoding="utf-8", newline="\n")
+
+
 def render_all() -> dict[Path, str]:
     """Returns path and text of every generated file."""
+    return {
+        path: text
+        for interface in interfaces()
+        for path, text in render_component(interface).items()
+    }
+
+
+def interfaces() -> tuple[Interface, ...]:
+    """Returns the interfaces of plant, controller and policy of the default robot."""
     robot = load_robot(DEFAULT_ROBOT)
     setup = ControllerSetup(robot=robot, gait=make_gait(robot), period=DEFAULT_PERIOD)
-    interfaces = (
+    return (
         load_interface(robot),
         load_controller_interface(setup),
         load_policy_interface(standing_policy(DEFAULT_ROBOT), robot),
     )
-    return {
-        path: text for interface in interfaces for path, text in render_component(interface).items()
-    }
+
+
+def descriptions(folder: Path) -> dict[Path, str]:
+    """Returns path and text of modelDescription.xml and start_values.txt of plant and controller,
+    in a folder each.
+    """
+    found = {}
+    for interface in interfaces()[:2]:
+        description, place = render_fmi2(interface), folder / interface.component.name
+        found[place / "modelDescription.xml"] = description.xml
+        found[place / "start_values.txt"] = start_values(interface, description.guid)
+    return found
 
 
 def render_component(interface: Interface) -> dict[Path, str]:
     """Returns path and text of the generated files of one component."""
-    folder, description = ROOT / interface.component.tree / "generated", render_fmi2(interface)
+    folder = ROOT / interface.component.tree / "generated"
     return {
         folder / "variables.h": render_structure(interface.component),
-        folder / "variables.c": render_variables(interface, description.guid),
+        folder / "variables.c": render_variables(interface, render_fmi2(interface).guid),
         folder / "defaults.c": render_defaults(interface),
-        folder / "modelDescription.xml": description.xml,
-        folder / "index.html": render_html(
-            interface, description.xml, picture=PICTURES[2], reference=interface.component is PLANT
-        ),
-        folder / "terminalsAndIcons.xml": render_terminals(list(interface.by_name)),
-        folder / "start_values.txt": start_values(interface, description.guid),
     }
 
 

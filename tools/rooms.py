@@ -19,7 +19,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[1]
 PICTURE = ROOT / "docs" / "images" / "rooms.svg"
 PACKAGE = "hexapod_cosim"
-C_ROOMS = ("fmi", "plant_fmu", "controller_fmu", "policy_fmu", "master")
+C_ROOMS = ("fmi", "plant_fmu", "controller_fmu", "policy_fmu", "cosim/master")
 SHARED = (
     "range_check.h",
     "message.h",
@@ -69,7 +69,7 @@ def arrows() -> Arrows:
         if room is not None:
             found.setdefault(room, set()).update(imported_rooms(path))
     for room in C_ROOMS:
-        found[f"{room} (C)"] = included_rooms(room)
+        found[box_of(room)] = included_rooms(room)
     found[HEADERS] = set()
     return {room: frozenset(others - {room}) for room, others in sorted(found.items())}
 
@@ -89,7 +89,7 @@ def python_room(parts: tuple[str, ...]) -> str | None:
         return parts[0]
     if len(parts) < 3 or parts[-1] == "__init__":
         return None
-    return f"study/{parts[2]}" if parts[1] == "study" and len(parts) > 3 else parts[1]
+    return parts[1]
 
 
 def imported_rooms(path: Path) -> Iterator[str]:
@@ -113,8 +113,13 @@ def included_rooms(room: str) -> set[str]:
             if file in SHARED:
                 found.add(HEADERS)
             elif file not in own and "generated" not in name:
-                found |= {f"{other} (C)" for other in C_ROOMS if file in headers[other]}
+                found |= {box_of(other) for other in C_ROOMS if file in headers[other]}
     return found
+
+
+def box_of(room: str) -> str:
+    """Returns the name of a C room in the picture."""
+    return f"{Path(room).name} (C)"
 
 
 def c_files(room: str) -> list[Path]:

@@ -33,7 +33,7 @@ from hexapod_cosim.cosim.master.interrupts import termination_as_interrupt
 from hexapod_cosim.cosim.master.loop import COMPLETED, INTERRUPTED, Outcome
 from hexapod_cosim.cosim.master.native_loop import NativeMaster
 from hexapod_cosim.cosim.run.preparation import PlantFmus
-from hexapod_cosim.cosim.run.run import (
+from hexapod_cosim.cosim.run.single_run import (
     RunPlan,
     apply_settings,
     initialise_plant,

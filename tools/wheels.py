@@ -37,15 +37,8 @@ from wheel.wheelfile import WheelFile, get_zipinfo_datetime
 
 from hexapod_cosim.cosim.common.components import CONTROLLER, PLANT, POLICY
 from hexapod_cosim.cosim.common.plant_files import LOOP, fmi_headers
-from hexapod_cosim.cosim.export.cross_build import (
-    ALL_TARGETS,
-    COMPONENT,
-    TARGETS,
-    Library,
-    build_library,
-)
+from hexapod_cosim.cosim.export.cross_build import ALL_TARGETS, TARGETS, Library, build_library
 from hexapod_cosim.cosim.export.platforms import component_library
-from hexapod_cosim.cosim.export.wasm_component import build_component
 from hexapod_cosim.cosim.live.module import walker_module
 
 ROOT = Path(__file__).parents[1]
@@ -135,26 +128,17 @@ def common_files(wheel: Path) -> dict[str, bytes]:
 
 
 def cross_compile() -> dict[tuple[str, str], bytes]:
-    """Compiles all three FMUs' binaries and the loop for all targets, by library and target, and
-    the WebAssembly component of the plant; those of the controllers would make the wheels larger
-    than 5 MB, and `hexapod export --platforms wasm` compiles them.
-    """
-    components = (PLANT,)
+    """Compiles all three FMUs' binaries and the loop for all targets, by library and target."""
     libraries = [*map(component_library, (PLANT, CONTROLLER, POLICY)), loop_library()]
     jobs = [(library, target) for target in TARGETS for library in libraries]
     with ThreadPoolExecutor(os.cpu_count()) as pool:
         built = pool.map(lambda job: build_library(*job), jobs)
-        made = pool.map(build_component, components)
-        found = {(job[0].name, job[1]): data for job, data in zip(jobs, built, strict=True)}
-        named = {
-            (one.identifier, COMPONENT): data for one, data in zip(components, made, strict=True)
-        }
-        return found | named
+        return {(job[0].name, job[1]): data for job, data in zip(jobs, built, strict=True)}
 
 
 def loop_library() -> Library:
-    """Returns the co-simulation loops as a library, as master/CMakeLists.txt builds it."""
-    plant, own = ROOT / "plant_fmu", ROOT / "master"
+    """Returns the co-simulation loops as a library, as cosim/master/CMakeLists.txt builds it."""
+    plant, own = ROOT / "plant_fmu", ROOT / "cosim" / "master"
     files = {f"hexapod/{path.name}": path for path in (plant / "include/hexapod").glob("*.h")}
     files |= {f"hexapod/{path.name}": path for path in (own / "include/hexapod").glob("*.h")}
     files |= {f"src/{path.name}": path for path in (own / "src").glob("*.[ch]")}

@@ -53,7 +53,7 @@ def draw_feet(path: Path) -> None:
     """Draws where a foot should be and where it is in one gait cycle, under both controls."""
     with rc_context(SETTINGS):
         figure = Figure(figsize=(8.0, 4.6), layout="constrained")
-        grid = figure.subplots(2, 2, sharex=True, sharey="row")
+        grid = figure.subplots(2, 2, sharex="row", sharey="row")
         with Walker(everything=True) as walker:
             for column, control in zip(grid.T, CONTROLS, strict=True):
                 plan = load_scenario(
@@ -77,12 +77,13 @@ def _draw_foot(column: Sequence[Any], recording: Recording, control: str) -> Non
     drawn = 1e3 * planned + SCALE * off
     path.plot(1e3 * planned[:, 0], 1e3 * planned[:, 2], color="0.6", lw=3, label="planned")
     path.plot(drawn[:, 0], drawn[:, 2], color=PALETTE[3], label=f"real, deviation x {SCALE:g}")
-    path.set(title=f"{control}: foot {LEG} from the side", ylabel="z [mm], torso frame")
+    path.set(title=f"{control}: foot {LEG} from the side", xlabel="x [mm], torso frame")
+    path.set_ylabel("z [mm]")
     stance = ~recording.column(f"controller.{LEG}.swinging")[chosen].astype(bool)
     for axis, name in enumerate("xyz"):
         error.plot(time, off[:, axis], color=PALETTE[axis], lw=1.0, label=name)
     error.fill_between(time, -6, 6, where=stance, color="0.92", zorder=0, label="stance")
-    error.set(xlabel="time in the cycle [s] (above: x [mm])", ylabel="real - planned [mm]")
+    error.set(xlabel="time in the cycle [s]", ylabel="real - planned [mm]")
     error.set_ylim(-6.0, 6.0)
     error.legend(ncols=4, loc="lower right")
     rms = float(np.sqrt((off[stance] ** 2).sum(axis=1).mean()))

@@ -29,7 +29,7 @@ from typing import Any
 import numpy as np
 from secret_robots import GROUPS, Secret, damaged, secret_robot
 
-from hexapod_cosim.cosim.export.export import export_fmu
+from hexapod_cosim.cosim.export.plant_export import export_fmu
 from hexapod_cosim.cosim.identify.commands.command_screening import WrongCommandsError
 from hexapod_cosim.cosim.identify.identified import Identified
 from hexapod_cosim.cosim.identify.identify import TOLERANCE, identify, screen

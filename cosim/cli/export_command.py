@@ -21,7 +21,7 @@ from hexapod_cosim.cosim.cli.terminal import (
 )
 from hexapod_cosim.cosim.cli.terrain_command import surfaces_from
 from hexapod_cosim.cosim.export.controller_export import export_controller
-from hexapod_cosim.cosim.export.export import export_fmu
+from hexapod_cosim.cosim.export.plant_export import export_fmu
 from hexapod_cosim.cosim.export.robot_files import (
     Format,
     chosen_format,
@@ -65,8 +65,7 @@ Platforms = Annotated[
     typer.Option(
         "--platforms",
         help="Cross-compile for these, separated by commas (linux64, win64, darwin64, "
-        "aarch64-linux, or FMI 3's names of them) or all; wasm, with --fmi 3: a WebAssembly "
-        "component, after a draft standard; sources: no binary. "
+        "aarch64-linux, or FMI 3's names of them) or all; sources: no binary. "
         "Default: this machine's installed one.",
     ),
 ]

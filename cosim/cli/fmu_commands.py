@@ -103,8 +103,8 @@ def design(
     """Design the gains of compliant and paper control, with plots."""
     # imported here because python-control and matplotlib are slow to import
     from hexapod_cosim.controller.design import design_gains, plot_design  # noqa: PLC0415
-    from hexapod_cosim.cosim.design.design import examine_stances, read_requirements  # noqa: PLC0415
     from hexapod_cosim.cosim.design.design_check import check_design  # noqa: PLC0415
+    from hexapod_cosim.cosim.design.gain_design import examine_stances, read_requirements  # noqa: PLC0415
 
     loaded, folder, files = load_robot(robot), output or Path("out") / "design", list[Path]()
     found = design_stance(robot, folder) if stance else None

@@ -12,9 +12,9 @@ import typer
 from hexapod_cosim.controller import PATTERNS
 from hexapod_cosim.cosim.cli.terminal import Json, show_json, show_table, show_text
 from hexapod_cosim.cosim.cli.terrain_command import value_text
-from hexapod_cosim.cosim.interface.interface import load_interface
+from hexapod_cosim.cosim.interface.plant_interface import load_interface
 from hexapod_cosim.cosim.scenario.tables import list_scenarios
-from hexapod_cosim.cosim.study.plan.bundled import list_studies
+from hexapod_cosim.cosim.study.bundled import list_studies
 from hexapod_cosim.models import LEG_NAMES, Terrain, list_robots, load_robot, unknown_name
 from hexapod_cosim.models.ground.catalogue import CATALOGUE
 from hexapod_cosim.models.ground.entries import Entry

@@ -22,11 +22,10 @@ from hexapod_cosim.cosim.results.metrics import OF_THE_RUN
 from hexapod_cosim.cosim.results.recordings import check_formats
 from hexapod_cosim.cosim.results.result import Result
 from hexapod_cosim.cosim.results.results import ResultsFolder, write_result
-from hexapod_cosim.cosim.run.run import simulate as run_scenario
+from hexapod_cosim.cosim.run.single_run import simulate as run_scenario
 from hexapod_cosim.cosim.run.walker import Walker
 from hexapod_cosim.cosim.scenario.controls import Control, control_of, parse_controls
 from hexapod_cosim.cosim.scenario.records import CONTROLS, FORMATS, Scenario
-from hexapod_cosim.cosim.study.execute.engines import ENGINES
 from hexapod_cosim.models import HexapodError, unknown_name
 
 Name = Annotated[
@@ -90,6 +89,7 @@ Formats = Annotated[
     ),
 ]
 
+ENGINES = ("compiled", "python")
 Engine = Annotated[
     str | None,
     typer.Option(

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from types import MappingProxyType
 
-from hexapod_cosim.cosim.export.export import export_interface
+from hexapod_cosim.cosim.export.plant_export import export_interface
 from hexapod_cosim.cosim.export.starts import with_starts
 from hexapod_cosim.cosim.interface.controller_interface import (
     ControllerSetup,

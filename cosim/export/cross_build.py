@@ -11,7 +11,7 @@ import hashlib
 import os
 import subprocess
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cache
 from importlib import metadata, util
 from pathlib import Path
@@ -73,15 +73,7 @@ WEB_ASSEMBLY = Target(
     "generic+simd128+bulk_memory+nontrapping_fptoint",
     ("-mexec-model=reactor",),
 )
-# the core module of an FMU's component (wasm_component.py): only what its sources export by name
-COMPONENT = "wasm32-wasip2"
-ALL_TARGETS = {
-    **TARGETS,
-    BROWSER: WEB_ASSEMBLY,
-    COMPONENT: replace(
-        WEB_ASSEMBLY, link=tuple(one for one in WEB_ASSEMBLY.link if "dynamic" not in one)
-    ),
-}
+ALL_TARGETS = {**TARGETS, BROWSER: WEB_ASSEMBLY}
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ from xml.etree.ElementTree import Element
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from hexapod_cosim.cosim.interface.arrays import arrays
-from hexapod_cosim.cosim.interface.interface import CAUSALITIES, Interface, Pattern, Variable
+from hexapod_cosim.cosim.interface.plant_interface import CAUSALITIES, Interface, Pattern, Variable
 
 INTERFACES = {"CoSimulation": "co-simulation", "ModelExchange": "model exchange"}
 SERIALIZED = (

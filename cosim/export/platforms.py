@@ -19,7 +19,6 @@ from hexapod_cosim.cosim.export.fat_binary import join_mach_o
 from hexapod_cosim.models.errors import FmuError
 
 ALL, SOURCES = "all", "sources"
-WASM, WASM_FOLDER = "wasm", "wasm32-wasip2"  # a draft (wasm_component.py), hence not among "all"
 
 # FMI 2 has its own names for 64-bit x86 and FMI 3's names for other processors (FMI 2.0.5, section
 # 2.3). darwin64 is for both processors of Macs: importers on either look there.
@@ -30,7 +29,6 @@ _FMI2 = {
     "aarch64-linux": ("aarch64-linux",),
 }
 _FMI3 = {name: (name,) for name in TARGETS}
-FMI_OF_WASM = 3
 
 
 def platform_targets(fmi: int) -> Mapping[str, tuple[str, ...]]:
@@ -41,24 +39,15 @@ def platform_targets(fmi: int) -> Mapping[str, tuple[str, ...]]:
 def choose_platforms(names: Iterable[str], *, fmi: int) -> list[str]:
     """Returns the folders of binaries/ for platform names of either version of the standard.
 
-    "all" stands for all folders but that of "wasm", "sources" for none. darwin64 of FMI 2 stands
-    for the two platforms of FMI 3, and each of them for darwin64. Raises FmuError for an unknown
-    name, and for WebAssembly in an FMI 2 FMU.
+    "all" stands for all folders, "sources" for none. darwin64 of FMI 2 stands for the two platforms
+    of FMI 3, and each of them for darwin64. Raises FmuError for an unknown name.
     """
     chosen = [names] if isinstance(names, str) else list(names)
-    component = [WASM_FOLDER] if {WASM, WASM_FOLDER}.intersection(chosen) else []
-    if component and fmi != FMI_OF_WASM:
-        raise FmuError(
-            "no WebAssembly in an FMU of this version",
-            got=f"--fmi {fmi}",
-            expected=f"--fmi {FMI_OF_WASM}, for which the draft standard fmi-ls-wasm is",
-            fix=f"add --fmi {FMI_OF_WASM}",
-        )
     targets: set[str] = set()
     for name in chosen:
-        if name not in {*_FMI2, *_FMI3, ALL, SOURCES, WASM, WASM_FOLDER}:
+        if name not in {*_FMI2, *_FMI3, ALL, SOURCES}:
             expected = ", ".join(
-                (*dict.fromkeys((*_FMI2, *_FMI3)), WASM, ALL, f"{SOURCES} for no binary at all")
+                (*dict.fromkeys((*_FMI2, *_FMI3)), ALL, f"{SOURCES} for no binary at all")
             )
             raise FmuError(
                 "no such platform",
@@ -75,7 +64,7 @@ def choose_platforms(names: Iterable[str], *, fmi: int) -> list[str]:
             fix=f"leave out {SOURCES}",
         )
     folders = platform_targets(fmi).items()
-    return [folder for folder, parts in folders if targets.intersection(parts)] + component
+    return [folder for folder, parts in folders if targets.intersection(parts)]
 
 
 def component_library(component: Component = PLANT) -> Library:
@@ -90,13 +79,12 @@ def build_binaries(library: Library, platforms: Iterable[str], *, fmi: int) -> d
 
     Args:
         library: the library to build.
-        platforms: folders, as `choose_platforms` returns them; that of WebAssembly is left out,
-            because its binary contains the FMU's resources.
+        platforms: folders, as `choose_platforms` returns them.
         fmi: version of the standard.
 
     Raises FmuError without a cross compiler, and for sources that do not compile.
     """
-    wanted = {name: platform_targets(fmi)[name] for name in platforms if name != WASM_FOLDER}
+    wanted = {name: platform_targets(fmi)[name] for name in platforms}
     targets = list(dict.fromkeys(target for parts in wanted.values() for target in parts))
     released = {target: released_binary(target, library.name) for target in targets}
     built = {target: data for target, data in released.items() if data is not None}

@@ -20,7 +20,7 @@ from itertools import accumulate, pairwise
 from pathlib import Path
 
 from hexapod_cosim.cosim.interface.arrays import arrays
-from hexapod_cosim.cosim.interface.interface import Interface
+from hexapod_cosim.cosim.interface.plant_interface import Interface
 from hexapod_cosim.cosim.master.fmu import Fmu
 
 STANDARD, STANDARD_VERSION = "org.fmi-standard.fmi-ls-ref", "1.0.0-alpha.1"

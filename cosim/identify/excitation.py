@@ -16,7 +16,7 @@ import tomlkit
 from numpy.typing import NDArray
 
 from hexapod_cosim.cosim.common.temporary import TemporaryFolder
-from hexapod_cosim.cosim.export.export import export_fmu
+from hexapod_cosim.cosim.export.plant_export import export_fmu
 from hexapod_cosim.cosim.identify.experiment import Experiment
 from hexapod_cosim.cosim.identify.fitting.differences import FINE
 from hexapod_cosim.cosim.identify.fitting.problem import Problem
@@ -28,7 +28,7 @@ from hexapod_cosim.cosim.identify.log_plant import LogPlant
 from hexapod_cosim.cosim.identify.unknowns import START
 from hexapod_cosim.cosim.interface.names import joint_names
 from hexapod_cosim.cosim.master.recorder import Recording
-from hexapod_cosim.cosim.run.run import simulate
+from hexapod_cosim.cosim.run.single_run import simulate
 from hexapod_cosim.cosim.scenario.scenario import scenario_from_table
 from hexapod_cosim.cosim.scenario.tables import read_tables, with_values
 from hexapod_cosim.models import HexapodError, Robot

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hexapod_cosim.cosim.common.temporary import TemporaryFolder
-from hexapod_cosim.cosim.export.export import export_fmu
+from hexapod_cosim.cosim.export.plant_export import export_fmu
 from hexapod_cosim.cosim.identify.channel_screening import screened, turned_after_the_fit
 from hexapod_cosim.cosim.identify.commands.command_screening import check_commands
 from hexapod_cosim.cosim.identify.commands.speed_references import with_speed_references

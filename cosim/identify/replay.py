@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from hexapod_cosim.cosim.common.temporary import TemporaryFolder
-from hexapod_cosim.cosim.export.export import export_fmu
+from hexapod_cosim.cosim.export.plant_export import export_fmu
 from hexapod_cosim.cosim.identify.channel_screening import screened
 from hexapod_cosim.cosim.identify.commands.command_screening import (
     wrong_commands,

@@ -24,6 +24,12 @@ def read_description(path: Path, versions: Collection[str] = ("2.0",)) -> Any:
     Raises FmuError for any other file.
     """
     description = open_description(path)
+    refuse_other_kinds(description, path, versions)
+    return description
+
+
+def refuse_other_kinds(description: Any, path: Path, versions: Collection[str]) -> None:
+    """Raises FmuError for a description of another version, or without co-simulation."""
     if description.fmiVersion not in versions or description.coSimulation is None:
         kind = "co-simulation" if description.coSimulation else "model exchange only"
         raise FmuError(
@@ -33,7 +39,6 @@ def read_description(path: Path, versions: Collection[str] = ("2.0",)) -> Any:
             fix=FIX,
             where=str(path),
         )
-    return description
 
 
 def open_description(path: Path) -> Any:
@@ -41,15 +46,32 @@ def open_description(path: Path) -> Any:
 
     Raises FmuError for a file that is no FMU.
     """
+    refuse_unsafe(path)
+    try:
+        description = read_model_description(path, validate=False)
+    except Exception as error:
+        raise FmuError(
+            "the FMU's modelDescription.xml cannot be read",
+            got=str(error),
+            expected="XML after the standard's schema",
+            fix=FIX,
+            where=str(path),
+        ) from error
+    _refuse_identifiers(description, path)
+    return description
+
+
+def refuse_unsafe(path: Path) -> None:
+    """Raises FmuError for a file that fmpy is not given to read.
+
+    These are other files than FMUs, archives that are unsafe to unpack and XML with entities.
+    """
     refuse_path(path, "an FMU", FmuError)
     if not path.is_file():
         raise FmuError("no such FMU", got=str(path), expected="an existing .fmu file", fix=FIX)
     try:
         with open_archive(path) as archive:
             _refuse_markup(archive, path)
-        description = read_model_description(path, validate=False)
-    except FmuError:
-        raise
     except KeyError as error:
         raise FmuError(
             "not an FMU",
@@ -58,21 +80,12 @@ def open_description(path: Path) -> Any:
             fix=FIX,
             where=str(path),
         ) from error
-    except Exception as error:
-        raise FmuError(
-            "the FMU's modelDescription.xml cannot be read",
-            got=str(error),
-            fix=FIX,
-            where=str(path),
-        ) from error
-    _refuse_identifiers(description, path)
-    return description
 
 
 def _refuse_markup(archive: ZipFile, path: Path) -> None:
     """Raises FmuError for a model description with a document type, which may define entities."""
     archive.getinfo(DESCRIPTION)  # raises KeyError
-    found = forbidden_markup(read_member(archive, DESCRIPTION))
+    found = _forbidden_markup(read_member(archive, DESCRIPTION))
     if found:
         expected = "XML in UTF-8 without a document type, which might define entities"
         raise FmuError(
@@ -84,7 +97,7 @@ def _refuse_markup(archive: ZipFile, path: Path) -> None:
         )
 
 
-def forbidden_markup(data: bytes) -> str | None:
+def _forbidden_markup(data: bytes) -> str | None:
     """Returns what a document holds that is not read: a document type or another encoding."""
     if b"\0" in data or data.startswith((b"\xff\xfe", b"\xfe\xff")):
         return "another encoding than UTF-8"

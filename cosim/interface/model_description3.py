@@ -12,7 +12,6 @@ from xml.etree.ElementTree import Element, SubElement
 from hexapod_cosim.cosim.common.components import Component
 from hexapod_cosim.cosim.common.plant_files import DISTRIBUTION
 from hexapod_cosim.cosim.interface.arrays import Array, arrays
-from hexapod_cosim.cosim.interface.interface import Enumeration, Interface, Unit
 from hexapod_cosim.cosim.interface.model_description import (
     ModelDescription,
     add_log_categories,
@@ -21,6 +20,7 @@ from hexapod_cosim.cosim.interface.model_description import (
     general_facts,
     render_fmi2,
 )
+from hexapod_cosim.cosim.interface.plant_interface import Enumeration, Interface, Unit
 
 # capabilities, each tested by tests/fmi/test_fmi3.py
 CAPABILITIES = {

@@ -12,8 +12,8 @@ from types import SimpleNamespace
 from typing import Any
 
 from hexapod_cosim.cosim.common.components import Component
-from hexapod_cosim.cosim.interface.interface import Enumeration, enumerations_of, read_table
 from hexapod_cosim.cosim.interface.patterns import expand, labelled
+from hexapod_cosim.cosim.interface.plant_interface import Enumeration, enumerations_of, read_table
 
 Step = str | int  # an attribute's name or an index of a sequence
 # name; a constant or None; without a constant the path from the roots to the value; enumeration

@@ -19,7 +19,7 @@ from hexapod_cosim.cosim.interface.controller_interface import (
 from hexapod_cosim.cosim.master.fmu import Fmu
 from hexapod_cosim.cosim.master.fmu_controller import FmuController
 from hexapod_cosim.cosim.master.loop import JointController
-from hexapod_cosim.cosim.run.run import RunPlan
+from hexapod_cosim.cosim.run.single_run import RunPlan
 from hexapod_cosim.cosim.scenario.controls import control_of
 
 HORIZON = 1e6  # s    stop time of the FMUs

@@ -45,7 +45,7 @@ from hexapod_cosim.cosim.master.loop import JointController
 from hexapod_cosim.cosim.master.signals import Signals
 from hexapod_cosim.cosim.results.walk import robot_weight
 from hexapod_cosim.cosim.run.preparation import PlantFmus
-from hexapod_cosim.cosim.run.run import (
+from hexapod_cosim.cosim.run.single_run import (
     RunPlan,
     apply_settings,
     initialise_plant,

@@ -12,7 +12,7 @@ from typing import Any
 from hexapod_cosim.controller import PATTERNS, Gait, make_gait
 from hexapod_cosim.cosim.common.components import CONTROLLER
 from hexapod_cosim.cosim.common.files import write_text
-from hexapod_cosim.cosim.interface.interface import enumerations_of, load_interface
+from hexapod_cosim.cosim.interface.plant_interface import enumerations_of, load_interface
 from hexapod_cosim.cosim.live.gait_change import SHARE
 from hexapod_cosim.cosim.live.module import walker_module
 from hexapod_cosim.cosim.live.page import describe, fill_page

@@ -1,4 +1,4 @@
-"""Loads the co-simulation library (master/src) after comparing its structures with Python's."""
+"""Loads the co-simulation library (cosim/master/src) and compares its structures with Python's."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Runs the master's loop in C (master/src/master.c) on a plant FMU and a controller FMU.
+"""Runs the master's loop in C (src/master.c) on a plant FMU and a controller FMU.
 
 It computes the same walk as `loop.run` with an `FmuController`. Python loads, initialises and
 frees the FMUs; the C loop drives them through FMI functions alone, for some macro-steps at a time

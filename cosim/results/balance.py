@@ -25,10 +25,6 @@ class Unbalanced:
         above = values[values > UNBALANCED]
         return cls(above.size, float(above.max(initial=0.0)))
 
-    def merged(self, other: Unbalanced) -> Unbalanced:
-        """Returns the unbalanced runs of both."""
-        return Unbalanced(self.count + other.count, max(self.largest, other.largest))
-
     def warnings(self, control: str, *, runs: int) -> list[str]:
         """Returns one warning for all runs under a control, or none.
 

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 from functools import cache
 
 from hexapod_cosim.cosim.common.components import CONTROLLER, PLANT, Component
-from hexapod_cosim.cosim.interface.interface import read_table
 from hexapod_cosim.cosim.interface.patterns import expand, labelled
+from hexapod_cosim.cosim.interface.plant_interface import read_table
 
 NO_UNIT = "1"
 HEADING = re.compile(r"(?P<name>.*\S) \[(?P<unit>[^\[\]]*)\]")  # no space precedes an index

@@ -3,6 +3,6 @@
 Imports every folder of `cosim` above it but `validate` and `report`.
 """
 
-from hexapod_cosim.cosim.run.run import simulate
+from hexapod_cosim.cosim.run.single_run import simulate
 
 __all__ = ["simulate"]

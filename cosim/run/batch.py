@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator, Iterator, Sequence
+from collections import deque
+from collections.abc import Callable, Generator, Iterator, Sequence
+from concurrent.futures import Executor, Future
 from contextlib import nullcontext
 from dataclasses import dataclass
 from functools import cache, partial
+from itertools import islice
 from multiprocessing.util import Finalize
 from pathlib import Path
 
@@ -14,16 +17,14 @@ from hexapod_cosim.cosim.common.temporary import TemporaryFolder
 from hexapod_cosim.cosim.master.loop import INTERRUPTED
 from hexapod_cosim.cosim.results.summary import Summary, refused_summary, summarise
 from hexapod_cosim.cosim.run.preparation import PlantFmus, chosen_gains
-from hexapod_cosim.cosim.run.run import simulate
+from hexapod_cosim.cosim.run.single_run import simulate
 from hexapod_cosim.cosim.run.walker import Walker
 from hexapod_cosim.cosim.run.worker_pool import (
-    TASKS_PER_WORKER,
-    Finished,
-    InProcessExecutor,
-    TaskExecutor,
+    SerialExecutor,
+    WorkerDiedError,
+    WorkerPool,
     processor_count,
     raise_if_stopped,
-    worker_pool,
 )
 from hexapod_cosim.cosim.scenario.controls import control_of
 from hexapod_cosim.cosim.scenario.records import Scenario
@@ -34,7 +35,6 @@ MAX_AHEAD = 8  # runs for each worker that may be finished before one that was s
 
 @dataclass(frozen=True)
 class _Task:
-    number: int
     scenario: Scenario
     fmu: Path | None = None
     gains: Gains | None = None
@@ -67,51 +67,54 @@ def run_batch(
     """
     with TemporaryFolder("batch") as folder:
         fmus = PlantFmus(folder, given=fmu)
-        tasks = [_prepare(k, scenario, fmus, gains) for k, scenario in enumerate(scenarios)]
+        tasks = [_prepare(scenario, fmus, gains) for scenario in scenarios]
         count = min(processor_count() if workers is None else workers, len(tasks))
         if count <= 1:
             with Walker() if compiled else nullcontext() as walker:
-                yield from _in_order(tasks, InProcessExecutor(partial(_run, walker=walker)))
+                run: Callable[[_Task], Summary] = partial(_run, walker=walker)
+                yield from _in_order(tasks, SerialExecutor(), run, ahead=1)
         else:
-            with worker_pool(count, _run_compiled if compiled else _run) as pool:
-                yield from _in_order(tasks, pool)
+            with WorkerPool(count) as pool:
+                run = _run_compiled if compiled else _run
+                yield from _in_order(tasks, pool, run, ahead=MAX_AHEAD * count)
 
 
-def _prepare(number: int, scenario: Scenario, fmus: PlantFmus, gains: Gains | None) -> _Task:
+def _prepare(scenario: Scenario, fmus: PlantFmus, gains: Gains | None) -> _Task:
     """Makes what the run shares with others; a failure to do so refuses the scenario."""
     try:
         chosen = chosen_gains(scenario, gains)
-        return _Task(number, scenario, fmu=fmus.fmu(scenario.robot), gains=chosen)
+        return _Task(scenario, fmu=fmus.fmu(scenario.robot), gains=chosen)
     except HexapodError as error:
-        return _Task(number, scenario, refusal=refused_summary(scenario, error))
+        return _Task(scenario, refusal=refused_summary(scenario, error))
 
 
-def _in_order(tasks: Sequence[_Task], executor: TaskExecutor[_Task, Summary]) -> Iterator[Summary]:
-    """Runs tasks and yields their summaries in the order of the tasks."""
-    finished: dict[int, Finished[_Task, Summary]] = {}
-    submitted, running = 0, 0
-    for number in range(len(tasks)):
-        while number not in finished:
-            limit = min(number + MAX_AHEAD * executor.size, len(tasks))
-            while submitted < limit and running < TASKS_PER_WORKER * executor.size:
-                executor.submit(tasks[submitted])
-                submitted, running = submitted + 1, running + 1
-            for item in executor.wait():
-                finished[item.task.number] = item
-                running -= 1
-        yield _summary_of(finished.pop(number))
+def _in_order(
+    tasks: Sequence[_Task], executor: Executor, run: Callable[[_Task], Summary], *, ahead: int
+) -> Iterator[Summary]:
+    """Runs tasks and yields their summaries in the order of the tasks.
+
+    At most `ahead` tasks are submitted before the first of them is finished.
+    """
+    rest, submitted = iter(tasks), deque[tuple[_Task, Future[Summary]]]()
+    while True:
+        more = islice(rest, ahead - len(submitted))
+        submitted.extend((task, executor.submit(run, task)) for task in more)
+        if not submitted:
+            return
+        yield _summary_of(*submitted.popleft())
 
 
-def _summary_of(finished: Finished[_Task, Summary]) -> Summary:
-    """Returns the summary of a finished task. Raises HexapodError when its worker died."""
-    summary, scenario = finished.result, finished.task.scenario
-    if summary is None:
-        label = control_of(scenario.control).label
+def _summary_of(task: _Task, future: Future[Summary]) -> Summary:
+    """Returns the summary of a task. Raises HexapodError when its worker died."""
+    try:
+        summary = future.result()
+    except WorkerDiedError as error:
+        label = control_of(task.scenario.control).label
         raise HexapodError(
             "a worker process of the batch ended by itself",
-            got=f"{scenario.title}, seed {scenario.seed}, {label} control",
+            got=f"{task.scenario.title}, seed {task.scenario.seed}, {label} control",
             fix="look for what ended it (memory?), or run fewer at once",
-        )
+        ) from error
     if summary.status == INTERRUPTED:
         raise KeyboardInterrupt
     return summary

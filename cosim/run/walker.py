@@ -36,7 +36,7 @@ from hexapod_cosim.cosim.results.metrics import metric_columns
 from hexapod_cosim.cosim.results.result import Result
 from hexapod_cosim.cosim.results.summary import Summary, refused_summary, summarise
 from hexapod_cosim.cosim.run.preparation import PlantFmus
-from hexapod_cosim.cosim.run.run import (
+from hexapod_cosim.cosim.run.single_run import (
     RunPlan,
     describe,
     different_settings,

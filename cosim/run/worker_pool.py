@@ -1,8 +1,7 @@
-"""A pool of worker processes on this machine, generic in task and result, and the same interface
-within the calling process.
+"""Executors for many runs on this machine, with the interface of `concurrent.futures.Executor`.
 
-Each worker process has a queue of its own. So it is known which task a worker was running when it
-died.
+WorkerPool runs tasks in worker processes, SerialExecutor in the calling process. A study also runs
+on the executor of a Dask cluster.
 """
 
 from __future__ import annotations
@@ -11,188 +10,115 @@ import multiprocessing
 import os
 import shutil
 import tempfile
-from collections import deque
-from collections.abc import Callable, Iterator
-from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+import threading
+from collections.abc import Callable
+from concurrent.futures import Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import contextmanager
-from dataclasses import dataclass
 from multiprocessing import connection
 from multiprocessing.synchronize import Event
 from pathlib import Path
-from threading import Thread
-from typing import Generic, Protocol, TypeVar
+from typing import Any, TypeVar
 
 from hexapod_cosim.cosim.master.interrupts import blocked_interrupts
+from hexapod_cosim.models import HexapodError
 
 START_METHOD = "spawn"  # a fork would copy the locks that threads of this process and numpy hold
-TASKS_PER_WORKER = 2  # a worker that finishes a task has the next one already
+TRIES = 3  # processes that may end during a task before it is given up
 DIED = "its worker process ended by itself (killed, or out of memory)"
 
-_Task = TypeVar("_Task")
 _Result = TypeVar("_Result")
 
 _stop: Event | None = None  # set in worker processes only
 
 
-@dataclass(frozen=True)
-class Finished(Generic[_Task, _Result]):
-    """A task that a worker has finished, or of which its worker died."""
-
-    task: _Task
-    result: _Result | None  # None when the worker died
-    death: str = ""  # how the worker ended; empty when it lives
+class WorkerDiedError(HexapodError):
+    """TRIES processes ended while they ran the same task."""
 
 
-class TaskExecutor(Protocol[_Task, _Result]):
-    """Runs tasks and returns their results in any order."""
+class SerialExecutor(Executor):
+    """Runs each task in the calling process, when it is submitted."""
 
-    @property
-    def size(self) -> int:
-        """Number of tasks that run at once."""
-        ...
-
-    def submit(self, task: _Task) -> None:
-        """Queues a task and returns at once."""
-        ...
-
-    def wait(self) -> list[Finished[_Task, _Result]]:
-        """Waits until a task is finished. Raises HexapodError when no worker can go on."""
-        ...
-
-
-class InProcessExecutor(Generic[_Task, _Result]):
-    """Runs tasks one by one in the calling process, when they are waited for."""
-
-    size = 1
-
-    def __init__(self, run: Callable[[_Task], _Result]) -> None:
-        self._run, self._tasks = run, deque[_Task]()
-
-    def submit(self, task: _Task) -> None:
-        """Queues a task."""
-        self._tasks.append(task)
-
-    def wait(self) -> list[Finished[_Task, _Result]]:
-        """Runs the next task. Raises what the task raises."""
-        task = self._tasks.popleft()
-        return [Finished(task, self._run(task))]
-
-
-@dataclass(frozen=True)
-class _Setup(Generic[_Task, _Result]):
-    """What a worker process is started with; all of it is pickled."""
-
-    run: Callable[[_Task], _Result]
-    stop: Event
-    initialise: Callable[[], None] | None
-    scratch: Path | None
-
-
-class _Worker(Generic[_Task, _Result]):
-    """One worker process and the tasks it was given, of which it runs the first."""
-
-    def __init__(self, setup: _Setup[_Task, _Result]) -> None:
-        self._setup = setup
-        self.queue: deque[tuple[Future[_Result], _Task]] = deque()
-        self._start()
-
-    def _start(self) -> None:
-        setup = self._setup
-        self._process = ProcessPoolExecutor(
-            1,
-            mp_context=multiprocessing.get_context(START_METHOD),
-            initializer=_initialise_worker,
-            initargs=(setup.stop, setup.scratch, setup.initialise),
-        )
-
-    def submit(self, task: _Task) -> None:
-        """Queues a task; the process starts with the first one."""
+    def submit(
+        self, function: Callable[..., _Result], /, *args: Any, **options: Any
+    ) -> Future[_Result]:
+        """Returns the finished future of the task."""
+        future: Future[_Result] = Future()
         try:
-            with blocked_interrupts():  # inherited by the process: only `stop` ends its tasks
-                future = self._process.submit(self._setup.run, task)
-        except BrokenProcessPool as error:  # it died meanwhile; finished() handles the death
-            future = Future()
+            future.set_result(function(*args, **options))
+        except Exception as error:
             future.set_exception(error)
-        self.queue.append((future, task))
-
-    def finished(self) -> Iterator[Finished[_Task, _Result]]:
-        """Removes the finished tasks from the queue."""
-        while self.queue and self.queue[0][0].done():
-            future, task = self.queue.popleft()
-            try:
-                yield Finished(task, future.result())
-            except BrokenProcessPool:
-                yield Finished(task, None, death=DIED)
-                self._replace()
-                return
-
-    def _replace(self) -> None:
-        """Starts another process, which gets the tasks that the dead one had not begun."""
-        tasks = [task for _, task in self.queue]
-        self.queue.clear()
-        self._process.shutdown(wait=False)
-        self._start()
-        for task in tasks:
-            self.submit(task)
-
-    def close(self) -> None:
-        """Cancels the queue and waits for the process to end."""
-        self._process.shutdown(wait=True, cancel_futures=True)
+        return future
 
 
-class WorkerPool(Generic[_Task, _Result]):
-    """Worker processes of this machine; see worker_pool()."""
+class WorkerPool(Executor):
+    """Worker processes, of which each is given one task at a time by a thread of its own.
 
-    def __init__(self, size: int, setup: _Setup[_Task, _Result]) -> None:
-        self.size = size
-        self._workers = [_Worker(setup) for _ in range(size)]
-
-    def submit(self, task: _Task) -> None:
-        """Queues a task with the worker that has the shortest queue."""
-        min(self._workers, key=lambda worker: len(worker.queue)).submit(task)
-
-    def wait(self) -> list[Finished[_Task, _Result]]:
-        """Waits until a task is finished. Raises what the task raises."""
-        first = [worker.queue[0][0] for worker in self._workers if worker.queue]
-        wait(first, return_when=FIRST_COMPLETED)
-        return [item for worker in self._workers for item in worker.finished()]
-
-    def close(self) -> None:
-        """Waits for all processes to end."""
-        for worker in self._workers:
-            worker.close()
-
-
-@contextmanager
-def worker_pool(
-    size: int,
-    run: Callable[[_Task], _Result],
-    *,
-    initialise: Callable[[], None] | None = None,
-    scratch: Path | None = None,
-) -> Iterator[WorkerPool[_Task, _Result]]:
-    """Opens a pool whose processes have ended when the block ends, however it ends.
+    So it is known which task a process was running when it died: another process runs it again,
+    and after TRIES deaths its future has a WorkerDiedError. Processes start with their first task.
 
     Args:
-        size: number of processes, which start with their first task.
-        run: function of a module that a process runs for each task; long ones call
-            raise_if_stopped() now and then.
+        size: number of processes.
         initialise: function that each process calls once, before its first task.
         scratch: folder for temporary files of the processes, which remove it when their parent
             is killed.
     """
-    stop = multiprocessing.get_context(START_METHOD).Event()
-    pool = WorkerPool(size, _Setup(run, stop, initialise, scratch))
-    try:
-        yield pool
-    finally:
-        stop.set()
-        pool.close()
+
+    def __init__(
+        self,
+        size: int,
+        *,
+        initialise: Callable[[], None] | None = None,
+        scratch: Path | None = None,
+    ) -> None:
+        self._context = multiprocessing.get_context(START_METHOD)
+        self._stop = self._context.Event()
+        self._setup = self._stop, scratch, initialise
+        self._threads = ThreadPoolExecutor(size)
+        self._own = threading.local()  # the process of each thread
+        self._processes: list[ProcessPoolExecutor] = []
+
+    def submit(
+        self, function: Callable[..., _Result], /, *args: Any, **options: Any
+    ) -> Future[_Result]:
+        """Queues a task. A long one calls raise_if_stopped() now and then."""
+        return self._threads.submit(self._run, function, args, options)
+
+    def shutdown(self, wait: bool = True, *, cancel_futures: bool = True) -> None:
+        """Stops the tasks under way, drops the others and waits until all processes have ended."""
+        self._stop.set()
+        self._threads.shutdown(wait, cancel_futures=cancel_futures)
+        for process in self._processes:
+            process.shutdown(wait)
+
+    def _run(
+        self, function: Callable[..., _Result], args: tuple[Any, ...], options: dict[str, Any]
+    ) -> _Result:
+        """Runs a task in the process of this thread."""
+        for _ in range(TRIES):
+            try:
+                with blocked_interrupts():  # inherited by the process: only `stop` ends its tasks
+                    future = self._process().submit(function, *args, **options)
+                return future.result()
+            except BrokenProcessPool:
+                self._own.process.shutdown(wait=False)
+                self._own.process = None
+        raise WorkerDiedError(
+            "a task has no result", got=DIED, fix="look for what ended it, or run fewer at once"
+        )
+
+    def _process(self) -> ProcessPoolExecutor:
+        process: ProcessPoolExecutor | None = getattr(self._own, "process", None)
+        if process is None:
+            process = ProcessPoolExecutor(
+                1, self._context, initializer=_initialise_worker, initargs=self._setup
+            )
+            self._own.process = process
+            self._processes.append(process)
+        return process
 
 
 def raise_if_stopped(_done: float) -> None:
-    """Raises KeyboardInterrupt when the pool of this worker process is closing.
+    """Raises KeyboardInterrupt when the pool of this worker process is shut down.
 
     Its argument is that of a Progress callback, as which it is passed to the master.
     """
@@ -215,7 +141,7 @@ def _initialise_worker(
 
     _stop = stop
     threadpool_limits(1)  # there is a worker for each processor
-    Thread(target=_end_with_parent, args=(scratch,), daemon=True).start()
+    threading.Thread(target=_end_with_parent, args=(scratch,), daemon=True).start()
     if scratch is not None:
         tempfile.tempdir = str(scratch)
     if initialise is not None:

@@ -1,5 +1,12 @@
-"""Runs studies: many runs of scenarios that differ by factors, seeds and control.
+"""Runs studies: many runs of scenarios that differ by factors, seeds and control. Imports
+every folder of `cosim` above it but `validate`, `report`, `identify`, `course` and `live`.
 
-`plan` reads the study file and numbers the runs, `execute` runs them in worker processes or on a
-cluster, `store` keeps the results, and `report` shows them.
+The data flow, in the order of the modules:
+
+    study file -> reading (keys, factors, objective, checks) -> Study (records)
+    Study -> runs: numbers every run and makes its Order
+    Study -> job: what every worker needs -> folder: the manifest
+    orders -> dispatch -> workers (an executor) -> worker -> Summary -> store (SQLite, a row a run)
+    an optimisation asks Optuna for its orders: search
+    store -> groups (GROUP BY, moments) -> summary -> report; store -> folder: results.parquet
 """

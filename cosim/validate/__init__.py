@@ -1,1 +1,1 @@
-"""Checks FMU archives against the FMI standard. Imports `common` to `export`."""
+"""Validates FMUs: fmpy's checks and a trial of the binary. Imports `common` to `master`."""

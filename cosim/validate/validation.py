@@ -1,167 +1,106 @@
-"""Validates FMUs that this package wrote: with fmpy's checks and with checks of its own."""
+"""Validates FMUs: with fmpy's checks, then by a trial of the binary in a process of its own."""
 
 from __future__ import annotations
 
-import zipfile
-from contextlib import chdir
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
-from xml.etree import ElementTree
 
-from fmpy.fmi2 import FMU2Slave, fmi2CallbackFunctions
+import numpy as np
+from fmpy import read_model_description, simulate_fmu
+from fmpy.simulation import instantiate_fmu
 from fmpy.validation import validate_fmu
 
-from hexapod_cosim.cosim.common.archives import unpack, unsafe_members
-from hexapod_cosim.cosim.common.binaries import incomplete
-from hexapod_cosim.cosim.common.components import CONTROLLER, POLICY
-from hexapod_cosim.cosim.common.plant_files import fmi2_platform, packed_binary
+from hexapod_cosim.cosim.common.archives import unpack
+from hexapod_cosim.cosim.common.binaries import refuse_incomplete
+from hexapod_cosim.cosim.common.own_process import ProcessEndedError, call_in_process
+from hexapod_cosim.cosim.common.plant_files import fmi2_platform, fmi3_platform, packed_binary
 from hexapod_cosim.cosim.common.temporary import TemporaryFolder
 from hexapod_cosim.cosim.interface.descriptions import (
-    forbidden_markup,
     open_description,
-    read_description,
+    refuse_other_kinds,
+    refuse_unsafe,
 )
-from hexapod_cosim.cosim.master.fmu import Fmu
-from hexapod_cosim.cosim.master.signals import Signals
-from hexapod_cosim.cosim.validate.archive import (
-    DESCRIPTION,
-    archive_problems,
-    read_members,
-    zip_problems,
-)
-from hexapod_cosim.cosim.validate.description import description_problems, schema_problems
-from hexapod_cosim.cosim.validate.description3 import description_problems3
-from hexapod_cosim.cosim.validate.start_value import START_VALUES, start_value_problems
-from hexapod_cosim.cosim.validate.trial import problems_of_a_trial
-from hexapod_cosim.cosim.validate.validation3 import find_own_problems3
-from hexapod_cosim.models import FmuError, HexapodError
+from hexapod_cosim.models.errors import FmuError
 
-TRIAL_STEP = 0.001  # s
-FOREIGN_GUID = "{00000000-0000-0000-0000-000000000000}"
+STEP, STEPS = 0.001, 5  # of the trial: their length [s] and their number
+TIME_LIMIT = 60.0  # s, of the steps
+PLATFORMS = {"2.0": fmi2_platform, "3.0": fmi3_platform}
 
 
 def find_problems(path: Path) -> list[str]:
     """Returns the problems of an FMU, one sentence each; empty for a valid FMU.
 
-    Raises FmuError for a file that is no FMU.
+    The binary is tried only if fmpy finds nothing. Raises FmuError for a file that is no FMU.
     """
+    refuse_unsafe(path)
+    found = [str(problem) for problem in validate_fmu(str(path))]
     try:
         description = open_description(path)
-    except FmuError:
-        problems = _unread_problems(path)
-        if not problems:
+    except FmuError as error:
+        if not found:
             raise
-        return problems
-    if description.fmiVersion.startswith("3.") and description.coSimulation is not None:
-        return [*map(str, validate_fmu(str(path))), *find_own_problems3(path, description)]
-    read_description(path)
-    return [*map(str, validate_fmu(str(path))), *find_own_problems(path)]
+        return [str(error), *(problem for problem in found if problem != error.got)]
+    refuse_other_kinds(description, path, PLATFORMS)
+    return found or _problems_of_a_trial(path, PLATFORMS[description.fmiVersion]())
 
 
-def _unread_problems(path: Path) -> list[str]:
-    """Returns the problems of a modelDescription.xml that fmpy cannot read.
+def _problems_of_a_trial(path: Path, platform: str) -> list[str]:
+    """Returns why the FMU cannot be unpacked or run; a damaged binary may end the process.
 
-    Empty if it is no XML.
+    An FMU without a binary for this platform is unpacked and not run.
     """
-    unsafe = _unsafe_problems(path)
-    if unsafe:
-        return unsafe
-    try:
-        with zipfile.ZipFile(path) as archive:
-            data = archive.read(DESCRIPTION)
-        root = ElementTree.fromstring(data)
-    except Exception:  # also zlib's and the parser's: the error that was raised says why
-        return []
-    if forbidden_markup(data):
-        return []
-    fmi3 = root.get("fmiVersion", "").startswith("3.")
-    broken = schema_problems(
-        DESCRIPTION,
-        data,
-        "fmi3/fmi3ModelDescription.xsd" if fmi3 else "fmi2/fmi2ModelDescription.xsd",
-    )
-    return broken or (description_problems3 if fmi3 else description_problems)(root)
-
-
-def _unsafe_problems(path: Path) -> list[str]:
-    """Returns why the archive is not unpacked, and its violations of the ZIP format."""
-    try:
-        with zipfile.ZipFile(path) as archive:
-            unsafe = [
-                f"{what}: got {got!r}, expected {expected}"
-                for what, got, expected in unsafe_members(archive.infolist())
-            ]
-            return [*zip_problems(archive), *unsafe] if unsafe else []
-    except Exception:  # no archive
-        return []
-
-
-def find_own_problems(path: Path) -> list[str]:
-    """Returns the problems that this package's own checks find in an FMI 2.0 FMU.
-
-    An FMU without a binary for this machine is not run. Raises FmuError for a file that is no FMU.
-    """
-    description, (found, damaged) = read_description(path), read_members(path)
-    if found is None:
-        return damaged
-    problems = archive_problems(path)
-    with zipfile.ZipFile(path) as archive:
-        names = archive.namelist()
-        data = archive.read(START_VALUES) if START_VALUES in names else None
-        problems += start_value_problems(data, description.guid, description)
-        runs_here = any(name.startswith(f"binaries/{fmi2_platform()}/") for name in names)
-    return problems + (problems_of_a_trial(binary_problems, path) if runs_here else [])
-
-
-def binary_problems(path: Path) -> list[str]:
-    """Returns the problems that show when the FMU runs in this process."""
-    return _run_problems(path) + _guid_problems(path, read_description(path))
-
-
-def _run_problems(path: Path) -> list[str]:
-    """Loads, initializes and steps the FMU; returns the error, if any."""
-    try:
-        with Fmu(path, name="validate") as plant:
-            plant.initialise(0.0, 1.0)
-            identifier = plant.description.coSimulation.modelIdentifier
-            if identifier in (CONTROLLER.identifier, POLICY.identifier):
-                plant.block(plant.names("output")).get()
-            else:
-                Signals(plant).read()
-            plant.step(0.0, TRIAL_STEP)
-    except HexapodError as error:
-        return [str(error)]
-    return []
-
-
-def _guid_problems(path: Path, description: Any) -> list[str]:
-    """Checks that the binary refuses another model description's GUID."""
-    callbacks = fmi2CallbackFunctions()
     with TemporaryFolder("validate") as folder:
-        unpack(path, folder)
-        identifier = description.coSimulation.modelIdentifier
-        library = packed_binary(folder, identifier)
-        if library is not None and incomplete(Path(library).read_bytes()):
-            return []  # archive_problems reports it; loading it would end this process
         try:
-            with chdir(Path.cwd()):  # fmpy does not restore the working folder when loading fails
-                facts = {
-                    "guid": FOREIGN_GUID,
-                    "modelIdentifier": identifier,
-                    "libraryPath": library,
-                }
-                slave = FMU2Slave(unzipDirectory=folder, instanceName="validate", **facts)
-        except Exception:  # fmpy's errors have no common type; _run_problems reports this one
-            return []
-        try:
-            slave.instantiate(callbacks=callbacks)
-        except Exception:  # the binary refuses the GUID
-            slave.freeLibrary()
-            return []
-        slave.freeInstance()
-    return [
-        (
-            f"binaries: {identifier} takes the GUID {FOREIGN_GUID}, expected that of "
-            "modelDescription.xml alone"
+            unpack(path, folder)
+            if not (folder / "binaries" / platform).is_dir():
+                return []
+            return [str(problem) for problem in call_in_process(try_unpacked, folder)]
+        except FmuError as error:
+            return [str(error)]
+        except ProcessEndedError as error:
+            return [
+                "binaries: loading the FMU and stepping it ended the process: got "
+                f"{error}, expected a step; fix: the binary is damaged or made for another "
+                "system, export the FMU again"
+            ]
+
+
+def try_unpacked(folder: Path) -> list[str]:
+    """Runs an unpacked FMU for a few steps in this process; returns the problems."""
+    messages: list[str] = []
+    try:
+        description = read_model_description(str(folder), validate=False)
+        for library in (folder / "binaries" / PLATFORMS[description.fmiVersion]()).iterdir():
+            refuse_incomplete(library)
+        fmu = instantiate_fmu(
+            str(folder),
+            description,
+            "CoSimulation",
+            library_path=packed_binary(folder, description.coSimulation.modelIdentifier),
+            logger=lambda *message: messages.append(message[-1].decode(errors="replace")),
         )
-    ]
+        result = simulate_fmu(
+            str(folder),
+            validate=False,
+            start_time=0.0,
+            stop_time=STEPS * STEP,
+            output_interval=STEP,
+            timeout=TIME_LIMIT,
+            model_description=description,
+            fmu_instance=fmu,
+        )
+    except Exception as error:  # fmpy's errors have no common type
+        return [f"binaries: {error}" + (f": got {messages[-1]!r}" if messages else "")]
+    return list(result_problems(result))
+
+
+def result_problems(result: Any) -> Iterator[str]:
+    """Yields what is wrong with the recorded outputs: too few rows, values that are no numbers."""
+    steps = len(result) - 1
+    if steps != STEPS:
+        yield f"binaries: the FMU takes no steps of {STEP} s: got {steps}, expected {STEPS}"
+    for name in result.dtype.names:
+        if not np.isfinite(result[name]).all():
+            got = result[name][~np.isfinite(result[name])][0]
+            yield f"{name}: got {got} within {steps} steps, expected finite numbers"

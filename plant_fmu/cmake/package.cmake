@@ -20,7 +20,7 @@ function(hexapod_package target component)
   install(FILES ${HX_LICENCE} DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/hexapod)
 
   configure_package_config_file(${HX_PACKAGE_DIR}/hexapodConfig.cmake.in hexapodConfig.cmake
-    INSTALL_DESTINATION ${config} PATH_VARS CMAKE_INSTALL_DATADIR)
+    INSTALL_DESTINATION ${config})
   # before 1.0 a minor version may change the binary interface
   write_basic_package_version_file(hexapodConfigVersion.cmake
     VERSION ${hexapod_VERSION} COMPATIBILITY SameMinorVersion)

@@ -134,7 +134,7 @@ def test_a_controller_that_raises_keeps_the_recording_and_fails(
 
     monkeypatch.setattr(Controller, "step", broken)
     # it tries the controller out
-    monkeypatch.setattr("hexapod_cosim.cosim.run.run.check_commands", lambda *_, **__: None)
+    monkeypatch.setattr("hexapod_cosim.cosim.run.single_run.check_commands", lambda *_, **__: None)
     folder = tmp_path / "out"
     code, out, err = call("simulate", "walk_flat", "-o", folder, *QUICK)
     assert (code, out) == (1, "")

@@ -13,7 +13,7 @@ from hexapod_cosim.cosim.control.wiring import compiled_wiring
 from hexapod_cosim.cosim.export.controller_export import export_controller
 from hexapod_cosim.cosim.interface.names import foot_names, joint_names
 from hexapod_cosim.cosim.run.controller_setup import make_setup
-from hexapod_cosim.cosim.run.run import simulate
+from hexapod_cosim.cosim.run.single_run import simulate
 from hexapod_cosim.cosim.run.walker import Walker
 from hexapod_cosim.cosim.scenario.scenario import load_scenario
 from hexapod_cosim.models import FmuError, load_robot

@@ -21,7 +21,7 @@ from hexapod_cosim.cosim.master.loop import COMPLETED, FAILED
 from hexapod_cosim.cosim.results.comparison import read_seeds
 from hexapod_cosim.cosim.results.summary import REFUSED, Summary, summarise
 from hexapod_cosim.cosim.run.batch import run_batch
-from hexapod_cosim.cosim.run.run import simulate
+from hexapod_cosim.cosim.run.single_run import simulate
 from hexapod_cosim.cosim.scenario.records import Scenario
 from hexapod_cosim.cosim.scenario.scenario import load_scenario
 from hexapod_cosim.cosim.scenario.variation import STANDARD
@@ -192,7 +192,10 @@ def test_an_interrupted_comparison_keeps_whole_runs_and_leaves_no_process(
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="no such signal")
-def test_a_worker_that_dies_is_reported_with_its_run(plant_build: Path) -> None:
+def test_a_worker_that_dies_each_time_is_reported_with_its_run(
+    plant_build: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("hexapod_cosim.cosim.run.worker_pool.TRIES", 1)
     plans = [replace(short(), seed=7), *[replace(short(), duration=60.0, seed=8)] * 5]
     with closing(run_batch(plans, workers=2)) as runs:
         assert next(runs).walked

@@ -16,7 +16,7 @@ from hexapod_cosim.controller import BodyCommand, JointCommand, Measurement
 from hexapod_cosim.cosim.master.loop import Outcome, run
 from hexapod_cosim.cosim.master.recorder import Recorder
 from hexapod_cosim.cosim.master.signals import Signals
-from hexapod_cosim.cosim.run.run import make_inner_sensors, make_sensor, simulate
+from hexapod_cosim.cosim.run.single_run import make_inner_sensors, make_sensor, simulate
 from hexapod_cosim.cosim.scenario.event_log import describe_event
 from hexapod_cosim.cosim.scenario.scenario import load_scenario, scenario_from_table
 from hexapod_cosim.cosim.scenario.schedule import make_schedule

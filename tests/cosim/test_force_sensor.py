@@ -11,7 +11,7 @@ from hexapod_cosim.controller import BodyCommand, JointCommand, Measurement
 from hexapod_cosim.cosim.master.loop import run
 from hexapod_cosim.cosim.master.recorder import Recorder, Recording
 from hexapod_cosim.cosim.master.signals import CONTACT, Signals
-from hexapod_cosim.cosim.run.run import make_sensor
+from hexapod_cosim.cosim.run.single_run import make_sensor
 from hexapod_cosim.cosim.scenario.scenario import load_scenario
 from hexapod_cosim.cosim.scenario.schedule import make_schedule
 from hexapod_cosim.models import LEG_NAMES

@@ -17,7 +17,7 @@ from hexapod_cosim.cosim.master.loop import Outcome, run
 from hexapod_cosim.cosim.master.recorder import Recorder
 from hexapod_cosim.cosim.master.signals import Signals
 from hexapod_cosim.cosim.results.results import read_facts, write_result
-from hexapod_cosim.cosim.run.run import make_sensor, simulate
+from hexapod_cosim.cosim.run.single_run import make_sensor, simulate
 from hexapod_cosim.cosim.run.walker import Walker
 from hexapod_cosim.cosim.scenario.event_log import event_log
 from hexapod_cosim.cosim.scenario.scenario import load_scenario

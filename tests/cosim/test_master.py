@@ -29,7 +29,7 @@ from hexapod_cosim.cosim.results.recordings import read_csv, write_csv
 from hexapod_cosim.cosim.results.result import Result
 from hexapod_cosim.cosim.results.walk import View
 from hexapod_cosim.cosim.results.warnings import describe_walk
-from hexapod_cosim.cosim.run.run import apply_settings, make_sensor, simulate
+from hexapod_cosim.cosim.run.single_run import apply_settings, make_sensor, simulate
 from hexapod_cosim.cosim.scenario.records import Push, Scenario
 from hexapod_cosim.cosim.scenario.scenario import load_scenario, scenario_robot
 from hexapod_cosim.cosim.scenario.schedule import make_schedule, push_rows

@@ -9,7 +9,7 @@ import pytest
 from gains import make_gains
 
 from hexapod_cosim.cosim.results.result import Result
-from hexapod_cosim.cosim.run.run import simulate
+from hexapod_cosim.cosim.run.single_run import simulate
 from hexapod_cosim.cosim.scenario.scenario import load_scenario
 from hexapod_cosim.models import load_robot
 

@@ -14,7 +14,7 @@ from memory import resident
 
 from hexapod_cosim.controller import Gains
 from hexapod_cosim.cosim.export.controller_export import export_controller
-from hexapod_cosim.cosim.export.export import export_fmu
+from hexapod_cosim.cosim.export.plant_export import export_fmu
 from hexapod_cosim.cosim.master import native_loop as native_master
 from hexapod_cosim.cosim.master.fmu import Fmu
 from hexapod_cosim.cosim.master.fmu_controller import FmuController
@@ -32,7 +32,7 @@ from hexapod_cosim.cosim.master.signals import Signals
 from hexapod_cosim.cosim.results.result import Result
 from hexapod_cosim.cosim.results.summary import REFUSED, Summary, summarise
 from hexapod_cosim.cosim.run.batch import run_batch
-from hexapod_cosim.cosim.run.run import (
+from hexapod_cosim.cosim.run.single_run import (
     initialise_plant,
     make_plan,
     make_result,

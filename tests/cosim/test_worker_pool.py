@@ -1,30 +1,40 @@
-"""The worker pool: results of all tasks, and the task of a worker that dies."""
+"""The executors: results of all tasks, and the task of a worker that dies."""
 
 from __future__ import annotations
 
 import multiprocessing
 import os
 import time
+from functools import partial
 from pathlib import Path
 
 import pytest
 
 from hexapod_cosim.cosim.run.worker_pool import (
-    DIED,
-    Finished,
-    InProcessExecutor,
-    TaskExecutor,
+    TRIES,
+    SerialExecutor,
+    WorkerDiedError,
+    WorkerPool,
     raise_if_stopped,
-    worker_pool,
 )
 
 DEADLY = 5  # the task that ends its process
+TASKS = [0, 1, 2, 3, 4]
+SQUARES = [0, 1, 4, 9, 16]
 
 
 def square(task: int) -> int:
     if task == DEADLY:
         os._exit(9)
     return task * task
+
+
+def die_once(file: Path, task: int) -> int:
+    """Ends the first process that runs the task 2."""
+    if task == 2 and not file.exists():
+        file.touch()
+        os._exit(9)
+    return task
 
 
 def wait_for_stop(_task: int) -> bool:
@@ -40,56 +50,53 @@ def set_variable() -> None:
     os.environ["HEXAPOD_TEST_POOL"] = "initialised"
 
 
-def read_environment(_task: int) -> tuple[str, str]:
+def read_environment() -> tuple[str, str]:
     import tempfile  # noqa: PLC0415
 
     return os.environ["HEXAPOD_TEST_POOL"], tempfile.gettempdir()
 
 
-def run_all(executor: TaskExecutor[int, int], tasks: list[int]) -> list[Finished[int, int]]:
-    """Runs tasks and returns them in the order of the tasks."""
-    for task in tasks:
-        executor.submit(task)
-    finished: list[Finished[int, int]] = []
-    while len(finished) < len(tasks):
-        finished += executor.wait()
-    return sorted(finished, key=lambda item: item.task)
-
-
 def test_all_executors_return_the_same_results() -> None:
-    tasks = [0, 1, 2, 3, 4]
-    expected = [Finished(0, 0), Finished(1, 1), Finished(2, 4), Finished(3, 9), Finished(4, 16)]
-    assert run_all(InProcessExecutor(square), tasks) == expected
+    assert list(SerialExecutor().map(square, TASKS)) == SQUARES
     for size in (1, 2):
-        with worker_pool(size, square) as pool:
-            assert run_all(pool, tasks) == expected
+        with WorkerPool(size) as pool:
+            assert list(pool.map(square, TASKS)) == SQUARES
     assert multiprocessing.active_children() == []
 
 
-def test_the_task_of_a_dead_worker_is_named_and_the_others_are_finished() -> None:
-    with worker_pool(1, square) as pool:
-        finished = run_all(pool, [4, DEADLY, 6, 7])
-    deaths = [item for item in finished if item.death]
-    assert deaths == [Finished(DEADLY, None, death=DIED)]
-    assert [item.result for item in finished if not item.death] == [16, 36, 49]
+def test_a_task_that_ends_every_process_has_an_error_and_the_others_are_finished() -> None:
+    with WorkerPool(1) as pool:
+        futures = [pool.submit(square, task) for task in (4, DEADLY, 6, 7)]
+        with pytest.raises(WorkerDiedError, match="ended by itself"):
+            futures.pop(1).result()
+        assert [future.result() for future in futures] == [16, 36, 49]
+        assert len(pool._processes) == 1 + TRIES
+
+
+def test_a_process_that_dies_once_costs_no_task(tmp_path: Path) -> None:
+    with WorkerPool(2) as pool:
+        assert list(pool.map(partial(die_once, tmp_path / "died"), TASKS)) == TASKS
+    assert (tmp_path / "died").exists()
 
 
 def test_closing_a_pool_stops_its_tasks() -> None:
-    with worker_pool(1, wait_for_stop) as pool:
-        pool.submit(0)
+    with WorkerPool(1) as pool:
+        running, waiting = pool.submit(wait_for_stop, 0), pool.submit(wait_for_stop, 1)
+        while not running.running():
+            time.sleep(0.01)
+    assert running.result()
+    assert waiting.cancelled()
     assert multiprocessing.active_children() == []
 
 
 def test_workers_are_initialised_and_use_the_scratch_folder(tmp_path: Path) -> None:
-    with worker_pool(1, read_environment, initialise=set_variable, scratch=tmp_path) as pool:
-        pool.submit(0)
-        (finished,) = pool.wait()
-    assert finished.result == ("initialised", str(tmp_path))
+    with WorkerPool(1, initialise=set_variable, scratch=tmp_path) as pool:
+        assert pool.submit(read_environment).result() == ("initialised", str(tmp_path))
     assert "HEXAPOD_TEST_POOL" not in os.environ
 
 
-def test_an_error_in_a_task_is_raised_by_wait() -> None:
-    with worker_pool(1, int) as pool:
-        pool.submit("seven")
-        with pytest.raises(ValueError, match="seven"):
-            pool.wait()
+def test_an_error_in_a_task_is_raised_by_its_future() -> None:
+    with WorkerPool(1) as pool:
+        for executor in (pool, SerialExecutor()):
+            with pytest.raises(ValueError, match="seven"):
+                executor.submit(int, "seven").result()

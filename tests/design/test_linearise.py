@@ -14,7 +14,7 @@ from hexapod_cosim.controller.design.closed import disturbed
 from hexapod_cosim.controller.design.loci import response
 from hexapod_cosim.controller.design.paper import shifted
 from hexapod_cosim.controller.design.standing import ANGLES, StandingPlant, weight_share
-from hexapod_cosim.cosim.design.design import STANCES, level_fmu
+from hexapod_cosim.cosim.design.gain_design import STANCES, level_fmu
 from hexapod_cosim.cosim.design.linearise import STATES, Bench, linearise
 from hexapod_cosim.cosim.design.standing import StanceError, rest
 from hexapod_cosim.cosim.interface.names import foot_vector_names
@@ -50,7 +50,8 @@ def yielded(robot: Robot, plant: StandingPlant, force: np.ndarray) -> np.ndarray
     """Returns by how much the servos yield at the standing feet (3 n) [m] to forces (3 n) [N]."""
     jacobian = LegSolver(robot).jacobian(plant.angle)[plant.standing]
     soft = jacobian @ jacobian.transpose(0, 2, 1) / robot.servo.kp
-    return np.asarray(np.einsum("nij,nj->ni", soft, force.reshape(-1, 3)).reshape(-1))
+    moved: np.ndarray = np.einsum("nij,nj->ni", soft, force.reshape(-1, 3))
+    return moved.reshape(-1)
 
 
 @pytest.mark.parametrize("name", ROBOTS)

@@ -9,13 +9,10 @@ import shutil
 import subprocess
 import sys
 import tomllib
-import zipfile
 from pathlib import Path
 
 import pytest
 from pages import blocks
-
-from hexapod_cosim.cosim.common.plant_files import fmi_headers
 
 ROOT = Path(__file__).resolve().parents[2]
 VERSION = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]["version"]
@@ -51,12 +48,9 @@ def output(*command: str | Path, **variables: str) -> str:
 
 @pytest.fixture(scope="module")
 def vendored(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The plant and the FMI layer in another tree, with the licence and without the Python
-    project.
-    """
+    """The plant in another tree, with the licence and without the Python project."""
     folder = tmp_path_factory.mktemp("vendor") / "hexapod"
     shutil.copytree(ROOT / "plant_fmu", folder)
-    shutil.copytree(ROOT / "fmi", folder / "fmi")
     shutil.copy(ROOT / "LICENSE", folder)
     return folder
 
@@ -65,7 +59,6 @@ def vendored(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def prefix(vendored: Path) -> Path:
     """Where it is installed; it is moved there afterwards, since an installation may be."""
     build, first, moved = (vendored.parent / name for name in ("build", "first", "moved"))
-    headers = f"-DFMI_HEADERS={fmi_headers()}"
     output(
         CMAKE,
         "-S",
@@ -73,7 +66,6 @@ def prefix(vendored: Path) -> Path:
         "-B",
         build,
         *NINJA,
-        headers,
         "-DCMAKE_BUILD_TYPE=Debug",
         "-DHX_LINT=ON",
     )
@@ -89,11 +81,8 @@ def test_the_installation_is_what_c_people_expect(prefix: Path) -> None:
     assert headers == {
         f"include/hexapod/{name}.h" for name in ("hexapod", "legs", "status", "terrain")
     }
-    assert {"share/doc/hexapod/LICENSE", "share/hexapod/athena.fmu"} <= files
+    assert "share/doc/hexapod/LICENSE" in files
     assert any(path.endswith("/cmake/hexapod/hexapodConfigVersion.cmake") for path in files)
-    with zipfile.ZipFile(prefix / "share/hexapod/athena.fmu") as archive:
-        assert "modelDescription.xml" in archive.namelist()
-        assert "MIT License" in archive.read("documentation/licenses/license.txt").decode()
     for path in files:
         if path.endswith((".cmake", ".pc")):
             assert str(prefix.parent) not in (prefix / path).read_text(encoding="utf-8"), (
@@ -178,12 +167,9 @@ def test_what_is_not_installed_is_not_found(
     assert message in " ".join(process.stderr.split())
 
 
-def test_missing_headers_and_a_missing_licence_are_said_with_what_to_do(
-    vendored: Path, tmp_path: Path
-) -> None:
-    process = done(
-        CMAKE, "-S", vendored, "-B", tmp_path / "build", *NINJA, f"-DFMI_HEADERS={tmp_path}"
-    )
+def test_missing_headers_and_a_missing_licence_are_said_with_what_to_do(tmp_path: Path) -> None:
+    asked = ("-DHX_FMU=ON", f"-DFMI_HEADERS={tmp_path}")
+    process = done(CMAKE, "-S", ROOT, "-B", tmp_path / "build", *NINJA, *asked)
     assert process.returncode != 0
     told = " ".join(process.stderr.split())
     assert (
@@ -193,33 +179,24 @@ def test_missing_headers_and_a_missing_licence_are_said_with_what_to_do(
     assert "-DHX_FMU=OFF" in told
     alone = tmp_path / "alone" / "plant"
     shutil.copytree(ROOT / "plant_fmu", alone)
-    process = done(CMAKE, "-S", alone, "-B", tmp_path / "other", *NINJA, "-DHX_FMU=OFF")
+    process = done(CMAKE, "-S", alone, "-B", tmp_path / "other", *NINJA)
     assert process.returncode != 0
     assert f"No LICENSE in {alone} or in {alone.parent}." in " ".join(process.stderr.split())
 
 
-def test_the_library_alone_needs_no_fmi_headers_and_fits_into_another_project(
+def test_the_library_fits_into_another_project_and_installs_nothing_there(
     vendored: Path, tmp_path: Path
 ) -> None:
     (tmp_path / "CMakeLists.txt").write_text(
         "cmake_minimum_required(VERSION 3.25)\n"
-        "project(theirs VERSION 9.9 LANGUAGES C)\nset(HX_FMU OFF)\n"
+        "project(theirs VERSION 9.9 LANGUAGES C)\n"
         f"add_subdirectory({vendored.as_posix()} hexapod EXCLUDE_FROM_ALL)\n"
         f"add_executable(step {EXAMPLE.as_posix()}/step.c)\n"
         "target_link_libraries(step PRIVATE hexapod::plant)\n",
         encoding="utf-8",
     )
     build = tmp_path / "build"
-    output(
-        CMAKE,
-        "-S",
-        tmp_path,
-        "-B",
-        build,
-        *NINJA,
-        "-DCMAKE_BUILD_TYPE=Debug",
-        f"-DFMI_HEADERS={tmp_path}",
-    )
+    output(CMAKE, "-S", tmp_path, "-B", build, *NINJA, "-DCMAKE_BUILD_TYPE=Debug")
     output(CMAKE, "--build", build)
     assert SAYS[0] in output(build / "step")
     output(CMAKE, "--install", build, "--prefix", tmp_path / "installed")

@@ -22,7 +22,7 @@ SEES = {
     "cosim": {"models", "controller", "cosim"},
     "gym": {"models", "controller", "cosim", "gym"},
 }
-# what each room of cosim may import; study has rooms of its own
+# what each room of cosim may import
 LOW = ["common", "interface", "scenario", "master"]
 RUNNING = [*LOW, "control", "export", "logs", "results", "design"]
 ROOMS = {
@@ -34,17 +34,14 @@ ROOMS = {
     "export": LOW,
     "logs": LOW,
     "results": [*LOW, "logs"],
-    "validate": [*LOW, "export"],
+    "validate": LOW,
     "design": [*LOW, "export"],
     "report": [*LOW, "export", "results"],
     "run": RUNNING,
     "identify": [*RUNNING, "report", "run"],
     "course": [*RUNNING, "report", "run"],
     "live": [*RUNNING, "report", "run"],
-    "study.plan": [*LOW, "results"],
-    "study.store": [*LOW, "results", "study.plan"],
-    "study.execute": [*RUNNING, "run", "study.plan", "study.store"],
-    "study.report": [*LOW, "results", "study.plan", "study.store"],
+    "study": [*RUNNING, "run"],
 }
 COMPONENTS = ("plant_fmu", "controller_fmu", "policy_fmu")  # the folders of FMUs in C
 MOST_FILES = 20  # in a folder that people write
@@ -95,22 +92,17 @@ def test_a_folder_imports_only_what_lies_below_it(folder: str) -> None:
                 assert parts[1] in SEES[folder], f"{path.relative_to(ROOT)} imports {name}"
 
 
-def room_of(parts: tuple[str, ...]) -> str:
-    """The room of a module of cosim, from the parts of its name after `cosim`."""
-    return ".".join(parts[:2]) if parts[0] == "study" else parts[0]
-
-
 def test_a_room_imports_only_the_rooms_below_it() -> None:
     seen = set()
     for path in python_files("cosim"):
         parts = path.relative_to(ROOT / "cosim").with_suffix("").parts
         if len(parts) == 1 or parts[0] == "cli" or parts[-1] == "__init__":
             continue
-        room = room_of(parts)
+        room = parts[0]
         seen.add(room)
         for name in imports(path):
             if name.startswith(f"{PACKAGE}.cosim."):
-                other = room_of(tuple(name.split(".")[2:]))
+                other = name.split(".")[2]
                 assert other == room or other in ROOMS[room], (
                     f"{path.relative_to(ROOT)} imports {name}"
                 )
@@ -120,11 +112,7 @@ def test_a_room_imports_only_the_rooms_below_it() -> None:
 def test_each_room_says_what_it_is_for_and_what_it_may_import() -> None:
     for room in ROOMS:
         text = ast.get_docstring(
-            ast.parse(
-                (ROOT / "cosim" / room.replace(".", "/") / "__init__.py").read_text(
-                    encoding="utf-8"
-                )
-            )
+            ast.parse((ROOT / "cosim" / room / "__init__.py").read_text(encoding="utf-8"))
         )
         assert text is not None, room
         assert " ".join(text.split()).count(". Imports ") == 1, f"{room}: {text}"
@@ -132,7 +120,7 @@ def test_each_room_says_what_it_is_for_and_what_it_may_import() -> None:
 
 def test_no_folder_holds_more_files_than_a_reader_can_survey() -> None:
     python = ("models", "controller", "cosim", "gym", "tests", "benchmarks", "tools", "examples")
-    names = (*python, "fmi", *COMPONENTS, "master")
+    names = (*python, "fmi", *COMPONENTS)
     kinds = {".py", ".c", ".h", ".ts"}
     counts: dict[Path, int] = {}
     for path in (path for name in names for path in (ROOT / name).rglob("*.*")):
@@ -235,7 +223,7 @@ def test_the_ground_knows_nothing_of_legs_in_lanes() -> None:
 
 
 def test_the_masters_loop_sees_the_standard_and_nothing_of_the_fmus_it_drives() -> None:
-    files = c_files("src", "include/hexapod", component="master")
+    files = c_files("src", "include/hexapod", component="cosim/master")
     assert files
     own = {path.name for path in files if path.suffix == ".h"}
     own |= {
@@ -268,7 +256,7 @@ DEFINED = re.compile(r"^\}\s*(hx[A-Z]\w*);|^\w[\w ]*?[ *]+(hx_\w+)\([^;{]*\)\s*\
 
 def test_no_two_types_or_functions_of_c_share_a_name() -> None:
     places: dict[str, set[str]] = {}  # within a file alternatives stand behind #if
-    for component in (*COMPONENTS, "master", "fmi"):
+    for component in (*COMPONENTS, "cosim/master", "fmi"):
         folders = ("", "src", "include/hexapod")
         for path in c_files(*folders, component=component):
             text = re.sub(r"/\*.*?\*/", "", path.read_text(encoding="utf-8"), flags=re.DOTALL)

@@ -16,7 +16,7 @@ import pytest
 from command import Call
 
 from hexapod_cosim.cosim.export.controller_export import export_controller
-from hexapod_cosim.cosim.export.export import export_fmu
+from hexapod_cosim.cosim.export.plant_export import export_fmu
 from hexapod_cosim.cosim.run.controller_setup import make_setup
 from hexapod_cosim.models import load_robot
 
@@ -142,8 +142,3 @@ def test_an_fmu_holds_the_projects_licence(
             text = archive.read("documentation/licenses/license.txt").decode()
         assert OURS in text
         assert PERMISSION in text
-
-
-def test_the_fmu_that_cmake_packs_holds_the_projects_licence(athena_fmu: Path) -> None:
-    with zipfile.ZipFile(athena_fmu) as archive:
-        assert OURS in archive.read("documentation/licenses/license.txt").decode()

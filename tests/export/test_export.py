@@ -20,10 +20,11 @@ import pytest
 from fmi_plant import ATHENA, GUID, OK, Plant
 
 from hexapod_cosim.cosim.common import plant_files
-from hexapod_cosim.cosim.export.export import checksum, export_fmu, start_values
+from hexapod_cosim.cosim.export.plant_export import export_fmu
 from hexapod_cosim.cosim.export.reference import FOLDER, MANIFEST
-from hexapod_cosim.cosim.interface.interface import load_interface
+from hexapod_cosim.cosim.export.start_values import checksum, start_values
 from hexapod_cosim.cosim.interface.model_description import render_fmi2
+from hexapod_cosim.cosim.interface.plant_interface import load_interface
 from hexapod_cosim.models.errors import HexapodError
 from hexapod_cosim.models.records import Robot
 from hexapod_cosim.models.robot import load_robot
@@ -76,15 +77,6 @@ def test_a_bare_fmu_has_the_description_starts_and_binary_of_the_whole_one_and_n
         "binaries", "modelDescription.xml", "resources",
     }  # fmt: skip
     assert all(whole[name] == content for name, content in bare.items())
-
-
-def test_cmake_and_the_exporter_write_the_same_fmu(exported: Path, athena_fmu: Path) -> None:
-    ours, cmakes = members(exported), members(athena_fmu)
-    assert set(ours) == set(cmakes)
-    # compiled, drawn and simulated parts are compared in test_extras.py: other compilers and
-    # libraries make other bytes
-    made = ("binaries/", f"{FOLDER}/", "model.png", "terminalsAndIcons/icon.png")
-    assert [name for name in ours if ours[name] != cmakes[name] and not name.startswith(made)] == []
 
 
 def test_the_default_robot_needs_no_resources(exported: Path, tmp_path: Path) -> None:

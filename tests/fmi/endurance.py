@@ -26,7 +26,7 @@ from fmi_plant import ATHENA, GUID, LAST_SUCCESSFUL_TIME, OK, Plant
 from fuzz import run
 from memory import resident
 
-from hexapod_cosim.cosim.export.export import start_values
+from hexapod_cosim.cosim.export.start_values import start_values
 
 H = 0.005  # s
 ALLOWED_GROWTH = 1_000_000  # bytes, half a percent of the memory of 10,000 instances

@@ -16,9 +16,9 @@ import pytest
 from fmi_plant import ATHENA, ERROR, GUID, LAST_SUCCESSFUL_TIME, OK, WARNING, Callbacks, Plant
 from memory import resident
 
-from hexapod_cosim.cosim.export.export import start_values
-from hexapod_cosim.cosim.interface.interface import load_interface
+from hexapod_cosim.cosim.export.start_values import start_values
 from hexapod_cosim.cosim.interface.model_description import render_fmi2
+from hexapod_cosim.cosim.interface.plant_interface import load_interface
 from hexapod_cosim.models.robot import load_robot
 
 H = 0.01  # s

@@ -17,8 +17,8 @@ import fmpy
 import pytest
 from fmi_plant import ATHENA, GUID
 
-from hexapod_cosim.cosim.interface.interface import load_interface
 from hexapod_cosim.cosim.interface.model_description import render_fmi2
+from hexapod_cosim.cosim.interface.plant_interface import load_interface
 from hexapod_cosim.models.errors import HexapodError
 from hexapod_cosim.models.robot import load_robot
 
@@ -176,15 +176,15 @@ def test_a_file_that_is_not_up_to_date_is_found(
 ) -> None:
     generator = load_generator()
     monkeypatch.setattr(generator, "ROOT", tmp_path)
-    for path, text in generator.stale_files().items():
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(text, encoding="utf-8")
-    assert generator.stale_files() == {}
+    files = generator.render_all()
+    for path, text in files.items():
+        generator.write(path, text)
+    assert generator.stale_files(files) == {}
     for component in ("plant_fmu", "controller_fmu", "policy_fmu"):
         changed = tmp_path / component / "generated" / "defaults.c"
         kept = changed.read_text(encoding="utf-8")
         changed.write_text("/* by hand */", encoding="utf-8")
-        assert list(generator.stale_files()) == [changed]
+        assert list(generator.stale_files(files)) == [changed]
         changed.write_text(kept, encoding="utf-8")
 
 

@@ -22,6 +22,8 @@ from hypothesis import strategies as st
 from PIL import Image
 
 from hexapod_cosim.cosim.control.connection import read_map
+from hexapod_cosim.cosim.interface.controller_interface import load_controller_interface
+from hexapod_cosim.cosim.interface.model_description import render_fmi2
 from hexapod_cosim.cosim.master.recorder import Recording
 from hexapod_cosim.cosim.results.recordings import (
     read_csv,
@@ -30,8 +32,9 @@ from hexapod_cosim.cosim.results.recordings import (
     write_parquet,
 )
 from hexapod_cosim.cosim.results.results import read_result
+from hexapod_cosim.cosim.run.controller_setup import make_setup
 from hexapod_cosim.cosim.scenario.scenario import load_scenario
-from hexapod_cosim.cosim.study.plan.reading import load_study
+from hexapod_cosim.cosim.study.reading import load_study
 from hexapod_cosim.cosim.validate.validation import find_problems
 from hexapod_cosim.models import HexapodError, load_robot
 from hexapod_cosim.models.ground.grid_file import surface_from_bytes
@@ -114,7 +117,7 @@ def toml_files(path: Path) -> st.SearchStrategy[bytes]:
 
 ROBOT = ROOT / "models" / "athena.toml"
 SCENARIOS = ROOT / "cosim" / "scenario" / "scenarios"
-STUDIES = ROOT / "cosim" / "study" / "plan" / "studies"
+STUDIES = ROOT / "cosim" / "study" / "studies"
 
 
 @MODES
@@ -259,7 +262,9 @@ def test_a_folder_of_results_is_read_or_refused(
     reads(lambda: read_result(tmp_path))
 
 
-DESCRIPTION = (ROOT / "controller_fmu" / "generated" / "modelDescription.xml").read_bytes()
+DESCRIPTION = render_fmi2(
+    load_controller_interface(make_setup(load_robot("athena"), control="kinematic", period=0.005))
+).xml.encode()
 
 
 def archive(description: bytes) -> bytes:

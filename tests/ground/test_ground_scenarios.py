@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 import tomlkit
 
-from hexapod_cosim.cosim.export.export import grid_members
+from hexapod_cosim.cosim.export.plant_export import grid_members
 from hexapod_cosim.cosim.master.fmu import Fmu
 from hexapod_cosim.cosim.master.recorder import Recording
 from hexapod_cosim.cosim.report.relief import write_heights

@@ -14,7 +14,8 @@ from hexapod_cosim.cosim.master.fmu import Fmu
 from hexapod_cosim.cosim.validate.validation import find_problems
 from hexapod_cosim.gym.__main__ import main
 from hexapod_cosim.gym.batch import Batch
-from hexapod_cosim.gym.export import export_policy, standing_policy
+from hexapod_cosim.gym.export import export_policy
+from hexapod_cosim.gym.interface import standing_policy
 from hexapod_cosim.gym.policy import (
     FREE_SIZE,
     INPUTS,

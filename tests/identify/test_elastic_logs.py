@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from secret_robots import NOISE, SEEN, Secret, secret_robot
 
-from hexapod_cosim.cosim.export.export import export_fmu
+from hexapod_cosim.cosim.export.plant_export import export_fmu
 from hexapod_cosim.cosim.identify.experiment import Experiment
 from hexapod_cosim.cosim.identify.fitting.output_error import fit
 from hexapod_cosim.cosim.identify.fitting.problem import Problem

@@ -20,7 +20,7 @@ from secret_robots import NOISE, Secret, secret_robot, with_column
 
 from benchmarks.identification.campaign import GOAL_COVERED, GOAL_RATIO, summary, table_row
 from benchmarks.identification.campaign import score as score_of
-from hexapod_cosim.cosim.export.export import export_fmu
+from hexapod_cosim.cosim.export.plant_export import export_fmu
 from hexapod_cosim.cosim.identify import excitation
 from hexapod_cosim.cosim.identify.channel_screening import screened
 from hexapod_cosim.cosim.identify.excitation import Proposal, propose, scenario_text

@@ -12,7 +12,7 @@ from mirror import HxOutput
 from numpy.typing import NDArray
 
 from hexapod_cosim.cosim.live.module import walker_module
-from hexapod_cosim.cosim.run.run import simulate
+from hexapod_cosim.cosim.run.single_run import simulate
 from hexapod_cosim.cosim.scenario.scenario import load_scenario
 
 wasmtime = pytest.importorskip("wasmtime")

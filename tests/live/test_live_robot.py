@@ -28,7 +28,7 @@ from hexapod_cosim.cosim.live.settings import (
 from hexapod_cosim.cosim.live.take import NO_FORCE, Take
 from hexapod_cosim.cosim.master.fmu import Fmu
 from hexapod_cosim.cosim.run.preparation import chosen_gains
-from hexapod_cosim.cosim.run.run import RunPlan, initialise_plant
+from hexapod_cosim.cosim.run.single_run import RunPlan, initialise_plant
 from hexapod_cosim.cosim.run.walker import Walker
 from hexapod_cosim.cosim.scenario.reach import check_commands
 from hexapod_cosim.cosim.scenario.records import Command

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from hexapod_cosim.cosim.results.drop import drop_text
-from hexapod_cosim.cosim.run.run import simulate
+from hexapod_cosim.cosim.run.single_run import simulate
 from hexapod_cosim.cosim.scenario.scenario import load_scenario
 
 STIFF = "contact.stiffness=1e9"  # the weight acts for too short a time to matter

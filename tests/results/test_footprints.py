@@ -14,7 +14,7 @@ from states import changed
 from hexapod_cosim.cosim.interface.names import foot_names, foot_vector_names
 from hexapod_cosim.cosim.master.recorder import Recording
 from hexapod_cosim.cosim.results.footprints import find_footprints, sinkage_warnings
-from hexapod_cosim.cosim.run.run import simulate
+from hexapod_cosim.cosim.run.single_run import simulate
 from hexapod_cosim.cosim.scenario.scenario import load_scenario
 from hexapod_cosim.models import SOIL_LAWS, load_robot
 from hexapod_cosim.models.dynamics import Command

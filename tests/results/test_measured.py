@@ -24,7 +24,7 @@ from hexapod_cosim.cosim.interface.names import foot_names, joint_names, vector_
 from hexapod_cosim.cosim.results.metrics import compute_metrics
 from hexapod_cosim.cosim.results.metrics import landing_rates as plant_rates
 from hexapod_cosim.cosim.results.walk import View, Walk
-from hexapod_cosim.cosim.run.run import simulate
+from hexapod_cosim.cosim.run.single_run import simulate
 from hexapod_cosim.cosim.scenario.records import CONTROLS
 from hexapod_cosim.cosim.scenario.scenario import load_scenario
 from hexapod_cosim.models import load_robot

@@ -1,29 +1,30 @@
-"""Small studies with engines that simulate no walk."""
+"""Small studies with runners that simulate no walk."""
 
 from __future__ import annotations
 
-import hashlib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
 import pyarrow.parquet as pq
+import pytest
+from study_runners import Fake
 
-from hexapod_cosim.cosim.study.execute.study import Options, run_study
-from hexapod_cosim.cosim.study.plan.reading import study_from_table
-from hexapod_cosim.cosim.study.plan.records import Study
-from hexapod_cosim.cosim.study.store.columns import schema_of
-from hexapod_cosim.cosim.study.store.manifest import RESULTS, RUNS
-from hexapod_cosim.cosim.study.store.store import Store
+from hexapod_cosim.cosim.study.folder import RESULTS
+from hexapod_cosim.cosim.study.job import Job, make_job
+from hexapod_cosim.cosim.study.reading import study_from_table
+from hexapod_cosim.cosim.study.records import Study
+from hexapod_cosim.cosim.study.store import RUNS, Store, quoted
+from hexapod_cosim.cosim.study.study import Options, run_study
 
-FAKE, SLOW, BRIEF = "study_engines:Fake", "study_engines:Slow", "study_engines:Brief"
-LEAKY = "study_engines:Leaky"
 SMALL: dict[str, Any] = {
     "scenario": "walk_flat",
     "seeds": 3,
     "factors": {"friction.mu": [0.3, 0.6, 0.9]},
 }
 KINEMATIC = {"controls": ["kinematic"]}
+Row = dict[str, Any]
 
 
 def study_of(table: Mapping[str, Any] = SMALL, **changes: Any) -> Study:
@@ -35,31 +36,54 @@ def quiet(_total: int, _done: int) -> Any:
     return lambda _more, _lost: None
 
 
-def run_quietly(study: Study, folder: Path, **options: Any) -> list[dict[str, Any]]:
+def run_quietly(study: Study, folder: Path, **options: Any) -> list[Row]:
     """Runs a study without a display of progress; returns the rows of its results."""
     run_study(
-        study, folder, options=Options(**{"engine": FAKE, "workers": 0, **options}), start=quiet
+        study, folder, options=Options(**{"runner": Fake, "workers": 0, **options}), start=quiet
     )
     return rows(folder)
 
 
-def rows(folder: Path) -> list[dict[str, Any]]:
-    found: list[dict[str, Any]] = pq.read_table(folder / RESULTS).to_pylist()
+def rows(folder: Path) -> list[Row]:
+    found: list[Row] = pq.read_table(folder / RESULTS).to_pylist()
     return found
 
 
-def digest(folder: Path) -> str:
-    """Returns the SHA-256 of the results."""
-    return hashlib.sha256((folder / RESULTS).read_bytes()).hexdigest()
+def stored_rows(study: Study, folder: Path) -> list[Row]:
+    """Returns the rows of the store, also of a study that runs, in the order of their numbers."""
+    with closing(Store(folder, study)) as store:
+        return list(store.rows(range(10**6)).values())
+
+
+def stored_count(study: Study, folder: Path) -> int:
+    """Returns the number of runs in the store; 0 where there is none."""
+    return len(stored_rows(study, folder)) if (folder / RUNS).exists() else 0
 
 
 def replace_stored(
-    study: Study, folder: Path, change: Callable[[dict[str, Any]], dict[str, Any] | None]
+    study: Study, folder: Path, change: Callable[[Row], Row | None] = lambda row: row
 ) -> None:
     """Replaces each stored row by the result of `change`, or removes it for None."""
-    store = Store(folder / RUNS, schema_of(study))
-    stored = [row for table in store.sorted_rows() for row in table.to_pylist()]
-    for part in store.parts():
-        part.unlink()
-    store.add(row for row in map(change, stored) if row is not None)
-    store.flush()
+    kept = [row for row in map(change, stored_rows(study, folder)) if row is not None]
+    write_rows(study, folder, kept)
+
+
+def write_rows(study: Study, folder: Path, found: Iterable[Row]) -> None:
+    """Replaces all stored rows; what a row lacks is NULL."""
+    with closing(Store(folder, study)) as store, store.database:
+        names = [item.name for item in store.columns]
+        store.database.execute("DELETE FROM runs")
+        store.database.executemany(
+            f"INSERT INTO runs ({', '.join(map(quoted, names))}) VALUES "
+            f"({', '.join('?' * len(names))})",
+            [[row.get(name) for name in names] for row in found],
+        )
+
+
+def use_runner(monkeypatch: pytest.MonkeyPatch, runner: type) -> None:
+    """Makes commands run studies with a runner of the tests."""
+
+    def make(*arguments: Any, **options: Any) -> Job:
+        return make_job(*arguments, **{**options, "runner": runner})
+
+    monkeypatch.setattr("hexapod_cosim.cosim.study.study.make_job", make)

@@ -15,10 +15,10 @@ import tomlkit
 from studies import study_of
 
 from hexapod_cosim.cosim.common.files import to_json
-from hexapod_cosim.cosim.study.plan.bundled import list_studies
-from hexapod_cosim.cosim.study.plan.points import Sweep
-from hexapod_cosim.cosim.study.plan.reading import load_study, study_from_table
-from hexapod_cosim.cosim.study.store.columns import schema_of
+from hexapod_cosim.cosim.study.bundled import list_studies
+from hexapod_cosim.cosim.study.reading import load_study, study_from_table
+from hexapod_cosim.cosim.study.runs import Sweep
+from hexapod_cosim.cosim.study.store import columns_of
 from hexapod_cosim.models import HexapodError
 
 SEEDS, FILES = 8, 60  # files per seed: 480 in all, of which one in fourteen is a study
@@ -190,7 +190,7 @@ def test_a_file_changed_at_random_is_a_study_or_refused_with_a_reason(seed: int)
             study = study_of(table)
         except HexapodError:
             continue
-        schema_of(study)
+        columns_of(study)
         source = json.loads(to_json(study.source))  # as a folder keeps it
         assert tomllib.loads(tomlkit.dumps(source)) == source
         again = study_from_table(

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import pickle
 import signal
 import subprocess
 import time
@@ -16,18 +14,15 @@ from typing import Any
 import pytest
 import tomlkit
 from command import COMMAND
-from dask_cluster import HELPERS, TIMEOUT, dask_scheduler, kill, mortal_workers, restarting_workers
-from distributed import Client
-from studies import KINEMATIC, SLOW, digest, quiet, rows, run_quietly, study_of
+from dask_cluster import TIMEOUT, dask_scheduler, kill, mortal_workers, restarting_workers
+from studies import KINEMATIC, Row, quiet, rows, run_quietly, stored_count, study_of
+from study_runners import Slow
 
-from hexapod_cosim.cosim.study.execute import cluster
-from hexapod_cosim.cosim.study.execute.chunk import Chunk
-from hexapod_cosim.cosim.study.execute.cluster_worker import run_chunk
-from hexapod_cosim.cosim.study.execute.job import make_job
-from hexapod_cosim.cosim.study.execute.study import Options, run_study
-from hexapod_cosim.cosim.study.plan.points import Sweep
-from hexapod_cosim.cosim.study.plan.reading import load_study
-from hexapod_cosim.cosim.study.plan.records import StudyError
+from hexapod_cosim.cosim.run.walker import Walker
+from hexapod_cosim.cosim.study import workers as workers_module
+from hexapod_cosim.cosim.study.reading import load_study
+from hexapod_cosim.cosim.study.records import StudyError
+from hexapod_cosim.cosim.study.study import Options, run_study
 
 TABLE: dict[str, Any] = {**KINEMATIC, "seeds": 60, "factors": {"friction.mu": [0.3, 0.5]}}
 REAL: dict[str, Any] = {
@@ -55,7 +50,7 @@ def study_on(athena_fmu: Path, tmp_path: Path, scheduler: str) -> Callable[..., 
 
     def run(after_the_first: Callable[[], object], address: str = scheduler) -> list[str]:
         events: list[str] = []
-        options = Options(engine=SLOW, fmu=athena_fmu, scheduler=address, events=events.append)
+        options = Options(runner=Slow, fmu=athena_fmu, scheduler=address, events=events.append)
         run_study(study_of(TABLE), tmp_path / "out", options=options, start=once(after_the_first))
         return events
 
@@ -69,34 +64,33 @@ def once(act: Callable[[], object]) -> Any:
 
 
 @pytest.fixture(scope="module")
-def alone(athena_fmu: Path, tmp_path_factory: pytest.TempPathFactory) -> str:
-    """Returns the digest of the study run within this process."""
+def alone(athena_fmu: Path, tmp_path_factory: pytest.TempPathFactory) -> list[Row]:
+    """Returns the rows of the study run within this process."""
     folder = tmp_path_factory.mktemp("alone") / "out"
-    run_quietly(study_of(TABLE), folder, fmu=athena_fmu, engine=SLOW)
-    return digest(folder)
+    return run_quietly(study_of(TABLE), folder, fmu=athena_fmu, runner=Slow)
 
 
 def test_a_killed_worker_costs_no_run(
-    study_on: Callable[..., Any], scheduler: str, alone: str, tmp_path: Path
+    study_on: Callable[..., Any], scheduler: str, alone: list[Row], tmp_path: Path
 ) -> None:
     with mortal_workers(scheduler, 2, tmp_path) as workers:
         study_on(lambda: kill(workers[0]))
-    assert digest(tmp_path / "out") == alone
+    assert rows(tmp_path / "out") == alone
 
 
 def test_without_workers_a_study_ends_with_what_is_stored_and_is_resumed_in_this_process(
     study_on: Callable[..., Any],
     scheduler: str,
     athena_fmu: Path,
-    alone: str,
+    alone: list[Row],
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     with mortal_workers(scheduler, 2, tmp_path) as workers:
-        monkeypatch.setattr(cluster, "NO_WORKER_TIMEOUT", TIMEOUT)
+        monkeypatch.setattr(workers_module, "NO_WORKER_TIMEOUT", TIMEOUT)
 
         def kill_all() -> None:
-            monkeypatch.setattr(cluster, "NO_WORKER_TIMEOUT", SHORT_TIMEOUT)
+            monkeypatch.setattr(workers_module, "NO_WORKER_TIMEOUT", SHORT_TIMEOUT)
             for worker in workers:
                 kill(worker)
 
@@ -105,13 +99,13 @@ def test_without_workers_a_study_ends_with_what_is_stored_and_is_resumed_in_this
             match=r"the cluster has no workers.*dask worker tcp://.*stored so far are kept",
         ):
             study_on(kill_all)
-    assert list((tmp_path / "out" / "runs").glob("*.parquet"))
-    run_quietly(study_of(TABLE), tmp_path / "out", fmu=athena_fmu, engine=SLOW)
-    assert digest(tmp_path / "out") == alone
+    assert 0 < stored_count(study_of(TABLE), tmp_path / "out") < len(alone)
+    run_quietly(study_of(TABLE), tmp_path / "out", fmu=athena_fmu, runner=Slow)
+    assert rows(tmp_path / "out") == alone
 
 
 def test_workers_that_join_when_all_are_gone_get_the_job_and_continue(
-    study_on: Callable[..., Any], scheduler: str, alone: str, tmp_path: Path
+    study_on: Callable[..., Any], scheduler: str, alone: list[Row], tmp_path: Path
 ) -> None:
     with ExitStack() as opened, mortal_workers(scheduler, 1, tmp_path) as workers:
 
@@ -121,11 +115,11 @@ def test_workers_that_join_when_all_are_gone_get_the_job_and_continue(
 
         events = study_on(replace)
     assert any("waiting for some" in text for text in events)
-    assert digest(tmp_path / "out") == alone
+    assert rows(tmp_path / "out") == alone
 
 
 def test_a_scheduler_that_dies_ends_the_study_with_what_is_stored(
-    study_on: Callable[..., Any], athena_fmu: Path, alone: str, tmp_path: Path
+    study_on: Callable[..., Any], athena_fmu: Path, alone: list[Row], tmp_path: Path
 ) -> None:
     with (
         dask_scheduler(tmp_path) as (address, process),
@@ -133,8 +127,8 @@ def test_a_scheduler_that_dies_ends_the_study_with_what_is_stored(
         pytest.raises(StudyError, match=r"the cluster is gone.*start the study again"),
     ):
         study_on(lambda: kill(process), address)
-    run_quietly(study_of(TABLE), tmp_path / "out", fmu=athena_fmu, engine=SLOW)
-    assert digest(tmp_path / "out") == alone
+    run_quietly(study_of(TABLE), tmp_path / "out", fmu=athena_fmu, runner=Slow)
+    assert rows(tmp_path / "out") == alone
 
 
 def test_ctrl_c_ends_a_study_that_waits_for_workers(
@@ -142,22 +136,9 @@ def test_ctrl_c_ends_a_study_that_waits_for_workers(
 ) -> None:
     file = tmp_path / "study.toml"
     file.write_text('controls = ["kinematic"]\nseeds = 30\n')
-    words = [
-        *COMMAND,
-        "study",
-        str(file),
-        "-o",
-        str(tmp_path / "out"),
-        "--engine",
-        SLOW,
-        "--fmu",
-        str(athena_fmu),
-    ]
+    words = [*COMMAND, "study", str(file), "-o", str(tmp_path / "out"), "--fmu", str(athena_fmu)]
     with subprocess.Popen(
-        [*words, "--scheduler", scheduler],
-        env={**os.environ, "PYTHONPATH": HELPERS},
-        stderr=subprocess.PIPE,
-        text=True,
+        [*words, "--scheduler", scheduler], stderr=subprocess.PIPE, text=True
     ) as process:
         assert process.stderr is not None
         warning = next(line for line in process.stderr if "waiting for some" in line)
@@ -173,39 +154,26 @@ def test_a_program_killed_on_a_cluster_leaves_its_results_and_the_cluster_in_ord
 ) -> None:
     file, folder = tmp_path / "study.toml", tmp_path / "out"
     file.write_text(tomlkit.dumps(REAL))
-    words = [
-        *COMMAND,
-        "study",
-        str(file),
-        "-o",
-        str(folder),
-        "--fmu",
-        str(athena_fmu),
-        "--scheduler",
-        scheduler,
-    ]
+    study = load_study(str(file))
+    words = ["study", str(file), "-o", str(folder), "--fmu", str(athena_fmu)]
     with restarting_workers(scheduler, 2, tmp_path):
         process = subprocess.Popen(
-            words, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True
+            [*COMMAND, *words, "--scheduler", scheduler],
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+            start_new_session=True,
         )
         deadline = time.monotonic() + TIMEOUT
         while (
-            not list(folder.glob("runs/*.parquet"))
+            not stored_count(study, folder)
             and time.monotonic() < deadline
             and process.poll() is None
         ):
             time.sleep(0.02)
         kill(process)
         assert not (folder / "results.parquet").exists()
-        study, options = load_study(str(file)), {"engine": "compiled", "fmu": athena_fmu}
-        run_quietly(study, folder, scheduler=scheduler, **options)
-        with Client(scheduler, set_as_default=False) as client:
-            left = client.run_on_scheduler(
-                lambda dask_scheduler: list(dask_scheduler.worker_plugins)
-            )
-        assert not [name for name in left if name.startswith(cluster.JOB_PREFIX)]
-    run_quietly(study, tmp_path / "alone", **options)
-    assert digest(folder) == digest(tmp_path / "alone")
+        found = run_quietly(study, folder, scheduler=scheduler, runner=Walker, fmu=athena_fmu)
+    assert found == run_quietly(study, tmp_path / "alone", runner=Walker, fmu=athena_fmu)
 
 
 def test_studies_that_share_a_cluster_do_not_disturb_each_other(
@@ -215,21 +183,12 @@ def test_studies_that_share_a_cluster_do_not_disturb_each_other(
     tables = [TABLE, {**TABLE, "seeds": {"first": 500, "count": 20}}, TABLE]
 
     def run(k: int) -> None:
-        options = Options(engine=SLOW, fmu=athena_fmu, scheduler=scheduler)
+        options = Options(runner=Slow, fmu=athena_fmu, scheduler=scheduler)
         run_study(study_of(tables[k]), tmp_path / f"out{k}", options=options, start=quiet)
 
     with mortal_workers(scheduler, 2, tmp_path), ThreadPoolExecutor(len(tables)) as together:
         list(together.map(run, range(len(tables))))
     for k, table in enumerate(tables[:2]):
-        alone = run_quietly(study_of(table), tmp_path / f"alone{k}", engine=SLOW, fmu=athena_fmu)
+        alone = run_quietly(study_of(table), tmp_path / f"alone{k}", runner=Slow, fmu=athena_fmu)
         assert rows(tmp_path / f"out{k}") == alone
-    assert digest(tmp_path / "out0") == digest(tmp_path / "out2")
-
-
-def test_the_job_is_not_sent_with_chunks(athena_fmu: Path) -> None:
-    study = study_of(TABLE)
-    job = make_job(study, engine=SLOW, fmu=athena_fmu)
-    orders = tuple(Sweep(study).orders(iter(range(120))))
-    per_run = len(pickle.dumps((run_chunk, job.name, Chunk(orders)))) / len(orders)
-    assert per_run < 200.0  # bytes: its number, point, case, values, seed and control
-    assert len(pickle.dumps(job)) > athena_fmu.stat().st_size
+    assert rows(tmp_path / "out0") == rows(tmp_path / "out2")

@@ -11,9 +11,8 @@ import pytest
 from scipy import stats
 from studies import study_of
 
-from hexapod_cosim.cosim.study.plan.factors import at_quantile
-from hexapod_cosim.cosim.study.plan.points import Design, Sweep
-from hexapod_cosim.cosim.study.plan.records import (
+from hexapod_cosim.cosim.study.factors import at_quantile
+from hexapod_cosim.cosim.study.records import (
     INTEGERS,
     LOGUNIFORM,
     NORMAL,
@@ -22,6 +21,7 @@ from hexapod_cosim.cosim.study.plan.records import (
     Factor,
     Study,
 )
+from hexapod_cosim.cosim.study.runs import Design, Sweep
 
 TWO = {"friction.mu": {"uniform": [0.0, 1.0]}, "command.vx": {"uniform": [0.0, 1.0]}}
 STRATA = 64

@@ -9,10 +9,10 @@ from typing import Any
 import pytest
 from studies import study_of
 
-from hexapod_cosim.cosim.study.plan.bundled import list_studies
-from hexapod_cosim.cosim.study.plan.reading import load_study
-from hexapod_cosim.cosim.study.plan.records import Study, StudyError
-from hexapod_cosim.models import HexapodError, load_robot
+from hexapod_cosim.cosim.study.bundled import list_studies
+from hexapod_cosim.cosim.study.reading import load_study
+from hexapod_cosim.cosim.study.records import Study, StudyError
+from hexapod_cosim.models import HexapodError
 
 TRAINING = {"scenarios": ["walk_flat"], "seeds": {"first": 10, "count": 3}}
 JUDGED = {"training": TRAINING, "held_out": {"scenarios": ["ripple"], "seeds": 10}}
@@ -155,7 +155,7 @@ def test_several_seeds_differ_by_the_standard_variation_and_one_seed_is_the_plai
         ),
         (
             optimisation(held_out={"scenarios": ["ripple", "walk_flat"]}),
-            ["trained on", "got 'walk_flat'", 'scenarios = ["amble", "course"'],
+            ["trained on", "got 'walk_flat'", "name other scenarios"],
         ),
         (
             {"factors": {"gains.hold.path_rate": [math.nan]}},
@@ -240,13 +240,13 @@ def test_several_seeds_differ_by_the_standard_variation_and_one_seed_is_the_plai
         (
             {
                 "design": "latin_hypercube",
-                "points": 10**7,
+                "points": 6 * 10**7,
                 "factors": {
                     "friction.mu": {"uniform": [0.1, 1]},
                     "command.vx": {"uniform": [0, 0.1]},
                 },
             },
-            ["too large a Latin hypercube", 'design = "sobol"'],
+            ["too large a latin_hypercube", 'design = "random"'],
         ),
         (
             optimisation(
@@ -323,7 +323,6 @@ def test_what_is_no_study_is_refused(tmp_path: Path) -> None:
 
 
 SAME = """title = "Another"
-robot = "own.toml"
 duration = "4 s"
 macro_step = "4 ms"
 seed = 7
@@ -341,16 +340,12 @@ name = "tripod"
         ("[variation]\nheight = 0.001\n[solver]\ntolerance = 0.01\n[outputs]\nplots = false\n", {}),
         ("[friction]\nmu = 0.4\n", {"set": {"friction": {"mu": 0.5}}}),
         ("[compliance]\nposture = false\n", {"variables": {"compliance.posture": [True, False]}}),
-        ('[parameters]\n"torso.mass" = 2.6\n', {}),
     ],
 )
 def test_a_held_out_scenario_is_compared_with_training_by_its_walk_not_its_name(
     tmp_path: Path, more: str, changes: dict[str, Any]
 ) -> None:
     """The file differs from the training scenario in its name, units and irrelevant settings."""
-    (tmp_path / "own.toml").write_text(
-        (Path(load_robot.__code__.co_filename).parent / "athena.toml").read_text()
-    )
     mine = tmp_path / "Mine.toml"
     mine.write_text(SAME + more)
     table = optimisation(

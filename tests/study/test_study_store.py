@@ -1,4 +1,4 @@
-"""The store of a study: no run is lost or damaged by kills, and results have the same bytes."""
+"""The store of a study: no run is lost or damaged by kills, and its rows are always the same."""
 
 from __future__ import annotations
 
@@ -10,24 +10,34 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 from command import COMMAND
-from studies import FAKE, KINEMATIC, SLOW, SMALL, digest, quiet, rows, run_quietly, study_of
+from studies import (
+    KINEMATIC,
+    SMALL,
+    Row,
+    rows,
+    run_quietly,
+    stored_count,
+    stored_rows,
+    study_of,
+    write_rows,
+)
+from study_runners import Counting, Slow
 
-from hexapod_cosim.cosim.study.execute.study import Options, run_study
-from hexapod_cosim.cosim.study.plan.reading import load_study
-from hexapod_cosim.cosim.study.plan.records import StudyError
-from hexapod_cosim.cosim.study.store import store as store_module
-from hexapod_cosim.cosim.study.store.columns import FIGURES, result_schema, schema_of
-from hexapod_cosim.cosim.study.store.manifest import MANIFEST, RUNS, locked
-from hexapod_cosim.cosim.study.store.results import read_results
-from hexapod_cosim.cosim.study.store.store import MERGE_COUNT, Store, write_durably, write_whole
+from hexapod_cosim.cosim.run.walker import Walker
+from hexapod_cosim.cosim.study import store as store_module
+from hexapod_cosim.cosim.study.folder import MANIFEST, RESULTS, TIMES, export_runs, locked
+from hexapod_cosim.cosim.study.reading import load_study
+from hexapod_cosim.cosim.study.records import StudyError
+from hexapod_cosim.cosim.study.store import RUNS, Store
+from hexapod_cosim.cosim.study.study import Options, run_study
+from hexapod_cosim.cosim.study.summary import read_results
 
 ROOT = Path(__file__).resolve().parents[2]
 TIMEOUT = 180.0  # s    for what takes some seconds on an idle machine
@@ -36,69 +46,6 @@ MANY_RUNS: dict[str, Any] = {
     "seeds": 10,
     "factors": {"friction.mu": {"linspace": [0.3, 0.9, 20]}},
 }
-
-
-@pytest.fixture
-def small(athena_fmu: Path, tmp_path: Path) -> Callable[..., list[dict[str, Any]]]:
-    """A function that runs a small study under kinematic control into a folder of the test."""
-
-    def run(
-        name: str = "out", table: dict[str, Any] = SMALL, **options: Any
-    ) -> list[dict[str, Any]]:
-        return run_quietly(
-            study_of({**table, **KINEMATIC}), tmp_path / name, **{"fmu": athena_fmu, **options}
-        )
-
-    return run
-
-
-def test_a_finished_study_is_left_as_it_is_when_started_again(
-    small: Callable[..., Any], tmp_path: Path
-) -> None:
-    small()
-    before = {path: path.stat().st_mtime_ns for path in (tmp_path / "out" / RUNS).iterdir()}
-    first = digest(tmp_path / "out")
-    small()
-    assert {path: path.stat().st_mtime_ns for path in (tmp_path / "out" / RUNS).iterdir()} == before
-    assert digest(tmp_path / "out") == first
-
-
-def test_results_do_not_depend_on_workers_or_chunks(
-    small: Callable[..., Any], tmp_path: Path
-) -> None:
-    small("none", MANY_RUNS, workers=0)
-    small("one", MANY_RUNS, workers=1)
-    small("two", MANY_RUNS, workers=2)
-    small("slow", MANY_RUNS, workers=2, engine=SLOW)
-    assert digest(tmp_path / "none") == digest(tmp_path / "one") == digest(tmp_path / "two")
-    # the bytes differ by the name of the engine in the metadata
-    assert rows(tmp_path / "one") == rows(tmp_path / "slow")
-
-
-def test_rows_hold_the_settings_the_figures_and_how_a_run_ended(small: Callable[..., Any]) -> None:
-    table = {
-        **SMALL,
-        "seeds": 1,
-        "factors": {"friction.mu": [0.17, 0.19, 0.5], "gait.name": ["tripod"]},
-    }
-    refused, fallen, walked = small(table=table)
-    assert (refused["status"], refused["reason"], refused["walked"]) == (
-        "refused",
-        "no walk with 0",
-        False,
-    )
-    assert refused["slip_per_metre"] is None
-    assert (fallen["status"], fallen["upright"], fallen["walked"]) == ("completed", False, False)
-    assert (
-        walked["friction.mu"],
-        walked["gait.name"],
-        walked["foot_error_stance"],
-        walked["walked"],
-    ) == (0.5, "tripod", 1.25, True)
-    assert len({row["identity"] for row in (refused, fallen, walked)}) == 3
-    assert not {"wall", "realtime_factor"} & set(walked)
-
-
 REAL = """
 controls = ["kinematic"]
 seeds = 35
@@ -110,21 +57,68 @@ friction.mu = {linspace = [0.3, 0.9, 20]}
 REAL_RUNS = 700
 
 
-def command(folder: Path, fmu: Path, *more: str, study: Path) -> subprocess.Popen[str]:
-    words = [
-        *COMMAND,
-        "study",
-        str(study),
-        "-o",
-        str(folder),
-        "--fmu",
-        str(fmu),
-        "--workers",
-        "2",
-        *more,
-    ]
+@pytest.fixture
+def small(athena_fmu: Path, tmp_path: Path) -> Callable[..., list[Row]]:
+    """A function that runs a small study under kinematic control into a folder of the test."""
+
+    def run(name: str = "out", table: dict[str, Any] = SMALL, **options: Any) -> list[Row]:
+        return run_quietly(
+            study_of({**table, **KINEMATIC}), tmp_path / name, **{"fmu": athena_fmu, **options}
+        )
+
+    return run
+
+
+def test_a_finished_study_runs_nothing_when_started_again(small: Callable[..., Any]) -> None:
+    first = small()
+    Counting.asked.clear()
+    assert small(runner=Counting) == first
+    assert not Counting.asked
+
+
+def test_rows_do_not_depend_on_workers_or_chunks(small: Callable[..., Any]) -> None:
+    here = small("none", MANY_RUNS, workers=0)
+    assert [row["run"] for row in here] == list(range(200))
+    assert small("one", MANY_RUNS, workers=1) == here
+    assert small("two", MANY_RUNS, workers=2) == here
+    assert small("slow", MANY_RUNS, workers=2, runner=Slow) == here
+
+
+def test_rows_hold_the_settings_the_figures_and_how_a_run_ended(small: Callable[..., Any]) -> None:
+    factors = {"friction.mu": [0.17, 0.19, 0.5], "gait.name": ["tripod"]}
+    refused, fallen, walked = small(table={**SMALL, "seeds": 1, "factors": factors})
+    assert (refused["status"], refused["reason"], refused["walked"]) == (
+        "refused",
+        "no walk with 0",
+        False,
+    )
+    assert refused["slip_per_metre"] is None
+    assert (fallen["status"], fallen["upright"], fallen["walked"]) == ("completed", False, False)
+    settings = (walked["friction.mu"], walked["gait.name"])
+    assert (*settings, walked["foot_error_stance"], walked["walked"]) == (0.5, "tripod", 1.25, True)
+    assert len({row["identity"] for row in (refused, fallen, walked)}) == 3
+    assert not {"wall", "realtime_factor"} & set(walked)
+
+
+def test_files_have_the_runs_in_order_and_units_in_their_columns(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, small: Callable[..., Any]
+) -> None:
+    monkeypatch.setattr(store_module, "ROWS_AT_ONCE", 2)
+    study, out = study_of({**SMALL, **KINEMATIC}), tmp_path / "out"
+    small()
+    write_rows(study, out, [{"run": run, "walked": True, "wall": 0.5} for run in (8, 3, 5, 4, 0)])
+    with closing(Store(out, study)) as store:
+        export_runs(store, out)
+    assert pq.read_table(out / RESULTS)["run"].to_pylist() == [0, 3, 4, 5, 8]
+    assert pq.read_table(out / RESULTS)["walked"].to_pylist() == [True] * 5
+    assert pq.read_table(out / TIMES).to_pylist()[1] == {"run": 3, "wall": 0.5}
+    assert pq.read_schema(out / RESULTS).field("slip_per_metre").metadata == {b"unit": b"m/m"}
+
+
+def command(folder: Path, fmu: Path, *, study: Path) -> subprocess.Popen[str]:
+    words = ["study", str(study), "-o", str(folder), "--fmu", str(fmu), "--workers", "2"]
     return subprocess.Popen(
-        words,
+        [*COMMAND, *words],
         cwd=ROOT,
         stdout=subprocess.DEVNULL,
         stderr=subprocess.PIPE,
@@ -133,242 +127,95 @@ def command(folder: Path, fmu: Path, *more: str, study: Path) -> subprocess.Pope
     )
 
 
-def stored_runs(folder: Path) -> int:
-    return sum(pq.ParquetFile(path).metadata.num_rows for path in (folder / RUNS).glob("*.parquet"))
-
-
 def test_real_walks_killed_twice_at_any_point_and_completed_are_the_uninterrupted_ones(
     athena_fmu: Path, tmp_path: Path
 ) -> None:
     file = tmp_path / "study.toml"
     file.write_text(REAL)
-    whole, killed = tmp_path / "whole", tmp_path / "killed"
+    study, whole, killed = load_study(str(file)), tmp_path / "whole", tmp_path / "killed"
     for least in (1, random.randint(50, 150)):
         process = command(killed, athena_fmu, study=file)
         deadline = time.monotonic() + TIMEOUT
         while (
-            stored_runs(killed) < least and time.monotonic() < deadline and process.poll() is None
+            stored_count(study, killed) < least
+            and time.monotonic() < deadline
+            and process.poll() is None
         ):
             time.sleep(0.005)
         time.sleep(random.uniform(0.0, 0.02))
         os.killpg(process.pid, signal.SIGKILL)
         process.wait()
-        assert least <= stored_runs(killed) < REAL_RUNS
-    kept = {path.name: path.read_bytes() for path in (killed / RUNS).glob("*.parquet")}
-    (killed / RUNS / ".part-99999999.parquet.12345678.new").write_bytes(b"half a part")
-    (killed / ".results.parquet.12345678.new").write_bytes(b"half a file")
+        assert least <= stored_count(study, killed) < REAL_RUNS
+    kept = stored_rows(study, killed)
     process = command(killed, athena_fmu, study=file)
     _, err = process.communicate(timeout=TIMEOUT)
     assert process.returncode == 0, err
-    run_quietly(load_study(str(file)), whole, fmu=athena_fmu, engine="compiled")
-    assert digest(killed) == digest(whole)
-    assert {name: (killed / RUNS / name).read_bytes() for name in kept} == kept
-    assert not list(killed.rglob(".*.new"))
+    numbers = {row["run"] for row in kept}
+    # with their times: they were not run again
+    assert [row for row in stored_rows(study, killed) if row["run"] in numbers] == kept
+    assert rows(killed) == run_quietly(study, whole, fmu=athena_fmu, runner=Walker)
     assert len(rows(whole)) == REAL_RUNS
     assert all(row["status"] == "completed" for row in rows(whole))
 
 
-def test_a_study_is_not_resumed_with_other_code(
-    small: Callable[..., Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+def test_the_report_of_a_study_that_runs_has_the_runs_so_far(
+    athena_fmu: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    small("out", SMALL)
-    monkeypatch.setattr(
-        "hexapod_cosim.cosim.study.execute.job.code_hash", lambda: "0123456789abcdef"
-    )
-    with pytest.raises(StudyError, match=r"environment.code was .*, is \"0123456789abcdef\""):
-        small("out", SMALL)
+    monkeypatch.setattr(store_module, "FLUSH_SECONDS", 0.0)
+    study, seen = study_of({**SMALL, **KINEMATIC}), list[int]()
+
+    def start(_total: int, _done: int) -> Any:
+        return lambda _more, _lost: seen.append(read_results(tmp_path).runs)
+
+    run_study(study, tmp_path, options=Options(fmu=athena_fmu, runner=Slow, workers=2), start=start)
+    assert seen == sorted(seen)
+    assert 0 < seen[0] < seen[-1] == 9
 
 
 def test_a_full_disk_is_reported_and_the_study_is_resumed_from_the_stored_runs(
-    athena_fmu: Path, tmp_path: Path
+    athena_fmu: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    room = [3]
-
-    def filling(path: Path, content: bytes) -> None:
-        if not room[0]:
-            raise store_module._not_written(path, OSError(errno.ENOSPC, os.strerror(errno.ENOSPC)))
-        room[0] -= 1
-        write_durably(path, content)
-
     study, folder = study_of(MANY_RUNS), tmp_path / "out"
-    options = Options(engine=FAKE, workers=0, fmu=athena_fmu, write=filling)
-    with pytest.MonkeyPatch.context() as patch:
+    with monkeypatch.context() as patch:
         patch.setattr(store_module, "FLUSH_ROWS", 20)
-        patch.setattr("hexapod_cosim.cosim.study.execute.dispatch.MAX_CHUNK", 10)
-        with pytest.raises(
-            StudyError, match=r"the disk is full.*make room and start the study again"
-        ):
-            run_study(study, folder, options=options, start=quiet)
-    stored = stored_runs(folder)
-    assert 0 < stored < 200
-    run_quietly(study, folder, fmu=athena_fmu)
-    run_quietly(study, tmp_path / "whole", fmu=athena_fmu)
-    assert digest(folder) == digest(tmp_path / "whole")
+        patch.setattr("hexapod_cosim.cosim.study.dispatch.MAX_CHUNK", 10)
+        patch.setattr("hexapod_cosim.cosim.study.study.Store", SmallStore)
+        expected = r"the disk is full.*make room and start the study again"
+        with pytest.raises(StudyError, match=expected):
+            run_quietly(study, folder, fmu=athena_fmu)
+    assert 0 < stored_count(study, folder) < 200
+    found = run_quietly(study, folder, fmu=athena_fmu)
+    assert found == run_quietly(study, tmp_path / "whole", fmu=athena_fmu)
 
 
-@pytest.mark.skipif(not Path("/dev/full").exists(), reason="no device that is always full")
-def test_a_file_that_does_not_fit_leaves_the_old_one(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+class SmallStore(Store):
+    """A store on a disk with room for some pages."""
+
+    def __init__(self, *arguments: Any) -> None:
+        super().__init__(*arguments)
+        self.database.execute("PRAGMA max_page_count = 12")
+
+
+@pytest.mark.parametrize("content", [b"garbage" * 1000, b""], ids=["garbage", "empty"])
+def test_a_damaged_file_of_runs_is_named_and_without_it_the_runs_are_run_again(
+    small: Callable[..., Any], tmp_path: Path, content: bytes
 ) -> None:
-    place = tmp_path / "results.parquet"
-    place.write_bytes(b"old")
-    unfinished = tmp_path / ".results.parquet.new"
-    monkeypatch.setattr(store_module, "_unfinished", lambda _path: unfinished)
-    unfinished.symlink_to("/dev/full")
-    with pytest.raises(StudyError, match="the disk is full"):
-        write_durably(place, b"new" * 100_000)
-    assert place.read_bytes() == b"old"
-    unfinished.symlink_to("/dev/full")
-    table = pa.table({"run": np.arange(1_000_000)})
-    with pytest.raises(StudyError, match="the disk is full"):
-        write_whole(place, [table], table.schema)
-    assert place.read_bytes() == b"old"
-    assert [path.name for path in tmp_path.iterdir()] == ["results.parquet"]
+    first = small()
+    (tmp_path / "out" / RUNS).write_bytes(content)
+    if content:  # an empty file is a database without a table
+        with pytest.raises(StudyError, match=r"runs.sqlite: damaged results.*remove it and start"):
+            small()
+        (tmp_path / "out" / RUNS).unlink()
+    assert small() == first
 
 
-def cut(content: bytes) -> bytes:
-    return content[: len(content) // 2]
-
-
-def flipped(content: bytes) -> bytes:
-    place = len(content) // 3
-    return content[:place] + bytes([content[place] ^ 1]) + content[place + 1 :]
-
-
-@pytest.mark.parametrize(
-    "damage",
-    [cut, flipped, lambda _: b"", lambda _: b"PAR1 garbage PAR1"],
-    ids=["cut", "flipped", "empty", "garbage"],
-)
-def test_a_damaged_part_is_set_aside_and_its_runs_are_run_again(
-    small: Callable[..., Any], tmp_path: Path, damage: Callable[[bytes], bytes]
+def test_a_study_is_not_resumed_with_other_code(
+    small: Callable[..., Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     small()
-    first, events = digest(tmp_path / "out"), list[str]()
-    (part,) = (tmp_path / "out" / RUNS).glob("*.parquet")
-    content = damage(part.read_bytes())
-    part.write_bytes(content)
-    assert (
-        read_results(tmp_path / "out").overall.runs,
-        read_results(tmp_path / "out").damaged,
-    ) == (9, [])  # of results.parquet
-    (tmp_path / "out" / "results.parquet").unlink()
-    found = read_results(tmp_path / "out")
-    assert (found.overall.runs, [text.partition(" ")[0] for text in found.damaged]) == (
-        0,
-        [part.name],
-    )
-    small(events=events.append)
-    assert digest(tmp_path / "out") == first
-    assert part.with_name(part.name + ".damaged").read_bytes() == content
-    assert [f"{part.name}: a damaged part" in text for text in events] == [True]
-    small(events=events.append)
-    assert len(events) == 1
-
-
-def test_a_part_of_another_study_is_set_aside(small: Callable[..., Any], tmp_path: Path) -> None:
-    small()
-    first = digest(tmp_path / "out")
-    small("columns", {**SMALL, "factors": {"friction.mu": [0.3], "command.vx": [0.05]}})
-    small("more", {**SMALL, "seeds": 9})
-    for other in ("columns", "more"):
-        (part,) = (tmp_path / other / RUNS).glob("*.parquet")
-        events: list[str] = []
-        (tmp_path / "out" / RUNS / part.name).write_bytes(part.read_bytes())
-        small(events=events.append)
-        assert digest(tmp_path / "out") == first
-        assert len(events) == 1
-
-
-def test_what_is_not_a_part_is_left_alone(small: Callable[..., Any], tmp_path: Path) -> None:
-    small()
-    first = digest(tmp_path / "out")
-    (tmp_path / "out" / RUNS / "part-mine.parquet").write_bytes(b"mine")
-    small()
-    assert digest(tmp_path / "out") == first
-    assert (tmp_path / "out" / RUNS / "part-mine.parquet").read_bytes() == b"mine"
-
-
-def test_a_reader_finds_every_run_while_parts_are_put_together(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(store_module, "ROWS_AT_ONCE", 10)
-    monkeypatch.setattr(store_module, "MERGE_COUNT", 4)
-    schema = schema_of(study_of())
-    writer, reader = Store(tmp_path / RUNS, schema), Store(tmp_path / RUNS, schema)
-    writer.prepare(100)
-    for first in (0, 20, 40):
-        writer.add(rows_from(schema, list(range(first, first + 20))))
-        writer.flush()
-    found: list[int] = []
-    for block, table in enumerate(reader.sorted_rows()):
-        found += table["run"].to_pylist()
-        if block == 1:  # the three parts become one
-            writer.add(rows_from(schema, [60, 61]))
-            writer.flush()
-            assert len(writer.parts()) == 1
-    assert found == list(range(62))
-
-
-def test_files_that_others_may_write_just_now_are_left_alone_for_a_while(
-    small: Callable[..., Any], tmp_path: Path
-) -> None:
-    small()
-    young, old = (
-        tmp_path / "out" / f".summary.json.{name}.new" for name in ("12345678", "87654321")
-    )
-    for path in (young, old):
-        path.touch()
-    os.utime(old, (0.0, 0.0))
-    small()
-    assert young.exists()
-    assert not old.exists()
-
-
-def rows_from(schema: pa.Schema, runs: list[int]) -> list[dict[str, Any]]:
-    zero = {pa.int64(): 0, pa.float64(): 0.5, pa.bool_(): True, pa.string(): "x"}
-    return [
-        {**{item.name: zero[item.type] for item in schema}, "run": run, "seed": run} for run in runs
-    ]
-
-
-def test_many_parts_become_one_and_a_run_in_two_parts_counts_once(tmp_path: Path) -> None:
-    schema = schema_of(study_of())
-    store = Store(tmp_path / RUNS, schema)
-    store.prepare(3 * MERGE_COUNT)
-    numbers = np.random.default_rng(0).permutation(3 * MERGE_COUNT).tolist()
-    for run in numbers:
-        store.add(rows_from(schema, [run]))
-        store.flush()
-    assert len(store.parts()) == 3
-    # as after a kill between writing the merged part and removing the small ones
-    store.add(rows_from(schema, [7, 8]))
-    store.flush()
-    (table,) = store.sorted_rows()
-    assert table["run"].to_pylist() == list(range(3 * MERGE_COUNT))
-    assert store.done(3 * MERGE_COUNT + 1).tolist() == [True] * 3 * MERGE_COUNT + [False]
-    assert {row["seed"] for row in store.rows([3, 8]).values()} == {3, 8}
-
-
-def test_sorting_goes_block_by_block(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(store_module, "ROWS_AT_ONCE", 10)
-    schema = schema_of(study_of())
-    store = Store(tmp_path / RUNS, schema)
-    store.prepare(26)
-    for part in ([25, 3, 11], [4, 19, 3], [12]):
-        store.add(rows_from(schema, part))
-        store.flush()
-    assert [table["run"].to_pylist() for table in store.sorted_rows()] == [
-        [3, 4],
-        [11, 12, 19],
-        [25],
-    ]
-    write_whole(tmp_path / "whole.parquet", store.sorted_rows(), result_schema(schema))
-    assert pq.read_table(tmp_path / "whole.parquet")["run"].to_pylist() == [3, 4, 11, 12, 19, 25]
-    assert pq.read_schema(tmp_path / "whole.parquet").field("slip_per_metre").metadata == {
-        b"unit": b"m/m"
-    }
-    assert set(FIGURES) < set(schema.names)
+    monkeypatch.setattr("hexapod_cosim.cosim.study.job.code_hash", lambda: "0123456789abcdef")
+    with pytest.raises(StudyError, match=r"environment.code was .*, is \"0123456789abcdef\""):
+        small()
 
 
 def test_another_study_into_the_same_folder_is_refused_and_the_differences_named(
@@ -382,9 +229,7 @@ def test_another_study_into_the_same_folder_is_refused_and_the_differences_named
     other.write_bytes(athena_fmu.read_bytes() + b"\0")
     with pytest.raises(StudyError, match=r"fmus.athena was"):
         small(fmu=other)
-    with pytest.raises(StudyError, match=f"engine was .*{FAKE}.*, is .*{SLOW}"):
-        small(engine=SLOW)
-    monkeypatch.setattr("hexapod_cosim.cosim.study.execute.job.package_version", lambda: "9.9")
+    monkeypatch.setattr("hexapod_cosim.cosim.study.job.package_version", lambda: "9.9")
     with pytest.raises(StudyError, match=r"environment.hexapod-cosim was .*, is \"9.9\""):
         small()
     assert (tmp_path / "out" / MANIFEST).read_bytes() == first
@@ -407,32 +252,32 @@ def test_two_processes_do_not_share_a_folder(small: Callable[..., Any], tmp_path
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="locks files by another function")
-@pytest.mark.parametrize("number", [errno.ENOSYS, errno.ENOTSUP, errno.ENOLCK])
 def test_a_file_system_without_locks_holds_studies_too(
-    small: Callable[..., Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, number: int
+    small: Callable[..., Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def flock(_file: int, _operation: int) -> None:
-        raise OSError(number, os.strerror(number))
+        raise OSError(errno.ENOTSUP, os.strerror(errno.ENOTSUP))
 
     monkeypatch.setattr("fcntl.flock", flock)
     assert len(small()) == 9
 
 
-def test_the_lock_of_a_killed_process_is_gone(tmp_path: Path) -> None:
-    holder = (
-        "import sys, time; from pathlib import Path\n"
-        "from hexapod_cosim.cosim.study.store.manifest import locked\n"
-        "with locked(Path(sys.argv[1])):\n"
-        "    print('locked', flush=True); time.sleep(600)\n"
-    )
-    with subprocess.Popen(
-        [sys.executable, "-c", holder, str(tmp_path)], stdout=subprocess.PIPE, text=True
-    ) as process:
-        assert process.stdout is not None
-        assert process.stdout.readline() == "locked\n"
-        with pytest.raises(StudyError, match="another process"), locked(tmp_path):
-            pass
-        process.kill()
-        process.wait()
-    with locked(tmp_path):
-        pass
+def test_progress_counts_new_runs_and_those_that_did_not_walk(
+    athena_fmu: Path, tmp_path: Path
+) -> None:
+    study = study_of({**KINEMATIC, "seeds": 2, "factors": {"friction.mu": [0.17, 0.5]}})
+    counts, begun = [0, 0], list[tuple[int, int]]()
+
+    def start(total: int, done: int) -> Any:
+        begun.append((total, done))
+
+        def tell(more: int, lost: int) -> None:
+            counts[:] = [counts[0] + more, counts[1] + lost]
+
+        return tell
+
+    options = Options(runner=Counting, workers=0, fmu=athena_fmu)
+    run_study(study, tmp_path, options=options, start=start)
+    run_study(study, tmp_path, options=options, start=start)
+    assert begun == [(4, 0), (4, 4)]
+    assert counts == [4, 2]

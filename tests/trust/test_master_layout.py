@@ -38,7 +38,7 @@ class Interface:
 
     def code(self) -> str:
         """Returns the header without its comments."""
-        root = Path(__file__).parents[2] / "master" / "include" / "hexapod"
+        root = Path(__file__).parents[2] / "cosim" / "master" / "include" / "hexapod"
         text = (root / f"{self.name}.h").read_text(encoding="utf-8")
         return re.sub(r"/\*.*?\*/", "", text, flags=re.DOTALL)
 

@@ -25,18 +25,16 @@ ROOT = Path(__file__).parents[2]
     reason="the program that measures is for Linux on x86-64",
 )
 @pytest.mark.skipif(shutil.which("cc") is None, reason="needs a C compiler")
-@pytest.mark.parametrize(
-    ("component", "folder"), [(PLANT, "plant_fmu"), (CONTROLLER, "controller_fmu")]
-)
+@pytest.mark.parametrize("component", [PLANT, CONTROLLER], ids=["plant", "controller"])
 def test_no_call_of_a_released_binary_takes_more_than_48_kb_of_stack(
-    component: Component, folder: str, tmp_path: Path
+    plant_build: Path, component: Component, tmp_path: Path
 ) -> None:
     library, program = tmp_path / "library.so", tmp_path / "measure"
     library.write_bytes(build_library(component_library(component), "x86_64-linux"))
     source = ROOT / "tests" / "native" / "test_stack_fmi.c"
     options = [f"-I{fmi_headers()}", f"-Wl,-rpath,{tmp_path}", "-lpthread", "-lm"]
     subprocess.run(["cc", "-o", program, source, library, *options], check=True)
-    description = ROOT / folder / "generated" / "modelDescription.xml"
+    description = plant_build / "descriptions" / component.name / "modelDescription.xml"
     done = subprocess.run([program, description], capture_output=True, text=True, check=False)
     assert (done.returncode, done.stderr) == (0, "")
     assert "FMI 2.0: inputs, step" in done.stdout

@@ -19,8 +19,8 @@ from fmi_plant import ERROR, Plant
 from numpy.testing import assert_array_equal
 
 from hexapod_cosim.cosim.common.plant_files import fmi_headers, source_files
-from hexapod_cosim.cosim.export import export
-from hexapod_cosim.cosim.export.export import export_fmu
+from hexapod_cosim.cosim.export import plant_export
+from hexapod_cosim.cosim.export.plant_export import export_fmu
 from hexapod_cosim.cosim.interface.variants import listed_items
 from hexapod_cosim.cosim.master.fmu import Fmu
 from hexapod_cosim.cosim.validate.validation import find_problems
@@ -69,7 +69,7 @@ def test_derivatives_are_promised_where_the_binary_has_them(
     def other(*_: Any, **__: Any) -> dict[str, bytes]:
         return {BINARY: without_complex.read_bytes()}
 
-    monkeypatch.setattr(export, "installed_binary", other)
+    monkeypatch.setattr(plant_export, "installed_binary", other)
     assert promised(export_fmu(ATHENA, tmp_path / "less.fmu", fmi=fmi)) == {"yes": 0, "no": 2}
 
 

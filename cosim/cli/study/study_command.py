@@ -13,8 +13,7 @@ from hexapod_cosim.cosim.cli.failures import FELL
 from hexapod_cosim.cosim.cli.running import ControlNames, FmuFile, GainsFile, given_gains
 from hexapod_cosim.cosim.cli.terminal import Json, warn
 from hexapod_cosim.cosim.common.installation import require_pyarrow
-from hexapod_cosim.cosim.study.execute.engines import DEFAULT_ENGINE, ENGINES
-from hexapod_cosim.cosim.study.plan.records import StudyError
+from hexapod_cosim.cosim.study.records import StudyError
 
 EPILOG = (
     f"A fall is a result of a study. Exit code {FELL} only when no run walked to its end "
@@ -46,14 +45,6 @@ StudyFolder = Annotated[
         help="Folder to write, or to resume; default out/STUDY.",
     ),
 ]
-EngineName = Annotated[
-    str,
-    typer.Option(
-        "--engine",
-        metavar="|".join(ENGINES),
-        help="How runs are simulated; or MODULE:NAME of your own.",
-    ),
-]
 
 
 def study(
@@ -65,7 +56,6 @@ def study(
     output: StudyFolder = None,
     workers: Workers = None,
     scheduler: Scheduler = None,
-    engine: EngineName = DEFAULT_ENGINE,
     fmu: FmuFile = None,
     gains: GainsFile = None,
     json: Json = False,
@@ -78,10 +68,9 @@ def study(
     require_pyarrow("studies", "hexapod study")
     # imported here: it is slow, and no other command needs it
     from hexapod_cosim.cosim.cli.study.studying import run_and_report  # noqa: PLC0415
-    from hexapod_cosim.cosim.study.execute.study import Options  # noqa: PLC0415
+    from hexapod_cosim.cosim.study.study import Options  # noqa: PLC0415
 
     options = Options(
-        engine=engine,
         fmu=fmu,
         gains=given_gains(gains),
         workers=_checked_workers(workers),
@@ -90,7 +79,7 @@ def study(
         command=_command_line(
             file,
             control or [],
-            {"engine": engine if engine != DEFAULT_ENGINE else None, "fmu": fmu, "gains": gains},
+            {"fmu": fmu, "gains": gains},
         ),
     )
     folder = output or Path("out") / Path(file).stem

@@ -21,18 +21,18 @@ from hexapod_cosim.cosim.cli.terminal import (
 )
 from hexapod_cosim.cosim.master.loop import COMPLETED
 from hexapod_cosim.cosim.results.comparison import METHOD
-from hexapod_cosim.cosim.study.execute.dispatch import ProgressSink
-from hexapod_cosim.cosim.study.execute.study import Options, StartProgress, run_study
-from hexapod_cosim.cosim.study.plan.reading import load_study
+from hexapod_cosim.cosim.study.dispatch import ProgressSink
+from hexapod_cosim.cosim.study.folder import TIMES
+from hexapod_cosim.cosim.study.reading import load_study
 from hexapod_cosim.cosim.study.report.notes import NO_WALK, notes
-from hexapod_cosim.cosim.study.report.report import (
+from hexapod_cosim.cosim.study.report.page import (
     optimum_changes,
     optimum_rows,
     overall_rows,
     write_study_report,
 )
-from hexapod_cosim.cosim.study.store.manifest import TIMES
-from hexapod_cosim.cosim.study.store.results import Results, read_results, summary_of
+from hexapod_cosim.cosim.study.study import Options, StartProgress, run_study
+from hexapod_cosim.cosim.study.summary import Results, read_results, summary_of
 
 MAX_REASONS = 10  # of failures that are shown
 
@@ -67,9 +67,8 @@ def run_and_report(
 
 def _only_falls(found: Results) -> bool:
     """Returns whether no run walked to its end and the robot fell in some of them."""
-    overall = found.overall
-    return not any(overall.walked.values()) and any(
-        status == COMPLETED for _, status, _ in overall.failures
+    return not any(found.overall.walked.values()) and any(
+        status == COMPLETED for _, status, _ in found.failures
     )
 
 
@@ -82,12 +81,10 @@ def warn_of(found: Results) -> None:
 def failed_controls(found: Results) -> list[str]:
     """Returns a sentence for each control under which no run walked to its end."""
     texts = []
-    for control, total in found.overall.total.items():
+    for control, total in found.overall.runs.items():
         if total and not found.overall.walked.get(control, 0):
             reasons = [
-                (count, *key[1:])
-                for key, count in found.overall.failures.items()
-                if key[0] == control
+                (count, *key[1:]) for key, count in found.failures.items() if key[0] == control
             ]
             count, status, reason = reasons[0]
             alike = "all" if len(reasons) == 1 else f"{count} of them"
@@ -137,7 +134,7 @@ def progress(*, plain: bool) -> Iterator[StartProgress]:
 
 def show_study(found: Results) -> None:
     """Prints the table of all runs, totals, failures by reason and the optimum."""
-    overall, controls = found.overall, found.study.run_controls
+    overall, controls = found.overall, found.study.controls
     rows = overall_rows(found)
     columns = [
         "metric",
@@ -160,13 +157,13 @@ def show_study(found: Results) -> None:
         right=[k for k, name in enumerate(columns) if name not in ("metric", "unit", "")],
     )
     walked = ", ".join(
-        f"{control} {overall.walked.get(control, 0)} of {overall.total.get(control, 0)}"
+        f"{control} {overall.walked.get(control, 0)} of {overall.runs.get(control, 0)}"
         for control in controls
     )
-    show_text(f"{overall.runs} runs at {found.of_points} points; walked to the end: {walked}")
+    show_text(f"{found.runs} runs at {found.of_points} points; walked to the end: {walked}")
     if len(controls) > 1:
         show_text(f"{METHOD}.")
-    for (control, status, reason), count in list(overall.failures.items())[:MAX_REASONS]:
+    for (control, status, reason), count in list(found.failures.items())[:MAX_REASONS]:
         show_text(f"{count:6d} x {control} {_ending(status)}: {reason}")
     for row in optimum_rows(found):
         settings = ", ".join(

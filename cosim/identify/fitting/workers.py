@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pickle
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import as_completed
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import partial
@@ -17,7 +18,7 @@ from hexapod_cosim.cosim.identify.experiment import Experiment, simulated
 from hexapod_cosim.cosim.identify.log import LogError
 from hexapod_cosim.cosim.identify.log_plant import LogPlant
 from hexapod_cosim.cosim.identify.unknowns import ROBOT
-from hexapod_cosim.cosim.run.worker_pool import WorkerPool, worker_pool
+from hexapod_cosim.cosim.run.worker_pool import WorkerDiedError, WorkerPool
 from hexapod_cosim.models import FmuError, HexapodError, Robot
 
 Array = NDArray[np.float64]
@@ -28,7 +29,6 @@ Outputs = list[Array] | None  # of each experiment; None: the plant refuses the 
 class Task:
     """Numbers for which the experiments of a file are simulated."""
 
-    number: int
     file: Path
     values: Mapping[str, float]
     parameters: Mapping[str, float]  # further ones of the FMU
@@ -64,7 +64,7 @@ def _simulate(task: Task) -> Outputs:
 class Workers:
     """Worker processes that simulate logs; see `simulating_workers`."""
 
-    def __init__(self, pool: WorkerPool[Task, Outputs], folder: Path) -> None:
+    def __init__(self, pool: WorkerPool, folder: Path) -> None:
         self._pool, self._folder = pool, folder
         self.watch: Callable[[], None] = lambda: None  # called after each simulation of all logs
         self._written: dict[int, tuple[tuple[Experiment, ...], Path]] = {}
@@ -82,21 +82,19 @@ class Workers:
         Raises HexapodError when a worker process dies.
         """
         file = self._file(experiments)
-        for number, values in enumerate(many):
-            self._pool.submit(Task(number, file, values, parameters))
-        found: dict[int, Outputs] = {}
-        while len(found) < len(many):
-            for item in self._pool.wait():
-                if item.death:
-                    raise HexapodError(
-                        "a simulation of the log has no result",
-                        got=item.death,
-                        expected="outputs of the plant",
-                        fix="give --workers 1, which needs less memory",
-                    )
-                found[item.task.number] = item.result
+        futures = [self._pool.submit(_simulate, Task(file, values, parameters)) for values in many]
+        try:
+            for future in as_completed(futures):
+                future.result()
                 self.watch()
-        return [found[number] for number in range(len(many))]
+        except WorkerDiedError as error:
+            raise HexapodError(
+                "a simulation of the log has no result",
+                got=error.got,
+                expected="outputs of the plant",
+                fix="give --workers 1, which needs less memory",
+            ) from error
+        return [future.result() for future in futures]
 
     def _file(self, experiments: tuple[Experiment, ...]) -> Path:
         """Returns the file of experiments, which is written once."""
@@ -126,5 +124,5 @@ def simulating_workers(
     scratch = folder / "scratch"
     scratch.mkdir(parents=True)
     initialise = partial(_open, fmu, robot, dict(parameters))
-    with worker_pool(size, _simulate, initialise=initialise, scratch=scratch) as pool:
+    with WorkerPool(size, initialise=initialise, scratch=scratch) as pool:
         yield Workers(pool, folder)

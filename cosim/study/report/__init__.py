@@ -1,1 +1,1 @@
-"""Writes the report of a study with its figures. Imports `plan` and `store`."""
+"""The report of a study: its page, figures and notes."""

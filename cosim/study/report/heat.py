@@ -4,172 +4,107 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.colors import Normalize
+from matplotlib.colors import LogNorm, Normalize
 from matplotlib.figure import Figure
+from numpy.typing import NDArray
 
-from hexapod_cosim.cosim.study.plan.records import Factor, Study
-from hexapod_cosim.cosim.study.report.style import (
-    CHANGES,
-    COLOURMAP,
-    SLIP,
-    Array,
-    label_of,
-    logarithmic,
-    mean_of,
-    ticks_of,
-)
-from hexapod_cosim.cosim.study.store.table import Point
+from hexapod_cosim.cosim.results.metrics import FLOORS
+from hexapod_cosim.cosim.study.groups import Point
+from hexapod_cosim.cosim.study.records import Factor, Study
 
+Array = NDArray[np.float64]
+SLIP = "slip_per_metre"
+COLOURMAP, CHANGES = "viridis", "RdBu_r"
 MAX_NUMBERED = 60  # cells that show their values as numbers
-GREY = "0.5"
+EMPTY = "0.85"  # grey of cells without a value
 
 
-@dataclass(frozen=True)
-class _Panel:
-    """A panel with arrays by cell (values of the second factor, values of the first)."""
+def mean_of(point: Point, control: str, metric: str) -> float:
+    """Returns the mean of a metric at a point, NaN where there is none."""
+    return point.figures.means[control][metric].value
 
-    title: str
-    values: Array  # NaN in cells without one
-    runs: Array  # numbers of runs
-    walked: Array  # numbers of walks
-    norm: Normalize
-    colours: str
+
+def label_of(factor: Factor) -> str:
+    """Returns the name of a factor with its unit."""
+    unit = "x designed" if factor.relative else factor.unit
+    return f"{factor.name} [{unit}]" if unit else factor.name
+
+
+def ticks_of(factor: Factor) -> list[str]:
+    """Returns the different values of a factor as labels."""
+    return [
+        f"{value:.4g}" if isinstance(value, float) else str(value)
+        for value in dict.fromkeys(factor.values)
+    ]
 
 
 def heat_map(points: Sequence[Point], first: Factor, second: Factor, study: Study) -> Figure:
     """Draws the slip over two factors for each control, and the changes from the first one."""
-    cells = _Cells(points, first, second)
-    controls = study.run_controls
-    slips = [cells.mean(_slip(control)) for control in controls]
-    norm = logarithmic(np.concatenate(slips, axis=None))
-    panels = [
-        _Panel(
-            f"{control}, slip [m/m]",
-            values,
-            cells.total(_runs(control)),
-            cells.total(_walked(control)),
-            norm,
-            COLOURMAP,
-        )
-        for control, values in zip(controls, slips, strict=True)
-    ]
-    panels += [
-        _Panel(
-            f"{controls[0]} → {control}, pairs [%]",
-            100.0 * (cells.mean(_change(control)) - 1.0),
-            cells.total(_pairs_known(controls[0], control)),
-            cells.total(_pairs(control)),
-            Normalize(-100.0, 100.0),
-            CHANGES,
-        )
-        for control in controls[1:]
-    ]
-    figure = Figure(
-        figsize=(3.6 * len(panels) + 0.8, 0.42 * min(max(len(second.values), 3), 12) + 2.2)
-    )
-    for axes, panel in zip(
+
+    def slip(control: str) -> Array:
+        return _cells(points, first, second, lambda point: (mean_of(point, control, SLIP), 1.0))
+
+    def change(control: str) -> Array:
+        def slips(point: Point) -> tuple[float, float]:
+            pairs = point.figures.changes[control][SLIP]
+            return pairs.after, pairs.before
+
+        return 100.0 * (_cells(points, first, second, slips) - 1.0)
+
+    before, *others = study.controls
+    slips = {control: slip(control) for control in study.controls}
+    norm = _logarithmic(np.concatenate(list(slips.values()), axis=None))
+    panels: list[tuple[str, Array, Normalize, str]]
+    panels = [(f"{name}, slip [m/m]", values, norm, COLOURMAP) for name, values in slips.items()]
+    apart = Normalize(-100.0, 100.0)
+    panels += [(f"{before} → {name}, pairs [%]", change(name), apart, CHANGES) for name in others]
+    height = 0.42 * min(max(len(second.values), 3), 12) + 2.2
+    figure = Figure(figsize=(3.6 * len(panels) + 0.8, height))
+    for axes, (title, values, scale, colours) in zip(
         np.atleast_1d(figure.subplots(1, len(panels), sharey=True)), panels, strict=True
     ):
-        _draw(figure, axes, panel, first, second)
+        axes.set(title=title, xlabel=label_of(first), facecolor=EMPTY)
+        axes.grid(visible=False)
+        image = axes.imshow(values, origin="lower", aspect="auto", cmap=colours, norm=scale)
+        if values.size <= MAX_NUMBERED:
+            _numbers(axes, values, image)
+        rotation = 45 if len(first.values) > 6 else 0
+        axes.set_xticks(range(len(first.values)), ticks_of(first), rotation=rotation)
+        axes.set_yticks(range(len(second.values)), ticks_of(second))
+        figure.colorbar(image, ax=axes, shrink=0.9)
     figure.axes[0].set_ylabel(label_of(second))
     return figure
 
 
-def _slip(control: str) -> Callable[[Point], tuple[float, float]]:
-    return lambda point: (mean_of(point, control, SLIP), 1.0)
+def _cells(
+    points: Sequence[Point],
+    first: Factor,
+    second: Factor,
+    pair_of: Callable[[Point], tuple[float, float]],
+) -> Array:
+    """Returns the ratio of sums over the points of each cell; NaN where there is none.
 
-
-def _runs(control: str) -> Callable[[Point], int]:
-    return lambda point: point.runs[control]
-
-
-def _walked(control: str) -> Callable[[Point], int]:
-    return lambda point: point.walked[control]
-
-
-def _pairs(control: str) -> Callable[[Point], int]:
-    return lambda point: point.pairs[control]
-
-
-def _pairs_known(*controls: str) -> Callable[[Point], int]:
-    """Returns > 0 when a point has pairs, or when it has none as one control never walked."""
-    return lambda point: (
-        point.pairs[controls[-1]]
-        or int(any(point.runs[name] and not point.walked[name] for name in controls))
-    )
-
-
-def _change(control: str) -> Callable[[Point], tuple[float, float]]:
-    return lambda point: (point.changes[control][SLIP].after, point.changes[control][SLIP].before)
-
-
-class _Cells:
-    """Points by the values of two factors."""
-
-    def __init__(self, points: Sequence[Point], first: Factor, second: Factor) -> None:
-        self._shape = len(second.values), len(first.values)
-        across = {value: place for place, value in enumerate(first.values)}
-        up = {value: place for place, value in enumerate(second.values)}
-        self._points = [
-            ((up[point.values[second.name]], across[point.values[first.name]]), point)
-            for point in points
-        ]
-
-    def mean(self, figures: Callable[[Point], tuple[float, float]]) -> Array:
-        """Returns the ratio of sums over the points of each cell; NaN where there is none.
-
-        `figures` returns the numerator and the denominator of a point.
-        """
-        above, below = np.zeros(self._shape), np.zeros(self._shape)
-        for place, point in self._points:
-            pair = figures(point)
-            if all(map(math.isfinite, pair)):
-                above[place] += pair[0]
-                below[place] += pair[1]
-        return np.asarray(
-            np.divide(above, below, out=np.full(self._shape, math.nan), where=below > 0.0)
-        )
-
-    def total(self, figure: Callable[[Point], int]) -> Array:
-        """Returns the sum over the points of each cell."""
-        found = np.zeros(self._shape)
-        for place, point in self._points:
-            found[place] += figure(point)
-        return found
-
-
-def _draw(figure: Figure, axes: Axes, panel: _Panel, first: Factor, second: Factor) -> None:
-    """Draws a panel, with a mark in cells without a value.
-
-    The mark is a dot where nothing was run yet, a cross where no run walked, and a dash where the
-    walk has no value.
+    `pair_of` returns the numerator and the denominator of a point.
     """
-    axes.set_title(panel.title)
-    axes.grid(visible=False)
-    image = axes.imshow(
-        panel.values,
-        origin="lower",
-        aspect="auto",
-        cmap=panel.colours,
-        norm=panel.norm,
-        interpolation="nearest",
-    )
-    for row, column in np.argwhere(~np.isfinite(panel.values)):
-        mark = "." if not panel.runs[row, column] else "x" if not panel.walked[row, column] else "_"
-        axes.plot(column, row, marker=mark, color=GREY)
-    if panel.values.size <= MAX_NUMBERED:
-        _numbers(axes, panel.values, image)
-    axes.set_xticks(
-        range(len(first.values)), ticks_of(first), rotation=45 if len(first.values) > 6 else 0
-    )
-    axes.set_yticks(range(len(second.values)), ticks_of(second))
-    axes.set_xlabel(label_of(first))
-    figure.colorbar(image, ax=axes, shrink=0.9)
+    sums = np.zeros((2, len(second.values), len(first.values)))
+    for point in points:
+        pair = pair_of(point)
+        if all(map(math.isfinite, pair)):
+            row = second.values.index(point.values[second.name])
+            sums[:, row, first.values.index(point.values[first.name])] += pair
+    above, below = sums
+    return np.divide(above, below, out=np.full_like(above, math.nan), where=below > 0.0)
+
+
+def _logarithmic(slips: Array) -> LogNorm:
+    """Returns the logarithmic colour scale of slips."""
+    seen = np.clip(slips[np.isfinite(slips)], FLOORS[SLIP], None)
+    low, high = (float(seen.min()), float(seen.max())) if len(seen) else (FLOORS[SLIP], 1.0)
+    return LogNorm(low, high * (1.0 + 1e-9))
 
 
 def _numbers(axes: Axes, values: Array, image: Any) -> None:
@@ -177,12 +112,6 @@ def _numbers(axes: Axes, values: Array, image: Any) -> None:
         if math.isfinite(value):
             red, green, blue, _ = image.cmap(image.norm(value))
             light = 0.299 * red + 0.587 * green + 0.114 * blue > 0.55
-            axes.text(
-                column,
-                row,
-                f"{value:.2g}" if abs(value) < 10 else f"{value:.0f}",
-                ha="center",
-                va="center",
-                fontsize=7.5,
-                color="black" if light else "white",
-            )
+            text = f"{value:.2g}" if abs(value) < 10 else f"{value:.0f}"
+            colour = "black" if light else "white"
+            axes.text(column, row, text, ha="center", va="center", fontsize=7.5, color=colour)

@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from hexapod_cosim.cosim.master.loop import COMPLETED
-from hexapod_cosim.cosim.study.plan.records import SOBOL, Study
-from hexapod_cosim.cosim.study.store.results import Results
-from hexapod_cosim.cosim.study.store.table import Overall
+from hexapod_cosim.cosim.study.records import SOBOL, Study
+from hexapod_cosim.cosim.study.summary import Results
 
 NO_WALK = (
     "No run walked to its end, so there are no figures of walks. "
@@ -21,7 +20,9 @@ TOO_SHORT = (
 def notes(results: Results) -> list[str]:
     """Returns the notes as sentences."""
     found = [*_of_design(results.study), *_of_missing_runs(results), *_of_walks(results)]
-    return [*found, *_of_balances(results.overall)]
+    for control, unbalanced in results.unbalanced.items():
+        found += unbalanced.warnings(control, runs=results.overall.runs[control])
+    return found
 
 
 def _of_design(study: Study) -> Iterator[str]:
@@ -34,11 +35,6 @@ def _of_design(study: Study) -> Iterator[str]:
 
 
 def _of_missing_runs(results: Results) -> Iterator[str]:
-    if results.damaged:
-        yield (
-            "Damaged parts of the results are left out, and their runs with them: "
-            f"{', '.join(results.damaged)}. Start the study again: their runs are run again."
-        )
     if results.facts["status"] != COMPLETED and results.study.optimise is None:
         yield (
             "Not all runs are there. Means by control are of the runs that are there, which need "
@@ -48,8 +44,8 @@ def _of_missing_runs(results: Results) -> Iterator[str]:
 
 def _of_walks(results: Results) -> Iterator[str]:
     """Yields notes where no run walked, or where the walks of a scenario gave no figures."""
-    walks = results.overall.walks
-    if results.overall.runs and not walks:
+    walks = results.walks
+    if results.runs and not walks:
         yield NO_WALK
     elif walks and not any(figured for _, figured in walks.values()):
         yield f"The walks are {TOO_SHORT}"
@@ -57,9 +53,3 @@ def _of_walks(results: Results) -> Iterator[str]:
         for (case, control), (walked, figured) in walks.items():
             if not figured:
                 yield f"All {walked} {control} walks of {case} are {TOO_SHORT}"
-
-
-def _of_balances(overall: Overall) -> Iterator[str]:
-    """Yields a note for each control with runs whose energy balance does not close."""
-    for control, unbalanced in sorted(overall.unbalanced.items()):
-        yield from unbalanced.warnings(control, runs=overall.total[control])

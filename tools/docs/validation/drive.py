@@ -11,7 +11,7 @@ from hexapod_cosim.cosim.master.recorder import Recording
 from hexapod_cosim.cosim.master.signals import ACCELERATION, COMMANDED
 from hexapod_cosim.cosim.results.metrics import compute_metrics
 from hexapod_cosim.cosim.results.result import Result
-from hexapod_cosim.cosim.run.run import initialise_plant, make_plan, open_plant
+from hexapod_cosim.cosim.run.single_run import initialise_plant, make_plan, open_plant
 from hexapod_cosim.cosim.scenario.records import Scenario
 from hexapod_cosim.models import load_robot
 from tools.docs.validation.shown import Shown

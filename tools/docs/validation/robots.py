@@ -10,7 +10,7 @@ from tempfile import TemporaryDirectory
 from random_robots import COUNT, draw_robot, hip_height, walk_of
 from test_random_robots import odd_robots
 
-from hexapod_cosim.cosim.design.design import design_for
+from hexapod_cosim.cosim.design.gain_design import design_for
 from hexapod_cosim.cosim.run.walker import Walker
 from hexapod_cosim.cosim.scenario.records import COMPARED, Scenario
 from hexapod_cosim.cosim.scenario.scenario import load_scenario

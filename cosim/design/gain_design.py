@@ -1,0 +1,172 @@
+"""Designs gains for a robot from its own FMU, linearised in all its stances."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import fields, replace
+
+import numpy as np
+from threadpoolctl import threadpool_limits
+
+from hexapod_cosim.controller import Gains, GainsError, Requirements
+from hexapod_cosim.controller.design import StandingPlant, design_gains
+from hexapod_cosim.controller.size import requirements_for
+from hexapod_cosim.cosim.common.temporary import TemporaryFolder
+from hexapod_cosim.cosim.design.linearise import Motion, linearise
+from hexapod_cosim.cosim.design.standing import StanceError, rest
+from hexapod_cosim.cosim.export.plant_export import export_fmu
+from hexapod_cosim.cosim.master.fmu import Fmu
+from hexapod_cosim.models import LEG_NAMES, Robot, unknown_name
+from hexapod_cosim.models.records import Array
+
+STANCES: Mapping[str, Sequence[str]] = {
+    "six legs": LEG_NAMES,
+    "tripod LF LR RM": ("LF", "LR", "RM"),
+    "tripod LM RF RR": ("LM", "RF", "RR"),
+}
+OWN_WEIGHT = 1.0
+LOADS = (0.1, OWN_WEIGHT, 2.0)  # 1    mean load of the standing legs, in thirds of the weight
+NO_MARGIN = 180.0  # deg    phase margin that no loop with a crossing has
+
+
+def design_for(robot: Robot, period: float, requirements: Requirements | None = None) -> Gains:
+    """Designs gains of a robot for a controller period [s]. Raises GainsError, FmuError."""
+    with threadpool_limits(1):  # for small matrices, threads cost more time than they save
+        plants, left_out = examine_stances(robot, period)
+        return design_gains(
+            robot, period, plants=plants, requirements=requirements, left_out=left_out
+        )
+
+
+def standing_plants(robot: Robot, period: float) -> dict[str, StandingPlant]:
+    """Returns the plants of `examine_stances`."""
+    return examine_stances(robot, period)[0]
+
+
+def examine_stances(
+    robot: Robot, period: float
+) -> tuple[dict[str, StandingPlant], tuple[str, ...]]:
+    """Linearises the robot's FMU on level ground in its stances, under light and heavy loads.
+
+    Each is linearised with the friction of its gears and without: that friction is a strong damper
+    at standstill and none at walking speed. Stances and loads in which the robot does not stand are
+    left out; the returned texts name them, with the reason. Raises GainsError for a robot that
+    stands in no stance, and for a robot or a period that no gains can be designed for.
+    """
+    _check_can_design(robot, period)
+    plants: dict[str, StandingPlant] = {}
+    failures: dict[str, StanceError] = {}
+    frictions = {"gears stick": robot.servo.coulomb_friction, "gears slip": 0.0}
+    with level_fmu(robot) as fmu:
+        for stance, standing in STANCES.items():
+            for load, (motion, inputs) in _rests(fmu, robot, stance, standing, failures).items():
+                for gears, friction in frictions.items():
+                    plants[f"{stance}, load {load:g}, {gears}"] = linearise(
+                        fmu, robot, motion, inputs, period=period, coulomb_friction=friction
+                    )
+    if not plants:
+        first = failures[next(iter(STANCES))]
+        raise GainsError(
+            "the robot does not stand",
+            got=f"{first.what}: {first.got}",
+            expected="rest on six legs or on one of its tripods",
+            fix=first.fix,
+            where=robot.name,
+        )
+    return plants, tuple(
+        f"{name}: {error.what} (got {error.got}, expected {error.expected})"
+        for name, error in failures.items()
+    )
+
+
+def _check_can_design(robot: Robot, period: float) -> None:
+    """Raises GainsError for a period that is not positive and for feet without friction."""
+    if not period > 0.0:
+        raise GainsError(
+            "impossible controller period",
+            got=period,
+            expected="a number > 0",
+            fix="give it in seconds",
+        )
+    if robot.friction.law == "none" or robot.friction.mu == 0.0:
+        raise GainsError(
+            "compliant control answers to the feet's friction",
+            got=f"friction law {robot.friction.law}, mu {robot.friction.mu}",
+            expected="a robot file whose feet have friction",
+            fix="give the file the friction of ordinary ground, and a scenario friction.mu = 0",
+            where=robot.name,
+        )
+
+
+def _rests(
+    fmu: Fmu, robot: Robot, stance: str, standing: Sequence[str], failures: dict[str, StanceError]
+) -> dict[float, tuple[Motion, Array]]:
+    """Returns the robot at rest under each load that it can stand under, with its inputs.
+
+    Returns {} when it cannot stand under its own weight. Adds the reasons to `failures`.
+    """
+    found: dict[float, tuple[Motion, Array]] = {}
+    for load in sorted(LOADS, key=lambda load: load != OWN_WEIGHT):
+        try:
+            found[load] = rest(fmu, robot, standing=standing, load=load)
+        except StanceError as error:
+            name = stance if load == OWN_WEIGHT else f"{stance} under {load:g} times its weight"
+            failures[name] = error
+            if load == OWN_WEIGHT:
+                return {}
+    return {load: found[load] for load in LOADS if load in found}
+
+
+@contextmanager
+def level_fmu(robot: Robot) -> Iterator[Fmu]:
+    """Exports the robot's FMU on level ground at height 0 and opens it.
+
+    Raises GainsError for a robot without position servos.
+    """
+    if robot.servo.mode != "position" or robot.servo.kp <= 0.0:
+        raise GainsError(
+            "compliant control shifts the servos' targets",
+            got=f"servo mode {robot.servo.mode}, kp {robot.servo.kp}",
+            expected="servo mode position with kp > 0",
+            fix="use position servos, or kinematic control",
+        )
+    # level ground is normal to gravity
+    down = (0.0, 0.0, -float(np.linalg.norm(robot.gravity)))
+    level = replace(robot, gravity=down, terrain=replace(robot.terrain, kind="flat", height=0.0))
+    with (
+        TemporaryFolder("export") as folder,
+        Fmu(export_fmu(level, folder / f"{robot.name}.fmu", bare=True)) as fmu,
+    ):
+        yield fmu
+
+
+def read_requirements(settings: Sequence[str], robot: Robot) -> Requirements:
+    """Returns a robot's requirements with settings `NAME=VALUE` applied.
+
+    Raises GainsError, which names the setting.
+    """
+    names, values = [entry.name for entry in fields(Requirements)], {}
+    for setting in settings:
+        name, _, text = setting.partition("=")
+        if name not in names:
+            raise unknown_name("requirement", name, names, error=GainsError)
+        try:
+            values[name] = float(text)
+        except ValueError as error:
+            raise GainsError(
+                "not a number",
+                got=text,
+                expected=f"{name}=NUMBER",
+                fix="give a number in SI units",
+                where=name,
+            ) from error
+    if not 0.0 <= values.get("phase_margin", 0.0) < NO_MARGIN:
+        raise GainsError(
+            "value not allowed",
+            got=values["phase_margin"],
+            expected=f"a number >= 0 and < {NO_MARGIN:g} [deg]",
+            fix="write --set phase_margin=50",
+            where="phase_margin",
+        )
+    return requirements_for(robot, **values)

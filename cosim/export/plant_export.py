@@ -1,0 +1,221 @@
+"""Writes FMUs: the same binary for every robot, with the robot's model description and start
+values.
+"""
+
+from __future__ import annotations
+
+import zipfile
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from types import MappingProxyType
+from zipfile import ZIP_DEFLATED, ZIP_STORED
+
+from hexapod_cosim.cosim.common.components import PLANT, Component
+from hexapod_cosim.cosim.common.files import atomic_path, not_writable
+from hexapod_cosim.cosim.common.plant_files import (
+    FMI2_SOURCES,
+    FMI3_SOURCES,
+    binary,
+    fmi2_platform,
+    fmi3_platform,
+    source_files,
+)
+from hexapod_cosim.cosim.common.temporary import TemporaryFolder
+from hexapod_cosim.cosim.export.extras import extra_members
+from hexapod_cosim.cosim.export.platforms import (
+    build_binaries,
+    choose_platforms,
+    component_library,
+)
+from hexapod_cosim.cosim.export.reference import reference_members
+from hexapod_cosim.cosim.export.start_values import start_values
+from hexapod_cosim.cosim.export.starts import with_starts
+from hexapod_cosim.cosim.interface.model_description import render_fmi2
+from hexapod_cosim.cosim.interface.model_description3 import render_build_description, render_fmi3
+from hexapod_cosim.cosim.interface.plant_interface import Interface, load_interface
+from hexapod_cosim.cosim.interface.variants import for_binaries, with_integers
+from hexapod_cosim.models.errors import FmuError
+from hexapod_cosim.models.ground.grid_file import grid_bytes
+from hexapod_cosim.models.ground.surface import Surface
+from hexapod_cosim.models.records import Robot
+from hexapod_cosim.models.terrain import surface_of
+from hexapod_cosim.models.validation import check_contact_surface, check_settings
+
+FMI_VERSIONS = (2, 3)
+NOTHING: Mapping[str, bytes] = MappingProxyType({})
+TIMESTAMP = (1980, 1, 1, 0, 0, 0)  # of every member, so that archives are reproducible
+
+
+def export_fmu(
+    robot: Robot,
+    path: str | Path,
+    *,
+    fmi: int = 2,
+    platforms: Iterable[str] | None = None,
+    terrains: Sequence[Surface] = (),
+    integers: bool = False,
+    starts: Mapping[str, float] = MappingProxyType({}),
+    bare: bool = False,
+) -> Path:
+    """Writes the plant's FMU of a robot and returns its path.
+
+    Args:
+        robot: the robot whose values the FMU starts with.
+        path: the file to write, atomically. Its folder is created if need be.
+        fmi: version of the standard.
+        platforms: names such as linux64 or "all", to cross-compile binaries; "sources" for no
+            binary. By default the installed binary of this machine.
+        terrains: surfaces to pack as grid files, numbered from 1; after the robot's own, if it
+            stands on one. If it does not, the FMU starts on the first of them.
+        integers: offer Integers instead of enumerations, for importers without enumerations.
+        starts: of inputs and parameters by name, instead of the robot's.
+        bare: write only what a simulation reads: model description, start values, binary and
+            grids, without compression. Such a file is made in a tenth of the time, for use by this
+            process alone: documentation, pictures, sources and the licence are missing.
+
+    Raises FmuError without a binary or cross compiler, for an unknown version or platform and for
+    invalid start values; HexapodError when the path cannot be written.
+    """
+    own = surface_of(robot.terrain)
+    grids = list(dict.fromkeys([*([] if own is None else [own]), *terrains]))
+    if grids and own is None:
+        robot = replace(robot, terrain=replace(robot.terrain, kind="grid", surface=grids[0]))
+        check_settings(robot)
+    for number, surface in enumerate(grids, start=1):
+        check_contact_surface(robot, surface, f"terrain {number}, {surface.name}")
+    return export_interface(
+        with_starts(load_interface(robot), starts),
+        path,
+        fmi=fmi,
+        platforms=platforms,
+        grids=grid_members(grids),
+        integers=integers,
+        bare=bare,
+    )
+
+
+def grid_members(surfaces: Iterable[Surface]) -> dict[str, bytes]:
+    """Returns grid files by their path in the FMU, numbered from 1."""
+    return {
+        f"resources/terrain/{number}.terrain": grid_bytes(surface)
+        for number, surface in enumerate(surfaces, start=1)
+    }
+
+
+def export_interface(
+    interface: Interface,
+    path: str | Path,
+    *,
+    fmi: int = 2,
+    platforms: Iterable[str] | None = None,
+    grids: Mapping[str, bytes] = NOTHING,
+    integers: bool = False,
+    bare: bool = False,
+) -> Path:
+    """Writes the FMU of a component with this interface; arguments and errors as `export_fmu`.
+
+    grids: grid files by their path in the FMU.
+    """
+    if fmi not in FMI_VERSIONS:
+        offered = ", ".join(map(str, FMI_VERSIONS))
+        raise FmuError(
+            "no such FMI version", got=fmi, expected=offered, fix="export with one of these"
+        )
+    component = interface.component
+    chosen = None if platforms is None else choose_platforms(platforms, fmi=fmi)
+    if chosen is None:
+        binaries = installed_binary(component, fmi=fmi)
+    else:
+        binaries = build_binaries(component_library(component), chosen, fmi=fmi)
+    complete = for_binaries(with_integers(interface) if integers else interface, binaries)
+    if bare:
+        description = _description(complete, fmi)[1]
+        return write_archive(Path(path), description | dict(binaries) | dict(grids), ZIP_STORED)
+    return write_archive(Path(path), _members(complete, dict(binaries) | dict(grids), fmi))
+
+
+def installed_binary(component: Component = PLANT, *, fmi: int = 2) -> dict[str, bytes]:
+    """Returns the binary that was installed with this package, by its path in the FMU."""
+    library = binary(fmi2_platform(), component)
+    folder = fmi2_platform() if fmi == 2 else fmi3_platform()
+    return {f"binaries/{folder}/{component.identifier}{library.suffix}": library.read_bytes()}
+
+
+def _description(interface: Interface, fmi: int) -> tuple[str, dict[str, bytes]]:
+    """Returns the text of modelDescription.xml, and it and the start values by path."""
+    description = (render_fmi2 if fmi == 2 else render_fmi3)(interface)
+    return description.xml, {
+        "modelDescription.xml": description.xml.encode(),
+        "resources/start_values.txt": start_values(interface, description.guid).encode(),
+    }
+
+
+def _members(interface: Interface, binaries: Mapping[str, bytes], fmi: int) -> dict[str, bytes]:
+    """Returns the contents of the archive by path."""
+    xml, members = _description(interface, fmi)
+    members |= dict(binaries) | _sources(interface.component, fmi)
+    reference = _reference(interface, members, fmi)
+    return members | extra_members(interface, xml, fmi=fmi, reference=bool(reference)) | reference
+
+
+def _sources(component: Component, fmi: int) -> dict[str, bytes]:
+    """Returns the binary's sources without the files for the other version of the standard, whose
+    headers an importer may not have.
+    """
+    other = FMI3_SOURCES if fmi == 2 else FMI2_SOURCES
+    files = {
+        name: path for name, path in source_files(component).items() if not name.startswith(other)
+    }
+    members = {f"sources/{name}": path.read_bytes() for name, path in files.items()}
+    if fmi == 3:
+        description = render_build_description(
+            component, (name for name in files if name.endswith(".c"))
+        )
+        members["sources/buildDescription.xml"] = description.encode()
+    return members
+
+
+def _reference(interface: Interface, members: dict[str, bytes], fmi: int) -> dict[str, bytes]:
+    """Returns reference results of the plant; none when the FMU has no binary for this machine."""
+    folders = {2: fmi2_platform(), 3: fmi3_platform()}
+    own = f"binaries/{folders[fmi]}/"
+    found = {name: data for name, data in members.items() if name.startswith(own)}
+    if interface.component is not PLANT or not found:
+        return {}
+    trial = members
+    if fmi == 3:  # the same binary and start values as an FMU of FMI 2.0, which runs here
+        trial = {name: data for name, data in members.items() if name.startswith("resources/")}
+        trial |= _description(interface, 2)[1]
+        trial |= {
+            name.replace(own, f"binaries/{folders[2]}/"): data for name, data in found.items()
+        }
+    with TemporaryFolder("export") as folder:
+        fmu = write_archive(folder / "trial.fmu", trial)
+        return reference_members(interface, fmu, fmi=fmi)
+
+
+def write_archive(
+    path: Path, members: Mapping[str, bytes], compression: int = ZIP_DEFLATED
+) -> Path:
+    """Writes a ZIP archive atomically; equal members give equal bytes.
+
+    Raises HexapodError when it cannot be written.
+    """
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise not_writable(path, error) from error
+    with atomic_path(path) as part, zipfile.ZipFile(part, "w") as archive:
+        for name, content in members.items():
+            archive.writestr(_member(name, compression), content)
+    return path
+
+
+def _member(name: str, compression: int) -> zipfile.ZipInfo:
+    """Returns the ZIP entry of a path."""
+    info = zipfile.ZipInfo(name, TIMESTAMP)
+    info.compress_type = compression
+    info.create_system = 3  # Unix, wherever it is packed
+    info.external_attr = (0o755 if name.startswith("binaries/") else 0o644) << 16
+    return info

@@ -1,3 +1,0 @@
-"""Plans a study: its file, factors, design points and identities of runs. Imports no other room
-of `study`.
-"""

@@ -1,0 +1,177 @@
+"""The records of a study: factors, cases, optimisation, orders and their results."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from hexapod_cosim.cosim.results.summary import Summary
+from hexapod_cosim.cosim.scenario.controls import Control, control_of
+from hexapod_cosim.models import HexapodError
+
+Value = float | int | bool | str
+
+VALUES, UNIFORM, LOGUNIFORM, NORMAL, INTEGERS = (
+    "values",
+    "uniform",
+    "loguniform",
+    "normal",
+    "integers",
+)
+GRID, LIST, RANDOM, LATIN_HYPERCUBE, SOBOL = DESIGNS = (
+    "grid",
+    "list",
+    "random",
+    "latin_hypercube",
+    "sobol",
+)
+DRAWN = (RANDOM, LATIN_HYPERCUBE, SOBOL)  # designs with a given number of points
+SCENARIO_FACTOR = "scenario"
+GAINS = "gains."  # prefix of factors that are gains of the compliant control
+FRONT = 8  # members of a Pareto front that are evaluated on the held-out runs
+SAMPLERS = ("tpe", "nsga2", "random")
+
+
+class StudyError(HexapodError):
+    """A study cannot be run or continued."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Factor:
+    """A quantity that a study varies: a setting, a gain, or the scenario.
+
+    Settings have the names that --set accepts; gains have names like gains.hold.path_rate.
+    """
+
+    name: str
+    kind: str  # VALUES, or a distribution
+    values: tuple[Value, ...] = ()  # of kind VALUES
+    low: float = math.nan  # of a distribution; the mean of a normal one
+    high: float = math.nan  # its standard deviation
+    unit: str = ""  # of the values; empty: the unit of the setting
+    relative: bool = False  # whether values are multiples of the designed gain
+
+    def setting(self, value: Value) -> Value:
+        """Returns the value as a scenario accepts it, with its unit."""
+        return f"{value!r} {self.unit}" if self.unit else value
+
+
+@dataclass(frozen=True, kw_only=True)
+class Case:
+    """A scenario of a study: the tables of its file with the settings of the study."""
+
+    name: str
+    table: Mapping[str, Any]
+    where: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class Evaluation:
+    """The runs that settings are evaluated on: names of scenarios, and seeds."""
+
+    cases: tuple[str, ...]
+    seeds: Sequence[int]
+
+    @property
+    def runs(self) -> int:
+        """Number of runs."""
+        return len(self.cases) * len(self.seeds)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Bound:
+    """A constraint on the mean of a metric."""
+
+    metric: str  # or WALKED, the share of runs that walked to the end
+    at_least: float = -math.inf
+    at_most: float = math.inf
+
+    def excess(self, value: float) -> float:
+        """Returns by how much a value exceeds the bounds: <= 0 within them, infinite for NaN."""
+        return math.inf if math.isnan(value) else max(self.at_least - value, value - self.at_most)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Optimise:
+    """An optimisation: objectives, constraints and the runs for them."""
+
+    metrics: tuple[str, ...]
+    constraints: tuple[Bound, ...]
+    trials: int
+    batch: int  # trials that are proposed before the result of any of them is known
+    sampler: str
+    control: str
+    training: Evaluation
+    held_out: Evaluation
+
+    @property
+    def chosen(self) -> int:
+        """Largest number of trials that are evaluated on the held-out runs."""
+        return 1 if len(self.metrics) == 1 else FRONT
+
+    @property
+    def trained(self) -> int:
+        """Number of training runs, of all trials and of the unchanged settings."""
+        return (self.trials + 1) * self.training.runs
+
+    @property
+    def most(self) -> int:
+        """Largest number of all runs."""
+        return self.trained + (1 + self.chosen) * self.held_out.runs
+
+
+@dataclass(frozen=True, kw_only=True)
+class Study:
+    """A complete study: its cases hold the content of their files."""
+
+    title: str
+    cases: Mapping[str, Case]  # by name; without SCENARIO_FACTOR all runs use the first
+    factors: tuple[Factor, ...]  # with an optimiser, its variables
+    design: str
+    points: int  # of a drawn design
+    seeds: Sequence[int]
+    controls: tuple[str, ...]  # labels; an optimisation has one
+    texts: Mapping[str, str]  # of all controls, by label; see scenario.controls
+    seed: int  # of the design and the optimiser
+    optimise: Optimise | None
+    source: Mapping[str, Any]  # the tables of the file
+    where: str
+
+    @property
+    def chosen_controls(self) -> tuple[Control, ...]:
+        """The controls of its runs, as records."""
+        return tuple(control_of(self.texts[label]) for label in self.controls)
+
+    @property
+    def gains_text(self) -> str | None:
+        """The text of the first control that has gains; None without one."""
+        texts = [
+            control.text
+            for control in self.chosen_controls
+            if control.is_builtin and control.name != "kinematic"
+        ]
+        return texts[0] if texts else None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Order:
+    """One run of a study."""
+
+    run: int
+    point: int
+    case: str
+    # of the factors, in their order; None leaves a setting as the scenario has it
+    values: tuple[Value | None, ...]
+    seed: int
+    control: str
+
+
+@dataclass(frozen=True)
+class RunResult:
+    """A run that has ended, with its summary."""
+
+    order: Order
+    summary: Summary
+    wall: float  # s    elapsed time
