@@ -1,19 +1,15 @@
 """Corrects the foot trajectories by the deviations that the ground causes. C: paper.c.
 
-Section 3 of the paper: kinematic control neglects the deviations of the feet during stance; a PID
-on the tangential force and a virtual suspension on the normal force correct the foot positions, the
-correction is added to the trajectory, and inverse kinematics is done again. The paper gives no
-equations, these are ours. They use joint angles and foot forces, and command angles only:
+Section 3 of the paper corrects the foot positions by a PID on the tangential force and a virtual
+suspension on the normal force, and does inverse kinematics again. It gives no equations: these are
+ours. They use joint angles and foot forces, and command angles only.
 
-1. Deviations. Under its load a leg yields like a spring: force and softness of the leg give the
-   deviation of a standing foot at once (C25). The measured joint angles give it with the friction
-   of the gears, for feet in the air, which deviate with the torso (C26).
-2. Along the ground (C47). A share of the deviation under the load is taken back. The P part yields
-   to the force that makes a foot slip; the I part returns all feet to their planned places, all by
-   the same way, so that no leg pulls against another.
-3. Upwards (C48, C49). A share of the deviation under the load is taken back, feet in the air are
-   lifted by what the torso sags, and a suspension yields where a foot meets the ground early, and
-   extends it where it is late.
+1. Deviations. Force and softness of a leg give the deviation of a standing foot at once (C25), the
+   measured joint angles that of the torso, with which feet in the air deviate (C26).
+2. Along the ground (C47). A share of the deviation is taken back. The P part yields to the force
+   that makes a foot slip, the I part returns all feet to their plan by the same way.
+3. Upwards (C48, C49). A share of the deviation is taken back, feet in the air are lifted by the
+   torso's sag, and a suspension answers early and late landings.
 """
 
 from __future__ import annotations
@@ -29,7 +25,7 @@ from hexapod_cosim.controller.memory import Stateful
 from hexapod_cosim.controller.parts import Parts
 from hexapod_cosim.controller.plane import LEGS, Array, Mask, Plane, along, clamp, square
 from hexapod_cosim.controller.walk.gait import Gait
-from hexapod_cosim.controller.walk.kinematics import Feet, Joints, LegSolver, Pose
+from hexapod_cosim.controller.walk.kinematics import Feet, Joints, LegSolver, Pose, Softness
 from hexapod_cosim.models import Robot
 
 LEAST_LOAD = 1e-6  # N    a smaller sum of loads cannot be divided by
@@ -44,15 +40,6 @@ SEARCH_SPEED = 0.08  # m/s    at most, of a foot that extends
 AIR_TIME = 0.06  # s    in which the suspension of a foot in the air returns
 
 
-class Softness(NamedTuple):
-    """Softness of the legs, C = J J^T / kp, along outward, sideward and upward (6,) [m/N]."""
-
-    outward: Array
-    sideward: Array
-    up: Array
-    splay: Array  # outward under an upward force
-
-
 class Step(NamedTuple):
     """Plan and measurements of a period, torso frame, six legs."""
 
@@ -63,18 +50,6 @@ class Step(NamedTuple):
     swinging: Mask  # planned in the air
     angle: Array  # rad    (6, 3) measured
     force: Array  # N    (6, 3) measured, ground on foot
-
-
-def softness(legs: LegSolver, pose: Pose, kp: float) -> Softness:
-    """Returns the softness of legs whose servos have the stiffness kp [N m/rad] (C25)."""
-    # rates of the foot, outward + i up, by the femur's and by the tibia's joint
-    femur, tibia = 1j * pose.foot, -1j * legs.tibia * pose.tibia
-    return Softness(
-        outward=(femur.real**2 + tibia.real**2 + legs.offset_y**2) / kp,
-        sideward=(pose.foot.real + legs.coxa_length) ** 2 / kp,
-        up=(femur.imag**2 + tibia.imag**2) / kp,
-        splay=(femur.real * femur.imag + tibia.real * tibia.imag) / kp,
-    )
 
 
 class Paper(Stateful):
@@ -201,7 +176,7 @@ class Paper(Stateful):
         """Advances the corrections by one period."""
         self.force = self.force + self.smoothing * (step.force - self.force)
         load = np.maximum(self.force[:, 2], 0.0)
-        soft = softness(self.legs, step.pose, self.kp)
+        soft = self.legs.softness(step.pose, self.kp)
         total = float(np.maximum(step.force[:, 2], 0.0).sum())
         started = self.weight > 0.0
         self.weight += (self.weighing if started else 1.0) * (total - self.weight)

@@ -16,7 +16,6 @@ from dataclasses import dataclass, replace
 import control
 import numpy as np
 
-from hexapod_cosim.controller.comply.paper import softness
 from hexapod_cosim.controller.design.closed import parallel, spectral_radius
 from hexapod_cosim.controller.design.loci import (
     SLOWEST,
@@ -63,7 +62,7 @@ def law_matrix(robot: Robot, plant: StandingPlant, gains: PaperGains) -> Array:
     legs, count = LegSolver(robot), int(plant.standing.sum())
     feet = legs.forward(plant.angle)
     pose = legs.pose(feet[:, 0] + 1j * feet[:, 1], feet[:, 2])
-    soft = softness(legs, pose, robot.servo.kp)
+    soft = legs.softness(pose, robot.servo.kp)
     lighter = (count / TRIPOD_LEGS) ** 2
     share = min(lighter * gains.share, gains.share_limit)
     height_share = min(lighter * gains.height_share, gains.share_limit)

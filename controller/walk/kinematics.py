@@ -52,6 +52,15 @@ class Joints(NamedTuple):
     unreachable: Mask  # (6,) legs whose angles do not put the foot on its target
 
 
+class Softness(NamedTuple):
+    """Softness of the legs on their servos, C = J J^T / kp, (6,) each [m/N]."""
+
+    outward: Array
+    sideward: Array
+    up: Array
+    splay: Array  # outward under an upward force
+
+
 class LegSolver:
     """Forward and inverse kinematics of a robot's legs.
 
@@ -183,6 +192,17 @@ class LegSolver:
         held |= np.abs(speed) >= self.speed_max
         way = clamp(neighbour.angle, self.angle_min, self.angle_max) - angle - ahead * speed
         return np.where(held, 0.0, clamp(2.0 * way / (ahead * ahead), -most, most))
+
+    def softness(self, pose: Pose, kp: float) -> Softness:
+        """Returns the softness of legs whose servos have the stiffness kp [N m/rad] (C25)."""
+        # rates of the foot, outward + i up, by the femur's and by the tibia's joint
+        femur, tibia = 1j * pose.foot, -1j * self.tibia * pose.tibia
+        return Softness(
+            outward=(femur.real**2 + tibia.real**2 + self.offset_y**2) / kp,
+            sideward=(pose.foot.real + self.coxa_length) ** 2 / kp,
+            up=(femur.imag**2 + tibia.imag**2) / kp,
+            splay=(femur.real * femur.imag + tibia.real * tibia.imag) / kp,
+        )
 
     # the design and the static checks use the following; the running controller does not
 

@@ -16,7 +16,7 @@ from hexapod_cosim.controller import (
     Parts,
     make_gait,
 )
-from hexapod_cosim.controller.comply.paper import Paper, Step, softness
+from hexapod_cosim.controller.comply.paper import Paper, Step
 from hexapod_cosim.controller.walk.inverse_dynamics import InverseDynamics
 from hexapod_cosim.cosim.run.single_run import simulate
 from hexapod_cosim.cosim.scenario.scenario import load_scenario
@@ -76,7 +76,7 @@ def test_the_softness_is_that_of_the_jacobian() -> None:
     angle = ATHENA.stance + np.array([0.2, -0.1, 0.15])
     jacobian, foot = LEGS.jacobian(angle), LEGS.forward(angle)
     pose = LEGS.pose(foot[:, 0] + 1j * foot[:, 1], foot[:, 2])
-    soft, matrix = softness(LEGS, pose, 40.0), jacobian @ jacobian.transpose(0, 2, 1) / 40.0
+    soft, matrix = LEGS.softness(pose, 40.0), jacobian @ jacobian.transpose(0, 2, 1) / 40.0
     out = np.column_stack([pose.heading.real, pose.heading.imag, np.zeros(6)])
     side = np.column_stack([-pose.heading.imag, pose.heading.real, np.zeros(6)])
     np.testing.assert_allclose(soft.outward, np.einsum("ki,kij,kj->k", out, matrix, out), 1e-12)
@@ -128,7 +128,7 @@ def test_what_a_foot_carries_beyond_half_of_the_weight_is_not_taken_back() -> No
 
 def test_a_foot_yields_sidewards_to_the_force_and_outwards_only_in_the_air() -> None:
     heading = np.exp(1j * LEGS.hip_yaw)
-    soft = softness(LEGS, LEGS.pose(HOME[:, 0] + 1j * HOME[:, 1], HOME[:, 2]), ATHENA.servo.kp)
+    soft = LEGS.softness(LEGS.pose(HOME[:, 0] + 1j * HOME[:, 1], HOME[:, 2]), ATHENA.servo.kp)
     pull = (2.0 + 3.0j) * heading  # N    outwards, sidewards
     force = np.column_stack([pull.real, pull.imag, np.full(6, SHARE)])
     swinging = np.array([True, False] * 3)

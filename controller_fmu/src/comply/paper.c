@@ -18,19 +18,6 @@ static const double late_time = 0.04; /* s, after the planned touch-down: a foot
 static const double search_speed = 0.08; /* m/s, at most, of a foot that extends */
 static const double air_time = 0.06; /* s, in which the suspension of a foot in the air returns */
 
-hxSoftness hx_softness(const hxLegSolver *leg, const hxPose *pose, double kp) {
-  /* rates of the foot, outward + i up, by the femur's and by the tibia's joint */
-  const hxPlane femur = {-pose->foot.y, pose->foot.x},
-                tibia = {leg->tibia * pose->tibia.y, -leg->tibia * pose->tibia.x};
-  const double reach = pose->foot.x + leg->coxa_length;
-  return (hxSoftness){
-      .outward = (femur.x * femur.x + tibia.x * tibia.x + leg->offset_y * leg->offset_y) / kp,
-      .sideward = reach * reach / kp,
-      .up = (femur.y * femur.y + tibia.y * tibia.y) / kp,
-      .splay = (femur.x * femur.y + tibia.x * tibia.y) / kp,
-  };
-}
-
 void hx_paper_compile(const hxControllerDefinition *definition, hxPaperModel *model) {
   const double h = definition->period, duty = definition->gait.duty;
   /* what a leg gives up by a share grows with the square of its load, W/(6 duty) on average */
@@ -156,7 +143,7 @@ void hx_paper_step(const hxPaperModel *model, const hxLegSolver leg[HX_LEGS],
   see_torso(model, leg, step, load, paper);
   for (int k = 0; k < HX_LEGS; ++k) {
     const int swinging = step->swinging[k];
-    const hxSoftness soft = hx_softness(&leg[k], &step->pose[k], model->servo_stiffness);
+    const hxSoftness soft = hx_leg_solver_softness(&leg[k], &step->pose[k], model->servo_stiffness);
     const double borne = fmin(load[k], largest_part * paper->weight);
     if (model->lifts) lift_swinging(model, step->planned[k], swinging, k, paper);
     if (model->suspension) suspend(model, step, k, paper);

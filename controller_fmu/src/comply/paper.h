@@ -35,12 +35,6 @@ typedef struct hxPaper {
   double lift[HX_LEGS]; /* m, correction upwards */
 } hxPaper;
 
-/* Softness of a leg, C = J J^T / kp, along outward, sideward and upward [m/N] (C25). */
-typedef struct hxSoftness {
-  double outward, sideward, up;
-  double splay; /* outward under an upward force */
-} hxSoftness;
-
 /* Plan and measurements of a period, torso frame. */
 typedef struct hxPaperStep {
   const hxPose *pose; /* (6) planned */
@@ -53,9 +47,6 @@ typedef struct hxPaperStep {
 } hxPaperStep;
 
 void hx_paper_compile(const hxControllerDefinition *definition, hxPaperModel *model);
-
-/* Returns the softness of a leg whose servos have the stiffness kp [N m/rad] (C25). */
-hxSoftness hx_softness(const hxLegSolver *leg, const hxPose *pose, double kp);
 
 /* Advances the corrections by one period (C25, C26, C47 to C49). */
 void hx_paper_step(const hxPaperModel *model, const hxLegSolver leg[HX_LEGS],

@@ -149,3 +149,16 @@ void hx_leg_solver_accelerations(const hxLegSolver *model, const hxPose *neighbo
     acceleration[joint] = hx_clamp(2.0 * way / (ahead * ahead), -most, most);
   }
 }
+
+hxSoftness hx_leg_solver_softness(const hxLegSolver *model, const hxPose *pose, double kp) {
+  /* rates of the foot, outward + i up, by the femur's and by the tibia's joint */
+  const hxPlane femur = {-pose->foot.y, pose->foot.x},
+                tibia = {model->tibia * pose->tibia.y, -model->tibia * pose->tibia.x};
+  const double reach = pose->foot.x + model->coxa_length;
+  return (hxSoftness){
+      .outward = (femur.x * femur.x + tibia.x * tibia.x + model->offset_y * model->offset_y) / kp,
+      .sideward = reach * reach / kp,
+      .up = (femur.y * femur.y + tibia.y * tibia.y) / kp,
+      .splay = (femur.x * femur.y + tibia.x * tibia.y) / kp,
+  };
+}

@@ -36,6 +36,12 @@ typedef struct hxPose {
   int lost; /* the foot is out of reach, and the angles are the nearest ones */
 } hxPose;
 
+/* Softness of a leg on its servos, C = J J^T / kp [m/N]. */
+typedef struct hxSoftness {
+  double outward, sideward, up;
+  double splay; /* outward under an upward force */
+} hxSoftness;
+
 void hx_leg_solver_compile(const hxControllerDefinition *definition, int leg, hxLegSolver *model);
 
 /* Computes the centre of the foot from the joint angles (C11). */
@@ -67,6 +73,9 @@ int hx_leg_solver_solve(const hxLegSolver *model, const hxPose *pose, hxPlane ve
 void hx_leg_solver_accelerations(const hxLegSolver *model, const hxPose *neighbour, double ahead,
                                  const double angle[HX_JOINTS], const double speed[HX_JOINTS],
                                  double acceleration[HX_JOINTS]);
+
+/* Returns the softness of a leg whose servos have the stiffness kp [N m/rad] (C25). */
+hxSoftness hx_leg_solver_softness(const hxLegSolver *model, const hxPose *pose, double kp);
 
 HX_HIDDEN_END
 
