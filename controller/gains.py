@@ -77,9 +77,9 @@ class Requirements:
     delay_periods: float = 1.0  # 1    computing delay in controller periods
     force_delay: float = 0.010  # s    of the force sensors
     filter_time: float = 0.005  # s    smoothing of the forces
-    share: float = 0.4  # 1    of the paper's control: of the deviations along the ground
-    height_share: float = 0.45  # 1    of the deviations upwards, at most
-    share_limit: float = 0.7  # 1    of both, in gaits with more standing legs
+    share: float = 0.38  # 1    of the paper's control: of the deviations along the ground
+    height_share: float = 0.5  # 1    of the deviations upwards, at most
+    share_limit: float = 0.66  # 1    of both, in gaits with more standing legs
     yield_share: float = 0.3  # 1
     return_rate: float = 3.0  # 1/s
     # m/s    at which the suspension yields, at most, to a sixth of the weight beyond the share
@@ -109,7 +109,8 @@ class Margins:
     # of the paper's control: the worst of its loops
     binding: str  # what limited the shares
     paper_phase_margin: float = math.inf  # deg
-    paper_gain_margin: float = math.inf  # dB
+    paper_gain_margin: float = math.inf  # dB    of oscillations
+    paper_static_margin: float = math.inf  # dB    of feet that push against each other, at rest
     paper_spectral_radius: float = 0.0  # 1    of its whole closed loop, < 1
 
 

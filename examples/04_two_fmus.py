@@ -82,7 +82,7 @@ def main() -> None:
         plant = Instance(export_fmu(robot, Path(folder) / "plant.fmu"))
         controller = Instance(
             export_controller(
-                make_setup(robot, control="kinematic", period=STEP), Path(folder) / "controller.fmu"
+                make_setup(robot, control="paper", period=STEP), Path(folder) / "controller.fmu"
             )
         )
         for instance in (plant, controller):

@@ -54,13 +54,11 @@ def disturbed(
     )
 
 
-def spectral_radius(system: control.StateSpace, *, feet: int) -> float:
+def spectral_radius(system: control.StateSpace) -> float:
     """Returns the largest magnitude of a closed loop's eigenvalues that are not 1 by construction.
 
-    The position of the robot and that of each foot on the ground are not controlled: their
-    eigenvalues are exactly 1.
+    The position of the robot on the ground is not controlled: its eigenvalues are exactly 1.
     """
     values = np.linalg.eigvals(system.A)
     by_distance = np.abs(values)[np.argsort(np.abs(values - 1.0))]
-    controlled: Array = by_distance[FREE_COORDINATES + 2 * feet :]
-    return float(controlled.max())
+    return float(by_distance[FREE_COORDINATES:].max())

@@ -63,6 +63,7 @@ class LoopMargins:
 
     gain: float  # dB
     phase: float  # deg
+    static: float  # dB    of the gain, at frequency 0: no crossing, but an eigenvalue of 1
 
 
 def critical_size(loops: Response) -> Array:
@@ -86,7 +87,20 @@ def worst_margins(loops: Response, omega: Array) -> LoopMargins:
     """
     chosen = {int(critical_size(loops).argmax()), int(np.abs(loops).max(axis=1).argmax())}
     found = [loop_margins(loops[number], omega) for number in sorted(chosen)]
-    return LoopMargins(gain=min(m.gain for m in found), phase=min(m.phase for m in found))
+    return LoopMargins(
+        gain=min(m.gain for m in found),
+        phase=min(m.phase for m in found),
+        static=static_margin(loops),
+    )
+
+
+def static_margin(loops: Response) -> float:
+    """Returns the least gain margin of loops at the lowest frequency of their grid [dB].
+
+    A positive feedback of springs is a loop on the negative real axis, which it does not cross.
+    """
+    size = float((-loops[..., 0].real).max())
+    return -20.0 * math.log10(size) if size > 0.0 else math.inf
 
 
 def loop_margins(loop: Response, omega: Array) -> LoopMargins:
@@ -97,4 +111,5 @@ def loop_margins(loop: Response, omega: Array) -> LoopMargins:
     return LoopMargins(
         gain=20.0 * math.log10(min(more)) if more else math.inf,
         phase=float(np.abs(phases).min(initial=math.inf)),
+        static=static_margin(loop),
     )

@@ -152,10 +152,7 @@ class PaperLoops:
     def radius(self, gains: PaperGains) -> float:
         """Returns the largest spectral radius of the closed loops [1]."""
         return max(
-            spectral_radius(
-                closed_loop(self.robot, plant, gains, delays=self.delays),
-                feet=int(plant.standing.sum()),
-            )
+            spectral_radius(closed_loop(self.robot, plant, gains, delays=self.delays))
             for plant in self.plants.values()
         )
 

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from hexapod_cosim.controller.design.closed import disturbed, spectral_radius, splay
-from hexapod_cosim.controller.design.loci import Response, critical_size
+from hexapod_cosim.controller.design.loci import Response, critical_size, static_margin
 from hexapod_cosim.controller.design.paper import (
     PaperLoops,
     Plants,
@@ -30,7 +30,8 @@ from hexapod_cosim.models import Robot
 STEP_TIME = 0.6  # s    shown of a response
 SHIFT = 0.001  # m    of the feet
 MOST_DELAY, DELAYS = 0.05, 21  # s    further delay shown, and in how many points
-FACTORS = np.linspace(0.5, 2.0, 16)  # 1    on the shares
+FACTORS = np.linspace(0.5, 3.5, 16)  # 1    on the shares
+SMALLEST = 0.03  # 1    size of loci that are drawn
 DECIBELS = (-40.0, 10.0)
 COLOURS = {"worst": PALETTE[3], "others": "0.75", "asked": PALETTE[0], "without": PALETTE[1]}
 
@@ -51,6 +52,7 @@ def plot_design(robot: Robot, gains: Gains, plants: Plants, directory: str | Pat
         )
     loops = PaperLoops(robot, plants, gains.requirements, period=gains.period)
     loci = np.concatenate([loops.loci(name, gains.paper) for name in plants])
+    loci = loci[np.abs(loci).max(axis=1) > SMALLEST]
     from matplotlib import rc_context  # noqa: PLC0415  slow to import
 
     folder = Path(directory)
@@ -206,18 +208,33 @@ def _margins(loci: Response, loops: PaperLoops, gains: Gains) -> Any:
     )
     late.axhline(0.0, color="k", lw=0.6)
     late.set(xlabel="further delay [ms]", ylabel="gain margin [dB]")
-    margins, name = loops.worst(gains.paper)
-    plant, critical = loops.plants[name], 10.0 ** (margins.gain / 20.0)
-    radii = [
-        spectral_radius(
-            closed_loop(loops.robot, plant, scaled(gains.paper, factor), delays=loops.delays),
-            feet=int(plant.standing.sum()),
+    counts = sorted({int(plant.standing.sum()) for plant in loops.plants.values()})
+    for count, colour in zip(counts, PALETTE[3:], strict=False):
+        edge, name = max(
+            (_edge(loops.loci(name, gains.paper)), name)
+            for name, plant in loops.plants.items()
+            if plant.standing.sum() == count
         )
-        for factor in FACTORS
-    ]
-    more.plot(FACTORS, radii, color=colour, marker="o", ms=3, lw=1.0, label="worst plant")
-    more.axvline(critical, color=COLOURS["without"], ls="--", lw=1.0, label="by the gain margin")
+        closed = [
+            closed_loop(
+                loops.robot, loops.plants[name], scaled(gains.paper, factor), delays=loops.delays
+            )
+            for factor in FACTORS
+        ]
+        radii = [spectral_radius(loop) for loop in closed]
+        more.plot(FACTORS, radii, color=colour, marker="o", ms=3, lw=1.0, label=name)
+        more.axvline(1.0 / edge, color=colour, ls="--", lw=1.0)
     more.axhline(1.0, color="k", lw=0.6)
-    more.set(xlabel="factor on the shares [1]", ylabel="spectral radius [1]")
+    more.set(
+        xlabel="factor on the shares [1]",
+        ylabel="spectral radius [1]",
+        title="dashed: by the margins",
+        xlim=FACTORS[[0, -1]],
+    )
     _legend_below(figure, late, more)
     return figure
+
+
+def _edge(loci: Response) -> float:
+    """Returns the inverse of the factor on the shares at which a plant becomes unstable."""
+    return max(float(critical_size(loci).max()), float(10.0 ** (-static_margin(loci) / 20.0)))

@@ -67,6 +67,7 @@ def design_gains(
             binding=paper.binding,
             paper_phase_margin=paper.margins.phase,
             paper_gain_margin=paper.margins.gain,
+            paper_static_margin=paper.margins.static,
             paper_spectral_radius=paper.radius,
         ),
         caveats=(

@@ -27,7 +27,7 @@ SPREAD = 1e-4  # m    shift of the feet, which friction answers linearly
 
 @dataclass(frozen=True, kw_only=True)
 class DesignCheck:
-    """The squeezing force over time, per metre by which the feet are spread."""
+    """The squeezing force over time, per metre by which the feet are shifted."""
 
     time: Array  # s    (steps,)
     predicted: Array  # N/m    (steps,) by the linear closed loop
@@ -72,19 +72,22 @@ def check_design(
     stance: str | None = None,
     load: float = 1.0,
     gears_stick: bool = True,
+    push: Array | None = None,
     spread: float = SPREAD,
 ) -> DesignCheck:
-    """Simulates how the law of the paper's control answers to feet that are spread.
+    """Simulates how the law of the paper's control answers to feet that are shifted.
 
     It runs on the FMU and in the linear closed loop. stance: by default the first in which the
     robot stands; load: mean of the standing legs, in thirds of the weight; gears_stick: with the
-    dry friction of the gears; spread: of the feet [m].
+    dry friction of the gears; push: shifts (3 n) of the standing feet of unit length, by default
+    those that spread them; spread: their size [m].
     """
     period, friction = gains.period, robot.servo.coulomb_friction if gears_stick else 0.0
     with level_fmu(robot) as fmu:
         motion, inputs = _rest(fmu, robot, stance, load)
         plant = linearise(fmu, robot, motion, inputs, period=period, coulomb_friction=friction)
-        push, delays = splay(robot, plant), delay_steps(gains.requirements, period=period)
+        push = splay(robot, plant) if push is None else push
+        delays = delay_steps(gains.requirements, period=period)
         time, forces = disturbed(
             closed_loop(robot, plant, gains.paper, delays=delays),
             push,

@@ -172,7 +172,6 @@ def test_tripods_that_do_not_stand_are_left_out_and_named() -> None:
             f"(got the centre of mass at (139, {y}) mm, "
             f"under which foot {leg} carries nothing, expected between {stance})"
         )
-    assert "six legs" in gains.margins.binding
 
 
 def test_loads_under_which_a_soft_robot_finds_no_rest_are_left_out() -> None:

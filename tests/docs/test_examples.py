@@ -13,7 +13,7 @@ SAYS = {
     "01_stand.py": ["sum 54.936 N, weight 54.936 N"],
     "02_walk.py": ["completed", "slip_per_metre", "cost_of_transport"],
     "03_own_controller.py": ["completed", "deg"],
-    "04_two_fmus.py": ["40 measurements, 72 commands", "walks 0.36"],
+    "04_two_fmus.py": ["40 measurements, 72 commands", "walks 0.37"],
     "05_robot_log.py": ["log.mcap: 801 rows, 108 columns", "hexapod identify log.mcap"],
 }
 

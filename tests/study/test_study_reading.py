@@ -339,10 +339,7 @@ name = "tripod"
         ("", {}),
         ("[variation]\nheight = 0.001\n[solver]\ntolerance = 0.01\n[outputs]\nplots = false\n", {}),
         ("[friction]\nmu = 0.4\n", {"set": {"friction": {"mu": 0.5}}}),
-        (
-            "[compliance]\npaper_pid = false\n",
-            {"variables": {"compliance.paper_pid": [True, False]}},
-        ),
+        ("[compliance]\nposture = false\n", {"variables": {"compliance.posture": [True, False]}}),
     ],
 )
 def test_a_held_out_scenario_is_compared_with_training_by_its_walk_not_its_name(

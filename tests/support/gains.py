@@ -17,9 +17,9 @@ MARGINS = Margins(
     paper_spectral_radius=0.99,
 )
 PAPER = PaperGains(
-    share=0.4,
-    height_share=0.45,
-    share_limit=0.7,
+    share=0.38,
+    height_share=0.5,
+    share_limit=0.66,
     yield_share=0.3,
     return_rate=3.0,
     filter_time=0.005,
