@@ -239,6 +239,7 @@ study-demo: setup
 
 control: setup
 	$(BIN)/python -m benchmarks.control
+	$(BIN)/python -m benchmarks.control.paper
 
 figures: setup
 	$(BIN)/hexapod benchmark -o out/benchmark

@@ -74,6 +74,7 @@ class Requirements:
 
     phase_margin: float = 60.0  # deg    of the paper's control, at least
     gain_margin: float = 5.0  # dB    the same
+    static_margin: float = 3.0  # dB    the same, of feet that push against each other
     delay_periods: float = 1.0  # 1    computing delay in controller periods
     force_delay: float = 0.010  # s    of the force sensors
     filter_time: float = 0.005  # s    smoothing of the forces

@@ -31,6 +31,7 @@ from hexapod_cosim.models import Robot
 LEAST_LOAD = 1e-6  # N    a smaller sum of loads cannot be divided by
 LARGEST_PART = 0.5  # 1    of the weight: what a foot carries beyond is not taken back
 TOUCH_PART = 0.02  # 1    of the weight: a foot with more is on the ground
+WHOLE_PART = 0.9  # 1    of the weight: with less in all, the force of some foot is not reported
 WEIGHT_TIME = 0.5  # s    smoothing of the sum of all loads
 EVENING = 0.15  # 1    added to the spread of the standing feet, for the tilt of the torso
 LANDED_TIME = 0.05  # s    in which a landed foot gives back the lift that it had in the air
@@ -57,7 +58,7 @@ class Paper(Stateful):
 
     Attributes:
         force: (6, 3) smoothed forces on the feet, torso axes [N].
-        weight: smoothed sum of the normal forces [N].
+        total, weight: sum of the normal forces, and the same smoothed [N].
         back: common return of all feet, x + i y [m].
         sag: height by which the torso sags at its centre, and its slope, x + i y [m, 1].
         lifted: (6,) lift by the torso's sag [m].
@@ -66,7 +67,9 @@ class Paper(Stateful):
         shift, lift: (6,) corrections of the feet, torso frame, x + i y and z [m].
     """
 
-    STATE = ("force", "weight", "back", "sag", "lifted", "yielded", "late", "shift", "lift")
+    STATE = (
+        "force", "total", "weight", "back", "sag", "lifted", "yielded", "late", "shift", "lift",
+    )  # fmt: skip
 
     def __init__(
         self,
@@ -80,10 +83,10 @@ class Paper(Stateful):
     ) -> None:
         self.gains, self.parts, self.legs, self.period = gains.paper, parts, legs, period
         self.kp, self.ground = robot.servo.kp, robot.contact.stiffness
-        # what a leg gives up by a share grows with the square of its load, W/(6 duty) on average
-        lighter = (2.0 * gait.duty) ** 2 if parts.paper_share else 0.0
-        self.share = min(lighter * self.gains.share, self.gains.share_limit)
-        self.height_share = min(lighter * self.gains.height_share, self.gains.share_limit)
+        # the torque that a share costs grows with the square of the load, W/(6 duty) on average
+        factor = (2.0 * gait.duty) ** 2 if parts.paper_share else 0.0
+        self.share = min(factor * self.gains.share, self.gains.share_limit)
+        self.height_share = min(factor * self.gains.height_share, self.gains.share_limit)
         self.weighing = 1.0 - math.exp(-period / WEIGHT_TIME)
         self.smoothing = 1.0 - math.exp(-period / self.gains.filter_time)
         self.landed = math.exp(-period / LANDED_TIME)
@@ -94,11 +97,9 @@ class Paper(Stateful):
     def reset(self) -> None:
         """Sets all forces, deviations and corrections to zero."""
         self.force = np.zeros((LEGS, 3))
-        self.weight, self.back, self.sag = 0.0, 0j, (0.0, 0j)
+        self.total, self.weight, self.back, self.sag = 0.0, 0.0, 0j, (0.0, 0j)
         self.lifted, self.yielded, self.late, self.lift = np.zeros((4, LEGS))
         self.shift: Plane = np.zeros(LEGS, dtype=np.complex128)
-
-    # -------------------------------------------------------------------------- deviations
 
     def _see_torso(self, step: Step, load: Array) -> None:
         """Updates the torso's sag and the return of the feet by the standing feet (C26, C47).
@@ -131,8 +132,6 @@ class Paper(Stateful):
             back = self.back - self.period * self.gains.return_rate * astray
             self.back = back * (self.gains.limit / max(abs(back), self.gains.limit))
 
-    # ------------------------------------------------------------------------- corrections
-
     def _along_ground(self, step: Step, soft: Softness, borne: Array) -> Plane:
         """Returns the correction along the ground (6,) x + i y [m] (C47).
 
@@ -153,14 +152,14 @@ class Paper(Stateful):
         height, slope = self.sag
         sunk = height + along(step.planned[:, 0] + 1j * step.planned[:, 1], slope)
         wanted = clamp(sunk, -self.gains.sag_limit, self.gains.sag_limit)
-        rising = self.lifted + self.smoothing * (wanted - self.lifted)
-        self.lifted = np.where(step.swinging, rising, self.landed * self.lifted)
+        raised = self.lifted + self.smoothing * (wanted - self.lifted)
+        self.lifted = np.where(step.swinging, raised, self.landed * self.lifted)
 
     def _suspend(self, step: Step) -> None:
         """Updates the deflections of the suspensions (C48)."""
         h = self.period
         touching = step.force[:, 2] > max(TOUCH_PART * self.weight, LEAST_LOAD)
-        missing = ~touching & ~step.swinging
+        missing = ~touching & ~step.swinging & (self.total >= WHOLE_PART * self.weight)
         self.late = np.where(missing, self.late + h, 0.0)
         # the damper yields to the force beyond the share of a foot
         rate = (step.force[:, 2] - self.weight / LEGS) / self.gains.damping
@@ -177,9 +176,9 @@ class Paper(Stateful):
         self.force = self.force + self.smoothing * (step.force - self.force)
         load = np.maximum(self.force[:, 2], 0.0)
         soft = self.legs.softness(step.pose, self.kp)
-        total = float(np.maximum(step.force[:, 2], 0.0).sum())
+        self.total = float(np.maximum(step.force[:, 2], 0.0).sum())
         started = self.weight > 0.0
-        self.weight += (self.weighing if started else 1.0) * (total - self.weight)
+        self.weight += (self.weighing if started else 1.0) * (self.total - self.weight)
         borne = np.minimum(load, LARGEST_PART * self.weight)
         self._see_torso(step, load)
         if self.parts.paper_share:

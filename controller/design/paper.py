@@ -156,6 +156,15 @@ class PaperLoops:
         )
 
 
+def meets(margins: LoopMargins, needs: Requirements) -> bool:
+    """Returns whether all margins are at least the required ones."""
+    return (
+        margins.gain >= needs.gain_margin
+        and margins.phase >= needs.phase_margin
+        and margins.static >= needs.static_margin
+    )
+
+
 def design_paper(
     robot: Robot, plants: Plants, needs: Requirements, *, period: float
 ) -> PaperDesign:
@@ -165,8 +174,7 @@ def design_paper(
     for _ in range(BACK_OFFS):
         margins, name = loops.worst(gains)
         radius = loops.radius(gains)
-        kept = margins.gain >= needs.gain_margin and margins.phase >= needs.phase_margin
-        if kept and radius < 1.0:
+        if meets(margins, needs) and radius < 1.0:
             break
         binding = f"the margins ({name})"
         gains = scaled(gains, BACK_OFF)

@@ -12,7 +12,7 @@ from dataclasses import fields
 
 import numpy as np
 
-from hexapod_cosim.controller.design.paper import PaperDesign, Plants, design_paper
+from hexapod_cosim.controller.design.paper import PaperDesign, Plants, design_paper, meets
 from hexapod_cosim.controller.design.standing import StandingPlant
 from hexapod_cosim.controller.gains import (
     POSITIVE,
@@ -79,12 +79,12 @@ def design_gains(
 
 def _shortfalls(paper: PaperDesign, needs: Requirements) -> tuple[str, ...]:
     """Returns a text on margins of the paper's control that are missed, or nothing."""
-    gain, phase = paper.margins.gain, paper.margins.phase
-    if gain >= needs.gain_margin and phase >= needs.phase_margin and paper.radius < 1.0:
+    found = paper.margins
+    if meets(found, needs) and paper.radius < 1.0:
         return ()
     return (
-        f"the paper's control has {phase:.3g} deg and {gain:.3g} dB of margin and a spectral "
-        f"radius of {paper.radius:.6g} on these legs",
+        f"the paper's control has {found.phase:.3g} deg and {found.gain:.3g} dB of margin, "
+        f"{found.static:.3g} dB at rest, and a spectral radius of {paper.radius:.6g} on these legs",
     )
 
 

@@ -199,7 +199,11 @@ def design_rows(gains: Gains) -> list[tuple[str, str, str]]:
     rows = (
         ("phase margin, paper [deg]", f">= {needs.phase_margin:g}", reached.paper_phase_margin),
         ("gain margin, paper [dB]", f">= {needs.gain_margin:g}", reached.paper_gain_margin),
-        ("static gain margin, paper [dB]", "> 0", reached.paper_static_margin),
+        (
+            "static gain margin, paper [dB]",
+            f">= {needs.static_margin:g}",
+            reached.paper_static_margin,
+        ),
         ("spectral radius, paper, all feet [1]", "< 1", reached.paper_spectral_radius),
         ("share taken back, along the ground [1]", f"<= {needs.share:g}", paper.share),
         ("share taken back, upwards [1]", f"<= {needs.height_share:g}", paper.height_share),

@@ -8,6 +8,8 @@ static const double least_load = 1e-6; /* N, a smaller sum of loads cannot be di
 static const double largest_part = 0.5;
 static const double weight_time = 0.5; /* s, smoothing of the sum of all loads */
 static const double touch_part = 0.02; /* 1, of the weight: a foot with more stands */
+/* 1, of the weight: with less in all, the force of some foot is not reported */
+static const double whole_part = 0.9;
 /* 1, added to the spread of the standing feet, for the tilt of the torso */
 static const double evening = 0.15;
 /* s, in which a landed foot gives back the lift that it had in the air */
@@ -20,17 +22,17 @@ static const double air_time = 0.06; /* s, in which the suspension of a foot in 
 
 void hx_paper_compile(const hxControllerDefinition *definition, hxPaperModel *model) {
   const double h = definition->period, duty = definition->gait.duty;
-  /* what a leg gives up by a share grows with the square of its load, W/(6 duty) on average */
-  const double lighter = definition->parts.paper_share ? (2.0 * duty) * (2.0 * duty) : 0.0;
+  /* the torque that a share costs grows with the square of the load, W/(6 duty) on average */
+  const double factor = definition->parts.paper_share ? (2.0 * duty) * (2.0 * duty) : 0.0;
   model->period = h;
   model->servo_stiffness = definition->servo.kp;
   model->ground_stiffness = definition->contact_stiffness;
   model->pid = definition->parts.paper_pid;
   model->suspension = definition->parts.paper_suspension;
   model->lifts = definition->parts.paper_share;
-  model->share = fmin(lighter * definition->gains.paper.share, definition->gains.paper.share_limit);
+  model->share = fmin(factor * definition->gains.paper.share, definition->gains.paper.share_limit);
   model->height_share =
-      fmin(lighter * definition->gains.paper.height_share, definition->gains.paper.share_limit);
+      fmin(factor * definition->gains.paper.height_share, definition->gains.paper.share_limit);
   model->yield_share = definition->gains.paper.yield_share;
   model->return_rate = definition->gains.paper.return_rate;
   model->damping = definition->gains.paper.damping;
@@ -119,7 +121,8 @@ static void suspend(const hxPaperModel *model, const hxPaperStep *step, int k, h
   const int swinging = step->swinging[k];
   /* the damper yields to the force beyond the share of a foot */
   const double rate = (force - paper->weight / HX_LEGS) / model->damping;
-  paper->late[k] = !touching && !swinging ? paper->late[k] + h : 0.0;
+  const int missing = !touching && !swinging && paper->total >= whole_part * paper->weight;
+  paper->late[k] = missing ? paper->late[k] + h : 0.0;
   if (paper->late[k] > late_time)
     paper->yielded[k] += h * hx_clamp(rate, -search_speed, 0.0);
   else if (swinging && touching)
@@ -132,14 +135,15 @@ static void suspend(const hxPaperModel *model, const hxPaperStep *step, int k, h
 
 void hx_paper_step(const hxPaperModel *model, const hxLegSolver leg[HX_LEGS],
                    const hxPaperStep *step, hxPaper *paper) {
-  double load[HX_LEGS], total = 0.0;
+  double load[HX_LEGS];
+  paper->total = 0.0;
   for (int k = 0; k < HX_LEGS; ++k) {
     for (int i = 0; i < 3; ++i)
       paper->force[k][i] += model->smoothing * (step->force[k][i] - paper->force[k][i]);
     load[k] = fmax(paper->force[k][2], 0.0);
-    total += fmax(step->force[k][2], 0.0);
+    paper->total += fmax(step->force[k][2], 0.0);
   }
-  paper->weight += (paper->weight > 0.0 ? model->weighing : 1.0) * (total - paper->weight);
+  paper->weight += (paper->weight > 0.0 ? model->weighing : 1.0) * (paper->total - paper->weight);
   see_torso(model, leg, step, load, paper);
   for (int k = 0; k < HX_LEGS; ++k) {
     const int swinging = step->swinging[k];

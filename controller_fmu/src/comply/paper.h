@@ -24,7 +24,7 @@ typedef struct hxPaperModel {
 
 typedef struct hxPaper {
   double force[HX_LEGS][3]; /* N, smoothed, torso axes */
-  double weight; /* N, smoothed sum of the normal forces */
+  double total, weight; /* N, sum of the normal forces, and the same smoothed */
   hxPlane back; /* m, common return of all feet */
   double sag; /* m, height by which the torso sags at its centre */
   hxPlane slope; /* 1, of the sag */
