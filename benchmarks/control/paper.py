@@ -45,9 +45,16 @@ COLUMNS = {
     "roll_rms": ("roll [mrad]", 1e3),
     "torque_rms": ("torque [N m]", 1.0),
     "electrical_cost": ("electrical cost", 1.0),
+    "servo_load_max": ("hottest servo", 1.0),
     "path_error": ("path error [mm/m]", 1e3),
 }
 GROUND = {"slip": "slip", "peak": "peak", "loading": "loading", "electrical": "electrical"}
+PARTS = {
+    "all parts": (),
+    "without share and lift": ("paper_share",),
+    "without PID": ("paper_pid",),
+    "without suspension": ("paper_suspension",),
+}
 CONDITIONS = {
     "as judged": [],
     "rubber of 1e4 N/m^1.5": ["contact.stiffness=1e4"],
@@ -60,6 +67,8 @@ CONDITIONS = {
     "forces 30 ms late": ["sensors.foot_force_delay=30 ms"],
     "friction 0.3": ["friction.mu=0.3"],
     "soil: mud, pads of 25 mm": ["soil=mud", "foot.pad_radius=0.025"],
+    "sensor of LM dead from 4 s": ["events=[{time=4, leg='LM', fault='dead'}]"],
+    "robot's own stance": ["walk.stance=own"],
 }
 Walked = Mapping[str, float]  # medians of the metrics
 
@@ -210,23 +219,41 @@ def pid_table(seeds: range) -> str:
 
 
 def survival_table(seeds: range) -> str:
-    """Returns slip, peak and energy of paper control, with changes, under other conditions."""
+    """Returns changes from kinematic control by conditions that differ from the design's."""
+    names = ("slip_per_metre", "peak_force", "foot_error_stance", "electrical_cost")
     rows = []
     for title, more in CONDITIONS.items():
         row = [title]
-        for law in LAWS:
-            if "soil" in title and law != LAWS[0]:
-                row.append("soil has its own law")
-                continue
-            settings = [*settings_of("tripod", law), *more]
-            theirs, ours = (walked(name, settings, seeds) for name in CONTROLS[:2])
-            cells = [
-                change(ours[name], theirs[name])
-                for name in ("slip_per_metre", "peak_force", "electrical_cost")
-            ]
-            row.append(", ".join(cells))
+        for walk in WALKS:
+            for law in LAWS:
+                settings = [*settings_of(walk, law), *more]
+                if "own stance" in title:
+                    settings.append(f"gait.name={walk}")
+                theirs, ours = (walked(name, settings, seeds) for name in CONTROLS[:2])
+                row.append(" ".join(change(ours[name], theirs[name])[:-2] for name in names))
         rows.append(row)
-    return markdown(["condition", *(f"{law}: slip, peak, electrical" for law in LAWS)], rows)
+    heads = [f"{walk}, {law}" for walk in WALKS for law in LAWS]
+    return markdown(["condition", *heads], rows)
+
+
+def parts_table(seeds: int | None) -> str:
+    """Returns changes from kinematic control without each part, on flat and uneven ground."""
+    kinds = ("flat_tanh", "flat_sticking", "rough", "stairs")
+    entries = ["kinematic", "paper"]
+    rows = []
+    for walk in WALKS:
+        for title, off in PARTS.items():
+            switches = [f"compliance.{part}=false" for part in off]
+            row = [walk, title]
+            for kind in kinds:
+                settings = [*settings_of(walk, "tanh"), *switches]
+                settings = settings[:1] + settings[2:] if kind.startswith("flat") else settings
+                course = load_course("judge", names=[kind], seeds=seeds, settings=settings)
+                runs = list(run_course(course, read_entries(entries)))
+                cells = [_ground_change(runs, "paper", name)[:-2] for name in GROUND]
+                row.append(" ".join(cells))
+            rows.append(row)
+    return markdown(["gait", "parts", *kinds], rows)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -245,6 +272,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         "paper front": front_table(shares),
         "paper pid": pid_table(few),
         "paper survival": survival_table(few),
+        "paper parts": parts_table(1 if given.quick else 3),
     }
     draw_front(images / "paper_front.svg", shares, SHARES, DEFAULT)
     draw_feet(images / "paper_feet.svg")

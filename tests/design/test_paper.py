@@ -193,6 +193,14 @@ def test_a_force_below_the_share_of_a_foot_stops_no_foot() -> None:
     assert not paper.lift.any()
 
 
+def test_a_foot_whose_sensor_is_dead_does_not_extend() -> None:
+    """The feet together then lack weight."""
+    paper = law(with_parts(paper_suspension=True))
+    stand(paper, loads(*[SHARE] * 6))
+    stand(paper, loads(0.0, *[SHARE] * 5), steps=40)
+    assert not paper.lift.any()
+
+
 def test_a_foot_without_ground_extends_after_a_while_at_a_limited_speed_to_the_limit() -> None:
     paper, missing = law(with_parts(paper_suspension=True)), loads(0.0, *[11.0] * 5)
     stand(paper, loads(*[SHARE] * 6))

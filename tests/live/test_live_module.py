@@ -140,9 +140,10 @@ def test_the_control_changes_while_the_robot_walks(
             assert changing(module) == 0.0
             angles.append(angles_of(module))
             places.append(module.position())
-        # rad    in a macro-step: walks at this speed need up to 0.021, and compliant control adds
-        # up to 0.004 when it lifts a foot that meets the ground early
-        assert np.abs(np.diff(angles, axis=0)).max() < 0.03
+        # rad    in a macro-step: walks at this speed need up to 0.021, compliant control adds up to
+        # 0.004 when it lifts a foot that meets the ground early, and the paper's up to 0.018 when a
+        # foot takes up its load
+        assert np.abs(np.diff(angles, axis=0)).max() < (0.04 if PAPER in (first, then) else 0.03)
         ways = np.array(places)[50:, 0] - np.array(places)[:-50, 0]
         assert ways.min() > 0.5 * 0.25 * 0.08  # m    in a quarter of a second: it never stops
         assert np.array(places)[:, 2].min() > 0.12

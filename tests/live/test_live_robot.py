@@ -183,13 +183,17 @@ def test_the_control_changes_while_the_robot_walks_in_any_phase(
             angles.append(value(placed, *joint_names("angle_ref")))
             speeds.append(value(placed, "torso.velocity[1]")[0])
             heights.append(place_of(placed)[2])
-        # rad    in a macro-step: walks at these speeds need up to 0.023, and compliant control
-        # adds up to 0.004 when it lifts a foot that meets the ground early
-        assert np.abs(np.diff(angles, axis=0)).max() < 0.03
+        # rad    in a macro-step: walks at these speeds need up to 0.023, compliant control adds up
+        # to 0.004 when it lifts a foot that meets the ground early, and the paper's up to 0.018
+        # when a foot takes up its load
+        paper = "paper" in (first, then)
+        assert np.abs(np.diff(angles, axis=0)).max() < (0.042 if paper else 0.03)
         # m    it neither falls nor stops: means over a quarter of a second
         assert min(heights) > 0.12
         assert np.convolve(speeds, np.full(50, 0.02), mode="valid").min() > 0.5 * command.vx
-        assert place_of(placed)[0] - begin == pytest.approx(2.0 * command.vx, rel=0.05)
+        # the paper's control does not hold the path, and walks some 5 % further than commanded
+        rel = 0.08 if paper else 0.05
+        assert place_of(placed)[0] - begin == pytest.approx(2.0 * command.vx, rel=rel)
         assert placed.fault == ""
 
 

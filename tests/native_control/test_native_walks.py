@@ -13,7 +13,7 @@ from gains import PERIOD, make_gains
 from native_walks import ALL_PARTS, ROBOTS, STEPS, Ground, close, differences, setup_of, uneven
 
 from hexapod_cosim.controller import (
-    SWITCHES,
+    COMPLIANT_PARTS,
     Controller,
     Gait,
     Measurement,
@@ -59,26 +59,35 @@ def test_a_walk_that_changes_its_gait_is_the_same(
     assert not fallback.any()
 
 
+PAPER_PARTS = ("paper_share", "paper_pid", "paper_suspension")
+
+
+@pytest.mark.parametrize("off", [None, *PAPER_PARTS])
+@pytest.mark.parametrize("gait", ["tripod", "amble"])
 @pytest.mark.parametrize("name", ROBOTS)
-def test_a_walk_under_the_papers_control_is_the_same(controller_core: ct.CDLL, name: str) -> None:
-    """The forces are drawn at random, up to both limits of the corrections."""
-    generator = np.random.default_rng(5)
+def test_a_walk_under_the_papers_control_is_the_same(
+    controller_core: ct.CDLL, name: str, gait: str, off: str | None
+) -> None:
+    """Forces and joint angles are drawn at random, up to the limits of the corrections."""
+    generator, stance = np.random.default_rng(5), load_robot(name).stance
 
     def sense(_: Controller, step: int, measurement: Measurement) -> None:
         size = 1.0 + 9.0 * (step % 400 > 350)
         measurement.foot_force[:] = size * (
             generator.normal(size=(6, 3)) * 5.0 + [8.0 * (step % 900 > 700), 0.0, 10.0]
         )
+        measurement.angle[:] = stance + 0.05 * generator.normal(size=(6, 3))
         turn = np.array([1.0, *(0.02 * generator.normal(size=3))])
         measurement.quaternion[:] = turn / np.linalg.norm(turn)
 
-    setup = replace(setup_of(name), law="paper")
+    parts = replace(ALL_PARTS, **({} if off is None else {off: False}))
+    setup = replace(setup_of(name, gait, parts=parts), law="paper")
     worst, fallback = differences(controller_core, setup, sense=sense)
     assert close(worst)
     assert not fallback.any()
 
 
-@pytest.mark.parametrize("part", SWITCHES)
+@pytest.mark.parametrize("part", COMPLIANT_PARTS)
 def test_each_part_can_be_switched_off(controller_core: ct.CDLL, part: str) -> None:
     ground = Ground()
 

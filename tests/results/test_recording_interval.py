@@ -92,12 +92,12 @@ def test_the_figures_of_a_run_do_not_depend_on_the_rows_that_are_kept(
 def test_what_the_plant_measures_can_be_had_from_rows_far_apart(
     runs: tuple[Result, Result],
 ) -> None:
-    """The kept rows alone give the metrics within 1 %."""
+    """The kept rows alone give the metrics within 1 %, or 10 um of the torso's height."""
     every, coarse = runs
     view = View(coarse.outcome.recording, coarse.parameters, 0.8)
     found = compute_metrics(view, servo=load_robot("athena").servo, realtime_factor=1.0)
     for name in OF_ROWS:
-        assert found[name] == pytest.approx(every.metrics[name], rel=NEAR), name
+        assert found[name] == pytest.approx(every.metrics[name], rel=NEAR, abs=1e-5), name
 
 
 def test_rows_are_left_out_and_their_peaks_are_not(runs: tuple[Result, Result]) -> None:

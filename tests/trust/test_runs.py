@@ -161,7 +161,6 @@ def test_a_killed_command_leaves_nothing_that_the_next_does_not_delete(
 
 
 def test_every_temporary_folder_is_one_that_is_swept() -> None:
-    """scratch.py has a lock of its own, which workers of its process wait for."""
     rooms = [Path(cosim.__file__).parent, Path(gym.__file__).parent]
     made = {
         path.name
@@ -169,7 +168,7 @@ def test_every_temporary_folder_is_one_that_is_swept() -> None:
         for path in room.rglob("*.py")
         if re.search(r"TemporaryDirectory|mkdtemp", path.read_text(encoding="utf-8"))
     }
-    assert made == {"temporary.py", "scratch.py"}
+    assert made == {"temporary.py"}
 
 
 def test_files_are_flushed_before_they_replace_others(
