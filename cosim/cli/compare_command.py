@@ -79,6 +79,10 @@ EPILOG = (
     "and compares the seeds on which both walked."
 )
 MAX_SEEDS = 10_000
+NAMED_WALK = (
+    "all walk in the gait and stance that the scenario names; `hexapod compare demo_course` also "
+    "shows what the choice of gait and stance changes by itself"
+)
 CHOSEN_WALK = (f"{CONTROLS[0]}@{CHOSEN}", f"{CHOOSER}@{CHOSEN}")
 TERRAINS = "terrains"  # folder in out/ of a comparison over several scenarios
 Names = Annotated[
@@ -150,6 +154,8 @@ def compare(
         show_json({**_table(done.comparison, done.checked), "report": report})
     else:
         _show(done, works[0].walks)
+        if works[0].plan.names_walk and not control:
+            show_text(NAMED_WALK)
         report = "" if done.report is None else f"report: {done.report}"
         show_text("\n".join(filter(None, (about(done.comparison), report))))
     return FELL if done.comparison.losses else SUCCESS
