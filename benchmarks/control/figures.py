@@ -39,7 +39,9 @@ def draw_front(
                 cost = [one["electrical_cost"] for one in values]
                 slip = [1e3 * one["slip_per_metre"] for one in values]
                 axes.plot(cost, slip, "o-", color=colour, ms=3, label=name.split(",")[0])
-                points = dict(reversed(list(zip(zip(cost, slip, strict=True), shares, strict=True))))
+                points = dict(
+                    reversed(list(zip(zip(cost, slip, strict=True), shares, strict=True)))
+                )
                 for (x, y), share in points.items():
                     axes.annotate(f"{share:g}", (x, y), xytext=(3, 3), textcoords="offset points")
                 at = list(shares).index(default)

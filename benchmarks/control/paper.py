@@ -68,7 +68,6 @@ CONDITIONS = {
     "friction 0.3": ["friction.mu=0.3"],
     "soil: mud, pads of 25 mm": ["soil=mud", "foot.pad_radius=0.025"],
     "sensor of LM dead from 4 s": ["events=[{time=4, leg='LM', fault='dead'}]"],
-    "robot's own stance": ["walk.stance=own"],
 }
 Walked = Mapping[str, float]  # medians of the metrics
 
@@ -227,8 +226,6 @@ def survival_table(seeds: range) -> str:
         for walk in WALKS:
             for law in LAWS:
                 settings = [*settings_of(walk, law), *more]
-                if "own stance" in title:
-                    settings.append(f"gait.name={walk}")
                 theirs, ours = (walked(name, settings, seeds) for name in CONTROLS[:2])
                 row.append(" ".join(change(ours[name], theirs[name])[:-2] for name in names))
         rows.append(row)
