@@ -140,7 +140,8 @@ static hxControllerOutput walked(hxController *controller,
   hx_controller_input_default(&input);
   input.command.vx = 0.05;
   for (int leg = 0; leg < HX_LEGS; ++leg)
-    for (int axis = 0; axis < 3; ++axis) input.foot_force[leg][axis] = axis == 2 ? 12.0 : 3.0;
+    for (int axis = 0; axis < 3; ++axis)
+      input.foot_force[leg][axis] = axis == 2 ? 8.0 + 2.0 * leg : 3.0;
   CHECK(hx_controller_reset(controller, definition, 0.0) == HX_OK);
   for (int k = 1; k <= 150; ++k)
     CHECK(hx_controller_step(controller, &input, NULL, 0.005 * k) == HX_OK);
