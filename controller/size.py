@@ -25,7 +25,7 @@ TIMES = ("load_time", "handover_time", "weight_time", "ground_time", "return_tim
 RATES = ("return_rate", "attitude_rate", "height_rate", "path_rate", "turn_limit")
 SPEEDS = ("landing_speed", "speed_limit")
 
-Section = TypeVar("Section")
+_Section = TypeVar("_Section")
 
 
 @dataclass(frozen=True)
@@ -65,7 +65,7 @@ def requirements_for(robot: Robot, **given: Any) -> Requirements:
     return Requirements(**{**asked, **given})
 
 
-def taken(kind: type[Section], needs: Requirements, **given: float) -> Section:
+def taken(kind: type[_Section], needs: Requirements, **given: float) -> _Section:
     """Returns a section of the gains whose values are those of the requirements, or given ones."""
     names = [entry.name for entry in fields(kind) if entry.name not in given]  # type: ignore[arg-type]
     return kind(**{name: getattr(needs, name) for name in names}, **given)
