@@ -37,6 +37,17 @@ class PaperGains:
     sag_limit: float  # m    largest lift of a foot in the air by the torso's sag
     limit: float  # m    largest deflection of the suspension and return of the feet, > 0
 
+    def shares(self, duty: float) -> tuple[float, float]:
+        """Returns the shares along the ground and upwards of a gait with this duty factor [1].
+
+        The torque that a share costs grows with the square of the load, W/(6 duty) on average.
+        """
+        factor = (2.0 * duty) ** 2
+        return (
+            min(factor * self.share, self.share_limit),
+            min(factor * self.height_share, self.share_limit),
+        )
+
 
 @dataclass(frozen=True, kw_only=True)
 class SupportGains:

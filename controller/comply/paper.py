@@ -83,10 +83,8 @@ class Paper(Stateful):
     ) -> None:
         self.gains, self.parts, self.legs, self.period = gains.paper, parts, legs, period
         self.kp, self.ground = robot.servo.kp, robot.contact.stiffness
-        # the torque that a share costs grows with the square of the load, W/(6 duty) on average
-        factor = (2.0 * gait.duty) ** 2 if parts.paper_share else 0.0
-        self.share = min(factor * self.gains.share, self.gains.share_limit)
-        self.height_share = min(factor * self.gains.height_share, self.gains.share_limit)
+        shares = self.gains.shares(gait.duty) if parts.paper_share else (0.0, 0.0)
+        self.share, self.height_share = shares
         self.weighing = 1.0 - math.exp(-period / WEIGHT_TIME)
         self.smoothing = 1.0 - math.exp(-period / self.gains.filter_time)
         self.landed = math.exp(-period / LANDED_TIME)

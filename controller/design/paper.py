@@ -28,8 +28,8 @@ from hexapod_cosim.controller.design.loci import (
     worst_margins,
 )
 from hexapod_cosim.controller.design.standing import ANGLES, FORCES, JOINTS, StandingPlant
-from hexapod_cosim.controller.gains import TRIPOD_LEGS, PaperGains, Requirements
-from hexapod_cosim.controller.plane import Array
+from hexapod_cosim.controller.gains import PaperGains, Requirements
+from hexapod_cosim.controller.plane import LEGS, Array
 from hexapod_cosim.controller.size import paper_gains, size_of
 from hexapod_cosim.controller.walk.kinematics import LegSolver
 from hexapod_cosim.models import Robot
@@ -63,9 +63,7 @@ def law_matrix(robot: Robot, plant: StandingPlant, gains: PaperGains) -> Array:
     feet = legs.forward(plant.angle)
     pose = legs.pose(feet[:, 0] + 1j * feet[:, 1], feet[:, 2])
     soft = legs.softness(pose, robot.servo.kp)
-    lighter = (count / TRIPOD_LEGS) ** 2
-    share = min(lighter * gains.share, gains.share_limit)
-    height_share = min(lighter * gains.height_share, gains.share_limit)
+    share, height_share = gains.shares(count / LEGS)
     matrix = np.zeros((3 * count, 3 * count))
     for place, leg in enumerate(np.flatnonzero(plant.standing)):
         heading = pose.heading[leg]
