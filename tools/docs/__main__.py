@@ -12,7 +12,7 @@ from pathlib import Path
 
 from sphinx.cmd.build import main as sphinx
 
-from hexapod_cosim.cosim.live.static_page import write_static_page
+from hexapod_cosim.extensions.live.static_page import write_static_page
 from tools.docs import validation, variables
 from tools.docs.stage import DOCS, ROOT, add_page, pages, write
 
@@ -34,7 +34,7 @@ All public modules, from their docstrings. Start with the [tutorial](../tutorial
 WALK = "walk.html"  # the robot on the front page (docs/index.md)
 HEADERS = (
     "plant_fmu/include/hexapod/hexapod.h",
-    "controller_fmu/include/hexapod/controller.h",
+    "controller/fmu/include/hexapod/controller.h",
     "plant_fmu/include/hexapod/status.h",
     "plant_fmu/include/hexapod/legs.h",
 )

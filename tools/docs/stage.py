@@ -24,9 +24,9 @@ ELSEWHERE = {
 INSTEAD = {
     "README.md": "index.md",
     "plant_fmu/interface.toml": "reference/plant.md",
-    "controller_fmu/interface.toml": "reference/controller.md",
+    "controller/fmu/interface.toml": "reference/controller.md",
     "plant_fmu/include/hexapod/hexapod.h": "reference/c.md",
-    "controller_fmu/include/hexapod/controller.h": "reference/c.md",
+    "controller/fmu/include/hexapod/controller.h": "reference/c.md",
 }
 LINK = re.compile(r"(!?)\[((?:[^\[\]]|\[[^\]]*\])*)\]\(([^)\s]+)\)")
 FENCE = re.compile(r"(^```.*?^```[^\n]*$)", flags=re.DOTALL | re.MULTILINE)
