@@ -141,10 +141,8 @@ def test_formulas_of_the_site_are_drawn_and_numbered_without_a_network(site: Pat
 
 
 def test_every_variable_is_in_the_reference(reference: dict[str, str]) -> None:
-    for component in ("plant", "controller"):
-        table = tomllib.loads(
-            (ROOT / f"{component}_fmu" / "interface.toml").read_text(encoding="utf-8")
-        )
+    for component, folder in (("plant", "plant_fmu"), ("controller", "controller/fmu")):
+        table = tomllib.loads((ROOT / folder / "interface.toml").read_text(encoding="utf-8"))
         names = [
             entry["name"]
             for causality in ("input", "output", "parameter", "local")
