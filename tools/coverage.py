@@ -57,11 +57,13 @@ def measure() -> bool:
     """Builds with counters and runs the tests; returns whether all passed."""
     for counters in BUILD.rglob("*.gcda"):
         counters.unlink()
-    configure = ["cmake", "--preset", "coverage", f"-DPython_EXECUTABLE={sys.executable}"]
+    settings = str(ROOT / "tools" / "cmake" / "coverage.cmake")
+    where = ["-S", str(ROOT), "-B", str(BUILD), "-C", settings]
+    configure = ["cmake", *where, f"-DPython_EXECUTABLE={sys.executable}"]
     fresh = not (BUILD / "CMakeCache.txt").exists()
     run(*configure, "--log-level=WARNING", *(["-G", "Ninja"] if fresh else []))
-    run("cmake", "--build", "--preset", "native-coverage", "--", "--quiet")
-    native = run("ctest", "--preset", "coverage", check=False)
+    run("cmake", "--build", str(BUILD), "--", "--quiet")
+    native = run("ctest", "--test-dir", str(BUILD), "--output-on-failure", check=False)
     return run(sys.executable, "-m", "pytest", "-q", *TESTS, *LEFT_OUT, check=False) and native
 
 

@@ -19,8 +19,8 @@ ROOT = Path(__file__).resolve().parents[2]
 DOCS = ROOT / "docs"
 # pages outside docs/, and files for which the site has a better page
 ELSEWHERE = {
-    "CONTRIBUTING.md": "contributing.md",
-    "CHANGELOG.md": "changelog.md",
+    ".github/CONTRIBUTING.md": "contributing.md",
+    "docs/CHANGELOG.md": "changelog.md",
     "benchmarks/README.md": "benchmarks.md",
 }
 INSTEAD = {
