@@ -15,8 +15,8 @@ SANITIZER = rm -f $(REPORT).*; HEXAPOD_PRESET=sanitize ASAN_OPTIONS=detect_leaks
 	LD_PRELOAD=$$($(CC) -print-file-name=libasan.so)
 SANITIZED_END = || { cat $(REPORT).* 2>/dev/null; exit 1; }
 TYPING := build/typing/hexapod_cosim
-SOURCES := pyproject.toml CMakeLists.txt $(shell find fmi plant_fmu controller_fmu policy_fmu cosim/master/src cosim/master/include -type f) $(wildcard cosim/viewer/*.* cosim/viewer/src/*.ts cosim/viewer/src/*/*.ts)
-C_FILES = $(wildcard plant_fmu/src/*.[ch] plant_fmu/src/*/*.[ch] fmi/*.[ch] plant_fmu/*.c plant_fmu/include/hexapod/*.h controller_fmu/src/*.[ch] controller_fmu/src/*/*.[ch] controller_fmu/*.c controller_fmu/include/hexapod/*.h policy_fmu/src/*.[ch] policy_fmu/*.c policy_fmu/include/hexapod/*.h cosim/master/src/*.[ch] cosim/master/include/hexapod/*.h wasm/*.[ch] tests/native/*.[ch] tests/native/probe/*.c tests/fuzz/*.[ch] benchmarks/native/*.[ch] benchmarks/native/*.cpp examples/*.c examples/c_library/*.c)
+SOURCES := pyproject.toml CMakeLists.txt $(shell find fmi plant_fmu controller/fmu $(wildcard extensions/gym/policy_fmu) cosim/master/src cosim/master/include -type f) $(wildcard cosim/viewer/*.* cosim/viewer/src/*.ts cosim/viewer/src/*/*.ts)
+C_FILES = $(wildcard plant_fmu/src/*.[ch] plant_fmu/src/*/*.[ch] fmi/*.[ch] plant_fmu/*.c plant_fmu/include/hexapod/*.h controller/fmu/src/*.[ch] controller/fmu/src/*/*.[ch] controller/fmu/*.c controller/fmu/include/hexapod/*.h extensions/gym/policy_fmu/src/*.[ch] extensions/gym/policy_fmu/*.c extensions/gym/policy_fmu/include/hexapod/*.h cosim/master/src/*.[ch] cosim/master/include/hexapod/*.h extensions/live/wasm/*.[ch] tests/native/*.[ch] tests/native/probe/*.c tests/fuzz/*.[ch] benchmarks/native/*.[ch] benchmarks/native/*.cpp examples/*.c examples/c_library/*.c)
 EMPTY :=
 TEST_ROOMS := $(subst $(EMPTY) $(EMPTY),:,$(filter-out tests/native tests/conftest.py,$(wildcard tests/[a-z]*[a-z])))
 SANITIZED_SHORT := $(patsubst %,tests/fmi/test_%.py,fmi fmi3 fmi3_order fmi_state fmi_values) $(wildcard tests/exchange/test_*.py) \
@@ -274,7 +274,7 @@ fmu: setup
 # the folders under the name they are imported by, for type checkers
 typing:
 	@mkdir -p $(TYPING)
-	@for part in models controller cosim gym; do ln -sfn ../../../$$part $(TYPING)/$$part; done
+	@for part in models controller cosim extensions; do ln -sfn ../../../$$part $(TYPING)/$$part; done
 	@ln -sfn ../../../packaging/hexapod_cosim/__init__.py $(TYPING)/__init__.py
 
 clean:

@@ -37,7 +37,7 @@ TESTS = (
 )
 # gcc's own counters are exported functions too
 LEFT_OUT = ("--deselect", "tests/fmi/test_fmi.py::test_no_other_function_is_exported")
-FILES = ("plant_fmu/.*", "controller_fmu/.*", "fmi/.*")
+FILES = ("plant_fmu/.*", "controller/fmu/.*", "fmi/.*")
 NO_TESTS_NEEDED = (".*/generated/.*",)  # tables
 
 
@@ -73,7 +73,7 @@ def table() -> str:
     run(
         str(Path(sys.executable).parent / "gcovr"),
         *("--root", str(ROOT), "--object-directory", str(BUILD)),
-        *(str(BUILD / part) for part in ("plant_fmu", "controller_fmu", "tests")),
+        *(str(BUILD / part) for part in ("plant_fmu", "controller/fmu", "tests")),
         *options,
         *("--merge-mode-functions=merge-use-line-min", "--exclude-throw-branches"),
         "--gcov-suspicious-hits-threshold=0",  # loads of lanes are counted more than 2^32 times

@@ -9,8 +9,8 @@ from typing import Annotated, Any
 
 import typer
 
-from hexapod_cosim.cosim.cli import benchmark_command
 from hexapod_cosim.cosim.cli.accuracy_check import CheckAccuracy, check_accuracy, show_accuracy
+from hexapod_cosim.cosim.cli.extension import report_functions
 from hexapod_cosim.cosim.cli.failures import FELL, SUCCESS
 from hexapod_cosim.cosim.cli.running import (
     ControlNames,
@@ -32,8 +32,7 @@ from hexapod_cosim.cosim.cli.running import (
     with_formats,
 )
 from hexapod_cosim.cosim.cli.terminal import Json, show_files, show_json, show_text, warn
-from hexapod_cosim.cosim.common.files import BENCHMARK, PARTS, STUDY
-from hexapod_cosim.cosim.common.installation import require_pyarrow
+from hexapod_cosim.cosim.common.files import PARTS
 from hexapod_cosim.cosim.report.accuracy import with_errors
 from hexapod_cosim.cosim.report.report import REPORT, metric_rows, write_report
 from hexapod_cosim.cosim.results.accuracy import Accuracy, halved_scenario
@@ -58,7 +57,6 @@ from hexapod_cosim.cosim.scenario.records import Scenario
 from hexapod_cosim.cosim.scenario.scenario import load_scenario
 from hexapod_cosim.models import HexapodError
 
-LOG_KINDS = ("replay", "identify")  # folders that depend on a log
 EPILOG = (
     f"Exit code {FELL} when the robot fell: what was recorded and measured is written all the same."
 )
@@ -178,23 +176,16 @@ def report(
 
 def _report_again(folder: Path, facts: Mapping[str, Any]) -> list[Path]:
     """Writes the report of a folder again; `facts` are those of its run.json."""
-    if facts.get("kind") == STUDY:
-        require_pyarrow("studies", "hexapod report")
-        # imported only here because it is slow
-        from hexapod_cosim.cosim.cli.study.studying import report_on, warn_of  # noqa: PLC0415
-
-        found, files = report_on(folder)
-        warn_of(found)
-        return list(files)
-    if facts.get("kind") == BENCHMARK:
-        return list(benchmark_command.report_on(folder))
-    if facts.get("kind") == "compare":
+    kind, reports = facts.get("kind"), report_functions()
+    if kind in reports:
+        return list(reports[kind](folder))
+    if kind == "compare":
         return _report_comparison(folder, facts)
-    if facts.get("kind") in LOG_KINDS:
+    if kind is not None:
         raise HexapodError(
             "not a run, whose report can be made again",
-            got=f"a folder of `hexapod {facts['kind']}`",
-            expected="a run, a comparison, a study or a benchmark",
+            got=f"a folder of `hexapod {kind}`",
+            expected=" or ".join(["a run", "a comparison", *(f"a {name}" for name in reports)]),
             fix=f"run it again: {facts.get('command', '')}",
             where=str(folder),
         )

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
-PYTHON, C = ROOT / "controller", ROOT / "controller_fmu/src"
+PYTHON, C = ROOT / "controller", ROOT / "controller/fmu/src"
 
 
 def files_below(folder: Path, suffix: str) -> set[str]:

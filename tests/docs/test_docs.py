@@ -173,7 +173,7 @@ def test_every_function_of_the_c_headers_is_in_the_reference(reference: dict[str
     described = {name for line in directives for name in re.findall(r"(hx_\w+)\(", line)}
     for header in (
         ROOT / "plant_fmu/include/hexapod/hexapod.h",
-        ROOT / "controller_fmu/include/hexapod/controller.h",
+        ROOT / "controller/fmu/include/hexapod/controller.h",
     ):
         functions = re.findall(
             r"^HX_API [^(]*?(hx_\w+)\(", header.read_text(encoding="utf-8"), flags=re.MULTILINE

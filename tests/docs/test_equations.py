@@ -25,7 +25,7 @@ def page_numbers() -> list[int]:
 
 
 def cited_files() -> list[Path]:
-    folders = ("models", "controller", "plant_fmu", "controller_fmu", "cosim", "docs", "tests")
+    folders = ("models", "controller", "plant_fmu", "controller/fmu", "cosim", "docs", "tests")
     more = ("benchmarks", "examples", "tools")
     paths = [path for folder in (*folders, *more) for path in (ROOT / folder).rglob("*")]
     kept = [path for path in paths if path.suffix in TEXTS and "node_modules" not in path.parts]

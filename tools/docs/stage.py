@@ -27,9 +27,9 @@ INSTEAD = {
     "README.md": "index.md",
     "docs/README.md": "index.md",
     "plant_fmu/interface.toml": "reference/plant.md",
-    "controller_fmu/interface.toml": "reference/controller.md",
+    "controller/fmu/interface.toml": "reference/controller.md",
     "plant_fmu/include/hexapod/hexapod.h": "reference/c.md",
-    "controller_fmu/include/hexapod/controller.h": "reference/c.md",
+    "controller/fmu/include/hexapod/controller.h": "reference/c.md",
 }
 PACKAGES = ("models", "controller", "cosim")  # with a page per module in the reference
 LANGUAGES = {
