@@ -54,9 +54,10 @@ def build(targets: Sequence[str]) -> None:
     search = os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])
     cmake = shutil.which("cmake", path=search) or "cmake"
     generator = [] if (BUILD / "CMakeCache.txt").exists() else ["-G", "Ninja"]
+    where = ["-S", str(ROOT), "-B", str(BUILD), "-C", str(ROOT / "tools" / "cmake" / "fuzz.cmake")]
     for command in (
-        [cmake, "--preset", "fuzz", f"-DPython_EXECUTABLE={sys.executable}", *generator],
-        [cmake, "--build", "--preset", "fuzz", "--target", *targets],
+        [cmake, *where, f"-DPython_EXECUTABLE={sys.executable}", *generator],
+        [cmake, "--build", str(BUILD), "--target", *targets],
     ):
         done = run(command, env=os.environ | {"PATH": search})
         if done.returncode != 0:

@@ -27,7 +27,7 @@ ROOT = Path(__file__).parents[2]
 DOCS = ROOT / "docs"
 NOTEBOOKS = sorted((DOCS / "notebooks").glob("*.ipynb"))
 PAGES = [
-    ROOT / name for name in ("README.md", "CONTRIBUTING.md", "CHANGELOG.md", "benchmarks/README.md")
+    ROOT / name for name in ("README.md", ".github/CONTRIBUTING.md", "benchmarks/README.md")
 ] + sorted(DOCS.rglob("*.md"))
 SHORT, PLAIN = "duration=2", ["--set", "outputs.plots=false"]
 COMPUTED = os.environ.get("HEXAPOD_SITE") == "computed"

@@ -17,8 +17,8 @@ ROOT = Path(__file__).resolve().parents[2]
 DOCS = ROOT / "docs"
 # pages outside docs/, and files for which the site has a better page
 ELSEWHERE = {
-    "CONTRIBUTING.md": "contributing.md",
-    "CHANGELOG.md": "changelog.md",
+    ".github/CONTRIBUTING.md": "contributing.md",
+    "docs/CHANGELOG.md": "changelog.md",
     "benchmarks/README.md": "benchmarks.md",
 }
 INSTEAD = {
@@ -28,7 +28,8 @@ INSTEAD = {
     "plant_fmu/include/hexapod/hexapod.h": "reference/c.md",
     "controller/fmu/include/hexapod/controller.h": "reference/c.md",
 }
-LINK = re.compile(r"(!?)\[((?:[^\[\]]|\[[^\]]*\])*)\]\(([^)\s]+)\)")
+# a link or a picture, or inline code outside of links, which is left as it is
+LINK = re.compile(r"(!?)\[((?:[^\[\]]|\[[^\]]*\])*)\]\(([^)\s]+)\)|`[^`\n]+`")
 FENCE = re.compile(r"(^```.*?^```[^\n]*$)", flags=re.DOTALL | re.MULTILINE)
 
 
@@ -38,9 +39,8 @@ class BrokenLinkError(Exception):
 
 def pages() -> Iterator[Path]:
     """Yields the pages of the repository that are also pages of the site."""
-    yield from sorted(DOCS.rglob("*.md"))
-    yield from sorted(DOCS.rglob("*.ipynb"))
-    yield from (ROOT / name for name in ELSEWHERE)
+    yield from sorted([*DOCS.rglob("*.md"), *DOCS.rglob("*.ipynb")])
+    yield from (ROOT / name for name in ELSEWHERE if not name.startswith("docs/"))
 
 
 def page_name(path: Path) -> str | None:
@@ -80,6 +80,8 @@ def linked(text: str, source: Path, place: Path, folder: Path) -> str:
     """Converts the links of a page's text, except in code."""
 
     def change(match: re.Match[str]) -> str:
+        if match[3] is None:
+            return match[0]
         target = converted(match[3], source, place, folder)
         return match[2] if target is None else f"{match[1]}[{match[2]}]({target})"
 
