@@ -58,7 +58,7 @@ def measure() -> bool:
     for counters in BUILD.rglob("*.gcda"):
         counters.unlink()
     settings = str(ROOT / "tools" / "cmake" / "coverage.cmake")
-    where = ["-S", str(ROOT), "-B", str(BUILD), "-C", settings]
+    where = ["-S", str(ROOT / "packaging"), "-B", str(BUILD), "-C", settings]
     configure = ["cmake", *where, f"-DPython_EXECUTABLE={sys.executable}"]
     fresh = not (BUILD / "CMakeCache.txt").exists()
     run(*configure, "--log-level=WARNING", *(["-G", "Ninja"] if fresh else []))

@@ -107,7 +107,7 @@ def build(folder: Path, targets: Sequence[str]) -> None:
     cmake = shutil.which("cmake", path=search) or "cmake"
     fresh = not (folder / "CMakeCache.txt").exists()
     settings = ROOT / "tools" / "cmake" / f"{folder.name}.cmake"
-    where = ["-S", str(ROOT), "-B", str(folder), "-C", str(settings)]
+    where = ["-S", str(ROOT / "packaging"), "-B", str(folder), "-C", str(settings)]
     configure = [cmake, *where, f"-DPython_EXECUTABLE={sys.executable}"]
     commands = [
         [*configure, *(["-G", "Ninja"] if fresh else [])],

@@ -169,7 +169,7 @@ def test_what_is_not_installed_is_not_found(
 
 def test_missing_headers_and_a_missing_licence_are_said_with_what_to_do(tmp_path: Path) -> None:
     asked = ("-DHX_FMU=ON", f"-DFMI_HEADERS={tmp_path}")
-    process = done(CMAKE, "-S", ROOT, "-B", tmp_path / "build", *NINJA, *asked)
+    process = done(CMAKE, "-S", ROOT / "plant_fmu", "-B", tmp_path / "build", *NINJA, *asked)
     assert process.returncode != 0
     told = " ".join(process.stderr.split())
     assert (
