@@ -8,16 +8,12 @@ FADE_TIME those of the present one.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from hexapod_cosim.controller.memory import Stateful
 from hexapod_cosim.controller.plane import LEGS, clamp
+from hexapod_cosim.controller.signals import JointCommand
 from hexapod_cosim.controller.walk.kinematics import LegSolver
-
-if TYPE_CHECKING:
-    from hexapod_cosim.controller.controller import JointCommand
 
 FADE_TIME = 0.4  # s    duration of a transition
 

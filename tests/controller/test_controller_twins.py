@@ -43,7 +43,7 @@ WITHOUT_TWIN = {
 PREFIX = re.compile(
     r"^hx_((burden|compliance|compliant|contact_detector|sensor_watch|controller|gait"
     r"|hold|inverse_dynamics|leg_solver|landings"
-    r"|paper|planned_squeeze|posture|support|sway|touchdown|warmth"
+    r"|paper|planned_squeeze|posture|support|sway|touchdown|load_adaptation"
     r"|command_ramp|fade|foot_paths)_)?"
 )
 FUNCTION = re.compile(r"^(?:static )?(?:const )?\w+ \*?(\w+)\([^;]*?\) \{", re.MULTILINE)

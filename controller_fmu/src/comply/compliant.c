@@ -52,13 +52,13 @@ void hx_compliant_compile(const hxControllerDefinition *definition, const hxLegS
   hx_planned_squeeze_compile(definition, model->laws.weight, -model->dynamics.floor,
                              &model->squeeze);
   hx_hold_compile(definition, &model->hold);
-  hx_warmth_compile(definition, &model->warmth);
+  hx_load_adaptation_compile(definition, &model->adaptation);
 }
 
 void hx_compliant_reset(const hxCompliantModel *model, hxCompliant *compliant) {
   memset(compliant, 0, sizeof *compliant);
   hx_compliance_reset(&compliant->laws);
-  hx_warmth_reset(&model->warmth, &compliant->warmth);
+  hx_load_adaptation_reset(&model->adaptation, &compliant->adaptation);
 }
 
 /* ----------------------------------------------------------------------------------- steering */
@@ -159,7 +159,7 @@ void hx_compliant_step(const hxCompliantModel *model, const hxLegSolver leg[HX_L
   }
   if (busy || compliant->moving) compliant->moving = busy;
   const double needed = laws->burden.heft * laws->burden.peak / model->laws.most;
-  hx_warmth_weigh(&model->warmth, laws->burden.heft, &compliant->warmth);
-  hx_warmth_step(&model->warmth, (const double (*)[HX_JOINTS])laws->torque, needed, laws->held,
-                 &compliant->warmth);
+  hx_load_adaptation_weigh(&model->adaptation, laws->burden.heft, &compliant->adaptation);
+  hx_load_adaptation_step(&model->adaptation, (const double (*)[HX_JOINTS])laws->torque, needed, laws->held,
+                 &compliant->adaptation);
 }

@@ -3,7 +3,7 @@
 #ifndef HX_COMPLIANT_H
 #define HX_COMPLIANT_H
 
-#include "../sense/warmth.h"
+#include "../sense/load_adaptation.h"
 #include "../walk/hold.h"
 #include "../walk/trajectory.h"
 #include "compliance.h"
@@ -22,7 +22,7 @@ typedef struct hxCompliantModel {
   hxPlannedSqueeze squeeze;
   hxComplianceModel laws;
   hxHoldModel hold;
-  hxWarmthModel warmth;
+  hxLoadAdaptationModel adaptation;
 } hxCompliantModel;
 
 /* Velocity that steers back to the path, added to the commanded one, with a transition from one
@@ -35,7 +35,7 @@ typedef struct hxSteering {
 typedef struct hxCompliant {
   hxCompliance laws;
   hxHold hold;
-  hxWarmth warmth;
+  hxLoadAdaptation adaptation;
   hxSteering steering;
   int64_t count; /* number of steps */
   double offset[HX_LEGS]; /* m, offsets for early and late touch-downs at the last step */

@@ -51,35 +51,35 @@ void hx_sway_compile(const hxControllerDefinition *definition, const hxLegSolver
   model->rest = moment_of(dynamics, leg, hx_plane(0.0, 0.0));
 }
 
-int hx_sway_acts(const hxSway *model, const hxWarmth *warmth) {
-  return model->active && warmth->narrowing > 0.0;
+int hx_sway_acts(const hxSway *model, const hxLoadAdaptation *adaptation) {
+  return model->active && adaptation->narrowing > 0.0;
 }
 
-double hx_sway_laden(const hxSway *model, const hxWarmth *warmth) {
-  return model->active ? hx_warmth_laden(warmth) : 1.0;
+double hx_sway_laden(const hxSway *model, const hxLoadAdaptation *adaptation) {
+  return model->active ? hx_load_adaptation_laden(adaptation) : 1.0;
 }
 
 /* Returns the way of the torso that gives the robot another sum of m p [kg m]. */
-static hxPlane yield_to(const hxSway *model, hxPlane moment, const hxWarmth *warmth) {
-  const double laden = hx_warmth_laden(warmth);
+static hxPlane yield_to(const hxSway *model, hxPlane moment, const hxLoadAdaptation *adaptation) {
+  const double laden = hx_load_adaptation_laden(adaptation);
   return hx_plane(moment.x / (model->mass * (laden - model->forward)),
                   moment.y / (model->mass * (laden - model->aside)));
 }
 
-hxPlane hx_sway_guess(const hxSway *model, const hxPlannedFeet *feet, const hxWarmth *warmth) {
+hxPlane hx_sway_guess(const hxSway *model, const hxPlannedFeet *feet, const hxLoadAdaptation *adaptation) {
   const double mass = model->mass / HX_LEGS;
   hxPlane away = hx_scaled(model->home, -1.0);
   for (int k = 0; k < HX_LEGS; ++k) away = hx_plane_add(away, feet->plane[k]);
   away = hx_plane(model->forward * mass * away.x, model->aside * mass * away.y);
-  return hx_scaled(yield_to(model, away, warmth), -1.0);
+  return hx_scaled(yield_to(model, away, adaptation), -1.0);
 }
 
 hxPlane hx_sway_of(const hxSway *model, const hxInverseDynamics *dynamics, hxPlane guess,
-                   const hxMasses *masses, const hxWarmth *warmth) {
+                   const hxMasses *masses, const hxLoadAdaptation *adaptation) {
   hxPlane moved =
-      hx_plane_sub(hx_scaled(guess, hx_warmth_laden(warmth) * model->mass), model->rest);
+      hx_plane_sub(hx_scaled(guess, hx_load_adaptation_laden(adaptation) * model->mass), model->rest);
   for (int k = 0; k < HX_LEGS; ++k)
     for (int link = 0; link < HX_JOINTS; ++link)
       moved = hx_plane_add(moved, hx_scaled(masses->place[k][link], dynamics->mass[k][link]));
-  return hx_scaled(hx_plane_sub(guess, yield_to(model, moved, warmth)), warmth->narrowing);
+  return hx_scaled(hx_plane_sub(guess, yield_to(model, moved, adaptation)), adaptation->narrowing);
 }

@@ -2,7 +2,7 @@
 #ifndef HX_SWAY_H
 #define HX_SWAY_H
 
-#include "../sense/warmth.h"
+#include "../sense/load_adaptation.h"
 #include "../walk/inverse_dynamics.h"
 #include "../walk/trajectory.h"
 #include "hexapod/inside.h"
@@ -21,18 +21,18 @@ void hx_sway_compile(const hxControllerDefinition *definition, const hxLegSolver
                      const hxInverseDynamics *dynamics, hxSway *model);
 
 /* Returns whether the torso sways. */
-int hx_sway_acts(const hxSway *model, const hxWarmth *warmth);
+int hx_sway_acts(const hxSway *model, const hxLoadAdaptation *adaptation);
 
 /* Returns the weight that sways over the modelled one [1]. */
-double hx_sway_laden(const hxSway *model, const hxWarmth *warmth);
+double hx_sway_laden(const hxSway *model, const hxLoadAdaptation *adaptation);
 
 /* Returns nearly the whole way of the torso in the walking frame, by the shares [m]. */
-hxPlane hx_sway_guess(const hxSway *model, const hxPlannedFeet *feet, const hxWarmth *warmth);
+hxPlane hx_sway_guess(const hxSway *model, const hxPlannedFeet *feet, const hxLoadAdaptation *adaptation);
 
 /* Returns the way of the torso in the walking frame [m] (C54). masses: of a torso that has moved by
  * the guess. */
 hxPlane hx_sway_of(const hxSway *model, const hxInverseDynamics *dynamics, hxPlane guess,
-                   const hxMasses *masses, const hxWarmth *warmth);
+                   const hxMasses *masses, const hxLoadAdaptation *adaptation);
 
 HX_HIDDEN_END
 

@@ -34,11 +34,11 @@ void hx_landings_look(const int touching[HX_LEGS], const double height[HX_LEGS],
 void hx_landings_expected(const hxLandings *landings, const int touching[HX_LEGS],
                           const double height[HX_LEGS], const int swinging[HX_LEGS],
                           double expected[HX_LEGS]) {
-  double told[HX_LEGS];
+  double known[HX_LEGS];
   for (int leg = 0; leg < HX_LEGS; ++leg)
-    told[leg] = swinging[leg] && !touching[leg] ? fmax(height[leg], 0.0) : landings->met[leg];
+    known[leg] = swinging[leg] && !touching[leg] ? fmax(height[leg], 0.0) : landings->met[leg];
   for (int leg = 0; leg < HX_LEGS; ++leg)
-    expected[leg] = fmax(least_of_others(told, leg), landings->before[leg]);
+    expected[leg] = fmax(least_of_others(known, leg), landings->before[leg]);
 }
 
 void hx_landings_early(const hxLandings *landings, const double expected[HX_LEGS],

@@ -1,4 +1,4 @@
-#include "warmth.h"
+#include "load_adaptation.h"
 
 #include <string.h>
 
@@ -15,11 +15,11 @@ static const double over = 1.0, far_over = 1.2;
 static const double creeps = 0.75, holds = 0.82;
 /* 1, weight of the torques when it costs nothing or servos need it */
 static const double most_squeeze = 0.95;
-static const double told = 1.1, heavier = 1.2; /* 1, measured over modelled weight */
+static const double modelled = 1.1, heavy = 1.2; /* 1, measured over modelled weight */
 /* 1, of the set weight of the squeeze, in the narrow stance */
 static const double spared = 0.75;
 
-void hx_warmth_compile(const hxControllerDefinition *definition, hxWarmthModel *model) {
+void hx_load_adaptation_compile(const hxControllerDefinition *definition, hxLoadAdaptationModel *model) {
   const double rating = definition->servo.torque_continuous,
                squeeze = definition->parts.support ? definition->parts.squeeze : 0.0;
   model->rating = rating * rating;
@@ -29,29 +29,29 @@ void hx_warmth_compile(const hxControllerDefinition *definition, hxWarmthModel *
   model->follow = 1.0 - hx_decay(-definition->period / heat_time);
 }
 
-void hx_warmth_reset(const hxWarmthModel *model, hxWarmth *warmth) {
-  memset(warmth, 0, sizeof *warmth);
-  warmth->heft = 1.0;
-  warmth->squeeze = model->squeeze;
+void hx_load_adaptation_reset(const hxLoadAdaptationModel *model, hxLoadAdaptation *adaptation) {
+  memset(adaptation, 0, sizeof *adaptation);
+  adaptation->heft = 1.0;
+  adaptation->squeeze = model->squeeze;
 }
 
-void hx_warmth_weigh(const hxWarmthModel *model, double heft, hxWarmth *warmth) {
-  warmth->heft += model->follow_work * (heft - warmth->heft);
+void hx_load_adaptation_weigh(const hxLoadAdaptationModel *model, double heft, hxLoadAdaptation *adaptation) {
+  adaptation->heft += model->follow_work * (heft - adaptation->heft);
   if (model->narrows)
-    warmth->narrowing = hx_clamp((warmth->heft - told) / (heavier - told), 0.0, 1.0);
+    adaptation->narrowing = hx_clamp((adaptation->heft - modelled) / (heavy - modelled), 0.0, 1.0);
 }
 
-double hx_warmth_laden(const hxWarmth *warmth) {
-  return 1.0 + warmth->narrowing * (warmth->heft - 1.0);
+double hx_load_adaptation_laden(const hxLoadAdaptation *adaptation) {
+  return 1.0 + adaptation->narrowing * (adaptation->heft - 1.0);
 }
 
-void hx_warmth_step(const hxWarmthModel *model, const double torque[HX_LEGS][HX_JOINTS],
-                    double needed, double held, hxWarmth *warmth) {
+void hx_load_adaptation_step(const hxLoadAdaptationModel *model, const double torque[HX_LEGS][HX_JOINTS],
+                    double needed, double held, hxLoadAdaptation *adaptation) {
   double hottest = 0.0, hardest = 0.0;
   for (int leg = 0; leg < HX_LEGS; ++leg)
     for (int joint = 0; joint < HX_JOINTS; ++joint) {
       const double square = torque[leg][joint] * torque[leg][joint];
-      double *work = &warmth->work[leg][joint], *heat = &warmth->heat[leg][joint];
+      double *work = &adaptation->work[leg][joint], *heat = &adaptation->heat[leg][joint];
       *work += model->follow_work * (square - *work);
       *heat += model->follow * (square - *heat);
       hardest = hx_larger(*work, hardest);
@@ -61,8 +61,8 @@ void hx_warmth_step(const hxWarmthModel *model, const double torque[HX_LEGS][HX_
                                 (hardest / model->rating - over) / (far_over - over)),
                part = hx_larger(
                    warm, hx_larger((needed - easy) / (hard - easy),
-                                   (held - creeps) / (holds - creeps) * (1.0 - warmth->narrowing)));
-  const double least = model->squeeze * (1.0 - spared * warmth->narrowing),
+                                   (held - creeps) / (holds - creeps) * (1.0 - adaptation->narrowing)));
+  const double least = model->squeeze * (1.0 - spared * adaptation->narrowing),
                more = least > 0.0 ? hx_larger(most_squeeze - least, 0.0) : 0.0;
-  warmth->squeeze = least + more * hx_clamp(part, 0.0, 1.0);
+  adaptation->squeeze = least + more * hx_clamp(part, 0.0, 1.0);
 }
