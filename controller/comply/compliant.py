@@ -1,4 +1,4 @@
-"""Corrects the planned joint commands by the sensors, once per period. C: compliant.c.
+"""Corrects the planned joint commands by the sensors, once per period. C: compliant.h.
 
 Every period controller.py provides a plan of the present step: joint angles, the forces on the
 feet, and the torques for these forces. Compliant control corrects the plan by the measurements:

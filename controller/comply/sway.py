@@ -1,4 +1,4 @@
-"""Computes by how far the torso sways against the swinging legs. C: sway.c.
+"""Computes by how far the torso sways against the swinging legs. C: sway.h.
 
 A swinging leg takes its mass forwards and stops it again. Under a torso of constant velocity the
 feet that stand must push for that, forwards and backwards in every swing. The torso instead moves

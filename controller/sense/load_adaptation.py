@@ -1,4 +1,4 @@
-"""Chooses squeeze and width of the stance by the load of the servos. C: load_adaptation.c.
+"""Chooses squeeze and width of the stance by the load of the servos. C: load_adaptation.h.
 
 The squeeze takes load from the femurs. On ground on which feet creep its price is slip, so it has
 its set weight there. It has its largest weight (C45) where the ground holds the planned squeeze

@@ -1,4 +1,4 @@
-"""Lets joint commands go on without a jump when the control changes. C: fade.c.
+"""Lets joint commands go on without a jump when the control changes. C: fade.h.
 
 At the first step under another control, the distance of its commands from those that the control
 before would give is computed. It is added to the commands, and goes to 0 by the cubic of the

@@ -349,9 +349,9 @@ static void ask(const hxControllerModel *model, hxControllerState *state, hxStan
   hxPlane *feet = plan->feet;
   double height[HX_LEGS];
   hxDemand demand;
-  hx_inverse_dynamics_demand(&model->laws.dynamics, model->leg, &motion, output->speed_ref,
-                             &now->posture,
-                             hx_sway_laden(&model->laws.sway, &state->compliant.adaptation), &demand);
+  hx_inverse_dynamics_demand(
+      &model->laws.dynamics, model->leg, &motion, output->speed_ref, &now->posture,
+      hx_sway_laden(&model->laws.sway, &state->compliant.adaptation), &demand);
   plan->overspeed = 0;
   for (int k = 0; k < HX_LEGS; ++k) {
     feet[k] = hx_plane_add(now->plane[k], now->shift[k]);

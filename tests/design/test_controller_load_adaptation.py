@@ -8,7 +8,13 @@ import numpy as np
 import pytest
 from gains import PERIOD
 
-from hexapod_cosim.controller.sense.load_adaptation import COOL, HEAT_TIME, HOT, MOST_SQUEEZE, LoadAdaptation
+from hexapod_cosim.controller.sense.load_adaptation import (
+    COOL,
+    HEAT_TIME,
+    HOT,
+    MOST_SQUEEZE,
+    LoadAdaptation,
+)
 
 RATING = 1.2  # N m
 MINUTE = round(HEAT_TIME / PERIOD)  # periods
@@ -17,7 +23,9 @@ LOST = 0.4  # share of the planned squeeze that is held on ground on which feet 
 
 
 def make(squeeze: float = 0.4, *, narrows: bool = False) -> LoadAdaptation:
-    return LoadAdaptation(rating=RATING, squeeze=squeeze, narrows=narrows, cycle=CYCLE, period=PERIOD)
+    return LoadAdaptation(
+        rating=RATING, squeeze=squeeze, narrows=narrows, cycle=CYCLE, period=PERIOD
+    )
 
 
 def loaded(largest: float) -> np.ndarray:
