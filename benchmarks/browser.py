@@ -18,7 +18,7 @@ from typing import Any
 from browser import launcher
 
 from hexapod_cosim.controller import make_gait
-from hexapod_cosim.cosim.live.module import walker_module
+from hexapod_cosim.extensions.live.module import walker_module
 from hexapod_cosim.models import load_robot
 
 CONTROLS = {"kinematic": 1, "compliant": 2, "paper": 3}

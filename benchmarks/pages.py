@@ -18,18 +18,18 @@ from PIL import Image
 
 from benchmarks import ROOT
 from benchmarks.control.tables import markdown, put_into
-from hexapod_cosim.cosim.course import texts
-from hexapod_cosim.cosim.course.goals import verdicts
-from hexapod_cosim.cosim.course.picture import FOLDER, STEM
-from hexapod_cosim.cosim.course.records import SHOWN
-from hexapod_cosim.cosim.course.store import read_table
-from hexapod_cosim.cosim.course.table import Table
 from hexapod_cosim.cosim.results.comparison import WORSE
 from hexapod_cosim.cosim.results.comparisons import Comparisons, compare_all
 from hexapod_cosim.cosim.run.batch import run_batch
 from hexapod_cosim.cosim.scenario.controls import parse_controls
 from hexapod_cosim.cosim.scenario.scenario import load_scenario
 from hexapod_cosim.cosim.scenario.variation import STANDARD
+from hexapod_cosim.extensions.course import texts
+from hexapod_cosim.extensions.course.goals import verdicts
+from hexapod_cosim.extensions.course.picture import FOLDER, STEM
+from hexapod_cosim.extensions.course.records import SHOWN
+from hexapod_cosim.extensions.course.store import read_table
+from hexapod_cosim.extensions.course.table import Table
 
 PAGES = tuple(ROOT / "docs" / name for name in ("comparison.md", "control.md", "course.md"))
 SEEDS = range(10)

@@ -36,12 +36,12 @@ from hexapod_cosim.cosim.run.preparation import chosen_gains
 from hexapod_cosim.cosim.run.walker import Walker
 from hexapod_cosim.cosim.scenario.scenario import load_scenario
 from hexapod_cosim.cosim.scenario.variation import STANDARD
-from hexapod_cosim.cosim.study import dispatch
-from hexapod_cosim.cosim.study.folder import RESULTS as RESULTS_FILE
-from hexapod_cosim.cosim.study.reading import study_from_table
-from hexapod_cosim.cosim.study.report.page import write_study_report
-from hexapod_cosim.cosim.study.study import Options, run_study
-from hexapod_cosim.cosim.study.summary import read_results
+from hexapod_cosim.extensions.study import dispatch
+from hexapod_cosim.extensions.study.folder import RESULTS as RESULTS_FILE
+from hexapod_cosim.extensions.study.reading import study_from_table
+from hexapod_cosim.extensions.study.report.page import write_study_report
+from hexapod_cosim.extensions.study.study import Options, run_study
+from hexapod_cosim.extensions.study.summary import read_results
 from hexapod_cosim.models import load_robot
 
 ROOT = Path(__file__).resolve().parents[1]

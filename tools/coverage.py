@@ -37,7 +37,7 @@ TESTS = (
 )
 # gcc's own counters are exported functions too
 LEFT_OUT = ("--deselect", "tests/fmi/test_fmi.py::test_no_other_function_is_exported")
-FILES = ("plant_fmu/.*", "controller_fmu/.*", "fmi/.*")
+FILES = ("plant_fmu/.*", "controller/fmu/.*", "fmi/.*")
 NO_TESTS_NEEDED = (".*/generated/.*",)  # tables
 
 
@@ -57,11 +57,13 @@ def measure() -> bool:
     """Builds with counters and runs the tests; returns whether all passed."""
     for counters in BUILD.rglob("*.gcda"):
         counters.unlink()
-    configure = ["cmake", "--preset", "coverage", f"-DPython_EXECUTABLE={sys.executable}"]
+    settings = str(ROOT / "tools" / "cmake" / "coverage.cmake")
+    where = ["-S", str(ROOT), "-B", str(BUILD), "-C", settings]
+    configure = ["cmake", *where, f"-DPython_EXECUTABLE={sys.executable}"]
     fresh = not (BUILD / "CMakeCache.txt").exists()
     run(*configure, "--log-level=WARNING", *(["-G", "Ninja"] if fresh else []))
-    run("cmake", "--build", "--preset", "native-coverage", "--", "--quiet")
-    native = run("ctest", "--preset", "coverage", check=False)
+    run("cmake", "--build", str(BUILD), "--", "--quiet")
+    native = run("ctest", "--test-dir", str(BUILD), "--output-on-failure", check=False)
     return run(sys.executable, "-m", "pytest", "-q", *TESTS, *LEFT_OUT, check=False) and native
 
 
@@ -73,7 +75,7 @@ def table() -> str:
     run(
         str(Path(sys.executable).parent / "gcovr"),
         *("--root", str(ROOT), "--object-directory", str(BUILD)),
-        *(str(BUILD / part) for part in ("plant_fmu", "controller_fmu", "tests")),
+        *(str(BUILD / part) for part in ("plant_fmu", "controller/fmu", "tests")),
         *options,
         *("--merge-mode-functions=merge-use-line-min", "--exclude-throw-branches"),
         "--gcov-suspicious-hits-threshold=0",  # loads of lanes are counted more than 2^32 times

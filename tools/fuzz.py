@@ -106,10 +106,12 @@ def build(folder: Path, targets: Sequence[str]) -> None:
     search = os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])
     cmake = shutil.which("cmake", path=search) or "cmake"
     fresh = not (folder / "CMakeCache.txt").exists()
-    configure = [cmake, "--preset", folder.name, f"-DPython_EXECUTABLE={sys.executable}"]
+    settings = ROOT / "tools" / "cmake" / f"{folder.name}.cmake"
+    where = ["-S", str(ROOT), "-B", str(folder), "-C", str(settings)]
+    configure = [cmake, *where, f"-DPython_EXECUTABLE={sys.executable}"]
     commands = [
         [*configure, *(["-G", "Ninja"] if fresh else [])],
-        [cmake, "--build", "--preset", folder.name, "--target", *targets],
+        [cmake, "--build", str(folder), "--target", *targets],
     ]
     for command in commands:
         done = subprocess.run(

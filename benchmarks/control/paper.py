@@ -20,14 +20,14 @@ from benchmarks import BUILD, ROOT
 from benchmarks.control.figures import draw_feet, draw_front
 from benchmarks.control.tables import markdown, put_into
 from hexapod_cosim.controller import Gains
-from hexapod_cosim.cosim.course.reading import load_course
-from hexapod_cosim.cosim.course.records import read_entries
-from hexapod_cosim.cosim.course.runs import Run, run_course
 from hexapod_cosim.cosim.results.summary import Summary
 from hexapod_cosim.cosim.run.batch import run_batch
 from hexapod_cosim.cosim.run.preparation import design_key, designed_gains
 from hexapod_cosim.cosim.scenario.scenario import load_scenario
 from hexapod_cosim.cosim.scenario.variation import STANDARD
+from hexapod_cosim.extensions.course.reading import load_course
+from hexapod_cosim.extensions.course.records import read_entries
+from hexapod_cosim.extensions.course.runs import Run, run_course
 
 PAGE = ROOT / "docs" / "control" / "paper.md"
 CONTROLS = ("kinematic", "paper", "compliant")

@@ -30,11 +30,11 @@ import numpy as np
 from secret_robots import GROUPS, Secret, damaged, secret_robot
 
 from hexapod_cosim.cosim.export.plant_export import export_fmu
-from hexapod_cosim.cosim.identify.commands.command_screening import WrongCommandsError
-from hexapod_cosim.cosim.identify.identified import Identified
-from hexapod_cosim.cosim.identify.identify import TOLERANCE, identify, screen
-from hexapod_cosim.cosim.identify.log import Log
-from hexapod_cosim.cosim.identify.log_plant import LogPlant
+from hexapod_cosim.extensions.identify.commands.command_screening import WrongCommandsError
+from hexapod_cosim.extensions.identify.identified import Identified
+from hexapod_cosim.extensions.identify.identify import TOLERANCE, identify, screen
+from hexapod_cosim.extensions.identify.log import Log
+from hexapod_cosim.extensions.identify.log_plant import LogPlant
 from hexapod_cosim.models import load_robot
 
 JUDGED = ("torque", "position", "attitude")  # channels of the goal: torque and pose

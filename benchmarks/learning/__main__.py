@@ -21,8 +21,8 @@ from mujoco import rollout
 from numpy.typing import NDArray
 
 from benchmarks.learning import fmugym_walk
-from hexapod_cosim.gym.bench import bench, walking_action
-from hexapod_cosim.gym.settings import JOINTS, RATE, EnvSettings
+from hexapod_cosim.extensions.gym.bench import bench, walking_action
+from hexapod_cosim.extensions.gym.settings import JOINTS, RATE, EnvSettings
 from hexapod_cosim.models import load_robot
 from hexapod_cosim.models.mjcf import robot_to_mjcf
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
-PYTHON, C = ROOT / "controller", ROOT / "controller_fmu/src"
+PYTHON, C = ROOT / "controller", ROOT / "controller/fmu/src"
 FOLDERS = ("walk", "sense", "comply")  # of the parts
 PARTS = sorted(f"{folder}/{file.stem}" for folder in FOLDERS for file in (C / folder).glob("*.h"))
 CONSTANT = re.compile(r"(\w+) = (-?[\d.e+-]+)(?=[,;])")

@@ -32,7 +32,7 @@ ROOT = Path(__file__).parents[2]
 DOCS = ROOT / "docs"
 NOTEBOOKS = sorted((DOCS / "notebooks").glob("*.ipynb"))
 PAGES = [
-    ROOT / name for name in ("README.md", "CONTRIBUTING.md", "CHANGELOG.md", "benchmarks/README.md")
+    ROOT / name for name in ("README.md", ".github/CONTRIBUTING.md", "benchmarks/README.md")
 ] + sorted(DOCS.rglob("*.md"))
 SHORT, PLAIN = "duration=2", ["--set", "outputs.plots=false"]
 COMPUTED = os.environ.get("HEXAPOD_SITE") == "computed"
@@ -173,7 +173,7 @@ def test_every_function_of_the_c_headers_is_in_the_reference(reference: dict[str
     described = {name for line in directives for name in re.findall(r"(hx_\w+)\(", line)}
     for header in (
         ROOT / "plant_fmu/include/hexapod/hexapod.h",
-        ROOT / "controller_fmu/include/hexapod/controller.h",
+        ROOT / "controller/fmu/include/hexapod/controller.h",
     ):
         functions = re.findall(
             r"^HX_API [^(]*?(hx_\w+)\(", header.read_text(encoding="utf-8"), flags=re.MULTILINE

@@ -25,11 +25,11 @@ def page_numbers() -> list[int]:
 
 
 def cited_files() -> list[Path]:
-    folders = ("models", "controller", "plant_fmu", "controller_fmu", "cosim", "docs", "tests")
+    folders = ("models", "controller", "plant_fmu", "controller/fmu", "cosim", "docs", "tests")
     more = ("benchmarks", "examples", "tools")
     paths = [path for folder in (*folders, *more) for path in (ROOT / folder).rglob("*")]
     kept = [path for path in paths if path.suffix in TEXTS and "node_modules" not in path.parts]
-    return [*sorted(kept), ROOT / "README.md", ROOT / "CONTRIBUTING.md"]
+    return [*sorted(kept), ROOT / "README.md", ROOT / ".github" / "CONTRIBUTING.md"]
 
 
 def citations(text: str) -> list[tuple[str, bool, set[int]]]:

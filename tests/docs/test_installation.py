@@ -15,7 +15,7 @@ from hexapod_cosim.cosim.common.installation import install_extra
 ROOT = Path(__file__).parents[2]
 PLACES = (
     "README.md",
-    "CONTRIBUTING.md",
+    ".github/CONTRIBUTING.md",
     "Makefile",
     "docs",
     "cosim",

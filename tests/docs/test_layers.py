@@ -20,7 +20,7 @@ SEES = {
     "models": {"models"},
     "controller": {"models", "controller"},
     "cosim": {"models", "controller", "cosim"},
-    "gym": {"models", "controller", "cosim", "gym"},
+    "extensions": {"models", "controller", "cosim", "extensions"},
 }
 # what each room of cosim may import
 LOW = ["common", "interface", "scenario", "master"]
@@ -38,18 +38,17 @@ ROOMS = {
     "design": [*LOW, "export"],
     "report": [*LOW, "export", "results"],
     "run": RUNNING,
-    "identify": [*RUNNING, "report", "run"],
-    "course": [*RUNNING, "report", "run"],
-    "live": [*RUNNING, "report", "run"],
-    "study": [*RUNNING, "run"],
 }
-COMPONENTS = ("plant_fmu", "controller_fmu", "policy_fmu")  # the folders of FMUs in C
-MOST_FILES = 20  # in a folder that people write
+COMPONENTS = (
+    "plant_fmu",
+    "controller/fmu",
+    "extensions/gym/policy_fmu",
+)
 # third-party packages by folder; cosim may use what pyproject lists
 MAY_USE = {
     "models": {"numpy", "PIL"},
     "controller": {"numpy", "scipy", "control", "matplotlib"},
-    "gym": {"numpy", "gymnasium"},
+    "extensions/gym": {"numpy", "gymnasium"},
 }
 RUN_TIME_ONLY = {"numpy", "scipy"}  # of the controller outside controller/design
 INCLUDE = re.compile(r'^\s*#\s*include\s+["<]([^">]+)[">]', re.MULTILINE)
@@ -109,6 +108,14 @@ def test_a_room_imports_only_the_rooms_below_it() -> None:
     assert seen == set(ROOMS)
 
 
+def test_an_extension_imports_no_other() -> None:
+    for path in python_files("extensions"):
+        own = path.relative_to(ROOT / "extensions").parts[0]
+        for name in imports(path):
+            if name.startswith(f"{PACKAGE}.extensions."):
+                assert name.split(".")[2] == own, f"{path.relative_to(ROOT)} imports {name}"
+
+
 def test_each_room_says_what_it_is_for_and_what_it_may_import() -> None:
     for room in ROOMS:
         text = ast.get_docstring(
@@ -116,23 +123,6 @@ def test_each_room_says_what_it_is_for_and_what_it_may_import() -> None:
         )
         assert text is not None, room
         assert " ".join(text.split()).count(". Imports ") == 1, f"{room}: {text}"
-
-
-def test_no_folder_holds_more_files_than_a_reader_can_survey() -> None:
-    python = ("models", "controller", "cosim", "gym", "tests", "benchmarks", "tools", "examples")
-    names = (*python, "fmi", *COMPONENTS)
-    kinds = {".py", ".c", ".h", ".ts"}
-    counts: dict[Path, int] = {}
-    for path in (path for name in names for path in (ROOT / name).rglob("*.*")):
-        if path.suffix in kinds and path.name != "__init__.py":
-            counts[path.parent] = counts.get(path.parent, 0) + 1
-    made = {"generated", "results", "node_modules", "build"}
-    crowded = {
-        str(folder.relative_to(ROOT)): count
-        for folder, count in counts.items()
-        if count > MOST_FILES and not made & set(folder.parts)
-    }
-    assert not crowded
 
 
 @pytest.mark.parametrize("folder", MAY_USE)
@@ -184,8 +174,8 @@ def test_a_core_includes_itself_its_header_and_the_c_library(component: str) -> 
     own = {path.name for path in c_files("src", component=component)}
     public = {
         "plant_fmu": {path.name for path in c_files("include/hexapod")},
-        "controller_fmu": {"controller.h", *SHARED_HEADERS},
-        "policy_fmu": {"policy.h", *SHARED_HEADERS},
+        "controller/fmu": {"controller.h", *SHARED_HEADERS},
+        "extensions/gym/policy_fmu": {"policy.h", *SHARED_HEADERS},
     }
     own |= {f"hexapod/{name}" for name in public[component]}
     files = c_files(*folders, component=component)

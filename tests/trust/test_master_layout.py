@@ -16,8 +16,8 @@ from pathlib import Path
 import pytest
 
 from hexapod_cosim.cosim.master import loop_library, native_loop
-from hexapod_cosim.gym import batch, native
-from hexapod_cosim.gym.settings import BLOCKS, REASONS, TERMS
+from hexapod_cosim.extensions.gym import batch, native
+from hexapod_cosim.extensions.gym.settings import BLOCKS, REASONS, TERMS
 from hexapod_cosim.models import FmuError
 
 STRUCTURE = re.compile(r"typedef struct (\w+) \{(.*?)\} \1;", re.DOTALL)

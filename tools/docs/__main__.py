@@ -9,7 +9,7 @@ from pathlib import Path
 
 from sphinx.cmd.build import main as sphinx
 
-from hexapod_cosim.cosim.live.static_page import write_static_page
+from hexapod_cosim.extensions.live.static_page import write_static_page
 from tools.docs import c_api, commands, notebooks, python_api, validation, variables
 from tools.docs.stage import DOCS, ROOT, Stage, pages
 

@@ -9,7 +9,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[2]
 HEADERS = (
     "plant_fmu/include/hexapod/hexapod.h",
-    "controller_fmu/include/hexapod/controller.h",
+    "controller/fmu/include/hexapod/controller.h",
     "plant_fmu/include/hexapod/status.h",
     "plant_fmu/include/hexapod/legs.h",
     "plant_fmu/include/hexapod/range_check.h",

@@ -19,17 +19,17 @@ ROOT = Path(__file__).resolve().parents[2]
 DOCS = ROOT / "docs"
 # pages outside docs/, and files for which the site has a better page
 ELSEWHERE = {
-    "CONTRIBUTING.md": "contributing.md",
-    "CHANGELOG.md": "changelog.md",
+    ".github/CONTRIBUTING.md": "contributing.md",
+    "docs/CHANGELOG.md": "changelog.md",
     "benchmarks/README.md": "benchmarks.md",
 }
 INSTEAD = {
     "README.md": "index.md",
     "docs/README.md": "index.md",
     "plant_fmu/interface.toml": "reference/plant.md",
-    "controller_fmu/interface.toml": "reference/controller.md",
+    "controller/fmu/interface.toml": "reference/controller.md",
     "plant_fmu/include/hexapod/hexapod.h": "reference/c.md",
-    "controller_fmu/include/hexapod/controller.h": "reference/c.md",
+    "controller/fmu/include/hexapod/controller.h": "reference/c.md",
 }
 PACKAGES = ("models", "controller", "cosim")  # with a page per module in the reference
 LANGUAGES = {

@@ -52,7 +52,7 @@ def touch_down() -> Shown:
         axes = figure.subplots()
         for k, (period, (_, compliant)) in enumerate(walks.items()):
             part = judged(compliant).recording
-            rows = part.time <= part.time[0] + compliant.facts["gait_period"]
+            rows = part.time <= part.time[0] + compliant.facts.gait_period
             torque = part.column(f"{LEG}.{JOINT}.torque_ref")[rows]
             label = f"{MILLI * period:g} ms"
             style = {"color": PALETTE[k], "label": label, "linewidth": 1.0}
@@ -108,7 +108,7 @@ def model_errors() -> Shown:
         (title, *(changed(scale * run.metrics[name] for run in pair) for pair in pairs))
         for name, (title, scale) in PLAIN.items()
     ]  # fmt: skip
-    shares = (pair[1].facts["walk"]["fallback"] for pair in pairs)
+    shares = (pair[1].facts.walk.fallback for pair in pairs)
     rows.append(("fallback, compliant [%]", *(f"{100.0 * share:.0f}" for share in shares)))
     return Shown(columns=("the plant", *UNKNOWN), rows=rows)
 

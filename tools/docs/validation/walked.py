@@ -37,14 +37,14 @@ def under_both(*settings: str, scenario: str = "walk_flat") -> tuple[Result, Res
     """Runs it under both controls, kinematic first. Raises RuntimeError unless both walk."""
     first, second = (walk(f"control={name}", *settings, scenario=scenario) for name in COMPARED)
     for result in (first, second):
-        if not (result.completed and result.facts["walk"]["upright"]):
+        if not (result.completed and result.facts.walk.upright):
             raise RuntimeError(f"{scenario} {settings}: {result.outcome.reason or 'fell'}")
     return first, second
 
 
 def view(result: Result) -> View:
     """Returns the macro-steps of a run from which its metrics are computed."""
-    return View(result.outcome.judged, result.parameters, result.facts["gait_period"])
+    return View(result.outcome.judged, result.parameters, result.facts.gait_period)
 
 
 def judged(result: Result) -> Walk:
