@@ -221,3 +221,7 @@ def main() -> int:
     )
     print("goals reached" if reached else "goals missed")
     return int(not reached)
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

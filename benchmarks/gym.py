@@ -1,7 +1,6 @@
-"""Environment steps per second: the vector environment in C, mujoco.rollout on the same robot, and
-fmugym on the same FMU.
+"""Environment steps per second: the vector environment in C, and mujoco.rollout on the same robot.
 
-usage: python -m benchmarks.learning
+usage: python -m benchmarks.gym
 
 All walk the same open-loop tripod gait, held for 20 ms at a time. The error of a path is measured
 against a fine solution of the same engine, because the contact laws of the two differ. Speeds are
@@ -20,7 +19,6 @@ import numpy as np
 from mujoco import rollout
 from numpy.typing import NDArray
 
-from benchmarks.learning import fmugym_walk
 from hexapod_cosim.extensions.gym.bench import bench, walking_action
 from hexapod_cosim.extensions.gym.settings import JOINTS, RATE, EnvSettings
 from hexapod_cosim.models import load_robot
@@ -96,9 +94,7 @@ def main() -> None:
     cores = os.cpu_count() or 1
     print(bench(count=COUNT, duration=DURATION), flush=True)
     print()
-    print(mujoco_table(cores), flush=True)
-    print()
-    print(fmugym_walk.table(DURATION))
+    print(mujoco_table(cores))
 
 
 if __name__ == "__main__":
