@@ -25,12 +25,12 @@ from hexapod_cosim.controller import (
 from hexapod_cosim.cosim.interface.controller_interface import ControllerSetup
 from hexapod_cosim.models import load_robot
 
-PERIODS = {"tripod": (0.004, 0.002), "ripple": (0.005, 0.004)}  # s
+PERIODS = {"tripod": (0.002, 0.001), "ripple": (0.004,)}  # s
 LARGEST = {
     "athena": 3.2,
     "phantomx_mk4": 1.7,
 }  # N m; of 5.4 and 2.7 allowed: load of the middle leg of a tripod, and gear friction
-STANDING, WALKING = 0.2, 3.3  # s
+STANDING, WALKING = 0.2, 2.4  # s
 STOPPING = 2.5  # cycles
 
 
@@ -71,10 +71,11 @@ def steepest(name: str, gait: str, period: float) -> float:
     return float(np.abs(np.diff(torques(name, gait, period)[under_way], axis=0)).max())
 
 
-@pytest.mark.parametrize("name", LARGEST)
-@pytest.mark.parametrize("gait", PERIODS)
+@pytest.mark.parametrize(
+    ("gait", "name"), [("tripod", "athena"), ("tripod", "phantomx_mk4"), ("ripple", "athena")]
+)
 def test_the_largest_torque_is_what_the_load_needs_whatever_the_period(
-    name: str, gait: str
+    gait: str, name: str
 ) -> None:
     for period in PERIODS[gait]:
         assert np.abs(torques(name, gait, period)).max() < LARGEST[name]
