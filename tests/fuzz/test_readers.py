@@ -30,7 +30,6 @@ from hexapod_cosim.cosim.results.recordings import (
 )
 from hexapod_cosim.cosim.results.results import read_result
 from hexapod_cosim.cosim.scenario.scenario import load_scenario
-from hexapod_cosim.extensions.study.reading import load_study
 from hexapod_cosim.models import HexapodError, load_robot
 from hexapod_cosim.models.ground.grid_file import surface_from_bytes
 from hexapod_cosim.models.ground.height_map import heightfield
@@ -112,7 +111,6 @@ def toml_files(path: Path) -> st.SearchStrategy[bytes]:
 
 ROBOT = ROOT / "models" / "athena.toml"
 SCENARIOS = ROOT / "cosim" / "scenario" / "scenarios"
-STUDIES = ROOT / "cosim" / "study" / "studies"
 
 
 @MODES
@@ -127,14 +125,6 @@ def test_a_robot_file_is_read_or_refused(tmp_path: Path, content: bytes) -> None
 def test_a_scenario_is_read_or_refused(tmp_path: Path, content: bytes) -> None:
     path = written(tmp_path, "scenario.toml", content)
     reads(lambda: load_scenario(path))
-
-
-@MODES
-@given(content=toml_files(STUDIES / "friction_speed.toml"))
-@example(content=b'controls = ["' + 300 * b"5" + b'"]')  # longer than a name may be
-def test_a_study_is_read_or_refused(tmp_path: Path, content: bytes) -> None:
-    path = written(tmp_path, "study.toml", content)
-    reads(lambda: load_study(path))
 
 
 URDF = robot_to_urdf(load_robot("athena")).encode()
