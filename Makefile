@@ -42,7 +42,7 @@ help:
 	@echo "make test-rerun  recordings as RRD, read back by Rerun; installs its wheel of 170 MB (1 min)"
 	@echo "make test-importers  the same walk through libcosim, Ecos, ... and how far each is from fmpy (2 min)"
 	@echo "make test-platforms  the binaries for all platforms, the wheel for Windows under Wine, Arm under qemu-user (installed with apt when root)"
-	@echo "make test-endurance  10,000 instances, 5,000 loadings, a million steps, threads, random calls (10 min)"
+	@echo "make test-endurance  10,000 instances, a million steps, threads (5 min)"
 	@echo "make test-native   the tests that are programs in C, run by ctest (1 min)"
 	@echo "make test-sanitize   these, the FMU's tests and random calls under address and undefined-behaviour sanitizers (5 min)"
 	@echo "make test-sanitize-short  the same without random calls and many instances (2 min)"
