@@ -234,9 +234,7 @@ def test_a_saved_state_that_is_damaged_is_refused(controller_core: ct.CDLL) -> N
 
 def test_absurd_commands_end_in_finite_joint_commands(controller_core: ct.CDLL) -> None:
     native = NativeController(controller_core, setup_of())
-    command = native.input.command
-    command.vx, command.vy, command.yaw_rate, command.height = 10.0, -10.0, 10.0, 10.0
-    command.roll, command.pitch = 1.5, -1.5
+    native.input.command = type(native.input.command)(10.0, -10.0, 10.0, 10.0, 1.5, -1.5)
     native.input.foot_force[0][2] = 1e9
     for k in range(1, 400):
         native.go(k * PERIOD)

@@ -5,9 +5,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "../state.h"
-#include "../validation.h"
 #include "hexapod/message.h"
+#include "state.h"
 
 /* A saved state: a header that identifies it, then the controller's definition, models and state.
  */
@@ -19,7 +18,7 @@ typedef struct {
 } hxSaved;
 
 static const uint64_t magic = 0x72746e6f43507868u; /* "hxPContr" */
-static const uint64_t saved_version = 6;
+static const uint64_t saved_version = 7;
 /* 1, of a period: a tick that is later than the present time by less than this is due */
 static const double clock_tolerance = 0.01;
 

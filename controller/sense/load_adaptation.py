@@ -1,4 +1,4 @@
-"""Chooses squeeze and width of the stance by the load of the servos. C: warmth.c.
+"""Chooses squeeze and width of the stance by the load of the servos. C: load_adaptation.h.
 
 The squeeze takes load from the femurs. On ground on which feet creep its price is slip, so it has
 its set weight there. It has its largest weight (C45) where the ground holds the planned squeeze
@@ -27,11 +27,11 @@ EASY, HARD = 0.8, 1.0  # 1    torque needed for the measured weight over torque 
 OVER, FAR_OVER = 1.0, 1.2  # 1    mean square torque of a gait cycle over that of the rating
 CREEPS, HOLDS = 0.75, 0.82  # 1    share of the planned squeeze that is held
 MOST_SQUEEZE = 0.95  # 1    weight of the torques when it costs nothing or servos need it
-TOLD, HEAVIER = 1.1, 1.2  # 1    measured over modelled weight
+MODELLED, HEAVY = 1.1, 1.2  # 1    measured over modelled weight
 SPARED = 0.75  # 1    of the set weight of the squeeze, in the narrow stance
 
 
-class Warmth(Stateful):
+class LoadAdaptation(Stateful):
     """Smoothed squares of the servos' torques, and the weight of the squeeze.
 
     Attributes:
@@ -72,7 +72,7 @@ class Warmth(Stateful):
         """
         self.heft += self.follow_work * (heft - self.heft)
         if self.narrows:
-            self.narrowing = min(max((self.heft - TOLD) / (HEAVIER - TOLD), 0.0), 1.0)
+            self.narrowing = min(max((self.heft - MODELLED) / (HEAVY - MODELLED), 0.0), 1.0)
 
     def laden(self) -> float:
         """Returns measured over modelled weight, 1 in the wide stance [1] (C53)."""
