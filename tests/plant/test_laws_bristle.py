@@ -16,7 +16,7 @@ from test_laws_standing import ACCURATE, block, laid, marching, stood, tilted
 
 from hexapod_cosim.models import load_robot
 from hexapod_cosim.models.dynamics import Command
-from hexapod_cosim.models.friction import SPRING_LIMIT, bristle_force, bristle_rate
+from hexapod_cosim.models.friction import SPRING_LIMIT, bristle_rate, friction_force
 from hexapod_cosim.models.records import Array
 
 FRICTION = replace(load_robot("athena").friction, law="bristle")
@@ -41,7 +41,7 @@ def test_below_break_away_a_bristle_is_a_spring() -> None:
     for share in (0.0, 0.3, SPRING_LIMIT):
         slip, z = rng.normal(size=3), share * FRICTION.presliding * np.array([0.6, 0.8, 0.0])
         assert bristle_rate(FRICTION, slip, z) == pytest.approx(slip, rel=EXACT)
-        still = bristle_force(FRICTION, 10.0, np.zeros(3), z)
+        still = friction_force(FRICTION, 10.0, np.zeros(3), z)
         assert still == pytest.approx(
             -FRICTION.mu * 10.0 * 0.5 * share * (3.0 - share**2) * np.array([0.6, 0.8, 0.0]),
             rel=EXACT,
@@ -66,7 +66,7 @@ def test_no_motion_takes_a_bristle_past_its_presliding_or_friction_past_its_cone
             float(bristle_rate(FRICTION, slip, FRICTION.presliding * direction) @ direction)
             <= EXACT
         )
-        force = bristle_force(FRICTION, 10.0, slip, z)
+        force = friction_force(FRICTION, 10.0, slip, z)
         assert float(np.linalg.norm(force)) <= FRICTION.mu * 10.0 * (1.0 + EXACT)
 
 
@@ -75,11 +75,11 @@ def test_turning_slip_and_bristle_turns_the_force() -> None:
     turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
     for _ in range(20):
         slip, z = rng.normal(0.0, 0.05, 3), rng.normal(0.0, 3e-4, 3)
-        rate, force = bristle_rate(FRICTION, slip, z), bristle_force(FRICTION, 10.0, slip, z)
+        rate, force = bristle_rate(FRICTION, slip, z), friction_force(FRICTION, 10.0, slip, z)
         assert bristle_rate(FRICTION, turn @ slip, turn @ z) == pytest.approx(
             turn @ rate, rel=EXACT, abs=EXACT
         )
-        assert bristle_force(FRICTION, 10.0, turn @ slip, turn @ z) == pytest.approx(
+        assert friction_force(FRICTION, 10.0, turn @ slip, turn @ z) == pytest.approx(
             turn @ force, rel=EXACT, abs=EXACT
         )
 

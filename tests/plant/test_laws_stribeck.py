@@ -21,7 +21,7 @@ from test_laws_standing import block, laid
 
 from hexapod_cosim.models import load_robot
 from hexapod_cosim.models.dynamics import Command
-from hexapod_cosim.models.friction import bristle_force, bristle_rate, sliding_friction
+from hexapod_cosim.models.friction import bristle_rate, friction_force, sliding_friction
 from hexapod_cosim.models.records import Array
 
 FRICTION = replace(
@@ -44,7 +44,7 @@ def test_friction_falls_from_static_to_kinetic_half_way_at_the_stribeck_speed(
     speed: float, mu: float
 ) -> None:
     assert sliding_friction(FRICTION, speed) == pytest.approx(mu, rel=EXACT)
-    full = bristle_force(FRICTION, 10.0, speed * ALONG, 1e-4 * ALONG)
+    full = friction_force(FRICTION, 10.0, speed * ALONG, 1e-4 * ALONG)
     assert full == pytest.approx(-10.0 * mu * ALONG, rel=EXACT)
 
 
@@ -53,11 +53,11 @@ def test_a_foot_that_sticks_has_static_friction_however_it_swings(slip: float) -
     """Half-way up a bristle, u = 0.5, the force is 0.6 times u (3 - u^2)/2 = 0.6875 of the load. A
     sliding foot that reverses sticks again.
     """
-    assert bristle_force(FRICTION, 10.0, slip * ALONG, 0.5e-4 * ALONG) == pytest.approx(
+    assert friction_force(FRICTION, 10.0, slip * ALONG, 0.5e-4 * ALONG) == pytest.approx(
         -10.0 * 0.6 * 0.6875 * ALONG, rel=EXACT
     )
     if slip <= 0.0:
-        assert bristle_force(FRICTION, 10.0, slip * ALONG, 1e-4 * ALONG) == pytest.approx(
+        assert friction_force(FRICTION, 10.0, slip * ALONG, 1e-4 * ALONG) == pytest.approx(
             -6.0 * ALONG, rel=EXACT
         )
 
@@ -151,7 +151,7 @@ def test_the_twins_law_sticks_and_slips_by_the_closed_form_too() -> None:
         slip, bristle = (y[1] - 0.1) * x_axis, y[2] * x_axis
         return [
             y[1],
-            bristle_force(friction, 9.81, slip, bristle)[0] - 100.0 * y[0],
+            friction_force(friction, 9.81, slip, bristle)[0] - 100.0 * y[0],
             bristle_rate(friction, slip, bristle)[0],
         ]
 

@@ -21,7 +21,7 @@ from test_laws_servo import tibia_inertia, tibias, walled
 from test_measured_servos import with_servo
 
 from hexapod_cosim.models import Robot, RobotError, load_robot
-from hexapod_cosim.models.contact import standing_damping
+from hexapod_cosim.models.contact.geometry import standing_damping
 from hexapod_cosim.models.dynamics import Command, accelerations
 from hexapod_cosim.models.energy import kinetic_energy, potential_energy
 from hexapod_cosim.models.integrator import Start, State, end_step, start_state, try_step
