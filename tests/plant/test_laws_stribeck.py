@@ -15,14 +15,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from plant import Plant
-from scipy.integrate import solve_ivp
 from states import changed
 from test_laws_standing import block, laid
 
 from hexapod_cosim.models import load_robot
 from hexapod_cosim.models.dynamics import Command
-from hexapod_cosim.models.friction import bristle_rate, friction_force, sliding_friction
-from hexapod_cosim.models.records import Array
+from hexapod_cosim.models.friction import bristle_force, sliding_friction
 
 FRICTION = replace(
     load_robot("athena").friction,
@@ -44,7 +42,7 @@ def test_friction_falls_from_static_to_kinetic_half_way_at_the_stribeck_speed(
     speed: float, mu: float
 ) -> None:
     assert sliding_friction(FRICTION, speed) == pytest.approx(mu, rel=EXACT)
-    full = friction_force(FRICTION, 10.0, speed * ALONG, 1e-4 * ALONG)
+    full = bristle_force(FRICTION, 10.0, speed * ALONG, 1e-4 * ALONG)
     assert full == pytest.approx(-10.0 * mu * ALONG, rel=EXACT)
 
 
@@ -53,11 +51,11 @@ def test_a_foot_that_sticks_has_static_friction_however_it_swings(slip: float) -
     """Half-way up a bristle, u = 0.5, the force is 0.6 times u (3 - u^2)/2 = 0.6875 of the load. A
     sliding foot that reverses sticks again.
     """
-    assert friction_force(FRICTION, 10.0, slip * ALONG, 0.5e-4 * ALONG) == pytest.approx(
+    assert bristle_force(FRICTION, 10.0, slip * ALONG, 0.5e-4 * ALONG) == pytest.approx(
         -10.0 * 0.6 * 0.6875 * ALONG, rel=EXACT
     )
     if slip <= 0.0:
-        assert friction_force(FRICTION, 10.0, slip * ALONG, 1e-4 * ALONG) == pytest.approx(
+        assert bristle_force(FRICTION, 10.0, slip * ALONG, 1e-4 * ALONG) == pytest.approx(
             -6.0 * ALONG, rel=EXACT
         )
 
@@ -138,31 +136,6 @@ def phases(plant: Plant, *, until: float, h: float = 2e-3) -> tuple[list[float],
         last = speed
     lengths = np.diff(changes)
     return lengths[0::2].tolist(), lengths[1::2].tolist()
-
-
-def test_the_twins_law_sticks_and_slips_by_the_closed_form_too() -> None:
-    """A point of 1 kg lies on a belt that moves at 0.1 m/s, behind a spring of 100 N/m. It counts
-    as slipping while it is slower than the belt by more than 1 mm/s.
-    """
-    friction = replace(FRICTION, presliding=1e-6, stribeck_speed=1e-4, bristle_damping=0.005)
-    x_axis = np.array([1.0, 0.0, 0.0])
-
-    def rate(_: float, y: Array) -> list[float]:
-        slip, bristle = (y[1] - 0.1) * x_axis, y[2] * x_axis
-        return [
-            y[1],
-            friction_force(friction, 9.81, slip, bristle)[0] - 100.0 * y[0],
-            bristle_rate(friction, slip, bristle)[0],
-        ]
-
-    def behind(_: float, y: Array) -> float:
-        return float(0.1 - y[1] - 1e-3)
-
-    found = solve_ivp(
-        rate, (0.0, 1.9), [0.0, 0.1, 0.0], method="Radau", rtol=1e-7, atol=1e-12, events=behind
-    )
-    lengths = np.diff(found.t_events[0][found.t_events[0] > 0.3])
-    assert lengths[:2] == pytest.approx([0.408432, 0.392400], rel=3e-3)
 
 
 def test_a_mass_on_a_spring_sticks_and_slips_by_its_closed_form(core: ct.CDLL) -> None:
