@@ -32,7 +32,7 @@ from hexapod_cosim.models.errors import RobotError
 from hexapod_cosim.models.integrator import integrate, start_state
 from hexapod_cosim.models.kinematics import body_states
 from hexapod_cosim.models.records import Array
-from hexapod_cosim.models.validation import check_robot
+from hexapod_cosim.models.validation.robot import check_robot
 
 DENSE = 1e-10  # relative: the error of the dense solution, whose condition number is about 1e6
 FORCES = 1e-12  # relative: rounding of forces

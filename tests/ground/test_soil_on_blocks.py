@@ -26,7 +26,7 @@ from hexapod_cosim.models.ground.surface import Surface
 from hexapod_cosim.models.kinematics import foot_centres
 from hexapod_cosim.models.records import Array, Terrain
 from hexapod_cosim.models.soil.presets import soil_preset
-from hexapod_cosim.models.validation import check_settings
+from hexapod_cosim.models.validation.robot import check_settings
 
 ATHENA = changed(load_robot("athena"), body={"contact": "off"})
 TERRAINS: dict[str, dict[str, Any]] = {
