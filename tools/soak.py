@@ -32,13 +32,13 @@ from hexapod_cosim.cosim.master.fmu import Fmu
 from hexapod_cosim.cosim.master.interrupts import termination_as_interrupt
 from hexapod_cosim.cosim.master.loop import COMPLETED, INTERRUPTED, Outcome
 from hexapod_cosim.cosim.master.native_loop import NativeMaster
+from hexapod_cosim.cosim.master.sensors import errors_of
 from hexapod_cosim.cosim.run.preparation import PlantFmus
 from hexapod_cosim.cosim.run.single_run import (
     RunPlan,
     apply_settings,
     initialise_plant,
     make_plan,
-    sensor_settings,
 )
 from hexapod_cosim.cosim.scenario.records import FAULTS, Command, Fault, Push, Scenario
 from hexapod_cosim.cosim.scenario.scenario import load_scenario
@@ -165,7 +165,7 @@ def drawn(scenario: Scenario, start: float, rng: np.random.Generator) -> Scenari
 def walked(master: NativeMaster, piece: Scenario) -> Outcome:
     """Runs a piece; the FMUs stand at its start. Raises KeyboardInterrupt."""
     schedule = make_schedule(piece)
-    outcome = master.run(schedule, h=piece.macro_step, sensor=sensor_settings(piece, schedule))
+    outcome = master.run(schedule, h=piece.macro_step, errors=errors_of(piece, schedule))
     if outcome.status == INTERRUPTED:
         raise KeyboardInterrupt
     return outcome

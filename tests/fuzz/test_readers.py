@@ -21,9 +21,9 @@ from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 from PIL import Image
 
-from hexapod_cosim.cosim.control.connection import read_map
 from hexapod_cosim.cosim.interface.controller_interface import load_controller_interface
 from hexapod_cosim.cosim.interface.model_description import render_fmi2
+from hexapod_cosim.cosim.master.connection import read_map
 from hexapod_cosim.cosim.master.recorder import Recording
 from hexapod_cosim.cosim.results.recordings import (
     read_csv,
