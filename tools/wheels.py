@@ -35,11 +35,12 @@ from packaging.tags import platform_tags
 from rich.console import Console
 from wheel.wheelfile import WheelFile, get_zipinfo_datetime
 
-from hexapod_cosim.cosim.common.components import CONTROLLER, PLANT, POLICY
+from hexapod_cosim.cosim.common.components import CONTROLLER, PLANT
 from hexapod_cosim.cosim.common.plant_files import LOOP, fmi_headers
 from hexapod_cosim.cosim.export.cross_build import ALL_TARGETS, TARGETS, Library, build_library
 from hexapod_cosim.cosim.export.platforms import component_library
-from hexapod_cosim.cosim.live.module import walker_module
+from hexapod_cosim.extensions.gym.interface import POLICY
+from hexapod_cosim.extensions.live.module import walker_module
 
 ROOT = Path(__file__).parents[1]
 BINARIES, LIBRARIES = "hexapod_cosim/plant/binaries/", "hexapod_cosim/plant/lib/"

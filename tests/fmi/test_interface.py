@@ -180,7 +180,7 @@ def test_a_file_that_is_not_up_to_date_is_found(
     for path, text in files.items():
         generator.write(path, text)
     assert generator.stale_files(files) == {}
-    for component in ("plant_fmu", "controller_fmu", "policy_fmu"):
+    for component in ("plant_fmu", "controller/fmu"):
         changed = tmp_path / component / "generated" / "defaults.c"
         kept = changed.read_text(encoding="utf-8")
         changed.write_text("/* by hand */", encoding="utf-8")

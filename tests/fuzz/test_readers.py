@@ -34,8 +34,8 @@ from hexapod_cosim.cosim.results.recordings import (
 from hexapod_cosim.cosim.results.results import read_result
 from hexapod_cosim.cosim.run.controller_setup import make_setup
 from hexapod_cosim.cosim.scenario.scenario import load_scenario
-from hexapod_cosim.cosim.study.reading import load_study
 from hexapod_cosim.cosim.validate.validation import find_problems
+from hexapod_cosim.extensions.study.reading import load_study
 from hexapod_cosim.models import HexapodError, load_robot
 from hexapod_cosim.models.ground.grid_file import surface_from_bytes
 from hexapod_cosim.models.ground.height_map import heightfield

@@ -9,10 +9,10 @@ from command import Call
 from gains import make_gains
 
 from hexapod_cosim.controller import Gains
-from hexapod_cosim.cosim.live import realtime, server
-from hexapod_cosim.cosim.live.settings import Choices
 from hexapod_cosim.cosim.run import preparation
 from hexapod_cosim.cosim.scenario.scenario import load_scenario
+from hexapod_cosim.extensions.live import realtime, server
+from hexapod_cosim.extensions.live.settings import Choices
 from hexapod_cosim.models import HexapodError, Robot
 
 Keys = list[tuple[Robot, float]]

@@ -8,9 +8,10 @@ from pathlib import Path
 
 import pytest
 
-from hexapod_cosim.cosim.common.components import CONTROLLER, PLANT, POLICY
+from hexapod_cosim.cosim.common.components import CONTROLLER, PLANT
 from hexapod_cosim.cosim.export.cross_build import Library, build_library
 from hexapod_cosim.cosim.export.platforms import component_library
+from hexapod_cosim.extensions.gym.interface import POLICY
 
 wheels = pytest.importorskip("tools.wheels", reason="needs the extra release")
 

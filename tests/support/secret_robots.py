@@ -14,11 +14,14 @@ from numpy.typing import NDArray
 
 import hexapod_cosim
 from hexapod_cosim.cosim.export.plant_export import export_fmu
-from hexapod_cosim.cosim.identify.experiment import JOINTS, Experiment, of_point, readings
-from hexapod_cosim.cosim.identify.log import ATTITUDE, CHANNELS, Log, log_of
-from hexapod_cosim.cosim.identify.log_plant import LogPlant
-from hexapod_cosim.cosim.identify.numbers.unknown import Unknown
-from hexapod_cosim.cosim.identify.unknowns import (
+from hexapod_cosim.cosim.interface.names import joint_names, vector_names
+from hexapod_cosim.cosim.interface.plant_interface import plant_roots
+from hexapod_cosim.cosim.master.recorder import Recording
+from hexapod_cosim.extensions.identify.experiment import JOINTS, Experiment, of_point, readings
+from hexapod_cosim.extensions.identify.log import ATTITUDE, CHANNELS, Log, log_of
+from hexapod_cosim.extensions.identify.log_plant import LogPlant
+from hexapod_cosim.extensions.identify.numbers.unknown import Unknown
+from hexapod_cosim.extensions.identify.unknowns import (
     DELAYS,
     START,
     changed_robot,
@@ -26,9 +29,6 @@ from hexapod_cosim.cosim.identify.unknowns import (
     is_delay,
     value_before,
 )
-from hexapod_cosim.cosim.interface.names import joint_names, vector_names
-from hexapod_cosim.cosim.interface.plant_interface import plant_roots
-from hexapod_cosim.cosim.master.recorder import Recording
 from hexapod_cosim.models import Robot, load_robot
 
 Array = NDArray[np.float64]

@@ -15,8 +15,8 @@ import pytest
 from hexapod_cosim.cosim.common.plant_files import fmi_headers
 from hexapod_cosim.cosim.master import loop_library, native_loop
 from hexapod_cosim.cosim.master.loop_library import HEADERS, ORDER, read_headers
-from hexapod_cosim.gym import batch, native
-from hexapod_cosim.gym.settings import BLOCKS, REASONS, TERMS
+from hexapod_cosim.extensions.gym import batch, native
+from hexapod_cosim.extensions.gym.settings import BLOCKS, REASONS, TERMS
 from hexapod_cosim.models import FmuError
 
 ROOT = Path(__file__).parents[2]
