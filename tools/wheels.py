@@ -39,11 +39,11 @@ from hexapod_cosim.cosim.common.components import CONTROLLER, PLANT, POLICY
 from hexapod_cosim.cosim.common.plant_files import LOOP, fmi_headers
 from hexapod_cosim.cosim.export.cross_build import ALL_TARGETS, TARGETS, Library, build_library
 from hexapod_cosim.cosim.export.platforms import component_library
-from hexapod_cosim.cosim.live.module import walker_module
+from hexapod_cosim.cosim.live.static_page import robot_module
 
 ROOT = Path(__file__).parents[1]
 BINARIES, LIBRARIES = "hexapod_cosim/plant/binaries/", "hexapod_cosim/plant/lib/"
-MODULE = "hexapod_cosim/plant/browser/walker.wasm"
+MODULE = "hexapod_cosim/plant/browser/robot.wasm"
 BEST = 9  # level of compression
 LARGEST = 5_000_000  # bytes of a wheel
 OTHERS = "other_platforms"  # folder of the wheels that do not fit this machine
@@ -83,7 +83,7 @@ def main(folder: Path) -> None:
         source, base = build_source(folder)
     with console.status("compiling for all platforms (minutes, the first time)"):
         binaries = cross_compile()
-    base[MODULE] = walker_module()
+    base[MODULE] = robot_module()
     wheels = [
         write_wheel(base, platform, binaries, folder if platform.fits else folder / OTHERS)
         for platform in PLATFORMS

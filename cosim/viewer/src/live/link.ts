@@ -1,16 +1,13 @@
 import type { Frame, Status, World } from "./messages";
 
 const AGAIN = 1000; // ms    until a lost connection is tried again
-const SILENT = 1500; // ms    without a frame, after which the loop is said not to answer
-const PING = 500; // ms    between two requests for an echo
+const SILENT = 1500; // ms    without a message, after which the loop is said not to answer
 
 export interface Received {
-  hello: { client: number };
-  pages: { count: number };
   world: World;
   status: Status;
   frame: Frame;
-  refused: { reason: string };
+  note: { text: string };
 }
 
 export type Kind = keyof Received;
@@ -18,47 +15,46 @@ export type State = "connecting" | "open" | "silent" | "lost" | "refused";
 
 /** What the page needs of a loop, wherever it runs. */
 export interface Connection {
-  readonly client: number;
-  /** [ms] from a message to the first frame that shows its effect. */
-  readonly latency: number | undefined;
   readonly state: State;
   on<K extends Kind>(kind: K, listener: (message: Received[K]) => void): void;
   watchState(watcher: (state: State) => void): void;
   send(message: Record<string, unknown>): void;
 }
 
-/** The socket to the loop: connects, connects again, and measures the latency of an echo. */
-export class Link implements Connection {
-  private socket: WebSocket | undefined;
-  private readonly listeners: { [K in Kind]?: ((message: Received[K]) => void)[] } = {};
-  private readonly watchers: ((state: State) => void)[] = [];
-  private known: State = "connecting";
-  private heard = 0;
-  client = 0;
-  /** From a message to the first frame that shows its effect, smoothed [ms]. */
-  latency: number | undefined;
-
-  constructor() {
-    this.on("hello", ({ client }) => {
-      this.client = client;
-    });
-    this.on("frame", (frame) => this.noteEcho(frame));
-    setInterval(() => this.watch(), PING);
-    this.connect();
-  }
-
-  get state(): State {
-    return this.known;
-  }
+/** Functions that are called with each message of a kind. */
+export class Listeners {
+  private readonly lists: { [K in Kind]: ((message: Received[K]) => void)[] } = {
+    world: [],
+    status: [],
+    frame: [],
+    note: [],
+  };
 
   on<K extends Kind>(kind: K, listener: (message: Received[K]) => void): void {
-    const list = (this.listeners[kind] ?? []) as ((message: Received[K]) => void)[];
-    this.listeners[kind] = [...list, listener] as (typeof this.listeners)[K];
+    this.lists[kind].push(listener);
+  }
+
+  protected tell<K extends Kind>(kind: K, message: Received[K]): void {
+    for (const listener of this.lists[kind]) listener(message);
+  }
+}
+
+/** The socket to the loop, which connects again when the connection is lost. */
+export class Link extends Listeners implements Connection {
+  private socket: WebSocket | undefined;
+  private readonly watchers: ((state: State) => void)[] = [];
+  private heard = performance.now();
+  state: State = "connecting";
+
+  constructor() {
+    super();
+    setInterval(() => this.watch(), SILENT / 3);
+    this.connect();
   }
 
   watchState(watcher: (state: State) => void): void {
     this.watchers.push(watcher);
-    watcher(this.known);
+    watcher(this.state);
   }
 
   /** Sends a message, or drops it while there is no connection. */
@@ -82,28 +78,21 @@ export class Link implements Connection {
   }
 
   private receive(text: string): void {
-    const message = JSON.parse(text) as { type: Kind };
+    const message = JSON.parse(text) as Received[Kind] & { readonly type: Kind };
     this.heard = performance.now();
-    if (this.known === "silent") this.become("open");
-    const list = this.listeners[message.type] as ((message: unknown) => void)[] | undefined;
-    for (const listener of list ?? []) listener(message);
+    if (this.state === "silent") this.become("open");
+    this.tell(message.type, message);
   }
 
-  private noteEcho(frame: Frame): void {
-    const stamp = frame.echo[String(this.client)];
-    if (!stamp) return;
-    const took = performance.now() - stamp;
-    this.latency = this.latency === undefined ? took : 0.8 * this.latency + 0.2 * took;
-  }
-
+  /** A loop that is paused is silent as well, which is no fault. */
   private watch(): void {
-    this.send({ type: "ping", stamp: performance.now() });
-    if (this.known === "open" && this.heard > 0 && performance.now() - this.heard > SILENT)
-      this.become("silent");
+    const { mode } = document.documentElement.dataset;
+    const silent = performance.now() - this.heard > SILENT && mode !== "paused";
+    if (this.state === "open" && silent) this.become("silent");
   }
 
   private become(state: State): void {
-    this.known = state;
+    this.state = state;
     for (const watcher of this.watchers) watcher(state);
   }
 }

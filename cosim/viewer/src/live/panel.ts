@@ -13,13 +13,12 @@ const STATES: Record<State, string> = {
   lost: "no connection: is hexapod live still running?",
   refused: "the connection was refused",
 };
+/** Groups of buttons of which one is chosen, and their settings. */
+const GROUPS = { gaits: "gait", controls: "control" } as const;
 
 /** The page's buttons, choices and figures. */
 export class Panel {
-  private settings: Settings | undefined;
   private status: Status | undefined;
-  private noted = 0;
-  private pages = 1;
   private forward = 0; // m/s    mean of the last time
   private turn = 0; // rad/s
   private time = 0; // s    of the last frame
@@ -34,11 +33,11 @@ export class Panel {
     for (const button of document.querySelectorAll<HTMLButtonElement>("[data-do]"))
       button.addEventListener("click", () => this.act(button.dataset.do!));
     link.on("status", (status) => this.show(status));
-    link.on("pages", ({ count }) => {
-      this.pages = count;
+    link.on("note", (message) => note(message.text));
+    link.watchState((state) => {
+      document.documentElement.dataset.link = state;
+      text("state", STATES[state]);
     });
-    link.on("refused", ({ reason }) => note(reason));
-    link.watchState((state) => this.showState(state));
     drive.listen(() => this.showDrive());
     this.showDrive();
   }
@@ -50,38 +49,32 @@ export class Panel {
 
   /** Goes to the next value of a setting, or with -1 to the one before. */
   next(key: "gait" | "control", step = 1): void {
-    const names = key === "gait" ? this.setup.gaits : this.setup.controls.map(({ name }) => name);
-    const present = names.indexOf((this.status?.wanted ?? this.settings)?.[key] ?? "");
+    const names = key === "gait" ? this.setup.gaits : this.setup.controls;
+    const present = names.indexOf(this.status?.wanted[key] ?? "");
     this.change(key, names[(present + step + names.length) % names.length]);
   }
 
   act(action: string): void {
-    const { status } = this;
-    if (action === "record" && status?.mode === "recording") action = "stop";
-    if (action === "replay" && status?.mode === "replaying") action = "stop";
-    if (action === "pause" && status?.paused) action = "resume";
+    if (action === "record" && this.status?.recording) action = "stop";
+    if (action === "pause" && this.status?.paused) action = "resume";
     this.link.send({ type: "do", action });
   }
 
   /** Shows the figures of a frame. */
   showFrame(frame: Frame): void {
-    const factor = byId("factor");
-    if (factor) {
-      text("factor", `${frame.factor.toFixed(2)} ×`);
-      factor.parentElement?.classList.toggle("bad", frame.factor < SLOW && frame.steps > 400);
-    }
-    text("misses", String(frame.misses));
-    const share = frame.steps ? (100 * frame.misses) / frame.steps : 0;
-    title(
-      "misses",
-      `${frame.misses} of ${frame.steps} macro-steps ended late (${share.toFixed(2)} %), ` +
-        `the worst by ${(1e3 * frame.worst).toFixed(1)} ms; ` +
-        `${frame.gaps} gaps, ${frame.skipped.toFixed(1)} s skipped`,
+    text("factor", `${frame.factor.toFixed(2)} ×`);
+    byId("factor")?.parentElement?.classList.toggle(
+      "bad",
+      frame.factor < SLOW && frame.steps > 400,
     );
-    byId("gaps")?.toggleAttribute("hidden", frame.gaps === 0);
+    text("misses", String(frame.misses));
+    const late = byId("misses")?.parentElement;
+    if (late)
+      late.title =
+        `${frame.misses} of ${frame.steps} macro-steps ended late, ` +
+        `the worst by ${(1e3 * frame.worst).toFixed(1)} ms`;
+    byId("gaps")?.toggleAttribute("hidden", frame.skipped === 0);
     text("skipped", `${frame.skipped.toFixed(1)} s`);
-    const { latency } = this.link;
-    text("latency", latency === undefined ? "–" : `${latency.toFixed(0)} ms`);
     text("seconds", `${frame.seconds.toFixed(1)} s`);
     // frames may be far apart on a slow computer
     const weight = 1 - Math.exp(-Math.max(frame.time - this.time, 0) / SPAN);
@@ -90,46 +83,17 @@ export class Panel {
     this.turn += weight * (frame.speed[2] - this.turn);
     text("speed-now", `${whole(1e3 * this.forward)} mm/s`);
     text("turn-now", `${whole((180 / Math.PI) * this.turn)} °/s`);
-    const others = this.pages > 1;
-    byId("driver")?.toggleAttribute("hidden", !others);
-    if (others)
-      text(
-        "driver",
-        frame.driver === 0
-          ? `${this.pages} pages`
-          : frame.driver === this.link.client
-            ? `${this.pages} pages, you drive`
-            : `${this.pages} pages, page ${frame.driver} drives`,
-      );
   }
 
   private makeChoices(): void {
-    const make = (id: string, key: "gait" | "control", names: readonly string[]) => {
-      for (const name of names) {
-        const button = element("button", "", name);
-        button.type = "button";
-        button.dataset.value = name;
-        button.addEventListener("click", () => this.change(key, name));
-        byId(id)?.append(button);
-      }
-    };
-    make("gaits", "gait", this.setup.gaits);
-    make(
-      "controls",
-      "control",
-      this.setup.controls.map(({ name }) => name),
-    );
-    for (const [name, reason] of Object.entries(this.setup.refused)) {
-      const button = element("button", "", name);
-      button.disabled = true;
-      button.title = reason;
-      byId("controls")?.append(button);
-    }
+    for (const [id, key] of Object.entries(GROUPS))
+      for (const name of this.setup[id as keyof typeof GROUPS])
+        addButton(id, name).addEventListener("click", () => this.change(key, name));
+    for (const [name, reason] of Object.entries(this.setup.refused))
+      Object.assign(addButton("controls", name), { disabled: true, title: reason });
     const grounds = byId<HTMLSelectElement>("ground");
     for (const { name, about } of this.setup.grounds) {
-      const shown = name === "scenario" ? about : name.replaceAll("_", " ");
-      const option = element("option", "", shown);
-      option.value = name;
+      const option = new Option(name === "scenario" ? about : name.replaceAll("_", " "), name);
       option.title = about;
       grounds?.append(option);
     }
@@ -137,14 +101,10 @@ export class Panel {
   }
 
   private listenToSliders(): void {
-    const speed = byId<HTMLInputElement>("speed");
-    speed?.addEventListener("input", () => {
-      this.drive.speed = speed.valueAsNumber / 100;
-    });
-    const height = byId<HTMLInputElement>("height");
-    height?.addEventListener("input", () => {
-      this.drive.height = height.valueAsNumber / 100;
-    });
+    for (const name of ["speed", "height"] as const)
+      byId(name)?.addEventListener("input", (event) => {
+        this.drive[name] = (event.target as HTMLInputElement).valueAsNumber / 100;
+      });
     const friction = byId<HTMLInputElement>("friction");
     friction?.addEventListener("input", () => text("friction-value", friction.value));
     friction?.addEventListener("change", () => this.change("friction", friction.valueAsNumber));
@@ -152,25 +112,22 @@ export class Panel {
 
   private show(status: Status): void {
     this.status = status;
-    this.settings = status.settings;
-    const { settings, wanted, mode } = status;
-    for (const [id, key] of [
-      ["gaits", "gait"],
-      ["controls", "control"],
-    ] as const)
+    const { settings, wanted, recording, paused } = status;
+    for (const [id, key] of Object.entries(GROUPS))
       for (const button of byId(id)?.querySelectorAll<HTMLElement>("[data-value]") ?? []) {
-        button.setAttribute("aria-pressed", String(button.dataset.value === settings[key]));
-        const coming = wanted !== null && wanted[key] !== settings[key];
-        button.classList.toggle("coming", coming && button.dataset.value === wanted?.[key]);
+        const { value } = button.dataset;
+        button.setAttribute("aria-pressed", String(value === settings[key]));
+        button.classList.toggle("coming", value === wanted[key] && value !== settings[key]);
       }
     const ground = byId<HTMLSelectElement>("ground");
     if (ground) ground.value = settings.ground;
     const friction = byId<HTMLInputElement>("friction");
     if (friction && document.activeElement !== friction) friction.value = String(settings.friction);
     text("friction-value", settings.friction.toFixed(2));
-    this.showButtons(status);
-    const fault = byId("fault");
-    fault?.toggleAttribute("hidden", status.fault === "");
+    label("record", recording ? "Stop" : "Record", recording);
+    label("pause", paused ? "Go on" : "Pause", paused);
+    byId("save")?.classList.toggle("disabled", !status.recorded);
+    byId("fault")?.toggleAttribute("hidden", status.fault === "");
     text("fault-text", status.fault);
     text(
       "fault-title",
@@ -178,46 +135,20 @@ export class Panel {
         ? "The plant has stopped. Place the robot anew."
         : "The controller has failed: the joints hold. Choose a control, or place the robot anew.",
     );
-    document.documentElement.dataset.mode = status.paused ? "paused" : mode;
+    document.documentElement.dataset.mode = paused ? "paused" : recording ? "recording" : "free";
     this.showDrive();
-    for (const [number, sentence] of status.notes) if (number > this.noted) note(sentence);
-    this.noted = Math.max(this.noted, ...status.notes.map(([number]) => number));
-  }
-
-  private showButtons({ mode, recorded, paused }: Status): void {
-    const label = (action: string, name: string, pressed: boolean) => {
-      const button = document.querySelector<HTMLElement>(`[data-do="${action}"]`);
-      button?.setAttribute("aria-pressed", String(pressed));
-      const place = button?.querySelector("span");
-      if (place) place.textContent = name;
-    };
-    label("record", mode === "recording" ? "Stop" : "Record", mode === "recording");
-    label("replay", mode === "replaying" ? "Stop" : "Replay", mode === "replaying");
-    label("pause", paused ? "Go on" : "Pause", paused);
-    const replay = document.querySelector<HTMLButtonElement>('[data-do="replay"]');
-    if (replay) replay.disabled = !recorded;
-    byId("save")?.classList.toggle("disabled", !recorded);
-  }
-
-  private showState(state: State): void {
-    document.documentElement.dataset.link = state;
-    text("state", STATES[state]);
   }
 
   private showDrive(): void {
+    const { speed, height } = this.drive;
+    setSlider("speed", 100 * speed);
+    setSlider("height", 100 * height);
+    setSlider("friction");
     const limits = this.status?.limits;
-    const speed = byId<HTMLInputElement>("speed");
-    if (speed) speed.value = String(Math.round(100 * this.drive.speed));
-    if (speed) fill(speed);
-    const height = byId<HTMLInputElement>("height");
-    if (height) height.value = String(Math.round(100 * this.drive.height));
-    if (limits) {
-      text("speed-value", `${(1e3 * this.drive.speed * limits.vx).toFixed(0)} mm/s`);
-      const rise = this.drive.height * (this.drive.height > 0 ? limits.up : limits.down);
-      text("height-value", `${rise > 0 ? "+" : ""}${(1e3 * rise).toFixed(0)} mm`);
-    }
-    const friction = byId<HTMLInputElement>("friction");
-    if (friction) fill(friction);
+    if (!limits) return;
+    text("speed-value", `${(1e3 * speed * limits.vx).toFixed(0)} mm/s`);
+    const rise = height * (height > 0 ? limits.up : limits.down);
+    text("height-value", `${rise > 0 ? "+" : ""}${(1e3 * rise).toFixed(0)} mm`);
   }
 }
 
@@ -231,6 +162,23 @@ export function note(sentence: string): void {
   setTimeout(() => shown.remove(), SHOWN);
 }
 
+/** Adds a button of a choice to a group and returns it. */
+function addButton(group: string, name: string): HTMLButtonElement {
+  const button = element("button", "", name);
+  button.type = "button";
+  button.dataset.value = name;
+  byId(group)?.append(button);
+  return button;
+}
+
+/** Names the button of an action. */
+function label(action: string, name: string, pressed: boolean): void {
+  const button = document.querySelector<HTMLElement>(`[data-do="${action}"]`);
+  button?.setAttribute("aria-pressed", String(pressed));
+  const place = button?.querySelector("span");
+  if (place) place.textContent = name;
+}
+
 /** Returns a whole number without the sign of zero. */
 function whole(value: number): string {
   return String(Math.round(value) + 0);
@@ -241,14 +189,11 @@ function text(id: string, content: string): void {
   if (found && found.textContent !== content) found.textContent = content;
 }
 
-function title(id: string, content: string): void {
-  const found = byId(id)?.parentElement;
-  if (found) found.title = content;
-}
-
-/** Colours a slider up to its value. */
-function fill(slider: HTMLInputElement): void {
+/** Sets a slider, if a value is given, and colours it up to its value. */
+function setSlider(id: string, value?: number): void {
+  const slider = byId<HTMLInputElement>(id);
+  if (!slider) return;
+  if (value !== undefined) slider.value = String(Math.round(value));
   const [low, high] = [Number(slider.min), Number(slider.max)];
-  const share = (slider.valueAsNumber - low) / (high - low);
-  slider.style.setProperty("--done", `${100 * share}%`);
+  slider.style.setProperty("--done", `${(100 * (slider.valueAsNumber - low)) / (high - low)}%`);
 }

@@ -1,5 +1,5 @@
 import { LocalLoop, type StaticSetup } from "../browser/local";
-import { Walker } from "../browser/walker";
+import { Robot } from "../browser/robot";
 import { byId, element } from "../dom";
 import { Link } from "./link";
 import type { Setup } from "./messages";
@@ -8,8 +8,7 @@ import { start } from "./page";
 /** Starts the robot of a page that holds plant and controller, or says why it cannot walk here. */
 async function walkHere(setup: StaticSetup, code: string): Promise<void> {
   try {
-    const walker = await Walker.load(code);
-    start(setup, new LocalLoop(walker, setup));
+    start(setup, new LocalLoop(await Robot.load(code), setup));
   } catch (error) {
     const reason = error instanceof Error ? error.message : String(error);
     byId("stage")?.append(element("p", "refusal", `This browser cannot run the robot: ${reason}`));
