@@ -9,11 +9,11 @@ import pytest
 from command import Call
 from secret_robots import Secret, secret_robot
 
-from hexapod_cosim.cosim.identify.fitting.progress import AGAIN, MOST_STEPS, Done, Reporter
-from hexapod_cosim.cosim.identify.identify import identify
-from hexapod_cosim.cosim.identify.log import Log
-from hexapod_cosim.cosim.identify.log_plant import LogPlant
 from hexapod_cosim.cosim.logs.mcap_writer import write_mcap
+from hexapod_cosim.extensions.identify.fitting.progress import AGAIN, MOST_STEPS, Done, Reporter
+from hexapod_cosim.extensions.identify.identify import identify
+from hexapod_cosim.extensions.identify.log import Log
+from hexapod_cosim.extensions.identify.log_plant import LogPlant
 from hexapod_cosim.models import load_robot
 
 # of the first steps of every identification

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from hexapod_cosim.cosim.identify.numbers.inertia import BodyInertia, body_inertia
-from hexapod_cosim.cosim.identify.unknowns import chosen_unknowns
+from hexapod_cosim.extensions.identify.numbers.inertia import BodyInertia, body_inertia
+from hexapod_cosim.extensions.identify.unknowns import chosen_unknowns
 from hexapod_cosim.models import load_robot
 
 

@@ -7,11 +7,11 @@ from pathlib import Path
 import pytest
 
 import hexapod_cosim
-from hexapod_cosim.cosim.identify.log import Log, LogError, log_of
-from hexapod_cosim.cosim.identify.other_robot import other_robot
-from hexapod_cosim.cosim.identify.replay import replay
 from hexapod_cosim.cosim.interface.names import foot_names, joint_names, vector_names
 from hexapod_cosim.cosim.master.recorder import Recording
+from hexapod_cosim.extensions.identify.log import Log, LogError, log_of
+from hexapod_cosim.extensions.identify.other_robot import other_robot
+from hexapod_cosim.extensions.identify.replay import replay
 from hexapod_cosim.models import load_robot
 
 HEIGHT, FORCES = vector_names("torso.position"), foot_names("normal_force")

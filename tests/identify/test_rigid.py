@@ -11,16 +11,17 @@ import pytest
 from secret_robots import Secret, secret_robot
 from states import lopsided, random_bodies, random_command
 
-from hexapod_cosim.cosim.identify.identify import make_experiment
-from hexapod_cosim.cosim.identify.log import Log
-from hexapod_cosim.cosim.identify.rigid.base_parameters import (
+from hexapod_cosim.cosim.master.recorder import Recording
+from hexapod_cosim.extensions.identify.identify import make_experiment
+from hexapod_cosim.extensions.identify.log import Log
+from hexapod_cosim.extensions.identify.rigid.base_parameters import (
     Base,
     base_of,
     group_parameters,
     least_squares_base,
 )
-from hexapod_cosim.cosim.identify.rigid.linear_start import linear_start
-from hexapod_cosim.cosim.identify.rigid.regressor import (
+from hexapod_cosim.extensions.identify.rigid.linear_start import linear_start
+from hexapod_cosim.extensions.identify.rigid.regressor import (
     EQUATIONS,
     Motion,
     body_wrenches,
@@ -28,9 +29,8 @@ from hexapod_cosim.cosim.identify.rigid.regressor import (
     frames,
     regressor,
 )
-from hexapod_cosim.cosim.identify.rigid.samples import lacking
-from hexapod_cosim.cosim.identify.unknowns import ROBOT, chosen_unknowns
-from hexapod_cosim.cosim.master.recorder import Recording
+from hexapod_cosim.extensions.identify.rigid.samples import lacking
+from hexapod_cosim.extensions.identify.unknowns import ROBOT, chosen_unknowns
 from hexapod_cosim.models import Robot, load_robot
 from hexapod_cosim.models.contact import foot_contacts, foot_force
 from hexapod_cosim.models.dynamics import Command, accelerations

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hexapod_cosim.cosim.live.messages import (
+from hexapod_cosim.extensions.live.messages import (
     Action,
     Change,
     Drive,

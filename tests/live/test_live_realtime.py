@@ -9,14 +9,14 @@ import numpy as np
 import pytest
 from command import Call
 
-from hexapod_cosim.cosim.live.realtime import (
+from hexapod_cosim.cosim.scenario.scenario import load_scenario
+from hexapod_cosim.extensions.live.realtime import (
     StepTimes,
     facts_of,
     goal_met,
     measure,
     table_of,
 )
-from hexapod_cosim.cosim.scenario.scenario import load_scenario
 from hexapod_cosim.models import HexapodError
 
 

@@ -14,17 +14,6 @@ from numpy.typing import NDArray
 
 from hexapod_cosim.controller import BodyCommand, make_gait
 from hexapod_cosim.cosim.interface.names import joint_names, vector_names
-from hexapod_cosim.cosim.live import robot as live_robot
-from hexapod_cosim.cosim.live.messages import Change, Drive
-from hexapod_cosim.cosim.live.recording import NO_FORCE, Recording
-from hexapod_cosim.cosim.live.robot import LiveRobot
-from hexapod_cosim.cosim.live.settings import (
-    Choices,
-    control_texts,
-    find_limits,
-    gait_of,
-    live_scenario,
-)
 from hexapod_cosim.cosim.master.fmu import Fmu
 from hexapod_cosim.cosim.run.preparation import chosen_gains
 from hexapod_cosim.cosim.run.single_run import RunPlan, initialise_plant
@@ -32,6 +21,17 @@ from hexapod_cosim.cosim.run.walker import Walker
 from hexapod_cosim.cosim.scenario.reach import check_commands
 from hexapod_cosim.cosim.scenario.records import Command
 from hexapod_cosim.cosim.scenario.scenario import load_scenario, scenario_from_table
+from hexapod_cosim.extensions.live import robot as live_robot
+from hexapod_cosim.extensions.live.messages import Change, Drive
+from hexapod_cosim.extensions.live.recording import NO_FORCE, Recording
+from hexapod_cosim.extensions.live.robot import LiveRobot
+from hexapod_cosim.extensions.live.settings import (
+    Choices,
+    control_texts,
+    find_limits,
+    gait_of,
+    live_scenario,
+)
 from hexapod_cosim.models import HexapodError, load_robot
 from hexapod_cosim.models.schema import parse_toml
 

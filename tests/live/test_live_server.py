@@ -15,11 +15,11 @@ import pytest
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import connect
 
-from hexapod_cosim.cosim.live.hub import BURST, MOST_CLIENTS, Client, Hub
-from hexapod_cosim.cosim.live.messages import MessageError
-from hexapod_cosim.cosim.live.server import LiveError, LiveServer
-from hexapod_cosim.cosim.live.settings import Choices, control_texts
 from hexapod_cosim.cosim.scenario.scenario import load_scenario
+from hexapod_cosim.extensions.live.hub import BURST, MOST_CLIENTS, Client, Hub
+from hexapod_cosim.extensions.live.messages import MessageError
+from hexapod_cosim.extensions.live.server import LiveError, LiveServer
+from hexapod_cosim.extensions.live.settings import Choices, control_texts
 
 PATIENCE = 180.0  # s    for a loaded machine; nothing is asserted about it
 

@@ -1,0 +1,75 @@
+"""Renders the page of a live robot: one HTML file with the viewer."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined
+from markupsafe import Markup
+
+from hexapod_cosim.cosim.common.control_style import all_styles
+from hexapod_cosim.cosim.report.page import VIEWER, viewer_script
+from hexapod_cosim.cosim.report.payload import as_json
+from hexapod_cosim.extensions.live.settings import FLAT, OWN, Choices, shown_speed
+from hexapod_cosim.models import HexapodError
+from hexapod_cosim.models.ground.catalogue import CATALOGUE
+
+TEMPLATE = "live.html.jinja"
+
+
+def render_page(
+    choices: Choices, more: Mapping[str, Any] | None = None, *, module: str = ""
+) -> str:
+    """Returns the page with its viewer.
+
+    Args:
+        choices: the scenario and what the page may change.
+        more: what a page without a server reads besides.
+        module: the robot as WebAssembly in base64, for a page without a server.
+
+    Raises HexapodError when the viewer was not built.
+    """
+    script = viewer_script()
+    if script is None:
+        raise HexapodError(
+            "the page needs the viewer, which is not installed", got=f"no {VIEWER}",
+            fix="install the package without HX_VIEWER=OFF",
+        )  # fmt: skip
+    return (
+        _environment()
+        .get_template(TEMPLATE)
+        .render(
+            title=choices.scenario.title,
+            robot=choices.scenario.robot,
+            setup=Markup(as_json(_describe(choices) | dict(more or {}))),
+            styles=all_styles(list(choices.controls)),
+            viewer=script,
+            module=module,
+        )
+    )
+
+
+def _describe(choices: Choices) -> dict[str, Any]:
+    """Returns the choices of the page (viewer/messages.ts)."""
+    about = {OWN: "of the scenario", FLAT: "a horizontal plane"}
+    about |= {name: entry.about for name, entry in CATALOGUE.items()}
+    return {
+        "controls": list(choices.controls),
+        "refused": choices.refused,
+        "gaits": list(choices.gaits),
+        "grounds": [{"name": name, "about": about[name]} for name in choices.grounds],
+        "speed": shown_speed(choices),
+    }
+
+
+def _environment() -> Environment:
+    """Returns the templates of this folder; they include the report's style sheets."""
+    folders = ("hexapod_cosim.extensions", "live"), ("hexapod_cosim.cosim", "report")
+    return Environment(
+        loader=ChoiceLoader([PackageLoader(*each) for each in folders]),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )

@@ -1,0 +1,179 @@
+"""Measures how long the plant's doStep takes, step by step, in a walk of a live robot.
+
+Times are of the call through Python's ctypes, in processor time of the thread, which is what the
+step costs, and in wall time, which adds what other processes and the system take.
+"""
+
+from __future__ import annotations
+
+import gc
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from time import perf_counter_ns, thread_time_ns
+from typing import Any
+
+import matplotlib
+import numpy as np
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from hexapod_cosim.controller import BodyCommand, Gains
+from hexapod_cosim.controller.figure_style import DPI, PALETTE, SETTINGS, UNDATED, WIDTH
+from hexapod_cosim.cosim.common.files import atomic_path
+from hexapod_cosim.cosim.interface.names import foot_names
+from hexapod_cosim.cosim.scenario.records import Scenario
+from hexapod_cosim.extensions.live.recording import NO_FORCE
+from hexapod_cosim.extensions.live.robot import LiveRobot
+from hexapod_cosim.extensions.live.settings import Choices, control_texts
+from hexapod_cosim.models import HexapodError
+
+SHARES = (0.5, 0.99, 0.999, 0.9999)  # quantiles
+GOAL, GOAL_SHARE = 100.0, 0.9999  # us, and the share of steps below it
+WORST = 300.0  # us    goal of the slowest step
+EDGES = np.geomspace(1.0, 1e5, 101)  # us    of the bins
+FEWEST = 1000  # steps of a measurement
+FIGURE = "realtime"
+Micro = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class StepTimes:
+    """Times of successive steps of `step` [s] (n,) [us], and whether a foot touched down."""
+
+    step: float
+    thread: Micro
+    wall: Micro
+    touched: NDArray[np.bool_]
+
+    def kinds(self) -> dict[str, Micro]:
+        """Returns the times by clock and kind of steps, those without any left out."""
+        found: dict[str, Micro] = {}
+        for clock, values in (("thread", self.thread), ("wall", self.wall)):
+            found[f"{clock} time, all steps"] = values
+            if self.touched.any():
+                found[f"{clock} time, with a touch-down"] = values[self.touched]
+        return found
+
+
+def measure(
+    scenario: Scenario,
+    *,
+    step: float,
+    count: int,
+    gains: Gains | None = None,
+    progress: Callable[[float], None] | None = None,
+) -> StepTimes:
+    """Walks `count` macro-steps of `step` [s] under the scenario's first command.
+
+    gains: designed for this step; None for a control without any. Raises HexapodError, also when
+    the robot does not walk to the end.
+    """
+    if count < FEWEST:
+        raise HexapodError(
+            "too few steps", got=count, expected=f"at least {FEWEST}", fix="raise --steps"
+        )
+    first = scenario.commands[0]
+    command = BodyCommand(first.vx, first.vy, first.yaw_rate, first.height, first.roll, first.pitch)
+    wanted = replace(scenario, macro_step=step)
+    with LiveRobot(Choices(wanted, control_texts(wanted, ()), {}), gains=gains) as robot:
+        return _measure(robot, command, count, progress)
+
+
+def _measure(
+    robot: LiveRobot,
+    command: BodyCommand,
+    count: int,
+    progress: Callable[[float], None] | None,
+) -> StepTimes:
+    """Steps a robot with a clock around its plant; collections of garbage wait."""
+    places = [robot.signals.names.index(name) for name in foot_names("landings")]
+    times, touched = np.zeros((2, count)), np.zeros(count, dtype=np.bool_)
+    advance, number = robot.advance, 0
+
+    def timed(t: float, h: float) -> None:
+        before = perf_counter_ns(), thread_time_ns()
+        advance(t, h)
+        thread = thread_time_ns() - before[1]
+        times[:, number] = thread, perf_counter_ns() - before[0]
+
+    robot.advance = timed
+    gc.disable()
+    try:
+        for number in range(count):
+            landings = robot.signals.values[places].copy()
+            robot.step(command, NO_FORCE)
+            touched[number] = np.any(robot.signals.values[places] != landings)
+            if robot.fault:
+                raise HexapodError("the robot did not walk to the end", got=robot.fault)
+            if progress is not None and number % 1000 == 0:
+                progress(number * robot.h)
+    finally:
+        gc.enable()
+    return StepTimes(robot.h, times[0] / 1e3, times[1] / 1e3, touched)
+
+
+def facts_of(times: StepTimes) -> dict[str, Any]:
+    """Returns counts, quantiles [us] and whether the goals are met, for people and for JSON."""
+    return {
+        "step": times.step,
+        "steps": len(times.thread),
+        "touch_downs": int(times.touched.sum()),
+        "goal_met": goal_met(times.thread),
+        "times": {kind: _quantiles(values) for kind, values in times.kinds().items()},
+    }
+
+
+def goal_met(thread: Micro) -> bool:
+    """Whether GOAL_SHARE of the steps took less than GOAL and none more than WORST [us]."""
+    return bool(np.mean(thread < GOAL) >= GOAL_SHARE and np.max(thread) <= WORST)
+
+
+def _quantiles(values: Micro) -> dict[str, float]:
+    """Returns quantiles and the largest [us], and the number of steps above the goals."""
+    return {
+        **{f"{100.0 * share:g} %": float(np.quantile(values, share)) for share in SHARES},
+        "largest": float(values.max()),
+        f"above {GOAL:g} us": int(np.sum(values >= GOAL)),
+        f"above {WORST:g} us": int(np.sum(values > WORST)),
+    }
+
+
+def table_of(facts: Mapping[str, Any]) -> tuple[list[str], list[list[str]]]:
+    """Returns the heading and the rows of a table of the quantiles [us]."""
+    rows = [
+        [kind, *(f"{value:.0f}" for value in values.values())]
+        for kind, values in facts["times"].items()
+    ]
+    return ["us", *next(iter(facts["times"].values()))], rows
+
+
+def write(times: StepTimes, folder: Path) -> list[Path]:
+    """Writes the histogram as PNG and SVG; returns the files."""
+    folder.mkdir(parents=True, exist_ok=True)
+    files = []
+    with matplotlib.rc_context(SETTINGS):
+        figure = draw(times)
+        for kind, metadata in UNDATED.items():
+            files.append(folder / f"{FIGURE}.{kind}")
+            with atomic_path(files[-1]) as temporary:
+                figure.savefig(temporary, format=kind, dpi=DPI, metadata=metadata)
+    return files
+
+
+def draw(times: StepTimes) -> Figure:
+    """Draws the histograms of both clocks beside each other, with the goals."""
+    figure = Figure(figsize=(WIDTH, 2.6))
+    axes = figure.subplots(1, 2, sharex=True, sharey=True)
+    for clock, axis in zip(("thread", "wall"), axes, strict=True):
+        shown = {kind: values for kind, values in times.kinds().items() if kind.startswith(clock)}
+        for (kind, values), colour in zip(shown.items(), PALETTE, strict=False):
+            label = kind.partition(", ")[2]
+            bars: dict[str, Any] = {"bins": EDGES, "color": colour}
+            axis.hist(values, histtype="stepfilled", alpha=0.35, label=label, **bars)
+        for goal in (GOAL, WORST):
+            axis.axvline(goal, color="0.4", linestyle=":", linewidth=1.0)
+        axis.set(title=f"{clock} time", xlabel=f"doStep({1e3 * times.step:g} ms) [µs]")
+    axes[0].set(ylabel="steps", xscale="log", yscale="log", xlim=(2.0, 5e4))
+    axes[0].legend(loc="upper right")
+    return figure

@@ -1,0 +1,319 @@
+"""A robot whose plant and controller are stepped one macro-step at a time, and changed meanwhile.
+
+The steps are those of `cosim/master/loop.py`: read outputs, call the controller, set inputs, step.
+So a walk from the start repeats under `hexapod simulate` bit for bit. The built-in controls are the
+controller FMU; all others run as in `simulate`.
+
+Changes while the robot walks:
+
+- friction: the plant begins again in its present pose and motion, on ground of the new friction.
+  Bristles of the friction laws and the measures of work and slip begin at zero.
+- control, from a built-in one to another: it goes on in the present phase of the walk at once.
+- gait of a built-in control: the robot walks on slowly meanwhile (`gait_change.py`).
+- ground, and control or gait where a controller of the user walks: the robot is placed at its
+  start.
+
+A controller that raises an exception, ends the program or commands a value that the plant refuses
+is replaced by the last joint commands that the plant accepted.
+"""
+
+from __future__ import annotations
+
+from contextlib import ExitStack
+from dataclasses import dataclass, replace
+
+from hexapod_cosim.controller import BodyCommand, ControllerError, Gains, Gait, JointCommand
+from hexapod_cosim.cosim.common.closing import Closing
+from hexapod_cosim.cosim.common.temporary import TemporaryFolder
+from hexapod_cosim.cosim.control.controllers import make_controller
+from hexapod_cosim.cosim.export.controller_export import export_controller
+from hexapod_cosim.cosim.interface.controller_interface import controller_parameters
+from hexapod_cosim.cosim.master.fmu import Fmu
+from hexapod_cosim.cosim.master.fmu_controller import FmuController
+from hexapod_cosim.cosim.master.loop import JointController
+from hexapod_cosim.cosim.master.signals import Signals
+from hexapod_cosim.cosim.results.walk import robot_weight
+from hexapod_cosim.cosim.run.preparation import PlantFmus
+from hexapod_cosim.cosim.run.single_run import (
+    RunPlan,
+    apply_settings,
+    initialise_plant,
+    make_plan,
+    make_sensor,
+)
+from hexapod_cosim.cosim.scenario.controls import control_of
+from hexapod_cosim.extensions.live.gait_change import GaitChange, plan_change
+from hexapod_cosim.extensions.live.messages import Change
+from hexapod_cosim.extensions.live.recording import Force
+from hexapod_cosim.extensions.live.settings import Choices, Limits, Settings, find_limits, gait_of
+from hexapod_cosim.models import HexapodError
+
+HORIZON = 1e6  # s    stop time of the FMUs
+STATE = "initial."  # prefix of the plant's parameters for the state at the start
+MOST_WEIGHTS = 3.0  # body weights    largest push
+
+
+@dataclass
+class PendingGait:
+    """A gait that the robot changes to; `since` is the macro-step of the request."""
+
+    plan: GaitChange
+    gait: Gait
+    since: int
+
+
+class LiveRobot(Closing):
+    """Steps a robot; a context manager that frees its FMUs.
+
+    Args:
+        choices: the scenario and the changes that are allowed.
+        gains: of the built-in controls; they are needed unless kinematic control alone is allowed.
+
+    Attributes:
+        settings: the settings that hold.
+        limits: the largest commands.
+        count: macro-steps since the robot was placed.
+        fault: why a controller was replaced or the plant has stopped; "" without a fault.
+        stopped: whether the plant has refused a step; only `place` helps.
+        weight: of the robot [N].
+        signals: the plant's variables as of now.
+        advance: steps the plant from t [s] by h [s]; `realtime.py` puts a clock around it.
+    """
+
+    settings: Settings
+    limits: Limits
+    signals: Signals
+
+    def __init__(self, choices: Choices, *, gains: Gains | None = None) -> None:
+        self.choices, self._gains = choices, gains
+        self._open = ExitStack()
+        self._folder = self._open.enter_context(TemporaryFolder("live"))
+        self._law = self._open.enter_context(ExitStack())  # a controller of the user
+        self._built_in: Fmu | None = None
+        try:
+            path = PlantFmus(self._folder).fmu(choices.scenario.robot)
+            self._plant = self._open.enter_context(Fmu(path))
+            self.advance = self._plant.step
+            self._begin(choices.first())
+            if self.fault:
+                raise ControllerError(self.fault)
+            for gait in choices.gaits:  # now, because finding them takes longer than a macro-step
+                scenario = choices.scenario_with(replace(self.settings, gait=gait))
+                find_limits(self.plan.controller.robot, gait_of(scenario))
+        except BaseException:
+            self._open.close()
+            raise
+
+    @property
+    def h(self) -> float:
+        """The macro-step [s]."""
+        return self.plan.scenario.macro_step
+
+    @property
+    def time(self) -> float:
+        """Returns the simulated time [s]."""
+        return self.plan.scenario.start + self.h * self.count
+
+    @property
+    def wanted(self) -> Settings:
+        """Returns the settings that hold when all changes are made."""
+        pending = self._pending
+        return self.settings if pending is None else replace(self.settings, gait=pending.gait.name)
+
+    # ------------------------------------------------------------------------------- changes
+
+    def place(self, settings: Settings | None = None) -> None:
+        """Places the robot at its start, standing, under settings: given or wanted ones.
+
+        Raises HexapodError for settings under which it cannot start; it is then placed under
+        those that held before.
+        """
+        before = self.settings
+        try:
+            self._begin(settings or self.wanted)
+        except HexapodError:
+            self._begin(before)
+            raise
+
+    def _begin(self, settings: Settings) -> None:
+        """Starts plant and controller anew. Raises HexapodError."""
+        self.plan = self._plan_of(settings)
+        scenario = self.plan.scenario
+        self.count, self.settings = 0, settings
+        self.fault, self.stopped = "", False
+        self._pending: PendingGait | None = None
+        self._plant.reset()
+        apply_settings(self._plant, self.plan.robot)
+        endless = replace(self.plan, scenario=replace(scenario, duration=HORIZON))
+        self.parameters = initialise_plant(self._plant, endless)
+        self.weight = robot_weight(self.parameters)
+        self.signals = Signals(self._plant, sensor=make_sensor(scenario, self.plan.schedule))
+        self.signals.read()
+        self._last = JointCommand(angle_ref=self.signals.measurement.angle.copy())
+        self._start_controller()
+
+    def change(self, change: Change) -> None:
+        """Begins a change of the settings. Raises HexapodError, and then leaves all as it was."""
+        wanted = self.choices.changed(self.wanted, change)
+        if wanted == self.wanted:
+            return
+        plan = self._plan_of(wanted)
+        if self.stopped or change.key == "ground":
+            self.place(wanted)
+        elif change.key == "friction":
+            self._change_friction(wanted, plan)
+        elif self.fault or not _can_go_on(self.plan, plan):
+            self.place(wanted)
+        elif change.key == "control":
+            self._tune(plan, "control")
+            self.settings, self.plan = replace(self.settings, control=wanted.control), plan
+        else:
+            self._request_gait(plan)
+
+    def _plan_of(self, settings: Settings) -> RunPlan:
+        scenario = self.choices.scenario_with(settings)
+        return make_plan(scenario, gains=self._gains if _is_built_in(scenario.control) else None)
+
+    def _change_friction(self, wanted: Settings, plan: RunPlan) -> None:
+        """Starts the plant again in its present state with another friction."""
+        self.settings, self.plan = replace(self.settings, friction=wanted.friction), plan
+        state = self._state()
+        self._plant.reset()
+        apply_settings(self._plant, plan.robot)
+        self._plant.set_parameters({**plan.scenario.parameters, **state})
+        self._plant.initialise(self.time, HORIZON)
+        self.signals.read()
+
+    def _state(self) -> dict[str, float]:
+        """Returns the plant's pose and motion as the parameters of a start."""
+        present = dict(zip(self.signals.names, self.signals.values.tolist(), strict=True))
+        own = {
+            name: name.removeprefix(STATE)
+            for name in self._plant.variables
+            if name.startswith(STATE)
+        }
+        return {
+            name: present[key if key in present else f"torso.{key}"] for name, key in own.items()
+        }
+
+    def _tune(self, plan: RunPlan, prefix: str) -> None:
+        """Sets the parameters of the controller FMU whose names begin with a prefix."""
+        assert self._built_in is not None
+        given = controller_parameters(plan.controller)
+        self._built_in.set_parameters(
+            {name: value for name, value in given.items() if name.startswith(prefix)}
+        )
+
+    # ------------------------------------------------------------------------- change of gait
+
+    def _request_gait(self, plan: RunPlan) -> None:
+        """Begins to walk slowly, for a change to the gait of a plan."""
+        setup = plan.controller
+        change = plan_change(setup.robot, self._gait, setup.gait)
+        self.plan, self._pending = plan, PendingGait(change, setup.gait, self.count)
+        self.limits = change.limits.least(self.limits)
+
+    def _follow_change(self) -> None:
+        """Does what is due of a change of gait."""
+        pending = self._pending
+        if pending is None or self.fault:
+            return
+        change, passed = pending.plan, self.count - pending.since
+        if passed == round(change.begin / self.h):
+            self._tune(self.plan, "gait.")
+            self._gait = pending.gait
+        if passed == round(change.settled / self.h):
+            self.settings = replace(self.settings, gait=pending.gait.name)
+        if passed == round(change.end / self.h):
+            self.limits, self._pending = find_limits(self.plan.controller.robot, self._gait), None
+
+    # ------------------------------------------------------------------------------- controllers
+
+    def _start_controller(self) -> None:
+        """Makes the controller of the plan; one that cannot start is a fault."""
+        setup = self.plan.controller
+        self._gait, self.limits = setup.gait, find_limits(setup.robot, setup.gait)
+        try:
+            self._controller = self._make_controller()
+        except (Exception, SystemExit) as error:  # of a user's controller
+            self.fault = _text_of(error)
+
+    def _make_controller(self) -> JointController:
+        """Returns the controller of the plan, which begins at the present time in the stance."""
+        self._law.close()
+        if _is_built_in(self.plan.scenario.control):
+            return self._start_built_in()
+        controller = self._law.enter_context(make_controller(self.plan))
+        controller.start(self.time, HORIZON, BodyCommand(), self.signals.measurement)
+        return controller
+
+    def _start_built_in(self) -> FmuController:
+        """Returns the controller FMU with the plan's parameters, and gains for each control."""
+        setup = self.plan.controller
+        parameters = controller_parameters(replace(setup, gains=setup.gains or self._gains))
+        parameters["control"] = controller_parameters(setup)["control"]
+        if self._built_in is None:
+            path = export_controller(setup, self._folder / "controller.fmu")
+            self._built_in = self._open.enter_context(Fmu(path, name="controller"))
+        self._built_in.reset()
+        self._built_in.set_parameters(parameters)
+        self._built_in.initialise(self.time, HORIZON)
+        return FmuController(self._built_in, period=setup.period)
+
+    # ------------------------------------------------------------------------------- steps
+
+    def step(self, command: BodyCommand, force: Force) -> None:
+        """Makes one macro-step under a body command and a force on the torso [N], world axes.
+
+        Does nothing once the plant has stopped.
+        """
+        if self.stopped:
+            return
+        self._follow_change()
+        self.signals.push[:3] = force
+        self._command_joints(command)
+        try:
+            self.advance(self.time, self.h)
+            self.count += 1
+            self.signals.read()
+        except HexapodError as error:
+            self.fault, self.stopped = str(error), True
+
+    def _command_joints(self, command: BodyCommand) -> None:
+        """Writes the controller's joint commands; after a fault, the last that were accepted."""
+        if not self.fault:
+            try:
+                joints = self._controller.step(self.time, command, self.signals.measurement)
+                self.signals.write(joints)
+            except (Exception, SystemExit) as error:  # a user's controller may raise anything
+                self.fault = _text_of(error)
+            else:
+                # copies, because a controller may write its next commands into the same arrays
+                angle, torque = joints.angle_ref.copy(), joints.torque_ref.copy()
+                self._last = JointCommand(angle_ref=angle, torque_ref=torque)
+                return
+        self.signals.write(self._last)
+
+    def close(self) -> None:
+        """Frees the FMUs."""
+        self._open.close()
+
+
+def _is_built_in(control: str) -> bool:
+    return control_of(control).is_builtin
+
+
+def _can_go_on(present: RunPlan, then: RunPlan) -> bool:
+    """Returns whether the controller FMU can go on: both controls are built-in ones, and the plans
+    differ in control, gait and friction at most.
+    """
+    now, after = present.controller, then.controller
+    robot = replace(after.robot, friction=now.robot.friction)
+    same = replace(after, robot=robot, gains=now.gains, law=now.law, gait=now.gait)
+    both = (present.scenario.control, then.scenario.control)
+    return all(map(_is_built_in, both)) and same == now
+
+
+def _text_of(error: BaseException) -> str:
+    """Returns what happened in a controller, in a sentence."""
+    return str(error) if isinstance(error, HexapodError) else f"{type(error).__name__}: {error}"
