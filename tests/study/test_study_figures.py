@@ -15,14 +15,14 @@ from matplotlib.figure import Figure
 from studies import KINEMATIC, replace_stored, run_quietly, study_of
 
 from hexapod_cosim.cosim.results.comparison import made_change
-from hexapod_cosim.extensions.study.groups import Point
-from hexapod_cosim.extensions.study.moments import Figures, Mean
+from hexapod_cosim.extensions.study.groups import Figures, Mean, Point
+from hexapod_cosim.extensions.study.optimum import Trial
 from hexapod_cosim.extensions.study.records import Study
 from hexapod_cosim.extensions.study.report import heat
 from hexapod_cosim.extensions.study.report.figures import drawings, history
 from hexapod_cosim.extensions.study.store import FIGURES
 from hexapod_cosim.extensions.study.studying import report_on
-from hexapod_cosim.extensions.study.summary import Results, Trial, read_results
+from hexapod_cosim.extensions.study.summary import Results, read_results
 from hexapod_cosim.models import load_robot
 
 GRID = {"factors": {"friction.mu": [0.3, 0.5], "command.vx": [0.05, 0.08]}}

@@ -15,8 +15,7 @@ from hexapod_cosim.cosim.common.control_style import control_styles
 from hexapod_cosim.cosim.common.files import without_none, write_text
 from hexapod_cosim.cosim.results.comparison import METHOD, Change
 from hexapod_cosim.cosim.results.metrics import DUST, FLOORS, METRICS, shown_metrics
-from hexapod_cosim.extensions.study.groups import Point
-from hexapod_cosim.extensions.study.moments import Mean
+from hexapod_cosim.extensions.study.groups import Mean, Point
 from hexapod_cosim.extensions.study.objective import WALKED
 from hexapod_cosim.extensions.study.records import DRAWN
 from hexapod_cosim.extensions.study.report.figures import drawings, save
