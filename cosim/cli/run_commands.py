@@ -38,7 +38,6 @@ from hexapod_cosim.cosim.report.report import REPORT, metric_rows, write_report
 from hexapod_cosim.cosim.results.accuracy import Accuracy, halved_scenario
 from hexapod_cosim.cosim.results.comparison import SEEDS, read_seeds
 from hexapod_cosim.cosim.results.comparisons import WALKS, compare_all
-from hexapod_cosim.cosim.results.drop import drop_text
 from hexapod_cosim.cosim.results.metrics import has_net_slip
 from hexapod_cosim.cosim.results.result import Result
 from hexapod_cosim.cosim.results.results import (
@@ -53,7 +52,6 @@ from hexapod_cosim.cosim.results.results import (
     write_accuracy,
 )
 from hexapod_cosim.cosim.results.summary import summarise
-from hexapod_cosim.cosim.results.walking import WALKING, walking_text
 from hexapod_cosim.cosim.scenario.controls import control_of
 from hexapod_cosim.cosim.scenario.records import Scenario
 from hexapod_cosim.cosim.scenario.scenario import load_scenario
@@ -141,9 +139,7 @@ def _simulate_one(run: _Run, path: Path, *, quiet: bool) -> _Simulated:
                 files += write_report(runs, folder.path, warn=warn, accuracies=checked)
     if not quiet:
         _show(result, files, checked)
-    return _Simulated(
-        _summary(result, folder.path, files, checked), result.facts["walk"]["upright"]
-    )
+    return _Simulated(_summary(result, folder.path, files, checked), result.facts.walk.upright)
 
 
 def _show(result: Result, files: Sequence[Path], checked: Mapping[str, Accuracy]) -> None:
@@ -153,10 +149,9 @@ def _show(result: Result, files: Sequence[Path], checked: Mapping[str, Accuracy]
     rows = metric_rows(metrics, net_slip=has_net_slip(result.parameters))
     show_rows(with_errors(rows, checked), [control])
     show_accuracy(rows, checked, metrics)
-    if walking := walking_text(result.facts):
-        show_text(f"walk: {walking}")
-    if result.facts.get("drop"):
-        show_text(drop_text(result.facts["drop"]))
+    show_text(f"walk: {result.facts.walking.text}")
+    if result.facts.drop is not None:
+        show_text(result.facts.drop.text)
     show_files(files)
 
 
@@ -195,7 +190,7 @@ def _report_again(folder: Path, facts: Mapping[str, Any]) -> list[Path]:
             where=str(folder),
         )
     run = read_result(folder)
-    control = run.facts["control"]
+    control = run.facts.control
     accuracies = {control: run.accuracy} if run.accuracy else {}
     return write_report({control: run}, folder, warn=warn, accuracies=accuracies)
 
@@ -225,9 +220,9 @@ def _summary(
         "directory": str(folder),
         "files": [str(file) for file in files],
     }
-    shown = {key: result.facts[key] for key in ("robot", "walk", WALKING, "warnings")}
-    status = {"status": result.outcome.status}
-    summary = {"metrics": dict(result.metrics), **names, **shown, **status}
+    facts = result.facts.as_table()
+    shown = {key: facts[key] for key in ("robot", "walk", "walking", "warnings", "status")}
+    summary = {"metrics": dict(result.metrics), **names, **shown}
     if checked:
         summary[ACCURACY] = checked[label].as_table()
     return summary

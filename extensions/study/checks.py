@@ -8,7 +8,7 @@ from dataclasses import fields, is_dataclass
 from typing import Any, get_type_hints
 
 from hexapod_cosim.controller import Gains
-from hexapod_cosim.controller.gains import POSITIVE
+from hexapod_cosim.controller.gains import PARTS
 from hexapod_cosim.cosim.interface.plant_interface import Interface, load_interface
 from hexapod_cosim.cosim.scenario.controls import LAW
 from hexapod_cosim.cosim.scenario.quantities import QUANTITY
@@ -35,6 +35,7 @@ from hexapod_cosim.extensions.study.records import (
 )
 from hexapod_cosim.extensions.study.runs import count_runs
 from hexapod_cosim.models import HexapodError, load_robot, unknown_name
+from hexapod_cosim.models.schema import Number, specs
 
 # settings that a study gives its runs itself, and what to write instead
 ELSEWHERE = {
@@ -128,13 +129,13 @@ def _check_gain(factor: Factor, study: Study, where: str) -> None:
     if factor.name not in gain_names():
         raise unknown_name("gain", factor.name, gain_names(), where=where, error=StudyError)
     part, _, name = factor.name.removeprefix(GAINS).partition(".")
-    positive = name in POSITIVE[part]
+    allowed = specs(PARTS[part])[name]
+    assert isinstance(allowed, Number)
     what, fix = "not a gain's value", "correct it, or leave the unit out"
     for value in samples(factor):
         plain = is_number(value) and not factor.unit
         require(plain, value, "numbers without a unit", where, what=what, fix=fix)
-        fits = float(value) > 0.0 or (float(value) == 0.0 and not positive)
-        require(fits, value, f"numbers {'>' if positive else '>='} 0", where, what=what)
+        require(allowed.holds(float(value)), value, allowed.range_text(), where, what=what)
     fix = 'add "compliant" to the controls, or take the gain away: kinematic control has none'
     expected, what = "compliant or paper among the controls", "a gain that no run has"
     require(study.gains_text is not None, factor.name, expected, where, what=what, fix=fix)

@@ -4,7 +4,6 @@ ones.
 
 from __future__ import annotations
 
-import re
 from dataclasses import asdict, replace
 from functools import cache
 from pathlib import Path
@@ -258,17 +257,6 @@ def test_caveats_are_kept_and_warned_about(tmp_path: Path) -> None:
         "the design leaves out a: b",
         'and "c"',
     )
-    path.write_text(
-        path.read_text(encoding="utf-8").replace("caveats = [", "caveats = [1.0, "),
-        encoding="utf-8",
-    )
-    with pytest.raises(GainsError, match=r"caveats: wrong type: got 1\.0, expected a text"):
-        load_gains(path)
-    path.write_text(
-        re.sub("caveats = .*", 'caveats = "a"', path.read_text(encoding="utf-8")), encoding="utf-8"
-    )
-    with pytest.raises(GainsError, match="caveats: wrong type: got 'a', expected a list of texts"):
-        load_gains(path)
 
 
 @pytest.mark.parametrize(
@@ -279,10 +267,11 @@ def test_caveats_are_kept_and_warned_about(tmp_path: Path) -> None:
             "hight_share = ",
             "unknown key.*hight_share.*did you mean 'height_share'",
         ),
-        ("\n[hold]", "\n[hald]", "missing section.*\\[hold\\]"),
-        ("damping = ", "damping = -", "paper.damping: impossible value"),
+        ("\n[hold]", "\n[hald]", "\\[hold\\]: wrong type.*expected a table"),
+        ("damping = ", "damping = -", "damping: value not allowed"),
         ("format = 5", "format = 4", "unknown format"),
-        ("\nlimit = ", "\nlimit = true # ", "paper.limit: wrong type"),
+        ("caveats = []", "caveats = [1.0]", "caveats: wrong type"),
+        ("\nlimit = ", "\nlimit = true # ", "limit: wrong type"),
         ("format = 5", "format = ", "not a TOML file"),
     ],
 )
@@ -305,8 +294,11 @@ def test_a_missing_file_or_folder_is_reported(gains: Gains, tmp_path: Path) -> N
 @pytest.mark.parametrize(
     ("setting", "message"),
     [
-        ("filter_time=0", "filter_time: impossible requirement: got 0.0, expected a number > 0"),
-        ("force_delay=-1", "force_delay: impossible requirement: got -1.0, expected a number >= 0"),
+        ("filter_time=0", "filter_time: value not allowed: got 0.0, expected a finite number > 0"),
+        (
+            "force_delay=-1",
+            "force_delay: value not allowed: got -1.0, expected a finite number >= 0",
+        ),
         ("phase_margn=50", "unknown requirement.*did you mean 'phase_margin'"),
         ("phase_margin=steep", "not a number: got 'steep'"),
     ],

@@ -116,15 +116,6 @@ def test_an_extension_imports_no_other() -> None:
                 assert name.split(".")[2] == own, f"{path.relative_to(ROOT)} imports {name}"
 
 
-def test_each_room_says_what_it_is_for_and_what_it_may_import() -> None:
-    for room in ROOMS:
-        text = ast.get_docstring(
-            ast.parse((ROOT / "cosim" / room / "__init__.py").read_text(encoding="utf-8"))
-        )
-        assert text is not None, room
-        assert " ".join(text.split()).count(". Imports ") == 1, f"{room}: {text}"
-
-
 @pytest.mark.parametrize("folder", MAY_USE)
 def test_a_folder_uses_only_the_packages_it_may(folder: str) -> None:
     for path in python_files(folder):
@@ -204,14 +195,6 @@ def test_the_fmi_layer_includes_no_core(component: str) -> None:
         assert not inside, f"{path.relative_to(ROOT)} includes {sorted(inside)}"
 
 
-def test_the_ground_knows_nothing_of_legs_in_lanes() -> None:
-    files = c_files("src/ground")
-    assert files
-    for path in files:
-        upward = [name for name in INCLUDE.findall(path.read_text("utf-8")) if "lanes/" in name]
-        assert upward == [], f"{path.relative_to(ROOT)} includes {upward}"
-
-
 def test_the_masters_loop_sees_the_standard_and_nothing_of_the_fmus_it_drives() -> None:
     files = c_files("src", "include/hexapod", component="cosim/master")
     assert files
@@ -236,29 +219,3 @@ def test_only_the_fmi_layer_names_the_standard(component: str) -> None:
         assert not re.search(r"\bfmi[23][A-Z]", path.read_text(encoding="utf-8")), (
             f"{path.relative_to(ROOT)} names an FMI type or function"
         )
-
-
-# A second definition stands for the first: complex numbers and one lane for lanes, and each
-# component's side of component.h.
-STAND_INS = {"complex_step.h": "hx_", "one_lane.h": "hx_", "component.c": "hx_component_"}
-DEFINED = re.compile(r"^\}\s*(hx[A-Z]\w*);|^\w[\w ]*?[ *]+(hx_\w+)\([^;{]*\)\s*\{", re.MULTILINE)
-
-
-def test_no_two_types_or_functions_of_c_share_a_name() -> None:
-    places: dict[str, set[str]] = {}  # within a file alternatives stand behind #if
-    for component in (*COMPONENTS, "cosim/master", "fmi"):
-        folders = ("", "src", "include/hexapod")
-        for path in c_files(*folders, component=component):
-            text = re.sub(r"/\*.*?\*/", "", path.read_text(encoding="utf-8"), flags=re.DOTALL)
-            for match in DEFINED.finditer(text):
-                name = match[1] or match[2]
-                stand_in = name.startswith(STAND_INS.get(path.name, "no stand-in"))
-                if not stand_in:
-                    places.setdefault(name, set()).add(str(path.relative_to(ROOT)))
-    assert len(places) > 200
-    assert not {name: where for name, where in places.items() if len(where) > 1}
-
-
-def test_no_two_headers_of_the_plant_share_a_name() -> None:
-    names = [path.name for path in c_files("src", "include/hexapod") if path.suffix == ".h"]
-    assert len(names) == len(set(names))

@@ -18,8 +18,8 @@ import tomlkit
 from command import Call, assert_refused
 from secret_robots import NOISE, Secret, secret_robot, with_column
 
-from benchmarks.identification.campaign import GOAL_COVERED, GOAL_RATIO, summary, table_row
-from benchmarks.identification.campaign import score as score_of
+from benchmarks.identification import GOAL_COVERED, GOAL_RATIO, summary, table_row
+from benchmarks.identification import score as score_of
 from hexapod_cosim.cosim.export.plant_export import export_fmu
 from hexapod_cosim.cosim.logs.mcap_writer import write_mcap
 from hexapod_cosim.extensions.identify import excitation

@@ -108,12 +108,12 @@ static void stand(const hxControllerModel *model, const hxControllerState *state
 static void lay_out(const hxControllerModel *model, const hxControllerState *state,
                     hxPlannedStep *step) {
   const hxSway *sway = &model->laws.sway;
-  const hxWarmth *warmth = &state->compliant.warmth;
+  const hxLoadAdaptation *adaptation = &state->compliant.adaptation;
   step->sway = hx_plane(0.0, 0.0);
-  if (model->compliant && hx_sway_acts(sway, warmth)) {
-    step->sway = hx_sway_guess(sway, &step->feet, warmth);
+  if (model->compliant && hx_sway_acts(sway, adaptation)) {
+    step->sway = hx_sway_guess(sway, &step->feet, adaptation);
     stand(model, state, step);
-    step->sway = hx_sway_of(sway, &model->laws.dynamics, step->sway, &step->masses, warmth);
+    step->sway = hx_sway_of(sway, &model->laws.dynamics, step->sway, &step->masses, adaptation);
   }
   stand(model, state, step);
 }
@@ -140,7 +140,7 @@ static void note_contacts(const hxControllerModel *model, hxControllerState *sta
 /* Aims the steps of a commanded motion at the stance that the weight asks for (C53). */
 static void narrow(const hxControllerModel *model, hxControllerState *state) {
   if (model->compliant && hx_command_ramp_moves(&state->ramp))
-    state->paths.narrowing = state->compliant.warmth.narrowing;
+    state->paths.narrowing = state->compliant.adaptation.narrowing;
 }
 
 /* Returns whether the gait clock waits for feet at the ends of their swings (C50). */
@@ -172,10 +172,10 @@ static void plan_afresh(const hxControllerModel *model, int waiting, hxControlle
   plan_step(model, state, 1, 1, first, step_at(state, 1));
 }
 
-/* Advances to the planned next step and plans the one after it. told: the command has changed, so
+/* Advances to the planned next step and plans the one after it. command_changed: so
  * the plan is void. */
-static void advance(const hxControllerModel *model, int told, hxControllerState *state) {
-  const int due = told || !state->has_after;
+static void advance(const hxControllerModel *model, int command_changed, hxControllerState *state) {
+  const int due = command_changed || !state->has_after;
   note_contacts(model, state);
   narrow(model, state);
   if (due || state->paths.held) {
@@ -349,9 +349,9 @@ static void ask(const hxControllerModel *model, hxControllerState *state, hxStan
   hxPlane *feet = plan->feet;
   double height[HX_LEGS];
   hxDemand demand;
-  hx_inverse_dynamics_demand(&model->laws.dynamics, model->leg, &motion, output->speed_ref,
-                             &now->posture,
-                             hx_sway_laden(&model->laws.sway, &state->compliant.warmth), &demand);
+  hx_inverse_dynamics_demand(
+      &model->laws.dynamics, model->leg, &motion, output->speed_ref, &now->posture,
+      hx_sway_laden(&model->laws.sway, &state->compliant.adaptation), &demand);
   plan->overspeed = 0;
   for (int k = 0; k < HX_LEGS; ++k) {
     feet[k] = hx_plane_add(now->plane[k], now->shift[k]);
@@ -365,7 +365,7 @@ static void ask(const hxControllerModel *model, hxControllerState *state, hxStan
   }
   demand.moment = hx_plane_add(demand.moment, hx_scaled(state->compliant.laws.lean, demand.weight));
   hx_support_shares(feet, &demand, &plan->shares);
-  hx_planned_squeeze_add(&model->laws.squeeze, feet, &demand, state->compliant.warmth.squeeze,
+  hx_planned_squeeze_add(&model->laws.squeeze, feet, &demand, state->compliant.adaptation.squeeze,
                          &plan->shares);
   hx_compliance_plan(&model->laws.laws, &demand, height, now->feet.rise, plan);
   stance->value = now->value;
@@ -397,10 +397,10 @@ void hx_controller_tick(const hxControllerModel *model, const hxControllerInput 
   const double command[HX_COMMANDS] = {input->command.vx,       input->command.vy,
                                        input->command.yaw_rate, input->command.height,
                                        input->command.roll,     input->command.pitch};
-  const int told = hx_command_ramp_aim(&model->ramp, command, &state->ramp);
+  const int command_changed = hx_command_ramp_aim(&model->ramp, command, &state->ramp);
   hxStance stance;
   /* the first tick commands the stance, whatever the input */
-  if (state->tick > 0) advance(model, told, state);
+  if (state->tick > 0) advance(model, command_changed, state);
   ++state->tick;
   follow_paths(model, state);
   if (model->paper) correct_paths(model, input, state);

@@ -11,7 +11,7 @@
 /* Changes of gait and control are rare: their functions are compiled for size, because wheels
  * contain them for every platform. */
 #if defined(__GNUC__)
-#define HX_SELDOM __attribute__((cold, noinline))
+#define HX_SELDOM __attribute__((cold, noinline, unused))
 #else
 #define HX_SELDOM
 #endif

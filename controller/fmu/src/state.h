@@ -90,6 +90,10 @@ void hx_controller_change(hxControllerModel model[2], hxControllerState *state);
 void hx_controller_exchange(hxControllerModel *model, const hxFootPathsModel *before,
                             hxControllerState *state);
 
+/* Checks the range of every number of an input. On failure message says which value was got and
+ * what was expected. */
+hxStatus hx_controller_input_check(const hxControllerInput *input, char *message);
+
 /* Computes one tick; state->output then holds the commands for this input. */
 void hx_controller_tick(const hxControllerModel *model, const hxControllerInput *input,
                         hxControllerState *state);

@@ -1,10 +1,9 @@
-#include "validation.h"
-
+/* validation.c - checks of definitions and inputs. */
 #include <math.h>
 
 #include "hexapod/message.h"
 #include "hexapod/range_check.h"
-#include "plane.h"
+#include "state.h"
 
 static void legs(hxChecker *c, const hxControllerDefinition *d) {
   char name[32];

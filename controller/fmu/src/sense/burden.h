@@ -3,10 +3,8 @@
 #ifndef HX_BURDEN_H
 #define HX_BURDEN_H
 
+#include "../plane.h"
 #include "hexapod/controller.h"
-#include "hexapod/inside.h"
-
-HX_HIDDEN_BEGIN
 
 typedef struct hxBurdenModel {
   double most; /* N m, largest torque that a servo may be commanded */
@@ -23,16 +21,40 @@ typedef struct hxBurden {
   int overburdened; /* the robot is far too heavy: kinematic control */
 } hxBurden;
 
-void hx_burden_compile(const hxControllerDefinition *definition, hxBurdenModel *model);
-void hx_burden_reset(hxBurden *burden);
+/* 1, of the time in which the support follows the weight, for the measured weight */
+static const double quick = 0.2;
+/* 1, part of the needed torque that servos may give */
+static const double no_support = 0.54, full_support = 0.84;
+/* 1, of the allowed torque, needed to carry the measured weight */
+static const double support_helps = 1.35, support_fails = 1.5;
+/* 1, measured over modelled weight; values outside are not taken as weights */
+static const double lightest = 0.5, heaviest = 4.0;
+
+static inline void hx_burden_compile(const hxControllerDefinition *definition,
+                                     hxBurdenModel *model) {
+  model->most = definition->gains.limits.torque;
+  model->fade = hx_decay(-definition->period / definition->gait.period);
+  model->follow =
+      1.0 - hx_decay(-definition->period / (quick * definition->gains.support.weight_time));
+}
+
+static inline void hx_burden_reset(hxBurden *burden) { *burden = (hxBurden){1.0, 0.0, 1.0, 0}; }
 
 /* Takes the measured over the modelled weight of this period (C32). */
-void hx_burden_weigh(const hxBurdenModel *model, double ratio, hxBurden *burden);
+static inline void hx_burden_weigh(const hxBurdenModel *model, double ratio, hxBurden *burden) {
+  burden->heft += model->follow * (hx_clamp(ratio, lightest, heaviest) - burden->heft);
+}
 
 /* Advances by one period (C31, C32). needed: largest torque to carry the model's weight [N m];
  * scale: measured over modelled weight, as the support assumes it [1]. */
-void hx_burden_step(const hxBurdenModel *model, double needed, double scale, hxBurden *burden);
-
-HX_HIDDEN_END
+static inline void hx_burden_step(const hxBurdenModel *model, double needed, double scale,
+                                  hxBurden *burden) {
+  burden->peak = hx_larger(needed, model->fade * burden->peak);
+  burden->overburdened = burden->heft * burden->peak >
+                         model->most * (burden->overburdened ? support_helps : support_fails);
+  const double allowed = model->most / hx_larger(scale * burden->peak, model->most);
+  burden->strength = hx_smaller(
+      allowed, hx_larger(full_support * (allowed - no_support) / (full_support - no_support), 0.0));
+}
 
 #endif
