@@ -30,10 +30,10 @@ from hexapod_cosim.extensions.study.report.heat import (
     SLIP,
     Array,
     heat_map,
-    label_of,
     mean_of,
     ticks_of,
 )
+from hexapod_cosim.extensions.study.report.tables import label_of
 from hexapod_cosim.extensions.study.summary import Results
 from hexapod_cosim.models import HexapodError
 
