@@ -28,7 +28,8 @@ COVERED := $(patsubst %,tests/%,fmi exchange plant native_control friction groun
 SANITIZED := $(SANITIZED_SHORT) tests/fmi/test_fmi_importers.py tests/fmi/test_endurance.py
 
 .PHONY: help setup demo test test-docs test-browser test-rerun test-importers test-platforms \
-	test-endurance test-native test-native-sanitize test-sanitize test-sanitize-short test-robots \
+	test-endurance test-native test-native-sanitize test-sanitize test-sanitize-short \
+	test-robots test-extensions \
 	test-wheels test-metadata wheels test-compilers fuzz fuzz-short lint-c check bench \
 	bench-quick bench-gym figures format generate \
 	fmu typing clean docs identify-campaign coverage lock audit
@@ -42,10 +43,11 @@ help:
 	@echo "make test-rerun  recordings as RRD, read back by Rerun; installs its wheel of 170 MB (1 min)"
 	@echo "make test-importers  the same walk through libcosim, Ecos, ... and how far each is from fmpy (2 min)"
 	@echo "make test-platforms  the binaries for all platforms, the wheel for Windows under Wine, Arm under qemu-user (installed with apt when root)"
-	@echo "make test-endurance  10,000 instances, 5,000 loadings, a million steps, threads, random calls (10 min)"
+	@echo "make test-endurance  10,000 instances, a million steps, threads (5 min)"
 	@echo "make test-native   the tests that are programs in C, run by ctest (1 min)"
 	@echo "make test-sanitize   these, the FMU's tests and random calls under address and undefined-behaviour sanitizers (5 min)"
 	@echo "make test-sanitize-short  the same without random calls and many instances (2 min)"
+	@echo "make test-extensions  each extension deleted in turn: the rest is installed anew and passes its tests (an hour)"
 	@echo "make test-robots  30 robots drawn at random, 0.5 to 30 kg: all designed for, all walk (3 min)"
 	@echo "make wheels    wheels for Linux, Windows and macOS, source distribution and SHA-256 list in dist/ (3 min)"
 	@echo "make test-wheels  these: sizes, tags, and the Linux wheel in an empty environment without a compiler (3 min)"
@@ -117,6 +119,10 @@ test-endurance: setup
 
 test-compilers: setup
 	HEXAPOD_COMPILERS=all $(BIN)/python -m pytest -q tests/trust/test_compilers.py
+
+# each extension deleted in turn: installs the rest anew and runs its tests
+test-extensions: setup
+	HEXAPOD_EXTENSIONS=all $(BIN)/python -m pytest -q tests/docs/test_extensions.py
 
 test-robots: setup
 	HEXAPOD_ROBOTS=all $(BIN)/python -m pytest -q -s tests/design/test_random_robots.py
@@ -230,7 +236,7 @@ ROBOTS ?= 20
 SECONDS ?= 6
 AT_A_TIME ?= 1
 identify-campaign: setup
-	PYTHONPATH=tests/support $(BIN)/python -m benchmarks.identification --robots $(ROBOTS) --seconds $(SECONDS) \
+	PYTHONPATH=tests/support:tests/identify $(BIN)/python -m benchmarks.identification --robots $(ROBOTS) --seconds $(SECONDS) \
 		--workers $(AT_A_TIME) --table out/identification_$(SECONDS).csv
 
 docs: setup
