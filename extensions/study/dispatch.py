@@ -95,6 +95,7 @@ class _Dispatcher:
         """Runs an order while no other one is; a worker that dies is its failure."""
         self._submit((order,))
         while self._pending:
+            self._workers.size()  # raises an error when there are none
             for _, results in self._finished():
                 died = summary_without_figures(order, WHY_DIED, status=DIED)
                 self._sink.add([RunResult(order, died, 0.0)] if results is None else results)

@@ -123,10 +123,8 @@ def _check_held_out(training: Evaluation, held_out: Evaluation, where: str) -> N
 
     A seed draws the same changes in every scenario.
     """
-    names, seeds = (
-        sorted(set(one) & set(other))
-        for one, other in ((training.cases, held_out.cases), (training.seeds, held_out.seeds))
-    )
+    names = sorted(set(training.cases) & set(held_out.cases))
+    seeds = sorted(set(training.seeds) & set(held_out.seeds))
     what, fix = "a held-out scenario that is trained on", "name other scenarios"
     expected = "scenarios that the optimiser never sees"
     require(not names, names, expected, f"{where}.scenarios", what=what, fix=fix)

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from hexapod_cosim.cosim.results.comparison import change_of
 from hexapod_cosim.cosim.results.metrics import METRICS
@@ -38,7 +39,7 @@ def metric_names(asked: Optimise) -> list[str]:
     return list(dict.fromkeys([*asked.metrics, *(bound.metric for bound in asked.constraints)]))
 
 
-def means_of(walked: Array, values: Array, asked: Optimise) -> dict[str, float]:
+def means_of(walked: NDArray[np.bool_], values: Array, asked: Optimise) -> dict[str, float]:
     """Returns the means of the metrics of objectives and constraints, by name.
 
     A mean is over the walks that have the metric (a walk on the spot has no slip per metre). It

@@ -101,7 +101,9 @@ def make_sampler(study: Study) -> Any:
         ),
         "random": lambda: optuna.samplers.RandomSampler(seed=study.seed),
     }
-    directions = ["minimize" if METRICS[name][1] else "maximize" for name in asked.metrics]
+    directions: list[Any] = [
+        "minimize" if METRICS[name][1] else "maximize" for name in asked.metrics
+    ]
     return optuna.create_study(sampler=samplers[asked.sampler](), directions=directions)
 
 

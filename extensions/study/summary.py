@@ -210,9 +210,11 @@ def write_points(
     """
     study, starts = runs.study, groups.starts
     names = ["case", *(factor.name for factor in study.factors)]
-    given = {name: [row[k] for row in settings] for k, name in enumerate(names)}
+    given: dict[str, Any] = {name: [row[k] for row in settings] for k, name in enumerate(names)}
     given["point"] = runs.point[starts]
-    table = [(item, given[item.name]) for item in columns_of(study) if item.name in given]
+    table: list[tuple[Column, Any]] = [
+        (item, given[item.name]) for item in columns_of(study) if item.name in given
+    ]
     table.append((Column("held_out", BOOLEAN), runs.held_out[starts]))
     for control, found in groups.by_control.items():
         table.append((Column(f"{control}.runs", INTEGER), found.runs))

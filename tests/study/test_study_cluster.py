@@ -85,7 +85,7 @@ def test_without_workers_a_study_ends_with_what_is_stored_and_is_resumed_in_this
 
         with pytest.raises(
             StudyError,
-            match=r"the cluster has no workers.*dask worker tcp://.*stored so far are kept",
+            match=r"the cluster has no workers.*dask worker tcp://.*all stored runs are kept",
         ):
             study_on(kill_all)
     assert 0 < stored_count(study_of(TABLE), tmp_path / "out") < len(alone)
