@@ -9,7 +9,7 @@ LOCK ?=# a file of pinned requirements with hashes, which .ci/run gives; without
 PARALLEL := -n auto --maxprocesses 8 --dist loadfile --no-loadscope-reorder# a process a core; files stay whole, see tests/conftest.py
 CMAKE = PATH="$(CURDIR)/$(BIN):$$PATH" cmake
 # $(call CONFIGURE,NAME): build/NAME with the settings of tools/cmake/NAME.cmake
-CONFIGURE = $(CMAKE) -G Ninja -S . -B build/$(1) -C tools/cmake/$(1).cmake -DPython_EXECUTABLE=$(CURDIR)/$(BIN)/python --log-level=WARNING
+CONFIGURE = $(CMAKE) -G Ninja -S packaging -B build/$(1) -C tools/cmake/$(1).cmake -DPython_EXECUTABLE=$(CURDIR)/$(BIN)/python --log-level=WARNING
 BUILD = $(CMAKE) --build build/$(1) -- --quiet
 CTEST = PATH="$(CURDIR)/$(BIN):$$PATH" ctest --output-on-failure --test-dir build/$(1)
 CLANG_FORMAT = $(BIN)/clang-format --style=file:tools/clang-format.yaml
@@ -18,7 +18,7 @@ SANITIZER = rm -f $(REPORT).*; HEXAPOD_PRESET=sanitize ASAN_OPTIONS=detect_leaks
 	LD_PRELOAD=$$($(CC) -print-file-name=libasan.so)
 SANITIZED_END = || { cat $(REPORT).* 2>/dev/null; exit 1; }
 TYPING := build/typing/hexapod_cosim
-SOURCES := pyproject.toml CMakeLists.txt $(shell find fmi plant_fmu controller/fmu $(wildcard extensions/gym/policy_fmu) cosim/master/src cosim/master/include -type f) $(wildcard cosim/viewer/*.* cosim/viewer/src/*.ts cosim/viewer/src/*/*.ts)
+SOURCES := pyproject.toml packaging/CMakeLists.txt $(shell find fmi plant_fmu controller/fmu $(wildcard extensions/gym/policy_fmu) cosim/master/src cosim/master/include -type f) $(wildcard cosim/viewer/*.* cosim/viewer/src/*.ts cosim/viewer/src/*/*.ts)
 C_FILES = $(wildcard plant_fmu/src/*.[ch] plant_fmu/src/*/*.[ch] fmi/*.[ch] plant_fmu/*.c plant_fmu/include/hexapod/*.h controller/fmu/src/*.[ch] controller/fmu/src/*/*.[ch] controller/fmu/*.c controller/fmu/include/hexapod/*.h extensions/gym/policy_fmu/src/*.[ch] extensions/gym/policy_fmu/*.c extensions/gym/policy_fmu/include/hexapod/*.h cosim/master/src/*.[ch] cosim/master/include/hexapod/*.h extensions/live/wasm/*.[ch] tests/native/*.[ch] tests/native/probe/*.c tests/fuzz/*.[ch] benchmarks/native/*.[ch] benchmarks/native/*.cpp examples/*.c examples/c_library/*.c)
 EMPTY :=
 TEST_ROOMS := $(subst $(EMPTY) $(EMPTY),:,$(filter-out tests/native tests/conftest.py,$(wildcard tests/[a-z]*[a-z])))
@@ -28,7 +28,8 @@ COVERED := $(patsubst %,tests/%,fmi exchange plant native_control friction groun
 SANITIZED := $(SANITIZED_SHORT) tests/fmi/test_fmi_importers.py tests/fmi/test_endurance.py
 
 .PHONY: help setup demo test test-docs test-browser test-rerun test-importers test-platforms \
-	test-endurance test-native test-native-sanitize test-sanitize test-sanitize-short test-robots \
+	test-endurance test-native test-native-sanitize test-sanitize test-sanitize-short \
+	test-robots test-extensions \
 	test-wheels test-metadata wheels test-compilers fuzz fuzz-short lint-c check bench \
 	bench-quick bench-gym figures format generate \
 	fmu typing clean docs identify-campaign coverage lock audit
@@ -42,14 +43,15 @@ help:
 	@echo "make test-rerun  recordings as RRD, read back by Rerun; installs its wheel of 170 MB (1 min)"
 	@echo "make test-importers  the same walk through libcosim, Ecos, ... and how far each is from fmpy (2 min)"
 	@echo "make test-platforms  the binaries for all platforms, the wheel for Windows under Wine, Arm under qemu-user (installed with apt when root)"
-	@echo "make test-endurance  10,000 instances, 5,000 loadings, a million steps, threads, random calls (10 min)"
+	@echo "make test-endurance  10,000 instances, a million steps, threads (5 min)"
 	@echo "make test-native   the tests that are programs in C, run by ctest (1 min)"
 	@echo "make test-sanitize   these, the FMU's tests and random calls under address and undefined-behaviour sanitizers (5 min)"
 	@echo "make test-sanitize-short  the same without random calls and many instances (2 min)"
+	@echo "make test-extensions  each extension deleted in turn: the rest is installed anew and passes its tests (an hour)"
 	@echo "make test-robots  30 robots drawn at random, 0.5 to 30 kg: all designed for, all walk (3 min)"
 	@echo "make wheels    wheels for Linux, Windows and macOS, source distribution and SHA-256 list in dist/ (3 min)"
 	@echo "make test-wheels  these: sizes, tags, and the Linux wheel in an empty environment without a compiler (3 min)"
-	@echo "make test-metadata  conda recipe and release workflow, by the tools of their kinds (1 min)"
+	@echo "make test-metadata  citation, conda recipe and release workflow, by the tools of their kinds (1 min)"
 	@echo "make test-compilers  the plant built by gcc, clang and zig at -O0 to -O3: the same bits (3 min)"
 	@echo "make fuzz      libFuzzer on calls, states, start values and grids, Hypothesis on every reader: FUZZ_SECONDS, 3600 in all"
 	@echo "make fuzz-short  the same for a minute in all"
@@ -118,6 +120,10 @@ test-endurance: setup
 test-compilers: setup
 	HEXAPOD_COMPILERS=all $(BIN)/python -m pytest -q tests/trust/test_compilers.py
 
+# each extension deleted in turn: installs the rest anew and runs its tests
+test-extensions: setup
+	HEXAPOD_EXTENSIONS=all $(BIN)/python -m pytest -q tests/docs/test_extensions.py
+
 test-robots: setup
 	HEXAPOD_ROBOTS=all $(BIN)/python -m pytest -q -s tests/design/test_random_robots.py
 
@@ -141,6 +147,7 @@ ACTIONLINT := github.com/rhysd/actionlint/cmd/actionlint@v1.7.12
 test-metadata:
 	$(PYTHON) -m venv $(METADATA)
 	$(METADATA)/bin/python -m pip install --quiet check-jsonschema py-rattler-build
+	$(METADATA)/bin/check-jsonschema --builtin-schema vendor.citation-file-format CITATION.cff
 	$(METADATA)/bin/check-jsonschema --builtin-schema vendor.github-workflows .github/workflows/*.yml
 	$(METADATA)/bin/python tools/check_recipe.py packaging/conda/recipe.yaml
 	@if command -v go >/dev/null; then go run $(ACTIONLINT) .github/workflows/*.yml && echo "actionlint: no findings"; \
@@ -229,7 +236,7 @@ ROBOTS ?= 20
 SECONDS ?= 6
 AT_A_TIME ?= 1
 identify-campaign: setup
-	PYTHONPATH=tests/support $(BIN)/python -m benchmarks.identification --robots $(ROBOTS) --seconds $(SECONDS) \
+	PYTHONPATH=tests/support:tests/identify $(BIN)/python -m benchmarks.identification --robots $(ROBOTS) --seconds $(SECONDS) \
 		--workers $(AT_A_TIME) --table out/identification_$(SECONDS).csv
 
 docs: setup

@@ -54,7 +54,8 @@ def build(targets: Sequence[str]) -> None:
     search = os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])
     cmake = shutil.which("cmake", path=search) or "cmake"
     generator = [] if (BUILD / "CMakeCache.txt").exists() else ["-G", "Ninja"]
-    where = ["-S", str(ROOT), "-B", str(BUILD), "-C", str(ROOT / "tools" / "cmake" / "fuzz.cmake")]
+    settings = ROOT / "tools" / "cmake" / "fuzz.cmake"
+    where = ["-S", str(ROOT / "packaging"), "-B", str(BUILD), "-C", str(settings)]
     for command in (
         [cmake, *where, f"-DPython_EXECUTABLE={sys.executable}", *generator],
         [cmake, "--build", str(BUILD), "--target", *targets],

@@ -105,6 +105,7 @@ def test_an_interrupt_writes_the_table_of_the_completed_runs(
         ([*KINEMATIC, *KINEMATIC], ["two controls with one label"]),
         (["--split", "train"], ["unknown split", "judge"]),
         (["--control", "missing.py:Law"], ["missing.py"]),
+        (["--control", "kinematic", "--without", "posture"], ["--without: ", "got 'kinematic'"]),
         (["--case", "rough_11"], ["unknown case", "rough_10"]),
         (["--seeds", "0"], ["--seeds", "1 to 1000"]),
         (["--workers", "0"], ["--workers", "1 to"]),

@@ -55,33 +55,6 @@ def test_the_squeeze_follows_the_hottest_servo(share: float, expected: float) ->
     assert adaptation.squeeze == pytest.approx(expected, abs=1e-6)
 
 
-def test_the_weight_of_the_squeeze_is_no_steeper_than_the_design_page_says() -> None:
-    """The margins of its loops, which docs/control/design.md gives, follow from these slopes."""
-    held, work = [], []
-    for share in np.linspace(0.7, 0.9, 401):
-        adaptation = make(0.3)
-        adaptation.step(loaded(0.1), 0.5, share)
-        held.append(adaptation.squeeze)
-    for part in np.linspace(0.9, 1.3, 401):
-        adaptation = make(0.3)
-        adaptation.work = np.full((6, 3), part * RATING**2)
-        adaptation.follow_work = 0.0
-        adaptation.step(loaded(0.1), 0.5, LOST)
-        work.append(adaptation.squeeze)
-    assert np.diff(held).max() / 0.0005 == pytest.approx(65.0 / 7.0, rel=1e-6)
-    assert np.diff(work).max() / 0.001 == pytest.approx(3.25, rel=1e-6)
-
-
-def test_cool_servos_keep_the_weight_that_was_set_and_none_stays_none() -> None:
-    for squeeze in (0.0, 0.3, 0.97):
-        adaptation = make(squeeze)
-        assert adaptation.squeeze == squeeze
-    nothing = make(0.0)
-    nothing.heat = np.full((6, 3), 10.0)
-    nothing.step(loaded(9.0), 2.0, 1.0)
-    assert nothing.squeeze == 0.0
-
-
 def weighed(adaptation: LoadAdaptation, heft: float, *, held: float = LOST) -> LoadAdaptation:
     """Returns the adaptation after ten cycles with cool servos and a constant weight."""
     for _ in range(round(10.0 * CYCLE / PERIOD)):
@@ -104,27 +77,6 @@ def test_a_weight_above_the_models_narrows_the_stance_and_spares_the_squeeze(
 def test_in_the_narrow_stance_ground_that_holds_does_not_raise_the_squeeze() -> None:
     assert weighed(make(narrows=True), 1.0, held=1.0).squeeze == pytest.approx(0.95)
     assert weighed(make(narrows=True), 1.4, held=1.0).squeeze == pytest.approx(0.1)
-
-
-def test_a_gait_without_a_narrow_stance_keeps_its_squeeze_under_any_weight() -> None:
-    found = weighed(make(), 2.0)
-    assert (found.narrowing, found.squeeze) == (0.0, 0.4)
-
-
-def test_a_saved_load_adaptation_goes_on_the_same_and_a_reset_one_is_cool() -> None:
-    adaptation, other = make(), make()
-    for _ in range(1000):
-        adaptation.step(loaded(4.0), 0.5, LOST)
-    other.restore(adaptation.save())
-    for one in (adaptation, other):
-        one.step(loaded(2.0), 0.5, LOST)
-    assert adaptation.squeeze == other.squeeze > 0.4
-    assert (adaptation.heat == other.heat).all()
-    assert (adaptation.work == other.work).all()
-    adaptation.reset()
-    assert adaptation.squeeze == 0.4
-    assert not adaptation.heat.any()
-    assert not adaptation.work.any()
 
 
 @pytest.mark.parametrize(

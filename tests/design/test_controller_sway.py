@@ -22,7 +22,6 @@ from hexapod_cosim.models import load_robot
 
 ROBOTS = ["athena", "phantomx_mk4"]
 ROUND_OFF = 1e-12  # m
-CURVED = 2e-3  # m/s    h^2/6 times the third derivative of a swing, 500 m/s3
 HEAVY = 1.4  # 1    weight over that of the model
 
 
@@ -126,38 +125,6 @@ def test_a_standing_foot_keeps_its_place_on_the_ground(sway: bool) -> None:
         last = ground
     assert (max(ways) > 1e-3) == sway
     assert max(ways) < 5e-3  # m
-
-
-@pytest.mark.parametrize("narrowing", [0.25, 1.0])
-def test_the_sway_grows_with_the_way_to_the_narrow_stance(narrowing: float) -> None:
-    """Under one weight, so that the part of it that counts is set as well."""
-    controller = walk("athena", sway=True)
-    assert controller.compliant is not None
-    now, sway = controller._now, controller.compliant.sway
-    feet = now.feet._replace(plane=now.feet.plane + 0.01)
-    ways = []
-    for part in (1.0, narrowing):
-        controller.compliant.adaptation = Weighed(1.0 + (HEAVY - 1.0) / part, part)
-        assert sway.acts(controller.compliant.adaptation)
-        ways.append(controller._lay_out(now.value, now.posture, feet).sway)
-    assert abs(ways[0]) > 1e-3  # m
-    assert ways[1] == pytest.approx(narrowing * ways[0], rel=1e-12)
-
-
-def test_a_foot_that_swings_has_the_speed_of_its_places() -> None:
-    """Seen from the torso, by differences of the planned feet over whole sections."""
-    controller, measurement = walk("athena", sway=True), Measurement()
-    checked = 0
-    for step in range(600):
-        controller.step(step * PERIOD, BodyCommand(vx=0.06), measurement)
-        if controller._before is not None and controller._after is not None and step > 300:
-            places = [x.plane for x in (controller._before, controller._after)]
-            rate = (places[1] - places[0]) / (2.0 * PERIOD)
-            shift = controller._rate_of("shift")
-            gap = controller._planned_feet().velocity - shift - rate
-            assert np.abs(gap).max() < CURVED
-            checked += 1
-    assert checked > 200
 
 
 def test_the_torso_does_not_sway_without_payload_or_part_and_under_other_controls() -> None:

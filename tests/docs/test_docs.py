@@ -28,7 +28,7 @@ DOCS = ROOT / "docs"
 NOTEBOOKS = sorted((DOCS / "notebooks").glob("*.ipynb"))
 PAGES = [
     ROOT / name for name in ("README.md", ".github/CONTRIBUTING.md", "benchmarks/README.md")
-] + sorted(DOCS.rglob("*.md"))
+] + sorted([*DOCS.rglob("*.md"), *(ROOT / "extensions").glob("*/README.md")])
 SHORT, PLAIN = "duration=2", ["--set", "outputs.plots=false"]
 COMPUTED = os.environ.get("HEXAPOD_SITE") == "computed"
 of_the_site = pytest.mark.skipif(not COMPUTED, reason="built by make test-docs")

@@ -21,9 +21,10 @@ def read_yaml(path: str) -> Any:
     return yaml.safe_load((ROOT / path).read_text(encoding="utf-8"))
 
 
-def test_the_conda_recipe_has_the_version_of_the_project() -> None:
+def test_versions_are_the_project_s() -> None:
     recipe = read_yaml("packaging/conda/recipe.yaml")
     assert recipe["context"]["version"] == PROJECT["version"]
+    assert read_yaml("CITATION.cff")["version"] == PROJECT["version"]
 
 
 def test_the_conda_recipe_requires_what_the_wheel_requires() -> None:

@@ -65,7 +65,7 @@ def _configure() -> subprocess.CompletedProcess[str]:
     fresh = not (BUILD / "CMakeCache.txt").exists()
     generator = ["-G", "Ninja"] if fresh and shutil.which("ninja", path=_search_path()) else []
     settings = str(ROOT / "tools" / "cmake" / f"{PRESET}.cmake")
-    where = ["-S", str(ROOT), "-B", str(BUILD), "-C", settings]
+    where = ["-S", str(ROOT / "packaging"), "-B", str(BUILD), "-C", settings]
     return _cmake(*where, f"-DPython_EXECUTABLE={sys.executable}", *generator)
 
 

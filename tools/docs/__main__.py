@@ -12,7 +12,6 @@ from pathlib import Path
 
 from sphinx.cmd.build import main as sphinx
 
-from hexapod_cosim.extensions.live.static_page import write_static_page
 from tools.docs import validation, variables
 from tools.docs.stage import DOCS, ROOT, add_page, pages, write
 
@@ -56,7 +55,10 @@ def build(out: Path, *, work: Path, computed: bool = True) -> int:
     if computed:
         validation.fill(work)
     out.mkdir(parents=True, exist_ok=True)
-    write_static_page(out / WALK)
+    if (ROOT / "extensions" / "live").is_dir():
+        from hexapod_cosim.extensions.live.static_page import write_static_page  # noqa: PLC0415
+
+        write_static_page(out / WALK)
     options = ["-W", "--keep-going", "-q", "-n", "-E", "-j", "auto", "-c", str(DOCS)]
     options += ["-D", f"nb_execution_mode={'force' if computed else 'off'}"]
     return int(sphinx([*options, "-d", str(work / ".doctrees"), str(work), str(out)]))
