@@ -91,7 +91,7 @@ from hexapod_cosim.cosim.cli import main
         ),
         (["export", "--gait", "wave", "--fmi", "3"], ["got '--gait'"]),
         (["export", "-o", "athena.zip"], [".fmu"]),
-        (["export", "-o", "."], ["got '.'", "not a folder", "write -o athena.fmu"]),
+        (["export", "-o", "."], ["got '.'", "ends in .fmu", "write -o athena.fmu"]),
         (["export", "--fmi", "7"], ["FMI version", "got 7"]),
         (["export", "--platforms", "amiga"], ["amiga"]),
         (["design", "--robot", "atena"], ["unknown robot"]),
