@@ -26,11 +26,12 @@ from hexapod_cosim.controller import BodyCommand, ControllerError, Gains, Gait, 
 from hexapod_cosim.cosim.common.closing import Closing
 from hexapod_cosim.cosim.common.temporary import TemporaryFolder
 from hexapod_cosim.cosim.control.controllers import make_controller
+from hexapod_cosim.cosim.control.fmu_law import FmuLaw, law_of_ours
 from hexapod_cosim.cosim.export.controller_export import export_controller
 from hexapod_cosim.cosim.interface.controller_interface import controller_parameters
 from hexapod_cosim.cosim.master.fmu import Fmu
-from hexapod_cosim.cosim.master.fmu_controller import FmuController
 from hexapod_cosim.cosim.master.loop import JointController
+from hexapod_cosim.cosim.master.sensors import errors_of
 from hexapod_cosim.cosim.master.signals import Signals
 from hexapod_cosim.cosim.results.walk import robot_weight
 from hexapod_cosim.cosim.run.preparation import PlantFmus
@@ -39,7 +40,6 @@ from hexapod_cosim.cosim.run.single_run import (
     apply_settings,
     initialise_plant,
     make_plan,
-    make_sensor,
 )
 from hexapod_cosim.cosim.scenario.controls import control_of
 from hexapod_cosim.extensions.live.gait_change import GaitChange, plan_change
@@ -147,7 +147,7 @@ class LiveRobot(Closing):
         endless = replace(self.plan, scenario=replace(scenario, duration=HORIZON))
         self.parameters = initialise_plant(self._plant, endless)
         self.weight = robot_weight(self.parameters)
-        self.signals = Signals(self._plant, sensor=make_sensor(scenario, self.plan.schedule))
+        self.signals = Signals(self._plant, errors=errors_of(scenario, self.plan.schedule))
         self.signals.read()
         self._last = JointCommand(angle_ref=self.signals.measurement.angle.copy())
         self._start_controller()
@@ -247,7 +247,7 @@ class LiveRobot(Closing):
         controller.start(self.time, HORIZON, BodyCommand(), self.signals.measurement)
         return controller
 
-    def _start_built_in(self) -> FmuController:
+    def _start_built_in(self) -> FmuLaw:
         """Returns the controller FMU with the plan's parameters, and gains for each control."""
         setup = self.plan.controller
         parameters = controller_parameters(replace(setup, gains=setup.gains or self._gains))
@@ -258,7 +258,7 @@ class LiveRobot(Closing):
         self._built_in.reset()
         self._built_in.set_parameters(parameters)
         self._built_in.initialise(self.time, HORIZON)
-        return FmuController(self._built_in, period=setup.period)
+        return law_of_ours(self._built_in, period=setup.period)
 
     # ------------------------------------------------------------------------------- steps
 

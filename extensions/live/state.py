@@ -16,8 +16,8 @@ from hexapod_cosim.cosim.results.walk import robot_weight
 from hexapod_cosim.extensions.live.pacing import Pacer
 from hexapod_cosim.extensions.live.robot import LiveRobot
 from hexapod_cosim.models import LEG_NAMES, Robot
+from hexapod_cosim.models.ground.faces import surface_of
 from hexapod_cosim.models.kinematics import rotation_matrix
-from hexapod_cosim.models.terrain import surface_of
 
 Array = NDArray[np.float64]
 
