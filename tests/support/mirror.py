@@ -15,7 +15,9 @@ ROOT = Path(__file__).resolve().parents[2]
 HEADERS = (
     ROOT / "plant_fmu/include/hexapod/legs.h",
     ROOT / "plant_fmu/include/hexapod/status.h",
+    ROOT / "plant_fmu/include/hexapod/generated/plant_settings.h",
     ROOT / "plant_fmu/include/hexapod/hexapod.h",
+    ROOT / "controller/fmu/include/hexapod/generated/controller_settings.h",
     ROOT / "controller/fmu/include/hexapod/controller.h",
 )
 COMMENT = re.compile(r"/\*.*?\*/", re.DOTALL)
