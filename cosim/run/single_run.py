@@ -66,9 +66,9 @@ from hexapod_cosim.cosim.scenario.variation import (
     initial_values,
 )
 from hexapod_cosim.models import LEG_NAMES, FmuError, Robot
+from hexapod_cosim.models.ground.faces import surface_of
 from hexapod_cosim.models.ground.grid_file import grid_bytes
 from hexapod_cosim.models.ground.surface import Surface
-from hexapod_cosim.models.terrain import surface_of
 
 # parameters with these prefixes describe the robot; all others are settings
 BODY_PARAMETERS = ("torso.", "foot.", *(f"{leg}." for leg in LEG_NAMES))

@@ -50,7 +50,7 @@ from hexapod_cosim.cosim.run.single_run import (
 from hexapod_cosim.cosim.scenario.controls import FMU, Control, control_of
 from hexapod_cosim.cosim.scenario.records import Scenario
 from hexapod_cosim.models import HexapodError, Robot
-from hexapod_cosim.models.records import BRISTLE_LAWS
+from hexapod_cosim.models.friction import BRISTLE_LAWS
 
 MAX_SETTINGS = 64  # robots whose settings are kept
 

@@ -138,7 +138,7 @@ def _check_gain(factor: Factor, study: Study, where: str) -> None:
     for value in samples(factor):
         plain = is_number(value) and not factor.unit
         require(plain, value, "numbers without a unit", where, what=what, fix=fix)
-        require(allowed.holds(float(value)), value, allowed.range_text(), where, what=what)
+        require(allowed.holds(float(value)), value, allowed.expected, where, what=what)
     fix = 'add "compliant" to the controls, or take the gain away: kinematic control has none'
     expected, what = "compliant or paper among the controls", "a gain that no run has"
     require(study.gains_text is not None, factor.name, expected, where, what=what, fix=fix)

@@ -32,8 +32,9 @@ from hexapod_cosim.extensions.identify.rigid.regressor import (
 from hexapod_cosim.extensions.identify.rigid.samples import lacking
 from hexapod_cosim.extensions.identify.unknowns import ROBOT, chosen_unknowns
 from hexapod_cosim.models import Robot, load_robot
-from hexapod_cosim.models.contact import foot_contacts, foot_force
+from hexapod_cosim.models.contact.geometry import foot_contacts, foot_force
 from hexapod_cosim.models.dynamics import Command, accelerations
+from hexapod_cosim.models.ground.faces import ground_normal
 from hexapod_cosim.models.kinematics import (
     cross,
     joint_angles,
@@ -41,7 +42,6 @@ from hexapod_cosim.models.kinematics import (
     joint_speeds,
     rotation_matrix,
 )
-from hexapod_cosim.models.terrain import ground_normal
 
 Array = np.ndarray
 DAMPING = 1.0  # s/m    of feet in the ground

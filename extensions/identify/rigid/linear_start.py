@@ -38,12 +38,12 @@ from hexapod_cosim.extensions.identify.rigid.regressor import (
 from hexapod_cosim.extensions.identify.rigid.samples import Samples, lacking, samples_of
 from hexapod_cosim.extensions.identify.unknowns import CURRENT, DELAYS, value_before
 from hexapod_cosim.models import Robot
+from hexapod_cosim.models.ground.faces import ground_normal
 from hexapod_cosim.models.servos.motor import (
     back_emf_damping,
     friction_torque,
     has_measured_friction,
 )
-from hexapod_cosim.models.terrain import ground_normal
 
 Array = NDArray[np.float64]
 LONGEST_SHIFT = 10  # rows between a command and the reading that it causes

@@ -8,11 +8,12 @@ from __future__ import annotations
 
 import numpy as np
 
+from hexapod_cosim.models.arrays import Array
+from hexapod_cosim.models.contact.forces import Candidate, Contacts
 from hexapod_cosim.models.ground.blocks import cell_at
+from hexapod_cosim.models.ground.faces import surface_of
 from hexapod_cosim.models.ground.surface import Surface
-from hexapod_cosim.models.records import Array, Robot
-from hexapod_cosim.models.terrain import surface_of
-from hexapod_cosim.models.touch.forces import Contacts, Spot
+from hexapod_cosim.models.records import Robot
 
 LEAST_FOOTPRINT = 1e-6  # m  shallower ones are not kept
 
@@ -32,12 +33,12 @@ def deepest(start: float, slope_start: float, end: float, slope_end: float) -> f
     return max(top, start, end)
 
 
-def place_of_print(robot: Robot, contacts: Contacts, spot: Spot, centre: Array) -> Array:
-    """Returns where (2,) [m] a sphere loses its print's bottom; of a foot that keeps its block, the
-    nearest place over that block.
+def place_of_footprint(robot: Robot, contacts: Contacts, point: Candidate, centre: Array) -> Array:
+    """Returns where (2,) [m] a sphere loses the bottom of its footprint; of a foot that keeps its
+    block, the nearest place over that block.
     """
     surface, place = surface_of(robot.terrain), centre[:2]
-    cell = contacts.cell[spot.leg] if spot.leg >= 0 else None
+    cell = contacts.cell[point.leg] if point.leg >= 0 else None
     if surface is None or cell is None:
         return place
     if surface.height[cell_at(surface, *place.tolist())] == surface.height[cell]:

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from hexapod_cosim.models.arrays import Array
 from hexapod_cosim.models.kinematics import JOINTS, LEGS, rotation_matrix
-from hexapod_cosim.models.records import Array, Robot
+from hexapod_cosim.models.records import Robot
 
 RING = (0, 1, 2, 5, 4, 3)  # legs around the torso: LF LM LR RR RM RF
 PARALLEL = 1e-12  # 1  squared sine below which lines are parallel

@@ -11,10 +11,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hexapod_cosim.models.body.clearance import RING, leg_points, nearest_shares
-from hexapod_cosim.models.contact import FootContact
+from hexapod_cosim.models.arrays import Array
+from hexapod_cosim.models.contact.clearance import RING, leg_points, nearest_shares
+from hexapod_cosim.models.contact.geometry import FootContact
 from hexapod_cosim.models.kinematics import JOINTS, LEGS, cross
-from hexapod_cosim.models.records import Array, Robot
+from hexapod_cosim.models.records import Robot
 
 LINES = 2  # femur and tibia
 NEXT = {leg: RING[(k + 1) % LEGS] for k, leg in enumerate(RING)}

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from hexapod_cosim.models.arrays import Array
 from hexapod_cosim.models.ground.blocks import (
     FACES,
     TOP,
@@ -16,7 +17,7 @@ from hexapod_cosim.models.ground.blocks import (
 )
 from hexapod_cosim.models.ground.smooth import height_and_slopes, heights_at, smooth_distance
 from hexapod_cosim.models.ground.surface import Surface
-from hexapod_cosim.models.records import Array, Terrain
+from hexapod_cosim.models.records import Terrain
 
 Face = tuple[float, Array]  # distance [m], positive above the ground, and unit normal (3,)
 

@@ -1,106 +1,21 @@
-"""Computes the contact of a foot: normal force with restitution (eq. 14), and the friction of
-friction.py on it.
+"""Computes where spheres touch the ground, how fast, and with which force.
 
-f_n = K delta^1.5 max(0, 1 + d ddelta). Touch-down fixes d [s/m] by the approach speed, and d holds
-until lift-off. Most laws have the form d = chi(e) / v0 and differ in chi(e).
+The normal force is that of law.py, friction that of friction.py.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
 
+from hexapod_cosim.models.contact.law import Contact, contact_damping, normal_force
 from hexapod_cosim.models.friction import friction_force, turning_moment
+from hexapod_cosim.models.ground.faces import Face, ground_faces
 from hexapod_cosim.models.kinematics import JOINTS, LEGS, cross, foot_centres, skew
-from hexapod_cosim.models.records import Array, Contact, Robot
-from hexapod_cosim.models.terrain import Face, ground_faces
-
-# below it the closed form of _log_rest loses more digits than its series omits
-SERIES_BELOW = 1e-2
-SERIES_TERMS = 9
-
-
-def _log_rest(x: float) -> float:
-    """Returns (ln(1 + x) - x) / x^2 without cancellation near 0, for x > -1."""
-    if abs(x) < SERIES_BELOW:
-        return sum((-1.0) ** (n + 1) * x ** (n - 2) / n for n in range(2, 2 + SERIES_TERMS))
-    return (math.log1p(x) - x) / (x * x)
-
-
-def _balance(chi: float, e: float) -> float:
-    """Returns [ln(1 + chi) - ln(1 - chi e) - chi (1 + e)] / chi^2.
-
-    It is 0 for a law with chi whose restitution is exactly e.
-    """
-    return _log_rest(chi) - e * e * _log_rest(-chi * e) if chi * e < 1.0 else math.inf
-
-
-def _bisect(function: Callable[[float], float], low: float, high: float) -> float:
-    """Returns the root, to the last bit, of a function that is negative at low and positive at
-    high.
-    """
-    while low < (middle := 0.5 * (low + high)) < high:
-        low, high = (middle, high) if function(middle) < 0.0 else (low, middle)
-    return 0.5 * (low + high)
-
-
-def exact_restitution_chi(e: float) -> float:
-    """Returns chi of the law with exact restitution e in (0, 1].
-
-    It solves chi (1 + e) = ln[(1 + chi)/(1 - chi e)].
-    """
-    return 0.0 if e >= 1.0 else _bisect(lambda chi: _balance(chi, e), 0.0, 1.0 / e)
-
-
-def achieved_restitution(chi: float) -> float:
-    """Returns the restitution of a law with chi > 0, from the same equation solved for e."""
-    return 1.0 if chi <= 0.0 else _bisect(lambda e: _balance(chi, e), 0.0, min(1.0, 1.0 / chi))
-
-
-CHI: dict[str, Callable[[float], float]] = {
-    "exact_restitution": exact_restitution_chi,
-    "flores": lambda e: 8.0 * (1.0 - e) / (5.0 * e),
-    "lankarani_nikravesh": lambda e: 0.75 * (1.0 - e * e),
-    "hunt_crossley": lambda e: 1.5 * (1.0 - e),
-}
-
-
-def contact_damping(contact: Contact, impact_speed: float) -> float:
-    """Returns d [s/m] of a foot that touches down at this approach speed [m/s], or at the floor if
-    slower.
-    """
-    if contact.law == "hertz":
-        return 0.0
-    if contact.law == "constant_damping":
-        return 1.5 * contact.damping_factor
-    return CHI[contact.law](contact.restitution) / max(impact_speed, contact.impact_speed_floor)
-
-
-def normal_force(contact: Contact, damping: float, delta: float, ddelta: float) -> float:
-    """Returns f_n >= 0 [N] at penetration delta [m] and approach speed ddelta [m/s] (eq. 14).
-
-    damping: d [s/m]; nan: no contact.
-    """
-    if math.isnan(damping):
-        return 0.0
-    return contact.stiffness * float(max(delta, 0.0) ** 1.5) * max(0.0, 1.0 + damping * ddelta)
-
-
-def normal_slopes(
-    contact: Contact,
-    damping: float,
-    delta: float,
-    ddelta: float,
-) -> tuple[float, float]:
-    """Returns the derivatives of `normal_force` by delta [N/m] and by ddelta [N s/m]."""
-    factor = 1.0 + damping * ddelta
-    if math.isnan(damping) or factor <= 0.0:
-        return 0.0, 0.0
-    root = math.sqrt(max(delta, 0.0))
-    return 1.5 * contact.stiffness * root * factor, contact.stiffness * root**3 * damping
+from hexapod_cosim.models.records import Array, Robot
 
 
 @dataclass(frozen=True)

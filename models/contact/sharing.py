@@ -25,7 +25,7 @@ from itertools import combinations
 
 import numpy as np
 
-from hexapod_cosim.models.records import Array
+from hexapod_cosim.models.arrays import Array
 
 REACH = 25.0  # 1  of rho^2; 20 gives phi the slope of a hidden depth, more is on the safe side
 SINGULAR = 1e-9  # 1  least determinant of a G whose contacts count as different

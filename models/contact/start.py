@@ -8,14 +8,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from hexapod_cosim.models.records import Array, Foot, Robot, Soil
+from hexapod_cosim.models.arrays import Array
+from hexapod_cosim.models.contact.forces import candidates
+from hexapod_cosim.models.contact.switching import depths_of, start_contacts
+from hexapod_cosim.models.records import Foot, Robot, Soil
 from hexapod_cosim.models.soil.law import sinkage, virgin_force
-from hexapod_cosim.models.touch.forces import spots
-from hexapod_cosim.models.touch.switching import depths_of, start_contacts
 
 
 @dataclass(frozen=True)
-class Sunk:
+class DeepStart:
     """A sphere that starts deeper in the ground than it may."""
 
     name: str  # foot LF, knee LF, shank LF, torso corner
@@ -24,7 +25,7 @@ class Sunk:
     reason: str  # what the bound is
 
 
-def deepest_start(robot: Robot, body: Array) -> Sunk | None:
+def deepest_start(robot: Robot, body: Array) -> DeepStart | None:
     """Returns the sphere that is furthest below the depth at which it may start, of bodies (19,
     13); None if all may start.
 
@@ -32,23 +33,25 @@ def deepest_start(robot: Robot, body: Array) -> Sunk | None:
     where the soil carries the robot's weight on it alone, if that is deeper. Corners of the torso
     that are points may be as deep as feet, because the force at a depth is the same.
     """
-    contacts, found = start_contacts(robot, body), list[Sunk]()
+    contacts, found = start_contacts(robot, body), list[DeepStart]()
     depths = depths_of(robot, body, contacts).delta
-    for k, spot in enumerate(spots(robot)):
-        held, depth = contacts.held[k], float(depths[k] + contacts.sunk[k])
-        if not spot.may_sink:
+    for k, point in enumerate(candidates(robot)):
+        state, depth = contacts.states[k], float(depths[k] + contacts.soil_depth[k])
+        if not point.may_sink:
             continue
-        own = spot.sphere.radius
+        own = point.sphere.radius
         radius = own or robot.foot.radius
         reason = "its radius" if own > 0.0 else "the radius of a foot"
         bound = radius
-        if depth > radius and held.is_soft:
-            bound = _soil_bound(robot, held.soil, spot.shape(robot, held.side), radius)
+        if depth > radius and state.is_soft:
+            bound = _soil_bound(robot, state.soil, point.shape(robot, state.side), radius)
         if bound > radius:
             reason = "where the soil carries the robot's weight on it"
         if depth > bound:
-            leg, _, part = spot.sphere.name.rpartition(".")
-            found.append(Sunk(f"{part} {leg}" if leg else "torso corner", depth, bound, reason))
+            leg, _, part = point.sphere.name.rpartition(".")
+            found.append(
+                DeepStart(f"{part} {leg}" if leg else "torso corner", depth, bound, reason)
+            )
     return max(found, key=lambda one: one.depth - one.bound, default=None)
 
 

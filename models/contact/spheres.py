@@ -14,15 +14,17 @@ from itertools import product
 
 import numpy as np
 
-from hexapod_cosim.models.contact import (
+from hexapod_cosim.models.arrays import Array
+from hexapod_cosim.models.contact.geometry import (
     FootContact,
     foot_force,
     resting_damping,
     sphere_contact,
 )
+from hexapod_cosim.models.friction import Friction
+from hexapod_cosim.models.ground.faces import ground
 from hexapod_cosim.models.kinematics import JOINTS, LEGS, rotation_matrix
-from hexapod_cosim.models.records import Array, Friction, Robot
-from hexapod_cosim.models.terrain import ground
+from hexapod_cosim.models.records import Robot
 
 
 @dataclass(frozen=True)
