@@ -146,10 +146,11 @@ ACTIONLINT := github.com/rhysd/actionlint/cmd/actionlint@v1.7.12
 # tools of an environment of their own, which the project does not depend on
 test-metadata:
 	$(PYTHON) -m venv $(METADATA)
-	$(METADATA)/bin/python -m pip install --quiet check-jsonschema py-rattler-build
+	$(METADATA)/bin/python -m pip install --quiet check-jsonschema py-rattler-build zizmor
 	$(METADATA)/bin/check-jsonschema --builtin-schema vendor.citation-file-format CITATION.cff
 	$(METADATA)/bin/check-jsonschema --builtin-schema vendor.github-workflows .github/workflows/*.yml
 	$(METADATA)/bin/python tools/check_recipe.py packaging/conda/recipe.yaml
+	$(METADATA)/bin/zizmor --offline --quiet .github/workflows
 	@if command -v go >/dev/null; then go run $(ACTIONLINT) .github/workflows/*.yml && echo "actionlint: no findings"; \
 	else echo "test-metadata: skipped actionlint: no go is installed (Debian, Ubuntu: apt-get install golang)"; fi
 

@@ -286,12 +286,6 @@ class Scenario:
         """The events that are lost commands or dropped macro-steps."""
         return tuple(event for event in self.events if isinstance(event, Lost))
 
-    @property
-    def has_loop_faults(self) -> bool:
-        """Whether faults occur that the loop in Python alone knows."""
-        inner = self.servo_faults or self.lost or self.angle_faults or self.attitude_faults
-        return bool(inner) or any(event.fault in ("nan", "late") for event in self.faults)
-
     def to_table(self) -> dict[str, Any]:
         """Returns the scenario as the tables of an equivalent scenario file."""
         keys = ("title", "robot", "control", *PLAIN_KEYS, "seed")

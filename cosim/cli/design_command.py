@@ -1,25 +1,20 @@
-"""Defines the commands `hexapod validate` and `hexapod design`."""
+"""Defines the command `hexapod design`."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from hexapod_cosim.controller import Gains, save_gains
 from hexapod_cosim.cosim.cli import completion
-from hexapod_cosim.cosim.cli.export_command import DEFAULT_PERIOD, RobotName
-from hexapod_cosim.cosim.cli.terminal import Json, show_files, show_json, show_table, show_text
-from hexapod_cosim.cosim.common.files import not_writable
-from hexapod_cosim.cosim.export.robot_package import SUFFIX as PACKAGE_SUFFIX
-from hexapod_cosim.models import FmuError, HexapodError, load_robot
-from hexapod_cosim.models.robot import robot_path
+from hexapod_cosim.cosim.cli.export_command import DEFAULT_PERIOD
+from hexapod_cosim.cosim.cli.options import Json, RobotName
 
 if TYPE_CHECKING:
+    from hexapod_cosim.controller import Gains
     from hexapod_cosim.cosim.design.stance import StanceDesign
 
 MacroStep = Annotated[
@@ -44,54 +39,6 @@ StanceFlag = Annotated[
 ]
 
 
-class InvalidFmuError(FmuError):
-    """An FMU with problems.
-
-    `found` is the content of validate's --json output, which is printed beside the error.
-    """
-
-    def __init__(self, fmu: Path, problems: Sequence[str], what: str, **parts: Any) -> None:
-        super().__init__(what, **parts)
-        self.found = {"fmu": str(fmu), "valid": False, "problems": list(problems)}
-
-
-def validate(
-    fmu: Annotated[Path, typer.Argument(metavar="FILE.fmu", help="The FMU to check.")],
-    json: Json = False,
-) -> None:
-    """Check an FMU of ours and say what is wrong."""
-    if fmu.suffix == PACKAGE_SUFFIX:
-        fix = (
-            f"unpack it (`unzip {fmu.name} -d package`) and validate the FMUs in package/resources"
-        )
-        raise FmuError("packages are not checked here", got=fmu.name, expected="an FMU", fix=fix)
-    # imported only here because lxml and fmpy's checks are slow to import
-    from hexapod_cosim.cosim.validate.validation import find_problems  # noqa: PLC0415
-
-    try:
-        problems = find_problems(fmu)
-    except HexapodError as error:  # the FMU cannot be read
-        parts = {
-            "got": error.got,
-            "expected": error.expected,
-            "fix": error.fix,
-            "where": error.where,
-        }
-        raise InvalidFmuError(fmu, [str(error)], error.what, **parts) from error
-    if problems:
-        if not json:
-            print("\n".join(problems))
-        fix = "export it again with `hexapod export`"
-        what, got = "the FMU is not sound: problems", f"{len(problems)} of them"
-        raise InvalidFmuError(
-            fmu, problems, what, got=got, expected="none", fix=fix, where=str(fmu)
-        )
-    if json:
-        show_json({"fmu": str(fmu), "valid": True, "problems": []})
-    else:
-        print(f"{fmu}: no problems found")
-
-
 def design(
     robot: RobotName = "athena",
     macro_step: MacroStep = DEFAULT_PERIOD,
@@ -101,63 +48,57 @@ def design(
     json: Json = False,
 ) -> None:
     """Design the gains of compliant and paper control, with plots."""
-    # imported here because python-control and matplotlib are slow to import
-    from hexapod_cosim.controller.design import design_gains, plot_design  # noqa: PLC0415
-    from hexapod_cosim.cosim.design.design_check import check_design  # noqa: PLC0415
-    from hexapod_cosim.cosim.design.gain_design import examine_stances, read_requirements  # noqa: PLC0415
+    from hexapod_cosim.controller import save_gains
+    from hexapod_cosim.controller.design import design_gains, plot_design
+    from hexapod_cosim.cosim.cli.terminal import show_files, show_json, show_table
+    from hexapod_cosim.cosim.common.files import writing_into
+    from hexapod_cosim.cosim.design.design_check import check_design
+    from hexapod_cosim.cosim.design.gain_design import examine_stances, read_requirements
+    from hexapod_cosim.models import load_robot
 
     loaded, folder, files = load_robot(robot), output or Path("out") / "design", list[Path]()
-    found = design_stance(robot, folder) if stance else None
-    if found is not None:
-        files, loaded = [found.file], found.design.robot
+    found = None
+    if stance:
+        found, file = _find_stance(robot, folder)
+        files, loaded = [file], found.robot
     requirements = read_requirements(settings or [], loaded)
     plants, left_out = examine_stances(loaded, macro_step)
     gains = design_gains(
         loaded, macro_step, plants=plants, requirements=requirements, left_out=left_out
     )
     deviation = check_design(loaded, gains).error
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        gains_file = save_gains(gains, folder / "gains.toml")
-        files += [gains_file, *plot_design(loaded, gains, plants, folder)]
-    except OSError as error:
-        raise not_writable(folder, error) from error
+    with writing_into(folder):
+        files += [save_gains(gains, folder / "gains.toml")]
+        files += plot_design(loaded, gains, plants, folder)
     if json:
         names = [str(file) for file in files]
         content = {"gains": asdict(gains), "check_error": deviation, "files": names}
-        show_json(content if found is None else content | {"stance": stance_json(found.design)})
-    else:
-        if found is not None:
-            show_table(["stance", "before", "after"], stance_rows(found.design), right=(1, 2))
-        _show_design(gains, deviation)
-        show_files(files)
+        show_json(content if found is None else content | {"stance": _stance_json(found)})
+        return
+    if found is not None:
+        show_table(["stance", "before", "after"], _stance_rows(found), right=(1, 2))
+    _show_design(gains, deviation)
+    show_files(files)
 
 
-class FoundStance(NamedTuple):
-    """A stance and the robot file that it is written to."""
-
-    design: StanceDesign
-    file: Path
-
-
-def design_stance(robot: str, folder: Path) -> FoundStance:
+def _find_stance(robot: str, folder: Path) -> tuple[StanceDesign, Path]:
     """Finds the stance of least heat of a robot and writes NAME_stance.toml into a folder.
 
     The robot of the result is that of the written file. Raises GainsError.
     """
-    from hexapod_cosim.cosim.design.stance import find_stance, write_robot  # noqa: PLC0415
+    from hexapod_cosim.cosim.common.files import writing_into
+    from hexapod_cosim.cosim.design.stance import find_stance, write_robot
+    from hexapod_cosim.models import load_robot
+    from hexapod_cosim.models.robot import robot_path
 
     loaded = load_robot(robot)
     found, name = find_stance(loaded), f"{loaded.name}_stance"
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
+    with writing_into(folder):
         file = write_robot(robot_path(robot), found.robot, folder / f"{name}.toml", name=name)
-    except OSError as error:
-        raise not_writable(folder, error) from error
-    return FoundStance(replace(found, robot=load_robot(file)), file)
+    return replace(found, robot=load_robot(file)), file
 
 
-def stance_rows(found: StanceDesign) -> list[tuple[str, str, str]]:
+def _stance_rows(found: StanceDesign) -> list[tuple[str, str, str]]:
     """Returns the rows of the table of a stance: name, value of the robot's own, value found."""
     before, after = found.before, found.after
     rows = (
@@ -171,7 +112,7 @@ def stance_rows(found: StanceDesign) -> list[tuple[str, str, str]]:
     return [(name, f"{first:.4g}", f"{second:.4g}") for name, first, second in rows]
 
 
-def stance_json(found: StanceDesign) -> dict[str, Any]:
+def _stance_json(found: StanceDesign) -> dict[str, Any]:
     """Returns what --json prints of a stance."""
     return {
         "outward": found.outward,
@@ -183,7 +124,9 @@ def stance_json(found: StanceDesign) -> dict[str, Any]:
 
 def _show_design(gains: Gains, deviation: float) -> None:
     """Prints requirements and margins; deviation: of the FMU from the linear loop, relative."""
-    show_table(["requirement", "asked", "reached"], design_rows(gains), right=(1, 2))
+    from hexapod_cosim.cosim.cli.terminal import show_table, show_text
+
+    show_table(["requirement", "asked", "reached"], _design_rows(gains), right=(1, 2))
     show_text(f"binding: {gains.margins.binding}")
     for text in gains.caveats:
         show_text(text)
@@ -193,7 +136,7 @@ def _show_design(gains: Gains, deviation: float) -> None:
     )
 
 
-def design_rows(gains: Gains) -> list[tuple[str, str, str]]:
+def _design_rows(gains: Gains) -> list[tuple[str, str, str]]:
     """Returns the rows of the table of requirements: name, required value, reached value."""
     needs, reached, paper = gains.requirements, gains.margins, gains.paper
     rows = (

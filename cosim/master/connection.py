@@ -14,23 +14,24 @@ the FMU's:
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
-from hexapod_cosim.controller import BodyCommand
-from hexapod_cosim.cosim.interface.names import foot_names, foot_vector_names, vector_names
-from hexapod_cosim.cosim.master.fmu_controller import COMMANDS, FLAGS
-from hexapod_cosim.cosim.master.signals import ACCELERATION, COMMANDED, CONTACT, MEASURED
+from hexapod_cosim.cosim.interface.names import vector_names
+from hexapod_cosim.cosim.master.protocols import FmuVariable
+from hexapod_cosim.cosim.master.sensors import CONTACT, MEASURED, READINGS
+from hexapod_cosim.cosim.master.signals import ACCELERATION, COMMANDED, COMMANDS, JOINT_COMMANDS
 from hexapod_cosim.models import JOINT_NAMES, LEG_NAMES, FmuError, nearest_name
 from hexapod_cosim.models.files import read_text
 from hexapod_cosim.models.schema import decoding_toml, parse_toml
 
 MOST_SHOWN = 12  # names in a message
 # sources of inputs, in the order of the vector that source_vector() fills
-SOURCES = [*COMMANDS, *(name for names in MEASURED.values() for name in names), *CONTACT]
-# sinks of outputs: the plant's inputs
-SINKS = [*(name for names in COMMANDED.values() for name in names), *ACCELERATION]
+SOURCES = [*COMMANDS, *READINGS]
+SINKS = [*JOINT_COMMANDS, *ACCELERATION]  # of outputs: the plant's inputs
+FLAGS = ("swinging", "unreachable", "fallback")
 SHIFT = [name for leg in LEG_NAMES for name in vector_names(f"{leg}.shift", 2)]
 LIFT = [f"{leg}.lift" for leg in LEG_NAMES]
 PLANNED = [name for leg in LEG_NAMES for name in vector_names(f"{leg}.planned")]
@@ -40,8 +41,8 @@ DIAGNOSED_FLAGS = [f"{leg}.{flag}" for flag in FLAGS for leg in LEG_NAMES]
 GROUPS: dict[str, list[str]] = {
     "angle": MEASURED["angle"],
     "speed": MEASURED["speed"],
-    "foot.force": foot_vector_names("force"),
-    "foot.contact": foot_names("contact"),
+    "foot.force": MEASURED["foot_force"],
+    "foot.contact": CONTACT,
     "torso.quaternion": MEASURED["quaternion"],
     "torso.angular_velocity": MEASURED["angular_velocity"],
     **COMMANDED,
@@ -50,20 +51,9 @@ GROUPS: dict[str, list[str]] = {
     "lift": LIFT,
     "planned": PLANNED,
     **{flag: [f"{leg}.{flag}" for leg in LEG_NAMES] for flag in FLAGS},
-    "command": [f"command.{item.name}" for item in fields(BodyCommand)],
+    "command": COMMANDS,
 }
 OURS = {*SOURCES, *SINKS, *DIAGNOSED, *DIAGNOSED_FLAGS}
-
-
-@dataclass(frozen=True)
-class FmuVariable:
-    """A variable of a controller FMU."""
-
-    name: str
-    causality: str
-    real: bool  # whether it is a floating-point variable
-    flag: bool  # whether it is a Boolean variable
-    size: int  # number of elements; 1 for a scalar
 
 
 Pairs = list[tuple[str, list[str]]]  # the FMU's variable and our names of its elements
@@ -79,6 +69,12 @@ class Connection:
     diagnostics: Pairs  # complete, or empty
     flags: Pairs  # complete, or empty
     unconnected: tuple[str, ...]  # inputs of the FMU without a source
+
+    @property
+    def is_scalar(self) -> bool:
+        """Whether the loop in C can drive the FMU: it writes floating-point scalars alone."""
+        pairs = chain(self.inputs, self.outputs, self.diagnostics, self.flags)
+        return not self.flag_inputs and all(len(names) == 1 for _, names in pairs)
 
 
 def connect(
