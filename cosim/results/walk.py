@@ -16,8 +16,8 @@ from hexapod_cosim.cosim.interface.names import foot_names, joint_names, vector_
 from hexapod_cosim.cosim.master.recorder import COMMAND_COLUMNS, Recording
 from hexapod_cosim.cosim.results.feet import feet_of_angles
 from hexapod_cosim.models import FRICTION_LAWS, TERRAINS
+from hexapod_cosim.models.friction import BRISTLE_LAWS
 from hexapod_cosim.models.ground.surface import Surface
-from hexapod_cosim.models.records import BRISTLE_LAWS
 
 Array = NDArray[np.float64]
 
