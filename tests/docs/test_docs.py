@@ -236,7 +236,7 @@ def test_the_steps_to_a_new_contact_law_fit_the_code(tmp_path: Path) -> None:
             ROOT / folder, tmp_path / folder, ignore=shutil.ignore_patterns("__pycache__")
         )
     patches = [text for kind, text in blocks(DOCS / "howto" / "contact-law.md") if kind == "diff"]
-    assert len(patches) == 6
+    assert len(patches) == 5
     subprocess.run(["git", "init", "--quiet", str(tmp_path)], check=True)
     for patch in patches:
         done = subprocess.run(
