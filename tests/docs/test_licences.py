@@ -47,7 +47,7 @@ def licences() -> dict[str, str]:
     inputs = json.loads((ROOT / "build" / "viewer" / "metafile.json").read_text(encoding="utf-8"))[
         "inputs"
     ]
-    foreign = [path for path in inputs if not path.startswith("src/")]
+    foreign = [path for path in inputs if "node_modules/" in path]
     names = {re.findall(r"node_modules/((?:@[^/]+/)?[^/]+)/", path)[-1] for path in foreign}
     return {
         name: (PACKAGES / name / "LICENSE").read_text(encoding="utf-8").strip() for name in names
