@@ -211,56 +211,16 @@ def progress_bar(label: str, duration: float) -> Iterator[master.Progress | None
         yield report
 
 
-class _Steps(ProgressColumn):
-    """Number of the present step, of simulations, and the time taken; later steps may be left out.
-
-    The time is drawn without a report, so that a long step is seen to run.
-    """
-
-    def render(self, task: Task) -> Text:
-        simulated = f"{task.fields['simulations']} simulations"
-        step = f"{task.completed:.0f} of {task.total:.0f}"
-        return Text(f"{step}  {simulated}  {_clock(task.elapsed or 0.0)}")
-
-
-class Step(Protocol):
-    """Reports what is being done, its number from 1 on, and how many simulations were made."""
-
-    def __call__(self, text: str, step: int, simulations: int) -> None: ...
-
-
 @contextmanager
-def stages_bar(most: int, *, shown: bool = True) -> Iterator[Step]:
-    """Shows what is being done, in at most `most` steps, on stderr.
-
-    A bar on a terminal, a line for each step elsewhere, nothing unless `shown`.
+def steps(*, shown: bool = True) -> Iterator[Callable[[str], None]]:
+    """Yields a function that shows what is being done on stderr: a status on a terminal, a line
+    elsewhere, nothing unless `shown`.
     """
-    if not shown:
-        yield lambda text, step, simulations: None
-        return
-    if not sys.stderr.isatty():
-        yield _PlainSteps()
-        return
-    columns = (TextColumn("{task.description}"), BarColumn(), _Steps(_whole()))
-    with Progress(*columns, console=Console(stderr=True)) as bar:
-        task = bar.add_task("", total=most, simulations=0)
-
-        def report(text: str, step: int, simulations: int) -> None:
-            bar.update(task, description=text, completed=step, simulations=simulations)
-
-        yield report
-
-
-class _PlainSteps:
-    """Prints a line for each step."""
-
-    def __init__(self) -> None:
-        self._last: tuple[str, int] | None = None
-
-    def __call__(self, text: str, step: int, simulations: int) -> None:
-        if (text, step) != self._last:
-            self._last = text, step
-            print(f"step {step}: {text}", file=sys.stderr, flush=True)
+    if shown and sys.stderr.isatty():
+        with Console(stderr=True).status("") as status:
+            yield status.update
+    else:
+        yield lambda text: print(text, file=sys.stderr, flush=True) if shown else None
 
 
 class Count(Protocol):
