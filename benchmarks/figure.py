@@ -30,7 +30,6 @@ NAMES = {
     OURS: "this plant",
     "mujoco": "MuJoCo",
     "pinocchio": "Pinocchio",
-    "simbody": "Simbody",
     "drake": "Drake",
 }
 COLOURS = (*PALETTE, "0.55")

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
@@ -17,19 +17,16 @@ from pathlib import Path
 from PIL import Image
 
 from benchmarks import ROOT
-from benchmarks.control.tables import markdown, put_into
-from hexapod_cosim.cosim.course import texts
-from hexapod_cosim.cosim.course.goals import verdicts
-from hexapod_cosim.cosim.course.picture import FOLDER, STEM
-from hexapod_cosim.cosim.course.records import SHOWN
-from hexapod_cosim.cosim.course.store import read_table
-from hexapod_cosim.cosim.course.table import Table
-from hexapod_cosim.cosim.results.comparison import WORSE
+from hexapod_cosim.cosim.common.files import write_text
 from hexapod_cosim.cosim.results.comparisons import Comparisons, compare_all
 from hexapod_cosim.cosim.run.batch import run_batch
 from hexapod_cosim.cosim.scenario.controls import parse_controls
 from hexapod_cosim.cosim.scenario.scenario import load_scenario
 from hexapod_cosim.cosim.scenario.variation import STANDARD
+from hexapod_cosim.extensions.course import texts
+from hexapod_cosim.extensions.course.picture import FOLDER, STEM
+from hexapod_cosim.extensions.course.store import read_table
+from hexapod_cosim.extensions.course.table import Table
 
 PAGES = tuple(ROOT / "docs" / name for name in ("comparison.md", "control.md", "course.md"))
 SEEDS = range(10)
@@ -37,7 +34,6 @@ WALKED = ("kinematic", "paper", "compliant")
 OWN = [f"{name}={name}@own" for name in WALKED]
 CHOSEN = [f"{name}@chosen" for name in WALKED]
 TWIN = "compliant against kinematic@chosen"
-GAIT = "kinematic@chosen"
 # metric -> its row, and factor and unit of its values
 ROWS = {
     "foot_error_stance": ("feet from their plan in stance, RMS", 1e3, "mm"),
@@ -56,8 +52,7 @@ ROWS = {
 }
 DETAILS = ("foot_error_swing", "height_rms", "pitch_rms")
 COLOURS = 64  # of the picture
-HARDLY = 0.07  # a smaller change for the worse of a case is not listed
-EFFORT = ("electrical", "heat", "load")  # worse in nearly all cases; the classes show by how much
+BEGIN, END = "<!-- control:{} -->", "<!-- /control:{} -->"  # of a table's place on a page
 
 
 def compared(scenario: str, controls: Sequence[str], *settings: str) -> Comparisons:
@@ -101,35 +96,39 @@ def course_tables(table: Table) -> Mapping[str, str]:
     """Returns the tables of a course by their names."""
     headings, rows = texts.class_rows(table)
     keep = [k for k, heading in enumerate(headings) if heading not in ("control", "against")]
-
-    def classes(column: str) -> str:
-        chosen = [row for row in rows if tuple(row[1:3]) == table.columns[column]]
-        return markdown([headings[k] for k in keep], [[row[k] for k in keep] for row in chosen])
-
-    found = verdicts(table)
-    judged = [each for each in found if each.control in (GAIT, "compliant", TWIN)]
+    chosen = [row for row in rows if tuple(row[1:3]) == table.columns[TWIN]]
     return {
         "all": markdown(headings[1:], [row[1:] for row in rows if row[0] == "all"]),
-        "gait": classes(GAIT),
-        "compliant": classes(TWIN),
+        "compliant": markdown(
+            [headings[k] for k in keep], [[row[k] for k in keep] for row in chosen]
+        ),
         "heights": markdown(*texts.sweep_rows(table)),
-        "goals": markdown(*texts.goal_rows(judged)),
-        "worse": markdown(["case", "worse"], worse_rows(table)),
     }
 
 
-def worse_rows(table: Table) -> list[list[str]]:
-    """Returns the cases in which compliant control is worse than kinematic in the same walk."""
-    rows = []
-    for case in table.cases_of("all", TWIN):
-        changes = {one: case.change(one.name) for one in SHOWN if one.name not in EFFORT}
-        told = [
-            f"{one.short} {100.0 * change.relative:+.0f} %"
-            for one, change in changes.items()
-            if change.verdict == WORSE and change.relative >= HARDLY
-        ]
-        rows += [[case.case.name, ", ".join(told)]] if told else []
-    return rows
+def markdown(headings: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    """Returns a table in Markdown."""
+    lines = [headings, ["---"] * len(headings), *rows]
+    return "\n".join(
+        "| " + " | ".join(text.replace("|", "/") for text in line) + " |" for line in lines
+    )
+
+
+def put_into(pages: Sequence[Path], tables: Mapping[str, str]) -> None:
+    """Replaces the text between the markers of each table, on the page that has them.
+
+    Raises ValueError for a table without a place, before a page is changed.
+    """
+    texts = {page: page.read_text(encoding="utf-8") for page in pages}
+    for name, table in tables.items():
+        begin, end = BEGIN.format(name), END.format(name)
+        page = next((page for page, text in texts.items() if begin in text), None)
+        if page is None or end not in texts[page]:
+            raise ValueError(f"no page has a place {begin} ... {end}; looked in {pages}")
+        head, _, rest = texts[page].partition(begin)
+        texts[page] = f"{head}{begin}\n\n{table}\n\n{end}{rest.partition(end)[2]}"
+    for page, text in texts.items():
+        write_text(page, text)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -23,12 +23,8 @@ from rich.progress import track
 
 from benchmarks import BUILD, RESULTS, machine
 from benchmarks.figure import draw
-from benchmarks.ground.cost import ground_costs
-from benchmarks.ground.size import map_costs
-from benchmarks.ground.table import ground_rows
-from benchmarks.ground.waves import landings, walks_over_waves
 from benchmarks.judge import agreement, spreads
-from benchmarks.loop import compiled_factors, master_overhead, realtime_factor
+from benchmarks.loop import compiled_factors, realtime_factor
 from benchmarks.measure import Bench, Run
 from benchmarks.parts import (
     cost_of,
@@ -67,14 +63,12 @@ def main() -> None:
         action="store_true",
         help="few walks and settings, no peer that takes long to build",
     )
-    parser.add_argument("--ground", action="store_true", help="measure the height fields only")
-    arguments = parser.parse_args()
-    quick, tools = arguments.quick, prepare(quick=arguments.quick or arguments.ground)
+    quick = parser.parse_args().quick
+    tools = prepare(quick=quick)
     folder = BUILD / "quick" if quick else RESULTS / machine()
-    ground = measured_ground(tools, folder, quick=quick)
-    if arguments.ground:
-        console.print(shown(ground, title=f"height fields on {machine()}"))
-        return
+    folder.mkdir(parents=True, exist_ok=True)
+    facts = json.dumps(described(tools), indent=2)
+    (folder / "machine.json").write_text(f"{facts}\n", encoding="utf-8")
     series = [
         *_chosen(ours(), quick),
         *_chosen([one for one in peers() if command(one.engine, tools)], quick),
@@ -85,7 +79,7 @@ def main() -> None:
     runs = measured(bench, series, [walk.name for walk in walks])
     _write_walks(folder, runs, series, tools)
     parts, scaling = measured_parts(bench, series, runs, walks, quick=quick)
-    table = [*rows(runs, series, parts), *ground]
+    table = rows(runs, series, parts)
     _write_csv(folder / "table.csv", [asdict(row) | {"met": row.met} for row in table])
     _write_csv(folder / "instances.csv", scaling)
     _print_results(runs, series, table, tools, folder)
@@ -93,22 +87,6 @@ def main() -> None:
         console.print(
             'quick: few walks, settings and peers; "the best of them" is the best of these only'
         )
-
-
-def measured_ground(tools: Tools, folder: Path, *, quick: bool) -> list[Row]:
-    """Measures the height fields, writes the records and returns their rows of the table."""
-    folder.mkdir(parents=True, exist_ok=True)
-    facts = json.dumps(described(tools), indent=2)
-    (folder / "machine.json").write_text(f"{facts}\n", encoding="utf-8")
-    costs, walks = ground_costs(tools, quick=quick), walks_over_waves(tools, quick=quick)
-    landed, maps = landings(tools), map_costs(tools, quick=quick)
-    found = ground_rows(costs, walks, landed, maps)
-    records = {"ground": walks, "ground_landings": landed, "ground_maps": maps}
-    records["ground_costs"] = costs
-    records["ground_table"] = [asdict(row) | {"met": row.met} for row in found]
-    for name, content in records.items():
-        _write_csv(folder / f"{name}.csv", content)
-    return found
 
 
 def _chosen(series: Sequence[Series], quick: bool) -> list[Series]:
@@ -166,7 +144,6 @@ def measured_parts(
         compiled=compiled_factors(bench.tools),
         crowd=crowding(scaling),
         studies=measured_studies(quick=quick),
-        master=master_overhead(bench.tools),
         structure=scaling[0]["bytes_per_instance"],
         resident=resident_bytes(scaling),
         allocations=sum(one["allocations"] for one in scaling),
@@ -177,7 +154,6 @@ def measured_parts(
 
 
 def _write_walks(folder: Path, runs: Sequence[Run], series: Sequence[Series], tools: Tools) -> None:
-    folder.mkdir(parents=True, exist_ok=True)
     _write_csv(
         folder / "walks.csv",
         [asdict(run) | {"realtime_factor": run.realtime_factor} for run in runs],

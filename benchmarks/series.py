@@ -89,7 +89,7 @@ def ours() -> list[Series]:
 def peers() -> list[Series]:
     """Returns the peers' integrators.
 
-    MuJoCo, Pinocchio and Simbody use the plant's law, MuJoCo and Drake also their own.
+    MuJoCo and Pinocchio use the plant's law; MuJoCo also has its own, and Drake only its own.
     """
     return [*_with_plant_law(), *_with_own_law()]
 
@@ -106,27 +106,6 @@ def _with_plant_law() -> list[Series]:
         ),
         Series(engine="pinocchio", method="rk4", settings=PEER_STEPS[1:], adaptive=False),
         Series(engine="pinocchio", method="semi-implicit", settings=PEER_STEPS, adaptive=False),
-        Series(
-            engine="simbody",
-            method="CPodesBDF",
-            settings=(1e-1, 1e-2, 1e-3, 1e-4),
-            adaptive=True,
-            every=3,
-        ),
-        Series(
-            engine="simbody",
-            method="RungeKuttaMerson",
-            settings=(1e-1, 1e-2, 1e-3),
-            adaptive=True,
-            every=3,
-        ),
-        Series(
-            engine="simbody",
-            method="SemiExplicitEuler",
-            settings=(1e-3, 5e-4, 2.5e-4),
-            adaptive=False,
-            every=3,
-        ),
     ]
 
 

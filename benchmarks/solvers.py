@@ -1,17 +1,16 @@
 """Measures what coarser solver settings cost in accuracy and save in steps.
 
-usage: python -m benchmarks.solvers [--page]
+usage: python -m benchmarks.solvers
 
 Walks are `walk_flat`, 10 s, under both controls, with variations. Errors are against a solver that
 is a thousand times as exact as the default one. The results do not depend on the machine. Writes
-benchmarks/results/solvers.csv; with --page the table in docs/studies.md too.
+benchmarks/results/solvers.csv: errors in the metric's unit and relative to its mean.
 """
 
 from __future__ import annotations
 
 import csv
-import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -19,15 +18,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks import RESULTS
-from benchmarks.study import BOTH, PAGE, put_in_page
 from hexapod_cosim.controller import Gains
 from hexapod_cosim.cosim.common.files import atomic_text
-from hexapod_cosim.cosim.results.metrics import FLOORS, METRICS
+from hexapod_cosim.cosim.results.metrics import METRICS
 from hexapod_cosim.cosim.run.preparation import chosen_gains
 from hexapod_cosim.cosim.run.walker import Walker
 from hexapod_cosim.cosim.scenario.scenario import load_scenario
 from hexapod_cosim.cosim.scenario.variation import STANDARD
 
+BOTH = ("kinematic", "compliant")
 SEEDS = 6
 SHOWN = (
     "slip_per_metre",
@@ -89,32 +88,6 @@ def errors(control: str) -> list[dict[str, Any]]:
     return rows
 
 
-def table(rows: Sequence[Mapping[str, Any]]) -> str:
-    """Returns the table in Markdown.
-
-    Errors are relative to the metric. Those in brackets are too small for `hexapod compare` to
-    report a change.
-    """
-    lines = [
-        "| control | solver, tolerance | steps | "
-        + " | ".join(name.replace("_", " ") for name in SHOWN)
-        + " |"
-    ]
-    lines.append("|---" * (3 + len(SHOWN)) + "|")
-    for row in rows:
-        cells = [_cell(row[name], row[f"{name} relative"], FLOORS[name]) for name in SHOWN]
-        lines.append(
-            f"| {row['control']} | {row['solver']} | {row['steps']} | " + " | ".join(cells) + " |"
-        )
-    return "\n".join(lines)
-
-
-def _cell(error: float, share: float, floor: float) -> str:
-    percent = 100.0 * share
-    text = f"{percent:.2g} %" if percent < 99.5 else f"{percent:.0f} %"
-    return f"({text})" if error < floor else text
-
-
 def main() -> None:
     """Computes the errors, prints and writes them."""
     assert set(SHOWN) <= set(METRICS)
@@ -124,10 +97,7 @@ def main() -> None:
         writer = csv.DictWriter(file, list(rows[0]), lineterminator="\n")
         writer.writeheader()
         writer.writerows(rows)
-    print(table(rows))
-    if "--page" in sys.argv[1:]:
-        put_in_page({"solvers": table(rows)})
-    print(f"wrote {path}" + (f" and {PAGE}" if "--page" in sys.argv[1:] else ""))
+    print(f"wrote {path}")
 
 
 if __name__ == "__main__":

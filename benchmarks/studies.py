@@ -8,19 +8,27 @@ import os
 import subprocess
 import sys
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from contextlib import closing
+from dataclasses import dataclass, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from time import perf_counter
 
 import matplotlib
 
-from benchmarks.batch import SETTINGS, per_minute, scenarios
+from hexapod_cosim.controller import Gains
+from hexapod_cosim.cosim.run.batch import run_batch
 from hexapod_cosim.cosim.run.preparation import chosen_gains
 from hexapod_cosim.cosim.run.worker_pool import processor_count
+from hexapod_cosim.cosim.scenario.records import Scenario
 from hexapod_cosim.cosim.scenario.scenario import load_scenario
+from hexapod_cosim.cosim.scenario.variation import STANDARD
 
 WALKS, QUICK_WALKS = 80, 24  # of each setting
+WARM = 4  # walks that are not measured, because they also build FMUs and caches
+# benchmarks/results/solvers.csv says what these settings cost in accuracy
+FAST = ("solver.method=ros2", "solver.tolerance=0.01")
+SETTINGS: Mapping[str, Sequence[str]] = {"default solver": (), "fast solver": FAST}
 CONTROL = "compliant"
 
 
@@ -39,15 +47,30 @@ def measured_studies(*, quick: bool) -> Studies:
     gains = chosen_gains(load_scenario("walk_flat", overrides=[f"control={CONTROL}"]))
     count = QUICK_WALKS if quick else WALKS
     rates = {
-        name: per_minute(
-            scenarios(CONTROL, changes, count), gains, workers=processor_count(), compiled=True
-        )
+        name: per_minute(scenarios(changes, count), gains, workers=processor_count())
         for name, changes in SETTINGS.items()
     }
     with TemporaryDirectory(prefix="hexapod-bench-") as folder:
         design, kept = (_design_time(Path(folder)) for _ in range(2))
         comparison = float("nan") if quick else _comparison_time(Path(folder))
     return Studies(rates, comparison, design, kept)
+
+
+def scenarios(settings: Sequence[str], count: int) -> list[Scenario]:
+    """Returns `count` walks that differ by their seeds."""
+    scenario = load_scenario("walk_flat", overrides=[f"control={CONTROL}", *settings])
+    return [replace(scenario, seed=seed, variation=STANDARD) for seed in range(count)]
+
+
+def per_minute(plans: Sequence[Scenario], gains: Gains | None, *, workers: int) -> float:
+    """Returns walks per minute, measured after all workers have started."""
+    times = []
+    with closing(run_batch(plans, gains=gains, workers=workers, compiled=True)) as runs:
+        for summary in runs:
+            assert summary.walked, summary.reason
+            times.append(perf_counter())
+    late = times[max(WARM, 2 * workers) :]
+    return 60.0 * (len(late) - 1) / (late[-1] - late[0])
 
 
 def _design_time(cache: Path) -> float:

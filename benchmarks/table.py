@@ -21,7 +21,7 @@ PINOCCHIO_GOAL, PEERS_GOAL, OWN_CONTACT_GOAL = 8.0, 60.0, 10.0  # times faster
 REALTIME_GOALS = {FINE: 1800.0, FINER: 600.0}
 WORST_GOAL = 1200.0  # times real time, at FINE
 STEEP_GOAL = 2.0  # times the default's cost
-LOOP_GOAL, MASTER_GOAL = 100.0, 10.0  # times real time; us
+LOOP_GOAL = 100.0  # times real time
 COMPILED_GOAL = 150.0  # times real time
 MANY_GOAL = 2500.0  # simulated seconds per second and core
 WALKS_GOALS = {"default solver": 3500.0, "fast solver": 6500.0}  # per minute
@@ -63,7 +63,6 @@ class Parts:
     compiled: dict[str, float]  # of compliant control compiled, by what drives the FMUs
     crowd: float  # 1    time of a step among many plants, over that of one plant alone
     studies: Studies
-    master: float  # us
     structure: float  # bytes
     resident: float  # bytes
     allocations: float
@@ -104,7 +103,6 @@ def _evaluation(runs: Sequence[Run], parts: Parts) -> Iterable[Row]:
         ("pinocchio", PLANT_LAW),
         ("mujoco", PLANT_LAW),
         ("mujoco", MUJOCO_LAW),
-        ("simbody", PLANT_LAW),
         ("drake", DRAKE_LAW),
     ]
     for engine, law in peers:
@@ -270,9 +268,6 @@ def _rest(parts: Parts) -> Iterable[Row]:
             goal=goal,
             better="more",
         )
-    yield Row(
-        figure="the master itself, a macro-step", unit="us", ours=parts.master, goal=MASTER_GOAL
-    )
     yield Row(
         figure="an instance, its structure", unit="byte", ours=parts.structure, goal=MEMORY_GOAL
     )

@@ -17,14 +17,8 @@ from hexapod_cosim.cosim.export.plant_export import export_fmu
 from hexapod_cosim.models import load_robot
 
 REQUIREMENTS = Path(__file__).parent / "requirements.txt"
-OUR_TARGETS = (
-    "bench_plant",
-    "bench_derivative",
-    "bench_instances",
-    "bench_idle_fmu",
-    "hexapod_c",
-)
-PEER_TARGETS = ("mujoco", "pinocchio", "simbody")
+OUR_TARGETS = ("bench_plant", "bench_derivative", "bench_instances", "hexapod_c")
+PEER_TARGETS = ("mujoco", "pinocchio")
 QUICK_TARGETS = ("mujoco",)  # compiles in seconds; Pinocchio takes minutes
 LAST_LINES = 3  # of a failed command's output
 

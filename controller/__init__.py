@@ -6,9 +6,6 @@ Imports `models`.
 from hexapod_cosim.controller.controller import (
     Controller,
     ControllerError,
-    Diagnostics,
-    JointCommand,
-    Measurement,
 )
 from hexapod_cosim.controller.gains import (
     Gains,
@@ -20,6 +17,7 @@ from hexapod_cosim.controller.gains import (
     save_gains,
 )
 from hexapod_cosim.controller.parts import COMPLIANT_PARTS, SWITCHES, Parts
+from hexapod_cosim.controller.signals import Diagnostics, JointCommand, Measurement
 from hexapod_cosim.controller.walk.gait import PATTERNS, Gait, Pattern, make_gait
 from hexapod_cosim.controller.walk.kinematics import LegSolver
 from hexapod_cosim.controller.walk.trajectory import BodyCommand, CommandRamp, FootPaths

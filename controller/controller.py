@@ -15,7 +15,6 @@ the walk begins; no difference reaches across the boundary of two sections.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -27,6 +26,7 @@ from hexapod_cosim.controller.gains import Gains
 from hexapod_cosim.controller.memory import Stateful
 from hexapod_cosim.controller.parts import Parts
 from hexapod_cosim.controller.plane import LEGS, Array, Mask, Plane, cis, rows_of
+from hexapod_cosim.controller.signals import Diagnostics, JointCommand, Measurement
 from hexapod_cosim.controller.walk.fade import Fade
 from hexapod_cosim.controller.walk.gait import Gait
 from hexapod_cosim.controller.walk.inverse_dynamics import Masses, Neighbours
@@ -42,59 +42,12 @@ from hexapod_cosim.models import HexapodError, Robot, unknown_name
 
 ALL_PARTS = Parts()
 LAWS = ("compliant", "paper")  # what the feet's forces do; without gains control is kinematic
+NO_LEG: Mask = np.zeros(LEGS, dtype=np.bool_)
 CLOCK_TOLERANCE = 0.01  # 1    of a period, between the time given and the steps counted
 
 
 class ControllerError(HexapodError):
     """The controller cannot be built, or was called at a wrong time."""
-
-
-def _zeros() -> Array:
-    return np.zeros((LEGS, 3))
-
-
-def _flags() -> Mask:
-    return np.zeros(LEGS, dtype=np.bool_)
-
-
-def _upright() -> Array:
-    return np.array([1.0, 0.0, 0.0, 0.0])
-
-
-@dataclass
-class Measurement:
-    """Sensor values of the robot. The arrays belong to the caller, who updates them in place."""
-
-    angle: Array = field(default_factory=_zeros)  # rad    (6, 3)
-    speed: Array = field(default_factory=_zeros)  # rad/s    (6, 3)
-    foot_force: Array = field(default_factory=_zeros)  # N    (6, 3) ground on foot, world axes
-    contact: Mask = field(default_factory=_flags)  # (6,)
-    quaternion: Array = field(default_factory=_upright)  # 1    (4,) torso to world, w x y z
-    # rad/s    (3,) torso, world axes
-    angular_velocity: Array = field(default_factory=lambda: np.zeros(3))
-
-
-@dataclass
-class JointCommand:
-    """Commands to the servos. The arrays belong to the controller, which rewrites them."""
-
-    angle_ref: Array = field(default_factory=_zeros)  # rad    (6, 3)
-    speed_ref: Array = field(default_factory=_zeros)  # rad/s    (6, 3)
-    torque_ref: Array = field(default_factory=_zeros)  # N m    (6, 3)
-    # rad/s2    (6, 3) planned, for kinematic drives
-    acceleration_ref: Array = field(default_factory=_zeros)
-
-
-@dataclass(frozen=True)
-class Diagnostics:
-    """Internal quantities for recorders and tests: arrays of six legs that change at every step."""
-
-    swinging: Mask  # planned to be in the air
-    planned: Array  # m    (6, 3) centres of the feet as commanded, torso frame, uncorrected
-    shift: Plane  # m    horizontal correction of the feet, x + i y, walking frame
-    lift: Array  # m    vertical correction of the feet
-    unreachable: Mask  # the joints could not follow at the last step
-    fallback: Mask  # walks without feedback
 
 
 class PlannedStep(NamedTuple):
@@ -171,8 +124,7 @@ class Controller(Stateful):
         self._next: Gait | None = None  # that the legs change to
         self.warnings = gains_warnings(robot, gains, period)
         self._out = JointCommand()
-        still, nothing = np.zeros(LEGS, dtype=np.complex128), np.zeros(LEGS)
-        self.diagnostics = Diagnostics(_flags(), _zeros(), still, nothing, _flags(), _flags())
+        self.diagnostics = Diagnostics()
         self._start: float | None = None  # s    time of the first step
         self._count = 0  # completed steps
         self._at = 0  # the present step, counted from the begin of its section
@@ -295,11 +247,11 @@ class Controller(Stateful):
     def _lay_out(self, value: Array, posture: Posture, feet: PlannedFeet) -> PlannedStep:
         """Computes sway, pose of the legs and point masses for planned feet."""
         sway, compliant = 0j, self.compliant
-        if compliant is not None and compliant.sway.acts(compliant.warmth):
-            guess = compliant.sway.guess(feet, compliant.warmth)
+        if compliant is not None and compliant.sway.acts(compliant.adaptation):
+            guess = compliant.sway.guess(feet, compliant.adaptation)
             masses = self._stand(value, posture, feet, guess).masses
             assert masses is not None
-            sway = compliant.sway.of(guess, masses, compliant.warmth)
+            sway = compliant.sway.of(guess, masses, compliant.adaptation)
         return self._stand(value, posture, feet, sway)
 
     def _plan_step(self, number: int, ahead: int, before: PlannedStep) -> PlannedStep:
@@ -319,7 +271,7 @@ class Controller(Stateful):
     def _narrow(self) -> None:
         """Aims the steps of a commanded motion at the stance that the weight asks for (C53)."""
         if self.compliant is not None and self.ramp.moves():
-            self.paths.narrowing = self.compliant.warmth.narrowing
+            self.paths.narrowing = self.compliant.adaptation.narrowing
 
     def _waits(self) -> bool:
         """Returns whether the gait clock waits for feet at the ends of their swings (C50)."""
@@ -411,7 +363,7 @@ class Controller(Stateful):
         self.paths.carry()
         if self.compliant is None:
             self.paths.narrowing = 0.0
-        self._show(np.zeros((LEGS, 3)), _flags())
+        self._show(np.zeros((LEGS, 3)), NO_LEG)
         self._after, self._cut = None, True
 
     def change_control(self, gains: Gains | None, law: str = "compliant") -> None:
@@ -497,7 +449,7 @@ class Controller(Stateful):
         out.angle_ref[...], out.speed_ref[...] = joints.angle, joints.speed
         shown.unreachable[...] = joints.unreachable
         shift = paper.shift
-        self._show(rows_of(shift.real, shift.imag, paper.lift), _flags())
+        self._show(rows_of(shift.real, shift.imag, paper.lift), NO_LEG)
 
     def _ask(self, compliant: Compliant) -> Stance:
         """Returns planned loads and geometry of the present step for the laws (C15 to C20)."""
@@ -508,7 +460,7 @@ class Controller(Stateful):
             motion = Neighbours(
                 (before.masses, now.masses, after.masses), (before.pose, now.pose, after.pose)
             )
-        laden = compliant.sway.laden(compliant.warmth)
+        laden = compliant.sway.laden(compliant.adaptation)
         demand = compliant.dynamics.demand(motion, speed, now.posture, laden)
         feet = now.plane + now.shift
         plan = compliant.laws.plan(
@@ -549,7 +501,7 @@ class Controller(Stateful):
         value, posture, _ = self._look_ahead(0, 0)
         self._before, self._after = None, None
         self._now = self._lay_out(value, posture, feet)
-        self._shown = np.zeros((LEGS, 3)), _flags()
+        self._shown = np.zeros((LEGS, 3)), NO_LEG
         self._next = None
         self._follow_paths()
 

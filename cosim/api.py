@@ -21,6 +21,7 @@ from hexapod_cosim.cosim.master.loop import FAILED, Progress
 from hexapod_cosim.cosim.report.report import write_report
 from hexapod_cosim.cosim.results.comparison import SEEDS, write_seeds
 from hexapod_cosim.cosim.results.comparisons import compare_all, write_comparison
+from hexapod_cosim.cosim.results.gait_choice import gait_differences
 from hexapod_cosim.cosim.results.result import Result
 from hexapod_cosim.cosim.results.results import (
     ResultsFolder,
@@ -30,7 +31,6 @@ from hexapod_cosim.cosim.results.results import (
     write_result,
 )
 from hexapod_cosim.cosim.results.summary import summarise
-from hexapod_cosim.cosim.results.walking import different_walks
 from hexapod_cosim.cosim.run.single_run import simulate as run_scenario
 from hexapod_cosim.cosim.scenario.controls import (
     Control,
@@ -143,7 +143,7 @@ def report(results: Result | Sequence[Result], folder: str | Path) -> Path:
         by_label = dict(zip(labels, runs, strict=True))
         comparison = compare_all({label: [summarise(run)] for label, run in by_label.items()})
         write_seeds(path / SEEDS, [summarise(run) for run in runs])
-        walks = different_walks({label: run.facts for label, run in by_label.items()})
+        walks = gait_differences({label: run.facts.walking for label, run in by_label.items()})
         write_comparison(path, runs[0].scenario, comparison, labels=labels, walks=walks)
         files = write_report(
             {label: stored_result(run) for label, run in by_label.items()},

@@ -27,6 +27,8 @@ version = release = version_of("hexapod-cosim")
 extensions = [
     "myst_nb",
     "sphinx.ext.autodoc",
+    "sphinx.ext.autosummary",
+    "sphinx.ext.napoleon",
     "sphinx_copybutton",
     "sphinx_design",
     "sphinx.ext.mathjax",
@@ -38,8 +40,10 @@ myst_enable_extensions = ["dollarmath", "colon_fence", "attrs_inline", "substitu
 myst_fence_as_directive = ["math"]
 myst_heading_anchors = 3
 myst_dmath_double_inline = True
-nb_execution_mode = "off"  # tools/docs runs the notebooks, all at once
+nb_execution_timeout = 300  # s    for a cell
+nb_execution_raise_on_error = True
 
+autosummary_generate = True
 autodoc_member_order = "bysource"
 autodoc_typehints_format = "short"
 python_use_unqualified_type_names = True

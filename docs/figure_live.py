@@ -25,12 +25,12 @@ from typing import Any
 from PIL import Image
 from playwright.sync_api import sync_playwright
 
-from hexapod_cosim.cosim.live.loop import Loop
-from hexapod_cosim.cosim.live.robot import LiveRobot
-from hexapod_cosim.cosim.live.server import LiveServer
-from hexapod_cosim.cosim.live.settings import Choices, control_texts
 from hexapod_cosim.cosim.run.preparation import chosen_gains
 from hexapod_cosim.cosim.scenario.scenario import load_scenario
+from hexapod_cosim.extensions.live.loop import Loop
+from hexapod_cosim.extensions.live.robot import LiveRobot
+from hexapod_cosim.extensions.live.server import LiveServer
+from hexapod_cosim.extensions.live.settings import Choices, control_texts
 
 RATE = 12  # pictures per second of simulated time
 STEP = 0.02  # s    by which the clock goes on: a state is sent as often

@@ -155,7 +155,7 @@ def core(plant_build: Path) -> ctypes.CDLL:
 def controller_core(plant_build: Path) -> ctypes.CDLL:
     """controller.h as a shared library."""
     return ctypes.CDLL(
-        str(shared_library(plant_build, "controller_fmu", "libhexapod_controller_c"))
+        str(shared_library(plant_build, "controller/fmu", "libhexapod_controller_c"))
     )
 
 

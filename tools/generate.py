@@ -1,5 +1,5 @@
-"""Writes generated/ of plant_fmu, controller_fmu and policy_fmu from their interface.toml,
-models/athena.toml and pyproject.toml's version.
+"""Writes generated/ of each FMU from its interface.toml, the robot athena and the version in
+pyproject.toml.
 
 usage: python tools/generate.py [--check]
 
@@ -31,7 +31,6 @@ from hexapod_cosim.cosim.interface.plant_interface import (
     Variable,
     load_interface,
 )
-from hexapod_cosim.gym.interface import load_policy_interface, standing_policy
 from hexapod_cosim.models.robot import load_robot
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -42,9 +41,7 @@ TYPES = {"Real": "HX_REAL", "Enumeration": "HX_INTEGER", "Boolean": "HX_BOOLEAN"
 
 def main() -> int:
     """Writes or checks the files; returns the exit code."""
-    parser = argparse.ArgumentParser(
-        description="Generates generated/ of plant_fmu, controller_fmu and policy_fmu."
-    )
+    parser = argparse.ArgumentParser(description="Generates generated/ of each FMU.")
     parser.add_argument(
         "--check", action="store_true", help="write nothing; exit with 1 if a file is stale"
     )
@@ -82,14 +79,20 @@ def render_all() -> dict[Path, str]:
 
 
 def interfaces() -> tuple[Interface, ...]:
-    """Returns the interfaces of plant, controller and policy of the default robot."""
+    """Returns the interfaces of plant and controller of the default robot, and that of a policy if
+    the extension gym exists.
+    """
     robot = load_robot(DEFAULT_ROBOT)
     setup = ControllerSetup(robot=robot, gait=make_gait(robot), period=DEFAULT_PERIOD)
-    return (
-        load_interface(robot),
-        load_controller_interface(setup),
-        load_policy_interface(standing_policy(DEFAULT_ROBOT), robot),
+    core = (load_interface(robot), load_controller_interface(setup))
+    if not (ROOT / "extensions" / "gym").is_dir():
+        return core
+    from hexapod_cosim.extensions.gym.interface import (  # noqa: PLC0415  may be deleted
+        load_policy_interface,
+        standing_policy,
     )
+
+    return (*core, load_policy_interface(standing_policy(DEFAULT_ROBOT), robot))
 
 
 def descriptions(folder: Path) -> dict[Path, str]:

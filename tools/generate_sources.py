@@ -16,7 +16,7 @@ from pathlib import Path
 from types import ModuleType
 
 ROOT = Path(__file__).resolve().parents[1]
-COMMITTED = ("plant_fmu/generated/defaults.c", "controller_fmu/generated/defaults.c")
+COMMITTED = ("plant_fmu/generated/defaults.c", "controller/fmu/generated/defaults.c")
 
 
 def import_from(folder: Path) -> None:
@@ -24,7 +24,8 @@ def import_from(folder: Path) -> None:
     which requires Gymnasium.
     """
     sys.meta_path.insert(0, PathFinder)  # before the finder of an editable installation
-    for name, place in (("hexapod_cosim", folder), ("hexapod_cosim.gym", folder / "gym")):
+    gym = folder / "extensions" / "gym"
+    for name, place in (("hexapod_cosim", folder), ("hexapod_cosim.extensions.gym", gym)):
         package = ModuleType(name)
         package.__path__ = [str(place)]
         sys.modules[name] = package

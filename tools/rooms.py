@@ -19,7 +19,8 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[1]
 PICTURE = ROOT / "docs" / "images" / "rooms.svg"
 PACKAGE = "hexapod_cosim"
-C_ROOMS = ("fmi", "plant_fmu", "controller_fmu", "policy_fmu", "cosim/master")
+C_NAMES = {"extensions/gym/policy_fmu": "policy_fmu", "cosim/master": "master"}
+C_ROOMS = ("fmi", "plant_fmu", "controller/fmu", *C_NAMES)
 SHARED = (
     "range_check.h",
     "message.h",
@@ -76,7 +77,7 @@ def arrows() -> Arrows:
 
 def python_files() -> Iterator[Path]:
     """Returns the modules of the Python package."""
-    for folder in ("models", "controller", "cosim", "gym"):
+    for folder in ("models", "controller", "cosim", "extensions"):
         yield from sorted((ROOT / folder).rglob("*.py"))
 
 
@@ -85,11 +86,11 @@ def python_room(parts: tuple[str, ...]) -> str | None:
 
     parts: of the module's name.
     """
-    if parts[0] != "cosim":
+    if parts[0] not in ("cosim", "extensions"):
         return parts[0]
     if len(parts) < 3 or parts[-1] == "__init__":
         return None
-    return parts[1]
+    return parts[1] if parts[0] == "cosim" else f"{parts[1]} (extension)"
 
 
 def imported_rooms(path: Path) -> Iterator[str]:
@@ -119,7 +120,7 @@ def included_rooms(room: str) -> set[str]:
 
 def box_of(room: str) -> str:
     """Returns the name of a C room in the picture."""
-    return f"{Path(room).name} (C)"
+    return f"{C_NAMES.get(room, room)} (C)"
 
 
 def c_files(room: str) -> list[Path]:

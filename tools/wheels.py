@@ -35,11 +35,10 @@ from packaging.tags import platform_tags
 from rich.console import Console
 from wheel.wheelfile import WheelFile, get_zipinfo_datetime
 
-from hexapod_cosim.cosim.common.components import CONTROLLER, PLANT, POLICY
+from hexapod_cosim.cosim.common.components import CONTROLLER, PLANT, Component
 from hexapod_cosim.cosim.common.plant_files import LOOP, fmi_headers
 from hexapod_cosim.cosim.export.cross_build import ALL_TARGETS, TARGETS, Library, build_library
 from hexapod_cosim.cosim.export.platforms import component_library
-from hexapod_cosim.cosim.live.module import walker_module
 
 ROOT = Path(__file__).parents[1]
 BINARIES, LIBRARIES = "hexapod_cosim/plant/binaries/", "hexapod_cosim/plant/lib/"
@@ -83,7 +82,10 @@ def main(folder: Path) -> None:
         source, base = build_source(folder)
     with console.status("compiling for all platforms (minutes, the first time)"):
         binaries = cross_compile()
-    base[MODULE] = walker_module()
+    if (ROOT / "extensions" / "live").is_dir():
+        from hexapod_cosim.extensions.live.module import walker_module  # noqa: PLC0415
+
+        base[MODULE] = walker_module()
     wheels = [
         write_wheel(base, platform, binaries, folder if platform.fits else folder / OTHERS)
         for platform in PLATFORMS
@@ -127,9 +129,19 @@ def common_files(wheel: Path) -> dict[str, bytes]:
         }
 
 
+def components() -> list[Component]:
+    """Returns the components whose binaries a wheel holds."""
+    found = [PLANT, CONTROLLER]
+    if (ROOT / "extensions" / "gym").is_dir():
+        from hexapod_cosim.extensions.gym.interface import POLICY  # noqa: PLC0415
+
+        found.append(POLICY)
+    return found
+
+
 def cross_compile() -> dict[tuple[str, str], bytes]:
-    """Compiles all three FMUs' binaries and the loop for all targets, by library and target."""
-    libraries = [*map(component_library, (PLANT, CONTROLLER, POLICY)), loop_library()]
+    """Compiles the binaries of the FMUs and the loop for all targets, by library and target."""
+    libraries = [*map(component_library, components()), loop_library()]
     jobs = [(library, target) for target in TARGETS for library in libraries]
     with ThreadPoolExecutor(os.cpu_count()) as pool:
         built = pool.map(lambda job: build_library(*job), jobs)

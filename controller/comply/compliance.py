@@ -1,6 +1,6 @@
 """Applies the force laws: turns planned load and measured foot forces into servo torques.
 
-C: compliance.c. Every period consists of these steps:
+C: compliance.h. Every period consists of these steps:
 
 1. Contacts. The detector decides which feet touch the ground (C23). If a contact contradicts the
    plan, a sensor may be wrong (C34) or the ground may be higher or lower than planned (C35, C36).
@@ -263,7 +263,7 @@ class Compliance(Stateful):
             self.trust = goal
         self.fallback = self.doubted | (goal == 0.0)
 
-    def _missing_share(self, plan: Plan, deviation: Plane) -> float:
+    def _squeeze_lost(self, plan: Plan, deviation: Plane) -> float:
         """Returns the share of the planned squeeze that creep has taken away, in [0, 1] (C46).
 
         deviation: (6,) of the tangential forces from the planned ones [N]. Without planned squeeze
@@ -289,7 +289,7 @@ class Compliance(Stateful):
             drag = abs(deviation.sum()) / total if total > max(self.settled, LOAD_FLOOR) else 0.0
             self._update_trust(plan, drag)
         self.load = self.load + self.follow_load * (normal / self.share - self.load)
-        missing = self._missing_share(plan, deviation)
+        missing = self._squeeze_lost(plan, deviation)
         self.held += self.follow_cycle * (1.0 - missing - self.held)
         return normal, total
 

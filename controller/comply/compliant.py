@@ -1,4 +1,4 @@
-"""Corrects the planned joint commands by the sensors, once per period. C: compliant.c.
+"""Corrects the planned joint commands by the sensors, once per period. C: compliant.h.
 
 Every period controller.py provides a plan of the present step: joint angles, the forces on the
 feet, and the torques for these forces. Compliant control corrects the plan by the measurements:
@@ -15,7 +15,7 @@ steps are planned.
 from __future__ import annotations
 
 from math import asin, atan2
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -28,16 +28,14 @@ from hexapod_cosim.controller.gains import Gains
 from hexapod_cosim.controller.memory import Stateful
 from hexapod_cosim.controller.parts import Parts
 from hexapod_cosim.controller.plane import LEGS, Array, Plane, cis, clamp
-from hexapod_cosim.controller.sense.warmth import Warmth
+from hexapod_cosim.controller.sense.load_adaptation import LoadAdaptation
+from hexapod_cosim.controller.signals import JointCommand, Measurement
 from hexapod_cosim.controller.walk.gait import Gait
 from hexapod_cosim.controller.walk.hold import Hold, Sight
 from hexapod_cosim.controller.walk.inverse_dynamics import Demand, InverseDynamics
 from hexapod_cosim.controller.walk.kinematics import LegSolver
 from hexapod_cosim.controller.walk.trajectory import Twist
 from hexapod_cosim.models import Robot
-
-if TYPE_CHECKING:
-    from hexapod_cosim.controller.controller import JointCommand, Measurement
 
 STEERING_TIME = 0.1  # s    duration of the ramp from one added velocity to the next
 
@@ -87,7 +85,7 @@ class Compliant(Stateful):
     Attributes:
         laws: the force laws.
         hold: the slow loops.
-        warmth: of the servos.
+        adaptation: of the servos.
         steering: of the path.
         count: number of completed periods.
         offset: (6,) height offsets of early and late touch-downs at the last period [m].
@@ -95,7 +93,7 @@ class Compliant(Stateful):
         stance: that of the last step; not part of the state.
     """
 
-    STATE = ("laws", "hold", "warmth", "steering", "count", "offset", "moving")
+    STATE = ("laws", "hold", "adaptation", "steering", "count", "offset", "moving")
 
     def __init__(
         self,
@@ -124,7 +122,7 @@ class Compliant(Stateful):
             period=period,
         )
         self.hold = Hold(gains.hold, parts, period=period)
-        self.warmth = Warmth(
+        self.adaptation = LoadAdaptation(
             rating=robot.servo.torque_continuous,
             squeeze=parts.squeeze if parts.support else 0.0,
             narrows=parts.support and gait.narrowing > 0.0,
@@ -138,7 +136,7 @@ class Compliant(Stateful):
         """Resets all laws and the slow loops to their initial states."""
         self.laws.reset()
         self.hold.reset()
-        self.warmth.reset()
+        self.adaptation.reset()
         self.steering, self.count = NO_STEERING, 0
         self.offset, self.moving = np.zeros(LEGS), False
 
@@ -146,7 +144,7 @@ class Compliant(Stateful):
         """Returns the planned forces of feet (6,) x + i y, walking frame [m] (C19, C20, C42)."""
         moment = demand.moment + demand.weight * self.laws.lean
         shares = self.support.shares(feet, activation, demand._replace(moment=moment))
-        return self.squeeze.add(feet, demand, shares, self.warmth.squeeze)
+        return self.squeeze.add(feet, demand, shares, self.adaptation.squeeze)
 
     # ------------------------------------------------------------------------------- steering
 
@@ -233,8 +231,8 @@ class Compliant(Stateful):
         output.angle_ref[...] = self._correct(output.angle_ref, climb, raised)
         output.torque_ref[...] = laws.torque
         burden = laws.burden
-        self.warmth.weigh(burden.heft)
-        self.warmth.step(laws.torque, burden.heft * burden.peak / burden.most, laws.held)
+        self.adaptation.weigh(burden.heft)
+        self.adaptation.step(laws.torque, burden.heft * burden.peak / burden.most, laws.held)
         if busy or self.moving:
             rise = (offset - self.offset) * self.per_second
             output.speed_ref[...] += climb * rise[:, None]

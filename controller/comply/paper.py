@@ -1,4 +1,4 @@
-"""Corrects the foot trajectories by the deviations that the ground causes. C: paper.c.
+"""Corrects the foot trajectories by the deviations that the ground causes. C: paper.h.
 
 Section 3 of the paper corrects the foot positions by a PID on the tangential force and a virtual
 suspension on the normal force, and does inverse kinematics again. It gives no equations: these are
@@ -19,7 +19,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hexapod_cosim.controller.comply.support import indentation
+from hexapod_cosim.controller.comply.support import LEAST_LOAD, indentation
 from hexapod_cosim.controller.gains import Gains
 from hexapod_cosim.controller.memory import Stateful
 from hexapod_cosim.controller.parts import Parts
@@ -28,14 +28,13 @@ from hexapod_cosim.controller.walk.gait import Gait
 from hexapod_cosim.controller.walk.kinematics import Feet, Joints, LegSolver, Pose, Softness
 from hexapod_cosim.models import Robot
 
-LEAST_LOAD = 1e-6  # N    a smaller sum of loads cannot be divided by
 LARGEST_PART = 0.5  # 1    of the weight: what a foot carries beyond is not taken back
 TOUCH_PART = 0.02  # 1    of the weight: a foot with more is on the ground
 WHOLE_PART = 0.9  # 1    of the weight: with less in all, the force of some foot is not reported
 WEIGHT_TIME = 0.5  # s    smoothing of the sum of all loads
 EVENING = 0.15  # 1    added to the spread of the standing feet, for the tilt of the torso
 LANDED_TIME = 0.05  # s    in which a landed foot gives back the lift that it had in the air
-EARLY = 0.003  # m    a foot that is planned higher above the ground meets it early
+EARLY_HEIGHT = 0.003  # m    a foot that is planned higher above the ground meets it early
 LATE_TIME = 0.04  # s    after the planned touch-down, in which a foot may be late
 SEARCH_SPEED = 0.08  # m/s    at most, of a foot that extends
 AIR_TIME = 0.06  # s    in which the suspension of a foot in the air returns
@@ -58,7 +57,7 @@ class Paper(Stateful):
 
     Attributes:
         force: (6, 3) smoothed forces on the feet, torso axes [N].
-        total, weight: sum of the normal forces, and the same smoothed [N].
+        weight: smoothed sum of the normal forces [N].
         back: common return of all feet, x + i y [m].
         sag: height by which the torso sags at its centre, and its slope, x + i y [m, 1].
         lifted: (6,) lift by the torso's sag [m].
@@ -68,7 +67,7 @@ class Paper(Stateful):
     """
 
     STATE = (
-        "force", "total", "weight", "back", "sag", "lifted", "yielded", "late", "shift", "lift",
+        "force", "weight", "back", "sag", "lifted", "yielded", "late", "shift", "lift",
     )  # fmt: skip
 
     def __init__(
@@ -95,7 +94,7 @@ class Paper(Stateful):
     def reset(self) -> None:
         """Sets all forces, deviations and corrections to zero."""
         self.force = np.zeros((LEGS, 3))
-        self.total, self.weight, self.back, self.sag = 0.0, 0.0, 0j, (0.0, 0j)
+        self.weight, self.back, self.sag = 0.0, 0j, (0.0, 0j)
         self.lifted, self.yielded, self.late, self.lift = np.zeros((4, LEGS))
         self.shift: Plane = np.zeros(LEGS, dtype=np.complex128)
 
@@ -153,15 +152,15 @@ class Paper(Stateful):
         raised = self.lifted + self.smoothing * (wanted - self.lifted)
         self.lifted = np.where(step.swinging, raised, self.landed * self.lifted)
 
-    def _suspend(self, step: Step) -> None:
-        """Updates the deflections of the suspensions (C48)."""
+    def _suspend(self, step: Step, total: float) -> None:
+        """Updates the deflections of the suspensions (C48). total: of the normal forces [N]."""
         h = self.period
         touching = step.force[:, 2] > max(TOUCH_PART * self.weight, LEAST_LOAD)
-        missing = ~touching & ~step.swinging & (self.total >= WHOLE_PART * self.weight)
+        missing = ~touching & ~step.swinging & (total >= WHOLE_PART * self.weight)
         self.late = np.where(missing, self.late + h, 0.0)
         # the damper yields to the force beyond the share of a foot
         rate = (step.force[:, 2] - self.weight / LEGS) / self.gains.damping
-        descent = np.where(step.height > EARLY, np.maximum(-step.rise, 0.0), 0.0)
+        descent = np.where(step.height > EARLY_HEIGHT, np.maximum(-step.rise, 0.0), 0.0)
         met = self.yielded + h * clamp(rate, 0.0, descent)
         sought = self.yielded + h * clamp(rate, -SEARCH_SPEED, 0.0)
         kept = np.where(step.swinging & ~touching, self.in_air, self.on_ground)
@@ -174,15 +173,15 @@ class Paper(Stateful):
         self.force = self.force + self.smoothing * (step.force - self.force)
         load = np.maximum(self.force[:, 2], 0.0)
         soft = self.legs.softness(step.pose, self.kp)
-        self.total = float(np.maximum(step.force[:, 2], 0.0).sum())
+        total = float(np.maximum(step.force[:, 2], 0.0).sum())
         started = self.weight > 0.0
-        self.weight += (self.weighing if started else 1.0) * (self.total - self.weight)
+        self.weight += (self.weighing if started else 1.0) * (total - self.weight)
         borne = np.minimum(load, LARGEST_PART * self.weight)
         self._see_torso(step, load)
         if self.parts.paper_share:
             self._lift_swinging(step)
         if self.parts.paper_suspension:
-            self._suspend(step)
+            self._suspend(step, total)
         self.shift = self._along_ground(step, soft, borne)
         self.lift = self.lifted + self.yielded - self.height_share * soft.up * borne
 

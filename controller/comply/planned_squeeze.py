@@ -1,4 +1,4 @@
-"""Plans forces by which the standing legs squeeze each other. C: planned_squeeze.c.
+"""Plans forces by which the standing legs squeeze each other. C: planned_squeeze.h.
 
 Legs that squeeze each other support the torso like an arch: horizontal forces on the feet whose sum
 and moment vanish carry a part of the femurs' load. They use friction, and a foot that uses more of
@@ -12,14 +12,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from hexapod_cosim.controller.comply.support import Shares, solve
+from hexapod_cosim.controller.comply.support import LEAST_LOAD, Shares, solve
 from hexapod_cosim.controller.plane import Array, Plane, across, square
 from hexapod_cosim.controller.walk.inverse_dynamics import Demand
 
 MOST_FRICTION = 0.7  # 1    share of its friction that a foot is planned to use at most
 TRIPOD_SHARE = 1.0 / 3.0  # 1    of the weight: the load at which both sums are compared
 LEAST_PUSH = 1e-12  # N    floor of a change of a force that a factor is divided by
-LEAST_LOAD = 1e-6  # N    a foot with less takes no part; floor of the sum of loads
 Yielding = tuple[Array, Array, Array]  # xx, xy, yy of symmetric matrices, (6,) each
 
 

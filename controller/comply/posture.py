@@ -1,4 +1,4 @@
-"""Converts vectors between torso frame and walking frame (C10). C: posture.c.
+"""Converts vectors between torso frame and walking frame (C10). C: posture.h.
 
 The walking frame K is the torso frame of a robot at its nominal height and level posture. The torso
 frame T is above it by a height and turned by R_KT, roll about x first and then pitch about y.

@@ -1,4 +1,4 @@
-"""Shares the force that the planned motion needs among the standing feet. C: support.c.
+"""Shares the force that the planned motion needs among the standing feet. C: support.h.
 
 The ground must exert the force and the moment that the planned motion needs (inverse_dynamics.py).
 Of all shares that do so, those with the least sum of f_n^2/a are taken (C19, C20), and no foot

@@ -1,4 +1,4 @@
-"""Computes by how far the torso sways against the swinging legs. C: sway.c.
+"""Computes by how far the torso sways against the swinging legs. C: sway.h.
 
 A swinging leg takes its mass forwards and stops it again. Under a torso of constant velocity the
 feet that stand must push for that, forwards and backwards in every swing. The torso instead moves
@@ -16,7 +16,7 @@ import numpy as np
 
 from hexapod_cosim.controller.comply.posture import Posture
 from hexapod_cosim.controller.plane import LEGS, along
-from hexapod_cosim.controller.sense.warmth import Warmth
+from hexapod_cosim.controller.sense.load_adaptation import LoadAdaptation
 from hexapod_cosim.controller.walk.inverse_dynamics import InverseDynamics, Masses
 from hexapod_cosim.controller.walk.kinematics import LegSolver
 from hexapod_cosim.controller.walk.trajectory import PlannedFeet
@@ -52,31 +52,31 @@ class Sway:
             self.aside = _share_of(dynamics, legs, complex(0.0, REACH))
             self.rest = _moment_of(dynamics, legs, 0j)
 
-    def acts(self, warmth: Warmth) -> bool:
+    def acts(self, adaptation: LoadAdaptation) -> bool:
         """Returns whether the torso sways."""
-        return self.active and warmth.narrowing > 0.0
+        return self.active and adaptation.narrowing > 0.0
 
-    def laden(self, warmth: Warmth) -> float:
+    def laden(self, adaptation: LoadAdaptation) -> float:
         """Returns the weight that sways over the modelled one [1]."""
-        return warmth.laden() if self.active else 1.0
+        return adaptation.laden() if self.active else 1.0
 
-    def _yield_to(self, moment: complex, warmth: Warmth) -> complex:
+    def _yield_to(self, moment: complex, adaptation: LoadAdaptation) -> complex:
         """Returns the way of the torso that gives the robot another sum of m p [kg m]."""
-        mass, laden = self.dynamics.total_mass, warmth.laden()
+        mass, laden = self.dynamics.total_mass, adaptation.laden()
         x = moment.real / (mass * (laden - self.forward))
         return complex(x, moment.imag / (mass * (laden - self.aside)))
 
-    def guess(self, feet: PlannedFeet, warmth: Warmth) -> complex:
+    def guess(self, feet: PlannedFeet, adaptation: LoadAdaptation) -> complex:
         """Returns nearly the whole way of the torso, by the shares [m] x + i y, walking frame."""
         away, mass = complex(feet.plane.sum()) - self.home, self.dynamics.total_mass / LEGS
         moment = complex(self.forward * mass * away.real, self.aside * mass * away.imag)
-        return -self._yield_to(moment, warmth)
+        return -self._yield_to(moment, adaptation)
 
-    def of(self, guess: complex, masses: Masses, warmth: Warmth) -> complex:
+    def of(self, guess: complex, masses: Masses, adaptation: LoadAdaptation) -> complex:
         """Returns the way of the torso in the walking frame [m], x + i y (C54).
 
         masses: of a torso that has moved by the guess.
         """
         moved = complex((self.dynamics.mass * masses.place).sum()) - self.rest
-        moved += warmth.laden() * self.dynamics.total_mass * guess
-        return warmth.narrowing * (guess - self._yield_to(moved, warmth))
+        moved += adaptation.laden() * self.dynamics.total_mass * guess
+        return adaptation.narrowing * (guess - self._yield_to(moved, adaptation))

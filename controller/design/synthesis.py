@@ -8,23 +8,23 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import fields
 
 import numpy as np
 
 from hexapod_cosim.controller.design.paper import PaperDesign, Plants, design_paper, meets
 from hexapod_cosim.controller.design.standing import StandingPlant
 from hexapod_cosim.controller.gains import (
-    POSITIVE,
     Gains,
     GainsError,
     HoldGains,
     Margins,
     Requirements,
     SupportGains,
+    raising_gains_errors,
 )
 from hexapod_cosim.controller.size import limit_gains, requirements_for, taken
 from hexapod_cosim.models import LEG_NAMES, Robot
+from hexapod_cosim.models.schema import check_record
 
 NOMINAL = (0.8, 1.25)  # 1    range of mean loads that are about the robot's own
 SAME = 1e-9  # 1    relative tolerance of periods
@@ -115,17 +115,8 @@ def _check(robot: Robot, needs: Requirements, plants: Plants, *, period: float) 
             expected="servo mode position with kp > 0",
             fix="use position servos, or kinematic control",
         )
-    for entry in fields(needs):
-        value, strict = getattr(needs, entry.name), entry.name in POSITIVE["requirements"]
-        if not 0.0 <= value < math.inf or (strict and not value):
-            expected = f"a number >{'' if strict else '='} 0"
-            raise GainsError(
-                "impossible requirement",
-                got=value,
-                expected=expected,
-                fix="correct it",
-                where=entry.name,
-            )
+    with raising_gains_errors():
+        check_record(needs, "requirements")
     for name, plant in plants.items():
         if not math.isclose(plant.system.dt, period, rel_tol=SAME):
             raise GainsError(

@@ -1,4 +1,4 @@
-"""Limits the support to the weight that the servos can carry. C: burden.c.
+"""Limits the support to the weight that the servos can carry. C: burden.h.
 
 Legs that squeeze each other support the torso like an arch: kinematic control needs only 0.6 of the
 torque of the planned shares, which contain no squeeze. If a robot is too heavy for its servos

@@ -1,4 +1,4 @@
-"""Detects contacts from foot forces, and faulty force sensors. C: contact_detection.c.
+"""Detects contacts from foot forces, and faulty force sensors. C: contact_detection.h.
 
 A foot touches down when its force rises above one threshold and lifts off when it falls below a
 lower one, so that noise near a threshold does not toggle the contact (C23). A sensor is doubted
@@ -14,8 +14,8 @@ import numpy as np
 from hexapod_cosim.controller.memory import Stateful
 from hexapod_cosim.controller.plane import LEGS, Array, Mask
 
-TOUCH = 0.02  # 1    of the weight: a foot with more has touched down
-LIFT = 0.005  # 1    of the weight: a foot with less has lifted off
+TOUCH_SHARE = 0.02  # 1    of the weight: a foot with more has touched down
+LIFT_SHARE = 0.005  # 1    of the weight: a foot with less has lifted off
 AIRBORNE_TIME = 0.06  # s    longest plausible force on a foot in mid-swing
 ABSENT_TIME = 0.10  # s    longest plausible lack of force on a standing foot; both exceed the lag
 MISSING_SHARE = 0.92  # 1    of the weight: with less, the force of some foot is not reported
@@ -38,7 +38,7 @@ class ContactDetector(Stateful):
 
     def step(self, normal: Array) -> Mask:
         """Updates and returns `touching` for normal forces (6,) [N] (C23)."""
-        limit = np.where(self.touching, LIFT * self.weight, TOUCH * self.weight)
+        limit = np.where(self.touching, LIFT_SHARE * self.weight, TOUCH_SHARE * self.weight)
         self.touching = normal > limit
         return self.touching
 

@@ -1,6 +1,6 @@
 """Predicts the height above the end of its path at which each foot meets the ground (C35).
 
-C: landing.c. On level ground with the torso as planned this height is 0. A torso that sags or
+C: landing.h. On level ground with the torso as planned this height is 0. A torso that sags or
 leans, or ground that yields, lets all feet meet the ground early at every step; a bump lets one
 foot meet it early once. The expected height of a foot is therefore the least height at which
 another foot last met the ground, or to which it has come down in its swing without contact. It is

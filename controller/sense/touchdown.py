@@ -1,4 +1,4 @@
-"""Corrects foot heights when the ground is met too early or too late (C36). C: touchdown.c.
+"""Corrects foot heights when the ground is met too early or too late (C36). C: touchdown.h.
 
 A foot that meets the ground before its path ends keeps the height of its contact through its
 stance. A foot that finds no ground at the end of its path moves down at a fixed speed to a limit.

@@ -1,4 +1,4 @@
-"""Lets joint commands go on without a jump when the control changes. C: fade.c.
+"""Lets joint commands go on without a jump when the control changes. C: fade.h.
 
 At the first step under another control, the distance of its commands from those that the control
 before would give is computed. It is added to the commands, and goes to 0 by the cubic of the
@@ -8,16 +8,12 @@ FADE_TIME those of the present one.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from hexapod_cosim.controller.memory import Stateful
 from hexapod_cosim.controller.plane import LEGS, clamp
+from hexapod_cosim.controller.signals import JointCommand
 from hexapod_cosim.controller.walk.kinematics import LegSolver
-
-if TYPE_CHECKING:
-    from hexapod_cosim.controller.controller import JointCommand
 
 FADE_TIME = 0.4  # s    duration of a transition
 

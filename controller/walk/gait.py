@@ -1,4 +1,4 @@
-"""Defines gaits: the times at which each leg stands and swings. C: gait.c.
+"""Defines gaits: the times at which each leg stands and swings. C: gait.h.
 
 The phase of a leg is its offset plus the gait clock, modulo 1; below the duty factor it stands,
 above it swings (C2). The offsets are OpenSHC's multiplier x offset / (stance + swing), given there

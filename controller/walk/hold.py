@@ -1,6 +1,6 @@
 """Controls posture and path of the torso slowly, by the positions of the standing feet.
 
-C: hold.c. Standing feet are fixed to the ground, so their positions by the joint encoders give the
+C: hold.h. Standing feet are fixed to the ground, so their positions by the joint encoders give the
 height and tilt of the torso over them (C37). This tilt and that of the attitude sensor give the
 inclination of the ground. The torso is held parallel to the smoothed inclination; fast tilts are
 corrected by the sensor (C38). Between two looks, the feet that stood all the time give the path of
@@ -21,7 +21,7 @@ from hexapod_cosim.controller.parts import Parts
 from hexapod_cosim.controller.plane import LEGS, Array, Plane, cis, clamp
 
 LOOK_TIME = 0.04  # s    between two looks, at least a period
-LOADED = 0.4  # 1    thirds of the weight; a foot with more load does not slide
+LOADED_FROM = 0.4  # 1    thirds of the weight; a foot with more load does not slide
 DETERMINANT_FLOOR = 1e-6  # m4    feet on one line determine no plane
 
 
@@ -45,12 +45,12 @@ def fit_plane(feet: Plane, height: Array, weight: Array) -> Array | None:
     Args:
         feet: (6,) x + i y [m].
         height: (6,) [m].
-        weight: (6,) feet with no more than LOADED are left out.
+        weight: (6,) feet with no more than LOADED_FROM are left out.
 
     Returns:
         (3,) c, s_x, s_y; None when the feet do not span a plane.
     """
-    loaded = weight > LOADED
+    loaded = weight > LOADED_FROM
     if np.count_nonzero(loaded) < 3:
         return None
     part = np.where(loaded, weight, 0.0)
@@ -123,7 +123,7 @@ class Hold(Stateful):
             return
         before, loads, yaw = self.last
         least = np.minimum(loads, seen.load)
-        both = np.where(least > LOADED, least, 0.0)
+        both = np.where(least > LOADED_FROM, least, 0.0)
         total = both.sum()
         ahead = cis(yaw + self.heading + 0.5 * seen.yaw_rate * self.time)
         commanded = ahead * seen.velocity * self.time

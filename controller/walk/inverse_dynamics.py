@@ -1,6 +1,6 @@
 """Computes the servo torques and ground forces that the planned motion needs (inverse dynamics).
 
-C: inverse_dynamics.c. A leg is three point masses. In its own vertical plane, which turns with the
+C: inverse_dynamics.h. A leg is three point masses. In its own vertical plane, which turns with the
 coxa, a point is U = u + i w (outward, up) and Y to the side; this plane has the heading e^(i psi).
 Accelerations are second differences of three successive planned steps. The joint torques are C15,
 the force and moment of the ground on the whole robot C16. A force f of the ground on the foot needs

@@ -1,4 +1,4 @@
-"""Computes the kinematics of six three-joint legs in closed form, torso frame. C: kinematics.c.
+"""Computes the kinematics of six three-joint legs in closed form, torso frame. C: kinematics.h.
 
 Geometry (docs/architecture.md): the coxa turns about +z, the femur about -y, the tibia about +y;
 the tip of a link is (length, offset_y, offset_z) in the link's frame. Seen in the coxa frame, a leg

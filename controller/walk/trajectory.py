@@ -1,4 +1,4 @@
-"""Computes the paths of the feet from the body command. C: trajectory.c.
+"""Computes the paths of the feet from the body command. C: trajectory.h.
 
 The walking frame K is the torso frame of a robot at its nominal height and level posture. It moves
 over the ground with the velocity v = vx + i vy and the yaw rate w. Horizontal points are complex

@@ -7,21 +7,17 @@ from typing import Annotated
 import typer
 
 from hexapod_cosim.cosim.cli import (
-    benchmark_command,
     compare_command,
     controller_command,
     examples_command,
     export_command,
     fmu_commands,
-    identify_command,
     listing,
-    replay_command,
     run_commands,
     terrain_command,
 )
+from hexapod_cosim.cosim.cli.extension import installed_extensions
 from hexapod_cosim.cosim.cli.failures import EPILOG
-from hexapod_cosim.cosim.cli.live import live_command, realtime_command
-from hexapod_cosim.cosim.cli.study import study_command
 from hexapod_cosim.cosim.common.plant_files import package_version
 
 app = typer.Typer(
@@ -34,19 +30,19 @@ app = typer.Typer(
 app.command("export")(export_command.export)
 app.command("simulate", epilog=run_commands.EPILOG)(run_commands.simulate)
 app.command("compare", epilog=compare_command.EPILOG)(compare_command.compare)
-app.command("study", epilog=study_command.EPILOG)(study_command.study)
-app.command("benchmark", epilog=benchmark_command.EPILOG)(benchmark_command.benchmark)
 app.command("design")(fmu_commands.design)
 app.command("report")(run_commands.report)
 app.add_typer(controller_command.app, name="controller")
 app.command("examples")(examples_command.examples)
 app.command("validate")(fmu_commands.validate)
 app.command("terrain")(terrain_command.terrain)
-app.command("live")(live_command.live)
-app.command("realtime")(realtime_command.realtime)
-app.command("replay")(replay_command.replay)
-app.command("identify")(identify_command.identify)
 app.command("list")(listing.list_what)
+for extension in installed_extensions():
+    for command in extension.commands:
+        if isinstance(command.run, typer.Typer):
+            app.add_typer(command.run, name=command.name, epilog=command.epilog)
+        else:
+            app.command(command.name, epilog=command.epilog)(command.run)
 
 
 def _show_version(wanted: bool) -> None:

@@ -52,6 +52,7 @@ from hexapod_cosim.cosim.results.comparison import (
     write_seeds,
 )
 from hexapod_cosim.cosim.results.comparisons import Comparisons, compare_all, write_comparison
+from hexapod_cosim.cosim.results.gait_choice import gait_differences
 from hexapod_cosim.cosim.results.metrics import has_net_slip
 from hexapod_cosim.cosim.results.result import Result
 from hexapod_cosim.cosim.results.results import (
@@ -63,7 +64,6 @@ from hexapod_cosim.cosim.results.results import (
     stored_result,
 )
 from hexapod_cosim.cosim.results.summary import Summary, summarise
-from hexapod_cosim.cosim.results.walking import WALKING, different_walks
 from hexapod_cosim.cosim.run.batch import run_batch
 from hexapod_cosim.cosim.run.chosen_walk import choose_walk
 from hexapod_cosim.cosim.run.preparation import PlantFmus, chosen_gains
@@ -205,8 +205,8 @@ class Work:
         for control in self.compared:
             plan = replace(self.plan, control=control.text)
             walk = choose_walk(plan, gains=chosen_gains(plan, self.options.gains))
-            found[control.label] = {WALKING: walk.as_facts()}
-        return different_walks(found)
+            found[control.label] = walk.as_facts()
+        return gait_differences(found)
 
 
 @dataclass(frozen=True)

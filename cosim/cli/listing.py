@@ -10,11 +10,11 @@ from typing import Annotated, Any
 import typer
 
 from hexapod_cosim.controller import PATTERNS
+from hexapod_cosim.cosim.cli.extension import Rows, list_functions
 from hexapod_cosim.cosim.cli.terminal import Json, show_json, show_table, show_text
 from hexapod_cosim.cosim.cli.terrain_command import value_text
 from hexapod_cosim.cosim.interface.plant_interface import load_interface
 from hexapod_cosim.cosim.scenario.tables import list_scenarios
-from hexapod_cosim.cosim.study.bundled import list_studies
 from hexapod_cosim.models import LEG_NAMES, Terrain, list_robots, load_robot, unknown_name
 from hexapod_cosim.models.ground.catalogue import CATALOGUE
 from hexapod_cosim.models.ground.entries import Entry
@@ -25,8 +25,6 @@ from hexapod_cosim.models.schema import Number, specs
 from hexapod_cosim.models.servos.motor import no_load_speed, stall_torque
 from hexapod_cosim.models.servos.presets import list_servos, measured_servo
 from hexapod_cosim.models.soil.presets import list_soils, soil_preset
-
-Rows = list[dict[str, Any]]
 
 
 def robots() -> Rows:
@@ -44,15 +42,10 @@ def robots() -> Rows:
 
 def scenarios() -> Rows:
     """Returns the bundled scenarios."""
-    return _titles(list_scenarios())
+    return titles(list_scenarios())
 
 
-def studies() -> Rows:
-    """Returns the bundled studies."""
-    return _titles(list_studies())
-
-
-def _titles(files: Mapping[str, Path]) -> Rows:
+def titles(files: Mapping[str, Path]) -> Rows:
     """Returns the titles of TOML files, by name."""
     return [
         {
@@ -138,12 +131,12 @@ def _choices(enumeration: str) -> Rows:
 LISTS: dict[str, Callable[[], Rows]] = {
     "robots": robots,
     "scenarios": scenarios,
-    "studies": studies,
     "gaits": gaits,
     "terrains": terrains,
     "soils": soils,
     "servos": servos,
     "laws": laws,
+    **list_functions(),
 }
 
 
@@ -158,7 +151,7 @@ What = Annotated[
 
 
 def list_what(what: What, json: Json = False) -> None:
-    """List robots, scenarios, studies, gaits, terrains, soils, servos or laws."""
+    """List robots, scenarios, gaits, terrains, soils, servos, laws or what an extension adds."""
     if what not in LISTS:
         raise unknown_name("list", what, LISTS)
     rows = LISTS[what]()

@@ -9,8 +9,8 @@ from typing import Annotated, Any
 
 import typer
 
-from hexapod_cosim.cosim.cli import benchmark_command
 from hexapod_cosim.cosim.cli.accuracy_check import CheckAccuracy, check_accuracy, show_accuracy
+from hexapod_cosim.cosim.cli.extension import report_functions
 from hexapod_cosim.cosim.cli.failures import FELL, SUCCESS
 from hexapod_cosim.cosim.cli.running import (
     ControlNames,
@@ -32,14 +32,12 @@ from hexapod_cosim.cosim.cli.running import (
     with_formats,
 )
 from hexapod_cosim.cosim.cli.terminal import Json, show_files, show_json, show_text, warn
-from hexapod_cosim.cosim.common.files import BENCHMARK, PARTS, STUDY
-from hexapod_cosim.cosim.common.installation import require_pyarrow
+from hexapod_cosim.cosim.common.files import PARTS
 from hexapod_cosim.cosim.report.accuracy import with_errors
 from hexapod_cosim.cosim.report.report import REPORT, metric_rows, write_report
 from hexapod_cosim.cosim.results.accuracy import Accuracy, halved_scenario
 from hexapod_cosim.cosim.results.comparison import SEEDS, read_seeds
 from hexapod_cosim.cosim.results.comparisons import WALKS, compare_all
-from hexapod_cosim.cosim.results.drop import drop_text
 from hexapod_cosim.cosim.results.metrics import has_net_slip
 from hexapod_cosim.cosim.results.result import Result
 from hexapod_cosim.cosim.results.results import (
@@ -54,13 +52,11 @@ from hexapod_cosim.cosim.results.results import (
     write_accuracy,
 )
 from hexapod_cosim.cosim.results.summary import summarise
-from hexapod_cosim.cosim.results.walking import WALKING, walking_text
 from hexapod_cosim.cosim.scenario.controls import control_of
 from hexapod_cosim.cosim.scenario.records import Scenario
 from hexapod_cosim.cosim.scenario.scenario import load_scenario
 from hexapod_cosim.models import HexapodError
 
-LOG_KINDS = ("replay", "identify")  # folders that depend on a log
 EPILOG = (
     f"Exit code {FELL} when the robot fell: what was recorded and measured is written all the same."
 )
@@ -143,9 +139,7 @@ def _simulate_one(run: _Run, path: Path, *, quiet: bool) -> _Simulated:
                 files += write_report(runs, folder.path, warn=warn, accuracies=checked)
     if not quiet:
         _show(result, files, checked)
-    return _Simulated(
-        _summary(result, folder.path, files, checked), result.facts["walk"]["upright"]
-    )
+    return _Simulated(_summary(result, folder.path, files, checked), result.facts.walk.upright)
 
 
 def _show(result: Result, files: Sequence[Path], checked: Mapping[str, Accuracy]) -> None:
@@ -155,10 +149,9 @@ def _show(result: Result, files: Sequence[Path], checked: Mapping[str, Accuracy]
     rows = metric_rows(metrics, net_slip=has_net_slip(result.parameters))
     show_rows(with_errors(rows, checked), [control])
     show_accuracy(rows, checked, metrics)
-    if walking := walking_text(result.facts):
-        show_text(f"walk: {walking}")
-    if result.facts.get("drop"):
-        show_text(drop_text(result.facts["drop"]))
+    show_text(f"walk: {result.facts.walking.text}")
+    if result.facts.drop is not None:
+        show_text(result.facts.drop.text)
     show_files(files)
 
 
@@ -183,28 +176,21 @@ def report(
 
 def _report_again(folder: Path, facts: Mapping[str, Any]) -> list[Path]:
     """Writes the report of a folder again; `facts` are those of its run.json."""
-    if facts.get("kind") == STUDY:
-        require_pyarrow("studies", "hexapod report")
-        # imported only here because it is slow
-        from hexapod_cosim.cosim.cli.study.studying import report_on, warn_of  # noqa: PLC0415
-
-        found, files = report_on(folder)
-        warn_of(found)
-        return list(files)
-    if facts.get("kind") == BENCHMARK:
-        return list(benchmark_command.report_on(folder))
-    if facts.get("kind") == "compare":
+    kind, reports = facts.get("kind"), report_functions()
+    if kind in reports:
+        return list(reports[kind](folder))
+    if kind == "compare":
         return _report_comparison(folder, facts)
-    if facts.get("kind") in LOG_KINDS:
+    if kind is not None:
         raise HexapodError(
             "not a run, whose report can be made again",
-            got=f"a folder of `hexapod {facts['kind']}`",
-            expected="a run, a comparison, a study or a benchmark",
+            got=f"a folder of `hexapod {kind}`",
+            expected=" or ".join(["a run", "a comparison", *(f"a {name}" for name in reports)]),
             fix=f"run it again: {facts.get('command', '')}",
             where=str(folder),
         )
     run = read_result(folder)
-    control = run.facts["control"]
+    control = run.facts.control
     accuracies = {control: run.accuracy} if run.accuracy else {}
     return write_report({control: run}, folder, warn=warn, accuracies=accuracies)
 
@@ -234,9 +220,9 @@ def _summary(
         "directory": str(folder),
         "files": [str(file) for file in files],
     }
-    shown = {key: result.facts[key] for key in ("robot", "walk", WALKING, "warnings")}
-    status = {"status": result.outcome.status}
-    summary = {"metrics": dict(result.metrics), **names, **shown, **status}
+    facts = result.facts.as_table()
+    shown = {key: facts[key] for key in ("robot", "walk", "walking", "warnings", "status")}
+    summary = {"metrics": dict(result.metrics), **names, **shown}
     if checked:
         summary[ACCURACY] = checked[label].as_table()
     return summary

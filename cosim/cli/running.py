@@ -218,10 +218,10 @@ def run_into(
             if options.engine == "compiled":
                 run = partial(stack.enter_context(Walker(everything=True)).simulate, plan)
             result = run(fmu=options.fmu, gains=options.gains, progress=progress, begin=begin)
-        result = replace(result, facts={**result.facts, "command": command})
+        result = replace(result, facts=replace(result.facts, command=command))
         with waiting("writing the results"):
             files = write_result(result, folders[-1].path)
-    for warning in result.facts["warnings"]:
+    for warning in result.facts.warnings:
         warn(f"{label}: {warning}")
     outcome = result.outcome
     if outcome.status == INTERRUPTED:

@@ -1,6 +1,6 @@
-"""The components that FMUs exist for: the plant, its controller and learned policies.
+"""The components that FMUs exist for: the plant and its controller.
 
-All use the FMI layer in fmi/ and describe their variables in an interface.toml.
+They use the FMI layer in fmi/ and describe their variables in an interface.toml.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ PLANT = Component(
 CONTROLLER = Component(
     name="controller",
     identifier="hexapod_controller",
-    tree="controller_fmu",
+    tree="controller/fmu",
     installed="plant/controller",
     header="hexapod/controller.h",
     prefix="controller_",
@@ -49,19 +49,5 @@ CONTROLLER = Component(
     description=(
         "Walking controller of a hexapod robot: commands of its {joints} joints from a body "
         "velocity and from foot forces"
-    ),
-)
-POLICY = Component(
-    name="policy",
-    identifier="hexapod_policy",
-    tree="policy_fmu",
-    installed="plant/policy",
-    header="hexapod/policy.h",
-    prefix="policy_",
-    structure="Policy",
-    suffix="_policy",
-    description=(
-        "Learned policy of a hexapod robot: angles of its {joints} joints from a body velocity and "
-        "from measurements by a multilayer perceptron"
     ),
 )

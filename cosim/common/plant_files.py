@@ -71,7 +71,9 @@ def code_hash() -> str:
     and co-simulation loop.
     """
     digest = hashlib.sha256()
-    for folder in (_COSIM, _COSIM.parent / "controller", _COSIM.parent / "models"):
+    for folder in (
+        _COSIM.parent / name for name in ("cosim", "controller", "models", "extensions")
+    ):
         for path in sorted([*folder.rglob("*.py"), *folder.rglob("*.toml")]):
             digest.update(
                 path.relative_to(_COSIM.parent).as_posix().encode()

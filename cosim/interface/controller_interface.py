@@ -1,4 +1,4 @@
-"""The variables of the controller's FMU, from controller_fmu/interface.toml and one setup of the
+"""The variables of the controller's FMU, from controller/fmu/interface.toml and one setup of the
 controller.
 """
 

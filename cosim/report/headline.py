@@ -10,6 +10,8 @@ from typing import Any
 import numpy as np
 
 from hexapod_cosim.cosim.results.comparison import BETTER, WORSE, Change, Comparison
+from hexapod_cosim.cosim.results.drop import Drop
+from hexapod_cosim.cosim.results.facts import RunFacts
 from hexapod_cosim.cosim.results.metrics import METRICS, PER_RADIAN
 from hexapod_cosim.cosim.results.walk import TANH
 from hexapod_cosim.cosim.scenario.records import CONTROLS
@@ -109,16 +111,16 @@ def _shown(comparison: Comparison) -> dict[str, tuple[str, str]]:
     return shown
 
 
-def creep_note(facts: Mapping[str, Any], surface: Surface | None = None) -> str:
+def creep_note(facts: RunFacts, surface: Surface | None = None) -> str:
     """Returns a note on slip under a run's friction law, "" if there is none.
 
     A drop has none, nor has ground with soil: there the law does not act, and slip is shear.
 
-    facts: those of run.json, of which `parameters` and `drop` count. surface: the run's.
+    surface: the run's.
     """
-    parameters = facts["parameters"]
+    parameters = facts.parameters
     creeps = parameters.get("friction.law", TANH) == TANH
-    return CREEP if creeps and not facts.get("drop") and not _has_soil(parameters, surface) else ""
+    return CREEP if creeps and not facts.drop and not _has_soil(parameters, surface) else ""
 
 
 def _has_soil(parameters: Mapping[str, Any], surface: Surface | None) -> bool:
@@ -231,19 +233,18 @@ def _share(value: float) -> str:
     return f"{100.0 * value:+.{1 if abs(value) < 1.0 else 0}f} %".replace("-", "−")
 
 
-def plain_headline(metrics: Mapping[str, float | None], facts: Mapping[str, Any]) -> list[Part]:
+def plain_headline(metrics: Mapping[str, float | None], facts: RunFacts) -> list[Part]:
     """Returns the headline of one run: duration, speed, error of the feet, cost of transport.
 
     That of a drop has the restitution of its first impact instead.
     """
-    if facts.get("drop"):
-        return [_drop_part(facts)]
-    speed = (facts.get("walk") or {}).get("mean_speed")
-    label = facts["control"]
+    if facts.drop is not None:
+        return [_drop_part(facts.drop, facts.simulated)]
+    speed, label = facts.walk.mean_speed, facts.control
     name = f"{label.capitalize()} control" if label in CONTROLS else f"Control {label}"
-    begin = f"{name}, {facts['simulated']:.4g} s"
+    begin = f"{name}, {facts.simulated:.4g} s"
     error, cost = metrics.get("foot_error_stance"), metrics.get("cost_of_transport")
-    parts = [f"{1e3 * speed:.3g} mm/s"] if speed is not None and math.isfinite(speed) else []
+    parts = [f"{1e3 * speed:.3g} mm/s"] if math.isfinite(speed) else []
     if error is not None and math.isfinite(error) and error > ROUND_OFF:
         parts.append(f"standing feet {1e3 * error:.3g} mm from their plan")
     if cost is not None and math.isfinite(cost):
@@ -251,12 +252,11 @@ def plain_headline(metrics: Mapping[str, float | None], facts: Mapping[str, Any]
     return [Part(f"{begin}: {', '.join(parts)}." if parts else f"{begin}.")]
 
 
-def _drop_part(facts: Mapping[str, Any]) -> Part:
+def _drop_part(drop: Drop, simulated: float) -> Part:
     """Returns the headline of a drop: the restitution delivered and the one asked for."""
-    drop, asked = facts["drop"], facts["drop"]["asked"]
-    first = drop["bounces"][0]
+    asked, first = drop.asked, drop.bounces[0]
     text = (
-        f"Drop, {facts['simulated']:.4g} s: restitution {first['restitution']:.3g} delivered at "
-        f"{first['speed']:.3g} m/s"
+        f"Drop, {simulated:.4g} s: restitution {first.restitution:.3g} delivered at "
+        f"{first.speed:.3g} m/s"
     )
     return Part(f"{text}, {asked:.3g} asked for." if asked is not None else f"{text}.")

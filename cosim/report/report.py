@@ -29,7 +29,7 @@ from hexapod_cosim.cosim.report.surface import material_legend
 from hexapod_cosim.cosim.results.accuracy import Accuracy
 from hexapod_cosim.cosim.results.comparison import BETTER, METHOD, SAME, WORSE, Change
 from hexapod_cosim.cosim.results.comparisons import Comparisons
-from hexapod_cosim.cosim.results.drop import drop_text
+from hexapod_cosim.cosim.results.facts import RunFacts
 from hexapod_cosim.cosim.results.ground import describe_terrain
 from hexapod_cosim.cosim.results.metrics import (
     DUST,
@@ -40,7 +40,6 @@ from hexapod_cosim.cosim.results.metrics import (
     shown_metrics,
 )
 from hexapod_cosim.cosim.results.results import StoredResult
-from hexapod_cosim.cosim.results.walking import walking_text
 from hexapod_cosim.models import JOINT_NAMES
 
 REPORT, PLOTS, PROFILE = "report.html", "plots", "profile"
@@ -149,13 +148,11 @@ def write_report(
     first = next(iter(runs.values()))
     content = _one_run(first) if comparison is None else _comparison(comparison, first.facts)
     content["warnings"] = [
-        f"{label}: {text}" for label, run in runs.items() for text in run.facts["warnings"]
+        f"{label}: {text}" for label, run in runs.items() for text in run.facts.warnings
     ] + content.pop("overall")
-    content["events"] = [
-        f"{event['time']:g} s: {event['text']}" for event in first.facts.get("events", [])
-    ]
+    content["events"] = [f"{event['time']:g} s: {event['text']}" for event in first.facts.events]
     content["scenario"] = first.scenario if scenario is None else scenario
-    content["command"] = first.facts.get("command", "") if command is None else command
+    content["command"] = first.facts.command if command is None else command
     metrics = (
         {label: run.metrics for label, run in runs.items()}
         if comparison is None
@@ -165,15 +162,15 @@ def write_report(
         "report.html.jinja",
         controls=runs,
         keys={label: style.key for label, style in control_styles(runs).items()},
-        title=first.facts["title"],
+        title=first.facts.title,
         sections=[section for section in SECTIONS if section.name not in skipped],
         missing=missing,
         servos=servo_rows(runs),
         joints=JOINT_NAMES,
         creep=creep_note(first.facts, first.view.surface),
-        walks={label: walking_text(run.facts) for label, run in runs.items()},
+        walks={label: run.facts.walking.text for label, run in runs.items()},
         differences=walks,
-        terrain=describe_terrain(first.view.surface, first.facts["parameters"]),
+        terrain=describe_terrain(first.view.surface, first.facts.parameters),
         materials=_materials(runs),
         **content | _accuracy(content["rows"], accuracies, metrics),
         **_facts(runs),
@@ -216,17 +213,17 @@ def _facts(runs: Mapping[str, StoredResult]) -> dict[str, Any]:
         "durations": {label: _duration(run.facts) for label, run in runs.items()},
         "walked": {label: _walked(run.facts) for label, run in runs.items()},
         "gains": {
-            label: tomlkit.dumps(without_none(run.facts["gains"]))
+            label: tomlkit.dumps(without_none(run.facts.gains))
             for label, run in runs.items()
-            if run.facts.get("gains")
+            if run.facts.gains
         },
     }
 
 
 def _one_run(run: StoredResult) -> dict[str, Any]:
     """Returns the parts of the page that only a report of a single run has."""
-    metrics = {run.facts["control"]: run.metrics}
-    rows = metric_rows(metrics, net_slip=has_net_slip(run.facts["parameters"]))
+    metrics = {run.facts.control: run.metrics}
+    rows = metric_rows(metrics, net_slip=has_net_slip(run.facts.parameters))
     return {
         "headline": plain_headline(run.metrics, run.facts),
         "headlines": [],
@@ -240,13 +237,13 @@ def _one_run(run: StoredResult) -> dict[str, Any]:
     }
 
 
-def _comparison(comparison: Comparisons, facts: Mapping[str, Any]) -> dict[str, Any]:
+def _comparison(comparison: Comparisons, facts: RunFacts) -> dict[str, Any]:
     """Returns the parts of the page that only a report of a comparison has."""
-    rows = comparison_rows(comparison, net_slip=has_net_slip(facts["parameters"]))
+    rows = comparison_rows(comparison, net_slip=has_net_slip(facts.parameters))
     notes = about(comparison)
     means = notes.partition(f"; {METHOD}")[0]
     means = f"{means}; 95 % intervals in brackets." if means else "One run of each control."
-    lead = f"Robot {facts['robot']['name']}. {means}"
+    lead = f"Robot {facts.robot.name}. {means}"
     main = comparison.main
     return {
         "headline": headline(main),
@@ -275,23 +272,22 @@ def _replay(runs: Mapping[str, StoredResult]) -> dict[str, Any]:
     }
 
 
-def _duration(facts: Mapping[str, Any]) -> str:
-    simulated, wall = f"{facts['simulated']:.6g} s", f"{facts['wall']:.3g} s"
-    return f"{simulated} simulated in {wall} ({facts['realtime_factor']:.3g} x real time)"
+def _duration(facts: RunFacts) -> str:
+    simulated, wall = f"{facts.simulated:.6g} s", f"{facts.wall:.3g} s"
+    return f"{simulated} simulated in {wall} ({facts.realtime_factor:.3g} x real time)"
 
 
-def _walked(facts: Mapping[str, Any]) -> str:
+def _walked(facts: RunFacts) -> str:
     """Returns duration and, if known, mean speed."""
-    speed = (facts.get("walk") or {}).get("mean_speed")
-    simulated = f"{facts['simulated']:.6g} s"
-    if speed is None or not math.isfinite(speed):
+    speed, simulated = facts.walk.mean_speed, f"{facts.simulated:.6g} s"
+    if not math.isfinite(speed):
         return simulated
     return f"{simulated} at {1e3 * speed:.3g} mm/s"
 
 
-def _robot(facts: Mapping[str, Any]) -> str:
-    drop = f" {drop_text(facts['drop'])}" if facts.get("drop") else ""
-    return f"Robot {facts['robot']['name']}, {_duration(facts)}.{drop}"
+def _robot(facts: RunFacts) -> str:
+    drop = f" {facts.drop.text}" if facts.drop else ""
+    return f"Robot {facts.robot.name}, {_duration(facts)}.{drop}"
 
 
 def metric_rows(metrics: Metrics, *, net_slip: bool) -> Rows:

@@ -9,7 +9,7 @@ plant tracks, which do not depend on sampling either.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -42,9 +42,16 @@ class Drop:
     of_the_law: float | None  # that the law delivers, by its closed form
     bounces: tuple[Bounce, ...]
 
-    def as_facts(self) -> dict[str, Any]:
-        """Returns the drop for run.json."""
-        return asdict(self) | {"bounces": [asdict(bounce) for bounce in self.bounces]}
+    @property
+    def text(self) -> str:
+        """The drop as one sentence."""
+        asked = "no restitution" if self.asked is None else f"restitution {self.asked:.3g}"
+        law = "" if self.of_the_law is None else f", the law gives {self.of_the_law:.4f}"
+        delivered = ", ".join(
+            f"{bounce.restitution:.4f} at {bounce.speed:.3g} m/s (peak {bounce.peak:.3g} BW)"
+            for bounce in self.bounces
+        )
+        return f"Asked for {asked}{law}; delivered {delivered}."
 
 
 def describe_drop(view: View) -> Drop | None:
@@ -103,19 +110,3 @@ def asked_restitution(parameters: Mapping[str, float]) -> tuple[float | None, fl
         return None, 1.0 if law == "hertz" else None
     asked = parameters["contact.restitution"]
     return asked, achieved_restitution(CHI[law](asked))
-
-
-def drop_text(drop: Mapping[str, Any]) -> str:
-    """Returns the facts of a drop as one sentence."""
-    asked = "no restitution" if drop["asked"] is None else f"restitution {drop['asked']:.3g}"
-    law = "" if drop["of_the_law"] is None else f", the law gives {drop['of_the_law']:.4f}"
-    delivered = ", ".join(
-        f"{bounce['restitution']:.4f} at {bounce['speed']:.3g} m/s{_peak_text(bounce)}"
-        for bounce in drop["bounces"]
-    )
-    return f"Asked for {asked}{law}; delivered {delivered}."
-
-
-def _peak_text(bounce: Mapping[str, Any]) -> str:
-    """Returns the peak of an impact's force; "" for results of earlier versions, without it."""
-    return f" (peak {bounce['peak']:.3g} BW)" if "peak" in bounce else ""

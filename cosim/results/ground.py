@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 
 from hexapod_cosim.cosim.master.recorder import Recording
 from hexapod_cosim.cosim.results.walk import FLAT, GRID
-from hexapod_cosim.models.errors import RobotError
 from hexapod_cosim.models.ground.grid_file import read_grid, surface_from_bytes, write_grid
 from hexapod_cosim.models.ground.surface import Surface
 from hexapod_cosim.models.ground.table import terrain_specs
@@ -131,11 +130,3 @@ def _text(key: str, value: Any) -> str:
     spec = terrain_specs().get(key)
     unit = spec.unit if isinstance(spec, Number) else "1"
     return f"{value:.4g}" + ("" if unit == "1" else f" {unit}")
-
-
-def recipe_of(facts: Mapping[str, Any]) -> Mapping[str, Any]:
-    """Returns the keys of [terrain] in a run's facts. Raises RobotError for other content."""
-    recipe = facts.get("terrain") or {}
-    if not isinstance(recipe, Mapping):
-        raise RobotError("the facts of the ground", got=recipe, expected="a table", where="terrain")
-    return recipe

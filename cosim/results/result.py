@@ -5,11 +5,10 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
 
 from hexapod_cosim.cosim.master.loop import COMPLETED, Outcome
 from hexapod_cosim.cosim.master.recorder import Recording
-from hexapod_cosim.cosim.scenario.controls import control_of
+from hexapod_cosim.cosim.results.facts import RunFacts
 from hexapod_cosim.cosim.scenario.records import Scenario
 from hexapod_cosim.models.ground.surface import Surface
 
@@ -23,18 +22,17 @@ class Result:
     scenario: Scenario
     outcome: Outcome
     metrics: Mapping[str, float]
-    parameters: Mapping[str, float]  # of the FMU during the run
-    facts: Mapping[str, Any]  # robot, FMU, versions, warnings
+    facts: RunFacts
     surface: Surface | None = None  # that the FMU read from its resources; None: a plane
 
     def __repr__(self) -> str:
         """Returns title, control, status, simulated time and the main metrics that there are."""
-        control, outcome = control_of(self.scenario.control).label, self.outcome
+        outcome = self.outcome
         found = {name: self.metrics.get(name, math.nan) for name in MAIN}
         figures = [f"{name}={value:.4g}" for name, value in found.items() if math.isfinite(value)]
         parts = [
             f"{self.scenario.title!r}",
-            f"control={control!r}",
+            f"control={self.facts.control!r}",
             f"status={outcome.status!r}",
             f"simulated={outcome.simulated:.4g}",
             *figures,
@@ -45,6 +43,11 @@ class Result:
     def recording(self) -> Recording:
         """The recorded rows: time, the plant's outputs and inputs, commands."""
         return self.outcome.recording
+
+    @property
+    def parameters(self) -> Mapping[str, float]:
+        """The FMU's parameters during the run."""
+        return self.facts.parameters
 
     @property
     def completed(self) -> bool:

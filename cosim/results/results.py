@@ -23,7 +23,8 @@ from hexapod_cosim.cosim.common.locks import lock_folder
 from hexapod_cosim.cosim.interface.names import vector_names
 from hexapod_cosim.cosim.master.loop import COMPLETED, FAILED, INTERRUPTED
 from hexapod_cosim.cosim.results.accuracy import Accuracy, accuracy_from_table
-from hexapod_cosim.cosim.results.ground import around_walk, read_ground, recipe_of, write_ground
+from hexapod_cosim.cosim.results.facts import RunFacts, facts_from_table
+from hexapod_cosim.cosim.results.ground import around_walk, read_ground, write_ground
 from hexapod_cosim.cosim.results.recordings import (
     COMMANDS,
     read_recording,
@@ -32,7 +33,6 @@ from hexapod_cosim.cosim.results.recordings import (
 )
 from hexapod_cosim.cosim.results.result import Result
 from hexapod_cosim.cosim.results.walk import View
-from hexapod_cosim.cosim.scenario.controls import control_of
 from hexapod_cosim.models import HexapodError, load_robot
 from hexapod_cosim.models.files import read_text
 
@@ -41,10 +41,6 @@ METRICS_FILE, SCENARIO = "metrics.json", "scenario.toml"
 ACCURACY = "accuracy"  # key of metrics.json, where accuracy was checked
 WARNINGS = "warnings"  # key of metrics.json: the run's, as in run.json
 ABOUT = ("title", "control", "robot", "fmu", "versions")  # facts in the Parquet file
-NEEDED = (  # facts that a report needs
-    *("title", "control", "simulated", "wall", "realtime_factor", "finished", "gait_period"),
-    *("parameters", "robot", "fmu", "versions", "platform", "warnings"),
-)
 
 
 @dataclass(frozen=True)
@@ -53,7 +49,7 @@ class StoredResult:
 
     view: View
     metrics: Mapping[str, float | None]
-    facts: Mapping[str, Any]
+    facts: RunFacts
     scenario: str  # TOML
     accuracy: Accuracy | None = None  # None: not checked
 
@@ -121,7 +117,7 @@ def write_result(result: Result, folder: Path) -> list[Path]:
     which reports are made again, hold all columns; CSV holds those that outputs.csv names.
     Commands are written only where every macro-step is recorded, since they hold from row to row.
     """
-    facts, outputs = run_facts(result), result.scenario.outputs
+    facts, outputs = result.facts.as_table(), result.scenario.outputs
     scenario, recording = tomlkit.dumps(result.scenario.to_table()), result.outcome.recording
     write_text(folder / SCENARIO, scenario)
     about = {key: facts[key] for key in ABOUT} | {"scenario": scenario}
@@ -148,45 +144,20 @@ def write_result(result: Result, folder: Path) -> list[Path]:
     return [*files, folder / RUN_FILE]
 
 
-def run_facts(result: Result) -> dict[str, Any]:
-    """Returns the content of run.json."""
-    outcome, scenario = result.outcome, result.scenario
-    return {
-        "kind": "simulate",
-        "status": outcome.status,
-        "reason": outcome.reason,
-        "title": scenario.title,
-        "control": control_of(scenario.control).label,
-        "simulated": outcome.simulated,
-        "wall": outcome.wall,
-        "realtime_factor": outcome.realtime_factor,
-        "finished": outcome.finished.isoformat(timespec="seconds"),
-        **result.facts,
-        "terrain": {} if result.surface is None else dict(result.surface.recipe),
-        "parameters": dict(result.parameters),
-    }
-
-
 def read_result(folder: Path) -> StoredResult:
     """Reads a completed run from its folder.
 
     Raises HexapodError when there is none or it did not complete.
     """
-    facts = read_facts(folder)
-    if facts["status"] != COMPLETED:
-        raise _incomplete(folder, facts)
-    missing = [name for name in NEEDED if name not in facts]
-    if missing:
-        raise _damaged(folder / RUN_FILE, f"no {', '.join(missing)}", "all facts of a run")
+    table = read_facts(folder)
+    if table["status"] != COMPLETED:
+        raise _incomplete(folder, table)
+    facts = facts_from_table(table, where=str(folder / RUN_FILE))
     metrics = read_json(folder / METRICS_FILE)
     if not isinstance(metrics, dict):
         raise _damaged(folder / METRICS_FILE, type(metrics).__name__, "a table of metrics")
-    view = View(
-        read_recording(folder, RESULTS),
-        facts["parameters"],
-        facts["gait_period"],
-        read_ground(folder, recipe_of(facts)),
-    )
+    surface = read_ground(folder, facts.terrain)
+    view = View(read_recording(folder, RESULTS), facts.parameters, facts.gait_period, surface)
     checked = metrics.pop(ACCURACY, None)
     metrics.pop(WARNINGS, None)  # also in run.json
     accuracy = None
@@ -264,10 +235,10 @@ def _damaged(path: Path, got: str, expected: str) -> HexapodError:
 
 def stored_result(result: Result) -> StoredResult:
     """Returns what `read_result` would read after the run is written."""
-    facts, recording = run_facts(result), result.outcome.recording
+    facts, recording = result.facts, result.outcome.recording
     surface = None if result.surface is None else around_walk(result.surface, recording)
     return StoredResult(
-        View(recording, result.parameters, facts["gait_period"], surface),
+        View(recording, facts.parameters, facts.gait_period, surface),
         result.metrics,
         facts,
         tomlkit.dumps(result.scenario.to_table()),

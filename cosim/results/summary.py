@@ -57,16 +57,16 @@ def described_losses(runs: Iterable[Summary]) -> list[str]:
 
 def summarise(result: Result) -> Summary:
     """Returns the summary of a run."""
-    scenario, walk = result.scenario, result.facts["walk"]
+    facts = result.facts
     return Summary(
-        control=control_of(scenario.control).label,
-        seed=scenario.seed,
-        status=result.outcome.status,
-        reason=result.outcome.reason,
-        upright=walk["upright"],
-        fallback=walk.get("fallback"),
-        missed=walk.get("missed", ""),
-        warnings=tuple(result.facts["warnings"]),
+        control=facts.control,
+        seed=result.scenario.seed,
+        status=facts.status,
+        reason=facts.reason,
+        upright=facts.walk.upright,
+        fallback=facts.walk.fallback,
+        missed=facts.walk.missed,
+        warnings=facts.warnings,
         metrics=dict(result.metrics) if result.completed else NO_FIGURES,
     )
 

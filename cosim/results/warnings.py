@@ -17,7 +17,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,6 +24,7 @@ from numpy.typing import NDArray
 from hexapod_cosim.cosim.interface.names import joint_names, vector_names
 from hexapod_cosim.cosim.master.recorder import Recording
 from hexapod_cosim.cosim.results.balance import run_balance_warnings
+from hexapod_cosim.cosim.results.facts import Locomotion
 from hexapod_cosim.cosim.results.footprints import sinkage_warnings
 from hexapod_cosim.cosim.results.walk import LEAST_DISTANCE, SKIPPED_CYCLES, View, body_height
 from hexapod_cosim.cosim.scenario.records import Scenario
@@ -39,23 +39,22 @@ SUNK = 0.5  # 1
 SUNK_TIME = 0.5  # s    longer than the legs stay bent after a landing
 
 
-def describe_walk(view: View, *, upright: bool) -> dict[str, Any]:
-    """Returns the facts of the walk for run.json.
+def locomotion_of(view: View, *, upright: bool, missed: str = "") -> Locomotion:
+    """Returns how the robot got ahead.
 
-    They are the distance [m] and mean speed [m/s] over the measured cycles (NaN when there is no
-    walk), whether the robot stayed upright and, if the controller reports it, the share of time
-    in which it fell back to kinematic control.
+    upright: whether it stayed so; missed: how it missed the end of its path, "" if it arrived.
     """
     walk = view.walk
     distance = walk.distance if walk else math.nan
     lasted = float(walk.recording.time[-1] - walk.recording.time[0]) if walk else math.nan
     fallen_back = fallback_columns(view.recording)
-    fallback = {"fallback": float(np.mean(fallen_back.any(axis=1)))} if len(fallen_back) else {}
-    return {
-        "distance": distance,
-        "mean_speed": distance / lasted,
-        "upright": upright,
-    } | fallback
+    return Locomotion(
+        distance=distance,
+        mean_speed=distance / lasted,
+        upright=upright,
+        fallback=float(np.mean(fallen_back.any(axis=1))) if len(fallen_back) else None,
+        missed=missed,
+    )
 
 
 def fallback_columns(recording: Recording) -> NDArray[np.bool_]:

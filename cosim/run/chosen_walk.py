@@ -33,7 +33,7 @@ from hexapod_cosim.cosim.design.stance import (
     with_stance,
 )
 from hexapod_cosim.cosim.export.robot_package import SPEED
-from hexapod_cosim.cosim.results.walking import OF_FMU
+from hexapod_cosim.cosim.results.gait_choice import OF_FMU, GaitChoice
 from hexapod_cosim.cosim.run.kept_stance import Stance, kept_stance
 from hexapod_cosim.cosim.scenario.controls import FMU, control_of
 from hexapod_cosim.cosim.scenario.reach import reaches
@@ -60,18 +60,18 @@ class ChosenWalk:
     deeper: float = 0.0  # m    and deeper below them
     chosen_by: str = BY_SCENARIO
 
-    def as_facts(self) -> dict[str, Any]:
-        """Returns what run.json tells about the walk."""
-        return {
-            "gait": self.gait.name,
-            "period": self.gait.period,
-            "duty": self.gait.duty,
-            "stance": self.stance,
-            "outward": self.outward,
-            "deeper": self.deeper,
-            "narrowing": self.gait.narrowing,
-            "chosen_by": self.chosen_by,
-        }
+    def as_facts(self) -> GaitChoice:
+        """Returns gait and stance for run.json."""
+        return GaitChoice(
+            gait=self.gait.name,
+            period=self.gait.period,
+            duty=self.gait.duty,
+            stance=self.stance,
+            outward=self.outward,
+            deeper=self.deeper,
+            narrowing=self.gait.narrowing,
+            chosen_by=self.chosen_by,
+        )
 
     def standing(self, own: Robot) -> Robot:
         """Returns the plant's robot in the stance."""

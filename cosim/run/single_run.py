@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import platform
 import sys
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import cache
@@ -34,15 +34,15 @@ from hexapod_cosim.cosim.master.recorder import Recorder, chosen_columns
 from hexapod_cosim.cosim.master.signals import Signals
 from hexapod_cosim.cosim.results.arrival import is_sent_ahead, missed_end
 from hexapod_cosim.cosim.results.drop import describe_drop
+from hexapod_cosim.cosim.results.facts import FmuIdentity, RobotIdentity, RunFacts
 from hexapod_cosim.cosim.results.ground import is_on_surface, surface_of_grid
 from hexapod_cosim.cosim.results.heat import heat_warnings
 from hexapod_cosim.cosim.results.metrics import MEASURED_BY_PLANT, compute_metrics, metric_columns
 from hexapod_cosim.cosim.results.result import Result
 from hexapod_cosim.cosim.results.walk import View
-from hexapod_cosim.cosim.results.walking import WALKING
 from hexapod_cosim.cosim.results.warnings import (
     describe_fall,
-    describe_walk,
+    locomotion_of,
     missing_metrics_warnings,
     off_map_warnings,
     short_run_warnings,
@@ -104,7 +104,6 @@ def simulate(
     if law is not None:
         scenario = replace(scenario, control=text_of_law(law, label))
     plan = make_plan(scenario, gains=gains)
-    setup = plan.controller
     with (
         open_plant(scenario, fmu, robot=plan.robot) as plant,
         make_controller(plan, law=law) as controller,
@@ -128,10 +127,15 @@ def simulate(
             h=scenario.macro_step,
             progress=progress,
         )
-        facts = describe(setup.robot, plant, setup.gait.period)
-        surface = run_surface(plant, plan.robot, parameters)
-        facts |= {"warnings": controller.warnings, "controller": control_facts(scenario, law)}
-    return make_result(plan, outcome, parameters, facts, surface=surface)
+        return make_result(
+            plan,
+            outcome,
+            plant,
+            parameters,
+            controller=control_facts(scenario, law),
+            warnings=controller.warnings,
+            surface=run_surface(plant, plan.robot, parameters),
+        )
 
 
 def start_controller(controller: RunController, plant: Fmu, plan: RunPlan) -> None:
@@ -240,15 +244,16 @@ def _check_measurements(plant: Fmu) -> None:
 def make_result(
     plan: RunPlan,
     outcome: Outcome,
+    plant: Fmu,
     parameters: Mapping[str, float],
-    facts: Mapping[str, Any],
     *,
+    controller: Mapping[str, Any],
+    warnings: Sequence[str] = (),
     surface: Surface | None = None,
 ) -> Result:
     """Returns the result of a run, with its metrics and warnings.
 
-    facts: those of `describe`, and the controller's warnings.
-    surface: the run's, for reports.
+    controller: facts of the controller; warnings: its own; surface: the run's, for reports.
     """
     scenario, setup, drawn = plan.scenario, plan.controller, plan.drawn
     view = View(outcome.judged, parameters, setup.gait.period)
@@ -261,31 +266,40 @@ def make_result(
     metrics = compute_metrics(view, servo=plan.robot.servo, realtime_factor=outcome.realtime_factor)
     arrives = outcome.status != COMPLETED or not is_sent_ahead(view)
     missed = "" if arrives else missed_end(metrics)
-    found = {
-        "events": event_log(scenario, outcome.simulated),
-        "warnings": [
-            *facts["warnings"],
+    facts = RunFacts(
+        status=outcome.status,
+        reason=outcome.reason,
+        title=scenario.title,
+        control=control_of(scenario.control).label,
+        simulated=outcome.simulated,
+        wall=outcome.wall,
+        realtime_factor=outcome.realtime_factor,
+        finished=outcome.finished.isoformat(timespec="seconds"),
+        robot=RobotIdentity(name=setup.robot.name, hash=setup.robot.hash),
+        gait_period=setup.gait.period,
+        fmu=FmuIdentity(file=plant.path.name, guid=plant.description.guid, sha256=plant.sha256),
+        versions=dict(_versions()),
+        platform=f"{sys.platform} {platform.machine()}",
+        controller=controller,
+        warnings=(
+            *warnings,
             *unused_settings(scenario, setup.robot),
             *([fall] if fall else []),
             *walk_warnings(view, setup.robot),
             *off_map_warnings(view.recording, surface_of(plan.robot.terrain)),
             *heat_warnings(view.recording, plan.robot.servo),
             *missing,
-        ],
-        "gains": None if setup.gains is None else setup.gains.as_facts(),
-        "walk": {**describe_walk(view, upright=not fall), "missed": missed},
-        "drop": None if drop is None else drop.as_facts(),
-        "drawn": None if drawn is None else drawn.as_facts(),
-        WALKING: plan.walk.as_facts(),
-    }
-    return Result(
-        scenario=scenario,
-        outcome=outcome,
-        metrics=metrics,
-        parameters=parameters,
-        facts={**facts, **found},
-        surface=surface,
+        ),
+        events=tuple(event_log(scenario, outcome.simulated)),
+        gains=None if setup.gains is None else setup.gains.as_facts(),
+        walk=locomotion_of(view, upright=not fall, missed=missed),
+        drop=drop,
+        drawn=None if drawn is None else drawn.as_facts(),
+        walking=plan.walk.as_facts(),
+        terrain={} if surface is None else dict(surface.recipe),
+        parameters=dict(parameters),
     )
+    return Result(scenario=scenario, outcome=outcome, metrics=metrics, facts=facts, surface=surface)
 
 
 def sensor_settings(scenario: Scenario, schedule: Schedule) -> SensorSettings | None:
@@ -393,17 +407,6 @@ def run_surface(plant: Fmu, robot: Robot, parameters: Mapping[str, float]) -> Su
     if own is not None and content == grid_bytes(own):
         return own
     return surface_of_grid(content, {})
-
-
-def describe(robot: Robot, plant: Fmu, period: float) -> dict[str, Any]:
-    """Returns the robot, FMU and software that made a run, for run.json; `period` is the gait's."""
-    return {
-        "robot": {"name": robot.name, "hash": robot.hash},
-        "gait_period": period,
-        "fmu": {"file": plant.path.name, "guid": plant.description.guid, "sha256": plant.sha256},
-        "versions": dict(_versions()),
-        "platform": f"{sys.platform} {platform.machine()}",
-    }
 
 
 @cache

@@ -38,7 +38,6 @@ from hexapod_cosim.cosim.results.summary import Summary, refused_summary, summar
 from hexapod_cosim.cosim.run.preparation import PlantFmus
 from hexapod_cosim.cosim.run.single_run import (
     RunPlan,
-    describe,
     different_settings,
     initialise_plant,
     make_plan,
@@ -200,12 +199,17 @@ class Walker(Closing):
             plan.schedule, h=scenario.macro_step, every=every, sensor=sensor, progress=progress
         )
         self.loop_time = thread_time() - started
-        facts = describe(plan.controller.robot, plant, plan.controller.gait.period)
-        facts |= {"warnings": [*plan.controller.warnings, *warnings]}
-        facts |= {"controller": control_facts(scenario)}
         # only a run that records everything gets a report, which shows the surface
         surface = run_surface(plant, plan.robot, parameters) if self._everything else None
-        return make_result(plan, outcome, parameters, facts, surface=surface)
+        return make_result(
+            plan,
+            outcome,
+            plant,
+            parameters,
+            controller=control_facts(scenario),
+            warnings=[*plan.controller.warnings, *warnings],
+            surface=surface,
+        )
 
     def summary(
         self,

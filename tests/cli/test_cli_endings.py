@@ -249,26 +249,11 @@ def test_a_fall_under_either_control_ends_a_comparison_with_the_code_of_falls(
     assert (tmp_path / "out" / "report.html").is_file()
 
 
-@pytest.mark.parametrize(("modes", "code"), [(["torque"], 3), (["position", "torque"], 0)])
-def test_only_a_study_in_which_every_run_failed_ends_with_the_code_of_falls(
-    call: Call, tmp_path: Path, modes: list[str], code: int
-) -> None:
-    text = (
-        'scenario = "stand"\ncontrols = ["kinematic"]\n[set]\nduration = 2\n'
-        f"[factors]\nservo.mode = {json.dumps(modes)}\n"
-    )
-    (tmp_path / "sinks.toml").write_text(text)
-    returned, out, _ = call(
-        "study", tmp_path / "sinks.toml", "-o", tmp_path / "out", "--workers", "0", "--json"
-    )
-    assert returned == code, out
-
-
 def test_the_exit_codes_are_in_the_help(call: Call) -> None:
     said = " ".join(call("--help")[1].split())
     assert "0 success; 1 an error" in said
     assert "3 the robot fell" in said
-    for command in ("simulate", "compare", "study"):
+    for command in ("simulate", "compare"):
         assert "xit code 3" in " ".join(call(command, "--help")[1].split())
 
 

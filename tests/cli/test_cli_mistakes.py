@@ -44,15 +44,6 @@ from hexapod_cosim.cosim.cli import main
             ["simulate", "--set", "friction.mu=0.4mm"],
             ["got '0.4mm'", "a number without a unit", "write a plain number"],
         ),
-        (["live", "--no-browser", "--port", "99999"], ["got 99999", "from 1 to 65535"]),
-        (
-            ["study", "friction_speed", "--scheduler", "localhost"],
-            ["not an address of a scheduler", "got 'localhost'", "tcp://HOST:8786"],
-        ),
-        (
-            ["benchmark", "--control", "kinematic", "--without", "posture"],
-            ["--without: ", "got 'kinematic'", "add --control compliant"],
-        ),
         (["design", "--set", "phase_margin=500"], ["got 500", "< 180 [deg]", "phase_margin=50"]),
         (
             ["report", "."],
@@ -127,7 +118,6 @@ def test_a_file_of_another_format_is_named_with_its_format(
     (tmp_path / "arm.xml").write_text("<mujoco/>")
     expected = "a ZIP file, such as an FMU"
     assert_refused(call("simulate", athena_fmu), expected, "give the path of a scenario file")
-    assert_refused(call("study", athena_fmu), expected, "give the path of a study file")
     assert_refused(
         call("export", "--robot", tmp_path / "arm.xml"),
         "got 'an XML file, such as a URDF without the ending .urdf or a MuJoCo model'",
@@ -218,7 +208,6 @@ def test_an_unexpected_error_is_one_line_with_a_hint(
             1,
             {"got": 0, "expected": "1 to 10000", "fix": "write --seeds 10", "where": "--seeds"},
         ),
-        (["study", "nothing.toml"], 1, {"where": "nothing.toml"}),
         (["report", "."], 1, {"what": "not a results folder", "got": "."}),
         (["design", "--robot", "atena"], 1, {"what": "unknown robot", "got": "atena"}),
         (["export", "--fmi", "7"], 1, {"got": 7}),

@@ -121,7 +121,7 @@ def test_our_exported_controller_repeats_the_walk_of_the_built_in_control(
     assert given.recording.names == reference.recording.names
     # the two implementations agree to 1e-12 of a joint command; friction amplifies round-off
     assert np.abs(given.recording.data - reference.recording.data).max() < 1e-4
-    assert given.facts["controller"]["kind"] == "fmu"
+    assert given.facts.controller["kind"] == "fmu"
 
 
 def test_the_loop_in_c_gives_the_same_bits_as_the_loop_in_python(

@@ -46,7 +46,7 @@ def test_the_controller_walks_and_turns_and_slips_less_than_kinematic_control(
     law = f"{write_law('my_walk', tmp_path)[0]}:MyWalk"
     settings = {"duration": 4, "robot": robot}
     ahead = hexapod_cosim.simulate("walk_flat", law, settings=settings)
-    assert ahead.facts["walk"]["upright"]
+    assert ahead.facts.walk.upright
     # 0.08 m/s for 4 s, less the ramp of one second
     assert ahead.recording.vector("torso.position")[-1, 0] == pytest.approx(0.28, rel=0.05)
     ours = hexapod_cosim.simulate("walk_flat", "kinematic", settings=settings)
@@ -61,7 +61,7 @@ def test_the_controller_walks_and_turns_and_slips_less_than_kinematic_control(
 def test_the_pattern_generator_walks_forward_and_turns(robot: str, plant_build: Path) -> None:
     settings = {"duration": 4, "robot": robot}
     ahead = hexapod_cosim.simulate("walk_flat", f"{EXAMPLE}:Cpg", settings=settings)
-    assert ahead.facts["walk"]["upright"]
+    assert ahead.facts.walk.upright
     # 0.08 m/s for 4 s, less the ramp of one second; the feet slip sideways on their arcs
     assert ahead.recording.vector("torso.position")[-1, 0] == pytest.approx(0.28, rel=0.25)
     turning = hexapod_cosim.simulate(

@@ -43,7 +43,7 @@ def test_a_built_in_control_gives_recording_metrics_and_facts() -> None:
     assert isinstance(result, Result)
     assert set(result.metrics) == set(METRICS)
     assert result.recording.time[-1] == 3.0
-    assert result.facts["controller"] == {"kind": "builtin", "text": "kinematic"}
+    assert result.facts.controller == {"kind": "builtin", "text": "kinematic"}
     assert f"{result!r}".startswith(
         f"Result({result.scenario.title!r}, control='kinematic', status='completed', simulated=3, "
         "slip_per_metre="

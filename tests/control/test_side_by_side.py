@@ -164,19 +164,3 @@ def test_a_law_that_prints_does_not_spoil_the_json(tmp_path: Path, words: tuple[
     assert isinstance(json.loads(done.stdout), dict)
     for text in ("the file is read", "a step", "and C code prints"):
         assert text in done.stderr
-
-
-def test_a_study_runs_the_users_controls_in_its_workers(call: Call, tmp_path: Path) -> None:
-    (tmp_path / "plan.toml").write_text(
-        f'controls = ["kinematic", "mine={CPG}"]\nseeds = 2\n'
-        '[set]\nduration = 3\ngait.period = 0.8\n[factors]\n"control.lift" = [0.2, 0.3]\n'
-    )
-    code, out, err = call(
-        "study", tmp_path / "plan.toml", "--workers", "2", "--json", "-o", tmp_path / "out"
-    )
-    assert code == 0, err
-    summary = json.loads(out)
-    assert summary["runs"] == 8
-    assert "mine" in json.dumps(summary)
-    manifest = json.loads((tmp_path / "out" / "manifest.json").read_text())
-    assert list(manifest["laws"]) == ["mine"]

@@ -38,9 +38,9 @@ def test_an_exported_controller_walks_as_the_built_in_one(
         simulate(load_scenario(tmp_path / "level.toml", overrides=[f"control={control}"]))
         for control in ("compliant", str(path))
     )
-    walking = by_fmu.facts["walking"]
-    assert (walking["gait"], walking["stance"]) == ("amble", "controller FMU")
-    assert walking["period"] == pytest.approx(1.5)
+    walking = by_fmu.facts.walking
+    assert (walking.gait, walking.stance) == ("amble", "controller FMU")
+    assert walking.period == pytest.approx(1.5)
     expected, found = (run.outcome.recording.columns(TORSO) for run in (built_in, by_fmu))
     np.testing.assert_allclose(found, expected, rtol=0.0, atol=1e-9)
 

@@ -11,9 +11,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from gains import PERIOD
-from standing import GAINS, ROBOT, make_laws, plan, rest, shared
+from standing import GAINS, make_laws, plan, shared
 
-from hexapod_cosim.controller import Parts
 from hexapod_cosim.controller.sense.burden import Burden
 
 MOST, CYCLE = 5.0, 1.0  # N m, s
@@ -81,34 +80,6 @@ def test_the_largest_torque_of_late_fades_by_e_in_a_gait_cycle() -> None:
         burden.step(0.0, 1.0)
     assert burden.strength == 1.0
     assert burden.peak == pytest.approx(10.0 * math.exp(-1.0))
-
-
-def test_a_saved_burden_goes_on_the_same() -> None:
-    burden, other = of_weight(1.7), make()
-    burden.step(8.0, 1.5)
-    other.restore(burden.save())
-    for one in (burden, other):
-        one.weigh(1.0)
-        one.step(1.0, 1.0)
-    assert burden.save() == other.save()
-
-
-def test_servos_that_saturate_would_be_asked_for_the_same_part_of_every_share() -> None:
-    """The weight is 1.9 times the model's, and the servos have 90 % of the torque for it.
-
-    All torques for the load shrink by the same factor.
-    """
-    largest = 0.9 * 1.9 * float(np.abs(carried()).max())
-    weak = replace(GAINS, limits=replace(GAINS.limits, torque=largest))
-    laws = make_laws(gains=weak, parts=Parts(fallback=False))
-    plan(laws)
-    force = 1.9 * shared(laws)
-    for _ in range(3000):
-        laws.feel(force)
-    asked = np.abs(laws.planned.carry) > 0.1 * np.abs(carried()).max()
-    ratio = (laws.torque - rest(ROBOT).torque)[asked] / carried()[asked]
-    assert np.median(ratio) == pytest.approx(1.71, rel=1e-3)
-    assert np.abs(laws.torque).max() <= largest
 
 
 def carried() -> np.ndarray:

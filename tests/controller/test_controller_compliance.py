@@ -34,18 +34,6 @@ def contact_jacobians(robot: Robot) -> np.ndarray:
     return np.array(found)
 
 
-def test_the_loads_follow_within_the_time_of_real_changes_of_load() -> None:
-    laws = make_laws(parts=Parts(touchdown=False, fallback=False))
-    plan(laws)
-    force = squeezing()
-    force[3, 2] = 0.004 * WEIGHT  # too little to touch the ground
-    for k in range(1, 60):
-        laws.feel(force)
-        grown = 0.5 * (1.0 - math.exp(-k * PERIOD / GAINS.support.load_time))
-        np.testing.assert_allclose(laws.load[[0, 1, 2, 4, 5]], grown)
-        assert laws.load[3] == 0.0
-
-
 @pytest.mark.parametrize("missing", [0.0, 0.3, 1.0])
 def test_the_held_share_of_the_planned_squeeze_is_what_creep_leaves_of_it(missing: float) -> None:
     """A push of all feet and a squeeze that is not planned do not count; the share is smoothed."""
@@ -79,16 +67,6 @@ def test_the_support_grows_into_the_measured_weight_whatever_the_robot_carries(
         grown = payload * (1.0 - math.exp(-k * PERIOD / GAINS.support.weight_time))
         assert laws.scale == pytest.approx(grown)
         np.testing.assert_allclose(laws.torque, own + grown * carry, atol=1e-12)
-
-
-def test_no_weight_is_believed_beyond_reason() -> None:
-    for size, believed in ((0.1, 0.5), (2.9, 2.9), (5.0, 3.0)):
-        laws = make_laws()
-        plan(laws)
-        force = size * shared(laws)
-        for _ in range(2000):
-            laws.feel(force)
-        assert laws.scale == pytest.approx(believed, rel=1e-6)
 
 
 def test_the_torques_carry_the_shares_and_the_legs() -> None:
@@ -138,29 +116,6 @@ def test_a_force_not_believed_is_replaced_by_the_plans_and_from_three_on_all_are
     assert laws.doubted.all()
 
 
-def test_saved_laws_go_on_bit_for_bit() -> None:
-    laws, noise = make_laws(), np.random.default_rng(3).normal(size=(120, 6, 3)) * [1.0, 1.0, 3.0]
-    dead = squeezing() * np.array([1.0, 1.0, 0.0, 1.0, 1.0, 1.0])[:, None]
-    plan(laws)
-
-    def go_on() -> np.ndarray:
-        found = []
-        for shake in noise[60:]:
-            laws.feel(dead + 0.3 * shake)
-            found.append(
-                np.column_stack([laws.torque, laws.load, laws.touchdown.offset, laws.doubted])
-            )
-        return np.array(found)
-
-    for shake in noise[:60]:
-        laws.feel(dead + shake)
-    state = laws.save()
-    first = go_on()
-    laws.restore(state)
-    np.testing.assert_array_equal(go_on(), first)
-    assert first[:, 2, -1].any()
-
-
 def test_a_sliding_robot_goes_over_to_kinematic_control_and_back_once_it_holds() -> None:
     """All feet drag with more than half of their loads.
 
@@ -182,19 +137,6 @@ def test_a_sliding_robot_goes_over_to_kinematic_control_and_back_once_it_holds()
     run(deaf, calm, 400)
     run(deaf, sliding, 60)
     assert np.abs(deaf.torque).max() > 0.5 * carried
-
-
-@pytest.mark.parametrize(("carried", "falls_back"), [(0.45, False), (0.55, True)])
-def test_feet_that_carry_less_than_half_the_weight_together_tell_no_slide(
-    carried: float, falls_back: bool
-) -> None:
-    """Such feet have only just met the ground and may skid."""
-    laws, sliding = make_laws(), squeezing(0.0)
-    run(laws, squeezing(0.0), 400)
-    sliding[:, 2] *= carried
-    sliding[:, 0] = -0.6 * sliding[:, 2]
-    run(laws, sliding, 12)
-    assert (laws.trust < 1.0) is falls_back
 
 
 def steps_until_fallback(drag: float, total: float) -> int:
@@ -223,36 +165,6 @@ def test_a_robot_slides_when_loaded_feet_drag_by_55_percent_for_40_milliseconds(
 ) -> None:
     """At a period of 5 ms, 40 ms are eight periods; the ninth is longer."""
     assert steps_until_fallback(drag, total) == count
-
-
-def test_feet_are_trusted_again_half_a_cycle_after_the_last_slide() -> None:
-    laws, calm, sliding = make_laws(), squeezing(0.0), squeezing(0.0)
-    sliding[:, 0] = 0.6 * sliding[:, 2]
-    run(laws, calm, 400)
-    run(laws, sliding, 20)
-    plan(laws)
-    count = 0
-    while laws.fallback.all():
-        laws.feel(calm)
-        count += 1
-    assert count == pytest.approx(0.5 * ROBOT.gait.period / PERIOD, abs=1)
-    while laws.trust < 1.0:
-        laws.feel(calm)
-        count += 1
-    # trust rises by 1 - e^(-t/load_time), here to 0.99; from the first step of the rise on no foot
-    # reports fallback
-    assert count == pytest.approx(
-        0.5 * ROBOT.gait.period / PERIOD + math.log(100.0) * GAINS.support.load_time / PERIOD, abs=1
-    )
-
-
-@pytest.mark.parametrize(("part", "doubted"), [(0.24, False), (0.26, True)])
-def test_a_force_on_a_foot_is_doubted_from_a_quarter_of_the_step_height_on(
-    part: float, doubted: bool
-) -> None:
-    laws, force = make_laws(), squeezing(0.0)
-    run(laws, force, 40, standing="101111", height=part * ROBOT.gait.step_height)
-    assert laws.doubted.tolist() == [False, doubted, False, False, False, False]
 
 
 def test_a_leg_that_should_stand_and_does_not_is_given_no_share_until_it_does() -> None:

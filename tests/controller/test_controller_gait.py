@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -42,10 +41,6 @@ def _turn(a: np.ndarray, b: np.ndarray, c: np.ndarray) -> float:
     return float(ax * by - ay * bx)
 
 
-def test_every_named_gait_has_a_pattern() -> None:
-    assert tuple(PATTERNS) == GAITS
-
-
 @pytest.mark.parametrize("name", GAITS)
 def test_offsets_are_openshcs_in_our_order_of_legs(name: str) -> None:
     rf, rm, rr, lr, lm, lf = OPENSHC[name]
@@ -75,16 +70,6 @@ def test_the_standing_feet_carry_the_robot_at_all_times(name: str, robot_name: s
     feet = LegSolver(robot).forward(robot.stance)[:, :2]
     gait = make_gait(robot, name)
     assert min(margin(feet[gait.stance(clock)]) for clock in CLOCKS) > 0.03
-
-
-def test_the_clock_starts_where_legs_are_about_to_lift_off() -> None:
-    for name in GAITS:
-        gait = make_gait(load_robot("athena"), name)
-        before, after = (
-            gait.stance(gait.start_clock() - 1e-6),
-            gait.stance(gait.start_clock() + 1e-6),
-        )
-        assert (before & ~after).any()
 
 
 def test_another_gait_than_the_robots_gets_its_natural_duty_factor_and_the_robots_swing_time() -> (
@@ -118,9 +103,3 @@ def test_an_unknown_gait_names_the_nearest() -> None:
 def test_an_impossible_gait_is_refused(change: dict[str, Any]) -> None:
     with pytest.raises(HexapodError, match="impossible gait"):
         make_gait(load_robot("athena"), **change)
-
-
-@pytest.mark.parametrize("narrowing", [-0.01, float("nan"), float("inf")])
-def test_an_impossible_narrowing_is_refused(narrowing: float) -> None:
-    with pytest.raises(HexapodError, match="0 <= narrowing < inf"):
-        replace(make_gait(load_robot("athena")), narrowing=narrowing)

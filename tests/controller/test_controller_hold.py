@@ -91,19 +91,6 @@ def test_a_plane_near_points_is_the_weighted_least_squares() -> None:
     np.testing.assert_allclose(plane(height, weights), expected, atol=EXACT)
 
 
-def test_feet_in_the_air_tell_nothing_and_two_or_three_in_a_line_no_plane() -> None:
-    """Feet in the air are ignored; two or three feet in a line define no plane."""
-    height, line = (
-        np.array([5.0, 0.0, 5.0, 0.0, 5.0, 0.0]),
-        np.array([0j, 0.1 + 0.1j, 0.2 + 0.2j, 0j, 0j, 0j]),
-    )
-    np.testing.assert_allclose(
-        plane(height, np.array([0.29, 1.0, 0.0, 1.0, 0.0, 1.0])), 0.0, atol=EXACT
-    )
-    assert fit_plane(HOME, height, np.array([0.0, 1.0, 0.0, 0.0, 1.0, 0.0])) is None
-    assert fit_plane(line, height, np.array([1.0, 1.0, 1.0, 0.0, 0.0, 0.0])) is None
-
-
 @pytest.mark.parametrize(
     ("low", "roll", "pitch"),
     [
@@ -136,11 +123,6 @@ def test_a_torso_that_lies_wrong_is_driven_back_at_the_stated_rates(
     assert np.abs(left[-1]).max() < 1e-5
 
 
-def test_on_a_slope_the_torso_is_held_parallel_to_it() -> None:
-    left = np.array(list(settle(make(), roll=0.01, pitch=-0.015, ground=(0.1, 0.2))))
-    assert np.abs(left[-1]).max() < 1e-5
-
-
 def test_ground_that_begins_to_slope_is_followed_with_its_time() -> None:
     """The loop first compensates the tilt that the sensor measures; later it attributes the tilt to
     the ground.
@@ -152,16 +134,6 @@ def test_ground_that_begins_to_slope_is_followed_with_its_time() -> None:
     for _ in range(4):
         last = np.array(list(settle(hold, ground=(0.0, 0.03))))
     assert np.abs(last[-1]).max() < 1e-3
-
-
-def test_commanded_tilts_are_no_errors() -> None:
-    """The measured tilt excludes the commanded one and the feet are where they were planned, so
-    nothing is corrected.
-    """
-    hold = make()
-    for _ in range(50):
-        hold.look(sight())
-    assert not any(hold.lift)
 
 
 def test_corrections_of_the_posture_have_limits() -> None:
@@ -185,17 +157,6 @@ def test_a_foot_counts_beyond_four_tenths_of_a_third_of_the_weight() -> None:
         for k in range(2):
             hold.look(sight(plane=HOME - 0.01 * k, load=[load] * 6))
         assert (abs(hold.way) > 1e-3) is counts
-
-
-def test_three_feet_span_a_plane_from_a_determinant_of_a_millionth_on() -> None:
-    """The determinant [m4] is that of the covariance of three feet at 0, a and i b: a^2 b^2/27."""
-    for b, spans in ((0.0515, False), (0.0525, True)):
-        found = fit_plane(
-            np.array([0j, 0.1, 1j * b, 0j, 0j, 0j]),
-            np.full(6, 0.01),
-            np.array([1.0, 1.0, 1.0, 0.0, 0.0, 0.0]),
-        )
-        assert (found is not None) is spans
 
 
 def walk(
@@ -241,22 +202,6 @@ def test_the_way_and_heading_lost_are_the_commanded_less_the_true_ones_whichever
     assert hold.way == pytest.approx(commanded - way, abs=1e-9)
 
 
-def test_a_walk_as_commanded_loses_nothing() -> None:
-    hold = make()
-    walk(hold, 0.08 - 0.02j, 0.3, legs=(0, 2, 4), told=(0.08 - 0.02j, 0.3))
-    arc = (0.3 * hold.every * PERIOD) ** 2 / 24.0 * 0.08 * 4.0  # m; difference of arc and chord
-    assert abs(hold.way) < 1.1 * arc
-    assert hold.heading == pytest.approx(0.0, abs=EXACT)
-
-
-def test_the_heading_is_counted_on_through_half_a_turn() -> None:
-    hold = make()
-    for k in range(400):
-        yaw = 0.02 * k
-        hold.look(sight(yaw=(yaw + np.pi) % (2.0 * np.pi) - np.pi, yaw_rate=0.0))
-    assert hold.heading == pytest.approx(-0.02 * 399, abs=1e-9)
-
-
 def test_without_a_foot_that_stood_all_the_time_the_way_is_taken_as_commanded() -> None:
     hold = make()
     for k in range(10):
@@ -286,15 +231,6 @@ def test_steering_drives_a_steady_loss_to_a_steady_correction_that_makes_it_good
     assert abs(hold.way) == pytest.approx(abs(hold.velocity) / HOLD.path_rate, rel=0.02)
 
 
-def test_steering_has_limits_and_keeps_its_direction() -> None:
-    hold = make()
-    hold.way, hold.heading = 3.0 - 4.0j, -9.0
-    hold.look(sight(yaw=0.5))
-    assert abs(hold.velocity) == pytest.approx(HOLD.speed_limit)
-    assert hold.velocity / abs(hold.velocity) == pytest.approx((0.6 - 0.8j) * np.exp(-0.5j))
-    assert hold.yaw_rate == -HOLD.turn_limit
-
-
 def test_parts_switched_off_do_nothing() -> None:
     hold = make(Parts(posture=False, path=False))
     walk(hold, 0.07 + 0j, 0.1, legs=(0, 2, 4), told=(0.08 + 0j, 0.0))
@@ -302,16 +238,3 @@ def test_parts_switched_off_do_nothing() -> None:
     assert not any(hold.lift)
     assert hold.velocity == 0j
     assert hold.yaw_rate == 0.0
-
-
-def test_a_saved_hold_goes_on_the_same() -> None:
-    hold, other = make(), make()
-    walk(hold, 0.07 + 0j, 0.1, legs=(0, 2, 4), told=(0.08 + 0j, 0.0))
-    state = hold.save()
-    assert {"gains", "parts", "every"}.isdisjoint(state)
-    other.restore(state)
-    for one in (hold, other):
-        one.look(sight(height=seen_heights(0.003, 0.01, 0.0), yaw=0.5))
-    np.testing.assert_array_equal(hold.lift, other.lift)
-    assert (hold.way, hold.heading, hold.velocity) == (other.way, other.heading, other.velocity)
-    assert (state["lift"] != hold.lift).any()

@@ -94,18 +94,6 @@ def test_the_jacobian_is_the_slope_of_forward_kinematics(robot: Robot) -> None:
             np.testing.assert_allclose(jacobian[:, :, joint], slope, atol=DIFFERENCE_ERROR)
 
 
-def test_many_poses_at_once_are_the_same_as_each_by_itself(robot: Robot) -> None:
-    solver, poses = LegSolver(robot), reachable_poses(robot, 20)
-    foot = solver.forward(poses)
-    together = solver.pose(plane(foot), foot[..., 2])
-    for k, angle in enumerate(poses):
-        np.testing.assert_array_equal(foot[k], solver.forward(angle))
-        np.testing.assert_array_equal(
-            together.angle[k], solver.pose(plane(foot[k]), foot[k, :, 2]).angle
-        )
-    assert not together.lost.any()
-
-
 def test_a_pose_says_where_the_links_point(robot: Robot) -> None:
     """Computes foot and knee from the directions of the links and compares them with the forward
     kinematics of the angles.
@@ -143,13 +131,6 @@ def test_joint_speeds_are_the_jacobians_inverse_times_foot_velocity(robot: Robot
     assert np.abs(joints.speed).max() <= robot.servo.speed_max
 
 
-def test_the_stance_is_found_again(robot: Robot) -> None:
-    solver = LegSolver(robot)
-    np.testing.assert_allclose(
-        solver.inverse(solver.forward(robot.stance)), robot.stance, atol=ROUND_OFF
-    )
-
-
 @pytest.mark.parametrize(("leg", "name"), [(0, "LF"), (4, "RM")])
 def test_a_foot_out_of_reach_is_refused_with_leg_target_and_reach(leg: int, name: str) -> None:
     robot = load_robot("athena")
@@ -172,14 +153,6 @@ def test_a_foot_beyond_a_joint_limit_is_refused() -> None:
         solver.inverse(solver.forward(angle))
 
 
-def test_a_foot_that_is_not_a_number_is_refused() -> None:
-    robot = load_robot("athena")
-    foot = LegSolver(robot).forward(robot.stance)
-    foot[3, 2] = np.nan
-    with pytest.raises(ReachError, match="leg RF"):
-        LegSolver(robot).inverse(foot)
-
-
 def test_solve_stays_within_the_limits_and_flags_the_leg() -> None:
     robot = load_robot("athena")
     solver = LegSolver(robot)
@@ -191,17 +164,6 @@ def test_solve_stays_within_the_limits_and_flags_the_leg() -> None:
     assert (joints.angle >= solver.angle_min).all()
     assert (joints.angle <= solver.angle_max).all()
     assert np.isfinite(joints.speed).all()
-
-
-def test_a_joint_held_by_its_limit_has_no_speed_and_the_others_of_its_leg_keep_theirs() -> None:
-    robot = load_robot("athena")
-    solver, angle = LegSolver(robot), robot.stance
-    angle[2, 0] = solver.angle_max[2, 0] + 0.1
-    joints = solved(solver, solver.forward(angle)[None], np.tile([0.01, 0.02, 0.03], (1, 6, 1)))
-    assert joints.unreachable.tolist() == [[False, False, True, False, False, False]]
-    assert joints.angle[0, 2, 0] == solver.angle_max[2, 0]
-    assert joints.speed[0, 2, 0] == 0.0
-    assert np.count_nonzero(joints.speed) == 17
 
 
 def test_another_axis_pattern_is_refused() -> None:

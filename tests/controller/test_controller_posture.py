@@ -74,9 +74,3 @@ def test_velocities_are_the_slopes_of_positions_while_feet_and_torso_move(t: flo
     np.testing.assert_allclose(
         now.rise, (after.height - before.height) / (2.0 * STEP), atol=DIFFERENCE_ERROR
     )
-
-
-def test_a_level_torso_sees_feet_as_they_are() -> None:
-    feet = moving_feet(0.3)
-    assert leaning(0.0, 0.0).level
-    assert leaning(0.0, 0.0).see(feet) is feet

@@ -84,30 +84,3 @@ def test_reaching_for_missing_ground_is_told_to_the_servos_as_speed() -> None:
     assert not moved[1:, 1][~reaching].any()
     assert controller.diagnostics.lift[1] < -0.039
     assert not controller.diagnostics.fallback.any()
-
-
-def test_steering_is_led_over_without_a_jump_and_looked_at_afresh_only_when_asked() -> None:
-    compliant, ramp = (
-        make(compliant=True).compliant,
-        np.minimum(np.arange(41) * PERIOD / 0.1, 1.0),  # the ramp takes 0.1 s
-    )
-    assert compliant is not None
-
-    def steered(past: int = 0, *, moves: bool = True, afresh: bool = False) -> np.ndarray:
-        compliant.steer(past, moves=moves, afresh=afresh)
-        return np.array([compliant.addition(k) for k in range(41)])
-
-    goal, other = np.array([0.01 + 0.02j, 0.03]), np.array([-0.01 + 0j, 0.05])
-    compliant.hold.velocity, compliant.hold.yaw_rate = complex(goal[0]), float(goal[1].real)
-    np.testing.assert_allclose(steered(afresh=True), np.outer(ramp, goal), atol=1e-15)
-    compliant.hold.velocity, compliant.hold.yaw_rate = complex(other[0]), float(other[1].real)
-    np.testing.assert_allclose(steered(7)[:-7], np.outer(ramp[7:], goal), atol=1e-15)
-    np.testing.assert_allclose(
-        steered(afresh=True), ramp[7] * goal + np.outer(ramp, other - ramp[7] * goal), atol=1e-15
-    )
-    for past, since in ((30, 0), (4, 4)):  # at a stop it fades, however often steer() is called
-        np.testing.assert_allclose(
-            steered(past, moves=False)[: 41 - since],
-            np.outer(1.0 - ramp[since:], other),
-            atol=1e-15,
-        )

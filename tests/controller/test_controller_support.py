@@ -17,7 +17,6 @@ from hexapod_cosim.models import GAITS, Robot, load_robot
 ROBOT = load_robot("athena")
 WEIGHT = weight(ROBOT)
 HOME = LegSolver(ROBOT).forward(ROBOT.stance)[:, :2] @ np.array([1.0, 1.0j])
-REST = InverseDynamics(ROBOT, LegSolver(ROBOT), period=0.005).rest()
 CLOCKS = np.linspace(0.0, 1.0, 1000, endpoint=False) + 1e-7  # cycles
 ALL, NONE = np.ones(6, dtype=bool), np.zeros(6, dtype=bool)
 RIDGED = 1e-8 * WEIGHT  # N, N m; ten times what the ridge of 1e-9 changes in the balance
@@ -97,30 +96,6 @@ def test_hand_overs_are_smooth(gait: str) -> None:
     )  # its largest second derivative is 5.77
 
 
-def test_a_hand_over_is_never_longer_than_stance_or_swing() -> None:
-    support = make("wave", handover=10.0)
-    active = support.activation(phases("wave"), NONE, NONE, walking=True)
-    assert active.max() == pytest.approx(1.0, abs=1e-6)
-    assert active.min() == pytest.approx(0.0, abs=1e-6)
-
-
-def test_who_stands_still_or_has_nowhere_to_step_is_active() -> None:
-    support, phase = make(), phases("tripod")
-    assert (support.activation(phase, NONE, NONE, walking=False) == 1.0).all()
-    assert (support.activation(phase, ALL, ALL, walking=True) == 1.0).all()
-    stayed, stays, steps = (
-        support.activation(phase, *flags, walking=True)
-        for flags in ((ALL, NONE), (NONE, ALL), (NONE, NONE))
-    )
-    early, late = phase < 0.25, (phase > 0.25) & (phase < 0.5)
-    assert (
-        stayed[early | (phase >= 0.5)] == 1.0
-    ).all()  # it has no load to take over, because it never gave its load away
-    np.testing.assert_array_equal(stayed[late], steps[late])
-    assert (stays[late] == 1.0).all()
-    np.testing.assert_array_equal(stays[early], steps[early])
-
-
 @pytest.mark.parametrize("standing", BALANCED)
 def test_shares_balance_force_and_moment(standing: str) -> None:
     asked = demand(push=3.0 - 2.0j, moment=WEIGHT * (0.02 - 0.01j), twist=0.4)
@@ -149,16 +124,6 @@ def test_of_all_shares_that_balance_the_sum_of_squares_is_least() -> None:
     np.testing.assert_allclose(free @ (normal / active), 0.0, atol=1e-6)
 
 
-def test_shares_follow_activation_without_a_jump_to_nothing() -> None:
-    shares = [
-        normal_shares(make(), HOME, np.array([a, 1.0, 1.0, 1.0, 1.0, 1.0]), demand())[0]
-        for a in (1.0, 0.5, 0.1, 0.01, 0.0)
-    ]
-    assert (np.diff(shares) < 0.0).all()
-    assert shares[-2] < 0.03 * WEIGHT / 6.0
-    assert shares[-1] == 0.0
-
-
 @pytest.mark.parametrize(
     ("standing", "least"), [("010010", 0.999), ("100001", 0.999), ("010000", 0.8)]
 )
@@ -171,18 +136,6 @@ def test_two_feet_or_one_carry_what_they_can_without_their_moment(
     assert normal.min() >= 0.0
 
 
-def test_the_ridge_changes_loads_of_feet_on_a_line_by_a_billionth_of_the_weight() -> None:
-    """With S = sum a (1, y^2) and ridge = 1e-9 (S_00 + S_yy) + 1e-12, the vertical force is W
-    S_00/(S_00 + ridge).
-    """
-    feet, y = np.array([0.1j, -0.1j, 0j, 0j, 0j, 0j]), 0.1
-    for active, lost in ((1.0, 1e-9 * (1.0 + y * y)), (1e-6, 0.5e-6 + 1e-9 * (1.0 + y * y))):
-        normal = normal_shares(
-            make(), feet, np.array([active, active, 0.0, 0.0, 0.0, 0.0]), demand()
-        )
-        assert 1.0 - normal.sum() / WEIGHT == pytest.approx(lost, rel=1e-3)
-
-
 def test_feet_within_a_centimetre_take_no_yaw_moment_and_a_micronewton_is_no_load() -> None:
     for reach, turns in ((0.0099, False), (0.0101, True)):
         feet = np.array([reach * 1j, -reach * 1j, 0j, 0j, 0j, 0j])
@@ -191,17 +144,6 @@ def test_feet_within_a_centimetre_take_no_yaw_moment_and_a_micronewton_is_no_loa
     for load, part in ((0.5e-6, 0.5), (1.0e-6, 1.0), (3e-6, 1.0)):
         shares = make().shares(HOME, legs("111111"), demand(push=2.0 + 0j, load=load))
         assert shares.push.sum().real == pytest.approx(2.0 * part, rel=0.01)
-
-
-def test_no_foot_at_all_is_asked_for_nothing() -> None:
-    shares = make().shares(HOME, legs("000000"), demand(push=1.0 + 0j))
-    assert not shares.normal.any()
-    assert np.isfinite(shares.push).all()
-
-
-def test_no_foot_is_asked_to_pull() -> None:
-    normal = normal_shares(make(), HOME, legs("111111"), demand(moment=WEIGHT * 0.5))
-    assert normal.min() == 0.0
 
 
 @pytest.mark.parametrize("name", ["athena", "phantomx_mk4"])

@@ -8,14 +8,12 @@ import math
 
 import numpy as np
 import pytest
-from standing import ROBOT, WEIGHT, Laws, make_laws, plan, squeezing
+from standing import ROBOT, make_laws, plan, squeezing
 
-from hexapod_cosim.controller import Parts
 from hexapod_cosim.controller.sense.touchdown import Touchdown
 
 PERIOD = 0.005  # s
 YES, NO, STILL = np.ones(6, dtype=bool), np.zeros(6, dtype=bool), np.zeros(6)
-ONLY_TOUCHDOWN = Parts(support=False, fallback=False)
 
 
 def only(leg: int) -> np.ndarray:
@@ -36,12 +34,6 @@ def test_a_foot_that_meets_the_ground_early_keeps_the_height_at_which_it_touched
     assert [down.offset[leg] for leg in (0, 1, 3, 4, 5)] == [0.0] * 5
 
 
-def test_only_a_foot_that_swings_is_held_up() -> None:
-    down = Touchdown(period=PERIOD)
-    down.step(YES, np.full(6, 0.002), NO, NO, NO, NO)
-    assert not down.offset.any()
-
-
 def test_it_keeps_it_through_its_stance_and_gives_it_up_in_the_next_swing() -> None:
     down = Touchdown(period=PERIOD)
     for _ in range(5):
@@ -58,13 +50,6 @@ def test_it_keeps_it_through_its_stance_and_gives_it_up_in_the_next_swing() -> N
     assert not down.busy()
 
 
-def test_a_foot_is_held_no_higher_than_it_may() -> None:
-    down = Touchdown(period=PERIOD)
-    for _ in range(30):
-        down.step(only(2), np.full(6, 0.002), YES, NO, NO, NO)
-    assert down.offset[2] == 0.03
-
-
 def test_a_foot_that_finds_no_ground_reaches_down_after_the_grace_time_to_the_limit() -> None:
     down, missing = Touchdown(period=PERIOD), ~only(2)
     offsets = []
@@ -75,36 +60,6 @@ def test_a_foot_that_finds_no_ground_reaches_down_after_the_grace_time_to_the_li
     assert begun in {8, 9}  # 40 ms are 8 periods; times are sums, so it may be the 9th
     reach = -0.08 * PERIOD * np.arange(1, 151 - begun)  # with 80 mm/s down to 40 mm
     np.testing.assert_allclose(offsets[begun:], np.maximum(reach, -0.04), atol=1e-12)
-
-
-def test_it_stops_where_it_finds_the_ground() -> None:
-    down, missing = Touchdown(period=PERIOD), ~only(2)
-    for _ in range(20):
-        down.step(missing, STILL, NO, YES, NO, NO)
-    found = down.offset[2]
-    assert -0.02 < found < 0.0
-    for _ in range(50):
-        down.step(YES, STILL, NO, YES, NO, NO)
-    assert down.offset[2] == found
-    for _ in range(7):
-        down.step(missing, STILL, NO, YES, NO, NO)  # a short loss of contact does not move the foot
-    assert down.offset[2] == found
-
-
-def test_on_flat_ground_nothing_happens() -> None:
-    down = Touchdown(period=PERIOD)
-    for k in range(400):
-        swings = k // 100 % 2 == 0
-        down.step(
-            NO if swings else YES,
-            np.full(6, 0.001) if swings else STILL,
-            YES if swings else NO,
-            NO if swings else YES,
-            NO,
-            NO,
-        )
-        assert not down.busy()
-        assert not down.offset.any()
 
 
 def test_an_awaited_foot_searches_at_once_at_a_set_speed_and_stops_within_a_period() -> None:
@@ -137,47 +92,6 @@ def test_a_foot_whose_sensor_is_doubted_returns_to_its_path_in_its_stance_too(
         down.step(NO, np.full(6, 0.001), swinging, loaded, only(2), only(2))
     assert down.offset[2] == 0.0
     assert down.late[2] == 0.0
-
-
-def test_what_is_negligible_goes_at_once() -> None:
-    down = Touchdown(period=PERIOD)
-    for size, goes in ((0.99e-5, True), (1.01e-5, False)):
-        down.restore({"offset": np.full(6, size), "late": STILL})
-        down.step(NO, STILL, YES, NO, NO, NO)
-        assert (down.offset == 0.0).all() == goes
-
-
-def test_a_saved_state_does_not_change() -> None:
-    down = Touchdown(period=PERIOD)
-    down.step(only(2), np.full(6, 0.002), YES, NO, NO, NO)
-    state = down.save()
-    down.step(only(2), np.full(6, 0.002), YES, NO, NO, NO)
-    down.restore(state)
-    assert down.offset[2] == 0.002
-
-
-def descend(laws: Laws, touching: bool) -> list[float]:
-    """Returns the offsets of foot 1 while it moves from 20 mm down at 0.05 m/s.
-
-    With `touching` a force acts on it below 8 mm.
-    """
-    offsets, height, rise = [], 0.02, -0.05
-    while height > 0.0:
-        force = squeezing(0.0)
-        force[1, 2] = 0.05 * WEIGHT if touching and height < 0.008 else 0.0
-        plan(laws, standing="101111", height=height, rise=rise)
-        laws.feel(force)
-        height += rise * PERIOD
-        offsets.append(float(laws.touchdown.offset[1]))
-    return offsets
-
-
-def test_the_laws_hold_a_foot_that_touches_well_above_the_end_of_its_path() -> None:
-    offsets = descend(make_laws(parts=ONLY_TOUCHDOWN), touching=True)
-    # the path falls 0.25 mm a step; the first force comes at 8 mm, and 2 mm are left
-    assert offsets[-1] == pytest.approx(0.006, abs=2.6e-4)
-    assert not any(descend(make_laws(parts=ONLY_TOUCHDOWN), touching=False))
-    assert not any(descend(make_laws(parts=Parts(touchdown=False)), touching=True))
 
 
 def test_the_laws_reach_for_ground_that_is_missing_while_the_others_carry_the_weight() -> None:

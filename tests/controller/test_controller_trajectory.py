@@ -120,17 +120,6 @@ def test_narrowed_steps_pass_the_middle_of_their_stance_at_the_narrow_position()
     assert log["rolled"] == pytest.approx(np.full_like(log["rolled"], 0.5 * TURNED[0]))
 
 
-def test_feet_that_come_home_stop_in_the_narrow_stance() -> None:
-    walk = narrowing_walk()
-    cycle = round(walk.gait.period / PERIOD)
-    record(advance(walk, STRAIGHT, cycle))
-    record(advance(walk, REST, 3 * cycle, going=False))
-    assert not walk.paths.walking
-    assert walk.feet.plane == pytest.approx(walk.paths.home + 0.5 * INWARD, abs=1e-9)
-    assert walk.feet.rolled == pytest.approx(0.5 * TURNED)
-    assert walk.paths.reset().plane == pytest.approx(walk.paths.home)
-
-
 @pytest.mark.parametrize("twist", [STRAIGHT, TWIST])
 def test_velocity_is_the_slope_of_position_and_nothing_jumps(twist: Twist) -> None:
     log = steady(Walk("ripple"), twist, 1000)
@@ -173,36 +162,12 @@ def test_a_foot_moves_along_the_ground_between_a_tenth_and_nine_tenths_of_its_sw
     assert bool(np.abs(ground_velocity(log, STRAIGHT)[there]).min() > 1e-4) is moves
 
 
-def test_the_optional_touch_down_speed_is_reached() -> None:
-    log = steady(Walk(touchdown_speed=0.05), STRAIGHT, 1000)
-    last = log["progress"] > 0.9975
-    assert last.any()
-    np.testing.assert_allclose(log["rise"][last], -0.05, atol=2e-3)
-
-
 def test_the_foot_rises_by_the_step_height() -> None:
     walk = Walk()
     log = steady(walk, STRAIGHT, 1000)
     np.testing.assert_allclose(
         (log["height"] - walk.paths.home_height).max(axis=0), walk.gait.step_height, rtol=1e-4
     )
-
-
-@pytest.mark.parametrize("twist", [STRAIGHT, TWIST])
-def test_the_middle_of_a_stance_is_the_stance_position(twist: Twist) -> None:
-    walk = Walk("wave")
-    log = record(advance(walk, twist, 5000))
-    middle = (np.abs(log["phase"] - 0.5 * walk.gait.duty) < 0.6 * PERIOD) & ~log["swinging"]
-    middle[:2000] = False
-    assert middle.any(axis=0).all()
-    assert np.abs(log["plane"] - walk.paths.home)[middle].max() < 1.2 * PERIOD * 0.2
-
-
-def test_a_swing_that_ends_within_a_period_still_lands_on_its_point() -> None:
-    coarse, fine = Walk(period=0.007), Walk(period=0.001)
-    slow, quick = record(advance(coarse, TWIST, 300)), record(advance(fine, TWIST, 2100))
-    standing = ~slow["swinging"][-1]
-    np.testing.assert_allclose(slow["plane"][-1][standing], quick["plane"][-1][standing], atol=1e-9)
 
 
 @pytest.mark.parametrize(("progress", "follows"), [(0.4, True), (0.74, True), (0.77, False)])
@@ -217,21 +182,6 @@ def test_a_foot_follows_a_new_command_up_to_three_quarters_of_its_swing(
     before = walk.feet.goal[leg]
     walk.step(TWIST, afresh=True)
     assert bool(abs(walk.feet.goal[leg] - before) > 1e-4) is follows
-
-
-@pytest.mark.parametrize(("away", "steps"), [(0.9e-9, False), (1.1e-9, True)])
-def test_a_foot_within_a_nanometre_of_its_stance_position_stays_where_it_is(
-    away: float, steps: bool
-) -> None:
-    walk = Walk()
-    walk.step(STRAIGHT)
-    home = walk.paths.home + complex(away)
-    walk.feet, walk.paths.swinging = (
-        walk.feet._replace(plane=home, goal=home),
-        np.zeros(6, dtype=bool),
-    )
-    walk.step(REST, going=False, afresh=True)
-    assert walk.paths.walking is steps
 
 
 @pytest.mark.parametrize("name", GAITS)
@@ -265,41 +215,9 @@ def test_a_ramp_is_smooth_and_ends_on_its_target_exactly() -> None:
     assert ramp.settled()
 
 
-@pytest.mark.parametrize(
-    ("duration", "period"), [(1.0, 0.005), (1.2, 0.005), (3.000000000000001, 0.005), (0.7, 0.003)]
-)
-def test_a_ramp_takes_the_least_number_of_periods_that_fill_its_duration(
-    duration: float, period: float
-) -> None:
-    ramp = CommandRamp(duration, period=period)
-    ramp.aim(BodyCommand(vx=0.1))
-    assert (ramp.end - 1) * period < duration <= ramp.end * period
-    ramp.steps += ramp.end - 1
-    assert not ramp.settled()
-    ramp.steps += 1
-    assert ramp.settled()
-
-
-def test_repeating_a_command_does_not_restart_the_ramp() -> None:
-    once, often = CommandRamp(1.0, period=PERIOD), CommandRamp(1.0, period=PERIOD)
-    once.aim(BodyCommand(vx=0.1))
-    for _ in range(500):
-        often.aim(BodyCommand(vx=0.1))
-        often.steps += 1
-        once.steps += 1
-    np.testing.assert_array_equal(once.ahead(100), often.ahead(100))
-
-
 def test_a_command_that_is_not_a_number_is_refused() -> None:
     with pytest.raises(HexapodError, match="impossible body command"):
         CommandRamp(1.0, period=PERIOD).aim(BodyCommand(vy=float("nan")))
-
-
-def test_the_clock_stays_stopped_without_a_command() -> None:
-    walk = Walk()
-    log = record(advance(walk, REST, 100, going=False))
-    np.testing.assert_array_equal(log["plane"], np.tile(walk.paths.home, (100, 1)))
-    assert not walk.paths.walking
 
 
 def test_while_the_clock_is_held_no_foot_moves_over_the_ground_and_then_it_continues() -> None:

@@ -16,7 +16,6 @@ from hexapod_cosim.controller import (
     Measurement,
     make_gait,
 )
-from hexapod_cosim.controller.walk.kinematics import LegSolver
 from hexapod_cosim.models import GAITS, foot_positions, load_robot
 from hexapod_cosim.models.kinematics import quaternion_product
 
@@ -137,29 +136,6 @@ def test_speed_and_acceleration_lead_from_each_angle_to_the_next(gait: str) -> N
     assert 5.0 < max(accelerations) < 200.0  # rad/s2
 
 
-def test_a_joint_at_its_limit_has_no_acceleration_and_none_exceeds_a_reversal() -> None:
-    legs = LegSolver(load_robot("athena"))
-    angle, speed = np.zeros((6, 3)), np.zeros((6, 3))
-    speed[0, 0], angle[1, 1], angle[2, 2] = (
-        legs.speed_max,
-        legs.angle_max[1, 1],
-        legs.angle_min[2, 2],
-    )
-    pose = legs.pose(np.zeros(6, dtype=np.complex128), np.zeros(6))._replace(
-        angle=np.full((6, 3), 0.1)
-    )
-    found = legs.accelerations(pose, 0.01, angle, speed)
-    assert found[0, 0] == found[1, 1] == found[2, 2] == 0.0
-    assert found[3, 0] == pytest.approx(
-        2.0 * legs.speed_max / 0.01
-    )  # rad/s2; without the limit it would be 2 (0.1 rad)/(10 ms)^2 = 2000
-    assert legs.accelerations(pose, 0.1, angle, speed)[3, 0] == pytest.approx(20.0)
-    assert legs.accelerations(pose, -0.1, angle, speed)[3, 0] == pytest.approx(
-        20.0
-    )  # the neighbour is the previous position
-    assert not legs.accelerations(None, 0.01, angle, speed).any()
-
-
 @pytest.mark.parametrize("compliant", [False, True])
 def test_speed_ref_is_the_slope_of_angle_ref(compliant: bool) -> None:
     controller = make(compliant=compliant)
@@ -244,41 +220,11 @@ def test_a_restored_controller_goes_on_bit_for_bit(compliant: bool) -> None:
     )
 
 
-def test_a_restored_controller_goes_on_bit_for_bit_amid_doubts_and_missing_ground() -> None:
-    controller, measurement, command = make(compliant=True), squeezed(), BodyCommand(vx=0.08)
-    run(
-        controller, command, 250, measurement=measurement
-    )  # feet that measure a force in mid-swing are doubted
-    measurement.foot_force[:, 2] *= [0.0, 2.0, 0.0, 2.0, 0.0, 2.0]
-    run(controller, command, 33, first=250, measurement=measurement)
-    state, shown = controller.save(), controller.diagnostics
-    before = shown.fallback.copy()
-    first = run(controller, command, 400, first=283, measurement=measurement)
-    controller.restore(state)
-    np.testing.assert_array_equal(shown.fallback, before)
-    np.testing.assert_array_equal(
-        run(controller, command, 400, first=283, measurement=measurement), first
-    )
-    assert before.any()
-
-
 def test_kinematic_control_does_not_look_at_the_forces() -> None:
     np.testing.assert_array_equal(
         run(make(), BodyCommand(vx=0.08), 200, measurement=squeezed()),
         run(make(), BodyCommand(vx=0.08), 200, measurement=Measurement()),
     )
-
-
-def test_the_diagnostics_tell_where_the_corrections_move_the_feet() -> None:
-    """The prediction holds to first order, because the angles are corrected and not the feet."""
-    controller, robot = make(compliant=True), load_robot("athena")
-    for k in range(30):
-        out = controller.step(k * PERIOD, BodyCommand(), squeezed())
-    lift = controller.diagnostics.lift
-    moved = foot_positions(robot, out.angle_ref) - foot_positions(robot, robot.stance)
-    assert np.abs(lift).max() > 2e-4
-    np.testing.assert_allclose(moved[:, 2], lift, atol=0.1 * np.abs(lift).max())
-    assert not controller.diagnostics.shift.any()
 
 
 def test_the_planned_feet_are_where_kinematic_control_sends_them() -> None:
@@ -301,25 +247,6 @@ def test_the_planned_feet_are_where_kinematic_control_sends_them() -> None:
     assert farthest > 0.03
 
 
-def test_the_planned_feet_are_the_same_under_both_controls() -> None:
-    """The feet of a squeezed robot move under compliant control, but its plan does not, as long as
-    the robot is not steered back to its path.
-    """
-    kinematic, compliant = make(), make(compliant=True)
-    for k in range(60):
-        for controller in (kinematic, compliant):
-            out = controller.step(k * PERIOD, BodyCommand(), squeezed())
-        np.testing.assert_allclose(
-            compliant.diagnostics.planned, kinematic.diagnostics.planned, atol=1e-12
-        )
-    assert (
-        np.abs(
-            foot_positions(load_robot("athena"), out.angle_ref) - compliant.diagnostics.planned
-        ).max()
-        > 2e-4
-    )
-
-
 def test_forces_are_judged_in_the_torsos_axes() -> None:
     """Turning the robot and the forces together in the world changes nothing."""
     yaw, straight = 0.7, squeezed()
@@ -338,45 +265,12 @@ def test_forces_are_judged_in_the_torsos_axes() -> None:
     np.testing.assert_allclose(rotated, plain, atol=1e-9)
 
 
-def test_posture_and_height_turn_and_lift_the_torso_over_its_feet() -> None:
-    robot, controller = load_robot("athena"), make()
-    command = BodyCommand(height=0.02, roll=0.1, pitch=-0.15)
-    angle = run(controller, command, 1200)[-1, 0]
-    cr, sr, cp, sp = np.cos(0.1), np.sin(0.1), np.cos(-0.15), np.sin(-0.15)
-    turn = np.array([[cp, 0.0, sp], [0.0, 1.0, 0.0], [-sp, 0.0, cp]]) @ np.array(
-        [[1.0, 0.0, 0.0], [0.0, cr, -sr], [0.0, sr, cr]]
-    )
-    on_ground = foot_positions(robot, angle) @ turn.T + [0.0, 0.0, 0.02]
-    home = foot_positions(robot, robot.stance)
-    np.testing.assert_allclose(on_ground[:, 2], home[:, 2], atol=1e-9)
-    np.testing.assert_allclose(
-        on_ground[:, :2], home[:, :2], atol=0.005
-    )  # the feet roll by their radius times the change of the tibias' pitch
-
-
 def test_a_leg_that_cannot_follow_is_flagged_and_stays_within_its_limits() -> None:
     robot, controller = load_robot("athena"), make()
     angle = run(controller, BodyCommand(height=0.25), 400)[-1, 0]
     assert controller.diagnostics.unreachable.all()
     assert (angle >= robot.angle_min).all()
     assert (angle <= robot.angle_max).all()
-
-
-def test_the_buffers_are_reused() -> None:
-    controller = make()
-    first = controller.step(0.0, BodyCommand(), Measurement())
-    assert controller.step(PERIOD, BodyCommand(), Measurement()) is first
-
-
-def test_what_leads_back_to_the_way_is_led_over_in_a_tenth_of_a_second() -> None:
-    compliant = make(compliant=True).compliant
-    assert compliant is not None
-    compliant.hold.velocity, compliant.hold.yaw_rate = 0.01 - 0.004j, 0.02
-    compliant.steer(0, moves=True, afresh=True)
-    v, yaw_rate = np.array([compliant.addition(k) for k in range(31)]).T
-    part = np.minimum(np.arange(31) / 20.0, 1.0)  # a tenth of a second are 20 periods of 5 ms
-    np.testing.assert_allclose(v, part * (0.01 - 0.004j), atol=1e-12)
-    np.testing.assert_allclose(yaw_rate, part * 0.02, atol=1e-12)
 
 
 @pytest.mark.parametrize("t", [PERIOD, 2.5 * PERIOD, float("nan")])

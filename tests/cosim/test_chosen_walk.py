@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from gains import make_gains
 
-from hexapod_cosim.cosim.results.walking import different_walks, walking_text
+from hexapod_cosim.cosim.results.gait_choice import gait_differences
 from hexapod_cosim.cosim.run.chosen_walk import ChosenWalk, choose_walk
 from hexapod_cosim.cosim.run.single_run import make_plan, simulate
 from hexapod_cosim.cosim.run.walker import Walker
@@ -145,20 +145,19 @@ def test_both_implementations_walk_the_chosen_walk_alike() -> None:
             readable.outcome.recording.column(name),
             atol=AGREEMENT,
         )
-    assert readable.facts["walking"] == compiled.facts["walking"]
+    assert readable.facts.walking == compiled.facts.walking
     femur = readable.outcome.recording.column("LF.femur.angle")[0]
     assert femur == pytest.approx(walk().robot.stance[0, 1], abs=0.03)  # the servos sag
 
 
 def test_the_report_says_how_the_controls_walk_when_they_differ() -> None:
     facts = {
-        "kinematic": {"walking": walk(control="kinematic").as_facts()},
-        "compliant": {"walking": walk().as_facts()},
+        "kinematic": walk(control="kinematic").as_facts(),
+        "compliant": walk().as_facts(),
     }
-    assert different_walks(facts) == [
+    assert gait_differences(facts) == [
         "kinematic walks tripod, period 1 s, the robot file's stance, chosen by the robot file",
         "compliant walks amble, period 1.5 s, feet 20 mm nearer to the hips and 19 mm deeper below "
         "them, chosen by the control",
     ]
-    assert different_walks({"a": facts["kinematic"], "b": facts["kinematic"]}) == []
-    assert walking_text({}) == ""  # of an earlier version
+    assert gait_differences({"a": facts["kinematic"], "b": facts["kinematic"]}) == []

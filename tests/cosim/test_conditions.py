@@ -34,8 +34,8 @@ def test_a_robot_on_ice_walks_on_the_spot_and_is_warned_why(
     position = result.outcome.recording.vector("torso.position")
     # m: of 0.12 commanded; its legs swing its torso to and fro
     assert float(np.abs(position[:, :2] - position[0, :2]).max()) < 0.01
-    assert NO_PUSH in result.facts["warnings"]
-    assert result.facts["walk"]["upright"]
+    assert NO_PUSH in result.facts.warnings
+    assert result.facts.walk.upright
 
 
 def test_a_robot_on_an_icy_slope_slides_at_the_gravity_along_it_and_is_warned(
@@ -53,9 +53,9 @@ def test_a_robot_on_an_icy_slope_slides_at_the_gravity_along_it_and_is_warned(
     assert position[-1, 0] < position[0, 0]
     assert (
         "the robot slides: the ground's slope pulls it downhill at 0.979 m/s2, without friction"
-        in result.facts["warnings"]
+        in result.facts.warnings
     )
-    assert result.facts["walk"]["upright"]
+    assert result.facts.walk.upright
 
 
 def test_gains_are_not_designed_for_feet_without_friction(plant_build: Path) -> None:
@@ -71,7 +71,7 @@ def test_a_robot_dropped_from_a_metre_lands_on_its_feet_and_has_not_fallen(
     plant_build: Path,
 ) -> None:
     result = run("stand", "initial.position[3]=1", "duration=2")
-    assert result.facts["walk"]["upright"]
+    assert result.facts.walk.upright
     recording = result.outcome.recording
     landed = recording.time[np.argmax((recording.feet("contact") > 0.5).any(axis=1))]
     # s    to a macro-step; it stands at 0.132 m
@@ -87,7 +87,7 @@ def test_a_robot_dropped_on_its_side_has_fallen(plant_build: Path) -> None:
         "initial.quaternion[2]=0.6",
         "duration=1",
     )
-    assert not result.facts["walk"]["upright"]
+    assert not result.facts.walk.upright
 
 
 def test_a_kinematic_drive_follows_the_walk_within_a_third_of_a_milliradian(
@@ -116,15 +116,15 @@ def test_the_robot_walks_under_other_gravities(plant_build: Path, world: str, co
     The start is settled, and the weight is m g.
     """
     result = run(world, f"control={control}", "gait.name=tripod", "duration=4")
-    recording, walk = result.outcome.recording, result.facts["walk"]
+    recording, walk = result.outcome.recording, result.facts.walk
     weight = 5.6 * WORLDS[world]  # N    5.6 kg
     assert float(recording.feet("normal_force")[0].sum()) == pytest.approx(weight, rel=1e-5)
     assert float(recording.feet("normal_force")[400:].sum(axis=1).mean()) == pytest.approx(
         weight, rel=0.01
     )
-    assert walk["upright"]
-    assert walk["distance"] == pytest.approx(0.16, rel=0.05)  # m    two seconds at 0.08 m/s
-    assert walk.get("fallback", 0.0) == 0.0
+    assert walk.upright
+    assert walk.distance == pytest.approx(0.16, rel=0.05)  # m    two seconds at 0.08 m/s
+    assert (walk.fallback or 0.0) == 0.0
     assert result.metrics["path_error"] < (0.005 if control == "compliant" else 0.05)
     if (
         control == "compliant"

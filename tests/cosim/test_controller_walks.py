@@ -48,7 +48,7 @@ def test_compliance_without_a_planned_squeeze_takes_most_of_the_slip(robot: str)
         assert compliant.metrics[name] < SLIP_LEFT * kinematic.metrics[name]
     for name in ("height_rms", "path_error", "peak_force"):
         assert compliant.metrics[name] < kinematic.metrics[name]
-    assert compliant.facts["walk"]["fallback"] == 0.0
+    assert compliant.facts.walk.fallback == 0.0
 
 
 @pytest.mark.usefixtures("plant_build")
@@ -98,8 +98,8 @@ def test_with_a_dead_sensor_it_walks_on_by_the_plan_of_that_leg() -> None:
         walk("athena", "compliant", 'events=[{time=0.5, leg="RM", fault="dead"}]'),
     )
     assert hurt.completed
-    assert hurt.facts["walk"]["upright"]
-    assert hurt.facts["walk"]["fallback"] > 0.8
+    assert hurt.facts.walk.upright
+    assert hurt.facts.walk.fallback > 0.8
     recording = hurt.outcome.recording
     doubted = np.array(
         [
@@ -108,9 +108,7 @@ def test_with_a_dead_sensor_it_walks_on_by_the_plan_of_that_leg() -> None:
         ]
     )
     assert doubted.tolist() == [False, False, False, False, True, False]
-    assert hurt.facts["walk"]["distance"] == pytest.approx(
-        whole.facts["walk"]["distance"], rel=0.03
-    )
+    assert hurt.facts.walk.distance == pytest.approx(whole.facts.walk.distance, rel=0.03)
     assert hurt.metrics["slip_per_metre"] < walk("athena", "kinematic").metrics["slip_per_metre"]
 
 
@@ -124,7 +122,7 @@ def test_a_dead_sensor_makes_no_foot_land_harder_on_level_ground(leg: str) -> No
         walk("athena", "compliant", f"events=[{event}]", duration=7.0)
         for event in ("", f'{{time=3.3, leg="{leg}", fault="dead"}}')
     )
-    assert hurt.facts["walk"]["fallback"] > 0.4
+    assert hurt.facts.walk.fallback > 0.4
     assert hurt.metrics["peak_force"] < 1.1 * whole.metrics["peak_force"]
 
 
@@ -152,7 +150,7 @@ def test_on_ground_100_times_softer_or_with_2_3_times_the_weight_it_is_no_worse_
     for name in FIGURES:
         assert compliant.metrics[name] < kinematic.metrics[name], name
     assert compliant.metrics["slip_per_metre"] < 0.7 * kinematic.metrics["slip_per_metre"]
-    assert compliant.facts["walk"]["fallback"] == 0.0
+    assert compliant.facts.walk.fallback == 0.0
 
 
 @pytest.mark.usefixtures("plant_build")
@@ -161,7 +159,7 @@ def test_with_three_times_the_weight_and_no_squeeze_it_is_kinematic_control() ->
         walk("athena", control, "parameters.torso.mass=14", "compliance.squeeze=0", duration=6.0)
         for control in ("kinematic", "compliant")
     )
-    assert compliant.facts["walk"]["fallback"] > 0.8  # from 1 s on, when that weight is known
+    assert compliant.facts.walk.fallback > 0.8  # from 1 s on, when that weight is known
     assert compliant.metrics["slip_per_metre"] == pytest.approx(
         kinematic.metrics["slip_per_metre"], rel=0.1
     )

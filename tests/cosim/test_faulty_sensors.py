@@ -217,7 +217,7 @@ def test_a_walk_with_faulty_sensors_goes_on_or_says_why_it_ended(
     overrides = ["duration=0.3", f"control={control}", f"events=[{{time=0.1, {fault}}}]"]
     result = simulate(load_scenario("walk_flat", overrides=overrides))
     assert result.outcome.status == status
-    assert len(result.facts["events"]) == 1
+    assert len(result.facts.events) == 1
     if status == "failed":
         assert 0.1 <= result.outcome.simulated < 0.2
         assert "nan" in result.outcome.reason.lower()

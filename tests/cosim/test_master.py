@@ -28,7 +28,7 @@ from hexapod_cosim.cosim.master.signals import MEASURED, Signals
 from hexapod_cosim.cosim.results.recordings import read_csv, write_csv
 from hexapod_cosim.cosim.results.result import Result
 from hexapod_cosim.cosim.results.walk import View
-from hexapod_cosim.cosim.results.warnings import describe_walk
+from hexapod_cosim.cosim.results.warnings import locomotion_of
 from hexapod_cosim.cosim.run.single_run import apply_settings, make_sensor, simulate
 from hexapod_cosim.cosim.scenario.records import Push, Scenario
 from hexapod_cosim.cosim.scenario.scenario import load_scenario, scenario_robot
@@ -185,8 +185,8 @@ def test_the_share_of_time_in_which_a_controller_fell_back_is_recorded_and_repor
     ).recording
     assert recording.column("controller.RM.fallback").tolist() == [0.0] * 15 + [1.0] * 6
     assert not recording.column("controller.LM.fallback").any()
-    measured = describe_walk(View(recording, FakePlant().parameters(), 1.0), upright=True)
-    assert measured["fallback"] == pytest.approx(6 / 21)
+    measured = locomotion_of(View(recording, FakePlant().parameters(), 1.0), upright=True)
+    assert measured.fallback == pytest.approx(6 / 21)
 
 
 def test_progress_reaches_the_whole_duration() -> None:
@@ -372,7 +372,7 @@ def walked(plant_build: Path) -> Result:
 
 def test_the_robot_sets_out_and_stays_up(walked: Result) -> None:
     assert walked.outcome.status == COMPLETED
-    assert walked.facts["walk"]["upright"]
+    assert walked.facts.walk.upright
     position = walked.outcome.recording.vector("torso.position")
     assert position[-1, 0] - position[0, 0] > 0.002  # m: half a second, most of it ramp
 

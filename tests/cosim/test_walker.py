@@ -86,7 +86,7 @@ def in_python(scenario: Scenario, walker: Walker) -> tuple[Outcome, Result]:
             signals, plan.schedule.times, plan.schedule.rows, extra=diagnostic_columns(ours)
         )
         outcome = run(plant, signals, ours, plan.schedule, recorder, h=scenario.macro_step)
-    return outcome, make_result(plan, outcome, parameters, {"warnings": []})
+        return outcome, make_result(plan, outcome, plant, parameters, controller={})
 
 
 def steady(summary: Summary) -> Summary:
@@ -133,7 +133,7 @@ def test_every_signal_of_a_walk_is_the_python_masters_bit_for_bit(scenario: Scen
     np.testing.assert_array_equal(ours.columns(theirs.names), theirs.data)
     assert found.parameters == judged.parameters
     assert steady(summarise(found)) == steady(summarise(judged))
-    assert found.facts["walk"]["distance"] == judged.facts["walk"]["distance"] > 0.0
+    assert found.facts.walk.distance == judged.facts.walk.distance > 0.0
 
 
 def test_what_is_recorded_changes_no_figure_and_runs_do_not_depend_on_those_before(
@@ -173,7 +173,7 @@ def test_the_figures_are_those_of_the_python_controller(walker: Walker) -> None:
             assert found.metrics[name] == pytest.approx(
                 expected.metrics[name], rel=CLOSE, abs=1e-12, nan_ok=True
             ), name
-        assert found.facts["warnings"] == expected.facts["warnings"]
+        assert found.facts.warnings == expected.facts.warnings
         assert found.parameters == expected.parameters
 
 

@@ -10,10 +10,10 @@ from typing import Any
 import pytest
 from command import Call, assert_refused
 
-from hexapod_cosim.cosim.course.reading import load_course
-from hexapod_cosim.cosim.course.records import read_entries
-from hexapod_cosim.cosim.course.runs import Run, run_course
-from hexapod_cosim.cosim.course.store import read_table
+from hexapod_cosim.extensions.course.reading import load_course
+from hexapod_cosim.extensions.course.records import read_entries
+from hexapod_cosim.extensions.course.runs import Run, run_course
+from hexapod_cosim.extensions.course.store import read_table
 
 KINEMATIC = ["--control", "kinematic"]
 
@@ -45,7 +45,7 @@ def replayed(monkeypatch: pytest.MonkeyPatch, found: tuple[Run, ...], *, stop: b
         if stop:
             raise KeyboardInterrupt
 
-    monkeypatch.setattr("hexapod_cosim.cosim.cli.benchmark_command.run_course", again)
+    monkeypatch.setattr("hexapod_cosim.extensions.course.benchmark_command.run_course", again)
 
 
 CHOICE = ["--split", "tune", "--seeds", "2", "--case", "rough_10", "--case", "turn", *KINEMATIC]
@@ -105,6 +105,7 @@ def test_an_interrupt_writes_the_table_of_the_completed_runs(
         ([*KINEMATIC, *KINEMATIC], ["two controls with one label"]),
         (["--split", "train"], ["unknown split", "judge"]),
         (["--control", "missing.py:Law"], ["missing.py"]),
+        (["--control", "kinematic", "--without", "posture"], ["--without: ", "got 'kinematic'"]),
         (["--case", "rough_11"], ["unknown case", "rough_10"]),
         (["--seeds", "0"], ["--seeds", "1 to 1000"]),
         (["--workers", "0"], ["--workers", "1 to"]),

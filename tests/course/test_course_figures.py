@@ -8,16 +8,16 @@ from dataclasses import replace
 
 import pytest
 
-from hexapod_cosim.cosim.course import texts
-from hexapod_cosim.cosim.course.goals import Verdict, verdicts
-from hexapod_cosim.cosim.course.parts import judge_parts
-from hexapod_cosim.cosim.course.reading import load_course
-from hexapod_cosim.cosim.course.records import BY_NAME, QUANTITIES, Case
-from hexapod_cosim.cosim.course.runs import Run, failure_of
-from hexapod_cosim.cosim.course.table import ALL, Table
 from hexapod_cosim.cosim.master.loop import COMPLETED, FAILED
 from hexapod_cosim.cosim.results.metrics import METRICS
 from hexapod_cosim.cosim.results.summary import NO_FIGURES, Summary
+from hexapod_cosim.extensions.course import texts
+from hexapod_cosim.extensions.course.goals import Verdict, verdicts
+from hexapod_cosim.extensions.course.parts import judge_parts
+from hexapod_cosim.extensions.course.reading import load_course
+from hexapod_cosim.extensions.course.records import BY_NAME, QUANTITIES, Case
+from hexapod_cosim.extensions.course.runs import Run, failure_of
+from hexapod_cosim.extensions.course.table import ALL, Table
 
 CONTROLS = ("before", "after")
 COURSE = load_course("judge", seeds=4)

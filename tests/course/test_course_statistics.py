@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from hexapod_cosim.cosim.course.statistics import Rate, median_ratio, wilson
+from hexapod_cosim.extensions.course.statistics import Rate, median_ratio, wilson
 
 
 def test_wilsons_interval_solves_its_equation() -> None:

@@ -4,8 +4,7 @@ ones.
 
 from __future__ import annotations
 
-import re
-from dataclasses import asdict, replace
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
@@ -25,12 +24,9 @@ from hexapod_cosim.controller import (
 from hexapod_cosim.controller.comply.paper import Paper, Step
 from hexapod_cosim.controller.controller import gains_warnings
 from hexapod_cosim.controller.design import StandingPlant, design_gains, plot_design
-from hexapod_cosim.controller.design.closed import disturbed, spectral_radius
-from hexapod_cosim.controller.design.loci import critical_size, loop_margins, response
+from hexapod_cosim.controller.design.loci import critical_size, loop_margins
 from hexapod_cosim.controller.design.paper import (
     PaperLoops,
-    closed_loop,
-    delay_steps,
     late_filter,
     law_matrix,
     scaled,
@@ -43,7 +39,6 @@ from hexapod_cosim.models import load_robot
 PERIOD = 0.005  # s
 ROBOTS = ("athena", "phantomx_mk4")
 NOMINAL = "tripod LF LR RM, load 1, gears slip"
-AT_ONE = 1e-5  # 1    the next eigenvalues are 1e-3 away
 pytestmark = pytest.mark.usefixtures("plant_build")
 
 
@@ -128,15 +123,6 @@ def test_the_law_of_the_design_is_the_one_that_runs(gains: Gains) -> None:
     np.testing.assert_allclose(found.reshape(-1), expected, rtol=1e-6, atol=1e-9)
 
 
-def test_all_feet_together_are_stable(gains: Gains) -> None:
-    robot, delays = load_robot(gains.robot), loops_of(gains).delays
-    for name, plant in plants_of(gains.robot).items():
-        loop = closed_loop(robot, plant, gains.paper, delays=delays)
-        assert spectral_radius(loop) < 1.0, name
-        # the position on the ground is held by nothing, and all else is
-        assert (np.abs(np.linalg.eigvals(loop.A) - 1.0) < AT_ONE).sum() == 3, name
-
-
 @pytest.mark.parametrize("kind", ["gain", "static"])
 def test_a_margin_is_where_the_closed_loops_become_unstable(gains: Gains, kind: str) -> None:
     """The eigenvalues of the whole loops agree with the margin on their frequency responses.
@@ -149,23 +135,6 @@ def test_a_margin_is_where_the_closed_loops_become_unstable(gains: Gains, kind: 
     critical = 10.0 ** (getattr(loops.worst(gains.paper)[0], kind) / 20.0)
     assert loops.radius(scaled(gains.paper, 0.98 * critical)) < 1.0
     assert loops.radius(scaled(gains.paper, 1.02 * critical)) > 1.0
-
-
-def test_the_static_margin_is_that_of_the_share_beside_ground_that_yields(gains: Gains) -> None:
-    """A share of 1 would be the edge on hard ground; ground in series with the leg adds to it."""
-    hard = -20.0 * np.log10(gains.paper.share_limit)
-    assert hard < gains.margins.paper_static_margin < hard + 1.0  # dB
-
-
-def test_gains_scaled_by_a_factor_scale_the_law_and_the_loci(gains: Gains) -> None:
-    robot, plant, loops = load_robot(gains.robot), plants_of(gains.robot)[NOMINAL], loops_of(gains)
-    twice = scaled(gains.paper, 2.0)
-    np.testing.assert_allclose(
-        law_matrix(robot, plant, twice), 2.0 * law_matrix(robot, plant, gains.paper), rtol=1e-12
-    )
-    assert loops.worst(gains.paper)[0].gain - loops.worst(twice)[0].gain == pytest.approx(
-        20.0 * np.log10(2.0), abs=0.01
-    )
 
 
 def test_a_larger_margin_makes_the_shares_smaller_and_a_smaller_one_no_larger_than_asked() -> None:
@@ -201,53 +170,9 @@ def test_the_late_filter_smooths_a_delayed_force_as_the_controller_does() -> Non
     np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-12)
 
 
-def test_a_response_is_python_controls() -> None:
-    omega = np.array([1.0, 30.0, 200.0])
-    system = shifted(load_robot("athena"), plants_of("athena")[NOMINAL])
-    for w, found in zip(omega, response(system, omega), strict=True):
-        expected = control.evalfr(system, np.exp(1j * w * PERIOD))
-        np.testing.assert_allclose(found, expected, rtol=1e-6, atol=1e-6 * np.abs(expected).max())
-
-
-def test_delays_count_whole_periods() -> None:
-    assert delay_steps(Requirements(delay_periods=1.0, force_delay=0.01), period=0.005) == 3
-    assert delay_steps(Requirements(delay_periods=0.2, force_delay=0.011), period=0.005) == 4
-    assert delay_steps(Requirements(delay_periods=0.0, force_delay=0.0), period=0.005) == 0
-
-
-def test_sections_that_need_no_design_come_from_the_requirements(gains: Gains) -> None:
-    needs, robot = gains.requirements, load_robot(gains.robot)
-    assert gains.hold.attitude_rate == needs.attitude_rate
-    assert gains.support.handover_time == needs.handover_time
-    assert gains.limits.torque == needs.torque_share * robot.servo.torque_max
-    assert gains.support.load_time == needs.load_time
-    assert gains.paper.limit == needs.deflection_limit
-    assert gains.paper.damping == pytest.approx(robot.weight / 6.0 / 0.9)
-
-
-def test_gains_are_for_their_robot(gains: Gains) -> None:
-    robot = load_robot(gains.robot)
-    assert gains.mismatch(robot, period=PERIOD) is None
-    heavier = replace(robot, torso=replace(robot.torso, mass=robot.torso.mass + 2.0))
-    assert gains.mismatch(heavier, period=PERIOD) is not None
-
-
-def test_a_stiffer_robot_gets_gains_of_its_own() -> None:
-    robot = load_robot("athena")
-    stiffer = replace(robot, servo=replace(robot.servo, kp=2.0 * robot.servo.kp))
-    found = design_for(stiffer, PERIOD)
-    assert found.robot_hash == stiffer.hash
-    usual = designed("athena").margins
-    assert found.margins.paper_gain_margin != usual.paper_gain_margin
-
-
 def test_saved_gains_are_loaded_to_the_last_bit(gains: Gains, tmp_path: Path) -> None:
     assert load_gains(save_gains(gains, tmp_path / "gains.toml")) == gains
     assert [path.name for path in tmp_path.iterdir()] == ["gains.toml"]
-
-
-def test_the_facts_of_gains_are_all_their_fields(gains: Gains) -> None:
-    assert gains.as_facts() == asdict(gains)
 
 
 def test_caveats_are_kept_and_warned_about(tmp_path: Path) -> None:
@@ -258,17 +183,6 @@ def test_caveats_are_kept_and_warned_about(tmp_path: Path) -> None:
         "the design leaves out a: b",
         'and "c"',
     )
-    path.write_text(
-        path.read_text(encoding="utf-8").replace("caveats = [", "caveats = [1.0, "),
-        encoding="utf-8",
-    )
-    with pytest.raises(GainsError, match=r"caveats: wrong type: got 1\.0, expected a text"):
-        load_gains(path)
-    path.write_text(
-        re.sub("caveats = .*", 'caveats = "a"', path.read_text(encoding="utf-8")), encoding="utf-8"
-    )
-    with pytest.raises(GainsError, match="caveats: wrong type: got 'a', expected a list of texts"):
-        load_gains(path)
 
 
 @pytest.mark.parametrize(
@@ -279,10 +193,11 @@ def test_caveats_are_kept_and_warned_about(tmp_path: Path) -> None:
             "hight_share = ",
             "unknown key.*hight_share.*did you mean 'height_share'",
         ),
-        ("\n[hold]", "\n[hald]", "missing section.*\\[hold\\]"),
-        ("damping = ", "damping = -", "paper.damping: impossible value"),
+        ("\n[hold]", "\n[hald]", "\\[hold\\]: wrong type.*expected a table"),
+        ("damping = ", "damping = -", "damping: value not allowed"),
         ("format = 5", "format = 4", "unknown format"),
-        ("\nlimit = ", "\nlimit = true # ", "paper.limit: wrong type"),
+        ("caveats = []", "caveats = [1.0]", "caveats: wrong type"),
+        ("\nlimit = ", "\nlimit = true # ", "limit: wrong type"),
         ("format = 5", "format = ", "not a TOML file"),
     ],
 )
@@ -305,8 +220,11 @@ def test_a_missing_file_or_folder_is_reported(gains: Gains, tmp_path: Path) -> N
 @pytest.mark.parametrize(
     ("setting", "message"),
     [
-        ("filter_time=0", "filter_time: impossible requirement: got 0.0, expected a number > 0"),
-        ("force_delay=-1", "force_delay: impossible requirement: got -1.0, expected a number >= 0"),
+        ("filter_time=0", "filter_time: value not allowed: got 0.0, expected a finite number > 0"),
+        (
+            "force_delay=-1",
+            "force_delay: value not allowed: got -1.0, expected a finite number >= 0",
+        ),
         ("phase_margn=50", "unknown requirement.*did you mean 'phase_margin'"),
         ("phase_margin=steep", "not a number: got 'steep'"),
     ],
@@ -348,10 +266,3 @@ def test_the_design_is_drawn(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("in the way")
     with pytest.raises(GainsError, match="cannot write the design's figures"):
         plot_design(load_robot("athena"), gains, plants, tmp_path / "file")
-
-
-def test_a_disturbance_rises_and_stays() -> None:
-    time, outputs = disturbed(control.ss([], [], [], [[2.0]], 0.01), np.array([3.0]), duration=0.2)
-    assert len(time) == 20
-    assert np.all(np.diff(outputs[0]) >= 0.0)
-    assert outputs[0, -1] == 6.0

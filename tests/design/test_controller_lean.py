@@ -55,14 +55,6 @@ def test_the_distance_is_limited_and_centred_loads_have_none() -> None:
     assert abs(laws.lean.imag) < TURNED
 
 
-def test_feet_that_have_hardly_landed_tell_nothing() -> None:
-    laws = make_laws()
-    plan(laws)
-    for _ in range(CYCLE):
-        laws.feel(0.4 * loads(0.02 + 0.0j))
-    assert laws.lean == 0j
-
-
 def test_a_doubted_sensor_stops_the_estimate() -> None:
     laws = make_laws()
     plan(laws, height=0.0)

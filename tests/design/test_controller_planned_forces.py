@@ -4,7 +4,6 @@ make the planned motion.
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -157,18 +156,3 @@ def test_standing_still_is_planned_to_round_off(name: str) -> None:
     # stand on the stance
     indented = 5e-6
     np.testing.assert_allclose(given, needed, atol=indented)
-
-
-@pytest.mark.parametrize("command", ["straight", "turning", "leaning"])
-def test_a_mirrored_plan_is_the_plan_in_a_mirror(command: str) -> None:
-    robot, mirror, straight = load_robot("athena"), [3, 4, 5, 0, 1, 2], COMMANDS[command]
-    gait = make_gait(robot, "ripple", step_height=0.02)
-    left = planned(robot, straight, gait)
-    other = replace(straight, vy=-straight.vy, yaw_rate=-straight.yaw_rate, roll=-straight.roll)
-    right = planned(robot, other, replace(gait, offsets=tuple(np.array(gait.offsets)[mirror])))
-    assert len(left) == len(right) > 20
-    for mine, seen in ((one.plan, two.plan) for one, two in zip(left, right, strict=True)):
-        for wanted, found in ((mine.own, seen.own), (mine.carry, seen.carry)):
-            np.testing.assert_allclose(found, wanted[mirror] * [-1.0, 1.0, 1.0], atol=1e-9)
-        np.testing.assert_allclose(seen.shares.normal, mine.shares.normal[mirror], atol=1e-9)
-        np.testing.assert_allclose(seen.shares.push, mine.shares.push[mirror].conj(), atol=1e-9)

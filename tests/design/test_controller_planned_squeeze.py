@@ -21,7 +21,6 @@ REST, DEPTH = DYNAMICS.rest(), -DYNAMICS.floor
 HOME = LEGS.forward(ROBOT.stance)[:, :2] @ np.array([1.0, 1.0j])
 STANDING = ("111111", "101010", "010101", "110110", "111000")
 RIDGED = 1e-7 * WEIGHT  # N, N m    the ridge of the multipliers' system is 1e-9 of its trace
-MIRRORED = [3, 4, 5, 0, 1, 2]  # right legs for left ones
 
 
 def shares_of(standing: str, asked: Demand = REST) -> Shares:
@@ -97,16 +96,6 @@ def test_no_other_squeeze_has_less_torque_and_friction_together(
         assert ahead == pytest.approx(behind, rel=1e-6)
 
 
-def test_more_weight_of_the_torques_means_less_torque_and_more_friction() -> None:
-    before = shares_of("101010")
-    found = [squeezed(before, squeeze) for squeeze in (0.0, 0.1, 0.3, 0.5, 0.7, 0.9)]
-    efforts = [float((torque(shares) ** 2).sum()) for shares in found]
-    uses = [float((np.abs(one.push) ** 2)[one.normal > 0.0].sum()) for one in found]
-    assert efforts == sorted(efforts, reverse=True)
-    assert uses == sorted(uses)
-    assert efforts[-1] < 0.5 * efforts[0]
-
-
 def test_without_weight_or_friction_nothing_is_squeezed() -> None:
     before = shares_of("101010")
     assert squeezed(before, 0.0) is before
@@ -118,17 +107,6 @@ def test_no_foot_is_planned_beyond_its_share_of_the_friction(friction: float) ->
     for standing in STANDING:
         shares = squeezed(shares_of(standing), 0.99, friction=friction)
         assert (np.abs(shares.push) <= MOST_FRICTION * friction * shares.normal + RIDGED).all()
-
-
-def test_a_motion_that_needs_all_the_friction_gets_no_squeeze() -> None:
-    pushed = REST._replace(push=complex(0.8 * FRICTION * WEIGHT, 0.0))
-    before = shares_of("101010", pushed)
-    assert (squeezed(before, 0.5, asked=pushed).push == before.push).all()
-
-
-def test_mirrored_legs_squeeze_each_other_mirrored() -> None:
-    left, right = (squeezed(shares_of(text), 0.5).push for text in ("101010", "010101"))
-    np.testing.assert_allclose(left[MIRRORED], right.conj(), atol=1e-9)
 
 
 def test_feet_are_pulled_towards_each_other_so_that_the_femurs_carry_less() -> None:

@@ -12,12 +12,12 @@ import pytest
 from random_robots import centre_of_mass
 from scaled_robots import scaled_robot
 
-from hexapod_cosim.controller import GainsError, LegSolver, Requirements
+from hexapod_cosim.controller import GainsError, LegSolver
 from hexapod_cosim.controller.design import StandingPlant, design_gains
 from hexapod_cosim.controller.size import requirements_for
 from hexapod_cosim.cosim.design.gain_design import STANCES, design_for, examine_stances, level_fmu
-from hexapod_cosim.cosim.design.linearise import Bench, linearise
-from hexapod_cosim.cosim.design.standing import StanceError, lifted_stance, loads, rest
+from hexapod_cosim.cosim.design.linearise import Bench
+from hexapod_cosim.cosim.design.standing import lifted_stance, loads, rest
 from hexapod_cosim.models import Robot, load_robot
 
 PERIOD = 0.005  # s
@@ -101,63 +101,6 @@ def lifted_centre(robot: Robot, angle: np.ndarray) -> np.ndarray:
     return centre_of_mass(posed)
 
 
-def test_a_torso_whose_feet_keep_their_shares_is_pushed_at_its_own_centre() -> None:
-    for name in ("athena", "phantomx_mk4"):
-        robot = load_robot(name)
-        for standing in STANCES.values():
-            push = loads(robot, lifted_stance(robot, standing), standing, load=0.1)[1]
-            assert push[3:].tolist() == [0.0, 0.0, 0.0]
-            assert push[2] == pytest.approx((1.0 - 0.1 * len(standing) / 3.0) * robot.weight)
-
-
-def test_feet_are_lifted_by_the_robots_size_and_no_further_than_they_reach() -> None:
-    robot = load_robot("athena")
-
-    def lifts(robot: Robot) -> np.ndarray:
-        legs = LegSolver(robot)
-        return (legs.forward(lifted_stance(robot, TRIPOD)) - legs.forward(robot.stance))[:, 2]
-
-    def bending(most: float) -> Robot:
-        """Returns a robot whose tibias can bend by so much beyond the stance [rad]."""
-        links = [
-            (*leg.links[:2], replace(leg.links[2], angle_max=leg.stance[2] + most))
-            for leg in robot.legs
-        ]
-        return replace(
-            robot,
-            legs=tuple(replace(leg, links=of) for leg, of in zip(robot.legs, links, strict=True)),
-        )
-
-    lifted = np.array([0.0, 1.0, 0.0, 1.0, 0.0, 1.0])
-    np.testing.assert_allclose(lifts(robot), 0.04 * lifted, atol=1e-12)
-    # legs of 0.16 m
-    np.testing.assert_allclose(
-        lifts(scaled_robot(robot, 0.5)), 0.04 * 0.16 / 0.22 * lifted, atol=1e-12
-    )
-    np.testing.assert_allclose(
-        lifts(scaled_robot(robot, 2.0)), 0.04 * 0.64 / 0.44 * lifted, atol=1e-12
-    )
-    np.testing.assert_allclose(lifts(bending(0.2)), 0.02 * lifted, atol=1e-12)
-    with pytest.raises(
-        StanceError,
-        match=r"a foot cannot be lifted: got 'leg LM', "
-        r"expected 0.01 m within the joints' limits; widen",
-    ):
-        lifts(bending(0.01))
-
-
-def test_servos_however_weak_carry_any_load_while_the_plant_is_looked_at() -> None:
-    found = []
-    for most in (3.0, 300.0):
-        robot = strong(most)
-        with level_fmu(robot) as fmu:
-            motion, inputs = rest(fmu, robot, standing=TRIPOD, load=2.0)
-            found.append(linearise(fmu, robot, motion, inputs, period=PERIOD, coulomb_friction=0.0))
-    assert np.abs(found[0].torque).max() > 6.0
-    np.testing.assert_allclose(found[0].force, found[1].force, atol=1e-6)
-    np.testing.assert_allclose(found[0].system.A, found[1].system.A, atol=1e-6)
-
-
 def test_tripods_that_do_not_stand_are_left_out_and_named() -> None:
     """With a torso so heavy in front, tripods have no foot ahead of the centre of mass; six legs
     have.
@@ -172,21 +115,6 @@ def test_tripods_that_do_not_stand_are_left_out_and_named() -> None:
             f"(got the centre of mass at (139, {y}) mm, "
             f"under which foot {leg} carries nothing, expected between {stance})"
         )
-
-
-def test_loads_under_which_a_soft_robot_finds_no_rest_are_left_out() -> None:
-    plants, left_out = examine_stances(soft(15.0), PERIOD)
-    assert [name for name in plants if "load 2" in name] == [
-        "six legs, load 2, gears stick",
-        "six legs, load 2, gears slip",
-    ]
-    assert [text.split(":")[0] for text in left_out] == [
-        f"tripod {legs} under 2 times its weight" for legs in ("LF LR RM", "LM RF RR")
-    ]
-    assert all(
-        "the robot does not stay on its legs (got " in text and " rad/s after " in text
-        for text in left_out
-    )
 
 
 def test_stances_that_the_servos_do_not_carry_are_left_out_and_a_robot_that_none_carries_is_refused(
@@ -268,15 +196,3 @@ def test_similar_robots_beyond_the_usual_sizes_get_similar_gains() -> None:
     assert large.support.handover_time == pytest.approx(small.support.handover_time * time)
     assert large.support.weight_time == pytest.approx(small.support.weight_time * time)
     assert large.support.load_time == pytest.approx(small.support.load_time * time)
-
-
-def test_figures_are_those_of_the_package_for_legs_of_22_to_44_cm() -> None:
-    robot = load_robot("athena")  # legs of 0.32 m
-    for by in (0.69, 1.0, 1.37):
-        assert requirements_for(scaled_robot(robot, by)) == Requirements()
-    assert requirements_for(load_robot("phantomx_mk4")) == Requirements()
-    half, double = (requirements_for(scaled_robot(robot, by)) for by in (0.5, 2.0))
-    assert half.height_limit == pytest.approx(0.010 * 0.16 / 0.22)
-    assert double.height_limit == pytest.approx(0.010 * 0.64 / 0.44)
-    assert double.handover_time == pytest.approx(0.065 * (0.64 / 0.44) ** 0.5)
-    assert requirements_for(scaled_robot(robot, 2.0), handover_time=0.04).handover_time == 0.04

@@ -11,7 +11,6 @@ import pytest
 
 from hexapod_cosim.controller import LegSolver
 from hexapod_cosim.controller.design.closed import disturbed
-from hexapod_cosim.controller.design.loci import response
 from hexapod_cosim.controller.design.paper import shifted
 from hexapod_cosim.controller.design.standing import ANGLES, StandingPlant, weight_share
 from hexapod_cosim.cosim.design.gain_design import STANCES, level_fmu
@@ -21,11 +20,6 @@ from hexapod_cosim.cosim.interface.names import foot_vector_names
 from hexapod_cosim.models import Robot, load_robot
 
 PERIOD = 0.005  # s
-ROBOTS = ("athena", "phantomx_mk4")
-# 1    of a column's size: third derivatives of contact and friction over differences of 1e-6 m and
-# 1e-5 m/s
-HALVED = 1e-4
-ROUNDING = 1e-5  # N/m and the like    of forces of 10 N over 1e-6 m
 # 1    of the largest force change: second derivatives over motions some hundred times the
 # differences
 PREDICTED = 2e-3
@@ -37,11 +31,6 @@ STUCK, HARD = (
 )
 # 1    what still creeps of a force in 0.3 s, and the contact's compliance beside the leg's
 YIELDED = 0.01
-# rad/s, 1    what the load does to the legs' stiffness by leaning on them
-SLOW, STIFFENED = (
-    1e-2,
-    0.1,
-)
 BALANCE = 1e-4  # 1    of the force: rest is reached to 1e-3 m/s
 pytestmark = pytest.mark.usefixtures("plant_build")
 
@@ -52,28 +41,6 @@ def yielded(robot: Robot, plant: StandingPlant, force: np.ndarray) -> np.ndarray
     soft = jacobian @ jacobian.transpose(0, 2, 1) / robot.servo.kp
     moved: np.ndarray = np.einsum("nij,nj->ni", soft, force.reshape(-1, 3))
     return moved.reshape(-1)
-
-
-@pytest.mark.parametrize("name", ROBOTS)
-@pytest.mark.parametrize("stance", ["six legs", "tripod LF LR RM"])
-def test_halving_the_differences_changes_little(name: str, stance: str) -> None:
-    robot = load_robot(name)
-    with level_fmu(robot) as fmu:
-        motion, inputs = rest(fmu, robot, standing=STANCES[stance], load=1.0)
-        bench = Bench(
-            fmu,
-            robot,
-            coulomb_friction=robot.servo.coulomb_friction,
-            slope=robot.friction.slope,
-            period=PERIOD,
-        )
-        whole, half = (
-            bench.differences(motion, inputs),
-            bench.differences(motion, inputs, scale=0.5),
-        )
-    for one, other in zip(whole, half, strict=True):
-        size = np.abs(one).max(axis=0)
-        assert np.all(np.abs(one - other).max(axis=0) <= HALVED * size + ROUNDING)
 
 
 @pytest.mark.parametrize("stance", ["six legs", "tripod LM RF RR"])
@@ -157,40 +124,6 @@ def test_the_feet_carry_the_load_asked_for_and_do_not_squeeze(stance: str, load:
     assert plant.force[:, 2].sum() == pytest.approx(total, rel=BALANCE)
     assert plant.load(robot).mean() == pytest.approx(load, rel=BALANCE)
     assert np.abs(plant.force[:, :2]).max() < 1e-3 * total
-
-
-def test_no_shift_carries_less_than_the_weight_for_long() -> None:
-    """After constant upward shifts the foot forces add up to the weight again.
-
-    No force along the ground remains.
-    """
-    robot = load_robot("athena")
-    with level_fmu(robot) as fmu:
-        motion, inputs = rest(fmu, robot, standing=STANCES["tripod LF LR RM"], load=1.0)
-        plant = linearise(fmu, robot, motion, inputs, period=PERIOD, coulomb_friction=0.0)
-    force = np.zeros(9)
-    force[2::3] = 1.0, 2.0, -0.5
-    shift = yielded(robot, plant, force)
-    _, forces = disturbed(shifted(robot, plant), shift, duration=4.0)
-    sums = forces.reshape(3, 3, -1).sum(axis=0)
-    assert np.abs(sums).max() > 0.1
-    np.testing.assert_allclose(sums[:, -1], 0.0, atol=1e-3)
-
-
-def test_slow_squeezing_meets_friction_as_a_damper_that_goes_with_the_load() -> None:
-    """f = c x' with c = mu f_n k_t, so that slow loci are twice as large under twice the load.
-
-    The common push and twist of all feet meet nothing.
-    """
-    robot, loci = load_robot("athena"), []
-    with level_fmu(robot) as fmu:
-        for load in (0.5, 1.0):
-            motion, inputs = rest(fmu, robot, standing=STANCES["six legs"], load=load)
-            plant = linearise(fmu, robot, motion, inputs, period=PERIOD, coulomb_friction=0.0)
-            flat = response(shifted(robot, plant), np.array([SLOW]))[0].reshape(6, 3, 6, 3)
-            along = flat[:, :2, :, :2].reshape(12, 12)
-            loci.append(np.sort(np.abs(np.linalg.eigvals(along)))[4:])
-    np.testing.assert_allclose(loci[1] / loci[0], 2.0, rtol=STIFFENED)
 
 
 def test_states_inputs_and_outputs_have_names() -> None:

@@ -119,13 +119,6 @@ def test_the_shares_grow_with_the_duty_of_the_gait_to_their_limit() -> None:
     assert wave.height_share == 0.66
 
 
-def test_what_a_foot_carries_beyond_half_of_the_weight_is_not_taken_back() -> None:
-    paper, heavier = law(with_parts(paper_share=True)), law(with_parts(paper_share=True))
-    stand(paper, loads(30.0, 6.0, 6.0, 6.0, 6.0, 6.0))
-    stand(heavier, loads(40.0, 4.0, 4.0, 4.0, 4.0, 4.0))
-    assert paper.lift[0] == pytest.approx(heavier.lift[0], rel=1e-3)  # both 60 N in all
-
-
 def test_a_foot_yields_sidewards_to_the_force_and_outwards_only_in_the_air() -> None:
     heading = np.exp(1j * LEGS.hip_yaw)
     soft = LEGS.softness(LEGS.pose(HOME[:, 0] + 1j * HOME[:, 1], HOME[:, 2]), ATHENA.servo.kp)
@@ -186,21 +179,6 @@ def test_a_foot_that_meets_the_ground_early_stops_and_keeps_its_height_while_it_
     assert paper.lift[0] < 1e-4
 
 
-def test_a_force_below_the_share_of_a_foot_stops_no_foot() -> None:
-    """On rubber feet are loaded long before the end of their paths."""
-    paper, swinging = law(with_parts(paper_suspension=True)), np.array([True] + [False] * 5)
-    stand(paper, loads(*[SHARE] * 6), swinging=swinging, height=0.02, rise=-0.1)
-    assert not paper.lift.any()
-
-
-def test_a_foot_whose_sensor_is_dead_does_not_extend() -> None:
-    """The feet together then lack weight."""
-    paper = law(with_parts(paper_suspension=True))
-    stand(paper, loads(*[SHARE] * 6))
-    stand(paper, loads(0.0, *[SHARE] * 5), steps=40)
-    assert not paper.lift.any()
-
-
 def test_a_foot_without_ground_extends_after_a_while_at_a_limited_speed_to_the_limit() -> None:
     paper, missing = law(with_parts(paper_suspension=True)), loads(0.0, *[11.0] * 5)
     stand(paper, loads(*[SHARE] * 6))
@@ -254,14 +232,6 @@ def test_without_its_parts_it_is_kinematic_control() -> None:
     np.testing.assert_array_equal(ours, theirs)
 
 
-def test_a_saved_state_continues_with_the_same_bits() -> None:
-    walker, other, force = controller(), controller(), np.tile([1.0, 1.0, SHARE], (6, 1))
-    walk(walker, range(250), force)
-    other.restore(walker.save())
-    ours, theirs = (walk(one, range(250, 400), force) for one in (walker, other))
-    np.testing.assert_array_equal(ours, theirs)
-
-
 def test_an_unknown_law_is_refused_with_the_nearest_one() -> None:
     with pytest.raises(HexapodError, match="paper"):
         Controller(
@@ -285,14 +255,3 @@ def test_forces_and_angles_of_a_standing_robot_tell_the_same_deviations() -> Non
     by_force = (jacobian @ torque[:, :, None])[:, :, 0] / ATHENA.servo.kp
     assert np.abs(by_angle[:, 2]).min() > 0.7e-3
     assert np.abs(by_angle - by_force).max() < 0.25e-3
-
-
-@pytest.mark.usefixtures("plant_build")
-def test_a_scenario_walks_under_the_papers_control_without_feed_forward() -> None:
-    scenario = replace(load_scenario("walk_flat", overrides=["control=paper"]), duration=2.0)
-    result = simulate(scenario, gains=make_gains(ATHENA))
-    assert result.completed
-    recording = result.outcome.recording
-    torques = [name for name in recording.names if name.endswith(".torque_ref")]
-    assert len(torques) == 18
-    assert not recording.columns(torques).any()

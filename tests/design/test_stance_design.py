@@ -9,16 +9,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hexapod_cosim.controller import GainsError, LegSolver, make_gait
+from hexapod_cosim.controller import GainsError, make_gait
 from hexapod_cosim.cosim.design.stance import (
     StanceDesign,
-    _edge_distance,
     find_stance,
     walked,
     with_stance,
     write_robot,
 )
-from hexapod_cosim.models import ReachError, Robot, load_robot
+from hexapod_cosim.models import load_robot
 from hexapod_cosim.models.robot import robot_path
 
 ATHENA = load_robot("athena")
@@ -27,10 +26,6 @@ ATHENA = load_robot("athena")
 @cache
 def found() -> StanceDesign:
     return find_stance(ATHENA)
-
-
-def feet(robot: Robot) -> np.ndarray:
-    return LegSolver(robot).forward(robot.stance)
 
 
 def test_the_stance_of_least_heat_brings_the_feet_nearer_to_the_hips() -> None:
@@ -47,32 +42,6 @@ def test_the_found_stance_is_as_firm_and_as_slow_as_required() -> None:
     assert after.lifts
     assert after.speed <= 0.8 * ATHENA.servo.speed_max
     assert after == walked(found().robot, make_gait(ATHENA))
-
-
-def test_a_foot_moves_in_the_plane_of_its_leg_and_down() -> None:
-    moved = feet(with_stance(ATHENA, 0.01, 0.02)) - feet(ATHENA)
-    heading = LegSolver(ATHENA).hip_yaw + ATHENA.stance[:, 0]
-    np.testing.assert_allclose(
-        moved, np.column_stack([0.01 * np.cos(heading), 0.01 * np.sin(heading), np.full(6, -0.02)]),
-        atol=1e-12,
-    )  # fmt: skip
-    with pytest.raises(ReachError):
-        with_stance(ATHENA, 0.2, 0.0)
-
-
-def test_the_distance_from_the_edge_is_that_of_a_triangle() -> None:
-    triangle = np.array([0.0 + 0.0j, 4.0 + 0.0j, 0.0 + 3.0j])
-    assert _edge_distance(triangle, 1.0 + 1.0j) == pytest.approx(1.0)  # the inscribed circle
-    assert _edge_distance(triangle, 1.0 - 0.5j) == pytest.approx(-0.5)
-    assert _edge_distance(triangle[::-1], 1.0 + 0.2j) == pytest.approx(0.2)
-
-
-def test_a_static_load_is_carried_by_the_joints_of_standing_legs() -> None:
-    """With all the robot's weight doubled, all static torques double and the heat has fourfold."""
-    gait = make_gait(ATHENA)
-    light = replace(ATHENA, servo=replace(ATHENA.servo, coulomb_friction=0.0))
-    heavy = replace(light, gravity=(0.0, 0.0, 2.0 * ATHENA.gravity[2]))
-    assert walked(heavy, gait).heat == pytest.approx(4.0 * walked(light, gait).heat)
 
 
 def test_the_written_file_is_the_robot_with_the_stance(tmp_path: Path) -> None:

@@ -14,6 +14,22 @@ from pathlib import Path
 
 from hexapod_cosim.cosim.cli import main
 
+EXTENSIONS = Path(__file__).resolve().parents[2] / "extensions"
+COMMANDS = {
+    "study": ("study",),
+    "identify": ("identify", "replay"),
+    "course": ("benchmark",),
+    "live": ("live", "realtime"),
+    "gym": ("gym",),
+}
+# the beginnings of commands of extensions that were deleted
+MISSING = [
+    f"hexapod {command}"
+    for name, commands in COMMANDS.items()
+    if not (EXTENSIONS / name).is_dir()
+    for command in commands
+]
+
 
 def blocks(page: Path) -> list[tuple[str, str]]:
     """Kind and text of a page's code."""
@@ -29,7 +45,12 @@ def commands(page: Path, program: str) -> list[str]:
         if not kind
         for line in text.splitlines()
     ]
-    return [line for line in lines if line.startswith(program + " ")]
+    missing = MISSING if program.split(maxsplit=1)[0] == "hexapod" else ()
+    return [
+        line
+        for line in lines
+        if line.startswith(program + " ") and not line.startswith(tuple(missing))
+    ]
 
 
 def typed(folder: Path, program: str, *words: str) -> str:

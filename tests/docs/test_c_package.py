@@ -143,47 +143,6 @@ def test_the_program_of_the_page_works_as_it_stands(prefix: Path, tmp_path: Path
     assert output(tmp_path / "mine") == "after 1 s the feet carry 54.936 N\n"
 
 
-@pytest.mark.parametrize(
-    ("asked", "message"),
-    [
-        ("find_package(hexapod 0.2 REQUIRED)", "version"),
-        ("find_package(hexapod 1.0 REQUIRED)", "version"),
-        (
-            "find_package(hexapod REQUIRED COMPONENTS controller)",
-            "No component controller is installed here",
-        ),
-    ],
-)
-def test_what_is_not_installed_is_not_found(
-    prefix: Path, tmp_path: Path, asked: str, message: str
-) -> None:
-    (tmp_path / "CMakeLists.txt").write_text(
-        f"cmake_minimum_required(VERSION 3.16)\nproject(x LANGUAGES C)\n{asked}\n", encoding="utf-8"
-    )
-    process = done(
-        CMAKE, "-S", tmp_path, "-B", tmp_path / "build", *NINJA, f"-DCMAKE_PREFIX_PATH={prefix}"
-    )
-    assert process.returncode != 0
-    assert message in " ".join(process.stderr.split())
-
-
-def test_missing_headers_and_a_missing_licence_are_said_with_what_to_do(tmp_path: Path) -> None:
-    asked = ("-DHX_FMU=ON", f"-DFMI_HEADERS={tmp_path}")
-    process = done(CMAKE, "-S", ROOT, "-B", tmp_path / "build", *NINJA, *asked)
-    assert process.returncode != 0
-    told = " ".join(process.stderr.split())
-    assert (
-        f"No fmi2Functions.h in '{tmp_path}'. Give -DFMI_HEADERS=<folder of the headers "
-        "of FMI 2.0 and 3.0" in told
-    )
-    assert "-DHX_FMU=OFF" in told
-    alone = tmp_path / "alone" / "plant"
-    shutil.copytree(ROOT / "plant_fmu", alone)
-    process = done(CMAKE, "-S", alone, "-B", tmp_path / "other", *NINJA)
-    assert process.returncode != 0
-    assert f"No LICENSE in {alone} or in {alone.parent}." in " ".join(process.stderr.split())
-
-
 def test_the_library_fits_into_another_project_and_installs_nothing_there(
     vendored: Path, tmp_path: Path
 ) -> None:

@@ -8,7 +8,6 @@ validation; `make test` checks the sources of the pages.
 from __future__ import annotations
 
 import ctypes
-import json
 import os
 import re
 import shlex
@@ -20,19 +19,15 @@ from html.parser import HTMLParser
 from pathlib import Path
 from urllib.parse import unquote
 
-import numpy as np
 import pytest
 from browser import FLAGS, PATIENCE, launcher
-from pages import blocks, commands, run, typed
-
-from hexapod_cosim.models import JOINT_NAMES, load_robot
-from hexapod_cosim.models.kinematics import foot_positions
+from pages import blocks, run, typed
 
 ROOT = Path(__file__).parents[2]
 DOCS = ROOT / "docs"
 NOTEBOOKS = sorted((DOCS / "notebooks").glob("*.ipynb"))
 PAGES = [
-    ROOT / name for name in ("README.md", "CONTRIBUTING.md", "CHANGELOG.md", "benchmarks/README.md")
+    ROOT / name for name in ("README.md", ".github/CONTRIBUTING.md", "benchmarks/README.md")
 ] + sorted(DOCS.rglob("*.md"))
 SHORT, PLAIN = "duration=2", ["--set", "outputs.plots=false"]
 COMPUTED = os.environ.get("HEXAPOD_SITE") == "computed"
@@ -75,7 +70,7 @@ def reference() -> dict[str, str]:
     """The sources of the pages that are made from code and tables, by name."""
     from tools.docs.__main__ import generated  # noqa: PLC0415  takes seconds
 
-    return dict(generated())
+    return dict(generated(ROOT))
 
 
 @pytest.fixture(scope="module")
@@ -146,10 +141,8 @@ def test_formulas_of_the_site_are_drawn_and_numbered_without_a_network(site: Pat
 
 
 def test_every_variable_is_in_the_reference(reference: dict[str, str]) -> None:
-    for component in ("plant", "controller"):
-        table = tomllib.loads(
-            (ROOT / f"{component}_fmu" / "interface.toml").read_text(encoding="utf-8")
-        )
+    for component, folder in (("plant", "plant_fmu"), ("controller", "controller/fmu")):
+        table = tomllib.loads((ROOT / folder / "interface.toml").read_text(encoding="utf-8"))
         names = [
             entry["name"]
             for causality in ("input", "output", "parameter", "local")
@@ -160,63 +153,16 @@ def test_every_variable_is_in_the_reference(reference: dict[str, str]) -> None:
         assert not [name for name in names if f"| `{name}` |" not in text]
 
 
-def test_every_command_is_in_the_reference(reference: dict[str, str]) -> None:
-    text = reference["reference/commands.md"]
-    for name in ("export", "simulate", "compare", "design", "report", "validate", "list"):
-        assert f"\n## `hexapod {name}`\n" in text
-
-
-def test_every_function_of_the_c_headers_is_in_the_reference(reference: dict[str, str]) -> None:
-    directives = [
-        line for line in reference["reference/c.md"].splitlines() if "{c:function}" in line
-    ]
-    described = {name for line in directives for name in re.findall(r"(hx_\w+)\(", line)}
-    for header in (
-        ROOT / "plant_fmu/include/hexapod/hexapod.h",
-        ROOT / "controller_fmu/include/hexapod/controller.h",
-    ):
-        functions = re.findall(
-            r"^HX_API [^(]*?(hx_\w+)\(", header.read_text(encoding="utf-8"), flags=re.MULTILINE
-        )
-        assert len(functions) > 10
-        assert not set(functions) - described
-
-
 @of_the_site
 def test_the_validation_has_all_its_results(site: Path) -> None:
     text = (site / "validation.html").read_text(encoding="utf-8")
     assert "<!-- result" not in text
-    assert text.count("<table") >= 20
+    assert text.count("<table") >= 6
     for law, delivered in (("exact restitution", "0.5000"), ("Hunt-Crossley", "0.6630")):
         assert re.search(rf"{law}</p></td>.*?{delivered}", text, flags=re.DOTALL)
 
-    assert text.count("<p>both</p>") == 8  # robots drawn at random and odd ones that walk
-    between = r"</p></td>\s*<td><p>"
-    # slip [m/m], torque [N m]
-    for period, slip, torque in (
-        ("1", "0.217", "1.74"), ("2", "0.218", "1.72"), ("5", "0.218", "1.70")
-    ):  # fmt: skip
-        row = (f"<p>{period} ms", f"0.287.→.{slip}", f"0.00.→.{torque}<")
-        assert re.search(between.join(row), text)
-
-
-def test_every_result_of_the_validation_has_its_place_on_the_page() -> None:
-    from tools.docs.validation import COMPUTED, PLACE, READ  # noqa: PLC0415  takes seconds
-
-    places = PLACE.findall((DOCS / "validation.md").read_text(encoding="utf-8"))
-    assert sorted(places) == sorted([*COMPUTED, *READ])
-
 
 # the pages
-
-
-def test_notebooks_are_committed_without_what_they_put_out() -> None:
-    assert len(NOTEBOOKS) == 3
-    for path in NOTEBOOKS:
-        cells = json.loads(path.read_text(encoding="utf-8"))["cells"]
-        assert all(
-            not cell.get("outputs") and cell.get("execution_count") is None for cell in cells
-        ), path.name
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
@@ -259,57 +205,6 @@ def test_the_tutorial_works_as_typed_from_top_to_bottom(reader: Path) -> None:
     assert done >= 11
 
 
-SIDES = {"L": 1, "R": 2}  # column of the tutorial's table by a leg's first letter
-
-
-@pytest.mark.parametrize("name", ["athena", "phantomx_mk4"])
-def test_the_tutorial_says_where_each_joint_moves_a_foot(name: str) -> None:
-    """Against the feet's positions a small angle away from the standing pose, by their
-    kinematics.
-    """
-    robot = load_robot(name)
-    rows = [
-        [cell.strip() for cell in line.strip("|").split("|")]
-        for line in (DOCS / "tutorial.md").read_text("utf-8").splitlines()
-    ]
-    told = {row[0]: row for row in rows if row[0] in JOINT_NAMES}
-    assert list(told) == ["coxa", "femur", "tibia"]
-    pose = np.array([leg.stance for leg in robot.legs])
-    standing = foot_positions(robot, pose)
-    for k, leg in enumerate(robot.legs):
-        outwards = standing[k] - np.array(leg.hip_position)
-        outwards[2] = 0.0
-        outwards /= np.linalg.norm(outwards)
-        directions = {
-            "forwards": np.array([1.0, 0.0, 0.0]),
-            "up": np.array([0.0, 0.0, 1.0]),
-            "outwards": outwards,
-        }
-        directions |= {
-            "backwards": -directions["forwards"],
-            "down": -directions["up"],
-            "inwards": -outwards,
-        }
-        for j, joint in enumerate(JOINT_NAMES):
-            turned = pose.copy()
-            turned[k, j] += 0.01
-            moved = foot_positions(robot, turned)[k] - standing[k]
-            for word in told[joint][SIDES[leg.name[0]]].split(" and "):
-                assert moved @ directions[word] > 1e-4, f"{leg.name}.{joint}: {word}"
-
-
-def test_the_controller_of_the_page_lowers_the_roll(reader: Path) -> None:
-    (code,) = (
-        text
-        for kind, text in blocks(DOCS / "howto" / "my-controller.md")
-        if kind == "python" and "peak_roll" in text
-    )
-    without, with_law = map(
-        float, re.findall(r"([\d.]+) mrad", run(reader, sys.executable, "-c", code))
-    )
-    assert with_law < without
-
-
 def test_the_five_minutes_of_the_page_on_controllers_work_as_typed(reader: Path) -> None:
     page = blocks(DOCS / "howto" / "my-controller.md")
     (shell,) = (text for kind, text in page if kind == "sh")
@@ -323,29 +218,6 @@ def test_the_five_minutes_of_the_page_on_controllers_work_as_typed(reader: Path)
     said = run(reader, sys.executable, "-c", code).strip().splitlines()
     assert [" m, slip " in line for line in said] == [True, True, False]
     assert said[-1] == str(Path("out") / "both" / "report.html")
-
-
-def test_designed_gains_walk_and_serve_a_task_of_many(
-    reader: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """The pages on controllers and on clusters, whose designs go to the same place: once is
-    enough.
-    """
-    # the figures of a design are drawn in tests/docs/test_readme.py
-    monkeypatch.setattr("hexapod_cosim.controller.design.plot_design", lambda *_: [])
-    done = [
-        line
-        for page in ("my-controller.md", "cluster.md")
-        for line in commands(DOCS / "howto" / page, "hexapod")
-    ]
-    assert len(done) == 4
-    for command in [line for line in done if line != "hexapod design -o out/gains"]:
-        plain = PLAIN if " simulate " in command else []
-        typed(reader, *shlex.split(re.sub("duration=[0-9]+", SHORT, command)), *plain)
-    _, task = (text for kind, text in blocks(DOCS / "howto" / "cluster.md") if kind == "python")
-    assert (
-        run(reader, sys.executable, "-c", task.replace("duration=5", SHORT)).count("completed") == 2
-    )
 
 
 def test_the_sweep_of_the_page_on_clusters_leaves_a_table(reader: Path) -> None:

@@ -30,11 +30,6 @@ def folder(plant_build: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def test_the_page_on_fmpy_has_commands_and_code() -> None:
-    assert len(COMMANDS) >= 4
-    assert len(PYTHON) == 1
-
-
 @pytest.mark.parametrize("command", COMMANDS)
 def test_a_command_of_the_page_on_fmpy_works(folder: Path, command: str) -> None:
     run(
@@ -83,12 +78,6 @@ def leave_identified(folder: Path) -> None:
     if not (place / "experiment.toml").exists():
         walk = 'robot = "robot.toml"\ncontrol = "kinematic"\n[[command]]\nvx = 0.08\n'
         (place / "experiment.toml").write_text(walk, encoding="utf-8")
-
-
-def test_the_pages_on_robots_and_packages_have_commands() -> None:
-    assert len(commands(PAGES / "my-robot.md", "hexapod")) >= 7
-    assert len(commands(PAGES / "urdf.md", "hexapod")) >= 2
-    assert len(commands(PAGES / "libcosim_ecos.md", "hexapod")) >= 2
 
 
 @pytest.mark.parametrize(

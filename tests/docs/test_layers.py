@@ -20,7 +20,7 @@ SEES = {
     "models": {"models"},
     "controller": {"models", "controller"},
     "cosim": {"models", "controller", "cosim"},
-    "gym": {"models", "controller", "cosim", "gym"},
+    "extensions": {"models", "controller", "cosim", "extensions"},
 }
 # what each room of cosim may import
 LOW = ["common", "interface", "scenario", "master"]
@@ -38,18 +38,17 @@ ROOMS = {
     "design": [*LOW, "export"],
     "report": [*LOW, "export", "results"],
     "run": RUNNING,
-    "identify": [*RUNNING, "report", "run"],
-    "course": [*RUNNING, "report", "run"],
-    "live": [*RUNNING, "report", "run"],
-    "study": [*RUNNING, "run"],
 }
-COMPONENTS = ("plant_fmu", "controller_fmu", "policy_fmu")  # the folders of FMUs in C
-MOST_FILES = 20  # in a folder that people write
+COMPONENTS = (
+    "plant_fmu",
+    "controller/fmu",
+    "extensions/gym/policy_fmu",
+)
 # third-party packages by folder; cosim may use what pyproject lists
 MAY_USE = {
     "models": {"numpy", "PIL"},
     "controller": {"numpy", "scipy", "control", "matplotlib"},
-    "gym": {"numpy", "gymnasium"},
+    "extensions/gym": {"numpy", "gymnasium"},
 }
 RUN_TIME_ONLY = {"numpy", "scipy"}  # of the controller outside controller/design
 INCLUDE = re.compile(r'^\s*#\s*include\s+["<]([^">]+)[">]', re.MULTILINE)
@@ -109,30 +108,12 @@ def test_a_room_imports_only_the_rooms_below_it() -> None:
     assert seen == set(ROOMS)
 
 
-def test_each_room_says_what_it_is_for_and_what_it_may_import() -> None:
-    for room in ROOMS:
-        text = ast.get_docstring(
-            ast.parse((ROOT / "cosim" / room / "__init__.py").read_text(encoding="utf-8"))
-        )
-        assert text is not None, room
-        assert " ".join(text.split()).count(". Imports ") == 1, f"{room}: {text}"
-
-
-def test_no_folder_holds_more_files_than_a_reader_can_survey() -> None:
-    python = ("models", "controller", "cosim", "gym", "tests", "benchmarks", "tools", "examples")
-    names = (*python, "fmi", *COMPONENTS)
-    kinds = {".py", ".c", ".h", ".ts"}
-    counts: dict[Path, int] = {}
-    for path in (path for name in names for path in (ROOT / name).rglob("*.*")):
-        if path.suffix in kinds and path.name != "__init__.py":
-            counts[path.parent] = counts.get(path.parent, 0) + 1
-    made = {"generated", "results", "node_modules", "build"}
-    crowded = {
-        str(folder.relative_to(ROOT)): count
-        for folder, count in counts.items()
-        if count > MOST_FILES and not made & set(folder.parts)
-    }
-    assert not crowded
+def test_an_extension_imports_no_other() -> None:
+    for path in python_files("extensions"):
+        own = path.relative_to(ROOT / "extensions").parts[0]
+        for name in imports(path):
+            if name.startswith(f"{PACKAGE}.extensions."):
+                assert name.split(".")[2] == own, f"{path.relative_to(ROOT)} imports {name}"
 
 
 @pytest.mark.parametrize("folder", MAY_USE)
@@ -184,8 +165,8 @@ def test_a_core_includes_itself_its_header_and_the_c_library(component: str) -> 
     own = {path.name for path in c_files("src", component=component)}
     public = {
         "plant_fmu": {path.name for path in c_files("include/hexapod")},
-        "controller_fmu": {"controller.h", *SHARED_HEADERS},
-        "policy_fmu": {"policy.h", *SHARED_HEADERS},
+        "controller/fmu": {"controller.h", *SHARED_HEADERS},
+        "extensions/gym/policy_fmu": {"policy.h", *SHARED_HEADERS},
     }
     own |= {f"hexapod/{name}" for name in public[component]}
     files = c_files(*folders, component=component)
@@ -214,14 +195,6 @@ def test_the_fmi_layer_includes_no_core(component: str) -> None:
         assert not inside, f"{path.relative_to(ROOT)} includes {sorted(inside)}"
 
 
-def test_the_ground_knows_nothing_of_legs_in_lanes() -> None:
-    files = c_files("src/ground")
-    assert files
-    for path in files:
-        upward = [name for name in INCLUDE.findall(path.read_text("utf-8")) if "lanes/" in name]
-        assert upward == [], f"{path.relative_to(ROOT)} includes {upward}"
-
-
 def test_the_masters_loop_sees_the_standard_and_nothing_of_the_fmus_it_drives() -> None:
     files = c_files("src", "include/hexapod", component="cosim/master")
     assert files
@@ -246,29 +219,3 @@ def test_only_the_fmi_layer_names_the_standard(component: str) -> None:
         assert not re.search(r"\bfmi[23][A-Z]", path.read_text(encoding="utf-8")), (
             f"{path.relative_to(ROOT)} names an FMI type or function"
         )
-
-
-# A second definition stands for the first: complex numbers and one lane for lanes, and each
-# component's side of component.h.
-STAND_INS = {"complex_step.h": "hx_", "one_lane.h": "hx_", "component.c": "hx_component_"}
-DEFINED = re.compile(r"^\}\s*(hx[A-Z]\w*);|^\w[\w ]*?[ *]+(hx_\w+)\([^;{]*\)\s*\{", re.MULTILINE)
-
-
-def test_no_two_types_or_functions_of_c_share_a_name() -> None:
-    places: dict[str, set[str]] = {}  # within a file alternatives stand behind #if
-    for component in (*COMPONENTS, "cosim/master", "fmi"):
-        folders = ("", "src", "include/hexapod")
-        for path in c_files(*folders, component=component):
-            text = re.sub(r"/\*.*?\*/", "", path.read_text(encoding="utf-8"), flags=re.DOTALL)
-            for match in DEFINED.finditer(text):
-                name = match[1] or match[2]
-                stand_in = name.startswith(STAND_INS.get(path.name, "no stand-in"))
-                if not stand_in:
-                    places.setdefault(name, set()).add(str(path.relative_to(ROOT)))
-    assert len(places) > 200
-    assert not {name: where for name, where in places.items() if len(where) > 1}
-
-
-def test_no_two_headers_of_the_plant_share_a_name() -> None:
-    names = [path.name for path in c_files("src", "include/hexapod") if path.suffix == ".h"]
-    assert len(names) == len(set(names))

@@ -13,7 +13,6 @@ from pathlib import Path
 from types import ModuleType
 
 import pytest
-from command import Call
 
 from hexapod_cosim.cosim.export.controller_export import export_controller
 from hexapod_cosim.cosim.export.plant_export import export_fmu
@@ -55,27 +54,12 @@ def licences() -> dict[str, str]:
     }
 
 
-def test_the_viewer_bundles_the_packages_that_are_known(licences: dict[str, str]) -> None:
-    assert set(licences) == {"three", "uplot"}
-    assert "three.js authors" in licences["three"]
-    assert "Leon Sorokin" in licences["uplot"]
-    assert all(PERMISSION in text for text in licences.values())
-
-
 def test_the_bundle_begins_with_every_licence(licences: dict[str, str]) -> None:
     bundle = (ROOT / "build" / "viewer" / "viewer.js").read_text(encoding="utf-8")
     head, _, code = bundle.partition("*/")
     assert head.startswith("/*!")
     assert all(text in head for text in [OURS, *licences.values()])
     assert code.lstrip().startswith('"use strict"')
-
-
-@pytest.mark.usefixtures("undrawn")
-def test_a_report_holds_every_licence(licences: dict[str, str], call: Call, tmp_path: Path) -> None:
-    code, _, errors = call("simulate", "stand", "--set", "duration=0.1", "-o", tmp_path)
-    assert code == 0, errors
-    page = (tmp_path / "report.html").read_text(encoding="utf-8")
-    assert all(text in page for text in [OURS, *licences.values()])
 
 
 def test_the_installed_wheel_holds_every_licence(licences: dict[str, str]) -> None:
@@ -94,37 +78,6 @@ def test_the_installed_wheel_holds_every_licence(licences: dict[str, str]) -> No
             path for name, path in files.items() if name.endswith(".dist-info/licenses/LICENSE")
         ).read_text()
     )
-
-
-def test_a_package_without_a_licence_is_not_bundled(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    tool = build_viewer()
-    package = tmp_path / "node_modules" / "@somebody" / "nameless"
-    package.mkdir(parents=True)
-    (package / "package.json").write_text(
-        '{"name": "@somebody/nameless", "version": "1.0.0"}', encoding="utf-8"
-    )
-    metafile = tmp_path / "metafile.json"
-    metafile.write_text(
-        '{"inputs": {"src/main.ts": {}, "node_modules/@somebody/nameless/index.js": {}}}',
-        encoding="utf-8",
-    )
-    for name, path in {
-        "VIEWER": tmp_path,
-        "METAFILE": metafile,
-        "BUNDLE": tmp_path / "viewer.js",
-        "LICENCES": tmp_path / "texts",
-    }.items():
-        monkeypatch.setattr(tool, name, path)
-    (tmp_path / "viewer.js").write_text("code", encoding="utf-8")
-    with pytest.raises(tool.ViewerError, match=r"no licence's text in .*nameless"):
-        tool.add_licences(tmp_path / "viewer.js")
-    (package / "LICENCE.md").write_text("do as you like", encoding="utf-8")
-    tool.add_licences(tmp_path / "viewer.js")
-    assert "---- @somebody/nameless 1.0.0 ----\n\ndo as you like" in (
-        tmp_path / "viewer.js"
-    ).read_text(encoding="utf-8")
 
 
 @pytest.mark.parametrize("fmi", [2, 3])

@@ -31,13 +31,6 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def test_the_readme_exports_every_kind_of_file() -> None:
-    lines = " ".join(commands("hexapod export"))
-    assert all(
-        option in lines for option in ("--fmi 3", "--robot my.urdf", "--controller", "--ssp")
-    )
-
-
 @pytest.mark.parametrize("command", commands("hexapod export")[1:])
 def test_an_export_of_the_readme_writes_its_file(folder: Path, command: str) -> None:
     assert shlex.split(command)[-1] in typed(folder, *shlex.split(command))
@@ -57,11 +50,6 @@ def test_a_command_of_the_readme_works(folder: Path, command: str) -> None:
     assert typed(folder, *shlex.split(command), *(shorter if "simulate" in command else []))
 
 
-def test_the_readme_compares_and_simulates_the_bare_fmu_too() -> None:
-    assert commands("hexapod compare")  # run in full by tests/cli/test_cli.py
-    assert commands("fmpy simulate")
-
-
 def test_the_bare_fmu_simulates(folder: Path) -> None:
     command = shlex.split(
         commands("fmpy simulate")[0].replace("--show-plot", "--output-file result.csv")
@@ -73,13 +61,6 @@ def test_the_bare_fmu_simulates(folder: Path) -> None:
 def test_the_python_of_the_readme_prints_a_standing_height(folder: Path) -> None:
     _, snippet = (text for kind, text in BLOCKS if kind == "python")
     assert 0.12 < float(run(folder, sys.executable, "-c", snippet)) < 0.14
-
-
-@pytest.mark.parametrize("page", ["README.md", "docs/index.md", "docs/howto/my-controller.md"])
-def test_the_first_code_of_a_page_is_the_public_call(page: str) -> None:
-    first = next(text for kind, text in blocks(ROOT / page) if kind == "python")
-    assert first.startswith("import hexapod_cosim\n")
-    assert "hexapod_cosim.simulate(" in first
 
 
 def test_the_public_call_of_the_readme_writes_a_report(folder: Path) -> None:
@@ -95,9 +76,3 @@ def test_the_scenario_of_the_readme_is_valid(folder: Path) -> None:
     path = folder / "mine.toml"
     path.write_text(text, encoding="utf-8")
     assert load_scenario(str(path)).settings["gait"]["name"] == "ripple"
-
-
-def test_the_make_targets_of_the_readme_exist() -> None:
-    makefile = (ROOT / "Makefile").read_text(encoding="utf-8")
-    for line in commands("make"):
-        assert f"\n{line.split()[1]}:" in makefile

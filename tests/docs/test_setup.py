@@ -115,17 +115,6 @@ def test_a_compiler_that_cannot_compile_is_reported_with_its_error_message(tmp_p
     )
 
 
-def test_cc_is_the_only_compiler_that_is_tried_where_it_is_set(tmp_path: Path) -> None:
-    done = ask(tmp_path, HOOKS[0], compilers={"gcc": "exit 0"}, CC="mycc -m64")
-    assert done.returncode == 1
-    assert "looked for mycc -m64, got none in PATH" in done.stderr
-
-
-def test_the_build_uses_the_compiler_that_was_found(tmp_path: Path) -> None:
-    done = ask(tmp_path, HOOKS[2], compilers={"clang": "exit 0"})
-    assert (done.returncode, done.stdout.split()) == (0, ["built", "CC", "clang"])
-
-
 @pytest.mark.parametrize("name", ["CMAKE_TOOLCHAIN_FILE", "CMAKE_C_COMPILER"])
 def test_a_toolchain_that_is_chosen_for_cmake_is_not_checked(tmp_path: Path, name: str) -> None:
     assert ask(tmp_path, HOOKS[0], CMAKE_ARGS=f"-D{name}=/some/where").returncode == 0

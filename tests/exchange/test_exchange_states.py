@@ -8,9 +8,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from exchange_calls import LEGS, ROUNDING, STATES, fetched, put_states, solved_by_cvode
+from exchange_calls import LEGS, ROUNDING, STATES, fetched, put_states
 from fmi_plant import ATHENA, DISCARD, ERROR, MODEL_EXCHANGE, OK, Plant
-from fmpy import simulate_fmu
 
 INDICATORS = 50
 
@@ -102,42 +101,6 @@ def test_indicators_are_the_feet_s_penetrations_and_an_event_closes_a_foot(solve
         assert solved.call("fmi2EnterContinuousTimeMode") == OK
 
 
-@pytest.mark.parametrize("depth", [0.0, 4e-11, -4e-11, 2e-10, -2e-10])
-@pytest.mark.parametrize("speed", [0.0, 1e-6, -1e-6])
-def test_feet_at_the_ground_s_surface_stand_on_it(
-    plant_library: Path, athena_fmu: Path, depth: float, speed: float
-) -> None:
-    """An event indicator agrees with the contact, so the contact of a foot that starts, rests or
-    reverses within 0.1 nm of the ground is not lost.
-    """
-    with Plant(plant_library, kind=MODEL_EXCHANGE) as plant:
-        plant.set_reals({"solver.tolerance": 1e-8})
-        deepest = max(plant.reals([f"{leg}.foot.penetration" for leg in LEGS]))
-        height = plant.real("initial.position[3]") + deepest - depth
-        assert plant.set_reals({"initial.position[3]": height, "initial.velocity[3]": speed}) == OK
-        plant.initialize()
-        assert plant.call("fmi2NewDiscreteStates", ctypes.byref(EventInfo())) == OK
-        closed = plant.get_references(
-            "fmi2GetBoolean", ATHENA.references([f"{leg}.foot.contact" for leg in LEGS])
-        )[1]
-        assert [
-            float(z > 0.0)
-            for z in fetched(plant, "fmi2GetEventIndicators", INDICATORS)[: len(LEGS)]
-        ] == closed
-    start = {"initial.position[3]": height, "initial.velocity[3]": speed}
-    asked = {
-        "start_values": start,
-        "stop_time": 0.1,
-        "output_interval": 0.02,
-        "output": ["torso.position[3]"],
-    }
-    ours = simulate_fmu(str(athena_fmu), fmi_type="CoSimulation", **asked)
-    theirs = solved_by_cvode(athena_fmu, 1e-8, **asked)
-    np.testing.assert_allclose(
-        theirs["torso.position[3]"], ours["torso.position[3]"], atol=1e-5
-    )  # co-simulation at its default tolerance
-
-
 def test_a_foot_that_lifts_off_slackens_its_bristles_and_changes_no_other_state(
     plant_library: Path,
 ) -> None:
@@ -161,12 +124,6 @@ def test_a_foot_that_lifts_off_slackens_its_bristles_and_changes_no_other_state(
         }
         assert changed == set(STATES[-18:]) == ATHENA.reinitialised
         assert not now[-18:].any()
-
-
-def test_nominals_are_those_of_the_description(solved: Plant) -> None:
-    assert fetched(solved, "fmi2GetNominalsOfContinuousStates", len(STATES)).tolist() == [
-        ATHENA.variable(n).nominal for n in STATES
-    ]
 
 
 def test_a_saved_state_holds_the_contacts_and_the_solver_s_state(solved: Plant) -> None:
@@ -200,20 +157,3 @@ def test_calls_of_the_other_interface_are_refused_by_name(solved: Plant, running
     )
     assert running.call("fmi2EnterEventMode") == ERROR
     assert "got a call of model exchange, expected one of co-simulation" in running.last_message
-
-
-@pytest.mark.parametrize(
-    "function", ["fmi2EnterEventMode", "fmi2CompletedIntegratorStep", "fmi2SetContinuousStates"]
-)
-def test_continuous_time_calls_need_continuous_time_mode(solved: Plant, function: str) -> None:
-    assert solved.call(function) == ERROR
-    assert "in event mode" in solved.last_message
-
-
-def test_no_integrator_step_needs_an_event(solved: Plant) -> None:
-    event, end = ctypes.c_int(7), ctypes.c_int(7)
-    assert solved.call("fmi2EnterContinuousTimeMode") == OK
-    assert (
-        solved.call("fmi2CompletedIntegratorStep", 1, ctypes.byref(event), ctypes.byref(end)) == OK
-    )
-    assert (event.value, end.value) == (0, 0)

@@ -79,42 +79,6 @@ def test_measures_with_another_solver_equal_those_of_co_simulation(athena_fmu: P
         assert sums[0] > 0.0, name
 
 
-def test_the_commands_of_a_walk_give_the_same_path_with_another_solver(athena_fmu: Path) -> None:
-    t = np.linspace(0.0, 0.2, 201)
-    columns = {
-        "time": t,
-        "LF.femur.angle_ref": 0.4 + 0.5 * t,
-        "RM.coxa.angle_ref": 0.3 * t,
-        "torso.push_force[2]": 20.0 * t,
-    }
-    signals = np.zeros(len(t), dtype=[(name, np.float64) for name in columns])
-    for name, values in columns.items():
-        signals[name] = values
-    asked = {
-        "input": signals,
-        "stop_time": 0.2,
-        "output_interval": 0.02,
-        "output": STATES[:7],
-        "start_values": {"solver.tolerance": 1e-9},
-    }
-    theirs = solved_by_cvode(athena_fmu, 1e-7, **asked)
-    ours = simulate_fmu(
-        str(athena_fmu), fmi_type="CoSimulation", **(asked | {"output_interval": 0.0005})
-    )
-    late = (
-        0.5 * 0.0005 * 0.5
-        # m; a command that is held for 0.5 ms lags by half of that, with speeds of 0.5 rad/s and
-        # legs of 0.5 m
-    )
-    for name in STATES[:7]:
-        np.testing.assert_allclose(
-            theirs[name],
-            np.interp(theirs["time"], ours["time"], ours[name]),
-            atol=late,
-            err_msg=name,
-        )
-
-
 def folded(position: float) -> dict[str, float]:
     """Returns the start of an upturned robot with folded legs whose joints are held."""
     start = {"initial.position[3]": position}

@@ -1,4 +1,4 @@
-"""Runs trials with many instances, libraries, threads and steps.
+"""Runs trials with many instances, threads and steps.
 
 Each trial prints its figures and exits with 1 if they are bad.
 
@@ -10,7 +10,6 @@ short ones, each in its own process.
 
 from __future__ import annotations
 
-import _ctypes
 import ctypes
 import json
 import os
@@ -23,7 +22,6 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 from fmi_plant import ATHENA, GUID, LAST_SUCCESSFUL_TIME, OK, Plant
-from fuzz import run
 from memory import resident
 
 from hexapod_cosim.cosim.export.start_values import start_values
@@ -77,25 +75,6 @@ def instances(library: Path, count: int) -> Figures:
                 assert refused.component is None
 
         return growth(live, count)
-
-
-def libraries(library: Path, count: int) -> Figures:
-    """Loads the library, creates and frees an instance, and unloads it."""
-
-    def load() -> None:
-        handle = _ctypes.dlopen(str(library), os.RTLD_NOW | os.RTLD_LOCAL)
-        dll = ctypes.CDLL(str(library), handle=handle)
-        dll.fmi2Instantiate.restype = ctypes.c_void_p
-        component = dll.fmi2Instantiate(b"plant", 1, GUID.encode(), None, None, 0, 0)
-        assert component
-        dll.fmi2FreeInstance(ctypes.c_void_p(component))
-        _ctypes.dlclose(handle)
-
-    figures = growth(load, count)
-    assert not MAPS.exists() or str(library.resolve()) not in MAPS.read_text(encoding="utf-8"), (
-        "the library is still mapped"
-    )
-    return figures
 
 
 def trace(plant: Plant, seed: int, first: int, last: int) -> list[list[float]]:
@@ -165,39 +144,10 @@ def clock(library: Path, count: int) -> Figures:
     }
 
 
-def states(library: Path, count: int) -> Figures:
-    """Saves a state at every step and frees none.
-
-    The memory must be that of the states, and steps must not slow down.
-    """
-    with Plant(library) as plant:
-        plant.initialize()
-        size, memory, times = len(plant.serialize(plant.save())), resident(), [time.perf_counter()]
-        for k in range(count):
-            assert plant.step(k * H, H) == OK
-            plant.save()
-            if (k + 1) % (count // 2) == 0:
-                times.append(time.perf_counter())
-        figures = {"states": count, "bytes": size, "growth_bytes": resident() - memory}
-    assert figures["growth_bytes"] < 1.1 * count * size + ALLOWED_GROWTH, figures
-    return figures | {"second_half_over_first": (times[2] - times[1]) / (times[1] - times[0])}
-
-
-def fuzz(library: Path, count: int) -> Figures:
-    """Makes random calls on one instance after the other."""
-    each = 1000
-    for seed in range(max(1, count // each)):
-        run(library, seed, min(count, each))
-    return {"calls": count}
-
-
 TRIALS: dict[str, tuple[Callable[[Path, int], Figures], int]] = {
     "instances": (instances, 10_000),
-    "libraries": (libraries, 5_000),
     "threads": (threads, 100),
-    "states": (states, 20_000),
     "clock": (clock, 1_000_000),
-    "fuzz": (fuzz, 200_000),
 }
 
 

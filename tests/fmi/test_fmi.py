@@ -17,7 +17,6 @@ import fmpy.validation
 import pytest
 from fmi_plant import (
     ATHENA,
-    CO_SIMULATION,
     DISCARD,
     DO_STEP_STATUS,
     ERROR,
@@ -105,12 +104,6 @@ def test_a_wrong_instantiation_is_refused_with_a_message(
         assert plant.speakers == {arguments.get("name", "plant") or ""}
 
 
-def test_missing_callbacks_are_tolerated(plant_library: Path) -> None:
-    with Plant(plant_library, callbacks=False, kind=CO_SIMULATION) as plant:
-        assert plant.initialize().step(0.0, H) == OK
-        assert plant.step(NAN, H) == ERROR
-
-
 def test_a_missing_instance_is_an_error(plant_library: Path) -> None:
     library = ctypes.CDLL(str(plant_library))
     library.fmi2FreeInstance(None)
@@ -157,11 +150,6 @@ def test_calls_out_of_order_are_refused_and_change_nothing(
     assert str(illegal[0]) in plant.last_message
     assert plant.call("fmi2Reset") == OK
     assert plant.initialize().step(0.0, H) == OK
-
-
-def test_terminating_twice_is_tolerated(running: Plant) -> None:
-    assert running.call("fmi2Terminate") == OK
-    assert running.call("fmi2Terminate") == OK
 
 
 def test_no_step_goes_past_a_stop_time(plant: Plant) -> None:
@@ -212,49 +200,6 @@ def test_last_bit_differences_of_the_clock_are_adopted(running: Plant) -> None:
     assert running.step(time.value - 1e-16, 1e-17) == OK
 
 
-@pytest.mark.parametrize(
-    ("start", "offset", "status"),
-    [
-        (0.0, 5e-10, OK),
-        (0.0, 2e-9, ERROR),
-        (1e6, 2e-6, OK),
-        (1e6, 1e-5, ERROR),
-        (1e6, -1e-5, ERROR),
-        (1e9, 2e-3, OK),
-        (1e9, 4e-3, ERROR),
-        (-1e9, -4e-3, ERROR),
-    ],
-)
-def test_a_late_clock_is_held_to_its_rounding_and_half_a_step(
-    plant: Plant, start: float, offset: float, status: int
-) -> None:
-    assert plant.initialize(start=start).step(start + offset, H) == status
-
-
-def test_the_clock_is_never_off_by_more_than_half_a_step(running: Plant) -> None:
-    assert running.step(8e-10, 1e-9) == ERROR
-    assert running.step(4e-10, 1e-9) == OK
-
-
-@pytest.mark.parametrize("start", [1.1e9, -1.1e9, 1.7e9, 1e300])
-def test_a_start_too_late_for_the_clock_is_refused(plant: Plant, start: float) -> None:
-    assert plant.call("fmi2SetupExperiment", 0, 0.0, start, 0, 0.0) == ERROR
-    assert "later origin" in plant.last_message
-    assert plant.initialize(start=1e9).step(1e9, H) == OK
-
-
-@pytest.mark.parametrize("size", [1e-300, 1e-16, 1e-8])
-def test_a_step_that_does_not_change_the_clock_succeeds(plant: Plant, size: float) -> None:
-    before = plant.initialize(start=1e9).everything()
-    assert plant.step(1e9, size) == OK
-    assert plant.everything() == before
-
-
-def test_a_step_is_at_most_100_seconds(running: Plant) -> None:
-    assert running.step(0.0, 100.001) == ERROR
-    assert "at most 100" in running.last_message
-
-
 def test_a_step_that_the_plant_cannot_take_is_discarded_and_changes_nothing(running: Plant) -> None:
     assert running.set_reals({"torso.push_force[3]": -1e9}) == OK
     before = running.everything()
@@ -275,14 +220,6 @@ def test_status_functions_return_known_values_and_discard_others(running: Plant)
     assert running.call("fmi2GetRealStatus", PENDING_STATUS, ctypes.byref(number)) == DISCARD
     assert running.call("fmi2GetStringStatus", PENDING_STATUS, None) == DISCARD
     assert running.call("fmi2GetIntegerStatus", DO_STEP_STATUS, None) == DISCARD
-
-
-def test_a_reset_clears_the_status_of_the_last_step(running: Plant) -> None:
-    status = ctypes.c_int()
-    assert running.step(0.0, NAN) == ERROR
-    assert running.call("fmi2Reset") == OK
-    assert running.call("fmi2GetStatus", DO_STEP_STATUS, ctypes.byref(status)) == OK
-    assert status.value == OK
 
 
 def test_the_log_contains_the_chosen_categories(plant_library: Path) -> None:
@@ -319,16 +256,6 @@ def test_switching_categories_on_leaves_these_only_and_refusals(plant_library: P
         assert plant.last_message == "reset"
 
 
-def test_switching_one_category_off_leaves_the_others(plant_library: Path) -> None:
-    with Plant(plant_library, logging=True) as plant:
-        plant.messages.clear()
-        assert plant.call("fmi2SetDebugLogging", 0, *categories("logEvents")) == OK
-        assert plant.call("fmi2Reset") == OK
-        assert plant.messages == []
-        assert plant.call("fmi2SetupExperiment", 1, -1.0, 0.0, 0, 0.0) == WARNING
-        assert [category for _, category, _ in plant.messages] == ["logStatusWarning"]
-
-
 def test_every_declared_log_category_is_known_and_no_other(plant: Plant) -> None:
     for name in ATHENA.log_categories:
         assert (
@@ -344,8 +271,3 @@ def test_every_declared_log_category_is_known_and_no_other(plant: Plant) -> None
         == ERROR
     )
     assert "logRumours" in plant.last_message
-
-
-def test_messages_contain_no_printf_formats(plant_library: Path) -> None:
-    with Plant(plant_library, guid="%s%n#r1#") as plant:
-        assert "%%s%%n##r1##" in plant.last_message

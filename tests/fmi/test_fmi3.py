@@ -12,7 +12,7 @@ from pathlib import Path
 import fmpy
 import numpy as np
 import pytest
-from fmi3_plant import ARRAYS, TIME, Plant3
+from fmi3_plant import ARRAYS, Plant3
 from fmi_plant import ATHENA, DISCARD, ERROR, OK, Plant
 
 from hexapod_cosim.cosim.interface.arrays import array_name
@@ -122,13 +122,6 @@ def test_events_and_early_returns_do_not_change_the_motion(
         assert broken.get("solver.steps") == whole.get("solver.steps")
 
 
-def test_time_is_the_independent_variable(running3: Plant3) -> None:
-    assert running3.step(0.0, H).status == OK
-    assert running3.get_raw("Float64", [TIME], 1) == (OK, [H])
-    assert running3.set_raw("Float64", [TIME], [1.0]) == ERROR
-    assert "time" in running3.last_message
-
-
 # arrays
 
 
@@ -149,22 +142,6 @@ def test_an_array_is_its_elements_in_the_order_of_their_references() -> None:
             )
             == 1
         )
-
-
-@pytest.mark.parametrize(
-    ("pattern", "name"),
-    [
-        ("{leg}.{joint}.angle_ref", "angle_ref"),
-        ("{leg}.foot.force[i]", "foot.force"),
-        ("torso.inertia_{inertia}", "torso.inertia"),
-        ("{leg}.{joint}.inertia_{inertia}", "inertia"),
-        ("initial.{leg}.{joint}.angle", "initial.angle"),
-        ("torso.mass", "torso.mass"),
-        ("der({leg}.foot.bristle[i])", "der(foot.bristle)"),
-    ],
-)
-def test_an_array_s_name_is_the_pattern_s_without_axes(pattern: str, name: str) -> None:
-    assert array_name(pattern) == name
 
 
 def test_elements_are_stored_in_the_order_of_fmi_2(plant3: Plant3, plant: Plant) -> None:
@@ -227,11 +204,6 @@ def test_outputs_and_derivatives_cannot_be_set(running3: Plant3, name: str) -> N
     assert running3.set({name: np.zeros(18)}) == ERROR
 
 
-def test_parameters_are_fixed_after_initialisation(running3: Plant3) -> None:
-    assert running3.set({"mass": np.ones(18)}) == ERROR
-    assert "LF.coxa.mass" in running3.last_message
-
-
 @pytest.mark.parametrize(
     "kind", ["Float32", "Int8", "UInt8", "Int16", "UInt16", "Int32", "UInt32", "UInt64", "String"]
 )
@@ -242,12 +214,6 @@ def test_functions_for_other_types_accept_no_variables(
     one = (ctypes.c_uint * 1)(0)
     assert running3.call(f"fmi3{verb}{kind}", None, 0, None, 0) == OK
     assert running3.call(f"fmi3{verb}{kind}", one, 1, ctypes.create_string_buffer(8), 1) == ERROR
-
-
-def test_null_arrays_are_refused_unless_empty(running3: Plant3) -> None:
-    assert running3.call("fmi3GetFloat64", None, 0, None, 0) == OK
-    assert running3.call("fmi3GetFloat64", None, 1, None, 1) == ERROR
-    assert "NULL" in running3.last_message
 
 
 # stepping
@@ -289,28 +255,6 @@ def test_an_event_is_where_a_foot_touches_down(plant_library: Path) -> None:
         assert plant.get("foot.impact_speed")[0][contact].min() > 0.0
 
 
-def test_inputs_may_change_in_event_mode(plant_library: Path) -> None:
-    def velocity(push: float) -> float:
-        with Plant3(plant_library, events=True, early=True) as plant:
-            dropped(plant)
-            assert plant.call("fmi3EnterStepMode") == OK
-            time = plant.step(0.0, 0.2).time
-            assert plant.call("fmi3EnterEventMode") == OK
-            assert plant.set({"torso.push_force": [push, 0.0, 0.0]}) == OK
-            assert plant.update() == (OK, [False] * 5)
-            assert plant.call("fmi3EnterStepMode") == OK
-            assert plant.step(time, 1e-4).status == OK
-            return float(plant.get("torso.velocity")[0][0])
-
-    assert velocity(10.0 * PUSH) > velocity(PUSH)
-
-
-def test_event_mode_is_refused_when_it_was_not_requested(running3: Plant3) -> None:
-    assert running3.call("fmi3EnterEventMode") == ERROR
-    assert "eventModeUsed" in running3.last_message
-    assert running3.step(0.0, H) == (OK, False, False, False, H)
-
-
 # saved states
 
 
@@ -346,28 +290,8 @@ def test_damaged_bytes_are_refused(running3: Plant3) -> None:
     running3.free(state)
 
 
-def test_a_state_saved_in_event_mode_continues_in_an_instance_without_it(
-    plant3: Plant3, plant_library: Path
-) -> None:
-    with Plant3(plant_library, events=True) as other:
-        saved = other.initialize().save()
-        plant3.initialize()
-        assert plant3.call("fmi3SetFMUState", saved) == OK
-        assert plant3.step(0.0, H).status == OK, plant3.last_message
-        other.free(saved)
-
-
 def test_a_state_of_the_other_interface_is_refused(running3: Plant3, plant_library: Path) -> None:
     state = running3.save()
     with Plant3(plant_library, kind="ModelExchange") as other:
         assert other.call("fmi3SetFMUState", state) == ERROR
     running3.free(state)
-
-
-def test_log_categories_are_those_of_the_description(plant3: Plant3) -> None:
-    names = [b"logEvents", b"logAll"]
-    assert plant3.call("fmi3SetDebugLogging", True, 2, (ctypes.c_char_p * 2)(*names)) == OK
-    plant3.initialize()
-    assert plant3.messages[-1][:2] == (OK, "logEvents")
-    assert plant3.call("fmi3SetDebugLogging", True, 1, (ctypes.c_char_p * 1)(b"nonsense")) == ERROR
-    assert "nonsense" in plant3.last_message

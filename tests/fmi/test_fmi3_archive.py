@@ -122,30 +122,6 @@ def test_co_simulation_gives_what_fmi_2_gives_bit_for_bit(
     )
 
 
-@pytest.mark.parametrize("event_mode", [False, True])
-def test_early_returns_change_nothing_but_rounding(
-    exported3: Path, athena_fmu: Path, event_mode: bool
-) -> None:
-    expected = run2(athena_fmu, fmi_type="CoSimulation")
-    # fmpy then steps over the rest of a step, whose end may differ in the last bit
-    found = run3(
-        exported3, fmi_type="CoSimulation", early_return_allowed=True, use_event_mode=event_mode
-    )
-    np.testing.assert_allclose(found, expected, rtol=1e-11, atol=1e-11)
-
-
-def test_another_solver_gets_equal_results_from_both_versions(
-    exported3: Path, athena_fmu: Path
-) -> None:
-    options = {"fmi_type": "ModelExchange", "relative_tolerance": 1e-6}
-    expected, found = run2(athena_fmu, **options), run3(exported3, **options)
-    assert found.tolist() == expected.tolist()
-    position = slice(0, 2)
-    np.testing.assert_allclose(
-        found[position], run2(athena_fmu, fmi_type="CoSimulation")[position], atol=1e-5
-    )  # m
-
-
 def test_fmpy_builds_the_sources_into_an_equal_binary(exported3: Path, tmp_path: Path) -> None:
     unzipped = Path(fmpy.extract(str(exported3), str(tmp_path / "fmu")))
     for binary in (unzipped / "binaries").rglob("*.*"):
@@ -213,22 +189,6 @@ def test_dependencies_are_those_of_the_elements(exported3: Path) -> None:
     assert stated["der(speed)"] is None  # on all
 
 
-def test_discrete_variables_are_those_that_change_at_events(exported3: Path) -> None:
-    description = fmpy.read_model_description(str(exported3))
-    discrete = {
-        variable.name
-        for variable in description.modelVariables
-        if variable.variability == "discrete"
-    }
-    assert discrete == {
-        "feet.footprints",
-        "foot.contact",
-        "foot.impact_speed",
-        "foot.landings",
-        "solver.touchdowns",
-    }
-
-
 def test_directional_derivatives_of_arrays_are_fmi_2_s_of_elements(
     running3: Plant3, running: Plant
 ) -> None:
@@ -265,19 +225,5 @@ def test_directional_derivatives_of_arrays_are_fmi_2_s_of_elements(
         running3.call(
             "fmi3GetDirectionalDerivative", references[0], 1, references[1], 1, seed, 18, result, 6
         )
-        == ERROR
-    )
-
-
-def test_output_derivatives_of_arrays_are_rates(running3: Plant3) -> None:
-    assert running3.step(0.0, 0.005).status == OK
-    rate, reference = (ctypes.c_double * 18)(), (ctypes.c_uint * 1)(ARRAYS["angle"].reference)
-    assert (
-        running3.call("fmi3GetOutputDerivatives", reference, 1, (ctypes.c_int32 * 1)(1), rate, 18)
-        == OK
-    )
-    np.testing.assert_allclose(list(rate), running3.get("speed")[0].ravel(), rtol=1e-9, atol=1e-12)
-    assert (
-        running3.call("fmi3GetOutputDerivatives", reference, 1, (ctypes.c_int32 * 1)(2), rate, 18)
         == ERROR
     )

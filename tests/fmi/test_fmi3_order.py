@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import ctypes
 import math
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 from fmi3_plant import Plant3
-from fmi_plant import ERROR, OK, WARNING
+from fmi_plant import ERROR, OK
 
 H = 0.005  # s, communication step
 NAN, INF = math.nan, math.inf
@@ -32,12 +31,6 @@ def test_a_wrong_instantiation_is_refused_with_a_message(
         assert plant.handle is None
         assert "got" in plant.last_message
         assert "expected" in plant.last_message
-
-
-def test_a_missing_logger_is_tolerated(plant_library: Path) -> None:
-    with Plant3(plant_library, logger=False) as plant:
-        assert plant.initialize().step(0.0, H).status == OK
-        assert plant.step(NAN, H).status == ERROR
 
 
 def test_a_missing_instance_is_an_error(plant_library: Path) -> None:
@@ -196,49 +189,6 @@ def test_functions_that_are_not_offered_return_an_error_with_a_message(
     assert running3.call(str(call[0]), *call[1:]) == ERROR
     assert str(call[0]) in running3.last_message
     assert running3.step(0.0, H).status == OK
-
-
-CLOCK_FUNCTIONS = {
-    "fmi3GetClock": 1,
-    "fmi3SetClock": 1,
-    "fmi3GetIntervalDecimal": 2,
-    "fmi3GetIntervalFraction": 3,
-    "fmi3GetShiftDecimal": 1,
-    "fmi3GetShiftFraction": 2,
-    "fmi3SetIntervalDecimal": 1,
-    "fmi3SetIntervalFraction": 2,
-    "fmi3SetShiftDecimal": 1,
-    "fmi3SetShiftFraction": 2,
-}
-
-
-@pytest.mark.parametrize("function", CLOCK_FUNCTIONS)
-def test_there_are_no_clocks(running3: Plant3, function: str) -> None:
-    places = [ctypes.create_string_buffer(16) for _ in range(CLOCK_FUNCTIONS[function])]
-    assert running3.call(function, None, 0, *places) == OK
-    assert running3.call(function, (ctypes.c_uint * 1)(0), 1, *places) == ERROR
-
-
-def test_a_reset_instance_equals_a_new_one(plant_library: Path) -> None:
-    def saved(prepare: Callable[[Plant3], object]) -> bytes:
-        with Plant3(plant_library) as plant:
-            prepare(plant)
-            state = plant.save()
-            data = plant.serialize(state)
-            plant.free(state)
-            return data
-
-    def used(plant: Plant3) -> None:
-        assert plant.set({"torso.push_force": [1.0, 0.0, 0.0]}) == OK
-        assert plant.initialize().step(0.0, 0.1).status == OK
-        assert plant.call("fmi3Reset") == OK
-
-    assert saved(used) == saved(lambda plant: None)
-
-
-def test_an_invalid_tolerance_is_a_warning(plant3: Plant3) -> None:
-    assert plant3.enter_initialization(tolerance=-1.0) == WARNING
-    assert plant3.call("fmi3ExitInitializationMode") == OK
 
 
 @pytest.mark.parametrize(

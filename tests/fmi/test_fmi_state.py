@@ -5,7 +5,6 @@ state.
 from __future__ import annotations
 
 import ctypes
-import struct
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -71,15 +70,6 @@ def test_a_state_holds_the_mode(plant: Plant) -> None:
     plant.free(state)
 
 
-def test_saving_again_reuses_the_memory(plant: Plant) -> None:
-    state = plant.save()
-    address = state.value
-    walk(plant, 0, 3)
-    assert plant.call("fmi2GetFMUstate", ctypes.byref(state)) == OK
-    assert state.value == address
-    plant.free(state)
-
-
 @pytest.mark.parametrize("place", [0, 9, 13, 17, 30, 200, 4000, -1])
 def test_a_single_damaged_byte_is_refused_and_changes_nothing(plant: Plant, place: int) -> None:
     state = plant.save()
@@ -90,19 +80,6 @@ def test_a_single_damaged_byte_is_refused_and_changes_nothing(plant: Plant, plac
     assert (status, copy.value) == (ERROR, None)
     assert "saved state" in plant.last_message
     assert plant.everything() == before
-    plant.free(state)
-
-
-@pytest.mark.parametrize("mask", [0x80, 0x40, 0x01])
-@pytest.mark.parametrize("places", [(207, 1207), (1207, 1215), (-1001, -9), (-17, -1)])
-def test_two_damaged_bytes_do_not_cancel(plant: Plant, places: tuple[int, int], mask: int) -> None:
-    """The pairs contain the last bytes of words, which hold signs, and neighbouring bytes."""
-    state = plant.save()
-    data = bytearray(plant.serialize(state))
-    for place in places:
-        data[place] ^= mask
-    assert plant.deserialize(bytes(data))[0] == ERROR
-    assert "damaged" in plant.last_message
     plant.free(state)
 
 
@@ -144,44 +121,3 @@ def test_a_reset_instance_equals_a_new_one(plant: Plant, plant_library: Path) ->
         for state in states:
             plant.free(state)
         assert walk(plant.initialize(), 0, 20) == walk(fresh.initialize(), 0, 20)
-
-
-def test_a_reset_undoes_parameters(plant: Plant) -> None:
-    mass = plant.real("torso.mass")
-    assert plant.call("fmi2Reset") == OK
-    assert plant.set_reals({"torso.mass": 4.0}) == OK
-    assert plant.call("fmi2Reset") == OK
-    assert plant.real("torso.mass") == mass
-
-
-def test_interleaved_instances_are_independent(plant: Plant, plant_library: Path) -> None:
-    alone = walk(plant, 0, 20)
-    with Plant(plant_library, name="a") as first, Plant(plant_library, name="b") as second:
-        first.initialize()
-        second.initialize()
-        assert second.set_reals(PUSH) == OK
-        trace = []
-        for k in range(20):
-            trace += walk(first, k, k + 1)
-            assert second.step(k * H, H) == OK
-        assert trace == alone
-
-
-def test_the_start_time_only_shifts_the_clock(plant: Plant, plant_library: Path) -> None:
-    start = 1024.0  # s; exact, as are start + k H up to the last bits that the clock adopts
-    names = ["torso.position[3]", "LF.tibia.angle"]
-    with Plant(plant_library) as late:
-        late.initialize(start=start)
-        for k in range(20):
-            assert plant.step(k * H, H) == OK
-            assert late.step(start + k * H, H) == OK
-        assert late.reals(names) == pytest.approx(plant.reals(names), abs=1e-9)
-
-
-def test_no_pointer_is_in_a_saved_state(plant: Plant) -> None:
-    state = plant.save()
-    data = plant.serialize(state)
-    pages = {int(component) >> 12 for component in (plant.component, state.value) if component}
-    words = struct.unpack(f"<{len(data) // 8}Q", data[: len(data) // 8 * 8])
-    assert not [word for word in words if word >> 12 in pages]
-    plant.free(state)

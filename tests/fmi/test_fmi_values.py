@@ -4,9 +4,7 @@ changes nothing.
 
 from __future__ import annotations
 
-import ctypes
 import math
-from random import Random
 
 import pytest
 from fmi_plant import ATHENA, ERROR, OK, Plant
@@ -74,7 +72,6 @@ RELATED = [
     "servo.gear_ratio",
 ]
 DEEP = "deep in the ground"  # a start with its feet below the ground is refused
-LOWEST = -10000.0  # m  of the ground: limits of lengths do not put feet into it
 
 
 def started(plant: Plant) -> int:
@@ -106,31 +103,6 @@ def test_every_limit_is_accepted_to_the_end_of_initialization_and_nothing_beyond
             assert all(map(math.isfinite, plant.everything())), variable.name
 
 
-def test_no_mixture_of_limits_makes_an_output_that_is_no_number(plant: Plant) -> None:
-    random = Random(5)
-    free = [
-        variable
-        for variable in LIMITED
-        if variable.name not in [*RELATED, "initial.position[3]", "terrain.height"]
-        and ".axis" not in variable.name
-    ]
-    for count in (2, 5, 50, len(free)) * 50:
-        assert plant.call("fmi2Reset") == OK
-        limits = {
-            v.name: random.choice([v.minimum or 0.0, v.maximum or 0.0])
-            for v in random.sample(free, count)
-        }
-        assert plant.set_reals(limits | {"terrain.height": LOWEST}) == OK
-        assert (
-            plant.set_references(
-                "fmi2SetInteger", ATHENA.references(["servo.mode"]), [random.randint(1, 3)]
-            )
-            == OK
-        )
-        assert started(plant) == OK, plant.last_message
-        assert all(map(math.isfinite, plant.everything())), limits
-
-
 @pytest.mark.parametrize("bad", [{"torso.push_force[2]": NAN}, {"torso.roll": 0.0}])
 def test_a_batch_is_set_whole_or_not_at_all(running: Plant, bad: dict[str, float]) -> None:
     before = running.everything()
@@ -150,22 +122,6 @@ def test_unknown_references_and_wrong_types_are_refused(running: Plant) -> None:
     assert running.get_references("fmi2GetBoolean", [mass])[0] == ERROR
     assert running.get_references("fmi2GetInteger", [law]) == (OK, [1])
     assert running.get_references("fmi2GetBoolean", [contact]) == (OK, [1])
-
-
-def test_an_enumeration_takes_its_numbers_only(plant: Plant) -> None:
-    law = ATHENA.references(["contact.law"])
-    for value, status in ((0, ERROR), (6, OK), (7, ERROR)):
-        assert plant.set_references("fmi2SetInteger", law, [value]) == status
-    assert "expected a finite number in [1, 6]; nothing was set" in plant.last_message
-    assert plant.get_references("fmi2GetInteger", law) == (OK, [6])
-
-
-def test_empty_batches_are_accepted_and_missing_arrays_are_refused(running: Plant) -> None:
-    none, one = ctypes.c_size_t(0), ctypes.c_size_t(1)
-    for kind in ("Real", "Integer", "Boolean", "String"):
-        assert running.call(f"fmi2Get{kind}", None, none, None) == OK
-        assert running.call(f"fmi2Set{kind}", None, none, None) == OK
-        assert running.call(f"fmi2Get{kind}", None, one, None) == ERROR
 
 
 def test_parameters_are_fixed_after_initialization(running: Plant) -> None:

@@ -104,20 +104,6 @@ def test_an_importer_that_was_installed_and_fails_does_not_pass(
     assert f"{adapter} does not agree" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize("adapter", FAILING)
-def test_a_tool_for_packages_that_was_installed_and_fails_does_not_pass(
-    walk: Walk, adapter: str
-) -> None:
-    assert verdict(importers(walk, *RIGHT), tools(walk, "right", adapter), ours=[]) == 1
-
-
-def test_outputs_of_an_earlier_run_are_ignored(walk: Walk) -> None:
-    (walk.folder / "silent.csv").write_bytes(walk.inputs.read_bytes())
-    (walk.folder / "package.csv").write_bytes(walk.inputs.read_bytes())
-    assert not importers(walk, "silent")[0].agrees
-    assert not tools(walk, "silent")[0].agrees
-
-
 def test_tools_that_could_not_be_installed_pass_with_a_remark(walk: Walk) -> None:
     absent, absent_tool = importers(walk, "crashes", of=MISSING), tools(walk, "crashes", of=MISSING)
     assert "could not be installed: no-such-distribution" in absent[0].remark
@@ -138,13 +124,3 @@ def test_tools_that_could_not_be_installed_pass_with_a_remark(walk: Walk) -> Non
     )
     assert without_rust.missing
     assert "Rust" in without_rust.remark
-
-
-def test_fewer_importers_or_tools_than_there_are_do_not_pass(walk: Walk) -> None:
-    assert verdict(importers(walk, "right", "right"), tools(walk, *BOTH), ours=[]) == 1
-    assert verdict(importers(walk, *RIGHT), tools(walk, "right"), ours=[]) == 1
-    assert verdict([], [], ours=[]) == 1
-
-
-def test_a_master_of_our_own_that_does_not_agree_does_not_pass(walk: Walk) -> None:
-    assert verdict(importers(walk, *RIGHT), tools(walk, *BOTH), ours=importers(walk, "wrong")) == 1

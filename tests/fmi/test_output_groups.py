@@ -99,25 +99,3 @@ def test_a_group_that_was_not_read_is_computed_after_the_next_step(plant_library
         assert plant.real("torso.position[3]") == other.real("torso.position[3]")
         assert plant.reals(energy) == other.reals(energy)
         assert plant.reals(energy) != before
-
-
-def test_a_saved_state_does_not_depend_on_the_groups_that_were_read(plant_library: Path) -> None:
-    with walking(plant_library, {}, {}) as plant:
-        saved = []
-        for names in ([], ["torso.position[1]"], ["energy.kinetic"]):
-            push(plant)
-            plant.reals(names)
-            state = plant.save()
-            saved.append(plant.serialize(state))
-            plant.free(state)
-        assert saved[0] == saved[1] == saved[2]
-
-
-def test_a_restored_state_computes_its_groups_again(plant_library: Path) -> None:
-    with walking(plant_library, {}, {}) as plant:
-        state, expected = plant.save(), plant.reals(["torso.position[1]", "energy.kinetic"])
-        assert plant.step(0.32, 0.02) == OK
-        plant.reals(["torso.position[1]"])
-        assert plant.call("fmi2SetFMUstate", state) == OK
-        assert plant.reals(["torso.position[1]", "energy.kinetic"]) == expected
-        plant.free(state)

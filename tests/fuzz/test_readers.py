@@ -21,9 +21,6 @@ from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 from PIL import Image
 
-from hexapod_cosim.cosim.control.connection import read_map
-from hexapod_cosim.cosim.interface.controller_interface import load_controller_interface
-from hexapod_cosim.cosim.interface.model_description import render_fmi2
 from hexapod_cosim.cosim.master.recorder import Recording
 from hexapod_cosim.cosim.results.recordings import (
     read_csv,
@@ -32,10 +29,7 @@ from hexapod_cosim.cosim.results.recordings import (
     write_parquet,
 )
 from hexapod_cosim.cosim.results.results import read_result
-from hexapod_cosim.cosim.run.controller_setup import make_setup
 from hexapod_cosim.cosim.scenario.scenario import load_scenario
-from hexapod_cosim.cosim.study.reading import load_study
-from hexapod_cosim.cosim.validate.validation import find_problems
 from hexapod_cosim.models import HexapodError, load_robot
 from hexapod_cosim.models.ground.grid_file import surface_from_bytes
 from hexapod_cosim.models.ground.height_map import heightfield
@@ -117,7 +111,6 @@ def toml_files(path: Path) -> st.SearchStrategy[bytes]:
 
 ROBOT = ROOT / "models" / "athena.toml"
 SCENARIOS = ROOT / "cosim" / "scenario" / "scenarios"
-STUDIES = ROOT / "cosim" / "study" / "studies"
 
 
 @MODES
@@ -132,30 +125,6 @@ def test_a_robot_file_is_read_or_refused(tmp_path: Path, content: bytes) -> None
 def test_a_scenario_is_read_or_refused(tmp_path: Path, content: bytes) -> None:
     path = written(tmp_path, "scenario.toml", content)
     reads(lambda: load_scenario(path))
-
-
-@MODES
-@given(content=toml_files(STUDIES / "friction_speed.toml"))
-@example(content=b'controls = ["' + 300 * b"5" + b'"]')  # longer than a name may be
-def test_a_study_is_read_or_refused(tmp_path: Path, content: bytes) -> None:
-    path = written(tmp_path, "study.toml", content)
-    reads(lambda: load_study(path))
-
-
-@MODES
-@given(content=toml_files(STUDIES / "tune_squeeze.toml"))
-def test_an_optimisation_is_read_or_refused(tmp_path: Path, content: bytes) -> None:
-    path = written(tmp_path, "study.toml", content)
-    reads(lambda: load_study(path))
-
-
-@MODES
-@given(edits=EDITS)
-@example(edits=[(0.0, 0, b"x = " + b"[" * 3000)])
-@example(edits=[(0.0, 0, b"x = " + b"1" * 5000)])
-def test_the_names_of_a_controller_are_read_or_refused(tmp_path: Path, edits: list[Edit]) -> None:
-    path = written(tmp_path, "law.toml", edited(b'[map]\n"a{leg}" = "b{leg}"\nc = "d"\n', edits))
-    reads(lambda: read_map(path))
 
 
 URDF = robot_to_urdf(load_robot("athena")).encode()
@@ -262,23 +231,9 @@ def test_a_folder_of_results_is_read_or_refused(
     reads(lambda: read_result(tmp_path))
 
 
-DESCRIPTION = render_fmi2(
-    load_controller_interface(make_setup(load_robot("athena"), control="kinematic", period=0.005))
-).xml.encode()
-
-
 def archive(description: bytes) -> bytes:
     """Returns a ZIP archive with a model description and nothing else."""
     content = io.BytesIO()
     with zipfile.ZipFile(content, "w") as file:
         file.writestr("modelDescription.xml", description)
     return content.getvalue()
-
-
-@MODES
-@given(inside=EDITS, outside=EDITS)
-def test_an_archive_is_validated_or_refused(
-    tmp_path: Path, inside: list[Edit], outside: list[Edit]
-) -> None:
-    path = written(tmp_path, "a.fmu", edited(archive(edited(DESCRIPTION, inside)), outside))
-    reads(lambda: find_problems(path))

@@ -75,4 +75,4 @@ def test_the_energy_balance_holds_on_a_surface(plant_build: Path, kind: str) -> 
 
 def test_a_robot_that_leaves_its_map_is_reported(plant_build: Path) -> None:
     result = walk("terrain.kind=plane", "terrain.size=0.2", "command.vx=0.08")
-    assert any("left the map of the ground" in text for text in result.facts["warnings"])
+    assert any("left the map of the ground" in text for text in result.facts.warnings)

@@ -29,10 +29,10 @@ def walker(plant_build: Path) -> Iterator[Walker]:
 @pytest.mark.parametrize("control", CONTROLS)
 def test_both_controls_walk_it_upright(walker: Walker, name: str, control: str) -> None:
     result = walker.simulate(load_scenario(name, overrides=[f"control={control}"]))
-    walk = result.facts["walk"]
+    walk = result.facts.walk
     assert result.completed
-    assert walk["upright"]
-    assert walk["distance"] > SHARE * WAYS[name]
+    assert walk.upright
+    assert walk.distance > SHARE * WAYS[name]
     assert result.metrics["energy_residual"] < ENERGY
 
 
@@ -50,8 +50,8 @@ def test_feet_that_find_no_ground_neither_end_the_run_nor_its_metrics(control: s
     ]
     result = simulate(load_scenario("walk_flat", overrides=settings))
     assert result.completed
-    fell = any("the robot fell at" in text for text in result.facts["warnings"])
-    assert result.facts["walk"]["upright"] == (not fell)
+    fell = any("the robot fell at" in text for text in result.facts.warnings)
+    assert result.facts.walk.upright == (not fell)
     for name in ("peak_force", "slip_per_metre", "roll_rms", "energy_residual"):
         assert math.isfinite(result.metrics[name])
     assert result.surface is not None

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from hexapod_cosim.gym.batch import Batch
-from hexapod_cosim.gym.settings import MEASURABLE, REASONS, TERMS, EnvSettings
+from hexapod_cosim.extensions.gym.batch import Batch
+from hexapod_cosim.extensions.gym.settings import MEASURABLE, REASONS, TERMS, EnvSettings
 from hexapod_cosim.models import HexapodError
 
 SEEDS = (11, 7, 30, 2, 5)

@@ -12,10 +12,10 @@ from building import ROOT
 from gymnasium.utils.env_checker import check_env
 from gymnasium.vector import AutoresetMode
 
-from hexapod_cosim.gym.environment import HexapodEnv
-from hexapod_cosim.gym.settings import BLOCKS, LEGGED_GYM
-from hexapod_cosim.gym.tasks import TASKS
-from hexapod_cosim.gym.vector import HexapodVectorEnv
+from hexapod_cosim.extensions.gym.environment import HexapodEnv
+from hexapod_cosim.extensions.gym.settings import BLOCKS, LEGGED_GYM
+from hexapod_cosim.extensions.gym.tasks import TASKS
+from hexapod_cosim.extensions.gym.vector import HexapodVectorEnv
 from hexapod_cosim.models import HexapodError
 
 pytestmark = pytest.mark.usefixtures("plant_build")

@@ -11,11 +11,11 @@ import pytest
 from gymnasium.utils.env_checker import check_env
 from numpy.typing import NDArray
 
-from hexapod_cosim.gym.batch import Batch
-from hexapod_cosim.gym.environment import HexapodEnv
-from hexapod_cosim.gym.plants import grounds
-from hexapod_cosim.gym.settings import EnvSettings
-from hexapod_cosim.gym.vector import HexapodVectorEnv
+from hexapod_cosim.extensions.gym.batch import Batch
+from hexapod_cosim.extensions.gym.environment import HexapodEnv
+from hexapod_cosim.extensions.gym.plants import grounds
+from hexapod_cosim.extensions.gym.settings import EnvSettings
+from hexapod_cosim.extensions.gym.vector import HexapodVectorEnv
 from hexapod_cosim.models import HexapodError
 from hexapod_cosim.models.terrain import ground_height
 

@@ -12,11 +12,11 @@ import pytest
 from hexapod_cosim.cosim.interface.names import joint_names, vector_names
 from hexapod_cosim.cosim.master.fmu import Fmu
 from hexapod_cosim.cosim.validate.validation import find_problems
-from hexapod_cosim.gym.__main__ import main
-from hexapod_cosim.gym.batch import Batch
-from hexapod_cosim.gym.export import export_policy
-from hexapod_cosim.gym.interface import standing_policy
-from hexapod_cosim.gym.policy import (
+from hexapod_cosim.extensions.gym.__main__ import main
+from hexapod_cosim.extensions.gym.batch import Batch
+from hexapod_cosim.extensions.gym.export import export_policy
+from hexapod_cosim.extensions.gym.interface import standing_policy
+from hexapod_cosim.extensions.gym.policy import (
     FREE_SIZE,
     INPUTS,
     Policy,
@@ -25,8 +25,8 @@ from hexapod_cosim.gym.policy import (
     observation_mirror,
     symmetric_weights,
 )
-from hexapod_cosim.gym.tasks import task
-from hexapod_cosim.gym.train import Progress, TrainSettings, train, training_settings
+from hexapod_cosim.extensions.gym.tasks import task
+from hexapod_cosim.extensions.gym.train import Progress, TrainSettings, train, training_settings
 from hexapod_cosim.models import HexapodError, load_robot
 
 pytestmark = pytest.mark.usefixtures("plant_build")

@@ -14,8 +14,8 @@ from building import shared_library
 from fmi_plant import ATHENA, ERROR, OK, Plant
 
 from hexapod_cosim.cosim.master.fmu import Fmu
-from hexapod_cosim.gym.batch import Batch
-from hexapod_cosim.gym.settings import EnvSettings
+from hexapod_cosim.extensions.gym.batch import Batch
+from hexapod_cosim.extensions.gym.settings import EnvSettings
 
 ALIGNMENT = 64
 REFUSED = 1  # HX_INVALID_ARGUMENT
@@ -106,7 +106,7 @@ def test_memory_that_is_too_small_or_not_aligned_is_refused_and_changes_nothing(
 
 
 def test_a_controller_has_no_work_space(plant_build: Path) -> None:
-    library = ct.CDLL(str(shared_library(plant_build, "controller_fmu", "hexapod_controller")))
+    library = ct.CDLL(str(shared_library(plant_build, "controller/fmu", "hexapod_controller")))
     library.hx_shared_work_size.restype = ct.c_size_t
     assert library.hx_shared_work_size() == 0
 

@@ -14,11 +14,11 @@ import gymnasium
 import numpy as np
 import pytest
 
-import hexapod_cosim.gym
-from hexapod_cosim.gym.batch import Batch
-from hexapod_cosim.gym.environment import HexapodEnv
-from hexapod_cosim.gym.settings import REASONS, EnvSettings
-from hexapod_cosim.gym.vector import HexapodVectorEnv
+import hexapod_cosim.extensions.gym
+from hexapod_cosim.extensions.gym.batch import Batch
+from hexapod_cosim.extensions.gym.environment import HexapodEnv
+from hexapod_cosim.extensions.gym.settings import REASONS, EnvSettings
+from hexapod_cosim.extensions.gym.vector import HexapodVectorEnv
 from hexapod_cosim.models import HexapodError
 
 pytestmark = pytest.mark.usefixtures("plant_build")
@@ -114,4 +114,4 @@ def test_a_forked_process_steps_and_closes_what_it_inherited() -> None:
 def test_without_gymnasium_the_import_names_the_extra(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "gymnasium", None)
     with pytest.raises(ModuleNotFoundError, match=r"needs gymnasium.*WHEEL\.whl\[gym\]"):
-        importlib.reload(hexapod_cosim.gym)
+        importlib.reload(hexapod_cosim.extensions.gym)

@@ -11,9 +11,9 @@ import pytest
 from scipy.optimize import root
 from secret_robots import GROUPS, secret_robot
 
-from hexapod_cosim.cosim.identify.fitting.rank import QUANTILE
-from hexapod_cosim.cosim.identify.identify import identify
-from hexapod_cosim.cosim.identify.start import standing_attitude
+from hexapod_cosim.extensions.identify.fitting.rank import QUANTILE
+from hexapod_cosim.extensions.identify.identify import identify
+from hexapod_cosim.extensions.identify.start import standing_attitude
 from hexapod_cosim.models import Robot, load_robot
 from hexapod_cosim.models.kinematics import axis_quaternion, foot_positions, quaternion_product
 from hexapod_cosim.models.kinematics import rotation_matrix as rotation

@@ -11,16 +11,16 @@ import numpy as np
 import pytest
 from secret_robots import GROUPS, Secret, secret_robot
 
-from hexapod_cosim.cosim.identify.channel_screening import turned_after_the_fit
-from hexapod_cosim.cosim.identify.experiment import Experiment
-from hexapod_cosim.cosim.identify.identify import TOLERANCE, screen
-from hexapod_cosim.cosim.identify.log import CHANNELS, Log, LogError, log_of, read_log
-from hexapod_cosim.cosim.identify.log_plant import LogPlant
-from hexapod_cosim.cosim.identify.replay import replay
-from hexapod_cosim.cosim.identify.screening import left_out
-from hexapod_cosim.cosim.identify.start import initial_state
 from hexapod_cosim.cosim.master.recorder import Recording
 from hexapod_cosim.cosim.results.recordings import write_csv
+from hexapod_cosim.extensions.identify.channel_screening import turned_after_the_fit
+from hexapod_cosim.extensions.identify.experiment import Experiment
+from hexapod_cosim.extensions.identify.identify import TOLERANCE, screen
+from hexapod_cosim.extensions.identify.log import CHANNELS, Log, LogError, log_of, read_log
+from hexapod_cosim.extensions.identify.log_plant import LogPlant
+from hexapod_cosim.extensions.identify.replay import replay
+from hexapod_cosim.extensions.identify.screening import left_out
+from hexapod_cosim.extensions.identify.start import initial_state
 from hexapod_cosim.models import HexapodError, load_robot
 
 Change = Callable[[np.ndarray], np.ndarray]

@@ -13,15 +13,15 @@ import pytest
 from command import Call, assert_refused
 from secret_robots import DAMAGES, Secret, secret_robot, with_column
 
-from hexapod_cosim.cosim.identify.commands.command_screening import (
+from hexapod_cosim.cosim.logs.mcap_writer import write_mcap
+from hexapod_cosim.cosim.master.recorder import Recording
+from hexapod_cosim.extensions.identify.commands.command_screening import (
     WrongCommandsError,
     check_commands,
     wrong_commands,
 )
-from hexapod_cosim.cosim.identify.log import Log
-from hexapod_cosim.cosim.identify.replay import replay
-from hexapod_cosim.cosim.logs.mcap_writer import write_mcap
-from hexapod_cosim.cosim.master.recorder import Recording
+from hexapod_cosim.extensions.identify.log import Log
+from hexapod_cosim.extensions.identify.replay import replay
 from hexapod_cosim.models import load_robot
 
 Change = Callable[[np.ndarray], np.ndarray]

@@ -10,15 +10,15 @@ import pytest
 from secret_robots import NOISE, SEEN, Secret, secret_robot
 
 from hexapod_cosim.cosim.export.plant_export import export_fmu
-from hexapod_cosim.cosim.identify.experiment import Experiment
-from hexapod_cosim.cosim.identify.fitting.output_error import fit
-from hexapod_cosim.cosim.identify.fitting.problem import Problem
-from hexapod_cosim.cosim.identify.fitting.rank import TOLD
-from hexapod_cosim.cosim.identify.identify import TOLERANCE, make_experiment
-from hexapod_cosim.cosim.identify.log_plant import LogPlant
-from hexapod_cosim.cosim.identify.numbers.servo import GEAR
-from hexapod_cosim.cosim.identify.numbers.unknown import Unknown
-from hexapod_cosim.cosim.identify.unknowns import ROBOT, chosen_unknowns
+from hexapod_cosim.extensions.identify.experiment import Experiment
+from hexapod_cosim.extensions.identify.fitting.output_error import fit
+from hexapod_cosim.extensions.identify.fitting.problem import Problem
+from hexapod_cosim.extensions.identify.fitting.rank import TOLD
+from hexapod_cosim.extensions.identify.identify import TOLERANCE, make_experiment
+from hexapod_cosim.extensions.identify.log_plant import LogPlant
+from hexapod_cosim.extensions.identify.numbers.servo import GEAR
+from hexapod_cosim.extensions.identify.numbers.unknown import Unknown
+from hexapod_cosim.extensions.identify.unknowns import ROBOT, chosen_unknowns
 from hexapod_cosim.models import JOINT_NAMES, Robot, load_robot
 
 DURATION = 1.8  # s

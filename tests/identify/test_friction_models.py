@@ -14,13 +14,13 @@ import tomlkit
 from command import Call
 from secret_robots import SEEN, Secret, secret_robot
 
-from hexapod_cosim.cosim.identify.fitting.friction_search import FrictionTrial
-from hexapod_cosim.cosim.identify.identified import Identified
-from hexapod_cosim.cosim.identify.identify import identify
-from hexapod_cosim.cosim.identify.identify_tables import friction_text, untold_text, warnings
-from hexapod_cosim.cosim.identify.numbers.friction_models import with_friction_model
-from hexapod_cosim.cosim.identify.unknowns import chosen_unknowns
 from hexapod_cosim.cosim.logs.mcap_writer import write_mcap
+from hexapod_cosim.extensions.identify.fitting.friction_search import FrictionTrial
+from hexapod_cosim.extensions.identify.identified import Identified
+from hexapod_cosim.extensions.identify.identify import identify
+from hexapod_cosim.extensions.identify.identify_tables import friction_text, untold_text, warnings
+from hexapod_cosim.extensions.identify.numbers.friction_models import with_friction_model
+from hexapod_cosim.extensions.identify.unknowns import chosen_unknowns
 from hexapod_cosim.models import HexapodError, Robot, load_robot
 from hexapod_cosim.models.robot import robot_path
 from hexapod_cosim.models.servos.presets import measured_servo

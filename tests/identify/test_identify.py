@@ -18,27 +18,27 @@ import tomlkit
 from command import Call, assert_refused
 from secret_robots import NOISE, Secret, secret_robot, with_column
 
-from benchmarks.identification.campaign import GOAL_COVERED, GOAL_RATIO, summary, table_row
-from benchmarks.identification.campaign import score as score_of
+from benchmarks.identification import GOAL_COVERED, GOAL_RATIO, summary, table_row
+from benchmarks.identification import score as score_of
 from hexapod_cosim.cosim.export.plant_export import export_fmu
-from hexapod_cosim.cosim.identify import excitation
-from hexapod_cosim.cosim.identify.channel_screening import screened
-from hexapod_cosim.cosim.identify.excitation import Proposal, propose, scenario_text
-from hexapod_cosim.cosim.identify.experiment import Experiment, of_point
-from hexapod_cosim.cosim.identify.fitting.judging import Fit
-from hexapod_cosim.cosim.identify.fitting.last_search import remaining_step
-from hexapod_cosim.cosim.identify.fitting.misfit import read_noise
-from hexapod_cosim.cosim.identify.fitting.output_error import _tried
-from hexapod_cosim.cosim.identify.fitting.problem import Problem
-from hexapod_cosim.cosim.identify.fitting.workers import simulating_workers
-from hexapod_cosim.cosim.identify.identified import Identified
-from hexapod_cosim.cosim.identify.identify import identify, make_experiment
-from hexapod_cosim.cosim.identify.log_plant import LogPlant
-from hexapod_cosim.cosim.identify.robot_file import write_robot
-from hexapod_cosim.cosim.identify.screening import BadColumn, left_out
-from hexapod_cosim.cosim.identify.start import initial_state
-from hexapod_cosim.cosim.identify.unknowns import ROBOT, chosen_unknowns
 from hexapod_cosim.cosim.logs.mcap_writer import write_mcap
+from hexapod_cosim.extensions.identify import excitation
+from hexapod_cosim.extensions.identify.channel_screening import screened
+from hexapod_cosim.extensions.identify.excitation import Proposal, propose, scenario_text
+from hexapod_cosim.extensions.identify.experiment import Experiment, of_point
+from hexapod_cosim.extensions.identify.fitting.judging import Fit
+from hexapod_cosim.extensions.identify.fitting.last_search import remaining_step
+from hexapod_cosim.extensions.identify.fitting.misfit import read_noise
+from hexapod_cosim.extensions.identify.fitting.output_error import _tried
+from hexapod_cosim.extensions.identify.fitting.problem import Problem
+from hexapod_cosim.extensions.identify.fitting.workers import simulating_workers
+from hexapod_cosim.extensions.identify.identified import Identified
+from hexapod_cosim.extensions.identify.identify import identify, make_experiment
+from hexapod_cosim.extensions.identify.log_plant import LogPlant
+from hexapod_cosim.extensions.identify.robot_file import write_robot
+from hexapod_cosim.extensions.identify.screening import BadColumn, left_out
+from hexapod_cosim.extensions.identify.start import initial_state
+from hexapod_cosim.extensions.identify.unknowns import ROBOT, chosen_unknowns
 from hexapod_cosim.models import LEG_NAMES, load_robot
 from hexapod_cosim.models.robot import robot_path
 

@@ -14,17 +14,17 @@ from numpy.typing import NDArray
 from scipy.signal import lfilter
 from secret_robots import Secret, secret_robot
 
-from hexapod_cosim.cosim.identify.fitting.covariance import (
+from hexapod_cosim.extensions.identify.fitting.covariance import (
     Series,
     coloured_information,
     readings_as_one,
     spectrum,
     white_information,
 )
-from hexapod_cosim.cosim.identify.fitting.last_search import ENOUGH, bounded_step
-from hexapod_cosim.cosim.identify.identified import Estimate, Identified
-from hexapod_cosim.cosim.identify.identify import identify
-from hexapod_cosim.cosim.identify.identify_tables import warnings
+from hexapod_cosim.extensions.identify.fitting.last_search import ENOUGH, bounded_step
+from hexapod_cosim.extensions.identify.identified import Estimate, Identified
+from hexapod_cosim.extensions.identify.identify import identify
+from hexapod_cosim.extensions.identify.identify_tables import warnings
 from hexapod_cosim.models import load_robot
 
 Array = NDArray[np.float64]

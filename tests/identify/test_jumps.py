@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from hexapod_cosim.cosim.identify.fitting.differences import FINE, differences
-from hexapod_cosim.cosim.identify.fitting.last_search import finished
+from hexapod_cosim.extensions.identify.fitting.differences import FINE, differences
+from hexapod_cosim.extensions.identify.fitting.last_search import finished
 
 Array = NDArray[np.float64]
 READINGS, JUMPING = 60, slice(0, 6)

@@ -14,7 +14,7 @@ import pytest
 from numpy.typing import NDArray
 from secret_robots import secret_robot
 
-from hexapod_cosim.cosim.identify.fitting.rank import (
+from hexapod_cosim.extensions.identify.fitting.rank import (
     Combination,
     combination_text,
     combinations,
@@ -23,10 +23,10 @@ from hexapod_cosim.cosim.identify.fitting.rank import (
     untold,
     weak_moves,
 )
-from hexapod_cosim.cosim.identify.identify import identify
-from hexapod_cosim.cosim.identify.identify_tables import untold_text
-from hexapod_cosim.cosim.identify.robot_file import write_robot
-from hexapod_cosim.cosim.identify.unknowns import ROBOT
+from hexapod_cosim.extensions.identify.identify import identify
+from hexapod_cosim.extensions.identify.identify_tables import untold_text
+from hexapod_cosim.extensions.identify.robot_file import write_robot
+from hexapod_cosim.extensions.identify.unknowns import ROBOT
 from hexapod_cosim.models import load_robot
 from hexapod_cosim.models.servos.motor import back_emf_damping
 from hexapod_cosim.models.servos.presets import measured_servo

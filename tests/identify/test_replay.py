@@ -13,11 +13,11 @@ import numpy as np
 import pytest
 from command import QUICK, Call, assert_refused
 
-from hexapod_cosim.cosim.identify.log import Log, LogError, log_of, read_log, roll_pitch_yaw
-from hexapod_cosim.cosim.identify.replay import replay
-from hexapod_cosim.cosim.identify.start import initial_state, rest_rows
 from hexapod_cosim.cosim.master.recorder import Recording
 from hexapod_cosim.cosim.results.recordings import read_parquet, write_csv
+from hexapod_cosim.extensions.identify.log import Log, LogError, log_of, read_log, roll_pitch_yaw
+from hexapod_cosim.extensions.identify.replay import replay
+from hexapod_cosim.extensions.identify.start import initial_state, rest_rows
 from hexapod_cosim.models import load_robot
 
 ROUND_OFF = 1e-9  # of joint angles, in rad, and of forces, in N: numbers are computed from states

@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 from secret_robots import Secret, secret_robot, with_column
 
-from hexapod_cosim.cosim.identify.identified import Identified
-from hexapod_cosim.cosim.identify.identify import identify
-from hexapod_cosim.cosim.identify.identify_tables import warnings
-from hexapod_cosim.cosim.identify.rigid.samples import force_biases
-from hexapod_cosim.cosim.identify.start import moving_at_rest
+from hexapod_cosim.extensions.identify.identified import Identified
+from hexapod_cosim.extensions.identify.identify import identify
+from hexapod_cosim.extensions.identify.identify_tables import warnings
+from hexapod_cosim.extensions.identify.rigid.samples import force_biases
+from hexapod_cosim.extensions.identify.start import moving_at_rest
 from hexapod_cosim.models import LEG_NAMES, load_robot
 
 KINDS = ("joints", "currents", "forces", "imu", "pose")

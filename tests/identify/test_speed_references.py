@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 from secret_robots import Secret, secret_robot
 
-from hexapod_cosim.cosim.identify.commands.speed_references import with_speed_references
-from hexapod_cosim.cosim.identify.identify import screen
-from hexapod_cosim.cosim.identify.log import Log
-from hexapod_cosim.cosim.identify.log_plant import LogPlant
-from hexapod_cosim.cosim.identify.replay import Replay, replay
 from hexapod_cosim.cosim.interface.names import joint_names
+from hexapod_cosim.extensions.identify.commands.speed_references import with_speed_references
+from hexapod_cosim.extensions.identify.identify import screen
+from hexapod_cosim.extensions.identify.log import Log
+from hexapod_cosim.extensions.identify.log_plant import LogPlant
+from hexapod_cosim.extensions.identify.replay import Replay, replay
 from hexapod_cosim.models import load_robot
 
 SPEEDS = tuple(joint_names("speed_ref"))

@@ -5,14 +5,14 @@ from __future__ import annotations
 from typing import Any
 
 import pytest
-from command import Call
+from command import Call, assert_refused
 from gains import make_gains
 
 from hexapod_cosim.controller import Gains
-from hexapod_cosim.cosim.live import realtime, server
-from hexapod_cosim.cosim.live.settings import Choices
 from hexapod_cosim.cosim.run import preparation
 from hexapod_cosim.cosim.scenario.scenario import load_scenario
+from hexapod_cosim.extensions.live import realtime, server
+from hexapod_cosim.extensions.live.settings import Choices
 from hexapod_cosim.models import HexapodError, Robot
 
 Keys = list[tuple[Robot, float]]
@@ -60,3 +60,8 @@ def test_realtime_designs_gains_for_the_walk_that_it_measures(
     monkeypatch.setattr(realtime, "measure", measure)
     assert call("realtime", "rubble", "--control", "compliant", "--step", "0.005")[0] == 1
     assert designed == [preparation.design_key(load_scenario("rubble", overrides=NAMED))]
+
+
+def test_a_port_out_of_range_is_refused(call: Call) -> None:
+    words = ["--no-browser", "--port", "99999"]
+    assert_refused(call("live", *words), "got 99999", "from 1 to 65535")

@@ -10,11 +10,11 @@ from typing import Any
 import pytest
 from gains import make_gains
 
-from hexapod_cosim.cosim.live.loop import Loop
-from hexapod_cosim.cosim.live.protocol import Action, Change, Drive, Ping, Push
-from hexapod_cosim.cosim.live.robot import LiveRobot
-from hexapod_cosim.cosim.live.settings import Choices, control_texts
 from hexapod_cosim.cosim.scenario.scenario import load_scenario, scenario_from_table
+from hexapod_cosim.extensions.live.loop import Loop
+from hexapod_cosim.extensions.live.protocol import Action, Change, Drive, Ping, Push
+from hexapod_cosim.extensions.live.robot import LiveRobot
+from hexapod_cosim.extensions.live.settings import Choices, control_texts
 from hexapod_cosim.models import load_robot
 from hexapod_cosim.models.schema import parse_toml
 

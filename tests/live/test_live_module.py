@@ -11,9 +11,9 @@ import pytest
 from mirror import HxOutput
 from numpy.typing import NDArray
 
-from hexapod_cosim.cosim.live.module import walker_module
 from hexapod_cosim.cosim.run.single_run import simulate
 from hexapod_cosim.cosim.scenario.scenario import load_scenario
+from hexapod_cosim.extensions.live.module import walker_module
 
 wasmtime = pytest.importorskip("wasmtime")
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from hexapod_cosim.cosim.live.pacing import Pacer
+from hexapod_cosim.extensions.live.pacing import Pacer
 
 H = 0.005  # s
 

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hexapod_cosim.cosim.live.protocol import (
+from hexapod_cosim.extensions.live.protocol import (
     Action,
     Change,
     Drive,

@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 from command import Call
 
-from hexapod_cosim.cosim.live.realtime import (
+from hexapod_cosim.cosim.scenario.scenario import load_scenario
+from hexapod_cosim.extensions.live.realtime import (
     StepTimes,
     facts_of,
     goal_met,
@@ -18,7 +19,6 @@ from hexapod_cosim.cosim.live.realtime import (
     table_of,
     write,
 )
-from hexapod_cosim.cosim.scenario.scenario import load_scenario
 from hexapod_cosim.models import HexapodError
 
 

@@ -15,17 +15,6 @@ from numpy.typing import NDArray
 
 from hexapod_cosim.controller import BodyCommand, make_gait
 from hexapod_cosim.cosim.interface.names import joint_names, vector_names
-from hexapod_cosim.cosim.live import robot as live_robot
-from hexapod_cosim.cosim.live.protocol import Change, Drive
-from hexapod_cosim.cosim.live.robot import LiveRobot
-from hexapod_cosim.cosim.live.settings import (
-    Choices,
-    control_texts,
-    find_limits,
-    gait_of,
-    live_scenario,
-)
-from hexapod_cosim.cosim.live.take import NO_FORCE, Take
 from hexapod_cosim.cosim.master.fmu import Fmu
 from hexapod_cosim.cosim.run.preparation import chosen_gains
 from hexapod_cosim.cosim.run.single_run import RunPlan, initialise_plant
@@ -36,6 +25,17 @@ from hexapod_cosim.cosim.scenario.scenario import (
     load_scenario,
     scenario_from_table,
 )
+from hexapod_cosim.extensions.live import robot as live_robot
+from hexapod_cosim.extensions.live.protocol import Change, Drive
+from hexapod_cosim.extensions.live.robot import LiveRobot
+from hexapod_cosim.extensions.live.settings import (
+    Choices,
+    control_texts,
+    find_limits,
+    gait_of,
+    live_scenario,
+)
+from hexapod_cosim.extensions.live.take import NO_FORCE, Take
 from hexapod_cosim.models import HexapodError, load_robot
 from hexapod_cosim.models.schema import parse_toml
 

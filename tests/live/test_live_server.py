@@ -22,12 +22,12 @@ from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import connect
 
 from hexapod_cosim.controller import Gains
-from hexapod_cosim.cosim.live.hub import BURST, MOST_CLIENTS, MOST_DROPPED, MOST_REFUSED, Hub
-from hexapod_cosim.cosim.live.loop import run_process
-from hexapod_cosim.cosim.live.pacing import MOST_LAG
-from hexapod_cosim.cosim.live.server import LiveError, LiveServer
-from hexapod_cosim.cosim.live.settings import Choices, control_texts
 from hexapod_cosim.cosim.scenario.scenario import load_scenario
+from hexapod_cosim.extensions.live.hub import BURST, MOST_CLIENTS, MOST_DROPPED, MOST_REFUSED, Hub
+from hexapod_cosim.extensions.live.loop import run_process
+from hexapod_cosim.extensions.live.pacing import MOST_LAG
+from hexapod_cosim.extensions.live.server import LiveError, LiveServer
+from hexapod_cosim.extensions.live.settings import Choices, control_texts
 from hexapod_cosim.models import HexapodError
 
 Process = Callable[[Connection, Choices, Gains | None], None]
@@ -204,8 +204,8 @@ def test_after_a_sleep_of_the_computer_the_loop_goes_on_and_counts_what_it_misse
 
 
 SERVER = """
-from hexapod_cosim.cosim.live.server import LiveServer
-from hexapod_cosim.cosim.live.settings import Choices, control_texts
+from hexapod_cosim.extensions.live.server import LiveServer
+from hexapod_cosim.extensions.live.settings import Choices, control_texts
 from hexapod_cosim.cosim.scenario.scenario import load_scenario
 
 if __name__ == "__main__":

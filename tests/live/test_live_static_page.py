@@ -11,7 +11,7 @@ import pytest
 from browser import FLAGS, PATIENCE, launcher
 from command import Call, assert_refused
 
-from hexapod_cosim.cosim.live.static_page import write_static_page
+from hexapod_cosim.extensions.live.static_page import write_static_page
 
 FRAME = "window.hexapod.poses.newest"
 

@@ -88,9 +88,9 @@ def test_inputs_that_change_at_a_rate_are_taken_as_they_are_at_each_tick(
 ) -> None:
     stepped_input, ramped = (NativeController(controller_core, setup_of()) for _ in range(2))
     rate = HxControllerInput()
-    rate.foot_force[1][0], rate.command[0] = 3.0, 0.2
+    rate.foot_force[1][0], rate.command.vx = 3.0, 0.2
     for k in range(4):
-        stepped_input.input.foot_force[1][0], stepped_input.input.command[0] = (
+        stepped_input.input.foot_force[1][0], stepped_input.input.command.vx = (
             3.0 * (k * PERIOD),
             0.2 * (k * PERIOD),
         )
@@ -104,7 +104,7 @@ def test_reading_outputs_changes_nothing(controller_core: ct.CDLL) -> None:
     stepped(native, 0, 50)
     saved = native.save()
     first = commands(native.output())
-    native.input.command[0] = 0.3
+    native.input.command.vx = 0.3
     native.input.foot_force[0][2] = 50.0
     second = commands(native.output())
     assert (first != second).any()  # outputs depend on inputs directly
@@ -155,9 +155,9 @@ def test_ticks_come_at_their_times_whatever_the_steps_are(controller_core: ct.CD
         coarse.go(7.0 + (2 * k + 2) * PERIOD)
         ticked = commands(half.output())
         half.go(7.0 + (2 * k + 0.5) * PERIOD)
-        half.input.command[1] = 0.05  # the input changes between two ticks and changes back
+        half.input.command.vy = 0.05  # the input changes between two ticks and changes back
         np.testing.assert_array_equal(commands(half.output()), ticked)
-        half.input.command[1] = 0.0
+        half.input.command.vy = 0.0
         half.go(7.0 + (2 * k + 2) * PERIOD)
     np.testing.assert_array_equal(commands(fine.output()), commands(coarse.output()))
     np.testing.assert_array_equal(commands(fine.output()), commands(half.output()))
@@ -170,7 +170,7 @@ def test_a_clock_that_is_off_by_round_off_ticks_all_the_same(
 ) -> None:
     exact, late = (NativeController(controller_core, setup_of(compliant=False)) for _ in range(2))
     for native in (exact, late):
-        native.input.command[0] = 0.05
+        native.input.command.vx = 0.05
     for k in range(1, 200):
         exact.go(k * PERIOD)
         late.go(k * PERIOD + slip)
@@ -234,7 +234,7 @@ def test_a_saved_state_that_is_damaged_is_refused(controller_core: ct.CDLL) -> N
 
 def test_absurd_commands_end_in_finite_joint_commands(controller_core: ct.CDLL) -> None:
     native = NativeController(controller_core, setup_of())
-    native.input.command[:] = [10.0, -10.0, 10.0, 10.0, 1.5, -1.5]
+    native.input.command = type(native.input.command)(10.0, -10.0, 10.0, 10.0, 1.5, -1.5)
     native.input.foot_force[0][2] = 1e9
     for k in range(1, 400):
         native.go(k * PERIOD)

@@ -7,17 +7,14 @@ from __future__ import annotations
 import ctypes as ct
 import math
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import pytest
 from states import changed
-from test_laws_standing import ACCURATE, block, laid, marching, stood, tilted
+from test_laws_standing import block, laid, marching, stood, tilted
 
 from hexapod_cosim.models import load_robot
-from hexapod_cosim.models.dynamics import Command
 from hexapod_cosim.models.friction import SPRING_LIMIT, bristle_force, bristle_rate
-from hexapod_cosim.models.records import Array
 
 FRICTION = replace(load_robot("athena").friction, law="bristle")
 EXACT = 1e-12  # relative: rounding
@@ -29,8 +26,6 @@ LEANING = 0.03
 # relative to the presliding: the error of some steps, 1e-3 each at the default tolerance; the
 # friction force stays in its cone nevertheless
 OVERSHOT = 5e-3
-# m, displacement after each cycle of a push; a thousandth of the displacement within one cycle
-RETURNED = 1e-8
 
 
 # the law alone
@@ -68,20 +63,6 @@ def test_no_motion_takes_a_bristle_past_its_presliding_or_friction_past_its_cone
         )
         force = bristle_force(FRICTION, 10.0, slip, z)
         assert float(np.linalg.norm(force)) <= FRICTION.mu * 10.0 * (1.0 + EXACT)
-
-
-def test_turning_slip_and_bristle_turns_the_force() -> None:
-    rng, (c, s) = np.random.default_rng(2), (math.cos(0.8), math.sin(0.8))
-    turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
-    for _ in range(20):
-        slip, z = rng.normal(0.0, 0.05, 3), rng.normal(0.0, 3e-4, 3)
-        rate, force = bristle_rate(FRICTION, slip, z), bristle_force(FRICTION, 10.0, slip, z)
-        assert bristle_rate(FRICTION, turn @ slip, turn @ z) == pytest.approx(
-            turn @ rate, rel=EXACT, abs=EXACT
-        )
-        assert bristle_force(FRICTION, 10.0, turn @ slip, turn @ z) == pytest.approx(
-            turn @ force, rel=EXACT, abs=EXACT
-        )
 
 
 def test_a_bristle_lets_go_without_a_step_in_its_rate() -> None:
@@ -140,42 +121,6 @@ def test_below_the_friction_angle_a_block_holds_still_where_it_has_given_way(
     assert 60.0 * creep > 1e6 * HELD
 
 
-def test_a_constant_force_between_break_away_and_the_limit_is_held_too(core: ct.CDLL) -> None:
-    plant, downhill, _ = tilted(core, 0.58, 0.0, by="gravity", law="bristle")
-    assert given(math.tan(0.58) / plant.robot.friction.mu) > SPRING_LIMIT
-    plant.step(5.0)
-    settled = plant.output()
-    plant.step(25.0)
-    held = plant.output()
-    assert float(np.max(np.abs(held.torso.position - settled.torso.position))) < HELD
-    assert held.foot.force.sum(axis=0) @ downhill == pytest.approx(
-        -plant.robot.total_mass * 9.81 * math.sin(0.58), rel=CLOSED
-    )
-
-
-@pytest.mark.parametrize("heading", [0.0, 1.0])
-def test_a_push_to_and_fro_below_break_away_does_not_walk_the_block_downhill(
-    core: ct.CDLL, heading: float
-) -> None:
-    plant, downhill, _ = tilted(core, 0.15, 0.0, by="gravity", law="bristle")
-    weight, mu = plant.robot.total_mass * 9.81, plant.robot.friction.mu
-    size = 0.35 * mu * weight
-    assert given(math.tan(0.15) / mu + 0.35 / math.cos(0.15)) < 0.9 * SPRING_LIMIT
-    way = np.array([math.cos(heading), math.sin(heading), 0.0])
-    places, swing = [], 0.0
-    for k in range(1200):  # 60 cycles of 0.1 s; the ends of cycles are compared from the 11th on
-        t = 5e-3 * k
-        plant.step(
-            t + 5e-3, replace(plant.hold(), push_force=size * math.sin(20.0 * math.pi * t) * way)
-        )
-        place = plant.output().torso.position @ downhill
-        places.append(place)
-        swing = max(swing, abs(place - places[0]))
-    ends = np.array(places[219::20])
-    assert swing > 1e3 * RETURNED
-    assert float(np.max(np.abs(ends - ends[-1]))) < RETURNED
-
-
 def test_what_bristles_hold_they_give_back(core: ct.CDLL) -> None:
     """A slow push below the spring limit stores energy and returns it (energy audit)."""
     robot = block("athena", gravity=np.array([0.0, 0.0, -9.81]), law="bristle")
@@ -217,34 +162,3 @@ def test_bristles_are_slack_in_the_air_and_never_past_their_presliding(
         assert np.all(share < 1.0 + OVERSHOT)
         stretched = max(stretched, float(np.max(share)))
     assert stretched > 0.9
-
-
-def test_a_walk_converges_in_proportion_to_the_tolerance(core: ct.CDLL) -> None:
-    def end(**solver: Any) -> Array:
-        robot = changed(load_robot("athena"), friction={"law": "bristle"}, solver=solver)
-        plant = stood(core, robot)
-        for k in range(100):
-            plant.step(5e-3 * (k + 1), marching(robot, 5e-3 * k))
-        return np.asarray(plant.output().torso.position)
-
-    exact = end(**ACCURATE)
-    for tolerance in (1e-4, 1e-6):
-        assert end(tolerance=tolerance) == pytest.approx(
-            exact, abs=tolerance
-        )  # m, after half a second
-
-
-def test_a_stuck_leg_does_not_ring(core: ct.CDLL) -> None:
-    """Checks that the standing robot is at rest within 0.2 s of a push.
-
-    The bristles damp the motion that the servos leave.
-    """
-    robot = changed(load_robot("athena"), friction={"law": "bristle"}, solver=ACCURATE)
-    plant, speeds = stood(core, robot), []
-    pushed = Command(angle_ref=robot.stance, push_force=np.array([0.0, 5.0, 0.0]))
-    plant.step(0.5, pushed)
-    for k in range(60):
-        plant.step(0.5 + 0.01 * (k + 1))
-        speeds.append(float(np.max(plant.output().foot.slip_speed)))
-    assert max(speeds) > 1e-5
-    assert max(speeds[20:]) < 0.05 * max(speeds)

@@ -22,8 +22,6 @@ from hexapod_cosim.models.kinematics import body_states
 RESTITUTION = 1e-3  # of the exact law
 FIGURES = 1e-4  # of figures that the reference table prints with four digits
 TIGHT = 1e-8  # tolerance; the error in a restitution is then below 1e-5
-# m/s: touch-down is found to 1e-10 m; at 1 m/s gravity changes the speed by 1e-9 m/s over that way
-LOCATED = 1e-9
 STILL = np.zeros(3)
 
 
@@ -102,14 +100,6 @@ def test_each_classic_law_asked_for_a_half_gives_its_reference_figure(
     assert bounced.torso.velocity[2] / 0.4 == pytest.approx(achieved, abs=FIGURES)
 
 
-def test_hertz_gives_everything_back(core: ct.CDLL) -> None:
-    bounced = flown_off(falling(core, rigid("hertz"), speed=0.4))
-    assert bounced.torso.velocity[2] == pytest.approx(0.4, rel=1e-6)
-    assert bounced.energy.dissipated == pytest.approx(
-        0.0, abs=1e-6 * bounced.energy.kinetic
-    )  # eq. 27 is of order 2 in the step size
-
-
 @pytest.mark.parametrize("speed", [0.2, 0.8])
 def test_a_constant_damping_factor_gives_back_less_the_faster_the_impact(
     core: ct.CDLL, speed: float
@@ -132,14 +122,6 @@ def test_the_deepest_penetration_has_its_closed_form(core: ct.CDLL, law: str) ->
     assert bounced.deepest == pytest.approx(
         depth, rel=1e-5
     )  # samples are 10 us apart, and the depth is a parabola near its maximum
-
-
-def test_the_energy_lost_in_an_impact_is_one_less_the_restitution_squared(core: ct.CDLL) -> None:
-    robot, speed = rigid(restitution=0.6), 0.5
-    bounced = flown_off(falling(core, robot, speed=speed))
-    energy = 0.5 * robot.total_mass * speed**2
-    assert bounced.energy.dissipated / energy == pytest.approx(1.0 - 0.6**2, abs=RESTITUTION)
-    assert abs(bounced.energy.residual) < 1e-5 * energy
 
 
 def test_every_apex_of_a_bouncing_robot_is_lower_by_the_restitution_squared(core: ct.CDLL) -> None:
@@ -168,82 +150,6 @@ def test_every_apex_of_a_bouncing_robot_is_lower_by_the_restitution_squared(core
 # touch-down
 
 
-@pytest.mark.parametrize("macro", [0.13, 0.05, 0.0037])
-@pytest.mark.parametrize("method", ["rosw3", "ros2", "dp54", "bs32"])
-def test_the_impact_speed_is_the_ballistic_one_whatever_the_macro_step(
-    core: ct.CDLL, macro: float, method: str
-) -> None:
-    height, gravity = 0.08, 9.81
-    robot = changed(
-        rigid(gravity=gravity), solver={"method": method, "tolerance": 1e-6}
-    )  # a parabola, which every method integrates exactly
-    plant = falling(core, robot, clearance=height)
-    while not plant.output().solver.touchdowns:
-        plant.step(plant.time + macro)
-    assert plant.output().foot.impact_speed[0] == pytest.approx(
-        math.sqrt(2.0 * gravity * height), abs=LOCATED
-    )
-
-
-def test_fixed_steps_find_the_touchdown_too(core: ct.CDLL) -> None:
-    height, gravity = 0.08, 9.81
-    fall = math.sqrt(2.0 * height / gravity)
-    plant = falling(core, changed(rigid(gravity=gravity), solver={"step": 7e-3}), clearance=height)
-    plant.step(fall - 1e-4)
-    assert plant.output().solver.touchdowns == 0
-    plant.step(fall + 1e-4)
-    assert plant.output().foot.impact_speed == pytest.approx(
-        np.full(6, gravity * fall), abs=LOCATED
-    )
-
-
-@pytest.mark.parametrize("method", ["rosw3", "ros2"])
-@pytest.mark.parametrize("step", [7e-3, 3e-3, 1e-3])
-def test_a_coarse_implicit_step_through_an_impact_gains_no_energy(
-    core: ct.CDLL, method: str, step: float
-) -> None:
-    """Checks that the robot rises more slowly than it fell.
-
-    The impact takes about 10 ms; the steps use the stiffness at the end of the approach.
-    """
-    plant, fastest = (
-        falling(
-            core,
-            changed(rigid(gravity=9.81), solver={"step": step, "method": method}),
-            clearance=0.08,
-        ),
-        0.0,
-    )
-    for _ in range(14):
-        plant.step(plant.time + 0.021)
-        fastest = max(fastest, float(plant.output().torso.velocity[2]))
-    # m/s; the impact speed is 1.25 m/s, an exact solution rebounds with about 0.6 m/s
-    assert 0.3 < fastest < 0.8
-
-
-def test_feet_of_unequal_height_touch_down_one_after_the_other(core: ct.CDLL) -> None:
-    """The first foot lands with the speed of free fall, and the impact speeds of all landings are
-    stored.
-    """
-    robot = rigid(gravity=9.81)
-    angle = robot.stance.copy()
-    angle[:, 1] -= 0.01 * np.arange(6)  # the femur of leg RR is lower, so that its foot lands first
-    feet = foot_contacts(
-        robot, body_states(robot, STILL, np.eye(4)[0], STILL, STILL, angle, np.zeros((6, 3)))
-    )
-    plant = Plant(
-        core, robot, position=[0.0, 0.0, 0.05 + max(foot.penetration for foot in feet)], angle=angle
-    )
-    command = type(plant.hold())(angle_ref=angle)
-    order: list[int] = []
-    while len(order) < 2:
-        plant.step(plant.time + 2e-4, command)
-        foot = plant.output(command).foot
-        order += [int(leg) for leg in np.flatnonzero(foot.impact_speed) if leg not in order]
-    assert order[0] == 5
-    assert foot.impact_speed[5] == pytest.approx(math.sqrt(2.0 * 9.81 * 0.05), abs=LOCATED)
-
-
 def test_the_impact_speed_is_held_until_lift_off_and_the_next_touchdown_samples_anew(
     core: ct.CDLL,
 ) -> None:
@@ -267,25 +173,6 @@ def test_the_impact_speed_is_held_until_lift_off_and_the_next_touchdown_samples_
     assert damped > 30
     # gravity changes the speeds over the depth of the contact, by a few per cent at this stiffness
     assert second / first == pytest.approx(0.5, abs=0.05)
-
-
-def test_a_touchdown_below_the_floor_counts_as_the_floor(core: ct.CDLL) -> None:
-    robot, speed = rigid(restitution=0.5, impact_speed_floor=0.1), 0.02
-    plant = falling(core, robot, clearance=1e-4, speed=speed)
-    chi, pressed = exact_restitution_chi(0.5), 0
-    for _ in range(100):
-        plant.step(plant.time + 2e-4)
-        foot = plant.output().foot
-        if foot.contact[0]:
-            assert foot.impact_speed[0] == pytest.approx(speed, rel=1e-9)
-            law = (
-                robot.contact.stiffness
-                * foot.penetration[0] ** 1.5
-                * (1.0 - chi * foot.velocity[0, 2] / 0.1)
-            )
-            assert foot.normal_force[0] == pytest.approx(law, rel=1e-9)
-            pressed += 1
-    assert pressed > 10
 
 
 def test_the_ground_never_pulls(core: ct.CDLL) -> None:

@@ -19,7 +19,6 @@ from states import changed, landing, random_command, with_links
 from hexapod_cosim.models import Robot, load_robot
 from hexapod_cosim.models.contact import standing_damping
 from hexapod_cosim.models.dynamics import Command, accelerations
-from hexapod_cosim.models.statics import standing
 
 # relative, of closed forms: a tibia's inertia is 1e-7 of its wall's, and the error control allows
 # 1e-10 a step
@@ -218,38 +217,6 @@ def test_a_drive_told_no_acceleration_lags_by_the_acceleration_over_beta_squared
     assert lag[1499] == pytest.approx(ACCELERATION / 1e4, rel=0.02)
 
 
-@pytest.mark.parametrize("mode", ["position", "torque"])
-def test_a_servo_does_not_look_at_acceleration_ref(core: ct.CDLL, mode: str) -> None:
-    robot = changed(load_robot("athena"), servo={"mode": mode})
-    told, untold = Plant(core, robot), Plant(core, robot)
-    command = random_command(robot, 4, size=0.2)
-    told.step(0.01, command)
-    untold.step(0.01, replace(command, acceleration_ref=np.zeros((6, 3))))
-    assert np.array_equal(told.bodies, untold.bodies)
-
-
-def test_a_rate_of_an_input_takes_the_place_of_the_input_above_it(core: ct.CDLL) -> None:
-    """A rate of speed_ref acts as acceleration_ref, and a rate of acceleration_ref moves the drive
-    by t^3/6 times the rate.
-    """
-    robot = in_flight(alpha=5.0, beta=80.0)
-    plants = [Plant(core, robot) for _ in range(3)]
-    none, speed = np.zeros((6, 3)), 0.1 * ACCELERATION
-    begin = Command(angle_ref=robot.stance, speed_ref=speed)
-    for plant in plants:
-        plant.bodies = Plant(core, robot, speed=speed).bodies
-    plants[0].step(0.02, replace(begin, acceleration_ref=ACCELERATION))
-    plants[1].step_ramp(0.02, begin, Command(angle_ref=none, speed_ref=ACCELERATION))
-    plants[2].step_ramp(0.02, begin, Command(angle_ref=none, acceleration_ref=ACCELERATION / 0.02))
-    way = ACCELERATION / 30.0
-    for plant, parabola in zip(
-        plants, (0.006, 0.006, 0.002), strict=True
-    ):  # rad; of 30 rad/s2 by t^2/2, and of 1500 rad/s3 by t^3/6
-        assert plant.output().angle - robot.stance == pytest.approx(
-            (0.06 + parabola) * way, abs=1e-8
-        )
-
-
 def test_a_drive_off_its_reference_returns_at_the_rate_of_its_stabilisation(core: ct.CDLL) -> None:
     """With alpha = beta the error decays critically damped: (1 + alpha t) exp(-alpha t)."""
     robot = changed(driven(load_robot("athena")), solver=FLIGHT)
@@ -283,28 +250,3 @@ def test_drive_torque_is_that_of_inverse_dynamics(core: ct.CDLL) -> None:
     strong.bodies = body
     by_torque = strong.accelerations(replace(command, torque_ref=solved.drive_torque)).dv
     assert float(np.max(np.abs(by_torque - solved.dv))) < 1e-8 * float(np.max(np.abs(solved.dv)))
-
-
-def test_drives_that_hold_a_standing_robot_give_the_torques_that_servos_give(core: ct.CDLL) -> None:
-    robot = load_robot("athena")
-    pose = standing(robot)
-    start = {"position": pose.position, "quaternion": pose.quaternion, "angle": pose.angle}
-    servo, drive = Plant(core, robot, **start), Plant(core, driven(robot), **start)
-    still = Command(angle_ref=pose.angle)
-    assert drive.output(still).torque == pytest.approx(servo.output().torque, abs=1e-6)
-
-
-def test_drive_work_is_what_the_robot_gains(core: ct.CDLL) -> None:
-    """The legs swing in free fall without gravity, so the drives' multipliers times speeds are the
-    only power.
-    """
-    robot = replace(
-        changed(driven(load_robot("athena")), servo={"coulomb_friction": 0.0}, solver=FLIGHT),
-        gravity=WEIGHTLESS,
-    )
-    plant = Plant(core, robot)
-    command = Command(angle_ref=robot.stance, speed_ref=np.tile([0.5, -1.0, 1.5], (6, 1)))
-    plant.step(0.1, command)
-    energy = plant.output(command).energy
-    assert energy.kinetic > 0.05
-    assert energy.actuator_work == pytest.approx(energy.kinetic, rel=1e-6)

@@ -15,14 +15,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from plant import Plant
-from scipy.integrate import solve_ivp
 from states import changed
 from test_laws_standing import block, laid
 
 from hexapod_cosim.models import load_robot
 from hexapod_cosim.models.dynamics import Command
-from hexapod_cosim.models.friction import bristle_force, bristle_rate, sliding_friction
-from hexapod_cosim.models.records import Array
+from hexapod_cosim.models.friction import bristle_force, sliding_friction
 
 FRICTION = replace(
     load_robot("athena").friction,
@@ -138,31 +136,6 @@ def phases(plant: Plant, *, until: float, h: float = 2e-3) -> tuple[list[float],
         last = speed
     lengths = np.diff(changes)
     return lengths[0::2].tolist(), lengths[1::2].tolist()
-
-
-def test_the_twins_law_sticks_and_slips_by_the_closed_form_too() -> None:
-    """A point of 1 kg lies on a belt that moves at 0.1 m/s, behind a spring of 100 N/m. It counts
-    as slipping while it is slower than the belt by more than 1 mm/s.
-    """
-    friction = replace(FRICTION, presliding=1e-6, stribeck_speed=1e-4, bristle_damping=0.005)
-    x_axis = np.array([1.0, 0.0, 0.0])
-
-    def rate(_: float, y: Array) -> list[float]:
-        slip, bristle = (y[1] - 0.1) * x_axis, y[2] * x_axis
-        return [
-            y[1],
-            bristle_force(friction, 9.81, slip, bristle)[0] - 100.0 * y[0],
-            bristle_rate(friction, slip, bristle)[0],
-        ]
-
-    def behind(_: float, y: Array) -> float:
-        return float(0.1 - y[1] - 1e-3)
-
-    found = solve_ivp(
-        rate, (0.0, 1.9), [0.0, 0.1, 0.0], method="Radau", rtol=1e-7, atol=1e-12, events=behind
-    )
-    lengths = np.diff(found.t_events[0][found.t_events[0] > 0.3])
-    assert lengths[:2] == pytest.approx([0.408432, 0.392400], rel=3e-3)
 
 
 def test_a_mass_on_a_spring_sticks_and_slips_by_its_closed_form(core: ct.CDLL) -> None:

@@ -16,8 +16,7 @@ from slopes import resting, slopes
 from states import changed, distance, lopsided, random_bodies, random_command
 from test_twin_pinocchio import pinocchio_accelerations
 
-from hexapod_cosim.models import CONTACT_LAWS, METHODS, Robot, load_robot
-from hexapod_cosim.models.actuator import gear_friction
+from hexapod_cosim.models import CONTACT_LAWS, Robot, load_robot
 from hexapod_cosim.models.contact import (
     contact_damping,
     foot_contacts,
@@ -32,7 +31,6 @@ from hexapod_cosim.models.dynamics import (
     mass_matrix,
 )
 from hexapod_cosim.models.kinematics import (
-    joint_speeds,
     quaternion_rate,
     skew,
 )
@@ -90,80 +88,6 @@ def test_accelerations_are_those_of_the_dense_system_under_every_law(
     ours = at(core, robot, body).accelerations(command)
     assert distance(ours.dv, dense.dv) < DENSE
     assert distance(ours.multipliers, dense.multipliers) < DENSE
-
-
-def test_the_accelerations_shown_are_the_rates_that_are_integrated(core: ct.CDLL) -> None:
-    robot = lopsided(5)
-    body, command = random_bodies(robot, 5, drift=0.01), random_command(robot, 5)
-    plant = at(core, robot, body)
-    rate, power = np.zeros((19, 13)), np.zeros(3)
-    core.hx_probe_rate(
-        ct.c_void_p(plant.handle),
-        ct.byref(inputs(command)),
-        ct.c_double(0.0),
-        pointer(rate),
-        pointer(power),
-    )
-    assert np.array_equal(rate[:, 7:13], plant.accelerations(command).dv)
-    assert np.array_equal(rate[:, 0:3], body[:, 7:10])
-    assert (
-        distance(rate[:, 3:7], [quaternion_rate(state[3:7], state[10:13]) for state in body])
-        < 1e-14
-    )
-
-
-@pytest.mark.parametrize("mode", MODES)
-def test_powers_of_motors_push_and_losses_are_forces_times_speeds(core: ct.CDLL, mode: str) -> None:
-    robot = changed(lopsided(6), servo={"mode": mode}, contact={"impact_speed_floor": 2.0})
-    body, command = random_bodies(robot, 6), random_command(robot, 6)
-    plant = at(core, robot, body)
-    rate, power = np.zeros((19, 13)), np.zeros(3)
-    core.hx_probe_rate(
-        ct.c_void_p(plant.handle),
-        ct.byref(inputs(command)),
-        ct.c_double(0.0),
-        pointer(rate),
-        pointer(power),
-    )
-    speed, lost = joint_speeds(robot, body), 0.0
-    for foot, damping in zip(
-        foot_contacts(robot, body), standing_damping(robot, body), strict=True
-    ):
-        elastic = robot.contact.stiffness * max(foot.penetration, 0.0) ** 1.5
-        lost -= (
-            float(foot_force(robot, foot, damping) @ foot.velocity) + elastic * foot.approach_speed
-        )
-    lost -= float(np.sum(gear_friction(robot.servo, speed) * speed))
-    pushed = float(command.push_force @ body[0, 7:10] + command.push_torque @ body[0, 10:13])
-    assert power == pytest.approx(
-        [float(np.sum(plant.accelerations(command).drive_torque * speed)), pushed, lost], rel=DENSE
-    )
-
-
-def test_a_kinematic_drive_follows_its_reference_on_from_when_it_was_given(core: ct.CDLL) -> None:
-    robot = changed(lopsided(7), servo={"mode": "kinematic"})
-    body, command = (
-        random_bodies(robot, 7, drift=1e-3),
-        replace(random_command(robot, 7), age=0.004),
-    )
-    plant = at(core, robot, body)
-    rate, power = np.zeros((19, 13)), np.zeros(3)
-    core.hx_probe_rate(
-        ct.c_void_p(plant.handle),
-        ct.byref(inputs(command)),
-        ct.c_double(command.age),
-        pointer(rate),
-        pointer(power),
-    )
-    dense = accelerations(robot, body, command, standing_damping(robot, body))
-    assert distance(rate[:, 7:13], dense.dv) < DENSE
-    assert (
-        distance(
-            dense.dv,
-            accelerations(robot, body, replace(command, age=0.0), standing_damping(robot, body)).dv,
-        )
-        > 1e3 * DENSE
-    )
 
 
 @pytest.mark.parametrize("robot", ROBOTS.values(), ids=ROBOTS)
@@ -300,44 +224,3 @@ def test_the_stage_matrix_uses_the_secant_of_friction_when_a_foot_slips(core: ct
 
 
 # method coefficients
-
-
-@pytest.mark.parametrize("method", METHODS)
-def test_method_coefficients_satisfy_the_order_conditions(core: ct.CDLL, method: str) -> None:
-    """Checks the conditions of a Rosenbrock-W method of order p with any matrix A: every tree of
-    order <= p with some of its nodes taken implicitly.
-
-    For a method whose A is computed anew at every stage, the change of A along the solution counts
-    too.
-    """
-    shape, gamma = (ct.c_int * 3)(), ct.c_double()
-    a, g, c, b, e = np.zeros((7, 7)), np.zeros((7, 7)), np.zeros(7), np.zeros(7), np.zeros(7)
-    core.hx_probe_method(
-        METHODS.index(method) + 1, shape, ct.byref(gamma), *map(pointer, (a, g, c, b, e))
-    )
-    stages, order, error_order = shape
-    full = g + gamma.value * np.diag([1.0] * stages + [0.0] * (7 - stages))
-    one, exact = np.ones(7), 1e-14
-    assert c == pytest.approx(a @ one, abs=exact)
-    for weights, accuracy in ((b, order), (b - e, error_order)):
-        conditions = [(1, weights @ one, 1.0)]
-        conditions += [(2, weights @ a @ one, 1.0 / 2.0), (2, weights @ full @ one, 0.0)]
-        conditions += [
-            (3, weights @ c**2, 1.0 / 3.0),
-            (3, weights @ a @ c, 1.0 / 6.0),
-            (3, weights @ a @ full @ one, 0.0),
-        ]
-        conditions += [
-            (3, weights @ full @ c, 0.0),
-            (3, weights @ full @ full @ one, 0.0),
-            (3, (weights * c) @ full @ one, 0.0),
-        ]
-        conditions += [(4, weights @ c**3, 1.0 / 4.0), (4, weights @ (c * (a @ c)), 1.0 / 8.0)]
-        conditions += [(4, weights @ a @ c**2, 1.0 / 12.0), (4, weights @ a @ a @ c, 1.0 / 24.0)]
-        conditions += [
-            (5, weights @ c**4, 1.0 / 5.0),
-            (5, weights @ a @ c**3, 1.0 / 20.0),
-            (5, weights @ a @ a @ a @ c, 1.0 / 120.0),
-        ]
-        for p, value, wanted in conditions:
-            assert p > accuracy or value == pytest.approx(wanted, abs=exact), (p, accuracy)

@@ -71,24 +71,3 @@ def test_another_input_after_a_stop_is_a_call_of_its_own(core: ct.CDLL) -> None:
     plant.step(END, command)
     early, late = plant.output(command).angle, other.output(turned).angle
     assert (early > late).all()
-
-
-def test_events_are_reported_without_a_stop_too(core: ct.CDLL) -> None:
-    command, plain, told = command_of(ATHENA), dropped(core, ATHENA), dropped(core, ATHENA)
-    plain.step(END, command)
-    assert told.step_to_event(END, command, stop=False)
-    assert told.save() == plain.save()
-    standing = Plant(core, ATHENA)
-    hold = standing.hold()
-    assert not standing.step_to_event(0.01, hold)
-    assert standing.time == 0.01
-
-
-def test_an_event_changes_contacts(core: ct.CDLL) -> None:
-    command, plant = command_of(ATHENA), dropped(core, ATHENA)
-    seen = plant.output(command).foot.contact
-    while plant.time < END:
-        event = plant.step_to_event(END, command)
-        contact = plant.output(command).foot.contact
-        assert event == bool((contact != seen).any())
-        seen = contact

@@ -6,10 +6,9 @@ import ctypes as ct
 import math
 from typing import Any
 
-import mirror
 import numpy as np
 import pytest
-from plant import Plant, asked, inputs, pointer, probed
+from plant import Plant, asked, inputs, probed
 from states import changed, distance, lopsided, random_bodies
 
 from hexapod_cosim.models import CONTACT_LAWS, Robot, load_robot
@@ -24,7 +23,6 @@ from hexapod_cosim.models.contact import (
 from hexapod_cosim.models.dynamics import joint_kinematics, world_inertias
 from hexapod_cosim.models.friction import bristle_rate, friction_force
 from hexapod_cosim.models.kinematics import (
-    axis_normals,
     body_states,
     joint_angle,
     joint_models,
@@ -57,22 +55,6 @@ def drifted(core: ct.CDLL, robot: Robot, seed: int) -> tuple[Plant, Array]:
     return plant, body
 
 
-def test_the_mirrors_of_the_header_have_the_compilers_layout(core: ct.CDLL) -> None:
-    core.hx_probe_field.restype = ct.c_char_p
-    offset, size, index, names = ct.c_size_t(), ct.c_size_t(), 0, set()
-    while name := core.hx_probe_field(ct.c_size_t(index), ct.byref(offset), ct.byref(size)):
-        kind, _, path = name.decode().partition(".")
-        structure, at = getattr(mirror, "Hx" + kind[2:]), 0
-        for part in filter(None, path.split(".")):
-            at += getattr(structure, part).offset
-            structure = dict(structure._fields_)[part]
-        assert (at, ct.sizeof(structure)) == (offset.value, size.value), name
-        names.add(name.decode())
-        index += 1
-    assert {f"hx{kind}" for kind in ("Link", "Leg", "Definition", "Input", "Output")} <= names
-    assert len(names) == index > 80
-
-
 # rotations and frames
 
 
@@ -87,14 +69,6 @@ def test_rotation_and_quaternion_functions_are_the_twins(core: ct.CDLL) -> None:
             distance(probed(core.hx_probe_quaternion_rate, p, w, size=4), quaternion_rate(p, w))
             < SAME
         )
-
-
-def test_axis_normals_are_the_twins(core: ct.CDLL) -> None:
-    rng = np.random.default_rng(2)
-    for axis in [*np.eye(3), -np.eye(3)[1], np.array([0.6, 0.0, 0.8]), *rng.normal(size=(50, 3))]:
-        unit, a, b = axis / np.linalg.norm(axis), np.zeros(3), np.zeros(3)
-        core.hx_probe_axis_normals(pointer(unit), pointer(a), pointer(b))
-        assert distance([a, b], axis_normals(unit)) < SAME
 
 
 def test_inertias_are_taken_to_another_point_by_the_congruence(core: ct.CDLL) -> None:
@@ -220,25 +194,6 @@ def test_foot_kinematics_and_forces_are_the_twins(
     ]
 
 
-def test_a_step_takes_a_foots_slopes_where_its_approach_leads_it(core: ct.CDLL) -> None:
-    """While the foot approaches, the derivatives are those at delta + h ddelta."""
-    robot = changed(lopsided(7), contact={"impact_speed_floor": 2.0})
-    plant, body = drifted(core, robot, 7)
-    damping, approaching = contact_damping(robot.contact, 0.0), 0
-    for leg, foot in enumerate(foot_contacts(robot, body)):
-        got = probed(core.hx_probe_foot, plant, inputs(plant.hold()), leg, 2e-3, size=17)
-        delta, ddelta = foot.penetration + 2e-3 * max(foot.approach_speed, 0.0), foot.approach_speed
-        closed = 1.0 if foot.penetration > 0.0 else 0.0
-        force, _, stiffness, viscosity = normal_probe(
-            core, plant, damping if closed else 0.0, delta, ddelta, closed=closed
-        )
-        slip = float(np.linalg.norm(foot.velocity + foot.approach_speed * foot.normal))
-        drag = robot.friction.mu * force * asked(core.hx_probe_friction, plant, slip)
-        assert got[14:] == pytest.approx([stiffness, viscosity, drag], rel=SAME)
-        approaching += closed > 0.0 and foot.approach_speed > 0.0
-    assert approaching > 0
-
-
 @pytest.mark.parametrize("law", CONTACT_LAWS)
 def test_the_normal_force_is_the_twins_and_its_slopes_are_its_derivatives(
     core: ct.CDLL, law: str
@@ -360,10 +315,6 @@ def test_the_exact_restitution_factor_is_the_twins(core: ct.CDLL, e: float) -> N
     assert asked(core.hx_probe_exact_restitution_chi, e) == pytest.approx(
         exact_restitution_chi(e), rel=1e-9, abs=rounding
     )
-
-
-def test_a_contact_that_gives_back_all_energy_has_no_damping(core: ct.CDLL) -> None:
-    assert asked(core.hx_probe_exact_restitution_chi, 1.0) == 0.0
 
 
 # servos

@@ -98,27 +98,6 @@ def test_the_angle_of_a_half_angle_is_right_in_the_whole_turn(core: ct.CDLL) -> 
     assert ulps(mapped(core.hx_probe_angle_from_half, y, x), 2.0 * np.arctan(y / x)) <= ANGLE_ULPS
 
 
-def test_a_half_turn_is_plus_or_minus_pi_and_no_turn_is_zero(core: ct.CDLL) -> None:
-    y, x = (
-        np.array([1.0, -1.0, 0.0, 0.0, 1.0, -1.0, 1e-300, 1.0]),
-        np.array([0.0, 0.0, 1.0, -1.0, 1.0, 1.0, 1.0, -1.0]),
-    )
-    expected = np.array([np.pi, -np.pi, 0.0, 0.0, np.pi / 2.0, -np.pi / 2.0, 2e-300, -np.pi / 2.0])
-    assert mapped(core.hx_probe_angle_from_half, y, x) == pytest.approx(
-        expected, rel=ANGLE_ULPS * ULP, abs=0.0
-    )
-
-
-def test_smaller_larger_and_absolute_value_are_taken_lane_by_lane(core: ct.CDLL) -> None:
-    a, b = (
-        np.array([1.0, -2.0, 0.0, 5.0, -1.0, np.inf, 3.0, -0.5]),
-        np.array([2.0, -3.0, 0.0, 5.0, 1.0, 1.0, -np.inf, -0.25]),
-    )
-    out = np.empty((3, SLOTS))
-    core.hx_probe_select(pointer(a), pointer(b), pointer(out))
-    assert np.array_equal(out, [np.minimum(a, b), np.maximum(a, b), np.abs(a)])
-
-
 @pytest.mark.parametrize("width", WIDTHS)
 @pytest.mark.parametrize("method", ["rosw3", "dp54"])
 @pytest.mark.parametrize("law", ["tanh", "bristle", "soil", "gears"])
@@ -138,25 +117,6 @@ def test_the_motion_does_not_depend_on_the_lane_width(
     assert np.array_equal(here.dv, there.dv)
     assert np.array_equal(here.multipliers, there.multipliers)
     assert bytes(plants[0].output_record(command)) == bytes(plants[1].output_record(command))
-
-
-@pytest.mark.parametrize("width", WIDTHS)
-@pytest.mark.parametrize("garbage", [0x00, 0xFF])
-@pytest.mark.parametrize("law", ["tanh", "bristle", "soil", "gears"])
-def test_what_lies_on_the_stack_and_in_the_work_space_does_not_matter(
-    core: ct.CDLL, other_cores: dict[str, ct.CDLL], width: str, garbage: int, law: str
-) -> None:
-    """Lanes that no leg occupies must be written before they are read: 0xFF... is a NaN."""
-    robot = changed(load_robot("athena"), **ground(law))
-    plants = [
-        Plant(library, robot, **random_pose(robot, 5)) for library in (core, other_cores[width])
-    ]
-    for library, plant in zip((core, other_cores[width]), plants, strict=True):
-        library.hx_probe_stain(ct.c_void_p(plant.handle), garbage)
-        plant.step(0.02)
-    clean = Plant(core, robot, **random_pose(robot, 5))
-    clean.step(0.02)
-    assert plants[0].save() == plants[1].save() == clean.save()
 
 
 def test_every_kernel_of_this_build_that_runs_here_gives_the_same_rates(core: ct.CDLL) -> None:

@@ -108,20 +108,6 @@ def test_the_landing_rate_is_that_of_the_first_20_milliseconds(core: ct.CDLL) ->
     assert plant.output().foot.landing_rate == pytest.approx(np.full(6, rates[199]), rel=CLOSED)
 
 
-@pytest.mark.parametrize("step", [2e-5, 3.7e-4, 5e-2])
-def test_the_landing_rate_does_not_depend_on_the_communication_step(
-    core: ct.CDLL, step: float
-) -> None:
-    """The windows of 1 ms begin and end within calls of 0.02, 0.37 and 50 ms."""
-    robot, mass = rigid("hertz", stiffness=1e6), weight(load_robot("athena")) / G / 6.0
-    plant = falling(core, robot, clearance=1e-4, speed=0.5)
-    while plant.time < 0.03:
-        plant.step(plant.time + step)
-    assert plant.output().foot.landing_rate == pytest.approx(
-        np.full(6, rises(hertz_forces(mass, 1e6, 0.5, 0.004)).max()), rel=CLOSED
-    )
-
-
 def test_the_loss_of_an_impact_is_the_kinetic_energy_it_takes(core: ct.CDLL) -> None:
     robot = rigid(restitution=0.5)
     bounced = flown_off(falling(core, robot, speed=0.4), step=2e-3)
@@ -173,20 +159,6 @@ def test_a_torque_that_turns_a_free_joint_does_its_work_and_its_square_adds_up(
     assert output.torque_squared[0, 0] == pytest.approx(0.04 * 0.1, rel=1e-9)
     assert output.torque_squared[4, 2] == pytest.approx(0.01 * 0.1, rel=1e-9)
     assert float(np.delete(output.torque_squared.ravel(), [0, 14]).max()) == 0.0
-
-
-def test_gears_take_the_energy_of_joints_that_spin_down(core: ct.CDLL) -> None:
-    off = {"mode": "torque", "coulomb_friction": 0.05}
-    robot = replace(
-        changed(load_robot("athena"), servo=off, solver={"tolerance": 1e-7}),
-        gravity=(0.0, 0.0, 0.0),
-    )
-    plant = Plant(core, robot, position=(0.0, 0.0, 5.0), speed=np.full((6, 3), 0.3))
-    before = plant.output().energy.kinetic
-    plant.step(1.0)
-    energy = plant.output().energy
-    assert energy.gear_loss == pytest.approx(before - energy.kinetic, rel=CLOSED)
-    assert energy.gear_loss > 0.5 * before
 
 
 # ---- sums over a walk ----
@@ -264,34 +236,6 @@ def test_what_is_measured_is_what_fine_samples_add_up_to(core: ct.CDLL, robot: R
     assert max(output.foot.peak_force_rate.max() for output in coarse) > 0.9 * float(rise.max())
 
 
-def test_the_interval_of_reading_changes_no_integral_and_loses_no_peak(
-    core: ct.CDLL, robot: Robot
-) -> None:
-    often = [after for _, after in samples(core, robot, 1e-3)[0]]
-    seldom = samples(core, robot, 5e-3)[1]
-    for name in ("positive_work", "negative_work", "torque_squared"):
-        one, other = (float(np.sum(getattr(run[-1], name))) for run in (often, seldom))
-        assert one == pytest.approx(other, rel=2e-3)
-    for name in ("slip_distance", "impulse", "landings"):
-        one, other = (float(np.sum(getattr(run[-1].foot, name))) for run in (often, seldom))
-        assert one == pytest.approx(other, rel=2e-3)
-    one, other = (
-        max(float(output.foot.peak_force.max()) for output in run) for run in (often, seldom)
-    )
-    assert one == pytest.approx(other, rel=SAMPLED)
-
-
-def test_steps_as_short_as_rounding_make_no_steep_forces(core: ct.CDLL) -> None:
-    """A robot stands and takes steps down to 1e-11 s, over which only the last bits of the depths
-    change.
-    """
-    plant = standing(core, load_robot("athena"))
-    for size in (1e-9, 1e-10, 1.1e-11):
-        for _ in range(5):
-            plant.step(plant.time + size)
-            assert float(plant.output().foot.peak_force_rate.max()) < 1.0
-
-
 def test_peaks_begin_anew_with_every_call(core: ct.CDLL) -> None:
     robot = rigid("hertz")
     plant = falling(core, robot, clearance=1e-4, speed=0.5)
@@ -302,12 +246,6 @@ def test_peaks_begin_anew_with_every_call(core: ct.CDLL) -> None:
     assert float(flying.peak_force.max()) == 0.0
     assert float(flying.peak_force_rate.max()) == 0.0
     assert float(flying.landing_rate.min()) > 1e3  # kept until the next touch-down
-
-
-def test_the_first_peak_is_the_load_at_the_start(core: ct.CDLL) -> None:
-    robot = load_robot("athena")
-    plant = standing(core, robot)
-    assert float(np.sum(plant.output().foot.peak_force)) == pytest.approx(weight(robot), rel=1e-6)
 
 
 def test_measures_come_back_with_a_saved_state(core: ct.CDLL, robot: Robot) -> None:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import ctypes as ct
 import math
 from collections.abc import Callable
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -85,13 +84,6 @@ def test_an_end_that_is_past_or_no_number_is_refused(core: ct.CDLL, end: float) 
     )
 
 
-def test_a_step_to_the_present_time_does_nothing(core: ct.CDLL) -> None:
-    plant = midway(core)
-    before = plant.save()
-    plant.step(plant.time)
-    assert plant.save() == before
-
-
 @pytest.mark.parametrize("number", BAD_NUMBERS)
 def test_bodies_or_a_start_time_that_are_no_numbers_are_refused(
     core: ct.CDLL, number: float
@@ -130,84 +122,38 @@ IMPOSSIBLE: list[tuple[str, Any, str]] = [
         r"torso\.inertia_xx: got 1, expected an inertia that a body can have",
     ),
     ("torso.inertia", (1.0, 1.0, 1.0, 0.9, 0.9, -0.9), r"torso\.inertia_xx: .* a body can have"),
-    ("torso.inertia", (1.0, 1.0, 1.0, 0.0, 0.4, 0.4), r"torso\.inertia_xx: .* a body can have"),
-    ("torso.inertia", (-1.0, 1.0, 1.0, 0.0, 0.0, 0.0), r"torso\.inertia_xx: got -1"),
     ("leg[4].hip_position", (math.nan, 0.0, 0.0), r"RM\.hip_position\[1\]: got -?nan"),
-    ("leg[5].hip_yaw", math.inf, r"RR\.hip_yaw: got inf"),
     ("leg[2].link[1].mass", -0.1, r"LR\.femur\.mass: got -0\.1, expected 1e-09 to"),
     ("leg[0].link[0].length", 0.0, r"LF\.coxa\.length: got 0, expected a tip away from the joint"),
-    ("leg[1].link[2].offset_z", math.nan, r"LM\.tibia\.offset_z: got -?nan"),
     ("leg[3].link[2].axis", (0.0, 0.0, 0.0), r"RF\.tibia\.axis: got 0, expected a direction"),
     (
         "leg[3].link[1].inertia",
         (1e-4, 1e-4, 3e-4, 0.0, 0.0, 0.0),
         r"RF\.femur\.inertia_xx: got 0\.0001",
     ),
-    ("foot_radius", 0.0, r"foot\.radius: got 0"),
-    ("contact.law", 0, r"contact\.law: got 0, expected 1 to 6$"),
     ("contact.law", 7, r"contact\.law: got 7, expected 1 to 6$"),
-    ("contact.stiffness", -1.0, r"contact\.stiffness: got -1, expected 0\.001 to"),
-    ("contact.restitution", 0.0, r"contact\.restitution: got 0, expected 0\.001 to 1"),
     ("contact.restitution", 1.1, r"contact\.restitution: got 1\.1, expected 0 to 1"),
-    ("contact.damping_factor", -1.0, r"contact\.damping_factor: got -1"),
-    ("contact.impact_speed_floor", 0.0, r"contact\.impact_speed_floor: got 0"),
     ("friction.law", 5, r"friction\.law: got 5, expected 1 to 4"),
-    ("friction.mu", -0.1, r"friction\.mu: got -0\.1"),
-    ("friction.slope", math.nan, r"friction\.slope: got -?nan"),
-    ("friction.presliding", 0.0, r"friction\.presliding: got 0, expected 1e-07 to 1 m"),
-    ("friction.bristle_damping", -0.1, r"friction\.bristle_damping: got -0\.1"),
     (
         "friction.mu_static",
         0.1,
         r"friction\.mu_static: got 0\.1, expected at least friction\.mu, or 0",
     ),
-    ("friction.viscous", -1.0, r"friction\.viscous: got -1, expected 0 to 1000000 s/m"),
-    ("friction.spin_radius", -1.0, r"friction\.spin_radius: got -1, expected 0 to 10 m"),
-    ("friction.rolling_radius", math.nan, r"friction\.rolling_radius: got -?nan"),
-    ("servo.stop_stiffness", -1.0, r"servo\.stop_stiffness: got -1"),
-    ("servo.stop_damping", -1.0, r"servo\.stop_damping: got -1"),
-    ("leg[1].link[0].angle_max", 4.0, r"LM\.coxa\.angle_max: got 4, expected -3\.14159265 to"),
     (
         "leg[0].link[2].angle_min",
         3.0,
         r"LF\.tibia\.angle_min: got 3, expected an angle below the joint's angle_max",
     ),
-    ("friction.stribeck_speed", 0.0, r"friction\.stribeck_speed: got 0, expected 1e-06 to 100 m/s"),
-    ("servo.mode", 4, r"servo\.mode: got 4, expected 1 to 3"),
-    ("servo.kp", -1.0, r"servo\.kp: got -1"),
-    ("servo.kd", -1.0, r"servo\.kd: got -1"),
-    ("servo.torque_max", -1.0, r"servo\.torque_max: got -1"),
-    ("servo.speed_max", 0.0, r"servo\.speed_max: got 0"),
-    ("servo.rotor_inertia", -1.0, r"servo\.rotor_inertia: got -1"),
-    ("servo.coulomb_friction", -1.0, r"servo\.coulomb_friction: got -1"),
-    ("baumgarte.alpha", -1.0, r"baumgarte\.alpha: got -1"),
-    ("baumgarte.beta", math.inf, r"baumgarte\.beta: got inf"),
     ("gravity", (0.0, 0.0, math.nan), r"gravity\[3\]: got -?nan"),
-    ("solver.method", 6, r"solver\.method: got 6, expected 1 to 5"),
-    ("solver.step", -1e-3, r"solver\.step: got -0\.001, expected 0 to 1 s"),
-    ("solver.step", 2.0, r"solver\.step: got 2"),
-    ("solver.tolerance", 0.0, r"solver\.tolerance: got 0"),
-    ("solver.step_max", 0.0, r"solver\.step_max: got 0"),
     (
         "solver.method",
         5,
         r"solver\.step: got 0, expected a fixed step > 0 with this solver\.method",
     ),
-    ("terrain.kind", 4, r"terrain\.kind: got 4, expected 1 to 3"),
-    ("terrain.height", math.nan, r"terrain\.height: got -?nan"),
-    ("terrain.incline", 1.6, r"terrain\.incline: got 1\.6"),
-    ("terrain.heading", math.nan, r"terrain\.heading: got -?nan"),
-    ("initial.position", (math.nan, 0.0, 0.0), r"initial\.position\[1\]: got -?nan"),
     (
         "initial.quaternion",
         (0.0, 0.0, 0.0, 0.0),
         r"initial\.quaternion: got 0, expected a quaternion",
-    ),
-    ("initial.velocity", (0.0, math.inf, 0.0), r"initial\.velocity\[2\]: got inf"),
-    (
-        "initial.angular_velocity",
-        (0.0, 0.0, -math.inf),
-        r"initial\.angular_velocity\[3\]: got -inf",
     ),
 ]
 
@@ -257,19 +203,6 @@ def test_a_definition_no_robot_can_have_is_refused(
     assert bound(core).hx_definition_check(bad, message) == INVALID_MODEL
     assert core.hx_definition_check(bad, None) == INVALID_MODEL
     assert message.value
-
-
-def test_every_joint_angle_and_speed_at_start_is_looked_at(core: ct.CDLL) -> None:
-    plant = midway(core)
-    for name in ("angle", "speed"):
-        bad = definition(plant.robot)
-        getattr(bad.initial, name)[5][2] = math.nan
-        refused(
-            plant,
-            partial(plant.reset, bad),
-            INVALID_MODEL,
-            rf"^initial\.RR\.tibia\.{name}: got -?nan",
-        )
 
 
 def test_every_status_has_a_name(core: ct.CDLL) -> None:

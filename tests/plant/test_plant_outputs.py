@@ -19,7 +19,7 @@ from hexapod_cosim.models import Robot, load_robot
 from hexapod_cosim.models.contact import foot_contacts
 from hexapod_cosim.models.dynamics import joint_reactions
 from hexapod_cosim.models.energy import constraint_errors, kinetic_energy, potential_energy
-from hexapod_cosim.models.kinematics import axis_quaternion, quaternion_product, rotation_matrix
+from hexapod_cosim.models.kinematics import rotation_matrix
 from hexapod_cosim.models.records import Array
 
 # relative: the same formula with its operations in another order, some hundred roundings
@@ -62,17 +62,6 @@ def test_energies_reactions_torques_and_errors_shown_are_the_twins(
     )
     assert distance(output.imu.angular_velocity, R.T @ body[0, 10:13]) < SAME
     assert output.energy.residual == 0.0
-
-
-def test_roll_pitch_and_yaw_turn_in_the_order_z_y_x(core: ct.CDLL) -> None:
-    roll, pitch, yaw = 0.3, -0.5, 2.4
-    x, y, z = np.eye(3)
-    turn = quaternion_product(
-        axis_quaternion(z, yaw),
-        quaternion_product(axis_quaternion(y, pitch), axis_quaternion(x, roll)),
-    )
-    torso = Plant(core, load_robot("athena"), quaternion=turn).output().torso
-    assert (torso.roll, torso.pitch, torso.yaw) == pytest.approx((roll, pitch, yaw), rel=SAME)
 
 
 @pytest.mark.parametrize("name", ["athena", "phantomx_mk4"])

@@ -12,8 +12,7 @@ import numpy as np
 import pytest
 from plant import Plant, inputs, pointer, probed
 from slopes import LawSlopes, assembled, law_slopes, resting
-from states import changed, scaled
-from test_plant_integrator import PROBLEMS
+from states import changed
 
 from hexapod_cosim.models import METHODS, Robot, load_robot
 from hexapod_cosim.models.contact import foot_contacts, normal_force, standing_damping
@@ -255,88 +254,3 @@ def test_an_implicit_step_on_bristles_is_that_of_the_dense_stages(
         np.max(np.abs(plant.output().foot.bristle - b - stretched)[closed])
     ) < 1e-5 * float(np.max(np.abs(stretched)))
     assert np.all(np.linalg.norm(b + stretched, axis=1) < 0.7 * robot.friction.presliding)
-
-
-@pytest.mark.parametrize("margin", [0.99, 1.01])
-@pytest.mark.parametrize(
-    ("size", "deciding"),
-    [(1.0, range(7, 10)), (0.05, range(10, 13))],
-    ids=["velocity", "angular velocity"],
-)
-def test_a_step_is_rejected_when_its_largest_scaled_error_exceeds_the_tolerance(
-    core: ct.CDLL, size: float, deciding: range, margin: float
-) -> None:
-    """The error scales are 0.1 m, 1 (quaternion), 1 m/s and 10 rad/s; the smaller a robot, the more
-    its rotation counts. The first step that is tried has 1e-4 s.
-    """
-    h, robot = 1e-4, scaled(PROBLEMS["tumbling"].robot, size)
-    start = PROBLEMS["tumbling"].start | {
-        "speed": 20.0 * np.random.default_rng(1).normal(size=(6, 3))
-    }
-    plant, command = Plant(core, robot, **start), Command(angle_ref=robot.stance)
-    m, k, y0, rate = (
-        coefficients(core, "bs32"),
-        np.zeros((7, 247)),
-        plant.bodies.ravel(),
-        rates(core, plant, command),
-    )
-    for i in range(m.stages):
-        k[i] = h * rate(y0 + m.a[i] @ k)
-    largest = np.max(np.abs(m.e @ k).reshape(19, 13), axis=0) / ([0.1] * 3 + [1.0] * 7 + [10.0] * 3)
-    assert int(np.argmax(largest)) in deciding
-    solver = {
-        "method": "bs32",
-        "step": 0.0,
-        "tolerance": margin * float(np.max(largest)),
-        "step_max": 1.0,
-    }
-    tried = Plant(core, changed(robot, solver=solver), **start)
-    tried.step(h, command)
-    assert (tried.output().solver.rejected > 0) == (margin < 1.0)
-
-
-@pytest.mark.parametrize("margin", [0.99, 1.01])
-def test_bristles_count_by_their_error_over_ten_preslidings(core: ct.CDLL, margin: float) -> None:
-    """The feet slide on slack bristles that are short and weak, so their error is the largest. The
-    first step that is tried has 1e-4 s.
-    """
-    h, m, still = 1e-4, coefficients(core, "bs32"), Command(angle_ref=load_robot("athena").stance)
-    robot = changed(
-        load_robot("athena"), friction={"law": "bristle", "presliding": 1e-5, "mu": 0.01}
-    )
-    body, k, k_b = resting(robot, 1), np.zeros((7, 247)), np.zeros((7, 6, 3))
-    body[:, 7:9] += np.array([0.3, 0.1])
-
-    def put(target: Plant, bodies: Array, bristles: Array) -> Array:
-        target.bodies = bodies
-        return probed(core.hx_probe_bristles, target, inputs(still), bristles, size=18).reshape(
-            6, 3
-        )
-
-    there = Plant(core, robot)
-    for i in range(m.stages):
-        y, b = (body.ravel() + m.a[i] @ k).reshape(19, 13), np.tensordot(m.a[i], k_b, 1)
-        result, power = np.zeros((19, 13)), np.zeros(3)
-        k_b[i] = h * put(there, y, b)
-        core.hx_probe_rate(
-            ct.c_void_p(there.handle),
-            ct.byref(inputs(still)),
-            ct.c_double(0.0),
-            pointer(result),
-            pointer(power),
-        )
-        k[i] = h * result.ravel()
-    largest = float(np.max(np.abs(np.tensordot(m.e, k_b, 1)))) / (10.0 * robot.friction.presliding)
-    assert largest > float(
-        np.max(np.abs(m.e @ k).reshape(19, 13) / ([0.1] * 3 + [1.0] * 7 + [10.0] * 3))
-    )
-    tried = Plant(
-        core,
-        changed(
-            robot,
-            solver={"method": "bs32", "step": 0.0, "tolerance": margin * largest, "step_max": 1.0},
-        ),
-    )
-    put(tried, body, np.zeros((6, 3)))
-    tried.step(h, still)
-    assert (tried.output().solver.rejected > 0) == (margin < 1.0)

@@ -9,10 +9,9 @@ import ctypes as ct
 import numpy as np
 import pytest
 from plant import Plant, definition
-from states import MACRO, changed, landing, lopsided, random_bodies, random_command, trail
+from states import MACRO, changed, landing, lopsided, random_bodies, trail
 
 from hexapod_cosim.models import METHODS, load_robot
-from hexapod_cosim.models.statics import settled
 
 
 @pytest.mark.parametrize("method", METHODS)
@@ -47,30 +46,6 @@ def test_restoring_at_any_point_gives_the_same_bits_in_another_instance(
     assert len(touching) > 1  # in the air as well as in contact
 
 
-def test_reading_outputs_accelerations_or_bytes_changes_nothing(core: ct.CDLL) -> None:
-    robot = load_robot("phantomx_mk4")
-    plant = Plant(core, robot, **landing(robot))
-    for saved in trail(Plant(core, robot, **landing(robot)), 8):
-        k = round(plant.time / MACRO)
-        plant.step((k + 1) * MACRO, random_command(robot, k, size=0.2))
-        seen = plant.output(random_command(robot, 99))
-        plant.accelerations(random_command(robot, 98))
-        assert plant.save() == saved
-        assert seen.time == plant.time
-
-
-def test_interleaved_instances_are_as_good_as_alone(core: ct.CDLL) -> None:
-    robots = [
-        load_robot("athena"),
-        lopsided(),
-        changed(load_robot("athena"), solver={"method": "dp54"}),
-    ]
-    alone = [trail(Plant(core, robot, **landing(robot)), 5) for robot in robots]
-    plants = [Plant(core, robot, **landing(robot)) for robot in robots]
-    together = [[trail(plant, 1, first=k)[0] for plant in plants] for k in range(5)]
-    assert [list(column) for column in zip(*together, strict=True)] == alone
-
-
 @pytest.mark.parametrize("law", ["tanh", "bristle"])
 def test_a_reset_goes_back_to_the_exact_start(core: ct.CDLL, law: str) -> None:
     robot = changed(load_robot("athena"), friction={"law": law})
@@ -96,21 +71,6 @@ def test_setting_the_bodies_restarts_the_energy_balance_at_the_same_time(core: c
         output.solver.steps,
     ) == (0.0, 0.0, 0.0, 0.0)
     assert np.array_equal(output.foot.contact != 0, output.foot.penetration > 0.0)
-
-
-@pytest.mark.parametrize("start", [0.0, 1.0, 64.0, 1000.1])
-def test_a_quiet_call_takes_one_step_whatever_the_clock_says(core: ct.CDLL, start: float) -> None:
-    """step_max is the call's length. The rounding of the clock makes two calls of three longer by a
-    last bit.
-    """
-    robot = load_robot("athena")
-    position, quaternion, angle = settled(robot)
-    plant, steps = Plant(core, robot), []
-    plant.reset(definition(robot, position=position, quaternion=quaternion, angle=angle), start)
-    for k in range(400):
-        plant.step(start + (k + 1) * robot.solver.step_max)
-        steps.append(plant.output().solver.steps)
-    assert steps[399] - steps[199] == 200
 
 
 def test_a_start_time_shifts_the_time_and_nothing_else(core: ct.CDLL) -> None:

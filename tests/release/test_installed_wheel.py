@@ -17,6 +17,7 @@ from pathlib import Path
 import pytest
 
 FOLDER = os.environ.get("HEXAPOD_WHEELS")
+EXTENSIONS = Path(__file__).resolve().parents[2] / "extensions"
 FAMILIES = {
     "manylinux_2_17_x86_64.manylinux2014_x86_64.musllinux_1_1_x86_64",
     "manylinux_2_17_aarch64.manylinux2014_aarch64.musllinux_1_1_aarch64",
@@ -113,6 +114,7 @@ def test_the_first_report_comes_out_of_the_wheel(hexapod: Path, tmp_path: Path) 
     assert (tmp_path / "first" / "report.html").stat().st_size > 100_000
 
 
+@pytest.mark.skipif(not (EXTENSIONS / "live").is_dir(), reason="the extension live")
 def test_the_page_of_a_live_robot_comes_out_of_the_wheel(hexapod: Path, tmp_path: Path) -> None:
     process = subprocess.Popen(
         [str(hexapod), "live", "walk_flat", "--no-browser"],
@@ -181,7 +183,7 @@ def test_an_installation_has_no_pyarrow_and_messages_name_the_extras(
     assert {path.name for path in (tmp_path / "stood").glob("results.*")} == {"results.csv"}
     for command, extra in (
         (["simulate", "stand", "--format", "parquet"], "parquet"),
-        (["study", "friction_speed"], "studies"),
+        *([(["study", "friction_speed"], "studies")] if (EXTENSIONS / "study").is_dir() else []),
     ):
         assert f"WHEEL.whl[{extra}]" in refused(hexapod, tmp_path, *command)
 

@@ -8,7 +8,6 @@ from pathlib import Path
 
 import pytest
 
-from hexapod_cosim.cosim.common.components import CONTROLLER, PLANT, POLICY
 from hexapod_cosim.cosim.export.cross_build import Library, build_library
 from hexapod_cosim.cosim.export.platforms import component_library
 
@@ -16,7 +15,7 @@ wheels = pytest.importorskip("tools.wheels", reason="needs the extra release")
 
 COMPILER = "musl-gcc"
 LIBRARIES = [
-    *((component_library(one), "fmi2GetVersion") for one in (PLANT, CONTROLLER, POLICY)),
+    *((component_library(one), "fmi2GetVersion") for one in wheels.components()),
     (wheels.loop_library(), "hx_master_layout"),
 ]
 PROGRAM = r"""

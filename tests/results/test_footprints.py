@@ -131,5 +131,5 @@ def test_a_foot_deeper_than_its_radius_is_warned_of(
 def test_the_walk_on_sand_stays_above_its_pads_radius_and_a_sphere_does_not() -> None:
     for settings, warned in (([], False), (["foot.pad_radius=0"], True)):
         result = simulate(load_scenario("sand", overrides=["duration=3", *settings]))
-        warnings = result.facts["warnings"]
+        warnings = result.facts.warnings
         assert any("sinks too deep" in warning for warning in warnings) == warned

@@ -86,7 +86,7 @@ def test_the_figures_of_a_run_do_not_depend_on_the_rows_that_are_kept(
     for name, value in every.metrics.items():
         if name != "realtime_factor":
             assert coarse.metrics[name] == pytest.approx(value, rel=0.0, abs=0.0, nan_ok=True), name
-    assert coarse.facts["warnings"] == every.facts["warnings"]
+    assert coarse.facts.warnings == every.facts.warnings
 
 
 def test_what_the_plant_measures_can_be_had_from_rows_far_apart(

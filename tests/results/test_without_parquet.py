@@ -37,9 +37,3 @@ def test_parquet_is_refused_before_the_run_and_the_extra_named(call: Call, tmp_p
 def test_a_parquet_file_cannot_be_read_and_the_extra_is_named(tmp_path: Path) -> None:
     with pytest.raises(HexapodError, match=r"results.parquet.*got 'no pyarrow'.*\[parquet\]"):
         read_parquet(tmp_path / "results.parquet")
-
-
-def test_a_study_is_refused_and_the_extra_named(call: Call, tmp_path: Path) -> None:
-    folder = tmp_path / "out"
-    assert_refused(call("study", "friction", "-o", folder), "hexapod study", "WHEEL.whl[studies]")
-    assert not folder.exists()

@@ -224,7 +224,7 @@ def test_a_run_warns_of_servos_that_gave_less_torque_because_they_were_hot() -> 
         settings = {"duration": 0.1, "outputs.plots": False}
         settings |= {f"servo.{key}": value for key, value in servo.items()}
         result = hexapod_cosim.simulate("walk_flat", "kinematic", settings=settings)
-        found = [text for text in result.facts["warnings"] if "because they were hot" in text]
+        found = [text for text in result.facts.warnings if "because they were hot" in text]
         assert len(found) == count
         if found:
             assert found[0].startswith("18 of 18 servos gave less torque")

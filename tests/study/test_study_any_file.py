@@ -15,10 +15,10 @@ import tomlkit
 from studies import study_of
 
 from hexapod_cosim.cosim.common.files import to_json
-from hexapod_cosim.cosim.study.bundled import list_studies
-from hexapod_cosim.cosim.study.reading import load_study, study_from_table
-from hexapod_cosim.cosim.study.runs import Sweep
-from hexapod_cosim.cosim.study.store import columns_of
+from hexapod_cosim.extensions.study.bundled import list_studies
+from hexapod_cosim.extensions.study.reading import load_study, study_from_table
+from hexapod_cosim.extensions.study.runs import Sweep
+from hexapod_cosim.extensions.study.store import columns_of
 from hexapod_cosim.models import HexapodError
 
 SEEDS, FILES = 8, 60  # files per seed: 480 in all, of which one in fourteen is a study

@@ -19,10 +19,10 @@ from studies import KINEMATIC, Row, quiet, rows, run_quietly, stored_count, stud
 from study_runners import Slow
 
 from hexapod_cosim.cosim.run.walker import Walker
-from hexapod_cosim.cosim.study import workers as workers_module
-from hexapod_cosim.cosim.study.reading import load_study
-from hexapod_cosim.cosim.study.records import StudyError
-from hexapod_cosim.cosim.study.study import Options, run_study
+from hexapod_cosim.extensions.study import workers as workers_module
+from hexapod_cosim.extensions.study.reading import load_study
+from hexapod_cosim.extensions.study.records import StudyError
+from hexapod_cosim.extensions.study.study import Options, run_study
 
 TABLE: dict[str, Any] = {**KINEMATIC, "seeds": 60, "factors": {"friction.mu": [0.3, 0.5]}}
 REAL: dict[str, Any] = {

@@ -10,8 +10,8 @@ from command import Call, assert_refused
 from studies import stored_count, use_runner
 from study_runners import Brief, Fake, Leaky
 
-from hexapod_cosim.cosim.study import store as store_module
-from hexapod_cosim.cosim.study.reading import load_study
+from hexapod_cosim.extensions.study import store as store_module
+from hexapod_cosim.extensions.study.reading import load_study
 
 KINEMATIC = 'controls = ["kinematic"]\n'
 GRIP = "seeds = 2\n[set]\nfriction.mu = 0.5\n"

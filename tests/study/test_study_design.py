@@ -11,8 +11,8 @@ import pytest
 from scipy import stats
 from studies import study_of
 
-from hexapod_cosim.cosim.study.factors import at_quantile
-from hexapod_cosim.cosim.study.records import (
+from hexapod_cosim.extensions.study.factors import at_quantile
+from hexapod_cosim.extensions.study.records import (
     INTEGERS,
     LOGUNIFORM,
     NORMAL,
@@ -21,7 +21,7 @@ from hexapod_cosim.cosim.study.records import (
     Factor,
     Study,
 )
-from hexapod_cosim.cosim.study.runs import Design, Sweep
+from hexapod_cosim.extensions.study.runs import Design, Sweep
 
 TWO = {"friction.mu": {"uniform": [0.0, 1.0]}, "command.vx": {"uniform": [0.0, 1.0]}}
 STRATA = 64

@@ -14,15 +14,15 @@ from gains import make_gains
 from matplotlib.figure import Figure
 from studies import KINEMATIC, replace_stored, run_quietly, study_of
 
-from hexapod_cosim.cosim.cli.study.studying import report_on
 from hexapod_cosim.cosim.results.comparison import made_change
-from hexapod_cosim.cosim.study.groups import Point
-from hexapod_cosim.cosim.study.moments import Figures, Mean
-from hexapod_cosim.cosim.study.records import Study
-from hexapod_cosim.cosim.study.report import heat
-from hexapod_cosim.cosim.study.report.figures import drawings, history
-from hexapod_cosim.cosim.study.store import FIGURES
-from hexapod_cosim.cosim.study.summary import Results, Trial, read_results
+from hexapod_cosim.extensions.study.groups import Point
+from hexapod_cosim.extensions.study.moments import Figures, Mean
+from hexapod_cosim.extensions.study.records import Study
+from hexapod_cosim.extensions.study.report import heat
+from hexapod_cosim.extensions.study.report.figures import drawings, history
+from hexapod_cosim.extensions.study.store import FIGURES
+from hexapod_cosim.extensions.study.studying import report_on
+from hexapod_cosim.extensions.study.summary import Results, Trial, read_results
 from hexapod_cosim.models import load_robot
 
 GRID = {"factors": {"friction.mu": [0.3, 0.5], "command.vx": [0.05, 0.08]}}
@@ -183,7 +183,7 @@ def folder(athena_fmu: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) ->
     def made(table: Mapping[str, Any], *, lost: int = 0, pictures: bool = False) -> str:
         if not pictures:
             monkeypatch.setattr(
-                "hexapod_cosim.cosim.study.report.page.drawings", lambda *_, **__: {}
+                "hexapod_cosim.extensions.study.report.page.drawings", lambda *_, **__: {}
             )
         out = tmp_path / "out"
         run_quietly(study_of(table), out, fmu=athena_fmu, gains=make_gains(load_robot("athena")))

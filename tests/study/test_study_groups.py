@@ -13,12 +13,12 @@ import pytest
 from studies import Row, study_of, write_rows
 
 from hexapod_cosim.cosim.results.comparison import Change, change_of, half_width_of
-from hexapod_cosim.cosim.study import groups as groups_module
-from hexapod_cosim.cosim.study.groups import Groups, Point
-from hexapod_cosim.cosim.study.moments import Figures
-from hexapod_cosim.cosim.study.records import Study
-from hexapod_cosim.cosim.study.store import FIGURES, Store
-from hexapod_cosim.cosim.study.summary import failure_counts, point_columns, point_row
+from hexapod_cosim.extensions.study import groups as groups_module
+from hexapod_cosim.extensions.study.groups import Groups, Point
+from hexapod_cosim.extensions.study.moments import Figures
+from hexapod_cosim.extensions.study.records import Study
+from hexapod_cosim.extensions.study.store import FIGURES, Store
+from hexapod_cosim.extensions.study.summary import failure_counts, point_columns, point_row
 
 ROUNDING = 1e-11  # relative: some dozen sums of numbers of one size
 POINTS, SEEDS = 5, 7

@@ -16,9 +16,9 @@ import pytest
 from gains import make_gains
 from studies import run_quietly, study_of
 
-from hexapod_cosim.cosim.study.folder import RESULTS
-from hexapod_cosim.cosim.study.reading import study_from_table
-from hexapod_cosim.cosim.study.summary import POINTS, read_results
+from hexapod_cosim.extensions.study.folder import RESULTS
+from hexapod_cosim.extensions.study.reading import study_from_table
+from hexapod_cosim.extensions.study.summary import POINTS, read_results
 from hexapod_cosim.models import load_robot
 
 TABLE: dict[str, Any] = {

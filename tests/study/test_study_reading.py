@@ -9,9 +9,9 @@ from typing import Any
 import pytest
 from studies import study_of
 
-from hexapod_cosim.cosim.study.bundled import list_studies
-from hexapod_cosim.cosim.study.reading import load_study
-from hexapod_cosim.cosim.study.records import Study, StudyError
+from hexapod_cosim.extensions.study.bundled import list_studies
+from hexapod_cosim.extensions.study.reading import load_study
+from hexapod_cosim.extensions.study.records import Study, StudyError
 from hexapod_cosim.models import HexapodError
 
 TRAINING = {"scenarios": ["walk_flat"], "seeds": {"first": 10, "count": 3}}

@@ -31,13 +31,13 @@ from studies import (
 from study_runners import Counting, Slow
 
 from hexapod_cosim.cosim.run.walker import Walker
-from hexapod_cosim.cosim.study import store as store_module
-from hexapod_cosim.cosim.study.folder import MANIFEST, RESULTS, TIMES, export_runs, locked
-from hexapod_cosim.cosim.study.reading import load_study
-from hexapod_cosim.cosim.study.records import StudyError
-from hexapod_cosim.cosim.study.store import RUNS, Store
-from hexapod_cosim.cosim.study.study import Options, run_study
-from hexapod_cosim.cosim.study.summary import read_results
+from hexapod_cosim.extensions.study import store as store_module
+from hexapod_cosim.extensions.study.folder import MANIFEST, RESULTS, TIMES, export_runs, locked
+from hexapod_cosim.extensions.study.reading import load_study
+from hexapod_cosim.extensions.study.records import StudyError
+from hexapod_cosim.extensions.study.store import RUNS, Store
+from hexapod_cosim.extensions.study.study import Options, run_study
+from hexapod_cosim.extensions.study.summary import read_results
 
 ROOT = Path(__file__).resolve().parents[2]
 TIMEOUT = 180.0  # s    for what takes some seconds on an idle machine
@@ -178,8 +178,8 @@ def test_a_full_disk_is_reported_and_the_study_is_resumed_from_the_stored_runs(
     study, folder = study_of(MANY_RUNS), tmp_path / "out"
     with monkeypatch.context() as patch:
         patch.setattr(store_module, "FLUSH_ROWS", 20)
-        patch.setattr("hexapod_cosim.cosim.study.dispatch.MAX_CHUNK", 10)
-        patch.setattr("hexapod_cosim.cosim.study.study.Store", SmallStore)
+        patch.setattr("hexapod_cosim.extensions.study.dispatch.MAX_CHUNK", 10)
+        patch.setattr("hexapod_cosim.extensions.study.study.Store", SmallStore)
         expected = r"the disk is full.*make room and start the study again"
         with pytest.raises(StudyError, match=expected):
             run_quietly(study, folder, fmu=athena_fmu)
@@ -213,7 +213,7 @@ def test_a_study_is_not_resumed_with_other_code(
     small: Callable[..., Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     small()
-    monkeypatch.setattr("hexapod_cosim.cosim.study.job.code_hash", lambda: "0123456789abcdef")
+    monkeypatch.setattr("hexapod_cosim.extensions.study.job.code_hash", lambda: "0123456789abcdef")
     with pytest.raises(StudyError, match=r"environment.code was .*, is \"0123456789abcdef\""):
         small()
 
@@ -229,7 +229,7 @@ def test_another_study_into_the_same_folder_is_refused_and_the_differences_named
     other.write_bytes(athena_fmu.read_bytes() + b"\0")
     with pytest.raises(StudyError, match=r"fmus.athena was"):
         small(fmu=other)
-    monkeypatch.setattr("hexapod_cosim.cosim.study.job.package_version", lambda: "9.9")
+    monkeypatch.setattr("hexapod_cosim.extensions.study.job.package_version", lambda: "9.9")
     with pytest.raises(StudyError, match=r"environment.hexapod-cosim was .*, is \"9.9\""):
         small()
     assert (tmp_path / "out" / MANIFEST).read_bytes() == first

@@ -25,10 +25,10 @@ from hexapod_cosim.cosim.run.batch import run_batch
 from hexapod_cosim.cosim.run.walker import Walker
 from hexapod_cosim.cosim.run.worker_pool import TRIES
 from hexapod_cosim.cosim.scenario.scenario import load_scenario
-from hexapod_cosim.cosim.study.dispatch import DIED, WHY_DIED
-from hexapod_cosim.cosim.study.records import StudyError
-from hexapod_cosim.cosim.study.store import FIGURES
-from hexapod_cosim.cosim.study.study import Options, run_study
+from hexapod_cosim.extensions.study.dispatch import DIED, WHY_DIED
+from hexapod_cosim.extensions.study.records import StudyError
+from hexapod_cosim.extensions.study.store import FIGURES
+from hexapod_cosim.extensions.study.study import Options, run_study
 from hexapod_cosim.models import load_robot
 
 WALK: dict[str, Any] = {
@@ -200,7 +200,7 @@ def _children() -> set[int]:
 def test_workers_that_only_die_end_the_study(
     athena_fmu: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("hexapod_cosim.cosim.study.dispatch.MAX_DEATHS_IN_A_ROW", 0)
+    monkeypatch.setattr("hexapod_cosim.extensions.study.dispatch.MAX_DEATHS_IN_A_ROW", 0)
     study = study_of({**KINEMATIC, "factors": {"friction.mu": [0.13]}, "seeds": 9})
     with pytest.raises(StudyError, match="every worker dies before it has finished a run"):
         run_quietly(study, tmp_path / "out", fmu=athena_fmu, workers=1)
@@ -209,7 +209,7 @@ def test_workers_that_only_die_end_the_study(
 def test_a_scheduler_that_is_not_there_is_named(
     athena_fmu: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("hexapod_cosim.cosim.study.workers.CONNECT_TIMEOUT", "1s")
+    monkeypatch.setattr("hexapod_cosim.extensions.study.workers.CONNECT_TIMEOUT", "1s")
     with pytest.raises(StudyError, match=r"--scheduler: no scheduler answers.*tcp://127.0.0.1:9"):
         run_study(
             study_of({**SMALL, **KINEMATIC}),
@@ -223,7 +223,7 @@ def test_a_worker_with_other_versions_is_refused(
     athena_fmu: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     # in this process, not in the worker
-    monkeypatch.setattr("hexapod_cosim.cosim.study.job.package_version", lambda: "9.9")
+    monkeypatch.setattr("hexapod_cosim.extensions.study.job.package_version", lambda: "9.9")
     with pytest.raises(
         StudyError, match=r"differs from the machine that sends.*hexapod-cosim 9.9, here"
     ):
@@ -272,7 +272,7 @@ def test_a_run_with_equal_settings_is_not_repeated(
         "compliant": 3 * 2 * 2,
     }
     Counting.asked.clear()
-    monkeypatch.setattr("hexapod_cosim.cosim.study.worker.MAX_KNOWN", 0)
+    monkeypatch.setattr("hexapod_cosim.extensions.study.worker.MAX_KNOWN", 0)
     assert run_quietly(study_of(table), tmp_path / "made", **options) == kept
     assert len(Counting.asked) == 24
     assert len({row["slip_per_metre"] for row in kept}) == 4 + 12

@@ -14,8 +14,13 @@ from pathlib import Path
 from filelock import FileLock
 
 ROOT = Path(__file__).resolve().parents[2]
-PRESET = os.environ.get("HEXAPOD_PRESET", "test")  # `make test-sanitize` uses another folder
+PRESET = os.environ.get(
+    "HEXAPOD_PRESET", "test"
+)  # of tools/cmake; `make test-sanitize` uses another folder
 BUILD = ROOT / "build" / PRESET
+TARGETS = ["hexapod", "hexapod_c", "hexapod_controller", "hexapod_controller_c", "hexapod_master"]
+if (ROOT / "extensions" / "gym").is_dir():
+    TARGETS.append("hexapod_policy")
 PACKED = ROOT / "build" / "plant" if PRESET == "test" else BUILD / "plant"
 
 
@@ -45,7 +50,7 @@ def _build() -> None:
         # CMake, Python or the generator of the build folder is missing
         shutil.rmtree(BUILD, ignore_errors=True)
         _succeed(_configure())
-    _succeed(_cmake("--build", "--preset", PRESET))
+    _succeed(_cmake("--build", str(BUILD), "--target", *TARGETS))
     _succeed(_cmake("--install", str(BUILD), "--prefix", str(PACKED)))
 
 
@@ -59,7 +64,9 @@ def shared_library(build: Path, component: str, name: str) -> Path:
 def _configure() -> subprocess.CompletedProcess[str]:
     fresh = not (BUILD / "CMakeCache.txt").exists()
     generator = ["-G", "Ninja"] if fresh and shutil.which("ninja", path=_search_path()) else []
-    return _cmake("--preset", PRESET, f"-DPython_EXECUTABLE={sys.executable}", *generator)
+    settings = str(ROOT / "tools" / "cmake" / f"{PRESET}.cmake")
+    where = ["-S", str(ROOT / "packaging"), "-B", str(BUILD), "-C", settings]
+    return _cmake(*where, f"-DPython_EXECUTABLE={sys.executable}", *generator)
 
 
 def _cmake(*arguments: str) -> subprocess.CompletedProcess[str]:

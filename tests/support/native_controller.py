@@ -10,7 +10,7 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from mirror import LEGS, OK, PerJoint, Real, record
+from mirror import OK, HxControllerInput, HxControllerOutput, HxRange, Real
 
 from hexapod_cosim.controller import BodyCommand, Gait, Measurement
 from hexapod_cosim.cosim.interface.controller_interface import (
@@ -18,37 +18,7 @@ from hexapod_cosim.cosim.interface.controller_interface import (
     load_controller_interface,
 )
 
-Flags = ct.c_int * LEGS
 COMMANDS = ("angle_ref", "speed_ref", "torque_ref", "acceleration_ref")
-HxRange = record(
-    "HxRange",
-    ("name", ct.c_char_p),
-    ("unit", ct.c_char_p),
-    ("min", Real),
-    ("max", Real),
-    ("offset", ct.c_size_t),
-    ("is_int", ct.c_int),
-)
-HxControllerInput = record(
-    "HxControllerInput",
-    ("command", Real * 6),
-    ("angle", PerJoint),
-    ("foot_force", PerJoint),
-    ("quaternion", Real * 4),
-)
-HxControllerOutput = record(
-    "HxControllerOutput",
-    ("angle_ref", PerJoint),
-    ("speed_ref", PerJoint),
-    ("torque_ref", PerJoint),
-    ("swinging", Flags),
-    ("unreachable", Flags),
-    ("fallback", Flags),
-    ("shift", (Real * 2) * LEGS),
-    ("lift", Real * LEGS),
-    ("planned", (Real * 3) * LEGS),
-    ("acceleration_ref", PerJoint),
-)
 
 
 class NativeError(Exception):
@@ -175,15 +145,8 @@ class NativeController:
 
     def sense(self, command: BodyCommand, measurement: Measurement) -> None:
         """Sets the input from command and measurement."""
-        values = (
-            command.vx,
-            command.vy,
-            command.yaw_rate,
-            command.height,
-            command.roll,
-            command.pitch,
-        )
-        self.input.command[:] = values
+        for name, _ in self.input.command._fields_:
+            setattr(self.input.command, name, getattr(command, name))
         for name in ("angle", "foot_force"):
             np.ctypeslib.as_array(getattr(self.input, name))[...] = getattr(measurement, name)
         self.input.quaternion[:] = measurement.quaternion.tolist()

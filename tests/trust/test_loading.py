@@ -43,7 +43,7 @@ def both(plant_build: Path) -> list[Path]:
     """The libraries of the plant's and of the controller's FMU."""
     return [
         shared_library(plant_build, "plant_fmu", "hexapod"),
-        shared_library(plant_build, "controller_fmu", "hexapod_controller"),
+        shared_library(plant_build, "controller/fmu", "hexapod_controller"),
     ]
 
 

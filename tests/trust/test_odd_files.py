@@ -66,13 +66,12 @@ def refused(*arguments: str) -> str:
     [
         lambda file, out: ("export", "--robot", file, "-o", f"{out}.fmu"),
         lambda file, out: ("simulate", file, "-o", out),
-        lambda file, out: ("study", file, "-o", out),
         lambda file, out: (
             *("export", "--controller", "compliant", "--gains", file),
             *("-o", f"{out}.fmu"),
         ),
     ],
-    ids=["robot", "scenario", "study", "gains"],
+    ids=["robot", "scenario", "gains"],
 )
 def test_large_numbers_and_deep_tables_are_no_toml(
     plant_build: Path, tmp_path: Path, command: Callable[[str, str], tuple[str, ...]], name: str
@@ -115,7 +114,6 @@ def test_a_large_number_on_the_command_line_is_no_number(plant_build: Path, name
         lambda path: ("simulate", f"{path}.toml"),
         lambda path: ("simulate", "walk_flat", "--set", "duration=0.01", "-o", path),
         lambda path: ("simulate", "walk_flat", "--fmu", f"{path}.fmu"),
-        lambda path: ("study", f"{path}.toml", "-o", "o"),
         lambda path: ("compare", f"{path}.toml", "-o", "o"),
         lambda path: ("validate", f"{path}.fmu"),
         lambda path: ("report", path),
@@ -220,7 +218,6 @@ ENDLESS = [
     ("simulate", "PATH.toml", "-o", "o"),
     ("export", "--robot", "PATH.toml", "-o", "o.fmu"),
     ("export", "--robot", "PATH.urdf", "-o", "o.fmu"),
-    ("study", "PATH.toml", "-o", "o"),
     ("export", "--controller", "compliant", "--gains", "PATH.toml", "-o", "o.fmu"),
     ("report", "folder"),
     ("simulate", "walk_flat", "--set", "robot=PATH.toml", "-o", "o"),

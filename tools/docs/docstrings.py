@@ -1,8 +1,7 @@
-"""Converts docstrings to reStructuredText for Sphinx.
+"""Prepares docstrings for Sphinx: characters of formulas are escaped, `names` become code.
 
-Our docstrings are plain text with formulas (|v_t|, f_n, x*y). Characters that are markup in
-reStructuredText are escaped, `names` become code, indented formulas stay unchanged, and Args become
-fields. A comment to the right of a field is the description of the field.
+Our docstrings are plain text with formulas (|v_t|, f_n, x*y) and sections of Google's style, which
+sphinx.ext.napoleon converts. A comment to the right of a field is its description.
 """
 
 from __future__ import annotations
@@ -14,40 +13,22 @@ from typing import Any
 from sphinx.pycode import parser
 
 OURS = "hexapod_cosim."
-INDENT = 4
-ARGUMENT = re.compile(r"^ {4}\*{0,2}([\w, .]+): (.*)")
-SECTIONS = ("Args:", "Returns:")
+SECTIONS = ("Args:", "Returns:", "Raises:")
 COMMENT = re.compile(r"^\s*#:? *(?!noqa|type:|fmt:)(.*)\r?\n?$")
 
 
 def converted(lines: list[str]) -> Iterator[str]:
-    """Yields the lines of a docstring in reStructuredText."""
-    place = "text"  # the meaning of indented lines: "text", "formula" or a section
+    """Yields the lines of a docstring; indented ones outside sections are formulas."""
+    place = "text"  # "text", "formula" or a section
     for line in lines:
-        indented = line.startswith(" " * INDENT)
-        if line.strip() and not indented:
+        if line.strip() and not line.startswith("    "):
             if place != "text":
                 yield ""
             place = line if line in SECTIONS else "text"
-            yield "" if line in SECTIONS else escaped(line)
-        elif indented and place in SECTIONS:
-            yield from _field(line, place)
-        elif indented and place == "text":
+        elif line.strip() and place == "text":
             place = "formula"
-            yield from ("", "::", "", line)
-        else:
-            yield line
-
-
-def _field(line: str, section: str) -> Iterator[str]:
-    """Yields the fields of a line of a section, one for each argument."""
-    found = ARGUMENT.match(line) if section == "Args:" else None
-    if found:
-        yield from (f":param {name}: {escaped(found[2])}" for name in found[1].split(", "))
-    elif section == "Returns:" and not line.startswith(" " * (INDENT + 1)):
-        yield f":returns: {escaped(line.strip())}"
-    else:
-        yield escaped(line)
+            yield from ("", "::", "")
+        yield line if place == "formula" else escaped(line)
 
 
 def escaped(line: str) -> str:
@@ -68,7 +49,7 @@ def process(
 
 
 def setup(app: Any) -> dict[str, bool]:
-    """Registers the extension with Sphinx."""
+    """Registers the extension with Sphinx; napoleon's conversion comes after it."""
     parser.comment_re = COMMENT  # Sphinx's own pattern requires "#:"
-    app.connect("autodoc-process-docstring", process)
+    app.connect("autodoc-process-docstring", process, priority=100)
     return {"parallel_read_safe": True, "parallel_write_safe": True}

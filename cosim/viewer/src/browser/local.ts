@@ -6,7 +6,7 @@ const LONGEST = 1; // s    made up at once; a longer gap, as of a hidden page, i
 const SPAN = 1000; // ms    over which the real-time factor is measured
 const MOST_WEIGHTS = 3; // body weights    largest push
 
-/** What the page holds (cosim/live/static_page.py). */
+/** What the page holds (extensions/live/static_page.py). */
 export interface StaticSetup extends Setup {
   readonly world: World;
   readonly first: Settings;
@@ -172,7 +172,7 @@ export class LocalLoop implements Connection {
     this.command();
   }
 
-  /** Returns the speeds for a change from one gait to another (cosim/live/gait_change.py). */
+  /** Returns the speeds for a change from one gait to another (extensions/live/gait_change.py). */
   private slowed(gait: string, next: string): Limits {
     const [a, b] = [gait, next].map((name) => this.setup.walks[name].limits);
     const { share } = this.setup;

@@ -1,5 +1,5 @@
 /**
- * The module of the robot with its controller (wasm/walker.h): its functions, and views of its
+ * The module of the robot with its controller (extensions/live/wasm/walker.h): its functions, and views of its
  * memory. SI units; legs LF LM LR RF RM RR.
  */
 

@@ -1,4 +1,4 @@
-/** What the loop sends (cosim/live/state.py and loop.py). SI units; legs LF LM LR RF RM RR. */
+/** What the loop sends (extensions/live/state.py and loop.py). SI units; legs LF LM LR RF RM RR. */
 
 import type { Ground, PackedSurface, Robot } from "../types";
 
@@ -72,7 +72,7 @@ export interface Status {
   readonly notes: readonly (readonly [number, string])[];
 }
 
-/** What the page holds (cosim/live/page.py). */
+/** What the page holds (extensions/live/page.py). */
 export interface Setup {
   readonly title: string;
   readonly controls: readonly {

@@ -1,1 +1,0 @@
-"""Compares compliant with kinematic control, part by part: `python -m benchmarks.control`."""

@@ -1,1 +1,0 @@
-"""Robots with secret numbers, identified from their logs."""

@@ -1,1 +1,0 @@
-"""Environment steps per second, beside mujoco.rollout and fmugym."""

@@ -1,0 +1,226 @@
+/* compliant.h - compliant control around its laws, from the sensors to the corrected feet. Python:
+ * controller/comply/compliant.py. */
+#ifndef HX_COMPLIANT_H
+#define HX_COMPLIANT_H
+
+#include "../sense/load_adaptation.h"
+#include "../walk/hold.h"
+#include "../walk/trajectory.h"
+#include "compliance.h"
+#include "planned_squeeze.h"
+#include "sway.h"
+#include <string.h>
+
+typedef struct hxCompliantModel {
+  double per_second; /* 1/s   one over the period */
+  double leading; /* steps of the transition of the added velocity */
+  hxInverseDynamics dynamics;
+  hxSway sway;
+  hxSupport support;
+  hxPlannedSqueeze squeeze;
+  hxComplianceModel laws;
+  hxHoldModel hold;
+  hxLoadAdaptationModel adaptation;
+} hxCompliantModel;
+
+/* Velocity that steers back to the path, added to the commanded one, with a transition from one
+ * value to the next. */
+typedef struct hxSteering {
+  hxTwist begin, goal;
+  int64_t past; /* steps from the start of the transition to the first planned step */
+} hxSteering;
+
+typedef struct hxCompliant {
+  hxCompliance laws;
+  hxHold hold;
+  hxLoadAdaptation adaptation;
+  hxSteering steering;
+  int64_t count; /* number of steps */
+  double offset[HX_LEGS]; /* m, offsets for early and late touch-downs at the last step */
+  int moving; /* the offsets have just changed */
+} hxCompliant;
+
+/* What a step requires, and its commands. */
+typedef struct hxStance {
+  hxPlan plan;
+  double climb[HX_LEGS][HX_JOINTS]; /* rad/m  of the joints as a foot rises */
+  const double *value; /* (6) commanded vx vy yaw_rate height roll pitch */
+  const hxPosture *posture;
+  const hxPlane *plane; /* m  (6) planned feet, walking frame */
+  hxPlane sway; /* m, of the torso in the walking frame */
+  const double *height; /* m, (6) heights of the lowered feet */
+  const double *rolled; /* m, (6) outwards from the stance to the positions that the feet aim at */
+} hxStance;
+
+/* s, duration of the transition of the added velocity */
+static const double steering_time = 0.1;
+
+/* Computes the foot forces in the walking frame (C22) [N]: f_K = R_KT R_TW f_W. */
+static inline void hx_sense(const hxControllerInput *input, const hxPosture *posture,
+                            double force[HX_LEGS][3]) {
+  const double w = input->quaternion[0], x = input->quaternion[1], y = input->quaternion[2],
+               z = input->quaternion[3];
+  const double xx = x * x, yy = y * y, zz = z * z;
+  const double rotation[3][3] = {
+      {1.0 - 2.0 * (yy + zz), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)},
+      {2.0 * (x * y + w * z), 1.0 - 2.0 * (xx + zz), 2.0 * (y * z - w * x)},
+      {2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (xx + yy)}};
+  for (int leg = 0; leg < HX_LEGS; ++leg) {
+    const double *f = input->foot_force[leg];
+    double seen[3];
+    for (int i = 0; i < 3; ++i)
+      seen[i] = f[0] * rotation[0][i] + f[1] * rotation[1][i] + f[2] * rotation[2][i];
+    hxPlane plane = {seen[0], seen[1]};
+    hx_posture_turn(posture, &plane, &seen[2]);
+    force[leg][0] = plane.x;
+    force[leg][1] = plane.y;
+    force[leg][2] = seen[2];
+  }
+}
+
+static inline void hx_compliant_compile(const hxControllerDefinition *definition,
+                                        const hxLegSolver leg[HX_LEGS], hxCompliantModel *model) {
+  const double still[HX_LEGS][HX_JOINTS] = {{0.0}}, zero[3] = {0.0};
+  hxPose pose[HX_LEGS];
+  hxPosture level;
+  hxMasses masses;
+  hxDemand rest;
+  double foot[3];
+  model->per_second = 1.0 / definition->period;
+  model->leading = steering_time / definition->period;
+  hx_inverse_dynamics_compile(definition, leg, &model->dynamics);
+  for (int k = 0; k < HX_LEGS; ++k) {
+    hx_leg_solver_forward(&leg[k], leg[k].stance, foot);
+    hx_leg_solver_pose(&leg[k], hx_plane(foot[0], foot[1]), foot[2], &pose[k]);
+  }
+  hx_posture_of(&level, zero, zero);
+  hx_inverse_dynamics_place(&model->dynamics, leg, pose, hx_plane(0.0, 0.0), hx_plane(1.0, 0.0),
+                            &level, &masses);
+  const hxNeighbours motion = {{NULL, &masses, NULL}, {NULL, pose, NULL}};
+  hx_inverse_dynamics_demand(&model->dynamics, leg, &motion, still, &level, 1.0, &rest);
+  hx_sway_compile(definition, leg, &model->dynamics, &model->sway);
+  hx_support_compile(definition, &rest, &model->support);
+  hx_compliance_compile(definition, -model->dynamics.floor, &model->laws);
+  hx_planned_squeeze_compile(definition, model->laws.weight, -model->dynamics.floor,
+                             &model->squeeze);
+  hx_hold_compile(definition, &model->hold);
+  hx_load_adaptation_compile(definition, &model->adaptation);
+}
+
+static inline void hx_compliant_reset(const hxCompliantModel *model, hxCompliant *compliant) {
+  memset(compliant, 0, sizeof *compliant);
+  hx_compliance_reset(&compliant->laws);
+  hx_load_adaptation_reset(&model->adaptation, &compliant->adaptation);
+}
+
+/* ----------------------------------------------------------------------------------- steering */
+
+/* Returns what is added to the commanded velocity a number of periods after the first planned step
+ * (C40). */
+static inline hxTwist hx_compliant_addition(const hxCompliantModel *model,
+                                            const hxCompliant *compliant, int64_t steps) {
+  const hxSteering *s = &compliant->steering;
+  const double part = hx_smaller((double)(s->past + steps) / model->leading, 1.0);
+  return (hxTwist){hx_plane_add(s->begin.velocity,
+                                hx_scaled(hx_plane_sub(s->goal.velocity, s->begin.velocity), part)),
+                   s->begin.yaw_rate + (s->goal.yaw_rate - s->begin.yaw_rate) * part};
+}
+
+/* Called before new steps are planned: takes over the corrections of the slow loops, when a leg
+ * lifts off or touches down (afresh), and at a stop (not moves) (C40). steps: periods since the
+ * last planning. */
+static inline void hx_compliant_steer(const hxCompliantModel *model, int64_t steps, int moves,
+                                      int afresh, hxCompliant *compliant) {
+  hxSteering *s = &compliant->steering;
+  const hxTwist none = {{0.0, 0.0}, 0.0},
+                lost = {compliant->hold.velocity, compliant->hold.yaw_rate};
+  s->past += steps;
+  const int added =
+      s->goal.velocity.x != 0.0 || s->goal.velocity.y != 0.0 || s->goal.yaw_rate != 0.0;
+  if (!afresh && (moves || !added)) return;
+  s->begin = hx_compliant_addition(model, compliant, 0);
+  s->goal = moves ? lost : none;
+  s->past = 0;
+}
+
+/* ------------------------------------------------------------------------------------ sensors */
+
+/* Passes the measured positions of the standing feet to the slow loops. */
+static inline void look(const hxCompliantModel *model, const hxLegSolver leg[HX_LEGS],
+                        const hxStance *stance, const hxControllerInput *input,
+                        hxCompliant *compliant) {
+  const double w = input->quaternion[0], x = input->quaternion[1], y = input->quaternion[2],
+               z = input->quaternion[3];
+  hxSight seen;
+  double foot[3];
+  for (int k = 0; k < HX_LEGS; ++k) {
+    const double *angle = input->angle[k];
+    hx_leg_solver_forward(&leg[k], angle, foot);
+    seen.plane[k] = hx_plane(foot[0], foot[1]);
+    seen.height[k] = foot[2];
+    hx_posture_turn(stance->posture, &seen.plane[k], &seen.height[k]);
+    const double rolls = hx_leg_solver_rolling(&leg[k], angle) - stance->rolled[k];
+    const hxPlane rolled = hx_scaled(hx_cis(leg[k].hip_yaw + angle[0]), rolls);
+    seen.plane[k] = hx_plane_add(hx_plane_sub(seen.plane[k], rolled), stance->sway);
+    seen.height[k] += stance->value[3];
+    seen.planned[k] = stance->plane[k];
+    seen.planned_height[k] = stance->height[k];
+    seen.load[k] = compliant->laws.load[k];
+  }
+  const double rise = hx_clamp(2.0 * (w * y - z * x), -1.0, 1.0);
+  seen.tilt[0] = hx_arc(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y)) - stance->value[4];
+  seen.tilt[1] = hx_arc(rise, sqrt((1.0 - rise) * (1.0 + rise))) - stance->value[5];
+  seen.yaw = hx_arc(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z));
+  seen.velocity = hx_plane(stance->value[0], stance->value[1]);
+  seen.yaw_rate = stance->value[2];
+  hx_hold_look(&model->hold, &seen, &compliant->hold);
+}
+
+/* --------------------------------------------------------------------------------------- step */
+
+/* Computes the joint angles of a leg with the foot raised (C41). */
+static inline void correct(const hxLegSolver *leg, const double climb[HX_JOINTS], double raised,
+                           double angle[HX_JOINTS]) {
+  for (int joint = 0; joint < HX_JOINTS; ++joint)
+    angle[joint] = hx_clamp(angle[joint] + climb[joint] * raised, leg->angle_min[joint],
+                            leg->angle_max[joint]);
+}
+
+/* Advances by one period: corrects the joint commands of this step in place (C41). */
+static inline void hx_compliant_step(const hxCompliantModel *model, const hxLegSolver leg[HX_LEGS],
+                                     const hxStance *stance, const hxControllerInput *input,
+                                     hxCompliant *compliant, hxControllerOutput *output) {
+  hxCompliance *laws = &compliant->laws;
+  double force[HX_LEGS][3];
+  hx_sense(input, stance->posture, force);
+  hx_compliance_step(&model->laws, &stance->plan, force, laws);
+  if (compliant->count % model->hold.every == 0) {
+    if (laws->trust == 1.0)
+      look(model, leg, stance, input, compliant);
+    else
+      memset(&compliant->hold, 0, sizeof compliant->hold);
+  }
+  ++compliant->count;
+  const int busy = hx_touchdown_busy(&laws->touchdown);
+  for (int k = 0; k < HX_LEGS; ++k) {
+    const double offset = laws->touchdown.offset[k], raised = offset + compliant->hold.lift[k];
+    correct(&leg[k], stance->climb[k], raised, output->angle_ref[k]);
+    for (int joint = 0; joint < HX_JOINTS; ++joint) {
+      if (busy || compliant->moving)
+        output->speed_ref[k][joint] +=
+            stance->climb[k][joint] * ((offset - compliant->offset[k]) * model->per_second);
+      output->torque_ref[k][joint] = laws->torque[k][joint];
+    }
+    if (busy || compliant->moving) compliant->offset[k] = offset;
+    output->fallback[k] = laws->fallback[k];
+    output->shift[k][0] = output->shift[k][1] = 0.0;
+    output->lift[k] = raised;
+  }
+  if (busy || compliant->moving) compliant->moving = busy;
+  const double needed = laws->burden.heft * laws->burden.peak / model->laws.most;
+  hx_load_adaptation_weigh(&model->adaptation, laws->burden.heft, &compliant->adaptation);
+  hx_load_adaptation_step(&model->adaptation, (const double (*)[HX_JOINTS])laws->torque, needed,
+                          laws->held, &compliant->adaptation);
+}
+
+#endif

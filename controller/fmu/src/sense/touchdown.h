@@ -1,0 +1,66 @@
+/* touchdown.h - ground that is met too early or too late (C36). Python:
+ * controller/sense/touchdown.py. */
+#ifndef HX_TOUCHDOWN_H
+#define HX_TOUCHDOWN_H
+
+#include "../plane.h"
+#include "hexapod/controller.h"
+#include <math.h>
+
+typedef struct hxTouchdown {
+  double offset[HX_LEGS]; /* m, by which the paths are raised */
+  double late[HX_LEGS]; /* s, for how long the ground has been missing */
+} hxTouchdown;
+
+/* m, a foot that meets the ground earlier on its way down has met it early */
+static const double hx_early = 0.002;
+static const double hx_reach_limit = 0.040; /* m, by which a foot is lowered at most */
+static const double reach_speed = 0.08; /* m/s  downwards */
+static const double hold_limit = 0.030;  /* m, upwards: the largest step height of the robots */
+/* s, delay after the planned touch-down that is tolerated */
+static const double grace = 0.040;
+static const double return_time = 0.060; /* s, in which an offset decays in the swing */
+static const double negligible = 1e-5; /* m, a smaller offset is set to 0 */
+
+/* Returns whether some foot has an offset or misses the ground. */
+static inline int hx_touchdown_busy(const hxTouchdown *touchdown) {
+  int busy = 0;
+  for (int leg = 0; leg < HX_LEGS; ++leg)
+    busy |= touchdown->offset[leg] != 0.0 || touchdown->late[leg] != 0.0;
+  return busy;
+}
+
+/* Returns the next offset of a foot that returns to its path. */
+static inline double faded(double offset, double period) {
+  return fabs(offset) > negligible ? offset * hx_decay(-period / return_time) : 0.0;
+}
+
+/* Returns the next offset of a foot that has missed the ground for a time [s]. */
+static inline double moved(double offset, double late, double period, int touching, double falling,
+                           int swinging, int searching) {
+  if (searching || late > grace) return fmax(offset - reach_speed * period, -hx_reach_limit);
+  if (swinging && touching && falling > 0.0) return fmin(offset + falling, hold_limit);
+  if (swinging && !touching) return faded(offset, period);
+  return offset;
+}
+
+/* Advances by one period [s] (C36). touching: feet that report a force; falling: distance by which
+ * the path of a foot that met the ground early moves down in this period [m], 0 for the others;
+ * swinging: legs planned in the air; loaded: legs planned to carry their whole share; searching:
+ * feet that the gait clock waits for; doubted: feet whose sensors are not trusted. */
+static inline void hx_touchdown_step(double period, const int touching[HX_LEGS],
+                                     const double falling[HX_LEGS], const int swinging[HX_LEGS],
+                                     const int loaded[HX_LEGS], const int searching[HX_LEGS],
+                                     const int doubted[HX_LEGS], hxTouchdown *touchdown) {
+  for (int leg = 0; leg < HX_LEGS; ++leg) {
+    const int misses = loaded[leg] && !touching[leg] && !doubted[leg];
+    const double offset = touchdown->offset[leg];
+    touchdown->late[leg] = misses ? touchdown->late[leg] + period : 0.0;
+    touchdown->offset[leg] = doubted[leg]
+                                 ? faded(offset, period)
+                                 : moved(offset, touchdown->late[leg], period, touching[leg],
+                                         falling[leg], swinging[leg], searching[leg]);
+  }
+}
+
+#endif

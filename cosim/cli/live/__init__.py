@@ -1,1 +1,0 @@
-"""The commands of the live robot: `hexapod live` and `hexapod realtime`."""

@@ -1,0 +1,234 @@
+"""Defines the command `hexapod benchmark`: controls on the cases of the course."""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Mapping, Sequence
+from contextlib import closing
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from hexapod_cosim.controller import Gains
+from hexapod_cosim.cosim.cli.extension import Command, Extension
+from hexapod_cosim.cosim.cli.failures import SUCCESS
+from hexapod_cosim.cosim.cli.running import ControlNames, GainsFile, Settings, given_gains
+from hexapod_cosim.cosim.cli.terminal import (
+    Json,
+    counting_bar,
+    show_files,
+    show_json,
+    show_table,
+    show_text,
+    waiting,
+    warn,
+)
+from hexapod_cosim.cosim.common.files import BENCHMARK, RUN_FILE, write_json
+from hexapod_cosim.cosim.control.controllers import check_control
+from hexapod_cosim.cosim.master.interrupts import deferred_interrupts
+from hexapod_cosim.cosim.master.loop import COMPLETED
+from hexapod_cosim.cosim.results.results import ResultsFolder, results_folder
+from hexapod_cosim.cosim.scenario.controls import AT, CHOOSER
+from hexapod_cosim.cosim.scenario.records import CHOSEN, CONTROLS
+from hexapod_cosim.extensions.course import texts
+from hexapod_cosim.extensions.course.goals import verdicts
+from hexapod_cosim.extensions.course.reading import load_course
+from hexapod_cosim.extensions.course.records import (
+    JUDGE,
+    SPLITS,
+    Course,
+    CourseError,
+    Entry,
+    lacking,
+    read_entries,
+)
+from hexapod_cosim.extensions.course.runs import Run, run_count, run_course
+from hexapod_cosim.extensions.course.store import read_table, write_result
+from hexapod_cosim.extensions.course.table import Table
+
+EPILOG = (
+    "A robot that falls or gets stuck is a result: it counts as a failure and is in no mean. "
+    "Ctrl-C writes the table of the runs that are done."
+)
+MAX_SEEDS = 1000
+OTHERS = tuple(name for name in CONTROLS if name != CHOOSER)
+DEFAULT = (*OTHERS, *(f"{name}{AT}{CHOSEN}" for name in OTHERS), CHOOSER)
+Without = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--without",
+        metavar="PART",
+        help="Add a column: the last control without this part of the compliant control.",
+    ),
+]
+Cases = Annotated[
+    list[str] | None,
+    typer.Option("--case", metavar="NAME", help="A case or a class of the course, repeated."),
+]
+
+
+def benchmark(
+    controls: ControlNames = None,
+    without: Without = None,
+    split: Annotated[
+        str,
+        typer.Option("--split", metavar="|".join(SPLITS), help="Cases to judge or to tune on."),
+    ] = JUDGE,
+    cases: Cases = None,
+    quick: Annotated[bool, typer.Option("--quick", help="Fewer seeds.")] = False,
+    seeds: Annotated[
+        int | None,
+        typer.Option("--seeds", metavar="N", help="Runs of each case and control; default 10."),
+    ] = None,
+    workers: Annotated[
+        int | None,
+        typer.Option("--workers", metavar="N", help="Processes; default: one for each processor."),
+    ] = None,
+    settings: Settings = None,
+    output: Annotated[
+        Path | None,
+        typer.Option("-o", "--output", metavar="DIR", help="Default out/benchmark."),
+    ] = None,
+    gains: GainsFile = None,
+    json: Json = False,
+) -> int:
+    """Judge controls on the course: ground, payload, sensors, pushes, commands, robots.
+
+    Without --control these are all built-in ones, and kinematic and paper control in the gait and
+    stance that compliant control chooses (kinematic@chosen). The first control is the reference; a
+    control in that walk is compared with the first one in it, and compliant control with both.
+    """
+    entries = read_entries(controls or DEFAULT, without or ())
+    _check_number(seeds, MAX_SEEDS, "--seeds")
+    _check_number(workers, MAX_SEEDS, "--workers")
+    course = load_course(
+        split, names=cases or (), seeds=seeds, quick=quick, settings=settings or ()
+    )
+    check_control(course.cases[0].scenario, [entry.control for entry in entries])
+    options = {
+        "control": controls,
+        "without": without,
+        "case": cases,
+        "set": settings,
+        "seeds": seeds,
+        "gains": gains,
+    }
+    command = _command_line(options, split=split, quick=quick)
+    with results_folder(output or Path("out") / BENCHMARK) as folder:
+        table, content, files = _run_into(
+            folder, course, entries, given_gains(gains), workers, command
+        )
+    if json:
+        show_json(content)
+    else:
+        _show(table)
+        show_files(files)
+        show_text(f"report: {files[-1]}")
+    return SUCCESS
+
+
+def _run_into(
+    folder: ResultsFolder,
+    course: Course,
+    entries: Sequence[Entry],
+    gains: Gains | None,
+    workers: int | None,
+    command: str,
+) -> tuple[Table, dict[str, Any], list[Path]]:
+    """Runs the course and writes its result; an interrupt writes that of the completed runs."""
+    done: list[Run] = []
+    labels = tuple(entry.label for entry in entries)
+    folder.begin()
+    try:
+        _collect(done, course, entries, gains=gains, workers=workers)
+    except KeyboardInterrupt:
+        with deferred_interrupts():
+            table = Table(course, labels, tuple(done), lacking(entries))
+            _write(table, folder.path, command, complete=False)
+            _show(table)
+            total = run_count(course, entries)
+            warn(f"stopped after {len(done)} of {total} runs; their table is in {folder.path}")
+        raise
+    table = Table(course, labels, tuple(done), lacking(entries))
+    content, files = _write(table, folder.path, command, complete=True)
+    title = f"Course {course.version}, {course.split}: {', '.join(labels)}"
+    facts = {"kind": BENCHMARK, "status": COMPLETED, "title": title, "command": command}
+    write_json(folder.path / RUN_FILE, facts)
+    return table, content, [folder.path / RUN_FILE, *files]
+
+
+def _write(
+    table: Table, folder: Path, command: str, *, complete: bool
+) -> tuple[dict[str, Any], list[Path]]:
+    """Writes result, picture and report; returns the content of benchmark.json and the files."""
+    # imported only here because matplotlib is slow to import
+    from hexapod_cosim.extensions.course.report import write_course_report  # noqa: PLC0415
+
+    content, files = write_result(table, folder, command=command, complete=complete)
+    with waiting("drawing the picture and the report"):
+        return content, [*files, *write_course_report(table, content, folder)]
+
+
+def report_on(folder: Path) -> list[Path]:
+    """Writes picture and report of a benchmark's folder again; returns the files.
+
+    Raises HexapodError.
+    """
+    from hexapod_cosim.extensions.course.report import write_course_report  # noqa: PLC0415  slow
+
+    return write_course_report(*read_table(folder), folder)
+
+
+def _collect(
+    done: list[Run],
+    course: Course,
+    entries: Sequence[Entry],
+    *,
+    gains: Gains | None,
+    workers: int | None,
+) -> None:
+    """Runs the course and appends each run to `done`."""
+    total, failed = run_count(course, entries), 0
+    with (
+        counting_bar("benchmark", total, plain=True) as count,
+        closing(run_course(course, entries, gains=gains, workers=workers)) as runs,
+    ):
+        count(0)
+        for run in runs:
+            done.append(run)
+            failed += not run.success
+            count(len(done), failed)
+
+
+def _show(table: Table) -> None:
+    """Prints the tables of a course."""
+    course = table.course
+    show_text(
+        f"Course {course.version} ({course.hash[:12]}), split {course.split}, "
+        f"{len(course.cases)} cases, {len(course.seeds)} seeds; reference {table.reference}"
+    )
+    for title, (columns, rows) in reversed(texts.tables(table, verdicts(table))):
+        show_text(f"\n{title}")
+        show_table(columns, rows)
+
+
+def _check_number(value: int | None, most: int, where: str) -> None:
+    """Raises CourseError for a given number that is not from 1 to `most`."""
+    if value is not None and not 1 <= value <= most:
+        raise CourseError("number out of range", got=value, expected=f"1 to {most}", where=where)
+
+
+def _command_line(options: Mapping[str, Any], *, split: str, quick: bool) -> str:
+    """Returns the command that repeats the benchmark."""
+    words = ["hexapod", "benchmark", "--split", split, *(["--quick"] if quick else [])]
+    for name, value in options.items():
+        for item in value if isinstance(value, list) else [value]:
+            words += [] if item is None else [f"--{name}", str(item)]
+    return shlex.join(words)
+
+
+EXTENSION = Extension(
+    commands=[Command(name="benchmark", run=benchmark, epilog=EPILOG)],
+    reports={BENCHMARK: report_on},
+)

@@ -1,0 +1,181 @@
+"""Writes a course's result: JSON to publish, and every run as CSV."""
+
+from __future__ import annotations
+
+import csv
+import math
+import platform
+import sys
+from collections.abc import Iterator, Mapping, Sequence
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+from hexapod_cosim.cosim.common.files import atomic_text, read_json, write_json, write_text
+from hexapod_cosim.cosim.common.plant_files import package_version
+from hexapod_cosim.extensions.course.goals import verdicts
+from hexapod_cosim.extensions.course.parts import judge_parts
+from hexapod_cosim.extensions.course.reading import load_course
+from hexapod_cosim.extensions.course.records import QUANTITIES, Case, CourseError
+from hexapod_cosim.extensions.course.runs import Run
+from hexapod_cosim.extensions.course.statistics import DRAWS
+from hexapod_cosim.extensions.course.table import Table
+from hexapod_cosim.extensions.course.texts import markdown
+
+RESULT, RUNS, TABLES = "benchmark.json", "runs.csv", "tables.md"
+FORMAT = 1
+PACKAGES = ("numpy", "scipy", "control", "fmpy")
+
+
+def result_table(table: Table, *, command: str, complete: bool) -> dict[str, Any]:
+    """Returns the content of benchmark.json; all of it but `machine` repeats bit by bit."""
+    course = table.course
+    return {
+        "format": FORMAT,
+        "course": {
+            "version": course.version,
+            "hash": course.hash,
+            "split": course.split,
+            "settings": list(course.settings),
+        },
+        "command": command,
+        "complete": complete,
+        "controls": list(table.controls),
+        "reference": table.reference,
+        "lacking": dict(table.parts),
+        "seeds": list(course.seeds),
+        "versions": versions(),
+        "machine": machine(),
+        "methods": methods(),
+        "quantities": {
+            item.name: {"title": item.title, "unit": item.unit, "metric": item.metric}
+            for item in QUANTITIES
+        },
+        "goals": [verdict.as_table() for verdict in verdicts(table)],
+        "parts": [each.as_table() for each in judge_parts(table)],
+        "classes": _by_control(table.classes),
+        "cases": {
+            name: {**_case_table(case), "controls": controls}
+            for name, controls in _by_control(table.cases).items()
+            for case in course.cases
+            if case.name == name
+        },
+    }
+
+
+def _by_control(figures: Mapping[tuple[str, str], Any]) -> dict[str, dict[str, Any]]:
+    """Returns the tables of figures by name and control."""
+    found: dict[str, dict[str, Any]] = {}
+    for (name, control), item in figures.items():
+        found.setdefault(name, {})[control] = item.as_table()
+    return found
+
+
+def _case_table(case: Case) -> dict[str, Any]:
+    sweep = {"sweep": case.sweep, "height": case.height} if case.sweep else {}
+    return {"class": case.kind, "about": case.about, **sweep, "scenario": case.scenario.to_table()}
+
+
+def versions() -> dict[str, str]:
+    """Returns the versions that figures depend on."""
+    return {
+        "hexapod-cosim": package_version(),
+        "python": platform.python_version(),
+        **{name: version(name) for name in PACKAGES},
+    }
+
+
+def machine() -> dict[str, str]:
+    """Returns what the course was run on."""
+    return {
+        "platform": f"{sys.platform} {platform.machine()}",
+        "processor": processor(),
+    }
+
+
+def processor() -> str:
+    """Returns the name of the processor."""
+    try:
+        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
+    except OSError:
+        lines = []
+    names = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
+    return names[0] if names else platform.processor() or platform.machine()
+
+
+def methods() -> dict[str, str]:
+    """Returns how the intervals are made."""
+    return {
+        "success": "Wilson, 95 %",
+        "means": "over successful runs; Student, 95 %",
+        "changes": "over pairs of successful runs; Student, of the ratio's logarithm, 95 %",
+        "ratios": f"median over cases; percentile bootstrap over seeds, {DRAWS} draws, 95 %",
+    }
+
+
+def write_runs(path: Path, runs: Sequence[Run]) -> None:
+    """Writes a line for each run. The file is never partial."""
+    names = [item.name for item in QUANTITIES]
+    with atomic_text(path) as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(["case", "control", "seed", "failure", *names])
+        for run in runs:
+            cells = [_cell(run.values[name]) for name in names]
+            writer.writerow([run.case, run.control, run.seed, run.failure, *cells])
+
+
+def _cell(value: float) -> str:
+    return "" if math.isnan(value) else repr(value)
+
+
+def read_table(folder: Path) -> tuple[Table, dict[str, Any]]:
+    """Reads the table of a folder and the content of its RESULT. Raises HexapodError."""
+    content = read_json(folder / RESULT)
+    try:
+        course = load_course(
+            content["course"]["split"],
+            names=content["cases"],
+            seeds=len(content["seeds"]),
+            settings=content["course"]["settings"],
+        )
+        if content["course"]["hash"] != course.hash:
+            raise CourseError(
+                "the result of another course",
+                got=f"version {content['course']['version']}, {content['course']['hash'][:12]}",
+                expected=f"version {course.version}, {course.hash[:12]}",
+                fix="run `hexapod benchmark` again",
+                where=str(folder / RESULT),
+            )
+        runs = tuple(_read_runs(folder / RUNS))
+        table = Table(course, tuple(content["controls"]), runs, dict(content.get("lacking", {})))
+        return table, content
+    except (KeyError, TypeError, ValueError, OSError) as error:
+        raise CourseError(
+            "damaged result",
+            got=f"{type(error).__name__}: {error}",
+            expected=f"{RESULT} and {RUNS} of a benchmark",
+            fix="run `hexapod benchmark` again",
+            where=str(folder),
+        ) from error
+
+
+def _read_runs(path: Path) -> Iterator[Run]:
+    """Yields the runs of a CSV file."""
+    with path.open(encoding="utf-8", newline="") as file:
+        for row in csv.DictReader(file):
+            values = {
+                item.name: float(row[item.name]) if row[item.name] else math.nan
+                for item in QUANTITIES
+            }
+            yield Run(row["case"], row["control"], int(row["seed"]), row["failure"], values)
+
+
+def write_result(
+    table: Table, folder: Path, *, command: str, complete: bool
+) -> tuple[dict[str, Any], list[Path]]:
+    """Writes RESULT, RUNS and TABLES; returns the content of RESULT and the files."""
+    content = result_table(table, command=command, complete=complete)
+    write_json(folder / RESULT, content)
+    write_runs(folder / RUNS, table.runs)
+    write_text(folder / TABLES, markdown(table, verdicts(table)))
+    return content, [folder / RESULT, folder / RUNS, folder / TABLES]

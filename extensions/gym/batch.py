@@ -1,0 +1,338 @@
+"""Runs many environments in C (cosim/master/src/environments.c), over threads.
+
+`Batch` owns the FMUs, the memory that is exchanged with C and the threads. An action array goes in,
+arrays of observations, rewards and flags come out; all of them are views of the memory that C reads
+and writes.
+"""
+
+from __future__ import annotations
+
+import ctypes as ct
+import os
+import weakref
+from collections.abc import Mapping, Sequence
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hexapod_cosim.cosim.common.closing import Closing
+from hexapod_cosim.cosim.common.temporary import TemporaryFolder
+from hexapod_cosim.cosim.interface.names import foot_names, joint_names, vector_names
+from hexapod_cosim.cosim.master.fmu import Fmu
+from hexapod_cosim.cosim.master.fmu_controller import COMMANDS, SENSED
+from hexapod_cosim.cosim.master.signals import MEASURED, PUSH
+from hexapod_cosim.cosim.master.wiring import JOINT_COMMANDS
+from hexapod_cosim.extensions.gym.checks import check_count, check_names, check_seeds, checked_mask
+from hexapod_cosim.extensions.gym.native import (
+    ARRAYS,
+    CALLS,
+    WORK,
+    NativeArrays,
+    NativeDraws,
+    NativeFmu,
+    NativeGround,
+    NativeSettings,
+    environments_library,
+)
+from hexapod_cosim.extensions.gym.owned import Owned
+from hexapod_cosim.extensions.gym.plants import (
+    CONTROL_PERIOD,
+    export_base,
+    export_plant,
+    grounds,
+    start_height,
+    surfaces,
+)
+from hexapod_cosim.extensions.gym.render import frame
+from hexapod_cosim.extensions.gym.scan import SPACING, GroundMaps, ground_maps
+from hexapod_cosim.extensions.gym.settings import BLOCKS, JOINTS, RATE, REASONS, TERMS, EnvSettings
+from hexapod_cosim.models import FmuError, HexapodError, Robot
+
+AUTORESET = ("next_step", "same_step", "disabled")  # hxAutoreset in C
+FAILED = REASONS.index("failed")
+MESSAGE_SIZE = 512
+STARTS = 20  # episodes in a row that a plant may refuse to start before a reset is an error
+GROUND = "terrain.grid"  # the parameter that chooses one of several grounds, from 1
+# outputs of the plant in the order of hxEnvPlace
+OUTPUTS = [
+    *MEASURED["angle"],
+    *MEASURED["speed"],
+    *MEASURED["foot_force"],
+    *MEASURED["quaternion"],
+    *MEASURED["angular_velocity"],
+    *joint_names("torque"),
+    *vector_names("torso.position"),
+    *vector_names("torso.velocity"),
+    *vector_names("torso.contact_force"),
+    *foot_names("slip_distance"),
+]
+Array = NDArray[Any]
+
+
+class Batch(Closing):
+    """A number of environments with the same settings; a context manager that frees them.
+
+    Args:
+        settings: of all environments.
+        count: number of environments.
+        threads: that step them; None: one for each core, at most one for each environment.
+        autoreset: "next_step", "same_step" or "disabled", as in Gymnasium.
+
+    Attributes, which `reset` and `step` read and write: `action` (count, 18), float32;
+    `observation` and `last` (count, size), float32; `reward` (count,); `term` (count, 13), the
+    weighted terms of the reward; `terminated`, `truncated` and `refused` (count,), bool; `reason`
+    (count,), an index of REASONS.
+
+    Raises HexapodError for settings that describe no possible robot, ground or controller.
+    """
+
+    def __init__(
+        self,
+        settings: EnvSettings,
+        count: int,
+        *,
+        threads: int | None = None,
+        autoreset: str = "next_step",
+    ) -> None:
+        check_count("number of environments", count)
+        cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
+        self.threads = min(cores or 1, count) if threads is None else threads
+        check_count("number of threads", self.threads)
+        check_names([autoreset], "autoreset mode", AUTORESET)
+        self.settings, self.count, self.autoreset = settings, count, autoreset
+        self._owned = Owned()
+        self._end = weakref.finalize(self, self._owned.free)  # for those who do not close
+        self._kept: list[Any] = []
+        try:
+            self._open()
+        except BaseException:
+            self.close()
+            raise
+
+    def _open(self) -> None:
+        """Exports and loads the FMUs, creates the environments and starts the threads."""
+        robots = grounds(self.settings)
+        self.robot, self._robots = robots[0], robots
+        with TemporaryFolder("gym") as folder:
+            fmus = self._owned.fmus
+            fmus.append(Fmu(export_plant(robots, folder)))
+            if self.settings.base != "stance":
+                fmus.append(Fmu(export_base(self.settings, self.robot, folder)))
+        self._allocate()
+        native = self._native_settings(robots)
+        arrays = NativeArrays(**{name: getattr(self, name).ctypes.data for name in ARRAYS})
+        message = ct.create_string_buffer(MESSAGE_SIZE)
+        self._library = environments_library()
+        self._owned.handle = self._library.hx_environments_create(
+            ct.byref(native), ct.byref(arrays), self.count, message
+        )
+        if not self._owned.handle:
+            got = message.value.decode(errors="replace")
+            raise FmuError("the environments cannot be created", got=got, fix="use fewer")
+        self._owned.serve(self.threads - 1)
+
+    def _allocate(self) -> None:
+        """Allocates the arrays that are exchanged with C."""
+        count, size = self.count, self.settings.size
+        self.action: NDArray[np.float32] = np.zeros((count, JOINTS), np.float32)
+        self.observation: NDArray[np.float32] = np.zeros((count, size), np.float32)
+        self.last: NDArray[np.float32] = np.zeros((count, size), np.float32)
+        self.reward: NDArray[np.float64] = np.zeros(count)
+        self.term: NDArray[np.float64] = np.zeros((count, len(TERMS)))
+        self.terminated: NDArray[np.bool_] = np.zeros(count, bool)
+        self.truncated: NDArray[np.bool_] = np.zeros(count, bool)
+        self.refused: NDArray[np.bool_] = np.zeros(count, bool)
+        self.reason: NDArray[np.int32] = np.zeros(count, np.int32)
+
+    def _keep(self, values: Sequence[Any] | Array, dtype: type) -> int:
+        """Returns the address of values that live as long as this object."""
+        array: Array = np.array(values, dtype=dtype)
+        self._kept.append(array)
+        return int(array.ctypes.data)
+
+    def _references(self, fmu: Fmu, names: Sequence[str]) -> int:
+        return self._keep(fmu.references(names), np.uint32)
+
+    def _fmu(self, fmu: Fmu) -> NativeFmu:
+        """Returns the functions of an FMU and what its instances are made with."""
+        calls = {name: fmu.address(f"fmi2{name}") for name in CALLS}
+        calls |= {name: fmu.address(name) for name in WORK}
+        texts = {"guid": fmu.description.guid.encode(), "resources": fmu.resources.encode()}
+        self._kept.append(texts)
+        return NativeFmu(**calls, **texts)
+
+    def _native_settings(self, robots: Sequence[Robot]) -> NativeSettings:
+        """Returns the settings as C reads them."""
+        given, plant = self.settings, self._owned.fmus[0]
+        stance = np.array([leg.stance for leg in self.robot.legs])
+        commands = (given.command_vx, given.command_vy, given.command_yaw_rate)
+        native = NativeSettings(
+            plant=self._fmu(plant),
+            plant_output=self._references(plant, OUTPUTS),
+            plant_input=self._references(plant, [*JOINT_COMMANDS, *PUSH[:3]]),
+            draws=self._draws(robots),
+            h=1.0 / RATE,
+            substeps=1,
+            length=given.steps,
+            stance=(ct.c_double * JOINTS)(*stance.ravel()),
+            action_scale=(ct.c_double * JOINTS)(*[given.action_scale] * JOINTS),
+            action_limit=1.0,
+            clock=given.clock,
+            command_interval=round(given.command_interval * RATE),
+            command_low=tuple(low for low, _ in commands),
+            command_high=tuple(high for _, high in commands),
+            push_interval=round(given.push_interval * RATE) if given.push_force else 0,
+            push_length=max(round(given.push_duration * RATE), 1),
+            push_force=given.push_force,
+            upright=float(np.cos(given.max_tilt)),
+            belly_force=given.belly_force,
+            weight=tuple(given.rewards.get(name, 0.0) for name in TERMS),
+            width=given.tracking_width,
+            autoreset=AUTORESET.index(self.autoreset),
+        )
+        for place, name in enumerate(BLOCKS):
+            native.observed[place][:] = np.broadcast_to(given.observation.get(name, 0.0), 3)
+        if "heights" in given.observation:
+            native.ground = self._ground()
+        if len(self._owned.fmus) > 1:
+            self._add_controller(native)
+        return native
+
+    @cached_property
+    def _maps(self) -> GroundMaps:
+        return ground_maps(self.settings, self._robots)
+
+    def _ground(self) -> NativeGround:
+        """Returns the heights that robots observe, as C reads them."""
+        maps, places = self._maps, self.settings.places
+        names, number = self.drawn_names, GROUND
+        count, rows, columns = maps.height.shape
+        return NativeGround(
+            height=self._keep(maps.height, np.float32),
+            place=self._keep(places, float),
+            count=count,
+            rows=rows,
+            columns=columns,
+            points=len(places),
+            draw=names.index(number) if number in names else len(names),
+            x0=maps.first,
+            y0=maps.first,
+            spacing=SPACING,
+            clearance=maps.clearance,
+        )
+
+    def _add_controller(self, native: NativeSettings) -> None:
+        """Adds the controller to the settings as C reads them."""
+        controller = self._owned.fmus[1]
+        native.controller = self._fmu(controller)
+        sensed = [name for key in SENSED for name in MEASURED[key]]
+        native.controller_input = self._references(controller, [*COMMANDS, *sensed])
+        native.controller_output = self._references(controller, JOINT_COMMANDS)
+        native.substeps = round(1.0 / (RATE * CONTROL_PERIOD))
+        native.h = CONTROL_PERIOD
+
+    def _draws(self, robots: Sequence[Robot]) -> NativeDraws:
+        """Returns the parameters that are drawn for each episode, as C reads them."""
+        drawn: dict[str, tuple[float, float, bool]] = {
+            name: (low, high, False) for name, (low, high) in self.settings.randomise.items()
+        }
+        count = len(surfaces(robots))
+        if count > 1:
+            height = start_height(robots)
+            drawn |= {"initial.position[3]": (height, height, False)}
+            drawn |= {GROUND: (1.0, float(count), True)}
+        self.drawn_names = tuple(drawn)
+        for name in drawn:
+            self._check_parameter(name)
+        low, high, whole = ([ends[place] for ends in drawn.values()] for place in range(3))
+        return NativeDraws(
+            reference=self._references(self._owned.fmus[0], self.drawn_names),
+            low=self._keep(low, float),
+            high=self._keep(high, float),
+            whole=self._keep(whole, np.int32),
+            group=self._keep(range(len(drawn)), np.int32),
+            count=len(drawn),
+        )
+
+    def _check_parameter(self, name: str) -> None:
+        """Raises FmuError unless a name is a real parameter of the plant and may have the values
+        that are drawn for it.
+        """
+        ends = self.settings.randomise.get(name)
+        if ends is not None:
+            for value in ends:
+                self._owned.fmus[0].set_parameters({name: float(value)})
+        if name not in self._owned.fmus[0].names("parameter"):
+            raise FmuError(
+                "a parameter that cannot be drawn",
+                got=name,
+                expected="a parameter of the plant that is a real number",
+                fix="remove it from randomise",
+            )
+
+    def reset(
+        self, *, seeds: Sequence[int] | None = None, mask: NDArray[np.bool_] | None = None
+    ) -> None:
+        """Starts an episode in all environments, or in those of a mask (count,).
+
+        An episode whose start the plant refuses is followed by the next one.
+
+        seeds: one for each environment, from which its episodes begin again; None: the next
+        episodes. Raises FmuError when a plant refuses STARTS episodes in a row.
+        """
+        if seeds is not None:
+            check_seeds(seeds, self.count)
+        numbers = None if seeds is None else np.array(seeds, dtype=np.uint64)
+        starting = np.ones(self.count, np.uint8) if mask is None else checked_mask(mask, self.count)
+        for _ in range(STARTS):
+            self._library.hx_environments_reset(
+                self._handle(),
+                starting.ctypes.data,
+                None if numbers is None else numbers.ctypes.data,
+            )
+            starting = np.where(self.reason == FAILED, starting, np.uint8(0))
+            if not starting.any():
+                return
+            numbers = None
+        failed = int(np.flatnonzero(starting)[0])
+        raise FmuError(f"environment {failed} cannot start", got=self.message(failed))
+
+    def step(self) -> None:
+        """Steps all environments under `action`.
+
+        An environment whose action is not finite does not step: it is `refused`.
+        """
+        self._library.hx_environments_step(self._handle())
+
+    def message(self, index: int) -> str:
+        """Returns the last message of an environment's FMUs."""
+        text: bytes = self._library.hx_environments_message(self._handle(), index)
+        return text.decode(errors="replace")
+
+    def drawn(self, index: int) -> dict[str, float]:
+        """Returns the parameters drawn for the present episode of an environment."""
+        values = np.zeros(len(self.drawn_names))
+        self._library.hx_environments_drawn(self._handle(), index, values.ctypes.data)
+        return dict(zip(self.drawn_names, values.tolist(), strict=True))
+
+    def values(self, index: int) -> Mapping[str, float]:
+        """Returns the outputs of the plant of an environment, by name."""
+        values = np.zeros(len(OUTPUTS))
+        self._library.hx_environments_values(self._handle(), index, values.ctypes.data)
+        return dict(zip(OUTPUTS, values.tolist(), strict=True))
+
+    def frame(self, index: int) -> NDArray[np.uint8]:
+        """Returns a picture (360, 480, 3) of an environment's robot on its ground."""
+        number = int(self.drawn(index).get(GROUND, 1.0)) - 1
+        return frame(self.robot, self._maps, number, self.values(index))
+
+    def _handle(self) -> int:
+        if self._owned.handle is None:
+            raise HexapodError("the environments are closed", fix="create new ones")
+        return self._owned.handle
+
+    def close(self) -> None:
+        """Ends the threads and frees the environments; may be called twice."""
+        self._end()

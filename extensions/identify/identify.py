@@ -1,0 +1,166 @@
+"""Identifies a robot from its logs: screens their columns, fits its numbers, and judges them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from hexapod_cosim.cosim.common.temporary import TemporaryFolder
+from hexapod_cosim.cosim.export.plant_export import export_fmu
+from hexapod_cosim.extensions.identify.command_screening import wrong_commands, wrong_commands_error
+from hexapod_cosim.extensions.identify.experiment import Experiment
+from hexapod_cosim.extensions.identify.fitting.judging import fit
+from hexapod_cosim.extensions.identify.fitting.problem import Problem
+from hexapod_cosim.extensions.identify.fitting.workers import simulating_workers
+from hexapod_cosim.extensions.identify.identified import Identified
+from hexapod_cosim.extensions.identify.log import (
+    HELD_OUT,
+    Log,
+    LogError,
+    with_speed_references,
+    without_readings,
+)
+from hexapod_cosim.extensions.identify.log_plant import LogPlant
+from hexapod_cosim.extensions.identify.numbers.servo import ELASTIC
+from hexapod_cosim.extensions.identify.screening import BadColumn, screened
+from hexapod_cosim.extensions.identify.start import rest_rows
+from hexapod_cosim.extensions.identify.unknowns import GROUPS, changed_robot, chosen_unknowns
+from hexapod_cosim.cosim.interface.names import vector_names
+from hexapod_cosim.cosim.run.worker_pool import processor_count
+from hexapod_cosim.models import Robot
+
+SETTLING = 0.1  # s    at the start of a log that is not compared: the first row has noise
+LONG = 4000  # rows from which on worker processes save more time than they take to start
+TOLERANCE = {"solver.tolerance": 1e-5}  # differences of simulations need exact ones
+
+
+def identify(
+    logs: Sequence[Log],
+    robot: Robot,
+    *,
+    groups: Sequence[str] = GROUPS,
+    held_out: float = HELD_OUT,
+    workers: int = 1,
+    progress: Callable[[str], None] = lambda _text: None,
+) -> Identified:
+    """Finds a robot's numbers from logs.
+
+    Args:
+        logs: commands and readings; each begins with the robot standing still.
+        robot: what is known of it.
+        groups: which numbers of the table of unknowns are to be found.
+        held_out: share of the rows at the end of each log that only judges the result.
+        workers: number of processes, on which the result does not depend. With more than one, the
+            calling script needs `if __name__ == "__main__"`.
+        progress: called when a step begins, with its name.
+
+    Raises HexapodError for logs without readings, and where the plant cannot follow them.
+    """
+    # imported here: the command's help starts sooner
+    from threadpoolctl import threadpool_limits  # noqa: PLC0415
+
+    rows = chosen_unknowns(robot, logs, groups)
+    # small matrices: threads of linear algebra would wait for each other
+    with threadpool_limits(1), TemporaryFolder("identify") as folder:
+        path = export_fmu(robot, folder / "robot.fmu")
+        with LogPlant(path, TOLERANCE) as plant:
+            progress("the columns of the log")
+            experiments, bad = screen(plant, robot, logs, groups=groups, held_out=held_out)
+            with simulating_workers(workers, path, robot, experiments, TOLERANCE) as pool:
+                problem = Problem(plant, robot, experiments, rows, pool)
+                found = fit(problem, progress=progress)
+            before = problem.predictions(np.zeros(len(rows)))
+    return Identified(
+        file=robot,
+        robot=robot if found.rejected else changed_robot(robot, rows, found.values),
+        fit=found,
+        experiments=tuple(experiments),
+        bad=tuple(bad),
+        before=tuple(before),
+    )
+
+
+def usual_workers(logs: Sequence[Log]) -> int:
+    """Returns a number of processes for logs: that of processors, but 1 for short logs."""
+    return processor_count() if sum(len(log.time) for log in logs) >= LONG else 1
+
+
+def make_experiment(log: Log, number: int, held_out: float, *, forget: float = 0.0) -> Experiment:
+    """Returns the comparison of a log, with the readings that the FMU predicts.
+
+    forget: how long rows from the first change of a command on are not compared, and none before
+    [s]; 0: from the rest on.
+
+    Raises LogError for a log without readings.
+    """
+    columns = log.measured
+    if set(vector_names("torso.position")) - set(columns):  # a part of a position has no use
+        columns = tuple(name for name in columns if not name.startswith("torso.position"))
+    if not columns:
+        raise without_readings(log)
+    count = len(log.time)
+    end = count - round(held_out * count)
+    begin = int(np.searchsorted(log.time, log.time[0] + SETTLING))
+    if rest_rows(log) == 1:  # without a rest the joints need longer to forget the first row
+        begin *= 3
+    if forget > 0.0:
+        moved = log.time[rest_rows(log) - 1] + forget
+        begin = max(begin, int(np.searchsorted(log.time, moved)))
+    if not 0 < begin < end - 1:
+        raise LogError(
+            "a log that is too short",
+            got=f"{log.time[-1] - log.time[0]:g} s",
+            expected="several steps of a walk",
+            fix="record a longer one",
+            where=log.where,
+        )
+    return Experiment(
+        log=log,
+        number=number,
+        columns=columns,
+        fitted=slice(begin, end),
+        held_out=slice(end, count),
+    )
+
+
+def screen(
+    plant: LogPlant,
+    robot: Robot,
+    logs: Sequence[Log],
+    *,
+    groups: Sequence[str] = GROUPS,
+    held_out: float = HELD_OUT,
+) -> tuple[list[Experiment], list[tuple[int, BadColumn]]]:
+    """Returns the comparisons of logs without dead and wrong columns of readings, and these.
+
+    plant: of the robot file's robot. groups, held_out: as of `identify`.
+
+    Raises WrongCommandsError for dead and wrong commands, LogError where no reading is left.
+    """
+    for log in logs:
+        wrong = wrong_commands(log)
+        if wrong:
+            raise wrong_commands_error(log, wrong)
+    logs = [with_speed_references(log, robot) for log in logs]
+    # Elastic gears stand somewhere in their play, and with zeros of the angles unknown so are the
+    # forces by which standing feet push against each other: no log shows these until each foot
+    # was lifted once, within a period of the gait.
+    forget = robot.gait.period if ELASTIC(robot) or "zero" in groups else 0.0
+    experiments = [make_experiment(log, k, held_out, forget=forget) for k, log in enumerate(logs)]
+    rows = chosen_unknowns(robot, logs, groups)
+    simulated = Problem(plant, robot, experiments, rows).predictions(np.zeros(len(rows)))
+    found, bad = [], []
+    for one, own in zip(experiments, simulated, strict=True):
+        wrong = screened(one, own)
+        bad += [(one.number, column) for column in wrong]
+        found.append(one.without([column.name for column in wrong]))
+        if not found[-1].columns:
+            raise LogError(
+                "no column of the log can be used",
+                got=f"{wrong[0].name}: {wrong[0].why}",
+                expected="readings that follow the commands",
+                fix="check names, units and signs of the columns, and the robot file",
+                where=one.log.where,
+            )
+    return found, bad

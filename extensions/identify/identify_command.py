@@ -1,0 +1,143 @@
+"""Defines the command `hexapod identify`: a robot's numbers from its own logs."""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from hexapod_cosim.cosim.cli.export_command import RobotName
+from hexapod_cosim.cosim.cli.extension import Command, Extension
+from hexapod_cosim.cosim.cli.terminal import (
+    Json,
+    show_files,
+    show_json,
+    show_table,
+    show_text,
+    steps,
+    warn,
+)
+from hexapod_cosim.extensions.identify.log import HELD_OUT, read_log
+from hexapod_cosim.extensions.identify.numbers.friction_models import TERMS, with_friction_model
+from hexapod_cosim.extensions.identify.replay_command import replay
+from hexapod_cosim.extensions.identify.unknowns import GROUPS
+from hexapod_cosim.cosim.results.results import results_folder
+from hexapod_cosim.models import HexapodError, load_robot, unknown_name
+
+FOUND = ("servo", "mass", "contact", "sensor")  # without --find
+Logs = Annotated[
+    list[Path],
+    typer.Argument(
+        metavar="LOG...",
+        help="CSV, Parquet or MCAP files with commands and readings, each from standing still on.",
+    ),
+]
+Find = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--find",
+        metavar="|".join(GROUPS),
+        help="Which numbers to find; repeat it for more. Default: all but zero, the legs' zeros.",
+    ),
+]
+HeldOut = Annotated[
+    float,
+    typer.Option("--held-out", metavar="SHARE", help="Part of each log that only judges."),
+]
+Friction = Annotated[
+    str | None,
+    typer.Option(
+        "--friction",
+        metavar="|".join(TERMS),
+        help="Friction model of measured servos. Default: the terms of the robot file.",
+    ),
+]
+Workers = Annotated[
+    int | None,
+    typer.Option(
+        "--workers", metavar="N", min=1, help="Processes; default: one for each processor."
+    ),
+]
+Folder = Annotated[
+    Path | None,
+    typer.Option("-o", "--output", metavar="DIR", help="Where to write; default out/identify."),
+]
+
+
+def identify(
+    logs: Logs,
+    robot: RobotName = "athena",
+    find: Find = None,
+    friction: Friction = None,
+    held_out: HeldOut = HELD_OUT,
+    workers: Workers = None,
+    output: Folder = None,
+    json: Json = False,
+) -> None:
+    """Find a robot's masses, servos, contacts and sensors from its own logs."""
+    # imported only here because they are slow to import
+    from hexapod_cosim.extensions.identify import identify_files as files  # noqa: PLC0415
+    from hexapod_cosim.extensions.identify.identify import (  # noqa: PLC0415
+        identify as identify_robot,
+    )
+    from hexapod_cosim.extensions.identify.identify import usual_workers  # noqa: PLC0415
+
+    groups = _checked(find or list(FOUND), held_out)
+    own = load_robot(robot)
+    if friction is not None:
+        own = with_friction_model(own, friction)
+    words = ["hexapod", "identify", *map(str, logs), "--robot", robot]
+    words += [word for name in find or [] for word in ("--find", name)]
+    words += ["--friction", friction] if friction else []
+    words += ["--held-out", str(held_out)] if held_out != HELD_OUT else []
+    recorded = [read_log(path, torso_com=own.torso.com) for path in logs]
+    with results_folder(output or Path("out") / "identify") as folder:
+        with steps(shown=not json) as show:
+            found = identify_robot(
+                recorded,
+                own,
+                groups=groups,
+                held_out=held_out,
+                workers=workers or usual_workers(recorded),
+                progress=show,
+            )
+        folder.begin()
+        command = shlex.join(words)
+        written = files.write_identified(found, robot, folder.path, command=command)
+    for text in files.warnings(found):
+        warn(text.removesuffix("."))
+    if json:
+        show_json({**files.result_table(found), "files": [str(path) for path in written]})
+        return
+    shown, zero = files.shown_estimates(found.estimates)
+    show_table(files.ESTIMATES, files.estimate_rows(shown), right=(2, 3, 4))
+    if zero:
+        show_text(f"{zero} biases of sensors may be 0; sensors.toml and the report have them.")
+    errors = files.error_rows(found.held_out() or found.fitted())
+    show_table(files.ERRORS, errors, right=(2, 3, 4))
+    show_text(files.open_text(found))
+    show_files(written)
+
+
+def _checked(names: Sequence[str], held_out: float) -> list[str]:
+    """Returns the groups. Raises HexapodError for an unknown one and a share that is none."""
+    for name in names:
+        if name not in GROUPS:
+            raise unknown_name("group of numbers", name, GROUPS, where="--find")
+    if not 0.0 <= held_out <= 0.9:
+        raise HexapodError(
+            "not a share",
+            got=held_out,
+            expected="0 to 0.9",
+            fix="give --held-out 0.25",
+            where="--held-out",
+        )
+    return list(names)
+
+
+EXTENSION = Extension(
+    commands=[Command(name="replay", run=replay), Command(name="identify", run=identify)]
+)

@@ -1,0 +1,136 @@
+"""Numbers of servos: gains, motor, friction and elasticity of the gears."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+from hexapod_cosim.extensions.identify.numbers.unknown import Unknown, section
+from hexapod_cosim.models import Robot
+from hexapod_cosim.models.records import Servo
+from hexapod_cosim.models.servos.presets import followed
+
+LINE: Callable[[Robot], bool] = lambda robot: robot.servo.drive == "line"  # noqa: E731
+MOTOR: Callable[[Robot], bool] = lambda robot: robot.servo.drive == "motor"  # noqa: E731
+ELASTIC: Callable[[Robot], bool] = lambda robot: robot.servo.gear_stiffness > 0.0  # noqa: E731
+# What terms of the friction of measured servos are, from `hexapod list servos` (M1 to M6):
+TERM = 0.5  # of the file's value, at least
+DRY = 0.02  # of the stall torque
+VISCOUS = 0.05  # of the stall torque at the no-load speed
+LOAD, SQUARE = 0.15, 0.01  # 1, 1/(N m)
+GEAR = ("servo.gear_stiffness", "servo.gear_damping", "servo.backlash")  # of elastic gears
+
+
+def _motor(name: str, unit: str, prior: float, applies: Callable[[Robot], bool] = MOTOR) -> Unknown:
+    """Returns the row of a number of measured servos, named "servo.key".
+
+    What follows from it, as the largest torque, changes with it; kp is a number of its own.
+    """
+    row = section(name, unit, "servo", prior, applies=applies)
+    plain = row.write
+    if plain is None:
+        raise ValueError(f"{name} is no number of robot files")
+
+    def write(robot: Robot, value: float) -> Robot:
+        changed = plain(robot, value)
+        return replace(changed, servo=followed(changed.servo))
+
+    return replace(row, write=write)
+
+
+def _term(
+    name: str, unit: str, typical: Callable[[Servo], float], applies: Callable[[Robot], bool]
+) -> Unknown:
+    """Returns the row of a term of the friction of measured servos, on a linear scale from 0 on: a
+    term near 0 could not move on a logarithmic one.
+
+    typical: what such terms are of servos of this size; the prior is at least this.
+    """
+    row = _motor(name, unit, 0.0)
+    read = row.read
+    if read is None:
+        raise ValueError(f"{name} is no number of robot files")
+    high = 1.0 if unit == "1" else math.inf
+
+    def prior(robot: Robot) -> float:
+        return max(TERM * read(robot), typical(robot.servo))
+
+    return replace(row, positive=False, low=0.0, high=high, prior_of=prior, applies=applies)
+
+
+def _of_both(name: str, motor: str, external: str) -> Unknown:
+    """Returns the row of a coefficient that the friction models M3 and M4 have for the torques of
+    the motor and of the load, named "servo.key".
+    """
+    sides = [_term(f"servo.{key}", "1", lambda _servo: LOAD, MOTOR) for key in (motor, external)]
+
+    def write(robot: Robot, value: float) -> Robot:
+        for side in sides:
+            robot = side.write(robot, value) if side.write else robot
+        return robot
+
+    return replace(sides[0], key=name, write=write, applies=lambda robot: _alike(robot, sides))
+
+
+def _alike(robot: Robot, sides: Sequence[Unknown]) -> bool:
+    """Returns whether terms of a measured servo are equal and not 0."""
+    first, second = (side.read(robot) for side in sides if side.read)
+    return MOTOR(robot) and first == second > 0.0
+
+
+def _has_term(*keys: str) -> Callable[[Robot], bool]:
+    """Returns whether a measured servo has one of some terms."""
+    return lambda robot: MOTOR(robot) and any(getattr(robot.servo, key) > 0.0 for key in keys)
+
+
+def _unlike(key: str, other: str) -> Callable[[Robot], bool]:
+    """Returns whether a measured servo has a term that differs from another one."""
+    return lambda robot: MOTOR(robot) and getattr(robot.servo, key) != getattr(robot.servo, other)
+
+
+LOADS = ("motor_load_friction", "external_load_friction")
+STRIBECK_LOADS = ("stribeck_motor_load_friction", "stribeck_external_load_friction")
+QUADRATIC = ("quadratic_motor_friction", "quadratic_external_friction")
+STRIBECK = ("stribeck_friction", *STRIBECK_LOADS, *QUADRATIC)  # that fall with the speed
+# coefficients of M3 and M4, with the keys of the robot file that have their value
+TIED = {"servo.load_friction": LOADS, "servo.stribeck_load_friction": STRIBECK_LOADS}
+FRICTION = (
+    _term(
+        "servo.viscous_friction", "N m s/rad",
+        lambda servo: VISCOUS * servo.torque_max / servo.speed_max, _has_term("viscous_friction"),
+    ),
+    _term(
+        "servo.stribeck_friction", "N m", lambda servo: DRY * servo.torque_max,
+        _has_term("stribeck_friction"),
+    ),
+    *(_of_both(name, *keys) for name, keys in TIED.items()),
+    *(
+        _term(f"servo.{key}", "1", lambda _servo: LOAD, _unlike(key, other))
+        for pair in TIED.values()
+        for key, other in (pair, pair[::-1])
+    ),
+    *(
+        _term(f"servo.{key}", "1/(N m)", lambda _servo: SQUARE, _has_term(key))
+        for key in QUADRATIC
+    ),
+    _motor("servo.stribeck_speed", "rad/s", 0.5, _has_term(*STRIBECK)),
+    _motor("servo.stribeck_exponent", "1", 0.5, _has_term(*STRIBECK)),
+)  # fmt: skip
+SERVO = (
+    section("servo.kp", "N m/rad", "servo", 0.3),
+    section("servo.kd", "N m s/rad", "servo", 0.3),
+    section("servo.coulomb_friction", "N m", "servo", 0.5, applies=LINE),
+    _term("servo.coulomb_friction", "N m", lambda servo: DRY * servo.torque_max, MOTOR),
+    section("servo.rotor_inertia", "kg m2", "servo", 0.5),
+    section("servo.torque_max", "N m", "servo", 0.2, applies=LINE),
+    section("servo.speed_max", "rad/s", "servo", 0.2, applies=LINE),
+    _motor("servo.torque_constant", "N m/A", 0.2),
+    _motor("servo.resistance", "ohm", 0.2),
+    *FRICTION,
+    section("servo.gear_stiffness", "N m/rad", "servo", 0.5, applies=ELASTIC),
+    section("servo.gear_damping", "N m s/rad", "servo", 0.7, applies=ELASTIC),
+    section(
+        "servo.backlash", "rad", "servo", 0.003, positive=False, low=0.0, high=1.0, applies=ELASTIC
+    ),
+)  # fmt: skip

@@ -1,0 +1,216 @@
+"""Writes the robot file of an identified robot: the file it came from with the new numbers.
+
+The comment beside a new number says from which log it is, with its interval, and so does [source];
+other comments and all other keys stay. Of a URDF a robot file is written that refers to it.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import fields
+from pathlib import Path
+from typing import Any
+
+import tomlkit
+import tomlkit.items
+
+from hexapod_cosim.cosim.common.files import write_text
+from hexapod_cosim.extensions.identify.identified import Estimate, Identified
+from hexapod_cosim.extensions.identify.numbers.servo import TIED
+from hexapod_cosim.extensions.identify.unknowns import OF_FILE
+from hexapod_cosim.models import JOINT_NAMES, HexapodError, Robot, load_robot
+from hexapod_cosim.models.robot import robot_path
+
+SECTIONS = ("servo", "contact", "friction")
+BODY_KEYS = ("mass", "com", "inertia")
+SENSORS = "sensors.toml"
+# coefficients of M3 and M4, with their keys in a robot file
+TIED_KEYS = {name: [f"servo.{key}" for key in keys] for name, keys in TIED.items()}
+FOLLOWS = "follows from identified numbers"  # comment beside a number that does
+
+
+def robot_text(found: Identified, file: str, folder: Path, logs: Sequence[str]) -> str:
+    """Returns the text of the robot file.
+
+    Args:
+        found: the identified robot.
+        file: the robot file it was identified from, or its name.
+        folder: where the new file will stand; a URDF is named relative to it.
+        logs: the names of the logs.
+
+    Raises HexapodError when the file cannot be read again.
+    """
+    path = robot_path(file)
+    document = _document(path, folder)
+    document["name"] = f"{found.robot.name}-identified"
+    source = document.setdefault("source", tomlkit.table())
+    names = " ".join(Path(log).name for log in logs)
+    source["identified"] = f"hexapod identify {names}"
+    own = [one for one in found.estimates if one.group in OF_FILE]
+    for one in own:
+        source[one.key] = _sentence(one, names, rejected=found.rejected)
+    before, said = load_robot(file), _comments(own, names)
+    after = before if found.rejected else found.robot
+    for name in SECTIONS:
+        _set_changed(document, name, getattr(before, name), getattr(after, name), said)
+    _set_bodies(document, before, after, said)
+    _set_defaults(document, after)
+    return tomlkit.dumps(document)
+
+
+def _document(path: Path, folder: Path) -> Any:
+    """Returns the tables of a robot file, to be changed; paths in it are made right for `folder`.
+
+    Raises HexapodError for a file that cannot be read.
+    """
+    try:
+        if path.suffix.lower() == ".urdf":
+            document = tomlkit.document()
+            document["urdf"] = {"file": _relative(path, folder)}
+            return document
+        document = tomlkit.parse(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise HexapodError("cannot read", got=error.strerror, where=str(path)) from error
+    for section in ("urdf", "terrain"):
+        table: Any = document.get(section, {})
+        if "file" in table:
+            table["file"] = _relative(path.parent / str(table["file"]), folder)
+    return document
+
+
+def _relative(path: Path, folder: Path) -> str:
+    """Returns a path from a folder, with slashes."""
+    return Path(os.path.relpath(path.resolve(), folder.resolve())).as_posix()
+
+
+def _sentence(one: Estimate, logs: str, *, rejected: bool) -> str:
+    """Returns where a number comes from."""
+    if one.determined:
+        interval = f"95 % interval {one.interval} {one.unit}"
+        return f"identified from {logs}: {interval}; before {one.before:.6g}"
+    if one.depends:
+        others = ", ".join(one.depends)
+        return f"identified from {logs} as long as {others} have the file's values"
+    why = ", which rejects the model" if rejected else ""
+    return f"not determined by {logs}{why}: as before"
+
+
+def _comments(estimates: Sequence[Estimate], logs: str) -> dict[str, str]:
+    """Returns the comments beside numbers that are new, by the keys of the file."""
+    said: dict[str, list[str]] = {}
+    units = {}
+    for one in estimates:
+        key, _, axis = one.key.partition("[")
+        if not (one.determined or one.depends):
+            continue
+        text = one.interval
+        for own in TIED_KEYS.get(key, (key,)):
+            units[own] = one.unit
+            said.setdefault(own, []).append(f"[{axis} {text}" if axis else text)
+    return {
+        key: f"{units[key]}    identified from {logs}, 95 % interval {', '.join(texts)}"
+        for key, texts in said.items()
+    }
+
+
+def _put(table: Any, key: str, value: Any, comment: str) -> None:
+    """Sets a number of a table with a comment, which replaces the one beside the old number."""
+    item = tomlkit.item(value)
+    if not isinstance(table, tomlkit.items.InlineTable):
+        item.comment(comment)
+    table[key] = item
+
+
+def _set_changed(
+    document: Any, name: str, before: Any, after: Any, said: Mapping[str, str]
+) -> None:
+    """Sets the keys of a section that have changed. said: comments, by key of the file."""
+    changed = [
+        item.name
+        for item in fields(after)
+        if getattr(before, item.name) != getattr(after, item.name)
+    ]
+    if not changed:
+        return
+    section = document.setdefault(name, tomlkit.table())
+    for key in changed:
+        _put(section, key, getattr(after, key), said.get(f"{name}.{key}", FOLLOWS))
+
+
+def _set_defaults(document: Any, after: Robot) -> None:
+    """Sets what a file leaves to a default that depends on numbers which may have changed."""
+    for section, key in (("servo", "motor_constant"), ("friction", "presliding")):
+        table = document.setdefault(section, tomlkit.table())
+        if key not in table:
+            table[key] = getattr(getattr(after, section), key)
+
+
+def _set_bodies(document: Any, before: Robot, after: Robot, said: Mapping[str, str]) -> None:
+    """Sets mass, centre of mass and inertia of the bodies where they have changed.
+
+    said: comments, by key of the file.
+    """
+    for key in BODY_KEYS:
+        if getattr(before.torso, key) != getattr(after.torso, key):
+            torso = document.setdefault("torso", tomlkit.table())
+            comment = said.get(f"torso.{key}", FOLLOWS)
+            _put(torso, key, _plain(getattr(after.torso, key)), comment)
+    for joint, name in enumerate(JOINT_NAMES):
+        for key in BODY_KEYS:
+            old, new = (
+                {leg.name: _plain(getattr(leg.links[joint], key)) for leg in robot.legs}
+                for robot in (before, after)
+            )
+            if old != new:
+                comment = said.get(f"links.{name}.{key}", FOLLOWS)
+                _set_links(document, name, key, new, comment)
+
+
+def _set_links(document: Any, name: str, key: str, values: Mapping[str, Any], comment: str) -> None:
+    """Sets a key of the links of all legs.
+
+    values: by name of the leg. Of a leg that has its own value, or needs one, its own table is set.
+    """
+    links = document.setdefault("links", tomlkit.table())
+    common = next(iter(values.values()))
+    _put(links.setdefault(name, tomlkit.table()), key, common, comment)
+    for leg, value in values.items():
+        own = _leg_table(document, leg, name)
+        if value != common:
+            own = document.setdefault("legs", tomlkit.table())
+            own = own.setdefault(leg, tomlkit.table()).setdefault(name, tomlkit.table())
+            _put(own, key, value, comment)
+        elif own is not None and key in own:
+            _put(own, key, value, comment)
+
+
+def _leg_table(document: Any, leg: str, joint: str) -> Any:
+    """Returns a leg's own table of a link; None without one."""
+    return document.get("legs", {}).get(leg, {}).get(joint)
+
+
+def _plain(value: Any) -> Any:
+    """Returns a number or a list of numbers for TOML."""
+    return list(value) if isinstance(value, tuple) else value
+
+
+def sensors_table(found: Identified) -> Mapping[str, Any]:
+    """Returns the numbers of the sensors, by key, with their intervals."""
+    return {
+        one.key: {
+            "value": one.value,
+            "low": one.low,
+            "high": one.high,
+            "unit": one.unit,
+            "determined": one.determined,
+        }
+        for one in found.estimates
+        if one.group in ("sensor", "zero")
+    }
+
+
+def write_robot(found: Identified, file: str, path: Path, logs: Sequence[str]) -> None:
+    """Writes the robot file and checks that it can be read again. Raises HexapodError."""
+    write_text(path, robot_text(found, file, path.parent, logs))
+    load_robot(path)

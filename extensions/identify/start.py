@@ -1,0 +1,147 @@
+"""Finds the state in which a log begins, as initial values of the FMU.
+
+A log should begin with the robot standing still: all rows before the first change of a command are
+averaged then. Unknown quantities are those of a robot at rest on level ground. A measured angle far
+from its command is not where the robot starts, so that a wrong column (in degrees, turned round,
+without numbers) is found by its comparison with the simulation instead of preventing it.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hexapod_cosim.extensions.identify.log import ATTITUDE, Log
+from hexapod_cosim.cosim.interface.names import LEGS, joint_names, vector_names
+from hexapod_cosim.models import Robot
+from hexapod_cosim.models.kinematics import axis_quaternion, foot_positions, quaternion_product
+from hexapod_cosim.models.kinematics import rotation_matrix as rotation
+
+Array = NDArray[np.float64]
+LONGEST_REST = 0.5  # s    of rest that is averaged
+FARTHEST = 0.5  # rad    of a joint from its command; a servo under load sags by some 0.1 rad
+HIGHEST = 0.1  # m    of the torso above or below the place where the feet carry it
+LEANS = 0.3  # rad    roll or pitch of a robot that stands on level ground
+TURN = 2.0 * np.pi  # rad    a command beyond it is not in rad, and is refused when it is sent
+RATES = {  # quantity of the log: initial value of the FMU
+    "torso.velocity": "initial.velocity",
+    "torso.angular_velocity": "initial.angular_velocity",
+}
+
+
+def rest_rows(log: Log) -> int:
+    """Returns the number of rows from the first one on that have its commands."""
+    table = np.column_stack(list(log.commands.values()))
+    moved = np.flatnonzero((table != table[0]).any(axis=1))
+    end = int(moved[0]) if moved.size else len(table)
+    return max(1, min(end, int(np.searchsorted(log.time, log.time[0] + LONGEST_REST))))
+
+
+def initial_state(log: Log, robot: Robot) -> dict[str, float]:
+    """Returns the initial values of the FMU's parameters for the first row of a log."""
+    rest = rest_rows(log)
+    rows = log.recording.rows(slice(0, rest))
+
+    def mean(name: str) -> float:
+        return _mean(rows.column(name))
+
+    def rate(name: str) -> float:
+        return float(np.nan_to_num(mean(name)))
+
+    found: dict[str, float] = {}
+    angle = np.zeros((6, 3))
+    commanded = joint_names("angle_ref")
+    for k, name in enumerate(joint_names("angle")):
+        wanted = mean(commanded[k])
+        measured = mean(name) if log.has([name]) else wanted
+        near = abs(measured - wanted) <= FARTHEST or abs(wanted) > TURN
+        angle.flat[k] = measured if near else wanted
+        found[f"initial.{name}"] = float(angle.flat[k])
+    for name in joint_names("speed"):
+        found[f"initial.{name}"] = rate(name) if rest == 1 and log.has([name]) else 0.0
+    is_flat = robot.terrain.kind == "flat"
+    if is_flat and not log.has(ATTITUDE):
+        turn = standing_attitude(robot, angle)
+    else:
+        turn = _quaternion(log, rows.data, rest, is_flat=is_flat)
+    found |= dict(zip(vector_names("initial.quaternion", 4), turn.tolist(), strict=True))
+    place = vector_names("torso.position")
+    position = _resting(robot, angle, turn)
+    if log.has(place):
+        position = _credible([mean(name) for name in place], position, robot)
+    found |= dict(zip(vector_names("initial.position"), position, strict=True))
+    for stem, target in RATES.items():
+        names = vector_names(stem)
+        known = rest == 1 and log.has(names)
+        values = [rate(name) if known else 0.0 for name in names]
+        found |= dict(zip(vector_names(target), values, strict=True))
+    return found
+
+
+def _mean(values: Array) -> float:
+    """Returns the mean of the numbers of a column; NaN where it has none."""
+    known = np.isfinite(values)
+    if known.all():
+        return float(np.mean(values))
+    return float(np.mean(values[known])) if known.any() else float("nan")
+
+
+def _credible(measured: list[float], resting: list[float], robot: Robot) -> list[float]:
+    """Returns a measured position, with that of standing legs for what it lacks. On flat ground a
+    height far from theirs is not where the robot starts.
+    """
+    found = [one if np.isfinite(one) else own for one, own in zip(measured, resting, strict=True)]
+    if robot.terrain.kind == "flat" and abs(found[2] - resting[2]) > HIGHEST:
+        found[2] = resting[2]
+    return found
+
+
+def _quaternion(log: Log, rows: Array, rest: int, *, is_flat: bool) -> Array:
+    """Returns the attitude (4,) in the first row, or its mean over the rows at rest; the level one
+    where the log has no numbers, or on flat ground more than a standing robot leans.
+    """
+    names = vector_names("torso.quaternion", 4)
+    if rest == 1 and log.has(names):
+        first: Array = log.recording.columns(names)[0]
+        if np.isfinite(first).all():
+            return first
+    if not log.has(ATTITUDE):
+        return np.array([1.0, 0.0, 0.0, 0.0])
+    angles = rows[:, [log.recording.names.index(name) for name in ATTITUDE]]
+    known = np.isfinite(angles).all(axis=1)
+    if not known.all():
+        angles = angles[known] if known.any() else np.zeros((1, 3))
+    roll, pitch, yaw = angles.mean(axis=0).tolist()
+    if is_flat and max(abs(roll), abs(pitch)) > LEANS:
+        roll, pitch = 0.0, 0.0
+    turn = axis_quaternion(np.array([0.0, 0.0, 1.0]), yaw)
+    turn = quaternion_product(turn, axis_quaternion(np.array([0.0, 1.0, 0.0]), pitch))
+    return quaternion_product(turn, axis_quaternion(np.array([1.0, 0.0, 0.0]), roll))
+
+
+def standing_attitude(robot: Robot, angle: Array) -> Array:
+    """Returns the attitude (4,) of a robot whose feet stand on level ground, with a yaw of 0.
+
+    angle: of the joints (6, 3) [rad]. The ground is the plane nearest to the feet; the attitude is
+    level where they lie in none that a standing robot may have.
+    """
+    feet = foot_positions(robot, angle)
+    offset = feet - feet.mean(axis=0)
+    slopes, *_ = np.linalg.lstsq(offset[:, :2], offset[:, 2], rcond=None)
+    up = np.array([-slopes[0], -slopes[1], 1.0]) / np.sqrt(1.0 + float(slopes @ slopes))
+    pitch, roll = -float(np.arcsin(up[0])), float(np.arctan2(up[1], up[2]))
+    if max(abs(roll), abs(pitch)) > LEANS:
+        roll = pitch = 0.0
+    turn = axis_quaternion(np.array([0.0, 1.0, 0.0]), pitch)
+    return quaternion_product(turn, axis_quaternion(np.array([1.0, 0.0, 0.0]), roll))
+
+
+def _resting(robot: Robot, angle: Array, turn: Array) -> list[float]:
+    """Returns the torso's position above the origin at which the lowest foot carries its share.
+
+    The share is a sixth of the weight, under which the foot sinks in by (share/K)^(2/3) (eq. 14).
+    """
+    from_origin = foot_positions(robot, angle) - np.array(robot.torso.com)
+    lowest = float((from_origin @ rotation(turn).T)[:, 2].min())
+    depth = (robot.weight / LEGS / robot.contact.stiffness) ** (2.0 / 3.0)
+    return [0.0, 0.0, robot.terrain.height + robot.foot.radius - depth - lowest]

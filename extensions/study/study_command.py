@@ -1,0 +1,137 @@
+"""Defines the command `hexapod study`, which runs a study."""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from hexapod_cosim.cosim.cli.extension import Command, Extension, Rows
+from hexapod_cosim.cosim.cli.failures import FELL
+from hexapod_cosim.cosim.cli.listing import titles
+from hexapod_cosim.cosim.cli.running import ControlNames, FmuFile, GainsFile, given_gains
+from hexapod_cosim.cosim.cli.terminal import Json, warn
+from hexapod_cosim.cosim.common.files import STUDY
+from hexapod_cosim.cosim.common.installation import require_pyarrow
+from hexapod_cosim.extensions.study.bundled import list_studies
+from hexapod_cosim.extensions.study.records import StudyError
+
+EPILOG = (
+    f"A fall is a result of a study. Exit code {FELL} only when no run walked to its end "
+    "and the robot fell in some of them."
+)
+MAX_WORKERS = 4096
+Workers = Annotated[
+    int | None,
+    typer.Option(
+        "--workers",
+        metavar="N",
+        help="Processes on this machine; default: one for each processor; 0: no other process.",
+    ),
+]
+Scheduler = Annotated[
+    str | None,
+    typer.Option(
+        "--scheduler",
+        metavar="ADDRESS",
+        help="Run on the workers of this Dask scheduler: tcp://HOST:8786.",
+    ),
+]
+StudyFolder = Annotated[
+    Path | None,
+    typer.Option(
+        "-o",
+        "--output",
+        metavar="DIR",
+        help="Folder to write, or to resume; default out/STUDY.",
+    ),
+]
+
+
+def study(
+    file: Annotated[
+        str,
+        typer.Argument(metavar="STUDY", help="A study file, or a name of `hexapod list studies`."),
+    ],
+    control: ControlNames = None,
+    output: StudyFolder = None,
+    workers: Workers = None,
+    scheduler: Scheduler = None,
+    fmu: FmuFile = None,
+    gains: GainsFile = None,
+    json: Json = False,
+) -> int:
+    """Run a study: a sweep, a Monte Carlo study or an optimisation.
+
+    --control replaces the controls of the file. A study that was stopped resumes when the same
+    command is started again.
+    """
+    require_pyarrow("studies", "hexapod study")
+    # imported here: it is slow, and no other command needs it
+    from hexapod_cosim.extensions.study.study import Options  # noqa: PLC0415
+    from hexapod_cosim.extensions.study.studying import run_and_report  # noqa: PLC0415
+
+    options = Options(
+        fmu=fmu,
+        gains=given_gains(gains),
+        workers=_checked_workers(workers),
+        scheduler=scheduler,
+        events=warn,
+        command=_command_line(
+            file,
+            control or [],
+            {"fmu": fmu, "gains": gains},
+        ),
+    )
+    folder = output or Path("out") / Path(file).stem
+    return run_and_report(file, folder, options, controls=control or [], json=json)
+
+
+def report_again(folder: Path) -> Sequence[Path]:
+    """Writes the tables and the report of a study's folder again; returns the files."""
+    require_pyarrow("studies", "hexapod report")
+    from hexapod_cosim.extensions.study.studying import report_on, warn_of  # noqa: PLC0415  slow
+
+    found, files = report_on(folder)
+    warn_of(found)
+    return files
+
+
+def _bundled() -> Rows:
+    """Returns the bundled studies for `hexapod list studies`."""
+    return titles(list_studies())
+
+
+def _checked_workers(count: int | None) -> int | None:
+    """Returns a number of workers. Raises StudyError when it is out of range."""
+    if count is not None and not 0 <= count <= MAX_WORKERS:
+        raise StudyError(
+            "not a number of workers",
+            got=count,
+            expected=f"0 to {MAX_WORKERS}",
+            fix="write --workers 2",
+            where="--workers",
+        )
+    return count
+
+
+def _command_line(file: str, controls: Sequence[str], options: Mapping[str, object]) -> str:
+    """Returns the command line that repeats the study, with the options that are not None."""
+    words = [
+        word
+        for name, value in options.items()
+        if value is not None
+        for word in (f"--{name}", str(value))
+    ]
+    words = [*(word for text in controls for word in ("--control", text)), *words]
+    return shlex.join(["hexapod", "study", file, *words])
+
+
+EXTENSION = Extension(
+    commands=[Command(name="study", run=study, epilog=EPILOG)],
+    reports={STUDY: report_again},
+    lists={"studies": _bundled},
+)

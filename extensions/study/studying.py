@@ -1,0 +1,193 @@
+"""Runs a study for `hexapod study` and shows its results.
+
+The command itself is in study_command.py, because the imports of this module take a second.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator, Sequence
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+
+from hexapod_cosim.cosim.cli.failures import FELL, SUCCESS
+from hexapod_cosim.cosim.cli.terminal import (
+    counting_bar,
+    show_files,
+    show_json,
+    show_table,
+    show_text,
+    warn,
+)
+from hexapod_cosim.cosim.master.loop import COMPLETED
+from hexapod_cosim.cosim.results.comparison import METHOD
+from hexapod_cosim.extensions.study.dispatch import ProgressSink
+from hexapod_cosim.extensions.study.folder import TIMES
+from hexapod_cosim.extensions.study.reading import load_study
+from hexapod_cosim.extensions.study.report.notes import NO_WALK, notes
+from hexapod_cosim.extensions.study.report.page import (
+    optimum_changes,
+    optimum_rows,
+    overall_rows,
+    write_study_report,
+)
+from hexapod_cosim.extensions.study.study import Options, StartProgress, run_study
+from hexapod_cosim.extensions.study.summary import Results, read_results, summary_of
+
+MAX_REASONS = 10  # of failures that are shown
+
+
+def run_and_report(
+    file: str, folder: Path, options: Options, *, controls: Sequence[str] = (), json: bool
+) -> int:
+    """Runs a study, or what is missing of it, writes its report and shows the results.
+
+    `controls` replace those of the file.
+
+    Returns:
+        The exit code of the command.
+    """
+    plan = load_study(file, controls=controls)
+    try:
+        with progress(plain=not json) as start:
+            results = run_study(plan, folder, options=options, start=start)
+    except KeyboardInterrupt:
+        warn(f"stopped; the runs so far are in {folder}, and the same command resumes the study")
+        raise
+    found, files = report_on(folder)
+    warn_of(found)
+    if json:
+        show_json({**summary_of(found), "results": str(results), "report": str(files[-1])})
+    else:
+        show_study(found)
+        show_files([results, folder / TIMES, *files])
+        print(f"report: {files[-1]}")
+    return FELL if _only_falls(found) else SUCCESS
+
+
+def _only_falls(found: Results) -> bool:
+    """Returns whether no run walked to its end and the robot fell in some of them."""
+    return not any(found.overall.walked.values()) and any(
+        status == COMPLETED for _, status, _ in found.failures
+    )
+
+
+def warn_of(found: Results) -> None:
+    """Prints the notes of the report as warnings, and the reasons where no run walked."""
+    for text in (*failed_controls(found), *(note for note in notes(found) if note != NO_WALK)):
+        warn(text)
+
+
+def failed_controls(found: Results) -> list[str]:
+    """Returns a sentence for each control under which no run walked to its end."""
+    texts = []
+    for control, total in found.overall.runs.items():
+        if total and not found.overall.walked.get(control, 0):
+            reasons = [
+                (count, *key[1:]) for key, count in found.failures.items() if key[0] == control
+            ]
+            count, status, reason = reasons[0]
+            alike = "all" if len(reasons) == 1 else f"{count} of them"
+            texts.append(
+                f"none of {total} {control} runs walked to its end; "
+                f"{alike} {_ending(status)}: {reason}"
+            )
+    return texts
+
+
+def _ending(status: str) -> str:
+    """Returns the word for how a run ended that did not walk to its end."""
+    return "fell" if status == COMPLETED else status
+
+
+def report_on(folder: Path) -> tuple[Results, list[Path]]:
+    """Reads a study's folder and writes its tables and report; returns the results and files."""
+    found = read_results(folder)
+    return found, write_study_report(found, folder)
+
+
+@contextmanager
+def progress(*, plain: bool) -> Iterator[StartProgress]:
+    """Yields a function that starts the display of progress when the number of runs is known.
+
+    The display is a bar with rate, remaining time and failures on a terminal, and lines elsewhere
+    if `plain`.
+    """
+    with ExitStack() as shown:
+
+        def start(total: int, done: int) -> ProgressSink:
+            if done:
+                print(f"resumed: {done} of {total} runs are there already", file=sys.stderr)
+            show = shown.enter_context(counting_bar("runs", total, plain=plain))
+            show(done, 0)
+            count, failed = done, 0
+
+            def add(more: int, lost: int) -> None:
+                nonlocal count, failed
+                count, failed = count + more, failed + lost
+                show(count, failed)
+
+            return add
+
+        yield start
+
+
+def show_study(found: Results) -> None:
+    """Prints the table of all runs, totals, failures by reason and the optimum."""
+    overall, controls = found.overall, found.study.controls
+    rows = overall_rows(found)
+    columns = [
+        "metric",
+        "unit",
+        *controls,
+        *(text for control in controls[1:] for text in _change_titles(control, controls)),
+    ]
+    texts = [
+        [
+            row["name"],
+            row["unit"],
+            *row["values"],
+            *(to[key] for to in row["changes"] for key in ("change", "interval", "verdict")),
+        ]
+        for row in rows
+    ]
+    show_table(
+        columns,
+        texts,
+        right=[k for k, name in enumerate(columns) if name not in ("metric", "unit", "")],
+    )
+    walked = ", ".join(
+        f"{control} {overall.walked.get(control, 0)} of {overall.runs.get(control, 0)}"
+        for control in controls
+    )
+    show_text(f"{found.runs} runs at {found.of_points} points; walked to the end: {walked}")
+    if len(controls) > 1:
+        show_text(f"{METHOD}.")
+    for (control, status, reason), count in list(found.failures.items())[:MAX_REASONS]:
+        show_text(f"{count:6d} x {control} {_ending(status)}: {reason}")
+    for row in optimum_rows(found):
+        settings = ", ".join(
+            f"{name} {text}"
+            for name, text in zip((found.optimum or {})["variables"], row["settings"], strict=True)
+        )
+        show_text(
+            f"{row['label']}: {settings}; training {' '.join(row['training'])}, "
+            f"held out {' '.join(row['held_out'])}"
+        )
+    show_optimum_changes(found)
+
+
+def _change_titles(control: str, controls: Sequence[str]) -> tuple[str, str, str]:
+    """Returns the titles of a change, its interval and its verdict, from the first control."""
+    return ("change" if len(controls) == 2 else f"to {control}"), "95 % interval", ""
+
+
+def show_optimum_changes(found: Results) -> None:
+    """Prints the changes from the settings before the optimisation to the best trials."""
+    for row in optimum_changes(found):
+        interval = f" (95 % interval {row['interval']})" if row["interval"] else ""
+        verdict = f", {row['verdict']}" if row["verdict"] else ""
+        show_text(
+            f"{row['label']}, {row['part']}: {row['metric']} {row['change']}{interval}, "
+            f"{row['pairs']} pairs{verdict}"
+        )
