@@ -8,6 +8,8 @@ import numpy as np
 
 from hexapod_cosim.cosim.common.temporary import TemporaryFolder
 from hexapod_cosim.cosim.export.plant_export import export_fmu
+from hexapod_cosim.cosim.interface.names import vector_names
+from hexapod_cosim.cosim.run.worker_pool import processor_count
 from hexapod_cosim.extensions.identify.command_screening import wrong_commands, wrong_commands_error
 from hexapod_cosim.extensions.identify.experiment import Experiment
 from hexapod_cosim.extensions.identify.fitting.judging import fit
@@ -26,8 +28,6 @@ from hexapod_cosim.extensions.identify.numbers.servo import ELASTIC
 from hexapod_cosim.extensions.identify.screening import BadColumn, screened
 from hexapod_cosim.extensions.identify.start import rest_rows
 from hexapod_cosim.extensions.identify.unknowns import GROUPS, changed_robot, chosen_unknowns
-from hexapod_cosim.cosim.interface.names import vector_names
-from hexapod_cosim.cosim.run.worker_pool import processor_count
 from hexapod_cosim.models import Robot
 
 SETTLING = 0.1  # s    at the start of a log that is not compared: the first row has noise

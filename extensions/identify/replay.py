@@ -14,10 +14,19 @@ import numpy as np
 from hexapod_cosim.cosim.common.files import RUN_FILE, write_json, write_text
 from hexapod_cosim.cosim.common.temporary import TemporaryFolder
 from hexapod_cosim.cosim.export.plant_export import export_fmu
+from hexapod_cosim.cosim.master.recorder import Recording
+from hexapod_cosim.cosim.results.recordings import write_recording
+from hexapod_cosim.cosim.results.results import RESULTS
+from hexapod_cosim.cosim.scenario.records import default_formats
 from hexapod_cosim.extensions.identify.command_screening import wrong_commands, wrong_commands_error
 from hexapod_cosim.extensions.identify.experiment import Experiment
 from hexapod_cosim.extensions.identify.figures import channel_figures
-from hexapod_cosim.extensions.identify.log import Log, LogError, with_speed_references, without_readings
+from hexapod_cosim.extensions.identify.log import (
+    Log,
+    LogError,
+    with_speed_references,
+    without_readings,
+)
 from hexapod_cosim.extensions.identify.log_plant import LogPlant
 from hexapod_cosim.extensions.identify.report import (
     COLUMNS,
@@ -29,10 +38,6 @@ from hexapod_cosim.extensions.identify.report import (
 )
 from hexapod_cosim.extensions.identify.screening import BadColumn, left_out, screened
 from hexapod_cosim.extensions.identify.start import initial_state
-from hexapod_cosim.cosim.master.recorder import Recording
-from hexapod_cosim.cosim.results.recordings import write_recording
-from hexapod_cosim.cosim.results.results import RESULTS
-from hexapod_cosim.cosim.scenario.records import default_formats
 from hexapod_cosim.models import FmuError, Robot
 
 REPLAY, REPORT, KIND = "replay.csv", "report.html", "replay"

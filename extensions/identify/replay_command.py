@@ -12,12 +12,12 @@ import typer
 from hexapod_cosim.cosim.cli.export_command import RobotName
 from hexapod_cosim.cosim.cli.running import FmuFile
 from hexapod_cosim.cosim.cli.terminal import Json, show_files, show_json, show_table, waiting, warn
+from hexapod_cosim.cosim.results.results import results_folder
+from hexapod_cosim.cosim.scenario.tables import with_overrides
 from hexapod_cosim.extensions.identify.log import read_log
 from hexapod_cosim.extensions.identify.replay import replay as replay_log
 from hexapod_cosim.extensions.identify.replay import write_replay
 from hexapod_cosim.extensions.identify.report import COLUMNS
-from hexapod_cosim.cosim.results.results import results_folder
-from hexapod_cosim.cosim.scenario.tables import with_overrides
 from hexapod_cosim.models import load_robot
 
 LogFile = Annotated[

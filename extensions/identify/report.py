@@ -11,8 +11,8 @@ from jinja2 import ChoiceLoader, PackageLoader
 from numpy.typing import NDArray
 
 from hexapod_cosim.cosim.common.control_style import all_styles
-from hexapod_cosim.extensions.identify.log import CHANNELS, Log
 from hexapod_cosim.cosim.report.page import environment
+from hexapod_cosim.extensions.identify.log import CHANNELS, Log
 
 Array = NDArray[np.float64]
 TEMPLATE = "log.html.jinja"

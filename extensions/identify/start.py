@@ -11,8 +11,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from hexapod_cosim.extensions.identify.log import ATTITUDE, Log
 from hexapod_cosim.cosim.interface.names import LEGS, joint_names, vector_names
+from hexapod_cosim.extensions.identify.log import ATTITUDE, Log
 from hexapod_cosim.models import Robot
 from hexapod_cosim.models.kinematics import axis_quaternion, foot_positions, quaternion_product
 from hexapod_cosim.models.kinematics import rotation_matrix as rotation

@@ -19,7 +19,7 @@ from typer.main import get_command
 from hexapod_cosim.cosim.cli import main
 from hexapod_cosim.cosim.cli import terminal as terminal_module
 from hexapod_cosim.cosim.cli.app import app
-from hexapod_cosim.cosim.cli.terminal import counting_bar, progress_bar, stages_bar, waiting
+from hexapod_cosim.cosim.cli.terminal import counting_bar, progress_bar, steps, waiting
 from hexapod_cosim.cosim.results.results import NEEDED
 
 ESCAPE = "\x1b"
@@ -150,30 +150,14 @@ def test_a_log_gets_a_line_of_progress_now_and_then(monkeypatch: pytest.MonkeyPa
     ]
 
 
-def test_a_terminal_sees_the_step_its_number_simulations_and_time(
-    narrow: Callable[[str], Terminal],
-) -> None:
-    screen = narrow("stderr")
-    with stages_bar(19) as show:
-        show("linear least squares", 2, 1)
-        show("linear least squares", 2, 15)
-    last = [line for line in lines_of(screen) if line][-1]
-    assert last.startswith("linear")
-    assert "2 of 19  15 simulations  0:0" in last
-    assert len(last) <= 60
-
-
 def test_a_pipe_gets_a_line_for_each_step_and_none_where_nothing_is_shown(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     for shown in (True, False):
-        with stages_bar(19, shown=shown) as show:
-            show("linear least squares", 2, 1)
-            show("linear least squares", 2, 2)
-            show("all rows", 6, 3)
+        with steps(shown=shown) as show:
+            show("all rows")
     out, err = capsys.readouterr()
-    assert out == ""
-    assert err.splitlines() == ["step 2: linear least squares", "step 6: all rows"]
+    assert (out, err) == ("", "all rows\n")
 
 
 def test_columns_of_a_table_are_aligned(call: Call) -> None:

@@ -12,11 +12,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from hexapod_cosim.cosim.run.worker_pool import WorkerPool
 from hexapod_cosim.extensions.identify.experiment import Experiment, first_part, simulated
 from hexapod_cosim.extensions.identify.log import LogError
 from hexapod_cosim.extensions.identify.log_plant import LogPlant
 from hexapod_cosim.extensions.identify.unknowns import ROBOT
-from hexapod_cosim.cosim.run.worker_pool import WorkerPool
 from hexapod_cosim.models import FmuError, Robot
 
 Array = NDArray[np.float64]
