@@ -28,7 +28,8 @@ COVERED := $(patsubst %,tests/%,fmi exchange plant native_control friction groun
 SANITIZED := $(SANITIZED_SHORT) tests/fmi/test_fmi_importers.py tests/fmi/test_endurance.py
 
 .PHONY: help setup demo test test-docs test-browser test-rerun test-importers test-platforms \
-	test-endurance test-native test-native-sanitize test-sanitize test-sanitize-short test-robots \
+	test-endurance test-native test-native-sanitize test-sanitize test-sanitize-short \
+	test-robots test-extensions \
 	test-wheels test-metadata wheels test-compilers fuzz fuzz-short lint-c check bench \
 	bench-quick bench-gym figures format generate \
 	fmu typing clean docs identify-campaign coverage lock audit
@@ -46,6 +47,7 @@ help:
 	@echo "make test-native   the tests that are programs in C, run by ctest (1 min)"
 	@echo "make test-sanitize   these, the FMU's tests and random calls under address and undefined-behaviour sanitizers (5 min)"
 	@echo "make test-sanitize-short  the same without random calls and many instances (2 min)"
+	@echo "make test-extensions  each extension deleted in turn: the rest is installed anew and passes its tests (an hour)"
 	@echo "make test-robots  30 robots drawn at random, 0.5 to 30 kg: all designed for, all walk (3 min)"
 	@echo "make wheels    wheels for Linux, Windows and macOS, source distribution and SHA-256 list in dist/ (3 min)"
 	@echo "make test-wheels  these: sizes, tags, and the Linux wheel in an empty environment without a compiler (3 min)"
@@ -118,6 +120,10 @@ test-endurance: setup
 test-compilers: setup
 	HEXAPOD_COMPILERS=all $(BIN)/python -m pytest -q tests/trust/test_compilers.py
 
+# each extension deleted in turn: installs the rest anew and runs its tests
+test-extensions: setup
+	HEXAPOD_EXTENSIONS=all $(BIN)/python -m pytest -q tests/docs/test_extensions.py
+
 test-robots: setup
 	HEXAPOD_ROBOTS=all $(BIN)/python -m pytest -q -s tests/design/test_random_robots.py
 
@@ -140,10 +146,11 @@ ACTIONLINT := github.com/rhysd/actionlint/cmd/actionlint@v1.7.12
 # tools of an environment of their own, which the project does not depend on
 test-metadata:
 	$(PYTHON) -m venv $(METADATA)
-	$(METADATA)/bin/python -m pip install --quiet check-jsonschema py-rattler-build
+	$(METADATA)/bin/python -m pip install --quiet check-jsonschema py-rattler-build zizmor
 	$(METADATA)/bin/check-jsonschema --builtin-schema vendor.citation-file-format CITATION.cff
 	$(METADATA)/bin/check-jsonschema --builtin-schema vendor.github-workflows .github/workflows/*.yml
 	$(METADATA)/bin/python tools/check_recipe.py packaging/conda/recipe.yaml
+	$(METADATA)/bin/zizmor --offline --quiet .github/workflows
 	@if command -v go >/dev/null; then go run $(ACTIONLINT) .github/workflows/*.yml && echo "actionlint: no findings"; \
 	else echo "test-metadata: skipped actionlint: no go is installed (Debian, Ubuntu: apt-get install golang)"; fi
 

@@ -28,7 +28,10 @@ from hexapod_cosim.extensions.course.picture import FOLDER, STEM
 from hexapod_cosim.extensions.course.store import read_table
 from hexapod_cosim.extensions.course.table import Table
 
-PAGES = tuple(ROOT / "docs" / name for name in ("comparison.md", "control.md", "course.md"))
+PAGES = (
+    *(ROOT / "docs" / name for name in ("comparison.md", "control.md")),
+    ROOT / "extensions" / "course" / "README.md",
+)
 SEEDS = range(10)
 WALKED = ("kinematic", "paper", "compliant")
 OWN = [f"{name}={name}@own" for name in WALKED]

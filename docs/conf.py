@@ -28,7 +28,6 @@ extensions = [
     "myst_nb",
     "sphinx.ext.autodoc",
     "sphinx.ext.autosummary",
-    "sphinx.ext.napoleon",
     "sphinx_copybutton",
     "sphinx_design",
     "sphinx.ext.mathjax",
@@ -59,7 +58,7 @@ nitpick_ignore_regex = [
 ]
 suppress_warnings = ["misc.highlighting_failure"]  # lines of other languages in a block
 
-templates_path = ["_templates"]
+templates_path = [str(ROOT / "docs" / "_templates")]  # autosummary looks beside the pages
 html_theme = "furo"
 html_title = "hexapod-cosim"
 html_static_path = ["_static", str(MATHJAX)]

@@ -2,6 +2,7 @@
 motion.
 """
 
+from hexapod_cosim.models.contact.law import CONTACT_LAWS, Contact
 from hexapod_cosim.models.errors import (
     FmuError,
     HexapodError,
@@ -11,11 +12,10 @@ from hexapod_cosim.models.errors import (
     nearest_name,
     unknown_name,
 )
+from hexapod_cosim.models.friction import FRICTION_LAWS, Friction
 from hexapod_cosim.models.kinematics import foot_position, foot_positions
-from hexapod_cosim.models.robot import (
+from hexapod_cosim.models.records import (
     BODY_CONTACTS,
-    CONTACT_LAWS,
-    FRICTION_LAWS,
     GAITS,
     JOINT_NAMES,
     LEG_NAMES,
@@ -28,9 +28,7 @@ from hexapod_cosim.models.robot import (
     TERRAINS,
     Baumgarte,
     BodyContact,
-    Contact,
     Foot,
-    Friction,
     Gait,
     Leg,
     Link,
@@ -40,13 +38,15 @@ from hexapod_cosim.models.robot import (
     Solver,
     Terrain,
     Torso,
+)
+from hexapod_cosim.models.robot import (
     box_inertia,
-    check_robot,
     hertz_stiffness,
     list_robots,
     load_robot,
     robot_from_table,
 )
+from hexapod_cosim.models.validation import check_robot
 
 __all__ = [
     "BODY_CONTACTS",

@@ -14,7 +14,14 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from hexapod_cosim.models.actuator import gear_friction, overrun, servo_torque, stop_torque
-from hexapod_cosim.models.body.contacts import standing_body_damping
+from hexapod_cosim.models.arrays import Array
+from hexapod_cosim.models.contact.forces import (
+    Contacts,
+    contact_wrenches,
+    contacts_of,
+    standing_pairs,
+)
+from hexapod_cosim.models.contact.spheres import standing_body_damping
 from hexapod_cosim.models.kinematics import (
     BODIES,
     JOINTS,
@@ -29,19 +36,13 @@ from hexapod_cosim.models.kinematics import (
     skew,
     split,
 )
-from hexapod_cosim.models.records import Array, Robot
+from hexapod_cosim.models.records import Robot
 from hexapod_cosim.models.servos.gear import Rotors, gear_torque, is_elastic, spin_inertia
 from hexapod_cosim.models.servos.motor import (
     FULL,
     Power,
     friction_torque,
     has_measured_friction,
-)
-from hexapod_cosim.models.touch.forces import (
-    Contacts,
-    contact_wrenches,
-    contacts_of,
-    standing_pairs,
 )
 
 MULTIPLIERS = 5

@@ -5,7 +5,14 @@ from __future__ import annotations
 import numpy as np
 
 from hexapod_cosim.models.actuator import stop_energy
-from hexapod_cosim.models.body.pairs import pair_contacts
+from hexapod_cosim.models.arrays import Array
+from hexapod_cosim.models.contact.forces import (
+    candidates,
+    contacts_at,
+    open_contacts,
+    shares_of_feet,
+)
+from hexapod_cosim.models.contact.pairs import pair_contacts
 from hexapod_cosim.models.dynamics import (
     carried_turns,
     constraints,
@@ -15,14 +22,8 @@ from hexapod_cosim.models.dynamics import (
     world_inertias,
 )
 from hexapod_cosim.models.kinematics import joint_models, rotation_matrix
-from hexapod_cosim.models.records import Array, Robot
+from hexapod_cosim.models.records import Robot
 from hexapod_cosim.models.servos.gear import Rotors, gear_energy, spin_inertia
-from hexapod_cosim.models.touch.forces import (
-    contacts_at,
-    open_contacts,
-    shares_of_feet,
-    spots,
-)
 
 
 def kinetic_energy(robot: Robot, body: Array, rotors: Rotors | None = None) -> float:
@@ -47,7 +48,9 @@ def potential_energy(robot: Robot, body: Array, rotors: Rotors | None = None) ->
     gravity = -float(masses(robot) @ (body[:, 0:3] @ np.array(robot.gravity)))
     open_ = open_contacts(robot)
     contacts = contacts_at(robot, body, open_)
-    shares = shares_of_feet(robot, list(zip(spots(robot), open_.held, contacts, strict=True)))
+    shares = shares_of_feet(
+        robot, list(zip(candidates(robot), open_.states, contacts, strict=True))
+    )
     depth = np.array([max(contact.penetration, 0.0) for contact in contacts])
     pairs = np.array([max(contact.penetration, 0.0) for contact in pair_contacts(robot, body)])
     stops = float(np.sum(stop_energy(robot.servo, joint_overruns(robot, body))))

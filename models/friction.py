@@ -1,57 +1,70 @@
-"""Computes friction: the tanh law (eq. 15, 35), elasto-plastic bristles (eq. 16-18), LuGre (eq. 36,
-37), and the moments of spin and rolling (eq. 38).
+"""Defines friction: the data of a material and its laws, tanh (eq. 15, 35), elasto-plastic bristles
+(eq. 16-18) and LuGre (eq. 36, 37), and the moments of spin and rolling (eq. 38).
 
-Velocities and deflections lie along the ground, in world axes.
+Velocities and deflections lie along the ground, in world axes. A law is a function and its row in
+LAWS.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
-from hexapod_cosim.models.records import BRISTLE_LAWS, Array, Friction
+from hexapod_cosim.models.arrays import Array
+from hexapod_cosim.models.schema import Choice, Number
 
 SPRING_LIMIT = 0.7  # 1  of the presliding; bristles below it are springs (eq. 16)
 NO_FRICTION = 1e-30  # 1  keeps ratios of coefficients finite at mu = 0
 
 
-def bristle_yield(share: Array) -> Array:
-    """Returns Y: the share of the slip along a bristle that is sliding, in the shape of the input.
+@dataclass(frozen=True, kw_only=True)
+class Friction:
+    """Friction law (eq. 15-18, 35-38)."""
 
-    share: deflection over presliding. Y rises from 0 at SPRING_LIMIT to 1 at 1 and is C1.
-    """
-    s = np.clip((share - SPRING_LIMIT) / (1.0 - SPRING_LIMIT), 0.0, 1.0)
-    return np.asarray(s * s * (3.0 - 2.0 * s))
-
-
-def sliding_velocity(presliding: float, slip: Array, bristle: Array) -> Array:
-    """Returns the plastic part (..., 3) of the slip velocity (..., 3) [m/s] (eq. 16).
-
-    It is Y (v_t.u)+ u/|u| with u = b/b_max; the rest stretches the bristles.
-    """
-    u = bristle / presliding
-    share = np.linalg.norm(u, axis=-1, keepdims=True)
-    along = np.maximum(np.sum(slip * u, axis=-1, keepdims=True), 0.0)
-    return np.asarray(bristle_yield(share) * along / np.maximum(share, SPRING_LIMIT) * u)
-
-
-def bristle_rate(friction: Friction, slip: Array, bristle: Array) -> Array:
-    """Returns db/dt (3,) [m/s] of a closed foot's bristles (eq. 16, 36); 0 without bristles."""
-    if friction.law not in BRISTLE_LAWS:
-        return np.zeros(3)
-    return slip - yielding_velocity(friction, slip, bristle)
+    law: Annotated[str, Choice(FRICTION_LAWS)]
+    mu: Annotated[float, Number("1", at_least=0.0)]
+    # static friction; 0: mu
+    mu_static: Annotated[float, Number("1", at_least=0.0)] = 0.0
+    slope: Annotated[float, Number("s/m", above=0.0)]  # k_t of eq. 15, tanh law, and of eq. 38
+    # b_max of eq. 16 and 36, laws with bristles; default of a file: Mindlin
+    presliding: Annotated[float, Number("m", at_least=1e-7, at_most=1.0)]
+    # tau of eq. 17 and 37, laws with bristles
+    bristle_damping: Annotated[float, Number("s", at_least=0.0, at_most=10.0)] = 0.005
+    # v_s of eq. 18
+    stribeck_speed: Annotated[float, Number("m/s", at_least=1e-6, at_most=100.0)] = 0.005
+    # of eq. 35: what a slip of 1 m/s adds to the coefficient
+    viscous: Annotated[float, Number("s/m", at_least=0.0, at_most=1e6)] = 0.0
+    # r_s and r_r of eq. 38: moments against spin over mu f_n and against rolling over f_n
+    spin_radius: Annotated[float, Number("m", at_least=0.0, at_most=10.0)] = 0.0
+    rolling_radius: Annotated[float, Number("m", at_least=0.0, at_most=10.0)] = 0.0
 
 
-def yielding_velocity(friction: Friction, slip: Array, bristle: Array) -> Array:
-    """Returns the part (..., 3) of the slip (..., 3) [m/s] that stretches no bristle (eq. 16, 36).
+@dataclass(frozen=True)
+class Grip:
+    """Friction of a contact at a slip velocity and a deflection, with its secants over the load."""
 
-    bristle: deflections (..., 3) [m] of a law with bristles.
-    """
-    if friction.law == "lugre":
-        return lugre_sliding(friction, slip, bristle)
-    return sliding_velocity(friction.presliding, slip, bristle)
+    force: Array  # (3,) N  f_t
+    damping: float  # s/m  of -f_t/f_n, by the slip; with bristles by db/dt
+    stiffness: float = 0.0  # 1/m  of -f_t/f_n, by b
+    beta: float = 0.0  # 1/s  release rate of bristles: of db/dt, by -b
+
+
+# laws without bristles
+
+
+def no_friction(friction: Friction, normal: float, slip: Array, bristle: Array) -> Grip:
+    """Returns no force."""
+    return Grip(np.zeros(3), 0.0)
+
+
+def tanh_friction(friction: Friction, normal: float, slip: Array, bristle: Array) -> Grip:
+    """Returns f_t = -f_n (mu(v) tanh(k_t v) + viscous v) v_t/v, v = |v_t| (eq. 15, 35)."""
+    drag = friction_drag(friction, float(np.linalg.norm(slip)))
+    return Grip(-normal * drag * slip, drag)
 
 
 def stribeck_curve(friction: Friction, sliding: Array) -> Array:
@@ -68,8 +81,48 @@ def sliding_friction(friction: Friction, sliding: float) -> float:
     return float(stribeck_curve(friction, np.array(sliding)))
 
 
-def bristle_force(friction: Friction, normal: float, slip: Array, bristle: Array) -> Array:
-    """Returns the tangential force f_t (3,) of the bristle law [N] (eq. 17, 35).
+def regularised_direction(friction: Friction, speed: float) -> float:
+    """Returns tanh(k_t v)/v [s/m] at a speed [m/s], at rest k_t."""
+    x = friction.slope * speed
+    return math.tanh(x) / speed if x > 1e-5 else friction.slope * (1.0 - x * x / 3.0)
+
+
+def friction_drag(friction: Friction, speed: float) -> float:
+    """Returns the tanh law's force over load and slip speed [s/m] at a slip speed [m/s].
+
+    It is mu(v) tanh(k_t v)/v + viscous (eq. 15, 35).
+    """
+    if friction.law == "none":
+        return 0.0
+    along = regularised_direction(friction, speed)
+    return sliding_friction(friction, speed) * along + friction.viscous
+
+
+# bristles
+
+
+def bristle_yield(share: Array) -> Array:
+    """Returns Y: the share of the slip along a bristle that is sliding, in the shape of the input.
+
+    share: deflection over presliding. Y rises from 0 at SPRING_LIMIT to 1 at 1 and is C1.
+    """
+    s = np.clip((share - SPRING_LIMIT) / (1.0 - SPRING_LIMIT), 0.0, 1.0)
+    return np.asarray(s * s * (3.0 - 2.0 * s))
+
+
+def bristle_sliding(friction: Friction, slip: Array, bristle: Array) -> Array:
+    """Returns the plastic part (..., 3) of the slip velocity (..., 3) [m/s] (eq. 16).
+
+    It is Y (v_t.u)+ u/|u| with u = b/b_max; the rest stretches the bristles.
+    """
+    u = bristle / friction.presliding
+    share = np.linalg.norm(u, axis=-1, keepdims=True)
+    along = np.maximum(np.sum(slip * u, axis=-1, keepdims=True), 0.0)
+    return np.asarray(bristle_yield(share) * along / np.maximum(share, SPRING_LIMIT) * u)
+
+
+def bristle_friction(friction: Friction, normal: float, slip: Array, bristle: Array) -> Grip:
+    """Returns the friction of elasto-plastic bristles (eq. 17, 21, 35).
 
     f_t = -mu(p) f_n (u (3 - u.u)/2 + d room/|(room, d)|) with u = b/b_max, limited to length 1, and
     d = 3/2 tau db/dt / b_max. The spring leaves room = 1 - |u| (3 - u.u)/2 to the damping, so that
@@ -78,57 +131,27 @@ def bristle_force(friction: Friction, normal: float, slip: Array, bristle: Array
     p is the speed of the plastic part of the slip, so that a foot that sticks has static friction
     at any slip velocity.
     """
-    u = bristle / friction.presliding
-    d = 1.5 * friction.bristle_damping / friction.presliding * bristle_rate(friction, slip, bristle)
-    u = u / max(float(np.linalg.norm(u)), 1.0)
-    spring = u * (3.0 - u @ u) / 2.0
-    room, push = 1.0 - float(np.linalg.norm(spring)), float(np.linalg.norm(d))
-    damped = d * (room / math.hypot(room, push)) if push > 0.0 else d
-    sliding = float(np.linalg.norm(sliding_velocity(friction.presliding, slip, bristle)))
-    grip = sliding_friction(friction, sliding) * (spring + damped)
-    return -normal * (grip + friction.viscous * slip)
-
-
-@dataclass(frozen=True)
-class BristleSlopes:
-    """Secants of the bristles' friction -f_t/f_n, and the release rate of bristles.
-
-    Laws without bristles have no stiffness and no release rate.
-    """
-
-    stiffness: float  # 1/m  of friction over load, by b
-    damping: float  # s/m  of friction over load, by db/dt
-    beta: float  # 1/s  of db/dt, by -b
-
-
-def bristle_slopes(friction: Friction, slip: Array, bristle: Array) -> BristleSlopes:
-    """Returns the secants at a slip velocity (3,) [m/s] and a deflection (3,) [m] (eq. 21)."""
-    if friction.law == "lugre":
-        return _lugre_slopes(friction, slip)
-    if friction.law != "bristle":
-        return BristleSlopes(0.0, friction_drag(friction, float(np.linalg.norm(slip))), 0.0)
-    u = bristle / friction.presliding
-    size, sliding = float(np.linalg.norm(u)), sliding_velocity(friction.presliding, slip, bristle)
-    spring = (3.0 - min(size, 1.0) ** 2) / (2.0 * max(size, 1.0))
+    plastic = bristle_sliding(friction, slip, bristle)
+    mu = sliding_friction(friction, float(np.linalg.norm(plastic)))
     per_rate = 1.5 * friction.bristle_damping / friction.presliding
-    push = per_rate * float(np.linalg.norm(slip - sliding))
-    room = 1.0 - spring * size
+    u, d = bristle / friction.presliding, per_rate * (slip - plastic)
+    size, push = float(np.linalg.norm(u)), float(np.linalg.norm(d))
+    limited = u / max(size, 1.0)
+    spring = limited * (3.0 - limited @ limited) / 2.0
+    room = 1.0 - float(np.linalg.norm(spring))
+    damped = d * (room / math.hypot(room, push)) if push > 0.0 else d
+    force = -normal * (mu * (spring + damped) + friction.viscous * slip)
+
+    secant = (3.0 - min(size, 1.0) ** 2) / (2.0 * max(size, 1.0))
+    room, push = 1.0 - secant * size, per_rate * float(np.linalg.norm(slip - plastic))
     share = room / math.hypot(room, push) if push > 0.0 or room > 0.0 else 0.0
-    mu = sliding_friction(friction, float(np.linalg.norm(sliding)))
     beta = float(bristle_yield(np.array(size))) * max(float(slip @ u), 0.0)
     beta /= max(size, SPRING_LIMIT) * friction.presliding
     damping = mu * per_rate * share + friction.viscous
-    return BristleSlopes(mu * spring / friction.presliding, damping, beta)
+    return Grip(force, damping, mu * secant / friction.presliding, beta)
 
 
-def _lugre_slopes(friction: Friction, slip: Array) -> BristleSlopes:
-    """Returns stiffness mu_0/b_max, damping sigma and release rate of the LuGre law (eq. 37)."""
-    stiffness = rest_friction(friction) / friction.presliding
-    still = stiffness * friction.bristle_damping
-    speed = float(np.linalg.norm(slip))
-    damping = still / (1.0 + still * speed / (sliding_friction(friction, speed) + NO_FRICTION))
-    release = float(lugre_release(friction, np.array(speed)))
-    return BristleSlopes(stiffness, damping + friction.viscous, release)
+# LuGre
 
 
 def rest_friction(friction: Friction) -> float:
@@ -148,61 +171,82 @@ def lugre_release(friction: Friction, speed: Array) -> Array:
 
 
 def lugre_sliding(friction: Friction, slip: Array, bristle: Array) -> Array:
-    """Returns the part (..., 3) of the slip (..., 3) [m/s] that bristles (..., 3) [m] lose by
-    yielding.
-    """
+    """Returns the part (..., 3) of the slip (..., 3) [m/s] that bristles lose by yielding."""
     speed = np.linalg.norm(slip, axis=-1, keepdims=True)
     return lugre_release(friction, speed) * bristle
 
 
-def lugre_force(friction: Friction, normal: float, slip: Array, bristle: Array) -> Array:
-    """Returns the tangential force f_t (3,) of the LuGre law [N] (eq. 37).
+def lugre_friction(friction: Friction, normal: float, slip: Array, bristle: Array) -> Grip:
+    """Returns the friction of the LuGre law (eq. 37).
 
     f_t = -f_n (mu_0 b/b_max + sigma db/dt + viscous v_t). sigma = sigma_1/(1 + sigma_1 |v_t|/mu)
     falls with the speed: with a constant one the law could release energy (it is passive for
     sigma |v_t| < 4 mu) and a foot that lands sliding would feel many times mu f_n.
     """
-    slopes = _lugre_slopes(friction, slip)
-    sigma = slopes.damping - friction.viscous
-    grip = slopes.stiffness * bristle + sigma * bristle_rate(friction, slip, bristle)
-    return -normal * (grip + friction.viscous * slip)
+    stiffness = rest_friction(friction) / friction.presliding
+    still = stiffness * friction.bristle_damping
+    speed = float(np.linalg.norm(slip))
+    sigma = still / (1.0 + still * speed / (sliding_friction(friction, speed) + NO_FRICTION))
+    rate = slip - lugre_sliding(friction, slip, bristle)
+    force = -normal * (stiffness * bristle + sigma * rate + friction.viscous * slip)
+    release = float(lugre_release(friction, np.array(speed)))
+    return Grip(force, sigma + friction.viscous, stiffness, release)
+
+
+# the table
+
+
+@dataclass(frozen=True)
+class FrictionLaw:
+    """A row of the table."""
+
+    grip: Callable[[Friction, float, Array, Array], Grip]  # of load [N], slip and deflection
+    # the part (..., 3) of the slip that stretches no bristle [m/s]; None: no bristles
+    sliding: Callable[[Friction, Array, Array], Array] | None = None
+    has_static: bool = True  # whether mu_static counts
+
+
+# in the order of their numbers in the FMU, so that a new law is the last one
+LAWS = {
+    "tanh": FrictionLaw(tanh_friction),
+    "none": FrictionLaw(no_friction, has_static=False),
+    "bristle": FrictionLaw(bristle_friction, bristle_sliding),
+    "lugre": FrictionLaw(lugre_friction, lugre_sliding),
+}
+FRICTION_LAWS = tuple(LAWS)
+STATIC_LAWS = tuple(name for name, law in LAWS.items() if law.has_static)
+# under which a foot can hold
+BRISTLE_LAWS = tuple(name for name, law in LAWS.items() if law.sliding is not None)
+
+
+def friction_grip(friction: Friction, normal: float, slip: Array, bristle: Array) -> Grip:
+    """Returns the friction under a load [N] at a slip velocity (3,) [m/s] and a deflection [m]."""
+    return LAWS[friction.law].grip(friction, normal, slip, bristle)
 
 
 def friction_force(
     friction: Friction, normal: float, slip: Array, bristle: Array | None = None
 ) -> Array:
-    """Returns the tangential force f_t (3,) [N].
+    """Returns the tangential force f_t (3,) [N]; bristle: deflection (3,) [m], 0 by default."""
+    deflection = np.zeros(3) if bristle is None else bristle
+    return friction_grip(friction, normal, slip, deflection).force
 
-    The tanh law has f_t = -f_n (mu(v) tanh(k_t v) + viscous v) v_t/v, v = |v_t| (eq. 15, 35).
-    bristle: deflection b (3,) [m] of laws with bristles, 0 by default.
+
+def yielding_velocity(friction: Friction, slip: Array, bristle: Array) -> Array:
+    """Returns the part (..., 3) of the slip (..., 3) [m/s] that stretches no bristle (eq. 16, 36).
+
+    bristle: deflections (..., 3) [m].
     """
-    if friction.law == "none":
-        return np.zeros(3)
-    if friction.law == "tanh":
-        return -normal * friction_drag(friction, float(np.linalg.norm(slip))) * slip
-    law = bristle_force if friction.law == "bristle" else lugre_force
-    return law(friction, normal, slip, np.zeros(3) if bristle is None else bristle)
+    sliding = LAWS[friction.law].sliding
+    return slip if sliding is None else sliding(friction, slip, bristle)
 
 
-def _tanh_per_speed(friction: Friction, speed: float) -> float:
-    """Returns `regularised_direction`, 0 for the law `none`."""
-    return 0.0 if friction.law == "none" else regularised_direction(friction, speed)
+def bristle_rate(friction: Friction, slip: Array, bristle: Array) -> Array:
+    """Returns db/dt (3,) [m/s] of a closed foot's bristles (eq. 16, 36); 0 without bristles."""
+    return slip - yielding_velocity(friction, slip, bristle)
 
 
-def regularised_direction(friction: Friction, speed: float) -> float:
-    """Returns tanh(k_t v)/v [s/m] at a speed [m/s], at rest k_t."""
-    x = friction.slope * speed
-    return math.tanh(x) / speed if x > 1e-5 else friction.slope * (1.0 - x * x / 3.0)
-
-
-def friction_drag(friction: Friction, speed: float) -> float:
-    """Returns the tanh law's force over load and slip speed [s/m] at a slip speed [m/s].
-
-    It is mu(v) tanh(k_t v)/v + viscous (eq. 15, 35).
-    """
-    if friction.law == "none":
-        return 0.0
-    return sliding_friction(friction, speed) * _tanh_per_speed(friction, speed) + friction.viscous
+# moments
 
 
 def turning_slopes(
@@ -213,6 +257,8 @@ def turning_slopes(
     radius: that of the sphere [m]; its speeds R |w_n| and R |w_t| regularise the moments.
     normal: (3,) of the ground; turn: angular velocity (3,) [rad/s].
     """
+    if friction.law == "none":
+        return 0.0, 0.0
     spin = float(normal @ turn)
     slow = radius * abs(spin)
     fast = radius * float(np.linalg.norm(turn - spin * normal))
@@ -220,8 +266,8 @@ def turning_slopes(
         friction.spin_radius
         * radius
         * sliding_friction(friction, slow)
-        * _tanh_per_speed(friction, slow),
-        friction.rolling_radius * radius * _tanh_per_speed(friction, fast),
+        * regularised_direction(friction, slow),
+        friction.rolling_radius * radius * regularised_direction(friction, fast),
     )
 
 

@@ -13,6 +13,16 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from hexapod_cosim.models.arrays import Array
+from hexapod_cosim.models.contact.forces import Contacts, bristle_length
+from hexapod_cosim.models.contact.switching import (
+    Depths,
+    cross_cells,
+    depths_of,
+    start_contacts,
+    switch_contacts,
+    yield_soil,
+)
 from hexapod_cosim.models.dynamics import Command
 from hexapod_cosim.models.errors import HexapodError
 from hexapod_cosim.models.kinematics import (
@@ -28,18 +38,9 @@ from hexapod_cosim.models.kinematics import (
     rotation_matrix,
 )
 from hexapod_cosim.models.method import METHOD, Method, method_step
-from hexapod_cosim.models.records import Array, Robot
+from hexapod_cosim.models.records import Robot
 from hexapod_cosim.models.servos.gear import Rotors, is_elastic
 from hexapod_cosim.models.stage import Slopes, keep_slopes, solve_stage
-from hexapod_cosim.models.touch.forces import Contacts, bristle_length
-from hexapod_cosim.models.touch.switching import (
-    Depths,
-    cross_cells,
-    depths_of,
-    start_contacts,
-    switch_contacts,
-    yield_soil,
-)
 
 STEP_FLOOR = 1e-11  # s  the error control fails below this step
 TOUCH_DEPTH = (1e-10, 1e-6)  # m, m per tolerance  depth to which a touch-down is located
@@ -317,7 +318,7 @@ def end_step(start: Start, h: float, trial: Trial) -> State:
     """
     robot, state, contacts = start.robot, start.state, start.state.contacts
     before, after = (depths_of(robot, body, contacts) for body in (state.body, trial.body))
-    yielded = replace(contacts, sunk=yield_soil(robot, contacts, h, before, after))
+    yielded = replace(contacts, soil_depth=yield_soil(robot, contacts, h, before, after))
     moved = cross_cells(robot, trial.body, yielded, after)
     depths = depths_of(robot, trial.body, moved)
     switched, touchdowns = switch_contacts(robot, trial.body, moved, depths)

@@ -12,7 +12,8 @@ from functools import lru_cache
 
 import numpy as np
 
-from hexapod_cosim.models.records import Array, Leg, Robot
+from hexapod_cosim.models.arrays import Array
+from hexapod_cosim.models.records import Leg, Robot
 
 LEGS, JOINTS = 6, 3
 BODIES = 1 + LEGS * JOINTS

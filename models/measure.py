@@ -14,7 +14,9 @@ from itertools import pairwise
 import numpy as np
 
 from hexapod_cosim.models.actuator import servo_torque, stop_energy
-from hexapod_cosim.models.contact import foot_contacts, normal_force
+from hexapod_cosim.models.arrays import Array
+from hexapod_cosim.models.contact.geometry import foot_contacts
+from hexapod_cosim.models.contact.law import normal_force
 from hexapod_cosim.models.dynamics import Command, joint_overruns
 from hexapod_cosim.models.kinematics import (
     JOINTS,
@@ -24,7 +26,7 @@ from hexapod_cosim.models.kinematics import (
     joint_angles,
     joint_speeds,
 )
-from hexapod_cosim.models.records import Array, Robot
+from hexapod_cosim.models.records import Robot
 
 # nodes of a step for the forces of feet; motors use every second one
 NODES = np.linspace(0.0, 1.0, 5)

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hexapod_cosim.models.records import Array
+from hexapod_cosim.models.arrays import Array
 
 Stage = Callable[[float, Array, Array], Array]
 

@@ -26,7 +26,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from hexapod_cosim.models.arrays import Array, Vector3
 from hexapod_cosim.models.dynamics import mass_matrix
+from hexapod_cosim.models.ground.faces import ground_height, surface_of
 from hexapod_cosim.models.kinematics import (
     BODIES,
     JOINTS,
@@ -38,9 +40,8 @@ from hexapod_cosim.models.kinematics import (
     rotation_matrix,
 )
 from hexapod_cosim.models.mjcf_ground import APPROXIMATION, add_surface
-from hexapod_cosim.models.records import JOINT_NAMES, Array, Leg, Link, Robot, Vector3
+from hexapod_cosim.models.records import JOINT_NAMES, Leg, Link, Robot
 from hexapod_cosim.models.servos.motor import back_emf_damping
-from hexapod_cosim.models.terrain import ground_height, surface_of
 from hexapod_cosim.models.urdf.writer import COLOURS, THICKNESS, numbers
 
 TIME_STEP = 0.001  # s

@@ -7,8 +7,9 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
+from hexapod_cosim.models.arrays import Array
 from hexapod_cosim.models.errors import RobotError
-from hexapod_cosim.models.ground.surface import Array, Surface
+from hexapod_cosim.models.ground.surface import Surface
 from hexapod_cosim.models.urdf.writer import numbers
 
 BELOW = 0.1  # m    thickness below the lowest height

@@ -16,28 +16,19 @@ from functools import cached_property
 from typing import Annotated, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hexapod_cosim.models import arrays
+from hexapod_cosim.models.contact.law import Contact
+from hexapod_cosim.models.friction import Friction
 from hexapod_cosim.models.ground.surface import Surface
 from hexapod_cosim.models.schema import Choice, Number, Vector
 
-Array = NDArray[np.float64]
-Vector3 = tuple[float, float, float]
-Vector6 = tuple[float, float, float, float, float, float]
+Array = arrays.Array
+Vector3 = arrays.Vector3
+Vector6 = arrays.Vector6
 
 LEG_NAMES = ("LF", "LM", "LR", "RF", "RM", "RR")
 JOINT_NAMES = ("coxa", "femur", "tibia")
-CONTACT_LAWS = (
-    "exact_restitution",
-    "flores",
-    "lankarani_nikravesh",
-    "hunt_crossley",
-    "constant_damping",
-    "hertz",
-)
-FRICTION_LAWS = ("tanh", "none", "bristle", "lugre")
-STATIC_LAWS = ("tanh", "bristle", "lugre")  # friction laws with a static friction coefficient
-BRISTLE_LAWS = ("bristle", "lugre")  # friction laws with bristles, under which a foot can hold
 SERVO_MODES = ("position", "torque", "kinematic")
 SERVO_DRIVES = ("line", "motor")
 METHODS = ("rosw3", "ros2", "dp54", "bs32", "rk4")
@@ -57,7 +48,7 @@ class Torso:
     mass: Annotated[float, Number("kg", above=0.0)]
     # box, for pictures and for the default inertia
     size: Annotated[Vector3, Vector("m", 3, above=0.0)]
-    com: Annotated[Vector3, Vector("m", 3, default=(0.0, 0.0, 0.0))]
+    com: Annotated[Vector3, Vector("m", 3)] = (0.0, 0.0, 0.0)
     # about the com: xx yy zz xy xz yz; default of a file: homogeneous box
     inertia: Annotated[Vector6, Vector("kg m2", 6)]
 
@@ -68,8 +59,8 @@ class Link:
 
     mass: Annotated[float, Number("kg", above=0.0)]
     length: Annotated[float, Number("m")]  # next joint (tibia: foot centre) along x
-    offset_y: Annotated[float, Number("m", default=0.0)]
-    offset_z: Annotated[float, Number("m", default=0.0)]
+    offset_y: Annotated[float, Number("m")] = 0.0
+    offset_z: Annotated[float, Number("m")] = 0.0
     com: Annotated[Vector3, Vector("m", 3)]
     inertia: Annotated[Vector6, Vector("kg m2", 6)]  # about the com: xx yy zz xy xz yz
     axis: Annotated[Vector3, Vector("1", 3)]  # in the parent frame (coxa: hip frame), unit length
@@ -99,21 +90,9 @@ class Foot:
 
     radius: Annotated[float, Number("m", above=0.0)]
     # flat round pad on soil; 0: the sphere itself
-    pad_radius: Annotated[float, Number("m", at_least=0.0, default=0.0)] = 0.0
+    pad_radius: Annotated[float, Number("m", at_least=0.0)] = 0.0
     youngs_modulus: Annotated[float, Number("Pa", above=0.0)]
     poisson: Annotated[float, Number("1", above=-1.0, at_most=0.5)]
-
-
-@dataclass(frozen=True, kw_only=True)
-class Contact:
-    """Normal contact law (eq. 14)."""
-
-    law: Annotated[str, Choice(CONTACT_LAWS)]
-    # default of a file: Hertz, sphere on rigid ground
-    stiffness: Annotated[float, Number("N/m^1.5", above=0.0)]
-    restitution: Annotated[float, Number("1", at_least=0.0, at_most=1.0)]
-    damping_factor: Annotated[float, Number("s/m", at_least=0.0)]  # c of the constant law
-    impact_speed_floor: Annotated[float, Number("m/s", above=0.0)]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -124,49 +103,25 @@ class BodyContact:
     between neighbouring legs, which do not depend on `contact`.
     """
 
-    contact: Annotated[str, Choice(BODY_CONTACTS, default="off")] = "off"
+    contact: Annotated[str, Choice(BODY_CONTACTS)] = "off"
     # whether a run warns of neighbouring legs that overlap, or these push each other
-    self_contact: Annotated[str, Choice(SELF_CONTACTS, default="off")] = "off"
+    self_contact: Annotated[str, Choice(SELF_CONTACTS)] = "off"
     # half edges of a box along the torso's axes, with a sphere around each corner
-    torso_box: Annotated[Vector3, Vector("m", 3, default=(0.0, 0.0, 0.0))] = (0.0, 0.0, 0.0)
+    torso_box: Annotated[Vector3, Vector("m", 3)] = (0.0, 0.0, 0.0)
     # centre of the box, from the torso's origin
-    torso_centre: Annotated[Vector3, Vector("m", 3, default=(0.0, 0.0, 0.0))] = (0.0, 0.0, 0.0)
-    corner_radius: Annotated[float, Number("m", at_least=0.0, default=0.0)] = 0.0
-    knee_radius: Annotated[float, Number("m", at_least=0.0, default=0.0)] = 0.0
-    shank_radius: Annotated[float, Number("m", at_least=0.0, default=0.0)] = 0.0
+    torso_centre: Annotated[Vector3, Vector("m", 3)] = (0.0, 0.0, 0.0)
+    corner_radius: Annotated[float, Number("m", at_least=0.0)] = 0.0
+    knee_radius: Annotated[float, Number("m", at_least=0.0)] = 0.0
+    shank_radius: Annotated[float, Number("m", at_least=0.0)] = 0.0
     # of the shank's sphere: 0 at the tibia's joint, 1 at the foot's centre
-    shank_position: Annotated[float, Number("1", at_least=0.0, at_most=1.0, default=0.5)] = 0.5
-
-
-@dataclass(frozen=True, kw_only=True)
-class Friction:
-    """Friction law (eq. 15-18, 35-38)."""
-
-    law: Annotated[str, Choice(FRICTION_LAWS)]
-    mu: Annotated[float, Number("1", at_least=0.0)]
-    # static friction; 0: mu
-    mu_static: Annotated[float, Number("1", at_least=0.0, default=0.0)] = 0.0
-    slope: Annotated[float, Number("s/m", above=0.0)]  # k_t of eq. 15, tanh law, and of eq. 38
-    # b_max of eq. 16 and 36, laws with bristles; default of a file: Mindlin
-    presliding: Annotated[float, Number("m", at_least=1e-7, at_most=1.0)]
-    # tau of eq. 17 and 37, laws with bristles
-    bristle_damping: Annotated[float, Number("s", at_least=0.0, at_most=10.0, default=0.005)]
-    # v_s of eq. 18
-    stribeck_speed: Annotated[float, Number("m/s", at_least=1e-6, at_most=100.0, default=0.005)] = (
-        0.005
-    )
-    # of eq. 35: what a slip of 1 m/s adds to the coefficient
-    viscous: Annotated[float, Number("s/m", at_least=0.0, at_most=1e6, default=0.0)] = 0.0
-    # r_s and r_r of eq. 38: moments against spin over mu f_n and against rolling over f_n
-    spin_radius: Annotated[float, Number("m", at_least=0.0, at_most=10.0, default=0.0)] = 0.0
-    rolling_radius: Annotated[float, Number("m", at_least=0.0, at_most=10.0, default=0.0)] = 0.0
+    shank_position: Annotated[float, Number("1", at_least=0.0, at_most=1.0)] = 0.5
 
 
 @dataclass(frozen=True, kw_only=True)
 class Servo:
     """Servo of every joint (eq. 12) and the joints' stops (eq. 39)."""
 
-    mode: Annotated[str, Choice(SERVO_MODES, default="position")]
+    mode: Annotated[str, Choice(SERVO_MODES)] = "position"
     kp: Annotated[float, Number("N m/rad", at_least=0.0)]
     kd: Annotated[float, Number("N m s/rad", at_least=0.0)]
     torque_max: Annotated[float, Number("N m", above=0.0)]  # at stall
@@ -177,81 +132,51 @@ class Servo:
     # torque over the root of the copper loss, at the joint; default of a file: ideal motor
     motor_constant: Annotated[float, Number("N m/sqrt(W)", above=0.0)]
     # stops at the links' angle_min and angle_max; 0: none
-    stop_stiffness: Annotated[float, Number("N m/rad", at_least=0.0, at_most=1e8, default=0.0)] = (
-        0.0
-    )
-    stop_damping: Annotated[float, Number("N m s/rad", at_least=0.0, at_most=1e8, default=0.0)] = (
-        0.0
-    )
+    stop_stiffness: Annotated[float, Number("N m/rad", at_least=0.0, at_most=1e8)] = 0.0
+    stop_damping: Annotated[float, Number("N m s/rad", at_least=0.0, at_most=1e8)] = 0.0
     # line: PD torque within the torque-speed line; motor: PD voltage on a motor with back-EMF
-    drive: Annotated[str, Choice(SERVO_DRIVES, default="line")] = "line"
+    drive: Annotated[str, Choice(SERVO_DRIVES)] = "line"
     # of the drive motor (eq. 48); torque constant and resistance are seen at the joint
-    voltage: Annotated[float, Number("V", at_least=0.0, at_most=1e4, default=0.0)] = 0.0
-    duty_max: Annotated[float, Number("1", above=0.0, at_most=1.0, default=1.0)] = 1.0
-    torque_constant: Annotated[float, Number("N m/A", at_least=0.0, at_most=1e6, default=0.0)] = 0.0
-    resistance: Annotated[float, Number("ohm", at_least=0.0, at_most=1e6, default=0.0)] = 0.0
+    voltage: Annotated[float, Number("V", at_least=0.0, at_most=1e4)] = 0.0
+    duty_max: Annotated[float, Number("1", above=0.0, at_most=1.0)] = 1.0
+    torque_constant: Annotated[float, Number("N m/A", at_least=0.0, at_most=1e6)] = 0.0
+    resistance: Annotated[float, Number("ohm", at_least=0.0, at_most=1e6)] = 0.0
     # friction of gear and motor besides coulomb_friction (eq. 49, 50); all 0: none
-    viscous_friction: Annotated[
-        float, Number("N m s/rad", at_least=0.0, at_most=1e6, default=0.0)
-    ] = 0.0
-    stribeck_friction: Annotated[float, Number("N m", at_least=0.0, at_most=1e6, default=0.0)] = 0.0
-    motor_load_friction: Annotated[float, Number("1", at_least=0.0, at_most=1.0, default=0.0)] = 0.0
-    external_load_friction: Annotated[
-        float, Number("1", at_least=0.0, at_most=1.0, default=0.0)
-    ] = 0.0
-    stribeck_motor_load_friction: Annotated[
-        float, Number("1", at_least=0.0, at_most=1.0, default=0.0)
-    ] = 0.0
-    stribeck_external_load_friction: Annotated[
-        float, Number("1", at_least=0.0, at_most=1.0, default=0.0)
-    ] = 0.0
-    quadratic_motor_friction: Annotated[
-        float, Number("1/(N m)", at_least=0.0, at_most=1e6, default=0.0)
-    ] = 0.0
-    quadratic_external_friction: Annotated[
-        float, Number("1/(N m)", at_least=0.0, at_most=1e6, default=0.0)
-    ] = 0.0
-    stribeck_speed: Annotated[float, Number("rad/s", at_least=1e-6, at_most=1e6, default=1.0)] = 1.0
-    stribeck_exponent: Annotated[float, Number("1", above=0.0, at_most=16.0, default=1.0)] = 1.0
+    viscous_friction: Annotated[float, Number("N m s/rad", at_least=0.0, at_most=1e6)] = 0.0
+    stribeck_friction: Annotated[float, Number("N m", at_least=0.0, at_most=1e6)] = 0.0
+    motor_load_friction: Annotated[float, Number("1", at_least=0.0, at_most=1.0)] = 0.0
+    external_load_friction: Annotated[float, Number("1", at_least=0.0, at_most=1.0)] = 0.0
+    stribeck_motor_load_friction: Annotated[float, Number("1", at_least=0.0, at_most=1.0)] = 0.0
+    stribeck_external_load_friction: Annotated[float, Number("1", at_least=0.0, at_most=1.0)] = 0.0
+    quadratic_motor_friction: Annotated[float, Number("1/(N m)", at_least=0.0, at_most=1e6)] = 0.0
+    quadratic_external_friction: Annotated[float, Number("1/(N m)", at_least=0.0, at_most=1e6)] = (
+        0.0
+    )
+    stribeck_speed: Annotated[float, Number("rad/s", at_least=1e-6, at_most=1e6)] = 1.0
+    stribeck_exponent: Annotated[float, Number("1", above=0.0, at_most=16.0)] = 1.0
     # speed at which the dry friction saturates: it is regularised by tanh(speed / friction_speed)
-    friction_speed: Annotated[float, Number("rad/s", at_least=1e-5, at_most=1e3, default=0.05)] = (
-        0.05
-    )
+    friction_speed: Annotated[float, Number("rad/s", at_least=1e-5, at_most=1e3)] = 0.05
     # heat of a motor (eq. 52); a winding without capacity keeps its temperature
-    winding_capacity: Annotated[float, Number("J/K", at_least=0.0, at_most=1e6, default=0.0)] = 0.0
-    housing_capacity: Annotated[float, Number("J/K", at_least=0.0, at_most=1e6, default=0.0)] = 0.0
-    winding_to_housing: Annotated[float, Number("K/W", at_least=1e-6, at_most=1e6, default=1.0)] = (
-        1.0
-    )
-    housing_to_air: Annotated[float, Number("K/W", at_least=1e-6, at_most=1e6, default=1.0)] = 1.0
-    air_temperature: Annotated[float, Number("K", at_least=0.0, at_most=1e4, default=298.15)] = (
-        298.15
-    )
-    start_temperature: Annotated[float, Number("K", at_least=0.0, at_most=1e4, default=298.15)] = (
-        298.15
-    )
+    winding_capacity: Annotated[float, Number("J/K", at_least=0.0, at_most=1e6)] = 0.0
+    housing_capacity: Annotated[float, Number("J/K", at_least=0.0, at_most=1e6)] = 0.0
+    winding_to_housing: Annotated[float, Number("K/W", at_least=1e-6, at_most=1e6)] = 1.0
+    housing_to_air: Annotated[float, Number("K/W", at_least=1e-6, at_most=1e6)] = 1.0
+    air_temperature: Annotated[float, Number("K", at_least=0.0, at_most=1e4)] = 298.15
+    start_temperature: Annotated[float, Number("K", at_least=0.0, at_most=1e4)] = 298.15
     # hotter windings lower the duty limit, to 0 at temperature_max
-    derate_temperature: Annotated[float, Number("K", at_least=0.0, at_most=1e4, default=343.15)] = (
-        343.15
-    )
-    temperature_max: Annotated[float, Number("K", at_least=0.0, at_most=2e4, default=353.15)] = (
-        353.15
-    )
+    derate_temperature: Annotated[float, Number("K", at_least=0.0, at_most=1e4)] = 343.15
+    temperature_max: Annotated[float, Number("K", at_least=0.0, at_most=2e4)] = 353.15
     # of battery and cables, which all servos share (eq. 53)
-    supply_resistance: Annotated[float, Number("ohm", at_least=0.0, at_most=1e6, default=0.0)] = 0.0
+    supply_resistance: Annotated[float, Number("ohm", at_least=0.0, at_most=1e6)] = 0.0
     # how commands reach the servos, but in kinematic mode: transmissions, rounding of angles
-    bus_period: Annotated[float, Number("s", at_least=0.0, at_most=1e3, default=0.0)] = 0.0
-    command_step: Annotated[float, Number("rad", at_least=0.0, at_most=1.0, default=0.0)] = 0.0
+    bus_period: Annotated[float, Number("s", at_least=0.0, at_most=1e3)] = 0.0
+    command_step: Annotated[float, Number("rad", at_least=0.0, at_most=1.0)] = 0.0
     # gear between rotor and link (eq. 54-56), but in kinematic mode; stiffness 0: rigid
-    gear_stiffness: Annotated[float, Number("N m/rad", at_least=0.0, at_most=1e9, default=0.0)] = (
-        0.0
-    )
-    gear_damping: Annotated[float, Number("N m s/rad", at_least=0.0, at_most=1e6, default=0.0)] = (
-        0.0
-    )
-    backlash: Annotated[float, Number("rad", at_least=0.0, at_most=1.0, default=0.0)] = 0.0
+    gear_stiffness: Annotated[float, Number("N m/rad", at_least=0.0, at_most=1e9)] = 0.0
+    gear_damping: Annotated[float, Number("N m s/rad", at_least=0.0, at_most=1e6)] = 0.0
+    backlash: Annotated[float, Number("rad", at_least=0.0, at_most=1.0)] = 0.0
     # turns of the rotor for one of the joint, < 0: against it (eq. 57); 0: no angular momentum
-    gear_ratio: Annotated[float, Number("1", at_least=-1e6, at_most=1e6, default=0.0)] = 0.0
+    gear_ratio: Annotated[float, Number("1", at_least=-1e6, at_most=1e6)] = 0.0
 
 
 def _unused_fields(servo: Servo) -> list[str]:
@@ -278,7 +203,7 @@ class Solver:
     step: Annotated[float, Number("s", at_least=0.0)]  # 0: error control
     tolerance: Annotated[float, Number("1", above=0.0, below=1.0)]
     step_max: Annotated[float, Number("s", above=0.0)]
-    projection: Annotated[str, Choice(PROJECTIONS, default="none")]
+    projection: Annotated[str, Choice(PROJECTIONS)] = "none"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -290,11 +215,9 @@ class Terrain:
     """
 
     kind: Annotated[str, Choice(TERRAINS)]
-    height: Annotated[float, Number("m", default=0.0)] = 0.0
-    incline: Annotated[float, Number("rad", above=-math.pi / 2, below=math.pi / 2, default=0.0)] = (
-        0.0
-    )
-    heading: Annotated[float, Number("rad", default=0.0)] = 0.0
+    height: Annotated[float, Number("m")] = 0.0
+    incline: Annotated[float, Number("rad", above=-math.pi / 2, below=math.pi / 2)] = 0.0
+    heading: Annotated[float, Number("rad")] = 0.0
     surface: Surface | None = None  # of the kind grid; other kinds do not use it
 
     @property
@@ -309,28 +232,26 @@ class Terrain:
 class Soil:
     """Law of soft ground and its numbers (eq. 40-46); each law uses those it names."""
 
-    law: Annotated[str, Choice(SOIL_LAWS, default="none")] = "none"
+    law: Annotated[str, Choice(SOIL_LAWS)] = "none"
     # bekker: pressure (Kc/b + Kphi) z^n
-    frictional_modulus: Annotated[float, Number("N/m^(n+2)", at_least=0.0, default=0.0)] = 0.0
-    cohesive_modulus: Annotated[float, Number("N/m^(n+1)", at_least=0.0, default=0.0)] = 0.0
-    exponent: Annotated[float, Number("1", at_least=0.05, at_most=3.0, default=1.0)] = 1.0
+    frictional_modulus: Annotated[float, Number("N/m^(n+2)", at_least=0.0)] = 0.0
+    cohesive_modulus: Annotated[float, Number("N/m^(n+1)", at_least=0.0)] = 0.0
+    exponent: Annotated[float, Number("1", at_least=0.05, at_most=3.0)] = 1.0
     # granular: resistances of plates in units of `resistance`: facing down and moving down, on
     # edge and moving down, on edge and moving ahead
-    resistance: Annotated[float, Number("N/m^3", at_least=0.0, default=0.0)] = 0.0
-    alpha_down: Annotated[float, Number("1", at_least=0.0, default=1.0)] = 1.0
-    alpha_side: Annotated[float, Number("1", at_least=0.0, default=0.128)] = 0.128
-    alpha_ahead: Annotated[float, Number("1", at_least=0.0, default=0.37)] = 0.37
+    resistance: Annotated[float, Number("N/m^3", at_least=0.0)] = 0.0
+    alpha_down: Annotated[float, Number("1", at_least=0.0)] = 1.0
+    alpha_side: Annotated[float, Number("1", at_least=0.0)] = 0.128
+    alpha_ahead: Annotated[float, Number("1", at_least=0.0)] = 0.37
     # mud: pressure yield_pressure + hardening z
-    yield_pressure: Annotated[float, Number("Pa", at_least=0.0, default=0.0)] = 0.0
-    hardening: Annotated[float, Number("Pa/m", at_least=0.0, default=0.0)] = 0.0
+    yield_pressure: Annotated[float, Number("Pa", at_least=0.0)] = 0.0
+    hardening: Annotated[float, Number("Pa/m", at_least=0.0)] = 0.0
     # all laws: shear strength, its displacement K, stiffness of unloading, damping
-    cohesion: Annotated[float, Number("Pa", at_least=0.0, default=0.0)] = 0.0
-    friction_angle: Annotated[float, Number("rad", at_least=0.0, at_most=1.4, default=0.0)] = 0.0
-    shear_displacement: Annotated[float, Number("m", at_least=1e-5, at_most=1.0, default=0.01)] = (
-        0.01
-    )
-    stiffness: Annotated[float, Number("Pa/m", above=0.0, default=4e8)] = 4e8
-    damping: Annotated[float, Number("Pa s/m", at_least=0.0, default=3e4)] = 3e4
+    cohesion: Annotated[float, Number("Pa", at_least=0.0)] = 0.0
+    friction_angle: Annotated[float, Number("rad", at_least=0.0, at_most=1.4)] = 0.0
+    shear_displacement: Annotated[float, Number("m", at_least=1e-5, at_most=1.0)] = 0.01
+    stiffness: Annotated[float, Number("Pa/m", above=0.0)] = 4e8
+    damping: Annotated[float, Number("Pa s/m", at_least=0.0)] = 3e4
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -20,40 +20,24 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
+from hexapod_cosim.models.arrays import Vector3, Vector6
+from hexapod_cosim.models.contact.law import Contact
 from hexapod_cosim.models.errors import RobotError, refuse_path, unknown_name
 from hexapod_cosim.models.files import read_text
+from hexapod_cosim.models.friction import Friction
 from hexapod_cosim.models.ground.table import beside, read_terrain
 from hexapod_cosim.models.records import (
-    BODY_CONTACTS,
-    CONTACT_LAWS,
-    FRICTION_LAWS,
-    GAITS,
     JOINT_NAMES,
     LEG_NAMES,
-    METHODS,
-    PROJECTIONS,
-    SELF_CONTACTS,
-    SERVO_DRIVES,
-    SERVO_MODES,
-    SOIL_LAWS,
-    TERRAINS,
-    Array,
-    Baumgarte,
     BodyContact,
-    Contact,
     Foot,
-    Friction,
-    Gait,
     Leg,
     Link,
     Robot,
     Servo,
     Soil,
-    Solver,
     Terrain,
     Torso,
-    Vector3,
-    Vector6,
 )
 from hexapod_cosim.models.schema import (
     Number,
@@ -69,44 +53,6 @@ from hexapod_cosim.models.servos.presets import servo_table
 from hexapod_cosim.models.soil.presets import soil_table
 from hexapod_cosim.models.urdf.table import SECTIONS, element_named, side_table, urdf_table
 from hexapod_cosim.models.validation import check_robot
-
-__all__ = [
-    "BODY_CONTACTS",
-    "CONTACT_LAWS",
-    "FRICTION_LAWS",
-    "GAITS",
-    "JOINT_NAMES",
-    "LEG_NAMES",
-    "METHODS",
-    "PROJECTIONS",
-    "SELF_CONTACTS",
-    "SERVO_DRIVES",
-    "SERVO_MODES",
-    "SOIL_LAWS",
-    "TERRAINS",
-    "Array",
-    "Baumgarte",
-    "BodyContact",
-    "Contact",
-    "Foot",
-    "Friction",
-    "Gait",
-    "Leg",
-    "Link",
-    "Robot",
-    "Servo",
-    "Soil",
-    "Solver",
-    "Terrain",
-    "Torso",
-    "box_inertia",
-    "check_robot",
-    "hertz_stiffness",
-    "list_robots",
-    "load_robot",
-    "mindlin_presliding",
-    "robot_from_table",
-]
 
 LEAST_PRESLIDING = 1e-6  # m  default without load or friction
 STANCE = Number("rad", at_least=-math.pi, at_most=math.pi)

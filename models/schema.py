@@ -11,7 +11,7 @@ import tomllib
 from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from copy import deepcopy
-from dataclasses import dataclass
+from dataclasses import MISSING, dataclass, fields
 from functools import cache
 from pathlib import Path
 from typing import Any, cast, get_type_hints
@@ -129,10 +129,10 @@ class Number:
     below: float = math.inf  # exclusive
     at_least: float = -math.inf
     at_most: float = math.inf
-    default: float | None = None
 
-    def range_text(self) -> str:
-        """Returns the range in words, "a finite number" without one."""
+    @property
+    def expected(self) -> str:
+        """The range in words, "a finite number" without one."""
         bounds = [(self.above, ">"), (self.at_least, ">="), (self.below, "<"), (self.at_most, "<=")]
         parts = [f"{sign} {bound:g}" for bound, sign in bounds if math.isfinite(bound)]
         text = "a finite number" + (" " + " and ".join(parts) if parts else "")
@@ -149,20 +149,11 @@ class Number:
     def read(self, value: Any, where: str) -> float:
         """Returns the value as a float. Raises RobotError; `where` names the key."""
         if isinstance(value, bool) or not isinstance(value, int | float):
-            raise RobotError(
-                "wrong type",
-                got=value,
-                expected=self.range_text(),
-                fix="give a number",
-                where=where,
-            )
+            raise wrong_type(value, self.expected, "give a number", where)
         if not self.holds(value):
+            fix = "correct the value and its unit"
             raise RobotError(
-                "value not allowed",
-                got=value,
-                expected=self.range_text(),
-                fix="correct the value and its unit",
-                where=where,
+                "value not allowed", got=value, expected=self.expected, fix=fix, where=where
             )
         return float(value)
 
@@ -174,26 +165,20 @@ class Vector:
     unit: str
     size: int
     above: float = -math.inf  # each entry, exclusive
-    default: tuple[float, ...] | None = None
+
+    @property
+    def expected(self) -> str:
+        """The count of numbers and their unit, in words."""
+        return f"{self.size} numbers [{self.unit}]"
 
     def read(self, value: Any, where: str) -> tuple[float, ...]:
         """Returns the values as a tuple. Raises RobotError; `where` names the key."""
-        expected = f"{self.size} numbers [{self.unit}]"
         if not isinstance(value, list | tuple):
-            raise RobotError(
-                "wrong type",
-                got=value,
-                expected=expected,
-                fix="give a list of numbers",
-                where=where,
-            )
+            raise wrong_type(value, self.expected, "give a list of numbers", where)
         if len(value) != self.size:
+            fix = f"give exactly {self.size} entries"
             raise RobotError(
-                "wrong length",
-                got=value,
-                expected=expected,
-                fix=f"give exactly {self.size} entries",
-                where=where,
+                "wrong length", got=value, expected=self.expected, fix=fix, where=where
             )
         entry = Number(self.unit, above=self.above)
         return tuple(entry.read(item, f"{where}[{k}]") for k, item in enumerate(value))
@@ -204,18 +189,16 @@ class Choice:
     """A name from a closed list."""
 
     names: tuple[str, ...]
-    default: str | None = None
+
+    @property
+    def expected(self) -> str:
+        """The names."""
+        return f"one of {', '.join(self.names)}"
 
     def read(self, value: Any, where: str) -> str:
         """Returns the name. Raises RobotError; `where` names the key."""
         if not isinstance(value, str):
-            raise RobotError(
-                "wrong type",
-                got=value,
-                expected=f"one of {', '.join(self.names)}",
-                fix="give a name in quotes",
-                where=where,
-            )
+            raise wrong_type(value, self.expected, "give a name in quotes", where)
         if value not in self.names:
             raise unknown_name("name", value, self.names, where=where, error=RobotError)
         return value
@@ -225,18 +208,21 @@ class Choice:
 class Text:
     """A text that is not empty."""
 
-    default: str | None = None
+    expected = "a text"
 
     def read(self, value: Any, where: str) -> str:
         """Returns the text. Raises RobotError; `where` names the key."""
         if not isinstance(value, str) or not value:
-            raise RobotError(
-                "wrong type", got=value, expected="a text", fix="give it in quotes", where=where
-            )
+            raise wrong_type(value, self.expected, "give it in quotes", where)
         return value
 
 
 Spec = Number | Vector | Choice | Text
+
+
+def wrong_type(got: Any, expected: str, fix: str, where: str) -> RobotError:
+    """Returns the exception for a value of another type."""
+    return RobotError("wrong type", got=got, expected=expected, fix=fix, where=where)
 
 
 def specs(record: type[Any]) -> dict[str, Spec]:
@@ -259,17 +245,11 @@ def _specs(record: Any) -> dict[str, Spec]:
 def expect_table(value: Any, where: str) -> Mapping[str, Any]:
     """Returns the value if it is a TOML table. Raises RobotError otherwise."""
     if not isinstance(value, Mapping):
-        raise RobotError(
-            "wrong type",
-            got=value,
-            expected="a table",
-            fix="write it as [section] with keys below",
-            where=where,
-        )
+        raise wrong_type(value, "a table", "write it as [section] with keys below", where)
     return value
 
 
-def refuse_unknown_keys(table: Mapping[str, Any], valid: list[str], where: str) -> None:
+def refuse_unknown_keys(table: Mapping[str, Any], valid: Iterable[str], where: str) -> None:
     """Raises RobotError for the first invalid key, with the most similar valid one."""
     for key in table:
         if key not in valid:
@@ -277,42 +257,37 @@ def refuse_unknown_keys(table: Mapping[str, Any], valid: list[str], where: str) 
 
 
 def read_given(
-    record: type[Any], table: Mapping[str, Any], where: str, *, extra: tuple[str, ...] = ()
+    record: type[Any], table: Any, where: str, *, extra: tuple[str, ...] = ()
 ) -> dict[str, Any]:
     """Returns the checked fields of the record that the table contains. Raises RobotError.
 
     extra: valid keys that are not fields of the record.
     """
-    fields = specs(record)
-    refuse_unknown_keys(table, [*fields, *extra], where)
+    known, table = specs(record), expect_table(table, where)
+    refuse_unknown_keys(table, [*known, *extra], where)
     return {
-        key: fields[key].read(value, f"{where}.{key}")
+        key: known[key].read(value, f"{where}.{key}")
         for key, value in table.items()
-        if key in fields
+        if key in known
     }
 
 
-def require(record: type[Any], given: Mapping[str, Any], where: str) -> dict[str, Any]:
+def require(record: type[Any], given: dict[str, Any], where: str) -> dict[str, Any]:
     """Returns all fields of the record, given ones and defaults.
 
     Raises RobotError for a missing one.
     """
-    values = {key: spec.default for key, spec in specs(record).items() if spec.default is not None}
-    values |= given
+    usual = {item.name: item.default for item in fields(record) if item.default is not MISSING}
+    values = {key: usual[key] for key in specs(record) if key in usual} | given
     for key, spec in specs(record).items():
         if key not in values:
-            expected = expected_text(spec)
-            raise RobotError(
-                "missing key", expected=expected, fix=f"add `{key} = ...`", where=f"{where}.{key}"
-            )
+            raise missing_key(key, spec, f"{where}.{key}")
     return values
 
 
-def expected_text(spec: Spec) -> str:
-    """Returns in words which values a specification allows."""
-    if isinstance(spec, Choice):
-        return f"one of {', '.join(spec.names)}"
-    return "a text" if isinstance(spec, Text) else f"a value in {spec.unit}"
+def missing_key(key: str, spec: Spec, where: str) -> RobotError:
+    """Returns the exception for a key without a value."""
+    return RobotError("missing key", expected=spec.expected, fix=f"add `{key} = ...`", where=where)
 
 
 def check_record(record: Any, where: str) -> None:

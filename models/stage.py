@@ -14,14 +14,23 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from hexapod_cosim.models.actuator import gear_drag, servo_slopes, servo_torque, stop_slopes
-from hexapod_cosim.models.contact import (
+from hexapod_cosim.models.arrays import Array
+from hexapod_cosim.models.contact.forces import (
+    Candidate,
+    Contacts,
+    ContactState,
+    closed_contacts,
+    contact_bristle_rate,
+    contacts_of,
+    has_bristles,
+)
+from hexapod_cosim.models.contact.geometry import (
     FootContact,
     contact_jacobian,
     contact_matrices,
-    normal_force,
-    normal_slopes,
     slip_velocity,
 )
+from hexapod_cosim.models.contact.law import normal_force, normal_slopes
 from hexapod_cosim.models.dynamics import (
     Command,
     applied_forces,
@@ -39,8 +48,8 @@ from hexapod_cosim.models.dynamics import (
     solve_constrained,
     stop_torques,
 )
-from hexapod_cosim.models.friction import bristle_slopes, turning_slopes
 from hexapod_cosim.models.friction import friction_drag as foot_drag
+from hexapod_cosim.models.friction import friction_grip, turning_slopes
 from hexapod_cosim.models.kinematics import (
     BODIES,
     JOINTS,
@@ -48,7 +57,7 @@ from hexapod_cosim.models.kinematics import (
     joint_angles,
     joint_speeds,
 )
-from hexapod_cosim.models.records import Array, Robot
+from hexapod_cosim.models.records import Robot
 from hexapod_cosim.models.servos.gear import Rotors, gear_slopes, is_elastic, spin_inertia
 from hexapod_cosim.models.servos.motor import friction_drag, has_measured_friction
 from hexapod_cosim.models.soil.law import (
@@ -56,15 +65,6 @@ from hexapod_cosim.models.soil.law import (
     shear_limit,
     soil_normal_force,
     soil_normal_slopes,
-)
-from hexapod_cosim.models.touch.forces import (
-    Contacts,
-    Held,
-    Spot,
-    closed_contacts,
-    contact_bristle_rate,
-    contacts_of,
-    has_bristles,
 )
 
 
@@ -128,13 +128,15 @@ def keep_slopes(
     link_speed = joint_speeds(robot, body)
     stops = stop_slopes(robot.servo, joint_overruns(robot, body), link_speed)
     found = {}
-    for k, spot, held, contact in closed_contacts(robot, body, contacts):
-        turn = body[spot.sphere.body, 10:13]
-        if held.is_soft:
-            found[k] = soil_slopes(robot, spot, held, float(contacts.sunk[k]), contact, ahead)
+    for k, point, state, contact in closed_contacts(robot, body, contacts):
+        turn = body[point.sphere.body, 10:13]
+        if state.is_soft:
+            found[k] = soil_slopes(
+                robot, point, state, float(contacts.soil_depth[k]), contact, ahead
+            )
         else:
-            deflection = bristle[spot.leg] if spot.is_sole else np.zeros(3)
-            found[k] = rigid_slopes(robot, spot, held, contact, deflection, turn, ahead)
+            deflection = bristle[point.leg] if point.is_sole else np.zeros(3)
+            found[k] = rigid_slopes(robot, point, state, contact, deflection, turn, ahead)
     drag = gear_drag(robot.servo, speed)
     if has_measured_friction(robot.servo):
         forces = applied_forces(robot, body, command, contacts, bristle, rotors=rotors).ravel()
@@ -160,8 +162,8 @@ def expected_depth(contact: FootContact, ahead: float) -> float:
 
 def rigid_slopes(
     robot: Robot,
-    spot: Spot,
-    held: Held,
+    point: Candidate,
+    state: ContactState,
     contact: FootContact,
     bristle: Array,
     turn: Array,
@@ -171,33 +173,42 @@ def rigid_slopes(
 
     bristle: deflection (3,) of a sole [m]; turn: angular velocity (3,) of the body [rad/s].
     """
-    at = (held.contact, held.damping, expected_depth(contact, ahead), contact.approach_speed)
+    at = (state.contact, state.damping, expected_depth(contact, ahead), contact.approach_speed)
     f_n, (stiffness, viscosity) = normal_force(*at), normal_slopes(*at)
-    slip, friction = slip_velocity(contact), held.friction
-    if not spot.is_sole:
+    slip, friction = slip_velocity(contact), state.friction
+    if not point.is_sole:
         along = f_n * foot_drag(friction, float(np.linalg.norm(slip)))
         slopes = ContactSlopes(stiffness, viscosity, along)
     else:
-        b = bristle_slopes(friction, slip, bristle)
+        b = friction_grip(friction, f_n, slip, bristle)
         slopes = ContactSlopes(stiffness, viscosity, f_n * b.damping, f_n * b.stiffness, b.beta)
-    if spot.leg < 0:
+    if point.leg < 0:
         return slopes
     spin, roll = turning_slopes(friction, robot.foot.radius, contact.normal, turn)
     return replace(slopes, spin=f_n * spin, roll=f_n * roll)
 
 
 def soil_slopes(
-    robot: Robot, spot: Spot, held: Held, plastic: float, contact: FootContact, ahead: float
+    robot: Robot,
+    point: Candidate,
+    state: ContactState,
+    plastic: float,
+    contact: FootContact,
+    ahead: float,
 ) -> ContactSlopes:
     """Returns the derivatives of a sphere on soil at plastic depth z_p [m]; its moments have
     none.
     """
-    soil, foot, depth = held.soil, spot.shape(robot, held.side), expected_depth(contact, ahead)
+    soil, foot, depth = (
+        state.soil,
+        point.shape(robot, state.side),
+        expected_depth(contact, ahead),
+    )
     at = (soil, foot, plastic, depth, contact.approach_speed)
     limit = shear_limit(soil, foot, max(depth, plastic), soil_normal_force(*at))
     slip_speed = float(np.linalg.norm(slip_velocity(contact)))
-    if not spot.is_sole:
-        along = body_shear_drag(held.friction, limit, slip_speed)
+    if not point.is_sole:
+        along = body_shear_drag(state.friction, limit, slip_speed)
         return ContactSlopes(*soil_normal_slopes(*at), drag=along)
     yielding = slip_speed / soil.shear_displacement
     shear = limit / soil.shear_displacement
@@ -218,10 +229,10 @@ def slope_matrices(
     stiffness = motor * slopes.motor_stiffness + slopes.stop_stiffness
     G_x = -G.T @ (stiffness.reshape(-1, 1) * G)
     G_v = -G.T @ (damping.reshape(-1, 1) * G)
-    for k, spot, _, contact in closed_contacts(robot, body, contacts):
+    for k, point, _, contact in closed_contacts(robot, body, contacts):
         law = slopes.contact[k]
         by_x, by_v = contact_matrices(
-            contact_jacobian(body, spot.sphere.body, contact),
+            contact_jacobian(body, point.sphere.body, contact),
             contact.normal,
             stiffness=law.stiffness,
             viscosity=law.viscosity,
@@ -230,13 +241,13 @@ def slope_matrices(
         G_x += by_x
         G_v += by_v
         nn = np.outer(contact.normal, contact.normal)
-        turn = slice(6 * spot.sphere.body + 3, 6 * spot.sphere.body + 6)
+        turn = slice(6 * point.sphere.body + 3, 6 * point.sphere.body + 6)
         G_v[turn, turn] -= law.spin * nn + law.roll * (np.eye(3) - nn)
     return G_x, G_v
 
 
 @dataclass(frozen=True)
-class Grip:
+class SoleBristles:
     """Bristles of a closed sole in a stage."""
 
     leg: int
@@ -245,17 +256,17 @@ class Grip:
     law: ContactSlopes
 
 
-def grips(
+def sole_bristles(
     robot: Robot, body: Array, bristle: Array, contacts: Contacts, slopes: Slopes
-) -> list[Grip]:
+) -> list[SoleBristles]:
     """Returns the bristles of all closed soles that have some."""
     found = []
-    for k, spot, held, contact in closed_contacts(robot, body, contacts):
-        if spot.is_sole and has_bristles(held):
+    for k, point, state, contact in closed_contacts(robot, body, contacts):
+        if point.is_sole and has_bristles(state):
             across = np.eye(3) - np.outer(contact.normal, contact.normal)
-            T = across @ contact_jacobian(body, spot.sphere.body, contact)
-            rate = contact_bristle_rate(held, contact, bristle[spot.leg])
-            found.append(Grip(spot.leg, T, rate, slopes.contact[k]))
+            T = across @ contact_jacobian(body, point.sphere.body, contact)
+            rate = contact_bristle_rate(state, contact, bristle[point.leg])
+            found.append(SoleBristles(point.leg, T, rate, slopes.contact[k]))
     return found
 
 
@@ -300,11 +311,11 @@ def solve_stage(
     right = g + G_v @ s_v + G_x @ (s_x + z * (v + s_v))
 
     # bristles: a spring across the normal, -G_b/(1 + z beta), stretched by s_b + z (db/dt + s_v)
-    held = grips(robot, body, bristle, contacts, slopes)
-    for grip in held:
-        spring = grip.law.bristle / (1.0 + z * grip.law.beta)
-        W += z * z * spring * grip.T.T @ grip.T
-        right -= spring * grip.T.T @ (s_b[grip.leg] + z * (grip.rate + grip.T @ s_v))
+    soles = sole_bristles(robot, body, bristle, contacts, slopes)
+    for sole in soles:
+        spring = sole.law.bristle / (1.0 + z * sole.law.beta)
+        W += z * z * spring * sole.T.T @ sole.T
+        right -= spring * sole.T.T @ (s_b[sole.leg] + z * (sole.rate + sole.T @ s_v))
     # [W  D^T; D  0] [alpha; lambda] = [right; c]
     D, c = constraint_equations(robot, body, command, joints)
     turning = None
@@ -319,9 +330,9 @@ def solve_stage(
 
     # nu = v + s_v + z alpha;  k_b/h = (db/dt + s_v + z alpha - beta s_b)/(1 + z beta)
     rate = np.zeros((LEGS, JOINTS))
-    for grip in held:
-        moved = grip.rate + grip.T @ (s_v + z * alpha) - grip.law.beta * s_b[grip.leg]
-        rate[grip.leg] = moved / (1.0 + z * grip.law.beta)
+    for sole in soles:
+        moved = sole.rate + sole.T @ (s_v + z * alpha) - sole.law.beta * s_b[sole.leg]
+        rate[sole.leg] = moved / (1.0 + z * sole.law.beta)
     return StageRate(v + s_v + z * alpha, alpha, rate, turning)
 
 

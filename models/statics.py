@@ -22,9 +22,12 @@ from functools import lru_cache
 import numpy as np
 
 from hexapod_cosim.models.actuator import servo_torque
-from hexapod_cosim.models.contact import foot_contacts, foot_force, foot_moment
+from hexapod_cosim.models.arrays import Array
+from hexapod_cosim.models.contact.geometry import foot_contacts, foot_force, foot_moment
 from hexapod_cosim.models.dynamics import masses, stop_torques
 from hexapod_cosim.models.errors import RobotError
+from hexapod_cosim.models.friction import BRISTLE_LAWS
+from hexapod_cosim.models.ground.faces import ground, ground_height, ground_normal, surface_of
 from hexapod_cosim.models.kinematics import (
     JOINTS,
     LEGS,
@@ -36,8 +39,7 @@ from hexapod_cosim.models.kinematics import (
     quaternion_product,
     rotation_matrix,
 )
-from hexapod_cosim.models.records import BRISTLE_LAWS, Array, Baumgarte, Gait, Robot, Solver
-from hexapod_cosim.models.terrain import ground, ground_height, ground_normal, surface_of
+from hexapod_cosim.models.records import Baumgarte, Gait, Robot, Solver
 
 RESIDUAL = 1e-9  # N, N m  about 1e4 times the rounding of such forces
 ITERATIONS = 60

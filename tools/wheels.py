@@ -19,6 +19,7 @@ therefore have the tags of both.
 from __future__ import annotations
 
 import hashlib
+import json
 import os
 import shutil
 import stat
@@ -29,6 +30,7 @@ import zipfile
 from collections.abc import Iterable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from importlib.metadata import version
 from pathlib import Path
 
 from packaging.tags import platform_tags
@@ -86,6 +88,7 @@ def main(folder: Path) -> None:
         from hexapod_cosim.extensions.live.module import walker_module  # noqa: PLC0415
 
         base[MODULE] = walker_module()
+    base |= bill_of_materials(base)
     wheels = [
         write_wheel(base, platform, binaries, folder if platform.fits else folder / OTHERS)
         for platform in PLATFORMS
@@ -127,6 +130,22 @@ def common_files(wheel: Path) -> dict[str, bytes]:
             for member in archive.namelist()
             if not member.startswith((BINARIES, LIBRARIES)) and not member.endswith("/RECORD")
         }
+
+
+def bill_of_materials(base: Mapping[str, bytes]) -> dict[str, bytes]:
+    """Returns the list of foreign software in a wheel, in the form of CycloneDX (PEP 770).
+
+    The viewer bundles packages of npm, and the binaries are compiled with fmpy's FMI headers.
+    """
+    (info,) = (name.rpartition("/")[0] for name in base if name.endswith(".dist-info/WHEEL"))
+    package = json.loads((ROOT / "cosim" / "viewer" / "package.json").read_text(encoding="utf-8"))
+    bundled = [("npm", *item) for item in package["dependencies"].items() if item[0] != "esbuild"]
+    found = [
+        {"type": "library", "name": name, "version": number, "purl": f"pkg:{kind}/{name}@{number}"}
+        for kind, name, number in [*bundled, ("pypi", "fmpy", version("fmpy"))]
+    ]
+    content = {"bomFormat": "CycloneDX", "specVersion": "1.6", "version": 1, "components": found}
+    return {f"{info}/sboms/bundled.cdx.json": (json.dumps(content, indent=1) + "\n").encode()}
 
 
 def components() -> list[Component]:

@@ -36,11 +36,12 @@ from hexapod_cosim.cosim.interface.model_description3 import render_build_descri
 from hexapod_cosim.cosim.interface.plant_interface import Interface, load_interface
 from hexapod_cosim.cosim.interface.variants import for_binaries, with_integers
 from hexapod_cosim.models.errors import FmuError
+from hexapod_cosim.models.ground.faces import surface_of
 from hexapod_cosim.models.ground.grid_file import grid_bytes
 from hexapod_cosim.models.ground.surface import Surface
 from hexapod_cosim.models.records import Robot
-from hexapod_cosim.models.terrain import surface_of
-from hexapod_cosim.models.validation import check_contact_surface, check_settings
+from hexapod_cosim.models.validation.ground import check_contact_surface
+from hexapod_cosim.models.validation.robot import check_settings
 
 FMI_VERSIONS = (2, 3)
 NOTHING: Mapping[str, bytes] = MappingProxyType({})

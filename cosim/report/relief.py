@@ -17,8 +17,9 @@ from PIL import Image
 from hexapod_cosim.controller.figure_style import DPI, SETTINGS, UNDATED
 from hexapod_cosim.cosim.common.files import atomic_path
 from hexapod_cosim.models import Robot, foot_positions
-from hexapod_cosim.models.ground.surface import Array, Surface
-from hexapod_cosim.models.terrain import surface_heights
+from hexapod_cosim.models.arrays import Array
+from hexapod_cosim.models.ground.faces import surface_heights
+from hexapod_cosim.models.ground.surface import Surface
 
 WIDTH = 5.0  # in
 BELOW = -28.0  # pt    of the text below the labels of the x axis

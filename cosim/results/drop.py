@@ -18,7 +18,7 @@ from hexapod_cosim.cosim.interface.names import foot_names
 from hexapod_cosim.cosim.master.recorder import Recording
 from hexapod_cosim.cosim.results.walk import View, is_drop, robot_weight
 from hexapod_cosim.models import CONTACT_LAWS
-from hexapod_cosim.models.contact import CHI, achieved_restitution
+from hexapod_cosim.models.contact.law import CHI, achieved_restitution
 
 MEASURED = ("impact_speed", "landings", "peak_force")  # outputs of the plant, of each foot
 MOST = 5  # impacts that are reported

@@ -20,10 +20,10 @@ from numpy.typing import NDArray
 from hexapod_cosim.cosim.interface.names import foot_names
 from hexapod_cosim.cosim.master.recorder import Recording
 from hexapod_cosim.models import LEG_NAMES, SOIL_LAWS, Robot
+from hexapod_cosim.models.ground.faces import surface_of
 from hexapod_cosim.models.ground.surface import LAW
 from hexapod_cosim.models.records import Foot, Soil
 from hexapod_cosim.models.soil.law import row_soil, soil_radius, virgin_force
-from hexapod_cosim.models.terrain import surface_of
 
 Array = NDArray[np.float64]
 

@@ -29,10 +29,11 @@ from hexapod_cosim.cosim.results.footprints import sinkage_warnings
 from hexapod_cosim.cosim.results.walk import LEAST_DISTANCE, SKIPPED_CYCLES, View, body_height
 from hexapod_cosim.cosim.scenario.records import Scenario
 from hexapod_cosim.models import FRICTION_LAWS, LEG_NAMES, TERRAINS, Robot, Terrain
+from hexapod_cosim.models.friction import BRISTLE_LAWS
+from hexapod_cosim.models.ground.faces import ground_normal
 from hexapod_cosim.models.ground.surface import Surface
-from hexapod_cosim.models.records import BRISTLE_LAWS, SELF_CONTACTS
+from hexapod_cosim.models.records import SELF_CONTACTS
 from hexapod_cosim.models.statics import sliding
-from hexapod_cosim.models.terrain import ground_normal
 
 UPRIGHT = 0.6  # rad
 SUNK = 0.5  # 1

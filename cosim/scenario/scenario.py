@@ -51,12 +51,13 @@ from hexapod_cosim.cosim.scenario.values import (
     read_text,
 )
 from hexapod_cosim.models import Robot, ScenarioError, load_robot
+from hexapod_cosim.models.friction import STATIC_LAWS
+from hexapod_cosim.models.ground.faces import ground_normal
 from hexapod_cosim.models.ground.table import merged_terrain
-from hexapod_cosim.models.records import STATIC_LAWS, Terrain
+from hexapod_cosim.models.records import Terrain
 from hexapod_cosim.models.schema import Number, expect_table, refuse_unknown_keys, require
 from hexapod_cosim.models.servos.presets import changed_servo
-from hexapod_cosim.models.terrain import ground_normal
-from hexapod_cosim.models.validation import check_settings
+from hexapod_cosim.models.validation.robot import check_settings
 
 NUMBER = Number(GRAVITY.unit)
 

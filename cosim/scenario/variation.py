@@ -13,14 +13,14 @@ from numpy.typing import NDArray
 from hexapod_cosim.cosim.interface.names import JOINTS, LEGS, joint_names, vector_names
 from hexapod_cosim.cosim.scenario.records import Command, Variation
 from hexapod_cosim.models import Robot, ScenarioError
+from hexapod_cosim.models.contact.start import deepest_start
+from hexapod_cosim.models.ground.faces import ground
 from hexapod_cosim.models.kinematics import (
     body_states,
     foot_positions,
     quaternion_product,
     rotation_matrix,
 )
-from hexapod_cosim.models.terrain import ground
-from hexapod_cosim.models.touch.start import deepest_start
 
 Array = NDArray[np.float64]
 

@@ -11,11 +11,10 @@ from typing import Annotated, Any
 import typer
 
 from hexapod_cosim.controller import Gains
-from hexapod_cosim.cosim.cli.extension import Command, Extension
 from hexapod_cosim.cosim.cli.failures import SUCCESS
-from hexapod_cosim.cosim.cli.running import ControlNames, GainsFile, Settings, given_gains
+from hexapod_cosim.cosim.cli.options import ControlNames, GainsFile, Json, Settings
+from hexapod_cosim.cosim.cli.running import given_gains
 from hexapod_cosim.cosim.cli.terminal import (
-    Json,
     counting_bar,
     show_files,
     show_json,
@@ -226,9 +225,3 @@ def _command_line(options: Mapping[str, Any], *, split: str, quick: bool) -> str
         for item in value if isinstance(value, list) else [value]:
             words += [] if item is None else [f"--{name}", str(item)]
     return shlex.join(words)
-
-
-EXTENSION = Extension(
-    commands=[Command(name="benchmark", run=benchmark, epilog=EPILOG)],
-    reports={BENCHMARK: report_on},
-)

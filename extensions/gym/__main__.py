@@ -26,7 +26,7 @@ def parser() -> argparse.ArgumentParser:
     main_parser = argparse.ArgumentParser(
         prog="python -m hexapod_cosim.extensions.gym",
         description="Gymnasium environments of the walking hexapod.",
-        epilog="docs/learning.md leads from the installation to a trained policy.",
+        epilog="extensions/gym/README.md leads from the installation to a trained policy.",
     )
     commands = main_parser.add_subparsers(dest="command", required=True)
     commands.add_parser("list", help="names the environments")

@@ -15,11 +15,11 @@ from hexapod_cosim.cosim.interface.controller_interface import ControllerSetup
 from hexapod_cosim.cosim.run.controller_setup import make_setup
 from hexapod_cosim.extensions.gym.settings import EnvSettings
 from hexapod_cosim.models import Robot, load_robot
+from hexapod_cosim.models.ground.faces import surface_of
 from hexapod_cosim.models.ground.surface import Surface
 from hexapod_cosim.models.ground.table import merged_terrain
 from hexapod_cosim.models.statics import settled
-from hexapod_cosim.models.terrain import surface_of
-from hexapod_cosim.models.validation import check_settings
+from hexapod_cosim.models.validation.robot import check_settings
 
 CONTROL_PERIOD = 0.005  # s  of the controllers that actions are added to
 

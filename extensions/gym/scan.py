@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 from hexapod_cosim.extensions.gym.plants import surfaces
 from hexapod_cosim.extensions.gym.settings import EnvSettings, symmetric
 from hexapod_cosim.models import Robot
+from hexapod_cosim.models.ground.faces import ground_height, surface_heights
 from hexapod_cosim.models.records import Array, Terrain
 from hexapod_cosim.models.statics import settled
-from hexapod_cosim.models.terrain import ground_height, surface_heights
 
 SPACING = 0.02  # m  of the samples
 MARGIN = 0.5  # m  beyond the places that a robot can scan after an episode at its largest speed

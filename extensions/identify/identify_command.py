@@ -3,27 +3,24 @@
 from __future__ import annotations
 
 import shlex
+import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from hexapod_cosim.cosim.cli.export_command import RobotName
-from hexapod_cosim.cosim.cli.extension import Command, Extension
+from hexapod_cosim.cosim.cli.options import Json, RobotName
 from hexapod_cosim.cosim.cli.terminal import (
-    Json,
     show_files,
     show_json,
     show_table,
     show_text,
-    steps,
     warn,
 )
 from hexapod_cosim.cosim.results.results import results_folder
 from hexapod_cosim.extensions.identify.log import HELD_OUT, read_log
 from hexapod_cosim.extensions.identify.numbers.friction_models import TERMS, with_friction_model
-from hexapod_cosim.extensions.identify.replay_command import replay
 from hexapod_cosim.extensions.identify.unknowns import GROUPS
 from hexapod_cosim.models import HexapodError, load_robot, unknown_name
 
@@ -95,15 +92,14 @@ def identify(
     words += ["--held-out", str(held_out)] if held_out != HELD_OUT else []
     recorded = [read_log(path, torso_com=own.torso.com) for path in logs]
     with results_folder(output or Path("out") / "identify") as folder:
-        with steps(shown=not json) as show:
-            found = identify_robot(
-                recorded,
-                own,
-                groups=groups,
-                held_out=held_out,
-                workers=workers or usual_workers(recorded),
-                progress=show,
-            )
+        found = identify_robot(
+            recorded,
+            own,
+            groups=groups,
+            held_out=held_out,
+            workers=workers or usual_workers(recorded),
+            progress=(lambda _text: None) if json else _show_step,
+        )
         folder.begin()
         command = shlex.join(words)
         written = files.write_identified(found, robot, folder.path, command=command)
@@ -122,6 +118,10 @@ def identify(
     show_files(written)
 
 
+def _show_step(text: str) -> None:
+    print(text, file=sys.stderr, flush=True)
+
+
 def _checked(names: Sequence[str], held_out: float) -> list[str]:
     """Returns the groups. Raises HexapodError for an unknown one and a share that is none."""
     for name in names:
@@ -136,8 +136,3 @@ def _checked(names: Sequence[str], held_out: float) -> list[str]:
             where="--held-out",
         )
     return list(names)
-
-
-EXTENSION = Extension(
-    commands=[Command(name="replay", run=replay), Command(name="identify", run=identify)]
-)

@@ -15,7 +15,7 @@ from hexapod_cosim.extensions.identify.numbers.bodies import com_row, gyration_r
 from hexapod_cosim.extensions.identify.numbers.servo import MOTOR, SERVO
 from hexapod_cosim.extensions.identify.numbers.unknown import Unknown, section
 from hexapod_cosim.models import Robot
-from hexapod_cosim.models.records import BRISTLE_LAWS
+from hexapod_cosim.models.friction import BRISTLE_LAWS
 
 GROUPS = ("servo", "mass", "contact", "sensor", "zero")  # that a user can choose
 OF_FILE = ("servo", "mass", "contact")  # of the robot file, not of sensors

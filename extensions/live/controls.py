@@ -11,13 +11,13 @@ from pathlib import Path
 from hexapod_cosim.controller import BodyCommand, Gains, Measurement
 from hexapod_cosim.cosim.common.closing import Closing
 from hexapod_cosim.cosim.control.controllers import make_controller
+from hexapod_cosim.cosim.control.fmu_law import FmuLaw, law_of_ours
 from hexapod_cosim.cosim.export.controller_export import export_controller
 from hexapod_cosim.cosim.interface.controller_interface import (
     ControllerSetup,
     controller_parameters,
 )
 from hexapod_cosim.cosim.master.fmu import Fmu
-from hexapod_cosim.cosim.master.fmu_controller import FmuController
 from hexapod_cosim.cosim.master.loop import JointController
 from hexapod_cosim.cosim.run.single_run import RunPlan
 from hexapod_cosim.cosim.scenario.controls import control_of
@@ -52,7 +52,7 @@ class Controls(Closing):
         controller.start(time, HORIZON, REST, measurement)
         return controller
 
-    def _start_built_in(self, setup: ControllerSetup, time: float) -> FmuController:
+    def _start_built_in(self, setup: ControllerSetup, time: float) -> FmuLaw:
         """Returns the controller FMU with the set-up's parameters, and gains for each control."""
         known = replace(setup, gains=setup.gains or self._gains)
         control = {"control": controller_parameters(setup)["control"]}
@@ -62,7 +62,7 @@ class Controls(Closing):
         self._built_in.reset()
         self._built_in.set_parameters(controller_parameters(known) | control)
         self._built_in.initialise(time, HORIZON)
-        return FmuController(self._built_in, period=setup.period)
+        return law_of_ours(self._built_in, period=setup.period)
 
     def change_control(self, setup: ControllerSetup) -> None:
         """Lets the controller FMU go on under the control of a set-up."""

@@ -29,6 +29,7 @@ from hexapod_cosim.cosim.common.closing import Closing
 from hexapod_cosim.cosim.common.temporary import TemporaryFolder
 from hexapod_cosim.cosim.master.fmu import Fmu
 from hexapod_cosim.cosim.master.loop import JointController
+from hexapod_cosim.cosim.master.sensors import errors_of
 from hexapod_cosim.cosim.master.signals import Signals
 from hexapod_cosim.cosim.results.walk import robot_weight
 from hexapod_cosim.cosim.run.preparation import PlantFmus
@@ -37,7 +38,6 @@ from hexapod_cosim.cosim.run.single_run import (
     apply_settings,
     initialise_plant,
     make_plan,
-    make_sensor,
 )
 from hexapod_cosim.cosim.scenario.controls import control_of
 from hexapod_cosim.extensions.live.controls import (
@@ -142,7 +142,7 @@ class LiveRobot(Closing):
         parameters = initialise_plant(self._plant, endless)
         self.weight = robot_weight(parameters)
         self.parameters = parameters
-        self._signals = Signals(self._plant, sensor=make_sensor(scenario, self.plan.schedule))
+        self._signals = Signals(self._plant, errors=errors_of(scenario, self.plan.schedule))
         self._signals.read()
         self._last = JointCommand(angle_ref=self._signals.measurement.angle.copy())
         self._fading = 0

@@ -15,8 +15,8 @@ from hexapod_cosim.cosim.report.surface import pack_surface
 from hexapod_cosim.extensions.live.pacing import Pacer
 from hexapod_cosim.extensions.live.robot import LiveRobot
 from hexapod_cosim.models import LEG_NAMES
+from hexapod_cosim.models.ground.faces import surface_of
 from hexapod_cosim.models.kinematics import rotation_matrix
-from hexapod_cosim.models.terrain import surface_of
 
 Array = NDArray[np.float64]
 

@@ -14,7 +14,8 @@ import math
 
 import numpy as np
 
-from hexapod_cosim.models.ground.surface import Array, Surface
+from hexapod_cosim.models.arrays import Array
+from hexapod_cosim.models.ground.surface import Surface
 
 UP = (0.0, 0.0, 1.0)
 TOP = "top"

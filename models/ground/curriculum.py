@@ -9,12 +9,13 @@ from types import SimpleNamespace
 
 import numpy as np
 
+from hexapod_cosim.models.arrays import Array
 from hexapod_cosim.models.errors import RobotError, unknown_name
 from hexapod_cosim.models.ground.blocks import block_heights
 from hexapod_cosim.models.ground.parameters import Parameters, with_defaults
 from hexapod_cosim.models.ground.rough import rounded
 from hexapod_cosim.models.ground.smooth import heights_at
-from hexapod_cosim.models.ground.surface import Array, Surface
+from hexapod_cosim.models.ground.surface import Surface
 
 MOST_BLOCKS = 1 << 24
 ROUGH_SCALE = 0.1  # m  least spacing of random heights of smooth tiles

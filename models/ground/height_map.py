@@ -11,10 +11,11 @@ from types import SimpleNamespace
 
 import numpy as np
 
+from hexapod_cosim.models.arrays import Array
 from hexapod_cosim.models.errors import RobotError
 from hexapod_cosim.models.ground.map_files import READERS
 from hexapod_cosim.models.ground.rough import off_platform
-from hexapod_cosim.models.ground.surface import Array, Surface, check_heights
+from hexapod_cosim.models.ground.surface import Surface, check_heights
 
 
 def heightfield(values: SimpleNamespace) -> Surface:

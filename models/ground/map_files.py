@@ -14,9 +14,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from hexapod_cosim.models.arrays import Array
 from hexapod_cosim.models.errors import RobotError
 from hexapod_cosim.models.files import MAP_SIZE, read_bytes
-from hexapod_cosim.models.ground.surface import Array
 
 LEVELS = "PNG with 16 bits of grey per pixel"
 PNG_BEGIN = b"\x89PNG\r\n\x1a\n"

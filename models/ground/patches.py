@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from hexapod_cosim.models.arrays import Array
 from hexapod_cosim.models.errors import RobotError
 from hexapod_cosim.models.ground.surface import (
     LAW,
@@ -17,7 +18,6 @@ from hexapod_cosim.models.ground.surface import (
     MU,
     MU_STATIC,
     STIFFNESS,
-    Array,
     Bytes,
     Surface,
 )

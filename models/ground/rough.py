@@ -12,7 +12,8 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from hexapod_cosim.models.ground.surface import Array, Surface
+from hexapod_cosim.models.arrays import Array
+from hexapod_cosim.models.ground.surface import Surface
 
 QUANTUM = 2.0**24  # 1/m    60 nm
 FLAT_CELLS = 2  # cells beyond the platform that its bicubic patches reach

@@ -14,7 +14,8 @@ import math
 
 import numpy as np
 
-from hexapod_cosim.models.ground.surface import Array, Surface
+from hexapod_cosim.models.arrays import Array
+from hexapod_cosim.models.ground.surface import Surface
 
 ITERATIONS = 100
 HALVINGS = 40

@@ -13,7 +13,8 @@ from types import SimpleNamespace
 import numpy as np
 from numpy.typing import NDArray
 
-from hexapod_cosim.models.ground.surface import Array, Surface
+from hexapod_cosim.models.arrays import Array
+from hexapod_cosim.models.ground.surface import Surface
 
 Mask = NDArray[np.bool_]
 

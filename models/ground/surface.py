@@ -18,9 +18,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from hexapod_cosim.models.arrays import Array
 from hexapod_cosim.models.errors import RobotError, unknown_name
 
-Array = NDArray[np.float64]
 Bytes = NDArray[np.uint8]
 
 KINDS = ("smooth", "blocks")  # numbered from 1 in grid files

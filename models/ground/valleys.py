@@ -19,8 +19,9 @@ from functools import lru_cache
 
 import numpy as np
 
+from hexapod_cosim.models.arrays import Array
 from hexapod_cosim.models.ground.smooth import CATMULL_ROM
-from hexapod_cosim.models.ground.surface import Array, Surface
+from hexapod_cosim.models.ground.surface import Surface
 
 TILE = 1 << 19  # nodes of a band of rows that is bounded at once
 CHUNK = 1 << 14  # cells that are sampled at once

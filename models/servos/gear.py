@@ -8,7 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hexapod_cosim.models.records import Array, Servo
+from hexapod_cosim.models.arrays import Array
+from hexapod_cosim.models.records import Servo
 
 TOOTH_EDGE = 0.1  # of half of the play: half of the way on which the teeth engage
 

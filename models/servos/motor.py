@@ -12,7 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hexapod_cosim.models.records import Array, Servo
+from hexapod_cosim.models.arrays import Array
+from hexapod_cosim.models.records import Servo
 
 
 def torque_per_volt(servo: Servo) -> float:

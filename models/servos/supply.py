@@ -7,7 +7,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from hexapod_cosim.models.records import Array, Servo
+from hexapod_cosim.models.arrays import Array
+from hexapod_cosim.models.records import Servo
 from hexapod_cosim.models.servos.motor import Power, back_emf_damping, stall_torque
 
 BUS_MARGIN = 1e-9  # s  transmissions this early or late are on time

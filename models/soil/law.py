@@ -18,8 +18,9 @@ from collections.abc import Callable
 
 import numpy as np
 
-from hexapod_cosim.models.friction import regularised_direction
-from hexapod_cosim.models.records import Array, Foot, Friction, Soil
+from hexapod_cosim.models.arrays import Array
+from hexapod_cosim.models.friction import Friction, regularised_direction
+from hexapod_cosim.models.records import Foot, Soil
 
 REACHED = 1e-8  # m  short of the virgin curve: links are off their joints by less
 BISECTIONS = 200  # halvings of an interval, more than doubles resolve

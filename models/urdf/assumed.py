@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from hexapod_cosim.models.records import JOINT_NAMES, Array
+from hexapod_cosim.models.arrays import Array
+from hexapod_cosim.models.records import JOINT_NAMES
 
 Table = dict[str, Any]
 

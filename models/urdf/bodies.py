@@ -6,8 +6,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from hexapod_cosim.models.arrays import Array
 from hexapod_cosim.models.errors import RobotError, unknown_name
-from hexapod_cosim.models.records import Array
 from hexapod_cosim.models.urdf.elements import Inertial, Sphere, Urdf, UrdfJoint, UrdfLink
 
 

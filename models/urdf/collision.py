@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hexapod_cosim.models.records import Array
+from hexapod_cosim.models.arrays import Array
 from hexapod_cosim.models.urdf.values import number, numbers, origin
 
 if TYPE_CHECKING:

@@ -15,9 +15,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from hexapod_cosim.models.arrays import Array
 from hexapod_cosim.models.errors import RobotError, unknown_name
 from hexapod_cosim.models.kinematics import inertia_matrix
-from hexapod_cosim.models.records import Array
 from hexapod_cosim.models.urdf.collision import Solid, read_solids
 from hexapod_cosim.models.urdf.values import name_of, number, numbers, origin, read_root
 from hexapod_cosim.models.validation import check_inertia

@@ -14,9 +14,10 @@ from typing import Any
 
 import numpy as np
 
+from hexapod_cosim.models.arrays import Array
 from hexapod_cosim.models.errors import RobotError
 from hexapod_cosim.models.kinematics import axis_rotation, cross
-from hexapod_cosim.models.records import JOINT_NAMES, LEG_NAMES, Array
+from hexapod_cosim.models.records import JOINT_NAMES, LEG_NAMES
 from hexapod_cosim.models.urdf.bodies import Body, Branch
 
 Z = np.array([0.0, 0.0, 1.0])

@@ -15,19 +15,19 @@ from typing import Any
 
 import numpy as np
 
+from hexapod_cosim.models.arrays import Array
+from hexapod_cosim.models.contact.law import Contact
 from hexapod_cosim.models.errors import RobotError, unknown_name
 from hexapod_cosim.models.files import read_bytes
+from hexapod_cosim.models.friction import Friction
 from hexapod_cosim.models.ground.table import beside, patch_specs, read_keys, terrain_specs
 from hexapod_cosim.models.kinematics import axis_rotation
 from hexapod_cosim.models.records import (
     JOINT_NAMES,
     LEG_NAMES,
-    Array,
     Baumgarte,
     BodyContact,
-    Contact,
     Foot,
-    Friction,
     Gait,
     Leg,
     Link,

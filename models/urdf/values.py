@@ -8,8 +8,8 @@ import xml.etree.ElementTree as ET
 
 import numpy as np
 
+from hexapod_cosim.models.arrays import Array
 from hexapod_cosim.models.errors import RobotError
-from hexapod_cosim.models.records import Array
 
 DECIMALS = re.compile(r"[+-]?\d*\.(\d{2,})")
 

@@ -11,16 +11,9 @@ import xml.etree.ElementTree as ET
 from collections.abc import Iterable
 from typing import Any
 
+from hexapod_cosim.models.arrays import Vector3
 from hexapod_cosim.models.ground.table import terrain_table
-from hexapod_cosim.models.records import (
-    JOINT_NAMES,
-    BodyContact,
-    Leg,
-    Link,
-    Robot,
-    Terrain,
-    Vector3,
-)
+from hexapod_cosim.models.records import JOINT_NAMES, BodyContact, Leg, Link, Robot, Terrain
 from hexapod_cosim.models.schema import specs
 from hexapod_cosim.models.urdf.elements import EXTENSION
 

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from hexapod_cosim.models.errors import RobotError
-from hexapod_cosim.models.records import STATIC_LAWS, BodyContact, Friction, Robot
+from hexapod_cosim.models.friction import STATIC_LAWS, Friction
+from hexapod_cosim.models.records import BodyContact, Robot
 from hexapod_cosim.models.validation.ground import check_soil, check_terrain
 from hexapod_cosim.models.validation.servos import check_servo
 

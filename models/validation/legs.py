@@ -6,9 +6,10 @@ import math
 
 import numpy as np
 
+from hexapod_cosim.models.arrays import Array
 from hexapod_cosim.models.errors import RobotError
 from hexapod_cosim.models.kinematics import foot_positions, inertia_matrix
-from hexapod_cosim.models.records import JOINT_NAMES, LEG_NAMES, Array, Leg, Link, Robot
+from hexapod_cosim.models.records import JOINT_NAMES, LEG_NAMES, Leg, Link, Robot
 from hexapod_cosim.models.schema import check_record
 from hexapod_cosim.models.validation.inertia import check_com, check_inertia
 

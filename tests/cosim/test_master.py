@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 import zipfile
 from dataclasses import replace
 from pathlib import Path
@@ -24,12 +25,13 @@ from hexapod_cosim.cosim.master.loop import (
     run,
 )
 from hexapod_cosim.cosim.master.recorder import Recorder, Recording
-from hexapod_cosim.cosim.master.signals import MEASURED, Signals
+from hexapod_cosim.cosim.master.sensors import MEASURED, errors_of
+from hexapod_cosim.cosim.master.signals import Signals
 from hexapod_cosim.cosim.results.recordings import read_csv, write_csv
 from hexapod_cosim.cosim.results.result import Result
 from hexapod_cosim.cosim.results.walk import View
 from hexapod_cosim.cosim.results.warnings import locomotion_of
-from hexapod_cosim.cosim.run.single_run import apply_settings, make_sensor, simulate
+from hexapod_cosim.cosim.run.single_run import apply_settings, simulate
 from hexapod_cosim.cosim.scenario.records import Push, Scenario
 from hexapod_cosim.cosim.scenario.scenario import load_scenario, scenario_robot
 from hexapod_cosim.cosim.scenario.schedule import make_schedule, push_rows
@@ -42,9 +44,20 @@ def scenario_of(*settings: str) -> Scenario:
     return load_scenario("walk_flat", overrides=settings)
 
 
-def run_fake(plant: FakePlant, controller: JointController, scenario: Scenario) -> Outcome:
+class Hanging(FakeController):
+    """A controller whose fourth call does not return."""
+
+    def step(self, t: float, command: BodyCommand, measurement: Measurement) -> JointCommand:
+        while len(self.times) == 3:
+            pass
+        return super().step(t, command, measurement)
+
+
+def run_fake(
+    plant: FakePlant, controller: JointController, scenario: Scenario, *, time_limit: float = 60.0
+) -> Outcome:
     schedule = make_schedule(scenario)
-    signals = Signals(plant, sensor=make_sensor(scenario, schedule))
+    signals = Signals(plant, errors=errors_of(scenario, schedule))
     return run(
         plant,
         signals,
@@ -52,7 +65,19 @@ def run_fake(plant: FakePlant, controller: JointController, scenario: Scenario) 
         schedule,
         Recorder(signals, schedule.times, schedule.rows),
         h=scenario.macro_step,
+        time_limit=time_limit,
     )
+
+
+@pytest.mark.skipif(not hasattr(signal, "setitimer"), reason="this system has no such timer")
+def test_a_controller_that_does_not_answer_ends_the_run_and_the_rows_until_then_are_kept() -> None:
+    before = signal.getsignal(signal.SIGALRM)
+    outcome = run_fake(FakePlant(), Hanging(), scenario_of("duration=0.05"), time_limit=0.05)
+    assert outcome.status == FAILED
+    assert outcome.reason == "TimeoutError: the controller has not answered for 0.05 s"
+    assert len(outcome.recording.time) == 3
+    assert signal.getsignal(signal.SIGALRM) == before
+    assert signal.getitimer(signal.ITIMER_REAL)[0] == 0.0
 
 
 def test_each_macro_step_reads_controls_sets_and_steps_in_this_order() -> None:

@@ -28,7 +28,7 @@ DOCS = ROOT / "docs"
 NOTEBOOKS = sorted((DOCS / "notebooks").glob("*.ipynb"))
 PAGES = [
     ROOT / name for name in ("README.md", ".github/CONTRIBUTING.md", "benchmarks/README.md")
-] + sorted(DOCS.rglob("*.md"))
+] + sorted([*DOCS.rglob("*.md"), *(ROOT / "extensions").glob("*/README.md")])
 SHORT, PLAIN = "duration=2", ["--set", "outputs.plots=false"]
 COMPUTED = os.environ.get("HEXAPOD_SITE") == "computed"
 of_the_site = pytest.mark.skipif(not COMPUTED, reason="built by make test-docs")
@@ -298,6 +298,7 @@ def twin_chi(tree: Path, law: str, restitution: float) -> float:
         "[finder for finder in sys.meta_path if 'Redirect' not in type(finder).__name__]\n"
         "package = types.ModuleType('hexapod_cosim'); package.__path__ = ['.']; "
         "sys.modules['hexapod_cosim'] = package\n"
-        f"from hexapod_cosim.models.contact import CHI; print(repr(CHI[{law!r}]({restitution})))"
+        "from hexapod_cosim.models.contact.law import CHI\n"
+        f"print(repr(CHI[{law!r}]({restitution})))"
     )
     return float(run(tree, sys.executable, "-c", code))

@@ -20,12 +20,13 @@ from scipy.integrate import solve_ivp
 
 from hexapod_cosim.models import load_robot
 from hexapod_cosim.models.friction import (
+    Friction,
     bristle_rate,
-    bristle_slopes,
     friction_drag,
     friction_force,
+    friction_grip,
 )
-from hexapod_cosim.models.records import Array, Friction
+from hexapod_cosim.models.records import Array
 
 SAME = 1e-13  # relative: the same formula, its operations in another order
 EXACT = 1e-12  # relative: rounding
@@ -66,7 +67,7 @@ def test_the_plants_laws_are_the_twins(
             slip = speed * rng.normal(size=3)
             bristle = size * friction.presliding * ALONG
             got = native(core, plant, slip, bristle)
-            slopes = bristle_slopes(friction, slip, bristle)
+            slopes = friction_grip(friction, 1.0, slip, bristle)
             force = -friction_force(friction, 1.0, slip, bristle)
             twin = [*force, *bristle_rate(friction, slip, bristle)]
             assert got[:6] == pytest.approx(twin, rel=SAME, abs=SAME)
@@ -139,7 +140,7 @@ def test_lugre_at_rest_is_a_spring_of_the_static_force_over_the_presliding() -> 
 def test_lugre_at_rest_has_the_damping_of_its_bristles() -> None:
     """sigma_1 = tau mu_0/b_max = 0.005 s 0.6/1e-4 m = 30 s/m."""
     friction = replace(BOTH, law="lugre", bristle_damping=0.005)
-    slopes = bristle_slopes(friction, np.zeros(3), np.zeros(3))
+    slopes = friction_grip(friction, 1.0, np.zeros(3), np.zeros(3))
     assert slopes.damping == pytest.approx(30.0, rel=EXACT)
     assert slopes.stiffness == pytest.approx(6000.0, rel=EXACT)
 

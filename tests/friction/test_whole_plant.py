@@ -28,7 +28,7 @@ from test_twin_integrator import IMPLICIT, STEP, assert_same_steps
 from test_twin_measure import H, stage_forces
 
 from hexapod_cosim.models import METHODS, Robot, load_robot
-from hexapod_cosim.models.contact import foot_contacts, foot_moment, standing_damping
+from hexapod_cosim.models.contact.geometry import foot_contacts, foot_moment, standing_damping
 from hexapod_cosim.models.dynamics import accelerations, joint_overruns, stop_torques
 from hexapod_cosim.models.measure import Impulses, step_works
 from hexapod_cosim.models.records import Array

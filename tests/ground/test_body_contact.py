@@ -14,19 +14,19 @@ from plant import Plant, PlantError, inputs, pointer
 from states import changed, distance, lopsided, random_bodies, random_command
 
 from hexapod_cosim.models import Robot, load_robot
-from hexapod_cosim.models.body.contacts import (
+from hexapod_cosim.models.contact.forces import contacts_of
+from hexapod_cosim.models.contact.geometry import standing_damping
+from hexapod_cosim.models.contact.spheres import (
     body_contacts,
     body_forces,
     body_spheres,
     standing_body_damping,
 )
-from hexapod_cosim.models.contact import standing_damping
+from hexapod_cosim.models.contact.start import deepest_start
 from hexapod_cosim.models.dynamics import Command, accelerations
 from hexapod_cosim.models.kinematics import body_states
 from hexapod_cosim.models.records import Array
 from hexapod_cosim.models.stage import keep_slopes, solve_stage
-from hexapod_cosim.models.touch.forces import contacts_of
-from hexapod_cosim.models.touch.start import deepest_start
 
 DENSE = 1e-10  # relative: the error of the dense solution, whose condition number is about 1e6
 Z = 7e-4  # s: h gamma of a step in which the stiff terms dominate

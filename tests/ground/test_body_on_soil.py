@@ -17,7 +17,7 @@ from plant import Plant
 from states import changed
 
 from hexapod_cosim.models import Robot, load_robot
-from hexapod_cosim.models.body.contacts import body_contacts
+from hexapod_cosim.models.contact.spheres import body_contacts
 from hexapod_cosim.models.dynamics import Command
 from hexapod_cosim.models.ground.grid_file import grid_bytes
 from hexapod_cosim.models.ground.patches import material_row
@@ -203,7 +203,7 @@ def test_knees_and_shanks_that_fall_on_patches_of_soil_move_as_the_twins(core: c
     start = (np.array([0.01, 0.02, 0.0645]), np.eye(4)[0], [0.1, 0.0, -0.8], [0.0, 0.0, 0.0])
     _, state = moved_with_the_twin(core, robot, body_of(robot, start, KNEELING), KNEELING, 0.01)
     assert state.touchdowns >= 6
-    knees = [state.contacts.held[k] for k in range(14, 20)]
+    knees = [state.contacts.states[k] for k in range(14, 20)]
     assert {held.soil.law for held in knees if not held.is_open} == {"none", "bekker", "mud"}
 
 
@@ -216,7 +216,7 @@ def test_prints_of_the_torso_are_found_again_and_are_the_twins(core: ct.CDLL) ->
     assert plant.output(Command(angle_ref=FOLDED)).footprints == len(prints) == 4
     assert prints[:, 3] == pytest.approx(np.full(4, PAD), rel=1e-5)
     assert prints[:, 2].min() > 1e-3
-    corners = state.contacts.sunk[6:14]
+    corners = state.contacts.soil_depth[6:14]
     assert np.sort(corners)[-4:].min() >= prints[:, 2].min()
     assert np.count_nonzero(~np.isnan(state.contacts.damping[6:14])) == 4
 
@@ -245,7 +245,7 @@ def moved_with_the_twin(
     assert np.abs(plant.bodies[:, 7:] - state.body[:, 7:]).max() < SPEEDS
     counts = (state.evaluations, state.steps, state.rejected, state.touchdowns)
     assert counts == tuple(int(x) for x in vars(plant.output(command).solver).values())
-    assert state.contacts.sunk[6:].max() > 1e-4
+    assert state.contacts.soil_depth[6:].max() > 1e-4
     return plant, state
 
 

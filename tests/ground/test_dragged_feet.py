@@ -80,7 +80,7 @@ def test_a_foot_that_was_dragged_through_a_higher_block_meets_no_wall_behind_it(
     pair.assert_same()
     assert block_below(pair) == (20, 23)
     assert state.contacts.cell[0] == (20, 20)
-    assert state.contacts.held[0].is_soft
+    assert state.contacts.states[0].is_soft
 
 
 def test_a_foot_that_comes_over_a_trench_to_a_level_block_meets_no_corner_at_a_depth(
@@ -123,8 +123,8 @@ def test_a_foot_that_leaves_its_print_within_a_higher_block_meets_it_from_outsid
     assert_closed(pair)
     assert block_below(pair)[1] > 21
     assert inside.contacts.cell[0] == (20, 20)
-    assert inside.contacts.held[0].is_open
-    assert inside.contacts.sunk[0] == 0.0
+    assert inside.contacts.states[0].is_open
+    assert inside.contacts.soil_depth[0] == 0.0
     outside = pair.move(0.09, lifted)
     assert_closed(pair)
     pair.assert_same()

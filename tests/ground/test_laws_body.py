@@ -14,7 +14,7 @@ from plant import Plant
 from states import changed
 
 from hexapod_cosim.models import Robot, load_robot
-from hexapod_cosim.models.body.contacts import body_contacts
+from hexapod_cosim.models.contact.spheres import body_contacts
 from hexapod_cosim.models.dynamics import Command
 from hexapod_cosim.models.records import Array
 

@@ -17,6 +17,7 @@ from test_grid_motion import march
 from test_twin_motion import Pair, stood
 
 from hexapod_cosim.models import Robot, load_robot
+from hexapod_cosim.models.contact.footprints import footprint_depth
 from hexapod_cosim.models.dynamics import Command
 from hexapod_cosim.models.ground.catalogue import make_surface
 from hexapod_cosim.models.ground.grid_file import grid_bytes
@@ -25,8 +26,7 @@ from hexapod_cosim.models.ground.surface import Surface
 from hexapod_cosim.models.kinematics import foot_centres
 from hexapod_cosim.models.records import Array, Terrain
 from hexapod_cosim.models.soil.presets import soil_preset
-from hexapod_cosim.models.touch.prints import footprint_depth
-from hexapod_cosim.models.validation import check_settings
+from hexapod_cosim.models.validation.robot import check_settings
 
 ATHENA = changed(load_robot("athena"), body={"contact": "off"})
 TERRAINS: dict[str, dict[str, Any]] = {
@@ -64,7 +64,7 @@ def gross(out: Any) -> float:
 @pytest.mark.parametrize("soil", ["dry_sand", "mud"])
 @pytest.mark.parametrize("name", list(TERRAINS))
 def test_the_energy_books_of_a_march_close(core: ct.CDLL, name: str, soil: str, pad: float) -> None:
-    """Beside the platform, feet tread on tops and noses and are dragged along walls."""
+    """Beside the platform, feet update_footprints on tops and noses and are dragged along walls."""
     robot = on(make_surface(name, TERRAINS[name]), soft(ATHENA, soil, pad))
     check_settings(robot)
     plant, _ground = put(core, robot)

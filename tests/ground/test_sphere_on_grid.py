@@ -19,13 +19,13 @@ from plant import Plant
 from states import changed, scaled
 
 from hexapod_cosim.models import CONTACT_LAWS, Leg, Link, Robot, load_robot
-from hexapod_cosim.models.contact import CHI, achieved_restitution
+from hexapod_cosim.models.contact.forces import candidates, contact_at, open_contacts
+from hexapod_cosim.models.contact.law import CHI, achieved_restitution
+from hexapod_cosim.models.contact.switching import start_contacts
 from hexapod_cosim.models.dynamics import Command, accelerations
 from hexapod_cosim.models.ground.surface import Surface
 from hexapod_cosim.models.kinematics import body_states
 from hexapod_cosim.models.records import Array, Terrain
-from hexapod_cosim.models.touch.forces import contact_at, open_contacts, spots
-from hexapod_cosim.models.touch.switching import start_contacts
 
 RADIUS = 0.02  # m  of the sphere
 BOWL = 0.25  # m  radius of the bowl
@@ -139,13 +139,13 @@ def test_the_twins_sphere_is_pulled_back_by_the_bowl_as_a_pendulum() -> None:
     place = np.array([SMALL, 0.0, BOWL - math.sqrt(reach**2 - SMALL**2)])
     body = body_states(robot, place, np.eye(4)[0], still, still, robot.stance, np.zeros((6, 3)))
     command, contacts = Command(angle_ref=robot.stance), start_contacts(robot, body)
-    corners = [contact_at(robot, spot, body) for spot in spots(robot)[6:]]
+    corners = [contact_at(robot, candidate, body) for candidate in candidates(robot)[6:]]
     assert [corner.penetration for corner in corners] == pytest.approx([depth] * 8, abs=1e-9)
-    assert all(held.is_open for held in contacts.held[:6])
+    assert all(held.is_open for held in contacts.states[:6])
     dv = accelerations(robot, body, command, contacts).dv
     # the contact bears m g; a pendulum m g cos: second order in x/rho
     assert dv[0, 0] == pytest.approx(-9.81 * SMALL / reach, rel=1e-4)
-    assert len(open_contacts(robot).held) == 14
+    assert len(open_contacts(robot).states) == 14
 
 
 @pytest.mark.parametrize("law", CONTACT_LAWS)

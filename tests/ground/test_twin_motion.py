@@ -217,7 +217,7 @@ def test_patches_of_other_material_are_the_twins(core: ct.CDLL, law: str) -> Non
     pair = Pair(core, robot, stood(robot, height=1e-3, velocity=(0.2, 0.1, -0.3)))
     state = pair.move(0.03, lambda _: Command(angle_ref=robot.stance))
     pair.assert_same()
-    held = [state.contacts.held[leg] for leg in range(6)]
+    held = [state.contacts.states[leg] for leg in range(6)]
     assert [h.soil.law for h in held] == ["none", "none", "none", "bekker", "none", "none"]
     assert held[0].friction.mu == 0.05
     assert held[2].friction.mu_static == 0.9
@@ -250,8 +250,8 @@ def test_a_foot_that_is_dragged_in_its_print_over_an_edge_moves_as_the_twins(
     pair.assert_same()
     assert foot_centres(robot, state.body)[0, 0] > foot[0] + 1e-3 + 0.031
     assert state.contacts.cell[0] == (20, 21)
-    assert not state.contacts.held[0].is_open
-    assert state.contacts.held[0].is_soft
+    assert not state.contacts.states[0].is_open
+    assert state.contacts.states[0].is_soft
 
 
 def test_a_robot_that_lands_on_its_back_moves_as_the_twin(core: ct.CDLL) -> None:

@@ -22,7 +22,7 @@ from hexapod_cosim.models.ground.grid_file import grid_bytes
 from hexapod_cosim.models.ground.surface import Surface
 from hexapod_cosim.models.ground.valleys import tightest_valley
 from hexapod_cosim.models.records import Terrain
-from hexapod_cosim.models.validation import check_settings
+from hexapod_cosim.models.validation.robot import check_settings
 
 LIMIT, ABOVE = 0.01575, 0.0162  # m: least radius for a foot of 15 mm, and 3 % more
 

@@ -204,7 +204,7 @@ def test_an_episode_that_cannot_start_ends_with_its_message_and_is_followed_by_a
 
 
 def test_the_page_has_the_places_and_scales_of_the_observation() -> None:
-    page = (ROOT / "docs" / "learning.md").read_text(encoding="utf-8")
+    page = (ROOT / "extensions" / "gym" / "README.md").read_text(encoding="utf-8")
     rows = re.findall(r"\| (\d+)-(\d+) \| `(\w+)`.*\| ([\d., ]+) \|$", page, flags=re.MULTILINE)
     assert [row[2] for row in rows] == list(LEGGED_GYM)
     begin = 0
@@ -217,7 +217,7 @@ def test_the_page_has_the_places_and_scales_of_the_observation() -> None:
 
 
 def test_the_examples_of_the_page_work_as_typed(capsys: pytest.CaptureFixture[str]) -> None:
-    page = (ROOT / "docs" / "learning.md").read_text(encoding="utf-8")
+    page = (ROOT / "extensions" / "gym" / "README.md").read_text(encoding="utf-8")
     names: dict[str, Any] = {}
     for example in re.findall(r"```python\n(.*?)```", page, flags=re.DOTALL):
         exec(example, names)

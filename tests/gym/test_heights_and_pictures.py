@@ -17,7 +17,7 @@ from hexapod_cosim.extensions.gym.plants import grounds
 from hexapod_cosim.extensions.gym.settings import EnvSettings
 from hexapod_cosim.extensions.gym.vector import HexapodVectorEnv
 from hexapod_cosim.models import HexapodError
-from hexapod_cosim.models.terrain import ground_height
+from hexapod_cosim.models.ground.faces import ground_height
 
 pytestmark = pytest.mark.usefixtures("plant_build")
 HEIGHTS = {"heights": 1.0}

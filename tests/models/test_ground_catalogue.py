@@ -16,10 +16,10 @@ import mujoco
 import numpy as np
 import pytest
 
-from hexapod_cosim.cosim.cli.terrain_command import value_text
 from hexapod_cosim.models import RobotError, load_robot, robot_from_table
 from hexapod_cosim.models.ground.catalogue import CATALOGUE, make_surface
 from hexapod_cosim.models.ground.curriculum import TileMaker, column_names
+from hexapod_cosim.models.ground.faces import ground_height
 from hexapod_cosim.models.ground.grid_file import (
     HEADER,
     grid_bytes,
@@ -34,7 +34,6 @@ from hexapod_cosim.models.ground.table import merged_terrain, terrain_table
 from hexapod_cosim.models.mjcf import robot_to_mjcf
 from hexapod_cosim.models.mjcf_ground import rectangles
 from hexapod_cosim.models.records import Array, Terrain
-from hexapod_cosim.models.terrain import ground_height
 from hexapod_cosim.models.urdf.writer import robot_to_urdf
 
 MADE = [name for name in CATALOGUE if name != "heightfield"]
@@ -435,7 +434,7 @@ def documented(name: str) -> str:
     entry = CATALOGUE[name]
     kind = "either" if name == "heightfield" else make_surface(name, {}).kind
     own = [
-        f"`{key}` {value_text(parameter, parameter.value(DIFFICULTY))}"
+        f"`{key}` {parameter.text(parameter.value(DIFFICULTY))}"
         for key, parameter in entry.parameters.items()
         if parameter != RANDOM_TILE.get(key)
     ]

@@ -10,9 +10,11 @@ import numpy as np
 import pytest
 
 from hexapod_cosim.models import load_robot
-from hexapod_cosim.models.contact import foot_contacts
+from hexapod_cosim.models.contact.forces import contacts_at, open_contacts
+from hexapod_cosim.models.contact.geometry import foot_contacts
 from hexapod_cosim.models.ground.blocks import block_faces
 from hexapod_cosim.models.ground.catalogue import make_surface
+from hexapod_cosim.models.ground.faces import ground, ground_faces, ground_height
 from hexapod_cosim.models.ground.smooth import (
     height_and_slopes,
     heights_at,
@@ -23,8 +25,6 @@ from hexapod_cosim.models.ground.surface import Surface
 from hexapod_cosim.models.kinematics import body_states, foot_centres
 from hexapod_cosim.models.records import Array, Terrain
 from hexapod_cosim.models.statics import standing
-from hexapod_cosim.models.terrain import ground, ground_faces, ground_height
-from hexapod_cosim.models.touch.forces import contacts_at, open_contacts
 
 PLANE = 1e-12  # m
 CLOSED_FORM = 1e-9  # m

@@ -15,11 +15,11 @@ from disguised_urdf import random_robot
 from hexapod_cosim.cosim.export.robot_files import FORMATS, export_description
 from hexapod_cosim.models import LEG_NAMES, Robot, foot_positions, list_robots, load_robot
 from hexapod_cosim.models.dynamics import mass_matrix, masses
+from hexapod_cosim.models.ground.faces import ground_normal
 from hexapod_cosim.models.kinematics import body_states, rotation_matrix
 from hexapod_cosim.models.mjcf import robot_to_mjcf, tibia_mobility
 from hexapod_cosim.models.records import JOINT_NAMES, Array
 from hexapod_cosim.models.statics import settled
-from hexapod_cosim.models.terrain import ground_normal
 from hexapod_cosim.models.urdf.writer import robot_to_urdf
 
 EXACT = 1e-12  # relative to the largest entry: about 1e3 times the rounding of a dozen products

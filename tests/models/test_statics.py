@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from hexapod_cosim.models import Robot, RobotError, load_robot
-from hexapod_cosim.models.contact import standing_damping
+from hexapod_cosim.models.contact.geometry import standing_damping
 from hexapod_cosim.models.dynamics import Command, accelerations
 from hexapod_cosim.models.energy import centre_of_mass
 from hexapod_cosim.models.kinematics import body_states, foot_centres, rotation_matrix

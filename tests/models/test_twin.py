@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from hexapod_cosim.models import BodyContact, Robot, load_robot
-from hexapod_cosim.models.contact import foot_contacts, foot_force, normal_force
+from hexapod_cosim.models.contact.geometry import foot_contacts, foot_force
+from hexapod_cosim.models.contact.law import normal_force
 from hexapod_cosim.models.dynamics import (
     Command,
     accelerations,
@@ -29,6 +30,7 @@ from hexapod_cosim.models.energy import (
     potential_energy,
 )
 from hexapod_cosim.models.friction import friction_force
+from hexapod_cosim.models.ground.faces import ground
 from hexapod_cosim.models.kinematics import (
     axis_normals,
     axis_quaternion,
@@ -44,7 +46,6 @@ from hexapod_cosim.models.kinematics import (
     rotation_matrix,
 )
 from hexapod_cosim.models.records import Array
-from hexapod_cosim.models.terrain import ground
 
 EXACT = 1e-12  # relative to the size of the compared quantities: about 1e3 roundings
 DIFFERENCE = 1e-6  # s, of central differences, whose error is about 1e-8 of the third derivative

@@ -15,7 +15,7 @@ from states import changed, distance, landing, lopsided, random_bodies, random_c
 
 from hexapod_cosim.models import METHODS, Robot, load_robot
 from hexapod_cosim.models.actuator import servo_slopes
-from hexapod_cosim.models.contact import foot_contacts, standing_damping
+from hexapod_cosim.models.contact.geometry import foot_contacts, standing_damping
 from hexapod_cosim.models.dynamics import Command, accelerations
 from hexapod_cosim.models.integrator import (
     Start,

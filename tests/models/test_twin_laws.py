@@ -10,7 +10,7 @@ import pytest
 
 from hexapod_cosim.models import load_robot
 from hexapod_cosim.models.actuator import gear_friction, servo_torque
-from hexapod_cosim.models.contact import (
+from hexapod_cosim.models.contact.law import (
     CHI,
     achieved_restitution,
     contact_damping,
@@ -18,8 +18,8 @@ from hexapod_cosim.models.contact import (
     normal_force,
 )
 from hexapod_cosim.models.friction import friction_force
+from hexapod_cosim.models.ground.faces import ground
 from hexapod_cosim.models.records import Array
-from hexapod_cosim.models.terrain import ground
 
 EXACT = 1e-12  # relative: about 1e3 roundings
 FIGURES = 1e-4  # of figures that are printed with four to six digits

@@ -15,12 +15,8 @@ from test_plant_stages import coefficients, rates
 
 from hexapod_cosim.models import Robot, load_robot
 from hexapod_cosim.models.actuator import gear_friction, servo_torque
-from hexapod_cosim.models.contact import (
-    contact_damping,
-    foot_contacts,
-    foot_force,
-    standing_damping,
-)
+from hexapod_cosim.models.contact.geometry import foot_contacts, foot_force, standing_damping
+from hexapod_cosim.models.contact.law import contact_damping
 from hexapod_cosim.models.dynamics import Command
 from hexapod_cosim.models.kinematics import joint_angles, joint_speeds
 from hexapod_cosim.models.measure import (

@@ -12,7 +12,7 @@ import pinocchio as pin
 import pytest
 
 from hexapod_cosim.models import LEG_NAMES, Robot, load_robot
-from hexapod_cosim.models.contact import foot_contacts, foot_force
+from hexapod_cosim.models.contact.geometry import foot_contacts, foot_force
 from hexapod_cosim.models.dynamics import Command, accelerations, constraints, joint_torques
 from hexapod_cosim.models.energy import kinetic_energy
 from hexapod_cosim.models.kinematics import (

@@ -40,7 +40,7 @@ def test_a_native_change_of_gait_is_saved_restored_and_refused(controller_core: 
     state = native.save()
     # stance and swing of a wave of 20 ms are shorter than the period; setting it up is refused too
     native.definition["gait.period"] = 0.006
-    gait = ct.addressof(native.definition.bytes) + native.definition.ranges["gait.pattern"].offset
+    gait = native.definition.bytes.gait
     with pytest.raises(NativeError, match="gait's shorter phase"):
         native._checked(controller_core.hx_controller_change_gait(native._handle, gait))
     assert native.save() == state

@@ -10,7 +10,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from hexapod_cosim.models import Robot
-from hexapod_cosim.models.contact import foot_contact, foot_contacts, foot_force, standing_damping
+from hexapod_cosim.models.contact.geometry import (
+    foot_contact,
+    foot_contacts,
+    foot_force,
+    standing_damping,
+)
 from hexapod_cosim.models.dynamics import Command, constraints, joint_torques
 from hexapod_cosim.models.kinematics import (
     body_states,

@@ -14,7 +14,7 @@ from states import changed
 from test_laws_standing import block, laid, marching, stood, tilted
 
 from hexapod_cosim.models import load_robot
-from hexapod_cosim.models.friction import SPRING_LIMIT, bristle_force, bristle_rate
+from hexapod_cosim.models.friction import SPRING_LIMIT, bristle_rate, friction_force
 
 FRICTION = replace(load_robot("athena").friction, law="bristle")
 EXACT = 1e-12  # relative: rounding
@@ -36,7 +36,7 @@ def test_below_break_away_a_bristle_is_a_spring() -> None:
     for share in (0.0, 0.3, SPRING_LIMIT):
         slip, z = rng.normal(size=3), share * FRICTION.presliding * np.array([0.6, 0.8, 0.0])
         assert bristle_rate(FRICTION, slip, z) == pytest.approx(slip, rel=EXACT)
-        still = bristle_force(FRICTION, 10.0, np.zeros(3), z)
+        still = friction_force(FRICTION, 10.0, np.zeros(3), z)
         assert still == pytest.approx(
             -FRICTION.mu * 10.0 * 0.5 * share * (3.0 - share**2) * np.array([0.6, 0.8, 0.0]),
             rel=EXACT,
@@ -61,7 +61,7 @@ def test_no_motion_takes_a_bristle_past_its_presliding_or_friction_past_its_cone
             float(bristle_rate(FRICTION, slip, FRICTION.presliding * direction) @ direction)
             <= EXACT
         )
-        force = bristle_force(FRICTION, 10.0, slip, z)
+        force = friction_force(FRICTION, 10.0, slip, z)
         assert float(np.linalg.norm(force)) <= FRICTION.mu * 10.0 * (1.0 + EXACT)
 
 

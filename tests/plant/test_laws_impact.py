@@ -16,7 +16,8 @@ from plant import Plant, asked
 from states import changed
 
 from hexapod_cosim.models import Robot, load_robot
-from hexapod_cosim.models.contact import exact_restitution_chi, foot_contacts
+from hexapod_cosim.models.contact.geometry import foot_contacts
+from hexapod_cosim.models.contact.law import exact_restitution_chi
 from hexapod_cosim.models.kinematics import body_states
 
 RESTITUTION = 1e-3  # of the exact law

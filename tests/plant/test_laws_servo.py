@@ -17,7 +17,7 @@ from plant import Plant
 from states import changed, landing, random_command, with_links
 
 from hexapod_cosim.models import Robot, load_robot
-from hexapod_cosim.models.contact import standing_damping
+from hexapod_cosim.models.contact.geometry import standing_damping
 from hexapod_cosim.models.dynamics import Command, accelerations
 
 # relative, of closed forms: a tibia's inertia is 1e-7 of its wall's, and the error control allows

@@ -15,7 +15,7 @@ from plant import Plant
 from states import changed, landing, random_command
 
 from hexapod_cosim.models import Robot, load_robot
-from hexapod_cosim.models.contact import foot_contacts
+from hexapod_cosim.models.contact.geometry import foot_contacts
 from hexapod_cosim.models.dynamics import Command
 from hexapod_cosim.models.energy import centre_of_mass
 from hexapod_cosim.models.kinematics import body_states, rotation_matrix

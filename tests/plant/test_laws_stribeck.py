@@ -20,7 +20,7 @@ from test_laws_standing import block, laid
 
 from hexapod_cosim.models import load_robot
 from hexapod_cosim.models.dynamics import Command
-from hexapod_cosim.models.friction import bristle_force, sliding_friction
+from hexapod_cosim.models.friction import friction_force, sliding_friction
 
 FRICTION = replace(
     load_robot("athena").friction,
@@ -42,7 +42,7 @@ def test_friction_falls_from_static_to_kinetic_half_way_at_the_stribeck_speed(
     speed: float, mu: float
 ) -> None:
     assert sliding_friction(FRICTION, speed) == pytest.approx(mu, rel=EXACT)
-    full = bristle_force(FRICTION, 10.0, speed * ALONG, 1e-4 * ALONG)
+    full = friction_force(FRICTION, 10.0, speed * ALONG, 1e-4 * ALONG)
     assert full == pytest.approx(-10.0 * mu * ALONG, rel=EXACT)
 
 
@@ -51,11 +51,11 @@ def test_a_foot_that_sticks_has_static_friction_however_it_swings(slip: float) -
     """Half-way up a bristle, u = 0.5, the force is 0.6 times u (3 - u^2)/2 = 0.6875 of the load. A
     sliding foot that reverses sticks again.
     """
-    assert bristle_force(FRICTION, 10.0, slip * ALONG, 0.5e-4 * ALONG) == pytest.approx(
+    assert friction_force(FRICTION, 10.0, slip * ALONG, 0.5e-4 * ALONG) == pytest.approx(
         -10.0 * 0.6 * 0.6875 * ALONG, rel=EXACT
     )
     if slip <= 0.0:
-        assert bristle_force(FRICTION, 10.0, slip * ALONG, 1e-4 * ALONG) == pytest.approx(
+        assert friction_force(FRICTION, 10.0, slip * ALONG, 1e-4 * ALONG) == pytest.approx(
             -6.0 * ALONG, rel=EXACT
         )
 

@@ -17,12 +17,8 @@ from states import changed, distance, lopsided, random_bodies, random_command
 from test_twin_pinocchio import pinocchio_accelerations
 
 from hexapod_cosim.models import CONTACT_LAWS, Robot, load_robot
-from hexapod_cosim.models.contact import (
-    contact_damping,
-    foot_contacts,
-    foot_force,
-    standing_damping,
-)
+from hexapod_cosim.models.contact.geometry import foot_contacts, foot_force, standing_damping
+from hexapod_cosim.models.contact.law import contact_damping
 from hexapod_cosim.models.dynamics import (
     Command,
     accelerations,

@@ -13,15 +13,11 @@ from states import changed, distance, lopsided, random_bodies
 
 from hexapod_cosim.models import CONTACT_LAWS, Robot, load_robot
 from hexapod_cosim.models.actuator import gear_friction, servo_torque
-from hexapod_cosim.models.contact import (
-    contact_damping,
-    exact_restitution_chi,
-    foot_contacts,
-    foot_force,
-    normal_force,
-)
+from hexapod_cosim.models.contact.geometry import foot_contacts, foot_force
+from hexapod_cosim.models.contact.law import contact_damping, exact_restitution_chi, normal_force
 from hexapod_cosim.models.dynamics import joint_kinematics, world_inertias
 from hexapod_cosim.models.friction import bristle_rate, friction_force
+from hexapod_cosim.models.ground.faces import ground
 from hexapod_cosim.models.kinematics import (
     body_states,
     joint_angle,
@@ -32,7 +28,6 @@ from hexapod_cosim.models.kinematics import (
     skew,
 )
 from hexapod_cosim.models.records import Array
-from hexapod_cosim.models.terrain import ground
 
 # relative: the same formula with its operations in another order, some hundred roundings
 SAME = 1e-13

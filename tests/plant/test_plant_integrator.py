@@ -16,7 +16,7 @@ from plant import Plant, PlantError, inputs, probed
 from states import changed, random_command
 
 from hexapod_cosim.models import METHODS, Robot, load_robot
-from hexapod_cosim.models.contact import foot_contacts
+from hexapod_cosim.models.contact.geometry import foot_contacts
 from hexapod_cosim.models.dynamics import Command
 from hexapod_cosim.models.kinematics import body_states
 from hexapod_cosim.models.records import Array

@@ -15,7 +15,8 @@ from slopes import LawSlopes, assembled, law_slopes, resting
 from states import changed
 
 from hexapod_cosim.models import METHODS, Robot, load_robot
-from hexapod_cosim.models.contact import foot_contacts, normal_force, standing_damping
+from hexapod_cosim.models.contact.geometry import foot_contacts, standing_damping
+from hexapod_cosim.models.contact.law import normal_force
 from hexapod_cosim.models.dynamics import Command, constraints, mass_matrix
 from hexapod_cosim.models.kinematics import quaternion_rate, skew
 from hexapod_cosim.models.records import Array

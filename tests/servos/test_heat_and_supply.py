@@ -18,7 +18,7 @@ from test_measured_servos import with_servo
 
 import hexapod_cosim
 from hexapod_cosim.models import Robot, load_robot
-from hexapod_cosim.models.contact import standing_damping
+from hexapod_cosim.models.contact.geometry import standing_damping
 from hexapod_cosim.models.dynamics import Command, accelerations
 from hexapod_cosim.models.kinematics import joint_angles, joint_speeds
 from hexapod_cosim.models.records import Servo

@@ -10,7 +10,8 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from mirror import OK, HxControllerInput, HxControllerOutput, HxRange, Real
+from headers import Header
+from mirror import OK, Real
 
 from hexapod_cosim.controller import BodyCommand, Gait, Measurement
 from hexapod_cosim.cosim.interface.controller_interface import (
@@ -19,6 +20,15 @@ from hexapod_cosim.cosim.interface.controller_interface import (
 )
 
 COMMANDS = ("angle_ref", "speed_ref", "torque_ref", "acceleration_ref")
+HEADER = Header(
+    *(f"plant_fmu/include/hexapod/{name}.h" for name in ("legs", "status")),
+    "controller/fmu/include/hexapod/controller.h",
+)
+HxRange: Any = HEADER.types["hxRange"]
+HxControllerInput: Any = HEADER.types["hxControllerInput"]
+HxControllerOutput: Any = HEADER.types["hxControllerOutput"]
+HxControllerDefinition: Any = HEADER.types["hxControllerDefinition"]
+HxGait: Any = HEADER.types["hxGait"]
 
 
 class NativeError(Exception):
@@ -31,35 +41,7 @@ class NativeError(Exception):
 
 def bound(core: ct.CDLL) -> ct.CDLL:
     """Declares the types of the library's functions; may be called repeatedly."""
-    controller, status, ranges = ct.c_void_p, ct.c_int, [ct.POINTER(ct.POINTER(HxRange))]
-    signatures: dict[str, tuple[Any, list[Any]]] = {
-        "hx_controller_definition_default": (None, [ct.c_void_p]),
-        "hx_controller_definition_ranges": (ct.c_size_t, ranges),
-        "hx_controller_input_ranges": (ct.c_size_t, ranges),
-        "hx_controller_definition_check": (status, [ct.c_void_p, ct.c_char_p]),
-        "hx_controller_create": (controller, []),
-        "hx_controller_destroy": (None, [controller]),
-        "hx_controller_reset": (status, [controller, ct.c_void_p, Real]),
-        "hx_controller_change_gait": (status, [controller, ct.c_void_p]),
-        "hx_controller_change_control": (status, [controller, ct.c_int]),
-        "hx_controller_output": (
-            None,
-            [controller, ct.POINTER(HxControllerInput), ct.POINTER(HxControllerOutput)],
-        ),
-        "hx_controller_step": (
-            status,
-            [controller, ct.POINTER(HxControllerInput), ct.POINTER(HxControllerInput), Real],
-        ),
-        "hx_controller_time": (Real, [controller]),
-        "hx_controller_message": (ct.c_char_p, [controller]),
-        "hx_controller_state_size": (ct.c_size_t, []),
-        "hx_controller_get_state": (None, [controller, ct.c_char_p]),
-        "hx_controller_set_state": (status, [controller, ct.c_char_p, ct.c_size_t]),
-    }
-    for name, (result, arguments) in signatures.items():
-        function = getattr(core, name)
-        function.restype, function.argtypes = result, arguments
-    return core
+    return HEADER.bind(core)
 
 
 def ranges_of(core: ct.CDLL, member: str) -> dict[str, Any]:
@@ -70,12 +52,11 @@ def ranges_of(core: ct.CDLL, member: str) -> dict[str, Any]:
 
 
 class Definition:
-    """The bytes of an hxControllerDefinition, set by variable names."""
+    """An hxControllerDefinition, `bytes`, set by variable names."""
 
     def __init__(self, core: ct.CDLL, setup: ControllerSetup) -> None:
         self.ranges = ranges_of(core, "definition")
-        last = max(entry.offset for entry in self.ranges.values())
-        self.bytes = ct.create_string_buffer(last + ct.sizeof(Real))
+        self.bytes = HxControllerDefinition()
         core.hx_controller_definition_default(self.bytes)
         for variable in load_controller_interface(setup).of_causality("parameter"):
             self[variable.name] = variable.start
@@ -117,11 +98,8 @@ class NativeController:
         for variable in load_controller_interface(setup).of_causality("parameter"):
             if variable.name.startswith("gait."):
                 self.definition[variable.name] = variable.start
-        place = self.definition.ranges["gait.pattern"].offset
         self._checked(
-            self._core.hx_controller_change_gait(
-                self._handle, ct.addressof(self.definition.bytes) + place
-            )
+            self._core.hx_controller_change_gait(self._handle, self.definition.bytes.gait)
         )
 
     def change_control(self, control: str) -> None:

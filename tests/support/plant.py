@@ -13,6 +13,7 @@ import numpy as np
 from mirror import (
     BODIES,
     BODY_STATE,
+    HEADER,
     JOINTS,
     LEGS,
     MULTIPLIERS,
@@ -54,51 +55,7 @@ class PlantError(Exception):
 
 def bound(core: ct.CDLL) -> ct.CDLL:
     """Declares the types of the library's functions; may be called repeatedly."""
-    plant, status = ct.c_void_p, ct.c_int
-    signatures: dict[str, tuple[Any, list[Any]]] = {
-        "hx_version": (ct.c_char_p, []),
-        "hx_status_name": (ct.c_char_p, [ct.c_int]),
-        "hx_definition_default": (None, [ct.POINTER(HxDefinition)]),
-        "hx_input_default": (None, [ct.POINTER(HxInput)]),
-        "hx_definition_check": (status, [ct.POINTER(HxDefinition), ct.c_char_p]),
-        "hx_plant_create": (plant, []),
-        "hx_plant_destroy": (None, [plant]),
-        "hx_plant_reset": (status, [plant, ct.POINTER(HxDefinition), Real]),
-        "hx_plant_step": (status, [plant, ct.POINTER(HxInput), Real]),
-        "hx_plant_step_ramp": (status, [plant, ct.POINTER(HxInput), ct.POINTER(HxInput), Real]),
-        "hx_plant_output": (None, [plant, ct.POINTER(HxInput), ct.POINTER(HxOutput)]),
-        "hx_plant_time": (Real, [plant]),
-        "hx_plant_message": (ct.c_char_p, [plant]),
-        "hx_plant_state_size": (ct.c_size_t, []),
-        "hx_plant_step_to_event": (
-            status,
-            [plant, ct.POINTER(HxInput), Real, ct.c_int, ct.POINTER(ct.c_int)],
-        ),
-        "hx_plant_get_state": (None, [plant, ct.c_char_p]),
-        "hx_plant_set_state": (status, [plant, ct.c_char_p, ct.c_size_t]),
-        "hx_plant_get_bodies": (None, [plant, Doubles]),
-        "hx_plant_set_bodies": (status, [plant, Doubles]),
-        "hx_plant_get_coordinates": (None, [plant, ct.POINTER(HxCoordinates)]),
-        "hx_plant_set_coordinates": (status, [plant, Real, ct.POINTER(HxCoordinates)]),
-        "hx_plant_rates": (None, [plant, ct.POINTER(HxInput), ct.POINTER(HxCoordinates)]),
-        "hx_plant_indicators": (None, [plant, Doubles]),
-        "hx_plant_update_contacts": (ct.c_int, [plant]),
-        "hx_plant_tangent": (
-            status,
-            [
-                plant,
-                *[
-                    ct.POINTER(kind)
-                    for kind in (HxInput, HxInput, HxCoordinates, HxCoordinates, HxOutput)
-                ],
-            ],
-        ),
-        "hx_plant_accelerations": (None, [plant, ct.POINTER(HxInput), Doubles, Doubles, Doubles]),
-    }
-    for name, (result, arguments) in signatures.items():
-        function = getattr(core, name)
-        function.restype, function.argtypes = result, arguments
-    return core
+    return HEADER.bind(core)
 
 
 def pointer(array: Array) -> Any:

@@ -8,7 +8,9 @@ from __future__ import annotations
 from dataclasses import replace
 
 from hexapod_cosim.models import Robot
-from hexapod_cosim.models.records import Contact, Friction, Leg, Link, Servo, Vector3, Vector6
+from hexapod_cosim.models.contact.law import Contact
+from hexapod_cosim.models.friction import Friction
+from hexapod_cosim.models.records import Leg, Link, Servo, Vector3, Vector6
 
 
 def scaled_robot(robot: Robot, by: float) -> Robot:

@@ -11,11 +11,11 @@ import numpy as np
 from plant import Plant
 
 from hexapod_cosim.models import BodyContact, Leg, Link, Robot, load_robot
-from hexapod_cosim.models.contact import foot_contacts
+from hexapod_cosim.models.contact.geometry import foot_contacts
 from hexapod_cosim.models.dynamics import Command
+from hexapod_cosim.models.ground.faces import ground_normal
 from hexapod_cosim.models.kinematics import body_states
 from hexapod_cosim.models.records import Array, Vector3, Vector6
-from hexapod_cosim.models.terrain import ground_normal
 
 LEGS, JOINTS = 6, 3
 MACRO = 0.004  # s, macro-step of a trail

@@ -14,11 +14,10 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
-DOCS = ROOT / "docs"
+DOCS, EXTENSIONS = ROOT / "docs", ROOT / "extensions"
 # pages outside docs/, and files for which the site has a better page
 ELSEWHERE = {
     ".github/CONTRIBUTING.md": "contributing.md",
-    "docs/CHANGELOG.md": "changelog.md",
     "benchmarks/README.md": "benchmarks.md",
 }
 INSTEAD = {
@@ -41,6 +40,7 @@ def pages() -> Iterator[Path]:
     """Yields the pages of the repository that are also pages of the site."""
     yield from sorted([*DOCS.rglob("*.md"), *DOCS.rglob("*.ipynb")])
     yield from (ROOT / name for name in ELSEWHERE if not name.startswith("docs/"))
+    yield from sorted(EXTENSIONS.glob("*/README.md"))
 
 
 def page_name(path: Path) -> str | None:
@@ -48,6 +48,8 @@ def page_name(path: Path) -> str | None:
     inside = path.relative_to(ROOT).as_posix()
     if inside in ELSEWHERE | INSTEAD:
         return (ELSEWHERE | INSTEAD)[inside]
+    if path.name == "README.md" and path.parent.parent == EXTENSIONS:
+        return f"extensions/{path.parent.name}.md"
     if path.suffix not in {".md", ".ipynb"} or not path.is_relative_to(DOCS):
         return None
     name = path.relative_to(DOCS)
@@ -89,7 +91,8 @@ def linked(text: str, source: Path, place: Path, folder: Path) -> str:
 
 
 def converted(link: str, source: Path, place: Path, folder: Path) -> str | None:
-    """Returns the target of a link on the copy at `place`; None for a folder.
+    """Returns the target of a link on the copy at `place`; None for a folder and for
+    an extension that was deleted.
 
     Raises BrokenLinkError.
     """
@@ -97,6 +100,8 @@ def converted(link: str, source: Path, place: Path, folder: Path) -> str | None:
     if "://" in link or link.startswith("mailto:") or not path:
         return link
     found = (source.parent / path).resolve()
+    if is_deleted_extension(found):
+        return None
     if not found.exists() or not found.is_relative_to(ROOT):
         raise BrokenLinkError(
             f"{source.relative_to(ROOT)}: link to {link}: no such file;"
@@ -107,6 +112,14 @@ def converted(link: str, source: Path, place: Path, folder: Path) -> str | None:
     name = page_name(found)
     target = os.path.relpath(folder / name if name else found, place.parent)
     return target + (f"#{anchor}" if anchor and found.suffix == ".md" else "")
+
+
+def is_deleted_extension(path: Path) -> bool:
+    """Returns whether a path is one of an extension whose folder does not exist."""
+    if not path.is_relative_to(EXTENSIONS):
+        return False
+    parts = path.relative_to(EXTENSIONS).parts
+    return len(parts) > 1 and not (EXTENSIONS / parts[0]).is_dir()
 
 
 def outside_code(text: str, change: Callable[[str], str]) -> str:

@@ -36,24 +36,51 @@ static fmi2Component instantiate(hxEnvironment *environment, const hxEnvFmu *fmu
                           fmu->resources, &environment->callbacks[which], fmi2False, fmi2False);
 }
 
+/* Prepares the macro-steps of an environment, whose instances are not made yet. */
+static void prepare(hxEnvironment *environment, const hxEnvSettings *settings) {
+  const hxStepBlock output = {settings->plant_output, HX_ENV_VALUES, 0};
+  const hxStepBlock input = {settings->plant_input, HX_ENV_INPUTS, HX_ENV_VALUES};
+  const hxStepBlock commands = {settings->controller_output, HX_ENV_COMMANDS, HX_ENV_VALUES};
+  for (size_t i = 0; i < HX_ENV_SENSED; ++i) /* angles, then forces and quaternion, which adjoin */
+    environment->sensed[i] =
+        i < HX_ENV_JOINTS ? HX_ENV_ANGLE + i : HX_ENV_FORCE + i - HX_ENV_JOINTS;
+  environment->stepper = (hxStepper){
+      .plant = settings->plant.step,
+      .controller = settings->controller.step,
+      .plant_output = output,
+      .plant_input = input,
+      .controller_output = commands,
+      .controller_input = settings->controller_input,
+      .sensed = environment->sensed,
+      .command_count = HX_ENV_BODY,
+      .sensed_count = HX_ENV_SENSED,
+      .given = environment->given,
+      .value = environment->value,
+      .h = settings->h,
+  };
+}
+
 int hx_environment_open(hxEnvironment *environment, const hxEnvSettings *settings, double *drawn) {
   environment->settings = settings;
   environment->drawn = drawn;
   environment->ended = 1;
-  environment->plant = instantiate(environment, &settings->plant, 0);
-  if (!environment->plant) return 0;
+  prepare(environment, settings);
+  hxStepper *stepper = &environment->stepper;
+  stepper->plant.instance = instantiate(environment, &settings->plant, 0);
+  if (!stepper->plant.instance) return 0;
   if (!settings->controller.instantiate) return 1;
-  environment->controller = instantiate(environment, &settings->controller, 1);
-  if (environment->controller) return 1;
+  stepper->controller.instance = instantiate(environment, &settings->controller, 1);
+  if (stepper->controller.instance) return 1;
   hx_environment_close(environment);
   return 0;
 }
 
 void hx_environment_close(hxEnvironment *environment) {
   const hxEnvSettings *settings = environment->settings;
-  if (environment->plant) settings->plant.free_instance(environment->plant);
-  if (environment->controller) settings->controller.free_instance(environment->controller);
-  environment->plant = environment->controller = NULL;
+  hxStepFmu *plant = &environment->stepper.plant, *controller = &environment->stepper.controller;
+  if (plant->instance) settings->plant.free_instance(plant->instance);
+  if (controller->instance) settings->controller.free_instance(controller->instance);
+  plant->instance = controller->instance = NULL;
 }
 
 hxEnvWork hx_environment_work(const hxEnvSettings *settings) {
@@ -71,23 +98,17 @@ void hx_environment_use(hxEnvironment *environment, const hxEnvWork *work) {
   const hxEnvFmu *fmu = &environment->settings->plant;
   if (!fmu->work_use) return;
   if (!work)
-    fmu->work_use(environment->plant, NULL, 0);
+    fmu->work_use(environment->stepper.plant.instance, NULL, 0);
   else if (work->memory)
-    fmu->work_use(environment->plant, work->memory, work->size);
+    fmu->work_use(environment->stepper.plant.instance, work->memory, work->size);
 }
 
-static int accept(fmi2Status status) { return status <= fmi2Warning; }
+static int accept(int status) { return status <= fmi2Warning; }
 
 /* Initialises an instance with its parameters. */
 static int start(const hxEnvFmu *fmu, fmi2Component instance) {
   return accept(fmu->setup(instance, fmi2False, 0.0, 0.0, fmi2False, 0.0)) &&
          accept(fmu->enter(instance)) && accept(fmu->leave(instance));
-}
-
-static int read_plant(hxEnvironment *environment) {
-  const hxEnvSettings *settings = environment->settings;
-  return accept(settings->plant.get_real(environment->plant, settings->plant_output, HX_ENV_VALUES,
-                                         environment->value));
 }
 
 /* ----------------------------------------------------------------------------------------------
@@ -121,30 +142,53 @@ static void draw_command(hxEnvironment *environment) {
 /* Resets and initialises the FMUs; returns 0 when one refuses. */
 static int restart(hxEnvironment *environment) {
   const hxEnvSettings *settings = environment->settings;
-  const hxEnvFmu *plant = &settings->plant, *controller = &settings->controller;
-  if (!accept(plant->reset(environment->plant)) ||
-      (settings->draws.count &&
-       !accept(plant->set_real(environment->plant, settings->draws.reference, settings->draws.count,
-                               environment->drawn))) ||
-      !start(plant, environment->plant))
+  const hxEnvDraws *draws = &settings->draws;
+  const hxStepFmu *plant = &environment->stepper.plant;
+  void *controller = environment->stepper.controller.instance;
+  if (!accept(settings->plant.reset(plant->instance))) return 0;
+  if (draws->count && !accept(plant->set_reals(plant->instance, draws->reference, draws->count,
+                                               environment->drawn)))
     return 0;
-  if (environment->controller && (!accept(controller->reset(environment->controller)) ||
-                                  !start(controller, environment->controller)))
+  if (!start(&settings->plant, plant->instance)) return 0;
+  if (controller &&
+      !(accept(settings->controller.reset(controller)) && start(&settings->controller, controller)))
     return 0;
-  return read_plant(environment);
+  return hx_read_plant(&environment->stepper);
 }
 
 void hx_environment_reset(hxEnvironment *environment) {
   environment->step = 0;
   environment->reason = HX_END_NONE;
   memset(environment->action, 0, sizeof environment->action);
-  memset(environment->input, 0, sizeof environment->input);
   memset(environment->value, 0, sizeof environment->value);
   environment->value[HX_ENV_QUATERNION] = 1.0;
   draw_parameters(environment);
   draw_command(environment);
   environment->ended = !restart(environment);
   if (environment->ended) environment->reason = HX_END_FAILED;
+}
+
+/* ----------------------------------------------------------------------------------------------
+ * motion in axes of the torso */
+
+/* Computes R^T u, with the rotation R of the quaternion [w x y z], torso to world. */
+static void to_torso(const double p[4], const double u[3], double v[3]) {
+  const double w = p[0], *q = p + 1;
+  const double c[3] = {u[1] * q[2] - u[2] * q[1], u[2] * q[0] - u[0] * q[2],
+                       u[0] * q[1] - u[1] * q[0]}; /* u x q */
+  const double d[3] = {c[1] * q[2] - c[2] * q[1], c[2] * q[0] - c[0] * q[2],
+                       c[0] * q[1] - c[1] * q[0]}; /* (u x q) x q */
+  for (int i = 0; i < 3; ++i) v[i] = u[i] + 2.0 * (w * c[i] + d[i]);
+}
+
+static hxEnvView view_of(const hxEnvironment *environment) {
+  static const double down[3] = {0.0, 0.0, -1.0};
+  const double *value = environment->value, *p = value + HX_ENV_QUATERNION;
+  hxEnvView view;
+  to_torso(p, value + HX_ENV_VELOCITY, view.velocity);
+  to_torso(p, value + HX_ENV_ROTATION, view.rotation);
+  to_torso(p, down, view.gravity);
+  return view;
 }
 
 /* ----------------------------------------------------------------------------------------------
@@ -166,7 +210,7 @@ static double take_action(hxEnvironment *environment, const float action[HX_ENV_
 /* Sets the push of this step. */
 static void push(hxEnvironment *environment) {
   const hxEnvSettings *settings = environment->settings;
-  double *force = environment->input + HX_ENV_COMMANDS;
+  double *force = environment->value + HX_ENV_VALUES + HX_ENV_COMMANDS;
   const size_t interval = settings->push_interval;
   force[0] = force[1] = 0.0;
   if (!interval || environment->step < interval) return;
@@ -178,37 +222,21 @@ static void push(hxEnvironment *environment) {
   force[1] = size * sin(angle);
 }
 
-/* Writes the controller's joint commands, or the stance, to the plant's inputs; steps the
- * controller. */
-static int command_joints(hxEnvironment *environment, double t) {
+/* Adds the action to the joint commands of the controller, or to the stance. */
+static void act(void *owner) {
+  hxEnvironment *environment = owner;
   const hxEnvSettings *settings = environment->settings;
-  const hxEnvFmu *fmu = &settings->controller;
-  double given[HX_ENV_BODY + HX_ENV_SENSED];
-  if (!environment->controller) {
-    memcpy(environment->input, settings->stance, sizeof settings->stance);
-    return 1;
-  }
-  memcpy(given, environment->body, sizeof environment->body);
-  memcpy(given + HX_ENV_BODY, environment->value + HX_ENV_ANGLE, HX_ENV_JOINTS * sizeof *given);
-  memcpy(given + HX_ENV_BODY + HX_ENV_JOINTS, environment->value + HX_ENV_FORCE,
-         (3 * HX_ENV_FEET + 4) * sizeof *given);
-  return accept(fmu->set_real(environment->controller, settings->controller_input,
-                              HX_ENV_BODY + HX_ENV_SENSED, given)) &&
-         accept(fmu->get_real(environment->controller, settings->controller_output, HX_ENV_COMMANDS,
-                              environment->input)) &&
-         accept(fmu->do_step(environment->controller, t, settings->h, fmi2True));
+  double *angle = environment->value + HX_ENV_VALUES;
+  if (!environment->stepper.controller.instance)
+    memcpy(angle, settings->stance, sizeof settings->stance);
+  for (int i = 0; i < HX_ENV_JOINTS; ++i)
+    angle[i] += settings->action_scale[i] * environment->action[i];
 }
 
 static int substep(hxEnvironment *environment, size_t number) {
   const hxEnvSettings *settings = environment->settings;
   const double t = (double)(environment->step * settings->substeps + number) * settings->h;
-  if (!command_joints(environment, t)) return 0;
-  for (int i = 0; i < HX_ENV_JOINTS; ++i)
-    environment->input[i] += settings->action_scale[i] * environment->action[i];
-  return accept(settings->plant.set_real(environment->plant, settings->plant_input, HX_ENV_INPUTS,
-                                         environment->input)) &&
-         accept(settings->plant.do_step(environment->plant, t, settings->h, fmi2True)) &&
-         read_plant(environment);
+  return hx_macro_step(&environment->stepper, t, environment->body, act, NULL, environment);
 }
 
 static int advance(hxEnvironment *environment) {
@@ -240,37 +268,26 @@ double hx_environment_step(hxEnvironment *environment, const float action[HX_ENV
   const double before = slip_distance(environment);
   const double change = take_action(environment, action);
   const int going = advance(environment);
-  const hxEnvView view = hx_environment_view(environment);
+  const hxEnvView view = view_of(environment);
   environment->reason = going ? judge(environment, &view) : HX_END_FAILED;
   environment->ended = environment->reason != HX_END_NONE;
-  const double reward = hx_reward(environment, change, slip_distance(environment) - before,
-                                  (double)settings->substeps * settings->h, term);
+  const hxEnvMotion motion = {
+      .view = view,
+      .command = environment->body,
+      .torque = environment->value + HX_ENV_TORQUE,
+      .speed = environment->value + HX_ENV_SPEED,
+      .change = change,
+      .slip = slip_distance(environment) - before,
+      .time = (double)settings->substeps * settings->h,
+      .fell = environment->ended && environment->reason != HX_END_TIME,
+  };
+  const double reward = hx_reward(settings, &motion, term);
   draw_command(environment);
   return reward;
 }
 
 /* ----------------------------------------------------------------------------------------------
  * observations */
-
-/* Computes R^T u, with the rotation R of the quaternion [w x y z], torso to world. */
-static void to_torso(const double p[4], const double u[3], double v[3]) {
-  const double w = p[0], *q = p + 1;
-  const double c[3] = {u[1] * q[2] - u[2] * q[1], u[2] * q[0] - u[0] * q[2],
-                       u[0] * q[1] - u[1] * q[0]}; /* u x q */
-  const double d[3] = {c[1] * q[2] - c[2] * q[1], c[2] * q[0] - c[0] * q[2],
-                       c[0] * q[1] - c[1] * q[0]}; /* (u x q) x q */
-  for (int i = 0; i < 3; ++i) v[i] = u[i] + 2.0 * (w * c[i] + d[i]);
-}
-
-hxEnvView hx_environment_view(const hxEnvironment *environment) {
-  static const double down[3] = {0.0, 0.0, -1.0};
-  const double *value = environment->value, *p = value + HX_ENV_QUATERNION;
-  hxEnvView view;
-  to_torso(p, value + HX_ENV_VELOCITY, view.velocity);
-  to_torso(p, value + HX_ENV_ROTATION, view.rotation);
-  to_torso(p, down, view.gravity);
-  return view;
-}
 
 static const size_t block_size[HX_ENV_BLOCKS] = {
     3, 3, 3, 3, HX_ENV_JOINTS, HX_ENV_JOINTS, HX_ENV_JOINTS, 2, 0};
@@ -352,7 +369,7 @@ static void scan(const hxEnvironment *environment, float *to) {
 
 void hx_environment_observe(const hxEnvironment *environment, float *observation) {
   const hxEnvSettings *settings = environment->settings;
-  const hxEnvView view = hx_environment_view(environment);
+  const hxEnvView view = view_of(environment);
   const double time = (double)(environment->step * settings->substeps) * settings->h;
   const double turns = settings->clock * time, phase = two_pi * (turns - floor(turns));
   const double clock[2] = {sin(phase), cos(phase)};

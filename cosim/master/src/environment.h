@@ -3,23 +3,18 @@
 #define HX_ENVIRONMENT_H
 
 #include "hexapod/environments.h"
-
-/* A view of the last outputs of the plant in axes of the torso. */
-typedef struct hxEnvView {
-  double velocity[3]; /* m/s    torso axes */
-  double rotation[3]; /* rad/s  torso axes */
-  double gravity[3];  /* 1      direction, torso axes */
-} hxEnvView;
+#include "reward.h"
 
 typedef struct hxEnvironment {
   const hxEnvSettings *settings;
-  fmi2Component plant, controller;
+  hxStepper stepper; /* plant and controller */
   uint64_t seed, episode;
   size_t step;                          /* 1  steps of this episode */
   int ended;                            /* 1: the episode is over, or none was started */
   int reason;                           /* hxEnvReason */
-  double value[HX_ENV_VALUES];          /* outputs of the plant */
-  double input[HX_ENV_INPUTS];          /* inputs of the plant */
+  double value[HX_ENV_VALUES + HX_ENV_INPUTS]; /* outputs of the plant, then its inputs */
+  size_t sensed[HX_ENV_SENSED]; /* 1    indices of the controller's measurements in `value` */
+  double given[HX_ENV_BODY + HX_ENV_SENSED];   /* inputs of the controller */
   double action[HX_ENV_JOINTS];         /* 1    last one, limited */
   double body[HX_ENV_BODY];             /*      command; the first three are drawn */
   double *drawn;                        /*      [draws.count] values of the parameters */
@@ -52,13 +47,5 @@ double hx_environment_step(hxEnvironment *environment, const float action[HX_ENV
 
 /* Writes the observation of the present state. */
 void hx_environment_observe(const hxEnvironment *environment, float *observation);
-
-/* Returns the view of the present values. */
-hxEnvView hx_environment_view(const hxEnvironment *environment);
-
-/* Writes the weighted terms of a step and returns their sum. change: sum of the squared changes of
- * the action; slip: of the feet in this step, m; time: of the step, s. */
-double hx_reward(const hxEnvironment *environment, double change, double slip, double time,
-                 double term[HX_ENV_TERMS]);
 
 #endif

@@ -198,5 +198,5 @@ void hx_environments_drawn(const hxEnvironments *all, size_t index, double *valu
 }
 
 void hx_environments_values(const hxEnvironments *all, size_t index, double *value) {
-  memcpy(value, all->environment[index].value, sizeof all->environment[index].value);
+  memcpy(value, all->environment[index].value, HX_ENV_VALUES * sizeof *value);
 }

@@ -1,7 +1,7 @@
 /* reward.c - the terms of the reward. */
-#include <math.h>
+#include "reward.h"
 
-#include "environment.h"
+#include <math.h>
 
 /* Returns exp(-x), x >= 0, to 1e-13 without libm, whose last bits differ between systems: a series
  * for x / 1024, squared ten times. */
@@ -33,16 +33,12 @@ static double driving_power(const double *torque, const double *speed) {
   return sum;
 }
 
-double hx_reward(const hxEnvironment *environment, double change, double slip, double time,
+double hx_reward(const hxEnvSettings *settings, const hxEnvMotion *motion,
                  double term[HX_ENV_TERMS]) {
-  const hxEnvSettings *settings = environment->settings;
-  const hxEnvView view = hx_environment_view(environment);
-  const double *value = environment->value, *c = environment->body;
-  const double *v = view.velocity, *w = view.rotation, *g = view.gravity;
+  const double *c = motion->command, time = motion->time;
+  const double *v = motion->view.velocity, *w = motion->view.rotation, *g = motion->view.gravity;
   const double error[3] = {(c[0] - v[0]) / settings->width[0], (c[1] - v[1]) / settings->width[0],
                            (c[2] - w[2]) / settings->width[1]};
-  const double *torque = value + HX_ENV_TORQUE, *speed = value + HX_ENV_SPEED;
-  const double fell = environment->ended && environment->reason != HX_END_TIME ? 1.0 : 0.0;
   double sum = 0.0;
   term[HX_TERM_TRACKING_LIN_VEL] = decay(error[0] * error[0] + error[1] * error[1]);
   term[HX_TERM_TRACKING_ANG_VEL] = decay(error[2] * error[2]);
@@ -50,13 +46,13 @@ double hx_reward(const hxEnvironment *environment, double change, double slip, d
   term[HX_TERM_LIN_VEL_Z] = v[2] * v[2];
   term[HX_TERM_ANG_VEL_XY] = w[0] * w[0] + w[1] * w[1];
   term[HX_TERM_ORIENTATION] = g[0] * g[0] + g[1] * g[1];
-  term[HX_TERM_TORQUES] = sum_of_squares(torque, HX_ENV_JOINTS);
-  term[HX_TERM_DOF_VEL] = sum_of_squares(speed, HX_ENV_JOINTS);
-  term[HX_TERM_POWER] = driving_power(torque, speed);
-  term[HX_TERM_ACTION_RATE] = change;
-  term[HX_TERM_FEET_SLIP] = slip / time;
+  term[HX_TERM_TORQUES] = sum_of_squares(motion->torque, HX_ENV_JOINTS);
+  term[HX_TERM_DOF_VEL] = sum_of_squares(motion->speed, HX_ENV_JOINTS);
+  term[HX_TERM_POWER] = driving_power(motion->torque, motion->speed);
+  term[HX_TERM_ACTION_RATE] = motion->change;
+  term[HX_TERM_FEET_SLIP] = motion->slip / time;
   term[HX_TERM_ALIVE] = 1.0;
-  term[HX_TERM_TERMINATION] = fell / time; /* counts once, whatever the time of a step */
+  term[HX_TERM_TERMINATION] = (motion->fell ? 1.0 : 0.0) / time; /* counts once */
   for (int i = 0; i < HX_ENV_TERMS; ++i) {
     term[i] *= settings->weight[i] * time;
     sum += term[i];

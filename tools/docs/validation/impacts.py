@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from test_laws_impact import falling, flown_off, rigid
 
-from hexapod_cosim.models.contact import CHI, achieved_restitution, exact_restitution_chi
+from hexapod_cosim.models.contact.law import CHI, achieved_restitution, exact_restitution_chi
 from tools.docs.validation.shown import MARKERS, PALETTE, Shown, short
 
 ASKED = (0.1, 0.3, 0.5, 0.7, 0.9)

@@ -23,6 +23,7 @@
 
 #include "fmi2FunctionTypes.h"
 
+#include "hexapod/macro_step.h"
 #include "hexapod/shared_work.h"
 #include "hexapod/status.h"
 
@@ -112,9 +113,7 @@ typedef struct hxEnvFmu {
   fmi2SetupExperimentTYPE *setup;
   fmi2EnterInitializationModeTYPE *enter;
   fmi2ExitInitializationModeTYPE *leave;
-  fmi2GetRealTYPE *get_real;
-  fmi2SetRealTYPE *set_real;
-  fmi2DoStepTYPE *do_step;
+  hxStepFmu step; /* its functions; the instances are those of the environments */
   const char *guid;
   const char *resources; /* URI of the unpacked resources */
   hxSharedWorkSize *work_size; /* NULL, like the next: the binary does not have it */
@@ -194,7 +193,7 @@ typedef struct hxEnvironments hxEnvironments;
 
 /* Number of the layout of hxEnvSettings, hxEnvArrays, the structures in them and the lists of names
  * above. A change of their members, or of what a member means, increases it. */
-#define HX_ENVIRONMENTS_LAYOUT 1
+#define HX_ENVIRONMENTS_LAYOUT 2
 
 /* Layout and size of hxEnvSettings in this library, with which callers check their own. */
 HX_API int hx_environments_layout(void);

@@ -1,0 +1,138 @@
+"""Each extension can be deleted: the core then installs, passes its tests and shows fewer commands.
+
+`HEXAPOD_EXTENSIONS=all` (make test-extensions) installs each shorter tree in an environment of its
+own and runs all of its tests, which takes as many times as long as the whole suite.
+"""
+
+from __future__ import annotations
+
+import ast
+import os
+import re
+import shutil
+import subprocess
+import sys
+import venv
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+COMMANDS: dict[str, set[str]] = {  # of each extension
+    "study": {"study"},
+    "identify": {"identify", "replay"},
+    "course": {"benchmark"},
+    "live": {"live", "realtime"},
+    "gym": set(),
+}
+CORE_COMMANDS = {
+    *("export", "simulate", "compare", "design", "report", "controller", "examples", "validate"),
+    *("terrain", "list"),
+}
+WHOLE = os.environ.get("HEXAPOD_EXTENSIONS") == "all"
+# runs the command of a tree whose package is in the folder LINKS, not the installed one
+BOOT = """
+import sys
+sys.meta_path[:] = [f for f in sys.meta_path if not type(f).__module__.startswith("_editable")]
+sys.path.insert(0, sys.argv.pop(1))
+from hexapod_cosim.cosim.cli import main
+sys.exit(main(sys.argv[1:]))
+"""
+
+
+def tree_without(extension: str, place: Path) -> Path:
+    """Copies the tracked files but those of an extension and its tests; returns the copy."""
+    listed = subprocess.run(
+        ["git", "ls-files", "-z"], cwd=ROOT, capture_output=True, text=True, check=True
+    ).stdout.split("\0")
+    left_out = (f"extensions/{extension}/", f"tests/{extension}/")
+    for name in listed:
+        if name and not name.startswith(left_out) and (ROOT / name).is_file():
+            (place / name).parent.mkdir(parents=True, exist_ok=True)
+            shutil.copy2(ROOT / name, place / name)
+    for generated in ("plant_fmu", "controller/fmu"):
+        shutil.copytree(
+            ROOT / generated / "generated", place / generated / "generated", dirs_exist_ok=True
+        )
+    return place
+
+
+def linked_package(tree: Path, links: Path) -> Path:
+    """Makes a folder in which the tree's folders are the package hexapod_cosim."""
+    package = links / "hexapod_cosim"
+    package.mkdir(parents=True)
+    for part in ("models", "controller", "cosim", "extensions", "examples"):
+        (package / part).symlink_to(tree / part)
+    (package / "__init__.py").symlink_to(tree / "packaging" / "hexapod_cosim" / "__init__.py")
+    return links
+
+
+def commands_in(help_text: str) -> set[str]:
+    """Returns the names of the commands that `hexapod --help` lists."""
+    _, _, listed = help_text.partition("Commands:\n")
+    return set(re.findall(r"^  (\w+)  ", listed, re.MULTILINE))
+
+
+def imported(path: Path) -> Iterator[str]:
+    """Yields the names of the modules that a file imports."""
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.ImportFrom):
+            yield f"{node.module}."
+            yield from (f"{node.module}.{alias.name}." for alias in node.names)
+        elif isinstance(node, ast.Import):
+            yield from (f"{alias.name}." for alias in node.names)
+
+
+def test_every_extension_is_tried() -> None:
+    folders = {path.name for path in (ROOT / "extensions").iterdir() if path.is_dir()}
+    assert folders - {"__pycache__"} == set(COMMANDS)
+
+
+def test_tests_of_the_core_import_no_extension() -> None:
+    for path in (ROOT / "tests").rglob("*.py"):
+        room = path.relative_to(ROOT / "tests").parts[0]
+        others = {f"hexapod_cosim.extensions.{name}." for name in COMMANDS if name != room}
+        found = [name for name in imported(path) if any(name.startswith(one) for one in others)]
+        assert not found, f"{path.relative_to(ROOT)} imports {found}"
+
+
+@pytest.mark.parametrize("extension", COMMANDS)
+def test_without_an_extension_the_core_walks_and_has_its_commands(
+    extension: str, tmp_path: Path
+) -> None:
+    tree = tree_without(extension, tmp_path / "tree")
+    links = linked_package(tree, tmp_path / "links")
+
+    def run(*words: str) -> str:
+        done = subprocess.run(
+            [sys.executable, "-c", BOOT, str(links), *words],
+            cwd=tmp_path,
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+        assert done.returncode == 0, done.stderr
+        return done.stdout
+
+    others = {name for one, names in COMMANDS.items() if one != extension for name in names}
+    assert commands_in(run("--help")) == CORE_COMMANDS | others
+    short = ["--set", "duration=1.0", "--set", "outputs.plots=false"]
+    assert "results.csv" in run("simulate", "walk_flat", *short, "-o", str(tmp_path / "out"))
+
+
+@pytest.mark.skipif(not WHOLE, reason="make test-extensions")
+@pytest.mark.parametrize("extension", COMMANDS)
+def test_without_an_extension_the_core_installs_and_passes_its_tests(
+    extension: str, tmp_path: Path
+) -> None:
+    tree = tree_without(extension, tmp_path / "tree")
+    subprocess.run(["git", "init", "-q", str(tree)], check=True)
+    subprocess.run(["git", "-C", str(tree), "add", "--all"], check=True)
+    venv.create(tmp_path / "venv", with_pip=True)
+    python = str(tmp_path / "venv" / "bin" / "python")
+    install = ["-m", "pip", "install", "--quiet", "--editable", ".[test]"]
+    subprocess.run([python, *install], cwd=tree, check=True)
+    tests = ["-m", "pytest", "-q", "-n", "auto", "--dist", "loadfile"]
+    without_this = ["--deselect", f"tests/docs/{Path(__file__).name}"]
+    subprocess.run([python, *tests, *without_this], cwd=tree, check=True)
