@@ -170,8 +170,9 @@ def cross_compile() -> dict[tuple[str, str], bytes]:
 def loop_library() -> Library:
     """Returns the co-simulation loops as a library, as cosim/master/CMakeLists.txt builds it."""
     plant, own = ROOT / "plant_fmu", ROOT / "cosim" / "master"
-    files = {f"hexapod/{path.name}": path for path in (plant / "include/hexapod").glob("*.h")}
-    files |= {f"hexapod/{path.name}": path for path in (own / "include/hexapod").glob("*.h")}
+    files = {}
+    for include in (plant / "include", own / "include"):
+        files |= {path.relative_to(include).as_posix(): path for path in include.rglob("*.h")}
     files |= {f"src/{path.name}": path for path in (own / "src").glob("*.[ch]")}
     files["src/message.c"] = plant / "src" / "message.c"
     flags = ("-DHX_SHARED", "-pthread")
