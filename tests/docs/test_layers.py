@@ -48,7 +48,7 @@ COMPONENTS = (
 MAY_USE = {
     "models": {"numpy", "PIL"},
     "controller": {"numpy", "scipy", "control", "matplotlib"},
-    "extensions/gym": {"numpy", "gymnasium"},
+    "extensions/gym": {"numpy", "gymnasium", "typer"},
 }
 RUN_TIME_ONLY = {"numpy", "scipy"}  # of the controller outside controller/design
 INCLUDE = re.compile(r'^\s*#\s*include\s+["<]([^">]+)[">]', re.MULTILINE)
