@@ -150,10 +150,11 @@ def cross_compile() -> dict[tuple[str, str], bytes]:
 
 def loop_library() -> Library:
     """Returns the co-simulation loops as a library, as cosim/master/CMakeLists.txt builds it."""
-    plant, own = ROOT / "plant_fmu", ROOT / "cosim" / "master"
+    plant = ROOT / "plant_fmu"
     files = {f"hexapod/{path.name}": path for path in (plant / "include/hexapod").glob("*.h")}
-    files |= {f"hexapod/{path.name}": path for path in (own / "include/hexapod").glob("*.h")}
-    files |= {f"src/{path.name}": path for path in (own / "src").glob("*.[ch]")}
+    for own in (ROOT / "cosim" / "master", ROOT / "extensions" / "gym" / "loop"):
+        files |= {f"hexapod/{path.name}": path for path in (own / "include/hexapod").glob("*.h")}
+        files |= {f"src/{path.name}": path for path in (own / "src").glob("*.[ch]")}
     files["src/message.c"] = plant / "src" / "message.c"
     flags = ("-DHX_SHARED", "-pthread")
     return Library(LOOP, dict(sorted(files.items())), (fmi_headers(),), flags)

@@ -27,8 +27,8 @@ from dataclasses import replace
 from hexapod_cosim.controller import BodyCommand, ControllerError, Gains, JointCommand
 from hexapod_cosim.cosim.common.closing import Closing
 from hexapod_cosim.cosim.common.temporary import TemporaryFolder
-from hexapod_cosim.cosim.master.fmu import Fmu
-from hexapod_cosim.cosim.master.loop import JointController
+from hexapod_cosim.cosim.master.fmu import Fmu, StepError
+from hexapod_cosim.cosim.master.loop import JointController, macro_step
 from hexapod_cosim.cosim.master.sensors import errors_of
 from hexapod_cosim.cosim.master.signals import Signals
 from hexapod_cosim.cosim.results.walk import robot_weight
@@ -286,7 +286,6 @@ class LiveRobot(Closing):
         """
         if self.stopped:
             return
-        scenario = self.plan.scenario
         if command != self._command:
             self._command, self._since = command, self.count
         if self._gait_change is not None and not self.fault:
@@ -297,23 +296,23 @@ class LiveRobot(Closing):
                 self._take_over()
         self._signals.push[:3] = force
         try:
-            self._write(self._joints(command))
-            self.advance(self.time, scenario.macro_step)
+            self._advance(self._joints(command))
             self.count += 1
-            self._signals.read()
         except HexapodError as error:
             self.fault, self.stopped = str(error), True
 
-    def _write(self, joints: JointCommand) -> None:
-        """Writes joint commands, or those that hold if the plant refuses them. Raises FmuError."""
+    def _advance(self, joints: JointCommand) -> None:
+        """Makes a macro-step under joint commands, or under those that hold if the plant refuses
+        them. Raises FmuError.
+        """
         try:
-            self._signals.write(joints)
+            macro_step(self.advance, self._signals, joints, self.time, self._h)
         except FmuError as error:
-            if self.fault:
+            if self.fault or isinstance(error, StepError):
                 raise
             self.fault = str(error)
             joints = self._holding()
-            self._signals.write(joints)
+            macro_step(self.advance, self._signals, joints, self.time, self._h)
         # copies, because a controller may write its next commands into the same arrays
         angle, torque = joints.angle_ref.copy(), joints.torque_ref.copy()
         self._last = JointCommand(angle_ref=angle, torque_ref=torque)
