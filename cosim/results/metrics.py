@@ -23,11 +23,10 @@ from hexapod_cosim.cosim.interface.names import (
 from hexapod_cosim.cosim.master.recorder import Recording
 from hexapod_cosim.cosim.results.support import stability_margins
 from hexapod_cosim.cosim.results.walk import (
-    BRISTLE,
     CONTACT_SHARE,
-    LUGRE,
     NONE,
     TANH,
+    WITH_BRISTLES,
     Array,
     View,
     Walk,
@@ -254,7 +253,7 @@ def _net_slip(part: Recording, parameters: Mapping[str, float]) -> Array:
 
     That motion is the creep of the tanh law, or the stretch and return of a bristle.
     """
-    if parameters.get("friction.law", TANH) in (BRISTLE, LUGRE):
+    if parameters.get("friction.law", TANH) in WITH_BRISTLES:
         sliding = yielding_velocity(
             _friction(parameters), part.foot_vectors("velocity"), part.foot_vectors("bristle")
         )

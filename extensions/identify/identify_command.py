@@ -9,22 +9,19 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from hexapod_cosim.cosim.cli.export_command import RobotName
-from hexapod_cosim.cosim.cli.extension import Command, Extension
+from hexapod_cosim.cosim.cli.options import Json, RobotName
 from hexapod_cosim.cosim.cli.terminal import (
-    Json,
     show_files,
     show_json,
     show_table,
     show_text,
-    stages_bar,
+    step_lines,
     waiting,
     warn,
 )
 from hexapod_cosim.cosim.results.results import results_folder
 from hexapod_cosim.extensions.identify.log import HELD_OUT, read_log
 from hexapod_cosim.extensions.identify.numbers.friction_models import CHOICES
-from hexapod_cosim.extensions.identify.replay_command import replay
 from hexapod_cosim.extensions.identify.unknowns import GROUPS
 from hexapod_cosim.models import HexapodError, load_robot, unknown_name
 
@@ -91,7 +88,6 @@ def identify(
     # imported only here because they are slow to import
     from hexapod_cosim.extensions.identify import identify_tables as tables  # noqa: PLC0415
     from hexapod_cosim.extensions.identify.excitation import propose  # noqa: PLC0415
-    from hexapod_cosim.extensions.identify.fitting.progress import MOST_STEPS  # noqa: PLC0415
     from hexapod_cosim.extensions.identify.identify import (  # noqa: PLC0415
         identify as identify_robot,
     )
@@ -113,7 +109,7 @@ def identify(
     recorded = [read_log(path, torso_com=own.torso.com) for path in logs]
     size = workers or usual_workers(recorded)
     with results_folder(output or Path("out") / "identify") as folder:
-        with stages_bar(MOST_STEPS, shown=not json) as show:
+        with step_lines(shown=not json) as show:
             found = identify_robot(
                 recorded,
                 own,
@@ -168,8 +164,3 @@ def _show(found: Identified, files: Sequence[Path]) -> None:
         show_text(tables.friction_text(found.trials))
     show_text(tables.untold_text(found))
     show_files(files)
-
-
-EXTENSION = Extension(
-    commands=[Command(name="replay", run=replay), Command(name="identify", run=identify)]
-)

@@ -9,9 +9,8 @@ from typing import Annotated, Any
 
 import typer
 
-from hexapod_cosim.cosim.cli.export_command import RobotName
-from hexapod_cosim.cosim.cli.running import FmuFile
-from hexapod_cosim.cosim.cli.terminal import Json, show_files, show_json, show_table, waiting, warn
+from hexapod_cosim.cosim.cli.options import FmuFile, Json, RobotName
+from hexapod_cosim.cosim.cli.terminal import show_files, show_json, show_table, waiting, warn
 from hexapod_cosim.cosim.results.results import results_folder
 from hexapod_cosim.cosim.scenario.tables import with_overrides
 from hexapod_cosim.extensions.identify.log import read_log

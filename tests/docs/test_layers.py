@@ -48,7 +48,7 @@ COMPONENTS = (
 MAY_USE = {
     "models": {"numpy", "PIL"},
     "controller": {"numpy", "scipy", "control", "matplotlib"},
-    "extensions/gym": {"numpy", "gymnasium"},
+    "extensions/gym": {"numpy", "gymnasium", "typer"},
 }
 RUN_TIME_ONLY = {"numpy", "scipy"}  # of the controller outside controller/design
 INCLUDE = re.compile(r'^\s*#\s*include\s+["<]([^">]+)[">]', re.MULTILINE)
@@ -164,8 +164,13 @@ def test_a_core_includes_itself_its_header_and_the_c_library(component: str) -> 
     folders = ("src", "include/hexapod")
     own = {path.name for path in c_files("src", component=component)}
     public = {
-        "plant_fmu": {path.name for path in c_files("include/hexapod")},
-        "controller/fmu": {"controller.h", *SHARED_HEADERS},
+        "plant_fmu": {
+            path.relative_to(ROOT / "plant_fmu/include/hexapod").as_posix()
+            for path in c_files("include/hexapod")
+        },
+        "controller/fmu": {
+            *("controller.h", "generated/controller_settings.h", *SHARED_HEADERS),
+        },
         "extensions/gym/policy_fmu": {"policy.h", *SHARED_HEADERS},
     }
     own |= {f"hexapod/{name}" for name in public[component]}

@@ -234,7 +234,7 @@ def test_the_command_packs_a_kinematic_walk(call: Call, tmp_path: Path) -> None:
     ("arguments", "said"),
     [
         (("--set", "plant.friction.mu=0.5", "-o", "one.fmu"), "without a package"),
-        (("--ssp", "-o", "one.fmu"), "not a package's name"),
+        (("--ssp", "-o", "one.fmu"), "not the name of such a file"),
         (("--ssp", "--urdf"), "two formats"),
         (("--ssp", "--controller", "kinematic", "--fmi", "4"), "no such FMI version"),
         (("--ssp", "--platforms", "sources"), "without binaries"),

@@ -16,7 +16,6 @@ import mujoco
 import numpy as np
 import pytest
 
-from hexapod_cosim.cosim.cli.terrain_command import value_text
 from hexapod_cosim.models import RobotError, load_robot, robot_from_table
 from hexapod_cosim.models.ground.catalogue import CATALOGUE, make_surface
 from hexapod_cosim.models.ground.curriculum import TileMaker, column_names
@@ -435,7 +434,7 @@ def documented(name: str) -> str:
     entry = CATALOGUE[name]
     kind = "either" if name == "heightfield" else make_surface(name, {}).kind
     own = [
-        f"`{key}` {value_text(parameter, parameter.value(DIFFICULTY))}"
+        f"`{key}` {parameter.text(parameter.value(DIFFICULTY))}"
         for key, parameter in entry.parameters.items()
         if parameter != RANDOM_TILE.get(key)
     ]

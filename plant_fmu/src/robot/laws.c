@@ -36,11 +36,6 @@ static void compile_friction(hxModel *model, const hxDefinition *d) {
   model->roll_friction = rubs && model->rolling_radius > 0.0;
 }
 
-/* Returns whether bristles of friction hold the feet on rigid ground. */
-static int has_friction_bristles(const hxDefinition *d) {
-  return d->friction.law == HX_FRICTION_BRISTLE || d->friction.law == HX_FRICTION_LUGRE;
-}
-
 static const double pi = 3.14159265358979323846;
 
 /* Sets the pads as which a corner of the torso's box sinks into soil on the box's sides along x, y
@@ -74,7 +69,7 @@ static void compile_soil(hxModel *model, const hxDefinition *d) {
   model->bristle_length = d->friction.presliding;
   if (d->soil.law != HX_SOIL_NONE)
     model->bristle_length = d->soil.shear_displacement;
-  else if (on_grid > 0.0 && !has_friction_bristles(d))
+  else if (on_grid > 0.0 && !hx_is_bristle_law(d->friction.law))
     model->bristle_length = on_grid;
 }
 

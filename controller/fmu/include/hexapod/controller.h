@@ -9,27 +9,13 @@
 #ifndef HEXAPOD_CONTROLLER_H
 #define HEXAPOD_CONTROLLER_H
 
+#include "hexapod/generated/controller_settings.h"
 #include "hexapod/legs.h"
 #include "hexapod/status.h"
 
 #ifdef __cplusplus
 extern "C" {
 #endif
-
-typedef enum hxControl {
-  HX_CONTROL_KINEMATIC = 1, /* follows the paths, uses no measurement */
-  HX_CONTROL_COMPLIANT,     /* also reacts to the measured forces */
-  HX_CONTROL_PAPER          /* corrects the paths by the measured forces as the paper does */
-} hxControl;
-
-/* Pattern of a gait: phase offsets by name, or given ones. */
-typedef enum hxPattern {
-  HX_PATTERN_TRIPOD = 1,
-  HX_PATTERN_RIPPLE,
-  HX_PATTERN_WAVE,
-  HX_PATTERN_AMBLE,
-  HX_PATTERN_CUSTOM
-} hxPattern;
 
 /* The controller's model of a link; joint axes are z, -y, y (docs/architecture.md). */
 typedef struct hxKnownLink {
@@ -48,58 +34,6 @@ typedef struct hxKnownLeg {
   double hip_yaw;          /* rad  about z */
   hxKnownLink link[HX_JOINTS];
 } hxKnownLeg;
-
-typedef struct hxGait {
-  int pattern;             /* hxPattern */
-  double period;           /* s    one cycle of a leg */
-  double duty;             /* 1    share of the cycle on the ground */
-  double offset[HX_LEGS];  /* 1    phase of each leg at clock 0, of HX_PATTERN_CUSTOM */
-  double step_height;      /* m    the foot's lift above the ground */
-  double touchdown_speed;  /* m/s  vertical, at the end of a swing */
-  double narrowing;        /* m    nearer to the hips under a load that the model does not have */
-} hxGait;
-
-/* Contents of gains.toml, without the data that they were designed for. */
-typedef struct hxGains {
-  struct {
-    double handover_time;  /* s   in which one set of legs hands its load over to the next */
-    double weight_time;    /* s   smoothing of the measured weight */
-    double load_time;      /* s   smoothing of the measured loads, grip and trust */
-  } support;
-  struct {
-    double attitude_rate;  /* 1/s    integral of roll and pitch */
-    double height_rate;    /* 1/s    integral of the height */
-    double ground_time;    /* s      smoothing of the ground's inclination */
-    double angle_limit;    /* rad    largest correction of roll and pitch */
-    double height_limit;   /* m      largest correction of the height */
-    double path_rate;      /* 1/s    from lost displacement and heading to velocity */
-    double speed_limit;    /* m/s    largest change of the velocity */
-    double turn_limit;     /* rad/s  largest change of the yaw rate */
-  } hold;
-  struct {
-    double torque;  /* N m    largest feed-forward torque */
-  } limits;
-  struct {
-    double share; /* 1    of the deviation along the ground that is taken back, at duty 1/2 */
-    double height_share; /* 1    the same upwards */
-    double share_limit; /* 1    largest share at any duty */
-    double yield_share; /* 1    P part: yield to a force over the softness of the leg */
-    double return_rate; /* 1/s  I part: return of all feet */
-    double filter_time; /* s    smoothing of the measured forces */
-    double damping; /* N s/m  of the suspension */
-    double return_time; /* s    of the suspension of a standing foot */
-    double sag_limit; /* m    largest lift of a foot in the air by the torso's sag */
-    double limit; /* m    largest deflection of the suspension and return of the feet */
-  } paper;
-} hxGains;
-
-/* Switches, 1 or 0: enabled parts of compliant and paper control; and the weight of the squeeze. */
-typedef struct hxParts {
-  int support, paper_share, paper_pid, paper_suspension, touchdown, posture, sway, path, limits,
-      fallback;
-  /* 1  weight of the servos' torques against the feet's use of friction in the planned squeeze */
-  double squeeze;
-} hxParts;
 
 /* The controller's model of the robot, the gait and the laws. hx_controller_definition_default sets
  * the ATHENA-like robot. */
@@ -124,8 +58,8 @@ typedef struct hxControllerDefinition {
   } servo;
   double gravity[3]; /* m/s2 */
   hxGait gait;
-  hxGains gains;
-  hxParts parts;
+  hxGains gains; /* without the data that they were designed for */
+  hxParts parts; /* switches of compliant and paper control */
 } hxControllerDefinition;
 
 /* Command and measurements of the controller. */
