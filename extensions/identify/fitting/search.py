@@ -1,10 +1,9 @@
-"""Fits the unknown numbers to the readings of logs by output error.
+"""Searches the numbers that explain the readings of logs best: output error.
 
 The numbers minimise the sum of squares of (predicted - measured) / noise over all readings, and of
 (number - number before) / prior over all numbers. The second sum keeps the robot file's value
 where the readings tell nothing. With white noise this is the most probable robot. The noise of a
-channel is the typical size of its residuals, and residuals beyond three deviations count linearly
-(Huber's loss). judging.py says what the readings tell of the numbers.
+channel is the typical size of its residuals, and large residuals count linearly (Huber's loss).
 
 A search on the first seconds of long logs finds the valley of the best numbers, all rows its
 bottom. The numbers of contacts act at touch-downs alone, and play at the meeting of teeth, where
@@ -20,14 +19,16 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from hexapod_cosim.extensions.identify.fitting.judging import Fit, judged
-from hexapod_cosim.extensions.identify.fitting.last_search import BOUND, finished, huber
+from hexapod_cosim.extensions.identify.fitting.least_squares import (
+    BOUND,
+    huber,
+    minimised,
+    remaining_step,
+)
 from hexapod_cosim.extensions.identify.fitting.misfit import read_noise
-from hexapod_cosim.extensions.identify.fitting.problem import ALL, FLOOR, Problem
-from hexapod_cosim.extensions.identify.log import LogError
+from hexapod_cosim.extensions.identify.fitting.problem import ALL, FINE, Problem
 from hexapod_cosim.extensions.identify.numbers.servo import GEAR
 from hexapod_cosim.extensions.identify.unknowns import DELAYS
-from hexapod_cosim.models import FmuError
 
 Array = NDArray[np.float64]
 Progress = Callable[[str], None]
@@ -43,7 +44,7 @@ class Stage:
 
     channels: tuple[str, ...]
     share: float  # of the residuals before it, which counts as noise
-    scale: float  # of Huber's loss: larger residuals count linearly [deviations]
+    bound: float  # larger residuals count linearly [deviations]
     steps: int  # of the optimiser at most
     enough: float  # relative change of the cost at which the stage ends
 
@@ -61,98 +62,61 @@ ROUNDS = 3  # of trying starts, at most
 DELAYS_TRIED = 0.001 * np.arange(21.0)  # s
 # Forces and accelerations have peaks at touch-downs, and so several valleys near each other.
 NEAR_DELAYS = 1e-5 * np.array([-80.0, -40.0, -20.0, -10.0, -5.0, 5.0, 10.0, 20.0, 40.0, 80.0])  # s
+# The last search ends where Gauss and Newton's next step is this long [deviations]. A relative
+# change of the sum of squares is no measure: of a log of 60 s it is some 100,000, and a number that
+# is wrong by a deviation adds 1.
+ENOUGH = 0.1
+FINISHING = 12  # steps of the last search, at most
+# Readings that jump come and go near the optimum, so that a step is left, if a short one.
+NEAR, SHORTER = 1.0, 0.5  # deviations; of the step before
+# At the first steps all readings count anew. From then on those left out stay so: a search
+# would go back and forth between two points at which different readings count.
+ANEW = 2
+SHORTENED = (1.0, 0.5, 0.25, 0.1, 0.03)  # of a step, until the sum of squares falls
+SUFFICIENT = 0.1  # share of the fall that derivatives say
+# A longer step changes residuals otherwise than derivatives say where nothing jumps, too.
+LINEAR = 10.0  # deviations
 
 
-def better_start(problem: Problem, start: Array | None) -> Array:
-    """Returns a start (rows,), or 0 where the robot file's numbers have smaller errors."""
-    zero = np.zeros(len(problem.rows))
-    before = problem.typical(problem.errors(zero))
-    if start is None:
-        return zero
-    try:
-        after = problem.typical(problem.errors(start))
-    except (LogError, FmuError):
-        return zero
-    own = [key for key, size in before.items() if size > 0.0]
-    own = [key for key in own if key in SMOOTH] or own
-    gains = [np.log(max(after[key], FLOOR) / before[key]) for key in own]
-    return start if sum(gains) < 0.0 else zero
+def searched(problem: Problem, report: Progress) -> tuple[Problem, Array]:
+    """Returns the problem of the fitted rows and its most probable numbers (rows,).
 
-
-def fit(problem: Problem, *, start: Array | None = None, progress: Progress | None = None) -> Fit:
-    """Returns the most probable numbers.
-
-    start: z of another start than the robot file's numbers; the one with the smaller errors is
-    taken.
+    report: called when a step begins.
 
     Raises HexapodError when the plant refuses the robot file's numbers.
     """
-    report: Progress = progress or (lambda _text: None)
     short = problem.shortened(SHORT, parameters=COARSE, most=SEARCHED)
-    z = searched(short, start, report)
-    report("other starts of the contacts")
-    z = _best_of_starts(short, z)
-    report("all rows")
-    fitted = problem.shortened(parameters=COARSE)
-    least = read_noise(fitted.experiments)
-    z = _optimised(fitted, z, REFINE, least)
-    fitted.use({})
-    short.use({})
-    z = _with_delays(short, z, ("joints", "forces", "imu"), lambda own: own + NEAR_DELAYS)
-    fitted.count_all()
-    z = finished(fitted, z, report)
-    return judged(problem, fitted, z, least, report)
-
-
-def searched(short: Problem, start: Array | None, report: Progress) -> Array:
-    """Returns numbers from the first seconds of logs, without those of contacts tried one by one.
-
-    short: the problem of these rows. start, report: as of `fit`.
-    """
-    z = better_start(short, start)
+    z = np.zeros(len(problem.rows))
     for number, stage in enumerate(SEARCH):
         report(f"search on the first seconds, part {number + 1} of {len(SEARCH)}")
         z = _optimised(short, z, stage, read_noise(short.experiments))
         if number == 0:
             z = _with_delays(short, z, ("currents", "forces"), lambda _own: DELAYS_TRIED)
-    return z
+    report("other starts of the contacts")
+    z = _best_of_starts(short, z)
+    report("all rows")
+    fitted = problem.shortened(np.inf, parameters=COARSE)
+    z = _optimised(fitted, z, REFINE, read_noise(fitted.experiments))
+    fitted.use({})
+    short.use({})
+    z = _with_delays(short, z, ("joints", "forces", "imu"), lambda own: own + NEAR_DELAYS)
+    fitted.count_all()
+    return fitted, finished(fitted, z, report)
 
 
-def misfit_cost(problem: Problem, z: Array) -> float:
-    """Returns the sum of squares of all rows over the readings' own noise, by Huber's loss."""
-    problem.set_noise(
-        [np.zeros_like(one) for one in problem.errors(z)], least=read_noise(problem.experiments)
-    )
-    return 2.0 * _cost(problem, z)
-
-
-def _optimised(
-    problem: Problem, z: Array, stage: Stage, least: Mapping[str, float], *, jumps: bool = False
-) -> Array:
-    """Returns the numbers of the least sum of squares near a start.
-
-    jumps: whether rows beside jumps of the simulated signals count too.
-    """
-    from scipy.optimize import least_squares  # noqa: PLC0415  slow to import
-
+def _optimised(problem: Problem, z: Array, stage: Stage, least: Mapping[str, float]) -> Array:
+    """Returns the numbers of the least sum of squares near a start, without rows near jumps."""
     problem.set_noise(problem.errors(z), share=stage.share, least=least, channels=stage.channels)
-    if jumps:
-        problem.count_all()
-    else:
-        problem.leave_out_jumps(z)
-    found = least_squares(
+    problem.leave_out_jumps(z)
+    return minimised(
         problem.residuals,
         z,
-        jac=problem.jacobian,
+        jacobian=problem.jacobian,
         bounds=problem.bounds(),
-        loss="huber",
-        f_scale=stage.scale,
-        max_nfev=stage.steps,
-        ftol=stage.enough,
-        xtol=1e-6,
-        gtol=1e-8,
+        bound=stage.bound,
+        steps=stage.steps,
+        enough=stage.enough,
     )
-    return np.asarray(found.x, dtype=np.float64)
 
 
 def _best_of_starts(problem: Problem, z: Array) -> Array:
@@ -161,7 +125,7 @@ def _best_of_starts(problem: Problem, z: Array) -> Array:
     z = _optimised(problem, z, REFINE, least)
     best = _cost(problem, z)
     for _ in range(ROUNDS):
-        moved = _tried(problem, z)
+        moved = tried(problem, z)
         if np.array_equal(moved, z):
             break
         moved = _optimised(problem, moved, REFINE, least)
@@ -193,7 +157,7 @@ def _with_delays(
     return z
 
 
-def _tried(problem: Problem, z: Array) -> Array:
+def tried(problem: Problem, z: Array) -> Array:
     """Returns the numbers with those of contacts, and of elastic gears and their friction, at the
     best of some values, one by one.
     """
@@ -219,3 +183,49 @@ def _cost(problem: Problem, z: Array) -> float:
     residuals = problem.residuals(z)
     problem.counted = counted
     return huber(residuals)
+
+
+def finished(problem: Problem, z: Array, report: Progress) -> Array:
+    """Returns the numbers near a start at which the step that remains is short.
+
+    The noise of a channel is the typical size of its residuals at each step. Readings that jump
+    within the steps of the derivatives, or within a step of the search, do not count: a search that
+    counts them ends at the jump.
+    """
+    before = np.inf
+    for number in range(FINISHING):
+        report(f"all rows again, step {number + 1} of at most {FINISHING}")
+        if number < ANEW:
+            problem.count_all()
+        problem.set_noise(problem.errors(z))
+        problem.leave_out_bent(z)
+        better, length = _stepped(problem, z)
+        if better is None or (length < NEAR and length > SHORTER * before):
+            break
+        z, before = better, length
+    return z
+
+
+def _stepped(problem: Problem, z: Array) -> tuple[Array | None, float]:
+    """Returns the numbers after a step of Gauss and Newton's method, and its length in deviations.
+
+    None where it is short or no part of it is better.
+    """
+    while True:
+        jacobian, residuals = problem.jacobian(z, FINE), problem.residuals(z)
+        step = remaining_step(jacobian, residuals, z, problem.bounds())
+        length = float(np.linalg.norm(jacobian @ step))
+        if length < ENOUGH:
+            return None, length
+        cost = huber(residuals)
+        for share in SHORTENED:
+            moved = np.clip(z + share * step, *problem.bounds())
+            change = problem.residuals(moved) - residuals
+            if huber(residuals + change) < cost - SUFFICIENT * share * length**2:
+                return moved, length
+            if share == 1.0 and length < LINEAR and np.isfinite(change).all():
+                linear = jacobian @ (moved - z)
+                if problem.leave_out_nonlinear(change, linear):
+                    break  # again without these
+        else:
+            return None, length

@@ -1,17 +1,23 @@
-"""Compares the readings of a log with a simulation of it, column by column."""
+"""Renders the page of a log: warnings, tables of errors, and figures."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, field
 from typing import Any
 
 import numpy as np
+from jinja2 import ChoiceLoader, PackageLoader
 from numpy.typing import NDArray
 
+from hexapod_cosim.cosim.common.control_style import all_styles
+from hexapod_cosim.cosim.report.page import environment
 from hexapod_cosim.extensions.identify.log import CHANNELS, Log
 
 Array = NDArray[np.float64]
+TEMPLATE = "log.html.jinja"
+TITLES = {channel.key: channel.title for channel in CHANNELS}
+COLUMNS = ("channel", "unit", "columns", "spread", "rms error", "largest error", "in", "at [s]")
 
 
 @dataclass(frozen=True)
@@ -30,6 +36,14 @@ class Difference:
     def as_table(self) -> dict[str, Any]:
         """Returns the figures by name."""
         return asdict(self)
+
+    def as_row(self) -> list[str]:
+        """Returns the row of a table with COLUMNS."""
+        figures = [number(value) for value in (self.spread, self.rms, self.largest)]
+        return [
+            TITLES[self.channel], self.unit, str(self.columns), *figures, self.name,
+            number(self.at),
+        ]  # fmt: skip
 
 
 def column_differences(log: Log, names: Sequence[str], simulated: Array) -> list[Difference]:
@@ -62,8 +76,9 @@ def channel_differences(columns: Sequence[Difference]) -> list[Difference]:
         own = [one for one in columns if one.channel == channel.key]
         if own:
             worst = max(own, key=lambda one: one.largest)
-            spread = _rms(np.array([one.spread for one in own]))
-            rms = _rms(np.array([one.rms for one in own]))
+            spread, rms = (
+                _rms(np.array([getattr(one, key) for one in own])) for key in ("spread", "rms")
+            )
             found.append(
                 Difference(
                     channel.key, worst.name, channel.unit, len(own), spread, rms,
@@ -75,3 +90,29 @@ def channel_differences(columns: Sequence[Difference]) -> list[Difference]:
 
 def _rms(values: Array) -> float:
     return float(np.sqrt(np.mean(np.square(values))))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Section:
+    """A table and pictures below a heading."""
+
+    title: str
+    caption: str = ""
+    columns: Sequence[str] = ()
+    rows: Sequence[Sequence[str]] = ()
+    left: int = 1  # number of columns that are texts
+    pictures: Mapping[str, str] = field(default_factory=dict)  # data URLs by title
+
+
+def rendered(sections: Sequence[Section], **content: Any) -> str:
+    """Returns a page. content: title, headline, lead, warnings, command, facts, source."""
+    own = environment()
+    loaders = [PackageLoader("hexapod_cosim.extensions", "identify"), own.loader]
+    pages = own.overlay(loader=ChoiceLoader([each for each in loaders if each is not None]))
+    template = pages.get_template(TEMPLATE)
+    return template.render(styles=all_styles(()), sections=sections, **content)
+
+
+def number(value: float) -> str:
+    """Returns a number with four digits."""
+    return f"{value:.4g}"
