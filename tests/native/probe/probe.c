@@ -15,7 +15,6 @@
 #include "kernel.h"
 #include "lanes/dynamics.h"
 #include "method.h"
-#include "robot/frames.h"
 #include "robot/robot.h"
 
 #if defined(__GNUC__)
