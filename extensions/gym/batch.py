@@ -1,4 +1,4 @@
-"""Runs many environments in C (cosim/master/src/environments.c), over threads.
+"""Runs many environments in C (loop/src/environments.c), over threads.
 
 `Batch` owns the FMUs, the memory that is exchanged with C and the threads. An action array goes in,
 arrays of observations, rewards and flags come out; all of them are views of the memory that C reads
