@@ -151,9 +151,7 @@ void hx_component_output(hxComponent *component, struct hxVariables *variables, 
                          &variables->output);
 }
 
-double hx_component_time(const hxComponent *component) {
-  return hx_plant_time(component->plant);
-}
+double hx_component_time(const hxComponent *component) { return hx_plant_time(component->plant); }
 
 const char *hx_component_message(const hxComponent *component) {
   return component->message[0] ? component->message : hx_plant_message(component->plant);

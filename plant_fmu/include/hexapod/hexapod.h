@@ -59,8 +59,8 @@ typedef struct hxDefinition {
     double inertia[6]; /* kg m2  about the centre of mass, torso axes: xx yy zz xy xz yz */
   } torso;
   hxLeg leg[HX_LEGS];
-  double foot_radius;       /* m */
-  hxBodySettings body;      /* spheres that touch the ground besides the feet; see hxTerrain */
+  double foot_radius;     /* m */
+  hxBodySettings body;    /* spheres that touch the ground besides the feet; see hxTerrain */
   double foot_pad_radius; /* m  flat round pad of feet on soil; 0: the sphere */
   hxContactSettings contact;
   hxFrictionSettings friction;
