@@ -154,7 +154,7 @@ def cone_time(robot: Robot, before: Array, after: Array, h: float, impulses: Imp
             share = float(np.linalg.norm(impulses.foot[leg] - pressed * normal)) / (
                 robot.friction.mu * pressed
             )
-            time[np.flatnonzero(CONE_STARTS <= share)[-1]] += h
+            time[np.flatnonzero(share >= CONE_STARTS)[-1]] += h
     return time
 
 
