@@ -32,7 +32,7 @@ from study_runners import Counting, Slow
 
 from hexapod_cosim.cosim.run.walker import Walker
 from hexapod_cosim.extensions.study import store as store_module
-from hexapod_cosim.extensions.study.folder import MANIFEST, RESULTS, TIMES, export_runs, locked
+from hexapod_cosim.extensions.study.folder import MANIFEST, RESULTS, export_runs, locked
 from hexapod_cosim.extensions.study.reading import load_study
 from hexapod_cosim.extensions.study.records import StudyError
 from hexapod_cosim.extensions.study.store import RUNS, Store
@@ -109,7 +109,6 @@ def test_files_have_the_runs_in_order_and_units_in_their_columns(
         export_runs(store, out)
     assert pq.read_table(out / RESULTS)["run"].to_pylist() == [0, 3, 4, 5, 8]
     assert pq.read_table(out / RESULTS)["walked"].to_pylist() == [True] * 5
-    assert pq.read_table(out / TIMES).to_pylist()[1] == {"run": 3, "wall": 0.5}
     assert pq.read_schema(out / RESULTS).field("slip_per_metre").metadata == {b"unit": b"m/m"}
 
 
