@@ -48,13 +48,13 @@ MANY_RUNS: dict[str, Any] = {
 }
 REAL = """
 controls = ["kinematic"]
-seeds = 15
+seeds = 35
 [set]
 duration = 0.4
 [factors]
 friction.mu = {linspace = [0.3, 0.9, 20]}
 """
-REAL_RUNS = 300
+REAL_RUNS = 700
 
 
 @pytest.fixture
@@ -124,25 +124,22 @@ def command(folder: Path, fmu: Path, *, study: Path) -> subprocess.Popen[str]:
     )
 
 
-def test_real_walks_killed_twice_at_any_point_and_completed_are_the_uninterrupted_ones(
+def test_real_walks_killed_at_any_point_and_completed_are_the_uninterrupted_ones(
     athena_fmu: Path, tmp_path: Path
 ) -> None:
     file = tmp_path / "study.toml"
     file.write_text(REAL)
     study, whole, killed = load_study(str(file)), tmp_path / "whole", tmp_path / "killed"
-    for least in (1, random.randint(30, 60)):
-        process = command(killed, athena_fmu, study=file)
-        deadline = time.monotonic() + TIMEOUT
-        while (
-            stored_count(study, killed) < least
-            and time.monotonic() < deadline
-            and process.poll() is None
-        ):
-            time.sleep(0.005)
-        time.sleep(random.uniform(0.0, 0.02))
-        os.killpg(process.pid, signal.SIGKILL)
-        process.wait()
-        assert least <= stored_count(study, killed) < REAL_RUNS
+    process = command(killed, athena_fmu, study=file)
+    deadline = time.monotonic() + TIMEOUT
+    while (
+        not stored_count(study, killed) and time.monotonic() < deadline and process.poll() is None
+    ):
+        time.sleep(0.02)
+    time.sleep(random.uniform(0.0, 0.02))
+    os.killpg(process.pid, signal.SIGKILL)
+    process.wait()
+    assert 0 < stored_count(study, killed) < REAL_RUNS
     kept = stored_rows(study, killed)
     process = command(killed, athena_fmu, study=file)
     _, err = process.communicate(timeout=TIMEOUT)
