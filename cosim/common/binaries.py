@@ -12,6 +12,7 @@ from pathlib import Path
 
 from hexapod_cosim.models.errors import FmuError
 
+# first bytes of libraries of Linux, Windows and macOS, and of several joined for macOS
 ELF, PE, MACH, FAT = b"\x7fELF", b"MZ", b"\xcf\xfa\xed\xfe", b"\xca\xfe\xba\xbe"
 LOADED, SEGMENT = 1, 0x19  # PT_LOAD; LC_SEGMENT_64
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 import struct
 from collections.abc import Sequence
 
+from hexapod_cosim.cosim.common.binaries import FAT, MACH
 from hexapod_cosim.models.errors import FmuError
 
-FAT_MAGIC, MACH_O_64 = 0xCAFEBABE, 0xFEEDFACF
 PAGE_BITS = 14  # slices begin at multiples of 16 KiB, the larger of the processors' pages
-_HEADER, _SLICE, _MACH_HEADER = struct.Struct(">II"), struct.Struct(">5I"), struct.Struct("<3I")
+_HEADER, _SLICE, _PROCESSOR = struct.Struct(">4sI"), struct.Struct(">5I"), struct.Struct("<2I")
 
 
 def join_mach_o(slices: Sequence[bytes]) -> bytes:
@@ -27,7 +27,7 @@ def join_mach_o(slices: Sequence[bytes]) -> bytes:
             expected="each once",
             fix="join one file a processor",
         )
-    out = bytearray(_HEADER.pack(FAT_MAGIC, len(slices)))
+    out = bytearray(_HEADER.pack(FAT, len(slices)))
     offset = _aligned(_HEADER.size + _SLICE.size * len(slices))
     for processor, data in zip(processors, slices, strict=True):
         out += _SLICE.pack(*processor, offset, len(data), PAGE_BITS)
@@ -39,16 +39,14 @@ def join_mach_o(slices: Sequence[bytes]) -> bytes:
 
 def _processor(data: bytes) -> tuple[int, int]:
     """Returns type and subtype of a Mach-O file's processor. Raises FmuError for other files."""
-    magic, kind, subtype = _MACH_HEADER.unpack(
-        data[: _MACH_HEADER.size].ljust(_MACH_HEADER.size, b"\0")
-    )
-    if magic != MACH_O_64:
+    if not data.startswith(MACH):
         raise FmuError(
             "universal binary",
             got=f"a file that begins with {data[:4].hex()}",
             expected="64-bit Mach-O",
             fix="build it for macOS",
         )
+    kind, subtype = _PROCESSOR.unpack_from(data, len(MACH))
     return kind, subtype
 
 

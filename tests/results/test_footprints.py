@@ -72,13 +72,6 @@ def test_footprints_of_a_recording_are_those_of_the_plant(core: ct.CDLL) -> None
         assert nearest.radius == radius
 
 
-def test_a_foot_above_an_older_footprint_makes_none() -> None:
-    values = {name: np.zeros(4) for name in COLUMNS}
-    values["LF.foot.sinkage"][1:3] = 0.01
-    recording = Recording(("time", *COLUMNS), np.column_stack([np.arange(4.0), *values.values()]))
-    assert find_footprints(recording, {"foot.radius": 0.015}) == []
-
-
 def test_a_foot_that_stays_below_the_surface_takes_its_footprint_along() -> None:
     values = {name: np.zeros(6) for name in COLUMNS}
     values["LF.foot.sinkage"][:] = 0.01, 0.01, 0.01, 0.012, 0.012, 0.0
