@@ -44,7 +44,7 @@ from hexapod_cosim.cosim.export.platforms import component_library
 
 ROOT = Path(__file__).parents[1]
 BINARIES, LIBRARIES = "hexapod_cosim/plant/binaries/", "hexapod_cosim/plant/lib/"
-MODULE = "hexapod_cosim/plant/browser/walker.wasm"
+MODULE = "hexapod_cosim/plant/browser/robot.wasm"
 BEST = 9  # level of compression
 LARGEST = 5_000_000  # bytes of a wheel
 OTHERS = "other_platforms"  # folder of the wheels that do not fit this machine
@@ -85,9 +85,9 @@ def main(folder: Path) -> None:
     with console.status("compiling for all platforms (minutes, the first time)"):
         binaries = cross_compile()
     if (ROOT / "extensions" / "live").is_dir():
-        from hexapod_cosim.extensions.live.module import walker_module  # noqa: PLC0415
+        from hexapod_cosim.extensions.live.static_page import robot_module  # noqa: PLC0415
 
-        base[MODULE] = walker_module()
+        base[MODULE] = robot_module()
     base |= bill_of_materials(base)
     wheels = [
         write_wheel(base, platform, binaries, folder if platform.fits else folder / OTHERS)

@@ -19,7 +19,7 @@ from hexapod_cosim.models import FmuError
 
 HEADERS = Path(__file__).parent / "include" / "hexapod"
 # each uses structures of those before it
-ORDER = ("macro_step.h", "sensors.h", "gait_change.h", "master.h", "environments.h")
+ORDER = ("macro_step.h", "sensors.h", "master.h", "environments.h")
 _COMMENT = re.compile(r"/\*.*?\*/", re.DOTALL)
 _BLOCK = re.compile(
     r"typedef struct (?P<name>\w+) \{(?P<members>.*?)\} \w+;|enum \w* ?\{(?P<list>.*?)\}"

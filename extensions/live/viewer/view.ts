@@ -13,15 +13,15 @@ import {
   WebGLRenderer,
 } from "three";
 import { OrbitControls } from "three/addons/controls/OrbitControls.js";
-import { footCentres, type Pose } from "../kinematics";
-import { ForceArrows } from "../scene/arrows";
-import { Floor } from "../scene/ground";
-import { castShadows } from "../scene/lamp";
-import { Relief } from "../scene/relief";
-import { RobotModel } from "../scene/robot";
-import { unpackSurface } from "../scene/surface";
-import { Terrain } from "../scene/terrain";
-import { property, readColours } from "../theme";
+import { footCentres, type Pose } from "../../../cosim/viewer/src/kinematics";
+import { ForceArrows } from "../../../cosim/viewer/src/scene/arrows";
+import { Floor } from "../../../cosim/viewer/src/scene/ground";
+import { castShadows } from "../../../cosim/viewer/src/scene/lamp";
+import { Relief } from "../../../cosim/viewer/src/scene/relief";
+import { RobotModel } from "../../../cosim/viewer/src/scene/robot";
+import { unpackSurface } from "../../../cosim/viewer/src/scene/surface";
+import { Terrain } from "../../../cosim/viewer/src/scene/terrain";
+import { property, readColours } from "../../../cosim/viewer/src/theme";
 import type { Frame, World } from "./messages";
 
 const EYE = new Vector3(-0.86, -0.68, 0.56); // m    of the camera, from the robot: behind, to the right

@@ -1,4 +1,4 @@
-import { byId } from "../dom";
+import { byId } from "../../../cosim/viewer/src/dom";
 import { type Drive, NONE } from "./drive";
 
 const DEAD = 0.12; // share of a stick's way around its middle that counts as its middle

@@ -1,5 +1,5 @@
 import { Quaternion, Vector3 } from "three";
-import type { Pose } from "../kinematics";
+import type { Pose } from "../../../cosim/viewer/src/kinematics";
 import type { Frame } from "./messages";
 
 const BEHIND = 0.03; // s    that the picture is behind the newest frame, so that there is a next one

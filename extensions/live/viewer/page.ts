@@ -1,6 +1,6 @@
 import plotStyle from "uplot/dist/uPlot.min.css";
-import { byId, element } from "../dom";
-import { Theme } from "../theme";
+import { byId, element } from "../../../cosim/viewer/src/dom";
+import { Theme } from "../../../cosim/viewer/src/theme";
 import { Drive } from "./drive";
 import { Pad } from "./gamepad";
 import { Keys } from "./keys";

@@ -86,7 +86,7 @@ export class Drive {
     const due = text !== this.sent ? this.wants(moves) : moves && now - this.at > RENEW;
     if (!due || now - this.at < OFTEN || this.link.state !== "open") return;
     [this.sent, this.at, this.moved] = [text, now, moves];
-    this.link.send({ type: "drive", ...content, stamp: now });
+    this.link.send({ type: "drive", ...content });
   }
 
   /** A page that only watches sends nothing: the speed alone is no drive. */

@@ -53,7 +53,7 @@ export class Pusher {
     this.event = undefined;
     this.sent = "";
     this.view.canvas.classList.remove("pushing");
-    this.link.send({ type: "push", force: [0, 0, 0] });
+    this.link.send({ type: "push", x: 0, y: 0, z: 0 });
   }
 
   private send(event: PointerEvent): void {
@@ -61,10 +61,10 @@ export class Pusher {
     if (!this.offset || now - this.at < OFTEN) return;
     const grip = this.offset.clone().add(this.view.ground);
     const force = this.view.pull(event, grip, event.shiftKey).multiplyScalar(this.weight());
-    const parts = force.toArray().map((part) => Math.round(100 * part) / 100);
-    const text = JSON.stringify(parts);
+    const [x, y, z] = force.toArray().map((part) => Math.round(100 * part) / 100);
+    const text = JSON.stringify([x, y, z]);
     if (text === this.sent && now - this.at < RENEW) return;
     [this.sent, this.at] = [text, now];
-    this.link.send({ type: "push", force: parts });
+    this.link.send({ type: "push", x, y, z });
   }
 }

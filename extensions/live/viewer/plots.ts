@@ -1,6 +1,6 @@
 import uPlot from "uplot";
-import { byId, element } from "../dom";
-import { property, quietAxis } from "../theme";
+import { byId, element } from "../../../cosim/viewer/src/dom";
+import { property, quietAxis } from "../../../cosim/viewer/src/theme";
 import type { Frame, World } from "./messages";
 
 const WIDTH = 8; // s    that the plots show

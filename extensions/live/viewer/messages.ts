@@ -1,6 +1,6 @@
 /** What the loop sends (extensions/live/state.py and loop.py). SI units; legs LF LM LR RF RM RR. */
 
-import type { Ground, PackedSurface, Robot } from "../types";
+import type { Ground, PackedSurface, Robot } from "../../../cosim/viewer/src/types";
 
 export interface Frame {
   readonly time: number;
@@ -25,15 +25,12 @@ export interface Frame {
   readonly steps: number;
   readonly misses: number;
   readonly worst: number;
-  readonly gaps: number;
+  /** Wall time that was not simulated [s]. */
   readonly skipped: number;
   /** How often the robot was placed: its pose jumps when this changes. */
   readonly placed: number;
-  readonly driver: number;
   /** Time since the robot was placed [s]. */
   readonly seconds: number;
-  /** Stamps of messages [ms] by page, which took effect since the frame before. */
-  readonly echo: Readonly<Record<string, number>>;
 }
 
 export interface World {
@@ -62,24 +59,19 @@ export interface Limits {
 
 export interface Status {
   readonly settings: Settings;
-  readonly wanted: Settings | null;
+  /** That hold when all changes are made. */
+  readonly wanted: Settings;
   readonly limits: Limits;
   readonly fault: string;
   readonly stopped: boolean;
   readonly paused: boolean;
-  readonly mode: "free" | "recording" | "replaying";
+  readonly recording: boolean;
   readonly recorded: boolean;
-  readonly notes: readonly (readonly [number, string])[];
 }
 
 /** What the page holds (extensions/live/page.py). */
 export interface Setup {
-  readonly title: string;
-  readonly controls: readonly {
-    readonly name: string;
-    readonly title: string;
-    readonly own: boolean;
-  }[];
+  readonly controls: readonly string[];
   readonly refused: Readonly<Record<string, string>>;
   readonly gaits: readonly string[];
   readonly grounds: readonly { readonly name: string; readonly about: string }[];
