@@ -11,7 +11,7 @@ from typing import NamedTuple
 from hexapod_cosim.controller.figure_style import UNDATED
 from hexapod_cosim.cosim.common.closing import Closing
 from hexapod_cosim.cosim.common.files import atomic_path
-from hexapod_cosim.cosim.results.walk import View
+from hexapod_cosim.cosim.results.window import View
 
 
 class Figures(NamedTuple):

@@ -19,7 +19,7 @@ from hexapod_cosim.cosim.master.recorder import ColumnError
 from hexapod_cosim.cosim.report.figures import Figures
 from hexapod_cosim.cosim.report.profile import find_stances, make_profile
 from hexapod_cosim.cosim.results.metrics import planned_feet, plans_feet
-from hexapod_cosim.cosim.results.walk import (
+from hexapod_cosim.cosim.results.window import (
     Array,
     View,
     body_height,

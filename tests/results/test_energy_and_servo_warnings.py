@@ -9,8 +9,8 @@ from hexapod_cosim.cosim.master.loop import COMPLETED
 from hexapod_cosim.cosim.results.comparisons import compare_all
 from hexapod_cosim.cosim.results.metrics import METRICS
 from hexapod_cosim.cosim.results.summary import Summary
-from hexapod_cosim.cosim.results.walk import View
 from hexapod_cosim.cosim.results.warnings import energy_warnings, servo_warnings, walk_warnings
+from hexapod_cosim.cosim.results.window import View
 
 
 def walk_missing(missing: float) -> Walk:

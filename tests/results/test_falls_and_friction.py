@@ -10,12 +10,12 @@ from numpy.typing import NDArray
 from walks import PARAMETERS, PERIOD, ROBOT, Walk
 
 from hexapod_cosim.cosim.interface.names import foot_names
-from hexapod_cosim.cosim.results.walk import View
 from hexapod_cosim.cosim.results.warnings import (
     describe_fall,
     friction_warnings,
     missing_metrics_warnings,
 )
+from hexapod_cosim.cosim.results.window import View
 
 STANDING = 0.130  # m
 SLOPE = {"terrain.kind": 2.0, "terrain.incline": 0.5}

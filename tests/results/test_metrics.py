@@ -12,7 +12,7 @@ from walks import CYCLES, PARAMETERS, PERIOD, SERVO, WEIGHT, H, Walk
 from hexapod_cosim.cosim.interface.names import foot_names, joint_names
 from hexapod_cosim.cosim.report.report import metric_rows, number
 from hexapod_cosim.cosim.results.metrics import METRICS, compute_metrics
-from hexapod_cosim.cosim.results.walk import View
+from hexapod_cosim.cosim.results.window import View
 
 
 def test_the_metrics_are_those_of_the_contract_with_slip_after_what_is_exactly_measured() -> None:

@@ -16,7 +16,7 @@ from hexapod_cosim.cosim.interface.names import foot_names
 from hexapod_cosim.cosim.master.recorder import Peaks, Recording
 from hexapod_cosim.cosim.results.metrics import compute_metrics
 from hexapod_cosim.cosim.results.result import Result
-from hexapod_cosim.cosim.results.walk import View
+from hexapod_cosim.cosim.results.window import View
 from hexapod_cosim.cosim.run.single_run import simulate
 from hexapod_cosim.cosim.run.walker import Walker
 from hexapod_cosim.cosim.scenario.records import CONTROLS, Scenario
