@@ -192,7 +192,7 @@ def walk_warnings(view: View, robot: Robot) -> list[str]:
         found += [f"a foot was out of its leg's reach for {share:.1%} of the time"] if share else []
     found += [*fallback_warnings(recording), *servo_warnings(recording, robot)]
     found += overlap_warnings(recording, view.parameters)
-    found += sinkage_warnings(recording, view.parameters, robot)
+    found += sinkage_warnings(recording, view.parameters)
     return [*found, *energy_warnings(view)]
 
 

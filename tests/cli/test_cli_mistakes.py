@@ -164,11 +164,6 @@ def test_an_unexpected_error_is_one_line_with_a_hint(
         ),
         (["simulat"], 2, {"what": "not understood"}),
         (
-            ["compare", "--seeds", "ten"],
-            2,
-            {"got": "--seeds ten", "expected": "--seeds with an integer"},
-        ),
-        (
             ["simulate", "--robot", "my.toml"],
             2,
             {"fix": "write --set robot=athena; `hexapod simulate --help` explains it"},
