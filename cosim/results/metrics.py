@@ -356,9 +356,8 @@ def planned_feet(recording: Recording) -> Array:
 
 def _path(window: JudgedWindow) -> dict[str, float]:
     part = window.recording
-    missed = (
-        part.vector("torso.position")[-1, :2] - commanded_path(part, heading=window.heading)[-1]
-    )
+    end = commanded_path(part, heading=window.heading)[-1]
+    missed = float(np.linalg.norm(part.vector("torso.position")[-1, :2] - end))
     yaw = np.unwrap(part.column("torso.yaw"))
     lost = abs(float(yaw[-1] - yaw[0] - window.turned[-1]))
     return _per(window, missed, "path_error") | _per(window, lost, "yaw_drift")
