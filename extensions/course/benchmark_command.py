@@ -31,7 +31,6 @@ from hexapod_cosim.cosim.results.results import ResultsFolder, results_folder
 from hexapod_cosim.cosim.scenario.controls import AT, CHOOSER
 from hexapod_cosim.cosim.scenario.records import CHOSEN, CONTROLS
 from hexapod_cosim.extensions.course import texts
-from hexapod_cosim.extensions.course.goals import verdicts
 from hexapod_cosim.extensions.course.reading import load_course
 from hexapod_cosim.extensions.course.records import (
     JUDGE,
@@ -207,7 +206,7 @@ def _show(table: Table) -> None:
         f"Course {course.version} ({course.hash[:12]}), split {course.split}, "
         f"{len(course.cases)} cases, {len(course.seeds)} seeds; reference {table.reference}"
     )
-    for title, (columns, rows) in reversed(texts.tables(table, verdicts(table))):
+    for title, (columns, rows) in reversed(texts.tables(table)):
         show_text(f"\n{title}")
         show_table(columns, rows)
 

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 from hexapod_cosim.cosim.common.files import write_text
 from hexapod_cosim.cosim.report.page import embedded, render
 from hexapod_cosim.extensions.course import texts
-from hexapod_cosim.extensions.course.goals import verdicts
-from hexapod_cosim.extensions.course.picture import STEM, THEMES, write_picture
+from hexapod_cosim.extensions.course.picture import write_picture
 from hexapod_cosim.extensions.course.table import ALL, Table
 
 REPORT, TEMPLATE = "report.html", "course.html.jinja"
@@ -23,7 +22,6 @@ def write_course_report(table: Table, content: Mapping[str, Any], folder: Path) 
     content: of benchmark.json.
     """
     files = write_picture(table, folder) if table.cases else []
-    found = [verdict for verdict in verdicts(table) if verdict.was_run]
     page = render(
         TEMPLATE,
         extension="course",
@@ -32,8 +30,7 @@ def write_course_report(table: Table, content: Mapping[str, Any], folder: Path) 
         headline=headline(table),
         lead=lead(table),
         warnings=[] if content["complete"] else ["The course was stopped before its end."],
-        picture=_pictures(files),
-        goals=texts.goal_rows(found) if found else None,
+        picture=embedded(files[0]) if files else None,
         parts=texts.part_rows(table),
         classes=texts.class_rows(table),
         cases=texts.case_rows(table),
@@ -74,17 +71,6 @@ def lead(table: Table) -> str:
         f"Changes are from {table.reference} unless the tables name another control. "
         "A success walks upright to the end and arrives."
     )
-
-
-def _pictures(files: Sequence[Path]) -> dict[str, str] | None:
-    """Returns the pictures by theme as data URLs."""
-    found = {
-        theme.name: embedded(path)
-        for theme in THEMES
-        for path in files
-        if path.name == f"{STEM}-{theme.name}.svg"
-    }
-    return found or None
 
 
 def _facts(content: Mapping[str, Any]) -> dict[str, str]:

@@ -19,7 +19,7 @@ from typer.main import get_command
 from hexapod_cosim.cosim.cli import main
 from hexapod_cosim.cosim.cli import terminal as terminal_module
 from hexapod_cosim.cosim.cli.app import app
-from hexapod_cosim.cosim.cli.terminal import counting_bar, progress_bar, step_lines, waiting
+from hexapod_cosim.cosim.cli.terminal import counting_bar, progress_bar, waiting
 
 ESCAPE = "\x1b"
 GROUP: Any = get_command(app)
@@ -118,19 +118,6 @@ def test_a_log_gets_a_line_of_progress_now_and_then(monkeypatch: pytest.MonkeyPa
         "runs: 160 of 1000 runs, 60 a minute, 14:00 left, 3 failed",
         "runs: 190 of 1000 runs, 60 a minute, 13:30 left, 3 failed",
     ]
-
-
-def test_each_step_is_a_line_and_none_where_nothing_is_shown(
-    capsys: pytest.CaptureFixture[str],
-) -> None:
-    for shown in (True, False):
-        with step_lines(shown=shown) as show:
-            show("linear least squares", 2, 1)
-            show("linear least squares", 2, 2)
-            show("all rows", 6, 3)
-    out, err = capsys.readouterr()
-    assert out == ""
-    assert err.splitlines() == ["step 2: linear least squares", "step 6: all rows"]
 
 
 def test_columns_of_a_table_are_aligned(call: Call) -> None:
