@@ -23,7 +23,6 @@ EVERY = 30.0  # s    between two lines of progress in a log
 
 Show = Callable[[float, str], None]  # amount done, text behind the bar
 Count = Callable[..., None]  # number of runs done, number of failed ones
-Step = Callable[[str, int, int], None]  # what is done, its number from 1, simulations so far
 
 
 def refuse_unused(
@@ -219,17 +218,3 @@ def counting_bar(label: str, total: int, *, plain: bool = False) -> Iterator[Cou
             show(done, ", ".join(filter(None, texts)))
 
         yield report
-
-
-@contextmanager
-def step_lines(*, shown: bool = True) -> Iterator[Step]:
-    """Prints a line on stderr for each step of a long calculation, if `shown`."""
-    last = ("", 0)
-
-    def report(text: str, step: int, _simulations: int) -> None:
-        nonlocal last
-        if shown and (text, step) != last:
-            last = text, step
-            print(f"step {step}: {text}", file=sys.stderr, flush=True)
-
-    yield report
