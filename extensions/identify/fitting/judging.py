@@ -17,9 +17,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hexapod_cosim.extensions.identify.fitting.covariance import coloured_information
+from hexapod_cosim.extensions.identify.fitting.differences import FINE
 from hexapod_cosim.extensions.identify.fitting.least_squares import BOUND, remaining_step
 from hexapod_cosim.extensions.identify.fitting.misfit import Misfit, misfits, read_noise
-from hexapod_cosim.extensions.identify.fitting.problem import FINE, Problem
+from hexapod_cosim.extensions.identify.fitting.problem import Problem
 from hexapod_cosim.extensions.identify.fitting.rank import (
     dependences,
     determined,
