@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from contextlib import closing, nullcontext
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import closing
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -33,7 +34,7 @@ from hexapod_cosim.cosim.common.files import write_json
 from hexapod_cosim.cosim.common.temporary import TemporaryFolder
 from hexapod_cosim.cosim.master.interrupts import deferred_interrupts
 from hexapod_cosim.cosim.report.accuracy import with_errors
-from hexapod_cosim.cosim.report.figures import FigureThread
+from hexapod_cosim.cosim.report.figures import draw_figures
 from hexapod_cosim.cosim.report.report import about, comparison_rows, write_report
 from hexapod_cosim.cosim.results.accuracy import Accuracy, halved_scenario
 from hexapod_cosim.cosim.results.comparison import (
@@ -172,7 +173,8 @@ def run_work(work: Work, path: Path) -> Done:
         results, files = _first_seed(work, folder)
         stored = {control: stored_result(result) for control, result in results.items()}
         views = {control: run.view for control, run in stored.items()}
-        with FigureThread(views) if work.plan.outputs.plots else nullcontext() as figures:
+        with ThreadPoolExecutor(1) as thread:
+            figures = thread.submit(draw_figures, views) if work.plan.outputs.plots else None
             comparison = _all_seeds(work, results, folder.path)
             files += [folder.path / SEEDS]
             files += write_comparison(
