@@ -105,7 +105,7 @@ def test_the_robot_file_is_the_identified_robot(found: list[Identified], tmp_pat
     assert source["servo.torque_max"] == "not determined by log.mcap: as before"
     lines = path.read_text(encoding="utf-8").splitlines()
     kp = next(one for one in found[0].estimates if one.key == "servo.kp")
-    said = f"identified from log.mcap: 95 % interval {kp.interval} N m/rad; before 50"
+    said = f"identified from log.mcap: 95 % interval {kp.interval} N m/rad; before 40"
     assert source["servo.kp"] == said
     (line,) = [line for line in lines if line.startswith("kp = ")]
     assert line.startswith(f"kp = {kp.value!r} ")

@@ -35,7 +35,7 @@ Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 Progress = Callable[[str], None]
 # of deriving weak combinations anew: the first errors of derivatives hide some in others
-PASSES = 2
+PASSES = 4
 ROUNDS = 3  # of keeping numbers at the file's values, at most
 
 
