@@ -196,37 +196,6 @@ def test_a_wrong_map_is_refused_with_its_name(
         read(write(tmp_path / name), **given)
 
 
-@pytest.mark.parametrize("bytes_less", [1, 4, 5, 12, 13, 16, 20])
-def test_a_picture_that_is_cut_is_refused(bytes_less: int, tmp_path: Path) -> None:
-    """Pillow reads it as long as the pixels are there: the chunk IEND takes the last 12 bytes."""
-    path = png(tmp_path / "map.png")
-    path.write_bytes(path.read_bytes()[:-bytes_less])
-    with pytest.raises(RobotError, match=r"map\.png.*a file that is cut"):
-        read(path, **SCALES)
-
-
-@pytest.mark.parametrize("from_end", [1, 13])
-def test_a_picture_with_a_wrong_checksum_is_refused(from_end: int, tmp_path: Path) -> None:
-    path = png(tmp_path / "map.png")
-    content = bytearray(path.read_bytes())
-    content[-from_end] ^= 1  # in the checksum of IEND, or in that of the pixels
-    path.write_bytes(content)
-    with pytest.raises(RobotError, match=r"the checksum of the chunk I(END|DAT) is wrong"):
-        read(path, **SCALES)
-
-
-def test_a_picture_of_another_kind_is_refused(tmp_path: Path) -> None:
-    path = tmp_path / "map.png"
-    Image.fromarray(HEIGHTS.astype(np.uint16)).save(path, format="TIFF")
-    with pytest.raises(RobotError, match="another kind"):
-        read(path, **SCALES)
-
-
-def test_a_missing_map_is_refused_with_its_path(tmp_path: Path) -> None:
-    with pytest.raises(RobotError, match=r"cannot read the height map.*No such file"):
-        read(tmp_path / "nowhere.png", **SCALES)
-
-
 BAD_SURFACES: list[tuple[dict[str, Any], str]] = [
     ({"kind": "rough"}, "unknown kind of surface"),
     ({"height": np.zeros((1, 5))}, "at least 2 rows"),
@@ -255,12 +224,3 @@ def test_data_of_no_surface_are_refused(change: dict[str, Any], message: str) ->
 
 def zeros() -> Array:
     return np.zeros((2, 2))
-
-
-def test_a_surface_cannot_be_changed() -> None:
-    heights = zeros()
-    surface = Surface(kind="smooth", height=heights, x0=0.0, y0=0.0, cell=0.1)
-    heights[:] = 1.0
-    assert surface.height.tolist() == [[0.0, 0.0], [0.0, 0.0]]
-    with pytest.raises(ValueError, match="read-only"):
-        surface.height[0, 0] = 1.0
