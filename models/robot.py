@@ -230,12 +230,8 @@ def _read_leg(
     name: str, legs: Mapping[str, Any], common: Mapping[str, dict[str, Any]], where: str
 ) -> Leg:
     if name not in legs:
-        raise RobotError(
-            "missing leg",
-            expected="legs " + " ".join(LEG_NAMES),
-            fix=f"add [legs.{name}]",
-            where=where,
-        )
+        expected = "legs " + " ".join(LEG_NAMES)
+        raise RobotError("missing leg", expected=expected, fix=f"add [legs.{name}]", where=where)
     table = expect_table(legs[name], where)
     refuse_unknown_keys(table, ["hip_position", "hip_yaw", *JOINT_NAMES], where)
     placed = {key: value for key, value in table.items() if key not in JOINT_NAMES}

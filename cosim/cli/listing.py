@@ -17,8 +17,7 @@ from hexapod_cosim.cosim.interface.plant_interface import load_interface
 from hexapod_cosim.cosim.scenario.tables import list_scenarios
 from hexapod_cosim.models import LEG_NAMES, Terrain, list_robots, load_robot, unknown_name
 from hexapod_cosim.models.ground.catalogue import CATALOGUE
-from hexapod_cosim.models.ground.entries import Entry
-from hexapod_cosim.models.ground.parameters import DIFFICULTY
+from hexapod_cosim.models.ground.parameters import DIFFICULTY, Entry
 from hexapod_cosim.models.ground.table import PLACED
 from hexapod_cosim.models.records import PLANES
 from hexapod_cosim.models.schema import Number, specs

@@ -129,26 +129,20 @@ def _name(value: Any, where: str) -> str:
     """Returns the name of a servo. Raises RobotError for other values than texts."""
     if isinstance(value, str):
         return value
-    raise RobotError(
-        "wrong type",
-        got=value,
-        expected="a name of `hexapod list servos`",
-        fix="give a name in quotes",
-        where=f"{where}.{MODEL}",
-    )
+    expected = "a name of `hexapod list servos`"
+    fix = "give a name in quotes"
+    raise RobotError("wrong type", got=value, expected=expected, fix=fix, where=f"{where}.{MODEL}")
 
 
 def _check_constants(own: Mapping[str, Any], where: str) -> None:
     """Raises RobotError for a motor that lacks a constant or has one that is 0."""
     for key in ("voltage", "torque_constant", "resistance"):
         if not own.get(key, 0.0) > 0.0:
-            raise RobotError(
-                "a motor without its constants",
-                got=own.get(key),
-                expected="a number > 0",
-                fix=f"give {key}, or a servo of `hexapod list servos` as {MODEL}",
-                where=f"{where}.{key}",
-            )
+            what = "a motor without its constants"
+            got = own.get(key)
+            expected = "a number > 0"
+            fix = f"give {key}, or a servo of `hexapod list servos` as {MODEL}"
+            raise RobotError(what, got=got, expected=expected, fix=fix, where=f"{where}.{key}")
 
 
 def refuse_others(given: Mapping[str, Any], derived: Mapping[str, Any], where: str) -> None:
@@ -158,13 +152,11 @@ def refuse_others(given: Mapping[str, Any], derived: Mapping[str, Any], where: s
     """
     for key in FOLLOWING:
         if not math.isclose(given.get(key, derived[key]), derived[key], rel_tol=1e-9):
-            raise RobotError(
-                "a value that follows from the motor's constants",
-                got=given[key],
-                expected=f"{derived[key]:g}",
-                fix=f"remove it, or change {', '.join(CONSTANTS)}",
-                where=f"{where}.{key}",
-            )
+            what = "a value that follows from the motor's constants"
+            got = given[key]
+            expected = f"{derived[key]:g}"
+            fix = f"remove it, or change {', '.join(CONSTANTS)}"
+            raise RobotError(what, got=got, expected=expected, fix=fix, where=f"{where}.{key}")
 
 
 def followed(servo: Servo) -> Servo:

@@ -75,11 +75,8 @@ def soil_table(value: Any, where: str) -> Mapping[str, Any]:
         return table
     name = table.pop(PRESET)
     if not isinstance(name, str):
-        raise RobotError(
-            "wrong type",
-            got=name,
-            expected="a name of `hexapod list soils`",
-            fix="give a name in quotes",
-            where=f"{where}.{PRESET}",
-        )
+        what = "wrong type"
+        expected = "a name of `hexapod list soils`"
+        fix = "give a name in quotes"
+        raise RobotError(what, got=name, expected=expected, fix=fix, where=f"{where}.{PRESET}")
     return asdict(soil_preset(name, where=where).soil) | table

@@ -226,13 +226,10 @@ def _limits(
     limit = element.find("limit")
     lower, upper = number(limit, "lower", 0.0, where), number(limit, "upper", 0.0, where)
     if not lower < upper:
-        raise RobotError(
-            "limits not ordered",
-            got=[lower, upper],
-            expected="<limit> with lower < upper [rad]",
-            fix="correct them, or make the joint continuous",
-            where=where,
-        )
+        what = "limits not ordered"
+        expected = "<limit> with lower < upper [rad]"
+        fix = "correct them, or make the joint continuous"
+        raise RobotError(what, got=[lower, upper], expected=expected, fix=fix, where=where)
     ignored["limits beyond half a turn"] += lower < -math.pi or upper > math.pi
     return max(lower, -math.pi), min(upper, math.pi)
 

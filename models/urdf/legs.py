@@ -80,13 +80,11 @@ def _chain(branch: Branch, where: str) -> tuple[Branch, Branch, Branch]:
     rest = [item.joint.name for item in chain[-1].body.branches]
     if len(chain) != len(JOINT_NAMES) or rest:
         names = [item.joint.name for item in chain]
-        raise RobotError(
-            "a leg that is no chain of three joints",
-            got=f"{', '.join(names)}" + (f", then {', '.join(rest)}" if rest else ""),
-            expected="three moving joints, one after the other",
-            fix="make the others fixed, or all of them if this is no leg",
-            where=where,
-        )
+        what = "a leg that is no chain of three joints"
+        got = f"{', '.join(names)}" + (f", then {', '.join(rest)}" if rest else "")
+        expected = "three moving joints, one after the other"
+        fix = "make the others fixed, or all of them if this is no leg"
+        raise RobotError(what, got=got, expected=expected, fix=fix, where=where)
     return (chain[0], chain[1], chain[2])
 
 

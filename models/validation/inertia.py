@@ -32,13 +32,8 @@ def check_inertia(mass: float, inertia: tuple[float, ...], extent: float, where:
         )
     if moments[0] + moments[1] < (1.0 - INERTIA_ROUNDING) * moments[2]:
         expected = "principal moments of which no one exceeds the sum of the others"
-        raise RobotError(
-            "inertia of no possible body",
-            got=shown,
-            expected=expected,
-            fix=fix,
-            where=where + ".inertia",
-        )
+        what = "inertia of no possible body"
+        raise RobotError(what, got=shown, expected=expected, fix=fix, where=where + ".inertia")
     radius = math.sqrt(float(moments.sum()) / (2.0 * mass))
     if radius > extent:
         expected = f"a radius of gyration of at most {extent:.3g} m for matter of this extent"
@@ -54,10 +49,7 @@ def check_inertia(mass: float, inertia: tuple[float, ...], extent: float, where:
 def check_com(com: tuple[float, ...], extent: float, where: str) -> None:
     """Raises RobotError for a centre of mass further than `extent` [m] from its frame."""
     if math.hypot(*com) > extent:
-        raise RobotError(
-            "centre of mass outside the body",
-            got=com,
-            expected=f"within {extent:.3g} m of the frame",
-            fix="check the unit (m)",
-            where=where + ".com",
-        )
+        what = "centre of mass outside the body"
+        expected = f"within {extent:.3g} m of the frame"
+        fix = "check the unit (m)"
+        raise RobotError(what, got=com, expected=expected, fix=fix, where=where + ".com")

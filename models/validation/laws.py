@@ -47,13 +47,9 @@ def check_static_friction(friction: Friction, where: str) -> None:
     if static in (0.0, mu):
         return
     if static < mu:
-        raise RobotError(
-            "static friction below kinetic",
-            got=static,
-            expected=f"at least mu = {mu:g}",
-            fix="raise it or leave it out",
-            where=where,
-        )
+        what = "static friction below kinetic"
+        fix = "raise it or leave it out"
+        raise RobotError(what, got=static, expected=f"at least mu = {mu:g}", fix=fix, where=where)
     if friction.law not in STATIC_LAWS:
         laws = " or ".join(STATIC_LAWS)
         raise RobotError(
@@ -71,13 +67,11 @@ def check_body_contact(body: BodyContact, where: str) -> None:
     Raises RobotError.
     """
     if min(body.torso_box) < 0.0:
-        raise RobotError(
-            "a box with negative edges",
-            got=list(body.torso_box),
-            expected="half edges >= 0 m",
-            fix="correct them; all 0: the torso touches nothing",
-            where=where + ".torso_box",
-        )
+        what = "a box with negative edges"
+        got = list(body.torso_box)
+        expected = "half edges >= 0 m"
+        fix = "correct them; all 0: the torso touches nothing"
+        raise RobotError(what, got=got, expected=expected, fix=fix, where=where + ".torso_box")
     if body.contact == "on" and not any((*body.torso_box, body.knee_radius, body.shank_radius)):
         raise RobotError(
             "body contact without a body",

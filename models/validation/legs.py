@@ -43,13 +43,10 @@ def _check_link(link: Link, where: str) -> None:
     check_record(link, where)
     extent = math.hypot(*link.tip)
     if extent <= 0.0:
-        raise RobotError(
-            "link without extent",
-            got=link.tip,
-            expected="a tip away from the joint",
-            fix="give a length",
-            where=where + ".length",
-        )
+        what = "link without extent"
+        expected = "a tip away from the joint"
+        fix = "give a length"
+        raise RobotError(what, got=link.tip, expected=expected, fix=fix, where=where + ".length")
     check_inertia(link.mass, link.inertia, GYRATION_PER_EXTENT * extent, where)
     check_com(link.com, GYRATION_PER_EXTENT * extent, where)
     if abs(math.hypot(*link.axis) - 1.0) > AXIS_TOLERANCE:
@@ -107,13 +104,10 @@ def check_stance(robot: Robot, at: str) -> None:
     where = f"{at}legs.{LEG_NAMES[worst]}.stance"
     if abs(distance[worst]) > STANCE_PLANE_TOLERANCE:
         got = f"{distance[worst]:.4g} m off the plane of the other feet"
-        raise RobotError(
-            "a stance foot does not reach the ground",
-            got=got,
-            expected=f"at most {STANCE_PLANE_TOLERANCE} m",
-            fix="adapt this leg's stance",
-            where=where,
-        )
+        what = "a stance foot does not reach the ground"
+        expected = f"at most {STANCE_PLANE_TOLERANCE} m"
+        fix = "adapt this leg's stance"
+        raise RobotError(what, got=got, expected=expected, fix=fix, where=where)
     if slope > 0.5:
         raise RobotError(
             "the stance feet do not lie below the torso",

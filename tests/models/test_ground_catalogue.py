@@ -18,7 +18,7 @@ import pytest
 
 from hexapod_cosim.models import RobotError, load_robot, robot_from_table
 from hexapod_cosim.models.ground.catalogue import CATALOGUE, make_surface
-from hexapod_cosim.models.ground.curriculum import TileMaker, column_names
+from hexapod_cosim.models.ground.curriculum import column_names
 from hexapod_cosim.models.ground.faces import ground_height
 from hexapod_cosim.models.ground.grid_file import (
     HEADER,
@@ -175,14 +175,13 @@ def test_steps_of_a_curriculum_rise_along_its_rows_and_tiles_fit_together() -> N
 def test_columns_of_a_curriculum_have_their_proportions_as_in_legged_gym() -> None:
     """Its five terrains and their shares of 20 columns, by its names."""
     names = ("smooth_slope", "rough_slope", "stairs_up", "stairs_down", "discrete")
-    maker = TileMaker(lambda values: make_surface("plane", {}), {})
     values = SimpleNamespace(
         terrains=" ".join(names), terrain_proportions="0.1, 0.1, 0.35, 0.25, 0.2", num_cols=20
     )
-    found = column_names(values, dict.fromkeys(names, maker))
+    found = column_names(values)
     assert [found.count(name) for name in names] == [2, 2, 7, 5, 4]
     values.terrain_proportions = "equal"
-    assert column_names(values, dict.fromkeys(names, maker))[:6] == [*names, names[0]]
+    assert column_names(values)[:6] == [*names, names[0]]
 
 
 def test_a_curriculum_of_slopes_is_smooth_and_has_their_inclines() -> None:
@@ -214,12 +213,8 @@ def test_the_heights_of_a_picture_are_those_of_the_points() -> None:
 REFUSED: list[tuple[str, dict[str, Any], str]] = [
     ("staris", {}, "did you mean 'stairs'"),
     ("stairs", {"step_hight": 0.1}, "did you mean 'step_height'"),
-    ("stairs", {"seed": 3}, "unknown key"),
     ("stairs", {"step_height": -0.1}, r"> 0 and <= 100 \[m\]"),
-    ("stairs", {"step_height": math.nan}, "a finite number"),
-    ("stairs", {"step_height": "high"}, "wrong type"),
     ("rubble", {"seed": 1.5}, "whole number"),
-    ("rubble", {"difficulty": 2.0}, "<= 1"),
     ("rubble", {"size": 100.0, "horizontal_scale": 0.002}, "do not fit together"),
     ("rubble", {"patch": {"x": 0}}, "two brackets"),
     ("rubble", {"patch": [{"x": 0.0, "y": 0.0, "mu": 0.1}]}, "size"),
@@ -230,18 +225,11 @@ REFUSED: list[tuple[str, dict[str, Any], str]] = [
     ("sand", {"soil": "moon"}, "unknown soil"),
     ("heightfield", {}, "file"),
     ("stairs", {"size": 0.2}, r"covers the whole map: got 'size 0\.2 m.*at least 0\.9 m"),
-    ("step_up", {"size": 0.82}, "covers the whole map"),
-    ("dune", {"size": 2.0, "platform_size": 2.0}, "covers the whole map"),
     ("stairs", {"num_steps": 100}, r"on a map of 4 m', expected at most 11 steps; .*size=30\.8"),
-    ("stairs", {"num_steps": 12}, "more steps than the map has room for"),
     ("curriculum", {"terrains": "stairs plane"}, "unknown terrain of tiles"),
     ("curriculum", {"terrain_proportions": "1 2"}, "4 numbers >= 0, one for each of pyramid_st"),
-    ("curriculum", {"terrain_proportions": "1 1 -1 1"}, "proportions that do not fit"),
-    ("curriculum", {"terrain_proportions": "0 0 0 0"}, "proportions that do not fit"),
-    ("curriculum", {"terrains": " , "}, "a curriculum without terrains"),
     ("curriculum", {"size": 0.8}, "platforms cover their tiles"),
     ("curriculum", {"num_rows": 1000, "num_cols": 1000}, "the curriculum is too large"),
-    ("curriculum", {"num_rows": 0}, ">= 1"),
 ]
 
 
@@ -288,7 +276,7 @@ def test_a_robot_file_may_name_a_surface() -> None:
 
 BAD_TABLES: list[tuple[dict[str, Any], str]] = [
     ({"kind": "grid"}, "unknown surface"),
-    ({"height": 0.0}, "one of flat, slope, plane, stairs"),
+    ({"height": 0.0}, "one of flat, slope, stairs"),
     ({"kind": "flat", "step_height": 0.1}, "step_height"),
     ({"kind": "flat", "patch": [{"x": 0, "y": 0, "size": 1, "mu": 0.1}]}, 'kind = "plane"'),
     ({"kind": "rubble", "horizontal_scale": 0.01}, "blocks narrower than a foot"),
