@@ -169,9 +169,6 @@ def _check_room(values: SimpleNamespace, half: int, border: int) -> None:
         raise RobotError(what, got=got, expected=expected, fix=fix)
     count = 4 * (half * values.num_rows + border) * (half * values.num_cols + border)
     if count > MOST_BLOCKS:
-        raise RobotError(
-            "the curriculum is too large",
-            got=f"{count} blocks",
-            expected=f"at most {MOST_BLOCKS}",
-            fix="reduce terrain.num_rows, num_cols or border_width, or raise horizontal_scale",
-        )
+        what = "the curriculum is too large"
+        fix = "reduce terrain.num_rows, num_cols or border_width, or raise horizontal_scale"
+        raise RobotError(what, got=f"{count} blocks", expected=f"at most {MOST_BLOCKS}", fix=fix)

@@ -63,12 +63,10 @@ def heightfield(values: SimpleNamespace) -> Surface:
     try:
         read = reader(path)
     except OSError as error:
-        raise RobotError(
-            "cannot read the height map",
-            got=error.strerror or str(error),
-            fix="give the path of a .png, .npy or .asc file, relative to the TOML file",
-            where=str(path),
-        ) from error
+        what = "cannot read the height map"
+        got = error.strerror or str(error)
+        fix = "give the path of a .png, .npy or .asc file, relative to the TOML file"
+        raise RobotError(what, got=got, fix=fix, where=str(path)) from error
     cell = _chosen(
         "horizontal_scale", "m per pixel or cell", values.horizontal_scale, read.cell, path
     )
@@ -94,13 +92,10 @@ def _chosen(key: str, unit: str, given: float, own: float, path: Path) -> float:
         fix = f"add `{key} = ...` to [terrain]"
         raise RobotError(what, got="none in the file", expected=expected, fix=fix, where=str(path))
     if not (math.isfinite(scale) and scale > 0.0):
-        raise RobotError(
-            f"{key} of the height map",
-            got=scale,
-            expected=f"a positive scale in {unit}",
-            fix=f"correct `{key}` in [terrain], or the file's cellsize",
-            where=str(path),
-        )
+        what = f"{key} of the height map"
+        expected = f"a positive scale in {unit}"
+        fix = f"correct `{key}` in [terrain], or the file's cellsize"
+        raise RobotError(what, got=scale, expected=expected, fix=fix, where=str(path))
     return scale
 
 

@@ -138,13 +138,11 @@ def _check_shape(surface: Surface) -> None:
         fix = "give a map with more rows and columns"
         raise RobotError(what, got=got, expected=expected, fix=fix, where=surface.name)
     if surface.height.size > LARGEST_MAP:
-        raise RobotError(
-            "the height map is too large",
-            got=" x ".join(map(str, shape)),
-            expected=f"at most {LARGEST_MAP} heights",
-            fix="cut out a part of it or reduce its resolution",
-            where=surface.name,
-        )
+        what = "the height map is too large"
+        got = " x ".join(map(str, shape))
+        expected = f"at most {LARGEST_MAP} heights"
+        fix = "cut out a part of it or reduce its resolution"
+        raise RobotError(what, got=got, expected=expected, fix=fix, where=surface.name)
 
 
 def _check_place(surface: Surface) -> None:
@@ -154,13 +152,11 @@ def _check_place(surface: Surface) -> None:
         fix = "give horizontal_scale in metres"
         raise RobotError(what, got=surface.cell, expected=expected, fix=fix, where=surface.name)
     if not all(abs(edge) <= FARTHEST for edge in surface.extent):
-        raise RobotError(
-            "place of the height map",
-            got=[float(f"{edge:.6g}") for edge in surface.extent],
-            expected=f"edges within {FARTHEST:g} m of the world's origin",
-            fix="move it towards the origin, or correct horizontal_scale",
-            where=surface.name,
-        )
+        what = "place of the height map"
+        got = [float(f"{edge:.6g}") for edge in surface.extent]
+        expected = f"edges within {FARTHEST:g} m of the world's origin"
+        fix = "move it towards the origin, or correct horizontal_scale"
+        raise RobotError(what, got=got, expected=expected, fix=fix, where=surface.name)
 
 
 def check_heights(height: Array, name: str, place: Callable[[int, int], str] | None = None) -> None:
@@ -180,13 +176,10 @@ def check_heights(height: Array, name: str, place: Callable[[int, int], str] | N
         raise RobotError(what, got=got, expected="finite heights", fix=fix, where=name)
     worst = float(np.max(np.abs(height)))
     if worst > HIGHEST:
-        raise RobotError(
-            "enormous heights",
-            got=f"{worst:.6g} m",
-            expected=f"at most {HIGHEST:g} m above and below terrain.height",
-            fix="correct vertical_scale, or subtract the map's mean height",
-            where=name,
-        )
+        what = "enormous heights"
+        expected = f"at most {HIGHEST:g} m above and below terrain.height"
+        fix = "correct vertical_scale, or subtract the map's mean height"
+        raise RobotError(what, got=f"{worst:.6g} m", expected=expected, fix=fix, where=name)
 
 
 def _check_materials(surface: Surface) -> None:

@@ -96,13 +96,10 @@ def read_terrain(table: Any, where: str) -> Terrain:
     fields = {key: specs(Terrain)[key].read(placed[key], f"{where}.{key}") for key in placed}
     if kind in PLANES:
         if given.get("patch"):
-            raise RobotError(
-                "patches on a ground without a map",
-                got=kind,
-                expected="a surface of the catalogue",
-                fix='set terrain.kind = "plane", with slope_x for a slope',
-                where=f"{where}.patch",
-            )
+            what = "patches on a ground without a map"
+            expected = "a surface of the catalogue"
+            fix = 'set terrain.kind = "plane", with slope_x for a slope'
+            raise RobotError(what, got=kind, expected=expected, fix=fix, where=f"{where}.patch")
         return Terrain(**require(Terrain, fields | {"kind": kind}, where))
     rest = {key: value for key, value in given.items() if key not in ("kind", *PLACED)}
     surface = make_surface(kind, rest, where=where)

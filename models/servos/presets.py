@@ -21,6 +21,7 @@ from hexapod_cosim.models.schema import (
     read_given,
     require,
     specs,
+    wrong_type,
 )
 from hexapod_cosim.models.servos.motor import (
     motor_constant,
@@ -99,7 +100,11 @@ def servo_table(value: Any, where: str) -> Mapping[str, Any]:
     fields: Mapping[str, Any] = {}
     gain: float | None = None
     if MODEL in table:
-        measured = measured_servo(_name(table.pop(MODEL), where), where=f"{where}.{MODEL}")
+        name, at = table.pop(MODEL), f"{where}.{MODEL}"
+        if not isinstance(name, str):
+            expected = "a name of `hexapod list servos`"
+            raise wrong_type(name, expected, "give a name in quotes", at)
+        measured = measured_servo(name, where=at)
         fields, gain = measured.fields, measured.about.duty_gain
     elif table.get("drive") != "motor":
         return table
@@ -123,15 +128,6 @@ def _with_motor(given: Mapping[str, Any], gain: float | None) -> dict[str, Any]:
     if gain is not None:
         own = {"kp": position_gain(servo, gain)} | own
     return own | {key: getattr(servo, key) for key in FOLLOWING}
-
-
-def _name(value: Any, where: str) -> str:
-    """Returns the name of a servo. Raises RobotError for other values than texts."""
-    if isinstance(value, str):
-        return value
-    expected = "a name of `hexapod list servos`"
-    fix = "give a name in quotes"
-    raise RobotError("wrong type", got=value, expected=expected, fix=fix, where=f"{where}.{MODEL}")
 
 
 def _check_constants(own: Mapping[str, Any], where: str) -> None:

@@ -83,10 +83,8 @@ def check_soil(robot: Robot, at: str) -> None:
         raise RobotError(what, got=got, expected=expected, fix=fix, where=at + "soil")
     steepest = {"granular": strength["granular"], "mud": soil.hardening}.get(soil.law, 0.0)
     if steepest >= soil.stiffness:
-        raise RobotError(
-            "soil whose unloading is no steeper than its loading",
-            got=soil.stiffness,
-            expected=f"a stiffness above {steepest:g} Pa/m, the growth of pressure with depth",
-            fix="raise soil.stiffness",
-            where=at + "soil.stiffness",
-        )
+        what = "soil whose unloading is no steeper than its loading"
+        got = soil.stiffness
+        expected = f"a stiffness above {steepest:g} Pa/m, the growth of pressure with depth"
+        fix = "raise soil.stiffness"
+        raise RobotError(what, got=got, expected=expected, fix=fix, where=at + "soil.stiffness")

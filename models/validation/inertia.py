@@ -23,13 +23,9 @@ def check_inertia(mass: float, inertia: tuple[float, ...], extent: float, where:
     shown = [float(f"{moment:.4g}") for moment in moments]
     fix = "check units (kg m2), the reference point (centre of mass) and the signs of the products"
     if moments[0] <= 0.0:
-        raise RobotError(
-            "inertia not positive definite",
-            got=shown,
-            expected="principal moments > 0",
-            fix=fix,
-            where=where + ".inertia",
-        )
+        what = "inertia not positive definite"
+        expected = "principal moments > 0"
+        raise RobotError(what, got=shown, expected=expected, fix=fix, where=where + ".inertia")
     if moments[0] + moments[1] < (1.0 - INERTIA_ROUNDING) * moments[2]:
         expected = "principal moments of which no one exceeds the sum of the others"
         what = "inertia of no possible body"
@@ -37,13 +33,9 @@ def check_inertia(mass: float, inertia: tuple[float, ...], extent: float, where:
     radius = math.sqrt(float(moments.sum()) / (2.0 * mass))
     if radius > extent:
         expected = f"a radius of gyration of at most {extent:.3g} m for matter of this extent"
-        raise RobotError(
-            "inertia too large for the mass",
-            got=f"{radius:.3g} m",
-            expected=expected,
-            fix=fix,
-            where=where + ".inertia",
-        )
+        what = "inertia too large for the mass"
+        got = f"{radius:.3g} m"
+        raise RobotError(what, got=got, expected=expected, fix=fix, where=where + ".inertia")
 
 
 def check_com(com: tuple[float, ...], extent: float, where: str) -> None:

@@ -50,22 +50,16 @@ def _check_link(link: Link, where: str) -> None:
     check_inertia(link.mass, link.inertia, GYRATION_PER_EXTENT * extent, where)
     check_com(link.com, GYRATION_PER_EXTENT * extent, where)
     if abs(math.hypot(*link.axis) - 1.0) > AXIS_TOLERANCE:
-        raise RobotError(
-            "axis not of unit length",
-            got=link.axis,
-            expected="a unit vector",
-            fix="normalise it",
-            where=where + ".axis",
-        )
+        what = "axis not of unit length"
+        expected = "a unit vector"
+        fix = "normalise it"
+        raise RobotError(what, got=link.axis, expected=expected, fix=fix, where=where + ".axis")
     if link.angle_min >= link.angle_max:
         got = [link.angle_min, link.angle_max]
-        raise RobotError(
-            "limits not ordered",
-            got=got,
-            expected="angle_min < angle_max",
-            fix="swap or correct them (rad)",
-            where=where + ".angle_min",
-        )
+        what = "limits not ordered"
+        expected = "angle_min < angle_max"
+        fix = "swap or correct them (rad)"
+        raise RobotError(what, got=got, expected=expected, fix=fix, where=where + ".angle_min")
 
 
 def check_rotors(robot: Robot, at: str) -> None:
@@ -109,13 +103,10 @@ def check_stance(robot: Robot, at: str) -> None:
         fix = "adapt this leg's stance"
         raise RobotError(what, got=got, expected=expected, fix=fix, where=where)
     if slope > 0.5:
-        raise RobotError(
-            "the stance feet do not lie below the torso",
-            got=f"slope {slope:.3g}",
-            expected="at most 0.5",
-            fix="adapt the stance",
-            where=at + "legs",
-        )
+        what = "the stance feet do not lie below the torso"
+        got = f"slope {slope:.3g}"
+        fix = "adapt the stance"
+        raise RobotError(what, got=got, expected="at most 0.5", fix=fix, where=at + "legs")
     hips = np.array([leg.hip_position for leg in robot.legs])
     high = int(np.argmax(feet[:, 2] - hips[:, 2]))
     if feet[high, 2] - robot.foot.radius >= hips[high, 2]:

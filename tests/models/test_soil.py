@@ -13,7 +13,6 @@ import pytest
 from hexapod_cosim.models import load_robot
 from hexapod_cosim.models.errors import RobotError
 from hexapod_cosim.models.records import Foot, Soil
-from hexapod_cosim.models.soil.granular import Coefficients, alpha_x, alpha_z
 from hexapod_cosim.models.soil.law import (
     elastic_force,
     plastic_depth,
@@ -37,17 +36,6 @@ TRIPOD = 18.3  # N  load of a foot of a tripod
 CHECK = 1e-6  # relative: digits of the published check numbers
 EXACT = 1e-12  # relative: rounding
 DIFFERENCE = 1e-8  # relative: central differences of a step of 1e-6
-GENERIC = Coefficients(
-    A00=0.206,
-    A10=0.169,
-    B11=0.212,
-    B01=0.358,
-    Bm11=0.055,
-    C11=-0.124,
-    C01=0.253,
-    Cm11=0.007,
-    D10=0.088,
-)
 LAWS = (
     Soil(law="bekker", frictional_modulus=1.5e6, cohesive_modulus=900.0, exponent=1.1),
     Soil(law="bekker", frictional_modulus=1.3e6, exponent=0.7),
@@ -191,25 +179,6 @@ def test_the_steepest_slope_held_has_friction_and_cohesion() -> None:
     assert steepest == pytest.approx(
         math.tan(soil.friction_angle) + soil_area(foot) * soil.cohesion / load, rel=EXACT
     )
-
-
-@pytest.mark.parametrize(
-    ("beta", "gamma", "vertical", "horizontal"),
-    [
-        (0, 90, 1.000, None),
-        (90, 0, 0.037, 0.370),
-        (0, 0, 0.375, 0.136),
-        (0, -90, -0.250, None),
-        (30, 45, 0.7341854553574277, 0.29396329354996314),
-    ],
-)
-def test_granular_resistance_has_its_anchors(
-    beta: float, gamma: float, vertical: float, horizontal: float | None
-) -> None:
-    b, g = math.radians(beta), math.radians(gamma)
-    assert alpha_z(GENERIC, b, g) == pytest.approx(vertical, rel=EXACT)
-    expected = 0.0 if horizontal is None else horizontal
-    assert alpha_x(GENERIC, b, g) == pytest.approx(expected, rel=EXACT, abs=1e-15)
 
 
 def test_the_profile_of_a_sphere_is_the_integral_over_its_chords() -> None:
