@@ -30,7 +30,7 @@ import numpy as np
 from secret_robots import GROUPS, Secret, damaged, secret_robot
 
 from hexapod_cosim.cosim.export.plant_export import export_fmu
-from hexapod_cosim.extensions.identify.commands.command_screening import WrongCommandsError
+from hexapod_cosim.extensions.identify.command_screening import WrongCommandsError
 from hexapod_cosim.extensions.identify.identified import Identified
 from hexapod_cosim.extensions.identify.identify import TOLERANCE, identify, screen
 from hexapod_cosim.extensions.identify.log import Log
@@ -47,7 +47,7 @@ GOAL_COVERED, GOAL_RATIO = 0.9, 10.0
 class Score:
     """How well a robot was identified."""
 
-    told: int  # numbers that the log tells
+    told: int  # numbers that the log determines
     covered: int  # of these within their 95 % intervals
     missed: tuple[str, ...]
     before: dict[str, float]  # by channel: error on held-out rows of the robot file's numbers,
@@ -65,7 +65,7 @@ class Score:
 
 def score(secret: Secret, found: Identified, seconds: float) -> Score:
     """Compares an identified robot with the secret one."""
-    told = [one for one in found.estimates if one.told]
+    told = [one for one in found.estimates if one.determined]
     missed = tuple(one.key for one in told if not one.low <= secret.values[one.key] <= one.high)
     sides = (found.before, found.fit.predictions)
     before, after = (held_out_errors(secret, found, side[0]) for side in sides)

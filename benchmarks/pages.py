@@ -145,7 +145,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     put_into(PAGES, tables)
     demo = compared("demo_course", [*OWN, CHOSEN[0], CHOSEN[-1]])
     put_into((ROOT / "README.md",), {"demo": metrics_table(demo, brief=True)})
-    with Image.open(folder / FOLDER / f"{STEM}-light.png") as picture:
+    with Image.open(folder / FOLDER / f"{STEM}.png") as picture:
         small = picture.convert("RGB").quantize(COLOURS, dither=Image.Dither.NONE)
     small.save(ROOT / "docs" / "images" / f"{STEM}.png", optimize=True)
     return 0

@@ -3,7 +3,7 @@
 python docs/figure_live.py
 
 The loop's clock goes on from picture to picture, however long the browser takes to draw one. So the
-figures of real time and latency would say nothing, and are left out.
+figures of real time would say nothing, and are left out.
 
 Needs what docs/figure_report.py needs.
 """
@@ -17,7 +17,6 @@ import sys
 import threading
 from dataclasses import dataclass
 from functools import partial
-from multiprocessing import get_context
 from pathlib import Path
 from time import sleep
 from typing import Any
@@ -27,9 +26,8 @@ from playwright.sync_api import sync_playwright
 
 from hexapod_cosim.cosim.run.preparation import chosen_gains
 from hexapod_cosim.cosim.scenario.scenario import load_scenario
+from hexapod_cosim.extensions.live import server as live_server
 from hexapod_cosim.extensions.live.loop import Loop
-from hexapod_cosim.extensions.live.robot import LiveRobot
-from hexapod_cosim.extensions.live.server import LiveServer
 from hexapod_cosim.extensions.live.settings import Choices, control_texts
 
 RATE = 12  # pictures per second of simulated time
@@ -48,17 +46,17 @@ KEYS = {0.2: ("down", "w"), 2.2: ("down", "a"), 4.2: ("up", "a"), 6.0: ("up", "w
 PUSH = (4.8, 5.6)  # s
 
 
-def run_on(clock: Any, link: Any, choices: Choices, gains: Any) -> None:
-    """Runs the loop on a clock [s] that the process of the pictures moves."""
+@dataclass
+class Clock:
+    """A clock of the loop [s], which the thread of the pictures moves."""
 
-    def pause(seconds: float) -> None:
-        end = clock.value + seconds
-        while clock.value < end - 1e-9:
+    value: float = 0.0
+
+    def pause(self, seconds: float) -> None:
+        """Waits until the clock has moved on."""
+        end = self.value + seconds
+        while self.value < end - 1e-9:
             sleep(0.002)
-
-    with LiveRobot(choices, gains=gains) as robot:
-        link.send(("ready", None))
-        Loop(robot, link, now=lambda: float(clock.value), pause=pause).run()
 
 
 @dataclass
@@ -125,8 +123,9 @@ def main() -> None:
     )
     scenario = load_scenario("walk_flat", overrides=["control=compliant"])
     choices = Choices(scenario, control_texts(scenario), {})
-    clock = get_context("spawn").Value("d", 0.0)
-    server = LiveServer(choices, chosen_gains(scenario), process=partial(run_on, clock))
+    clock = Clock()
+    live_server.Loop = partial(Loop, now=lambda: clock.value, pause=clock.pause)
+    server = live_server.LiveServer(choices, chosen_gains(scenario))
     ready = threading.Event()
     thread = threading.Thread(target=server.run, args=(lambda url: ready.set(),), daemon=True)
     thread.start()
@@ -135,7 +134,7 @@ def main() -> None:
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=chromium, args=FLAGS)
         page = browser.new_page(viewport=SIZE, color_scheme="light")
-        page.goto(server.address.url)
+        page.goto(server.url)
         page.add_style_tag(content=HIDDEN)
         page.wait_for_function("window.hexapod?.poses.newest", timeout=PATIENCE)
         page.set_default_timeout(PATIENCE)

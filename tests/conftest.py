@@ -26,7 +26,6 @@ from xdist.scheduler import LoadScopeScheduling
 from hexapod_cosim.cosim.cli import main
 from hexapod_cosim.cosim.common import plant_files
 from hexapod_cosim.cosim.export.plant_export import export_fmu
-from hexapod_cosim.cosim.report.figures import Figures
 from hexapod_cosim.models import load_robot
 
 # A shell that runs the tests in the background lets them ignore Ctrl-C, and their children too.
@@ -177,8 +176,7 @@ def read_only() -> Iterator[Callable[[Path], None]]:
 @pytest.fixture
 def undrawn(monkeypatch: pytest.MonkeyPatch) -> None:
     """Reports that this process writes have no figures, which take seconds to draw."""
-    none = Figures({}, {})
-    monkeypatch.setattr("hexapod_cosim.cosim.report.plots.draw_figures", lambda *_: none)
+    monkeypatch.setattr("hexapod_cosim.cosim.report.plots.DRAWINGS", {})
 
 
 @pytest.fixture

@@ -25,7 +25,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[1]
 VIEWER = ROOT / "cosim" / "viewer"
 BUNDLE = ROOT / "build" / "viewer" / "viewer.js"
-ENTRY = "src/main.ts"
+ENTRY = BUNDLE.with_name("entry.ts")  # imports the viewer of reports and those of the extensions
 METAFILE = BUNDLE.with_name("metafile.json")  # esbuild's list of bundled files
 LICENCES = BUNDLE.with_name("LICENSES.txt")
 MODULES = VIEWER / "node_modules"
@@ -61,7 +61,10 @@ def bundle() -> None:
     if is_current():
         return
     install_packages(all_of_them=False)
-    run_script("bundle", ENTRY, f"--outfile={BUNDLE}", f"--metafile={METAFILE}")
+    ENTRY.parent.mkdir(parents=True, exist_ok=True)
+    mains = [VIEWER / "src" / "main.ts", *sorted(ROOT.glob("extensions/*/viewer/main.ts"))]
+    ENTRY.write_text("".join(f'import "{path.as_posix()}";\n' for path in mains))
+    run_script("bundle", str(ENTRY), f"--outfile={BUNDLE}", f"--metafile={METAFILE}")
     add_licences(BUNDLE)
     _stamp(BUNDLE).write_text(digest(), encoding="utf-8")
 
@@ -149,7 +152,8 @@ def digest() -> str:
         VIEWER / "package.json",
         VIEWER / "package-lock.json",
     ]
-    files = [*described, *sorted((VIEWER / "src").rglob("*.ts"))]
+    sources = [*(VIEWER / "src").rglob("*.ts"), *ROOT.glob("extensions/*/viewer/*.ts")]
+    files = [*described, *sorted(sources)]
     return hashlib.sha256(b"\0".join(path.read_bytes() for path in files)).hexdigest()
 
 
@@ -184,7 +188,9 @@ def run_npm(*arguments: str) -> None:
     """Runs npm in the viewer's folder, with its Node.js first in PATH."""
     node, npm = find_npm()
     path = os.pathsep.join([str(node.parent), os.environ.get("PATH", "")])
-    subprocess.run([*npm, *arguments], cwd=VIEWER, env=os.environ | {"PATH": path}, check=True)
+    # the sources of extensions find the viewer's packages by NODE_PATH
+    environment = os.environ | {"PATH": path, "NODE_PATH": str(MODULES)}
+    subprocess.run([*npm, *arguments], cwd=VIEWER, env=environment, check=True)
 
 
 def find_npm() -> tuple[Path, list[str]]:

@@ -3,8 +3,8 @@ pyproject.toml.
 
 usage: python tools/generate.py [--check]
 
-The repository has only defaults.c of plant and controller, which the C libraries need; a build of
-the FMUs writes the other files (tools/generate_sources.py).
+The repository has only defaults.c and include/hexapod/generated of plant and controller, which the
+C libraries need; a build of the FMUs writes the other files (tools/generate_sources.py).
 
 --check writes nothing, lists the files that are not up to date and exits with 1 if there are any.
 """
@@ -13,10 +13,11 @@ from __future__ import annotations
 
 import argparse
 import sys
+import textwrap
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 
-from hexapod_cosim.controller import make_gait
+from hexapod_cosim.controller import DEFAULT_PERIOD, make_gait
 from hexapod_cosim.cosim.common.components import PLANT, Component
 from hexapod_cosim.cosim.export.start_values import start_values
 from hexapod_cosim.cosim.interface.arrays import arrays
@@ -35,7 +36,17 @@ from hexapod_cosim.models.robot import load_robot
 
 ROOT = Path(__file__).resolve().parents[1]
 DEFAULT_ROBOT = "athena"
-DEFAULT_PERIOD = 0.005  # s  of the controller
+# constants of C that are sizes of arrays of outputs, by component
+SIZES = {"plant": {"HX_CONE_BINS": "output.cone_time"}}
+# structures of C whose fields are the parameters of a group, by component
+STRUCTURES: dict[str, dict[str, str]] = {
+    "controller": {"gait": "hxGait", "gains": "hxGains", "parts": "hxParts"},
+    "plant": {
+        **{"body": "hxBodySettings", "contact": "hxContactSettings", "soil": "hxSoilDefinition"},
+        **{"friction": "hxFrictionSettings", "servo": "hxServoSettings"},
+        **{"solver": "hxSolverSettings", "terrain": "hxTerrainSettings"},
+    },
+}
 TYPES = {"Real": "HX_REAL", "Enumeration": "HX_INTEGER", "Boolean": "HX_BOOLEAN"}
 
 
@@ -110,11 +121,70 @@ def descriptions(folder: Path) -> dict[Path, str]:
 def render_component(interface: Interface) -> dict[Path, str]:
     """Returns path and text of the generated files of one component."""
     folder = ROOT / interface.component.tree / "generated"
-    return {
+    header = ROOT / interface.component.tree / "include" / "hexapod" / "generated"
+    settings = {}
+    if interface.enumerations:
+        settings[header / f"{interface.component.name}_settings.h"] = render_settings(interface)
+    return settings | {
         folder / "variables.h": render_structure(interface.component),
         folder / "variables.c": render_variables(interface, render_fmi2(interface).guid),
         folder / "defaults.c": render_defaults(interface),
     }
+
+
+def render_settings(interface: Interface) -> str:
+    """Returns NAME_settings.h: the enumerations, and the structures of grouped parameters."""
+    guard = f"HEXAPOD_{interface.component.name.upper()}_SETTINGS_H"
+    lines = [
+        _head(f"{interface.component.name}_settings.h - choices and settings of a definition."),
+        *(f"#ifndef {guard}", f"#define {guard}", "", '#include "hexapod/legs.h"', ""),
+    ]
+    for enumeration in interface.enumerations.values():
+        lines += [f"typedef enum hx{enumeration.name} {{"]
+        for number, (_, description) in enumerate(enumeration.items, start=1):
+            value = " = 1" if number == 1 else ""
+            lines += [*_comment(description), f"  {enumeration.constant(number)}{value},"]
+        lines += [f"}} hx{enumeration.name};", ""]
+    for constant, array in SIZES.get(interface.component.name, {}).items():
+        size = sum(item.field.startswith(f"{array}[") for item in interface.of_causality("output"))
+        lines += [f"enum {{ {constant} = {size} }};", ""]
+    for group, kind in STRUCTURES.get(interface.component.name, {}).items():
+        lines += [f"typedef struct {kind} {{", *_fields(interface, group), f"}} {kind};", ""]
+    return "\n".join([*lines, "#endif", ""])
+
+
+def _fields(interface: Interface, group: str) -> Iterable[str]:
+    """Yields the C fields of a structure of the definition, with those of sections inside."""
+    inside = ""
+    for name, (variable, size) in _fields_of(interface, f"definition.{group}.").items():
+        section, _, field = name.rpartition(".")
+        if section != inside:
+            yield from [f"  }} {inside};"] * bool(inside)
+            yield from ["  struct {"] * bool(section)
+            inside = section
+        indent = "  " * bool(section)
+        kind = "double" if variable.type == "Real" else "int"
+        unit = f"hx{variable.enumeration}" if variable.enumeration else variable.unit or "0 or 1"
+        yield from _comment(f"{unit}  {variable.description}", indent)
+        yield f"{indent}  {kind} {field}{size};"
+    yield from [f"  }} {inside};"] * bool(inside)
+
+
+def _fields_of(interface: Interface, prefix: str) -> dict[str, tuple[Variable, str]]:
+    """Returns the parameters below a path of the definition and the sizes of arrays, by fields."""
+    found: dict[str, tuple[Variable, str]] = {}
+    for variable in interface.of_causality("parameter"):
+        name, bracket, index = variable.field.removeprefix(prefix).partition("[")
+        if variable.field.startswith(prefix):
+            size = f"[{int(index[:-1]) + 1}]" if bracket else ""
+            found[name] = (found.get(name, (variable, ""))[0], size)
+    return found
+
+
+def _comment(text: str, indent: str = "") -> list[str]:
+    """Returns a text as a C comment of lines of at most 100 columns."""
+    lines = textwrap.wrap(f"/* {text} */", 98 - len(indent), subsequent_indent=" * ")
+    return [f"{indent}  {line}" for line in lines]
 
 
 def render_structure(component: Component) -> str:

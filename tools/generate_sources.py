@@ -16,7 +16,11 @@ from pathlib import Path
 from types import ModuleType
 
 ROOT = Path(__file__).resolve().parents[1]
-COMMITTED = ("plant_fmu/generated/defaults.c", "controller/fmu/generated/defaults.c")
+COMMITTED = (
+    *("plant_fmu/generated/defaults.c", "controller/fmu/generated/defaults.c"),
+    "plant_fmu/include/hexapod/generated/plant_settings.h",
+    "controller/fmu/include/hexapod/generated/controller_settings.h",
+)
 
 
 def import_from(folder: Path) -> None:

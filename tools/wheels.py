@@ -19,6 +19,7 @@ therefore have the tags of both.
 from __future__ import annotations
 
 import hashlib
+import json
 import os
 import shutil
 import stat
@@ -29,6 +30,7 @@ import zipfile
 from collections.abc import Iterable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from importlib.metadata import version
 from pathlib import Path
 
 from packaging.tags import platform_tags
@@ -42,7 +44,7 @@ from hexapod_cosim.cosim.export.platforms import component_library
 
 ROOT = Path(__file__).parents[1]
 BINARIES, LIBRARIES = "hexapod_cosim/plant/binaries/", "hexapod_cosim/plant/lib/"
-MODULE = "hexapod_cosim/plant/browser/walker.wasm"
+MODULE = "hexapod_cosim/plant/browser/robot.wasm"
 BEST = 9  # level of compression
 LARGEST = 5_000_000  # bytes of a wheel
 OTHERS = "other_platforms"  # folder of the wheels that do not fit this machine
@@ -83,9 +85,10 @@ def main(folder: Path) -> None:
     with console.status("compiling for all platforms (minutes, the first time)"):
         binaries = cross_compile()
     if (ROOT / "extensions" / "live").is_dir():
-        from hexapod_cosim.extensions.live.module import walker_module  # noqa: PLC0415
+        from hexapod_cosim.extensions.live.static_page import robot_module  # noqa: PLC0415
 
-        base[MODULE] = walker_module()
+        base[MODULE] = robot_module()
+    base |= bill_of_materials(base)
     wheels = [
         write_wheel(base, platform, binaries, folder if platform.fits else folder / OTHERS)
         for platform in PLATFORMS
@@ -129,6 +132,22 @@ def common_files(wheel: Path) -> dict[str, bytes]:
         }
 
 
+def bill_of_materials(base: Mapping[str, bytes]) -> dict[str, bytes]:
+    """Returns the list of foreign software in a wheel, in the form of CycloneDX (PEP 770).
+
+    The viewer bundles packages of npm, and the binaries are compiled with fmpy's FMI headers.
+    """
+    (info,) = (name.rpartition("/")[0] for name in base if name.endswith(".dist-info/WHEEL"))
+    package = json.loads((ROOT / "cosim" / "viewer" / "package.json").read_text(encoding="utf-8"))
+    bundled = [("npm", *item) for item in package["dependencies"].items() if item[0] != "esbuild"]
+    found = [
+        {"type": "library", "name": name, "version": number, "purl": f"pkg:{kind}/{name}@{number}"}
+        for kind, name, number in [*bundled, ("pypi", "fmpy", version("fmpy"))]
+    ]
+    content = {"bomFormat": "CycloneDX", "specVersion": "1.6", "version": 1, "components": found}
+    return {f"{info}/sboms/bundled.cdx.json": (json.dumps(content, indent=1) + "\n").encode()}
+
+
 def components() -> list[Component]:
     """Returns the components whose binaries a wheel holds."""
     found = [PLANT, CONTROLLER]
@@ -150,10 +169,12 @@ def cross_compile() -> dict[tuple[str, str], bytes]:
 
 def loop_library() -> Library:
     """Returns the co-simulation loops as a library, as cosim/master/CMakeLists.txt builds it."""
-    plant, own = ROOT / "plant_fmu", ROOT / "cosim" / "master"
-    files = {f"hexapod/{path.name}": path for path in (plant / "include/hexapod").glob("*.h")}
-    files |= {f"hexapod/{path.name}": path for path in (own / "include/hexapod").glob("*.h")}
-    files |= {f"src/{path.name}": path for path in (own / "src").glob("*.[ch]")}
+    plant, loops = ROOT / "plant_fmu", ("cosim/master", "extensions/gym/loop")
+    files = {}
+    for include in (plant / "include", *(ROOT / loop / "include" for loop in loops)):
+        files |= {path.relative_to(include).as_posix(): path for path in include.rglob("*.h")}
+    for loop in loops:
+        files |= {f"src/{path.name}": path for path in (ROOT / loop / "src").glob("*.[ch]")}
     files["src/message.c"] = plant / "src" / "message.c"
     flags = ("-DHX_SHARED", "-pthread")
     return Library(LOOP, dict(sorted(files.items())), (fmi_headers(),), flags)

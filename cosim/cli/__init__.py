@@ -66,7 +66,7 @@ def _is_interrupt(error: BaseException) -> bool:
 
 def _refused_by_system(error: OSError) -> str:
     """Returns the message for a file, disk or process that the system refused."""
-    from hexapod_cosim.models.errors import shortened  # noqa: PLC0415
+    from hexapod_cosim.models.errors import shortened
 
     where = f"{shortened(str(error.filename))}: " if error.filename else ""
     got = shortened(repr(error.strerror or str(error)))
@@ -82,11 +82,10 @@ def _wants_json(given: Sequence[str]) -> bool:
 
 
 def _run(given: list[str]) -> int:
-    import typer  # noqa: PLC0415  imports for a second, in which Ctrl-C may come
+    import typer
 
-    from hexapod_cosim.cosim.cli.app import app  # noqa: PLC0415
-    from hexapod_cosim.cosim.master.interrupts import termination_as_interrupt  # noqa: PLC0415
-    from hexapod_cosim.models import HexapodError  # noqa: PLC0415
+    from hexapod_cosim.cosim.cli.app import app
+    from hexapod_cosim.cosim.master.interrupts import termination_as_interrupt
 
     usage_error: Any = typer.BadParameter.__mro__[1]  # typer does not export it
     json = _wants_json(given) and "--help" not in given
@@ -99,7 +98,11 @@ def _run(given: list[str]) -> int:
         if stop.code is None:
             return SUCCESS
         return stop.code if isinstance(stop.code, int) else FAILURE
-    except HexapodError as error:
+    except Exception as error:
+        from hexapod_cosim.models import HexapodError
+
+        if not isinstance(error, HexapodError):
+            raise
         report_failure(str(error), FAILURE, error=error, as_json=_wants_json(given))
         if "--debug" in given:
             traceback.print_exception(error)
@@ -110,7 +113,7 @@ def _run(given: list[str]) -> int:
 
 def _usage(error: Any, given: Sequence[str]) -> int:
     """Reports words that are no command, or shows the help. Returns the exit code."""
-    from hexapod_cosim.models import HexapodError  # noqa: PLC0415
+    from hexapod_cosim.models import HexapodError
 
     if not given:
         print(error.format_message(), file=sys.stderr)

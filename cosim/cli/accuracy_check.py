@@ -5,9 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import closing
 from pathlib import Path
-from typing import Annotated
-
-import typer
 
 from hexapod_cosim.cosim.cli.running import RunOptions
 from hexapod_cosim.cosim.cli.terminal import Count, counting_bar, show_table, show_text, warn
@@ -21,17 +18,6 @@ from hexapod_cosim.cosim.results.accuracy import (
 from hexapod_cosim.cosim.results.summary import Summary
 from hexapod_cosim.cosim.run.batch import run_batch
 from hexapod_cosim.cosim.scenario.records import Scenario
-
-CheckAccuracy = Annotated[
-    bool,
-    typer.Option(
-        "--check-accuracy",
-        help=(
-            "Walk again at a hundredth of the solver's tolerance, "
-            "and again with half the macro-step: an error beside every metric."
-        ),
-    ),
-]
 
 
 def check_accuracy(

@@ -1,52 +1,99 @@
-"""The `hexapod` application with all its commands."""
+"""The `hexapod` application with all its commands, which are imported when they are called."""
 
 from __future__ import annotations
 
-from typing import Annotated
+from importlib import import_module
+from typing import Annotated, Any
 
 import typer
+from typer.core import TyperCommand, TyperGroup
+from typer.main import get_command
 
-from hexapod_cosim.cosim.cli import (
-    compare_command,
-    controller_command,
-    examples_command,
-    export_command,
-    fmu_commands,
-    listing,
-    run_commands,
-    terrain_command,
-)
-from hexapod_cosim.cosim.cli.extension import installed_extensions
+from hexapod_cosim.cosim.cli.extension import Command, installed_extensions, loaded
 from hexapod_cosim.cosim.cli.failures import EPILOG
-from hexapod_cosim.cosim.common.plant_files import package_version
+
+CLI = "hexapod_cosim.cosim.cli"
+# name, line in the list of commands, place in cosim/cli
+CORE = (
+    (
+        "export",
+        "Write the FMU of a robot, its controller, or a package.",
+        "export_command:export",
+    ),
+    ("simulate", "Run one co-simulation: results, metrics, plots.", "simulate_command:simulate"),
+    ("compare", "Run walks under several controls and report them.", "compare_command:compare"),
+    ("design", "Design the gains of compliant and paper control.", "design_command:design"),
+    ("report", "Make the plots and the report of a folder again.", "report_command:report"),
+    ("controller", "Write a controller of your own.", "controller_command:app"),
+    ("examples", "Copy the example programs and notebooks.", "examples_command:examples"),
+    ("validate", "Check an FMU of ours and say what is wrong.", "validate_command:validate"),
+    ("terrain", "Show a kind of ground.", "terrain_command:terrain"),
+    ("list", "List robots, scenarios, gaits, terrains and others.", "listing:list_what"),
+)
+
+
+class LazyGroup(TyperGroup):
+    """A group that imports a command when it is called, and not to list the names of all."""
+
+    def __init__(self, **options: Any) -> None:
+        super().__init__(**options)
+        self._entries = {entry.name: entry for entry in all_commands()}
+        self.commands = {
+            name: TyperCommand(name, help=entry.about) for name, entry in self._entries.items()
+        }
+        self._lists_names = False
+
+    def get_command(self, ctx: Any, cmd_name: str) -> Any:
+        """Returns a command, or only its name and help while names are listed."""
+        if self._lists_names or cmd_name not in self._entries:
+            return self.commands.get(cmd_name)
+        return _typer_command(self._entries[cmd_name])
+
+    def format_commands(self, ctx: Any, formatter: Any) -> None:
+        """Writes the list of commands."""
+        self._lists_names = True
+        super().format_commands(ctx, formatter)
+        self._lists_names = False
+
+    def shell_complete(self, ctx: Any, incomplete: str) -> Any:
+        """Returns the completions of a command's name."""
+        self._lists_names = True
+        found = super().shell_complete(ctx, incomplete)
+        self._lists_names = False
+        return found
+
+
+def all_commands() -> list[Command]:
+    """Returns the commands of the core and of the installed extensions."""
+    core = [Command(name=name, about=text, place=f"{CLI}.{place}") for name, text, place in CORE]
+    return [*core, *(one for extension in installed_extensions() for one in extension.commands)]
+
+
+def _typer_command(entry: Command) -> Any:
+    """Imports a command and returns it as the parser's."""
+    run = loaded(entry.place)
+    if isinstance(run, typer.Typer):
+        return get_command(run)
+    epilog = getattr(import_module(entry.place.partition(":")[0]), "EPILOG", None)
+    alone = typer.Typer(rich_markup_mode=None, add_completion=False)
+    alone.command(entry.name, epilog=epilog)(run)
+    return get_command(alone)
+
 
 app = typer.Typer(
     name="hexapod",
+    cls=LazyGroup,
     no_args_is_help=True,
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
     epilog=EPILOG,
 )
-app.command("export")(export_command.export)
-app.command("simulate", epilog=run_commands.EPILOG)(run_commands.simulate)
-app.command("compare", epilog=compare_command.EPILOG)(compare_command.compare)
-app.command("design")(fmu_commands.design)
-app.command("report")(run_commands.report)
-app.add_typer(controller_command.app, name="controller")
-app.command("examples")(examples_command.examples)
-app.command("validate")(fmu_commands.validate)
-app.command("terrain")(terrain_command.terrain)
-app.command("list")(listing.list_what)
-for extension in installed_extensions():
-    for command in extension.commands:
-        if isinstance(command.run, typer.Typer):
-            app.add_typer(command.run, name=command.name, epilog=command.epilog)
-        else:
-            app.command(command.name, epilog=command.epilog)(command.run)
 
 
 def _show_version(wanted: bool) -> None:
     if wanted:
+        from hexapod_cosim.cosim.common.plant_files import package_version
+
         typer.echo(package_version())
         raise typer.Exit
 

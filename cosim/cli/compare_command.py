@@ -1,90 +1,29 @@
-"""Defines the command `hexapod compare`: walks under several controls, over several seeds."""
+"""Defines the command `hexapod compare`."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from contextlib import closing, nullcontext
-from dataclasses import dataclass, replace
-from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
 from hexapod_cosim.cosim.cli import completion
-from hexapod_cosim.cosim.cli.accuracy_check import CheckAccuracy, check_accuracy, show_accuracy
-from hexapod_cosim.cosim.cli.failures import FELL, SUCCESS
-from hexapod_cosim.cosim.cli.running import (
+from hexapod_cosim.cosim.cli.failures import FELL
+from hexapod_cosim.cosim.cli.options import (
+    CheckAccuracy,
     ControlNames,
     Engine,
     FmuFile,
     FolderName,
     GainsFile,
-    RunError,
-    RunOptions,
-    Settings,
-    chosen_controls,
-    command_line,
-    default_folder,
-    drawing,
-    run_into,
-    show_rows,
-    titled,
-)
-from hexapod_cosim.cosim.cli.terminal import (
     Json,
-    counting_bar,
-    show_files,
-    show_json,
-    show_table,
-    show_text,
-    warn,
+    Settings,
 )
-from hexapod_cosim.cosim.common.files import write_json
-from hexapod_cosim.cosim.common.temporary import TemporaryFolder
-from hexapod_cosim.cosim.master.interrupts import deferred_interrupts
-from hexapod_cosim.cosim.report.accuracy import with_errors
-from hexapod_cosim.cosim.report.figures import FigureThread
-from hexapod_cosim.cosim.report.report import about, comparison_rows, write_report
-from hexapod_cosim.cosim.results.accuracy import Accuracy, halved_scenario
-from hexapod_cosim.cosim.results.comparison import (
-    SEEDS,
-    SEEDS_PARTIAL,
-    write_seeds,
-)
-from hexapod_cosim.cosim.results.comparisons import Comparisons, compare_all, write_comparison
-from hexapod_cosim.cosim.results.gait_choice import gait_differences
-from hexapod_cosim.cosim.results.metrics import has_net_slip
-from hexapod_cosim.cosim.results.result import Result
-from hexapod_cosim.cosim.results.results import (
-    ACCURACY,
-    METRICS_FILE,
-    ResultsFolder,
-    read_scenario,
-    results_folder,
-    stored_result,
-)
-from hexapod_cosim.cosim.results.summary import Summary, summarise
-from hexapod_cosim.cosim.run.batch import run_batch
-from hexapod_cosim.cosim.run.chosen_walk import choose_walk
-from hexapod_cosim.cosim.run.preparation import PlantFmus, chosen_gains
-from hexapod_cosim.cosim.scenario.controls import CHOOSER, Control
-from hexapod_cosim.cosim.scenario.records import CHOSEN, COMPARED, CONTROLS, OWN, Scenario
-from hexapod_cosim.cosim.scenario.scenario import load_scenario
-from hexapod_cosim.cosim.scenario.variation import STANDARD
-from hexapod_cosim.models import ScenarioError
 
 EPILOG = (
     f"Exit code {FELL} when the robot did not walk to the end of every run, under any control: "
     "the report is written all the same, says how many did, "
     "and compares the seeds on which both walked."
 )
-MAX_SEEDS = 10_000
-NAMED_WALK = (
-    "all walk in the gait and stance that the scenario names; `hexapod compare demo_course` also "
-    "shows what the choice of gait and stance changes by itself"
-)
-CHOSEN_WALK = (f"{CONTROLS[0]}@{CHOSEN}", f"{CHOOSER}@{CHOSEN}")
-TERRAINS = "terrains"  # folder in out/ of a comparison over several scenarios
 Names = Annotated[
     list[str] | None,
     typer.Argument(
@@ -124,282 +63,9 @@ def compare(
     --control these are kinematic, paper and compliant. Where one scenario is given that names
     neither gait nor stance, and no gains, these two are in the tables too, without recordings.
     """
-    names = scenarios or ["walk_flat"]
+    from hexapod_cosim.cosim.cli.comparing import compare_each
+    from hexapod_cosim.cosim.cli.running import RunOptions, Words
+
+    words = Words(control, settings or [], engine, fmu, gains, seeds, accuracy)
     options = RunOptions.read(fmu=fmu, gains=gains, engine=engine, runs=seeds)
-    works = []
-    for name in names:
-        command = command_line(
-            "compare",
-            name,
-            controls=control,
-            seeds=seeds,
-            settings=settings,
-            engine=engine,
-            fmu=fmu,
-            gains=gains,
-            accuracy=accuracy,
-        )
-        plan = _plan(name, settings or [], seeds)
-        controls = _controls(control or CONTROLS, plan)
-        alike = control or gains or plan.names_walk or len(names) > 1
-        chosen = () if alike else chosen_controls(CHOSEN_WALK, plan)
-        works.append(Work(plan, controls, chosen, seeds, command, options, accuracy))
-    for work in works:
-        work.check()
-    if len(works) > 1:
-        return _compare_many(works, names, output or Path("out") / TERRAINS, json=json)
-    done = run_work(works[0], output or default_folder(names[0]))
-    if json:
-        report = None if done.report is None else str(done.report)
-        show_json({**_table(done.comparison, done.checked), "report": report})
-    else:
-        _show(done, works[0].walks)
-        if works[0].plan.names_walk and not control:
-            show_text(NAMED_WALK)
-        report = "" if done.report is None else f"report: {done.report}"
-        show_text("\n".join(filter(None, (about(done.comparison), report))))
-    return FELL if done.comparison.losses else SUCCESS
-
-
-@dataclass(frozen=True)
-class Work:
-    """A comparison to run: its scenario, controls, number of seeds and options."""
-
-    plan: Scenario
-    controls: tuple[Control, ...]  # whose first seed is recorded and drawn
-    chosen: tuple[Control, ...]  # of CHOSEN_WALK: what gait and stance give, in the tables alone
-    seeds: int
-    command: str
-    options: RunOptions
-    accuracy: bool
-
-    def check(self) -> None:
-        """Designs the gains of all runs, or raises errors before anything is run."""
-        if self.accuracy:
-            halved_scenario(self.plan)
-        for control in self.compared:
-            chosen_gains(replace(self.plan, control=control.text), self.options.gains)
-
-    def with_fmu(self, folder: Path) -> Work:
-        """Returns this work with a plant FMU for all its runs, exported to a folder.
-
-        A given FMU stays. Raises HexapodError when none can be exported.
-        """
-        fmu = PlantFmus(folder, given=self.options.fmu).fmu(self.plan.robot)
-        return replace(self, options=replace(self.options, fmu=fmu))
-
-    @property
-    def compared(self) -> tuple[Control, ...]:
-        """All controls of the tables."""
-        return (*self.controls, *self.chosen)
-
-    @property
-    def labels(self) -> list[str]:
-        """The labels of the controls that are recorded."""
-        return [control.label for control in self.controls]
-
-    @property
-    def walks(self) -> list[str]:
-        """A sentence for each control, if they walk differently."""
-        found = {}
-        for control in self.compared:
-            plan = replace(self.plan, control=control.text)
-            walk = choose_walk(plan, gains=chosen_gains(plan, self.options.gains))
-            found[control.label] = walk.as_facts()
-        return gait_differences(found)
-
-
-@dataclass(frozen=True)
-class Done:
-    """A comparison that was run, with its report."""
-
-    results: Mapping[str, Result]
-    comparison: Comparisons
-    checked: Mapping[str, Accuracy]
-    files: list[Path]
-    report: Path | None  # None: outputs.plots is false
-
-
-def run_work(work: Work, path: Path) -> Done:
-    """Runs a comparison into a folder and reports it. Raises HexapodError.
-
-    The figures are drawn in a thread while worker processes run the other seeds. Nothing is drawn
-    or reported where outputs.plots is false.
-    """
-    with results_folder(path, work.labels) as folder, TemporaryFolder("compare") as place:
-        work = work.with_fmu(place)
-        results, files = _first_seed(work, folder)
-        stored = {control: stored_result(result) for control, result in results.items()}
-        views = {control: run.view for control, run in stored.items()}
-        with FigureThread(views) if work.plan.outputs.plots else nullcontext() as figures:
-            comparison = _all_seeds(work, results, folder.path)
-            files += [folder.path / SEEDS]
-            files += write_comparison(
-                folder.path,
-                work.plan,
-                comparison,
-                labels=work.labels,
-                command=work.command,
-                walks=work.walks,
-            )
-            checked: dict[str, Accuracy] = {}
-            if work.accuracy:
-                checked = _accuracies(work, comparison, folder.path)
-                write_json(folder.path / METRICS_FILE, _table(comparison, checked))
-            if figures is None:
-                return Done(results, comparison, checked, files, None)
-            with drawing(folder.path):
-                files += write_report(
-                    stored,
-                    folder.path,
-                    warn=warn,
-                    comparison=comparison,
-                    scenario=read_scenario(folder.path),
-                    command=work.command,
-                    walks=work.walks,
-                    accuracies=checked,
-                    figures=figures.result(),
-                )
-    return Done(results, comparison, checked, files, files[-1])
-
-
-def _compare_many(works: Sequence[Work], names: Sequence[str], path: Path, *, json: bool) -> int:
-    """Runs comparisons into folders of their own beside a table over all of them."""
-    # imported only here because matplotlib is slow to import
-    from hexapod_cosim.cosim.report import terrains  # noqa: PLC0415
-
-    rows: list[terrains.Row] = []
-    reports: list[Path] = []
-    lost = False
-    for work, name in zip(works, names, strict=True):
-        place = Path(name).stem
-        try:
-            done = run_work(work, path / place)
-        except RunError as error:
-            warn(f"{place}: {error}")
-            lost = True
-            continue
-        rows += terrains.terrain_rows(place, done.comparison)
-        reports += [] if done.report is None else [done.report]
-        lost = lost or bool(done.comparison.losses)
-    files = terrains.write_terrains(rows, path) if rows else []
-    if json:
-        show_json(
-            {"rows": terrains.rows_as_table(rows), "reports": [str(report) for report in reports]}
-        )
-        return FELL if lost else SUCCESS
-    columns = terrains.table_columns(rows)
-    show_table(list(columns), zip(*columns.values(), strict=True), right=range(2, len(columns)))
-    show_files(files)
-    if reports:
-        show_text("\n".join(f"report: {report}" for report in reports))
-    return FELL if lost else SUCCESS
-
-
-def _show(done: Done, walks: Sequence[str]) -> None:
-    """Prints the metrics of all controls, their accuracy if it was checked, walks and files."""
-    comparison, checked = done.comparison, done.checked
-    net_slip = has_net_slip(next(iter(done.results.values())).parameters)
-    rows = comparison_rows(comparison, net_slip=net_slip)
-    compared = [pair.title for pair in comparison.pairs]
-    show_rows(with_errors(rows, checked), comparison.labels, compared)
-    show_accuracy(rows, checked, comparison.means)
-    for text in walks:
-        show_text(text)
-    show_files(done.files)
-
-
-def _plan(scenario: str, settings: Sequence[str], seeds: int) -> Scenario:
-    """Reads the scenario; several seeds get the standard variation unless it gives its own."""
-    if not 1 <= seeds <= MAX_SEEDS:
-        raise ScenarioError(
-            "not a number of runs",
-            got=seeds,
-            expected=f"1 to {MAX_SEEDS}",
-            fix="write --seeds 10",
-            where="--seeds",
-        )
-    plan = titled(load_scenario(scenario, overrides=settings), settings)
-    return replace(plan, variation=STANDARD) if seeds > 1 and plan.variation is None else plan
-
-
-def _controls(texts: Sequence[str], plan: Scenario) -> tuple[Control, ...]:
-    """Returns the controls to compare, all in one walk unless they are named with another one.
-
-    Raises HexapodError for fewer than two.
-    """
-    controls = chosen_controls(texts, plan)
-    if len(controls) < 2:
-        other = next(name for name in COMPARED if name != controls[0].label)
-        raise ScenarioError(
-            "nothing to compare with",
-            got=controls[0].label,
-            expected="two or more controls, the reference first",
-            fix=f"write --control {other} --control {texts[0]}, or use simulate",
-            where="--control",
-        )
-    return controls if plan.names_walk else tuple(one.walking(OWN) for one in controls)
-
-
-def _first_seed(work: Work, folder: ResultsFolder) -> tuple[dict[str, Result], list[Path]]:
-    """Runs the first seed under all controls and keeps the recordings."""
-    results: dict[str, Result] = {}
-    files: list[Path] = []
-    for control in work.controls:
-        with results_folder(folder.path / control.label) as part:
-            walk = replace(work.plan, control=control.text)
-            results[control.label], files_of_run = run_into(
-                walk, [folder, part], work.command, work.options
-            )
-        files += files_of_run
-    return results, files
-
-
-def _all_seeds(work: Work, results: Mapping[str, Result], folder: Path) -> Comparisons:
-    """Runs the other seeds; an interrupt or error keeps the completed runs in SEEDS_PARTIAL."""
-    plan, options, count = work.plan, work.options, len(work.compared)
-    scenarios = [
-        replace(plan, control=control.text, seed=seed)
-        for seed in range(plan.seed, plan.seed + work.seeds)
-        for control in (work.compared if seed > plan.seed else work.chosen)
-    ]
-    done: list[Summary] = [summarise(results[label]) for label in work.labels]
-    try:
-        compiled = options.engine == "compiled"
-        batch = run_batch(scenarios, fmu=options.fmu, gains=options.gains, compiled=compiled)
-        with counting_bar("seeds", count * work.seeds) as report_count, closing(batch) as runs:
-            report_count(len(done))
-            for run in runs:
-                done.append(run)
-                report_count(len(done))
-    except BaseException:
-        with deferred_interrupts():
-            write_seeds(folder / SEEDS_PARTIAL, done)
-            warn(f"the completed runs are in {folder / SEEDS_PARTIAL}")
-        raise
-    write_seeds(folder / SEEDS, done)
-    labels = [control.label for control in work.compared]
-    comparison = compare_all(
-        {label: [run for run in done if run.control == label] for label in labels}
-    )
-    for text in comparison.warnings if work.seeds > 1 else comparison.losses:
-        warn(text)
-    return comparison
-
-
-def _accuracies(work: Work, comparison: Comparisons, folder: Path) -> dict[str, Accuracy]:
-    """Returns the accuracies, by control, of the means over the compared seeds."""
-    found = {}
-    for control in work.compared:
-        runs = comparison.judged[control.label]
-        plans = [replace(work.plan, control=control.text, seed=run.seed) for run in runs]
-        found[control.label] = check_accuracy(plans, runs, folder, work.options)
-    return found
-
-
-def _table(comparison: Comparisons, checked: Mapping[str, Accuracy]) -> dict[str, Any]:
-    """Returns the content of metrics.json."""
-    table = comparison.as_table()
-    if checked:
-        table[ACCURACY] = {control: item.as_table() for control, item in checked.items()}
-    return table
+    return compare_each(scenarios or ["walk_flat"], words, options, output=output, as_json=json)

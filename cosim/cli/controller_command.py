@@ -7,7 +7,8 @@ from typing import Annotated
 
 import typer
 
-from hexapod_cosim.cosim.cli.terminal import Json, show_files, show_json, show_text
+from hexapod_cosim.cosim.cli.options import Json
+from hexapod_cosim.cosim.cli.terminal import show_files, show_json, show_text
 from hexapod_cosim.cosim.control.new_law import class_name, write_law
 
 app = typer.Typer(

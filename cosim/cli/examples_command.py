@@ -7,7 +7,8 @@ from typing import Annotated
 
 import typer
 
-from hexapod_cosim.cosim.cli.terminal import Json, show_files, show_json
+from hexapod_cosim.cosim.cli.options import Json
+from hexapod_cosim.cosim.cli.terminal import show_files, show_json
 from hexapod_cosim.cosim.common.examples import copy_examples
 
 

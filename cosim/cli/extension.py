@@ -1,16 +1,16 @@
-"""What an extension adds to the command line, and the extensions that are installed.
+"""The commands of the command line: how they are declared, and what the extensions add.
 
-An extension is a folder of extensions/, or another package, with an entry point in the group
-hexapod.commands that names an `Extension`.
+Commands are declared by name and place, so that `hexapod --help` and the completion of names import
+none of them. An extension is a folder of extensions/, or another package, with an entry point in
+the group hexapod.commands that names an `Extension` in a module which imports nothing slow.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache
-from importlib import metadata
-from pathlib import Path
+from importlib import import_module, metadata
 from typing import Any
 
 GROUP = "hexapod.commands"
@@ -19,22 +19,30 @@ Rows = list[dict[str, Any]]
 
 @dataclass(frozen=True, kw_only=True)
 class Command:
-    """A command: a function with Typer's annotations, or a Typer application of sub-commands."""
+    """A command: a function with Typer's annotations, or a Typer application of sub-commands.
+
+    The attribute EPILOG of its module, if there is one, ends its help.
+    """
 
     name: str
-    run: Callable[..., Any]
-    epilog: str | None = None
+    about: str  # in the list of commands
+    place: str  # "module:function"
 
 
 @dataclass(frozen=True, kw_only=True)
 class Extension:
-    """The parts of the command line that an extension defines."""
+    """The parts of the command line that an extension defines; functions by "module:function"."""
 
     commands: Sequence[Command]
-    # kind in run.json -> function that writes the report of such a folder again and returns the
-    # files it wrote
-    reports: Mapping[str, Callable[[Path], Sequence[Path]]] = field(default_factory=dict)
-    lists: Mapping[str, Callable[[], Rows]] = field(default_factory=dict)  # of `hexapod list`
+    # kind in run.json -> function of the folder that writes its report again and returns the files
+    reports: Mapping[str, str] = field(default_factory=dict)
+    lists: Mapping[str, str] = field(default_factory=dict)  # functions of `hexapod list` -> Rows
+
+
+def loaded(place: str) -> Any:
+    """Imports what a place "module:name" names."""
+    module, _, name = place.partition(":")
+    return getattr(import_module(module), name)
 
 
 @cache
@@ -44,11 +52,11 @@ def installed_extensions() -> tuple[Extension, ...]:
     An extension whose folder was deleted after the installation is left out.
     """
     entries = sorted(metadata.entry_points(group=GROUP), key=lambda entry: entry.name)
-    found = (_loaded(entry) for entry in entries)
+    found = (_extension(entry) for entry in entries)
     return tuple(extension for extension in found if extension is not None)
 
 
-def _loaded(entry: metadata.EntryPoint) -> Extension | None:
+def _extension(entry: metadata.EntryPoint) -> Extension | None:
     """Returns the extension that an entry point names, or None if its package does not exist."""
     try:
         extension = entry.load()
@@ -61,19 +69,11 @@ def _loaded(entry: metadata.EntryPoint) -> Extension | None:
     return extension
 
 
-def report_functions() -> dict[str, Callable[[Path], Sequence[Path]]]:
+def report_functions() -> dict[str, str]:
     """Returns the functions of all extensions that write a report again, by the folder's kind."""
-    return {
-        kind: function
-        for extension in installed_extensions()
-        for kind, function in extension.reports.items()
-    }
+    return {k: place for one in installed_extensions() for k, place in one.reports.items()}
 
 
-def list_functions() -> dict[str, Callable[[], Rows]]:
+def list_functions() -> dict[str, str]:
     """Returns what the extensions add to `hexapod list`, by name."""
-    return {
-        name: function
-        for extension in installed_extensions()
-        for name, function in extension.lists.items()
-    }
+    return {k: place for one in installed_extensions() for k, place in one.lists.items()}

@@ -5,58 +5,47 @@ from __future__ import annotations
 import tomllib
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
-from hexapod_cosim.controller import PATTERNS
-from hexapod_cosim.cosim.cli.extension import Rows, list_functions
-from hexapod_cosim.cosim.cli.terminal import Json, show_json, show_table, show_text
-from hexapod_cosim.cosim.cli.terrain_command import value_text
-from hexapod_cosim.cosim.interface.plant_interface import load_interface
-from hexapod_cosim.cosim.scenario.tables import list_scenarios
-from hexapod_cosim.models import LEG_NAMES, Terrain, list_robots, load_robot, unknown_name
-from hexapod_cosim.models.ground.catalogue import CATALOGUE
-from hexapod_cosim.models.ground.parameters import DIFFICULTY, Entry
-from hexapod_cosim.models.ground.table import PLACED
-from hexapod_cosim.models.records import PLANES
-from hexapod_cosim.models.schema import Number, specs
-from hexapod_cosim.models.servos.motor import no_load_speed, stall_torque
-from hexapod_cosim.models.servos.presets import list_servos, measured_servo
-from hexapod_cosim.models.soil.presets import list_soils, soil_preset
+from hexapod_cosim.cosim.cli.extension import Rows, list_functions, loaded
+from hexapod_cosim.cosim.cli.options import Json
 
 
 def robots() -> Rows:
     """Returns the bundled robots; mass in kg."""
-    loaded = [load_robot(name) for name in list_robots()]
+    from hexapod_cosim.models import list_robots, load_robot
+
+    found = [load_robot(name) for name in list_robots()]
     return [
         {
             "name": robot.name,
             "mass": round(robot.total_mass, 6),
             "about": robot.source.get("robot", ""),
         }
-        for robot in loaded
+        for robot in found
     ]
 
 
 def scenarios() -> Rows:
     """Returns the bundled scenarios."""
+    from hexapod_cosim.cosim.scenario.bundled import list_scenarios
+
     return titles(list_scenarios())
 
 
 def titles(files: Mapping[str, Path]) -> Rows:
     """Returns the titles of TOML files, by name."""
-    return [
-        {
-            "name": name,
-            "about": str(tomllib.loads(path.read_text(encoding="utf-8")).get("title", "")),
-        }
-        for name, path in files.items()
-    ]
+    tables = {name: tomllib.loads(path.read_text(encoding="utf-8")) for name, path in files.items()}
+    return [{"name": name, "about": str(one.get("title", ""))} for name, one in tables.items()]
 
 
 def gaits() -> Rows:
     """Returns the gaits with their natural duty factor and the phase of each leg."""
+    from hexapod_cosim.controller import PATTERNS
+    from hexapod_cosim.models import LEG_NAMES
+
     return [
         {"name": name, "duty": gait.duty, **dict(zip(LEG_NAMES, gait.offsets, strict=True))}
         for name, gait in PATTERNS.items()
@@ -65,29 +54,28 @@ def gaits() -> Rows:
 
 def terrains() -> Rows:
     """Returns the kinds of ground with the defaults of their parameters."""
-    planes = [row for row in _choices("TerrainKind") if row["name"] in PLANES]
-    for row in planes:
+    from hexapod_cosim.models.ground.catalogue import CATALOGUE
+    from hexapod_cosim.models.ground.parameters import DIFFICULTY
+    from hexapod_cosim.models.ground.table import PLACED
+    from hexapod_cosim.models.records import PLANES
+
+    units = {"height": "m", "incline": "rad", "heading": "rad"}
+    rows = [row for row in _choices("TerrainKind") if row["name"] in PLANES]
+    for row in rows:
         keys = PLACED if row["name"] == "slope" else PLACED[:1]
-        row["about"] += ": " + ", ".join(f"{key} 0 {_unit(key)}" for key in keys)
-    return [*planes, *(_surface(name, entry) for name, entry in CATALOGUE.items())]
-
-
-def _unit(key: str) -> str:
-    """Returns the unit of a key of planes."""
-    spec = specs(Terrain)[key]
-    return spec.unit if isinstance(spec, Number) else ""
-
-
-def _surface(name: str, entry: Entry) -> dict[str, Any]:
-    """Returns the row of a surface of the catalogue."""
-    texts = [
-        f"{key} {value_text(one, one.value(DIFFICULTY))}" for key, one in entry.parameters.items()
-    ]
-    return {"name": name, "about": f"{entry.about}: {', '.join(texts)}"}
+        row["about"] += ": " + ", ".join(f"{key} 0 {units[key]}" for key in keys)
+    for name, entry in CATALOGUE.items():
+        texts = [
+            f"{key} {one.text(one.value(DIFFICULTY))}" for key, one in entry.parameters.items()
+        ]
+        rows.append({"name": name, "about": f"{entry.about}: {', '.join(texts)}"})
+    return rows
 
 
 def soils() -> Rows:
     """Returns the bundled soils with their law and the source of their numbers."""
+    from hexapod_cosim.models.soil.presets import list_soils, soil_preset
+
     presets = {name: soil_preset(name) for name in list_soils()}
     return [
         {"name": name, "law": preset.soil.law, "about": preset.title, "source": preset.source}
@@ -99,6 +87,9 @@ def servos() -> Rows:
     """Returns the measured servos: friction model, voltage [V], stall torque [N m], no-load speed
     [rad/s], and the source of their numbers.
     """
+    from hexapod_cosim.models.servos.motor import no_load_speed, stall_torque
+    from hexapod_cosim.models.servos.presets import list_servos, measured_servo
+
     found = {name: measured_servo(name) for name in list_servos()}
     return [
         {
@@ -121,13 +112,15 @@ def laws() -> Rows:
 
 
 def _choices(enumeration: str) -> Rows:
-    interface = load_interface(load_robot(list_robots()[0]))
-    return [
-        {"name": name, "about": text} for name, text in interface.enumerations[enumeration].items
-    ]
+    """Returns the items of an enumeration of the plant's FMU."""
+    from hexapod_cosim.cosim.common.components import PLANT
+    from hexapod_cosim.cosim.interface.plant_interface import enumerations_of
+
+    items = enumerations_of(PLANT)[enumeration].items
+    return [{"name": name, "about": text} for name, text in items]
 
 
-LISTS: dict[str, Callable[[], Rows]] = {
+OWN: dict[str, Callable[[], Rows]] = {
     "robots": robots,
     "scenarios": scenarios,
     "gaits": gaits,
@@ -135,25 +128,26 @@ LISTS: dict[str, Callable[[], Rows]] = {
     "soils": soils,
     "servos": servos,
     "laws": laws,
-    **list_functions(),
 }
-
-
+NAMES = (*OWN, *list_functions())
 What = Annotated[
     str,
     typer.Argument(
-        metavar="|".join(LISTS),
+        metavar="|".join(NAMES),
         help="What to list.",
-        autocompletion=lambda incomplete: [name for name in LISTS if name.startswith(incomplete)],
+        autocompletion=lambda incomplete: [name for name in NAMES if name.startswith(incomplete)],
     ),
 ]
 
 
 def list_what(what: What, json: Json = False) -> None:
     """List robots, scenarios, gaits, terrains, soils, servos, laws or what an extension adds."""
-    if what not in LISTS:
-        raise unknown_name("list", what, LISTS)
-    rows = LISTS[what]()
+    from hexapod_cosim.cosim.cli.terminal import show_json, show_table, show_text
+    from hexapod_cosim.models.errors import unknown_name
+
+    if what not in NAMES:
+        raise unknown_name("list", what, NAMES)
+    rows = OWN[what]() if what in OWN else loaded(list_functions()[what])()
     if json:
         show_json(rows)
         return

@@ -8,12 +8,10 @@ from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import Annotated, Any
-
-import typer
+from typing import Any
 
 from hexapod_cosim.controller import Gains, load_gains
-from hexapod_cosim.cosim.cli import completion
+from hexapod_cosim.cosim.cli.options import ENGINES
 from hexapod_cosim.cosim.cli.terminal import progress_bar, show_table, show_text, waiting, warn
 from hexapod_cosim.cosim.control.controllers import check_control
 from hexapod_cosim.cosim.master.interrupts import deferred_interrupts
@@ -25,92 +23,8 @@ from hexapod_cosim.cosim.results.results import ResultsFolder, write_result
 from hexapod_cosim.cosim.run.single_run import simulate as run_scenario
 from hexapod_cosim.cosim.run.walker import Walker
 from hexapod_cosim.cosim.scenario.controls import Control, control_of, parse_controls
-from hexapod_cosim.cosim.scenario.records import CONTROLS, FORMATS, Scenario
+from hexapod_cosim.cosim.scenario.records import Scenario
 from hexapod_cosim.models import HexapodError, unknown_name
-
-Name = Annotated[
-    str,
-    typer.Argument(
-        metavar="SCENARIO",
-        help="A scenario file, or a name of `hexapod list scenarios`.",
-        autocompletion=completion.scenario,
-    ),
-]
-Settings = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--set",
-        metavar="NAME=VALUE",
-        help="Set a key of the scenario (gait.period=0.8) or an FMU parameter.",
-        autocompletion=completion.setting,
-    ),
-]
-FolderName = Annotated[
-    Path | None,
-    typer.Option("-o", "--output", metavar="DIR", help="Where to write; default out/SCENARIO."),
-]
-
-
-def _tried_fmu(context: typer.Context, path: Path | None) -> Path | None:
-    """Returns the path of an FMU that does not end the process which loads it.
-
-    The completion of a command line does not try it.
-    """
-    from hexapod_cosim.cosim.control.trial import refuse_crashing  # noqa: PLC0415
-
-    if path is not None and not context.resilient_parsing:
-        refuse_crashing(path)
-    return path
-
-
-FmuFile = Annotated[
-    Path | None,
-    typer.Option(
-        "--fmu",
-        metavar="FILE",
-        help="Use this FMU instead of exporting the robot's own.",
-        callback=_tried_fmu,
-    ),
-]
-GainsFile = Annotated[
-    Path | None,
-    typer.Option(
-        "--gains", metavar="FILE", help="Gains from `hexapod design` instead of designing them now."
-    ),
-]
-
-
-Formats = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--format",
-        metavar="|".join(FORMATS),
-        help="Write the recording as this, instead of outputs.formats. Repeat it for more.",
-    ),
-]
-
-ENGINES = ("compiled", "python")
-Engine = Annotated[
-    str | None,
-    typer.Option(
-        "--engine",
-        metavar="|".join(ENGINES),
-        help="Controller and loop; by default python for one run, compiled for many.",
-    ),
-]
-
-ControlNames = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--control",
-        metavar="CONTROL",
-        help=f"{', '.join(CONTROLS)}, law.py:Class or controller.fmu; LABEL=CONTROL names it, "
-        "CONTROL@chosen walks in the gait and stance that compliant control chooses. "
-        "Repeat it for more.",
-        show_default=False,
-        autocompletion=completion.control,
-    ),
-]
 
 UNTITLED = (
     "control=",
@@ -144,32 +58,27 @@ class RunOptions:
         return cls(fmu=fmu, gains=given_gains(gains), engine=checked_engine(engine, runs=runs))
 
 
-def with_formats(settings: list[str] | None, formats: list[str] | None) -> list[str]:
-    """Returns the settings of a command with those that --format stands for."""
-    chosen = [f"outputs.formats={formats!r}"] if formats else []
-    return [*(settings or []), *chosen]
+@dataclass(frozen=True)
+class Words:
+    """What was written on the command line, for the command that repeats a run."""
 
+    controls: list[str] | None
+    settings: list[str]
+    engine: str | None = None
+    fmu: Path | None = None
+    gains: Path | None = None
+    seeds: int | None = None
+    accuracy: bool = False
 
-def command_line(
-    name: str,
-    scenario: str,
-    *,
-    settings: list[str] | None,
-    fmu: Path | None,
-    gains: Path | None,
-    accuracy: bool = False,
-    controls: Sequence[str] | None = None,
-    **more: str | int | None,
-) -> str:
-    """Returns the command that repeats a run."""
-    options = [("--control", text) for text in controls or []]
-    options += [("--set", text) for text in settings or []]
-    given: dict[str, object] = {**more, "fmu": fmu, "gains": gains}
-    options += [(f"--{key}", str(value)) for key, value in given.items() if value is not None]
-    flags = ["--check-accuracy"] if accuracy else []
-    return shlex.join(
-        ["hexapod", name, scenario, *(word for option in options for word in option), *flags]
-    )
+    def command(self, name: str, scenario: str) -> str:
+        """Returns the command `name` that repeats the run of a scenario."""
+        words = [word for text in self.controls or [] for word in ("--control", text)]
+        words += [word for text in self.settings for word in ("--set", text)]
+        for key in ("seeds", "engine", "fmu", "gains"):
+            value = getattr(self, key)
+            words += [] if value is None else [f"--{key}", str(value)]
+        flags = ["--check-accuracy"] if self.accuracy else []
+        return shlex.join(["hexapod", name, scenario, *words, *flags])
 
 
 def checked_engine(name: str | None, *, runs: int) -> str:

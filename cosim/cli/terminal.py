@@ -4,36 +4,25 @@ from __future__ import annotations
 
 import math
 import sys
+import textwrap
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from time import monotonic
-from typing import Annotated, Any, Protocol
-
-import typer
-from rich.console import Console
-from rich.progress import BarColumn, Progress, ProgressColumn, Task, TextColumn
-from rich.table import Column, Table
-from rich.text import Text
+from typing import TYPE_CHECKING, Any
 
 from hexapod_cosim.cosim.cli.json_output import restore_output
 from hexapod_cosim.cosim.cli.width import columns_of, fitted
-from hexapod_cosim.cosim.common.files import to_json
-from hexapod_cosim.cosim.master import loop as master
-from hexapod_cosim.models import HexapodError
 
-PIPE = 160  # width of tables where there is no terminal, in characters
+if TYPE_CHECKING:
+    import typer
+
 GAP = 2  # between columns, in characters
 NARROWEST = 20  # width of a column of text that is broken into lines, in characters
 EVERY = 30.0  # s    between two lines of progress in a log
 
-Json = Annotated[bool, typer.Option("--json", help="Print the result as JSON, and nothing else.")]
-
-
-def is_given(context: typer.Context, name: str) -> bool:
-    """Returns whether an option was given on the command line."""
-    source = context.get_parameter_source(name)
-    return source is not None and source.name == "COMMANDLINE"
+Show = Callable[[float, str], None]  # amount done, text behind the bar
+Count = Callable[..., None]  # number of runs done, number of failed ones
 
 
 def refuse_unused(
@@ -43,7 +32,10 @@ def refuse_unused(
 
     names: what the user writes, by the name of the parameter.
     """
-    given = [word for name, word in names.items() if is_given(context, name)]
+    from hexapod_cosim.models.errors import HexapodError
+
+    sources = {name: context.get_parameter_source(name) for name in names}
+    given = [names[name] for name, one in sources.items() if one and one.name == "COMMANDLINE"]
     if given:
         raise HexapodError(
             f"options that do nothing for {written}",
@@ -55,6 +47,8 @@ def refuse_unused(
 
 def show_json(content: Mapping[str, Any] | Sequence[Any]) -> None:
     """Prints JSON on standard output; NaN becomes null."""
+    from hexapod_cosim.cosim.common.files import to_json
+
     restore_output()
     print(to_json(content), flush=True)
 
@@ -79,47 +73,45 @@ def show_table(
 ) -> None:
     """Prints an aligned table; `right` are the indices of right-aligned columns.
 
-    On a terminal that is too narrow, the last column is wrapped if it is text, or the gaps between
+    On a terminal that is too narrow, the last column is wrapped if it is text, the gaps between
     columns shrink, or the remaining columns follow in another table below the first column.
     """
-    texts, width = [list(row) for row in rows], columns_of(sys.stdout)
-    widths = [max(map(len, column)) for column in zip(columns, *texts, strict=True)]
-    gap, blocks = _layout(widths, width or PIPE, broken=len(columns) - 1 not in right)
-    console = Console(width=width or PIPE, force_terminal=width is not None, highlight=False)
-    for number, block in enumerate(blocks):
+    lines = [list(columns), *map(list, rows)]
+    widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
+    room, last = columns_of(sys.stdout) or sum(widths) + GAP * len(widths), len(columns) - 1
+    if last not in right:  # text, which may be wrapped
+        before = sum(widths[:last]) + GAP * last
+        widths[last] = min(widths[last], max(room - before, NARROWEST))
+    gap = 1 if sum(widths) + last <= room < sum(widths) + GAP * last else GAP
+    for number, block in enumerate(_blocks(widths, room, gap)):
         if number:
             print()
-        table = Table(box=None, pad_edge=False, padding=(0, gap, 0, 0))
-        for k in block:
-            last = k == len(columns) - 1
-            table.add_column(
-                columns[k],
-                justify="right" if k in right else "left",
-                no_wrap=not last,
-                overflow="fold",
-            )
-        for row in texts:
-            table.add_row(*(Text(row[k]) for k in block))
-        console.print(table)
+        for line in lines:
+            cells = [_cell(line[k], widths[k], right=k in right) for k in block]
+            height = max(map(len, cells))
+            for k in range(height):
+                parts = [
+                    cell[k] if k < len(cell) else " " * widths[column]
+                    for column, cell in zip(block, cells, strict=True)
+                ]
+                print((" " * gap).join(parts).rstrip())
 
 
-def _layout(widths: Sequence[int], width: int, *, broken: bool) -> tuple[int, list[list[int]]]:
-    """Returns the gap between columns and the columns of each table, for a terminal's width.
+def _cell(text: str, width: int, *, right: bool) -> list[str]:
+    """Returns the lines of a cell."""
+    parts = textwrap.wrap(text, width) if len(text) > width else [text]
+    return [part.rjust(width) if right else part.ljust(width) for part in parts]
 
-    broken: whether the last column may be wrapped.
-    """
-    whole = list(range(len(widths)))
-    least = [*widths[:-1], min(widths[-1], NARROWEST)] if broken else widths
-    for gap in (GAP, 1):
-        if sum(least) + gap * (len(least) - 1) <= width:
-            return gap, [whole]
+
+def _blocks(widths: Sequence[int], room: int, gap: int) -> list[list[int]]:
+    """Returns the columns of each table; all but the first begin with column 0."""
     blocks = [[0]]
-    for k in whole[1:]:
-        used = sum(least[place] + GAP for place in blocks[-1])
-        if len(blocks[-1]) > 1 and used + least[k] > width:
+    for k in range(1, len(widths)):
+        used = sum(widths[place] + gap for place in blocks[-1])
+        if len(blocks[-1]) > 1 and used + widths[k] > room:
             blocks.append([0])
         blocks[-1].append(k)
-    return GAP, blocks
+    return blocks
 
 
 def warn(text: str) -> None:
@@ -133,45 +125,27 @@ def waiting(label: str | None) -> Iterator[None]:
     if label is None or not sys.stderr.isatty():
         yield
         return
+    from rich.console import Console
+
     with Console(stderr=True).status(label):
         yield
 
 
-class _Simulated(ProgressColumn):
-    """Simulated time and its ratio to wall time since the first step."""
+class _Pace:
+    """Progress per second since the first report, and the time that is left."""
 
-    def render(self, task: Task) -> Text:
-        return Text(f"{task.completed:5.1f} of {task.total:g} s  {_rate(task):4.0f} x real time")
+    def __init__(self, total: float) -> None:
+        self._total = total
+        self._first: tuple[float, float] | None = None  # time [s] and amount
 
-
-class _Counted(ProgressColumn):
-    """Number of completed runs, runs per minute since the count began, and failed runs.
-
-    The task's field `already` is the number of runs before the count began.
-    """
-
-    def render(self, task: Task) -> Text:
-        rate = f"{60.0 * _rate(task):4.0f} a minute" if _rate(task) else ""
-        failed = f"  {task.fields['failed']} failed" if task.fields.get("failed") else ""
-        return Text(f"{task.completed:.0f} of {task.total:.0f} runs  {rate}{failed}")
-
-
-class _Left(ProgressColumn):
-    """Estimated remaining time; at the end, the time taken."""
-
-    max_refresh = 0.5
-
-    def render(self, task: Task) -> Text:
-        if task.finished and task.finished_time is not None:
-            return Text(f"in {_clock(task.finished_time)}")
-        rate = _rate(task)
-        return Text(f"{_clock((task.remaining or 0.0) / rate)} left" if rate else "")
-
-
-def _rate(task: Task) -> float:
-    """Progress per second since the task was started; 0 while that is unknown."""
-    elapsed = task.finished_time or task.elapsed
-    return (task.completed - float(task.fields["already"])) / elapsed if elapsed else 0.0
+    def __call__(self, done: float) -> tuple[float, str]:
+        """Returns the rate and a text on the time left, both unknown at first."""
+        now = monotonic()
+        begun, already = self._first = self._first or (now, done)
+        rate = (done - already) / (now - begun) if now > begun else 0.0
+        if done >= self._total:
+            return rate, f"in {_clock(now - begun)}"
+        return rate, f"{_clock((self._total - done) / rate)} left" if rate else ""
 
 
 def _clock(seconds: float) -> str:
@@ -180,93 +154,48 @@ def _clock(seconds: float) -> str:
     return f"{hours}:{minutes:02d}:{rest:02d}" if hours else f"{minutes}:{rest:02d}"
 
 
-def _whole() -> Column:
-    """Returns a column of a progress bar that is never wrapped: the bar shrinks instead."""
-    return Column(no_wrap=True)
-
-
 @contextmanager
-def _bar(label: str, total: float, shown: ProgressColumn) -> Iterator[Callable[..., None]]:
-    """Shows a progress bar that pulses until the first report of progress and counts from there."""
-    columns = (TextColumn("{task.description:<12}"), BarColumn(), shown, _Left(_whole()))
+def _bar(label: str, total: float) -> Iterator[Show]:
+    """Shows a progress bar on the terminal, on one line."""
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn
+    from rich.table import Column
+
+    behind = TextColumn("{task.fields[text]}", table_column=Column(no_wrap=True))
+    columns = (TextColumn("{task.description:<12}"), BarColumn(), behind)
     with Progress(*columns, console=Console(stderr=True)) as bar:
-        task = bar.add_task(label, total=total, start=False, already=0.0)
-
-        def report(done: float, failed: int = 0) -> None:
-            if bar.tasks[0].start_time is None:
-                bar.start_task(task)
-                bar.update(task, already=done)
-            bar.update(task, completed=done, failed=failed)
-
-        yield report
+        task = bar.add_task(label, total=total, text="")
+        yield lambda done, text: bar.update(task, completed=done, text=text)
 
 
 @contextmanager
-def progress_bar(label: str, duration: float) -> Iterator[master.Progress | None]:
+def _log_lines(label: str) -> Iterator[Show]:
+    """Prints progress as lines for a log, one every EVERY seconds at most."""
+    printed = monotonic()
+
+    def show(_done: float, text: str) -> None:
+        nonlocal printed
+        if monotonic() - printed >= EVERY:
+            printed = monotonic()
+            print(f"{label}: {text}", file=sys.stderr, flush=True)
+
+    yield show
+
+
+@contextmanager
+def progress_bar(label: str, duration: float) -> Iterator[Callable[[float], None] | None]:
     """Shows a progress bar over `duration` [s] on a terminal; yields None elsewhere."""
     if not sys.stderr.isatty():
         yield None
         return
-    with _bar(label, duration, _Simulated(_whole())) as report:
-        yield report
+    pace = _Pace(duration)
+    with _bar(label, duration) as show:
 
-
-class _Steps(ProgressColumn):
-    """Number of the present step, of simulations, and the time taken; later steps may be left out.
-
-    The time is drawn without a report, so that a long step is seen to run.
-    """
-
-    def render(self, task: Task) -> Text:
-        simulated = f"{task.fields['simulations']} simulations"
-        step = f"{task.completed:.0f} of {task.total:.0f}"
-        return Text(f"{step}  {simulated}  {_clock(task.elapsed or 0.0)}")
-
-
-class Step(Protocol):
-    """Reports what is being done, its number from 1 on, and how many simulations were made."""
-
-    def __call__(self, text: str, step: int, simulations: int) -> None: ...
-
-
-@contextmanager
-def stages_bar(most: int, *, shown: bool = True) -> Iterator[Step]:
-    """Shows what is being done, in at most `most` steps, on stderr.
-
-    A bar on a terminal, a line for each step elsewhere, nothing unless `shown`.
-    """
-    if not shown:
-        yield lambda text, step, simulations: None
-        return
-    if not sys.stderr.isatty():
-        yield _PlainSteps()
-        return
-    columns = (TextColumn("{task.description}"), BarColumn(), _Steps(_whole()))
-    with Progress(*columns, console=Console(stderr=True)) as bar:
-        task = bar.add_task("", total=most, simulations=0)
-
-        def report(text: str, step: int, simulations: int) -> None:
-            bar.update(task, description=text, completed=step, simulations=simulations)
+        def report(time: float) -> None:
+            rate, left = pace(time)
+            show(time, f"{time:5.1f} of {duration:g} s  {rate:4.0f} x real time  {left}")
 
         yield report
-
-
-class _PlainSteps:
-    """Prints a line for each step."""
-
-    def __init__(self) -> None:
-        self._last: tuple[str, int] | None = None
-
-    def __call__(self, text: str, step: int, simulations: int) -> None:
-        if (text, step) != self._last:
-            self._last = text, step
-            print(f"step {step}: {text}", file=sys.stderr, flush=True)
-
-
-class Count(Protocol):
-    """Reports how many runs are done, and how many failed since the first report."""
-
-    def __call__(self, done: int, failed: int = 0) -> None: ...
 
 
 @contextmanager
@@ -275,32 +204,17 @@ def counting_bar(label: str, total: int, *, plain: bool = False) -> Iterator[Cou
 
     Without a terminal it prints nothing, or a line now and then if `plain`.
     """
-    if not sys.stderr.isatty():
-        yield _PlainCount(label, total) if plain else lambda done, failed=0: None
+    on_terminal = sys.stderr.isatty()
+    if not on_terminal and not plain:
+        yield lambda done, failed=0: None
         return
-    with _bar(label, total, _Counted(_whole())) as report:
+    pace = _Pace(total)
+    with _bar(label, total) if on_terminal else _log_lines(label) as show:
+
+        def report(done: int, failed: int = 0) -> None:
+            rate, left = pace(done)
+            lost = [f"{failed} failed"] if failed else []
+            texts = [f"{done} of {total} runs", f"{60.0 * rate:.0f} a minute", left, *lost]
+            show(done, ", ".join(filter(None, texts)))
+
         yield report
-
-
-class _PlainCount:
-    """Prints progress as lines for a log, one every EVERY seconds at most."""
-
-    def __init__(self, label: str, total: int) -> None:
-        self._label, self._total = label, total
-        self._begun = self._printed = monotonic()
-        self._already: int | None = None
-
-    def __call__(self, done: int, failed: int = 0) -> None:
-        now = monotonic()
-        if self._already is None:
-            self._already, self._begun, self._printed = done, now, now
-        elif now - self._printed >= EVERY:
-            self._printed = now
-            rate = (done - self._already) / (now - self._begun)
-            left = f", {_clock((self._total - done) / rate)} left" if rate else ""
-            counted = f"{done} of {self._total}, {60.0 * rate:.0f} a minute"
-            print(
-                f"{self._label}: {counted}{left}, {failed} failed",
-                file=sys.stderr,
-                flush=True,
-            )

@@ -187,6 +187,16 @@ def not_writable(path: Path, error: OSError) -> HexapodError:
     )
 
 
+@contextmanager
+def writing_into(folder: Path) -> Iterator[None]:
+    """Creates a folder and turns the system's errors in the block into a HexapodError."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        yield
+    except OSError as error:
+        raise not_writable(folder, error) from error
+
+
 def claim_folder(folder: Path) -> list[Path]:
     """Checks that results can be written to a folder, and creates it if need be.
 

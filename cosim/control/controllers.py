@@ -10,13 +10,6 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from hexapod_cosim.controller import BodyCommand, ControllerError, JointCommand, Measurement
-from hexapod_cosim.cosim.control.connection import (
-    Connection,
-    FmuVariable,
-    connect,
-    names_of_map,
-    read_map,
-)
 from hexapod_cosim.cosim.control.fmu_instance import open_controller_fmu
 from hexapod_cosim.cosim.control.fmu_law import FmuLaw
 from hexapod_cosim.cosim.control.python_law import (
@@ -29,6 +22,8 @@ from hexapod_cosim.cosim.control.python_law import (
 from hexapod_cosim.cosim.control.trial import refuse_crashing
 from hexapod_cosim.cosim.interface.controller_interface import ControllerSetup
 from hexapod_cosim.cosim.interface.descriptions import open_description
+from hexapod_cosim.cosim.master.connection import Connection, connect, names_of_map, read_map
+from hexapod_cosim.cosim.master.protocols import FmuVariable
 from hexapod_cosim.cosim.scenario.controls import (
     FMU,
     MAP,

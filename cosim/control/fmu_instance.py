@@ -17,10 +17,9 @@ from numpy.typing import NDArray
 from hexapod_cosim.cosim.common.archives import unpack
 from hexapod_cosim.cosim.common.binaries import refuse_incomplete
 from hexapod_cosim.cosim.common.temporary import TemporaryFolder
-from hexapod_cosim.cosim.control.connection import FmuVariable
 from hexapod_cosim.cosim.interface.descriptions import open_description
 from hexapod_cosim.cosim.master.fmu import Fmu, StepError
-from hexapod_cosim.cosim.master.protocols import Block
+from hexapod_cosim.cosim.master.protocols import Block, FmuVariable
 from hexapod_cosim.models import FmuError
 from hexapod_cosim.models.errors import nearest_name
 
@@ -67,7 +66,7 @@ def open_controller_fmu(path: Path) -> ControllerFmu:
         )
     try:
         if description.fmiVersion == "2.0":
-            return ControllerFmu2(path)
+            return Fmu(path, name="controller")
         return ControllerFmu3(path, description)
     except FmuError as error:
         raise FmuError(
@@ -77,45 +76,6 @@ def open_controller_fmu(path: Path) -> ControllerFmu:
             fix="make it for this platform, with the libraries that it needs",
             where=str(path),
         ) from error
-
-
-class ControllerFmu2(Fmu):
-    """An instance of a controller FMU of FMI 2.0."""
-
-    def __init__(self, path: Path) -> None:
-        super().__init__(path, name="controller")
-        self._initialised = False
-
-    @property
-    def described(self) -> list[FmuVariable]:
-        """The variables of the FMU, of all causalities."""
-        return [
-            FmuVariable(
-                name, variable.causality, variable.type == "Real", variable.type == "Boolean", 1
-            )
-            for name, variable in self.variables.items()
-        ]
-
-    def initialise(
-        self, start: float, stop: float, begin: Callable[[], None] = lambda: None
-    ) -> None:
-        """Initialises the FMU; calls `begin`, which sets its inputs, in initialisation mode."""
-        self._begin_initialisation(start, stop)
-        begin()
-        self._end_initialisation()
-        self._initialised = True
-
-    def reset(self) -> None:
-        """Resets the instance to its start values, not initialised. Raises FmuError."""
-        super().reset()
-        self._initialised = False
-
-    def close(self) -> None:
-        """Terminates and frees the instance; may be called twice."""
-        if self._slave is not None and self._initialised:
-            with suppress(Exception):  # an FMU that fails to terminate is freed all the same
-                self._slave.terminate()
-        super().close()
 
 
 class Block3:

@@ -14,16 +14,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hexapod_cosim.controller import BodyCommand, Diagnostics, JointCommand, Measurement
-from hexapod_cosim.cosim.control.connection import (
+from hexapod_cosim.cosim.control.fmu_instance import ControllerFmu
+from hexapod_cosim.cosim.master.connection import (
     DIAGNOSED,
     DIAGNOSED_FLAGS,
+    FLAGS,
     SINKS,
     SOURCES,
     Connection,
     Pairs,
+    connect,
 )
-from hexapod_cosim.cosim.control.fmu_instance import ControllerFmu
-from hexapod_cosim.cosim.master.fmu_controller import FLAGS
 from hexapod_cosim.cosim.master.protocols import Block
 from hexapod_cosim.models import JOINT_NAMES, LEG_NAMES, FmuError
 
@@ -106,6 +107,12 @@ class FmuLaw:
         row = source_row(command, measurement)
         for wire in self._inputs:
             wire.write_from(row)
+
+
+def law_of_ours(fmu: ControllerFmu, *, period: float) -> FmuLaw:
+    """Returns the driver of a controller FMU whose variables have our names."""
+    connection = connect(fmu.described, {}, torque=False, where=str(fmu.path))
+    return FmuLaw(fmu, connection, period=period)
 
 
 class _Wire:

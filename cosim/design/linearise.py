@@ -30,7 +30,8 @@ from hexapod_cosim.controller.design.standing import StandingPlant
 from hexapod_cosim.controller.size import Size, size_of
 from hexapod_cosim.cosim.interface.names import JOINTS, LEGS, vector_names
 from hexapod_cosim.cosim.master.fmu import Fmu
-from hexapod_cosim.cosim.master.signals import COMMANDED, MEASURED, PUSH
+from hexapod_cosim.cosim.master.sensors import MEASURED
+from hexapod_cosim.cosim.master.signals import COMMANDED, PUSH
 from hexapod_cosim.models import Robot
 from hexapod_cosim.models.kinematics import quaternion_product
 from hexapod_cosim.models.records import Array

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from hexapod_cosim.cosim.common.files import named, not_writable, write_text
+from hexapod_cosim.cosim.common.files import not_writable, write_text
 from hexapod_cosim.models import HexapodError, Robot
 from hexapod_cosim.models.mjcf import robot_to_mjcf
 from hexapod_cosim.models.records import Servo
@@ -69,18 +69,9 @@ def left_out(servo: Servo, form: Format) -> list[str]:
 def export_description(robot: Robot, path: str | Path, form: Format) -> Path:
     """Writes a robot's file atomically and returns its path.
 
-    Raises HexapodError for another suffix, and when the file cannot be written.
+    Raises HexapodError when the file cannot be written.
     """
-    path = Path(path)
-    if path.suffix != form.suffix:
-        expected = f"a name that ends in {form.suffix}"
-        raise HexapodError(
-            f"not {form.title}'s name",
-            got=path.name,
-            expected=expected,
-            fix=f"write -o {named(path, form.suffix)}",
-        )
-    text = form.write(robot)
+    path, text = Path(path), form.write(robot)
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
     except OSError as error:

@@ -110,16 +110,6 @@ def chosen_package(
     return package
 
 
-def package_path(path: Path | None, name: str) -> Path:
-    """Returns the path of the package to write. Raises HexapodError for another suffix."""
-    if path is not None and (path.is_dir() or path.suffix != SUFFIX):
-        fix = f"write -o {path / name if path.is_dir() else path.with_suffix('')}{SUFFIX}"
-        raise HexapodError(
-            "not a package's name", got=path.name, expected=f"a file that ends in {SUFFIX}", fix=fix
-        )
-    return path or Path(f"{name}{SUFFIX}")
-
-
 def read_values(texts: Iterable[str]) -> dict[str, dict[str, float]]:
     """Parses "COMPONENT.NAME=NUMBER" to values by component and name. Raises HexapodError."""
     found: dict[str, dict[str, float]] = {}

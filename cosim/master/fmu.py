@@ -9,7 +9,7 @@ import ctypes
 import hashlib
 import math
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import chdir
+from contextlib import chdir, suppress
 from functools import cached_property, partial
 from pathlib import Path
 from typing import Any
@@ -26,6 +26,7 @@ from hexapod_cosim.cosim.common.temporary import TemporaryFolder
 from hexapod_cosim.cosim.interface.descriptions import read_description
 from hexapod_cosim.cosim.interface.variants import listed_items
 from hexapod_cosim.cosim.master.fmu_log import STATUS, WARNING, FmuLog
+from hexapod_cosim.cosim.master.protocols import FmuVariable
 from hexapod_cosim.models.errors import FmuError, nearest_name, unknown_name
 
 LAST_SUCCESSFUL_TIME = 2  # fmi2StatusKind
@@ -122,6 +123,7 @@ class Fmu(Closing):
         self.clear_log = self._log.clear  # called before each call: errors quote new messages only
         self._directory = TemporaryFolder("fmu")
         self._slave: Any = None
+        self._initialised = False
         self._grids: dict[str, int] | None = None  # numbers of grid files by their digest
         try:
             self._instantiate(name)
@@ -160,6 +162,16 @@ class Fmu(Closing):
         message = self._log[-1] if self._log else str(error)
         fix = "export it again on this machine with `hexapod export`"
         return FmuError("the FMU cannot be loaded", got=message, fix=fix, where=str(self.path))
+
+    @property
+    def described(self) -> list[FmuVariable]:
+        """The variables of the FMU, of all causalities."""
+        return [
+            FmuVariable(
+                name, variable.causality, variable.type == "Real", variable.type == "Boolean", 1
+            )
+            for name, variable in self.variables.items()
+        ]
 
     @cached_property
     def sha256(self) -> str:
@@ -358,24 +370,19 @@ class Fmu(Closing):
         fix = f"did you mean {near!r}?" if near else "`fmpy info` lists the names it has"
         return FmuError("the FMU has no such variable", got=name, fix=fix, where=str(self.path))
 
-    def initialise(self, start: float, stop: float) -> None:
+    def initialise(
+        self, start: float, stop: float, begin: Callable[[], None] = lambda: None
+    ) -> None:
         """Initialises the FMU with its parameters and initial state at time `start` [s].
 
-        Raises FmuError.
+        begin: is called in initialisation mode, and may set inputs. Raises FmuError.
         """
-        self._begin_initialisation(start, stop)
-        self._end_initialisation()
-
-    def _begin_initialisation(self, start: float, stop: float) -> None:
-        """Enters initialisation mode. Raises FmuError."""
-        self._call_to_initialise(
-            lambda: self._slave.setupExperiment(startTime=start, stopTime=stop)
-        )
-        self._call_to_initialise(self._slave.enterInitializationMode)
-
-    def _end_initialisation(self) -> None:
-        """Leaves initialisation mode. Raises FmuError."""
-        self._call_to_initialise(self._slave.exitInitializationMode)
+        slave = self._slave
+        self._call_to_initialise(lambda: slave.setupExperiment(startTime=start, stopTime=stop))
+        self._call_to_initialise(slave.enterInitializationMode)
+        begin()
+        self._call_to_initialise(slave.exitInitializationMode)
+        self._initialised = True
 
     def _call_to_initialise(self, call: Callable[[], Any]) -> None:
         """Calls a function of fmpy. Raises FmuError with the FMU's last message."""
@@ -394,6 +401,7 @@ class Fmu(Closing):
         status = self._reset()
         if status > WARNING:
             raise self.failure("the FMU cannot be reset", status)
+        self._initialised = False
 
     def step(self, t: float, h: float) -> None:
         """Steps from t to t + h [s]. Raises StepError."""
@@ -425,6 +433,9 @@ class Fmu(Closing):
         """Frees the instance and deletes the unpacked files; may be called twice."""
         slave, self._slave = self._slave, None
         if slave is not None:
+            if self._initialised:
+                with suppress(Exception):  # an FMU that fails to terminate is freed all the same
+                    slave.terminate()
             slave.fmiCallLogger = None
             slave.freeInstance()
         self._directory.close()

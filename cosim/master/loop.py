@@ -18,7 +18,7 @@ from hexapod_cosim.controller import BodyCommand, Diagnostics, JointCommand, Mea
 from hexapod_cosim.cosim.interface.names import vector_names
 from hexapod_cosim.cosim.master.interrupts import Watch, interruptible, watched
 from hexapod_cosim.cosim.master.protocols import Plant
-from hexapod_cosim.cosim.master.recorder import Recorder, Recording
+from hexapod_cosim.cosim.master.recorder import Recorder, Recording, Rows
 from hexapod_cosim.cosim.master.signals import Signals
 from hexapod_cosim.cosim.scenario.schedule import Schedule
 from hexapod_cosim.models import LEG_NAMES, HexapodError
@@ -88,9 +88,18 @@ def run(
         reason = str(error)
         if not isinstance(error, HexapodError):
             reason = f"{type(error).__name__}: {error}"
-    wall, judged = perf_counter() - begin, recorder.judged
-    simulated = float(judged.time[-1] - schedule.times[0]) if len(judged.time) else 0.0
-    return Outcome(status, reason, simulated, wall, recorder.recording, cause, judged)
+    wall = perf_counter() - begin
+    recorder.finish()
+    return outcome_of(recorder, status, reason, cause, wall=wall)
+
+
+def outcome_of(
+    rows: Rows, status: str, reason: str, cause: Exception | None, *, wall: float
+) -> Outcome:
+    """Returns the outcome of a run with the rows that it has recorded; wall time in s."""
+    time = rows.judged.time
+    simulated = float(time[-1] - time[0]) if len(time) else 0.0
+    return Outcome(status, reason, simulated, wall, rows.recording, cause, rows.judged)
 
 
 def diagnostic_columns(controller: JointController) -> dict[tuple[str, ...], NDArray[Any]]:
@@ -130,29 +139,48 @@ def _loop(
     progress: Progress | None,
 ) -> None:
     """Runs all macro-steps; the last row, at the end of the run, is followed by no step."""
-    # bound methods are looked up once: this loop is the hot path
-    read, control, write = signals.read, controller.step, signals.write
-    record, advance = recorder.record, plant.step
-    pushes, measurement = schedule.pushes, signals.measurement
-    faults, lost = schedule.servo_faults, schedule.lost
-    read()
+    pushes, lost, measurement = schedule.pushes, schedule.lost, signals.measurement
+    signals.read()
     for k, (t, command) in enumerate(zip(schedule.times.tolist(), schedule.commands, strict=False)):
         if pushes is not None:
             signals.push[:] = pushes[k]
-        if faults is not None:
-            signals.servo_faults = faults[k]
         watch.call = k + 1
-        joints = control(t, command, measurement)
+        joints = controller.step(t, command, measurement)
         watch.call = 0
-        if lost is None or not lost[k]:
-            write(joints)
-        else:
-            signals.hold()
-        record()
-        advance(t, h)
-        read()
+        is_lost = lost is not None and lost[k]
+        macro_step(plant.step, signals, None if is_lost else joints, t, h, recorder.record)
         if progress is not None and k % PROGRESS_STEPS == 0:
             progress((k + 1) * h)
-    record()
+    recorder.record()
     if progress is not None:
         progress(len(schedule.commands) * h)
+
+
+def macro_step(
+    step: Callable[[float, float], None],
+    signals: Signals,
+    joints: JointCommand | None,
+    t: float,
+    h: float,
+    record: Callable[[], None] = lambda: None,
+) -> None:
+    """Makes the macro-step from t to t + h [s] and reads the plant's outputs.
+
+    Every loop in Python calls it; cosim/master/src/macro_step.c is the same in C.
+
+    Args:
+        step: steps the plant from t by h.
+        signals: of the plant; the push in them is set as well.
+        joints: commands of the controller; None: the last ones again.
+        record: is called before the plant steps, so that a recording shows the values that led to a
+            failed step.
+
+    Raises FmuError for refused inputs and StepError for a refused step.
+    """
+    if joints is None:
+        signals.hold()
+    else:
+        signals.write(joints)
+    record()
+    step(t, h)
+    signals.read()

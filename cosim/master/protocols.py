@@ -1,11 +1,23 @@
-"""The interface of a plant that the master needs, which an FMU or a replacement implements."""
+"""The interfaces of plants and FMUs that the master needs, which replacements implement too."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any, Protocol
 
 from numpy.typing import NDArray
+
+
+@dataclass(frozen=True)
+class FmuVariable:
+    """A variable of an FMU."""
+
+    name: str
+    causality: str
+    real: bool  # whether it is a floating-point variable
+    flag: bool  # whether it is a Boolean variable
+    size: int  # number of elements; 1 for a scalar
 
 
 class Block(Protocol):

@@ -6,7 +6,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from fnmatch import fnmatchcase
 from functools import lru_cache
-from itertools import pairwise
 from types import MappingProxyType
 from typing import Any
 
@@ -25,6 +24,7 @@ from hexapod_cosim.cosim.master.signals import Signals
 from hexapod_cosim.models import HexapodError, ScenarioError, nearest_name
 
 Array = NDArray[np.float64]
+BLOCK_ROWS = 500  # that are stored at once
 PEAKS = ("peak_force", "peak_force_rate")  # of a foot, within the last communication step
 LANDING_RATE, LANDINGS = "landing_rate", "landings"
 COMMAND_COLUMNS = (
@@ -144,13 +144,85 @@ def _matches(name: str, pattern: str) -> bool:
     return fnmatchcase(name, pattern.replace("[", "[[]"))  # brackets in our names mean an index
 
 
-class Recorder:
-    """Records one row per macro-step; times (rows,) and body commands (rows, 6) are known before.
+class Rows:
+    """Stores the rows of a run; times (rows,) and body commands (rows, 6) are known before.
+
+    A loop writes rows of `names` to `room` and calls `store`. With `every` > 1 only the first,
+    every `every`-th and the last row are kept; then `judged` names the columns that are kept of all
+    rows, and the plant's peaks in a kept row are the largest since the kept row before.
+    """
+
+    def __init__(
+        self,
+        names: Sequence[str],
+        times: Array,
+        commands: Array,
+        *,
+        every: int = 1,
+        judged: Sequence[str] = (),
+    ) -> None:
+        moments = kept_moments(len(times), every)
+        self._kept = _table(names, times[moments], commands[moments])
+        self._judged = self._kept
+        self._block = np.zeros((BLOCK_ROWS + every, len(names)))
+        self._count = self._kept_count = self._left = 0  # rows; those after the last kept one
+        if every > 1:
+            self._judged_places = [k for k, name in enumerate(names) if name in set(judged)]
+            columns = [names[k] for k in self._judged_places]
+            self._judged = _table(columns, times, commands)
+            self._due, self._peaks = set(moments.tolist()), Peaks(names)
+
+    @property
+    def room(self) -> Array:
+        """Where the next rows are written (at least BLOCK_ROWS, names)."""
+        return self._block[self._left :]
+
+    def store(self, count: int) -> None:
+        """Takes over the first `count` rows of the room."""
+        fresh, first = self.room[:count], self._count
+        self._count += count
+        if self._judged is self._kept:
+            self._kept.data[first : self._count, 1 : 1 + fresh.shape[1]] = fresh
+            self._kept_count = self._count
+            return
+        places = self._judged_places
+        self._judged.data[first : self._count, 1 : 1 + len(places)] = fresh[:, places]
+        self._thin(self._block[: self._left + count], first - self._left)
+
+    def _thin(self, rows: Array, first: int) -> None:
+        """Keeps the rows that are due; the first one is number `first`."""
+        begin = 0
+        for k in range(len(rows)):
+            if first + k in self._due:
+                row = self._peaks.fold(rows[begin : k + 1])
+                self._kept.data[self._kept_count, 1 : 1 + len(row)] = row
+                self._kept_count, begin = self._kept_count + 1, k + 1
+        self._left = len(rows) - begin
+        rows[: self._left] = rows[begin:].copy()
+
+    @property
+    def recording(self) -> Recording:
+        """The rows kept so far."""
+        return self._kept.rows(slice(self._kept_count))
+
+    @property
+    def judged(self) -> Recording:
+        """All rows so far, with the `judged` columns at least."""
+        return self._judged.rows(slice(self._count))
+
+
+def _table(names: Sequence[str], times: Array, commands: Array) -> Recording:
+    """Returns rows whose columns adjoin in memory, because metrics read columns."""
+    data = np.empty((len(times), 1 + len(names) + len(COMMAND_COLUMNS)), order="F")
+    data[:, 0], data[:, 1 + len(names) :] = times, commands
+    return Recording(("time", *names, *COMMAND_COLUMNS), data)
+
+
+class Recorder(Rows):
+    """Records the present values of a plant's signals, one row per macro-step.
 
     `extra`: further arrays to record, by the names of their entries in memory order; each row reads
-    them again. With `every` > 1 only the first, every `every`-th and the last row are kept; then
-    `judged` names the columns that are kept of all rows, and the plant's peaks in a kept row are
-    the largest since the kept row before.
+    them again. Other arguments are those of Rows.
     """
 
     def __init__(
@@ -163,83 +235,23 @@ class Recorder:
         every: int = 1,
         judged: Sequence[str] = (),
     ) -> None:
-        sources = {signals.names: signals.values} | {
-            names: array.reshape(-1) for names, array in extra.items()
-        }
-        self.names = ("time", *(name for names in sources for name in names), *COMMAND_COLUMNS)
-        ends = np.cumsum([1, *map(len, sources)]).tolist()
-        self._thinned = None if every == 1 else ThinnedRows(self.names, judged, len(times), every)
-        rows = len(times) if every == 1 else 1  # thinned: one row is filled again and again
-        # filling touches all memory now rather than during the run
-        self._data = np.full((rows, len(self.names)), np.nan)
-        self._times, self._commands = self._data[:, 0], self._data[:, ends[-1] :]
-        self._known = times, commands
-        if every == 1:
-            self._times[:], self._commands[:] = times, commands
-        self._copies = [
-            (self._data[:, begin:end], source)
-            for (begin, end), source in zip(pairwise(ends), sources.values(), strict=True)
-        ]
-        self._count = 0
+        self._sources = [signals.values, *(array.reshape(-1) for array in extra.values())]
+        names = (*signals.names, *(name for names in extra for name in names))
+        super().__init__(names, times, commands, every=every, judged=judged)
+        self.names = ("time", *names, *COMMAND_COLUMNS)
+        self._waiting = 0
 
     def record(self) -> None:
         """Adds a row with the present values."""
-        k = self._count
-        row = k if self._thinned is None else 0
-        for target, source in self._copies:
-            target[row] = source
-        if self._thinned is not None:
-            self._times[0], self._commands[0] = self._known[0][k], self._known[1][k]
-            self._thinned.add(self._data[0])
-        self._count = k + 1  # last, so that an interrupted row is not counted
+        np.concatenate(self._sources, out=self.room[self._waiting])
+        self._waiting += 1
+        if self._waiting == BLOCK_ROWS:
+            self.finish()
 
-    @property
-    def recording(self) -> Recording:
-        """The rows kept so far."""
-        if self._thinned is not None:
-            return Recording(self.names, self._thinned.rows)
-        return Recording(self.names, self._data[: self._count])
-
-    @property
-    def judged(self) -> Recording:
-        """All rows so far, with the `judged` columns at least."""
-        if self._thinned is not None:
-            return Recording(self._thinned.names, self._thinned.judged[: self._count])
-        return self.recording
-
-
-class ThinnedRows:
-    """Keeps one of `every` rows and the last one; of all rows it keeps the `judged` columns.
-
-    `rows` is the largest number of rows.
-    """
-
-    def __init__(self, names: Sequence[str], judged: Sequence[str], rows: int, every: int) -> None:
-        wanted = {"time", *judged, *COMMAND_COLUMNS}
-        self._places = [k for k, name in enumerate(names) if name in wanted]
-        self.names = tuple(names[k] for k in self._places)
-        self.judged: Array = np.full((rows, len(self._places)), np.nan)
-        moments = kept_moments(rows, every)
-        self._kept = np.full((len(moments), len(names)), np.nan)
-        self._due = set(moments.tolist())
-        self._count = self._kept_count = 0
-        self._peaks = Peaks(names)
-
-    def add(self, row: Array) -> None:
-        """Adds a row (names,)."""
-        k = self._count
-        self.judged[k] = row[self._places]
-        self._peaks.update(row)
-        if k in self._due:
-            self._kept[self._kept_count] = row
-            self._peaks.write(self._kept[self._kept_count])
-            self._kept_count += 1
-        self._count = k + 1
-
-    @property
-    def rows(self) -> Array:
-        """The kept rows so far (rows, names)."""
-        return self._kept[: self._kept_count]
+    def finish(self) -> None:
+        """Stores the rows that are recorded."""
+        self.store(self._waiting)
+        self._waiting = 0
 
 
 def kept_moments(rows: int, every: int) -> NDArray[np.intp]:
@@ -249,7 +261,7 @@ def kept_moments(rows: int, every: int) -> NDArray[np.intp]:
 
 
 class Peaks:
-    """Tracks the largest value of each peak column since the last kept row.
+    """Folds the peaks of all rows since the last kept one into the row to keep.
 
     The plant restarts `landing_rate` at a touch-down; its largest value restarts at the first
     touch-down since the last kept row.
@@ -257,25 +269,19 @@ class Peaks:
 
     def __init__(self, names: Sequence[str]) -> None:
         place = {name: k for k, name in enumerate(names)}
-        plain = [name for quantity in PEAKS for name in foot_names(quantity) if name in place]
-        restarted = [name for name in foot_names(LANDING_RATE) if name in place]
-        counts = [name.removesuffix(LANDING_RATE) + LANDINGS for name in restarted]
-        self.places = [place[name] for name in (*plain, *restarted)]
-        self.counts = [place[name] for name in counts]  # for the last ones of `places`
-        self._fresh = np.zeros(len(self.places), dtype=np.bool_)
-        self._largest = np.zeros(len(self.places))
-        self._seen, self._kept = np.zeros(len(counts)), np.zeros(len(counts))
+        self._plain = [place[name] for key in PEAKS for name in foot_names(key) if name in place]
+        rates = [name for name in foot_names(LANDING_RATE) if name in place]
+        self._rates = [place[name] for name in rates]
+        self._counts = [place[name.removesuffix(LANDING_RATE) + LANDINGS] for name in rates]
+        self._landings = np.zeros(len(rates))  # in the last kept row
 
-    def update(self, row: Array) -> None:
-        """Takes the peaks of a row into account."""
-        counts = row[self.counts]
-        landed = (counts != self._seen) & (self._seen == self._kept)
-        self._fresh[len(self.places) - len(counts) :] = landed
-        values = row[self.places]
-        self._largest = np.where(self._fresh, values, np.maximum(self._largest, values))
-        self._seen = counts
-
-    def write(self, row: Array) -> None:
-        """Writes the largest values into the row to keep and restarts."""
-        row[self.places] = self._largest
-        self._largest, self._kept = np.zeros(len(self.places)), self._seen
+    def fold(self, rows: Array) -> Array:
+        """Returns the last one of some rows (rows, names) with the peaks of all of them."""
+        row: Array = rows[-1].copy()
+        counts = rows[:, self._counts]
+        landed = np.logical_or.accumulate(counts != self._landings)
+        since = landed | ~landed[-1]  # all rows where no foot has landed
+        row[self._plain] = np.maximum(rows[:, self._plain].max(axis=0), 0.0)
+        row[self._rates] = np.where(since, rows[:, self._rates], 0.0).max(axis=0)
+        self._landings = counts[-1]
+        return row

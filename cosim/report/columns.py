@@ -17,7 +17,6 @@ from hexapod_cosim.cosim.results.walk import (
     View,
     bearing_load,
     body_height,
-    commanded_path,
     robot_weight,
     running_integral,
     slip_under_load,
@@ -128,11 +127,6 @@ def _slipped(view: View) -> Iterator[tuple[str, Array]]:
     yield from _split([f"{leg}.slipped.{axis}" for leg in LEG_NAMES for axis in "xy"], way)
 
 
-def _commanded(view: View) -> Iterator[tuple[str, Array]]:
-    """Yields the path of the body command [m], world x and y."""
-    yield from _split(("command.x", "command.y"), commanded_path(view.recording))
-
-
 def _normal_forces(view: View) -> Iterator[tuple[str, Array]]:
     """Yields the normal forces of the feet in body weights."""
     yield from _split(
@@ -192,7 +186,6 @@ REPLAYED: dict[str, Maker] = {
     "contacts": _contacts,
     "swings": _swings,
     "slipped": _slipped,
-    "commanded": _commanded,
 }
 DRAWN: dict[str, Maker] = {
     "normal_forces": _normal_forces, "slip": _slip, "feet": _feet,

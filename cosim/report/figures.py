@@ -1,17 +1,19 @@
-"""Holds the figures of a report as files in memory, drawn in a thread if the caller wishes."""
+"""Draws the figures of a report into memory, and writes them."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Iterator, Mapping
+from io import BytesIO
 from pathlib import Path
-from threading import Event
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
-from hexapod_cosim.controller.figure_style import UNDATED
-from hexapod_cosim.cosim.common.closing import Closing
+from hexapod_cosim.controller.figure_style import DPI, SETTINGS, UNDATED
 from hexapod_cosim.cosim.common.files import atomic_path
+from hexapod_cosim.cosim.master.recorder import ColumnError
 from hexapod_cosim.cosim.results.walk import View
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 
 class Figures(NamedTuple):
@@ -19,6 +21,46 @@ class Figures(NamedTuple):
 
     images: Mapping[str, bytes]  # content of each file by its name
     skipped: Mapping[str, str]  # by name of a figure, why it was not drawn
+
+
+def draw_figures(views: Mapping[str, View]) -> Figures:
+    """Draws the figures of runs by control as PNG and SVG."""
+    # imported only here because matplotlib is slow to import
+    import matplotlib  # noqa: PLC0415
+
+    from hexapod_cosim.cosim.report.plots import DRAWINGS  # noqa: PLC0415
+
+    images: dict[str, bytes] = {}
+    skipped: dict[str, str] = {}
+    with matplotlib.rc_context(SETTINGS):
+        for name, draw in DRAWINGS.items():
+            try:
+                figure = draw(views)
+            except ColumnError as error:
+                skipped[name] = f"{error.got} was not recorded"
+                continue
+            images |= {f"{name}.{kind}": content for kind, content in _files(figure)}
+    return Figures(images, skipped)
+
+
+def _files(figure: Figure) -> Iterator[tuple[str, bytes]]:
+    """Yields a figure's file in each format, as (format, content).
+
+    The axes are placed once, for the PNG: savefig() would do so for each format, and before each
+    would draw everything once more.
+    """
+    import matplotlib  # noqa: PLC0415
+
+    figure.set_dpi(DPI)
+    engine = figure.get_layout_engine()
+    if engine is not None and figure.axes:
+        engine.execute(figure)
+    with matplotlib.rc_context({"figure.constrained_layout.use": False}):
+        figure.set_layout_engine(None)
+        for kind, metadata in UNDATED.items():
+            content = BytesIO()
+            figure.savefig(content, format=kind, dpi=DPI, metadata=metadata)
+            yield kind, content.getvalue()
 
 
 def write_figures(figures: Figures, folder: Path) -> list[Path]:
@@ -35,31 +77,3 @@ def write_figures(figures: Figures, folder: Path) -> list[Path]:
         with atomic_path(path) as temporary:
             temporary.write_bytes(content)
     return files
-
-
-class FigureThread(Closing):
-    """Draws the figures of runs in a thread of its own, from its creation on.
-
-    The caller must not draw with matplotlib until result() has returned or close() was called: the
-    style is a setting of the whole process. A with statement ends the thread at the next figure.
-    """
-
-    def __init__(self, views: Mapping[str, View]) -> None:
-        self._views, self._stop = views, Event()
-        self._threads = ThreadPoolExecutor(1, thread_name_prefix="figures")
-        self._drawn = self._threads.submit(self._draw)
-
-    def _draw(self) -> Figures:
-        # imported only here because matplotlib is slow to import
-        from hexapod_cosim.cosim.report.plots import draw_figures  # noqa: PLC0415
-
-        return draw_figures(self._views, self._stop.is_set)
-
-    def result(self) -> Figures:
-        """Waits until all figures are drawn and returns them. Raises what drawing raised."""
-        return self._drawn.result()
-
-    def close(self) -> None:
-        """Stops drawing after the present figure and waits for the thread."""
-        self._stop.set()
-        self._threads.shutdown(wait=True, cancel_futures=True)

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import base64
 from collections.abc import Iterable
 from functools import cache
 from pathlib import Path
 from typing import Any
 
-from jinja2 import Environment, PackageLoader, StrictUndefined
+from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
 from hexapod_cosim.cosim.common.control_style import all_styles
@@ -23,10 +24,16 @@ NO_VIEWER = (
 
 
 @cache
-def environment() -> Environment:
-    """Returns the templates of this folder; reports extend `base.html.jinja`."""
+def environment(extension: str = "") -> Environment:
+    """Returns the templates of this folder; reports extend `base.html.jinja`.
+
+    extension: name of the extension whose folder has further templates.
+    """
+    folders = [PackageLoader("hexapod_cosim.cosim", "report")]
+    if extension:
+        folders.append(PackageLoader("hexapod_cosim.extensions", extension))
     return Environment(
-        loader=PackageLoader("hexapod_cosim.cosim", "report"),
+        loader=ChoiceLoader(folders),
         autoescape=True,
         undefined=StrictUndefined,
         trim_blocks=True,
@@ -34,10 +41,17 @@ def environment() -> Environment:
     )
 
 
-def render(template: str, *, controls: Iterable[str] = (), **content: Any) -> str:
+def render(
+    template: str, *, controls: Iterable[str] = (), extension: str = "", **content: Any
+) -> str:
     """Renders a page with the colours of the figures; `controls` are the labels on it."""
     styles = all_styles(controls)
-    return environment().get_template(template).render(styles=styles, **content)
+    return environment(extension).get_template(template).render(styles=styles, **content)
+
+
+def embedded(svg: Path) -> str:
+    """Returns a picture as a URL that contains it."""
+    return "data:image/svg+xml;base64," + base64.b64encode(svg.read_bytes()).decode("ascii")
 
 
 def viewer_script() -> Markup | None:

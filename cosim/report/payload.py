@@ -7,18 +7,11 @@ from collections.abc import Mapping
 from contextlib import suppress
 from typing import Any
 
-import numpy as np
-
 from hexapod_cosim.cosim.common.control_style import control_styles
 from hexapod_cosim.cosim.master.recorder import ColumnError
 from hexapod_cosim.cosim.report.columns import MOST_ROWS, Chosen, choose
 from hexapod_cosim.cosim.report.geometry import describe_ground, describe_robot
 from hexapod_cosim.cosim.report.packing import pack
-from hexapod_cosim.cosim.report.profile import (
-    find_stances,
-    make_profile,
-    pack_profile,
-)
 from hexapod_cosim.cosim.report.surface import pack_footprints, pack_surface, stride
 from hexapod_cosim.cosim.results.footprints import find_footprints
 from hexapod_cosim.cosim.results.results import StoredResult
@@ -68,17 +61,13 @@ def _describe(
     view = run.view
     about = {"label": label, "period": view.period, "bucket": chosen.bucket}
     ground: dict[str, Any] = describe_ground(view.parameters)
-    columns = dict(chosen.columns)
     if run.view.surface is not None:
         ground["surface"] = surfaces.index(run.view.surface)
-        with suppress(ColumnError):  # a recording without positions shows the surface alone
-            stances = find_stances(view, run.view.surface)
-            profile = make_profile(view, run.view.surface, stances)
-            columns["way"] = np.interp(chosen.time, view.recording.time, profile.torso_way)
-            ground["profile"] = pack_profile(profile, stances)
     with suppress(ColumnError):
         ground["footprints"] = pack_footprints(find_footprints(view.recording, view.parameters))
-    return about | {"robot": describe_robot(run), "ground": ground} | pack(chosen.time, columns)
+    return (
+        about | {"robot": describe_robot(run), "ground": ground} | pack(chosen.time, chosen.columns)
+    )
 
 
 def _coarse(surface: Surface) -> str:

@@ -2,22 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import dataclass
-from io import BytesIO
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
-import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
-from hexapod_cosim.controller.figure_style import DPI, PALETTE, SETTINGS, UNDATED, WIDTH
+from hexapod_cosim.controller.figure_style import PALETTE, WIDTH
 from hexapod_cosim.cosim.common.control_style import control_styles
 from hexapod_cosim.cosim.master.recorder import ColumnError
-from hexapod_cosim.cosim.report.figures import Figures
-from hexapod_cosim.cosim.report.profile import find_stances, make_profile
+from hexapod_cosim.cosim.report.profile import make_profile
 from hexapod_cosim.cosim.results.metrics import planned_feet, plans_feet
 from hexapod_cosim.cosim.results.walk import (
     Array,
@@ -187,14 +183,14 @@ def _draw_profile(axis: Axes, label: str, view: View, colour: str) -> None:
     """Draws one run's ground: a line below the torso, a band across the robot's width."""
     if view.surface is None:
         return
-    stances = find_stances(view, view.surface)
-    found = make_profile(view, view.surface, stances)
+    found = make_profile(view, view.surface)
     band: dict[str, Any] = {"color": BAND, "linewidth": 0, "label": "across the robot's width"}
     axis.fill_between(found.way, 1e3 * found.low, 1e3 * found.high, **band)
     axis.plot(found.way, 1e3 * found.ground, color=GROUND, linewidth=1.1, label="below the torso")
-    height = [1e3 * stance.z for stance in stances]
     dots: dict[str, Any] = {"marker": "o", "markersize": 2.6, "linestyle": "none"}
-    axis.plot(found.stance_way, height, color=colour, label="feet touch down", **dots)
+    axis.plot(
+        found.contact_way, 1e3 * found.contact_height, color=colour, label="feet touch down", **dots
+    )
     axis.set_title(label)
     axis.set_ylabel("height [mm]")
     axis.margins(x=0.0)
@@ -324,99 +320,14 @@ def _legend(figure: Figure, axis: Axes) -> None:
     figure.legend(handles, labels, loc="outside upper center", ncols=len(labels))
 
 
-@dataclass(frozen=True)
-class Drawing:
-    """A figure of the report and its texts."""
-
-    title: str
-    caption: str
-    draw: Callable[[Views], Figure]
-
-
-FIGURES: dict[str, Drawing] = {
-    "foot_forces": Drawing(
-        "Foot forces",
-        "Normal force of each foot over the last gait cycles, in body weights.",
-        foot_forces,
-    ),
-    "slip": Drawing(
-        "Slip",
-        "Above, the way all loaded feet have slipped since the start; "
-        "below, the slip speed of each foot.",
-        slip,
-    ),
-    "feet": Drawing(
-        "Planned and real feet",
-        "Each foot's path in the torso's frame over the last gait cycles, from the side.",
-        feet,
-    ),
-    "posture": Drawing(
-        "Height and attitude",
-        "Height of the torso above the ground, and its roll, pitch and yaw.",
-        posture,
-    ),
-    "path": Drawing(
-        "Path of the torso",
-        "The torso from above, its end marked by a dot, and where the command leads.",
-        path,
-    ),
-    "profile": Drawing(
-        "Height profile",
-        "The ground along the torso's path, and where the feet touched down.",
-        profile,
-    ),
-    "torques": Drawing(
-        "Torques",
-        "The largest absolute torque over the six legs, joint by joint, over the last gait cycles.",
-        torques,
-    ),
-    "energy": Drawing(
-        "Energy audit",
-        "Work, loss and stored energy; on its own axis, the unexplained residual.",
-        energy,
-    ),
-    "footfall": Drawing(
-        "Footfall",
-        "Coloured: the foot is on the ground. Grey: the gait plans it to swing.",
-        footfall,
-    ),
+DRAWINGS: dict[str, Callable[[Views], Figure]] = {
+    "foot_forces": foot_forces,
+    "slip": slip,
+    "feet": feet,
+    "posture": posture,
+    "path": path,
+    "profile": profile,
+    "torques": torques,
+    "energy": energy,
+    "footfall": footfall,
 }
-
-
-def draw_figures(views: Views, is_stopped: Callable[[], bool] = lambda: False) -> Figures:
-    """Draws FIGURES as PNG and SVG into memory.
-
-    is_stopped: asked before each figure; True leaves out this one and all after it.
-    """
-    images: dict[str, bytes] = {}
-    skipped: dict[str, str] = {}
-    with matplotlib.rc_context(SETTINGS):
-        for name, item in FIGURES.items():
-            if is_stopped():
-                break
-            try:
-                figure = item.draw(views)
-            except ColumnError as error:
-                skipped[name] = f"{error.got} was not recorded"
-                continue
-            for kind, content in _files(figure):
-                images[f"{name}.{kind}"] = content
-    return Figures(images, skipped)
-
-
-def _files(figure: Figure) -> Iterator[tuple[str, bytes]]:
-    """Yields a figure's file in each format, as (format, content).
-
-    The axes are placed once, for the PNG: savefig() would do so for each format, and before each
-    would draw everything once more.
-    """
-    figure.set_dpi(DPI)
-    engine = figure.get_layout_engine()
-    if engine is not None and figure.axes:
-        engine.execute(figure)
-    with matplotlib.rc_context({"figure.constrained_layout.use": False}):
-        figure.set_layout_engine(None)
-        for kind, metadata in UNDATED.items():
-            content = BytesIO()
-            figure.savefig(content, format=kind, dpi=DPI, metadata=metadata)
-            yield kind, content.getvalue()

@@ -1,13 +1,13 @@
-"""Computes where feet stood, and the height profile of the ground along the torso's path."""
+"""Computes the height profile of the ground along the torso's path."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from hexapod_cosim.cosim.master.recorder import Recording
 from hexapod_cosim.cosim.results.ground import heights_at
 from hexapod_cosim.cosim.results.walk import View
 from hexapod_cosim.models.ground.surface import Surface
@@ -18,20 +18,6 @@ SAMPLES = 600  # of the profile
 ACROSS = 9  # places across the robot's width whose least and largest height are shown
 BEYOND = 0.3  # m    of the profile before and after the torso's path
 LEAST_STEP = 1e-4  # m    of the smoothed path from row to row that has a direction
-MILLI = 1e3
-
-
-@dataclass(frozen=True)
-class Stance:
-    """A foot on the ground from touch-down to lift-off."""
-
-    leg: int
-    begin: float  # s
-    end: float  # s
-    x: float  # m    contact point at touch-down, world
-    y: float
-    z: float
-    depth: float  # m    of the contact point's lowest place below the surface before the contact
 
 
 @dataclass(frozen=True)
@@ -42,38 +28,18 @@ class Profile:
     ground: Array  # (samples,) m    below the path
     low: Array  # (samples,) m    least and largest height across the robot's width
     high: Array
-    torso_way: Array  # (rows,) m    of the torso in each row of the recording
-    torso_height: Array  # (rows,) m    world
-    stance_way: Array  # (stances,) m    of the contact points at touch-down
+    contact_way: Array  # (touch-downs,) m    of the contact points
+    contact_height: Array  # (touch-downs,) m    world
 
 
-def find_stances(view: View, surface: Surface) -> list[Stance]:
-    """Returns all stances of a run, by leg and time. Raises ColumnError without the columns."""
-    recording = view.recording
-    touching, place = recording.feet("contact") > 0.5, recording.foot_vectors("position")
-    time, found = recording.time, list[Stance]()
-    for leg in range(touching.shape[1]):
-        on = touching[:, leg].astype(int)
-        edges = np.flatnonzero(np.diff(on, prepend=0, append=0)).reshape(-1, 2)
-        for begin, end in edges.tolist():
-            x, y, z = place[begin, leg].tolist()
-            lowest = float(place[begin:end, leg, 2].min())
-            last = float(time[min(end, len(time) - 1)])
-            found.append(Stance(leg, float(time[begin]), last, x, y, z, lowest))
-    return _with_depths(found, view, surface)
+def _touch_downs(recording: Recording) -> tuple[NDArray[np.intp], Array]:
+    """Returns rows (n,) and contact points (n, 3) [m] of all touch-downs, leg by leg."""
+    on = recording.feet("contact") > 0.5
+    legs, rows = np.nonzero(np.diff(on.astype(int), axis=0, prepend=0).T > 0)
+    return rows, recording.foot_vectors("position")[rows, legs]
 
 
-def _with_depths(found: list[Stance], view: View, surface: Surface) -> list[Stance]:
-    """Returns stances whose depth, the lowest height until now, is below the surface."""
-    x, y = np.array([[one.x, one.y] for one in found]).reshape(-1, 2).T
-    ground = heights_at(surface, view.parameters, x, y)
-    return [
-        Stance(one.leg, one.begin, one.end, one.x, one.y, one.z, float(height) - one.depth)
-        for one, height in zip(found, ground, strict=True)
-    ]
-
-
-def make_profile(view: View, surface: Surface, stances: list[Stance]) -> Profile:
+def make_profile(view: View, surface: Surface) -> Profile:
     """Returns the profile along the torso's path, averaged over a gait period.
 
     Raises ColumnError without the columns.
@@ -83,9 +49,8 @@ def make_profile(view: View, surface: Surface, stances: list[Stance]) -> Profile
     steps = np.linalg.norm(np.diff(path, axis=0), axis=1)
     torso_way = np.concatenate([[0.0], np.cumsum(steps)])
     ahead = _directions(path, recording.column("torso.yaw"))
-    rows = np.searchsorted(recording.time, [one.begin for one in stances])
-    rows = np.minimum(rows, len(path) - 1)
-    arms = np.array([[one.x, one.y] for one in stances]).reshape(-1, 2) - path[rows]
+    rows, contacts = _touch_downs(recording)
+    arms = contacts[:, :2] - path[rows]
     forward = np.einsum("ri,ri->r", arms, ahead[rows])
     aside = np.abs(ahead[rows, 0] * arms[:, 1] - ahead[rows, 1] * arms[:, 0])
     way = np.linspace(-BEYOND, torso_way[-1] + BEYOND, SAMPLES)
@@ -95,9 +60,8 @@ def make_profile(view: View, surface: Surface, stances: list[Stance]) -> Profile
         ground=ground[ACROSS // 2],
         low=ground.min(axis=0),
         high=ground.max(axis=0),
-        torso_way=torso_way,
-        torso_height=recording.vector("torso.position")[:, 2],
-        stance_way=torso_way[rows] + forward,
+        contact_way=torso_way[rows] + forward,
+        contact_height=contacts[:, 2],
     )
 
 
@@ -140,20 +104,3 @@ def _band(
     left = np.column_stack([-ahead[rows, 1], ahead[rows, 0]])
     lines = [along + side * left for side in np.linspace(-half_width, half_width, ACROSS)]
     return np.array([heights_at(surface, view.parameters, *line.T) for line in lines])
-
-
-def pack_profile(profile: Profile, stances: list[Stance]) -> dict[str, Any]:
-    """Returns a profile for the viewer (panels/profile.ts): ways [mm] and heights [0.1 mm]."""
-    lines = {
-        name: np.round(1e4 * getattr(profile, name)).astype(int).tolist()
-        for name in ("ground", "low", "high")
-    }
-    feet = zip(profile.stance_way, stances, strict=True)
-    return lines | {
-        "begin": float(profile.way[0]),
-        "end": float(profile.way[-1]),
-        "feet": [
-            [stance.leg, round(stance.begin, 6), round(float(way), 4), round(stance.z, 5)]
-            for way, stance in feet
-        ],
-    }

@@ -20,9 +20,9 @@ from hexapod_cosim.cosim.report.accuracy import (
     effect_rows,
     with_errors,
 )
-from hexapod_cosim.cosim.report.figures import Figures, write_figures
+from hexapod_cosim.cosim.report.figures import Figures, draw_figures, write_figures
 from hexapod_cosim.cosim.report.headline import cards, creep_note, headline, plain_headline
-from hexapod_cosim.cosim.report.page import NO_VIEWER, render, viewer_script
+from hexapod_cosim.cosim.report.page import NO_VIEWER, embedded, render, viewer_script
 from hexapod_cosim.cosim.report.payload import as_json, make_payload
 from hexapod_cosim.cosim.report.servos import servo_rows
 from hexapod_cosim.cosim.report.surface import material_legend
@@ -43,6 +43,7 @@ from hexapod_cosim.cosim.results.results import StoredResult
 from hexapod_cosim.models import JOINT_NAMES
 
 REPORT, PLOTS, PROFILE = "report.html", "plots", "profile"
+STATIC = "static"  # of a section: its figure alone, without plots of the viewer
 
 
 class Section(NamedTuple):
@@ -51,7 +52,7 @@ class Section(NamedTuple):
     name: str  # of the static figure that shows the same
     title: str
     caption: str
-    shape: str = ""  # layout of its plots: three in a row, "pairs", "wide" or "overhead"
+    shape: str = ""  # layout of its plots: three in a row, "pairs", "wide" or STATIC
 
 
 SECTIONS = (
@@ -79,7 +80,7 @@ SECTIONS = (
         "Height profile",
         "The ground along the torso's path: the line below the torso, the band from the lowest to "
         "the highest ground across the robot's width; dots where feet touched down.",
-        "overhead",
+        STATIC,
     ),
     Section("torques", "Torques", "The largest absolute torque over the six legs, joint by joint."),
     Section(
@@ -97,9 +98,8 @@ SECTIONS = (
     Section(
         "path",
         "Path of the torso",
-        "The torso from above, dots where it is at the replay's time; "
-        "dotted, where the command leads.",
-        "overhead",
+        "The torso from above, its end marked by a dot; dotted, where the command leads.",
+        STATIC,
     ),
 )
 
@@ -128,9 +128,6 @@ def write_report(
         accuracies: by control, where they were checked.
         figures: those of the runs; by default they are drawn now.
     """
-    # imported only here because matplotlib is slow to import
-    from hexapod_cosim.cosim.report.plots import FIGURES, draw_figures  # noqa: PLC0415
-
     if figures is None:
         figures = draw_figures({label: run.view for label, run in runs.items()})
     files, skipped = write_figures(figures, folder / PLOTS), dict(figures.skipped)
@@ -139,9 +136,9 @@ def write_report(
     if not any(plans_feet(run.view.recording) for run in runs.values()):
         skipped["feet"] = ""  # a controller need not tell its plan
     missing = [
-        f"{FIGURES[name].title} is not drawn: {reason}"
-        for name, reason in skipped.items()
-        if reason
+        f"{section.title} is not drawn: {skipped[section.name]}"
+        for section in SECTIONS
+        if skipped.get(section.name)
     ]
     for text in missing:
         warn(text)
@@ -164,6 +161,11 @@ def write_report(
         keys={label: style.key for label, style in control_styles(runs).items()},
         title=first.facts.title,
         sections=[section for section in SECTIONS if section.name not in skipped],
+        images={
+            section.name: embedded(folder / PLOTS / f"{section.name}.svg")
+            for section in SECTIONS
+            if section.shape == STATIC and f"{section.name}.svg" in figures.images
+        },
         missing=missing,
         servos=servo_rows(runs),
         joints=JOINT_NAMES,

@@ -23,11 +23,10 @@ from hexapod_cosim.cosim.interface.names import (
 from hexapod_cosim.cosim.master.recorder import Recording
 from hexapod_cosim.cosim.results.support import stability_margins
 from hexapod_cosim.cosim.results.walk import (
-    BRISTLE,
     CONTACT_SHARE,
-    LUGRE,
     NONE,
     TANH,
+    WITH_BRISTLES,
     Array,
     View,
     Walk,
@@ -38,9 +37,9 @@ from hexapod_cosim.cosim.results.walk import (
 )
 from hexapod_cosim.models import FRICTION_LAWS, LEG_NAMES, Friction, Servo
 from hexapod_cosim.models.friction import yielding_velocity
+from hexapod_cosim.models.measure import CONE_BINS, CONE_STARTS
 
 TANH_LIMIT = 0.999  # limits atanh: a larger share is sliding, not creep
-NEARLY_SLIDING = 0.9  # of the friction cone
 
 
 class Metric(NamedTuple):
@@ -149,8 +148,8 @@ DUST = 1e-6  # of the floor: a smaller value is round-off and is shown as 0
 PLANNED = tuple(name for leg in LEG_NAMES for name in vector_names(f"controller.{leg}.planned"))
 # Time of all feet under load by the share of the friction cone used: bins begin at 0.9 (i/30)^2,
 # the last holds all above 0.9
-CONE_TIMES = tuple(vector_names("feet.cone_time", 31))
-_CONE_EDGES = np.append(NEARLY_SLIDING * (np.arange(31) / 30.0) ** 2, 1.0)
+CONE_TIMES = tuple(vector_names("feet.cone_time", CONE_BINS))
+_CONE_EDGES = np.append(CONE_STARTS, 1.0)
 # outputs that the plant integrates or tracks for the metrics
 MEASURED_BY_PLANT = (
     *(
@@ -254,7 +253,7 @@ def _net_slip(part: Recording, parameters: Mapping[str, float]) -> Array:
 
     That motion is the creep of the tanh law, or the stretch and return of a bristle.
     """
-    if parameters.get("friction.law", TANH) in (BRISTLE, LUGRE):
+    if parameters.get("friction.law", TANH) in WITH_BRISTLES:
         sliding = yielding_velocity(
             _friction(parameters), part.foot_vectors("velocity"), part.foot_vectors("bristle")
         )

@@ -16,6 +16,7 @@ from hexapod_cosim.cosim.interface.names import foot_names, joint_names, vector_
 from hexapod_cosim.cosim.master.recorder import COMMAND_COLUMNS, Recording
 from hexapod_cosim.cosim.results.feet import feet_of_angles
 from hexapod_cosim.models import FRICTION_LAWS, TERRAINS
+from hexapod_cosim.models.friction import BRISTLE_LAWS
 from hexapod_cosim.models.ground.surface import Surface
 
 Array = NDArray[np.float64]
@@ -29,9 +30,8 @@ SHOWN_CYCLES = 3  # in plots of what happens within a gait cycle
 ROUND_OFF = 1e-6  # s    of a recorded time
 # numbers of the FMU's enumerations
 FLAT, SLOPE, GRID = (TERRAINS.index(kind) + 1 for kind in ("flat", "slope", "grid"))
-NONE, TANH, BRISTLE, LUGRE = (
-    FRICTION_LAWS.index(law) + 1 for law in ("none", "tanh", "bristle", "lugre")
-)
+NONE, TANH = (FRICTION_LAWS.index(law) + 1 for law in ("none", "tanh"))
+WITH_BRISTLES = tuple(FRICTION_LAWS.index(law) + 1 for law in BRISTLE_LAWS)
 
 
 @dataclass(frozen=True)

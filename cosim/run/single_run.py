@@ -26,11 +26,10 @@ from hexapod_cosim.cosim.control.controllers import (
 from hexapod_cosim.cosim.interface.controller_interface import ControllerSetup
 from hexapod_cosim.cosim.interface.plant_interface import plant_roots
 from hexapod_cosim.cosim.interface.start_values import parameter_values
-from hexapod_cosim.cosim.master.faulty_sensors import InnerSensors
 from hexapod_cosim.cosim.master.fmu import Fmu
-from hexapod_cosim.cosim.master.force_sensor import ForceSensor, SensorSettings
 from hexapod_cosim.cosim.master.loop import COMPLETED, Outcome, Progress, diagnostic_columns, run
 from hexapod_cosim.cosim.master.recorder import Recorder, chosen_columns
+from hexapod_cosim.cosim.master.sensors import errors_of
 from hexapod_cosim.cosim.master.signals import Signals
 from hexapod_cosim.cosim.results.arrival import is_sent_ahead, missed_end
 from hexapod_cosim.cosim.results.drop import describe_drop
@@ -72,7 +71,6 @@ from hexapod_cosim.models.ground.surface import Surface
 # parameters with these prefixes describe the robot; all others are settings
 BODY_PARAMETERS = ("torso.", "foot.", *(f"{leg}." for leg in LEG_NAMES))
 GRID = "terrain.grid"  # parameter: number of the grid file in the FMU's resources
-ROUND_OFF = 1e-6  # of a macro-step, in a delay
 SAME = 1e-9  # relative, of a parameter that was printed and read again
 
 
@@ -108,11 +106,7 @@ def simulate(
         make_controller(plan, law=law) as controller,
     ):
         parameters = initialise_plant(plant, plan)
-        signals = Signals(
-            plant,
-            sensor=make_sensor(scenario, plan.schedule),
-            inner=make_inner_sensors(plan.schedule),
-        )
+        signals = Signals(plant, errors=errors_of(scenario, plan.schedule))
         recorder = _make_recorder(plan, signals, controller)
         start_controller(controller, plant, plan)
         if begin is not None:
@@ -296,27 +290,6 @@ def make_result(
         parameters=dict(parameters),
     )
     return Result(scenario=scenario, outcome=outcome, metrics=metrics, facts=facts, surface=surface)
-
-
-def sensor_settings(scenario: Scenario, schedule: Schedule) -> SensorSettings | None:
-    """Returns the errors of the feet's force sensors; None when there are none."""
-    noise = scenario.sensors.foot_force_noise
-    delay = math.ceil(scenario.sensors.foot_force_delay / scenario.macro_step - ROUND_OFF)
-    if not noise and not delay and schedule.faults is None:
-        return None
-    return SensorSettings(noise=noise, seed=scenario.seed, delay=delay, faults=schedule.faults)
-
-
-def make_sensor(scenario: Scenario, schedule: Schedule) -> ForceSensor | None:
-    """Returns the model of the feet's force sensors; None when they have no errors."""
-    settings = sensor_settings(scenario, schedule)
-    return None if settings is None else ForceSensor(settings)
-
-
-def make_inner_sensors(schedule: Schedule) -> InnerSensors | None:
-    """Returns the sensors of joints and attitude with their faults; None when they have none."""
-    angle, attitude = schedule.angle_faults, schedule.attitude_faults
-    return None if angle is None and attitude is None else InnerSensors(angle, attitude)
 
 
 @contextmanager

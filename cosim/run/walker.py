@@ -13,25 +13,24 @@ from time import thread_time
 from hexapod_cosim.controller import Gains
 from hexapod_cosim.cosim.common.closing import Closing
 from hexapod_cosim.cosim.common.temporary import TemporaryFolder
-from hexapod_cosim.cosim.control.connection import Connection
 from hexapod_cosim.cosim.control.controllers import (
     connection_of,
     control_facts,
     fmu_parameters_of,
 )
-from hexapod_cosim.cosim.control.fmu_instance import ControllerFmu2, open_controller_fmu
+from hexapod_cosim.cosim.control.fmu_instance import open_controller_fmu
 from hexapod_cosim.cosim.control.fmu_law import FmuLaw
-from hexapod_cosim.cosim.control.wiring import compiled_wiring
 from hexapod_cosim.cosim.export.controller_export import export_controller
 from hexapod_cosim.cosim.interface.controller_interface import (
     ControllerSetup,
     controller_parameters,
 )
+from hexapod_cosim.cosim.master.connection import Connection
 from hexapod_cosim.cosim.master.fmu import Fmu, FmuBlock
 from hexapod_cosim.cosim.master.loop import Progress
 from hexapod_cosim.cosim.master.native_loop import NativeMaster
 from hexapod_cosim.cosim.master.recorder import COMMAND_COLUMNS, chosen_columns
-from hexapod_cosim.cosim.master.wiring import Wiring
+from hexapod_cosim.cosim.master.sensors import errors_of
 from hexapod_cosim.cosim.results.metrics import metric_columns
 from hexapod_cosim.cosim.results.result import Result
 from hexapod_cosim.cosim.results.summary import Summary, refused_summary, summarise
@@ -43,16 +42,21 @@ from hexapod_cosim.cosim.run.single_run import (
     make_plan,
     make_result,
     run_surface,
-    sensor_settings,
     simulate,
     start_controller,
 )
-from hexapod_cosim.cosim.scenario.controls import FMU, Control, control_of
+from hexapod_cosim.cosim.scenario.controls import FMU, control_of
 from hexapod_cosim.cosim.scenario.records import Scenario
 from hexapod_cosim.models import HexapodError, Robot
 from hexapod_cosim.models.friction import BRISTLE_LAWS
 
 MAX_SETTINGS = 64  # robots whose settings are kept
+
+
+def reads_no_numbers(scenario: Scenario) -> bool:
+    """Returns whether a sensor of a scenario reads NaN."""
+    kinds = scenario.faults, scenario.angle_faults, scenario.attitude_faults
+    return any(event.fault == "nan" for events in kinds for event in events)
 
 
 class Walker(Closing):
@@ -95,71 +99,42 @@ class Walker(Closing):
     ) -> Result:
         """Runs a scenario, on the plant FMU `fmu` and with `gains` if given.
 
-        Arguments are those of run.simulate(), which runs scenarios with faults that the loop in C
-        does not know (Scenario.has_loop_faults). Raises HexapodError when the run cannot start; how
-        a run that started ended is in the result.
+        Arguments are those of run.simulate(), which runs on the loop in Python what the loop in C
+        cannot: a controller in Python, an FMU of FMI 3.0 or with Boolean inputs, and a built-in
+        control whose sensors read NaN, which FMUs refuse. Raises HexapodError when the run cannot
+        start; how a run that started ended is in the result.
         """
         control = control_of(scenario.control)
-        if scenario.has_loop_faults:
-            path = self._fmus.fmu(scenario.robot) if fmu is None else fmu
-            return simulate(scenario, fmu=path, gains=gains, progress=progress, begin=begin)
-        if not control.is_builtin:
-            return self._simulate_given(
-                scenario, control, fmu=fmu, gains=gains, progress=progress, begin=begin
-            )
-        plan = make_plan(scenario, gains=gains)
-        controller = self._controller_for(plan)
-        plant, master = self._plant(plan, controller, fmu)
-        parameters = self._initialise_plant(plant, plan)
-        controller.initialise(scenario.start, scenario.start + scenario.duration)
-        return self._run(plan, plant, master, parameters, progress, begin)
-
-    def _simulate_given(
-        self,
-        scenario: Scenario,
-        control: Control,
-        *,
-        fmu: Path | None,
-        gains: Gains | None,
-        progress: Progress | None,
-        begin: Callable[[], None] | None,
-    ) -> Result:
-        """Runs a scenario under the user's control.
-
-        An FMU of FMI 2.0 with floating-point inputs runs on the loop in C, opened anew for each
-        run, because FMUs need not support a reset; all others run on the loop in Python.
-        """
         path = self._fmus.fmu(scenario.robot) if fmu is None else fmu
+        if control.is_builtin and not reads_no_numbers(scenario):
+            plan = make_plan(scenario, gains=gains)
+            controller = self._controller_for(plan)
+            plant, master = self._plant(plan, controller, path)
+            parameters = self._initialise_plant(plant, plan)
+            controller.initialise(scenario.start, scenario.start + scenario.duration)
+            return self._run(plan, plant, master, parameters, progress, begin)
         if control.kind == FMU and control.path is not None:
-            with closing(open_controller_fmu(control.path)) as controller:
+            # opened anew for each run, because FMUs need not support a reset
+            with closing(open_controller_fmu(control.path)) as given:
                 plan = make_plan(scenario, gains=gains)
-                connection = connection_of(control, controller.described, scenario, plan.controller)
-                wiring = compiled_wiring(connection)
-                if wiring is not None and isinstance(controller, ControllerFmu2):
-                    return self._simulate_fmu(
-                        plan, path, controller, connection, wiring, progress, begin
-                    )
+                connection = connection_of(control, given.described, scenario, plan.controller)
+                if connection.is_scalar and isinstance(given, Fmu):
+                    return self._simulate_fmu(plan, path, given, connection, progress, begin)
         return simulate(scenario, fmu=path, gains=gains, progress=progress, begin=begin)
 
     def _simulate_fmu(
         self,
         plan: RunPlan,
         path: Path,
-        controller: ControllerFmu2,
+        controller: Fmu,
         connection: Connection,
-        wiring: Wiring,
         progress: Progress | None,
         begin: Callable[[], None] | None,
     ) -> Result:
-        """Runs a plan under a controller FMU on the loop in C."""
+        """Runs a plan under a user's controller FMU on the loop in C."""
         control, plant = control_of(plan.scenario.control), self._open_plant(path)
-        master = NativeMaster(
-            plant,
-            controller,
-            columns=self._columns(plan),
-            judged=metric_columns(bristles=True),
-            wiring=wiring,
-        )
+        columns, judged = self._columns(plan), metric_columns(bristles=True)
+        master = NativeMaster(plant, controller, connection, columns=columns, judged=judged)
         parameters = self._initialise_plant(plant, plan)
         controller.set_parameters(fmu_parameters_of(control, controller.described, plan.scenario))
         law = FmuLaw(controller, connection, period=plan.controller.period)
@@ -184,7 +159,6 @@ class Walker(Closing):
     ) -> Result:
         """Runs the loop in C on initialised FMUs; `warnings` are the controller's."""
         scenario = plan.scenario
-        sensor = sensor_settings(scenario, plan.schedule)
         if self._everything:
             chosen_columns(
                 ("time", *master.columns, *COMMAND_COLUMNS),
@@ -195,8 +169,9 @@ class Walker(Closing):
             begin()
         started = thread_time()
         every = scenario.every if self._everything else 1  # metrics need every macro-step
+        errors = errors_of(scenario, plan.schedule)
         outcome = master.run(
-            plan.schedule, h=scenario.macro_step, every=every, sensor=sensor, progress=progress
+            plan.schedule, h=scenario.macro_step, every=every, errors=errors, progress=progress
         )
         self.loop_time = thread_time() - started
         # only a run that records everything gets a report, which shows the surface
@@ -225,9 +200,8 @@ class Walker(Closing):
         except HexapodError as error:
             return refused_summary(scenario, error)
 
-    def _plant(self, plan: RunPlan, controller: Fmu, fmu: Path | None) -> tuple[Fmu, NativeMaster]:
+    def _plant(self, plan: RunPlan, controller: Fmu, path: Path) -> tuple[Fmu, NativeMaster]:
         """Returns the plant FMU of the plan and the master that connects it to the controller."""
-        path = self._fmus.fmu(plan.scenario.robot) if fmu is None else fmu
         plant, columns = self._open_plant(path), self._columns(plan)
         key = path, columns
         if key not in self._masters:

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from typing import Annotated, Any
 
-from hexapod_cosim.controller import Parts
+from hexapod_cosim.controller import DEFAULT_PERIOD, Parts
 from hexapod_cosim.cosim.common.installation import has_pyarrow
 from hexapod_cosim.models import (
     JOINT_NAMES,
@@ -226,7 +226,7 @@ class Scenario:
     control_settings: Mapping[str, Any] = field(default_factory=dict)
     start: Annotated[float, Number("s")] = 0.0
     duration: Annotated[float, Number("s", above=0.0)] = 10.0
-    macro_step: Annotated[float, Number("s", above=0.0, at_most=0.1)] = 0.005
+    macro_step: Annotated[float, Number("s", above=0.0, at_most=0.1)] = DEFAULT_PERIOD
     seed: int = 0
     gravity: tuple[float, float, float] | None = None  # m/s2    None: the robot's own
     walk: Walk = Walk()
@@ -285,12 +285,6 @@ class Scenario:
     def lost(self) -> tuple[Lost, ...]:
         """The events that are lost commands or dropped macro-steps."""
         return tuple(event for event in self.events if isinstance(event, Lost))
-
-    @property
-    def has_loop_faults(self) -> bool:
-        """Whether faults occur that the loop in Python alone knows."""
-        inner = self.servo_faults or self.lost or self.angle_faults or self.attitude_faults
-        return bool(inner) or any(event.fault in ("nan", "late") for event in self.faults)
 
     def to_table(self) -> dict[str, Any]:
         """Returns the scenario as the tables of an equivalent scenario file."""

@@ -12,6 +12,7 @@ from copy import deepcopy
 from pathlib import Path
 from typing import Any
 
+from hexapod_cosim.cosim.scenario.bundled import list_scenarios
 from hexapod_cosim.cosim.scenario.controls import LAW, control_beside
 from hexapod_cosim.cosim.scenario.records import KEYS, SECTIONS
 from hexapod_cosim.models import ScenarioError, unknown_name
@@ -21,12 +22,6 @@ from hexapod_cosim.models.ground.table import beside
 from hexapod_cosim.models.schema import parse_toml, reading_toml
 
 POINTED = re.compile(r"[+-]?(?:\d+\.|\.\d+)(?:[eE][+-]?\d+)?")  # .1 or 1.
-
-
-def list_scenarios() -> dict[str, Path]:
-    """Returns the bundled scenarios by name."""
-    found = {path.stem: path for path in (Path(__file__).parent / "scenarios").rglob("*.toml")}
-    return dict(sorted(found.items()))
 
 
 def read_tables(path_or_name: str | Path) -> tuple[dict[str, Any], str]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -26,6 +26,20 @@ from hexapod_cosim.models.errors import FmuError
 STEP, STEPS = 0.001, 5  # of the trial: their length [s] and their number
 TIME_LIMIT = 60.0  # s, of the steps
 PLATFORMS = {"2.0": fmi2_platform, "3.0": fmi3_platform}
+
+
+class UnsoundFmuError(FmuError):
+    """An FMU with problems; `found` goes into the JSON of the failure."""
+
+    def __init__(self, path: Path, problems: Sequence[str]) -> None:
+        super().__init__(
+            "the FMU is not sound: problems",
+            got=f"{len(problems)} of them",
+            expected="none",
+            fix="export it again with `hexapod export`",
+            where=str(path),
+        )
+        self.found = {"fmu": str(path), "valid": False, "problems": list(problems)}
 
 
 def find_problems(path: Path) -> list[str]:

@@ -1,4 +1,4 @@
-"""The course: fixed cases that judge controls, their statistics, goals, picture and report.
+"""The course: fixed cases that judge controls, their statistics, picture and report.
 
 Imports `common`, `interface`, `scenario`, `master`, `export`, `results`, `report`, `design` and
 `run`.

@@ -11,11 +11,10 @@ from typing import Annotated, Any
 import typer
 
 from hexapod_cosim.controller import Gains
-from hexapod_cosim.cosim.cli.extension import Command, Extension
 from hexapod_cosim.cosim.cli.failures import SUCCESS
-from hexapod_cosim.cosim.cli.running import ControlNames, GainsFile, Settings, given_gains
+from hexapod_cosim.cosim.cli.options import ControlNames, GainsFile, Json, Settings
+from hexapod_cosim.cosim.cli.running import given_gains
 from hexapod_cosim.cosim.cli.terminal import (
-    Json,
     counting_bar,
     show_files,
     show_json,
@@ -32,7 +31,6 @@ from hexapod_cosim.cosim.results.results import ResultsFolder, results_folder
 from hexapod_cosim.cosim.scenario.controls import AT, CHOOSER
 from hexapod_cosim.cosim.scenario.records import CHOSEN, CONTROLS
 from hexapod_cosim.extensions.course import texts
-from hexapod_cosim.extensions.course.goals import verdicts
 from hexapod_cosim.extensions.course.reading import load_course
 from hexapod_cosim.extensions.course.records import (
     JUDGE,
@@ -208,7 +206,7 @@ def _show(table: Table) -> None:
         f"Course {course.version} ({course.hash[:12]}), split {course.split}, "
         f"{len(course.cases)} cases, {len(course.seeds)} seeds; reference {table.reference}"
     )
-    for title, (columns, rows) in reversed(texts.tables(table, verdicts(table))):
+    for title, (columns, rows) in reversed(texts.tables(table)):
         show_text(f"\n{title}")
         show_table(columns, rows)
 
@@ -226,9 +224,3 @@ def _command_line(options: Mapping[str, Any], *, split: str, quick: bool) -> str
         for item in value if isinstance(value, list) else [value]:
             words += [] if item is None else [f"--{name}", str(item)]
     return shlex.join(words)
-
-
-EXTENSION = Extension(
-    commands=[Command(name="benchmark", run=benchmark, epilog=EPILOG)],
-    reports={BENCHMARK: report_on},
-)

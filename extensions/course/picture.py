@@ -35,27 +35,9 @@ HEAD, FOOT = 0.75, 0.6  # in
 GAP, ROUND = 0.06, 0.12  # of a cell: between cells, of their corners
 
 
-@dataclass(frozen=True)
-class Theme:
-    """Colours of the picture on a page."""
-
-    name: str
-    ink: str
-    muted: str
-    better: str
-    middle: str
-    worse: str
-
-    @property
-    def colours(self) -> LinearSegmentedColormap:
-        """The colours from better to worse."""
-        stops = [self.better, self.middle, self.worse]
-        return LinearSegmentedColormap.from_list(f"change-{self.name}", stops)
-
-
-LIGHT = Theme("light", "#15191f", "#5c6570", "#00805e", "#eef0f3", "#c25700")
-DARK = Theme("dark", "#e8ebef", "#9aa4b0", "#2fae86", "#232931", "#ee8a45")
-THEMES = (LIGHT, DARK)
+INK, MUTED = "#15191f", "#5c6570"
+# from better to worse
+COLOURS = LinearSegmentedColormap.from_list("change", ["#00805e", "#eef0f3", "#c25700"])
 
 
 @dataclass(frozen=True)
@@ -93,7 +75,7 @@ def rows_of(table: Table) -> list[str]:
     return rows
 
 
-def draw_course(table: Table, theme: Theme) -> Figure:
+def draw_course(table: Table) -> Figure:
     """Draws a panel for each column, but one column of a control that is compared with two.
 
     That with another walk is left out. The reference has a panel where it is alone.
@@ -109,34 +91,34 @@ def draw_course(table: Table, theme: Theme) -> Figure:
         axes = figure.add_axes(
             (left / width, FOOT / height, len(COLUMNS) * CELL / width, ROW * len(rows) / height)
         )
-        _draw_panel(axes, table, control, rows, theme)
+        _draw_panel(axes, table, control, rows)
         if not number:
-            _draw_labels(axes, rows, theme)
-    _draw_key(figure, table, theme, width=width, height=height)
+            _draw_labels(axes, rows)
+    _draw_key(figure, table, width=width, height=height)
     return figure
 
 
-def _draw_panel(axes: Axes, table: Table, control: str, rows: Sequence[str], theme: Theme) -> None:
+def _draw_panel(axes: Axes, table: Table, control: str, rows: Sequence[str]) -> None:
     """Draws the cells of a control."""
     axes.set_axis_off()
     axes.set_xlim(0.0, len(COLUMNS))
     axes.set_ylim(len(rows), 0.0)
     for place, heading in enumerate(HEADINGS):
-        _write(axes, place + 0.5, -0.35, heading, theme.muted, va="bottom", fontsize=6.5)
+        _write(axes, place + 0.5, -0.35, heading, MUTED, va="bottom", fontsize=6.5)
     beside = " against ".join(dict.fromkeys(table.columns[control]))
-    _write(axes, 0.0, -1.9, beside, theme.ink, ha="left", va="bottom", fontsize=9.0, weight="bold")
+    _write(axes, 0.0, -1.9, beside, INK, ha="left", va="bottom", fontsize=9.0, weight="bold")
     for number, row in enumerate(rows):
         case = table.cases.get((row, control))
         for place, column in enumerate(COLUMNS if case is not None else ()):
             assert case is not None
-            _draw_cell(axes, place, number, cell_of(case, column), theme)
+            _draw_cell(axes, place, number, cell_of(case, column))
 
 
-def _draw_cell(axes: Axes, x: float, y: float, cell: Cell, theme: Theme) -> None:
+def _draw_cell(axes: Axes, x: float, y: float, cell: Cell) -> None:
     if math.isnan(cell.shade):
-        _write(axes, x + 0.5, y + 0.5, "–", theme.muted)
+        _write(axes, x + 0.5, y + 0.5, "–", MUTED)
         return
-    colour = theme.colours(0.5 + 0.5 * cell.shade)
+    colour = COLOURS(0.5 + 0.5 * cell.shade)
     box = FancyBboxPatch(
         (x + GAP, y + GAP),
         1.0 - 2.0 * GAP,
@@ -164,56 +146,46 @@ def _write(axes: Axes, x: float, y: float, text: str, colour: str, **more: Any) 
     axes.text(x, y, text, color=colour, clip_on=False, **style)
 
 
-def _draw_labels(axes: Axes, rows: Sequence[str], theme: Theme) -> None:
+def _draw_labels(axes: Axes, rows: Sequence[str]) -> None:
     """Writes the names of classes and cases to the left of the first panel."""
     for number, row in enumerate(rows):
         kind, colon, name = row.partition(":")
         style = {"ha": "right", "fontsize": 6.5}
         if colon:
             style |= {"fontsize": 7.0, "weight": "bold"}
-        _write(
-            axes, -0.2, number + 0.53, name or kind, theme.ink if colon else theme.muted, **style
-        )
+        _write(axes, -0.2, number + 0.53, name or kind, INK if colon else MUTED, **style)
 
 
-def _draw_key(figure: Figure, table: Table, theme: Theme, *, width: float, height: float) -> None:
+def _draw_key(figure: Figure, table: Table, *, width: float, height: float) -> None:
     """Draws the scale of colours below the panels."""
     axes = figure.add_axes((LABELS / width, 0.34 / height, 4.0 * CELL / width, 0.08 / height))
-    axes.imshow(np.linspace(-1.0, 1.0, 128)[None, :], aspect="auto", cmap=theme.colours)
+    axes.imshow(np.linspace(-1.0, 1.0, 128)[None, :], aspect="auto", cmap=COLOURS)
     axes.set_axis_off()
     ends = ((0.0, "÷ 4, better", "left"), (0.5, "1", "center"), (1.0, "× 4, worse", "right"))
     for place, text, side in ends:
-        _write(axes, place, -0.9, text, theme.muted, transform=axes.transAxes, ha=side)
+        _write(axes, place, -0.9, text, MUTED, transform=axes.transAxes, ha=side)
     note = (
         "Change of the means in %, over seeds on which both succeeded; "
         "pale: not sure; –: fewer than half of them did."
     )
     figure.text(
-        (LABELS + 4.4 * CELL) / width, 0.38 / height, note, color=theme.muted, fontsize=6.5,
+        (LABELS + 4.4 * CELL) / width, 0.38 / height, note, color=MUTED, fontsize=6.5,
         va="center", wrap=True,
     )  # fmt: skip
 
 
 def write_picture(table: Table, folder: Path) -> list[Path]:
-    """Writes the picture as SVG in both themes and as PNG on white; returns the files.
-
-    Raises HexapodError.
-    """
+    """Writes the picture as SVG and PNG; returns the files. Raises HexapodError."""
     place = folder / FOLDER
     try:
         place.mkdir(exist_ok=True)
     except OSError as error:
         raise HexapodError("cannot write", got=error.strerror, where=str(place)) from error
-    files: list[Path] = []
+    files = [place / f"{STEM}.svg", place / f"{STEM}.png"]
     with matplotlib.rc_context({**SETTINGS, "figure.constrained_layout.use": False}):
-        for theme in THEMES:
-            figure = draw_course(table, theme)
-            kinds = ("svg", "png") if theme is LIGHT else ("svg",)
-            for kind in kinds:
-                files.append(place / f"{STEM}-{theme.name}.{kind}")
-                clear = kind == "svg"
-                with atomic_path(files[-1]) as path:
-                    figure.savefig(
-                        path, format=kind, dpi=DPI, metadata=UNDATED[kind], transparent=clear
-                    )
+        figure = draw_course(table)
+        for file in files:
+            kind = file.suffix[1:]
+            with atomic_path(file) as path:
+                figure.savefig(path, format=kind, dpi=DPI, metadata=UNDATED[kind])
     return files

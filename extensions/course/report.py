@@ -2,20 +2,15 @@
 
 from __future__ import annotations
 
-import base64
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from jinja2 import ChoiceLoader, PackageLoader
-
-from hexapod_cosim.cosim.common.control_style import all_styles
 from hexapod_cosim.cosim.common.files import write_text
-from hexapod_cosim.cosim.report.page import environment
+from hexapod_cosim.cosim.report.page import embedded, render
 from hexapod_cosim.extensions.course import texts
-from hexapod_cosim.extensions.course.goals import verdicts
-from hexapod_cosim.extensions.course.picture import STEM, THEMES, write_picture
+from hexapod_cosim.extensions.course.picture import write_picture
 from hexapod_cosim.extensions.course.table import ALL, Table
 
 REPORT, TEMPLATE = "report.html", "course.html.jinja"
@@ -27,15 +22,15 @@ def write_course_report(table: Table, content: Mapping[str, Any], folder: Path) 
     content: of benchmark.json.
     """
     files = write_picture(table, folder) if table.cases else []
-    found = [verdict for verdict in verdicts(table) if verdict.was_run]
-    page = _environment().get_template(TEMPLATE).render(
-        styles=all_styles(table.controls),
+    page = render(
+        TEMPLATE,
+        extension="course",
+        controls=table.controls,
         title=title_of(table),
         headline=headline(table),
         lead=lead(table),
         warnings=[] if content["complete"] else ["The course was stopped before its end."],
-        picture=_pictures(files),
-        goals=texts.goal_rows(found) if found else None,
+        picture=embedded(files[0]) if files else None,
         parts=texts.part_rows(table),
         classes=texts.class_rows(table),
         cases=texts.case_rows(table),
@@ -46,13 +41,6 @@ def write_course_report(table: Table, content: Mapping[str, Any], folder: Path) 
     )  # fmt: skip
     write_text(folder / REPORT, page)
     return [*files, folder / REPORT]
-
-
-def _environment() -> Any:
-    """Returns the templates of this folder and those of the folder `report`."""
-    own = environment()
-    loaders = [PackageLoader("hexapod_cosim.extensions", "course"), own.loader]
-    return own.overlay(loader=ChoiceLoader([each for each in loaders if each is not None]))
 
 
 def title_of(table: Table) -> str:
@@ -83,21 +71,6 @@ def lead(table: Table) -> str:
         f"Changes are from {table.reference} unless the tables name another control. "
         "A success walks upright to the end and arrives."
     )
-
-
-def _pictures(files: Sequence[Path]) -> dict[str, str] | None:
-    """Returns the pictures by theme as data URLs."""
-    found = {
-        theme.name: _embedded(path)
-        for theme in THEMES
-        for path in files
-        if path.name == f"{STEM}-{theme.name}.svg"
-    }
-    return found or None
-
-
-def _embedded(svg: Path) -> str:
-    return "data:image/svg+xml;base64," + base64.b64encode(svg.read_bytes()).decode("ascii")
 
 
 def _facts(content: Mapping[str, Any]) -> dict[str, str]:

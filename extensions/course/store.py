@@ -13,7 +13,6 @@ from typing import Any
 
 from hexapod_cosim.cosim.common.files import atomic_text, read_json, write_json, write_text
 from hexapod_cosim.cosim.common.plant_files import package_version
-from hexapod_cosim.extensions.course.goals import verdicts
 from hexapod_cosim.extensions.course.parts import judge_parts
 from hexapod_cosim.extensions.course.reading import load_course
 from hexapod_cosim.extensions.course.records import QUANTITIES, Case, CourseError
@@ -51,7 +50,6 @@ def result_table(table: Table, *, command: str, complete: bool) -> dict[str, Any
             item.name: {"title": item.title, "unit": item.unit, "metric": item.metric}
             for item in QUANTITIES
         },
-        "goals": [verdict.as_table() for verdict in verdicts(table)],
         "parts": [each.as_table() for each in judge_parts(table)],
         "classes": _by_control(table.classes),
         "cases": {
@@ -177,5 +175,5 @@ def write_result(
     content = result_table(table, command=command, complete=complete)
     write_json(folder / RESULT, content)
     write_runs(folder / RUNS, table.runs)
-    write_text(folder / TABLES, markdown(table, verdicts(table)))
+    write_text(folder / TABLES, markdown(table))
     return content, [folder / RESULT, folder / RUNS, folder / TABLES]

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 
-from hexapod_cosim.extensions.course.goals import Verdict
 from hexapod_cosim.extensions.course.parts import Effect, judge_parts
 from hexapod_cosim.extensions.course.records import SHOWN, Quantity
 from hexapod_cosim.extensions.course.statistics import Interval, Rate
@@ -118,46 +117,6 @@ def case_rows(table: Table) -> tuple[list[str], list[list[str]]]:
     return columns, rows
 
 
-def goal_rows(found: Sequence[Verdict]) -> tuple[list[str], list[list[str]]]:
-    """Returns the table of goals: a row for each goal, what was measured of each control."""
-    controls = list(dict.fromkeys(verdict.control for verdict in found))
-    goals: dict[str, list[Verdict]] = {}
-    for verdict in found:
-        goals.setdefault(verdict.goal.name, []).append(verdict)
-    rows = [
-        [one[0].goal.text, _bound(one[0]), *map(_goal_cell, one), one[-1].measured.note]
-        for one in goals.values()
-    ]
-    return ["goal", "bound", *controls, "of"], rows
-
-
-def _bound(verdict: Verdict) -> str:
-    sign = "≥" if verdict.goal.at_least else "≤"
-    return f"{sign} {_goal_value(verdict, verdict.goal.bound)}"
-
-
-def _goal_cell(verdict: Verdict) -> str:
-    """Returns a value with its interval where it shows, and whether the goal is reached."""
-    value = verdict.measured.value
-    shown = [_goal_value(verdict, each) for each in (value.value, value.low, value.high)]
-    interval = f" ({shown[1]} .. {shown[2]})" if len({*shown, NONE}) > 2 else ""
-    return f"{shown[0]}{interval} {reached_text(verdict)}"
-
-
-def _goal_value(verdict: Verdict, value: float) -> str:
-    if math.isnan(value):
-        return NONE
-    return f"{100.0 * value:.0f} %" if verdict.goal.percent else f"{value:.3g}"
-
-
-def reached_text(verdict: Verdict) -> str:
-    """Returns whether a goal is reached, as a word; "?" where its interval contains the bound."""
-    if verdict.reached is None:
-        return "no value"
-    word = "reached" if verdict.reached else "missed"
-    return word if verdict.sure else f"{word}?"
-
-
 def failure_rows(table: Table) -> tuple[list[str], list[list[str]]]:
     """Returns the table of failed runs by case, control and reason."""
     rows = [
@@ -214,13 +173,10 @@ def sweep_rows(table: Table) -> tuple[list[str], list[list[str]]]:
     return ["heights", "control", "success"], [row for row in rows if row[2]]
 
 
-def tables(
-    table: Table, found: Sequence[Verdict]
-) -> list[tuple[str, tuple[list[str], list[list[str]]]]]:
+def tables(table: Table) -> list[tuple[str, tuple[list[str], list[list[str]]]]]:
     """Returns titles and contents of all tables that are not empty."""
     every = [
         ("Parts: best and worst effect on a class, and whether the part pays", part_rows(table)),
-        ("Goals", goal_rows([verdict for verdict in found if verdict.was_run])),
         (
             "Classes: success, and medians over cases of the change from the control that is named "
             "beside it (95 % interval)",
@@ -233,11 +189,11 @@ def tables(
     return [(title, content) for title, content in every if content[1]]
 
 
-def markdown(table: Table, found: Sequence[Verdict]) -> str:
+def markdown(table: Table) -> str:
     """Returns all tables as a page in Markdown."""
     parts = [f"Course {table.course.version}, split {table.course.split}, "
              f"{len(table.course.seeds)} seeds."]  # fmt: skip
-    for title, (columns, rows) in tables(table, found):
+    for title, (columns, rows) in tables(table):
         lines = [columns, ["---"] * len(columns), *rows]
         parts += [f"{title}:", "\n".join(f"| {' | '.join(line)} |" for line in lines)]
     return "\n\n".join(parts) + "\n"

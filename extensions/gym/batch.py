@@ -1,4 +1,4 @@
-"""Runs many environments in C (cosim/master/src/environments.c), over threads.
+"""Runs many environments in C (loop/src/environments.c), over threads.
 
 `Batch` owns the FMUs, the memory that is exchanged with C and the threads. An action array goes in,
 arrays of observations, rewards and flags come out; all of them are views of the memory that C reads
@@ -17,18 +17,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from hexapod_cosim.controller import DEFAULT_PERIOD
 from hexapod_cosim.cosim.common.closing import Closing
 from hexapod_cosim.cosim.common.temporary import TemporaryFolder
 from hexapod_cosim.cosim.interface.names import foot_names, joint_names, vector_names
 from hexapod_cosim.cosim.master.fmu import Fmu
-from hexapod_cosim.cosim.master.fmu_controller import COMMANDS, SENSED
-from hexapod_cosim.cosim.master.signals import MEASURED, PUSH
-from hexapod_cosim.cosim.master.wiring import JOINT_COMMANDS
+from hexapod_cosim.cosim.master.native_loop import step_functions
+from hexapod_cosim.cosim.master.sensors import MEASURED
+from hexapod_cosim.cosim.master.signals import COMMANDS, JOINT_COMMANDS, PUSH
 from hexapod_cosim.extensions.gym.checks import check_count, check_names, check_seeds, checked_mask
 from hexapod_cosim.extensions.gym.native import (
     ARRAYS,
     CALLS,
-    WORK,
     NativeArrays,
     NativeDraws,
     NativeFmu,
@@ -38,7 +38,6 @@ from hexapod_cosim.extensions.gym.native import (
 )
 from hexapod_cosim.extensions.gym.owned import Owned
 from hexapod_cosim.extensions.gym.plants import (
-    CONTROL_PERIOD,
     export_base,
     export_plant,
     grounds,
@@ -155,15 +154,15 @@ class Batch(Closing):
     def _references(self, fmu: Fmu, names: Sequence[str]) -> int:
         return self._keep(fmu.references(names), np.uint32)
 
-    def _fmu(self, fmu: Fmu) -> NativeFmu:
+    def _fmu(self, fmu: Fmu) -> Any:
         """Returns the functions of an FMU and what its instances are made with."""
-        calls = {name: fmu.address(f"fmi2{name}") for name in CALLS}
-        calls |= {name: fmu.address(name) for name in WORK}
+        calls: dict[str, Any] = {name: fmu.address(call) for name, call in CALLS.items()}
+        calls["step"] = step_functions(fmu, None)
         texts = {"guid": fmu.description.guid.encode(), "resources": fmu.resources.encode()}
         self._kept.append(texts)
         return NativeFmu(**calls, **texts)
 
-    def _native_settings(self, robots: Sequence[Robot]) -> NativeSettings:
+    def _native_settings(self, robots: Sequence[Robot]) -> Any:
         """Returns the settings as C reads them."""
         given, plant = self.settings, self._owned.fmus[0]
         stance = np.array([leg.stance for leg in self.robot.legs])
@@ -204,7 +203,7 @@ class Batch(Closing):
     def _maps(self) -> GroundMaps:
         return ground_maps(self.settings, self._robots)
 
-    def _ground(self) -> NativeGround:
+    def _ground(self) -> Any:
         """Returns the heights that robots observe, as C reads them."""
         maps, places = self._maps, self.settings.places
         names, number = self.drawn_names, GROUND
@@ -223,17 +222,17 @@ class Batch(Closing):
             clearance=maps.clearance,
         )
 
-    def _add_controller(self, native: NativeSettings) -> None:
+    def _add_controller(self, native: Any) -> None:
         """Adds the controller to the settings as C reads them."""
         controller = self._owned.fmus[1]
         native.controller = self._fmu(controller)
-        sensed = [name for key in SENSED for name in MEASURED[key]]
+        sensed = [*MEASURED["angle"], *MEASURED["foot_force"], *MEASURED["quaternion"]]
         native.controller_input = self._references(controller, [*COMMANDS, *sensed])
         native.controller_output = self._references(controller, JOINT_COMMANDS)
-        native.substeps = round(1.0 / (RATE * CONTROL_PERIOD))
-        native.h = CONTROL_PERIOD
+        native.substeps = round(1.0 / (RATE * DEFAULT_PERIOD))
+        native.h = DEFAULT_PERIOD
 
-    def _draws(self, robots: Sequence[Robot]) -> NativeDraws:
+    def _draws(self, robots: Sequence[Robot]) -> Any:
         """Returns the parameters that are drawn for each episode, as C reads them."""
         drawn: dict[str, tuple[float, float, bool]] = {
             name: (low, high, False) for name, (low, high) in self.settings.randomise.items()

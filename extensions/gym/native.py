@@ -4,82 +4,29 @@ from __future__ import annotations
 
 import ctypes as ct
 from functools import cache
+from pathlib import Path
 
-from hexapod_cosim.cosim.master.loop_library import load_loop
-from hexapod_cosim.extensions.gym.settings import BLOCKS, JOINTS, TERMS
+from hexapod_cosim.cosim.master.loop_library import load_loop, read_headers
 
-LAYOUT = 1  # of the structures below, HX_ENVIRONMENTS_LAYOUT in C
-# functions of an FMU in the order of hxEnvFmu
-CALLS = (
-    *("Instantiate", "FreeInstance", "Reset", "SetupExperiment", "EnterInitializationMode"),
-    *("ExitInitializationMode", "GetReal", "SetReal", "DoStep"),
-)
-WORK = ("hx_shared_work_size", "hx_shared_work_use")  # which a foreign FMU does not have
-
+# functions of an FMU by the members of hxEnvFmu
+CALLS = {
+    "instantiate": "fmi2Instantiate",
+    "free_instance": "fmi2FreeInstance",
+    "reset": "fmi2Reset",
+    "setup": "fmi2SetupExperiment",
+    "enter": "fmi2EnterInitializationMode",
+    "leave": "fmi2ExitInitializationMode",
+    "work_size": "hx_shared_work_size",  # which a foreign FMU does not have, like the next
+    "work_use": "hx_shared_work_use",
+}
 Pointer, Size = ct.c_void_p, ct.c_size_t
 
-
-class NativeFmu(ct.Structure):
-    """hxEnvFmu in C."""
-
-    _fields_ = [
-        *((name, Pointer) for name in CALLS),
-        ("guid", ct.c_char_p),
-        ("resources", ct.c_char_p),
-        *((name, Pointer) for name in WORK),
-    ]
-
-
-class NativeDraws(ct.Structure):
-    """hxEnvDraws in C."""
-
-    _fields_ = [
-        *((name, Pointer) for name in ("reference", "low", "high", "whole", "group")),
-        ("count", Size),
-    ]
-
-
-class NativeGround(ct.Structure):
-    """hxEnvGround in C."""
-
-    _fields_ = [
-        ("height", Pointer), ("place", Pointer),
-        *((name, Size) for name in ("count", "rows", "columns", "points", "draw")),
-        *((name, ct.c_double) for name in ("x0", "y0", "spacing", "clearance")),
-    ]  # fmt: skip
-
-
-class NativeSettings(ct.Structure):
-    """hxEnvSettings in C."""
-
-    _fields_ = [
-        ("plant", NativeFmu), ("controller", NativeFmu),
-        *((name, Pointer) for name in (
-            "plant_output", "plant_input", "controller_input", "controller_output")),
-        ("draws", NativeDraws), ("ground", NativeGround),
-        ("h", ct.c_double), ("substeps", Size), ("length", Size),
-        ("stance", ct.c_double * JOINTS), ("action_scale", ct.c_double * JOINTS),
-        ("action_limit", ct.c_double), ("observed", ct.c_double * 3 * len(BLOCKS)),
-        ("clock", ct.c_double),
-        ("command_low", ct.c_double * 3), ("command_high", ct.c_double * 3),
-        ("command_interval", Size),
-        ("push_interval", Size), ("push_length", Size), ("push_force", ct.c_double),
-        ("upright", ct.c_double), ("belly_force", ct.c_double),
-        ("weight", ct.c_double * len(TERMS)), ("width", ct.c_double * 2),
-        ("autoreset", ct.c_int),
-    ]  # fmt: skip
-
-
-ARRAYS = (  # of hxEnvArrays in C
-    *("action", "observation", "last", "reward", "term"),
-    *("terminated", "truncated", "refused", "reason"),
-)
-
-
-class NativeArrays(ct.Structure):
-    """hxEnvArrays in C."""
-
-    _fields_ = [(name, Pointer) for name in ARRAYS]
+HEADER = Path(__file__).parent / "loop" / "include" / "hexapod" / "environments.h"
+_STRUCTURES = read_headers(HEADER).structures
+NativeFmu, NativeDraws = _STRUCTURES["hxEnvFmu"], _STRUCTURES["hxEnvDraws"]
+NativeGround, NativeSettings = _STRUCTURES["hxEnvGround"], _STRUCTURES["hxEnvSettings"]
+NativeArrays = _STRUCTURES["hxEnvArrays"]
+ARRAYS = tuple(name for name, _ in NativeArrays._fields_)
 
 
 @cache
@@ -88,10 +35,7 @@ def environments_library() -> ct.CDLL:
 
     Raises FmuError when the library is missing or has another version.
     """
-    library = load_loop(
-        ("hx_environments_layout", LAYOUT),
-        ("hx_environments_settings_size", ct.sizeof(NativeSettings)),
-    )
+    library = load_loop("environments", "hx_environments_settings_size", "hxEnvSettings", HEADER)
     library.hx_environments_create.restype = Pointer
     library.hx_environments_create.argtypes = [Pointer, Pointer, Size, ct.c_char_p]
     library.hx_environments_message.restype = ct.c_char_p

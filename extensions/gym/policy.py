@@ -81,7 +81,7 @@ def _no_policy(path: Path, got: str) -> HexapodError:
     return HexapodError(
         "not a policy",
         got=got,
-        expected="a file that `python -m hexapod_cosim.extensions.gym train` wrote",
+        expected="a file that `hexapod gym train` wrote",
         fix="train one",
         where=str(path),
     )

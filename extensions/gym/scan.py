@@ -39,15 +39,6 @@ class GroundMaps:
         heights: Array = self.height[number][row, column].astype(np.float64)
         return heights
 
-    def range_around(self, number: int, place: Array, reach: float) -> tuple[float, float]:
-        """Returns the lowest and the highest height [m] within a square around a place [m]."""
-        last = self.height.shape[1] - 1
-        first = np.round((place[:2] - reach - self.first) / SPACING).astype(int)
-        column, row = np.clip(first, 0, last)
-        side = round(2.0 * reach / SPACING) + 1
-        part = self.height[number][row : row + side, column : column + side]
-        return float(part.min()), float(part.max())
-
 
 def ground_maps(settings: EnvSettings, robots: Sequence[Robot]) -> GroundMaps:
     """Returns the heights of the grounds, in the order of their numbers in the plant's FMU.

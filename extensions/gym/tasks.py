@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 from types import MappingProxyType
+from typing import Any
 
 from hexapod_cosim.extensions.gym.settings import LEGGED_GYM_HEIGHTS, EnvSettings
 from hexapod_cosim.models import unknown_name
@@ -43,3 +44,8 @@ def task(name: str) -> EnvSettings:
     if name not in TASKS:
         raise unknown_name("environment", name, TASKS)
     return TASKS[name]
+
+
+def environment_rows() -> list[dict[str, Any]]:
+    """Returns what `hexapod list environments` shows."""
+    return [{"name": name, "title": title} for name, title in TITLES.items()]

@@ -14,11 +14,11 @@ from numpy.typing import NDArray
 from hexapod_cosim.cosim.common.components import PLANT
 from hexapod_cosim.cosim.interface.names import joint_names, vector_names
 from hexapod_cosim.cosim.interface.start_values import parameter_values
-from hexapod_cosim.extensions.identify.log import ATTITUDE, CHANNELS, Log
+from hexapod_cosim.extensions.identify.log import ATTITUDE, CHANNELS, Channel, Log
 from hexapod_cosim.extensions.identify.log_plant import LogPlant
 from hexapod_cosim.extensions.identify.numbers.unknown import Unknown
 from hexapod_cosim.extensions.identify.start import initial_state
-from hexapod_cosim.extensions.identify.unknowns import CURRENT, DELAYS, START, changed_robot
+from hexapod_cosim.extensions.identify.unknowns import CURRENT, DELAYS, changed_robot
 from hexapod_cosim.models import Robot
 from hexapod_cosim.models.kinematics import axis_quaternion, quaternion_product, rotation_matrix
 
@@ -58,19 +58,18 @@ class Experiment:
     @property
     def channels(self) -> list[str]:
         """The channel of each column."""
-        keys = {name: channel.key for channel in CHANNELS for name in channel.names}
-        return [keys[name] for name in self.columns]
+        return [channel_of(name).key for name in self.columns]
 
     @property
     def sensors(self) -> list[str]:
         """The sensors of each column."""
-        return [sensors_of(name) for name in self.columns]
+        return [channel_of(name).sensors for name in self.columns]
 
 
 @cache
-def sensors_of(name: str) -> str:
-    """Returns the sensors that a column is of: of "joints", "currents", "forces", "imu", "pose"."""
-    return next(channel.sensors for channel in CHANNELS if name in channel.names)
+def channel_of(name: str) -> Channel:
+    """Returns the channel of a column."""
+    return next(channel for channel in CHANNELS if name in channel.names)
 
 
 def first_part(experiment: Experiment, seconds: float = math.inf) -> Experiment:
@@ -85,11 +84,6 @@ def first_part(experiment: Experiment, seconds: float = math.inf) -> Experiment:
         return experiment
     part = slice(experiment.fitted.start, end)
     return replace(experiment, log=log.part(slice(0, end)), fitted=part, held_out=slice(end, end))
-
-
-def is_level(robot: Robot) -> bool:
-    """Returns whether a robot that starts elsewhere and turned about the vertical walks alike."""
-    return robot.terrain.kind == "flat" and robot.gravity[:2] == (0.0, 0.0)
 
 
 def robot_parameters(robot: Robot, base: Robot) -> dict[str, float]:
@@ -133,7 +127,7 @@ def simulated(
         {
             **(parameters or {}),
             **robot_parameters(robot, base),
-            **_start(experiment, robot, zero, {} if is_level(base) else values, offset),
+            **_start(experiment, robot, zero, values, offset),
         },
         offset=-zero if zero.any() else None,
         delay=[delay for _, delay in pairs],
@@ -168,13 +162,8 @@ def _turned(attitude: Array, vector: Array) -> Array:
     return np.column_stack([cy * ahead - sy * left, sy * ahead + cy * left, up])
 
 
-def readings(
-    experiment: Experiment, outputs: Array, values: Mapping[str, float], robot: Robot
-) -> Array:
-    """Returns what the sensors read (rows, columns) of the outputs of `simulated`.
-
-    robot: on level ground the start values move the simulated path as a whole.
-    """
+def readings(experiment: Experiment, outputs: Array, values: Mapping[str, float]) -> Array:
+    """Returns what the sensors read (rows, columns) of the outputs of `simulated`."""
     found = outputs.copy()
     for k, name in enumerate(experiment.columns):
         if name.endswith((".angle", ".motor_angle")):
@@ -184,46 +173,11 @@ def readings(
         elif name == ATTITUDE[2]:
             found[:, k] = np.unwrap(found[:, k])
         found[:, k] += values.get(f"bias.{name}", 0.0)
-    if is_level(robot):
-        key = experiment.start_key
-        x, y, yaw = (values.get(f"start.{name}{key}", 0.0) for name in ("x", "y", "yaw"))
-        place_elsewhere(experiment, found, x, y, yaw)
     return found
 
 
-def place_elsewhere(experiment: Experiment, outputs: Array, x: float, y: float, yaw: float) -> None:
-    """Moves a path (rows, columns) by x and y [m] and turns it by a yaw [rad] about the place that
-    the first row of the log has.
-    """
-    columns = experiment.columns
-    places = [name for name in vector_names("torso.position") if name in columns]
-    if yaw:
-        if ATTITUDE[2] in columns:
-            outputs[:, columns.index(ATTITUDE[2])] += yaw
-        if places:
-            first = experiment.log.recording.columns(places)[0]
-            _turn(outputs, [columns.index(name) for name in places[:2]], yaw, first)
-        for name in columns:
-            if name.endswith(".force[1]"):
-                other = name.removesuffix("[1]") + "[2]"
-                if other in columns:
-                    _turn(outputs, [columns.index(name), columns.index(other)], yaw, np.zeros(2))
-    for name, own in zip(places, (x, y), strict=False):
-        outputs[:, columns.index(name)] += own
-
-
-def _turn(outputs: Array, pair: Sequence[int], yaw: float, about: Array) -> None:
-    """Turns two columns of outputs, x and y, about a point."""
-    cos, sin = math.cos(yaw), math.sin(yaw)
-    x, y = (outputs[:, k] - about[axis] for axis, k in enumerate(pair))
-    outputs[:, pair[0]] = about[0] + cos * x - sin * y
-    outputs[:, pair[1]] = about[1] + sin * x + cos * y
-
-
-def needs_simulation(row: Unknown, robot: Robot) -> bool:
+def needs_simulation(row: Unknown) -> bool:
     """Returns whether a number changes more than the reading of simulated outputs."""
-    if row.group == START and is_level(robot):
-        return False
     return not (row.key.startswith("bias.") or row.key == CURRENT)
 
 

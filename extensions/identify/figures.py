@@ -27,7 +27,7 @@ COLOURS = (PALETTE[3], PALETTE[0], PALETTE[2])  # of simulations
 def channel_figures(
     log: Log, simulations: Simulated, *, split: float | None = None
 ) -> dict[str, str]:
-    """Returns a figure of each channel with simulated columns, by the channel's title, as SVG.
+    """Returns a figure of each channel with simulated columns, by the channel's title, as data URL.
 
     split: time [s] of a vertical line.
     """
@@ -42,13 +42,8 @@ def channel_figures(
         ]
         if names:
             with rc_context(SETTINGS):
-                found[channel.title] = _svg(_draw(log, channel, names, simulations, split))
+                found[channel.title] = _embedded(_draw(log, channel, names, simulations, split))
     return found
-
-
-def embedded(svg: str) -> str:
-    """Returns a picture as a data URL."""
-    return "data:image/svg+xml;base64," + base64.b64encode(svg.encode()).decode("ascii")
 
 
 def _draw(
@@ -86,7 +81,8 @@ def _draw(
     return figure
 
 
-def _svg(figure: Figure) -> str:
-    buffer = io.StringIO()
+def _embedded(figure: Figure) -> str:
+    """Returns a figure as a data URL of an SVG."""
+    buffer = io.BytesIO()
     figure.savefig(buffer, format="svg", metadata=UNDATED["svg"])
-    return buffer.getvalue()
+    return "data:image/svg+xml;base64," + base64.b64encode(buffer.getvalue()).decode("ascii")

@@ -8,22 +8,21 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from hexapod_cosim.extensions.identify.comparison import (
+from hexapod_cosim.extensions.identify.experiment import Experiment
+from hexapod_cosim.extensions.identify.fitting.judging import Fit
+from hexapod_cosim.extensions.identify.fitting.rank import DETERMINED
+from hexapod_cosim.extensions.identify.numbers.unknown import Unknown
+from hexapod_cosim.extensions.identify.report import (
     Difference,
     channel_differences,
     column_differences,
 )
-from hexapod_cosim.extensions.identify.experiment import Experiment
-from hexapod_cosim.extensions.identify.fitting.friction_search import FrictionTrial
-from hexapod_cosim.extensions.identify.fitting.judging import Fit
-from hexapod_cosim.extensions.identify.fitting.rank import QUANTILE, TOLD, combination_text
-from hexapod_cosim.extensions.identify.numbers.unknown import Unknown
-from hexapod_cosim.extensions.identify.rigid.linear_start import LinearStart
 from hexapod_cosim.extensions.identify.screening import BadColumn
 from hexapod_cosim.extensions.identify.unknowns import START
 from hexapod_cosim.models import Robot
 
 Array = NDArray[np.float64]
+QUANTILE = 1.959963985  # of a normal distribution, for 95 %
 FEWEST_DIGITS = 5  # of a value and its interval in texts
 NEAR = 0.8  # correlation of two numbers that is reported
 
@@ -39,16 +38,16 @@ class Estimate:
     value: float
     low: float  # of the 95 % interval
     high: float
-    deviation: float  # over that of what was known before: 1 where the logs tell nothing
+    deviation: float  # over that of what was known before: 1 where the logs say nothing
     partner: str  # the number with which it is correlated most
     correlation: float
-    alone: bool = True  # whether the logs tell it without a number that they do not tell
-    combination: str = ""  # that the logs tell instead, as a formula with its value and interval
+    alone: bool = True  # whether the logs determine it without numbers that they do not determine
+    depends: tuple[str, ...] = ()  # numbers of the robot file with which alone it is determined
 
     @property
-    def told(self) -> bool:
-        """Whether the logs tell the number: they at least halve what was unknown of it."""
-        return self.alone and self.deviation < TOLD
+    def determined(self) -> bool:
+        """Whether the logs determine the number: they at least halve what was unknown of it."""
+        return self.alone and self.deviation < DETERMINED
 
     @property
     def interval(self) -> str:
@@ -76,16 +75,6 @@ class Identified:
     experiments: tuple[Experiment, ...]
     bad: tuple[tuple[int, BadColumn], ...]  # number of the log and column left out
     before: tuple[Array, ...]  # readings that the robot file predicts (rows, columns)
-    linear: LinearStart | None  # what linear least squares tell
-    lacking: str  # what the logs lack for these
-    # the robot file's robot where `file` has another friction model than it
-    given: Robot | None = None
-    trials: tuple[FrictionTrial, ...] = ()  # of friction models, the best one first
-
-    @property
-    def origin(self) -> Robot:
-        """Returns the robot of the robot file, with its own friction model."""
-        return self.given or self.file
 
     @property
     def rejected(self) -> bool:
@@ -97,21 +86,17 @@ class Identified:
         """The numbers of robot and sensors, in the order of the table of unknowns."""
         own = np.sqrt(np.diag(self.fit.covariance))
         correlation = self.fit.covariance / np.outer(own, own) - np.eye(len(own))
-        values = self.fit.values
-        together = {
-            one.key: combination_text(one, self.fit.rows, values) for one in self.fit.combinations
-        }
         return [
-            self._estimate(k, row, correlation[k], together.get(row.key, ""))
+            self._estimate(k, row, correlation[k])
             for k, row in enumerate(self.fit.rows)
             if row.group != START
         ]
 
-    def _estimate(self, k: int, row: Unknown, correlation: Array, combination: str) -> Estimate:
+    def _estimate(self, k: int, row: Unknown, correlation: Array) -> Estimate:
         """Returns what was found of a number; nothing of a model that the logs reject."""
         before, rejected = self.fit.before[row.key], self.rejected
         # z = 0 is the file's value to the last digit
-        value = before if self.fit.stay[k] or rejected else self.fit.values[row.key]
+        value = before if self.fit.kept[k] or rejected else self.fit.values[row.key]
         deviation = 1.0 if rejected else self.fit.deviations[row.key]
         low, high = row.interval(value, QUANTILE * deviation)
         other = int(np.argmax(np.abs(correlation)))
@@ -119,14 +104,9 @@ class Identified:
             row.key, row.unit, row.group, before, value,
             max(low, row.low), min(high, row.high), deviation,
             self.fit.rows[other].key, float(correlation[other]),
-            bool(self.fit.alone[k]) and not self.fit.stay[k] and not rejected,
-            "" if rejected else combination,
+            bool(self.fit.alone[k]) and not self.fit.kept[k] and not rejected,
+            () if rejected else self.fit.depends.get(row.key, ()),
         )  # fmt: skip
-
-    @property
-    def rank(self) -> int:
-        """Number of independent combinations that the logs tell better than was known before."""
-        return int(np.sum(self.fit.singular > 1.0))
 
     def held_out(self) -> list[tuple[Difference, Difference]]:
         """Returns the difference of each channel on the held-out rows, before and after."""

@@ -3,33 +3,26 @@
 from __future__ import annotations
 
 import shlex
+import sys
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
-from hexapod_cosim.cosim.cli.export_command import RobotName
-from hexapod_cosim.cosim.cli.extension import Command, Extension
+from hexapod_cosim.cosim.cli.options import Json, RobotName
 from hexapod_cosim.cosim.cli.terminal import (
-    Json,
     show_files,
     show_json,
     show_table,
     show_text,
-    stages_bar,
-    waiting,
     warn,
 )
 from hexapod_cosim.cosim.results.results import results_folder
 from hexapod_cosim.extensions.identify.log import HELD_OUT, read_log
-from hexapod_cosim.extensions.identify.numbers.friction_models import CHOICES
-from hexapod_cosim.extensions.identify.replay_command import replay
+from hexapod_cosim.extensions.identify.numbers.friction_models import TERMS, with_friction_model
 from hexapod_cosim.extensions.identify.unknowns import GROUPS
 from hexapod_cosim.models import HexapodError, load_robot, unknown_name
-
-if TYPE_CHECKING:
-    from hexapod_cosim.extensions.identify.identified import Identified
 
 FOUND = ("servo", "mass", "contact", "sensor")  # without --find
 Logs = Annotated[
@@ -55,14 +48,9 @@ Friction = Annotated[
     str | None,
     typer.Option(
         "--friction",
-        metavar="|".join(CHOICES),
-        help="Friction model of measured servos; best: the one that explains the logs best. "
-        "Default: the terms of the robot file.",
+        metavar="|".join(TERMS),
+        help="Friction model of measured servos. Default: the terms of the robot file.",
     ),
-]
-Propose = Annotated[
-    bool,
-    typer.Option("--propose/--no-propose", help="Search for a walk that would tell more."),
 ]
 Workers = Annotated[
     int | None,
@@ -82,60 +70,56 @@ def identify(
     find: Find = None,
     friction: Friction = None,
     held_out: HeldOut = HELD_OUT,
-    search: Propose = True,
     workers: Workers = None,
     output: Folder = None,
     json: Json = False,
 ) -> None:
     """Find a robot's masses, servos, contacts and sensors from its own logs."""
     # imported only here because they are slow to import
-    from hexapod_cosim.extensions.identify import identify_tables as tables  # noqa: PLC0415
-    from hexapod_cosim.extensions.identify.excitation import propose  # noqa: PLC0415
-    from hexapod_cosim.extensions.identify.fitting.progress import MOST_STEPS  # noqa: PLC0415
+    from hexapod_cosim.extensions.identify import identify_files as files  # noqa: PLC0415
     from hexapod_cosim.extensions.identify.identify import (  # noqa: PLC0415
         identify as identify_robot,
     )
     from hexapod_cosim.extensions.identify.identify import usual_workers  # noqa: PLC0415
-    from hexapod_cosim.extensions.identify.identify_files import (  # noqa: PLC0415
-        result_table,
-        write_identified,
-    )
 
     groups = _checked(find or list(FOUND), held_out)
-    if friction is not None and friction not in CHOICES:
-        raise unknown_name("friction model", friction, CHOICES, where="--friction")
     own = load_robot(robot)
+    if friction is not None:
+        own = with_friction_model(own, friction)
     words = ["hexapod", "identify", *map(str, logs), "--robot", robot]
     words += [word for name in find or [] for word in ("--find", name)]
     words += ["--friction", friction] if friction else []
     words += ["--held-out", str(held_out)] if held_out != HELD_OUT else []
-    words += [] if search else ["--no-propose"]
     recorded = [read_log(path, torso_com=own.torso.com) for path in logs]
-    size = workers or usual_workers(recorded)
     with results_folder(output or Path("out") / "identify") as folder:
-        with stages_bar(MOST_STEPS, shown=not json) as show:
-            found = identify_robot(
-                recorded,
-                own,
-                groups=groups,
-                held_out=held_out,
-                workers=size,
-                friction=friction,
-                progress=lambda done: show(done.text, done.step, done.simulations),
-            )
-        with waiting(None if json else "searching for a walk that would tell more"):
-            proposals = propose(found, robot) if search else []
+        found = identify_robot(
+            recorded,
+            own,
+            groups=groups,
+            held_out=held_out,
+            workers=workers or usual_workers(recorded),
+            progress=(lambda _text: None) if json else _show_step,
+        )
         folder.begin()
         command = shlex.join(words)
-        files = write_identified(found, proposals, robot, folder.path, command=command)
-    for text in tables.warnings(found):
+        written = files.write_identified(found, robot, folder.path, command=command)
+    for text in files.warnings(found):
         warn(text.removesuffix("."))
     if json:
-        show_json({**result_table(found, proposals), "files": [str(path) for path in files]})
+        show_json({**files.result_table(found), "files": [str(path) for path in written]})
         return
-    _show(found, files)
-    if search:
-        show_text(tables.proposal_text(proposals))
+    shown, zero = files.shown_estimates(found.estimates)
+    show_table(files.ESTIMATES, files.estimate_rows(shown), right=(2, 3, 4))
+    if zero:
+        show_text(f"{zero} biases of sensors may be 0; sensors.toml and the report have them.")
+    errors = files.error_rows(found.held_out() or found.fitted())
+    show_table(files.ERRORS, errors, right=(2, 3, 4))
+    show_text(files.open_text(found))
+    show_files(written)
+
+
+def _show_step(text: str) -> None:
+    print(text, file=sys.stderr, flush=True)
 
 
 def _checked(names: Sequence[str], held_out: float) -> list[str]:
@@ -152,24 +136,3 @@ def _checked(names: Sequence[str], held_out: float) -> list[str]:
             where="--held-out",
         )
     return list(names)
-
-
-def _show(found: Identified, files: Sequence[Path]) -> None:
-    """Prints the estimates, the errors, what the logs did not tell, and the files."""
-    from hexapod_cosim.extensions.identify import identify_tables as tables  # noqa: PLC0415
-
-    errors = tables.error_rows(found.held_out() or found.fitted())
-    shown, zero = tables.shown_estimates(found.estimates)
-    show_table(tables.ESTIMATES, tables.estimate_rows(shown), right=(2, 3, 4))
-    if zero:
-        show_text(f"{zero} biases of sensors may be 0; sensors.toml and the report have them.")
-    show_table(tables.ERRORS, errors, right=(2, 3, 4))
-    if found.trials:
-        show_text(tables.friction_text(found.trials))
-    show_text(tables.untold_text(found))
-    show_files(files)
-
-
-EXTENSION = Extension(
-    commands=[Command(name="replay", run=replay), Command(name="identify", run=identify)]
-)

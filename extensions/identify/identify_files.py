@@ -1,4 +1,6 @@
-"""Writes an identification into a folder: robot file, sensors, figures, report."""
+"""Writes an identification into a folder: robot file, sensors, figures, report; and says in words
+what was found.
+"""
 
 from __future__ import annotations
 
@@ -10,98 +12,63 @@ from typing import Any
 import tomlkit
 
 from hexapod_cosim.cosim.common.files import RUN_FILE, write_json, write_text
-from hexapod_cosim.extensions.identify.comparison import Difference
-from hexapod_cosim.extensions.identify.excitation import Proposal, scenario_text
-from hexapod_cosim.extensions.identify.figures import channel_figures, embedded
-from hexapod_cosim.extensions.identify.fitting.misfit import EXPLAINED
-from hexapod_cosim.extensions.identify.identified import NEAR, Identified
-from hexapod_cosim.extensions.identify.identify_tables import (
-    BASE,
-    ERRORS,
-    ESTIMATES,
-    MISFIT,
-    TRIALS,
-    base_rows,
-    base_values,
-    error_rows,
-    estimate_rows,
-    friction_text,
-    misfit_rows,
-    proposal_text,
-    trial_rows,
-    untold_text,
-    warnings,
-)
-from hexapod_cosim.extensions.identify.page import Section, number, rendered
+from hexapod_cosim.extensions.identify.figures import channel_figures
+from hexapod_cosim.extensions.identify.fitting.misfit import EXPLAINED, REJECTED
+from hexapod_cosim.extensions.identify.identified import NEAR, Estimate, Identified
+from hexapod_cosim.extensions.identify.numbers.servo import GEAR
+from hexapod_cosim.extensions.identify.report import TITLES, Difference, Section, number, rendered
 from hexapod_cosim.extensions.identify.robot_file import SENSORS, sensors_table, write_robot
+from hexapod_cosim.extensions.identify.screening import left_out
+from hexapod_cosim.extensions.identify.unknowns import BIAS
 
-BASE_KEYS = ("combination", "unit", "before", "least_squares", "deviation", "found")
 KIND, ROBOT_FILE, REPORT, RESULT = "identify", "robot.toml", "report.html", "identify.json"
-EXPERIMENT = "experiment.toml"
+ESTIMATES = ("number", "unit", "before", "found", "95 % interval", "determined", "nearest partner")
+MISFIT = ("channel", "noise", "fitted", "held out")
+ERRORS = ("channel", "unit", "before", "after", "ratio")
+MOTOR = {"servo.torque_constant", "servo.resistance"}
 
 
-def write_identified(
-    found: Identified,
-    proposals: Sequence[Proposal],
-    file: str,
-    folder: Path,
-    *,
-    command: str,
-) -> list[Path]:
-    """Writes robot.toml, sensors.toml, identify.json, the proposed experiment, the report and
-    run.json; returns the files.
+def write_identified(found: Identified, file: str, folder: Path, *, command: str) -> list[Path]:
+    """Writes robot.toml, sensors.toml, identify.json, the report and run.json; returns the files.
 
     file: the robot file that was given.
     """
     logs = [one.log.where for one in found.experiments]
-    names = [ROBOT_FILE, SENSORS, RESULT]
     write_robot(found, file, folder / ROBOT_FILE, logs)
     write_text(folder / SENSORS, tomlkit.dumps(dict(sensors_table(found))))
-    content = result_table(found, proposals)
-    write_json(folder / RESULT, content)
-    if proposals and proposals[0].tells:
-        names.append(EXPERIMENT)
-        write_text(folder / EXPERIMENT, scenario_text(proposals[0], ROBOT_FILE))
-    write_text(folder / REPORT, _page(found, proposals, command))
+    write_json(folder / RESULT, result_table(found))
+    write_text(folder / REPORT, _page(found, command))
     facts = {
         "kind": KIND,
         "status": "completed",
         "logs": logs,
-        "robot": {"name": found.origin.name, "hash": found.origin.hash},
+        "robot": {"name": found.file.name, "hash": found.file.hash},
         "command": command,
     }
     write_json(folder / RUN_FILE, facts)
-    return [folder / name for name in (*names, REPORT, RUN_FILE)]
+    return [folder / name for name in (ROBOT_FILE, SENSORS, RESULT, REPORT, RUN_FILE)]
 
 
-def result_table(found: Identified, proposals: Sequence[Proposal]) -> dict[str, Any]:
+def result_table(found: Identified) -> dict[str, Any]:
     """Returns everything that was found, for JSON."""
     return {
-        "estimates": [{**asdict(one), "told": one.told} for one in found.estimates],
-        "rank": found.rank,
+        "estimates": [{**asdict(one), "determined": one.determined} for one in found.estimates],
+        "rank": found.fit.rank,
         "unknowns": len(found.fit.rows),
         "noise": dict(found.fit.noise),
         "deviations_from_optimum": found.fit.decrement,
-        "readings_that_count_as_one": dict(found.fit.correlated),
         "mean_square_over_noise": {
             "fitted": {key: one.value for key, one in found.fit.misfit.items()},
             "held_out": {key: one.value for key, one in found.fit.held_out.items()},
         },
         "unexplained": found.fit.unexplained,
         "rejected": found.fit.rejected,
-        "friction_models": [asdict(one) for one in found.trials],
-        "base_parameters": [dict(zip(BASE_KEYS, row, strict=True)) for row in base_values(found)],
-        "no_base_parameters": found.lacking,
         "bad_columns": [
             {"log": found.experiments[number].log.where, **asdict(column)}
             for number, column in found.bad
         ],
         "held_out": _error_table(found.held_out()),
         "fitted": _error_table(found.fitted()),
-        "proposals": [
-            {"walk": one.title, "tells": list(one.tells), "deviations": dict(one.deviations)}
-            for one in proposals
-        ],
     }
 
 
@@ -112,29 +79,23 @@ def _error_table(pairs: Sequence[tuple[Difference, Difference]]) -> list[dict[st
     ]
 
 
-def _page(found: Identified, proposals: Sequence[Proposal], command: str) -> str:
-    estimates, held = found.estimates, found.held_out()
-    told = [one for one in estimates if one.told]
-    first = found.experiments[0]
-    sides = {"before": found.before[0], "after": found.fit.predictions[0]}
-    simulations = {
-        label: dict(zip(first.columns, own.T, strict=True)) for label, own in sides.items()
-    }
-    split = float(first.log.time[first.held_out][0]) if _rows(first.held_out) else None
-    figures = channel_figures(first.log, simulations, split=split)
+def _page(found: Identified, command: str) -> str:
+    estimates = found.estimates
+    determined = [one for one in estimates if one.determined]
+    logs = [one.log.where for one in found.experiments]
     sections = [
         Section(
             title="Held-out rows",
             caption="Root mean squares of simulated minus measured over the rows that the fit did "
             "not see, before and after; they contain the noise of the sensors.",
             columns=ERRORS,
-            rows=error_rows(held),
+            rows=error_rows(found.held_out()),
             left=2,
         ),
         Section(
             title="Numbers",
-            caption="Told: the logs at least halve what was unknown of a number. The partner is "
-            f"the number with which it is correlated, above {NEAR}.",
+            caption="Determined: the logs at least halve what was unknown of a number. The partner "
+            f"is the number with which it is correlated, above {NEAR}.",
             columns=ESTIMATES,
             rows=estimate_rows(estimates),
             left=2,
@@ -147,54 +108,23 @@ def _page(found: Identified, proposals: Sequence[Proposal], command: str) -> str
             "rows above 1 widen all intervals.",
             columns=MISFIT,
             rows=misfit_rows(found),
-            left=1,
         ),
-        *(
-            [
-                Section(
-                    title="Which friction model?",
-                    caption=friction_text(found.trials),
-                    columns=TRIALS,
-                    rows=trial_rows(found),
-                    left=1,
-                )
-            ]
-            if found.trials
-            else []
-        ),
-        Section(
-            title="Base parameters",
-            caption=_base_caption(found),
-            columns=BASE,
-            rows=base_rows(found),
-            left=2,
-        ),
-        Section(title="What the logs cannot tell", caption=untold_text(found)),
-        Section(
-            title="Which experiment would",
-            caption=proposal_text(proposals),
-            columns=("walk", "tells besides", "median deviation"),
-            rows=[
-                [one.title, ", ".join(one.tells) or "nothing", number(one.median)]
-                for one in proposals
-            ],
-            left=2,
-        ),
+        Section(title="What the logs do not determine", caption=open_text(found)),
         Section(
             title="Measured and simulated",
             caption="The rows right of the vertical line were held out.",
-            pictures={title: embedded(svg) for title, svg in figures.items()},
+            pictures=_figures(found),
         ),
     ]
     return rendered(
         sections,
-        title=f"Robot {found.file.name} identified from {_count(len(found.experiments), 'log')}",
-        headline=f"{len(told)} of {len(estimates)} numbers are told by the logs",
+        title=f"Robot {found.file.name} identified from its logs",
+        headline=f"The logs determine {len(determined)} of {len(estimates)} numbers",
         lead="Each number is the most probable one, given the readings and the robot file.",
         warnings=warnings(found),
         command=command,
         facts={
-            "logs": ", ".join(one.log.where for one in found.experiments),
+            "logs": ", ".join(logs),
             "rows": ", ".join(str(len(one.log.time)) for one in found.experiments),
             "noise": ", ".join(f"{key} {value:.3g}" for key, value in found.fit.noise.items()),
         },
@@ -202,24 +132,132 @@ def _page(found: Identified, proposals: Sequence[Proposal], command: str) -> str
     )
 
 
-def _count(number: int, name: str) -> str:
-    """Returns a number of things in words."""
-    return f"a {name}" if number == 1 else f"{number} {name}s"
+def _figures(found: Identified) -> dict[str, str]:
+    """Returns the figures of the first log."""
+    first = found.experiments[0]
+    simulations = {
+        label: dict(zip(first.columns, own[0].T, strict=True))
+        for label, own in (("before", found.before), ("after", found.fit.predictions))
+    }
+    time = first.log.time[first.held_out]
+    return channel_figures(first.log, simulations, split=float(time[0]) if len(time) else None)
 
 
-def _base_caption(found: Identified) -> str:
-    """Returns what base parameters are and where these come from."""
+def error_rows(pairs: Sequence[tuple[Difference, Difference]]) -> list[list[str]]:
+    """Returns the rows of a table with ERRORS."""
+    return [
+        [
+            TITLES[one.channel],
+            one.unit,
+            number(one.rms),
+            number(other.rms),
+            f"{one.rms / other.rms:.1f}" if other.rms > 0.0 else "",
+        ]
+        for one, other in pairs
+    ]
+
+
+def estimate_rows(estimates: Sequence[Estimate]) -> list[list[str]]:
+    """Returns the rows of a table with ESTIMATES."""
+    return [
+        [
+            one.key,
+            one.unit,
+            number(one.before),
+            one.found,
+            one.interval,
+            "yes" if one.determined else "in part" if one.depends else "no",
+            f"{one.partner} {one.correlation:+.2f}" if abs(one.correlation) > NEAR else "",
+        ]
+        for one in estimates
+    ]
+
+
+def shown_estimates(estimates: Sequence[Estimate]) -> tuple[list[Estimate], int]:
+    """Returns the estimates for a terminal without biases that may be 0, and how many those are."""
+    shown = [
+        one
+        for one in estimates
+        if not (one.key.startswith(BIAS) and one.low <= 0.0 <= one.high and one.determined)
+    ]
+    return shown, len(estimates) - len(shown)
+
+
+def misfit_rows(found: Identified) -> list[list[str]]:
+    """Returns the rows of a table with MISFIT."""
+    held_out = found.fit.held_out
+    return [
+        [
+            TITLES[key],
+            number(found.fit.noise[key]),
+            f"{one.value:.2f}",
+            f"{held_out[key].value:.2f}" if key in held_out else "",
+        ]
+        for key, one in found.fit.misfit.items()
+    ]
+
+
+def open_text(found: Identified) -> str:
+    """Returns what the logs do not determine, as sentences."""
+    if found.rejected:
+        return "The logs reject the model, so they determine no number."
+    missing = [one.key for one in found.estimates if not one.determined and not one.depends]
     text = (
-        "Combinations of masses m, first moments mx and inertias J about the links' joints that "
-        "the equations of motion hold; no log tells their parts apart. "
+        f"The logs determine {found.fit.rank} independent combinations of {len(found.fit.rows)} "
+        "numbers better than the robot file. "
     )
-    if found.linear is None:
-        return text + f"They need readings that the logs lack: {found.lacking}."
-    return text + (
-        "Linear least squares found them without a simulation, as a start of the fit; shown are "
-        "those that the logs tell well."
-    )
+    text += f"Not determined: {', '.join(missing)}." if missing else "They determine every number."
+    for one in found.estimates:
+        if one.depends:
+            text += (
+                f" The value {one.found} of {one.key} holds as long as {', '.join(one.depends)} "
+                "have the file's."
+            )
+    channels = {key for one in found.experiments for key in one.channels}
+    if "current" not in channels and any(
+        one.key in MOTOR and not one.determined for one in found.estimates
+    ):
+        text += (
+            " Currents would determine both the motor's torque constant and its resistance: "
+            "record LF.coxa.current [A], ..."
+        )
+    if set(GEAR) & set(missing) and "motor_angle" not in channels:
+        text += (
+            " Elasticity and play of gears show most in the angles of rotors beside those of "
+            "links: record LF.coxa.motor_angle [rad], ..."
+        )
+    return text
 
 
-def _rows(part: slice) -> int:
-    return int(part.stop - part.start)
+def warnings(found: Identified) -> list[str]:
+    """Returns what a user must know of the result, as sentences."""
+    texts = [text for one in found.experiments for text in one.log.warnings]
+    for one in found.experiments:
+        texts += left_out([column for number, column in found.bad if number == one.number])
+    if found.fit.decrement > 1.0:
+        texts.append(
+            f"The search ended {found.fit.decrement:.1f} deviations before the optimum of the "
+            "linearised problem. The intervals contain this step, but are a guess: give a longer "
+            "log, or begin again from the robot file that was written."
+        )
+    advice = (
+        "find all groups of numbers, look at the curves of these channels, or choose another model "
+        "of servo (--friction) or ground."
+    )
+    if found.rejected:
+        texts.append(
+            "The logs reject the model: mean squares of residuals over those of the readings' "
+            f"noise are {REJECTED:g} and more in {_channels(found.fit.rejected)}. A fit of a wrong "
+            f"model has wrong numbers, so all stay as in the robot file: {advice}"
+        )
+    elif found.fit.unexplained:
+        texts.append(
+            "The model does not explain this log: mean squares of residuals over those of the "
+            f"readings' noise are too large in {_channels(found.fit.unexplained)}. The intervals "
+            f"are wider for it, but may miss the true numbers: {advice}"
+        )
+    return texts
+
+
+def _channels(sizes: dict[str, float]) -> str:
+    return ", ".join(f"{TITLES[key].lower()} ({value:.1f})" for key, value in sizes.items())

@@ -25,7 +25,7 @@ from hexapod_cosim.cosim.logs.mcap_reader import read_mcap
 from hexapod_cosim.cosim.master.recorder import Recording
 from hexapod_cosim.cosim.results.columns import known_columns, plant_variables
 from hexapod_cosim.cosim.results.recordings import read_csv, read_parquet
-from hexapod_cosim.models import HexapodError
+from hexapod_cosim.models import HexapodError, Robot
 from hexapod_cosim.models.errors import nearest_name
 
 Array = NDArray[np.float64]
@@ -286,3 +286,26 @@ def without_readings(log: Log) -> LogError:
         fix="name the columns as the FMU's outputs: LF.coxa.angle [rad], ...",
         where=log.where,
     )
+
+
+def with_speed_references(log: Log, robot: Robot) -> Log:
+    """Returns the log with the rates of its angle commands as the speed commands that it lacks.
+
+    A servo's law has kd times the commanded less the measured speed (eq. 12). With a speed command
+    of 0 kd would brake each motion, and the fit would make up for it with masses and gains far off.
+    A log of servos without kd, whose law has no speed command, is returned as it is.
+    """
+    pairs = zip(joint_names("speed_ref"), COMMANDS, strict=True)
+    missing = {name: angle for name, angle in pairs if not log.has([name])}
+    if not missing or robot.servo.kd == 0.0:
+        return log
+    rates = [np.gradient(log.recording.column(angle), log.time) for angle in missing.values()]
+    data = np.column_stack([log.recording.data, *rates])
+    some = "" if len(missing) == len(COMMANDS) else f" of {len(missing)} joints"
+    note = (
+        f"{log.where} has no speed commands{some} ({next(iter(missing))} [rad/s], ...), which the "
+        "servo's kd needs: the rates of the commanded angles are taken. Give the columns; 0 in "
+        "each row is right where the servo damps the measured speed alone."
+    )
+    recording = Recording((*log.recording.names, *missing), data)
+    return replace(log, recording=recording, derived=note)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -31,11 +31,7 @@ class LogPlant(Closing):
     def __init__(self, fmu: Path, parameters: Mapping[str, Any] | None = None) -> None:
         self.fmu = Fmu(fmu)
         self._common = self.fmu.parameter_blocks(parameters or {})
-        self.watch: Callable[[], None] = lambda: None  # called after each simulation
         self._outputs = set(self.fmu.names("output"))
-        # of the log that was simulated last: its commands, and the events of some delays
-        self._last: tuple[Log, list[str], Array] | None = None
-        self._ordered: tuple[Log, tuple[float, ...], list[Event]] | None = None
 
     def known(self, names: Sequence[str]) -> list[str]:
         """Returns those of some columns that follow from outputs of the FMU."""
@@ -61,31 +57,25 @@ class LogPlant(Closing):
 
         Raises FmuError for a parameter that is refused, LogError for a refused command or step.
         """
-        time = log.time
-        commands, table = self._commands(log)
-        inputs = self.fmu.block(commands)
         late = [delay] * len(names) if isinstance(delay, float | int) else list(delay)
-        delays = list(dict.fromkeys(late))
-        # outputs that are read at the same time, one block for each delay
-        sources = [
-            list(dict.fromkeys(
-                term for name, own in zip(names, late, strict=True) if own == one
-                for term in _terms(name)
-            ))
-            for one in delays
-        ]  # fmt: skip
-        outputs = [self.fmu.block(own) for own in sources]
+        # outputs that are read at the same time, by their delay
+        sources: dict[float, dict[str, None]] = {}
+        for name, own in zip(names, late, strict=True):
+            sources.setdefault(own, {}).update(dict.fromkeys(_terms(name)))
+        commands = log.commands
+        table = np.column_stack(list(commands.values()))
         if offset is not None:
-            table = table.copy()
             places = [k for k, name in enumerate(commands) if name.endswith(".angle_ref")]
             table[:, places] += offset
         self.fmu.reset()
         self.fmu.set_blocks(self._common)
         self.fmu.set_parameters(parameters)
-        self.fmu.initialise(float(time[0]), float(time[-1]))
-        found = [np.empty((len(time), len(own))) for own in sources]
+        self.fmu.initialise(float(log.time[0]), float(log.time[-1]))
+        outputs = [self.fmu.block(list(own)) for own in sources.values()]
         try:
-            self._run(self._in_order(log, delays), table, inputs, outputs, found)
+            found = self._run(
+                log.time, list(sources), table, self.fmu.block(list(commands)), outputs
+            )
         except FmuError as error:
             raise LogError(
                 "the plant cannot follow the log",
@@ -95,42 +85,27 @@ class LogPlant(Closing):
                 where=log.where,
             ) from error
         columns = {
-            (one, term): values[:, k]
-            for one, own, values in zip(delays, sources, found, strict=True)
-            for k, term in enumerate(own)
+            (own, term): values[:, k]
+            for (own, terms), values in zip(sources.items(), found, strict=True)
+            for k, term in enumerate(terms)
         }
-        self.watch()
-        return _summed(columns, names, late)
-
-    def _commands(self, log: Log) -> tuple[list[str], Array]:
-        """Returns names and rows of a log's commands (rows, names), which nobody may change."""
-        if self._last is None or self._last[0] is not log:
-            commands = log.commands
-            self._last = log, list(commands), np.column_stack(list(commands.values()))
-        return self._last[1], self._last[2]
-
-    def _in_order(self, log: Log, delays: Sequence[float]) -> list[Event]:
-        """Returns the events of a log with some delays; those of the last ones are kept."""
-        key = tuple(delays)
-        last = self._ordered
-        if last is None or last[0] is not log or last[1] != key:
-            self._ordered = last = log, key, _events(log.time, delays)
-        return last[2]
+        sums = [
+            np.sum([columns[own, term] for term in _terms(name)], axis=0)
+            for name, own in zip(names, late, strict=True)
+        ]
+        return np.column_stack(sums)
 
     def _run(
-        self,
-        events: Sequence[Event],
-        table: Array,
-        inputs: Any,
-        outputs: Sequence[Any],
-        found: Sequence[Array],
-    ) -> None:
+        self, time: Array, delays: Sequence[float], table: Array, inputs: Any, outputs: list[Any]
+    ) -> list[Array]:
+        """Simulates rows of commands; returns the outputs of each block (rows, outputs)."""
+        found = [np.empty((len(time), len(one.values))) for one in outputs]
         step, rows = self.fmu.step, [(one.get, one.values) for one in outputs]
-        now = events[0][0]
-        for time, is_command, row, which in events:
-            if time - now > SAME_TIME:
-                step(now, time - now)
-                now = time
+        now = float(time[0])
+        for at, is_command, row, which in _events(time, delays):
+            if at - now > SAME_TIME:
+                step(now, at - now)
+                now = at
             if is_command:
                 inputs.values[:] = table[row]
                 inputs.set()
@@ -138,6 +113,7 @@ class LogPlant(Closing):
                 get, values = rows[which]
                 get()
                 found[which][row] = values
+        return found
 
     def close(self) -> None:
         """Frees the FMU."""
@@ -151,17 +127,6 @@ def _terms(name: str) -> tuple[str, ...]:
     """
     stem, _, kind = name.rpartition(".")
     return (f"{stem}.angle", f"{stem}.gear_deflection") if kind == "motor_angle" else (name,)
-
-
-def _summed(
-    columns: Mapping[tuple[float, str], Array], names: Sequence[str], delays: Sequence[float]
-) -> Array:
-    """Returns columns (rows, names) from outputs of the FMU, by their delay and name."""
-    found = []
-    for name, delay in zip(names, delays, strict=True):
-        first, *more = (columns[delay, term] for term in _terms(name))
-        found.append(sum(more, start=first))
-    return np.column_stack(found)
 
 
 def _events(time: Array, delays: Sequence[float]) -> list[Event]:

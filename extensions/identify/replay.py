@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import csv
+import io
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -9,27 +11,40 @@ from typing import Any
 
 import numpy as np
 
+from hexapod_cosim.cosim.common.files import RUN_FILE, write_json, write_text
 from hexapod_cosim.cosim.common.temporary import TemporaryFolder
 from hexapod_cosim.cosim.export.plant_export import export_fmu
 from hexapod_cosim.cosim.master.recorder import Recording
-from hexapod_cosim.extensions.identify.channel_screening import screened
-from hexapod_cosim.extensions.identify.commands.command_screening import (
-    wrong_commands,
-    wrong_commands_error,
+from hexapod_cosim.cosim.results.recordings import write_recording
+from hexapod_cosim.cosim.results.results import RESULTS
+from hexapod_cosim.cosim.scenario.records import default_formats
+from hexapod_cosim.extensions.identify.command_screening import wrong_commands, wrong_commands_error
+from hexapod_cosim.extensions.identify.experiment import Experiment
+from hexapod_cosim.extensions.identify.figures import channel_figures
+from hexapod_cosim.extensions.identify.log import (
+    Log,
+    LogError,
+    with_speed_references,
+    without_readings,
 )
-from hexapod_cosim.extensions.identify.commands.speed_references import with_speed_references
-from hexapod_cosim.extensions.identify.comparison import (
+from hexapod_cosim.extensions.identify.log_plant import LogPlant
+from hexapod_cosim.extensions.identify.report import (
+    COLUMNS,
     Difference,
+    Section,
     channel_differences,
     column_differences,
+    rendered,
 )
-from hexapod_cosim.extensions.identify.experiment import Experiment
-from hexapod_cosim.extensions.identify.log import Log, LogError, without_readings
-from hexapod_cosim.extensions.identify.log_plant import LogPlant
-from hexapod_cosim.extensions.identify.other_robot import other_robot
-from hexapod_cosim.extensions.identify.screening import BadColumn, left_out
+from hexapod_cosim.extensions.identify.screening import BadColumn, left_out, screened
 from hexapod_cosim.extensions.identify.start import initial_state
 from hexapod_cosim.models import FmuError, Robot
+
+REPLAY, REPORT, KIND = "replay.csv", "report.html", "replay"
+CAPTION = (
+    "Errors are simulated minus measured, over all rows; the spread is the root mean square of the "
+    "readings about their mean."
+)
 
 
 @dataclass(frozen=True)
@@ -42,14 +57,12 @@ class Replay:
     columns: tuple[Difference, ...]
     commands: tuple[BadColumn, ...]  # that the servos cannot have got
     readings: tuple[BadColumn, ...]  # dead or wrong; none are named where commands are wrong
-    other: str = ""  # why the log is another robot's, as a sentence
 
     @property
     def warnings(self) -> list[str]:
         """What a user must know of the columns, as sentences."""
         return [
             *self.log.warnings,
-            *([self.other] if self.other else []),
             *(
                 f"The robot cannot have got {one.name}: {one.why}. The simulated robot got it, so "
                 "that the differences are not those of the robot file."
@@ -96,26 +109,82 @@ def replay(
             except (LogError, FmuError) as error:
                 if wrong:
                     raise wrong_commands_error(log, wrong) from error
-                other = other_robot(log, robot)
-                if other:
-                    raise LogError(other, got=str(error), where=log.where) from error
                 raise
     inputs = log.commands
     data = np.column_stack([log.time, *inputs.values(), found])
-    simulated = Recording(("time", *inputs, *names), data)
-    whole = Experiment(
-        log=log,
-        number=0,
-        columns=tuple(names),
-        fitted=slice(0, len(log.time)),
-        held_out=slice(len(log.time), len(log.time)),
-    )
+    rows = slice(0, len(log.time))
+    whole = Experiment(log=log, number=0, columns=tuple(names), fitted=rows, held_out=slice(0, 0))
     return Replay(
         log=log,
-        simulated=simulated,
+        simulated=Recording(("time", *inputs, *names), data),
         names=tuple(names),
         columns=tuple(column_differences(log, names, found)),
         commands=tuple(wrong),
         readings=() if wrong else tuple(screened(whole, found)),
-        other=other_robot(log, robot),
+    )
+
+
+def write_replay(
+    done: Replay, robot: Robot, folder: Path, *, command: str, settings: Mapping[str, Any]
+) -> list[Path]:
+    """Writes replay.csv, the simulated rows, the report and run.json; returns the files."""
+    facts = {
+        "kind": KIND,
+        "status": "completed",
+        "log": done.log.where,
+        "robot": {"name": robot.name, "hash": robot.hash},
+        "settings": dict(settings),
+        "command": command,
+        "channels": [one.as_table() for one in done.channels],
+        "warnings": done.warnings,
+    }
+    text = io.StringIO()
+    rows = [one.as_table() for one in done.columns]
+    writer = csv.DictWriter(text, list(rows[0]), lineterminator="\n")
+    writer.writeheader()
+    writer.writerows(rows)
+    write_text(folder / REPLAY, text.getvalue())
+    (simulated,) = write_recording(
+        done.simulated,
+        folder,
+        RESULTS,
+        formats=default_formats()[:1],
+        about={"log": done.log.where},
+    )
+    write_text(folder / REPORT, _page(done, robot, command, simulated.name))
+    write_json(folder / RUN_FILE, facts)
+    return [folder / REPLAY, simulated, folder / REPORT, folder / RUN_FILE]
+
+
+def _page(done: Replay, robot: Robot, command: str, simulated_file: str) -> str:
+    time = done.log.time
+    columns = {name: done.simulated.column(name) for name in done.names}
+    sections = [
+        Section(
+            title="Channel by channel",
+            caption=CAPTION,
+            columns=COLUMNS,
+            rows=[one.as_row() for one in done.channels],
+            left=2,
+        ),
+        Section(
+            title="Measured and simulated",
+            pictures=channel_figures(done.log, {"simulated": columns}),
+        ),
+        Section(
+            title="Column by column",
+            columns=COLUMNS,
+            rows=[one.as_row() for one in done.columns],
+            left=2,
+        ),
+    ]
+    return rendered(
+        sections,
+        title=f"Replay of {Path(done.log.where).name}",
+        headline=f"Robot {robot.name}, {time[-1] - time[0]:.2f} s, {len(time)} rows",
+        lead="The plant FMU was driven with the commands of the log, from its first row on.",
+        warnings=done.warnings,
+        command=command,
+        facts={"log": done.log.where, "robot": robot.name, "SHA-256 of the robot": robot.hash},
+        source=f"{REPLAY} and {simulated_file}",
     )

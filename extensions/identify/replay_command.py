@@ -9,15 +9,14 @@ from typing import Annotated, Any
 
 import typer
 
-from hexapod_cosim.cosim.cli.export_command import RobotName
-from hexapod_cosim.cosim.cli.running import FmuFile
-from hexapod_cosim.cosim.cli.terminal import Json, show_files, show_json, show_table, waiting, warn
+from hexapod_cosim.cosim.cli.options import FmuFile, Json, RobotName
+from hexapod_cosim.cosim.cli.terminal import show_files, show_json, show_table, waiting, warn
 from hexapod_cosim.cosim.results.results import results_folder
 from hexapod_cosim.cosim.scenario.tables import with_overrides
 from hexapod_cosim.extensions.identify.log import read_log
-from hexapod_cosim.extensions.identify.page import COLUMNS, difference_rows
 from hexapod_cosim.extensions.identify.replay import replay as replay_log
-from hexapod_cosim.extensions.identify.replay_files import write_replay
+from hexapod_cosim.extensions.identify.replay import write_replay
+from hexapod_cosim.extensions.identify.report import COLUMNS
 from hexapod_cosim.models import load_robot
 
 LogFile = Annotated[
@@ -63,7 +62,7 @@ def replay(
         written = [str(path) for path in files]
         show_json({"channels": channels, "warnings": done.warnings, "files": written})
         return
-    show_table(COLUMNS, difference_rows(done.channels), right=(2, 3, 4, 5))
+    show_table(COLUMNS, [one.as_row() for one in done.channels], right=(2, 3, 4, 5))
     show_files(files)
 
 

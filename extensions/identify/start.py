@@ -23,10 +23,6 @@ FARTHEST = 0.5  # rad    of a joint from its command; a servo under load sags by
 HIGHEST = 0.1  # m    of the torso above or below the place where the feet carry it
 LEANS = 0.3  # rad    roll or pitch of a robot that stands on level ground
 TURN = 2.0 * np.pi  # rad    a command beyond it is not in rad, and is refused when it is sent
-LEAST_THIRD = 10  # rows of a third of the rest, of which means are compared
-LARGEST_CHANGE = 6.0  # of a mean, in its deviations: one of 21 is larger in one of 10^7 logs
-SECOND = 0.6745 * np.sqrt(6.0)  # median of second differences of white noise over its deviation
-LEAST_CHANGE = 0.003  # rad    feet that push against each other creep by less
 RATES = {  # quantity of the log: initial value of the FMU
     "torso.velocity": "initial.velocity",
     "torso.angular_velocity": "initial.angular_velocity",
@@ -39,27 +35,6 @@ def rest_rows(log: Log) -> int:
     moved = np.flatnonzero((table != table[0]).any(axis=1))
     end = int(moved[0]) if moved.size else len(table)
     return max(1, min(end, int(np.searchsorted(log.time, log.time[0] + LONGEST_REST))))
-
-
-def moving_at_rest(log: Log) -> str:
-    """Returns the reading that changes most while the commands at the start stand still, and by how
-    much, as words; empty where none changes by more than its noise.
-
-    The noise of a reading is that of its second differences.
-    """
-    count = rest_rows(log) // 3
-    if count < LEAST_THIRD:
-        return ""
-    names = [name for name in (*joint_names("angle"), *ATTITUDE) if log.has([name])]
-    found, largest = "", LARGEST_CHANGE
-    for name in names:
-        own = log.recording.column(name)[: 3 * count]
-        noise = float(np.nanmedian(np.abs(np.diff(own, n=2)))) / SECOND
-        change = float(np.nanmean(own[2 * count :]) - np.nanmean(own[:count]))
-        size = abs(change) / max(noise * np.sqrt(2.0 / count), 1e-12)
-        if size > largest and abs(change) > LEAST_CHANGE:
-            found, largest = f"{name} by {change:.2g} rad", size
-    return found
 
 
 def initial_state(log: Log, robot: Robot) -> dict[str, float]:

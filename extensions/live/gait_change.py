@@ -1,62 +1,36 @@
-"""A change of gait while the robot walks: when the controller is told, and how fast the robot walks
-meanwhile.
+"""A change of gait while the robot walks: how fast it walks meanwhile, and when things are due.
 
 Feet stand longer during a change than in either gait and need more reach (docs/control/gait.md,
 C55). So the robot walks slowly from the request until every leg has made a step in the next gait.
+The server's loop and the page without a server both follow the plan that is made here.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
-from hexapod_cosim.controller import BodyCommand, Gait
-from hexapod_cosim.extensions.live.settings import Limits
+from hexapod_cosim.controller import Gait
+from hexapod_cosim.extensions.live.settings import Limits, find_limits
+from hexapod_cosim.models import Robot
 
 # of the commands that both gaits allow: no leg reaches its limits (docs/control/gait.md)
 SHARE = 0.3
-ROUNDING = 1e-9
 
 
-@dataclass
+@dataclass(frozen=True)
 class GaitChange:
-    """The macro-steps that are left until the controller is told, the gait holds and all is over.
+    """The plan of a change; times since the request."""
 
-    The limits hold until then.
-    """
-
-    limits: Limits
-    tell: int
-    hold: int
-    end: int
-
-    def advance(self) -> None:
-        """Counts a macro-step."""
-        self.tell, self.hold, self.end = self.tell - 1, self.hold - 1, self.end - 1
+    limits: Limits  # of commands until `end`
+    begin: float  # s    the robot is slow, and the controller gets the next gait
+    settled: float  # s    no leg steps in the gait before
+    end: float  # s    each leg has made its first step in the next gait
 
 
-def begin_change(
-    before: Gait,
-    after: Gait,
-    *,
-    limits: tuple[Limits, ...],
-    command: BodyCommand,
-    held: float,
-    h: float,
-) -> GaitChange:
-    """Plans a change of gait.
-
-    Args:
-        before, after: gaits.
-        limits: present ones, those of both gaits.
-        command: of the last macro-step.
-        held: time for which it has not changed [s].
-        h: macro-step [s].
-    """
-    present, *both = limits
-    slow = both[0].least(both[1]).times(SHARE).least(present)
-    # the ramp to a slower command takes a gait period (C1)
-    ramp = before.period if slow.share(command) > 1.0 + ROUNDING else before.period - held
+def plan_change(robot: Robot, before: Gait, after: Gait) -> GaitChange:
+    """Returns the plan of a change between two gaits of a robot."""
+    limits = find_limits(robot, before).least(find_limits(robot, after)).times(SHARE)
     swing = before.period * (1.0 - before.duty)
-    tell = max(round(ramp / h), 0)
-    hold = tell + max(round(swing / h), 1)
-    return GaitChange(slow, tell, hold, hold + round((swing + after.period) / h))
+    begin = before.period  # the ramp to a slower command takes a gait period (C1)
+    settled = begin + swing
+    return GaitChange(limits, begin, settled, settled + swing + after.period)

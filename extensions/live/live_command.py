@@ -12,10 +12,9 @@ from typing import Annotated
 import typer
 
 from hexapod_cosim.controller import Gains, GainsError
-from hexapod_cosim.cosim.cli.extension import Command, Extension
-from hexapod_cosim.cosim.cli.running import ControlNames, GainsFile, Name, Settings, given_gains
+from hexapod_cosim.cosim.cli.options import ControlNames, GainsFile, Json, Name, Settings
+from hexapod_cosim.cosim.cli.running import given_gains
 from hexapod_cosim.cosim.cli.terminal import (
-    Json,
     refuse_unused,
     show_files,
     show_json,
@@ -26,7 +25,6 @@ from hexapod_cosim.cosim.control.controllers import check_control
 from hexapod_cosim.cosim.scenario.controls import parse_controls
 from hexapod_cosim.cosim.scenario.records import CONTROLS, Scenario
 from hexapod_cosim.cosim.scenario.scenario import load_scenario
-from hexapod_cosim.extensions.live.realtime_command import realtime
 
 Port = Annotated[
     int,
@@ -134,8 +132,3 @@ def _announce(url: str, *, browser: bool, json: bool) -> None:
         show_text("Ctrl-C ends it")
     if browser:
         threading.Thread(target=webbrowser.open, args=(url,), daemon=True).start()
-
-
-EXTENSION = Extension(
-    commands=[Command(name="live", run=live), Command(name="realtime", run=realtime)]
-)

@@ -2,8 +2,7 @@
 
 Step k is due to begin at t_k = origin + k h and misses its deadline when it ends after t_(k+1).
 A lag of less than MOST_LAG is made up by steps without a pause between them. After a larger one,
-such as the sleep of a laptop, the origin moves: the gap is skipped and counted, and the robot does
-not run through it in a burst.
+such as the sleep of a laptop, the origin moves: the gap is skipped and counted.
 """
 
 from __future__ import annotations
@@ -34,18 +33,16 @@ class Lateness:
     steps: int = 0
     misses: int = 0  # steps that ended after the next one was due
     worst: float = 0.0  # s    largest time by which a step ended late
-    gaps: int = 0  # times that wall time was skipped
-    skipped: float = 0.0  # s    of wall time in all gaps
+    skipped: float = 0.0  # s    of wall time in gaps
 
 
 class Pacer:
-    """Tells how long to wait before a macro-step of `h` [s]; `now` returns wall time [s]."""
+    """Computes the time to wait before a macro-step of `h` [s]; `now` returns wall time [s]."""
 
     def __init__(self, h: float, now: Callable[[], float]) -> None:
         self._h, self._now = h, now
         self.lateness = Lateness()
         self._ends: deque[float] = deque(maxlen=max(round(WINDOW / h), 2) + 1)
-        self._due = 0.0
         self.restart()
 
     def restart(self) -> None:
@@ -57,13 +54,12 @@ class Pacer:
         """Returns the time [s] until the next step is due; skips a gap that is too large."""
         left = self._due - self._now()
         if left < -MOST_LAG:
-            self.lateness.gaps += 1
             self.lateness.skipped -= left
             self.restart()
             return 0.0
         return max(left, 0.0)
 
-    def stepped(self) -> None:
+    def note_step(self) -> None:
         """Notes that the step that was due has ended."""
         end, count = self._now(), self.lateness
         self._due += self._h

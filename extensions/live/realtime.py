@@ -1,8 +1,7 @@
 """Measures how long the plant's doStep takes, step by step, in a walk of a live robot.
 
-Times are of the call through Python's ctypes, in processor time of the thread and in wall time. The
-thread's time is what the step costs; wall time adds what other processes and the system take. Every
-step counts, from the first one on.
+Times are of the call through Python's ctypes, in processor time of the thread, which is what the
+step costs, and in wall time, which adds what other processes and the system take.
 """
 
 from __future__ import annotations
@@ -10,25 +9,23 @@ from __future__ import annotations
 import gc
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from itertools import pairwise
 from pathlib import Path
 from time import perf_counter_ns, thread_time_ns
 from typing import Any
 
 import matplotlib
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from hexapod_cosim.controller import BodyCommand, Gains
 from hexapod_cosim.controller.figure_style import DPI, PALETTE, SETTINGS, UNDATED, WIDTH
-from hexapod_cosim.cosim.common.files import atomic_path, write_text
+from hexapod_cosim.cosim.common.files import atomic_path
 from hexapod_cosim.cosim.interface.names import foot_names
 from hexapod_cosim.cosim.scenario.records import Scenario
+from hexapod_cosim.extensions.live.recording import NO_FORCE
 from hexapod_cosim.extensions.live.robot import LiveRobot
 from hexapod_cosim.extensions.live.settings import Choices, control_texts
-from hexapod_cosim.extensions.live.take import NO_FORCE
 from hexapod_cosim.models import HexapodError
 
 SHARES = (0.5, 0.99, 0.999, 0.9999)  # quantiles
@@ -36,7 +33,7 @@ GOAL, GOAL_SHARE = 100.0, 0.9999  # us, and the share of steps below it
 WORST = 300.0  # us    goal of the slowest step
 EDGES = np.geomspace(1.0, 1e5, 101)  # us    of the bins
 FEWEST = 1000  # steps of a measurement
-CSV, FIGURE = "realtime.csv", "realtime"
+FIGURE = "realtime"
 Micro = NDArray[np.float64]
 
 
@@ -49,13 +46,14 @@ class StepTimes:
     wall: Micro
     touched: NDArray[np.bool_]
 
-    def chosen(self) -> dict[str, dict[str, Micro]]:
-        """Returns the times by clock and by kind of steps."""
-        clocks = {"thread": self.thread, "wall": self.wall}
-        return {
-            clock: {"all steps": values, "with a touch-down": values[self.touched]}
-            for clock, values in clocks.items()
-        }
+    def kinds(self) -> dict[str, Micro]:
+        """Returns the times by clock and kind of steps, those without any left out."""
+        found: dict[str, Micro] = {}
+        for clock, values in (("thread", self.thread), ("wall", self.wall)):
+            found[f"{clock} time, all steps"] = values
+            if self.touched.any():
+                found[f"{clock} time, with a touch-down"] = values[self.touched]
+        return found
 
 
 def measure(
@@ -75,32 +73,29 @@ def measure(
         raise HexapodError(
             "too few steps", got=count, expected=f"at least {FEWEST}", fix="raise --steps"
         )
-    wanted = replace(scenario, macro_step=step)
-    own = control_texts(wanted, ())
-    with LiveRobot(Choices(wanted, own, {}), gains=gains) as robot:
-        return _measure(robot, _first_command(scenario), count, progress)
-
-
-def _first_command(scenario: Scenario) -> BodyCommand:
     first = scenario.commands[0]
-    return BodyCommand(first.vx, first.vy, first.yaw_rate, first.height, first.roll, first.pitch)
+    command = BodyCommand(first.vx, first.vy, first.yaw_rate, first.height, first.roll, first.pitch)
+    wanted = replace(scenario, macro_step=step)
+    with LiveRobot(Choices(wanted, control_texts(wanted, ()), {}), gains=gains) as robot:
+        return _measure(robot, command, count, progress)
 
 
 def _measure(
-    robot: LiveRobot, command: BodyCommand, count: int, progress: Callable[[float], None] | None
+    robot: LiveRobot,
+    command: BodyCommand,
+    count: int,
+    progress: Callable[[float], None] | None,
 ) -> StepTimes:
     """Steps a robot with a clock around its plant; collections of garbage wait."""
-    names = robot.signals.names
-    places = [names.index(name) for name in foot_names("landings")]
-    thread, wall = np.zeros(count), np.zeros(count)
-    touched, step = np.zeros(count, dtype=np.bool_), robot.plan.scenario.macro_step
+    places = [robot.signals.names.index(name) for name in foot_names("landings")]
+    times, touched = np.zeros((2, count)), np.zeros(count, dtype=np.bool_)
     advance, number = robot.advance, 0
 
     def timed(t: float, h: float) -> None:
-        before_wall, before = perf_counter_ns(), thread_time_ns()
+        before = perf_counter_ns(), thread_time_ns()
         advance(t, h)
-        after = thread_time_ns()
-        wall[number], thread[number] = perf_counter_ns() - before_wall, after - before
+        thread = thread_time_ns() - before[1]
+        times[:, number] = thread, perf_counter_ns() - before[0]
 
     robot.advance = timed
     gc.disable()
@@ -112,24 +107,21 @@ def _measure(
             if robot.fault:
                 raise HexapodError("the robot did not walk to the end", got=robot.fault)
             if progress is not None and number % 1000 == 0:
-                progress(number * step)
+                progress(number * robot.h)
     finally:
         gc.enable()
-        robot.advance = advance
-    return StepTimes(step, thread / 1e3, wall / 1e3, touched)
+    return StepTimes(robot.h, times[0] / 1e3, times[1] / 1e3, touched)
 
 
 def facts_of(times: StepTimes) -> dict[str, Any]:
     """Returns counts, quantiles [us] and whether the goals are met, for people and for JSON."""
-    found: dict[str, Any] = {
+    return {
         "step": times.step,
         "steps": len(times.thread),
         "touch_downs": int(times.touched.sum()),
         "goal_met": goal_met(times.thread),
+        "times": {kind: _quantiles(values) for kind, values in times.kinds().items()},
     }
-    for clock, kinds in times.chosen().items():
-        found[clock] = {kind: _quantiles(values) for kind, values in kinds.items()}
-    return found
 
 
 def goal_met(thread: Micro) -> bool:
@@ -139,11 +131,8 @@ def goal_met(thread: Micro) -> bool:
 
 def _quantiles(values: Micro) -> dict[str, float]:
     """Returns quantiles and the largest [us], and the number of steps above the goals."""
-    if len(values) == 0:
-        return {}
-    found = {f"{100.0 * share:g} %": float(np.quantile(values, share)) for share in SHARES}
     return {
-        **found,
+        **{f"{100.0 * share:g} %": float(np.quantile(values, share)) for share in SHARES},
         "largest": float(values.max()),
         f"above {GOAL:g} us": int(np.sum(values >= GOAL)),
         f"above {WORST:g} us": int(np.sum(values > WORST)),
@@ -152,32 +141,17 @@ def _quantiles(values: Micro) -> dict[str, float]:
 
 def table_of(facts: Mapping[str, Any]) -> tuple[list[str], list[list[str]]]:
     """Returns the heading and the rows of a table of the quantiles [us]."""
-    names = list(facts["thread"]["all steps"])
     rows = [
-        [f"{clock} time, {kind}", *(f"{values[name]:.0f}" for name in names)]
-        for clock in ("thread", "wall")
-        for kind, values in facts[clock].items()
-        if values
+        [kind, *(f"{value:.0f}" for value in values.values())]
+        for kind, values in facts["times"].items()
     ]
-    return ["us", *names], rows
+    return ["us", *next(iter(facts["times"].values()))], rows
 
 
 def write(times: StepTimes, folder: Path) -> list[Path]:
-    """Writes the histogram as CSV, PNG and SVG; returns the files."""
+    """Writes the histogram as PNG and SVG; returns the files."""
     folder.mkdir(parents=True, exist_ok=True)
-    counts = {
-        f"{clock}, {kind}": np.histogram(np.clip(values, EDGES[0], EDGES[-1]), EDGES)[0]
-        for clock, kinds in times.chosen().items()
-        for kind, values in kinds.items()
-    }
-    lines = [
-        "from_us,to_us," + ",".join(name.replace(", ", "_").replace(" ", "_") for name in counts)
-    ]
-    for k, (low, high) in enumerate(pairwise(EDGES)):
-        numbers = ",".join(str(column[k]) for column in counts.values())
-        lines.append(f"{low:.6g},{high:.6g},{numbers}")
-    files = [folder / CSV]
-    write_text(files[0], "\n".join(lines) + "\n")
+    files = []
     with matplotlib.rc_context(SETTINGS):
         figure = draw(times)
         for kind, metadata in UNDATED.items():
@@ -190,26 +164,16 @@ def write(times: StepTimes, folder: Path) -> list[Path]:
 def draw(times: StepTimes) -> Figure:
     """Draws the histograms of both clocks beside each other, with the goals."""
     figure = Figure(figsize=(WIDTH, 2.6))
-    titles = {"thread": "processor time of the thread", "wall": "wall time"}
     axes = figure.subplots(1, 2, sharex=True, sharey=True)
-    for axis, (clock, kinds) in zip(axes, times.chosen().items(), strict=True):
-        _draw_clock(axis, kinds)
-        axis.set_title(titles[clock])
-        axis.set_xlabel(f"doStep({1e3 * times.step:g} ms) [µs]")
-    axes[0].set_ylabel("steps")
+    for clock, axis in zip(("thread", "wall"), axes, strict=True):
+        shown = {kind: values for kind, values in times.kinds().items() if kind.startswith(clock)}
+        for (kind, values), colour in zip(shown.items(), PALETTE, strict=False):
+            label = kind.partition(", ")[2]
+            bars: dict[str, Any] = {"bins": EDGES, "color": colour}
+            axis.hist(values, histtype="stepfilled", alpha=0.35, label=label, **bars)
+        for goal in (GOAL, WORST):
+            axis.axvline(goal, color="0.4", linestyle=":", linewidth=1.0)
+        axis.set(title=f"{clock} time", xlabel=f"doStep({1e3 * times.step:g} ms) [µs]")
+    axes[0].set(ylabel="steps", xscale="log", yscale="log", xlim=(2.0, 5e4))
     axes[0].legend(loc="upper right")
     return figure
-
-
-def _draw_clock(axis: Axes, kinds: Mapping[str, Micro]) -> None:
-    """Draws the histograms of the kinds of steps over each other."""
-    edges = EDGES.tolist()
-    for (kind, values), colour in zip(kinds.items(), PALETTE, strict=False):
-        shown = np.clip(values, EDGES[0], EDGES[-1])
-        axis.hist(shown, edges, histtype="stepfilled", alpha=0.35, color=colour, label=kind)
-        axis.hist(shown, edges, histtype="step", color=colour)
-    for goal in (GOAL, WORST):
-        axis.axvline(goal, color="0.4", linestyle=":", linewidth=1.0)
-    axis.set_xscale("log")
-    axis.set_yscale("log")
-    axis.set_xlim(2.0, 5e4)

@@ -8,9 +8,8 @@ from typing import Annotated
 
 import typer
 
-from hexapod_cosim.cosim.cli.running import Name, Settings
+from hexapod_cosim.cosim.cli.options import Json, Name, Settings
 from hexapod_cosim.cosim.cli.terminal import (
-    Json,
     progress_bar,
     show_files,
     show_json,

@@ -1,4 +1,4 @@
-"""Serves the page of a live robot to browsers on this computer, and starts the loop.
+"""Serves the page of a live robot to browsers on this computer, and runs its loop.
 
 The server listens on the loopback address alone. Every address begins with a random token. Requests
 with another token, from another origin or for another host are refused, so that neither programs of
@@ -10,33 +10,39 @@ from __future__ import annotations
 import asyncio
 import secrets
 import socket
-from collections.abc import AsyncIterator, Callable, Mapping
+import sys
+import threading
+from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager, suppress
-from dataclasses import dataclass
 from errno import EADDRINUSE
-from multiprocessing import get_context
-from multiprocessing.connection import Connection
-from types import MappingProxyType
 from typing import Any
 
+import uvicorn
+from starlette.applications import Starlette
+from starlette.middleware import Middleware
+from starlette.requests import HTTPConnection, Request
+from starlette.responses import PlainTextResponse, Response
+from starlette.routing import Route, WebSocketRoute
+from starlette.websockets import WebSocket
+
 from hexapod_cosim.controller import Gains
-from hexapod_cosim.extensions.live.hub import Client, Hub, LoopLink
-from hexapod_cosim.extensions.live.loop import run_process
+from hexapod_cosim.extensions.live.hub import Hub
+from hexapod_cosim.extensions.live.loop import Loop
+from hexapod_cosim.extensions.live.messages import MessageError
 from hexapod_cosim.extensions.live.page import render_page
-from hexapod_cosim.extensions.live.protocol import MOST_BYTES
+from hexapod_cosim.extensions.live.robot import LiveRobot
 from hexapod_cosim.extensions.live.settings import Choices
 from hexapod_cosim.models import HexapodError
 
 HOST = "127.0.0.1"
-PORTS = 65536  # numbers of ports, from 0, which asks for a free one
-NAMES = (HOST, "localhost")  # hosts that a browser may have asked for
 TOKEN_BYTES = 16
 POLICY = 1008  # WebSocket: closed because of what the page sent
 BUSY = 1013  # WebSocket: try again later
-ENDING = 5.0  # s    until a loop that does not end is killed
+ENDING = 5.0  # s    until a loop that does not end is left behind
+SWITCH = 5e-4  # s    for which the server's thread may keep the loop's waiting
 UVICORN: dict[str, Any] = {
     "ws": "websockets-sansio",
-    "ws_max_size": 2 * MOST_BYTES,
+    "ws_max_size": 4096,
     "ws_max_queue": 16,
     "log_level": "critical",
     "access_log": False,
@@ -45,250 +51,152 @@ UVICORN: dict[str, Any] = {
     "timeout_graceful_shutdown": 1,
     "lifespan": "on",
 }
-CSP = (
-    "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'; "
-    "img-src data: blob:; connect-src 'self' ws://{host}:{port}; base-uri 'none'; "
-    "form-action 'none'; frame-ancestors 'none'"
-)
-NONE: Mapping[str, str] = MappingProxyType({})
 HEADERS = {
     "cache-control": "no-store",
     "referrer-policy": "no-referrer",
     "x-content-type-options": "nosniff",
     "cross-origin-resource-policy": "same-origin",
+    "content-security-policy": (
+        "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'; "
+        "img-src data: blob:; connect-src 'self'; base-uri 'none'; form-action 'none'; "
+        "frame-ancestors 'none'"
+    ),
 }
 
 
 class LiveError(HexapodError):
-    """The live robot cannot be started, or its loop has ended by itself."""
+    """The live robot cannot be started."""
 
 
-@dataclass(frozen=True)
-class Address:
-    """The port and the token of the page's address."""
+class Guard:
+    """Refuses requests for another host, from another origin or without the token."""
 
-    port: int
-    token: str
+    def __init__(self, app: Any, port: int, token: str) -> None:
+        self._app, self._token = app, token.encode()
+        self._hosts = {f"{name}:{port}" for name in (HOST, "localhost")}
 
-    @property
-    def url(self) -> str:
-        """The page's address."""
-        return f"http://{HOST}:{self.port}/{self.token}/"
+    async def __call__(self, scope: Any, receive: Any, send: Any) -> None:
+        """Answers what is refused, and passes on all else."""
+        if scope["type"] == "lifespan" or self._allows(HTTPConnection(scope)):
+            await self._app(scope, receive, send)
+        elif scope["type"] == "websocket":
+            await WebSocket(scope, receive, send).close(POLICY)
+        else:
+            refusal = "use the address that `hexapod live` printed"
+            await PlainTextResponse(refusal, 403, HEADERS)(scope, receive, send)
 
-    def has(self, token: str) -> bool:
-        """Whether a token is ours, in a time that does not tell how much of it is."""
-        return secrets.compare_digest(token.encode(), self.token.encode())
-
-    def is_ours(self, host: str, origin: str | None) -> bool:
-        """Whether a request is for this host, and from no page but ours."""
-        hosts = {f"{name}:{self.port}" for name in NAMES}
-        return host in hosts and (origin is None or origin in {f"http://{one}" for one in hosts})
-
-
-class Pages:
-    """Answers requests for the page, for the last recording and for the socket."""
-
-    def __init__(self, address: Address, hub: Hub, page: str) -> None:
-        self._address, self._hub, self._page = address, hub, page
-
-    async def show(self, request: Any) -> Any:
-        """Answers with the page."""
-        refused = self._refusal(request)
-        if refused is not None:
-            return refused
-        host = request.headers["host"].rpartition(":")[0]
-        policy = CSP.format(host=host, port=self._address.port)
-        return _answer(self._page, kind="text/html", headers={"content-security-policy": policy})
-
-    async def scenario(self, request: Any) -> Any:
-        """Answers with the last recording as a scenario file."""
-        refused = self._refusal(request)
-        if refused is not None:
-            return refused
-        if not self._hub.take:
-            return _answer("nothing is recorded yet", 404)
-        name = {"content-disposition": 'attachment; filename="driven.toml"'}
-        return _answer(self._hub.take, kind="application/toml", headers=name)
-
-    def _refusal(self, request: Any) -> Any:
-        """Returns the answer to a request that is refused; None for one that is not."""
-        headers, token = request.headers, request.path_params["token"]
-        if not self._address.is_ours(headers.get("host", ""), headers.get("origin")):
-            return _answer("another host or origin is refused", 403)
-        if not self._address.has(token):
-            return _answer("this address lacks the token that `hexapod live` printed", 404)
-        return None
-
-    async def talk(self, connection: Any) -> None:
-        """Serves a socket of our page; a socket of another one is refused."""
-        headers, token = connection.headers, connection.path_params["token"]
-        origin = headers.get("origin", "none")  # browsers always send one
-        ours = self._address.is_ours(headers.get("host", ""), origin)
-        if not ours or not self._address.has(token):
-            await connection.close(POLICY)
-            return
-        await _serve_socket(connection, self._hub)
-
-
-def _answer(
-    text: str, code: int = 200, *, kind: str = "text/plain", headers: Mapping[str, str] = NONE
-) -> Any:
-    from starlette.responses import Response  # noqa: PLC0415  slow to import
-
-    return Response(text, code, headers={**HEADERS, **headers}, media_type=kind)
-
-
-def make_app(pages: Pages, on_start: Callable[[], None]) -> Any:
-    """Returns the ASGI application; it calls `on_start` in its event loop."""
-    from starlette.applications import Starlette  # noqa: PLC0415  slow to import
-    from starlette.routing import Route, WebSocketRoute  # noqa: PLC0415
-
-    @asynccontextmanager
-    async def lifespan(_app: Any) -> AsyncIterator[None]:
-        on_start()
-        yield
-
-    routes = [
-        Route("/{token:str}/", pages.show),
-        Route("/{token:str}/scenario.toml", pages.scenario),
-        WebSocketRoute("/{token:str}/socket", pages.talk),
-    ]
-    app = Starlette(routes=routes, lifespan=lifespan)
-    app.router.redirect_slashes = False  # a redirection would be answered before any check
-    return app
-
-
-async def _serve_socket(connection: Any, hub: Hub) -> None:
-    """Serves a page until it or the server ends the connection."""
-    await connection.accept()
-    client = hub.join()
-    if client is None:
-        await connection.close(BUSY, "too many pages")
-        return
-    sending = asyncio.ensure_future(_send_all(connection, client))
-    try:
-        while True:
-            message = await connection.receive()
-            if message["type"] == "websocket.disconnect":
-                return
-            reason = hub.from_page(client, message.get("text") or message.get("bytes") or "")
-            if reason is not None:
-                await connection.close(POLICY, reason)
-                return
-    finally:
-        hub.leave(client)
-        sending.cancel()
-        with suppress(asyncio.CancelledError, Exception):
-            await sending
-
-
-async def _send_all(connection: Any, client: Client) -> None:
-    """Sends a page what is new; a slow page gets fewer states, and holds nothing up."""
-    while True:
-        for text in await client.take():
-            await connection.send_text(text)
+    def _allows(self, request: HTTPConnection) -> bool:
+        host, origin = request.headers.get("host", ""), request.headers.get("origin")
+        is_socket = request.scope["type"] == "websocket"  # of which browsers always say the origin
+        ours = {f"http://{one}" for one in self._hosts} | (set() if is_socket else {None})
+        token = request.url.path.split("/")[1].encode()
+        # compared in a time that does not depend on how much of the token is right
+        return host in self._hosts and origin in ours and secrets.compare_digest(token, self._token)
 
 
 class LiveServer:
-    """The server and the loop's process.
+    """The server and the thread of the loop.
 
     Args:
         choices: the scenario and the changes that pages may make.
         gains: of the built-in controls.
         port: 0 for a free one.
-        process: what the loop's process runs.
 
     Raises LiveError for a port that is taken.
     """
 
-    def __init__(
-        self,
-        choices: Choices,
-        gains: Gains | None,
-        *,
-        port: int = 0,
-        process: Callable[[Connection, Choices, Gains | None], None] = run_process,
-    ) -> None:
+    def __init__(self, choices: Choices, gains: Gains | None, *, port: int = 0) -> None:
         self._socket = _bound(port)
-        self.address = Address(self._socket.getsockname()[1], secrets.token_urlsafe(TOKEN_BYTES))
-        context = get_context("spawn")
-        ours, theirs = context.Pipe()
-        self._process = context.Process(
-            target=process, args=(theirs, choices, gains), name="hexapod-live", daemon=True
-        )
+        port, token = self._socket.getsockname()[1], secrets.token_urlsafe(TOKEN_BYTES)
+        self.url = f"http://{HOST}:{port}/{token}/"
+        self._choices, self._gains = choices, gains
         self._page = render_page(choices)
-        self._link = LoopLink(ours, self._received)
-        self.hub = Hub(self._link)
-        self._server: Any = None
-        self._loop: asyncio.AbstractEventLoop | None = None
-        self.lost: HexapodError | None = None  # why the loop has ended
-        self._connection, self._theirs = ours, theirs
+        self.hub = Hub()
+        self._loop: Loop
+        self._events: asyncio.AbstractEventLoop | None = None
+        routes = [
+            Route("/{token}/", self._show),
+            Route("/{token}/scenario.toml", self._save),
+            WebSocketRoute("/{token}/socket", self._talk),
+        ]
+        guard = Middleware(Guard, port=port, token=token)
+        app = Starlette(routes=routes, middleware=[guard], lifespan=self._lifespan)
+        self._server = uvicorn.Server(uvicorn.Config(app, **UVICORN))
 
     def run(self, ready: Callable[[str], None] = lambda url: None) -> None:
-        """Serves until Ctrl-C or until the loop ends; `ready` gets the page's address.
+        """Serves until Ctrl-C; `ready` gets the page's address.
 
-        Raises LiveError when the loop ends by itself.
+        Raises HexapodError for a robot that cannot start.
         """
-        import uvicorn  # noqa: PLC0415  slow to import
-
-        app = make_app(Pages(self.address, self.hub, self._page), self._started)
-        config = uvicorn.Config(app, **UVICORN)
-        self._server = uvicorn.Server(config)
+        sys.setswitchinterval(SWITCH)
         try:
-            self._start_loop()
-            ready(self.address.url)
-            self._server.run(sockets=[self._socket])
+            with LiveRobot(self._choices, gains=self._gains) as robot:
+                self._loop = Loop(robot, self._publish)
+                thread = threading.Thread(target=self._run_loop, daemon=True, name="hexapod-live")
+                thread.start()
+                try:
+                    ready(self.url)
+                    self._server.run(sockets=[self._socket])
+                finally:
+                    self._loop.ended = True
+                    thread.join(ENDING)
         finally:
-            self._end()
-        if self.lost is not None:
-            raise self.lost
+            self._socket.close()
 
-    def _start_loop(self) -> None:
-        """Starts the loop's process and waits until it is ready. Raises HexapodError."""
-        self._process.start()
-        self._theirs.close()
+    def _run_loop(self) -> None:
+        """Runs the loop; when it ends by itself, the server ends too."""
         try:
-            kind, content = self._connection.recv()
-        except EOFError:
-            kind, content = "refused", LiveError("the loop's process has ended by itself")
-        if kind == "refused":
-            raise content
-
-    def _started(self) -> None:
-        """Lets messages of the loop in, now that there is an event loop for them."""
-        self._loop = asyncio.get_running_loop()
-        self._link.start()
-
-    def _received(self, kind: str, content: Any) -> None:
-        """Takes a message of the loop, in the link's thread."""
-        loop = self._loop
-        if kind in ("lost", "refused"):
-            if self._server is not None and not self._server.should_exit:
-                ended = LiveError(
-                    "the loop's process has ended by itself", fix="start `hexapod live` again"
-                )
-                self.lost = content if kind == "refused" else ended
-                self._server.should_exit = True
-            return
-        if loop is not None and not loop.is_closed():
-            with suppress(RuntimeError):  # the server has just ended
-                loop.call_soon_threadsafe(self.hub.from_loop, kind, content)
+            self._loop.run()
+        finally:
+            self.stop()
 
     def stop(self) -> None:
         """Ends `run`, from any thread."""
-        if self._server is not None:
-            self._server.should_exit = True
+        self._server.should_exit = True
 
-    def _end(self) -> None:
-        """Ends the loop's process."""
-        self._link.close()
-        if self._process.pid is not None:
-            self._process.join(ENDING)
-            if self._process.is_alive():
-                self._process.kill()
-                self._process.join()
-        self._connection.close()
-        self._socket.close()
+    def _publish(self, kind: str, content: Any) -> None:
+        """Passes a message of the loop's thread to the pages."""
+        if self._events is None:
+            self.hub.publish(kind, content)  # kept for the first page
+        else:
+            with suppress(RuntimeError):  # the server has just ended
+                self._events.call_soon_threadsafe(self.hub.publish, kind, content)
+
+    @asynccontextmanager
+    async def _lifespan(self, _app: Any) -> AsyncIterator[None]:
+        self._events = asyncio.get_running_loop()
+        yield
+
+    async def _show(self, _request: Request) -> Response:
+        return Response(self._page, headers=HEADERS, media_type="text/html")
+
+    async def _save(self, _request: Request) -> Response:
+        """Answers with the last recording as a scenario file."""
+        if not self.hub.recording:
+            return PlainTextResponse("nothing is recorded yet", 404, HEADERS)
+        name = {"content-disposition": 'attachment; filename="driven.toml"'}
+        return Response(self.hub.recording, headers=HEADERS | name, media_type="application/toml")
+
+    async def _talk(self, connection: WebSocket) -> None:
+        """Serves a page's socket until one side ends the connection."""
+        await connection.accept()
+        client = self.hub.join()
+        if client is None:
+            await connection.close(BUSY, "too many pages")
+            return
+        self._loop.pages = len(self.hub.clients)
+        sending = asyncio.ensure_future(client.send_all(connection.send_text))
+        try:
+            while (message := await connection.receive())["type"] != "websocket.disconnect":
+                self._loop.post(client.read(message.get("text") or message.get("bytes") or ""))
+        except MessageError as error:
+            await connection.close(POLICY, str(error)[:120])
+        finally:
+            self.hub.clients.discard(client)
+            self._loop.pages = len(self.hub.clients)
+            sending.cancel()
+            with suppress(asyncio.CancelledError, Exception):
+                await sending
 
 
 def _bound(port: int) -> socket.socket:
@@ -300,11 +208,11 @@ def _bound(port: int) -> socket.socket:
         bound.listen()  # a browser that comes before the server is ready waits
     except (OSError, OverflowError) as error:
         bound.close()
-        in_use = "another program uses it" if getattr(error, "errno", 0) == EADDRINUSE else None
+        in_use = getattr(error, "errno", 0) == EADDRINUSE
         raise LiveError(
             "cannot listen on this port",
-            got=port if in_use is None else f"{port}: {in_use}",
-            expected=f"a free port from 1 to {PORTS - 1}",
+            got=f"{port}: another program uses it" if in_use else port,
+            expected="a free port from 1 to 65535",
             fix="leave out --port for a free one", where=HOST,
         ) from error  # fmt: skip
     return bound

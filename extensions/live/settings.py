@@ -16,7 +16,7 @@ from hexapod_cosim.cosim.scenario.controls import control_of
 from hexapod_cosim.cosim.scenario.reach import largest_share
 from hexapod_cosim.cosim.scenario.records import CONTROLS, Command, Scenario
 from hexapod_cosim.cosim.scenario.scenario import scenario_from_table, scenario_robot
-from hexapod_cosim.extensions.live.protocol import Change, Drive
+from hexapod_cosim.extensions.live.messages import Change, Drive
 from hexapod_cosim.models import Robot, unknown_name
 from hexapod_cosim.models.ground.catalogue import CATALOGUE
 

@@ -1,10 +1,12 @@
 """Writes a page in which the default robot walks without a server: one HTML file.
 
-The page is that of `hexapod live`; plant and controller are inside as a WebAssembly module.
+The page is that of `hexapod live`. Plant, controller and the macro-step of both
+(cosim/master/src/macro_step.c) are inside as a WebAssembly module (wasm/robot.c).
 """
 
 from __future__ import annotations
 
+import base64
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -12,18 +14,21 @@ from typing import Any
 from hexapod_cosim.controller import PATTERNS, Gait, make_gait
 from hexapod_cosim.cosim.common.components import CONTROLLER
 from hexapod_cosim.cosim.common.files import write_text
+from hexapod_cosim.cosim.common.plant_files import in_source_tree, plant_folders
+from hexapod_cosim.cosim.export.cross_build import BROWSER, Library, build_library
 from hexapod_cosim.cosim.interface.plant_interface import enumerations_of, load_interface
-from hexapod_cosim.cosim.report.geometry import describe_ground, describe_shape
-from hexapod_cosim.cosim.results.walk import robot_weight
 from hexapod_cosim.cosim.scenario.records import CONTROLS
 from hexapod_cosim.cosim.scenario.scenario import load_scenario
-from hexapod_cosim.extensions.live.gait_change import SHARE
-from hexapod_cosim.extensions.live.module import walker_module
-from hexapod_cosim.extensions.live.page import describe, fill_page
+from hexapod_cosim.extensions.live.gait_change import plan_change
+from hexapod_cosim.extensions.live.page import render_page
 from hexapod_cosim.extensions.live.settings import FLAT, Choices, control_texts, find_limits
-from hexapod_cosim.models import Robot, load_robot
+from hexapod_cosim.extensions.live.state import describe_world
+from hexapod_cosim.models import HexapodError, Robot, load_robot
 
 SCENARIO = "walk_flat"
+MODULE = "robot"
+CONTROLLER_ROBOT = "controller/fmu/generated/defaults.c"  # wasm/controller_defaults.c says why
+_TREE = Path(__file__).resolve().parents[2]
 
 
 def write_static_page(path: Path) -> Path:
@@ -31,47 +36,44 @@ def write_static_page(path: Path) -> Path:
 
     Raises HexapodError without the viewer or the module, and when the path cannot be written.
     """
-    write_text(path, render_static_page())
+    scenario = load_scenario(SCENARIO)
+    choices = Choices(scenario, control_texts(scenario), {})
+    module = base64.b64encode(robot_module()).decode("ascii")
+    more = _setup(choices, load_robot(scenario.robot))
+    write_text(path, render_page(choices, more, module=module))
     return path
 
 
-def render_static_page() -> str:
-    """Returns the page. Raises HexapodError without the viewer or the module."""
-    scenario = load_scenario(SCENARIO)
-    choices = Choices(scenario, control_texts(scenario), {})
-    robot = load_robot(scenario.robot)
-    return fill_page(choices, _setup(choices, robot), walker_module())
-
-
 def _setup(choices: Choices, robot: Robot) -> dict[str, Any]:
-    """Returns what the page reads (cosim/viewer/src/browser/local.ts)."""
-    parameters, types = _parameters(robot), enumerations_of(CONTROLLER)
-    world = {
-        "robot": describe_shape(parameters, robot.torso.size),
-        "ground": describe_ground(parameters),
-        "surfaces": [],
-        "weight": round(robot_weight(parameters), 3),
-        "step": choices.scenario.macro_step,
-    }
-    return describe(choices) | {
-        "world": world,
+    """Returns what the page reads (viewer/local.ts)."""
+    types = enumerations_of(CONTROLLER)
+    gaits = {name: make_gait(robot, name) for name in PATTERNS}
+    return {
+        "world": describe_world(robot, _parameters(robot), choices.scenario.macro_step),
         "first": vars(replace(choices.first(), ground=FLAT)),
         "grounds": [],
         "numbers": {name: types["Control"].number(name) for name in CONTROLS},
-        "share": SHARE,
         "walks": {
-            name: _walk(make_gait(robot, name), types["GaitPattern"].number(name), robot)
-            for name in PATTERNS
+            name: {
+                "gait": _numbers(gait, types["GaitPattern"].number(name)),
+                "limits": vars(find_limits(robot, gait)),
+                "changes": {
+                    other: _change(robot, gait, gaits[other]) for other in PATTERNS if other != name
+                },
+            }
+            for name, gait in gaits.items()
         },
     }
 
 
-def _walk(gait: Gait, pattern: int, robot: Robot) -> dict[str, Any]:
-    """Returns a gait with its pattern's number in the order of hxWalk, and the largest commands
-    with it.
-    """
-    numbers = [pattern, gait.period, gait.duty, gait.step_height, gait.touchdown_speed]
-    return {"gait": numbers, "limits": vars(find_limits(robot, gait))}
+def _numbers(gait: Gait, pattern: int) -> list[float]:
+    """Returns a gait in the order of hx_page_gait (wasm/robot.c)."""
+    return [pattern, gait.period, gait.duty, gait.step_height, gait.touchdown_speed]
+
+
+def _change(robot: Robot, before: Gait, after: Gait) -> dict[str, Any]:
+    plan = plan_change(robot, before, after)
+    return vars(plan) | {"limits": vars(plan.limits)}
 
 
 def _parameters(robot: Robot) -> dict[str, float]:
@@ -81,3 +83,43 @@ def _parameters(robot: Robot) -> dict[str, float]:
         for variable in load_interface(robot).variables
         if variable.causality == "parameter" and variable.start is not None
     }
+
+
+def robot_module() -> bytes:
+    """Returns the module: that of a released wheel, or one that is compiled, or from the cache.
+
+    Raises HexapodError in a wheel that was built for one machine, and FmuError without a cross
+    compiler.
+    """
+    if in_source_tree():
+        return build_library(_library(), BROWSER)
+    for folder in plant_folders():
+        path = folder / "browser" / f"{MODULE}.wasm"
+        if path.is_file():
+            return path.read_bytes()
+    raise HexapodError(
+        "no WebAssembly module in this installation",
+        got="a wheel that was built for one machine",
+        expected="a clone, or a wheel of `make wheels`",
+        fix="install one of these",
+    )
+
+
+def _library() -> Library:
+    """Returns the sources of the module by their paths in the repository.
+
+    Public headers are at their path in the include folder.
+    """
+    paths = [_TREE / "cosim" / "master" / "src" / "macro_step.c"]
+    paths += sorted((_TREE / "extensions" / "live" / "wasm").glob("*.c"))
+    found: dict[str, Path] = {}
+    for component in ("plant_fmu", "controller/fmu"):
+        paths += (_TREE / component / "src").rglob("*.[ch]")
+        paths.append(_TREE / component / "generated" / "defaults.c")
+    for folder in ("plant_fmu", "controller/fmu", "cosim/master"):
+        headers = (_TREE / folder / "include" / "hexapod").glob("*.h")
+        found |= {f"hexapod/{path.name}": path for path in headers}
+    found |= {path.relative_to(_TREE).as_posix(): path for path in paths}
+    return Library(
+        MODULE, dict(sorted(found.items())), flags=("-DHX_SHARED",), included=(CONTROLLER_ROBOT,)
+    )

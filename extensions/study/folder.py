@@ -138,37 +138,36 @@ def export_runs(store: Store, folder: Path) -> None:
     results = [item for item in store.columns if item.name != WALL]
     times = [item for item in store.columns if item.name in ("run", WALL)]
     metadata = provenance(read_json(folder / MANIFEST))
-    write_table(folder / RESULTS, results, store.tables(results), metadata)
-    write_table(folder / TIMES, times, store.tables(times), {})
+    for name, columns, facts in ((RESULTS, results, metadata), (TIMES, times, {})):
+        blocks = (list(zip(*rows, strict=True)) for rows in store.tables(columns))
+        write_table(folder / name, columns, blocks, facts)
 
 
 def write_table(
     path: Path,
     columns: Sequence[Column],
-    blocks: Iterable[Sequence[Sequence[Any]]],
+    blocks: Iterable[Sequence[Any]],
     metadata: Mapping[str, str],
 ) -> None:
-    """Writes blocks of rows to a Parquet file. The file is never partial.
+    """Writes a Parquet file in parts, each of which has the values of all columns.
 
-    Units are in the metadata of the columns.
+    Units are in the metadata of the columns. The file is never partial.
     """
+    kinds = [PARQUET_TYPES[item.kind.split()[0]] for item in columns]
+    units = [{"unit": item.unit} if item.unit else None for item in columns]
     fields = [
-        pa.field(
-            item.name,
-            PARQUET_TYPES[item.kind.split()[0]],
-            metadata={"unit": item.unit} if item.unit else None,
-        )
-        for item in columns
+        pa.field(item.name, kind, metadata=unit)
+        for item, kind, unit in zip(columns, kinds, units, strict=True)
     ]
     schema = pa.schema(fields, metadata=dict(metadata))
     with (
         atomic_path(path) as part,
         pq.ParquetWriter(part, schema, compression=COMPRESSION) as writer,
     ):
-        for rows in blocks:
+        for block in blocks:
             arrays = [
-                pa.array(values, item.type, from_pandas=True)
-                for values, item in zip(zip(*rows, strict=True), schema, strict=True)
+                pa.array(values, kind, from_pandas=True)
+                for values, kind in zip(block, kinds, strict=True)
             ]
             writer.write_table(pa.Table.from_arrays(arrays, schema=schema))
 

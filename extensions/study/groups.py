@@ -1,4 +1,4 @@
-"""Groups the runs of a study by point and control, in SQL, some thousand runs at a time.
+"""Groups the runs of a study by point and control, and computes the figures of each group.
 
 Means are over the runs that walked to the end; metrics of runs in which the robot fell are in
 results.parquet only. A pair consists of two runs of the same point, scenario and seed: one under
@@ -9,28 +9,44 @@ missing counts in the means of its control and not in the changes.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from hexapod_cosim.extensions.study.moments import (
-    SAMPLES,
-    Figures,
-    Moments,
-    Numbers,
-    Sums,
-    figures_of,
-    merged,
-)
+from hexapod_cosim.cosim.results.comparison import Change, half_widths, log_half_widths, verdicts
+from hexapod_cosim.cosim.results.metrics import FLOORS
 from hexapod_cosim.extensions.study.records import SCENARIO_FACTOR, Study
-from hexapod_cosim.extensions.study.runs import count_runs
-from hexapod_cosim.extensions.study.store import FIGURES, ROWS_AT_ONCE, Store, quoted
+from hexapod_cosim.extensions.study.store import FIGURES, Store, quoted
 
-MAX_POINTS = 4000  # kept for figures and tables; evenly chosen if there are more
-BY = "point, held_out, control"  # the columns that groups differ by
-Rows = list[tuple[Any, ...]]
+Array = NDArray[np.float64]
+LAST = 2**62  # larger than the number of any run
+SAMPLES = ("before", "after", "change")  # of a pair
+
+
+@dataclass(frozen=True)
+class Mean:
+    """The mean of a metric over walks."""
+
+    value: float  # NaN where no walk has the metric
+    half_width: float  # of its 95 % interval; NaN for fewer than two walks
+    runs: int
+
+
+@dataclass(frozen=True, kw_only=True)
+class Figures:
+    """The figures of a group of runs."""
+
+    runs: Mapping[str, int]  # numbers of runs by control
+    walked: Mapping[str, int]  # numbers of walks by control
+    # numbers of pairs with the first control, of which both runs walked to the end, by the other
+    pairs: Mapping[str, int]
+    means: Mapping[str, Mapping[str, Mean]]  # by control and metric
+    # from the first control to each other one, by the other one and metric
+    changes: Mapping[str, Mapping[str, Change]]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -44,158 +60,217 @@ class Point:
     figures: Figures
 
 
-class Groups:
-    """Computes the figures of all points and of all runs."""
+@dataclass(frozen=True)
+class Moments:
+    """The moments of samples, one for each group and metric."""
 
-    def __init__(self, study: Study, store: Store) -> None:
-        self._study, self._store, self._controls = study, store, study.controls
-        self._sums: Sums | None = None  # of all runs
-        self._step = _point_step(study, store.select("SELECT count(*) FROM runs")[0][0])
-        self.points: list[Point] = []  # every step-th one
-        self.count = 0  # of all points
+    count: Array
+    mean: Array  # NaN of an empty sample
+    square: Array  # sum of squared deviations from the mean
 
-    @property
-    def overall(self) -> Figures:
-        """The figures of all blocks that were computed; at least one."""
-        assert self._sums is not None
-        return figures_of(self._sums, self._controls)[0]
+    @cached_property
+    def half_width(self) -> Array:
+        """Half widths of Student's 95 % intervals, NaN for fewer than two values."""
+        return half_widths(self.count, self.square)
 
-    def blocks(self) -> Iterator[list[Point]]:
-        """Yields the points, some at a time, in the order of their runs."""
-        for begin, end in _ranges(self._study):
-            points, sums = self._block(begin, end)
-            self._sums = merged([sums] if self._sums is None else [self._sums, sums])
-            self.count += len(points)
-            self.points += [point for point in points if point.number % self._step == 0]
-            if points:
-                yield points
 
-    def _block(self, begin: int, end: int) -> tuple[list[Point], Sums]:
-        """Returns the points whose runs are from `begin` to before `end`, and their sums."""
-        study = self._study
-        names = ["case" if f.name == SCENARIO_FACTOR else f.name for f in study.factors]
-        columns = ", ".join(map(quoted, ["case", *names]))
-        # the settings of a point are those of its first run
-        rows = self._store.select(
-            f"SELECT point, {_held_out(study)} AS held_out, min(run), {columns} FROM runs"
-            f" WHERE run >= {begin} AND run < {end}"
-            " GROUP BY point, held_out ORDER BY min(run)"
+def moments_of(values: Array, starts: Sequence[int]) -> Moments:
+    """Returns the moments (g, m) of values (n, m), without those that are NaN.
+
+    starts: (g,) first row of each group.
+    """
+    if not len(values):
+        empty = np.zeros((len(starts), values.shape[1]))
+        return Moments(empty, np.full_like(empty, math.nan), empty)
+    known = np.isfinite(values)
+    count = np.add.reduceat(known.astype(float), starts)
+    mean = np.add.reduceat(np.where(known, values, 0.0), starts) / np.where(count, count, math.nan)
+    apart = values - np.repeat(mean, np.diff([*starts, len(values)]), axis=0)
+    return Moments(count, mean, np.add.reduceat(np.where(known, apart, 0.0) ** 2, starts))
+
+
+class Runs:
+    """The stored runs of a study, in the order of their numbers, as arrays.
+
+    The runs of a group follow each other: those of a point are numbered one after the other, and
+    the held-out runs of an optimisation after all others.
+    """
+
+    def __init__(self, study: Study, store: Store, *, first: int = 0, end: int = LAST) -> None:
+        self.study, controls = study, study.controls
+        names = ", ".join(map(quoted, FIGURES))
+        rows = store.select(
+            f"SELECT run, point, control, walked, {names} FROM runs"
+            " WHERE run >= ? AND run < ? ORDER BY run",
+            (first, end),
         )
-        places = {row[:2]: place for place, row in enumerate(rows)}
-        sums = self._group_sums(begin, end, places)
-        found = figures_of(sums, self._controls)
-        keys = [factor.name for factor in study.factors]
-        points = [
-            Point(
-                number=number,
-                held_out=bool(held_out),
-                case=case,
-                values=dict(zip(keys, values, strict=True)),
-                figures=figures,
-            )
-            for (number, held_out, _, case, *values), figures in zip(rows, found, strict=True)
-        ]
-        return points, sums
+        self.number = np.array([row[0] for row in rows], dtype=np.int64)
+        self.point = np.array([row[1] for row in rows], dtype=np.int64)
+        self.control = np.array([controls.index(row[2]) for row in rows], dtype=np.int64)
+        self.walked = np.array([row[3] for row in rows], dtype=np.bool_)
+        self.values = np.array([row[4:] for row in rows], dtype=float).reshape(-1, len(FIGURES))
+        self.held_out = self.number >= _first_held_out(study)
 
-    def _group_sums(self, begin: int, end: int, places: Mapping[tuple[Any, ...], int]) -> Sums:
-        """Returns the sums of the runs from `begin` to before `end`.
+    def starts(self) -> list[int]:
+        """Returns the first row of each point."""
+        keys = np.stack([self.point, self.held_out])
+        differ = np.any(keys[:, 1:] != keys[:, :-1], axis=0)
+        return [0, *(np.flatnonzero(differ) + 1).tolist()] if len(self.number) else []
 
-        places: index of each group by point and whether it is held out.
+    def of(self, control: int) -> Array:
+        """Returns the metrics (n, m) of the walks under a control, NaN in all other rows."""
+        return np.where((self.walked & (self.control == control))[:, None], self.values, math.nan)
+
+    def pairs(self, other: int) -> tuple[NDArray[np.bool_], Array, Array]:
+        """Returns which rows are the first of a pair (n,), and the metrics of both runs (n, m).
+
+        The numbers of the runs of a pair differ by `other`, the place of the other control.
         """
-        controls, size = self._controls, len(FIGURES)
-        keys = f"point, {_held_out(self._study)} AS held_out, control"
-        source = f"FROM runs WHERE run >= {begin} AND run < {end}"
-        figures = ", ".join(map(quoted, FIGURES))
-        walks = f"SELECT {keys}, {figures} {source} AND walked"
-        total = self._store.select(f"SELECT {keys}, count(*) {source} GROUP BY {BY}")
-        walked = self._store.select(moments_query(walks, FIGURES))
-        paired: Rows = []
-        for k in range(1, len(controls)):
-            pairs, names = pairs_query(k, len(controls), begin, end)
-            paired += self._store.select(moments_query(pairs, names))
-        numbers, _ = _filled(total, places, controls, 0)
-        of_walks, means = _filled(walked, places, controls, size)
-        of_pairs, changes = _filled(paired, places, controls[1:], SAMPLES * size)
-        shape = (*of_pairs.shape, SAMPLES, size)
-        changes = Moments(*(part.reshape(shape) for part in vars(changes).values()))
-        return Sums(runs=numbers, walked=of_walks, pairs=of_pairs, means=means, changes=changes)
+        partner = np.searchsorted(self.number, self.number + other)
+        there = partner < len(self.number)
+        partner = np.where(there, partner, 0)
+        paired = (
+            (self.number[partner] == self.number + other)
+            & (self.control == 0)
+            & (self.walked & self.walked[partner] & there)
+        )
+        values, partners = self.values, self.values[partner]
+        known = paired[:, None] & np.isfinite(values) & np.isfinite(partners)
+        return paired, np.where(known, values, math.nan), np.where(known, partners, math.nan)
 
 
-def _held_out(study: Study) -> str:
-    """Returns the SQL expression for whether a run is held out from the optimiser."""
-    return "0" if study.optimise is None else f"run >= {study.optimise.trained}"
+@dataclass(frozen=True, kw_only=True)
+class ControlGroups:
+    """The runs of groups under a control."""
+
+    runs: NDArray[np.int64]  # (g,)
+    walked: NDArray[np.int64]  # (g,)
+    means: Moments  # (g, m)
 
 
-def _ranges(study: Study) -> Iterator[tuple[int, int]]:
-    """Yields ranges of run numbers with whole points; one at least."""
-    asked, count = study.optimise, count_runs(study)
-    if asked is None:
-        parts = [(0, count, len(study.seeds) * len(study.controls))]
-    else:
-        parts = [
-            (0, asked.trained, asked.training.runs),
-            (asked.trained, count, asked.held_out.runs),
+@dataclass(frozen=True, kw_only=True)
+class PairGroups:
+    """The pairs of groups with a control other than the first."""
+
+    pairs: NDArray[np.int64]  # (g,)
+    samples: Mapping[str, Moments]  # (g, m) by SAMPLES
+    log_half_width: Array  # (g, m)
+    verdict: NDArray[np.str_]  # (g, m)
+
+    def change(self, group: int, metric: int) -> Change:
+        """Returns the change of a metric in a group."""
+        before, after, change = (self.samples[name] for name in SAMPLES)
+        return Change(
+            before=float(before.mean[group, metric]),
+            after=float(after.mean[group, metric]),
+            half_width=float(change.half_width[group, metric]),
+            log_half_width=float(self.log_half_width[group, metric]),
+            pairs=int(change.count[group, metric]),
+            floor=FLOORS[FIGURES[metric]],
+            verdict=str(self.verdict[group, metric]),
+        )
+
+
+class Groups:
+    """The figures of groups of runs.
+
+    Args:
+        starts: first row of each group in `runs`; by default there is one group.
+    """
+
+    def __init__(self, runs: Runs, starts: Sequence[int] = (0,)) -> None:
+        self.controls = runs.study.controls
+        self._runs, self.starts = runs, starts
+        self.by_control = {name: self._control(k) for k, name in enumerate(self.controls)}
+        self.changes = {name: self._pairs(k) for k, name in enumerate(self.controls) if k}
+
+    def figures(self, group: int) -> Figures:
+        """Returns the figures of a group, given its number."""
+        found, changes = self.by_control, self.changes
+        return Figures(
+            runs={name: int(item.runs[group]) for name, item in found.items()},
+            walked={name: int(item.walked[group]) for name, item in found.items()},
+            pairs={name: int(item.pairs[group]) for name, item in changes.items()},
+            means={name: _means(item.means, group) for name, item in found.items()},
+            changes={
+                name: {metric: item.change(group, k) for k, metric in enumerate(FIGURES)}
+                for name, item in changes.items()
+            },
+        )
+
+    def _count(self, chosen: NDArray[np.bool_]) -> NDArray[np.int64]:
+        """Returns the numbers (g,) of chosen rows (n,)."""
+        if not len(chosen):
+            return np.zeros(len(self.starts), dtype=np.int64)
+        return np.asarray(np.add.reduceat(chosen.astype(np.int64), self.starts))
+
+    def _control(self, control: int) -> ControlGroups:
+        runs = self._runs
+        own = runs.control == control
+        return ControlGroups(
+            runs=self._count(own),
+            walked=self._count(own & runs.walked),
+            means=moments_of(runs.of(control), self.starts),
+        )
+
+    def _pairs(self, control: int) -> PairGroups:
+        paired, before, after = self._runs.pairs(control)
+        values = zip(SAMPLES, (before, after, after - before), strict=True)
+        samples = {name: moments_of(one, self.starts) for name, one in values}
+        first, second, change = samples.values()
+        squares = (first.square, second.square, change.square)
+        log_half = log_half_widths(change.count, first.mean, second.mean, squares)
+        parts = (first.mean, second.mean, change.half_width, log_half)
+        verdict = [
+            verdicts(name, *(part[:, k] for part in parts)) for k, name in enumerate(FIGURES)
         ]
-    for first, end, runs_of_point in parts:
-        step = runs_of_point * max(ROWS_AT_ONCE // runs_of_point, 1)
-        yield from ((begin, min(begin + step, end)) for begin in range(first, end, step))
+        return PairGroups(
+            pairs=self._count(paired),
+            samples=samples,
+            log_half_width=log_half,
+            verdict=np.stack(verdict, axis=1),
+        )
 
 
-def pairs_query(k: int, controls: int, begin: int, end: int) -> tuple[str, list[str]]:
-    """Returns the SQL of the pairs with the control number `k`, from 1, and its columns.
+def _means(moments: Moments, group: int) -> dict[str, Mean]:
+    """Returns the means of a group by metric."""
+    parts = (moments.mean[group], moments.half_width[group], moments.count[group].astype(int))
+    values = zip(FIGURES, *(part.tolist() for part in parts), strict=True)
+    return {name: Mean(*figures) for name, *figures in values}
 
-    The numbers of the runs of a pair differ by `k`. A metric that one of both runs lacks is NULL.
+
+def _first_held_out(study: Study) -> int:
+    """Returns the number of the first run that is held out from the optimiser."""
+    return LAST if study.optimise is None else study.optimise.trained
+
+
+def settings_of_points(study: Study, store: Store) -> list[tuple[Any, ...]]:
+    """Returns scenario and values of the factors of each point, in the order of their runs."""
+    names = ["case" if f.name == SCENARIO_FACTOR else f.name for f in study.factors]
+    rows = store.select(
+        f"SELECT {', '.join(map(quoted, ['case', *names]))}, min(run) FROM runs"
+        " GROUP BY point, run >= ? ORDER BY min(run)",
+        (_first_held_out(study),),
+    )
+    return [row[:-1] for row in rows]
+
+
+def points_of(
+    runs: Runs, groups: Groups, settings: Sequence[tuple[Any, ...]], *, most: int
+) -> list[Point]:
+    """Returns at most `most` points, evenly chosen, in the order of their runs.
+
+    groups: of all points; settings: of settings_of_points().
     """
-    names = [f"{sample} {name}" for sample in ("before", "after", "change") for name in FIGURES]
-    one, other = ([f"{table}.{quoted(name)}" for name in FIGURES] for table in ("a", "b"))
-    before = [f"iif({b} IS NULL, NULL, {a})" for a, b in zip(one, other, strict=True)]
-    after = [f"iif({a} IS NULL, NULL, {b})" for a, b in zip(one, other, strict=True)]
-    change = [f"{b} - {a}" for a, b in zip(one, other, strict=True)]
-    values = zip([*before, *after, *change], names, strict=True)
-    columns = ", ".join(f"{value} AS {quoted(name)}" for value, name in values)
-    text = (
-        f"SELECT a.point, 0 AS held_out, b.control, {columns} FROM runs a JOIN runs b"
-        f" ON b.run = a.run + {k} WHERE a.run % {controls} = 0 AND a.walked AND b.walked"
-        f" AND a.run >= {begin} AND a.run < {end}"
-    )
-    return text, names
-
-
-def moments_query(source: str, names: Sequence[str]) -> str:
-    """Returns SQL that groups the rows of a query.
-
-    It gives the number of rows of each group and, for each of the columns `names`, the number of
-    values, their mean and the sum of squared deviations from it.
-    """
-    pairs = [(quoted(name), quoted(f"mean {name}")) for name in names]
-    means = ", ".join(f"avg({value}) OVER same AS {mean}" for value, mean in pairs)
-    apart = [f"({value} - {mean})" for value, mean in pairs]
-    moments = ", ".join(
-        f"count({value}), coalesce(max({mean}), 0.0), total({one} * {one})"
-        for (value, mean), one in zip(pairs, apart, strict=True)
-    )
-    return (
-        f"SELECT {BY}, count(*), {moments} FROM"
-        f" (SELECT *, {means} FROM ({source}) WINDOW same AS (PARTITION BY {BY})) GROUP BY {BY}"
-    )
-
-
-def _filled(
-    rows: Rows, places: Mapping[tuple[Any, ...], int], controls: Sequence[str], size: int
-) -> tuple[Numbers, Moments]:
-    """Returns the numbers of rows (g, c) and the moments (g, c, size) that a query has grouped."""
-    numbers = np.zeros((len(places), len(controls)), dtype=np.int64)
-    moments = np.zeros((3, *numbers.shape, size))
-    for point, held_out, control, number, *values in rows:
-        group, place = places[point, held_out], controls.index(control)
-        numbers[group, place] = number
-        moments[:, group, place] = np.reshape(values, (size, 3)).T
-    return numbers, Moments(*moments)
-
-
-def _point_step(study: Study, runs: int) -> int:
-    """Returns every how many points one is kept, for a study of a number of runs."""
-    if study.optimise is not None:
-        return 1
-    points = runs / (len(study.seeds) * len(study.controls))
-    return max(math.ceil(points / MAX_POINTS), 1)
+    names = [factor.name for factor in runs.study.factors]
+    step = max(math.ceil(len(settings) / most), 1)
+    return [
+        Point(
+            number=int(runs.point[groups.starts[place]]),
+            case=settings[place][0],
+            values=dict(zip(names, settings[place][1:], strict=True)),
+            held_out=bool(runs.held_out[groups.starts[place]]),
+            figures=groups.figures(place),
+        )
+        for place in range(0, len(settings), step)
+    ]

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any, Protocol
 from uuid import uuid4
 
-from hexapod_cosim.controller import Gains
+from hexapod_cosim.controller import DEFAULT_PERIOD, Gains
 from hexapod_cosim.cosim.common.plant_files import code_hash, package_version
 from hexapod_cosim.cosim.common.temporary import TemporaryFolder
 from hexapod_cosim.cosim.control.controllers import check_control
@@ -30,7 +30,6 @@ from hexapod_cosim.extensions.study.factors import samples
 from hexapod_cosim.extensions.study.records import Study, StudyError
 from hexapod_cosim.models import HexapodError, list_robots, load_robot
 
-CONTROLLER_PERIOD = 0.005  # s    of the exported FMU; each run sets its own
 FORMAT = 2  # of a study's folder
 PACKAGES = ("fmpy", "numpy", "scipy", "control")
 DESIGN_FACTORS = ("robot", "macro_step", "servo.")  # a design of gains depends on these
@@ -135,7 +134,7 @@ def _robots(study: Study) -> list[str]:
 
 def _controller(folder: Path) -> bytes:
     """Exports the controller FMU to a folder and returns its content."""
-    setup = make_setup(load_robot(list_robots()[0]), control="kinematic", period=CONTROLLER_PERIOD)
+    setup = make_setup(load_robot(list_robots()[0]), control="kinematic", period=DEFAULT_PERIOD)
     return export_controller(setup, folder / "controller.fmu").read_bytes()
 
 

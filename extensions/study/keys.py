@@ -1,4 +1,4 @@
-"""Reads and checks values of a study file's keys."""
+"""Reads and checks values of a study file's keys. All functions raise StudyError."""
 
 from __future__ import annotations
 
@@ -11,7 +11,6 @@ from hexapod_cosim.models import unknown_name
 
 LARGEST = 2**63 - 1  # integer of TOML and of a column
 MAX_LENGTH = 1000  # characters of a text
-MAX_DEPTH = 12  # of nested tables and lists
 
 
 def require(
@@ -29,7 +28,7 @@ def require(
 
 
 def require_known(names: Mapping[str, Any], known: Sequence[str], where: str) -> None:
-    """Raises StudyError for a key of a table that is not known."""
+    """Checks that the keys of a table are known."""
     for key in names:
         if key not in known:
             raise unknown_name("key", key, known, where=where, error=StudyError)
@@ -40,16 +39,14 @@ def is_number(value: Any) -> bool:
     return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
 
 
-def check_plain(value: Any, where: str, depth: int = 0) -> None:
-    """Raises StudyError for a value that JSON or a column cannot hold unchanged."""
-    deep = f"no more than {MAX_DEPTH} nested tables or lists"
-    require(depth <= MAX_DEPTH, None, deep, where, what="too deep", fix="take it apart")
+def check_plain(value: Any, where: str) -> None:
+    """Checks that JSON and a column can hold a value and all values in it."""
     if isinstance(value, Mapping):
         for key, item in value.items():
-            check_plain(item, f"{where}{'.' if depth else ': '}{key}", depth + 1)
+            check_plain(item, f"{where}{'.' if ': ' in where else ': '}{key}")
     elif isinstance(value, list):
         for place, item in enumerate(value):
-            check_plain(item, f"{where}[{place}]", depth + 1)
+            check_plain(item, f"{where}[{place}]")
     elif isinstance(value, int):
         require(abs(value) <= LARGEST, value, "a whole number within 64 bits", where)
     elif isinstance(value, float):
@@ -61,38 +58,45 @@ def check_plain(value: Any, where: str, depth: int = 0) -> None:
 
 
 def whole(value: Any, where: str, *, least: int, most: int) -> int:
-    """Returns a whole number within bounds. Raises StudyError."""
+    """Returns a whole number within bounds."""
     fits = isinstance(value, int) and not isinstance(value, bool) and least <= value <= most
     require(fits, value, f"a whole number >= {least} and <= {most}", where)
     return int(value)
 
 
+def table_of(value: Any, where: str, fix: str) -> Mapping[str, Any]:
+    """Returns a table."""
+    require(isinstance(value, Mapping), value, "a table", where, fix=fix)
+    return dict(value)
+
+
 def text_of(table: Mapping[str, Any], key: str, default: str, where: str) -> str:
-    """Returns the text under a key. Raises StudyError."""
+    """Returns the text under a key."""
     value = table.get(key, default)
     require(isinstance(value, str), value, "a text in quotes", f"{where}: {key}")
     return str(value)
 
 
-def boolean_of(table: Mapping[str, Any], key: str, default: bool, where: str) -> bool:
-    """Returns the boolean under a key. Raises StudyError."""
-    value, fix = table.get(key, default), f"write {key} = true, without quotes"
-    require(isinstance(value, bool), value, "true or false", f"{where}: {key}", fix=fix)
-    return bool(value)
-
-
-def names_of(value: Any, known: Sequence[str], where: str) -> tuple[str, ...]:
-    """Returns a list of one or more different names among `known`. Raises StudyError."""
-    different = isinstance(value, list) and 0 < len(value) == len(set(map(str, value)))
-    require(different, value, f"a list of some of {', '.join(known)}", where)
-    for item in value:
-        if item not in known:
-            raise unknown_name("name", str(item), known, where=where, error=StudyError)
+def texts_of(value: Any, where: str, example: str) -> tuple[str, ...]:
+    """Returns a list of one or more different texts."""
+    listed = isinstance(value, list) and all(isinstance(item, str) for item in value)
+    different = listed and 0 < len(value) == len(set(value))
+    what = "missing key" if value is None else "value not allowed"
+    require(different, value, "a list of different texts", where, what=what, fix=f"write {example}")
     return tuple(value)
 
 
+def names_of(value: Any, known: Sequence[str], where: str) -> tuple[str, ...]:
+    """Returns a list of one or more different names among `known`."""
+    names = texts_of(value, where, f"some of {', '.join(known)}")
+    for item in names:
+        if item not in known:
+            raise unknown_name("name", item, known, where=where, error=StudyError)
+    return names
+
+
 def read_seeds(value: Any, where: str, *, most: int) -> Sequence[int]:
-    """Returns seeds from their number, { first, count } or a list of them. Raises StudyError."""
+    """Returns seeds from their number, { first, count } or a list of them."""
     if isinstance(value, Mapping):
         require_known(value, ("first", "count"), where)
         count = whole(value.get("count", 1), f"{where}.count", least=1, most=most)
@@ -106,10 +110,7 @@ def read_seeds(value: Any, where: str, *, most: int) -> Sequence[int]:
 
 
 def flat(table: Mapping[str, Any], where: str) -> dict[str, Any]:
-    """Returns the values of nested tables by their names with dots.
-
-    Raises StudyError for a name that is given twice.
-    """
+    """Returns the values of nested tables by their names with dots, each of which is given once."""
     found: dict[str, Any] = {}
     for name, value in _leaves(table, ""):
         require_once(name, name in found, f"{where}.{name}")
@@ -118,7 +119,7 @@ def flat(table: Mapping[str, Any], where: str) -> dict[str, Any]:
 
 
 def require_once(name: str, again: bool, where: str) -> None:
-    """Raises StudyError for a name that is there already."""
+    """Checks that a name is not there already."""
     require(not again, name, "each name once", where, what="given twice", fix="take one away")
 
 

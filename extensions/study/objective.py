@@ -30,7 +30,9 @@ from hexapod_cosim.extensions.study.keys import (
     read_seeds,
     require,
     require_known,
+    table_of,
     text_of,
+    texts_of,
     whole,
 )
 from hexapod_cosim.extensions.study.records import (
@@ -46,15 +48,8 @@ from hexapod_cosim.extensions.study.records import (
 from hexapod_cosim.models import unknown_name
 
 KEYS = (
-    "metric",
-    "constraints",
-    "trials",
-    "batch",
-    "sampler",
-    "control",
-    "variables",
-    "training",
-    "held_out",
+    *("metric", "constraints", "trials", "batch", "sampler", "control"),
+    *("variables", "training", "held_out"),
 )
 REQUIRED = {
     "metric": 'metric = "slip_per_metre"',
@@ -72,7 +67,7 @@ MAX_TRIALS, MAX_SEEDS = 100_000, 10_000
 
 def read_optimise(table: Any, where: str) -> tuple[Optimise, tuple[Factor, ...]]:
     """Returns the optimisation and its variables. Raises StudyError."""
-    require(isinstance(table, Mapping), table, "a table", where, fix="write [optimise]")
+    table = table_of(table, where, "write [optimise]")
     require_known(table, KEYS, where)
     for key, expected in REQUIRED.items():
         require(key in table, None, expected, f"{where}.{key}", what="missing key", fix="add it")
@@ -80,7 +75,9 @@ def read_optimise(table: Any, where: str) -> tuple[Optimise, tuple[Factor, ...]]
     training, held_out = (
         _evaluation(table[part], f"{where}.{part}") for part in ("training", "held_out")
     )
-    _check_held_out_seeds(training, held_out, f"{where}.held_out.seeds")
+    _check_held_out(training, held_out, f"{where}.held_out")
+    place, fix = f"{where}.constraints", "write torque_rms = { at_most = 1.0 }"
+    bounds = table_of(table.get("constraints", {}), place, fix)
     metric = table["metric"]
     several = isinstance(metric, list)
     sampler = table.get("sampler", "nsga2" if several else "tpe")
@@ -88,7 +85,7 @@ def read_optimise(table: Any, where: str) -> tuple[Optimise, tuple[Factor, ...]]
         metrics=names_of(metric if several else [metric], OBJECTIVES, f"{where}.metric"),
         constraints=(
             Bound(metric=WALKED, at_least=1.0),
-            *_bounds(table.get("constraints", {}), f"{where}.constraints"),
+            *(_bound(name, value, f"{place}.{name}") for name, value in bounds.items()),
         ),
         trials=whole(table.get("trials", 50), f"{where}.trials", least=1, most=MAX_TRIALS),
         batch=whole(table.get("batch", 4), f"{where}.batch", least=1, most=1000),
@@ -113,31 +110,27 @@ def _variables(table: Any, where: str) -> tuple[Factor, ...]:
 
 
 def _evaluation(table: Any, where: str) -> Evaluation:
-    require(isinstance(table, Mapping), table, "scenarios = [...], seeds = ...", where)
+    table = table_of(table, where, "write scenarios = [...] and seeds = ...")
     require_known(table, ("scenarios", "seeds"), where)
-    names, place, fix = table.get("scenarios"), f"{where}.scenarios", 'scenarios = ["walk_flat"]'
-    what = "value not allowed" if "scenarios" in table else "missing key"
-    listed = isinstance(names, list) and all(isinstance(name, str) for name in names)
-    different = listed and 0 < len(names) == len(set(names))
-    require(different, names, "a list of scenarios", place, what=what, fix=f"write {fix}")
+    example = 'scenarios = ["walk_flat"]'
+    names = texts_of(table.get("scenarios"), f"{where}.scenarios", example)
     seeds = read_seeds(table.get("seeds", 1), f"{where}.seeds", most=MAX_SEEDS)
-    return Evaluation(cases=tuple(names), seeds=seeds)
+    return Evaluation(cases=names, seeds=seeds)
 
 
-def _check_held_out_seeds(training: Evaluation, held_out: Evaluation, where: str) -> None:
-    """Raises StudyError for a held-out seed that is one of training.
+def _check_held_out(training: Evaluation, held_out: Evaluation, where: str) -> None:
+    """Raises StudyError for a held-out scenario or seed that is one of training.
 
     A seed draws the same changes in every scenario.
     """
-    shared = sorted(set(training.seeds) & set(held_out.seeds))
+    names = sorted(set(training.cases) & set(held_out.cases))
+    seeds = sorted(set(training.seeds) & set(held_out.seeds))
+    what, fix = "a held-out scenario that is trained on", "name other scenarios"
+    expected = "scenarios that the optimiser never sees"
+    require(not names, names, expected, f"{where}.scenarios", what=what, fix=fix)
     fix = f"write seeds = {{ first = {max(training.seeds) + 1}, count = {len(held_out.seeds)} }}"
     expected, what = "seeds that the optimiser never sees", "held-out seeds that are trained on"
-    require(not shared, shared, expected, where, what=what, fix=fix)
-
-
-def _bounds(table: Any, where: str) -> list[Bound]:
-    require(isinstance(table, Mapping), table, "torque_rms = { at_most = 1.0 }", where)
-    return [_bound(name, value, f"{where}.{name}") for name, value in table.items()]
+    require(not seeds, seeds, expected, f"{where}.seeds", what=what, fix=fix)
 
 
 def _bound(name: str, table: Any, where: str) -> Bound:

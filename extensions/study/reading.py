@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
@@ -21,14 +22,15 @@ from hexapod_cosim.extensions.study.checks import (
 )
 from hexapod_cosim.extensions.study.factors import plain_name, read_factors
 from hexapod_cosim.extensions.study.keys import (
-    boolean_of,
     check_plain,
     flat,
     names_of,
     read_seeds,
     require,
     require_known,
+    table_of,
     text_of,
+    texts_of,
     whole,
 )
 from hexapod_cosim.extensions.study.objective import read_optimise
@@ -46,25 +48,10 @@ from hexapod_cosim.models.errors import refuse_path
 from hexapod_cosim.models.files import read_text
 from hexapod_cosim.models.schema import parse_toml, reading_toml
 
-KEYS = (
-    "title",
-    "scenario",
-    "set",
-    "design",
-    "points",
-    "seeds",
-    "controls",
-    "seed",
-    "variation",
-    "factors",
-    "optimise",
-)
-MAX_POINTS, MAX_SEEDS = 10**8, 10**7
+OF_A_SWEEP = ("factors", "design", "points", "seeds", "controls")  # not of an optimisation
+KEYS = ("title", "scenario", "set", "seed", "variation", "optimise", *OF_A_SWEEP)
+MAX_POINTS, MAX_SEEDS = 10**7, 10**7
 MAX_SEED = 2**32 - 1  # that all random number generators accept
-MAX_FILE_NAME = 255  # bytes
-STANDARD_TABLE = {
-    name: getattr(STANDARD, name) for name in ("attitude", "height", "joint_angle", "command_delay")
-}
 
 
 def load_study(path_or_name: str | Path, *, controls: Sequence[str] = ()) -> Study:
@@ -83,9 +70,8 @@ def load_study(path_or_name: str | Path, *, controls: Sequence[str] = ()) -> Stu
         table = parse_toml(read_text(path))
     if controls:
         table = _with_controls(table, controls)
-    return study_from_table(
-        table, where=path.name if path in bundled.values() else str(path), folder=path.parent
-    )
+    where = path.name if path in bundled.values() else str(path)
+    return study_from_table(table, where=where, folder=path.parent)
 
 
 def _with_controls(table: dict[str, Any], texts: Sequence[str]) -> dict[str, Any]:
@@ -115,67 +101,56 @@ def study_from_table(
     """
     check_plain(table, where)
     require_known(table, KEYS, where)
-    factors = read_factors(table.get("factors", {}), f"{where}: factors")
-    optimise = (
-        read_optimise(table["optimise"], f"{where}: optimise") if "optimise" in table else None
-    )
-    if optimise is not None:
-        fix = "leave it out: [optimise] says what is run"
-        for key in ("factors", "design", "points", "seeds", "controls"):
-            what = "not a key of an optimisation"
+    factors, optimise = read_factors(table.get("factors", {}), f"{where}: factors"), None
+    if "optimise" in table:
+        what, fix = "not a key of an optimisation", "leave it out: [optimise] says what is run"
+        for key in OF_A_SWEEP:
             require(key not in table, key, "[optimise] alone", where, what=what, fix=fix)
-    controls = _controls(table, optimise, folder, where)
+        optimise, factors = read_optimise(table["optimise"], f"{where}: optimise")
+    controls = _controls(table, folder, where)
     if optimise is not None:
-        optimise = replace(optimise[0], control=controls[0].label), optimise[1]
+        optimise = replace(optimise, control=controls[0].label)
     study = Study(
         title=text_of(table, "title", Path(where).stem, where),
         cases={},
-        factors=factors if optimise is None else optimise[1],
+        factors=factors,
         design=names_of([table.get("design", GRID)], DESIGNS, f"{where}: design")[0],
         points=_points(table, where),
         seeds=read_seeds(table.get("seeds", 1), f"{where}: seeds", most=MAX_SEEDS),
         controls=tuple(control.label for control in controls),
         texts={control.label: control.text for control in controls},
         seed=whole(table.get("seed", 0), f"{where}: seed", least=0, most=MAX_SEED),
-        optimise=None if optimise is None else optimise[0],
+        optimise=optimise,
         source=dict(table),
         where=where,
     )
     if scenarios is not None:
-        return replace(
-            study,
-            cases={
-                name: Case(name=name, table=tables, where=where)
-                for name, tables in scenarios.items()
-            },
-        )
+        cases = {name: Case(name=name, table=one, where=where) for name, one in scenarios.items()}
+        return replace(study, cases=cases)
     study = replace(study, cases=_cases(study, folder))
     check_study(study)
     return study
 
 
-def _controls(
-    table: Mapping[str, Any], optimise: object | None, folder: Path, where: str
-) -> tuple[Control, ...]:
+def _controls(table: Mapping[str, Any], folder: Path, where: str) -> tuple[Control, ...]:
     """Returns the controls of a study's file. Raises ScenarioError, StudyError for no list."""
     texts, place = table.get("controls", list(COMPARED)), f"{where}: controls"
-    if optimise is not None:
+    if "optimise" in table:
         texts = [table["optimise"].get("control", COMPARED[-1])]
         place = f"{where}: optimise.control"
-    listed = isinstance(texts, list) and all(isinstance(one, str) for one in texts)
-    fix = 'write controls = ["kinematic", "law.py:Class"]'
-    require(listed and len(texts) > 0, texts, "a list of controls", place, fix=fix)
-    return parse_controls([control_beside(text, folder) for text in texts], where=place)
+    listed = texts_of(texts, place, 'controls = ["kinematic", "law.py:Class"]')
+    return parse_controls([control_beside(text, folder) for text in listed], where=place)
 
 
 def _points(table: Mapping[str, Any], where: str) -> int:
+    """Returns the number of points, which drawn designs have."""
     drawn, place = table.get("design") in DRAWN, f"{where}: points"
-    given = "points" in table
-    fix, expected = "write points = 100", "a number of points"
-    require(given or not drawn, None, expected, place, what="missing key", fix=fix)
-    fix = f'leave it out, or write design = "{DRAWN[-1]}" (or {", ".join(DRAWN[:-1])})'
+    given, got = "points" in table, table.get("points")
+    what, fix = "missing key", "write points = 100"
+    require(given or not drawn, None, "a number of points", place, what=what, fix=fix)
     what = "a number of points for a design that has its own"
-    require(drawn or not given, table.get("points"), "no points", place, what=what, fix=fix)
+    fix = f'leave it out, or write design = "{DRAWN[-1]}" (or {", ".join(DRAWN[:-1])})'
+    require(drawn or not given, got, "no points", place, what=what, fix=fix)
     return whole(table.get("points", 1), place, least=1, most=MAX_POINTS)
 
 
@@ -186,94 +161,87 @@ def _cases(study: Study, folder: Path) -> dict[str, Case]:
     """
     source, where = study.source, study.where
     own = source.get("scenario", "walk_flat")
-    changes = source.get("set", {})
-    place = f"{where}: set"
-    require(isinstance(changes, Mapping), changes, "a table of settings", place, fix="write [set]")
-    changed = flat(changes, f"{where}: set")
-    for name in changed:
-        check_settable(plain_name(name), f"{where}: set.{name}", kind="setting")
-        _refuse_twice(name, study)
-    vary = boolean_of(
-        source, "variation", len(study.seeds) > 1 or study.optimise is not None, where
-    )
-    keys = _scenario_keys(study)
-    names = [own if isinstance(own, str) else study.title, *keys]
-    tables: dict[str, Mapping[str, Any] | None] = dict.fromkeys(names)
-    place = f"{where}: scenario"
     named = isinstance(own, str | Mapping)
-    require(named, own, "a scenario's name, file or table", place)
+    require(named, own, "a scenario's name, file or table", f"{where}: scenario")
+    changes = _changes(study)
+    vary = source.get("variation", len(study.seeds) > 1 or study.optimise is not None)
+    fix, place = "write variation = true, without quotes", f"{where}: variation"
+    require(isinstance(vary, bool), vary, "true or false", place, fix=fix)
+    found = {}
     if isinstance(own, Mapping):
+        place = f"{where}: scenario"
+        found[study.title] = _case(study.title, dict(own), place, changes, where, vary=vary)
+    places = ({} if found else {own: f"{where}: scenario"}) | _scenario_places(study)
+    for name, place in places.items():
         what, fix = "two scenarios of one name", "give the study another title"
-        once = names[0] not in names[1:]
-        require(once, names[0], "different names", place, what=what, fix=fix)
-        tables[names[0]] = own
-    return {
-        name: _case(name, inline, changed, folder, where, vary=vary, key=keys.get(name, "scenario"))
-        for name, inline in tables.items()
-    }
+        require(name not in found, name, "different names", place, what=what, fix=fix)
+        table, file = _read(folder / name, name, place)
+        found[name] = _case(name, table, file, changes, where, vary=vary)
+    return found
 
 
-def _scenario_keys(study: Study) -> dict[str, str]:
+def _scenario_places(study: Study) -> dict[str, str]:
     """Returns the keys of the study file that name scenarios beside `scenario`, by scenario."""
-    keys = {
-        str(value): "factors.scenario"
+    where, asked = study.where, study.optimise
+    values = [
+        value
         for factor in study.factors
         if factor.name == SCENARIO_FACTOR
         for value in factor.values
-    }
-    if study.optimise is not None:
-        keys |= dict.fromkeys(study.optimise.training.cases, "optimise.training.scenarios")
-        keys |= dict.fromkeys(study.optimise.held_out.cases, "optimise.held_out.scenarios")
-    return keys
+    ]
+    places = {str(value): f"{where}: factors.scenario" for value in values}
+    if asked is not None:
+        places |= dict.fromkeys(asked.training.cases, f"{where}: optimise.training.scenarios")
+        places |= dict.fromkeys(asked.held_out.cases, f"{where}: optimise.held_out.scenarios")
+    return places
 
 
-def _refuse_twice(name: str, study: Study) -> None:
-    """Raises StudyError for a setting that is a factor as well.
+def _changes(study: Study) -> dict[str, Any]:
+    """Returns the settings of [set] by name.
 
-    For a variable of an optimiser the setting is allowed: it is the value before the optimisation.
+    A setting that is a factor as well is refused. For a variable of an optimiser it is allowed: it
+    is the value before the optimisation.
     """
-    twice = study.optimise is None and plain_name(name) in {item.name for item in study.factors}
+    where = f"{study.where}: set"
+    changes = flat(table_of(study.source.get("set", {}), where, "write [set]"), where)
+    factors = {factor.name for factor in study.factors}
     what, fix = "set and varied", "take one of them away: the factor would replace it"
-    expected, place = "each name in [set] or [factors]", f"{study.where}: set.{name}"
-    require(not twice, name, expected, place, what=what, fix=fix)
+    for name in changes:
+        check_settable(plain_name(name), f"{where}.{name}", kind="setting")
+        twice = study.optimise is None and plain_name(name) in factors
+        expected, place = "each name in [set] or [factors]", f"{where}.{name}"
+        require(not twice, name, expected, place, what=what, fix=fix)
+    return changes
 
 
 def _case(
     name: str,
-    inline: Mapping[str, Any] | None,
+    table: dict[str, Any],
+    place: str,
     changes: Mapping[str, Any],
-    folder: Path,
     where: str,
     *,
     vary: bool,
-    key: str,
 ) -> Case:
     """Makes a case. Raises ScenarioError for its scenario, StudyError for a change.
 
     Args:
-        inline: the tables of a scenario in the study file; None for one of a file.
+        table: the tables of the scenario.
+        place: where they come from.
         changes: the settings of [set] by name.
-        folder: folder of the study file.
         vary: whether the standard variation is added.
-        key: key of the study file that names the scenario.
     """
-    table, place = (
-        _read(folder / name, name, f"{where}: {key}")
-        if inline is None
-        else (dict(inline), f"{where}: scenario")
-    )
     scenario = scenario_from_table(table, where=place)
     check_scenario(scenario, names=list(scenario.parameters))
     try:
         table = with_values(table, changes)
-        check_scenario(
-            scenario_from_table(table, where=place, given=list(changes)),
-            names=[plain_name(name) for name in changes],
-        )
+        scenario = scenario_from_table(table, where=place, given=list(changes))
+        check_scenario(scenario, names=[plain_name(name) for name in changes])
     except HexapodError as error:
-        raise placed(error, _place(error, where)) from error
+        key = (error.where or "").rpartition(": ")[2].removeprefix("--set ")
+        raise placed(error, f"{where}: set.{plain_name(key)}") from error
     if vary and "variation" not in table:
-        table["variation"] = dict(STANDARD_TABLE)
+        table["variation"] = asdict(STANDARD)
     table["outputs"] = {"plots": False}  # a study keeps no recordings
     return Case(name=name, table=table, where=place)
 
@@ -283,17 +251,9 @@ def _read(beside: Path, name: str, where: str) -> tuple[dict[str, Any], str]:
 
     Raises HexapodError; for an unknown name it cites the place in the study file.
     """
-    short, expected = len(beside.name.encode()) <= MAX_FILE_NAME, f"at most {MAX_FILE_NAME} bytes"
-    require(short, name, expected, where, what="no file has such a name")
     try:
-        return read_tables(beside if beside.is_file() else name)
+        return read_tables(beside if os.path.isfile(beside) else name)
     except HexapodError as error:
         if error.where:
             raise
         raise placed(error, where) from error
-
-
-def _place(error: HexapodError, where: str) -> str:
-    """Returns the place in [set] of an error in a scenario."""
-    key = (error.where or "").rpartition(": ")[2].removeprefix("--set ")
-    return f"{where}: set.{plain_name(key)}"

@@ -163,15 +163,10 @@ class Store:
             found[run] = True
         return found
 
-    def rows(self, runs: Sequence[int]) -> dict[int, dict[str, Any]]:
-        """Returns the rows of those of the given runs that are stored, by run number."""
-        if not runs:
-            return {}
-        names, wanted = [item.name for item in self.columns], set(runs)
-        found = self.select(
-            "SELECT * FROM runs WHERE run BETWEEN ? AND ?", (min(wanted), max(wanted))
-        )
-        return {row[0]: dict(zip(names, row, strict=True)) for row in found if row[0] in wanted}
+    def numbers(self, first: int, end: int) -> set[int]:
+        """Returns the numbers of the stored runs from `first` to before `end`."""
+        rows = self.select("SELECT run FROM runs WHERE run >= ? AND run < ?", (first, end))
+        return {run for (run,) in rows}
 
     def tables(self, columns: Sequence[Column]) -> Iterator[list[tuple[Any, ...]]]:
         """Yields the columns of all runs in the order of their numbers, some rows at a time."""

@@ -13,7 +13,7 @@ from hexapod_cosim.controller import Gains
 from hexapod_cosim.cosim.common.events import EventSink, ignore_event
 from hexapod_cosim.cosim.run.walker import Walker
 from hexapod_cosim.cosim.run.worker_pool import processor_count
-from hexapod_cosim.extensions.study.dispatch import ProgressSink, ResultSink, dispatch, missing_runs
+from hexapod_cosim.extensions.study.dispatch import ProgressSink, ResultSink, dispatch
 from hexapod_cosim.extensions.study.folder import (
     RESULTS,
     begin_folder,
@@ -74,9 +74,10 @@ def run_study(study: Study, folder: Path, *, options: Options, start: StartProgr
                 with open_workers(job, options, count) as workers:
                     optimise(sink, workers, folder)
             elif not done.all():
-                orders = Sweep(study).orders(missing_runs(done))
+                missing = np.flatnonzero(~done)
+                orders = Sweep(study).orders(map(int, missing))
                 with open_workers(job, options, count) as workers:
-                    dispatch(sink, workers, orders)
+                    dispatch(sink, workers, orders, len(missing))
             export_runs(store, folder)
         finish_folder(folder)
     return folder / RESULTS

@@ -9,14 +9,11 @@ from typing import Annotated
 
 import typer
 
-from hexapod_cosim.cosim.cli.extension import Command, Extension, Rows
 from hexapod_cosim.cosim.cli.failures import FELL
-from hexapod_cosim.cosim.cli.listing import titles
-from hexapod_cosim.cosim.cli.running import ControlNames, FmuFile, GainsFile, given_gains
-from hexapod_cosim.cosim.cli.terminal import Json, warn
-from hexapod_cosim.cosim.common.files import STUDY
+from hexapod_cosim.cosim.cli.options import ControlNames, FmuFile, GainsFile, Json
+from hexapod_cosim.cosim.cli.running import given_gains
+from hexapod_cosim.cosim.cli.terminal import warn
 from hexapod_cosim.cosim.common.installation import require_pyarrow
-from hexapod_cosim.extensions.study.bundled import list_studies
 from hexapod_cosim.extensions.study.records import StudyError
 
 EPILOG = (
@@ -100,11 +97,6 @@ def report_again(folder: Path) -> Sequence[Path]:
     return files
 
 
-def _bundled() -> Rows:
-    """Returns the bundled studies for `hexapod list studies`."""
-    return titles(list_studies())
-
-
 def _checked_workers(count: int | None) -> int | None:
     """Returns a number of workers. Raises StudyError when it is out of range."""
     if count is not None and not 0 <= count <= MAX_WORKERS:
@@ -128,10 +120,3 @@ def _command_line(file: str, controls: Sequence[str], options: Mapping[str, obje
     ]
     words = [*(word for text in controls for word in ("--control", text)), *words]
     return shlex.join(["hexapod", "study", file, *words])
-
-
-EXTENSION = Extension(
-    commands=[Command(name="study", run=study, epilog=EPILOG)],
-    reports={STUDY: report_again},
-    lists={"studies": _bundled},
-)

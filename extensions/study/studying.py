@@ -24,13 +24,9 @@ from hexapod_cosim.cosim.results.comparison import METHOD
 from hexapod_cosim.extensions.study.dispatch import ProgressSink
 from hexapod_cosim.extensions.study.folder import TIMES
 from hexapod_cosim.extensions.study.reading import load_study
+from hexapod_cosim.extensions.study.report import tables
 from hexapod_cosim.extensions.study.report.notes import NO_WALK, notes
-from hexapod_cosim.extensions.study.report.page import (
-    optimum_changes,
-    optimum_rows,
-    overall_rows,
-    write_study_report,
-)
+from hexapod_cosim.extensions.study.report.page import write_study_report
 from hexapod_cosim.extensions.study.study import Options, StartProgress, run_study
 from hexapod_cosim.extensions.study.summary import Results, read_results, summary_of
 
@@ -90,14 +86,9 @@ def failed_controls(found: Results) -> list[str]:
             alike = "all" if len(reasons) == 1 else f"{count} of them"
             texts.append(
                 f"none of {total} {control} runs walked to its end; "
-                f"{alike} {_ending(status)}: {reason}"
+                f"{alike} {tables.ending(status)}: {reason}"
             )
     return texts
-
-
-def _ending(status: str) -> str:
-    """Returns the word for how a run ended that did not walk to its end."""
-    return "fell" if status == COMPLETED else status
 
 
 def report_on(folder: Path) -> tuple[Results, list[Path]]:
@@ -135,59 +126,19 @@ def progress(*, plain: bool) -> Iterator[StartProgress]:
 def show_study(found: Results) -> None:
     """Prints the table of all runs, totals, failures by reason and the optimum."""
     overall, controls = found.overall, found.study.controls
-    rows = overall_rows(found)
-    columns = [
-        "metric",
-        "unit",
-        *controls,
-        *(text for control in controls[1:] for text in _change_titles(control, controls)),
-    ]
-    texts = [
-        [
-            row["name"],
-            row["unit"],
-            *row["values"],
-            *(to[key] for to in row["changes"] for key in ("change", "interval", "verdict")),
-        ]
-        for row in rows
-    ]
-    show_table(
-        columns,
-        texts,
-        right=[k for k, name in enumerate(columns) if name not in ("metric", "unit", "")],
-    )
+    _show(tables.overall_table(found))
     walked = ", ".join(
-        f"{control} {overall.walked.get(control, 0)} of {overall.runs.get(control, 0)}"
-        for control in controls
+        f"{control} {overall.walked[control]} of {overall.runs[control]}" for control in controls
     )
     show_text(f"{found.runs} runs at {found.of_points} points; walked to the end: {walked}")
     if len(controls) > 1:
         show_text(f"{METHOD}.")
-    for (control, status, reason), count in list(found.failures.items())[:MAX_REASONS]:
-        show_text(f"{count:6d} x {control} {_ending(status)}: {reason}")
-    for row in optimum_rows(found):
-        settings = ", ".join(
-            f"{name} {text}"
-            for name, text in zip((found.optimum or {})["variables"], row["settings"], strict=True)
-        )
-        show_text(
-            f"{row['label']}: {settings}; training {' '.join(row['training'])}, "
-            f"held out {' '.join(row['held_out'])}"
-        )
-    show_optimum_changes(found)
+    for count, control, how, reason in tables.failure_table(found).rows[:MAX_REASONS]:
+        show_text(f"{count:>6} x {control} {how}: {reason}")
+    if found.optimum is not None:
+        _show(tables.optimum_table(found))
+        _show(tables.optimum_changes(found))
 
 
-def _change_titles(control: str, controls: Sequence[str]) -> tuple[str, str, str]:
-    """Returns the titles of a change, its interval and its verdict, from the first control."""
-    return ("change" if len(controls) == 2 else f"to {control}"), "95 % interval", ""
-
-
-def show_optimum_changes(found: Results) -> None:
-    """Prints the changes from the settings before the optimisation to the best trials."""
-    for row in optimum_changes(found):
-        interval = f" (95 % interval {row['interval']})" if row["interval"] else ""
-        verdict = f", {row['verdict']}" if row["verdict"] else ""
-        show_text(
-            f"{row['label']}, {row['part']}: {row['metric']} {row['change']}{interval}, "
-            f"{row['pairs']} pairs{verdict}"
-        )
+def _show(table: tables.Table) -> None:
+    show_table(table.columns, table.rows, right=table.right)

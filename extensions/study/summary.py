@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Mapping, Sequence
 from contextlib import closing
@@ -14,11 +13,18 @@ from hexapod_cosim.cosim.common.files import RUN_FILE, read_json, write_json
 from hexapod_cosim.cosim.results.balance import UNBALANCED, Unbalanced
 from hexapod_cosim.cosim.results.metrics import OF_THE_RUN
 from hexapod_cosim.extensions.study.folder import MANIFEST, provenance, write_table
-from hexapod_cosim.extensions.study.groups import Groups, Point
-from hexapod_cosim.extensions.study.moments import Figures
-from hexapod_cosim.extensions.study.objective import WALKED
+from hexapod_cosim.extensions.study.groups import (
+    Array,
+    Figures,
+    Groups,
+    Point,
+    Runs,
+    points_of,
+    settings_of_points,
+)
+from hexapod_cosim.extensions.study.optimum import OPTIMUM, Parts, Trial
 from hexapod_cosim.extensions.study.reading import study_from_table
-from hexapod_cosim.extensions.study.records import SCENARIO_FACTOR, Optimise, Study, Value
+from hexapod_cosim.extensions.study.records import Study
 from hexapod_cosim.extensions.study.store import (
     BOOLEAN,
     FIGURES,
@@ -34,20 +40,11 @@ from hexapod_cosim.extensions.study.store import (
 )
 from hexapod_cosim.models import HexapodError
 
-POINTS, SUMMARY, OPTIMUM = "points.parquet", "summary.json", "optimum.json"
+POINTS, SUMMARY = "points.parquet", "summary.json"
+MAX_POINTS = 4000  # kept for figures and tables; evenly chosen if there are more
 HALF_WIDTH = ".half_width"  # suffix of columns with half widths of 95 % intervals
 MAX_REASONS = 30  # that are shown
 NUMBER = re.compile(r"[0-9#]+(?:\.[0-9#]+)?")
-
-
-@dataclass(frozen=True, kw_only=True)
-class Trial:
-    """The settings of a trial of an optimiser and its results on the training runs."""
-
-    number: int
-    values: tuple[Value, ...]
-    means: Mapping[str, float]  # by metric of the objectives and constraints
-    feasible: bool
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -99,21 +96,21 @@ def read_results(folder: Path) -> Results:
     """
     study, manifest = stored_study(folder)
     with closing(Store(folder, study)) as store:
-        groups = Groups(study, store)
-        columns = point_columns(study)
-        rows = ([point_row(point) for point in block] for block in groups.blocks())
-        write_table(folder / POINTS, columns, rows, provenance(manifest))
+        runs, settings = Runs(study, store), settings_of_points(study, store)
+        groups = Groups(runs, runs.starts())
+        write_points(folder / POINTS, runs, groups, settings, provenance(manifest))
+        most = len(settings) if study.optimise is not None else MAX_POINTS
         results = Results(
             study=study,
             manifest=manifest,
             facts=read_json(folder / RUN_FILE),
-            overall=groups.overall,
-            points=groups.points,
-            of_points=groups.count,
+            overall=Groups(runs).figures(0),
+            points=points_of(runs, groups, settings, most=max(most, 1)),
+            of_points=len(settings),
             failures=failure_counts(store),
             walks=_walks(store),
             unbalanced=_unbalanced(store),
-            trials=trials_of(study, groups.points),
+            trials=[] if study.optimise is None else Parts(runs, settings).trials(),
             optimum=read_json(folder / OPTIMUM) if (folder / OPTIMUM).exists() else None,
             wall=store.select("SELECT total(wall) FROM runs")[0][0],
         )
@@ -161,30 +158,6 @@ def _unbalanced(store: Store) -> dict[str, Unbalanced]:
     return {control: Unbalanced(count, largest) for control, count, largest in rows}
 
 
-def feasible(means: Mapping[str, float], asked: Optimise) -> bool:
-    """Returns whether the means meet all constraints."""
-    return all(bound.excess(means[bound.metric]) <= 0.0 for bound in asked.constraints)
-
-
-def trials_of(study: Study, points: Sequence[Point]) -> list[Trial]:
-    """Returns the trials of which all training runs are stored, from the points of the study."""
-    asked, found = study.optimise, []
-    if asked is None:
-        return []
-    for point in points:
-        runs, walked = (kind[asked.control] for kind in (point.figures.runs, point.figures.walked))
-        if point.held_out or point.number >= asked.trials or runs < asked.training.runs:
-            continue
-        means = {
-            name: item.value if walked == runs else math.nan
-            for name, item in point.figures.means[asked.control].items()
-        } | {WALKED: walked / runs}
-        values = tuple(point.values[factor.name] for factor in study.factors)
-        fits = feasible(means, asked)
-        found.append(Trial(number=point.number, values=values, means=means, feasible=fits))
-    return found
-
-
 def summary_of(results: Results) -> dict[str, Any]:
     """Returns the content of summary.json: totals, means, changes, failures and the optimum."""
     overall = results.overall
@@ -222,45 +195,49 @@ def summary_of(results: Results) -> dict[str, Any]:
     }
 
 
-def point_columns(study: Study) -> list[Column]:
-    """Returns the columns of points.parquet.
+def write_points(
+    path: Path,
+    runs: Runs,
+    groups: Groups,
+    settings: Sequence[tuple[Any, ...]],
+    metadata: Mapping[str, str],
+) -> None:
+    """Writes points.parquet, a row a point.
 
-    They are the settings; for each control the numbers of runs and walks and the means of the
-    metrics with the half widths of their intervals; then the pairs and their changes. With more
+    Its columns are the settings; for each control the numbers of runs and walks and the means of
+    the metrics with the half widths of their intervals; then the pairs and their changes. With more
     than two controls the names of the latter begin with the other control.
     """
-    settings = {factor.name for factor in study.factors} | {"point", "case"}
-    columns = [item for item in columns_of(study) if item.name in settings]
-    columns.append(Column("held_out", BOOLEAN))
-    for control in study.controls:
-        columns += [Column(f"{control}.{name}", INTEGER) for name in ("runs", "walked")]
-        columns += _figure_columns(control)
-    others = study.controls[1:]
-    for before in [""] if len(others) == 1 else [f"{control}." for control in others]:
-        columns.append(Column(f"{before}pairs", INTEGER))
-        columns += _figure_columns(f"{before}change")
-        columns += [Column(f"{before}change.{name}.verdict", TEXT) for name in FIGURES]
-    return columns
-
-
-def _figure_columns(prefix: str) -> list[Column]:
-    return [
-        Column(f"{prefix}.{name}{part}", REAL, UNITS[name])
-        for name in FIGURES
-        for part in ("", HALF_WIDTH)
+    study, starts = runs.study, groups.starts
+    names = ["case", *(factor.name for factor in study.factors)]
+    given: dict[str, Any] = {name: [row[k] for row in settings] for k, name in enumerate(names)}
+    given["point"] = runs.point[starts]
+    table: list[tuple[Column, Any]] = [
+        (item, given[item.name]) for item in columns_of(study) if item.name in given
     ]
+    table.append((Column("held_out", BOOLEAN), runs.held_out[starts]))
+    for control, found in groups.by_control.items():
+        table.append((Column(f"{control}.runs", INTEGER), found.runs))
+        table.append((Column(f"{control}.walked", INTEGER), found.walked))
+        table += _figure_columns(control, found.means.mean, found.means.half_width)
+    for control, change in groups.changes.items():
+        before = f"{control}." if len(groups.changes) > 1 else ""
+        samples = change.samples
+        difference = samples["after"].mean - samples["before"].mean
+        table.append((Column(f"{before}pairs", INTEGER), change.pairs))
+        table += _figure_columns(f"{before}change", difference, samples["change"].half_width)
+        table += [
+            (Column(f"{before}change.{name}.verdict", TEXT), change.verdict[:, k])
+            for k, name in enumerate(FIGURES)
+        ]
+    columns, arrays = zip(*table, strict=True)
+    write_table(path, columns, [arrays], metadata)
 
 
-def point_row(point: Point) -> list[Any]:
-    """Returns the row of a point, in the order of point_columns()."""
-    figures = point.figures
-    settings = [value for name, value in point.values.items() if name != SCENARIO_FACTOR]
-    row = [point.number, point.case, *settings, point.held_out]
-    for control, means in figures.means.items():
-        row += [figures.runs[control], figures.walked[control]]
-        row += [part for item in means.values() for part in (item.value, item.half_width)]
-    for control, changes in figures.changes.items():
-        row.append(figures.pairs[control])
-        row += [part for item in changes.values() for part in (item.difference, item.half_width)]
-        row += [item.verdict for item in changes.values()]
-    return row
+def _figure_columns(prefix: str, values: Array, half_widths: Array) -> list[tuple[Column, Array]]:
+    """Returns the columns of all metrics with the half widths of their intervals (g, m)."""
+    return [
+        (Column(f"{prefix}.{name}{suffix}", REAL, UNITS[name]), array[:, k])
+        for k, name in enumerate(FIGURES)
+        for suffix, array in (("", values), (HALF_WIDTH, half_widths))
+    ]

@@ -5,7 +5,6 @@ from __future__ import annotations
 import pickle
 import re
 import traceback
-from collections import OrderedDict
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import cache
@@ -34,15 +33,14 @@ from hexapod_cosim.extensions.study.records import (
     StudyError,
     Value,
 )
-from hexapod_cosim.extensions.study.runs import order_key, settings_of
+from hexapod_cosim.extensions.study.runs import settings_of
 from hexapod_cosim.models import HexapodError
 
-MAX_KNOWN = 4096  # summaries that a worker keeps: some 10 MB
-MAX_CONTEXTS = 4  # jobs that are unpacked in a process: studies may share a cluster
 MAX_TEXT = 400  # characters of an exception's text
 ADDRESS = re.compile(r"0x[0-9a-fA-F]+")  # of an object in memory, which differs each time
 
-_contexts: OrderedDict[str, _JobContext] = OrderedDict()  # by the name of their job
+# the job that is unpacked in this process, if any; a worker of a cluster may get another one
+_contexts: list[_JobContext] = []
 # a cluster's worker may have threads, and the loader of an FMU changes the working directory
 _one_at_a_time = Lock()
 
@@ -57,12 +55,10 @@ def run_orders(job: Job | Path, orders: Sequence[Order]) -> list[RunResult]:
         job = _read_job(job)
     with _one_at_a_time:
         raise_if_stopped(0.0)
-        if job.name not in _contexts:
-            while len(_contexts) >= MAX_CONTEXTS:
-                _contexts.popitem(last=False)[1].close()
-            _contexts[job.name] = _JobContext(job)
-        _contexts.move_to_end(job.name)
-        return [_contexts[job.name].run(order) for order in orders]
+        if not _contexts or _contexts[0].job.name != job.name:
+            _close_contexts()
+            _contexts.append(_JobContext(job))
+        return [_contexts[0].run(order) for order in orders]
 
 
 def unpack_job(content: bytes) -> Job:
@@ -76,11 +72,15 @@ def _read_job(file: Path) -> Job:
     return unpack_job(file.read_bytes())
 
 
-def close_job_contexts() -> None:
+def close_job_context() -> None:
     """Closes what this process has unpacked."""
     with _one_at_a_time:
-        while _contexts:
-            _contexts.popitem()[1].close()
+        _close_contexts()
+
+
+def _close_contexts() -> None:
+    while _contexts:
+        _contexts.pop().close()
 
 
 class _JobContext:
@@ -91,9 +91,8 @@ class _JobContext:
 
     def __init__(self, job: Job) -> None:
         _check_environment(job)
-        self._job, self._known = job, OrderedDict[bytes, Summary]()
+        self.job, self._folder = job, TemporaryFolder("job")
         try:
-            self._folder = TemporaryFolder("job")
             self._files = {
                 name: self._unpack(f"robot{k}{Path(name).suffix}", data)
                 for k, (name, data) in enumerate(job.robots.items())
@@ -103,7 +102,8 @@ class _JobContext:
                 for k, (name, data) in enumerate(job.fmus.items())
             }
             self._controls = {
-                label: self._local(label, text) for label, text in job.study.texts.items()
+                label: self._local(f"law{k}", label, text)
+                for k, (label, text) in enumerate(job.study.texts.items())
             }
             self._controller = self._unpack("controller.fmu", job.controller)
         except OSError as error:
@@ -122,17 +122,16 @@ class _JobContext:
         path.write_bytes(content)
         return path
 
-    def _local(self, label: str, text: str) -> str:
+    def _local(self, folder: str, label: str, text: str) -> str:
         """Returns the text of a control with a path that holds its file on this machine.
 
         This is the path of the study where it has the same content, else an unpacked copy.
         """
-        control, content = control_of(text), self._job.laws.get(label)
+        control, content = control_of(text), self.job.laws.get(label)
         if control.path is None or content is None:
             return text
         if control.path.is_file() and control.path.read_bytes() == content:
             return text
-        folder = f"law{len(list(self._folder.path.iterdir()))}"
         copy = self._unpack(f"{folder}/{control.path.name}", content)
         at = split_walk(control.text)[1]
         return f"{label}={copy}:{control.name}{at}" if control.kind == PYTHON else f"{label}={copy}"
@@ -148,35 +147,23 @@ class _JobContext:
         return RunResult(order, summary, perf_counter() - begin)
 
     def _summary(self, order: Order) -> Summary:
-        """Returns the summary of an order's run, whatever happens in it.
-
-        A run with equal settings is not repeated: kinematic control, for instance, has no gains.
-        """
-        key = _settings_key(order, self._job.study.factors)
-        if key in self._known:
-            self._known.move_to_end(key)
-            return self._known[key]
+        """Returns the summary of an order's run, whatever happens in it."""
         try:
-            summary = self._run(order)
+            return self._run(order)
         except HexapodError as error:
             return summary_without_figures(order, str(error))
         except KeyboardInterrupt:
             raise
         except BaseException as error:  # an error in a control ends this run, not the study
             self._runner.close()  # its state is unknown
-            self._runner = self._job.runner(controller=self._controller)
+            self._runner = self.job.runner(controller=self._controller)
             return summary_without_figures(order, describe_exception(error), status=FAILED)
-        if summary.status != INTERRUPTED:
-            self._known[key] = summary
-            if len(self._known) > MAX_KNOWN:
-                self._known.popitem(last=False)
-        return summary
 
     def _run(self, order: Order) -> Summary:
         scenario = self._scenario(order)
-        name, gains = scenario.robot, chosen_gains(scenario, self._job.gains)
+        name, gains = scenario.robot, chosen_gains(scenario, self.job.gains)
         if gains is not None:
-            gains = changed_gains(gains, settings_of(order, self._job.study.factors))
+            gains = changed_gains(gains, settings_of(order, self.job.study.factors))
         scenario = replace(scenario, robot=str(self._files.get(name, name)))
         return self._runner.summary(
             scenario, fmu=self._fmus[name], gains=gains, progress=raise_if_stopped
@@ -184,17 +171,15 @@ class _JobContext:
 
     def _scenario(self, order: Order) -> Scenario:
         """Returns the scenario of an order, with the values of the factors."""
-        case = self._job.study.cases[order.case]
+        case = self.job.study.cases[order.case]
         settings = {
             factor.name: factor.setting(value)
-            for factor, value in settings_of(order, self._job.study.factors)
+            for factor, value in settings_of(order, self.job.study.factors)
             if factor.name != SCENARIO_FACTOR and not factor.name.startswith(GAINS)
         }
-        table = with_values(case.table, settings)
+        table = table_with_control(with_values(case.table, settings), self._controls[order.control])
         return scenario_from_table(
-            {**table_with_control(table, self._controls[order.control]), "seed": order.seed},
-            where=case.where,
-            given=list(settings),
+            {**table, "seed": order.seed}, where=case.where, given=list(settings)
         )
 
     def close(self) -> None:
@@ -216,14 +201,6 @@ def _check_environment(job: Job) -> None:
             got="; ".join(differences),
             fix="install the same versions on all machines of the cluster",
         )
-
-
-def _settings_key(order: Order, factors: Sequence[Factor]) -> bytes:
-    """Returns the key of all that a run depends on. Kinematic control has no gains."""
-    settings = settings_of(order, factors)
-    if order.control == "kinematic":
-        settings = [item for item in settings if not item[0].name.startswith(GAINS)]
-    return order_key(order, settings)
 
 
 def describe_exception(error: BaseException) -> str:

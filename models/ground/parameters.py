@@ -39,6 +39,13 @@ class Parameter:
             return easy + difficulty * (hard - easy)
         return self.default
 
+    def text(self, value: float | str | None) -> str:
+        """Returns a value with its unit; "-" for one that has to be given."""
+        if value is None or isinstance(value, str):
+            return value or "-"
+        unit = self.spec.unit if isinstance(self.spec, Number) else "1"
+        return f"{value:.4g}" + ("" if unit == "1" else f" {unit}")
+
     def read(self, value: Any, where: str) -> float | str:
         """Returns the checked value. Raises RobotError; `where` names the key."""
         found = cast("float | str", self.spec.read(value, where))

@@ -17,6 +17,8 @@ function(hexapod_package target component)
     ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR})
   install(EXPORT hexapod-${component} NAMESPACE hexapod:: DESTINATION ${config})
   install(FILES ${ARGN} DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/hexapod)
+  install(DIRECTORY ${CMAKE_CURRENT_SOURCE_DIR}/include/hexapod/generated
+    DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/hexapod)
   install(FILES ${HX_LICENCE} DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/hexapod)
 
   configure_package_config_file(${HX_PACKAGE_DIR}/hexapodConfig.cmake.in hexapodConfig.cmake

@@ -42,6 +42,9 @@ enum {
   HX_TIBIA_ROWS = HX_TORSO
 };
 
+/* Returns whether a friction law holds feet by bristles: those from HX_FRICTION_BRISTLE on do. */
+static inline int hx_is_bristle_law(int law) { return law >= HX_FRICTION_BRISTLE; }
+
 /* Numbers of hxSoil (ground/soil.h), and rows of contacts that may be on soil: those of feet with
  * the ground below them, of knees, of shanks and of the torso (hx_soil_row). */
 enum { HX_SOIL_SIZE = 16, HX_SOIL_ROWS = 4 };

@@ -12,8 +12,8 @@ import pytest
 from command import COMMAND
 
 from hexapod_cosim.cosim.cli import main
+from hexapod_cosim.cosim.scenario.bundled import list_scenarios
 from hexapod_cosim.cosim.scenario.scenario import load_scenario
-from hexapod_cosim.cosim.scenario.tables import list_scenarios
 from hexapod_cosim.models import HexapodError, list_robots
 
 Ask = Callable[..., list[str]]

@@ -168,7 +168,7 @@ def test_an_interrupt_while_figures_are_drawn_says_what_is_there(
         signal.raise_signal(signal.SIGINT)
         return []
 
-    monkeypatch.setattr("hexapod_cosim.cosim.cli.run_commands.write_report", struck)
+    monkeypatch.setattr("hexapod_cosim.cosim.cli.simulating.write_report", struck)
     # a test run in the background starts with it ignored
     before = signal.signal(signal.SIGINT, signal.default_int_handler)
     request.addfinalizer(lambda: signal.signal(signal.SIGINT, before))
@@ -231,7 +231,7 @@ def test_a_fall_under_either_control_ends_a_comparison_with_the_code_of_falls(
                 warnings=() if stands else ("it fell",),
             )
 
-    monkeypatch.setattr("hexapod_cosim.cosim.cli.compare_command.run_batch", others)
+    monkeypatch.setattr("hexapod_cosim.cosim.cli.comparing.run_batch", others)
     returned, out, _ = call(
         "compare",
         "stand",

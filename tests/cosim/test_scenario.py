@@ -14,9 +14,9 @@ import tomlkit
 
 from hexapod_cosim.controller import SWITCHES, Controller, Parts, make_gait
 from hexapod_cosim.cosim.run.chosen_walk import known_robot
+from hexapod_cosim.cosim.scenario.bundled import list_scenarios
 from hexapod_cosim.cosim.scenario.records import MAX_STEPS, Variation
 from hexapod_cosim.cosim.scenario.scenario import load_scenario, scenario_from_table, scenario_robot
-from hexapod_cosim.cosim.scenario.tables import list_scenarios
 from hexapod_cosim.models import HexapodError, RobotError, ScenarioError, load_robot
 
 

@@ -79,7 +79,8 @@ def test_the_installation_is_what_c_people_expect(prefix: Path) -> None:
     files = {path.relative_to(prefix).as_posix() for path in prefix.rglob("*") if not path.is_dir()}
     headers = {path for path in files if path.startswith("include/")}
     assert headers == {
-        f"include/hexapod/{name}.h" for name in ("hexapod", "legs", "status", "terrain")
+        f"include/hexapod/{name}.h"
+        for name in ("generated/plant_settings", "hexapod", "legs", "status", "terrain")
     }
     assert "share/doc/hexapod/LICENSE" in files
     assert any(path.endswith("/cmake/hexapod/hexapodConfigVersion.cmake") for path in files)

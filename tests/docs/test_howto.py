@@ -94,7 +94,7 @@ def test_a_command_of_the_pages_on_robots_and_packages_works(
     # the figures of a design are drawn in tests/docs/test_readme.py
     monkeypatch.setattr("hexapod_cosim.controller.design.plot_design", lambda *_: [])
     shorter = [*SHORTER] if "simulate" in command else []
-    shorter += ["--find", "servo", "--no-propose"] if "identify" in command else []
+    shorter += ["--find", "servo"] if "identify" in command else []
     if "out/identified/" in command:
         leave_identified(robots)
     assert typed(robots, *shlex.split(command), *shorter)

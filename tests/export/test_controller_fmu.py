@@ -23,8 +23,8 @@ from hexapod_cosim.cosim.interface.controller_interface import (
 )
 from hexapod_cosim.cosim.interface.names import joint_names
 from hexapod_cosim.cosim.master.fmu import Fmu, StepError
-from hexapod_cosim.cosim.master.fmu_controller import COMMANDS
-from hexapod_cosim.cosim.master.signals import COMMANDED, MEASURED
+from hexapod_cosim.cosim.master.sensors import MEASURED
+from hexapod_cosim.cosim.master.signals import COMMANDED, COMMANDS
 from hexapod_cosim.cosim.run.controller_setup import make_setup
 from hexapod_cosim.cosim.validate.validation import find_problems
 from hexapod_cosim.models import LEG_NAMES, FmuError, HexapodError, load_robot

@@ -14,13 +14,13 @@ from fmpy.fmi3 import FMU3Slave
 from gains import PERIOD, make_gains
 
 from hexapod_cosim.controller import BodyCommand, Measurement, make_gait
+from hexapod_cosim.cosim.control.fmu_law import law_of_ours
 from hexapod_cosim.cosim.export.controller_export import export_controller
 from hexapod_cosim.cosim.interface.controller_interface import (
     ControllerSetup,
     controller_parameters,
 )
 from hexapod_cosim.cosim.master.fmu import StepError
-from hexapod_cosim.cosim.master.fmu_controller import FmuController
 from hexapod_cosim.models import FmuError, load_robot
 
 
@@ -36,7 +36,7 @@ def test_the_gait_is_tunable_while_the_robot_walks(tmp_path: Path) -> None:
     amble = replace(setup, gait=make_gait(robot, "amble"))
     command, lead = BodyCommand(vx=0.03), setup.build()
     with packed(setup, tmp_path) as fmu:
-        walker, worst = FmuController(fmu, period=PERIOD), 0.0
+        walker, worst = law_of_ours(fmu, period=PERIOD), 0.0
         for k in range(800):
             if k == 330:
                 fmu.set_parameters(gait_parameters(amble))
@@ -62,7 +62,7 @@ def test_the_control_is_tunable_while_the_robot_walks(tmp_path: Path) -> None:
     amble = replace(setup, gait=make_gait(robot, "amble"))
     command, lead = BodyCommand(vx=0.03), setup.build()
     with packed(setup, tmp_path) as fmu:
-        walker, worst = FmuController(fmu, period=PERIOD), 0.0
+        walker, worst = law_of_ours(fmu, period=PERIOD), 0.0
         for k in range(800):
             if k == 330:
                 fmu.set_parameters({"control": 3.0})

@@ -9,16 +9,17 @@ import pytest
 from controller_fmus import ANGLE, SPEED, packed, setup_for
 
 from hexapod_cosim.controller import BodyCommand, JointCommand, Measurement
+from hexapod_cosim.cosim.control.fmu_law import law_of_ours
 from hexapod_cosim.cosim.interface.controller_interface import (
     ControllerSetup,
 )
 from hexapod_cosim.cosim.interface.names import vector_names
 from hexapod_cosim.cosim.master.fmu import Fmu
-from hexapod_cosim.cosim.master.fmu_controller import FmuController
 from hexapod_cosim.cosim.master.loop import COMPLETED, JointController, run
 from hexapod_cosim.cosim.master.recorder import Recorder, Recording
+from hexapod_cosim.cosim.master.sensors import errors_of
 from hexapod_cosim.cosim.master.signals import COMMANDED, Signals
-from hexapod_cosim.cosim.run.single_run import make_sensor, open_plant
+from hexapod_cosim.cosim.run.single_run import open_plant
 from hexapod_cosim.cosim.scenario.records import Scenario
 from hexapod_cosim.cosim.scenario.scenario import load_scenario
 from hexapod_cosim.cosim.scenario.schedule import make_schedule
@@ -40,7 +41,7 @@ class Both:
     def __init__(self, setup: ControllerSetup, fmu: Fmu) -> None:
         self.lead, self.other, self.fallback = (
             setup.build(),
-            FmuController(fmu, period=setup.period),
+            law_of_ours(fmu, period=setup.period),
             False,
         )
         self.worst, self.scale = (
@@ -75,7 +76,7 @@ def walked(scenario: Scenario, controller: JointController) -> Recording:
     schedule = make_schedule(scenario)
     with open_plant(scenario) as plant:
         plant.initialise(scenario.start, scenario.start + scenario.duration)
-        signals = Signals(plant, sensor=make_sensor(scenario, schedule))
+        signals = Signals(plant, errors=errors_of(scenario, schedule))
         recorder = Recorder(signals, schedule.times, schedule.rows)
         outcome = run(plant, signals, controller, schedule, recorder, h=scenario.macro_step)
     assert outcome.status == COMPLETED, outcome.reason
@@ -127,7 +128,7 @@ def test_plant_and_controller_fmu_walk_as_the_python_master_does(
     with packed(setup, tmp_path) as fmu:
         ours, theirs = (
             walked(scenario, setup.build()),
-            walked(scenario, FmuController(fmu, period=setup.period)),
+            walked(scenario, law_of_ours(fmu, period=setup.period)),
         )
     position = vector_names("torso.position")
     assert (

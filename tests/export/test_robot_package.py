@@ -18,7 +18,8 @@ from gains import PERIOD, make_gains
 from hexapod_cosim.controller import make_gait
 from hexapod_cosim.cosim.export.robot_package import CONTROLLER, PLANT, export_package, read_values
 from hexapod_cosim.cosim.interface.controller_interface import ControllerSetup
-from hexapod_cosim.cosim.master.signals import ACCELERATION, COMMANDED, MEASURED
+from hexapod_cosim.cosim.master.sensors import MEASURED
+from hexapod_cosim.cosim.master.signals import ACCELERATION, COMMANDED
 from hexapod_cosim.models import FmuError, HexapodError, load_robot
 from tools.importers import delayed, package3
 from tools.importers.compare import largest_difference
@@ -233,7 +234,7 @@ def test_the_command_packs_a_kinematic_walk(call: Call, tmp_path: Path) -> None:
     ("arguments", "said"),
     [
         (("--set", "plant.friction.mu=0.5", "-o", "one.fmu"), "without a package"),
-        (("--ssp", "-o", "one.fmu"), "not a package's name"),
+        (("--ssp", "-o", "one.fmu"), "not the name of such a file"),
         (("--ssp", "--urdf"), "two formats"),
         (("--ssp", "--controller", "kinematic", "--fmi", "4"), "no such FMI version"),
         (("--ssp", "--platforms", "sources"), "without binaries"),

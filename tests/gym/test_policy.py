@@ -8,14 +8,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from command import Call
 
+from hexapod_cosim.cosim.export.plant_export import export_interface
 from hexapod_cosim.cosim.interface.names import joint_names, vector_names
 from hexapod_cosim.cosim.master.fmu import Fmu
 from hexapod_cosim.cosim.validate.validation import find_problems
-from hexapod_cosim.extensions.gym.__main__ import main
 from hexapod_cosim.extensions.gym.batch import Batch
-from hexapod_cosim.extensions.gym.export import export_policy
-from hexapod_cosim.extensions.gym.interface import standing_policy
+from hexapod_cosim.extensions.gym.interface import load_policy_interface, standing_policy
 from hexapod_cosim.extensions.gym.policy import (
     FREE_SIZE,
     INPUTS,
@@ -47,7 +47,8 @@ def policy() -> Policy:
 
 @pytest.fixture(scope="module")
 def fmu_path(policy: Policy, tmp_path_factory: pytest.TempPathFactory, plant_build: Path) -> Path:
-    return export_policy(policy, load_robot("athena"), tmp_path_factory.mktemp("p") / "policy.fmu")
+    interface = load_policy_interface(policy, load_robot("athena"))
+    return export_interface(interface, tmp_path_factory.mktemp("p") / "policy.fmu")
 
 
 @pytest.fixture
@@ -113,10 +114,9 @@ def test_the_fmu_is_sound(fmu_path: Path) -> None:
     assert find_problems(fmu_path) == []
 
 
-def test_a_policy_of_another_robot_is_refused(policy: Policy, tmp_path: Path) -> None:
+def test_a_policy_of_another_robot_is_refused(policy: Policy) -> None:
     with pytest.raises(HexapodError, match=r"got 'phantomx_mk4', expected athena"):
-        export_policy(policy, load_robot("phantomx_mk4"), tmp_path / "policy.fmu")
-    assert not list(tmp_path.iterdir())
+        load_policy_interface(policy, load_robot("phantomx_mk4"))
 
 
 def test_a_saved_policy_is_read_again_and_other_files_are_refused(
@@ -142,60 +142,23 @@ def test_training_is_repeatable_and_leaves_the_standing_policy() -> None:
     assert np.abs(first - standing_policy("athena")(np.ones(INPUTS))).max() > 0.01
 
 
-def test_training_pays_a_standing_robot_little_for_a_commanded_speed() -> None:
-    settings = replace(
-        training_settings(task("Hexapod-v0")),
-        command_vx=(0.1, 0.1),
-        rewards={"tracking_lin_vel": 1},
-    )
-    with Batch(settings, 1, threads=1) as batch:
-        batch.reset(seeds=[1])
-        batch.step()
-        # exp(-(0.1 / 0.05)^2) = 0.018 of the whole, less or more with the first movements
-        assert batch.reward[0] / 0.02 < 0.05
-
-
-def test_the_command_trains_another_robot(tmp_path: Path) -> None:
+def test_the_commands_train_and_export_also_another_robot(call: Call, tmp_path: Path) -> None:
     policy, fmu = tmp_path / "policy.npz", tmp_path / "policy.fmu"
     robot = ["--robot", "phantomx_mk4"]
-    assert main(["train", "-o", str(policy), "--minutes", "0.001", *robot]) == 0
+    assert call("gym", "train", "-o", policy, "--minutes", "0.001", *robot)[0] == 0
     assert load_policy(policy).robot == "phantomx_mk4"
-    assert main(["export", str(policy), "-o", str(fmu), *robot]) == 0
+    assert call("gym", "export", policy, "-o", fmu, *robot)[0] == 0
     assert fmu.is_file()
+    assert "not a policy" in call("gym", "export", fmu, "-o", fmu)[2]
+    assert "HexapodRough-v0" in call("list", "environments")[1]
 
 
-def test_the_bench_refuses_a_time_below_a_step(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["bench", "--seconds", "-1"]) == 2
-    assert "seconds: got -1.0" in capsys.readouterr().err
-
-
-def test_the_command_trains_and_exports(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    policy, fmu = tmp_path / "policy.npz", tmp_path / "policy.fmu"
-    assert main(["list"]) == 0
-    assert "HexapodRough-v0" in capsys.readouterr().out
-    assert main(["train", "-o", str(policy), "--minutes", "0.001"]) == 0
-    assert main(["export", str(policy), "-o", str(fmu)]) == 0
-    assert fmu.is_file()
-    assert main(["export", str(fmu), "-o", str(fmu)]) == 2
-    assert "not a policy" in capsys.readouterr().err
-
-
-def test_the_command_refuses_before_it_trains(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    wrong = {
-        "minutes": "nan",
-        "generations": "0",
-        "seed": "-1",
-        "output": str(tmp_path / "none" / "policy.npz"),
-    }
-    for name, value in wrong.items():
-        options = {"output": str(tmp_path / "policy.npz"), "minutes": "0.001"} | {name: value}
-        given = [text for key, one in options.items() for text in (f"--{key}", one)]
-        assert main(["train", *given]) == 2
-        said = capsys.readouterr()
-        assert "expected" in said.err
-        assert "generation " not in said.out
+@pytest.mark.parametrize("option", ["--minutes=nan", "--generations=0", "--seed=-1"])
+def test_the_command_refuses_before_it_trains(call: Call, tmp_path: Path, option: str) -> None:
+    code, out, err = call("gym", "train", "-o", tmp_path / "policy.npz", option)
+    assert code == 1
+    assert "expected" in err
+    assert not out
     assert not list(tmp_path.iterdir())
 
 

@@ -135,7 +135,7 @@ def secret_robot(
     attitude = outputs[:, [columns.index(name) for name in ATTITUDE]]
     outputs = of_point(columns, outputs, attitude, offset)
     recorded = slice(round(BEFORE / PERIOD), None)
-    clean = readings(experiment, outputs, values, file)[recorded]
+    clean = readings(experiment, outputs, values)[recorded]
     noise = np.array([NOISE[key] for key in experiment.channels])
     noisy = clean + noise * rng.standard_normal(clean.shape)
     data = np.column_stack([commands.recording.data[recorded], noisy])

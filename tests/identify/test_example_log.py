@@ -27,18 +27,18 @@ def test_the_robot_of_the_example_is_identified(
 ) -> None:
     log, place = tmp_path / "log.mcap", tmp_path / "out"
     subprocess.run([sys.executable, str(EXAMPLE), str(log)], check=True, capture_output=True)
-    code, out, err = call("identify", log, "-o", place, "--no-propose", "--json")
+    code, out, err = call("identify", log, "-o", place, "--json")
     assert code == 0
     assert "warning" not in err
     result = json.loads(out)
     assert result["deviations_from_optimum"] < 1.0
     own = {one["key"]: one for one in result["estimates"]}
     for key, value in SECRET.items():
-        assert own[key]["told"], key
+        assert own[key]["determined"], key
         assert own[key]["low"] <= value <= own[key]["high"], key
     # of the legs' masses a walk of this length tells combinations alone
     legs = [own[f"links.{joint}.mass"] for joint in ("coxa", "femur", "tibia")]
-    assert [one["told"] for one in legs] == [False, False, False]
+    assert [one["determined"] for one in legs] == [False, False, False]
     off = [one for one in own.values() if one["key"].startswith("delay.")]
     # the example's sensors have none; of five intervals of 95 % one misses in a quarter of logs
     far = [one for one in off if one["value"] > WIDE * (one["value"] - one["low"])]

@@ -6,16 +6,15 @@ from __future__ import annotations
 
 import csv
 import json
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
 from command import QUICK, Call, assert_refused
+from secret_robots import with_column
 
-from hexapod_cosim.cosim.master.recorder import Recording
 from hexapod_cosim.cosim.results.recordings import read_parquet, write_csv
-from hexapod_cosim.extensions.identify.log import Log, LogError, log_of, read_log, roll_pitch_yaw
+from hexapod_cosim.extensions.identify.log import Log, read_log, roll_pitch_yaw
 from hexapod_cosim.extensions.identify.replay import replay
 from hexapod_cosim.extensions.identify.start import initial_state, rest_rows
 from hexapod_cosim.models import load_robot
@@ -100,69 +99,12 @@ def test_roll_pitch_and_yaw_are_the_plants(folder: Path) -> None:
     assert angles == pytest.approx(expected, abs=1e-12)
 
 
-def edited(log: Log, change: Callable[[np.ndarray, tuple[str, ...]], None]) -> Recording:
-    """Returns the rows of a log after a change of a copy."""
-    data = log.recording.data.copy()
-    change(data, log.recording.names)
-    return Recording(log.recording.names, data)
-
-
-def test_unusable_logs_are_refused(log: Log, folder: Path) -> None:
-    names = log.recording.names
-    with pytest.raises(LogError, match=r"no column 'LF\.coxa\.angle_ref' and 17 more"):
-        log_of(Recording(names[:1], log.recording.data[:, :1]), "x.csv")
-    with pytest.raises(LogError, match="3 rows"):
-        log_of(Recording(names, log.recording.data[:3]), "x.csv")
-
-    def twice(data: np.ndarray, _: tuple[str, ...]) -> None:
-        data[5, 0] = data[4, 0]
-
-    with pytest.raises(LogError, match="0 s from row 4 to row 5"):
-        log_of(edited(log, twice), "x.csv")
-
-    def unknown(data: np.ndarray, names: tuple[str, ...]) -> None:
-        data[7, names.index("RM.tibia.angle_ref")] = np.nan
-
-    with pytest.raises(LogError, match=r"RM\.tibia\.angle_ref at 0\.035 s"):
-        log_of(edited(log, unknown), "x.csv")
-    with pytest.raises(LogError, match="name the log's file, not its folder"):
-        read_log(folder)
-
-
-def test_degrees_are_refused_with_the_commands_name(log: Log, athena_fmu: Path) -> None:
-    def degrees(data: np.ndarray, names: tuple[str, ...]) -> None:
-        data[:, names.index("LF.tibia.angle_ref")] *= 57.3
-
-    wrong = log_of(edited(log, degrees), "x.csv")
-    with pytest.raises(LogError, match=r"LF\.tibia\.angle_ref: not in rad"):
-        replay(wrong, load_robot("athena"), fmu=athena_fmu)
-
-
 def test_a_replay_names_wrong_readings_and_no_others(log: Log, athena_fmu: Path) -> None:
-    def dead(data: np.ndarray, names: tuple[str, ...]) -> None:
-        data[:, names.index("LM.femur.torque")] = 0.3
-
     robot = load_robot("athena")
     assert replay(log, robot, fmu=athena_fmu).warnings == []
-    done = replay(log_of(edited(log, dead), "x.csv"), robot, fmu=athena_fmu)
+    dead = with_column(log, "LM.femur.torque", lambda y: np.full_like(y, 0.3))
+    done = replay(dead, robot, fmu=athena_fmu)
     assert done.warnings == ["LM.femur.torque cannot be the robot's: dead: 0.3 in every row."]
-
-
-@pytest.mark.parametrize("wrong", [np.degrees, np.negative, lambda y: np.full_like(y, np.nan)])
-def test_a_joint_whose_angle_is_wrong_starts_where_it_is_commanded(
-    log: Log, wrong: Callable[[np.ndarray], np.ndarray]
-) -> None:
-    def change(data: np.ndarray, names: tuple[str, ...]) -> None:
-        place = names.index("LF.tibia.angle")
-        data[:, place] = wrong(data[:, place])
-
-    robot = load_robot("athena")
-    start = initial_state(log_of(edited(log, change), "x.csv"), robot)
-    sound = initial_state(log, robot)
-    commanded = log.recording.column("LF.tibia.angle_ref")[0]
-    assert start["initial.LF.tibia.angle"] == pytest.approx(commanded, abs=1e-9)
-    assert abs(sound["initial.LF.tibia.angle"] - commanded) > 1e-4
-    assert start["initial.LM.tibia.angle"] == sound["initial.LM.tibia.angle"]
 
 
 def test_the_command_writes_table_rows_and_report(

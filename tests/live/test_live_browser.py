@@ -105,7 +105,6 @@ def test_the_page_opens_without_errors_and_asks_for_nothing_else(
     assert live.errors == []
     assert live.requests == [address]
     assert live.page.inner_text("#state") == "live"
-    live.until("link.latency > 0")
 
 
 def test_keys_walk_and_turn_the_robot(live: LivePage) -> None:
@@ -182,7 +181,7 @@ def test_gait_control_friction_and_ground_are_changed(live: LivePage) -> None:
     assert live.errors == []
 
 
-def test_a_recording_is_replayed_and_saved(live: LivePage, tmp_path: Path) -> None:
+def test_a_recording_is_saved(live: LivePage, tmp_path: Path) -> None:
     live.page.click("[data-do=record]")
     live.page.wait_for_selector("html[data-mode=recording]")
     live.page.keyboard.down("w")
@@ -197,23 +196,6 @@ def test_a_recording_is_replayed_and_saved(live: LivePage, tmp_path: Path) -> No
     text = (tmp_path / "driven.toml").read_text(encoding="utf-8")
     assert "driven by hand" in text
     assert text.count("[[command]]") >= 2
-    live.page.click("[data-do=replay]")
-    live.page.wait_for_selector("html[data-mode=replaying]")
-    live.until("frame.command[0] > 0")
-    live.page.click("[data-do=replay]")
-    live.page.wait_for_selector("html[data-mode=free]")
-
-
-def test_two_pages_are_told_who_drives(live: LivePage, browser: Any, address: str) -> None:
-    other = LivePage(browser, address, viewport={"width": 400, "height": 300})
-    other.page.keyboard.down("w")
-    other.until("frame.driver === link.client")
-    live.until("frame.driver !== link.client")
-    live.page.wait_for_selector("#driver:not([hidden])")
-    assert "drives" in live.page.inner_text("#driver")
-    other.close()
-    # a closed tab lets go of the robot
-    live.until("frame.command[0] === 0")
 
 
 def test_both_themes_are_drawn(live: LivePage) -> None:

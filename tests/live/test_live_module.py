@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import ctypes as ct
-from itertools import permutations
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +12,7 @@ from numpy.typing import NDArray
 
 from hexapod_cosim.cosim.run.single_run import simulate
 from hexapod_cosim.cosim.scenario.scenario import load_scenario
-from hexapod_cosim.extensions.live.module import walker_module
+from hexapod_cosim.extensions.live.static_page import robot_module
 
 wasmtime = pytest.importorskip("wasmtime")
 
@@ -22,7 +21,7 @@ COMMANDS = ("angle_ref", "speed_ref", "torque_ref")  # the first 54 numbers of h
 OUTPUT = 5384  # bytes of hxOutput, all of which are compared
 TRIPOD = (1.0, 0.75, 0.5, 0.03, 0.0)  # pattern, period, duty, step height, touch-down speed
 AMBLE = (4.0, 1.125, 2 / 3, 0.03, 0.0)
-KINEMATIC, COMPLIANT, PAPER = 1.0, 2.0, 3.0
+KINEMATIC, COMPLIANT, PAPER = 1, 2, 3
 
 
 class Module:
@@ -31,27 +30,45 @@ class Module:
     def __init__(self) -> None:
         engine = wasmtime.Engine()
         self.store = wasmtime.Store(engine)
-        instance = wasmtime.Instance(self.store, wasmtime.Module(engine, walker_module()), [])
+        instance = wasmtime.Instance(self.store, wasmtime.Module(engine, robot_module()), [])
         self.exports = instance.exports(self.store)
-        self.call("_initialize")
+        self.exports["_initialize"](self.store)
 
-    def call(self, name: str, *arguments: float) -> float:
-        found: float = self.exports[name](self.store, *arguments)
+    def call(self, name: str, *arguments: float) -> int:
+        found: int = self.exports[f"hx_page_{name}"](self.store, *arguments)
         return found
 
-    def read(self, place: float, size: int) -> bytes:
-        return bytes(self.exports["memory"].read(self.store, int(place), int(place) + size))
+    def read(self, place: int, size: int) -> bytes:
+        return bytes(self.exports["memory"].read(self.store, place, place + size))
 
-    def write(self, place: float, data: bytes) -> None:
-        self.exports["memory"].write(self.store, data, int(place))
+    def write(self, place: int, data: bytes) -> None:
+        self.exports["memory"].write(self.store, data, place)
 
-    def start(self, control: float, gait: tuple[float, ...] = TRIPOD) -> None:
-        self.write(self.call("hx_walker_wanted"), np.array([control, *gait]).tobytes())
-        assert self.call("hx_walker_start", 0.7) == 0
+    def set(self, name: str, *numbers: float) -> None:
+        """Writes the gait, the body command or the push."""
+        self.write(self.call(name), np.array(numbers).tobytes())
+
+    def start(self, control: int, gait: tuple[float, ...] = TRIPOD, speed: float = 0.08) -> None:
+        self.set("gait", *gait)
+        assert self.call("start", control, 0.7) == 0
+        self.set("command", speed)
+
+    def values(self) -> NDArray[np.float64]:
+        """The row of values of the page (extensions/live/viewer/robot.ts)."""
+        return np.frombuffer(self.read(self.call("values"), 8 * 152))
 
     def position(self) -> NDArray[np.float64]:
-        """Returns the torso's centre of mass [m], which follows the time in hxFrame."""
-        return np.frombuffer(self.read(self.call("hx_walker_frame"), 32)[8:])
+        """Returns the torso's centre of mass [m]."""
+        return self.values()[79:82]
+
+    def walk(self, steps: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Returns joint commands (steps, 18) [rad] and the torso's positions (steps, 3) [m]."""
+        angles, places = [], []
+        for _ in range(steps):
+            assert self.call("advance", 1) == 0
+            angles.append(self.values()[95:113])
+            places.append(self.position())
+        return np.array(angles), np.array(places)
 
 
 @pytest.fixture(scope="module")
@@ -88,104 +105,49 @@ def test_the_plant_has_the_bits_of_the_native_one(
     assert commands.shape == (300, 54)
     for step, row in enumerate(commands, start=1):
         ct.memmove(given, row.tobytes(), row.nbytes)
-        module.write(module.call("hx_walker_input"), row.tobytes())
+        module.write(module.call("push") - row.nbytes, row.tobytes())
         assert core.hx_plant_step(plant, given, 0.005 * step) == 0
         core.hx_plant_output(plant, given, seen)
-        place = module.call("hx_walker_replay", 0.005 * step)
+        place = module.call("replay", 0.005 * step)
         different += module.read(place, OUTPUT) != seen.raw[:OUTPUT]
     core.hx_plant_destroy(plant)
     assert different == 0
-    assert np.linalg.norm(module.position()[:2]) > 0.05
 
 
 @pytest.mark.parametrize("control", [KINEMATIC, COMPLIANT])
-def test_the_robot_walks_as_fast_as_it_is_told(module: Module, control: float) -> None:
+def test_the_robot_walks_as_fast_as_it_is_commanded(module: Module, control: int) -> None:
     module.start(control)
-    module.call("hx_walker_command", 0.08, 0.0, 0.0, 0.0)
-    assert module.call("hx_walker_advance", 1000) == 0
+    assert module.call("advance", 1000) == 0
     assert module.position()[0] == pytest.approx(0.37, abs=0.03)  # it begins after half a cycle
 
 
-FRAME = 8 * (1 + 3 + 4 + 3 + 3 + 18 + 6 + 18 + 6 + 1 + 1)  # bytes of hxFrame; `changing` is last
+@pytest.mark.parametrize(
+    ("first", "then"), [(KINEMATIC, COMPLIANT), (COMPLIANT, PAPER), (PAPER, KINEMATIC)]
+)
+def test_the_control_changes_while_the_robot_walks(module: Module, first: int, then: int) -> None:
+    module.start(first, AMBLE)
+    module.call("advance", 440)
+    assert module.call("change_control", then) == 0
+    angles, places = module.walk(300)
+    # rad    in a macro-step: walks at this speed need up to 0.021, and the paper's control adds up
+    # to 0.018 when a foot takes up its load
+    assert np.abs(np.diff(angles, axis=0)).max() < 0.04
+    ways = places[50:, 0] - places[:-50, 0]
+    assert ways.min() > 0.5 * 0.25 * 0.08  # m    in a quarter of a second: it never stops
 
 
-def change(module: Module, *walk: float) -> None:
-    module.write(module.call("hx_walker_wanted"), np.array(walk).tobytes())
-    assert module.call("hx_walker_change") == 0
-
-
-def changing(module: Module) -> float:
-    frame = module.read(module.call("hx_walker_frame"), FRAME)
-    return float(np.frombuffer(frame)[-1])
-
-
-def angles_of(module: Module) -> NDArray[np.float64]:
-    """Returns the joint commands (18,) [rad], with which hxInput begins."""
-    return np.frombuffer(module.read(module.call("hx_walker_input"), 8 * 18))
-
-
-@pytest.mark.parametrize(("first", "then"), list(permutations((KINEMATIC, COMPLIANT, PAPER), 2)))
-@pytest.mark.parametrize("gait", [TRIPOD, AMBLE], ids=["tripod", "amble"])
-def test_the_control_changes_while_the_robot_walks(
-    module: Module, first: float, then: float, gait: tuple[float, ...]
-) -> None:
-    for step in (380, 440, 500):
-        module.start(first, gait)
-        module.call("hx_walker_command", 0.08, 0.0, 0.0, 0.0)
-        module.call("hx_walker_advance", step)
-        angles, places = [angles_of(module)], [module.position()]
-        change(module, then, *gait)
-        for _ in range(300):
-            assert module.call("hx_walker_advance", 1) == 0
-            assert changing(module) == 0.0
-            angles.append(angles_of(module))
-            places.append(module.position())
-        # rad    in a macro-step: walks at this speed need up to 0.021, compliant control adds up to
-        # 0.004 when it lifts a foot that meets the ground early, and the paper's up to 0.018 when a
-        # foot takes up its load
-        assert np.abs(np.diff(angles, axis=0)).max() < (0.04 if PAPER in (first, then) else 0.03)
-        ways = np.array(places)[50:, 0] - np.array(places)[:-50, 0]
-        assert ways.min() > 0.5 * 0.25 * 0.08  # m    in a quarter of a second: it never stops
-        assert np.array(places)[:, 2].min() > 0.12
-
-
-def test_the_control_changes_during_a_change_of_gait(module: Module) -> None:
-    module.start(KINEMATIC)
-    module.call("hx_walker_command", 0.03, 0.0, 0.0, 0.0)
-    module.call("hx_walker_advance", 400)
-    change(module, KINEMATIC, *AMBLE)
-    module.call("hx_walker_advance", 20)
-    change(module, COMPLIANT, *AMBLE)
-    for _ in range(5):  # the stages of the gait's change go on
-        assert changing(module) == 1.0
-        assert module.call("hx_walker_advance", 10) == 0
-    assert module.call("hx_walker_advance", 600) == 0
-    assert changing(module) == 0.0
-    assert module.position()[0] > 0.06
-
-
-@pytest.mark.parametrize("control", [KINEMATIC, COMPLIANT])
-def test_the_gait_changes_while_the_robot_walks(module: Module, control: float) -> None:
-    module.start(control)
-    module.call("hx_walker_command", 0.04, 0.0, 0.0, 0.0)
-    module.call("hx_walker_advance", 400)
-    change(module, control, *AMBLE)
-    stages, places = [], [module.position()[0]]
-    for _ in range(500):
-        assert module.call("hx_walker_advance", 1) == 0
-        stages.append(changing(module))
-        places.append(module.position()[0])
-    # a swing of 0.375 s in the old gait, then a swing and a period of 1.125 s of the new one
-    assert [stages.count(stage) for stage in (1.0, 2.0)] == [75, 300]
-    assert stages[-1] == 0.0
-    speeds = (np.array(places)[50:] - np.array(places)[:-50]) / 0.25
-    assert speeds.min() > 0.03
+def test_gait_and_friction_change_while_the_robot_walks(module: Module) -> None:
+    module.start(KINEMATIC, speed=0.04)
+    module.call("advance", 400)
+    module.set("gait", *AMBLE)
+    assert module.call("change_gait") == 0
+    assert module.call("change_friction", 0.4) == 0
+    _, places = module.walk(500)
+    assert (places[50:, 0] - places[:-50, 0]).min() > 0.03 * 0.25
 
 
 def test_a_start_that_is_no_walk_says_why(module: Module) -> None:
-    module.write(
-        module.call("hx_walker_wanted"), np.array([KINEMATIC, 1.0, 0.75, 7.0, 0.03, 0.0]).tobytes()
-    )
-    assert module.call("hx_walker_start", 0.7) != 0
-    text = module.read(module.call("hx_walker_message"), 200).partition(b"\0")[0].decode()
+    module.set("gait", 1.0, 0.75, 7.0, 0.03, 0.0)
+    assert module.call("start", KINEMATIC, 0.7) != 0
+    text = module.read(module.call("message"), 200).partition(b"\0")[0].decode()
     assert "duty" in text

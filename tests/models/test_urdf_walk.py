@@ -133,8 +133,11 @@ def test_a_robot_is_written_by_option_or_by_suffix(
     ("arguments", "parts"),
     [
         (["--urdf", "--mjcf"], ["two formats at once", "--urdf --mjcf"]),
-        (["--urdf", "-o", "robot.fmu"], ["not a URDF's name", "robot.fmu", "write -o robot.urdf"]),
-        (["--mjcf", "-o", "robot.urdf"], ["not an MJCF file's name", "write -o robot.xml"]),
+        (
+            ["--urdf", "-o", "robot.fmu"],
+            ["not the name of such a file", "robot.fmu", "write -o robot.urdf"],
+        ),
+        (["--mjcf", "-o", "robot.urdf"], ["not the name of such a file", "write -o robot.xml"]),
         (["--urdf", "-o", "file/robot.urdf"], ["cannot write"]),
         (["--robot", "none.urdf"], ["none.urdf", "cannot read the URDF"]),
         (["--robot", "file.urdf"], ["file.urdf", "not XML"]),

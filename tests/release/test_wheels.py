@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import zipfile
 from pathlib import Path
 
@@ -72,6 +73,13 @@ def test_a_wheel_for_linux_has_the_tags_of_both_c_libraries() -> None:
         "Tag: py3-none-manylinux2014_x86_64",
         "Tag: py3-none-musllinux_1_1_x86_64",
     ]
+
+
+def test_a_wheel_lists_the_foreign_software_in_it() -> None:
+    ((name, text),) = wheels.bill_of_materials(BASE).items()
+    assert name == "hexapod_cosim-0.1.0.dist-info/sboms/bundled.cdx.json"
+    found = {part["name"] for part in json.loads(text)["components"]}
+    assert found == {"three", "uplot", "fmpy"}
 
 
 def test_the_list_of_hashes_is_what_sha256sum_reads(tmp_path: Path) -> None:

@@ -1,4 +1,4 @@
-"""Tests figures in memory: drawing that is stopped, drawing in a thread, writing."""
+"""Tests figures in memory: drawing and writing."""
 
 from __future__ import annotations
 
@@ -12,29 +12,7 @@ from matplotlib.figure import Figure
 
 from hexapod_cosim.controller.figure_style import SETTINGS
 from hexapod_cosim.cosim.report import plots
-from hexapod_cosim.cosim.report.figures import Figures, FigureThread, write_figures
-
-
-@pytest.fixture
-def two_figures(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Replaces the figures of a report by two empty ones."""
-    empty = plots.Drawing("Nothing", "Nothing.", lambda _views: Figure(figsize=(1.0, 1.0)))
-    monkeypatch.setattr(plots, "FIGURES", {"one": empty, "two": empty})
-
-
-@pytest.mark.usefixtures("two_figures")
-def test_drawing_that_is_stopped_leaves_out_the_figures_that_follow() -> None:
-    answers = iter([False, True])
-    drawn = plots.draw_figures({}, lambda: next(answers))
-    assert (set(drawn.images), drawn.skipped) == ({"one.png", "one.svg"}, {})
-
-
-@pytest.mark.usefixtures("two_figures")
-def test_a_thread_draws_the_same_bytes() -> None:
-    with FigureThread({}) as thread:
-        drawn = thread.result()
-    assert drawn == plots.draw_figures({})
-    assert set(drawn.images) == {"one.png", "one.svg", "two.png", "two.svg"}
+from hexapod_cosim.cosim.report.figures import Figures, draw_figures, write_figures
 
 
 def labelled(_views: plots.Views) -> Figure:
@@ -50,8 +28,8 @@ def labelled(_views: plots.Views) -> Figure:
 def test_files_have_the_bytes_of_figures_that_are_laid_out_by_saving_them(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(plots, "FIGURES", {"one": plots.Drawing("", "", labelled)})
-    drawn = plots.draw_figures({}).images
+    monkeypatch.setattr(plots, "DRAWINGS", {"one": labelled})
+    drawn = draw_figures({}).images
     with matplotlib.rc_context(SETTINGS):
         figure = labelled({})
         for kind, metadata in (("png", {}), ("svg", {"Date": None})):
@@ -74,20 +52,9 @@ def test_a_figure_is_drawn_once_for_each_file(monkeypatch: pytest.MonkeyPatch) -
         figure.subplots()
         return figure
 
-    monkeypatch.setattr(plots, "FIGURES", {"one": plots.Drawing("", "", counted)})
-    assert set(plots.draw_figures({}).images) == {"one.png", "one.svg"}
+    monkeypatch.setattr(plots, "DRAWINGS", {"one": counted})
+    assert set(draw_figures({}).images) == {"one.png", "one.svg"}
     assert len(drawn) == 2
-
-
-def test_an_error_of_drawing_arises_where_the_figures_are_asked_for(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    def fail(_views: plots.Views) -> Figure:
-        raise ZeroDivisionError
-
-    monkeypatch.setattr(plots, "FIGURES", {"one": plots.Drawing("", "", fail)})
-    with FigureThread({}) as thread, pytest.raises(ZeroDivisionError):
-        thread.result()
 
 
 def test_files_of_skipped_figures_are_deleted(tmp_path: Path) -> None:

@@ -1,9 +1,8 @@
-"""Tests what a report tells of the ground: heights, the part around a walk, profile, stances."""
+"""Tests what a report tells of the ground: heights, the part around a walk, profile."""
 
 from __future__ import annotations
 
 import base64
-import json
 import math
 import zlib
 from dataclasses import replace
@@ -17,7 +16,7 @@ from hexapod_cosim.cosim.interface.names import foot_names, foot_vector_names, v
 from hexapod_cosim.cosim.master.recorder import Recording
 from hexapod_cosim.cosim.report.geometry import describe_ground
 from hexapod_cosim.cosim.report.payload import as_json
-from hexapod_cosim.cosim.report.profile import find_stances, make_profile, pack_profile
+from hexapod_cosim.cosim.report.profile import make_profile
 from hexapod_cosim.cosim.report.surface import MOST_NODES, material_legend, pack_surface
 from hexapod_cosim.cosim.results.ground import around_walk, cut, describe_terrain
 from hexapod_cosim.cosim.results.walk import GRID, View
@@ -48,7 +47,7 @@ def random_blocks(count: int) -> Surface:
     return Surface(kind="blocks", height=heights, x0=0.0, y0=0.0, cell=0.05)
 
 
-def walked(*, sunk: float = 0.0, rise: float = 0.0) -> View:
+def walked(*, rise: float = 0.0) -> View:
     """Returns a straight walk along x whose left front foot stands from 1 s to 2 s at x = 0.2."""
     time = STEP * np.arange(ROWS, dtype=np.float64)
     columns: dict[str, NDArray[np.float64]] = {
@@ -63,7 +62,7 @@ def walked(*, sunk: float = 0.0, rise: float = 0.0) -> View:
     columns["LF.foot.contact"] = ((time >= 1.0) & (time < 2.0)).astype(float)
     columns["LF.foot.position[1]"] += 0.2
     columns["LF.foot.position[2]"] += 0.15
-    columns["LF.foot.position[3]"] += rise * 0.2 - sunk * np.clip(time - 1.0, 0.0, 1.0)
+    columns["LF.foot.position[3]"] += rise * 0.2
     recording = Recording(tuple(columns), np.column_stack(list(columns.values())))
     return View(recording, ON_GRID, 1.0)
 
@@ -123,38 +122,18 @@ def test_the_plane_of_a_surface_has_no_rise() -> None:
     assert ground == {"height": 0.3, "rise": 0.0, "heading": 0.0}
 
 
-def test_a_stance_tells_place_time_and_the_greatest_depth() -> None:
-    surface = make_surface("sand", {})
-    (stance,) = find_stances(walked(sunk=0.012), surface)
-    assert (stance.leg, stance.begin, stance.end) == (0, 1.0, 2.0)
-    assert (stance.x, stance.y) == pytest.approx((0.2, 0.15))
-    assert stance.depth == pytest.approx(0.012 * 0.99)  # in its last row, at 1.99 s
-
-
 def test_the_profile_of_a_slope_is_a_line_under_the_path() -> None:
-    surface = make_surface("plane", {"slope_x": 0.1})
-    view = walked(rise=0.1)
-    stances = find_stances(view, surface)
-    profile = make_profile(view, surface, stances)
+    profile = make_profile(walked(rise=0.1), make_surface("plane", {"slope_x": 0.1}))
     np.testing.assert_allclose(profile.ground, 0.1 * profile.way, atol=1e-9)
-    np.testing.assert_allclose(profile.torso_way, SPEED * view.recording.time, atol=1e-9)
-    assert profile.stance_way == pytest.approx([0.2])
     np.testing.assert_allclose(profile.low, profile.high, atol=1e-9)
+    assert profile.contact_way == pytest.approx([0.2])
+    assert profile.contact_height == pytest.approx([0.02])
 
 
 def test_the_band_of_a_profile_is_the_ground_across_the_feet() -> None:
-    surface = make_surface("plane", {"slope_y": 0.2})
-    profile = make_profile(walked(), surface, find_stances(walked(), surface))
+    profile = make_profile(walked(), make_surface("plane", {"slope_y": 0.2}))
     np.testing.assert_allclose(profile.high, 0.2 * 0.15, atol=1e-9)
     np.testing.assert_allclose(profile.low, -0.2 * 0.15, atol=1e-9)
-
-
-def test_a_run_without_a_touch_down_has_a_profile_too() -> None:
-    surface = make_surface("rubble", {})
-    profile = make_profile(walked(), surface, [])
-    packed = json.loads(as_json(pack_profile(profile, [])))
-    assert packed["feet"] == []
-    assert len(packed["ground"]) == len(packed["low"]) == 600
 
 
 def test_the_text_of_the_ground_has_its_name_and_parameters() -> None:

@@ -17,7 +17,6 @@ import pytest
 from command import Call, assert_refused, settings
 
 from hexapod_cosim.cosim.cli import main
-from hexapod_cosim.cosim.report.figures import Figures
 from hexapod_cosim.cosim.results.accuracy import (
     accuracy_from_table,
     compare_accuracy,
@@ -156,9 +155,8 @@ def checked(
     """Runs a comparison of one seed with --check-accuracy; its report has no figures."""
     folder = tmp_path_factory.mktemp("checked") / "out"
     words = ["compare", "walk_flat", "-o", str(folder), "--seeds", "1", "--check-accuracy"]
-    draw = "hexapod_cosim.cosim.report.plots.draw_figures"
     with pytest.MonkeyPatch.context() as patch, redirect_stdout(io.StringIO()) as out:
-        patch.setattr(draw, lambda *_: Figures({}, {}))
+        patch.setattr("hexapod_cosim.cosim.report.plots.DRAWINGS", {})
         code = main([*words, "--json", *settings(*CYCLES)])
     assert code == 0
     return folder, json.loads(out.getvalue())

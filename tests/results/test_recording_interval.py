@@ -13,8 +13,8 @@ from command import Call
 from gains import make_gains
 
 from hexapod_cosim.controller import Gains
+from hexapod_cosim.cosim.control.fmu_law import law_of_ours
 from hexapod_cosim.cosim.interface.names import foot_names
-from hexapod_cosim.cosim.master.fmu_controller import FmuController
 from hexapod_cosim.cosim.master.loop import Outcome, diagnostic_columns, run
 from hexapod_cosim.cosim.master.recorder import Peaks, Recorder, Recording, kept_moments
 from hexapod_cosim.cosim.master.signals import Signals
@@ -115,38 +115,21 @@ def test_rows_are_left_out_and_their_peaks_are_not(runs: tuple[Result, Result]) 
 
 
 def test_the_rate_of_a_landing_is_that_of_the_touch_downs_since_the_last_row() -> None:
-    names = ("time", "LF.foot.peak_force", "LF.foot.landing_rate", "LF.foot.landings")
-    peaks, shown = Peaks(names), []
-    #        a row kept   between                          a row     a row          nothing new   a
-    #        row
-    moments = [
-        (5.0, 9.0, 1),
-        (7.0, 9.0, 1),
-        (1.0, 2.0, 2),
-        (2.0, 4.0, 2),
-        (3.0, 4.0, 2),
-        (0.0, 1.0, 3),
-        (0.0, 3.0, 3),
+    peaks = Peaks(("LF.foot.peak_force", "LF.foot.landing_rate", "LF.foot.landings"))
+    kept_rows = [
+        [(5.0, 9.0, 1)],
+        [(7.0, 9.0, 1), (1.0, 2.0, 2), (2.0, 4.0, 2)],
+        [(3.0, 4.0, 2)],  # nothing new
+        [(0.0, 1.0, 3), (0.0, 3.0, 3)],
     ]
-    kept = (0, 3, 4, 6)
-    for k, (force, rate, count) in enumerate(moments):
-        row = np.array([0.0, force, rate, float(count)])
-        peaks.update(row)
-        if k in kept:
-            peaks.write(row)
-            shown.append((row[1], row[2]))
+    shown = [tuple(peaks.fold(np.array(rows))[:2]) for rows in kept_rows]
     assert shown == [(5.0, 9.0), (7.0, 4.0), (3.0, 4.0), (0.0, 3.0)]
 
 
 def test_bounces_between_two_rows_leave_the_steepest_landing() -> None:
-    peaks = Peaks(("time", "RM.foot.landing_rate", "RM.foot.landings"))
-    row = np.zeros(3)
-    # before them the rate of an older landing was 90
-    for rate, count in ((80.0, 1), (50.0, 2), (10.0, 3)):
-        row[:] = 0.0, rate, count
-        peaks.update(row)
-    peaks.write(row)
-    assert row[1] == 80.0
+    peaks = Peaks(("RM.foot.landing_rate", "RM.foot.landings"))
+    rows = np.array([(90.0, 0.0), (80.0, 1.0), (50.0, 2.0), (10.0, 3.0)])
+    assert peaks.fold(rows)[0] == 80.0  # 90 is the rate of an older landing
 
 
 @pytest.mark.parametrize(
@@ -164,7 +147,7 @@ def in_python(scenario: Scenario, walker: Walker) -> Outcome:
     controller.initialise(scenario.start, scenario.start + scenario.duration)
     with open_plant(scenario) as plant:
         initialise_plant(plant, plan)
-        signals, ours = Signals(plant), FmuController(controller, period=scenario.macro_step)
+        signals, ours = Signals(plant), law_of_ours(controller, period=scenario.macro_step)
         recorder = Recorder(
             signals,
             plan.schedule.times,

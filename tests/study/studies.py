@@ -52,7 +52,9 @@ def rows(folder: Path) -> list[Row]:
 def stored_rows(study: Study, folder: Path) -> list[Row]:
     """Returns the rows of the store, also of a study that runs, in the order of their numbers."""
     with closing(Store(folder, study)) as store:
-        return list(store.rows(range(10**6)).values())
+        names = [item.name for item in store.columns]
+        found = store.select("SELECT * FROM runs ORDER BY run")
+        return [dict(zip(names, row, strict=True)) for row in found]
 
 
 def stored_count(study: Study, folder: Path) -> int:

@@ -120,13 +120,6 @@ def test_runs_are_points_then_seeds_then_controls() -> None:
     assert list(sweep.orders(iter([1, 5]))) == [orders[1], orders[5]]
 
 
-def test_a_hundred_million_runs_are_not_held_in_memory() -> None:
-    sweep = Sweep(drawn("random", points=5 * 10**7))
-    assert sweep.count == 10**8
-    (order,) = sweep.orders(iter([10**8 - 1]))
-    assert order.point == 5 * 10**7 - 1
-
-
 def test_scenarios_are_a_factor_too() -> None:
     sweep = Sweep(
         study_of({"factors": {"scenario": ["walk_flat", "turn"]}, "controls": ["kinematic"]})

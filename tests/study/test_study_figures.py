@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -15,14 +14,14 @@ from matplotlib.figure import Figure
 from studies import KINEMATIC, replace_stored, run_quietly, study_of
 
 from hexapod_cosim.cosim.results.comparison import made_change
-from hexapod_cosim.extensions.study.groups import Point
-from hexapod_cosim.extensions.study.moments import Figures, Mean
+from hexapod_cosim.extensions.study.groups import Figures, Mean, Point
+from hexapod_cosim.extensions.study.optimum import Trial
 from hexapod_cosim.extensions.study.records import Study
 from hexapod_cosim.extensions.study.report import heat
 from hexapod_cosim.extensions.study.report.figures import drawings, history
 from hexapod_cosim.extensions.study.store import FIGURES
 from hexapod_cosim.extensions.study.studying import report_on
-from hexapod_cosim.extensions.study.summary import Results, Trial, read_results
+from hexapod_cosim.extensions.study.summary import Results, read_results
 from hexapod_cosim.models import load_robot
 
 GRID = {"factors": {"friction.mu": [0.3, 0.5], "command.vx": [0.05, 0.08]}}
@@ -230,18 +229,15 @@ def test_a_page_compares_each_control_with_the_first_one(folder: Any) -> None:
     assert "kinematic → paper, compliant, relative to the mean of kinematic" in page
     over_all = page.partition("<h2>Over all runs</h2>")[2]
     assert "over the 8 and 8 pairs in which both walked" in over_all
-    for control in controls[1:]:
-        assert re.search(rf'change to <span class="[\w-]+">{control}</span></th>', over_all)
-    assert "to kinematic" not in page
+    assert all(f">to {control}</th>" in over_all for control in controls[1:])
 
 
-def test_a_page_has_the_files_name_without_a_title_and_pairs_only_with_several_controls(
+def test_a_page_of_one_control_has_the_files_name_without_a_title_and_no_pairs(
     folder: Any,
 ) -> None:
     page = folder({**KINEMATIC, "seeds": 2, "factors": {"friction.mu": [0.3, 0.19]}})
     assert "<h1>test</h1>" in page
     assert "pair" not in page.partition("<h2>Over all runs</h2>")[2]
-    assert "half of Student's 95 % interval over its seeds" in page
 
 
 def test_sobol_points_that_are_no_power_of_two_have_a_note(folder: Any) -> None:
@@ -249,20 +245,6 @@ def test_sobol_points_that_are_no_power_of_two_have_a_note(folder: Any) -> None:
         {"design": "sobol", "points": 3, "factors": {"friction.mu": {"uniform": [0.3, 0.9]}}}
     )
     assert "3 Sobol points are no power of two: only 2 or 4" in page
-
-
-def test_the_headline_has_an_interval_over_seeds_and_a_range_over_points(folder: Any) -> None:
-    page = folder({"seeds": 3, **GRID}).partition("<h2>")[0]
-    # the fake engine changes all metrics by the same share
-    assert re.search(r"([+-]\d+%) \.\. \1 by point", page)
-    assert "95 %" not in page
-    assert "which is no confidence interval" in page
-
-
-def test_the_headline_of_one_point_has_its_interval(folder: Any) -> None:
-    page = folder({"seeds": 3, "factors": {"friction.mu": [0.5]}}).partition("<h2>")[0]
-    assert "95 %: " in page
-    assert "by point" not in page
 
 
 def test_a_page_of_an_unfinished_study_says_what_its_figures_are_of(folder: Any) -> None:

@@ -9,27 +9,33 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pyarrow.parquet as pq
 import pytest
 from studies import Row, study_of, write_rows
 
 from hexapod_cosim.cosim.results.comparison import Change, change_of, half_width_of
-from hexapod_cosim.extensions.study import groups as groups_module
-from hexapod_cosim.extensions.study.groups import Groups, Point
-from hexapod_cosim.extensions.study.moments import Figures
+from hexapod_cosim.extensions.study.groups import (
+    Figures,
+    Groups,
+    Point,
+    Runs,
+    points_of,
+    settings_of_points,
+)
 from hexapod_cosim.extensions.study.records import Study
 from hexapod_cosim.extensions.study.store import FIGURES, Store
-from hexapod_cosim.extensions.study.summary import failure_counts, point_columns, point_row
+from hexapod_cosim.extensions.study.summary import POINTS, failure_counts, write_points
 
 ROUNDING = 1e-11  # relative: some dozen sums of numbers of one size
-POINTS, SEEDS = 5, 7
+COUNT, SEEDS, POINTS_AT_MOST = 5, 7, 100
 PAIR = ("point", "case", "seed", "control")
-TWO = study_of({"seeds": SEEDS, "factors": {"friction.mu": {"linspace": [0.3, 0.7, POINTS]}}})
+TWO = study_of({"seeds": SEEDS, "factors": {"friction.mu": {"linspace": [0.3, 0.7, COUNT]}}})
 BOTH = TWO.controls
 THREE = study_of(
     {
         "seeds": SEEDS,
         "controls": ["kinematic", "paper", "compliant"],
-        "factors": {"friction.mu": {"linspace": [0.3, 0.7, POINTS]}},
+        "factors": {"friction.mu": {"linspace": [0.3, 0.7, COUNT]}},
     }
 )
 
@@ -78,9 +84,11 @@ def summed(tmp_path: Path) -> Summed:
     def found(rows: Sequence[Row], study: Study = TWO) -> tuple[list[Point], Figures]:
         write_rows(study, tmp_path, rows)
         with closing(Store(tmp_path, study)) as store:
-            groups = Groups(study, store)
-            points = [point for block in groups.blocks() for point in block]
-            return points, groups.overall
+            runs, settings = Runs(study, store), settings_of_points(study, store)
+            groups = Groups(runs, runs.starts())
+            write_points(tmp_path / POINTS, runs, groups, settings, {})
+            points = points_of(runs, groups, settings, most=POINTS_AT_MOST)
+            return points, Groups(runs).figures(0)
 
     return found
 
@@ -132,7 +140,7 @@ def test_changes_are_of_whole_pairs_whichever_runs_are_missing(
     summed: Summed, share: float, study: Study
 ) -> None:
     for seed in range(3):
-        rows = some_of(made_rows(study, range(POINTS), seed=seed), share=share, seed=seed)
+        rows = some_of(made_rows(study, range(COUNT), seed=seed), share=share, seed=seed)
         points, overall = summed(rows, study)
         assert_changes_of_pairs(overall, rows, study)
         for point in points:
@@ -152,7 +160,7 @@ def test_a_single_control_has_no_pairs(summed: Summed) -> None:
 def test_means_and_counts_are_of_all_walks_with_a_pair_or_without(
     summed: Summed, share: float
 ) -> None:
-    rows = some_of(made_rows(TWO, range(POINTS)), share=share, seed=3)
+    rows = some_of(made_rows(TWO, range(COUNT)), share=share, seed=3)
     points, overall = summed(rows)
     for control in BOTH:
         own = [row for row in rows if row["control"] == control]
@@ -192,22 +200,6 @@ def test_the_control_of_the_first_run_does_not_turn_a_change_round(summed: Summe
     assert point.figures.pairs == overall.pairs == {"compliant": SEEDS - 1}
 
 
-@pytest.mark.parametrize("study", [TWO, THREE], ids=["two controls", "three controls"])
-def test_how_many_runs_are_read_at_once_does_not_show(
-    summed: Summed, study: Study, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    rows = some_of(made_rows(study, range(POINTS)), share=0.9, seed=1)
-    points, overall = summed(rows, study)
-    monkeypatch.setattr(groups_module, "ROWS_AT_ONCE", 1)
-    others, again = summed(rows, study)
-    assert repr(others) == repr(points)  # also where figures are NaN
-    for control, changes in overall.changes.items():
-        for name in FIGURES:
-            assert_same(again.changes[control][name], changes[name])
-            mean = overall.means[control][name].value
-            assert again.means[control][name].value == pytest.approx(mean, rel=ROUNDING)
-
-
 def test_falls_leave_no_figures_where_nothing_walked(summed: Summed) -> None:
     rows = [{**row, "walked": False} for row in made_rows(TWO, [0, 1])]
     points, overall = summed(rows)
@@ -223,7 +215,7 @@ def test_falls_leave_no_figures_where_nothing_walked(summed: Summed) -> None:
 def test_sums_of_numbers_far_from_zero_keep_their_spread(summed: Summed) -> None:
     rows = [
         {**row, "walked": True, "peak_force": 1e8 + k % 3}
-        for k, row in enumerate(made_rows(TWO, range(POINTS)))
+        for k, row in enumerate(made_rows(TWO, range(COUNT)))
     ]
     points, _ = summed(rows)
     for point in points:
@@ -235,28 +227,25 @@ def test_sums_of_numbers_far_from_zero_keep_their_spread(summed: Summed) -> None
 
 
 @pytest.mark.parametrize("study", [TWO, THREE], ids=["two controls", "three controls"])
-def test_a_row_of_the_table_of_points_says_what_its_point_says(
-    summed: Summed, study: Study
+def test_a_row_of_the_table_of_points_has_the_figures_of_its_point(
+    summed: Summed, study: Study, tmp_path: Path
 ) -> None:
-    points, _ = summed(some_of(made_rows(study, range(POINTS)), share=0.7, seed=2), study)
-    names = [column.name for column in point_columns(study)]
-    for point in points:
-        row, figures = dict(zip(names, point_row(point), strict=True)), point.figures
-        assert (row["point"], row["compliant.walked"]) == (
-            point.number,
-            figures.walked["compliant"],
-        )
-        assert row["kinematic.slip_per_metre"] == pytest.approx(
-            figures.means["kinematic"]["slip_per_metre"].value, nan_ok=True
-        )
+    points, _ = summed(some_of(made_rows(study, range(COUNT)), share=0.7, seed=2), study)
+    rows = pq.read_table(tmp_path / POINTS).to_pylist()
+    assert len(rows) == len(points) == COUNT
+    for point, row in zip(points, rows, strict=True):
+        figures = point.figures
+        mean = figures.means["kinematic"]["slip_per_metre"].value
+        assert row["point"] == point.number
+        assert row["compliant.walked"] == figures.walked["compliant"]
+        assert row["kinematic.slip_per_metre"] == (mean if math.isfinite(mean) else None)
         for control, changes in figures.changes.items():
             before = f"{control}." if study is THREE else ""
             change = changes["slip_per_metre"]
             assert row[f"{before}pairs"] == figures.pairs[control]
             assert row[f"{before}change.slip_per_metre.verdict"] == change.verdict
-            assert row[f"{before}change.slip_per_metre"] == pytest.approx(
-                change.after - change.before, nan_ok=True
-            )
+            difference = row[f"{before}change.slip_per_metre"]
+            assert difference == (change.difference if change.pairs else None)
 
 
 def test_failures_are_counted_without_the_numbers_in_their_reasons_the_most_first(

@@ -18,7 +18,7 @@ import pytest
 from dask_cluster import dask_scheduler, restarting_workers
 from gains import make_gains
 from studies import KINEMATIC, SMALL, quiet, rows, run_quietly, study_of
-from study_runners import DEATHS_FILE, Buggy, Counting, Slow
+from study_runners import DEATHS_FILE, Buggy, Slow
 
 from hexapod_cosim.cosim.master.loop import FAILED
 from hexapod_cosim.cosim.run.batch import run_batch
@@ -90,33 +90,6 @@ def test_a_run_of_a_study_is_the_run_by_itself(athena_fmu: Path, tmp_path: Path)
         if name in FIGURES
     }
     assert {name: row[name] for name in FIGURES} == figures
-
-
-def test_a_study_is_resumed_on_a_cluster_and_on_this_machine_again(
-    athena_fmu: Path, tmp_path: Path, scheduler: str
-) -> None:
-    study = study_of({**KINEMATIC, "seeds": 40, "factors": {"friction.mu": [0.3, 0.5, 0.7]}})
-    for place in ({"workers": 2}, {"scheduler": scheduler}, {"workers": 1}):
-        with pytest.raises(KeyboardInterrupt):
-            run_study(
-                study,
-                tmp_path / "moved",
-                options=Options(runner=Slow, fmu=athena_fmu, **place),
-                start=_stop_after(20),
-            )
-    moved = run_quietly(study, tmp_path / "moved", runner=Slow, fmu=athena_fmu)
-    assert moved == run_quietly(study, tmp_path / "stayed", runner=Slow, fmu=athena_fmu)
-
-
-def _stop_after(runs: int) -> Any:
-    counted = [0]
-
-    def tell(more: int, _lost: int) -> None:
-        counted[0] += more
-        if counted[0] >= runs:
-            raise KeyboardInterrupt
-
-    return lambda _total, _done: tell
 
 
 @pytest.mark.parametrize("cluster", [False, True], ids=["process", "cluster"])
@@ -230,9 +203,8 @@ def test_a_worker_with_other_versions_is_refused(
         run_quietly(study_of({**SMALL, **KINEMATIC}), tmp_path, fmu=athena_fmu, workers=2)
 
 
-@pytest.mark.parametrize("workers", [0, 1])
 def test_errors_in_a_run_are_results_and_the_study_continues(
-    athena_fmu: Path, tmp_path: Path, workers: int
+    athena_fmu: Path, tmp_path: Path
 ) -> None:
     errors = {
         0.21: "LinAlgError: Singular matrix",
@@ -242,7 +214,7 @@ def test_errors_in_a_run_are_results_and_the_study_continues(
         0.26: "BadTextError: its text cannot be read",
     }
     study = study_of({**KINEMATIC, "seeds": 1, "factors": {"friction.mu": [0.3, *errors, 0.5]}})
-    options: dict[str, Any] = {"runner": Buggy, "workers": workers}
+    options: dict[str, Any] = {"runner": Buggy, "workers": 1}
     first, *bad, last = run_quietly(study, tmp_path / "out", fmu=athena_fmu, **options)
     assert first["walked"]
     assert last["walked"]
@@ -251,28 +223,3 @@ def test_errors_in_a_run_are_results_and_the_study_continues(
         assert row["reason"].startswith(expected)
         assert row["slip_per_metre"] is None
     assert "(study_runners.py, line" in bad[1]["reason"]
-
-
-def test_a_run_with_equal_settings_is_not_repeated(
-    athena_fmu: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    table = {
-        "seeds": 2,
-        "factors": {"gains.hold.path_rate": [0.1, 0.2, 0.3], "friction.mu": [0.3, 0.5]},
-    }
-    options: dict[str, Any] = {
-        "runner": Counting,
-        "fmu": athena_fmu,
-        "gains": make_gains(load_robot("athena")),
-    }
-    Counting.asked.clear()
-    kept = run_quietly(study_of(table), tmp_path / "kept", **options)
-    assert Counter(control for control, _ in Counting.asked) == {
-        "kinematic": 2 * 2,
-        "compliant": 3 * 2 * 2,
-    }
-    Counting.asked.clear()
-    monkeypatch.setattr("hexapod_cosim.extensions.study.worker.MAX_KNOWN", 0)
-    assert run_quietly(study_of(table), tmp_path / "made", **options) == kept
-    assert len(Counting.asked) == 24
-    assert len({row["slip_per_metre"] for row in kept}) == 4 + 12

@@ -11,7 +11,10 @@ from typing import Any
 from headers import Header
 
 HEADER = Header(
-    *(f"plant_fmu/include/hexapod/{name}.h" for name in ("legs", "status", "terrain", "hexapod"))
+    *(
+        f"plant_fmu/include/hexapod/{name}.h"
+        for name in ("legs", "status", "terrain", "generated/plant_settings", "hexapod")
+    )
 )
 LEGS: int = HEADER.constants["HX_LEGS"]
 JOINTS: int = HEADER.constants["HX_JOINTS"]

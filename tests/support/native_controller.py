@@ -22,6 +22,7 @@ from hexapod_cosim.cosim.interface.controller_interface import (
 COMMANDS = ("angle_ref", "speed_ref", "torque_ref", "acceleration_ref")
 HEADER = Header(
     *(f"plant_fmu/include/hexapod/{name}.h" for name in ("legs", "status")),
+    "controller/fmu/include/hexapod/generated/controller_settings.h",
     "controller/fmu/include/hexapod/controller.h",
 )
 HxRange: Any = HEADER.types["hxRange"]

@@ -32,7 +32,9 @@ All public modules, from their docstrings. Start with the [tutorial](../tutorial
 """
 WALK = "walk.html"  # the robot on the front page (docs/index.md)
 HEADERS = (
+    "plant_fmu/include/hexapod/generated/plant_settings.h",
     "plant_fmu/include/hexapod/hexapod.h",
+    "controller/fmu/include/hexapod/generated/controller_settings.h",
     "controller/fmu/include/hexapod/controller.h",
     "plant_fmu/include/hexapod/status.h",
     "plant_fmu/include/hexapod/legs.h",

@@ -4,10 +4,8 @@ import { Clock } from "./clock";
 import { byId, element } from "./dom";
 import { listenToKeys } from "./keyboard";
 import { footCentres, poseAt } from "./kinematics";
-import { drawPath } from "./panels/overhead";
 import type { Panel } from "./panels/panel";
 import { labelTimes, panelMakers } from "./panels/panels";
-import { drawProfiles } from "./panels/profile";
 import type { Run } from "./panels/run";
 import { Span } from "./panels/span";
 import { unpack } from "./recording";
@@ -189,8 +187,6 @@ async function makePanels(runs: readonly Run[], clock: Clock): Promise<Panel[]> 
     panels.push(make());
   }
   labelTimes();
-  drawPath(runs, clock);
-  drawProfiles(runs, clock);
   clock.listen(() => cycles.follow(clock.time));
   return panels;
 }

@@ -29,16 +29,6 @@ export interface Robot {
 /** A footprint in soil: begin, end (0: it stays) [s], x and y, depth below the surface, radius [m]. */
 export type PackedFootprint = readonly [number, number, number, number, number, number];
 
-/** Heights [0.1 mm] along the torso's path, and touch-downs: leg, time [s], way, height [m]. */
-export interface PackedProfile {
-  readonly begin: number;
-  readonly end: number;
-  readonly ground: readonly number[];
-  readonly low: readonly number[];
-  readonly high: readonly number[];
-  readonly feet: readonly (readonly [number, number, number, number])[];
-}
-
 /** A plane; with `surface`, the number of the surface whose heights are above the plane's. */
 export interface Ground {
   readonly height: number;
@@ -46,7 +36,6 @@ export interface Ground {
   readonly heading: number;
   readonly surface?: number;
   readonly footprints?: readonly PackedFootprint[];
-  readonly profile?: PackedProfile;
 }
 
 export interface Material {

@@ -82,19 +82,6 @@ def spectrum(series: Series, covariance: Array) -> Array:
     return _smoothed(power, half) / np.maximum(_smoothed(left, half), NEGLIGIBLE)
 
 
-def readings_as_one(series: Sequence[Series], covariance: Array) -> dict[str, float]:
-    """Returns, by channel, how many readings in a row count as one for a slow effect.
-
-    That is the spectrum of the residuals at frequency 0 over its mean; the mean over logs.
-    """
-    found: dict[str, list[float]] = {}
-    for one in series:
-        own = spectrum(one, covariance)
-        mean = float(np.mean(own))
-        found.setdefault(one.key, []).append(float(own[0]) / mean if mean > 0.0 else 1.0)
-    return {key: float(np.mean(parts)) for key, parts in found.items()}
-
-
 def _waves(values: Array) -> tuple[NDArray[np.complex128], Array]:
     """Returns the Fourier transform along the rows and how often each frequency counts, so that
     the weighted sum of squares is that of the values.

@@ -1,49 +1,40 @@
-"""Judges what the readings tell of the numbers that a search has found.
+"""Judges what the readings say of the numbers that a search has found.
 
 The covariance is that of the linearised problem with the spectra of the residuals (covariance.py),
 plus the square of the step that the search left. Residuals larger than the noise of the readings
 themselves say that the model does not explain the log: they widen all intervals, and far larger
-ones reject the model. Numbers of the robot file that the readings do not tell (rank.py) keep its
-values, and the search ends with them there. How far this moves the others is a part of their
+ones reject the model. Numbers of the robot file that the readings do not determine (rank.py) keep
+its values, and the search ends with them there. How far this moves the others is a part of their
 intervals.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from hexapod_cosim.extensions.identify.fitting.covariance import (
-    Series,
-    coloured_information,
-    readings_as_one,
-)
-from hexapod_cosim.extensions.identify.fitting.differences import FINE
-from hexapod_cosim.extensions.identify.fitting.last_search import BOUND, bounded_step, finished
-from hexapod_cosim.extensions.identify.fitting.misfit import Misfit
-from hexapod_cosim.extensions.identify.fitting.problem import Problem
+from hexapod_cosim.extensions.identify.fitting.covariance import coloured_information
+from hexapod_cosim.extensions.identify.fitting.least_squares import BOUND, remaining_step
+from hexapod_cosim.extensions.identify.fitting.misfit import Misfit, misfits, read_noise
+from hexapod_cosim.extensions.identify.fitting.problem import FINE, Problem
 from hexapod_cosim.extensions.identify.fitting.rank import (
-    Combination,
-    combinations,
-    measured_information,
+    dependences,
+    determined,
     sharpened,
-    told,
-    untold,
-    weak_moves,
+    to_keep,
 )
+from hexapod_cosim.extensions.identify.fitting.search import finished, searched
 from hexapod_cosim.extensions.identify.numbers.unknown import Unknown
 from hexapod_cosim.extensions.identify.unknowns import OF_FILE
 
 Array = NDArray[np.float64]
+Flags = NDArray[np.bool_]
 Progress = Callable[[str], None]
-# Combinations with less information [1/prior^2] are simulated as a whole over their deviation: near
-# a foot that barely lifts, slopes by short steps are steep and do not hold as far as the interval
-# reaches. Where the first errors of derivatives hide combinations in others, the second time shows
-# them.
-WEAK, PASSES = 1000.0, 2
+# of deriving weak combinations anew: the first errors of derivatives hide some in others
+PASSES = 2
 ROUNDS = 3  # of keeping numbers at the file's values, at most
 
 
@@ -55,23 +46,21 @@ class Fit:
     before: Mapping[str, float]  # values of the robot file
     z: Array  # (rows,)  distances from these, in priors
     covariance: Array  # (rows, rows) of z
-    singular: Array  # singular values of the readings' sensitivity, in priors, largest first
+    rank: int  # independent combinations that are known better than before
     noise: Mapping[str, float]  # by channel
-    correlated: Mapping[str, float]  # by channel: readings that count as one
     predictions: tuple[Array, ...]  # (rows, columns) of each experiment
     misfit: Mapping[str, Misfit]  # by channel
     held_out: Mapping[str, Misfit]  # the same on held-out rows; empty without them
     decrement: float  # length of the step that the optimiser left, in deviations
-    stay: NDArray[np.bool_]  # (rows,)  numbers of the robot file that keep its values
-    alone: NDArray[np.bool_]  # (rows,)  numbers that the readings tell by themselves
-    combinations: tuple[Combination, ...]  # of numbers that they tell together alone
+    kept: Flags  # (rows,)  numbers of the robot file that keep its values
+    alone: Flags  # (rows,)  numbers that the readings determine by themselves
+    depends: Mapping[str, tuple[str, ...]]  # numbers determined only with others as in the file
 
     @property
     def unexplained(self) -> dict[str, float]:
         """Returns the channels that the model does not explain, with the larger mean square."""
-        both = [*self.misfit.items(), *self.held_out.items()]
         found: dict[str, float] = {}
-        for key, one in both:
+        for key, one in [*self.misfit.items(), *self.held_out.items()]:
             if not one.explained:
                 found[key] = max(one.value, found.get(key, 0.0))
         return found
@@ -91,98 +80,82 @@ class Fit:
 
     @property
     def deviations(self) -> dict[str, float]:
-        """Standard deviations by key, in priors: 1 where the logs tell nothing."""
+        """Standard deviations by key, in priors: 1 where the logs say nothing."""
         own = np.sqrt(np.diag(self.covariance))
         return {row.key: float(value) for row, value in zip(self.rows, own, strict=True)}
 
 
-@dataclass(frozen=True)
-class _Told:
-    """What readings tell at some numbers."""
+def fit(problem: Problem, *, progress: Progress = lambda _text: None) -> Fit:
+    """Returns the most probable numbers of logs, with what the readings say of them.
 
-    jacobian: Array
-    residuals: Array
-    series: Sequence[Series]
-    misfit: Mapping[str, Misfit]
-    information: Array  # (rows, rows)  [1/prior^2]
-    covariance: Array  # (rows, rows)  with what was known before
+    progress: called when a step begins.
 
-
-def judged(
-    problem: Problem, fitted: Problem, z: Array, least: Mapping[str, float], report: Progress
-) -> Fit:
-    """Returns the numbers with what the readings tell of them.
-
-    Args:
-        problem: of the whole logs.
-        fitted: of their fitted rows.
-        z: the numbers.
-        least: noise of the readings themselves, by channel.
-        report: called when a step begins.
+    Raises HexapodError when the plant refuses the robot file's numbers.
     """
-    report("what the log tells")
-    best, candidates = z, np.array([row.group in OF_FILE for row in problem.rows])
-    stay = np.zeros(len(z), dtype=np.bool_)
-    own = _told(fitted, z, least)
+    fitted, best = searched(problem, progress)
+    progress("what the log determines")
+    least = read_noise(fitted.experiments)
+    of_file = np.array([row.group in OF_FILE for row in problem.rows])
+    kept = np.zeros(len(best), dtype=np.bool_)
+    z, own = best, _evidence(fitted, best, least)
     for _ in range(ROUNDS):
-        more = stay | untold(own.information, candidates)
-        if any(one.rejected for one in own.misfit.values()) or np.array_equal(more, stay):
+        more = kept | to_keep(own.information, of_file)
+        if any(one.rejected for one in own.misfit.values()) or np.array_equal(more, kept):
             break
-        stay, z = more, np.where(more, 0.0, z)
+        kept, z = more, np.where(more, 0.0, z)
         if float(np.max(np.abs(z - best))) > FINE.near:
-            with fitted.holding(stay):
-                z = finished(fitted, z, lambda _text: None)  # a part of this step
-        own = _told(fitted, z, least)
-    with fitted.holding(stay):
+            with fitted.keeping(kept):
+                z = finished(fitted, z, lambda _text: None)
+        own = _evidence(fitted, z, least)
+    with fitted.keeping(kept):
         # where touch-downs make the sum of squares rough, the optimiser stops on the way
-        left = bounded_step(fitted, z, own.jacobian, own.residuals)
-    moved, covariance = z - best, own.covariance
-    eigenvalues = np.linalg.eigvalsh(own.information)[::-1]
+        left = remaining_step(own.jacobian, own.residuals, z, fitted.bounds())
+    moved = z - best
+    keys = [row.key for row in problem.rows]
+    depends = dependences(own.information, kept, of_file)
     return Fit(
         rows=problem.rows,
         before=problem.before,
         z=z,
-        covariance=np.asarray(covariance + np.outer(left, left) + np.outer(moved, moved)),
-        singular=np.sqrt(np.maximum(eigenvalues, 0.0)),
+        covariance=own.covariance + np.outer(left, left) + np.outer(moved, moved),
+        rank=int(np.sum(np.linalg.eigvalsh(own.information) > 1.0)),
         noise=dict(fitted.noise),
-        correlated=readings_as_one(own.series, covariance),
-        decrement=float(np.sqrt(left @ np.linalg.solve(covariance, left))),
         predictions=tuple(problem.predictions(z)),
         misfit=own.misfit,
-        held_out=problem.misfit(z, least, "held_out"),
-        stay=stay,
-        alone=told(own.information),
-        combinations=combinations(own.information, stay, candidates, problem.rows),
+        held_out=misfits(problem.experiments, problem.predictions(z), least, "held_out"),
+        decrement=float(np.sqrt(left @ np.linalg.solve(own.covariance, left))),
+        kept=kept,
+        alone=determined(own.information),
+        depends={keys[k]: tuple(keys[j] for j in others) for k, others in depends.items()},
     )
 
 
-def _told(fitted: Problem, z: Array, least: Mapping[str, float]) -> _Told:
-    """Returns what the readings tell at some numbers."""
+@dataclass(frozen=True)
+class _Evidence:
+    """What readings say at some numbers."""
+
+    jacobian: Array
+    residuals: Array
+    misfit: Mapping[str, Misfit]
+    information: Array  # (rows, rows)  [1/prior^2]
+
+    @property
+    def covariance(self) -> Array:
+        """Returns the covariance of the numbers with what was known before (rows, rows)."""
+        return np.asarray(np.linalg.inv(self.information + np.eye(len(self.information))))
+
+
+def _evidence(fitted: Problem, z: Array, least: Mapping[str, float]) -> _Evidence:
+    """Returns what the readings say at some numbers. least: noise of the readings, by channel."""
     fitted.set_noise(fitted.errors(z))
     fitted.leave_out_bent(z)
     jacobian, residuals = fitted.jacobian(z, FINE), fitted.residuals(z)
-    bounded = np.clip(residuals, -BOUND, BOUND)
-    misfit = fitted.misfit(z, least, "fitted")
-    # errors of the model count as noise; at most the whole prior is unknown
+    misfit = misfits(fitted.experiments, fitted.predictions(z), least, "fitted")
+    # errors of the model count as noise
     worst = max(1.0, *(one.value for one in misfit.values()))
-    series = fitted.series(jacobian, bounded)
-    information = coloured_information(series) / worst
-    moves = weak_moves(fitted, z, information, WEAK)
-    first = _covariance(measured_information(information, jacobian, moves))
-    far = jacobian  # over deviations; the step that the search left is by its own derivatives
-    for again in range(PASSES):
-        moves = weak_moves(fitted, z, information, WEAK) if again else moves
-        far = sharpened(far, moves)
-        series = fitted.series(far, bounded)
-        information = coloured_information(series) / worst
-    # both are estimates, and intervals that are too narrow are worse than wide ones
-    second = _covariance(information)
-    wider = np.sqrt(np.maximum(np.diag(second) / np.diag(first), 1.0))
-    covariance = first * np.outer(wider, wider)
-    return _Told(jacobian, residuals, series, misfit, information, covariance)
-
-
-def _covariance(information: Array) -> Array:
-    """Returns the covariance of numbers with what was known before (rows, rows)."""
-    own = np.linalg.inv(information + np.eye(len(information)))
-    return np.asarray(own, dtype=np.float64)
+    bounded, far = np.clip(residuals, -BOUND, BOUND), jacobian
+    information = coloured_information(fitted.series(far, bounded)) / worst
+    for _ in range(PASSES):
+        far = sharpened(fitted, z, far, information)
+        information = coloured_information(fitted.series(far, bounded)) / worst
+    return _Evidence(jacobian, residuals, misfit, information)

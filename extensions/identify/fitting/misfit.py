@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from hexapod_cosim.extensions.identify.experiment import Experiment
 
 Array = NDArray[np.float64]
+SMALLEST = 1e-9  # noise, in the units of the channels
 CLIPPED = 5.0  # deviations    of a residual in the test whether the model explains the log
 # Largest mean square of residuals over that of the readings' noise, of many readings. That of the
 # noise has a relative deviation of about 3.8 over the root of their number.
@@ -54,3 +55,28 @@ def read_noise(experiments: Sequence[Experiment]) -> dict[str, float]:
             found.setdefault(key, []).append(column)
     scale = 0.6745 * np.sqrt(6.0)
     return {key: float(np.nanmedian(np.concatenate(own))) / scale for key, own in found.items()}
+
+
+def misfits(
+    experiments: Sequence[Experiment],
+    predictions: Sequence[Array],
+    noise: Mapping[str, float],
+    part: str,
+) -> dict[str, Misfit]:
+    """Returns the mean square of residuals over that of a noise, by channel.
+
+    It is 1 where the model explains the readings. Residuals beyond five deviations count as five.
+    part: "fitted" or "held_out" rows.
+    """
+    found: dict[str, list[Array]] = {}
+    for one, own in zip(experiments, predictions, strict=True):
+        error = (own - one.measured)[getattr(one, part)]
+        for key, column in zip(one.channels, error.T, strict=True):
+            size = column[np.isfinite(column)] / max(noise[key], SMALLEST)
+            found.setdefault(key, []).append(np.clip(size, -CLIPPED, CLIPPED) ** 2)
+    joined = {key: np.concatenate(parts) for key, parts in found.items()}
+    return {
+        key: Misfit(float(np.mean(values)), len(values))
+        for key, values in joined.items()
+        if len(values)
+    }

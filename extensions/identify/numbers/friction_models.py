@@ -15,12 +15,9 @@ from hexapod_cosim.extensions.identify.numbers.servo import (
     STRIBECK_LOADS,
     VISCOUS,
 )
-from hexapod_cosim.models import HexapodError, Robot
+from hexapod_cosim.models import HexapodError, Robot, unknown_name
 from hexapod_cosim.models.records import Servo
-from hexapod_cosim.models.servos.presets import FRICTION_MODELS
 
-BEST = "best"  # all models are tried
-CHOICES = (*FRICTION_MODELS, BEST)
 # terms besides Coulomb and viscous friction
 TERMS = {
     "m1": (),
@@ -42,8 +39,11 @@ def with_friction_model(robot: Robot, model: str) -> Robot:
     Terms are the robot file's, and a part of what is typical of servos of its size where it has
     none.
 
-    Raises HexapodError for a servo without a model of its motor, which has no such friction.
+    Raises HexapodError for an unknown model, and for a servo without a model of its motor, which
+    has no such friction.
     """
+    if model not in TERMS:
+        raise unknown_name("friction model", model, TERMS, where="--friction")
     if not MOTOR(robot):
         raise HexapodError(
             "friction models are those of measured servos",

@@ -24,16 +24,17 @@ from hexapod_cosim.cosim.common.control_style import ControlStyle, control_style
 from hexapod_cosim.cosim.common.files import atomic_path
 from hexapod_cosim.cosim.results.metrics import METRICS
 from hexapod_cosim.extensions.study.groups import Point
+from hexapod_cosim.extensions.study.optimum import Trial
 from hexapod_cosim.extensions.study.records import GRID, VALUES, Factor, Study
 from hexapod_cosim.extensions.study.report.heat import (
     SLIP,
     Array,
     heat_map,
-    label_of,
     mean_of,
     ticks_of,
 )
-from hexapod_cosim.extensions.study.summary import Results, Trial
+from hexapod_cosim.extensions.study.report.tables import label_of
+from hexapod_cosim.extensions.study.summary import Results
 from hexapod_cosim.models import HexapodError
 
 COST = "cost_of_transport"

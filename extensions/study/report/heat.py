@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from hexapod_cosim.cosim.results.metrics import FLOORS
 from hexapod_cosim.extensions.study.groups import Point
 from hexapod_cosim.extensions.study.records import Factor, Study
+from hexapod_cosim.extensions.study.report.tables import label_of
 
 Array = NDArray[np.float64]
 SLIP = "slip_per_metre"
@@ -26,12 +27,6 @@ EMPTY = "0.85"  # grey of cells without a value
 def mean_of(point: Point, control: str, metric: str) -> float:
     """Returns the mean of a metric at a point, NaN where there is none."""
     return point.figures.means[control][metric].value
-
-
-def label_of(factor: Factor) -> str:
-    """Returns the name of a factor with its unit."""
-    unit = "x designed" if factor.relative else factor.unit
-    return f"{factor.name} [{unit}]" if unit else factor.name
 
 
 def ticks_of(factor: Factor) -> list[str]:

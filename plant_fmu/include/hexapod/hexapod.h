@@ -14,6 +14,7 @@
 #ifndef HEXAPOD_H
 #define HEXAPOD_H
 
+#include "hexapod/generated/plant_settings.h"
 #include "hexapod/legs.h"
 #include "hexapod/status.h"
 #include "hexapod/terrain.h"
@@ -27,63 +28,8 @@ enum {
   HX_CORNERS = 8,                      /* of the torso's box */
   HX_NEIGHBOUR_PAIRS = 4,              /* of lines of a leg and its next leg */
   HX_BODY_STATE = 13,                  /* r[3] p[4] v[3] w[3] */
-  HX_MULTIPLIERS = 5,                  /* per joint */
-  HX_CONE_BINS = 31                    /* bins of the share of the friction cone that feet use */
+  HX_MULTIPLIERS = 5                   /* per joint */
 };
-
-typedef enum hxContactLaw {
-  HX_CONTACT_EXACT_RESTITUTION = 1,
-  HX_CONTACT_FLORES,
-  HX_CONTACT_LANKARANI_NIKRAVESH,
-  HX_CONTACT_HUNT_CROSSLEY,
-  HX_CONTACT_CONSTANT_DAMPING,
-  HX_CONTACT_HERTZ
-} hxContactLaw;
-
-typedef enum hxFrictionLaw {
-  HX_FRICTION_TANH = 1,
-  HX_FRICTION_NONE,
-  HX_FRICTION_BRISTLE,
-  HX_FRICTION_LUGRE
-} hxFrictionLaw;
-
-typedef enum hxTerrainKind {
-  HX_TERRAIN_FLAT = 1,
-  HX_TERRAIN_SLOPE,
-  HX_TERRAIN_GRID /* an hxTerrain, see hx_plant_set_terrain */
-} hxTerrainKind;
-
-typedef enum hxSoilLaw {
-  HX_SOIL_NONE = 1,
-  HX_SOIL_BEKKER,
-  HX_SOIL_GRANULAR,
-  HX_SOIL_MUD
-} hxSoilLaw;
-
-/* Whether torso, knees and shanks touch the ground. */
-typedef enum hxBodyContact { HX_BODY_OFF = 1, HX_BODY_ON } hxBodyContact;
-
-/* Whether a run warns of legs that overlap. The plant ignores it: there is no force between legs.
- */
-typedef enum hxSelfContact { HX_SELF_OFF = 1, HX_SELF_WARN, HX_SELF_FORCE } hxSelfContact;
-
-typedef enum hxServoMode { HX_SERVO_POSITION = 1, HX_SERVO_TORQUE, HX_SERVO_KINEMATIC } hxServoMode;
-
-/* What limits the servos' torque: the torque-speed line, or a motor's voltage and back-EMF. */
-typedef enum hxServoDrive { HX_DRIVE_LINE = 1, HX_DRIVE_MOTOR } hxServoDrive;
-
-typedef enum hxProjection {
-  HX_PROJECTION_NONE = 1, /* joints drift; the Baumgarte terms limit the drift */
-  HX_PROJECTION_STEP /* positions and velocities are projected onto the joints after every step */
-} hxProjection;
-
-typedef enum hxMethod {
-  HX_METHOD_ROSW3 = 1, /* linearly implicit W-method, order 3(2) */
-  HX_METHOD_ROS2,      /* linearly implicit W-method, order 2(1) */
-  HX_METHOD_DP54,      /* explicit Dormand-Prince, order 5(4) */
-  HX_METHOD_BS32,      /* explicit Bogacki-Shampine, order 3(2) */
-  HX_METHOD_RK4        /* explicit classic, order 4, fixed step only */
-} hxMethod;
 
 /* One link. Its frame lies at its own joint and has the parent link's axes when the joint angle is
  * 0. */
@@ -105,25 +51,6 @@ typedef struct hxLeg {
   hxLink link[HX_JOINTS];
 } hxLeg;
 
-/* Soft ground under the feet (eq. 40-47): its law and the numbers of all laws. */
-typedef struct hxSoilDefinition {
-  int law;                   /* hxSoilLaw; HX_SOIL_NONE: rigid ground */
-  double frictional_modulus; /* N/m^(n+2)  Kphi of HX_SOIL_BEKKER */
-  double cohesive_modulus;   /* N/m^(n+1)  Kc */
-  double exponent;           /* 1          n */
-  double resistance;         /* N/m3       unit of the three resistances of HX_SOIL_GRANULAR: */
-  double alpha_down;         /* 1          of a horizontal plate that moves down */
-  double alpha_side;         /* 1          of a plate on edge that moves down */
-  double alpha_ahead;        /* 1          of a plate on edge that moves ahead */
-  double yield_pressure;     /* Pa         of HX_SOIL_MUD, at the surface */
-  double hardening;          /* Pa/m       its growth with depth */
-  double cohesion;           /* Pa         c */
-  double friction_angle;     /* rad        phi */
-  double shear_displacement; /* m          K */
-  double stiffness;          /* Pa/m       Ke of unloading */
-  double damping;            /* Pa s/m     R */
-} hxSoilDefinition;
-
 /* The robot, its laws and its settings. hx_definition_default() fills in the ATHENA-like robot. */
 typedef struct hxDefinition {
   struct {
@@ -132,105 +59,19 @@ typedef struct hxDefinition {
     double inertia[6]; /* kg m2  about the centre of mass, torso axes: xx yy zz xy xz yz */
   } torso;
   hxLeg leg[HX_LEGS];
-  double foot_radius;       /* m */
-  struct {                  /* spheres that touch the ground besides the feet; see hxTerrain */
-    int contact;            /* hxBodyContact */
-    int self_contact;       /* hxSelfContact */
-    double torso_box[3];    /* m  half edges along the torso's axes of a box whose eight corners
-                             *    touch the ground; 0 0 0: they do not */
-    double torso_centre[3]; /* m  centre of the box from the torso's origin */
-    double corner_radius;   /* m  of spheres at the box's corners; 0: points */
-    double knee_radius;     /* m  of a sphere at the tibia's joint; 0: none; of the femur */
-    double shank_radius;    /* m  of a sphere on the tibia's line; 0: none; of the tibia */
-    double shank_position;  /* 1  its place, 0 at the joint, 1 at the foot's centre */
-  } body;
+  double foot_radius;     /* m */
+  hxBodySettings body;    /* spheres that touch the ground besides the feet; see hxTerrain */
   double foot_pad_radius; /* m  flat round pad of feet on soil; 0: the sphere */
-  struct {
-    int law;                   /* hxContactLaw */
-    double stiffness;          /* N/m^1.5  K of eq. 14 */
-    double restitution;        /* 1        [0, 1]; the dissipative laws need > 0 */
-    double damping_factor;     /* s/m      c of the constant law F = K d^1.5 (1 + 1.5 c dd) */
-    double impact_speed_floor; /* m/s      slower touch-downs use this speed */
-  } contact;
-  struct {
-    int law;                /* hxFrictionLaw */
-    double mu;              /* 1 */
-    double slope;           /* s/m  k_t of eq. 15, tanh law, and of eq. 38 */
-    double presliding;      /* m    b_max of eq. 16, 36: a foot pushed this far slides */
-    double bristle_damping; /* s    tau of eq. 17, 37: damping of bristles over their stiffness */
-    double mu_static;       /* 1    static friction; 0: mu */
-    double stribeck_speed;  /* m/s  v_s of eq. 18: half-way from mu_static to mu */
-    double viscous;         /* s/m  of eq. 35: coefficient added for each m/s of slip; 0: none */
-    double spin_radius;     /* m    r_s of eq. 38: moment against spin over mu f_n; 0: none */
-    double rolling_radius;  /* m    r_r of eq. 38: moment against rolling over f_n; 0: none */
-  } friction;
-  struct {
-    int mode;                /* hxServoMode, all joints */
-    int drive;               /* hxServoDrive */
-    double kp;               /* N m/rad */
-    double kd;               /* N m s/rad */
-    double torque_max;       /* N m      at stall, of HX_DRIVE_LINE */
-    double speed_max;        /* rad/s    no-load speed, where the torque-speed line ends */
-    double rotor_inertia;    /* kg m2    seen at the joint */
-    double coulomb_friction; /* N m      in the gear, regularised by tanh(speed/friction_speed) */
-    double stop_stiffness;   /* N m/rad    k of the joints' stops (eq. 39); 0: no stops */
-    double stop_damping;     /* N m s/rad  c of eq. 39 */
-    /* of HX_DRIVE_MOTOR (eq. 48), seen at the joint */
-    double voltage;         /* V      of the supply */
-    double duty_max;        /* 1      largest duty: the motor gets at most duty_max voltage */
-    double torque_constant; /* N m/A  k_t */
-    double resistance;      /* ohm    R */
-    /* friction of motor and gear besides coulomb_friction (eq. 49, 50) */
-    double viscous_friction;                /* N m s/rad  K_v */
-    double stribeck_friction;               /* N m        K_cs */
-    double motor_load_friction;             /* 1          K_m */
-    double external_load_friction;          /* 1          K_e */
-    double stribeck_motor_load_friction;    /* 1          K_ms */
-    double stribeck_external_load_friction; /* 1          K_es */
-    double quadratic_motor_friction;        /* 1/(N m)    K_mq */
-    double quadratic_external_friction;     /* 1/(N m)    K_eq */
-    double stribeck_speed;                  /* rad/s      w_s */
-    double stribeck_exponent;               /* 1          a */
-    double friction_speed;                  /* rad/s      w_f: dry friction saturates there */
-    /* heat of HX_DRIVE_MOTOR (eq. 52), and its supply (eq. 53) */
-    double winding_capacity;   /* J/K  heat capacity of a winding; 0: no heating */
-    double housing_capacity;   /* J/K  of a housing, > 0 */
-    double winding_to_housing; /* K/W  thermal resistance */
-    double housing_to_air;     /* K/W */
-    double air_temperature;    /* K */
-    double start_temperature;  /* K    of windings and housings at the start */
-    double derate_temperature; /* K    of a winding: hotter ones lower the duty limit */
-    double temperature_max;    /* K    there it is 0; > derate_temperature */
-    double supply_resistance;  /* ohm  of the battery and its cables */
-    /* how commands reach the servos, but in kinematic mode */
-    double bus_period;   /* s    from one transmission to the next; 0: at every call */
-    double command_step; /* rad  angles are rounded to multiples of it; 0: they are not */
-    /* gear between rotor and link, but in kinematic mode (eq. 54-56) */
-    double gear_stiffness; /* N m/rad    0: rigid; else rotor_inertia is > 0 */
-    double gear_damping;   /* N m s/rad */
-    double backlash;       /* rad        play of the elastic gear, from side to side */
-    double gear_ratio;     /* 1  turns of the rotor for one of the joint, < 0: against it; 0: the
-                            *    rotor's angular momentum is left out (eq. 57, 58) */
-  } servo;
+  hxContactSettings contact;
+  hxFrictionSettings friction;
+  hxServoSettings servo;
   struct {
     double alpha, beta; /* 1/s */
   } baumgarte;
   double gravity[3]; /* m/s2 */
-  struct {
-    int method;       /* hxMethod */
-    double step;      /* s   > 0: fixed step; 0: error control */
-    double tolerance; /* 1   of the error control */
-    double step_max;  /* s   of the error control */
-    int projection;   /* hxProjection */
-  } solver;
-  struct {
-    int kind;       /* hxTerrainKind */
-    double height;  /* m    of the ground at the world's origin, of a grid's zero */
-    double incline; /* rad  of HX_TERRAIN_SLOPE: the ground rises along the heading */
-    double heading; /* rad  about z, from x */
-    double grid;    /* 1    which grid of an FMU's resources; the plant itself ignores it */
-  } terrain;
-  hxSoilDefinition soil;
+  hxSolverSettings solver;
+  hxTerrainSettings terrain;
+  hxSoilDefinition soil; /* under the feet (eq. 40-47) */
   struct {
     double position[3];         /* m      torso's centre of mass */
     double quaternion[4];       /* 1      normalised on use */

@@ -55,8 +55,7 @@ typedef struct {
 /* Returns whether the friction of a row's contacts on rigid ground has bristles; others slide by
  * the tanh law then. */
 static inline int has_friction_bristles(const hxModel *model, int row) {
-  return row == HX_FOOT &&
-         (model->friction_law == HX_FRICTION_BRISTLE || model->friction_law == HX_FRICTION_LUGRE);
+  return row == HX_FOOT && hx_is_bristle_law(model->friction_law);
 }
 
 /* Returns whether the contacts of a row stand on bristles, those of friction or of soil. */
@@ -273,7 +272,7 @@ HX_RARE void hx_foot_shares(const hxModel *model, const hxContactState *state, i
 }
 
 /* Computes the force of rigid ground on a row of contacts: f_n along the normal, and across it f_t
- * = -mu f_n g(|v_t|) v_t or the bristles' force. All friction laws are chosen by this function. */
+ * = -mu f_n g(|v_t|) v_t or the bristles' force. */
 HX_INLINE void rigid_force(const hxModel *model, int row, int slot, const hxPlantMotion *motion,
                            hxFrictionAt at, hxContactWork *contact) {
   const hxContactKinematics *kin = &contact->kin;
@@ -283,9 +282,7 @@ HX_INLINE void rigid_force(const hxModel *model, int row, int slot, const hxPlan
   if (has_friction_bristles(model, row)) {
     const hxReal closed = contact->law.closed;
     const hxVec3 b = hx_load_vec3(motion->bristle, slot);
-    contact->bristle = model->friction_law == HX_FRICTION_LUGRE
-                           ? hx_lugre(model, at, closed, b, contact->slip)
-                           : hx_bristle(model, at, closed, b, contact->slip);
+    contact->bristle = hx_bristle_friction(model, at, closed, b, contact->slip);
     contact->force = hx_scale(contact->normal.force, hx_sub3(kin->normal, contact->bristle.grip));
     return;
   }

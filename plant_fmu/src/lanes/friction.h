@@ -115,6 +115,13 @@ HX_INLINE hxBristle hx_lugre(const hxModel *model, hxFrictionAt at, hxReal close
   };
 }
 
+/* Chooses the law of bristles: what a further law needs here is its function above and a case. */
+HX_INLINE hxBristle hx_bristle_friction(const hxModel *model, hxFrictionAt at, hxReal closed,
+                                        hxVec3 b, hxVec3 slip) {
+  return model->friction_law == HX_FRICTION_LUGRE ? hx_lugre(model, at, closed, b, slip)
+                                                  : hx_bristle(model, at, closed, b, slip);
+}
+
 /* Returns the moment over the load of spin about the normal and of rolling across it (eq. 38), at
  * the angular velocity w of a body whose sphere touches the ground. */
 HX_INLINE hxTurningFriction hx_turning_friction(const hxModel *model, hxFrictionAt at,

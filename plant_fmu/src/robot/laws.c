@@ -1,4 +1,4 @@
-#include "laws.h"
+#include "robot.h"
 
 #include <math.h>
 #include <string.h>
@@ -6,7 +6,6 @@
 #include "../contact_law.h"
 #include "../ground/soil.h"
 #include "../ground/surface.h"
-#include "validation.h"
 
 static const double load_share =
     0.01; /* 1  of the robot's weight; feet with a larger load count their slip */
@@ -34,11 +33,6 @@ static void compile_friction(hxModel *model, const hxDefinition *d) {
                                    d->terrain.kind == HX_TERRAIN_GRID);
   model->spin_friction = rubs && model->spin_radius > 0.0;
   model->roll_friction = rubs && model->rolling_radius > 0.0;
-}
-
-/* Returns whether bristles of friction hold the feet on rigid ground. */
-static int has_friction_bristles(const hxDefinition *d) {
-  return d->friction.law == HX_FRICTION_BRISTLE || d->friction.law == HX_FRICTION_LUGRE;
 }
 
 static const double pi = 3.14159265358979323846;
@@ -74,7 +68,7 @@ static void compile_soil(hxModel *model, const hxDefinition *d) {
   model->bristle_length = d->friction.presliding;
   if (d->soil.law != HX_SOIL_NONE)
     model->bristle_length = d->soil.shear_displacement;
-  else if (on_grid > 0.0 && !has_friction_bristles(d))
+  else if (on_grid > 0.0 && !hx_is_bristle_law(d->friction.law))
     model->bristle_length = on_grid;
 }
 

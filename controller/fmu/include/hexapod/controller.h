@@ -9,6 +9,7 @@
 #ifndef HEXAPOD_CONTROLLER_H
 #define HEXAPOD_CONTROLLER_H
 
+#include "hexapod/generated/controller_settings.h"
 #include "hexapod/legs.h"
 #include "hexapod/status.h"
 
@@ -16,140 +17,73 @@
 extern "C" {
 #endif
 
-typedef enum hxControl {
-  HX_CONTROL_KINEMATIC = 1, /* follows the paths, uses no measurement */
-  HX_CONTROL_COMPLIANT,     /* also reacts to the measured forces */
-  HX_CONTROL_PAPER          /* corrects the paths by the measured forces as the paper does */
-} hxControl;
-
-/* Pattern of a gait: phase offsets by name, or given ones. */
-typedef enum hxPattern {
-  HX_PATTERN_TRIPOD = 1,
-  HX_PATTERN_RIPPLE,
-  HX_PATTERN_WAVE,
-  HX_PATTERN_AMBLE,
-  HX_PATTERN_CUSTOM
-} hxPattern;
-
 /* The controller's model of a link; joint axes are z, -y, y (docs/architecture.md). */
 typedef struct hxKnownLink {
-  double mass;                  /* kg */
-  double length;                /* m     next joint (tibia: foot centre) along the link's x */
-  double offset_y, offset_z;    /* m     the same point along y and z */
-  double com[3];                /* m     centre of mass, link axes */
-  double inertia_yy;            /* kg m2 about the centre of mass */
-  double inertia_zz;            /* kg m2 */
-  double angle_min, angle_max;  /* rad   limits of the joint */
-  double stance;                /* rad   the joint in the standing pose */
+  double mass;                 /* kg */
+  double length;               /* m     next joint (tibia: foot centre) along the link's x */
+  double offset_y, offset_z;   /* m     the same point along y and z */
+  double com[3];               /* m     centre of mass, link axes */
+  double inertia_yy;           /* kg m2 about the centre of mass */
+  double inertia_zz;           /* kg m2 */
+  double angle_min, angle_max; /* rad   limits of the joint */
+  double stance;               /* rad   the joint in the standing pose */
 } hxKnownLink;
 
 typedef struct hxKnownLeg {
-  double hip_position[3];  /* m    coxa joint, torso axes */
-  double hip_yaw;          /* rad  about z */
+  double hip_position[3]; /* m    coxa joint, torso axes */
+  double hip_yaw;         /* rad  about z */
   hxKnownLink link[HX_JOINTS];
 } hxKnownLeg;
-
-typedef struct hxGait {
-  int pattern;             /* hxPattern */
-  double period;           /* s    one cycle of a leg */
-  double duty;             /* 1    share of the cycle on the ground */
-  double offset[HX_LEGS];  /* 1    phase of each leg at clock 0, of HX_PATTERN_CUSTOM */
-  double step_height;      /* m    the foot's lift above the ground */
-  double touchdown_speed;  /* m/s  vertical, at the end of a swing */
-  double narrowing;        /* m    nearer to the hips under a load that the model does not have */
-} hxGait;
-
-/* Contents of gains.toml, without the data that they were designed for. */
-typedef struct hxGains {
-  struct {
-    double handover_time;  /* s   in which one set of legs hands its load over to the next */
-    double weight_time;    /* s   smoothing of the measured weight */
-    double load_time;      /* s   smoothing of the measured loads, grip and trust */
-  } support;
-  struct {
-    double attitude_rate;  /* 1/s    integral of roll and pitch */
-    double height_rate;    /* 1/s    integral of the height */
-    double ground_time;    /* s      smoothing of the ground's inclination */
-    double angle_limit;    /* rad    largest correction of roll and pitch */
-    double height_limit;   /* m      largest correction of the height */
-    double path_rate;      /* 1/s    from lost displacement and heading to velocity */
-    double speed_limit;    /* m/s    largest change of the velocity */
-    double turn_limit;     /* rad/s  largest change of the yaw rate */
-  } hold;
-  struct {
-    double torque;  /* N m    largest feed-forward torque */
-  } limits;
-  struct {
-    double share; /* 1    of the deviation along the ground that is taken back, at duty 1/2 */
-    double height_share; /* 1    the same upwards */
-    double share_limit; /* 1    largest share at any duty */
-    double yield_share; /* 1    P part: yield to a force over the softness of the leg */
-    double return_rate; /* 1/s  I part: return of all feet */
-    double filter_time; /* s    smoothing of the measured forces */
-    double damping; /* N s/m  of the suspension */
-    double return_time; /* s    of the suspension of a standing foot */
-    double sag_limit; /* m    largest lift of a foot in the air by the torso's sag */
-    double limit; /* m    largest deflection of the suspension and return of the feet */
-  } paper;
-} hxGains;
-
-/* Switches, 1 or 0: enabled parts of compliant and paper control; and the weight of the squeeze. */
-typedef struct hxParts {
-  int support, paper_share, paper_pid, paper_suspension, touchdown, posture, sway, path, limits,
-      fallback;
-  /* 1  weight of the servos' torques against the feet's use of friction in the planned squeeze */
-  double squeeze;
-} hxParts;
 
 /* The controller's model of the robot, the gait and the laws. hx_controller_definition_default sets
  * the ATHENA-like robot. */
 typedef struct hxControllerDefinition {
   double period; /* s    between two steps of the controller */
-  int control; /* hxControl */
+  int control;   /* hxControl */
   struct {
-    double mass; /* kg */
-    double com[3]; /* m      from the torso's origin, torso axes */
+    double mass;       /* kg */
+    double com[3];     /* m      from the torso's origin, torso axes */
     double inertia_zz; /* kg m2  about the centre of mass */
   } torso;
   hxKnownLeg leg[HX_LEGS];
-  double foot_radius; /* m */
+  double foot_radius;       /* m */
   double contact_stiffness; /* N/m^1.5  of a foot on the ground */
-  double friction; /* 1        coefficient of friction that is believed */
+  double friction;          /* 1        coefficient of friction that is believed */
   struct {
-    double kp; /* N m/rad */
-    double speed_max; /* rad/s */
-    double rotor_inertia; /* kg m2  seen at the joint */
-    double coulomb_friction; /* N m    in the gear */
+    double kp;                /* N m/rad */
+    double speed_max;         /* rad/s */
+    double rotor_inertia;     /* kg m2  seen at the joint */
+    double coulomb_friction;  /* N m    in the gear */
     double torque_continuous; /* N m    that it can give for ever */
   } servo;
   double gravity[3]; /* m/s2 */
   hxGait gait;
-  hxGains gains;
-  hxParts parts;
+  hxGains gains; /* without the data that they were designed for */
+  hxParts parts; /* switches of compliant and paper control */
 } hxControllerDefinition;
 
 /* Command and measurements of the controller. */
 typedef struct hxControllerInput {
   struct {
-    double vx, vy; /* m/s    forward, to the left */
-    double yaw_rate; /* rad/s  to the left */
-    double height; /* m      above the stance */
+    double vx, vy;      /* m/s    forward, to the left */
+    double yaw_rate;    /* rad/s  to the left */
+    double height;      /* m      above the stance */
     double roll, pitch; /* rad    z-y-x */
   } command;
   double angle[HX_LEGS][HX_JOINTS]; /* rad */
-  double foot_force[HX_LEGS][3]; /* N   ground on foot, world axes */
-  double quaternion[4]; /* 1   torso to world, w x y z */
+  double foot_force[HX_LEGS][3];    /* N   ground on foot, world axes */
+  double quaternion[4];             /* 1   torso to world, w x y z */
 } hxControllerInput;
 
 typedef struct hxControllerOutput {
-  double angle_ref[HX_LEGS][HX_JOINTS]; /* rad */
-  double speed_ref[HX_LEGS][HX_JOINTS]; /* rad/s */
+  double angle_ref[HX_LEGS][HX_JOINTS];  /* rad */
+  double speed_ref[HX_LEGS][HX_JOINTS];  /* rad/s */
   double torque_ref[HX_LEGS][HX_JOINTS]; /* N m */
-  int swinging[HX_LEGS]; /* planned to be in the air */
-  int unreachable[HX_LEGS]; /* the joints cannot follow */
-  int fallback[HX_LEGS]; /* walks without feedback */
-  double shift[HX_LEGS][2]; /* m  horizontal correction of the foot, walking frame */
-  double lift[HX_LEGS]; /* m  vertical correction of the foot */
+  int swinging[HX_LEGS];                 /* planned to be in the air */
+  int unreachable[HX_LEGS];              /* the joints cannot follow */
+  int fallback[HX_LEGS];                 /* walks without feedback */
+  double shift[HX_LEGS][2];              /* m  horizontal correction of the foot, walking frame */
+  double lift[HX_LEGS];                  /* m  vertical correction of the foot */
   double planned[HX_LEGS][3]; /* m  the foot's centre as the command plans it, torso frame, without
                                  any correction */
   double acceleration_ref[HX_LEGS][HX_JOINTS]; /* rad/s2  planned, for kinematic drives */

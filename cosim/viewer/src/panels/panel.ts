@@ -194,7 +194,7 @@ function roomy(from: number, to: number): uPlot.Range.MinMax {
 }
 
 /** Returns a value of an axis as text with as many digits as the step between values needs. */
-export function tick(value: number, step: number): string {
+function tick(value: number, step: number): string {
   const digits =
     [0, 1, 2, 3, 4, 5, 6].find(
       (count) => Math.abs(step * 10 ** count - Math.round(step * 10 ** count)) < 1e-6,
@@ -204,7 +204,7 @@ export function tick(value: number, step: number): string {
 }
 
 /** Returns a value as text with about three digits. */
-export function figures(value: number): string {
+function figures(value: number): string {
   if (!Number.isFinite(value)) return "–";
   if (Number.isInteger(value)) return String(value).replace("-", "−");
   const size = Math.abs(value);

@@ -4,7 +4,7 @@ import type { Recording } from "../recording";
 import type { Colours } from "../theme";
 import type { PackedRun } from "../types";
 import { ForceArrows } from "./arrows";
-import { Dents, findDents } from "./dents";
+import { Dents } from "./dents";
 import { Floor } from "./ground";
 import { castShadows } from "./lamp";
 import type { Relief } from "./relief";
@@ -23,7 +23,7 @@ export class Actor {
   readonly place = new Vector3();
   private readonly model: RobotModel;
   private readonly floor: Floor | Terrain;
-  private readonly dents: Dents | undefined;
+  private readonly dents: Dents;
   private readonly arrows: ForceArrows;
   private readonly lamp = new DirectionalLight("#ffffff", 2.1);
   private readonly sky = new HemisphereLight("#ffffff", "#8d9099", 1.6);
@@ -39,12 +39,11 @@ export class Actor {
     this.model = new RobotModel(run.robot, mark);
     const { surface } = relief;
     this.floor = surface ? new Terrain(surface, run.ground.height) : new Floor(relief);
-    const dents = findDents(run.ground.footprints ?? []);
-    if (dents.length > 0) this.dents = new Dents(dents, relief, recording);
+    this.dents = new Dents(run.ground.footprints ?? [], relief);
     this.arrows = new ForceArrows(run.robot.legs.length);
     castShadows(this.lamp, surface ? FAR_REACH : REACH, surface ? 2048 : 1024);
-    this.scene.add(this.model, this.floor, this.arrows, this.lamp, this.lamp.target, this.sky);
-    if (this.dents) this.scene.add(this.dents);
+    this.scene.add(this.model, this.floor, this.dents, this.arrows);
+    this.scene.add(this.lamp, this.lamp.target, this.sky);
   }
 
   addTrails(stances: readonly Stance[], enlarged: number): void {
@@ -58,7 +57,7 @@ export class Actor {
     this.scene.fog = new Fog(colours.sky, 2.2, 6.5);
     if (this.floor instanceof Terrain) this.floor.paint(colours);
     else this.floor.paint(colours.floor, colours.grid);
-    this.dents?.paint(colours.soil);
+    this.dents.paint(colours.soil);
     this.arrows.paint(colours.force);
     this.sky.intensity = colours.dark ? 1.15 : 1.7;
     this.lamp.intensity = colours.dark ? 2.2 : 2.3;
@@ -76,7 +75,7 @@ export class Actor {
     this.lamp.target.position.copy(this.place);
     this.lamp.position.copy(this.place).add(LAMP);
     this.trails?.show(time);
-    this.dents?.show(time);
+    this.dents.show(time);
   }
 
   poseAt(time: number): Pose {
@@ -96,7 +95,7 @@ export class Actor {
       lit: this.model.lit(),
       arrows: this.arrows.shown(),
       triangles: this.floor instanceof Terrain ? this.floor.triangles : 0,
-      dents: this.dents?.count ?? 0,
+      dents: this.dents.count,
     };
   }
 

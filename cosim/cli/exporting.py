@@ -1,0 +1,201 @@
+"""Writes FMUs, packages and robot descriptions, for `hexapod export`."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import typer
+
+from hexapod_cosim.controller import Gait
+from hexapod_cosim.cosim.cli.running import given_gains
+from hexapod_cosim.cosim.cli.terminal import refuse_unused, show_files, show_json, waiting, warn
+from hexapod_cosim.cosim.cli.terrains import surfaces_from
+from hexapod_cosim.cosim.export.controller_export import export_controller
+from hexapod_cosim.cosim.export.plant_export import export_fmu
+from hexapod_cosim.cosim.export.robot_files import (
+    Format,
+    chosen_format,
+    export_description,
+    left_out,
+)
+from hexapod_cosim.cosim.export.robot_package import chosen_package, export_package, read_values
+from hexapod_cosim.cosim.interface.controller_interface import ControllerSetup
+from hexapod_cosim.cosim.run.chosen_walk import chosen_walk
+from hexapod_cosim.cosim.run.controller_setup import make_setup
+from hexapod_cosim.cosim.scenario.records import CHOSEN, OWN
+from hexapod_cosim.models import HexapodError, Robot, load_robot, unknown_name
+
+DEFAULT_CONTROL = "compliant"  # of a package
+CONTROLLER_OPTIONS = ("gait", "gains", "period")
+DESCRIPTION, PLANT_FMU = "a robot's description", "the plant's FMU"
+CONTROLLER_FMU, PACKAGE = "a controller's FMU", "a package"
+# options without effect, by what is written
+UNUSED_OPTIONS = {
+    DESCRIPTION: (
+        *("fmi", "platforms", "integers", "terrain", "stance", "controller"),
+        *CONTROLLER_OPTIONS,
+    ),
+    PLANT_FMU: CONTROLLER_OPTIONS,
+    CONTROLLER_FMU: ("terrain",),
+    PACKAGE: ("terrain", "integers"),
+}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Request:
+    """The options of the command line."""
+
+    context: typer.Context
+    output: Path | None
+    robot: str
+    fmi: int
+    platforms: list[str] | None
+    integers: bool
+    urdf: bool
+    mjcf: bool
+    ssp: bool
+    values: Sequence[str]
+    terrains: Sequence[str]
+    controller: str | None
+    gait: str | None
+    stance: str
+    gains: Path | None
+    period: float  # s
+
+
+def write_export(request: Request, *, as_json: bool) -> None:
+    """Writes what was asked for and prints its path. Raises HexapodError."""
+    robot = load_robot(request.robot)
+    form = chosen_format(request.output, urdf=request.urdf, mjcf=request.mjcf)
+    package = chosen_package(
+        request.output, wanted=request.ssp, described=form is not None, values=request.values
+    )
+    control = DEFAULT_CONTROL if package and request.controller is None else request.controller
+    _refuse_unused_options(request.context, _written(form, package=package, control=control))
+    robot, gait = _in_stance(robot, request.stance)
+    if form is not None:
+        path = _export_description(robot, request.output, form)
+    elif control is None:
+        path = _export_plant(robot, request)
+    else:
+        setup = _controller_setup(robot, request, control, gait)
+        path = _export_package(setup, request) if package else _export_controller(setup, request)
+    kind = form.name if form is not None else "ssp" if package else "fmu"
+    if as_json:
+        show_json({kind: str(path), "robot": robot.name, "hash": robot.hash})
+        return
+    show_files([path])
+    for key, text in robot.source.items():
+        if key.startswith("URDF, "):  # what was assumed when it was read
+            print(text)
+
+
+def _written(form: Format | None, *, package: bool, control: str | None) -> str:
+    """Returns what is written, a key of UNUSED_OPTIONS."""
+    if form is not None:
+        return DESCRIPTION
+    if package:
+        return PACKAGE
+    return PLANT_FMU if control is None else CONTROLLER_FMU
+
+
+def _refuse_unused_options(context: typer.Context, written: str) -> None:
+    """Raises HexapodError for given options that have no effect on what is written."""
+    fix = "leave them out"
+    if written == PLANT_FMU:
+        fix += ", or add --controller kinematic or compliant"
+    names = {name: f"--{name}" for name in UNUSED_OPTIONS[written]}
+    refuse_unused(context, names, written=written, fix=fix)
+
+
+def _in_stance(robot: Robot, stance: str) -> tuple[Robot, Gait | None]:
+    """Returns the robot in a stance, and the gait that belongs to it; None: the robot file's.
+
+    Raises HexapodError for an unknown stance.
+    """
+    if stance not in (OWN, CHOSEN):
+        raise unknown_name("stance", stance, (OWN, CHOSEN))
+    if stance == OWN:
+        return robot, None
+    with waiting("choosing the stance"):
+        walk = chosen_walk(robot)
+    return walk.robot, walk.gait
+
+
+def _export_description(robot: Robot, output: Path | None, form: Format) -> Path:
+    """Writes a robot's URDF or MJCF file and returns its path."""
+    path = export_description(robot, _path(output, robot.name, form.suffix), form)
+    lost = left_out(robot.servo, form)
+    if lost:
+        warn(
+            f"{path.name}: {form.title} cannot say and leaves out of the servos: {', '.join(lost)}"
+        )
+    return path
+
+
+def _export_plant(robot: Robot, request: Request) -> Path:
+    """Writes the plant's FMU and returns its path."""
+    with waiting("compiling" if request.platforms else None):
+        return export_fmu(
+            robot,
+            _path(request.output, robot.name, ".fmu"),
+            fmi=request.fmi,
+            platforms=request.platforms,
+            terrains=surfaces_from(request.terrains),
+            integers=request.integers,
+        )
+
+
+def _export_controller(setup: ControllerSetup, request: Request) -> Path:
+    """Writes the controller's FMU and returns its path."""
+    with waiting("compiling" if request.platforms else None):
+        return export_controller(
+            setup,
+            _path(request.output, f"{setup.robot.name}_controller", ".fmu"),
+            fmi=request.fmi,
+            platforms=request.platforms,
+            integers=request.integers,
+        )
+
+
+def _export_package(setup: ControllerSetup, request: Request) -> Path:
+    """Writes plant and controller as an SSP package and returns its path."""
+    with waiting("compiling" if request.platforms else None):
+        return export_package(
+            setup,
+            _path(request.output, setup.robot.name, ".ssp"),
+            values=read_values(request.values),
+            platforms=request.platforms,
+            fmi=request.fmi,
+        )
+
+
+def _path(output: Path | None, name: str, suffix: str) -> Path:
+    """Returns the file to write. Raises HexapodError for a folder or another suffix."""
+    path = output or Path(f"{name}{suffix}")
+    if path.is_dir() or path.suffix != suffix:
+        right = path / f"{name}{suffix}" if path.is_dir() else path.with_suffix(suffix)
+        raise HexapodError(
+            "not the name of such a file",
+            got=str(path),
+            expected=f"a file that ends in {suffix}",
+            fix=f"write -o {right}",
+        )
+    return path
+
+
+def _controller_setup(
+    robot: Robot, request: Request, control: str, gait: Gait | None
+) -> ControllerSetup:
+    """Builds the controller's setup; shows a warning for gains of another robot or period."""
+    gains = given_gains(request.gains)
+    designs = control != "kinematic" and gains is None
+    with waiting("designing the gains" if designs else None):
+        setup = make_setup(
+            robot, control=control, period=request.period, gait=request.gait or gait, gains=gains
+        )
+    for warning in setup.build().warnings:
+        warn(warning)
+    return setup

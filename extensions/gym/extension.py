@@ -1,0 +1,12 @@
+"""What this extension adds to the command line."""
+
+from hexapod_cosim.cosim.cli.extension import Command, Extension
+
+GYM = Command(
+    name="gym",
+    about="Train, measure and export policies for reinforcement learning.",
+    place="hexapod_cosim.extensions.gym.gym_command:app",
+)
+EXTENSION = Extension(
+    commands=[GYM], lists={"environments": "hexapod_cosim.extensions.gym.tasks:environment_rows"}
+)

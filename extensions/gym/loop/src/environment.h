@@ -1,0 +1,51 @@
+/* environment.h - one environment: a robot, its episode and its rewards. */
+#ifndef HX_ENVIRONMENT_H
+#define HX_ENVIRONMENT_H
+
+#include "hexapod/environments.h"
+#include "reward.h"
+
+typedef struct hxEnvironment {
+  const hxEnvSettings *settings;
+  hxStepper stepper; /* plant and controller */
+  uint64_t seed, episode;
+  size_t step;                                 /* 1  steps of this episode */
+  int ended;                                   /* 1: the episode is over, or none was started */
+  int reason;                                  /* hxEnvReason */
+  double value[HX_ENV_VALUES + HX_ENV_INPUTS]; /* outputs of the plant, then its inputs */
+  size_t sensed[HX_ENV_SENSED]; /* 1    indices of the controller's measurements in `value` */
+  double given[HX_ENV_BODY + HX_ENV_SENSED]; /* inputs of the controller */
+  double action[HX_ENV_JOINTS];              /* 1    last one, limited */
+  double body[HX_ENV_BODY];                  /*      command; the first three are drawn */
+  double *drawn;                             /*      [draws.count] values of the parameters */
+  fmi2CallbackFunctions callbacks[2];        /* of plant and controller */
+  char message[HX_MESSAGE_SIZE];
+} hxEnvironment;
+
+/* Instantiates the FMUs. Returns 0 when one refuses, and then frees the others. */
+int hx_environment_open(hxEnvironment *environment, const hxEnvSettings *settings, double *drawn);
+void hx_environment_close(hxEnvironment *environment);
+
+/* Memory that plants use as their work space (shared_work.h). */
+typedef struct hxEnvWork {
+  void *block, *memory; /* NULL: the plants use their own */
+  size_t size;          /* B  of the memory */
+} hxEnvWork;
+
+/* Allocates memory if the plant can use it; without, or out of memory, there is none. */
+hxEnvWork hx_environment_work(const hxEnvSettings *settings);
+
+/* Makes the environment's plant use the memory; with NULL its own again. */
+void hx_environment_use(hxEnvironment *environment, const hxEnvWork *work);
+
+/* Starts the episode `episode` of the seed. */
+void hx_environment_reset(hxEnvironment *environment);
+
+/* Does one step; writes the weighted terms of the reward and returns their sum. */
+double hx_environment_step(hxEnvironment *environment, const float action[HX_ENV_JOINTS],
+                           double term[HX_ENV_TERMS]);
+
+/* Writes the observation of the present state. */
+void hx_environment_observe(const hxEnvironment *environment, float *observation);
+
+#endif

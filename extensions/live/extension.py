@@ -1,0 +1,16 @@
+"""What this extension adds to the command line."""
+
+from hexapod_cosim.cosim.cli.extension import Command, Extension
+
+PACKAGE = "hexapod_cosim.extensions.live"
+LIVE = Command(
+    name="live",
+    about="Drive the robot in a browser, in real time.",
+    place=f"{PACKAGE}.live_command:live",
+)
+REALTIME = Command(
+    name="realtime",
+    about="Measure how long the plant takes for a step.",
+    place=f"{PACKAGE}.realtime_command:realtime",
+)
+EXTENSION = Extension(commands=[LIVE, REALTIME])

@@ -1,0 +1,137 @@
+import plotStyle from "uplot/dist/uPlot.min.css";
+import { byId, element } from "../../../cosim/viewer/src/dom";
+import { Theme } from "../../../cosim/viewer/src/theme";
+import { Drive } from "./drive";
+import { Pad } from "./gamepad";
+import { Keys } from "./keys";
+import type { Connection } from "./link";
+import type { Setup, World } from "./messages";
+import { note, Panel } from "./panel";
+import { Plots } from "./plots";
+import { Poses } from "./poses";
+import { Pusher } from "./push";
+import { listenToTouch } from "./touch";
+import { View } from "./view";
+
+const RISE = 0.1; // of the largest height, at a press of a key
+const PACE = 0.05; // of the largest speed, at a press of a key
+
+/** Connects the page's parts with each other and with the loop. */
+export function start(setup: Setup, link: Connection): void {
+  document.head.append(element("style", "", plotStyle));
+  const theme = new Theme(byId<HTMLButtonElement>("theme"));
+  const drive = new Drive(link, setup.speed);
+  const panel = new Panel(setup, link, drive);
+  const [plots, poses, view] = [new Plots(), new Poses(), makeView()];
+  let world: World | undefined;
+  link.on("world", (message) => {
+    world = message;
+    plots.build(message);
+    void view?.build(message);
+  });
+  link.on("frame", (frame) => {
+    poses.add(frame);
+    plots.add(frame);
+    panel.showFrame(frame);
+    document.documentElement.dataset.ready = "true";
+  });
+  theme.listen(() => {
+    view?.paint();
+    plots.repaint();
+  });
+  const keys = new Keys(drive, actionsOf(drive, panel, theme, view));
+  listenToPad(keys);
+  listenToTouch(drive);
+  const pad = new Pad(drive, buttonsOf(panel), (name) => {
+    document.documentElement.dataset.gamepad = name;
+    if (name) note(`Gamepad: ${name}`);
+  });
+  const pusher = view && new Pusher(view, link, () => world?.weight ?? 0);
+  listenToHelp();
+  byId("home")?.addEventListener("click", () => view?.home());
+  const picture = (): void => {
+    pad.read();
+    pusher?.renew();
+    const shown = poses.advance();
+    if (shown) view?.draw(shown.pose, shown.frame);
+    plots.draw();
+    requestAnimationFrame(picture);
+  };
+  requestAnimationFrame(picture);
+  Object.assign(window, { hexapod: { link, drive, poses, plots, view, panel } });
+}
+
+/** Returns the 3D view, or shows why there is none. */
+function makeView(): View | undefined {
+  try {
+    return new View(byId("stage")!);
+  } catch {
+    const text = "This browser has no WebGL, so the robot is not drawn. Keys and plots work.";
+    byId("stage")?.append(element("p", "refusal", text));
+    return undefined;
+  }
+}
+
+function actionsOf(
+  drive: Drive,
+  panel: Panel,
+  theme: Theme,
+  view: View | undefined,
+): Record<string, () => void> {
+  const gaits = ["Digit1", "Digit2", "Digit3", "Digit4"];
+  const chosen = (k: number) => () => {
+    byId("gaits")?.querySelectorAll<HTMLButtonElement>("button")[k]?.click();
+  };
+  return {
+    ...Object.fromEntries(gaits.map((code, k) => [code, chosen(k)])),
+    KeyC: () => panel.next("control"),
+    KeyR: () => {
+      drive.height += RISE;
+    },
+    KeyF: () => {
+      drive.height -= RISE;
+    },
+    "+": () => {
+      drive.speed += PACE;
+    },
+    "-": () => {
+      drive.speed -= PACE;
+    },
+    Space: () => panel.act("pause"),
+    Backspace: () => panel.act("place"),
+    KeyH: () => view?.home(),
+    KeyT: () => theme.toggle(),
+    "?": () => byId("help-button")?.click(),
+  };
+}
+
+/** What the buttons of a gamepad do: A, X, Y, and the two at its front. */
+function buttonsOf(panel: Panel): Record<number, () => void> {
+  return {
+    0: () => panel.act("place"),
+    2: () => panel.act("record"),
+    3: () => panel.next("control"),
+    4: () => panel.next("gait", -1),
+    5: () => panel.next("gait"),
+    9: () => panel.act("pause"),
+  };
+}
+
+/** Lets the page's pad of keys be pressed with a pointer. */
+function listenToPad(keys: Keys): void {
+  for (const button of document.querySelectorAll<HTMLElement>("[data-key]")) {
+    const code = button.dataset.key!;
+    button.addEventListener("pointerdown", (event) => {
+      button.setPointerCapture(event.pointerId);
+      keys.hold(code);
+    });
+    for (const name of ["pointerup", "pointercancel", "lostpointercapture"] as const)
+      button.addEventListener(name, () => keys.release(code));
+  }
+}
+
+function listenToHelp(): void {
+  const help = byId<HTMLDialogElement>("help");
+  byId("help-button")?.addEventListener("click", () => help?.showModal());
+  byId("help-close")?.addEventListener("click", () => help?.close());
+}

@@ -1,0 +1,225 @@
+import uPlot from "uplot";
+import { byId, element } from "../../../cosim/viewer/src/dom";
+import { property, quietAxis } from "../../../cosim/viewer/src/theme";
+import type { Frame, World } from "./messages";
+
+const WIDTH = 8; // s    that the plots show
+const SLOWEST = 45; // ms    between two drawings
+const DEGREES = 180 / Math.PI;
+
+interface Curve {
+  readonly label: string;
+  readonly colour: string;
+  readonly dash?: number[];
+  value(frame: Frame): number;
+}
+
+interface Described {
+  readonly name: string;
+  readonly unit: string;
+  /** Least range of the axis. */
+  readonly least: readonly [number, number];
+  readonly digits: number;
+  readonly curves: readonly Curve[];
+}
+
+/** Returns a number with a fixed count of digits, and zero without a sign. */
+function fixed(value: number, digits: number): string {
+  const text = value.toFixed(digits);
+  return Number(text) === 0 ? (0).toFixed(digits) : text;
+}
+
+/** Plots that run along: the last seconds of a few quantities. */
+export class Plots {
+  private readonly strips: Strip[] = [];
+  private drawn = 0;
+  private placed = -1;
+
+  build(world: World): void {
+    if (this.strips.length > 0) return;
+    const host = byId("plots");
+    if (!host) return;
+    for (const one of described(world)) this.strips.push(new Strip(one, host));
+  }
+
+  add(frame: Frame): void {
+    if (frame.placed !== this.placed) for (const strip of this.strips) strip.clear();
+    this.placed = frame.placed;
+    for (const strip of this.strips) strip.add(frame);
+  }
+
+  /** Draws what is new, not more often than it can be seen. */
+  draw(): void {
+    const now = performance.now();
+    if (now - this.drawn < SLOWEST) return;
+    this.drawn = now;
+    for (const strip of this.strips) strip.draw();
+  }
+
+  repaint(): void {
+    for (const strip of this.strips) strip.repaint();
+  }
+
+  /** Number of points of each plot, for tests. */
+  get counts(): number[] {
+    return this.strips.map((strip) => strip.count);
+  }
+}
+
+function described(world: World): Described[] {
+  const legs = world.robot.legs.map(({ name }) => name);
+  const size = (frame: Frame, k: number) => Math.hypot(...frame.force.slice(3 * k, 3 * k + 3));
+  return [
+    {
+      name: "Foot forces",
+      unit: "body weights",
+      least: [0, 0.6],
+      digits: 2,
+      curves: legs.map((label, k) => ({
+        label,
+        colour: `--leg${k}`,
+        value: (frame) => size(frame, k),
+      })),
+    },
+    {
+      name: "Speed",
+      unit: "mm/s",
+      least: [-60, 120],
+      digits: 0,
+      curves: [
+        { label: "asked", colour: "--commanded", dash: [4, 3], value: (f) => 1e3 * f.command[0] },
+        { label: "forward", colour: "--curve1", value: (f) => 1e3 * f.speed[0] },
+        { label: "left", colour: "--curve2", value: (f) => 1e3 * f.speed[1] },
+      ],
+    },
+    {
+      name: "Attitude",
+      unit: "degrees",
+      least: [-3, 3],
+      digits: 1,
+      curves: [
+        { label: "roll", colour: "--curve1", value: (f) => DEGREES * f.tilt[0] },
+        { label: "pitch", colour: "--curve2", value: (f) => DEGREES * f.tilt[1] },
+      ],
+    },
+    {
+      name: "Sliding of feet",
+      unit: "mm/s",
+      least: [0, 40],
+      digits: 0,
+      curves: [
+        {
+          label: "fastest foot",
+          colour: "--curve3",
+          value: (f) => 1e3 * Math.max(...f.slip.map((speed, k) => (f.contact[k] ? speed : 0))),
+        },
+      ],
+    },
+  ];
+}
+
+/** One plot, with the newest values in its heading. */
+class Strip {
+  private readonly plot: uPlot;
+  private readonly data: number[][];
+  private readonly values: HTMLElement[];
+
+  constructor(
+    private readonly about: Described,
+    host: HTMLElement,
+  ) {
+    const figure = element("figure", "panel");
+    const heading = element("figcaption", "panel-title");
+    const name = element("span", "panel-name", `${about.name} `);
+    name.append(element("span", "panel-unit", about.unit));
+    heading.append(name);
+    this.values = about.curves.map((curve) => readout(heading, curve));
+    const box = element("div", "panel-box");
+    figure.append(heading, box);
+    host.append(figure);
+    this.data = [[], ...about.curves.map(() => [])];
+    this.plot = new uPlot(this.describe(box), this.data as uPlot.AlignedData, box);
+    new ResizeObserver(() =>
+      this.plot.setSize({ width: Math.max(box.clientWidth, 100), height: box.clientHeight || 110 }),
+    ).observe(box);
+  }
+
+  get count(): number {
+    return this.data[0].length;
+  }
+
+  add(frame: Frame): void {
+    this.data[0].push(frame.time);
+    this.about.curves.forEach((curve, k) => {
+      this.data[k + 1].push(curve.value(frame));
+    });
+    while (this.data[0][0] < frame.time - WIDTH) for (const column of this.data) column.shift();
+  }
+
+  clear(): void {
+    for (const column of this.data) column.length = 0;
+  }
+
+  draw(): void {
+    const last = this.data[0][this.data[0].length - 1];
+    if (last === undefined) return;
+    this.plot.setData(this.data as uPlot.AlignedData, false);
+    this.plot.batch(() => {
+      this.plot.setScale("x", { min: last - WIDTH, max: last });
+      this.plot.setScale("y", this.range());
+    });
+    this.values.forEach((value, k) => {
+      const column = this.data[k + 1];
+      value.textContent = fixed(column[column.length - 1], this.about.digits);
+    });
+  }
+
+  repaint(): void {
+    this.plot.redraw(false, true);
+  }
+
+  /** The range of all curves, and at least that of the plot, with some room above and below. */
+  private range(): { min: number; max: number } {
+    let [min, max] = this.about.least;
+    for (const column of this.data.slice(1))
+      for (const value of column) [min, max] = [Math.min(min, value), Math.max(max, value)];
+    const room = 0.06 * (max - min);
+    return { min: min < 0 ? min - room : min, max: max + room };
+  }
+
+  private describe(box: HTMLElement): uPlot.Options {
+    const quiet = quietAxis();
+    return {
+      width: Math.max(box.clientWidth, 100),
+      height: box.clientHeight || 110,
+      legend: { show: false },
+      cursor: { show: false },
+      padding: [6, 6, 0, 0],
+      scales: { x: { time: false, auto: false }, y: { auto: false } },
+      axes: [
+        { ...quiet, size: 20, space: 60 },
+        { ...quiet, size: 38, space: 26 },
+      ],
+      series: [
+        {},
+        ...this.about.curves.map((curve) => ({
+          stroke: () => property(curve.colour),
+          width: 1.6,
+          points: { show: false },
+          ...(curve.dash ? { dash: curve.dash } : {}),
+        })),
+      ],
+    };
+  }
+}
+
+/** Adds a curve's mark, label and value to a heading; returns the value's element. */
+function readout(heading: HTMLElement, curve: Curve): HTMLElement {
+  const item = element("span", "readout");
+  const mark = element("i", curve.dash ? "mark dashed" : "mark");
+  mark.style.setProperty("--mark", `var(${curve.colour})`);
+  const value = element("span", "value", "0");
+  item.append(mark, curve.label, value);
+  heading.append(item);
+  return value;
+}
