@@ -38,7 +38,6 @@ from hexapod_cosim.cosim.results.ground import is_on_surface, surface_of_grid
 from hexapod_cosim.cosim.results.heat import heat_warnings
 from hexapod_cosim.cosim.results.metrics import MEASURED_BY_PLANT, compute_metrics, metric_columns
 from hexapod_cosim.cosim.results.result import Result
-from hexapod_cosim.cosim.results.walk import View
 from hexapod_cosim.cosim.results.warnings import (
     describe_fall,
     locomotion_of,
@@ -48,6 +47,7 @@ from hexapod_cosim.cosim.results.warnings import (
     unused_settings,
     walk_warnings,
 )
+from hexapod_cosim.cosim.results.window import View
 from hexapod_cosim.cosim.run.chosen_walk import ChosenWalk, choose_walk
 from hexapod_cosim.cosim.run.preparation import PlantFmus, chosen_gains, law_of
 from hexapod_cosim.cosim.scenario.checks import check_servo_faults
