@@ -19,7 +19,11 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[1]
 PICTURE = ROOT / "docs" / "images" / "rooms.svg"
 PACKAGE = "hexapod_cosim"
-C_NAMES = {"extensions/gym/policy_fmu": "policy_fmu", "cosim/master": "master"}
+C_NAMES = {
+    "extensions/gym/policy_fmu": "policy_fmu",
+    "extensions/gym/loop": "gym loop",
+    "cosim/master": "master",
+}
 C_ROOMS = ("fmi", "plant_fmu", "controller/fmu", *C_NAMES)
 SHARED = (
     "range_check.h",

@@ -169,11 +169,12 @@ def cross_compile() -> dict[tuple[str, str], bytes]:
 
 def loop_library() -> Library:
     """Returns the co-simulation loops as a library, as cosim/master/CMakeLists.txt builds it."""
-    plant, own = ROOT / "plant_fmu", ROOT / "cosim" / "master"
+    plant, loops = ROOT / "plant_fmu", ("cosim/master", "extensions/gym/loop")
     files = {}
-    for include in (plant / "include", own / "include"):
+    for include in (plant / "include", *(ROOT / loop / "include" for loop in loops)):
         files |= {path.relative_to(include).as_posix(): path for path in include.rglob("*.h")}
-    files |= {f"src/{path.name}": path for path in (own / "src").glob("*.[ch]")}
+    for loop in loops:
+        files |= {f"src/{path.name}": path for path in (ROOT / loop / "src").glob("*.[ch]")}
     files["src/message.c"] = plant / "src" / "message.c"
     flags = ("-DHX_SHARED", "-pthread")
     return Library(LOOP, dict(sorted(files.items())), (fmi_headers(),), flags)

@@ -30,13 +30,6 @@ TIME_LIMIT = 60.0  # s    wall time of one call of a controller; twice as much a
 Progress = Callable[[float], None]  # simulated time since the start [s]
 
 
-class Stepped(Protocol):
-    """What the master steps."""
-
-    def step(self, t: float, h: float) -> None:
-        """Steps from t to t + h [s]. Raises StepError."""
-
-
 class JointController(Protocol):
     """Interface of a controller that the master needs."""
 
@@ -155,7 +148,7 @@ def _loop(
         joints = controller.step(t, command, measurement)
         watch.call = 0
         is_lost = lost is not None and lost[k]
-        macro_step(plant, signals, None if is_lost else joints, t, h, recorder.record)
+        macro_step(plant.step, signals, None if is_lost else joints, t, h, recorder.record)
         if progress is not None and k % PROGRESS_STEPS == 0:
             progress((k + 1) * h)
     recorder.record()
@@ -164,7 +157,7 @@ def _loop(
 
 
 def macro_step(
-    plant: Stepped,
+    step: Callable[[float, float], None],
     signals: Signals,
     joints: JointCommand | None,
     t: float,
@@ -176,7 +169,7 @@ def macro_step(
     Every loop in Python calls it; cosim/master/src/macro_step.c is the same in C.
 
     Args:
-        plant: it is stepped after its inputs are set.
+        step: steps the plant from t by h.
         signals: of the plant; the push in them is set as well.
         joints: commands of the controller; None: the last ones again.
         record: is called before the plant steps, so that a recording shows the values that led to a
@@ -189,5 +182,5 @@ def macro_step(
     else:
         signals.write(joints)
     record()
-    plant.step(t, h)
+    step(t, h)
     signals.read()

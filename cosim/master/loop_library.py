@@ -19,7 +19,7 @@ from hexapod_cosim.models import FmuError
 
 HEADERS = Path(__file__).parent / "include" / "hexapod"
 # each uses structures of those before it
-ORDER = ("macro_step.h", "sensors.h", "master.h", "environments.h")
+ORDER = ("macro_step.h", "sensors.h", "master.h")
 _COMMENT = re.compile(r"/\*.*?\*/", re.DOTALL)
 _BLOCK = re.compile(
     r"typedef struct (?P<name>\w+) \{(?P<members>.*?)\} \w+;|enum \w* ?\{(?P<list>.*?)\}"
@@ -96,25 +96,29 @@ class Header:
 
 
 @cache
-def read_headers() -> Header:
-    """Returns what the library's headers declare."""
+def read_headers(*more: Path) -> Header:
+    """Returns what the library's headers declare, and those of an extension that use them."""
     header = Header()
-    for name in ORDER:
-        header.read((HEADERS / name).read_text(encoding="utf-8"))
+    if more:  # whose structures hold the same ones
+        header.structures |= read_headers().structures
+        header.numbers |= read_headers().numbers
+    for path in more or (HEADERS / name for name in ORDER):
+        header.read(path.read_text(encoding="utf-8"))
     return header
 
 
-def load_loop(part: str, size: str, structure: str) -> ct.CDLL:
+def load_loop(part: str, size: str, structure: str, *more: Path) -> ct.CDLL:
     """Returns the library if its structures are those of the headers.
 
     Args:
-        part: the part of the library: "master" or "environments".
+        part: the part of the library: "master", or that of an extension.
         size: the function that returns the size of the structure.
         structure: name of the structure that holds all others of this part.
+        more: headers of the extension.
 
     Raises FmuError when the library is missing or has other structures.
     """
-    path, header = shared_library(LOOP), read_headers()
+    path, header = shared_library(LOOP), read_headers(*more)
     library = ct.CDLL(str(path))
     layout = f"hx_{part}_layout"
     want = header.numbers[layout.upper()], ct.sizeof(header.structures[structure])

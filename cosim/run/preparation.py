@@ -13,7 +13,7 @@ from hexapod_cosim.cosim.common.plant_files import binary, fmi2_platform
 from hexapod_cosim.cosim.common.temporary import TemporaryFolder
 from hexapod_cosim.cosim.export.plant_export import export_fmu
 from hexapod_cosim.cosim.run.chosen_walk import choose_walk
-from hexapod_cosim.cosim.run.kept_gains import kept_gains
+from hexapod_cosim.cosim.run.kept_designs import kept_gains
 from hexapod_cosim.cosim.scenario.controls import control_of
 from hexapod_cosim.cosim.scenario.records import Scenario
 from hexapod_cosim.models import Robot, load_robot

@@ -45,7 +45,7 @@ from hexapod_cosim.cosim.run.single_run import (
     simulate,
     start_controller,
 )
-from hexapod_cosim.cosim.scenario.controls import FMU, Control, control_of
+from hexapod_cosim.cosim.scenario.controls import FMU, control_of
 from hexapod_cosim.cosim.scenario.records import Scenario
 from hexapod_cosim.models import HexapodError, Robot
 from hexapod_cosim.models.friction import BRISTLE_LAWS
@@ -105,42 +105,21 @@ class Walker(Closing):
         start; how a run that started ended is in the result.
         """
         control = control_of(scenario.control)
-        if control.is_builtin and reads_no_numbers(scenario):
-            path = self._fmus.fmu(scenario.robot) if fmu is None else fmu
-            return simulate(scenario, fmu=path, gains=gains, progress=progress, begin=begin)
-        if not control.is_builtin:
-            return self._simulate_given(
-                scenario, control, fmu=fmu, gains=gains, progress=progress, begin=begin
-            )
-        plan = make_plan(scenario, gains=gains)
-        controller = self._controller_for(plan)
-        plant, master = self._plant(plan, controller, fmu)
-        parameters = self._initialise_plant(plant, plan)
-        controller.initialise(scenario.start, scenario.start + scenario.duration)
-        return self._run(plan, plant, master, parameters, progress, begin)
-
-    def _simulate_given(
-        self,
-        scenario: Scenario,
-        control: Control,
-        *,
-        fmu: Path | None,
-        gains: Gains | None,
-        progress: Progress | None,
-        begin: Callable[[], None] | None,
-    ) -> Result:
-        """Runs a scenario under the user's control.
-
-        An FMU of FMI 2.0 without Boolean inputs runs on the loop in C, opened anew for each run,
-        because FMUs need not support a reset.
-        """
         path = self._fmus.fmu(scenario.robot) if fmu is None else fmu
+        if control.is_builtin and not reads_no_numbers(scenario):
+            plan = make_plan(scenario, gains=gains)
+            controller = self._controller_for(plan)
+            plant, master = self._plant(plan, controller, path)
+            parameters = self._initialise_plant(plant, plan)
+            controller.initialise(scenario.start, scenario.start + scenario.duration)
+            return self._run(plan, plant, master, parameters, progress, begin)
         if control.kind == FMU and control.path is not None:
-            with closing(open_controller_fmu(control.path)) as controller:
+            # opened anew for each run, because FMUs need not support a reset
+            with closing(open_controller_fmu(control.path)) as given:
                 plan = make_plan(scenario, gains=gains)
-                connection = connection_of(control, controller.described, scenario, plan.controller)
-                if connection.is_scalar and isinstance(controller, Fmu):
-                    return self._simulate_fmu(plan, path, controller, connection, progress, begin)
+                connection = connection_of(control, given.described, scenario, plan.controller)
+                if connection.is_scalar and isinstance(given, Fmu):
+                    return self._simulate_fmu(plan, path, given, connection, progress, begin)
         return simulate(scenario, fmu=path, gains=gains, progress=progress, begin=begin)
 
     def _simulate_fmu(
@@ -152,15 +131,10 @@ class Walker(Closing):
         progress: Progress | None,
         begin: Callable[[], None] | None,
     ) -> Result:
-        """Runs a plan under a controller FMU on the loop in C."""
+        """Runs a plan under a user's controller FMU on the loop in C."""
         control, plant = control_of(plan.scenario.control), self._open_plant(path)
-        master = NativeMaster(
-            plant,
-            controller,
-            connection,
-            columns=self._columns(plan),
-            judged=metric_columns(bristles=True),
-        )
+        columns, judged = self._columns(plan), metric_columns(bristles=True)
+        master = NativeMaster(plant, controller, connection, columns=columns, judged=judged)
         parameters = self._initialise_plant(plant, plan)
         controller.set_parameters(fmu_parameters_of(control, controller.described, plan.scenario))
         law = FmuLaw(controller, connection, period=plan.controller.period)
@@ -226,9 +200,8 @@ class Walker(Closing):
         except HexapodError as error:
             return refused_summary(scenario, error)
 
-    def _plant(self, plan: RunPlan, controller: Fmu, fmu: Path | None) -> tuple[Fmu, NativeMaster]:
+    def _plant(self, plan: RunPlan, controller: Fmu, path: Path) -> tuple[Fmu, NativeMaster]:
         """Returns the plant FMU of the plan and the master that connects it to the controller."""
-        path = self._fmus.fmu(plan.scenario.robot) if fmu is None else fmu
         plant, columns = self._open_plant(path), self._columns(plan)
         key = path, columns
         if key not in self._masters:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ctypes as ct
 from functools import cache
+from pathlib import Path
 
 from hexapod_cosim.cosim.master.loop_library import load_loop, read_headers
 
@@ -20,7 +21,8 @@ CALLS = {
 }
 Pointer, Size = ct.c_void_p, ct.c_size_t
 
-_STRUCTURES = read_headers().structures
+HEADER = Path(__file__).parent / "loop" / "include" / "hexapod" / "environments.h"
+_STRUCTURES = read_headers(HEADER).structures
 NativeFmu, NativeDraws = _STRUCTURES["hxEnvFmu"], _STRUCTURES["hxEnvDraws"]
 NativeGround, NativeSettings = _STRUCTURES["hxEnvGround"], _STRUCTURES["hxEnvSettings"]
 NativeArrays = _STRUCTURES["hxEnvArrays"]
@@ -33,7 +35,7 @@ def environments_library() -> ct.CDLL:
 
     Raises FmuError when the library is missing or has another version.
     """
-    library = load_loop("environments", "hx_environments_settings_size", "hxEnvSettings")
+    library = load_loop("environments", "hx_environments_settings_size", "hxEnvSettings", HEADER)
     library.hx_environments_create.restype = Pointer
     library.hx_environments_create.argtypes = [Pointer, Pointer, Size, ct.c_char_p]
     library.hx_environments_message.restype = ct.c_char_p

@@ -29,11 +29,11 @@ from hexapod_cosim.cosim.control.controllers import make_controller
 from hexapod_cosim.cosim.control.fmu_law import FmuLaw, law_of_ours
 from hexapod_cosim.cosim.export.controller_export import export_controller
 from hexapod_cosim.cosim.interface.controller_interface import controller_parameters
-from hexapod_cosim.cosim.master.fmu import Fmu
-from hexapod_cosim.cosim.master.loop import JointController
+from hexapod_cosim.cosim.master.fmu import Fmu, StepError
+from hexapod_cosim.cosim.master.loop import JointController, macro_step
 from hexapod_cosim.cosim.master.sensors import errors_of
 from hexapod_cosim.cosim.master.signals import Signals
-from hexapod_cosim.cosim.results.walk import robot_weight
+from hexapod_cosim.cosim.results.window import robot_weight
 from hexapod_cosim.cosim.run.preparation import PlantFmus
 from hexapod_cosim.cosim.run.single_run import (
     RunPlan,
@@ -271,20 +271,22 @@ class LiveRobot(Closing):
             return
         self._follow_change()
         self.signals.push[:3] = force
-        self._command_joints(command)
         try:
-            self.advance(self.time, self.h)
+            self._advance(command)
             self.count += 1
-            self.signals.read()
         except HexapodError as error:
             self.fault, self.stopped = str(error), True
 
-    def _command_joints(self, command: BodyCommand) -> None:
-        """Writes the controller's joint commands; after a fault, the last that were accepted."""
+    def _advance(self, command: BodyCommand) -> None:
+        """Makes a macro-step under the controller's joint commands; after a fault, under the last
+        that were accepted. Raises FmuError.
+        """
         if not self.fault:
             try:
                 joints = self._controller.step(self.time, command, self.signals.measurement)
-                self.signals.write(joints)
+                macro_step(self.advance, self.signals, joints, self.time, self.h)
+            except StepError:
+                raise
             except (Exception, SystemExit) as error:  # a user's controller may raise anything
                 self.fault = _text_of(error)
             else:
@@ -292,7 +294,7 @@ class LiveRobot(Closing):
                 angle, torque = joints.angle_ref.copy(), joints.torque_ref.copy()
                 self._last = JointCommand(angle_ref=angle, torque_ref=torque)
                 return
-        self.signals.write(self._last)
+        macro_step(self.advance, self.signals, self._last, self.time, self.h)
 
     def close(self) -> None:
         """Frees the FMUs."""

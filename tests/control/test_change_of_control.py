@@ -16,6 +16,7 @@ from hexapod_cosim.cosim.interface.controller_interface import ControllerSetup
 from hexapod_cosim.models import HexapodError, load_robot
 
 CONTROLS = ("kinematic", "compliant", "paper")
+CYCLE = [("kinematic", "compliant"), ("compliant", "paper"), ("paper", "kinematic")]
 STEP = 0.005  # s
 WALK = BodyCommand(vx=0.06, yaw_rate=0.05)
 ROBOT = load_robot("athena")
@@ -53,7 +54,7 @@ def sense(controller: Controller, generator: np.random.Generator, seen: Measurem
 
 
 @pytest.mark.parametrize("pair", list(permutations(CONTROLS, 2)), ids="-".join)
-@pytest.mark.parametrize("step", [0, 1, 60, 340, 431])
+@pytest.mark.parametrize("step", [1, 340])
 def test_python_and_c_change_the_control_alike(
     controller_core: ct.CDLL, pair: tuple[str, str], step: int
 ) -> None:
@@ -149,7 +150,7 @@ def test_the_phase_and_the_command_go_on_when_the_control_changes() -> None:
 def test_angles_and_speeds_begin_with_those_of_the_control_before() -> None:
     """The first command after a change is the last one, continued by a period."""
     seen, generator = Measurement(angle=ROBOT.stance.copy()), np.random.default_rng(5)
-    for first, then in permutations(CONTROLS, 2):
+    for first, then in CYCLE:
         lead = setup_of(first).build()
         for k in range(371):
             lead.step(k * STEP, WALK, seen)
@@ -162,7 +163,7 @@ def test_angles_and_speeds_begin_with_those_of_the_control_before() -> None:
         np.testing.assert_allclose(out.torque_ref, last[2], rtol=0.0, atol=1e-12)
 
 
-@pytest.mark.parametrize("pair", list(permutations(CONTROLS, 2)), ids="-".join)
+@pytest.mark.parametrize("pair", CYCLE, ids="-".join)
 def test_a_state_saved_during_a_change_of_control_continues_with_the_same_bits(
     controller_core: ct.CDLL, pair: tuple[str, str]
 ) -> None:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from hexapod_cosim.cosim.export.controller_export import export_controller
-from hexapod_cosim.cosim.interface.names import foot_names, joint_names
+from hexapod_cosim.cosim.interface.names import joint_names
 from hexapod_cosim.cosim.master.connection import FmuVariable, connect, names_of_map, read_map
 from hexapod_cosim.cosim.run.controller_setup import make_setup
 from hexapod_cosim.cosim.run.single_run import simulate
@@ -64,6 +64,7 @@ def test_equal_names_are_connected_and_all_others_are_left_alone() -> None:
     assert [theirs for theirs, _ in found.outputs] == ANGLES
     assert found.unconnected == ("temperature", "torso.position[1]")
     assert found.diagnostics == found.flags == []
+    assert not found.is_scalar
 
 
 def test_an_array_of_fmi_3_is_connected_as_a_whole() -> None:
@@ -95,12 +96,6 @@ def test_a_table_with_a_wrong_name_is_refused() -> None:
         names_of_map({"LF.coxa.angel_ref": "q"}, where="test")
     with pytest.raises(FmuError, match="the map names a variable that the FMU lacks, for command"):
         connect([real("v", "input")], {"command.vx": "w"}, torque=False, where="test")
-
-
-def test_contacts_need_the_loop_in_python() -> None:
-    variables = [flag(name, "input") for name in foot_names("contact")]
-    found = connect([*variables, *map(real, ANGLES)], {}, torque=False, where="test")
-    assert not found.is_scalar
 
 
 def test_a_file_without_a_table_beside_it_maps_nothing(tmp_path: Path) -> None:

@@ -45,7 +45,10 @@ def steady(summary: Summary) -> Summary:
     return replace(summary, metrics=figures)
 
 
-def test_runs_come_in_order_and_do_not_depend_on_the_processes(plant_build: Path) -> None:
+@pytest.mark.parametrize("compiled", [False, True])
+def test_runs_come_in_order_and_do_not_depend_on_the_processes(
+    plant_build: Path, compiled: bool
+) -> None:
     kinds = (
         (2, "kinematic", "athena"),
         (0, "compliant", "athena"),
@@ -55,19 +58,17 @@ def test_runs_come_in_order_and_do_not_depend_on_the_processes(plant_build: Path
         replace(short(f"control={control}", f"robot={robot}"), seed=seed)
         for seed, control, robot in kinds
     ]
-    serial, parallel = (list(run_batch(plans, workers=workers)) for workers in (1, 2))
+    serial, parallel = (
+        list(run_batch(plans, workers=workers, compiled=compiled)) for workers in (1, 2)
+    )
     assert [(run.seed, run.control) for run in serial] == [
         (plan.seed, plan.control) for plan in plans
     ]
     assert list(map(steady, serial)) == list(map(steady, parallel))
     assert all(run.walked for run in serial)
     assert serial[0].metrics["slip_per_metre"] != serial[1].metrics["slip_per_metre"]
-
-
-def test_a_run_of_a_batch_is_the_run_by_itself(plant_build: Path) -> None:
-    plan = short("friction.mu=0.5", "torso.mass=3.1")
-    (run,) = run_batch([plan], workers=1)
-    assert steady(run) == steady(summarise(simulate(plan)))
+    if not compiled:
+        assert steady(serial[0]) == steady(summarise(simulate(plans[0])))
 
 
 def test_a_run_that_fails_or_cannot_begin_says_why_and_the_others_go_on(plant_build: Path) -> None:
@@ -204,11 +205,3 @@ def test_a_worker_that_dies_each_time_is_reported_with_its_run(
         with pytest.raises(HexapodError, match=r"worker process of the batch.*seed 8, kinematic"):
             list(runs)
     assert multiprocessing.active_children() == []
-
-
-@pytest.mark.skipif(sys.platform == "win32", reason="no such signal")
-def test_workers_end_when_the_command_is_killed(plant_build: Path, tmp_path: Path) -> None:
-    process = start_comparison(tmp_path / "out", engine="compiled")
-    process.kill()
-    process.communicate(timeout=TIMEOUT)
-    assert_none_left(process.pid)

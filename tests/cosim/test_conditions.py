@@ -13,7 +13,8 @@ from hexapod_cosim.cosim.design.gain_design import design_for
 from hexapod_cosim.cosim.export.robot_package import read_values
 from hexapod_cosim.cosim.interface.controller_interface import controller_parameters
 from hexapod_cosim.cosim.results.result import Result
-from hexapod_cosim.cosim.run.single_run import make_plan, simulate
+from hexapod_cosim.cosim.run.single_run import make_plan
+from hexapod_cosim.cosim.run.walker import Walker
 from hexapod_cosim.cosim.scenario.scenario import load_scenario
 from hexapod_cosim.models import HexapodError, load_robot
 
@@ -21,7 +22,8 @@ NO_PUSH = "the ground has no friction: feet cannot push, and the robot does not 
 
 
 def run(name: str, *overrides: str) -> Result:
-    result = simulate(load_scenario(name, overrides=overrides))
+    with Walker(everything=True) as walker:
+        result = walker.simulate(load_scenario(name, overrides=overrides))
     assert result.completed, result.outcome.reason
     return result
 

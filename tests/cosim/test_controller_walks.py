@@ -1,4 +1,4 @@
-"""Walks with gains chosen by hand, through the FMU: effects of the compliant control."""
+"""Effects of the compliant control: walks with gains chosen by hand, on the loop in C."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from gains import make_gains
 
 from hexapod_cosim.controller import SWITCHES
 from hexapod_cosim.cosim.results.result import Result
-from hexapod_cosim.cosim.run.single_run import simulate
+from hexapod_cosim.cosim.run.walker import Walker
 from hexapod_cosim.cosim.scenario.scenario import load_scenario
 from hexapod_cosim.models import load_robot
 
@@ -26,7 +26,8 @@ def walk(robot: str, control: str, *overrides: str, duration: float = 4.0) -> Re
         "walk_flat",
         overrides=[f"robot={robot}", f"control={control}", f"duration={duration}", *overrides],
     )
-    return simulate(scenario, gains=make_gains(load_robot(robot)))
+    with Walker(everything=True) as walker:
+        return walker.simulate(scenario, gains=make_gains(load_robot(robot)))
 
 
 def outputs(result: Result) -> np.ndarray:

@@ -9,7 +9,7 @@ import pytest
 from gains import make_gains
 
 from hexapod_cosim.cosim.results.result import Result
-from hexapod_cosim.cosim.run.single_run import simulate
+from hexapod_cosim.cosim.run.walker import Walker
 from hexapod_cosim.cosim.scenario.scenario import load_scenario
 from hexapod_cosim.models import load_robot
 
@@ -22,7 +22,8 @@ def walk(control: str, *overrides: str) -> Result:
     scenario = load_scenario(
         "walk_flat", overrides=[f"control={control}", "duration=8.0", *overrides]
     )
-    return simulate(scenario, gains=make_gains(load_robot("athena")))
+    with Walker(everything=True) as walker:
+        return walker.simulate(scenario, gains=make_gains(load_robot("athena")))
 
 
 @pytest.mark.usefixtures("plant_build")

@@ -30,7 +30,6 @@ from hexapod_cosim.cosim.master.sensors import errors_of
 from hexapod_cosim.cosim.master.signals import Signals
 from hexapod_cosim.cosim.results.result import Result
 from hexapod_cosim.cosim.results.summary import REFUSED, Summary, summarise
-from hexapod_cosim.cosim.run.batch import run_batch
 from hexapod_cosim.cosim.run.single_run import (
     initialise_plant,
     make_plan,
@@ -46,9 +45,6 @@ from hexapod_cosim.models import FRICTION_LAWS, FmuError, load_robot
 
 SENSORS = ("sensors.foot_force_noise=0.05", "sensors.foot_force_delay=0.012")
 FAULTS = (
-    'events=[{time=1.5, leg="LM", fault="dead", duration=0.5}, {time=1.2, leg="RF", fault="stuck"}]'
-)
-ALL_FAULTS = (
     "events=[{time=0.5, duration=0.1, sensor='angle', leg='LM', joint='femur', fault='late', "
     "delay=0.02}, {time=0.6, duration=0.1, sensor='attitude', fault='dead'}, "
     "{time=0.7, duration=0.1, leg='RF', fault='dead'}, {time=0.8, leg='LF', fault='late', "
@@ -61,7 +57,7 @@ TURN = ("command.yaw_rate=0.2", "command.roll=0.03", "command.vy=0.01")
 ENDLESS = "events=[{time=0.1, duration=0.1, force=[1e8, 1e8, 1e8], torque=[1e8, 1e8, 1e8]}]"
 # relative, of figures under the C and the Python controller, whose commands agree to 1e-12 rad
 CLOSE = 1e-6
-GROWTH = 1_000_000  # bytes    over 40 runs: less than one recording, of 2 MB
+GROWTH = 1_000_000  # bytes    over 20 runs: less than one recording, of 2 MB
 
 pytestmark = pytest.mark.usefixtures("plant_build")
 
@@ -119,12 +115,11 @@ WALKS = [
     planned("walk_flat", "control=compliant", seed=3),
     planned("walk_flat", "control=kinematic", "gait.name=ripple", *TURN, seed=4),
     planned("walk_flat", "control=compliant", "gait.name=wave", PUSH),
-    planned("walk_flat", "control=compliant", FAULTS, *SENSORS, seed=5),
-    planned("walk_flat", "control=compliant", ALL_FAULTS, *SENSORS),
+    planned("walk_flat", "control=compliant", FAULTS, *SENSORS),
     planned("walk_flat", "gait.name=amble", "friction.law=bristle", SENSORS[1]),
-    planned("stop_and_go", "control=compliant", "macro_step=0.004"),
-    planned("phantomx_walk", "control=compliant", "start=7.3", "torso.mass=1.9", seed=6),
-    planned("incline", "control=compliant", seed=7),
+    planned(
+        "phantomx_walk", "control=compliant", "start=7.3", "torso.mass=1.9", "macro_step=0.004"
+    ),
 ]
 
 
@@ -146,7 +141,7 @@ def test_every_signal_of_a_walk_is_the_python_masters_bit_for_bit(scenario: Scen
 def test_what_is_recorded_changes_no_figure_and_runs_do_not_depend_on_those_before(
     walker: Walker,
 ) -> None:
-    plans = [WALKS[0], WALKS[3], replace(WALKS[1], robot="phantomx_mk4"), WALKS[2]]
+    plans = [WALKS[3], replace(WALKS[1], robot="phantomx_mk4")]
     first = [steady(walker.summary(plan, gains=gains_of(plan))) for plan in plans]
     assert all(summary.walked for summary in first)
     again = [steady(walker.summary(plan, gains=gains_of(plan))) for plan in reversed(plans)]
@@ -171,7 +166,7 @@ def test_bristles_are_judged_however_a_scenario_asks_for_them(walker: Walker) ->
 
 
 def test_the_figures_are_those_of_the_python_controller(walker: Walker) -> None:
-    for scenario in WALKS[:3]:
+    for scenario in WALKS[:2]:
         found, expected = (
             walker.simulate(scenario, gains=gains_of(scenario)),
             simulate(scenario, gains=gains_of(scenario)),
@@ -280,31 +275,11 @@ def test_an_interrupted_walk_keeps_its_rows(walker: Walker) -> None:
 
 
 def test_memory_does_not_grow_with_the_number_of_runs(walker: Walker) -> None:
-    plans = [replace(WALKS[0], seed=seed, duration=1.0) for seed in range(40)]
+    plans = [replace(WALKS[0], seed=seed, duration=1.0) for seed in range(20)]
     gains = gains_of(WALKS[0])
-    for plan in plans[:10]:
+    for plan in plans[:8]:
         walker.summary(plan, gains=gains)
     before = resident()
     for plan in plans:
         walker.summary(plan, gains=gains)
     assert resident() - before < GROWTH
-
-
-# ------------------------------------------------------------------------------------------------
-# in processes
-
-
-def test_a_batch_of_compiled_controllers_does_not_depend_on_the_processes(walker: Walker) -> None:
-    plans = [replace(WALKS[1], seed=seed) for seed in range(3)] + [
-        replace(WALKS[1], robot="nowhere.toml"),
-        WALKS[4],
-    ]
-    serial, parallel = (
-        list(run_batch(plans, workers=workers, compiled=True)) for workers in (1, 2)
-    )
-    assert (
-        list(map(steady, serial))
-        == list(map(steady, parallel))
-        == [steady(walker.summary(plan)) for plan in plans]
-    )
-    assert [summary.status for summary in serial] == [COMPLETED] * 3 + [REFUSED, COMPLETED]

@@ -200,10 +200,17 @@ def test_the_fmi_layer_includes_no_core(component: str) -> None:
         assert not inside, f"{path.relative_to(ROOT)} includes {sorted(inside)}"
 
 
-def test_the_masters_loop_sees_the_standard_and_nothing_of_the_fmus_it_drives() -> None:
-    files = c_files("src", "include/hexapod", component="cosim/master")
-    assert files
-    headers = [path for path in files if path.suffix == ".h"]
+@pytest.mark.parametrize(
+    ("component", "more"), [("cosim/master", ""), ("extensions/gym/loop", "cosim/master")]
+)
+def test_the_loops_see_the_standard_and_nothing_of_the_fmus_they_drive(
+    component: str, more: str
+) -> None:
+    files = c_files("src", "include/hexapod", component=component)
+    if not files:
+        pytest.skip("the extension is not there")
+    below = c_files("include/hexapod", component=more) if more else []
+    headers = [path for path in (*files, *below) if path.suffix == ".h"]
     own = {path.name for path in headers} | {f"hexapod/{path.name}" for path in headers}
     own |= {"hexapod/shared_work.h", "hexapod/status.h", "hexapod/message.h"}
     for path in files:

@@ -20,6 +20,7 @@ from hexapod_cosim.extensions.gym.settings import BLOCKS, REASONS, TERMS
 from hexapod_cosim.models import FmuError
 
 ROOT = Path(__file__).parents[2]
+HEADER = read_headers(native.HEADER)
 
 
 def compile_c(text: str, *options: str | Path, folder: Path) -> None:
@@ -33,8 +34,8 @@ def compile_c(text: str, *options: str | Path, folder: Path) -> None:
 
 
 def test_python_reads_the_sizes_and_places_of_the_compiler(tmp_path: Path) -> None:
-    lines = [f'#include "hexapod/{name}"' for name in ORDER]
-    for name, structure in read_headers().structures.items():
+    lines = [f'#include "hexapod/{name}"' for name in (*ORDER, native.HEADER.name)]
+    for name, structure in HEADER.structures.items():
         lines.append(f'_Static_assert(sizeof({name}) == {ctypes.sizeof(structure)}, "{name}");')
         lines += [
             f"_Static_assert(offsetof({name}, {member}) == {getattr(structure, member).offset} && "
@@ -43,10 +44,14 @@ def test_python_reads_the_sizes_and_places_of_the_compiler(tmp_path: Path) -> No
             for member, _ in structure._fields_
         ]
     lines += [
-        f'_Static_assert({name} == {number}, "{name}");'
-        for name, number in read_headers().numbers.items()
+        f'_Static_assert({name} == {number}, "{name}");' for name, number in HEADER.numbers.items()
     ]
-    folders = [HEADERS.parent, ROOT / "plant_fmu" / "include", fmi_headers()]
+    folders = [
+        HEADERS.parent,
+        native.HEADER.parents[1],
+        ROOT / "plant_fmu" / "include",
+        fmi_headers(),
+    ]
     options = [f"-I{folder}" for folder in folders]
     compile_c("\n".join(lines), "-std=c11", "-fsyntax-only", *options, folder=tmp_path)
 
@@ -59,7 +64,7 @@ def test_python_lists_the_names_of_the_header_in_their_order() -> None:
         "HX_AUTORESET_": batch.AUTORESET,
     }
     for prefix, expected in names.items():
-        found = [name for name in read_headers().numbers if name.startswith(prefix)]
+        found = [name for name in HEADER.numbers if name.startswith(prefix)]
         assert tuple(name.removeprefix(prefix).lower() for name in found) == expected
 
 
@@ -83,8 +88,8 @@ def test_a_library_with_another_layout_is_refused(
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    bytes_ = ctypes.sizeof(read_headers().structures[structure])
-    number = read_headers().numbers[f"HX_{part.upper()}_LAYOUT"]
+    bytes_ = ctypes.sizeof(HEADER.structures[structure])
+    number = HEADER.numbers[f"HX_{part.upper()}_LAYOUT"]
     sized = "unsigned long {}(void) {{ return {}; }} int hx_{}_layout(void) {{ return {}; }}"
     cases = {
         "layout 0 of 0 bytes": "int other;",

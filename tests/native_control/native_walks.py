@@ -20,7 +20,6 @@ from hexapod_cosim.controller import (
 from hexapod_cosim.cosim.interface.controller_interface import ControllerSetup
 from hexapod_cosim.models import load_robot
 
-ROBOTS = ("athena", "phantomx_mk4")
 ALL_PARTS = Parts()
 ANGLE = 1e-12  # rad
 SPEED = 1e-12  # relative to a servo's largest speed

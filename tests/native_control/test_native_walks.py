@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from gains import PERIOD, make_gains
-from native_walks import ALL_PARTS, ROBOTS, STEPS, Ground, close, differences, setup_of, uneven
+from native_walks import ALL_PARTS, STEPS, Ground, close, differences, setup_of, uneven
 
 from hexapod_cosim.controller import (
     COMPLIANT_PARTS,
@@ -24,9 +24,10 @@ from hexapod_cosim.cosim.interface.controller_interface import ControllerSetup
 from hexapod_cosim.models import load_robot
 
 WALKS = [
-    *((name, gait, True) for name in ROBOTS for gait in ("tripod", "ripple", "wave")),
-    ("athena", "amble", True),
-    ("athena", "tripod", False),
+    ("athena", "tripod", True),
+    ("phantomx_mk4", "ripple", True),
+    ("athena", "wave", True),
+    ("phantomx_mk4", "amble", True),
     ("phantomx_mk4", "wave", False),
 ]
 
@@ -63,8 +64,7 @@ PAPER_PARTS = ("paper_share", "paper_pid", "paper_suspension")
 
 
 @pytest.mark.parametrize("off", [None, *PAPER_PARTS])
-@pytest.mark.parametrize("gait", ["tripod", "amble"])
-@pytest.mark.parametrize("name", ROBOTS)
+@pytest.mark.parametrize(("name", "gait"), [("athena", "tripod"), ("phantomx_mk4", "amble")])
 def test_a_walk_under_the_papers_control_is_the_same(
     controller_core: ct.CDLL, name: str, gait: str, off: str | None
 ) -> None:
@@ -82,7 +82,7 @@ def test_a_walk_under_the_papers_control_is_the_same(
 
     parts = replace(ALL_PARTS, **({} if off is None else {off: False}))
     setup = replace(setup_of(name, gait, parts=parts), law="paper")
-    worst, fallback = differences(controller_core, setup, sense=sense)
+    worst, fallback = differences(controller_core, setup, sense=sense, steps=1000)
     assert close(worst)
     assert not fallback.any()
 
@@ -105,8 +105,9 @@ def test_each_part_can_be_switched_off(controller_core: ct.CDLL, part: str) -> N
     )
 
 
-@pytest.mark.parametrize("gait", ["tripod", "amble"])
-@pytest.mark.parametrize("weight", [0.0, 0.1, 0.5, 0.99])
+@pytest.mark.parametrize(
+    ("weight", "gait"), [(0.0, "tripod"), (0.1, "amble"), (0.5, "tripod"), (0.99, "amble")]
+)
 def test_walks_with_a_planned_squeeze_are_the_same(
     controller_core: ct.CDLL, weight: float, gait: str
 ) -> None:
