@@ -21,7 +21,9 @@ from hexapod_cosim.cosim.master.signals import Signals
 from hexapod_cosim.cosim.results.metrics import compute_metrics, metric_columns
 from hexapod_cosim.cosim.results.result import Result
 from hexapod_cosim.cosim.results.walk import View
-from hexapod_cosim.cosim.run.single_run import initialise_plant, make_plan, open_plant, simulate
+from hexapod_cosim.cosim.run.plan import make_plan
+from hexapod_cosim.cosim.run.plant import initialise_plant, open_plant
+from hexapod_cosim.cosim.run.single_run import simulate
 from hexapod_cosim.cosim.run.walker import Walker
 from hexapod_cosim.cosim.scenario.records import CONTROLS, Outputs, Scenario
 from hexapod_cosim.cosim.scenario.scenario import load_scenario

@@ -54,7 +54,7 @@ typedef struct hxServos {
   const size_t *angle_ref;  /* 1     [count] indices of the joint commands in the row */
   const size_t *speed_ref;
   const size_t *torque_ref;
-  const size_t *acceleration_ref; /* NULL: the plant has no such input */
+  const size_t *acceleration_ref;
   double *stuck_at;         /* rad   [count] where a servo stuck; NaN: it does not */
 } hxServos;
 
