@@ -8,6 +8,8 @@ import numpy as np
 
 from hexapod_cosim.controller.plane import LEGS, Array, Mask, Plane
 
+DEFAULT_PERIOD = 0.005  # s    between two steps of the controller, and of a co-simulation
+
 
 def _zeros() -> Array:
     return np.zeros((LEGS, 3))

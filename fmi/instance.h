@@ -92,10 +92,10 @@ struct hxInstance {
   struct hxVariables start; /* values after a reset: compiled in or from the resources */
   char guid[HX_GUID_SIZE];
   char name[HX_NAME_SIZE];
-  unsigned fresh;      /* groups of outputs that are up to date, unless state.output_stale */
-  int uses_event_mode; /* co-simulation: the importer handles events */
+  unsigned fresh;       /* groups of outputs that are up to date, unless state.output_stale */
+  int uses_event_mode;  /* co-simulation: the importer handles events */
   int may_return_early; /* co-simulation: a step may end where discrete variables change */
-  unsigned logged;     /* bit k: category k is passed on */
+  unsigned logged;      /* bit k: category k is passed on */
   hxLogSink *sink;
   hxKnownOutputs outputs;
   hxKnownInputs inputs;

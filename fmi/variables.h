@@ -22,11 +22,11 @@ typedef enum hxCausality {
 
 typedef struct hxVariable {
   const char *name;
-  const char *unit; /* "" when it has none */
-  double min, max; /* the allowed range, finite and inclusive */
-  unsigned short offset; /* in struct hxVariables */
-  unsigned char type; /* hxType */
-  unsigned char tunable; /* 1: a parameter that may be set between steps */
+  const char *unit;          /* "" when it has none */
+  double min, max;           /* the allowed range, finite and inclusive */
+  unsigned short offset;     /* in struct hxVariables */
+  unsigned char type;        /* hxType */
+  unsigned char tunable;     /* 1: a parameter that may be set between steps */
   unsigned short array_rows; /* FMI 3: of the array that begins here; 1: scalar, 0: within one */
 } hxVariable;
 

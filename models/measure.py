@@ -37,6 +37,7 @@ LANDING_SAMPLE = 1e-4  # s  between two forces of a landing
 LANDING_SAMPLES = 200  # samples of a landing, which lasts 20 ms
 CONE_BINS = 31  # bins of the share of the friction cone
 NEARLY_SLIDING = 0.9  # 1  start of the last bin
+CONE_STARTS = NEARLY_SLIDING * (np.arange(CONE_BINS) / (CONE_BINS - 1)) ** 2  # 1  of the bins
 RISE_SAMPLES = 10  # samples in the rise window of 1 ms
 
 
@@ -144,7 +145,6 @@ def cone_time(robot: Robot, before: Array, after: Array, h: float, impulses: Imp
     """
     time = np.zeros(CONE_BINS)
     least = h * LOAD_SHARE * robot.total_mass * float(np.linalg.norm(robot.gravity))
-    edges = NEARLY_SLIDING * (np.arange(CONE_BINS) / (CONE_BINS - 1)) ** 2
     for leg, (first, last) in enumerate(
         zip(foot_contacts(robot, before), foot_contacts(robot, after), strict=True)
     ):
@@ -154,7 +154,7 @@ def cone_time(robot: Robot, before: Array, after: Array, h: float, impulses: Imp
             share = float(np.linalg.norm(impulses.foot[leg] - pressed * normal)) / (
                 robot.friction.mu * pressed
             )
-            time[np.flatnonzero(edges <= share)[-1]] += h
+            time[np.flatnonzero(share >= CONE_STARTS)[-1]] += h
     return time
 
 

@@ -17,9 +17,6 @@ struct hxComponent {
   char message[HX_MESSAGE_SIZE];
 };
 
-static hxPlant *plant_of(hxComponent *component) { return component->plant; }
-static const hxPlant *const_plant(const hxComponent *component) { return component->plant; }
-
 hxComponent *hx_component_create(void) {
   hxComponent *component = calloc(1, sizeof *component);
   if (!component) return NULL;
@@ -146,17 +143,15 @@ hxStatus hx_component_reset(hxComponent *component, const struct hxVariables *va
 
 hxStatus hx_component_step(hxComponent *component, const struct hxVariables *variables,
                            const hxInput *rate, double t_end) {
-  return hx_plant_step_ramp(plant_of(component), &variables->input, rate, t_end);
+  return hx_plant_step_ramp(component->plant, &variables->input, rate, t_end);
 }
 
 void hx_component_output(hxComponent *component, struct hxVariables *variables, unsigned groups) {
-  hx_plant_output_groups(plant_of(component), &variables->input, groups & HX_OUTPUT_ALL,
+  hx_plant_output_groups(component->plant, &variables->input, groups & HX_OUTPUT_ALL,
                          &variables->output);
 }
 
-double hx_component_time(const hxComponent *component) {
-  return hx_plant_time(const_plant(component));
-}
+double hx_component_time(const hxComponent *component) { return hx_plant_time(component->plant); }
 
 const char *hx_component_message(const hxComponent *component) {
   return component->message[0] ? component->message : hx_plant_message(component->plant);
@@ -190,45 +185,45 @@ static hxStatus check_states(hxComponent *component, const struct hxVariables *v
 }
 
 static void get_state(const hxComponent *component, struct hxVariables *variables) {
-  hx_plant_get_coordinates(const_plant(component), &variables->state);
+  hx_plant_get_coordinates(component->plant, &variables->state);
 }
 
 static hxStatus set_state(hxComponent *component, const struct hxVariables *variables, double t) {
-  return hx_plant_set_coordinates(plant_of(component), t, &variables->state);
+  return hx_plant_set_coordinates(component->plant, t, &variables->state);
 }
 
 static void rates(hxComponent *component, struct hxVariables *variables) {
-  hx_plant_rates(plant_of(component), &variables->input, &variables->rate);
-  hx_plant_indicators(const_plant(component), &variables->indicator);
+  hx_plant_rates(component->plant, &variables->input, &variables->rate);
+  hx_plant_indicators(component->plant, &variables->indicator);
 }
 
 static void completed(hxComponent *component, const struct hxVariables *variables) {
-  hx_plant_completed_step(plant_of(component), &variables->input);
+  hx_plant_completed_step(component->plant, &variables->input);
 }
 
 static hxStatus step(hxComponent *component, const struct hxVariables *variables, double t_end,
                      int stop, int *event) {
-  return hx_plant_step_to_event(plant_of(component), &variables->input, t_end, stop, event);
+  return hx_plant_step_to_event(component->plant, &variables->input, t_end, stop, event);
 }
 
 static void indicate(const hxComponent *component, double indicator[]) {
   hxIndicators all;
-  hx_plant_indicators(const_plant(component), &all);
+  hx_plant_indicators(component->plant, &all);
   memcpy(indicator, &all, sizeof all);
 }
 
 /* Updates the contacts; bristles are the only states that an event sets. */
 static int update(hxComponent *component, struct hxVariables *variables) {
   hxCoordinates now;
-  if (!hx_plant_update_contacts(plant_of(component))) return 0;
-  hx_plant_get_coordinates(const_plant(component), &now);
+  if (!hx_plant_update_contacts(component->plant)) return 0;
+  hx_plant_get_coordinates(component->plant, &now);
   memcpy(variables->state.bristle, now.bristle, sizeof now.bristle);
   return 1;
 }
 
 static hxStatus tangent(hxComponent *component, const struct hxVariables *variables,
                         const struct hxVariables *change, struct hxVariables *result) {
-  const hxStatus status = hx_plant_tangent(plant_of(component), &variables->input, &change->input,
+  const hxStatus status = hx_plant_tangent(component->plant, &variables->input, &change->input,
                                            &change->state, &result->rate, &result->output);
   result->indicator = result->output.depth;
   return status;
@@ -236,7 +231,7 @@ static hxStatus tangent(hxComponent *component, const struct hxVariables *variab
 
 static void integrals(hxComponent *component, const struct hxVariables *variables,
                       struct hxVariables *result) {
-  hx_plant_integral_rates(plant_of(component), &variables->input, &result->output);
+  hx_plant_integral_rates(component->plant, &variables->input, &result->output);
 }
 
 static hxStatus use_work(hxComponent *component, void *memory, size_t size) {

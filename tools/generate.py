@@ -17,7 +17,7 @@ import textwrap
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 
-from hexapod_cosim.controller import make_gait
+from hexapod_cosim.controller import DEFAULT_PERIOD, make_gait
 from hexapod_cosim.cosim.common.components import PLANT, Component
 from hexapod_cosim.cosim.export.start_values import start_values
 from hexapod_cosim.cosim.interface.arrays import arrays
@@ -36,7 +36,8 @@ from hexapod_cosim.models.robot import load_robot
 
 ROOT = Path(__file__).resolve().parents[1]
 DEFAULT_ROBOT = "athena"
-DEFAULT_PERIOD = 0.005  # s  of the controller
+# constants of C that are sizes of arrays of outputs, by component
+SIZES = {"plant": {"HX_CONE_BINS": "output.cone_time"}}
 # structures of C whose fields are the parameters of a group, by component
 STRUCTURES: dict[str, dict[str, str]] = {
     "controller": {"gait": "hxGait", "gains": "hxGains", "parts": "hxParts"},
@@ -144,6 +145,9 @@ def render_settings(interface: Interface) -> str:
             value = " = 1" if number == 1 else ""
             lines += [*_comment(description), f"  {enumeration.constant(number)}{value},"]
         lines += [f"}} hx{enumeration.name};", ""]
+    for constant, array in SIZES.get(interface.component.name, {}).items():
+        size = sum(item.field.startswith(f"{array}[") for item in interface.of_causality("output"))
+        lines += [f"enum {{ {constant} = {size} }};", ""]
     for group, kind in STRUCTURES.get(interface.component.name, {}).items():
         lines += [f"typedef struct {kind} {{", *_fields(interface, group), f"}} {kind};", ""]
     return "\n".join([*lines, "#endif", ""])

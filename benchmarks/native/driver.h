@@ -18,8 +18,8 @@
 typedef struct {
   hxDefinition definition;
   int64_t n;
-  double h;        /* s  input k is held over [k h, (k + 1) h) */
-  hxInput *input;  /* n of them */
+  double h;       /* s  input k is held over [k h, (k + 1) h) */
+  hxInput *input; /* n of them */
 } Walk;
 
 /* One engine. Functions return 0 on success; self points to the data of the driver. */
@@ -28,7 +28,7 @@ typedef struct {
   int (*start)(void *self); /* the initial state at t = 0 */
   int (*advance)(void *self, const hxInput *input, double t_end);
   void (*torso)(void *self, double position[3]); /* m  centre of mass */
-  double (*evaluations)(void *self); /* of the right-hand side since start */
+  double (*evaluations)(void *self);             /* of the right-hand side since start */
   /* evaluates the right-hand side count times; NULL if the engine cannot */
   void (*evaluate)(void *self, const hxInput *input, int count);
 } Driver;

@@ -11,11 +11,6 @@ struct hxComponent {
   hxController next; /* memory of a call that changes the walk; threads may have small stacks */
 };
 
-static hxController *controller_of(hxComponent *component) { return &component->controller; }
-static const hxController *const_controller(const hxComponent *component) {
-  return &component->controller;
-}
-
 hxComponent *hx_component_create(void) {
   hxControllerDefinition definition;
   hxComponent *component = calloc(1, sizeof *component);
@@ -42,7 +37,7 @@ hxStatus hx_component_check(const struct hxVariables *variables, char *message) 
 }
 
 hxStatus hx_component_reset(hxComponent *component, const struct hxVariables *variables, double t) {
-  return hx_controller_reset(controller_of(component), &variables->definition, t);
+  return hx_controller_reset(&component->controller, &variables->definition, t);
 }
 
 static int is_same_gait(const hxGait *a, const hxGait *b) {
@@ -114,21 +109,21 @@ void hx_component_output(hxComponent *component, struct hxVariables *variables, 
 }
 
 double hx_component_time(const hxComponent *component) {
-  return hx_controller_time(const_controller(component));
+  return hx_controller_time(&component->controller);
 }
 
 const char *hx_component_message(const hxComponent *component) {
-  return hx_controller_message(const_controller(component));
+  return hx_controller_message(&component->controller);
 }
 
 size_t hx_component_state_size(void) { return hx_controller_state_size(); }
 
 void hx_component_get_state(const hxComponent *component, void *bytes) {
-  hx_controller_get_state(const_controller(component), bytes);
+  hx_controller_get_state(&component->controller, bytes);
 }
 
 hxStatus hx_component_set_state(hxComponent *component, const void *bytes) {
-  return hx_controller_set_state(controller_of(component), bytes, hx_controller_state_size());
+  return hx_controller_set_state(&component->controller, bytes, hx_controller_state_size());
 }
 
 const hxContinuous *const hx_continuous = NULL;

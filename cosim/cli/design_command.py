@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from hexapod_cosim.controller import DEFAULT_PERIOD
 from hexapod_cosim.cosim.cli import completion
-from hexapod_cosim.cosim.cli.export_command import DEFAULT_PERIOD
 from hexapod_cosim.cosim.cli.options import Json, RobotName
 
 if TYPE_CHECKING:

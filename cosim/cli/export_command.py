@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from hexapod_cosim.controller import DEFAULT_PERIOD
 from hexapod_cosim.cosim.cli import completion
 from hexapod_cosim.cosim.cli.options import GainsFile, Json, RobotName
 
@@ -95,8 +96,6 @@ StanceName = Annotated[
     ),
 ]
 Period = Annotated[float, typer.Option("--period", help="Of the controller [s].")]
-
-DEFAULT_PERIOD = 0.005  # s, the default macro-step
 
 
 def export(

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hexapod_cosim.cosim.common.files import atomic_path
-from hexapod_cosim.cosim.common.installation import install_extra, require_packages
+from hexapod_cosim.cosim.common.installation import require_packages
 from hexapod_cosim.cosim.interface.names import joint_names, vector_names
 from hexapod_cosim.cosim.logs.places import torso_places
 from hexapod_cosim.cosim.master.recorder import Recording
@@ -35,13 +35,7 @@ LINE = 0.003  # m    radius of the lines of links
 
 def require_rerun(where: str | Path) -> None:
     """Raises HexapodError, which names the extra, unless RRD files can be written."""
-    require_packages(
-        [PACKAGE],
-        "RRD files need a package that is not installed",
-        expected="rerun-sdk (170 MB)",
-        fix=f"{install_extra(EXTRA)}; MCAP files need less, and Rerun opens them too",
-        where=where,
-    )
+    require_packages([PACKAGE], "RRD", extra=EXTRA, where=where)
 
 
 @dataclass(frozen=True)

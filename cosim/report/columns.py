@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from hexapod_cosim.cosim.master.recorder import ColumnError
 from hexapod_cosim.cosim.results.metrics import foot_errors
-from hexapod_cosim.cosim.results.walk import (
+from hexapod_cosim.cosim.results.window import (
     View,
     bearing_load,
     body_height,

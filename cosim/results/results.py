@@ -32,7 +32,7 @@ from hexapod_cosim.cosim.results.recordings import (
     write_recording,
 )
 from hexapod_cosim.cosim.results.result import Result
-from hexapod_cosim.cosim.results.walk import View
+from hexapod_cosim.cosim.results.window import View
 from hexapod_cosim.models import HexapodError, load_robot
 from hexapod_cosim.models.files import read_text
 

@@ -18,7 +18,6 @@ from hexapod_cosim.cosim.run.preparation import PlantFmus
 from hexapod_cosim.cosim.scenario.records import Scenario
 from hexapod_cosim.cosim.scenario.scenario import scenario_robot
 from hexapod_cosim.cosim.scenario.variation import (
-    check_start_depth,
     initial_values,
 )
 from hexapod_cosim.models import LEG_NAMES, FmuError, Robot
@@ -114,9 +113,6 @@ def initialise_plant(plant: Fmu, plan: RunPlan) -> dict[str, float]:
     """
     scenario = plan.scenario
     plant.set_parameters(scenario.parameters)
-    if scenario.parameters and all(name.startswith("initial.") for name in scenario.parameters):
-        # with other parameters the robot's own numbers may not be the plant's, which checks too
-        check_start_depth(plan.robot, plant.parameters(), where=f"{scenario.where}: initial")
     if plan.drawn is not None:
         plant.set_parameters(initial_values(plan.robot, plant.parameters(), plan.drawn))
     plant.initialise(scenario.start, scenario.start + scenario.duration)

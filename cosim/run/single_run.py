@@ -37,7 +37,6 @@ from hexapod_cosim.cosim.results.facts import FmuIdentity, RobotIdentity, RunFac
 from hexapod_cosim.cosim.results.heat import heat_warnings
 from hexapod_cosim.cosim.results.metrics import compute_metrics, metric_columns
 from hexapod_cosim.cosim.results.result import Result
-from hexapod_cosim.cosim.results.walk import View
 from hexapod_cosim.cosim.results.warnings import (
     describe_fall,
     locomotion_of,
@@ -47,6 +46,7 @@ from hexapod_cosim.cosim.results.warnings import (
     unused_settings,
     walk_warnings,
 )
+from hexapod_cosim.cosim.results.window import View
 from hexapod_cosim.cosim.run.plan import RunPlan, make_plan
 from hexapod_cosim.cosim.run.plant import initialise_plant, open_plant, run_surface
 from hexapod_cosim.cosim.scenario.controls import control_of

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from typing import Annotated, Any
 
-from hexapod_cosim.controller import Parts
+from hexapod_cosim.controller import DEFAULT_PERIOD, Parts
 from hexapod_cosim.cosim.common.installation import has_pyarrow
 from hexapod_cosim.models import (
     JOINT_NAMES,
@@ -226,7 +226,7 @@ class Scenario:
     control_settings: Mapping[str, Any] = field(default_factory=dict)
     start: Annotated[float, Number("s")] = 0.0
     duration: Annotated[float, Number("s", above=0.0)] = 10.0
-    macro_step: Annotated[float, Number("s", above=0.0, at_most=0.1)] = 0.005
+    macro_step: Annotated[float, Number("s", above=0.0, at_most=0.1)] = DEFAULT_PERIOD
     seed: int = 0
     gravity: tuple[float, float, float] | None = None  # m/s2    None: the robot's own
     walk: Walk = Walk()

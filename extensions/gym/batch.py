@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from hexapod_cosim.controller import DEFAULT_PERIOD
 from hexapod_cosim.cosim.common.closing import Closing
 from hexapod_cosim.cosim.common.temporary import TemporaryFolder
 from hexapod_cosim.cosim.interface.names import foot_names, joint_names, vector_names
@@ -37,7 +38,6 @@ from hexapod_cosim.extensions.gym.native import (
 )
 from hexapod_cosim.extensions.gym.owned import Owned
 from hexapod_cosim.extensions.gym.plants import (
-    CONTROL_PERIOD,
     export_base,
     export_plant,
     grounds,
@@ -229,8 +229,8 @@ class Batch(Closing):
         sensed = [*MEASURED["angle"], *MEASURED["foot_force"], *MEASURED["quaternion"]]
         native.controller_input = self._references(controller, [*COMMANDS, *sensed])
         native.controller_output = self._references(controller, JOINT_COMMANDS)
-        native.substeps = round(1.0 / (RATE * CONTROL_PERIOD))
-        native.h = CONTROL_PERIOD
+        native.substeps = round(1.0 / (RATE * DEFAULT_PERIOD))
+        native.h = DEFAULT_PERIOD
 
     def _draws(self, robots: Sequence[Robot]) -> Any:
         """Returns the parameters that are drawn for each episode, as C reads them."""

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from hexapod_cosim.controller import make_gait
+from hexapod_cosim.controller import DEFAULT_PERIOD, make_gait
 from hexapod_cosim.cosim.export.controller_export import export_controller
 from hexapod_cosim.cosim.export.plant_export import export_fmu
 from hexapod_cosim.cosim.interface.controller_interface import ControllerSetup
@@ -20,8 +20,6 @@ from hexapod_cosim.models.ground.surface import Surface
 from hexapod_cosim.models.ground.table import merged_terrain
 from hexapod_cosim.models.statics import settled
 from hexapod_cosim.models.validation.robot import check_settings
-
-CONTROL_PERIOD = 0.005  # s  of the controllers that actions are added to
 
 
 def grounds(settings: EnvSettings) -> tuple[Robot, ...]:
@@ -66,8 +64,8 @@ def controller_setup(settings: EnvSettings, robot: Robot) -> ControllerSetup:
     Raises HexapodError when no gains can be designed.
     """
     if settings.base == "kinematic":
-        return ControllerSetup(robot=robot, gait=make_gait(robot), period=CONTROL_PERIOD)
-    return make_setup(load_robot(settings.robot), control=settings.base, period=CONTROL_PERIOD)
+        return ControllerSetup(robot=robot, gait=make_gait(robot), period=DEFAULT_PERIOD)
+    return make_setup(load_robot(settings.robot), control=settings.base, period=DEFAULT_PERIOD)
 
 
 def export_base(settings: EnvSettings, robot: Robot, folder: Path) -> Path:

@@ -4,10 +4,34 @@
 
 #include "command/command.h"
 #include "ground/footprints.h"
+#include "hexapod/message.h"
 #include "kernel.h"
 #include "plant/parts.h"
 #include "robot/robot.h"
-#include "robot/validation.h"
+
+hxStatus hx_plant_fail(hxPlant *plant, hxStatus status, const char *text) {
+  hx_print(plant->message, HX_MESSAGE_SIZE, "%s", text);
+  return status;
+}
+
+void hx_plant_derive_feet(hxPlant *plant) {
+  plant->feet = plant->model;
+  plant->feet.rows = plant->feet.listed = plant->model.foot_rows;
+  plant->feet.torso_rows = plant->feet.pair_rows = 0;
+}
+
+double hx_largest(double so_far, const void *first, size_t n) {
+  const double *entry = first;
+  for (size_t i = 0; first && i < n; ++i)
+    if (!isnan(so_far) && !(fabs(entry[i]) <= so_far)) so_far = fabs(entry[i]);
+  return so_far;
+}
+
+void hx_plant_command(const hxPlant *plant, const hxInput *input, hxCommand *command) {
+  hx_command_from_input(command, input, plant->state.time);
+  hx_bus_command(command, &plant->model, &plant->state);
+  hx_command_supply(command, &plant->model, &plant->state);
+}
 
 const char *hx_plant_message(const hxPlant *plant) { return plant->message; }
 double hx_plant_time(const hxPlant *plant) { return plant->state.time; }

@@ -10,9 +10,9 @@
 #include "check.h"
 
 enum {
-  STACK = 64 * 1024,        /* bytes, with what the system needs of it */
-  ALLOWED = 48 * 1024,      /* for a call */
-  BEYOND = 4 * STACK, /* memory below the stack, so that a call that needs more is measured */
+  STACK = 64 * 1024,       /* bytes, with what the system needs of it */
+  ALLOWED = 48 * 1024,     /* for a call */
+  BEYOND = 4 * STACK,      /* memory below the stack, so that a call that needs more is measured */
   SANITIZED = 1024 * 1024, /* sanitizers enlarge frames, so that nothing is measured then */
   PAINT = 0xA5
 };

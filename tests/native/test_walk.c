@@ -8,7 +8,7 @@
 #include "check.h"
 
 static const double h = 0.005, duration = 4.0; /* s */
-static const double speed = 0.08; /* m/s */
+static const double speed = 0.08;              /* m/s */
 
 static void sense(const hxOutput *seen, hxControllerInput *sensed) {
   memcpy(sensed->angle, seen->angle, sizeof sensed->angle);

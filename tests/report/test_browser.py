@@ -16,7 +16,7 @@ from browser import FLAGS, FULL, Launcher, Opened, find_chromium, launcher
 
 from hexapod_cosim.cosim.cli import main
 from hexapod_cosim.cosim.results.results import read_result
-from hexapod_cosim.cosim.results.walk import robot_weight
+from hexapod_cosim.cosim.results.window import robot_weight
 from hexapod_cosim.models import LEG_NAMES, load_robot
 from hexapod_cosim.models.kinematics import foot_positions, rotation_matrix
 

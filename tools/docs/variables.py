@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from hexapod_cosim.controller import DEFAULT_PERIOD
 from hexapod_cosim.cosim.export.documentation import Row, variable_rows
 from hexapod_cosim.cosim.interface.controller_interface import load_controller_interface
 from hexapod_cosim.cosim.interface.plant_interface import Interface, load_interface
@@ -11,7 +12,6 @@ from hexapod_cosim.cosim.run.controller_setup import make_setup
 from hexapod_cosim.models import load_robot
 
 HEADINGS = {"input": "Inputs", "output": "Outputs", "parameter": "Parameters", "local": "Locals"}
-PERIOD = 0.005  # s, the default macro-step
 # `hexapod design` computes these start values for each robot
 DESIGNED, DESIGNED_NAMES = "designed", ("gains.paper.",)
 COLUMNS = ("variable", "unit", "number", "range", "start", "meaning")
@@ -23,7 +23,7 @@ def interfaces() -> dict[str, Interface]:
     return {
         "plant": load_interface(robot),
         "controller": load_controller_interface(
-            make_setup(robot, control="kinematic", period=PERIOD)
+            make_setup(robot, control="kinematic", period=DEFAULT_PERIOD)
         ),
     }
 

@@ -12,7 +12,7 @@
 HX_HIDDEN_BEGIN
 
 typedef struct hxControllerModel {
-  double period; /* s */
+  double period;        /* s */
   int compliant, paper; /* this control, otherwise kinematic control */
   hxGait gait;
   hxLegSolver leg[HX_LEGS];
@@ -29,43 +29,43 @@ typedef struct hxPlannedStep {
       rate[HX_COMMANDS]; /* vx vy yaw_rate height roll pitch, and per second */
   hxPosture posture;
   hxPlannedFeet feet;
-  hxPlane sway; /* m, of the torso against the swinging legs (C54) */
-  hxPlane plane[HX_LEGS]; /* m, of the feet from the torso that sways */
+  hxPlane sway;               /* m, of the torso against the swinging legs (C54) */
+  hxPlane plane[HX_LEGS];     /* m, of the feet from the torso that sways */
   double activation[HX_LEGS]; /* 1 */
-  double lowering[HX_LEGS]; /* m, deformation of the ground */
-  double height[HX_LEGS]; /* m, of the lowered feet */
-  hxPlane shift[HX_LEGS]; /* m, of contact points, by rolling */
+  double lowering[HX_LEGS];   /* m, deformation of the ground */
+  double height[HX_LEGS];     /* m, of the lowered feet */
+  hxPlane shift[HX_LEGS];     /* m, of contact points, by rolling */
   hxPose pose[HX_LEGS];
   hxMasses masses;
 } hxPlannedStep;
 
 typedef struct hxControllerState {
   double start; /* s, time of the first tick */
-  double time; /* s */
+  double time;  /* s */
   int64_t tick; /* number of the next tick */
   hxCommandRamp ramp;
   hxFootPaths paths;
-  int64_t at; /* the present step, counted from the beginning of its section */
+  int64_t at;   /* the present step, counted from the beginning of its section */
   int64_t last; /* the step at which the command comes to rest and is planned again */
-  int cut; /* the present step is the last of its section: a leg lifts off or touches down */
+  int cut;      /* the present step is the last of its section: a leg lifts off or touches down */
   int has_before, has_after; /* the neighbours of the present step are planned */
-  int present; /* index of the present step in `step`, a ring buffer */
+  int present;               /* index of the present step in `step`, a ring buffer */
   hxPlannedStep step[3];
   hxCompliant compliant;
   hxPaper paper;
-  hxFade fade; /* from the control before */
-  int model; /* index of the present model; the other one is that of the next gait */
+  hxFade fade;  /* from the control before */
+  int model;    /* index of the present model; the other one is that of the next gait */
   int changing; /* to the other model */
   hxControllerOutput output; /* of the last tick */
 } hxControllerState;
 
 struct hxController {
   hxControllerDefinition definition; /* with the gait that was asked for last */
-  hxControllerModel model[2]; /* of the present gait and of the next one */
+  hxControllerModel model[2];        /* of the present gait and of the next one */
   /* the present state, and the other one: the next tick's, computed early for its outputs, or that
    * before a step, which one that fails restores. It is not part of the controller's state */
   hxControllerState state[2];
-  int now; /* index of the present state */
+  int now;      /* index of the present state */
   int is_ahead; /* the other state is that after the next tick under `input` */
   hxControllerInput input;
   char message[HX_MESSAGE_SIZE];

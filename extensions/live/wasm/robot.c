@@ -15,15 +15,15 @@
 enum {
   ANGLES = HX_LEGS * HX_JOINTS,
   FORCES = HX_LEGS * 3,
-  DRIVES = 3 * ANGLES,       /* angle_ref, speed_ref, torque_ref */
-  INPUTS = DRIVES + 3,       /* and push_force: the begin of hxInput */
-  COMMANDS = 6,              /* vx, vy, yaw_rate, height, roll, pitch */
+  DRIVES = 3 * ANGLES, /* angle_ref, speed_ref, torque_ref */
+  INPUTS = DRIVES + 3, /* and push_force: the begin of hxInput */
+  COMMANDS = 6,        /* vx, vy, yaw_rate, height, roll, pitch */
   SENSED = ANGLES + FORCES + 4,
   /* the row of values, which viewer/robot.ts reads */
-  ANGLE = 1,                 /* after the time: joint angles, speeds, torques */
+  ANGLE = 1, /* after the time: joint angles, speeds, torques */
   FORCE = ANGLE + 3 * ANGLES,
-  SLIP = FORCE + FORCES,     /* slip speeds */
-  TORSO = SLIP + HX_LEGS,    /* position, quaternion, roll, pitch, yaw, velocities */
+  SLIP = FORCE + FORCES,  /* slip speeds */
+  TORSO = SLIP + HX_LEGS, /* position, quaternion, roll, pitch, yaw, velocities */
   INPUT = TORSO + 16,
   VALUES = INPUT + INPUTS
 };
@@ -39,7 +39,7 @@ static hxOutput output;
 static hxControllerInput seen;
 static hxControllerOutput joints;
 static double value[VALUES], given[COMMANDS + SENSED], command[COMMANDS];
-static double gait[5]; /* pattern, period, duty, step height, touch-down speed */
+static double gait[5];        /* pattern, period, duty, step height, touch-down speed */
 static unsigned shown[INPUT]; /* indices of the plant's outputs in the row, among its doubles */
 static size_t sensed[SENSED];
 static hxStepper stepper;

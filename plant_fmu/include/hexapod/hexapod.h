@@ -28,8 +28,7 @@ enum {
   HX_CORNERS = 8,                      /* of the torso's box */
   HX_NEIGHBOUR_PAIRS = 4,              /* of lines of a leg and its next leg */
   HX_BODY_STATE = 13,                  /* r[3] p[4] v[3] w[3] */
-  HX_MULTIPLIERS = 5,                  /* per joint */
-  HX_CONE_BINS = 31                    /* bins of the share of the friction cone that feet use */
+  HX_MULTIPLIERS = 5                   /* per joint */
 };
 
 /* One link. Its frame lies at its own joint and has the parent link's axes when the joint angle is
@@ -60,8 +59,8 @@ typedef struct hxDefinition {
     double inertia[6]; /* kg m2  about the centre of mass, torso axes: xx yy zz xy xz yz */
   } torso;
   hxLeg leg[HX_LEGS];
-  double foot_radius;       /* m */
-  hxBodySettings body;      /* spheres that touch the ground besides the feet; see hxTerrain */
+  double foot_radius;     /* m */
+  hxBodySettings body;    /* spheres that touch the ground besides the feet; see hxTerrain */
   double foot_pad_radius; /* m  flat round pad of feet on soil; 0: the sphere */
   hxContactSettings contact;
   hxFrictionSettings friction;

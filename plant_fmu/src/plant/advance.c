@@ -4,7 +4,7 @@
 
 #include "../command/command.h"
 #include "../kernel.h"
-#include "../robot/validation.h"
+#include "../robot/robot.h"
 #include "hexapod/message.h"
 #include "hexapod/status.h"
 #include "parts.h"

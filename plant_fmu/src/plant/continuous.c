@@ -4,7 +4,7 @@
 #include "../command/command.h"
 #include "../contact_law.h"
 #include "../kernel.h"
-#include "../robot/validation.h"
+#include "../robot/robot.h"
 #include "../tangent.h"
 #include "parts.h"
 

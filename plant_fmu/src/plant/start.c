@@ -5,7 +5,7 @@
 #include "../ground/surface.h"
 #include "../ground/valleys.h"
 #include "../kernel.h"
-#include "../robot/laws.h"
+#include "../robot/robot.h"
 #include "hexapod/message.h"
 #include "hexapod/range_check.h"
 #include "parts.h"

@@ -1,7 +1,6 @@
 #include <string.h>
 
 #include "../elementary.h"
-#include "frames.h"
 #include "robot.h"
 
 /* Computes the child's state from the parent's: p_j = p_i zero turn(angle), velocities by

@@ -1,4 +1,4 @@
-#include "frames.h"
+#include "robot.h"
 
 #include <math.h>
 

@@ -1,4 +1,4 @@
-#include "laws.h"
+#include "robot.h"
 
 #include <math.h>
 #include <string.h>
@@ -6,7 +6,6 @@
 #include "../contact_law.h"
 #include "../ground/soil.h"
 #include "../ground/surface.h"
-#include "validation.h"
 
 static const double load_share =
     0.01; /* 1  of the robot's weight; feet with a larger load count their slip */

@@ -2,8 +2,6 @@
 
 #include "../contact_law.h"
 #include "../elementary.h"
-#include "frames.h"
-#include "laws.h"
 
 /* Computes xx yy zz xy xz yz of R(p)^T S R(p). */
 static void inertia_in_frame(const double S[6], const double p[4], double out[6]) {

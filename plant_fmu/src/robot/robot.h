@@ -19,6 +19,61 @@ void hx_motion_from_bodies(const hxModel *model, const double body[HX_BODIES][HX
 void hx_bodies_from_motion(const hxModel *model, const hxPlantMotion *motion,
                            double body[HX_BODIES][HX_BODY_STATE]);
 
+/* laws.c */
+
+/* Computes the part of a model that no geometry enters: friction, soil, servos, gears, solver.
+ * The model's terrain is known. */
+void hx_laws_compile(hxModel *model, const hxDefinition *d);
+
+/* Returns the weight of all bodies, N. */
+double hx_weight(const hxDefinition *d);
+
+/* validation.c; hx_definition_check is public */
+
+/* Checks the ranges of an input. message: HX_MESSAGE_SIZE bytes, written on failure only; may be
+ * NULL. */
+hxStatus hx_input_check(const hxInput *input, char *message);
+
+int hx_has_elastic_gears(const hxDefinition *definition);
+
+/* Writes why coordinates are not the state of a robot with elastic gears; message as above. */
+hxStatus hx_refuse_elastic_gears(char *message);
+
+/* frames.c: vectors and quaternions, and the frames of a definition's joints */
+
+/* Computes out = a x b. */
+void hx_vector_cross(const double a[3], const double b[3], double out[3]);
+
+/* Computes out = a/|a| of n numbers and returns |a|. */
+double hx_vector_normalise(const double *a, int n, double *out);
+
+/* Computes the product out = a b of quaternions. */
+void hx_quaternion_product(const double a[4], const double b[4], double out[4]);
+
+/* Computes the conjugate of a quaternion. */
+void hx_quaternion_conjugate(const double p[4], double out[4]);
+
+/* Computes out = R(p) a, p of unit length: a + 2 w (u x a) + 2 u x (u x a). */
+void hx_vector_rotate(const double p[4], const double a[3], double out[3]);
+
+/* Computes two unit normals of a unit axis: a = axis x e with the coordinate direction e of the
+ * axis's smallest component (the first of equal ones), b = axis x a. */
+void hx_axis_normals(const double axis[3], double a[3], double b[3]);
+
+/* Copies the position of the next joint or the foot in link axes. */
+void hx_link_tip(const hxLink *link, double tip[3]);
+
+/* Computes the joint's point from the parent's centre of mass, in the parent link's axes. */
+void hx_joint_on_parent(const hxDefinition *d, int leg, int joint, double point[3]);
+
+/* Computes the rotation from the parent's to the child's axes at angle 0: the hip's yaw for the
+ * coxa, identity for the others. */
+void hx_zero_turn(const hxDefinition *d, int leg, int joint, double p[4]);
+
+/* Computes the rotation from a link's axes to its joint's (x = a, y = b, z = axis); identity for
+ * the torso. */
+void hx_joint_frame(const hxDefinition *d, int leg, int joint, double p[4]);
+
 HX_HIDDEN_END
 
 #endif

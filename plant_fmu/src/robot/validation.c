@@ -1,4 +1,4 @@
-#include "validation.h"
+#include "robot.h"
 
 #include <math.h>
 

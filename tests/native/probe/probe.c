@@ -15,15 +15,12 @@
 #include "kernel.h"
 #include "lanes/dynamics.h"
 #include "method.h"
-#include "robot/frames.h"
 #include "robot/robot.h"
 
 #if defined(__GNUC__)
 #pragma GCC diagnostic ignored                                                                     \
     "-Wmissing-prototypes" /* called from Python only: there is no header */
 #endif
-
-HX_API int hx_probe_lanes(void) { return HX_LANES; }
 
 /* ---- lanes, vectors ---- */
 
@@ -102,14 +99,6 @@ HX_API void hx_probe_footprints(double depth[3][4]) {
 
 HX_API double hx_probe_atan2(double y, double x) { return hx_atan2(y, x); }
 
-HX_API void hx_probe_select(const double *a, const double *b, double out[3][HX_SLOTS]) {
-  for (int i = 0; i < HX_SLOTS; i += HX_LANES) {
-    hx_store(&out[0][i], hx_min(hx_load(a + i), hx_load(b + i)));
-    hx_store(&out[1][i], hx_max(hx_load(a + i), hx_load(b + i)));
-    hx_store(&out[2][i], hx_abs(hx_load(a + i)));
-  }
-}
-
 HX_API void hx_probe_rotation_matrix(const double p[4], double R[3][3]) {
   const hxMat3 M = hx_rotation_matrix(quat(p));
   double column[3][3];
@@ -122,10 +111,6 @@ HX_API void hx_probe_quaternion_rate(const double p[4], const double w[3], doubl
   const hxQuat d = hx_quaternion_rate(quat(p), hx_splat_vec3(w));
   out[0] = hx_lane(d.w, 0), out[1] = hx_lane(d.x, 0), out[2] = hx_lane(d.y, 0),
   out[3] = hx_lane(d.z, 0);
-}
-
-HX_API void hx_probe_axis_normals(const double axis[3], double a[3], double b[3]) {
-  hx_axis_normals(axis, a, b);
 }
 
 static hxSym3 take_sym3(const double S[3][3]) {
@@ -430,12 +415,6 @@ HX_API const char *hx_probe_kernel(int i, hxPlant *plant, const hxInput *input,
   hx_kernels[i]->derivative(&plant->model, &plant->state, &command, 1, plant->scratch, &rate);
   hx_bodies_from_motion(&plant->model, &rate, body);
   return hx_kernels[i]->name;
-}
-
-/* Returns the step that may follow one of h with an error, between these limits, s. */
-HX_API double hx_probe_following_step(int method, double error, double h, double most,
-                                      double least) {
-  return following_step(hx_method(method), error, h, most, least);
 }
 
 /* Copies a row of the methods. shape: stages, order, error order; others as in hxMethodRow. */

@@ -18,28 +18,28 @@ typedef struct hxComplianceModel {
   /* N, of the robot; a third of it; load of all feet from which on they have settled */
   double weight, share, settled;
   double most_lean; /* m, limit of the distance of the centre of mass, each axis */
-  double high; /* m, a foot that is planned higher is in the air for certain */
+  double high;      /* m, a foot that is planned higher is in the air for certain */
   /* 1, factors of the smoothings over a period */
   double follow_load, follow_cycle, follow_weight;
   int64_t calm; /* steps without sliding until feet are trusted again */
-  double most; /* N m, limit of the torque */
+  double most;  /* N m, limit of the torque */
 } hxComplianceModel;
 
 /* What a planned step requires of the laws. */
 typedef struct hxPlan {
-  double own[HX_LEGS][HX_JOINTS]; /* N m  torques for the legs' own weight and motion */
+  double own[HX_LEGS][HX_JOINTS];   /* N m  torques for the legs' own weight and motion */
   double carry[HX_LEGS][HX_JOINTS]; /* N m, torques for the planned load */
   hxShares shares;
-  hxPlane feet[HX_LEGS]; /* m    contact points */
-  double weight; /* N, sum of all shares */
-  int standing[HX_LEGS]; /* the leg carries its whole share */
-  int well_up[HX_LEGS]; /* the foot is in the air even if it meets the ground early */
+  hxPlane feet[HX_LEGS];  /* m    contact points */
+  double weight;          /* N, sum of all shares */
+  int standing[HX_LEGS];  /* the leg carries its whole share */
+  int well_up[HX_LEGS];   /* the foot is in the air even if it meets the ground early */
   double height[HX_LEGS]; /* m, of the paths above their ends */
-  double needed; /* N m, largest element of carry */
+  double needed;          /* N m, largest element of carry */
   int swinging[HX_LEGS];
-  int awaited[HX_LEGS]; /* the gait clock waits for the foot */
+  int awaited[HX_LEGS];    /* the gait clock waits for the foot */
   double falling[HX_LEGS]; /* m, by which feet well above the ground move down in a period */
-  int overspeed; /* the plan exceeds the speed limit of some joint */
+  int overspeed;           /* the plan exceeds the speed limit of some joint */
 } hxPlan;
 
 typedef struct hxCompliance {
@@ -48,21 +48,21 @@ typedef struct hxCompliance {
   hxLandings landings;
   hxBurden burden;
   int touching[HX_LEGS];
-  double load[HX_LEGS]; /* 1    smoothed, in thirds of the weight */
+  double load[HX_LEGS];              /* 1    smoothed, in thirds of the weight */
   double torque[HX_LEGS][HX_JOINTS]; /* N m, for the servos */
-  int doubted[HX_LEGS]; /* the foot's sensor is not trusted */
+  int doubted[HX_LEGS];              /* the foot's sensor is not trusted */
   /* walks without feedback, because the sensor is not trusted, the robot slides, or its joints do
    * not follow */
   int fallback[HX_LEGS];
   double grip[HX_LEGS]; /* 1, factor on the planned load of a leg that is regaining contact */
-  int regaining; /* some grip may be below 1 */
-  double scale; /* 1    measured over planned weight */
-  hxPlane lean; /* m, of the measured centre of mass from the modelled one, walking frame */
-  double held; /* 1, share of the planned squeeze that the ground holds, smoothed */
-  double trust; /* 1, below 1 while the robot slides or its joints cannot follow */
-  int lagging; /* the joints cannot follow the plan */
-  double overspeed_share; /* 1, share of the time in which the plan exceeds a speed limit */
-  int64_t slide_periods; /* steps for which the robot has been sliding */
+  int regaining;        /* some grip may be below 1 */
+  double scale;         /* 1    measured over planned weight */
+  hxPlane lean;         /* m, of the measured centre of mass from the modelled one, walking frame */
+  double held;          /* 1, share of the planned squeeze that the ground holds, smoothed */
+  double trust;         /* 1, below 1 while the robot slides or its joints cannot follow */
+  int lagging;          /* the joints cannot follow the plan */
+  double overspeed_share;   /* 1, share of the time in which the plan exceeds a speed limit */
+  int64_t slide_periods;    /* steps for which the robot has been sliding */
   int64_t recovery_periods; /* steps that remain until feedback resumes after sliding */
 } hxCompliance;
 
@@ -75,8 +75,8 @@ static const double sliding_time = 0.04; /* s, longer than a foot skids at touch
 static const double settled_share = 0.5;
 /* 1, share of the time in which joints would need more speed than a servo has */
 static const double joints_follow = 0.35, joints_do_not = 0.45;
-static const double feet_late = 0.2; /* 1, the same, from which feet end their swings late */
-static const double gripped = 0.99; /* 1, of its share: a leg that is given more carries it */
+static const double feet_late = 0.2;   /* 1, the same, from which feet end their swings late */
+static const double gripped = 0.99;    /* 1, of its share: a leg that is given more carries it */
 static const double load_floor = 1e-6; /* N, a smaller sum of loads cannot be divided by */
 /* 1, measured over modelled weight, range that the support accepts */
 static const double least_scale = 0.5, largest_scale = 3.0;

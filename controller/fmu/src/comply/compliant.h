@@ -13,7 +13,7 @@
 
 typedef struct hxCompliantModel {
   double per_second; /* 1/s   one over the period */
-  double leading; /* steps of the transition of the added velocity */
+  double leading;    /* steps of the transition of the added velocity */
   hxInverseDynamics dynamics;
   hxSway sway;
   hxSupport support;
@@ -35,19 +35,19 @@ typedef struct hxCompliant {
   hxHold hold;
   hxLoadAdaptation adaptation;
   hxSteering steering;
-  int64_t count; /* number of steps */
+  int64_t count;          /* number of steps */
   double offset[HX_LEGS]; /* m, offsets for early and late touch-downs at the last step */
-  int moving; /* the offsets have just changed */
+  int moving;             /* the offsets have just changed */
 } hxCompliant;
 
 /* What a step requires, and its commands. */
 typedef struct hxStance {
   hxPlan plan;
   double climb[HX_LEGS][HX_JOINTS]; /* rad/m  of the joints as a foot rises */
-  const double *value; /* (6) commanded vx vy yaw_rate height roll pitch */
+  const double *value;              /* (6) commanded vx vy yaw_rate height roll pitch */
   const hxPosture *posture;
   const hxPlane *plane; /* m  (6) planned feet, walking frame */
-  hxPlane sway; /* m, of the torso in the walking frame */
+  hxPlane sway;         /* m, of the torso in the walking frame */
   const double *height; /* m, (6) heights of the lowered feet */
   const double *rolled; /* m, (6) outwards from the stance to the positions that the feet aim at */
 } hxStance;

@@ -7,7 +7,7 @@
 
 typedef struct hxPlannedSqueeze {
   double friction; /* 1, coefficient that is believed */
-  double torque; /* N m, of a tripod's load at the arm of the torso's height */
+  double torque;   /* N m, of a tripod's load at the arm of the torso's height */
 } hxPlannedSqueeze;
 
 /* 1, share of its friction that a foot is planned to use at most */

@@ -7,11 +7,11 @@
 
 /* The torso in the walking frame. */
 typedef struct hxPosture {
-  int level; /* height, roll, pitch and their rates are all 0: nothing to turn */
-  double height; /* m */
+  int level;             /* height, roll, pitch and their rates are all 0: nothing to turn */
+  double height;         /* m */
   double rotation[3][3]; /* 1      R_KT */
-  double rate; /* m/s    of the height */
-  double spin[3]; /* rad/s  w_KT, torso axes */
+  double rate;           /* m/s    of the height */
+  double spin[3];        /* rad/s  w_KT, torso axes */
 } hxPosture;
 
 /* Sets the torso's posture: first roll about x, then pitch about y [m, rad, per second]. */

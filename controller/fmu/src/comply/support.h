@@ -7,18 +7,18 @@
 
 typedef struct hxSupport {
   double duty, handover; /* cycles; hand-overs of a leg never overlap, whatever the gait */
-  double stiffness; /* N/m^1.5 */
-  double rest_weight; /* N, that the robot requires in its stance */
-  hxPlane rest_moment; /* N m */
-  double rest_depth; /* m, penetration of a foot in the stance */
+  double stiffness;      /* N/m^1.5 */
+  double rest_weight;    /* N, that the robot requires in its stance */
+  hxPlane rest_moment;   /* N m */
+  double rest_depth;     /* m, penetration of a foot in the stance */
 } hxSupport;
 
 /* Planned forces of the ground on the feet at one step, walking frame. */
 typedef struct hxShares {
   double activation[HX_LEGS]; /* 1  in [0, 1] */
-  double normal[HX_LEGS]; /* N */
-  hxPlane push[HX_LEGS]; /* N */
-  hxPlane squeeze[HX_LEGS]; /* N, the part of push by which the legs squeeze each other (C42) */
+  double normal[HX_LEGS];     /* N */
+  hxPlane push[HX_LEGS];      /* N */
+  hxPlane squeeze[HX_LEGS];   /* N, the part of push by which the legs squeeze each other (C42) */
 } hxShares;
 
 /* 1, of the mean square arm: feet on one line share no moment about it */
@@ -27,7 +27,7 @@ static const double ridge_share = 1e-9;
 static const double least_arm = 1e-12;
 /* m2, of the feet about their centre: feet that are closer take no moment about the vertical */
 static const double least_spread = 1e-4;
-static const double least_load = 1e-6;     /* N, a smaller load is not shared */
+static const double least_load = 1e-6; /* N, a smaller load is not shared */
 
 /* Returns the depth [m] by which the ground deforms under a load [N] (C21). */
 /* Returns the indentation [m] of the ground under a load [N], (f_n/K)^(2/3) (C21). */

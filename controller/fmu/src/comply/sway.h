@@ -7,11 +7,11 @@
 #include "../walk/trajectory.h"
 
 typedef struct hxSway {
-  int active; /* the part is on */
+  int active;            /* the part is on */
   double forward, aside; /* 1    share of the mass that moves with all feet; 0 without the part */
-  double mass; /* kg    of the robot */
-  hxPlane home; /* m    sum of the feet in the stance */
-  hxPlane rest; /* kg m    sum of m p of all links in the stance */
+  double mass;           /* kg    of the robot */
+  hxPlane home;          /* m    sum of the feet in the stance */
+  hxPlane rest;          /* kg m    sum of m p of all links in the stance */
 } hxSway;
 
 /* m, by which all feet are moved to find the mass that moves with them */

@@ -7,7 +7,7 @@
 #include "hexapod/controller.h"
 
 typedef struct hxBurdenModel {
-  double most; /* N m, largest torque that a servo may be commanded */
+  double most;         /* N m, largest torque that a servo may be commanded */
   double fade, follow; /* 1, factors of the smoothings over a period */
 } hxBurdenModel;
 

@@ -8,14 +8,14 @@
 
 /* Finds the foot sensors that contradict the plan for too long (C34). */
 typedef struct hxSensorWatchModel {
-  double period; /* s */
+  double period;  /* s */
   double missing; /* N, when all feet measure less, some sensor reports too little */
-  double memory; /* s, time without contradiction until a sensor is trusted again */
+  double memory;  /* s, time without contradiction until a sensor is trusted again */
 } hxSensorWatchModel;
 
 typedef struct hxSensorWatch {
   double contradicted[HX_LEGS]; /* s, duration of the contradiction */
-  double left[HX_LEGS]; /* s, time until the sensor is trusted again */
+  double left[HX_LEGS];         /* s, time until the sensor is trusted again */
 } hxSensorWatch;
 
 /* 1, of the weight: a foot with more touches down, a foot with less lifts off */
@@ -26,7 +26,7 @@ static const double airborne_time = 0.06;
  * delay of the sensors */
 static const double absent_time = 0.10;
 static const double missing_share = 0.92; /* 1  of the weight */
-static const double memory_cycles = 1.5; /* 1  gait cycles */
+static const double memory_cycles = 1.5;  /* 1  gait cycles */
 
 /* Detects touch-down and lift-off with hysteresis (C23) from normal forces [N]; weight: of the
  * robot [N]. */

@@ -12,7 +12,7 @@ typedef struct hxLandings {
    */
   double met[HX_LEGS];
   double before[HX_LEGS]; /* m, the same at the landing before; 0 until then */
-  int flew[HX_LEGS]; /* the foot has left the ground in a swing since */
+  int flew[HX_LEGS];      /* the foot has left the ground in a swing since */
 } hxLandings;
 
 /* Returns the smallest of the other five heights; 0 when it is infinite. */

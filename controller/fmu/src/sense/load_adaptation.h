@@ -8,18 +8,18 @@
 #include <string.h>
 
 typedef struct hxLoadAdaptationModel {
-  double rating; /* N2 m2, square of the continuous torque of a servo */
+  double rating;  /* N2 m2, square of the continuous torque of a servo */
   double squeeze; /* 1, weight on ground on which feet creep, while all servos are cool */
-  int narrows; /* the gait has a narrow stance */
+  int narrows;    /* the gait has a narrow stance */
   double follow_work, follow; /* 1, factors of the smoothings over a period */
 } hxLoadAdaptationModel;
 
 typedef struct hxLoadAdaptation {
   double work[HX_LEGS][HX_JOINTS]; /* N2 m2, squares of the torques, smoothed over a gait cycle */
   double heat[HX_LEGS][HX_JOINTS]; /* N2 m2, the same, smoothed over a minute */
-  double heft; /* 1, measured over modelled weight, smoothed over a gait cycle */
+  double heft;      /* 1, measured over modelled weight, smoothed over a gait cycle */
   double narrowing; /* 1, part of the way to the narrow stance */
-  double squeeze; /* 1, weight of the torques in the planned squeeze */
+  double squeeze;   /* 1, weight of the torques in the planned squeeze */
 } hxLoadAdaptation;
 
 static const double heat_time = 60.0; /* s, in which a small servo warms up */

@@ -9,18 +9,18 @@
 
 typedef struct hxTouchdown {
   double offset[HX_LEGS]; /* m, by which the paths are raised */
-  double late[HX_LEGS]; /* s, for how long the ground has been missing */
+  double late[HX_LEGS];   /* s, for how long the ground has been missing */
 } hxTouchdown;
 
 /* m, a foot that meets the ground earlier on its way down has met it early */
 static const double hx_early = 0.002;
 static const double hx_reach_limit = 0.040; /* m, by which a foot is lowered at most */
-static const double reach_speed = 0.08; /* m/s  downwards */
-static const double hold_limit = 0.030;  /* m, upwards: the largest step height of the robots */
+static const double reach_speed = 0.08;     /* m/s  downwards */
+static const double hold_limit = 0.030;     /* m, upwards: the largest step height of the robots */
 /* s, delay after the planned touch-down that is tolerated */
 static const double grace = 0.040;
 static const double return_time = 0.060; /* s, in which an offset decays in the swing */
-static const double negligible = 1e-5; /* m, a smaller offset is set to 0 */
+static const double negligible = 1e-5;   /* m, a smaller offset is set to 0 */
 
 /* Returns whether some foot has an offset or misses the ground. */
 static inline int hx_touchdown_busy(const hxTouchdown *touchdown) {

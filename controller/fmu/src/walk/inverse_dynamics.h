@@ -10,7 +10,7 @@
 typedef struct hxInverseDynamics {
   double period, gravity; /* s, m/s2 */
   double rotor, friction; /* kg m2, N m  of servo and gear */
-  double floor; /* m, height of the ground below the stance, torso frame */
+  double floor;           /* m, height of the ground below the stance, torso frame */
   double torso_mass, torso_inertia;
   double total_mass; /* kg, of torso and links */
   hxPlane torso_com;
@@ -19,19 +19,19 @@ typedef struct hxInverseDynamics {
   hxPlane com[HX_LEGS]
              [HX_JOINTS]; /* m   along the link and up, from its joint, in the leg's plane */
   double side[HX_LEGS][HX_JOINTS]; /* m   Y of the mass points */
-  double yaw_inertia[HX_LEGS]; /* kg m2  of all links about the vertical */
+  double yaw_inertia[HX_LEGS];     /* kg m2  of all links about the vertical */
   double pitch_inertia[HX_LEGS][HX_JOINTS];
 } hxInverseDynamics;
 
 /* Positions of the mass points at one step. */
 typedef struct hxMasses {
-  hxPlane point[HX_LEGS][HX_JOINTS]; /* m   U, from where the coxa axis meets the hip */
-  hxPlane place[HX_LEGS][HX_JOINTS]; /* m   walking frame */
-  double height[HX_LEGS][HX_JOINTS]; /* m */
+  hxPlane point[HX_LEGS][HX_JOINTS];  /* m   U, from where the coxa axis meets the hip */
+  hxPlane place[HX_LEGS][HX_JOINTS];  /* m   walking frame */
+  double height[HX_LEGS][HX_JOINTS];  /* m */
   hxPlane ground[HX_LEGS][HX_JOINTS]; /* m, relative to the ground, from the start of the walk */
-  hxPlane torso_place, torso_ground; /* m */
-  double torso_height; /* m */
-  hxPlane turn; /* 1   e^(i yaw) of the walking frame */
+  hxPlane torso_place, torso_ground;  /* m */
+  double torso_height;                /* m */
+  hxPlane turn;                       /* 1   e^(i yaw) of the walking frame */
 } hxMasses;
 
 /* Torques and ground forces that a planned motion requires at one step. */
@@ -40,16 +40,16 @@ typedef struct hxDemand {
                                         their feet free */
   double lever[HX_LEGS][HX_JOINTS]
               [3]; /* m    J^T: joint torques per force on the contact point, walking frame */
-  hxPlane push; /* N    horizontal force the ground must give the robot, walking frame */
-  double weight; /* N, vertical force of the ground */
-  hxPlane moment; /* N m, sum of p f_n over the feet */
-  double twist; /* N m, sum of Im(p^* f_h), the moment about the vertical */
+  hxPlane push;    /* N    horizontal force the ground must give the robot, walking frame */
+  double weight;   /* N, vertical force of the ground */
+  hxPlane moment;  /* N m, sum of p f_n over the feet */
+  double twist;    /* N m, sum of Im(p^* f_h), the moment about the vertical */
 } hxDemand;
 
 /* Three successive steps. Without one of the neighbours the present step has no acceleration. */
 typedef struct hxNeighbours {
   const hxMasses *masses[3]; /* before, now, after */
-  const hxPose *pose[3]; /* of all legs */
+  const hxPose *pose[3];     /* of all legs */
 } hxNeighbours;
 
 /* rad/s, speed at which the gear's dry friction saturates, as in the plant */

@@ -9,29 +9,29 @@
 
 /* Constants of one leg. */
 typedef struct hxLegSolver {
-  double hip[3]; /* m    torso frame */
-  double hip_yaw; /* rad */
-  hxPlane upright; /* 1    e^(-i hip_yaw) */
+  double hip[3];                   /* m    torso frame */
+  double hip_yaw;                  /* rad */
+  hxPlane upright;                 /* 1    e^(-i hip_yaw) */
   double coxa_length, coxa_height; /* m */
-  double offset_y; /* m    Y, of all links */
-  double femur, tibia; /* m    a, b */
-  double femur_tilt, tibia_tilt; /* rad */
-  hxPlane femur_zero, tibia_zero; /* 1    e^(-i tilt) */
+  double offset_y;                 /* m    Y, of all links */
+  double femur, tibia;             /* m    a, b */
+  double femur_tilt, tibia_tilt;   /* rad */
+  hxPlane femur_zero, tibia_zero;  /* 1    e^(-i tilt) */
   double angle_min[HX_JOINTS], angle_max[HX_JOINTS];
   double stance[HX_JOINTS]; /* rad */
-  double stance_pitch; /* rad  q_3 - q_2 of the stance */
-  double speed_max; /* rad/s */
-  double radius; /* m    of the foot */
+  double stance_pitch;      /* rad  q_3 - q_2 of the stance */
+  double speed_max;         /* rad/s */
+  double radius;            /* m    of the foot */
 } hxLegSolver;
 
 /* A leg in its plane, torso frame. */
 typedef struct hxPose {
-  hxPlane point; /* m    from the coxa axis to the foot, x + i y */
-  hxPlane heading; /* 1    e^(i psi), the leg's outward direction */
-  hxPlane foot; /* m    from the femur joint to the foot, u + i w */
-  hxPlane femur, tibia; /* 1    e^(i A), e^(i B) */
+  hxPlane point;           /* m    from the coxa axis to the foot, x + i y */
+  hxPlane heading;         /* 1    e^(i psi), the leg's outward direction */
+  hxPlane foot;            /* m    from the femur joint to the foot, u + i w */
+  hxPlane femur, tibia;    /* 1    e^(i A), e^(i B) */
   double angle[HX_JOINTS]; /* rad  without joint limits */
-  int lost; /* the foot is out of reach, and the angles are the nearest ones */
+  int lost;                /* the foot is out of reach, and the angles are the nearest ones */
 } hxPose;
 
 /* Softness of a leg on its servos, C = J J^T / kp [m/N]. */

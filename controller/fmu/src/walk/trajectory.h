@@ -13,7 +13,7 @@ enum { HX_COMMANDS = 6 }; /* vx vy yaw_rate height roll pitch */
  * rate 0. */
 typedef struct hxCommandRampModel {
   double duration, period; /* s */
-  int64_t end; /* steps that a change takes */
+  int64_t end;             /* steps that a change takes */
 } hxCommandRampModel;
 
 typedef struct hxCommandRamp {
@@ -25,47 +25,47 @@ typedef struct hxCommandRamp {
 typedef struct hxFootPathsModel {
   double period, gait_period, duty, step_height, touchdown_speed;
   double gait_offset[HX_LEGS]; /* cycles; phases at clock 0 */
-  double offset[HX_LEGS]; /* cycles; phases at the start of the walk */
+  double offset[HX_LEGS];      /* cycles; phases at the start of the walk */
   /* the walk begins during the leg's swing, or while it takes up its load */
   int late[HX_LEGS];
-  double handover; /* cycles in which a leg takes up or gives up its load (C18) */
-  double swing_time; /* s */
-  double landing_lead; /* s, from lift-off to the middle of the next stance */
-  hxPlane home[HX_LEGS]; /* m   feet of the stance */
-  hxPlane inward[HX_LEGS]; /* m   from the stance to the narrow one */
-  double turned[HX_LEGS]; /* m   that the feet roll outwards on this way */
+  double handover;             /* cycles in which a leg takes up or gives up its load (C18) */
+  double swing_time;           /* s */
+  double landing_lead;         /* s, from lift-off to the middle of the next stance */
+  hxPlane home[HX_LEGS];       /* m   feet of the stance */
+  hxPlane inward[HX_LEGS];     /* m   from the stance to the narrow one */
+  double turned[HX_LEGS];      /* m   that the feet roll outwards on this way */
   double home_height[HX_LEGS]; /* m */
 } hxFootPathsModel;
 
 /* Motion of the body at one step: the command, plus what leads the body back to its path. */
 typedef struct hxTwist {
   hxPlane velocity; /* m/s */
-  double yaw_rate; /* rad/s */
+  double yaw_rate;  /* rad/s */
 } hxTwist;
 
 /* The feet at one step, as the command plans them, in the walking frame. goal, pull, way and turn
  * are in the ground frame. */
 typedef struct hxPlannedFeet {
-  hxPlane plane[HX_LEGS]; /* m    centres, x + i y */
-  double height[HX_LEGS]; /* m    z */
+  hxPlane plane[HX_LEGS];    /* m    centres, x + i y */
+  double height[HX_LEGS];    /* m    z */
   hxPlane velocity[HX_LEGS]; /* m/s  of x + i y */
-  double rise[HX_LEGS]; /* m/s  of z */
-  double phase[HX_LEGS]; /* 1    in [0, 1) */
-  double blend[HX_LEGS]; /* 1    s of swinging feet, else 0 */
+  double rise[HX_LEGS];      /* m/s  of z */
+  double phase[HX_LEGS];     /* 1    in [0, 1) */
+  double blend[HX_LEGS];     /* 1    s of swinging feet, else 0 */
   /* m, where a swinging foot will touch down, or where a standing foot stands */
   hxPlane goal[HX_LEGS];
-  hxPlane pull[HX_LEGS]; /* m, (goal - foot)/(1 - s) of swinging feet, 0 of standing feet */
+  hxPlane pull[HX_LEGS];  /* m, (goal - foot)/(1 - s) of swinging feet, 0 of standing feet */
   double rolled[HX_LEGS]; /* m, outwards from the stance to the position that the foot aims at */
-  hxPlane way; /* m, displacement of the walking frame over the ground */
-  double turn; /* rad  of the walking frame over the ground */
-  hxTwist twist; /* of the body */
+  hxPlane way;            /* m, displacement of the walking frame over the ground */
+  double turn;            /* rad  of the walking frame over the ground */
+  hxTwist twist;          /* of the body */
 } hxPlannedFeet;
 
 /* The paths of the feet between a lift-off or touch-down and the next one. The same legs are in the
  * air throughout such a section of the walk. */
 typedef struct hxFootPaths {
-  int walking; /* the gait clock runs */
-  int64_t before; /* periods from the start of the walk to the first step of the section */
+  int walking;           /* the gait clock runs */
+  int64_t before;        /* periods from the start of the walk to the first step of the section */
   int swinging[HX_LEGS]; /* in the air */
   /* stands by the gait clock; a foot that makes no step neither stands by the clock nor swings */
   int standing[HX_LEGS];
@@ -77,8 +77,8 @@ typedef struct hxFootPaths {
   int met[HX_LEGS]; /* the foot has met the ground on its way down, and stays where it is */
   int held; /* the gait clock stands still until feet at the ends of their swings carry load */
   int awaited[HX_LEGS]; /* the gait clock waits for this foot */
-  int ending; /* another gait follows: legs finish their steps and begin no other */
-  double narrowing; /* 1, part of the way to the narrow stance that the steps aim at */
+  int ending;           /* another gait follows: legs finish their steps and begin no other */
+  double narrowing;     /* 1, part of the way to the narrow stance that the steps aim at */
 } hxFootPaths;
 
 /* 1, share of the swing at each end in which the foot moves vertically only */

@@ -31,14 +31,14 @@ typedef struct hxMaster {
   size_t push_count;
   size_t push_place;
   const uint8_t *lost; /* 1     [steps] whether the plant keeps its last joint commands; NULL: no */
-  size_t drive_place; /* 1     index of the first joint command in the row */
-  size_t drive_count; /* 1     joint commands */
-  double *drive; /*       [drive_count] the last joint commands */
+  size_t drive_place;  /* 1     index of the first joint command in the row */
+  size_t drive_count;  /* 1     joint commands */
+  double *drive;       /*       [drive_count] the last joint commands */
   const size_t *column; /* 1     [columns] indices in the row of the values to record */
   size_t columns;
-  double *record; /*       where the next row is written, which adjoins the one before */
+  double *record;  /*       where the next row is written, which adjoins the one before */
   size_t recorded; /* 1     number of rows written */
-  size_t step; /* 1     macro-steps done */
+  size_t step;     /* 1     macro-steps done */
 } hxMaster;
 
 /* Number of the layout of hxMaster and of the structures in it. A change of their members, or of

@@ -26,19 +26,19 @@ typedef enum hxFault {
 /* Equal sensors, each of which reads `size` numbers. Noise comes first, then the delay, then the
  * faults. Until there are readings as old as a delay, the first one is used. */
 typedef struct hxSensors {
-  size_t count;         /* 1     sensors; 0: none have errors */
-  size_t size;          /* 1     numbers of each */
-  const size_t *place;  /* 1     [count][size] indices of the true numbers in the row */
+  size_t count;          /* 1     sensors; 0: none have errors */
+  size_t size;           /* 1     numbers of each */
+  const size_t *place;   /* 1     [count][size] indices of the true numbers in the row */
   const size_t *reading; /* 1     [count][size] indices of the readings in the row */
-  const double *factor; /* 1     [moments][count][noisy] noise; NULL: none */
-  size_t noisy;         /* 1     numbers of each that have noise, the first ones */
-  size_t delay;         /* 1     macro-steps by which all readings are late */
-  const int8_t *fault;  /* 1     [moments][count] hxFault; NULL: none */
-  const int32_t *late;  /* 1     [moments][count] macro-steps, where the fault is HX_FAULT_LATE */
-  size_t moments;       /* 1     after them noise repeats, and there are no faults */
+  const double *factor;  /* 1     [moments][count][noisy] noise; NULL: none */
+  size_t noisy;          /* 1     numbers of each that have noise, the first ones */
+  size_t delay;          /* 1     macro-steps by which all readings are late */
+  const int8_t *fault;   /* 1     [moments][count] hxFault; NULL: none */
+  const int32_t *late;   /* 1     [moments][count] macro-steps, where the fault is HX_FAULT_LATE */
+  size_t moments;        /* 1     after them noise repeats, and there are no faults */
   const double *dead, *nan; /*   [size] readings with these faults */
-  double *memory;       /*       [slots][count][size] latest numbers, without faults */
-  size_t slots;         /* 1     more than the longest delay */
+  double *memory;           /*       [slots][count][size] latest numbers, without faults */
+  size_t slots;             /* 1     more than the longest delay */
 } hxSensors;
 
 /* Computes the readings of a moment from the true numbers. */
@@ -46,16 +46,16 @@ HX_API void hx_sensors_read(const hxSensors *sensors, size_t moment, double *row
 
 /* Faults of servos, which know the true angles. */
 typedef struct hxServos {
-  size_t count;             /* 1     servos; 0: none have faults */
-  const int8_t *fault;      /* 1     [moments][count] hxFault */
-  size_t moments;           /* 1     after them there are no faults */
-  const size_t *angle;      /* 1     [count] indices of joint angles and speeds in the row */
+  size_t count;        /* 1     servos; 0: none have faults */
+  const int8_t *fault; /* 1     [moments][count] hxFault */
+  size_t moments;      /* 1     after them there are no faults */
+  const size_t *angle; /* 1     [count] indices of joint angles and speeds in the row */
   const size_t *speed;
-  const size_t *angle_ref;  /* 1     [count] indices of the joint commands in the row */
+  const size_t *angle_ref; /* 1     [count] indices of the joint commands in the row */
   const size_t *speed_ref;
   const size_t *torque_ref;
   const size_t *acceleration_ref;
-  double *stuck_at;         /* rad   [count] where a servo stuck; NaN: it does not */
+  double *stuck_at; /* rad   [count] where a servo stuck; NaN: it does not */
 } hxServos;
 
 /* Replaces the joint commands of servos with faults. */

@@ -16,7 +16,7 @@ struct hxEnvironments {
   hxEnvironment *environment;
   double *drawn;
   hxPool pool;
-  hxEnvWork work; /* of the thread that calls reset or step */
+  hxEnvWork work;       /* of the thread that calls reset or step */
   const uint8_t *mask;  /* of the present reset */
   const uint64_t *seed; /* of the present reset */
 };

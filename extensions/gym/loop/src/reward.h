@@ -13,14 +13,14 @@ typedef struct hxEnvView {
 
 /* What a step is rewarded for. */
 typedef struct hxEnvMotion {
-  hxEnvView view;       /*        at its end */
+  hxEnvView view;        /*        at its end */
   const double *command; /* m/s, m/s, rad/s  forward, to the left, yaw rate */
-  const double *torque; /* N m    [HX_ENV_JOINTS] at its end */
-  const double *speed;  /* rad/s  [HX_ENV_JOINTS] at its end */
-  double change;        /* 1      sum of the squared changes of the action */
-  double slip;          /* m      of all feet */
-  double time;          /* s      of the step */
-  int fell;             /* 1: the episode ended with a fall */
+  const double *torque;  /* N m    [HX_ENV_JOINTS] at its end */
+  const double *speed;   /* rad/s  [HX_ENV_JOINTS] at its end */
+  double change;         /* 1      sum of the squared changes of the action */
+  double slip;           /* m      of all feet */
+  double time;           /* s      of the step */
+  int fell;              /* 1: the episode ended with a fall */
 } hxEnvMotion;
 
 /* Writes the weighted terms of a step and returns their sum. */

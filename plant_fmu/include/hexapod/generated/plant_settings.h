@@ -104,6 +104,8 @@ typedef enum hxTerrainKind {
   HX_TERRAIN_GRID,
 } hxTerrainKind;
 
+enum { HX_CONE_BINS = 31 };
+
 typedef struct hxBodySettings {
   /* hxBodyContact  Whether torso, knees and shanks touch the ground */
   int contact;

@@ -35,16 +35,16 @@ enum { HX_ENV_JOINTS = 18, HX_ENV_FEET = 6 };
 
 /* Outputs of the plant in the order in which they are read: names with their numbers. */
 typedef enum hxEnvPlace {
-  HX_ENV_ANGLE = 0,                                 /* 18 joint angles */
-  HX_ENV_SPEED = HX_ENV_ANGLE + HX_ENV_JOINTS,      /* 18 joint speeds */
-  HX_ENV_FORCE = HX_ENV_SPEED + HX_ENV_JOINTS,      /* 6 x 3 forces on the feet, world axes */
+  HX_ENV_ANGLE = 0,                            /* 18 joint angles */
+  HX_ENV_SPEED = HX_ENV_ANGLE + HX_ENV_JOINTS, /* 18 joint speeds */
+  HX_ENV_FORCE = HX_ENV_SPEED + HX_ENV_JOINTS, /* 6 x 3 forces on the feet, world axes */
   HX_ENV_QUATERNION = HX_ENV_FORCE + 3 * HX_ENV_FEET,
-  HX_ENV_ROTATION = HX_ENV_QUATERNION + 4,          /* 3 angular velocity, world axes */
-  HX_ENV_TORQUE = HX_ENV_ROTATION + 3,              /* 18 torques of the servos */
-  HX_ENV_POSITION = HX_ENV_TORQUE + HX_ENV_JOINTS,  /* 3 */
-  HX_ENV_VELOCITY = HX_ENV_POSITION + 3,            /* 3 world axes */
-  HX_ENV_BELLY = HX_ENV_VELOCITY + 3,               /* 3 force of the ground on the torso */
-  HX_ENV_SLIP = HX_ENV_BELLY + 3,                   /* 6 slip distances of the feet */
+  HX_ENV_ROTATION = HX_ENV_QUATERNION + 4,         /* 3 angular velocity, world axes */
+  HX_ENV_TORQUE = HX_ENV_ROTATION + 3,             /* 18 torques of the servos */
+  HX_ENV_POSITION = HX_ENV_TORQUE + HX_ENV_JOINTS, /* 3 */
+  HX_ENV_VELOCITY = HX_ENV_POSITION + 3,           /* 3 world axes */
+  HX_ENV_BELLY = HX_ENV_VELOCITY + 3,              /* 3 force of the ground on the torso */
+  HX_ENV_SLIP = HX_ENV_BELLY + 3,                  /* 6 slip distances of the feet */
   HX_ENV_VALUES = HX_ENV_SLIP + HX_ENV_FEET
 } hxEnvPlace;
 
@@ -74,27 +74,27 @@ typedef enum hxEnvBlock {
 typedef enum hxEnvTerm {
   HX_TERM_TRACKING_LIN_VEL, /* 1         exp(-|c_xy - v_xy|^2 / width^2) */
   HX_TERM_TRACKING_ANG_VEL, /* 1         exp(-(c_yaw - w_z)^2 / width^2) */
-  HX_TERM_PROGRESS, /* m/s       velocity along the commanded one, at most its size */
-  HX_TERM_LIN_VEL_Z, /* m2/s2     v_z^2 */
-  HX_TERM_ANG_VEL_XY, /* rad2/s2   w_x^2 + w_y^2 */
-  HX_TERM_ORIENTATION, /* 1         square of the horizontal part of gravity's direction */
-  HX_TERM_TORQUES, /* N2 m2     sum of squares */
-  HX_TERM_DOF_VEL, /* rad2/s2   sum of squares */
-  HX_TERM_POWER, /* W         sum of the positive powers of the servos */
-  HX_TERM_ACTION_RATE, /* 1         sum of squared changes of the action */
-  HX_TERM_FEET_SLIP, /* m/s       mean speed over the step, summed over the feet */
-  HX_TERM_ALIVE, /* 1         1 */
-  HX_TERM_TERMINATION, /* 1         1 in a step that ends with a fall */
+  HX_TERM_PROGRESS,         /* m/s       velocity along the commanded one, at most its size */
+  HX_TERM_LIN_VEL_Z,        /* m2/s2     v_z^2 */
+  HX_TERM_ANG_VEL_XY,       /* rad2/s2   w_x^2 + w_y^2 */
+  HX_TERM_ORIENTATION,      /* 1         square of the horizontal part of gravity's direction */
+  HX_TERM_TORQUES,          /* N2 m2     sum of squares */
+  HX_TERM_DOF_VEL,          /* rad2/s2   sum of squares */
+  HX_TERM_POWER,            /* W         sum of the positive powers of the servos */
+  HX_TERM_ACTION_RATE,      /* 1         sum of squared changes of the action */
+  HX_TERM_FEET_SLIP,        /* m/s       mean speed over the step, summed over the feet */
+  HX_TERM_ALIVE,            /* 1         1 */
+  HX_TERM_TERMINATION,      /* 1         1 in a step that ends with a fall */
   HX_ENV_TERMS
 } hxEnvTerm;
 
 /* Why an episode ended. */
 typedef enum hxEnvReason {
-  HX_END_NONE, /* it goes on */
-  HX_END_TIME, /* its time is over: truncated */
+  HX_END_NONE,   /* it goes on */
+  HX_END_TIME,   /* its time is over: truncated */
   HX_END_TILTED, /* the torso leans more than the limit: terminated */
-  HX_END_BELLY, /* the torso rests on the ground: terminated */
-  HX_END_FAILED /* an FMU refused a step or its start, see the message: terminated */
+  HX_END_BELLY,  /* the torso rests on the ground: terminated */
+  HX_END_FAILED  /* an FMU refused a step or its start, see the message: terminated */
 } hxEnvReason;
 
 /* What follows the end of an episode, as in Gymnasium. An episode whose start fails has ended, with
@@ -102,7 +102,7 @@ typedef enum hxEnvReason {
 typedef enum hxAutoreset {
   HX_AUTORESET_NEXT_STEP, /* the next step resets, whatever its action */
   HX_AUTORESET_SAME_STEP, /* the same step resets; the last observation is in `last` */
-  HX_AUTORESET_DISABLED /* the caller resets; until then steps change nothing */
+  HX_AUTORESET_DISABLED   /* the caller resets; until then steps change nothing */
 } hxAutoreset;
 
 /* An FMU and its functions. instantiate = NULL: there is none. */
@@ -115,7 +115,7 @@ typedef struct hxEnvFmu {
   fmi2ExitInitializationModeTYPE *leave;
   hxStepFmu step; /* its functions; the instances are those of the environments */
   const char *guid;
-  const char *resources; /* URI of the unpacked resources */
+  const char *resources;       /* URI of the unpacked resources */
   hxSharedWorkSize *work_size; /* NULL, like the next: the binary does not have it */
   hxSharedWorkUse *work_use;
 } hxEnvFmu;
@@ -124,9 +124,9 @@ typedef struct hxEnvFmu {
  * the same random number. */
 typedef struct hxEnvDraws {
   const fmi2ValueReference *reference; /*       [count] */
-  const double *low, *high; /*       [count] range, both ends possible */
-  const int32_t *whole; /* 1     [count] whole numbers only */
-  const int32_t *group; /* 1     [count] number of the random number */
+  const double *low, *high;            /*       [count] range, both ends possible */
+  const int32_t *whole;                /* 1     [count] whole numbers only */
+  const int32_t *group;                /* 1     [count] number of the random number */
   size_t count;
 } hxEnvDraws;
 
@@ -134,59 +134,59 @@ typedef struct hxEnvDraws {
  * heights are sampled on a square grid, bilinear between its nodes; outside the grid those of its
  * border go on. */
 typedef struct hxEnvGround {
-  const float *height; /* m    [count][rows][columns]; rows along y, columns along x */
-  const double *place; /* m    [points][2] forward and to the left of the torso's centre of
-                        *      mass, in horizontal axes that turn with the torso */
+  const float *height;         /* m    [count][rows][columns]; rows along y, columns along x */
+  const double *place;         /* m    [points][2] forward and to the left of the torso's centre of
+                                *      mass, in horizontal axes that turn with the torso */
   size_t count, rows, columns; /* 1    at least 1, 2, 2 where points is not 0 */
-  size_t points; /* 1    scanned places */
-  size_t draw; /* 1    index of the draw whose value is the ground's number, from 1;
-                *      draws.count: always the first ground */
-  double x0, y0; /* m    of the first node */
-  double spacing; /* m    of the nodes */
-  double clearance; /* m    height of the torso over level ground in the stance */
+  size_t points;               /* 1    scanned places */
+  size_t draw;                 /* 1    index of the draw whose value is the ground's number, from 1;
+                                *      draws.count: always the first ground */
+  double x0, y0;               /* m    of the first node */
+  double spacing;              /* m    of the nodes */
+  double clearance;            /* m    height of the torso over level ground in the stance */
 } hxEnvGround;
 
 /* Equal for all environments of a batch. Arrays must live as long as the batch. */
 typedef struct hxEnvSettings {
   hxEnvFmu plant, controller;
-  const fmi2ValueReference *plant_output; /* [HX_ENV_VALUES] */
-  const fmi2ValueReference *plant_input; /* [HX_ENV_INPUTS] angles, speeds, torques, push */
-  const fmi2ValueReference *controller_input; /* [HX_ENV_BODY + HX_ENV_SENSED] */
+  const fmi2ValueReference *plant_output;      /* [HX_ENV_VALUES] */
+  const fmi2ValueReference *plant_input;       /* [HX_ENV_INPUTS] angles, speeds, torques, push */
+  const fmi2ValueReference *controller_input;  /* [HX_ENV_BODY + HX_ENV_SENSED] */
   const fmi2ValueReference *controller_output; /* [HX_ENV_COMMANDS] */
   hxEnvDraws draws;
   hxEnvGround ground;
-  double h; /* s    between two commands of a controller */
-  size_t substeps; /* 1    of h, in a step of an environment */
-  size_t length; /* 1    steps of an episode */
-  double stance[HX_ENV_JOINTS]; /* rad  commanded angles for the action 0 */
+  double h;                           /* s    between two commands of a controller */
+  size_t substeps;                    /* 1    of h, in a step of an environment */
+  size_t length;                      /* 1    steps of an episode */
+  double stance[HX_ENV_JOINTS];       /* rad  commanded angles for the action 0 */
   double action_scale[HX_ENV_JOINTS]; /* rad  for the action 1 */
-  double action_limit; /* 1    larger actions are limited to this size */
-  double observed[HX_ENV_BLOCKS][3]; /*      scales of the blocks; for each axis of blocks of 3,
-                                      *      otherwise the first */
-  double clock; /* Hz */
+  double action_limit;                /* 1    larger actions are limited to this size */
+  double observed[HX_ENV_BLOCKS][3];  /*      scales of the blocks; for each axis of blocks of 3,
+                                       *      otherwise the first */
+  double clock;                       /* Hz */
   double command_low[3], command_high[3]; /* m/s, m/s, rad/s  ranges of the drawn commands */
   size_t command_interval; /* 1    steps from one draw of the command to the next; 0: one draw for
                             *      each episode */
-  size_t push_interval; /* 1    steps from the start of a push to the next; 0: none */
-  size_t push_length; /* 1    steps that a push lasts */
-  double push_force; /* N    largest; horizontal, of uniform size and direction */
-  double upright; /* 1    least cosine of the torso's lean */
-  double belly_force; /* N    largest force of the ground on the torso */
+  size_t push_interval;    /* 1    steps from the start of a push to the next; 0: none */
+  size_t push_length;      /* 1    steps that a push lasts */
+  double push_force;       /* N    largest; horizontal, of uniform size and direction */
+  double upright;          /* 1    least cosine of the torso's lean */
+  double belly_force;      /* N    largest force of the ground on the torso */
   double weight[HX_ENV_TERMS]; /*      of the terms of the reward */
-  double width[2]; /* m/s, rad/s  of the tracking terms: exp(-(e / width)^2) */
-  int autoreset; /* hxAutoreset */
+  double width[2];             /* m/s, rad/s  of the tracking terms: exp(-(e / width)^2) */
+  int autoreset;               /* hxAutoreset */
 } hxEnvSettings;
 
 /* What goes in and out of all environments. The caller's arrays; there are no copies. */
 typedef struct hxEnvArrays {
   const float *action; /* 1  [n][18] */
-  float *observation; /*    [n][size] */
-  float *last; /*    [n][size] last observation of an episode that ended in this step */
-  double *reward; /*    [n] */
-  double *term; /*    [n][HX_ENV_TERMS] weighted terms, whose sum is the reward */
+  float *observation;  /*    [n][size] */
+  float *last;         /*    [n][size] last observation of an episode that ended in this step */
+  double *reward;      /*    [n] */
+  double *term;        /*    [n][HX_ENV_TERMS] weighted terms, whose sum is the reward */
   uint8_t *terminated, *truncated; /* 1  [n] */
   uint8_t *refused; /* 1  [n] the action was not finite: the environment did not step */
-  int32_t *reason; /* 1  [n] hxEnvReason */
+  int32_t *reason;  /* 1  [n] hxEnvReason */
 } hxEnvArrays;
 
 typedef struct hxEnvironments hxEnvironments;

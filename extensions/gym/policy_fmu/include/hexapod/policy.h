@@ -21,30 +21,30 @@ enum { HX_POLICY_SEEN = 29, HX_POLICY_UNITS = 16 };
  * of gravity in torso axes, command times 10, 10 and 1, joint angles less those of the stance, sine
  * and cosine of the clock. */
 typedef struct hxPolicyDefinition {
-  double period; /* s    between two actions */
-  double clock; /* Hz */
-  double action_scale; /* rad  for the action 1 */
-  double stance[HX_LEGS][HX_JOINTS]; /* rad  for the action 0 */
-  double hidden_weight[HX_POLICY_UNITS][HX_POLICY_SEEN]; /* 1    W */
-  double hidden_bias[HX_POLICY_UNITS]; /* 1    w */
+  double period;                                             /* s    between two actions */
+  double clock;                                              /* Hz */
+  double action_scale;                                       /* rad  for the action 1 */
+  double stance[HX_LEGS][HX_JOINTS];                         /* rad  for the action 0 */
+  double hidden_weight[HX_POLICY_UNITS][HX_POLICY_SEEN];     /* 1    W */
+  double hidden_bias[HX_POLICY_UNITS];                       /* 1    w */
   double action_weight[HX_LEGS][HX_JOINTS][HX_POLICY_UNITS]; /* 1    V */
-  double action_bias[HX_LEGS][HX_JOINTS]; /* 1    v */
+  double action_bias[HX_LEGS][HX_JOINTS];                    /* 1    v */
 } hxPolicyDefinition;
 
 /* Command and measurements. */
 typedef struct hxPolicyInput {
   struct {
-    double vx, vy; /* m/s    forward, to the left */
+    double vx, vy;   /* m/s    forward, to the left */
     double yaw_rate; /* rad/s  to the left */
   } command;
   double angle[HX_LEGS][HX_JOINTS]; /* rad */
-  double quaternion[4]; /* 1      torso to world, w x y z */
-  double rotation[3]; /* rad/s  of the torso, world axes */
+  double quaternion[4];             /* 1      torso to world, w x y z */
+  double rotation[3];               /* rad/s  of the torso, world axes */
 } hxPolicyInput;
 
 typedef struct hxPolicyOutput {
   double angle_ref[HX_LEGS][HX_JOINTS]; /* rad */
-  double action[HX_LEGS][HX_JOINTS]; /* 1    limited to [-1, 1] */
+  double action[HX_LEGS][HX_JOINTS];    /* 1    limited to [-1, 1] */
 } hxPolicyOutput;
 
 typedef struct hxPolicy hxPolicy;
