@@ -25,11 +25,7 @@ Rectangle = tuple[int, int, int, int]  # first row, rows, first column, columns
 
 
 def add_surface(
-    root: ET.Element,
-    world: ET.Element,
-    surface: Surface,
-    height: float,
-    contact: Mapping[str, str],
+    root: ET.Element, world: ET.Element, surface: Surface, height: float, contact: Mapping[str, str]
 ) -> None:
     """Adds the surface, with 0 at `height` [m], to a model's assets and its world.
 
@@ -49,11 +45,7 @@ def add_surface(
 
 
 def _add_field(
-    root: ET.Element,
-    world: ET.Element,
-    surface: Surface,
-    height: float,
-    common: Mapping[str, str],
+    root: ET.Element, world: ET.Element, surface: Surface, height: float, common: Mapping[str, str]
 ) -> None:
     """Adds a height field, whose data are heights from 0 to 1 over its range."""
     left, right, low, high = surface.extent
