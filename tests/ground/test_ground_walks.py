@@ -40,7 +40,7 @@ def test_both_controls_walk_it_upright(walker: Walker, name: str, control: str) 
 def test_feet_that_find_no_ground_neither_end_the_run_nor_its_metrics() -> None:
     """The robot steps into gaps deeper than its legs reach, and falls or hangs between them."""
     settings = [
-        f"control={control}",
+        "control=compliant",
         "terrain.kind=gaps",
         "terrain.gap_size=0.3",
         "terrain.depth=1",
