@@ -59,7 +59,6 @@ from hexapod_cosim.cosim.scenario.scenario import scenario_robot
 from hexapod_cosim.cosim.scenario.schedule import Schedule, make_schedule
 from hexapod_cosim.cosim.scenario.variation import (
     Drawn,
-    check_start_depth,
     delayed,
     draw,
     initial_values,
@@ -211,9 +210,6 @@ def initialise_plant(plant: Fmu, plan: RunPlan) -> dict[str, float]:
     scenario = plan.scenario
     _check_measurements(plant)
     plant.set_parameters(scenario.parameters)
-    if scenario.parameters and all(name.startswith("initial.") for name in scenario.parameters):
-        # with other parameters the robot's own numbers may not be the plant's, which checks too
-        check_start_depth(plan.robot, plant.parameters(), where=f"{scenario.where}: initial")
     if plan.drawn is not None:
         plant.set_parameters(initial_values(plan.robot, plant.parameters(), plan.drawn))
     plant.initialise(scenario.start, scenario.start + scenario.duration)
