@@ -141,7 +141,6 @@ def other_cores(tmp_path_factory: pytest.TempPathFactory) -> dict[str, ct.CDLL]:
         for path in [
             *sorted((plant / "src").rglob("*.c")),
             plant / "generated" / "defaults.c",
-            ROOT / "tests" / "native" / "probe" / "stain.c",
         ]
     ]
     flags = [
