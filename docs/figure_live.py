@@ -32,7 +32,7 @@ from hexapod_cosim.extensions.live.settings import Choices, control_texts
 
 RATE = 12  # pictures per second of simulated time
 STEP = 0.02  # s    by which the clock goes on: a state is sent as often
-SECONDS = "window.hexapod.poses.newest.seconds"
+SECONDS = "window.hexapod.shown.frame.seconds"
 SETTLE = 150  # ms
 END = 7.0  # s    of simulated time
 SIZE = {"width": 1280, "height": 800}  # px    of the browser
@@ -136,7 +136,7 @@ def main() -> None:
         page = browser.new_page(viewport=SIZE, color_scheme="light")
         page.goto(server.url)
         page.add_style_tag(content=HIDDEN)
-        page.wait_for_function("window.hexapod?.poses.newest", timeout=PATIENCE)
+        page.wait_for_function("window.hexapod?.shown.frame", timeout=PATIENCE)
         page.set_default_timeout(PATIENCE)
         pictures = take_pictures(page, clock)
         browser.close()

@@ -5,12 +5,15 @@ python docs/figure_terrains.py
 
 from __future__ import annotations
 
+import io
 from pathlib import Path
-from tempfile import TemporaryDirectory
 
+import matplotlib
+from matplotlib.figure import Figure
 from PIL import Image
 
-from hexapod_cosim.cosim.report.relief import contact_sheet
+from hexapod_cosim.controller.figure_style import DPI, SETTINGS
+from hexapod_cosim.cosim.report.relief import draw_robot, draw_surface
 from hexapod_cosim.models import load_robot
 from hexapod_cosim.models.ground.catalogue import CATALOGUE, make_surface
 
@@ -20,17 +23,23 @@ COLOURS = 256  # of the picture's palette
 
 def main() -> None:
     """Writes the picture."""
-    surfaces = [
-        make_surface(name, {})
-        for name in CATALOGUE
-        if name != "heightfield"  # needs a file
-    ]
+    names = [name for name in CATALOGUE if name != "heightfield"]  # which needs a file
+    rows, robot, content = -(-len(names) // COLUMNS), load_robot("athena"), io.BytesIO()
+    with matplotlib.rc_context(SETTINGS | {"axes.grid": False, "axes.titlesize": 7.0}):
+        figure = Figure(figsize=(1.8 * COLUMNS, 1.95 * rows))
+        grid = figure.subplots(rows, COLUMNS, squeeze=False).ravel()
+        for axes in grid[len(names) :]:
+            axes.set_axis_off()
+        for axes, name in zip(grid, names, strict=False):
+            draw_surface(axes, make_surface(name, {}))
+            draw_robot(axes, robot)
+            heights = axes.texts[0].get_text().partition(",")[0]
+            axes.texts[0].remove()
+            axes.set_title(f"{name}\n{heights}")
+            axes.tick_params(labelsize=5.0)
+        figure.savefig(content, format="png", dpi=DPI)
     target = Path(__file__).parent / "images" / "terrains.png"
-    with TemporaryDirectory() as folder:
-        sheet = contact_sheet(
-            surfaces, load_robot("athena"), Path(folder) / "sheet.png", columns=COLUMNS
-        )
-        picture = Image.open(sheet).convert("RGB")
+    picture = Image.open(content).convert("RGB")
     picture.quantize(COLOURS, dither=Image.Dither.NONE).save(target, optimize=True)
     print(f"wrote {target}: {target.stat().st_size / 1000:.0f} kB")
 

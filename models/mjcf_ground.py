@@ -36,13 +36,11 @@ def add_surface(
     contact: attributes of the geoms. Raises RobotError for a map too large for a text file.
     """
     if surface.height.size > MOST_HEIGHTS:
-        raise RobotError(
-            "a map too large for an MJCF file",
-            got=f"{surface.height.size} heights",
-            expected=f"at most {MOST_HEIGHTS}",
-            fix="reduce its resolution",
-            where=surface.name,
-        )
+        what = "a map too large for an MJCF file"
+        got = f"{surface.height.size} heights"
+        expected = f"at most {MOST_HEIGHTS}"
+        fix = "reduce its resolution"
+        raise RobotError(what, got=got, expected=expected, fix=fix, where=surface.name)
     common = {"material": "ground", **contact}
     if surface.kind == "smooth":
         _add_field(root, world, surface, height, common)

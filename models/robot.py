@@ -41,8 +41,10 @@ from hexapod_cosim.models.records import (
 )
 from hexapod_cosim.models.schema import (
     Number,
+    Text,
     Vector,
     expect_table,
+    missing_key,
     parse_toml,
     read_given,
     reading_toml,
@@ -131,37 +133,26 @@ def robot_from_table(table: Mapping[str, Any], *, where: str) -> Robot:
         for name in SECTIONS
         if name != "friction"
     }
-    gravity, legs = _read_gravity(table, f"{where}: gravity"), _read_legs(table, where)
+    given = table.get("gravity", (0.0, 0.0, -9.81))
+    x, y, z = Vector("m/s2", 3).read(given, f"{where}: gravity")
+    legs = _read_legs(table, where)
     mass = sections["torso"].mass + sum(link.mass for leg in legs for link in leg.links)
-    standing = mass * math.hypot(*gravity) / 3.0  # N  load of a foot of a tripod
+    standing = mass * math.hypot(x, y, z) / 3.0  # N  load of a foot of a tripod
     robot = Robot(
-        name=_read_text(table.get("name"), f"{where}: name"),
-        gravity=gravity,
+        name=Text().read(table.get("name"), f"{where}: name"),
+        gravity=(x, y, z),
         legs=legs,
         friction=_read_friction(
             table, f"{where}: friction", sections["foot"], sections["contact"], standing
         ),
         source={
-            key: _read_text(text, f"{where}: source.{key}")
+            key: Text().read(text, f"{where}: source.{key}")
             for key, text in expect_table(table.get("source", {}), f"{where}: source").items()
         },
         **sections,
     )
     check_robot(robot, where=where)
     return robot
-
-
-def _read_text(value: Any, where: str) -> str:
-    if not isinstance(value, str) or not value:
-        raise RobotError(
-            "wrong type", got=value, expected="a text", fix="give it in quotes", where=where
-        )
-    return value
-
-
-def _read_gravity(table: Mapping[str, Any], where: str) -> Vector3:
-    x, y, z = Vector("m/s2", 3).read(table.get("gravity", (0.0, 0.0, -9.81)), where)
-    return (x, y, z)
 
 
 def _section(table: Mapping[str, Any], name: str, where: str) -> Mapping[str, Any]:
@@ -220,7 +211,7 @@ def _read_legs(table: Mapping[str, Any], where: str) -> tuple[Leg, ...]:
 
 
 def _read_link(table: Any, where: str) -> dict[str, Any]:
-    given = read_given(Link, expect_table(table, where), where, extra=("stance",))
+    given = read_given(Link, table, where, extra=("stance",))
     if "stance" in table:
         given["stance"] = STANCE.read(table["stance"], f"{where}.stance")
     return given
@@ -230,12 +221,8 @@ def _read_leg(
     name: str, legs: Mapping[str, Any], common: Mapping[str, dict[str, Any]], where: str
 ) -> Leg:
     if name not in legs:
-        raise RobotError(
-            "missing leg",
-            expected="legs " + " ".join(LEG_NAMES),
-            fix=f"add [legs.{name}]",
-            where=where,
-        )
+        expected = "legs " + " ".join(LEG_NAMES)
+        raise RobotError("missing leg", expected=expected, fix=f"add [legs.{name}]", where=where)
     table = expect_table(legs[name], where)
     refuse_unknown_keys(table, ["hip_position", "hip_yaw", *JOINT_NAMES], where)
     placed = {key: value for key, value in table.items() if key not in JOINT_NAMES}
@@ -243,12 +230,7 @@ def _read_leg(
     for joint in JOINT_NAMES:
         values = common[joint] | _read_link(table.get(joint, {}), f"{where}.{joint}")
         if "stance" not in values:
-            raise RobotError(
-                "missing key",
-                expected="a value in rad",
-                fix="add `stance = ...`",
-                where=f"{where}.{joint}.stance",
-            )
+            raise missing_key("stance", STANCE, f"{where}.{joint}.stance")
         stance.append(values.pop("stance"))
         links.append(Link(**require(Link, values, f"{where}.{joint}")))
     given = read_given(Leg, placed, where) | {"stance": tuple(stance)}

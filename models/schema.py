@@ -53,13 +53,11 @@ def decoding_toml(path: Path, *, kind: str, error: type[HexapodError]) -> Iterat
         yield
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as cause:
         other = _other_format(path)
-        raise error(
-            "not a TOML file",
-            got=other or str(cause),
-            expected="TOML 1.0 in UTF-8",
-            fix="correct that line" if other is None else f"give the path of a {kind} file",
-            where=str(path),
-        ) from cause
+        what = "not a TOML file"
+        got = other or str(cause)
+        expected = "TOML 1.0 in UTF-8"
+        fix = "correct that line" if other is None else f"give the path of a {kind} file"
+        raise error(what, got=got, expected=expected, fix=fix, where=str(path)) from cause
 
 
 @contextmanager

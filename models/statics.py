@@ -204,13 +204,9 @@ def _no_equilibrium(robot: Robot, residual: Array) -> RobotError:
     """Returns the exception for a residual that does not vanish."""
     got = f"forces out of balance by {np.max(np.abs(residual)):.3g}"
     fix = "raise servo.kp or servo.torque_max, or change the stance"
-    return RobotError(
-        "the robot does not stand",
-        got=got,
-        expected=f"a pose in balance to {RESIDUAL} N",
-        fix=fix,
-        where=robot.name,
-    )
+    what = "the robot does not stand"
+    expected = f"a pose in balance to {RESIDUAL} N"
+    return RobotError(what, got=got, expected=expected, fix=fix, where=robot.name)
 
 
 def _newton_step(robot: Robot, x: Array, loads: Array) -> tuple[Array, Array]:

@@ -118,6 +118,6 @@ def _usage(error: Any, given: Sequence[str]) -> int:
     if not given:
         print(error.format_message(), file=sys.stderr)
         return USAGE
-    got, expected, fix = usage_parts(error, given)
+    got, expected, fix = usage_parts(error)
     failure = HexapodError("not understood", got=got, expected=expected, fix=fix)
     return report_failure(str(failure), USAGE, error=failure, as_json=_wants_json(given))

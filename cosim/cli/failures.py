@@ -7,9 +7,8 @@ from __future__ import annotations
 
 import json
 import math
-import re
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any
 
 from hexapod_cosim.cosim.cli.width import fitted
@@ -79,12 +78,10 @@ def _plain(value: Any) -> Any:
     return [_plain(item) for item in value] if isinstance(value, list | tuple) else repr(value)
 
 
-def usage_parts(error: Any, given: Sequence[str]) -> tuple[str, str, str]:
+def usage_parts(error: Any) -> tuple[str, str, str]:
     """Returns what was got and expected, and the fix, for a command line that is not understood.
 
-    Args:
-        error: the exception of the parser; its `ctx` is None for an option without its value.
-        given: the words of the command line.
+    error: the exception of the parser; its `ctx` is None for an option without its value.
     """
     context, message = error.ctx, " ".join(error.format_message().rstrip(".").split())
     if not context:
@@ -94,23 +91,4 @@ def usage_parts(error: Any, given: Sequence[str]) -> tuple[str, str, str]:
     setting = SETTINGS.get(getattr(error, "option_name", "").replace("_", "-"))
     if setting and path.split()[-1] in OF_SCENARIOS:
         fix = f"write --set {setting}; {fix}"
-    wrong = re.search(r"'(--?[\w-]+)'.*: Input should be a valid (integer|number)", message)
-    if wrong:
-        option, kind = wrong.groups()
-        return (
-            f"{option} {_value_after(option, given)}",
-            f"{option} with {'an' if kind == 'integer' else 'a'} {kind}",
-            fix,
-        )
     return message, usage, fix
-
-
-def _value_after(option: str, given: Sequence[str]) -> str:
-    """Returns the last value that the words give to an option, or an empty text."""
-    found = ""
-    for word, following in zip(given, [*given[1:], ""], strict=True):
-        if word == option:
-            found = following
-        elif word.startswith(f"{option}="):
-            found = word.removeprefix(f"{option}=")
-    return found

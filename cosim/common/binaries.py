@@ -1,4 +1,5 @@
-"""Checks that a shared library is complete, before the system maps it into this process.
+"""Shared libraries: whether one is complete, before the system maps it into this process, and
+several of macOS as one.
 
 A library that was cut short is mapped all the same: the process then ends with SIGBUS when it
 reaches a page behind the file's end.
@@ -7,12 +8,14 @@ reaches a page behind the file's end.
 from __future__ import annotations
 
 import struct
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from hexapod_cosim.models.errors import FmuError
 
+# first bytes of libraries of Linux, Windows and macOS, and of several joined for macOS
 ELF, PE, MACH, FAT = b"\x7fELF", b"MZ", b"\xcf\xfa\xed\xfe", b"\xca\xfe\xba\xbe"
+PAGE_BITS = 14  # slices begin at multiples of 16 KiB, the larger of the processors' pages
 LOADED, SEGMENT = 1, 0x19  # PT_LOAD; LC_SEGMENT_64
 
 
@@ -108,3 +111,26 @@ def _fat_ends(data: bytes) -> Iterator[int]:
     for entry in range(min(number, 64)):
         offset, size = struct.unpack_from(">II", data, 8 + 20 * entry + 8)
         yield offset + size
+
+
+def join_mach_o(slices: Sequence[bytes]) -> bytes:
+    """Returns a universal file of 64-bit Mach-O files, one for each processor, as Apple's lipo.
+
+    Layout (mach-o/fat.h, all big-endian): magic and number of slices; type and subtype of the
+    processor, offset, size and alignment of each; the slices.
+    """
+    assert all(data.startswith(MACH) for data in slices), "not 64-bit Mach-O"
+    head = bytearray(struct.pack(">4sI", FAT, len(slices)))
+    offset, body = _aligned(len(head) + 20 * len(slices)), bytearray()
+    start = offset
+    for data in slices:
+        processor = struct.unpack_from("<2I", data, len(MACH))
+        head += struct.pack(">5I", *processor, offset, len(data), PAGE_BITS)
+        body += bytes(offset - start - len(body)) + data
+        offset = _aligned(offset + len(data))
+    return bytes(head) + bytes(start - len(head)) + bytes(body)
+
+
+def _aligned(offset: int) -> int:
+    """Rounds an offset up to the alignment of slices."""
+    return -(-offset >> PAGE_BITS) << PAGE_BITS

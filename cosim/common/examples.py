@@ -5,7 +5,7 @@ from __future__ import annotations
 import shutil
 from pathlib import Path
 
-from hexapod_cosim.cosim.common.files import not_writable
+from hexapod_cosim.cosim.common.files import writing_into
 from hexapod_cosim.cosim.common.plant_files import in_source_tree
 from hexapod_cosim.models.errors import HexapodError
 
@@ -26,19 +26,8 @@ def copy_examples(folder: Path) -> list[Path]:
             expected="a new or an empty folder",
             fix="choose another one with -o",
         )
-    try:
-        shutil.copytree(_programs(), folder, dirs_exist_ok=True, ignore=UNWANTED)
-        shutil.copytree(_notebooks(), folder / "notebooks", ignore=UNWANTED)
-    except OSError as error:
-        raise not_writable(folder, error) from error
+    notebooks = _PACKAGE / ("docs/notebooks" if in_source_tree() else "notebooks")
+    with writing_into(folder):
+        shutil.copytree(_PACKAGE / "examples", folder, dirs_exist_ok=True, ignore=UNWANTED)
+        shutil.copytree(notebooks, folder / "notebooks", ignore=UNWANTED)
     return sorted(path for path in folder.rglob("*") if path.is_file())
-
-
-def _programs() -> Path:
-    """Returns the folder of the example programs."""
-    return _PACKAGE / "examples"
-
-
-def _notebooks() -> Path:
-    """Returns the folder of the notebooks."""
-    return _PACKAGE / ("docs/notebooks" if in_source_tree() else "notebooks")

@@ -25,17 +25,14 @@ RESULT_FILES = (
     "results.parquet",
     "results.csv",
     "results.mcap",
-    "results.rrd",
     "commands.csv",
     "results.partial.parquet",
     "results.partial.csv",
     "results.partial.mcap",
-    "results.partial.rrd",
     "replay.csv",
     "robot.toml",
     "sensors.toml",
     "identify.json",
-    "experiment.toml",
     "seeds.csv",
     "seeds.partial.csv",
     "metrics.json",
@@ -168,23 +165,11 @@ def without_none(content: Any) -> Any:
 
 def not_writable(path: Path, error: OSError) -> HexapodError:
     """Returns the error for a path that cannot be written."""
-    fix = "choose another place"
+    got, expected = error.strerror or str(error), "a place that can be written to"
     if isinstance(error, FileExistsError | NotADirectoryError):
-        return HexapodError(
-            "cannot write",
-            got="a file where a folder should be",
-            expected="a folder",
-            fix=fix,
-            where=str(path),
-        )
-    expected = "a place that can be written to"
-    return HexapodError(
-        "cannot write",
-        got=error.strerror or str(error),
-        expected=expected,
-        fix=fix,
-        where=str(path),
-    )
+        got, expected = "a file where a folder should be", "a folder"
+    fix = "choose another place"
+    return HexapodError("cannot write", got=got, expected=expected, fix=fix, where=str(path))
 
 
 @contextmanager
@@ -268,22 +253,15 @@ def read_json(path: Path) -> Any:
     """Reads a JSON file of a results folder. Raises HexapodError when it is missing or damaged."""
     try:
         return json.loads(read_text(path))
-    except OSError as error:
-        if not isinstance(error, FileNotFoundError | NotADirectoryError):
-            raise HexapodError(
-                "cannot read a file of the results",
-                got=error.strerror,
-                expected="a file that `hexapod` wrote",
-                fix="check its rights, or run the scenario again",
-                where=str(path),
-            ) from error
-        fix = "give a folder written by `hexapod simulate`, `hexapod compare` or `hexapod study`"
+    except (FileNotFoundError, NotADirectoryError) as error:
         raise HexapodError(
             "not a results folder",
             got=str(path.parent),
             expected=f"a folder with {path.name}",
-            fix=fix,
+            fix="give a folder written by `hexapod simulate`, `hexapod compare` or `hexapod study`",
         ) from error
+    except OSError as error:
+        raise not_writable(path, error) from error
     except (ValueError, RecursionError) as error:
         raise HexapodError(
             "damaged file",

@@ -25,29 +25,22 @@ def has_pyarrow() -> bool:
     return find_spec("pyarrow") is not None
 
 
-def require_pyarrow(extra: str, where: str | Path) -> None:
-    """Raises HexapodError, which names an extra that brings pyarrow, where pyarrow is missing."""
-    require_packages(
-        ["pyarrow"],
-        "Parquet files need a package that is not installed",
-        expected=f"the extra `{extra}`",
-        fix=install_extra(extra),
-        where=where,
-    )
-
-
-def require_packages(
-    packages: Iterable[str], what: str, *, expected: str, fix: str, where: str | Path
-) -> None:
+def require_packages(packages: Iterable[str], files: str, *, extra: str, where: str | Path) -> None:
     """Raises HexapodError, which names the first of these packages that is not installed.
 
-    Args:
-        packages: names of the modules that are imported.
-        what: what is wrong without them, a sentence.
-        expected: what has to be installed.
-        fix: how it is installed.
-        where: the file, option or command that needs them.
+    files: the kind of files that need them; extra: that brings them; where: what needs the files.
     """
     for name in packages:
         if find_spec(name) is None:
-            raise HexapodError(what, got=f"no {name}", expected=expected, fix=fix, where=str(where))
+            raise HexapodError(
+                f"{files} files need a package that is not installed",
+                got=f"no {name}",
+                expected=f"the extra `{extra}`",
+                fix=install_extra(extra),
+                where=str(where),
+            )
+
+
+def require_pyarrow(extra: str, where: str | Path) -> None:
+    """Raises HexapodError, which names an extra that brings pyarrow, where pyarrow is missing."""
+    require_packages(["pyarrow"], "Parquet", extra=extra, where=where)

@@ -12,7 +12,7 @@ from types import MappingProxyType
 from zipfile import ZIP_DEFLATED, ZIP_STORED
 
 from hexapod_cosim.cosim.common.components import PLANT, Component
-from hexapod_cosim.cosim.common.files import atomic_path, not_writable
+from hexapod_cosim.cosim.common.files import atomic_path, writing_into
 from hexapod_cosim.cosim.common.plant_files import (
     FMI2_SOURCES,
     FMI3_SOURCES,
@@ -203,11 +203,11 @@ def write_archive(
 
     Raises HexapodError when it cannot be written.
     """
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise not_writable(path, error) from error
-    with atomic_path(path) as part, zipfile.ZipFile(part, "w") as archive:
+    with (
+        writing_into(path.parent),
+        atomic_path(path) as part,
+        zipfile.ZipFile(part, "w") as archive,
+    ):
         for name, content in members.items():
             archive.writestr(_member(name, compression), content)
     return path

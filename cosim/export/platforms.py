@@ -12,10 +12,10 @@ from collections.abc import Iterable, Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 
+from hexapod_cosim.cosim.common.binaries import join_mach_o
 from hexapod_cosim.cosim.common.components import PLANT, Component
 from hexapod_cosim.cosim.common.plant_files import fmi_headers, released_binary, source_files
 from hexapod_cosim.cosim.export.cross_build import TARGETS, Library, build_library, find_compiler
-from hexapod_cosim.cosim.export.fat_binary import join_mach_o
 from hexapod_cosim.models.errors import FmuError
 
 ALL, SOURCES = "all", "sources"

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from hexapod_cosim.cosim.common.files import not_writable, write_text
+from hexapod_cosim.cosim.common.files import write_text, writing_into
 from hexapod_cosim.models import HexapodError, Robot
 from hexapod_cosim.models.mjcf import robot_to_mjcf
 from hexapod_cosim.models.records import Servo
@@ -72,9 +72,6 @@ def export_description(robot: Robot, path: str | Path, form: Format) -> Path:
     Raises HexapodError when the file cannot be written.
     """
     path, text = Path(path), form.write(robot)
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise not_writable(path, error) from error
-    write_text(path, text)
+    with writing_into(path.parent):
+        write_text(path, text)
     return path

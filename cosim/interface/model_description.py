@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import hashlib
 import uuid
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from typing import Any
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element, SubElement
 
@@ -44,9 +45,14 @@ def render_fmi2(interface: Interface) -> ModelDescription:
     digest = hashlib.sha256(ElementTree.tostring(root)).digest()
     guid = "{" + str(uuid.UUID(bytes=digest[:16], version=4)) + "}"
     root.set("guid", guid)
+    return ModelDescription(guid=guid, xml=document_text(root))
+
+
+def document_text(root: Element) -> str:
+    """Formats a document."""
     ElementTree.indent(root)
     text = ElementTree.tostring(root, encoding="unicode")
-    return ModelDescription(guid=guid, xml=f'<?xml version="1.0" encoding="UTF-8"?>\n{text}\n')
+    return f'<?xml version="1.0" encoding="UTF-8"?>\n{text}\n'
 
 
 def _document(interface: Interface) -> Element:
@@ -61,14 +67,8 @@ def _document(interface: Interface) -> Element:
     add_units(root, interface.units)
     _add_types(root, interface.enumerations.values(), interface.units)
     add_log_categories(root, interface)
-    SubElement(
-        root,
-        "DefaultExperiment",
-        startTime="0",
-        stopTime=repr(interface.stop_time),
-        stepSize=repr(interface.step),
-    )
-    _add_provenance(root, interface)
+    add_experiment(root, interface)
+    add_provenance(SubElement(root, "VendorAnnotations"), "Tool", {"name": DISTRIBUTION}, interface)
     variables = SubElement(root, "ModelVariables")
     for variable in interface.variables:
         _add_variable(variables, variable, interface)
@@ -164,10 +164,37 @@ def _add_real_type(parent: Element, unit: Unit) -> None:
         )
 
 
-def _add_provenance(root: Element, interface: Interface) -> None:
-    """Adds the robot's name and hash."""
-    tool = SubElement(SubElement(root, "VendorAnnotations"), "Tool", name=DISTRIBUTION)
+def add_experiment(root: Element, interface: Interface) -> None:
+    """Adds the default experiment."""
+    stop, step = repr(interface.stop_time), repr(interface.step)
+    SubElement(root, "DefaultExperiment", startTime="0", stopTime=stop, stepSize=step)
+
+
+def add_provenance(
+    parent: Element, tag: str, attributes: dict[str, str], interface: Interface
+) -> None:
+    """Adds the robot's name and hash as an annotation of this tool."""
+    tool = SubElement(parent, tag, attributes)
     SubElement(tool, "Robot", name=interface.robot.name, hash=interface.robot.hash)
+
+
+def typed_attributes(variable: Variable, interface: Interface) -> dict[str, Any]:
+    """Returns the attributes of a variable's type, None for those that it does not have."""
+    units = {unit.name: unit for unit in interface.units}
+    unit = units.get(variable.unit or "")
+    return {
+        "declaredType": variable.enumeration or (unit.type if unit else None),
+        "unit": variable.unit,
+        "displayUnit": unit.display[0] if unit and unit.display else None,
+        "min": variable.minimum,
+        "max": variable.maximum,
+        "nominal": variable.nominal,
+    }
+
+
+def stated(attributes: Mapping[str, Any]) -> dict[str, str]:
+    """Returns the attributes that are not None, as texts."""
+    return {name: _text(value) for name, value in attributes.items() if value is not None}
 
 
 def _add_variable(parent: Element, variable: Variable, interface: Interface) -> None:
@@ -186,27 +213,15 @@ def _add_variable(parent: Element, variable: Variable, interface: Interface) -> 
     )
     if variable.causality == "input":
         del element.attrib["initial"]  # the standard forbids it for inputs
-    displays = {unit.name: unit.display[0] for unit in interface.units if unit.display}
-    types = {unit.name: unit.type for unit in interface.units}
-    attributes = {
-        "declaredType": variable.enumeration or types.get(variable.unit or ""),
-        "unit": variable.unit,
-        "displayUnit": displays.get(variable.unit or ""),
-        "min": variable.minimum,
-        "max": variable.maximum,
-        "nominal": variable.nominal,
+    attributes = typed_attributes(variable, interface) | {
         "start": variable.start,
         "derivative": interface.derivative_of.get(variable.name),
         "reinit": "true" if variable.name in interface.reinitialised else None,
     }
-    SubElement(
-        element,
-        variable.type,
-        {name: attribute_text(value) for name, value in attributes.items() if value is not None},
-    )
+    SubElement(element, variable.type, stated(attributes))
 
 
-def attribute_text(value: float | int | str) -> str:
+def _text(value: float | int | str) -> str:
     """Formats a number, Boolean or text for XML."""
     if isinstance(value, bool):
         return str(value).lower()

@@ -6,7 +6,7 @@ The variables are those of FMI 2.0, with arrays in the place of their elements.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
-from xml.etree import ElementTree
+from typing import Any
 from xml.etree.ElementTree import Element, SubElement
 
 from hexapod_cosim.cosim.common.components import Component
@@ -14,11 +14,15 @@ from hexapod_cosim.cosim.common.plant_files import DISTRIBUTION
 from hexapod_cosim.cosim.interface.arrays import Array, arrays
 from hexapod_cosim.cosim.interface.model_description import (
     ModelDescription,
+    add_experiment,
     add_log_categories,
+    add_provenance,
     add_units,
-    attribute_text,
+    document_text,
     general_facts,
     render_fmi2,
+    stated,
+    typed_attributes,
 )
 from hexapod_cosim.cosim.interface.plant_interface import Enumeration, Interface, Unit
 
@@ -63,17 +67,11 @@ def render_fmi3(interface: Interface) -> ModelDescription:
     add_units(root, interface.units)
     _add_types(root, interface.enumerations.values(), interface.units)
     add_log_categories(root, interface)
-    SubElement(
-        root,
-        "DefaultExperiment",
-        startTime="0",
-        stopTime=repr(interface.stop_time),
-        stepSize=repr(interface.step),
-    )
+    add_experiment(root, interface)
     _add_variables(root, interface, variables)
     _add_structure(root, interface, variables)
-    _add_provenance(root, interface)
-    return ModelDescription(guid=guid, xml=_document(root))
+    add_provenance(SubElement(root, "Annotations"), "Annotation", {"type": DISTRIBUTION}, interface)
+    return ModelDescription(guid=guid, xml=document_text(root))
 
 
 def render_build_description(component: Component, sources: Iterable[str]) -> str:
@@ -96,14 +94,7 @@ def render_build_description(component: Component, sources: Iterable[str]) -> st
         external="true",
         description="mathematics of the C library, where it stands apart",
     )
-    return _document(root)
-
-
-def _document(root: Element) -> str:
-    """Formats a document."""
-    ElementTree.indent(root)
-    text = ElementTree.tostring(root, encoding="unicode")
-    return f'<?xml version="1.0" encoding="UTF-8"?>\n{text}\n'
+    return document_text(root)
 
 
 def _add_interfaces(root: Element, interface: Interface) -> None:
@@ -171,29 +162,19 @@ def _add_variable(
 ) -> None:
     """Adds a variable; derivative_of: value reference of its state."""
     first = array.first
-    displays = {unit.name: unit.display[0] for unit in interface.units if unit.display}
-    types = {unit.name: unit.type for unit in interface.units}
-    attributes: dict[str, float | int | str | None] = {
+    attributes: dict[str, Any] = {
         "name": array.name,
         "valueReference": array.reference,
         "causality": first.causality,
         "variability": first.variability,
         "initial": {"input": None, "parameter": "exact"}.get(first.causality, "calculated"),
         "description": array.description,
-        "declaredType": first.enumeration or types.get(first.unit or ""),
-        "unit": first.unit,
-        "displayUnit": displays.get(first.unit or ""),
-        "min": first.minimum,
-        "max": first.maximum,
-        "nominal": first.nominal,
+        **typed_attributes(first, interface),
         "start": _starts(array),
         "derivative": derivative_of,
         "reinit": "true" if first.name in interface.reinitialised else None,
     }
-    stated = {
-        name: attribute_text(value) for name, value in attributes.items() if value is not None
-    }
-    element = SubElement(parent, TYPES[first.type], stated)
+    element = SubElement(parent, TYPES[first.type], stated(attributes))
     for size in array.shape:
         SubElement(element, "Dimension", start=str(size))
 
@@ -201,7 +182,7 @@ def _add_variable(
 def _starts(array: Array) -> str | None:
     """Returns the elements' start values; None for outputs."""
     values = [e.start for e in array.elements if e.start is not None]
-    return " ".join(map(attribute_text, values)) if values else None
+    return " ".join(stated({str(k): value for k, value in enumerate(values)}).values()) or None
 
 
 def _add_structure(root: Element, interface: Interface, variables: tuple[Array, ...]) -> None:
@@ -265,9 +246,3 @@ def _add_unknown(
     if knowns is not None:
         attributes["dependencies"] = " ".join(map(str, knowns))
     SubElement(structure, title, attributes)
-
-
-def _add_provenance(root: Element, interface: Interface) -> None:
-    """Adds the robot's name and hash."""
-    annotation = SubElement(SubElement(root, "Annotations"), "Annotation", type=DISTRIBUTION)
-    SubElement(annotation, "Robot", name=interface.robot.name, hash=interface.robot.hash)

@@ -4,17 +4,11 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from hexapod_cosim.cosim.common.installation import install_extra, require_packages
+from hexapod_cosim.cosim.common.installation import require_packages
 
 EXTRA, PACKAGES = "logs", ("mcap", "mcap_ros2")
 
 
 def require_mcap(where: str | Path) -> None:
     """Raises HexapodError, which names the extra, unless MCAP files can be written and read."""
-    require_packages(
-        PACKAGES,
-        "MCAP files need packages that are not installed",
-        expected="mcap and mcap-ros2-support",
-        fix=install_extra(EXTRA),
-        where=where,
-    )
+    require_packages(PACKAGES, "MCAP", extra=EXTRA, where=where)

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from hexapod_cosim.cosim.master.recorder import ColumnError
 from hexapod_cosim.cosim.results.metrics import foot_errors
-from hexapod_cosim.cosim.results.walk import (
+from hexapod_cosim.cosim.results.window import (
     View,
     bearing_load,
     body_height,
@@ -112,12 +112,6 @@ def _contacts(view: View) -> Iterator[tuple[str, Array]]:
     yield from _split([f"{leg}.contact" for leg in LEG_NAMES], view.recording.feet("contact"))
 
 
-def _swings(view: View) -> Iterator[tuple[str, Array]]:
-    """Yields when the gait plans a leg to swing."""
-    names = [f"controller.{leg}.swinging" for leg in LEG_NAMES]
-    yield from _split([f"{leg}.swing" for leg in LEG_NAMES], view.recording.columns(names))
-
-
 def _slipped(view: View) -> Iterator[tuple[str, Array]]:
     """Yields how far each foot has slipped under load since the start [m], world x and y."""
     time = view.recording.time
@@ -184,7 +178,6 @@ REPLAYED: dict[str, Maker] = {
     "pose": _pose,
     "forces": _forces,
     "contacts": _contacts,
-    "swings": _swings,
     "slipped": _slipped,
 }
 DRAWN: dict[str, Maker] = {

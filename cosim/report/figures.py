@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from hexapod_cosim.controller.figure_style import DPI, SETTINGS, UNDATED
 from hexapod_cosim.cosim.common.files import atomic_path
 from hexapod_cosim.cosim.master.recorder import ColumnError
-from hexapod_cosim.cosim.results.walk import View
+from hexapod_cosim.cosim.results.window import View
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -15,7 +15,7 @@ from hexapod_cosim.cosim.report.packing import pack
 from hexapod_cosim.cosim.report.surface import pack_footprints, pack_surface, stride
 from hexapod_cosim.cosim.results.footprints import find_footprints
 from hexapod_cosim.cosim.results.results import StoredResult
-from hexapod_cosim.cosim.results.walk import CONTACT_SHARE
+from hexapod_cosim.cosim.results.window import CONTACT_SHARE
 from hexapod_cosim.models.ground.surface import Surface
 
 DASH = 1.5  # pixels per point of a dash

@@ -15,7 +15,7 @@ from hexapod_cosim.cosim.common.control_style import control_styles
 from hexapod_cosim.cosim.master.recorder import ColumnError
 from hexapod_cosim.cosim.report.profile import make_profile
 from hexapod_cosim.cosim.results.metrics import planned_feet, plans_feet
-from hexapod_cosim.cosim.results.walk import (
+from hexapod_cosim.cosim.results.window import (
     Array,
     View,
     body_height,

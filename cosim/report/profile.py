@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from hexapod_cosim.cosim.master.recorder import Recording
 from hexapod_cosim.cosim.results.ground import heights_at
-from hexapod_cosim.cosim.results.walk import View
+from hexapod_cosim.cosim.results.window import View
 from hexapod_cosim.models.ground.surface import Surface
 
 Array = NDArray[np.float64]

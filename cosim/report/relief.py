@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from pathlib import Path
 
 import matplotlib
@@ -39,8 +38,8 @@ def draw_relief(surface: Surface, robot: Robot, path: Path) -> Path:
         share = min(max((high - low) / (right - left), 0.25), 1.5)
         figure = Figure(figsize=(WIDTH, 0.9 * WIDTH * share + 0.4))
         axes = figure.subplots()
-        scale = _draw(axes, surface)
-        _draw_robot(axes, robot)
+        scale = draw_surface(axes, surface)
+        draw_robot(axes, robot)
         if np.ptp(surface.height) > 0.0:
             bar = figure.colorbar(scale, ax=axes, shrink=0.8, pad=0.02, label="height [mm]")
             bar.ax.set_ylim(1e3 * surface.height.min(), 1e3 * surface.height.max())
@@ -53,7 +52,7 @@ def draw_relief(surface: Surface, robot: Robot, path: Path) -> Path:
     return path
 
 
-def _draw(axes: Axes, surface: Surface) -> ScalarMappable:
+def draw_surface(axes: Axes, surface: Surface) -> ScalarMappable:
     """Draws shading, colour of the height and contour lines; returns the scale of colours [mm]."""
     x, y, height = sampled(surface)
     pitch = float(x[1] - x[0]), float(y[1] - y[0])
@@ -111,7 +110,7 @@ def sampled(surface: Surface) -> tuple[Array, Array, Array]:
     return x, y, surface_heights(surface, x, y)
 
 
-def _draw_robot(axes: Axes, robot: Robot) -> None:
+def draw_robot(axes: Axes, robot: Robot) -> None:
     """Draws the torso and the standing feet, for scale."""
     length, width, _ = robot.torso.size
     com = robot.torso.com
@@ -143,25 +142,3 @@ def write_heights(surface: Surface, path: Path) -> dict[str, float]:
     if surface.kind == "blocks":
         keys["slope_threshold"] = float(f"{scale / surface.cell:.3g}")
     return keys
-
-
-def contact_sheet(surfaces: Iterable[Surface], robot: Robot, path: Path, *, columns: int) -> Path:
-    """Writes the reliefs of several surfaces as one picture and returns its path."""
-    shown = list(surfaces)
-    rows = -(-len(shown) // columns)
-    with matplotlib.rc_context(SETTINGS | {"axes.grid": False, "axes.titlesize": 7.0}):
-        figure = Figure(figsize=(1.8 * columns, 1.95 * rows))
-        grid = figure.subplots(rows, columns, squeeze=False)
-        for axes in grid.ravel()[len(shown) :]:
-            axes.set_axis_off()
-        for axes, surface in zip(grid.ravel(), shown, strict=False):
-            _draw(axes, surface)
-            _draw_robot(axes, robot)
-            heights = axes.texts[0].get_text().partition(",")[0]
-            axes.texts[0].remove()
-            axes.set_title(f"{surface.name}\n{heights}")
-            axes.tick_params(labelsize=5.0)
-        with atomic_path(path) as part:
-            kind = path.suffix.removeprefix(".")
-            figure.savefig(part, format=kind, dpi=DPI, metadata=UNDATED[kind])
-    return path

@@ -52,7 +52,7 @@ class Section(NamedTuple):
     name: str  # of the static figure that shows the same
     title: str
     caption: str
-    shape: str = ""  # layout of its plots: three in a row, "pairs", "wide" or STATIC
+    shape: str = ""  # layout of its plots: three in a row, "pairs" or STATIC
 
 
 SECTIONS = (
@@ -92,8 +92,9 @@ SECTIONS = (
     Section(
         "footfall",
         "Footfall",
-        "Bars: the foot is on the ground. Grey bands: the gait plans it to swing.",
-        "wide",
+        "Over the last gait cycles. Bars: the foot is on the ground. Grey bands: the gait plans it "
+        "to swing.",
+        STATIC,
     ),
     Section(
         "path",

@@ -9,7 +9,7 @@ import numpy as np
 
 from hexapod_cosim.cosim.interface.names import joint_names
 from hexapod_cosim.cosim.results.results import StoredResult
-from hexapod_cosim.cosim.results.walk import Array
+from hexapod_cosim.cosim.results.window import Array
 from hexapod_cosim.models import JOINT_NAMES, LEG_NAMES
 
 SIZE = (len(LEG_NAMES), len(JOINT_NAMES))
@@ -20,7 +20,7 @@ def servo_loads(run: StoredResult) -> Array | None:
 
     The rating is that by which the run's metric servo_load_max was computed.
     """
-    walk, largest = run.view.walk, run.metrics.get("servo_load_max")
+    walk, largest = run.view.window, run.metrics.get("servo_load_max")
     if walk is None or largest is None or not np.isfinite(largest):
         return None
     squares = walk.gained(joint_names("torque_squared")).reshape(SIZE)

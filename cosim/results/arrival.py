@@ -12,7 +12,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from hexapod_cosim.cosim.results.walk import LEAST_DISTANCE, LEAST_TURN, View
+from hexapod_cosim.cosim.results.window import LEAST_DISTANCE, LEAST_TURN, View
 
 ARRIVE = 0.5  # m/m, rad/rad    largest path error, or yaw drift of a turn on the spot
 SURELY = 2.0  # times the least walk: a shorter commanded way asks for no walk
@@ -36,10 +36,10 @@ def missed_end(metrics: Mapping[str, float], *, arrive: float = ARRIVE) -> str:
 
 def is_sent_ahead(view: View) -> bool:
     """Returns whether the command of the measured cycles leads further than standing still does."""
-    walk = view.walk
-    if walk is None:
+    window = view.window
+    if window is None:
         return False
-    steps = np.diff(walk.recording.time)
-    vx, vy, rate = walk.recording.columns(["command.vx", "command.vy", "command.yaw_rate"])[:-1].T
+    steps = np.diff(window.recording.time)
+    vx, vy, rate = window.recording.columns(["command.vx", "command.vy", "command.yaw_rate"])[:-1].T
     way, turn = float(steps @ np.hypot(vx, vy)), float(steps @ np.abs(rate))
     return way >= SURELY * LEAST_DISTANCE or turn >= SURELY * LEAST_TURN

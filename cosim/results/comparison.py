@@ -168,9 +168,10 @@ def judged_pairs(
     return [pair for pair in pairs if pair[0].success and pair[1].success] or pairs
 
 
-def change_of(name: str, pairs: Sequence[tuple[float, float]]) -> Change:
-    """Returns the change of a metric over pairs of values, without pairs that lack a value."""
-    values = np.array([pair for pair in pairs if all(map(math.isfinite, pair))]).reshape(-1, 2)
+def change_of(name: str, pairs: Sequence[tuple[float, float]] | Array) -> Change:
+    """Returns the change of a metric over pairs (n, 2) of values, without those that lack one."""
+    values = np.array(pairs, dtype=float).reshape(-1, 2)
+    values = values[np.isfinite(values).all(axis=1)]
     n = len(values)
     samples = np.column_stack([values, values[:, 1] - values[:, 0]])
     mean = samples.mean(axis=0) if n else np.full(3, math.nan)

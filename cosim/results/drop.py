@@ -16,7 +16,7 @@ import numpy as np
 
 from hexapod_cosim.cosim.interface.names import foot_names
 from hexapod_cosim.cosim.master.recorder import Recording
-from hexapod_cosim.cosim.results.walk import View, is_drop, robot_weight
+from hexapod_cosim.cosim.results.window import View, is_drop, robot_weight
 from hexapod_cosim.models import CONTACT_LAWS
 from hexapod_cosim.models.contact.law import CHI, achieved_restitution
 

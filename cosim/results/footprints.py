@@ -12,25 +12,20 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from hexapod_cosim.cosim.interface.names import foot_names
 from hexapod_cosim.cosim.master.recorder import Recording
-from hexapod_cosim.models import LEG_NAMES, SOIL_LAWS, Robot
-from hexapod_cosim.models.ground.faces import surface_of
-from hexapod_cosim.models.ground.surface import LAW
-from hexapod_cosim.models.records import Foot, Soil
-from hexapod_cosim.models.soil.law import row_soil, soil_radius, virgin_force
+from hexapod_cosim.models import LEG_NAMES
+from hexapod_cosim.models.records import Foot
+from hexapod_cosim.models.soil.law import soil_radius
 
 Array = NDArray[np.float64]
 
 LEAST = 1e-6  # m    of depth; the plant keeps no shallower footprints
-PADS = (0.025, 0.03, 0.035, 0.04, 0.045, 0.05)  # m    of pads that the warning may propose
-SHARE = 1.0 / 3.0  # 1    of the weight on a foot of a tripod
-MARGIN = 1.5  # 1    of the load: a pad that sinks less takes up harder touch-downs
 
 
 @dataclass(frozen=True)
@@ -67,13 +62,10 @@ def find_footprints(recording: Recording, parameters: Mapping[str, float]) -> li
     return sorted(found, key=lambda one: one.begin)
 
 
-def sinkage_warnings(
-    recording: Recording, parameters: Mapping[str, float], robot: Robot | None = None
-) -> list[str]:
+def sinkage_warnings(recording: Recording, parameters: Mapping[str, float]) -> list[str]:
     """Warns of a foot that sinks into soil deeper than the radius of its sphere or pad.
 
     The laws of soil count the foot alone; deeper than that the leg above it is in the soil, too.
-    robot: has the surface, whose patches may be soil; None: the soil is that of the parameters.
     """
     names = foot_names("sinkage")
     if not len(recording.time) or not set(names) <= set(recording.names):
@@ -85,47 +77,13 @@ def sinkage_warnings(
         return []
     row, leg = np.unravel_index(int(np.argmax(depth)), depth.shape)
     kind, deepest = "pad" if pad else "sphere", float(depth[row, leg])
-    place = recording.foot_vectors("position")[row, leg] if robot is not None else np.zeros(3)
-    soil = _soil_at(parameters, robot, place)
-    # a foot that falls through soft soil carries less than its share of the weight
-    load = max(virgin_force(soil, foot, deepest), SHARE * robot.weight if robot else 0.0)
     return [
         f"foot {LEG_NAMES[leg]} sinks too deep: got {1e3 * deepest:.3g} mm at "
         f"{recording.time[row]:.3f} s, expected at most the radius of its {kind}, "
         f"{1e3 * radius:.3g} mm; the soil's law counts the foot alone and not the leg above it, so "
-        f"depth and slip are not reliable; {_remedy(soil, foot, load)}"
-    ]
-
-
-def _soil_at(parameters: Mapping[str, float], robot: Robot | None, place: Array) -> Soil:
-    """Returns the soil at a world place (3,) [m]: that of a patch, or of the parameters."""
-    surface = surface_of(robot.terrain) if robot is not None else None
-    if surface is not None and surface.materials is not None:
-        number = surface.material_at(float(place[0]), float(place[1]))
-        if number:
-            return row_soil(surface.materials[number - 1][LAW:])
-    given = {
-        name.removeprefix("soil."): value
-        for name, value in parameters.items()
-        if name.startswith("soil.") and name != "soil.law"
-    }
-    return Soil(law=SOIL_LAWS[round(parameters.get("soil.law", 1.0)) - 1], **given)
-
-
-def _remedy(soil: Soil, foot: Foot, load: float) -> str:
-    """Returns what helps a foot that has sunk too deep: the smallest pad that sinks at most its
-    radius under a load [N], if one of `PADS` does.
-    """
-    if soil.law == "none":  # it is not known
-        return "give the feet larger pads (foot.pad_radius), or walk on firmer soil"
-    for radius in PADS:
-        carried = virgin_force(soil, replace(foot, pad_radius=radius), radius)
-        if radius > foot.pad_radius and carried >= MARGIN * load:
-            return f"set foot.pad_radius={radius:g}, or walk on firmer soil"
-    return (
-        f"this soil does not carry the robot on pads of up to {1e3 * PADS[-1]:g} mm; walk on "
+        "depth and slip are not reliable; give the feet larger pads (foot.pad_radius), or walk on "
         "firmer soil"
-    )
+    ]
 
 
 def _spans(flag: NDArray[np.bool_]) -> list[list[int]]:

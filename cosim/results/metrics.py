@@ -22,14 +22,14 @@ from hexapod_cosim.cosim.interface.names import (
 )
 from hexapod_cosim.cosim.master.recorder import Recording
 from hexapod_cosim.cosim.results.support import stability_margins
-from hexapod_cosim.cosim.results.walk import (
+from hexapod_cosim.cosim.results.window import (
     CONTACT_SHARE,
     NONE,
     TANH,
     WITH_BRISTLES,
     Array,
+    JudgedWindow,
     View,
-    Walk,
     bearing_load,
     body_height,
     commanded_path,
@@ -199,14 +199,16 @@ def metric_columns(*, bristles: bool) -> tuple[str, ...]:
 
 def compute_metrics(view: View, *, servo: Servo, realtime_factor: float) -> dict[str, float]:
     """Computes all METRICS of a run; the servo gives continuous rating and motor constant."""
-    walk = view.walk
+    window = view.window
     of_the_run = {"energy_residual": view.energy_residual, "realtime_factor": realtime_factor}
-    if walk is None:
+    if window is None:
         return dict.fromkeys(METRICS, np.nan) | of_the_run
     parameters = view.parameters
-    figures = _slip(walk, parameters) | _cone(walk, parameters) | _feet(walk, parameters)
-    figures |= _path(walk) | _posture(walk, parameters) | _force(walk) | _effort(walk, servo)
-    margins = stability_margins(walk.recording, parameters)
+    figures = _slip(window, parameters) | _cone(window, parameters) | _feet(window, parameters)
+    figures |= (
+        _path(window) | _posture(window, parameters) | _force(window) | _effort(window, servo)
+    )
+    margins = stability_margins(window.recording, parameters)
     figures["stability_margin"] = (
         float(np.nanmin(margins)) if np.isfinite(margins).any() else np.nan
     )
@@ -236,16 +238,18 @@ def has_net_slip(parameters: Mapping[str, float]) -> bool:
     return parameters.get("friction.law", TANH) != TANH
 
 
-def _per(walk: Walk, amount: float, name: str) -> dict[str, float]:
+def _per(window: JudgedWindow, amount: float, name: str) -> dict[str, float]:
     """Returns an amount per metre and per radian, by the metrics' names; NaN where not defined."""
-    return {name: amount / walk.distance, PER_RADIAN[name]: amount / walk.angle}
+    return {name: amount / window.distance, PER_RADIAN[name]: amount / window.angle}
 
 
-def _slip(walk: Walk, parameters: Mapping[str, float]) -> dict[str, float]:
-    part = walk.recording
+def _slip(window: JudgedWindow, parameters: Mapping[str, float]) -> dict[str, float]:
+    part = window.recording
     net = np.where(bearing_load(part, parameters), _net_slip(part, parameters), 0.0).sum(axis=1)
-    slip = _per(walk, float(walk.gained(foot_names("slip_distance")).sum()), "slip_per_metre")
-    return slip | {"slip_net_per_metre": float(walk.weights @ net) * walk.duration / walk.distance}
+    slip = _per(window, float(window.gained(foot_names("slip_distance")).sum()), "slip_per_metre")
+    return slip | {
+        "slip_net_per_metre": float(window.weights @ net) * window.duration / window.distance
+    }
 
 
 def _net_slip(part: Recording, parameters: Mapping[str, float]) -> Array:
@@ -284,9 +288,9 @@ def cone_use(part: Recording, parameters: Mapping[str, float]) -> Array:
     )
 
 
-def _cone(walk: Walk, parameters: Mapping[str, float]) -> dict[str, float]:
+def _cone(window: JudgedWindow, parameters: Mapping[str, float]) -> dict[str, float]:
     names = ("cone_use_p50", "cone_use_p95", "cone_use_over_90")
-    times = walk.gained(list(CONE_TIMES))
+    times = window.gained(list(CONE_TIMES))
     slippery = parameters["friction.mu"] == 0.0 or parameters.get("friction.law", TANH) == NONE
     if slippery or not times.any():
         return dict.fromkeys(names, np.nan)
@@ -296,9 +300,9 @@ def _cone(walk: Walk, parameters: Mapping[str, float]) -> dict[str, float]:
     return dict(zip(names, (float(p50), float(p95), float(times[-1] / times.sum())), strict=True))
 
 
-def _spread(walk: Walk) -> Array:
+def _spread(window: JudgedWindow) -> Array:
     """Returns the share of time that each row represents, for each foot (rows, 6)."""
-    return np.broadcast_to(walk.weights[:, None], (len(walk.weights), len(LEG_NAMES)))
+    return np.broadcast_to(window.weights[:, None], (len(window.weights), len(LEG_NAMES)))
 
 
 def _percentiles(values: Array, weights: Array, wanted: tuple[float, ...]) -> list[float]:
@@ -309,13 +313,13 @@ def _percentiles(values: Array, weights: Array, wanted: tuple[float, ...]) -> li
     return [float(value) for value in np.interp(places, reached, values[order])]
 
 
-def _feet(walk: Walk, parameters: Mapping[str, float]) -> dict[str, float]:
-    part, names = walk.recording, ("foot_error_stance", "foot_error_swing")
+def _feet(window: JudgedWindow, parameters: Mapping[str, float]) -> dict[str, float]:
+    part, names = window.recording, ("foot_error_stance", "foot_error_swing")
     error = foot_errors(part, parameters)
     if not len(error):
         return dict.fromkeys(names, np.nan)
     swinging = part.columns([f"controller.{leg}.swinging" for leg in LEG_NAMES]) > 0.5
-    square, weights = np.sum(error * error, axis=-1), _spread(walk)
+    square, weights = np.sum(error * error, axis=-1), _spread(window)
     return {
         name: _rms_of(square, np.where(those, weights, 0.0))
         for name, those in zip(names, (~swinging, swinging), strict=True)
@@ -349,37 +353,39 @@ def planned_feet(recording: Recording) -> Array:
     return recording.columns(PLANNED).reshape(-1, len(LEG_NAMES), 3)
 
 
-def _path(walk: Walk) -> dict[str, float]:
-    part = walk.recording
-    missed = part.vector("torso.position")[-1, :2] - commanded_path(part, heading=walk.heading)[-1]
+def _path(window: JudgedWindow) -> dict[str, float]:
+    part = window.recording
+    end = commanded_path(part, heading=window.heading)[-1]
+    missed = float(np.linalg.norm(part.vector("torso.position")[-1, :2] - end))
     yaw = np.unwrap(part.column("torso.yaw"))
-    lost = abs(float(yaw[-1] - yaw[0] - walk.turned[-1]))
-    return _per(walk, float(np.linalg.norm(missed)), "path_error") | _per(walk, lost, "yaw_drift")
+    lost = abs(float(yaw[-1] - yaw[0] - window.turned[-1]))
+    return _per(window, missed, "path_error") | _per(window, lost, "yaw_drift")
 
 
-def _posture(walk: Walk, parameters: Mapping[str, float]) -> dict[str, float]:
-    part = walk.recording
+def _posture(window: JudgedWindow, parameters: Mapping[str, float]) -> dict[str, float]:
+    part = window.recording
     angles = {
-        f"{name}_rms": walk.rms(np.unwrap(part.column(f"torso.{name}")))
+        f"{name}_rms": window.rms(np.unwrap(part.column(f"torso.{name}")))
         for name in ("roll", "pitch")
     }
-    return {"height_rms": walk.rms(body_height(part, parameters))} | angles
+    return {"height_rms": window.rms(body_height(part, parameters))} | angles
 
 
-def _force(walk: Walk) -> dict[str, float]:
-    normal = walk.recording.feet("normal_force") / walk.weight
+def _force(window: JudgedWindow) -> dict[str, float]:
+    normal = window.recording.feet("normal_force") / window.weight
     loaded = normal > CONTACT_SHARE
-    rates = landing_rates(walk) / walk.weight
+    rates = landing_rates(window) / window.weight
+    peaks = window.whole.rows(window.steps()).feet("peak_force")
     return {
-        "peak_force": float(walk.whole.rows(walk.steps()).feet("peak_force").max()) / walk.weight,
-        "force_p95": _percentiles(normal[loaded], _spread(walk)[loaded], (95.0,))[0]
+        "peak_force": float(peaks.max()) / window.weight,
+        "force_p95": _percentiles(normal[loaded], _spread(window)[loaded], (95.0,))[0]
         if loaded.any()
         else np.nan,
         "loading_rate": float(np.percentile(rates, 95)) if len(rates) else np.nan,
     }
 
 
-def landing_rates(walk: Walk) -> Array:
+def landing_rates(window: JudgedWindow) -> Array:
     """Returns the largest rise of the force over 1 ms [N/s] in the 20 ms after each landing.
 
     Landings of all feet between begin and end count. A landing is the first contact of a foot after
@@ -387,15 +393,15 @@ def landing_rates(walk: Walk) -> Array:
     has the steepest rise of all; a later one begins the next landing.
     """
     found: list[float] = []
-    steps = walk.steps()
+    steps = window.steps()
     time, counts, rates = (
-        walk.whole.time,
-        walk.whole.feet("landings"),
-        walk.whole.feet("landing_rate"),
+        window.whole.time,
+        window.whole.feet("landings"),
+        window.whole.feet("landing_rate"),
     )
     for count, rate in zip(counts.T, rates.T, strict=True):
         touched = 1 + np.flatnonzero(np.diff(count) > 0.0)
-        begins = _first_contacts(touched, time, apart=0.5 * walk.period)
+        begins = _first_contacts(touched, time, apart=0.5 * window.period)
         ends = np.append(begins[1:], len(time))
         judged = (begins >= steps.start) & (begins < steps.stop)
         found += [
@@ -414,15 +420,15 @@ def _first_contacts(touched: NDArray[np.intp], time: Array, *, apart: float) -> 
     return np.array(found, dtype=np.intp)
 
 
-def _effort(walk: Walk, servo: Servo) -> dict[str, float]:
-    squares = walk.gained(joint_names("torque_squared"))  # N2 m2 s
-    work = float(walk.gained(joint_names("positive_work")).sum())  # J
+def _effort(window: JudgedWindow, servo: Servo) -> dict[str, float]:
+    squares = window.gained(joint_names("torque_squared"))  # N2 m2 s
+    work = float(window.gained(joint_names("positive_work")).sum())  # J
     square = float(squares.sum())
     copper = square / servo.motor_constant**2  # J
     return {
-        "torque_rms": float(np.sqrt(square / (len(squares) * walk.duration))),
-        "servo_load_max": float(np.sqrt(squares.max() / walk.duration)) / servo.torque_continuous,
-        **_per(walk, square, "heat"),
-        **_per(walk, work / walk.weight, "cost_of_transport"),
-        **_per(walk, (work + copper) / walk.weight, "electrical_cost"),
+        "torque_rms": float(np.sqrt(square / (len(squares) * window.duration))),
+        "servo_load_max": float(np.sqrt(squares.max() / window.duration)) / servo.torque_continuous,
+        **_per(window, square, "heat"),
+        **_per(window, work / window.weight, "cost_of_transport"),
+        **_per(window, (work + copper) / window.weight, "electrical_cost"),
     }

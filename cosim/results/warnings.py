@@ -26,7 +26,7 @@ from hexapod_cosim.cosim.master.recorder import Recording
 from hexapod_cosim.cosim.results.balance import run_balance_warnings
 from hexapod_cosim.cosim.results.facts import Locomotion
 from hexapod_cosim.cosim.results.footprints import sinkage_warnings
-from hexapod_cosim.cosim.results.walk import LEAST_DISTANCE, SKIPPED_CYCLES, View, body_height
+from hexapod_cosim.cosim.results.window import LEAST_DISTANCE, SKIPPED_CYCLES, View, body_height
 from hexapod_cosim.cosim.scenario.records import Scenario
 from hexapod_cosim.models import FRICTION_LAWS, LEG_NAMES, TERRAINS, Robot, Terrain
 from hexapod_cosim.models.friction import BRISTLE_LAWS
@@ -45,9 +45,9 @@ def locomotion_of(view: View, *, upright: bool, missed: str = "") -> Locomotion:
 
     upright: whether it stayed so; missed: how it missed the end of its path, "" if it arrived.
     """
-    walk = view.walk
-    distance = walk.distance if walk else math.nan
-    lasted = float(walk.recording.time[-1] - walk.recording.time[0]) if walk else math.nan
+    window = view.window
+    distance = window.distance if window else math.nan
+    lasted = float(window.recording.time[-1] - window.recording.time[0]) if window else math.nan
     fallen_back = fallback_columns(view.recording)
     return Locomotion(
         distance=distance,
@@ -192,7 +192,7 @@ def walk_warnings(view: View, robot: Robot) -> list[str]:
         found += [f"a foot was out of its leg's reach for {share:.1%} of the time"] if share else []
     found += [*fallback_warnings(recording), *servo_warnings(recording, robot)]
     found += overlap_warnings(recording, view.parameters)
-    found += sinkage_warnings(recording, view.parameters, robot)
+    found += sinkage_warnings(recording, view.parameters)
     return [*found, *energy_warnings(view)]
 
 
@@ -281,7 +281,7 @@ def energy_warnings(view: View) -> list[str]:
 def short_run_warnings(view: View) -> list[str]:
     """Warns of a run that is too short for metrics, with the duration that it needs."""
     time, needed = view.recording.time, (SKIPPED_CYCLES + 1) * view.period
-    if view.walk is not None or not len(time):
+    if view.window is not None or not len(time):
         return []
     lasted, cycles = float(time[-1] - time[0]), SKIPPED_CYCLES + 1
     return [
@@ -293,14 +293,14 @@ def short_run_warnings(view: View) -> list[str]:
 
 def missing_metrics_warnings(view: View) -> list[str]:
     """Warns of metrics that a run of enough cycles lacks, with the reason."""
-    walk, found = view.walk, list[str]()
-    if walk is None:
+    window, found = view.window, list[str]()
+    if window is None:
         return found
-    if math.isnan(walk.distance) and math.isnan(walk.angle):
+    if math.isnan(window.distance) and math.isnan(window.angle):
         least = f"{100.0 * LEAST_DISTANCE:g} cm"
         found.append(f"the robot walked less than {least}: it has no figures per metre")
     names = [f"controller.{leg}.swinging" for leg in LEG_NAMES]
-    recorded = set(names) <= set(walk.recording.names)
-    if recorded and not (walk.recording.columns(names) > 0.5).any():
+    recorded = set(names) <= set(window.recording.names)
+    if recorded and not (window.recording.columns(names) > 0.5).any():
         found.append("no foot swung: foot_error_swing has no value")
     return found

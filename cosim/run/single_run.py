@@ -38,7 +38,6 @@ from hexapod_cosim.cosim.results.ground import is_on_surface, surface_of_grid
 from hexapod_cosim.cosim.results.heat import heat_warnings
 from hexapod_cosim.cosim.results.metrics import MEASURED_BY_PLANT, compute_metrics, metric_columns
 from hexapod_cosim.cosim.results.result import Result
-from hexapod_cosim.cosim.results.walk import View
 from hexapod_cosim.cosim.results.warnings import (
     describe_fall,
     locomotion_of,
@@ -48,6 +47,7 @@ from hexapod_cosim.cosim.results.warnings import (
     unused_settings,
     walk_warnings,
 )
+from hexapod_cosim.cosim.results.window import View
 from hexapod_cosim.cosim.run.chosen_walk import ChosenWalk, choose_walk
 from hexapod_cosim.cosim.run.preparation import PlantFmus, chosen_gains, law_of
 from hexapod_cosim.cosim.scenario.checks import check_servo_faults
@@ -59,7 +59,6 @@ from hexapod_cosim.cosim.scenario.scenario import scenario_robot
 from hexapod_cosim.cosim.scenario.schedule import Schedule, make_schedule
 from hexapod_cosim.cosim.scenario.variation import (
     Drawn,
-    check_start_depth,
     delayed,
     draw,
     initial_values,
@@ -211,9 +210,6 @@ def initialise_plant(plant: Fmu, plan: RunPlan) -> dict[str, float]:
     scenario = plan.scenario
     _check_measurements(plant)
     plant.set_parameters(scenario.parameters)
-    if scenario.parameters and all(name.startswith("initial.") for name in scenario.parameters):
-        # with other parameters the robot's own numbers may not be the plant's, which checks too
-        check_start_depth(plan.robot, plant.parameters(), where=f"{scenario.where}: initial")
     if plan.drawn is not None:
         plant.set_parameters(initial_values(plan.robot, plant.parameters(), plan.drawn))
     plant.initialise(scenario.start, scenario.start + scenario.duration)

@@ -12,11 +12,9 @@ from numpy.typing import NDArray
 
 from hexapod_cosim.cosim.interface.names import JOINTS, LEGS, joint_names, vector_names
 from hexapod_cosim.cosim.scenario.records import Command, Variation
-from hexapod_cosim.models import Robot, ScenarioError
-from hexapod_cosim.models.contact.start import deepest_start
+from hexapod_cosim.models import Robot
 from hexapod_cosim.models.ground.faces import ground
 from hexapod_cosim.models.kinematics import (
-    body_states,
     foot_positions,
     quaternion_product,
     rotation_matrix,
@@ -96,28 +94,6 @@ def initial_values(robot: Robot, parameters: Mapping[str, float], drawn: Drawn) 
         for names, values in pairs
         for name, value in zip(names, values.tolist(), strict=True)
     }
-
-
-def check_start_depth(robot: Robot, parameters: Mapping[str, float], *, where: str) -> None:
-    """Raises ScenarioError if a foot or a part of the body starts too deep in the ground.
-
-    parameters: the FMU's parameters initial.* of the robot's start.
-    """
-    position, quaternion, angle = (
-        np.array([parameters[name] for name in names]) for names in (POSITION, QUATERNION, ANGLE)
-    )
-    still = np.zeros(3)
-    joints = angle.reshape(LEGS, JOINTS)
-    body = body_states(robot, position, quaternion, still, still, joints, np.zeros_like(joints))
-    sunk = deepest_start(robot, body)
-    if sunk is not None:
-        raise ScenarioError(
-            f"a {sunk.name.partition(' ')[0]} starts deep in the ground",
-            got=f"{sunk.name} {sunk.depth:.4g} m deep",
-            expected=f"at most {sunk.bound:.4g} m, {sunk.reason}",
-            fix=f"raise initial.position[3] by {sunk.depth - sunk.bound:.4g} m or more",
-            where=where,
-        )
 
 
 @lru_cache(maxsize=64)

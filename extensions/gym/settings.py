@@ -7,8 +7,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
-from types import MappingProxyType
-from typing import Any
+from typing import Annotated, Any
 
 from hexapod_cosim.extensions.gym.checks import (
     check_count,
@@ -20,6 +19,7 @@ from hexapod_cosim.extensions.gym.checks import (
     check_widths,
     refused,
 )
+from hexapod_cosim.models.schema import Number, check_record
 
 JOINTS = 18
 RATE = 50  # Hz  of actions
@@ -28,19 +28,17 @@ BASES = ("stance", "kinematic", "compliant")  # what actions are added to
 
 # Blocks of an observation in their order, with their sizes (hxEnvBlock in C). The size of the
 # heights is the number of places that are scanned.
-BLOCKS: Mapping[str, int] = MappingProxyType(
-    {
-        "velocity": 3,
-        "rotation": 3,
-        "gravity": 3,
-        "command": 3,
-        "angle": JOINTS,
-        "speed": JOINTS,
-        "action": JOINTS,
-        "clock": 2,
-        "heights": 0,
-    }
-)
+BLOCKS: Mapping[str, int] = {
+    "velocity": 3,
+    "rotation": 3,
+    "gravity": 3,
+    "command": 3,
+    "angle": JOINTS,
+    "speed": JOINTS,
+    "action": JOINTS,
+    "clock": 2,
+    "heights": 0,
+}
 # Terms of the reward in their order (hxEnvTerm in C), with the names that legged_gym uses where it
 # has the term.
 TERMS = (
@@ -61,62 +59,54 @@ TERMS = (
 # Reasons for the end of an episode (hxEnvReason in C).
 REASONS = ("", "time", "tilted", "belly", "failed")
 
-# Settings by what their numbers may be.
-POSITIVE = ("action_scale", "tolerance", "step_max", "scan_spacing", "max_tilt")
-NOT_NEGATIVE = (
-    *("clock", "scan_length", "scan_width", "command_interval"),
-    *("push_force", "belly_force", "pad_radius"),
-)
 MAPPINGS = ("terrain", "observation", "rewards", "randomise")
-TIMES = ("duration", "push_interval", "push_duration")  # at least one step
+Positive = Annotated[float, Number("1", above=0.0)]
+Length = Annotated[float, Number("m", at_least=0.0)]
+Spacing = Annotated[float, Number("m", above=0.0)]
+Angle = Annotated[float, Number("rad", above=0.0)]
+Force = Annotated[float, Number("N", at_least=0.0)]
+Duration = Annotated[float, Number("s", at_least=1.0 / RATE)]  # one step or more
 
+MAX_TILT = math.radians(60.0)  # rad
 Range = tuple[float, float]
 Scale = float | tuple[float, float, float]
 
 # The observation that users of legged_gym expect, with its scales.
-LEGGED_GYM: Mapping[str, Scale] = MappingProxyType(
-    {
-        "velocity": 2.0,
-        "rotation": 0.25,
-        "gravity": 1.0,
-        "command": (2.0, 2.0, 0.25),
-        "angle": 1.0,
-        "speed": 0.05,
-        "action": 1.0,
-    }
-)
+LEGGED_GYM: Mapping[str, Scale] = {
+    "velocity": 2.0,
+    "rotation": 0.25,
+    "gravity": 1.0,
+    "command": (2.0, 2.0, 0.25),
+    "angle": 1.0,
+    "speed": 0.05,
+    "action": 1.0,
+}
 # The same with heights of the ground around the robot, as on legged_gym's uneven grounds.
-LEGGED_GYM_HEIGHTS: Mapping[str, Scale] = MappingProxyType({**LEGGED_GYM, "heights": 5.0})
+LEGGED_GYM_HEIGHTS: Mapping[str, Scale] = {**LEGGED_GYM, "heights": 5.0}
 # What a robot can measure, and a clock: the observation of policies that are exported as FMUs
 # (extensions/gym/policy_fmu/src/policy.c computes the same).
-MEASURABLE: Mapping[str, Scale] = MappingProxyType(
-    {
-        "rotation": 0.25,
-        "gravity": 1.0,
-        "command": (10.0, 10.0, 1.0),
-        "angle": 1.0,
-        "clock": 1.0,
-    }
-)
-OBSERVATIONS: Mapping[str, Mapping[str, Scale]] = MappingProxyType(
-    {
-        "legged_gym": LEGGED_GYM,
-        "legged_gym_heights": LEGGED_GYM_HEIGHTS,
-        "measurable": MEASURABLE,
-    }
-)
-REWARDS: Mapping[str, float] = MappingProxyType(
-    {
-        "tracking_lin_vel": 1.0,
-        "tracking_ang_vel": 0.5,
-        "lin_vel_z": -2.0,
-        "ang_vel_xy": -0.05,
-        "orientation": -1.0,
-        "torques": -1e-4,
-        "action_rate": -0.01,
-        "termination": -1.0,
-    }
-)
+MEASURABLE: Mapping[str, Scale] = {
+    "rotation": 0.25,
+    "gravity": 1.0,
+    "command": (10.0, 10.0, 1.0),
+    "angle": 1.0,
+    "clock": 1.0,
+}
+OBSERVATIONS: Mapping[str, Mapping[str, Scale]] = {
+    "legged_gym": LEGGED_GYM,
+    "legged_gym_heights": LEGGED_GYM_HEIGHTS,
+    "measurable": MEASURABLE,
+}
+REWARDS: Mapping[str, float] = {
+    "tracking_lin_vel": 1.0,
+    "tracking_ang_vel": 0.5,
+    "lin_vel_z": -2.0,
+    "ang_vel_xy": -0.05,
+    "orientation": -1.0,
+    "torques": -1e-4,
+    "action_rate": -0.01,
+    "termination": -1.0,
+}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -131,32 +121,34 @@ class EnvSettings:
         default_factory=dict
     )  # as [terrain] of a scenario; {}: the robot's own
     terrain_seeds: int = 1  # grounds with seeds 1, 2, ... to draw from, for kinds with a seed
-    pad_radius: float = 0.0  # m  of the feet on soil; 0: the robot's own
+    pad_radius: Length = 0.0  # of the feet on soil; 0: the robot's own
     base: str = "stance"  # what actions are added to: the standing pose or a controller's commands
-    action_scale: float = 0.4  # rad  change of a joint's commanded angle for the action 1
+    action_scale: Angle = 0.4  # change of a joint's commanded angle for the action 1
     observation: Mapping[str, Scale] = field(default_factory=lambda: LEGGED_GYM)
     rewards: Mapping[str, float] = field(default_factory=lambda: REWARDS)  # weights of the terms
     tracking_width: tuple[float, float] = (0.1, 0.25)  # m/s, rad/s  of the tracking terms
-    clock: float = 1.5  # Hz
-    duration: float = 20.0  # s  of an episode
+    clock: Annotated[float, Number("Hz", at_least=0.0)] = 1.5
+    duration: Duration = 20.0  # of an episode
     # a grid of places around the torso whose heights are observed
-    scan_length: float = 0.8  # m  forward and back, from end to end
-    scan_width: float = 0.5  # m  to the sides
-    scan_spacing: float = 0.05  # m
-    command_interval: float = 0.0  # s  from one draw of the command to the next; 0: the episode
+    scan_length: Length = 0.8  # forward and back, from end to end
+    scan_width: Length = 0.5  # to the sides
+    scan_spacing: Spacing = 0.05
+    command_interval: Annotated[float, Number("s", at_least=0.0)] = (
+        0.0  # s  from one draw of the command to the next; 0: the episode
+    )
     command_vx: Range = (0.0, 0.15)  # m/s
     command_vy: Range = (-0.05, 0.05)  # m/s
     command_yaw_rate: Range = (-0.3, 0.3)  # rad/s
-    push_force: float = 0.0  # N    largest push on the torso; 0: none
-    push_interval: float = 2.0  # s    from the start of a push to the next
-    push_duration: float = 0.1  # s
-    max_tilt: float = math.radians(60.0)  # rad  lean that counts as a fall
-    belly_force: float = 1.0  # N    on the torso that counts as a fall
+    push_force: Force = 0.0  # largest push on the torso; 0: none
+    push_interval: Duration = 2.0  # from the start of a push to the next
+    push_duration: Duration = 0.1
+    max_tilt: Angle = MAX_TILT  # lean that counts as a fall
+    belly_force: Force = 1.0  # on the torso that counts as a fall
     # plant parameters drawn for each episode, as factors of a study: name -> (lowest, highest)
     randomise: Mapping[str, Range] = field(default_factory=dict)
     solver: str = "ros2"
-    tolerance: float = 0.005  # 0.85 mm of path error in 10 s of a tripod gait
-    step_max: float = 0.02  # s
+    tolerance: Positive = 0.005  # 0.85 mm of path error in 10 s of a tripod gait
+    step_max: Annotated[float, Number("s", above=0.0)] = 0.02
 
     def __post_init__(self) -> None:
         """Checks names and numbers."""
@@ -165,12 +157,7 @@ class EnvSettings:
         check_names(self.rewards, "term of the reward", TERMS)
         check_names(self.observation, "block of the observation", BLOCKS)
         check_names([self.base], "base of actions", BASES)
-        for name in POSITIVE:
-            check_number(name, getattr(self, name), above=0.0)
-        for name in NOT_NEGATIVE:
-            check_number(name, getattr(self, name), least=0.0)
-        for name in TIMES:
-            check_number(name, getattr(self, name), least=1.0 / RATE)
+        check_record(self, "environment")
         if self.command_interval:
             check_number("command_interval", self.command_interval, least=1.0 / RATE)
         check_count("terrain_seeds", self.terrain_seeds)

@@ -62,7 +62,7 @@ def live(
     page: Page = None,
     json: Json = False,
 ) -> None:
-    """Drive the robot in a browser, in real time: keys, gamepad or touch. Ctrl-C ends it."""
+    """Drive the robot in a browser, in real time: keys or touch. Ctrl-C ends it."""
     if page is not None:
         fix = (
             "leave them out: the page has the default robot on flat ground; others need a server, "

@@ -33,7 +33,7 @@ from hexapod_cosim.cosim.master.fmu import Fmu, StepError
 from hexapod_cosim.cosim.master.loop import JointController, macro_step
 from hexapod_cosim.cosim.master.sensors import errors_of
 from hexapod_cosim.cosim.master.signals import Signals
-from hexapod_cosim.cosim.results.walk import robot_weight
+from hexapod_cosim.cosim.results.window import robot_weight
 from hexapod_cosim.cosim.run.preparation import PlantFmus
 from hexapod_cosim.cosim.run.single_run import (
     RunPlan,

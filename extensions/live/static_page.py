@@ -117,8 +117,8 @@ def _library() -> Library:
         paths += (_TREE / component / "src").rglob("*.[ch]")
         paths.append(_TREE / component / "generated" / "defaults.c")
     for folder in ("plant_fmu", "controller/fmu", "cosim/master"):
-        headers = (_TREE / folder / "include" / "hexapod").glob("*.h")
-        found |= {f"hexapod/{path.name}": path for path in headers}
+        include = _TREE / folder / "include"
+        found |= {path.relative_to(include).as_posix(): path for path in include.rglob("*.h")}
     found |= {path.relative_to(_TREE).as_posix(): path for path in paths}
     return Library(
         MODULE, dict(sorted(found.items())), flags=("-DHX_SHARED",), included=(CONTROLLER_ROBOT,)

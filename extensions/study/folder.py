@@ -1,14 +1,13 @@
-"""The folder of a study: the manifest, by which another study is refused, and the exported tables.
+"""The folder of a study: the manifest, by which another study is refused, and the exported table.
 
-results.parquet has all runs in the order of their numbers and is the same however they were run;
-times.parquet has the time of each run.
+results.parquet has all runs in the order of their numbers and is the same however they were run.
 """
 
 from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -29,9 +28,9 @@ from hexapod_cosim.cosim.common.files import (
 )
 from hexapod_cosim.cosim.master.loop import COMPLETED
 from hexapod_cosim.extensions.study.records import StudyError
-from hexapod_cosim.extensions.study.store import BOOLEAN, INTEGER, REAL, TEXT, WALL, Column, Store
+from hexapod_cosim.extensions.study.store import BOOLEAN, INTEGER, REAL, TEXT, WALL, Store
 
-MANIFEST, LOCK, RESULTS, TIMES = "manifest.json", ".lock", "results.parquet", "times.parquet"
+MANIFEST, LOCK, RESULTS = "manifest.json", ".lock", "results.parquet"
 COMPRESSION = "zstd"
 METADATA_PREFIX = "hexapod."  # of the keys of a file's metadata
 MAX_NAMED = 6  # differences in a message
@@ -134,41 +133,24 @@ def locked(folder: Path) -> Iterator[None]:
 
 
 def export_runs(store: Store, folder: Path) -> None:
-    """Writes results.parquet and times.parquet."""
-    results = [item for item in store.columns if item.name != WALL]
-    times = [item for item in store.columns if item.name in ("run", WALL)]
-    metadata = provenance(read_json(folder / MANIFEST))
-    for name, columns, facts in ((RESULTS, results, metadata), (TIMES, times, {})):
-        blocks = (list(zip(*rows, strict=True)) for rows in store.tables(columns))
-        write_table(folder / name, columns, blocks, facts)
-
-
-def write_table(
-    path: Path,
-    columns: Sequence[Column],
-    blocks: Iterable[Sequence[Any]],
-    metadata: Mapping[str, str],
-) -> None:
-    """Writes a Parquet file in parts, each of which has the values of all columns.
-
-    Units are in the metadata of the columns. The file is never partial.
-    """
-    kinds = [PARQUET_TYPES[item.kind.split()[0]] for item in columns]
-    units = [{"unit": item.unit} if item.unit else None for item in columns]
+    """Writes results.parquet. The file is never partial; units are in the metadata of columns."""
+    columns = [item for item in store.columns if item.name != WALL]
     fields = [
-        pa.field(item.name, kind, metadata=unit)
-        for item, kind, unit in zip(columns, kinds, units, strict=True)
+        pa.field(
+            item.name,
+            PARQUET_TYPES[item.kind.split()[0]],
+            metadata={"unit": item.unit} if item.unit else None,
+        )
+        for item in columns
     ]
-    schema = pa.schema(fields, metadata=dict(metadata))
+    schema = pa.schema(fields, metadata=provenance(read_json(folder / MANIFEST)))
     with (
-        atomic_path(path) as part,
+        atomic_path(folder / RESULTS) as part,
         pq.ParquetWriter(part, schema, compression=COMPRESSION) as writer,
     ):
-        for block in blocks:
-            arrays = [
-                pa.array(values, kind, from_pandas=True)
-                for values, kind in zip(block, kinds, strict=True)
-            ]
+        for rows in store.tables(columns):
+            values = zip(zip(*rows, strict=True), schema.types, strict=True)
+            arrays = [pa.array(column, kind) for column, kind in values]
             writer.write_table(pa.Table.from_arrays(arrays, schema=schema))
 
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 import hashlib
 import platform
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 from uuid import uuid4
 
 from hexapod_cosim.controller import DEFAULT_PERIOD, Gains
@@ -17,13 +17,10 @@ from hexapod_cosim.cosim.common.plant_files import code_hash, package_version
 from hexapod_cosim.cosim.common.temporary import TemporaryFolder
 from hexapod_cosim.cosim.control.controllers import check_control
 from hexapod_cosim.cosim.export.controller_export import export_controller
-from hexapod_cosim.cosim.master.loop import Progress
-from hexapod_cosim.cosim.results.summary import Summary
 from hexapod_cosim.cosim.run.controller_setup import make_setup
 from hexapod_cosim.cosim.run.preparation import PlantFmus, chosen_gains, design_key
 from hexapod_cosim.cosim.run.walker import Walker
 from hexapod_cosim.cosim.scenario.controls import table_with_control
-from hexapod_cosim.cosim.scenario.records import Scenario
 from hexapod_cosim.cosim.scenario.scenario import scenario_from_table
 from hexapod_cosim.cosim.scenario.tables import with_values
 from hexapod_cosim.extensions.study.factors import samples
@@ -33,23 +30,6 @@ from hexapod_cosim.models import HexapodError, list_robots, load_robot
 FORMAT = 2  # of a study's folder
 PACKAGES = ("fmpy", "numpy", "scipy", "control")
 DESIGN_FACTORS = ("robot", "macro_step", "servo.")  # a design of gains depends on these
-
-
-class Runner(Protocol):
-    """Runs scenarios, as Walker does."""
-
-    def summary(
-        self, scenario: Scenario, *, fmu: Path, gains: Gains | None, progress: Progress
-    ) -> Summary:
-        """Runs a scenario and returns its summary, also of a run that is refused.
-
-        When `progress` raises KeyboardInterrupt, the run ends with the status INTERRUPTED.
-        """
-        ...
-
-    def close(self) -> None:
-        """Frees the FMUs."""
-        ...
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -64,7 +44,7 @@ class Job:
     laws: Mapping[str, bytes]  # files of the users' controls, by label
     gains: Gains | None  # of all compliant runs; None: workers design them
     environment: Mapping[str, str]  # versions, see environment()
-    runner: Callable[..., Runner] = Walker  # gets the controller FMU as `controller`
+    runner: type[Walker] = Walker  # gets the controller FMU as `controller`
 
 
 def make_job(
@@ -72,7 +52,7 @@ def make_job(
     *,
     fmu: Path | None = None,
     gains: Gains | None = None,
-    runner: Callable[..., Runner] = Walker,
+    runner: type[Walker] = Walker,
 ) -> Job:
     """Exports the FMUs and designs the gains that all runs share. Raises HexapodError.
 

@@ -12,6 +12,7 @@ import math
 import warnings
 from collections.abc import Callable, Iterator, Sequence
 from itertools import product
+from typing import Any
 
 import numpy as np
 
@@ -20,7 +21,6 @@ from hexapod_cosim.extensions.study.records import (
     DRAWN,
     GRID,
     LATIN_HYPERCUBE,
-    LIST,
     SCENARIO_FACTOR,
     SOBOL,
     Evaluation,
@@ -38,33 +38,22 @@ class Design:
     """The points of a study."""
 
     def __init__(self, study: Study) -> None:
-        self._study, self.count = study, _count(study)
+        self._study = study
+        lengths = [len(factor.values) for factor in study.factors]
+        self._shape = lengths if study.design == GRID else lengths[:1]
+        self.count = study.points if study.design in DRAWN else math.prod(self._shape)
         self._shares = _shares(study)
 
     def point(self, index: int) -> tuple[Value, ...]:
-        """Returns the values of the factors at a point, given its number."""
+        """Returns the values of the factors at a point; in a grid the last one changes fastest."""
         factors = self._study.factors
-        if self._study.design == LIST:
-            return tuple(factor.values[index] for factor in factors)
-        if self._study.design == GRID:
-            return _of_grid(factors, index)
-        return tuple(
-            at_quantile(factor, float(share))
-            for factor, share in zip(factors, self._shares(index), strict=True)
-        )
-
-
-def _of_grid(factors: tuple[Factor, ...], index: int) -> tuple[Value, ...]:
-    """Returns a point of a grid, in which the last factor changes fastest."""
-    places = np.unravel_index(index, [len(factor.values) for factor in factors])
-    return tuple(factor.values[place] for factor, place in zip(factors, places, strict=True))
-
-
-def _count(study: Study) -> int:
-    if study.design in DRAWN:
-        return study.points
-    lengths = [len(factor.values) for factor in study.factors]
-    return math.prod(lengths) if study.design == GRID else lengths[0]
+        if self._study.design in DRAWN:
+            pairs = zip(factors, self._shares(index).tolist(), strict=True)
+            return tuple(at_quantile(factor, share) for factor, share in pairs)
+        places: Sequence[Any] = (index,) * len(factors)
+        if self._study.design == GRID and factors:
+            places = np.unravel_index(index, self._shape)
+        return tuple(factor.values[place] for factor, place in zip(factors, places, strict=True))
 
 
 def _shares(study: Study) -> Shares:
@@ -122,40 +111,28 @@ class Optimisation:
     def __init__(self, study: Study) -> None:
         assert study.optimise is not None
         self.study, self.asked = study, study.optimise
+        self.unset = (None,) * len(study.factors)  # leaves variables as the scenarios have them
 
     def training(self, point: int, values: tuple[Value | None, ...]) -> list[Order]:
         """Returns the training runs of a trial, whose number is `point`."""
-        return self._orders(self.asked.training, point * self.asked.training.runs, point, values)
+        part = self.asked.training
+        return self._orders(part, point * part.runs, point, values)
 
     def held_out(self, place: int, point: int, values: tuple[Value | None, ...]) -> list[Order]:
         """Returns the held-out runs of the settings that are evaluated as number `place`."""
-        return self._orders(
-            self.asked.held_out,
-            self.asked.trained + place * self.asked.held_out.runs,
-            point,
-            values,
-        )
+        part = self.asked.held_out
+        return self._orders(part, self.asked.trained + place * part.runs, point, values)
 
     def _orders(
-        self, evaluation: Evaluation, first: int, point: int, values: tuple[Value | None, ...]
+        self, part: Evaluation, first: int, point: int, values: tuple[Value | None, ...]
     ) -> list[Order]:
-        pairs = enumerate(product(evaluation.cases, evaluation.seeds))
-        return [
-            Order(
-                run=first + k,
-                point=point,
-                case=case,
-                values=values,
-                seed=seed,
-                control=self.asked.control,
-            )
-            for k, (case, seed) in pairs
-        ]
-
-    @property
-    def unset(self) -> tuple[None, ...]:
-        """The values that leave all variables as the scenarios have them."""
-        return (None,) * len(self.study.factors)
+        common: dict[str, Any] = {
+            "point": point,
+            "values": values,
+            "control": self.asked.control,
+        }
+        pairs = enumerate(product(part.cases, part.seeds), first)
+        return [Order(run=run, case=case, seed=seed, **common) for run, (case, seed) in pairs]
 
 
 def count_runs(study: Study) -> int:
@@ -172,14 +149,9 @@ def settings_of(order: Order, factors: Sequence[Factor]) -> list[tuple[Factor, V
     ]
 
 
-def order_key(order: Order, settings: Sequence[tuple[Factor, Value]]) -> bytes:
-    """Returns bytes that depend on an order's scenario, settings, seed and control only."""
-    named = {factor.name: value for factor, value in settings}
-    content = [order.case, named, order.seed, order.control]
-    return json.dumps(content, sort_keys=True, default=str).encode()
-
-
 def identity(order: Order, factors: Sequence[Factor]) -> str:
-    """Returns the hash of a run's settings, which does not depend on its number."""
-    key = order_key(order, settings_of(order, factors))
+    """Returns the hash of a run's scenario, settings, seed and control."""
+    named = {factor.name: value for factor, value in settings_of(order, factors)}
+    content = [order.case, named, order.seed, order.control]
+    key = json.dumps(content, sort_keys=True, default=str).encode()
     return hashlib.sha256(key).hexdigest()[:16]

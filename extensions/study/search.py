@@ -17,7 +17,7 @@ from hexapod_cosim.cosim.common.files import write_json
 from hexapod_cosim.cosim.common.installation import install_extra
 from hexapod_cosim.cosim.results.metrics import METRICS
 from hexapod_cosim.extensions.study.dispatch import ResultSink, dispatch
-from hexapod_cosim.extensions.study.groups import Runs, settings_of_points
+from hexapod_cosim.extensions.study.groups import Runs
 from hexapod_cosim.extensions.study.optimum import (
     OPTIMUM,
     Trial,
@@ -51,8 +51,7 @@ def optimise(sink: ResultSink, workers: Workers, folder: Path) -> None:
     chosen = [before, *((trial.number, trial.values) for trial in best_of(trials, plan.asked))]
     sets = [plan.held_out(place, *pair) for place, pair in enumerate(chosen)]
     _run(sink, workers, [order for part in sets for order in part])
-    settings = settings_of_points(sink.study, sink.store)
-    write_json(folder / OPTIMUM, optimum_of(sink.study, sink.store, settings))
+    write_json(folder / OPTIMUM, optimum_of(Runs(sink.study, sink.store), trials))
 
 
 def _search(plan: Optimisation, sink: ResultSink, workers: Workers) -> Iterator[Trial]:
@@ -68,8 +67,7 @@ def _search(plan: Optimisation, sink: ResultSink, workers: Workers) -> Iterator[
         stored = Runs(plan.study, sink.store, first=first * runs, end=numbers.stop * runs)
         for k, (number, handle, item) in enumerate(zip(numbers, handles, values, strict=True)):
             rows = slice(k * runs, (k + 1) * runs)
-            means = means_of(stored.walked[rows], stored.values[rows], asked)
-            trial = made_trial(number, item, means, asked)
+            trial = made_trial(number, item, means_of(stored, rows, asked), asked)
             _tell_sampler(sampler, handle, trial, asked)
             yield trial
 

@@ -201,9 +201,8 @@ def quoted(name: str) -> str:
 
 def _study_error(error: sqlite3.DatabaseError, path: Path) -> StudyError:
     """Returns the error for an error of SQLite."""
-    code = getattr(error, "sqlite_errorcode", None)
-    primary = None if code is None else code & 0xFF
-    if primary in (sqlite3.SQLITE_FULL, sqlite3.SQLITE_IOERR):
+    code = getattr(error, "sqlite_errorcode", 0) & 0xFF
+    if code in (sqlite3.SQLITE_FULL, sqlite3.SQLITE_IOERR):
         return StudyError(
             "the disk is full or fails",
             got=str(error),
@@ -211,18 +210,10 @@ def _study_error(error: sqlite3.DatabaseError, path: Path) -> StudyError:
             fix="make room and start the study again: it goes on, all runs stored so far are kept",
             where=str(path.parent),
         )
-    if primary in (sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_NOTADB, sqlite3.SQLITE_ERROR):
-        return StudyError(
-            "damaged results",
-            got=str(error),
-            expected="the file that was stored",
-            fix="remove it and start the study again: its runs are run again",
-            where=str(path),
-        )
     return StudyError(
-        "cannot use the file of the runs",
+        "damaged results, or a file that cannot be used",
         got=str(error),
-        expected="a file that can be read and written",
-        fix="check its rights and whether another program holds it",
+        expected="the file that was stored",
+        fix="check its rights, or remove it and start the study again: its runs are run again",
         where=str(path),
     )

@@ -21,7 +21,7 @@ from hexapod_cosim.extensions.study.folder import (
     finish_folder,
     locked,
 )
-from hexapod_cosim.extensions.study.job import Job, Runner, make_job, manifest_of
+from hexapod_cosim.extensions.study.job import Job, make_job, manifest_of
 from hexapod_cosim.extensions.study.records import Study
 from hexapod_cosim.extensions.study.runs import Sweep, count_runs
 from hexapod_cosim.extensions.study.search import optimise
@@ -48,7 +48,7 @@ class Options:
     scheduler: str | None = None  # address of a Dask scheduler that replaces the processes
     command: str = ""  # command line that repeats the study, for its report
     events: EventSink = ignore_event  # for instance that the study waits for workers
-    runner: Callable[..., Runner] = Walker  # a class that workers can import
+    runner: type[Walker] = Walker  # a class that workers can import
 
 
 def run_study(study: Study, folder: Path, *, options: Options, start: StartProgress) -> Path:

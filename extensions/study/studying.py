@@ -22,10 +22,9 @@ from hexapod_cosim.cosim.cli.terminal import (
 from hexapod_cosim.cosim.master.loop import COMPLETED
 from hexapod_cosim.cosim.results.comparison import METHOD
 from hexapod_cosim.extensions.study.dispatch import ProgressSink
-from hexapod_cosim.extensions.study.folder import TIMES
 from hexapod_cosim.extensions.study.reading import load_study
 from hexapod_cosim.extensions.study.report import tables
-from hexapod_cosim.extensions.study.report.notes import NO_WALK, notes
+from hexapod_cosim.extensions.study.report.notes import notes
 from hexapod_cosim.extensions.study.report.page import write_study_report
 from hexapod_cosim.extensions.study.study import Options, StartProgress, run_study
 from hexapod_cosim.extensions.study.summary import Results, read_results, summary_of
@@ -56,7 +55,7 @@ def run_and_report(
         show_json({**summary_of(found), "results": str(results), "report": str(files[-1])})
     else:
         show_study(found)
-        show_files([results, folder / TIMES, *files])
+        show_files([results, *files])
         print(f"report: {files[-1]}")
     return FELL if _only_falls(found) else SUCCESS
 
@@ -69,26 +68,9 @@ def _only_falls(found: Results) -> bool:
 
 
 def warn_of(found: Results) -> None:
-    """Prints the notes of the report as warnings, and the reasons where no run walked."""
-    for text in (*failed_controls(found), *(note for note in notes(found) if note != NO_WALK)):
+    """Prints the notes of the report as warnings."""
+    for text in notes(found):
         warn(text)
-
-
-def failed_controls(found: Results) -> list[str]:
-    """Returns a sentence for each control under which no run walked to its end."""
-    texts = []
-    for control, total in found.overall.runs.items():
-        if total and not found.overall.walked.get(control, 0):
-            reasons = [
-                (count, *key[1:]) for key, count in found.failures.items() if key[0] == control
-            ]
-            count, status, reason = reasons[0]
-            alike = "all" if len(reasons) == 1 else f"{count} of them"
-            texts.append(
-                f"none of {total} {control} runs walked to its end; "
-                f"{alike} {tables.ending(status)}: {reason}"
-            )
-    return texts
 
 
 def report_on(folder: Path) -> tuple[Results, list[Path]]:

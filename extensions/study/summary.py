@@ -1,9 +1,9 @@
-"""Reads the results of a study's folder; writes points.parquet and summary.json."""
+"""Reads the results of a study's folder; writes summary.json."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from contextlib import closing
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -12,37 +12,17 @@ from typing import Any
 from hexapod_cosim.cosim.common.files import RUN_FILE, read_json, write_json
 from hexapod_cosim.cosim.results.balance import UNBALANCED, Unbalanced
 from hexapod_cosim.cosim.results.metrics import OF_THE_RUN
-from hexapod_cosim.extensions.study.folder import MANIFEST, provenance, write_table
-from hexapod_cosim.extensions.study.groups import (
-    Array,
-    Figures,
-    Groups,
-    Point,
-    Runs,
-    points_of,
-    settings_of_points,
-)
-from hexapod_cosim.extensions.study.optimum import OPTIMUM, Parts, Trial
+from hexapod_cosim.extensions.study.folder import MANIFEST
+from hexapod_cosim.extensions.study.groups import LAST, Figures, Point, Runs, points_of
+from hexapod_cosim.extensions.study.optimum import OPTIMUM, Trial, trials_of
 from hexapod_cosim.extensions.study.reading import study_from_table
 from hexapod_cosim.extensions.study.records import Study
-from hexapod_cosim.extensions.study.store import (
-    BOOLEAN,
-    FIGURES,
-    INTEGER,
-    REAL,
-    TEXT,
-    UNITS,
-    WARNING_SEPARATOR,
-    Column,
-    Store,
-    columns_of,
-    quoted,
-)
+from hexapod_cosim.extensions.study.store import FIGURES, WARNING_SEPARATOR, Store, quoted
 from hexapod_cosim.models import HexapodError
 
-POINTS, SUMMARY = "points.parquet", "summary.json"
+SUMMARY = "summary.json"
+POINT_METRICS = ("slip_per_metre", "cost_of_transport", "peak_force", "torque_rms")
 MAX_POINTS = 4000  # kept for figures and tables; evenly chosen if there are more
-HALF_WIDTH = ".half_width"  # suffix of columns with half widths of 95 % intervals
 MAX_REASONS = 30  # that are shown
 NUMBER = re.compile(r"[0-9#]+(?:\.[0-9#]+)?")
 
@@ -90,27 +70,26 @@ def stored_study(folder: Path) -> tuple[Study, dict[str, Any]]:
 
 
 def read_results(folder: Path) -> Results:
-    """Reads the results of a study, also of one that runs, and writes the tables of them.
+    """Reads the results of a study, also of one that runs, and writes summary.json.
 
     Raises HexapodError when the folder holds no study or its file of runs is damaged.
     """
     study, manifest = stored_study(folder)
     with closing(Store(folder, study)) as store:
-        runs, settings = Runs(study, store), settings_of_points(study, store)
-        groups = Groups(runs, runs.starts())
-        write_points(folder / POINTS, runs, groups, settings, provenance(manifest))
-        most = len(settings) if study.optimise is not None else MAX_POINTS
+        runs, optimised = Runs(study, store), study.optimise is not None
+        names = POINT_METRICS
+        points, count = points_of(runs, store, names=names, most=LAST if optimised else MAX_POINTS)
         results = Results(
             study=study,
             manifest=manifest,
             facts=read_json(folder / RUN_FILE),
-            overall=Groups(runs).figures(0),
-            points=points_of(runs, groups, settings, most=max(most, 1)),
-            of_points=len(settings),
+            overall=runs.figures(),
+            points=points,
+            of_points=count,
             failures=failure_counts(store),
             walks=_walks(store),
             unbalanced=_unbalanced(store),
-            trials=[] if study.optimise is None else Parts(runs, settings).trials(),
+            trials=trials_of(runs, points) if optimised else [],
             optimum=read_json(folder / OPTIMUM) if (folder / OPTIMUM).exists() else None,
             wall=store.select("SELECT total(wall) FROM runs")[0][0],
         )
@@ -193,51 +172,3 @@ def summary_of(results: Results) -> dict[str, Any]:
         ],
         "optimum": results.optimum,
     }
-
-
-def write_points(
-    path: Path,
-    runs: Runs,
-    groups: Groups,
-    settings: Sequence[tuple[Any, ...]],
-    metadata: Mapping[str, str],
-) -> None:
-    """Writes points.parquet, a row a point.
-
-    Its columns are the settings; for each control the numbers of runs and walks and the means of
-    the metrics with the half widths of their intervals; then the pairs and their changes. With more
-    than two controls the names of the latter begin with the other control.
-    """
-    study, starts = runs.study, groups.starts
-    names = ["case", *(factor.name for factor in study.factors)]
-    given: dict[str, Any] = {name: [row[k] for row in settings] for k, name in enumerate(names)}
-    given["point"] = runs.point[starts]
-    table: list[tuple[Column, Any]] = [
-        (item, given[item.name]) for item in columns_of(study) if item.name in given
-    ]
-    table.append((Column("held_out", BOOLEAN), runs.held_out[starts]))
-    for control, found in groups.by_control.items():
-        table.append((Column(f"{control}.runs", INTEGER), found.runs))
-        table.append((Column(f"{control}.walked", INTEGER), found.walked))
-        table += _figure_columns(control, found.means.mean, found.means.half_width)
-    for control, change in groups.changes.items():
-        before = f"{control}." if len(groups.changes) > 1 else ""
-        samples = change.samples
-        difference = samples["after"].mean - samples["before"].mean
-        table.append((Column(f"{before}pairs", INTEGER), change.pairs))
-        table += _figure_columns(f"{before}change", difference, samples["change"].half_width)
-        table += [
-            (Column(f"{before}change.{name}.verdict", TEXT), change.verdict[:, k])
-            for k, name in enumerate(FIGURES)
-        ]
-    columns, arrays = zip(*table, strict=True)
-    write_table(path, columns, [arrays], metadata)
-
-
-def _figure_columns(prefix: str, values: Array, half_widths: Array) -> list[tuple[Column, Array]]:
-    """Returns the columns of all metrics with the half widths of their intervals (g, m)."""
-    return [
-        (Column(f"{prefix}.{name}{suffix}", REAL, UNITS[name]), array[:, k])
-        for k, name in enumerate(FIGURES)
-        for suffix, array in (("", values), (HALF_WIDTH, half_widths))
-    ]

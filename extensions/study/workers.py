@@ -13,7 +13,6 @@ from collections.abc import Callable, Iterator
 from concurrent.futures import Executor
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
-from time import monotonic
 from typing import Any
 
 from hexapod_cosim.cosim.common.events import EventSink
@@ -28,7 +27,6 @@ from hexapod_cosim.extensions.study.worker import close_job_context, unpack_job
 
 CONNECT_TIMEOUT = "10s"
 ADDRESS = re.compile(r"[a-z]+://\S+")  # PROTOCOL://HOST:PORT, as Dask writes it
-NO_WORKER_TIMEOUT = 60.0  # s    without any worker, after which the study stops
 FIX_RESUME = "start the study again when it is back; it continues, and all stored runs are kept"
 
 
@@ -93,28 +91,19 @@ def cluster_workers(job: Job, address: str, events: EventSink) -> Iterator[Worke
 
 
 def _cluster_size(client: Any, events: EventSink) -> Callable[[], int]:
-    """Returns a function that asks for the number of workers, and returns 1 for none.
+    """Returns a function that returns the number of workers, or 1 while Dask waits for some.
 
-    It raises StudyError when the scheduler is gone, or when there was no worker for
-    NO_WORKER_TIMEOUT.
+    It raises StudyError when the scheduler is gone.
     """
-    seen, warned = monotonic(), False
+    before = 1
 
     def size() -> int:
-        nonlocal seen, warned
-        count = _worker_count(client)
-        if count:
-            seen, warned = monotonic(), False
-        elif monotonic() - seen > NO_WORKER_TIMEOUT:
-            fix = f"start some: dask worker {client.scheduler.address} --nthreads 1; {FIX_RESUME}"
-            got = f"none for {NO_WORKER_TIMEOUT:g} s"
-            what = "the cluster has no workers"
-            raise StudyError(what, got=got, expected="one at least", fix=fix)
-        elif not warned:
-            warned = True
-            timeout = f"{NO_WORKER_TIMEOUT:g} s at most"
-            events(f"the cluster has no workers: waiting for some, {timeout}")
-        return max(count, 1)
+        nonlocal before
+        before, last = _worker_count(client), before
+        if last and not before:
+            address = client.scheduler.address
+            events(f"the cluster has no workers: waiting for some (dask worker {address})")
+        return max(before, 1)
 
     return size
 

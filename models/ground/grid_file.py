@@ -96,21 +96,14 @@ def read_grid(path: Path) -> Surface:
     try:
         content = read_bytes(path, MAP_SIZE)
     except OSError as error:
-        raise RobotError(
-            "cannot read the grid file",
-            got=error.strerror,
-            fix="give the path of a .terrain file",
-            where=str(path),
-        ) from error
+        what = "cannot read the grid file"
+        fix = "give the path of a .terrain file"
+        raise RobotError(what, got=error.strerror, fix=fix, where=str(path)) from error
     return surface_from_bytes(content, where=str(path))
 
 
 def _damaged(where: str, *, got: str) -> RobotError:
     """Returns the exception for content of no grid file."""
-    return RobotError(
-        "not a grid file",
-        got=got,
-        expected="an undamaged grid file of version 1, which begins with hxGrid01",
-        fix="export the FMU again",
-        where=where,
-    )
+    expected = "an undamaged grid file of version 1, which begins with hxGrid01"
+    fix = "export the FMU again"
+    return RobotError("not a grid file", got=got, expected=expected, fix=fix, where=where)

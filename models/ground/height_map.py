@@ -6,6 +6,7 @@ The middle of the map comes to (x, y).
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -14,10 +15,37 @@ import numpy as np
 from hexapod_cosim.models.arrays import Array
 from hexapod_cosim.models.errors import RobotError
 from hexapod_cosim.models.ground.map_files import READERS
+from hexapod_cosim.models.ground.parameters import (
+    PLATFORM,
+    Entries,
+    Parameter,
+    entry,
+    length,
+    ratio,
+    text,
+)
 from hexapod_cosim.models.ground.rough import off_platform
 from hexapod_cosim.models.ground.surface import Surface, check_heights
+from hexapod_cosim.models.schema import Number
+
+MAPS: Entries = {}
 
 
+@entry(
+    MAPS,
+    "Height map from a file",
+    {
+        "file": text(None, "path of a 16-bit PNG, a .npy array or an ESRI .asc grid"),
+        "horizontal_scale": length(0.0, "per pixel or cell; 0: cellsize of the file", zero=True),
+        "vertical_scale": length(0.0, "per unit of height; 0: the file is in metres", zero=True),
+        "slope_threshold": ratio(
+            0.0, "steeper maps become blocks; 0: always smooth", least=0.0, most=1e3
+        ),
+        "platform_size": replace(PLATFORM, default=0.0),
+        "x": Parameter(spec=Number("m"), default=0.0, about="middle of the map"),
+        "y": Parameter(spec=Number("m"), default=0.0, about="middle of the map"),
+    },
+)
 def heightfield(values: SimpleNamespace) -> Surface:
     """Returns the surface of a height map's file.
 
@@ -28,22 +56,17 @@ def heightfield(values: SimpleNamespace) -> Surface:
     path = Path(values.file)
     reader = READERS.get(path.suffix.lower())
     if reader is None:
-        raise RobotError(
-            "unknown kind of height map",
-            got=path.name,
-            expected="a file that ends in " + ", ".join(READERS),
-            fix="convert the map",
-            where=str(path),
-        )
+        what = "unknown kind of height map"
+        expected = "a file that ends in " + ", ".join(READERS)
+        fix = "convert the map"
+        raise RobotError(what, got=path.name, expected=expected, fix=fix, where=str(path))
     try:
         read = reader(path)
     except OSError as error:
-        raise RobotError(
-            "cannot read the height map",
-            got=error.strerror or str(error),
-            fix="give the path of a .png, .npy or .asc file, relative to the TOML file",
-            where=str(path),
-        ) from error
+        what = "cannot read the height map"
+        got = error.strerror or str(error)
+        fix = "give the path of a .png, .npy or .asc file, relative to the TOML file"
+        raise RobotError(what, got=got, fix=fix, where=str(path)) from error
     cell = _chosen(
         "horizontal_scale", "m per pixel or cell", values.horizontal_scale, read.cell, path
     )
@@ -64,34 +87,26 @@ def _chosen(key: str, unit: str, given: float, own: float, path: Path) -> float:
     """Returns the given scale, or else the file's own. Raises RobotError without any."""
     scale = given or own
     if scale == 0.0:
-        raise RobotError(
-            f"a height map without {key}",
-            got="none in the file",
-            expected=f"a scale in {unit}",
-            fix=f"add `{key} = ...` to [terrain]",
-            where=str(path),
-        )
+        what = f"a height map without {key}"
+        expected = f"a scale in {unit}"
+        fix = f"add `{key} = ...` to [terrain]"
+        raise RobotError(what, got="none in the file", expected=expected, fix=fix, where=str(path))
     if not (math.isfinite(scale) and scale > 0.0):
-        raise RobotError(
-            f"{key} of the height map",
-            got=scale,
-            expected=f"a positive scale in {unit}",
-            fix=f"correct `{key}` in [terrain], or the file's cellsize",
-            where=str(path),
-        )
+        what = f"{key} of the height map"
+        expected = f"a positive scale in {unit}"
+        fix = f"correct `{key}` in [terrain], or the file's cellsize"
+        raise RobotError(what, got=scale, expected=expected, fix=fix, where=str(path))
     return scale
 
 
 def _check_size(path: Path, height: Array) -> None:
     """Raises RobotError for a map without two rows and columns."""
     if height.ndim != 2 or min(height.shape) < 2:
-        raise RobotError(
-            "the height map is too small",
-            got=" x ".join(map(str, height.shape)),
-            expected="at least 2 rows and 2 columns",
-            fix="give a map with more rows and columns",
-            where=str(path),
-        )
+        what = "the height map is too small"
+        got = " x ".join(map(str, height.shape))
+        expected = "at least 2 rows and 2 columns"
+        fix = "give a map with more rows and columns"
+        raise RobotError(what, got=got, expected=expected, fix=fix, where=str(path))
 
 
 def _surface(path: Path, height: Array, cell: float, values: SimpleNamespace) -> Surface:

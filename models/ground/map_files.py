@@ -7,8 +7,8 @@ array is at the smallest y, as in `Surface`.
 from __future__ import annotations
 
 import math
-import zlib
 from collections.abc import Callable
+from io import BytesIO
 from pathlib import Path
 from typing import NamedTuple
 
@@ -18,15 +18,7 @@ from hexapod_cosim.models.arrays import Array
 from hexapod_cosim.models.errors import RobotError
 from hexapod_cosim.models.files import MAP_SIZE, read_bytes
 
-LEVELS = "PNG with 16 bits of grey per pixel"
-PNG_BEGIN = b"\x89PNG\r\n\x1a\n"
-PNG_KINDS = {
-    0: "grey",
-    2: "colours",
-    3: "a palette of colours",
-    4: "grey with transparency",
-    6: "colours with transparency",
-}
+NO_MAP = "not a height map"
 ASC_KEYS = ("ncols", "nrows", "xllcorner", "yllcorner", "xllcenter", "yllcenter", "cellsize")
 
 
@@ -39,68 +31,37 @@ class HeightFile(NamedTuple):
     place: Callable[[int, int], str]  # where (row, column) is in the file, for messages
 
 
+def _refused(path: Path, what: str, got: str, expected: str, fix: str) -> RobotError:
+    """Returns the exception for a file of another content."""
+    return RobotError(what, got=got, expected=expected, fix=fix, where=str(path))
+
+
 def _read_png(path: Path) -> HeightFile:
     """Returns the grey levels of a picture, which has no scales."""
     # Pillow takes a moment to import, and few robots have height maps
-    from PIL import Image, UnidentifiedImageError  # noqa: PLC0415
+    from PIL import Image  # noqa: PLC0415
 
-    content = read_bytes(path, MAP_SIZE)
-    if damage := _damage(content):
-        raise _wrong_picture(path, damage)
-    with path.open("rb") as file:
-        try:
-            picture = Image.open(file, formats=("PNG",))
-            if picture.mode in ("I;16", "I;16B", "I"):
-                levels = np.asarray(picture).astype(np.float64)[::-1]
-                return HeightFile(levels, 0.0, 0.0, _place_in_picture(len(levels)))
-        except UnidentifiedImageError as error:
-            raise _wrong_picture(path, "a file of another kind") from error
-        except Exception as error:  # Pillow's readers raise errors of many kinds
-            raise _wrong_picture(path, f"a damaged file ({error})") from error
-    raise _wrong_picture(path, _pixels(content))
+    try:
+        picture = Image.open(BytesIO(read_bytes(path, MAP_SIZE)), formats=("PNG",))
+        levels, mode = np.asarray(picture).astype(np.float64)[::-1], picture.mode
+    except OSError:
+        if not path.is_file():
+            raise
+        raise _not_grey(path, "a file of another kind, or one that is cut") from None
+    except Exception as error:  # Pillow's readers raise errors of many kinds
+        raise _not_grey(path, f"a damaged file ({error})") from error
+    if mode not in ("I;16", "I;16B", "I"):
+        raise _not_grey(path, f"pixels of the kind {mode}")
 
+    def place(row: int, column: int) -> str:
+        return f"in row {len(levels) - row} from above, column {column + 1}"
 
-def _pixels(content: bytes) -> str:
-    """Returns what a PNG file's pixels are, by its header (PNG specification, 11.2.2), because
-    Pillow gives 16 bits of grey with transparency as colours.
-    """
-    depth, kind = content[24], content[25]
-    return f"{depth} bit{'s' if depth > 1 else ''} of {PNG_KINDS.get(kind, f'kind {kind}')}"
+    return HeightFile(levels, 0.0, 0.0, place)
 
 
-def _place_in_picture(rows: int) -> Callable[[int, int], str]:
-    return lambda row, column: f"in row {rows - row} from above, column {column + 1}"
-
-
-def _damage(content: bytes) -> str:
-    """Returns what is wrong with the chunks of a PNG file; "" where they are whole.
-
-    A chunk is its length, its type, as many bytes, and their CRC-32 (PNG specification, 5.3); the
-    last one is IEND. Pillow reads a picture whose file ends behind the pixels.
-    """
-    if not content.startswith(PNG_BEGIN):
-        return ""  # Pillow names files of other kinds
-    at, kind = len(PNG_BEGIN), b""
-    while kind != b"IEND":
-        length = int.from_bytes(content[at : at + 4], "big")
-        end = at + 12 + length
-        if end > len(content):
-            return f"a file that is cut: {len(content)} bytes, without its end (the chunk IEND)"
-        kind, body = content[at + 4 : at + 8], content[at + 4 : end - 4]
-        if zlib.crc32(body) != int.from_bytes(content[end - 4 : end], "big"):
-            return f"a damaged file (the checksum of the chunk {kind.decode('latin-1')} is wrong)"
-        at = end
-    return ""
-
-
-def _wrong_picture(path: Path, got: str) -> RobotError:
-    return RobotError(
-        "not a height map",
-        got=got,
-        expected=LEVELS,
-        fix="save the map again as 16-bit greyscale, or give heights in metres as a .npy array",
-        where=str(path),
-    )
+def _not_grey(path: Path, got: str) -> RobotError:
+    fix = "save the map again as 16-bit greyscale, or give heights in metres as a .npy array"
+    return _refused(path, NO_MAP, got, "PNG with 16 bits of grey per pixel", fix)
 
 
 def _read_npy(path: Path) -> HeightFile:
@@ -120,13 +81,8 @@ def _read_npy(path: Path) -> HeightFile:
 
 
 def _wrong_array(path: Path, got: str) -> RobotError:
-    return RobotError(
-        "not a height map",
-        got=got,
-        expected="an array with two axes (rows along +y, columns along +x) of real numbers",
-        fix="write it with numpy.save",
-        where=str(path),
-    )
+    expected = "an array with two axes (rows along +y, columns along +x) of real numbers"
+    return _refused(path, NO_MAP, got, expected, "write it with numpy.save")
 
 
 def _read_asc(path: Path) -> HeightFile:
@@ -149,41 +105,15 @@ def _read_asc(path: Path) -> HeightFile:
     try:
         values = np.array(words[begin:], dtype=np.float64)
     except ValueError as error:
-        bad = next((k for k in range(begin, len(words)) if not _is_number(words[k])), begin)
-        raise _wrong_grid(path, f"{words[bad]!r} {_place_of_word(text, bad)}") from error
+        raise _wrong_grid(path, str(error)) from error
     if values.size != rows * columns or rows < 1:
-        got = f"{values.size} heights for {rows} rows of {columns}"
-        raise _wrong_grid(path, got + _uneven_line(text, begin, columns))
+        raise _wrong_grid(path, f"{values.size} heights for {rows} rows of {columns}")
     values = np.where(values == header.get("nodata_value", -9999.0), math.nan, values)
 
     def place(row: int, column: int) -> str:
-        return _place_of_word(text, begin + (rows - 1 - row) * columns + column)
+        return f"in row {rows - row} of the grid, number {column + 1}"
 
     return HeightFile(values.reshape(rows, columns)[::-1], header.get("cellsize", 0.0), 1.0, place)
-
-
-def _place_of_word(text: str, index: int) -> str:
-    """Returns the place of a word, by its index from 0, as an editor shows it: from 1 on."""
-    for number, line in enumerate(text.splitlines(), start=1):
-        count = len(line.split())
-        if index < count:
-            return f"in line {number} of the file, number {index + 1}"
-        index -= count
-    return "at the end of the file"
-
-
-def _uneven_line(text: str, begin: int, columns: int) -> str:
-    """Returns which line behind the header is the first that has not a row's count of numbers.
-
-    begin: words of the header. It is "" where rows are not lines.
-    """
-    seen = 0
-    for number, line in enumerate(text.splitlines(), start=1):
-        count = len(line.split())
-        seen += count
-        if seen > begin and count not in (0, columns):
-            return f"; line {number} of the file has {count} numbers"
-    return ""
 
 
 def _is_number(word: str) -> bool:
@@ -195,13 +125,9 @@ def _is_number(word: str) -> bool:
 
 
 def _wrong_grid(path: Path, got: str) -> RobotError:
-    return RobotError(
-        "not an ESRI ASCII grid",
-        got=got,
-        expected="ncols, nrows, cellsize and then nrows x ncols heights in metres",
-        fix="export the map again from the tool that made it",
-        where=str(path),
-    )
+    expected = "ncols, nrows, cellsize and then nrows x ncols heights in metres"
+    fix = "export the map again from the tool that made it"
+    return _refused(path, "not an ESRI ASCII grid", got, expected, fix)
 
 
 READERS: dict[str, Callable[[Path], HeightFile]] = {

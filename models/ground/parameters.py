@@ -7,12 +7,14 @@ leg length; the defaults here are half of them.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from types import SimpleNamespace
 from typing import Any, cast
 
 from hexapod_cosim.models.errors import RobotError
-from hexapod_cosim.models.schema import Number, Spec, Text, refuse_unknown_keys
+from hexapod_cosim.models.ground.surface import Surface
+from hexapod_cosim.models.schema import Number, Spec, Text, missing_key, refuse_unknown_keys
 
 DIFFICULTY = 0.2  # 1    default
 
@@ -48,13 +50,9 @@ class Parameter:
         """Returns the checked value. Raises RobotError; `where` names the key."""
         found = cast("float | str", self.spec.read(value, where))
         if self.whole and found != math.floor(float(found)):
-            raise RobotError(
-                "not a whole number",
-                got=value,
-                expected="a whole number",
-                fix=f"write {math.floor(float(found))}",
-                where=where,
-            )
+            what = "not a whole number"
+            fix = f"write {math.floor(float(found))}"
+            raise RobotError(what, got=value, expected="a whole number", fix=fix, where=where)
         return found
 
 
@@ -107,6 +105,42 @@ TILE: Parameters = {
 RANDOM_TILE: Parameters = {**TILE, "vertical_scale": VERTICAL, "seed": SEED}
 
 
+# legged_gym's 0.05 + 0.18 difficulty, by half
+STEP_HEIGHT = length((0.025, 0.115), "height of a step")
+STEP_WIDTH = length(0.15, "depth of a step's tread", least=0.01, zero=True)
+DEPTH = length(0.3, "depth of the gaps")
+STEPS: Parameters = {**TILE, "step_height": STEP_HEIGHT, "step_width": STEP_WIDTH}
+ONE_STEP: Parameters = {**TILE, "step_height": STEP_HEIGHT}
+
+
+@dataclass(frozen=True)
+class Entry:
+    """A surface of the catalogue."""
+
+    about: str
+    make: Callable[[SimpleNamespace], Surface]
+    parameters: Parameters
+    tile: bool  # whether tiles of a curriculum may have it
+    listed: bool  # whether it is a surface of its own
+
+
+Entries = dict[str, Entry]
+
+
+def entry(
+    table: Entries, about: str, parameters: Parameters, *, tile: bool = True, listed: bool = True
+) -> Callable[[Callable[[SimpleNamespace], Surface]], Callable[[SimpleNamespace], Surface]]:
+    """Returns a decorator that puts a surface into a table, by the name of its function."""
+
+    def register(
+        make: Callable[[SimpleNamespace], Surface],
+    ) -> Callable[[SimpleNamespace], Surface]:
+        table[make.__name__] = Entry(about, make, parameters, tile, listed)
+        return make
+
+    return register
+
+
 def read_values(
     parameters: Parameters, given: Mapping[str, Any], where: str
 ) -> dict[str, float | str]:
@@ -125,13 +159,7 @@ def with_defaults(
     for key, value in values.items():
         if value is None:
             spec = parameters[key].spec
-            unit = f" [{spec.unit}]" if isinstance(spec, Number) else ""
-            raise RobotError(
-                "missing key",
-                expected=f"{parameters[key].about}{unit}",
-                fix=f"add `{key} = ...` to [terrain]",
-                where=f"{where}.{key}",
-            )
+            raise missing_key(key, spec, f"{where}.{key}")
         if parameters[key].whole:
             values[key] = int(value)
     return values

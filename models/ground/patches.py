@@ -49,13 +49,9 @@ PROPERTIES = {"mu": MU, "mu_static": MU_STATIC, "stiffness": STIFFNESS}
 def read_patches(value: Any, where: str) -> tuple[dict[str, Any], ...]:
     """Returns the checked [[terrain.patch]] entries. Raises RobotError."""
     if not isinstance(value, list | tuple):
-        raise RobotError(
-            "wrong type",
-            got=value,
-            expected="entries [[terrain.patch]]",
-            fix="write [[terrain.patch]] with two brackets",
-            where=where,
-        )
+        expected = "entries [[terrain.patch]]"
+        fix = "write [[terrain.patch]] with two brackets"
+        raise RobotError("wrong type", got=value, expected=expected, fix=fix, where=where)
     patches = tuple(_read_patch(item, f"{where}[{k}]") for k, item in enumerate(value))
     if len(patches) > MOST_MATERIALS:
         raise RobotError(
@@ -82,13 +78,10 @@ def _read_patch(value: Any, where: str) -> dict[str, Any]:
                 "missing key", expected="a value in m", fix=f"add `{key} = ...`", where=where
             )
     if not {*PROPERTIES, "soil"} & set(found):
-        raise RobotError(
-            "a patch like its surroundings",
-            got=sorted(found),
-            expected="one of mu, mu_static, stiffness, soil",
-            fix="say in what the patch differs",
-            where=where,
-        )
+        what = "a patch like its surroundings"
+        expected = "one of mu, mu_static, stiffness, soil"
+        fix = "say in what the patch differs"
+        raise RobotError(what, got=sorted(found), expected=expected, fix=fix, where=where)
     if "soil" in found:
         check_soil(found["soil"], f"{where}.soil")
     return found
@@ -163,11 +156,8 @@ def _lay(
     y = surface.y0 + surface.cell * (np.arange(surface.rows) + shift)
     columns, rows = np.abs(x - place[0]) <= half[0], np.abs(y - place[1]) <= half[1]
     if not (columns.any() and rows.any()):
-        raise RobotError(
-            "a patch smaller than the map's cells",
-            got=list(patch["size"]),
-            expected=f"at least {surface.cell:.4g} m",
-            fix="enlarge it, or reduce terrain.horizontal_scale",
-            where=where,
-        )
+        what = "a patch smaller than the map's cells"
+        expected = f"at least {surface.cell:.4g} m"
+        fix = "enlarge it, or reduce terrain.horizontal_scale"
+        raise RobotError(what, got=list(patch["size"]), expected=expected, fix=fix, where=where)
     material[np.ix_(rows, columns)] = number

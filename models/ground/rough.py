@@ -13,8 +13,29 @@ from types import SimpleNamespace
 import numpy as np
 
 from hexapod_cosim.models.arrays import Array
+from hexapod_cosim.models.ground.parameters import (
+    HORIZONTAL,
+    RANDOM_TILE,
+    SIZE,
+    TILE,
+    Entries,
+    Parameters,
+    entry,
+    length,
+    ratio,
+    text,
+)
 from hexapod_cosim.models.ground.surface import Surface
 
+SMOOTH: Entries = {}  # the surfaces by name
+PLANE: Parameters = {"size": SIZE, "horizontal_scale": HORIZONTAL}
+SLOPE = ratio((0.0, 0.4), "rise over run", least=-2.0, most=2.0)
+SOIL = text("dry_sand", "name of the soil everywhere")
+ROUGHNESS: Parameters = {
+    **RANDOM_TILE,
+    "horizontal_scale": replace(HORIZONTAL, default=0.1),
+    "max_height": length((0.01, 0.05), "largest height above and below 0"),
+}
 QUANTUM = 2.0**24  # 1/m    60 nm
 FLAT_CELLS = 2  # cells beyond the platform that its bicubic patches reach
 BLEND = 0.25  # 1    width of the transition over the platform's size
@@ -58,18 +79,33 @@ def off_platform(x: Array, y: Array, cell: float, platform: float) -> Array:
     return np.asarray(share * share * (3.0 - 2.0 * share))
 
 
+@entry(
+    SMOOTH,
+    "Inclined plane as a grid",
+    {
+        "size": SIZE,
+        "horizontal_scale": HORIZONTAL,
+        "slope_x": ratio(0.0, "rise along +x over run", least=-2.0, most=2.0),
+        "slope_y": ratio(0.0, "rise along +y over run", least=-2.0, most=2.0),
+    },
+    tile=False,
+)
 def plane(values: SimpleNamespace) -> Surface:
     """Returns the plane z = slope_x x + slope_y y, exact to rounding."""
     x, y, cell = _nodes(values.size, values.size, values.horizontal_scale)
     return _surface("plane", x, y, cell, values.slope_x * x + values.slope_y * y)
 
 
+@entry(
+    SMOOTH, "Level soil", {"size": SIZE, "horizontal_scale": HORIZONTAL, "soil": SOIL}, tile=False
+)
 def sand(values: SimpleNamespace) -> Surface:
     """Returns a plane whose material is given by the parameter `soil` (catalogue.py)."""
     x, y, cell = _nodes(values.size, values.size, values.horizontal_scale)
     return _surface("sand", x, y, cell, np.zeros_like(x))
 
 
+@entry(SMOOTH, "Slopes down to all sides", {**TILE, "slope": SLOPE})
 def pyramid_slope(values: SimpleNamespace) -> Surface:
     """Returns a pyramid with a flat top at the start; a negative slope makes a hollow."""
     x, y, cell = _nodes(values.size, values.size, values.horizontal_scale)
@@ -77,18 +113,27 @@ def pyramid_slope(values: SimpleNamespace) -> Surface:
     return _surface("pyramid_slope", x, y, cell, -values.slope * np.maximum(outside, 0.0))
 
 
+@entry(SMOOTH, "Slopes up to all sides", {**TILE, "slope": SLOPE}, listed=False)
 def inverted_pyramid_slope(values: SimpleNamespace) -> Surface:
     """Returns a hollow with a flat bottom at the start, whose sides have the pyramid's slope."""
     pyramid = pyramid_slope(values)
     return replace(pyramid, height=-pyramid.height, name="inverted_pyramid_slope")
 
 
+@entry(
+    SMOOTH, "Slopes down to all sides with roughness", {**ROUGHNESS, "slope": SLOPE}, listed=False
+)
 def rough_slope(values: SimpleNamespace) -> Surface:
     """Returns the sum of a pyramid's slopes and random heights."""
     pyramid, rough = pyramid_slope(values), random_uniform(values)
     return replace(pyramid, height=pyramid.height + rough.height, name="rough_slope")
 
 
+@entry(
+    SMOOTH,
+    "Ramp up and down along +x",
+    {**TILE, "slope": SLOPE, "ramp_length": length(0.5, "run of the ramp")},
+)
 def ramp(values: SimpleNamespace) -> Surface:
     """Returns a ramp along +x: level, up, level for half its length, and down again."""
     x, y, cell = _nodes(values.size, values.size, values.horizontal_scale)
@@ -98,6 +143,15 @@ def ramp(values: SimpleNamespace) -> Surface:
     return _surface("ramp", x, y, cell, values.slope * (up - down))
 
 
+@entry(
+    SMOOTH,
+    "Sine waves along x and y",
+    {
+        **TILE,
+        "amplitude": length((0.02, 0.15), "largest height"),
+        "num_waves": ratio(4.0, "waves along an edge of the map", least=0.1, most=1000.0),
+    },
+)
 def wave(values: SimpleNamespace) -> Surface:
     """Returns waves along x and y: amplitude (sin(k x) + sin(k y))/2, k = 2 pi num_waves/size."""
     x, y, cell = _nodes(values.size, values.size, values.horizontal_scale)
@@ -108,6 +162,15 @@ def wave(values: SimpleNamespace) -> Surface:
     )
 
 
+@entry(
+    SMOOTH,
+    "Dunes across x, steep on their far side",
+    {
+        **TILE,
+        "dune_height": length((0.03, 0.2), "height of a crest"),
+        "dune_length": length(1.2, "from crest to crest", least=0.1, zero=True),
+    },
+)
 def dune(values: SimpleNamespace) -> Surface:
     """Returns dunes across x: WINDWARD of a length rises gently, the rest falls.
 
@@ -123,6 +186,7 @@ def dune(values: SimpleNamespace) -> Surface:
     return _surface("dune", x, y, cell, height)
 
 
+@entry(SMOOTH, "Smooth roughness from random heights", ROUGHNESS)
 def random_uniform(values: SimpleNamespace) -> Surface:
     """Returns random heights between -max_height and max_height, in steps of vertical_scale."""
     x, y, cell = _nodes(values.size, values.size, values.horizontal_scale)

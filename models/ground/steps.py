@@ -8,14 +8,33 @@ one width that repeats, the blocks are chosen so that the width is exact.
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from hexapod_cosim.models.arrays import Array
+from hexapod_cosim.models.ground.parameters import (
+    DEPTH,
+    HARD,
+    HORIZONTAL,
+    ONE_STEP,
+    PLATFORM,
+    RANDOM_TILE,
+    SEED,
+    SIZE,
+    STEPS,
+    TILE,
+    VERTICAL,
+    Entries,
+    count,
+    entry,
+    length,
+)
 from hexapod_cosim.models.ground.surface import Surface
 
+BLOCKS: Entries = {}  # the surfaces by name
 Mask = NDArray[np.bool_]
 
 TILT = 3  # obstacles have heights -1, -1/2, 1/2, 1 of the largest: 4 choices
@@ -61,6 +80,11 @@ def _stairs_along(distance: Array, width: float, number: float) -> Array:
     return np.clip(np.floor(distance / width + 1.0), 0.0, number)
 
 
+@entry(
+    BLOCKS,
+    "Stairs up along +x and a landing",
+    {**STEPS, "num_steps": count(5, "number of steps", most=1000)},
+)
 def stairs(values: SimpleNamespace) -> Surface:
     """Returns num_steps steps up along +x, which begin at the platform's edge, and a landing."""
     cell = _fitting(values.step_width, values.horizontal_scale)
@@ -79,11 +103,13 @@ def _pyramid(values: SimpleNamespace, name: str, sign: float) -> Surface:
     return _surface(name, x, y, cell, sign * values.step_height * passed)
 
 
+@entry(BLOCKS, "Stairs down to all sides", STEPS)
 def pyramid_stairs(values: SimpleNamespace) -> Surface:
     """Returns stairs that lead down from the platform to all sides."""
     return _pyramid(values, "pyramid_stairs", -1.0)
 
 
+@entry(BLOCKS, "Stairs up to all sides", STEPS)
 def inverted_pyramid_stairs(values: SimpleNamespace) -> Surface:
     """Returns stairs that lead up from the platform to all sides."""
     return _pyramid(values, "inverted_pyramid_stairs", 1.0)
@@ -96,16 +122,19 @@ def _one_step(values: SimpleNamespace, name: str, sign: float) -> Surface:
     return _surface(name, x, y, cell, np.where(high, sign * values.step_height, 0.0))
 
 
+@entry(BLOCKS, "One step up along +x", ONE_STEP)
 def step_up(values: SimpleNamespace) -> Surface:
     """Returns one step up along +x, at the platform's edge."""
     return _one_step(values, "step_up", 1.0)
 
 
+@entry(BLOCKS, "One step down along +x", ONE_STEP)
 def step_down(values: SimpleNamespace) -> Surface:
     """Returns one step down along +x, at the platform's edge."""
     return _one_step(values, "step_down", -1.0)
 
 
+@entry(BLOCKS, "Kerbs across x", STEPS)
 def steps(values: SimpleNamespace) -> Surface:
     """Returns kerbs across x: step_width high, step_width low, and so on."""
     cell = _fitting(values.step_width, values.horizontal_scale)
@@ -116,6 +145,17 @@ def steps(values: SimpleNamespace) -> Surface:
     return _surface("steps", x, y, cell, np.where(high, values.step_height, 0.0))
 
 
+@entry(
+    BLOCKS,
+    "Square stones with gaps between them",
+    {
+        **RANDOM_TILE,
+        "stone_size": length((0.5, 0.1), "edge of a stone", least=0.01, zero=True),
+        "stone_distance": length(0.05, "width of the gaps"),
+        "max_height": length(0.0, "largest deviation of the tops", zero=True),
+        "depth": DEPTH,
+    },
+)
 def stepping_stones(values: SimpleNamespace) -> Surface:
     """Returns square stones with gaps between them; each row of stones is shifted at random.
 
@@ -143,6 +183,16 @@ def _levels(values: SimpleNamespace) -> int:
     return round(float(values.max_height) / float(values.vertical_scale))
 
 
+@entry(
+    BLOCKS,
+    "Gaps across x",
+    {
+        **TILE,
+        "gap_size": length((0.02, 0.2), "width of a gap", least=0.01, zero=True),
+        "gap_distance": length(0.4, "ground between two gaps"),
+        "depth": DEPTH,
+    },
+)
 def gaps(values: SimpleNamespace) -> Surface:
     """Returns gaps across x, gap_size wide and gap_distance apart, from the platform's edge on."""
     cell = _fitting(values.gap_size, values.horizontal_scale)
@@ -155,6 +205,17 @@ def gaps(values: SimpleNamespace) -> Surface:
     return _surface("gaps", x, y, cell, np.where(open_, -values.depth, 0.0))
 
 
+@entry(
+    BLOCKS,
+    "Flat rectangles above and below the ground",
+    {
+        **RANDOM_TILE,
+        "max_height": length((0.025, 0.125), "largest height"),
+        "min_size": length(0.2, "shortest edge"),
+        "max_size": length(0.6, "longest edge"),
+        "num_rects": count(40, "number of rectangles"),
+    },
+)
 def discrete_obstacles(values: SimpleNamespace) -> Surface:
     """Returns num_rects flat rectangles at random places, higher or lower than the ground.
 
@@ -184,6 +245,15 @@ def random_tops(values: SimpleNamespace, x: Array, y: Array, cell: float) -> Arr
     return np.asarray(values.vertical_scale * tops.astype(np.float64))
 
 
+@entry(
+    BLOCKS,
+    "Square stones of random height",
+    {
+        **RANDOM_TILE,
+        "stone_size": length(0.2, "edge of a stone", least=0.01, zero=True),
+        "max_height": length((0.02, 0.1), "largest height of a stone"),
+    },
+)
 def rubble(values: SimpleNamespace) -> Surface:
     """Returns square stones of random heights from 0 to max_height, without gaps."""
     cell = _fitting(values.stone_size, values.horizontal_scale)
@@ -193,6 +263,21 @@ def rubble(values: SimpleNamespace) -> Surface:
     return _surface("rubble", x, y, cell, height)
 
 
+@entry(
+    BLOCKS,
+    "5 m of rubble, kerbs, stones with gaps, stairs, along +x",
+    {
+        "size": replace(SIZE, default=2.0, about="width of the course"),
+        "horizontal_scale": HORIZONTAL,
+        "platform_size": PLATFORM,
+        "difficulty": HARD,
+        "step_height": length((0.015, 0.1), "height of kerbs, stairs and rubble"),
+        "depth": DEPTH,
+        "vertical_scale": VERTICAL,
+        "seed": SEED,
+    },
+    tile=False,
+)
 def course(values: SimpleNamespace) -> Surface:
     """Returns a course of 5 m along +x: rubble, kerbs, stones with gaps, stairs up and down.
 

@@ -124,52 +124,39 @@ def check_surface(surface: Surface) -> None:
     check_heights(surface.height, surface.name)
     _check_materials(surface)
     if not surface.name or len(surface.name.encode()) >= NAME_BYTES or "\0" in surface.name:
-        raise RobotError(
-            "name of a surface",
-            got=surface.name,
-            expected=f"1 to {NAME_BYTES - 1} bytes of UTF-8 text",
-            fix="shorten it",
-        )
+        expected = f"1 to {NAME_BYTES - 1} bytes of UTF-8 text"
+        raise RobotError("name of a surface", got=surface.name, expected=expected, fix="shorten it")
 
 
 def _check_shape(surface: Surface) -> None:
     least = 2 if surface.kind == "smooth" else 1
     shape = surface.height.shape
     if len(shape) != 2 or min(shape) < least:
-        raise RobotError(
-            "the height map is too small",
-            got=" x ".join(map(str, shape)),
-            expected=f"at least {least} rows and {least} columns of a {surface.kind} surface",
-            fix="give a map with more rows and columns",
-            where=surface.name,
-        )
+        what = "the height map is too small"
+        got = " x ".join(map(str, shape))
+        expected = f"at least {least} rows and {least} columns of a {surface.kind} surface"
+        fix = "give a map with more rows and columns"
+        raise RobotError(what, got=got, expected=expected, fix=fix, where=surface.name)
     if surface.height.size > LARGEST_MAP:
-        raise RobotError(
-            "the height map is too large",
-            got=" x ".join(map(str, shape)),
-            expected=f"at most {LARGEST_MAP} heights",
-            fix="cut out a part of it or reduce its resolution",
-            where=surface.name,
-        )
+        what = "the height map is too large"
+        got = " x ".join(map(str, shape))
+        expected = f"at most {LARGEST_MAP} heights"
+        fix = "cut out a part of it or reduce its resolution"
+        raise RobotError(what, got=got, expected=expected, fix=fix, where=surface.name)
 
 
 def _check_place(surface: Surface) -> None:
     if not SMALLEST_CELL <= surface.cell <= LARGEST_CELL:
-        raise RobotError(
-            "scale of the height map",
-            got=surface.cell,
-            expected=f"horizontal_scale from {SMALLEST_CELL:g} to {LARGEST_CELL:g} m for a cell",
-            fix="give horizontal_scale in metres",
-            where=surface.name,
-        )
+        what = "scale of the height map"
+        expected = f"horizontal_scale from {SMALLEST_CELL:g} to {LARGEST_CELL:g} m for a cell"
+        fix = "give horizontal_scale in metres"
+        raise RobotError(what, got=surface.cell, expected=expected, fix=fix, where=surface.name)
     if not all(abs(edge) <= FARTHEST for edge in surface.extent):
-        raise RobotError(
-            "place of the height map",
-            got=[float(f"{edge:.6g}") for edge in surface.extent],
-            expected=f"edges within {FARTHEST:g} m of the world's origin",
-            fix="move it towards the origin, or correct horizontal_scale",
-            where=surface.name,
-        )
+        what = "place of the height map"
+        got = [float(f"{edge:.6g}") for edge in surface.extent]
+        expected = f"edges within {FARTHEST:g} m of the world's origin"
+        fix = "move it towards the origin, or correct horizontal_scale"
+        raise RobotError(what, got=got, expected=expected, fix=fix, where=surface.name)
 
 
 def check_heights(height: Array, name: str, place: Callable[[int, int], str] | None = None) -> None:
@@ -183,22 +170,16 @@ def check_heights(height: Array, name: str, place: Callable[[int, int], str] | N
         row, column = (int(index) for index in bad[0])
         at = place(row, column) if place else f"in row {row}, column {column}"
         more = f", and {len(bad) - 1} more" if len(bad) > 1 else ""
-        raise RobotError(
-            "a height that is no number",
-            got=f"{height[row, column]} {at}{more}",
-            expected="finite heights",
-            fix="fill the holes of the map first",
-            where=name,
-        )
+        what = "a height that is no number"
+        got = f"{height[row, column]} {at}{more}"
+        fix = "fill the holes of the map first"
+        raise RobotError(what, got=got, expected="finite heights", fix=fix, where=name)
     worst = float(np.max(np.abs(height)))
     if worst > HIGHEST:
-        raise RobotError(
-            "enormous heights",
-            got=f"{worst:.6g} m",
-            expected=f"at most {HIGHEST:g} m above and below terrain.height",
-            fix="correct vertical_scale, or subtract the map's mean height",
-            where=name,
-        )
+        what = "enormous heights"
+        expected = f"at most {HIGHEST:g} m above and below terrain.height"
+        fix = "correct vertical_scale, or subtract the map's mean height"
+        raise RobotError(what, got=f"{worst:.6g} m", expected=expected, fix=fix, where=name)
 
 
 def _check_materials(surface: Surface) -> None:
@@ -207,12 +188,9 @@ def _check_materials(surface: Surface) -> None:
         return
     table = surface.materials
     if surface.material is None or table is None:
-        raise RobotError(
-            "materials of a surface",
-            got="only one of map and table",
-            expected="material and materials, or none of them",
-            where=surface.name,
-        )
+        got = "only one of map and table"
+        expected = "material and materials, or none of them"
+        raise RobotError("materials of a surface", got=got, expected=expected, where=surface.name)
     rows = len(table)
     largest = int(np.max(surface.material)) if np.size(surface.material) else 0
     fits = np.shape(table) == (rows, MATERIAL_COLUMNS) and 0 < rows <= MOST_MATERIALS

@@ -86,12 +86,9 @@ def read_terrain(table: Any, where: str) -> Terrain:
     """Returns the ground of a table [terrain]. Raises RobotError."""
     given = expect_table(table, where)
     if "kind" not in given:
-        raise RobotError(
-            "missing key",
-            expected=f"one of {', '.join(NAMES)}",
-            fix="add `kind = ...`",
-            where=f"{where}.kind",
-        )
+        expected = f"one of {', '.join(NAMES)}"
+        fix = "add `kind = ...`"
+        raise RobotError("missing key", expected=expected, fix=fix, where=f"{where}.kind")
     kind = given["kind"]
     check_kind(kind, where)
     refuse_unknown_keys(given, [*keys_of(kind), "patch"], where)
@@ -99,13 +96,10 @@ def read_terrain(table: Any, where: str) -> Terrain:
     fields = {key: specs(Terrain)[key].read(placed[key], f"{where}.{key}") for key in placed}
     if kind in PLANES:
         if given.get("patch"):
-            raise RobotError(
-                "patches on a ground without a map",
-                got=kind,
-                expected="a surface of the catalogue",
-                fix='set terrain.kind = "plane", with slope_x for a slope',
-                where=f"{where}.patch",
-            )
+            what = "patches on a ground without a map"
+            expected = "a surface of the catalogue"
+            fix = 'set terrain.kind = "plane", with slope_x for a slope'
+            raise RobotError(what, got=kind, expected=expected, fix=fix, where=f"{where}.patch")
         return Terrain(**require(Terrain, fields | {"kind": kind}, where))
     rest = {key: value for key, value in given.items() if key not in ("kind", *PLACED)}
     surface = make_surface(kind, rest, where=where)
@@ -145,13 +139,11 @@ def terrain_table(terrain: Terrain) -> dict[str, Any]:
     if terrain.kind in PLANES or terrain.surface is None:
         return {"kind": terrain.kind, **placed}
     if not terrain.surface.recipe:
-        raise RobotError(
-            "a surface that no file can name",
-            got=terrain.surface.name,
-            expected="a surface of the catalogue",
-            fix="write its heights with numpy.save, and use kind = heightfield",
-            where="terrain",
-        )
+        what = "a surface that no file can name"
+        got = terrain.surface.name
+        expected = "a surface of the catalogue"
+        fix = "write its heights with numpy.save, and use kind = heightfield"
+        raise RobotError(what, got=got, expected=expected, fix=fix, where="terrain")
     recipe = dict(terrain.surface.recipe)
     if "patch" in recipe:
         recipe["patch"] = patch_lists(recipe["patch"])

@@ -21,6 +21,7 @@ from hexapod_cosim.models.schema import (
     read_given,
     require,
     specs,
+    wrong_type,
 )
 from hexapod_cosim.models.servos.motor import (
     motor_constant,
@@ -99,7 +100,11 @@ def servo_table(value: Any, where: str) -> Mapping[str, Any]:
     fields: Mapping[str, Any] = {}
     gain: float | None = None
     if MODEL in table:
-        measured = measured_servo(_name(table.pop(MODEL), where), where=f"{where}.{MODEL}")
+        name, at = table.pop(MODEL), f"{where}.{MODEL}"
+        if not isinstance(name, str):
+            expected = "a name of `hexapod list servos`"
+            raise wrong_type(name, expected, "give a name in quotes", at)
+        measured = measured_servo(name, where=at)
         fields, gain = measured.fields, measured.about.duty_gain
     elif table.get("drive") != "motor":
         return table
@@ -125,30 +130,15 @@ def _with_motor(given: Mapping[str, Any], gain: float | None) -> dict[str, Any]:
     return own | {key: getattr(servo, key) for key in FOLLOWING}
 
 
-def _name(value: Any, where: str) -> str:
-    """Returns the name of a servo. Raises RobotError for other values than texts."""
-    if isinstance(value, str):
-        return value
-    raise RobotError(
-        "wrong type",
-        got=value,
-        expected="a name of `hexapod list servos`",
-        fix="give a name in quotes",
-        where=f"{where}.{MODEL}",
-    )
-
-
 def _check_constants(own: Mapping[str, Any], where: str) -> None:
     """Raises RobotError for a motor that lacks a constant or has one that is 0."""
     for key in ("voltage", "torque_constant", "resistance"):
         if not own.get(key, 0.0) > 0.0:
-            raise RobotError(
-                "a motor without its constants",
-                got=own.get(key),
-                expected="a number > 0",
-                fix=f"give {key}, or a servo of `hexapod list servos` as {MODEL}",
-                where=f"{where}.{key}",
-            )
+            what = "a motor without its constants"
+            got = own.get(key)
+            expected = "a number > 0"
+            fix = f"give {key}, or a servo of `hexapod list servos` as {MODEL}"
+            raise RobotError(what, got=got, expected=expected, fix=fix, where=f"{where}.{key}")
 
 
 def refuse_others(given: Mapping[str, Any], derived: Mapping[str, Any], where: str) -> None:
@@ -158,13 +148,11 @@ def refuse_others(given: Mapping[str, Any], derived: Mapping[str, Any], where: s
     """
     for key in FOLLOWING:
         if not math.isclose(given.get(key, derived[key]), derived[key], rel_tol=1e-9):
-            raise RobotError(
-                "a value that follows from the motor's constants",
-                got=given[key],
-                expected=f"{derived[key]:g}",
-                fix=f"remove it, or change {', '.join(CONSTANTS)}",
-                where=f"{where}.{key}",
-            )
+            what = "a value that follows from the motor's constants"
+            got = given[key]
+            expected = f"{derived[key]:g}"
+            fix = f"remove it, or change {', '.join(CONSTANTS)}"
+            raise RobotError(what, got=got, expected=expected, fix=fix, where=f"{where}.{key}")
 
 
 def followed(servo: Servo) -> Servo:

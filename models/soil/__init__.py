@@ -1,3 +1,3 @@
-"""Defines soft ground: law.py its forces (eq. 40-46), granular.py the resistance of granular media
-as a function of direction, presets.py measured soils.
+"""Defines soft ground: law.py its forces (eq. 40-46), losses.py its powers, presets.py the measured
+soils of data/*.toml.
 """

@@ -12,7 +12,6 @@ from typing import Any
 from hexapod_cosim.models.errors import HexapodError, RobotError, unknown_name
 from hexapod_cosim.models.records import Soil
 from hexapod_cosim.models.schema import expect_table, read_given, require
-from hexapod_cosim.models.soil.granular import Coefficients, foot_resistances
 
 PRESET = "preset"  # key of a table that starts from a soil of `list_soils()`
 
@@ -40,14 +39,7 @@ def _presets() -> dict[str, Preset]:
 
 def _preset(table: dict[str, Any], where: str) -> Preset:
     title, source = table.pop("title"), table.pop("source")
-    if "coefficients" in table:
-        given = read_given(Coefficients, table.pop("coefficients"), f"{where}.coefficients")
-        table |= foot_resistances(Coefficients(**given))
-    return Preset(_soil_of(table, where), title, source)
-
-
-def _soil_of(table: Mapping[str, Any], where: str) -> Soil:
-    return Soil(**require(Soil, read_given(Soil, table, where), where))
+    return Preset(Soil(**require(Soil, read_given(Soil, table, where), where)), title, source)
 
 
 def list_soils() -> list[str]:
@@ -75,11 +67,8 @@ def soil_table(value: Any, where: str) -> Mapping[str, Any]:
         return table
     name = table.pop(PRESET)
     if not isinstance(name, str):
-        raise RobotError(
-            "wrong type",
-            got=name,
-            expected="a name of `hexapod list soils`",
-            fix="give a name in quotes",
-            where=f"{where}.{PRESET}",
-        )
+        what = "wrong type"
+        expected = "a name of `hexapod list soils`"
+        fix = "give a name in quotes"
+        raise RobotError(what, got=name, expected=expected, fix=fix, where=f"{where}.{PRESET}")
     return asdict(soil_preset(name, where=where).soil) | table

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from hexapod_cosim.models.arrays import Array
 from hexapod_cosim.models.errors import RobotError, unknown_name
-from hexapod_cosim.models.urdf.elements import Inertial, Sphere, Urdf, UrdfJoint, UrdfLink
+from hexapod_cosim.models.urdf.elements import Inertial, Solid, Urdf, UrdfJoint, UrdfLink
 
 
 @dataclass(frozen=True, eq=False)
@@ -22,6 +22,11 @@ class Member:
     def point(self, place: Array) -> Array:
         """Returns a point (3,) of the link in the body's frame [m]."""
         return self.position + self.rotation @ place
+
+    def moved(self, part: Inertial) -> Inertial:
+        """Returns the link's mass, centre of mass and inertia in the body's frame."""
+        R = self.rotation
+        return Inertial(part.mass, self.point(part.com), R @ part.inertia @ R.T)
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,12 +49,16 @@ class Body:
     branches: list[Branch] = field(default_factory=list)
 
     @property
-    def spheres(self) -> list[Sphere]:
-        """Returns the collision spheres in the body's frame."""
+    def solids(self) -> list[Solid]:
+        """Collision shapes of all links, in the body's frame."""
         return [
-            Sphere(member.point(sphere.centre), sphere.radius)
+            replace(
+                solid,
+                centre=member.point(solid.centre),
+                rotation=member.rotation @ solid.rotation,
+            )
             for member in self.members
-            for sphere in member.link.spheres
+            for solid in member.link.solids
         ]
 
     def inertial(self, where: str) -> Inertial:
@@ -57,43 +66,22 @@ class Body:
 
         Raises RobotError without mass.
         """
-        parts = [_moved(member) for member in self.members if member.link.inertial is not None]
+        parts = [member.moved(part) for member in self.members if (part := member.link.inertial)]
         if not parts:
-            fix = "give it <inertial> with its mass and inertia"
-            raise RobotError(
-                "a moving body without mass",
-                expected="<inertial>",
-                fix=fix,
-                where=f"{where}: link {self.name!r}",
-            )
+            what, fix = "a moving body without mass", "give it <inertial> with its mass and inertia"
+            at = f"{where}: link {self.name!r}"
+            raise RobotError(what, expected="<inertial>", fix=fix, where=at)
         return parts[0] if len(parts) == 1 else _together(parts)
-
-    @property
-    def problem(self) -> RobotError | None:
-        """The reason why the inertia is impossible, or None."""
-        found = (
-            member.link.inertial.problem
-            for member in self.members
-            if member.link.inertial is not None
-        )
-        return next((problem for problem in found if problem is not None), None)
-
-
-def _moved(member: Member) -> Inertial:
-    inertial, R = member.link.inertial, member.rotation
-    assert inertial is not None
-    return Inertial(inertial.mass, member.point(inertial.com), R @ inertial.inertia @ R.T)
 
 
 def _together(parts: list[Inertial]) -> Inertial:
+    """Returns the sum of several bodies, by the parallel-axis theorem."""
     mass = sum(part.mass for part in parts)
     com = sum((part.mass * part.com for part in parts), start=np.zeros(3)) / mass
     inertia = np.zeros((3, 3))
     for part in parts:
         d = part.com - com
-        inertia = (
-            inertia + part.inertia + part.mass * (d @ d * np.eye(3) - np.outer(d, d))
-        )  # parallel axes
+        inertia = inertia + part.inertia + part.mass * (d @ d * np.eye(3) - np.outer(d, d))
     return Inertial(mass, com, inertia)
 
 
@@ -103,76 +91,50 @@ def root_body(urdf: Urdf) -> Body:
     Raises RobotError for a graph that is not a tree, or a torso fixed to the world.
     """
     leaving = _leaving(urdf)
-    root = _unworldly(_root(urdf), leaving, urdf)
-    torso = Body(root)
-    waiting, reached = [torso], {_root(urdf)}
+    children = {joint.child for joint in urdf.joints}
+    roots = [name for name in urdf.links if name not in children]
+    if len(roots) != 1:
+        what, fix = "not one root link", "connect the links"
+        expected = "one link that is no joint's child"
+        raise RobotError(what, got=roots, expected=expected, fix=fix, where=urdf.where)
+    torso = Body(_moving_root(roots[0], leaving[roots[0]], urdf))
+    waiting, reached = [torso], {roots[0]}
     while waiting:
         _collect(body := waiting.pop(), urdf, leaving)
         waiting += [branch.body for branch in body.branches]
         reached |= {member.link.name for member in body.members}
-    if len(reached) < len(urdf.links):
-        got = sorted(set(urdf.links) - reached)[0]
-        raise RobotError(
-            "links in a ring of their own",
-            got=got,
-            expected="a tree",
-            fix="connect them to the root",
-            where=urdf.where,
-        )
+    lost = sorted(set(urdf.links) - reached)
+    if lost:
+        what, fix = "links in a ring of their own", "connect them to the root"
+        raise RobotError(what, got=lost[0], expected="a tree", fix=fix, where=urdf.where)
     return torso
 
 
 def _leaving(urdf: Urdf) -> dict[str, list[UrdfJoint]]:
     """Returns the joints that leave each link."""
     leaving: dict[str, list[UrdfJoint]] = {name: [] for name in urdf.links}
-    parents: dict[str, str] = {}
+    children = set[str]()
     for joint in urdf.joints:
         where = f"{urdf.where}: joint {joint.name!r}"
         for name in (joint.parent, joint.child):
             if name not in urdf.links:
                 raise unknown_name("link", name, list(urdf.links), where=where, error=RobotError)
-        if joint.child in parents:
-            got = f"link {joint.child!r} also hangs on {parents[joint.child]!r}"
-            raise RobotError(
-                "a closed loop",
-                got=got,
-                expected="a tree",
-                fix="remove one of the joints",
-                where=where,
-            )
-        parents[joint.child] = joint.parent
+        if joint.child in children:
+            got, fix = f"link {joint.child!r} hangs on two joints", "remove one of the joints"
+            raise RobotError("a closed loop", got=got, expected="a tree", fix=fix, where=where)
+        children.add(joint.child)
         leaving[joint.parent].append(joint)
     return leaving
 
 
-def _root(urdf: Urdf) -> str:
-    children = {joint.child for joint in urdf.joints}
-    roots = [name for name in urdf.links if name not in children]
-    if len(roots) != 1:
-        raise RobotError(
-            "not one root link",
-            got=roots,
-            expected="one link that is no joint's child",
-            fix="connect the links",
-            where=urdf.where,
-        )
-    return roots[0]
-
-
-def _unworldly(root: str, leaving: dict[str, list[UrdfJoint]], urdf: Urdf) -> str:
+def _moving_root(root: str, joints: list[UrdfJoint], urdf: Urdf) -> str:
     """Returns the root, or the floating child of a root that is the world."""
-    joints = leaving[root]
     if len(joints) == 1 and joints[0].kind == "floating" and urdf.links[root].inertial is None:
         return joints[0].child
     if root == "world" and any(joint.kind == "fixed" for joint in joints):
+        what = "a robot fixed to the world"
         fix = "remove the link world and its joint, or make that floating"
-        raise RobotError(
-            "a robot fixed to the world",
-            got=joints[0].name,
-            expected="a torso that moves",
-            fix=fix,
-            where=urdf.where,
-        )
+        raise RobotError(what, got=root, expected="a moving torso", fix=fix, where=urdf.where)
     return root
 
 
@@ -183,19 +145,13 @@ def _collect(body: Body, urdf: Urdf, leaving: dict[str, list[UrdfJoint]]) -> Non
         member = waiting.pop(0)
         body.members.append(member)
         for joint in leaving[member.link.name]:
+            where = f"{urdf.where}: joint {joint.name!r}"
             if joint.kind == "floating":
-                fix = "only the torso may float: make it fixed"
-                raise RobotError(
-                    "a link that floats",
-                    got=joint.child,
-                    expected="joints",
-                    fix=fix,
-                    where=f"{urdf.where}: joint {joint.name!r}",
-                )
+                what, fix = "a link that floats", "only the torso may float: make it fixed"
+                raise RobotError(what, got=joint.child, expected="joints", fix=fix, where=where)
             R, p = member.rotation @ joint.rotation, member.point(joint.position)
             if joint.kind == "fixed":
                 waiting.append(Member(urdf.links[joint.child], R, p))
             else:
-                body.branches.append(
-                    Branch(joint, R, p, member is body.members[0], Body(joint.child))
-                )
+                direct = member is body.members[0]
+                body.branches.append(Branch(joint, R, p, direct, Body(joint.child)))

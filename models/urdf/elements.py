@@ -18,14 +18,12 @@ import numpy as np
 from hexapod_cosim.models.arrays import Array
 from hexapod_cosim.models.errors import RobotError, unknown_name
 from hexapod_cosim.models.kinematics import inertia_matrix
-from hexapod_cosim.models.urdf.collision import Solid, read_solids
 from hexapod_cosim.models.urdf.values import name_of, number, numbers, origin, read_root
-from hexapod_cosim.models.validation import check_inertia
 
 EXTENSION = "hexapod"  # element of this project for data that URDF lacks
 MOVING = ("revolute", "continuous")
-KINDS = (*MOVING, "fixed", "floating", "prismatic", "planar")
-SILENT = ("link", "joint", EXTENSION, "material", "mujoco")  # all others are told to have no effect
+KINDS = (*MOVING, "fixed", "floating")
+EFFECTIVE = ("link", "joint", EXTENSION, "material", "mujoco")  # others are listed as ignored
 AXIS_TOLERANCE = 1e-6  # an axis this close to unit length is not normalised
 DAMPING = "damping"  # a side file may ignore it
 
@@ -37,34 +35,33 @@ class Inertial:
     mass: float
     com: Array  # (3,)
     inertia: Array  # (3, 3)
-    problem: RobotError | None = (
-        None  # why no body can be so; to be raised unless someone else gives the inertia
-    )
 
 
 @dataclass(frozen=True, eq=False)
-class Sphere:
-    """A collision sphere in the link's frame [m]."""
+class Solid:
+    """A collision shape in its link's frame [m]."""
 
+    kind: str  # box, cylinder, sphere, capsule
     centre: Array  # (3,)
-    radius: float
+    rotation: Array  # (3, 3) shape to link
+    half: Array  # (3,) half extents along the shape's axes
+    radius: float  # m  0 for a box
 
 
 @dataclass(frozen=True, eq=False)
 class UrdfLink:
+    """A link; meshes are not read."""
+
     name: str
     inertial: Inertial | None
-    spheres: tuple[Sphere, ...]
-    box: (
-        Array | None
-        # (3,) m    extents along the link's axes of its first collision box, else of its first
-        # visual one
-    )
-    solids: tuple[Solid, ...] = ()  # its collision shapes but meshes
+    solids: tuple[Solid, ...]
+    box: Array | None  # (3,) m  extents along the link's axes of its first collision or visual box
 
 
 @dataclass(frozen=True, eq=False)
 class UrdfJoint:
+    """A joint between two links."""
+
     name: str
     kind: str
     parent: str
@@ -82,6 +79,8 @@ class UrdfJoint:
 
 @dataclass(frozen=True, eq=False)
 class Urdf:
+    """The content of a file."""
+
     name: str
     where: str  # its file, for messages
     links: dict[str, UrdfLink]
@@ -93,61 +92,61 @@ class Urdf:
 def parse_urdf(text: str | bytes, *, where: str, ignore: tuple[str, ...] = ()) -> Urdf:
     """Reads a URDF; `ignore` may contain "damping". Raises RobotError."""
     root = read_root(text, where)
-    ignored: Counter[str] = Counter()
-    links = [
-        _link(element, f"{where}: link {name_of(element, where)!r}", ignored)
-        for element in root.findall("link")
-    ]
-    joints = [
-        _joint(element, f"{where}: joint {name_of(element, where)!r}", ignore, ignored)
-        for element in root.findall("joint")
-    ]
-    ignored.update(element.tag for element in root if element.tag not in SILENT)
-    _check_unique_names([link.name for link in links], "link", where)
-    _check_unique_names([joint.name for joint in joints], "joint", where)
-    return Urdf(
-        root.get("name") or "robot",
-        where,
-        {link.name: link for link in links},
-        tuple(joints),
-        root.find(EXTENSION),
-        ignored,
+    ignored = Counter(element.tag for element in root if element.tag not in EFFECTIVE)
+    elements = {kind: _named(root, kind, where) for kind in ("link", "joint")}
+    links = {
+        name: _link(element, f"{where}: link {name!r}", ignored)
+        for name, element in elements["link"].items()
+    }
+    joints = tuple(
+        _joint(element, f"{where}: joint {name!r}", ignore, ignored)
+        for name, element in elements["joint"].items()
     )
+    return Urdf(root.get("name") or "robot", where, links, joints, root.find(EXTENSION), ignored)
 
 
-def _check_unique_names(names: list[str], kind: str, where: str) -> None:
-    twins = [name for name, count in Counter(names).items() if count > 1]
-    if twins:
-        raise RobotError(
-            f"a {kind} twice",
-            got=twins[0],
-            expected="different names",
-            fix="rename one",
-            where=where,
-        )
+def _named(root: ET.Element, kind: str, where: str) -> dict[str, ET.Element]:
+    """Returns the elements of a kind by their names, which differ."""
+    found: dict[str, ET.Element] = {}
+    for element in root.findall(kind):
+        name = name_of(element, where)
+        if name in found:
+            fix = "rename one"
+            raise RobotError(f"a {kind} twice", got=name, expected="names", fix=fix, where=where)
+        found[name] = element
+    return found
 
 
 def _link(element: ET.Element, where: str, ignored: Counter[str]) -> UrdfLink:
-    spheres, boxes = [], []
+    solids, boxes = [], []
     for tag in ("collision", "visual"):
         for shape in element.findall(tag):
-            R, p, _ = origin(shape, f"{where}: {tag}")
-            sphere, box = shape.find("geometry/sphere"), shape.find("geometry/box")
-            ignored["mesh"] += shape.find("geometry/mesh") is not None
-            if sphere is not None and tag == "collision":
-                spheres.append(Sphere(p, number(sphere, "radius", None, f"{where}: {tag}")))
-            if box is not None:
-                boxes.append(np.abs(R) @ numbers(box, "size", None, f"{where}: {tag}"))
-    return UrdfLink(
-        element.get("name", ""),
-        _inertial(element, where),
-        tuple(spheres),
-        boxes[0] if boxes else None,
-        read_solids(element, where),
-    )
+            at = f"{where}: {tag}"
+            R, p, _ = origin(shape, at)
+            for geometry in shape.findall("geometry/*"):
+                ignored["mesh"] += geometry.tag == "mesh"
+                if geometry.tag == "box":
+                    boxes.append(np.abs(R) @ numbers(geometry, "size", None, at))
+                if tag == "collision" and geometry.tag in ("box", "cylinder", "sphere", "capsule"):
+                    solids.append(_solid(geometry, p, R, at))
+    box = boxes[0] if boxes else None
+    return UrdfLink(element.get("name", ""), _inertial(element, where), tuple(solids), box)
+
+
+def _solid(geometry: ET.Element, centre: Array, rotation: Array, where: str) -> Solid:
+    """Returns a shape; the axis of a cylinder or capsule is its z."""
+    if geometry.tag == "box":
+        return Solid("box", centre, rotation, 0.5 * numbers(geometry, "size", None, where), 0.0)
+    radius = number(geometry, "radius", None, where)
+    along = radius
+    if geometry.tag != "sphere":
+        along = 0.5 * number(geometry, "length", None, where)
+        along += radius if geometry.tag == "capsule" else 0.0
+    return Solid(geometry.tag, centre, rotation, np.array([radius, radius, along]), radius)
 
 
 def _inertial(link: ET.Element, where: str) -> Inertial | None:
+    """Returns mass and inertia, None without mass; a point mass has no moments."""
     element = link.find("inertial")
     if element is None:
         return None
@@ -157,26 +156,10 @@ def _inertial(link: ET.Element, where: str) -> Inertial | None:
         raise RobotError("negative mass", got=mass, expected=">= 0 kg", fix="correct it", where=at)
     R, p, _ = origin(element, at)
     table = element.find("inertia")
-    moments = tuple(
-        number(table, key, None if key in ("ixx", "iyy", "izz") else 0.0, at)
-        for key in ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
-    )
-    if mass == 0.0:
-        return None
-    return Inertial(
-        mass,
-        p,
-        R @ inertia_matrix(moments) @ R.T + 0.0,
-        _problem(mass, moments, at) if any(moments) else None,
-    )  # none: a point mass
-
-
-def _problem(mass: float, moments: tuple[float, ...], where: str) -> RobotError | None:
-    try:
-        check_inertia(mass, moments, math.inf, where)
-    except RobotError as error:
-        return error
-    return None
+    moments = [number(table, key, None, at) for key in ("ixx", "iyy", "izz")]
+    products = [number(table, key, 0.0, at) for key in ("ixy", "ixz", "iyz")]
+    inertia = inertia_matrix((*moments, *products))
+    return Inertial(mass, p, R @ inertia @ R.T + 0.0) if mass > 0.0 else None
 
 
 def _joint(
@@ -185,19 +168,14 @@ def _joint(
     kind = element.get("type", "")
     if kind not in KINDS:
         raise unknown_name("joint type", kind, KINDS, where=where, error=RobotError)
-    if kind in ("prismatic", "planar"):
-        raise RobotError(
-            "a joint that slides",
-            got=kind,
-            expected="revolute, continuous or fixed",
-            fix="make it fixed",
-            where=where,
-        )
     moves = kind in MOVING
-    if moves:
-        _refuse_mimic(element, where)
+    mimic = element.find("mimic")
+    if moves and mimic is not None:
+        what, got = "a joint that follows another", f"mimics {mimic.get('joint')!r}"
+        fix, expected = "remove <mimic>", "joints with motors of their own"
+        raise RobotError(what, got=got, expected=expected, fix=fix, where=where)
     R, p, angles = origin(element, where)
-    limit, lower, upper = _limits(element, kind, where, ignored)
+    limit, (lower, upper) = element.find("limit"), _limits(element, kind, where, ignored)
     return UrdfJoint(
         name=element.get("name", ""),
         kind=kind,
@@ -215,26 +193,12 @@ def _joint(
     )
 
 
-def _refuse_mimic(element: ET.Element, where: str) -> None:
-    mimic = element.find("mimic")
-    if mimic is not None:
-        got = f"mimics {mimic.get('joint')!r}"
-        raise RobotError(
-            "a joint that follows another",
-            got=got,
-            expected="joints of their own",
-            fix="remove <mimic>",
-            where=where,
-        )
-
-
 def _end(element: ET.Element, tag: str, where: str) -> str:
     end = element.find(tag)
     name = None if end is None else end.get("link")
     if not name:
-        raise RobotError(
-            f"a joint without {tag}", expected=f'<{tag} link="..."/>', fix="add it", where=where
-        )
+        example = f'<{tag} link="..."/>'
+        raise RobotError(f"a joint without {tag}", expected=example, fix="add it", where=where)
     return name
 
 
@@ -242,13 +206,8 @@ def _axis(element: ET.Element, where: str) -> Array:
     axis = numbers(element.find("axis"), "xyz", (1.0, 0.0, 0.0), where)
     length = float(np.linalg.norm(axis))
     if length == 0.0:
-        raise RobotError(
-            "an axis without direction",
-            got=axis.tolist(),
-            expected="a direction",
-            fix="correct it",
-            where=f"{where}: axis",
-        )
+        what, at = "an axis without direction", f"{where}: axis"
+        raise RobotError(what, got=axis.tolist(), expected="xyz", fix="correct it", where=at)
     return axis if abs(length - 1.0) <= AXIS_TOLERANCE else axis / length
 
 
@@ -260,28 +219,19 @@ def _optional(limit: ET.Element | None, key: str, where: str) -> float | None:
 
 def _limits(
     element: ET.Element, kind: str, where: str, ignored: Counter[str]
-) -> tuple[ET.Element | None, float, float]:
-    limit = element.find("limit")
-    if kind == "revolute" and limit is None:
-        example = '<limit lower="..." upper="..." effort="..." velocity="..."/>'
-        fix = f"add {example}, or make it continuous"
-        raise RobotError(
-            "a revolute joint without limits", expected="<limit>", fix=fix, where=where
-        )
+) -> tuple[float, float]:
+    """Returns the lower and upper limit [rad], of half a turn at most."""
     if kind != "revolute":
-        return limit, -math.pi, math.pi
+        return -math.pi, math.pi
+    limit = element.find("limit")
     lower, upper = number(limit, "lower", 0.0, where), number(limit, "upper", 0.0, where)
     if not lower < upper:
-        raise RobotError(
-            "limits not ordered",
-            got=[lower, upper],
-            expected="lower < upper [rad]",
-            fix="correct them",
-            where=f"{where}: limit",
-        )
-    if lower < -math.pi or upper > math.pi:
-        ignored["limits beyond half a turn"] += 1
-    return limit, max(lower, -math.pi), min(upper, math.pi)
+        what = "limits not ordered"
+        expected = "<limit> with lower < upper [rad]"
+        fix = "correct them, or make the joint continuous"
+        raise RobotError(what, got=[lower, upper], expected=expected, fix=fix, where=where)
+    ignored["limits beyond half a turn"] += lower < -math.pi or upper > math.pi
+    return max(lower, -math.pi), min(upper, math.pi)
 
 
 def _friction(
@@ -290,21 +240,13 @@ def _friction(
     dynamics = element.find("dynamics")
     damping = number(dynamics, "damping", 0.0, where)
     if damping != 0.0 and DAMPING not in ignore:
-        fix = (
-            'put it into servo.kd and write `ignore = ["damping"]` under [urdf] '
-            'of a robot file with file = "..."'
-        )
         raise RobotError(
             "viscous damping in a joint",
             got=damping,
             expected="0 N m s/rad",
-            fix=fix,
+            fix='put it into servo.kd and write `ignore = ["damping"]` under [urdf] of a robot '
+            'file with file = "..."',
             where=f"{where}: dynamics",
         )
     ignored[DAMPING] += damping != 0.0
     return number(dynamics, "friction", 0.0, where)
-
-
-def describe(ignored: Counter[str]) -> str:
-    """Returns a text about elements without effect, empty if there are none."""
-    return ", ".join(f"{count} {name}" for name, count in sorted(ignored.items()) if count)

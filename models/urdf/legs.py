@@ -22,9 +22,7 @@ from hexapod_cosim.models.urdf.bodies import Body, Branch
 
 Z = np.array([0.0, 0.0, 1.0])
 PATTERN = (Z, np.array([0.0, -1.0, 0.0]), np.array([0.0, 1.0, 0.0]))  # the controller's joint axes
-PATTERN_TOLERANCE = (
-    1e-3  # rad    URDFs have 1.5704 for a quarter turn; it moves a foot by a tenth of a millimetre
-)
+PATTERN_TOLERANCE = 1e-3  # rad  URDFs have 1.5704 for a quarter turn; it moves a foot by 0.1 mm
 SAME_YAW = 1e-9  # rad    then the printed one is taken
 SHORT = 1e-6  # m    no direction can be taken from a way as short
 
@@ -35,10 +33,10 @@ class FoundLeg:
 
     name: str
     table: dict[str, Any]
-    joints: tuple[str, str, str]
+    joints: tuple[str, ...]
     reversed: tuple[str, ...]  # joints counted the other way round
     radius: float | None  # m    of the foot, where the URDF states it
-    footless: RobotError | None  # the error to raise if the position of the foot is given nowhere
+    foot: Array | None  # (3,) m  its centre in the tibia's frame
     servo: tuple[Branch, Branch, Branch]
 
 
@@ -62,82 +60,31 @@ def find_legs(
 
 
 def _not_six(torso: Body, where: str) -> RobotError:
-    """Returns the exception for a torso without exactly six moving joints.
-
-    Additional joints can be made fixed; missing legs cannot be added.
-    """
-    legs = [branch.joint.name for branch in torso.branches if _is_leg(branch)]
-    others = [branch.joint.name for branch in torso.branches if not _is_leg(branch)]
+    """Returns the exception for a torso without exactly six moving joints."""
     names = ", ".join(branch.joint.name for branch in torso.branches)
-    got = f"{len(torso.branches)} moving joints on {torso.name!r}: {names}"
-    if len(legs) == len(LEG_NAMES):
-        fix = f"make joints that are no legs' fixed: {', '.join(others)}"
-        return RobotError(
-            "not six legs alone",
-            got=got,
-            expected="six legs and no other moving joints",
-            fix=fix,
-            where=where,
-        )
-    if len(torso.branches) == 1:
-        fix = (
-            f"make {torso.branches[0].joint.name!r} fixed if what it moves is the torso; "
-            "robots with six legs alone can be simulated"
-        )
-        return RobotError(
-            "not six legs on the root link",
-            got=got,
-            expected="six legs of three joints each",
-            fix=fix,
-            where=where,
-        )
-    got = f"{len(legs)} legs of three joints each, of {got}"
-    fix = (
-        "take a robot with six legs: plant, gaits and controller are a hexapod's, "
-        "and fixing or adding joints makes no other robot one"
-    )
     return RobotError(
-        "six legs only: robots with another number of legs cannot be simulated",
-        got=got,
-        expected="six",
-        fix=fix,
+        "not six legs on the root link",
+        got=f"{len(torso.branches)} moving joints on {torso.name!r}: {names}",
+        expected="six legs of three joints each and no other moving joint",
+        fix="make joints that are no legs' fixed; robots with another number of legs cannot be "
+        "simulated, because plant, gaits and controller are a hexapod's",
         where=where,
     )
 
 
-def _is_leg(branch: Branch) -> bool:
-    """Returns whether exactly three moving joints follow each other."""
-    count, branches = 1, branch.body.branches
-    while len(branches) == 1:
-        count, branches = count + 1, branches[0].body.branches
-    return not branches and count == len(JOINT_NAMES)
-
-
 def _chain(branch: Branch, where: str) -> tuple[Branch, Branch, Branch]:
+    """Returns the three joints of a leg, of which each follows the other."""
     chain = [branch]
-    while chain[-1].body.branches:
-        body = chain[-1].body
-        if len(body.branches) > 1 or len(chain) == len(JOINT_NAMES):
-            found = ", ".join(item.joint.name for item in body.branches)
-            got = f"{found} on link {body.name!r}, joint {len(chain) + 1} of the leg"
-            fix = "make the others fixed"
-            raise RobotError(
-                "a leg that is no chain of three joints",
-                got=got,
-                expected="one after the other",
-                fix=fix,
-                where=where,
-            )
-        chain.append(body.branches[0])
-    if len(chain) != len(JOINT_NAMES):
-        names, fix = [item.joint.name for item in chain], "make it fixed if it is no leg"
-        raise RobotError(
-            "a leg that is no chain of three joints",
-            got=names,
-            expected="three moving joints",
-            fix=fix,
-            where=where,
-        )
+    while len(chain[-1].body.branches) == 1 and len(chain) < len(JOINT_NAMES):
+        chain.append(chain[-1].body.branches[0])
+    rest = [item.joint.name for item in chain[-1].body.branches]
+    if len(chain) != len(JOINT_NAMES) or rest:
+        names = [item.joint.name for item in chain]
+        what = "a leg that is no chain of three joints"
+        got = f"{', '.join(names)}" + (f", then {', '.join(rest)}" if rest else "")
+        expected = "three moving joints, one after the other"
+        fix = "make the others fixed, or all of them if this is no leg"
+        raise RobotError(what, got=got, expected=expected, fix=fix, where=where)
     return (chain[0], chain[1], chain[2])
 
 
@@ -148,18 +95,13 @@ def _order(hips: Array, names: list[str], where: str) -> list[int]:
         for sign in (1.0, -1.0)
     ]
     if [len(side) for side in sides] != [3, 3]:
-        got = ", ".join(
-            f"{name} at ({x:.3g}, {y:.3g})" for name, (x, y, _) in zip(names, hips, strict=True)
-        )
-        fix = (
-            'say which way is forward: `forward = "y"` under [urdf] '
-            'of a robot file with file = "..."'
-        )
+        places = zip(names, hips, strict=True)
         raise RobotError(
             "not three hips left and three right",
-            got=got,
+            got=", ".join(f"{name} at ({x:.3g}, {y:.3g})" for name, (x, y, _) in places),
             expected="x forward, y left",
-            fix=fix,
+            fix='say which way is forward: `forward = "y"` under [urdf] of a robot file with '
+            'file = "..."',
             where=where,
         )
     return [*sides[0], *sides[1]]
@@ -195,14 +137,14 @@ def _leg(
         axis, sign = _axis(R @ branch.joint.axis, pattern if wanted is not None else None)
         other_way += [branch.joint.name] if sign < 0.0 else []
         table[joint] = _link(branch, R, tip, axis, sign, where)
-    names = (chain[0].joint.name, chain[1].joint.name, chain[2].joint.name)
+    names = tuple(branch.joint.name for branch in chain)
     return FoundLeg(
         name,
         table,
         names,
         tuple(other_way),
         radius,
-        _footless(chain[2].body, where) if foot is None else None,
+        foot,
         chain,
     )
 
@@ -250,7 +192,7 @@ def foot_of(tibia: Body) -> tuple[Array | None, float | None]:
 
     It is the outermost collision sphere, else the outermost fixed link.
     """
-    spheres = tibia.spheres
+    spheres = [solid for solid in tibia.solids if solid.kind == "sphere"]
     if spheres:
         outermost = max(spheres, key=lambda sphere: float(np.linalg.norm(sphere.centre)))
         return outermost.centre, outermost.radius
@@ -261,26 +203,13 @@ def foot_of(tibia: Body) -> tuple[Array | None, float | None]:
     return (tip, None) if np.linalg.norm(tip) > SHORT else (None, None)
 
 
-def _footless(tibia: Body, where: str) -> RobotError:
-    fix = (
-        "give it a collision sphere where it touches the ground, or a fixed link there; "
-        "or give length and offsets under [links.tibia]"
-    )
-    return RobotError(
-        "a leg without a foot", expected="a foot", fix=fix, where=f"{where}: link {tibia.name!r}"
-    )
-
-
 def _link(
     branch: Branch, R: Array, tip: Array | None, axis: Array, sign: float, where: str
 ) -> dict[str, Any]:
     """Returns a link's table, in hip axes."""
     inertial, joint = branch.body.inertial(where), branch.joint
-    place = (
-        {}
-        if tip is None
-        else {"length": float(tip[0]), "offset_y": float(tip[1]), "offset_z": float(tip[2])}
-    )
+    keys = ("length", "offset_y", "offset_z")
+    place = {} if tip is None else dict(zip(keys, tip.tolist(), strict=True))
     limits = (joint.lower, joint.upper) if sign > 0.0 else (-joint.upper, -joint.lower)
     return {
         "mass": inertial.mass,

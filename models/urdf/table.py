@@ -17,7 +17,7 @@ import numpy as np
 
 from hexapod_cosim.models.arrays import Array
 from hexapod_cosim.models.contact.law import Contact
-from hexapod_cosim.models.errors import RobotError, unknown_name
+from hexapod_cosim.models.errors import RobotError
 from hexapod_cosim.models.files import read_bytes
 from hexapod_cosim.models.friction import Friction
 from hexapod_cosim.models.ground.table import beside, patch_specs, read_keys, terrain_specs
@@ -38,13 +38,16 @@ from hexapod_cosim.models.records import (
     Torso,
 )
 from hexapod_cosim.models.schema import (
+    Choice,
     Number,
+    Text,
     Vector,
     expect_table,
     merged_tables,
     read_given,
     refuse_unknown_keys,
     specs,
+    wrong_type,
 )
 from hexapod_cosim.models.servos.presets import servo_table
 from hexapod_cosim.models.soil.presets import soil_table
@@ -56,25 +59,18 @@ from hexapod_cosim.models.urdf.assumed import (
 )
 from hexapod_cosim.models.urdf.bodies import Body, root_body
 from hexapod_cosim.models.urdf.collision import collision_body
-from hexapod_cosim.models.urdf.elements import DAMPING, Urdf, describe, parse_urdf
+from hexapod_cosim.models.urdf.elements import DAMPING, Urdf, parse_urdf
 from hexapod_cosim.models.urdf.extension import extension_tables
-from hexapod_cosim.models.urdf.legs import FoundLeg, find_legs, foot_of, inertia_entries
+from hexapod_cosim.models.urdf.legs import FoundLeg, find_legs, inertia_entries
 
 Table = dict[str, Any]
 
 JOINTS = "read: joints "  # a leg's, in source
 
-FORWARD = {
-    "x": 0.0,
-    "y": 0.5 * np.pi,
-    "-x": np.pi,
-    "-y": -0.5 * np.pi,
-}  # the torso's yaw in the root link
-SIZES = {
-    "torque_max": "effort",
-    "speed_max": "velocity",
-    "coulomb_friction": "friction",
-}  # servo's, and a joint's in the URDF
+# the torso's yaw in the root link
+FORWARD = {"x": 0.0, "y": 0.5 * np.pi, "-x": np.pi, "-y": -0.5 * np.pi}
+# keys of the servo, and of a joint in the URDF
+SIZES = {"torque_max": "effort", "speed_max": "velocity", "coulomb_friction": "friction"}
 WHOLE = ("contact", "friction", "baumgarte", "solver", "terrain")  # sections that URDF lacks
 SECTIONS: dict[str, type[Any]] = {
     "torso": Torso,
@@ -113,31 +109,12 @@ class Options:
     def read(cls, table: Mapping[str, Any], where: str) -> Options:
         """Returns the options of a table. Raises RobotError for keys and values not allowed."""
         refuse_unknown_keys(table, ["file", "forward", "ignore", "keep_frames"], where)
-        forward, ignore, keep = (
-            table.get("forward", "x"),
-            table.get("ignore", []),
-            table.get("keep_frames", False),
-        )
-        if forward not in FORWARD:
-            raise unknown_name(
-                "direction", str(forward), FORWARD, where=f"{where}.forward", error=RobotError
-            )
+        forward = Choice(tuple(FORWARD)).read(table.get("forward", "x"), f"{where}.forward")
+        ignore, keep = table.get("ignore", []), table.get("keep_frames", False)
         if not isinstance(ignore, list) or any(name != DAMPING for name in ignore):
-            raise RobotError(
-                "cannot be ignored",
-                got=ignore,
-                expected=f'["{DAMPING}"]',
-                fix="correct it",
-                where=f"{where}.ignore",
-            )
+            raise wrong_type(ignore, f'["{DAMPING}"]', "correct it", f"{where}.ignore")
         if not isinstance(keep, bool):
-            raise RobotError(
-                "wrong type",
-                got=keep,
-                expected="true or false",
-                fix="correct it",
-                where=f"{where}.keep_frames",
-            )
+            raise wrong_type(keep, "true or false", "correct it", f"{where}.keep_frames")
         return cls(forward, tuple(ignore), keep)
 
 
@@ -147,19 +124,10 @@ def side_table(side: Mapping[str, Any], folder: Path, where: str) -> Table:
     Raises RobotError.
     """
     given = expect_table(side["urdf"], f"{where}: urdf")
-    file = given.get("file")
-    if not isinstance(file, str) or not file:
-        raise RobotError(
-            "no URDF named",
-            got=file,
-            expected="a path",
-            fix='write file = "my.urdf"',
-            where=f"{where}: urdf.file",
-        )
+    file = Text().read(given.get("file"), f"{where}: urdf.file")
     rest = {key: value for key, value in side.items() if key != "urdf"}
-    return urdf_table(
-        folder / file, side=rest, options=Options.read(given, f"{where}: urdf"), where=where
-    )
+    options = Options.read(given, f"{where}: urdf")
+    return urdf_table(folder / file, side=rest, options=options, where=where)
 
 
 def urdf_table(
@@ -185,12 +153,10 @@ def urdf_table(
     root = root_body(urdf)
     torso, body, legs = _found(root, urdf, options.forward, keep_frames=keep)
     above = merged_tables(_shaped(own), _spread(side, where or str(path)))
-    _refuse_impossible(root, legs, above)
-    _refuse_footless(legs, above)
     table = merged_tables(merged_tables(_assumed(), _measured(urdf, torso, body, legs)), above)
-    assumed = [name for name in WHOLE if name not in own and name not in side] + _complete(
-        table, legs, urdf
-    )
+    _refuse_footless(legs, table, urdf.where)
+    assumed = [name for name in WHOLE if name not in own and name not in side]
+    assumed += _complete(table, legs, urdf)
     table["source"] = _source(urdf, legs, assumed, body) | dict(side.get("source", {}))
     return table
 
@@ -204,12 +170,8 @@ def _read(path: Path) -> bytes:
     try:
         return read_bytes(path)
     except OSError as error:
-        raise RobotError(
-            "cannot read the URDF",
-            got=error.strerror,
-            fix="give the path of a URDF",
-            where=str(path),
-        ) from error
+        what, fix = "cannot read the URDF", "give the path of a URDF"
+        raise RobotError(what, got=error.strerror, fix=fix, where=str(path)) from error
 
 
 def _assumed() -> Table:
@@ -228,10 +190,8 @@ def _found(
     heaviest = max(
         root.members, key=lambda member: member.link.inertial.mass if member.link.inertial else 0.0
     )
-    origin, axes = (
-        heaviest.position,
-        np.round(axis_rotation(np.array([0.0, 0.0, 1.0]), FORWARD[forward])) + 0.0,
-    )
+    origin = heaviest.position
+    axes = np.round(axis_rotation(np.array([0.0, 0.0, 1.0]), FORWARD[forward])) + 0.0
     torso = {
         "mass": inertial.mass,
         "com": (axes.T @ (inertial.com - origin) + 0.0).tolist(),
@@ -239,45 +199,23 @@ def _found(
     }
     torso["size"] = _box(root, axes, torso) or equivalent_box(torso["mass"], torso["inertia"])
     legs = find_legs(root, origin, axes, keep_frames=keep_frames, where=urdf.where)
-    limbs = []
-    for leg in legs:
-        foot, _ = foot_of(leg.servo[2].body)
-        if foot is not None:
-            limbs.append((leg.servo[1].body, leg.servo[2].body, foot))
+    limbs = [
+        (leg.servo[1].body, leg.servo[2].body, leg.foot) for leg in legs if leg.foot is not None
+    ]
     return torso, collision_body(root, origin, axes, limbs), legs
 
 
-def _refuse_impossible(torso: Body, legs: list[FoundLeg], above: Table) -> None:
-    """Raises RobotError for the first body whose impossible inertia is not replaced."""
-    bodies = [("[torso]", torso, above.get("torso", {}))]
+def _refuse_footless(legs: list[FoundLeg], table: Table, where: str) -> None:
+    """Raises RobotError for a leg of which no file gives the foot."""
     for leg in legs:
-        given = above.get("legs", {}).get(leg.name, {})
-        bodies += [
-            (f"[links.{joint}]", branch.body, given.get(joint, {}))
-            for joint, branch in zip(JOINT_NAMES, leg.servo, strict=True)
-        ]
-    for section, body, given in bodies:
-        problem = None if "inertia" in given else body.problem
-        if problem is not None:
-            fix = (
-                f"{problem.fix}; or give the right one, `inertia = [...]` under {section} "
-                "of a robot file with [urdf] file"
-            )
+        if "length" not in table["legs"][leg.name]["tibia"]:
             raise RobotError(
-                problem.what,
-                got=problem.got,
-                expected=problem.expected,
-                fix=fix,
-                where=problem.where,
+                "a leg without a foot",
+                expected="a foot",
+                fix="give it a collision sphere where it touches the ground, or a fixed link "
+                "there; or give length and offsets under [links.tibia]",
+                where=f"{where}: link {leg.servo[2].body.name!r}",
             )
-
-
-def _refuse_footless(legs: list[FoundLeg], above: Table) -> None:
-    for leg in legs:
-        if leg.footless is not None and "length" not in above.get("legs", {}).get(leg.name, {}).get(
-            "tibia", {}
-        ):
-            raise leg.footless
 
 
 def _box(root: Body, axes: Array, torso: Table) -> list[float] | None:
@@ -340,37 +278,27 @@ def _spread(side: Mapping[str, Any], where: str) -> Table:
 def _check_side(side: Mapping[str, Any], where: str) -> None:
     """Raises RobotError for keys and types that are invalid in a robot file."""
     refuse_unknown_keys(side, ["name", "gravity", "source", "links", "legs", *SECTIONS], where)
+    readers = {"soil": soil_table, "servo": servo_table}
     for name, record in SECTIONS.items():
         at, value = f"{where}: {name}", side.get(name, {})
         if name == "terrain":
-            read_keys(expect_table(value, at), at)
-            continue
-        readers = {Soil: soil_table, Servo: servo_table}
-        section = readers.get(record, expect_table)(value, at)
-        read_given(record, section, at)
-    legs = expect_table(side.get("legs", {}), f"{where}: legs")
-    refuse_unknown_keys(legs, list(LEG_NAMES), f"{where}: legs")
+            read_keys(value, at)
+        else:
+            read_given(record, readers.get(name, expect_table)(value, at), at)
+    at = f"{where}: legs"
+    legs = expect_table(side.get("legs", {}), at)
+    refuse_unknown_keys(legs, LEG_NAMES, at)
     for name, leg in legs.items():
-        read_given(
-            Leg,
-            expect_table(leg, f"{where}: legs.{name}"),
-            f"{where}: legs.{name}",
-            extra=JOINT_NAMES,
-        )
-        _check_links(
-            {key: value for key, value in leg.items() if key in JOINT_NAMES},
-            f"{where}: legs.{name}",
-        )
+        read_given(Leg, leg, f"{at}.{name}", extra=JOINT_NAMES)
+        _check_links({key: leg[key] for key in JOINT_NAMES if key in leg}, f"{at}.{name}")
     _check_links(expect_table(side.get("links", {}), f"{where}: links"), f"{where}: links")
     expect_table(side.get("source", {}), f"{where}: source")
 
 
 def _check_links(links: Mapping[str, Any], where: str) -> None:
-    refuse_unknown_keys(links, list(JOINT_NAMES), where)
+    refuse_unknown_keys(links, JOINT_NAMES, where)
     for joint, link in links.items():
-        read_given(
-            Link, expect_table(link, f"{where}.{joint}"), f"{where}.{joint}", extra=("stance",)
-        )
+        read_given(Link, link, f"{where}.{joint}", extra=("stance",))
         Number("rad").read(link.get("stance", 0.0), f"{where}.{joint}.stance")
 
 
@@ -386,33 +314,29 @@ def _complete(table: Table, legs: list[FoundLeg], urdf: Urdf) -> list[str]:
 
 def _unify(table: Table, legs: list[FoundLeg], urdf: Urdf) -> None:
     """Replaces lists of one number per joint or foot by a single number, in place."""
-    names = [name for leg in legs for name in leg.joints]
-    for section, keys, owners in (
-        ("servo", SIZES, names),
-        ("foot", {"radius": "radius"}, [leg.joints[2] for leg in legs]),
-    ):
-        for key, name in keys.items():
-            values = table[section].get(key)
-            if isinstance(values, list) and len(values) == len(owners):
-                table[section][key] = _same(values, owners, f"{section}.{key}", name, urdf.where)
+    joints = [name for leg in legs for name in leg.joints]
+    for key, name in SIZES.items():
+        _unify_one(table, f"servo.{key}", joints, name, urdf.where)
+    _unify_one(table, "foot.radius", [leg.joints[2] for leg in legs], "radius", urdf.where)
 
 
-def _same(values: list[float | None], owners: list[str], key: str, name: str, where: str) -> float:
-    first = values[0]
-    odd = next((k for k, value in enumerate(values) if value is None or value != first), None)
-    if odd is None and first is not None:
-        return first
-    odd = odd or 0
-    at, fix = (
-        f"{where}: joint {owners[odd]!r}",
-        f"give {key} for all in a robot file with [urdf] file",
-    )
-    if values[odd] is None:
-        raise RobotError(f"no {name}", expected=f"what {key} is", fix=fix, where=at)
-    expected = (
-        f"{first!r} as at {owners[0]!r}: all joints have the same servo, all feet the same radius"
-    )
-    raise RobotError(f"another {name}", got=values[odd], expected=expected, fix=fix, where=at)
+def _unify_one(table: Table, key: str, owners: list[str], name: str, where: str) -> None:
+    """Replaces a list of equal numbers; side files give one number. Raises RobotError."""
+    section, _, last = key.partition(".")
+    values = table[section].get(last)
+    if not isinstance(values, list):
+        return
+    odd = next((k for k, value in enumerate(values) if value is None or value != values[0]), 0)
+    if values[odd] is None or values[odd] != values[0]:
+        raise RobotError(
+            f"no {name}" if values[odd] is None else f"another {name}",
+            got=values[odd],
+            expected=f"{values[0]!r} as at {owners[0]!r}: all joints have the same servo, all feet "
+            "the same radius",
+            fix=f"give {key} for all in a robot file with [urdf] file",
+            where=f"{where}: joint {owners[odd]!r}",
+        )
+    table[section][last] = values[0]
 
 
 def _height(table: Table) -> float:
@@ -422,15 +346,12 @@ def _height(table: Table) -> float:
 
 
 def _drop(leg: Table) -> float:
+    """Returns how far a foot is below its hip in the standing pose [m]."""
     R, z = np.eye(3), 0.0
     for joint in JOINT_NAMES:
         link = leg[joint]
         R = R @ axis_rotation(np.array(link["axis"]), link["stance"])
-        z -= float(
-            (R @ np.array([link["length"], link.get("offset_y", 0.0), link.get("offset_z", 0.0)]))[
-                2
-            ]
-        )
+        z -= float(R[2] @ [link["length"], link.get("offset_y", 0.0), link.get("offset_z", 0.0)])
     return max(z, 1e-3)
 
 
@@ -446,7 +367,8 @@ def _source(urdf: Urdf, legs: list[FoundLeg], assumed: list[str], body: Table) -
         source["URDF, body"] = (
             "from collision shapes: the torso's box encloses them, all legs have the largest radii"
         )
-    ignored = describe(urdf.ignored)
+    counts = [f"{count} {name}" for name, count in sorted(urdf.ignored.items()) if count]
+    ignored = ", ".join(counts)
     return source | (
         {"URDF, ignored": f"in the URDF, without effect here: {ignored}"} if ignored else {}
     )

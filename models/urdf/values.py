@@ -18,12 +18,7 @@ class _Builder(ET.TreeBuilder):
     """Rejects document types, and with them external or expanding entities."""
 
     def doctype(self, name: str, pubid: str | None, system: str | None) -> None:
-        raise RobotError(
-            "a document type in a URDF",
-            got=f"<!DOCTYPE {name}>",
-            expected="plain XML without entities",
-            fix="remove it",
-        )
+        raise ValueError(f"a document type, <!DOCTYPE {name}>")
 
 
 def read_root(text: str | bytes, where: str) -> ET.Element:
@@ -31,28 +26,16 @@ def read_root(text: str | bytes, where: str) -> ET.Element:
     try:
         root = ET.fromstring(text, parser=ET.XMLParser(target=_Builder()))
     except (ET.ParseError, ValueError, LookupError) as error:  # LookupError: an unknown encoding
+        fix = "correct that place"
         raise RobotError(
-            "not XML", got=str(error), expected="a URDF", fix="correct that place", where=where
-        ) from error
-    except RobotError as error:
-        raise RobotError(
-            error.what, got=error.got, expected=error.expected, fix=error.fix, where=where
+            "not XML", got=str(error), expected="a URDF", fix=fix, where=where
         ) from error
     if any("xacro" in element.tag for element in root.iter()):
-        raise RobotError(
-            "xacro macros",
-            expected="a URDF",
-            fix="expand them first: xacro my.urdf.xacro > my.urdf",
-            where=where,
-        )
+        fix = "expand them first: xacro my.urdf.xacro > my.urdf"
+        raise RobotError("xacro macros", expected="a URDF", fix=fix, where=where)
     if root.tag != "robot":
-        raise RobotError(
-            "no URDF",
-            got=f"<{root.tag}>",
-            expected="<robot>",
-            fix="give a URDF of a six-legged robot",
-            where=where,
-        )
+        got, fix = f"<{root.tag}>", "give a URDF of a six-legged robot"
+        raise RobotError("no URDF", got=got, expected="<robot>", fix=fix, where=where)
     return root
 
 
@@ -60,9 +43,8 @@ def name_of(element: ET.Element, where: str) -> str:
     """Returns the element's required name."""
     name = element.get("name")
     if not name:
-        raise RobotError(
-            f"a {element.tag} without a name", expected="name=...", fix="name it", where=where
-        )
+        what = f"a {element.tag} without a name"
+        raise RobotError(what, expected="name=...", fix="name it", where=where)
     return name
 
 
@@ -86,10 +68,9 @@ def numbers(
         values = np.full(1, math.nan)
     if len(values) != count or not np.isfinite(values).all():
         expected = "a finite number" if count == 1 else f"{count} finite numbers"
+        what, fix = f"no good {key}", f"correct {key}"
         at = f"{where}: {element.tag}" if element is not None else where
-        raise RobotError(
-            f"no good {key}", got=text, expected=expected, fix=f"correct {key}", where=at
-        )
+        raise RobotError(what, got=text, expected=expected, fix=fix, where=at)
     return values
 
 
@@ -118,17 +99,10 @@ def _cos_sin(angle: float) -> tuple[float, float]:
     return math.cos(angle), math.sin(angle)
 
 
-def _angles(element: ET.Element | None, where: str) -> list[float]:
-    """Returns roll, pitch, yaw.
-
-    Numbers that equal a quarter turn to all their printed digits (1.57, 3.1416) become exact.
-    """
-    values = numbers(element, "rpy", (0.0, 0.0, 0.0), where)
-    words = (element.get("rpy", "0 0 0") if element is not None else "0 0 0").split()
-    return [_quarter_turn(value, word) for value, word in zip(values.tolist(), words, strict=True)]
-
-
 def _quarter_turn(value: float, word: str) -> float:
+    """Returns an angle; one that equals a quarter turn to all its printed digits (1.57, 3.1416)
+    becomes exact.
+    """
     digits, quarters = DECIMALS.fullmatch(word), round(value / (0.5 * math.pi))
     exact = quarters * 0.5 * math.pi
     if digits is None or quarters == 0:
@@ -142,11 +116,9 @@ def origin(element: ET.Element, where: str) -> tuple[Array, Array, list[float]]:
     """Returns rotation (3, 3), position (3,) [m] and roll, pitch, yaw [rad] of the element."""
     origin = element.find("origin")
     if origin is not None and origin.get("quat_xyzw"):
-        raise RobotError(
-            "a quaternion as origin",
-            expected="rpy",
-            fix="write it as roll, pitch and yaw",
-            where=where,
-        )
-    angles = _angles(origin, where)
+        what, fix = "a quaternion as origin", "write it as roll, pitch and yaw"
+        raise RobotError(what, got="quat_xyzw", expected="rpy", fix=fix, where=where)
+    given = numbers(origin, "rpy", (0.0, 0.0, 0.0), where).tolist()
+    words = (origin.get("rpy", "0 0 0") if origin is not None else "0 0 0").split()
+    angles = [_quarter_turn(value, word) for value, word in zip(given, words, strict=True)]
     return rpy_matrix(*angles), numbers(origin, "xyz", (0.0, 0.0, 0.0), where), angles

@@ -21,13 +21,10 @@ def check_terrain(robot: Robot, where: str) -> None:
     if terrain.kind != "grid":
         return
     if terrain.surface is None:
-        raise RobotError(
-            "no surface",
-            got=None,
-            expected="a surface of the ground",
-            fix='give Terrain(kind="grid", surface=...)',
-            where=where + ".surface",
-        )
+        what = "no surface"
+        expected = "a surface of the ground"
+        fix = 'give Terrain(kind="grid", surface=...)'
+        raise RobotError(what, got=None, expected=expected, fix=fix, where=where + ".surface")
     check_contact_surface(robot, terrain.surface, where)
 
 
@@ -42,13 +39,10 @@ def check_contact_surface(robot: Robot, surface: Surface, where: str) -> None:
     name, radius = _largest_sphere(robot)
     part = "foot" if name == "foot.radius" else "part"
     if surface.kind == "blocks" and surface.cell < 2.0 * radius:
-        raise RobotError(
-            f"blocks narrower than a {part}",
-            got=f"{surface.cell:.4g} m",
-            expected=f"at least twice {name}, {2.0 * radius:g} m",
-            fix=f"enlarge terrain.horizontal_scale, or reduce {name}",
-            where=where,
-        )
+        what = f"blocks narrower than a {part}"
+        expected = f"at least twice {name}, {2.0 * radius:g} m"
+        fix = f"enlarge terrain.horizontal_scale, or reduce {name}"
+        raise RobotError(what, got=f"{surface.cell:.4g} m", expected=expected, fix=fix, where=where)
     limit = VALLEY_MARGIN * radius
     valley = tightest_valley(surface, limit)
     if valley is None:
@@ -82,19 +76,15 @@ def check_soil(robot: Robot, at: str) -> None:
         "mud": soil.yield_pressure + soil.hardening,
     }
     if soil.law != "none" and strength[soil.law] <= 0.0:
-        raise RobotError(
-            "soil that bears no load",
-            got=strength[soil.law],
-            expected=f"numbers of the {soil.law} law above 0",
-            fix="give the law's numbers, or a soil of `hexapod list soils`",
-            where=at + "soil",
-        )
+        what = "soil that bears no load"
+        got = strength[soil.law]
+        expected = f"numbers of the {soil.law} law above 0"
+        fix = "give the law's numbers, or a soil of `hexapod list soils`"
+        raise RobotError(what, got=got, expected=expected, fix=fix, where=at + "soil")
     steepest = {"granular": strength["granular"], "mud": soil.hardening}.get(soil.law, 0.0)
     if steepest >= soil.stiffness:
-        raise RobotError(
-            "soil whose unloading is no steeper than its loading",
-            got=soil.stiffness,
-            expected=f"a stiffness above {steepest:g} Pa/m, the growth of pressure with depth",
-            fix="raise soil.stiffness",
-            where=at + "soil.stiffness",
-        )
+        what = "soil whose unloading is no steeper than its loading"
+        got = soil.stiffness
+        expected = f"a stiffness above {steepest:g} Pa/m, the growth of pressure with depth"
+        fix = "raise soil.stiffness"
+        raise RobotError(what, got=got, expected=expected, fix=fix, where=at + "soil.stiffness")

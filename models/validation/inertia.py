@@ -23,41 +23,25 @@ def check_inertia(mass: float, inertia: tuple[float, ...], extent: float, where:
     shown = [float(f"{moment:.4g}") for moment in moments]
     fix = "check units (kg m2), the reference point (centre of mass) and the signs of the products"
     if moments[0] <= 0.0:
-        raise RobotError(
-            "inertia not positive definite",
-            got=shown,
-            expected="principal moments > 0",
-            fix=fix,
-            where=where + ".inertia",
-        )
+        what = "inertia not positive definite"
+        expected = "principal moments > 0"
+        raise RobotError(what, got=shown, expected=expected, fix=fix, where=where + ".inertia")
     if moments[0] + moments[1] < (1.0 - INERTIA_ROUNDING) * moments[2]:
         expected = "principal moments of which no one exceeds the sum of the others"
-        raise RobotError(
-            "inertia of no possible body",
-            got=shown,
-            expected=expected,
-            fix=fix,
-            where=where + ".inertia",
-        )
+        what = "inertia of no possible body"
+        raise RobotError(what, got=shown, expected=expected, fix=fix, where=where + ".inertia")
     radius = math.sqrt(float(moments.sum()) / (2.0 * mass))
     if radius > extent:
         expected = f"a radius of gyration of at most {extent:.3g} m for matter of this extent"
-        raise RobotError(
-            "inertia too large for the mass",
-            got=f"{radius:.3g} m",
-            expected=expected,
-            fix=fix,
-            where=where + ".inertia",
-        )
+        what = "inertia too large for the mass"
+        got = f"{radius:.3g} m"
+        raise RobotError(what, got=got, expected=expected, fix=fix, where=where + ".inertia")
 
 
 def check_com(com: tuple[float, ...], extent: float, where: str) -> None:
     """Raises RobotError for a centre of mass further than `extent` [m] from its frame."""
     if math.hypot(*com) > extent:
-        raise RobotError(
-            "centre of mass outside the body",
-            got=com,
-            expected=f"within {extent:.3g} m of the frame",
-            fix="check the unit (m)",
-            where=where + ".com",
-        )
+        what = "centre of mass outside the body"
+        expected = f"within {extent:.3g} m of the frame"
+        fix = "check the unit (m)"
+        raise RobotError(what, got=com, expected=expected, fix=fix, where=where + ".com")

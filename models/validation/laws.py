@@ -24,13 +24,11 @@ def check_laws(robot: Robot, at: str) -> None:
             where=at + "contact.restitution",
         )
     if solver.method == "rk4" and solver.step <= 0.0:
-        raise RobotError(
-            "rk4 has no error control",
-            got=solver.step,
-            expected="a fixed step > 0 s",
-            fix="set solver.step",
-            where=at + "solver.step",
-        )
+        what = "rk4 has no error control"
+        got = solver.step
+        expected = "a fixed step > 0 s"
+        fix = "set solver.step"
+        raise RobotError(what, got=got, expected=expected, fix=fix, where=at + "solver.step")
     check_soil(robot, at)
     check_servo(robot.servo, at)
     check_static_friction(robot.friction, at + "friction.mu_static")
@@ -47,22 +45,16 @@ def check_static_friction(friction: Friction, where: str) -> None:
     if static in (0.0, mu):
         return
     if static < mu:
-        raise RobotError(
-            "static friction below kinetic",
-            got=static,
-            expected=f"at least mu = {mu:g}",
-            fix="raise it or leave it out",
-            where=where,
-        )
+        what = "static friction below kinetic"
+        fix = "raise it or leave it out"
+        raise RobotError(what, got=static, expected=f"at least mu = {mu:g}", fix=fix, where=where)
     if friction.law not in STATIC_LAWS:
         laws = " or ".join(STATIC_LAWS)
-        raise RobotError(
-            "static friction that has no effect",
-            got=f"{static:g} with the law {friction.law}",
-            expected=f"friction.law = {laws}" if laws else f"mu = {mu:g}: no law uses another",
-            fix="leave it out" + (f", or choose the law {laws}" if laws else ""),
-            where=where,
-        )
+        what = "static friction that has no effect"
+        got = f"{static:g} with the law {friction.law}"
+        expected = f"friction.law = {laws}" if laws else f"mu = {mu:g}: no law uses another"
+        fix = "leave it out" + (f", or choose the law {laws}" if laws else "")
+        raise RobotError(what, got=got, expected=expected, fix=fix, where=where)
 
 
 def check_body_contact(body: BodyContact, where: str) -> None:
@@ -71,26 +63,20 @@ def check_body_contact(body: BodyContact, where: str) -> None:
     Raises RobotError.
     """
     if min(body.torso_box) < 0.0:
-        raise RobotError(
-            "a box with negative edges",
-            got=list(body.torso_box),
-            expected="half edges >= 0 m",
-            fix="correct them; all 0: the torso touches nothing",
-            where=where + ".torso_box",
-        )
+        what = "a box with negative edges"
+        expected = "half edges >= 0 m"
+        fix = "correct them; all 0: the torso touches nothing"
+        edges, at = list(body.torso_box), where + ".torso_box"
+        raise RobotError(what, got=edges, expected=expected, fix=fix, where=at)
     if body.contact == "on" and not any((*body.torso_box, body.knee_radius, body.shank_radius)):
-        raise RobotError(
-            "body contact without a body",
-            got="torso_box, knee_radius and shank_radius of 0",
-            expected="at least one of them > 0 m",
-            fix="give the robot's sizes, or leave body.contact off",
-            where=where + ".contact",
-        )
+        what = "body contact without a body"
+        got = "torso_box, knee_radius and shank_radius of 0"
+        expected = "at least one of them > 0 m"
+        fix = "give the robot's sizes, or leave body.contact off"
+        raise RobotError(what, got=got, expected=expected, fix=fix, where=where + ".contact")
     if body.self_contact == "force" and not any((body.knee_radius, body.shank_radius)):
-        raise RobotError(
-            "forces between legs without a radius",
-            got="knee_radius and shank_radius of 0",
-            expected="at least one of them > 0 m: they are those of femurs and tibias",
-            fix="give the robot's radii, or set body.self_contact to off or warn",
-            where=where + ".self_contact",
-        )
+        what = "forces between legs without a radius"
+        got = "knee_radius and shank_radius of 0"
+        expected = "at least one of them > 0 m: they are those of femurs and tibias"
+        fix = "give the robot's radii, or set body.self_contact to off or warn"
+        raise RobotError(what, got=got, expected=expected, fix=fix, where=where + ".self_contact")

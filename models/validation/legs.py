@@ -43,32 +43,23 @@ def _check_link(link: Link, where: str) -> None:
     check_record(link, where)
     extent = math.hypot(*link.tip)
     if extent <= 0.0:
-        raise RobotError(
-            "link without extent",
-            got=link.tip,
-            expected="a tip away from the joint",
-            fix="give a length",
-            where=where + ".length",
-        )
+        what = "link without extent"
+        expected = "a tip away from the joint"
+        fix = "give a length"
+        raise RobotError(what, got=link.tip, expected=expected, fix=fix, where=where + ".length")
     check_inertia(link.mass, link.inertia, GYRATION_PER_EXTENT * extent, where)
     check_com(link.com, GYRATION_PER_EXTENT * extent, where)
     if abs(math.hypot(*link.axis) - 1.0) > AXIS_TOLERANCE:
-        raise RobotError(
-            "axis not of unit length",
-            got=link.axis,
-            expected="a unit vector",
-            fix="normalise it",
-            where=where + ".axis",
-        )
+        what = "axis not of unit length"
+        expected = "a unit vector"
+        fix = "normalise it"
+        raise RobotError(what, got=link.axis, expected=expected, fix=fix, where=where + ".axis")
     if link.angle_min >= link.angle_max:
         got = [link.angle_min, link.angle_max]
-        raise RobotError(
-            "limits not ordered",
-            got=got,
-            expected="angle_min < angle_max",
-            fix="swap or correct them (rad)",
-            where=where + ".angle_min",
-        )
+        what = "limits not ordered"
+        expected = "angle_min < angle_max"
+        fix = "swap or correct them (rad)"
+        raise RobotError(what, got=got, expected=expected, fix=fix, where=where + ".angle_min")
 
 
 def check_rotors(robot: Robot, at: str) -> None:
@@ -107,21 +98,15 @@ def check_stance(robot: Robot, at: str) -> None:
     where = f"{at}legs.{LEG_NAMES[worst]}.stance"
     if abs(distance[worst]) > STANCE_PLANE_TOLERANCE:
         got = f"{distance[worst]:.4g} m off the plane of the other feet"
-        raise RobotError(
-            "a stance foot does not reach the ground",
-            got=got,
-            expected=f"at most {STANCE_PLANE_TOLERANCE} m",
-            fix="adapt this leg's stance",
-            where=where,
-        )
+        what = "a stance foot does not reach the ground"
+        expected = f"at most {STANCE_PLANE_TOLERANCE} m"
+        fix = "adapt this leg's stance"
+        raise RobotError(what, got=got, expected=expected, fix=fix, where=where)
     if slope > 0.5:
-        raise RobotError(
-            "the stance feet do not lie below the torso",
-            got=f"slope {slope:.3g}",
-            expected="at most 0.5",
-            fix="adapt the stance",
-            where=at + "legs",
-        )
+        what = "the stance feet do not lie below the torso"
+        got = f"slope {slope:.3g}"
+        fix = "adapt the stance"
+        raise RobotError(what, got=got, expected="at most 0.5", fix=fix, where=at + "legs")
     hips = np.array([leg.hip_position for leg in robot.legs])
     high = int(np.argmax(feet[:, 2] - hips[:, 2]))
     if feet[high, 2] - robot.foot.radius >= hips[high, 2]:

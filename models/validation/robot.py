@@ -36,13 +36,9 @@ def check_robot(robot: Robot, *, where: str | None = None) -> None:
     check_com(robot.torso.com, math.hypot(*robot.torso.size), at + "torso")
     if tuple(leg.name for leg in robot.legs) != LEG_NAMES:
         expected = "legs " + " ".join(LEG_NAMES)
-        raise RobotError(
-            "wrong legs",
-            got=[leg.name for leg in robot.legs],
-            expected=expected,
-            fix="give these six in this order",
-            where=at + "legs",
-        )
+        got = [leg.name for leg in robot.legs]
+        fix = "give these six in this order"
+        raise RobotError("wrong legs", got=got, expected=expected, fix=fix, where=at + "legs")
     for leg in robot.legs:
         check_leg(leg, f"{at}legs.{leg.name}")
     check_rotors(robot, at)

@@ -43,13 +43,11 @@ def _check_motor(servo: Servo, at: str) -> None:
         )
     for key in ("voltage", "torque_constant", "resistance"):
         if motor and not getattr(servo, key) > 0.0:
-            raise RobotError(
-                "a motor without its constants",
-                got=getattr(servo, key),
-                expected="a number > 0 with the drive motor",
-                fix=f"give servo.{key}, or a servo of `hexapod list servos` as servo.model",
-                where=at + f"servo.{key}",
-            )
+            what = "a motor without its constants"
+            got = getattr(servo, key)
+            expected = "a number > 0 with the drive motor"
+            fix = f"give servo.{key}, or a servo of `hexapod list servos` as servo.model"
+            raise RobotError(what, got=got, expected=expected, fix=fix, where=at + f"servo.{key}")
 
 
 def _check_gear(servo: Servo, at: str) -> None:

@@ -13,11 +13,10 @@ from command import COMMAND
 
 from hexapod_cosim.cosim.cli import main
 from hexapod_cosim.cosim.scenario.bundled import list_scenarios
-from hexapod_cosim.cosim.scenario.scenario import load_scenario
-from hexapod_cosim.models import HexapodError, list_robots
+from hexapod_cosim.models import list_robots
 
 Ask = Callable[..., list[str]]
-SLOW = {"scipy", "control", "matplotlib", "pyarrow", "mujoco", "pinocchio"}
+SLOW = {"numpy", "scipy", "control", "matplotlib", "pyarrow", "mujoco", "pinocchio"}
 SHELLS = {"bash": ".bashrc", "zsh": ".zshrc", "fish": ".config/fish/completions/hexapod.fish"}
 
 
@@ -66,23 +65,6 @@ def test_keys_of_set_are_those_of_the_scenario_and_of_the_fmu(offered: Ask) -> N
     assert offered("design", "--set", "phase") == ["phase_margin="]
 
 
-@pytest.mark.parametrize("typed", ["gait", "command.", "sensors.", "torso.ma", "solver.s"])
-def test_a_key_that_is_offered_is_a_key(offered: Ask, typed: str) -> None:
-    """The key must be known; the value 1 may be refused."""
-    keys = offered("simulate", "--set", typed)
-    assert keys
-    assert not any("unknown" in refusal(f"{key}1") for key in keys)
-
-
-def refusal(setting: str) -> str:
-    """Returns why a setting is refused, "" when it is not."""
-    try:
-        load_scenario("walk_flat", overrides=[setting])
-    except HexapodError as error:
-        return str(error)
-    return ""
-
-
 def ask_shell(shell: str, typed: str) -> list[str]:
     environment = os.environ | {
         "_HEXAPOD_COMPLETE": f"complete_{shell}",
@@ -122,12 +104,20 @@ def test_completion_is_installed_for_every_shell(tmp_path: Path, shell: str, fil
     )
 
 
-def test_completion_imports_nothing_slow() -> None:
+@pytest.mark.parametrize("words", ["hexapod --help", "hexapod sim", "hexapod simulate --se"])
+def test_help_and_completion_import_nothing_slow(words: str) -> None:
+    """Not even NumPy: a command imports what it needs when it is called."""
     script = (
-        "import sys, hexapod_cosim.cosim.cli.app; "
-        "print(*{name.partition('.')[0] for name in sys.modules})"
+        "import sys; from hexapod_cosim.cosim.cli import main; main(['--help'] if 'help' in "
+        f"'{words}' else []); print(*(name.partition('.')[0] for name in sys.modules))"
     )
-    done = subprocess.run(
-        [sys.executable, "-c", script], capture_output=True, text=True, check=True
-    )
+    environment = dict(os.environ)
+    if "help" not in words:
+        environment |= {
+            "COMP_WORDS": words,
+            "COMP_CWORD": str(len(words.split()) - 1),
+            "_HEXAPOD_COMPLETE": "complete_bash",
+        }
+    command = [sys.executable, "-c", script]
+    done = subprocess.run(command, capture_output=True, text=True, check=True, env=environment)
     assert not SLOW & set(done.stdout.split())

@@ -26,10 +26,3 @@ def test_a_folder_with_files_is_refused_and_left_alone(call: Call, tmp_path: Pat
     assert code == 1
     assert "a new or an empty folder" in err
     assert [path.name for path in tmp_path.iterdir()] == ["mine.txt"]
-
-
-def test_a_file_in_the_place_of_the_folder_is_refused(call: Call, tmp_path: Path) -> None:
-    (tmp_path / "file").write_text("mine", encoding="utf-8")
-    code, _, err = call("examples", "-o", tmp_path / "file")
-    assert code == 1
-    assert "choose another one with -o" in err

@@ -34,14 +34,6 @@ def test_a_surface_is_drawn(call: Call, tmp_path: Path, suffix: str) -> None:
     assert path.stat().st_size > 1000
 
 
-def test_equal_surfaces_give_equal_pictures(call: Call, tmp_path: Path) -> None:
-    contents = []
-    for name in ("a.png", "b.png"):
-        assert call("terrain", "wave", "-o", tmp_path / name)[0] == 0
-        contents.append((tmp_path / name).read_bytes())
-    assert contents[0] == contents[1]
-
-
 def test_written_heights_give_the_surface_back(call: Call, tmp_path: Path) -> None:
     path = tmp_path / "heights.png"
     code, out, _ = call("terrain", "dune", "--heights", path, "--json")
@@ -123,25 +115,3 @@ def test_a_controllers_fmu_has_no_ground(call: Call, tmp_path: Path) -> None:
     assert code == 1
     assert "options that do nothing" in err
     assert not path.exists()
-
-
-def test_level_ground_has_the_colour_of_its_height_on_the_scale(call: Call, tmp_path: Path) -> None:
-    code, out, _ = call("terrain", "stairs", "-o", tmp_path / "stairs.png")
-    assert code == 0
-    assert "cell [m]: 0.05\n" in out
-    with Image.open(tmp_path / "stairs.png") as picture:
-        counts = {
-            colour: count for count, colour in picture.convert("RGB").getcolors(1 << 24) or ()
-        }
-    # cividis at 0.3 / 1.4, the lowest height; half of the picture is ground before the stairs
-    ground = max((colour for colour in counts if colour != (255, 255, 255)), key=counts.__getitem__)
-    assert np.abs(np.subtract(ground, (57, 72, 107))).max() <= 2
-
-
-def test_a_table_of_presets_leaves_their_sources_to_json(call: Call) -> None:
-    for what in ("servos", "soils"):
-        code, out, _ = call("list", what)
-        assert code == 0
-        assert max(map(len, out.splitlines())) < 140
-        assert f"`hexapod list {what} --json` has the sources of the numbers" in out
-        assert all(row["source"] for row in json.loads(call("list", what, "--json")[1]))

@@ -28,8 +28,8 @@ from hexapod_cosim.cosim.master.sensors import MEASURED, errors_of
 from hexapod_cosim.cosim.master.signals import Signals
 from hexapod_cosim.cosim.results.recordings import read_csv, write_csv
 from hexapod_cosim.cosim.results.result import Result
-from hexapod_cosim.cosim.results.walk import View
 from hexapod_cosim.cosim.results.warnings import locomotion_of
+from hexapod_cosim.cosim.results.window import View
 from hexapod_cosim.cosim.run.single_run import apply_settings, simulate
 from hexapod_cosim.cosim.scenario.records import Push, Scenario
 from hexapod_cosim.cosim.scenario.scenario import load_scenario, scenario_robot

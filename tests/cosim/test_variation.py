@@ -18,12 +18,11 @@ from hexapod_cosim.cosim.scenario.variation import (
     QUATERNION,
     STANDARD,
     _depths,
-    check_start_depth,
     delayed,
     draw,
     initial_values,
 )
-from hexapod_cosim.models import ScenarioError, load_robot
+from hexapod_cosim.models import load_robot
 
 ROBOT = load_robot("athena")
 PARAMETERS = {
@@ -127,15 +126,3 @@ def test_a_varied_run_begins_as_drawn_and_settles(athena_fmu: Path) -> None:
     assert heights[1][-1] == pytest.approx(heights[0][-1], abs=2e-4)
     assert varied.facts.drawn["height"] == draw(STANDARD, seed=2).height
     assert plain.facts.drawn is None
-
-
-def test_a_start_with_a_foot_deeper_than_its_radius_is_refused_with_the_height_missing() -> None:
-    """The settled feet are less than 1 mm in the ground; 20 mm lower they exceed 15 mm."""
-    check_start_depth(ROBOT, PARAMETERS, where="walk: initial")
-    lower = PARAMETERS | {POSITION[2]: PARAMETERS[POSITION[2]] - 0.02}
-    message = (
-        r"walk: initial: a foot starts deep in the ground: got 'foot .. 0\.020\d* m "
-        r"deep', expected at most 0\.015 m, its radius; raise initial\.position\[3\] by 0\.005"
-    )
-    with pytest.raises(ScenarioError, match=message):
-        check_start_depth(ROBOT, lower, where="walk: initial")

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from command import Call
-from controller_fmus import give, outputs, packed, walk
+from controller_fmus import outputs, packed, walk
 from fmpy import simulate_fmu
 from fmpy.validation import validate_fmu
 from gains import PERIOD, make_gains
@@ -22,7 +22,7 @@ from hexapod_cosim.cosim.interface.controller_interface import (
     ControllerSetup,
 )
 from hexapod_cosim.cosim.interface.names import joint_names
-from hexapod_cosim.cosim.master.fmu import Fmu, StepError
+from hexapod_cosim.cosim.master.fmu import Fmu
 from hexapod_cosim.cosim.master.sensors import MEASURED
 from hexapod_cosim.cosim.master.signals import COMMANDED, COMMANDS
 from hexapod_cosim.cosim.run.controller_setup import make_setup
@@ -164,28 +164,6 @@ def test_saved_restored_and_serialised_states_continue_bit_for_bit(
         np.testing.assert_array_equal(walk(other, 123, 150), rest)
 
 
-def test_a_reset_instance_equals_a_new_one(fmu: Fmu) -> None:
-    fmu.initialise(0.0, 60.0)
-    first = walk(fmu, 0, 150)
-    fmu.reset()
-    fmu.initialise(0.0, 60.0)
-    np.testing.assert_array_equal(walk(fmu, 0, 150), first)
-
-
-def test_communication_steps_of_any_length_end_at_the_same_walk(compliant_fmu: Path) -> None:
-    """The inputs are constant. 7 ms is no multiple of the period."""
-    found = []
-    for h, count in ((PERIOD, 420), (0.02, 105), (0.007, 300), (2.1, 1)):
-        with Fmu(compliant_fmu) as fmu:
-            fmu.initialise(3.0, 60.0)
-            give(fmu, command__vx=0.06)
-            for k in range(count):
-                fmu.step(3.0 + k * h, h)
-            found.append(outputs(fmu))
-    for other in found[1:]:
-        np.testing.assert_array_equal(other, found[0])
-
-
 @pytest.mark.parametrize(
     ("values", "said"),
     [
@@ -217,19 +195,6 @@ def test_parameters_that_do_not_fit_together_are_refused_at_initialisation(
         fmu.initialise(0.0, 1.0)
 
 
-def test_inputs_that_are_no_numbers_and_steps_back_are_refused(fmu: Fmu) -> None:
-    fmu.initialise(0.0, 60.0)
-    walk(fmu, 0, 5)
-    before = outputs(fmu)
-    with pytest.raises(
-        FmuError, match=r"command.vx: got nan, expected a finite number in \[-10, 10\] m/s"
-    ):
-        give(fmu, command__vx=np.nan)
-    with pytest.raises(StepError):
-        fmu.step(0.0, PERIOD)
-    np.testing.assert_array_equal(outputs(fmu), before)
-
-
 def test_the_export_command_writes_the_controller_that_simulate_uses(
     call: Call, tmp_path: Path
 ) -> None:
@@ -255,39 +220,6 @@ def test_the_export_command_writes_the_controller_that_simulate_uses(
     )
     assert path.read_bytes() == export_controller(setup, tmp_path / "same.fmu").read_bytes()
     assert call("validate", path)[0] == 0
-
-
-@pytest.mark.parametrize(
-    ("arguments", "said"),
-    [
-        (["--controller", "complaint"], "did you mean 'compliant'?"),
-        (["--controller", "kinematic", "--gait", "trot"], "gait"),
-        (["--gait", "ripple"], "add --controller kinematic or compliant"),
-        (["--controller", "kinematic", "--period", "0.7"], "impossible controller period"),
-        (["--controller", "kinematic", "-o", "walk.zip"], "a name that ends in .fmu"),
-    ],
-)
-def test_controllers_that_cannot_be_exported_are_refused_with_a_message(
-    call: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, arguments: list[str], said: str
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    code, _, error = call("export", *arguments)
-    assert code != 0
-    assert said in error
-    assert list(tmp_path.iterdir()) == []
-
-
-def test_gains_of_another_robot_give_a_warning_and_kinematic_control_takes_none(
-    call: Call, tmp_path: Path
-) -> None:
-    save_gains(make_gains(load_robot("phantomx_mk4")), tmp_path / "gains.toml")
-    where = ("--gains", tmp_path / "gains.toml", "-o", tmp_path / "c.fmu")
-    code, _, error = call("export", "--controller", "compliant", *where)
-    assert code == 0
-    assert "designed for robot 'phantomx_mk4'" in error
-    code, _, error = call("export", "--controller", "kinematic", *where)
-    assert code != 0
-    assert "gains for kinematic control" in error
 
 
 def test_a_robot_with_other_joint_axes_has_no_controller(tmp_path: Path) -> None:

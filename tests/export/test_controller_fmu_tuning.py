@@ -115,12 +115,3 @@ def test_the_gait_is_tunable_in_fmi_3_too(plant_build: Path, tmp_path: Path) -> 
     assert fmu.getFloat64([references["gait.step_height"]]) == [0.02]
     fmu.terminate()
     fmu.freeInstance()
-
-
-def test_a_custom_gait_of_a_patterns_offsets_is_that_pattern(tmp_path: Path) -> None:
-    robot = load_robot("athena")
-    setup = ControllerSetup(robot=robot, gait=make_gait(robot, "wave"), period=PERIOD)
-    with packed(setup, tmp_path) as named:
-        expected = walk(named, 0, 200)
-    with packed(setup, tmp_path, gait__pattern="custom") as custom:
-        np.testing.assert_array_equal(walk(custom, 0, 200), expected)

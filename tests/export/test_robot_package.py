@@ -22,7 +22,6 @@ from hexapod_cosim.cosim.master.sensors import MEASURED
 from hexapod_cosim.cosim.master.signals import ACCELERATION, COMMANDED
 from hexapod_cosim.models import FmuError, HexapodError, load_robot
 from tools.importers import delayed, package3
-from tools.importers.compare import largest_difference
 from tools.importers.package import run
 
 ORDER = (PLANT, CONTROLLER)
@@ -94,15 +93,6 @@ def test_a_package_walks_as_the_python_master_does(
     ) / scale == pytest.approx(0.0, abs=SAME)
 
 
-def test_a_delay_of_one_period_exceeds_round_off(package: Path) -> None:
-    names = [f"{PLANT}.{name}" for name in SEEN]
-    present, late = (
-        run(package, names, step=PERIOD, steps=STEPS, order=ORDER, in_order=once)
-        for once in (True, False)
-    )
-    assert largest_difference(present, late)[0] > 1e3 * SAME
-
-
 def test_values_reach_the_parameter_sets(
     setup: ControllerSetup, plant_build: Path, tmp_path: Path
 ) -> None:
@@ -127,16 +117,6 @@ def test_without_values_the_robot_walks_straight_ahead(package: Path) -> None:
     }
     command = {name: float(value) for name, value in found.items() if name.startswith("command.")}
     assert {name: value for name, value in command.items() if value} == {"command.vx": 0.08}
-
-
-def test_the_fmus_themselves_hold_the_walk_s_command(package: Path, tmp_path: Path) -> None:
-    with zipfile.ZipFile(package) as archive:
-        fmu = archive.extract(f"resources/{CONTROLLER}.fmu", tmp_path)
-    starts = {one.name: one.start for one in fmpy.read_model_description(fmu).modelVariables}
-    command = {name: value for name, value in starts.items() if name.startswith("command.")}
-    assert {name: value for name, value in command.items() if float(value)} == {
-        "command.vx": "0.08"
-    }
 
 
 def test_arrays_of_fmi_3_are_connected_as_a_whole_and_there_is_no_parameter_set(
@@ -181,22 +161,6 @@ def test_a_package_of_fmi_3_walks_without_a_parameter_set_as_that_of_fmi_2_with_
     assert found[-1, 0] - found[0, 0] > 0.02
 
 
-def test_values_are_start_values_of_a_package_without_parameter_sets(
-    setup: ControllerSetup, plant_build: Path, tmp_path: Path
-) -> None:
-    values = read_values(["controller.command.vx=0.05", "plant.friction.mu=0.5"])
-    path = export_package(setup, tmp_path / "athena.ssp", values=values, fmi=3)
-    with zipfile.ZipFile(path) as archive:
-        archive.extractall(tmp_path)
-    for component, name, value in (
-        (PLANT, "friction.mu", 0.5),
-        (CONTROLLER, "command.vx", 0.05),
-    ):
-        fmu = fmpy.read_model_description(str(tmp_path / "resources" / f"{component}.fmu"))
-        (found,) = (one.start for one in fmu.modelVariables if one.name == name)
-        assert float(found) == value
-
-
 def test_a_value_of_an_input_that_the_controller_sets_is_refused(
     setup: ControllerSetup, tmp_path: Path
 ) -> None:
@@ -213,21 +177,6 @@ def test_a_value_of_an_input_that_the_controller_sets_is_refused(
 def test_invalid_values_are_refused(text: str, said: str) -> None:
     with pytest.raises(HexapodError, match=said):
         read_values([text])
-
-
-def test_the_command_packs_a_kinematic_walk(call: Call, tmp_path: Path) -> None:
-    code, out, err = call(
-        "export",
-        "--controller",
-        "kinematic",
-        "--set",
-        "controller.command.vx=0.05",
-        "-o",
-        tmp_path / "walk.ssp",
-    )
-    assert (code, err) == (0, "")
-    assert "walk.ssp" in out
-    assert read_ssd(str(tmp_path / "walk.ssp"), validate=True).name == "athena"
 
 
 @pytest.mark.parametrize(
@@ -269,13 +218,6 @@ def test_invalid_packages_are_refused_and_no_file_is_written(
     assert code != 0
     assert said in err
     assert not list(tmp_path.iterdir())
-
-
-def test_validate_refuses_a_package_and_says_that_it_checks_fmus(call: Call, package: Path) -> None:
-    code, out, err = call("validate", package)
-    assert (code != 0, out) == (True, "")
-    assert "packages are not checked" in err
-    assert "validate the FMUs in package/resources" in err
 
 
 def test_a_package_for_no_platform_is_refused(setup: ControllerSetup, tmp_path: Path) -> None:

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import json
 import re
-import struct
 import zipfile
 from collections.abc import Callable
 from pathlib import Path
@@ -139,47 +137,3 @@ def test_an_fmu_for_other_machines_is_checked_without_running_it(
 ) -> None:
     sources = changed(sound, tmp_path / "a.fmu", lambda members: members.pop(library(members)))
     assert find_problems(sources) == []
-
-
-def test_a_file_with_a_wrong_checksum_is_named(sound: Path, tmp_path: Path, call: Call) -> None:
-    bad, data = tmp_path / "bad.fmu", bytearray(sound.read_bytes())
-    with zipfile.ZipFile(sound) as archive:
-        info = archive.getinfo(STARTS)
-    name_size, extra = struct.unpack_from("<HH", data, info.header_offset + 26)
-    data[info.header_offset + 30 + name_size + extra + info.compress_size // 2] ^= 0xFF
-    bad.write_bytes(data)
-    code, out, _ = call("validate", bad)
-    assert code == 1
-    assert "resources/start_values.txt: a file of the archive cannot be unpacked: got" in out
-
-
-def test_validate_prints_the_problems(call: Call, sound: Path, tmp_path: Path) -> None:
-    damage = edited(DESCRIPTION, b'causality="output"', b'causality="outputs"')
-    bad = changed(sound, tmp_path / "bad.fmu", damage)
-    code, out, err = call("validate", bad, "--json")
-    printed = json.loads(out)
-    assert code == 1
-    assert printed["valid"] is False
-    assert any("outputs" in problem for problem in printed["problems"])
-    assert "the FMU is not sound" in err
-
-
-@pytest.mark.parametrize(
-    ("text", "part"),
-    [
-        (b"nonsense", "cannot be read"),
-        (b"<other/>", "expected XML after the standard's schema"),
-        (b"<fmiModelDescription fmiVersion='2.0' />", "'guid' is required"),
-    ],
-)
-def test_an_unreadable_description_is_reported_as_json_too(
-    call: Call, tmp_path: Path, text: bytes, part: str
-) -> None:
-    bad = tmp_path / "bad.fmu"
-    with zipfile.ZipFile(bad, "w") as archive:
-        archive.writestr("modelDescription.xml", text)
-    code, out, _ = call("validate", bad, "--json")
-    printed = json.loads(out)
-    assert code == 1
-    assert (printed["fmu"], printed["valid"]) == (str(bad), False)
-    assert any(part in problem for problem in printed["problems"]), printed

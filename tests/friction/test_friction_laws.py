@@ -102,11 +102,6 @@ def test_the_viscous_part_adds_its_coefficient_to_every_law() -> None:
         assert more - less == pytest.approx(-20.0 * 0.5 * 0.3 * ALONG, rel=EXACT)
 
 
-def test_a_law_without_friction_has_no_viscous_part() -> None:
-    friction = replace(BOTH, law="none", mu_static=0.0, viscous=2.0)
-    assert friction_force(friction, 20.0, 0.3 * ALONG) == pytest.approx(np.zeros(3), abs=0.0)
-
-
 # LuGre by itself
 
 
@@ -128,13 +123,6 @@ def test_lugre_slides_steadily_on_the_stribeck_curve(speed: float, mu: float) ->
     assert rate == pytest.approx(np.zeros(3), abs=EXACT * speed)
     force = friction_force(friction, 10.0, speed * ALONG, bristle)
     assert force == pytest.approx(-10.0 * mu * ALONG, rel=1e-9)
-
-
-def test_lugre_at_rest_is_a_spring_of_the_static_force_over_the_presliding() -> None:
-    friction = replace(BOTH, law="lugre")
-    for share in (0.1, 0.5, 1.0):
-        force = friction_force(friction, 10.0, np.zeros(3), share * 1e-4 * ALONG)
-        assert force == pytest.approx(-6.0 * share * ALONG, rel=EXACT)
 
 
 def test_lugre_at_rest_has_the_damping_of_its_bristles() -> None:
@@ -159,13 +147,6 @@ def test_lugre_dissipates_in_every_motion_and_keeps_its_cone() -> None:
         power = -float(force @ slip)
         assert power - stored >= -EXACT * (abs(power) + abs(stored))
         assert float(np.linalg.norm(force)) <= 0.6 * (1.0 + EXACT)
-
-
-def test_without_any_friction_lugre_gives_no_force_and_its_bristles_stay_short() -> None:
-    friction = replace(BOTH, law="lugre", mu=0.0, mu_static=0.0)
-    assert friction_force(friction, 10.0, ALONG, 1e-4 * ALONG) == pytest.approx(np.zeros(3))
-    rate = bristle_rate(friction, 0.3 * ALONG, 1e-4 * ALONG)
-    assert rate == pytest.approx(np.zeros(3), abs=EXACT)
 
 
 # a mass on a spring on a belt
@@ -241,14 +222,6 @@ def test_lugre_sticks_and_slips_by_the_closed_form_in_its_steep_limit(
     assert phases(tried, size=1e3) == pytest.approx([0.408432, 0.392400], rel=STEEP)
 
 
-@pytest.mark.parametrize("where", ["twin", "plant"])
-def test_a_steep_tanh_law_sticks_and_slips_as_long(core: ct.CDLL, where: str) -> None:
-    """k_t v_s = 100, at which the peak of mu(v) tanh(k_t v) lies 0.2 % below mu_s."""
-    friction = replace(BOTH, law="tanh", slope=1e7, stribeck_speed=1e-5)
-    tried = twin_law(friction) if where == "twin" else native_law(core, friction)
-    assert phases(tried) == pytest.approx([0.408432, 0.392400], rel=STEEP)
-
-
 # an incline
 
 
@@ -268,45 +241,3 @@ def slid(law: Law, angle: float, duration: float) -> tuple[float, float]:
         rate, (0.0, 1.0 + duration), [0.0, 0.0, 0.0], "Radau", rtol=1e-7, atol=1e-11, max_step=0.1
     ).y[:, -1]
     return float(end[0]), float(end[1])
-
-
-@pytest.mark.parametrize("where", ["twin", "plant"])
-@pytest.mark.parametrize(("law", "below", "above"), [("bristle", 0.53, 0.55), ("lugre", 0.5, 0.58)])
-def test_bristles_hold_below_the_static_angle_and_slide_above_it(
-    core: ct.CDLL, law: str, below: float, above: float, where: str
-) -> None:
-    """mu_s = 0.6 up to atan(0.6) = 0.5404 rad; above it g (sin a - mu cos a) with mu = 0.4, once
-    friction has fallen to mu. LuGre's bristles yield already as the limit comes near.
-    """
-    friction = replace(BOTH, law=law, presliding=1e-5, stribeck_speed=1e-3, bristle_damping=0.005)
-    tried = twin_law(friction) if where == "twin" else native_law(core, friction)
-    held, speed = slid(tried, below, 1.0)
-    assert 0.0 < held < 1e-4
-    assert abs(speed) < 1e-9
-    _, before = slid(tried, above, 0.3)
-    _, after = slid(tried, above, 0.6)
-    expected = 9.81 * (math.sin(above) - 0.4 * math.cos(above))
-    assert (after - before) / 0.3 == pytest.approx(expected, rel=1e-5)
-
-
-def test_lugre_creeps_under_a_load_that_oscillates_and_the_bristle_law_does_not() -> None:
-    """LuGre yields at every speed, so a to and fro below the limit walks downhill; the
-    elasto-plastic law has no motion there but the spring's.
-    """
-    moved = {}
-    for law in ("bristle", "lugre"):
-        tried = twin_law(
-            replace(BOTH, law=law, mu_static=0.0, presliding=1e-3, bristle_damping=0.005)
-        )
-
-        def rate(t: float, y: Array, law: Law = tried) -> list[float]:
-            friction, bristle = law(np.array([y[1], 0.0, 0.0]), np.array([y[2], 0.0, 0.0]))
-            push = 0.1 + 0.08 * math.sin(20.0 * math.pi * t)
-            return [y[1], 9.81 * (push + friction), bristle]
-
-        found = solve_ivp(
-            rate, (0.0, 2.0), [0.0, 0.0, 0.0], "Radau", t_eval=[1.0, 2.0], rtol=1e-8, atol=1e-12
-        ).y[0]
-        moved[law] = float(found[1] - found[0])
-    assert abs(moved["bristle"]) < 1e-7
-    assert moved["lugre"] > 1e-5

@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 import pytest
 from plant import Plant, probed
-from states import changed, random_command, with_links
+from states import changed, with_links
 from test_laws_servo import CLOSED, tibia_inertia, tibias, walled
 
-from hexapod_cosim.models import Robot, load_robot
+from hexapod_cosim.models import Robot
 from hexapod_cosim.models.actuator import overrun, stop_energy, stop_slopes, stop_torque
 from hexapod_cosim.models.dynamics import Command
 from hexapod_cosim.models.records import Array
@@ -114,19 +114,6 @@ def test_what_a_damped_stop_takes_is_the_gear_loss_and_no_work_of_motors(
     assert abs(energy.residual) < 1e-6 * lost
 
 
-def test_a_stop_with_a_strong_damper_lets_a_link_rest_on_it(core: ct.CDLL) -> None:
-    """The damper's torque is at most the spring's: on the way in both brake, on the way out the
-    link creeps back.
-    """
-    robot = struck(stop_damping=100.0)
-    plant = Plant(core, robot, angle=tibias(0.05), speed=tibias(SPEED))
-    plant.step(0.2, free())
-    angle, speed = knee(plant)
-    deepest = SPEED * math.sqrt(tibia_inertia(robot) / 400.0)
-    assert np.all(angle < 0.1 + deepest)
-    assert np.all(np.abs(speed) < 0.1 * SPEED)
-
-
 def test_a_servo_that_pushes_into_a_stop_rests_where_both_torques_agree(core: ct.CDLL) -> None:
     """tau/k = 1.5/200 rad past the stop."""
     robot = struck(stop_damping=2.0, torque_max=100.0, speed_max=1e6)
@@ -138,28 +125,3 @@ def test_a_servo_that_pushes_into_a_stop_rests_where_both_torques_agree(core: ct
 
 
 # with the whole robot
-
-
-def test_stops_that_no_joint_reaches_change_no_bit(core: ct.CDLL) -> None:
-    robot = load_robot("athena")
-    stiff = {"stop_stiffness": 300.0, "stop_damping": 1.0}
-    bodies = []
-    for servo in ({"stop_stiffness": 0.0, "stop_damping": 0.0}, stiff):
-        plant = Plant(core, changed(robot, servo=servo), position=(0.0, 0.0, 0.14))
-        for k in range(20):
-            plant.step(0.02 * (k + 1), random_command(robot, k, size=0.3))
-        bodies.append(plant.bodies)
-    assert np.array_equal(bodies[0], bodies[1])
-
-
-def test_kinematic_drives_have_no_stops(core: ct.CDLL) -> None:
-    bodies = []
-    for stiffness in (0.0, 300.0):
-        robot = with_links(load_robot("athena"), 1, angle_min=0.37, angle_max=0.40)
-        robot = changed(robot, servo={"mode": "kinematic", "stop_stiffness": stiffness})
-        plant = Plant(core, robot, position=(0.0, 0.0, 0.3))
-        raised = Command(angle_ref=robot.stance + np.array([0.0, 0.2, 0.0]))
-        plant.step(0.2, raised)
-        assert float(plant.output(raised).angle[0, 1]) > 0.45
-        bodies.append(plant.bodies)
-    assert np.array_equal(bodies[0], bodies[1])

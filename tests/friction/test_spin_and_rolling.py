@@ -5,15 +5,13 @@ forms, the whole robot, and its energy balance.
 from __future__ import annotations
 
 import ctypes as ct
-import math
 from collections.abc import Callable
-from dataclasses import replace
 
 import numpy as np
 import pytest
 from plant import Plant, probed
 from scipy.integrate import solve_ivp
-from states import changed, random_command, random_pose
+from states import changed
 from test_laws_standing import block, laid
 
 from hexapod_cosim.models import Robot, load_robot
@@ -84,14 +82,6 @@ def test_a_rolling_sphere_slows_down_by_its_rolling_radius(core: ct.CDLL, where:
     assert 0.6 - float(end) == pytest.approx(0.46714, rel=REGULARISED)
 
 
-def test_moments_act_against_spin_and_rolling_alone() -> None:
-    w = np.array([3.0, -4.0, 2.0])
-    moment = turning_moment(ROBOT.friction, RADIUS, 10.0, UP, w)
-    assert moment == pytest.approx(
-        [-10.0 * 1e-3 * 0.6, 10.0 * 1e-3 * 0.8, -10.0 * 0.5 * 2e-3], rel=REGULARISED
-    )
-
-
 # the robot
 
 
@@ -125,37 +115,3 @@ def test_a_robot_that_spins_on_its_feet_slows_down_by_the_moments_of_all_feet(
     more, _ = spinning(core, arm)
     assert without < 0.0
     assert more / without == pytest.approx(2.0, rel=1e-2)
-
-
-@pytest.mark.parametrize("law", ["tanh", "bristle", "lugre"])
-def test_the_energy_balance_closes_with_spin_and_rolling(core: ct.CDLL, law: str) -> None:
-    """What is left falls as the tolerance does: 1e-7 a step of some 0.1 J."""
-    friction = {"law": law, "slope": 300.0, "spin_radius": 0.01, "rolling_radius": 0.005}
-    robot = changed(load_robot("athena"), friction=friction, solver={"tolerance": 1e-7})
-    plant = Plant(core, robot, **random_pose(robot, 2))
-    plain = Plant(
-        core,
-        changed(robot, friction={"spin_radius": 0.0, "rolling_radius": 0.0}),
-        **random_pose(robot, 2),
-    )
-    for k in range(20):
-        command = random_command(robot, k, size=0.2)
-        plant.step(0.01 * (k + 1), command)
-        plain.step(0.01 * (k + 1), command)
-    energy = plant.output().energy
-    assert abs(energy.residual) < 1e-4 * energy.dissipated
-    assert energy.friction_loss > 0.01
-    assert abs(energy.friction_loss - plain.output().energy.friction_loss) > 1e-3
-    parts = energy.contact_loss + energy.friction_loss + energy.gear_loss
-    assert parts == pytest.approx(energy.dissipated, rel=1e-12)
-
-
-def test_feet_without_friction_resist_neither_spin_nor_rolling(core: ct.CDLL) -> None:
-    robot = changed(ROBOT, friction={"law": "none"})
-    with_radii = Plant(core, robot, **random_pose(robot, 3))
-    bare = replace(robot, friction=replace(robot.friction, spin_radius=0.0, rolling_radius=0.0))
-    without = Plant(core, bare, **random_pose(robot, 3))
-    for plant in (with_radii, without):
-        plant.step(0.02)
-    assert np.array_equal(with_radii.bodies, without.bodies)
-    assert math.isfinite(float(with_radii.output().energy.dissipated))

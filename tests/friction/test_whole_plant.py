@@ -24,7 +24,7 @@ from test_laws_motion import (
 )
 from test_plant_dynamics import DENSE, at
 from test_plant_stages import coefficients, rates
-from test_twin_integrator import IMPLICIT, STEP, assert_same_steps
+from test_twin_integrator import STEP, assert_same_steps
 from test_twin_measure import H, stage_forces
 
 from hexapod_cosim.models import METHODS, Robot, load_robot
@@ -84,14 +84,6 @@ def test_steps_are_the_plants(core: ct.CDLL, name: str, law: str) -> None:
     state = assert_same_steps(core, robot, body, command, [h, 2.0 * h])
     assert np.count_nonzero(~np.isnan(state.damping)) == 3
     assert np.count_nonzero(joint_overruns(robot, state.body)) > 3
-
-
-@pytest.mark.parametrize("name", IMPLICIT)
-def test_steps_with_kinematic_drives_are_the_plants(core: ct.CDLL, name: str) -> None:
-    h = STEP[name]
-    solver = {"method": name, "step": h}
-    robot = everything("lugre", solver=solver, servo={"mode": "kinematic"})
-    assert_same_steps(core, robot, random_bodies(robot, 1), random_command(robot, 1), [h, 2.0 * h])
 
 
 def moments(robot: Robot, body: Array, damping: Array) -> Array:

@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 import pytest
 from mirror import LEGS
-from plant import Plant, PlantError, inputs, pointer
+from plant import Plant, inputs, pointer
 from states import changed, distance, lopsided, random_bodies, random_command
 
-from hexapod_cosim.models import Robot, load_robot
+from hexapod_cosim.models import Robot
 from hexapod_cosim.models.contact.forces import contacts_of
 from hexapod_cosim.models.contact.geometry import standing_damping
 from hexapod_cosim.models.contact.spheres import (
@@ -22,9 +22,7 @@ from hexapod_cosim.models.contact.spheres import (
     body_spheres,
     standing_body_damping,
 )
-from hexapod_cosim.models.contact.start import deepest_start
 from hexapod_cosim.models.dynamics import Command, accelerations
-from hexapod_cosim.models.kinematics import body_states
 from hexapod_cosim.models.records import Array
 from hexapod_cosim.models.stage import keep_slopes, solve_stage
 
@@ -125,49 +123,3 @@ def test_an_implicit_stage_with_the_body_in_the_ground_is_the_dense_one(core: ct
         nu, alpha = stage_rates(core, plant, command, s_x, s_v)
         assert distance(alpha, dense.alpha.reshape(19, 6)) < DENSE
         assert distance(nu, dense.nu.reshape(19, 6)) < DENSE
-
-
-UPTURNED = (0.0, 1.0, 0.0, 0.0)
-FOLDED = np.tile([0.0, -0.3, 0.2], (6, 1))  # rad: knees and feet of an upturned robot are high
-KNEELING = np.tile([0.0, -0.5, -0.75], (6, 1))  # rad: the knees are the lowest points
-
-
-@pytest.mark.parametrize(
-    ("corner", "quaternion", "angle", "height", "message"),
-    [
-        (
-            0.01,
-            UPTURNED,
-            FOLDED,
-            -0.1,
-            r"corner \(.x .y \+z\) 0\.14\d* m .* 0\.01 m, its",
-        ),
-        (
-            0.0,
-            UPTURNED,
-            FOLDED,
-            -0.1,
-            r"torso corner .* 0\.015 m, the radius of a foot",
-        ),
-        (0.01, (1.0, 0.0, 0.0, 0.0), KNEELING, 0.0, r"knee .. 0\.\d+ m .* 0\.0105 m, its radius"),
-    ],
-)
-def test_parts_deeper_than_their_radius_at_the_start_are_refused_by_name(
-    core: ct.CDLL, corner: float, quaternion: Any, angle: Array, height: float, message: str
-) -> None:
-    robot = changed(load_robot("athena"), body={"contact": "on", "corner_radius": corner})
-    still = np.zeros(3)
-    start = {"quaternion": quaternion, "angle": angle}
-    body = body_states(robot, np.zeros(3), np.array(quaternion), still, still, angle, 0.0 * angle)
-    sunk = deepest_start(robot, body + np.array([0.0, 0.0, height] + 10 * [0.0]))
-    assert sunk is not None
-    with pytest.raises(PlantError, match=message) as error:
-        Plant(core, robot, position=(0.0, 0.0, height), **start)
-    assert f"{sunk.depth:.4g} m deep in the ground, expected at most {sunk.bound:.4g} m, " in str(
-        error.value
-    )
-    above = height + sunk.depth - sunk.bound + 1e-6
-    Plant(core, robot, position=(0.0, 0.0, above), **start)
-    off = changed(robot, body={"contact": "off"})
-    if corner and height < 0.0:
-        Plant(core, off, position=(0.0, 0.0, height), **start)

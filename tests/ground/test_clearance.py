@@ -68,14 +68,3 @@ def test_the_plants_clearance_is_that_of_the_twin_and_of_brute_force(core: ct.CD
                     gap -= radius[i] + radius[j]
                     least[[leg, other]] = np.minimum(least[[leg, other]], gap)
         assert ours == pytest.approx(least, abs=1e-7)
-
-
-def test_legs_that_overlap_have_a_negative_clearance(core: ct.CDLL) -> None:
-    robot = load_robot("athena")
-    angle = robot.stance.copy()
-    angle[0, 0], angle[1, 0] = 0.9, -0.9  # the coxae of LF and LM turn towards each other
-    output = Plant(core, robot, angle=angle).output()
-    apart = Plant(core, robot).output().body.clearance
-    assert output.body.clearance[[0, 1]].max() < 0.0
-    assert apart.min() > 0.0
-    assert output.body.clearance[4:] == pytest.approx(apart[4:], abs=1e-12)

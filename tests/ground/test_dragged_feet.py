@@ -83,54 +83,6 @@ def test_a_foot_that_was_dragged_through_a_higher_block_meets_no_wall_behind_it(
     assert state.contacts.states[0].is_soft
 
 
-def test_a_foot_that_comes_over_a_trench_to_a_level_block_meets_no_corner_at_a_depth(
-    core: ct.CDLL,
-) -> None:
-    """Along the diagonal: its own block, a trench beside a block that is 10 mm higher, a level
-    block. It changes to level ground when it is no longer in the corner of the higher block.
-    """
-    height = np.zeros((40, 40))
-    height[20, 21], height[20, 22] = -0.03, 0.01
-    pair = dragged(core, height, (0.7, 0.7), (1e-3, 0.024))
-    kept = pair.move(0.05, still)
-    assert_closed(pair)
-    assert block_below(pair) == (21, 21)
-    assert kept.contacts.cell[0] == (20, 20)
-    left = pair.move(0.08, still)
-    assert_closed(pair)
-    pair.assert_same()
-    assert left.contacts.cell[0] == block_below(pair) == (21, 22)
-
-
-def lifted(_: float) -> Command:
-    """Raises the first foot."""
-    angle = np.array(SLIPPERY.stance)
-    angle[0, 1] += 0.6
-    return Command(angle_ref=angle)
-
-
-def test_a_foot_that_leaves_its_print_within_a_higher_block_meets_it_from_outside_alone(
-    core: ct.CDLL,
-) -> None:
-    """Along x: its own block, a trench, blocks that are 10 mm higher, in which it is lifted. It
-    keeps its block, without a force, until it has left them.
-    """
-    height = np.zeros((40, 40))
-    height[17:24, 21], height[17:24, 22:] = -0.03, 0.01
-    pair = dragged(core, height, (1.6, 0.0), (1e-3, 0.5 * CELL))
-    pair.move(0.03, still)
-    inside = pair.move(0.055, lifted)
-    assert_closed(pair)
-    assert block_below(pair)[1] > 21
-    assert inside.contacts.cell[0] == (20, 20)
-    assert inside.contacts.states[0].is_open
-    assert inside.contacts.soil_depth[0] == 0.0
-    outside = pair.move(0.09, lifted)
-    assert_closed(pair)
-    pair.assert_same()
-    assert outside.contacts.cell[0] is None
-
-
 @pytest.mark.parametrize("seed", [1042, 1151, 1157])
 def test_feet_that_are_dragged_over_random_blocks_get_no_energy(core: ct.CDLL, seed: int) -> None:
     """A push drags the robot by 0.2 to 0.5 m: feet leave their prints in higher blocks, or there

@@ -88,22 +88,6 @@ def test_no_sphere_is_deeper_than_its_bound(core: ct.CDLL, kind: int, cell: floa
         assert ground.depth_bound(centre, radius) >= radius - distance
 
 
-def test_spheres_far_above_a_grid_are_known_not_to_touch_it(core: ct.CDLL) -> None:
-    rng = np.random.default_rng(12)
-    ground = Ground(core, grid_bytes(rng.uniform(-0.01, 0.01, (50, 40)), cell=0.05))
-    for centre in rng.uniform([0.2, 0.2, 0.06], [1.7, 2.2, 1.0], (300, 3)):
-        assert ground.depth_bound(centre, 0.015) < 0.0
-    assert ground.depth_bound([1.0, 1.0, 1.0], 0.06) == 0.06  # beyond the reach: not known
-
-
-def test_the_border_s_height_goes_on_beyond_the_run_out_of_its_slope(core: ct.CDLL) -> None:
-    height = np.array([[0.1, 0.2], [0.1, 0.2]])
-    for kind, rise in ((SMOOTH, 0.002), (BLOCKS, 0.0)):  # a third of 60 mm by a slope of 0.1
-        ground = Ground(core, grid_bytes(height, cell=1.0, kind=kind))
-        assert ground.face([-5.0, 0.5, 1.0], TOP)[0] == pytest.approx(0.9 + rise, abs=1e-12)
-        assert ground.face([9.0, 0.5, 1.0], TOP)[0] == pytest.approx(0.8 - rise, abs=1e-12)
-
-
 def test_distance_and_normal_at_the_edge_of_a_map_are_the_twin_s(core: ct.CDLL) -> None:
     rng = np.random.default_rng(13)
     height, cell, first = rng.uniform(0.0, 0.02, (12, 9)), 0.05, np.array([0.4, 0.55])
@@ -144,12 +128,6 @@ def test_a_step_has_a_top_a_wall_and_an_edge(
     assert got[1] == pytest.approx(normal, abs=1e-9)
 
 
-def test_an_edge_s_normal_turns_about_the_edge(core: ct.CDLL) -> None:
-    bend = step(core).face([-0.03, 0.1, 0.14], WALL)[2]
-    along = np.array([0.8, 0.0, 0.6])  # across the edge and the normal
-    assert np.abs(bend - np.outer(along, along) / 0.05).max() < 1e-9
-
-
 def test_a_concave_corner_touches_two_walls_and_a_convex_one_its_edge(core: ct.CDLL) -> None:
     height = np.array([[0.0, 0.1], [0.1, 0.1]])
     concave = Ground(core, grid_bytes(height, cell=1.0, origin=(-1.0, -1.0), kind=BLOCKS))
@@ -166,12 +144,6 @@ def test_a_concave_corner_touches_two_walls_and_a_convex_one_its_edge(core: ct.C
     distance, normal, _ = convex.face([-0.02, -0.03, 0.16], CORNER)
     assert distance == pytest.approx(0.07, abs=1e-12)
     assert normal == pytest.approx([-2 / 7, -3 / 7, 6 / 7], abs=1e-12)
-
-
-def test_columns_of_equal_height_have_no_edge_between_them(core: ct.CDLL) -> None:
-    ground = Ground(core, grid_bytes(np.full((3, 3), 0.2), cell=1.0, kind=BLOCKS))
-    for kind in (WALL, SIDE, CORNER):
-        assert ground.face([0.999, 0.999, 0.201], kind)[0] == 1000.0
 
 
 PLAIN = grid_bytes(np.zeros((3, 4)), cell=0.1)

@@ -4,21 +4,17 @@ from __future__ import annotations
 
 import ctypes as ct
 import math
-from typing import Any
 
 import numpy as np
 import pytest
 from grids import BLOCKS, Ground, grid_bytes, on_grid, sampled, start_on_grid
-from mirror import BAD_STATE, INVALID_MODEL, HxInput, HxOutput
-from plant import Plant, PlantError, definition, flat
+from mirror import BAD_STATE, HxInput, HxOutput
+from plant import Plant, PlantError, flat
 from states import changed
 
 from hexapod_cosim.models import Robot, load_robot
 from hexapod_cosim.models.dynamics import Command
 from hexapod_cosim.models.records import Array
-from hexapod_cosim.models.soil.law import table_row
-from hexapod_cosim.models.soil.presets import soil_preset
-from hexapod_cosim.models.statics import standing
 
 ATHENA = load_robot("athena")
 HEIGHT = 0.2  # m, of the torso above the ground at the start
@@ -73,54 +69,6 @@ def test_a_grid_that_is_a_plane_gives_the_path_of_the_slope(core: ct.CDLL) -> No
     assert np.abs(difference).max() < 1e-9
 
 
-@pytest.mark.parametrize("kind", [1, BLOCKS])
-def test_energy_balances_on_rough_ground(core: ct.CDLL, kind: int) -> None:
-    for law in ("tanh", "bristle"):
-        ground = Ground(core, rough(1, kind=kind))
-        robot = changed(ATHENA, friction={"law": law})
-        plant = on_grid(core, robot, ground, position=(0.0, 0.0, HEIGHT))
-        march(plant, 4.0)
-        energy = plant.output().energy
-        assert energy.actuator_work > 10.0
-        assert abs(energy.residual) < 1e-4 * energy.actuator_work
-
-
-@pytest.mark.parametrize(("height", "path"), [(1e-9, 1e-5), (1e-4, 1e-2)])
-def test_blocks_with_low_steps_carry_a_walk_as_level_ground(
-    core: ct.CDLL, height: float, path: float
-) -> None:
-    rng, paths = np.random.default_rng(1), []
-    for rough in (0.0, height):
-        heights = rough * rng.uniform(0.0, 1.0, (80, 80))
-        ground = Ground(core, grid_bytes(heights, cell=0.05, origin=(-2, -2), kind=BLOCKS))
-        plant = on_grid(core, ATHENA, ground, position=(0.0, 0.0, HEIGHT))
-        paths.append(march(plant, 1.0))
-        energy = plant.output().energy
-        assert abs(energy.residual) < 1e-4 * energy.actuator_work
-    assert np.abs(paths[1] - paths[0]).max() < path
-
-
-def sphere_drop(core: ct.CDLL, ground: Ground | None) -> tuple[float, float]:
-    """Drops the robot on its feet at 3 m/s with motors off; returns the first impact's impulse
-    [N s] and peak force [N], sums over the feet.
-    """
-    robot = changed(ATHENA, servo={"mode": "torque"}, friction={"law": "none"})
-    start: dict[str, Any] = {"position": (0.013, 0.021, 0.4), "velocity": (0.0, 0.0, -3.0)}
-    plant = Plant(core, robot, **start)
-    if ground:
-        start_on_grid(plant, ground, **start)
-    command = Command(angle_ref=robot.stance)
-    plant.step(0.15, command)
-    foot = plant.output(command).foot
-    return float(np.sum(foot.impulse)), float(np.max(foot.peak_force))
-
-
-def test_a_foot_rebounds_from_a_grid_as_from_the_plane(core: ct.CDLL) -> None:
-    for kind in (1, BLOCKS):
-        ground = Ground(core, grid_bytes(np.zeros((41, 41)), cell=0.05, origin=(-1, -1), kind=kind))
-        assert sphere_drop(core, ground) == pytest.approx(sphere_drop(core, None), rel=1e-3)
-
-
 def forces(plant: Plant, x: float, z: float) -> Array:
     """Returns the force on each foot (6, 3) of the robot at rest with its torso at x, z."""
     body = plant.bodies
@@ -128,47 +76,6 @@ def forces(plant: Plant, x: float, z: float) -> Array:
     body[:, 2] += z - body[0, 2]
     plant.bodies = body
     return np.array(plant.output().foot.force)
-
-
-def test_the_foot_force_is_continuous_over_noses_and_borders(core: ct.CDLL) -> None:
-    height = np.zeros((40, 60))
-    height[:, 30:] = 0.03  # a step of 30 mm at x = 0, under one foot after the other
-    ground = Ground(core, grid_bytes(height, cell=0.05, origin=(-1.5, -1.0), kind=BLOCKS))
-    robot = changed(ATHENA, friction={"law": "none"})
-    plant = on_grid(core, robot, ground, position=(0.0, 0.0, 1.0))
-    foot = np.array(plant.output().foot.position)[0]
-    reach, radius = foot[0], robot.foot.radius
-    drop = 1.0 - (foot[2] + radius) + (0.03 + radius) - 1e-4  # torso's height: 0.1 mm in the nose
-    before, after = forces(plant, -reach - 1e-9, drop), forces(plant, -reach + 1e-9, drop)
-    load = np.linalg.norm(before[0])
-    assert load > 1.0
-    assert np.abs(after[0] - before[0]).max() < 1e-6 * load
-
-
-@pytest.mark.parametrize("kind", [1, BLOCKS])
-def test_a_walk_on_a_grid_is_the_same_on_rerun_and_after_a_restore(
-    core: ct.CDLL, kind: int
-) -> None:
-    ground = Ground(core, rough(2, kind=kind))
-    place = {"position": (0.0, 0.0, HEIGHT)}
-    plant, again = (on_grid(core, ATHENA, ground, **place) for _ in range(2))
-    march(plant, 1.0)
-    march(again, 0.4)
-    saved = again.save()
-    march(again, 0.7)
-    again.restore(saved)
-    march(again, 1.0)
-    assert plant.save() == again.save()
-
-
-@pytest.mark.parametrize("kind", [1, BLOCKS])
-def test_every_kernel_gives_the_same_rates_on_a_grid(core: ct.CDLL, kind: int) -> None:
-    ground = Ground(core, rough(3, kind=kind))
-    plant = on_grid(core, ATHENA, ground, position=(0.0, 0.0, HEIGHT))
-    march(plant, 0.6)
-    seen = plant.rates_of_kernels(marching(ATHENA, 0.6))
-    assert "baseline" in seen
-    assert all(np.array_equal(rate, seen["baseline"]) for rate in seen.values())
 
 
 def test_a_state_is_refused_over_another_ground(core: ct.CDLL) -> None:
@@ -181,20 +88,6 @@ def test_a_state_is_refused_over_another_ground(core: ct.CDLL) -> None:
         other.restore(one.save())
     assert e.value.status == BAD_STATE
     assert other.save() == before
-
-
-def test_a_grid_that_is_missing_or_too_fine_for_the_feet_is_refused(core: ct.CDLL) -> None:
-    plant = Plant(core, ATHENA)
-    before = plant.save()
-    d = definition(ATHENA)
-    d.terrain.kind = 3
-    with pytest.raises(PlantError, match="got grid, expected a grid; load one") as missing:
-        plant.reset(d)
-    assert missing.value.status == INVALID_MODEL
-    fine = Ground(core, grid_bytes(np.zeros((9, 9)), cell=0.01, kind=BLOCKS))
-    with pytest.raises(PlantError, match=r"blocks with cells of 0\.01 m, expected at least"):
-        start_on_grid(plant, fine)
-    assert plant.save() == before
 
 
 @pytest.mark.parametrize("kind", [1, BLOCKS])
@@ -273,69 +166,3 @@ def test_a_material_s_friction_and_stiffness_are_those_of_the_touch_down(core: c
     load = [foot.normal_force[foot.contact != 0].mean() for foot in feet]
     stiffness = [f / d**1.5 for f, d in zip(load, depth, strict=True)]
     assert stiffness[1] < 0.5 * stiffness[0]
-
-
-def test_the_torso_slides_over_a_patch_of_ice_as_feet_do(core: ct.CDLL) -> None:
-    """An upturned robot slides on its torso's corners, over the middle of a patch or beside it."""
-    table = np.full((1, 16), np.nan)
-    table[0, 0], table[0, 3:] = 0.0, 0.0
-    material = np.zeros((41, 41))
-    material[:, 21:] = 1.0
-    ground = Ground(
-        core,
-        grid_bytes(np.zeros((41, 41)), cell=0.5, origin=(-10, -10), material=material, table=table),
-    )
-    robot = changed(ATHENA, body={"contact": "on"}, friction={"law": "tanh"})
-    folded, left = np.tile([0.0, -0.3, 0.2], (6, 1)), []
-    for x in (5.0, -5.0):
-        start: dict[str, Any] = {"angle": folded, "quaternion": (0.0, 1.0, 0.0, 0.0)}
-        plant = on_grid(
-            core, robot, ground, position=(x, 0.0, 0.0405), velocity=(0.3, 0.0, 0.0), **start
-        )
-        for k in range(20):
-            plant.step(0.005 * (k + 1), Command(angle_ref=folded))
-        output = plant.output(Command(angle_ref=folded))
-        left.append(float(output.torso.velocity[0]))
-    assert left[0] == pytest.approx(0.3, abs=1e-3)
-    assert left[1] < 0.1
-
-
-def test_a_rigid_patch_beside_a_footprint_carries_a_foot_at_its_surface(core: ct.CDLL) -> None:
-    """The feet in front leave prints in sand 10 mm before a rigid patch, and hop onto it, within
-    the radius of the prints.
-    """
-    robot = changed(ATHENA, foot={"pad_radius": 0.025}, body={"contact": "off"})
-    pose = standing(robot)
-    table = np.array([np.concatenate([[np.nan] * 3, table_row(soil_preset("dry_sand").soil)])])
-    material, front = np.ones((101, 101)), 0.2418825
-    material[:, 51:] = 0.0  # rigid from 10 mm before the front feet's second place on
-    file = grid_bytes(
-        np.zeros((101, 101)),
-        cell=0.1,
-        origin=(front + 0.01 - 5.05, -5.0),
-        material=material,
-        table=table,
-    )
-    ground = Ground(core, file)
-    plant = on_grid(
-        core,
-        robot,
-        ground,
-        position=np.add(pose.position, (0.0, 0.0, 1e-3)),
-        quaternion=pose.quaternion,
-        angle=pose.angle,
-    )
-    weight, landed, sunk = robot.weight, 0, 0.0
-    for k in range(80):
-        push = np.zeros(3)
-        if 10 <= k < 16:
-            push = np.array([0.4, 0.0, 4.0]) * weight
-        plant.step(0.005 * (k + 1), Command(angle_ref=robot.stance, push_force=push))
-        foot = plant.output().foot
-        for leg in (0, 3):
-            if k > 20 and foot.contact[leg] and foot.position[leg][0] > front + 0.01:
-                landed, sunk = landed + 1, max(sunk, float(foot.sinkage[leg]))
-    prints = plant.output().footprints
-    assert prints == 6
-    assert landed > 20
-    assert sunk == 0.0

@@ -36,15 +36,6 @@ def on_grid(plant: Plant, grid: float) -> int:
     return plant.call("fmi2ExitInitializationMode")
 
 
-def test_the_grid_is_chosen_by_its_number(plant_library: Path, resources: Path) -> None:
-    depth = []
-    for grid in (1.0, 2.0):
-        with Plant(plant_library, resources=resources.as_uri()) as plant:
-            assert on_grid(plant, grid) == OK
-            depth.append(plant.real("LF.foot.penetration"))
-    assert depth[0] - depth[1] == pytest.approx(0.05, abs=1e-12)
-
-
 @pytest.mark.parametrize(
     ("grid", "message"),
     [

@@ -11,21 +11,18 @@ import numpy as np
 import pytest
 import tomlkit
 
-from hexapod_cosim.cosim.export.plant_export import grid_members
 from hexapod_cosim.cosim.master.fmu import Fmu
 from hexapod_cosim.cosim.master.recorder import Recording
 from hexapod_cosim.cosim.report.relief import write_heights
-from hexapod_cosim.cosim.results.walk import body_height
 from hexapod_cosim.cosim.results.warnings import (
     off_map_warnings,
     overlap_warnings,
-    unused_settings,
 )
+from hexapod_cosim.cosim.results.window import body_height
 from hexapod_cosim.cosim.scenario.scenario import load_scenario, scenario_from_table, scenario_robot
-from hexapod_cosim.cosim.scenario.tables import with_overrides
-from hexapod_cosim.models import LEG_NAMES, RobotError, ScenarioError
+from hexapod_cosim.models import LEG_NAMES, ScenarioError
 from hexapod_cosim.models.ground.catalogue import make_surface
-from hexapod_cosim.models.ground.grid_file import grid_bytes, surface_from_bytes
+from hexapod_cosim.models.ground.grid_file import grid_bytes
 from hexapod_cosim.models.ground.surface import Surface
 
 GRID = {"terrain.kind": 3.0}
@@ -91,35 +88,6 @@ def test_a_wrong_ground_is_refused_with_its_key(overrides: list[str], message: s
     assert "stand.toml" in str(caught.value.where)
 
 
-def test_overrides_leave_the_given_table_alone() -> None:
-    table = {"terrain": {"kind": "stairs"}}
-    changed = with_overrides(table, ["terrain.step_height=0.03"])
-    assert changed["terrain"] == {"kind": "stairs", "step_height": 0.03}
-    assert table == {"terrain": {"kind": "stairs"}}
-
-
-def test_keys_of_a_slope_do_nothing_on_a_surface() -> None:
-    scenario = load_scenario("stand", overrides=["terrain.kind=stairs", "terrain.incline=5 deg"])
-    (warning,) = unused_settings(scenario, scenario_robot(scenario))
-    assert warning == ("terrain.incline does nothing on the surface stairs; set terrain.kind=slope")
-
-
-def test_valleys_narrower_than_a_foot_are_refused() -> None:
-    keys = ("kind=random_uniform", "horizontal_scale=0.03", "difficulty=1")
-    scenario = load_scenario("walk_flat", overrides=[f"terrain.{key}" for key in keys])
-    with pytest.raises(
-        RobotError, match=r"walk_flat.*athena: terrain: valleys narrower than a foot"
-    ):
-        scenario_robot(scenario)
-
-
-def test_grid_files_are_numbered_from_one() -> None:
-    surfaces = [make_surface("stairs", {}), make_surface("wave", {})]
-    members = grid_members(surfaces)
-    assert list(members) == ["resources/terrain/1.terrain", "resources/terrain/2.terrain"]
-    assert [surface_from_bytes(content) for content in members.values()] == surfaces
-
-
 def test_an_opened_fmu_gets_each_grid_once(athena_fmu: Path) -> None:
     stairs, wave = (grid_bytes(make_surface(name, {})) for name in ("stairs", "wave"))
     with Fmu(athena_fmu) as plant:
@@ -170,15 +138,3 @@ def test_overlapping_legs_are_reported_once_and_only_on_request() -> None:
     (warning,) = overlap_warnings(run, {"body.self_contact": 2.0})
     assert warning.startswith("legs overlapped from 1.000 s on, for 50.0% of the time: leg LF was ")
     assert "3.2 mm inside its neighbour at 1.500 s" in warning
-
-
-def test_legs_that_push_each_other_are_reported_with_the_largest_force() -> None:
-    forces = [f"{leg}.neighbour_force[{i}]" for leg in LEG_NAMES for i in (1, 2, 3)]
-    rows = np.zeros((4, 19))
-    rows[:, 0] = [0.0, 0.5, 1.0, 1.5]
-    run, parameters = Recording(("time", *forces), rows), {"body.self_contact": 3.0}
-    assert overlap_warnings(run, parameters) == []
-    rows[2, 4:7], rows[3, 4:7] = [0.0, 1.0, 0.0], [3.0, 0.0, -4.0]
-    (warning,) = overlap_warnings(run, parameters)
-    assert warning.startswith("legs touched each other from 1.000 s on, for 50.0% of the time: leg")
-    assert "leg LM and its neighbour pushed each other with 5 N at 1.500 s" in warning

@@ -5,21 +5,17 @@ energy balance, and the same bits after a restore.
 from __future__ import annotations
 
 import ctypes as ct
-from contextlib import nullcontext
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
-from grids import BLOCKS, Ground, grid_bytes, on_grid, start_on_grid
+from grids import Ground, grid_bytes, on_grid
 from plant import Plant, PlantError, pointer
 from states import changed
 
 from hexapod_cosim.models import Robot, load_robot
 from hexapod_cosim.models.dynamics import Command
-from hexapod_cosim.models.ground import grid_file
-from hexapod_cosim.models.ground.catalogue import make_surface
-from hexapod_cosim.models.ground.patches import with_soil
 from hexapod_cosim.models.records import Array
 from hexapod_cosim.models.soil import law
 from hexapod_cosim.models.soil.presets import soil_preset
@@ -112,26 +108,6 @@ def test_a_robot_that_is_put_down_gently_sinks_to_the_closed_form(
         plastic, sinking = out.foot.sinkage[leg], -out.foot.velocity[leg][2]
         expected = law.soil_normal_force(robot.soil, robot.foot, plastic, z, sinking)
         assert force == pytest.approx(expected, rel=REST)
-
-
-@pytest.mark.parametrize("name", ["dry_sand", "clay", "granular", "mud"])
-def test_the_forces_on_feet_are_those_of_the_model(core: ct.CDLL, name: str) -> None:
-    robot = on_soil(name)
-    plant = placed(core, robot, 0.005)
-    pressed = 0
-    for _ in range(20):
-        walk(plant, 0.04)
-        out = plant.output()
-        for leg in np.flatnonzero(out.foot.contact):
-            z, plastic = out.foot.penetration[leg], out.foot.sinkage[leg]
-            velocity, b = out.foot.velocity[leg], out.foot.bristle[leg]
-            f_n = law.soil_normal_force(robot.soil, robot.foot, plastic, z, -velocity[2])
-            limit = law.shear_limit(robot.soil, robot.foot, max(z, plastic), f_n)
-            expected = np.array([0.0, 0.0, f_n]) + law.shear_force(robot.soil, limit, b)
-            assert out.foot.force[leg] == pytest.approx(expected, rel=REST, abs=1e-8)
-            assert np.linalg.norm(b) <= robot.soil.shear_displacement * (1.0 + 1e-3)
-            pressed += f_n > 1.0
-    assert pressed > 40
 
 
 @pytest.mark.parametrize("name", ["dry_sand", "clay", "lunar", "poppy_seed_close", "mud"])
@@ -240,57 +216,6 @@ def test_a_soil_of_a_grids_table_is_the_same_as_that_of_the_definition(core: ct.
     assert np.max(there.foot.sinkage) > 0.001
 
 
-@pytest.mark.parametrize("pad", [0.0, 0.025])
-def test_a_foot_that_is_pushed_over_the_border_of_level_soft_blocks_moves_as_on_the_plane(
-    core: ct.CDLL, pad: float
-) -> None:
-    """All feet stand 3 mm before a border along y, deeper than their radius without pads."""
-    robot = on_soil("dry_sand", pad, body={"contact": "off"})
-    plane = placed(core, robot, 0.002)
-    foot = plane.output().foot.position
-    origin = (float(foot[0, 0]) + 0.003 - 2.0, -2.0)
-    ground = Ground(core, grid_bytes(np.zeros((40, 40)), cell=0.1, origin=origin, kind=BLOCKS))
-    pose = standing(robot)
-    start: dict[str, Any] = {"quaternion": pose.quaternion, "angle": pose.angle}
-    blocks = on_grid(core, robot, ground, position=np.add(pose.position, (0, 0, 0.002)), **start)
-    for plant in (plane, blocks):
-        for k in range(100):
-            aside = np.array([0.6 * robot.weight if k >= 40 else 0.0, 0.0, 0.0])
-            plant.step((k + 1) * STEP, Command(angle_ref=robot.stance, push_force=aside))
-    here, there = blocks.output(), plane.output()
-    assert here.foot.position[0, 0] > foot[0, 0] + 0.003
-    assert here.foot.sinkage.max() > (0.002 if pad else robot.foot.radius)
-    assert here.foot.position == pytest.approx(there.foot.position, abs=1e-5)
-    assert abs(here.energy.residual) < BALANCE * here.energy.dissipated
-
-
-@pytest.mark.parametrize("pad", [0.0, 0.025])
-def test_a_foot_that_is_dragged_in_its_print_over_an_edge_beside_level_ground_gets_no_energy(
-    core: ct.CDLL, pad: float
-) -> None:
-    """Two legs stand in a patch of sand, 3 mm before a rigid block of 40 mm, behind which the
-    ground is 30 mm lower. They keep their block until lift-off.
-    """
-    rigid = changed(load_robot("athena"), foot={"pad_radius": pad}, friction={"mu": 0.1})
-    rigid = changed(rigid, body={"contact": "off"})
-    pose, foot = standing(rigid), Plant(core, rigid).output().foot.position[0]
-    height, material = np.zeros((200, 200)), np.zeros((200, 200))
-    material[97:104, :101], height[96:105, 102:106] = 1.0, -0.03
-    row = np.concatenate([[np.nan] * 3, law.table_row(soil_preset("dry_sand").soil)])[None]
-    origin = (float(foot[0]) + 0.003 - 0.04 * 101, float(foot[1]) - 0.02 - 0.04 * 100)
-    file = grid_bytes(height, cell=0.04, origin=origin, kind=BLOCKS, material=material, table=row)
-    ground = Ground(core, file)
-    start: dict[str, Any] = {"quaternion": pose.quaternion, "angle": pose.angle}
-    plant = on_grid(core, rigid, ground, position=np.add(pose.position, (0, 0, 0.002)), **start)
-    for k in range(85):
-        aside = np.array([0.5 * rigid.weight if k > 30 else 0.0, 0.0, 0.0])
-        plant.step(0.01 * (k + 1), Command(angle_ref=rigid.stance, push_force=aside))
-    output = plant.output()
-    assert output.foot.position[0, 0] > foot[0] + 0.003 + 0.04
-    assert output.foot.sinkage[0] > 0.008
-    assert abs(output.energy.residual) < BALANCE * output.energy.dissipated
-
-
 def test_a_foot_may_start_deeper_than_its_radius_in_soil_and_not_in_rigid_ground(
     core: ct.CDLL,
 ) -> None:
@@ -306,42 +231,3 @@ def test_a_foot_may_start_deeper_than_its_radius_in_soil_and_not_in_rigid_ground
     rigid = replace(soft, soil=load_robot("athena").soil)
     with pytest.raises(PlantError, match="deep in the ground"):
         Plant(core, rigid, position=np.subtract(standing(rigid).position, (0, 0, 0.02)), **start)
-
-
-@pytest.mark.parametrize(
-    ("soil", "pad", "bound"),
-    [("dry_sand", 0.0, "0.06914"), ("dry_sand", 0.025, "0.02573"), ("clay", 0.0, "0.015")],
-)
-@pytest.mark.parametrize("patch", [False, True])
-def test_a_foot_may_start_as_deep_as_where_the_soil_carries_the_robot_on_it(
-    core: ct.CDLL, soil: str, pad: float, bound: str, patch: bool
-) -> None:
-    """The weight is 54.936 N. Clay carries it at 7.9 mm, so that the radius holds there."""
-    robot, ground = on_soil(soil, pad), None
-    if patch:
-        robot = replace(robot, soil=load_robot("athena").soil)
-        data = with_soil(make_surface("plane", {}), soil)
-        ground = Ground(core, grid_file.grid_bytes(data))
-    plant = Plant(core, robot)
-    for depth in (float(bound) - 1e-4, float(bound) + 1e-4, 1.0):
-        height = 0.12 + 0.015 - depth  # m: the stance's feet are 0.12 m below
-        start: dict[str, Any] = {"position": (0.0, 0.0, height), "angle": robot.stance}
-        accepted, message = depth < float(bound), f"deep in the ground, expected at most {bound} m"
-        with nullcontext() if accepted else pytest.raises(PlantError, match=message):
-            start_on_grid(plant, ground, **start) if ground else Plant(core, robot, **start)
-
-
-def test_the_soil_law_does_not_describe_the_spheres_of_the_torso() -> None:
-    """A corner's sphere carries less than a quarter of the robot; its flat side hardly sinks."""
-    robot = load_robot("athena")
-    corner = replace(robot.foot, radius=robot.body.corner_radius, pad_radius=0.0)
-    knee = replace(corner, radius=robot.body.knee_radius)
-    length, width = 2.0 * robot.body.torso_box[0], 2.0 * robot.body.torso_box[1]
-    side = replace(corner, pad_radius=float(np.sqrt(length * width / np.pi)))
-    sand = soil_preset("dry_sand").soil
-    assert law.virgin_force(sand, corner, corner.radius) == pytest.approx(2.08, abs=0.01)
-    assert law.virgin_force(sand, knee, knee.radius) == pytest.approx(2.41, abs=0.01)
-    assert robot.weight / 4.0 == pytest.approx(13.734, abs=1e-3)
-    for name, depth in (("dry_sand", 1.150e-3), ("clay", 1e-6), ("snow", 31.401e-3)):
-        sunk = law.sinkage(soil_preset(name).soil, side, robot.weight)
-        assert sunk == pytest.approx(depth, abs=1e-6)

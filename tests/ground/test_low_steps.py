@@ -116,27 +116,6 @@ def test_a_step_whose_height_goes_to_0_carries_as_the_plane(core: ct.CDLL) -> No
             assert error < 2.0 * np.sqrt(height / RADIUS) + 3.0 * height / 1e-3
 
 
-def test_contacts_far_apart_on_a_foot_act_alone(core: ct.CDLL) -> None:
-    blocks = Blocks(core, np.array([[0.0, 0.02, 0.0], [0.0, 0.02, 0.0], [0.02, 0.02, 0.0]]))
-    for depth in (1e-5, 1e-3):
-        place = np.array([CELL - RADIUS + depth, 2 * CELL - RADIUS + depth, RADIUS - depth])
-        assert blocks.force(place) == pytest.approx(
-            depth**1.5 * np.array([-1.0, -1.0, 1.0]), rel=1e-12
-        )
-
-
-def test_a_hidden_contact_has_no_share() -> None:
-    rng = np.random.default_rng(3)
-    for _ in range(300):
-        depth = rng.uniform(1e-5, 0.5 * RADIUS)
-        tilt = rng.uniform(1e-3, np.arccos(1.0 - depth / RADIUS))
-        behind = RADIUS - (RADIUS - depth) / np.cos(tilt) - rng.uniform(0.0, 1e-4)
-        if behind <= 0.0:
-            continue
-        normals = np.array([[0.0, 0.0, 1.0], [np.sin(tilt), 0.0, np.cos(tilt)]])
-        assert contact_shares(np.array([depth, behind]), normals, RADIUS).tolist() == [1.0, 0.0]
-
-
 def test_two_contacts_share_by_the_solution_of_two_equations() -> None:
     depth, normal = np.array([1e-3, 1.2e-3]), np.array([[0.0, 0.0, 1.0], [0.28, 0.0, 0.96]])
     # rho^2 = 25 * 1.2/12.6 = 2.380952, |n - n'|^2 = 0.08, r = 0.18330303

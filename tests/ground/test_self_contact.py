@@ -27,7 +27,6 @@ from hexapod_cosim.models.dynamics import (
     masses,
     world_inertias,
 )
-from hexapod_cosim.models.energy import momentum
 from hexapod_cosim.models.errors import RobotError
 from hexapod_cosim.models.integrator import integrate, start_state
 from hexapod_cosim.models.kinematics import body_states
@@ -193,29 +192,6 @@ def test_two_legs_rebound_with_the_restitution_of_the_law(core: ct.CDLL, rebound
     assert collision(robot, plant.bodies)[0] == pytest.approx(-0.5 * speed, rel=IMPACT)
 
 
-def test_two_elastic_legs_overlap_as_deep_as_the_closed_form_says(rebound: Rebound) -> None:
-    """Hertz: the largest depth (5 m v^2/(4 K))^(2/5) after 1.4716 depths over the speed."""
-    robot, body, plant = rebound(law="hertz")
-    speed, mass, _ = collision(robot, body)
-    depth = (5.0 * mass * speed**2 / (4.0 * 1e12)) ** 0.4
-    plant.step(1e-5 / speed + 1.4716 * depth / speed, free(robot))
-    assert -plant.output().body.clearance.min() == pytest.approx(depth, rel=IMPACT)
-    plant.step(1e-5 / speed + 5.0 * depth / speed, free(robot))
-    assert collision(robot, plant.bodies)[0] == pytest.approx(-speed, rel=IMPACT)
-
-
-def test_momentum_and_energy_are_those_before_an_elastic_rebound(rebound: Rebound) -> None:
-    robot, body, plant = rebound(law="hertz", stiffness=1e8)
-    before = momentum(robot, body)
-    kinetic = plant.output().energy.kinetic
-    plant.step(0.01, free(robot))
-    output, after = plant.output(), momentum(robot, plant.bodies)
-    assert output.solver.touchdowns >= 1.0
-    assert np.abs(after[0] - before[0]).max() < 1e-12
-    assert np.abs(after[1] - before[1]).max() < 1e-8
-    assert output.energy.kinetic == pytest.approx(kinetic, rel=1e-5)
-
-
 @pytest.mark.parametrize("law", ["none", "tanh"])
 def test_the_energy_books_of_colliding_legs_close_with_the_tolerance(
     core: ct.CDLL, law: str
@@ -250,44 +226,12 @@ def test_colliding_legs_move_as_the_twins(core: ct.CDLL) -> None:
     assert np.abs(plant.bodies[:, 7:] - state.body[:, 7:]).max() < SPEEDS
 
 
-def test_steps_have_the_same_bits_until_legs_touch(core: ct.CDLL) -> None:
-    plants = []
-    for self_contact in ("off", "force"):
-        robot = athena(body=FREE["body"] | {"self_contact": self_contact})
-        plants.append(at(core, robot, clasped(robot, 4e-3, 1.5)))
-    same = []
-    for k in range(20):
-        for plant in plants:
-            plant.step((k + 1) * 1e-3, free(plant.robot))
-        same.append(np.array_equal(plants[0].bodies, plants[1].bodies))
-    first = same.index(False)
-    assert 3 < first < 18
-    assert not any(same[first:])
-
-
 def test_every_kernel_gives_the_same_rates_with_legs_in_contact(core: ct.CDLL) -> None:
     robot = athena()
     plant = at(core, robot, clasped(robot, -1e-4, 0.5))
     seen = plant.rates_of_kernels(free(robot))
     assert np.abs(plant.output().body.neighbour_force).max() > 10.0
     assert all(np.array_equal(rate, seen["baseline"]) for rate in seen.values())
-
-
-def test_a_restored_collision_continues_with_the_same_bits(core: ct.CDLL) -> None:
-    robot, command = athena(), free(athena())
-    plant = at(core, robot, clasped(robot, 1e-3, 1.5))
-    saved, touching = [], []
-    for k in range(16):
-        plant.step((k + 1) * 5e-4, command)
-        saved.append(plant.save())
-        touching.append(plant.output().body.clearance.min() < 0.0)
-    assert any(touching)
-    for k in (0, touching.index(True)):
-        other = Plant(core, load_robot("phantomx_mk4"))
-        other.restore(saved[k])
-        for j in range(k + 1, 16):
-            other.step((j + 1) * 5e-4, command)
-        assert other.save() == saved[15]
 
 
 # refused

@@ -21,7 +21,6 @@ from hexapod_cosim.models.contact.footprints import footprint_depth
 from hexapod_cosim.models.dynamics import Command
 from hexapod_cosim.models.ground.catalogue import make_surface
 from hexapod_cosim.models.ground.grid_file import grid_bytes
-from hexapod_cosim.models.ground.patches import with_soil
 from hexapod_cosim.models.ground.surface import Surface
 from hexapod_cosim.models.kinematics import foot_centres
 from hexapod_cosim.models.records import Array, Terrain
@@ -74,17 +73,6 @@ def test_the_energy_books_of_a_march_close(core: ct.CDLL, name: str, soil: str, 
     assert abs(out.energy.residual) < BOOKS * gross(out)
 
 
-def test_a_march_on_patches_of_soil_with_edges_closes_its_books(core: ct.CDLL) -> None:
-    """The soil is that of the grid's table, on rigid ground."""
-    rough = make_surface("rubble", {**TERRAINS["rubble"], "seed": 3})
-    robot = on(with_soil(rough, "dry_sand"), changed(ATHENA, foot={"pad_radius": 0.025}))
-    plant, _ground = put(core, robot)
-    march(plant, 2.0)
-    out = plant.output()
-    assert out.foot.sinkage.max() > 1e-3
-    assert abs(out.energy.residual) < BOOKS * gross(out)
-
-
 def nose(robot: Robot, before: float, height: float = EDGE) -> Surface:
     """Returns blocks of 0.1 m that fall by a height [m] at a way [m] before the front feet."""
     edge = float(foot_centres(robot, stood(robot))[0, 0]) + before
@@ -114,38 +102,6 @@ def test_a_sunken_foot_that_is_dragged_over_the_nose_of_its_block_gets_no_energy
 
 
 @pytest.mark.parametrize("pad", [0.0, 0.025])
-def test_a_foot_above_the_bottom_of_its_print_passes_the_nose_without_a_force(
-    core: ct.CDLL, pad: float
-) -> None:
-    """The robot sinks, is raised by less than it has sunk, and is carried over the nose: a foot
-    that met the wall of its own block from inside would be pressed by up to its radius.
-    """
-    bare = soft(ATHENA, "dry_sand", pad)
-    robot = on(nose(bare, 0.004), bare)
-    plant, _ground = put(core, robot)
-    for k in range(60):
-        plant.step(0.01 * (k + 1), pushed(robot, 0.0, 0.0, -1.0 if 20 < k < 40 else 0.0))
-    sunk = plant.output().foot.sinkage[0]
-    x = np.array(plant.coordinates)
-    x[2] += 0.4 * sunk
-    left = []
-    for way in np.arange(0.0, 0.02, 5e-4):
-        x[0] += 5e-4 if way > 0.0 else 0.0
-        plant.coordinates = x
-        plant.core.hx_plant_update_contacts(plant.handle)
-        left.append(float(np.linalg.norm(plant.output().foot.force[0])))
-    assert plant.output().foot.position[0, 0] > robot_nose(robot)
-    assert max(left) == 0.0
-    assert sunk > 0.002
-
-
-def robot_nose(robot: Robot) -> float:
-    surface = robot.terrain.surface
-    assert surface is not None
-    return surface.x0 + 20 * surface.cell
-
-
-@pytest.mark.parametrize("pad", [0.0, 0.025])
 def test_feet_that_land_beside_and_on_a_nose_of_soil_move_as_the_twins(
     core: ct.CDLL, pad: float
 ) -> None:
@@ -158,30 +114,6 @@ def test_feet_that_land_beside_and_on_a_nose_of_soil_move_as_the_twins(
     assert pair.state.contacts.plastic.max() > 1e-3
     pair.move(0.06, lambda _: pushed(robot, 1.0, 0.0, 1.5))
     pair.assert_same(scale=10.0)
-
-
-def test_a_foot_that_rolls_from_a_rigid_nose_onto_a_soft_top_stays_on_rigid_ground(
-    core: ct.CDLL,
-) -> None:
-    """Its contact is the same before and behind the border, so its force has no jump."""
-    bare = soft(ATHENA, "dry_sand", 0.0)
-    edge = float(foot_centres(bare, stood(bare))[0, 0]) + 1e-4
-    heights = np.zeros((40, 40))
-    heights[:, :20] = -0.05  # the front feet begin over the lower blocks, at the edge
-    surface = Surface(kind="blocks", height=heights, x0=edge - 2.0, y0=-1.97, cell=0.1)
-    robot = on(surface, bare)
-    plant, _ground = put(core, robot, height=0.0)
-    force, over = [], []
-    for k in range(60):
-        plant.step(2e-4 * (k + 1), pushed(robot, 1.5, 0.0, 0.6))
-        out = plant.output()
-        force.append(float(out.foot.normal_force[0]))
-        over.append(float(foot_centres(robot, plant.bodies)[0, 0]) > edge)
-    first = over.index(True)
-    assert 0 < first < 50
-    assert force[first] > 0.5
-    assert force[first] == pytest.approx(force[first - 1], rel=0.2)
-    assert out.foot.sinkage[0] == 0.0
 
 
 def test_a_print_counts_on_its_own_level_alone() -> None:
@@ -216,18 +148,3 @@ def test_torso_knees_and_shanks_meet_blocks_with_edges_as_rigid_ground(
     assert out.torso.contact_force[2] > 10.0
     assert (0.04 - out.torso.position[2] > 8e-4) == soft_depth
     assert abs(out.energy.residual) < 1e-2 * out.energy.dissipated
-
-
-@pytest.mark.parametrize("name", ["stairs", "rubble"])
-def test_two_instances_and_a_restored_one_move_by_the_same_bits(core: ct.CDLL, name: str) -> None:
-    robot = on(make_surface(name, TERRAINS[name]), soft(ATHENA, "dry_sand", 0.025))
-    made = [put(core, robot) for _ in range(3)]
-    one, two, third = (plant for plant, _ in made)
-    for plant in (one, two):
-        march(plant, 0.7)
-    saved = one.save()
-    march(one, 1.1)
-    march(two, 1.1)
-    third.restore(saved)
-    march(third, 1.1)
-    assert one.save() == two.save() == third.save()

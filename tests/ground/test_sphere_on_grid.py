@@ -19,13 +19,9 @@ from plant import Plant
 from states import changed, scaled
 
 from hexapod_cosim.models import CONTACT_LAWS, Leg, Link, Robot, load_robot
-from hexapod_cosim.models.contact.forces import candidates, contact_at, open_contacts
 from hexapod_cosim.models.contact.law import CHI, achieved_restitution
-from hexapod_cosim.models.contact.switching import start_contacts
-from hexapod_cosim.models.dynamics import Command, accelerations
-from hexapod_cosim.models.ground.surface import Surface
-from hexapod_cosim.models.kinematics import body_states
-from hexapod_cosim.models.records import Array, Terrain
+from hexapod_cosim.models.dynamics import Command
+from hexapod_cosim.models.records import Array
 
 RADIUS = 0.02  # m  of the sphere
 BOWL = 0.25  # m  radius of the bowl
@@ -37,7 +33,6 @@ SMALL = 1e-3  # m  amplitude, of which (A/rho)^2/16 = 1.4e-6 changes the period
 SWING = 2e-5  # relative: that, the legs' inertia, and the mean of two crossings
 REBOUND = 1e-3  # relative
 IDENTICAL = 1e-9  # relative: a level grid is the plane
-BORDER = 1e-6  # of the force
 SPEED = 3.0  # m/s
 
 
@@ -126,28 +121,6 @@ def test_a_sphere_that_rolls_in_a_bowl_has_five_sevenths_of_it(core: ct.CDLL) ->
     assert omega**2 == pytest.approx(30.4658, rel=1e-3)  # without the depth
 
 
-def test_the_twins_sphere_is_pulled_back_by_the_bowl_as_a_pendulum() -> None:
-    """At rest on its contact, off the middle by x, it accelerates by -g x/(rho - R) along x."""
-    robot = sphere(friction={"law": "none"})
-    nodes = np.linspace(-0.05, 0.05, 101)
-    height = BOWL - np.sqrt(BOWL**2 - nodes[None, :] ** 2 - nodes[:, None] ** 2)
-    surface = Surface(kind="smooth", height=height, x0=-0.05, y0=-0.05, cell=CELL)
-    robot = replace(robot, terrain=Terrain(kind="grid", surface=surface))
-    depth = (MASS * 9.81 / (8.0 * STIFFNESS)) ** (2.0 / 3.0)
-    reach = BOWL - RADIUS + depth
-    still = np.zeros(3)
-    place = np.array([SMALL, 0.0, BOWL - math.sqrt(reach**2 - SMALL**2)])
-    body = body_states(robot, place, np.eye(4)[0], still, still, robot.stance, np.zeros((6, 3)))
-    command, contacts = Command(angle_ref=robot.stance), start_contacts(robot, body)
-    corners = [contact_at(robot, candidate, body) for candidate in candidates(robot)[6:]]
-    assert [corner.penetration for corner in corners] == pytest.approx([depth] * 8, abs=1e-9)
-    assert all(held.is_open for held in contacts.states[:6])
-    dv = accelerations(robot, body, command, contacts).dv
-    # the contact bears m g; a pendulum m g cos: second order in x/rho
-    assert dv[0, 0] == pytest.approx(-9.81 * SMALL / reach, rel=1e-4)
-    assert len(open_contacts(robot).states) == 14
-
-
 @pytest.mark.parametrize("law", CONTACT_LAWS)
 @pytest.mark.parametrize("ground", ["smooth", "blocks", "incline"])
 def test_a_sphere_of_20_mm_at_3_m_s_rebounds_as_from_the_plane(
@@ -185,34 +158,3 @@ def restitution(law: str) -> float:
     if law == "constant_damping":
         return achieved_restitution(1.5 * 0.1 * SPEED)
     return achieved_restitution(CHI[law](0.6))
-
-
-def test_the_force_changes_by_less_than_a_millionth_over_1000_borders_of_cells(
-    core: ct.CDLL,
-) -> None:
-    """F = K delta^1.5 n of a sphere of 15 mm, 1 nm before and behind a border."""
-    rng = np.random.default_rng(4)
-    ground = Ground(core, grid_bytes(rng.uniform(0.0, 0.01, (60, 60)), cell=0.05))
-    nm, worst = np.array([1e-9, 0.0, 0.0]), 0.0
-    for _ in range(1000):
-        point = np.array([0.05 * rng.integers(5, 55), rng.uniform(0.3, 2.7), 0.02])
-        distance, normal, _ = ground.face(point)
-        point += (0.013 - distance) * normal  # 2 mm deep
-        point[0] = 0.05 * round(point[0] / 0.05)
-        forces = []
-        for side in (-nm, nm):
-            distance, normal, _ = ground.face(point + side)
-            forces.append(1e8 * (0.015 - distance) ** 1.5 * normal)
-        worst = max(worst, float(np.linalg.norm(forces[1] - forces[0]) / np.linalg.norm(forces[0])))
-    assert worst < BORDER
-
-
-def test_a_foot_far_above_a_rough_surface_does_not_touch_it(core: ct.CDLL) -> None:
-    """Beyond the centres of curvature Newton's method has no nearby minimum to find."""
-    rng = np.random.default_rng(0)
-    ground = Ground(core, grid_bytes(rng.uniform(-0.05, 0.05, (41, 41)), cell=0.1))
-    for height in (0.2, 0.5, 1.0, 3.0):
-        for x, y in rng.uniform(0.5, 3.5, (500, 2)):
-            distance, normal, _ = ground.face([x, y, height])
-            assert 0.3 * (height - 0.06) < distance < height + 0.06
-            assert normal[2] > 0.0

@@ -133,21 +133,6 @@ def test_feet_that_slide_over_edges_of_stairs_move_as_the_twins(core: ct.CDLL, l
     assert pair.state.touchdowns >= 2
 
 
-@pytest.mark.parametrize("rise", [2e-5, -2e-5])
-def test_feet_that_slide_over_low_steps_move_as_the_twins(core: ct.CDLL, rise: float) -> None:
-    """Two feet pass a step that is lower than they are deep, which is no touch-down of its own."""
-    nose, height = float(foot_centres(FEET, stood(FEET))[0, 0]) + 1e-3, np.zeros((40, 40))
-    height[:, 20:] = rise
-    surface = Surface(kind="blocks", height=height, x0=nose - 2.0, y0=-1.97, cell=0.1)
-    robot = on(surface)
-    pair = Pair(core, robot, stood(robot, height=-1e-4, velocity=(0.5, 0.0, 0.0)))
-    damping = pair.state.contacts.damping[0]
-    state = pair.move(0.005, lambda _: Command(angle_ref=robot.stance))
-    pair.assert_same()
-    assert foot_centres(robot, state.body)[0, 0] > nose
-    assert state.contacts.damping[0] == damping
-
-
 def test_feet_between_walls_and_floors_move_as_the_twins(core: ct.CDLL) -> None:
     given = {"platform_size": 0.0, "seed": 3, "max_height": 0.02, "stone_size": 0.06}
     robot = on(make_surface("rubble", given))
@@ -222,36 +207,6 @@ def test_patches_of_other_material_are_the_twins(core: ct.CDLL, law: str) -> Non
     assert held[0].friction.mu == 0.05
     assert held[2].friction.mu_static == 0.9
     assert state.touchdowns >= 6
-
-
-def test_a_foot_that_is_dragged_in_its_print_over_an_edge_moves_as_the_twins(
-    core: ct.CDLL,
-) -> None:
-    """It stands in sand, 1 mm before a rigid block of 31 mm, behind which the ground is lower.
-
-    It sinks at first: whether soil yields at a foot that moves level depends on the last bits.
-    """
-    robot = changed(FEET, foot={"pad_radius": 0.025}, friction={"mu": 0.05})
-    body = stood(robot, height=-1e-3, velocity=(1.0, 0.0, -0.02))
-    foot = foot_centres(robot, body)[0]
-    height, material = np.zeros((40, 40)), np.zeros((40, 40), dtype=np.uint8)
-    height[17:24, 22:24], material[18:23, :21] = -0.03, 1
-    surface = Surface(
-        kind="blocks",
-        height=height,
-        x0=float(foot[0]) + 1e-3 - 0.031 * 21,
-        y0=float(foot[1]) - 0.031 * 20.5,
-        cell=0.031,
-        material=material,
-        materials=material_row({"soil": "dry_sand"})[None],
-    )
-    pair = Pair(core, on(surface, robot), body)
-    state = pair.move(0.045, lambda _: Command(angle_ref=robot.stance))
-    pair.assert_same()
-    assert foot_centres(robot, state.body)[0, 0] > foot[0] + 1e-3 + 0.031
-    assert state.contacts.cell[0] == (20, 21)
-    assert not state.contacts.states[0].is_open
-    assert state.contacts.states[0].is_soft
 
 
 def test_a_robot_that_lands_on_its_back_moves_as_the_twin(core: ct.CDLL) -> None:

@@ -94,9 +94,9 @@ def test_wrong_settings_are_refused_by_name() -> None:
 @pytest.mark.parametrize(
     ("setting", "value", "expected"),
     [
-        ("max_tilt", -1.0, "a finite number above 0"),
-        ("push_interval", 0.001, "a finite number, 0.02 or above"),
-        ("action_scale", "a", "a finite number above 0"),
+        ("max_tilt", -1.0, "a finite number > 0"),
+        ("push_interval", 0.001, "a finite number >= 0.02"),
+        ("action_scale", "a", "a finite number > 0"),
         ("terrain_seeds", 0, "a whole number, 1 or more"),
         ("tracking_width", (0.0, 1.0), "two finite numbers above 0"),
         ("command_vx", 0.1, "a range"),

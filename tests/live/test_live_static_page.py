@@ -13,7 +13,7 @@ from command import Call, assert_refused
 
 from hexapod_cosim.extensions.live.static_page import write_static_page
 
-FRAME = "window.hexapod.poses.newest"
+FRAME = "window.hexapod.shown.frame"
 
 
 @pytest.fixture(scope="module")
@@ -109,14 +109,19 @@ def test_the_control_changes_while_the_robot_walks(page: Any) -> None:
     assert problems(page) == []
 
 
-PHONE = {"viewport": {"width": 390, "height": 844}, "has_touch": True, "is_mobile": True}
+PHONE = {
+    "viewport": {"width": 390, "height": 844},
+    "has_touch": True,
+    "is_mobile": True,
+    "device_scale_factor": 0.5,  # fewer pixels, because they are drawn without a graphics card
+    "color_scheme": "dark",
+}
 
 
-@pytest.mark.parametrize("theme", ["light", "dark"])
 def test_on_a_phone_all_fits_its_width_and_a_stick_walks_the_robot(
-    browser: Any, written: Path, theme: str
+    browser: Any, written: Path
 ) -> None:
-    phone = opened(browser, written, color_scheme=theme, **PHONE)
+    phone = opened(browser, written, **PHONE)
     assert phone.evaluate("document.documentElement.scrollWidth") == 390
     for name in ("controls", "gaits", "friction"):
         box = phone.locator(f"#{name}").bounding_box()
@@ -124,7 +129,7 @@ def test_on_a_phone_all_fits_its_width_and_a_stick_walks_the_robot(
         assert box["x"] + box["width"] <= 390.0
     colour = phone.evaluate("getComputedStyle(document.body).backgroundColor")
     brightness = sum(int(part) for part in re.findall(r"\d+", colour)[:3]) / 3
-    assert brightness > 200 if theme == "light" else brightness < 60
+    assert brightness < 60
     phone.evaluate("scrollTo(0, 0)")
     box = phone.locator("#stick-walk").bounding_box()
     middle = box["x"] + 0.5 * box["width"], box["y"] + 0.5 * box["height"]

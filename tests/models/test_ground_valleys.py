@@ -12,7 +12,6 @@ import numpy as np
 import pytest
 
 from hexapod_cosim.models import RobotError, load_robot
-from hexapod_cosim.models.ground import valleys
 from hexapod_cosim.models.ground.catalogue import make_surface
 from hexapod_cosim.models.ground.smooth import height_and_slopes
 from hexapod_cosim.models.ground.surface import Surface
@@ -22,7 +21,6 @@ from hexapod_cosim.models.validation.robot import check_settings
 
 ALL = 100.0  # m    a limit that no valley here reaches
 BRUTE = 0.01  # of the radius, of a search with places 1/30 cell apart
-SEARCH = 1e-3  # of the radius, of a search that ends 1/500 cell beside the place
 SMOOTH = ("dune", "pyramid_slope", "ramp", "random_uniform", "wave")  # with a difficulty
 
 
@@ -109,21 +107,6 @@ def test_the_radius_is_that_of_a_search_of_all_places(seed: int) -> None:
     assert narrowest(surface).radius == pytest.approx(brute_radius(surface), rel=BRUTE)
 
 
-@pytest.mark.parametrize("seed", range(5))
-def test_a_limit_leaves_out_no_narrower_valley(seed: int) -> None:
-    surface = rough(seed)
-    valley = narrowest(surface)
-    assert tightest_valley(surface, (1.0 + SEARCH) * valley.radius) == valley
-    assert tightest_valley(surface, (1.0 - SEARCH) * valley.radius) is None
-
-
-def test_a_map_in_bands_has_the_valley_of_the_map(monkeypatch: pytest.MonkeyPatch) -> None:
-    whole = [narrowest(rough(seed)) for seed in range(5)]
-    monkeypatch.setattr(valleys, "TILE", 18)
-    tightest_valley.cache_clear()
-    assert [narrowest(rough(seed)) for seed in range(5)] == whole
-
-
 @pytest.mark.parametrize(
     ("given", "radius"),
     [
@@ -139,15 +122,6 @@ def test_valleys_narrower_than_a_foot_are_refused(given: dict[str, Any], radius:
     assert f"a radius of curvature of {radius}" in message
     assert "at least 15.75 mm, 1.05 times foot.radius" in message
     assert "enlarge terrain.horizontal_scale" in message
-
-
-def test_a_knee_that_touches_counts_as_a_foot() -> None:
-    robot = standing_on(make_surface("random_uniform", {"difficulty": 0.5}))
-    check_settings(robot)
-    thick = replace(robot, body=replace(robot.body, contact="on", knee_radius=0.04))
-    with pytest.raises(RobotError, match=r"narrower than a part.*1\.05 times body\.knee_radius"):
-        check_settings(thick)
-    check_settings(replace(thick, body=replace(thick.body, contact="off")))
 
 
 @pytest.mark.parametrize("robot", ["athena", "phantomx_mk4"])

@@ -111,12 +111,6 @@ def test_joint_stops_are_the_spring_and_damper_of_the_plant() -> None:
         assert data.qfrc_constraint[6 + joint] == pytest.approx(expected, rel=STOP)
 
 
-def test_mobilities_of_joints_are_mujocos() -> None:
-    robot = with_stops()
-    model = mujoco.MjModel.from_xml_string(robot_to_mjcf(robot))
-    assert joint_mobility(robot).ravel() == pytest.approx(model.dof_invweight0[6:], rel=1e-9)
-
-
 def test_shapes_of_torso_knees_and_shanks_are_those_of_the_robot_file() -> None:
     robot = load_robot("athena")
     model = mujoco.MjModel.from_xml_string(robot_to_mjcf(robot))
@@ -128,13 +122,3 @@ def test_shapes_of_torso_knees_and_shanks_are_those_of_the_robot_file() -> None:
             assert geom.size[0] == 0.0105
             assert tuple(geom.pos) == pytest.approx((place, 0.0, 0.0), abs=1e-15)
             assert model.body(int(geom.bodyid[0])).name == f"{leg}_tibia"
-
-
-def test_a_robot_without_body_contact_has_feet_alone() -> None:
-    robot = load_robot("athena")
-    robot = replace(robot, body=replace(robot.body, contact="off"))
-    model = mujoco.MjModel.from_xml_string(robot_to_mjcf(robot))
-    touching = [model.geom(k).name for k in range(model.ngeom) if model.geom_conaffinity[k]]
-    assert sorted(touching) == sorted(
-        ["ground", *(f"{leg}_foot" for leg in ("LF", "LM", "LR", "RF", "RM", "RR"))]
-    )

@@ -58,17 +58,6 @@ def test_athena_has_the_reference_figures() -> None:
     )
 
 
-def test_athena_stance_feet_are_where_the_reference_puts_them() -> None:
-    robot = load_robot("athena")
-    hips = np.array([leg.hip_position for leg in robot.legs])
-    arms = models.foot_positions(robot, robot.stance) - hips
-    assert np.hypot(arms[:, 0], arms[:, 1]) == pytest.approx(np.full(6, 0.18), abs=1e-9)
-    assert arms[:, 2] == pytest.approx(np.full(6, -0.12), abs=1e-9)
-    assert np.arctan2(arms[:, 1], arms[:, 0]) == pytest.approx(
-        [leg.hip_yaw for leg in robot.legs], abs=1e-9
-    )
-
-
 def test_phantomx_has_the_reference_figures() -> None:
     robot = load_robot("phantomx_mk4")
     assert robot.total_mass == pytest.approx(3.216, abs=5e-4)
@@ -76,14 +65,6 @@ def test_phantomx_has_the_reference_figures() -> None:
     assert robot.legs[3].links[1].tip == (0.06, 0.0, -0.015)
     assert robot.legs[5].links[2].tip == (0.095, 0.0, -0.09)
     assert (robot.servo.torque_max, robot.servo.speed_max) == (3.0, math.pi)
-
-
-@pytest.mark.parametrize("name", models.list_robots())
-def test_provenance_marks_what_is_assumed(name: str) -> None:
-    source = load_robot(name).source
-    assert all(text.split(":")[0] for text in source.values())
-    assert any("assumed" in text for text in source.values())
-    assert any("read" in text for text in source.values())
 
 
 def test_a_leg_may_differ_from_the_others() -> None:
@@ -120,15 +101,6 @@ def test_equal_robots_hash_equal() -> None:
     )
 
 
-def test_a_heavier_torso_gets_its_own_inertia_and_a_softer_foot_its_own_stiffness() -> None:
-    table = athena_table()
-    put(table, "torso.mass", 5.2)
-    put(table, "foot.youngs_modulus", 1.0e6)
-    robot, before = robot_from_table(table, where="a"), load_robot("athena")
-    assert robot.torso.inertia[0] == pytest.approx(2.0 * before.torso.inertia[0])
-    assert robot.contact.stiffness == pytest.approx(before.contact.stiffness / 5.0)
-
-
 def test_the_motor_constant_is_the_data_sheets_or_else_an_ideal_motors() -> None:
     """MX-64: 6.0 N m at stall from 12 V and 4.1 A. At stall an ideal motor draws its stall torque
     times its no-load speed.
@@ -156,81 +128,37 @@ def test_robots_are_frozen_comparable_and_picklable() -> None:
 
 BAD: list[tuple[str, Callable[[Table], None], list[str]]] = [
     ("unknown key", lambda t: put(t, "torso.mas", 1.0), ["torso", "'mas'", "did you mean 'mass'?"]),
-    ("unknown section", lambda t: put(t, "servos", {}), ["'servos'", "did you mean 'servo'?"]),
     ("unknown leg", lambda t: put(t, "legs.FL", {}), ["legs", "'FL'", "LF, LM, LR"]),
-    (
-        "unknown link key",
-        lambda t: put(t, "legs.LF.tibia.lenght", 1.0),
-        ["legs.LF.tibia", "did you mean 'length'?"],
-    ),
     (
         "unknown law",
         lambda t: put(t, "contact.law", "floris"),
         ["contact.law", "did you mean 'flores'?"],
     ),
-    (
-        "name of wrong type",
-        lambda t: put(t, "contact.law", 3),
-        ["contact.law", "got 3", "exact_restitution"],
-    ),
     ("missing section", lambda t: drop(t, "servo"), ["servo", "missing section", "[servo]"]),
     ("missing key", lambda t: drop(t, "servo.kp"), ["servo.kp", "missing key", "N m/rad"]),
     ("missing leg", lambda t: drop(t, "legs.RR"), ["legs.RR", "missing leg", "add [legs.RR]"]),
-    (
-        "missing link key",
-        lambda t: drop(t, "links.femur.mass"),
-        ["legs.LF.femur.mass", "missing key"],
-    ),
     (
         "missing stance",
         lambda t: drop(t, "links.femur.stance"),
         ["legs.LF.femur.stance", "missing key"],
     ),
-    ("missing name", lambda t: drop(t, "name"), ["name", "expected a text"]),
     (
         "text for number",
         lambda t: put(t, "torso.mass", "2.6 kg"),
         ["torso.mass", "'2.6 kg'", "[kg]"],
     ),
-    ("true for number", lambda t: put(t, "torso.mass", True), ["torso.mass", "got True", "[kg]"]),
     ("number for table", lambda t: put(t, "torso", 3.0), ["torso", "expected a table"]),
     ("number for vector", lambda t: put(t, "torso.com", 0.0), ["torso.com", "3 numbers [m]"]),
-    (
-        "short vector",
-        lambda t: put(t, "links.tibia.com", [0.0, 0.0]),
-        ["links.tibia.com", "wrong length", "exactly 3"],
-    ),
     ("not finite", lambda t: put(t, "servo.kp", math.nan), ["servo.kp", "got nan", "finite"]),
-    (
-        "entry not finite",
-        lambda t: put(t, "gravity", [0.0, 0.0, -math.inf]),
-        ["gravity[2]", "got -inf"],
-    ),
     (
         "zero mass",
         lambda t: put(t, "links.coxa.mass", 0.0),
         ["links.coxa.mass", "got 0.0", "> 0 [kg]"],
     ),
     (
-        "negative mass of one leg",
-        lambda t: put(t, "legs.LM.femur", {"mass": -1.0}),
-        ["legs.LM.femur.mass", "got -1.0", "> 0 [kg]"],
-    ),
-    ("negative gain", lambda t: put(t, "servo.kd", -0.1), ["servo.kd", "got -0.1", ">= 0"]),
-    (
         "negative moment",
         lambda t: put(t, "links.tibia.inertia", [1e-5, -1e-5, 1e-5, 0, 0, 0]),
         ["tibia.inertia", "not positive definite"],
-    ),
-    (
-        "large product",
-        lambda t: put(t, "torso.inertia", [0.01, 0.03, 0.04, 0.02, 0, 0]),
-        ["torso.inertia", "not positive definite"],
-    ),
-    (
-        "triangle",
-        lambda t: put(t, "links.coxa.inertia", [1e-5, 1e-5, 3e-5, 0, 0, 0]),
-        ["coxa.inertia", "no possible body", "sum of"],
     ),
     (
         "wrong unit",
@@ -248,11 +176,6 @@ BAD: list[tuple[str, Callable[[Table], None], list[str]]] = [
         ["coxa.angle_min", "not ordered", "angle_min < angle_max"],
     ),
     (
-        "limits in degrees",
-        lambda t: put(t, "links.coxa.angle_max", 55.0),
-        ["links.coxa.angle_max", "got 55.0", "rad"],
-    ),
-    (
         "stance outside",
         lambda t: put(t, "legs.RF.coxa", {"stance": 1.2}),
         ["legs.RF.coxa.stance", "outside the joint's limits"],
@@ -262,27 +185,11 @@ BAD: list[tuple[str, Callable[[Table], None], list[str]]] = [
         lambda t: put(t, "legs.RM.femur", {"stance": 0.9}),
         ["legs.RM.stance", "does not reach the ground"],
     ),
-    (
-        "feet above hips",
-        lambda t: put(t, "links.femur", t["links"]["femur"] | {"stance": 1.5}),
-        ["stance", "above its hip"],
-    ),
     ("no length", lambda t: put(t, "links.femur.length", 0.0), ["femur.length", "without extent"]),
-    ("long axis", lambda t: put(t, "links.femur.axis", [0.0, -2.0, 0.0]), ["femur.axis", "unit"]),
-    (
-        "restitution above 1",
-        lambda t: put(t, "contact.restitution", 1.2),
-        ["contact.restitution", "got 1.2", "<= 1"],
-    ),
     (
         "restitution 0",
         lambda t: put(t, "contact.restitution", 0.0),
         ["contact.restitution", "> 0", "hertz"],
-    ),
-    (
-        "no floor",
-        lambda t: put(t, "contact.impact_speed_floor", 0.0),
-        ["contact.impact_speed_floor", "> 0 [m/s]"],
     ),
     (
         "friction order",
@@ -290,37 +197,11 @@ BAD: list[tuple[str, Callable[[Table], None], list[str]]] = [
         ["friction.mu_static", "at least mu = 0.7"],
     ),
     (
-        "idle static friction",
-        lambda t: t["friction"].update(mu_static=0.8, law="none"),
-        ["friction.mu_static", "has no effect", "got '0.8 with the law none'", "leave it out"],
-    ),
-    (
-        "presliding 0",
-        lambda t: put(t, "friction.presliding", 0.0),
-        ["friction.presliding", "got 0.0", ">= 1e-07"],
-    ),
-    (
-        "bristles that pull",
-        lambda t: put(t, "friction.bristle_damping", -1.0),
-        ["friction.bristle_damping", "got -1.0"],
-    ),
-    (
         "continuous torque",
         lambda t: put(t, "servo.torque_continuous", 7.0),
         ["servo.torque_continuous", "torque_max = 6"],
     ),
     ("rk4 without step", lambda t: put(t, "solver.method", "rk4"), ["solver.step", "fixed step"]),
-    (
-        "vertical slope",
-        lambda t: put(t, "terrain.incline", 1.6),
-        ["terrain.incline", "got 1.6", "rad"],
-    ),
-    ("duty of 1", lambda t: put(t, "gait.duty", 1.0), ["gait.duty", "< 1"]),
-    (
-        "compressible beyond physics",
-        lambda t: put(t, "foot.poisson", 0.6),
-        ["foot.poisson", "<= 0.5"],
-    ),
 ]
 
 

@@ -138,19 +138,6 @@ def still() -> tuple[Array, Array, Array]:
     return np.zeros(3), np.zeros(3), np.zeros((6, 3))
 
 
-def test_viewers_find_geometry_in_the_urdf(robot: Robot) -> None:
-    """Viewers such as meshcat get the torso, a cylinder for each link and a sphere for each foot.
-    The contact geometry has the feet, the torso's box, and spheres of knees and shanks.
-    """
-    text = robot_to_urdf(robot)
-    model = pin.buildModelFromXML(text)
-    shown, touching = (
-        pin.buildGeomFromUrdfString(model, text, kind)
-        for kind in (pin.GeometryType.VISUAL, pin.GeometryType.COLLISION)
-    )
-    assert (shown.ngeoms, touching.ngeoms) == (1 + 18 + 6, 6 + 1 + 6 + 6)
-
-
 def test_the_exported_file_loads_as_viewers_load_it(robot: Robot, tmp_path: Path) -> None:
     """Pinocchio's MeshcatVisualizer needs these three models. Every body has its mass and a visible
     shape, without any mesh.

@@ -10,7 +10,6 @@ import pytest
 
 from hexapod_cosim.models import BodyContact, Robot, load_robot
 from hexapod_cosim.models.contact.geometry import foot_contacts, foot_force
-from hexapod_cosim.models.contact.law import normal_force
 from hexapod_cosim.models.dynamics import (
     Command,
     accelerations,
@@ -29,15 +28,12 @@ from hexapod_cosim.models.energy import (
     momentum,
     potential_energy,
 )
-from hexapod_cosim.models.friction import friction_force
 from hexapod_cosim.models.ground.faces import ground
 from hexapod_cosim.models.kinematics import (
     axis_normals,
     axis_quaternion,
     body_states,
     cross,
-    foot_centres,
-    foot_positions,
     joint_angles,
     joint_models,
     joint_speeds,
@@ -152,29 +148,6 @@ def test_bodies_from_joint_angles_satisfy_the_joints_and_give_the_angles_back(na
     assert max(constraint_errors(robot, body)) < EXACT * 100.0
     assert close(joint_angles(robot, body), angle, EXACT)
     assert close(joint_speeds(robot, body), speed, EXACT)
-
-
-def test_feet_of_the_bodies_are_the_feet_of_the_angles() -> None:
-    robot = load_robot("phantomx_mk4")
-    body = random_bodies(robot, 3)
-    R_WT = rotation_matrix(body[0, 3:7])
-    feet = (
-        body[0, 0:3]
-        + (foot_positions(robot, joint_angles(robot, body)) - np.array(robot.torso.com)) @ R_WT.T
-    )
-    assert close(foot_centres(robot, body), feet, EXACT)
-
-
-def test_a_positive_femur_angle_raises_the_foot_and_a_positive_tibia_angle_lowers_it() -> None:
-    robot = load_robot("athena")
-    flat = np.zeros((6, 3))
-    femur, tibia = (
-        foot_positions(robot, flat + np.array([0.0, 0.1, 0.0])),
-        foot_positions(robot, flat + np.array([0.0, 0.0, 0.1])),
-    )
-    assert np.all(femur[:, 2] > 0.0)
-    assert np.all(tibia[:, 2] < 0.0)
-    assert foot_positions(robot, flat + np.array([0.1, 0.0, 0.0]))[1, 0] < 0.0
 
 
 # constraints, eq. 2-4
@@ -328,14 +301,6 @@ def test_a_kinematic_drive_gives_the_commanded_acceleration_and_its_multiplier_i
     assert close(by_torque.dv, driven.dv, 1e-8)
 
 
-def test_a_kinematic_drive_on_its_path_stays_on_it() -> None:
-    robot = with_mode(load_robot("athena"), "kinematic")
-    body = random_bodies(robot, 11)
-    speed = joint_speeds(robot, body)
-    command = Command(angle_ref=joint_angles(robot, body) - 0.02 * speed, speed_ref=speed, age=0.02)
-    assert close(drive_acceleration(robot, body, command), np.zeros((6, 3)), 1e-9)
-
-
 # feet on the ground, eq. 14 and 15
 
 
@@ -351,15 +316,3 @@ def test_the_contact_point_is_the_material_point_that_the_foot_presses() -> None
         )
         assert (later - before) / (2.0 * DIFFERENCE) == pytest.approx(foot.approach_speed, abs=1e-7)
         assert ground(robot.terrain, foot.point)[0] == pytest.approx(-foot.penetration, abs=EXACT)
-
-
-def test_a_foot_slips_along_the_ground_only() -> None:
-    robot = load_robot("athena")
-    robot = replace(robot, terrain=replace(robot.terrain, kind="slope", incline=0.3, heading=1.1))
-    for foot in foot_contacts(robot, random_bodies(robot, 13)):
-        pressed = replace(foot, penetration=1e-3)
-        f_n = normal_force(robot.contact, 3.0, 1e-3, foot.approach_speed)
-        slip = foot.velocity - (foot.velocity @ foot.normal) * foot.normal
-        f_t = foot_force(robot, pressed, 3.0) - f_n * foot.normal
-        assert close(f_t, friction_force(robot.friction, f_n, slip), EXACT)
-        assert f_n == 0.0 or float(f_t @ slip) < 0.0

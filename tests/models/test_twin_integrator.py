@@ -15,10 +15,9 @@ from states import changed, distance, landing, lopsided, random_bodies, random_c
 
 from hexapod_cosim.models import METHODS, Robot, load_robot
 from hexapod_cosim.models.actuator import servo_slopes
-from hexapod_cosim.models.contact.geometry import foot_contacts, standing_damping
-from hexapod_cosim.models.dynamics import Command, accelerations
+from hexapod_cosim.models.contact.geometry import foot_contacts
+from hexapod_cosim.models.dynamics import Command
 from hexapod_cosim.models.integrator import (
-    Start,
     State,
     cubic_crossing,
     error_norm,
@@ -26,7 +25,6 @@ from hexapod_cosim.models.integrator import (
     project,
     start_state,
     step_factor,
-    try_step,
 )
 from hexapod_cosim.models.kinematics import body_states, joint_angles, joint_speeds
 from hexapod_cosim.models.method import METHOD, Stage, method_step
@@ -106,13 +104,6 @@ def test_stiff_linear_motion_is_damped_at_once_and_oscillation_never_grows(name:
         assert np.linalg.norm(amplified(name, turn, np.array([1.0, 0.0]))) <= 1.0 + 1e-12
 
 
-def test_the_explicit_methods_have_the_taylor_series_of_their_order() -> None:
-    x = 1e-2
-    series = 1.0 + x + x**2 / 2.0 + x**3 / 6.0 + x**4 / 24.0
-    assert amplified("rk4", x * np.eye(1), ONE)[0] == pytest.approx(series, abs=1e-15)
-    assert amplified("dp54", x * np.eye(1), ONE)[0] == pytest.approx(math.exp(x), abs=1e-14)
-
-
 # step sizes and touch-downs alone
 
 
@@ -175,20 +166,6 @@ def test_bodies_on_their_joints_stay_there_when_projected_and_drifted_ones_retur
 # the stages of a robot
 
 
-@pytest.mark.parametrize("mode", ["position", "kinematic"])
-def test_a_short_step_is_the_acceleration_of_equation_one(mode: str) -> None:
-    """To first order in h, a step of any method changes the velocities by h times the accelerations
-    of eq. 1.
-    """
-    h = 1e-7
-    robot = changed(lopsided(), servo={"mode": mode}, solver={"step": h})
-    body, command = random_bodies(robot, 2), random_command(robot, 2)
-    dv = accelerations(robot, body, command, standing_damping(robot, body)).dv
-    trial = try_step(Start(robot, command, start_state(robot, body)), h)
-    assert distance((trial.body - body)[:, 7:13] / h, dv) < 1e-2
-    assert distance((trial.body - body)[:, 0:3] / h, body[:, 7:10]) < 1e-3
-
-
 # the C plant's steps
 
 
@@ -237,25 +214,6 @@ def test_steps_with_other_drives_are_the_plants(core: ct.CDLL, name: str, mode: 
     h = STEP[name]
     robot = changed(load_robot("athena"), solver={"method": name, "step": h}, servo={"mode": mode})
     assert_same_steps(core, robot, random_bodies(robot, 1), random_command(robot, 1), [h, 2.0 * h])
-
-
-@pytest.mark.parametrize("name", METHODS)
-def test_steps_in_flight_are_the_plants(core: ct.CDLL, name: str) -> None:
-    h = STEP[name]
-    robot = changed(lopsided(), solver={"method": name, "step": h})
-    flying = random_pose(robot, 1) | {"position": np.array([0.0, 0.0, 2.0])}
-    command = random_command(robot, 1)
-    state = assert_same_steps(core, robot, body_states(robot, **flying), command, [2.0 * h])
-    assert np.all(np.isnan(state.damping))
-
-
-@pytest.mark.parametrize("name", IMPLICIT)
-def test_a_step_cut_short_by_the_end_does_not_shorten_the_next(core: ct.CDLL, name: str) -> None:
-    robot = changed(lopsided(), solver={"method": name, "step": 0.0, "tolerance": 1e-4})
-    flying = random_pose(robot, 1) | {"position": np.array([0.0, 0.0, 2.0])}
-    body, command = body_states(robot, **flying), random_command(robot, 1)
-    state = assert_same_steps(core, robot, body, command, [2e-3, 2.001e-3])
-    assert state.next_step > 5e-5  # s; five times the last step would be 5e-6
 
 
 @pytest.mark.parametrize("name", METHODS)
@@ -308,12 +266,3 @@ def test_controlled_steps_through_a_touch_down_are_the_plants(
     state = assert_same_steps(core, robot, body, command, [2e-4, 4e-4])
     assert state.touchdowns == 1
     assert state.rejected > 0
-
-
-def test_fixed_steps_through_a_touch_down_are_the_plants(core: ct.CDLL) -> None:
-    robot = changed(load_robot("athena"), solver={"method": "rosw3", "step": 1e-3})
-    body = body_states(robot, **landing(robot))
-    body[:, 2] -= 1.8e-3
-    state = assert_same_steps(core, robot, body, Command(angle_ref=robot.stance), [2e-3])
-    assert state.touchdowns == 1
-    assert state.steps == 3

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from hexapod_cosim.models import load_robot
-from hexapod_cosim.models.actuator import gear_friction, servo_torque
+from hexapod_cosim.models.actuator import servo_torque
 from hexapod_cosim.models.contact.law import (
     CHI,
     achieved_restitution,
@@ -40,17 +40,6 @@ def test_the_servo_follows_its_law_inside_the_torque_speed_line() -> None:
         0
     ] == pytest.approx(-0.75 * servo.torque_max)
     assert servo_torque(servo, zero, zero + 99.0, zero - 9.0, zero, zero)[0] == -servo.torque_max
-
-
-def test_a_torque_servo_ignores_angles_and_the_gear_opposes_motion() -> None:
-    servo = replace(load_robot("athena").servo, mode="torque")
-    assert (
-        servo_torque(servo, np.ones(1), np.zeros(1), np.zeros(1), np.ones(1), np.full(1, 0.7))[0]
-        == 0.7
-    )
-    assert gear_friction(servo, np.array([-1.0, 0.0, 1.0])) == pytest.approx(
-        [0.05, 0.0, -0.05], rel=1e-9
-    )
 
 
 @pytest.mark.parametrize(
@@ -113,12 +102,6 @@ def test_the_ground_never_pulls_and_a_slow_touch_down_counts_as_the_floor() -> N
         == contact_damping(contact, 0.01)
         > contact_damping(contact, 0.02)
     )
-
-
-def test_the_constant_law_and_hertz_do_not_ask_for_the_impact_speed() -> None:
-    contact = load_robot("athena").contact
-    assert contact_damping(replace(contact, law="constant_damping", damping_factor=2.0), 0.3) == 3.0
-    assert contact_damping(replace(contact, law="hertz"), 0.3) == 0.0
 
 
 def test_friction_opposes_slip_within_the_cone_and_has_the_linear_limit() -> None:

@@ -34,14 +34,6 @@ def reread(root: ET.Element, tmp_path: Path) -> Robot:
     return load_robot(path)
 
 
-def test_a_written_urdf_reads_back_with_the_same_body(tmp_path: Path) -> None:
-    robot = load_robot("athena")
-    path = tmp_path / "robot.urdf"
-    path.write_text(robot_to_urdf(robot), encoding="utf-8")
-    assert load_robot(path).body == robot.body
-    assert robot.body.contact == "on"
-
-
 def test_collision_shapes_alone_give_the_outer_box_and_the_largest_radii(tmp_path: Path) -> None:
     robot = reread(without_body(robot_to_urdf(load_robot("athena"))), tmp_path)
     assert robot.body.torso_box == pytest.approx((0.18, 0.10, 0.04), abs=1e-15)
@@ -77,11 +69,6 @@ def add(link: ET.Element, kind: str, place: str, **size: str) -> None:
     shape = ET.SubElement(link, "collision")
     ET.SubElement(shape, "origin", xyz=place)
     ET.SubElement(ET.SubElement(shape, "geometry"), kind, size)
-
-
-def test_a_urdf_without_collision_shapes_of_the_body_has_no_body_contact(tmp_path: Path) -> None:
-    robot = replace(load_robot("athena"), body=BodyContact())
-    assert reread(without_body(robot_to_urdf(robot)), tmp_path).body == BodyContact()
 
 
 def test_an_upturned_robot_rests_on_its_torso_in_mujoco_too() -> None:

@@ -16,7 +16,7 @@ from browser import FLAGS, FULL, Launcher, Opened, find_chromium, launcher
 
 from hexapod_cosim.cosim.cli import main
 from hexapod_cosim.cosim.results.results import read_result
-from hexapod_cosim.cosim.results.walk import robot_weight
+from hexapod_cosim.cosim.results.window import robot_weight
 from hexapod_cosim.models import LEG_NAMES, load_robot
 from hexapod_cosim.models.kinematics import foot_positions, rotation_matrix
 
@@ -27,8 +27,8 @@ PACKED = 2e-4  # m    a foot's place, from a position and angles in steps of 1/6
 PACKED_FORCE = 1e-3
 LEAST_FORCE = 0.01  # body weights that have an arrow
 TICK = 1e-6  # s    of the packed times
-# forces, slip, height and attitude, torques, energies, footfall, feet against their plan
-PLOTS = 6 + 7 + 4 + 3 + 4 + 2 + 6
+# forces, slip, height and attitude, torques, energies, feet against their plan
+PLOTS = 6 + 7 + 4 + 3 + 4 + 6
 SMALLEST_TEXT = 11  # px
 TALLEST_BAR = 90  # px    on a phone
 BRIGHT, DIM = 200, 60  # of 255

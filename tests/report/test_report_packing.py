@@ -14,7 +14,7 @@ from hexapod_cosim.cosim.master.recorder import Recording
 from hexapod_cosim.cosim.report.columns import MOST_ROWS, choose, envelope
 from hexapod_cosim.cosim.report.packing import error_bound, pack
 from hexapod_cosim.cosim.report.payload import as_json
-from hexapod_cosim.cosim.results.walk import View
+from hexapod_cosim.cosim.results.window import View
 
 MOST_COLUMNS = 95  # of a run that recorded everything
 REST = 800_000  # bytes of a report without its recordings

@@ -12,7 +12,7 @@ from walks import PARAMETERS, PERIOD, Walk
 
 from hexapod_cosim.cosim.report.servos import servo_rows
 from hexapod_cosim.cosim.results.results import StoredResult
-from hexapod_cosim.cosim.results.walk import View
+from hexapod_cosim.cosim.results.window import View
 
 
 def stored(walk: Walk) -> StoredResult:

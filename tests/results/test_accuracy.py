@@ -18,7 +18,6 @@ from command import Call, assert_refused, settings
 
 from hexapod_cosim.cosim.cli import main
 from hexapod_cosim.cosim.results.accuracy import (
-    accuracy_from_table,
     compare_accuracy,
     halved_scenario,
     reference_scenario,
@@ -28,7 +27,6 @@ from hexapod_cosim.cosim.results.summary import Summary
 from hexapod_cosim.cosim.run.batch import run_batch
 from hexapod_cosim.cosim.scenario.records import Scenario
 from hexapod_cosim.cosim.scenario.scenario import load_scenario
-from hexapod_cosim.models import HexapodError
 
 CYCLES = ("duration=2.4", "gait.period=0.8")  # the shortest walk with metrics
 SOLVER_METRICS = [name for name in METRICS if name != "realtime_factor"]
@@ -134,17 +132,6 @@ def test_errors_of_several_runs_are_of_the_means_over_those_that_walked_each_tim
     )
 
 
-def test_a_reference_without_figures_leaves_errors_open_and_is_reported() -> None:
-    failed = replace(
-        made(math.nan, math.nan), status="failed", reason="the step is too long", upright=False
-    )
-    found = compare_accuracy(walk(), [made(1.0)], [failed], [made(1.0)])
-    assert all(map(math.isnan, found.solver_error.values()))
-    assert found.notes == (
-        "kinematic, seed 0, at solver.tolerance=1e-06 ended differently: the step is too long",
-    )
-
-
 # the command
 
 
@@ -160,70 +147,6 @@ def checked(
         code = main([*words, "--json", *settings(*CYCLES)])
     assert code == 0
     return folder, json.loads(out.getvalue())
-
-
-@pytest.mark.parametrize("control", ["kinematic", "compliant"])
-def test_errors_are_the_differences_from_runs_that_one_makes_oneself(
-    call: Call, tmp_path: Path, checked: tuple[Path, Mapping[str, Any]], control: str
-) -> None:
-    _, printed = checked
-    accuracy = printed["accuracy"][control]
-    assert (accuracy["reference"], accuracy["macro_step"], accuracy["runs"]) == (
-        "solver.tolerance=1e-06",
-        0.0025,
-        1,
-    )
-    plain = [
-        "simulate",
-        "walk_flat",
-        "--control",
-        control,
-        "--json",
-        *settings(*CYCLES, "outputs.plots=false"),
-    ]
-    fine = json.loads(call(*plain, "--set", "solver.tolerance=1e-6", "-o", tmp_path / "fine")[1])[
-        "metrics"
-    ]
-    half = json.loads(call(*plain, "--set", "macro_step=2.5 ms", "-o", tmp_path / "half")[1])[
-        "metrics"
-    ]
-    assert list(accuracy["solver_error"]) == list(accuracy["macro_step_effect"]) == SOLVER_METRICS
-    for name in WALKED:
-        value = printed[control][name]
-        assert accuracy["solver_error"][name] == pytest.approx(
-            value - fine[name], rel=1e-6, abs=1e-12 * abs(value)
-        )
-        assert accuracy["macro_step_effect"][name] == pytest.approx(
-            half[name] - value, rel=1e-6, abs=1e-12 * abs(value)
-        )
-    assert any(accuracy["solver_error"].values())
-    assert any(accuracy["macro_step_effect"].values())
-
-
-def accuracy_table(folder: Path) -> str:
-    return (
-        (folder / "report.html")
-        .read_text(encoding="utf-8")
-        .partition("<h2>Accuracy</h2>")[2]
-        .partition("</table>")[0]
-    )
-
-
-@pytest.mark.usefixtures("undrawn")
-def test_files_and_report_have_the_errors_and_the_report_can_be_made_again(
-    call: Call, checked: tuple[Path, Mapping[str, Any]]
-) -> None:
-    folder, printed = checked
-    stored = json.loads((folder / "metrics.json").read_text())
-    assert stored == {key: value for key, value in printed.items() if key != "report"}
-    assert "--check-accuracy" in json.loads((folder / "run.json").read_text())["command"]
-    page, table = (folder / "report.html").read_text(encoding="utf-8"), accuracy_table(folder)
-    assert all(f"<code>{name}</code>" in table for name in SHOWN)
-    assert "solver.tolerance=1e-06" in table
-    main_table = page.partition("<h2>Metrics</h2>")[2].partition("</table>")[0]
-    assert main_table.count(" ± ") == 3 * len(SHOWN)
-    assert call("report", folder)[0] == 0
-    assert accuracy_table(folder) == table
 
 
 def test_a_run_shows_an_error_beside_every_metric_and_keeps_it(call: Call, tmp_path: Path) -> None:
@@ -244,23 +167,6 @@ def test_a_run_shows_an_error_beside_every_metric_and_keeps_it(call: Call, tmp_p
     stored = json.loads((tmp_path / "metrics.json").read_text())
     assert list(stored) == [*METRICS, "warnings", "accuracy"]
     assert list(stored["accuracy"]["solver_error"]) == SOLVER_METRICS
-
-
-def test_without_the_option_nothing_is_walked_again_and_nothing_printed(
-    call: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.delattr("hexapod_cosim.cosim.cli.accuracy_check.run_batch")
-    code, out, _ = call(
-        "simulate",
-        "stand",
-        "-o",
-        tmp_path,
-        "--json",
-        *settings("duration=0.2", "outputs.plots=false"),
-    )
-    assert code == 0
-    assert "accuracy" not in json.loads(out)
-    assert "accuracy" not in json.loads((tmp_path / "metrics.json").read_text())
 
 
 @pytest.mark.usefixtures("undrawn")
@@ -297,22 +203,3 @@ def test_a_run_too_long_for_half_the_macro_step_is_refused_before_it_begins(
         call(*arguments), "too long for --check-accuracy", "got 4000", "2500 s", "shorten"
     )
     assert not (tmp_path / "out").exists()
-
-
-@pytest.mark.parametrize(
-    "table",
-    [
-        {},
-        [],
-        {
-            "reference": "x",
-            "macro_step": "a",
-            "runs": 1,
-            "solver_error": {},
-            "macro_step_effect": {},
-        },
-    ],
-)
-def test_damaged_errors_are_refused_by_name(table: Any) -> None:
-    with pytest.raises(HexapodError, match=r"metrics.json: damaged accuracy.*--check-accuracy"):
-        accuracy_from_table(table, where="metrics.json")

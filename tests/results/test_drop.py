@@ -61,18 +61,6 @@ def test_the_metrics_of_a_drop_are_of_all_of_it() -> None:
     assert times == pytest.approx(flights, abs=4e-3)  # two macro-steps
 
 
-@pytest.mark.usefixtures("plant_build")
-def test_a_drop_is_not_warned_of_figures_of_walks() -> None:
-    facts = simulate(load_scenario("drop")).facts
-    assert facts.drop is not None
-    assert not [text for text in facts.warnings if "walked less" in text or "swung" in text]
-
-
-@pytest.mark.usefixtures("plant_build")
-def test_a_walk_reports_no_drop() -> None:
-    assert simulate(load_scenario("walk_flat", overrides=["duration=0.1"])).facts.drop is None
-
-
 def test_the_text_of_a_drop_tells_asked_and_delivered() -> None:
     bounce = Bounce(time=0.1, speed=0.94, peak=51.2, restitution=0.4926)
     assert Drop(0.5, 0.5, (bounce,)).text == (

@@ -23,7 +23,7 @@ from measured import (
 from hexapod_cosim.cosim.interface.names import foot_names, joint_names, vector_names
 from hexapod_cosim.cosim.results.metrics import compute_metrics
 from hexapod_cosim.cosim.results.metrics import landing_rates as plant_rates
-from hexapod_cosim.cosim.results.walk import View, Walk
+from hexapod_cosim.cosim.results.window import JudgedWindow, View
 from hexapod_cosim.cosim.run.single_run import simulate
 from hexapod_cosim.cosim.scenario.records import CONTROLS
 from hexapod_cosim.cosim.scenario.scenario import load_scenario
@@ -43,7 +43,7 @@ class Twice:
     judged: dict[str, float]  # metrics of the walk
     measured: dict[str, float]  # of the repetition, from the plant's measures
     sampled: dict[str, float]  # of the repetition, from samples
-    walk: Walk  # the repetition
+    walk: JudgedWindow  # the repetition
     before: Samples  # of it, from half a cycle before the measured one
     tolerance: float
 
@@ -72,12 +72,12 @@ def twice(request: pytest.FixtureRequest, plant_build: Path) -> Twice:
     result = simulate(plan, gains=gains)
     again = repeated(plan, result.outcome.recording, begin=1.5 * PERIOD)
     view = View(again.recording, result.parameters, PERIOD)
-    assert view.walk is not None
+    assert view.window is not None
     return Twice(
         dict(result.metrics),
         compute_metrics(view, servo=robot.servo, realtime_factor=np.nan),
-        sampled_metrics(again.samples, view.walk, robot.servo, mu=MU),
-        view.walk,
+        sampled_metrics(again.samples, view.window, robot.servo, mu=MU),
+        view.window,
         again.samples,
         tolerance,
     )

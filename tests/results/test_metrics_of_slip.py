@@ -109,14 +109,6 @@ def test_cone_use_is_what_the_plant_counted_over_time() -> None:
     assert 0.10 <= metrics["cone_use_p50"] <= 0.13
 
 
-def test_cone_use_before_the_judged_cycles_does_not_count() -> None:
-    walk = Walk()
-    use_cone(walk, 0.5, np.where(walk.time > 2.0, 1.0, 0.0))
-    use_cone(walk, 0.95, np.where(walk.time > 2.0, 0.0, 100.0))
-    metrics = walk.metrics(friction__mu=0.7)
-    assert metrics["cone_use_p50"] == pytest.approx(0.50, abs=0.03)
-
-
 @pytest.mark.parametrize(
     ("largest", "p50", "p95", "bin_width"), [(0.80, 0.40, 0.76, 0.056), (0.10, 0.05, 0.095, 0.021)]
 )
@@ -136,13 +128,6 @@ def test_cone_use_is_told_by_percentiles_over_time(
     assert metrics["cone_use_p50"] == pytest.approx(p50, rel=0.03)
     assert metrics["cone_use_p95"] == pytest.approx(p95, abs=0.5 * bin_width)
     assert metrics["cone_use_over_90"] == 0.0
-
-
-@pytest.mark.parametrize(("share", "over"), [(0.89, 0.0), (0.91, 1.0)])
-def test_nearly_sliding_is_over_nine_tenths_of_the_cone(share: float, over: float) -> None:
-    walk = Walk()
-    use_cone(walk, share)
-    assert walk.metrics(friction__mu=0.7)["cone_use_over_90"] == pytest.approx(over)
 
 
 @pytest.mark.parametrize(("load", "counts"), [(0.0095, False), (0.0105, True)])

@@ -4,7 +4,6 @@ same.
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,17 +12,14 @@ from command import Call
 from gains import make_gains
 
 from hexapod_cosim.controller import Gains
-from hexapod_cosim.cosim.control.fmu_law import law_of_ours
 from hexapod_cosim.cosim.interface.names import foot_names
-from hexapod_cosim.cosim.master.loop import Outcome, diagnostic_columns, run
-from hexapod_cosim.cosim.master.recorder import Peaks, Recorder, Recording, kept_moments
-from hexapod_cosim.cosim.master.signals import Signals
-from hexapod_cosim.cosim.results.metrics import compute_metrics, metric_columns
+from hexapod_cosim.cosim.master.recorder import Peaks, Recording
+from hexapod_cosim.cosim.results.metrics import compute_metrics
 from hexapod_cosim.cosim.results.result import Result
-from hexapod_cosim.cosim.results.walk import View
-from hexapod_cosim.cosim.run.single_run import initialise_plant, make_plan, open_plant, simulate
+from hexapod_cosim.cosim.results.window import View
+from hexapod_cosim.cosim.run.single_run import simulate
 from hexapod_cosim.cosim.run.walker import Walker
-from hexapod_cosim.cosim.scenario.records import CONTROLS, Outputs, Scenario
+from hexapod_cosim.cosim.scenario.records import CONTROLS, Scenario
 from hexapod_cosim.cosim.scenario.scenario import load_scenario
 from hexapod_cosim.models import load_robot
 
@@ -126,80 +122,10 @@ def test_the_rate_of_a_landing_is_that_of_the_touch_downs_since_the_last_row() -
     assert shown == [(5.0, 9.0), (7.0, 4.0), (3.0, 4.0), (0.0, 3.0)]
 
 
-def test_bounces_between_two_rows_leave_the_steepest_landing() -> None:
-    peaks = Peaks(("RM.foot.landing_rate", "RM.foot.landings"))
-    rows = np.array([(90.0, 0.0), (80.0, 1.0), (50.0, 2.0), (10.0, 3.0)])
-    assert peaks.fold(rows)[0] == 80.0  # 90 is the rate of an older landing
-
-
-@pytest.mark.parametrize(
-    ("rows", "every", "kept"),
-    [(7, 3, [0, 3, 6]), (9, 3, [0, 3, 6, 8]), (1, 4, [0]), (3, 1, [0, 1, 2])],
-)
-def test_the_last_row_is_always_kept(rows: int, every: int, kept: list[int]) -> None:
-    assert kept_moments(rows, every).tolist() == kept
-
-
-def in_python(scenario: Scenario, walker: Walker) -> Outcome:
-    """Runs a scenario in the Python master with the plant FMU and the controller FMU."""
-    plan = make_plan(scenario, gains=gains_of(scenario))
-    controller = walker._controller_for(plan)
-    controller.initialise(scenario.start, scenario.start + scenario.duration)
-    with open_plant(scenario) as plant:
-        initialise_plant(plant, plan)
-        signals, ours = Signals(plant), law_of_ours(controller, period=scenario.macro_step)
-        recorder = Recorder(
-            signals,
-            plan.schedule.times,
-            plan.schedule.rows,
-            extra=diagnostic_columns(ours),
-            every=scenario.every,
-            judged=metric_columns(bristles=True),
-        )
-        return run(plant, signals, ours, plan.schedule, recorder, h=scenario.macro_step)
-
-
 def same(found: Recording, expected: Recording) -> None:
     names = [name for name in expected.names if name in found.names]
     assert set(names) == set(found.names)
     np.testing.assert_array_equal(found.columns(names), expected.columns(names))
-
-
-@pytest.mark.parametrize("control", CONTROLS)
-def test_both_masters_keep_the_same_rows(control: str) -> None:
-    """They agree bit for bit.
-
-    43 macro-steps are no multiple of the interval, so the last row is an extra one.
-    """
-    plan = load_scenario(
-        "walk_flat",
-        overrides=[f"control={control}", "duration=0.86", "gait.period=0.4", "macro_step=0.01"],
-    )
-    plan = replace(plan, duration=0.87, outputs=Outputs(interval=0.04))
-    with Walker(everything=True) as walker:
-        expected = in_python(plan, walker)
-        found = walker.simulate(plan, gains=gains_of(plan)).outcome
-        again = walker.simulate(plan, gains=gains_of(plan)).outcome
-    assert found.recording.time == pytest.approx([*(0.04 * k for k in range(22)), 0.87])
-    assert len(found.judged.time) == 88
-    same(found.recording, expected.recording)
-    same(found.judged, expected.judged)
-    same(again.recording, expected.recording)
-    assert (expected.recording.columns(foot_names("landings"))[-1] > 0.0).any()
-
-
-def test_a_walker_that_keeps_what_is_judged_keeps_it_of_every_macro_step() -> None:
-    plan = load_scenario(
-        "walk_flat",
-        overrides=["duration=1.2", "gait.period=0.4", "macro_step=0.01", "outputs.interval=0.04"],
-    )
-    with Walker() as walker:
-        found = walker.simulate(plan)
-    assert len(found.outcome.recording.time) == 121
-    expected = simulate(plan)
-    assert found.metrics["slip_per_metre"] == pytest.approx(
-        expected.metrics["slip_per_metre"], rel=1e-6
-    )
 
 
 def test_commands_are_written_only_where_all_of_them_are_recorded(

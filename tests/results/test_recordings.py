@@ -5,8 +5,6 @@ importers.
 from __future__ import annotations
 
 import csv
-import json
-import tomllib
 from pathlib import Path
 
 import fmpy
@@ -19,7 +17,7 @@ from fmpy.util import read_csv as fmpy_read_csv
 
 from hexapod_cosim.cosim.interface.descriptions import read_description
 from hexapod_cosim.cosim.master.recorder import Recording
-from hexapod_cosim.cosim.results.columns import bare_name, heading, known_columns
+from hexapod_cosim.cosim.results.columns import heading, known_columns
 from hexapod_cosim.cosim.results.recordings import (
     read_csv,
     read_parquet,
@@ -109,34 +107,6 @@ def test_the_header_of_the_csv_file_names_the_units(folder: Path) -> None:
     assert header == [heading(name) for name in read_parquet(folder / "results.parquet").names]
 
 
-def test_both_files_hold_the_same_recording(folder: Path) -> None:
-    table, text = read_parquet(folder / "results.parquet"), read_csv(folder / "results.csv")
-    assert table.names == text.names
-    assert table.data.tobytes() == text.data.tobytes()
-
-
-def test_the_table_says_what_was_run(folder: Path) -> None:
-    metadata = pyarrow.parquet.read_schema(folder / "results.parquet").metadata
-    facts = json.loads((folder / "run.json").read_text())
-    assert metadata[b"control"] == b"compliant"
-    assert metadata[b"scenario"].decode() == (folder / "scenario.toml").read_text(encoding="utf-8")
-    assert tomllib.loads(metadata[b"scenario"].decode())["duration"] == 0.2
-    assert all(
-        json.loads(metadata[key.encode()]) == facts[key] for key in ("robot", "fmu", "versions")
-    )
-
-
-def test_a_row_of_a_table_is_a_row_of_the_recording(folder: Path) -> None:
-    """pandas, polars and DuckDB see plain columns of doubles without gaps."""
-    table = pyarrow.parquet.read_table(folder / "results.parquet")
-    assert {str(field.type) for field in table.schema} == {"double"}
-    assert sum(column.null_count for column in table.columns) == 0
-    rows = table.slice(7, 1).to_pylist()[0]
-    assert (
-        rows["torso.position[3]"] == read_csv(folder / "results.csv").column("torso.position[3]")[7]
-    )
-
-
 def test_equal_runs_leave_equal_files(call: Call, folder: Path, tmp_path: Path) -> None:
     assert (
         call("simulate", "walk_flat", "--control", "compliant", "-o", tmp_path / "again", *QUICK)[0]
@@ -144,17 +114,6 @@ def test_equal_runs_leave_equal_files(call: Call, folder: Path, tmp_path: Path) 
     )
     for name in ("results.parquet", "results.csv", "commands.csv"):
         assert (tmp_path / "again" / name).read_bytes() == (folder / name).read_bytes()
-
-
-def test_other_readers_take_the_csv_file(folder: Path) -> None:
-    ours, theirs, plain = (
-        read_csv(folder / "results.csv"),
-        fmpy_read_csv(folder / "results.csv"),
-        pyarrow.csv.read_csv(folder / "results.csv"),
-    )
-    assert [bare_name(name) for name in theirs.dtype.names] == list(ours.names)
-    assert np.array_equal(np.array(theirs.tolist()), ours.data)
-    assert np.array_equal(np.column_stack(plain.columns), ours.data)
 
 
 def test_the_commands_are_the_fmus_inputs_under_their_own_names(
@@ -220,12 +179,6 @@ def test_a_missing_file_is_refused(tmp_path: Path, kind: str) -> None:
         read_recording(tmp_path, "results")
 
 
-def test_a_table_of_texts_is_no_recording(tmp_path: Path) -> None:
-    pyarrow.parquet.write_table(pyarrow.table({"time": ["now"]}), tmp_path / "a.parquet")
-    with pytest.raises(HexapodError, match="not a recording"):
-        read_parquet(tmp_path / "a.parquet")
-
-
 def test_a_recording_without_rows_is_one(tmp_path: Path) -> None:
     empty = Recording(("time", "torso.roll"), np.zeros((0, 2)))
     write_parquet(empty, tmp_path / "a.parquet", about={})
@@ -255,17 +208,3 @@ def test_formats_can_be_chosen_and_either_is_read_back(
         "scenario.toml",
     } | left
     assert len(read_result(folder).view.recording.time) == 41
-
-
-@pytest.mark.usefixtures("undrawn")
-def test_a_folder_of_an_earlier_version_makes_a_report(call: Call, tmp_path: Path) -> None:
-    """Such a folder holds results.csv with bare names."""
-    folder = tmp_path / "out"
-    assert call("simulate", "stand", "-o", folder, *QUICK)[0] == 0
-    recording = read_recording(folder, RESULTS)
-    for name in ("results.parquet", "results.csv", "commands.csv"):
-        (folder / name).unlink()
-    write_csv(recording, folder / "results.csv")
-    code, _, err = call("report", folder)
-    assert code == 0, err
-    assert (folder / "report.html").is_file()

@@ -43,27 +43,6 @@ def test_the_margin_is_the_distance_to_the_nearest_edge(
     assert got == pytest.approx([margin], nan_ok=True)
 
 
-@pytest.mark.parametrize(("apart", "margin"), [(1e-9, math.nan), (2e-9, -0.5)])
-def test_two_feet_within_a_nanometre_make_no_edge(apart: float, margin: float) -> None:
-    feet = np.zeros((6, 2, 1))
-    feet[1, 0] = apart
-    standing = np.array([[True, True, False, False, False, False]])
-    got = polygon_margins(feet, standing, np.array([[0.0], [0.5]]))
-    assert got == pytest.approx([margin], nan_ok=True)
-
-
-def test_the_margin_does_not_depend_on_the_order_of_the_feet() -> None:
-    generator = np.random.default_rng(5)
-    feet = generator.normal(size=(6, 2, 50))
-    centre, standing = 0.3 * generator.normal(size=(2, 50)), generator.random((50, 6)) < 0.7
-    order = generator.permutation(6)
-    first, second = (
-        polygon_margins(feet, standing, centre),
-        polygon_margins(feet[order], standing[:, order], centre),
-    )
-    np.testing.assert_allclose(first, second, atol=1e-12)
-
-
 def poses(robot: Robot, rows: int) -> tuple[Recording, list[Array]]:
     """Returns random poses as a recording, and the body states of models/ for them."""
     generator = np.random.default_rng(7)

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from plant import Plant, PlantError
+from plant import Plant
 from states import changed, landing, random_command
 from test_measured_servos import with_servo
 
@@ -80,38 +80,6 @@ def test_outputs_are_those_of_the_held_command(core: ct.CDLL) -> None:
     assert np.array_equal(plant.output(held).torque, plant.output(first).torque)
     plant.step(0.01, held)
     assert not np.array_equal(plant.output(held).torque, plant.output(first).torque)
-
-
-def test_events_do_not_change_what_is_held(core: ct.CDLL) -> None:
-    on_bus, _ = robots(bus_period=0.008, command_step=STEP)
-    command, whole = random_command(on_bus, 1, size=0.3), Plant(core, on_bus, **landing(on_bus))
-    whole.step(0.1, command)
-    parts, events = Plant(core, on_bus, **landing(on_bus)), 0
-    while parts.time < 0.1:
-        events += parts.step_to_event(0.1, command)
-    assert events > 1
-    assert parts.save() == whole.save()
-
-
-def test_kinematic_drives_have_no_bus(core: ct.CDLL) -> None:
-    on_bus, _ = robots(bus_period=0.02, command_step=STEP, mode="kinematic")
-    alone = changed(on_bus, servo={"bus_period": 0.0, "command_step": 0.0})
-    bodies = []
-    for robot in (on_bus, alone):
-        plant = Plant(core, robot, **landing(robot))
-        for k in range(3):
-            plant.step(0.005 * (k + 1), random_command(robot, k, size=0.1))
-        bodies.append(plant.bodies)
-    assert np.array_equal(bodies[0], bodies[1])
-
-
-def test_a_call_with_too_many_transmissions_is_refused(core: ct.CDLL) -> None:
-    on_bus, _ = robots(bus_period=1e-9)
-    plant = Plant(core, on_bus)
-    before = plant.save()
-    with pytest.raises(PlantError, match=r"servo\.bus_period: got 1e-09 s"):
-        plant.step(1.0)
-    assert plant.save() == before
 
 
 def test_the_twin_rounds_and_holds() -> None:

@@ -13,7 +13,6 @@ import numpy as np
 import pytest
 from fmi_plant import ERROR, MODEL_EXCHANGE, OK
 from fmi_plant import Plant as FmuPlant
-from mirror import INVALID_ARGUMENT
 from plant import Plant, PlantError
 from scipy.integrate import solve_ivp
 from states import changed, distance, landing, lopsided, random_bodies, random_command
@@ -26,14 +25,12 @@ from hexapod_cosim.models.dynamics import Command, accelerations
 from hexapod_cosim.models.energy import kinetic_energy, potential_energy
 from hexapod_cosim.models.integrator import Start, State, end_step, start_state, try_step
 from hexapod_cosim.models.records import Array
-from hexapod_cosim.models.servos.gear import gear_energy, gear_torque
 from hexapod_cosim.models.validation.robot import check_robot
 
 CLOSED = 1e-8  # rad, rad/s  of closed forms: a tibia's inertia is 1e-7 of its wall's
 AGREES = 1e-6  # of an independent integration
 DENSE = 1e-9  # relative, of the sweeps and the dense system
 TWIN = 1e-11  # relative, of steps
-SHOWN = ["LF.femur.gear_deflection", "LF.femur.motor_speed", "LF.femur.speed"]
 ELASTIC: dict[str, Any] = {"gear_stiffness": 400.0, "gear_damping": 0.05}
 
 
@@ -162,23 +159,6 @@ def test_a_servo_with_play_follows_an_independent_integration(
     assert plant.output(command).energy.residual == pytest.approx(0.0, abs=1e-11)
 
 
-def test_a_servo_with_play_hunts_about_its_target_and_one_without_comes_to_rest(
-    core: ct.CDLL,
-) -> None:
-    """The position is measured at the joint, so that the rotor crosses the play back and forth."""
-    spans = []
-    for play in (0.0, 0.02):
-        robot, _, _ = rod(kp=40.0, kd=0.3, backlash=play, **ELASTIC)
-        robot = changed(robot, solver={"method": "rosw3", "tolerance": 1e-5})
-        plant, angles = Plant(core, robot, angle=tibias(0.02)), []
-        for k in range(1, 81):
-            plant.step(0.01 * k, Command(angle_ref=tibias(0.0)))
-            angles.append(float(plant.output().angle[1, 2]))
-        spans.append(float(np.ptp(angles[50:])))
-    assert spans[0] < 1e-4
-    assert spans[1] == pytest.approx(0.0272, abs=2e-3)
-
-
 # the rigid limit
 
 
@@ -204,18 +184,6 @@ def test_a_stiff_gear_converges_to_the_rigid_one_with_the_inverse_of_its_stiffne
     ]
     assert errors[0] == pytest.approx(1.19e-4, rel=0.02)
     assert [errors[0] / errors[1], errors[1] / errors[2]] == pytest.approx([10.0, 10.0], rel=0.15)
-
-
-def test_the_steps_of_a_landing_do_not_depend_on_the_stiffness_of_the_gears(core: ct.CDLL) -> None:
-    steps = []
-    for stiffness in (0.0, 1e6, 1e9):
-        gear = {"gear_stiffness": stiffness, "gear_damping": 1.0}
-        robot = changed(load_robot("athena"), servo=gear)
-        plant = Plant(core, robot, **landing(robot))
-        for k in range(1, 21):
-            plant.step(0.005 * k)
-        steps.append(plant.output().solver.steps)
-    assert max(steps[1:]) < 2.5 * steps[0]
 
 
 # the whole robot
@@ -291,59 +259,7 @@ def assert_same(plant: Plant, state: State, command: Command) -> None:
     assert float(np.max(np.abs(output.gear_deflection))) > 1e-4
 
 
-@pytest.mark.parametrize("play", [0.0, 0.01])
-def test_the_energy_of_a_gear_is_the_integral_of_its_torque(play: float) -> None:
-    servo = changed(load_robot("athena"), servo=ELASTIC | {"backlash": play}).servo
-    ends = np.linspace(-0.02, 0.02, 40001)
-    torque = gear_torque(servo, ends, np.zeros_like(ends))
-    stored = gear_energy(servo, ends)
-    work = np.concatenate([[0.0], np.cumsum(0.5 * (torque[1:] + torque[:-1]) * np.diff(ends))])
-    assert stored - stored[0] == pytest.approx(work, abs=1e-9)
-    assert stored[20000] == 0.0
-    assert np.all(torque[np.abs(ends) < 0.44 * play] == 0.0)
-
-
-def test_a_restored_state_continues_with_the_same_deflections(core: ct.CDLL) -> None:
-    robot = with_servo(load_robot("athena"), "mx64_m1", backlash=0.01, **ELASTIC)
-    plant = landed(core, robot, 0.03)
-    saved = plant.save()
-    plant.step(0.05)
-    after, other = plant.output(), Plant(core, load_robot("athena"))
-    other.restore(saved)
-    other.step(0.05)
-    again = other.output()
-    assert np.array_equal(again.gear_deflection, after.gear_deflection)
-    assert np.array_equal(again.motor_speed, after.motor_speed)
-    assert other.save() == plant.save()
-
-
-def test_every_kernel_gives_the_same_rates_with_elastic_gears_and_spinning_rotors(
-    core: ct.CDLL,
-) -> None:
-    robot = with_servo(lopsided(2), "mx64_m6", backlash=0.01, gear_ratio=90.0, **ELASTIC)
-    plant = landed(core, robot, 0.03)
-    seen = plant.rates_of_kernels(plant.hold())
-    assert "baseline" in seen
-    assert all(np.array_equal(rate, seen["baseline"]) for rate in seen.values())
-
-
-def test_a_rigid_gear_shows_the_joints_speed_and_no_deflection(core: ct.CDLL) -> None:
-    output = landed(core, load_robot("athena"), 0.01).output()
-    assert np.array_equal(output.motor_speed, output.speed)
-    assert np.all(output.gear_deflection == 0.0)
-
-
 # refusals
-
-
-def test_derivatives_of_elastic_gears_are_refused(core: ct.CDLL) -> None:
-    robot = changed(load_robot("athena"), servo=ELASTIC)
-    plant = Plant(core, robot)
-    with pytest.raises(
-        PlantError, match=r"expected 0 \(rigid gears\) in model exchange"
-    ) as refused:
-        plant.tangent(plant.hold(), np.zeros(96), np.zeros(70))
-    assert refused.value.status == INVALID_ARGUMENT
 
 
 def test_model_exchange_with_elastic_gears_is_refused(plant_library: Path) -> None:
@@ -355,26 +271,6 @@ def test_model_exchange_with_elastic_gears_is_refused(plant_library: Path) -> No
         assert "use co-simulation" in instance.last_message
         assert instance.call("fmi2Reset") == OK
         instance.initialize()
-
-
-def test_an_fmu_with_elastic_gears_steps_and_continues_saved_states(
-    plant_library: Path,
-) -> None:
-    gear = ELASTIC | {"backlash": 0.004, "gear_ratio": 200.0}
-    values = {f"servo.{key}": value for key, value in gear.items()}
-    with FmuPlant(plant_library) as instance:
-        assert instance.set_reals(values) == OK
-        instance.initialize()
-        assert instance.step(0.0, 0.02) == OK
-        state = instance.save()
-        assert instance.step(0.02, 0.02) == OK
-        shown = instance.reals(SHOWN)
-        assert instance.call("fmi2SetFMUstate", state) == OK
-        assert instance.step(0.02, 0.02) == OK
-        assert instance.reals(SHOWN) == shown
-        instance.free(state)
-    assert abs(shown[0]) > 1e-5
-    assert shown[1] != shown[2]
 
 
 @pytest.mark.parametrize(

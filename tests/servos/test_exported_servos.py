@@ -7,9 +7,7 @@ from pathlib import Path
 
 import pytest
 from test_measured_servos import with_servo
-from typer.testing import CliRunner
 
-from hexapod_cosim.cosim.cli.app import app
 from hexapod_cosim.cosim.export.robot_files import FORMATS, left_out
 from hexapod_cosim.models import load_robot
 from hexapod_cosim.models.mjcf import robot_to_mjcf
@@ -48,17 +46,3 @@ def test_an_ideal_servo_loses_nothing_and_gears_their_play() -> None:
 def models() -> Path:
     """Returns the folder of the robots' files."""
     return Path(__file__).parents[2] / "models"
-
-
-def test_the_command_warns_of_what_a_file_leaves_out(tmp_path: Path) -> None:
-    robot = tmp_path / "mine.toml"
-    text = (models() / "athena.toml").read_text(encoding="utf-8")
-    gear = "[servo]\ngear_stiffness = 400.0  # assumed\nbacklash = 0.01  # assumed\n"
-    robot.write_text(text.replace("[servo]\n", gear), encoding="utf-8")
-    file = tmp_path / "mine.urdf"
-    result = CliRunner().invoke(app, ["export", "--robot", str(robot), "-o", str(file)])
-    assert result.exit_code == 0, result.output
-    assert file.exists()
-    told = " ".join(result.stderr.split())
-    assert "warning: mine.urdf: a URDF cannot say and leaves out of the servos" in told
-    assert "the elasticity of the gears, backlash" in told

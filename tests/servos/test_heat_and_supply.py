@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from plant import Plant, PlantError
+from plant import Plant
 from scipy.linalg import expm
 from states import changed, landing, random_bodies, random_command, with_links
 from test_laws_servo import HEAVY, tibias, walled
@@ -21,7 +21,6 @@ from hexapod_cosim.models import Robot, load_robot
 from hexapod_cosim.models.contact.geometry import standing_damping
 from hexapod_cosim.models.dynamics import Command, accelerations
 from hexapod_cosim.models.kinematics import joint_angles, joint_speeds
-from hexapod_cosim.models.records import Servo
 from hexapod_cosim.models.servos.supply import duty_share, supply_power, warmed
 
 WARM: dict[str, Any] = {
@@ -98,28 +97,6 @@ def test_a_hot_motor_gets_less(core: ct.CDLL, start: float, share: float, left: 
     assert float(duty_share(servo, np.array(start))) == pytest.approx(share, rel=EXACT)
 
 
-def test_a_motor_that_overheats_limits_itself(core: ct.CDLL) -> None:
-    """It settles where the power that its limit allows keeps the winding as warm as it is."""
-    robot = blocked(**WARM | {"winding_to_housing": 1.0, "housing_capacity": 1.0})
-    plant = Plant(core, robot)
-    for k in range(300):
-        plant.step(float(k + 1), pushed(100.0))
-    servo, after = robot.servo, plant.output(pushed(100.0))
-    current, winding = after.current[0, 2], after.winding_temperature[0, 2]
-    assert winding - AIR == pytest.approx(18.0 * servo.resistance * current**2, rel=2e-2)
-    assert 343.15 < winding < 353.15
-
-
-def test_heat_changes_nothing_while_motors_are_cool(core: ct.CDLL) -> None:
-    bodies = []
-    for settings in ({}, WARM):
-        robot = with_servo(load_robot("athena"), "mx64_m6", **settings)
-        plant = Plant(core, robot, **landing(robot))
-        plant.step(0.05, random_command(robot, 0, size=0.3))
-        bodies.append(plant.bodies)
-    assert np.array_equal(bodies[0], bodies[1])
-
-
 # the supply
 
 
@@ -134,15 +111,6 @@ def test_a_battery_sags_under_the_currents_of_all_motors(core: ct.CDLL) -> None:
     assert volts < 9.0
     assert output.current == pytest.approx(np.full((6, 3), duty * volts / servo.resistance))
     assert float(np.sum(output.electrical_power)) == pytest.approx(volts * taken, rel=EXACT)
-
-
-def test_a_battery_is_not_charged(core: ct.CDLL) -> None:
-    robot = with_servo(walled(), "mx64_m1", supply_resistance=0.5)
-    driven = Plant(core, robot, angle=tibias(0.0), speed=tibias(-9.0))
-    output = driven.output(Command(angle_ref=tibias(0.02)))
-    assert output.supply_voltage <= 12.0
-    still = Plant(core, robot, angle=tibias(0.0)).output(Command(angle_ref=tibias(0.0)))
-    assert still.supply_voltage == 12.0
 
 
 @pytest.mark.parametrize("mode", ["position", "torque"])
@@ -168,36 +136,6 @@ def test_accelerations_under_a_sagging_supply_are_the_twins(core: ct.CDLL, mode:
         ours = plant.accelerations(command)
         assert ours.drive_torque == pytest.approx(dense.drive_torque, rel=1e-8, abs=1e-9)
         assert ours.dv == pytest.approx(dense.dv, rel=1e-6, abs=1e-6)
-
-
-def test_an_interrupted_call_goes_on_with_the_same_supply(core: ct.CDLL) -> None:
-    robot = with_servo(load_robot("athena"), "mx64_m6", supply_resistance=0.2, **WARM)
-    command, whole = random_command(robot, 1, size=0.3), Plant(core, robot, **landing(robot))
-    whole.step(0.1, command)
-    parts, events = Plant(core, robot, **landing(robot)), 0
-    while parts.time < 0.1:
-        events += parts.step_to_event(0.1, command)
-    assert events > 1
-    assert parts.save() == whole.save()
-
-
-@pytest.mark.parametrize(
-    ("change", "message"),
-    [
-        ({"winding_capacity": 5.0}, "servo.housing_capacity: got 0, expected more than 0"),
-        ({"temperature_max": 340.0}, "servo.temperature_max: got 340, expected more than"),
-    ],
-)
-def test_impossible_heat_is_refused(core: ct.CDLL, change: dict[str, Any], message: str) -> None:
-    robot = with_servo(load_robot("athena"), "mx64_m6")
-    with pytest.raises(PlantError, match=message):
-        Plant(core, changed(robot, servo=change))
-
-
-def test_servos_without_heat_stay_as_warm_as_they_are() -> None:
-    assert Servo.__dataclass_fields__["winding_capacity"].default == 0.0
-    servo = with_servo(load_robot("athena"), "mx64_m6").servo
-    assert float(duty_share(servo, np.array(1000.0))) == 1.0
 
 
 def test_the_figures_of_a_run_contain_the_energy_from_the_supply(core: ct.CDLL) -> None:

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from plant import Plant, PlantError, flat, inputs, probed
+from plant import Plant, flat, inputs, probed
 from states import changed, distance, landing, lopsided, random_bodies, random_command
 from test_laws_servo import tibias, walled
 
@@ -35,12 +35,10 @@ from hexapod_cosim.models.servos.motor import (
     electrical_power,
     friction_drag,
     friction_torque,
-    has_measured_friction,
     motor_current,
     motor_torque,
 )
-from hexapod_cosim.models.servos.presets import list_servos, measured_servo, servo_table
-from hexapod_cosim.models.urdf.writer import robot_to_urdf
+from hexapod_cosim.models.servos.presets import measured_servo, servo_table
 
 # relative, and N m or N m s: the same formulas; powers and exponentials of different libraries, and
 # 1 - tanh^2 of a saturated friction times a slope of 70 N m s
@@ -209,14 +207,6 @@ def test_a_driven_motor_takes_its_work_and_its_heat_from_the_supply() -> None:
     assert electrical_power(servo, torque, speed) == pytest.approx(torque * speed + heat, rel=1e-9)
 
 
-@pytest.mark.parametrize("name", list_servos())
-def test_friction_never_drives(name: str) -> None:
-    servo, rng = measured_servo(name).servo, np.random.default_rng(3)
-    speed, motor, external = rng.normal(0.0, 3.0, (3, 1000))
-    assert np.all(friction_torque(servo, speed, motor, external) * speed < 0.0)
-    assert has_measured_friction(servo)
-
-
 # the whole robot
 
 
@@ -275,33 +265,3 @@ def test_servos_that_cannot_be_are_refused_by_name(section: dict[str, Any], mess
     overrides = [f"servo.{key}={value}" for key, value in section.items()]
     with pytest.raises((ScenarioError, RobotError), match=message):
         scenario_robot(load_scenario("amble", overrides=overrides))
-
-
-@pytest.mark.parametrize(
-    ("change", "message"),
-    [
-        ({"voltage": 0.0}, "servo.voltage: got 0, expected more than 0 with servo.drive motor"),
-        ({"torque_constant": 0.0}, "servo.torque_constant: got 0"),
-        ({"resistance": 0.0}, "servo.resistance: got 0"),
-    ],
-)
-def test_the_plant_refuses_the_same(core: ct.CDLL, change: dict[str, Any], message: str) -> None:
-    robot = with_servo(load_robot("athena"), "mx64_m6")
-    with pytest.raises(PlantError, match=message):
-        Plant(core, changed(robot, servo=change))
-
-
-def test_a_robot_with_measured_servos_survives_its_urdf(tmp_path: Path) -> None:
-    robot = with_servo(load_robot("athena"), "mx64_m6")
-    path = tmp_path / "mine.urdf"
-    path.write_text(robot_to_urdf(robot), encoding="utf-8")
-    assert load_robot(path).servo == robot.servo
-    assert load_robot("athena").hash != robot.hash
-
-
-def test_servos_name_the_source_of_their_numbers() -> None:
-    for name in list_servos():
-        about = measured_servo(name).about
-        assert "Rhoban/bam 1b5a1ce" in about.source
-        assert name.endswith(about.friction_model)
-    assert {"mx64_m1", "mx64_m6", "mx106_m6", "sts3215_m1"} <= set(list_servos())

@@ -91,21 +91,6 @@ def test_a_row_of_a_grids_table_is_the_same_soil(core: ct.CDLL, name: str, foot:
         assert got == pytest.approx(computed(core, soil, foot, motion), rel=EXACT)
 
 
-def test_the_shear_base_has_its_slope(core: ct.CDLL) -> None:
-    h = 1e-7
-    for soil in (soil_preset("granular").soil, soil_preset("clay").soil):
-        for foot in FEET:
-            for z in (0.004, 0.0149, 0.022, 0.035):
-                low, high = (computed(core, soil, foot, (0.0, z + s, 0.0))[8] for s in (-h, h))
-                slope = computed(core, soil, foot, (0.0, z, 0.0))[9]
-                assert (high - low) / (2 * h) == pytest.approx(slope, rel=1e-6, abs=1e-9)
-
-
-def test_above_the_ground_there_is_no_force(core: ct.CDLL) -> None:
-    got = computed(core, soil_preset("dry_sand").soil, SPHERE, (0.0, -0.001, 0.2))
-    assert got[:8] == [0.0] * 8
-
-
 def test_a_law_that_is_linear_in_the_depth_has_finite_slopes_under_a_pad_that_just_touches(
     core: ct.CDLL,
 ) -> None:

@@ -114,12 +114,3 @@ def test_the_shear_curve_of_a_measured_soil_has_its_points(name: str) -> None:
         assert rate == pytest.approx(0.3 * math.exp(-way) * along, rel=CHECK)
     small = law.shear_force(soil, limit, 1e-9 * along)
     assert float(np.linalg.norm(small)) / 1e-9 == pytest.approx(limit / K, rel=CHECK)
-
-
-@pytest.mark.parametrize("name", [figures[0] for figures in FIGURES])
-def test_a_measured_soil_names_its_source(name: str) -> None:
-    preset = soil_preset(name)
-    seeds = name.startswith("poppy")
-    expected = "coefficients read in five public files" if seeds else "read, as transcribed in"
-    assert preset.source.startswith(expected)
-    assert preset.title

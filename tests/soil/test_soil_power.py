@@ -17,9 +17,8 @@ from states import changed
 from hexapod_cosim.models import Robot, load_robot
 from hexapod_cosim.models.actuator import gear_friction
 from hexapod_cosim.models.dynamics import Command
-from hexapod_cosim.models.records import Foot
 from hexapod_cosim.models.soil import law
-from hexapod_cosim.models.soil.losses import lost_power, stored_power
+from hexapod_cosim.models.soil.losses import lost_power
 from hexapod_cosim.models.soil.presets import soil_preset
 from hexapod_cosim.models.statics import standing
 
@@ -98,29 +97,6 @@ def test_the_rate_while_feet_sink_sums_up_to_the_books(core: ct.CDLL) -> None:
     summed = h / 3.0 * (rates[0] + rates[-1] + 4.0 * sum(rates[1::2]) + 2.0 * sum(rates[2:-1:2]))
     assert taken > 0.02
     assert summed == pytest.approx(taken, rel=1e-3)
-
-
-def feet_of_the_law() -> list[tuple[str, Foot]]:
-    shapes = (ATHENA.foot, replace(ATHENA.foot, pad_radius=0.025))
-    return [(name, foot) for name in ("dry_sand", "granular", "mud") for foot in shapes]
-
-
-@pytest.mark.parametrize(("name", "foot"), feet_of_the_law())
-def test_the_stored_power_is_the_growth_of_the_stored_energy(name: str, foot: Foot) -> None:
-    """While a foot sinks its plastic depth follows; on the line of unloading it stays."""
-    soil, h = soil_preset(name).soil, 1e-6
-    for z in (0.004, 0.012, 0.021):
-        own = [law.plastic_depth(soil, foot, z + s) for s in (-h, 0.0, h)]
-        energy = [
-            law.stored_energy(soil, foot, p, z + s) for p, s in zip(own, (-h, 0.0, h), strict=True)
-        ]
-        growth = (energy[2] - energy[0]) / (2.0 * h)
-        assert stored_power(soil, foot, own[1], z, 0.3) == pytest.approx(0.3 * growth, rel=1e-5)
-        way = z - own[1]
-        for share, dz in ((0.5, 0.3), (0.5, -0.3), (1.0, -0.3)):
-            line = law.unloading_stiffness(soil, foot) * share * way
-            got = stored_power(soil, foot, own[1], own[1] + share * way, dz)
-            assert got == pytest.approx(line * dz, rel=1e-9)
 
 
 @pytest.mark.parametrize(

@@ -6,21 +6,20 @@ import signal
 import subprocess
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
 import pytest
 from command import COMMAND
 from dask_cluster import TIMEOUT, dask_scheduler, kill, mortal_workers, restarting_workers
-from studies import KINEMATIC, Row, quiet, rows, run_quietly, stored_count, study_of
+from studies import KINEMATIC, Row, quiet, rows, run_quietly, study_of
 from study_runners import Slow
 
-from hexapod_cosim.extensions.study import workers as workers_module
 from hexapod_cosim.extensions.study.records import StudyError
 from hexapod_cosim.extensions.study.study import Options, run_study
 
 TABLE: dict[str, Any] = {**KINEMATIC, "seeds": 40, "factors": {"friction.mu": [0.3, 0.5]}}
-SHORT_TIMEOUT = 3.0  # s    without workers, in place of a minute
 
 
 @pytest.fixture(scope="module")
@@ -67,29 +66,16 @@ def test_a_killed_worker_costs_no_run(
     assert rows(tmp_path / "out") == alone
 
 
-def test_without_workers_a_study_ends_with_what_is_stored_and_is_resumed_in_this_process(
-    study_on: Callable[..., Any],
-    scheduler: str,
-    athena_fmu: Path,
-    alone: list[Row],
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
+def test_workers_that_join_when_all_are_gone_get_the_job_and_continue(
+    study_on: Callable[..., Any], scheduler: str, alone: list[Row], tmp_path: Path
 ) -> None:
-    with mortal_workers(scheduler, 2, tmp_path) as workers:
-        monkeypatch.setattr(workers_module, "NO_WORKER_TIMEOUT", TIMEOUT)
+    with ExitStack() as opened, mortal_workers(scheduler, 1, tmp_path) as workers:
 
-        def kill_all() -> None:
-            monkeypatch.setattr(workers_module, "NO_WORKER_TIMEOUT", SHORT_TIMEOUT)
-            for worker in workers:
-                kill(worker)
+        def replace() -> None:
+            kill(workers[0])
+            opened.enter_context(mortal_workers(scheduler, 1, tmp_path))
 
-        with pytest.raises(
-            StudyError,
-            match=r"the cluster has no workers.*dask worker tcp://.*all stored runs are kept",
-        ):
-            study_on(kill_all)
-    assert 0 < stored_count(study_of(TABLE), tmp_path / "out") < len(alone)
-    run_quietly(study_of(TABLE), tmp_path / "out", fmu=athena_fmu, runner=Slow)
+        study_on(replace)
     assert rows(tmp_path / "out") == alone
 
 

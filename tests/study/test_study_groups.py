@@ -9,25 +9,17 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-import pyarrow.parquet as pq
 import pytest
 from studies import Row, study_of, write_rows
 
 from hexapod_cosim.cosim.results.comparison import Change, change_of, half_width_of
-from hexapod_cosim.extensions.study.groups import (
-    Figures,
-    Groups,
-    Point,
-    Runs,
-    points_of,
-    settings_of_points,
-)
+from hexapod_cosim.extensions.study.groups import Figures, Point, Runs, points_of
 from hexapod_cosim.extensions.study.records import Study
 from hexapod_cosim.extensions.study.store import FIGURES, Store
-from hexapod_cosim.extensions.study.summary import POINTS, failure_counts, write_points
+from hexapod_cosim.extensions.study.summary import failure_counts
 
 ROUNDING = 1e-11  # relative: some dozen sums of numbers of one size
-COUNT, SEEDS, POINTS_AT_MOST = 5, 7, 100
+COUNT, SEEDS = 5, 7
 PAIR = ("point", "case", "seed", "control")
 TWO = study_of({"seeds": SEEDS, "factors": {"friction.mu": {"linspace": [0.3, 0.7, COUNT]}}})
 BOTH = TWO.controls
@@ -84,11 +76,8 @@ def summed(tmp_path: Path) -> Summed:
     def found(rows: Sequence[Row], study: Study = TWO) -> tuple[list[Point], Figures]:
         write_rows(study, tmp_path, rows)
         with closing(Store(tmp_path, study)) as store:
-            runs, settings = Runs(study, store), settings_of_points(study, store)
-            groups = Groups(runs, runs.starts())
-            write_points(tmp_path / POINTS, runs, groups, settings, {})
-            points = points_of(runs, groups, settings, most=POINTS_AT_MOST)
-            return points, Groups(runs).figures(0)
+            runs = Runs(study, store)
+            return points_of(runs, store)[0], runs.figures()
 
     return found
 
@@ -210,42 +199,6 @@ def test_falls_leave_no_figures_where_nothing_walked(summed: Summed) -> None:
         assert all(change.pairs == 0 and not change.verdict for change in changes)
         assert found.pairs == {"compliant": 0}
     assert sum(overall.runs.values()) == len(rows)
-
-
-def test_sums_of_numbers_far_from_zero_keep_their_spread(summed: Summed) -> None:
-    rows = [
-        {**row, "walked": True, "peak_force": 1e8 + k % 3}
-        for k, row in enumerate(made_rows(TWO, range(COUNT)))
-    ]
-    points, _ = summed(rows)
-    for point in points:
-        own = [row for row in rows if row["point"] == point.number]
-        values = np.array([row["peak_force"] for row in own if row["control"] == BOTH[0]])
-        # the values of 1e8 are doubles, of 16 digits
-        half_width = point.figures.means[BOTH[0]]["peak_force"].half_width
-        assert half_width == pytest.approx(half_width_of(values), rel=1e-6)
-
-
-@pytest.mark.parametrize("study", [TWO, THREE], ids=["two controls", "three controls"])
-def test_a_row_of_the_table_of_points_has_the_figures_of_its_point(
-    summed: Summed, study: Study, tmp_path: Path
-) -> None:
-    points, _ = summed(some_of(made_rows(study, range(COUNT)), share=0.7, seed=2), study)
-    rows = pq.read_table(tmp_path / POINTS).to_pylist()
-    assert len(rows) == len(points) == COUNT
-    for point, row in zip(points, rows, strict=True):
-        figures = point.figures
-        mean = figures.means["kinematic"]["slip_per_metre"].value
-        assert row["point"] == point.number
-        assert row["compliant.walked"] == figures.walked["compliant"]
-        assert row["kinematic.slip_per_metre"] == (mean if math.isfinite(mean) else None)
-        for control, changes in figures.changes.items():
-            before = f"{control}." if study is THREE else ""
-            change = changes["slip_per_metre"]
-            assert row[f"{before}pairs"] == figures.pairs[control]
-            assert row[f"{before}change.slip_per_metre.verdict"] == change.verdict
-            difference = row[f"{before}change.slip_per_metre"]
-            assert difference == (change.difference if change.pairs else None)
 
 
 def test_failures_are_counted_without_the_numbers_in_their_reasons_the_most_first(

@@ -15,7 +15,6 @@ from studies import run_quietly, study_of
 
 from hexapod_cosim.extensions.study.folder import RESULTS
 from hexapod_cosim.extensions.study.reading import study_from_table
-from hexapod_cosim.extensions.study.summary import POINTS, read_results
 from hexapod_cosim.models import load_robot
 
 TABLE: dict[str, Any] = {
@@ -62,5 +61,3 @@ def test_a_file_by_itself_holds_the_study_its_scenarios_seeds_versions_and_gains
     hold = asdict(gains)["hold"]
     assert json.loads(facts["gains"])["hold"] == hold
     assert facts["gains_sha256"] == hashlib.sha256(facts["gains"].encode()).hexdigest()
-    read_results(tmp_path / "out")
-    assert read_facts(tmp_path / "out" / POINTS) == facts

@@ -32,7 +32,7 @@ from study_runners import Counting, Slow
 
 from hexapod_cosim.cosim.run.walker import Walker
 from hexapod_cosim.extensions.study import store as store_module
-from hexapod_cosim.extensions.study.folder import MANIFEST, RESULTS, TIMES, export_runs, locked
+from hexapod_cosim.extensions.study.folder import MANIFEST, RESULTS, export_runs, locked
 from hexapod_cosim.extensions.study.reading import load_study
 from hexapod_cosim.extensions.study.records import StudyError
 from hexapod_cosim.extensions.study.store import RUNS, Store
@@ -48,13 +48,13 @@ MANY_RUNS: dict[str, Any] = {
 }
 REAL = """
 controls = ["kinematic"]
-seeds = 15
+seeds = 35
 [set]
 duration = 0.4
 [factors]
 friction.mu = {linspace = [0.3, 0.9, 20]}
 """
-REAL_RUNS = 300
+REAL_RUNS = 700
 
 
 @pytest.fixture
@@ -109,7 +109,6 @@ def test_files_have_the_runs_in_order_and_units_in_their_columns(
         export_runs(store, out)
     assert pq.read_table(out / RESULTS)["run"].to_pylist() == [0, 3, 4, 5, 8]
     assert pq.read_table(out / RESULTS)["walked"].to_pylist() == [True] * 5
-    assert pq.read_table(out / TIMES).to_pylist()[1] == {"run": 3, "wall": 0.5}
     assert pq.read_schema(out / RESULTS).field("slip_per_metre").metadata == {b"unit": b"m/m"}
 
 
@@ -125,25 +124,22 @@ def command(folder: Path, fmu: Path, *, study: Path) -> subprocess.Popen[str]:
     )
 
 
-def test_real_walks_killed_twice_at_any_point_and_completed_are_the_uninterrupted_ones(
+def test_real_walks_killed_at_any_point_and_completed_are_the_uninterrupted_ones(
     athena_fmu: Path, tmp_path: Path
 ) -> None:
     file = tmp_path / "study.toml"
     file.write_text(REAL)
     study, whole, killed = load_study(str(file)), tmp_path / "whole", tmp_path / "killed"
-    for least in (1, random.randint(30, 60)):
-        process = command(killed, athena_fmu, study=file)
-        deadline = time.monotonic() + TIMEOUT
-        while (
-            stored_count(study, killed) < least
-            and time.monotonic() < deadline
-            and process.poll() is None
-        ):
-            time.sleep(0.005)
-        time.sleep(random.uniform(0.0, 0.02))
-        os.killpg(process.pid, signal.SIGKILL)
-        process.wait()
-        assert least <= stored_count(study, killed) < REAL_RUNS
+    process = command(killed, athena_fmu, study=file)
+    deadline = time.monotonic() + TIMEOUT
+    while (
+        not stored_count(study, killed) and time.monotonic() < deadline and process.poll() is None
+    ):
+        time.sleep(0.02)
+    time.sleep(random.uniform(0.0, 0.02))
+    os.killpg(process.pid, signal.SIGKILL)
+    process.wait()
+    assert 0 < stored_count(study, killed) < REAL_RUNS
     kept = stored_rows(study, killed)
     process = command(killed, athena_fmu, study=file)
     _, err = process.communicate(timeout=TIMEOUT)

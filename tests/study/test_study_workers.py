@@ -98,15 +98,15 @@ def test_a_run_that_ends_its_worker_is_a_failure_with_a_reason_and_the_others_go
 ) -> None:
     deaths.unlink(missing_ok=True)
     place = {"scheduler": request.getfixturevalue("scheduler")} if cluster else {"workers": 1}
-    study = study_of({**KINEMATIC, "factors": {"friction.mu": [0.3, 0.5, 0.13, 0.6]}, "seeds": 2})
+    study = study_of({**KINEMATIC, "factors": {"friction.mu": [0.3, 0.5, 0.13, 0.6]}})
     found = run_quietly(study, tmp_path / "out", fmu=athena_fmu, **place)
     died = [row for row in found if row["status"] == DIED]
-    assert [(row["friction.mu"], row["seed"]) for row in died] == [(0.13, 0), (0.13, 1)]
+    assert [(row["friction.mu"], row["seed"]) for row in died] == [(0.13, 0)]
     assert {row["reason"] for row in died} == {WHY_DIED}
-    assert sum(row["walked"] for row in found) == len(found) - 2
-    assert [row["run"] for row in found] == list(range(8))
+    assert sum(row["walked"] for row in found) == len(found) - 1
+    assert [row["run"] for row in found] == list(range(4))
     counted = Counter(deaths.read_text().splitlines())
-    assert set(counted) == {"kinematic 0", "kinematic 1"}
+    assert set(counted) == {"kinematic 0"}
     # alone, and perhaps among other runs before
     assert all(number >= TRIES for number in counted.values())
 

@@ -57,12 +57,6 @@ class Ground:
     def __init__(self, core: ct.CDLL, file: bytes) -> None:
         self.core = bound(core)
         message = ct.create_string_buffer(MESSAGE_SIZE)
-        core.hx_terrain_create.restype = ct.c_void_p
-        core.hx_terrain_create.argtypes = [ct.c_char_p, ct.c_size_t, ct.c_char_p]
-        core.hx_terrain_destroy.argtypes = [ct.c_void_p]
-        core.hx_plant_set_terrain.argtypes = [ct.c_void_p, ct.c_void_p]
-        core.hx_terrain_checksum.argtypes = [ct.c_void_p]
-        core.hx_terrain_checksum.restype = ct.c_uint64
         self.handle = core.hx_terrain_create(file, len(file), message)
         if not self.handle:
             raise ValueError(message.value.decode())

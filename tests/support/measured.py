@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from hexapod_cosim.cosim.interface.names import foot_names, foot_vector_names, joint_names
 from hexapod_cosim.cosim.master.recorder import Recording
 from hexapod_cosim.cosim.master.signals import COMMANDED
-from hexapod_cosim.cosim.results.walk import Walk
+from hexapod_cosim.cosim.results.window import JudgedWindow
 from hexapod_cosim.cosim.run.single_run import initialise_plant, make_plan, open_plant
 from hexapod_cosim.cosim.scenario.records import Scenario
 from hexapod_cosim.models import Servo
@@ -115,7 +115,9 @@ def as_samples(times: Array, rows: Array) -> Samples:
     return Samples(times, torque, speed, normal, across, velocity.reshape(2, -1, 6, 3))
 
 
-def sampled_metrics(before: Samples, walk: Walk, servo: Servo, *, mu: float) -> dict[str, float]:
+def sampled_metrics(
+    before: Samples, walk: JudgedWindow, servo: Servo, *, mu: float
+) -> dict[str, float]:
     """Returns the metrics that use the plant's measures, calculated from samples alone.
 
     before: samples that begin at least half a gait cycle before the walk's measured part, to

@@ -5,12 +5,45 @@ Lengths are multiplied by l, masses by l^3, times by sqrt(l).
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
+from typing import TypeVar
 
 from hexapod_cosim.models import Robot
-from hexapod_cosim.models.contact.law import Contact
-from hexapod_cosim.models.friction import Friction
-from hexapod_cosim.models.records import Leg, Link, Servo, Vector3, Vector6
+
+Part = TypeVar("Part")
+# exponents of l in the numbers of a robot's parts
+LINK = {"mass": 3, "com": 1, "inertia": 5, "length": 1, "offset_y": 1, "offset_z": 1}
+PARTS: Mapping[str, Mapping[str, float]] = {
+    "torso": {"mass": 3, "size": 1, "com": 1, "inertia": 5},
+    "foot": {"radius": 1, "youngs_modulus": 1},
+    # K in F = K d^1.5 is proportional to sqrt(R) E
+    "contact": {"stiffness": 1.5, "damping_factor": -0.5, "impact_speed_floor": 0.5},
+    "friction": {"slope": -0.5, "presliding": 1, "bristle_damping": 0.5},
+    "servo": {
+        "kp": 4,
+        "kd": 4.5,
+        "torque_max": 4,
+        "speed_max": -0.5,
+        "rotor_inertia": 5,
+        "coulomb_friction": 4,
+        "torque_continuous": 4,
+    },
+    "baumgarte": {"alpha": -0.5, "beta": -0.5},
+    "solver": {"step": 0.5, "step_max": 0.5},
+    "gait": {"period": 0.5, "stride": 1, "step_height": 1},
+}
+
+
+def scaled_part(part: Part, by: float, exponents: Mapping[str, float]) -> Part:
+    """Multiplies fields of a dataclass, numbers or vectors, by powers of a factor."""
+
+    def times(value: float | tuple[float, ...], exponent: float) -> float | tuple[float, ...]:
+        factor = by**exponent
+        return tuple(factor * x for x in value) if isinstance(value, tuple) else factor * value
+
+    changes = {name: times(getattr(part, name), power) for name, power in exponents.items()}
+    return replace(part, **changes)  # type: ignore[type-var]
 
 
 def scaled_robot(robot: Robot, by: float) -> Robot:
@@ -18,92 +51,10 @@ def scaled_robot(robot: Robot, by: float) -> Robot:
 
     Forces are multiplied by by^3, torques by by^4, moduli of elasticity by by.
     """
-    time = by**0.5
-    torso, foot, baumgarte, gait = robot.torso, robot.foot, robot.baumgarte, robot.gait
-    return replace(
-        robot,
-        name=f"{robot.name}_times_{by:g}",
-        torso=replace(
-            torso,
-            mass=by**3 * torso.mass,
-            size=_scaled_vector(torso.size, by),
-            com=_scaled_vector(torso.com, by),
-            inertia=_scaled_inertia(torso.inertia, by),
-        ),
-        legs=tuple(_scaled_leg(leg, by) for leg in robot.legs),
-        foot=replace(foot, radius=by * foot.radius, youngs_modulus=by * foot.youngs_modulus),
-        contact=_scaled_contact(robot.contact, by),
-        friction=_scaled_friction(robot.friction, by),
-        servo=_scaled_servo(robot.servo, by),
-        baumgarte=replace(baumgarte, alpha=baumgarte.alpha / time, beta=baumgarte.beta / time),
-        solver=replace(
-            robot.solver, step=time * robot.solver.step, step_max=time * robot.solver.step_max
-        ),
-        gait=replace(
-            gait,
-            period=time * gait.period,
-            stride=by * gait.stride,
-            step_height=by * gait.step_height,
-        ),
-    )
-
-
-def _scaled_vector(values: Vector3, by: float) -> Vector3:
-    x, y, z = values
-    return by * x, by * y, by * z
-
-
-def _scaled_inertia(inertia: Vector6, by: float) -> Vector6:
-    xx, yy, zz, xy, xz, yz = (by**5 * value for value in inertia)
-    return xx, yy, zz, xy, xz, yz
-
-
-def _scaled_leg(leg: Leg, by: float) -> Leg:
-    coxa, femur, tibia = (_scaled_link(link, by) for link in leg.links)
-    return replace(
-        leg, hip_position=_scaled_vector(leg.hip_position, by), links=(coxa, femur, tibia)
-    )
-
-
-def _scaled_link(link: Link, by: float) -> Link:
-    return replace(
-        link,
-        mass=by**3 * link.mass,
-        com=_scaled_vector(link.com, by),
-        inertia=_scaled_inertia(link.inertia, by),
-        length=by * link.length,
-        offset_y=by * link.offset_y,
-        offset_z=by * link.offset_z,
-    )
-
-
-def _scaled_contact(contact: Contact, by: float) -> Contact:
-    """Scales the contact, whose stiffness K in F = K d^1.5 is proportional to sqrt(R) E."""
-    return replace(
-        contact,
-        stiffness=by**1.5 * contact.stiffness,
-        damping_factor=contact.damping_factor / by**0.5,
-        impact_speed_floor=contact.impact_speed_floor * by**0.5,
-    )
-
-
-def _scaled_friction(friction: Friction, by: float) -> Friction:
-    return replace(
-        friction,
-        slope=friction.slope / by**0.5,
-        presliding=by * friction.presliding,
-        bristle_damping=by**0.5 * friction.bristle_damping,
-    )
-
-
-def _scaled_servo(servo: Servo, by: float) -> Servo:
-    return replace(
-        servo,
-        kp=by**4 * servo.kp,
-        kd=by**4 * by**0.5 * servo.kd,
-        torque_max=by**4 * servo.torque_max,
-        speed_max=servo.speed_max / by**0.5,
-        rotor_inertia=by**5 * servo.rotor_inertia,
-        coulomb_friction=by**4 * servo.coulomb_friction,
-        torque_continuous=by**4 * servo.torque_continuous,
-    )
+    legs = []
+    for leg in robot.legs:
+        coxa, femur, tibia = (scaled_part(link, by, LINK) for link in leg.links)
+        moved = scaled_part(leg, by, {"hip_position": 1})
+        legs.append(replace(moved, links=(coxa, femur, tibia)))
+    parts = {name: scaled_part(getattr(robot, name), by, powers) for name, powers in PARTS.items()}
+    return replace(robot, name=f"{robot.name}_times_{by:g}", legs=tuple(legs), **parts)

@@ -9,13 +9,14 @@ from typing import Any
 
 import numpy as np
 from plant import Plant
+from scaled_robots import scaled_part
 
 from hexapod_cosim.models import BodyContact, Leg, Link, Robot, load_robot
 from hexapod_cosim.models.contact.geometry import foot_contacts
 from hexapod_cosim.models.dynamics import Command
 from hexapod_cosim.models.ground.faces import ground_normal
 from hexapod_cosim.models.kinematics import body_states
-from hexapod_cosim.models.records import Array, Vector3, Vector6
+from hexapod_cosim.models.records import Array, Vector6
 
 LEGS, JOINTS = 6, 3
 MACRO = 0.004  # s, macro-step of a trail
@@ -41,34 +42,15 @@ def with_links(robot: Robot, joint: int, **fields: Any) -> Robot:
 
 def scaled(robot: Robot, size: float) -> Robot:
     """Multiplies every length of a robot, and inertias by its square; masses stay the same."""
-
-    def lengths(values: Vector3) -> Vector3:
-        return (size * values[0], size * values[1], size * values[2])
-
-    def inertia(values: Vector6) -> Vector6:
-        xx, yy, zz, xy, xz, yz = (size * size * value for value in values)
-        return (xx, yy, zz, xy, xz, yz)
-
-    def link(part: Link) -> Link:
-        x, y, z = lengths(part.tip)
-        return replace(
-            part,
-            length=x,
-            offset_y=y,
-            offset_z=z,
-            com=lengths(part.com),
-            inertia=inertia(part.inertia),
-        )
-
+    part = {"com": 1, "inertia": 2}
     legs = []
     for leg in robot.legs:
-        coxa, femur, tibia = (link(part) for part in leg.links)
-        legs.append(
-            replace(leg, hip_position=lengths(leg.hip_position), links=(coxa, femur, tibia))
-        )
-    torso = replace(robot.torso, com=lengths(robot.torso.com), inertia=inertia(robot.torso.inertia))
-    rotor = size * size * robot.servo.rotor_inertia
-    return changed(replace(robot, torso=torso, legs=tuple(legs)), servo={"rotor_inertia": rotor})
+        lengths = {"length": 1, "offset_y": 1, "offset_z": 1}
+        coxa, femur, tibia = (scaled_part(link, size, part | lengths) for link in leg.links)
+        moved = scaled_part(leg, size, {"hip_position": 1})
+        legs.append(replace(moved, links=(coxa, femur, tibia)))
+    servo = scaled_part(robot.servo, size, {"rotor_inertia": 2})
+    return replace(robot, torso=scaled_part(robot.torso, size, part), legs=tuple(legs), servo=servo)
 
 
 def lopsided(seed: int = 0) -> Robot:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from hexapod_cosim.cosim.interface.plant_interface import load_interface
 from hexapod_cosim.cosim.master.recorder import COMMAND_COLUMNS, Recording
 from hexapod_cosim.cosim.results.metrics import PLANNED, compute_metrics
-from hexapod_cosim.cosim.results.walk import View, robot_weight, running_integral
+from hexapod_cosim.cosim.results.window import View, robot_weight, running_integral
 from hexapod_cosim.models import LEG_NAMES, load_robot
 
 Numbers = NDArray[np.floating[Any]] | NDArray[np.bool_]

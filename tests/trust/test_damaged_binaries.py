@@ -15,7 +15,6 @@ import pytest
 
 from hexapod_cosim.cosim.common.own_process import ProcessEndedError, call_in_process
 from hexapod_cosim.cosim.control.fmu_instance import open_controller_fmu
-from hexapod_cosim.cosim.control.trial import refuse_crashing
 from hexapod_cosim.cosim.export.controller_export import export_controller
 from hexapod_cosim.cosim.export.plant_export import export_fmu
 from hexapod_cosim.cosim.run.controller_setup import make_setup
@@ -78,12 +77,6 @@ def run(*arguments: str | Path) -> subprocess.CompletedProcess[str]:
     )  # fmt: skip
 
 
-def test_validation_finds_it(plant: Path) -> None:
-    done = run("validate", plant)
-    assert done.returncode == 1, done
-    assert "ended the process: got SIGSEGV" in " ".join(done.stdout.split())
-
-
 def test_a_run_refuses_a_plant(plant: Path, tmp_path: Path) -> None:
     done = run("simulate", "walk_flat", "--fmu", plant, "-o", tmp_path / "out")
     assert done.returncode == 1, done
@@ -96,15 +89,6 @@ def test_a_run_refuses_a_controller(controller: Path, tmp_path: Path) -> None:
         done = run("simulate", "walk_flat", *choice, "-o", tmp_path / "out")
         assert done.returncode == 1, done
         assert "ends the process that loads it: got 'SIGSEGV'" in " ".join(done.stderr.split())
-
-
-def test_a_sound_fmu_and_a_file_that_is_none_are_not_refused(
-    athena_fmu: Path, tmp_path: Path
-) -> None:
-    refuse_crashing(athena_fmu)
-    refuse_crashing(tmp_path / "missing.fmu")
-    (tmp_path / "text.fmu").write_text("no archive", encoding="utf-8")
-    refuse_crashing(tmp_path / "text.fmu")
 
 
 def test_an_archive_of_fmi3_may_not_leave_its_folder(plant_build: Path, tmp_path: Path) -> None:

@@ -98,14 +98,3 @@ def test_a_number_of_a_material_out_of_its_range_is_named(
     with pytest.raises(ValueError, match="terrain grid") as caught:
         Ground(core, with_material(column, value, law))
     assert str(caught.value).startswith(f"terrain grid: table: {said}")
-
-
-@pytest.mark.parametrize("law", [0.0, 1.0, 2.0, 3.0])
-def test_a_material_with_numbers_in_their_ranges_is_taken(core: ct.CDLL, law: float) -> None:
-    assert Ground(core, with_material(0, NAN, law)).checksum
-    assert Ground(core, with_material(1, 0.9, law)).checksum
-    assert Ground(core, with_material(2, 1e5, law)).checksum
-
-
-def test_a_material_without_soil_may_have_any_parameters_of_soil(core: ct.CDLL) -> None:
-    assert Ground(core, with_material(SOIL + 7, -1.0)).checksum

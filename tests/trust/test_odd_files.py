@@ -14,11 +14,6 @@ from pathlib import Path
 import pytest
 
 from hexapod_cosim.cosim.cli import main
-from hexapod_cosim.cosim.common.files import write_text
-from hexapod_cosim.models import HexapodError
-from hexapod_cosim.models.files import LARGEST_FILE, MAP_SIZE
-from hexapod_cosim.models.ground import map_files
-from hexapod_cosim.models.schema import parse_toml
 
 MODELS = Path(__file__).resolve().parents[2] / "models"
 ATHENA = (MODELS / "athena.toml").read_text(encoding="utf-8")
@@ -85,21 +80,6 @@ def test_large_numbers_and_deep_tables_are_no_toml(
     expected = "an integer of more than 64 bits" if name.startswith("large") else "deep"
     assert expected in text
     assert [path.name for path in tmp_path.iterdir()] == ["file.toml"]
-
-
-def test_numbers_of_64_bits_and_64_tables_are_read() -> None:
-    assert parse_toml(f"x = {2**63 - 1}") == {"x": 2**63 - 1}
-    assert parse_toml(f"x = {-(2**63) + 1}") == {"x": -(2**63) + 1}
-    inner = parse_toml("x = " + 63 * "[" + 63 * "]")["x"]
-    assert isinstance(inner, list)
-
-
-@pytest.mark.parametrize("name", LARGE)
-def test_a_large_number_on_the_command_line_is_no_number(plant_build: Path, name: str) -> None:
-    text = refused("simulate", "walk_flat", "--set", f"duration={LARGE[name]}")
-    what = "wrong unit" if name == "hexadecimal" else "number without unit in quotes"
-    assert f"duration: {what}: got " in text
-    assert "expected a value in s or ms or us or min" in text
 
 
 @pytest.mark.parametrize(
@@ -185,13 +165,6 @@ def test_a_report_of_a_damaged_file_names_it(
     assert name in refused("report", str(damaged(results, tmp_path, name, content)))
 
 
-@pytest.mark.parametrize("share", [0.01, 0.5, 0.99])
-def test_a_recording_cut_short_is_named(results: Path, tmp_path: Path, share: float) -> None:
-    whole = (results / "results.parquet").read_bytes()
-    copy = damaged(results, tmp_path, "results.parquet", whole[: int(share * len(whole))])
-    assert "results.parquet" in refused("report", str(copy))
-
-
 def test_a_report_into_a_folder_that_takes_no_files_names_the_place(
     results: Path, tmp_path: Path
 ) -> None:
@@ -239,36 +212,12 @@ def test_a_file_without_an_end_is_refused(
     assert "a file of more than 64 MiB" in refused(*command)
 
 
-def test_the_limits_of_files_are_those_of_the_page() -> None:
-    assert (LARGEST_FILE, MAP_SIZE) == (67_108_864, 536_870_912)
-
-
-def test_a_height_map_without_an_end_is_refused(
-    plant_build: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(map_files, "MAP_SIZE", 1000)
-    (tmp_path / "map.asc").write_text("1 " * 1000, encoding="utf-8")
-    kind = ("--set", "terrain.kind=heightfield")
-    file = ("--set", f"terrain.file={tmp_path / 'map.asc'}")
-    text = refused("simulate", "walk_flat", *kind, *file, "-o", str(tmp_path / "o"))
-    assert "a file of more than 0 MiB" in text
-
-
 def test_a_full_memory_is_one_paragraph(plant_build: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def full(*_: object, **__: object) -> None:
         raise MemoryError
 
     monkeypatch.setattr("hexapod_cosim.cosim.validate.validation.find_problems", full)
     assert "the memory is full" in refused("validate", "x.fmu")
-
-
-@pytest.mark.parametrize("duty", ["5e-324", "1e-6", "0.9999999999999999"])
-def test_a_gait_without_stance_or_swing_is_refused(
-    plant_build: Path, tmp_path: Path, duty: str
-) -> None:
-    sets = ("--set", f"gait.duty={duty}", "--set", "duration=0.02")
-    text = refused("simulate", "walk_flat", *sets, "-o", str(tmp_path / "o"))
-    assert "the gait's shorter phase" in text
 
 
 @pytest.mark.parametrize("path", [".", "/", "", "folder", "..", "./"])
@@ -302,13 +251,6 @@ def test_a_folder_whose_name_is_no_utf_8_gets_results(
     assert code == 0, text
     assert (folder / "report.html").is_file()
     assert said("report", str(folder))[0] == 0
-
-
-def test_a_text_that_is_no_utf_8_is_not_written(tmp_path: Path) -> None:
-    (tmp_path / "file").write_text("before", encoding="utf-8")
-    with pytest.raises(HexapodError, match="expected names of files in UTF-8"):
-        write_text(tmp_path / "file", "a\udcff")
-    assert (tmp_path / "file").read_text(encoding="utf-8") == "before"
 
 
 def test_a_setting_that_is_no_utf_8_is_refused(plant_build: Path, tmp_path: Path) -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import re
 import signal
 import subprocess
 import sys
@@ -12,8 +11,6 @@ from pathlib import Path
 
 import pytest
 
-from hexapod_cosim import cosim, gym
-from hexapod_cosim.cosim.cli import main
 from hexapod_cosim.cosim.common import files
 from hexapod_cosim.cosim.common import temporary as temporaries
 from hexapod_cosim.cosim.results.results import results_folder
@@ -105,33 +102,6 @@ def test_the_unpacked_folder_of_a_killed_process_is_deleted_by_the_next(
     process.stdout.close()
 
 
-def test_a_folder_that_is_no_unpacked_fmu_is_not_deleted(temporary: Path) -> None:
-    (temporary / "hexapod-fmu-notes").mkdir()
-    (temporary / "hexapod-fmu-notes" / "text").write_text("mine", encoding="utf-8")
-    (temporary / "hexapod-fmu-link").symlink_to(temporary / "hexapod-fmu-notes")
-    later = temporary.stat().st_mtime + 1000.0
-    assert temporaries.sweep(now=later) == []
-    assert (temporary / "hexapod-fmu-notes" / "text").exists()
-
-
-def test_what_is_not_closed_is_deleted_when_its_process_ends(temporary: Path) -> None:
-    code = """
-from hexapod_cosim.cosim.common.temporary import TemporaryFolder
-kept = TemporaryFolder("fmu")
-print(kept.path)
-raise KeyboardInterrupt
-"""
-    done = subprocess.run(
-        [sys.executable, "-c", code],
-        env=os.environ | {"TMPDIR": str(temporary)},
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert "hexapod-fmu-" in done.stdout
-    assert list(temporary.iterdir()) == []
-
-
 COMMANDS = {
     "simulate": ("simulate", "walk_flat", "--set", "duration=1000"),
     "compare": ("compare", "walk_flat", "--set", "duration=1000"),
@@ -160,17 +130,6 @@ def test_a_killed_command_leaves_nothing_that_the_next_does_not_delete(
     assert list(temporary.iterdir()) == []
 
 
-def test_every_temporary_folder_is_one_that_is_swept() -> None:
-    rooms = [Path(cosim.__file__).parent, Path(gym.__file__).parent]
-    made = {
-        path.name
-        for room in rooms
-        for path in room.rglob("*.py")
-        if re.search(r"TemporaryDirectory|mkdtemp", path.read_text(encoding="utf-8"))
-    }
-    assert made == {"temporary.py"}
-
-
 def test_files_are_flushed_before_they_replace_others(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -189,17 +148,3 @@ def test_files_are_flushed_before_they_replace_others(
     monkeypatch.setattr(Path, "replace", replaced)
     files.write_text(tmp_path / "file", "text")
     assert order == ["flush", "replace", "flush"]
-
-
-def test_ctrl_c_inside_an_import_is_an_interrupt(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    def interrupted(*_: object) -> int:
-        try:
-            raise KeyboardInterrupt
-        except KeyboardInterrupt as error:
-            raise RuntimeError("failed to initialize ft2font") from error
-
-    monkeypatch.setattr("hexapod_cosim.cosim.cli._run", interrupted)
-    assert main(["simulate"]) == 130
-    assert capsys.readouterr().err == "hexapod: interrupted\n"

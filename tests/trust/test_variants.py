@@ -21,10 +21,8 @@ from numpy.testing import assert_array_equal
 from hexapod_cosim.cosim.common.plant_files import fmi_headers, source_files
 from hexapod_cosim.cosim.export import plant_export
 from hexapod_cosim.cosim.export.plant_export import export_fmu
-from hexapod_cosim.cosim.interface.variants import listed_items
-from hexapod_cosim.cosim.master.fmu import Fmu
 from hexapod_cosim.cosim.validate.validation import find_problems
-from hexapod_cosim.models import FmuError, load_robot
+from hexapod_cosim.models import load_robot
 
 ATHENA = load_robot("athena")
 TF = ("true", "false")
@@ -106,17 +104,3 @@ def test_integers_replace_enumerations_and_change_no_result(
         fmpy.simulate_fmu(str(fmu), stop_time=0.02, output=output) for fmu in (usual, plain)
     )
     assert_array_equal(one, other)
-
-
-def test_an_integer_lists_its_items_and_takes_their_names(
-    plant_library: Path, tmp_path: Path
-) -> None:
-    fmu = export_fmu(ATHENA, tmp_path / "plain.fmu", integers=True)
-    with Fmu(fmu) as plant:
-        variable = plant.variables["terrain.kind"]
-        assert (variable.min, variable.max) == ("1", "3")
-        assert listed_items(variable.description) == {"flat": 1, "slope": 2, "grid": 3}
-        plant.set_parameters({"terrain.kind": "slope"})
-        assert plant.parameters()["terrain.kind"] == 2.0
-        with pytest.raises(FmuError, match="got 'hill', expected one of flat, slope, grid"):
-            plant.set_parameters({"terrain.kind": "hill"})

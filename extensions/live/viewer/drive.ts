@@ -16,9 +16,8 @@ export const NONE: Axes = { forward: 0, left: 0, turn: 0 };
 export class Drive {
   private readonly sources = new Map<string, Axes>();
   private readonly listeners: (() => void)[] = [];
-  private sent = "";
+  private sent = JSON.stringify({ ...NONE, height: 0 });
   private at = 0;
-  private moved = false;
   private pace: number;
   private rise = 0;
 
@@ -79,20 +78,14 @@ export class Drive {
   /** Sends the drive if it is a new one, or if the robot is to move on. */
   private renew(): void {
     const { axes } = this;
-    const content = { ...axes, speed: this.pace, height: Math.round(GRAIN * this.rise) / GRAIN };
-    const text = JSON.stringify(content);
     const now = performance.now();
-    const moves = axes.forward !== 0 || axes.left !== 0 || axes.turn !== 0;
-    const due = text !== this.sent ? this.wants(moves) : moves && now - this.at > RENEW;
+    const moves = Object.values(axes).some((axis) => axis !== 0);
+    const height = Math.round(GRAIN * this.rise) / GRAIN;
+    // the speed alone is no drive: a page that only watches sends nothing
+    const text = JSON.stringify({ ...axes, height, ...(moves ? { speed: this.pace } : {}) });
+    const due = text !== this.sent || (moves && now - this.at > RENEW);
     if (!due || now - this.at < OFTEN || this.link.state !== "open") return;
-    [this.sent, this.at, this.moved] = [text, now, moves];
-    this.link.send({ type: "drive", ...content });
-  }
-
-  /** A page that only watches sends nothing: the speed alone is no drive. */
-  private wants(moves: boolean): boolean {
-    if (moves || this.moved) return true;
-    const before = this.sent ? (JSON.parse(this.sent) as { height: number }).height : 0;
-    return Math.round(GRAIN * this.rise) / GRAIN !== before;
+    [this.sent, this.at] = [text, now];
+    this.link.send({ type: "drive", ...axes, height, speed: this.pace });
   }
 }

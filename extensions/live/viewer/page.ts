@@ -2,13 +2,11 @@ import plotStyle from "uplot/dist/uPlot.min.css";
 import { byId, element } from "../../../cosim/viewer/src/dom";
 import { Theme } from "../../../cosim/viewer/src/theme";
 import { Drive } from "./drive";
-import { Pad } from "./gamepad";
 import { Keys } from "./keys";
 import type { Connection } from "./link";
-import type { Setup, World } from "./messages";
-import { note, Panel } from "./panel";
+import type { Frame, Setup, World } from "./messages";
+import { Panel } from "./panel";
 import { Plots } from "./plots";
-import { Poses } from "./poses";
 import { Pusher } from "./push";
 import { listenToTouch } from "./touch";
 import { View } from "./view";
@@ -22,15 +20,14 @@ export function start(setup: Setup, link: Connection): void {
   const theme = new Theme(byId<HTMLButtonElement>("theme"));
   const drive = new Drive(link, setup.speed);
   const panel = new Panel(setup, link, drive);
-  const [plots, poses, view] = [new Plots(), new Poses(), makeView()];
-  let world: World | undefined;
-  link.on("world", (message) => {
-    world = message;
-    plots.build(message);
-    void view?.build(message);
+  const [plots, view] = [new Plots(byId("plots")!), makeView()];
+  const shown: { world?: World; frame?: Frame } = {};
+  link.on("world", (world) => {
+    shown.world = world;
+    void view?.build(world);
   });
   link.on("frame", (frame) => {
-    poses.add(frame);
+    shown.frame = frame;
     plots.add(frame);
     panel.showFrame(frame);
     document.documentElement.dataset.ready = "true";
@@ -42,23 +39,17 @@ export function start(setup: Setup, link: Connection): void {
   const keys = new Keys(drive, actionsOf(drive, panel, theme, view));
   listenToPad(keys);
   listenToTouch(drive);
-  const pad = new Pad(drive, buttonsOf(panel), (name) => {
-    document.documentElement.dataset.gamepad = name;
-    if (name) note(`Gamepad: ${name}`);
-  });
-  const pusher = view && new Pusher(view, link, () => world?.weight ?? 0);
+  const pusher = view && new Pusher(view, link, () => shown.world?.weight ?? 0);
   listenToHelp();
-  byId("home")?.addEventListener("click", () => view?.home());
+  byId("home")?.addEventListener("click", () => view?.eye.home());
   const picture = (): void => {
-    pad.read();
     pusher?.renew();
-    const shown = poses.advance();
-    if (shown) view?.draw(shown.pose, shown.frame);
+    if (shown.frame) view?.draw(shown.frame);
     plots.draw();
     requestAnimationFrame(picture);
   };
   requestAnimationFrame(picture);
-  Object.assign(window, { hexapod: { link, drive, poses, plots, view, panel } });
+  Object.assign(window, { hexapod: { link, view, shown } });
 }
 
 /** Returns the 3D view, or shows why there is none. */
@@ -99,21 +90,9 @@ function actionsOf(
     },
     Space: () => panel.act("pause"),
     Backspace: () => panel.act("place"),
-    KeyH: () => view?.home(),
+    KeyH: () => view?.eye.home(),
     KeyT: () => theme.toggle(),
     "?": () => byId("help-button")?.click(),
-  };
-}
-
-/** What the buttons of a gamepad do: A, X, Y, and the two at its front. */
-function buttonsOf(panel: Panel): Record<number, () => void> {
-  return {
-    0: () => panel.act("place"),
-    2: () => panel.act("record"),
-    3: () => panel.next("control"),
-    4: () => panel.next("gait", -1),
-    5: () => panel.next("gait"),
-    9: () => panel.act("pause"),
   };
 }
 

@@ -1,16 +1,16 @@
 import uPlot from "uplot";
-import { byId, element } from "../../../cosim/viewer/src/dom";
+import { element } from "../../../cosim/viewer/src/dom";
 import { property, quietAxis } from "../../../cosim/viewer/src/theme";
-import type { Frame, World } from "./messages";
+import type { Frame } from "./messages";
 
 const WIDTH = 8; // s    that the plots show
 const SLOWEST = 45; // ms    between two drawings
 const DEGREES = 180 / Math.PI;
+const LEGS = ["LF", "LM", "LR", "RF", "RM", "RR"];
 
 interface Curve {
   readonly label: string;
   readonly colour: string;
-  readonly dash?: number[];
   value(frame: Frame): number;
 }
 
@@ -23,23 +23,62 @@ interface Described {
   readonly curves: readonly Curve[];
 }
 
-/** Returns a number with a fixed count of digits, and zero without a sign. */
-function fixed(value: number, digits: number): string {
-  const text = value.toFixed(digits);
-  return Number(text) === 0 ? (0).toFixed(digits) : text;
-}
+const STRIPS: readonly Described[] = [
+  {
+    name: "Foot forces",
+    unit: "body weights",
+    least: [0, 0.6],
+    digits: 2,
+    curves: LEGS.map((label, k) => ({
+      label,
+      colour: `--leg${k}`,
+      value: (frame) => Math.hypot(...frame.force.slice(3 * k, 3 * k + 3)),
+    })),
+  },
+  {
+    name: "Speed",
+    unit: "mm/s",
+    least: [-60, 120],
+    digits: 0,
+    curves: [
+      { label: "commanded", colour: "--commanded", value: (f) => 1e3 * f.command[0] },
+      { label: "forward", colour: "--curve1", value: (f) => 1e3 * f.speed[0] },
+      { label: "left", colour: "--curve2", value: (f) => 1e3 * f.speed[1] },
+    ],
+  },
+  {
+    name: "Attitude",
+    unit: "degrees",
+    least: [-3, 3],
+    digits: 1,
+    curves: [
+      { label: "roll", colour: "--curve1", value: (f) => DEGREES * f.tilt[0] },
+      { label: "pitch", colour: "--curve2", value: (f) => DEGREES * f.tilt[1] },
+    ],
+  },
+  {
+    name: "Slip",
+    unit: "mm/s",
+    least: [0, 40],
+    digits: 0,
+    curves: [
+      {
+        label: "fastest foot",
+        colour: "--curve3",
+        value: (f) => 1e3 * Math.max(...f.slip.map((speed, k) => (f.contact[k] ? speed : 0))),
+      },
+    ],
+  },
+];
 
 /** Plots that run along: the last seconds of a few quantities. */
 export class Plots {
-  private readonly strips: Strip[] = [];
+  private readonly strips: Strip[];
   private drawn = 0;
   private placed = -1;
 
-  build(world: World): void {
-    if (this.strips.length > 0) return;
-    const host = byId("plots");
-    if (!host) return;
-    for (const one of described(world)) this.strips.push(new Strip(one, host));
+  constructor(host: HTMLElement) {
+    this.strips = STRIPS.map((about) => new Strip(about, host));
   }
 
   add(frame: Frame): void {
@@ -57,70 +96,13 @@ export class Plots {
   }
 
   repaint(): void {
-    for (const strip of this.strips) strip.repaint();
+    for (const strip of this.strips) strip.plot.redraw(false, true);
   }
-
-  /** Number of points of each plot, for tests. */
-  get counts(): number[] {
-    return this.strips.map((strip) => strip.count);
-  }
-}
-
-function described(world: World): Described[] {
-  const legs = world.robot.legs.map(({ name }) => name);
-  const size = (frame: Frame, k: number) => Math.hypot(...frame.force.slice(3 * k, 3 * k + 3));
-  return [
-    {
-      name: "Foot forces",
-      unit: "body weights",
-      least: [0, 0.6],
-      digits: 2,
-      curves: legs.map((label, k) => ({
-        label,
-        colour: `--leg${k}`,
-        value: (frame) => size(frame, k),
-      })),
-    },
-    {
-      name: "Speed",
-      unit: "mm/s",
-      least: [-60, 120],
-      digits: 0,
-      curves: [
-        { label: "asked", colour: "--commanded", dash: [4, 3], value: (f) => 1e3 * f.command[0] },
-        { label: "forward", colour: "--curve1", value: (f) => 1e3 * f.speed[0] },
-        { label: "left", colour: "--curve2", value: (f) => 1e3 * f.speed[1] },
-      ],
-    },
-    {
-      name: "Attitude",
-      unit: "degrees",
-      least: [-3, 3],
-      digits: 1,
-      curves: [
-        { label: "roll", colour: "--curve1", value: (f) => DEGREES * f.tilt[0] },
-        { label: "pitch", colour: "--curve2", value: (f) => DEGREES * f.tilt[1] },
-      ],
-    },
-    {
-      name: "Sliding of feet",
-      unit: "mm/s",
-      least: [0, 40],
-      digits: 0,
-      curves: [
-        {
-          label: "fastest foot",
-          colour: "--curve3",
-          value: (f) => 1e3 * Math.max(...f.slip.map((speed, k) => (f.contact[k] ? speed : 0))),
-        },
-      ],
-    },
-  ];
 }
 
 /** One plot, with the newest values in its heading. */
 class Strip {
-  private readonly plot: uPlot;
+  readonly plot: uPlot;
   private readonly data: number[][];
   private readonly values: HTMLElement[];
 
@@ -138,14 +120,11 @@ class Strip {
     figure.append(heading, box);
     host.append(figure);
     this.data = [[], ...about.curves.map(() => [])];
-    this.plot = new uPlot(this.describe(box), this.data as uPlot.AlignedData, box);
-    new ResizeObserver(() =>
-      this.plot.setSize({ width: Math.max(box.clientWidth, 100), height: box.clientHeight || 110 }),
-    ).observe(box);
-  }
-
-  get count(): number {
-    return this.data[0].length;
+    this.plot = new uPlot(this.describe(), this.data as uPlot.AlignedData, box);
+    new ResizeObserver(() => {
+      const { clientWidth: width, clientHeight: height } = box;
+      if (width > 0 && height > 0) this.plot.setSize({ width, height });
+    }).observe(box);
   }
 
   add(frame: Frame): void {
@@ -161,7 +140,7 @@ class Strip {
   }
 
   draw(): void {
-    const last = this.data[0][this.data[0].length - 1];
+    const last = this.data[0].at(-1);
     if (last === undefined) return;
     this.plot.setData(this.data as uPlot.AlignedData, false);
     this.plot.batch(() => {
@@ -169,13 +148,8 @@ class Strip {
       this.plot.setScale("y", this.range());
     });
     this.values.forEach((value, k) => {
-      const column = this.data[k + 1];
-      value.textContent = fixed(column[column.length - 1], this.about.digits);
+      value.textContent = this.data[k + 1].at(-1)!.toFixed(this.about.digits);
     });
-  }
-
-  repaint(): void {
-    this.plot.redraw(false, true);
   }
 
   /** The range of all curves, and at least that of the plot, with some room above and below. */
@@ -187,11 +161,11 @@ class Strip {
     return { min: min < 0 ? min - room : min, max: max + room };
   }
 
-  private describe(box: HTMLElement): uPlot.Options {
+  private describe(): uPlot.Options {
     const quiet = quietAxis();
     return {
-      width: Math.max(box.clientWidth, 100),
-      height: box.clientHeight || 110,
+      width: 100,
+      height: 110,
       legend: { show: false },
       cursor: { show: false },
       padding: [6, 6, 0, 0],
@@ -202,11 +176,10 @@ class Strip {
       ],
       series: [
         {},
-        ...this.about.curves.map((curve) => ({
-          stroke: () => property(curve.colour),
+        ...this.about.curves.map(({ colour }) => ({
+          stroke: () => property(colour),
           width: 1.6,
           points: { show: false },
-          ...(curve.dash ? { dash: curve.dash } : {}),
         })),
       ],
     };
@@ -216,7 +189,7 @@ class Strip {
 /** Adds a curve's mark, label and value to a heading; returns the value's element. */
 function readout(heading: HTMLElement, curve: Curve): HTMLElement {
   const item = element("span", "readout");
-  const mark = element("i", curve.dash ? "mark dashed" : "mark");
+  const mark = element("i", "mark");
   mark.style.setProperty("--mark", `var(${curve.colour})`);
   const value = element("span", "value", "0");
   item.append(mark, curve.label, value);

@@ -3,18 +3,17 @@ import {
   DirectionalLight,
   Fog,
   HemisphereLight,
-  PCFShadowMap,
-  PerspectiveCamera,
   Plane,
+  Quaternion,
   Raycaster,
   Scene,
   Vector2,
   Vector3,
-  WebGLRenderer,
+  type WebGLRenderer,
 } from "three";
-import { OrbitControls } from "three/addons/controls/OrbitControls.js";
 import { footCentres, type Pose } from "../../../cosim/viewer/src/kinematics";
 import { ForceArrows } from "../../../cosim/viewer/src/scene/arrows";
+import { Eye, makeRenderer } from "../../../cosim/viewer/src/scene/camera";
 import { Floor } from "../../../cosim/viewer/src/scene/ground";
 import { castShadows } from "../../../cosim/viewer/src/scene/lamp";
 import { Relief } from "../../../cosim/viewer/src/scene/relief";
@@ -26,9 +25,6 @@ import type { Frame, World } from "./messages";
 
 const EYE = new Vector3(-0.86, -0.68, 0.56); // m    of the camera, from the robot: behind, to the right
 const LOOK = new Vector3(0.06, 0, 0.04); // m    target of the camera, above the ground
-const FIELD = 36; // deg    vertical field of view
-const WIDE = 1.35; // width over height; a narrower view needs more than FIELD
-const SHARPEST = 2; // largest number of device pixels per pixel
 const LAMP = new Vector3(0.9, 1.3, 2.6); // m    from the robot
 const REACH = 1.0; // m    from the robot within which shadows are cast
 const SOFT = 0.15; // share of the way to the robot's height that the camera goes in a picture
@@ -38,9 +34,7 @@ const RULER = 0.42; // m    of dragging for a push of one body weight, as long a
 export class View {
   private readonly renderer: WebGLRenderer;
   private readonly scene = new Scene();
-  private readonly camera = new PerspectiveCamera(FIELD, 1, 0.02, 60);
-  private readonly eye = new PerspectiveCamera(FIELD, 1, 0.02, 60);
-  readonly controls: OrbitControls;
+  readonly eye: Eye;
   private readonly lamp = new DirectionalLight("#ffffff", 2.1);
   private readonly sky = new HemisphereLight("#ffffff", "#8d9099", 1.6);
   private readonly push = new ForceArrows(1);
@@ -58,22 +52,8 @@ export class View {
 
   /** Throws when the browser has no WebGL. */
   constructor(private readonly host: HTMLElement) {
-    this.renderer = new WebGLRenderer({ antialias: true, powerPreference: "high-performance" });
-    this.renderer.shadowMap.enabled = true;
-    this.renderer.shadowMap.type = PCFShadowMap;
-    this.renderer.setPixelRatio(Math.min(devicePixelRatio, SHARPEST));
-    this.renderer.domElement.setAttribute("aria-hidden", "true");
-    host.prepend(this.renderer.domElement);
-    this.camera.up.set(0, 0, 1);
-    this.eye.up.set(0, 0, 1);
-    this.controls = new OrbitControls(this.camera, this.renderer.domElement);
-    Object.assign(this.controls, {
-      enablePan: false,
-      minDistance: 0.3,
-      maxDistance: 4,
-      maxPolarAngle: 0.49 * Math.PI,
-    });
-    this.home();
+    this.renderer = makeRenderer(host);
+    this.eye = new Eye(this.renderer.domElement, EYE, LOOK);
     this.light();
     this.push.show([new Vector3()], [new Vector3()]);
     this.scene.add(this.push);
@@ -83,13 +63,6 @@ export class View {
 
   get canvas(): HTMLCanvasElement {
     return this.renderer.domElement;
-  }
-
-  /** Puts the camera behind the robot. */
-  home(): void {
-    this.camera.position.copy(EYE).add(LOOK);
-    this.controls.target.copy(LOOK);
-    this.controls.update();
   }
 
   /** Builds robot and ground. */
@@ -120,10 +93,16 @@ export class View {
     this.lamp.intensity = colours.dark ? 2.2 : 2.3;
   }
 
-  /** Draws the robot in a pose, with the forces and contacts of a frame. */
-  draw(pose: Pose, frame: Frame): void {
+  /** Draws the robot with its forces and contacts as of a frame. */
+  draw(frame: Frame): void {
     const { world } = this;
     if (!world || !this.model || !this.forces) return;
+    const [w, x, y, z] = frame.quaternion;
+    const pose: Pose = {
+      position: new Vector3(...frame.position),
+      attitude: new Quaternion(x, y, z, w).normalize(),
+      angles: Float64Array.from(frame.angle),
+    };
     this.model.place(
       pose,
       frame.contact.map((flag) => flag > 0),
@@ -146,7 +125,7 @@ export class View {
    */
   pull(event: PointerEvent, from: Vector3, lift: boolean): Vector3 {
     const normal = lift
-      ? this.eye.getWorldDirection(new Vector3()).setZ(0).normalize()
+      ? this.eye.view.getWorldDirection(new Vector3()).setZ(0).normalize()
       : new Vector3(0, 0, 1);
     const plane = new Plane().setFromNormalAndCoplanarPoint(normal, from);
     const to = this.ray(event).ray.intersectPlane(plane, new Vector3());
@@ -156,7 +135,7 @@ export class View {
   /** Where the torso is on the page [px], for tests. */
   get spot(): { x: number; y: number } {
     const { left, top, width, height } = this.canvas.getBoundingClientRect();
-    const seen = this.torso.clone().project(this.eye);
+    const seen = this.torso.clone().project(this.eye.view);
     return { x: left + 0.5 * width * (1 + seen.x), y: top + 0.5 * height * (1 - seen.y) };
   }
 
@@ -172,7 +151,7 @@ export class View {
       1 - (2 * (event.clientY - top)) / height,
     );
     const found = new Raycaster();
-    found.setFromCamera(at, this.eye);
+    found.setFromCamera(at, this.eye.view);
     return found;
   }
 
@@ -206,14 +185,8 @@ export class View {
   private render(): void {
     const { clientWidth: width, clientHeight: height } = this.host;
     if (width === 0 || height === 0) return;
-    this.eye.position.copy(this.camera.position).add(this.anchor);
-    this.eye.quaternion.copy(this.camera.quaternion);
-    this.eye.aspect = width / height;
-    const half = Math.tan((FIELD * Math.PI) / 360) * Math.max(1, (WIDE * height) / width);
-    this.eye.fov = (360 * Math.atan(half)) / Math.PI;
-    this.eye.updateProjectionMatrix();
-    this.eye.updateMatrixWorld();
-    this.renderer.render(this.scene, this.eye);
+    this.eye.lookFrom(this.anchor, width / height);
+    this.renderer.render(this.scene, this.eye.view);
     this.drawn += 1;
   }
 

@@ -10,14 +10,13 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TypeVar
 
 import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
-from numpy.typing import NDArray
 
 from hexapod_cosim.controller.figure_style import DPI, SETTINGS, UNDATED
 from hexapod_cosim.cosim.common.control_style import ControlStyle, control_styles
@@ -28,7 +27,6 @@ from hexapod_cosim.extensions.study.optimum import Trial
 from hexapod_cosim.extensions.study.records import GRID, VALUES, Factor, Study
 from hexapod_cosim.extensions.study.report.heat import (
     SLIP,
-    Array,
     heat_map,
     mean_of,
     ticks_of,
@@ -75,13 +73,6 @@ def drawings(results: Results, *, before: float = math.nan) -> dict[str, Drawing
         for control in study.controls
     ):
         found |= _of_factors(study, points)
-    if any(len(slip_and_cost(points, control)) for control in study.controls):
-        caption = (
-            "A mark per point and control, means over its walks; "
-            "line: the points that no other point betters in both."
-        )
-        draw = partial(pareto, points, study)
-        found["pareto"] = Drawing("Slip against cost of transport", caption, draw)
     return found
 
 
@@ -194,26 +185,6 @@ def _marks(
     axes.plot(place[lost], edge, "x", markersize=4, color=style.light, transform=transform)
 
 
-def pareto(points: Sequence[Point], study: Study) -> Figure:
-    """Draws slip against cost of transport with the Pareto front of each control."""
-    figure = Figure(figsize=(6.4, 4.2))
-    axes = figure.subplots()
-    for control, style in control_styles(study.controls).items():
-        pairs = slip_and_cost(points, control)
-        if not len(pairs):
-            continue
-        look: dict[str, Any] = {"color": style.light, "marker": style.marker}
-        shown = np.array(some_of(pairs.tolist()))
-        axes.plot(*shown.T, linestyle="", markersize=4, alpha=0.5, label=control, **look)
-        axes.plot(*front(pairs).T, drawstyle="steps-post", linewidth=1.4, markersize=5.5, **look)
-    for side in ("x", "y"):
-        _log_scale(axes, side)
-    axes.set(xlabel=NAMES[COST], ylabel=NAMES[SLIP])
-    axes.margins(0.05)
-    axes.legend(title="line: the front")
-    return figure
-
-
 def _log_scale(axes: Axes, side: str) -> None:
     """Makes an axis logarithmic when its values differ by more than LOG_RATIO."""
     lines = [line for line in axes.lines if line.get_transform() == axes.transData]
@@ -222,24 +193,6 @@ def _log_scale(axes: Axes, side: str) -> None:
     values = values[np.isfinite(values)]
     if len(values) and values.min() > 0.0 and values.max() > LOG_RATIO * values.min():
         axes.set(**{f"{side}scale": "log"})
-
-
-def slip_and_cost(points: Sequence[Point], control: str) -> Array:
-    """Returns cost of transport and slip (k, 2) of the points that have both."""
-    pairs = np.array(
-        [(mean_of(point, control, COST), mean_of(point, control, SLIP)) for point in points]
-    ).reshape(-1, 2)
-    return np.asarray(pairs[np.isfinite(pairs).all(axis=1)])
-
-
-def front(pairs: NDArray[np.float64]) -> Array:
-    """Returns the Pareto front (k, 2) of points (n, 2), less being better, by the first value."""
-    kept, best = [], math.inf
-    for first, second in pairs[np.lexsort((pairs[:, 1], pairs[:, 0]))].tolist():
-        if second < best:
-            kept.append((first, second))
-            best = second
-    return np.array(kept, dtype=np.float64).reshape(-1, 2)
 
 
 def history(study: Study, trials: Sequence[Trial], before: float) -> Figure:

@@ -6,12 +6,9 @@ from collections.abc import Iterator
 
 from hexapod_cosim.cosim.master.loop import COMPLETED
 from hexapod_cosim.extensions.study.records import SOBOL, Study
+from hexapod_cosim.extensions.study.report.tables import ending
 from hexapod_cosim.extensions.study.summary import Results
 
-NO_WALK = (
-    "No run walked to its end, so there are no figures of walks. "
-    "The reasons are listed under Failures."
-)
 TOO_SHORT = (
     "too short for figures, which are of whole gait cycles after the second: set a longer duration."
 )
@@ -19,7 +16,8 @@ TOO_SHORT = (
 
 def notes(results: Results) -> list[str]:
     """Returns the notes as sentences."""
-    found = [*_of_design(results.study), *_of_missing_runs(results), *_of_walks(results)]
+    found = [*_of_design(results.study), *_of_missing_runs(results)]
+    found += [*_without_walks(results), *_of_walks(results)]
     for control, unbalanced in results.unbalanced.items():
         found += unbalanced.warnings(control, runs=results.overall.runs[control])
     return found
@@ -42,14 +40,22 @@ def _of_missing_runs(results: Results) -> Iterator[str]:
         )
 
 
+def _without_walks(results: Results) -> Iterator[str]:
+    """Yields a note for each control under which no run walked to its end."""
+    overall = results.overall
+    for control, total in overall.runs.items():
+        reasons = [(key, count) for key, count in results.failures.items() if key[0] == control]
+        if reasons and not overall.walked[control]:
+            (_, status, reason), count = reasons[0]
+            alike = "all" if len(reasons) == 1 else f"{count} of them"
+            yield (
+                f"none of {total} {control} runs walked to its end; "
+                f"{alike} {ending(status)}: {reason}"
+            )
+
+
 def _of_walks(results: Results) -> Iterator[str]:
-    """Yields notes where no run walked, or where the walks of a scenario gave no figures."""
-    walks = results.walks
-    if results.runs and not walks:
-        yield NO_WALK
-    elif walks and not any(figured for _, figured in walks.values()):
-        yield f"The walks are {TOO_SHORT}"
-    else:
-        for (case, control), (walked, figured) in walks.items():
-            if not figured:
-                yield f"All {walked} {control} walks of {case} are {TOO_SHORT}"
+    """Yields a note for each scenario and control whose walks gave no figures."""
+    for (case, control), (walked, figured) in results.walks.items():
+        if not figured:
+            yield f"All {walked} {control} walks of {case} are {TOO_SHORT}"

@@ -14,7 +14,7 @@ from hexapod_cosim.cosim.results.metrics import METRICS
 from hexapod_cosim.extensions.study.report import tables
 from hexapod_cosim.extensions.study.report.figures import drawings, save
 from hexapod_cosim.extensions.study.report.notes import notes
-from hexapod_cosim.extensions.study.summary import POINTS, SUMMARY, Results
+from hexapod_cosim.extensions.study.summary import SUMMARY, Results
 
 REPORT, FIGURES_FOLDER = "report.html", "plots"
 HEADLINES = ("slip_per_metre", "cost_of_transport")  # metrics whose changes come first
@@ -50,7 +50,7 @@ def write_study_report(results: Results, folder: Path) -> list[Path]:
         method=METHOD,
     )
     write_text(folder / REPORT, page)
-    return [folder / POINTS, folder / SUMMARY, *files, folder / REPORT]
+    return [folder / SUMMARY, *files, folder / REPORT]
 
 
 def cards(results: Results) -> list[tuple[str, str, str, str]]:

@@ -14,11 +14,10 @@ from hexapod_cosim.extensions.study.groups import Mean, Point
 from hexapod_cosim.extensions.study.objective import WALKED
 from hexapod_cosim.extensions.study.records import Factor
 from hexapod_cosim.extensions.study.store import FIGURES
-from hexapod_cosim.extensions.study.summary import Results
+from hexapod_cosim.extensions.study.summary import POINT_METRICS, Results
 
 NONE = "-"  # where there is no value
-SHOWN_POINTS = 100  # rows of the table of points; points.parquet has all
-POINT_METRICS = ("slip_per_metre", "cost_of_transport", "peak_force", "torque_rms")
+SHOWN_POINTS = 100  # rows of the table of points
 
 
 @dataclass(frozen=True)

@@ -25,7 +25,6 @@ export interface PanelOptions {
   readonly host: HTMLElement;
   /** Least and largest value, for plots that share a scale. */
   readonly limits?: readonly [number, number] | undefined;
-  readonly more?: Partial<uPlot.Options>;
 }
 
 /** A plot with a cursor at the replay's time; pressing or dragging in it moves the replay. */
@@ -90,8 +89,7 @@ export class Panel {
         },
       ],
       series: [{}, ...this.options.curves.map(seriesOf)],
-      ...this.options.more,
-      hooks: { ...this.options.more?.hooks, ready: [again], setScale: [again], setSize: [again] },
+      hooks: { ready: [again], setScale: [again], setSize: [again] },
     };
   }
 

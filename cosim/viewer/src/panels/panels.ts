@@ -1,7 +1,6 @@
 import type { Clock } from "../clock";
 import { element } from "../dom";
 import type { Recording } from "../recording";
-import { footfallPanel } from "./footfall";
 import { type Curve, Panel, type PanelOptions } from "./panel";
 import { hostOf, type Run } from "./run";
 import type { Span } from "./span";
@@ -82,9 +81,6 @@ export function panelMakers(runs: readonly Run[], clock: Clock, spans: Spans): (
     ),
   );
   makers.push(...runs.flatMap((run) => energyPanels(run, clock, spans.walk)));
-  makers.push(
-    ...runs.flatMap((run) => footfallPanel(run, hostOf("footfall"), clock, spans.cycles)),
-  );
   return makers;
 }
 

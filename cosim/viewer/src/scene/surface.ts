@@ -67,11 +67,6 @@ export class Surface {
     ];
   }
 
-  /** Returns what the material at a position is drawn as, "" for the ground of the definition. */
-  lookAt(x: number, y: number): string {
-    return this.materials[this.materialAt(x, y) - 1]?.look ?? "";
-  }
-
   private bicubic(across: number, up: number): Place {
     const length = RUN_OUT / this.cell;
     const [column, a, da] = weights(across, this.columns, length);

@@ -5,6 +5,7 @@ Of a drop it is the whole run.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
@@ -44,9 +45,9 @@ class View:
     surface: Surface | None = None  # around the walk, for reports; None: a plane, or not needed
 
     @cached_property
-    def walk(self) -> Walk | None:
+    def window(self) -> JudgedWindow | None:
         """Whole gait cycles after the first two; None when there is none. A drop is whole."""
-        return _whole_drop(self) if is_drop(self.recording) else _cut_walk(self)
+        return _whole_drop(self) if is_drop(self.recording) else _judged_window(self)
 
     @cached_property
     def energy_residual(self) -> float:
@@ -67,8 +68,8 @@ class View:
         return replace(self, recording=self.recording.rows(slice(begin, None)))
 
 
-@dataclass(frozen=True)
-class Walk:
+@dataclass(frozen=True, kw_only=True)
+class JudgedWindow:
     """The part of a run that metrics use, and the quantities that they refer to."""
 
     whole: Recording  # the run
@@ -125,7 +126,7 @@ def time_shares(time: Array) -> Array:
     return np.asarray(weights / weights.sum())
 
 
-def _cut_walk(view: View) -> Walk | None:
+def _judged_window(view: View) -> JudgedWindow | None:
     recording, period = view.recording, view.period
     time = recording.time
     cycles = int((time[-1] - time[0] + ROUND_OFF) / period) if len(time) else 0
@@ -141,8 +142,18 @@ def _cut_walk(view: View) -> Walk | None:
     # first cycle
     first = part.time <= begin + period + ROUND_OFF
     heading = float(time_shares(part.time[first]) @ (yaw - turned)[first])
-    weight = robot_weight(view.parameters)
-    return Walk(recording, part, begin, end, period, distance, angle, weight, turned, heading)
+    return JudgedWindow(
+        whole=recording,
+        recording=part,
+        begin=begin,
+        end=end,
+        period=period,
+        distance=distance,
+        angle=angle,
+        weight=robot_weight(view.parameters),
+        turned=turned,
+        heading=heading,
+    )
 
 
 def is_drop(recording: Recording) -> bool:
@@ -155,14 +166,20 @@ def is_drop(recording: Recording) -> bool:
     )
 
 
-def _whole_drop(view: View) -> Walk:
+def _whole_drop(view: View) -> JudgedWindow:
     """Returns all of a drop, whose impacts come first; it has no figures per metre or radian."""
-    recording, nowhere = view.recording, float("nan")
-    time, turned = recording.time, np.zeros_like(recording.time)
-    weight, heading = robot_weight(view.parameters), float(recording.column("torso.yaw")[0])
-    begin, end = float(time[0]), float(time[-1])
-    return Walk(
-        recording, recording, begin, end, view.period, nowhere, nowhere, weight, turned, heading
+    recording, time = view.recording, view.recording.time
+    return JudgedWindow(
+        whole=recording,
+        recording=recording,
+        begin=float(time[0]),
+        end=float(time[-1]),
+        period=view.period,
+        distance=math.nan,
+        angle=math.nan,
+        weight=robot_weight(view.parameters),
+        turned=np.zeros_like(time),
+        heading=float(recording.column("torso.yaw")[0]),
     )
 
 
