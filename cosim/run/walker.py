@@ -20,7 +20,7 @@ from hexapod_cosim.cosim.control.controllers import (
 )
 from hexapod_cosim.cosim.control.fmu_instance import open_controller_fmu
 from hexapod_cosim.cosim.control.fmu_law import FmuLaw
-from hexapod_cosim.cosim.export.controller_export import export_controller
+from hexapod_cosim.cosim.export.plant_export import export_controller
 from hexapod_cosim.cosim.interface.controller_interface import (
     ControllerSetup,
     controller_parameters,

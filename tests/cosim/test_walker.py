@@ -13,8 +13,7 @@ from memory import resident
 
 from hexapod_cosim.controller import Gains
 from hexapod_cosim.cosim.control.fmu_law import law_of_ours
-from hexapod_cosim.cosim.export.controller_export import export_controller
-from hexapod_cosim.cosim.export.plant_export import export_fmu
+from hexapod_cosim.cosim.export.plant_export import export_controller, export_fmu
 from hexapod_cosim.cosim.master.fmu import Fmu
 from hexapod_cosim.cosim.master.loop import (
     COMPLETED,
