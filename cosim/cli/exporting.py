@@ -12,8 +12,7 @@ from hexapod_cosim.controller import Gait
 from hexapod_cosim.cosim.cli.running import given_gains
 from hexapod_cosim.cosim.cli.terminal import refuse_unused, show_files, show_json, waiting, warn
 from hexapod_cosim.cosim.cli.terrains import surfaces_from
-from hexapod_cosim.cosim.export.controller_export import export_controller
-from hexapod_cosim.cosim.export.plant_export import export_fmu
+from hexapod_cosim.cosim.export.plant_export import export_controller, export_fmu
 from hexapod_cosim.cosim.export.robot_files import (
     Format,
     chosen_format,

@@ -1,5 +1,6 @@
-"""Writes FMUs: the same binary for every robot, with the robot's model description and start
-values.
+"""Writes FMUs of plants and controllers.
+
+The binary is the same for every robot; the model description and the start values are the robot's.
 """
 
 from __future__ import annotations
@@ -31,6 +32,10 @@ from hexapod_cosim.cosim.export.platforms import (
 from hexapod_cosim.cosim.export.reference import reference_members
 from hexapod_cosim.cosim.export.start_values import start_values
 from hexapod_cosim.cosim.export.starts import with_starts
+from hexapod_cosim.cosim.interface.controller_interface import (
+    ControllerSetup,
+    load_controller_interface,
+)
 from hexapod_cosim.cosim.interface.model_description import render_fmi2
 from hexapod_cosim.cosim.interface.model_description3 import render_build_description, render_fmi3
 from hexapod_cosim.cosim.interface.plant_interface import Interface, load_interface
@@ -93,6 +98,26 @@ def export_fmu(
         grids=grid_members(grids),
         integers=integers,
         bare=bare,
+    )
+
+
+def export_controller(
+    setup: ControllerSetup,
+    path: str | Path,
+    *,
+    fmi: int = 2,
+    platforms: Iterable[str] | None = None,
+    integers: bool = False,
+    starts: Mapping[str, float] = MappingProxyType({}),
+    bare: bool = False,
+) -> Path:
+    """Writes a controller's FMU and returns its path.
+
+    Arguments and errors are those of `export_fmu`; also raises the errors of `Controller`.
+    """
+    interface = with_starts(load_controller_interface(setup), starts)
+    return export_interface(
+        interface, path, fmi=fmi, platforms=platforms, integers=integers, bare=bare
     )
 
 

@@ -11,8 +11,7 @@ from pathlib import Path
 from types import MappingProxyType
 
 from hexapod_cosim.cosim.common.temporary import TemporaryFolder
-from hexapod_cosim.cosim.export.controller_export import export_controller
-from hexapod_cosim.cosim.export.plant_export import export_fmu
+from hexapod_cosim.cosim.export.plant_export import export_controller, export_fmu
 from hexapod_cosim.cosim.export.platforms import choose_platforms
 from hexapod_cosim.cosim.export.ssp import NOTHING, Experiment, export_ssp
 from hexapod_cosim.cosim.export.starts import with_starts

@@ -17,7 +17,7 @@ from fmpy.validation import validate_fmu
 from gains import PERIOD, make_gains
 
 from hexapod_cosim.controller import make_gait, save_gains
-from hexapod_cosim.cosim.export.controller_export import export_controller
+from hexapod_cosim.cosim.export.plant_export import export_controller
 from hexapod_cosim.cosim.interface.controller_interface import (
     ControllerSetup,
 )

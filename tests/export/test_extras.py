@@ -18,7 +18,6 @@ import pytest
 from fmi_plant import ATHENA
 from PIL import Image
 
-from hexapod_cosim.cosim.export.documentation import CAPABILITIES
 from hexapod_cosim.cosim.export.extras import ICON_SIZE, PICTURE_SIZE, pictures
 from hexapod_cosim.cosim.export.plant_export import export_fmu
 from hexapod_cosim.cosim.export.reference import FOLDER, OUTPUTS, read_csv
@@ -131,23 +130,15 @@ def test_the_page_s_quick_start_runs_as_it_stands(
     assert capsys.readouterr().out.endswith("]\n")
 
 
-def test_the_page_names_every_variable_s_pattern_unit_choice_and_flag(exported: Path) -> None:
+def test_the_page_names_every_variable_s_pattern_unit_and_choice(exported: Path) -> None:
     with zipfile.ZipFile(exported) as archive:
-        page, description = (
-            archive.read(name).decode()
-            for name in ("documentation/index.html", "modelDescription.xml")
-        )
+        page = archive.read("documentation/index.html").decode()
     for pattern in ATHENA.patterns:
         assert f"<code>{pattern.name}</code>" in page
     for enumeration in ATHENA.enumerations.values():
         assert all(
             f"{number} {name}:" in page
             for number, (name, _) in enumerate(enumeration.items, start=1)
-        )
-    for element in map(ElementTree.fromstring(description).find, ("CoSimulation", "ModelExchange")):
-        flags = {} if element is None else dict(element.attrib)
-        assert {flag for flag in flags if flag.startswith(("can", "provides", "max"))} <= set(
-            CAPABILITIES
         )
     counts = [
         int(number) for number in re.findall(r'</code></td><td class="value">(\d+)</td>\n', page)
