@@ -60,9 +60,6 @@ def build(out: Path, *, work: Path, computed: bool = True) -> int:
     if (ROOT / "extensions" / "live").is_dir():
         from hexapod_cosim.extensions.live.static_page import write_static_page  # noqa: PLC0415
 
-        if (ROOT / "extensions" / "live").is_dir():
-        from hexapod_cosim.extensions.live.static_page import write_static_page  # noqa: PLC0415
-
         write_static_page(out / WALK)
     options = ["-W", "--keep-going", "-q", "-n", "-E", "-j", "auto", "-c", str(DOCS)]
     options += ["-D", f"nb_execution_mode={'force' if computed else 'off'}"]
