@@ -29,12 +29,12 @@ CONTROLLER_FMU, PACKAGE = "a controller's FMU", "a package"
 # options without effect, by what is written
 UNUSED_OPTIONS = {
     DESCRIPTION: (
-        *("fmi", "platforms", "integers", "terrain", "stance", "controller"),
+        *("fmi", "platforms", "terrain", "stance", "controller"),
         *CONTROLLER_OPTIONS,
     ),
     PLANT_FMU: CONTROLLER_OPTIONS,
     CONTROLLER_FMU: ("terrain",),
-    PACKAGE: ("terrain", "integers"),
+    PACKAGE: ("terrain",),
 }
 
 
@@ -47,7 +47,6 @@ class Request:
     robot: str
     fmi: int
     platforms: list[str] | None
-    integers: bool
     urdf: bool
     mjcf: bool
     ssp: bool
@@ -154,7 +153,6 @@ def _export_plant(robot: Robot, request: Request) -> Path:
             fmi=request.fmi,
             platforms=request.platforms,
             terrains=surfaces_from(request.terrains),
-            integers=request.integers,
         )
 
 
@@ -166,7 +164,6 @@ def _export_controller(setup: ControllerSetup, request: Request) -> Path:
             _path(request.output, f"{setup.robot.name}_controller", ".fmu"),
             fmi=request.fmi,
             platforms=request.platforms,
-            integers=request.integers,
         )
 
 
