@@ -196,22 +196,12 @@ def _sources(component: Component, fmi: int) -> dict[str, bytes]:
 
 
 def _reference(interface: Interface, members: dict[str, bytes], fmi: int) -> dict[str, bytes]:
-    """Returns reference results of the plant; none when the FMU has no binary for this machine."""
-    folders = {2: fmi2_platform(), 3: fmi3_platform()}
-    own = f"binaries/{folders[fmi]}/"
-    found = {name: data for name, data in members.items() if name.startswith(own)}
-    if interface.component is not PLANT or not found:
+    """Returns reference results of a plant of FMI 2.0 that has a binary for this machine."""
+    own = f"binaries/{fmi2_platform()}/"
+    if fmi != 2 or interface.component is not PLANT or not any(own in name for name in members):
         return {}
-    trial = members
-    if fmi == 3:  # the same binary and start values as an FMU of FMI 2.0, which runs here
-        trial = {name: data for name, data in members.items() if name.startswith("resources/")}
-        trial |= _description(interface, 2)[1]
-        trial |= {
-            name.replace(own, f"binaries/{folders[2]}/"): data for name, data in found.items()
-        }
     with TemporaryFolder("export") as folder:
-        fmu = write_archive(folder / "trial.fmu", trial)
-        return reference_members(interface, fmu, fmi=fmi)
+        return reference_members(interface, write_archive(folder / "trial.fmu", members))
 
 
 def write_archive(

@@ -1,6 +1,4 @@
-"""Tests that a model description offers what its binary and its importer have: no derivatives from
-compilers without complex numbers, integers for importers without enumerations.
-"""
+"""Tests that a model description offers what its binary has: derivatives with complex numbers."""
 
 from __future__ import annotations
 
