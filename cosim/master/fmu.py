@@ -22,7 +22,6 @@ from hexapod_cosim.cosim.common.closing import Closing
 from hexapod_cosim.cosim.common.plant_files import packed_binary
 from hexapod_cosim.cosim.common.temporary import TemporaryFolder
 from hexapod_cosim.cosim.interface.descriptions import read_description
-from hexapod_cosim.cosim.interface.variants import listed_items
 from hexapod_cosim.cosim.master.fmu_log import STATUS, WARNING, FmuLog
 from hexapod_cosim.models.errors import FmuError, nearest_name, unknown_name
 
@@ -356,11 +355,6 @@ class Fmu(Closing):
             if value not in items:
                 raise unknown_name(f"choice for {name}", value, items, error=FmuError)
             return int(items[value])
-        if variable.type == "Integer" and isinstance(value, str):
-            items = listed_items(variable.description)
-            if value not in items:
-                raise unknown_name(f"choice for {name}", value, items, error=FmuError)
-            return items[value]
         if not isinstance(value, int | float):
             raise FmuError(
                 f"parameter {name} is refused",
