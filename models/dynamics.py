@@ -285,12 +285,12 @@ def external_torques(
     alpha, beta = robot.baumgarte.alpha, robot.baumgarte.beta
     c = joints.gamma - 2.0 * alpha * joints.dphi - beta**2 * joints.phi
     torso = np.eye(6, 6 * BODIES)
-    held = np.vstack([torso, joints.D, joints.G])
+    fixed = np.vstack([torso, joints.D, joints.G])
     none, turns = np.zeros((6 + len(c), LEGS * JOINTS)), np.eye(LEGS * JOINTS)
-    motion = np.linalg.solve(held, np.vstack([none, turns]))  # of the links with each joint
+    motion = np.linalg.solve(fixed, np.vstack([none, turns]))  # of the links with each joint
     kinematic = robot.servo.mode == "kinematic"
     driven = drive_acceleration(robot, body, command).ravel() if kinematic else turns[0] * 0.0
-    bias = np.linalg.solve(held, np.concatenate([np.zeros(6), c, driven]))
+    bias = np.linalg.solve(fixed, np.concatenate([np.zeros(6), c, driven]))
     load = motion.T @ (forces - link_matrix(robot, body) @ bias)
     return load.reshape(LEGS, JOINTS) + stop_torques(robot, body)
 
