@@ -27,7 +27,7 @@ SANITIZED_SHORT := $(patsubst %,tests/fmi/test_%.py,fmi fmi3 fmi3_order fmi_stat
 COVERED := $(patsubst %,tests/%,fmi exchange plant native_control friction ground soil servos)
 SANITIZED := $(SANITIZED_SHORT) tests/fmi/test_fmi_importers.py tests/fmi/test_endurance.py
 
-.PHONY: help setup demo test test-docs test-browser test-rerun test-importers test-platforms \
+.PHONY: help setup demo test test-docs test-browser test-importers test-platforms \
 	test-endurance test-native test-native-sanitize test-sanitize test-sanitize-short \
 	test-robots test-extensions \
 	test-wheels test-metadata wheels test-compilers fuzz fuzz-short lint-c check bench \
@@ -40,7 +40,6 @@ help:
 	@echo "make test      the tests"
 	@echo "make test-docs  the site with its notebooks run and its validation computed (5 min)"
 	@echo "make test-browser  the report in Chromium, at full length, and how long it takes to open (1 min)"
-	@echo "make test-rerun  recordings as RRD, read back by Rerun; installs its wheel of 170 MB (1 min)"
 	@echo "make test-importers  the same walk through libcosim, Ecos, ... and how far each is from fmpy (2 min)"
 	@echo "make test-platforms  the binaries for all platforms, the wheel for Windows under Wine, Arm under qemu-user (installed with apt when root)"
 	@echo "make test-endurance  10,000 instances, a million steps, threads (5 min)"
@@ -99,11 +98,6 @@ test-docs: setup
 
 test-browser: setup
 	HEXAPOD_BROWSER=full $(BIN)/python -m pytest -s tests/report/test_browser.py tests/live/test_live_browser.py
-
-# in the environment of the tests; continuous integration leaves this out for the wheel's 170 MB
-test-rerun: setup
-	$(BIN)/python -m pip install --quiet 'rerun-sdk>=0.41'
-	HEXAPOD_RERUN=required $(BIN)/python -m pytest -q tests/logs/test_rrd.py
 
 test-importers: setup
 	$(BIN)/python -m tools.importers.compare

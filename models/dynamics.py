@@ -38,12 +38,7 @@ from hexapod_cosim.models.kinematics import (
 )
 from hexapod_cosim.models.records import Robot
 from hexapod_cosim.models.servos.gear import Rotors, gear_torque, is_elastic, spin_inertia
-from hexapod_cosim.models.servos.motor import (
-    FULL,
-    Power,
-    friction_torque,
-    has_measured_friction,
-)
+from hexapod_cosim.models.servos.motor import FULL, Power, friction_torque, has_measured_friction
 
 MULTIPLIERS = 5
 

@@ -26,7 +26,7 @@ Formats = Annotated[
     list[str] | None,
     typer.Option(
         "--format",
-        metavar="parquet|csv|mcap|rrd",
+        metavar="parquet|csv|mcap",
         help="Write the recording as this, instead of outputs.formats. Repeat it for more.",
     ),
 ]

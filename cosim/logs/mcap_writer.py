@@ -1,4 +1,4 @@
-"""Writes a recording as an MCAP file with ROS 2 messages, which Foxglove and Rerun open.
+"""Writes a recording as an MCAP file with ROS 2 messages, which Foxglove and Rerun read.
 
 Each row becomes a joint state, a joint command, six foot forces, an IMU reading and a transform, as
 far as the recording has their columns, and one message with all columns, whose numbers read back
@@ -19,9 +19,9 @@ from hexapod_cosim.cosim.common.files import atomic_path
 from hexapod_cosim.cosim.interface.names import joint_names, vector_names
 from hexapod_cosim.cosim.logs import messages as ros
 from hexapod_cosim.cosim.logs.mcap_package import require_mcap
-from hexapod_cosim.cosim.logs.places import torso_places
 from hexapod_cosim.cosim.master.recorder import Recording
 from hexapod_cosim.models import HexapodError
+from hexapod_cosim.models.kinematics import rotation_matrix
 
 Array = NDArray[np.float64]
 Message = dict[str, Any]
@@ -180,7 +180,7 @@ def _transform(recording: Recording, have: set[str], com: Array) -> Iterator[Sou
     place, turn = vector_names("torso.position"), vector_names("torso.quaternion", 4)
     if not {*place, *turn} <= have:
         return
-    positions, turns = torso_places(recording, com), recording.columns(turn)
+    positions, turns = _torso_places(recording, com), recording.columns(turn)
 
     def message(row: int, stamp: Message) -> Message:
         transform = {"translation": _xyz(positions[row]), "rotation": _rotation(turns[row])}
@@ -198,3 +198,15 @@ def _row_message(recording: Recording) -> Callable[[int, Message], Message]:
     """Returns the function that makes the message with all columns of a row."""
     fields = ros.field_names(recording.names)
     return lambda row, _stamp: dict(zip(fields, recording.data[row].tolist(), strict=True))
+
+
+def _torso_places(recording: Recording, com: Array) -> Array:
+    """Returns the positions (rows, 3) of the origin of the torso's frame in the world [m].
+
+    com: centre of mass in that frame (3,) [m].
+    """
+    positions = recording.columns(vector_names("torso.position"))
+    if not com.any():
+        return positions
+    turns = recording.columns(vector_names("torso.quaternion", 4))
+    return np.asarray(positions - np.array([rotation_matrix(turn) @ com for turn in turns]))

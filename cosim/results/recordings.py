@@ -1,10 +1,10 @@
 """Writes and reads recordings: CSV for spreadsheets, Parquet, MCAP for tools of robots, and the
-commands alone for importers. RRD files, for the viewer Rerun, are written only.
+commands alone for importers.
 
-CSV needs no package; Parquet, MCAP and RRD need the extras `parquet`, `logs` and `rerun`. A Parquet
-file has a column of doubles per variable, with unit and description as metadata of each field and
-the run's facts as metadata of the schema. A CSV file has "name [unit]" above each column. An MCAP
-file has ROS 2 messages (cosim/logs). All hold the same numbers, bit for bit.
+CSV needs no package; Parquet and MCAP need the extras `parquet` and `logs`. A Parquet file has a
+column of doubles per variable, with unit and description as metadata of each field and the run's
+facts as metadata of the schema. A CSV file has "name [unit]" above each column. An MCAP file has
+ROS 2 messages (cosim/logs). All hold the same numbers, bit for bit.
 """
 
 from __future__ import annotations
@@ -24,7 +24,6 @@ from hexapod_cosim.cosim.common.installation import require_pyarrow
 from hexapod_cosim.cosim.logs.mcap_package import require_mcap
 from hexapod_cosim.cosim.logs.mcap_reader import read_mcap
 from hexapod_cosim.cosim.logs.mcap_writer import check_start, write_mcap
-from hexapod_cosim.cosim.logs.rrd_writer import require_rerun, write_rrd
 from hexapod_cosim.cosim.master.recorder import Recording
 from hexapod_cosim.cosim.results.columns import (
     bare_name,
@@ -34,7 +33,7 @@ from hexapod_cosim.cosim.results.columns import (
     wrong_unit,
 )
 from hexapod_cosim.cosim.scenario.records import default_formats
-from hexapod_cosim.models import HexapodError, Robot
+from hexapod_cosim.models import HexapodError
 
 COMMANDS = "commands.csv"
 
@@ -48,21 +47,19 @@ def write_recording(
     columns: Sequence[str] = ("*",),
     about: Mapping[str, Any] | None = None,
     torso_com: Sequence[float] = (0.0, 0.0, 0.0),
-    robot: Robot | None = None,
 ) -> list[Path]:
-    """Writes STEM.parquet, STEM.mcap and STEM.rrd with all columns and STEM.csv, as far as wanted;
-    returns the files.
+    """Writes STEM.parquet and STEM.mcap with all columns and STEM.csv, as far as wanted; returns
+    the files.
 
     Args:
         recording: what to write.
         folder: where to write it.
         stem: name of the files without suffix.
-        formats: which of "parquet", "csv", "mcap" and "rrd" to write; None: the default of
+        formats: which of "parquet", "csv" and "mcap" to write; None: the default of
             scenarios.
         columns: patterns of the columns of the CSV file.
         about: facts of the run, texts or JSON values; metadata of all files but CSV.
-        torso_com: centre of mass in the torso's frame [m], for the transforms of MCAP and RRD.
-        robot: its lengths, for the 3D geometry of an RRD file.
+        torso_com: centre of mass in the torso's frame [m], for the transforms of MCAP.
     """
     facts = _texts(about or {})
     chosen = default_formats() if formats is None else formats
@@ -72,8 +69,6 @@ def write_recording(
             write_parquet(recording, path, about=facts)
         elif path.suffix == ".mcap":
             write_mcap(recording, path, about=facts, torso_com=torso_com)
-        elif path.suffix == ".rrd":
-            write_rrd(recording, path, robot=robot, about=facts, torso_com=torso_com)
         else:
             write_csv(recording.chosen(columns), path, units=True)
     return files
@@ -89,8 +84,6 @@ def check_formats(formats: Sequence[str], *, start: float, where: str) -> None:
     if "mcap" in formats:
         require_mcap(where)
         check_start(start, where)
-    if "rrd" in formats:
-        require_rerun(where)
 
 
 def _texts(facts: Mapping[str, Any]) -> dict[str, str]:

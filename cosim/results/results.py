@@ -33,7 +33,7 @@ from hexapod_cosim.cosim.results.recordings import (
 )
 from hexapod_cosim.cosim.results.result import Result
 from hexapod_cosim.cosim.results.window import View
-from hexapod_cosim.models import HexapodError, load_robot
+from hexapod_cosim.models import HexapodError
 from hexapod_cosim.models.files import read_text
 
 RESULTS, PARTIAL = "results", "results.partial"  # stems of recordings
@@ -131,7 +131,6 @@ def write_result(result: Result, folder: Path) -> list[Path]:
         columns=columns,
         about=about,
         torso_com=[result.parameters.get(name, 0.0) for name in vector_names("torso.com")],
-        robot=load_robot(result.scenario.robot) if "rrd" in outputs.formats else None,
     )
     if result.completed and "csv" in outputs.formats and result.scenario.every == 1:
         files.append(folder / COMMANDS)

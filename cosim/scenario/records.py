@@ -31,7 +31,7 @@ ANGLE, ATTITUDE = "angle", "attitude"  # sensors inside the robot
 SERVO_FAULTS = ("dead", "stuck")
 LOST = ("command", "step")
 DELAY = Number("s", at_least=0.0, at_most=1.0)  # of late readings
-FORMATS = ("parquet", "csv", "mcap", "rrd")  # of recordings
+FORMATS = ("parquet", "csv", "mcap")  # of recordings
 SETTINGS: dict[str, type[Any]] = {
     "gait": Gait,
     "terrain": Terrain,

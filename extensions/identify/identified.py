@@ -24,7 +24,6 @@ from hexapod_cosim.models import Robot
 Array = NDArray[np.float64]
 QUANTILE = 1.959963985  # of a normal distribution, for 95 %
 FEWEST_DIGITS = 5  # of a value and its interval in texts
-NEAR = 0.8  # correlation of two numbers that is reported
 
 
 @dataclass(frozen=True)
@@ -39,8 +38,6 @@ class Estimate:
     low: float  # of the 95 % interval
     high: float
     deviation: float  # over that of what was known before: 1 where the logs say nothing
-    partner: str  # the number with which it is correlated most
-    correlation: float
     alone: bool = True  # whether the logs determine it without numbers that they do not determine
     depends: tuple[str, ...] = ()  # numbers of the robot file with which alone it is determined
 
@@ -84,26 +81,18 @@ class Identified:
     @property
     def estimates(self) -> list[Estimate]:
         """The numbers of robot and sensors, in the order of the table of unknowns."""
-        own = np.sqrt(np.diag(self.fit.covariance))
-        correlation = self.fit.covariance / np.outer(own, own) - np.eye(len(own))
-        return [
-            self._estimate(k, row, correlation[k])
-            for k, row in enumerate(self.fit.rows)
-            if row.group != START
-        ]
+        return [self._estimate(k, row) for k, row in enumerate(self.fit.rows) if row.group != START]
 
-    def _estimate(self, k: int, row: Unknown, correlation: Array) -> Estimate:
+    def _estimate(self, k: int, row: Unknown) -> Estimate:
         """Returns what was found of a number; nothing of a model that the logs reject."""
         before, rejected = self.fit.before[row.key], self.rejected
         # z = 0 is the file's value to the last digit
         value = before if self.fit.kept[k] or rejected else self.fit.values[row.key]
         deviation = 1.0 if rejected else self.fit.deviations[row.key]
         low, high = row.interval(value, QUANTILE * deviation)
-        other = int(np.argmax(np.abs(correlation)))
         return Estimate(
             row.key, row.unit, row.group, before, value,
             max(low, row.low), min(high, row.high), deviation,
-            self.fit.rows[other].key, float(correlation[other]),
             bool(self.fit.alone[k]) and not self.fit.kept[k] and not rejected,
             () if rejected else self.fit.depends.get(row.key, ()),
         )  # fmt: skip

@@ -3,18 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from concurrent.futures import Executor
+from contextlib import AbstractContextManager, nullcontext
+from functools import partial
+from pathlib import Path
 
 import numpy as np
 
 from hexapod_cosim.cosim.common.temporary import TemporaryFolder
 from hexapod_cosim.cosim.export.plant_export import export_fmu
 from hexapod_cosim.cosim.interface.names import vector_names
-from hexapod_cosim.cosim.run.worker_pool import processor_count
+from hexapod_cosim.cosim.run.worker_pool import WorkerPool, processor_count
 from hexapod_cosim.extensions.identify.command_screening import wrong_commands, wrong_commands_error
 from hexapod_cosim.extensions.identify.experiment import Experiment
 from hexapod_cosim.extensions.identify.fitting.judging import fit
 from hexapod_cosim.extensions.identify.fitting.problem import Problem
-from hexapod_cosim.extensions.identify.fitting.workers import simulating_workers
+from hexapod_cosim.extensions.identify.fitting.workers import open_plant
 from hexapod_cosim.extensions.identify.identified import Identified
 from hexapod_cosim.extensions.identify.log import (
     HELD_OUT,
@@ -67,7 +71,7 @@ def identify(
         with LogPlant(path, TOLERANCE) as plant:
             progress("the columns of the log")
             experiments, bad = screen(plant, robot, logs, groups=groups, held_out=held_out)
-            with simulating_workers(workers, path, robot, experiments, TOLERANCE) as pool:
+            with worker_pool(workers, path, robot, experiments) as pool:
                 problem = Problem(plant, robot, experiments, rows, pool)
                 found = fit(problem, progress=progress)
             before = problem.predictions(np.zeros(len(rows)))
@@ -79,6 +83,18 @@ def identify(
         bad=tuple(bad),
         before=tuple(before),
     )
+
+
+def worker_pool(
+    size: int, fmu: Path, robot: Robot, experiments: Sequence[Experiment]
+) -> AbstractContextManager[Executor | None]:
+    """Returns processes that simulate experiments with a robot's FMU; none where `size` is 1."""
+    if size == 1:
+        return nullcontext()
+    scratch = fmu.with_name("workers")
+    scratch.mkdir(exist_ok=True)
+    initialise = partial(open_plant, fmu, robot, tuple(experiments), TOLERANCE)
+    return WorkerPool(size, initialise=initialise, scratch=scratch)
 
 
 def usual_workers(logs: Sequence[Log]) -> int:

@@ -14,7 +14,7 @@ import tomlkit
 from hexapod_cosim.cosim.common.files import RUN_FILE, write_json, write_text
 from hexapod_cosim.extensions.identify.figures import channel_figures
 from hexapod_cosim.extensions.identify.fitting.misfit import EXPLAINED, REJECTED
-from hexapod_cosim.extensions.identify.identified import NEAR, Estimate, Identified
+from hexapod_cosim.extensions.identify.identified import Estimate, Identified
 from hexapod_cosim.extensions.identify.numbers.servo import GEAR
 from hexapod_cosim.extensions.identify.report import TITLES, Difference, Section, number, rendered
 from hexapod_cosim.extensions.identify.robot_file import SENSORS, sensors_table, write_robot
@@ -22,7 +22,7 @@ from hexapod_cosim.extensions.identify.screening import left_out
 from hexapod_cosim.extensions.identify.unknowns import BIAS
 
 KIND, ROBOT_FILE, REPORT, RESULT = "identify", "robot.toml", "report.html", "identify.json"
-ESTIMATES = ("number", "unit", "before", "found", "95 % interval", "determined", "nearest partner")
+ESTIMATES = ("number", "unit", "before", "found", "95 % interval", "determined")
 MISFIT = ("channel", "noise", "fitted", "held out")
 ERRORS = ("channel", "unit", "before", "after", "ratio")
 MOTOR = {"servo.torque_constant", "servo.resistance"}
@@ -94,8 +94,7 @@ def _page(found: Identified, command: str) -> str:
         ),
         Section(
             title="Numbers",
-            caption="Determined: the logs at least halve what was unknown of a number. The partner "
-            f"is the number with which it is correlated, above {NEAR}.",
+            caption="Determined: the logs at least halve what was unknown of a number.",
             columns=ESTIMATES,
             rows=estimate_rows(estimates),
             left=2,
@@ -167,7 +166,6 @@ def estimate_rows(estimates: Sequence[Estimate]) -> list[list[str]]:
             one.found,
             one.interval,
             "yes" if one.determined else "in part" if one.depends else "no",
-            f"{one.partner} {one.correlation:+.2f}" if abs(one.correlation) > NEAR else "",
         ]
         for one in estimates
     ]

@@ -1,7 +1,7 @@
 """Writes the robot file of an identified robot: the file it came from with the new numbers.
 
-The comment beside a new number says from which log it is, with its interval, and so does [source];
-other comments and all other keys stay. Of a URDF a robot file is written that refers to it.
+[source] says from which log a new number is, with its interval; all other keys and their comments
+stay. Of a URDF a robot file is written that refers to it.
 """
 
 from __future__ import annotations
@@ -17,7 +17,6 @@ import tomlkit.items
 
 from hexapod_cosim.cosim.common.files import write_text
 from hexapod_cosim.extensions.identify.identified import Estimate, Identified
-from hexapod_cosim.extensions.identify.numbers.servo import TIED
 from hexapod_cosim.extensions.identify.unknowns import OF_FILE
 from hexapod_cosim.models import JOINT_NAMES, HexapodError, Robot, load_robot
 from hexapod_cosim.models.robot import robot_path
@@ -25,9 +24,7 @@ from hexapod_cosim.models.robot import robot_path
 SECTIONS = ("servo", "contact", "friction")
 BODY_KEYS = ("mass", "com", "inertia")
 SENSORS = "sensors.toml"
-# coefficients of M3 and M4, with their keys in a robot file
-TIED_KEYS = {name: [f"servo.{key}" for key in keys] for name, keys in TIED.items()}
-FOLLOWS = "follows from identified numbers"  # comment beside a number that does
+COMMENT = "identified, see [source]"  # beside a new number
 
 
 def robot_text(found: Identified, file: str, folder: Path, logs: Sequence[str]) -> str:
@@ -50,11 +47,11 @@ def robot_text(found: Identified, file: str, folder: Path, logs: Sequence[str]) 
     own = [one for one in found.estimates if one.group in OF_FILE]
     for one in own:
         source[one.key] = _sentence(one, names, rejected=found.rejected)
-    before, said = load_robot(file), _comments(own, names)
+    before = load_robot(file)
     after = before if found.rejected else found.robot
     for name in SECTIONS:
-        _set_changed(document, name, getattr(before, name), getattr(after, name), said)
-    _set_bodies(document, before, after, said)
+        _set_changed(document, name, getattr(before, name), getattr(after, name))
+    _set_bodies(document, before, after)
     _set_defaults(document, after)
     return tomlkit.dumps(document)
 
@@ -96,36 +93,16 @@ def _sentence(one: Estimate, logs: str, *, rejected: bool) -> str:
     return f"not determined by {logs}{why}: as before"
 
 
-def _comments(estimates: Sequence[Estimate], logs: str) -> dict[str, str]:
-    """Returns the comments beside numbers that are new, by the keys of the file."""
-    said: dict[str, list[str]] = {}
-    units = {}
-    for one in estimates:
-        key, _, axis = one.key.partition("[")
-        if not (one.determined or one.depends):
-            continue
-        text = one.interval
-        for own in TIED_KEYS.get(key, (key,)):
-            units[own] = one.unit
-            said.setdefault(own, []).append(f"[{axis} {text}" if axis else text)
-    return {
-        key: f"{units[key]}    identified from {logs}, 95 % interval {', '.join(texts)}"
-        for key, texts in said.items()
-    }
-
-
-def _put(table: Any, key: str, value: Any, comment: str) -> None:
-    """Sets a number of a table with a comment, which replaces the one beside the old number."""
+def _put(table: Any, key: str, value: Any) -> None:
+    """Sets a number of a table; the comment beside the old one would be wrong."""
     item = tomlkit.item(value)
     if not isinstance(table, tomlkit.items.InlineTable):
-        item.comment(comment)
+        item.comment(COMMENT)
     table[key] = item
 
 
-def _set_changed(
-    document: Any, name: str, before: Any, after: Any, said: Mapping[str, str]
-) -> None:
-    """Sets the keys of a section that have changed. said: comments, by key of the file."""
+def _set_changed(document: Any, name: str, before: Any, after: Any) -> None:
+    """Sets the keys of a section that have changed."""
     changed = [
         item.name
         for item in fields(after)
@@ -135,7 +112,7 @@ def _set_changed(
         return
     section = document.setdefault(name, tomlkit.table())
     for key in changed:
-        _put(section, key, getattr(after, key), said.get(f"{name}.{key}", FOLLOWS))
+        _put(section, key, getattr(after, key))
 
 
 def _set_defaults(document: Any, after: Robot) -> None:
@@ -146,16 +123,12 @@ def _set_defaults(document: Any, after: Robot) -> None:
             table[key] = getattr(getattr(after, section), key)
 
 
-def _set_bodies(document: Any, before: Robot, after: Robot, said: Mapping[str, str]) -> None:
-    """Sets mass, centre of mass and inertia of the bodies where they have changed.
-
-    said: comments, by key of the file.
-    """
+def _set_bodies(document: Any, before: Robot, after: Robot) -> None:
+    """Sets mass, centre of mass and inertia of the bodies where they have changed."""
     for key in BODY_KEYS:
         if getattr(before.torso, key) != getattr(after.torso, key):
             torso = document.setdefault("torso", tomlkit.table())
-            comment = said.get(f"torso.{key}", FOLLOWS)
-            _put(torso, key, _plain(getattr(after.torso, key)), comment)
+            _put(torso, key, _plain(getattr(after.torso, key)))
     for joint, name in enumerate(JOINT_NAMES):
         for key in BODY_KEYS:
             old, new = (
@@ -163,31 +136,23 @@ def _set_bodies(document: Any, before: Robot, after: Robot, said: Mapping[str, s
                 for robot in (before, after)
             )
             if old != new:
-                comment = said.get(f"links.{name}.{key}", FOLLOWS)
-                _set_links(document, name, key, new, comment)
+                _set_links(document, name, key, new)
 
 
-def _set_links(document: Any, name: str, key: str, values: Mapping[str, Any], comment: str) -> None:
+def _set_links(document: Any, name: str, key: str, values: Mapping[str, Any]) -> None:
     """Sets a key of the links of all legs.
 
     values: by name of the leg. Of a leg that has its own value, or needs one, its own table is set.
     """
     links = document.setdefault("links", tomlkit.table())
     common = next(iter(values.values()))
-    _put(links.setdefault(name, tomlkit.table()), key, common, comment)
+    _put(links.setdefault(name, tomlkit.table()), key, common)
     for leg, value in values.items():
-        own = _leg_table(document, leg, name)
-        if value != common:
-            own = document.setdefault("legs", tomlkit.table())
-            own = own.setdefault(leg, tomlkit.table()).setdefault(name, tomlkit.table())
-            _put(own, key, value, comment)
-        elif own is not None and key in own:
-            _put(own, key, value, comment)
-
-
-def _leg_table(document: Any, leg: str, joint: str) -> Any:
-    """Returns a leg's own table of a link; None without one."""
-    return document.get("legs", {}).get(leg, {}).get(joint)
+        own = document.get("legs", {}).get(leg, {}).get(name, {})
+        if value != common or key in own:
+            legs = document.setdefault("legs", tomlkit.table())
+            own = legs.setdefault(leg, tomlkit.table()).setdefault(name, tomlkit.table())
+            _put(own, key, value)
 
 
 def _plain(value: Any) -> Any:

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hexapod_cosim.cosim.interface.names import LEGS, joint_names, vector_names
+from hexapod_cosim.cosim.master.recorder import Recording
 from hexapod_cosim.extensions.identify.log import ATTITUDE, Log
 from hexapod_cosim.models import Robot
 from hexapod_cosim.models.kinematics import axis_quaternion, foot_positions, quaternion_product
@@ -59,11 +60,7 @@ def initial_state(log: Log, robot: Robot) -> dict[str, float]:
         found[f"initial.{name}"] = float(angle.flat[k])
     for name in joint_names("speed"):
         found[f"initial.{name}"] = rate(name) if rest == 1 and log.has([name]) else 0.0
-    is_flat = robot.terrain.kind == "flat"
-    if is_flat and not log.has(ATTITUDE):
-        turn = standing_attitude(robot, angle)
-    else:
-        turn = _quaternion(log, rows.data, rest, is_flat=is_flat)
+    turn = _attitude(rows, robot, angle)
     found |= dict(zip(vector_names("initial.quaternion", 4), turn.tolist(), strict=True))
     place = vector_names("torso.position")
     position = _resting(robot, angle, turn)
@@ -96,44 +93,34 @@ def _credible(measured: list[float], resting: list[float], robot: Robot) -> list
     return found
 
 
-def _quaternion(log: Log, rows: Array, rest: int, *, is_flat: bool) -> Array:
-    """Returns the attitude (4,) in the first row, or its mean over the rows at rest; the level one
-    where the log has no numbers, or on flat ground more than a standing robot leans.
+def _attitude(rows: Recording, robot: Robot, angle: Array) -> Array:
+    """Returns the mean attitude (4,) in the rows at rest.
+
+    On flat ground it is that of the standing feet where the log lacks it, and roll and pitch are 0
+    where they are more than a standing robot leans.
     """
-    names = vector_names("torso.quaternion", 4)
-    if rest == 1 and log.has(names):
-        first: Array = log.recording.columns(names)[0]
-        if np.isfinite(first).all():
-            return first
-    if not log.has(ATTITUDE):
-        return np.array([1.0, 0.0, 0.0, 0.0])
-    angles = rows[:, [log.recording.names.index(name) for name in ATTITUDE]]
-    known = np.isfinite(angles).all(axis=1)
-    if not known.all():
-        angles = angles[known] if known.any() else np.zeros((1, 3))
-    roll, pitch, yaw = angles.mean(axis=0).tolist()
-    if is_flat and max(abs(roll), abs(pitch)) > LEANS:
-        roll, pitch = 0.0, 0.0
+    flat, roll, pitch, yaw = robot.terrain.kind == "flat", 0.0, 0.0, 0.0
+    if set(ATTITUDE) <= set(rows.names):
+        roll, pitch, yaw = (float(np.nan_to_num(_mean(rows.column(name)))) for name in ATTITUDE)
+    elif flat:
+        roll, pitch = standing_attitude(robot, angle)
+    if flat and max(abs(roll), abs(pitch)) > LEANS:
+        roll = pitch = 0.0
     turn = axis_quaternion(np.array([0.0, 0.0, 1.0]), yaw)
     turn = quaternion_product(turn, axis_quaternion(np.array([0.0, 1.0, 0.0]), pitch))
     return quaternion_product(turn, axis_quaternion(np.array([1.0, 0.0, 0.0]), roll))
 
 
-def standing_attitude(robot: Robot, angle: Array) -> Array:
-    """Returns the attitude (4,) of a robot whose feet stand on level ground, with a yaw of 0.
+def standing_attitude(robot: Robot, angle: Array) -> tuple[float, float]:
+    """Returns roll and pitch [rad] of a robot whose feet stand on level ground.
 
-    angle: of the joints (6, 3) [rad]. The ground is the plane nearest to the feet; the attitude is
-    level where they lie in none that a standing robot may have.
+    angle: of the joints (6, 3) [rad]. The ground is the plane nearest to the feet.
     """
     feet = foot_positions(robot, angle)
     offset = feet - feet.mean(axis=0)
     slopes, *_ = np.linalg.lstsq(offset[:, :2], offset[:, 2], rcond=None)
     up = np.array([-slopes[0], -slopes[1], 1.0]) / np.sqrt(1.0 + float(slopes @ slopes))
-    pitch, roll = -float(np.arcsin(up[0])), float(np.arctan2(up[1], up[2]))
-    if max(abs(roll), abs(pitch)) > LEANS:
-        roll = pitch = 0.0
-    turn = axis_quaternion(np.array([0.0, 1.0, 0.0]), pitch)
-    return quaternion_product(turn, axis_quaternion(np.array([1.0, 0.0, 0.0]), roll))
+    return float(np.arctan2(up[1], up[2])), -float(np.arcsin(up[0]))
 
 
 def _resting(robot: Robot, angle: Array, turn: Array) -> list[float]:

@@ -144,9 +144,7 @@ def candidates(robot: Robot) -> tuple[Candidate, ...]:
 def own_ground(robot: Robot, point: Candidate) -> ContactState:
     """Returns an open contact with the ground of the robot file, without the surface's patches."""
     return ContactState(
-        robot.contact,
-        _friction_of(robot.friction, point),
-        soil_for(robot.soil, robot, point),
+        robot.contact, _friction_of(robot.friction, point), soil_for(robot.soil, robot, point)
     )
 
 

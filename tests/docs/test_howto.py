@@ -75,9 +75,6 @@ def leave_identified(folder: Path) -> None:
     place.mkdir(parents=True, exist_ok=True)
     if not (place / "robot.toml").exists():
         shutil.copy(folder / "my.toml", place / "robot.toml")
-    if not (place / "experiment.toml").exists():
-        walk = 'robot = "robot.toml"\ncontrol = "kinematic"\n[[command]]\nvx = 0.08\n'
-        (place / "experiment.toml").write_text(walk, encoding="utf-8")
 
 
 @pytest.mark.parametrize(

@@ -20,9 +20,13 @@ from hexapod_cosim.cosim.logs.mcap_writer import write_mcap
 from hexapod_cosim.extensions.identify.experiment import of_point
 from hexapod_cosim.extensions.identify.fitting.misfit import misfits, read_noise
 from hexapod_cosim.extensions.identify.fitting.problem import Problem
-from hexapod_cosim.extensions.identify.fitting.workers import simulating_workers
 from hexapod_cosim.extensions.identify.identified import Identified
-from hexapod_cosim.extensions.identify.identify import identify, make_experiment
+from hexapod_cosim.extensions.identify.identify import (
+    TOLERANCE,
+    identify,
+    make_experiment,
+    worker_pool,
+)
 from hexapod_cosim.extensions.identify.identify_files import warnings
 from hexapod_cosim.extensions.identify.log_plant import LogPlant
 from hexapod_cosim.extensions.identify.robot_file import write_robot
@@ -98,13 +102,13 @@ def test_the_robot_file_is_the_identified_robot(found: list[Identified], tmp_pat
     again, source = load_robot(path), tomllib.loads(path.read_text(encoding="utf-8"))["source"]
     assert again.servo == found[0].robot.servo
     assert (again.name, source["identified"]) == ("athena-identified", "hexapod identify log.mcap")
-    assert source["servo.kp"].startswith("identified from log.mcap: 95 % interval")
     assert source["servo.torque_max"] == "not determined by log.mcap: as before"
     lines = path.read_text(encoding="utf-8").splitlines()
     kp = next(one for one in found[0].estimates if one.key == "servo.kp")
+    said = f"identified from log.mcap: 95 % interval {kp.interval} N m/rad; before 40"
+    assert source["servo.kp"] == said
     (line,) = [line for line in lines if line.startswith("kp = ")]
     assert line.startswith(f"kp = {kp.value!r} ")
-    assert line.endswith(f"# N m/rad    identified from log.mcap, 95 % interval {kp.interval}")
     before = robot_path("athena").read_text(encoding="utf-8").splitlines()
     others = [each for each in before if each.startswith(("mass =", "length =", "speed_max ="))]
     assert others
@@ -167,8 +171,8 @@ def test_worker_processes_give_the_same_derivatives(
     experiments = [make_experiment(log, 0, 0.0)]
     found = []
     with (
-        LogPlant(athena_fmu) as plant,
-        simulating_workers(2, athena_fmu, robot, experiments, {}) as pool,
+        LogPlant(athena_fmu, TOLERANCE) as plant,
+        worker_pool(2, athena_fmu, robot, experiments) as pool,
     ):
         for own in (None, pool):
             problem = Problem(plant, robot, experiments, rows, own)
@@ -213,7 +217,7 @@ def test_two_logs_have_one_robot_and_two_starts(secrets: list[Secret], athena_fm
         problem = Problem(plant, robot, both, rows)
         z = np.zeros(len(rows))
         z[keys.index("start.x[2]")] = 1.0
-        first, second = problem.errors(z)
+        first, second = problem.predictions(z)
     place = both[0].columns.index("torso.position[1]")
     assert second[:, place] - first[:, place] == pytest.approx(0.005, abs=1e-6)
 

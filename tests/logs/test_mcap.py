@@ -198,7 +198,7 @@ def test_without_the_extra_the_message_names_it_and_nothing_is_run(
     monkeypatch.setattr(mcap_package, "PACKAGES", ("no_such_package",))
     folder = tmp_path / "out"
     outcome = call("simulate", "walk_flat", "--format", "mcap", "-o", folder, *QUICK)
-    assert_refused(outcome, "MCAP files need packages", "outputs.formats", "[logs]")
+    assert_refused(outcome, "MCAP files need", "outputs.formats", "[logs]")
     assert not folder.exists()
 
 

@@ -17,9 +17,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hexapod_cosim.extensions.identify.fitting.covariance import coloured_information
+from hexapod_cosim.extensions.identify.fitting.differences import FINE
 from hexapod_cosim.extensions.identify.fitting.least_squares import BOUND, remaining_step
 from hexapod_cosim.extensions.identify.fitting.misfit import Misfit, misfits, read_noise
-from hexapod_cosim.extensions.identify.fitting.problem import FINE, Problem
+from hexapod_cosim.extensions.identify.fitting.problem import Problem
 from hexapod_cosim.extensions.identify.fitting.rank import (
     dependences,
     determined,
@@ -34,7 +35,7 @@ Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 Progress = Callable[[str], None]
 # of deriving weak combinations anew: the first errors of derivatives hide some in others
-PASSES = 2
+PASSES = 4
 ROUNDS = 3  # of keeping numbers at the file's values, at most
 
 

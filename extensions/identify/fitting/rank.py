@@ -17,7 +17,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from hexapod_cosim.extensions.identify.fitting.problem import UNLIKE, Problem
+from hexapod_cosim.extensions.identify.fitting.differences import UNLIKE
+from hexapod_cosim.extensions.identify.fitting.problem import Problem
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]

@@ -19,6 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from hexapod_cosim.extensions.identify.fitting.differences import FINE
 from hexapod_cosim.extensions.identify.fitting.least_squares import (
     BOUND,
     huber,
@@ -26,7 +27,7 @@ from hexapod_cosim.extensions.identify.fitting.least_squares import (
     remaining_step,
 )
 from hexapod_cosim.extensions.identify.fitting.misfit import read_noise
-from hexapod_cosim.extensions.identify.fitting.problem import ALL, FINE, Problem
+from hexapod_cosim.extensions.identify.fitting.problem import ALL, Problem
 from hexapod_cosim.extensions.identify.numbers.servo import GEAR
 from hexapod_cosim.extensions.identify.unknowns import DELAYS
 
@@ -100,7 +101,7 @@ def searched(problem: Problem, report: Progress) -> tuple[Problem, Array]:
     fitted.use({})
     short.use({})
     z = _with_delays(short, z, ("joints", "forces", "imu"), lambda own: own + NEAR_DELAYS)
-    fitted.count_all()
+    fitted.counted = fitted.known
     return fitted, finished(fitted, z, report)
 
 
@@ -179,7 +180,7 @@ def tried(problem: Problem, z: Array) -> Array:
 
 def _cost(problem: Problem, z: Array) -> float:
     """Returns the sum of squares over all rows by Huber's loss."""
-    counted, problem.counted = problem.counted, problem.all_known()
+    counted, problem.counted = problem.counted, problem.known
     residuals = problem.residuals(z)
     problem.counted = counted
     return huber(residuals)
@@ -196,7 +197,7 @@ def finished(problem: Problem, z: Array, report: Progress) -> Array:
     for number in range(FINISHING):
         report(f"all rows again, step {number + 1} of at most {FINISHING}")
         if number < ANEW:
-            problem.count_all()
+            problem.counted = problem.known
         problem.set_noise(problem.errors(z))
         problem.leave_out_bent(z)
         better, length = _stepped(problem, z)
