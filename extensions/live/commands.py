@@ -1,4 +1,4 @@
-"""`hexapod live`: a robot that is driven in a browser; `hexapod realtime`: how long a step takes."""
+"""`hexapod live`: a robot is driven in a browser; `hexapod realtime`: how long a step takes."""
 
 from __future__ import annotations
 
