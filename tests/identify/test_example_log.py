@@ -36,7 +36,7 @@ def test_the_robot_of_the_example_is_identified(
     for key, value in SECRET.items():
         assert own[key]["determined"], key
         assert own[key]["low"] <= value <= own[key]["high"], key
-    # of the legs' masses a walk of this length tells combinations alone
+    # of the legs' masses a walk of this length determines combinations alone
     legs = [own[f"links.{joint}.mass"] for joint in ("coxa", "femur", "tibia")]
     assert [one["determined"] for one in legs] == [False, False, False]
     off = [one for one in own.values() if one["key"].startswith("delay.")]

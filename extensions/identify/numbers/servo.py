@@ -29,8 +29,6 @@ def _motor(name: str, unit: str, prior: float, applies: Callable[[Robot], bool] 
     """
     row = section(name, unit, "servo", prior, applies=applies)
     plain = row.write
-    if plain is None:
-        raise ValueError(f"{name} is no number of robot files")
 
     def write(robot: Robot, value: float) -> Robot:
         changed = plain(robot, value)
@@ -49,8 +47,6 @@ def _term(
     """
     row = _motor(name, unit, 0.0)
     read = row.read
-    if read is None:
-        raise ValueError(f"{name} is no number of robot files")
     high = 1.0 if unit == "1" else math.inf
 
     def prior(robot: Robot) -> float:
@@ -67,7 +63,7 @@ def _of_both(name: str, motor: str, external: str) -> Unknown:
 
     def write(robot: Robot, value: float) -> Robot:
         for side in sides:
-            robot = side.write(robot, value) if side.write else robot
+            robot = side.write(robot, value)
         return robot
 
     return replace(sides[0], key=name, write=write, applies=lambda robot: _alike(robot, sides))
@@ -75,7 +71,7 @@ def _of_both(name: str, motor: str, external: str) -> Unknown:
 
 def _alike(robot: Robot, sides: Sequence[Unknown]) -> bool:
     """Returns whether terms of a measured servo are equal and not 0."""
-    first, second = (side.read(robot) for side in sides if side.read)
+    first, second = (side.read(robot) for side in sides)
     return MOTOR(robot) and first == second > 0.0
 
 

@@ -21,12 +21,11 @@ class Unknown:
     group: str
     prior: float  # standard deviation; of the logarithm where `positive`
     positive: bool = True  # its logarithm is estimated
-    start: float = 0.0  # value before, of numbers that no robot file has
     low: float = -math.inf
     high: float = math.inf
-    # how the robot file's value is read and replaced; None: a number of sensors
-    read: Callable[[Robot], float] | None = None
-    write: Callable[[Robot, float], Robot] | None = None
+    # how the robot file's value is read and replaced; a number of sensors begins at a fixed one
+    read: Callable[[Robot], float] = lambda _robot: 0.0
+    write: Callable[[Robot, float], Robot] = lambda robot, _value: robot
     applies: Callable[[Robot], bool] = ALWAYS
     prior_of: Callable[[Robot], float] | None = None  # where the prior depends on the robot
     limits_of: Callable[[Robot], tuple[float, float]] | None = None  # likewise low and high
