@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from hexapod_cosim.models import Robot
+from hexapod_cosim.models.servos.presets import followed
 
 ALWAYS: Callable[[Robot], bool] = lambda _robot: True  # noqa: E731
 
@@ -67,7 +68,10 @@ FURTHEST = 8.0  # priors from the value before
 
 
 def section(name: str, unit: str, group: str, prior: float, **more: Any) -> Unknown:
-    """Returns the row of a number in a section of robot files, named "section.key"."""
+    """Returns the row of a number in a section of robot files, named "section.key".
+
+    What follows from constants of a measured servo, as its largest torque, changes with them.
+    """
     section, _, key = name.partition(".")
 
     def read(robot: Robot) -> float:
@@ -75,6 +79,8 @@ def section(name: str, unit: str, group: str, prior: float, **more: Any) -> Unkn
 
     def write(robot: Robot, value: float) -> Robot:
         changed: Any = replace(getattr(robot, section), **{key: value})
+        if section == "servo" and changed.drive == "motor":
+            changed = followed(changed)
         sections: dict[str, Any] = {section: changed}
         return replace(robot, **sections)
 
