@@ -44,4 +44,4 @@ def test_the_robot_of_the_example_is_identified(
     )
     # the noise of the sensors is left
     assert after["torque"] < 0.031
-    assert before["torque"] > 5.0 * after["torque"]
+    assert before["torque"] > 3.0 * after["torque"]
