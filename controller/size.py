@@ -9,7 +9,7 @@ rates are scaled.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from typing import Any, TypeVar
 
 import numpy as np
@@ -18,6 +18,7 @@ from hexapod_cosim.controller.gains import LimitGains, PaperGains, Requirements
 from hexapod_cosim.controller.plane import LEGS
 from hexapod_cosim.controller.walk.kinematics import LegSolver
 from hexapod_cosim.models import Robot
+from hexapod_cosim.models.schema import specs
 
 SHORTEST, LONGEST = 0.22, 0.44  # m    coxa, femur and tibia of legs that the figures suit
 LENGTHS = ("sag_limit", "deflection_limit", "height_limit")
@@ -67,7 +68,7 @@ def requirements_for(robot: Robot, **given: Any) -> Requirements:
 
 def taken(kind: type[_Section], needs: Requirements, **given: float) -> _Section:
     """Returns a section of the gains whose values are those of the requirements, or given ones."""
-    names = [entry.name for entry in fields(kind) if entry.name not in given]  # type: ignore[arg-type]
+    names = [name for name in specs(kind) if name not in given]
     return kind(**{name: getattr(needs, name) for name in names}, **given)
 
 

@@ -250,11 +250,7 @@ def deepest_open(contacts: Contacts, depths: Depths) -> float:
 
 
 def cubic_crossing(
-    start: float,
-    slope_start: float,
-    end: float,
-    slope_end: float,
-    level: float,
+    start: float, slope_start: float, end: float, slope_end: float, level: float
 ) -> float:
     """Returns where on [0, 1] the cubic with these ends and slopes reaches a level (eq. 24)."""
     bend = slope_start + slope_end - 2.0 * (end - start)

@@ -42,7 +42,8 @@ from hexapod_cosim.models.kinematics import (
 from hexapod_cosim.models.mjcf_ground import APPROXIMATION, add_surface
 from hexapod_cosim.models.records import JOINT_NAMES, Leg, Link, Robot
 from hexapod_cosim.models.servos.motor import back_emf_damping
-from hexapod_cosim.models.urdf.writer import COLOURS, THICKNESS, numbers
+from hexapod_cosim.models.urdf.writer import COLOURS, THICKNESS
+from hexapod_cosim.models.xml_elements import add, numbers, written
 
 TIME_STEP = 0.001  # s
 # 1  MuJoCo's default: the share of a constraint's acceleration that it corrects
@@ -63,15 +64,15 @@ GROUND = "5 5 0.1"  # m    half sizes of the drawn plane and its grid
 def robot_to_mjcf(robot: Robot) -> str:
     """Returns the text of an MJCF file, with a keyframe "stance" on the ground."""
     root = ET.Element("mujoco", model=robot.name)
-    ET.SubElement(root, "compiler", angle="radian", autolimits="true", balanceinertia="false")
-    option = ET.SubElement(root, "option", timestep=repr(TIME_STEP), gravity=numbers(robot.gravity))
+    add(root, "compiler", angle="radian", autolimits="true", balanceinertia="false")
+    option = add(root, "option", timestep=TIME_STEP, gravity=robot.gravity)
     option.attrib |= {"integrator": "implicitfast", "cone": "elliptic", "impratio": "10"}
     _assets(root)
     surface = surface_of(robot.terrain)
     if surface is not None:
         root.insert(0, ET.Comment(f" {APPROXIMATION[surface.kind]} "))
-    world = ET.SubElement(root, "worldbody")
-    ET.SubElement(world, "light", pos="0 0 3", dir="0 0 -1", directional="true")
+    world = add(root, "worldbody")
+    add(world, "light", pos="0 0 3", dir="0 0 -1", directional="true")
     if surface is None:
         _ground(world, robot)
     else:
@@ -79,15 +80,14 @@ def robot_to_mjcf(robot: Robot) -> str:
     _torso(world, robot)
     _servos(root, robot)
     _stance(root, robot)
-    ET.indent(root)
-    return f'<?xml version="1.0" encoding="utf-8"?>\n{ET.tostring(root, encoding="unicode")}\n'
+    return written(root)
 
 
 def _assets(root: ET.Element) -> None:
-    asset = ET.SubElement(root, "asset")
+    asset = add(root, "asset")
     for name, colour in COLOURS.items():
-        ET.SubElement(asset, "material", name=name, rgba=colour)
-    ET.SubElement(
+        add(asset, "material", name=name, rgba=colour)
+    add(
         asset,
         "texture",
         name="grid",
@@ -98,22 +98,20 @@ def _assets(root: ET.Element) -> None:
         width="256",
         height="256",
     )
-    ET.SubElement(
-        asset, "material", name="ground", texture="grid", texrepeat="5 5", texuniform="true"
-    )
+    add(asset, "material", name="ground", texture="grid", texrepeat="5 5", texuniform="true")
 
 
 def _ground(world: ET.Element, robot: Robot) -> None:
-    ET.SubElement(
+    add(
         world,
         "geom",
+        _contact_attributes(robot),
         name="ground",
         type="plane",
         size=GROUND,
         material="ground",
-        pos=numbers((0.0, 0.0, robot.terrain.height)),
-        quat=numbers(_ground_quaternion(robot)),
-        attrib=_contact_attributes(robot),
+        pos=(0.0, 0.0, robot.terrain.height),
+        quat=_ground_quaternion(robot),
     )
 
 
@@ -209,22 +207,22 @@ def _motion(robot: Robot, speed: Array) -> Array:
 
 
 def _inertial(body: ET.Element, mass: float, com: Vector3, inertia: Iterable[float]) -> None:
-    ET.SubElement(body, "inertial", pos=numbers(com), mass=repr(mass), fullinertia=numbers(inertia))
+    add(body, "inertial", pos=com, mass=mass, fullinertia=inertia)
 
 
 def _torso(world: ET.Element, robot: Robot) -> None:
-    torso = ET.SubElement(world, "body", name="torso")
-    ET.SubElement(torso, "freejoint", name="torso")
+    torso = add(world, "body", name="torso")
+    add(torso, "freejoint", name="torso")
     _inertial(torso, robot.torso.mass, robot.torso.com, robot.torso.inertia)
     half = numbers(0.5 * size for size in robot.torso.size)
-    ET.SubElement(
+    add(
         torso,
         "geom",
         DRAWN,
         name="torso",
         type="box",
         size=half,
-        pos=numbers(robot.torso.com),
+        pos=robot.torso.com,
         material="body",
     )
     body = robot.body
@@ -232,8 +230,8 @@ def _torso(world: ET.Element, robot: Robot) -> None:
         edges = numbers(half + body.corner_radius for half in body.torso_box)
         place = numbers(body.torso_centre)
         box = {"name": "torso_contact", "type": "box", "size": edges, "pos": place}
-        ET.SubElement(torso, "geom", _body_attributes(robot) | box)
-    ET.SubElement(torso, "site", name="imu", pos=numbers(robot.torso.com))
+        add(torso, "geom", _body_attributes(robot) | box)
+    add(torso, "site", name="imu", pos=robot.torso.com)
     for leg, mobility in zip(robot.legs, joint_mobility(robot), strict=True):
         _leg(torso, leg, robot, mobility)
 
@@ -243,18 +241,16 @@ def _leg(torso: ET.Element, leg: Leg, robot: Robot, mobility: Array) -> None:
     body, place = torso, leg.hip_position
     quaternion = axis_quaternion(Z, leg.hip_yaw)
     for name, link, mobile in zip(JOINT_NAMES, leg.links, mobility, strict=True):
-        body = ET.SubElement(
-            body, "body", name=f"{leg.name}_{name}", pos=numbers(place), quat=numbers(quaternion)
-        )
+        body = add(body, "body", name=f"{leg.name}_{name}", pos=place, quat=quaternion)
         _inertial(body, link.mass, link.com, link.inertia)
         _hinge(body, f"{leg.name}_{name}", link, robot, float(mobile))
         size = repr(THICKNESS * robot.foot.radius)
-        ET.SubElement(
+        add(
             body,
             "geom",
             DRAWN,
             type="capsule",
-            fromto=numbers((0.0, 0.0, 0.0, *link.tip)),
+            fromto=(0.0, 0.0, 0.0, *link.tip),
             size=size,
             material="limb",
         )
@@ -268,8 +264,8 @@ def _foot(tibia: ET.Element, leg: Leg, robot: Robot, place: Vector3) -> None:
     """Adds the foot's sphere, which touches the ground only, and its site."""
     sphere = {"name": f"{leg.name}_foot", "type": "sphere", "size": repr(robot.foot.radius)}
     contact = GROUNDED | {"condim": _contact_dimensions(robot), "material": "rubber"}
-    ET.SubElement(tibia, "geom", contact | sphere | {"pos": numbers(place)})
-    ET.SubElement(tibia, "site", name=f"{leg.name}_foot", pos=numbers(place))
+    add(tibia, "geom", contact | sphere | {"pos": numbers(place)})
+    add(tibia, "site", name=f"{leg.name}_foot", pos=place)
 
 
 def _tibia_spheres(tibia: ET.Element, leg: Leg, robot: Robot) -> None:
@@ -282,13 +278,13 @@ def _tibia_spheres(tibia: ET.Element, leg: Leg, robot: Robot) -> None:
         if radius > 0.0:
             place = numbers(share * value for value in leg.links[-1].tip)
             sphere = {"name": f"{leg.name}_{name}", "type": "sphere", "size": repr(radius)}
-            ET.SubElement(tibia, "geom", _body_attributes(robot) | sphere | {"pos": place})
+            add(tibia, "geom", _body_attributes(robot) | sphere | {"pos": place})
 
 
 def _hinge(body: ET.Element, name: str, link: Link, robot: Robot, mobility: float) -> None:
     """Adds a joint with its limits; mobility in 1/(kg m2)."""
     servo = robot.servo
-    joint = ET.SubElement(body, "joint", name=name, type="hinge", axis=numbers(link.axis))
+    joint = add(body, "joint", name=name, type="hinge", axis=link.axis)
     joint.attrib |= {
         "range": numbers((link.angle_min, link.angle_max)),
         "armature": repr(servo.rotor_inertia),
@@ -307,14 +303,12 @@ def _hinge(body: ET.Element, name: str, link: Link, robot: Robot, mobility: floa
 
 
 def _servos(root: ET.Element, robot: Robot) -> None:
-    servo, actuator = robot.servo, ET.SubElement(root, "actuator")
+    servo, actuator = robot.servo, add(root, "actuator")
     damping = servo.kd + (back_emf_damping(servo) if servo.drive == "motor" else 0.0)
     for leg in robot.legs:
         for name, link in zip(JOINT_NAMES, leg.links, strict=True):
             joint = f"{leg.name}_{name}"
-            position = ET.SubElement(
-                actuator, "position", name=joint, joint=joint, kp=repr(servo.kp), kv=repr(damping)
-            )
+            position = add(actuator, "position", name=joint, joint=joint, kp=servo.kp, kv=damping)
             position.set("ctrlrange", numbers((link.angle_min, link.angle_max)))
             position.set("forcerange", numbers((-servo.torque_max, servo.torque_max)))
 
@@ -333,7 +327,7 @@ def _stance(root: ET.Element, robot: Robot) -> None:
     if surface_of(robot.terrain) is not None:
         level = max(ground_height(robot.terrain, x, y) for x, y, _ in feet)
     place = np.array([0.0, 0.0, level]) + height * rotation_matrix(tilt)[:, 2]
-    key = ET.SubElement(ET.SubElement(root, "keyframe"), "key", name="stance")
+    key = add(add(root, "keyframe"), "key", name="stance")
     key.set("qpos", numbers([*place, *quaternion, *robot.stance.ravel()]))
     key.set("ctrl", numbers(robot.stance.ravel()))
 

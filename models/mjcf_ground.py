@@ -10,7 +10,7 @@ import numpy as np
 from hexapod_cosim.models.arrays import Array
 from hexapod_cosim.models.errors import RobotError
 from hexapod_cosim.models.ground.surface import Surface
-from hexapod_cosim.models.urdf.writer import numbers
+from hexapod_cosim.models.xml_elements import add, numbers
 
 BELOW = 0.1  # m    thickness below the lowest height
 MOST_HEIGHTS = 1_000_000  # in a text file
@@ -25,11 +25,7 @@ Rectangle = tuple[int, int, int, int]  # first row, rows, first column, columns
 
 
 def add_surface(
-    root: ET.Element,
-    world: ET.Element,
-    surface: Surface,
-    height: float,
-    contact: Mapping[str, str],
+    root: ET.Element, world: ET.Element, surface: Surface, height: float, contact: Mapping[str, str]
 ) -> None:
     """Adds the surface, with 0 at `height` [m], to a model's assets and its world.
 
@@ -49,11 +45,7 @@ def add_surface(
 
 
 def _add_field(
-    root: ET.Element,
-    world: ET.Element,
-    surface: Surface,
-    height: float,
-    common: Mapping[str, str],
+    root: ET.Element, world: ET.Element, surface: Surface, height: float, common: Mapping[str, str]
 ) -> None:
     """Adds a height field, whose data are heights from 0 to 1 over its range."""
     left, right, low, high = surface.extent
@@ -61,22 +53,14 @@ def _add_field(
     span = max(highest - lowest, 1e-6)
     asset = root.find("asset")
     assert asset is not None
-    field = ET.SubElement(asset, "hfield", name="ground", nrow=str(surface.rows))
+    field = add(asset, "hfield", name="ground", nrow=str(surface.rows))
     field.set("ncol", str(surface.columns))
     field.set("size", numbers((0.5 * (right - left), 0.5 * (high - low), span, BELOW)))
     # the first row of the attribute is the one at the largest y
     shares = (surface.height[::-1] - lowest) / span
     field.set("elevation", " ".join(f"{share:.9g}" for share in shares.ravel()))
     place = (0.5 * (left + right), 0.5 * (low + high), height + lowest)
-    ET.SubElement(
-        world,
-        "geom",
-        dict(common),
-        name="ground",
-        type="hfield",
-        hfield="ground",
-        pos=numbers(place),
-    )
+    add(world, "geom", dict(common), name="ground", type="hfield", hfield="ground", pos=place)
 
 
 def _add_boxes(
@@ -92,15 +76,7 @@ def _add_boxes(
             surface.y0 + surface.cell * row + half[1],
             height + bottom + half[2],
         )
-        ET.SubElement(
-            world,
-            "geom",
-            dict(common),
-            name=f"ground_{number}",
-            type="box",
-            size=numbers(half),
-            pos=numbers(place),
-        )
+        add(world, "geom", dict(common), name=f"ground_{number}", type="box", size=half, pos=place)
 
 
 def rectangles(height: Array) -> Iterator[Rectangle]:

@@ -50,13 +50,7 @@ from hexapod_cosim.models.dynamics import (
 )
 from hexapod_cosim.models.friction import friction_drag as foot_drag
 from hexapod_cosim.models.friction import friction_grip, turning_slopes
-from hexapod_cosim.models.kinematics import (
-    BODIES,
-    JOINTS,
-    LEGS,
-    joint_angles,
-    joint_speeds,
-)
+from hexapod_cosim.models.kinematics import BODIES, JOINTS, LEGS, joint_angles, joint_speeds
 from hexapod_cosim.models.records import Robot
 from hexapod_cosim.models.servos.gear import Rotors, gear_slopes, is_elastic, spin_inertia
 from hexapod_cosim.models.servos.motor import friction_drag, has_measured_friction
@@ -199,11 +193,7 @@ def soil_slopes(
     """Returns the derivatives of a sphere on soil at plastic depth z_p [m]; its moments have
     none.
     """
-    soil, foot, depth = (
-        state.soil,
-        point.shape(robot, state.side),
-        expected_depth(contact, ahead),
-    )
+    soil, foot, depth = (state.soil, point.shape(robot, state.side), expected_depth(contact, ahead))
     at = (soil, foot, plastic, depth, contact.approach_speed)
     limit = shear_limit(soil, foot, max(depth, plastic), soil_normal_force(*at))
     slip_speed = float(np.linalg.norm(slip_velocity(contact)))

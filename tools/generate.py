@@ -12,9 +12,11 @@ C libraries need; a build of the FMUs writes the other files (tools/generate_sou
 from __future__ import annotations
 
 import argparse
+import re
 import sys
 import textwrap
 from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
 from pathlib import Path
 
 from hexapod_cosim.controller import DEFAULT_PERIOD, make_gait
@@ -38,14 +40,27 @@ ROOT = Path(__file__).resolve().parents[1]
 DEFAULT_ROBOT = "athena"
 # constants of C that are sizes of arrays of outputs, by component
 SIZES = {"plant": {"HX_CONE_BINS": "output.cone_time"}}
-# structures of C whose fields are the parameters of a group, by component
+# structures of C with names, inner ones first, by component; their fields are variables
 STRUCTURES: dict[str, dict[str, str]] = {
-    "controller": {"gait": "hxGait", "gains": "hxGains", "parts": "hxParts"},
-    "plant": {
-        **{"body": "hxBodySettings", "contact": "hxContactSettings", "soil": "hxSoilDefinition"},
-        **{"friction": "hxFrictionSettings", "servo": "hxServoSettings"},
-        **{"solver": "hxSolverSettings", "terrain": "hxTerrainSettings"},
+    "controller": {
+        **{"definition.leg.link": "hxKnownLink", "definition.leg": "hxKnownLeg"},
+        **{"definition.gait": "hxGait", "definition.gains": "hxGains"},
+        **{"definition.parts": "hxParts", "definition": "hxControllerDefinition"},
+        **{"input": "hxControllerInput", "output": "hxControllerOutput"},
     },
+    "plant": {
+        **{"definition.leg.link": "hxLink", "definition.leg": "hxLeg"},
+        **{"definition.soil": "hxSoilDefinition", "definition": "hxDefinition"},
+        **{"input": "hxInput", "indicator": "hxIndicators", "output": "hxOutput"},
+    },
+}
+# fields that are no variables, by structure
+FURTHER = {
+    "hxOutput": (
+        *("  /* s */", "  double time;"),
+        "  /* m  of all contacts, < 0: clearance; -1 where the robot has none */",
+        "  hxIndicators depth;",
+    )
 }
 TYPES = {"Real": "HX_REAL", "Enumeration": "HX_INTEGER", "Boolean": "HX_BOOLEAN"}
 
@@ -148,43 +163,62 @@ def render_settings(interface: Interface) -> str:
     for constant, array in SIZES.get(interface.component.name, {}).items():
         size = sum(item.field.startswith(f"{array}[") for item in interface.of_causality("output"))
         lines += [f"enum {{ {constant} = {size} }};", ""]
-    for group, kind in STRUCTURES.get(interface.component.name, {}).items():
-        lines += [f"typedef struct {kind} {{", *_fields(interface, group), f"}} {kind};", ""]
+    names = STRUCTURES.get(interface.component.name, {})
+    fields = _field_tree(interface)
+    for path, name in names.items():
+        lines += [f"typedef struct {name} {{", *_render_fields(fields, path, names)]
+        lines += [*FURTHER.get(name, ()), f"}} {name};", ""]
     return "\n".join([*lines, "#endif", ""])
 
 
-def _fields(interface: Interface, group: str) -> Iterable[str]:
-    """Yields the C fields of a structure of the definition, with those of sections inside."""
-    inside = ""
-    for name, (variable, size) in _fields_of(interface, f"definition.{group}.").items():
-        section, _, field = name.rpartition(".")
-        if section != inside:
-            yield from [f"  }} {inside};"] * bool(inside)
-            yield from ["  struct {"] * bool(section)
-            inside = section
-        indent = "  " * bool(section)
-        kind = "double" if variable.type == "Real" else "int"
-        unit = f"hx{variable.enumeration}" if variable.enumeration else variable.unit or "0 or 1"
-        yield from _comment(f"{unit}  {variable.description}", indent)
-        yield f"{indent}  {kind} {field}{size};"
-    yield from [f"  }} {inside};"] * bool(inside)
+@dataclass
+class Field:
+    """A field of a structure in C: a variable, or a structure with the fields `inside`."""
+
+    variable: Variable
+    sizes: list[int]  # of an array, empty: a single one
+    inside: list[str]  # paths
 
 
-def _fields_of(interface: Interface, prefix: str) -> dict[str, tuple[Variable, str]]:
-    """Returns the parameters below a path of the definition and the sizes of arrays, by fields."""
-    found: dict[str, tuple[Variable, str]] = {}
-    for variable in interface.of_causality("parameter"):
-        name, bracket, index = variable.field.removeprefix(prefix).partition("[")
-        if variable.field.startswith(prefix):
-            size = f"[{int(index[:-1]) + 1}]" if bracket else ""
-            found[name] = (found.get(name, (variable, ""))[0], size)
+def _field_tree(interface: Interface) -> dict[str, Field]:
+    """Returns the fields of definition, input and output by their paths without indices."""
+    found: dict[str, Field] = {}
+    for variable in interface.of_causality("parameter", "input", "output", "local"):
+        path = ""
+        for part in variable.field.split("."):
+            name, *indices = re.findall(r"\w+", part)
+            above, path = path, f"{path}.{name}" if path else name
+            field = found.setdefault(path, Field(variable, [0] * len(indices), []))
+            field.sizes = [max(n, int(k) + 1) for n, k in zip(field.sizes, indices, strict=True)]
+            if above and path not in found[above].inside:
+                found[above].inside.append(path)
     return found
 
 
-def _comment(text: str, indent: str = "") -> list[str]:
+def _render_fields(
+    fields: Mapping[str, Field], path: str, names: Mapping[str, str], indent: str = "  "
+) -> Iterable[str]:
+    """Yields the C fields of a structure."""
+    for inner in fields[path].inside:
+        field = fields[inner]
+        name = inner.rpartition(".")[2] + "".join(f"[{size}]" for size in field.sizes)
+        if inner in names:
+            yield f"{indent}{names[inner]} {name};"
+        elif field.inside:
+            yield f"{indent}struct {{"
+            yield from _render_fields(fields, inner, names, indent + "  ")
+            yield f"{indent}}} {name};"
+        else:
+            item = field.variable
+            unit = f"hx{item.enumeration}" if item.enumeration else item.unit or "0 or 1"
+            yield from _comment(f"{unit}  {item.description}", indent)
+            yield f"{indent}{'double' if item.type == 'Real' else 'int'} {name};"
+
+
+def _comment(text: str, indent: str = "  ") -> list[str]:
     """Returns a text as a C comment of lines of at most 100 columns."""
-    lines = textwrap.wrap(f"/* {text} */", 98 - len(indent), subsequent_indent=" * ")
-    return [f"{indent}  {line}" for line in lines]
+    lines = textwrap.wrap(f"/* {text} */", 100 - len(indent), subsequent_indent=" * ")
+    return [indent + line for line in lines]
 
 
 def render_structure(component: Component) -> str:

@@ -18,8 +18,6 @@ MEMBER_SIZE = 256 * 2**20  # bytes, unpacked, of one file
 TOTAL_SIZE = 512 * 2**20  # bytes, unpacked, of all files
 NAME_SIZE = 255  # bytes, of a folder's or file's name
 PATH_SIZE = 1000  # bytes, of a path inside the archive
-METHODS = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
-ENCRYPTED = 1  # general purpose bit
 FIX = "take another copy of the file, and none from a place that you do not trust"
 MAKE = "make one with `hexapod export -o FILE.fmu`"
 
@@ -94,7 +92,6 @@ def unsafe_members(members: Iterable[zipfile.ZipInfo]) -> Iterator[tuple[str, ob
         yield "the archive is too large unpacked", f"{total} bytes", f"at most {TOTAL_SIZE} bytes"
     for member in members:
         yield from _unsafe_member(member)
-    yield from _clashes(members)
 
 
 def _unsafe_member(member: zipfile.ZipInfo) -> Iterator[tuple[str, object, str]]:
@@ -115,23 +112,3 @@ def _unsafe_member(member: zipfile.ZipInfo) -> Iterator[tuple[str, object, str]]
     if member.file_size > MEMBER_SIZE:
         got = f"{name} of {member.file_size} bytes"
         yield "a file of the archive is too large", got, f"at most {MEMBER_SIZE} bytes"
-    if member.flag_bits & ENCRYPTED:
-        yield "the archive is encrypted", name, "files without a password"
-    if member.compress_type not in METHODS:
-        got = f"{name} by method {member.compress_type}"
-        yield "the archive is packed by an unknown method", got, "store (0) or deflate (8)"
-
-
-def _clashes(members: Iterable[zipfile.ZipInfo]) -> Iterator[tuple[str, object, str]]:
-    """Yields paths that would overwrite each other, also where case is ignored."""
-    files, folders = set[str](), set[str]()
-    for member in members:
-        path = PurePosixPath(member.filename)
-        name = str(path).casefold()
-        if not member.is_dir() and (name in files or name in folders):
-            yield "a path is in the archive twice", member.filename, "each path once"
-        (folders if member.is_dir() else files).add(name)
-        folders |= {str(parent).casefold() for parent in path.parents}
-    both = sorted(files & folders)
-    if both:
-        yield "a path of the archive is a file and a folder", both[0], "one of them"

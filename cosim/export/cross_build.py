@@ -149,8 +149,8 @@ def build_library(
     flags = (*_flags(library, target), *library.flags)
     key = _digest([library.digest(), compiler.version, *flags])
     kept = folder / "binaries" / f"{library.name}-{target}-{key[:32]}{ALL_TARGETS[target].suffix}"
-    if kept.is_file() and (data := _verified(kept.read_bytes())):
-        return data
+    if kept.is_file():
+        return kept.read_bytes()
     data = _compile(library, [*compiler.command, *flags], target, folder)
     _keep(kept, data)
     return data
@@ -259,15 +259,9 @@ def _keep(path: Path, data: bytes) -> None:
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         with atomic_path(path) as part:
-            part.write_bytes(hashlib.sha256(data).digest() + data)
+            part.write_bytes(data)
     except (OSError, HexapodError):
         return
-
-
-def _verified(data: bytes) -> bytes:
-    """Returns the data that `_keep` wrote, or b"" if the file is damaged."""
-    size = hashlib.sha256().digest_size
-    return data[size:] if hashlib.sha256(data[size:]).digest() == data[:size] else b""
 
 
 def _headers(folder: Path) -> list[Path]:

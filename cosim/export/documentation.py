@@ -6,7 +6,6 @@ import posixpath
 import re
 from collections.abc import Iterable, Sequence
 from xml.etree import ElementTree
-from xml.etree.ElementTree import Element
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
@@ -14,36 +13,6 @@ from hexapod_cosim.cosim.interface.arrays import arrays
 from hexapod_cosim.cosim.interface.plant_interface import CAUSALITIES, Interface, Pattern, Variable
 
 INTERFACES = {"CoSimulation": "co-simulation", "ModelExchange": "model exchange"}
-SERIALIZED = (
-    "state as bytes: versioned, without pointers, checksummed; a damaged or foreign one is refused"
-)
-# descriptions of the capability flags of modelDescription.xml
-CAPABILITIES = {
-    "canHandleVariableCommunicationStepSize": "steps of any size, from rounding error to 100 s",
-    "canGetAndSetFMUstate": "state saved and restored, bit for bit",
-    "canSerializeFMUstate": SERIALIZED,
-    "providesDirectionalDerivative": "directional derivatives",
-    "canInterpolateInputs": "derivatives of inputs over a step; without them inputs are held",
-    "maxOutputDerivativeOrder": "derivatives of outputs, highest order",
-    "canBeInstantiatedOnlyOncePerProcess": "one instance a process only",
-    "canRunAsynchronuously": "steps that return before they are done",
-    "completedIntegratorStepNotNeeded": (
-        "model exchange without a call after every step of the solver"
-    ),
-    "canNotUseMemoryManagementFunctions": "needs no memory functions of the importer",
-    "canGetAndSetFMUState": "state saved and restored, bit for bit",
-    "canSerializeFMUState": SERIALIZED,
-    "providesDirectionalDerivatives": "directional derivatives",
-    "providesAdjointDerivatives": "adjoint derivatives",
-    "providesPerElementDependencies": "dependencies of single elements of arrays",
-    "hasEventMode": "event mode, where discrete variables change and inputs may",
-    "mightReturnEarlyFromDoStep": (
-        "steps that end where discrete variables change, if the importer allows"
-    ),
-    "providesIntermediateUpdate": "intermediate updates",
-    "providesEvaluateDiscreteStates": "discrete states evaluated without an update",
-    "needsCompletedIntegratorStep": "model exchange needs a call after every step of the solver",
-}
 # explanations of the names in the tables, for scalars (False) and arrays (True)
 NAMES = {
     False: (
@@ -85,7 +54,6 @@ def render_html(interface: Interface, description: str, *, picture: str, referen
         fmi=root.get("fmiVersion"),
         token=root.get("guid", root.get("instantiationToken")),
         kinds=[name for tag, name in INTERFACES.items() if root.find(tag) is not None],
-        capabilities=_capabilities(root),
         names=NAMES[arrayed],
         arrayed=arrayed,
         groups={
@@ -94,28 +62,6 @@ def render_html(interface: Interface, description: str, *, picture: str, referen
         },
         weight=robot.total_mass * max(map(abs, robot.gravity)),
     )
-
-
-def _capabilities(root: Element) -> list[Row]:
-    """Returns the capability flags that any interface of the model description declares."""
-    found = {tag: root.find(tag) for tag in INTERFACES}
-    offered = {tag: element for tag, element in found.items() if element is not None}
-    return [
-        {
-            "flag": flag,
-            "meaning": meaning,
-            "values": ", ".join(
-                dict.fromkeys(_words(element.get(flag)) for element in offered.values())
-            ),
-        }
-        for flag, meaning in CAPABILITIES.items()
-        if any(element.get(flag) is not None for element in offered.values())
-    ]
-
-
-def _words(value: str | None) -> str:
-    """Returns the text of a flag."""
-    return {"true": "yes", "false": "no", None: "not declared"}.get(value, str(value))
 
 
 def variable_rows(interface: Interface, causality: str, *, arrayed: bool) -> list[Row]:

@@ -26,6 +26,8 @@ from hexapod_cosim.models.statics import settled
 Causality = Literal["input", "output", "parameter", "local"]
 Type = Literal["Real", "Boolean", "Enumeration", "Integer"]
 
+Step = str | int  # of a path to a start value: an attribute's name or an index of a sequence
+
 CAUSALITIES: tuple[Causality, ...] = ("input", "output", "parameter", "local")
 DEFAULT_VARIABILITY = {
     "input": "continuous",
@@ -386,13 +388,24 @@ def _start(
     """Returns a start value: a constant, or the value at a path such as robot.torso.mass."""
     if not isinstance(given, str):
         return given
+    return value_at(roots, start_path(given, place), enumeration)
+
+
+def start_path(given: str, place: Mapping[str, tuple[int, str]]) -> tuple[Step, ...]:
+    """Returns the steps of a path such as robot.legs[leg].hip_yaw at a combination of axes."""
+    return tuple(
+        attribute or (place[axis][0] if axis in place else int(axis))
+        for attribute, axis in re.findall(r"(?:^|\.)(\w+)|\[(\w+)\]", given)
+    )
+
+
+def value_at(
+    roots: SimpleNamespace, path: Iterable[Step], enumeration: Enumeration | None
+) -> float | int:
+    """Returns the value at a path from the roots; of an enumeration, the number of the item."""
     value: Any = roots
-    for attribute, axis in re.findall(r"(?:^|\.)(\w+)|\[(\w+)\]", given):
-        value = (
-            getattr(value, attribute)
-            if attribute
-            else value[place[axis][0] if axis in place else int(axis)]
-        )
+    for step in path:
+        value = getattr(value, step) if isinstance(step, str) else value[step]
     if isinstance(value, bool):
         return value
     return enumeration.number(value) if enumeration else float(value)

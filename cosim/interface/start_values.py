@@ -5,7 +5,6 @@ A run sets them when it simulates a robot on the FMU of another one.
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator
 from functools import cache
 from types import SimpleNamespace
@@ -13,9 +12,15 @@ from typing import Any
 
 from hexapod_cosim.cosim.common.components import Component
 from hexapod_cosim.cosim.interface.patterns import expand, labelled
-from hexapod_cosim.cosim.interface.plant_interface import Enumeration, enumerations_of, read_table
+from hexapod_cosim.cosim.interface.plant_interface import (
+    Enumeration,
+    Step,
+    enumerations_of,
+    read_table,
+    start_path,
+    value_at,
+)
 
-Step = str | int  # an attribute's name or an index of a sequence
 # name; a constant or None; without a constant the path from the roots to the value; enumeration
 Row = tuple[str, Any, tuple[Step, ...], Enumeration | None]
 
@@ -26,21 +31,9 @@ def parameter_values(component: Component, roots: SimpleNamespace) -> dict[str, 
     Their ranges are not checked: the FMU does.
     """
     return {
-        name: constant if constant is not None else _value(roots, path, enumeration)
+        name: constant if constant is not None else value_at(roots, path, enumeration)
         for name, constant, path, enumeration in _rows(component)
     }
-
-
-def _value(
-    roots: SimpleNamespace, path: tuple[Step, ...], enumeration: Enumeration | None
-) -> float:
-    """Returns the value at a path from the roots."""
-    value: Any = roots
-    for step in path:
-        value = getattr(value, step) if isinstance(step, str) else value[step]
-    if isinstance(value, bool):
-        return value
-    return enumeration.number(value) if enumeration else float(value)
 
 
 @cache
@@ -58,12 +51,6 @@ def _parameters(component: Component) -> Iterator[Row]:
             name = labelled(entry["name"], {axis: label for axis, (_, label) in place.items()})
             enumeration = enumerations.get(entry.get("type", ""))
             if isinstance(given, str):
-                yield name, None, tuple(_path(given, place)), enumeration
+                yield name, None, start_path(given, place), enumeration
             elif given is not None:
                 yield name, given, (), enumeration
-
-
-def _path(given: str, place: Any) -> Iterator[Step]:
-    """Yields the steps of a path such as robot.legs[leg].hip_yaw."""
-    for attribute, axis in re.findall(r"(?:^|\.)(\w+)|\[(\w+)\]", given):
-        yield attribute or (place[axis][0] if axis in place else int(axis))

@@ -1,4 +1,6 @@
-"""Computes the centres of the feet in the torso's frame: what plans of feet are compared with."""
+"""Kinematics of the legs from joint angles: centres of the feet, which plans are compared with, and
+first moments of mass.
+"""
 
 from __future__ import annotations
 
@@ -29,12 +31,42 @@ def _centre(leg: str, angle: Array, parameters: Mapping[str, float]) -> Array:
     place = np.zeros((len(angle), 3))
     for joint, name in reversed(list(enumerate(JOINT_NAMES))):
         link = f"{leg}.{name}"
-        tip = [parameters[f"{link}.{key}"] for key in ("length", "offset_y", "offset_z")]
-        axis = np.array([parameters[key] for key in vector_names(f"{link}.axis")])
-        place = turned(place + np.array(tip), axis / np.linalg.norm(axis), angle[:, joint])
-    yaw = np.full(len(angle), parameters[f"{leg}.hip_yaw"])
-    hip = np.array([parameters[key] for key in vector_names(f"{leg}.hip_position")])
-    return np.asarray(hip + turned(place, np.array([0.0, 0.0, 1.0]), yaw))
+        place = turned(place + _tip(link, parameters), _axis(link, parameters), angle[:, joint])
+    return _hip(leg, parameters) + _turned_by_hip(leg, place, parameters)
+
+
+def moment_of_leg(leg: str, angle: Array, parameters: Mapping[str, float]) -> tuple[float, Array]:
+    """Returns the mass of a leg [kg] and its first moment [kg m] (rows, 3) in the torso's frame.
+
+    angle: (rows, 3) of its joints [rad].
+    """
+    borne, moment = 0.0, np.zeros((len(angle), 3))  # of the links from this joint on, about it
+    for joint, name in reversed(list(enumerate(JOINT_NAMES))):
+        link = f"{leg}.{name}"
+        mass = parameters[f"{link}.mass"]
+        com = np.array([parameters[key] for key in vector_names(f"{link}.com")])
+        moment = moment + mass * com + borne * _tip(link, parameters)
+        moment = turned(moment, _axis(link, parameters), angle[:, joint])
+        borne += mass
+    return borne, borne * _hip(leg, parameters) + _turned_by_hip(leg, moment, parameters)
+
+
+def _tip(link: str, parameters: Mapping[str, float]) -> Array:
+    return np.array([parameters[f"{link}.{key}"] for key in ("length", "offset_y", "offset_z")])
+
+
+def _axis(link: str, parameters: Mapping[str, float]) -> Array:
+    axis = np.array([parameters[key] for key in vector_names(f"{link}.axis")])
+    return np.asarray(axis / np.linalg.norm(axis))
+
+
+def _hip(leg: str, parameters: Mapping[str, float]) -> Array:
+    return np.array([parameters[key] for key in vector_names(f"{leg}.hip_position")])
+
+
+def _turned_by_hip(leg: str, vector: Array, parameters: Mapping[str, float]) -> Array:
+    yaw = np.full(len(vector), parameters[f"{leg}.hip_yaw"])
+    return turned(vector, np.array([0.0, 0.0, 1.0]), yaw)
 
 
 def turned(vector: Array, axis: Array, angle: Array) -> Array:

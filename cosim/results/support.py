@@ -5,8 +5,7 @@ All rows of a recording are computed at once.
 
 from __future__ import annotations
 
-import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from itertools import combinations
 
 import numpy as np
@@ -14,6 +13,7 @@ from numpy.typing import NDArray
 
 from hexapod_cosim.cosim.interface.names import joint_names, vector_names
 from hexapod_cosim.cosim.master.recorder import Recording
+from hexapod_cosim.cosim.results.feet import moment_of_leg
 from hexapod_cosim.models import JOINT_NAMES, LEG_NAMES
 
 Array = NDArray[np.float64]
@@ -96,59 +96,18 @@ def centre_of_mass(recording: Recording, parameters: Mapping[str, float]) -> Arr
 
     It follows from joint angles, torso pose and the FMU's parameters.
     """
-    angle = recording.columns(joint_names("angle")).T.reshape(len(LEG_NAMES), len(JOINT_NAMES), -1)
-    # mass [kg] and first moment [kg m] of the links from this joint on, about the joint
-    borne, moment = np.zeros(len(LEG_NAMES)), np.zeros((len(LEG_NAMES), 3, 1))
-    for k, joint in reversed(list(enumerate(JOINT_NAMES))):
-        links = [f"{leg}.{joint}" for leg in LEG_NAMES]
-        mass, com, axis = (
-            _of_links(parameters, links, part)
-            for part in (("mass",), vector_names("com"), vector_names("axis"))
-        )
-        tip = _of_links(parameters, links, ("length", "offset_y", "offset_z"))
-        moment = _turned(axis, angle[:, k], moment + (mass * com + borne[:, None] * tip)[..., None])
-        borne = borne + mass[:, 0]
-    offset = _vector(parameters, "torso.com")
-    hips = np.array([_vector(parameters, f"{leg}.hip_position") - offset for leg in LEG_NAMES])
-    yaws = _about_z(np.array([parameters[f"{leg}.hip_yaw"] for leg in LEG_NAMES]))
-    total = parameters["torso.mass"] + borne.sum()
-    # (3, rows) torso axes, from the torso's centre of mass
-    first_moment = np.concatenate(yaws, axis=1) @ moment.reshape(3 * len(LEG_NAMES), -1)
-    own = (first_moment + (borne @ hips)[:, None]) / total
+    angle = recording.columns(joint_names("angle")).reshape(-1, len(LEG_NAMES), len(JOINT_NAMES))
+    com = np.array([parameters[name] for name in vector_names("torso.com")])
+    mass = parameters["torso.mass"]
+    moment = np.broadcast_to(mass * com, (len(angle), 3))  # kg m    in the torso's frame
+    for k, leg in enumerate(LEG_NAMES):
+        own, first = moment_of_leg(leg, angle[:, k], parameters)
+        mass, moment = mass + own, moment + first
+    offset = moment / mass - com  # from the torso's centre of mass
     rotation = rotation_matrices(recording.vector("torso.quaternion", 4))
-    return np.asarray(recording.vector("torso.position") + np.einsum("ijr,jr->ri", rotation, own))
-
-
-def _of_links(parameters: Mapping[str, float], links: Sequence[str], parts: Sequence[str]) -> Array:
-    """Returns parameters of links as an array (links, parts)."""
-    return np.array([[parameters[f"{link}.{part}"] for part in parts] for link in links])
-
-
-def _turned(axis: Array, angle: Array, vector: Array) -> Array:
-    """Turns vectors (legs, 3, rows) about axes (legs, 3) by angles (legs, rows), by Rodrigues'
-    formula.
-    """
-    x, y, z = (axis / np.linalg.norm(axis, axis=1, keepdims=True)).T
-    zero = np.zeros_like(x)
-    skew = np.array([[zero, -z, y], [z, zero, -x], [-y, x, zero]]).transpose(2, 0, 1)
-    turned = np.sin(angle)[:, None] * (skew @ vector)
-    turned += (1.0 - np.cos(angle))[:, None] * (skew @ skew @ vector)
-    turned += vector
-    return turned
-
-
-def _about_z(angle: Array) -> Array:
-    """Returns the rotations about z by angles (legs,) as matrices (legs, 3, 3)."""
-    return np.array(
-        [
-            [[math.cos(a), -math.sin(a), 0.0], [math.sin(a), math.cos(a), 0.0], [0.0, 0.0, 1.0]]
-            for a in angle.tolist()
-        ]
+    return np.asarray(
+        recording.vector("torso.position") + np.einsum("ijr,rj->ri", rotation, offset)
     )
-
-
-def _vector(parameters: Mapping[str, float], stem: str) -> Array:
-    return np.array([parameters[name] for name in vector_names(stem)])
 
 
 def rotation_matrices(quaternion: Array) -> Array:

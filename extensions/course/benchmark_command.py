@@ -36,7 +36,6 @@ from hexapod_cosim.extensions.course.records import (
     JUDGE,
     SPLITS,
     Course,
-    CourseError,
     Entry,
     lacking,
     read_entries,
@@ -77,11 +76,19 @@ def benchmark(
     quick: Annotated[bool, typer.Option("--quick", help="Fewer seeds.")] = False,
     seeds: Annotated[
         int | None,
-        typer.Option("--seeds", metavar="N", help="Runs of each case and control; default 10."),
+        typer.Option(
+            "--seeds",
+            min=1,
+            max=MAX_SEEDS,
+            metavar="N",
+            help="Runs of each case and control; default 10.",
+        ),
     ] = None,
     workers: Annotated[
         int | None,
-        typer.Option("--workers", metavar="N", help="Processes; default: one for each processor."),
+        typer.Option(
+            "--workers", min=1, metavar="N", help="Processes; default: one for each processor."
+        ),
     ] = None,
     settings: Settings = None,
     output: Annotated[
@@ -98,8 +105,6 @@ def benchmark(
     control in that walk is compared with the first one in it, and compliant control with both.
     """
     entries = read_entries(controls or DEFAULT, without or ())
-    _check_number(seeds, MAX_SEEDS, "--seeds")
-    _check_number(workers, MAX_SEEDS, "--workers")
     course = load_course(
         split, names=cases or (), seeds=seeds, quick=quick, settings=settings or ()
     )
@@ -209,12 +214,6 @@ def _show(table: Table) -> None:
     for title, (columns, rows) in reversed(texts.tables(table)):
         show_text(f"\n{title}")
         show_table(columns, rows)
-
-
-def _check_number(value: int | None, most: int, where: str) -> None:
-    """Raises CourseError for a given number that is not from 1 to `most`."""
-    if value is not None and not 1 <= value <= most:
-        raise CourseError("number out of range", got=value, expected=f"1 to {most}", where=where)
 
 
 def _command_line(options: Mapping[str, Any], *, split: str, quick: bool) -> str:

@@ -1,5 +1,4 @@
-"""Runs studies: many runs of scenarios that differ by factors, seeds and control. Imports
-every folder of `cosim` above it but `validate`, `report`, `identify`, `course` and `live`.
+"""Runs studies: many runs of scenarios that differ by factors, seeds and control.
 
 The data flow, in the order of the modules:
 
@@ -8,5 +7,5 @@ The data flow, in the order of the modules:
     Study -> job: what every worker needs -> folder: the manifest
     orders -> dispatch -> workers (an executor) -> worker -> Summary -> store (SQLite, a row a run)
     an optimisation asks Optuna for its orders: search
-    store -> groups (GROUP BY, moments) -> summary -> report; store -> folder: results.parquet
+    store -> groups, optimum -> summary -> report; store -> folder: results.parquet
 """

@@ -14,7 +14,6 @@ from hexapod_cosim.cosim.cli.options import ControlNames, FmuFile, GainsFile, Js
 from hexapod_cosim.cosim.cli.running import given_gains
 from hexapod_cosim.cosim.cli.terminal import warn
 from hexapod_cosim.cosim.common.installation import require_pyarrow
-from hexapod_cosim.extensions.study.records import StudyError
 
 EPILOG = (
     f"A fall is a result of a study. Exit code {FELL} only when no run walked to its end "
@@ -25,6 +24,8 @@ Workers = Annotated[
     int | None,
     typer.Option(
         "--workers",
+        min=0,
+        max=MAX_WORKERS,
         metavar="N",
         help="Processes on this machine; default: one for each processor; 0: no other process.",
     ),
@@ -74,7 +75,7 @@ def study(
     options = Options(
         fmu=fmu,
         gains=given_gains(gains),
-        workers=_checked_workers(workers),
+        workers=workers,
         scheduler=scheduler,
         events=warn,
         command=_command_line(
@@ -95,19 +96,6 @@ def report_again(folder: Path) -> Sequence[Path]:
     found, files = report_on(folder)
     warn_of(found)
     return files
-
-
-def _checked_workers(count: int | None) -> int | None:
-    """Returns a number of workers. Raises StudyError when it is out of range."""
-    if count is not None and not 0 <= count <= MAX_WORKERS:
-        raise StudyError(
-            "not a number of workers",
-            got=count,
-            expected=f"0 to {MAX_WORKERS}",
-            fix="write --workers 2",
-            where="--workers",
-        )
-    return count
 
 
 def _command_line(file: str, controls: Sequence[str], options: Mapping[str, object]) -> str:

@@ -110,10 +110,7 @@ def normal_force(contact: Contact, damping: float, delta: float, ddelta: float) 
 
 
 def normal_slopes(
-    contact: Contact,
-    damping: float,
-    delta: float,
-    ddelta: float,
+    contact: Contact, damping: float, delta: float, ddelta: float
 ) -> tuple[float, float]:
     """Returns the derivatives of `normal_force` by delta [N/m] and by ddelta [N s/m]."""
     factor = 1.0 + damping * ddelta

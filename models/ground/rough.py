@@ -53,12 +53,7 @@ def _nodes(size_x: float, size_y: float, cell: float) -> tuple[Array, Array, flo
 def _surface(name: str, x: Array, y: Array, cell: float, height: Array) -> Surface:
     """Returns the surface of heights at nodes."""
     return Surface(
-        kind="smooth",
-        height=height,
-        x0=float(x[0, 0]),
-        y0=float(y[0, 0]),
-        cell=cell,
-        name=name,
+        kind="smooth", height=height, x0=float(x[0, 0]), y0=float(y[0, 0]), cell=cell, name=name
     )
 
 

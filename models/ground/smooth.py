@@ -25,12 +25,7 @@ SHORT = 1e-6  # m    steps that are not tried: the change of the distance is los
 
 # powers of t (1, t, t^2, t^3) in columns; weights of the nodes -1, 0, 1, 2 in rows
 CATMULL_ROM = 0.5 * np.array(
-    [
-        [0.0, -1.0, 2.0, -1.0],
-        [2.0, 0.0, -5.0, 3.0],
-        [0.0, 1.0, 4.0, -3.0],
-        [0.0, 0.0, -1.0, 1.0],
-    ]
+    [[0.0, -1.0, 2.0, -1.0], [2.0, 0.0, -5.0, 3.0], [0.0, 1.0, 4.0, -3.0], [0.0, 0.0, -1.0, 1.0]]
 )
 
 

@@ -119,11 +119,7 @@ def virgin_work(soil: Soil, foot: Foot, z: float) -> float:
 
 
 def _virgin(
-    soil: Soil,
-    foot: Foot,
-    z: float,
-    column: Callable[[Foot, float, float], float],
-    granular: int,
+    soil: Soil, foot: Foot, z: float, column: Callable[[Foot, float, float], float], granular: int
 ) -> float:
     """Returns force, slope or work of the virgin curve at z > 0.
 

@@ -53,9 +53,7 @@ class Body:
         """Collision shapes of all links, in the body's frame."""
         return [
             replace(
-                solid,
-                centre=member.point(solid.centre),
-                rotation=member.rotation @ solid.rotation,
+                solid, centre=member.point(solid.centre), rotation=member.rotation @ solid.rotation
             )
             for member in self.members
             for solid in member.link.solids

@@ -138,15 +138,7 @@ def _leg(
         other_way += [branch.joint.name] if sign < 0.0 else []
         table[joint] = _link(branch, R, tip, axis, sign, where)
     names = tuple(branch.joint.name for branch in chain)
-    return FoundLeg(
-        name,
-        table,
-        names,
-        tuple(other_way),
-        radius,
-        foot,
-        chain,
-    )
+    return FoundLeg(name, table, names, tuple(other_way), radius, foot, chain)
 
 
 def _pattern_yaw(

@@ -5,7 +5,6 @@ wrongly, so it is rejected on load.
 """
 
 from hexapod_cosim.models.validation.ground import check_contact_surface
-from hexapod_cosim.models.validation.inertia import check_inertia
 from hexapod_cosim.models.validation.robot import check_robot, check_settings
 
-__all__ = ["check_contact_surface", "check_inertia", "check_robot", "check_settings"]
+__all__ = ["check_contact_surface", "check_robot", "check_settings"]

@@ -7,9 +7,14 @@ import math
 from hexapod_cosim.models.errors import RobotError
 from hexapod_cosim.models.records import LEG_NAMES, Robot
 from hexapod_cosim.models.schema import Vector, check_record
-from hexapod_cosim.models.validation.inertia import check_com, check_inertia
+from hexapod_cosim.models.validation.bodies import (
+    check_com,
+    check_inertia,
+    check_leg,
+    check_rotors,
+    check_stance,
+)
 from hexapod_cosim.models.validation.laws import check_laws
-from hexapod_cosim.models.validation.legs import check_leg, check_rotors, check_stance
 
 # matter lies within the box; real torsos stay below half of this limit
 GYRATION_PER_DIAGONAL = 1.0

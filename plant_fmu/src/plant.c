@@ -50,7 +50,6 @@ void hx_plant_destroy(hxPlant *plant) { free(plant); }
 
 void hx_plant_set_terrain(hxPlant *plant, const hxTerrain *terrain) {
   plant->terrain = terrain;
-  plant->valley_limit = 0.0;
 }
 
 hxStatus hx_plant_reset(hxPlant *plant, const hxDefinition *definition, double t) {

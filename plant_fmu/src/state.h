@@ -290,7 +290,6 @@ struct hxPlant {
   hxModel feet;
   hxState state;
   const hxTerrain *terrain; /* of later resets */
-  double valley_limit;      /* m  its valleys are not narrower; 0: not searched yet */
   char message[HX_MESSAGE_SIZE];
   hxFootprintLog footprints; /* outside the state, which every call copies */
   hxState *state_before; /* that before a call, which one that fails restores: in the work space */

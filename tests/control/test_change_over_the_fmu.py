@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from hexapod_cosim.controller import make_gait
-from hexapod_cosim.cosim.export.controller_export import export_controller
+from hexapod_cosim.cosim.export.plant_export import export_controller
 from hexapod_cosim.cosim.interface.controller_interface import (
     ControllerSetup,
     controller_parameters,

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hexapod_cosim.cosim.export.controller_export import export_controller
+from hexapod_cosim.cosim.export.plant_export import export_controller
 from hexapod_cosim.cosim.interface.names import joint_names
 from hexapod_cosim.cosim.master.connection import FmuVariable, connect, names_of_map, read_map
 from hexapod_cosim.cosim.run.controller_setup import make_setup

@@ -91,7 +91,6 @@ def test_an_interrupt_writes_the_table_of_the_completed_runs(
         (["--split", "train"], ["unknown split", "judge"]),
         (["--control", "kinematic", "--without", "posture"], ["--without: ", "got 'kinematic'"]),
         (["--case", "rough_11"], ["unknown case", "rough_10"]),
-        (["--seeds", "0"], ["--seeds", "1 to 1000"]),
     ],
 )
 def test_mistakes_are_told_before_anything_is_run(

@@ -10,7 +10,7 @@ import numpy as np
 from gains import PERIOD, make_gains
 
 from hexapod_cosim.controller import make_gait
-from hexapod_cosim.cosim.export.controller_export import export_controller
+from hexapod_cosim.cosim.export.plant_export import export_controller
 from hexapod_cosim.cosim.interface.controller_interface import (
     ControllerSetup,
 )

@@ -15,7 +15,7 @@ from gains import PERIOD, make_gains
 
 from hexapod_cosim.controller import BodyCommand, Measurement, make_gait
 from hexapod_cosim.cosim.control.fmu_law import law_of_ours
-from hexapod_cosim.cosim.export.controller_export import export_controller
+from hexapod_cosim.cosim.export.plant_export import export_controller
 from hexapod_cosim.cosim.interface.controller_interface import (
     ControllerSetup,
     controller_parameters,

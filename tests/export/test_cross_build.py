@@ -27,7 +27,7 @@ def test_each_input_of_the_build_changes_the_key_of_the_cache(tmp_path: Path) ->
     assert len({*digests, first.digest()}) == 5
 
 
-def test_a_damaged_or_unwritable_cache_is_ignored(tmp_path: Path) -> None:
+def test_an_unwritable_cache_is_ignored(tmp_path: Path) -> None:
     source = tmp_path / "tiny.c"
     source.write_text(
         '__attribute__((visibility("default"))) int fmi2Tiny(void) { return 7; }\n',
@@ -37,9 +37,6 @@ def test_a_damaged_or_unwritable_cache_is_ignored(tmp_path: Path) -> None:
     cache.mkdir()
     (cache / "zig").symlink_to(user_cache() / "zig")
     data = build_library(library, "x86_64-linux", cache_folder=cache)
-    (kept,) = (cache / "binaries").iterdir()
-    kept.write_bytes(kept.read_bytes()[:-1])
-    assert build_library(library, "x86_64-linux", cache_folder=cache) == data
     shutil.rmtree(cache / "binaries")
     (cache / "binaries").write_text("in the way", encoding="utf-8")
     assert build_library(library, "x86_64-linux", cache_folder=cache) == data

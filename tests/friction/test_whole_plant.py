@@ -12,16 +12,7 @@ import numpy as np
 import pytest
 from plant import Plant
 from states import changed, distance, lopsided, random_bodies, random_command, random_pose
-from test_laws_motion import (
-    AXIAL,
-    COXA,
-    FIXED,
-    MIRRORED,
-    OTHER_SIDE,
-    POLAR,
-    TURN,
-    mirrored_command,
-)
+from test_laws_motion import AXIAL, COXA, FIXED, MIRRORED, OTHER_SIDE, POLAR, TURN, mirrored_command
 from test_plant_dynamics import DENSE, at
 from test_plant_stages import coefficients, rates
 from test_twin_integrator import STEP, assert_same_steps

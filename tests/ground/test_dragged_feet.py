@@ -83,7 +83,7 @@ def test_a_foot_that_was_dragged_through_a_higher_block_meets_no_wall_behind_it(
     assert state.contacts.states[0].is_soft
 
 
-@pytest.mark.parametrize("seed", [1042, 1151, 1157])
+@pytest.mark.parametrize("seed", [1042, 1151])
 def test_feet_that_are_dragged_over_random_blocks_get_no_energy(core: ct.CDLL, seed: int) -> None:
     """A push drags the robot by 0.2 to 0.5 m: feet leave their prints in higher blocks, or there
     touch the walls beside their own.

@@ -66,13 +66,7 @@ def above_ground(robot: Robot) -> Array:
     """Returns the robot in its stance at PLACE, its lowest part some mm above the ground."""
     still = np.zeros(3)
     body = body_states(
-        robot,
-        np.array([*PLACE, 0.5]),
-        np.eye(4)[0],
-        still,
-        still,
-        robot.stance,
-        np.zeros((6, 3)),
+        robot, np.array([*PLACE, 0.5]), np.eye(4)[0], still, still, robot.stance, np.zeros((6, 3))
     )
     for _ in range(2):  # the nearest part may be another one from nearby
         body[:, 2] += max(contact.penetration for contact in depths(robot, body)) + 2e-3

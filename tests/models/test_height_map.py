@@ -146,11 +146,7 @@ REFUSED: list[tuple[str, Callable[[Path], Path], dict[str, float], str]] = [
 
 @pytest.mark.parametrize(("name", "write", "given", "message"), REFUSED)
 def test_a_wrong_map_is_refused_with_its_name(
-    name: str,
-    write: Callable[[Path], Path],
-    given: dict[str, float],
-    message: str,
-    tmp_path: Path,
+    name: str, write: Callable[[Path], Path], given: dict[str, float], message: str, tmp_path: Path
 ) -> None:
     with pytest.raises(RobotError, match=message):
         read(write(tmp_path / name), **given)

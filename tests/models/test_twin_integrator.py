@@ -170,11 +170,7 @@ def test_bodies_on_their_joints_stay_there_when_projected_and_drifted_ones_retur
 
 
 def assert_same_steps(
-    core: ct.CDLL,
-    robot: Robot,
-    body: Array,
-    command: Command,
-    ends: list[float],
+    core: ct.CDLL, robot: Robot, body: Array, command: Command, ends: list[float]
 ) -> State:
     """Asserts that the plant and the twin, from these bodies to the ends [s], have the same motion,
     contacts and counts of the solver.
@@ -250,10 +246,7 @@ def test_projected_steps_of_drifted_bodies_are_the_plants(core: ct.CDLL, name: s
     ],
 )
 def test_controlled_steps_through_a_touch_down_are_the_plants(
-    core: ct.CDLL,
-    name: str,
-    tolerance: float,
-    friction: dict[str, Any],
+    core: ct.CDLL, name: str, tolerance: float, friction: dict[str, Any]
 ) -> None:
     """The twin tries, rejects and accepts the same steps and makes the same guesses of the
     touch-down time.

@@ -11,7 +11,7 @@ from pathlib import Path
 import fmpy
 import pytest
 import tomlkit
-from command import Call, assert_refused
+from command import Call
 from disguised_urdf import disguised, stances
 from foreign_urdf import SIDE, spider_table, spider_urdf
 
@@ -127,34 +127,6 @@ def test_a_robot_is_written_by_option_or_by_suffix(
         tmp_path / f"athena.{suffix}"
     ).read_text()
     assert start in (tmp_path / f"athena.{suffix}").read_text()
-
-
-@pytest.mark.parametrize(
-    ("arguments", "parts"),
-    [
-        (["--urdf", "--mjcf"], ["two formats at once", "--urdf --mjcf"]),
-        (
-            ["--urdf", "-o", "robot.fmu"],
-            ["not the name of such a file", "robot.fmu", "write -o robot.urdf"],
-        ),
-        (["--mjcf", "-o", "robot.urdf"], ["not the name of such a file", "write -o robot.xml"]),
-        (["--urdf", "-o", "file/robot.urdf"], ["cannot write"]),
-        (["--robot", "none.urdf"], ["none.urdf", "cannot read the URDF"]),
-        (["--robot", "file.urdf"], ["file.urdf", "not XML"]),
-    ],
-)
-def test_a_mistake_leaves_one_paragraph_and_no_file(
-    call: Call,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    arguments: list[str],
-    parts: list[str],
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    for name in ("file", "file.urdf"):
-        Path(name).write_text("in the way")
-    assert_refused(call("export", *arguments), *parts)
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["file", "file.urdf"]
 
 
 def test_forward_may_be_another_axis_of_the_urdf(tmp_path: Path) -> None:

@@ -30,10 +30,7 @@ TANH_ULPS, EXPM1_ULPS, ANGLE_ULPS = (
 )  # units in the last place: a few roundings each; no error of method is allowed
 ROOT = Path(__file__).parents[2]
 BASELINE = "-DHX_BASELINE_ONLY"  # without the kernels for other instruction sets
-WIDTHS = {
-    name: [BASELINE, f"-DHX_LANES={lanes}"]
-    for name, lanes in (("scalar", 1), ("two", 2), ("four", 4), ("eight", 8))
-}
+WIDTHS = {name: [BASELINE, f"-DHX_LANES={lanes}"] for name, lanes in (("scalar", 1), ("four", 4))}
 
 
 def mapped(function: Callable[..., None], *arguments: Array) -> Array:
@@ -141,7 +138,6 @@ def other_cores(tmp_path_factory: pytest.TempPathFactory) -> dict[str, ct.CDLL]:
         for path in [
             *sorted((plant / "src").rglob("*.c")),
             plant / "generated" / "defaults.c",
-            ROOT / "tests" / "native" / "probe" / "stain.c",
         ]
     ]
     flags = [

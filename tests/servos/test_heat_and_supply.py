@@ -16,7 +16,6 @@ from states import changed, landing, random_bodies, random_command, with_links
 from test_laws_servo import HEAVY, tibias, walled
 from test_measured_servos import with_servo
 
-import hexapod_cosim
 from hexapod_cosim.models import Robot, load_robot
 from hexapod_cosim.models.contact.geometry import standing_damping
 from hexapod_cosim.models.dynamics import Command, accelerations
@@ -153,18 +152,3 @@ def test_the_figures_of_a_run_contain_the_energy_from_the_supply(core: ct.CDLL) 
     work = float(np.sum(after.positive_work - after.negative_work))
     assert work + copper == pytest.approx(float(np.trapezoid(powers, dx=2.5e-4)), rel=2e-3)
     assert copper > abs(work) > 0.0
-
-
-def test_a_run_warns_of_servos_that_gave_less_torque_because_they_were_hot() -> None:
-    """All 18 begin 2 K above the temperature from which on the duty limit falls."""
-    for start, count in ((345.15, 1), (300.0, 0)):
-        servo = {"model": "mx64_m1", **WARM, "start_temperature": start}
-        settings = {"duration": 0.1, "outputs.plots": False}
-        settings |= {f"servo.{key}": value for key, value in servo.items()}
-        result = hexapod_cosim.simulate("walk_flat", "kinematic", settings=settings)
-        found = [text for text in result.facts.warnings if "because they were hot" in text]
-        assert len(found) == count
-        if found:
-            assert found[0].startswith("18 of 18 servos gave less torque")
-            assert "reached 345." in found[0]
-            assert "servo.derate_temperature 343.15 K" in found[0]

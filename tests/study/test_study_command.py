@@ -86,11 +86,6 @@ def test_one_fmu_for_several_robots_is_refused(
     )
 
 
-def test_a_negative_number_of_workers_is_refused(call: Call, tmp_path: Path) -> None:
-    outcome = call("study", "friction_speed", "-o", tmp_path / "out", "--workers", "-1")
-    assert_refused(outcome, "--workers", "not a number of workers", "0 to 4096")
-
-
 def test_a_full_disk_stops_the_command_and_with_room_it_is_resumed(
     call: Call, athena_fmu: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

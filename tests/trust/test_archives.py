@@ -97,18 +97,13 @@ def test_a_link_or_device_is_refused(members: dict[str, bytes], tmp_path: Path, 
 
 
 @pytest.mark.parametrize(
-    ("names", "what"),
-    [
-        (("resources/a", "resources/A"), "is in the archive twice"),
-        (("resources/a", "resources/a/b"), "is a file and a folder"),
-    ],
+    "names", [("resources/a", "resources/a/"), ("resources/a", "resources/a/b")]
 )
 def test_files_that_overwrite_each_other_are_refused(
-    members: dict[str, bytes], tmp_path: Path, names: tuple[str, str], what: str
+    members: dict[str, bytes], tmp_path: Path, names: tuple[str, str]
 ) -> None:
     path = packed(tmp_path / "odd.fmu", members | dict.fromkeys(names, b"x"))
-    assert what in refusal(path)
-    assert any(what in problem for problem in findings(path))
+    assert "cannot be unpacked" in refusal(path)
 
 
 def test_the_stated_limits_hold() -> None:

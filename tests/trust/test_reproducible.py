@@ -12,7 +12,7 @@ EXPORT = """
 import sys
 from pathlib import Path
 from hexapod_cosim.controller import make_gait
-from hexapod_cosim.cosim.export.controller_export import export_controller
+from hexapod_cosim.cosim.export.plant_export import export_controller
 from hexapod_cosim.cosim.export.plant_export import export_fmu
 from hexapod_cosim.cosim.interface.controller_interface import ControllerSetup
 from hexapod_cosim.models import load_robot

@@ -13,8 +13,7 @@ import pytest
 from building import PACKED
 
 from hexapod_cosim.controller import make_gait
-from hexapod_cosim.cosim.export.controller_export import export_controller
-from hexapod_cosim.cosim.export.plant_export import export_fmu
+from hexapod_cosim.cosim.export.plant_export import export_controller, export_fmu
 from hexapod_cosim.cosim.interface.controller_interface import ControllerSetup
 from hexapod_cosim.models import load_robot
 

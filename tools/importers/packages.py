@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
+from hexapod_cosim.controller import DEFAULT_PERIOD
 from hexapod_cosim.cosim.common.plant_files import package_version
 from hexapod_cosim.cosim.export.robot_package import CONTROLLER, PLANT, export_package
 from hexapod_cosim.cosim.master.fmu import Fmu
@@ -22,7 +23,6 @@ from tools.importers.outcome import answers, not_installed, version
 from tools.importers.package import run
 
 ADAPTERS = Path(__file__).resolve().parent / "adapters"
-PERIOD = 0.005  # s
 # largest relative difference due to the last bits of the commands, which stiff servos and the
 # ground amplify
 ROUND_OFF = 1e-9
@@ -76,8 +76,8 @@ def compare_packages(
     python: of the tools' virtual environment.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    setup = make_setup(load_robot("athena"), control="compliant", period=PERIOD)
-    steps = round(duration / PERIOD)
+    setup = make_setup(load_robot("athena"), control="compliant", period=DEFAULT_PERIOD)
+    steps = round(duration / DEFAULT_PERIOD)
     package = export_package(setup, folder / "athena.ssp", stop=duration)
     with zipfile.ZipFile(package) as archive:
         plant = Path(archive.extract("resources/plant.fmu", folder))
@@ -97,7 +97,7 @@ def compare_packages(
         found = run(
             package,
             wanted.read_text().split("\n"),
-            step=PERIOD,
+            step=DEFAULT_PERIOD,
             steps=steps,
             order=(PLANT, CONTROLLER),
             in_order=in_order,

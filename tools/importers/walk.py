@@ -12,6 +12,7 @@ import fmpy
 import numpy as np
 from numpy.typing import NDArray
 
+from hexapod_cosim.controller import DEFAULT_PERIOD
 from hexapod_cosim.cosim.export.plant_export import export_fmu
 from hexapod_cosim.cosim.interface.descriptions import read_description
 from hexapod_cosim.cosim.master.fmu import Fmu
@@ -21,7 +22,7 @@ from hexapod_cosim.cosim.run.single_run import simulate
 from hexapod_cosim.cosim.scenario.scenario import load_scenario
 from hexapod_cosim.models import load_robot
 
-STEP = 0.005  # s
+STEP = DEFAULT_PERIOD  # s
 
 
 @dataclass(frozen=True, kw_only=True)

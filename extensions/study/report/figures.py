@@ -10,7 +10,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import TypeVar
 
 import matplotlib
 import numpy as np
@@ -35,12 +34,8 @@ from hexapod_cosim.extensions.study.report.tables import label_of
 from hexapod_cosim.extensions.study.summary import Results
 from hexapod_cosim.models import HexapodError
 
-COST = "cost_of_transport"
-NAMES = {SLIP: "slip [m/m]", COST: "cost of transport [1]"}
-MAX_MARKS, MAX_CELLS = 1500, 40  # more make a figure slower and no clearer
+MAX_CELLS = 40  # more make a figure slower and no clearer
 MAX_PANELS, COLUMNS = 9, 3  # panels, and panels side by side
-LOG_RATIO = 10.0  # largest over least value beyond which an axis is logarithmic
-_Item = TypeVar("_Item")
 
 
 @dataclass(frozen=True)
@@ -77,7 +72,7 @@ def drawings(results: Results, *, before: float = math.nan) -> dict[str, Drawing
 
 
 def _of_factors(study: Study, points: Sequence[Point]) -> dict[str, Drawing]:
-    """Returns the figure over two factors of a grid, over the only factor or over each factor."""
+    """Returns the figure over two factors of a grid, or over each factor."""
     axes = [
         factor
         for factor in study.factors
@@ -88,17 +83,12 @@ def _of_factors(study: Study, points: Sequence[Point]) -> dict[str, Drawing]:
         caption = f"Mean slip per metre{averaged}. Grey: no run (no pair) with a figure."
         draw = partial(heat_map, points, axes[0], axes[1], study)
         return {"heat_map": Drawing(f"{axes[0].name} and {axes[1].name}", caption, draw)}
-    bars = "; bars: Student's 95 % intervals over seeds" if len(study.seeds) > 1 else ""
-    crosses = "crosses at the lower edge: no run walked"
-    if len(study.factors) == 1:
-        factor, caption = study.factors[0], f"Means of the walks at each point{bars}; {crosses}."
-        draw = partial(over_factors, points, [(factor, SLIP), (factor, COST)], study)
-        return {"response": Drawing(factor.name, caption, draw)}
     varied = [factor for factor in study.factors if len(set(factor.values)) != 1][:MAX_PANELS]
     if not varied:
         return {}
-    caption = f"Mean slip per metre of each point over each factor by itself{bars}; {crosses}."
-    draw = partial(over_factors, points, [(factor, SLIP) for factor in varied], study)
+    bars = "; bars: Student's 95 % intervals over seeds" if len(study.seeds) > 1 else ""
+    caption = f"Mean slip per metre of each point over each factor by itself{bars}."
+    draw = partial(over_factors, points, varied, study)
     return {"effects": Drawing("Slip over each factor", caption, draw)}
 
 
@@ -121,26 +111,23 @@ def save(found: dict[str, Drawing], folder: Path) -> list[Path]:
     return files
 
 
-def over_factors(
-    points: Sequence[Point], panels: Sequence[tuple[Factor, str]], study: Study
-) -> Figure:
-    """Draws a metric over a factor in each panel, with a mark and an interval for each point."""
-    columns = min(len(panels), COLUMNS)
-    rows = math.ceil(len(panels) / columns)
-    width = 4.2 if len(panels) < COLUMNS else 3.1
+def over_factors(points: Sequence[Point], factors: Sequence[Factor], study: Study) -> Figure:
+    """Draws the slip over a factor in each panel, with a mark and an interval for each point."""
+    columns = min(len(factors), COLUMNS)
+    rows = math.ceil(len(factors) / columns)
+    width = 4.2 if len(factors) < COLUMNS else 3.1
     figure = Figure(figsize=(width * columns + 0.6, 2.7 * rows + 0.5))
     axes = figure.subplots(rows, columns, squeeze=False).ravel()
-    for one, (factor, metric) in zip(axes, panels, strict=False):
+    for one, factor in zip(axes, factors, strict=False):
         for control, style in control_styles(study.controls).items():
-            _marks(one, some_of(points), factor, (control, metric), style)
+            _marks(one, points, factor, control, style)
         if _named(factor):
             names = ticks_of(factor)
             rotation = 20 if max(map(len, names)) > 8 else 0
             one.set_xticks(range(len(names)), names, rotation=rotation)
-        one.set(xlabel=label_of(factor), ylabel=NAMES[metric])
-        _log_scale(one, "y")
+        one.set(xlabel=label_of(factor), ylabel="slip [m/m]")
         one.margins(x=0.05, y=0.12)
-    for one in axes[len(panels) :]:
+    for one in axes[len(factors) :]:
         one.set_visible(False)
     axes[0].legend(fontsize=7)
     return figure
@@ -152,14 +139,13 @@ def _named(factor: Factor) -> bool:
 
 
 def _marks(
-    axes: Axes, points: Sequence[Point], factor: Factor, what: tuple[str, str], style: ControlStyle
+    axes: Axes, points: Sequence[Point], factor: Factor, control: str, style: ControlStyle
 ) -> None:
-    """Draws a mark per point, and a cross at the bottom where no run walked."""
-    control, metric = what
+    """Draws a mark per point."""
     names = list(dict.fromkeys(factor.values)) if _named(factor) else []
     values = [point.values[factor.name] for point in points]
     place = np.array([names.index(value) if names else value for value in values], dtype=float)
-    means = [point.figures.means[control][metric] for point in points]
+    means = [point.figures.means[control][SLIP] for point in points]
     half = np.array([item.half_width for item in means])
     axes.errorbar(
         place,
@@ -173,26 +159,6 @@ def _marks(
         color=style.light,
         label=control,
     )
-    lost = np.array(
-        [
-            point.figures.runs[control] > 0 and point.figures.walked[control] == 0
-            for point in points
-        ],
-        dtype=np.bool_,
-    )
-    transform = axes.get_xaxis_transform()
-    edge = np.full(int(np.sum(lost)), 0.03)
-    axes.plot(place[lost], edge, "x", markersize=4, color=style.light, transform=transform)
-
-
-def _log_scale(axes: Axes, side: str) -> None:
-    """Makes an axis logarithmic when its values differ by more than LOG_RATIO."""
-    lines = [line for line in axes.lines if line.get_transform() == axes.transData]
-    data = [np.asarray(line.get_data()["xy".index(side)], dtype=float) for line in lines]
-    values = np.concatenate([*data, [math.nan]])
-    values = values[np.isfinite(values)]
-    if len(values) and values.min() > 0.0 and values.max() > LOG_RATIO * values.min():
-        axes.set(**{f"{side}scale": "log"})
 
 
 def history(study: Study, trials: Sequence[Trial], before: float) -> Figure:
@@ -223,9 +189,3 @@ def history(study: Study, trials: Sequence[Trial], before: float) -> Figure:
     axes.xaxis.set_major_locator(MaxNLocator(integer=True))
     figure.legend(loc="outside upper center", ncols=5)
     return figure
-
-
-def some_of(items: Sequence[_Item]) -> list[_Item]:
-    """Returns at most MAX_MARKS items, evenly chosen."""
-    step = max(math.ceil(len(items) / MAX_MARKS), 1)
-    return list(items[::step])

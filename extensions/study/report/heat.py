@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from typing import Any
 
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.colors import LogNorm, Normalize
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
@@ -20,7 +18,6 @@ from hexapod_cosim.extensions.study.report.tables import label_of
 Array = NDArray[np.float64]
 SLIP = "slip_per_metre"
 COLOURMAP, CHANGES = "viridis", "RdBu_r"
-MAX_NUMBERED = 60  # cells that show their values as numbers
 EMPTY = "0.85"  # grey of cells without a value
 
 
@@ -65,8 +62,6 @@ def heat_map(points: Sequence[Point], first: Factor, second: Factor, study: Stud
         axes.set(title=title, xlabel=label_of(first), facecolor=EMPTY)
         axes.grid(visible=False)
         image = axes.imshow(values, origin="lower", aspect="auto", cmap=colours, norm=scale)
-        if values.size <= MAX_NUMBERED:
-            _numbers(axes, values, image)
         rotation = 45 if len(first.values) > 6 else 0
         axes.set_xticks(range(len(first.values)), ticks_of(first), rotation=rotation)
         axes.set_yticks(range(len(second.values)), ticks_of(second))
@@ -100,13 +95,3 @@ def _logarithmic(slips: Array) -> LogNorm:
     seen = np.clip(slips[np.isfinite(slips)], FLOORS[SLIP], None)
     low, high = (float(seen.min()), float(seen.max())) if len(seen) else (FLOORS[SLIP], 1.0)
     return LogNorm(low, high * (1.0 + 1e-9))
-
-
-def _numbers(axes: Axes, values: Array, image: Any) -> None:
-    for (row, column), value in np.ndenumerate(values):
-        if math.isfinite(value):
-            red, green, blue, _ = image.cmap(image.norm(value))
-            light = 0.299 * red + 0.587 * green + 0.114 * blue > 0.55
-            text = f"{value:.2g}" if abs(value) < 10 else f"{value:.0f}"
-            colour = "black" if light else "white"
-            axes.text(column, row, text, ha="center", va="center", fontsize=7.5, color=colour)

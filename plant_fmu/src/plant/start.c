@@ -3,40 +3,11 @@
 #include "../contact_law.h"
 #include "../ground/soil.h"
 #include "../ground/surface.h"
-#include "../ground/valleys.h"
 #include "../kernel.h"
 #include "../robot/robot.h"
 #include "hexapod/message.h"
 #include "hexapod/range_check.h"
 #include "parts.h"
-
-/* Fails if a smooth surface has a valley in which the largest sphere touches two places: the plant
- * computes one of them (ground/valleys.h). */
-static hxStatus check_valleys(hxPlant *plant, const hxDefinition *d, char *message) {
-  const double margin = 1.05; /* 1  least radius of valleys over that of the sphere */
-  const char *name[] = {"foot.radius", "body.corner_radius", "body.knee_radius",
-                        "body.shank_radius"};
-  const double radius[] = {d->foot_radius, d->body.corner_radius, d->body.knee_radius,
-                           d->body.shank_radius};
-  int largest = 0;
-  for (int i = 1; i < 4 && d->body.contact == HX_BODY_ON; ++i)
-    if (radius[i] > radius[largest]) largest = i;
-  const double limit = margin * radius[largest];
-  if (limit <= plant->valley_limit) return HX_OK;
-  const hxValley valley = hx_terrain_valley(plant->terrain, limit);
-  if (valley.radius == 0.0) {
-    plant->valley_limit = limit;
-    return HX_OK;
-  }
-  hx_print(message, HX_MESSAGE_SIZE,
-           "terrain.grid: valleys narrower than a %s: got a radius of curvature of %.4g mm at x = "
-           "%.4g m, y = %.4g m, expected at least %.4g mm, 1.05 times %s; enlarge "
-           "terrain.horizontal_scale, reduce difficulty or heights, choose blocks (a heightfield "
-           "with slope_threshold), or reduce %s",
-           largest == 0 ? "foot" : "part", 1e3 * valley.radius, valley.x, valley.y, 1e3 * limit,
-           name[largest], name[largest]);
-  return HX_INVALID_MODEL;
-}
 
 hxStatus hx_plant_check_terrain(hxPlant *plant, const hxDefinition *d, char *message) {
   if (d->terrain.kind != HX_TERRAIN_GRID) return HX_OK;
@@ -49,9 +20,7 @@ hxStatus hx_plant_check_terrain(hxPlant *plant, const hxDefinition *d, char *mes
   const double radius = fmax(fmax(d->foot_radius, d->body.corner_radius),
                              fmax(d->body.knee_radius, d->body.shank_radius));
   const double cell = hx_terrain_cell_size(plant->terrain);
-  if (hx_terrain_surface(plant->terrain) == HX_SURFACE_SMOOTH)
-    return check_valleys(plant, d, message);
-  if (cell >= 2.0 * radius) return HX_OK;
+  if (hx_terrain_surface(plant->terrain) == HX_SURFACE_SMOOTH || cell >= 2.0 * radius) return HX_OK;
   hx_print(message, HX_MESSAGE_SIZE,
            "terrain.grid: got blocks with cells of %.9g m, expected at least %.9g m, twice the "
            "largest radius that touches them; resample the grid, or reduce foot.radius",

@@ -17,77 +17,10 @@
 extern "C" {
 #endif
 
-/* The controller's model of a link; joint axes are z, -y, y (docs/architecture.md). */
-typedef struct hxKnownLink {
-  double mass;                 /* kg */
-  double length;               /* m     next joint (tibia: foot centre) along the link's x */
-  double offset_y, offset_z;   /* m     the same point along y and z */
-  double com[3];               /* m     centre of mass, link axes */
-  double inertia_yy;           /* kg m2 about the centre of mass */
-  double inertia_zz;           /* kg m2 */
-  double angle_min, angle_max; /* rad   limits of the joint */
-  double stance;               /* rad   the joint in the standing pose */
-} hxKnownLink;
-
-typedef struct hxKnownLeg {
-  double hip_position[3]; /* m    coxa joint, torso axes */
-  double hip_yaw;         /* rad  about z */
-  hxKnownLink link[HX_JOINTS];
-} hxKnownLeg;
-
-/* The controller's model of the robot, the gait and the laws. hx_controller_definition_default sets
- * the ATHENA-like robot. */
-typedef struct hxControllerDefinition {
-  double period; /* s    between two steps of the controller */
-  int control;   /* hxControl */
-  struct {
-    double mass;       /* kg */
-    double com[3];     /* m      from the torso's origin, torso axes */
-    double inertia_zz; /* kg m2  about the centre of mass */
-  } torso;
-  hxKnownLeg leg[HX_LEGS];
-  double foot_radius;       /* m */
-  double contact_stiffness; /* N/m^1.5  of a foot on the ground */
-  double friction;          /* 1        coefficient of friction that is believed */
-  struct {
-    double kp;                /* N m/rad */
-    double speed_max;         /* rad/s */
-    double rotor_inertia;     /* kg m2  seen at the joint */
-    double coulomb_friction;  /* N m    in the gear */
-    double torque_continuous; /* N m    that it can give for ever */
-  } servo;
-  double gravity[3]; /* m/s2 */
-  hxGait gait;
-  hxGains gains; /* without the data that they were designed for */
-  hxParts parts; /* switches of compliant and paper control */
-} hxControllerDefinition;
-
-/* Command and measurements of the controller. */
-typedef struct hxControllerInput {
-  struct {
-    double vx, vy;      /* m/s    forward, to the left */
-    double yaw_rate;    /* rad/s  to the left */
-    double height;      /* m      above the stance */
-    double roll, pitch; /* rad    z-y-x */
-  } command;
-  double angle[HX_LEGS][HX_JOINTS]; /* rad */
-  double foot_force[HX_LEGS][3];    /* N   ground on foot, world axes */
-  double quaternion[4];             /* 1   torso to world, w x y z */
-} hxControllerInput;
-
-typedef struct hxControllerOutput {
-  double angle_ref[HX_LEGS][HX_JOINTS];  /* rad */
-  double speed_ref[HX_LEGS][HX_JOINTS];  /* rad/s */
-  double torque_ref[HX_LEGS][HX_JOINTS]; /* N m */
-  int swinging[HX_LEGS];                 /* planned to be in the air */
-  int unreachable[HX_LEGS];              /* the joints cannot follow */
-  int fallback[HX_LEGS];                 /* walks without feedback */
-  double shift[HX_LEGS][2];              /* m  horizontal correction of the foot, walking frame */
-  double lift[HX_LEGS];                  /* m  vertical correction of the foot */
-  double planned[HX_LEGS][3]; /* m  the foot's centre as the command plans it, torso frame, without
-                                 any correction */
-  double acceleration_ref[HX_LEGS][HX_JOINTS]; /* rad/s2  planned, for kinematic drives */
-} hxControllerOutput;
+/* hxControllerDefinition (generated/controller_settings.h) is the controller's model of the robot,
+ * the gait and the laws: joint axes are z, -y, y (docs/architecture.md). hxControllerInput holds
+ * command and measurements,
+ * hxControllerOutput the joint commands and what recorders see. */
 
 typedef struct hxController hxController;
 

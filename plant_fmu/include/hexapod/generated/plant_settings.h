@@ -106,41 +106,34 @@ typedef enum hxTerrainKind {
 
 enum { HX_CONE_BINS = 31 };
 
-typedef struct hxBodySettings {
-  /* hxBodyContact  Whether torso, knees and shanks touch the ground */
-  int contact;
-  /* hxSelfContact  Whether a run warns of neighbouring legs whose femurs or tibias overlap, or
-   * these push each other */
-  int self_contact;
-  /* m  Half edges along the torso's axes of a box whose eight corners touch the ground; all 0: they
-   * do not */
-  double torso_box[3];
-  /* m  Centre of the torso's box from the torso's origin, torso axes */
-  double torso_centre[3];
-  /* m  Radius of spheres at the corners of the torso's box; 0: points */
-  double corner_radius;
-  /* m  Radius of a sphere at the tibia's joint that touches the ground, 0: none; and of the femur
-   * for clearance */
-  double knee_radius;
-  /* m  Radius of a sphere on the tibia's line that touches the ground, 0: none; and of the tibia
-   * for clearance */
-  double shank_radius;
-  /* 1  Place of the shank's sphere: 0 at the tibia's joint, 1 at the foot's centre */
-  double shank_position;
-} hxBodySettings;
+typedef struct hxLink {
+  /* kg  Mass of the link that the joint moves */
+  double mass;
+  /* m  Next joint (tibia: the foot's centre) along the link's x axis */
+  double length;
+  /* m  The same point along the link's y axis */
+  double offset_y;
+  /* m  The same point along the link's z axis */
+  double offset_z;
+  /* m  Centre of mass of the link, link axes */
+  double com[3];
+  /* kg.m2  Entry xx of the link's inertia matrix about its centre of mass, link axes */
+  double inertia[6];
+  /* 1  Joint axis, parent link's axes (coxa: hip axes); normalised on use */
+  double axis[3];
+  /* rad  Lower stop of the joint */
+  double angle_min;
+  /* rad  Upper stop of the joint */
+  double angle_max;
+} hxLink;
 
-typedef struct hxContactSettings {
-  /* hxContactLaw  Law of the normal force */
-  int law;
-  /* N/m1.5  K of the normal force K d^1.5 (1 + chi dd/v0) */
-  double stiffness;
-  /* 1  Coefficient of restitution */
-  double restitution;
-  /* s/m  c of the law constant_damping, K d^1.5 (1 + 1.5 c dd) */
-  double damping_factor;
-  /* m/s  A slower touch-down counts as this fast */
-  double impact_speed_floor;
-} hxContactSettings;
+typedef struct hxLeg {
+  /* m  Coxa joint from the torso's origin, torso axes */
+  double hip_position[3];
+  /* rad  Angle about z from the torso's axes to the hip's */
+  double hip_yaw;
+  hxLink link[3];
+} hxLeg;
 
 typedef struct hxSoilDefinition {
   /* hxSoilLaw  Law of soft ground under the feet */
@@ -175,142 +168,406 @@ typedef struct hxSoilDefinition {
   double damping;
 } hxSoilDefinition;
 
-typedef struct hxFrictionSettings {
-  /* hxFrictionLaw  Law of the tangential force */
-  int law;
-  /* 1  Coefficient of friction */
-  double mu;
-  /* s/m  Slope k_t at rest of the law tanh, and of spin and rolling friction */
-  double slope;
-  /* m  Displacement at which a foot slides under the laws bristle and lugre */
-  double presliding;
-  /* s  Damping of bristles over their stiffness at rest, of the laws bristle and lugre */
-  double bristle_damping;
-  /* 1  Coefficient of friction of a foot that sticks; 0: friction.mu */
-  double mu_static;
-  /* m/s  Sliding speed at which friction has fallen half-way from mu_static to mu */
-  double stribeck_speed;
-  /* s/m  Viscous part: what a slip of 1 m/s adds to the coefficient of friction */
-  double viscous;
-  /* m  Spin friction: moment about the ground's normal over mu times the normal force; 0: none */
-  double spin_radius;
-  /* m  Rolling friction: moment across the ground's normal over the normal force; 0: none */
-  double rolling_radius;
-} hxFrictionSettings;
+typedef struct hxDefinition {
+  struct {
+    /* kg  Mass of the torso */
+    double mass;
+    /* m  Centre of mass of the torso from its origin, torso axes */
+    double com[3];
+    /* kg.m2  Entry xx of the torso's inertia matrix about its centre of mass, torso axes */
+    double inertia[6];
+  } torso;
+  hxLeg leg[6];
+  /* m  Radius of the feet */
+  double foot_radius;
+  struct {
+    /* hxContactLaw  Law of the normal force */
+    int law;
+    /* N/m1.5  K of the normal force K d^1.5 (1 + chi dd/v0) */
+    double stiffness;
+    /* 1  Coefficient of restitution */
+    double restitution;
+    /* s/m  c of the law constant_damping, K d^1.5 (1 + 1.5 c dd) */
+    double damping_factor;
+    /* m/s  A slower touch-down counts as this fast */
+    double impact_speed_floor;
+  } contact;
+  struct {
+    /* hxFrictionLaw  Law of the tangential force */
+    int law;
+    /* 1  Coefficient of friction */
+    double mu;
+    /* s/m  Slope k_t at rest of the law tanh, and of spin and rolling friction */
+    double slope;
+    /* m  Displacement at which a foot slides under the laws bristle and lugre */
+    double presliding;
+    /* s  Damping of bristles over their stiffness at rest, of the laws bristle and lugre */
+    double bristle_damping;
+    /* 1  Coefficient of friction of a foot that sticks; 0: friction.mu */
+    double mu_static;
+    /* m/s  Sliding speed at which friction has fallen half-way from mu_static to mu */
+    double stribeck_speed;
+    /* s/m  Viscous part: what a slip of 1 m/s adds to the coefficient of friction */
+    double viscous;
+    /* m  Spin friction: moment about the ground's normal over mu times the normal force; 0: none */
+    double spin_radius;
+    /* m  Rolling friction: moment across the ground's normal over the normal force; 0: none */
+    double rolling_radius;
+  } friction;
+  struct {
+    /* hxServoMode  What the servos of all joints do with their commands */
+    int mode;
+    /* N.m/rad  Proportional gain */
+    double kp;
+    /* N.m.s/rad  Derivative gain */
+    double kd;
+    /* N.m  Torque at stall */
+    double torque_max;
+    /* rad/s  No-load speed, where the torque-speed line ends */
+    double speed_max;
+    /* kg.m2  Inertia of the rotor, seen at the joint */
+    double rotor_inertia;
+    /* N.m  Coulomb friction of the gear */
+    double coulomb_friction;
+    /* N.m/rad  Stiffness of the joints' stops at angle_min and angle_max; 0: no stops. Kinematic
+     * drives have none */
+    double stop_stiffness;
+    /* N.m.s/rad  Damping of the joints' stops, whose torque is at most that of their stiffness */
+    double stop_damping;
+    /* hxServoDrive  What limits the servos' torque */
+    int drive;
+    /* V  Supply of the motors, of servo.drive motor; servo.kp holds at it */
+    double voltage;
+    /* 1  Largest share of the supply's voltage that a motor gets */
+    double duty_max;
+    /* N.m/A  Torque of a motor per ampere, seen at the joint, and its back-EMF per rad/s */
+    double torque_constant;
+    /* ohm  Resistance of a motor */
+    double resistance;
+    /* N.m.s/rad  Viscous friction of motor and gear */
+    double viscous_friction;
+    /* N.m  Friction of motor and gear that vanishes with speed */
+    double stribeck_friction;
+    /* 1  Friction for each unit of the motor's torque, less that of the external torque */
+    double motor_load_friction;
+    /* 1  Friction for each unit of the external torque: gravity, ground and motion */
+    double external_load_friction;
+    /* 1  As motor_load_friction, of a part that vanishes with speed */
+    double stribeck_motor_load_friction;
+    /* 1  As external_load_friction, of a part that vanishes with speed */
+    double stribeck_external_load_friction;
+    /* 1/(N.m)  Friction for the squared motor torque where a larger external torque opposes it; it
+     * vanishes with speed */
+    double quadratic_motor_friction;
+    /* 1/(N.m)  Friction for the squared external torque where a larger motor torque opposes it; it
+     * vanishes with speed */
+    double quadratic_external_friction;
+    /* rad/s  Speed by which the parts that vanish with speed fall to 1/e */
+    double stribeck_speed;
+    /* 1  Exponent of their decay */
+    double stribeck_exponent;
+    /* rad/s  Speed at which dry friction of motor and gear saturates: tanh(speed/friction_speed) */
+    double friction_speed;
+    /* J/K  Heat capacity of a motor's winding; 0: no heating */
+    double winding_capacity;
+    /* J/K  Heat capacity of a servo's housing */
+    double housing_capacity;
+    /* K/W  Thermal resistance between winding and housing */
+    double winding_to_housing;
+    /* K/W  Thermal resistance between housing and air */
+    double housing_to_air;
+    /* K  Temperature of the air */
+    double air_temperature;
+    /* K  Temperature of windings and housings at the start */
+    double start_temperature;
+    /* K  Hotter windings lower the duty limit */
+    double derate_temperature;
+    /* K  Temperature of a winding at which the duty limit is 0 */
+    double temperature_max;
+    /* ohm  Resistance of the battery and its cables, which all servos share */
+    double supply_resistance;
+    /* s  Time between transmissions of commands, which the servos hold; 0: one at every
+     * communication point */
+    double bus_period;
+    /* rad  Commanded angles are rounded to multiples of it; 0: they are not */
+    double command_step;
+    /* N.m/rad  Stiffness of the gear between rotor and link, co-simulation only; 0: rigid */
+    double gear_stiffness;
+    /* N.m.s/rad  Damping of the elastic gear */
+    double gear_damping;
+    /* rad  Play of the elastic gear at the joint, from side to side */
+    double backlash;
+    /* 1  Turns of the rotor for one of the joint, below 0 against it; 0: the rotor's angular
+     * momentum is left out */
+    double gear_ratio;
+  } servo;
+  struct {
+    /* 1/s  Stabilisation of the joints, on the violation's rate */
+    double alpha;
+    /* 1/s  Stabilisation of the joints, on the violation */
+    double beta;
+  } baumgarte;
+  /* m/s2  Acceleration of free fall, world axes */
+  double gravity[3];
+  struct {
+    /* hxMethod  Integration method */
+    int method;
+    /* s  Internal step; 0: chosen by error control */
+    double step;
+    /* 1  Tolerance of the error control */
+    double tolerance;
+    /* s  Longest step of the error control */
+    double step_max;
+    /* hxProjection  Projection on the constraints */
+    int projection;
+  } solver;
+  struct {
+    /* hxTerrainKind  Shape of the ground */
+    int kind;
+    /* m  Height of the ground at the world's origin */
+    double height;
+    /* rad  Angle by which a slope rises along its heading */
+    double incline;
+    /* rad  Heading of a slope about z, from x */
+    double heading;
+    /* 1  With terrain.kind grid: which grid of the FMU's resources, the number in
+     * resources/terrain/1.terrain */
+    double grid;
+  } terrain;
+  struct {
+    /* m  Centre of mass of the torso at the start, world axes; by default at rest on the ground */
+    double position[3];
+    /* 1  Attitude of the torso at the start, w x y z; normalised on use */
+    double quaternion[4];
+    /* m/s  Velocity of the torso's centre of mass at the start, world axes */
+    double velocity[3];
+    /* rad/s  Angular velocity of the torso at the start, world axes */
+    double angular_velocity[3];
+    /* rad  Joint angle at the start */
+    double angle[6][3];
+    /* rad/s  Joint speed at the start */
+    double speed[6][3];
+  } initial;
+  struct {
+    /* hxBodyContact  Whether torso, knees and shanks touch the ground */
+    int contact;
+    /* hxSelfContact  Whether a run warns of neighbouring legs whose femurs or tibias overlap, or
+     * these push each other */
+    int self_contact;
+    /* m  Half edges along the torso's axes of a box whose eight corners touch the ground; all 0:
+     * they do not */
+    double torso_box[3];
+    /* m  Centre of the torso's box from the torso's origin, torso axes */
+    double torso_centre[3];
+    /* m  Radius of spheres at the corners of the torso's box; 0: points */
+    double corner_radius;
+    /* m  Radius of a sphere at the tibia's joint that touches the ground, 0: none; and of the femur
+     * for clearance */
+    double knee_radius;
+    /* m  Radius of a sphere on the tibia's line that touches the ground, 0: none; and of the tibia
+     * for clearance */
+    double shank_radius;
+    /* 1  Place of the shank's sphere: 0 at the tibia's joint, 1 at the foot's centre */
+    double shank_position;
+  } body;
+  /* m  Radius of a flat round pad under the feet on soil; 0: the sphere itself */
+  double foot_pad_radius;
+  hxSoilDefinition soil;
+} hxDefinition;
 
-typedef struct hxServoSettings {
-  /* hxServoMode  What the servos of all joints do with their commands */
-  int mode;
-  /* N.m/rad  Proportional gain */
-  double kp;
-  /* N.m.s/rad  Derivative gain */
-  double kd;
-  /* N.m  Torque at stall */
-  double torque_max;
-  /* rad/s  No-load speed, where the torque-speed line ends */
-  double speed_max;
-  /* kg.m2  Inertia of the rotor, seen at the joint */
-  double rotor_inertia;
-  /* N.m  Coulomb friction of the gear */
-  double coulomb_friction;
-  /* N.m/rad  Stiffness of the joints' stops at angle_min and angle_max; 0: no stops. Kinematic
-   * drives have none */
-  double stop_stiffness;
-  /* N.m.s/rad  Damping of the joints' stops, whose torque is at most that of their stiffness */
-  double stop_damping;
-  /* hxServoDrive  What limits the servos' torque */
-  int drive;
-  /* V  Supply of the motors, of servo.drive motor; servo.kp holds at it */
-  double voltage;
-  /* 1  Largest share of the supply's voltage that a motor gets */
-  double duty_max;
-  /* N.m/A  Torque of a motor per ampere, seen at the joint, and its back-EMF per rad/s */
-  double torque_constant;
-  /* ohm  Resistance of a motor */
-  double resistance;
-  /* N.m.s/rad  Viscous friction of motor and gear */
-  double viscous_friction;
-  /* N.m  Friction of motor and gear that vanishes with speed */
-  double stribeck_friction;
-  /* 1  Friction for each unit of the motor's torque, less that of the external torque */
-  double motor_load_friction;
-  /* 1  Friction for each unit of the external torque: gravity, ground and motion */
-  double external_load_friction;
-  /* 1  As motor_load_friction, of a part that vanishes with speed */
-  double stribeck_motor_load_friction;
-  /* 1  As external_load_friction, of a part that vanishes with speed */
-  double stribeck_external_load_friction;
-  /* 1/(N.m)  Friction for the squared motor torque where a larger external torque opposes it; it
-   * vanishes with speed */
-  double quadratic_motor_friction;
-  /* 1/(N.m)  Friction for the squared external torque where a larger motor torque opposes it; it
-   * vanishes with speed */
-  double quadratic_external_friction;
-  /* rad/s  Speed by which the parts that vanish with speed fall to 1/e */
-  double stribeck_speed;
-  /* 1  Exponent of their decay */
-  double stribeck_exponent;
-  /* rad/s  Speed at which dry friction of motor and gear saturates: tanh(speed/friction_speed) */
-  double friction_speed;
-  /* J/K  Heat capacity of a motor's winding; 0: no heating */
-  double winding_capacity;
-  /* J/K  Heat capacity of a servo's housing */
-  double housing_capacity;
-  /* K/W  Thermal resistance between winding and housing */
-  double winding_to_housing;
-  /* K/W  Thermal resistance between housing and air */
-  double housing_to_air;
-  /* K  Temperature of the air */
-  double air_temperature;
-  /* K  Temperature of windings and housings at the start */
-  double start_temperature;
-  /* K  Hotter windings lower the duty limit */
-  double derate_temperature;
-  /* K  Temperature of a winding at which the duty limit is 0 */
-  double temperature_max;
-  /* ohm  Resistance of the battery and its cables, which all servos share */
-  double supply_resistance;
-  /* s  Time between transmissions of commands, which the servos hold; 0: one at every communication
-   * point */
-  double bus_period;
-  /* rad  Commanded angles are rounded to multiples of it; 0: they are not */
-  double command_step;
-  /* N.m/rad  Stiffness of the gear between rotor and link, co-simulation only; 0: rigid */
-  double gear_stiffness;
-  /* N.m.s/rad  Damping of the elastic gear */
-  double gear_damping;
-  /* rad  Play of the elastic gear at the joint, from side to side */
-  double backlash;
-  /* 1  Turns of the rotor for one of the joint, below 0 against it; 0: the rotor's angular momentum
-   * is left out */
-  double gear_ratio;
-} hxServoSettings;
+typedef struct hxInput {
+  /* rad  Commanded angle */
+  double angle_ref[6][3];
+  /* rad/s  Commanded speed; in kinematic mode the drive goes on from angle_ref at it within a
+   * communication step */
+  double speed_ref[6][3];
+  /* N.m  Feed-forward torque; in torque mode the whole command */
+  double torque_ref[6][3];
+  /* N  Disturbing force on the torso's centre of mass, world axes */
+  double push_force[3];
+  /* N.m  Disturbing torque on the torso, world axes */
+  double push_torque[3];
+  /* rad/s2  Commanded acceleration, of the kinematic mode alone: speed_ref changes by it within a
+   * communication step */
+  double acceleration_ref[6][3];
+} hxInput;
 
-typedef struct hxSolverSettings {
-  /* hxMethod  Integration method */
-  int method;
-  /* s  Internal step; 0: chosen by error control */
-  double step;
-  /* 1  Tolerance of the error control */
-  double tolerance;
-  /* s  Longest step of the error control */
-  double step_max;
-  /* hxProjection  Projection on the constraints */
-  int projection;
-} hxSolverSettings;
+typedef struct hxIndicators {
+  /* m  Penetration, 0.1 nm more for a foot that touches the ground, less for one that does not:
+   * events are its changes of sign */
+  double foot[6];
+  /* m  The same of the knee; -1 without body.contact */
+  double knee[6];
+  /* m  The same of the shank; -1 without body.contact */
+  double shank[6];
+  /* m  The same of the corners of the torso's box; -1 without body.contact */
+  double torso[8];
+  /* m  The same of femur and tibia with those of the next leg around the torso: femur with femur,
+   * with tibia, tibia with femur, with tibia; -1 without body.self_contact force */
+  double neighbour[6][4];
+} hxIndicators;
 
-typedef struct hxTerrainSettings {
-  /* hxTerrainKind  Shape of the ground */
-  int kind;
-  /* m  Height of the ground at the world's origin */
-  double height;
-  /* rad  Angle by which a slope rises along its heading */
-  double incline;
-  /* rad  Heading of a slope about z, from x */
-  double heading;
-  /* 1  With terrain.kind grid: which grid of the FMU's resources, the number in
-   * resources/terrain/1.terrain */
-  double grid;
-} hxTerrainSettings;
+typedef struct hxOutput {
+  /* rad  Joint angle */
+  double angle[6][3];
+  /* rad/s  Joint speed */
+  double speed[6][3];
+  /* N.m  Torque of the servo on the child link; in kinematic mode the drive's multiplier */
+  double torque[6][3];
+  /* N  Reaction of the joint on the child link, world axes */
+  double reaction_force[6][3][3];
+  /* N.m  Reaction torque of the joint on the child link about the joint's point, world axes */
+  double reaction_torque[6][3][3];
+  struct {
+    /* N  Force of the ground on the foot, world axes */
+    double force[6][3];
+    /* N  Its part along the ground's normal */
+    double normal_force[6];
+    /* N  Size of its part in the ground's plane */
+    double tangential_force[6];
+    /* m  Contact point: the foot's lowest towards the ground, world axes */
+    double position[6][3];
+    /* m/s  Velocity of the foot's material point at the contact point, world axes */
+    double velocity[6][3];
+    /* m/s  Size of that velocity's part in the ground's plane */
+    double slip_speed[6];
+    /* m  Law bristle: how far the foot is pushed along the ground before it slides, world axes; 0
+     * with other laws */
+    double bristle[6][3];
+    /* m  Depth of the foot in the ground; negative: clearance */
+    double penetration[6];
+    /* 0 or 1  Whether the foot touches the ground */
+    int contact[6];
+    /* m/s  Approach speed at the last touch-down */
+    double impact_speed[6];
+    /* m  Way of the contact point's material along the ground under more than 1 % of the robot's
+     * weight, since the start */
+    double slip_distance[6];
+    /* N.s  Integral of the normal force since the start */
+    double impulse[6];
+    /* N  Largest normal force within the last communication step (model exchange: within the
+     * solver's last completed step) */
+    double peak_force[6];
+    /* N/s  Steepest rise of the normal force at any instant of the last communication step, 0 if it
+     * only fell */
+    double peak_force_rate[6];
+    /* N/s  Largest rise of the normal force over 1 ms, per second, in the 20 ms after the last
+     * touch-down, 0 before any */
+    double landing_rate[6];
+    /* 1  Touch-downs of this foot since the start */
+    double landings[6];
+    /* m  Depth of the footprint under a foot on soil, under the undisturbed surface; it stays when
+     * the foot is lifted, until the foot leaves the footprint upwards */
+    double sinkage[6];
+  } foot;
+  struct {
+    /* m  Centre of mass of the torso, world axes */
+    double position[3];
+    /* 1  Attitude of the torso, w x y z, torso to world */
+    double quaternion[4];
+    /* rad  Roll of the torso (z-y-x angles) */
+    double roll;
+    /* rad  Pitch of the torso (z-y-x angles); positive: nose down */
+    double pitch;
+    /* rad  Yaw of the torso (z-y-x angles) */
+    double yaw;
+    /* m/s  Velocity of the torso's centre of mass, world axes */
+    double velocity[3];
+    /* rad/s  Angular velocity of the torso, world axes */
+    double angular_velocity[3];
+    /* N  Force of the ground on the corners of the torso's box, world axes; 0 without body.contact
+     * */
+    double contact_force[3];
+  } torso;
+  struct {
+    /* m/s2  What an ideal accelerometer at the torso's centre of mass reads, torso axes */
+    double specific_force[3];
+    /* rad/s  What an ideal gyroscope in the torso reads, torso axes */
+    double angular_velocity[3];
+  } imu;
+  struct {
+    /* J  Kinetic energy of the bodies and rotors */
+    double kinetic;
+    /* J  Potential energy of gravity and of the elastic part of the contacts */
+    double potential;
+    /* J  Work of the motors on the joints since the start */
+    double actuator_work;
+    /* J  Energy dissipated in contact, friction (with what bristles hold) and gears since the start
+     * */
+    double dissipated;
+    /* J  What the books do not explain: gain of stored energy less work plus dissipation */
+    double residual;
+    /* J  Work of torso.push_force and torso.push_torque since the start */
+    double push_work;
+    /* J  Part of energy.dissipated that the normal contact forces took */
+    double contact_loss;
+    /* J  Part of energy.dissipated that friction at the feet took (with what bristles hold) */
+    double friction_loss;
+    /* J  Part of energy.dissipated that friction in the gears took */
+    double gear_loss;
+  } energy;
+  struct {
+    /* 1  Norm of the joints' constraint violations (m and 1 together) */
+    double position_error;
+    /* 1/s  Norm of the rates of the joints' constraint violations (m/s and 1/s together) */
+    double velocity_error;
+  } constraint;
+  struct {
+    /* 1  Evaluations of the equations of motion since the start */
+    double evaluations;
+    /* 1  Internal steps taken since the start */
+    double steps;
+    /* 1  Internal steps rejected by the error control since the start */
+    double rejected;
+    /* 1  Touch-downs of feet, torso, knees and shanks since the start */
+    double touchdowns;
+  } solver;
+  /* J  Work of the motor on the joint while it drives, since the start */
+  double positive_work[6][3];
+  /* J  Work that the motor takes from the joint while it brakes, since the start */
+  double negative_work[6][3];
+  /* N2.m2.s  Integral of the squared motor torque since the start, a measure of its heat */
+  double torque_squared[6][3];
+  /* s  Time that all feet bore more than 1 % of the weight since the start, by the share |f_t|/(mu
+   * f_n) of the friction cone used: bin i is from 0.9 ((i-1)/30)^2 to 0.9 (i/30)^2, the last is
+   * above 0.9 */
+  double cone_time[31];
+  /* 1  Footprints made in soil since the start; more than 512 replace the oldest ones */
+  double footprints;
+  struct {
+    /* N  Force of the ground on the knee, world axes; 0 without body.contact */
+    double knee_force[6][3];
+    /* N  Force of the ground on the shank, world axes; 0 without body.contact */
+    double shank_force[6][3];
+    /* m  Smallest distance of this leg's femur and tibia from those of the two neighbouring legs,
+     * less their radii; negative: they overlap */
+    double clearance[6];
+    /* N  Force of the two neighbouring legs on femur and tibia, world axes; 0 without
+     * body.self_contact force */
+    double neighbour_force[6][3];
+  } body;
+  /* A  Current of the servo's motor; 0 with servo.drive line, whose motor is unknown */
+  double current[6][3];
+  /* W  Voltage times current of the servo's motor, below 0 where it brakes and feeds back; 0 with
+   * servo.drive line */
+  double electrical_power[6][3];
+  /* K  Temperature of the motor's winding; the start's without heating */
+  double winding_temperature[6][3];
+  /* K  Temperature of the servo's housing */
+  double housing_temperature[6][3];
+  /* 1  Share of the winding's rise over the air that is left up to temperature_max */
+  double remaining_rating[6][3];
+  /* V  Voltage of the motors' supply under the present currents, held over a communication step; 0
+   * with servo.drive line */
+  double supply_voltage;
+  /* rad  Angle by which the rotor, seen at the joint, is ahead of the link; 0 with rigid gears */
+  double gear_deflection[6][3];
+  /* rad/s  Speed of the rotor, seen at the joint; the joint's with rigid gears */
+  double motor_speed[6][3];
+  /* s */
+  double time;
+  /* m  of all contacts, < 0: clearance; -1 where the robot has none */
+  hxIndicators depth;
+} hxOutput;
 
 #endif

@@ -27,6 +27,37 @@ typedef enum hxGaitPattern {
   HX_PATTERN_CUSTOM,
 } hxGaitPattern;
 
+typedef struct hxKnownLink {
+  /* kg  Mass of the link that the joint moves */
+  double mass;
+  /* m  Next joint (tibia: the foot's centre) along the link's x axis */
+  double length;
+  /* m  The same point along the link's y axis */
+  double offset_y;
+  /* m  The same point along the link's z axis */
+  double offset_z;
+  /* m  Centre of mass of the link, link axes */
+  double com[3];
+  /* kg.m2  Inertia of the link about y through its centre of mass, link axes */
+  double inertia_yy;
+  /* kg.m2  Inertia of the link about z through its centre of mass, link axes */
+  double inertia_zz;
+  /* rad  Lower limit of the joint */
+  double angle_min;
+  /* rad  Upper limit of the joint */
+  double angle_max;
+  /* rad  The joint in the standing pose */
+  double stance;
+} hxKnownLink;
+
+typedef struct hxKnownLeg {
+  /* m  Coxa joint from the torso's origin, torso axes */
+  double hip_position[3];
+  /* rad  Angle about z from the torso's axes to the hip's */
+  double hip_yaw;
+  hxKnownLink link[3];
+} hxKnownLeg;
+
 typedef struct hxGait {
   /* hxGaitPattern  Which leg is in the air when */
   int pattern;
@@ -133,5 +164,92 @@ typedef struct hxParts {
    * the legs; 0 plans none */
   double squeeze;
 } hxParts;
+
+typedef struct hxControllerDefinition {
+  /* hxControl  What the joint commands depend on */
+  int control;
+  /* s  Time between two ticks; gains are designed for one */
+  double period;
+  struct {
+    /* kg  Mass of the torso */
+    double mass;
+    /* m  Centre of mass of the torso from its origin, torso axes */
+    double com[3];
+    /* kg.m2  Inertia of the torso about the vertical through its centre of mass */
+    double inertia_zz;
+  } torso;
+  hxKnownLeg leg[6];
+  /* m  Radius of the feet */
+  double foot_radius;
+  /* N/m1.5  K of the normal force K d^1.5 by which the ground gives way */
+  double contact_stiffness;
+  struct {
+    /* N.m/rad  Proportional gain of the servos; compliant control needs it above 0 */
+    double kp;
+    /* rad/s  No-load speed of the servos: commands never ask more */
+    double speed_max;
+    /* kg.m2  Inertia of the rotor, seen at the joint */
+    double rotor_inertia;
+    /* N.m  Coulomb friction of the gear */
+    double coulomb_friction;
+    /* N.m  Torque that a servo can give for ever; the planned squeeze grows as its mean square
+     * nears the square of it */
+    double torque_continuous;
+  } servo;
+  /* m/s2  Acceleration of free fall, world axes */
+  double gravity[3];
+  hxGait gait;
+  hxGains gains;
+  hxParts parts;
+  /* 1  Coefficient of friction of the feet on the ground that is believed */
+  double friction;
+} hxControllerDefinition;
+
+typedef struct hxControllerInput {
+  struct {
+    /* m/s  Commanded velocity of the torso forward, its own axes */
+    double vx;
+    /* m/s  Commanded velocity of the torso to the left, its own axes */
+    double vy;
+    /* rad/s  Commanded yaw rate, positive to the left */
+    double yaw_rate;
+    /* m  Commanded height of the torso above its stance */
+    double height;
+    /* rad  Commanded roll (z-y-x); positive lowers the right side */
+    double roll;
+    /* rad  Commanded pitch (z-y-x); positive lowers the nose */
+    double pitch;
+  } command;
+  /* rad  Measured joint angle */
+  double angle[6][3];
+  /* N  Measured force of the ground on the foot, world axes */
+  double foot_force[6][3];
+  /* 1  Measured attitude of the torso, w x y z, torso to world */
+  double quaternion[4];
+} hxControllerInput;
+
+typedef struct hxControllerOutput {
+  /* rad  Commanded angle */
+  double angle_ref[6][3];
+  /* rad/s  Commanded speed */
+  double speed_ref[6][3];
+  /* N.m  Feed-forward torque */
+  double torque_ref[6][3];
+  /* 0 or 1  The leg is planned to be in the air */
+  int swinging[6];
+  /* 0 or 1  The leg's joints cannot follow the foot's path */
+  int unreachable[6];
+  /* 0 or 1  The leg walks without feedback: its sensor is not believed, or the robot slides or
+   * outruns its joints */
+  int fallback[6];
+  /* m  Horizontal correction of the foot by the compliance, walking frame */
+  double shift[6][2];
+  /* m  Vertical correction of the foot, of all parts */
+  double lift[6];
+  /* m  The foot's centre as the command plans it, torso frame, without any correction */
+  double planned[6][3];
+  /* rad/s2  Planned acceleration, for kinematic drives */
+  double acceleration_ref[6][3];
+} hxControllerOutput;
 
 #endif
