@@ -7,9 +7,9 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
-from hexapod_cosim.controller import BodyCommand, ControllerError, JointCommand, Measurement
+from hexapod_cosim.controller import Controller, ControllerError
 from hexapod_cosim.cosim.control.fmu_instance import open_controller_fmu
 from hexapod_cosim.cosim.control.fmu_law import FmuLaw
 from hexapod_cosim.cosim.control.python_law import (
@@ -23,7 +23,7 @@ from hexapod_cosim.cosim.control.trial import refuse_crashing
 from hexapod_cosim.cosim.interface.controller_interface import ControllerSetup
 from hexapod_cosim.cosim.interface.descriptions import open_description
 from hexapod_cosim.cosim.master.connection import Connection, connect, names_of_map, read_map
-from hexapod_cosim.cosim.master.protocols import FmuVariable
+from hexapod_cosim.cosim.master.fmu import FmuVariable
 from hexapod_cosim.cosim.scenario.controls import (
     FMU,
     MAP,
@@ -36,88 +36,46 @@ from hexapod_cosim.cosim.scenario.records import Scenario
 from hexapod_cosim.models import FmuError, HexapodError, nearest_name
 
 
-class RunController(Protocol):
-    """Interface of a controller that a run needs."""
-
-    @property
-    def warnings(self) -> Sequence[str]:
-        """The controller's warnings, which the report shows."""
-
-    def start(self, t: float, stop: float, command: BodyCommand, measured: Measurement) -> None:
-        """Starts the controller at t [s] with the first measurement."""
-
-    def step(self, t: float, command: BodyCommand, measurement: Measurement) -> JointCommand:
-        """Returns the joint commands that hold from t [s] for one macro-step."""
-
-
-class ControlPlan(Protocol):
-    """The parts of a run's plan that a controller is made from."""
-
-    @property
-    def scenario(self) -> Scenario:
-        """The scenario, with the parameters of [control]."""
-
-    @property
-    def controller(self) -> ControllerSetup:
-        """Robot, gait, period, gains and parts."""
-
-
-class BuiltIn:
-    """The built-in controller of a set-up."""
-
-    def __init__(self, setup: ControllerSetup) -> None:
-        self._law = setup.build()
-        self.diagnostics = self._law.diagnostics
-        self.step = self._law.step
-
-    @property
-    def warnings(self) -> Sequence[str]:
-        """The warnings about its gains, which the report shows."""
-        return self._law.warnings
-
-    def start(self, t: float, stop: float, command: BodyCommand, measured: Measurement) -> None:
-        """Does nothing: the controller starts with its first step."""
-
-
 @contextmanager
 def make_controller(
-    plan: ControlPlan, control: Control | None = None, *, law: Any = None
-) -> Iterator[RunController]:
+    scenario: Scenario, setup: ControllerSetup, *, law: Any = None
+) -> Iterator[Controller | PythonLaw | FmuLaw]:
     """Makes the controller of a run and frees it at the end of the block.
 
+    All have the method `step` and `warnings`; a controller FMU is to be started before.
+
     Args:
-        plan: the run's plan.
-        control: the control; by default the scenario's.
+        scenario: of the run.
+        setup: robot, gait, period, gains and parts.
         law: an object with the method `step`, or a class of such objects, which replaces the
-            control.
+            scenario's control.
 
     Raises:
         ControllerError: the user's class cannot be made.
         FmuError: the FMU cannot be opened or connected.
     """
-    chosen = control or control_of(plan.scenario.control)
-    setup = plan.controller
+    chosen = control_of(scenario.control)
     if law is not None:
-        yield _given_law(law, setup, plan.scenario)
+        yield _given_law(law, setup, scenario)
     elif chosen.kind == PYTHON and chosen.path is not None:
-        yield _python_law(chosen, chosen.path, setup, plan.scenario)
+        yield _python_law(chosen, chosen.path, setup, scenario)
     elif chosen.kind == FMU and chosen.path is not None:
         fmu = open_controller_fmu(chosen.path)
         try:
-            fmu.set_parameters(fmu_parameters_of(chosen, fmu.described, plan.scenario))
-            connection = connection_of(chosen, fmu.described, plan.scenario, setup)
+            fmu.set_parameters(fmu_parameters_of(chosen, fmu.described, scenario))
+            connection = connection_of(chosen, fmu.described, scenario, setup)
             yield FmuLaw(fmu, connection, period=setup.period)
         finally:
             fmu.close()
     elif chosen.is_builtin:
-        yield BuiltIn(setup)
+        yield setup.build()
     else:
         raise ControllerError(
             "the controller was an object of a Python program",
             got=chosen.text,
             expected="law.py:Class or controller.fmu",
             fix="name the file of its class with --control",
-            where=plan.scenario.where,
+            where=scenario.where,
         )
 
 

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import chdir, suppress
 from functools import partial
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from fmpy import platform_tuple
@@ -18,8 +18,7 @@ from hexapod_cosim.cosim.common.archives import unpack
 from hexapod_cosim.cosim.common.binaries import refuse_incomplete
 from hexapod_cosim.cosim.common.temporary import TemporaryFolder
 from hexapod_cosim.cosim.interface.descriptions import open_description
-from hexapod_cosim.cosim.master.fmu import Fmu, StepError
-from hexapod_cosim.cosim.master.protocols import Block, FmuVariable
+from hexapod_cosim.cosim.master.fmu import Fmu, FmuVariable, StepError
 from hexapod_cosim.models import FmuError
 from hexapod_cosim.models.errors import nearest_name
 
@@ -27,32 +26,7 @@ REAL3, FLAG3 = ("Float64", "Float32"), "Boolean"
 INTEGERS3 = ("Int64", "Int32", "Int16", "Int8", "UInt64", "UInt32", "UInt16", "UInt8")
 
 
-class ControllerFmu(Protocol):
-    """An instance of a controller FMU."""
-
-    path: Path
-
-    @property
-    def described(self) -> list[FmuVariable]:
-        """The variables of the FMU, of all causalities."""
-
-    def block(self, names: Sequence[str]) -> Block:
-        """Returns a block of variables of one type, whose elements stand one after the other."""
-
-    def set_parameters(self, values: Mapping[str, Any]) -> None:
-        """Sets parameters by name, before `initialise`. Raises FmuError."""
-
-    def initialise(self, start: float, stop: float, begin: Callable[[], None]) -> None:
-        """Initialises the FMU; calls `begin`, which sets its inputs, in initialisation mode."""
-
-    def step(self, t: float, h: float) -> None:
-        """Steps from t to t + h [s]. Raises FmuError."""
-
-    def close(self) -> None:
-        """Terminates and frees the instance; may be called twice."""
-
-
-def open_controller_fmu(path: Path) -> ControllerFmu:
+def open_controller_fmu(path: Path) -> Fmu | ControllerFmu3:
     """Opens a controller FMU of FMI 2.0 or 3.0 for co-simulation. Raises FmuError."""
     description = open_description(path)
     if description.coSimulation is None or description.fmiVersion not in ("2.0", "3.0"):

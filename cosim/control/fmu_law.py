@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hexapod_cosim.controller import BodyCommand, Diagnostics, JointCommand, Measurement
-from hexapod_cosim.cosim.control.fmu_instance import ControllerFmu
+from hexapod_cosim.cosim.control.fmu_instance import Block3, ControllerFmu3
 from hexapod_cosim.cosim.master.connection import (
     DIAGNOSED,
     DIAGNOSED_FLAGS,
@@ -25,7 +25,7 @@ from hexapod_cosim.cosim.master.connection import (
     Pairs,
     connect,
 )
-from hexapod_cosim.cosim.master.protocols import Block
+from hexapod_cosim.cosim.master.fmu import Fmu, FmuBlock
 from hexapod_cosim.models import JOINT_NAMES, LEG_NAMES, FmuError
 
 LEGS, JOINTS = len(LEG_NAMES), len(JOINT_NAMES)
@@ -35,7 +35,7 @@ REFERENCES = 4  # angle, speed, torque, acceleration
 class FmuLaw:
     """Steps a controller FMU through its connection; `period` [s] is the length of its steps."""
 
-    def __init__(self, fmu: ControllerFmu, connection: Connection, *, period: float) -> None:
+    def __init__(self, fmu: Fmu | ControllerFmu3, connection: Connection, *, period: float) -> None:
         self._fmu, self._period = fmu, period
         self._inputs = [
             _Wire(fmu, pairs, SOURCES)
@@ -109,7 +109,7 @@ class FmuLaw:
             wire.write_from(row)
 
 
-def law_of_ours(fmu: ControllerFmu, *, period: float) -> FmuLaw:
+def law_of_ours(fmu: Fmu | ControllerFmu3, *, period: float) -> FmuLaw:
     """Returns the driver of a controller FMU whose variables have our names."""
     connection = connect(fmu.described, {}, torque=False, where=str(fmu.path))
     return FmuLaw(fmu, connection, period=period)
@@ -118,9 +118,9 @@ def law_of_ours(fmu: ControllerFmu, *, period: float) -> FmuLaw:
 class _Wire:
     """Copies the elements of connected variables between a block and a row of our names."""
 
-    def __init__(self, fmu: ControllerFmu, pairs: Pairs, ours: list[str]) -> None:
+    def __init__(self, fmu: Fmu | ControllerFmu3, pairs: Pairs, ours: list[str]) -> None:
         index = {name: k for k, name in enumerate(ours)}
-        self._block: Block = fmu.block([name for name, _ in pairs])
+        self._block: FmuBlock | Block3 = fmu.block([name for name, _ in pairs])
         self._places = np.array([index[name] for _, names in pairs for name in names], dtype=int)
 
     def read_into(self, row: NDArray[np.float64]) -> None:

@@ -154,9 +154,6 @@ class PythonLaw:
         found = getattr(self._law, "warnings", ())
         return tuple(map(str, found)) if isinstance(found, list | tuple) else ()
 
-    def start(self, t: float, stop: float, command: BodyCommand, measured: Measurement) -> None:
-        """Does nothing: a Python controller starts with its first step."""
-
     def step(self, t: float, command: BodyCommand, measurement: Measurement) -> JointCommand:
         """Returns the checked joint commands of the user's controller. Raises ControllerError."""
         with users_errors(self._path):

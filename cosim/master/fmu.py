@@ -1,7 +1,4 @@
-"""Opens a co-simulation FMU through fmpy and reads and writes its variables in blocks.
-
-The master itself only needs the smaller interface in protocols.py.
-"""
+"""Opens a co-simulation FMU through fmpy and reads and writes its variables in blocks."""
 
 from __future__ import annotations
 
@@ -10,6 +7,7 @@ import hashlib
 import math
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import chdir, suppress
+from dataclasses import dataclass
 from functools import cached_property, partial
 from pathlib import Path
 from typing import Any
@@ -24,9 +22,7 @@ from hexapod_cosim.cosim.common.closing import Closing
 from hexapod_cosim.cosim.common.plant_files import packed_binary
 from hexapod_cosim.cosim.common.temporary import TemporaryFolder
 from hexapod_cosim.cosim.interface.descriptions import read_description
-from hexapod_cosim.cosim.interface.variants import listed_items
 from hexapod_cosim.cosim.master.fmu_log import STATUS, WARNING, FmuLog
-from hexapod_cosim.cosim.master.protocols import FmuVariable
 from hexapod_cosim.models.errors import FmuError, nearest_name, unknown_name
 
 LAST_SUCCESSFUL_TIME = 2  # fmi2StatusKind
@@ -47,6 +43,17 @@ class StepError(FmuError):
     def __init__(self, what: str, *, reached: float, **facts: Any) -> None:
         super().__init__(what, **facts)
         self.reached = reached
+
+
+@dataclass(frozen=True)
+class FmuVariable:
+    """A variable of an FMU."""
+
+    name: str
+    causality: str
+    real: bool  # whether it is a floating-point variable
+    flag: bool  # whether it is a Boolean variable
+    size: int  # number of elements; 1 for a scalar
 
 
 class FmuBlock:
@@ -84,10 +91,7 @@ class FmuBlock:
 
     def get(self) -> None:
         """Reads all values from the FMU. Raises FmuError."""
-        self._fmu.clear_log()
-        status = self._get()
-        if status > WARNING:
-            raise self._fmu.failure("the FMU does not give its outputs", status)
+        self._call(self._get, "the FMU does not give its outputs")
 
     def try_set(self) -> int:
         """Writes all values to the FMU and returns the FMI status."""
@@ -96,15 +100,13 @@ class FmuBlock:
 
     def set(self) -> None:
         """Writes all values to the FMU. Raises FmuError."""
+        self._call(self._set, "the FMU does not take its inputs")
+
+    def _call(self, call: Callable[[], int], what: str) -> None:
         self._fmu.clear_log()
-        status = self._set()
+        status = call()
         if status > WARNING:
-            raise self._fmu.failure("the FMU does not take its inputs", status)
-
-
-def _digest(content: bytes) -> str:
-    """Returns the SHA-256 of bytes, in hex."""
-    return hashlib.sha256(content).hexdigest()
+            raise self._fmu.failure(what, status)
 
 
 class Fmu(Closing):
@@ -218,8 +220,10 @@ class Fmu(Closing):
         folder = self._directory.path / "resources" / "terrain"
         if self._grids is None:
             present = [path for path in folder.glob("*.terrain") if path.stem.isdecimal()]
-            self._grids = {_digest(path.read_bytes()): int(path.stem) for path in present}
-        digest = _digest(content)
+            self._grids = {
+                hashlib.sha256(path.read_bytes()).hexdigest(): int(path.stem) for path in present
+            }
+        digest = hashlib.sha256(content).hexdigest()
         if digest not in self._grids:
             number = 1 + max(self._grids.values(), default=0)
             folder.mkdir(parents=True, exist_ok=True)
@@ -351,11 +355,6 @@ class Fmu(Closing):
             if value not in items:
                 raise unknown_name(f"choice for {name}", value, items, error=FmuError)
             return int(items[value])
-        if variable.type == "Integer" and isinstance(value, str):
-            items = listed_items(variable.description)
-            if value not in items:
-                raise unknown_name(f"choice for {name}", value, items, error=FmuError)
-            return items[value]
         if not isinstance(value, int | float):
             raise FmuError(
                 f"parameter {name} is refused",

@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 
 from hexapod_cosim.controller import BodyCommand, Diagnostics, JointCommand, Measurement
 from hexapod_cosim.cosim.interface.names import vector_names
+from hexapod_cosim.cosim.master.fmu import Fmu
 from hexapod_cosim.cosim.master.interrupts import Watch, interruptible, watched
-from hexapod_cosim.cosim.master.protocols import Plant
 from hexapod_cosim.cosim.master.recorder import Recorder, Recording, Rows
 from hexapod_cosim.cosim.master.signals import Signals
 from hexapod_cosim.cosim.scenario.schedule import Schedule
@@ -62,7 +62,7 @@ class Outcome:
 
 
 def run(
-    plant: Plant,
+    plant: Fmu,
     signals: Signals,
     controller: JointController,
     schedule: Schedule,
@@ -128,7 +128,7 @@ def _leg_vectors(quantity: str, size: int) -> tuple[str, ...]:
 
 
 def _loop(
-    plant: Plant,
+    plant: Fmu,
     signals: Signals,
     controller: JointController,
     schedule: Schedule,

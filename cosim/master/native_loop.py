@@ -114,9 +114,8 @@ class NativeMaster:
                 for pairs in (shown, marks)
             )
         self._inputs = sorted(connection.inputs, key=lambda pair: pair[1][0] not in COMMANDS)
-        driven = [pair for pair in connection.outputs if pair[1][0] in plant.variables]
-        inputs = [name for name in (*JOINT_COMMANDS, *ACCELERATION) if name in plant.variables]
-        given = _ours(driven)
+        driven, given = connection.outputs, _ours(connection.outputs)
+        inputs = (*JOINT_COMMANDS, *ACCELERATION)
         undriven = [name for name in inputs if name not in given]  # these stay 0
         self._drive = [*undriven, *given]
         insides = [f"controller.{name}" for name in (*_ours(shown), *_ours(marks))]

@@ -159,11 +159,9 @@ class Sensors:
         make = read_headers().structures["hxServos"]
         if faults is None:
             return make()
-        names = {key: joint_names(key) for key in ("angle", "speed", *REFERENCES)}
         where = {
-            key: self._keep([self._places[name] for name in own], np.uintp)
-            for key, own in names.items()
-            if own[0] in self._places
+            key: self._keep([self._places[name] for name in joint_names(key)], np.uintp)
+            for key in ("angle", "speed", *REFERENCES)
         }
         stuck_at = self._keep(np.full(LEGS * JOINTS, np.nan), np.float64)
         return make(

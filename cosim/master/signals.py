@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from hexapod_cosim.controller import BodyCommand, JointCommand, Measurement
 from hexapod_cosim.cosim.interface.names import AXES, JOINTS, LEGS, joint_names, vector_names
-from hexapod_cosim.cosim.master.protocols import Plant
+from hexapod_cosim.cosim.master.fmu import Fmu
 from hexapod_cosim.cosim.master.sensors import CONTACT, MEASURED, READINGS, Errors, Sensors
 from hexapod_cosim.models import FmuError
 
@@ -24,7 +24,7 @@ COMMANDED = {
     quantity: joint_names(quantity) for quantity in ("angle_ref", "speed_ref", "torque_ref")
 }
 JOINT_COMMANDS = [name for names in COMMANDED.values() for name in names]
-ACCELERATION = joint_names("acceleration_ref")  # FMUs of earlier versions lack these
+ACCELERATION = joint_names("acceleration_ref")
 PUSH = [*vector_names("torso.push_force"), *vector_names("torso.push_torque")]
 SHAPES = {"angle": (LEGS, JOINTS), "speed": (LEGS, JOINTS), "foot_force": (LEGS, len(AXES))}
 
@@ -39,14 +39,13 @@ class Signals:
     writes: force [N] and torque [N m] on the torso, world axes.
     """
 
-    def __init__(self, plant: Plant, *, errors: Errors | None = None) -> None:
+    def __init__(self, plant: Fmu, *, errors: Errors | None = None) -> None:
         outputs, inputs = plant.names("output"), plant.names("input")
         flags = plant.names("output", "Boolean")
         check_plant_variables(outputs, inputs, flags)
         output_names = _move_first(READINGS[: -len(CONTACT)], outputs)
         flag_names = _move_first(CONTACT, flags)
-        planned = ACCELERATION if set(ACCELERATION) <= set(inputs) else []
-        input_names = [*JOINT_COMMANDS, *PUSH, *planned]
+        input_names = [*JOINT_COMMANDS, *PUSH, *ACCELERATION]
         self.names = (*output_names, *flag_names, *input_names)
         self._row = np.zeros(len(self.names) + len(READINGS))
         output_row, self._flag_row, input_row, _ = np.split(
@@ -60,7 +59,7 @@ class Signals:
             input_row, np.cumsum([len(JOINT_COMMANDS), len(PUSH)])
         )
         self._angle_ref, self._speed_ref, self._torque_ref = commands.reshape(-1, LEGS, JOINTS)
-        self._acceleration_ref = accelerations.reshape(-1, LEGS, JOINTS)
+        self._acceleration_ref = accelerations.reshape(LEGS, JOINTS)
         places = {name: place for place, name in enumerate(self.names)}
         self._sensors = Sensors(errors or Errors(), places, first=len(self.names))
         self._moment = -1  # of the last reading
@@ -112,7 +111,9 @@ def check_plant_variables(
 ) -> None:
     """Raises FmuError when the plant lacks a variable that every hexapod FMU has."""
     have = {*outputs, *inputs, *flags}
-    missing = [name for name in (*READINGS, *JOINT_COMMANDS, *PUSH) if name not in have]
+    missing = [
+        name for name in (*READINGS, *JOINT_COMMANDS, *ACCELERATION, *PUSH) if name not in have
+    ]
     if missing:
         got = f"no {missing[0]}" + (
             f" and {len(missing) - 1} more missing" if len(missing) > 1 else ""

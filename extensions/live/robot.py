@@ -34,13 +34,9 @@ from hexapod_cosim.cosim.master.loop import JointController, macro_step
 from hexapod_cosim.cosim.master.sensors import errors_of
 from hexapod_cosim.cosim.master.signals import Signals
 from hexapod_cosim.cosim.results.window import robot_weight
+from hexapod_cosim.cosim.run.plan import RunPlan, make_plan
+from hexapod_cosim.cosim.run.plant import apply_settings, initialise_plant
 from hexapod_cosim.cosim.run.preparation import PlantFmus
-from hexapod_cosim.cosim.run.single_run import (
-    RunPlan,
-    apply_settings,
-    initialise_plant,
-    make_plan,
-)
 from hexapod_cosim.cosim.scenario.controls import control_of
 from hexapod_cosim.extensions.live.gait_change import GaitChange, plan_change
 from hexapod_cosim.extensions.live.messages import Change
@@ -243,8 +239,11 @@ class LiveRobot(Closing):
         self._law.close()
         if _is_built_in(self.plan.scenario.control):
             return self._start_built_in()
-        controller = self._law.enter_context(make_controller(self.plan))
-        controller.start(self.time, HORIZON, BodyCommand(), self.signals.measurement)
+        controller = self._law.enter_context(
+            make_controller(self.plan.scenario, self.plan.controller)
+        )
+        if isinstance(controller, FmuLaw):
+            controller.start(self.time, HORIZON, BodyCommand(), self.signals.measurement)
         return controller
 
     def _start_built_in(self) -> FmuLaw:

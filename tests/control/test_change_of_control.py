@@ -111,23 +111,6 @@ def test_a_control_that_is_changed_before_the_start_is_that_control(
             )
 
 
-@pytest.mark.parametrize("pair", list(permutations(CONTROLS, 2)), ids="-".join)
-def test_a_change_before_the_first_tick_keeps_the_time(
-    controller_core: ct.CDLL, pair: tuple[str, str]
-) -> None:
-    """The first tick is due at 0 s; a step that is shorter than 0.01 periods leaves it open."""
-    first, then = pair
-    native, other = native_of(controller_core, first), native_of(controller_core, then)
-    native.go(2e-5)
-    other.go(2e-5)
-    native.change_control(then)
-    assert native.time == 2e-5
-    assert native.save() == other.save()
-    for controller in (native, other):
-        controller.go(300 * STEP)
-    assert native.save() == other.save()
-
-
 def test_the_phase_and_the_command_go_on_when_the_control_changes() -> None:
     """Kinematic control and paper control without forces plan the same feet."""
     lead, other = setup_of("kinematic").build(), setup_of("kinematic").build()

@@ -102,20 +102,8 @@ def test_a_scenario_gives_the_control_as_a_text_or_as_a_table_with_parameters() 
     assert (again.control, again.control_settings) == (full.control, full.control_settings)
 
 
-def test_settings_reach_the_table_of_the_control() -> None:
-    plan = load_scenario("walk_flat", overrides=["control=compliant", "control.lift=0.2"])
-    assert (plan.control, plan.control_settings) == ("compliant", {"lift": 0.2})
-    plan = load_scenario("walk_flat", overrides=["control.lift=0.2", "control=/x/law.py:Cpg"])
-    assert (plan.control, plan.control_settings) == ("/x/law.py:Cpg", {"lift": 0.2})
-
-
 def test_a_relative_path_in_a_scenario_file_starts_at_the_file(tmp_path: Path) -> None:
     (tmp_path / "law.py").write_text("class Cpg: ...\n")
     (tmp_path / "walk.toml").write_text('control = "x=law.py:Cpg@chosen"\n')
     plan = load_scenario(tmp_path / "walk.toml")
     assert plan.control == f"x={tmp_path / 'law.py'}:Cpg@chosen"
-
-
-def test_a_control_that_is_no_text_is_refused() -> None:
-    with pytest.raises(ScenarioError, match="a text in quotes"):
-        scenario_from_table({"control": {"law": 3}}, where="test")

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import hexapod_cosim
-from hexapod_cosim.controller import BodyCommand, ControllerError, JointCommand, Measurement
+from hexapod_cosim.controller import BodyCommand, JointCommand, Measurement
 from hexapod_cosim.cosim.results.metrics import METRICS
 from hexapod_cosim.cosim.results.result import Result
 from hexapod_cosim.models import HexapodError, Robot
@@ -79,11 +79,6 @@ def test_a_controller_that_raises_ends_the_run_with_what_was_recorded() -> None:
     assert f"{Path(__file__).resolve()}, line 37, in step: RuntimeError: no idea" in (
         result.outcome.reason
     )
-
-
-def test_an_object_without_step_is_refused() -> None:
-    with pytest.raises(ControllerError, match="not a controller: got 'dict'"):
-        hexapod_cosim.simulate("walk_flat", {}, settings=SHORT)
 
 
 @pytest.fixture(scope="module")

@@ -46,18 +46,6 @@ def test_the_class_gets_what_it_asks_for_by_name(tmp_path: Path) -> None:
     assert law.got == ("the gait", 0.3, 0.005, 2.0)
 
 
-def test_a_class_that_takes_any_name_gets_all_parameters(tmp_path: Path) -> None:
-    law = made(
-        tmp_path,
-        "class Law:\n"
-        "    def __init__(self, robot, **rest):\n"
-        "        self.got = robot, rest\n"
-        "    def step(self, t, command, measurement): ...\n",
-        {"lift": 0.3},
-    )
-    assert law.got == ("the robot", {"lift": 0.3})
-
-
 def test_a_missing_parameter_is_named(tmp_path: Path) -> None:
     with pytest.raises(ControllerError, match=r"got 'amplitude'.*--set control.amplitude=VALUE"):
         made(tmp_path, "class Law:\n    def __init__(self, amplitude): ...\n")
@@ -90,18 +78,6 @@ def test_an_exception_is_told_in_one_line_with_the_users_line(
         made(tmp_path, text)
     assert str(caught.value).startswith(f"{tmp_path / 'law.py'}, {message}")
     assert "\n" not in str(caught.value)
-
-
-def test_an_exception_below_the_users_file_is_told_with_the_users_line(tmp_path: Path) -> None:
-    path = written(
-        tmp_path,
-        "import numpy as np\n"
-        "class Law:\n"
-        "    def step(self, t, command, measurement):\n"
-        "        return np.linalg.inv(np.zeros((2, 2)))\n",
-    )
-    with pytest.raises(ControllerError, match=r"law.py, line 4, in step: LinAlgError: Singular"):
-        stepped(load_class(path, "Law")(), path)
 
 
 def test_joint_angles_alone_are_a_command() -> None:

@@ -11,7 +11,8 @@ from gains import make_gains
 
 from hexapod_cosim.cosim.results.gait_choice import gait_differences
 from hexapod_cosim.cosim.run.chosen_walk import ChosenWalk, choose_walk
-from hexapod_cosim.cosim.run.single_run import make_plan, simulate
+from hexapod_cosim.cosim.run.plan import make_plan
+from hexapod_cosim.cosim.run.single_run import simulate
 from hexapod_cosim.cosim.run.walker import Walker
 from hexapod_cosim.cosim.scenario.records import Scenario
 from hexapod_cosim.cosim.scenario.scenario import scenario_from_table

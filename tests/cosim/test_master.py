@@ -30,7 +30,8 @@ from hexapod_cosim.cosim.results.recordings import read_csv, write_csv
 from hexapod_cosim.cosim.results.result import Result
 from hexapod_cosim.cosim.results.warnings import locomotion_of
 from hexapod_cosim.cosim.results.window import View
-from hexapod_cosim.cosim.run.single_run import apply_settings, simulate
+from hexapod_cosim.cosim.run.plant import apply_settings
+from hexapod_cosim.cosim.run.single_run import simulate
 from hexapod_cosim.cosim.scenario.records import Push, Scenario
 from hexapod_cosim.cosim.scenario.scenario import load_scenario, scenario_robot
 from hexapod_cosim.cosim.scenario.schedule import make_schedule, push_rows
@@ -282,20 +283,6 @@ def test_force_noise_is_seeded_unbiased_and_of_the_size_asked_for() -> None:
 def test_a_plant_that_lacks_a_variable_is_refused_by_its_name() -> None:
     with pytest.raises(FmuError, match=r"not a hexapod plant: got 'no LM.femur.angle_ref'"):
         Signals(FakePlant(missing=["LM.femur.angle_ref"]))
-
-
-def test_a_plant_made_before_acceleration_ref_is_driven_without_it() -> None:
-    old = FakePlant(missing=joint_names("acceleration_ref"))
-    signals = Signals(old)
-    assert not [name for name in signals.names if name.endswith(".acceleration_ref")]
-    signals.push[:] = np.arange(6.0)
-    signals.write(
-        JointCommand(angle_ref=np.full((6, 3), 0.5), acceleration_ref=np.full((6, 3), 7.0))
-    )
-    assert (old.values["RR.tibia.angle_ref"], old.values["torso.push_torque[3]"]) == (0.5, 5.0)
-    new = FakePlant()
-    Signals(new).write(JointCommand(acceleration_ref=np.full((6, 3), 7.0)))
-    assert new.values["RR.tibia.acceleration_ref"] == 7.0
 
 
 def test_a_recording_survives_its_csv_file_bit_for_bit(tmp_path: Path) -> None:

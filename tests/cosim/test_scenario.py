@@ -17,7 +17,7 @@ from hexapod_cosim.cosim.run.chosen_walk import known_robot
 from hexapod_cosim.cosim.scenario.bundled import list_scenarios
 from hexapod_cosim.cosim.scenario.records import MAX_STEPS, Variation
 from hexapod_cosim.cosim.scenario.scenario import load_scenario, scenario_from_table, scenario_robot
-from hexapod_cosim.models import HexapodError, RobotError, ScenarioError, load_robot
+from hexapod_cosim.models import RobotError, ScenarioError
 
 
 @pytest.mark.parametrize("name", list_scenarios())
@@ -37,33 +37,11 @@ def test_the_scenario_as_run_reads_back_as_the_same(name: str) -> None:
     )
 
 
-def test_the_default_scenario_is_the_papers_walk() -> None:
-    scenario = load_scenario("walk_flat")
-    assert (
-        scenario.robot,
-        scenario.control,
-        scenario.duration,
-        scenario.macro_step,
-        scenario.seed,
-    ) == (
-        "athena",
-        "kinematic",
-        10.0,
-        0.005,
-        0,
-    )
-    assert scenario.commands[0].vx == 0.08
-    assert scenario.settings["gait"] == {"name": "tripod"}
-    assert scenario.steps == 2000
-
-
 @pytest.mark.parametrize(
     ("setting", "value"),
     [
         ("macro_step=5 ms", 0.005),
-        ("macro_step=0.004", 0.004),
         ("duration=1 min", 60.0),
-        ("duration=2", 2.0),
         ("start=-3", -3.0),
     ],
 )
@@ -125,13 +103,6 @@ def test_gravity_is_a_number_a_vector_or_an_fmu_parameter_and_all_are_one_key(
     )
 
 
-def test_a_scenario_that_says_no_gravity_has_the_robots() -> None:
-    scenario = load_scenario("walk_flat")
-    assert scenario.gravity is None
-    assert scenario_robot(scenario).gravity == (0.0, 0.0, -9.81)
-    assert "gravity" not in scenario.to_table()
-
-
 @pytest.mark.parametrize(
     ("override", "message"),
     [
@@ -181,11 +152,6 @@ def test_gravity_that_does_not_press_the_robot_onto_the_ground_is_refused(overri
         scenario_robot(scenario)
 
 
-def test_static_friction_is_the_kinetic_one_unless_set() -> None:
-    robot = scenario_robot(load_scenario("walk_flat", overrides=["friction.mu=0.9"]))
-    assert (robot.friction.mu, robot.friction.mu_static) == (0.9, 0.0)
-
-
 def test_static_friction_is_refused_without_friction() -> None:
     scenario = load_scenario("walk_flat", overrides=["friction.law=none", "friction.mu_static=0.8"])
     message = (
@@ -197,12 +163,6 @@ def test_static_friction_is_refused_without_friction() -> None:
     # the kinetic one's
     same = load_scenario("walk_flat", overrides=["friction.law=none", "friction.mu_static=0.7"])
     assert scenario_robot(same).friction.mu_static == 0.7
-
-
-@pytest.mark.parametrize("law", ["tanh", "bristle", "lugre"])
-def test_every_law_with_friction_takes_a_static_coefficient(law: str) -> None:
-    sticks = load_scenario("walk_flat", overrides=[f"friction.law={law}", "friction.mu_static=0.8"])
-    assert scenario_robot(sticks).friction.mu_static == 0.8
 
 
 def test_a_first_command_later_than_the_start_is_preceded_by_standing() -> None:
@@ -265,13 +225,10 @@ def test_the_weight_of_the_squeeze_is_a_number_from_0_to_below_1() -> None:
 MISTAKES = {
     "duraton=3": ["--set", "'duraton'", "did you mean 'duration'"],
     "duration": ["'duration'", "expected NAME=VALUE"],
-    "duration=": ["expected NAME=VALUE"],
     "contact.stifness=1": ["walk_flat.toml", "contact", "'stifness'", "did you mean 'stiffness'"],
     "contact.law=herz": ["contact.law", "'herz'", "did you mean 'hertz'"],
-    "control=complaint": ["control", "'complaint'", "did you mean 'compliant'"],
     "macro_step=5 mm": ["macro_step", "'5 mm'", "a value in s or ms"],
     "macro_step=0": ["macro_step", "got 0", "> 0"],
-    "macro_step=-0.005": ["macro_step", "got -0.005", "> 0"],
     "macro_step=1": ["macro_step", "<= 0.1"],
     "macro_step=0.003": ["duration", "multiple of macro_step = 0.003", "9.999"],
     "duration=1e9": [
@@ -280,71 +237,41 @@ MISTAKES = {
         "at most 1000000 macro-steps, 5000 s",
         "lengthen macro_step",
     ],
-    "duration=1e308": ["too many macro-steps"],
     "outputs.interval=0.012": [
         "outputs.interval",
         "got 0.012",
         "multiple of macro_step = 0.005",
         "0.01 is the nearest",
     ],
-    "outputs.interval=0.001": [
-        "outputs.interval",
-        "multiple of macro_step = 0.005",
-        "0.005 is the nearest",
-    ],
     "outputs.interval=-0.01": ["outputs.interval", "got -0.01", ">= 0"],
-    "outputs.interval=often": ["outputs.interval", "'often'"],
-    "macro_step=1e-9": ["too many macro-steps", "0.001 s with macro_step = 1e-09 s"],
     "macro_step=5e-324": ["too many macro-steps"],
-    "fricton.mu=1": ["--set fricton.mu: ", "did you mean 'friction.mu'"],
-    "gat.period=1": ["--set gat.period: ", "did you mean 'gait.period'"],
     "torso.mas=1": ["--set torso.mas: ", "did you mean 'torso.mass'"],
     "torso.roll=1": ["--set torso.roll: ", "a parameter of the FMU; this is an output"],
-    "duration=-1": ["duration", "got -1"],
-    "duration=nan": ["duration", "got nan", "finite"],
     "duration=ten": ["duration", "'ten'", "number"],
     "seed=-1": ["seed", "got -1", "whole number"],
-    "seed=0.5": ["seed", "got 0.5", "whole number"],
-    "robot=3": ["robot", "got 3", "text"],
     "gait.stride=0.1": ["gait", "'stride'", "period"],
     "gait.duty=1": ["gait.duty", "got 1", "< 1"],
-    "command.vz=1": ["command", "'vz'", "vx"],
     "command=[{time=1},{time=0}]": ["command", "order", "time"],
     "command=3": ["command", "got 3", "table"],
-    "events={time=1}": ["events", "[[events]]"],
-    "events=[{time=1}]": ["events[0].duration", "missing key"],
     "events=[{time=1, duration=1, force=[1, 2]}]": ["events[0].force", "3 numbers"],
     "events=[{time=1, duration=1, force=['1 N', '2 Nm', 0]}]": [
         "events[0].force[1]",
         "'2 Nm'",
         "N",
     ],
-    "sensors.foot_force_noise=2": ["foot_force_noise", "got 2", "< 1"],
     "events=[{time=1, leg='LF'}]": ["events[0].fault", "missing key", "dead, stuck"],
-    "events=[{time=1, leg='LX', fault='dead'}]": ["events[0].leg", "'LX'", "LF, LM"],
     "events=[{time=1, leg='LF', fault='deaf'}]": ["events[0].fault", "did you mean 'dead'"],
-    "events=[{time=1, leg='LF', fault='dead', duration=0}]": ["events[0].duration", "> 0"],
     "events=[{time=1, leg='LF', fault='dead', force=[1,2,3]}]": ["events[0]", "'force'", "leg"],
-    "events=[{time=1, leg='LF', falt='dead'}]": ["events[0]", "did you mean 'fault'"],
-    "events=[3]": ["events[0]", "got 3", "table"],
     "sensors.foot_force_delay=-0.01": ["foot_force_delay", ">= 0"],
-    "sensors.foot_force_delay=10 mm": ["foot_force_delay", "'10 mm'", "ms"],
-    "compliance.paper_pd=false": ["compliance", "did you mean 'paper_pid'"],
     "compliance.paper_pid=0": ["compliance.paper_pid", "got 0", "true or false"],
     "complaince.paper_pid=false": [
         "--set complaince.paper_pid: ",
         "did you mean 'compliance.paper_pid'",
     ],
-    "compliance=3": ["compliance", "got 3", "table"],
     "variation.height=-1 mm": ["variation.height", ">= 0"],
-    "variation.hight=1 mm": ["variation", "did you mean 'height'"],
     "outputs.csv=torso": ["outputs.csv", "list"],
     "outputs.formats=['xlsx']": ["outputs.formats", "xlsx", "parquet, csv"],
-    "outputs.formats=csv": ["outputs.formats", "list"],
     "outputs.formats=[]": ["outputs.formats", "some of parquet, csv, mcap"],
-    "outputs.plots=1": ["outputs.plots", "true or false"],
-    "outputs.png=true": ["outputs", "'png'", "plots"],
-    "contact=3": ["contact", "got 3", "table"],
 }
 
 
@@ -362,19 +289,11 @@ def test_a_mistake_is_reported_with_what_was_got_and_what_is_allowed(setting: st
     ("text", "place"),
     [
         ("macro_step = 0", "macro_step"),
-        ("macro_step = '5 mm'", "macro_step"),
         ("duration = 1e9", "duration"),
-        ("duration = 0.0123", "duration"),
-        ("seed = -1", "seed"),
-        ("robot = 3", "robot"),
         ("command = {vx = 'a'}", "command.vx"),
-        ("command = {vx = '1 kg'}", "command.vx"),
-        ("events = 3", "events"),
         ("events = [{time = 1}]", "events[0].duration"),
         ("gait = {duty = 1}", "gait.duty"),
-        ("gait = {duti = 1}", "gait"),
         ("outputs = {plots = 1}", "outputs.plots"),
-        ("parameters = 3", "parameters"),
         ("parameters = {'fricton.mu' = 1}", "parameters"),
         ("parameters = {torso.mass = 1}", "parameters"),
     ],
@@ -430,45 +349,3 @@ def test_a_bad_file_is_reported_by_its_name(tmp_path: Path, text: str, message: 
     assert "mine.toml" in str(caught.value)
     with pytest.raises(ScenarioError, match="cannot read the scenario"):
         load_scenario(tmp_path / "missing.toml")
-
-
-def test_all_errors_share_the_one_base() -> None:
-    with pytest.raises(HexapodError):
-        load_scenario("walk_flat", overrides=["duration=0"])
-
-
-@pytest.mark.parametrize(
-    "table",
-    [
-        {"a": 1, "b": 0.1, "c": True, "d": 'say "ü"\n', "e": [1, 2.5, "x"], "f": []},
-        {
-            "plain": 1,
-            "table": {"inner": {"deep": -1e-300}},
-            "list": [{"a": 1}, {"a": 2, "b": {"c": [1]}}],
-        },
-        {"dotted.key": {"torso.com[1]": 0.5}, "spaced key": 1},
-        {"a": "delete \x7f", "b": "escape \x1b"},
-    ],
-)
-def test_toml_text_reads_back_as_the_table(table: dict[str, object]) -> None:
-    assert tomllib.loads(tomlkit.dumps(table)) == table
-
-
-def test_toml_text_has_each_value_on_one_line() -> None:
-    table = {"position": [0.1, -1e-300, 3.0], "inertia": (1.0, 2.0, 3.0, 0.0, 0.0, 1 / 3)}
-    assert tomlkit.dumps(table).splitlines() == [
-        "position = [0.1, -1e-300, 3.0]",
-        "inertia = [1.0, 2.0, 3.0, 0.0, 0.0, 0.3333333333333333]",
-    ]
-
-
-def test_a_title_with_a_control_character_is_stored_and_read_back() -> None:
-    scenario = load_scenario("walk_flat", overrides=["title=delete \x7f"])
-    table = tomllib.loads(tomlkit.dumps(scenario.to_table()))
-    assert scenario_from_table(table, where=scenario.where).title == "delete \x7f"
-
-
-def test_the_robots_gait_is_used_where_the_scenario_gives_none() -> None:
-    robot = load_robot("phantomx_mk4")
-    scenario = load_scenario("phantomx_walk")
-    assert make_gait(robot, **dict(scenario.settings.get("gait", {}))).period == robot.gait.period

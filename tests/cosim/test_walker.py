@@ -29,13 +29,9 @@ from hexapod_cosim.cosim.master.sensors import errors_of
 from hexapod_cosim.cosim.master.signals import Signals
 from hexapod_cosim.cosim.results.result import Result
 from hexapod_cosim.cosim.results.summary import REFUSED, Summary, summarise
-from hexapod_cosim.cosim.run.single_run import (
-    initialise_plant,
-    make_plan,
-    make_result,
-    open_plant,
-    simulate,
-)
+from hexapod_cosim.cosim.run.plan import make_plan
+from hexapod_cosim.cosim.run.plant import initialise_plant, open_plant
+from hexapod_cosim.cosim.run.single_run import make_result, simulate
 from hexapod_cosim.cosim.run.walker import Walker
 from hexapod_cosim.cosim.scenario.records import Command, Scenario
 from hexapod_cosim.cosim.scenario.scenario import load_scenario

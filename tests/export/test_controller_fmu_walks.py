@@ -19,7 +19,7 @@ from hexapod_cosim.cosim.master.loop import COMPLETED, JointController, run
 from hexapod_cosim.cosim.master.recorder import Recorder, Recording
 from hexapod_cosim.cosim.master.sensors import errors_of
 from hexapod_cosim.cosim.master.signals import COMMANDED, Signals
-from hexapod_cosim.cosim.run.single_run import open_plant
+from hexapod_cosim.cosim.run.plant import open_plant
 from hexapod_cosim.cosim.scenario.records import Scenario
 from hexapod_cosim.cosim.scenario.scenario import load_scenario
 from hexapod_cosim.cosim.scenario.schedule import make_schedule

@@ -15,8 +15,9 @@ from numpy.typing import NDArray
 from hexapod_cosim.controller import BodyCommand, make_gait
 from hexapod_cosim.cosim.interface.names import joint_names, vector_names
 from hexapod_cosim.cosim.master.fmu import Fmu
+from hexapod_cosim.cosim.run.plan import RunPlan
+from hexapod_cosim.cosim.run.plant import initialise_plant
 from hexapod_cosim.cosim.run.preparation import chosen_gains
-from hexapod_cosim.cosim.run.single_run import RunPlan, initialise_plant
 from hexapod_cosim.cosim.run.walker import Walker
 from hexapod_cosim.cosim.scenario.reach import check_commands
 from hexapod_cosim.cosim.scenario.records import Command

@@ -122,10 +122,3 @@ def test_the_controllers_arc_tangent_is_that_of_the_quadrant(controller_core: ct
     *_, found = transcendental(controller_core, x, y)
     np.testing.assert_allclose(found, np.arctan2(y, x), rtol=3 * ULP, atol=0.0)
     assert list(transcendental(controller_core, np.zeros(1), np.zeros(1))[5]) == [0.0]
-
-
-def test_what_is_no_number_has_no_sine_or_angle(controller_core: ct.CDLL) -> None:
-    x, y = np.array([math.nan, 1.0]), np.array([1.0, math.nan])
-    found = transcendental(controller_core, x, y)
-    assert all(np.isnan(values[0]) for values in found)
-    assert np.isnan(found[5][1])

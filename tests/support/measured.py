@@ -13,7 +13,8 @@ from hexapod_cosim.cosim.interface.names import foot_names, foot_vector_names, j
 from hexapod_cosim.cosim.master.recorder import Recording
 from hexapod_cosim.cosim.master.signals import COMMANDED
 from hexapod_cosim.cosim.results.window import JudgedWindow
-from hexapod_cosim.cosim.run.single_run import initialise_plant, make_plan, open_plant
+from hexapod_cosim.cosim.run.plan import make_plan
+from hexapod_cosim.cosim.run.plant import initialise_plant, open_plant
 from hexapod_cosim.cosim.scenario.records import Scenario
 from hexapod_cosim.models import Servo
 

@@ -67,7 +67,7 @@ static void break_one(const hxServos *servos, size_t i, int fault, double *row) 
   row[servos->angle_ref[i]] = stuck ? *stuck_at : angle;
   row[servos->speed_ref[i]] = stuck ? 0.0 : row[servos->speed[i]];
   row[servos->torque_ref[i]] = 0.0;
-  if (servos->acceleration_ref) row[servos->acceleration_ref[i]] = 0.0;
+  row[servos->acceleration_ref[i]] = 0.0;
 }
 
 void hx_servos_break(const hxServos *servos, size_t moment, double *row) {

@@ -54,8 +54,8 @@ typedef struct hxServos {
   const size_t *angle_ref; /* 1     [count] indices of the joint commands in the row */
   const size_t *speed_ref;
   const size_t *torque_ref;
-  const size_t *acceleration_ref; /* NULL: the plant has no such input */
-  double *stuck_at;               /* rad   [count] where a servo stuck; NaN: it does not */
+  const size_t *acceleration_ref;
+  double *stuck_at; /* rad   [count] where a servo stuck; NaN: it does not */
 } hxServos;
 
 /* Replaces the joint commands of servos with faults. */
