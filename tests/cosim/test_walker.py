@@ -13,7 +13,7 @@ from memory import resident
 
 from hexapod_cosim.controller import Gains
 from hexapod_cosim.cosim.control.fmu_law import law_of_ours
-from hexapod_cosim.cosim.export.plant_export import export_controller, export_fmu
+from hexapod_cosim.cosim.export.plant import export_controller, export_fmu
 from hexapod_cosim.cosim.master.fmu import Fmu
 from hexapod_cosim.cosim.master.loop import (
     COMPLETED,
@@ -33,8 +33,8 @@ from hexapod_cosim.cosim.run.plan import make_plan
 from hexapod_cosim.cosim.run.plant import initialise_plant, open_plant
 from hexapod_cosim.cosim.run.single_run import make_result, simulate
 from hexapod_cosim.cosim.run.walker import Walker
+from hexapod_cosim.cosim.scenario.reading import load_scenario
 from hexapod_cosim.cosim.scenario.records import Command, Scenario
-from hexapod_cosim.cosim.scenario.scenario import load_scenario
 from hexapod_cosim.cosim.scenario.variation import STANDARD
 from hexapod_cosim.models import FRICTION_LAWS, FmuError, load_robot
 
