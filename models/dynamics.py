@@ -216,22 +216,18 @@ def applied_forces(
     command: Command,
     damping: Array | Contacts,
     bristle: Array | None = None,
-    body_damping: Array | None = None,
     rotors: Rotors | None = None,
 ) -> Array:
     """Returns the forces g (19, 6) of eq. 1 without the joints' torques [N, N m].
 
     damping: of the feet on the ground below them (6,) [s/m], nan for open ones; or the state of all
-    contacts, which holds those of walls, materials and soil, too. bristle: deflections (6, 3) [m],
-    0 by default. body_damping: with an array of damping alone, that of torso, knees and shanks
-    [s/m], in the order of `body_spheres`; None: `standing_body_damping`. Legs that overlap then
-    touch as in `standing_pairs`. rotors: of elastic gears; None: rigid.
+    contacts, which has those of walls, materials and soil, too. With an array, parts of the body
+    in the ground and legs that overlap touch at impact speed 0. bristle: deflections (6, 3) [m], 0
+    by default. rotors: of elastic gears; None: rigid.
     """
     if not isinstance(damping, Contacts):
-        if body_damping is None:
-            body_damping = standing_body_damping(robot, body)
-        pairs = standing_pairs(robot, body)
-        damping = replace(contacts_of(robot, damping, body_damping), pairs=pairs)
+        closed = contacts_of(robot, damping, standing_body_damping(robot, body))
+        damping = replace(closed, pairs=standing_pairs(robot, body))
     g = np.zeros((BODIES, 6))
     g[:, 0:3] = masses(robot)[:, None] * np.array(robot.gravity)
     J, w = world_inertias(robot, body), body[:, 10:13]
@@ -285,12 +281,12 @@ def external_torques(
     alpha, beta = robot.baumgarte.alpha, robot.baumgarte.beta
     c = joints.gamma - 2.0 * alpha * joints.dphi - beta**2 * joints.phi
     torso = np.eye(6, 6 * BODIES)
-    held = np.vstack([torso, joints.D, joints.G])
+    fixed = np.vstack([torso, joints.D, joints.G])
     none, turns = np.zeros((6 + len(c), LEGS * JOINTS)), np.eye(LEGS * JOINTS)
-    motion = np.linalg.solve(held, np.vstack([none, turns]))  # of the links with each joint
+    motion = np.linalg.solve(fixed, np.vstack([none, turns]))  # of the links with each joint
     kinematic = robot.servo.mode == "kinematic"
     driven = drive_acceleration(robot, body, command).ravel() if kinematic else turns[0] * 0.0
-    bias = np.linalg.solve(held, np.concatenate([np.zeros(6), c, driven]))
+    bias = np.linalg.solve(fixed, np.concatenate([np.zeros(6), c, driven]))
     load = motion.T @ (forces - link_matrix(robot, body) @ bias)
     return load.reshape(LEGS, JOINTS) + stop_torques(robot, body)
 
@@ -381,17 +377,16 @@ def accelerations(
     command: Command,
     damping: Array | Contacts,
     bristle: Array | None = None,
-    body_damping: Array | None = None,
     rotors: Rotors | None = None,
 ) -> Accelerations:
     """Solves eq. 1 for bodies (19, 13), whose joints may have drifted.
 
-    damping, bristle and body_damping are those of `applied_forces`. In kinematic mode the
+    damping and bristle are those of `applied_forces`. In kinematic mode the
     multiplier of a joint's additional row is minus the motor's torque. rotors: those of elastic
     gears, whose accelerations are then part of the solution; None: rigid gears.
     """
     joints = constraints(robot, body)
-    forces = applied_forces(robot, body, command, damping, bristle, body_damping, rotors).ravel()
+    forces = applied_forces(robot, body, command, damping, bristle, rotors).ravel()
     load = gear_loads(robot, body, command, forces, joints)
     motor, gear = joint_torques(robot, body, command, load, rotors)
     if is_elastic(robot.servo):

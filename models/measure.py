@@ -129,11 +129,11 @@ def step_works(
         tibia = JOINTS * (leg + 1)
         friction -= float(impulses.moment[leg] @ (before + after)[tibia, 10:13]) / 2.0
     gear = -float(np.sum((impulses.gear + impulses.stop) * speed))
-    held = [
+    springs = [
         float(np.sum(stop_energy(robot.servo, joint_overruns(robot, body))))
         for body in (before, after)
     ]
-    return Works(impulses.motor * speed, contact, friction, gear - (held[1] - held[0]))
+    return Works(impulses.motor * speed, contact, friction, gear - (springs[1] - springs[0]))
 
 
 def cone_time(robot: Robot, before: Array, after: Array, h: float, impulses: Impulses) -> Array:

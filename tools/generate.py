@@ -51,16 +51,8 @@ STRUCTURES: dict[str, dict[str, str]] = {
     "plant": {
         **{"definition.leg.link": "hxLink", "definition.leg": "hxLeg"},
         **{"definition.soil": "hxSoilDefinition", "definition": "hxDefinition"},
-        **{"input": "hxInput", "indicator": "hxIndicators", "output": "hxOutput"},
+        "input": "hxInput",
     },
-}
-# fields that are no variables, by structure
-FURTHER = {
-    "hxOutput": (
-        *("  /* s */", "  double time;"),
-        "  /* m  of all contacts, < 0: clearance; -1 where the robot has none */",
-        "  hxIndicators depth;",
-    )
 }
 TYPES = {"Real": "HX_REAL", "Enumeration": "HX_INTEGER", "Boolean": "HX_BOOLEAN"}
 
@@ -167,7 +159,7 @@ def render_settings(interface: Interface) -> str:
     fields = _field_tree(interface)
     for path, name in names.items():
         lines += [f"typedef struct {name} {{", *_render_fields(fields, path, names)]
-        lines += [*FURTHER.get(name, ()), f"}} {name};", ""]
+        lines += [f"}} {name};", ""]
     return "\n".join([*lines, "#endif", ""])
 
 
@@ -183,7 +175,7 @@ class Field:
 def _field_tree(interface: Interface) -> dict[str, Field]:
     """Returns the fields of definition, input and output by their paths without indices."""
     found: dict[str, Field] = {}
-    for variable in interface.of_causality("parameter", "input", "output", "local"):
+    for variable in interface.of_causality("parameter", "input", "output"):
         path = ""
         for part in variable.field.split("."):
             name, *indices = re.findall(r"\w+", part)

@@ -30,13 +30,6 @@ Platforms = Annotated[
         "Default: this machine's installed one.",
     ),
 ]
-Integers = Annotated[
-    bool,
-    typer.Option(
-        "--integers",
-        help="Offer integers instead of enumerations, for importers that have none.",
-    ),
-]
 Urdf = Annotated[
     bool, typer.Option("--urdf", help="Write the robot as a URDF instead; so does -o FILE.urdf.")
 ]
@@ -104,7 +97,6 @@ def export(
     robot: RobotName = "athena",
     fmi: FmiVersion = 2,
     platforms: Platforms = None,
-    integers: Integers = False,
     urdf: Urdf = False,
     mjcf: Mjcf = False,
     ssp: Ssp = False,
@@ -128,7 +120,6 @@ def export(
         robot=robot,
         fmi=fmi,
         platforms=None if platforms is None else [name.strip() for name in platforms.split(",")],
-        integers=integers,
         urdf=urdf,
         mjcf=mjcf,
         ssp=ssp,

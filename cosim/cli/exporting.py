@@ -13,13 +13,8 @@ from hexapod_cosim.cosim.cli.running import given_gains
 from hexapod_cosim.cosim.cli.terminal import refuse_unused, show_files, show_json, waiting, warn
 from hexapod_cosim.cosim.cli.terrains import surfaces_from
 from hexapod_cosim.cosim.export.plant_export import export_controller, export_fmu
-from hexapod_cosim.cosim.export.robot_files import (
-    Format,
-    chosen_format,
-    export_description,
-    left_out,
-)
-from hexapod_cosim.cosim.export.robot_package import chosen_package, export_package, read_values
+from hexapod_cosim.cosim.export.robot_files import FORMATS, Format, export_description, left_out
+from hexapod_cosim.cosim.export.robot_package import export_package, read_values
 from hexapod_cosim.cosim.interface.controller_interface import ControllerSetup
 from hexapod_cosim.cosim.run.chosen_walk import chosen_walk
 from hexapod_cosim.cosim.run.controller_setup import make_setup
@@ -27,18 +22,19 @@ from hexapod_cosim.cosim.scenario.records import CHOSEN, OWN
 from hexapod_cosim.models import HexapodError, Robot, load_robot, unknown_name
 
 DEFAULT_CONTROL = "compliant"  # of a package
+SUFFIXES = {**{name: form.suffix for name, form in FORMATS.items()}, "ssp": ".ssp"}
 CONTROLLER_OPTIONS = ("gait", "gains", "period")
 DESCRIPTION, PLANT_FMU = "a robot's description", "the plant's FMU"
 CONTROLLER_FMU, PACKAGE = "a controller's FMU", "a package"
 # options without effect, by what is written
 UNUSED_OPTIONS = {
     DESCRIPTION: (
-        *("fmi", "platforms", "integers", "terrain", "stance", "controller"),
+        *("fmi", "platforms", "terrain", "stance", "controller"),
         *CONTROLLER_OPTIONS,
     ),
     PLANT_FMU: CONTROLLER_OPTIONS,
     CONTROLLER_FMU: ("terrain",),
-    PACKAGE: ("terrain", "integers"),
+    PACKAGE: ("terrain",),
 }
 
 
@@ -51,7 +47,6 @@ class Request:
     robot: str
     fmi: int
     platforms: list[str] | None
-    integers: bool
     urdf: bool
     mjcf: bool
     ssp: bool
@@ -66,22 +61,23 @@ class Request:
 
 def write_export(request: Request, *, as_json: bool) -> None:
     """Writes what was asked for and prints its path. Raises HexapodError."""
-    robot = load_robot(request.robot)
-    form = chosen_format(request.output, urdf=request.urdf, mjcf=request.mjcf)
-    package = chosen_package(
-        request.output, wanted=request.ssp, described=form is not None, values=request.values
-    )
-    control = DEFAULT_CONTROL if package and request.controller is None else request.controller
-    _refuse_unused_options(request.context, _written(form, package=package, control=control))
+    robot, kind, control = load_robot(request.robot), _chosen_kind(request), request.controller
+    if kind == "ssp":
+        control, written = control or DEFAULT_CONTROL, PACKAGE
+    elif kind == "fmu":
+        written = PLANT_FMU if control is None else CONTROLLER_FMU
+    else:
+        written = DESCRIPTION
+    _refuse_unused_options(request.context, written)
     robot, gait = _in_stance(robot, request.stance)
-    if form is not None:
-        path = _export_description(robot, request.output, form)
+    if kind in FORMATS:
+        path = _export_description(robot, request.output, FORMATS[kind])
     elif control is None:
         path = _export_plant(robot, request)
     else:
         setup = _controller_setup(robot, request, control, gait)
-        path = _export_package(setup, request) if package else _export_controller(setup, request)
-    kind = form.name if form is not None else "ssp" if package else "fmu"
+        export = _export_package if kind == "ssp" else _export_controller
+        path = export(setup, request)
     if as_json:
         show_json({kind: str(path), "robot": robot.name, "hash": robot.hash})
         return
@@ -91,13 +87,27 @@ def write_export(request: Request, *, as_json: bool) -> None:
             print(text)
 
 
-def _written(form: Format | None, *, package: bool, control: str | None) -> str:
-    """Returns what is written, a key of UNUSED_OPTIONS."""
-    if form is not None:
-        return DESCRIPTION
-    if package:
-        return PACKAGE
-    return PLANT_FMU if control is None else CONTROLLER_FMU
+def _chosen_kind(request: Request) -> str:
+    """Returns urdf, mjcf, ssp or fmu, by option or else by the file's suffix.
+
+    Raises HexapodError for two options, and for values of anything but a package.
+    """
+    wanted = [kind for kind in SUFFIXES if getattr(request, kind)]
+    if len(wanted) > 1:
+        raise HexapodError(
+            "two formats at once",
+            got=" ".join(f"--{kind}" for kind in wanted),
+            expected="one of them",
+            fix="run the command twice",
+        )
+    suffix = request.output.suffix if request.output is not None else ""
+    named = [kind for kind, own in SUFFIXES.items() if own == suffix]
+    kind = [*wanted, *named, "fmu"][0]
+    if request.values and kind != "ssp":
+        fix = "add --ssp; a robot's own values belong into its file"
+        got = request.values[0]
+        raise HexapodError("--set without a package", got=got, expected="--ssp", fix=fix)
+    return kind
 
 
 def _refuse_unused_options(context: typer.Context, written: str) -> None:
@@ -143,7 +153,6 @@ def _export_plant(robot: Robot, request: Request) -> Path:
             fmi=request.fmi,
             platforms=request.platforms,
             terrains=surfaces_from(request.terrains),
-            integers=request.integers,
         )
 
 
@@ -155,7 +164,6 @@ def _export_controller(setup: ControllerSetup, request: Request) -> Path:
             _path(request.output, f"{setup.robot.name}_controller", ".fmu"),
             fmi=request.fmi,
             platforms=request.platforms,
-            integers=request.integers,
         )
 
 

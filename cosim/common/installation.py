@@ -21,7 +21,7 @@ def install_extra(extra: str) -> str:
 
 
 def has_pyarrow() -> bool:
-    """Tells whether Parquet files can be written and read."""
+    """Returns whether Parquet files can be written and read."""
     return find_spec("pyarrow") is not None
 
 

@@ -82,9 +82,9 @@ def settle(
         bench.step(k - 1)
         if k < first or k % LOOKED:
             continue
-        way, touching = bench.motion().less(motion), bench.force()[2::3] > 0.0
-        if (touching != standing).any():
-            got = f"{_names(touching) or 'no foot'} on the ground"
+        way, in_contact = bench.motion().less(motion), bench.force()[2::3] > 0.0
+        if (in_contact != standing).any():
+            got = f"{_names(in_contact) or 'no foot'} on the ground"
             raise _not_standing(robot, got=got, expected=f"rest on {_names(standing)}", fix=STIFFEN)
         line = float(np.abs(way[POSES : POSES + 3]).max())  # m/s
         turn = float(np.abs(way[POSES + 3 :]).max())  # rad/s

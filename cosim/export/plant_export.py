@@ -39,7 +39,7 @@ from hexapod_cosim.cosim.interface.controller_interface import (
 from hexapod_cosim.cosim.interface.model_description import render_fmi2
 from hexapod_cosim.cosim.interface.model_description3 import render_build_description, render_fmi3
 from hexapod_cosim.cosim.interface.plant_interface import Interface, load_interface
-from hexapod_cosim.cosim.interface.variants import for_binaries, with_integers
+from hexapod_cosim.cosim.interface.variants import for_binaries
 from hexapod_cosim.models.errors import FmuError
 from hexapod_cosim.models.ground.faces import surface_of
 from hexapod_cosim.models.ground.grid_file import grid_bytes
@@ -60,7 +60,6 @@ def export_fmu(
     fmi: int = 2,
     platforms: Iterable[str] | None = None,
     terrains: Sequence[Surface] = (),
-    integers: bool = False,
     starts: Mapping[str, float] = MappingProxyType({}),
     bare: bool = False,
 ) -> Path:
@@ -74,7 +73,6 @@ def export_fmu(
             binary. By default the installed binary of this machine.
         terrains: surfaces to pack as grid files, numbered from 1; after the robot's own, if it
             stands on one. If it does not, the FMU starts on the first of them.
-        integers: offer Integers instead of enumerations, for importers without enumerations.
         starts: of inputs and parameters by name, instead of the robot's.
         bare: write only what a simulation reads: model description, start values, binary and
             grids, without compression. Such a file is made in a tenth of the time, for use by this
@@ -96,7 +94,6 @@ def export_fmu(
         fmi=fmi,
         platforms=platforms,
         grids=grid_members(grids),
-        integers=integers,
         bare=bare,
     )
 
@@ -107,7 +104,6 @@ def export_controller(
     *,
     fmi: int = 2,
     platforms: Iterable[str] | None = None,
-    integers: bool = False,
     starts: Mapping[str, float] = MappingProxyType({}),
     bare: bool = False,
 ) -> Path:
@@ -116,9 +112,7 @@ def export_controller(
     Arguments and errors are those of `export_fmu`; also raises the errors of `Controller`.
     """
     interface = with_starts(load_controller_interface(setup), starts)
-    return export_interface(
-        interface, path, fmi=fmi, platforms=platforms, integers=integers, bare=bare
-    )
+    return export_interface(interface, path, fmi=fmi, platforms=platforms, bare=bare)
 
 
 def grid_members(surfaces: Iterable[Surface]) -> dict[str, bytes]:
@@ -136,7 +130,6 @@ def export_interface(
     fmi: int = 2,
     platforms: Iterable[str] | None = None,
     grids: Mapping[str, bytes] = NOTHING,
-    integers: bool = False,
     bare: bool = False,
 ) -> Path:
     """Writes the FMU of a component with this interface; arguments and errors as `export_fmu`.
@@ -154,7 +147,7 @@ def export_interface(
         binaries = installed_binary(component, fmi=fmi)
     else:
         binaries = build_binaries(component_library(component), chosen, fmi=fmi)
-    complete = for_binaries(with_integers(interface) if integers else interface, binaries)
+    complete = for_binaries(interface, binaries)
     if bare:
         description = _description(complete, fmi)[1]
         return write_archive(Path(path), description | dict(binaries) | dict(grids), ZIP_STORED)
@@ -203,22 +196,12 @@ def _sources(component: Component, fmi: int) -> dict[str, bytes]:
 
 
 def _reference(interface: Interface, members: dict[str, bytes], fmi: int) -> dict[str, bytes]:
-    """Returns reference results of the plant; none when the FMU has no binary for this machine."""
-    folders = {2: fmi2_platform(), 3: fmi3_platform()}
-    own = f"binaries/{folders[fmi]}/"
-    found = {name: data for name, data in members.items() if name.startswith(own)}
-    if interface.component is not PLANT or not found:
+    """Returns reference results of a plant of FMI 2.0 that has a binary for this machine."""
+    own = f"binaries/{fmi2_platform()}/"
+    if fmi != 2 or interface.component is not PLANT or not any(own in name for name in members):
         return {}
-    trial = members
-    if fmi == 3:  # the same binary and start values as an FMU of FMI 2.0, which runs here
-        trial = {name: data for name, data in members.items() if name.startswith("resources/")}
-        trial |= _description(interface, 2)[1]
-        trial |= {
-            name.replace(own, f"binaries/{folders[2]}/"): data for name, data in found.items()
-        }
     with TemporaryFolder("export") as folder:
-        fmu = write_archive(folder / "trial.fmu", trial)
-        return reference_members(interface, fmu, fmi=fmi)
+        return reference_members(interface, write_archive(folder / "trial.fmu", members))
 
 
 def write_archive(

@@ -6,20 +6,14 @@ gives) has related files, with its manifest. The inputs (a force on the torso, t
 are sampled at every communication step, so that results do not depend on the importer's
 interpolation. The outputs depend on the state only, so that they may be read before or after the
 next inputs are set.
-
-An FMU of FMI 3.0 has arrays: a column is a whole array, with its elements in a cell, separated by
-spaces, as fmpy and the Reference FMUs read and write them. Its binary is that of FMI 2.0 and gives
-the same bits, so its results are calculated with an FMU of FMI 2.0.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
-from itertools import accumulate, pairwise
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
-from hexapod_cosim.cosim.interface.arrays import arrays
 from hexapod_cosim.cosim.interface.plant_interface import Interface
 from hexapod_cosim.cosim.master.fmu import Fmu
 
@@ -56,32 +50,24 @@ TOLERANCE = 1e-6
 DIGITS = 12
 
 
-def reference_members(interface: Interface, fmu: Path, *, fmi: int = 2) -> dict[str, bytes]:
-    """Runs an FMU and returns the three files and their manifest by path in the archive.
+def reference_members(interface: Interface, fmu: Path) -> dict[str, bytes]:
+    """Runs an FMU of FMI 2.0 and returns the three files and their manifest by path in the archive.
 
-    Args:
-        interface: of the plant.
-        fmu: of FMI 2.0.
-        fmi: version of the standard that the files are for.
-
-    Raises FmuError when it does not run.
+    interface: of the plant. Raises FmuError when it does not run.
     """
-    given = columns(interface, input_names(), fmi=fmi)
-    seen = columns(interface, OUTPUTS, fmi=fmi)
-    names = tuple(name for group in given.values() for name in group)
+    names = input_names()
     inputs = [
-        (k * STEP, *(float(f"{value:.{DIGITS}g}") for value in _inputs(interface, names, k * STEP)))
+        (k * STEP, *(float(f"{value:.{DIGITS}g}") for value in _moved(interface, k * STEP)))
         for k in range(STEPS + 1)
     ]
-    outputs = _run(fmu, names, inputs, [name for group in seen.values() for name in group])
+    outputs = _run(fmu, names, inputs, OUTPUTS)
     start = f"{FOLDER}/{interface.robot.name}"
     options = {"StartTime": 0.0, "StopTime": STEPS * STEP, "StepSize": STEP, "RelTol": TOLERANCE}
+    lines = [f"{name},{value!r}\n" for name, value in options.items()]
     return {
-        f"{start}_in.csv": _csv(given, inputs),
-        f"{start}_ref.csv": _csv(seen, outputs),
-        f"{start}_ref.opt": "".join(
-            f"{name},{value!r}\n" for name, value in options.items()
-        ).encode(),
+        f"{start}_in.csv": _csv(names, inputs),
+        f"{start}_ref.csv": _csv(OUTPUTS, outputs),
+        f"{start}_ref.opt": "".join(lines).encode(),
         MANIFEST: manifest(interface.robot.name),
     }
 
@@ -107,30 +93,8 @@ def input_names() -> tuple[str, ...]:
     return ("torso.push_force[1]", "torso.push_force[2]", *MOVED)
 
 
-def columns(
-    interface: Interface, names: Sequence[str], *, fmi: int = 2
-) -> dict[str, tuple[str, ...]]:
-    """Returns the variables of FMI 2.0 in each column; in FMI 3.0 a column is a whole array."""
-    if fmi == 2:
-        return {name: (name,) for name in names}
-    wanted = set(names)
-    groups = (
-        (array.name, tuple(one.name for one in array.elements)) for array in arrays(interface)
-    )
-    return {name: elements for name, elements in groups if wanted & set(elements)}
-
-
-def _inputs(interface: Interface, names: Sequence[str], time: float) -> tuple[float, ...]:
-    """Returns the values of inputs at a time [s]; those that do not move have their start values.
-
-    The others are smooth, zero at the start, of different frequencies.
-    """
-    moved = dict(zip(input_names(), _moved(interface, time), strict=True))
-    return tuple(moved.get(name, float(interface.variable(name).start or 0.0)) for name in names)
-
-
 def _moved(interface: Interface, time: float) -> tuple[float, ...]:
-    """Returns the values of the moved inputs at a time [s]."""
+    """Returns the values of the inputs at a time [s]: smooth, zero at first, of different rates."""
     weight = interface.robot.total_mass * math.hypot(*interface.robot.gravity)
     pushes = [PUSH * weight * math.sin(2.0 * math.pi * rate * time) for rate in (1.0, 1.5)]
     swings = [SWING * (1.0 - math.cos(2.0 * math.pi * rate * time)) / 2.0 for rate in (2.0, 1.0)]
@@ -158,31 +122,8 @@ def _run(
     return rows
 
 
-def _csv(groups: Mapping[str, Sequence[str]], rows: Iterable[Sequence[float]]) -> bytes:
-    """Formats rows of time and variables as CSV.
-
-    groups: the variables in each column after the time; spaces separate those of one column.
-    """
-    ends = list(accumulate([1, *map(len, groups.values())]))
-    lines = [",".join(f'"{name}"' for name in ("time", *groups))]
-    for row in rows:
-        cells = [row[first:last] for first, last in pairwise([0, *ends])]
-        lines.append(",".join(" ".join(map(_number, cell)) for cell in cells))
+def _csv(names: Sequence[str], rows: Iterable[Sequence[float]]) -> bytes:
+    """Formats rows of time and variables as CSV."""
+    lines = [",".join(f'"{name}"' for name in ("time", *names))]
+    lines += [",".join(f"{value + 0.0:.{DIGITS}g}" for value in row) for row in rows]
     return ("\n".join(lines) + "\n").encode()
-
-
-def _number(value: float) -> str:
-    return f"{value + 0.0:.{DIGITS}g}"
-
-
-def read_csv(data: bytes) -> Mapping[str, list[float]]:
-    """Returns the columns of a reference file by name.
-
-    A column of arrays has all elements of the first row, then those of the second.
-    """
-    header, *rows = data.decode().splitlines()
-    cells = zip(*(row.split(",") for row in rows), strict=True)
-    return {
-        name.strip('"'): [float(value) for cell in column for value in cell.split()]
-        for name, column in zip(header.split(","), cells, strict=True)
-    }

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from hexapod_cosim.cosim.common.files import write_text, writing_into
-from hexapod_cosim.models import HexapodError, Robot
+from hexapod_cosim.models import Robot
 from hexapod_cosim.models.mjcf import robot_to_mjcf
 from hexapod_cosim.models.records import Servo
 from hexapod_cosim.models.servos.motor import has_measured_friction
@@ -28,25 +28,6 @@ FORMATS = {
     "urdf": Format("urdf", "a URDF", ".urdf", robot_to_urdf),
     "mjcf": Format("mjcf", "an MJCF file", ".xml", robot_to_mjcf),
 }
-
-
-def chosen_format(path: Path | None, *, urdf: bool, mjcf: bool) -> Format | None:
-    """Returns the format chosen by an option or by the file's suffix; None for an FMU.
-
-    Raises HexapodError for two options.
-    """
-    if urdf and mjcf:
-        raise HexapodError(
-            "two formats at once",
-            got="--urdf --mjcf",
-            expected="one of them",
-            fix="run the command twice",
-        )
-    if urdf or mjcf:
-        return FORMATS["urdf" if urdf else "mjcf"]
-    return next(
-        (form for form in FORMATS.values() if path is not None and path.suffix == form.suffix), None
-    )
 
 
 def left_out(servo: Servo, form: Format) -> list[str]:

@@ -6,7 +6,7 @@ tools that read no parameter sets; those of SSP 1.0 repeat them.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from types import MappingProxyType
 
@@ -24,7 +24,6 @@ from hexapod_cosim.cosim.scenario.records import GRAVITY_NAMES
 from hexapod_cosim.models import FmuError, HexapodError, unknown_name
 
 PLANT, CONTROLLER = "plant", "controller"  # in the order of calculation
-SUFFIX = ".ssp"
 STOP = 10.0  # s
 SPEED = 0.08  # m/s    straight ahead, as in the paper's experiment
 WALK: Mapping[str, float] = MappingProxyType({"command.vx": SPEED})
@@ -86,27 +85,6 @@ def _refuse_driven(setup: ControllerSetup, values: Values) -> None:
     for name, other in ((PLANT, CONTROLLER), (CONTROLLER, PLANT)):
         driven = {one.name for one in parts[other].of_causality("output")}
         with_starts(parts[name], values[name], driven=driven)
-
-
-def chosen_package(
-    path: Path | None, *, wanted: bool, described: bool, values: Sequence[str] | None
-) -> bool:
-    """Returns whether a package is chosen, by option or by the file's suffix.
-
-    Raises HexapodError for two formats and for values without a package.
-    """
-    package = wanted or (path is not None and path.suffix == SUFFIX)
-    if package and described:
-        raise HexapodError(
-            "two formats at once",
-            got="--ssp and a URDF or MJCF",
-            expected="one of them",
-            fix="run the command twice",
-        )
-    if values and not package:
-        fix = "add --ssp; a robot's own values belong into its file"
-        raise HexapodError("--set without a package", got=values[0], expected="--ssp", fix=fix)
-    return package
 
 
 def read_values(texts: Iterable[str]) -> dict[str, dict[str, float]]:

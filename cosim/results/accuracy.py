@@ -17,7 +17,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, fields, replace
 from typing import Any
 
 import numpy as np
@@ -55,28 +55,16 @@ class Accuracy:
 
     def as_table(self) -> dict[str, Any]:
         """Returns a table for JSON, which `accuracy_from_table` reads."""
-        return {
-            "about": self.about,
-            "reference": self.reference,
-            "macro_step": self.macro_step,
-            "runs": self.runs,
-            "solver_error": dict(self.solver_error),
-            "macro_step_effect": dict(self.macro_step_effect),
-            "notes": list(self.notes),
-        }
+        return {"about": self.about, **asdict(self)}
 
 
 def accuracy_from_table(table: Any, *, where: str) -> Accuracy:
     """Reads a table that `as_table` returned. Raises HexapodError when it is damaged."""
     try:
-        return Accuracy(
-            reference=str(table["reference"]),
-            macro_step=float(table["macro_step"]),
-            runs=int(table["runs"]),
-            solver_error=_numbers(table["solver_error"]),
-            macro_step_effect=_numbers(table["macro_step_effect"]),
-            notes=tuple(map(str, table["notes"])),
-        )
+        given = {item.name: table[item.name] for item in fields(Accuracy)}
+        for name in ("solver_error", "macro_step_effect"):
+            given[name] = _numbers(given[name])
+        return Accuracy(**{**given, "notes": tuple(given["notes"])})
     except (KeyError, TypeError, ValueError, AttributeError) as error:
         fix = "run it again with --check-accuracy"
         raise HexapodError(

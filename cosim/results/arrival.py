@@ -1,4 +1,4 @@
-"""Tells whether a robot arrived at the end of the path that it was commanded to walk.
+"""Judges whether a robot arrived at the end of the path that it was commanded to walk.
 
 A robot that is stuck, at a stair or in snow, stands upright to the end of its run. Comparisons and
 the course count it as a failure by the same rule: the path error, or the yaw drift of a turn on the

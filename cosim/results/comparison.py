@@ -324,9 +324,8 @@ def _summary(row: Mapping[str, str]) -> Summary:
         upright=row["upright"] == str(True),
         fallback=_number(row["fallback"]) if row["fallback"] else None,
         warnings=tuple(filter(None, row["warnings"].split(SEPARATOR))),
-        # files of earlier versions do not tell who arrived, and have fewer metrics
-        missed=row.get("missed") or "",
-        metrics={name: _number(row.get(name) or "") for name in METRICS},
+        missed=row["missed"],
+        metrics={name: _number(row[name]) for name in METRICS},
     )
 
 

@@ -64,10 +64,10 @@ def describe_drop(view: View) -> Drop | None:
     needed = {name for each in MEASURED for name in foot_names(each)}
     if not is_drop(recording) or not needed <= set(recording.names):
         return None
-    touching = _touching(recording)
-    begins = np.flatnonzero(touching[1:] & ~touching[:-1]) + 1
+    in_contact = _in_contact(recording)
+    begins = np.flatnonzero(in_contact[1:] & ~in_contact[:-1]) + 1
     # all feet have touched down by the end of a landing, which is the row before the next flight
-    ends = [_end(touching, begin) for begin in begins.tolist()]
+    ends = [_end(in_contact, begin) for begin in begins.tolist()]
     speeds = recording.feet("impact_speed")[ends].mean(axis=1)
     peaks = recording.feet("peak_force").max(axis=1) / robot_weight(view.parameters)
     floor = view.parameters.get("contact.impact_speed_floor", 0.0)
@@ -87,7 +87,7 @@ def describe_drop(view: View) -> Drop | None:
     return Drop(asked, law, tuple(bounces[:MOST])) if bounces else None
 
 
-def _touching(recording: Recording) -> np.ndarray[Any, np.dtype[np.bool_]]:
+def _in_contact(recording: Recording) -> np.ndarray[Any, np.dtype[np.bool_]]:
     """Returns whether a foot is in contact at a row, or was between the row before and it (rows,).
 
     On stiff ground an impact may be shorter than the time between two rows.
@@ -97,10 +97,10 @@ def _touching(recording: Recording) -> np.ndarray[Any, np.dtype[np.bool_]]:
     return np.asarray((recording.feet("contact") > 0.5).any(axis=1) | landed)
 
 
-def _end(touching: np.ndarray[Any, np.dtype[np.bool_]], begin: int) -> int:
+def _end(in_contact: np.ndarray[Any, np.dtype[np.bool_]], begin: int) -> int:
     """Returns the last row of a landing that begins in a row."""
-    flight = np.flatnonzero(~touching[begin:])
-    return begin + int(flight[0]) - 1 if len(flight) else len(touching) - 1
+    flight = np.flatnonzero(~in_contact[begin:])
+    return begin + int(flight[0]) - 1 if len(flight) else len(in_contact) - 1
 
 
 def asked_restitution(parameters: Mapping[str, float]) -> tuple[float | None, float | None]:

@@ -1,8 +1,8 @@
 """Finds the footprints that a run left in soil, and feet that sink too deep, by the outputs.
 
 The plant keeps a footprint where a foot lost contact with it last, with its plastic depth and the
-radius of the foot. Its outputs tell the depth under each foot, which stays until the foot has left
-the footprint, so a recording tells place and time to a row and the depth exactly.
+radius of the foot. Its outputs give the depth under each foot, which stays until the foot has left
+the footprint, so a recording gives place and time to a row and the depth exactly.
 
 A foot that is not lifted above the surface takes its footprint along: the plant has the later place
 alone, so the one at the earlier place ends when the foot stands on the soil again.
@@ -43,7 +43,7 @@ class Footprint:
 
 def find_footprints(recording: Recording, parameters: Mapping[str, float]) -> list[Footprint]:
     """Returns the footprints of a run in order of time. Raises ColumnError without the columns."""
-    depth, touching = recording.feet("sinkage"), recording.feet("contact") > 0.5
+    depth, in_contact = recording.feet("sinkage"), recording.feet("contact") > 0.5
     place = recording.foot_vectors("position")
     radius = parameters.get("foot.pad_radius", 0.0) or parameters["foot.radius"]
     found = []
@@ -51,7 +51,7 @@ def find_footprints(recording: Recording, parameters: Mapping[str, float]) -> li
         for first, last in _spans(depth[:, leg] >= LEAST):
             # none: the foot is above an older footprint
             contacts = [
-                (first + begin, first + end) for begin, end in _spans(touching[first:last, leg])
+                (first + begin, first + end) for begin, end in _spans(in_contact[first:last, leg])
             ]
             begins = [float(recording.time[begin]) for begin, _ in contacts]
             for k, (begin, end) in enumerate(contacts):

@@ -400,8 +400,8 @@ def landing_rates(window: JudgedWindow) -> Array:
         window.whole.feet("landing_rate"),
     )
     for count, rate in zip(counts.T, rates.T, strict=True):
-        touched = 1 + np.flatnonzero(np.diff(count) > 0.0)
-        begins = _first_contacts(touched, time, apart=0.5 * window.period)
+        contacts = 1 + np.flatnonzero(np.diff(count) > 0.0)
+        begins = _first_contacts(contacts, time, apart=0.5 * window.period)
         ends = np.append(begins[1:], len(time))
         judged = (begins >= steps.start) & (begins < steps.stop)
         found += [
@@ -411,10 +411,10 @@ def landing_rates(window: JudgedWindow) -> Array:
     return np.array(found)
 
 
-def _first_contacts(touched: NDArray[np.intp], time: Array, *, apart: float) -> NDArray[np.intp]:
+def _first_contacts(contacts: NDArray[np.intp], time: Array, *, apart: float) -> NDArray[np.intp]:
     """Returns the rows of touch-downs that come later than `apart` [s] after the one before."""
     found: list[np.intp] = []
-    for row in touched:
+    for row in contacts:
         if not found or time[row] - time[found[-1]] > apart:
             found.append(row)
     return np.array(found, dtype=np.intp)

@@ -228,13 +228,14 @@ def push_warnings(recording: Recording) -> list[str]:
     if not len(recording.time) or not set(names) <= set(recording.names):
         return []
     force = np.linalg.norm(recording.columns(names).reshape(-1, len(LEG_NAMES), 3), axis=2)
-    touching = (force > 0.0).any(axis=1)
-    if not touching.any():
+    in_contact = (force > 0.0).any(axis=1)
+    if not in_contact.any():
         return []
     row, leg = np.unravel_index(int(np.argmax(force)), force.shape)
+    begin, share = recording.time[int(np.argmax(in_contact))], float(in_contact.mean())
     return [
-        f"legs touched each other from {recording.time[int(np.argmax(touching))]:.3f} s on, for "
-        f"{float(touching.mean()):.1%} of the time: leg {LEG_NAMES[leg]} and its neighbour pushed "
+        f"legs touched each other from {begin:.3f} s on, for "
+        f"{share:.1%} of the time: leg {LEG_NAMES[leg]} and its neighbour pushed "
         f"each other with {force[row, leg]:.3g} N at {recording.time[row]:.3f} s; use shorter "
         "steps or a slower turn"
     ]

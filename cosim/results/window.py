@@ -289,9 +289,9 @@ def _feet_level(part: Recording, parameters: Mapping[str, float]) -> Array:
     Rows without a contact have the value of the last row with one; before the first contact it is
     `terrain.height`.
     """
-    touching = part.feet("contact") > 0.5
-    count = touching.sum(axis=1)
-    height = np.where(touching, part.foot_vectors("position")[:, :, 2], 0.0).sum(axis=1)
+    in_contact = part.feet("contact") > 0.5
+    count = in_contact.sum(axis=1)
+    height = np.where(in_contact, part.foot_vectors("position")[:, :, 2], 0.0).sum(axis=1)
     level = height / np.maximum(count, 1)
     latest = np.maximum.accumulate(np.where(count > 0, np.arange(len(count)), -1))
     before = parameters.get("terrain.height", 0.0)

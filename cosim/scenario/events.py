@@ -29,7 +29,7 @@ def read_events(value: Any) -> tuple[Event, ...]:
 
 
 def _read_event(table: Any, where: str) -> Event:
-    """Reads an event, whose keys tell what it is: `lost`, `sensor` (angle or attitude), `joint` (of
+    """Reads an event, whose keys say what it is: `lost`, `sensor` (angle or attitude), `joint` (of
     a servo), `leg` or `fault` (of a force sensor), or else a push.
     """
     kinds = (Push, Fault, AngleFault, AttitudeFault, ServoFault, Lost)

@@ -117,7 +117,8 @@ def _of_kind(kind: str, given: Any, where: str) -> dict[str, Any]:
     require(kind == NORMAL or low <= high, given, "the lower end first", where)
     require(kind != LOGUNIFORM or low > 0.0, given, "ends > 0", where)
     require(kind != INTEGERS or whole, given, "whole numbers within 53 bits", where)
-    require(_is_finite(low, high, kind == LOGUNIFORM), given, "ends that are closer", where)
+    close = math.isfinite(high / low if kind == LOGUNIFORM else 10.0 * max(abs(low), abs(high)))
+    require(close, given, "ends that are closer", where)
     return {"kind": kind, "low": low, "high": high}
 
 
@@ -128,14 +129,10 @@ def _spaced(kind: str, given: Any, where: str) -> tuple[Value, ...]:
     require(whole, given, f"a whole number of 1 to {MAX_VALUES} values", where)
     require(kind == "linspace" or (low > 0.0 and high > 0.0), given, "ends > 0", where)
     require(low != high or count == 1, given, "different ends", where)
-    require(_is_finite(low, high, kind == "logspace"), given, "ends that are closer", where)
     space = np.linspace if kind == "linspace" else np.geomspace
-    return tuple(space(low, high, int(count)).tolist())
-
-
-def _is_finite(low: float, high: float, ratio: bool) -> bool:
-    """Returns whether the range, or the ratio of its ends, does not overflow."""
-    return math.isfinite(high / low if ratio else max(abs(low), abs(high)) * 10.0)
+    values = tuple(space(low, high, int(count)).tolist())
+    require(all(map(math.isfinite, values)), given, "ends that are closer", where)
+    return values
 
 
 def _values(given: Any, where: str) -> tuple[Value, ...]:

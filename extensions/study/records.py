@@ -13,20 +13,10 @@ from hexapod_cosim.models import HexapodError
 
 Value = float | int | bool | str
 
-VALUES, UNIFORM, LOGUNIFORM, NORMAL, INTEGERS = (
-    "values",
-    "uniform",
-    "loguniform",
-    "normal",
-    "integers",
-)
-GRID, LIST, RANDOM, LATIN_HYPERCUBE, SOBOL = DESIGNS = (
-    "grid",
-    "list",
-    "random",
-    "latin_hypercube",
-    "sobol",
-)
+KINDS = ("values", "uniform", "loguniform", "normal", "integers")
+VALUES, UNIFORM, LOGUNIFORM, NORMAL, INTEGERS = KINDS
+DESIGNS = ("grid", "list", "random", "latin_hypercube", "sobol")
+GRID, LIST, RANDOM, LATIN_HYPERCUBE, SOBOL = DESIGNS
 DRAWN = (RANDOM, LATIN_HYPERCUBE, SOBOL)  # designs with a given number of points
 SCENARIO_FACTOR = "scenario"
 GAINS = "gains."  # prefix of factors that are gains of the compliant control

@@ -1,5 +1,4 @@
-"""Computes what soil keeps of contacts: plastic depths at the ends of steps, places and depths of
-footprints.
+"""Computes the traces of contacts in soil: plastic depths at the ends of steps, and footprints.
 
 The fast form is plant_fmu/src/lanes/soil_path.h and plant_fmu/src/ground/footprints.c.
 """

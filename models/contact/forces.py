@@ -1,10 +1,10 @@
-"""Computes the forces of all contacts with any ground, and holds what they keep from touch-down to
-lift-off.
+"""Computes the forces of all contacts with any ground, and defines their state, which holds from
+touch-down to lift-off.
 
 A foot touches the ground below it and, on blocks, up to three higher blocks beside it; torso, knees
-and shanks are the spheres of body/contacts.py. A closed contact keeps its damping (eq. 14) and the
+and shanks are the spheres of spheres.py. A closed contact keeps its damping (eq. 14) and the
 ground on which it touched down: stiffness, friction or soil. Forces are those of rigid ground
-(contact.py) or of soil (soil/law.py).
+(law.py) or of soil (soil/law.py).
 """
 
 from __future__ import annotations
@@ -79,7 +79,7 @@ class Candidate:
 
 @dataclass(frozen=True)
 class ContactState:
-    """What a contact keeps from touch-down to lift-off."""
+    """State of a contact, which holds from touch-down to lift-off."""
 
     contact: Contact  # with the stiffness of the ground where it touched down
     friction: Friction

@@ -1,4 +1,4 @@
-"""Shares the force of a foot among faces, edges and corners of blocks that carry the same spot.
+"""Shares the force of a foot among faces, edges and corners of blocks that are close on it.
 
 Two contacts of a sphere act independently if they are far apart on it, such as a floor and a wall.
 Where they come close, as at a step that is lower than the foot is deep, the sum of both forces

@@ -130,7 +130,7 @@ def body_forces(robot: Robot, body: Array, damping: Array) -> Array:
     """
     smooth = replace(robot, friction=sliding_friction_of_bodies(robot.friction))
     forces = [
-        foot_force(smooth, contact, float(held))
-        for contact, held in zip(body_contacts(robot, body), damping, strict=True)
+        foot_force(smooth, contact, float(d))
+        for contact, d in zip(body_contacts(robot, body), damping, strict=True)
     ]
     return np.array(forces).reshape(-1, 3)

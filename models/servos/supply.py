@@ -58,9 +58,9 @@ def supply_power(servo: Servo, speed: Array, wanted: Array, winding: Array) -> P
     share = duty_share(servo, winding)
     if servo.supply_resistance == 0.0 or servo.mode == "kinematic":
         return Power(1.0, share)
-    held = back_emf_damping(servo) * speed if servo.mode == "torque" else 0.0
+    brake = back_emf_damping(servo) * speed if servo.mode == "torque" else 0.0
     limit = servo.duty_max * share
-    duty = np.clip((wanted + held) * servo.duty_max / stall_torque(servo), -limit, limit)
+    duty = np.clip((wanted + brake) * servo.duty_max / stall_torque(servo), -limit, limit)
     ratio = servo.supply_resistance / servo.resistance
     back = servo.torque_constant * float(np.sum(duty * speed)) / servo.voltage
     supply = min(1.0, (1.0 + ratio * back) / (1.0 + ratio * float(np.sum(duty**2))))

@@ -43,6 +43,8 @@ enum {
   OUTPUT_CONTACT = offsetof(hxOutput, torso) - offsetof(hxOutput, foot.contact),
   OUTPUT_LAST = NUMBERS(sizeof(hxOutput) - offsetof(hxOutput, torso))
 };
+_Static_assert(OUTPUT_CONTACT == sizeof(((hxOutput *)0)->foot.contact),
+               "the flags of the contacts lie between the numbers of feet and torso");
 _Static_assert(POINT_CHOICES % sizeof(double) == 0 && OUTPUT_CONTACT % sizeof(double) == 0,
                "no padding, whatever numbers are");
 

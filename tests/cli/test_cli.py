@@ -238,34 +238,6 @@ def test_a_run_too_short_for_metrics_prints_a_sentence_instead_of_a_table_of_das
     assert "too short for metrics" in err
 
 
-def test_recorded_columns_can_be_chosen(call: Call, tmp_path: Path) -> None:
-    code, _, _ = call(
-        "simulate",
-        "stand",
-        "-o",
-        tmp_path / "out",
-        *QUICK,
-        "--set",
-        "outputs.csv=['torso.roll', '*.contact']",
-    )
-    assert code == 0
-    names = read_csv(tmp_path / "out" / "results.csv").names
-    assert names == (
-        "time",
-        "torso.roll",
-        *(f"{leg}.foot.contact" for leg in ("LF", "LM", "LR", "RF", "RM", "RR")),
-    )
-
-
-@pytest.mark.usefixtures("undrawn")
-def test_a_folder_of_an_earlier_run_is_written_anew(call: Call, tmp_path: Path) -> None:
-    folder = tmp_path / "out"
-    assert call("simulate", "stand", "-o", folder, "--set", "duration=0.2")[0] == 0
-    assert (folder / "report.html").is_file()
-    assert call("simulate", "stand", "-o", folder, *QUICK)[0] == 0
-    assert {path.name for path in folder.iterdir()} == RUN
-
-
 def test_both_engines_walk_the_same_walk_and_leave_the_same_files(
     call: Call, tmp_path: Path
 ) -> None:

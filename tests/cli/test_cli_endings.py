@@ -16,7 +16,6 @@ import numpy as np
 import pytest
 from command import COMMAND, QUICK, Call, assert_refused, settings
 
-from hexapod_cosim.controller import BodyCommand, Controller, JointCommand, Measurement
 from hexapod_cosim.cosim.master.recorder import Recording
 from hexapod_cosim.cosim.results.recordings import read_csv, write_commands
 from hexapod_cosim.cosim.results.summary import Summary, refused_summary
@@ -120,30 +119,6 @@ def test_ctrl_c_keeps_what_was_recorded_under_another_name(
     assert json.loads((folder / "run.json").read_text())["status"] == "interrupted"
 
 
-def test_a_controller_that_raises_keeps_the_recording_and_fails(
-    call: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    step = Controller.step
-
-    def broken(
-        self: Controller, t: float, command: BodyCommand, measurement: Measurement
-    ) -> JointCommand:
-        if t > 0.1:
-            raise ValueError("shapes differ")
-        return step(self, t, command, measurement)
-
-    monkeypatch.setattr(Controller, "step", broken)
-    # it tries the controller out
-    monkeypatch.setattr("hexapod_cosim.cosim.run.single_run.check_commands", lambda *_, **__: None)
-    folder = tmp_path / "out"
-    code, out, err = call("simulate", "walk_flat", "-o", folder, *QUICK)
-    assert (code, out) == (1, "")
-    assert "ValueError: shapes differ" in err
-    assert read_csv(folder / "results.partial.csv").time[-1] == pytest.approx(0.1)
-    facts = json.loads((folder / "run.json").read_text())
-    assert (facts["status"], facts["reason"]) == ("failed", "ValueError: shapes differ")
-
-
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_an_interrupt_while_results_are_written_waits_for_them(
     call: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, number: signal.Signals
@@ -230,26 +205,3 @@ def test_a_fall_under_either_control_ends_a_comparison_with_the_code_of_falls(
     assert returned == code
     assert json.loads(out)["walked"] == {"kinematic": 1 + upright[0], "compliant": 1 + upright[1]}
     assert (tmp_path / "out" / "report.html").is_file()
-
-
-def test_report_skips_figures_whose_columns_were_not_kept(call: Call, tmp_path: Path) -> None:
-    folder = tmp_path / "out"
-    assert (
-        call(
-            "simulate",
-            "stand",
-            "-o",
-            folder,
-            *QUICK,
-            "--set",
-            "outputs.csv=['torso.*']",
-            "--set",
-            "outputs.formats=['csv']",
-        )[0]
-        == 0
-    )
-    code, _, err = call("report", folder)
-    assert code == 0
-    assert "Slip is not drawn: " in err
-    assert "Slip is not drawn" in (folder / "report.html").read_text()
-    assert (folder / "plots" / "posture.png").is_file()

@@ -47,13 +47,6 @@ def test_written_heights_give_the_surface_back(call: Call, tmp_path: Path) -> No
     assert again.height + height == pytest.approx(dune.height, abs=0.51 * keys["vertical_scale"])
 
 
-def test_the_facts_of_a_surface_are_shown(call: Call) -> None:
-    code, out, _ = call("terrain", "stairs", "--set", "terrain.step_height=0.03")
-    assert code == 0
-    assert "kind: blocks" in out
-    assert "step_height       0.03 m" in out
-
-
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
@@ -73,15 +66,6 @@ def test_a_wrong_call_is_refused(
     code, _, err = call("terrain", *arguments)
     assert code == 1
     assert message in " ".join(err.split())
-
-
-def test_every_listed_terrain_can_be_shown(call: Call, tmp_path: Path) -> None:
-    """But a height map, which needs a file."""
-    listed = json.loads(call("list", "terrains", "--json")[1])
-    for name in (row["name"] for row in listed if row["name"] != "heightfield"):
-        code, out, err = call("terrain", name, "--json")
-        assert (code, err) == (0, "")
-        assert json.loads(out)["name"] == name
 
 
 def test_a_plane_is_shown_with_its_place_and_slope(call: Call, tmp_path: Path) -> None:

@@ -24,7 +24,7 @@ COMMANDS: dict[str, set[str]] = {  # of each extension
     "identify": {"identify", "replay"},
     "course": {"benchmark"},
     "live": {"live", "realtime"},
-    "gym": set(),
+    "gym": {"gym"},
 }
 CORE_COMMANDS = {
     *("export", "simulate", "compare", "design", "report", "controller", "examples", "validate"),

@@ -5,7 +5,6 @@ exported by a command.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -220,17 +219,3 @@ def test_the_export_command_writes_the_controller_that_simulate_uses(
     )
     assert path.read_bytes() == export_controller(setup, tmp_path / "same.fmu").read_bytes()
     assert call("validate", path)[0] == 0
-
-
-def test_a_robot_with_other_joint_axes_has_no_controller(tmp_path: Path) -> None:
-    robot = load_robot("athena")
-    leg = robot.legs[0]
-    turned = replace(
-        leg, links=(leg.links[0], replace(leg.links[1], axis=(0.0, 1.0, 0.0)), leg.links[2])
-    )
-    odd = replace(robot, legs=(turned, *robot.legs[1:]))
-    with pytest.raises(HexapodError, match="no closed-form inverse kinematics"):
-        export_controller(
-            ControllerSetup(robot=odd, gait=make_gait(odd), period=PERIOD), tmp_path / "odd.fmu"
-        )
-    assert list(tmp_path.iterdir()) == []

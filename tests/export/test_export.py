@@ -6,8 +6,6 @@ import contextlib
 import ctypes
 import dataclasses
 import os
-import platform
-import sys
 import zipfile
 from pathlib import Path
 from urllib.parse import quote
@@ -269,21 +267,3 @@ def test_fmpy_builds_an_fmu_of_sources_alone_into_a_binary_of_the_same_results(
     original = fmpy.simulate_fmu(str(exported), output=names, stop_time=0.2)
     for name in names:
         assert np.array_equal(rebuilt[name], original[name])
-
-
-@pytest.mark.parametrize(
-    ("system", "machine", "two", "three"),
-    [
-        ("linux", "x86_64", "linux64", "x86_64-linux"),
-        ("linux", "aarch64", "aarch64-linux", "aarch64-linux"),
-        ("win32", "AMD64", "win64", "x86_64-windows"),
-        ("darwin", "x86_64", "darwin64", "x86_64-darwin"),
-        ("darwin", "arm64", "darwin64", "aarch64-darwin"),
-    ],
-)
-def test_a_machine_s_own_folder_names_its_processor(
-    monkeypatch: pytest.MonkeyPatch, system: str, machine: str, two: str, three: str
-) -> None:
-    monkeypatch.setattr(sys, "platform", system)
-    monkeypatch.setattr(platform, "machine", lambda: machine)
-    assert (plant_files.fmi2_platform(), plant_files.fmi3_platform()) == (two, three)

@@ -130,10 +130,3 @@ def test_outputs_must_be_finite_and_every_step_be_taken() -> None:
     assert list(result_problems(np.array(rows[:3], kinds))) == [
         "binaries: the FMU takes no steps of 0.001 s: got 2, expected 5"
     ]
-
-
-def test_an_fmu_for_other_machines_is_checked_without_running_it(
-    sound: Path, tmp_path: Path
-) -> None:
-    sources = changed(sound, tmp_path / "a.fmu", lambda members: members.pop(library(members)))
-    assert find_problems(sources) == []

@@ -75,10 +75,7 @@ def test_accelerations_with_the_body_in_the_ground_are_those_of_the_dense_system
     robot = changed(wide(lopsided(3)), friction={"law": friction}, terrain=slope)
     for seed, drift in ((0, 0.0), (1, 1e-3)):
         body, command = sprawled(robot, seed, drift=drift), random_command(robot, seed)
-        held = standing_body_damping(robot, body)
-        dense = accelerations(
-            robot, body, command, standing_damping(robot, body), body_damping=held
-        )
+        dense = accelerations(robot, body, command, standing_damping(robot, body))
         ours = at(core, robot, body).accelerations(command)
         assert touching_parts(robot, body) == {"torso", "knee", "shank"}
         assert distance(ours.dv, dense.dv) < DENSE

@@ -74,11 +74,11 @@ def walk(plant: Plant, duration: float) -> None:
 def footprints(plant: Plant) -> Array:
     """Returns x, y, depth and radius (n, 4) of the plant's footprints."""
     plant.core.hx_plant_footprints.restype = ct.c_size_t
-    print_ = np.zeros((2048, 4))
-    number = plant.core.hx_plant_footprints(
-        ct.c_void_p(plant.handle), pointer(print_), ct.c_size_t(len(print_))
-    )
-    return print_[:number]
+    plant.core.hx_plant_footprints.argtypes = None
+    found = np.zeros((2048, 4))
+    size = ct.c_size_t(len(found))
+    number = plant.core.hx_plant_footprints(ct.c_void_p(plant.handle), pointer(found), size)
+    return found[:number]
 
 
 @pytest.mark.parametrize(

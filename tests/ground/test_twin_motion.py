@@ -16,8 +16,9 @@ from typing import Any
 import numpy as np
 import pytest
 from grids import Ground, start_on_grid
-from plant import Plant, pointer
+from plant import Plant
 from states import changed
+from test_laws_soil import footprints
 
 from hexapod_cosim.models import Robot, load_robot
 from hexapod_cosim.models.dynamics import Command
@@ -153,16 +154,6 @@ def test_a_walk_in_soil_is_the_twins(core: ct.CDLL, soil: str, pad: float) -> No
     pair.assert_same()
     assert state.contacts.plastic.max() > 0.005
     assert state.touchdowns >= 3
-
-
-def footprints(plant: Plant) -> Array:
-    """Returns x, y, depth and radius (n, 4) of the plant's footprints."""
-    plant.core.hx_plant_footprints.restype = ct.c_size_t
-    found = np.zeros((64, 4))
-    number = plant.core.hx_plant_footprints(
-        ct.c_void_p(plant.handle), pointer(found), ct.c_size_t(len(found))
-    )
-    return found[:number]
 
 
 def test_a_robot_that_hops_into_its_footprints_moves_as_the_twin(core: ct.CDLL) -> None:

@@ -74,16 +74,6 @@ def test_instances_that_share_a_work_space_have_the_bits_of_instances_that_do_no
             assert stepped(pair[1], step, -0.3) == stepped(other, step, -0.3)
 
 
-def test_an_instance_may_return_to_its_own_work_space_at_any_time(
-    pair: tuple[Plant, Plant], work: Work
-) -> None:
-    for step in range(12):
-        lent = step % 3 == 1
-        assert use(pair[0], work.address if lent else None, work.size) == OK
-        assert stepped(pair[0], step, 0.3) == stepped(pair[1], step, 0.3)
-        work.stain(0x7F)
-
-
 @pytest.mark.parametrize(
     ("shift", "missing", "said"),
     [(0, 1, "work space: got "), (8, 0, "8 bytes above a multiple of 64")],
@@ -105,17 +95,6 @@ def test_a_controller_has_no_work_space(plant_build: Path) -> None:
     library = ct.CDLL(str(shared_library(plant_build, "controller/fmu", "hexapod_controller")))
     library.hx_shared_work_size.restype = ct.c_size_t
     assert library.hx_shared_work_size() == 0
-
-
-def test_a_freed_instance_leaves_the_memory_to_the_others(
-    plant_library: Path, pair: tuple[Plant, Plant], work: Work
-) -> None:
-    assert use(pair[0], work.address, work.size) == OK
-    with Plant(plant_library).initialize() as freed:
-        assert use(freed, work.address, work.size) == OK
-        stepped(freed, 0, 0.1)
-    for step in range(3):
-        assert stepped(pair[0], step, 0.3) == stepped(pair[1], step, 0.3)
 
 
 def test_a_refused_step_restores_the_state_from_a_shared_work_space(

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -61,14 +60,7 @@ def test_changes_are_of_the_pairs_in_which_both_arrived() -> None:
     assert compare_runs(before, after).changes["peak_force"].pairs == 2
 
 
-def test_seeds_csv_keeps_who_arrived_and_earlier_files_are_read(tmp_path: Path) -> None:
+def test_seeds_csv_keeps_who_arrived(tmp_path: Path) -> None:
     runs = [run("kinematic", 0), run("mine", 0, missed=STUCK)]
     write_seeds(tmp_path / "seeds.csv", runs)
     assert read_seeds(tmp_path / "seeds.csv") == {"kinematic": [runs[0]], "mine": [runs[1]]}
-    lines = (tmp_path / "seeds.csv").read_text().splitlines()
-    place = lines[0].split(",").index("missed")
-    earlier = [
-        ",".join(part for k, part in enumerate(line.split(",")) if k != place) for line in lines
-    ]
-    (tmp_path / "earlier.csv").write_text("\n".join(earlier) + "\n")
-    assert read_seeds(tmp_path / "earlier.csv")["mine"] == [replace(runs[1], missed="")]

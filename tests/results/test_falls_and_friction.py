@@ -173,15 +173,6 @@ def parameters(**changes: float) -> dict[str, float]:
     return PARAMETERS | {name.replace("__", "."): value for name, value in changes.items()}
 
 
-def test_static_friction_holds_a_robot_where_the_law_has_it() -> None:
-    """tan 0.5 = 0.546 lies between 0.3 and 0.6, so the bristle law holds the robot and the tanh
-    law does not.
-    """
-    between = {"friction__mu": 0.3, "friction__mu_static": 0.6}
-    assert friction_warnings(parameters(**SLOPE, **between, friction__law=3.0)) == []
-    assert friction_warnings(parameters(**SLOPE, **between, friction__law=1.0)) != []
-
-
 @pytest.mark.parametrize(
     "changes", [{"friction__mu": 0.0}, {"friction__law": 2.0}], ids=["mu = 0", "none"]
 )

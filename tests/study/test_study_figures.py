@@ -15,10 +15,9 @@ from studies import KINEMATIC, replace_stored, run_quietly, study_of
 
 from hexapod_cosim.cosim.results.comparison import made_change
 from hexapod_cosim.extensions.study.groups import Figures, Mean, Point
-from hexapod_cosim.extensions.study.optimum import Trial
 from hexapod_cosim.extensions.study.records import Study
 from hexapod_cosim.extensions.study.report import heat
-from hexapod_cosim.extensions.study.report.figures import drawings, history
+from hexapod_cosim.extensions.study.report.figures import drawings
 from hexapod_cosim.extensions.study.store import FIGURES
 from hexapod_cosim.extensions.study.studying import report_on
 from hexapod_cosim.extensions.study.summary import Results, read_results
@@ -33,15 +32,6 @@ DRAWN = {
     "design": "random",
     "points": 3,
     "factors": {"friction.mu": {"uniform": [0.3, 0.9]}, "gait.name": ["tripod", "wave"]},
-}
-ONE: dict[str, Any] = {
-    "trials": 3,
-    "metric": "slip_per_metre",
-    "variables": {"friction.mu": {"uniform": [0.3, 0.9]}},
-}
-SPLIT = {
-    "training": {"scenarios": ["walk_flat"], "seeds": [1]},
-    "held_out": {"scenarios": ["ripple"], "seeds": [2]},
 }
 
 
@@ -153,23 +143,6 @@ def test_the_change_of_a_cell_is_that_of_its_pairs() -> None:
     ]
     figure = heat.heat_map(points, study.factors[0], study.factors[1], study)
     assert shown(figure)[0, 0] == pytest.approx(-50.0)
-
-
-def test_trials_are_counted_in_whole_numbers() -> None:
-    study = study_of({"optimise": {**ONE, **SPLIT}})
-    trials = [
-        Trial(
-            number=k,
-            values=(0.3,),
-            means={"slip_per_metre": (0.1, math.nan, 0.2)[k], "walked": 1.0},
-            feasible=k != 1,
-        )
-        for k in range(3)
-    ]
-    axes = history(study, trials, 0.15).axes[0]
-    ticks = axes.get_xticks()
-    assert np.array_equal(ticks, np.round(ticks))
-    assert "no figure: a run fell" in {line.get_label() for line in axes.lines}
 
 
 @pytest.fixture

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import errno
 import os
 import random
 import signal
 import subprocess
-import sys
 import time
 from collections.abc import Callable
 from contextlib import closing
@@ -210,17 +208,6 @@ def test_two_processes_do_not_share_a_folder(small: Callable[..., Any], tmp_path
     ):
         small()
     small()
-
-
-@pytest.mark.skipif(sys.platform == "win32", reason="locks files by another function")
-def test_a_file_system_without_locks_holds_studies_too(
-    small: Callable[..., Any], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def flock(_file: int, _operation: int) -> None:
-        raise OSError(errno.ENOTSUP, os.strerror(errno.ENOTSUP))
-
-    monkeypatch.setattr("fcntl.flock", flock)
-    assert len(small()) == 9
 
 
 def test_progress_counts_new_runs_and_those_that_did_not_walk(

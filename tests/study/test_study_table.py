@@ -123,13 +123,6 @@ def test_the_command_runs_a_study_and_its_report_holds_everything(
     assert "report.html" in told
 
 
-def test_a_study_that_is_not_done_has_a_report_that_says_so(call: Call, compared: Path) -> None:
-    facts = json.loads((compared / "run.json").read_text())
-    (compared / "run.json").write_text(json.dumps({**facts, "status": "running"}))
-    assert call("report", compared)[0] == 0
-    assert "not done yet" in (compared / "report.html").read_text()
-
-
 def optimisation(**changes: Any) -> dict[str, Any]:
     question = {
         "metric": "slip_per_metre",

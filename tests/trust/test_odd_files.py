@@ -5,7 +5,6 @@ an unexpected exception.
 from __future__ import annotations
 
 import io
-import json
 import shutil
 from collections.abc import Callable
 from contextlib import redirect_stderr, redirect_stdout
@@ -128,41 +127,6 @@ def damaged(results: Path, tmp_path: Path, name: str, content: bytes) -> Path:
     shutil.copytree(results, copy)
     (copy / name).write_bytes(content)
     return copy
-
-
-FACTS = ("status", "kind", "title", "control", "gait_period", "parameters", "robot", "fmu")
-
-
-@pytest.mark.parametrize("value", [[1], {"a": [{}]}], ids=["list", "table"])
-@pytest.mark.parametrize("key", FACTS)
-def test_a_report_of_facts_of_wrong_types_says_so(
-    results: Path, tmp_path: Path, key: str, value: object
-) -> None:
-    facts = json.loads((results / "run.json").read_text(encoding="utf-8")) | {key: value}
-    copy = damaged(results, tmp_path, "run.json", json.dumps(facts).encode())
-    code, text = said("report", str(copy))
-    assert "unexpected" not in text
-    assert code == 0 or (code == 1 and text.startswith("hexapod: "))
-
-
-@pytest.mark.parametrize(
-    ("name", "content"),
-    [
-        ("run.json", 100_000 * b"["),
-        ("run.json", b"\xff\xfe{"),
-        ("metrics.json", 100_000 * b'{"a":'),
-        ("metrics.json", b'{"a": ' + 5000 * b"1" + b"}"),
-        ("metrics.json", 10 * b"\0"),
-        ("scenario.toml", b"\xff\xff"),
-        ("results.parquet", b""),
-        ("results.parquet", b"PAR1PAR1"),
-        ("results.parquet", 1000 * b"PAR1"),
-    ],
-)
-def test_a_report_of_a_damaged_file_names_it(
-    results: Path, tmp_path: Path, name: str, content: bytes
-) -> None:
-    assert name in refused("report", str(damaged(results, tmp_path, name, content)))
 
 
 def test_a_report_into_a_folder_that_takes_no_files_names_the_place(

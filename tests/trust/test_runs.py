@@ -128,23 +128,3 @@ def test_a_killed_command_leaves_nothing_that_the_next_does_not_delete(
     assert left
     assert temporaries.sweep(now=time.time() + 1000.0)
     assert list(temporary.iterdir()) == []
-
-
-def test_files_are_flushed_before_they_replace_others(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    order: list[str] = []
-    flush, replace = os.fsync, Path.replace
-
-    def flushed(handle: int) -> None:
-        order.append("flush")
-        flush(handle)
-
-    def replaced(self: Path, target: Path) -> Path:
-        order.append("replace")
-        return replace(self, target)
-
-    monkeypatch.setattr(os, "fsync", flushed)
-    monkeypatch.setattr(Path, "replace", replaced)
-    files.write_text(tmp_path / "file", "text")
-    assert order == ["flush", "replace", "flush"]

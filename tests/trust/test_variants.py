@@ -1,6 +1,4 @@
-"""Tests that a model description offers what its binary and its importer have: no derivatives from
-compilers without complex numbers, integers for importers without enumerations.
-"""
+"""Tests that a model description offers what its binary has: derivatives with complex numbers."""
 
 from __future__ import annotations
 
@@ -12,16 +10,13 @@ from collections import Counter
 from pathlib import Path
 from typing import Any
 
-import fmpy
 import pytest
 from fmi_plant import ATHENA as INTERFACE
 from fmi_plant import ERROR, Plant
-from numpy.testing import assert_array_equal
 
 from hexapod_cosim.cosim.common.plant_files import fmi_headers, source_files
 from hexapod_cosim.cosim.export import plant_export
 from hexapod_cosim.cosim.export.plant_export import export_fmu
-from hexapod_cosim.cosim.validate.validation import find_problems
 from hexapod_cosim.models import load_robot
 
 ATHENA = load_robot("athena")
@@ -83,24 +78,3 @@ def test_a_binary_without_complex_numbers_refuses_derivatives(without_complex: P
         )
         assert status == ERROR
         assert "without complex numbers" in plant.last_message
-
-
-@pytest.mark.parametrize("fmi", [2, 3])
-def test_integers_replace_enumerations_and_change_no_result(
-    plant_library: Path, tmp_path: Path, fmi: int
-) -> None:
-    usual = export_fmu(ATHENA, tmp_path / "usual.fmu", fmi=fmi)
-    plain = export_fmu(ATHENA, tmp_path / "plain.fmu", fmi=fmi, integers=True)
-    kinds = Counter(one.type for one in fmpy.read_model_description(str(usual)).modelVariables)
-    others = Counter(one.type for one in fmpy.read_model_description(str(plain)).modelVariables)
-    integer = "Integer" if fmi == 2 else "Int64"
-    assert kinds["Enumeration"] > 0
-    assert others == kinds - Counter(Enumeration=kinds["Enumeration"]) + Counter(
-        {integer: kinds["Enumeration"]}
-    )
-    assert find_problems(plain) == []
-    output = ["torso.position[3]" if fmi == 2 else "torso.position"]
-    one, other = (
-        fmpy.simulate_fmu(str(fmu), stop_time=0.02, output=output) for fmu in (usual, plain)
-    )
-    assert_array_equal(one, other)

@@ -2,7 +2,7 @@
 
 Links on the pages are relative paths in the repository. In the copy a link to another page leads to
 its copy, a link to a file to that file, which Sphinx offers as a download, and a link to a folder
-becomes its text.
+becomes its text, as does one to an extension that was deleted.
 """
 
 from __future__ import annotations

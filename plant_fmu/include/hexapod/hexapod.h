@@ -34,12 +34,96 @@ enum {
 /* hxDefinition (generated/plant_settings.h) is the robot, its laws and its settings. A link's frame
  * lies at its own joint and has the parent link's axes when the joint angle is 0; the hip's frame
  * has the torso's axes, rotated about z by the hip's yaw. Inertia matrices are xx yy zz xy xz yz.
- * hxInput holds the inputs of the robot, constant over a step unless a rate is given. hxOutput
- * holds its outputs: Booleans are ints, and integrals run from the start. hxIndicators has a number
- * for each contact that events close and open: the event indicators of model exchange, in their
- * order. It consists of doubles only. */
+ * hxInput holds the inputs of the robot, constant over a step unless a rate is given. */
+
+/* A number for each contact that events close and open. It consists of doubles only, in this order
+ * the event indicators of model exchange. */
+typedef struct hxIndicators {
+  double foot[HX_LEGS], knee[HX_LEGS], shank[HX_LEGS];
+  double torso[HX_CORNERS];
+  double neighbour[HX_LEGS][HX_NEIGHBOUR_PAIRS]; /* with the next leg: femur with femur, with tibia,
+                                                  * tibia with femur, with tibia */
+} hxIndicators;
 
 enum { HX_INDICATORS = sizeof(hxIndicators) / sizeof(double) };
+
+/* Outputs of the robot. Booleans are ints. Integrals run from the start. */
+typedef struct hxOutput {
+  double time;                               /* s */
+  double angle[HX_LEGS][HX_JOINTS];          /* rad */
+  double speed[HX_LEGS][HX_JOINTS];          /* rad/s */
+  double torque[HX_LEGS][HX_JOINTS];         /* N m     of the motor, or of the kinematic drive */
+  double positive_work[HX_LEGS][HX_JOINTS];  /* J       of the motor where it drives */
+  double negative_work[HX_LEGS][HX_JOINTS];  /* J       of the motor where it brakes, >= 0 */
+  double torque_squared[HX_LEGS][HX_JOINTS]; /* N2 m2 s  integral of the squared torque */
+  double reaction_force[HX_LEGS][HX_JOINTS][3];  /* N       joint on child */
+  double reaction_torque[HX_LEGS][HX_JOINTS][3]; /* N m     the same, about the joint's point */
+  struct {
+    double force[HX_LEGS][3];         /* N    ground on foot */
+    double normal_force[HX_LEGS];     /* N */
+    double tangential_force[HX_LEGS]; /* N    size */
+    double position[HX_LEGS][3];      /* m    contact point: the foot's lowest point */
+    double velocity[HX_LEGS][3];      /* m/s  of the foot's material at the contact point */
+    double slip_speed[HX_LEGS];       /* m/s  tangential part of the velocity */
+    double bristle[HX_LEGS][3];       /* m    b of eq. 16, 36; 0 with other laws */
+    double penetration[HX_LEGS];      /* m    < 0: clearance */
+    double impact_speed[HX_LEGS];     /* m/s  at the last touch-down */
+    double slip_distance[HX_LEGS];    /* m    slip under more than 1 % of the weight */
+    double impulse[HX_LEGS];          /* N s  integral of the normal force */
+    double peak_force[HX_LEGS];       /* N    largest normal force of the last hx_plant_step */
+    double peak_force_rate[HX_LEGS];  /* N/s  steepest rise of the normal force in that step */
+    double landing_rate[HX_LEGS];     /* N/s  largest rise over 1 ms of the last landing (20 ms) */
+    double landings[HX_LEGS];         /* 1    touch-downs */
+    double sinkage[HX_LEGS];          /* m    depth of the footprint under the foot, on soil */
+    int contact[HX_LEGS];
+  } foot;
+  struct {
+    double position[3], quaternion[4]; /* m, 1     centre of mass, attitude */
+    double roll, pitch, yaw;           /* rad      z-y-x */
+    double velocity[3];                /* m/s */
+    double angular_velocity[3];        /* rad/s */
+    double contact_force[3];           /* N        ground on the torso's corners */
+  } torso;
+  struct {
+    double knee_force[HX_LEGS][3];  /* N  ground on the knee */
+    double shank_force[HX_LEGS][3]; /* N  ground on the shank */
+    double clearance[HX_LEGS]; /* m  from femur and tibia to those of the two neighbouring legs */
+    double neighbour_force[HX_LEGS][3]; /* N  of these legs on femur and tibia */
+  } body;
+  struct {
+    double specific_force[3];   /* m/s2   torso axes, at the centre of mass */
+    double angular_velocity[3]; /* rad/s  torso axes */
+  } imu;
+  struct {
+    double kinetic;       /* J  bodies and rotors */
+    double potential;     /* J  gravity and the elastic parts of contacts, stops and gears */
+    double actuator_work; /* J  by the motors on the joints */
+    double push_work;     /* J  by push_force and push_torque */
+    double dissipated;    /* J  in contact, friction (with bristles' energy) and gears */
+    double contact_loss;  /* J  in the normal contact */
+    double friction_loss; /* J  in friction */
+    double gear_loss;     /* J  in the gears and at the joints' stops */
+    double residual;      /* J  stored - stored at start - works + dissipated: audit error */
+  } energy;
+  struct {
+    double position_error; /* m or 1          norm of Phi */
+    double velocity_error; /* m/s or 1/s      norm of dPhi/dt */
+  } constraint;
+  struct {
+    double evaluations, steps, rejected, touchdowns; /* 1 */
+  } solver;
+  double footprints;              /* 1  made in soil since the start */
+  double cone_time[HX_CONE_BINS]; /* s  feet under load, by |f_t|/(mu f_n): from 0.9 (i/30)^2 on */
+  double current[HX_LEGS][HX_JOINTS];             /* A  of the motors; 0 with HX_DRIVE_LINE */
+  double electrical_power[HX_LEGS][HX_JOINTS];    /* W  that they take from the supply; likewise */
+  double winding_temperature[HX_LEGS][HX_JOINTS]; /* K */
+  double housing_temperature[HX_LEGS][HX_JOINTS]; /* K */
+  double remaining_rating[HX_LEGS][HX_JOINTS]; /* 1  of the winding's rise over the air, 0 to 1 */
+  double supply_voltage; /* V  of all servos, under the currents at the start of the last call */
+  double gear_deflection[HX_LEGS][HX_JOINTS]; /* rad    rotor less link; 0 of a rigid gear */
+  double motor_speed[HX_LEGS][HX_JOINTS];     /* rad/s  of the rotor, seen at the joint */
+  hxIndicators depth; /* m  of all contacts, < 0: clearance; -1 where the robot has none */
+} hxOutput;
 
 enum { HX_FOOTPRINTS = 512 }; /* footprints that a plant keeps; older ones are forgotten */
 
