@@ -112,8 +112,7 @@ def identify(
     show_table(files.ESTIMATES, files.estimate_rows(shown), right=(2, 3, 4))
     if zero:
         show_text(f"{zero} biases of sensors may be 0; sensors.toml and the report have them.")
-    errors = files.error_rows(found.held_out() or found.fitted())
-    show_table(files.ERRORS, errors, right=(2, 3, 4))
+    show_table(files.ERRORS, files.error_rows(found), right=(2, 3, 4, 5, 6))
     show_text(files.open_text(found))
     show_files(written)
 
