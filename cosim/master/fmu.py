@@ -343,11 +343,8 @@ class Fmu(Closing):
     def _number(self, name: str, value: Any) -> float:
         """Converts a value of a parameter to the number that the FMU takes."""
         variable = self.variables[name]
-        if isinstance(value, str) and variable.type in ("Enumeration", "Integer"):
-            if variable.type == "Enumeration":
-                items = {item.name: item.value for item in variable.declaredType.items}
-            else:
-                items = listed_items(variable.description)
+        if isinstance(value, str) and variable.type == "Enumeration":
+            items = {item.name: item.value for item in variable.declaredType.items}
             if value not in items:
                 raise unknown_name(f"choice for {name}", value, items, error=FmuError)
             return int(items[value])
