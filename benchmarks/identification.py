@@ -1,13 +1,12 @@
 """Identifies robots with secret numbers from their logs: are the intervals right, and how much
 nearer does the identified robot come?
 
-usage: PYTHONPATH=tests/support python -m benchmarks.identification [--robots 20] [--seconds 6]
+usage: PYTHONPATH=tests/identify python -m benchmarks.identification [--robots 20] [--seconds 6]
        [--workers 1] [--table FILE.csv]
 
 Each robot is drawn as the table of unknowns says of what is known beforehand, walks on the plant
-FMU with an integrator tolerance of 1e-6, and is read through sensors with noise, delay and bias.
-Columns of its log are then made dead or wrong one by one: are they named, and no others? A robot
-whose row is in the table already is not identified again, so that an ended campaign goes on.
+FMU with an integrator tolerance of 1e-6, and is read through sensors with noise, delay and bias. A
+robot whose row is in the table already is not identified again, so that an ended campaign goes on.
 """
 
 from __future__ import annotations
@@ -18,7 +17,7 @@ import json
 import math
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 from multiprocessing import get_context
 from pathlib import Path
@@ -27,14 +26,10 @@ from time import process_time
 from typing import Any
 
 import numpy as np
-from secret_robots import GROUPS, Secret, damaged, secret_robot
+from secret_robots import GROUPS, Secret, secret_robot
 
-from hexapod_cosim.cosim.export.plant_export import export_fmu
-from hexapod_cosim.extensions.identify.command_screening import WrongCommandsError
 from hexapod_cosim.extensions.identify.identified import Identified
-from hexapod_cosim.extensions.identify.identify import TOLERANCE, identify, screen
-from hexapod_cosim.extensions.identify.log import Log
-from hexapod_cosim.extensions.identify.log_plant import LogPlant
+from hexapod_cosim.extensions.identify.identify import identify
 from hexapod_cosim.models import load_robot
 
 JUDGED = ("torque", "position", "attitude")  # channels of the goal: torque and pose
@@ -47,15 +42,13 @@ GOAL_COVERED, GOAL_RATIO = 0.9, 10.0
 class Score:
     """How well a robot was identified."""
 
-    told: int  # numbers that the log determines
+    determined: int  # numbers that the log determines
     covered: int  # of these within their 95 % intervals
     missed: tuple[str, ...]
     before: dict[str, float]  # by channel: error on held-out rows of the robot file's numbers,
     after: dict[str, float]  # and of those found, against readings without noise
     seconds: float  # of processor time
-    damaged: int = 0  # columns that were made dead or wrong,
-    named: int = 0  # and those of them that are named
-    good_named: tuple[str, ...] = ()  # good columns that are named or left out
+    left_out: tuple[str, ...] = ()  # good columns that the screening left out
 
     @property
     def ratios(self) -> dict[str, float]:
@@ -65,14 +58,14 @@ class Score:
 
 def score(secret: Secret, found: Identified, seconds: float) -> Score:
     """Compares an identified robot with the secret one."""
-    told = [one for one in found.estimates if one.determined]
-    missed = tuple(one.key for one in told if not one.low <= secret.values[one.key] <= one.high)
+    own = [one for one in found.estimates if one.determined]
+    missed = tuple(one.key for one in own if not one.low <= secret.values[one.key] <= one.high)
     sides = (found.before, found.fit.predictions)
     before, after = (held_out_errors(secret, found, side[0]) for side in sides)
     bad = tuple(column.name for _, column in found.bad)
     return Score(
-        told=len(told), covered=len(told) - len(missed), missed=missed, before=before, after=after,
-        seconds=seconds, good_named=bad,
+        determined=len(own), covered=len(own) - len(missed), missed=missed, before=before,
+        after=after, seconds=seconds, left_out=bad,
     )  # fmt: skip
 
 
@@ -88,38 +81,13 @@ def held_out_errors(secret: Secret, found: Identified, predicted: np.ndarray) ->
     }
 
 
-def with_screening(one: Score, secret: Secret, seed: int) -> Score:
-    """Returns the score with what `identify` says of damaged columns before it fits."""
-    robot, named, wrong = load_robot("athena"), 0, set(one.good_named)
-    logs = damaged(secret.log, seed)
-    with (
-        TemporaryDirectory(prefix="hexapod-screen-") as folder,
-        LogPlant(export_fmu(robot, Path(folder) / "athena.fmu"), TOLERANCE) as plant,
-    ):
-        for column, log in logs.values():
-            bad = named_columns(plant, log)
-            named += column in bad
-            wrong |= bad - {column}
-    return replace(one, damaged=len(logs), named=named, good_named=tuple(sorted(wrong)))
-
-
-def named_columns(plant: LogPlant, log: Log) -> set[str]:
-    """Returns the columns that the screening of `identify` names."""
-    try:
-        _, bad = screen(plant, load_robot("athena"), [log], groups=GROUPS)
-    except WrongCommandsError as error:
-        return {each.name for each in error.columns}
-    return {each.name for _, each in bad}
-
-
 def identified(seed: int, *, seconds: float) -> Score:
     """Makes the robot of a seed and identifies it from its log."""
     with TemporaryDirectory(prefix="hexapod-secret-") as folder:
         secret = secret_robot(seed, Path(folder), duration=seconds, groups=GROUPS)
     begin = process_time()
     found = identify([secret.log], load_robot("athena"), groups=GROUPS)
-    one = score(secret, found, process_time() - begin)
-    return one if found.bad else with_screening(one, secret, seed)
+    return score(secret, found, process_time() - begin)
 
 
 def run(seeds: Sequence[int], *, workers: int, seconds: float) -> Iterator[tuple[int, Score]]:
@@ -138,12 +106,11 @@ def line(seed: int, one: Score) -> str:
     """Returns a robot's result as a line of text."""
     gains = ", ".join(f"{key} {value:.0f}" for key, value in one.ratios.items())
     missed = f"; outside: {', '.join(one.missed)}" if one.missed else ""
-    wrong = f", also good: {', '.join(one.good_named)}" if one.good_named else ""
+    wrong = f"; left out: {', '.join(one.left_out)}" if one.left_out else ""
     return (
-        f"robot {seed}: {one.covered} of {one.told} within their intervals{missed}; "
+        f"robot {seed}: {one.covered} of {one.determined} within their intervals{missed}; "
         f"held-out error down by {gains}; "
-        f"{one.named} of {one.damaged} damaged columns named{wrong}; "
-        f"{one.seconds:.0f} s"
+        f"{one.seconds:.0f} s{wrong}"
     )
 
 
@@ -152,12 +119,10 @@ def table_row(seed: int, one: Score, seconds: float) -> dict[str, Any]:
     found: dict[str, Any] = {
         "robot": seed,
         "log_s": seconds,
-        "told": one.told,
+        "told": one.determined,
         "covered": one.covered,
         "outside": " ".join(one.missed),
-        "damaged": one.damaged,
-        "named": one.named,
-        "good_named": " ".join(one.good_named),
+        "left_out": " ".join(one.left_out),
         "processor_s": round(one.seconds, 1),
     }
     for side in ("before", "after"):

@@ -5,7 +5,7 @@ A column is left out if the recording lacks a variable that it is made of.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -27,7 +27,6 @@ Array = NDArray[np.float64]
 Columns = dict[str, Array]
 
 MOST_ROWS = 20_000  # of a run: all rows of 100 s at 5 ms; more rows would open slowly
-ENERGIES = ("actuator_work", "dissipated", "potential", "kinetic", "push_work", "residual")
 
 
 @dataclass(frozen=True)
@@ -76,10 +75,10 @@ def envelope(values: Array, bucket: int) -> Array:
 Maker = Callable[[View], Iterator[tuple[str, Array]]]
 
 
-def _gather(view: View, makers: Mapping[str, Maker]) -> Columns:
+def _gather(view: View, makers: tuple[Maker, ...]) -> Columns:
     """Returns the columns of all makers whose variables were recorded."""
     columns: Columns = {}
-    for make in makers.values():
+    for make in makers:
         try:
             columns |= dict(make(view))
         except ColumnError:
@@ -167,23 +166,8 @@ def _torques(view: View) -> Iterator[tuple[str, Array]]:
     )
 
 
-def _energies(view: View) -> Iterator[tuple[str, Array]]:
-    """Yields energies since the start [J], and the residual [mJ]."""
-    for name in ENERGIES:
-        values = view.recording.column(f"energy.{name}")
-        yield f"energy.{name}", (values - values[:1]) * (1e3 if name == "residual" else 1.0)
-
-
-REPLAYED: dict[str, Maker] = {
-    "pose": _pose,
-    "forces": _forces,
-    "contacts": _contacts,
-    "slipped": _slipped,
-}
-DRAWN: dict[str, Maker] = {
-    "normal_forces": _normal_forces, "slip": _slip, "feet": _feet,
-    "height": _height, "attitude": _attitude, "torques": _torques, "energies": _energies,
-}  # fmt: skip
+REPLAYED: tuple[Maker, ...] = (_pose, _forces, _contacts, _slipped)
+DRAWN: tuple[Maker, ...] = (_normal_forces, _slip, _feet, _height, _attitude, _torques)
 
 
 def _split(names: list[str] | tuple[str, ...], table: Array) -> Iterator[tuple[str, Array]]:

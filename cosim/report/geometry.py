@@ -19,7 +19,6 @@ from hexapod_cosim.models.schema import parse_toml
 Parameters = Mapping[str, float]
 
 FLATNESS = 0.25  # height of a torso of unknown size, relative to the width between its hips
-SAME = 1e-6  # m    tolerance of hip positions by which a robot file is recognised
 
 
 def describe_robot(run: StoredResult) -> dict[str, Any]:
@@ -60,22 +59,13 @@ def _leg(parameters: Parameters, leg: str) -> dict[str, Any]:
 
 
 def torso_size(run: StoredResult) -> list[float]:
-    """Returns the edges of the torso [m], from the robot file or else from the hips.
-
-    The robot file counts if it can be read and still has the same hips.
-    """
-    parameters = run.view.parameters
-    hips = np.array([_vector(parameters, f"{leg}.hip_position") for leg in LEG_NAMES])
+    """Returns the edges of the torso [m], from the robot file or, without it, from the hips."""
     try:
-        robot = load_robot(parse_toml(run.scenario)["robot"])
+        return [float(edge) for edge in load_robot(parse_toml(run.scenario)["robot"]).torso.size]
     except (HexapodError, KeyError, TypeError, tomllib.TOMLDecodeError):
-        robot = None
-    if robot is not None:
-        own = [leg.hip_position for leg in robot.legs]
-        if np.allclose(hips, own, rtol=0.0, atol=SAME):
-            return [float(edge) for edge in robot.torso.size]
-    length, width = np.ptp(hips[:, :2], axis=0).tolist()
-    return [length, width, FLATNESS * width]
+        hips = np.array([_vector(run.view.parameters, f"{leg}.hip_position") for leg in LEG_NAMES])
+        length, width = np.ptp(hips[:, :2], axis=0).tolist()
+        return [length, width, FLATNESS * width]
 
 
 def describe_ground(parameters: Parameters) -> dict[str, float]:

@@ -28,11 +28,10 @@ SHOWN = {
     "electrical_cost": ("electrical cost", "electrical energy per metre"),
     "servo_load_max": ("hottest servo, of its rating", "torque on the hottest servo"),
     "slip_per_metre": ("slip per metre", "slip"),
-}
-TURNED = {  # the same for a robot that turns on the spot
-    "cost_of_transport": ("work per radian", "motor work per radian"),
-    "electrical_cost": ("electrical cost per radian", "electrical energy per radian"),
-    "slip_per_metre": ("slip per radian", "slip"),
+    # of a robot that turns on the spot
+    "cost_per_radian": ("work per radian", "motor work per radian"),
+    "electrical_cost_per_radian": ("electrical cost per radian", "electrical energy per radian"),
+    "slip_per_radian": ("slip per radian", "slip"),
 }
 CREEP = (
     "Under the tanh friction law a foot under load always creeps, "
@@ -100,15 +99,10 @@ def headline(comparison: Comparison) -> list[Part]:
 
 
 def _shown(comparison: Comparison) -> dict[str, tuple[str, str]]:
-    """Returns SHOWN, with metrics per radian where the runs have those instead."""
-    shown: dict[str, tuple[str, str]] = {}
-    for name, text in SHOWN.items():
-        twin = PER_RADIAN.get(name, name)
-        turned = (
-            name in TURNED and comparison.changes[twin].pairs and not comparison.changes[name].pairs
-        )
-        shown[twin if turned else name] = TURNED[name] if turned else text
-    return shown
+    """Returns the entries of SHOWN that the runs have; those per radian instead of per metre."""
+    known = {name for name, change in comparison.changes.items() if change.pairs}
+    twice = {radian for metre, radian in PER_RADIAN.items() if metre in known}
+    return {name: texts for name, texts in SHOWN.items() if name in known - twice}
 
 
 def creep_note(facts: RunFacts, surface: Surface | None = None) -> str:
@@ -157,7 +151,7 @@ def _falls(comparison: Comparison) -> list[Part]:
 
 def _no_change(comparison: Comparison, begin: str) -> str:
     """Returns the sentence for runs that differ in no main metric."""
-    if not any(comparison.changes[name].pairs for name in _shown(comparison)):
+    if not any(comparison.changes[name].pairs for name in SHOWN):
         return (
             "The walk was too short to measure: "
             "figures are of whole gait cycles after the first two."
@@ -203,7 +197,6 @@ def cards(comparison: Comparison) -> list[Card]:
     return [
         _card(text, METRICS[name][0], comparison.changes[name])
         for name, (text, _) in _shown(comparison).items()
-        if comparison.changes[name].pairs
     ]
 
 

@@ -1,6 +1,6 @@
 """Packs columns of numbers into short texts: 16-bit steps, differences, deflate, base64.
 
-A column of range D is reproduced within D/131070 (`error_bound`), plus the rounding of the reader's
+A column of range D is reproduced within D/131070, plus the rounding of the reader's
 32-bit floats. That is a hundredth of a pixel of a plot 1000 pixels high, and 40 um of a torso that
 walked 5 m. Errors do not accumulate: differences are taken of the steps, exactly modulo 2^16.
 """
@@ -41,11 +41,6 @@ def pack(time: Array, columns: Mapping[str, Array]) -> dict[str, Any]:
         "columns": [[name, *scales[name]] for name in kept],
         "data": _deflated(np.array(rows)),
     }
-
-
-def error_bound(values: Array) -> float:
-    """Returns the largest error of a column by packing, in its unit."""
-    return _scale(values)[0] / 2.0
 
 
 def _scale(values: Array) -> tuple[float, float]:

@@ -157,7 +157,10 @@ def path(views: Views) -> Figure:
         axis.set_aspect(1e-3, adjustable="datalim")
         axis.set_title("to scale", loc="right", fontsize="small")
         return figure
-    _enlarge(figure, axis)
+    low, high = axis.get_ylim()
+    missing = max(LEAST_WIDTH - (high - low), 0.0)
+    axis.set_ylim(low - missing / 2, high + missing / 2)
+    axis.set_title("not to scale: mm upwards, m along", loc="right", fontsize="small")
     return figure
 
 
@@ -194,23 +197,6 @@ def _draw_profile(axis: Axes, label: str, view: View, colour: str) -> None:
     axis.set_title(label)
     axis.set_ylabel("height [mm]")
     axis.margins(x=0.0)
-
-
-def _enlarge(figure: Figure, axis: Axes) -> None:
-    """Enlarges the sideways axis of a straight path, and tells so in the title."""
-    low, high = axis.get_ylim()
-    missing = max(LEAST_WIDTH - (high - low), 0.0)
-    axis.set_ylim(low - missing / 2, high + missing / 2)
-    figure.draw_without_rendering()  # computes the size of the axes
-    enlarged = _per_pixel(axis.get_xlim(), axis.bbox.width) / (
-        1e-3 * _per_pixel(axis.get_ylim(), axis.bbox.height)
-    )
-    title = f"not to scale: y is drawn about {enlarged:.0f} times larger than x"
-    axis.set_title(title, loc="right", fontsize="small")
-
-
-def _per_pixel(limits: tuple[float, float], pixels: float) -> float:
-    return (limits[1] - limits[0]) / pixels
 
 
 def torques(views: Views) -> Figure:

@@ -87,7 +87,7 @@ SECTIONS = (
         "energy",
         "Energy audit",
         "Work, loss and stored energy since the start; beside them the unexplained residual.",
-        "pairs",
+        STATIC,
     ),
     Section(
         "footfall",

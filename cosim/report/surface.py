@@ -18,11 +18,16 @@ from numpy.typing import NDArray
 from hexapod_cosim.cosim.report.packing import STEPS
 from hexapod_cosim.cosim.results.footprints import Footprint
 from hexapod_cosim.models.ground.catalogue import CATALOGUE
+from hexapod_cosim.models.ground.faces import surface_heights
 from hexapod_cosim.models.ground.patches import PROPERTIES
+from hexapod_cosim.models.ground.smooth import RUN_OUT
 from hexapod_cosim.models.ground.surface import LAW, MU, Surface
 from hexapod_cosim.models.soil.presets import list_soils, soil_preset
 
+FINE = 0.0125  # m    spacing of the samples of a smooth surface, if it is not too large for it
 MOST_NODES = 250_000  # of a drawn surface; a finer one is drawn with every second, third ... node
+Array = NDArray[np.float64]
+
 SOIL, SLIPPERY, PATCH = "soil", "slippery", "patch"  # what a material is drawn as
 UNITS = {"mu": "", "mu_static": "", "stiffness": " N/m^1.5"}
 
@@ -30,28 +35,50 @@ UNITS = {"mu": "", "mu_static": "", "stiffness": " N/m^1.5"}
 def pack_surface(surface: Surface, parameters: Mapping[str, float]) -> dict[str, Any]:
     """Returns a surface for the viewer (scene/surface.ts): its grid, heights and materials.
 
-    Heights are steps of `step` [m] above `low` [m]: row by row, as differences of differences along
-    both axes modulo 2^16, all low bytes before all high bytes, deflated.
+    A smooth surface is sampled finely, with the run-out of its slope beyond the border, so that the
+    viewer needs no law of its own between samples. Heights are steps of `step` [m] above `low` [m]:
+    row by row, as differences of differences along both axes modulo 2^16, all low bytes before all
+    high bytes, deflated.
     """
-    every = stride(surface)
-    height = surface.height[::every, ::every]
+    x, y, height, material = _sampled(surface)
     low, step = float(height.min()), float(np.ptp(height)) / STEPS
     steps = np.round((height - low) / (step or 1.0)).astype(np.uint16)
-    material = surface.material
     return {
         "kind": surface.kind,
         "name": str(surface.recipe.get("kind", surface.name)),
         "rows": height.shape[0],
         "columns": height.shape[1],
-        "x0": surface.x0,
-        "y0": surface.y0,
-        "cell": every * surface.cell,
+        "x0": float(x[0]),
+        "y0": float(y[0]),
+        "cell": float(x[1] - x[0]),
         "low": low,
         "step": step,
         "data": _deflated_steps(steps),
         "materials": material_legend(surface, parameters),
-        "material": "" if material is None else _deflated(material[::every, ::every]),
+        "material": "" if material is None else _deflated(material),
     }
+
+
+def _sampled(surface: Surface) -> tuple[Array, Array, Array, NDArray[np.uint8] | None]:
+    """Returns x (columns,), y (rows,), heights (rows, columns) [m] and materials of a grid."""
+    every, parts, margin = stride(surface), 1, 0
+    if surface.kind == "smooth" and every == 1:
+        most = math.isqrt(MOST_NODES // surface.height.size)
+        parts = max(min(round(surface.cell / FINE), most), 1)
+        margin = math.ceil(RUN_OUT * parts / surface.cell)
+    along = [
+        np.arange(-margin, (count - 1) * parts + margin + 1, every)
+        for count in (surface.columns, surface.rows)
+    ]
+    x = surface.x0 + along[0] * surface.cell / parts
+    y = surface.y0 + along[1] * surface.cell / parts
+    columns, rows = (
+        np.clip(np.round(each / parts).astype(int), 0, count - 1)
+        for each, count in zip(along, (surface.columns, surface.rows), strict=True)
+    )
+    nodes = np.ix_(rows, columns)
+    height = surface.height[nodes] if parts == 1 and not margin else surface_heights(surface, x, y)
+    return x, y, height, None if surface.material is None else surface.material[nodes]
 
 
 def pack_footprints(footprints: Iterable[Footprint]) -> list[list[float]]:

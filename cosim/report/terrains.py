@@ -103,14 +103,12 @@ def _text(value: float, digits: int) -> str:
 def write_terrains(rows: list[Row], folder: Path) -> list[Path]:
     """Writes the table as CSV and the figure as PNG and SVG; returns the files."""
     files = [folder / TABLE]
-    names = [quantity.name for quantity in QUANTITIES[1:]]
+    table = rows_as_table(rows)
     with atomic_text(files[0]) as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(["scenario", "control", "runs", "walked", *names, "reason"])
-        for row in rows:
-            values = [_cell(row.values[name]) for name in names]
-            facts = [row.scenario, row.control, row.runs, row.walked]
-            writer.writerow([*facts, *values, row.reason])
+        writer = csv.DictWriter(file, table[0], lineterminator="\n")
+        writer.writeheader()
+        for row in table:
+            writer.writerow({name: _cell(value) for name, value in row.items()})
     with matplotlib.rc_context(SETTINGS):
         figure = draw_terrains(rows)
         for kind, metadata in UNDATED.items():
@@ -120,7 +118,9 @@ def write_terrains(rows: list[Row], folder: Path) -> list[Path]:
     return files
 
 
-def _cell(value: float) -> str:
+def _cell(value: Any) -> Any:
+    if not isinstance(value, float):
+        return value
     return f"{value:.6g}" if math.isfinite(value) else ""
 
 

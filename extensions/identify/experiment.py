@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cache, lru_cache
+from functools import lru_cache
 from types import SimpleNamespace
 
 import numpy as np
@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from hexapod_cosim.cosim.common.components import PLANT
 from hexapod_cosim.cosim.interface.names import joint_names, vector_names
 from hexapod_cosim.cosim.interface.start_values import parameter_values
-from hexapod_cosim.extensions.identify.log import ATTITUDE, CHANNELS, Channel, Log
+from hexapod_cosim.extensions.identify.log import ATTITUDE, Log, channel_of
 from hexapod_cosim.extensions.identify.log_plant import LogPlant
 from hexapod_cosim.extensions.identify.numbers.unknown import Unknown
 from hexapod_cosim.extensions.identify.start import initial_state
@@ -64,12 +64,6 @@ class Experiment:
     def sensors(self) -> list[str]:
         """The sensors of each column."""
         return [channel_of(name).sensors for name in self.columns]
-
-
-@cache
-def channel_of(name: str) -> Channel:
-    """Returns the channel of a column."""
-    return next(channel for channel in CHANNELS if name in channel.names)
 
 
 def first_part(experiment: Experiment, seconds: float = math.inf) -> Experiment:

@@ -97,15 +97,8 @@ class Identified:
             () if rejected else self.fit.depends.get(row.key, ()),
         )  # fmt: skip
 
-    def held_out(self) -> list[tuple[Difference, Difference]]:
-        """Returns the difference of each channel on the held-out rows, before and after."""
-        return self._differences("held_out")
-
-    def fitted(self) -> list[tuple[Difference, Difference]]:
-        """Returns the difference of each channel on the fitted rows, before and after."""
-        return self._differences("fitted")
-
-    def _differences(self, part: str) -> list[tuple[Difference, Difference]]:
+    def differences(self, part: str) -> list[tuple[Difference, Difference]]:
+        """Returns the difference of each channel before and after. part: "fitted" or "held_out"."""
         sides = []
         for predictions in (self.before, self.fit.predictions):
             columns: list[Difference] = []

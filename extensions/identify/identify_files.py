@@ -23,8 +23,7 @@ from hexapod_cosim.extensions.identify.unknowns import BIAS
 
 KIND, ROBOT_FILE, REPORT, RESULT = "identify", "robot.toml", "report.html", "identify.json"
 ESTIMATES = ("number", "unit", "before", "found", "95 % interval", "determined")
-MISFIT = ("channel", "noise", "fitted", "held out")
-ERRORS = ("channel", "unit", "before", "after", "ratio")
+ERRORS = ("channel", "unit", "before", "after", "ratio", "noise", "squares over noise")
 MOTOR = {"servo.torque_constant", "servo.resistance"}
 
 
@@ -67,8 +66,8 @@ def result_table(found: Identified) -> dict[str, Any]:
             {"log": found.experiments[number].log.where, **asdict(column)}
             for number, column in found.bad
         ],
-        "held_out": _error_table(found.held_out()),
-        "fitted": _error_table(found.fitted()),
+        "held_out": _error_table(found.differences("held_out")),
+        "fitted": _error_table(found.differences("fitted")),
     }
 
 
@@ -87,9 +86,11 @@ def _page(found: Identified, command: str) -> str:
         Section(
             title="Held-out rows",
             caption="Root mean squares of simulated minus measured over the rows that the fit did "
-            "not see, before and after; they contain the noise of the sensors.",
+            "not see, before and after; they contain the noise of the sensors. The last column has "
+            "mean squares of the residuals over those of this noise: 1 where the model explains "
+            f"the readings. Above {EXPLAINED:g} (more where readings are few) the page warns.",
             columns=ERRORS,
-            rows=error_rows(found.held_out()),
+            rows=error_rows(found),
             left=2,
         ),
         Section(
@@ -98,15 +99,6 @@ def _page(found: Identified, command: str) -> str:
             columns=ESTIMATES,
             rows=estimate_rows(estimates),
             left=2,
-        ),
-        Section(
-            title="Does the model explain the log?",
-            caption="Mean squares of residuals over those of the readings' own noise, which their "
-            "second differences show: 1 where the model explains the readings, more where it has "
-            f"errors. Above {EXPLAINED:g} (more where readings are few) the page warns; fitted "
-            "rows above 1 widen all intervals.",
-            columns=MISFIT,
-            rows=misfit_rows(found),
         ),
         Section(title="What the logs do not determine", caption=open_text(found)),
         Section(
@@ -125,7 +117,6 @@ def _page(found: Identified, command: str) -> str:
         facts={
             "logs": ", ".join(logs),
             "rows": ", ".join(str(len(one.log.time)) for one in found.experiments),
-            "noise": ", ".join(f"{key} {value:.3g}" for key, value in found.fit.noise.items()),
         },
         source=RESULT,
     )
@@ -142,8 +133,11 @@ def _figures(found: Identified) -> dict[str, str]:
     return channel_figures(first.log, simulations, split=float(time[0]) if len(time) else None)
 
 
-def error_rows(pairs: Sequence[tuple[Difference, Difference]]) -> list[list[str]]:
-    """Returns the rows of a table with ERRORS."""
+def error_rows(found: Identified) -> list[list[str]]:
+    """Returns the rows of a table with ERRORS: of held-out rows, or of all without any."""
+    part, misfit = "held_out", found.fit.held_out
+    if not misfit:
+        part, misfit = "fitted", found.fit.misfit
     return [
         [
             TITLES[one.channel],
@@ -151,8 +145,10 @@ def error_rows(pairs: Sequence[tuple[Difference, Difference]]) -> list[list[str]
             number(one.rms),
             number(other.rms),
             f"{one.rms / other.rms:.1f}" if other.rms > 0.0 else "",
+            number(found.fit.noise[one.channel]),
+            f"{misfit[one.channel].value:.2f}",
         ]
-        for one, other in pairs
+        for one, other in found.differences(part)
     ]
 
 
@@ -179,20 +175,6 @@ def shown_estimates(estimates: Sequence[Estimate]) -> tuple[list[Estimate], int]
         if not (one.key.startswith(BIAS) and one.low <= 0.0 <= one.high and one.determined)
     ]
     return shown, len(estimates) - len(shown)
-
-
-def misfit_rows(found: Identified) -> list[list[str]]:
-    """Returns the rows of a table with MISFIT."""
-    held_out = found.fit.held_out
-    return [
-        [
-            TITLES[key],
-            number(found.fit.noise[key]),
-            f"{one.value:.2f}",
-            f"{held_out[key].value:.2f}" if key in held_out else "",
-        ]
-        for key, one in found.fit.misfit.items()
-    ]
 
 
 def open_text(found: Identified) -> str:

@@ -26,7 +26,6 @@ from hexapod_cosim.cosim.master.recorder import Recording
 from hexapod_cosim.cosim.results.columns import known_columns, plant_variables
 from hexapod_cosim.cosim.results.recordings import read_csv, read_parquet
 from hexapod_cosim.models import HexapodError, Robot
-from hexapod_cosim.models.errors import nearest_name
 
 Array = NDArray[np.float64]
 LEAST_ROWS = 10
@@ -76,6 +75,12 @@ CHANNELS = (
 )
 SENSORS = tuple(dict.fromkeys(channel.sensors for channel in CHANNELS))
 COMMANDS = tuple(joint_names("angle_ref"))
+
+
+@cache
+def channel_of(name: str) -> Channel:
+    """Returns the channel of a column."""
+    return next(channel for channel in CHANNELS if name in channel.names)
 
 
 @dataclass(frozen=True)
@@ -131,10 +136,8 @@ class Log:
         derived = [self.derived] if self.derived else []
         if not self.unknown:
             return derived
-        named = [f"{name}{_meant(name)}" for name in self.unknown[:MOST_NAMED]]
-        more = len(self.unknown) - len(named)
-        text = ", ".join(named) + (f" and {more} more" if more else "")
-        return [f"Columns of {self.where} with unknown names are left out: {text}.", *derived]
+        named = ", ".join(self.unknown[:MOST_NAMED]) + ", ..." * (len(self.unknown) > MOST_NAMED)
+        return [f"Columns of {self.where} with unknown names are left out: {named}.", *derived]
 
 
 @cache
@@ -192,7 +195,6 @@ def log_of(recording: Recording, where: str) -> Log:
     known = _with_attitude(recording)
     wanted = {*input_names(), *(name for one in CHANNELS for name in one.names)}
     wanted |= {*vector_names("torso.velocity"), *vector_names("torso.angular_velocity")}
-    wanted |= set(vector_names(QUATERNIONS[0], 4))
     valid = known_columns().keys() | wanted
     unknown = tuple(name for name in recording.names if name not in valid)
     keep = [0, *(k for k, name in enumerate(known.names) if name in wanted)]
@@ -208,13 +210,6 @@ def log_of(recording: Recording, where: str) -> Log:
                 where=where,
             )
     return log
-
-
-def _meant(name: str) -> str:
-    """Returns the known column that an unknown one may mean, as words."""
-    valid = [*COMMANDS, *(one for channel in CHANNELS for one in channel.names)]
-    near = nearest_name(name, valid)
-    return f" (did you mean {near}?)" if near else ""
 
 
 def _check_times(time: Array, where: str) -> None:

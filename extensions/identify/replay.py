@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import io
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -135,11 +135,11 @@ def write_replay(
         "robot": {"name": robot.name, "hash": robot.hash},
         "settings": dict(settings),
         "command": command,
-        "channels": [one.as_table() for one in done.channels],
+        "channels": [asdict(one) for one in done.channels],
         "warnings": done.warnings,
     }
     text = io.StringIO()
-    rows = [one.as_table() for one in done.columns]
+    rows = [asdict(one) for one in done.columns]
     writer = csv.DictWriter(text, list(rows[0]), lineterminator="\n")
     writer.writeheader()
     writer.writerows(rows)

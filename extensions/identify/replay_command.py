@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shlex
 from collections.abc import Mapping, Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -58,7 +59,7 @@ def replay(
     for text in done.warnings:
         warn(text.removesuffix("."))
     if json:
-        channels = [one.as_table() for one in done.channels]
+        channels = [asdict(one) for one in done.channels]
         written = [str(path) for path in files]
         show_json({"channels": channels, "warnings": done.warnings, "files": written})
         return

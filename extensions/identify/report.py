@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from hexapod_cosim.cosim.common.control_style import all_styles
 from hexapod_cosim.cosim.report.page import environment
-from hexapod_cosim.extensions.identify.log import CHANNELS, Log
+from hexapod_cosim.extensions.identify.log import CHANNELS, Log, channel_of
 
 Array = NDArray[np.float64]
 TEMPLATE = "log.html.jinja"
@@ -33,10 +33,6 @@ class Difference:
     largest: float  # largest absolute difference
     at: float  # s    its time
 
-    def as_table(self) -> dict[str, Any]:
-        """Returns the figures by name."""
-        return asdict(self)
-
     def as_row(self) -> list[str]:
         """Returns the row of a table with COLUMNS."""
         figures = [number(value) for value in (self.spread, self.rms, self.largest)]
@@ -52,7 +48,6 @@ def column_differences(log: Log, names: Sequence[str], simulated: Array) -> list
     names: columns of the log that were simulated. simulated: (rows, names). Readings that are no
     numbers are left out.
     """
-    units = {name: (one.key, one.unit) for one in CHANNELS for name in one.names}
     found = []
     for name, values in zip(names, simulated.T, strict=True):
         measured = log.recording.column(name)
@@ -62,10 +57,13 @@ def column_differences(log: Log, names: Sequence[str], simulated: Array) -> list
             continue
         size = np.where(known, np.abs(error), -1.0)
         worst = int(np.argmax(size))
-        channel, unit = units[name]
-        spread, rms = float(np.std(measured[known])), _rms(error[known])
-        at = float(log.time[worst])
-        found.append(Difference(channel, name, unit, 1, spread, rms, float(size[worst]), at))
+        channel, at = channel_of(name), float(log.time[worst])
+        spread, rms, largest = (
+            float(np.std(measured[known])),
+            _rms(error[known]),
+            float(size[worst]),
+        )
+        found.append(Difference(channel.key, name, channel.unit, 1, spread, rms, largest, at))
     return found
 
 

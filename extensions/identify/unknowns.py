@@ -1,6 +1,6 @@
 """The table of unknown numbers of a robot and its sensors.
 
-A row tells what is known beforehand: `prior` is the standard deviation of the robot file's value,
+A row says what is known beforehand: `prior` is the standard deviation of the robot file's value,
 as a share of it for numbers above 0. A further number of the robot file is a further row.
 """
 
@@ -57,7 +57,7 @@ READINGS = (
     *(
         Unknown(
             key=key, unit="s", group="sensor", prior=0.01 if name == "pose" else 0.004,
-            positive=False, start=0.004, low=0.0,
+            positive=False, low=0.0, read=lambda _robot: 0.004,
         )
         for name, key in DELAYS.items()
     ),
@@ -71,7 +71,7 @@ READINGS = (
         if channel.key == key
         for name in channel.names
     ),
-    Unknown(key=CURRENT, unit="N m/A", group="sensor", prior=0.3, start=1.5),
+    Unknown(key=CURRENT, unit="N m/A", group="sensor", prior=0.3, read=lambda _robot: 1.5),
 )  # fmt: skip
 ZEROS = tuple(
     Unknown(key=f"zero.{name}", unit="rad", group="zero", prior=0.02, positive=False)
@@ -86,7 +86,7 @@ STARTS = (
 
 
 def chosen_unknowns(robot: Robot, logs: Sequence[Log], groups: Sequence[str]) -> list[Unknown]:
-    """Returns the rows of some groups that the robot has and the logs may tell of."""
+    """Returns the rows of some groups that the robot has and the logs may show."""
     have = {name for log in logs for name in log.measured}
     rows = [row for row in (*ROBOT, *READINGS, *ZEROS) if row.group in groups]
     found = []
@@ -98,7 +98,7 @@ def chosen_unknowns(robot: Robot, logs: Sequence[Log], groups: Sequence[str]) ->
         # the currents of a servo with a motor follow from its torque constant
         if row.key == CURRENT and (MOTOR(robot) or not have & set(_channel("current"))):
             continue
-        if row.applies(robot) and not (row.positive and row.read and row.read(robot) <= 0.0):
+        if row.applies(robot) and not (row.positive and row.read(robot) <= 0.0):
             found.append(row.of_robot(robot))
     if have & {*_channel("position"), *_channel("attitude")}:
         found += [
@@ -123,15 +123,9 @@ def _channel(key: str) -> tuple[str, ...]:
     return next(channel.names for channel in CHANNELS if channel.key == key)
 
 
-def value_before(row: Unknown, robot: Robot) -> float:
-    """Returns the robot file's value of a row, or the start of a sensor's."""
-    return row.start if row.read is None else row.read(robot)
-
-
 def changed_robot(robot: Robot, rows: Sequence[Unknown], values: Mapping[str, float]) -> Robot:
     """Returns the robot with the values of its rows; one that does not change keeps every digit."""
     for row in rows:
-        if row.write is not None and row.read is not None and row.key in values:
-            value = values[row.key]
-            robot = robot if value == row.read(robot) else row.write(robot, value)
+        if row.key in values and values[row.key] != row.read(robot):
+            robot = row.write(robot, values[row.key])
     return robot

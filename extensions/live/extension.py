@@ -6,11 +6,11 @@ PACKAGE = "hexapod_cosim.extensions.live"
 LIVE = Command(
     name="live",
     about="Drive the robot in a browser, in real time.",
-    place=f"{PACKAGE}.live_command:live",
+    place=f"{PACKAGE}.commands:live",
 )
 REALTIME = Command(
     name="realtime",
     about="Measure how long the plant takes for a step.",
-    place=f"{PACKAGE}.realtime_command:realtime",
+    place=f"{PACKAGE}.commands:realtime",
 )
 EXTENSION = Extension(commands=[LIVE, REALTIME])

@@ -6,13 +6,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from queue import Empty, SimpleQueue
-from time import sleep
+from time import monotonic, sleep
 from typing import Any
 
 from hexapod_cosim.controller import BodyCommand
 from hexapod_cosim.extensions.live import state
 from hexapod_cosim.extensions.live.messages import Action, Change, Drive, Message, Push
-from hexapod_cosim.extensions.live.pacing import Pacer, wall_time
+from hexapod_cosim.extensions.live.pacing import Pacer
 from hexapod_cosim.extensions.live.recording import NO_FORCE, Force, Recording
 from hexapod_cosim.extensions.live.robot import MOST_WEIGHTS, LiveRobot
 from hexapod_cosim.models import HexapodError
@@ -43,7 +43,7 @@ class Loop:
         robot: LiveRobot,
         publish: Publish,
         *,
-        now: Callable[[], float] = wall_time,
+        now: Callable[[], float] = monotonic,
         pause: Callable[[float], None] = sleep,
     ) -> None:
         self.robot, self._publish, self._now, self._pause = robot, publish, now, pause

@@ -1,29 +1,18 @@
 """Keeps macro-steps in step with wall time, and counts those that come late.
 
 Step k is due to begin at t_k = origin + k h and misses its deadline when it ends after t_(k+1).
-A lag of less than MOST_LAG is made up by steps without a pause between them. After a larger one,
-such as the sleep of a laptop, the origin moves: the gap is skipped and counted.
+A lag of less than MOST_LAG is made up by steps without a pause between them. After a larger one the
+origin moves: the gap is skipped and counted.
 """
 
 from __future__ import annotations
 
-import time
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
 
 MOST_LAG = 0.1  # s    behind wall time
 WINDOW = 1.0  # s    over which the real-time factor is taken
-# a clock that goes on while the computer sleeps: Linux has one of its own, macOS's does, and
-# Windows has no clock_gettime
-AWAKE_AND_ASLEEP = getattr(time, "CLOCK_BOOTTIME", getattr(time, "CLOCK_MONOTONIC", None))
-
-
-def wall_time() -> float:
-    """Returns a time [s] that never goes back and goes on while the computer sleeps."""
-    if AWAKE_AND_ASLEEP is None:
-        return time.perf_counter()
-    return time.clock_gettime(AWAKE_AND_ASLEEP)
 
 
 @dataclass

@@ -5,13 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
 from hexapod_cosim.cosim.common.control_style import all_styles
-from hexapod_cosim.cosim.report.page import VIEWER, viewer_script
+from hexapod_cosim.cosim.report.page import VIEWER, environment, viewer_script
 from hexapod_cosim.cosim.report.payload import as_json
-from hexapod_cosim.extensions.live.settings import FLAT, OWN, Choices, shown_speed
+from hexapod_cosim.extensions.live.settings import FLAT, OWN, Choices
 from hexapod_cosim.models import HexapodError
 from hexapod_cosim.models.ground.catalogue import CATALOGUE
 
@@ -37,7 +36,7 @@ def render_page(
             fix="install the package without HX_VIEWER=OFF",
         )  # fmt: skip
     return (
-        _environment()
+        environment("live")
         .get_template(TEMPLATE)
         .render(
             title=choices.scenario.title,
@@ -59,17 +58,4 @@ def _describe(choices: Choices) -> dict[str, Any]:
         "refused": choices.refused,
         "gaits": list(choices.gaits),
         "grounds": [{"name": name, "about": about[name]} for name in choices.grounds],
-        "speed": shown_speed(choices),
     }
-
-
-def _environment() -> Environment:
-    """Returns the templates of this folder; they include the report's style sheets."""
-    folders = ("hexapod_cosim.extensions", "live"), ("hexapod_cosim.cosim", "report")
-    return Environment(
-        loader=ChoiceLoader([PackageLoader(*each) for each in folders]),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )

@@ -25,7 +25,6 @@ FLAT = "flat"
 NEED_FILES = ("heightfield",)  # grounds that cannot be chosen by name alone
 REACHED = 0.6  # largest command as a share of what the legs reach
 PROBE = np.array([1.0, 1.0, 3.0])  # m/s, m/s, rad/s    more than legs reach
-SLOWEST, USUAL = 0.1, 0.3  # speeds with which a page begins: the least, and without a walk
 HEIGHT = 0.1  # m    of the torso above its stance, more than legs reach
 
 
@@ -143,18 +142,6 @@ def live_scenario(scenario: Scenario) -> Scenario:
     """
     choices = Choices(scenario, control_texts(scenario, ()), {})
     return choices.scenario_with(choices.first())
-
-
-def shown_speed(choices: Choices) -> float:
-    """Returns the speed (0 to 1) with which a page begins: that of the scenario's fastest walk."""
-    scenario = choices.scenario
-    limits = find_limits(known_robot(scenario), gait_of(scenario))
-    shares = [
-        abs(one.vx) / limits.vx + abs(one.vy) / limits.vy + abs(one.yaw_rate) / limits.yaw_rate
-        for one in scenario.commands
-    ]
-    fastest = max(shares)
-    return round(min(max(fastest, SLOWEST), 1.0), 2) if fastest > 0.0 else USUAL
 
 
 def control_texts(scenario: Scenario, able: tuple[str, ...] = CONTROLS) -> dict[str, str]:

@@ -7,6 +7,7 @@ The page is that of `hexapod live`. Plant, controller and the macro-step of both
 from __future__ import annotations
 
 import base64
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -54,26 +55,22 @@ def _setup(choices: Choices, robot: Robot) -> dict[str, Any]:
         "grounds": [],
         "numbers": {name: types["Control"].number(name) for name in CONTROLS},
         "walks": {
-            name: {
-                "gait": _numbers(gait, types["GaitPattern"].number(name)),
-                "limits": vars(find_limits(robot, gait)),
-                "changes": {
-                    other: _change(robot, gait, gaits[other]) for other in PATTERNS if other != name
-                },
-            }
+            name: _walk(robot, gait, gaits, types["GaitPattern"].number(name))
             for name, gait in gaits.items()
         },
     }
 
 
-def _numbers(gait: Gait, pattern: int) -> list[float]:
-    """Returns a gait in the order of hx_page_gait (wasm/robot.c)."""
-    return [pattern, gait.period, gait.duty, gait.step_height, gait.touchdown_speed]
-
-
-def _change(robot: Robot, before: Gait, after: Gait) -> dict[str, Any]:
-    plan = plan_change(robot, before, after)
-    return vars(plan) | {"limits": vars(plan.limits)}
+def _walk(robot: Robot, gait: Gait, gaits: Mapping[str, Gait], pattern: int) -> dict[str, Any]:
+    """Returns a gait in the order of hx_page_gait (wasm/robot.c), and the changes from it."""
+    plans = {name: plan_change(robot, gait, other) for name, other in gaits.items()}
+    return {
+        "gait": [pattern, gait.period, gait.duty, gait.step_height, gait.touchdown_speed],
+        "limits": vars(find_limits(robot, gait)),
+        "changes": {
+            name: vars(plan) | {"limits": vars(plan.limits)} for name, plan in plans.items()
+        },
+    }
 
 
 def _parameters(robot: Robot) -> dict[str, float]:

@@ -27,7 +27,6 @@ from hexapod_cosim.extensions.identify.unknowns import (
     changed_robot,
     chosen_unknowns,
     is_delay,
-    value_before,
 )
 from hexapod_cosim.models import Robot, load_robot
 
@@ -93,7 +92,7 @@ def drawn(rows: list[Unknown], robot: Robot, rng: np.random.Generator) -> dict[s
     for row in rows:
         z = float(np.clip(rng.normal(), -SPREAD, SPREAD))
         if row.group != START:
-            values[row.key] = row.value(z, value_before(row, robot))
+            values[row.key] = row.value(z, row.read(robot))
         if is_delay(row):
             values[row.key] = float(rng.uniform(0.001, 0.009))
     return values
@@ -152,27 +151,6 @@ DAMAGES: dict[str, Callable[[Array], Array]] = {
     ),
     "missing": lambda column: np.where(np.arange(len(column)) % 4 == 0, np.nan, column),
 }
-COMMANDED = (".coxa.angle_ref", ".femur.angle_ref", ".tibia.angle_ref")
-DAMAGED = (".coxa.angle", ".femur.angle", ".tibia.angle", ".femur.torque", ".tibia.torque",
-           ".tibia.speed", ".foot.normal_force")  # fmt: skip
-
-
-def damaged(log: Log, seed: int) -> dict[str, tuple[str, Log]]:
-    """Returns, for each kind of damage, a column drawn by a seed and the log with it damaged: of
-    readings, and of commands, in which no number can be missing.
-    """
-    rng = np.random.default_rng([seed, 1])
-    found = {}
-    for what, names, ends in (
-        ("reading", log.measured, DAMAGED),
-        ("command", tuple(log.commands), COMMANDED),
-    ):
-        own = [name for name in names if name.endswith(ends)]
-        for kind, change in DAMAGES.items():
-            if (what, kind) != ("command", "missing"):
-                name = str(rng.choice(own))
-                found[f"{what} {kind}"] = name, with_column(log, name, change)
-    return found
 
 
 def with_column(log: Log, name: str, change: Callable[[Array], Array]) -> Log:

@@ -12,7 +12,6 @@ from pathlib import Path
 from command import Call
 
 EXAMPLE = Path(__file__).resolve().parents[2] / "examples" / "05_robot_log.py"
-WIDE = 3.0 / 1.96  # three deviations over those of an interval of 95 %
 SECRET = {
     "servo.kp": 34.0,
     "servo.coulomb_friction": 0.08,
@@ -27,7 +26,8 @@ def test_the_robot_of_the_example_is_identified(
 ) -> None:
     log, place = tmp_path / "log.mcap", tmp_path / "out"
     subprocess.run([sys.executable, str(EXAMPLE), str(log)], check=True, capture_output=True)
-    code, out, err = call("identify", log, "-o", place, "--json")
+    groups = [word for name in ("servo", "mass", "contact") for word in ("--find", name)]
+    code, out, err = call("identify", log, "-o", place, *groups, "--json")
     assert code == 0
     assert "warning" not in err
     result = json.loads(out)
@@ -36,16 +36,12 @@ def test_the_robot_of_the_example_is_identified(
     for key, value in SECRET.items():
         assert own[key]["determined"], key
         assert own[key]["low"] <= value <= own[key]["high"], key
-    # of the legs' masses a walk of this length tells combinations alone
+    # of the legs' masses a walk of this length determines combinations alone
     legs = [own[f"links.{joint}.mass"] for joint in ("coxa", "femur", "tibia")]
     assert [one["determined"] for one in legs] == [False, False, False]
-    off = [one for one in own.values() if one["key"].startswith("delay.")]
-    # the example's sensors have none; of five intervals of 95 % one misses in a quarter of logs
-    far = [one for one in off if one["value"] > WIDE * (one["value"] - one["low"])]
-    assert [one["key"] for one in far] == []
     before, after = (
         {one["channel"]: one[side] for one in result["held_out"]} for side in ("before", "after")
     )
     # the noise of the sensors is left
     assert after["torque"] < 0.031
-    assert before["torque"] > 5.0 * after["torque"]
+    assert before["torque"] > 3.0 * after["torque"]

@@ -121,7 +121,7 @@ def test_bodies_of_all_legs_are_written_and_read_back(
     robot = load_robot("athena")
     changed = robot
     for row in ROBOT:
-        if row.group == "mass" and row.write is not None and row.read is not None:
+        if row.group == "mass":
             changed = row.write(changed, 1.1 * row.read(changed) + 0.001 * (not row.positive))
     write_robot(replace(found[0], robot=changed), "athena", tmp_path / "robot.toml", ["x.csv"])
     again = load_robot(tmp_path / "robot.toml")

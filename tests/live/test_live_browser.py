@@ -1,4 +1,4 @@
-"""The page of a live robot in Chromium: it is driven by keys, touch and drags.
+"""The page of a live robot in Chromium: it is driven by keys, buttons and drags.
 
 Each test waits for what it tests; none waits for a time.
 """
@@ -188,7 +188,7 @@ def test_both_themes_are_drawn(live: LivePage) -> None:
     assert len(set(colours)) == 2
 
 
-def test_on_a_phone_all_fits_its_width_and_a_stick_turns_the_robot(
+def test_on_a_phone_all_fits_its_width_and_a_button_turns_the_robot(
     browser: Any, address: str
 ) -> None:
     phone = LivePage(
@@ -197,11 +197,8 @@ def test_on_a_phone_all_fits_its_width_and_a_stick_turns_the_robot(
     assert phone.page.evaluate("document.documentElement.scrollWidth") <= 390
     phone.place()
     phone.page.evaluate("scrollTo(0, 0)")
-    box = phone.page.locator("#stick-turn").bounding_box()
-    middle = box["x"] + 0.5 * box["width"], box["y"] + 0.5 * box["height"]
-    phone.page.mouse.move(*middle)
+    phone.page.locator("[data-key=KeyA]").hover()
     phone.page.mouse.down()
-    phone.page.mouse.move(middle[0] - 40, middle[1], steps=3)
     phone.until(f"{HEADING} > 0.1")
     phone.page.mouse.up()
     phone.until("frame.command[2] === 0")

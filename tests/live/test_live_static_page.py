@@ -118,7 +118,7 @@ PHONE = {
 }
 
 
-def test_on_a_phone_all_fits_its_width_and_a_stick_walks_the_robot(
+def test_on_a_phone_all_fits_its_width_and_a_button_walks_the_robot(
     browser: Any, written: Path
 ) -> None:
     phone = opened(browser, written, **PHONE)
@@ -131,11 +131,8 @@ def test_on_a_phone_all_fits_its_width_and_a_stick_walks_the_robot(
     brightness = sum(int(part) for part in re.findall(r"\d+", colour)[:3]) / 3
     assert brightness < 60
     phone.evaluate("scrollTo(0, 0)")
-    box = phone.locator("#stick-walk").bounding_box()
-    middle = box["x"] + 0.5 * box["width"], box["y"] + 0.5 * box["height"]
-    phone.mouse.move(*middle)
+    phone.locator("[data-key=KeyW]").hover()
     phone.mouse.down()
-    phone.mouse.move(middle[0], middle[1] - 40, steps=3)
     phone.wait_for_function(f"{FRAME}.position[0] > 0.02")
     phone.mouse.up()
     phone.wait_for_function(f"{FRAME}.command[0] === 0")

@@ -27,8 +27,8 @@ PACKED = 2e-4  # m    a foot's place, from a position and angles in steps of 1/6
 PACKED_FORCE = 1e-3
 LEAST_FORCE = 0.01  # body weights that have an arrow
 TICK = 1e-6  # s    of the packed times
-# forces, slip, height and attitude, torques, energies, feet against their plan
-PLOTS = 6 + 7 + 4 + 3 + 4 + 6
+# forces, slip, height and attitude, torques, feet against their plan
+PLOTS = 6 + 7 + 4 + 3 + 6
 SMALLEST_TEXT = 11  # px
 TALLEST_BAR = 90  # px    on a phone
 BRIGHT, DIM = 200, 60  # of 255
@@ -282,9 +282,6 @@ def test_the_keyboard_does_it_all(report: Opened) -> None:
     press("-")
     assert report.value("clock.speed") == 0.5
     press("+")
-    press("f")
-    assert report.page.locator("#follow").get_attribute("aria-pressed") == "false"
-    press("f")
     press("?")
     assert report.page.locator("#help").is_visible()
     press("Escape")

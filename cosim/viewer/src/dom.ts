@@ -14,3 +14,12 @@ export function element<K extends keyof HTMLElementTagNameMap>(
 export function byId<T extends HTMLElement>(id: string): T | null {
   return document.getElementById(id) as T | null;
 }
+
+/** Lets the page's buttons open and close its dialog of keys; returns what opens or closes it. */
+export function listenToHelp(): () => void {
+  const help = byId<HTMLDialogElement>("help");
+  const toggle = () => (help?.open ? help.close() : help?.showModal());
+  byId("help-button")?.addEventListener("click", toggle);
+  byId("help-close")?.addEventListener("click", toggle);
+  return toggle;
+}

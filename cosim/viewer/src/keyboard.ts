@@ -1,20 +1,12 @@
 import type { Clock } from "./clock";
-import { byId } from "./dom";
+import { listenToHelp } from "./dom";
 
 const STEP = 0.02; // s    for an arrow key
 const LEAP = 0.5; // s    for an arrow key with shift
 
-export interface Actions {
-  follow(): void;
-  theme(): void;
-}
-
 /** Handles the keys of the replay, except keys that the focused element uses itself. */
-export function listenToKeys(clock: Clock, actions: Actions): void {
-  const help = byId<HTMLDialogElement>("help");
-  const askHelp = () => (help?.open ? help.close() : help?.showModal());
-  byId("help-button")?.addEventListener("click", askHelp);
-  byId("help-close")?.addEventListener("click", () => help?.close());
+export function listenToKeys(clock: Clock, toggleTheme: () => void): void {
+  const askHelp = listenToHelp();
   const move = (seconds: number) => {
     clock.pause();
     clock.seek(clock.time + seconds);
@@ -28,8 +20,7 @@ export function listenToKeys(clock: Clock, actions: Actions): void {
     "+": () => clock.changeSpeed(1),
     "=": () => clock.changeSpeed(1),
     "-": () => clock.changeSpeed(-1),
-    f: () => actions.follow(),
-    t: () => actions.theme(),
+    t: toggleTheme,
     "?": askHelp,
   };
   document.addEventListener("keydown", (event) => {

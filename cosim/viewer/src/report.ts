@@ -46,7 +46,7 @@ async function open(): Promise<void> {
   );
   clock.seek(requestedTime() ?? clock.start);
   const transport = new Transport(clock);
-  listenToKeys(clock, { follow: () => transport.toggleFollow(), theme: () => theme.toggle() });
+  listenToKeys(clock, () => theme.toggle());
   const panels = await makePanels(runs, clock);
   theme.listen(() => {
     for (const panel of panels) panel.repaint();

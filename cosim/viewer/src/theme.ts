@@ -1,19 +1,20 @@
 import { Color } from "three";
 
-/** The colours of the page's style sheet that the 3D view needs. */
-export interface Colours {
-  readonly dark: boolean;
-  readonly sky: Color;
-  readonly floor: Color;
-  readonly grid: Color;
-  readonly force: Color;
-  readonly print: Color;
-  readonly contour: Color;
-  readonly edge: Color;
-  readonly soil: Color;
-  readonly slippery: Color;
-  readonly patch: Color;
-}
+/** Custom properties of the page's style sheet with the colours that the 3D view needs. */
+const NAMES = [
+  "sky",
+  "floor",
+  "grid",
+  "force",
+  "print",
+  "contour",
+  "edge",
+  "soil",
+  "slippery",
+  "patch",
+] as const;
+
+export type Colours = Readonly<Record<(typeof NAMES)[number], Color>> & { readonly dark: boolean };
 
 const KEY = "hexapod-report-theme";
 
@@ -23,20 +24,8 @@ export function property(name: string): string {
 }
 
 export function readColours(): Colours {
-  const colour = (name: string) => new Color(property(name));
-  return {
-    dark: isDark(),
-    sky: colour("--sky"),
-    floor: colour("--floor"),
-    grid: colour("--grid"),
-    force: colour("--force"),
-    print: colour("--print"),
-    contour: colour("--contour"),
-    edge: colour("--edge"),
-    soil: colour("--soil"),
-    slippery: colour("--slippery"),
-    patch: colour("--patch"),
-  };
+  const colours = NAMES.map((name) => [name, new Color(property(`--${name}`))]);
+  return { ...Object.fromEntries(colours), dark: isDark() } as Colours;
 }
 
 export function isDark(): boolean {

@@ -5,15 +5,13 @@ import type { Stage } from "./scene/stage";
 
 const WINDOWS = [1, 3, 10]; // gait cycles shown by the plots
 
-/** The bar under the 3D view: play, time, speed, follow, and reset of the camera. */
+/** The bar under the 3D view: play, time, speed, and reset of the camera. */
 export class Transport {
   private readonly play = byId<HTMLButtonElement>("play");
   private readonly slider = byId<HTMLInputElement>("time");
   private readonly label = byId<HTMLElement>("clock");
   private readonly speed = byId<HTMLSelectElement>("speed");
-  private readonly follow = byId<HTMLButtonElement>("follow");
-
-  private stage: Stage | undefined;
+  private readonly home = byId<HTMLButtonElement>("home");
 
   constructor(private readonly clock: Clock) {
     this.prepare();
@@ -24,24 +22,15 @@ export class Transport {
       clock.seek(asked);
     });
     this.speed?.addEventListener("change", () => clock.setSpeed(Number(this.speed!.value)));
-    this.follow?.addEventListener("click", () => this.toggleFollow());
-    byId("home")?.addEventListener("click", () => this.stage?.home());
     clock.listen(() => this.show());
     this.show();
   }
 
-  /** Connects the bar to the stage whose camera its buttons move. */
+  /** Connects the bar to the stage whose camera its button resets. */
   attach(stage: Stage): void {
-    this.stage = stage;
-    for (const button of [this.follow, byId<HTMLButtonElement>("home")])
-      if (button) button.disabled = false;
-  }
-
-  toggleFollow(): void {
-    if (!this.stage) return;
-    this.stage.follows = !this.stage.follows;
-    this.follow?.setAttribute("aria-pressed", String(this.stage.follows));
-    this.stage.show(this.clock.time);
+    if (!this.home) return;
+    this.home.disabled = false;
+    this.home.addEventListener("click", () => stage.home());
   }
 
   private prepare(): void {
@@ -53,8 +42,7 @@ export class Transport {
     this.speed?.append(
       ...SPEEDS.map((speed) => new Option(`${speed}×`, String(speed), speed === 1, speed === 1)),
     );
-    for (const button of [this.follow, byId<HTMLButtonElement>("home")])
-      if (button) button.disabled = true;
+    if (this.home) this.home.disabled = true;
   }
 
   private show(): void {
@@ -78,28 +66,23 @@ export class Transport {
 
 /** Makes the buttons that set how much the plots show: one cycle, three, ten or the whole run. */
 export function makeWindowButtons(span: Span, clock: Clock, period: number): void {
-  const host = byId("windows");
   const whole = clock.end - clock.start;
   const cycles = WINDOWS.filter((count) => count * period < whole);
-  const choices = [
-    ...cycles.map((count) => ({
-      text: count === 1 ? "1 cycle" : `${count} cycles`,
-      width: count * period,
-    })),
-    { text: "whole run", width: whole },
+  const choices: [string, number][] = [
+    ...cycles.map((count): [string, number] => [`${count} cycles`, count * period]),
+    ["whole run", whole],
   ];
-  const buttons = choices.map(({ text, width }) => {
-    const button = element("button", "choice", text);
+  for (const [text, width] of choices) {
+    const button = element("button", "choice", text.replace(/^1 cycles/, "1 cycle"));
     button.type = "button";
     button.addEventListener("click", () => span.show(clock.time - 0.5 * width, width));
-    return { button, width };
-  });
-  const mark = () => {
-    const [low, high] = span.limits;
-    for (const { button, width } of buttons)
-      button.setAttribute("aria-pressed", String(Math.abs(high - low - width) < 1e-6 * whole));
-  };
-  span.listen(mark);
-  mark();
-  host?.append(...buttons.map(({ button }) => button));
+    const mark = () => {
+      const [low, high] = span.limits;
+      const shown = Math.abs(high - low - width) < 1e-6 * whole;
+      button.setAttribute("aria-pressed", String(shown));
+    };
+    span.listen(mark);
+    mark();
+    byId("windows")?.append(button);
+  }
 }

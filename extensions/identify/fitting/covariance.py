@@ -1,4 +1,4 @@
-"""Computes what readings tell of numbers from derivatives and from the spectra of the residuals.
+"""Computes the information of readings from derivatives and from the spectra of the residuals.
 
 White residuals of variance 1 give the information A = J' J of linear least squares. Coloured ones
 change the covariance of the estimate to A^-1 M A^-1 with M = sum over frequencies f of
@@ -46,13 +46,13 @@ class Series:
 
 
 def white_information(series: Sequence[Series]) -> Array:
-    """Returns J' J (numbers, numbers): what readings with white residuals tell, in 1/prior^2."""
+    """Returns J' J (numbers, numbers): the information by white residuals [1/prior^2]."""
     flat = [one.slopes.reshape(-1, one.slopes.shape[-1]) for one in series]
     return np.asarray(sum(own.T @ own for own in flat))
 
 
 def coloured_information(series: Sequence[Series]) -> Array:
-    """Returns A M^-1 A (numbers, numbers): what the readings tell with the residuals' spectra."""
+    """Returns A M^-1 A (numbers, numbers): the information with the residuals' spectra."""
     white = white_information(series)
     covariance: Array = np.asarray(np.linalg.inv(white + np.eye(len(white))), dtype=np.float64)
     scores = np.zeros_like(white)

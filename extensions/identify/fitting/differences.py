@@ -27,7 +27,7 @@ class Slopes:
 
 
 # A long step is what the search needs while sums of squares are rough. But its error of second
-# order hides combinations of numbers that the readings hardly tell: with it, the deviation of the
+# order hides combinations of numbers that the readings hardly show: with it, the deviation of the
 # torso's mass came out five times too small. Short central differences have converged there.
 ROUGH = Slopes(0.1, both=False, near=0.1)
 FINE = Slopes(0.01, both=True, near=1e-6)

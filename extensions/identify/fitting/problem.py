@@ -33,7 +33,7 @@ from hexapod_cosim.extensions.identify.fitting.differences import (
 from hexapod_cosim.extensions.identify.log import CHANNELS, LogError
 from hexapod_cosim.extensions.identify.log_plant import LogPlant
 from hexapod_cosim.extensions.identify.numbers.unknown import Unknown
-from hexapod_cosim.extensions.identify.unknowns import is_delay, value_before
+from hexapod_cosim.extensions.identify.unknowns import is_delay
 from hexapod_cosim.models import FmuError, Robot
 
 Array = NDArray[np.float64]
@@ -42,7 +42,7 @@ ALL = tuple(channel.key for channel in CHANNELS)
 TO_DEVIATION = 1.4826  # from the median of absolute values, of a normal distribution
 MOST_RESIDUALS = 150_000  # rows are thinned evenly where there would be more
 # A reading is left out around a jump of the simulated signal: there a shift in time by a fraction
-# of a row, of which a difference tells nothing, is a large error.
+# of a row, of which a difference says nothing, is a large error.
 JUMP = 1.0  # second difference of a simulated signal [deviations]
 BESIDE = 6  # rows before and after a jump
 BENT = 0.05  # deviations    second difference over short steps of a number, of a reading that jumps
@@ -53,10 +53,7 @@ FLOOR = 1e-9  # smallest noise, in the units of the channels
 
 
 class Problem:
-    """The residuals of experiments and their derivatives, as functions of z.
-
-    Predictions and readings of all fitted rows that count are in one array (predictions,).
-    """
+    """Residuals and derivatives; readings of all fitted rows are in one array (predictions,)."""
 
     def __init__(
         self,
@@ -69,7 +66,7 @@ class Problem:
         """pool: worker processes that have opened the plant for the same experiments."""
         self.plant, self.robot, self.pool = plant, robot, pool
         self.rows = tuple(rows)
-        self.before = {row.key: value_before(row, robot) for row in rows}
+        self.before = {row.key: row.read(robot) for row in rows}
         self._kept: Flags = np.zeros(len(rows), dtype=np.bool_)  # see `keeping`
         self.noise: dict[str, float] = {}  # by channel
         self._needs = np.array([needs_simulation(row) for row in rows], dtype=np.bool_)

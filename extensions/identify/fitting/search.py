@@ -2,7 +2,7 @@
 
 The numbers minimise the sum of squares of (predicted - measured) / noise over all readings, and of
 (number - number before) / prior over all numbers. The second sum keeps the robot file's value
-where the readings tell nothing. With white noise this is the most probable robot. The noise of a
+where the readings say nothing. With white noise this is the most probable robot. The noise of a
 channel is the typical size of its residuals, and large residuals count linearly (Huber's loss).
 
 A search on the first seconds of long logs finds the valley of the best numbers, all rows its

@@ -9,7 +9,6 @@ from dataclasses import replace
 from hexapod_cosim.extensions.identify.numbers.unknown import Unknown, section
 from hexapod_cosim.models import Robot
 from hexapod_cosim.models.records import Servo
-from hexapod_cosim.models.servos.presets import followed
 
 LINE: Callable[[Robot], bool] = lambda robot: robot.servo.drive == "line"  # noqa: E731
 MOTOR: Callable[[Robot], bool] = lambda robot: robot.servo.drive == "motor"  # noqa: E731
@@ -22,23 +21,6 @@ LOAD, SQUARE = 0.15, 0.01  # 1, 1/(N m)
 GEAR = ("servo.gear_stiffness", "servo.gear_damping", "servo.backlash")  # of elastic gears
 
 
-def _motor(name: str, unit: str, prior: float, applies: Callable[[Robot], bool] = MOTOR) -> Unknown:
-    """Returns the row of a number of measured servos, named "servo.key".
-
-    What follows from it, as the largest torque, changes with it; kp is a number of its own.
-    """
-    row = section(name, unit, "servo", prior, applies=applies)
-    plain = row.write
-    if plain is None:
-        raise ValueError(f"{name} is no number of robot files")
-
-    def write(robot: Robot, value: float) -> Robot:
-        changed = plain(robot, value)
-        return replace(changed, servo=followed(changed.servo))
-
-    return replace(row, write=write)
-
-
 def _term(
     name: str, unit: str, typical: Callable[[Servo], float], applies: Callable[[Robot], bool]
 ) -> Unknown:
@@ -47,16 +29,13 @@ def _term(
 
     typical: what such terms are of servos of this size; the prior is at least this.
     """
-    row = _motor(name, unit, 0.0)
-    read = row.read
-    if read is None:
-        raise ValueError(f"{name} is no number of robot files")
+    row = section(name, unit, "servo", 0.0, positive=False, low=0.0, applies=applies)
     high = 1.0 if unit == "1" else math.inf
 
     def prior(robot: Robot) -> float:
-        return max(TERM * read(robot), typical(robot.servo))
+        return max(TERM * row.read(robot), typical(robot.servo))
 
-    return replace(row, positive=False, low=0.0, high=high, prior_of=prior, applies=applies)
+    return replace(row, high=high, prior_of=prior)
 
 
 def _of_both(name: str, motor: str, external: str) -> Unknown:
@@ -67,7 +46,7 @@ def _of_both(name: str, motor: str, external: str) -> Unknown:
 
     def write(robot: Robot, value: float) -> Robot:
         for side in sides:
-            robot = side.write(robot, value) if side.write else robot
+            robot = side.write(robot, value)
         return robot
 
     return replace(sides[0], key=name, write=write, applies=lambda robot: _alike(robot, sides))
@@ -75,7 +54,7 @@ def _of_both(name: str, motor: str, external: str) -> Unknown:
 
 def _alike(robot: Robot, sides: Sequence[Unknown]) -> bool:
     """Returns whether terms of a measured servo are equal and not 0."""
-    first, second = (side.read(robot) for side in sides if side.read)
+    first, second = (side.read(robot) for side in sides)
     return MOTOR(robot) and first == second > 0.0
 
 
@@ -114,8 +93,8 @@ FRICTION = (
         _term(f"servo.{key}", "1/(N m)", lambda _servo: SQUARE, _has_term(key))
         for key in QUADRATIC
     ),
-    _motor("servo.stribeck_speed", "rad/s", 0.5, _has_term(*STRIBECK)),
-    _motor("servo.stribeck_exponent", "1", 0.5, _has_term(*STRIBECK)),
+    section("servo.stribeck_speed", "rad/s", "servo", 0.5, applies=_has_term(*STRIBECK)),
+    section("servo.stribeck_exponent", "1", "servo", 0.5, applies=_has_term(*STRIBECK)),
 )  # fmt: skip
 SERVO = (
     section("servo.kp", "N m/rad", "servo", 0.3),
@@ -125,8 +104,8 @@ SERVO = (
     section("servo.rotor_inertia", "kg m2", "servo", 0.5),
     section("servo.torque_max", "N m", "servo", 0.2, applies=LINE),
     section("servo.speed_max", "rad/s", "servo", 0.2, applies=LINE),
-    _motor("servo.torque_constant", "N m/A", 0.2),
-    _motor("servo.resistance", "ohm", 0.2),
+    section("servo.torque_constant", "N m/A", "servo", 0.2, applies=MOTOR),
+    section("servo.resistance", "ohm", "servo", 0.2, applies=MOTOR),
     *FRICTION,
     section("servo.gear_stiffness", "N m/rad", "servo", 0.5, applies=ELASTIC),
     section("servo.gear_damping", "N m s/rad", "servo", 0.7, applies=ELASTIC),

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from hexapod_cosim.models import Robot
+from hexapod_cosim.models.servos.presets import followed
 
 ALWAYS: Callable[[Robot], bool] = lambda _robot: True  # noqa: E731
 
@@ -21,12 +22,11 @@ class Unknown:
     group: str
     prior: float  # standard deviation; of the logarithm where `positive`
     positive: bool = True  # its logarithm is estimated
-    start: float = 0.0  # value before, of numbers that no robot file has
     low: float = -math.inf
     high: float = math.inf
-    # how the robot file's value is read and replaced; None: a number of sensors
-    read: Callable[[Robot], float] | None = None
-    write: Callable[[Robot, float], Robot] | None = None
+    # how the robot file's value is read and replaced; a number of sensors begins at a fixed one
+    read: Callable[[Robot], float] = lambda _robot: 0.0
+    write: Callable[[Robot, float], Robot] = lambda robot, _value: robot
     applies: Callable[[Robot], bool] = ALWAYS
     prior_of: Callable[[Robot], float] | None = None  # where the prior depends on the robot
     limits_of: Callable[[Robot], tuple[float, float]] | None = None  # likewise low and high
@@ -68,7 +68,10 @@ FURTHEST = 8.0  # priors from the value before
 
 
 def section(name: str, unit: str, group: str, prior: float, **more: Any) -> Unknown:
-    """Returns the row of a number in a section of robot files, named "section.key"."""
+    """Returns the row of a number in a section of robot files, named "section.key".
+
+    What follows from constants of a measured servo, as its largest torque, changes with them.
+    """
     section, _, key = name.partition(".")
 
     def read(robot: Robot) -> float:
@@ -76,6 +79,8 @@ def section(name: str, unit: str, group: str, prior: float, **more: Any) -> Unkn
 
     def write(robot: Robot, value: float) -> Robot:
         changed: Any = replace(getattr(robot, section), **{key: value})
+        if section == "servo" and changed.drive == "motor":
+            changed = followed(changed)
         sections: dict[str, Any] = {section: changed}
         return replace(robot, **sections)
 

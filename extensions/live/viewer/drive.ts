@@ -2,7 +2,6 @@ import type { Connection } from "./link";
 
 const OFTEN = 40; // ms    between two drives at the most
 const RENEW = 150; // ms    between two drives that are the same, while the robot is to move
-const GRAIN = 50; // steps of an axis from 0 to 1
 
 export interface Axes {
   readonly forward: number;
@@ -10,23 +9,25 @@ export interface Axes {
   readonly turn: number;
 }
 
-export const NONE: Axes = { forward: 0, left: 0, turn: 0 };
+const NONE: Axes = { forward: 0, left: 0, turn: 0 };
 
-/** Adds up what keys, gamepad and touch ask for, and sends it when it changes. */
+/** What the reader asks for, as shares of the largest command; it is sent when it changes. */
 export class Drive {
-  private readonly sources = new Map<string, Axes>();
   private readonly listeners: (() => void)[] = [];
+  private moves = NONE;
   private sent = JSON.stringify({ ...NONE, height: 0 });
   private at = 0;
-  private pace: number;
+  private pace = 0.3;
   private rise = 0;
 
-  constructor(
-    private readonly link: Connection,
-    speed: number,
-  ) {
-    this.pace = speed;
+  constructor(private readonly link: Connection) {
     setInterval(() => this.renew(), OFTEN);
+  }
+
+  /** Sets forward, left and turn, each from -1 to 1. */
+  set axes(axes: Axes) {
+    this.moves = axes;
+    this.changed();
   }
 
   get speed(): number {
@@ -43,27 +44,8 @@ export class Drive {
   }
 
   set height(value: number) {
-    this.rise = Math.min(Math.max(value, -1), 1);
+    this.rise = Math.min(Math.max(Math.round(100 * value) / 100, -1), 1);
     this.changed();
-  }
-
-  /** What a source asks for; NONE when it is let go. */
-  set(source: string, axes: Axes): void {
-    this.sources.set(source, axes);
-    this.changed();
-  }
-
-  /** The sum of all sources, each axis from -1 to 1. */
-  get axes(): Axes {
-    const sum = (part: (axes: Axes) => number) => {
-      const whole = [...this.sources.values()].reduce((total, one) => total + part(one), 0);
-      return Math.round(GRAIN * Math.min(Math.max(whole, -1), 1)) / GRAIN;
-    };
-    return {
-      forward: sum((one) => one.forward),
-      left: sum((one) => one.left),
-      turn: sum((one) => one.turn),
-    };
   }
 
   listen(listener: () => void): void {
@@ -77,15 +59,14 @@ export class Drive {
 
   /** Sends the drive if it is a new one, or if the robot is to move on. */
   private renew(): void {
-    const { axes } = this;
     const now = performance.now();
-    const moves = Object.values(axes).some((axis) => axis !== 0);
-    const height = Math.round(GRAIN * this.rise) / GRAIN;
+    const moves = Object.values(this.moves).some((axis) => axis !== 0);
     // the speed alone is no drive: a page that only watches sends nothing
-    const text = JSON.stringify({ ...axes, height, ...(moves ? { speed: this.pace } : {}) });
+    const shown = { ...this.moves, height: this.rise, ...(moves ? { speed: this.pace } : {}) };
+    const text = JSON.stringify(shown);
     const due = text !== this.sent || (moves && now - this.at > RENEW);
     if (!due || now - this.at < OFTEN || this.link.state !== "open") return;
     [this.sent, this.at] = [text, now];
-    this.link.send({ type: "drive", ...axes, height, speed: this.pace });
+    this.link.send({ type: "drive", ...this.moves, height: this.rise, speed: this.pace });
   }
 }

@@ -63,7 +63,7 @@ export class Keys {
       const [axis, sign] = HELD[code];
       axes[axis] = Math.min(Math.max(axes[axis] + sign, -1), 1);
     }
-    this.drive.set("keys", axes);
+    this.drive.axes = axes;
     for (const button of document.querySelectorAll<HTMLElement>("[data-key]"))
       button.classList.toggle("held", this.isHeld(button.dataset.key!));
   }

@@ -132,6 +132,7 @@ export class LocalLoop extends Listeners implements Connection {
   }
 
   private set(key: keyof Settings, value: unknown): void {
+    if (this.wanted[key] === value) return;
     this.wanted = { ...this.wanted, [key]: value };
     if (key === "gait") this.requestGait(String(value));
     else this.settings = { ...this.settings, [key]: value };
@@ -141,7 +142,6 @@ export class LocalLoop extends Listeners implements Connection {
 
   private requestGait(gait: string): void {
     const plan = this.setup.walks[this.gait].changes[gait];
-    if (!plan) return; // it walks in this gait
     this.change = { plan, since: this.robot.state.time[0] };
     this.limits = plan.limits;
   }

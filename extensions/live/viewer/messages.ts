@@ -75,5 +75,4 @@ export interface Setup {
   readonly refused: Readonly<Record<string, string>>;
   readonly gaits: readonly string[];
   readonly grounds: readonly { readonly name: string; readonly about: string }[];
-  readonly speed: number;
 }

@@ -1,5 +1,5 @@
 import plotStyle from "uplot/dist/uPlot.min.css";
-import { byId, element } from "../../../cosim/viewer/src/dom";
+import { byId, element, listenToHelp } from "../../../cosim/viewer/src/dom";
 import { Theme } from "../../../cosim/viewer/src/theme";
 import { Drive } from "./drive";
 import { Keys } from "./keys";
@@ -8,7 +8,6 @@ import type { Frame, Setup, World } from "./messages";
 import { Panel } from "./panel";
 import { Plots } from "./plots";
 import { Pusher } from "./push";
-import { listenToTouch } from "./touch";
 import { View } from "./view";
 
 const RISE = 0.1; // of the largest height, at a press of a key
@@ -18,7 +17,7 @@ const PACE = 0.05; // of the largest speed, at a press of a key
 export function start(setup: Setup, link: Connection): void {
   document.head.append(element("style", "", plotStyle));
   const theme = new Theme(byId<HTMLButtonElement>("theme"));
-  const drive = new Drive(link, setup.speed);
+  const drive = new Drive(link);
   const panel = new Panel(setup, link, drive);
   const [plots, view] = [new Plots(byId("plots")!), makeView()];
   const shown: { world?: World; frame?: Frame } = {};
@@ -38,7 +37,6 @@ export function start(setup: Setup, link: Connection): void {
   });
   const keys = new Keys(drive, actionsOf(drive, panel, theme, view));
   listenToPad(keys);
-  listenToTouch(drive);
   const pusher = view && new Pusher(view, link, () => shown.world?.weight ?? 0);
   listenToHelp();
   byId("home")?.addEventListener("click", () => view?.eye.home());
@@ -107,10 +105,4 @@ function listenToPad(keys: Keys): void {
     for (const name of ["pointerup", "pointercancel", "lostpointercapture"] as const)
       button.addEventListener(name, () => keys.release(code));
   }
-}
-
-function listenToHelp(): void {
-  const help = byId<HTMLDialogElement>("help");
-  byId("help-button")?.addEventListener("click", () => help?.showModal());
-  byId("help-close")?.addEventListener("click", () => help?.close());
 }

@@ -193,20 +193,19 @@ function roomy(from: number, to: number): uPlot.Range.MinMax {
 
 /** Returns a value of an axis as text with as many digits as the step between values needs. */
 function tick(value: number, step: number): string {
-  const digits =
-    [0, 1, 2, 3, 4, 5, 6].find(
-      (count) => Math.abs(step * 10 ** count - Math.round(step * 10 ** count)) < 1e-6,
-    ) ?? 6;
-  const text = value.toFixed(digits);
-  return (Number(text) === 0 ? (0).toFixed(digits) : text).replace("-", "−");
+  const digits = Math.min(Math.max(-Math.floor(Math.log10(step) + 1e-9), 0), 6);
+  return minus((value + 0).toFixed(digits));
+}
+
+/** Returns a number's text with a true minus sign, and zero without any. */
+function minus(text: string): string {
+  return (Number(text) === 0 ? text.replace("-", "") : text).replace("-", "−");
 }
 
 /** Returns a value as text with about three digits. */
 function figures(value: number): string {
   if (!Number.isFinite(value)) return "–";
-  if (Number.isInteger(value)) return String(value).replace("-", "−");
   const size = Math.abs(value);
   const digits = size >= 100 ? 0 : size >= 10 ? 1 : size >= 1 ? 2 : 3;
-  const text = value.toFixed(digits);
-  return (Number(text) === 0 ? (0).toFixed(digits) : text).replace("-", "−");
+  return minus(value.toFixed(digits));
 }

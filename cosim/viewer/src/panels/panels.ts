@@ -1,6 +1,5 @@
 import type { Clock } from "../clock";
 import { element } from "../dom";
-import type { Recording } from "../recording";
 import { type Curve, Panel, type PanelOptions } from "./panel";
 import { hostOf, type Run } from "./run";
 import type { Span } from "./span";
@@ -22,14 +21,6 @@ export interface Spans {
 
 const SIDES: Record<string, string> = { L: "left", R: "right" };
 const ENDS: Record<string, string> = { F: "front", M: "middle", R: "rear" };
-const ENERGIES = [
-  ["actuator_work", "work of motors", "--c1", []],
-  ["dissipated", "dissipated", "--c2", [9, 3]],
-  ["potential", "potential", "--c3", [2, 2]],
-  ["kinetic", "kinetic", "--c4", [9, 3, 2, 3]],
-  ["push_work", "work of pushes", "--c5", [5, 5]],
-] as const;
-
 /**
  * Returns how to make each plot of the page, section by section. Plots whose columns were not
  * recorded are left out.
@@ -75,13 +66,11 @@ export function panelMakers(runs: readonly Run[], clock: Clock, spans: Spans): (
       column: `${joint}.torque`,
     })),
   };
-  const makers = Object.entries(compared).flatMap(([section, plots]) =>
+  return Object.entries(compared).flatMap(([section, plots]) =>
     plots.flatMap((plot) =>
       comparedPanel(section, plot, runs, clock, plot.whole ? spans.walk : spans.cycles),
     ),
   );
-  makers.push(...runs.flatMap((run) => energyPanels(run, clock, spans.walk)));
-  return makers;
 }
 
 function comparedPanel(
@@ -107,40 +96,14 @@ function comparedPanel(
   return [() => new Panel(options, clock, span)];
 }
 
-function energyPanels({ run, recording }: Run, clock: Clock, span: Span): (() => Panel)[] {
-  const host = hostOf("energy");
-  const energies = ENERGIES.filter(
-    ([name]) => recording.has(`energy.${name}`) && moves(recording.column(`energy.${name}`)),
-  );
-  if (!host || energies.length === 0) return [];
-  const curves = energies.map(([name, label, colour, dash]) => ({
-    ...columnCurve(recording, `energy.${name}`, label, colour),
-    ...(dash.length > 0 ? { dash } : {}),
-  }));
-  const residual = [columnCurve(recording, "energy.residual", "residual", "--ink")];
-  return [
-    () => new Panel({ title: run.label, unit: "J", height: 190, curves, host }, clock, span),
-    () =>
-      new Panel(
-        { title: `${run.label}: unexplained`, unit: "mJ", height: 190, curves: residual, host },
-        clock,
-        span,
-      ),
-  ];
-}
-
 function curveOf({ run, recording }: Run, column: string): Curve {
-  const curve = columnCurve(recording, column, run.label, `--${run.key}`);
-  return run.dash.length > 0 ? { ...curve, dash: [...run.dash] } : curve;
-}
-
-function columnCurve(recording: Recording, column: string, label: string, colour: string): Curve {
   return {
-    label,
-    colour,
+    label: run.label,
+    colour: `--${run.key}`,
     time: recording.time,
     values: recording.column(column),
     at: (time) => recording.value(column, time),
+    ...(run.dash.length > 0 ? { dash: run.dash } : {}),
   };
 }
 
@@ -167,8 +130,4 @@ export function labelTimes(): void {
   for (const host of document.querySelectorAll<HTMLElement>("[data-panels]")) {
     if (host.querySelector(".playhead")) host.append(element("p", "across", "time [s]"));
   }
-}
-
-function moves(values: Float32Array): boolean {
-  return values.some((value) => value !== values[0]);
 }

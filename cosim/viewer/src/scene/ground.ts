@@ -1,6 +1,5 @@
 import {
   CanvasTexture,
-  type Color,
   Group,
   Mesh,
   MeshLambertMaterial,
@@ -10,6 +9,7 @@ import {
   SRGBColorSpace,
   Vector3,
 } from "three";
+import type { Colours } from "../theme";
 import { planeNormal, type Relief } from "./relief";
 
 const SIZE = 24; // m    of the drawn plane; fog hides its edge
@@ -45,9 +45,9 @@ export class Floor extends Group {
     this.position.copy(snapped.applyQuaternion(this.quaternion).add(origin));
   }
 
-  paint(surface: Color, line: Color): void {
+  paint({ floor, grid }: Colours): void {
     this.plane.material.map?.dispose();
-    this.plane.material.map = gridTexture(`#${surface.getHexString()}`, `#${line.getHexString()}`);
+    this.plane.material.map = gridTexture(`#${floor.getHexString()}`, `#${grid.getHexString()}`);
     this.plane.material.needsUpdate = true;
   }
 }

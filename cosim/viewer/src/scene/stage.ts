@@ -11,8 +11,6 @@ const STACKED = 560; // px    width below which views are placed above each othe
 export class Stage {
   private readonly renderer: WebGLRenderer;
   private readonly eye: Eye;
-  private readonly anchors: Vector3[];
-  private following = true;
   private stale = true;
   private warm = false;
 
@@ -22,19 +20,9 @@ export class Stage {
     readonly actors: readonly Actor[],
   ) {
     this.renderer = makeRenderer(host);
-    this.anchors = actors.map(() => new Vector3());
     this.eye = this.makeEye();
     new ResizeObserver(() => this.resize()).observe(host);
     this.resize();
-  }
-
-  get follows(): boolean {
-    return this.following;
-  }
-
-  set follows(follow: boolean) {
-    this.following = follow;
-    this.stale = true;
   }
 
   paint(colours: Colours): void {
@@ -43,10 +31,7 @@ export class Stage {
   }
 
   show(time: number): void {
-    this.actors.forEach((actor, k) => {
-      actor.show(time);
-      if (this.following) this.anchors[k].copy(actor.place);
-    });
+    for (const actor of this.actors) actor.show(time);
     this.stale = true;
   }
 
@@ -81,7 +66,7 @@ export class Stage {
       const [left, bottom] = [(k % columns) * w, height - (Math.floor(k / columns) + 1) * h];
       this.renderer.setViewport(left, bottom, w, h);
       this.renderer.setScissor(left, bottom, w, h);
-      this.eye.lookFrom(this.anchors[k], w / h);
+      this.eye.lookFrom(actor.place, w / h);
       this.renderer.render(actor.scene, this.eye.view);
     });
   }
