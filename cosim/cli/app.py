@@ -73,7 +73,9 @@ def _typer_command(entry: Command) -> Any:
     """Imports a command and returns it as the parser's."""
     run = loaded(entry.place)
     if isinstance(run, typer.Typer):
-        return get_command(run)
+        group = get_command(run)
+        group.name = entry.name
+        return group
     epilog = getattr(import_module(entry.place.partition(":")[0]), "EPILOG", None)
     alone = typer.Typer(rich_markup_mode=None, add_completion=False)
     alone.command(entry.name, epilog=epilog)(run)

@@ -143,9 +143,10 @@ What = Annotated[
 def list_what(what: What, json: Json = False) -> None:
     """List robots, scenarios, gaits, terrains, soils, servos, laws or what an extension adds."""
     from hexapod_cosim.cosim.cli.terminal import show_json, show_table, show_text
-    from hexapod_cosim.models.errors import unknown_name
 
     if what not in NAMES:
+        from hexapod_cosim.models.errors import unknown_name
+
         raise unknown_name("list", what, NAMES)
     rows = OWN[what]() if what in OWN else loaded(list_functions()[what])()
     if json:
