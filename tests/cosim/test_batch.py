@@ -86,10 +86,6 @@ def test_a_run_that_fails_or_cannot_begin_says_why_and_the_others_go_on(plant_bu
     assert steady(runs[0]) == steady(runs[4])
 
 
-def test_an_empty_batch_is_over_at_once() -> None:
-    assert list(run_batch([])) == []
-
-
 # a control whose walk of a minute takes ten minutes, and no processor time
 SLOW = """
 import time

@@ -79,14 +79,6 @@ def test_a_damaged_file_of_the_cache_is_replaced(designs: list[Design], tmp_path
     assert len(designs) == 2
 
 
-def test_without_a_cache_that_can_be_written_gains_are_designed(
-    designs: list[Design], tmp_path: Path
-) -> None:
-    (tmp_path / "gains").write_text("no folder", encoding="utf-8")
-    assert chosen_gains(scenario()) is not None
-    assert len(designs) == 1
-
-
 def test_kinematic_control_has_no_gains_and_given_ones_are_kept() -> None:
     given = make_gains(load_robot("athena"))
     assert chosen_gains(scenario(), given) is given

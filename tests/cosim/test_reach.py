@@ -95,11 +95,6 @@ def test_the_limit_shrinks_with_the_time_a_foot_stands() -> None:
     assert wave < 0.5 * tripod
 
 
-def test_a_stride_and_a_posture_out_of_reach_have_different_messages() -> None:
-    assert "strides" in refusal(Command(vx=10.0, height=0.01)).what
-    assert "posture" in refusal(Command(vx=0.1, height=0.5)).what
-
-
 def test_the_one_impossible_command_among_several_is_reported_by_its_time() -> None:
     assert (
         refusal(Command(vx=0.08), Command(time=2.5, vx=3.0)).where
