@@ -23,7 +23,7 @@ from hexapod_cosim.cosim.common.files import atomic_text
 from hexapod_cosim.cosim.results.metrics import METRICS
 from hexapod_cosim.cosim.run.preparation import chosen_gains
 from hexapod_cosim.cosim.run.walker import Walker
-from hexapod_cosim.cosim.scenario.scenario import load_scenario
+from hexapod_cosim.cosim.scenario.reading import load_scenario
 from hexapod_cosim.cosim.scenario.variation import STANDARD
 
 BOTH = ("kinematic", "compliant")

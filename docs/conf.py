@@ -39,8 +39,7 @@ myst_enable_extensions = ["dollarmath", "colon_fence", "attrs_inline", "substitu
 myst_fence_as_directive = ["math"]
 myst_heading_anchors = 3
 myst_dmath_double_inline = True
-nb_execution_timeout = 300  # s    for a cell
-nb_execution_raise_on_error = True
+nb_execution_mode = "off"  # tools/docs runs the notebooks
 
 autosummary_generate = True
 autodoc_member_order = "bysource"

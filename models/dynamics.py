@@ -381,49 +381,35 @@ def accelerations(
 ) -> Accelerations:
     """Solves eq. 1 for bodies (19, 13), whose joints may have drifted.
 
-    damping and bristle are those of `applied_forces`. In kinematic mode the
-    multiplier of a joint's additional row is minus the motor's torque. rotors: those of elastic
-    gears, whose accelerations are then part of the solution; None: rigid gears.
+    damping and bristle are those of `applied_forces`. In kinematic mode the multiplier of a joint's
+    additional row is minus the motor's torque. rotors: those of elastic gears, whose accelerations
+    are then part of the solution; None: rigid gears.
     """
     joints = constraints(robot, body)
     forces = applied_forces(robot, body, command, damping, bristle, rotors).ravel()
     load = gear_loads(robot, body, command, forces, joints)
     motor, gear = joint_torques(robot, body, command, load, rotors)
-    if is_elastic(robot.servo):
-        if rotors is None:
-            raise ValueError("rotors: got None, expected the state of the elastic gears' rotors")
-        return _elastic_accelerations(robot, body, command, forces, joints, (motor, gear), rotors)
-    g = forces + joints.G.T @ (motor + gear + stop_torques(robot, body)).ravel()
     D, c = constraint_equations(robot, body, command, joints)
-    solution = solve_constrained(mass_matrix(robot, body, joints), g, D, c)
-    dv, multiplier, drive = np.split(solution, [6 * BODIES, 6 * BODIES + len(joints.phi)])
-    motor = -drive.reshape(LEGS, JOINTS) if robot.servo.mode == "kinematic" else motor
-    return Accelerations(dv.reshape(BODIES, 6), multiplier.reshape(-1, MULTIPLIERS), motor, gear)
-
-
-def _elastic_accelerations(
-    robot: Robot,
-    body: Array,
-    command: Command,
-    forces: Array,
-    joints: Constraints,
-    torques: tuple[Array, Array],
-    rotors: Rotors,
-) -> Accelerations:
-    """Solves eq. 1 together with the rotors behind elastic gears, J_r m + J_r/n P dv = torque."""
-    count = LEGS * JOINTS
-    on_link = link_torques(robot, body, rotors)
+    if not is_elastic(robot.servo):
+        g = forces + joints.G.T @ (motor + gear + stop_torques(robot, body)).ravel()
+        solution = solve_constrained(mass_matrix(robot, body, joints), g, D, c)
+        dv, multiplier, drive = np.split(solution, [6 * BODIES, 6 * BODIES + len(joints.phi)])
+        motor = -drive.reshape(LEGS, JOINTS) if robot.servo.mode == "kinematic" else motor
+        multipliers = multiplier.reshape(-1, MULTIPLIERS)
+        return Accelerations(dv.reshape(BODIES, 6), multipliers, motor, gear)
+    if rotors is None:
+        raise ValueError("rotors: got None, expected the state of the elastic gears' rotors")
+    # with the rotors behind elastic gears: J_r m + J_r/n P dv = torque
+    on_link, count = link_torques(robot, body, rotors), LEGS * JOINTS
     g = forces + joints.G.T @ (on_link + stop_torques(robot, body)).ravel()
     coupling = spin_inertia(robot.servo) * carried_turns(robot, joints.G)
     M = link_matrix(robot, body, joints)
     W = np.block([[M, coupling.T], [coupling, robot.servo.rotor_inertia * np.eye(count)]])
-    right = np.concatenate([g, (torques[0] + torques[1] - on_link).ravel()])
-    D, c = constraint_equations(robot, body, command, joints)
+    right = np.concatenate([g, (motor + gear - on_link).ravel()])
     D = np.hstack([D, np.zeros((len(D), count))])
     dv, m, multiplier = np.split(solve_constrained(W, right, D, c), [len(M), len(W)])
-    shape = (LEGS, JOINTS)
-    multipliers = multiplier.reshape(-1, MULTIPLIERS)
-    return Accelerations(dv.reshape(BODIES, 6), multipliers, *torques, rotor=m.reshape(shape))
+    multipliers, rotor = multiplier.reshape(-1, MULTIPLIERS), m.reshape(LEGS, JOINTS)
+    return Accelerations(dv.reshape(BODIES, 6), multipliers, motor, gear, rotor)
 
 
 def joint_reactions(robot: Robot, body: Array, multipliers: Array) -> tuple[Array, Array]:

@@ -12,10 +12,10 @@ from hexapod_cosim.controller import Gait
 from hexapod_cosim.cosim.cli.running import given_gains
 from hexapod_cosim.cosim.cli.terminal import refuse_unused, show_files, show_json, waiting, warn
 from hexapod_cosim.cosim.cli.terrains import surfaces_from
-from hexapod_cosim.cosim.export.plant_export import export_controller, export_fmu
+from hexapod_cosim.cosim.export.plant import export_controller, export_fmu
 from hexapod_cosim.cosim.export.robot_files import FORMATS, Format, export_description, left_out
 from hexapod_cosim.cosim.export.robot_package import export_package, read_values
-from hexapod_cosim.cosim.interface.controller_interface import ControllerSetup
+from hexapod_cosim.cosim.interface.controller import ControllerSetup
 from hexapod_cosim.cosim.run.chosen_walk import chosen_walk
 from hexapod_cosim.cosim.run.controller_setup import make_setup
 from hexapod_cosim.cosim.scenario.records import CHOSEN, OWN

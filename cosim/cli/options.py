@@ -76,7 +76,8 @@ Engine = Annotated[
     typer.Option(
         "--engine",
         metavar="|".join(ENGINES),
-        help="Controller and loop; by default python for one run, compiled for many.",
+        help="Controller and loop; by default python for one run, compiled for many. What the loop "
+        "in C cannot run (a controller in Python, an FMU of FMI 3.0) runs on the loop in Python.",
     ),
 ]
 ControlNames = Annotated[

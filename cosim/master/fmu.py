@@ -296,7 +296,7 @@ class Fmu(Closing):
         """
         kinds: dict[str, dict[str, float]] = {}
         for name, value in values.items():
-            kind = self.variables[self._parameter(name)].type
+            kind = self._parameter(name).type
             kinds.setdefault(kind, {})[name] = self._number(name, value)
         blocks = [self.block(list(numbers)) for numbers in kinds.values()]
         for block, numbers in zip(blocks, kinds.values(), strict=True):
@@ -322,36 +322,29 @@ class Fmu(Closing):
                     f"{name}: the FMU refuses the value", got=value, where=self.path.name
                 )
 
-    def _parameter(self, name: str) -> str:
-        """Returns the name of a parameter. Raises FmuError when the name is none."""
-        if name not in self.variables:
-            parameters = [
-                known
-                for known, variable in self.variables.items()
-                if variable.causality == "parameter"
-            ]
-            raise self._unknown(name, parameters)
-        kind = self.variables[name].causality
-        if kind != "parameter":
-            fix = "set a parameter"
-            if name.startswith("torso.push"):
-                fix = "[[events]] push the torso"
+    def _parameter(self, name: str) -> Any:
+        """Returns the variable of a parameter. Raises FmuError when the name is none."""
+        variable = self.variables.get(name)
+        if variable is None:
+            kinds = ("Real", "Integer", "Enumeration", "Boolean")
+            raise self._unknown(name, [n for kind in kinds for n in self.names("parameter", kind)])
+        if variable.causality != "parameter":
             raise FmuError(
                 "not a parameter",
                 got=name,
-                expected=f"a parameter, and this is an {kind}",
-                fix=fix,
+                expected=f"a parameter, and this is an {variable.causality}",
+                fix="[[events]] push the torso"
+                if name.startswith("torso.push")
+                else "set a parameter",
                 where=self.path.name,
             )
-        return name
+        return variable
 
     def _number(self, name: str, value: Any) -> float:
-        """Converts a value to the number that the FMU takes."""
+        """Converts a value of a parameter to the number that the FMU takes."""
         variable = self.variables[name]
-        items = {}
-        if variable.type == "Enumeration":
+        if isinstance(value, str) and variable.type == "Enumeration":
             items = {item.name: item.value for item in variable.declaredType.items}
-        if isinstance(value, str) and items:
             if value not in items:
                 raise unknown_name(f"choice for {name}", value, items, error=FmuError)
             return int(items[value])

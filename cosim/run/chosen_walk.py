@@ -37,8 +37,8 @@ from hexapod_cosim.cosim.results.gait_choice import OF_FMU, GaitChoice
 from hexapod_cosim.cosim.run.kept_designs import Stance, kept_stance
 from hexapod_cosim.cosim.scenario.controls import FMU, control_of
 from hexapod_cosim.cosim.scenario.reach import reaches
+from hexapod_cosim.cosim.scenario.reading import scenario_robot
 from hexapod_cosim.cosim.scenario.records import CHOSEN, DESIGNED, OWN, Command, Scenario
-from hexapod_cosim.cosim.scenario.scenario import scenario_robot
 from hexapod_cosim.models import ReachError, Robot, ScenarioError, Servo, load_robot
 from hexapod_cosim.models.records import Vector3
 

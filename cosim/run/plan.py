@@ -5,14 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 from hexapod_cosim.controller import Gains
-from hexapod_cosim.cosim.interface.controller_interface import ControllerSetup
+from hexapod_cosim.cosim.interface.controller import ControllerSetup
 from hexapod_cosim.cosim.run.chosen_walk import ChosenWalk, choose_walk
 from hexapod_cosim.cosim.run.preparation import chosen_gains, law_of
 from hexapod_cosim.cosim.scenario.checks import check_servo_faults
 from hexapod_cosim.cosim.scenario.controls import control_of
 from hexapod_cosim.cosim.scenario.reach import check_commands
+from hexapod_cosim.cosim.scenario.reading import scenario_robot
 from hexapod_cosim.cosim.scenario.records import Scenario
-from hexapod_cosim.cosim.scenario.scenario import scenario_robot
 from hexapod_cosim.cosim.scenario.schedule import Schedule, make_schedule
 from hexapod_cosim.cosim.scenario.variation import (
     Drawn,

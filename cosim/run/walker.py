@@ -20,8 +20,8 @@ from hexapod_cosim.cosim.control.controllers import (
 )
 from hexapod_cosim.cosim.control.fmu_instance import open_controller_fmu
 from hexapod_cosim.cosim.control.fmu_law import FmuLaw
-from hexapod_cosim.cosim.export.plant_export import export_controller
-from hexapod_cosim.cosim.interface.controller_interface import (
+from hexapod_cosim.cosim.export.plant import export_controller
+from hexapod_cosim.cosim.interface.controller import (
     ControllerSetup,
     controller_parameters,
 )

@@ -18,7 +18,7 @@ from hexapod_cosim.cosim.cli.terminal import (
     show_text,
     warn,
 )
-from hexapod_cosim.cosim.results.results import results_folder
+from hexapod_cosim.cosim.results.folder import results_folder
 from hexapod_cosim.extensions.identify.log import HELD_OUT, read_log
 from hexapod_cosim.extensions.identify.numbers.friction_models import TERMS, with_friction_model
 from hexapod_cosim.extensions.identify.unknowns import GROUPS
@@ -76,11 +76,8 @@ def identify(
 ) -> None:
     """Find a robot's masses, servos, contacts and sensors from its own logs."""
     # imported only here because they are slow to import
+    from hexapod_cosim.extensions.identify import identify as fitting  # noqa: PLC0415
     from hexapod_cosim.extensions.identify import identify_files as files  # noqa: PLC0415
-    from hexapod_cosim.extensions.identify.identify import (  # noqa: PLC0415
-        identify as identify_robot,
-    )
-    from hexapod_cosim.extensions.identify.identify import usual_workers  # noqa: PLC0415
 
     groups = _checked(find or list(FOUND), held_out)
     own = load_robot(robot)
@@ -92,12 +89,12 @@ def identify(
     words += ["--held-out", str(held_out)] if held_out != HELD_OUT else []
     recorded = [read_log(path, torso_com=own.torso.com) for path in logs]
     with results_folder(output or Path("out") / "identify") as folder:
-        found = identify_robot(
+        found = fitting.identify(
             recorded,
             own,
             groups=groups,
             held_out=held_out,
-            workers=workers or usual_workers(recorded),
+            workers=workers or fitting.usual_workers(recorded),
             progress=(lambda _text: None) if json else _show_step,
         )
         folder.begin()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -67,10 +67,7 @@ class LogPlant(Closing):
         if offset is not None:
             places = [k for k, name in enumerate(commands) if name.endswith(".angle_ref")]
             table[:, places] += offset
-        self.fmu.reset()
-        self.fmu.set_blocks(self._common)
-        self.fmu.set_parameters(parameters)
-        self.fmu.initialise(float(log.time[0]), float(log.time[-1]))
+        self._begin(log.time, parameters)
         outputs = [self.fmu.block(list(own)) for own in sources.values()]
         try:
             found = self._run(
@@ -89,11 +86,14 @@ class LogPlant(Closing):
             for (own, terms), values in zip(sources.items(), found, strict=True)
             for k, term in enumerate(terms)
         }
-        sums = [
-            np.sum([columns[own, term] for term in _terms(name)], axis=0)
-            for name, own in zip(names, late, strict=True)
-        ]
-        return np.column_stack(sums)
+        return _summed(columns, zip(names, late, strict=True))
+
+    def _begin(self, time: Array, parameters: Mapping[str, float]) -> None:
+        """Resets and initialises the FMU. Raises FmuError for a parameter that is refused."""
+        self.fmu.reset()
+        self.fmu.set_blocks(self._common)
+        self.fmu.set_parameters(parameters)
+        self.fmu.initialise(float(time[0]), float(time[-1]))
 
     def _run(
         self, time: Array, delays: Sequence[float], table: Array, inputs: Any, outputs: list[Any]
@@ -127,6 +127,14 @@ def _terms(name: str) -> tuple[str, ...]:
     """
     stem, _, kind = name.rpartition(".")
     return (f"{stem}.angle", f"{stem}.gear_deflection") if kind == "motor_angle" else (name,)
+
+
+def _summed(
+    columns: Mapping[tuple[float, str], Array], wanted: Iterable[tuple[str, float]]
+) -> Array:
+    """Returns columns (rows, wanted), by name and delay, from outputs of the FMU, by both."""
+    sums = [[columns[late, term] for term in _terms(name)] for name, late in wanted]
+    return np.column_stack([np.sum(terms, axis=0) for terms in sums])
 
 
 def _events(time: Array, delays: Sequence[float]) -> list[Event]:

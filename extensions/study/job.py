@@ -16,12 +16,12 @@ from hexapod_cosim.controller import DEFAULT_PERIOD, Gains
 from hexapod_cosim.cosim.common.plant_files import code_hash, package_version
 from hexapod_cosim.cosim.common.temporary import TemporaryFolder
 from hexapod_cosim.cosim.control.controllers import check_control
-from hexapod_cosim.cosim.export.plant_export import export_controller
+from hexapod_cosim.cosim.export.plant import export_controller
 from hexapod_cosim.cosim.run.controller_setup import make_setup
 from hexapod_cosim.cosim.run.preparation import PlantFmus, chosen_gains, design_key
 from hexapod_cosim.cosim.run.walker import Walker
 from hexapod_cosim.cosim.scenario.controls import table_with_control
-from hexapod_cosim.cosim.scenario.scenario import scenario_from_table
+from hexapod_cosim.cosim.scenario.reading import scenario_from_table
 from hexapod_cosim.cosim.scenario.tables import with_values
 from hexapod_cosim.extensions.study.factors import samples
 from hexapod_cosim.extensions.study.records import Study, StudyError

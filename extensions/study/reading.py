@@ -12,8 +12,8 @@ from pathlib import Path
 from typing import Any
 
 from hexapod_cosim.cosim.scenario.controls import Control, control_beside, parse_controls
+from hexapod_cosim.cosim.scenario.reading import scenario_from_table
 from hexapod_cosim.cosim.scenario.records import COMPARED
-from hexapod_cosim.cosim.scenario.scenario import scenario_from_table
 from hexapod_cosim.cosim.scenario.tables import read_tables, with_values
 from hexapod_cosim.cosim.scenario.variation import STANDARD
 from hexapod_cosim.extensions.study import rules

@@ -16,8 +16,8 @@ from hexapod_cosim.models.schema import (
     Choice,
     Spec,
     expect_table,
+    missing_key,
     refuse_unknown_keys,
-    require,
     specs,
 )
 
@@ -47,13 +47,16 @@ def read_keys(table: Any, where: str) -> dict[str, Any]:
     Raises RobotError.
     """
     given = expect_table(table, where)
-    kind = given.get("kind")
+    kind, known = given.get("kind"), terrain_specs()
     if kind is not None:
-        check_kind(kind, where)
-    keys = list(terrain_specs()) if kind is None else keys_of(kind)
-    refuse_unknown_keys(given, [*keys, "patch"], where)
+        if kind not in NAMES:
+            raise unknown_name("surface", str(kind), NAMES, where=f"{where}.kind", error=RobotError)
+        own = CATALOGUE[kind].parameters if kind in CATALOGUE else {}
+        known = {key: known[key] for key in ("kind", *PLACED)}
+        known |= {key: parameter.spec for key, parameter in own.items()}
+    refuse_unknown_keys(given, [*known, "patch"], where)
     values: dict[str, Any] = {
-        key: terrain_specs()[key].read(value, f"{where}.{key}")
+        key: known[key].read(value, f"{where}.{key}")
         for key, value in given.items()
         if key != "patch"
     }
@@ -70,40 +73,21 @@ def patch_lists(patches: Iterable[Mapping[str, Any]]) -> list[dict[str, Any]]:
     ]
 
 
-def check_kind(kind: Any, where: str) -> None:
-    """Raises RobotError for a kind that no file may give."""
-    if kind not in NAMES:
-        raise unknown_name("surface", str(kind), NAMES, where=f"{where}.kind", error=RobotError)
-
-
-def keys_of(kind: str) -> list[str]:
-    """Returns the keys of [terrain] for a kind, but for `patch`."""
-    own = CATALOGUE[kind].parameters if kind in CATALOGUE else {}
-    return ["kind", *PLACED, *own]
-
-
 def read_terrain(table: Any, where: str) -> Terrain:
     """Returns the ground of a table [terrain]. Raises RobotError."""
-    given = expect_table(table, where)
-    if "kind" not in given:
-        expected = f"one of {', '.join(NAMES)}"
-        fix = "add `kind = ...`"
-        raise RobotError("missing key", expected=expected, fix=fix, where=f"{where}.kind")
-    kind = given["kind"]
-    check_kind(kind, where)
-    refuse_unknown_keys(given, [*keys_of(kind), "patch"], where)
-    placed = {key: value for key, value in given.items() if key in PLACED}
-    fields = {key: specs(Terrain)[key].read(placed[key], f"{where}.{key}") for key in placed}
-    if kind in PLANES:
-        if given.get("patch"):
-            what = "patches on a ground without a map"
-            expected = "a surface of the catalogue"
-            fix = 'set terrain.kind = "plane", with slope_x for a slope'
-            raise RobotError(what, got=kind, expected=expected, fix=fix, where=f"{where}.patch")
-        return Terrain(**require(Terrain, fields | {"kind": kind}, where))
-    rest = {key: value for key, value in given.items() if key not in ("kind", *PLACED)}
-    surface = make_surface(kind, rest, where=where)
-    return Terrain(**require(Terrain, fields | {"kind": "grid"}, where), surface=surface)
+    values = read_keys(table, where)
+    if "kind" not in values:
+        raise missing_key("kind", terrain_specs()["kind"], f"{where}.kind")
+    kind = values.pop("kind")
+    placed = {key: values.pop(key) for key in PLACED if key in values}
+    if kind not in PLANES:
+        return Terrain(kind="grid", **placed, surface=make_surface(kind, values, where=where))
+    if values.get("patch"):
+        what = "patches on a ground without a map"
+        expected = "a surface of the catalogue"
+        fix = 'set terrain.kind = "plane", with slope_x for a slope'
+        raise RobotError(what, got=kind, expected=expected, fix=fix, where=f"{where}.patch")
+    return Terrain(kind=kind, **placed)
 
 
 def merged_terrain(own: Terrain, given: Mapping[str, Any], where: str) -> Terrain:

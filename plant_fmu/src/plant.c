@@ -48,9 +48,7 @@ hxPlant *hx_plant_create(void) {
 
 void hx_plant_destroy(hxPlant *plant) { free(plant); }
 
-void hx_plant_set_terrain(hxPlant *plant, const hxTerrain *terrain) {
-  plant->terrain = terrain;
-}
+void hx_plant_set_terrain(hxPlant *plant, const hxTerrain *terrain) { plant->terrain = terrain; }
 
 hxStatus hx_plant_reset(hxPlant *plant, const hxDefinition *definition, double t) {
   char message[HX_MESSAGE_SIZE];

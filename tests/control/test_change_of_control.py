@@ -12,7 +12,7 @@ from gains import make_gains
 from native_controller import NativeController, NativeError, commands
 
 from hexapod_cosim.controller import BodyCommand, Controller, Gains, Measurement, make_gait
-from hexapod_cosim.cosim.interface.controller_interface import ControllerSetup
+from hexapod_cosim.cosim.interface.controller import ControllerSetup
 from hexapod_cosim.models import HexapodError, load_robot
 
 CONTROLS = ("kinematic", "compliant", "paper")
@@ -86,29 +86,6 @@ def test_python_and_c_change_the_control_alike(
         assert [bool(flag) for flag in native.out.swinging] == lead.diagnostics.swinging.tolist()
         sense(lead, generator, seen)
     assert lead.gait.name == "tripod"
-
-
-@pytest.mark.parametrize("control", CONTROLS)
-def test_a_control_that_is_changed_before_the_start_is_that_control(
-    controller_core: ct.CDLL, control: str
-) -> None:
-    expected = setup_of(control).build()
-    for first in CONTROLS:
-        lead, native = setup_of(first).build(), native_of(controller_core, first)
-        lead.change_control(*law_of(control))
-        native.change_control(control)
-        other = native_of(controller_core, control)
-        seen = Measurement(angle=ROBOT.stance.copy())
-        expected.reset()
-        for k in range(120):
-            ours = lead.step(k * STEP, WALK, seen)
-            wanted = expected.step(k * STEP, WALK, seen)
-            np.testing.assert_array_equal(ours.angle_ref, wanted.angle_ref)
-            np.testing.assert_array_equal(ours.torque_ref, wanted.torque_ref)
-            np.testing.assert_array_equal(
-                commands(native.step(k * STEP, WALK, seen)),
-                commands(other.step(k * STEP, WALK, seen)),
-            )
 
 
 def test_the_phase_and_the_command_go_on_when_the_control_changes() -> None:

@@ -8,13 +8,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hexapod_cosim.cosim.export.plant_export import export_controller
+from hexapod_cosim.cosim.export.plant import export_controller
 from hexapod_cosim.cosim.interface.names import joint_names
 from hexapod_cosim.cosim.master.connection import FmuVariable, connect, names_of_map, read_map
 from hexapod_cosim.cosim.run.controller_setup import make_setup
 from hexapod_cosim.cosim.run.single_run import simulate
 from hexapod_cosim.cosim.run.walker import Walker
-from hexapod_cosim.cosim.scenario.scenario import load_scenario
+from hexapod_cosim.cosim.scenario.reading import load_scenario
 from hexapod_cosim.models import FmuError, load_robot
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples" / "controllers"

@@ -55,19 +55,6 @@ def test_four_controls_stand_in_one_table_and_one_report(
 
 
 @pytest.mark.usefixtures("undrawn")
-def test_the_folders_of_earlier_labels_are_removed(call: Call, tmp_path: Path) -> None:
-    folder = tmp_path / "out"
-    first = ["--control", "kinematic", "--control", f"one={CPG}"]
-    second = ["--control", "kinematic", "--control", f"two={CPG}"]
-    for words in (first, second):
-        assert call("compare", "walk_flat", *words, "--seeds", "1", *QUICK, "-o", folder)[0] == 0
-    assert sorted(path.name for path in folder.iterdir() if path.is_dir()) == [
-        "kinematic",
-        "two",
-    ]
-
-
-@pytest.mark.usefixtures("undrawn")
 def test_several_terrains_and_several_controls_make_one_table(call: Call, tmp_path: Path) -> None:
     words = ["--control", "kinematic", "--control", f"a b={CPG}"]
     code, out, _ = call(

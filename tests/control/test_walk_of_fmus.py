@@ -11,9 +11,8 @@ from command import Call
 from hexapod_cosim.cosim.control.fmu_walk import walk_of_fmu
 from hexapod_cosim.cosim.interface.names import joint_names, vector_names
 from hexapod_cosim.cosim.master.fmu import Fmu
-from hexapod_cosim.cosim.run.chosen_walk import choose_walk
 from hexapod_cosim.cosim.run.single_run import simulate
-from hexapod_cosim.cosim.scenario.scenario import load_scenario
+from hexapod_cosim.cosim.scenario.reading import load_scenario
 from hexapod_cosim.models import load_robot
 
 # a walk that names neither gait nor stance
@@ -59,17 +58,6 @@ def test_the_plant_is_exported_in_the_same_stance(
         angles.get()
         # the robot stands settled: its servos give way under its weight
         np.testing.assert_allclose(angles.values.reshape(6, 3), stance, rtol=0.0, atol=0.03)
-
-
-def test_a_scenario_that_names_a_stance_has_chosen_it_for_controller_fmus_too(
-    call: Call, tmp_path: Path, plant_build: Path
-) -> None:
-    path = exported(call, tmp_path / "c.fmu", "--controller", "compliant", "--stance", "chosen")
-    (tmp_path / "level.toml").write_text(SCENARIO, encoding="utf-8")
-    overrides = [f"control={path}", "walk.stance=own"]
-    walk = choose_walk(load_scenario(tmp_path / "level.toml", overrides=overrides))
-    assert walk.stance == "own"
-    np.testing.assert_array_equal(walk.robot.stance, load_robot("athena").stance)
 
 
 def test_an_unknown_stance_is_refused(call: Call, tmp_path: Path) -> None:

@@ -22,8 +22,8 @@ from hexapod_cosim.cosim.results.comparison import read_seeds
 from hexapod_cosim.cosim.results.summary import REFUSED, Summary, summarise
 from hexapod_cosim.cosim.run.batch import run_batch
 from hexapod_cosim.cosim.run.single_run import simulate
+from hexapod_cosim.cosim.scenario.reading import load_scenario
 from hexapod_cosim.cosim.scenario.records import Scenario
-from hexapod_cosim.cosim.scenario.scenario import load_scenario
 from hexapod_cosim.cosim.scenario.variation import STANDARD
 from hexapod_cosim.models import HexapodError
 
@@ -84,10 +84,6 @@ def test_a_run_that_fails_or_cannot_begin_says_why_and_the_others_go_on(plant_bu
     assert "not finite" in runs[3].reason
     assert not any(run.walked for run in runs[1:4])
     assert steady(runs[0]) == steady(runs[4])
-
-
-def test_an_empty_batch_is_over_at_once() -> None:
-    assert list(run_batch([])) == []
 
 
 # a control whose walk of a minute takes ten minutes, and no processor time

@@ -12,10 +12,8 @@ from gains import make_gains
 from hexapod_cosim.cosim.results.gait_choice import gait_differences
 from hexapod_cosim.cosim.run.chosen_walk import ChosenWalk, choose_walk
 from hexapod_cosim.cosim.run.plan import make_plan
-from hexapod_cosim.cosim.run.single_run import simulate
-from hexapod_cosim.cosim.run.walker import Walker
+from hexapod_cosim.cosim.scenario.reading import scenario_from_table
 from hexapod_cosim.cosim.scenario.records import Scenario
-from hexapod_cosim.cosim.scenario.scenario import scenario_from_table
 from hexapod_cosim.cosim.scenario.tables import with_overrides
 from hexapod_cosim.models import ScenarioError, load_robot
 
@@ -75,11 +73,6 @@ def test_a_scenario_that_names_gait_or_stance_chooses_the_walk_of_every_control(
     assert compliant.gait.narrowing == 0.0
 
 
-def test_the_step_height_is_no_choice_of_the_walk() -> None:
-    assert not scenario("gait.step_height=0.02").names_walk
-    assert scenario("gait.step_height=0.02", "gait.duty=0.6").names_walk
-
-
 def test_a_command_too_fast_for_an_amble_is_walked_in_the_robots_gait() -> None:
     fast = walk("command.vx=0.26")
     assert (fast.gait.name, fast.stance) == ("tripod", "chosen")
@@ -112,12 +105,6 @@ def test_impossible_stances_are_refused_with_a_fix() -> None:
         scenario("walk.stanse=own")
 
 
-@pytest.mark.parametrize("setting", ["walk.stance=designed", "walk.stance=[-0.02, 0.01]"])
-def test_a_scenario_keeps_its_stance_in_its_tables(setting: str) -> None:
-    named = scenario(setting)
-    assert scenario_from_table(named.to_table(), where="mine.toml") == named
-
-
 def test_gains_for_the_robots_own_stance_keep_its_own_walk() -> None:
     kept = choose_walk(scenario(), gains=make_gains(ATHENA))
     assert (kept.gait.name, kept.stance) == ("tripod", "own")
@@ -133,22 +120,6 @@ def test_plant_and_controller_stand_in_the_chosen_stance() -> None:
     assert plan.controller.gains is not None
     assert plan.controller.gains.robot_hash == plan.controller.robot.hash
     assert not math.isclose(stance[0, 1], ATHENA.stance[0, 1], rel_tol=0.1)
-
-
-def test_both_implementations_walk_the_chosen_walk_alike() -> None:
-    names = [f"LF.{joint}.angle_ref" for joint in ("coxa", "femur", "tibia")]
-    readable = simulate(scenario())
-    with Walker(everything=True) as walker:
-        compiled = walker.simulate(scenario())
-    for name in names:
-        np.testing.assert_allclose(
-            compiled.outcome.recording.column(name),
-            readable.outcome.recording.column(name),
-            atol=AGREEMENT,
-        )
-    assert readable.facts.walking == compiled.facts.walking
-    femur = readable.outcome.recording.column("LF.femur.angle")[0]
-    assert femur == pytest.approx(walk().robot.stance[0, 1], abs=0.03)  # the servos sag
 
 
 def test_the_report_says_how_the_controls_walk_when_they_differ() -> None:

@@ -11,7 +11,7 @@ from gains import make_gains
 from hexapod_cosim.controller import SWITCHES
 from hexapod_cosim.cosim.results.result import Result
 from hexapod_cosim.cosim.run.walker import Walker
-from hexapod_cosim.cosim.scenario.scenario import load_scenario
+from hexapod_cosim.cosim.scenario.reading import load_scenario
 from hexapod_cosim.models import load_robot
 
 pytestmark = pytest.mark.usefixtures("plant_build")
@@ -122,13 +122,6 @@ def test_a_dead_sensor_makes_no_foot_land_harder_on_level_ground(leg: str) -> No
     assert hurt.metrics["peak_force"] < 1.1 * whole.metrics["peak_force"]
 
 
-def test_a_walk_that_leans_and_turns_completes_and_holds_what_is_commanded() -> None:
-    command = "command={vx=0.04, yaw_rate=0.15, height=0.008, roll=0.04, pitch=-0.03}"
-    recording = walk("athena", "compliant", command, duration=3.0).outcome.recording
-    roll, pitch = recording.columns(["torso.roll", "torso.pitch"])[-200:].mean(axis=0)
-    assert (roll, pitch) == pytest.approx((0.04, -0.03), abs=3e-3)
-
-
 # path errors of kinematic control change their sign with the weight, so they say nothing here
 FIGURES = ("slip_per_metre", "height_rms", "roll_rms", "pitch_rms", "peak_force")
 
@@ -145,22 +138,3 @@ def test_on_ground_100_times_softer_or_with_2_3_times_the_weight_it_is_no_worse_
         assert compliant.metrics[name] < kinematic.metrics[name], name
     assert compliant.metrics["slip_per_metre"] < 0.7 * kinematic.metrics["slip_per_metre"]
     assert compliant.facts.walk.fallback == 0.0
-
-
-def test_with_three_times_the_weight_and_no_squeeze_it_is_kinematic_control() -> None:
-    kinematic, compliant = (
-        walk("athena", control, "parameters.torso.mass=14", "compliance.squeeze=0", duration=6.0)
-        for control in ("kinematic", "compliant")
-    )
-    assert compliant.facts.walk.fallback > 0.8  # from 1 s on, when that weight is known
-    assert compliant.metrics["slip_per_metre"] == pytest.approx(
-        kinematic.metrics["slip_per_metre"], rel=0.1
-    )
-
-
-def test_turning_on_the_spot_asks_no_pitch_of_the_torso() -> None:
-    """A law that answered to the feet's common twist would oppose the turn."""
-    turning = walk(
-        "athena", "compliant", "command={yaw_rate=0.3}", "compliance.squeeze=0", duration=6.0
-    )
-    assert turning.metrics["pitch_rms"] < 1e-4

@@ -26,14 +26,13 @@ from hexapod_cosim.cosim.master.loop import (
 from hexapod_cosim.cosim.master.recorder import Recorder, Recording
 from hexapod_cosim.cosim.master.sensors import MEASURED, errors_of
 from hexapod_cosim.cosim.master.signals import Signals
-from hexapod_cosim.cosim.results.recordings import read_csv, write_csv
 from hexapod_cosim.cosim.results.result import Result
 from hexapod_cosim.cosim.results.warnings import locomotion_of
 from hexapod_cosim.cosim.results.window import View
 from hexapod_cosim.cosim.run.plant import apply_settings
 from hexapod_cosim.cosim.run.single_run import simulate
+from hexapod_cosim.cosim.scenario.reading import load_scenario
 from hexapod_cosim.cosim.scenario.records import Push, Scenario
-from hexapod_cosim.cosim.scenario.scenario import load_scenario, scenario_robot
 from hexapod_cosim.cosim.scenario.schedule import make_schedule, push_rows
 from hexapod_cosim.models import FmuError, HexapodError, load_robot
 
@@ -285,16 +284,6 @@ def test_a_plant_that_lacks_a_variable_is_refused_by_its_name() -> None:
         Signals(FakePlant(missing=["LM.femur.angle_ref"]))
 
 
-def test_a_recording_survives_its_csv_file_bit_for_bit(tmp_path: Path) -> None:
-    data = np.array([[0.0, 1.0 / 3.0, -0.0], [0.005, 1e-300, 1.0]])
-    recording = Recording(("time", "torso.position[1]", "LF.foot.contact"), data)
-    write_csv(recording, tmp_path / "results.csv")
-    again = read_csv(tmp_path / "results.csv")
-    assert again.names == recording.names
-    assert again.data.tobytes() == data.tobytes()
-    assert [path.name for path in tmp_path.iterdir()] == ["results.csv"]
-
-
 @pytest.mark.parametrize("order", ["C", "F"])
 @pytest.mark.parametrize("names", [["b", "c"], ["c", "b"], ["a", "c"], ["d"], []])
 def test_columns_are_those_named_and_adjoin_in_memory(
@@ -305,15 +294,6 @@ def test_columns_are_those_named_and_adjoin_in_memory(
     found = Recording(("a", "b", "c", "d"), np.array(data, order=order)).columns(names)
     assert found.tolist() == data[:, ["abcd".index(name) for name in names]].tolist()
     assert found.flags.f_contiguous
-
-
-def test_columns_do_not_give_write_access_to_the_recording() -> None:
-    data = np.arange(6.0).reshape(3, 2, order="F")
-    found = Recording(("a", "b"), data).columns(["a", "b"])
-    with pytest.raises(ValueError, match="read-only"):
-        found[0, 0] = 7.0
-    assert data[0, 0] == 0.0
-    data[0, 0] = 1.0  # whoever has the recording's own array may still write it
 
 
 def test_columns_are_chosen_by_pattern_and_a_misspelt_one_is_refused() -> None:
@@ -333,26 +313,6 @@ def test_columns_are_chosen_by_pattern_and_a_misspelt_one_is_refused() -> None:
 
 # ------------------------------------------------------------------------------------------------
 # the real FMU
-
-
-def test_fmpy_reads_our_csv_and_our_block_reads_what_fmpy_reads(
-    athena_fmu: Path, tmp_path: Path
-) -> None:
-    from fmpy.util import read_csv as fmpy_read_csv  # noqa: PLC0415
-
-    with Fmu(athena_fmu) as plant:
-        plant.initialise(0.0, 1.0)
-        block = plant.block(joint_names("angle"))
-        block.get()
-        references = [plant.variables[name].valueReference for name in block.names]
-        assert block.values.tolist() == plant._slave.getReal(references)
-    write_csv(
-        Recording(("time", *block.names), np.array([[0.0, *block.values]])),
-        tmp_path / "results.csv",
-    )
-    table = fmpy_read_csv(tmp_path / "results.csv")
-    assert table.dtype.names == ("time", *block.names)
-    assert table["LF.femur.angle"][0] == block.values[1]
 
 
 def test_a_block_fills_the_buffer_it_is_given_and_refuses_one_that_does_not_fit(
@@ -390,18 +350,6 @@ def test_a_given_fmu_of_the_robot_walks_like_the_exported_one(
 ) -> None:
     again = simulate(scenario_of(*SHORT), fmu=athena_fmu)
     np.testing.assert_array_equal(again.outcome.recording.data, walked.outcome.recording.data)
-
-
-def test_settings_reach_a_given_fmu(athena_fmu: Path) -> None:
-    robot = scenario_robot(scenario_of("friction.mu=0.4", "contact.law=flores", "servo.kp=50"))
-    with Fmu(athena_fmu) as plant:
-        apply_settings(plant, robot)
-        parameters = plant.parameters()
-    assert (parameters["friction.mu"], parameters["contact.law"], parameters["servo.kp"]) == (
-        0.4,
-        2,
-        50.0,
-    )
 
 
 def test_the_fmu_of_another_robot_is_refused(athena_fmu: Path) -> None:

@@ -11,7 +11,7 @@ from gains import make_gains
 
 from hexapod_cosim.controller import Gains, Gait, make_gait
 from hexapod_cosim.cosim.design.stance import StanceDesign, find_stance
-from hexapod_cosim.cosim.export.plant_export import export_fmu
+from hexapod_cosim.cosim.export.plant import export_fmu
 from hexapod_cosim.cosim.run import chosen_walk, preparation
 from hexapod_cosim.cosim.run.kept_designs import Stance, kept_gains, kept_stance
 from hexapod_cosim.cosim.run.preparation import (
@@ -19,8 +19,8 @@ from hexapod_cosim.cosim.run.preparation import (
     chosen_gains,
     designed_gains,
 )
+from hexapod_cosim.cosim.scenario.reading import load_scenario
 from hexapod_cosim.cosim.scenario.records import Scenario
-from hexapod_cosim.cosim.scenario.scenario import load_scenario
 from hexapod_cosim.models import HexapodError, Robot, load_robot
 
 Design = tuple[Robot, float]  # robot and period [s]
@@ -41,7 +41,7 @@ def designs(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Iterator[list[De
         calls.append((robot, period))
         return make_gains(load_robot("athena"), period=period)
 
-    monkeypatch.setattr("hexapod_cosim.cosim.design.gain_design.design_for", design)
+    monkeypatch.setattr("hexapod_cosim.cosim.design.gains.design_for", design)
     monkeypatch.setattr("hexapod_cosim.cosim.run.kept_designs.user_cache", lambda: tmp_path)
     designed_gains.cache_clear()
     yield calls
@@ -77,14 +77,6 @@ def test_a_damaged_file_of_the_cache_is_replaced(designs: list[Design], tmp_path
     designed_gains.cache_clear()
     assert chosen_gains(scenario()) == first
     assert len(designs) == 2
-
-
-def test_without_a_cache_that_can_be_written_gains_are_designed(
-    designs: list[Design], tmp_path: Path
-) -> None:
-    (tmp_path / "gains").write_text("no folder", encoding="utf-8")
-    assert chosen_gains(scenario()) is not None
-    assert len(designs) == 1
 
 
 def test_kinematic_control_has_no_gains_and_given_ones_are_kept() -> None:

@@ -9,8 +9,8 @@ import pytest
 from hexapod_cosim.controller import BodyCommand, Controller, Measurement, make_gait
 from hexapod_cosim.cosim.scenario.bundled import list_scenarios
 from hexapod_cosim.cosim.scenario.reach import check_commands
+from hexapod_cosim.cosim.scenario.reading import load_scenario, scenario_robot
 from hexapod_cosim.cosim.scenario.records import Command
-from hexapod_cosim.cosim.scenario.scenario import load_scenario, scenario_robot
 from hexapod_cosim.models import ScenarioError, load_robot
 
 ROBOT = load_robot("athena")
@@ -93,11 +93,6 @@ def test_the_limit_shrinks_with_the_time_a_foot_stands() -> None:
         for gait in ("tripod", "wave")
     )
     assert wave < 0.5 * tripod
-
-
-def test_a_stride_and_a_posture_out_of_reach_have_different_messages() -> None:
-    assert "strides" in refusal(Command(vx=10.0, height=0.01)).what
-    assert "posture" in refusal(Command(vx=0.1, height=0.5)).what
 
 
 def test_the_one_impossible_command_among_several_is_reported_by_its_time() -> None:

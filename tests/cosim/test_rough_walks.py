@@ -10,7 +10,7 @@ from gains import make_gains
 
 from hexapod_cosim.cosim.results.result import Result
 from hexapod_cosim.cosim.run.walker import Walker
-from hexapod_cosim.cosim.scenario.scenario import load_scenario
+from hexapod_cosim.cosim.scenario.reading import load_scenario
 from hexapod_cosim.models import load_robot
 
 ROUGH = ("terrain.kind=random_uniform", "terrain.max_height=20 mm", "terrain.seed=5")

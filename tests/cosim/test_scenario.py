@@ -15,8 +15,8 @@ import tomlkit
 from hexapod_cosim.controller import SWITCHES, Controller, Parts, make_gait
 from hexapod_cosim.cosim.run.chosen_walk import known_robot
 from hexapod_cosim.cosim.scenario.bundled import list_scenarios
-from hexapod_cosim.cosim.scenario.records import MAX_STEPS, Variation
-from hexapod_cosim.cosim.scenario.scenario import load_scenario, scenario_from_table, scenario_robot
+from hexapod_cosim.cosim.scenario.reading import load_scenario, scenario_from_table, scenario_robot
+from hexapod_cosim.cosim.scenario.records import Variation
 from hexapod_cosim.models import RobotError, ScenarioError
 
 
@@ -123,13 +123,6 @@ def test_gravity_is_a_number_a_vector_or_an_fmu_parameter_and_all_are_one_key(
 def test_impossible_gravity_is_refused(override: str, message: str) -> None:
     with pytest.raises(ScenarioError, match=message):
         load_scenario("walk_flat", overrides=[override])
-
-
-@pytest.mark.parametrize(
-    ("text", "value"), [(".1", 0.1), ("-.5", -0.5), ("+1.", 1.0), (".2e-1", 0.02), ("1.e2", 100.0)]
-)
-def test_a_number_may_begin_or_end_with_its_point(text: str, value: float) -> None:
-    assert load_scenario("walk_flat", overrides=[f"command.vx={text}"]).commands[0].vx == value
 
 
 def test_a_number_in_quotes_is_refused_for_its_quotes() -> None:
@@ -318,12 +311,6 @@ def test_the_message_for_an_unknown_parameter_of_a_file_names_the_nearest_and_as
     path.write_text("parameters = {torso.mass = 1}")
     with pytest.raises(ScenarioError, match=r"in quotes: \"torso\.mass\""):
         load_scenario(path)
-
-
-def test_the_longest_run_allowed_is_allowed() -> None:
-    assert (
-        load_scenario("walk_flat", overrides=[f"duration={0.005 * MAX_STEPS}"]).steps == MAX_STEPS
-    )
 
 
 def test_an_unknown_scenario_or_robot_is_reported_with_the_nearest_name() -> None:

@@ -13,7 +13,7 @@ from memory import resident
 
 from hexapod_cosim.controller import Gains
 from hexapod_cosim.cosim.control.fmu_law import law_of_ours
-from hexapod_cosim.cosim.export.plant_export import export_controller, export_fmu
+from hexapod_cosim.cosim.export.plant import export_controller, export_fmu
 from hexapod_cosim.cosim.master.fmu import Fmu
 from hexapod_cosim.cosim.master.loop import (
     COMPLETED,
@@ -33,10 +33,10 @@ from hexapod_cosim.cosim.run.plan import make_plan
 from hexapod_cosim.cosim.run.plant import initialise_plant, open_plant
 from hexapod_cosim.cosim.run.single_run import make_result, simulate
 from hexapod_cosim.cosim.run.walker import Walker
+from hexapod_cosim.cosim.scenario.reading import load_scenario
 from hexapod_cosim.cosim.scenario.records import Command, Scenario
-from hexapod_cosim.cosim.scenario.scenario import load_scenario
 from hexapod_cosim.cosim.scenario.variation import STANDARD
-from hexapod_cosim.models import FRICTION_LAWS, FmuError, load_robot
+from hexapod_cosim.models import FmuError, load_robot
 
 SENSORS = ("sensors.foot_force_noise=0.05", "sensors.foot_force_delay=0.012")
 FAULTS = (
@@ -144,20 +144,6 @@ def test_what_is_recorded_changes_no_figure_and_runs_do_not_depend_on_those_befo
     for plan, summary in zip(plans, first, strict=True):
         with Walker(everything=True) as other:
             assert steady(other.summary(plan, gains=gains_of(plan))) == summary
-
-
-def test_bristles_are_judged_however_a_scenario_asks_for_them(walker: Walker) -> None:
-    plain = replace(WALKS[0], control="kinematic", variation=None)
-    number = 1.0 + FRICTION_LAWS.index("bristle")
-    named, numbered = (
-        replace(plain, settings={**plain.settings, "friction": {"law": "bristle"}}),
-        replace(plain, parameters={"friction.law": number}),
-    )
-    figures = [walker.summary(plan) for plan in (named, numbered, plain)]
-    assert all(summary.walked for summary in figures)
-    net = [summary.metrics["slip_net_per_metre"] for summary in figures]
-    assert net[0] == pytest.approx(net[1], rel=0.2)
-    assert net[2] != net[0]
 
 
 def test_the_figures_are_those_of_the_python_controller(walker: Walker) -> None:

@@ -13,7 +13,7 @@ import pytest
 from numpy.typing import NDArray
 
 from hexapod_cosim.cosim.run.walker import Walker
-from hexapod_cosim.cosim.scenario.scenario import load_scenario
+from hexapod_cosim.cosim.scenario.reading import load_scenario
 from hexapod_cosim.models import LEG_NAMES, Robot, load_robot
 
 COMMANDED, SHARE = 0.08, 0.10  # m/s, 1: how near to it the mean speed must come

@@ -5,7 +5,6 @@ from __future__ import annotations
 import multiprocessing
 import os
 import time
-from functools import partial
 from pathlib import Path
 
 import pytest
@@ -27,14 +26,6 @@ def square(task: int) -> int:
     if task == DEADLY:
         os._exit(9)
     return task * task
-
-
-def die_once(file: Path, task: int) -> int:
-    """Ends the first process that runs the task 2."""
-    if task == 2 and not file.exists():
-        file.touch()
-        os._exit(9)
-    return task
 
 
 def wait_for_stop(_task: int) -> bool:
@@ -70,12 +61,6 @@ def test_a_task_that_ends_every_process_has_an_error_and_the_others_are_finished
             futures.pop(1).result()
         assert [future.result() for future in futures] == [16, 36, 49]
         assert len(pool._processes) == 1 + TRIES
-
-
-def test_a_process_that_dies_once_costs_no_task(tmp_path: Path) -> None:
-    with WorkerPool(2) as pool:
-        assert list(pool.map(partial(die_once, tmp_path / "died"), TASKS)) == TASKS
-    assert (tmp_path / "died").exists()
 
 
 def test_closing_a_pool_stops_its_tasks() -> None:

@@ -20,7 +20,7 @@ from random_robots import (
 )
 from scaled_robots import scaled_robot
 
-from hexapod_cosim.cosim.design.gain_design import design_for
+from hexapod_cosim.cosim.design.gains import design_for
 from hexapod_cosim.cosim.results.summary import Summary
 from hexapod_cosim.cosim.run.walker import Walker
 from hexapod_cosim.cosim.scenario.records import Scenario

@@ -10,8 +10,8 @@ import numpy as np
 from gains import PERIOD, make_gains
 
 from hexapod_cosim.controller import make_gait
-from hexapod_cosim.cosim.export.plant_export import export_controller
-from hexapod_cosim.cosim.interface.controller_interface import (
+from hexapod_cosim.cosim.export.plant import export_controller
+from hexapod_cosim.cosim.interface.controller import (
     ControllerSetup,
 )
 from hexapod_cosim.cosim.master.fmu import Fmu

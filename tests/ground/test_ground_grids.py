@@ -7,11 +7,11 @@ from pathlib import Path
 
 import pytest
 
-from hexapod_cosim.cosim.export.plant_export import export_fmu
+from hexapod_cosim.cosim.export.plant import export_fmu
 from hexapod_cosim.cosim.results.result import Result
 from hexapod_cosim.cosim.run.single_run import simulate
 from hexapod_cosim.cosim.run.walker import Walker
-from hexapod_cosim.cosim.scenario.scenario import load_scenario
+from hexapod_cosim.cosim.scenario.reading import load_scenario
 from hexapod_cosim.models import load_robot
 from hexapod_cosim.models.ground.catalogue import make_surface
 

@@ -10,7 +10,7 @@ import pytest
 
 from hexapod_cosim.cosim.run.single_run import simulate
 from hexapod_cosim.cosim.run.walker import Walker
-from hexapod_cosim.cosim.scenario.scenario import load_scenario
+from hexapod_cosim.cosim.scenario.reading import load_scenario
 
 CONTROLS = ("kinematic", "compliant")  # the paper's control does not climb the stairs
 ENERGY = 1e-4  # of the motors' work

@@ -20,8 +20,8 @@ from hexapod_cosim.cosim.run.plant import initialise_plant
 from hexapod_cosim.cosim.run.preparation import chosen_gains
 from hexapod_cosim.cosim.run.walker import Walker
 from hexapod_cosim.cosim.scenario.reach import check_commands
+from hexapod_cosim.cosim.scenario.reading import load_scenario, scenario_from_table
 from hexapod_cosim.cosim.scenario.records import Command
-from hexapod_cosim.cosim.scenario.scenario import load_scenario, scenario_from_table
 from hexapod_cosim.extensions.live import robot as live_robot
 from hexapod_cosim.extensions.live.messages import Change, Drive
 from hexapod_cosim.extensions.live.recording import NO_FORCE, Recording

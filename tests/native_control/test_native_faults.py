@@ -14,7 +14,6 @@ from gains import make_gains
 from native_walks import ALL_PARTS, Ground, close, differences, program, setup_of, uneven
 
 from hexapod_cosim.controller import (
-    BodyCommand,
     Controller,
     Measurement,
     Parts,
@@ -140,19 +139,6 @@ def test_feet_that_find_no_ground_are_awaited_at_the_same_step(
     worst, _ = differences(controller_core, setup_of(gait=gait), sense=sense)
     assert close(worst)
     assert 0.02 < np.mean(sense.held) < 0.8
-
-
-def test_stops_while_feet_are_awaited_are_the_same(controller_core: ct.CDLL) -> None:
-    """Every second command is to stand, given before the last one is reached."""
-    sense, stop = LowGround(), BodyCommand()
-
-    def told(t: float) -> BodyCommand:
-        return BodyCommand(0.04, 0.01, 0.05) if t % 1.7 < 1.2 else stop
-
-    worst, _ = differences(controller_core, setup_of(), sense=sense, steps=1400, told=told)
-    assert close(worst)
-    stands = [k for k, held in enumerate(sense.held) if held and told(0.005 * k) is stop]
-    assert len(stands) > 20
 
 
 @pytest.mark.parametrize(("speed_max", "least", "most"), [(3.0, 0.09, 0.11), (2.6, 0.0, 0.02)])

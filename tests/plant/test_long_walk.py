@@ -16,7 +16,7 @@ from states import changed
 from hexapod_cosim.controller import BodyCommand, Controller, Measurement, make_gait
 from hexapod_cosim.cosim.master.recorder import Recording
 from hexapod_cosim.cosim.run.walker import Walker
-from hexapod_cosim.cosim.scenario.scenario import load_scenario
+from hexapod_cosim.cosim.scenario.reading import load_scenario
 from hexapod_cosim.models import Robot, load_robot
 from hexapod_cosim.models.dynamics import Command
 from hexapod_cosim.models.statics import settled

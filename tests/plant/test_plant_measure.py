@@ -203,8 +203,8 @@ def test_what_is_measured_is_what_fine_samples_add_up_to(core: ct.CDLL, robot: R
     """Compares the plant at the default tolerance, with commands of 5 ms, with sums of forces,
     speeds and torques sampled every 0.1 ms.
     """
-    fine, _ = samples(core, changed(robot, solver={"tolerance": 1e-7}), 1e-4, 0.3)
-    _, coarse = samples(core, robot, 5e-3, 0.3)
+    fine, _ = samples(core, changed(robot, solver={"tolerance": 1e-7}), 1e-4)
+    _, coarse = samples(core, robot, 5e-3)
     least = 0.01 * weight(robot)
 
     def total(value: Callable[[Any], Array]) -> float:

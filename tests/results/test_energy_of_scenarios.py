@@ -9,7 +9,7 @@ import pytest
 
 from hexapod_cosim.cosim.run.walker import Walker
 from hexapod_cosim.cosim.scenario.bundled import list_scenarios
-from hexapod_cosim.cosim.scenario.scenario import load_scenario
+from hexapod_cosim.cosim.scenario.reading import load_scenario
 
 STANDING = ("stand", "compliant")  # 0.14 J of work in all, of which 0.3 mJ are missing
 # held joints have no compliant control

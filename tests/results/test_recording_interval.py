@@ -19,8 +19,8 @@ from hexapod_cosim.cosim.results.result import Result
 from hexapod_cosim.cosim.results.window import View
 from hexapod_cosim.cosim.run.single_run import simulate
 from hexapod_cosim.cosim.run.walker import Walker
+from hexapod_cosim.cosim.scenario.reading import load_scenario
 from hexapod_cosim.cosim.scenario.records import CONTROLS, Scenario
-from hexapod_cosim.cosim.scenario.scenario import load_scenario
 from hexapod_cosim.models import load_robot
 
 FOLDED = (*foot_names("peak_force"), *foot_names("peak_force_rate"), *foot_names("landing_rate"))

@@ -24,7 +24,7 @@ from hexapod_cosim.cosim.master.loop import FAILED
 from hexapod_cosim.cosim.run.batch import run_batch
 from hexapod_cosim.cosim.run.walker import Walker
 from hexapod_cosim.cosim.run.worker_pool import TRIES
-from hexapod_cosim.cosim.scenario.scenario import load_scenario
+from hexapod_cosim.cosim.scenario.reading import load_scenario
 from hexapod_cosim.extensions.study.dispatch import DIED, WHY_DIED
 from hexapod_cosim.extensions.study.records import StudyError
 from hexapod_cosim.extensions.study.store import FIGURES

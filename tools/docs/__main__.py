@@ -10,6 +10,8 @@ import sys
 from collections.abc import Iterator
 from pathlib import Path
 
+import nbformat
+from nbclient import NotebookClient
 from sphinx.cmd.build import main as sphinx
 
 from tools.docs import validation, variables
@@ -55,6 +57,7 @@ def build(out: Path, *, work: Path, computed: bool = True) -> int:
     for name, text in generated(work):
         write(work / name, text)
     if computed:
+        run_notebooks(work / "notebooks")
         validation.fill(work)
     out.mkdir(parents=True, exist_ok=True)
     if (ROOT / "extensions" / "live").is_dir():
@@ -62,8 +65,19 @@ def build(out: Path, *, work: Path, computed: bool = True) -> int:
 
         write_static_page(out / WALK)
     options = ["-W", "--keep-going", "-q", "-n", "-E", "-j", "auto", "-c", str(DOCS)]
-    options += ["-D", f"nb_execution_mode={'force' if computed else 'off'}"]
     return int(sphinx([*options, "-d", str(work / ".doctrees"), str(work), str(out)]))
+
+
+def run_notebooks(folder: Path) -> None:
+    """Runs the notebooks of a folder and writes their outputs into them.
+
+    Sphinx reads pages in forked processes, in which no kernel starts.
+    """
+    for path in sorted(folder.glob("*.ipynb")):
+        notebook = nbformat.read(path, as_version=4)
+        place = {"metadata": {"path": str(folder)}}
+        NotebookClient(notebook, timeout=300, kernel_name="python3", resources=place).execute()
+        nbformat.write(notebook, path)
 
 
 def generated(work: Path) -> Iterator[tuple[str, str]]:
