@@ -25,7 +25,7 @@ from PIL import Image
 from playwright.sync_api import sync_playwright
 
 from hexapod_cosim.cosim.run.preparation import chosen_gains
-from hexapod_cosim.cosim.scenario.scenario import load_scenario
+from hexapod_cosim.cosim.scenario.reading import load_scenario
 from hexapod_cosim.extensions.live import server as live_server
 from hexapod_cosim.extensions.live.loop import Loop
 from hexapod_cosim.extensions.live.settings import Choices, control_texts

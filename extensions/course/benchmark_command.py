@@ -27,7 +27,7 @@ from hexapod_cosim.cosim.common.files import BENCHMARK, RUN_FILE, write_json
 from hexapod_cosim.cosim.control.controllers import check_control
 from hexapod_cosim.cosim.master.interrupts import deferred_interrupts
 from hexapod_cosim.cosim.master.loop import COMPLETED
-from hexapod_cosim.cosim.results.results import ResultsFolder, results_folder
+from hexapod_cosim.cosim.results.folder import ResultsFolder, results_folder
 from hexapod_cosim.cosim.scenario.controls import AT, CHOOSER
 from hexapod_cosim.cosim.scenario.records import CHOSEN, CONTROLS
 from hexapod_cosim.extensions.course import texts

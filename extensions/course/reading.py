@@ -10,8 +10,8 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+from hexapod_cosim.cosim.scenario.reading import scenario_from_table
 from hexapod_cosim.cosim.scenario.records import Scenario
-from hexapod_cosim.cosim.scenario.scenario import scenario_from_table
 from hexapod_cosim.cosim.scenario.tables import with_overrides, with_values
 from hexapod_cosim.extensions.course.records import SPLITS, Case, Course, CourseError, Entry
 from hexapod_cosim.models import unknown_name

@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 
 from hexapod_cosim.cosim.common.components import Component
-from hexapod_cosim.cosim.interface.plant_interface import Interface, expand_interface
+from hexapod_cosim.cosim.interface.plant import Interface, expand_interface
 from hexapod_cosim.extensions.gym.policy import HIDDEN, SHAPES, Policy
 from hexapod_cosim.extensions.gym.settings import RATE, EnvSettings
 from hexapod_cosim.models import JOINT_NAMES, LEG_NAMES, HexapodError, Robot

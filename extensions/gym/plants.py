@@ -9,8 +9,8 @@ from dataclasses import replace
 from pathlib import Path
 
 from hexapod_cosim.controller import DEFAULT_PERIOD, make_gait
-from hexapod_cosim.cosim.export.plant_export import export_controller, export_fmu
-from hexapod_cosim.cosim.interface.controller_interface import ControllerSetup
+from hexapod_cosim.cosim.export.plant import export_controller, export_fmu
+from hexapod_cosim.cosim.interface.controller import ControllerSetup
 from hexapod_cosim.cosim.run.controller_setup import make_setup
 from hexapod_cosim.extensions.gym.settings import EnvSettings
 from hexapod_cosim.models import Robot, load_robot

@@ -13,10 +13,10 @@ import numpy as np
 
 from hexapod_cosim.cosim.common.files import RUN_FILE, write_json, write_text
 from hexapod_cosim.cosim.common.temporary import TemporaryFolder
-from hexapod_cosim.cosim.export.plant_export import export_fmu
+from hexapod_cosim.cosim.export.plant import export_fmu
 from hexapod_cosim.cosim.master.recorder import Recording
+from hexapod_cosim.cosim.results.folder import RESULTS
 from hexapod_cosim.cosim.results.recordings import write_recording
-from hexapod_cosim.cosim.results.results import RESULTS
 from hexapod_cosim.cosim.scenario.records import default_formats
 from hexapod_cosim.extensions.identify.command_screening import wrong_commands, wrong_commands_error
 from hexapod_cosim.extensions.identify.experiment import Experiment

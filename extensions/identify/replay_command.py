@@ -12,7 +12,7 @@ import typer
 
 from hexapod_cosim.cosim.cli.options import FmuFile, Json, RobotName
 from hexapod_cosim.cosim.cli.terminal import show_files, show_json, show_table, waiting, warn
-from hexapod_cosim.cosim.results.results import results_folder
+from hexapod_cosim.cosim.results.folder import results_folder
 from hexapod_cosim.cosim.scenario.tables import with_overrides
 from hexapod_cosim.extensions.identify.log import read_log
 from hexapod_cosim.extensions.identify.replay import replay as replay_log

@@ -17,9 +17,9 @@ from hexapod_cosim.cosim.common.components import CONTROLLER
 from hexapod_cosim.cosim.common.files import write_text
 from hexapod_cosim.cosim.common.plant_files import in_source_tree, plant_folders
 from hexapod_cosim.cosim.export.cross_build import BROWSER, Library, build_library
-from hexapod_cosim.cosim.interface.plant_interface import enumerations_of, load_interface
+from hexapod_cosim.cosim.interface.plant import enumerations_of, load_interface
+from hexapod_cosim.cosim.scenario.reading import load_scenario
 from hexapod_cosim.cosim.scenario.records import CONTROLS
-from hexapod_cosim.cosim.scenario.scenario import load_scenario
 from hexapod_cosim.extensions.live.gait_change import plan_change
 from hexapod_cosim.extensions.live.page import render_page
 from hexapod_cosim.extensions.live.settings import FLAT, Choices, control_texts, find_limits

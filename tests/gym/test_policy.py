@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 from command import Call
 
-from hexapod_cosim.cosim.export.plant_export import export_interface
+from hexapod_cosim.cosim.export.plant import export_interface
+from hexapod_cosim.cosim.export.validation import find_problems
 from hexapod_cosim.cosim.interface.names import joint_names, vector_names
 from hexapod_cosim.cosim.master.fmu import Fmu
-from hexapod_cosim.cosim.validate.validation import find_problems
 from hexapod_cosim.extensions.gym.batch import Batch
 from hexapod_cosim.extensions.gym.interface import load_policy_interface, standing_policy
 from hexapod_cosim.extensions.gym.policy import (

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 from gains import make_gains
 
-from hexapod_cosim.cosim.scenario.scenario import load_scenario, scenario_from_table
+from hexapod_cosim.cosim.scenario.reading import load_scenario, scenario_from_table
 from hexapod_cosim.extensions.live.loop import Loop
 from hexapod_cosim.extensions.live.messages import Action, Change, Drive, Push
 from hexapod_cosim.extensions.live.robot import LiveRobot

@@ -11,7 +11,7 @@ from mirror import HxOutput
 from numpy.typing import NDArray
 
 from hexapod_cosim.cosim.run.single_run import simulate
-from hexapod_cosim.cosim.scenario.scenario import load_scenario
+from hexapod_cosim.cosim.scenario.reading import load_scenario
 from hexapod_cosim.extensions.live.static_page import robot_module
 
 wasmtime = pytest.importorskip("wasmtime")

@@ -15,7 +15,7 @@ import pytest
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import connect
 
-from hexapod_cosim.cosim.scenario.scenario import load_scenario
+from hexapod_cosim.cosim.scenario.reading import load_scenario
 from hexapod_cosim.extensions.live.hub import BURST, MOST_CLIENTS, Client, Hub
 from hexapod_cosim.extensions.live.messages import MessageError
 from hexapod_cosim.extensions.live.server import LiveError, LiveServer

@@ -14,7 +14,7 @@ from headers import Header
 from mirror import OK, Real
 
 from hexapod_cosim.controller import BodyCommand, Gait, Measurement
-from hexapod_cosim.cosim.interface.controller_interface import (
+from hexapod_cosim.cosim.interface.controller import (
     ControllerSetup,
     load_controller_interface,
 )
