@@ -26,7 +26,7 @@ from hexapod_cosim.cosim.cli.terminal import (
 from hexapod_cosim.cosim.common.events import EventSink, ignore_event
 from hexapod_cosim.cosim.master.loop import COMPLETED
 from hexapod_cosim.cosim.results.comparison import METHOD
-from hexapod_cosim.cosim.run.walker import Walker
+from hexapod_cosim.cosim.run.runner import Runner
 from hexapod_cosim.cosim.run.worker_pool import processor_count
 from hexapod_cosim.extensions.study import tables
 from hexapod_cosim.extensions.study.dispatch import ProgressSink, ResultSink, dispatch
@@ -68,7 +68,7 @@ class Options:
     scheduler: str | None = None  # address of a Dask scheduler that replaces the processes
     command: str = ""  # command line that repeats the study, for its report
     events: EventSink = ignore_event  # for instance that the study waits for workers
-    runner: type[Walker] = Walker  # a class that workers can import
+    runner: type[Runner] = Runner  # a class that workers can import
 
 
 def run_study(study: Study, folder: Path, *, options: Options, start: StartProgress) -> Path:
