@@ -5,6 +5,7 @@ controller new writes.
 from __future__ import annotations
 
 import json
+from inspect import getsourcelines
 from pathlib import Path
 from typing import Any
 
@@ -83,9 +84,9 @@ def test_a_controller_that_raises_ends_the_run_with_what_was_recorded() -> None:
         result = hexapod_cosim.simulate("walk_flat", Fails, settings=SHORT)
     assert result.outcome.status == "failed"
     assert result.recording.time[-1] == pytest.approx(0.1)  # the step at 0.105 s fails
-    assert f"{Path(__file__).resolve()}, line 37, in step: RuntimeError: no idea" in (
-        result.outcome.reason
-    )
+    line = getsourcelines(Fails.step)[1] + 2
+    place = f"{Path(__file__).resolve()}, line {line}, in step"
+    assert f"{place}: RuntimeError: no idea" in result.outcome.reason
 
 
 @pytest.fixture(scope="module")
