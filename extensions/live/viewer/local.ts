@@ -22,7 +22,7 @@ interface Walk {
   /** Pattern, period, duty, step height, touch-down speed. */
   readonly gait: number[];
   readonly limits: Limits;
-  /** Plans of changes to other gaits (extensions/live/gait_change.py); times since the request. */
+  /** Plans of changes to other gaits (extensions/live/settings.py); times since the request. */
   readonly changes: Record<string, Record<"begin" | "end", number> & { limits: Limits }>;
 }
 

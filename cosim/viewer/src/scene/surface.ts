@@ -81,7 +81,7 @@ export function clamp(value: number, low: number, high: number): number {
   return Math.min(Math.max(value, low), high);
 }
 
-/** Unpacks what cosim/report/surface.py has packed. */
+/** Unpacks what cosim/report/geometry.py has packed. */
 export async function unpackSurface(packed: PackedSurface): Promise<Surface> {
   const { rows, columns } = packed;
   const size = rows * columns;
