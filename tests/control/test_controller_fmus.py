@@ -11,7 +11,7 @@ import pytest
 from hexapod_cosim.cosim.export.plant import export_controller
 from hexapod_cosim.cosim.interface.names import joint_names
 from hexapod_cosim.cosim.master.connection import FmuVariable, connect, names_of_map, read_map
-from hexapod_cosim.cosim.run.controller_setup import make_setup
+from hexapod_cosim.cosim.run.plan import make_setup
 from hexapod_cosim.cosim.run.runner import Runner
 from hexapod_cosim.cosim.run.single_run import simulate
 from hexapod_cosim.cosim.scenario.reading import load_scenario

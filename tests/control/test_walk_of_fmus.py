@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from command import Call
 
-from hexapod_cosim.cosim.control.fmu_walk import walk_of_fmu
+from hexapod_cosim.cosim.control.fmu_law import walk_of_fmu
 from hexapod_cosim.cosim.interface.names import joint_names, vector_names
 from hexapod_cosim.cosim.master.fmu import Fmu
 from hexapod_cosim.cosim.run.single_run import simulate
