@@ -12,7 +12,7 @@ that `hexapod export --platforms all` needs no compiler. The same sources and th
 the same bytes.
 
 The binaries for glibc run on musl too: musl's loader takes itself for libc.so.6 and libm.so.6, and
-they require no function that musl lacks (tests/release/test_musl.py). The wheels for Linux
+they require no function that musl lacks (tests/release/test_wheels.py). The wheels for Linux
 therefore have the tags of both.
 """
 
@@ -152,7 +152,7 @@ def components() -> list[Component]:
     """Returns the components whose binaries a wheel holds."""
     found = [PLANT, CONTROLLER]
     if (ROOT / "extensions" / "gym").is_dir():
-        from hexapod_cosim.extensions.gym.interface import POLICY  # noqa: PLC0415
+        from hexapod_cosim.extensions.gym.policy import POLICY  # noqa: PLC0415
 
         found.append(POLICY)
     return found
