@@ -26,7 +26,8 @@ from hexapod_cosim.cosim.interface.controller import (
     controller_parameters,
 )
 from hexapod_cosim.cosim.master.connection import Connection
-from hexapod_cosim.cosim.master.fmu import Fmu, FmuBlock
+from hexapod_cosim.cosim.master.fmu import Fmu
+from hexapod_cosim.cosim.master.fmu_block import FmuBlock
 from hexapod_cosim.cosim.master.loop import Progress
 from hexapod_cosim.cosim.master.native_loop import NativeMaster
 from hexapod_cosim.cosim.master.recorder import COMMAND_COLUMNS, chosen_columns

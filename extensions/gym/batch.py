@@ -160,7 +160,8 @@ class Batch(Closing):
         """Returns the functions of an FMU and what its instances are made with."""
         calls: dict[str, Any] = {name: fmu.address(call) for name, call in CALLS.items()}
         calls["step"] = step_functions(fmu, None)
-        texts = {"guid": fmu.description.guid.encode(), "resources": fmu.resources.encode()}
+        resources = fmu.resources.resolve().as_uri().encode()
+        texts = {"guid": fmu.description.guid.encode(), "resources": resources}
         self._kept.append(texts)
         return NativeFmu(**calls, **texts)
 

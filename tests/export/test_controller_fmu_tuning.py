@@ -20,7 +20,7 @@ from hexapod_cosim.cosim.interface.controller import (
     ControllerSetup,
     controller_parameters,
 )
-from hexapod_cosim.cosim.master.fmu import StepError
+from hexapod_cosim.cosim.master.fmu_block import StepError
 from hexapod_cosim.models import FmuError, load_robot
 
 
