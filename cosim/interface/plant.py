@@ -18,7 +18,7 @@ from typing import Any, Literal
 
 from hexapod_cosim.cosim.common.components import PLANT, Component
 from hexapod_cosim.cosim.common.plant_files import interface_file, package_version
-from hexapod_cosim.cosim.interface.patterns import expand, expand_names, labelled, own_axes
+from hexapod_cosim.cosim.interface.names import expand, expand_names, labelled, own_axes
 from hexapod_cosim.models.errors import HexapodError, unknown_name
 from hexapod_cosim.models.records import Robot
 from hexapod_cosim.models.statics import settled

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from hexapod_cosim.cosim.results.accuracy import Accuracy
-from hexapod_cosim.cosim.results.metrics import DUST, FLOORS
+from hexapod_cosim.cosim.results.metric_table import DUST, FLOORS
 
 SHOWN = 0.0005  # relative; a smaller effect would be shown as 0.0 %
 

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from hexapod_cosim.controller.parts import SWITCHES
-from hexapod_cosim.cosim.results.metrics import METRICS, PER_RADIAN
+from hexapod_cosim.cosim.results.metric_table import METRICS, PER_RADIAN
 from hexapod_cosim.cosim.scenario.controls import Control, parse_controls
 from hexapod_cosim.cosim.scenario.records import Scenario
 from hexapod_cosim.models import HexapodError, unknown_name

@@ -23,8 +23,7 @@ from contextlib import ExitStack
 from dataclasses import dataclass, replace
 
 from hexapod_cosim.controller import BodyCommand, ControllerError, Gains, Gait, JointCommand
-from hexapod_cosim.cosim.common.closing import Closing
-from hexapod_cosim.cosim.common.temporary import TemporaryFolder
+from hexapod_cosim.cosim.common.temporary import Closing, TemporaryFolder
 from hexapod_cosim.cosim.control.controllers import make_controller
 from hexapod_cosim.cosim.control.fmu_law import FmuLaw, law_of_ours
 from hexapod_cosim.cosim.export.plant import export_controller

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from hexapod_cosim.cosim.results.comparison import change_of
-from hexapod_cosim.cosim.results.metrics import METRICS
+from hexapod_cosim.cosim.results.metric_table import METRICS
 from hexapod_cosim.extensions.study.groups import Point, Runs
 from hexapod_cosim.extensions.study.objective import WALKED
 from hexapod_cosim.extensions.study.records import Optimise, Value

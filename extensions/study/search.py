@@ -15,7 +15,7 @@ from typing import Any
 
 from hexapod_cosim.cosim.common.files import write_json
 from hexapod_cosim.cosim.common.installation import install_extra
-from hexapod_cosim.cosim.results.metrics import METRICS
+from hexapod_cosim.cosim.results.metric_table import METRICS
 from hexapod_cosim.extensions.study.dispatch import ResultSink, dispatch
 from hexapod_cosim.extensions.study.groups import Runs
 from hexapod_cosim.extensions.study.optimum import (

@@ -10,7 +10,6 @@ from pathlib import Path
 import numpy as np
 
 from hexapod_cosim.controller import Gains
-from hexapod_cosim.cosim.common.events import EventSink, ignore_event
 from hexapod_cosim.cosim.run.walker import Walker
 from hexapod_cosim.cosim.run.worker_pool import processor_count
 from hexapod_cosim.extensions.study.dispatch import ProgressSink, ResultSink, dispatch
@@ -27,6 +26,7 @@ from hexapod_cosim.extensions.study.runs import Sweep, count_runs
 from hexapod_cosim.extensions.study.search import optimise
 from hexapod_cosim.extensions.study.store import Store
 from hexapod_cosim.extensions.study.workers import (
+    EventSink,
     Workers,
     cluster_workers,
     in_process_workers,
@@ -47,7 +47,7 @@ class Options:
     workers: int | None = None
     scheduler: str | None = None  # address of a Dask scheduler that replaces the processes
     command: str = ""  # command line that repeats the study, for its report
-    events: EventSink = ignore_event  # for instance that the study waits for workers
+    events: EventSink = lambda _text: None  # for instance that the study waits for workers
     runner: type[Walker] = Walker  # a class that workers can import
 
 

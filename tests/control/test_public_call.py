@@ -11,8 +11,8 @@ import pytest
 
 import hexapod_cosim
 from hexapod_cosim.controller import BodyCommand, JointCommand, Measurement
-from hexapod_cosim.cosim.results.metrics import METRICS
-from hexapod_cosim.cosim.results.result import Result
+from hexapod_cosim.cosim.results.facts import Result
+from hexapod_cosim.cosim.results.metric_table import METRICS
 from hexapod_cosim.models import HexapodError, Robot
 
 pytestmark = pytest.mark.usefixtures("plant_build")

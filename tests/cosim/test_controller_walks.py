@@ -9,7 +9,7 @@ import pytest
 from gains import make_gains
 
 from hexapod_cosim.controller import SWITCHES
-from hexapod_cosim.cosim.results.result import Result
+from hexapod_cosim.cosim.results.facts import Result
 from hexapod_cosim.cosim.run.walker import Walker
 from hexapod_cosim.cosim.scenario.reading import load_scenario
 from hexapod_cosim.models import load_robot

@@ -20,7 +20,7 @@ from matplotlib.ticker import MaxNLocator
 from hexapod_cosim.controller.figure_style import DPI, SETTINGS, UNDATED
 from hexapod_cosim.cosim.common.control_style import ControlStyle, control_styles
 from hexapod_cosim.cosim.common.files import atomic_path
-from hexapod_cosim.cosim.results.metrics import METRICS
+from hexapod_cosim.cosim.results.metric_table import METRICS
 from hexapod_cosim.extensions.study.groups import Point
 from hexapod_cosim.extensions.study.optimum import Trial
 from hexapod_cosim.extensions.study.records import GRID, VALUES, Factor, Study

@@ -10,7 +10,7 @@ from matplotlib.colors import LogNorm, Normalize
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from hexapod_cosim.cosim.results.metrics import FLOORS
+from hexapod_cosim.cosim.results.metric_table import FLOORS
 from hexapod_cosim.extensions.study.groups import Point
 from hexapod_cosim.extensions.study.records import Factor, Study
 from hexapod_cosim.extensions.study.report.tables import label_of

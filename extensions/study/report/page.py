@@ -10,7 +10,7 @@ import tomlkit
 from hexapod_cosim.cosim.common.files import without_none, write_text
 from hexapod_cosim.cosim.report.page import embedded, render
 from hexapod_cosim.cosim.results.comparison import METHOD
-from hexapod_cosim.cosim.results.metrics import METRICS
+from hexapod_cosim.cosim.results.metric_table import METRICS
 from hexapod_cosim.extensions.study.report import tables
 from hexapod_cosim.extensions.study.report.figures import drawings, save
 from hexapod_cosim.extensions.study.report.notes import notes
