@@ -105,7 +105,7 @@ def interfaces() -> tuple[Interface, ...]:
     core = (load_interface(robot), load_controller_interface(setup))
     if not (ROOT / "extensions" / "gym").is_dir():
         return core
-    from hexapod_cosim.extensions.gym.interface import (  # noqa: PLC0415  may be deleted
+    from hexapod_cosim.extensions.gym.policy import (  # noqa: PLC0415  may be deleted
         load_policy_interface,
         standing_policy,
     )

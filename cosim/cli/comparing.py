@@ -58,7 +58,7 @@ from hexapod_cosim.cosim.results.side_by_side import (
 )
 from hexapod_cosim.cosim.results.summary import Summary, summarise
 from hexapod_cosim.cosim.run.batch import run_batch
-from hexapod_cosim.cosim.run.chosen_walk import choose_walk
+from hexapod_cosim.cosim.run.gait_selection import select_gait
 from hexapod_cosim.cosim.run.preparation import PlantFmus, chosen_gains
 from hexapod_cosim.cosim.scenario.controls import CHOOSER, Control
 from hexapod_cosim.cosim.scenario.reading import load_scenario
@@ -148,7 +148,7 @@ class Work:
         found = {}
         for control in self.compared:
             plan = replace(self.plan, control=control.text)
-            walk = choose_walk(plan, gains=chosen_gains(plan, self.options.gains))
+            walk = select_gait(plan, gains=chosen_gains(plan, self.options.gains))
             found[control.label] = walk.as_facts()
         return gait_differences(found)
 

@@ -12,7 +12,7 @@ from hexapod_cosim.cosim.common.components import PLANT
 from hexapod_cosim.cosim.common.plant_files import binary, fmi2_platform
 from hexapod_cosim.cosim.common.temporary import TemporaryFolder
 from hexapod_cosim.cosim.export.plant import export_fmu
-from hexapod_cosim.cosim.run.chosen_walk import choose_walk
+from hexapod_cosim.cosim.run.gait_selection import select_gait
 from hexapod_cosim.cosim.run.kept_designs import kept_gains
 from hexapod_cosim.cosim.scenario.controls import control_of
 from hexapod_cosim.cosim.scenario.records import Scenario
@@ -65,7 +65,7 @@ def design_key(scenario: Scenario) -> tuple[Robot, float]:
 
     Scenarios with equal keys share gains. Raises HexapodError for a robot that cannot be read.
     """
-    return choose_walk(scenario).robot, scenario.macro_step
+    return select_gait(scenario).robot, scenario.macro_step
 
 
 @lru_cache(maxsize=MAX_FMUS)

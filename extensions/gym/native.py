@@ -1,11 +1,15 @@
-"""The structures and functions of environments.h for ctypes."""
+"""The structures and functions of environments.h for ctypes, and what a batch has to free."""
 
 from __future__ import annotations
 
 import ctypes as ct
+import os
+import threading
+from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
 
+from hexapod_cosim.cosim.master.fmu import Fmu
 from hexapod_cosim.cosim.master.loop_library import load_loop, read_headers
 
 # functions of an FMU by the members of hxEnvFmu
@@ -48,3 +52,46 @@ def environments_library() -> ct.CDLL:
     for name in ("reset", "step", "serve", "stop", "destroy", "drawn", "values"):
         getattr(library, f"hx_environments_{name}").restype = None
     return library
+
+
+@dataclass
+class Owned:
+    """Threads, environments and FMUs of one batch.
+
+    It has no reference to the batch, so that a batch that nobody closed can be freed by it.
+    """
+
+    handle: int | None = None  # of hxEnvironments
+    servers: list[threading.Thread] = field(default_factory=list)
+    fmus: list[Fmu] = field(default_factory=list)
+    process: int = field(default_factory=os.getpid)  # that made them
+
+    def serve(self, count: int) -> None:
+        """Starts a number of threads that work for the environments."""
+        for _ in range(count):
+            server = threading.Thread(
+                target=environments_library().hx_environments_serve,
+                args=(self.handle,),
+                daemon=True,
+            )
+            server.start()
+            self.servers.append(server)
+
+    def free(self) -> None:
+        """Ends the threads and frees the environments; may be called twice.
+
+        In a process that was forked from the one that made them it frees nothing: the threads do
+        not exist there, and the unpacked files belong to the first process.
+        """
+        handle, self.handle = self.handle, None
+        if os.getpid() != self.process:
+            return
+        if handle:
+            environments_library().hx_environments_stop(handle)
+            for server in self.servers:
+                server.join()
+            environments_library().hx_environments_destroy(handle)
+        for fmu in self.fmus:
+            fmu.close()
+        self.servers.clear()
+        self.fmus.clear()

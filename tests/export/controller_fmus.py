@@ -17,7 +17,7 @@ from hexapod_cosim.cosim.interface.controller import (
 from hexapod_cosim.cosim.master.fmu import Fmu
 from hexapod_cosim.cosim.master.sensors import MEASURED
 from hexapod_cosim.cosim.master.signals import COMMANDS
-from hexapod_cosim.cosim.run.chosen_walk import known_robot
+from hexapod_cosim.cosim.run.gait_selection import known_robot
 from hexapod_cosim.cosim.scenario.records import Scenario
 from hexapod_cosim.models import load_robot
 
