@@ -24,7 +24,7 @@ from hexapod_cosim.cosim.scenario.controls import parse_controls
 from hexapod_cosim.cosim.scenario.reading import load_scenario
 from hexapod_cosim.cosim.scenario.variation import STANDARD
 from hexapod_cosim.extensions.course import texts
-from hexapod_cosim.extensions.course.picture import FOLDER, STEM
+from hexapod_cosim.extensions.course.report import FOLDER, STEM
 from hexapod_cosim.extensions.course.store import read_table
 from hexapod_cosim.extensions.course.table import Table
 

@@ -11,8 +11,7 @@ from hexapod_cosim.cosim.results.locomotion import missed_end
 from hexapod_cosim.cosim.results.summary import UNBALANCED, Summary
 from hexapod_cosim.cosim.run.batch import run_batch
 from hexapod_cosim.cosim.scenario.records import Scenario
-from hexapod_cosim.extensions.course.reading import run_scenario
-from hexapod_cosim.extensions.course.records import QUANTITIES, Case, Course, Entry
+from hexapod_cosim.extensions.course.records import QUANTITIES, Case, Course, Entry, run_scenario
 
 
 @dataclass(frozen=True)

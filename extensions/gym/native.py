@@ -10,7 +10,7 @@ from functools import cache
 from pathlib import Path
 
 from hexapod_cosim.cosim.master.fmu import Fmu
-from hexapod_cosim.cosim.master.loop_library import load_loop, read_headers
+from hexapod_cosim.cosim.master.loop_library import Header, load_loop, loop_header
 
 # functions of an FMU by the members of hxEnvFmu
 CALLS = {
@@ -23,13 +23,11 @@ CALLS = {
     "work_size": "hx_shared_work_size",  # which a foreign FMU does not have, like the next
     "work_use": "hx_shared_work_use",
 }
-Pointer, Size = ct.c_void_p, ct.c_size_t
-
-HEADER = Path(__file__).parent / "loop" / "include" / "hexapod" / "environments.h"
-_STRUCTURES = read_headers(HEADER).structures
-NativeFmu, NativeDraws = _STRUCTURES["hxEnvFmu"], _STRUCTURES["hxEnvDraws"]
-NativeGround, NativeSettings = _STRUCTURES["hxEnvGround"], _STRUCTURES["hxEnvSettings"]
-NativeArrays = _STRUCTURES["hxEnvArrays"]
+PATH = Path(__file__).parent / "loop" / "include" / "hexapod" / "environments.h"
+HEADER = Header(PATH, base=loop_header())
+NativeFmu, NativeDraws = HEADER.types["hxEnvFmu"], HEADER.types["hxEnvDraws"]
+NativeGround, NativeSettings = HEADER.types["hxEnvGround"], HEADER.types["hxEnvSettings"]
+NativeArrays = HEADER.types["hxEnvArrays"]
 ARRAYS = tuple(name for name, _ in NativeArrays._fields_)
 
 
@@ -39,19 +37,7 @@ def environments_library() -> ct.CDLL:
 
     Raises FmuError when the library is missing or has another version.
     """
-    library = load_loop("environments", "hx_environments_settings_size", "hxEnvSettings", HEADER)
-    library.hx_environments_create.restype = Pointer
-    library.hx_environments_create.argtypes = [Pointer, Pointer, Size, ct.c_char_p]
-    library.hx_environments_message.restype = ct.c_char_p
-    library.hx_environments_message.argtypes = [Pointer, Size]
-    library.hx_environments_reset.argtypes = [Pointer] * 3
-    for name in ("drawn", "values"):
-        getattr(library, f"hx_environments_{name}").argtypes = [Pointer, Size, Pointer]
-    for name in ("step", "serve", "stop", "destroy"):
-        getattr(library, f"hx_environments_{name}").argtypes = [Pointer]
-    for name in ("reset", "step", "serve", "stop", "destroy", "drawn", "values"):
-        getattr(library, f"hx_environments_{name}").restype = None
-    return library
+    return load_loop("environments", "hx_environments_settings_size", "hxEnvSettings", HEADER)
 
 
 @dataclass

@@ -18,9 +18,9 @@ from matplotlib.colors import LogNorm, Normalize
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from hexapod_cosim.controller.figure_style import DPI, SETTINGS, UNDATED
+from hexapod_cosim.controller.figure_style import SETTINGS
 from hexapod_cosim.cosim.common.control_style import control_styles
-from hexapod_cosim.cosim.common.files import atomic_path, not_writable
+from hexapod_cosim.cosim.report.figures import Figures, figure_files, write_figures
 from hexapod_cosim.cosim.results.metric_table import FLOORS, METRICS
 from hexapod_cosim.extensions.study.groups import Point
 from hexapod_cosim.extensions.study.records import GRID, VALUES, Factor, Study
@@ -82,22 +82,13 @@ def _of_factors(study: Study, points: Sequence[Point]) -> dict[str, Drawing]:
 
 
 def save(found: dict[str, Drawing], folder: Path) -> list[Path]:
-    """Writes every figure as SVG and PNG; returns the files. Raises HexapodError."""
-    try:
-        folder.mkdir(exist_ok=True)
-    except OSError as error:
-        raise not_writable(folder, error) from error
-    files: list[Path] = []
+    """Writes every figure as SVG and PNG; returns the files."""
+    images: dict[str, bytes] = {}
     with matplotlib.rc_context(SETTINGS):
         for name, item in found.items():
-            figure = item.draw()
-            for kind, metadata in UNDATED.items():
-                with atomic_path(folder / f"{name}.{kind}") as path:
-                    figure.savefig(path, format=kind, dpi=DPI, metadata=metadata)
-                # the layout takes as long as the drawing, and is the same for both formats
-                figure.set_layout_engine("none")
-                files.append(folder / f"{name}.{kind}")
-    return files
+            files = figure_files(item.draw())
+            images |= {f"{name}.{kind}": content for kind, content in files}
+    return write_figures(Figures(images, {}), folder)
 
 
 def over_factors(points: Sequence[Point], factors: Sequence[Factor], study: Study) -> Figure:
