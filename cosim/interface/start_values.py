@@ -11,7 +11,7 @@ from types import SimpleNamespace
 from typing import Any
 
 from hexapod_cosim.cosim.common.components import Component
-from hexapod_cosim.cosim.interface.names import expand, labelled
+from hexapod_cosim.cosim.interface.patterns import expand, labelled
 from hexapod_cosim.cosim.interface.plant import (
     Enumeration,
     Step,

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from functools import cache
 
 from hexapod_cosim.cosim.common.components import CONTROLLER, PLANT, Component
-from hexapod_cosim.cosim.interface.names import expand, labelled
+from hexapod_cosim.cosim.interface.patterns import expand, labelled
 from hexapod_cosim.cosim.interface.plant import read_table
 
 NO_UNIT = "1"

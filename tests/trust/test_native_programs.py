@@ -1,9 +1,10 @@
-"""The stack that calls of the cross-compiled binaries take, which are those of a release: zig
-inlines other functions than the compiler of this machine, with which tests/native are built.
+"""Runs programs of tests/native: every choice that a definition offers, and the stack that calls
+of released binaries take.
 """
 
 from __future__ import annotations
 
+import os
 import platform
 import shutil
 import subprocess
@@ -18,6 +19,27 @@ from hexapod_cosim.cosim.export.cross_build import build_library
 from hexapod_cosim.cosim.export.platforms import component_library
 
 ROOT = Path(__file__).parents[2]
+GRIDS = ROOT / "tests" / "native" / "grids"
+
+
+def test_every_choice_of_a_definition_keeps_the_laws_or_is_refused_by_name(
+    plant_build: Path,
+) -> None:
+    search = os.pathsep.join([str(Path(sys.executable).parent), os.environ.get("PATH", "")])
+    cmake = shutil.which("cmake", path=search)
+    assert cmake is not None
+    command = [cmake, "--build", str(plant_build), "--target", "test_choices"]
+    built = subprocess.run(
+        command, capture_output=True, text=True, check=False, env=os.environ | {"PATH": search}
+    )
+    assert built.returncode == 0, built.stdout + built.stderr
+    program = plant_build / "tests" / "native" / "test_choices"
+    done = subprocess.run([program, GRIDS], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (0, "")
+
+
+# The stack that calls of the cross-compiled binaries take, which are those of a release: zig
+# inlines other functions than the compiler of this machine, with which tests/native are built.
 
 
 @pytest.mark.skipif(

@@ -1,6 +1,6 @@
-"""Writes the first inputs of the fuzz targets to tests/fuzz/seeds: a few short ones per target.
+"""Writes the first inputs of the fuzz targets to a folder: a few short ones per target.
 
-usage: python tests/fuzz/seeds.py
+usage: python tests/support/fuzz_seeds.py FOLDER
 
 A seed of calls is a list of bytes that fuzz_fmi2.c or fuzz_fmi3.c decodes; the numbers of calls are
 indices of the table `call` there. Inputs that mutations find are kept in build/fuzz, not here.
@@ -8,12 +8,11 @@ indices of the table `call` there. Inputs that mutations find are kept in build/
 
 from __future__ import annotations
 
-import struct
+import sys
 from pathlib import Path
 
-FOLDER = Path(__file__).parent / "seeds"
+GRIDS = Path(__file__).parents[1] / "native" / "grids"
 PARTS = ("plant", "controller")
-NAN = float("nan")
 # indices of calls
 FMI2 = {"initialize": 3, "get": 10, "set": 12, "save": 16, "restore": 17, "serialize": 19}
 FMI2 |= {"step": 20, "directional": 26, "continuous": 8, "set_states": 30, "row": 31, "update": 27}
@@ -50,19 +49,6 @@ FOUND = {
 }
 
 
-def grid(rows: int, columns: int, kind: int, table: list[float] | None = None) -> bytes:
-    """Returns a grid file (plant_fmu/include/hexapod/terrain.h), with one material or none."""
-    heights = [0.01 * ((3 * i) % 5) for i in range(rows * columns)]
-    head = struct.pack(
-        "<8s4q3d64s", b"hxGrid01", rows, columns, kind, table is not None, -0.5, -0.5, 0.25, b"seed"
-    )
-    content = head + struct.pack(f"<{len(heights)}d", *heights)
-    if table is None:
-        return content
-    codes = bytes(i % 2 for i in range(len(heights)))
-    return content + codes.ljust(-(-len(codes) // 8) * 8, b"\0") + struct.pack("<16d", *table)
-
-
 def seeds() -> dict[str, dict[str, bytes]]:
     """Returns the seeds by target and name."""
     found = {}
@@ -82,11 +68,7 @@ def seeds() -> dict[str, dict[str, bytes]]:
             "damaged": bytes([0, 1, 100, 0, 0, 1, 7]),
             "forged": bytes([1, 2, 72, 0, 0, 1, 7, 0, 1, 0, 0, 100, 140]),
         }
-    found["fuzz_grid"] = {
-        "smooth": grid(5, 4, 1),
-        "blocks": grid(4, 4, 2),
-        "material": grid(4, 4, 2, [0.3, 0.4, NAN, *13 * [0.0]]),
-    }
+    found["fuzz_grid"] = {path.name: path.read_bytes() for path in sorted(GRIDS.iterdir())}
     return found
 
 
@@ -99,4 +81,4 @@ def write(folder: Path) -> None:
 
 
 if __name__ == "__main__":
-    write(FOLDER)
+    write(Path(sys.argv[1]))
