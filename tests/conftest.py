@@ -41,8 +41,7 @@ LONGEST = (
     "test_platform_walks",
     "test_cli",
     "test_study_cluster",
-    "test_readme",
-    "test_howto",
+    "test_typed_commands",
     "test_live_browser",
     "test_twin_motion",
     "test_every_terrain",
@@ -60,7 +59,6 @@ LONGEST = (
     "test_export",
     "test_fmi3_archive",
     "test_control_benchmark",
-    "test_examples",
     "test_plant_lanes",
 )
 # what builds the same binaries for other platforms stays together

@@ -24,7 +24,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
 BUILD = ROOT / "build" / "fuzz"
-SEEDS = ROOT / "tests" / "fuzz" / "seeds"
+SEEDS = BUILD / "seeds"  # written by tests/support/fuzz_seeds.py
 READERS = "readers"
 READING = ("-q", "-n", "0", "--hypothesis-show-statistics", "tests/fuzz/test_readers.py")
 LONGEST_INPUT = 4096  # bytes
@@ -134,6 +134,7 @@ def read(seconds: float) -> Figures:
 
 def main() -> int:
     """Runs the targets and returns the exit code."""
+    run([sys.executable, "tests/support/fuzz_seeds.py", str(SEEDS)])
     known = [*sorted(folder.name for folder in SEEDS.iterdir()), READERS]
     parser = argparse.ArgumentParser(description="Fuzzes the C code and the Python readers.")
     parser.add_argument("--seed", type=int, default=0, help="of libFuzzer's mutations")

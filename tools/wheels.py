@@ -12,7 +12,7 @@ that `hexapod export --platforms all` needs no compiler. The same sources and th
 the same bytes.
 
 The binaries for glibc run on musl too: musl's loader takes itself for libc.so.6 and libm.so.6, and
-they require no function that musl lacks (tests/release/test_musl.py). The wheels for Linux
+they require no function that musl lacks (tests/release/test_wheels.py). The wheels for Linux
 therefore have the tags of both.
 """
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from hexapod_cosim.cosim.cli.running import RunOptions
 from hexapod_cosim.cosim.cli.terminal import Count, counting_bar, show_table, show_text, warn
-from hexapod_cosim.cosim.report.accuracy import Metrics, Rows, about_accuracy, effect_rows
+from hexapod_cosim.cosim.report.tables import Metrics, Rows, about_accuracy, effect_rows
 from hexapod_cosim.cosim.results.accuracy import (
     Accuracy,
     compare_accuracy,

@@ -33,9 +33,9 @@ from hexapod_cosim.cosim.cli.terminal import (
 from hexapod_cosim.cosim.common.files import write_json
 from hexapod_cosim.cosim.common.temporary import TemporaryFolder
 from hexapod_cosim.cosim.master.interrupts import deferred_interrupts
-from hexapod_cosim.cosim.report.accuracy import with_errors
 from hexapod_cosim.cosim.report.figures import draw_figures
-from hexapod_cosim.cosim.report.writing import about, comparison_rows, write_report
+from hexapod_cosim.cosim.report.tables import about, comparison_rows, with_errors
+from hexapod_cosim.cosim.report.writing import write_report
 from hexapod_cosim.cosim.results.accuracy import Accuracy, halved_scenario
 from hexapod_cosim.cosim.results.comparison import (
     SEEDS,
@@ -57,7 +57,8 @@ from hexapod_cosim.cosim.results.summary import Summary, summarise
 from hexapod_cosim.cosim.results.uncertainty import Comparisons, compare_all, write_comparison
 from hexapod_cosim.cosim.run.batch import run_batch
 from hexapod_cosim.cosim.run.gait_selection import select_gait
-from hexapod_cosim.cosim.run.preparation import PlantFmus, chosen_gains
+from hexapod_cosim.cosim.run.plan import chosen_gains
+from hexapod_cosim.cosim.run.plant import PlantFmus
 from hexapod_cosim.cosim.scenario.controls import CHOOSER, Control
 from hexapod_cosim.cosim.scenario.reading import load_scenario
 from hexapod_cosim.cosim.scenario.records import CHOSEN, COMPARED, CONTROLS, OWN, Scenario

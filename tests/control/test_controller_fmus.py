@@ -1,17 +1,23 @@
-"""Controller FMUs, ours of FMI 2 and 3 and a foreign one: connection by names, and walks."""
+"""Tests controller FMUs, ours of FMI 2 and 3 and a foreign one: connection by names, walks, the
+stance that they choose, and messages of each.
+"""
 
 from __future__ import annotations
 
+import gc
 import shutil
 from pathlib import Path
 
 import numpy as np
 import pytest
+from command import Call
 
+from hexapod_cosim.cosim.control.fmu_law import walk_of_fmu
 from hexapod_cosim.cosim.export.plant import export_controller
-from hexapod_cosim.cosim.interface.names import joint_names
+from hexapod_cosim.cosim.interface.names import joint_names, vector_names
 from hexapod_cosim.cosim.master.connection import FmuVariable, connect, names_of_map, read_map
-from hexapod_cosim.cosim.run.controller_setup import make_setup
+from hexapod_cosim.cosim.master.fmu import Fmu, StepError
+from hexapod_cosim.cosim.run.plan import make_setup
 from hexapod_cosim.cosim.run.runner import Runner
 from hexapod_cosim.cosim.run.single_run import simulate
 from hexapod_cosim.cosim.scenario.reading import load_scenario
@@ -145,3 +151,75 @@ def test_an_fmu_that_does_not_command_joints_is_refused(athena_fmu: Path) -> Non
     plan = load_scenario("walk_flat", overrides=[f"control={athena_fmu}"])
     with pytest.raises(FmuError, match="the controller FMU does not command every joint"):
         simulate(plan)
+
+
+# Exported FMUs in the stance that compliant control chooses, and the plant that stands in it.
+
+# a walk that names neither gait nor stance
+SCENARIO = 'title = "level"\nduration = 2.0\n[command]\nvx = 0.08\n'
+TORSO = (*vector_names("torso.position"), *vector_names("torso.quaternion", 4))
+
+
+def exported(call: Call, path: Path, *options: object) -> Path:
+    code, _, errors = call("export", "-o", path, *options)
+    assert code == 0, errors
+    return path
+
+
+def test_an_exported_controller_walks_as_the_built_in_one(
+    call: Call, tmp_path: Path, plant_build: Path
+) -> None:
+    chosen = ("--controller", "compliant", "--stance", "chosen", "--fmi", 3)
+    path = exported(call, tmp_path / "controller.fmu", *chosen)
+    (tmp_path / "level.toml").write_text(SCENARIO, encoding="utf-8")
+    built_in, by_fmu = (
+        simulate(load_scenario(tmp_path / "level.toml", overrides=[f"control={control}"]))
+        for control in ("compliant", str(path))
+    )
+    walking = by_fmu.facts.walking
+    assert (walking.gait, walking.stance) == ("amble", "controller FMU")
+    assert walking.period == pytest.approx(1.5)
+    expected, found = (run.outcome.recording.columns(TORSO) for run in (built_in, by_fmu))
+    np.testing.assert_allclose(found, expected, rtol=0.0, atol=1e-9)
+
+
+def test_the_plant_is_exported_in_the_same_stance(
+    call: Call, tmp_path: Path, plant_build: Path
+) -> None:
+    controller = exported(
+        call, tmp_path / "c.fmu", "--controller", "compliant", "--stance", "chosen"
+    )
+    stance = np.array(walk_of_fmu(controller).stance)
+    own = np.array(load_robot("athena").stance)
+    assert np.abs(stance - own).max() > 0.05  # rad
+    with Fmu(exported(call, tmp_path / "p.fmu", "--stance", "chosen")) as plant:
+        plant.initialise(0.0, 1.0)
+        angles = plant.block(joint_names("angle"))
+        angles.get()
+        # the robot stands settled: its servos give way under its weight
+        np.testing.assert_allclose(angles.values.reshape(6, 3), stance, rtol=0.0, atol=0.03)
+
+
+def test_an_unknown_stance_is_refused(call: Call, tmp_path: Path) -> None:
+    code, _, errors = call("export", "-o", tmp_path / "p.fmu", "--stance", "choosen")
+    assert code == 1
+    assert "unknown stance" in errors
+    assert "did you mean 'chosen'" in errors
+    assert not (tmp_path / "p.fmu").exists()
+
+
+# Errors of each of several FMUs in one process carry the messages of that FMU.
+
+LONG = (1.5, 2.5)  # s    steps over the end
+
+
+def test_each_fmu_reports_its_own_errors_alone_and_after_another_is_gone(athena_fmu: Path) -> None:
+    with Fmu(athena_fmu) as first:
+        with Fmu(athena_fmu) as second:
+            for fmu, h in zip((first, second), LONG, strict=True):
+                fmu.initialise(0.0, 1.0)
+                with pytest.raises(StepError, match=f"got {h:g} s"):
+                    fmu.step(0.0, h)
+        gc.collect()
+        with pytest.raises(StepError, match=r"got 1\.5 s"):
+            first.step(0.0, LONG[0])

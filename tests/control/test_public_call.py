@@ -1,21 +1,26 @@
-"""hexapod_cosim.simulate and report: any controller, its recording, metrics and files."""
+"""Tests hexapod_cosim.simulate and report with any controller, and what hexapod
+controller new writes.
+"""
 
 from __future__ import annotations
 
 import json
+from inspect import getsourcelines
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from command import Call, assert_refused
 
 import hexapod_cosim
 from hexapod_cosim.controller import BodyCommand, JointCommand, Measurement
+from hexapod_cosim.cosim.control.new_law import class_name, module_name, write_law
 from hexapod_cosim.cosim.results.metrics import METRICS
 from hexapod_cosim.cosim.results.result import Result
 from hexapod_cosim.models import HexapodError, Robot
 
-pytestmark = pytest.mark.usefixtures("plant_build")
+NEEDS_PUBLIC_CALL = pytest.mark.usefixtures("plant_build")
 SHORT = {"duration": 0.3}
 CYCLES = {"duration": 3, "gait.period": 0.8}
 
@@ -38,6 +43,7 @@ class Fails(Stand):
         return super().step(t, command, measurement)
 
 
+@NEEDS_PUBLIC_CALL
 def test_a_built_in_control_gives_recording_metrics_and_facts() -> None:
     result = hexapod_cosim.simulate("walk_flat", "kinematic", settings=CYCLES)
     assert isinstance(result, Result)
@@ -51,6 +57,7 @@ def test_a_built_in_control_gives_recording_metrics_and_facts() -> None:
     assert len(f"{result!r}") < 300
 
 
+@NEEDS_PUBLIC_CALL
 def test_a_class_and_an_object_of_it_give_the_same_run() -> None:
     settings = {**SHORT, "control.bend": 0.05}
     made = hexapod_cosim.simulate("walk_flat", Stand, settings=settings)
@@ -71,14 +78,15 @@ def hexapod_athena() -> Robot:
     return load_robot("athena")
 
 
+@NEEDS_PUBLIC_CALL
 def test_a_controller_that_raises_ends_the_run_with_what_was_recorded() -> None:
     with pytest.warns(RuntimeWarning, match="ended early, without metrics: .*: no idea"):
         result = hexapod_cosim.simulate("walk_flat", Fails, settings=SHORT)
     assert result.outcome.status == "failed"
     assert result.recording.time[-1] == pytest.approx(0.1)  # the step at 0.105 s fails
-    assert f"{Path(__file__).resolve()}, line 37, in step: RuntimeError: no idea" in (
-        result.outcome.reason
-    )
+    line = getsourcelines(Fails.step)[1] + 2
+    place = f"{Path(__file__).resolve()}, line {line}, in step"
+    assert f"{place}: RuntimeError: no idea" in result.outcome.reason
 
 
 @pytest.fixture(scope="module")
@@ -89,6 +97,7 @@ def runs() -> list[Result]:
     ]
 
 
+@NEEDS_PUBLIC_CALL
 def test_the_report_of_one_run_names_its_control(runs: list[Result], tmp_path: Path) -> None:
     page = hexapod_cosim.report(runs[1], tmp_path / "one")
     assert page == tmp_path / "one" / "report.html"
@@ -97,6 +106,7 @@ def test_the_report_of_one_run_names_its_control(runs: list[Result], tmp_path: P
     assert json.loads((page.parent / "run.json").read_text())["control"] == "my stand"
 
 
+@NEEDS_PUBLIC_CALL
 def test_the_report_of_several_runs_compares_them(runs: list[Result], tmp_path: Path) -> None:
     page = hexapod_cosim.report(runs, tmp_path / "two")
     found = {path.name for path in page.parent.iterdir()}
@@ -106,7 +116,65 @@ def test_the_report_of_several_runs_compares_them(runs: list[Result], tmp_path: 
     assert "my stand in 1 of 1" in page.read_text(encoding="utf-8")  # it did not arrive
 
 
+@NEEDS_PUBLIC_CALL
 def test_two_runs_of_one_label_are_refused(runs: list[Result], tmp_path: Path) -> None:
     with pytest.raises(HexapodError, match="two controls with one label"):
         hexapod_cosim.report([runs[0], runs[0]], tmp_path / "twice")
     assert not list(tmp_path.iterdir())
+
+
+# `hexapod controller new`: the files it writes, and that its controller and an example walk.
+
+EXAMPLE = Path(__file__).resolve().parents[2] / "examples" / "controllers" / "cpg.py"
+
+
+@pytest.mark.parametrize(
+    ("name", "stem", "kind"), [("my_walk", "my_walk", "MyWalk"), ("MyWalk", "my_walk", "MyWalk")]
+)
+def test_a_name_gives_a_module_and_a_class(name: str, stem: str, kind: str) -> None:
+    assert (module_name(name), class_name(name)) == (stem, kind)
+
+
+def test_it_writes_a_controller_its_test_and_a_line(call: Call, tmp_path: Path) -> None:
+    (tmp_path / "README.md").write_text("# Mine", encoding="utf-8")
+    code, out, err = call("controller", "new", "my_walk", "-o", tmp_path)
+    assert (code, err) == (0, "")
+    assert f"hexapod simulate walk_flat --control {tmp_path / 'my_walk.py'}:MyWalk" in out
+    assert (tmp_path / "README.md").read_text().startswith("# Mine\n- `my_walk.py`: ")
+    test = (tmp_path / "test_my_walk.py").read_text()
+    compile(test, "test_my_walk.py", "exec")
+    assert "@" not in test
+    assert "class MyWalk:" in (tmp_path / "my_walk.py").read_text()
+
+
+def test_it_overwrites_nothing(call: Call, tmp_path: Path) -> None:
+    (tmp_path / "test_walk.py").write_text("mine")
+    assert_refused(call("controller", "new", "walk", "-o", tmp_path), "the file is there already")
+    assert [path.name for path in tmp_path.iterdir()] == ["test_walk.py"]
+    assert_refused(call("controller", "new", "my-walk", "-o", tmp_path), "not a name")
+
+
+def test_the_controller_walks_and_turns_and_slips_less_than_kinematic_control(
+    tmp_path: Path, plant_build: Path
+) -> None:
+    law = f"{write_law('my_walk', tmp_path)[0]}:MyWalk"
+    settings = {"duration": 4, "robot": "athena"}
+    ahead = hexapod_cosim.simulate("walk_flat", law, settings=settings)
+    assert ahead.facts.walk.upright
+    # 0.08 m/s for 4 s, less the ramp of one second
+    assert ahead.recording.vector("torso.position")[-1, 0] == pytest.approx(0.28, rel=0.05)
+    ours = hexapod_cosim.simulate("walk_flat", "kinematic", settings=settings)
+    assert ahead.metrics["slip_per_metre"] < 0.6 * ours.metrics["slip_per_metre"]
+    turning = {**settings, "command.yaw_rate": 0.2, "robot": "phantomx_mk4"}
+    turned = hexapod_cosim.simulate("walk_flat", law, settings=turning)
+    assert turned.recording.column("torso.yaw")[-1] == pytest.approx(0.7, rel=0.05)
+
+
+def test_the_pattern_generator_walks_forward_and_turns(plant_build: Path) -> None:
+    settings = {"duration": 4, "robot": "phantomx_mk4", "command.yaw_rate": 0.2}
+    turning = hexapod_cosim.simulate("walk_flat", f"{EXAMPLE}:Cpg", settings=settings)
+    assert turning.facts.walk.upright
+    # 4 s less the ramp of one second; the feet slip sideways on their arcs
+    assert turning.recording.column("torso.yaw")[-1] == pytest.approx(0.7, rel=0.35)
+    torso = turning.recording.vector("torso.position")
+    assert np.linalg.norm(np.diff(torso[:, :2], axis=0), axis=1).sum() > 0.2  # m    of its arc

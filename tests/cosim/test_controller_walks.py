@@ -1,4 +1,6 @@
-"""Effects of the compliant control: walks with gains chosen by hand, on the loop in C."""
+"""Tests effects of the controls: compliant control with gains chosen by hand, and feet that search
+for the ground on uneven ground.
+"""
 
 from __future__ import annotations
 
@@ -14,7 +16,7 @@ from hexapod_cosim.cosim.run.runner import Runner
 from hexapod_cosim.cosim.scenario.reading import load_scenario
 from hexapod_cosim.models import load_robot
 
-pytestmark = pytest.mark.usefixtures("plant_build")
+NEEDS_CONTROLLER_WALKS = pytest.mark.usefixtures("plant_build")
 ROBOTS = ("athena", "phantomx_mk4")
 NOTHING = tuple(f"compliance.{part}=false" for part in SWITCHES)
 SLIP_LEFT = 0.2  # of that under kinematic control, at most
@@ -39,6 +41,7 @@ def outputs(result: Result) -> np.ndarray:
     )
 
 
+@NEEDS_CONTROLLER_WALKS
 @pytest.mark.parametrize("robot", ROBOTS)
 def test_compliance_without_a_planned_squeeze_takes_most_of_the_slip(robot: str) -> None:
     kinematic, compliant = (
@@ -52,6 +55,7 @@ def test_compliance_without_a_planned_squeeze_takes_most_of_the_slip(robot: str)
     assert compliant.facts.walk.fallback == 0.0
 
 
+@NEEDS_CONTROLLER_WALKS
 def test_the_planned_squeeze_takes_heat_from_the_servos_and_leaves_the_ground_some_slip() -> None:
     kinematic, none, some, most = (
         walk("athena", control, f"compliance.squeeze={squeeze}", "friction.law=bristle").metrics
@@ -68,6 +72,7 @@ def test_the_planned_squeeze_takes_heat_from_the_servos_and_leaves_the_ground_so
     assert max(slips) < 0.6 * kinematic["slip_per_metre"]
 
 
+@NEEDS_CONTROLLER_WALKS
 def test_with_every_part_off_it_is_kinematic_control_bit_for_bit() -> None:
     off, kinematic = (
         walk("athena", "compliant", *NOTHING, duration=2.0),
@@ -76,6 +81,7 @@ def test_with_every_part_off_it_is_kinematic_control_bit_for_bit() -> None:
     np.testing.assert_array_equal(outputs(off), outputs(kinematic))
 
 
+@NEEDS_CONTROLLER_WALKS
 def test_a_payload_is_carried_as_if_it_were_planned() -> None:
     mass = load_robot("athena").torso.mass + 1.5
     heights = [
@@ -89,6 +95,7 @@ def test_a_payload_is_carried_as_if_it_were_planned() -> None:
     assert abs(heights[1]) < 0.25 * abs(heights[0])
 
 
+@NEEDS_CONTROLLER_WALKS
 def test_with_a_dead_sensor_it_walks_on_by_the_plan_of_that_leg() -> None:
     whole, hurt = (
         walk("athena", "compliant"),
@@ -109,6 +116,7 @@ def test_with_a_dead_sensor_it_walks_on_by_the_plan_of_that_leg() -> None:
     assert hurt.metrics["slip_per_metre"] < walk("athena", "kinematic").metrics["slip_per_metre"]
 
 
+@NEEDS_CONTROLLER_WALKS
 @pytest.mark.parametrize("leg", ["RM"])
 def test_a_dead_sensor_makes_no_foot_land_harder_on_level_ground(leg: str) -> None:
     """The foot whose sensor is silent is lowered until the sensor is doubted, and not for longer:
@@ -126,6 +134,7 @@ def test_a_dead_sensor_makes_no_foot_land_harder_on_level_ground(leg: str) -> No
 FIGURES = ("slip_per_metre", "height_rms", "roll_rms", "pitch_rms", "peak_force")
 
 
+@NEEDS_CONTROLLER_WALKS
 @pytest.mark.parametrize("error", ["contact.stiffness=1.07e4", "torso.mass=10"])
 def test_on_ground_100_times_softer_or_with_2_3_times_the_weight_it_is_no_worse_than_kinematic(
     error: str,
@@ -138,3 +147,43 @@ def test_on_ground_100_times_softer_or_with_2_3_times_the_weight_it_is_no_worse_
         assert compliant.metrics[name] < kinematic.metrics[name], name
     assert compliant.metrics["slip_per_metre"] < 0.7 * kinematic.metrics["slip_per_metre"]
     assert compliant.facts.walk.fallback == 0.0
+
+
+# Walks on uneven ground: what the feet that search for the ground are worth.
+
+ROUGH = ("terrain.kind=random_uniform", "terrain.max_height=20 mm", "terrain.seed=5")
+PEAK, LOADING, TILT = 0.8, 0.6, 0.7  # of kinematic control's figures, at most
+
+
+@cache
+def rough_walk(control: str, *overrides: str) -> Result:
+    scenario = load_scenario(
+        "walk_flat", overrides=[f"control={control}", "duration=8.0", *overrides]
+    )
+    with Runner(everything=True) as runner:
+        return runner.simulate(scenario, gains=make_gains(load_robot("athena")))
+
+
+@pytest.mark.usefixtures("plant_build")
+def test_on_rough_ground_feet_land_softer_and_the_torso_tilts_less() -> None:
+    kinematic, compliant = (
+        rough_walk(control, *ROUGH).metrics for control in ("kinematic", "compliant")
+    )
+    assert compliant["peak_force"] < PEAK * kinematic["peak_force"]
+    assert compliant["loading_rate"] < LOADING * kinematic["loading_rate"]
+    for name in ("roll_rms", "pitch_rms"):
+        assert compliant[name] < TILT * kinematic[name]
+
+
+@pytest.mark.usefixtures("plant_build")
+def test_no_leg_lifts_off_before_the_feet_that_land_stand() -> None:
+    """At each lift-off, three other feet carry load, although the ground is up to 20 mm lower."""
+    recording = rough_walk("compliant", *ROUGH).outcome.recording
+    legs = ("LF", "LM", "LR", "RF", "RM", "RR")
+    swinging = recording.columns([f"controller.{leg}.swinging" for leg in legs]) > 0.5
+    normal = recording.columns([f"{leg}.foot.normal_force" for leg in legs])
+    lifts = np.flatnonzero((swinging[1:] & ~swinging[:-1]).any(axis=1)) + 1
+    walking = lifts[recording.time[lifts] > 1.0]
+    assert len(walking) > 5
+    standing = ((normal[walking] > 0.5) & ~swinging[walking]).sum(axis=1)
+    assert np.mean(standing >= 3) > 0.9

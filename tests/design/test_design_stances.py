@@ -1,30 +1,40 @@
-"""The stances in which the design linearises a robot: six legs and tripods.
-
-They are tested for robots of all sizes and distributions of mass.
+"""The stances in which the design linearises a robot: six legs and tripods. They are tested for
+robots of all sizes and distributions of mass. Also the search of the stance of least heat, and the
+robot file that it writes.
 """
 
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cache
+from pathlib import Path
 
 import numpy as np
 import pytest
 from random_robots import centre_of_mass
 from scaled_robots import scaled_robot
 
-from hexapod_cosim.controller import GainsError, LegSolver
+from hexapod_cosim.controller import GainsError, LegSolver, make_gait
 from hexapod_cosim.controller.design import StandingPlant, design_gains
 from hexapod_cosim.controller.size import requirements_for
 from hexapod_cosim.cosim.design.gains import STANCES, design_for, examine_stances, level_fmu
 from hexapod_cosim.cosim.design.linearise import Bench
+from hexapod_cosim.cosim.design.stance import (
+    StanceDesign,
+    find_stance,
+    walked,
+    with_stance,
+    write_robot,
+)
 from hexapod_cosim.cosim.design.standing import lifted_stance, loads, rest
 from hexapod_cosim.models import Robot, load_robot
+from hexapod_cosim.models.robot import robot_path
 
 PERIOD = 0.005  # s
 STILL = 1e-3  # m or rad    that a robot at rest moves by in a second; feet creep by some 0.1 mm
 ROUNDING = 1e-9
 TRIPOD = STANCES["tripod LF LR RM"]
-pytestmark = pytest.mark.usefixtures("plant_build")
+NEEDS_DESIGN_STANCES = pytest.mark.usefixtures("plant_build")
 
 
 def off_centre(x: float, y: float, z: float) -> Robot:
@@ -42,6 +52,7 @@ def strong(torque_max: float) -> Robot:
     return replace(robot, servo=replace(robot.servo, torque_max=torque_max))
 
 
+@NEEDS_DESIGN_STANCES
 @pytest.mark.parametrize(
     "robot",
     [soft(28.0), off_centre(0.05, 0.05, 0.1), scaled_robot(load_robot("athena"), 0.3)],
@@ -64,6 +75,7 @@ def test_a_robot_at_rest_stays_where_it_is(robot: Robot, load: float) -> None:
     assert np.abs(moved).max() < STILL
 
 
+@NEEDS_DESIGN_STANCES
 @pytest.mark.parametrize("load", [0.1, 1.0, 2.0])
 @pytest.mark.parametrize("stance", list(STANCES))
 def test_a_push_that_makes_a_load_leaves_every_foot_at_least_half_its_share(
@@ -101,6 +113,7 @@ def lifted_centre(robot: Robot, angle: np.ndarray) -> np.ndarray:
     return centre_of_mass(posed)
 
 
+@NEEDS_DESIGN_STANCES
 def test_tripods_that_do_not_stand_are_left_out_and_named() -> None:
     """With a torso so heavy in front, tripods have no foot ahead of the centre of mass; six legs
     have.
@@ -117,6 +130,7 @@ def test_tripods_that_do_not_stand_are_left_out_and_named() -> None:
         )
 
 
+@NEEDS_DESIGN_STANCES
 def test_stances_that_the_servos_do_not_carry_are_left_out_and_a_robot_that_none_carries_is_refused(
     plants: dict[str, StandingPlant],
 ) -> None:
@@ -143,6 +157,7 @@ def plants(plant_build: object) -> dict[str, StandingPlant]:
     return examine_stances(load_robot("athena"), PERIOD)[0]
 
 
+@NEEDS_DESIGN_STANCES
 def test_a_robot_that_stands_on_no_legs_is_refused() -> None:
     """The hips are so far back that the torso's weight lies ahead of all feet."""
     robot = load_robot("athena")
@@ -154,6 +169,7 @@ def test_a_robot_that_stands_on_no_legs_is_refused() -> None:
         design_for(replace(robot, legs=legs), PERIOD)
 
 
+@NEEDS_DESIGN_STANCES
 def test_similar_robots_beyond_the_usual_sizes_get_similar_gains() -> None:
     """By Froude scaling, all times of a robot twice as large are sqrt(2) times as long.
 
@@ -196,3 +212,47 @@ def test_similar_robots_beyond_the_usual_sizes_get_similar_gains() -> None:
     assert large.support.handover_time == pytest.approx(small.support.handover_time * time)
     assert large.support.weight_time == pytest.approx(small.support.weight_time * time)
     assert large.support.load_time == pytest.approx(small.support.load_time * time)
+
+
+# Tests the search of the stance of least heat, and the robot file that it writes.
+
+ATHENA = load_robot("athena")
+
+
+@cache
+def found() -> StanceDesign:
+    return find_stance(ATHENA)
+
+
+def test_the_stance_of_least_heat_brings_the_feet_nearer_to_the_hips() -> None:
+    design = found()
+    assert design.outward == pytest.approx(-0.05265)
+    assert design.deeper == pytest.approx(0.0189)
+    assert design.after.heat < 0.8 * design.before.heat
+    assert design.after.hottest < ATHENA.servo.torque_continuous < design.before.hottest
+
+
+def test_the_found_stance_is_as_firm_and_as_slow_as_required() -> None:
+    after = found().after
+    assert after.firmness >= 0.25
+    assert after.lifts
+    assert after.speed <= 0.8 * ATHENA.servo.speed_max
+    assert after == walked(found().robot, make_gait(ATHENA))
+
+
+def test_the_written_file_is_the_robot_with_the_stance(tmp_path: Path) -> None:
+    moved = with_stance(ATHENA, -0.02, 0.01)
+    file = write_robot(robot_path("athena"), moved, tmp_path / "low.toml", name="low")
+    read = load_robot(file)
+    assert read.name == "low"
+    np.testing.assert_array_equal(read.stance, moved.stance)
+    assert replace(read, name="athena", legs=ATHENA.legs) == replace(ATHENA, legs=ATHENA.legs)
+
+
+def test_a_urdf_is_not_written_and_a_stance_without_reach_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(GainsError, match="URDF is not written"):
+        write_robot(Path("robot.urdf"), ATHENA, tmp_path / "x.toml", name="x")
+    assert not list(tmp_path.iterdir())
+    far = replace(ATHENA, gait=replace(ATHENA.gait, stride=0.6))
+    with pytest.raises(GainsError, match="do not reach the steps"):
+        find_stance(far)

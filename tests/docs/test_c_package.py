@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 from pages import blocks
 
-ROOT = Path(__file__).resolve().parents[2]
+ROOT = Path(__file__).parents[2]
 VERSION = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]["version"]
 EXAMPLE = ROOT / "examples" / "c_library"
 STRICT = "-std=c11 -Wall -Wextra -Wpedantic -Werror"

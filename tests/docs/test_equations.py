@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-ROOT = Path(__file__).resolve().parents[2]
+ROOT = Path(__file__).parents[2]
 PAGE = ROOT / "docs" / "equations.md"
 OF_PAPER = 5  # equations that the source has
 TAG = re.compile(r"\\tag\{([^}]*)\}")

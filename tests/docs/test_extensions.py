@@ -18,7 +18,7 @@ from pathlib import Path
 
 import pytest
 
-ROOT = Path(__file__).resolve().parents[2]
+ROOT = Path(__file__).parents[2]
 COMMANDS: dict[str, set[str]] = {  # of each extension
     "study": {"study"},
     "identify": {"identify", "replay"},

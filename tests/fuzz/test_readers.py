@@ -171,10 +171,7 @@ def test_a_height_map_is_read_or_refused(tmp_path: Path, name: str, edits: list[
     reads(lambda: heightfield(values))
 
 
-GRIDS = [
-    path.read_bytes()
-    for path in sorted((ROOT / "tests" / "fuzz" / "seeds" / "fuzz_grid").iterdir())
-]
+GRIDS = [path.read_bytes() for path in sorted((ROOT / "tests" / "native" / "grids").iterdir())]
 
 
 @MODES

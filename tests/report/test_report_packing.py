@@ -1,17 +1,27 @@
-"""The data in a report's page: precise enough, small enough, and with all peaks."""
+"""Tests figures in memory, and the data in a report's page: precise enough,
+small enough, and with all peaks.
+"""
 
 from __future__ import annotations
 
 import base64
 import json
 import zlib
+from io import BytesIO
+from pathlib import Path
 from typing import Any
 
+import matplotlib
 import numpy as np
 import pytest
+from matplotlib.backend_bases import RendererBase
+from matplotlib.figure import Figure
 
+from hexapod_cosim.controller.figure_style import SETTINGS
 from hexapod_cosim.cosim.master.recorder import Recording
+from hexapod_cosim.cosim.report import plots
 from hexapod_cosim.cosim.report.columns import MOST_ROWS, choose, envelope
+from hexapod_cosim.cosim.report.figures import Figures, draw_figures, write_figures
 from hexapod_cosim.cosim.report.packing import pack
 from hexapod_cosim.cosim.report.payload import as_json
 from hexapod_cosim.cosim.results.window import View
@@ -144,3 +154,56 @@ def test_json_cannot_end_the_script_it_stands_in() -> None:
     text = as_json({"label": "</script><script>alert(1)</script><!--"})
     assert "<" not in text
     assert json.loads(text)["label"].startswith("</script>")
+
+
+# Tests figures in memory: drawing and writing.
+
+
+def labelled(_views: plots.Views) -> Figure:
+    """Two plots whose labels need room that only a layout gives them."""
+    figure = Figure(figsize=(3.0, 2.0))
+    for axes in figure.subplots(1, 2, sharey=True):
+        axes.plot([0.0, 1e4], [0.0, 1e-3])
+        axes.set(xlabel="long way\nin two lines", ylabel="height\n[m]", title="title")
+    figure.supxlabel("both")
+    return figure
+
+
+def test_files_have_the_bytes_of_figures_that_are_laid_out_by_saving_them(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(plots, "DRAWINGS", {"one": labelled})
+    drawn = draw_figures({}).images
+    with matplotlib.rc_context(SETTINGS):
+        figure = labelled({})
+        for kind, metadata in (("png", {}), ("svg", {"Date": None})):
+            content = BytesIO()
+            figure.savefig(content, format=kind, dpi=200, metadata=metadata)
+            assert drawn[f"one.{kind}"] == content.getvalue()
+            figure.set_layout_engine("none")
+
+
+def test_a_figure_is_drawn_once_for_each_file(monkeypatch: pytest.MonkeyPatch) -> None:
+    drawn = []
+
+    class Counted(Figure):
+        def draw(self, renderer: RendererBase) -> None:
+            drawn.append(renderer)
+            super().draw(renderer)
+
+    def counted(_views: plots.Views) -> Figure:
+        figure = Counted(figsize=(1.0, 1.0))
+        figure.subplots()
+        return figure
+
+    monkeypatch.setattr(plots, "DRAWINGS", {"one": counted})
+    assert set(draw_figures({}).images) == {"one.png", "one.svg"}
+    assert len(drawn) == 2
+
+
+def test_files_of_skipped_figures_are_deleted(tmp_path: Path) -> None:
+    for name in ("old.png", "old.svg", "other.txt"):
+        (tmp_path / name).touch()
+    files = write_figures(Figures({"new.svg": b"<svg/>"}, {"old": "not recorded"}), tmp_path)
+    assert files == [tmp_path / "new.svg"]
+    assert {path.name for path in tmp_path.iterdir()} == {"new.svg", "other.txt"}

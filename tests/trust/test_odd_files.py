@@ -214,6 +214,7 @@ def test_a_folder_whose_name_is_no_utf_8_gets_results(
     code, text = said("simulate", "walk_flat", "--set", "duration=0.02", "-o", str(folder))
     assert code == 0, text
     assert (folder / "report.html").is_file()
+    monkeypatch.setattr("hexapod_cosim.cosim.report.plots.DRAWINGS", {})
     assert said("report", str(folder))[0] == 0
 
 
