@@ -34,9 +34,9 @@ from hexapod_cosim.cosim.cli.terminal import (
 from hexapod_cosim.cosim.common.files import write_json
 from hexapod_cosim.cosim.common.temporary import TemporaryFolder
 from hexapod_cosim.cosim.master.interrupts import deferred_interrupts
-from hexapod_cosim.cosim.report.accuracy import with_errors
 from hexapod_cosim.cosim.report.figures import draw_figures
-from hexapod_cosim.cosim.report.writing import about, comparison_rows, write_report
+from hexapod_cosim.cosim.report.tables import about, comparison_rows, with_errors
+from hexapod_cosim.cosim.report.writing import write_report
 from hexapod_cosim.cosim.results.accuracy import Accuracy, halved_scenario
 from hexapod_cosim.cosim.results.facts import Result, gait_differences
 from hexapod_cosim.cosim.results.folder import (

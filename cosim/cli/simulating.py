@@ -21,8 +21,8 @@ from hexapod_cosim.cosim.cli.running import (
     titled,
 )
 from hexapod_cosim.cosim.cli.terminal import show_files, show_json, show_text, warn
-from hexapod_cosim.cosim.report.accuracy import with_errors
-from hexapod_cosim.cosim.report.writing import metric_rows, write_report
+from hexapod_cosim.cosim.report.tables import metric_rows, with_errors
+from hexapod_cosim.cosim.report.writing import write_report
 from hexapod_cosim.cosim.results.accuracy import Accuracy, halved_scenario
 from hexapod_cosim.cosim.results.facts import Result
 from hexapod_cosim.cosim.results.folder import (

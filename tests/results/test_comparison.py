@@ -12,7 +12,7 @@ import pytest
 from scipy import stats
 
 from hexapod_cosim.cosim.master.loop import COMPLETED, FAILED
-from hexapod_cosim.cosim.report.writing import about, comparison_rows
+from hexapod_cosim.cosim.report.tables import about, comparison_rows
 from hexapod_cosim.cosim.results.comparison import (
     BETTER,
     SAME,
