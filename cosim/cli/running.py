@@ -24,7 +24,7 @@ from hexapod_cosim.cosim.cli.terminal import (
 from hexapod_cosim.cosim.control.controllers import check_control
 from hexapod_cosim.cosim.master.interrupts import deferred_interrupts
 from hexapod_cosim.cosim.master.loop import INTERRUPTED
-from hexapod_cosim.cosim.report.accuracy import Metrics, Rows, about_accuracy, effect_rows
+from hexapod_cosim.cosim.report.tables import Metrics, Rows, about_accuracy, effect_rows
 from hexapod_cosim.cosim.results.accuracy import (
     Accuracy,
     compare_accuracy,

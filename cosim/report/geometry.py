@@ -20,12 +20,8 @@ from hexapod_cosim.cosim.export.picture import COLOURS, THICKNESS
 from hexapod_cosim.cosim.interface.names import vector_names
 from hexapod_cosim.cosim.report.packing import STEPS
 from hexapod_cosim.cosim.results.folder import StoredResult
-<<<<<<< HEAD
-from hexapod_cosim.cosim.results.support import FLAT, SLOPE
-=======
 from hexapod_cosim.cosim.results.footprints import Footprint
 from hexapod_cosim.cosim.results.support import FLAT, SLOPE
->>>>>>> main
 from hexapod_cosim.models import JOINT_NAMES, LEG_NAMES, HexapodError, load_robot
 from hexapod_cosim.models.ground.catalogue import CATALOGUE
 from hexapod_cosim.models.ground.faces import surface_heights

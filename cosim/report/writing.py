@@ -34,15 +34,6 @@ from hexapod_cosim.cosim.results.comparison import METHOD
 from hexapod_cosim.cosim.results.facts import RunFacts
 from hexapod_cosim.cosim.results.folder import StoredResult
 from hexapod_cosim.cosim.results.ground import describe_terrain
-<<<<<<< HEAD
-from hexapod_cosim.cosim.results.metric_table import (
-    DUST,
-    FLOORS,
-    METRICS,
-    has_net_slip,
-    shown_metrics,
-=======
-from hexapod_cosim.cosim.results.metrics import plans_feet, >>>>>>> main
 from hexapod_cosim.cosim.results.metric_table import has_net_slip
 from hexapod_cosim.cosim.results.metrics import plans_feet
 from hexapod_cosim.cosim.results.side_by_side import Comparisons
