@@ -14,10 +14,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import islice
 
+from hexapod_cosim.cosim.interface.patterns import plain_name
 from hexapod_cosim.cosim.interface.plant import CAUSALITIES, Interface, Pattern, Variable
 from hexapod_cosim.models.errors import HexapodError
-
-AXES = re.compile(r"\{\w+\}\.|[._]\{\w+\}|\{\w+\}|\[i\]")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -65,17 +64,12 @@ def arrays(interface: Interface) -> tuple[Array, ...]:
     return tuple(found)
 
 
-def array_name(pattern: str) -> str:
-    """Returns a pattern's name without its axes."""
-    return AXES.sub("", pattern)
-
-
 def _array(pattern: Pattern, variables: Iterator[Variable]) -> Array:
     """Makes the array of a pattern, whose elements are the next variables."""
     shape = tuple(len(labels) for _, labels in pattern.axes)
     elements = tuple(islice(variables, math.prod(shape)))
     return Array(
-        name=array_name(pattern.name),
+        name=plain_name(pattern.name),
         pattern=pattern.name,
         shape=shape,
         elements=elements,

@@ -7,6 +7,15 @@ import re
 from collections.abc import Iterable, Mapping
 from typing import Any
 
+AXIS = re.compile(r"\{(\w+)\}|\[i\]")
+AXES = re.compile(r"\{\w+\}\.|[._]\{\w+\}|\{\w+\}|\[i\]")
+ROOTS = ("gait.", "gains.", "parts.")  # objects besides the robot that parameters are named after
+
+
+def plain_name(pattern: str) -> str:
+    """Returns a pattern's name without its axes."""
+    return AXES.sub("", pattern)
+
 
 def expand(
     entry: Mapping[str, Any], axes: Mapping[str, list[str]]
@@ -17,12 +26,32 @@ def expand(
         yield entry, dict(zip(used, combination, strict=True))
 
 
+def with_defaults(entry: Mapping[str, Any], causality: str) -> dict[str, Any]:
+    """Returns an entry of interface.toml with the values that follow from its name and causality.
+
+    Parameters are fields of nested structures: {leg}.{joint}.mass is leg[leg].link[joint].mass.
+    Others are arrays over their axes: {leg}.foot.force[i] is foot.force[leg][i].
+    """
+    name = entry["name"]
+    defaults = {} if "type" in entry else {"unit": "1", "nominal": 1.0}
+    if causality == "parameter":
+        place = re.sub(r"_\{(\w+)\}", r"[\1]", name)
+        place = place.replace("{leg}.", "leg[leg].").replace("{joint}.", "link[joint].")
+        path = place.replace("leg[leg].", "legs[leg].").replace("link[joint].", "links[joint].")
+        own = path.startswith(ROOTS)
+        defaults |= {"field": f"definition.{place}", "start": path if own else f"robot.{path}"}
+    else:
+        axes = "".join(f"[{axis or 'i'}]" for axis in AXIS.findall(name))
+        defaults |= {"field": f"{causality}.{plain_name(name)}{axes}"}
+    if causality == "input":
+        defaults |= {"start": 0.0}
+    return defaults | dict(entry)
+
+
 def own_axes(entry: Mapping[str, Any], axes: Mapping[str, list[str]]) -> dict[str, list[str]]:
     """Returns the labels of the axes in an entry's name, in the order of the name."""
     labels = dict(axes) | {"i": [str(i + 1) for i in range(entry.get("size", 0))]}
-    return {
-        axis or "i": labels[axis or "i"] for axis in re.findall(r"\{(\w+)\}|\[i\]", entry["name"])
-    }
+    return {axis or "i": labels[axis or "i"] for axis in AXIS.findall(entry["name"])}
 
 
 def labelled(pattern: str, labels: Mapping[str, str]) -> str:

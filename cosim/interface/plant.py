@@ -18,7 +18,13 @@ from typing import Any, Literal
 
 from hexapod_cosim.cosim.common.components import PLANT, Component
 from hexapod_cosim.cosim.common.plant_files import interface_file, package_version
-from hexapod_cosim.cosim.interface.patterns import expand, expand_names, labelled, own_axes
+from hexapod_cosim.cosim.interface.patterns import (
+    expand,
+    expand_names,
+    labelled,
+    own_axes,
+    with_defaults,
+)
 from hexapod_cosim.models.errors import HexapodError, unknown_name
 from hexapod_cosim.models.records import Robot
 from hexapod_cosim.models.statics import settled
@@ -245,7 +251,11 @@ def expand_interface(component: Component, robot: Robot, roots: SimpleNamespace)
 @cache
 def read_table(component: Component) -> dict[str, Any]:
     """Reads a component's interface.toml. The result is shared and must not be changed."""
-    return tomllib.loads(interface_file(component).read_text(encoding="utf-8"))
+    table = tomllib.loads(interface_file(component).read_text(encoding="utf-8"))
+    for causality in CAUSALITIES:
+        entries = table.get(causality, [])
+        table[causality] = [with_defaults(entry, causality) for entry in entries]
+    return table
 
 
 @cache

@@ -15,13 +15,13 @@ import pytest
 from fmi3_plant import ARRAYS, Plant3
 from fmi_plant import ATHENA, DISCARD, ERROR, OK, Plant
 
-from hexapod_cosim.cosim.interface.arrays import array_name
 from hexapod_cosim.cosim.interface.model_description3 import (
     CAPABILITIES,
     CO_SIMULATION,
     EVENTS,
     MODEL_EXCHANGE,
 )
+from hexapod_cosim.cosim.interface.patterns import plain_name
 
 H = 0.005  # s, communication step
 DROP = 0.15  # m; a torso from this height falls for about 50 ms before the feet touch down
@@ -131,7 +131,7 @@ def test_an_array_is_its_elements_in_the_order_of_their_references() -> None:
             range(array.reference, array.reference + len(array.elements))
         )
         assert {
-            array_name(re.sub(r"\[\d\]", "[i]", element.name)) for element in array.elements[:1]
+            plain_name(re.sub(r"\[\d\]", "[i]", element.name)) for element in array.elements[:1]
         } >= {name} or array.shape
         assert (
             len(
