@@ -16,7 +16,7 @@ from fmi_plant import ATHENA, OK, Plant
 from grids import Ground, grid_bytes, on_grid
 
 from hexapod_cosim.cosim.export.plant import export_fmu
-from hexapod_cosim.cosim.results.result import Result
+from hexapod_cosim.cosim.results.facts import Result
 from hexapod_cosim.cosim.run.runner import Runner
 from hexapod_cosim.cosim.run.single_run import simulate
 from hexapod_cosim.cosim.scenario.reading import load_scenario

@@ -13,17 +13,13 @@ from walks import PARAMETERS, PERIOD, ROBOT, Walk
 from hexapod_cosim.cosim.interface.names import foot_names
 from hexapod_cosim.cosim.master.loop import COMPLETED
 from hexapod_cosim.cosim.report.headline import headline
-from hexapod_cosim.cosim.report.writing import comparison_rows
-from hexapod_cosim.cosim.results.arrival import missed_end
-from hexapod_cosim.cosim.results.comparison import compare_runs, read_seeds, write_seeds
-from hexapod_cosim.cosim.results.metrics import METRICS
+from hexapod_cosim.cosim.report.tables import comparison_rows
+from hexapod_cosim.cosim.results.comparison import compare_runs
+from hexapod_cosim.cosim.results.locomotion import describe_fall, missed_end
+from hexapod_cosim.cosim.results.metric_table import METRICS
+from hexapod_cosim.cosim.results.side_by_side import compare_all, read_seeds, write_seeds
 from hexapod_cosim.cosim.results.summary import Summary
-from hexapod_cosim.cosim.results.uncertainty import compare_all
-from hexapod_cosim.cosim.results.warnings import (
-    describe_fall,
-    friction_warnings,
-    missing_metrics_warnings,
-)
+from hexapod_cosim.cosim.results.warnings import friction_warnings, missing_metrics_warnings
 from hexapod_cosim.cosim.results.window import View
 
 STANDING = 0.130  # m
