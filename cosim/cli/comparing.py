@@ -57,7 +57,8 @@ from hexapod_cosim.cosim.results.summary import Summary, summarise
 from hexapod_cosim.cosim.results.uncertainty import Comparisons, compare_all, write_comparison
 from hexapod_cosim.cosim.run.batch import run_batch
 from hexapod_cosim.cosim.run.gait_selection import select_gait
-from hexapod_cosim.cosim.run.preparation import PlantFmus, chosen_gains
+from hexapod_cosim.cosim.run.plan import chosen_gains
+from hexapod_cosim.cosim.run.plant import PlantFmus
 from hexapod_cosim.cosim.scenario.controls import CHOOSER, Control
 from hexapod_cosim.cosim.scenario.reading import load_scenario
 from hexapod_cosim.cosim.scenario.records import CHOSEN, COMPARED, CONTROLS, OWN, Scenario

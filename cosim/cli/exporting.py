@@ -16,8 +16,8 @@ from hexapod_cosim.cosim.export.plant import export_controller, export_fmu
 from hexapod_cosim.cosim.export.robot_files import FORMATS, Format, export_description, left_out
 from hexapod_cosim.cosim.export.robot_package import export_package, read_values
 from hexapod_cosim.cosim.interface.controller import ControllerSetup
-from hexapod_cosim.cosim.run.controller_setup import make_setup
 from hexapod_cosim.cosim.run.gait_selection import compliant_gait
+from hexapod_cosim.cosim.run.plan import make_setup
 from hexapod_cosim.cosim.scenario.records import CHOSEN, OWN
 from hexapod_cosim.models import HexapodError, Robot, load_robot, unknown_name
 

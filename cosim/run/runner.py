@@ -35,8 +35,12 @@ from hexapod_cosim.cosim.results.metrics import metric_columns
 from hexapod_cosim.cosim.results.result import Result
 from hexapod_cosim.cosim.results.summary import Summary, refused_summary, summarise
 from hexapod_cosim.cosim.run.plan import RunPlan, make_plan
-from hexapod_cosim.cosim.run.plant import different_settings, initialise_plant, run_surface
-from hexapod_cosim.cosim.run.preparation import PlantFmus
+from hexapod_cosim.cosim.run.plant import (
+    PlantFmus,
+    different_settings,
+    initialise_plant,
+    run_surface,
+)
 from hexapod_cosim.cosim.run.single_run import make_result, simulate, start_controller
 from hexapod_cosim.cosim.scenario.controls import FMU, control_of
 from hexapod_cosim.cosim.scenario.records import Scenario

@@ -35,8 +35,7 @@ from hexapod_cosim.cosim.master.sensors import errors_of
 from hexapod_cosim.cosim.master.signals import Signals
 from hexapod_cosim.cosim.results.window import robot_weight
 from hexapod_cosim.cosim.run.plan import RunPlan, make_plan
-from hexapod_cosim.cosim.run.plant import apply_settings, initialise_plant
-from hexapod_cosim.cosim.run.preparation import PlantFmus
+from hexapod_cosim.cosim.run.plant import PlantFmus, apply_settings, initialise_plant
 from hexapod_cosim.cosim.scenario.controls import control_of
 from hexapod_cosim.extensions.live.gait_change import GaitChange, plan_change
 from hexapod_cosim.extensions.live.messages import Change

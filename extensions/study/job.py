@@ -17,8 +17,8 @@ from hexapod_cosim.cosim.common.plant_files import code_hash, package_version
 from hexapod_cosim.cosim.common.temporary import TemporaryFolder
 from hexapod_cosim.cosim.control.controllers import check_control
 from hexapod_cosim.cosim.export.plant import export_controller
-from hexapod_cosim.cosim.run.controller_setup import make_setup
-from hexapod_cosim.cosim.run.preparation import PlantFmus, chosen_gains, design_key
+from hexapod_cosim.cosim.run.plan import chosen_gains, design_key, make_setup
+from hexapod_cosim.cosim.run.plant import PlantFmus
 from hexapod_cosim.cosim.run.runner import Runner
 from hexapod_cosim.cosim.scenario.controls import table_with_control
 from hexapod_cosim.cosim.scenario.reading import scenario_from_table

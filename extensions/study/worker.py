@@ -17,7 +17,7 @@ from hexapod_cosim.controller import Gains
 from hexapod_cosim.cosim.common.temporary import TemporaryFolder
 from hexapod_cosim.cosim.master.loop import FAILED, INTERRUPTED
 from hexapod_cosim.cosim.results.summary import NO_FIGURES, REFUSED, Summary
-from hexapod_cosim.cosim.run.preparation import chosen_gains
+from hexapod_cosim.cosim.run.plan import chosen_gains
 from hexapod_cosim.cosim.run.worker_pool import raise_if_stopped
 from hexapod_cosim.cosim.scenario.controls import PYTHON, control_of, split_walk, table_with_control
 from hexapod_cosim.cosim.scenario.reading import scenario_from_table

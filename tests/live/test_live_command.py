@@ -9,7 +9,7 @@ from command import Call, assert_refused
 from gains import make_gains
 
 from hexapod_cosim.controller import Gains
-from hexapod_cosim.cosim.run import preparation
+from hexapod_cosim.cosim.run import plan
 from hexapod_cosim.cosim.scenario.reading import load_scenario
 from hexapod_cosim.extensions.live import realtime, server
 from hexapod_cosim.extensions.live.settings import Choices
@@ -29,7 +29,7 @@ def designed(monkeypatch: pytest.MonkeyPatch) -> Keys:
         keys.append((robot, period))
         return make_gains(robot, period=period)
 
-    monkeypatch.setattr(preparation, "designed_gains", design)
+    monkeypatch.setattr(plan, "designed_gains", design)
     return keys
 
 
@@ -48,7 +48,7 @@ def test_live_designs_gains_for_the_walk_that_a_recording_names(
     monkeypatch.setattr(server, "LiveServer", Server)
     code, out, _ = call("live", "rubble", "--control", "compliant", "--no-browser")
     assert (code, "stopped" in out) == (0, True)
-    assert designed == [preparation.design_key(load_scenario("rubble", overrides=NAMED))]
+    assert designed == [plan.design_key(load_scenario("rubble", overrides=NAMED))]
 
 
 def test_realtime_designs_gains_for_the_walk_that_it_measures(
@@ -59,7 +59,7 @@ def test_realtime_designs_gains_for_the_walk_that_it_measures(
 
     monkeypatch.setattr(realtime, "measure", measure)
     assert call("realtime", "rubble", "--control", "compliant", "--step", "0.005")[0] == 1
-    assert designed == [preparation.design_key(load_scenario("rubble", overrides=NAMED))]
+    assert designed == [plan.design_key(load_scenario("rubble", overrides=NAMED))]
 
 
 def test_a_port_out_of_range_is_refused(call: Call) -> None:
