@@ -18,9 +18,8 @@ from numpy.typing import NDArray
 
 from hexapod_cosim.cosim.common.archives import unpack
 from hexapod_cosim.cosim.common.binaries import refuse_incomplete
-from hexapod_cosim.cosim.common.closing import Closing
 from hexapod_cosim.cosim.common.plant_files import packed_binary
-from hexapod_cosim.cosim.common.temporary import TemporaryFolder
+from hexapod_cosim.cosim.common.temporary import Closing, TemporaryFolder
 from hexapod_cosim.cosim.interface.descriptions import read_description
 from hexapod_cosim.cosim.master.fmu_log import STATUS, WARNING, FmuLog
 from hexapod_cosim.models.errors import FmuError, nearest_name, unknown_name

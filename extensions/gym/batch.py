@@ -18,8 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hexapod_cosim.controller import DEFAULT_PERIOD
-from hexapod_cosim.cosim.common.closing import Closing
-from hexapod_cosim.cosim.common.temporary import TemporaryFolder
+from hexapod_cosim.cosim.common.temporary import Closing, TemporaryFolder
 from hexapod_cosim.cosim.interface.names import foot_names, joint_names, vector_names
 from hexapod_cosim.cosim.master.fmu import Fmu
 from hexapod_cosim.cosim.master.native_loop import step_functions

@@ -12,7 +12,7 @@ import pytest
 from command import COMMAND
 
 from hexapod_cosim.cosim.cli import main
-from hexapod_cosim.cosim.scenario.bundled import list_scenarios
+from hexapod_cosim.cosim.scenario import list_scenarios
 from hexapod_cosim.models import list_robots
 
 Ask = Callable[..., list[str]]

@@ -26,8 +26,8 @@ from hexapod_cosim.cosim.master.loop import (
 from hexapod_cosim.cosim.master.recorder import Recorder, Recording
 from hexapod_cosim.cosim.master.sensors import MEASURED, errors_of
 from hexapod_cosim.cosim.master.signals import Signals
-from hexapod_cosim.cosim.results.result import Result
-from hexapod_cosim.cosim.results.warnings import locomotion_of
+from hexapod_cosim.cosim.results.facts import Result
+from hexapod_cosim.cosim.results.locomotion import locomotion_of
 from hexapod_cosim.cosim.results.window import View
 from hexapod_cosim.cosim.run.plant import apply_settings
 from hexapod_cosim.cosim.run.single_run import simulate

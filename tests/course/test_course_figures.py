@@ -9,7 +9,7 @@ from dataclasses import replace
 import pytest
 
 from hexapod_cosim.cosim.master.loop import COMPLETED, FAILED
-from hexapod_cosim.cosim.results.metrics import METRICS
+from hexapod_cosim.cosim.results.metric_table import METRICS
 from hexapod_cosim.cosim.results.summary import NO_FIGURES, Summary
 from hexapod_cosim.extensions.course import texts
 from hexapod_cosim.extensions.course.records import BY_NAME, QUANTITIES, Case, load_course

@@ -18,8 +18,7 @@ import pytest
 from fmi_plant import ATHENA
 from PIL import Image
 
-from hexapod_cosim.cosim.export.extras import ICON_SIZE, PICTURE_SIZE, pictures
-from hexapod_cosim.cosim.export.plant import export_fmu
+from hexapod_cosim.cosim.export.plant import ICON_SIZE, PICTURE_SIZE, export_fmu, pictures
 from hexapod_cosim.cosim.export.reference import FOLDER, OUTPUTS
 from hexapod_cosim.cosim.interface.plant import load_interface
 from hexapod_cosim.cosim.interface.terminals import render_terminals

@@ -6,10 +6,10 @@ import pytest
 from walks import PARAMETERS, PERIOD, ROBOT, Walk
 
 from hexapod_cosim.cosim.master.loop import COMPLETED
-from hexapod_cosim.cosim.results.metrics import METRICS
+from hexapod_cosim.cosim.results.metric_table import METRICS
+from hexapod_cosim.cosim.results.side_by_side import compare_all
 from hexapod_cosim.cosim.results.summary import Summary
-from hexapod_cosim.cosim.results.uncertainty import compare_all
-from hexapod_cosim.cosim.results.warnings import energy_warnings, servo_warnings, walk_warnings
+from hexapod_cosim.cosim.results.warnings import run_balance_warnings, servo_warnings, walk_warnings
 from hexapod_cosim.cosim.results.window import View
 
 
@@ -28,7 +28,9 @@ def walk_missing(missing: float) -> Walk:
 def test_a_residual_above_a_hundredth_of_the_motors_work_is_warned_of(
     missing: float, shown: str
 ) -> None:
-    found = energy_warnings(View(walk_missing(missing).recording, PARAMETERS, PERIOD))
+    found = run_balance_warnings(
+        View(walk_missing(missing).recording, PARAMETERS, PERIOD).energy_residual
+    )
     text = f"the energy balance does not explain {shown} of the motors' work"
     assert len(found) == (1 if shown else 0)
     assert all(f"{text}: tighten solver.tolerance" in warning for warning in found)

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from hexapod_cosim.cosim.run.runner import Runner
-from hexapod_cosim.cosim.scenario.bundled import list_scenarios
+from hexapod_cosim.cosim.scenario import list_scenarios
 from hexapod_cosim.cosim.scenario.reading import load_scenario
 
 STANDING = ("stand", "compliant")  # 0.14 J of work in all, of which 0.3 mJ are missing

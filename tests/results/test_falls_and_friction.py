@@ -10,11 +10,8 @@ from numpy.typing import NDArray
 from walks import PARAMETERS, PERIOD, ROBOT, Walk
 
 from hexapod_cosim.cosim.interface.names import foot_names
-from hexapod_cosim.cosim.results.warnings import (
-    describe_fall,
-    friction_warnings,
-    missing_metrics_warnings,
-)
+from hexapod_cosim.cosim.results.locomotion import describe_fall
+from hexapod_cosim.cosim.results.warnings import friction_warnings, missing_metrics_warnings
 from hexapod_cosim.cosim.results.window import View
 
 STANDING = 0.130  # m

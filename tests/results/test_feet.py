@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from hexapod_cosim.cosim.results.feet import feet_of_angles
-from hexapod_cosim.cosim.results.result import Result
-from hexapod_cosim.cosim.results.window import SLOPE, real_feet
+from hexapod_cosim.cosim.results.facts import Result
+from hexapod_cosim.cosim.results.support import SLOPE, feet_of_angles, real_feet
 from hexapod_cosim.cosim.run.single_run import simulate
 from hexapod_cosim.cosim.scenario.reading import load_scenario
 from hexapod_cosim.models import foot_positions, load_robot
