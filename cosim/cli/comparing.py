@@ -9,16 +9,17 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from hexapod_cosim.cosim.cli.accuracy_check import check_accuracy, show_accuracy
 from hexapod_cosim.cosim.cli.failures import FELL, SUCCESS
 from hexapod_cosim.cosim.cli.running import (
     RunError,
     RunOptions,
     Words,
+    check_accuracy,
     chosen_controls,
     default_folder,
     drawing,
     run_into,
+    show_accuracy,
     show_rows,
     titled,
 )
@@ -37,11 +38,7 @@ from hexapod_cosim.cosim.report.figures import draw_figures
 from hexapod_cosim.cosim.report.tables import about, comparison_rows, with_errors
 from hexapod_cosim.cosim.report.writing import write_report
 from hexapod_cosim.cosim.results.accuracy import Accuracy, halved_scenario
-from hexapod_cosim.cosim.results.comparison import (
-    SEEDS,
-    SEEDS_PARTIAL,
-    write_seeds,
-)
+from hexapod_cosim.cosim.results.facts import Result, gait_differences
 from hexapod_cosim.cosim.results.folder import (
     ACCURACY,
     METRICS_FILE,
@@ -50,11 +47,16 @@ from hexapod_cosim.cosim.results.folder import (
     results_folder,
     stored_result,
 )
-from hexapod_cosim.cosim.results.gait_choice import gait_differences
-from hexapod_cosim.cosim.results.metrics import has_net_slip
-from hexapod_cosim.cosim.results.result import Result
+from hexapod_cosim.cosim.results.metric_table import has_net_slip
+from hexapod_cosim.cosim.results.side_by_side import (
+    SEEDS,
+    SEEDS_PARTIAL,
+    Comparisons,
+    compare_all,
+    write_comparison,
+    write_seeds,
+)
 from hexapod_cosim.cosim.results.summary import Summary, summarise
-from hexapod_cosim.cosim.results.uncertainty import Comparisons, compare_all, write_comparison
 from hexapod_cosim.cosim.run.batch import run_batch
 from hexapod_cosim.cosim.run.gait_selection import select_gait
 from hexapod_cosim.cosim.run.plan import chosen_gains

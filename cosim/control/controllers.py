@@ -22,7 +22,7 @@ from hexapod_cosim.cosim.control.python_law import (
 from hexapod_cosim.cosim.interface.controller import ControllerSetup
 from hexapod_cosim.cosim.interface.descriptions import open_description
 from hexapod_cosim.cosim.master.connection import Connection, connect, names_of_map, read_map
-from hexapod_cosim.cosim.master.fmu import FmuVariable
+from hexapod_cosim.cosim.master.fmu_block import FmuVariable
 from hexapod_cosim.cosim.scenario.controls import (
     FMU,
     MAP,

@@ -20,7 +20,8 @@ from hexapod_cosim.cosim.common.files import file_stamp
 from hexapod_cosim.cosim.common.own_process import ProcessEndedError, call_in_process
 from hexapod_cosim.cosim.common.temporary import TemporaryFolder
 from hexapod_cosim.cosim.interface.descriptions import open_description
-from hexapod_cosim.cosim.master.fmu import Fmu, FmuVariable, StepError
+from hexapod_cosim.cosim.master.fmu import Fmu
+from hexapod_cosim.cosim.master.fmu_block import FmuVariable, StepError
 from hexapod_cosim.models import FmuError
 from hexapod_cosim.models.errors import nearest_name
 

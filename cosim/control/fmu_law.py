@@ -34,7 +34,8 @@ from hexapod_cosim.cosim.master.connection import (
     Pairs,
     connect,
 )
-from hexapod_cosim.cosim.master.fmu import Fmu, FmuBlock
+from hexapod_cosim.cosim.master.fmu import Fmu
+from hexapod_cosim.cosim.master.fmu_block import FmuBlock
 from hexapod_cosim.models import JOINT_NAMES, LEG_NAMES, FmuError
 from hexapod_cosim.models.records import Vector3
 

@@ -21,7 +21,7 @@ from hexapod_cosim.cosim.interface.names import vector_names
 from hexapod_cosim.cosim.report.packing import STEPS
 from hexapod_cosim.cosim.results.folder import StoredResult
 from hexapod_cosim.cosim.results.footprints import Footprint
-from hexapod_cosim.cosim.results.window import FLAT, SLOPE
+from hexapod_cosim.cosim.results.support import FLAT, SLOPE
 from hexapod_cosim.models import JOINT_NAMES, LEG_NAMES, HexapodError, load_robot
 from hexapod_cosim.models.ground.catalogue import CATALOGUE
 from hexapod_cosim.models.ground.faces import surface_heights

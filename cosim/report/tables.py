@@ -12,13 +12,8 @@ from hexapod_cosim.cosim.interface.names import joint_names
 from hexapod_cosim.cosim.results.accuracy import Accuracy
 from hexapod_cosim.cosim.results.comparison import BETTER, METHOD, SAME, WORSE, Change
 from hexapod_cosim.cosim.results.folder import StoredResult
-from hexapod_cosim.cosim.results.metrics import (
-    DUST,
-    FLOORS,
-    METRICS,
-    shown_metrics,
-)
-from hexapod_cosim.cosim.results.uncertainty import Comparisons
+from hexapod_cosim.cosim.results.metric_table import DUST, FLOORS, METRICS, shown_metrics
+from hexapod_cosim.cosim.results.side_by_side import Comparisons
 from hexapod_cosim.cosim.results.window import Array
 from hexapod_cosim.models import JOINT_NAMES, LEG_NAMES
 

@@ -18,8 +18,8 @@ from hexapod_cosim.controller.figure_style import SETTINGS, WIDTH
 from hexapod_cosim.cosim.common.control_style import control_styles
 from hexapod_cosim.cosim.common.files import atomic_text
 from hexapod_cosim.cosim.report.figures import Figures, figure_files, write_figures
+from hexapod_cosim.cosim.results.side_by_side import Comparisons
 from hexapod_cosim.cosim.results.summary import Summary
-from hexapod_cosim.cosim.results.uncertainty import Comparisons
 
 TABLE, FIGURE = "terrains.csv", "terrains"
 LARGEST, SMALLER = 7.0, 0.75  # size of the first control's mark, and share of each next one's

@@ -34,11 +34,9 @@ from hexapod_cosim.cosim.results.comparison import METHOD
 from hexapod_cosim.cosim.results.facts import RunFacts
 from hexapod_cosim.cosim.results.folder import StoredResult
 from hexapod_cosim.cosim.results.ground import describe_terrain
-from hexapod_cosim.cosim.results.metrics import (
-    has_net_slip,
-    plans_feet,
-)
-from hexapod_cosim.cosim.results.uncertainty import Comparisons
+from hexapod_cosim.cosim.results.metric_table import has_net_slip
+from hexapod_cosim.cosim.results.metrics import plans_feet
+from hexapod_cosim.cosim.results.side_by_side import Comparisons
 from hexapod_cosim.models import JOINT_NAMES
 
 REPORT, PLOTS, PROFILE = "report.html", "plots", "profile"

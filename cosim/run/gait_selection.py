@@ -33,7 +33,7 @@ from hexapod_cosim.cosim.design.stance import (
     with_stance,
 )
 from hexapod_cosim.cosim.export.robot_package import SPEED
-from hexapod_cosim.cosim.results.gait_choice import OF_FMU, GaitChoice
+from hexapod_cosim.cosim.results.facts import OF_FMU, GaitChoice
 from hexapod_cosim.cosim.run.designs import Stance, kept_stance
 from hexapod_cosim.cosim.scenario.controls import FMU, control_of
 from hexapod_cosim.cosim.scenario.reach import reaches

@@ -130,7 +130,22 @@ def _grid_of(plant: Fmu, robot: Robot) -> dict[str, float]:
     surface = surface_of(robot.terrain)
     if surface is None:
         return {}
-    return {GRID: float(plant.provide_grid(grid_bytes(surface)))}
+    return {GRID: float(provide_grid(plant, grid_bytes(surface)))}
+
+
+def provide_grid(plant: Fmu, content: bytes) -> int:
+    """Puts a grid file into the unpacked resources of an instance, unless one of equal content is
+    there, and returns its number, which is a value of terrain.grid.
+    """
+    folder = plant.resources / "terrain"
+    files = {int(path.stem): path for path in folder.glob("*.terrain") if path.stem.isdecimal()}
+    for number, path in files.items():
+        if path.read_bytes() == content:
+            return number
+    number = 1 + max(files, default=0)
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / f"{number}.terrain").write_bytes(content)
+    return number
 
 
 def run_surface(plant: Fmu, robot: Robot, parameters: Mapping[str, float]) -> Surface | None:
@@ -140,7 +155,8 @@ def run_surface(plant: Fmu, robot: Robot, parameters: Mapping[str, float]) -> Su
     """
     if not is_on_surface(parameters):
         return None
-    own, content = surface_of(robot.terrain), plant.grid(round(parameters[GRID]))
+    path = plant.resources / "terrain" / f"{round(parameters[GRID])}.terrain"
+    own, content = surface_of(robot.terrain), path.read_bytes() if path.is_file() else None
     if own is not None and content == grid_bytes(own):
         return own
     return surface_of_grid(content, {})

@@ -32,7 +32,8 @@ from hexapod_cosim.cosim.report.profile import make_profile
 from hexapod_cosim.cosim.report.tables import servo_rows
 from hexapod_cosim.cosim.results.folder import StoredResult
 from hexapod_cosim.cosim.results.ground import around_walk, cut, describe_terrain
-from hexapod_cosim.cosim.results.window import GRID, View
+from hexapod_cosim.cosim.results.support import GRID
+from hexapod_cosim.cosim.results.window import View
 from hexapod_cosim.models import Terrain
 from hexapod_cosim.models.ground.catalogue import make_surface
 from hexapod_cosim.models.ground.faces import ground_height, surface_heights

@@ -20,12 +20,15 @@ from hexapod_cosim.cosim.results.comparison import (
     Change,
     change_of,
     compare_runs,
+)
+from hexapod_cosim.cosim.results.metric_table import METRICS
+from hexapod_cosim.cosim.results.side_by_side import (
+    Comparisons,
+    compare_all,
     read_seeds,
     write_seeds,
 )
-from hexapod_cosim.cosim.results.metrics import METRICS
 from hexapod_cosim.cosim.results.summary import NO_FIGURES, REFUSED, Summary
-from hexapod_cosim.cosim.results.uncertainty import Comparisons, compare_all
 from hexapod_cosim.models import HexapodError
 
 ROUNDING = 1e-12
