@@ -23,7 +23,8 @@ from hexapod_cosim.cosim.interface.controller import (
     controller_parameters,
 )
 from hexapod_cosim.cosim.interface.names import vector_names
-from hexapod_cosim.cosim.master.fmu import Fmu, StepError
+from hexapod_cosim.cosim.master.fmu import Fmu
+from hexapod_cosim.cosim.master.fmu_block import StepError
 from hexapod_cosim.cosim.master.loop import COMPLETED, JointController, run
 from hexapod_cosim.cosim.master.recorder import Recorder, Recording
 from hexapod_cosim.cosim.master.sensors import errors_of
