@@ -27,8 +27,8 @@ using Vector24 = Eigen::Matrix<double, 24, 1>;
 using Vector25 = Eigen::Matrix<double, 25, 1>;
 
 struct State {
-  Vector25 q;  // position, quaternion x y z w, angles along the joints' own axes
-  Vector24 v;  // torso axes, then speeds
+  Vector25 q; // position, quaternion x y z w, angles along the joints' own axes
+  Vector24 v; // torso axes, then speeds
 };
 
 struct Engine {
@@ -39,11 +39,11 @@ struct Engine {
   Law law{};
   LawFoot foot[HX_LEGS]{};
   pinocchio::JointIndex joint[HX_LEGS][HX_JOINTS]{};
-  double sign[HX_LEGS][HX_JOINTS]{};  // -1 where Pinocchio's joint turns about the opposite axis
+  double sign[HX_LEGS][HX_JOINTS]{}; // -1 where Pinocchio's joint turns about the opposite axis
   State state;
   double time = 0.0, step = 0.0, evaluations = 0.0;
   bool rk4 = true;
-  bool fresh = true;  // the next evaluation is a step's first: feet may touch down or lift off
+  bool fresh = true; // the next evaluation is a step's first: feet may touch down or lift off
 };
 
 Vector3d vector(const double *x) { return Vector3d(x[0], x[1], x[2]); }
@@ -254,7 +254,7 @@ void evaluate(void *self, const hxInput *input, int count) {
   for (int i = 0; i < count; ++i) sink = sink + acceleration(engine, engine.state, *input)[0];
 }
 
-}  // namespace
+} // namespace
 
 int main(int argc, char **argv) {
   static const Driver driver = {prepare, start, advance, torso, evaluations, evaluate};

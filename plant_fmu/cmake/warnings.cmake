@@ -37,6 +37,7 @@ if(HX_LINT)
       -Wno-double-promotion            # the C library's NAN and INFINITY are floats
       -Wno-cast-qual                   # fmi/arrays.c: one loop reads or writes values
       -Wno-disabled-macro-expansion    # FMI's headers define functions' names as themselves
+      -Wno-used-but-marked-unused      # a header's function that not every file calls
       -Wno-shadow-header)              # each component has its own generated/variables.h
   endif()
 endif()

@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import re
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -39,7 +40,7 @@ def test_constants_have_the_same_names_and_values(part: str) -> None:
 
 def python_constants(file: Path) -> dict[str, float]:
     """Returns the numbers that a module assigns to names, also several in a line."""
-    found = {}
+    found: dict[str, Any] = {}
     for node in ast.parse(file.read_text(encoding="utf-8")).body:
         if isinstance(node, ast.Assign):
             pairs = [(node.targets[0], node.value)]

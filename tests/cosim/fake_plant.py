@@ -35,7 +35,10 @@ class FakeBlock:
         self._plant.values.update(zip(self.names, self.values.tolist(), strict=True))
 
 
-class FakePlant:
+UNTYPED: Any = object  # so that the fake stands for an Fmu
+
+
+class FakePlant(UNTYPED):  # type: ignore[misc]
     """A plant with all variables of the default robot's FMU.
 
     It refuses the step that begins at `refuse_at`, or raises KeyboardInterrupt there if

@@ -124,5 +124,6 @@ def test_a_varied_run_begins_as_drawn_and_settles(athena_fmu: Path) -> None:
     assert heights[1][0] - heights[0][0] > draw(STANDARD, seed=2).height
     # m: feet creep on towards rest
     assert heights[1][-1] == pytest.approx(heights[0][-1], abs=2e-4)
+    assert varied.facts.drawn is not None
     assert varied.facts.drawn["height"] == draw(STANDARD, seed=2).height
     assert plain.facts.drawn is None

@@ -75,6 +75,7 @@ class Both:
             np.testing.assert_array_equal(
                 getattr(self.other.diagnostics, flag), getattr(self.lead.diagnostics, flag)
             )
+        assert self.other.diagnostics is not None
         np.testing.assert_allclose(
             self.other.diagnostics.planned, self.lead.diagnostics.planned, atol=1e-12
         )

@@ -74,7 +74,7 @@ def walk(plant: Plant, duration: float) -> None:
 def footprints(plant: Plant) -> Array:
     """Returns x, y, depth and radius (n, 4) of the plant's footprints."""
     plant.core.hx_plant_footprints.restype = ct.c_size_t
-    plant.core.hx_plant_footprints.argtypes = None
+    plant.core.hx_plant_footprints.argtypes = None  # type: ignore[assignment]
     found = np.zeros((2048, 4))
     size = ct.c_size_t(len(found))
     number = plant.core.hx_plant_footprints(ct.c_void_p(plant.handle), pointer(found), size)

@@ -187,7 +187,8 @@ def test_the_legend_names_soil_and_friction_of_patches() -> None:
 
 def stored(walk: Walk) -> StoredResult:
     view = View(walk.recording, PARAMETERS, PERIOD)
-    return StoredResult(view, walk.metrics(), {}, "")
+    no_facts: Any = {}
+    return StoredResult(view, walk.metrics(), no_facts, "")
 
 
 def test_each_servo_is_shown_with_its_load_in_per_cent_of_the_rating() -> None:

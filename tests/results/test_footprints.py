@@ -48,7 +48,7 @@ def stepped(plant: Plant, duration: float) -> Recording:
 def kept(plant: Plant) -> Array:
     """Returns x, y, depth and radius (n, 4) of the plant's footprints [m]."""
     plant.core.hx_plant_footprints.restype = ct.c_size_t
-    plant.core.hx_plant_footprints.argtypes = None
+    plant.core.hx_plant_footprints.argtypes = None  # type: ignore[assignment]
     found = np.zeros((512, 4))
     place = pointer(found)
     number = plant.core.hx_plant_footprints(ct.c_void_p(plant.handle), place, ct.c_size_t(512))
