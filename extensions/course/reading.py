@@ -15,7 +15,7 @@ from hexapod_cosim.cosim.scenario.scenario import scenario_from_table
 from hexapod_cosim.cosim.scenario.tables import with_overrides, with_values
 from hexapod_cosim.extensions.course.records import SPLITS, Case, Course, CourseError, Entry
 from hexapod_cosim.models import unknown_name
-from hexapod_cosim.models.ground.catalogue import CATALOGUE
+from hexapod_cosim.models.ground.table import CATALOGUE
 from hexapod_cosim.models.schema import merged_tables
 
 FOLDER = Path(__file__).parent / "cases"

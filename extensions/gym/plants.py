@@ -18,7 +18,7 @@ from hexapod_cosim.models.ground.faces import surface_of
 from hexapod_cosim.models.ground.surface import Surface
 from hexapod_cosim.models.ground.table import merged_terrain
 from hexapod_cosim.models.statics import settled
-from hexapod_cosim.models.validation.robot import check_settings
+from hexapod_cosim.models.validation.bodies import check_settings
 
 
 def grounds(settings: EnvSettings) -> tuple[Robot, ...]:

@@ -16,7 +16,7 @@ from hexapod_cosim.cosim.interface.names import joint_names, vector_names
 from hexapod_cosim.cosim.interface.start_values import parameter_values
 from hexapod_cosim.extensions.identify.log import ATTITUDE, Log, channel_of
 from hexapod_cosim.extensions.identify.log_plant import LogPlant
-from hexapod_cosim.extensions.identify.numbers.unknown import Unknown
+from hexapod_cosim.extensions.identify.numbers import Unknown
 from hexapod_cosim.extensions.identify.start import initial_state
 from hexapod_cosim.extensions.identify.unknowns import CURRENT, DELAYS, changed_robot
 from hexapod_cosim.models import Robot

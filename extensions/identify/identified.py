@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from hexapod_cosim.extensions.identify.experiment import Experiment
 from hexapod_cosim.extensions.identify.fitting.judging import Fit
-from hexapod_cosim.extensions.identify.fitting.rank import DETERMINED
-from hexapod_cosim.extensions.identify.numbers.unknown import Unknown
+from hexapod_cosim.extensions.identify.fitting.misfit import DETERMINED
+from hexapod_cosim.extensions.identify.numbers import Unknown
 from hexapod_cosim.extensions.identify.report import (
     Difference,
     channel_differences,

@@ -17,9 +17,12 @@ from hexapod_cosim.extensions.identify.fitting.covariance import (
     spectrum,
     white_information,
 )
-from hexapod_cosim.extensions.identify.fitting.differences import differences
-from hexapod_cosim.extensions.identify.fitting.least_squares import minimised, remaining_step
-from hexapod_cosim.extensions.identify.fitting.rank import (
+from hexapod_cosim.extensions.identify.fitting.least_squares import (
+    differences,
+    minimised,
+    remaining_step,
+)
+from hexapod_cosim.extensions.identify.fitting.misfit import (
     dependences,
     determined,
     sharpened,

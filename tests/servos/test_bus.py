@@ -16,7 +16,7 @@ from test_measured_servos import with_servo
 
 from hexapod_cosim.models import Robot, load_robot
 from hexapod_cosim.models.dynamics import Command
-from hexapod_cosim.models.servos.supply import held_commands
+from hexapod_cosim.models.servos.motor import held_commands
 
 STEP = 2.0 * np.pi / 4096.0  # rad  of an encoder
 
