@@ -245,8 +245,8 @@ def closed_contacts(
 ) -> list[tuple[int, Candidate, ContactState, FootContact]]:
     """Returns number, point, state and kinematics of the closed contacts.
 
-    The stiffness of feet is multiplied by the shares of their contacts (`contact_shares`), which are
-    1 but on blocks.
+    The stiffness of feet is multiplied by the shares of their contacts (`contact_shares`), which
+    are 1 but on blocks.
     """
     found = []
     for k, (point, state) in enumerate(zip(candidates(robot), contacts.states, strict=True)):
