@@ -8,12 +8,12 @@ from statistics import median
 from tempfile import TemporaryDirectory
 
 from benchmarks.toolchain import Tools
-from hexapod_cosim.cosim.design.gain_design import design_for
-from hexapod_cosim.cosim.export.plant_export import export_controller
+from hexapod_cosim.cosim.design.gains import design_for
+from hexapod_cosim.cosim.export.plant import export_controller
 from hexapod_cosim.cosim.run.plan import make_plan
+from hexapod_cosim.cosim.run.runner import Runner
 from hexapod_cosim.cosim.run.single_run import simulate
-from hexapod_cosim.cosim.run.walker import Walker
-from hexapod_cosim.cosim.scenario.scenario import load_scenario
+from hexapod_cosim.cosim.scenario.reading import load_scenario
 from hexapod_cosim.models import load_robot
 
 SCENARIO = "walk_flat"
@@ -47,9 +47,9 @@ def compiled_factors(tools: Tools) -> dict[str, float]:
         from_python = [
             simulate(driven, fmu=tools.fmu).outcome.realtime_factor for _ in range(REPEATS)
         ]
-        with Walker(fmu=tools.fmu, controller=controller, everything=True) as walker:
+        with Runner(fmu=tools.fmu, controller=controller, everything=True) as runner:
             in_c = [
-                walker.simulate(scenario, gains=gains).outcome.realtime_factor
+                runner.simulate(scenario, gains=gains).outcome.realtime_factor
                 for _ in range(REPEATS)
             ]
     return {"loop through fmpy": median(from_python), "loop in C": median(in_c)}

@@ -18,13 +18,13 @@ from PIL import Image
 
 from benchmarks import ROOT
 from hexapod_cosim.cosim.common.files import write_text
-from hexapod_cosim.cosim.results.comparisons import Comparisons, compare_all
+from hexapod_cosim.cosim.results.uncertainty import Comparisons, compare_all
 from hexapod_cosim.cosim.run.batch import run_batch
 from hexapod_cosim.cosim.scenario.controls import parse_controls
-from hexapod_cosim.cosim.scenario.scenario import load_scenario
+from hexapod_cosim.cosim.scenario.reading import load_scenario
 from hexapod_cosim.cosim.scenario.variation import STANDARD
 from hexapod_cosim.extensions.course import texts
-from hexapod_cosim.extensions.course.picture import FOLDER, STEM
+from hexapod_cosim.extensions.course.report import FOLDER, STEM
 from hexapod_cosim.extensions.course.store import read_table
 from hexapod_cosim.extensions.course.table import Table
 

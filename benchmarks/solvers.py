@@ -22,8 +22,8 @@ from hexapod_cosim.controller import Gains
 from hexapod_cosim.cosim.common.files import atomic_text
 from hexapod_cosim.cosim.results.metrics import METRICS
 from hexapod_cosim.cosim.run.preparation import chosen_gains
-from hexapod_cosim.cosim.run.walker import Walker
-from hexapod_cosim.cosim.scenario.scenario import load_scenario
+from hexapod_cosim.cosim.run.runner import Runner
+from hexapod_cosim.cosim.scenario.reading import load_scenario
 from hexapod_cosim.cosim.scenario.variation import STANDARD
 
 BOTH = ("kinematic", "compliant")
@@ -50,12 +50,12 @@ Array = NDArray[np.float64]
 
 
 def walked(
-    walker: Walker, control: str, gains: Gains | None, settings: Sequence[str]
+    runner: Runner, control: str, gains: Gains | None, settings: Sequence[str]
 ) -> tuple[Array, float]:
     """Returns metrics of walks (seeds, SHOWN) and their mean number of steps."""
     scenario = load_scenario("walk_flat", overrides=[f"control={control}", *settings])
     results = [
-        walker.simulate(replace(scenario, seed=seed, variation=STANDARD), gains=gains)
+        runner.simulate(replace(scenario, seed=seed, variation=STANDARD), gains=gains)
         for seed in range(SEEDS)
     ]
     figures = np.array([[result.metrics[name] for name in SHOWN] for result in results])
@@ -71,10 +71,10 @@ def errors(control: str) -> list[dict[str, Any]]:
     """
     gains = chosen_gains(load_scenario("walk_flat", overrides=[f"control={control}"]))
     rows = []
-    with Walker(everything=True) as walker:
-        exact, _ = walked(walker, control, gains, REFERENCE)
+    with Runner(everything=True) as runner:
+        exact, _ = walked(runner, control, gains, REFERENCE)
         for name, settings in SETTINGS.items():
-            figures, steps = walked(walker, control, gains, settings)
+            figures, steps = walked(runner, control, gains, settings)
             off = np.abs(figures - exact).max(axis=0)
             share = off / np.abs(exact).mean(axis=0)
             rows.append(

@@ -20,8 +20,8 @@ from hexapod_cosim.controller import Gains
 from hexapod_cosim.cosim.run.batch import run_batch
 from hexapod_cosim.cosim.run.preparation import chosen_gains
 from hexapod_cosim.cosim.run.worker_pool import processor_count
+from hexapod_cosim.cosim.scenario.reading import load_scenario
 from hexapod_cosim.cosim.scenario.records import Scenario
-from hexapod_cosim.cosim.scenario.scenario import load_scenario
 from hexapod_cosim.cosim.scenario.variation import STANDARD
 
 WALKS, QUICK_WALKS = 80, 24  # of each setting
@@ -77,7 +77,7 @@ def _design_time(cache: Path) -> float:
     """Returns the time until gains are there in a new process that uses a cache folder [s]."""
     program = (
         "from hexapod_cosim.cosim.run.preparation import chosen_gains as gains;"
-        "from hexapod_cosim.cosim.scenario.scenario import load_scenario as load;"
+        "from hexapod_cosim.cosim.scenario.reading import load_scenario as load;"
         f"gains(load('walk_flat', overrides=['control={CONTROL}']))"
     )
     return _seconds([sys.executable, "-c", program], cache)

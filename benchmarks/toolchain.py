@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from benchmarks import BUILD, ROOT
-from hexapod_cosim.cosim.export.plant_export import export_fmu
+from hexapod_cosim.cosim.export.plant import export_fmu
 from hexapod_cosim.models import load_robot
 
 REQUIREMENTS = Path(__file__).parent / "requirements.txt"

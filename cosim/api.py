@@ -18,19 +18,19 @@ from warnings import warn
 from hexapod_cosim.controller import Gains, load_gains
 from hexapod_cosim.cosim.control.controllers import check_control
 from hexapod_cosim.cosim.master.loop import FAILED, Progress
-from hexapod_cosim.cosim.report.report import write_report
+from hexapod_cosim.cosim.report.writing import write_report
 from hexapod_cosim.cosim.results.comparison import SEEDS, write_seeds
-from hexapod_cosim.cosim.results.comparisons import compare_all, write_comparison
-from hexapod_cosim.cosim.results.gait_choice import gait_differences
-from hexapod_cosim.cosim.results.result import Result
-from hexapod_cosim.cosim.results.results import (
+from hexapod_cosim.cosim.results.folder import (
     ResultsFolder,
     read_scenario,
     results_folder,
     stored_result,
     write_result,
 )
+from hexapod_cosim.cosim.results.gait_choice import gait_differences
+from hexapod_cosim.cosim.results.result import Result
 from hexapod_cosim.cosim.results.summary import summarise
+from hexapod_cosim.cosim.results.uncertainty import compare_all, write_comparison
 from hexapod_cosim.cosim.run.single_run import simulate as run_scenario
 from hexapod_cosim.cosim.scenario.controls import (
     Control,
@@ -39,8 +39,8 @@ from hexapod_cosim.cosim.scenario.controls import (
     parse_control,
     table_with_control,
 )
+from hexapod_cosim.cosim.scenario.reading import scenario_from_table
 from hexapod_cosim.cosim.scenario.records import Scenario
-from hexapod_cosim.cosim.scenario.scenario import scenario_from_table
 from hexapod_cosim.cosim.scenario.tables import read_tables, with_values
 
 

@@ -25,14 +25,14 @@ from PIL import Image
 from playwright.sync_api import sync_playwright
 
 from hexapod_cosim.cosim.run.preparation import chosen_gains
-from hexapod_cosim.cosim.scenario.scenario import load_scenario
+from hexapod_cosim.cosim.scenario.reading import load_scenario
 from hexapod_cosim.extensions.live import server as live_server
 from hexapod_cosim.extensions.live.loop import Loop
 from hexapod_cosim.extensions.live.settings import Choices, control_texts
 
 RATE = 12  # pictures per second of simulated time
 STEP = 0.02  # s    by which the clock goes on: a state is sent as often
-SECONDS = "window.hexapod.shown.frame.seconds"
+SECONDS = "window.hexapod.shown.frame.time"
 SETTLE = 150  # ms
 END = 7.0  # s    of simulated time
 SIZE = {"width": 1280, "height": 800}  # px    of the browser

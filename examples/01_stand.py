@@ -8,7 +8,7 @@ from tempfile import TemporaryDirectory
 
 import fmpy
 
-from hexapod_cosim.cosim.export.plant_export import export_fmu
+from hexapod_cosim.cosim.export.plant import export_fmu
 from hexapod_cosim.models import load_robot
 
 

@@ -11,7 +11,7 @@ from tempfile import TemporaryDirectory
 from fmpy import extract, read_model_description
 from fmpy.fmi2 import FMU2Slave
 
-from hexapod_cosim.cosim.export.plant_export import export_controller, export_fmu
+from hexapod_cosim.cosim.export.plant import export_controller, export_fmu
 from hexapod_cosim.cosim.run.controller_setup import make_setup
 from hexapod_cosim.models import load_robot
 

@@ -1,9 +1,12 @@
-/* exchange.c - model exchange and derivatives: continuous states, events, directional derivatives.
+/* exchange.c - model exchange and derivatives: continuous states, events, directional derivatives;
+ * and an extension: instances use a work space of the importer's, see hexapod/shared_work.h.
  * Instances of model exchange exist only where hx_continuous does. */
 #include "fmi/instance.h"
 
 #include <math.h>
 #include <string.h>
+
+#include "hexapod/shared_work.h"
 
 static double *state_of(struct hxVariables *variables) {
   return (double *)(void *)((char *)variables + hx_continuous->state);
@@ -231,4 +234,35 @@ hxStatus hx_instance_get_output_rates(hxInstance *instance, const unsigned refer
   memcpy(state_of(&flow), rate_of(&instance->state.variables), hx_state_count * sizeof(double));
   flow.input = instance->state.input_rate;
   return differentiate(instance, &flow, 1, reference, n, rate);
+}
+
+/* ----------------------------------------------------------------------------------------------
+ * work space */
+
+#if defined(_WIN32)
+#define EXPORT __declspec(dllexport)
+#elif defined(__GNUC__)
+#define EXPORT __attribute__((visibility("default")))
+#else
+#define EXPORT
+#endif
+
+EXPORT size_t hx_shared_work_size(void);
+EXPORT int hx_shared_work_use(void *instance, void *memory, size_t size);
+
+size_t hx_shared_work_size(void) { return hx_continuous ? hx_continuous->work_size() : 0; }
+
+int hx_shared_work_use(void *c, void *memory, size_t size) {
+  hxInstance *instance = c;
+  if (!instance || !instance->component) return HX_INVALID_ARGUMENT;
+  if (!hx_continuous) {
+    hx_log(instance, HX_LOG_ERROR,
+           "hx_shared_work_use: got a call, expected none, as hx_shared_work_size() is 0; nothing "
+           "was changed, leave it out");
+    return HX_INVALID_ARGUMENT;
+  }
+  const hxStatus status = hx_continuous->use_work(instance->component, memory, size);
+  if (status != HX_OK)
+    hx_log(instance, HX_LOG_ERROR, "%s", hx_component_message(instance->component));
+  return status;
 }

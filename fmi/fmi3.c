@@ -1,8 +1,7 @@
-/* fmi3.c - FMI 3.0: legal order, log and instances. The other functions of the standard are in
- * fmi3_values.c and fmi3_simulation.c, in its order. */
-#include "fmi/fmi3_calls.h"
+/* fmi3.c - every function of FMI 3.0, in the standard's order. */
+#include "fmi/call.h"
 
-#include <stdint.h>
+#include "fmi3Functions.h"
 
 typedef struct fmi3InstanceData {
   hxInstance base; /* first: a pointer to it is a pointer to this */
@@ -14,84 +13,11 @@ _Static_assert(sizeof(fmi3Float64) == sizeof(double) &&
                    sizeof(fmi3ValueReference) == sizeof(unsigned) &&
                    sizeof(fmi3Int32) == sizeof(int),
                "values are copied as they are");
+_Static_assert(fmi3Warning == (int)HX_REPLY_WARNING && fmi3Discard == (int)HX_REPLY_DISCARD &&
+                   fmi3Error == (int)HX_REPLY_ERROR,
+               "replies are returned as they are");
 
-/* ----------------------------------------------------------------------------------------------
- * legal order */
-
-enum {
-  RUNNING = HX_MODE_STEP | HX_MODE_EVENT | HX_MODE_CONTINUOUS,
-  BEFORE_END = HX_MODE_INSTANTIATED | HX_MODE_INITIALIZATION | RUNNING,
-  ANY_MODE = BEFORE_END | HX_MODE_TERMINATED,
-  INITIALIZED = HX_MODE_INITIALIZATION | RUNNING | HX_MODE_TERMINATED,
-  EITHER = HX_CO_SIMULATION | HX_MODEL_EXCHANGE
-};
-
-/* The standard's tables of allowed calls (sections 2.3, 3.2 and 4.2), and the further calls that
- * fmi2.c allows. */
-const hxCall hx_fmi3_calls[] = {
-    [SET_DEBUG_LOGGING] = {"fmi3SetDebugLogging", ANY_MODE, EITHER},
-    [ENTER_INITIALIZATION_MODE] = {"fmi3EnterInitializationMode", HX_MODE_INSTANTIATED, EITHER},
-    [EXIT_INITIALIZATION_MODE] = {"fmi3ExitInitializationMode", HX_MODE_INITIALIZATION, EITHER},
-    [ENTER_EVENT_MODE] = {"fmi3EnterEventMode", HX_MODE_STEP | HX_MODE_CONTINUOUS, EITHER},
-    [TERMINATE] = {"fmi3Terminate", RUNNING | HX_MODE_TERMINATED, EITHER},
-    [RESET] = {"fmi3Reset", ANY_MODE, EITHER},
-    [GET_FLOAT64] = {"fmi3GetFloat64", ANY_MODE, EITHER},
-    [GET_INT64] = {"fmi3GetInt64", ANY_MODE, EITHER},
-    [GET_BOOLEAN] = {"fmi3GetBoolean", ANY_MODE, EITHER},
-    [GET_OTHER] = {"fmi3Get of a type that no variable here has", ANY_MODE, EITHER},
-    [SET_FLOAT64] = {"fmi3SetFloat64", BEFORE_END, EITHER},
-    [SET_INT64] = {"fmi3SetInt64", BEFORE_END, EITHER},
-    [SET_BOOLEAN] = {"fmi3SetBoolean", BEFORE_END, EITHER},
-    [SET_OTHER] = {"fmi3Set of a type that no variable here has", BEFORE_END, EITHER},
-    [GET_STATE] = {"fmi3GetFMUState", ANY_MODE, EITHER},
-    [SET_STATE] = {"fmi3SetFMUState", ANY_MODE, EITHER},
-    [FREE_STATE] = {"fmi3FreeFMUState", ANY_MODE, EITHER},
-    [SERIALIZED_SIZE] = {"fmi3SerializedFMUStateSize", ANY_MODE, EITHER},
-    [SERIALIZE] = {"fmi3SerializeFMUState", ANY_MODE, EITHER},
-    [DESERIALIZE] = {"fmi3DeserializeFMUState", ANY_MODE, EITHER},
-    [DIRECTIONAL_DERIVATIVE] = {"fmi3GetDirectionalDerivative", INITIALIZED, EITHER},
-    [CLOCKS] = {"a function for clocks", ANY_MODE, EITHER},
-    [UPDATE_DISCRETE_STATES] = {"fmi3UpdateDiscreteStates", HX_MODE_EVENT, EITHER},
-    [ENTER_CONTINUOUS_TIME_MODE] = {"fmi3EnterContinuousTimeMode", HX_MODE_EVENT,
-                                    HX_MODEL_EXCHANGE},
-    [COMPLETED_INTEGRATOR_STEP] = {"fmi3CompletedIntegratorStep", HX_MODE_CONTINUOUS,
-                                   HX_MODEL_EXCHANGE},
-    [SET_TIME] = {"fmi3SetTime", HX_MODE_EVENT | HX_MODE_CONTINUOUS, HX_MODEL_EXCHANGE},
-    [SET_CONTINUOUS_STATES] = {"fmi3SetContinuousStates", HX_MODE_CONTINUOUS, HX_MODEL_EXCHANGE},
-    [GET_RATES] = {"fmi3GetContinuousStateDerivatives", INITIALIZED, HX_MODEL_EXCHANGE},
-    [GET_EVENT_INDICATORS] = {"fmi3GetEventIndicators", INITIALIZED, HX_MODEL_EXCHANGE},
-    [GET_CONTINUOUS_STATES] = {"fmi3GetContinuousStates", INITIALIZED, HX_MODEL_EXCHANGE},
-    [GET_NOMINALS] = {"fmi3GetNominalsOfContinuousStates", ANY_MODE, HX_MODEL_EXCHANGE},
-    [GET_NUMBER] = {"fmi3GetNumberOfXXX", ANY_MODE, HX_MODEL_EXCHANGE},
-    [ENTER_STEP_MODE] = {"fmi3EnterStepMode", HX_MODE_EVENT, HX_CO_SIMULATION},
-    [GET_OUTPUT_DERIVATIVES] = {"fmi3GetOutputDerivatives", HX_MODE_STEP | HX_MODE_TERMINATED,
-                                HX_CO_SIMULATION},
-    [DO_STEP] = {"fmi3DoStep", HX_MODE_STEP, HX_CO_SIMULATION},
-    [UNSUPPORTED] = {"a function that is not offered", ANY_MODE, EITHER},
-};
-
-hxInstance *hx_fmi3_enter(fmi3Instance c, fmi3Call call) {
-  return hx_call_is_legal(c, &hx_fmi3_calls[call]) ? c : NULL;
-}
-
-fmi3Status hx_fmi3_status(hxStatus status) {
-  if (status == HX_OK) return fmi3OK;
-  return status == HX_STEP_TOO_SMALL || status == HX_NOT_FINITE ? fmi3Discard : fmi3Error;
-}
-
-fmi3Status hx_fmi3_not_supported(fmi3Instance c, const char *name) {
-  hxInstance *instance = hx_fmi3_enter(c, UNSUPPORTED);
-  if (instance)
-    hx_log(instance, HX_LOG_ERROR,
-           "%s: got a call, expected none, as the model description does not offer it", name);
-  return fmi3Error;
-}
-
-fmi3Status hx_fmi3_no_variables(fmi3Instance c, fmi3Call call, size_t n) {
-  return hx_fmi3_status(hx_call_no_variables(c, &hx_fmi3_calls[call], n, ""));
-}
-
-void hx_fmi3_set_flag(fmi3Boolean *place, int value) {
+static void set_flag(fmi3Boolean *place, int value) {
   if (place) *place = value != 0;
 }
 
@@ -99,16 +25,15 @@ void hx_fmi3_set_flag(fmi3Boolean *place, int value) {
  * log */
 
 static void log_sink(hxInstance *base, hxLogCategory category, const char *text) {
-  static const fmi3Status status[] = {fmi3Error, fmi3Discard, fmi3Warning, fmi3OK, fmi3OK};
   const fmi3InstanceData *instance = (const fmi3InstanceData *)base;
   if (instance->log)
-    instance->log(instance->environment, status[category], hx_log_category_names[category], text);
+    instance->log(instance->environment, hx_reply_of_category(category),
+                  hx_log_category_names[category], text);
 }
 
 fmi3Status fmi3SetDebugLogging(fmi3Instance c, fmi3Boolean loggingOn, size_t nCategories,
                                const fmi3String categories[]) {
-  return hx_fmi3_status(
-      hx_call_log_select(c, &hx_fmi3_calls[SET_DEBUG_LOGGING], loggingOn, nCategories, categories));
+  return hx_call_log_select(c, loggingOn, nCategories, categories);
 }
 
 /* ----------------------------------------------------------------------------------------------
@@ -121,7 +46,7 @@ static fmi3InstanceData *new_instance(hxInterface interface, fmi3String name, fm
                                       fmi3InstanceEnvironment environment,
                                       fmi3LogMessageCallback log) {
   fmi3InstanceData *instance =
-      hx_instance_new(sizeof *instance, interface, name, loggingOn, log_sink);
+      hx_instance_new(sizeof *instance, 3, interface, name, loggingOn, log_sink);
   if (!instance) return NULL;
   instance->environment = environment;
   instance->log = log;
@@ -194,41 +119,324 @@ fmi3Instance fmi3InstantiateScheduledExecution(
 
 void fmi3FreeInstance(fmi3Instance c) { hx_instance_free(c); }
 
-/* An invalid tolerance gives a warning only, since it is not used. */
 fmi3Status fmi3EnterInitializationMode(fmi3Instance c, fmi3Boolean toleranceDefined,
                                        fmi3Float64 tolerance, fmi3Float64 startTime,
                                        fmi3Boolean stopTimeDefined, fmi3Float64 stopTime) {
-  hxInstance *instance = hx_fmi3_enter(c, ENTER_INITIALIZATION_MODE);
-  const char *name = hx_fmi3_calls[ENTER_INITIALIZATION_MODE].name;
-  if (!instance ||
-      hx_instance_set_experiment(instance, name, startTime, stopTimeDefined, stopTime) != HX_OK)
-    return fmi3Error;
-  instance->state.mode = HX_MODE_INITIALIZATION;
-  return hx_instance_check_tolerance(instance, name, toleranceDefined, tolerance) ? fmi3OK
-                                                                                  : fmi3Warning;
+  const int reply =
+      hx_call_set_experiment(c, toleranceDefined, tolerance, startTime, stopTimeDefined, stopTime);
+  if (reply != fmi3Error) ((hxInstance *)c)->state.mode = HX_MODE_INITIALIZATION;
+  return reply;
 }
 
-fmi3Status fmi3ExitInitializationMode(fmi3Instance c) {
-  return hx_fmi3_status(hx_call_exit_initialization(c, &hx_fmi3_calls[EXIT_INITIALIZATION_MODE]));
+fmi3Status fmi3ExitInitializationMode(fmi3Instance c) { return hx_call_exit_initialization(c); }
+
+fmi3Status fmi3EnterEventMode(fmi3Instance c) { return hx_call_enter_event_mode(c); }
+
+fmi3Status fmi3Terminate(fmi3Instance c) { return hx_call_terminate(c); }
+
+fmi3Status fmi3Reset(fmi3Instance c) { return hx_call_reset(c); }
+
+/* ----------------------------------------------------------------------------------------------
+ * values */
+
+static fmi3Status get_values(fmi3Instance c, hxCall call, hxType type,
+                             const fmi3ValueReference vr[], size_t nvr, void *value, size_t n) {
+  if (!hx_call_is_legal_with(c, call, nvr, vr, value)) return fmi3Error;
+  return hx_reply(hx_arrays_get(c, type, vr, nvr, value, n));
 }
 
-fmi3Status fmi3EnterEventMode(fmi3Instance c) {
-  hxInstance *instance = hx_fmi3_enter(c, ENTER_EVENT_MODE);
-  if (!instance) return fmi3Error;
-  if (instance->state.mode == HX_MODE_STEP && !instance->uses_event_mode) {
-    hx_log(instance, HX_LOG_ERROR,
-           "fmi3EnterEventMode: got a call, expected none, as there are no events or eventModeUsed "
-           "was false; nothing was changed");
-    return fmi3Error;
+static fmi3Status set_values(fmi3Instance c, hxCall call, hxType type,
+                             const fmi3ValueReference vr[], size_t nvr, const void *value,
+                             size_t n) {
+  if (!hx_call_is_legal_with(c, call, nvr, vr, value)) return fmi3Error;
+  return hx_reply(hx_arrays_set(c, type, vr, nvr, value, n));
+}
+
+fmi3Status fmi3GetFloat64(fmi3Instance c, const fmi3ValueReference vr[], size_t nvr,
+                          fmi3Float64 value[], size_t n) {
+  return get_values(c, HX_GET_REALS, HX_REAL, vr, nvr, value, n);
+}
+
+/* enumerations are Int64 */
+fmi3Status fmi3GetInt64(fmi3Instance c, const fmi3ValueReference vr[], size_t nvr,
+                        fmi3Int64 value[], size_t n) {
+  return get_values(c, HX_GET_INTEGERS, HX_INTEGER, vr, nvr, value, n);
+}
+
+fmi3Status fmi3GetBoolean(fmi3Instance c, const fmi3ValueReference vr[], size_t nvr,
+                          fmi3Boolean value[], size_t n) {
+  return get_values(c, HX_GET_BOOLEANS, HX_BOOLEAN, vr, nvr, value, n);
+}
+
+fmi3Status fmi3SetFloat64(fmi3Instance c, const fmi3ValueReference vr[], size_t nvr,
+                          const fmi3Float64 value[], size_t n) {
+  return set_values(c, HX_SET_REALS, HX_REAL, vr, nvr, value, n);
+}
+
+fmi3Status fmi3SetInt64(fmi3Instance c, const fmi3ValueReference vr[], size_t nvr,
+                        const fmi3Int64 value[], size_t n) {
+  return set_values(c, HX_SET_INTEGERS, HX_INTEGER, vr, nvr, value, n);
+}
+
+fmi3Status fmi3SetBoolean(fmi3Instance c, const fmi3ValueReference vr[], size_t nvr,
+                          const fmi3Boolean value[], size_t n) {
+  return set_values(c, HX_SET_BOOLEANS, HX_BOOLEAN, vr, nvr, value, n);
+}
+
+/* types that no variable has */
+#define NO_VARIABLES_OF(Type)                                                                      \
+  fmi3Status fmi3Get##Type(fmi3Instance c, const fmi3ValueReference vr[], size_t nvr,              \
+                           fmi3##Type value[], size_t n) {                                         \
+    (void)vr, (void)value, (void)n;                                                                \
+    return hx_call_no_variables(c, __func__, nvr);                                                 \
+  }                                                                                                \
+  fmi3Status fmi3Set##Type(fmi3Instance c, const fmi3ValueReference vr[], size_t nvr,              \
+                           const fmi3##Type value[], size_t n) {                                   \
+    (void)vr, (void)value, (void)n;                                                                \
+    return hx_call_no_variables(c, __func__, nvr);                                                 \
   }
-  instance->state.mode = HX_MODE_EVENT;
+
+NO_VARIABLES_OF(Float32)
+NO_VARIABLES_OF(Int8)
+NO_VARIABLES_OF(UInt8)
+NO_VARIABLES_OF(Int16)
+NO_VARIABLES_OF(UInt16)
+NO_VARIABLES_OF(Int32)
+NO_VARIABLES_OF(UInt32)
+NO_VARIABLES_OF(UInt64)
+NO_VARIABLES_OF(String)
+
+fmi3Status fmi3GetBinary(fmi3Instance c, const fmi3ValueReference vr[], size_t nvr, size_t size[],
+                         fmi3Binary value[], size_t n) {
+  (void)vr, (void)size, (void)value, (void)n;
+  return hx_call_no_variables(c, __func__, nvr);
+}
+
+fmi3Status fmi3SetBinary(fmi3Instance c, const fmi3ValueReference vr[], size_t nvr,
+                         const size_t size[], const fmi3Binary value[], size_t n) {
+  (void)vr, (void)size, (void)value, (void)n;
+  return hx_call_no_variables(c, __func__, nvr);
+}
+
+/* ----------------------------------------------------------------------------------------------
+ * dependencies */
+
+/* Dependencies of single elements are not offered: see providesPerElementDependencies. */
+fmi3Status fmi3GetNumberOfVariableDependencies(fmi3Instance c, fmi3ValueReference vr, size_t *n) {
+  (void)vr, (void)n;
+  return hx_call_not_offered(c, __func__);
+}
+
+fmi3Status fmi3GetVariableDependencies(fmi3Instance c, fmi3ValueReference dependent,
+                                       size_t elementIndicesOfDependent[],
+                                       fmi3ValueReference independents[],
+                                       size_t elementIndicesOfIndependents[],
+                                       fmi3DependencyKind dependencyKinds[], size_t nDependencies) {
+  (void)dependent, (void)elementIndicesOfDependent, (void)independents,
+      (void)elementIndicesOfIndependents, (void)dependencyKinds;
+  (void)nDependencies;
+  return hx_call_not_offered(c, __func__);
+}
+
+/* ----------------------------------------------------------------------------------------------
+ * saved states */
+
+fmi3Status fmi3GetFMUState(fmi3Instance c, fmi3FMUState *state) { return hx_call_save(c, state); }
+
+fmi3Status fmi3SetFMUState(fmi3Instance c, fmi3FMUState state) { return hx_call_restore(c, state); }
+
+fmi3Status fmi3FreeFMUState(fmi3Instance c, fmi3FMUState *state) {
+  return hx_call_free_state(c, state);
+}
+
+fmi3Status fmi3SerializedFMUStateSize(fmi3Instance c, fmi3FMUState state, size_t *size) {
+  return hx_call_state_size(c, state, size);
+}
+
+fmi3Status fmi3SerializeFMUState(fmi3Instance c, fmi3FMUState state, fmi3Byte bytes[],
+                                 size_t size) {
+  return hx_call_serialize(c, state, bytes, size);
+}
+
+fmi3Status fmi3DeserializeFMUState(fmi3Instance c, const fmi3Byte bytes[], size_t size,
+                                   fmi3FMUState *state) {
+  return hx_call_deserialize(c, bytes, size, state);
+}
+
+/* ----------------------------------------------------------------------------------------------
+ * derivatives */
+
+fmi3Status fmi3GetDirectionalDerivative(fmi3Instance c, const fmi3ValueReference unknowns[],
+                                        size_t nUnknowns, const fmi3ValueReference knowns[],
+                                        size_t nKnowns, const fmi3Float64 seed[], size_t nSeed,
+                                        fmi3Float64 sensitivity[], size_t nSensitivity) {
+  if (!hx_call_is_legal_with(c, HX_DIRECTIONAL, nUnknowns, unknowns, sensitivity)) return fmi3Error;
+  if (!hx_call_has_arrays(c, HX_DIRECTIONAL, nKnowns, knowns, seed)) return fmi3Error;
+  return hx_reply(hx_arrays_directional(c, unknowns, nUnknowns, knowns, nKnowns, seed, nSeed,
+                                        sensitivity, nSensitivity));
+}
+
+fmi3Status fmi3GetAdjointDerivative(fmi3Instance c, const fmi3ValueReference unknowns[],
+                                    size_t nUnknowns, const fmi3ValueReference knowns[],
+                                    size_t nKnowns, const fmi3Float64 seed[], size_t nSeed,
+                                    fmi3Float64 sensitivity[], size_t nSensitivity) {
+  (void)unknowns, (void)nUnknowns, (void)knowns, (void)nKnowns, (void)seed, (void)nSeed,
+      (void)sensitivity, (void)nSensitivity;
+  return hx_call_not_offered(c, __func__);
+}
+
+/* ----------------------------------------------------------------------------------------------
+ * configuration, clocks */
+
+/* There are no structural parameters. */
+fmi3Status fmi3EnterConfigurationMode(fmi3Instance c) { return hx_call_not_offered(c, __func__); }
+
+fmi3Status fmi3ExitConfigurationMode(fmi3Instance c) { return hx_call_not_offered(c, __func__); }
+
+fmi3Status fmi3GetIntervalDecimal(fmi3Instance c, const fmi3ValueReference vr[], size_t nvr,
+                                  fmi3Float64 interval[], fmi3IntervalQualifier qualifier[]) {
+  (void)vr, (void)interval, (void)qualifier;
+  return hx_call_no_variables(c, __func__, nvr);
+}
+
+fmi3Status fmi3GetIntervalFraction(fmi3Instance c, const fmi3ValueReference vr[], size_t nvr,
+                                   fmi3UInt64 counter[], fmi3UInt64 resolution[],
+                                   fmi3IntervalQualifier qualifier[]) {
+  (void)vr, (void)counter, (void)resolution, (void)qualifier;
+  return hx_call_no_variables(c, __func__, nvr);
+}
+
+fmi3Status fmi3ActivateModelPartition(fmi3Instance c, fmi3ValueReference clockReference,
+                                      fmi3Float64 activationTime) {
+  (void)clockReference, (void)activationTime;
+  return hx_call_not_offered(c, __func__);
+}
+
+#define NO_CLOCKS(Name, Type)                                                                      \
+  fmi3Status fmi3##Name(fmi3Instance c, const fmi3ValueReference vr[], size_t nvr, Type value[]) { \
+    (void)vr, (void)value;                                                                         \
+    return hx_call_no_variables(c, __func__, nvr);                                                 \
+  }
+#define NO_CLOCK_FRACTIONS(Name, Type)                                                             \
+  fmi3Status fmi3##Name(fmi3Instance c, const fmi3ValueReference vr[], size_t nvr, Type counter[], \
+                        Type resolution[]) {                                                       \
+    (void)vr, (void)counter, (void)resolution;                                                     \
+    return hx_call_no_variables(c, __func__, nvr);                                                 \
+  }
+
+NO_CLOCKS(GetClock, fmi3Clock)
+NO_CLOCKS(SetClock, const fmi3Clock)
+NO_CLOCKS(GetShiftDecimal, fmi3Float64)
+NO_CLOCKS(SetIntervalDecimal, const fmi3Float64)
+NO_CLOCKS(SetShiftDecimal, const fmi3Float64)
+NO_CLOCK_FRACTIONS(GetShiftFraction, fmi3UInt64)
+NO_CLOCK_FRACTIONS(SetIntervalFraction, const fmi3UInt64)
+NO_CLOCK_FRACTIONS(SetShiftFraction, const fmi3UInt64)
+
+/* ----------------------------------------------------------------------------------------------
+ * events */
+
+fmi3Status fmi3EvaluateDiscreteStates(fmi3Instance c) { return hx_call_not_offered(c, __func__); }
+
+fmi3Status fmi3UpdateDiscreteStates(fmi3Instance c, fmi3Boolean *discreteStatesNeedUpdate,
+                                    fmi3Boolean *terminateSimulation,
+                                    fmi3Boolean *nominalsOfContinuousStatesChanged,
+                                    fmi3Boolean *valuesOfContinuousStatesChanged,
+                                    fmi3Boolean *nextEventTimeDefined, fmi3Float64 *nextEventTime) {
+  int changed;
+  const int reply = hx_call_update(c, &changed);
+  set_flag(discreteStatesNeedUpdate, 0);
+  set_flag(terminateSimulation, 0);
+  set_flag(nominalsOfContinuousStatesChanged, 0);
+  set_flag(valuesOfContinuousStatesChanged, changed);
+  set_flag(nextEventTimeDefined, 0);
+  if (nextEventTime) *nextEventTime = 0.0;
+  return reply;
+}
+
+/* ----------------------------------------------------------------------------------------------
+ * model exchange */
+
+fmi3Status fmi3EnterContinuousTimeMode(fmi3Instance c) {
+  return hx_call_enter_mode(c, HX_ENTER_CONTINUOUS_TIME_MODE, HX_MODE_CONTINUOUS);
+}
+
+fmi3Status fmi3CompletedIntegratorStep(fmi3Instance c, fmi3Boolean noSetFMUStatePriorToCurrentPoint,
+                                       fmi3Boolean *enterEventMode,
+                                       fmi3Boolean *terminateSimulation) {
+  (void)noSetFMUStatePriorToCurrentPoint;
+  set_flag(enterEventMode, 0);
+  set_flag(terminateSimulation, 0);
+  return hx_call_completed_step(c);
+}
+
+fmi3Status fmi3SetTime(fmi3Instance c, fmi3Float64 time) { return hx_call_set_time(c, time); }
+
+fmi3Status fmi3SetContinuousStates(fmi3Instance c, const fmi3Float64 x[], size_t n) {
+  return hx_call_set_states(c, x, n);
+}
+
+fmi3Status fmi3GetContinuousStateDerivatives(fmi3Instance c, fmi3Float64 dx[], size_t n) {
+  return hx_call_get_row(c, HX_GET_RATES, hx_instance_get_rates, dx, n);
+}
+
+fmi3Status fmi3GetEventIndicators(fmi3Instance c, fmi3Float64 z[], size_t n) {
+  return hx_call_get_row(c, HX_GET_INDICATORS, hx_instance_get_indicators, z, n);
+}
+
+fmi3Status fmi3GetContinuousStates(fmi3Instance c, fmi3Float64 x[], size_t n) {
+  return hx_call_get_row(c, HX_GET_STATES, hx_instance_get_states, x, n);
+}
+
+fmi3Status fmi3GetNominalsOfContinuousStates(fmi3Instance c, fmi3Float64 nominal[], size_t n) {
+  return hx_call_get_row(c, HX_GET_NOMINALS, hx_instance_get_nominals, nominal, n);
+}
+
+static fmi3Status get_number(fmi3Instance c, size_t *place, size_t number) {
+  if (!hx_call_is_legal_with(c, HX_GET_NUMBER, 1, place, place)) return fmi3Error;
+  *place = number;
   return fmi3OK;
 }
 
-fmi3Status fmi3Terminate(fmi3Instance c) {
-  return hx_fmi3_status(hx_call_terminate(c, &hx_fmi3_calls[TERMINATE]));
+fmi3Status fmi3GetNumberOfEventIndicators(fmi3Instance c, size_t *n) {
+  return get_number(c, n, hx_continuous ? hx_continuous->indicators : 0);
 }
 
-fmi3Status fmi3Reset(fmi3Instance c) {
-  return hx_fmi3_status(hx_call_reset(c, &hx_fmi3_calls[RESET]));
+fmi3Status fmi3GetNumberOfContinuousStates(fmi3Instance c, size_t *n) {
+  return get_number(c, n, hx_state_count);
+}
+
+/* ----------------------------------------------------------------------------------------------
+ * co-simulation */
+
+fmi3Status fmi3EnterStepMode(fmi3Instance c) {
+  return hx_call_enter_mode(c, HX_ENTER_STEP_MODE, HX_MODE_STEP);
+}
+
+fmi3Status fmi3GetOutputDerivatives(fmi3Instance c, const fmi3ValueReference vr[], size_t nvr,
+                                    const fmi3Int32 order[], fmi3Float64 value[], size_t n) {
+  if (!hx_call_is_first_order(c, HX_GET_OUTPUT_RATES, nvr, vr, order, value)) return fmi3Error;
+  return hx_reply(hx_arrays_get_output_rates(c, vr, nvr, value, n));
+}
+
+/* Returns early where discrete variables change, if the importer allows it; requests event mode, if
+ * the importer uses it. */
+fmi3Status fmi3DoStep(fmi3Instance c, fmi3Float64 currentCommunicationPoint,
+                      fmi3Float64 communicationStepSize,
+                      fmi3Boolean noSetFMUStatePriorToCurrentPoint,
+                      fmi3Boolean *eventHandlingNeeded, fmi3Boolean *terminateSimulation,
+                      fmi3Boolean *earlyReturn, fmi3Float64 *lastSuccessfulTime) {
+  hxInstance *instance = c;
+  const double t = currentCommunicationPoint, h = communicationStepSize;
+  int event = 0;
+  (void)noSetFMUStatePriorToCurrentPoint;
+  if (!hx_call_is_legal(c, HX_DO_STEP)) return fmi3Error;
+  const hxStatus status =
+      hx_instance_step_to_event(instance, t, h, instance->may_return_early, &event);
+  const double reached = hx_instance_time(instance);
+  set_flag(eventHandlingNeeded, event && instance->uses_event_mode);
+  set_flag(terminateSimulation, 0);
+  set_flag(earlyReturn, event && reached < t + h);
+  if (lastSuccessfulTime) *lastSuccessfulTime = reached;
+  return hx_reply(status);
 }

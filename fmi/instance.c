@@ -33,10 +33,11 @@ static hxStatus check_default_guid(hxInstance *instance, const char *resources) 
   return HX_INVALID_ARGUMENT;
 }
 
-void *hx_instance_new(size_t size, hxInterface interface, const char *name, int logging,
-                      hxLogSink *sink) {
+void *hx_instance_new(size_t size, int version, hxInterface interface, const char *name,
+                      int logging, hxLogSink *sink) {
   hxInstance *instance = calloc(1, size);
   if (!instance) return NULL;
+  instance->version = version;
   instance->sink = sink;
   instance->logged = logging ? ~0u : HX_LOG_ALWAYS;
   instance->state.interface = (int)interface;

@@ -3,14 +3,12 @@
  *
  * The files of fmi/ in layers; each calls the layers below it only:
  *
- *   fmi3_values.c  fmi3_simulation.c   most functions of FMI 3.0
- *   fmi2.c  fmi3.c  work.c       the functions of FMI 2.0; the others of FMI 3.0; an extension
+ *   fmi2.c  fmi3.c               the functions of the standard's versions
  *   call.c  arrays.c             legal order and calls of both versions; FMI 3's arrays
- *   step.c  exchange.c  state.c  co-simulation, model exchange, saved states
+ *   step.c  exchange.c  state.c  co-simulation; model exchange, an extension; saved states
  *   instance.c                   opening, values, initialization, reset
  *   resources.c                  start values from the FMU's resources
- *   table.c                      the table of variables
- *   log.c                        messages to the importer
+ *   variables.c                  the table of variables; messages to the importer
  *
  * Every function either does all that it was asked for or changes nothing; a refusal is logged with
  * what was got and what was expected.
@@ -93,6 +91,7 @@ struct hxInstance {
   char guid[HX_GUID_SIZE];
   char name[HX_NAME_SIZE];
   unsigned fresh;       /* groups of outputs that are up to date, unless state.output_stale */
+  int version;          /* of the standard: 2 or 3 */
   int uses_event_mode;  /* co-simulation: the importer handles events */
   int may_return_early; /* co-simulation: a step may end where discrete variables change */
   unsigned logged;      /* bit k: category k is passed on */
@@ -102,7 +101,7 @@ struct hxInstance {
 };
 
 /* ----------------------------------------------------------------------------------------------
- * log.c */
+ * variables.c */
 
 #if defined(__GNUC__)
 __attribute__((format(printf, 3, 4)))
@@ -115,9 +114,6 @@ enum { HX_LOG_ALWAYS = 1u << HX_LOG_ERROR | 1u << HX_LOG_DISCARD };
 /* Turns n categories on or off; all of them when n = 0. */
 hxStatus hx_log_select(hxInstance *instance, const char *call, int on, size_t n,
                        const char *const category[]);
-
-/* ----------------------------------------------------------------------------------------------
- * table.c */
 
 /* The row of a reference, or NULL; sets its causality. */
 const hxVariable *hx_variable_find(unsigned reference, hxCausality *causality);
@@ -149,8 +145,8 @@ hxStatus hx_resources_read(hxInstance *instance, const char *resources, int *fou
 
 /* Allocates an instance of `size` bytes, which begin with an hxInstance and are otherwise zero, so
  * that it can log; NULL when out of memory. */
-void *hx_instance_new(size_t size, hxInterface interface, const char *name, int logging,
-                      hxLogSink *sink);
+void *hx_instance_new(size_t size, int version, hxInterface interface, const char *name,
+                      int logging, hxLogSink *sink);
 
 /* Opens a new instance; resources is a URI, a path or NULL. */
 hxStatus hx_instance_open(hxInstance *instance, const char *guid, const char *resources);
@@ -247,59 +243,6 @@ hxStatus hx_instance_restore(hxInstance *instance, const void *block);
 hxStatus hx_instance_serialize(hxInstance *instance, const char *call, void *block, void *bytes,
                                size_t n);
 hxStatus hx_instance_deserialize(hxInstance *instance, const void *bytes, size_t n, void **block);
-
-/* ----------------------------------------------------------------------------------------------
- * call.c */
-
-/* A function of the standard, with the modes and interfaces in which it may be called, as masks. */
-typedef struct hxCall {
-  const char *name;
-  int modes, interfaces;
-} hxCall;
-
-/* Checks of a call: that it is legal now, which it never is for NULL; that arrays of n > 0 elements
- * are not NULL; both. They return 1, or log and return 0. */
-int hx_call_is_legal(hxInstance *instance, const hxCall *call);
-int hx_call_has_arrays(hxInstance *instance, const hxCall *call, size_t n, const void *array,
-                       const void *other);
-int hx_call_is_legal_with(hxInstance *instance, const hxCall *call, size_t n, const void *array,
-                          const void *other);
-
-/* The same checks of a call for n time derivatives, and that all of them are of order 1. */
-int hx_call_is_first_order(hxInstance *instance, const hxCall *call, size_t n,
-                           const unsigned reference[], const int order[], const double value[]);
-
-/* Calls that do the same in both versions: they check, and then do what the functions of like names
- * above do. Those that are refused return HX_INVALID_ARGUMENT. */
-
-/* accepts n = 0 variables only; of_type completes the message: "" or " of type ..." */
-hxStatus hx_call_no_variables(hxInstance *instance, const hxCall *call, size_t n,
-                              const char *of_type);
-
-hxStatus hx_call_log_select(hxInstance *instance, const hxCall *call, int on, size_t n,
-                            const char *const category[]);
-hxStatus hx_call_enter_mode(hxInstance *instance, const hxCall *call, hxMode mode);
-hxStatus hx_call_exit_initialization(hxInstance *instance, const hxCall *call);
-hxStatus hx_call_terminate(hxInstance *instance, const hxCall *call);
-hxStatus hx_call_reset(hxInstance *instance, const hxCall *call);
-
-hxStatus hx_call_save(hxInstance *instance, const hxCall *call, void **block);
-hxStatus hx_call_restore(hxInstance *instance, const hxCall *call, const void *block);
-hxStatus hx_call_free_state(hxInstance *instance, const hxCall *call, void **block);
-hxStatus hx_call_state_size(hxInstance *instance, const hxCall *call, const void *block,
-                            size_t *size);
-hxStatus hx_call_serialize(hxInstance *instance, const hxCall *call, void *block, void *bytes,
-                           size_t n);
-hxStatus hx_call_deserialize(hxInstance *instance, const hxCall *call, const void *bytes, size_t n,
-                             void **block);
-
-/* A function of exchange.c that reads an array of n doubles. */
-typedef hxStatus hxGetter(hxInstance *instance, double value[], size_t n);
-
-hxStatus hx_call_set_time(hxInstance *instance, const hxCall *call, double t);
-hxStatus hx_call_set_states(hxInstance *instance, const hxCall *call, const double x[], size_t n);
-hxStatus hx_call_get_row(hxInstance *instance, const hxCall *call, hxGetter *getter, double value[],
-                         size_t n);
 
 /* ----------------------------------------------------------------------------------------------
  * arrays.c */

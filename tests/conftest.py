@@ -25,7 +25,7 @@ from xdist.scheduler import LoadScopeScheduling
 
 from hexapod_cosim.cosim.cli import main
 from hexapod_cosim.cosim.common import plant_files
-from hexapod_cosim.cosim.export.plant_export import export_fmu
+from hexapod_cosim.cosim.export.plant import export_fmu
 from hexapod_cosim.models import load_robot
 
 # A shell that runs the tests in the background lets them ignore Ctrl-C, and their children too.

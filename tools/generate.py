@@ -23,12 +23,12 @@ from hexapod_cosim.controller import DEFAULT_PERIOD, make_gait
 from hexapod_cosim.cosim.common.components import PLANT, Component
 from hexapod_cosim.cosim.export.start_values import start_values
 from hexapod_cosim.cosim.interface.arrays import arrays
-from hexapod_cosim.cosim.interface.controller_interface import (
+from hexapod_cosim.cosim.interface.controller import (
     ControllerSetup,
     load_controller_interface,
 )
 from hexapod_cosim.cosim.interface.model_description import render_fmi2
-from hexapod_cosim.cosim.interface.plant_interface import (
+from hexapod_cosim.cosim.interface.plant import (
     CAUSALITIES,
     Interface,
     Variable,
@@ -105,7 +105,7 @@ def interfaces() -> tuple[Interface, ...]:
     core = (load_interface(robot), load_controller_interface(setup))
     if not (ROOT / "extensions" / "gym").is_dir():
         return core
-    from hexapod_cosim.extensions.gym.interface import (  # noqa: PLC0415  may be deleted
+    from hexapod_cosim.extensions.gym.policy import (  # noqa: PLC0415  may be deleted
         load_policy_interface,
         standing_policy,
     )

@@ -152,7 +152,7 @@ def components() -> list[Component]:
     """Returns the components whose binaries a wheel holds."""
     found = [PLANT, CONTROLLER]
     if (ROOT / "extensions" / "gym").is_dir():
-        from hexapod_cosim.extensions.gym.interface import POLICY  # noqa: PLC0415
+        from hexapod_cosim.extensions.gym.policy import POLICY  # noqa: PLC0415
 
         found.append(POLICY)
     return found

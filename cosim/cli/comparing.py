@@ -35,18 +35,14 @@ from hexapod_cosim.cosim.common.temporary import TemporaryFolder
 from hexapod_cosim.cosim.master.interrupts import deferred_interrupts
 from hexapod_cosim.cosim.report.accuracy import with_errors
 from hexapod_cosim.cosim.report.figures import draw_figures
-from hexapod_cosim.cosim.report.report import about, comparison_rows, write_report
+from hexapod_cosim.cosim.report.writing import about, comparison_rows, write_report
 from hexapod_cosim.cosim.results.accuracy import Accuracy, halved_scenario
 from hexapod_cosim.cosim.results.comparison import (
     SEEDS,
     SEEDS_PARTIAL,
     write_seeds,
 )
-from hexapod_cosim.cosim.results.comparisons import Comparisons, compare_all, write_comparison
-from hexapod_cosim.cosim.results.gait_choice import gait_differences
-from hexapod_cosim.cosim.results.metrics import has_net_slip
-from hexapod_cosim.cosim.results.result import Result
-from hexapod_cosim.cosim.results.results import (
+from hexapod_cosim.cosim.results.folder import (
     ACCURACY,
     METRICS_FILE,
     ResultsFolder,
@@ -54,13 +50,17 @@ from hexapod_cosim.cosim.results.results import (
     results_folder,
     stored_result,
 )
+from hexapod_cosim.cosim.results.gait_choice import gait_differences
+from hexapod_cosim.cosim.results.metrics import has_net_slip
+from hexapod_cosim.cosim.results.result import Result
 from hexapod_cosim.cosim.results.summary import Summary, summarise
+from hexapod_cosim.cosim.results.uncertainty import Comparisons, compare_all, write_comparison
 from hexapod_cosim.cosim.run.batch import run_batch
-from hexapod_cosim.cosim.run.chosen_walk import choose_walk
+from hexapod_cosim.cosim.run.gait_selection import select_gait
 from hexapod_cosim.cosim.run.preparation import PlantFmus, chosen_gains
 from hexapod_cosim.cosim.scenario.controls import CHOOSER, Control
+from hexapod_cosim.cosim.scenario.reading import load_scenario
 from hexapod_cosim.cosim.scenario.records import CHOSEN, COMPARED, CONTROLS, OWN, Scenario
-from hexapod_cosim.cosim.scenario.scenario import load_scenario
 from hexapod_cosim.cosim.scenario.variation import STANDARD
 from hexapod_cosim.models import ScenarioError
 
@@ -146,7 +146,7 @@ class Work:
         found = {}
         for control in self.compared:
             plan = replace(self.plan, control=control.text)
-            walk = choose_walk(plan, gains=chosen_gains(plan, self.options.gains))
+            walk = select_gait(plan, gains=chosen_gains(plan, self.options.gains))
             found[control.label] = walk.as_facts()
         return gait_differences(found)
 

@@ -52,8 +52,8 @@ def design(
     from hexapod_cosim.controller.design import design_gains, plot_design
     from hexapod_cosim.cosim.cli.terminal import show_files, show_json, show_table
     from hexapod_cosim.cosim.common.files import writing_into
-    from hexapod_cosim.cosim.design.design_check import check_design
-    from hexapod_cosim.cosim.design.gain_design import examine_stances, read_requirements
+    from hexapod_cosim.cosim.design.gains import examine_stances, read_requirements
+    from hexapod_cosim.cosim.design.verification import check_design
     from hexapod_cosim.models import load_robot
 
     loaded, folder, files = load_robot(robot), output or Path("out") / "design", list[Path]()

@@ -12,12 +12,12 @@ from hexapod_cosim.controller import Gait
 from hexapod_cosim.cosim.cli.running import given_gains
 from hexapod_cosim.cosim.cli.terminal import refuse_unused, show_files, show_json, waiting, warn
 from hexapod_cosim.cosim.cli.terrains import surfaces_from
-from hexapod_cosim.cosim.export.plant_export import export_controller, export_fmu
+from hexapod_cosim.cosim.export.plant import export_controller, export_fmu
 from hexapod_cosim.cosim.export.robot_files import FORMATS, Format, export_description, left_out
 from hexapod_cosim.cosim.export.robot_package import export_package, read_values
-from hexapod_cosim.cosim.interface.controller_interface import ControllerSetup
-from hexapod_cosim.cosim.run.chosen_walk import chosen_walk
+from hexapod_cosim.cosim.interface.controller import ControllerSetup
 from hexapod_cosim.cosim.run.controller_setup import make_setup
+from hexapod_cosim.cosim.run.gait_selection import compliant_gait
 from hexapod_cosim.cosim.scenario.records import CHOSEN, OWN
 from hexapod_cosim.models import HexapodError, Robot, load_robot, unknown_name
 
@@ -129,7 +129,7 @@ def _in_stance(robot: Robot, stance: str) -> tuple[Robot, Gait | None]:
     if stance == OWN:
         return robot, None
     with waiting("choosing the stance"):
-        walk = chosen_walk(robot)
+        walk = compliant_gait(robot)
     return walk.robot, walk.gait
 
 

@@ -113,7 +113,7 @@ def laws() -> Rows:
 def _choices(enumeration: str) -> Rows:
     """Returns the items of an enumeration of the plant's FMU."""
     from hexapod_cosim.cosim.common.components import PLANT
-    from hexapod_cosim.cosim.interface.plant_interface import enumerations_of
+    from hexapod_cosim.cosim.interface.plant import enumerations_of
 
     items = enumerations_of(PLANT)[enumeration].items
     return [{"name": name, "about": text} for name, text in items]

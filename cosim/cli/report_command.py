@@ -22,8 +22,8 @@ def report(
 ) -> None:
     """Make the plots and the report of a run, a comparison, a study or a benchmark again."""
     from hexapod_cosim.cosim.cli.terminal import show_files, show_json
-    from hexapod_cosim.cosim.report.report import REPORT
-    from hexapod_cosim.cosim.results.results import damage_reported, read_facts
+    from hexapod_cosim.cosim.report.writing import REPORT
+    from hexapod_cosim.cosim.results.folder import damage_reported, read_facts
 
     facts = read_facts(folder)
     with damage_reported(folder):
@@ -38,8 +38,8 @@ def _report_again(folder: Path, facts: Mapping[str, Any]) -> list[Path]:
     """Writes the report of a folder again; `facts` are those of its run.json."""
     from hexapod_cosim.cosim.cli.extension import loaded, report_functions
     from hexapod_cosim.cosim.cli.terminal import warn
-    from hexapod_cosim.cosim.report.report import write_report
-    from hexapod_cosim.cosim.results.results import read_result
+    from hexapod_cosim.cosim.report.writing import write_report
+    from hexapod_cosim.cosim.results.folder import read_result
     from hexapod_cosim.models import HexapodError
 
     kind, reports = facts.get("kind"), report_functions()
@@ -65,10 +65,10 @@ def _report_comparison(folder: Path, facts: Mapping[str, Any]) -> list[Path]:
     """Writes the report of a comparison's folder again; `facts` are those of its run.json."""
     from hexapod_cosim.cosim.cli.terminal import warn
     from hexapod_cosim.cosim.common.files import PARTS
-    from hexapod_cosim.cosim.report.report import write_report
+    from hexapod_cosim.cosim.report.writing import write_report
     from hexapod_cosim.cosim.results.comparison import SEEDS, read_seeds
-    from hexapod_cosim.cosim.results.comparisons import WALKS, compare_all
-    from hexapod_cosim.cosim.results.results import read_accuracies, read_result, read_scenario
+    from hexapod_cosim.cosim.results.folder import read_accuracies, read_result, read_scenario
+    from hexapod_cosim.cosim.results.uncertainty import WALKS, compare_all
 
     seeds, labels = read_seeds(folder / SEEDS), facts[PARTS]
     return write_report(

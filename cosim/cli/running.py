@@ -16,12 +16,12 @@ from hexapod_cosim.cosim.cli.terminal import progress_bar, show_table, show_text
 from hexapod_cosim.cosim.control.controllers import check_control
 from hexapod_cosim.cosim.master.interrupts import deferred_interrupts
 from hexapod_cosim.cosim.master.loop import INTERRUPTED
+from hexapod_cosim.cosim.results.folder import ResultsFolder, write_result
 from hexapod_cosim.cosim.results.metrics import OF_THE_RUN
 from hexapod_cosim.cosim.results.recordings import check_formats
 from hexapod_cosim.cosim.results.result import Result
-from hexapod_cosim.cosim.results.results import ResultsFolder, write_result
+from hexapod_cosim.cosim.run.runner import Runner
 from hexapod_cosim.cosim.run.single_run import simulate as run_scenario
-from hexapod_cosim.cosim.run.walker import Walker
 from hexapod_cosim.cosim.scenario.controls import Control, control_of, parse_controls
 from hexapod_cosim.cosim.scenario.records import Scenario
 from hexapod_cosim.models import HexapodError, unknown_name
@@ -125,7 +125,7 @@ def run_into(
         with progress_bar(label, plan.duration) as progress:
             run = partial(run_scenario, plan)
             if options.engine == "compiled":
-                run = partial(stack.enter_context(Walker(everything=True)).simulate, plan)
+                run = partial(stack.enter_context(Runner(everything=True)).simulate, plan)
             result = run(fmu=options.fmu, gains=options.gains, progress=progress, begin=begin)
         result = replace(result, facts=replace(result.facts, command=command))
         with waiting("writing the results"):

@@ -21,19 +21,19 @@ from hexapod_cosim.cosim.cli.running import (
 )
 from hexapod_cosim.cosim.cli.terminal import show_files, show_json, show_text, warn
 from hexapod_cosim.cosim.report.accuracy import with_errors
-from hexapod_cosim.cosim.report.report import metric_rows, write_report
+from hexapod_cosim.cosim.report.writing import metric_rows, write_report
 from hexapod_cosim.cosim.results.accuracy import Accuracy, halved_scenario
-from hexapod_cosim.cosim.results.metrics import has_net_slip
-from hexapod_cosim.cosim.results.result import Result
-from hexapod_cosim.cosim.results.results import (
+from hexapod_cosim.cosim.results.folder import (
     ACCURACY,
     results_folder,
     stored_result,
     write_accuracy,
 )
+from hexapod_cosim.cosim.results.metrics import has_net_slip
+from hexapod_cosim.cosim.results.result import Result
 from hexapod_cosim.cosim.results.summary import summarise
+from hexapod_cosim.cosim.scenario.reading import load_scenario
 from hexapod_cosim.cosim.scenario.records import Scenario
-from hexapod_cosim.cosim.scenario.scenario import load_scenario
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,7 @@ def validate(
 ) -> None:
     """Check an FMU of ours and say what is wrong."""
     from hexapod_cosim.cosim.cli.terminal import show_json
-    from hexapod_cosim.cosim.validate.validation import UnsoundFmuError, find_problems
+    from hexapod_cosim.cosim.export.validation import UnsoundFmuError, find_problems
 
     problems = find_problems(fmu)
     if problems:

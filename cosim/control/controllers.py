@@ -20,7 +20,7 @@ from hexapod_cosim.cosim.control.python_law import (
     parameters_of,
 )
 from hexapod_cosim.cosim.control.trial import refuse_crashing
-from hexapod_cosim.cosim.interface.controller_interface import ControllerSetup
+from hexapod_cosim.cosim.interface.controller import ControllerSetup
 from hexapod_cosim.cosim.interface.descriptions import open_description
 from hexapod_cosim.cosim.master.connection import Connection, connect, names_of_map, read_map
 from hexapod_cosim.cosim.master.fmu import FmuVariable

@@ -1,1 +1,1 @@
-"""Writes FMUs, SSP packages and robot descriptions. Imports `common` to `master`."""
+"""Writes the FMUs of robots and checks FMUs. Imports `common` to `master`."""

@@ -82,18 +82,16 @@ class Library:
 
     sources: C files and headers by their path in the include folder.
     headers: further include folders.
-    included: C files that others include; they are not compiled by themselves.
     """
 
     name: str
     sources: Mapping[str, Path]
     headers: tuple[Path, ...] = ()
     flags: tuple[str, ...] = field(default=())
-    included: tuple[str, ...] = ()
 
     def digest(self) -> str:
         """Returns a hash of names, flags and contents of all files."""
-        parts = [self.name, *self.flags, *self.included]
+        parts = [self.name, *self.flags]
         files = [
             *self.sources.items(),
             *(
@@ -193,9 +191,7 @@ def _compile(library: Library, command: Sequence[str], target: str, cache_folder
                 for item in ("-isystem", f"headers{number}")
             ),
         ]
-        sources = [
-            path for path in library.sources if path.endswith(".c") and path not in library.included
-        ]
+        sources = [path for path in library.sources if path.endswith(".c")]
         _run([*command, *includes, *sources, "-o", f"../out/{out}"], root, target, cache_folder)
         return (root / "out" / out).read_bytes()
 

@@ -6,7 +6,7 @@ from hexapod_cosim.cosim.common.plant_files import licence_file
 from hexapod_cosim.cosim.export.documentation import render_html
 from hexapod_cosim.cosim.export.picture import draw_robot
 from hexapod_cosim.cosim.interface.arrays import arrays
-from hexapod_cosim.cosim.interface.plant_interface import Interface
+from hexapod_cosim.cosim.interface.plant import Interface
 from hexapod_cosim.cosim.interface.terminals import (
     FOLDER,
     ICON,

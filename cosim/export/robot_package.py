@@ -11,15 +11,15 @@ from pathlib import Path
 from types import MappingProxyType
 
 from hexapod_cosim.cosim.common.temporary import TemporaryFolder
-from hexapod_cosim.cosim.export.plant_export import export_controller, export_fmu
+from hexapod_cosim.cosim.export.plant import export_controller, export_fmu
 from hexapod_cosim.cosim.export.platforms import choose_platforms
 from hexapod_cosim.cosim.export.ssp import NOTHING, Experiment, export_ssp
 from hexapod_cosim.cosim.export.starts import with_starts
-from hexapod_cosim.cosim.interface.controller_interface import (
+from hexapod_cosim.cosim.interface.controller import (
     ControllerSetup,
     load_controller_interface,
 )
-from hexapod_cosim.cosim.interface.plant_interface import load_interface
+from hexapod_cosim.cosim.interface.plant import load_interface
 from hexapod_cosim.cosim.scenario.records import GRAVITY_NAMES
 from hexapod_cosim.models import FmuError, HexapodError, unknown_name
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from functools import reduce
 
-from hexapod_cosim.cosim.interface.plant_interface import Interface, Variable
+from hexapod_cosim.cosim.interface.plant import Interface, Variable
 
 FNV_BASIS, FNV_PRIME, MASK, WORD = 0xCBF29CE484222325, 0x100000001B3, (1 << 64) - 1, 8
 

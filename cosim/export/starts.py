@@ -6,7 +6,7 @@ import math
 from collections.abc import Collection, Mapping
 from dataclasses import replace
 
-from hexapod_cosim.cosim.interface.plant_interface import Causality, Interface, Variable
+from hexapod_cosim.cosim.interface.plant import Causality, Interface, Variable
 from hexapod_cosim.models.errors import FmuError, nearest_name
 
 # enumerations that no robot file has

@@ -14,7 +14,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import islice
 
-from hexapod_cosim.cosim.interface.plant_interface import CAUSALITIES, Interface, Pattern, Variable
+from hexapod_cosim.cosim.interface.plant import CAUSALITIES, Interface, Pattern, Variable
 from hexapod_cosim.models.errors import HexapodError
 
 AXES = re.compile(r"\{\w+\}\.|[._]\{\w+\}|\{\w+\}|\[i\]")

@@ -12,7 +12,7 @@ from typing import Any
 
 from hexapod_cosim.cosim.common.components import Component
 from hexapod_cosim.cosim.interface.patterns import expand, labelled
-from hexapod_cosim.cosim.interface.plant_interface import (
+from hexapod_cosim.cosim.interface.plant import (
     Enumeration,
     Step,
     enumerations_of,

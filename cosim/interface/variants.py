@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 
-from hexapod_cosim.cosim.interface.plant_interface import Interface
+from hexapod_cosim.cosim.interface.plant import Interface
 
 # in a binary that a compiler without complex numbers built (plant_fmu/src/plant/continuous.c)
 NO_DERIVATIVES = b"derivatives: got a call in a binary without complex numbers"

@@ -1,16 +1,15 @@
 """Loads the co-simulation library (cosim/master/src) with the structures of its headers.
 
-The structures for ctypes are read from the headers, so that no member is listed twice. The headers
-are written for this short reader: a declaration ends with a semicolon, and the length of an array
-is a number or a name of an enumeration.
+Structures, constants and functions are read from the headers, so that nothing is listed twice. The
+reader knows what this project's headers use.
 """
 
 from __future__ import annotations
 
 import ctypes as ct
 import re
+from collections.abc import Iterator
 from functools import cache
-from math import prod
 from pathlib import Path
 from typing import Any
 
@@ -20,111 +19,132 @@ from hexapod_cosim.models import FmuError
 HEADERS = Path(__file__).parent / "include" / "hexapod"
 # each uses structures of those before it
 ORDER = ("macro_step.h", "sensors.h", "master.h")
-_COMMENT = re.compile(r"/\*.*?\*/", re.DOTALL)
+_NOISE = re.compile(
+    r'/\*.*?\*/|^[ \t]*#(?:[^\n]*\\\n)*[^\n]*$|extern "C" \{', re.DOTALL | re.MULTILINE
+)
+_DEFINITION = re.compile(r"^#define (\w+) (\d+)$", re.MULTILINE)
 _BLOCK = re.compile(
-    r"typedef struct (?P<name>\w+) \{(?P<members>.*?)\} \w+;|enum \w* ?\{(?P<list>.*?)\}"
-    r"|#define (?P<constant>\w+) (?P<value>\d+)$",
+    r"enum\s*(?P<enum>\w*)\s*\{(?P<items>.*?)\}"
+    r"|typedef struct\s*\w*\s*\{(?P<members>.*?)^\}\s*(?P<name>\w+);",
     re.DOTALL | re.MULTILINE,
 )
-_MEMBER = re.compile(r"(?P<stars>\**)(?P<name>\w+)(?P<lengths>(\[\w+\])*)")
-_TYPES: dict[str, Any] = {
+_FUNCTION = re.compile(r"HX_API\s+([\w\s]+?[\s*]+)(\w+)\(([^;]*)\);")
+_MEMBER = re.compile(
+    r"struct \{(?P<inner>.*?)\}\s*(?P<own>\w+);|(?P<type>(?:const )?\w+ )(?P<names>[^;]+);",
+    re.DOTALL,
+)
+_PLAIN: dict[str, Any] = {
     "double": ct.c_double,
     "int": ct.c_int,
     "unsigned": ct.c_uint,
     "size_t": ct.c_size_t,
+    "uint64_t": ct.c_uint64,
+    "void": None,
 }
 
 
 class Header:
-    """Structures by their names in C, and the numbers of enumerations and definitions."""
+    """Declarations of header files, by their names in C.
 
-    def __init__(self) -> None:
-        self.structures: dict[str, Any] = {}
-        self.numbers: dict[str, int] = {}
+    Args:
+        paths: of headers, each of which may use the declarations of those before it.
+        base: other headers, whose declarations these may use.
 
-    def read(self, text: str) -> None:
-        """Adds what a header declares."""
-        for found in _BLOCK.finditer(_COMMENT.sub("", text)):
-            if found["name"]:
-                self._add_structure(found["name"], found["members"])
-            elif found["list"]:
-                self._add_names(found["list"])
+    Attributes:
+        types: plain types, enumerations and structures. A pointer in a structure is an address.
+        constants: numbers of enumerations and definitions.
+    """
+
+    def __init__(self, *paths: Path, base: Header | None = None) -> None:
+        self.types: dict[str, Any] = dict(base.types if base else _PLAIN)
+        self.constants: dict[str, int] = dict(base.constants if base else {})
+        text = "\n".join(path.read_text(encoding="utf-8") for path in paths)
+        self.constants |= {name: int(value) for name, value in _DEFINITION.findall(text)}
+        self._text = _NOISE.sub("", text)
+        for block in _BLOCK.finditer(self._text):
+            if block["name"]:
+                self.types[block["name"]] = self._structure(block["name"], block["members"])
             else:
-                self.numbers[found["constant"]] = int(found["value"])
+                self._read_enum(block["items"])
+                self.types[block["enum"]] = ct.c_int
 
-    def _add_structure(self, name: str, members: str) -> None:
-        fields = [
-            field for line in members.split(";") if line.strip() for field in self._fields(line)
-        ]
-        self.structures[name] = type(name, (ct.Structure,), {"_fields_": fields})
-
-    def _fields(self, line: str) -> list[tuple[str, Any]]:
-        """Returns names and types of one declaration: `const double *low, *high`."""
-        words = line.replace("const ", " ").strip()
-        base, _, rest = words.partition(" ")
-        fields = []
-        for part in rest.split(","):
-            member = _MEMBER.fullmatch(part.strip())
-            assert member, f"not a declaration for this reader: {line}"
-            fields.append((member["name"], self._type(base, member)))
-        return fields
-
-    def _type(self, base: str, member: re.Match[str]) -> Any:
-        if member["stars"]:
-            return ct.c_char_p if base == "char" else ct.c_void_p
-        kind = _TYPES[base] if base in _TYPES else self.structures[base]
-        for length in reversed(re.findall(r"\w+", member["lengths"])):
-            kind *= self._number(length)
-        return kind
-
-    def _add_names(self, names: str) -> None:
-        following = 0
-        for item in filter(None, map(str.strip, names.split(","))):
-            name, _, value = (part.strip() for part in item.partition("="))
-            self.numbers[name] = self._number(value) if value else following
-            following = self.numbers[name] + 1
+    def _read_enum(self, text: str) -> None:
+        value = -1
+        for item in filter(None, map(str.strip, text.split(","))):
+            name, _, given = (part.strip() for part in item.partition("="))
+            value = self._number(given) if given else value + 1
+            self.constants[name] = value
 
     def _number(self, text: str) -> int:
-        """Returns a sum of products of numbers and names."""
-        return sum(
-            prod(
-                int(factor) if factor.isdigit() else self.numbers[factor]
-                for factor in map(str.strip, term.split("*"))
-            )
-            for term in text.split("+")
-        )
+        """Evaluates an integer expression of constants and sizes."""
+        sized = re.sub(r"sizeof\((\w+)\)", lambda m: str(ct.sizeof(self.types[m[1]])), text)
+        return int(eval(sized.replace("/", "//"), {"__builtins__": {}}, self.constants))
+
+    def _structure(self, name: str, text: str) -> type[ct.Structure]:
+        fields = [field for member in _MEMBER.finditer(text) for field in self._fields(member)]
+        return type(name, (ct.Structure,), {"_fields_": fields})
+
+    def _fields(self, member: re.Match[str]) -> Iterator[tuple[str, Any]]:
+        if member["own"]:
+            yield member["own"], self._structure(member["own"], member["inner"])
+            return
+        base = member["type"].removeprefix("const ").strip()
+        for declarator in member["names"].split(","):
+            kind = _address(base) if "*" in declarator else self.types[base]
+            name, *sizes = re.findall(r"\w+", declarator)
+            for size in reversed(sizes):
+                kind *= self._number(size)
+            yield name, kind
+
+    def bind(self, library: ct.CDLL) -> ct.CDLL:
+        """Declares the types of the functions that a library has; may be called repeatedly."""
+        for result, name, arguments in _FUNCTION.findall(self._text):
+            function = getattr(library, name, None)
+            if function is not None:
+                given = [text for text in arguments.split(",") if text.strip() != "void"]
+                function.restype = self._type(result)
+                function.argtypes = [self._type(text) for text in given]
+        return library
+
+    def _type(self, declaration: str) -> Any:
+        """Returns the type of a parameter or a result; arrays are addresses."""
+        base = declaration.replace("const ", "").replace("*", " ").split()[0]
+        stars = declaration.count("*") + declaration.count("[")
+        if stars == 0:
+            return self.types[base]
+        known = self.types.get(base)
+        is_structure = isinstance(known, type) and issubclass(known, ct.Structure)
+        return ct.POINTER(known) if is_structure and stars == 1 else _address(base)
+
+
+def _address(base: str) -> Any:
+    """Returns the type of a pointer that is passed on and not followed."""
+    return ct.c_char_p if base == "char" else ct.c_void_p
 
 
 @cache
-def read_headers(*more: Path) -> Header:
-    """Returns what the library's headers declare, and those of an extension that use them."""
-    header = Header()
-    if more:  # whose structures hold the same ones
-        header.structures |= read_headers().structures
-        header.numbers |= read_headers().numbers
-    for path in more or (HEADERS / name for name in ORDER):
-        header.read(path.read_text(encoding="utf-8"))
-    return header
+def loop_header() -> Header:
+    """Returns what the library's headers declare."""
+    return Header(*(HEADERS / name for name in ORDER))
 
 
-def load_loop(part: str, size: str, structure: str, *more: Path) -> ct.CDLL:
-    """Returns the library if its structures are those of the headers.
+def load_loop(part: str, size: str, structure: str, header: Header | None = None) -> ct.CDLL:
+    """Returns the library, with its functions declared, if its structures are those of the headers.
 
     Args:
         part: the part of the library: "master", or that of an extension.
         size: the function that returns the size of the structure.
         structure: name of the structure that holds all others of this part.
-        more: headers of the extension.
+        header: of the extension; by default the library's own.
 
     Raises FmuError when the library is missing or has other structures.
     """
-    path, header = shared_library(LOOP), read_headers(*more)
-    library = ct.CDLL(str(path))
+    path, header = shared_library(LOOP), header or loop_header()
+    library = header.bind(ct.CDLL(str(path)))
     layout = f"hx_{part}_layout"
-    want = header.numbers[layout.upper()], ct.sizeof(header.structures[structure])
+    want = header.constants[layout.upper()], ct.sizeof(header.types[structure])
     got = 0, 0
     if hasattr(library, layout) and hasattr(library, size):
-        getattr(library, size).restype = ct.c_size_t
         got = int(getattr(library, layout)()), int(getattr(library, size)())
     if got != want:
         raise FmuError(
@@ -135,3 +155,9 @@ def load_loop(part: str, size: str, structure: str, *more: Path) -> ct.CDLL:
             where=str(path),
         )
     return library
+
+
+@cache
+def master_library() -> ct.CDLL:
+    """Returns the library for runs. Raises FmuError as load_loop()."""
+    return load_loop("master", "hx_master_size", "hxMaster")

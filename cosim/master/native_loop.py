@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import ctypes as ct
 from collections.abc import Sequence
-from functools import cache
 from itertools import chain
 from time import perf_counter
 from typing import Any
@@ -28,7 +27,7 @@ from hexapod_cosim.cosim.master.loop import (
     Progress,
     outcome_of,
 )
-from hexapod_cosim.cosim.master.loop_library import load_loop, read_headers
+from hexapod_cosim.cosim.master.loop_library import loop_header, master_library
 from hexapod_cosim.cosim.master.recorder import BLOCK_ROWS, Rows
 from hexapod_cosim.cosim.master.sensors import READINGS, Errors, Sensors
 from hexapod_cosim.cosim.master.signals import (
@@ -58,22 +57,10 @@ CALLS = (
 )
 
 
-@cache
-def _library() -> ct.CDLL:
-    """Loads the C loop and declares its functions' types.
-
-    Raises FmuError when the library is missing or has another version.
-    """
-    library = load_loop("master", "hx_master_size", "hxMaster")
-    library.hx_master_run.argtypes = [ct.c_void_p, ct.c_size_t]
-    library.hx_master_record.restype = None
-    return library
-
-
 def step_functions(fmu: Fmu, instance: int | None) -> Any:
     """Returns the functions of an FMU that a macro-step in C calls (hxStepFmu)."""
     calls = {name: fmu.address(function) for name, function in FUNCTIONS.items()}
-    return read_headers().structures["hxStepFmu"](instance=instance, **calls)
+    return loop_header().types["hxStepFmu"](instance=instance, **calls)
 
 
 class NativeMaster:
@@ -98,7 +85,7 @@ class NativeMaster:
         columns: Sequence[str] | None = None,
         judged: Sequence[str] = (),
     ) -> None:
-        self._library, self._fmus = _library(), {"plant": plant, "controller": controller}
+        self._library, self._fmus = master_library(), {"plant": plant, "controller": controller}
         outputs, flags = plant.names("output"), plant.names("output", "Boolean")
         check_plant_variables(outputs, plant.names("input"), flags)
         if connection is None:
@@ -133,7 +120,7 @@ class NativeMaster:
         )
         self._judged = judged
         self._arrays: list[NDArray[Any]] = []  # keeps alive what the structure points to
-        self._master = read_headers().structures["hxMaster"](
+        self._master = loop_header().types["hxMaster"](
             push_count=len(PUSH),
             push_place=self._places[PUSH[0]],
             drive_place=self._places[self._drive[0]],
@@ -176,7 +163,7 @@ class NativeMaster:
 
     def _block(self, fmu: Fmu, names: Sequence[str], place: int) -> Any:
         """Returns the variables of an FMU that one call reads or writes."""
-        make = read_headers().structures["hxStepBlock"]
+        make = loop_header().types["hxStepBlock"]
         return make(self._references(fmu, names), len(names), place)
 
     def run(

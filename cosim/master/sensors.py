@@ -10,7 +10,6 @@ import ctypes as ct
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import cache
 from typing import Any
 
 import numpy as np
@@ -24,7 +23,7 @@ from hexapod_cosim.cosim.interface.names import (
     joint_names,
     vector_names,
 )
-from hexapod_cosim.cosim.master.loop_library import load_loop, read_headers
+from hexapod_cosim.cosim.master.loop_library import loop_header, master_library
 from hexapod_cosim.cosim.scenario.records import Scenario
 from hexapod_cosim.cosim.scenario.schedule import Schedule, SensorFaults
 
@@ -77,15 +76,6 @@ def errors_of(scenario: Scenario, schedule: Schedule) -> Errors:
     )
 
 
-@cache
-def _library() -> ct.CDLL:
-    library = load_loop("master", "hx_master_size", "hxMaster")
-    for name in ("hx_sensors_read", "hx_servos_break"):
-        function = getattr(library, name)
-        function.argtypes, function.restype = [ct.c_void_p, ct.c_size_t, ct.c_void_p], None
-    return library
-
-
 class Sensors:
     """Sensors and servos with errors, on a row of values of one run.
 
@@ -131,7 +121,7 @@ class Sensors:
         delay: int = 0,
     ) -> Any:
         """Returns the structure of sensors of one kind; one of no sensors without errors."""
-        make = read_headers().structures["hxSensors"]
+        make = loop_header().types["hxSensors"]
         if faults is None and factor is None and not delay:
             return make()
         count, size, slots = len(names), len(names[0]), delay + 1
@@ -156,7 +146,7 @@ class Sensors:
 
     def _make_servos(self, faults: NDArray[np.int8] | None) -> Any:
         """Returns the structure of the servos; one of no servos without faults."""
-        make = read_headers().structures["hxServos"]
+        make = loop_header().types["hxServos"]
         if faults is None:
             return make()
         where = {
@@ -172,9 +162,9 @@ class Sensors:
     def read(self, moment: int, row: NDArray[np.float64]) -> None:
         """Computes the readings in the row after `moment` macro-steps."""
         for sensors in self._sensors:
-            _library().hx_sensors_read(sensors, moment, row.ctypes.data)
+            master_library().hx_sensors_read(sensors, moment, row.ctypes.data)
 
     def break_servos(self, moment: int, row: NDArray[np.float64]) -> None:
         """Replaces the joint commands in the row of servos with faults."""
         if self.servos.count:
-            _library().hx_servos_break(ct.byref(self.servos), moment, row.ctypes.data)
+            master_library().hx_servos_break(ct.byref(self.servos), moment, row.ctypes.data)

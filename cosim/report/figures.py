@@ -39,11 +39,11 @@ def draw_figures(views: Mapping[str, View]) -> Figures:
             except ColumnError as error:
                 skipped[name] = f"{error.got} was not recorded"
                 continue
-            images |= {f"{name}.{kind}": content for kind, content in _files(figure)}
+            images |= {f"{name}.{kind}": content for kind, content in figure_files(figure)}
     return Figures(images, skipped)
 
 
-def _files(figure: Figure) -> Iterator[tuple[str, bytes]]:
+def figure_files(figure: Figure) -> Iterator[tuple[str, bytes]]:
     """Yields a figure's file in each format, as (format, content).
 
     The axes are placed once, for the PNG: savefig() would do so for each format, and before each

@@ -11,7 +11,7 @@ import numpy as np
 
 from hexapod_cosim.cosim.export.picture import COLOURS, THICKNESS
 from hexapod_cosim.cosim.interface.names import vector_names
-from hexapod_cosim.cosim.results.results import StoredResult
+from hexapod_cosim.cosim.results.folder import StoredResult
 from hexapod_cosim.cosim.results.window import FLAT, SLOPE
 from hexapod_cosim.models import JOINT_NAMES, LEG_NAMES, HexapodError, load_robot
 from hexapod_cosim.models.schema import parse_toml

@@ -13,8 +13,8 @@ from hexapod_cosim.cosim.report.columns import MOST_ROWS, Chosen, choose
 from hexapod_cosim.cosim.report.geometry import describe_ground, describe_robot
 from hexapod_cosim.cosim.report.packing import pack
 from hexapod_cosim.cosim.report.surface import pack_footprints, pack_surface, stride
+from hexapod_cosim.cosim.results.folder import StoredResult
 from hexapod_cosim.cosim.results.footprints import find_footprints
-from hexapod_cosim.cosim.results.results import StoredResult
 from hexapod_cosim.cosim.results.window import CONTACT_SHARE
 from hexapod_cosim.models.ground.surface import Surface
 

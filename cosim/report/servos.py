@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from hexapod_cosim.cosim.interface.names import joint_names
-from hexapod_cosim.cosim.results.results import StoredResult
+from hexapod_cosim.cosim.results.folder import StoredResult
 from hexapod_cosim.cosim.results.window import Array
 from hexapod_cosim.models import JOINT_NAMES, LEG_NAMES
 

@@ -17,8 +17,8 @@ from matplotlib.figure import Figure
 from hexapod_cosim.controller.figure_style import DPI, SETTINGS, UNDATED, WIDTH
 from hexapod_cosim.cosim.common.control_style import control_styles
 from hexapod_cosim.cosim.common.files import atomic_path, atomic_text
-from hexapod_cosim.cosim.results.comparisons import Comparisons
 from hexapod_cosim.cosim.results.summary import Summary
+from hexapod_cosim.cosim.results.uncertainty import Comparisons
 
 TABLE, FIGURE = "terrains.csv", "terrains"
 LARGEST, SMALLER = 7.0, 0.75  # size of the first control's mark, and share of each next one's

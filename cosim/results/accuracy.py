@@ -25,8 +25,8 @@ import numpy as np
 from hexapod_cosim.cosim.master.loop import COMPLETED
 from hexapod_cosim.cosim.results.summary import Summary
 from hexapod_cosim.cosim.scenario.checks import check_steps
+from hexapod_cosim.cosim.scenario.reading import scenario_robot
 from hexapod_cosim.cosim.scenario.records import Scenario
-from hexapod_cosim.cosim.scenario.scenario import scenario_robot
 from hexapod_cosim.models import HexapodError, ScenarioError
 
 FINER, FINER_STEP = 100.0, 10.0

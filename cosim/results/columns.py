@@ -11,7 +11,7 @@ from functools import cache
 
 from hexapod_cosim.cosim.common.components import CONTROLLER, PLANT, Component
 from hexapod_cosim.cosim.interface.patterns import expand, labelled
-from hexapod_cosim.cosim.interface.plant_interface import read_table
+from hexapod_cosim.cosim.interface.plant import read_table
 
 NO_UNIT = "1"
 HEADING = re.compile(r"(?P<name>.*\S) \[(?P<unit>[^\[\]]*)\]")  # no space precedes an index

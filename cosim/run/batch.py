@@ -17,8 +17,8 @@ from hexapod_cosim.cosim.common.temporary import TemporaryFolder
 from hexapod_cosim.cosim.master.loop import INTERRUPTED
 from hexapod_cosim.cosim.results.summary import Summary, refused_summary, summarise
 from hexapod_cosim.cosim.run.preparation import PlantFmus, chosen_gains
+from hexapod_cosim.cosim.run.runner import Runner
 from hexapod_cosim.cosim.run.single_run import simulate
-from hexapod_cosim.cosim.run.walker import Walker
 from hexapod_cosim.cosim.run.worker_pool import (
     SerialExecutor,
     WorkerDiedError,
@@ -70,8 +70,8 @@ def run_batch(
         tasks = [_prepare(scenario, fmus, gains) for scenario in scenarios]
         count = min(processor_count() if workers is None else workers, len(tasks))
         if count <= 1:
-            with Walker() if compiled else nullcontext() as walker:
-                run: Callable[[_Task], Summary] = partial(_run, walker=walker)
+            with Runner() if compiled else nullcontext() as runner:
+                run: Callable[[_Task], Summary] = partial(_run, runner=runner)
                 yield from _in_order(tasks, SerialExecutor(), run, ahead=1)
         else:
             with WorkerPool(count) as pool:
@@ -120,12 +120,12 @@ def _summary_of(task: _Task, future: Future[Summary]) -> Summary:
     return summary
 
 
-def _run(task: _Task, walker: Walker | None = None) -> Summary:
+def _run(task: _Task, runner: Runner | None = None) -> Summary:
     """Runs a task in whatever process; an interrupted run has the status INTERRUPTED."""
     if task.refusal is not None:
         return task.refusal
-    if walker is not None:
-        return walker.summary(
+    if runner is not None:
+        return runner.summary(
             task.scenario, fmu=task.fmu, gains=task.gains, progress=raise_if_stopped
         )
     try:
@@ -138,12 +138,12 @@ def _run(task: _Task, walker: Walker | None = None) -> Summary:
 
 def _run_compiled(task: _Task) -> Summary:
     """Runs a task in a worker process on the compiled controller."""
-    return _run(task, _process_walker())
+    return _run(task, _process_runner())
 
 
 @cache
-def _process_walker() -> Walker:
-    """Returns the walker of this worker process, which is closed when the process ends."""
-    walker = Walker()
-    Finalize(walker, walker.close, exitpriority=1)
-    return walker
+def _process_runner() -> Runner:
+    """Returns the runner of this worker process, which is closed when the process ends."""
+    runner = Runner()
+    Finalize(runner, runner.close, exitpriority=1)
+    return runner

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from hexapod_cosim.controller import Gains, GainsError, Gait, make_gait
-from hexapod_cosim.cosim.interface.controller_interface import ControllerSetup
+from hexapod_cosim.cosim.interface.controller import ControllerSetup
 from hexapod_cosim.cosim.run.preparation import designed_gains
 from hexapod_cosim.cosim.scenario.records import CONTROLS
 from hexapod_cosim.models import Robot, unknown_name

@@ -5,14 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 from hexapod_cosim.controller import Gains
-from hexapod_cosim.cosim.interface.controller_interface import ControllerSetup
-from hexapod_cosim.cosim.run.chosen_walk import ChosenWalk, choose_walk
+from hexapod_cosim.cosim.interface.controller import ControllerSetup
+from hexapod_cosim.cosim.run.gait_selection import GaitSelection, select_gait
 from hexapod_cosim.cosim.run.preparation import chosen_gains, law_of
 from hexapod_cosim.cosim.scenario.checks import check_servo_faults
 from hexapod_cosim.cosim.scenario.controls import control_of
 from hexapod_cosim.cosim.scenario.reach import check_commands
+from hexapod_cosim.cosim.scenario.reading import scenario_robot
 from hexapod_cosim.cosim.scenario.records import Scenario
-from hexapod_cosim.cosim.scenario.scenario import scenario_robot
 from hexapod_cosim.cosim.scenario.schedule import Schedule, make_schedule
 from hexapod_cosim.cosim.scenario.variation import (
     Drawn,
@@ -28,7 +28,7 @@ class RunPlan:
 
     scenario: Scenario
     robot: Robot  # the plant's, in the stance of the walk
-    walk: ChosenWalk
+    selection: GaitSelection
     controller: ControllerSetup
     schedule: Schedule
     drawn: Drawn | None  # None: nothing is varied
@@ -41,8 +41,8 @@ def make_plan(scenario: Scenario, *, gains: Gains | None = None) -> RunPlan:
     """
     own = scenario_robot(scenario)
     check_servo_faults(scenario, own)
-    walk = choose_walk(scenario, own, gains)
-    robot, gait = walk.robot, walk.gait
+    selection = select_gait(scenario, own, gains)
+    robot, gait = selection.robot, selection.gait
     if control_of(scenario.control).is_builtin:  # another control has strides of its own
         check_commands(scenario.commands, robot, gait, where=f"{scenario.where}: command")
     setup = ControllerSetup(
@@ -59,8 +59,8 @@ def make_plan(scenario: Scenario, *, gains: Gains | None = None) -> RunPlan:
         timed = replace(scenario, commands=delayed(scenario.commands, drawn.command_delay))
     return RunPlan(
         scenario=scenario,
-        robot=walk.standing(own),
-        walk=walk,
+        robot=selection.standing(own),
+        selection=selection,
         controller=setup,
         schedule=make_schedule(timed),
         drawn=drawn,

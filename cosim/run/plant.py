@@ -9,14 +9,14 @@ from pathlib import Path
 
 from hexapod_cosim.cosim.common.components import PLANT
 from hexapod_cosim.cosim.common.temporary import TemporaryFolder
-from hexapod_cosim.cosim.interface.plant_interface import plant_roots
+from hexapod_cosim.cosim.interface.plant import plant_roots
 from hexapod_cosim.cosim.interface.start_values import parameter_values
 from hexapod_cosim.cosim.master.fmu import Fmu
 from hexapod_cosim.cosim.results.ground import is_on_surface, surface_of_grid
 from hexapod_cosim.cosim.run.plan import RunPlan
 from hexapod_cosim.cosim.run.preparation import PlantFmus
+from hexapod_cosim.cosim.scenario.reading import scenario_robot
 from hexapod_cosim.cosim.scenario.records import Scenario
-from hexapod_cosim.cosim.scenario.scenario import scenario_robot
 from hexapod_cosim.cosim.scenario.variation import (
     initial_values,
 )

@@ -11,8 +11,8 @@ from hexapod_cosim.controller import Gains
 from hexapod_cosim.cosim.common.components import PLANT
 from hexapod_cosim.cosim.common.plant_files import binary, fmi2_platform
 from hexapod_cosim.cosim.common.temporary import TemporaryFolder
-from hexapod_cosim.cosim.export.plant_export import export_fmu
-from hexapod_cosim.cosim.run.chosen_walk import choose_walk
+from hexapod_cosim.cosim.export.plant import export_fmu
+from hexapod_cosim.cosim.run.gait_selection import select_gait
 from hexapod_cosim.cosim.run.kept_designs import kept_gains
 from hexapod_cosim.cosim.scenario.controls import control_of
 from hexapod_cosim.cosim.scenario.records import Scenario
@@ -34,7 +34,7 @@ def designed_gains(robot: Robot, period: float) -> Gains:
 
 def _designed(robot: Robot, period: float) -> Gains:
     """Designs gains; python-control takes a second to import."""
-    from hexapod_cosim.cosim.design.gain_design import design_for  # noqa: PLC0415
+    from hexapod_cosim.cosim.design.gains import design_for  # noqa: PLC0415
 
     return design_for(robot, period)
 
@@ -65,7 +65,7 @@ def design_key(scenario: Scenario) -> tuple[Robot, float]:
 
     Scenarios with equal keys share gains. Raises HexapodError for a robot that cannot be read.
     """
-    return choose_walk(scenario).robot, scenario.macro_step
+    return select_gait(scenario).robot, scenario.macro_step
 
 
 @lru_cache(maxsize=MAX_FMUS)

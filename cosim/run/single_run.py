@@ -194,7 +194,7 @@ def make_result(
         walk=locomotion_of(view, upright=not fall, missed=missed),
         drop=drop,
         drawn=None if drawn is None else drawn.as_facts(),
-        walking=plan.walk.as_facts(),
+        walking=plan.selection.as_facts(),
         terrain={} if surface is None else dict(surface.recipe),
         parameters=dict(parameters),
     )

@@ -6,7 +6,7 @@ from collections.abc import Collection, Mapping
 from dataclasses import fields
 
 from hexapod_cosim.controller import Parts
-from hexapod_cosim.cosim.interface.plant_interface import load_interface
+from hexapod_cosim.cosim.interface.plant import load_interface
 from hexapod_cosim.cosim.scenario.records import (
     MAX_STEPS,
     SETTINGS,

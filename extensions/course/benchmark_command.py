@@ -27,17 +27,17 @@ from hexapod_cosim.cosim.common.files import BENCHMARK, RUN_FILE, write_json
 from hexapod_cosim.cosim.control.controllers import check_control
 from hexapod_cosim.cosim.master.interrupts import deferred_interrupts
 from hexapod_cosim.cosim.master.loop import COMPLETED
-from hexapod_cosim.cosim.results.results import ResultsFolder, results_folder
+from hexapod_cosim.cosim.results.folder import ResultsFolder, results_folder
 from hexapod_cosim.cosim.scenario.controls import AT, CHOOSER
 from hexapod_cosim.cosim.scenario.records import CHOSEN, CONTROLS
 from hexapod_cosim.extensions.course import texts
-from hexapod_cosim.extensions.course.reading import load_course
 from hexapod_cosim.extensions.course.records import (
     JUDGE,
     SPLITS,
     Course,
     Entry,
     lacking,
+    load_course,
     read_entries,
 )
 from hexapod_cosim.extensions.course.runs import Run, run_count, run_course
@@ -141,24 +141,26 @@ def _run_into(
 ) -> tuple[Table, dict[str, Any], list[Path]]:
     """Runs the course and writes its result; an interrupt writes that of the completed runs."""
     done: list[Run] = []
-    labels = tuple(entry.label for entry in entries)
+
+    def table() -> Table:
+        labels = tuple(entry.label for entry in entries)
+        return Table(course, labels, tuple(done), lacking(entries))
+
     folder.begin()
     try:
         _collect(done, course, entries, gains=gains, workers=workers)
     except KeyboardInterrupt:
         with deferred_interrupts():
-            table = Table(course, labels, tuple(done), lacking(entries))
-            _write(table, folder.path, command, complete=False)
-            _show(table)
+            _write(table(), folder.path, command, complete=False)
+            _show(table())
             total = run_count(course, entries)
             warn(f"stopped after {len(done)} of {total} runs; their table is in {folder.path}")
         raise
-    table = Table(course, labels, tuple(done), lacking(entries))
-    content, files = _write(table, folder.path, command, complete=True)
-    title = f"Course {course.version}, {course.split}: {', '.join(labels)}"
+    content, files = _write(table(), folder.path, command, complete=True)
+    title = f"Course {course.version}, {course.split}: {', '.join(table().controls)}"
     facts = {"kind": BENCHMARK, "status": COMPLETED, "title": title, "command": command}
     write_json(folder.path / RUN_FILE, facts)
-    return table, content, [folder.path / RUN_FILE, *files]
+    return table(), content, [folder.path / RUN_FILE, *files]
 
 
 def _write(

@@ -12,8 +12,7 @@ from hexapod_cosim.cosim.results.balance import UNBALANCED
 from hexapod_cosim.cosim.results.summary import Summary
 from hexapod_cosim.cosim.run.batch import run_batch
 from hexapod_cosim.cosim.scenario.records import Scenario
-from hexapod_cosim.extensions.course.reading import run_scenario
-from hexapod_cosim.extensions.course.records import QUANTITIES, Case, Course, Entry
+from hexapod_cosim.extensions.course.records import QUANTITIES, Case, Course, Entry, run_scenario
 
 
 @dataclass(frozen=True)

@@ -13,16 +13,20 @@ from typing import Any
 
 from hexapod_cosim.cosim.common.files import atomic_text, read_json, write_json, write_text
 from hexapod_cosim.cosim.common.plant_files import package_version
-from hexapod_cosim.extensions.course.parts import judge_parts
-from hexapod_cosim.extensions.course.reading import load_course
-from hexapod_cosim.extensions.course.records import QUANTITIES, Case, CourseError
+from hexapod_cosim.extensions.course.records import QUANTITIES, Case, CourseError, load_course
 from hexapod_cosim.extensions.course.runs import Run
 from hexapod_cosim.extensions.course.statistics import DRAWS
-from hexapod_cosim.extensions.course.table import Table
+from hexapod_cosim.extensions.course.table import Table, judge_parts
 from hexapod_cosim.extensions.course.texts import markdown
 
 RESULT, RUNS, TABLES = "benchmark.json", "runs.csv", "tables.md"
 FORMAT = 1
+METHODS = {  # how the intervals are made
+    "success": "Wilson, 95 %",
+    "means": "over successful runs; Student, 95 %",
+    "changes": "over pairs of successful runs; Student, of the ratio's logarithm, 95 %",
+    "ratios": f"median over cases; percentile bootstrap over seeds, {DRAWS} draws, 95 %",
+}
 PACKAGES = ("numpy", "scipy", "control", "fmpy")
 
 
@@ -43,9 +47,16 @@ def result_table(table: Table, *, command: str, complete: bool) -> dict[str, Any
         "reference": table.reference,
         "lacking": dict(table.parts),
         "seeds": list(course.seeds),
-        "versions": versions(),
-        "machine": machine(),
-        "methods": methods(),
+        "versions": {  # that figures depend on
+            "hexapod-cosim": package_version(),
+            "python": platform.python_version(),
+            **{name: version(name) for name in PACKAGES},
+        },
+        "machine": {
+            "platform": f"{sys.platform} {platform.machine()}",
+            "processor": processor(),
+        },
+        "methods": METHODS,
         "quantities": {
             item.name: {"title": item.title, "unit": item.unit, "metric": item.metric}
             for item in QUANTITIES
@@ -74,23 +85,6 @@ def _case_table(case: Case) -> dict[str, Any]:
     return {"class": case.kind, "about": case.about, **sweep, "scenario": case.scenario.to_table()}
 
 
-def versions() -> dict[str, str]:
-    """Returns the versions that figures depend on."""
-    return {
-        "hexapod-cosim": package_version(),
-        "python": platform.python_version(),
-        **{name: version(name) for name in PACKAGES},
-    }
-
-
-def machine() -> dict[str, str]:
-    """Returns what the course was run on."""
-    return {
-        "platform": f"{sys.platform} {platform.machine()}",
-        "processor": processor(),
-    }
-
-
 def processor() -> str:
     """Returns the name of the processor."""
     try:
@@ -99,16 +93,6 @@ def processor() -> str:
         lines = []
     names = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
     return names[0] if names else platform.processor() or platform.machine()
-
-
-def methods() -> dict[str, str]:
-    """Returns how the intervals are made."""
-    return {
-        "success": "Wilson, 95 %",
-        "means": "over successful runs; Student, 95 %",
-        "changes": "over pairs of successful runs; Student, of the ratio's logarithm, 95 %",
-        "ratios": f"median over cases; percentile bootstrap over seeds, {DRAWS} draws, 95 %",
-    }
 
 
 def write_runs(path: Path, runs: Sequence[Run]) -> None:

@@ -6,10 +6,16 @@ import math
 import re
 from collections.abc import Iterator, Mapping
 
-from hexapod_cosim.extensions.course.parts import Effect, judge_parts
 from hexapod_cosim.extensions.course.records import SHOWN, Quantity
 from hexapod_cosim.extensions.course.statistics import Interval, Rate
-from hexapod_cosim.extensions.course.table import ALL, CaseFigures, ClassFigures, Table
+from hexapod_cosim.extensions.course.table import (
+    ALL,
+    CaseFigures,
+    ClassFigures,
+    Effect,
+    Table,
+    judge_parts,
+)
 
 NUMBER = re.compile(r"[0-9.]*[0-9]")
 NONE = "-"  # where there is no value

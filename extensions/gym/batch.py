@@ -34,18 +34,20 @@ from hexapod_cosim.extensions.gym.native import (
     NativeFmu,
     NativeGround,
     NativeSettings,
+    Owned,
     environments_library,
 )
-from hexapod_cosim.extensions.gym.owned import Owned
 from hexapod_cosim.extensions.gym.plants import (
+    SPACING,
+    GroundMaps,
     export_base,
     export_plant,
+    ground_maps,
     grounds,
     start_height,
     surfaces,
 )
 from hexapod_cosim.extensions.gym.render import frame
-from hexapod_cosim.extensions.gym.scan import SPACING, GroundMaps, ground_maps
 from hexapod_cosim.extensions.gym.settings import BLOCKS, JOINTS, RATE, REASONS, TERMS, EnvSettings
 from hexapod_cosim.models import FmuError, HexapodError, Robot
 
@@ -177,7 +179,6 @@ class Batch(Closing):
             length=given.steps,
             stance=(ct.c_double * JOINTS)(*stance.ravel()),
             action_scale=(ct.c_double * JOINTS)(*[given.action_scale] * JOINTS),
-            action_limit=1.0,
             clock=given.clock,
             command_interval=round(given.command_interval * RATE),
             command_low=tuple(low for low, _ in commands),
@@ -251,7 +252,6 @@ class Batch(Closing):
             low=self._keep(low, float),
             high=self._keep(high, float),
             whole=self._keep(whole, np.int32),
-            group=self._keep(range(len(drawn)), np.int32),
             count=len(drawn),
         )
 

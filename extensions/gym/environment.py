@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from hexapod_cosim.extensions.gym.batch import Batch
 from hexapod_cosim.extensions.gym.settings import JOINTS, RATE, REASONS, TERMS, EnvSettings, changed
-from hexapod_cosim.extensions.gym.tasks import task as task_settings
+from hexapod_cosim.extensions.gym.settings import task as task_settings
 
 RENDER_MODES = ("rgb_array",)
 LARGEST_SEED = 2**32  # seeds are drawn below it

@@ -6,7 +6,7 @@ Importing this module does it; a module of its own, because the command line imp
 from __future__ import annotations
 
 from hexapod_cosim.cosim.common.installation import install_extra
-from hexapod_cosim.extensions.gym.tasks import TASKS
+from hexapod_cosim.extensions.gym.settings import TASKS
 
 try:
     import gymnasium

@@ -10,10 +10,9 @@ import typer
 
 from hexapod_cosim.cosim.cli.terminal import show_files
 from hexapod_cosim.cosim.common.files import atomic_path
-from hexapod_cosim.cosim.export.plant_export import export_interface
-from hexapod_cosim.extensions.gym.interface import load_policy_interface
-from hexapod_cosim.extensions.gym.policy import load_policy
-from hexapod_cosim.extensions.gym.tasks import task
+from hexapod_cosim.cosim.export.plant import export_interface
+from hexapod_cosim.extensions.gym.policy import load_policy, load_policy_interface
+from hexapod_cosim.extensions.gym.settings import task
 from hexapod_cosim.extensions.gym.train import Progress, TrainSettings, train, training_settings
 from hexapod_cosim.models import load_robot
 

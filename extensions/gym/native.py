@@ -1,12 +1,16 @@
-"""The structures and functions of environments.h for ctypes."""
+"""The structures and functions of environments.h for ctypes, and what a batch has to free."""
 
 from __future__ import annotations
 
 import ctypes as ct
+import os
+import threading
+from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
 
-from hexapod_cosim.cosim.master.loop_library import load_loop, read_headers
+from hexapod_cosim.cosim.master.fmu import Fmu
+from hexapod_cosim.cosim.master.loop_library import Header, load_loop, loop_header
 
 # functions of an FMU by the members of hxEnvFmu
 CALLS = {
@@ -19,13 +23,11 @@ CALLS = {
     "work_size": "hx_shared_work_size",  # which a foreign FMU does not have, like the next
     "work_use": "hx_shared_work_use",
 }
-Pointer, Size = ct.c_void_p, ct.c_size_t
-
-HEADER = Path(__file__).parent / "loop" / "include" / "hexapod" / "environments.h"
-_STRUCTURES = read_headers(HEADER).structures
-NativeFmu, NativeDraws = _STRUCTURES["hxEnvFmu"], _STRUCTURES["hxEnvDraws"]
-NativeGround, NativeSettings = _STRUCTURES["hxEnvGround"], _STRUCTURES["hxEnvSettings"]
-NativeArrays = _STRUCTURES["hxEnvArrays"]
+PATH = Path(__file__).parent / "loop" / "include" / "hexapod" / "environments.h"
+HEADER = Header(PATH, base=loop_header())
+NativeFmu, NativeDraws = HEADER.types["hxEnvFmu"], HEADER.types["hxEnvDraws"]
+NativeGround, NativeSettings = HEADER.types["hxEnvGround"], HEADER.types["hxEnvSettings"]
+NativeArrays = HEADER.types["hxEnvArrays"]
 ARRAYS = tuple(name for name, _ in NativeArrays._fields_)
 
 
@@ -35,16 +37,47 @@ def environments_library() -> ct.CDLL:
 
     Raises FmuError when the library is missing or has another version.
     """
-    library = load_loop("environments", "hx_environments_settings_size", "hxEnvSettings", HEADER)
-    library.hx_environments_create.restype = Pointer
-    library.hx_environments_create.argtypes = [Pointer, Pointer, Size, ct.c_char_p]
-    library.hx_environments_message.restype = ct.c_char_p
-    library.hx_environments_message.argtypes = [Pointer, Size]
-    library.hx_environments_reset.argtypes = [Pointer] * 3
-    for name in ("drawn", "values"):
-        getattr(library, f"hx_environments_{name}").argtypes = [Pointer, Size, Pointer]
-    for name in ("step", "serve", "stop", "destroy"):
-        getattr(library, f"hx_environments_{name}").argtypes = [Pointer]
-    for name in ("reset", "step", "serve", "stop", "destroy", "drawn", "values"):
-        getattr(library, f"hx_environments_{name}").restype = None
-    return library
+    return load_loop("environments", "hx_environments_settings_size", "hxEnvSettings", HEADER)
+
+
+@dataclass
+class Owned:
+    """Threads, environments and FMUs of one batch.
+
+    It has no reference to the batch, so that a batch that nobody closed can be freed by it.
+    """
+
+    handle: int | None = None  # of hxEnvironments
+    servers: list[threading.Thread] = field(default_factory=list)
+    fmus: list[Fmu] = field(default_factory=list)
+    process: int = field(default_factory=os.getpid)  # that made them
+
+    def serve(self, count: int) -> None:
+        """Starts a number of threads that work for the environments."""
+        for _ in range(count):
+            server = threading.Thread(
+                target=environments_library().hx_environments_serve,
+                args=(self.handle,),
+                daemon=True,
+            )
+            server.start()
+            self.servers.append(server)
+
+    def free(self) -> None:
+        """Ends the threads and frees the environments; may be called twice.
+
+        In a process that was forked from the one that made them it frees nothing: the threads do
+        not exist there, and the unpacked files belong to the first process.
+        """
+        handle, self.handle = self.handle, None
+        if os.getpid() != self.process:
+            return
+        if handle:
+            environments_library().hx_environments_stop(handle)
+            for server in self.servers:
+                server.join()
+            environments_library().hx_environments_destroy(handle)
+        for fmu in self.fmus:
+            fmu.close()
+        self.servers.clear()
+        self.fmus.clear()

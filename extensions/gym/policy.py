@@ -2,7 +2,8 @@
 
     a = V tanh(W x + w) + v
 
-x (29,) is the observation `MEASURABLE`, a (18,) the action. policy_fmu/ computes the same in C.
+x (29,) is the observation `MEASURABLE`, a (18,) the action. policy_fmu/ computes the same
+in C, with the weights as parameters.
 """
 
 from __future__ import annotations
@@ -10,15 +11,18 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 from zipfile import BadZipFile
 
 import numpy as np
 from numpy.typing import NDArray
 
+from hexapod_cosim.cosim.common.components import Component
 from hexapod_cosim.cosim.common.files import atomic_path
-from hexapod_cosim.extensions.gym.settings import BLOCKS, JOINTS, MEASURABLE
-from hexapod_cosim.models import HexapodError
+from hexapod_cosim.cosim.interface.plant import Interface, expand_interface
+from hexapod_cosim.extensions.gym.settings import BLOCKS, JOINTS, MEASURABLE, RATE, EnvSettings
+from hexapod_cosim.models import JOINT_NAMES, LEG_NAMES, HexapodError, Robot
 
 Array = NDArray[np.float64]
 INPUTS = sum(BLOCKS[name] for name in MEASURABLE)  # 29
@@ -30,6 +34,22 @@ SHAPES = {
     "action_weight": (JOINTS, HIDDEN),
     "action_bias": (JOINTS,),
 }
+UPRIGHT = (1.0, 0.0, 0.0, 0.0)
+LEGS, LEG_JOINTS = len(LEG_NAMES), len(JOINT_NAMES)
+POLICY = Component(
+    name="policy",
+    identifier="hexapod_policy",
+    tree="extensions/gym/policy_fmu",
+    installed="plant/policy",
+    header="hexapod/policy.h",
+    prefix="policy_",
+    structure="Policy",
+    suffix="_policy",
+    description=(
+        "Learned policy of a hexapod robot: angles of its {joints} joints from a body velocity and "
+        "from measurements by a multilayer perceptron"
+    ),
+)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -149,3 +169,39 @@ def symmetric_weights(free: Array) -> dict[str, Array]:
         "action_weight": np.concatenate([own, sides[:HALF_JOINTS, None] * crossed], axis=-2),
         "action_bias": np.concatenate([offset, sides[:HALF_JOINTS] * offset], axis=-1),
     }
+
+
+def standing_policy(robot: str) -> Policy:
+    """Returns the policy whose actions are 0."""
+    settings = EnvSettings()
+    return Policy(
+        **{name: np.zeros(shape) for name, shape in SHAPES.items()},
+        robot=robot,
+        clock=settings.clock,
+        action_scale=settings.action_scale,
+    )
+
+
+def load_policy_interface(policy: Policy, robot: Robot) -> Interface:
+    """Returns the interface of a policy's FMU.
+
+    Raises HexapodError for another robot than the policy's, and when a weight is out of range.
+    """
+    if robot.name != policy.robot:
+        raise HexapodError(
+            "a policy of another robot",
+            got=robot.name,
+            expected=policy.robot,
+            fix="export it for the robot that it was trained with",
+        )
+    weights = SimpleNamespace(
+        clock=policy.clock,
+        action_scale=policy.action_scale,
+        hidden_weight=policy.hidden_weight,
+        hidden_bias=policy.hidden_bias,
+        joint_weight=policy.action_weight.reshape(LEGS, LEG_JOINTS, HIDDEN),
+        joint_bias=policy.action_bias.reshape(LEGS, LEG_JOINTS),
+    )
+    settings = SimpleNamespace(period=1.0 / RATE, upright=UPRIGHT)
+    roots = SimpleNamespace(robot=robot, policy=weights, settings=settings)
+    return expand_interface(POLICY, robot, roots)

@@ -19,7 +19,7 @@ from hexapod_cosim.cosim.export.picture import (
 )
 from hexapod_cosim.cosim.interface.names import vector_names
 from hexapod_cosim.cosim.master.sensors import MEASURED
-from hexapod_cosim.extensions.gym.scan import GroundMaps
+from hexapod_cosim.extensions.gym.plants import GroundMaps
 from hexapod_cosim.models import Robot
 from hexapod_cosim.models.records import Array
 

@@ -10,14 +10,12 @@ from dataclasses import dataclass, field, fields, replace
 from typing import Annotated, Any
 
 from hexapod_cosim.extensions.gym.checks import (
+    check,
     check_count,
-    check_mapping,
     check_names,
     check_number,
     check_range,
-    check_scale,
-    check_widths,
-    refused,
+    numbers,
 )
 from hexapod_cosim.models.schema import Number, check_record
 
@@ -153,7 +151,9 @@ class EnvSettings:
     def __post_init__(self) -> None:
         """Checks names and numbers."""
         for name in MAPPINGS:
-            check_mapping(name, getattr(self, name))
+            given = getattr(self, name)
+            table = isinstance(given, Mapping) and all(isinstance(key, str) for key in given)
+            check(table, name, given, "a table (a dict) from names to values")
         check_names(self.rewards, "term of the reward", TERMS)
         check_names(self.observation, "block of the observation", BLOCKS)
         check_names([self.base], "base of actions", BASES)
@@ -163,21 +163,29 @@ class EnvSettings:
         check_count("terrain_seeds", self.terrain_seeds)
         for name in ("command_vx", "command_vy", "command_yaw_rate"):
             check_range(name, getattr(self, name))
-        for name, given in self.randomise.items():
-            check_range(f"randomise: {name}", given)
+        for name, ends in self.randomise.items():
+            check_range(f"randomise: {name}", ends)
         for name, weight in self.rewards.items():
             check_number(f"rewards: {name}", weight)
-        check_widths("tracking_width", self.tracking_width)
+        width = numbers(self.tracking_width)
+        holds = len(width) == 2 and min(width) > 0.0
+        check(holds, "tracking_width", self.tracking_width, "two finite numbers above 0")
         self._check_observation()
 
     def _check_observation(self) -> None:
-        """Checks the scales of the observed blocks, and the number of scanned places."""
-        if not self.observation:
-            raise refused("observation", "no blocks", f"some of {', '.join(BLOCKS)}")
+        """Checks the scales of the observed blocks, and the number of scanned places.
+
+        A scale of 0 would leave a block out.
+        """
+        check(bool(self.observation), "observation", "no blocks", f"some of {', '.join(BLOCKS)}")
         for name, scale in self.observation.items():
-            check_scale(f"observation: {name}", scale, axes=BLOCKS[name] == 3)
-        if "heights" in self.observation and len(self.places) > MOST_PLACES:
-            raise refused("scan_spacing", self.scan_spacing, f"at most {MOST_PLACES} places")
+            sizes = {1, 3} if BLOCKS[name] == 3 else {1}
+            holds = len(numbers(scale)) in sizes and any(numbers(scale))
+            expected = "a finite scale other than 0, or three of them for a block of 3"
+            check(holds, f"observation: {name}", scale, expected)
+        if "heights" in self.observation:
+            few = len(self.places) <= MOST_PLACES
+            check(few, "scan_spacing", self.scan_spacing, f"at most {MOST_PLACES} places")
 
     @property
     def size(self) -> int:
@@ -219,3 +227,37 @@ def changed(settings: EnvSettings, changes: Mapping[str, Any]) -> EnvSettings:
         check_names([given["observation"]], "observation", OBSERVATIONS)
         given["observation"] = OBSERVATIONS[given["observation"]]
     return replace(settings, **given)
+
+
+# the registered environments
+FLAT = EnvSettings()
+ROUGH = replace(
+    FLAT,
+    terrain={"kind": "rubble", "max_height": 0.03, "stone_size": 0.15},
+    terrain_seeds=8,
+    observation=LEGGED_GYM_HEIGHTS,
+    randomise={"friction.mu": (0.5, 0.9)},
+)
+SOIL = replace(FLAT, terrain={"kind": "sand", "soil": "dry_sand"}, pad_radius=0.025)
+PUSH = replace(FLAT, push_force=40.0, randomise={"friction.mu": (0.5, 0.9)})
+
+TASKS: Mapping[str, tuple[str, EnvSettings]] = {  # by name: title and settings
+    "Hexapod-v0": ("flat ground", FLAT),
+    "HexapodRough-v0": ("rubble of up to 30 mm from 8 seeds, friction 0.5 to 0.9", ROUGH),
+    "HexapodSoil-v0": ("dry sand, feet with pads", SOIL),
+    "HexapodPush-v0": (
+        "flat ground, pushes of up to 40 N every 2 s, friction 0.5 to 0.9",
+        PUSH,
+    ),
+}
+
+
+def task(name: str) -> EnvSettings:
+    """Returns the settings of a registered environment. Raises HexapodError."""
+    check_names([name], "environment", TASKS)
+    return TASKS[name][1]
+
+
+def environment_rows() -> list[dict[str, Any]]:
+    """Returns what `hexapod list environments` shows."""
+    return [{"name": name, "title": title} for name, (title, _) in TASKS.items()]

@@ -69,17 +69,6 @@ class Progress:
     distance: float  # m  mean way forward in an episode
     seconds: float
 
-    @classmethod
-    def of(cls, generation: int, returns: Array, way: float, seconds: float) -> Progress:
-        """Returns the progress of a generation from the returns of its policies."""
-        return cls(
-            generation=generation,
-            mean=float(returns.mean()),
-            best=float(returns.max()),
-            distance=way,
-            seconds=seconds,
-        )
-
 
 Report = Callable[[Progress], None]
 
@@ -177,7 +166,15 @@ def train(settings: EnvSettings, how: TrainSettings, report: Report) -> Policy:
                 weight = ranks(found)
                 free = free + ascent.step((weight[: how.pairs] - weight[how.pairs :]) @ changes)
                 seconds = time.monotonic() - begin
-                report(Progress.of(generation, found, way, seconds))
+                report(
+                    Progress(
+                        generation=generation,
+                        mean=float(found.mean()),
+                        best=float(found.max()),
+                        distance=way,
+                        seconds=seconds,
+                    )
+                )
                 if seconds > 60.0 * how.minutes:
                     break
         except KeyboardInterrupt:

@@ -23,7 +23,7 @@ from hexapod_cosim.extensions.gym.environment import (
     observation_space,
 )
 from hexapod_cosim.extensions.gym.settings import JOINTS, RATE, REASONS, TERMS, changed
-from hexapod_cosim.extensions.gym.tasks import task as task_settings
+from hexapod_cosim.extensions.gym.settings import task as task_settings
 
 MODES = {
     AutoresetMode.NEXT_STEP: "next_step",

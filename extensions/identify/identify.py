@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from hexapod_cosim.cosim.common.temporary import TemporaryFolder
-from hexapod_cosim.cosim.export.plant_export import export_fmu
+from hexapod_cosim.cosim.export.plant import export_fmu
 from hexapod_cosim.cosim.interface.names import vector_names
 from hexapod_cosim.cosim.run.worker_pool import WorkerPool, processor_count
 from hexapod_cosim.extensions.identify.command_screening import wrong_commands, wrong_commands_error

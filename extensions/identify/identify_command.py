@@ -18,7 +18,7 @@ from hexapod_cosim.cosim.cli.terminal import (
     show_text,
     warn,
 )
-from hexapod_cosim.cosim.results.results import results_folder
+from hexapod_cosim.cosim.results.folder import results_folder
 from hexapod_cosim.extensions.identify.log import HELD_OUT, read_log
 from hexapod_cosim.extensions.identify.numbers.servo import TERMS, with_friction_model
 from hexapod_cosim.extensions.identify.unknowns import GROUPS

@@ -19,10 +19,10 @@ from hexapod_cosim.cosim.cli.options import FmuFile, Json, RobotName
 from hexapod_cosim.cosim.cli.terminal import show_files, show_json, show_table, waiting, warn
 from hexapod_cosim.cosim.common.files import RUN_FILE, write_json, write_text
 from hexapod_cosim.cosim.common.temporary import TemporaryFolder
-from hexapod_cosim.cosim.export.plant_export import export_fmu
+from hexapod_cosim.cosim.export.plant import export_fmu
 from hexapod_cosim.cosim.master.recorder import Recording
+from hexapod_cosim.cosim.results.folder import RESULTS, results_folder
 from hexapod_cosim.cosim.results.recordings import write_recording
-from hexapod_cosim.cosim.results.results import RESULTS, results_folder
 from hexapod_cosim.cosim.scenario.records import default_formats
 from hexapod_cosim.cosim.scenario.tables import with_overrides
 from hexapod_cosim.extensions.identify.command_screening import wrong_commands, wrong_commands_error

@@ -25,8 +25,8 @@ from hexapod_cosim.cosim.cli.terminal import (
 )
 from hexapod_cosim.cosim.control.controllers import check_control
 from hexapod_cosim.cosim.scenario.controls import parse_control, parse_controls
+from hexapod_cosim.cosim.scenario.reading import load_scenario
 from hexapod_cosim.cosim.scenario.records import CONTROLS, Scenario
-from hexapod_cosim.cosim.scenario.scenario import load_scenario
 
 Port = Annotated[
     int,

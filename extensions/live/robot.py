@@ -27,8 +27,8 @@ from hexapod_cosim.cosim.common.closing import Closing
 from hexapod_cosim.cosim.common.temporary import TemporaryFolder
 from hexapod_cosim.cosim.control.controllers import make_controller
 from hexapod_cosim.cosim.control.fmu_law import FmuLaw, law_of_ours
-from hexapod_cosim.cosim.export.plant_export import export_controller
-from hexapod_cosim.cosim.interface.controller_interface import controller_parameters
+from hexapod_cosim.cosim.export.plant import export_controller
+from hexapod_cosim.cosim.interface.controller import controller_parameters
 from hexapod_cosim.cosim.master.fmu import Fmu, StepError
 from hexapod_cosim.cosim.master.loop import JointController, macro_step
 from hexapod_cosim.cosim.master.sensors import errors_of

@@ -11,11 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hexapod_cosim.controller import PATTERNS, BodyCommand, Gait, make_gait
-from hexapod_cosim.cosim.run.chosen_walk import known_robot
+from hexapod_cosim.cosim.run.gait_selection import known_robot
 from hexapod_cosim.cosim.scenario.controls import control_of
 from hexapod_cosim.cosim.scenario.reach import largest_share
+from hexapod_cosim.cosim.scenario.reading import scenario_from_table, scenario_robot
 from hexapod_cosim.cosim.scenario.records import CONTROLS, Command, Scenario
-from hexapod_cosim.cosim.scenario.scenario import scenario_from_table, scenario_robot
 from hexapod_cosim.extensions.live.messages import Change, Drive
 from hexapod_cosim.models import Robot, unknown_name
 from hexapod_cosim.models.ground.table import CATALOGUE

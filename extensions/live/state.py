@@ -17,7 +17,6 @@ from hexapod_cosim.extensions.live.pacing import Pacer
 from hexapod_cosim.extensions.live.robot import LiveRobot
 from hexapod_cosim.models import LEG_NAMES, Robot
 from hexapod_cosim.models.ground.faces import surface_of
-from hexapod_cosim.models.kinematics import rotation_matrix
 
 Array = NDArray[np.float64]
 
@@ -25,9 +24,10 @@ DIGITS = 5  # of positions [m], angles [rad] and shares
 SHOWN = {  # variables of the plant by key of a frame
     "position": vector_names("torso.position"),
     "quaternion": vector_names("torso.quaternion", 4),
-    "tilt": ["torso.roll", "torso.pitch"],
+    "attitude": ["torso.roll", "torso.pitch", "torso.yaw"],
+    "velocity": vector_names("torso.velocity"),
+    "rate": vector_names("torso.angular_velocity"),
     "angle": joint_names("angle"),
-    "contact": foot_names("contact"),
     "slip": foot_names("slip_speed"),
 }
 FORCES = [name for leg in LEG_NAMES for name in vector_names(f"{leg}.foot.force")]
@@ -52,27 +52,19 @@ def describe_world(robot: Robot, parameters: Mapping[str, float], step: float) -
 
 
 def frame_of(robot: LiveRobot, pacer: Pacer) -> dict[str, Any]:
-    """Returns pose, forces, motion and lateness as of now.
-
-    `force` [body weights] has three entries a foot; `speed` is forward, left [m/s] and turn
-    [rad/s] in the torso's own axes; `tilt` roll and pitch [rad]; `torque` [N m] the largest.
-    """
-    turn = rotation_matrix(_values(robot, SHOWN["quaternion"]))
-    velocity = turn.T @ _values(robot, vector_names("torso.velocity"))
-    rates = _values(robot, vector_names("imu.angular_velocity"))
+    """Returns pose, motion, forces and lateness as of now (viewer/messages.ts)."""
     late = pacer.lateness
     return {key: _rounded(_values(robot, names)) for key, names in SHOWN.items()} | {
         "time": round(robot.time, 6),
-        "seconds": robot.count * robot.h,
         "force": _rounded(_values(robot, FORCES) / robot.weight),
-        "torque": float(np.abs(_values(robot, joint_names("torque"))).max()),
-        "speed": _rounded(np.array([velocity[0], velocity[1], rates[2]])),
         "push": _rounded(robot.signals.push[:3]),
-        "factor": round(pacer.factor, 4),
-        "steps": late.steps,
-        "misses": late.misses,
-        "worst": round(late.worst, 5),
-        "skipped": round(late.skipped, 3),
+        "late": {
+            "factor": round(pacer.factor, 4),
+            "steps": late.steps,
+            "misses": late.misses,
+            "worst": round(late.worst, 5),
+            "skipped": round(late.skipped, 3),
+        },
     }
 
 

@@ -2,10 +2,10 @@
 
 The data flow, in the order of the modules:
 
-    study file -> reading (keys, factors, objective, checks) -> Study (records)
+    study file -> reading (rules, factors, checks) -> Study (records)
     Study -> runs: numbers every run and makes its Order
     Study -> job: what every worker needs -> folder: the manifest
     orders -> dispatch -> workers (an executor) -> worker -> Summary -> store (SQLite, a row a run)
     an optimisation asks Optuna for its orders: search
-    store -> groups, optimum -> summary -> report; store -> folder: results.parquet
+    store -> groups, search -> summary -> tables, figures, page; store -> folder: results.parquet
 """

@@ -9,14 +9,13 @@ from typing import Any, get_type_hints
 
 from hexapod_cosim.controller import Gains
 from hexapod_cosim.controller.gains import PARTS
-from hexapod_cosim.cosim.interface.plant_interface import Interface, load_interface
+from hexapod_cosim.cosim.interface.plant import Interface, load_interface
 from hexapod_cosim.cosim.scenario.controls import LAW
 from hexapod_cosim.cosim.scenario.quantities import QUANTITY
+from hexapod_cosim.cosim.scenario.reading import scenario_from_table
 from hexapod_cosim.cosim.scenario.records import Scenario
-from hexapod_cosim.cosim.scenario.scenario import scenario_from_table
 from hexapod_cosim.cosim.scenario.tables import with_values
 from hexapod_cosim.extensions.study.factors import PARAMETERS, samples
-from hexapod_cosim.extensions.study.keys import is_number, require
 from hexapod_cosim.extensions.study.records import (
     DRAWN,
     GAINS,
@@ -31,6 +30,7 @@ from hexapod_cosim.extensions.study.records import (
     StudyError,
     Value,
 )
+from hexapod_cosim.extensions.study.rules import is_number, require
 from hexapod_cosim.extensions.study.runs import count_runs
 from hexapod_cosim.models import HexapodError, load_robot, unknown_name
 from hexapod_cosim.models.schema import Number, specs

@@ -1,6 +1,7 @@
-"""Reads the factors of a study file: a list of values or a distribution for each name.
+"""Reads what a study varies: its factors, or the variables and the goal of its optimisation.
 
-Values, evenly spaced values and values that are evenly spaced in their logarithm:
+A factor is a list of values or a distribution. Values, evenly spaced ones, and ones that are evenly
+spaced in their logarithm:
 
     "friction.mu" = [0.3, 0.6]
     "friction.mu" = { linspace = [0.2, 1.0, 9] }
@@ -22,31 +23,72 @@ A unit, and a factor of the designed gain:
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Mapping
+from functools import partial
 from typing import Any
 
 import numpy as np
 from scipy.special import ndtri
 
-from hexapod_cosim.extensions.study.keys import is_number, require, require_known, require_once
+from hexapod_cosim.cosim.results.metrics import METRICS
+from hexapod_cosim.cosim.scenario.records import COMPARED
 from hexapod_cosim.extensions.study.records import (
     INTEGERS,
     LOGUNIFORM,
     NORMAL,
+    SAMPLERS,
+    SCENARIO_FACTOR,
     UNIFORM,
     VALUES,
+    WALKED,
+    Bound,
+    Evaluation,
     Factor,
+    Optimise,
     Value,
 )
+from hexapod_cosim.extensions.study.rules import (
+    Rule,
+    Rules,
+    boolean,
+    is_number,
+    leaves,
+    names,
+    optional,
+    read_table,
+    require,
+    require_known,
+    require_once,
+    seeds,
+    text,
+    texts,
+    whole,
+)
 
-SPACED = ("linspace", "logspace")
-KINDS = (VALUES, *SPACED, UNIFORM, LOGUNIFORM, NORMAL, INTEGERS)
-OPTIONS = ("unit", "relative")
-MAX_VALUES, MAX_FACTORS = 1_000_000, 1000
-LARGEST_INTEGER = 2**53  # a double holds all integers up to it
+SPACED: Mapping[str, Callable[..., Any]] = {
+    "linspace": np.linspace,
+    "logspace": np.geomspace,
+}
+LEAST, LARGEST = 1e-100, 1e100  # of ends: no quotient of them overflows
+LARGEST_INTEGER = 2**53  # a double represents all integers up to it
+MAX_VALUES = 1_000_000
 PARAMETERS = "parameters."
 LEAST_QUANTILE = 2.0**-53  # a normal distribution has no value at quantile 0
+# metrics of which less or more is better
+OBJECTIVES = tuple(name for name, (_, less, _) in METRICS.items() if less is not None)
 EXAMPLE = '"friction.mu" = { uniform = [0.3, 0.9] }'
+# of the two numbers of a distribution: what must hold, in words and as a function
+ENDS: Mapping[str, tuple[str, Callable[[float, float], bool]]] = {
+    UNIFORM: ("the lower end first", lambda low, high: low <= high),
+    LOGUNIFORM: ("ends > 0, the lower end first", lambda low, high: LEAST <= low <= high),
+    NORMAL: ("a standard deviation >= 0", lambda _, deviation: deviation >= 0.0),
+    INTEGERS: (
+        "whole numbers within 53 bits, the lower end first",
+        lambda low, high: (
+            low <= high and low % 1 == high % 1 == 0 and max(-low, high) <= LARGEST_INTEGER
+        ),
+    ),
+}
 
 
 def read_factors(table: Any, where: str) -> tuple[Factor, ...]:
@@ -54,14 +96,12 @@ def read_factors(table: Any, where: str) -> tuple[Factor, ...]:
 
     Names with dots may be written in quotes or as nested tables.
     """
-    fix = f"write [{where.rpartition(' ')[2]}]"
-    require(isinstance(table, Mapping), table, "a table of factors", where, fix=fix)
+    require(isinstance(table, Mapping), table, "a table of factors", where, fix=f"write {EXAMPLE}")
     found: dict[str, Factor] = {}  # by name in small letters: columns of SQL ignore case
-    for name, value in _named(table, ""):
+    for name, value in leaves(table, is_section=_is_section):
         plain = plain_name(name)
         require_once(name, plain.lower() in found, f"{where}.{name}")
         found[plain.lower()] = _read_factor(plain, value, f"{where}.{name}")
-    require(len(found) <= MAX_FACTORS, len(found), f"at most {MAX_FACTORS} factors", where)
     return tuple(found.values())
 
 
@@ -70,87 +110,148 @@ def plain_name(name: str) -> str:
     return name.removeprefix(PARAMETERS)
 
 
-def _named(table: Mapping[str, Any], before: str) -> Iterator[tuple[str, Any]]:
-    """Yields names with dots and their values: TOML reads friction.mu as nested tables."""
-    for key, value in table.items():
-        name = f"{before}{key}"
-        if "." not in key and isinstance(value, Mapping) and _is_section(value):
-            yield from _named(value, f"{name}.")
-        else:
-            yield name, value
-
-
-def _is_section(table: Mapping[str, Any]) -> bool:
-    """Returns whether a table holds factors rather than a distribution."""
-    return bool(table) and all(
-        isinstance(item, Mapping | list) and key not in KINDS for key, item in table.items()
+def _is_section(key: str, value: Any) -> bool:
+    """Returns whether a value holds factors: TOML reads friction.mu as nested tables."""
+    return (
+        "." not in key
+        and isinstance(value, Mapping)
+        and bool(value)
+        and all(isinstance(x, Mapping | list) and name not in KINDS for name, x in value.items())
     )
 
 
 def _read_factor(name: str, value: Any, where: str) -> Factor:
-    if isinstance(value, list):
-        return Factor(name=name, kind=VALUES, values=_values(value, where))
+    given = {VALUES: value} if isinstance(value, list) else value
     expected, fix = "a list of values or a distribution", f"write {EXAMPLE}"
-    require(isinstance(value, Mapping), value, expected, where, fix=fix)
-    require_known(value, (*KINDS, *OPTIONS), where)
-    kinds = [key for key in value if key in KINDS]
-    require(len(kinds) == 1, dict(value), f"one of {', '.join(KINDS)}", where, fix=fix)
-    unit, relative = value.get("unit", ""), value.get("relative", False)
-    typed = isinstance(unit, str) and isinstance(relative, bool)
-    require(typed, dict(value), 'unit = "deg", relative = true or false', where)
-    made = _of_kind(kinds[0], value[kinds[0]], f"{where}.{kinds[0]}")
-    numbers = all(map(is_number, made.get("values", ())))
-    expected = f"numbers, as there is a unit {unit!r}"
-    require(numbers or not unit, value[kinds[0]], expected, where)
-    return Factor(name=name, unit=unit, relative=relative, **made)
+    require(isinstance(given, Mapping), given, expected, where, fix=fix)
+    read = read_table(given, FACTOR, where)
+    made = [read[kind] for kind in KINDS if kind in given]
+    require(len(made) == 1, dict(given), f"one of {', '.join(KINDS)}", where, fix=fix)
+    return Factor(name=name, unit=read["unit"], relative=read["relative"], **made[0])
 
 
-def _of_kind(kind: str, given: Any, where: str) -> dict[str, Any]:
-    """Returns the kind and the values or ends of a factor, as keywords of Factor."""
-    if kind == VALUES:
-        return {"kind": VALUES, "values": _values(given, where)}
-    if kind in SPACED:
-        return {"kind": VALUES, "values": _spaced(kind, given, where)}
+def _distribution(kind: str, given: Any, where: str) -> dict[str, Any]:
+    """Returns the kind and the ends of a distribution, as keywords of Factor."""
     low, high = _numbers(given, 2, where)
-    whole = low == int(low) and high == int(high) and max(-low, high) <= LARGEST_INTEGER
-    require(kind != NORMAL or high >= 0.0, given, "a standard deviation >= 0", where)
-    require(kind == NORMAL or low <= high, given, "the lower end first", where)
-    require(kind != LOGUNIFORM or low > 0.0, given, "ends > 0", where)
-    require(kind != INTEGERS or whole, given, "whole numbers within 53 bits", where)
-    close = math.isfinite(high / low if kind == LOGUNIFORM else 10.0 * max(abs(low), abs(high)))
-    require(close, given, "ends that are closer", where)
+    expected, holds = ENDS[kind]
+    require(holds(low, high), given, expected, where)
     return {"kind": kind, "low": low, "high": high}
 
 
-def _spaced(kind: str, given: Any, where: str) -> tuple[Value, ...]:
-    """Returns the values of a linspace or a logspace."""
+def _spaced(kind: str, given: Any, where: str) -> dict[str, Any]:
+    """Returns the values of a linspace or a logspace, as keywords of Factor."""
     low, high, count = _numbers(given, 3, where)
-    whole = count == int(count) and 1 <= count <= MAX_VALUES
-    require(whole, given, f"a whole number of 1 to {MAX_VALUES} values", where)
-    require(kind == "linspace" or (low > 0.0 and high > 0.0), given, "ends > 0", where)
-    require(low != high or count == 1, given, "different ends", where)
-    space = np.linspace if kind == "linspace" else np.geomspace
-    values = tuple(space(low, high, int(count)).tolist())
-    require(all(map(math.isfinite, values)), given, "ends that are closer", where)
-    return values
+    counted = count % 1 == 0 and 1 <= count <= MAX_VALUES
+    require(counted, given, f"a whole number of 1 to {MAX_VALUES} values", where)
+    positive = kind == "linspace" or (low >= LEAST and high >= LEAST)
+    require(positive, given, "ends > 0", where)
+    return {"kind": VALUES, "values": tuple(SPACED[kind](low, high, int(count)).tolist())}
 
 
-def _values(given: Any, where: str) -> tuple[Value, ...]:
+def _values(given: Any, where: str) -> dict[str, Any]:
     typed = isinstance(given, list) and all(isinstance(item, int | float | str) for item in given)
     expected, fix = "a list of numbers, names or booleans", "write values = [0.3, 0.6]"
     require(typed and len(given) > 0, given, expected, where, fix=fix)
     kinds = {bool: "booleans", str: "texts"}
     alike = len({kinds.get(type(item), "numbers") for item in given}) == 1
     require(alike, given, "values of one kind: numbers, texts or booleans", where)
-    few = len(given) <= MAX_VALUES
-    require(few, f"{len(given)} values", f"at most {MAX_VALUES}", where)
-    return tuple(given)
+    return {"kind": VALUES, "values": tuple(given)}
 
 
 def _numbers(given: Any, count: int, where: str) -> list[float]:
-    finite = isinstance(given, list) and len(given) == count and all(map(is_number, given))
-    require(finite, given, f"{count} finite numbers", where, fix=f"write {EXAMPLE}")
+    listed = isinstance(given, list) and len(given) == count and all(map(is_number, given))
+    small = listed and all(abs(item) <= LARGEST for item in given)
+    expected = f"{count} finite numbers of at most {LARGEST:g}"
+    require(small, given, expected, where, fix=f"write {EXAMPLE}")
     return [float(item) for item in given]
+
+
+def _kind(read: Callable[[str, Any, str], dict[str, Any]], kind: str) -> tuple[Rule, None]:
+    """Returns the rule of an optional key that names a kind."""
+    return optional(partial(read, kind)), None
+
+
+_KINDS: Rules = {
+    VALUES: (optional(_values), None),
+    **{kind: _kind(_spaced, kind) for kind in SPACED},
+    **{kind: _kind(_distribution, kind) for kind in ENDS},
+}
+KINDS = tuple(_KINDS)
+FACTOR: Rules = {**_KINDS, "unit": (text, ""), "relative": (boolean, False)}
+
+
+def read_optimise(table: Any, where: str) -> tuple[Optimise, tuple[Factor, ...]]:
+    """Returns the optimisation and its variables, which are settings or gains with bounds."""
+    read = read_table(table, OPTIMISE, where)
+    variables, metrics = read.pop("variables"), read.pop("metric")
+    given = [factor.name for factor in variables]
+    some = len(given) > 0 and SCENARIO_FACTOR not in given
+    place = f"{where}.variables"
+    require(some, given, "settings or gains", place, what="not variables")
+    bounded = all(factor.kind != NORMAL for factor in variables)
+    expected = "values, uniform, loguniform or integers"
+    require(bounded, NORMAL, expected, place, what="a variable without bounds")
+    _check_held_out(read["training"], read["held_out"], f"{where}.held_out")
+    (sampler,) = read.pop("sampler") or ["tpe" if isinstance(table["metric"], str) else "nsga2"]
+    return Optimise(metrics=metrics, sampler=sampler, **read), variables
+
+
+def _evaluation(table: Any, where: str) -> Evaluation:
+    read = read_table(table, EVALUATION, where)
+    return Evaluation(cases=tuple(read["scenarios"]), seeds=read["seeds"])
+
+
+def _check_held_out(training: Evaluation, held_out: Evaluation, where: str) -> None:
+    """Raises StudyError for a held-out scenario or seed that is one of training.
+
+    A seed draws the same changes in every scenario.
+    """
+    first, count = max(training.seeds) + 1, len(held_out.seeds)
+    for key, one, other, fix in (
+        ("scenarios", training.cases, held_out.cases, "name other scenarios"),
+        (
+            "seeds",
+            training.seeds,
+            held_out.seeds,
+            f"write seeds = {{ first = {first}, count = {count} }}",
+        ),
+    ):
+        common: Any = sorted(set(one) & set(other))
+        what, expected = f"held-out {key} that are trained on", f"{key} that training does not use"
+        require(not common, common, expected, f"{where}.{key}", what=what, fix=fix)
+
+
+def _bounds(table: Any, where: str) -> tuple[Bound, ...]:
+    """Returns the constraints, of which the first is that every run walks to its end."""
+    found = [Bound(metric=WALKED, at_least=1.0)]
+    require(isinstance(table, Mapping), table, "a table", where)
+    require_known(table, OBJECTIVES, where, "metric")
+    for name, limits in table.items():
+        known = isinstance(limits, Mapping) and len(limits) > 0
+        known = known and set(limits) <= {"at_least", "at_most"}
+        known = known and all(map(is_number, limits.values()))
+        expected, fix = "at_least or at_most and a number", "write { at_most = 1.0 }"
+        place = f"{where}.{name}"
+        require(known, limits, expected, place, what="not a constraint", fix=fix)
+        found.append(Bound(metric=name, **{key: float(value) for key, value in limits.items()}))
+    return tuple(found)
+
+
+EVALUATION: Rules = {
+    "scenarios": (texts('scenarios = ["walk_flat"]'), None),
+    "seeds": (seeds(10_000), 1),
+}
+OPTIMISE: Rules = {
+    "metric": (names(OBJECTIVES), None),
+    "constraints": (_bounds, {}),
+    "trials": (whole(1, 100_000), 50),
+    "batch": (whole(1, 1000), 4),
+    "sampler": (optional(names(SAMPLERS)), None),
+    "control": (text, COMPARED[-1]),
+    "variables": (read_factors, None),
+    "training": (_evaluation, None),
+    "held_out": (_evaluation, None),
+}
 
 
 def at_quantile(factor: Factor, share: float) -> Value:

@@ -16,12 +16,12 @@ from hexapod_cosim.controller import DEFAULT_PERIOD, Gains
 from hexapod_cosim.cosim.common.plant_files import code_hash, package_version
 from hexapod_cosim.cosim.common.temporary import TemporaryFolder
 from hexapod_cosim.cosim.control.controllers import check_control
-from hexapod_cosim.cosim.export.plant_export import export_controller
+from hexapod_cosim.cosim.export.plant import export_controller
 from hexapod_cosim.cosim.run.controller_setup import make_setup
 from hexapod_cosim.cosim.run.preparation import PlantFmus, chosen_gains, design_key
-from hexapod_cosim.cosim.run.walker import Walker
+from hexapod_cosim.cosim.run.runner import Runner
 from hexapod_cosim.cosim.scenario.controls import table_with_control
-from hexapod_cosim.cosim.scenario.scenario import scenario_from_table
+from hexapod_cosim.cosim.scenario.reading import scenario_from_table
 from hexapod_cosim.cosim.scenario.tables import with_values
 from hexapod_cosim.extensions.study.factors import samples
 from hexapod_cosim.extensions.study.records import Study, StudyError
@@ -44,7 +44,7 @@ class Job:
     laws: Mapping[str, bytes]  # files of the users' controls, by label
     gains: Gains | None  # of all compliant runs; None: workers design them
     environment: Mapping[str, str]  # versions, see environment()
-    runner: type[Walker] = Walker  # gets the controller FMU as `controller`
+    runner: type[Runner] = Runner  # gets the controller FMU as `controller`
 
 
 def make_job(
@@ -52,7 +52,7 @@ def make_job(
     *,
     fmu: Path | None = None,
     gains: Gains | None = None,
-    runner: type[Walker] = Walker,
+    runner: type[Runner] = Runner,
 ) -> Job:
     """Exports the FMUs and designs the gains that all runs share. Raises HexapodError.
 

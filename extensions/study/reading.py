@@ -1,4 +1,7 @@
-"""Reads studies from TOML files and checks every key and factor before the first run."""
+"""Reads studies from TOML files and checks every key and factor before the first run.
+
+README.md documents the keys.
+"""
 
 from __future__ import annotations
 
@@ -9,31 +12,19 @@ from pathlib import Path
 from typing import Any
 
 from hexapod_cosim.cosim.scenario.controls import Control, control_beside, parse_controls
+from hexapod_cosim.cosim.scenario.reading import scenario_from_table
 from hexapod_cosim.cosim.scenario.records import COMPARED
-from hexapod_cosim.cosim.scenario.scenario import scenario_from_table
 from hexapod_cosim.cosim.scenario.tables import read_tables, with_values
 from hexapod_cosim.cosim.scenario.variation import STANDARD
-from hexapod_cosim.extensions.study.bundled import list_studies
+from hexapod_cosim.extensions.study import rules
 from hexapod_cosim.extensions.study.checks import (
     check_scenario,
     check_settable,
     check_study,
     placed,
 )
-from hexapod_cosim.extensions.study.factors import plain_name, read_factors
-from hexapod_cosim.extensions.study.keys import (
-    check_plain,
-    flat,
-    names_of,
-    read_seeds,
-    require,
-    require_known,
-    table_of,
-    text_of,
-    texts_of,
-    whole,
-)
-from hexapod_cosim.extensions.study.objective import read_optimise
+from hexapod_cosim.extensions.study.extension import list_studies
+from hexapod_cosim.extensions.study.factors import plain_name, read_factors, read_optimise
 from hexapod_cosim.extensions.study.records import (
     DESIGNS,
     DRAWN,
@@ -43,15 +34,13 @@ from hexapod_cosim.extensions.study.records import (
     Study,
     StudyError,
 )
+from hexapod_cosim.extensions.study.rules import Rules, read_table, require
 from hexapod_cosim.models import HexapodError, unknown_name
 from hexapod_cosim.models.errors import refuse_path
 from hexapod_cosim.models.files import read_text
 from hexapod_cosim.models.schema import parse_toml, reading_toml
 
 OF_A_SWEEP = ("factors", "design", "points", "seeds", "controls")  # not of an optimisation
-KEYS = ("title", "scenario", "set", "seed", "variation", "optimise", *OF_A_SWEEP)
-MAX_POINTS, MAX_SEEDS = 10**7, 10**7
-MAX_SEED = 2**32 - 1  # that all random number generators accept
 
 
 def load_study(path_or_name: str | Path, *, controls: Sequence[str] = ()) -> Study:
@@ -99,31 +88,30 @@ def study_from_table(
         folder: folder of the file, which paths of scenario files are relative to.
         scenarios: the scenarios by name, when no file shall be read and nothing be checked again.
     """
-    check_plain(table, where)
-    require_known(table, KEYS, where)
-    factors, optimise = read_factors(table.get("factors", {}), f"{where}: factors"), None
-    if "optimise" in table:
-        what, fix = "not a key of an optimisation", "leave it out: [optimise] says what is run"
-        for key in OF_A_SWEEP:
-            require(key not in table, key, "[optimise] alone", where, what=what, fix=fix)
-        optimise, factors = read_optimise(table["optimise"], f"{where}: optimise")
-    controls = _controls(table, folder, where)
+    rules.check_plain(table, where)
+    what, fix = "not a key of an optimisation", "leave it out: [optimise] says what is run"
+    for key in OF_A_SWEEP if "optimise" in table else ():
+        require(key not in table, key, "[optimise] alone", where, what=what, fix=fix)
+    read = read_table(table, STUDY, where)
+    optimise, factors = read["optimise"] or (None, read["factors"])
+    controls = _controls(read, folder, where)
     if optimise is not None:
         optimise = replace(optimise, control=controls[0].label)
     study = Study(
-        title=text_of(table, "title", Path(where).stem, where),
+        title=read["title"] or Path(where).stem,
         cases={},
         factors=factors,
-        design=names_of([table.get("design", GRID)], DESIGNS, f"{where}: design")[0],
-        points=_points(table, where),
-        seeds=read_seeds(table.get("seeds", 1), f"{where}: seeds", most=MAX_SEEDS),
+        design=read["design"][0],
+        points=read["points"] or 1,
+        seeds=read["seeds"],
         controls=tuple(control.label for control in controls),
         texts={control.label: control.text for control in controls},
-        seed=whole(table.get("seed", 0), f"{where}: seed", least=0, most=MAX_SEED),
+        seed=read["seed"],
         optimise=optimise,
         source=dict(table),
         where=where,
     )
+    _check_points(read["points"], study)
     if scenarios is not None:
         cases = {name: Case(name=name, table=one, where=where) for name, one in scenarios.items()}
         return replace(study, cases=cases)
@@ -132,26 +120,40 @@ def study_from_table(
     return study
 
 
-def _controls(table: Mapping[str, Any], folder: Path, where: str) -> tuple[Control, ...]:
-    """Returns the controls of a study's file. Raises ScenarioError, StudyError for no list."""
-    texts, place = table.get("controls", list(COMPARED)), f"{where}: controls"
-    if "optimise" in table:
-        texts = [table["optimise"].get("control", COMPARED[-1])]
-        place = f"{where}: optimise.control"
-    listed = texts_of(texts, place, 'controls = ["kinematic", "law.py:Class"]')
-    return parse_controls([control_beside(text, folder) for text in listed], where=place)
+def _controls(read: Mapping[str, Any], folder: Path, where: str) -> tuple[Control, ...]:
+    """Returns the controls of a study's file. Raises ScenarioError."""
+    texts, place = read["controls"], f"{where}: controls"
+    if read["optimise"]:
+        texts, place = [read["optimise"][0].control], f"{where}: optimise.control"
+    return parse_controls([control_beside(text, folder) for text in texts], where=place)
 
 
-def _points(table: Mapping[str, Any], where: str) -> int:
-    """Returns the number of points, which drawn designs have."""
-    drawn, place = table.get("design") in DRAWN, f"{where}: points"
-    given, got = "points" in table, table.get("points")
-    what, fix = "missing key", "write points = 100"
-    require(given or not drawn, None, "a number of points", place, what=what, fix=fix)
+def _check_points(points: int | None, study: Study) -> None:
+    """Checks that drawn designs have a number of points, and only they."""
+    drawn, place = study.design in DRAWN, f"{study.where}: points"
+    has = points is not None
+    require(has or not drawn, None, "a number of points", place, fix="write points = 100")
     what = "a number of points for a design that has its own"
     fix = f'leave it out, or write design = "{DRAWN[-1]}" (or {", ".join(DRAWN[:-1])})'
-    require(drawn or not given, got, "no points", place, what=what, fix=fix)
-    return whole(table.get("points", 1), place, least=1, most=MAX_POINTS)
+    require(drawn or not has, points, "no points", place, what=what, fix=fix)
+
+
+STUDY: Rules = {
+    "title": (rules.text, ""),
+    "scenario": (
+        rules.simple(lambda value: isinstance(value, str | Mapping), "a scenario's name or table"),
+        "walk_flat",
+    ),
+    "set": (rules.table, {}),
+    "seed": (rules.whole(0, 2**32 - 1), 0),  # that all random number generators accept
+    "variation": (rules.optional(rules.boolean), None),
+    "optimise": (rules.optional(read_optimise), None),
+    "factors": (read_factors, {}),
+    "design": (rules.names(DESIGNS), GRID),
+    "points": (rules.optional(rules.whole(1, 10**7)), None),
+    "seeds": (rules.seeds(10**7), 1),
+    "controls": (rules.texts('controls = ["kinematic", "law.py:Class"]'), list(COMPARED)),
+}
 
 
 def _cases(study: Study, folder: Path) -> dict[str, Case]:
@@ -161,12 +163,8 @@ def _cases(study: Study, folder: Path) -> dict[str, Case]:
     """
     source, where = study.source, study.where
     own = source.get("scenario", "walk_flat")
-    named = isinstance(own, str | Mapping)
-    require(named, own, "a scenario's name, file or table", f"{where}: scenario")
     changes = _changes(study)
     vary = source.get("variation", len(study.seeds) > 1 or study.optimise is not None)
-    fix, place = "write variation = true, without quotes", f"{where}: variation"
-    require(isinstance(vary, bool), vary, "true or false", place, fix=fix)
     found = {}
     if isinstance(own, Mapping):
         place = f"{where}: scenario"
@@ -203,10 +201,12 @@ def _changes(study: Study) -> dict[str, Any]:
     is the value before the optimisation.
     """
     where = f"{study.where}: set"
-    changes = flat(table_of(study.source.get("set", {}), where, "write [set]"), where)
+    changes: dict[str, Any] = {}
     factors = {factor.name for factor in study.factors}
     what, fix = "set and varied", "take one of them away: the factor would replace it"
-    for name in changes:
+    for name, value in rules.leaves(study.source.get("set", {})):
+        rules.require_once(name, name in changes, f"{where}.{name}")
+        changes[name] = value
         check_settable(plain_name(name), f"{where}.{name}", kind="setting")
         twice = study.optimise is None and plain_name(name) in factors
         expected, place = "each name in [set] or [factors]", f"{where}.{name}"

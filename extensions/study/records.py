@@ -21,6 +21,7 @@ DRAWN = (RANDOM, LATIN_HYPERCUBE, SOBOL)  # designs with a given number of point
 SCENARIO_FACTOR = "scenario"
 GAINS = "gains."  # prefix of factors that are gains of the compliant control
 FRONT = 8  # members of a Pareto front that are evaluated on the held-out runs
+WALKED = "walked"  # the share of runs that walked to the end, as a metric
 SAMPLERS = ("tpe", "nsga2", "random")
 
 

@@ -1,18 +1,34 @@
-"""Runs a study, or the part of it that is missing, and writes its results."""
+"""Runs a study, or what is missing of it, for `hexapod study`, and shows its results.
+
+The command is in study_command.py, because the imports of this module take a second.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from contextlib import AbstractContextManager, closing
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import AbstractContextManager, ExitStack, closing, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from hexapod_cosim.controller import Gains
+from hexapod_cosim.cosim.cli.failures import FELL, SUCCESS
+from hexapod_cosim.cosim.cli.terminal import (
+    counting_bar,
+    show_files,
+    show_json,
+    show_table,
+    show_text,
+    warn,
+)
 from hexapod_cosim.cosim.common.events import EventSink, ignore_event
-from hexapod_cosim.cosim.run.walker import Walker
+from hexapod_cosim.cosim.master.loop import COMPLETED
+from hexapod_cosim.cosim.results.comparison import METHOD
+from hexapod_cosim.cosim.run.runner import Runner
 from hexapod_cosim.cosim.run.worker_pool import processor_count
+from hexapod_cosim.extensions.study import tables
 from hexapod_cosim.extensions.study.dispatch import ProgressSink, ResultSink, dispatch
 from hexapod_cosim.extensions.study.folder import (
     RESULTS,
@@ -22,10 +38,13 @@ from hexapod_cosim.extensions.study.folder import (
     locked,
 )
 from hexapod_cosim.extensions.study.job import Job, make_job, manifest_of
+from hexapod_cosim.extensions.study.page import notes, write_study_report
+from hexapod_cosim.extensions.study.reading import load_study
 from hexapod_cosim.extensions.study.records import Study
 from hexapod_cosim.extensions.study.runs import Sweep, count_runs
 from hexapod_cosim.extensions.study.search import optimise
 from hexapod_cosim.extensions.study.store import Store
+from hexapod_cosim.extensions.study.summary import Results, read_results, summary_of
 from hexapod_cosim.extensions.study.workers import (
     Workers,
     cluster_workers,
@@ -33,6 +52,7 @@ from hexapod_cosim.extensions.study.workers import (
     local_workers,
 )
 
+MAX_REASONS = 10  # of failures that are shown
 # gets the numbers of all runs and of those that are done, and returns the display of progress
 StartProgress = Callable[[int, int], ProgressSink]
 
@@ -48,7 +68,7 @@ class Options:
     scheduler: str | None = None  # address of a Dask scheduler that replaces the processes
     command: str = ""  # command line that repeats the study, for its report
     events: EventSink = ignore_event  # for instance that the study waits for workers
-    runner: type[Walker] = Walker  # a class that workers can import
+    runner: type[Runner] = Runner  # a class that workers can import
 
 
 def run_study(study: Study, folder: Path, *, options: Options, start: StartProgress) -> Path:
@@ -90,3 +110,97 @@ def open_workers(job: Job, options: Options, count: int) -> AbstractContextManag
     if options.workers == 0:
         return in_process_workers(job)
     return local_workers(job, min(options.workers or processor_count(), count))
+
+
+def run_and_report(
+    file: str, folder: Path, options: Options, *, controls: Sequence[str] = (), json: bool
+) -> int:
+    """Runs a study, or what is missing of it, writes its report and shows the results.
+
+    `controls` replace those of the file.
+
+    Returns:
+        The exit code of the command.
+    """
+    plan = load_study(file, controls=controls)
+    try:
+        with progress(plain=not json) as start:
+            results = run_study(plan, folder, options=options, start=start)
+    except KeyboardInterrupt:
+        warn(f"stopped; the runs so far are in {folder}, and the same command resumes the study")
+        raise
+    found, files = report_on(folder)
+    warn_of(found)
+    if json:
+        show_json({**summary_of(found), "results": str(results), "report": str(files[-1])})
+    else:
+        show_study(found)
+        show_files([results, *files])
+        print(f"report: {files[-1]}")
+    return FELL if _only_falls(found) else SUCCESS
+
+
+def _only_falls(found: Results) -> bool:
+    """Returns whether no run walked to its end and the robot fell in some of them."""
+    return not any(found.overall.walked.values()) and any(
+        status == COMPLETED for _, status, _ in found.failures
+    )
+
+
+def warn_of(found: Results) -> None:
+    """Prints the notes of the report as warnings."""
+    for text in notes(found):
+        warn(text)
+
+
+def report_on(folder: Path) -> tuple[Results, list[Path]]:
+    """Reads a study's folder and writes its tables and report; returns the results and files."""
+    found = read_results(folder)
+    return found, write_study_report(found, folder)
+
+
+@contextmanager
+def progress(*, plain: bool) -> Iterator[StartProgress]:
+    """Yields a function that starts the display of progress when the number of runs is known.
+
+    The display is a bar with rate, remaining time and failures on a terminal, and lines elsewhere
+    if `plain`.
+    """
+    with ExitStack() as shown:
+
+        def start(total: int, done: int) -> ProgressSink:
+            if done:
+                print(f"resumed: {done} of {total} runs are there already", file=sys.stderr)
+            show = shown.enter_context(counting_bar("runs", total, plain=plain))
+            show(done, 0)
+            count, failed = done, 0
+
+            def add(more: int, lost: int) -> None:
+                nonlocal count, failed
+                count, failed = count + more, failed + lost
+                show(count, failed)
+
+            return add
+
+        yield start
+
+
+def show_study(found: Results) -> None:
+    """Prints the table of all runs, totals, failures by reason and the optimum."""
+    overall, controls = found.overall, found.study.controls
+    _show(tables.overall_table(found))
+    walked = ", ".join(
+        f"{control} {overall.walked[control]} of {overall.runs[control]}" for control in controls
+    )
+    show_text(f"{found.runs} runs at {found.of_points} points; walked to the end: {walked}")
+    if len(controls) > 1:
+        show_text(f"{METHOD}.")
+    for count, control, how, reason in tables.failure_table(found).rows[:MAX_REASONS]:
+        show_text(f"{count:>6} x {control} {how}: {reason}")
+    if found.optimum is not None:
+        _show(tables.optimum_table(found))
+        _show(tables.optimum_changes(found))
+
+
+def _show(table: tables.Table) -> None:
+    show_table(table.columns, table.rows, right=table.right)

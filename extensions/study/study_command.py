@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
 
@@ -69,8 +69,7 @@ def study(
     """
     require_pyarrow("studies", "hexapod study")
     # imported here: it is slow, and no other command needs it
-    from hexapod_cosim.extensions.study.study import Options  # noqa: PLC0415
-    from hexapod_cosim.extensions.study.studying import run_and_report  # noqa: PLC0415
+    from hexapod_cosim.extensions.study.study import Options, run_and_report  # noqa: PLC0415
 
     options = Options(
         fmu=fmu,
@@ -78,11 +77,7 @@ def study(
         workers=workers,
         scheduler=scheduler,
         events=warn,
-        command=_command_line(
-            file,
-            control or [],
-            {"fmu": fmu, "gains": gains},
-        ),
+        command=_command_line(file, control=control, fmu=fmu, gains=gains),
     )
     folder = output or Path("out") / Path(file).stem
     return run_and_report(file, folder, options, controls=control or [], json=json)
@@ -91,20 +86,17 @@ def study(
 def report_again(folder: Path) -> Sequence[Path]:
     """Writes the tables and the report of a study's folder again; returns the files."""
     require_pyarrow("studies", "hexapod report")
-    from hexapod_cosim.extensions.study.studying import report_on, warn_of  # noqa: PLC0415  slow
+    from hexapod_cosim.extensions.study.study import report_on, warn_of  # noqa: PLC0415  slow
 
     found, files = report_on(folder)
     warn_of(found)
     return files
 
 
-def _command_line(file: str, controls: Sequence[str], options: Mapping[str, object]) -> str:
-    """Returns the command line that repeats the study, with the options that are not None."""
-    words = [
-        word
-        for name, value in options.items()
-        if value is not None
-        for word in (f"--{name}", str(value))
-    ]
-    words = [*(word for text in controls for word in ("--control", text)), *words]
-    return shlex.join(["hexapod", "study", file, *words])
+def _command_line(file: str, **options: object) -> str:
+    """Returns the command line that repeats the study, with the options that were given."""
+    words = ["hexapod", "study", file]
+    for name, value in options.items():
+        for item in value if isinstance(value, list) else [value]:
+            words += [] if item is None else [f"--{name}", str(item)]
+    return shlex.join(words)

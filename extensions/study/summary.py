@@ -14,9 +14,9 @@ from hexapod_cosim.cosim.results.balance import UNBALANCED, Unbalanced
 from hexapod_cosim.cosim.results.metrics import OF_THE_RUN
 from hexapod_cosim.extensions.study.folder import MANIFEST
 from hexapod_cosim.extensions.study.groups import LAST, Figures, Point, Runs, points_of
-from hexapod_cosim.extensions.study.optimum import OPTIMUM, Trial, trials_of
 from hexapod_cosim.extensions.study.reading import study_from_table
 from hexapod_cosim.extensions.study.records import Study
+from hexapod_cosim.extensions.study.search import OPTIMUM, Trial, trials_of
 from hexapod_cosim.extensions.study.store import FIGURES, WARNING_SEPARATOR, Store, quoted
 from hexapod_cosim.models import HexapodError
 

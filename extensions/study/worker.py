@@ -20,8 +20,8 @@ from hexapod_cosim.cosim.results.summary import NO_FIGURES, REFUSED, Summary
 from hexapod_cosim.cosim.run.preparation import chosen_gains
 from hexapod_cosim.cosim.run.worker_pool import raise_if_stopped
 from hexapod_cosim.cosim.scenario.controls import PYTHON, control_of, split_walk, table_with_control
+from hexapod_cosim.cosim.scenario.reading import scenario_from_table
 from hexapod_cosim.cosim.scenario.records import Scenario
-from hexapod_cosim.cosim.scenario.scenario import scenario_from_table
 from hexapod_cosim.cosim.scenario.tables import with_values
 from hexapod_cosim.extensions.study.job import Job, environment
 from hexapod_cosim.extensions.study.records import (

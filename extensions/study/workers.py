@@ -11,7 +11,7 @@ import pickle
 import re
 from collections.abc import Callable, Iterator
 from concurrent.futures import Executor
-from contextlib import ExitStack, contextmanager, suppress
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from typing import Any
 
@@ -79,9 +79,9 @@ def cluster_workers(job: Job, address: str, events: EventSink) -> Iterator[Worke
     from distributed import KilledWorker  # noqa: PLC0415  an extra
 
     with ExitStack() as opened:
-        opened.callback(_close, client)
+        opened.callback(client.close, timeout=5)
         # its tracebacks of a dead scheduler say no more than our error does
-        opened.enter_context(_silenced("distributed"))
+        logging.getLogger("distributed").setLevel(logging.CRITICAL + 1)
         interrupts = opened.enter_context(remembered_interrupts())
         size = _cluster_size(client, events)
         # a task, because Dask repeats it when the worker that holds its result dies
@@ -141,20 +141,3 @@ def _connect(address: str) -> Any:
             fix="start one with `dask scheduler`, which prints its address",
             where="--scheduler",
         ) from error
-
-
-def _close(client: Any) -> None:
-    with suppress(Exception):  # of a scheduler that is gone
-        client.close(timeout=5)
-
-
-@contextmanager
-def _silenced(name: str) -> Iterator[None]:
-    """Suppresses the log messages of a library within the block."""
-    log = logging.getLogger(name)
-    before = log.level
-    log.setLevel(logging.CRITICAL + 1)
-    try:
-        yield
-    finally:
-        log.setLevel(before)

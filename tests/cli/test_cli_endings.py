@@ -127,7 +127,7 @@ def test_an_interrupt_while_results_are_written_waits_for_them(
         signal.raise_signal(number)
         write_commands(recording, path)
 
-    monkeypatch.setattr("hexapod_cosim.cosim.results.results.write_commands", struck)
+    monkeypatch.setattr("hexapod_cosim.cosim.results.folder.write_commands", struck)
     folder = tmp_path / "out"
     code, out, err = call("simulate", "stand", "-o", folder, *QUICK)
     assert (code, out) == (130, "")

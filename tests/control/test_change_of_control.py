@@ -12,7 +12,7 @@ from gains import make_gains
 from native_controller import NativeController, NativeError, commands
 
 from hexapod_cosim.controller import BodyCommand, Controller, Gains, Measurement, make_gait
-from hexapod_cosim.cosim.interface.controller_interface import ControllerSetup
+from hexapod_cosim.cosim.interface.controller import ControllerSetup
 from hexapod_cosim.models import HexapodError, load_robot
 
 CONTROLS = ("kinematic", "compliant", "paper")

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from hexapod_cosim.controller import make_gait
-from hexapod_cosim.cosim.export.plant_export import export_controller
-from hexapod_cosim.cosim.interface.controller_interface import (
+from hexapod_cosim.cosim.export.plant import export_controller
+from hexapod_cosim.cosim.interface.controller import (
     ControllerSetup,
     controller_parameters,
 )

@@ -8,7 +8,7 @@ import pytest
 
 from hexapod_cosim.cosim.control import parse_control
 from hexapod_cosim.cosim.scenario.controls import parse_controls, reference_of
-from hexapod_cosim.cosim.scenario.scenario import load_scenario, scenario_from_table
+from hexapod_cosim.cosim.scenario.reading import load_scenario, scenario_from_table
 from hexapod_cosim.models import ScenarioError
 
 HERE = Path("/laws")

@@ -8,13 +8,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hexapod_cosim.cosim.export.plant_export import export_controller
+from hexapod_cosim.cosim.export.plant import export_controller
 from hexapod_cosim.cosim.interface.names import joint_names
 from hexapod_cosim.cosim.master.connection import FmuVariable, connect, names_of_map, read_map
 from hexapod_cosim.cosim.run.controller_setup import make_setup
+from hexapod_cosim.cosim.run.runner import Runner
 from hexapod_cosim.cosim.run.single_run import simulate
-from hexapod_cosim.cosim.run.walker import Walker
-from hexapod_cosim.cosim.scenario.scenario import load_scenario
+from hexapod_cosim.cosim.scenario.reading import load_scenario
 from hexapod_cosim.models import FmuError, load_robot
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples" / "controllers"
@@ -121,10 +121,10 @@ def test_our_exported_controller_repeats_the_walk_of_the_built_in_control(
 def test_the_loop_in_c_gives_the_same_bits_as_the_loop_in_python(
     ours: dict[int, Path], foreign: Path
 ) -> None:
-    with Walker(everything=True) as walker:
+    with Runner(everything=True) as runner:
         for path in (ours[2], foreign):
             plan = load_scenario("push", overrides=["duration=0.6", f"control={path}"])
-            slow, fast = simulate(plan), walker.simulate(plan)
+            slow, fast = simulate(plan), runner.simulate(plan)
             assert fast.completed
             assert set(fast.recording.names) == set(slow.recording.names)
             same = fast.recording.columns(slow.recording.names)

@@ -13,7 +13,7 @@ from hexapod_cosim.controller import BodyCommand, ControllerError, JointCommand,
 from hexapod_cosim.cosim.control.controllers import check_control
 from hexapod_cosim.cosim.control.python_law import PythonLaw, build, load_class
 from hexapod_cosim.cosim.scenario.controls import parse_control
-from hexapod_cosim.cosim.scenario.scenario import scenario_from_table
+from hexapod_cosim.cosim.scenario.reading import scenario_from_table
 from hexapod_cosim.models import JOINT_NAMES, LEG_NAMES
 
 GIVEN = {"robot": "the robot", "period": 0.005, "gait": "the gait"}

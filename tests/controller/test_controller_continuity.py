@@ -22,7 +22,7 @@ from hexapod_cosim.controller import (
     Measurement,
     make_gait,
 )
-from hexapod_cosim.cosim.interface.controller_interface import ControllerSetup
+from hexapod_cosim.cosim.interface.controller import ControllerSetup
 from hexapod_cosim.models import load_robot
 
 PERIODS = {"tripod": (0.002, 0.001), "ripple": (0.004,)}  # s

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hexapod_cosim.controller import BodyCommand, JointCommand, Measurement
-from hexapod_cosim.cosim.interface.plant_interface import load_interface
+from hexapod_cosim.cosim.interface.plant import load_interface
 from hexapod_cosim.cosim.master.fmu import StepError
 from hexapod_cosim.models import load_robot
 

@@ -9,21 +9,21 @@ import numpy as np
 import pytest
 
 from hexapod_cosim.controller import GainsError
-from hexapod_cosim.cosim.design.gain_design import design_for
+from hexapod_cosim.cosim.design.gains import design_for
 from hexapod_cosim.cosim.export.robot_package import read_values
-from hexapod_cosim.cosim.interface.controller_interface import controller_parameters
+from hexapod_cosim.cosim.interface.controller import controller_parameters
 from hexapod_cosim.cosim.results.result import Result
 from hexapod_cosim.cosim.run.plan import make_plan
-from hexapod_cosim.cosim.run.walker import Walker
-from hexapod_cosim.cosim.scenario.scenario import load_scenario
+from hexapod_cosim.cosim.run.runner import Runner
+from hexapod_cosim.cosim.scenario.reading import load_scenario
 from hexapod_cosim.models import HexapodError, load_robot
 
 NO_PUSH = "the ground has no friction: feet cannot push, and the robot does not get ahead"
 
 
 def run(name: str, *overrides: str) -> Result:
-    with Walker(everything=True) as walker:
-        result = walker.simulate(load_scenario(name, overrides=overrides))
+    with Runner(everything=True) as runner:
+        result = runner.simulate(load_scenario(name, overrides=overrides))
     assert result.completed, result.outcome.reason
     return result
 

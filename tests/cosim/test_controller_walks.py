@@ -10,8 +10,8 @@ from gains import make_gains
 
 from hexapod_cosim.controller import SWITCHES
 from hexapod_cosim.cosim.results.result import Result
-from hexapod_cosim.cosim.run.walker import Walker
-from hexapod_cosim.cosim.scenario.scenario import load_scenario
+from hexapod_cosim.cosim.run.runner import Runner
+from hexapod_cosim.cosim.scenario.reading import load_scenario
 from hexapod_cosim.models import load_robot
 
 pytestmark = pytest.mark.usefixtures("plant_build")
@@ -27,8 +27,8 @@ def walk(robot: str, control: str, *overrides: str, duration: float = 4.0) -> Re
         "walk_flat",
         overrides=[f"robot={robot}", f"control={control}", f"duration={duration}", *overrides],
     )
-    with Walker(everything=True) as walker:
-        return walker.simulate(scenario, gains=make_gains(load_robot(robot)))
+    with Runner(everything=True) as runner:
+        return runner.simulate(scenario, gains=make_gains(load_robot(robot)))
 
 
 def outputs(result: Result) -> np.ndarray:

@@ -11,16 +11,16 @@ from gains import make_gains
 
 from hexapod_cosim.controller import Gains, Gait, make_gait
 from hexapod_cosim.cosim.design.stance import StanceDesign, find_stance
-from hexapod_cosim.cosim.export.plant_export import export_fmu
-from hexapod_cosim.cosim.run import chosen_walk, preparation
+from hexapod_cosim.cosim.export.plant import export_fmu
+from hexapod_cosim.cosim.run import gait_selection, preparation
 from hexapod_cosim.cosim.run.kept_designs import Stance, kept_gains, kept_stance
 from hexapod_cosim.cosim.run.preparation import (
     PlantFmus,
     chosen_gains,
     designed_gains,
 )
+from hexapod_cosim.cosim.scenario.reading import load_scenario
 from hexapod_cosim.cosim.scenario.records import Scenario
-from hexapod_cosim.cosim.scenario.scenario import load_scenario
 from hexapod_cosim.models import HexapodError, Robot, load_robot
 
 Design = tuple[Robot, float]  # robot and period [s]
@@ -41,7 +41,7 @@ def designs(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Iterator[list[De
         calls.append((robot, period))
         return make_gains(load_robot("athena"), period=period)
 
-    monkeypatch.setattr("hexapod_cosim.cosim.design.gain_design.design_for", design)
+    monkeypatch.setattr("hexapod_cosim.cosim.design.gains.design_for", design)
     monkeypatch.setattr("hexapod_cosim.cosim.run.kept_designs.user_cache", lambda: tmp_path)
     designed_gains.cache_clear()
     yield calls
@@ -149,14 +149,14 @@ def test_a_walk_of_an_earlier_process_is_not_designed_again(
         designs.append(gait.name)
         return find_stance(robot, gait=gait)
 
-    monkeypatch.setattr(chosen_walk, "find_stance", find)
+    monkeypatch.setattr(gait_selection, "find_stance", find)
     monkeypatch.setattr("hexapod_cosim.cosim.run.kept_designs.user_cache", lambda: tmp_path)
     plan = load_scenario("stand", overrides=["control=compliant"])
     walks = []
     for _ in range(2):
-        chosen_walk._design.cache_clear()
-        walks.append(chosen_walk.choose_walk(plan))
-    chosen_walk._design.cache_clear()
+        gait_selection._design.cache_clear()
+        walks.append(gait_selection.select_gait(plan))
+    gait_selection._design.cache_clear()
     assert designs == ["amble"]
     assert walks[0] == walks[1]
     assert walks[0].outward < 0.0

@@ -9,8 +9,8 @@ import pytest
 from hexapod_cosim.controller import BodyCommand, Controller, Measurement, make_gait
 from hexapod_cosim.cosim.scenario.bundled import list_scenarios
 from hexapod_cosim.cosim.scenario.reach import check_commands
+from hexapod_cosim.cosim.scenario.reading import load_scenario, scenario_robot
 from hexapod_cosim.cosim.scenario.records import Command
-from hexapod_cosim.cosim.scenario.scenario import load_scenario, scenario_robot
 from hexapod_cosim.models import ScenarioError, load_robot
 
 ROBOT = load_robot("athena")

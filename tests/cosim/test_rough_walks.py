@@ -9,8 +9,8 @@ import pytest
 from gains import make_gains
 
 from hexapod_cosim.cosim.results.result import Result
-from hexapod_cosim.cosim.run.walker import Walker
-from hexapod_cosim.cosim.scenario.scenario import load_scenario
+from hexapod_cosim.cosim.run.runner import Runner
+from hexapod_cosim.cosim.scenario.reading import load_scenario
 from hexapod_cosim.models import load_robot
 
 ROUGH = ("terrain.kind=random_uniform", "terrain.max_height=20 mm", "terrain.seed=5")
@@ -22,8 +22,8 @@ def walk(control: str, *overrides: str) -> Result:
     scenario = load_scenario(
         "walk_flat", overrides=[f"control={control}", "duration=8.0", *overrides]
     )
-    with Walker(everything=True) as walker:
-        return walker.simulate(scenario, gains=make_gains(load_robot("athena")))
+    with Runner(everything=True) as runner:
+        return runner.simulate(scenario, gains=make_gains(load_robot("athena")))
 
 
 @pytest.mark.usefixtures("plant_build")

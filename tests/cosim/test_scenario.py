@@ -13,10 +13,10 @@ import pytest
 import tomlkit
 
 from hexapod_cosim.controller import SWITCHES, Controller, Parts, make_gait
-from hexapod_cosim.cosim.run.chosen_walk import known_robot
+from hexapod_cosim.cosim.run.gait_selection import known_robot
 from hexapod_cosim.cosim.scenario.bundled import list_scenarios
+from hexapod_cosim.cosim.scenario.reading import load_scenario, scenario_from_table, scenario_robot
 from hexapod_cosim.cosim.scenario.records import Variation
-from hexapod_cosim.cosim.scenario.scenario import load_scenario, scenario_from_table, scenario_robot
 from hexapod_cosim.models import RobotError, ScenarioError
 
 

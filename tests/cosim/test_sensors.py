@@ -19,10 +19,10 @@ from hexapod_cosim.cosim.master.loop import run
 from hexapod_cosim.cosim.master.recorder import Recorder, Recording
 from hexapod_cosim.cosim.master.sensors import CONTACT, errors_of
 from hexapod_cosim.cosim.master.signals import Signals
-from hexapod_cosim.cosim.results.results import read_facts, write_result
+from hexapod_cosim.cosim.results.folder import read_facts, write_result
 from hexapod_cosim.cosim.run.single_run import simulate
 from hexapod_cosim.cosim.scenario.event_log import describe_event, event_log
-from hexapod_cosim.cosim.scenario.scenario import load_scenario, scenario_from_table
+from hexapod_cosim.cosim.scenario.reading import load_scenario, scenario_from_table
 from hexapod_cosim.cosim.scenario.schedule import make_schedule
 from hexapod_cosim.models import JOINT_NAMES, LEG_NAMES, ScenarioError
 

@@ -8,10 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hexapod_cosim.cosim.interface.plant_interface import load_interface
+from hexapod_cosim.cosim.interface.plant import load_interface
 from hexapod_cosim.cosim.run.single_run import simulate
+from hexapod_cosim.cosim.scenario.reading import load_scenario
 from hexapod_cosim.cosim.scenario.records import Command, Variation
-from hexapod_cosim.cosim.scenario.scenario import load_scenario
 from hexapod_cosim.cosim.scenario.variation import (
     ANGLE,
     POSITION,

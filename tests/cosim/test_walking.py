@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from hexapod_cosim.cosim.run.walker import Walker
-from hexapod_cosim.cosim.scenario.scenario import load_scenario
+from hexapod_cosim.cosim.run.runner import Runner
+from hexapod_cosim.cosim.scenario.reading import load_scenario
 from hexapod_cosim.models import LEG_NAMES, Robot, load_robot
 
 COMMANDED, SHARE = 0.08, 0.10  # m/s, 1: how near to it the mean speed must come
@@ -35,8 +35,8 @@ def test_a_robot_walks_for_a_minute_at_the_commanded_speed_without_falling(
     scenario = load_scenario(
         "walk_flat", overrides=[f"robot={robot}", f"control={control}", "duration=60"]
     )
-    with Walker(everything=True) as walker:
-        result = walker.simulate(scenario)
+    with Runner(everything=True) as runner:
+        result = runner.simulate(scenario)
     assert result.completed
     recording = result.outcome.recording
     assert recording.time[-1] == pytest.approx(60.0)

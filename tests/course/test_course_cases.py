@@ -11,9 +11,17 @@ from typing import Any
 
 import pytest
 
-from hexapod_cosim.cosim.scenario.scenario import scenario_robot
-from hexapod_cosim.extensions.course.reading import CLASSES, FOLDER, load_course, run_scenario
-from hexapod_cosim.extensions.course.records import Case, Course, CourseError, read_entries
+from hexapod_cosim.cosim.scenario.reading import scenario_robot
+from hexapod_cosim.extensions.course.records import (
+    CLASSES,
+    FOLDER,
+    Case,
+    Course,
+    CourseError,
+    load_course,
+    read_entries,
+    run_scenario,
+)
 from hexapod_cosim.models import load_robot
 
 KINEMATIC = read_entries(["kinematic"])[0]

@@ -10,8 +10,7 @@ from typing import Any
 import pytest
 from command import Call, assert_refused
 
-from hexapod_cosim.extensions.course.reading import load_course
-from hexapod_cosim.extensions.course.records import read_entries
+from hexapod_cosim.extensions.course.records import load_course, read_entries
 from hexapod_cosim.extensions.course.runs import Run, run_course
 from hexapod_cosim.extensions.course.store import read_table
 

@@ -12,11 +12,9 @@ from hexapod_cosim.cosim.master.loop import COMPLETED, FAILED
 from hexapod_cosim.cosim.results.metrics import METRICS
 from hexapod_cosim.cosim.results.summary import NO_FIGURES, Summary
 from hexapod_cosim.extensions.course import texts
-from hexapod_cosim.extensions.course.parts import judge_parts
-from hexapod_cosim.extensions.course.reading import load_course
-from hexapod_cosim.extensions.course.records import BY_NAME, QUANTITIES, Case
+from hexapod_cosim.extensions.course.records import BY_NAME, QUANTITIES, Case, load_course
 from hexapod_cosim.extensions.course.runs import Run, failure_of
-from hexapod_cosim.extensions.course.table import ALL, Table
+from hexapod_cosim.extensions.course.table import ALL, Table, judge_parts
 
 CONTROLS = ("before", "after")
 COURSE = load_course("judge", seeds=4)

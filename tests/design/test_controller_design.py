@@ -33,7 +33,7 @@ from hexapod_cosim.controller.design.paper import (
     shifted,
 )
 from hexapod_cosim.controller.parts import Parts
-from hexapod_cosim.cosim.design.gain_design import design_for, read_requirements, standing_plants
+from hexapod_cosim.cosim.design.gains import design_for, read_requirements, standing_plants
 from hexapod_cosim.models import load_robot
 
 PERIOD = 0.005  # s

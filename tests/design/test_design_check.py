@@ -10,8 +10,8 @@ import pytest
 from hexapod_cosim.controller import Gains
 from hexapod_cosim.controller.design.loci import worst_margins
 from hexapod_cosim.controller.design.paper import PaperLoops, scaled
-from hexapod_cosim.cosim.design.design_check import check_design
-from hexapod_cosim.cosim.design.gain_design import design_for, standing_plants
+from hexapod_cosim.cosim.design.gains import design_for, standing_plants
+from hexapod_cosim.cosim.design.verification import check_design
 from hexapod_cosim.models import load_robot
 
 PERIOD = 0.005  # s

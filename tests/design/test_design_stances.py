@@ -15,7 +15,7 @@ from scaled_robots import scaled_robot
 from hexapod_cosim.controller import GainsError, LegSolver
 from hexapod_cosim.controller.design import StandingPlant, design_gains
 from hexapod_cosim.controller.size import requirements_for
-from hexapod_cosim.cosim.design.gain_design import STANCES, design_for, examine_stances, level_fmu
+from hexapod_cosim.cosim.design.gains import STANCES, design_for, examine_stances, level_fmu
 from hexapod_cosim.cosim.design.linearise import Bench
 from hexapod_cosim.cosim.design.standing import lifted_stance, loads, rest
 from hexapod_cosim.models import Robot, load_robot

@@ -13,7 +13,7 @@ from hexapod_cosim.controller import LegSolver
 from hexapod_cosim.controller.design.closed import disturbed
 from hexapod_cosim.controller.design.paper import shifted
 from hexapod_cosim.controller.design.standing import ANGLES, StandingPlant, weight_share
-from hexapod_cosim.cosim.design.gain_design import STANCES, level_fmu
+from hexapod_cosim.cosim.design.gains import STANCES, level_fmu
 from hexapod_cosim.cosim.design.linearise import STATES, Bench, linearise
 from hexapod_cosim.cosim.design.standing import StanceError, rest
 from hexapod_cosim.cosim.interface.names import foot_vector_names

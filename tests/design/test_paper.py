@@ -19,7 +19,7 @@ from hexapod_cosim.controller import (
 from hexapod_cosim.controller.comply.paper import Paper, Step
 from hexapod_cosim.controller.walk.inverse_dynamics import InverseDynamics
 from hexapod_cosim.cosim.run.single_run import simulate
-from hexapod_cosim.cosim.scenario.scenario import load_scenario
+from hexapod_cosim.cosim.scenario.reading import load_scenario
 from hexapod_cosim.models import HexapodError, load_robot
 
 ATHENA = load_robot("athena")

@@ -20,9 +20,9 @@ from random_robots import (
 )
 from scaled_robots import scaled_robot
 
-from hexapod_cosim.cosim.design.gain_design import design_for
+from hexapod_cosim.cosim.design.gains import design_for
 from hexapod_cosim.cosim.results.summary import Summary
-from hexapod_cosim.cosim.run.walker import Walker
+from hexapod_cosim.cosim.run.runner import Runner
 from hexapod_cosim.cosim.scenario.records import Scenario
 from hexapod_cosim.models import Robot, load_robot
 from hexapod_cosim.models.urdf.writer import robot_to_urdf
@@ -52,9 +52,9 @@ def walks() -> Iterator[dict[str, tuple[Summary, Summary]]]:
 def walk(robot: Robot, scenario: Scenario, walks: dict[str, tuple[Summary, Summary]]) -> Summary:
     """Designs for a robot and runs it under compliant and, for comparison, kinematic control."""
     gains = design_for(robot, scenario.macro_step)
-    with Walker() as walker:
+    with Runner() as runner:
         kinematic, compliant = (
-            walker.summary(replace(scenario, control=name), gains=gains)
+            runner.summary(replace(scenario, control=name), gains=gains)
             for name in ("kinematic", "compliant")
         )
     walks[robot.name] = kinematic, compliant

@@ -34,7 +34,6 @@ ROOMS = {
     "export": LOW,
     "logs": LOW,
     "results": [*LOW, "logs"],
-    "validate": LOW,
     "design": [*LOW, "export"],
     "report": [*LOW, "export", "results"],
     "run": RUNNING,

@@ -14,7 +14,7 @@ from types import ModuleType
 
 import pytest
 
-from hexapod_cosim.cosim.export.plant_export import export_controller, export_fmu
+from hexapod_cosim.cosim.export.plant import export_controller, export_fmu
 from hexapod_cosim.cosim.run.controller_setup import make_setup
 from hexapod_cosim.models import load_robot
 

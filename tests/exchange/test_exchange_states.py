@@ -155,5 +155,5 @@ def test_calls_of_the_other_interface_are_refused_by_name(solved: Plant, running
         "fmi2DoStep: got a call of co-simulation, expected one of model exchange"
         in solved.last_message
     )
-    assert running.call("fmi2EnterEventMode") == ERROR
+    assert running.call("fmi2EnterContinuousTimeMode") == ERROR
     assert "got a call of model exchange, expected one of co-simulation" in running.last_message

@@ -10,14 +10,14 @@ import numpy as np
 from gains import PERIOD, make_gains
 
 from hexapod_cosim.controller import make_gait
-from hexapod_cosim.cosim.export.plant_export import export_controller
-from hexapod_cosim.cosim.interface.controller_interface import (
+from hexapod_cosim.cosim.export.plant import export_controller
+from hexapod_cosim.cosim.interface.controller import (
     ControllerSetup,
 )
 from hexapod_cosim.cosim.master.fmu import Fmu
 from hexapod_cosim.cosim.master.sensors import MEASURED
 from hexapod_cosim.cosim.master.signals import COMMANDS
-from hexapod_cosim.cosim.run.chosen_walk import known_robot
+from hexapod_cosim.cosim.run.gait_selection import known_robot
 from hexapod_cosim.cosim.scenario.records import Scenario
 from hexapod_cosim.models import load_robot
 

@@ -16,7 +16,7 @@ import fmpy
 import pytest
 from lxml import etree
 
-from hexapod_cosim.cosim.export.plant_export import export_controller, export_fmu
+from hexapod_cosim.cosim.export.plant import export_controller, export_fmu
 from hexapod_cosim.cosim.run.controller_setup import make_setup
 from hexapod_cosim.models import list_robots, load_robot
 

@@ -16,8 +16,9 @@ from fmpy.validation import validate_fmu
 from gains import PERIOD, make_gains
 
 from hexapod_cosim.controller import make_gait, save_gains
-from hexapod_cosim.cosim.export.plant_export import export_controller
-from hexapod_cosim.cosim.interface.controller_interface import (
+from hexapod_cosim.cosim.export.plant import export_controller
+from hexapod_cosim.cosim.export.validation import find_problems
+from hexapod_cosim.cosim.interface.controller import (
     ControllerSetup,
 )
 from hexapod_cosim.cosim.interface.names import joint_names
@@ -25,7 +26,6 @@ from hexapod_cosim.cosim.master.fmu import Fmu
 from hexapod_cosim.cosim.master.sensors import MEASURED
 from hexapod_cosim.cosim.master.signals import COMMANDED, COMMANDS
 from hexapod_cosim.cosim.run.controller_setup import make_setup
-from hexapod_cosim.cosim.validate.validation import find_problems
 from hexapod_cosim.models import LEG_NAMES, FmuError, HexapodError, load_robot
 
 

@@ -15,8 +15,8 @@ from gains import PERIOD, make_gains
 
 from hexapod_cosim.controller import BodyCommand, Measurement, make_gait
 from hexapod_cosim.cosim.control.fmu_law import law_of_ours
-from hexapod_cosim.cosim.export.plant_export import export_controller
-from hexapod_cosim.cosim.interface.controller_interface import (
+from hexapod_cosim.cosim.export.plant import export_controller
+from hexapod_cosim.cosim.interface.controller import (
     ControllerSetup,
     controller_parameters,
 )

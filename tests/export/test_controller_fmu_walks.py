@@ -10,7 +10,7 @@ from controller_fmus import ANGLE, SPEED, packed, setup_for
 
 from hexapod_cosim.controller import BodyCommand, JointCommand, Measurement
 from hexapod_cosim.cosim.control.fmu_law import law_of_ours
-from hexapod_cosim.cosim.interface.controller_interface import (
+from hexapod_cosim.cosim.interface.controller import (
     ControllerSetup,
 )
 from hexapod_cosim.cosim.interface.names import vector_names
@@ -20,8 +20,8 @@ from hexapod_cosim.cosim.master.recorder import Recorder, Recording
 from hexapod_cosim.cosim.master.sensors import errors_of
 from hexapod_cosim.cosim.master.signals import COMMANDED, Signals
 from hexapod_cosim.cosim.run.plant import open_plant
+from hexapod_cosim.cosim.scenario.reading import load_scenario
 from hexapod_cosim.cosim.scenario.records import Scenario
-from hexapod_cosim.cosim.scenario.scenario import load_scenario
 from hexapod_cosim.cosim.scenario.schedule import make_schedule
 
 ACCELERATION = 3e-12  # of what turns a servo's largest speed round within a period

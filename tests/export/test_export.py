@@ -18,11 +18,11 @@ import pytest
 from fmi_plant import ATHENA, OK, Plant
 
 from hexapod_cosim.cosim.common import plant_files
-from hexapod_cosim.cosim.export.plant_export import export_fmu
+from hexapod_cosim.cosim.export.plant import export_fmu
 from hexapod_cosim.cosim.export.reference import FOLDER, MANIFEST
 from hexapod_cosim.cosim.export.start_values import checksum, start_values
 from hexapod_cosim.cosim.interface.model_description import render_fmi2
-from hexapod_cosim.cosim.interface.plant_interface import load_interface
+from hexapod_cosim.cosim.interface.plant import load_interface
 from hexapod_cosim.models.errors import HexapodError
 from hexapod_cosim.models.records import Robot
 from hexapod_cosim.models.robot import load_robot

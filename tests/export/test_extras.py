@@ -19,9 +19,9 @@ from fmi_plant import ATHENA
 from PIL import Image
 
 from hexapod_cosim.cosim.export.extras import ICON_SIZE, PICTURE_SIZE, pictures
-from hexapod_cosim.cosim.export.plant_export import export_fmu
+from hexapod_cosim.cosim.export.plant import export_fmu
 from hexapod_cosim.cosim.export.reference import FOLDER, OUTPUTS
-from hexapod_cosim.cosim.interface.plant_interface import load_interface
+from hexapod_cosim.cosim.interface.plant import load_interface
 from hexapod_cosim.cosim.interface.terminals import render_terminals
 from hexapod_cosim.models import list_robots, load_robot
 

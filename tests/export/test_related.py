@@ -6,7 +6,7 @@ import zipfile
 from pathlib import Path
 from xml.etree import ElementTree
 
-from hexapod_cosim.cosim.export.plant_export import export_fmu
+from hexapod_cosim.cosim.export.plant import export_fmu
 from hexapod_cosim.cosim.export.reference import FOLDER, MANIFEST, OUTPUTS
 from hexapod_cosim.models import load_robot
 

@@ -17,7 +17,7 @@ from gains import PERIOD, make_gains
 
 from hexapod_cosim.controller import make_gait
 from hexapod_cosim.cosim.export.robot_package import CONTROLLER, PLANT, export_package, read_values
-from hexapod_cosim.cosim.interface.controller_interface import ControllerSetup
+from hexapod_cosim.cosim.interface.controller import ControllerSetup
 from hexapod_cosim.cosim.master.sensors import MEASURED
 from hexapod_cosim.cosim.master.signals import ACCELERATION, COMMANDED
 from hexapod_cosim.models import FmuError, HexapodError, load_robot

@@ -15,7 +15,7 @@ from feed_through import FOOT, JOINT, make_feed_through
 from fmpy.ssp.ssd import read_ssd, read_ssv
 
 from hexapod_cosim.cosim.common.plant_files import fmi2_platform
-from hexapod_cosim.cosim.export.plant_export import export_fmu
+from hexapod_cosim.cosim.export.plant import export_fmu
 from hexapod_cosim.cosim.export.ssp import (
     KINDS,
     PREFIXES,

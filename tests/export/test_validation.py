@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 from command import Call
 
-from hexapod_cosim.cosim.export.plant_export import export_fmu
-from hexapod_cosim.cosim.validate.validation import find_problems, result_problems
+from hexapod_cosim.cosim.export.plant import export_fmu
+from hexapod_cosim.cosim.export.validation import find_problems, result_problems
 from hexapod_cosim.models import load_robot
 
 Members = dict[str, bytes]

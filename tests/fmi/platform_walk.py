@@ -27,7 +27,7 @@ from hexapod_cosim.cosim.export.cross_build import (
 )
 from hexapod_cosim.cosim.master.fmu import Fmu
 from hexapod_cosim.cosim.run.single_run import simulate
-from hexapod_cosim.cosim.scenario.scenario import load_scenario
+from hexapod_cosim.cosim.scenario.reading import load_scenario
 
 WALKER = Path(__file__).resolve().parents[1] / "native" / "walker.c"
 ARM_LIBRARIES = Path("/usr/aarch64-linux-gnu")

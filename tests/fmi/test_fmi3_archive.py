@@ -20,7 +20,7 @@ from fmi_plant import ATHENA, ERROR, MODEL_EXCHANGE, OK, Plant
 from lxml import etree
 from numpy.typing import NDArray
 
-from hexapod_cosim.cosim.export.plant_export import export_fmu
+from hexapod_cosim.cosim.export.plant import export_fmu
 from hexapod_cosim.models.robot import load_robot
 
 SCHEMAS = Path(fmpy.__file__).parent / "schema" / "fmi3"

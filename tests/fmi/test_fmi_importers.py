@@ -17,7 +17,7 @@ from fmi_plant import ATHENA, ERROR, LAST_SUCCESSFUL_TIME, OK, WARNING, Callback
 
 from hexapod_cosim.cosim.export.start_values import start_values
 from hexapod_cosim.cosim.interface.model_description import render_fmi2
-from hexapod_cosim.cosim.interface.plant_interface import load_interface
+from hexapod_cosim.cosim.interface.plant import load_interface
 from hexapod_cosim.models.robot import load_robot
 
 H = 0.01  # s

@@ -15,7 +15,7 @@ import pytest
 from fmi_plant import ATHENA, GUID
 
 from hexapod_cosim.cosim.interface.model_description import render_fmi2
-from hexapod_cosim.cosim.interface.plant_interface import load_interface
+from hexapod_cosim.cosim.interface.plant import load_interface
 from hexapod_cosim.models.errors import HexapodError
 from hexapod_cosim.models.robot import load_robot
 

@@ -25,7 +25,7 @@ from platform_walk import (
 )
 
 from hexapod_cosim.cosim.export.cross_build import TARGETS, build_library
-from hexapod_cosim.cosim.export.plant_export import export_fmu
+from hexapod_cosim.cosim.export.plant import export_fmu
 from hexapod_cosim.cosim.export.platforms import component_library as library_to_build
 from hexapod_cosim.models import Robot, load_robot
 from hexapod_cosim.models.ground.table import read_terrain

@@ -17,7 +17,7 @@ from plant import Plant
 from states import changed
 
 from hexapod_cosim.cosim.run.single_run import simulate
-from hexapod_cosim.cosim.scenario.scenario import load_scenario
+from hexapod_cosim.cosim.scenario.reading import load_scenario
 from hexapod_cosim.models import Leg, Link, Robot, load_robot
 from hexapod_cosim.models.dynamics import Command
 

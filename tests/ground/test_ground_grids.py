@@ -7,11 +7,11 @@ from pathlib import Path
 
 import pytest
 
-from hexapod_cosim.cosim.export.plant_export import export_fmu
+from hexapod_cosim.cosim.export.plant import export_fmu
 from hexapod_cosim.cosim.results.result import Result
+from hexapod_cosim.cosim.run.runner import Runner
 from hexapod_cosim.cosim.run.single_run import simulate
-from hexapod_cosim.cosim.run.walker import Walker
-from hexapod_cosim.cosim.scenario.scenario import load_scenario
+from hexapod_cosim.cosim.scenario.reading import load_scenario
 from hexapod_cosim.models import load_robot
 from hexapod_cosim.models.ground.table import make_surface
 
@@ -37,7 +37,7 @@ def test_a_packed_grid_a_given_fmu_and_the_compiled_loop_give_the_same_figures(
     fmu = export_fmu(load_robot("athena"), tmp_path / "two.fmu", terrains=surfaces)
     own, given = walk(*RUBBLE), walk(*RUBBLE, fmu=fmu)
     assert figures(own) == figures(given)
-    with Walker() as walker:
+    with Runner() as runner:
         scenario = load_scenario("walk_flat", overrides=["duration=4", *RUBBLE])
-        compiled = walker.simulate(scenario)
+        compiled = runner.simulate(scenario)
     assert figures(compiled) == pytest.approx(figures(own), rel=1e-6)

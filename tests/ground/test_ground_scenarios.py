@@ -16,7 +16,7 @@ from hexapod_cosim.cosim.master.recorder import Recording
 from hexapod_cosim.cosim.report.relief import write_heights
 from hexapod_cosim.cosim.results.warnings import off_map_warnings, overlap_warnings
 from hexapod_cosim.cosim.results.window import body_height
-from hexapod_cosim.cosim.scenario.scenario import load_scenario, scenario_from_table, scenario_robot
+from hexapod_cosim.cosim.scenario.reading import load_scenario, scenario_from_table, scenario_robot
 from hexapod_cosim.models import LEG_NAMES, ScenarioError
 from hexapod_cosim.models.ground.grid_file import grid_bytes
 from hexapod_cosim.models.ground.surface import Surface

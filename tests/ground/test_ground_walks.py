@@ -8,9 +8,9 @@ from pathlib import Path
 
 import pytest
 
+from hexapod_cosim.cosim.run.runner import Runner
 from hexapod_cosim.cosim.run.single_run import simulate
-from hexapod_cosim.cosim.run.walker import Walker
-from hexapod_cosim.cosim.scenario.scenario import load_scenario
+from hexapod_cosim.cosim.scenario.reading import load_scenario
 
 CONTROLS = ("kinematic", "compliant")  # the paper's control does not climb the stairs
 ENERGY = 1e-4  # of the motors' work
@@ -20,15 +20,15 @@ WAYS = {"stairs": 0.78, "rubble": 0.6, "stones": 0.6, "dune": 1.08, "ramp": 1.38
 
 
 @pytest.fixture(scope="module")
-def walker(plant_build: Path) -> Iterator[Walker]:
-    with Walker() as made:
+def runner(plant_build: Path) -> Iterator[Runner]:
+    with Runner() as made:
         yield made
 
 
 @pytest.mark.parametrize("name", WAYS)
 @pytest.mark.parametrize("control", CONTROLS)
-def test_both_controls_walk_it_upright(walker: Walker, name: str, control: str) -> None:
-    result = walker.simulate(load_scenario(name, overrides=["control=compliant"]))
+def test_both_controls_walk_it_upright(runner: Runner, name: str, control: str) -> None:
+    result = runner.simulate(load_scenario(name, overrides=["control=compliant"]))
     walk = result.facts.walk
     assert result.completed
     assert walk.upright

@@ -13,14 +13,17 @@ from pathlib import Path
 import pytest
 
 from hexapod_cosim.cosim.common.plant_files import fmi_headers
-from hexapod_cosim.cosim.master import loop_library, native_loop
-from hexapod_cosim.cosim.master.loop_library import HEADERS, ORDER, read_headers
+from hexapod_cosim.cosim.master import loop_library
+from hexapod_cosim.cosim.master.loop_library import HEADERS, ORDER
 from hexapod_cosim.extensions.gym import batch, native
 from hexapod_cosim.extensions.gym.settings import BLOCKS, REASONS, TERMS
 from hexapod_cosim.models import FmuError
 
 ROOT = Path(__file__).parents[2]
-HEADER = read_headers(native.HEADER)
+HEADER = native.HEADER
+STRUCTURES = {
+    name: kind for name, kind in HEADER.types.items() if kind and issubclass(kind, ctypes.Structure)
+}
 
 
 def compile_c(text: str, *options: str | Path, folder: Path) -> None:
@@ -34,8 +37,8 @@ def compile_c(text: str, *options: str | Path, folder: Path) -> None:
 
 
 def test_python_reads_the_sizes_and_places_of_the_compiler(tmp_path: Path) -> None:
-    lines = [f'#include "hexapod/{name}"' for name in (*ORDER, native.HEADER.name)]
-    for name, structure in HEADER.structures.items():
+    lines = [f'#include "hexapod/{name}"' for name in (*ORDER, native.PATH.name)]
+    for name, structure in STRUCTURES.items():
         lines.append(f'_Static_assert(sizeof({name}) == {ctypes.sizeof(structure)}, "{name}");')
         lines += [
             f"_Static_assert(offsetof({name}, {member}) == {getattr(structure, member).offset} && "
@@ -44,11 +47,12 @@ def test_python_reads_the_sizes_and_places_of_the_compiler(tmp_path: Path) -> No
             for member, _ in structure._fields_
         ]
     lines += [
-        f'_Static_assert({name} == {number}, "{name}");' for name, number in HEADER.numbers.items()
+        f'_Static_assert({name} == {number}, "{name}");'
+        for name, number in HEADER.constants.items()
     ]
     folders = [
         HEADERS.parent,
-        native.HEADER.parents[1],
+        native.PATH.parents[1],
         ROOT / "plant_fmu" / "include",
         fmi_headers(),
     ]
@@ -64,14 +68,14 @@ def test_python_lists_the_names_of_the_header_in_their_order() -> None:
         "HX_AUTORESET_": batch.AUTORESET,
     }
     for prefix, expected in names.items():
-        found = [name for name in HEADER.numbers if name.startswith(prefix)]
+        found = [name for name in HEADER.constants if name.startswith(prefix)]
         assert tuple(name.removeprefix(prefix).lower() for name in found) == expected
 
 
 @pytest.mark.parametrize(
     ("part", "size", "structure", "load"),
     [
-        ("master", "hx_master_size", "hxMaster", native_loop._library.__wrapped__),
+        ("master", "hx_master_size", "hxMaster", loop_library.master_library.__wrapped__),
         (
             "environments",
             "hx_environments_settings_size",
@@ -88,8 +92,8 @@ def test_a_library_with_another_layout_is_refused(
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    bytes_ = ctypes.sizeof(HEADER.structures[structure])
-    number = HEADER.numbers[f"HX_{part.upper()}_LAYOUT"]
+    bytes_ = ctypes.sizeof(STRUCTURES[structure])
+    number = HEADER.constants[f"HX_{part.upper()}_LAYOUT"]
     sized = "unsigned long {}(void) {{ return {}; }} int hx_{}_layout(void) {{ return {}; }}"
     cases = {
         "layout 0 of 0 bytes": "int other;",

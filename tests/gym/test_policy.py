@@ -10,22 +10,23 @@ import numpy as np
 import pytest
 from command import Call
 
-from hexapod_cosim.cosim.export.plant_export import export_interface
+from hexapod_cosim.cosim.export.plant import export_interface
+from hexapod_cosim.cosim.export.validation import find_problems
 from hexapod_cosim.cosim.interface.names import joint_names, vector_names
 from hexapod_cosim.cosim.master.fmu import Fmu
-from hexapod_cosim.cosim.validate.validation import find_problems
 from hexapod_cosim.extensions.gym.batch import Batch
-from hexapod_cosim.extensions.gym.interface import load_policy_interface, standing_policy
 from hexapod_cosim.extensions.gym.policy import (
     FREE_SIZE,
     INPUTS,
     Policy,
     action_mirror,
     load_policy,
+    load_policy_interface,
     observation_mirror,
+    standing_policy,
     symmetric_weights,
 )
-from hexapod_cosim.extensions.gym.tasks import task
+from hexapod_cosim.extensions.gym.settings import task
 from hexapod_cosim.extensions.gym.train import Progress, TrainSettings, train, training_settings
 from hexapod_cosim.models import HexapodError, load_robot
 

@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 import hexapod_cosim
-from hexapod_cosim.cosim.export.plant_export import export_fmu
+from hexapod_cosim.cosim.export.plant import export_fmu
 from hexapod_cosim.cosim.interface.names import joint_names, vector_names
-from hexapod_cosim.cosim.interface.plant_interface import plant_roots
+from hexapod_cosim.cosim.interface.plant import plant_roots
 from hexapod_cosim.cosim.master.recorder import Recording
 from hexapod_cosim.extensions.identify.experiment import JOINTS, Experiment, of_point, readings
 from hexapod_cosim.extensions.identify.log import ATTITUDE, CHANNELS, Log, log_of

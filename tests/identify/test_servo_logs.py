@@ -13,7 +13,7 @@ import pytest
 import tomlkit
 from secret_robots import NOISE, SEEN, Secret, secret_robot
 
-from hexapod_cosim.cosim.export.plant_export import export_fmu
+from hexapod_cosim.cosim.export.plant import export_fmu
 from hexapod_cosim.extensions.identify.experiment import Experiment
 from hexapod_cosim.extensions.identify.fitting.judging import fit
 from hexapod_cosim.extensions.identify.fitting.misfit import DETERMINED

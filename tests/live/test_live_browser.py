@@ -157,9 +157,9 @@ def test_gait_control_friction_and_ground_are_changed(live: LivePage) -> None:
     live.until("document.getElementById('friction-value').textContent === '0.40'")
     placed = live.value("frame.placed")
     live.page.select_option("#ground", "stairs")
-    live.until(f"frame.placed > {placed} && frame.seconds > 0.1")
+    live.until(f"frame.placed > {placed} && frame.time > 0.1")
     live.page.select_option("#ground", "scenario")
-    live.until(f"frame.placed > {placed} + 1 && frame.seconds > 0.1")
+    live.until(f"frame.placed > {placed} + 1 && frame.time > 0.1")
     assert live.errors == []
 
 
@@ -167,7 +167,7 @@ def test_a_recording_is_saved(live: LivePage, tmp_path: Path) -> None:
     live.page.click("[data-do=record]")
     live.page.wait_for_selector("html[data-mode=recording]")
     live.page.keyboard.down("w")
-    live.until("frame.seconds > 1 && frame.command[0] > 0")
+    live.until("frame.time > 1 && frame.command[0] > 0")
     live.page.keyboard.up("w")
     live.until("frame.command[0] === 0")
     live.page.click("[data-do=record]")

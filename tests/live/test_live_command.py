@@ -10,7 +10,7 @@ from gains import make_gains
 
 from hexapod_cosim.controller import Gains
 from hexapod_cosim.cosim.run import preparation
-from hexapod_cosim.cosim.scenario.scenario import load_scenario
+from hexapod_cosim.cosim.scenario.reading import load_scenario
 from hexapod_cosim.extensions.live import realtime, server
 from hexapod_cosim.extensions.live.settings import Choices
 from hexapod_cosim.models import HexapodError, Robot

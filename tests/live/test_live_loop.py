@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 from gains import make_gains
 
-from hexapod_cosim.cosim.scenario.scenario import load_scenario, scenario_from_table
+from hexapod_cosim.cosim.scenario.reading import load_scenario, scenario_from_table
 from hexapod_cosim.extensions.live.loop import Loop
 from hexapod_cosim.extensions.live.messages import Action, Change, Drive, Push
 from hexapod_cosim.extensions.live.robot import LiveRobot
@@ -101,7 +101,7 @@ def test_a_page_gets_settings_once_and_fifty_frames_a_second(loop: Loop, side: S
     assert [status["settings"]["gait"] for status in side.all("status")] == ["tripod"]
     assert len(frames) == 50
     assert sum(frames[0]["force"][2::3]) == pytest.approx(1.0, abs=0.02)  # body weights
-    assert frames[-1]["factor"] == pytest.approx(1.0)
+    assert frames[-1]["late"]["factor"] == pytest.approx(1.0)
 
 
 def test_the_last_drive_moves_the_robot_until_its_page_falls_silent(loop: Loop, side: Side) -> None:
@@ -141,7 +141,7 @@ def test_a_gap_of_wall_time_is_shown_and_not_made_up(loop: Loop, side: Side) -> 
     before = side.time
     turn(loop, 100)
     assert side.time - before == pytest.approx(0.5, abs=0.02)
-    assert side.last("frame")["skipped"] == pytest.approx(30.0, abs=0.02)
+    assert side.last("frame")["late"]["skipped"] == pytest.approx(30.0, abs=0.02)
 
 
 def test_why_a_change_was_refused_is_shown_and_nothing_changes(loop: Loop, side: Side) -> None:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from command import Call
 
-from hexapod_cosim.cosim.scenario.scenario import load_scenario
+from hexapod_cosim.cosim.scenario.reading import load_scenario
 from hexapod_cosim.extensions.live.realtime import (
     StepTimes,
     facts_of,

@@ -18,10 +18,10 @@ from hexapod_cosim.cosim.master.fmu import Fmu
 from hexapod_cosim.cosim.run.plan import RunPlan
 from hexapod_cosim.cosim.run.plant import initialise_plant
 from hexapod_cosim.cosim.run.preparation import chosen_gains
-from hexapod_cosim.cosim.run.walker import Walker
+from hexapod_cosim.cosim.run.runner import Runner
 from hexapod_cosim.cosim.scenario.reach import check_commands
+from hexapod_cosim.cosim.scenario.reading import load_scenario, scenario_from_table
 from hexapod_cosim.cosim.scenario.records import Command
-from hexapod_cosim.cosim.scenario.scenario import load_scenario, scenario_from_table
 from hexapod_cosim.extensions.live import robot as live_robot
 from hexapod_cosim.extensions.live.messages import Change, Drive
 from hexapod_cosim.extensions.live.recording import NO_FORCE, Recording
@@ -75,8 +75,8 @@ def go(robot: LiveRobot, steps: int, command: BodyCommand = WALK) -> NDArray[np.
 
 def test_a_live_walk_is_the_walk_of_simulate_bit_for_bit(placed: LiveRobot) -> None:
     scenario = load_scenario("walk_flat", overrides=["duration=1.0"])
-    with Walker(everything=True) as walker:
-        recording = walker.simulate(scenario).outcome.recording
+    with Runner(everything=True) as runner:
+        recording = runner.simulate(scenario).outcome.recording
     for row in range(200):
         present = value(placed, *recording.names[1:10])
         np.testing.assert_array_equal(present, recording.data[row, 1:10])
@@ -219,8 +219,8 @@ def test_a_recording_with_a_push_is_the_same_walk(placed: LiveRobot) -> None:
     assert scenario.duration == pytest.approx(300 * 0.005)
     assert len(scenario.commands) == 3
     assert [push.force for push in scenario.pushes] == [(0.0, 3.0, 1.0)]
-    with Walker(everything=True) as walker:
-        walked = walker.simulate(scenario).outcome.recording
+    with Runner(everything=True) as runner:
+        walked = runner.simulate(scenario).outcome.recording
     # the push is a mean over a macro-step, whose times are rounded
     end = walked.columns(vector_names("torso.position"))[-1]
     np.testing.assert_allclose(end, place_of(placed), rtol=0.0, atol=1e-9)
@@ -239,8 +239,8 @@ def test_a_recording_under_compliant_control_on_rubble_repeats_bit_for_bit() -> 
         names = [*vector_names("torso.position"), *joint_names("angle"), *joint_names("speed")]
         end = value(robot, *names)
     saved = scenario_from_table(parse_toml(recording.as_toml()), where="driven.toml")
-    with Walker(everything=True) as walker:
-        walked = walker.simulate(saved).outcome.recording
+    with Runner(everything=True) as runner:
+        walked = runner.simulate(saved).outcome.recording
     np.testing.assert_array_equal(walked.columns(names)[-1], end)
 
 

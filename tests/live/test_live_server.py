@@ -15,7 +15,7 @@ import pytest
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import connect
 
-from hexapod_cosim.cosim.scenario.scenario import load_scenario
+from hexapod_cosim.cosim.scenario.reading import load_scenario
 from hexapod_cosim.extensions.live.hub import BURST, MOST_CLIENTS, Client, Hub
 from hexapod_cosim.extensions.live.messages import MessageError
 from hexapod_cosim.extensions.live.server import LiveError, LiveServer
@@ -158,7 +158,7 @@ def test_what_is_recorded_can_be_fetched(running: Running) -> None:
     with running.socket() as opened:
         opened.send(json.dumps({"type": "do", "action": "record"}))
         until(opened, lambda m: m["type"] == "status" and m["recording"])
-        until(opened, lambda m: is_frame(m) and m["seconds"] > 0.1)
+        until(opened, lambda m: is_frame(m) and m["time"] > 0.1)
         opened.send(json.dumps({"type": "do", "action": "stop"}))
         until(opened, lambda m: m["type"] == "status" and m["recorded"])
     code, text, headers = running.get(f"/{running.token}/scenario.toml")
@@ -183,8 +183,8 @@ def test_a_page_that_misbehaves_is_closed_and_another_one_goes_on(
             for _ in range(count):
                 bad.send(text)
         assert closing(bad)[0] == code
-        steps = until(calm, is_frame)["steps"]
-        assert until(calm, lambda m: is_frame(m) and m["steps"] > steps + 20)
+        steps = until(calm, is_frame)["late"]["steps"]
+        assert until(calm, lambda m: is_frame(m) and m["late"]["steps"] > steps + 20)
 
 
 def test_a_page_too_many_is_refused(running: Running) -> None:

@@ -155,12 +155,12 @@ def test_control_friction_and_place_answer(page: Any) -> None:
 
 def test_an_error_of_any_kind_is_shown_as_the_fault_and_ends_with_a_new_start(page: Any) -> None:
     page.evaluate(
-        "() => { window.hexapod.link.robot.do = () => { throw new RangeError('no memory left') } }"
+        "() => { window.hexapod.link.do = () => { throw new RangeError('no memory left') } }"
     )
     page.wait_for_selector("#fault:not([hidden])")
     assert page.inner_text("#fault-text") == "RangeError: no memory left"
     assert page.inner_text("#fault-title").startswith("The plant has stopped.")
-    page.evaluate("delete window.hexapod.link.robot.do")
+    page.evaluate("delete window.hexapod.link.do")
     page.click("[data-do=place]")
     page.wait_for_selector("#fault", state="hidden")
     page.wait_for_function(f"{FRAME}.time > 0.2")

@@ -16,8 +16,8 @@ from disguised_urdf import disguised, stances
 from foreign_urdf import SIDE, spider_table, spider_urdf
 
 from hexapod_cosim.cosim.master.recorder import Recording
+from hexapod_cosim.cosim.results.folder import RESULTS
 from hexapod_cosim.cosim.results.recordings import read_recording
-from hexapod_cosim.cosim.results.results import RESULTS
 from hexapod_cosim.models import LEG_NAMES, RobotError, list_robots, load_robot
 
 # m; the robots differ in the last bits of some inertias, which contacts amplify over seconds

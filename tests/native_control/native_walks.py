@@ -17,7 +17,7 @@ from hexapod_cosim.controller import (
     Parts,
     make_gait,
 )
-from hexapod_cosim.cosim.interface.controller_interface import ControllerSetup
+from hexapod_cosim.cosim.interface.controller import ControllerSetup
 from hexapod_cosim.models import load_robot
 
 ALL_PARTS = Parts()

@@ -15,8 +15,8 @@ from states import changed
 
 from hexapod_cosim.controller import BodyCommand, Controller, Measurement, make_gait
 from hexapod_cosim.cosim.master.recorder import Recording
-from hexapod_cosim.cosim.run.walker import Walker
-from hexapod_cosim.cosim.scenario.scenario import load_scenario
+from hexapod_cosim.cosim.run.runner import Runner
+from hexapod_cosim.cosim.scenario.reading import load_scenario
 from hexapod_cosim.models import Robot, load_robot
 from hexapod_cosim.models.dynamics import Command
 from hexapod_cosim.models.statics import settled
@@ -54,8 +54,8 @@ def recorded(robot: str, duration: float) -> Recording:
     overrides = ["control=kinematic", f"robot={robot}", "command.vx=0.08"]
     overrides += [f"duration={duration}", "outputs.interval=1"]
     scenario = load_scenario("walk_flat", overrides=overrides)
-    with Walker(everything=True) as walker:
-        result = walker.simulate(scenario)
+    with Runner(everything=True) as runner:
+        result = runner.simulate(scenario)
     assert result.completed
     assert result.outcome.recording.time[-1] == pytest.approx(duration)
     return result.outcome.recording

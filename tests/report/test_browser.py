@@ -15,7 +15,7 @@ import pytest
 from browser import FLAGS, FULL, Launcher, Opened, find_chromium, launcher
 
 from hexapod_cosim.cosim.cli import main
-from hexapod_cosim.cosim.results.results import read_result
+from hexapod_cosim.cosim.results.folder import read_result
 from hexapod_cosim.cosim.results.window import robot_weight
 from hexapod_cosim.models import LEG_NAMES, load_robot
 from hexapod_cosim.models.kinematics import foot_positions, rotation_matrix

@@ -11,12 +11,12 @@ import numpy as np
 import pytest
 from browser import FLAGS, Opened, find_chromium, launcher
 
-from hexapod_cosim.cosim.report.report import write_report
+from hexapod_cosim.cosim.report.writing import write_report
+from hexapod_cosim.cosim.results.folder import StoredResult, stored_result
 from hexapod_cosim.cosim.results.footprints import find_footprints
-from hexapod_cosim.cosim.results.results import StoredResult, stored_result
 from hexapod_cosim.cosim.results.window import GRID
 from hexapod_cosim.cosim.run.single_run import simulate
-from hexapod_cosim.cosim.scenario.scenario import load_scenario
+from hexapod_cosim.cosim.scenario.reading import load_scenario
 from hexapod_cosim.models import LEG_NAMES
 from hexapod_cosim.models.ground.surface import Surface
 from hexapod_cosim.models.ground.table import make_surface

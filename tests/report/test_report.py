@@ -16,7 +16,7 @@ from command import Call
 
 from hexapod_cosim.cosim.common.files import write_json
 from hexapod_cosim.cosim.master.loop import COMPLETED
-from hexapod_cosim.cosim.report import report
+from hexapod_cosim.cosim.report import writing
 from hexapod_cosim.cosim.report.headline import cards, creep_note, headline, plain_headline
 from hexapod_cosim.cosim.results.comparison import Comparison, compare_runs
 from hexapod_cosim.cosim.results.drop import Bounce, Drop
@@ -227,7 +227,7 @@ def test_a_drop_is_described_by_its_restitution() -> None:
 def test_without_the_viewer_a_report_has_its_tables_and_says_how_to_get_the_rest(
     call: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(report, "viewer_script", lambda: None)
+    monkeypatch.setattr(writing, "viewer_script", lambda: None)
     code, _, _ = call("simulate", "stand", "-o", tmp_path / "out", "--set", "duration=0.2")
     page = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
     assert code == 0

@@ -11,7 +11,7 @@ from command import Call
 from walks import PARAMETERS, PERIOD, Walk
 
 from hexapod_cosim.cosim.report.servos import servo_rows
-from hexapod_cosim.cosim.results.results import StoredResult
+from hexapod_cosim.cosim.results.folder import StoredResult
 from hexapod_cosim.cosim.results.window import View
 
 

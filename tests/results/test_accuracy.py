@@ -25,8 +25,8 @@ from hexapod_cosim.cosim.results.accuracy import (
 from hexapod_cosim.cosim.results.metrics import METRICS
 from hexapod_cosim.cosim.results.summary import Summary
 from hexapod_cosim.cosim.run.batch import run_batch
+from hexapod_cosim.cosim.scenario.reading import load_scenario
 from hexapod_cosim.cosim.scenario.records import Scenario
-from hexapod_cosim.cosim.scenario.scenario import load_scenario
 
 CYCLES = ("duration=2.4", "gait.period=0.8")  # the shortest walk with metrics
 SOLVER_METRICS = [name for name in METRICS if name != "realtime_factor"]

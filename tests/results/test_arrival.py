@@ -9,12 +9,12 @@ import pytest
 
 from hexapod_cosim.cosim.master.loop import COMPLETED
 from hexapod_cosim.cosim.report.headline import headline
-from hexapod_cosim.cosim.report.report import comparison_rows
+from hexapod_cosim.cosim.report.writing import comparison_rows
 from hexapod_cosim.cosim.results.arrival import missed_end
 from hexapod_cosim.cosim.results.comparison import compare_runs, read_seeds, write_seeds
-from hexapod_cosim.cosim.results.comparisons import compare_all
 from hexapod_cosim.cosim.results.metrics import METRICS
 from hexapod_cosim.cosim.results.summary import Summary
+from hexapod_cosim.cosim.results.uncertainty import compare_all
 
 STUCK = "the robot did not arrive: it missed the end by 5.5 m per metre walked"
 

@@ -12,7 +12,7 @@ import pytest
 from scipy import stats
 
 from hexapod_cosim.cosim.master.loop import COMPLETED, FAILED
-from hexapod_cosim.cosim.report.report import about, comparison_rows
+from hexapod_cosim.cosim.report.writing import about, comparison_rows
 from hexapod_cosim.cosim.results.comparison import (
     BETTER,
     SAME,
@@ -23,9 +23,9 @@ from hexapod_cosim.cosim.results.comparison import (
     read_seeds,
     write_seeds,
 )
-from hexapod_cosim.cosim.results.comparisons import Comparisons, compare_all
 from hexapod_cosim.cosim.results.metrics import METRICS
 from hexapod_cosim.cosim.results.summary import NO_FIGURES, REFUSED, Summary
+from hexapod_cosim.cosim.results.uncertainty import Comparisons, compare_all
 from hexapod_cosim.models import HexapodError
 
 ROUNDING = 1e-12

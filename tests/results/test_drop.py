@@ -7,7 +7,7 @@ import pytest
 
 from hexapod_cosim.cosim.results.drop import Bounce, Drop
 from hexapod_cosim.cosim.run.single_run import simulate
-from hexapod_cosim.cosim.scenario.scenario import load_scenario
+from hexapod_cosim.cosim.scenario.reading import load_scenario
 
 STIFF = "contact.stiffness=1e9"  # the weight acts for too short a time to matter
 NEAR = 5e-3  # of the restitution: what is left of the weight's part

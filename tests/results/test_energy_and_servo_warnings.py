@@ -6,9 +6,9 @@ import pytest
 from walks import PARAMETERS, PERIOD, ROBOT, Walk
 
 from hexapod_cosim.cosim.master.loop import COMPLETED
-from hexapod_cosim.cosim.results.comparisons import compare_all
 from hexapod_cosim.cosim.results.metrics import METRICS
 from hexapod_cosim.cosim.results.summary import Summary
+from hexapod_cosim.cosim.results.uncertainty import compare_all
 from hexapod_cosim.cosim.results.warnings import energy_warnings, servo_warnings, walk_warnings
 from hexapod_cosim.cosim.results.window import View
 

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from hexapod_cosim.cosim.run.walker import Walker
+from hexapod_cosim.cosim.run.runner import Runner
 from hexapod_cosim.cosim.scenario.bundled import list_scenarios
-from hexapod_cosim.cosim.scenario.scenario import load_scenario
+from hexapod_cosim.cosim.scenario.reading import load_scenario
 
 STANDING = ("stand", "compliant")  # 0.14 J of work in all, of which 0.3 mJ are missing
 # held joints have no compliant control
@@ -22,20 +22,20 @@ FAST = ("solver.method=ros2", "solver.tolerance=0.1")
 
 
 @pytest.fixture(scope="module")
-def walker(plant_build: Path) -> Iterator[Walker]:
-    with Walker() as made:
+def runner(plant_build: Path) -> Iterator[Runner]:
+    with Runner() as made:
         yield made
 
 
 @pytest.mark.parametrize("name", ["rubble", "push", "turn"])
-def test_the_energy_balance_of_the_other_robot_closes_too(walker: Walker, name: str) -> None:
+def test_the_energy_balance_of_the_other_robot_closes_too(runner: Runner, name: str) -> None:
     scenario = load_scenario(name, overrides=["control=kinematic", "robot=phantomx_mk4"])
-    assert walker.simulate(scenario).metrics["energy_residual"] < 1e-4
+    assert runner.simulate(scenario).metrics["energy_residual"] < 1e-4
 
 
 @pytest.mark.parametrize(("name", "control"), WALKS)
 def test_the_energy_balance_of_every_bundled_scenario_closes(
-    walker: Walker, name: str, control: str
+    runner: Runner, name: str, control: str
 ) -> None:
     """The residual is below 1e-4 of the motors' gross work with the default solver and 1e-3 at the
     fastest setting. On soil it is up to 2e-2 there, and below 1e-3 at a tenth of its tolerance. A
@@ -44,7 +44,7 @@ def test_the_energy_balance_of_every_bundled_scenario_closes(
 
     def missing(*solver: str) -> float:
         scenario = load_scenario(name, overrides=[f"control={control}", *solver])
-        return walker.simulate(scenario).metrics["energy_residual"]
+        return runner.simulate(scenario).metrics["energy_residual"]
 
     if (name, control) != STANDING:
         assert missing() < 1e-4
@@ -52,7 +52,7 @@ def test_the_energy_balance_of_every_bundled_scenario_closes(
     assert name not in ON_SOIL or missing("solver.method=ros2", "solver.tolerance=0.01") < 1e-3
 
 
-def test_the_residual_of_a_standing_robot_vanishes_with_the_tolerance(walker: Walker) -> None:
+def test_the_residual_of_a_standing_robot_vanishes_with_the_tolerance(runner: Runner) -> None:
     """It falls unevenly, because touch-downs of feet that settle end steps early: over three
     decades of the tolerance to a tenth at most.
     """
@@ -61,7 +61,7 @@ def test_the_residual_of_a_standing_robot_vanishes_with_the_tolerance(walker: Wa
         scenario = load_scenario(
             "stand", overrides=["control=compliant", f"solver.tolerance={tolerance}"]
         )
-        recording = walker.simulate(scenario).outcome.recording
+        recording = runner.simulate(scenario).outcome.recording
         residual.append(abs(recording.column("energy.residual")[-1]))
     assert residual[0] < 5e-4  # J
     assert residual[1] < 0.1 * residual[0]

@@ -9,7 +9,7 @@ from hexapod_cosim.cosim.results.feet import feet_of_angles
 from hexapod_cosim.cosim.results.result import Result
 from hexapod_cosim.cosim.results.window import SLOPE, real_feet
 from hexapod_cosim.cosim.run.single_run import simulate
-from hexapod_cosim.cosim.scenario.scenario import load_scenario
+from hexapod_cosim.cosim.scenario.reading import load_scenario
 from hexapod_cosim.models import foot_positions, load_robot
 
 pytestmark = pytest.mark.usefixtures("plant_build")

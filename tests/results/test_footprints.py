@@ -15,7 +15,7 @@ from hexapod_cosim.cosim.interface.names import foot_names, foot_vector_names
 from hexapod_cosim.cosim.master.recorder import Recording
 from hexapod_cosim.cosim.results.footprints import find_footprints, sinkage_warnings
 from hexapod_cosim.cosim.run.single_run import simulate
-from hexapod_cosim.cosim.scenario.scenario import load_scenario
+from hexapod_cosim.cosim.scenario.reading import load_scenario
 from hexapod_cosim.models import load_robot
 from hexapod_cosim.models.dynamics import Command
 from hexapod_cosim.models.records import Array

@@ -25,8 +25,8 @@ from hexapod_cosim.cosim.results.metrics import compute_metrics
 from hexapod_cosim.cosim.results.metrics import landing_rates as plant_rates
 from hexapod_cosim.cosim.results.window import JudgedWindow, View
 from hexapod_cosim.cosim.run.single_run import simulate
+from hexapod_cosim.cosim.scenario.reading import load_scenario
 from hexapod_cosim.cosim.scenario.records import CONTROLS
-from hexapod_cosim.cosim.scenario.scenario import load_scenario
 from hexapod_cosim.models import load_robot
 
 PERIOD, CYCLES = 0.8, 3  # s, 1

@@ -10,7 +10,7 @@ import pytest
 from walks import CYCLES, PARAMETERS, PERIOD, SERVO, WEIGHT, H, Walk
 
 from hexapod_cosim.cosim.interface.names import foot_names, joint_names
-from hexapod_cosim.cosim.report.report import metric_rows, number
+from hexapod_cosim.cosim.report.writing import metric_rows, number
 from hexapod_cosim.cosim.results.metrics import METRICS, compute_metrics
 from hexapod_cosim.cosim.results.window import View
 

@@ -17,10 +17,10 @@ from hexapod_cosim.cosim.master.recorder import Peaks, Recording
 from hexapod_cosim.cosim.results.metrics import compute_metrics
 from hexapod_cosim.cosim.results.result import Result
 from hexapod_cosim.cosim.results.window import View
+from hexapod_cosim.cosim.run.runner import Runner
 from hexapod_cosim.cosim.run.single_run import simulate
-from hexapod_cosim.cosim.run.walker import Walker
+from hexapod_cosim.cosim.scenario.reading import load_scenario
 from hexapod_cosim.cosim.scenario.records import CONTROLS, Scenario
-from hexapod_cosim.cosim.scenario.scenario import load_scenario
 from hexapod_cosim.models import load_robot
 
 FOLDED = (*foot_names("peak_force"), *foot_names("peak_force_rate"), *foot_names("landing_rate"))
@@ -67,8 +67,8 @@ def runs(request: pytest.FixtureRequest, plant_build: Path) -> tuple[Result, Res
     the loop in Python, under the others on the loop in C.
     """
     plans = [walk_of(request.param, interval) for interval in (0.0, 0.02)]
-    with Walker(everything=True) as walker:
-        run_plan = simulate if request.param == "kinematic" else walker.simulate
+    with Runner(everything=True) as runner:
+        run_plan = simulate if request.param == "kinematic" else runner.simulate
         every, coarse = (run_plan(plan, gains=gains_of(plan)) for plan in plans)
     return every, coarse
 

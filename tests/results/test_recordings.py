@@ -18,6 +18,7 @@ from fmpy.util import read_csv as fmpy_read_csv
 from hexapod_cosim.cosim.interface.descriptions import read_description
 from hexapod_cosim.cosim.master.recorder import Recording
 from hexapod_cosim.cosim.results.columns import heading, known_columns
+from hexapod_cosim.cosim.results.folder import RESULTS, read_result
 from hexapod_cosim.cosim.results.recordings import (
     read_csv,
     read_parquet,
@@ -26,7 +27,6 @@ from hexapod_cosim.cosim.results.recordings import (
     write_parquet,
     write_recording,
 )
-from hexapod_cosim.cosim.results.results import RESULTS, read_result
 from hexapod_cosim.models import HexapodError
 
 AWKWARD = [

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from walks import PARAMETERS, Walk
 
 from hexapod_cosim.cosim.interface.names import joint_names, vector_names
-from hexapod_cosim.cosim.interface.plant_interface import load_interface
+from hexapod_cosim.cosim.interface.plant import load_interface
 from hexapod_cosim.cosim.master.recorder import Recording
 from hexapod_cosim.cosim.results.support import centre_of_mass, polygon_margins, stability_margins
 from hexapod_cosim.models import LEG_NAMES, Robot, load_robot

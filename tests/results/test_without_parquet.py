@@ -8,8 +8,8 @@ import pytest
 from command import QUICK, Call, assert_refused
 
 from hexapod_cosim.cosim.common import installation
+from hexapod_cosim.cosim.results.folder import read_result
 from hexapod_cosim.cosim.results.recordings import read_parquet
-from hexapod_cosim.cosim.results.results import read_result
 from hexapod_cosim.models import HexapodError
 
 

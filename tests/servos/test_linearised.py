@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from test_measured_servos import with_servo
 
-from hexapod_cosim.cosim.design.gain_design import STANCES, level_fmu
+from hexapod_cosim.cosim.design.gains import STANCES, level_fmu
 from hexapod_cosim.cosim.design.linearise import ANGLES, linearise
 from hexapod_cosim.cosim.design.standing import rest
 from hexapod_cosim.models import load_robot

@@ -16,7 +16,7 @@ from plant import Plant, flat, inputs, probed
 from states import changed, distance, landing, lopsided, random_bodies, random_command
 from test_laws_servo import tibias, walled
 
-from hexapod_cosim.cosim.scenario.scenario import load_scenario, scenario_robot
+from hexapod_cosim.cosim.scenario.reading import load_scenario, scenario_robot
 from hexapod_cosim.models import Robot, RobotError, ScenarioError, load_robot, robot_from_table
 from hexapod_cosim.models.actuator import servo_slopes, servo_torque
 from hexapod_cosim.models.contact.geometry import standing_damping

@@ -15,7 +15,7 @@ import tomlkit
 from studies import study_of
 
 from hexapod_cosim.cosim.common.files import to_json
-from hexapod_cosim.extensions.study.bundled import list_studies
+from hexapod_cosim.extensions.study.extension import list_studies
 from hexapod_cosim.extensions.study.reading import load_study, study_from_table
 from hexapod_cosim.extensions.study.runs import Sweep
 from hexapod_cosim.extensions.study.store import columns_of

@@ -14,12 +14,12 @@ from matplotlib.figure import Figure
 from studies import KINEMATIC, replace_stored, run_quietly, study_of
 
 from hexapod_cosim.cosim.results.comparison import made_change
+from hexapod_cosim.extensions.study import figures
+from hexapod_cosim.extensions.study.figures import drawings
 from hexapod_cosim.extensions.study.groups import Figures, Mean, Point
 from hexapod_cosim.extensions.study.records import Study
-from hexapod_cosim.extensions.study.report import heat
-from hexapod_cosim.extensions.study.report.figures import drawings
 from hexapod_cosim.extensions.study.store import FIGURES
-from hexapod_cosim.extensions.study.studying import report_on
+from hexapod_cosim.extensions.study.study import report_on
 from hexapod_cosim.extensions.study.summary import Results, read_results
 from hexapod_cosim.models import load_robot
 
@@ -127,7 +127,7 @@ def test_a_cell_shows_its_slips_and_is_empty_without_a_walk() -> None:
         point(0, {"friction.mu": 0.3, "command.vx": 0.05}, {"kinematic": 0.4, "compliant": 0.1}),
         point(1, {"friction.mu": 0.3, "command.vx": 0.08}, nothing, walked=0, pairs=0),  # fell
     ]
-    figure = heat.heat_map(points, study.factors[0], study.factors[1], study)
+    figure = figures.heat_map(points, study.factors[0], study.factors[1], study)
     nan = math.nan
     for place, expected in enumerate((0.4, 0.1, -75.0)):
         np.testing.assert_allclose(shown(figure, place), [[expected, nan], [nan, nan]])
@@ -141,7 +141,7 @@ def test_the_change_of_a_cell_is_that_of_its_pairs() -> None:
         point(0, place, {"kinematic": 0.4, "compliant": 0.2}),
         point(1, place, {"kinematic": 9.0, "compliant": 0.2}, pairs=0),
     ]
-    figure = heat.heat_map(points, study.factors[0], study.factors[1], study)
+    figure = figures.heat_map(points, study.factors[0], study.factors[1], study)
     assert shown(figure)[0, 0] == pytest.approx(-50.0)
 
 
@@ -154,9 +154,7 @@ def folder(athena_fmu: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) ->
 
     def made(table: Mapping[str, Any], *, lost: int = 0, pictures: bool = False) -> str:
         if not pictures:
-            monkeypatch.setattr(
-                "hexapod_cosim.extensions.study.report.page.drawings", lambda *_, **__: {}
-            )
+            monkeypatch.setattr("hexapod_cosim.extensions.study.page.drawings", lambda *_, **__: {})
         out = tmp_path / "out"
         run_quietly(study_of(table), out, fmu=athena_fmu, gains=make_gains(load_robot("athena")))
         if lost:

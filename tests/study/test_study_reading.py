@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 from studies import study_of
 
-from hexapod_cosim.extensions.study.bundled import list_studies
+from hexapod_cosim.extensions.study.extension import list_studies
 from hexapod_cosim.extensions.study.reading import load_study
 from hexapod_cosim.extensions.study.records import Study, StudyError
 from hexapod_cosim.models import HexapodError
@@ -98,7 +98,7 @@ def test_several_seeds_differ_by_the_standard_variation_and_one_seed_is_the_plai
             {"design": "list", "factors": {"friction.mu": [0.1, 0.2], "command.vx": [0.1]}},
             ["different lengths", 'design = "grid"'],
         ),
-        ({"variation": "yes"}, ["variation", "got 'yes'", "write variation = true"]),
+        ({"variation": "yes"}, ["variation", "got 'yes'", "leave the quotes out"]),
         (
             {"factors": {"gains.hold.path_rate": {"values": [1.0], "unit": "s"}}},
             ["not a gain's value", "leave the unit out"],

@@ -28,7 +28,7 @@ from studies import (
 )
 from study_runners import Counting, Slow
 
-from hexapod_cosim.cosim.run.walker import Walker
+from hexapod_cosim.cosim.run.runner import Runner
 from hexapod_cosim.extensions.study import store as store_module
 from hexapod_cosim.extensions.study.folder import MANIFEST, RESULTS, export_runs, locked
 from hexapod_cosim.extensions.study.reading import load_study
@@ -145,7 +145,7 @@ def test_real_walks_killed_at_any_point_and_completed_are_the_uninterrupted_ones
     numbers = {row["run"] for row in kept}
     # with their times: they were not run again
     assert [row for row in stored_rows(study, killed) if row["run"] in numbers] == kept
-    assert rows(killed) == run_quietly(study, whole, fmu=athena_fmu, runner=Walker)
+    assert rows(killed) == run_quietly(study, whole, fmu=athena_fmu, runner=Runner)
     assert len(rows(whole)) == REAL_RUNS
     assert all(row["status"] == "completed" for row in rows(whole))
 

@@ -16,9 +16,9 @@ from studies import KINEMATIC, Row, replace_stored, rows, run_quietly, study_of,
 from study_runners import Fake
 
 from hexapod_cosim.controller import save_gains
-from hexapod_cosim.extensions.study.report.tables import optimum_changes
-from hexapod_cosim.extensions.study.studying import report_on
+from hexapod_cosim.extensions.study.study import report_on
 from hexapod_cosim.extensions.study.summary import OPTIMUM, SUMMARY, read_results
+from hexapod_cosim.extensions.study.tables import optimum_changes
 from hexapod_cosim.models import load_robot
 
 METRIC = "cost_of_transport"

@@ -22,9 +22,9 @@ from study_runners import DEATHS_FILE, Buggy, Slow
 
 from hexapod_cosim.cosim.master.loop import FAILED
 from hexapod_cosim.cosim.run.batch import run_batch
-from hexapod_cosim.cosim.run.walker import Walker
+from hexapod_cosim.cosim.run.runner import Runner
 from hexapod_cosim.cosim.run.worker_pool import TRIES
-from hexapod_cosim.cosim.scenario.scenario import load_scenario
+from hexapod_cosim.cosim.scenario.reading import load_scenario
 from hexapod_cosim.extensions.study.dispatch import DIED, WHY_DIED
 from hexapod_cosim.extensions.study.records import StudyError
 from hexapod_cosim.extensions.study.store import FIGURES
@@ -63,7 +63,7 @@ def scheduler(tmp_path_factory: pytest.TempPathFactory, deaths: Path) -> Iterato
 def test_real_walks_on_a_cluster_are_those_on_this_machine_bit_for_bit(
     athena_fmu: Path, tmp_path: Path, scheduler: str
 ) -> None:
-    options: dict[str, Any] = {"runner": Walker, "fmu": athena_fmu}
+    options: dict[str, Any] = {"runner": Runner, "fmu": athena_fmu}
     options["gains"] = make_gains(load_robot("athena"))
     here = run_quietly(study_of(WALK), tmp_path / "here", workers=2, **options)
     assert run_quietly(study_of(WALK), tmp_path / "there", scheduler=scheduler, **options) == here
@@ -79,7 +79,7 @@ def test_a_run_of_a_study_is_the_run_by_itself(athena_fmu: Path, tmp_path: Path)
         "seeds": {"first": 4, "count": 1},
         "factors": {"friction.mu": [0.5]},
     }
-    (row,) = run_quietly(study_of(table), tmp_path / "out", runner=Walker, fmu=athena_fmu)
+    (row,) = run_quietly(study_of(table), tmp_path / "out", runner=Runner, fmu=athena_fmu)
     plan = load_scenario(
         "walk_flat", overrides=["duration=1.2", "gait.period=0.4", "friction.mu=0.5", "seed=4"]
     )

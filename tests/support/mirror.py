@@ -6,13 +6,15 @@ test_plant_functions.py compares the structures with the compiler's layout.
 from __future__ import annotations
 
 import ctypes as ct
+from pathlib import Path
 from typing import Any
 
-from headers import Header
+from hexapod_cosim.cosim.master.loop_library import Header
 
+ROOT = Path(__file__).resolve().parents[2]
 HEADER = Header(
     *(
-        f"plant_fmu/include/hexapod/{name}.h"
+        ROOT / f"plant_fmu/include/hexapod/{name}.h"
         for name in ("legs", "status", "terrain", "generated/plant_settings", "hexapod")
     )
 )

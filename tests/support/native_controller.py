@@ -10,20 +10,22 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from headers import Header
-from mirror import OK, Real
+from mirror import OK, ROOT, Real
 
 from hexapod_cosim.controller import BodyCommand, Gait, Measurement
-from hexapod_cosim.cosim.interface.controller_interface import (
+from hexapod_cosim.cosim.interface.controller import (
     ControllerSetup,
     load_controller_interface,
 )
+from hexapod_cosim.cosim.master.loop_library import Header
 
 COMMANDS = ("angle_ref", "speed_ref", "torque_ref", "acceleration_ref")
 HEADER = Header(
-    *(f"plant_fmu/include/hexapod/{name}.h" for name in ("legs", "status")),
-    "controller/fmu/include/hexapod/generated/controller_settings.h",
-    "controller/fmu/include/hexapod/controller.h",
+    *(ROOT / f"plant_fmu/include/hexapod/{name}.h" for name in ("legs", "status")),
+    *(
+        ROOT / f"controller/fmu/include/hexapod/{name}.h"
+        for name in ("generated/controller_settings", "controller")
+    ),
 )
 HxRange: Any = HEADER.types["hxRange"]
 HxControllerInput: Any = HEADER.types["hxControllerInput"]

@@ -51,8 +51,8 @@ import tomlkit
 from numpy.typing import NDArray
 
 from hexapod_cosim.controller import BodyCommand, Controller, LegSolver, Measurement, make_gait
+from hexapod_cosim.cosim.scenario.reading import scenario_from_table
 from hexapod_cosim.cosim.scenario.records import Scenario
-from hexapod_cosim.cosim.scenario.scenario import scenario_from_table
 from hexapod_cosim.models import LEG_NAMES, Robot, load_robot
 from hexapod_cosim.models.dynamics import masses
 from hexapod_cosim.models.kinematics import body_states

@@ -17,9 +17,9 @@ from pathlib import Path
 import pytest
 
 from hexapod_cosim.cosim.common import archives
-from hexapod_cosim.cosim.export.plant_export import export_fmu
+from hexapod_cosim.cosim.export.plant import export_fmu
+from hexapod_cosim.cosim.export.validation import find_problems
 from hexapod_cosim.cosim.master.fmu import Fmu
-from hexapod_cosim.cosim.validate.validation import find_problems
 from hexapod_cosim.models import FmuError, load_robot
 
 BINARY = "binaries/linux64/hexapod.so"

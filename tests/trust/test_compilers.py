@@ -22,7 +22,7 @@ from plant import Plant
 from states import landing, random_command
 
 from hexapod_cosim.controller import BodyCommand, Measurement, Parts, make_gait
-from hexapod_cosim.cosim.interface.controller_interface import ControllerSetup
+from hexapod_cosim.cosim.interface.controller import ControllerSetup
 from hexapod_cosim.models import load_robot
 
 PLANT = Path(__file__).parents[2] / "plant_fmu"

@@ -146,7 +146,7 @@ def test_an_error_of_the_system_is_one_paragraph(
     def full(*_: object, **__: object) -> None:
         raise OSError(28, "No space left on device", "somewhere")
 
-    monkeypatch.setattr("hexapod_cosim.cosim.validate.validation.find_problems", full)
+    monkeypatch.setattr("hexapod_cosim.cosim.export.validation.find_problems", full)
     text = refused("validate", "x.fmu")
     assert "somewhere: the system refused an operation: got 'No space left on device'" in text
 
@@ -180,7 +180,7 @@ def test_a_full_memory_is_one_paragraph(plant_build: Path, monkeypatch: pytest.M
     def full(*_: object, **__: object) -> None:
         raise MemoryError
 
-    monkeypatch.setattr("hexapod_cosim.cosim.validate.validation.find_problems", full)
+    monkeypatch.setattr("hexapod_cosim.cosim.export.validation.find_problems", full)
     assert "the memory is full" in refused("validate", "x.fmu")
 
 

@@ -12,9 +12,9 @@ EXPORT = """
 import sys
 from pathlib import Path
 from hexapod_cosim.controller import make_gait
-from hexapod_cosim.cosim.export.plant_export import export_controller
-from hexapod_cosim.cosim.export.plant_export import export_fmu
-from hexapod_cosim.cosim.interface.controller_interface import ControllerSetup
+from hexapod_cosim.cosim.export.plant import export_controller
+from hexapod_cosim.cosim.export.plant import export_fmu
+from hexapod_cosim.cosim.interface.controller import ControllerSetup
 from hexapod_cosim.models import load_robot
 robot, folder = load_robot("athena"), Path(sys.argv[1])
 setup = ControllerSetup(robot=robot, gait=make_gait(robot), period=0.005)

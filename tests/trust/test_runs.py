@@ -13,14 +13,14 @@ import pytest
 
 from hexapod_cosim.cosim.common import files
 from hexapod_cosim.cosim.common import temporary as temporaries
-from hexapod_cosim.cosim.results.results import results_folder
+from hexapod_cosim.cosim.results.folder import results_folder
 from hexapod_cosim.models import HexapodError
 
 HOLD = """
 import sys
 from pathlib import Path
 from hexapod_cosim.cosim.common.temporary import TemporaryFolder
-from hexapod_cosim.cosim.results.results import results_folder
+from hexapod_cosim.cosim.results.folder import results_folder
 folder = TemporaryFolder("fmu")
 with results_folder(Path(sys.argv[1])):
     print(folder.path, flush=True)

@@ -13,8 +13,8 @@ import pytest
 from building import PACKED
 
 from hexapod_cosim.controller import make_gait
-from hexapod_cosim.cosim.export.plant_export import export_controller, export_fmu
-from hexapod_cosim.cosim.interface.controller_interface import ControllerSetup
+from hexapod_cosim.cosim.export.plant import export_controller, export_fmu
+from hexapod_cosim.cosim.interface.controller import ControllerSetup
 from hexapod_cosim.models import load_robot
 
 NEWEST = (2, 14)  # of x86-64, where memcpy got its present version

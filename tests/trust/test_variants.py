@@ -15,8 +15,8 @@ from fmi_plant import ATHENA as INTERFACE
 from fmi_plant import ERROR, Plant
 
 from hexapod_cosim.cosim.common.plant_files import fmi_headers, source_files
-from hexapod_cosim.cosim.export import plant_export
-from hexapod_cosim.cosim.export.plant_export import export_fmu
+from hexapod_cosim.cosim.export import plant
+from hexapod_cosim.cosim.export.plant import export_fmu
 from hexapod_cosim.models import load_robot
 
 ATHENA = load_robot("athena")
@@ -62,7 +62,7 @@ def test_derivatives_are_promised_where_the_binary_has_them(
     def other(*_: Any, **__: Any) -> dict[str, bytes]:
         return {BINARY: without_complex.read_bytes()}
 
-    monkeypatch.setattr(plant_export, "installed_binary", other)
+    monkeypatch.setattr(plant, "installed_binary", other)
     assert promised(export_fmu(ATHENA, tmp_path / "less.fmu", fmi=fmi)) == {"yes": 0, "no": 2}
 
 

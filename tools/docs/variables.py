@@ -6,8 +6,8 @@ from collections.abc import Iterator
 
 from hexapod_cosim.controller import DEFAULT_PERIOD
 from hexapod_cosim.cosim.export.documentation import Row, variable_rows
-from hexapod_cosim.cosim.interface.controller_interface import load_controller_interface
-from hexapod_cosim.cosim.interface.plant_interface import Interface, load_interface
+from hexapod_cosim.cosim.interface.controller import load_controller_interface
+from hexapod_cosim.cosim.interface.plant import Interface, load_interface
 from hexapod_cosim.cosim.run.controller_setup import make_setup
 from hexapod_cosim.models import load_robot
 

@@ -13,13 +13,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hexapod_cosim.controller import DEFAULT_PERIOD
-from hexapod_cosim.cosim.export.plant_export import export_fmu
+from hexapod_cosim.cosim.export.plant import export_fmu
 from hexapod_cosim.cosim.interface.descriptions import read_description
 from hexapod_cosim.cosim.master.fmu import Fmu
 from hexapod_cosim.cosim.master.recorder import Recording
 from hexapod_cosim.cosim.results.recordings import read_csv, write_csv
 from hexapod_cosim.cosim.run.single_run import simulate
-from hexapod_cosim.cosim.scenario.scenario import load_scenario
+from hexapod_cosim.cosim.scenario.reading import load_scenario
 from hexapod_cosim.models import load_robot
 
 STEP = DEFAULT_PERIOD  # s

@@ -1,4 +1,5 @@
 import type { Connection } from "./link";
+import type { Limits } from "./messages";
 
 const OFTEN = 40; // ms    between two drives at the most
 const RENEW = 150; // ms    between two drives that are the same, while the robot is to move
@@ -7,6 +8,22 @@ export interface Axes {
   readonly forward: number;
   readonly left: number;
   readonly turn: number;
+}
+
+/** What the reader asks for, as shares of the largest command; `speed` is a factor of the axes. */
+interface Asked extends Axes {
+  readonly height: number;
+  readonly speed: number;
+}
+
+/** Returns forward, left [m/s], turn [rad/s], height [m], which share the reach of the legs. */
+export function bodyCommand(asked: Asked, limits: Limits): number[] {
+  const { forward, left, turn, height, speed } = asked;
+  const sum = speed * (Math.abs(forward) + Math.abs(left) + Math.abs(turn));
+  const share = speed * Math.min((1 - Math.abs(height)) / Math.max(sum, 1e-9), 1);
+  const rise = height * (height > 0 ? limits.up : limits.down);
+  const { vx, vy, yaw_rate } = limits;
+  return [share * forward * vx, share * left * vy, share * turn * yaw_rate, rise];
 }
 
 const NONE: Axes = { forward: 0, left: 0, turn: 0 };

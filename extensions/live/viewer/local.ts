@@ -1,62 +1,60 @@
-import { Quaternion, Vector3 } from "three";
+import { bodyCommand } from "./drive";
 import { type Connection, Listeners } from "./link";
 import type { Limits, Settings, Setup, World } from "./messages";
-import type { Robot } from "./robot";
 
 const LONGEST = 1; // s    made up at once; a longer gap, as of a hidden page, is skipped
-const MOST_WEIGHTS = 3; // body weights    largest push
-
-/** The plan of a change of gait (extensions/live/gait_change.py); times since the request [s]. */
-interface GaitChange {
-  readonly limits: Limits;
-  readonly begin: number;
-  readonly settled: number;
-  readonly end: number;
-}
-
-interface Gait {
-  /** Pattern, period, duty, step height, touch-down speed. */
-  readonly gait: readonly number[];
-  readonly limits: Limits;
-  readonly changes: Readonly<Record<string, GaitChange>>;
-}
+/** Sizes of the parts of the module's row of values (extensions/live/wasm/robot.c). */
+const SIZES = {
+  ...{ time: 1, angle: 18, jointSpeed: 18, torque: 18, force: 18, slip: 6 },
+  ...{ position: 3, quaternion: 4, attitude: 3, velocity: 3, rate: 3, joints: 54, push: 3 },
+};
 
 /** What the page holds (extensions/live/static_page.py). */
 export interface StaticSetup extends Setup {
   readonly world: World;
   readonly first: Settings;
   /** hxControl by name. */
-  readonly numbers: Readonly<Record<string, number>>;
-  readonly walks: Readonly<Record<string, Gait>>;
+  readonly numbers: Record<string, number>;
+  readonly walks: Record<string, Walk>;
+}
+
+interface Walk {
+  /** Pattern, period, duty, step height, touch-down speed. */
+  readonly gait: number[];
+  readonly limits: Limits;
+  /** Plans of changes to other gaits (extensions/live/gait_change.py); times since the request. */
+  readonly changes: Record<string, Record<"begin" | "end", number> & { limits: Limits }>;
 }
 
 /** Steps the robot in this page in real time, and answers the page as a server does. */
 export class LocalLoop extends Listeners implements Connection {
   readonly state = "open";
-  private settings: Settings;
-  private wanted: Settings;
-  private limits: Limits;
-  private gait: string; // of the controller
-  private change: { readonly plan: GaitChange; readonly since: number } | undefined;
-  private drive = { forward: 0, left: 0, turn: 0, height: 0, speed: 1 };
-  private push = [0, 0, 0];
-  private paused = false;
-  private fault = "";
+  private readonly status;
+  private plan: [number, () => void][] = []; // s    what is due of a change of gait
+  private readonly input = { forward: 0, left: 0, turn: 0, height: 0, speed: 1, x: 0, y: 0, z: 0 };
   private last = performance.now();
   private due = 0; // s    of wall time that is not yet simulated
-  private steps = 0;
   private placed = 0;
-  private skipped = 0;
 
+  /** `module`: exports of the robot with its controller. */
   constructor(
-    private readonly robot: Robot,
+    private readonly module: WebAssembly.Exports,
     private readonly setup: StaticSetup,
   ) {
     super();
-    this.settings = this.wanted = setup.first;
-    this.gait = setup.first.gait;
-    this.limits = setup.walks[this.gait].limits;
-    setTimeout(() => this.begin());
+    const { first: settings, walks } = setup;
+    const never = { stopped: true, recording: false, recorded: false };
+    const { limits } = walks[settings.gait];
+    this.status = { ...never, settings, wanted: settings, limits, fault: "", paused: false };
+    setTimeout(() => {
+      this.tell("world", setup.world);
+      this.attempt(() => {
+        this.call("_initialize");
+        this.do("create");
+        this.place();
+      });
+      this.follow();
+    });
   }
 
   watchState(watcher: (state: "open") => void): void {
@@ -64,159 +62,111 @@ export class LocalLoop extends Listeners implements Connection {
   }
 
   /** Does what a message of the page asks for. */
-  send(message: Record<string, unknown>): void {
+  send({ type, key, value, action, ...input }: Record<string, unknown>): void {
     this.attempt(() => {
-      if (message.type === "drive") Object.assign(this.drive, message);
-      else if (message.type === "push")
-        this.setPush(["x", "y", "z"].map((k) => Number(message[k])));
-      else if (message.type === "set") this.set(message.key as keyof Settings, message.value);
-      else if (message.action === "place") this.place();
-      else this.paused = message.action === "pause";
-      if (message.type === "set" || message.type === "do") this.tellStatus();
+      if (type === "set") this.set(key as keyof Settings, value as string & number);
+      else if (action === "place") this.place();
+      else if (type === "do") this.status.paused = action === "pause";
+      else Object.assign(this.input, input);
     });
-  }
-
-  private begin(): void {
-    this.attempt(() => {
-      this.tell("world", this.setup.world);
-      this.place();
-    });
-    const picture = (): void => {
-      requestAnimationFrame(picture);
-      this.attempt(() => this.advance());
-    };
-    requestAnimationFrame(picture);
   }
 
   /** Does something; an error of any kind stops the robot, and the page shows it. */
   private attempt(act: () => void): void {
+    const before = JSON.stringify(this.status);
     try {
       act();
     } catch (error) {
-      this.fault = String(error);
-      this.tellStatus();
+      this.status.fault = String(error);
     }
+    if (JSON.stringify(this.status) !== before) this.tell("status", { ...this.status });
   }
 
   /** Simulates the time that has passed since the last picture. */
-  private advance(): void {
+  private follow(): void {
+    requestAnimationFrame(() => this.follow());
     const now = performance.now();
     const passed = (now - this.last) / 1000;
     this.last = now;
-    if (this.paused || this.fault) return;
-    if (passed > LONGEST) this.skipped += passed;
-    else this.due += passed;
-    const { step } = this.setup.world;
-    const count = Math.floor(this.due / step);
-    if (count === 0) return;
-    this.due -= count * step;
-    this.robot.write("command", this.command());
-    this.robot.write("push", this.push);
-    this.robot.do("advance", count);
-    this.steps += count;
-    this.followChange();
+    if (this.status.paused || this.status.fault || passed > LONGEST) return;
+    this.due += passed;
+    const count = Math.floor(this.due / this.setup.world.step);
+    this.due -= count * this.setup.world.step;
+    if (count > 0) this.attempt(() => this.advance(count));
+  }
+
+  private advance(count: number): void {
+    const { x, y, z } = this.input;
+    this.do("advance", count, ...bodyCommand(this.input, this.status.limits), x, y, z);
+    const [time] = this.row().time;
+    while (this.plan.length > 0 && time >= this.plan[0][0]) this.plan.shift()![1]();
     this.tellFrame();
   }
 
   private place(): void {
-    this.settings = this.wanted;
-    const { control, gait, friction } = this.settings;
-    const walk = this.setup.walks[gait];
-    this.robot.write("gait", walk.gait);
-    this.robot.do("start", this.setup.numbers[control], friction);
-    [this.gait, this.limits, this.change, this.push] = [gait, walk.limits, undefined, [0, 0, 0]];
-    [this.fault, this.paused, this.due, this.last] = ["", false, 0, performance.now()];
+    const { setup, status } = this;
+    const { control, gait, friction } = status.wanted;
+    const { gait: timing, limits } = setup.walks[gait];
+    this.do("gait", ...timing);
+    this.do("start", setup.numbers[control], friction);
+    Object.assign(status, { settings: status.wanted, limits, fault: "", paused: false });
+    [this.plan, this.due] = [[], 0];
     this.placed += 1;
-    this.tellStatus();
     this.tellFrame();
   }
 
-  private set(key: keyof Settings, value: unknown): void {
-    if (this.wanted[key] === value) return;
-    this.wanted = { ...this.wanted, [key]: value };
-    if (key === "gait") this.requestGait(String(value));
-    else this.settings = { ...this.settings, [key]: value };
-    if (key === "friction") this.robot.do("change_friction", Number(value));
-    if (key === "control") this.robot.do("change_control", this.setup.numbers[String(value)]);
+  private set(key: keyof Settings, value: string & number): void {
+    const { status } = this;
+    status.wanted = { ...status.wanted, [key]: value };
+    if (key === "gait") this.planChange(value);
+    else status.settings = { ...status.settings, [key]: value };
+    if (key === "friction") this.do("friction", value);
+    if (key === "control") this.do("control", this.setup.numbers[value]);
   }
 
-  private requestGait(gait: string): void {
-    const plan = this.setup.walks[this.gait].changes[gait];
-    this.change = { plan, since: this.robot.state.time[0] };
-    this.limits = plan.limits;
-  }
-
-  /** Does what is due of a change of gait. */
-  private followChange(): void {
-    if (!this.change) return;
-    const { plan, since } = this.change;
-    const { gait } = this.wanted;
-    const passed = this.robot.state.time[0] - since;
-    if (passed >= plan.begin && this.gait !== gait) {
-      this.robot.write("gait", this.setup.walks[gait].gait);
-      this.robot.do("change_gait");
-      this.gait = gait;
-    }
-    if (passed >= plan.settled) this.settings = this.wanted;
-    if (passed >= plan.end) [this.limits, this.change] = [this.setup.walks[gait].limits, undefined];
-    this.tellStatus();
-  }
-
-  /** Returns forward, left [m/s], turn [rad/s], height [m], which share the reach of the legs. */
-  private command(): number[] {
-    const { forward, left, turn, height, speed } = this.drive;
-    const { limits } = this;
-    const shares = [forward, left, turn].map((share) => share * speed);
-    const sum = shares.reduce((total, share) => total + Math.abs(share), 0);
-    const room = Math.min((1 - Math.abs(height)) / Math.max(sum, 1e-9), 1);
-    const largest = [limits.vx, limits.vy, limits.yaw_rate];
-    const rise = height * (height > 0 ? limits.up : limits.down);
-    return [...largest.map((most, k) => most * room * shares[k]), rise];
-  }
-
-  private setPush(force: readonly number[]): void {
-    const most = MOST_WEIGHTS * this.setup.world.weight;
-    const share = Math.min(most / Math.max(Math.hypot(...force), 1e-9), 1);
-    this.push = force.map((part) => share * part);
+  private planChange(gait: string): void {
+    const { status } = this;
+    const { walks } = this.setup;
+    const { begin, end, limits } = walks[status.settings.gait].changes[gait];
+    const [since] = this.row().time;
+    const change = () => {
+      this.do("gait", ...walks[gait].gait);
+      status.settings = { ...status.settings, gait };
+    };
+    status.limits = limits;
+    const allow = () => Object.assign(status, { limits: walks[gait].limits });
+    this.plan = [
+      [since + begin, change],
+      [since + end, allow],
+    ];
   }
 
   private tellFrame(): void {
-    const { setup, steps, skipped, placed } = this;
-    const { state } = this.robot;
-    const [w, x, y, z] = state.quaternion;
-    const own = (v: readonly number[]) =>
-      new Vector3(...v).applyQuaternion(new Quaternion(-x, -y, -z, w));
-    const [motion, rate] = [own(state.velocity), own(state.rate)];
-    this.tell("frame", {
-      ...state,
-      time: state.time[0],
-      seconds: state.time[0],
-      contact: state.slip.map((_, k) => Number(state.force[3 * k + 2] !== 0)),
-      force: state.force.map((part) => part / setup.world.weight),
-      torque: Math.max(...state.torque.map(Math.abs)),
-      speed: [motion.x, motion.y, rate.z],
-      command: this.command(),
-      factor: 1,
-      steps,
-      misses: 0,
-      worst: 0,
-      skipped,
-      placed,
-    });
+    const row = this.row();
+    const force = row.force.map((part) => part / this.setup.world.weight);
+    const command = bodyCommand(this.input, this.status.limits);
+    this.tell("frame", { ...row, time: row.time[0], force, command, placed: this.placed });
   }
 
-  private tellStatus(): void {
-    const { settings, wanted, limits, fault, paused } = this;
-    const stopped = fault !== "";
-    this.tell("status", {
-      settings,
-      wanted,
-      limits,
-      fault,
-      stopped,
-      paused,
-      recording: false,
-      recorded: false,
+  /** Returns the module's row of values. SI units; legs LF LM LR RF RM RR. */
+  private row(): Record<keyof typeof SIZES, number[]> {
+    const { buffer } = this.module.memory as WebAssembly.Memory; // changes when the memory grows
+    let place = this.call("hx_page_values");
+    const parts = Object.entries(SIZES).map(([name, size]) => {
+      const part = new Float64Array(buffer, place, size);
+      place += part.byteLength;
+      return [name, [...part]];
     });
+    return Object.fromEntries(parts);
+  }
+
+  /** Calls a function of the module that returns a status. Throws an error for a failure. */
+  private do(name: string, ...values: number[]): void {
+    const status = this.call(`hx_page_${name}`, ...values);
+    if (status !== 0) throw new Error(`${name} has failed with status ${status}`);
+  }
+
+  private call(name: string, ...values: number[]): number {
+    return (this.module[name] as (...values: number[]) => number)(...values);
   }
 }

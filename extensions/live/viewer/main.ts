@@ -3,15 +3,15 @@ import { Link } from "./link";
 import { LocalLoop, type StaticSetup } from "./local";
 import type { Setup } from "./messages";
 import { start } from "./page";
-import { Robot } from "./robot";
 
 /** Starts the robot of a page that holds plant and controller, or says why it cannot walk here. */
-async function walkHere(setup: StaticSetup, code: string): Promise<void> {
+async function walkHere(setup: StaticSetup, base64: string): Promise<void> {
   try {
-    start(setup, new LocalLoop(await Robot.load(code), setup));
+    const bytes = Uint8Array.from(atob(base64), (letter) => letter.charCodeAt(0));
+    const { instance } = await WebAssembly.instantiate(bytes, {});
+    start(setup, new LocalLoop(instance.exports, setup));
   } catch (error) {
-    const reason = error instanceof Error ? error.message : String(error);
-    byId("stage")?.append(element("p", "refusal", `This browser cannot run the robot: ${reason}`));
+    byId("stage")?.append(element("p", "refusal", `This browser cannot run the robot: ${error}`));
   }
 }
 

@@ -2,35 +2,49 @@
 
 import type { Ground, PackedSurface, Robot } from "../../../cosim/viewer/src/types";
 
+/** Of macro-steps of a loop behind a server, since it began. */
+export interface Lateness {
+  /** Simulated time over wall time. */
+  readonly factor: number;
+  readonly steps: number;
+  readonly misses: number;
+  /** [s] */
+  readonly worst: number;
+  /** Wall time that was not simulated [s]. */
+  readonly skipped: number;
+}
+
 export interface Frame {
   readonly time: number;
   readonly position: readonly number[];
   /** w x y z */
   readonly quaternion: readonly number[];
+  /** roll, pitch, yaw [rad] */
+  readonly attitude: readonly number[];
+  readonly velocity: readonly number[];
+  /** Angular velocity, world axes. */
+  readonly rate: readonly number[];
   readonly angle: readonly number[];
-  readonly contact: readonly number[];
   /** [body weights] three entries a foot */
   readonly force: readonly number[];
-  /** [N m] the largest of all servos */
-  readonly torque: number;
   readonly slip: readonly number[];
-  /** forward, left [m/s], turn [rad/s], in the torso's axes */
-  readonly speed: readonly number[];
   readonly command: readonly number[];
-  /** roll and pitch [rad] */
-  readonly tilt: readonly number[];
   /** [N] world axes */
   readonly push: readonly number[];
-  readonly factor: number;
-  readonly steps: number;
-  readonly misses: number;
-  readonly worst: number;
-  /** Wall time that was not simulated [s]. */
-  readonly skipped: number;
   /** How often the robot was placed: its pose jumps when this changes. */
   readonly placed: number;
-  /** Time since the robot was placed [s]. */
-  readonly seconds: number;
+  readonly late?: Lateness;
+}
+
+/** Returns the speed forward, to the left [m/s] and of the turn [rad/s]. */
+export function speedOf({ velocity: [x, y], attitude, rate }: Frame): [number, number, number] {
+  const [cos, sin] = [Math.cos(attitude[2]), Math.sin(attitude[2])];
+  return [cos * x + sin * y, cos * y - sin * x, rate[2]];
+}
+
+/** Returns the force on each foot [body weights]; it is 0 in the air. */
+export function footForces({ force, slip }: Frame): number[][] {
+  return slip.map((_, k) => force.slice(3 * k, 3 * k + 3));
 }
 
 export interface World {

@@ -1,7 +1,14 @@
 import { byId, element } from "../../../cosim/viewer/src/dom";
-import type { Drive } from "./drive";
+import { bodyCommand, type Drive } from "./drive";
 import type { Connection, State } from "./link";
-import type { Frame, Settings, Setup, Status } from "./messages";
+import {
+  type Frame,
+  type Lateness,
+  type Settings,
+  type Setup,
+  type Status,
+  speedOf,
+} from "./messages";
 
 const SHOWN = 7000; // ms    that a note stays
 const SPAN = 0.33; // s    time constant of the speeds' means
@@ -62,27 +69,29 @@ export class Panel {
 
   /** Shows the figures of a frame. */
   showFrame(frame: Frame): void {
-    text("factor", `${frame.factor.toFixed(2)} ×`);
-    byId("factor")?.parentElement?.classList.toggle(
-      "bad",
-      frame.factor < SLOW && frame.steps > 400,
-    );
-    text("misses", String(frame.misses));
-    const late = byId("misses")?.parentElement;
-    if (late)
-      late.title =
-        `${frame.misses} of ${frame.steps} macro-steps ended late, ` +
-        `the worst by ${(1e3 * frame.worst).toFixed(1)} ms`;
-    byId("gaps")?.toggleAttribute("hidden", frame.skipped === 0);
-    text("skipped", `${frame.skipped.toFixed(1)} s`);
-    text("seconds", `${frame.seconds.toFixed(1)} s`);
+    if (frame.late) this.showLateness(frame.late);
+    text("seconds", `${frame.time.toFixed(1)} s`);
     // frames may be far apart on a slow computer
     const weight = 1 - Math.exp(-Math.max(frame.time - this.time, 0) / SPAN);
     this.time = frame.time;
-    this.forward += weight * (frame.speed[0] - this.forward);
-    this.turn += weight * (frame.speed[2] - this.turn);
+    const [forward, , turn] = speedOf(frame);
+    this.forward += weight * (forward - this.forward);
+    this.turn += weight * (turn - this.turn);
     text("speed-now", `${whole(1e3 * this.forward)} mm/s`);
     text("turn-now", `${whole((180 / Math.PI) * this.turn)} °/s`);
+  }
+
+  private showLateness({ factor, steps, misses, worst, skipped }: Lateness): void {
+    text("factor", `${factor.toFixed(2)} ×`);
+    byId("factor")?.parentElement?.classList.toggle("bad", factor < SLOW && steps > 400);
+    text("misses", String(misses));
+    const late = byId("misses")?.parentElement;
+    if (late)
+      late.title =
+        `${misses} of ${steps} macro-steps ended late, ` +
+        `the worst by ${(1e3 * worst).toFixed(1)} ms`;
+    byId("gaps")?.toggleAttribute("hidden", skipped === 0);
+    text("skipped", `${skipped.toFixed(1)} s`);
   }
 
   private makeChoices(): void {
@@ -146,8 +155,9 @@ export class Panel {
     setSlider("friction");
     const limits = this.status?.limits;
     if (!limits) return;
-    text("speed-value", `${(1e3 * speed * limits.vx).toFixed(0)} mm/s`);
-    const rise = height * (height > 0 ? limits.up : limits.down);
+    const ahead = { forward: 1, left: 0, turn: 0, height, speed };
+    const [forward, , , rise] = bodyCommand(ahead, limits);
+    text("speed-value", `${(1e3 * forward).toFixed(0)} mm/s`);
     text("height-value", `${rise > 0 ? "+" : ""}${(1e3 * rise).toFixed(0)} mm`);
   }
 }

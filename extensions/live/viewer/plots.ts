@@ -1,7 +1,7 @@
 import uPlot from "uplot";
 import { element } from "../../../cosim/viewer/src/dom";
 import { property, quietAxis } from "../../../cosim/viewer/src/theme";
-import type { Frame } from "./messages";
+import { type Frame, footForces, speedOf } from "./messages";
 
 const WIDTH = 8; // s    that the plots show
 const SLOWEST = 45; // ms    between two drawings
@@ -32,7 +32,7 @@ const STRIPS: readonly Described[] = [
     curves: LEGS.map((label, k) => ({
       label,
       colour: `--leg${k}`,
-      value: (frame) => Math.hypot(...frame.force.slice(3 * k, 3 * k + 3)),
+      value: (frame) => Math.hypot(...footForces(frame)[k]),
     })),
   },
   {
@@ -42,8 +42,8 @@ const STRIPS: readonly Described[] = [
     digits: 0,
     curves: [
       { label: "commanded", colour: "--commanded", value: (f) => 1e3 * f.command[0] },
-      { label: "forward", colour: "--curve1", value: (f) => 1e3 * f.speed[0] },
-      { label: "left", colour: "--curve2", value: (f) => 1e3 * f.speed[1] },
+      { label: "forward", colour: "--curve1", value: (f) => 1e3 * speedOf(f)[0] },
+      { label: "left", colour: "--curve2", value: (f) => 1e3 * speedOf(f)[1] },
     ],
   },
   {
@@ -52,8 +52,8 @@ const STRIPS: readonly Described[] = [
     least: [-3, 3],
     digits: 1,
     curves: [
-      { label: "roll", colour: "--curve1", value: (f) => DEGREES * f.tilt[0] },
-      { label: "pitch", colour: "--curve2", value: (f) => DEGREES * f.tilt[1] },
+      { label: "roll", colour: "--curve1", value: (f) => DEGREES * f.attitude[0] },
+      { label: "pitch", colour: "--curve2", value: (f) => DEGREES * f.attitude[1] },
     ],
   },
   {
@@ -65,7 +65,7 @@ const STRIPS: readonly Described[] = [
       {
         label: "fastest foot",
         colour: "--curve3",
-        value: (f) => 1e3 * Math.max(...f.slip.map((speed, k) => (f.contact[k] ? speed : 0))),
+        value: (f) => 1e3 * Math.max(...footForces(f).map(([, , up], k) => (up ? f.slip[k] : 0))),
       },
     ],
   },

@@ -2,6 +2,7 @@ import type { Vector3 } from "three";
 import type { Connection } from "./link";
 import type { View } from "./view";
 
+const MOST_WEIGHTS = 3; // body weights    largest push
 const OFTEN = 40; // ms    between two pushes at the most
 const RENEW = 300; // ms    between two that are the same
 
@@ -60,7 +61,8 @@ export class Pusher {
     const now = performance.now();
     if (!this.offset || now - this.at < OFTEN) return;
     const grip = this.offset.clone().add(this.view.ground);
-    const force = this.view.pull(event, grip, event.shiftKey).multiplyScalar(this.weight());
+    const share = this.view.pull(event, grip, event.shiftKey).clampLength(0, MOST_WEIGHTS);
+    const force = share.multiplyScalar(this.weight());
     const [x, y, z] = force.toArray().map((part) => Math.round(100 * part) / 100);
     const text = JSON.stringify([x, y, z]);
     if (text === this.sent && now - this.at < RENEW) return;

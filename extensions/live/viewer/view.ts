@@ -6,7 +6,7 @@ import { Relief } from "../../../cosim/viewer/src/scene/relief";
 import { RobotScene } from "../../../cosim/viewer/src/scene/robot_scene";
 import { unpackSurface } from "../../../cosim/viewer/src/scene/surface";
 import { property, readColours } from "../../../cosim/viewer/src/theme";
-import type { Frame, World } from "./messages";
+import { type Frame, footForces, type World } from "./messages";
 
 const EYE = new Vector3(-0.86, -0.68, 0.56); // m    of the camera: behind the robot, to the right
 const LOOK = new Vector3(0.06, 0, 0.04); // m    target of the camera, above the ground
@@ -67,8 +67,8 @@ export class View {
       angles: Float64Array.from(frame.angle),
     };
     this.follow(pose);
-    const forces = frame.contact.map((_, k) => new Vector3(...frame.force.slice(3 * k, 3 * k + 3)));
-    const touching = frame.contact.map((flag) => flag > 0);
+    const forces = footForces(frame).map((force) => new Vector3(...force));
+    const touching = forces.map((force) => force.length() > 0);
     this.scene.show(pose, touching, forces, this.place);
     this.push.show([pose.position], [new Vector3(...frame.push).divideScalar(this.world.weight)]);
     this.eye.lookFrom(this.place, width / height);

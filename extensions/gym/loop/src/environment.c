@@ -122,7 +122,7 @@ static void draw_parameters(hxEnvironment *environment) {
   const hxEnvDraws *draws = &environment->settings->draws;
   for (size_t i = 0; i < draws->count; ++i) {
     const double low = draws->low[i], range = draws->high[i] - low;
-    const double u = uniform(environment, HX_STREAM_DRAWS, (size_t)draws->group[i]);
+    const double u = uniform(environment, HX_STREAM_DRAWS, i);
     environment->drawn[i] = low + (draws->whole[i] ? floor(u * (range + 1.0)) : u * range);
   }
 }
@@ -194,12 +194,11 @@ static hxEnvView view_of(const hxEnvironment *environment) {
 /* ----------------------------------------------------------------------------------------------
  * steps */
 
-/* Limits and keeps the action; returns the sum of its squared changes. */
+/* Stores the action, limited to [-1, 1]; returns the sum of its squared changes. */
 static double take_action(hxEnvironment *environment, const float action[HX_ENV_JOINTS]) {
-  const double limit = environment->settings->action_limit;
   double change = 0.0;
   for (int i = 0; i < HX_ENV_JOINTS; ++i) {
-    const double wanted = fmin(fmax((double)action[i], -limit), limit);
+    const double wanted = fmin(fmax((double)action[i], -1.0), 1.0);
     const double difference = wanted - environment->action[i];
     change += difference * difference;
     environment->action[i] = wanted;

@@ -120,8 +120,7 @@ typedef struct hxEnvFmu {
   hxSharedWorkUse *work_use;
 } hxEnvFmu;
 
-/* Parameters of the plant that are drawn anew for each episode, uniformly. Draws of one group get
- * the same random number. */
+/* Parameters of the plant that are drawn anew for each episode, uniformly. */
 typedef struct hxEnvDraws {
   const fmi2ValueReference *reference; /*       [count] */
   const double *low, *high;            /*       [count] range, both ends possible */
@@ -159,8 +158,7 @@ typedef struct hxEnvSettings {
   size_t substeps;                    /* 1    of h, in a step of an environment */
   size_t length;                      /* 1    steps of an episode */
   double stance[HX_ENV_JOINTS];       /* rad  commanded angles for the action 0 */
-  double action_scale[HX_ENV_JOINTS]; /* rad  for the action 1 */
-  double action_limit;                /* 1    larger actions are limited to this size */
+  double action_scale[HX_ENV_JOINTS]; /* rad  for the action 1, the largest */
   double observed[HX_ENV_BLOCKS][3];  /*      scales of the blocks; for each axis of blocks of 3,
                                        *      otherwise the first */
   double clock;                       /* Hz */
@@ -193,7 +191,7 @@ typedef struct hxEnvironments hxEnvironments;
 
 /* Number of the layout of hxEnvSettings, hxEnvArrays, the structures in them and the lists of names
  * above. A change of their members, or of what a member means, increases it. */
-#define HX_ENVIRONMENTS_LAYOUT 2
+#define HX_ENVIRONMENTS_LAYOUT 3
 
 /* Layout and size of hxEnvSettings in this library, with which callers check their own. */
 HX_API int hx_environments_layout(void);

@@ -11,8 +11,7 @@ from hexapod_cosim.cosim.master.loop import COMPLETED
 from hexapod_cosim.cosim.results.comparison import Change
 from hexapod_cosim.cosim.results.metrics import DUST, FLOORS, METRICS, shown_metrics
 from hexapod_cosim.extensions.study.groups import Mean, Point
-from hexapod_cosim.extensions.study.objective import WALKED
-from hexapod_cosim.extensions.study.records import Factor
+from hexapod_cosim.extensions.study.records import WALKED, Factor
 from hexapod_cosim.extensions.study.store import FIGURES
 from hexapod_cosim.extensions.study.summary import POINT_METRICS, Results
 

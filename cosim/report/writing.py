@@ -28,8 +28,8 @@ from hexapod_cosim.cosim.report.servos import servo_rows
 from hexapod_cosim.cosim.report.surface import material_legend
 from hexapod_cosim.cosim.results.accuracy import Accuracy
 from hexapod_cosim.cosim.results.comparison import BETTER, METHOD, SAME, WORSE, Change
-from hexapod_cosim.cosim.results.comparisons import Comparisons
 from hexapod_cosim.cosim.results.facts import RunFacts
+from hexapod_cosim.cosim.results.folder import StoredResult
 from hexapod_cosim.cosim.results.ground import describe_terrain
 from hexapod_cosim.cosim.results.metrics import (
     DUST,
@@ -39,7 +39,7 @@ from hexapod_cosim.cosim.results.metrics import (
     plans_feet,
     shown_metrics,
 )
-from hexapod_cosim.cosim.results.results import StoredResult
+from hexapod_cosim.cosim.results.uncertainty import Comparisons
 from hexapod_cosim.models import JOINT_NAMES
 
 REPORT, PLOTS, PROFILE = "report.html", "plots", "profile"

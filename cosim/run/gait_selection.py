@@ -37,8 +37,8 @@ from hexapod_cosim.cosim.results.gait_choice import OF_FMU, GaitChoice
 from hexapod_cosim.cosim.run.kept_designs import Stance, kept_stance
 from hexapod_cosim.cosim.scenario.controls import FMU, control_of
 from hexapod_cosim.cosim.scenario.reach import reaches
+from hexapod_cosim.cosim.scenario.reading import scenario_robot
 from hexapod_cosim.cosim.scenario.records import CHOSEN, DESIGNED, OWN, Command, Scenario
-from hexapod_cosim.cosim.scenario.scenario import scenario_robot
 from hexapod_cosim.models import ReachError, Robot, ScenarioError, Servo, load_robot
 from hexapod_cosim.models.records import Vector3
 
@@ -49,7 +49,7 @@ BY_SCENARIO, BY_CONTROL, BY_ROBOT = "scenario", "control", "robot file"
 
 
 @dataclass(frozen=True, kw_only=True)
-class ChosenWalk:
+class GaitSelection:
     """Gait and stance of a run."""
 
     robot: Robot  # as the controller knows it, in the stance
@@ -78,9 +78,9 @@ class ChosenWalk:
         return own if self.stance == OWN else replace(own, legs=self.robot.legs)
 
 
-def choose_walk(
+def select_gait(
     scenario: Scenario, own: Robot | None = None, gains: Gains | None = None
-) -> ChosenWalk:
+) -> GaitSelection:
     """Returns gait and stance of a run.
 
     Args:
@@ -97,7 +97,7 @@ def choose_walk(
     own = own or scenario_robot(scenario)
     robot = _with_servo(bare, own.servo, own.gravity)
     settings = dict(scenario.settings.get("gait", {}))
-    plain = ChosenWalk(robot=robot, gait=make_gait(robot, **settings), stance=OWN)
+    plain = GaitSelection(robot=robot, gait=make_gait(robot, **settings), stance=OWN)
     if scenario.walk.stance != CHOSEN:
         if scenario.names_walk:
             return _named(scenario, plain, bare)
@@ -113,16 +113,16 @@ def choose_walk(
     return chosen
 
 
-def chosen_walk(robot: Robot) -> ChosenWalk:
+def compliant_gait(robot: Robot) -> GaitSelection:
     """Returns the walk that compliant control chooses for a robot at the speed of packages.
 
     Exported FMUs can have it (`hexapod export --stance chosen`).
     """
-    plain = ChosenWalk(robot=robot, gait=make_gait(robot), stance=OWN, chosen_by=BY_CONTROL)
+    plain = GaitSelection(robot=robot, gait=make_gait(robot), stance=OWN, chosen_by=BY_CONTROL)
     return _chosen([Command(vx=SPEED)], plain, robot, {})
 
 
-def _of_fmu(plain: ChosenWalk, path: Path) -> ChosenWalk:
+def _of_fmu(plain: GaitSelection, path: Path) -> GaitSelection:
     """Returns the walk with stance and gait of a controller FMU, as far as it has them."""
     found = walk_of_fmu(path)
     gait = make_gait(plain.robot, **found.gait) if found.gait else plain.gait
@@ -136,7 +136,7 @@ def _of_fmu(plain: ChosenWalk, path: Path) -> ChosenWalk:
     return replace(own, robot=replace(plain.robot, legs=legs), stance=OF_FMU, chosen_by=BY_CONTROL)
 
 
-def _named(scenario: Scenario, plain: ChosenWalk, bare: Robot) -> ChosenWalk:
+def _named(scenario: Scenario, plain: GaitSelection, bare: Robot) -> GaitSelection:
     """Returns the walk with the stance that the scenario names; `bare` is the robot file's."""
     stance = scenario.walk.stance
     if stance is None or stance == OWN:
@@ -158,15 +158,15 @@ def _named(scenario: Scenario, plain: ChosenWalk, bare: Robot) -> ChosenWalk:
         ) from error
 
 
-def _moved(walk: ChosenWalk, name: str, outward: float, deeper: float) -> ChosenWalk:
+def _moved(walk: GaitSelection, name: str, outward: float, deeper: float) -> GaitSelection:
     """Returns a walk with the feet moved from the robot's own stance [m]. Raises ReachError."""
     moved = with_stance(walk.robot, outward, deeper)
     return replace(walk, robot=moved, stance=name, outward=outward, deeper=deeper)
 
 
 def _chosen(
-    commands: Sequence[Command], plain: ChosenWalk, bare: Robot, settings: Mapping[str, Any]
-) -> ChosenWalk:
+    commands: Sequence[Command], plain: GaitSelection, bare: Robot, settings: Mapping[str, Any]
+) -> GaitSelection:
     """Returns the first walk of compliant control that the robot can follow.
 
     bare: the robot of the robot file, for which stances are designed. settings: those of [gait],
@@ -186,12 +186,12 @@ def _chosen(
 
 
 def _narrowing(
-    walk: ChosenWalk,
-    begin: ChosenWalk,
+    walk: GaitSelection,
+    begin: GaitSelection,
     design: Stance,
-    plain: ChosenWalk,
+    plain: GaitSelection,
     commands: Sequence[Command],
-) -> ChosenWalk:
+) -> GaitSelection:
     """Returns a walk whose feet can step to the stance of least heat, if the robot follows there.
 
     In that stance feet can be lifted by half of the step height at least.
@@ -211,7 +211,7 @@ def _narrowing(
 
 
 def _follows(
-    walk: ChosenWalk, plain: ChosenWalk, commands: Sequence[Command], *, whole: bool = True
+    walk: GaitSelection, plain: GaitSelection, commands: Sequence[Command], *, whole: bool = True
 ) -> bool:
     """Returns whether legs and joints follow the commands in a walk.
 

@@ -14,7 +14,7 @@ from hexapod_cosim.controller.design.closed import disturbed, rising, splay
 from hexapod_cosim.controller.design.paper import closed_loop, delay_steps, law_matrix
 from hexapod_cosim.controller.design.standing import StandingPlant
 from hexapod_cosim.controller.size import size_of
-from hexapod_cosim.cosim.design.gain_design import STANCES, level_fmu
+from hexapod_cosim.cosim.design.gains import STANCES, level_fmu
 from hexapod_cosim.cosim.design.linearise import ANGLES, Bench, Motion, linearise
 from hexapod_cosim.cosim.design.standing import StanceError, rest
 from hexapod_cosim.cosim.master.fmu import Fmu

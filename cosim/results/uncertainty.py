@@ -20,8 +20,8 @@ from hexapod_cosim.cosim.common.files import PARTS, RUN_FILE, write_json, write_
 from hexapod_cosim.cosim.master.loop import COMPLETED
 from hexapod_cosim.cosim.results.balance import Unbalanced
 from hexapod_cosim.cosim.results.comparison import Comparison, compare_runs, judged_pairs
+from hexapod_cosim.cosim.results.folder import METRICS_FILE, SCENARIO
 from hexapod_cosim.cosim.results.metrics import METRICS
-from hexapod_cosim.cosim.results.results import METRICS_FILE, SCENARIO
 from hexapod_cosim.cosim.results.summary import Summary, described_losses
 from hexapod_cosim.cosim.scenario.controls import AT, reference_of
 from hexapod_cosim.cosim.scenario.records import Scenario

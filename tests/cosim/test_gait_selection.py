@@ -10,10 +10,10 @@ import pytest
 from gains import make_gains
 
 from hexapod_cosim.cosim.results.gait_choice import gait_differences
-from hexapod_cosim.cosim.run.chosen_walk import ChosenWalk, choose_walk
+from hexapod_cosim.cosim.run.gait_selection import GaitSelection, select_gait
 from hexapod_cosim.cosim.run.plan import make_plan
+from hexapod_cosim.cosim.scenario.reading import scenario_from_table
 from hexapod_cosim.cosim.scenario.records import Scenario
-from hexapod_cosim.cosim.scenario.scenario import scenario_from_table
 from hexapod_cosim.cosim.scenario.tables import with_overrides
 from hexapod_cosim.models import ScenarioError, load_robot
 
@@ -26,8 +26,8 @@ def scenario(*settings: str, control: str = "compliant") -> Scenario:
     return scenario_from_table(with_overrides(table, settings), where="mine.toml")
 
 
-def walk(*settings: str, control: str = "compliant") -> ChosenWalk:
-    return choose_walk(scenario(*settings, control=control))
+def walk(*settings: str, control: str = "compliant") -> GaitSelection:
+    return select_gait(scenario(*settings, control=control))
 
 
 def test_where_nothing_is_named_compliant_control_ambles_nearer_to_the_hips() -> None:
@@ -106,15 +106,15 @@ def test_impossible_stances_are_refused_with_a_fix() -> None:
 
 
 def test_gains_for_the_robots_own_stance_keep_its_own_walk() -> None:
-    kept = choose_walk(scenario(), gains=make_gains(ATHENA))
+    kept = select_gait(scenario(), gains=make_gains(ATHENA))
     assert (kept.gait.name, kept.stance) == ("tripod", "own")
     other = replace(make_gains(ATHENA), robot_hash="of another robot")
-    assert choose_walk(scenario(), gains=other).gait.name == "amble"
+    assert select_gait(scenario(), gains=other).gait.name == "amble"
 
 
 def test_plant_and_controller_stand_in_the_chosen_stance() -> None:
     plan = make_plan(scenario())
-    stance = plan.walk.robot.stance
+    stance = plan.selection.robot.stance
     np.testing.assert_array_equal(plan.robot.stance, stance)
     np.testing.assert_array_equal(plan.controller.robot.stance, stance)
     assert plan.controller.gains is not None

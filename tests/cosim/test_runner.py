@@ -1,4 +1,4 @@
-"""The walker, whose loop is C: its walks and errors are those of the Python master, bit for bit."""
+"""The runner, whose loop is C: its walks and errors are those of the Python master, bit for bit."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from memory import resident
 
 from hexapod_cosim.controller import Gains
 from hexapod_cosim.cosim.control.fmu_law import law_of_ours
-from hexapod_cosim.cosim.export.plant_export import export_controller, export_fmu
+from hexapod_cosim.cosim.export.plant import export_controller, export_fmu
 from hexapod_cosim.cosim.master.fmu import Fmu
 from hexapod_cosim.cosim.master.loop import (
     COMPLETED,
@@ -31,10 +31,10 @@ from hexapod_cosim.cosim.results.result import Result
 from hexapod_cosim.cosim.results.summary import REFUSED, Summary, summarise
 from hexapod_cosim.cosim.run.plan import make_plan
 from hexapod_cosim.cosim.run.plant import initialise_plant, open_plant
+from hexapod_cosim.cosim.run.runner import Runner
 from hexapod_cosim.cosim.run.single_run import make_result, simulate
-from hexapod_cosim.cosim.run.walker import Walker
+from hexapod_cosim.cosim.scenario.reading import load_scenario
 from hexapod_cosim.cosim.scenario.records import Command, Scenario
-from hexapod_cosim.cosim.scenario.scenario import load_scenario
 from hexapod_cosim.cosim.scenario.variation import STANDARD
 from hexapod_cosim.models import FmuError, load_robot
 
@@ -70,10 +70,10 @@ def gains_of(scenario: Scenario) -> Gains | None:
     )
 
 
-def in_python(scenario: Scenario, walker: Walker) -> tuple[Outcome, Result]:
+def in_python(scenario: Scenario, runner: Runner) -> tuple[Outcome, Result]:
     """Runs a scenario with the plant FMU and the controller FMU in the Python master."""
     plan = make_plan(scenario, gains=gains_of(scenario))
-    controller = walker._controller_for(plan)
+    controller = runner._controller_for(plan)
     controller.initialise(scenario.start, scenario.start + scenario.duration)
     with open_plant(scenario) as plant:
         parameters = initialise_plant(plant, plan)
@@ -97,8 +97,8 @@ def steady(summary: Summary) -> Summary:
 
 
 @pytest.fixture
-def walker() -> Iterator[Walker]:
-    with Walker() as one:
+def runner() -> Iterator[Runner]:
+    with Runner() as one:
         yield one
 
 
@@ -120,9 +120,9 @@ WALKS = [
 
 @pytest.mark.parametrize("scenario", WALKS, ids=lambda scenario: scenario.title)
 def test_every_signal_of_a_walk_is_the_python_masters_bit_for_bit(scenario: Scenario) -> None:
-    with Walker(everything=True) as walker:
-        expected, judged = in_python(scenario, walker)
-        found = walker.simulate(scenario, gains=gains_of(scenario))
+    with Runner(everything=True) as runner:
+        expected, judged = in_python(scenario, runner)
+        found = runner.simulate(scenario, gains=gains_of(scenario))
     assert (found.outcome.status, found.outcome.simulated) == (expected.status, expected.simulated)
     assert expected.status == COMPLETED
     ours, theirs = found.outcome.recording, expected.recording
@@ -134,22 +134,22 @@ def test_every_signal_of_a_walk_is_the_python_masters_bit_for_bit(scenario: Scen
 
 
 def test_what_is_recorded_changes_no_figure_and_runs_do_not_depend_on_those_before(
-    walker: Walker,
+    runner: Runner,
 ) -> None:
     plans = [WALKS[3], replace(WALKS[1], robot="phantomx_mk4")]
-    first = [steady(walker.summary(plan, gains=gains_of(plan))) for plan in plans]
+    first = [steady(runner.summary(plan, gains=gains_of(plan))) for plan in plans]
     assert all(summary.walked for summary in first)
-    again = [steady(walker.summary(plan, gains=gains_of(plan))) for plan in reversed(plans)]
+    again = [steady(runner.summary(plan, gains=gains_of(plan))) for plan in reversed(plans)]
     assert again[::-1] == first
     for plan, summary in zip(plans, first, strict=True):
-        with Walker(everything=True) as other:
+        with Runner(everything=True) as other:
             assert steady(other.summary(plan, gains=gains_of(plan))) == summary
 
 
-def test_the_figures_are_those_of_the_python_controller(walker: Walker) -> None:
+def test_the_figures_are_those_of_the_python_controller(runner: Runner) -> None:
     for scenario in WALKS[:2]:
         found, expected = (
-            walker.simulate(scenario, gains=gains_of(scenario)),
+            runner.simulate(scenario, gains=gains_of(scenario)),
             simulate(scenario, gains=gains_of(scenario)),
         )
         for name in expected.metrics.keys() - {"realtime_factor"}:
@@ -173,7 +173,7 @@ def test_a_study_may_bring_its_own_fmus(tmp_path: Path) -> None:
         export_fmu(load_robot("athena"), tmp_path / "a.fmu"),
         export_controller(plain, tmp_path / "c.fmu"),
     )
-    with Walker(fmu=plant, controller=controller) as given, Walker() as own:
+    with Runner(fmu=plant, controller=controller) as given, Runner() as own:
         assert steady(given.summary(scenario, gains=gains_of(scenario))) == steady(
             own.summary(scenario, gains=gains_of(scenario))
         )
@@ -184,17 +184,17 @@ def test_a_study_may_bring_its_own_fmus(tmp_path: Path) -> None:
 
 
 def test_a_refused_step_ends_the_walk_as_in_python_and_the_next_one_begins_afresh(
-    walker: Walker,
+    runner: Runner,
 ) -> None:
     bad = planned("walk_flat", "solver.method=rk4", "solver.step=0.005", ENDLESS)
-    good = walker.summary(WALKS[0], gains=gains_of(WALKS[0]))
-    expected, _ = in_python(bad, walker)
-    found = walker.simulate(bad)
+    good = runner.summary(WALKS[0], gains=gains_of(WALKS[0]))
+    expected, _ = in_python(bad, runner)
+    found = runner.simulate(bad)
     assert (found.outcome.status, found.outcome.simulated) == (FAILED, expected.simulated)
     assert found.outcome.reason == expected.reason
     assert "not finite" in expected.reason
     assert len(found.outcome.recording.time) == len(expected.recording.time)
-    assert steady(walker.summary(WALKS[0], gains=gains_of(WALKS[0]))) == steady(good)
+    assert steady(runner.summary(WALKS[0], gains=gains_of(WALKS[0]))) == steady(good)
 
 
 @pytest.mark.parametrize(
@@ -211,13 +211,13 @@ def test_a_refused_step_ends_the_walk_as_in_python_and_the_next_one_begins_afres
     ],
 )
 def test_a_walk_that_cannot_begin_is_refused_with_a_message(
-    walker: Walker, changes: dict[str, object], said: str
+    runner: Runner, changes: dict[str, object], said: str
 ) -> None:
-    good = walker.summary(WALKS[1])
-    summary = walker.summary(replace(WALKS[1], **changes))  # type: ignore[arg-type]
+    good = runner.summary(WALKS[1])
+    summary = runner.summary(replace(WALKS[1], **changes))  # type: ignore[arg-type]
     assert summary.status == REFUSED
     assert said in summary.reason
-    assert steady(walker.summary(WALKS[1])) == steady(good)
+    assert steady(runner.summary(WALKS[1])) == steady(good)
 
 
 def test_fmus_that_are_missing_or_something_else_are_refused(
@@ -232,35 +232,35 @@ def test_fmus_that_are_missing_or_something_else_are_refused(
         (other, None, "another robot"),
     )
     for fmu, controller, said in cases:
-        with Walker(fmu=fmu, controller=controller) as walker:
-            summary = walker.summary(WALKS[0], gains=gains_of(WALKS[0]))
+        with Runner(fmu=fmu, controller=controller) as runner:
+            summary = runner.summary(WALKS[0], gains=gains_of(WALKS[0]))
         assert summary.status == REFUSED
         assert said in summary.reason
-    with Fmu(athena_fmu) as plant, Walker() as walker:
-        swapped = walker._controller_for(make_plan(WALKS[1])), plant
+    with Fmu(athena_fmu) as plant, Runner() as runner:
+        swapped = runner._controller_for(make_plan(WALKS[1])), plant
         with pytest.raises(FmuError, match="not a hexapod plant"):
             NativeMaster(*swapped)
 
 
-def test_an_interrupted_walk_keeps_its_rows(walker: Walker) -> None:
+def test_an_interrupted_walk_keeps_its_rows(runner: Runner) -> None:
     def stop(done: float) -> None:
         if done > 4.0:
             raise KeyboardInterrupt
 
     scenario = replace(WALKS[1], duration=60.0)
-    result = walker.simulate(scenario, progress=stop)
+    result = runner.simulate(scenario, progress=stop)
     assert (result.outcome.status, result.outcome.reason) == (INTERRUPTED, "interrupted")
     assert 4.0 < result.outcome.simulated < 10.0
     assert np.isfinite(result.outcome.recording.data).all()
-    assert walker.summary(WALKS[1]).walked
+    assert runner.summary(WALKS[1]).walked
 
 
-def test_memory_does_not_grow_with_the_number_of_runs(walker: Walker) -> None:
+def test_memory_does_not_grow_with_the_number_of_runs(runner: Runner) -> None:
     plans = [replace(WALKS[0], seed=seed, duration=1.0) for seed in range(20)]
     gains = gains_of(WALKS[0])
     for plan in plans[:8]:
-        walker.summary(plan, gains=gains)
+        runner.summary(plan, gains=gains)
     before = resident()
     for plan in plans:
-        walker.summary(plan, gains=gains)
+        runner.summary(plan, gains=gains)
     assert resident() - before < GROWTH

@@ -20,8 +20,8 @@ from hexapod_cosim.cosim.control.controllers import (
 )
 from hexapod_cosim.cosim.control.fmu_instance import open_controller_fmu
 from hexapod_cosim.cosim.control.fmu_law import FmuLaw
-from hexapod_cosim.cosim.export.plant_export import export_controller
-from hexapod_cosim.cosim.interface.controller_interface import (
+from hexapod_cosim.cosim.export.plant import export_controller
+from hexapod_cosim.cosim.interface.controller import (
     ControllerSetup,
     controller_parameters,
 )
@@ -52,7 +52,7 @@ def reads_no_numbers(scenario: Scenario) -> bool:
     return any(event.fault == "nan" for events in kinds for event in events)
 
 
-class Walker(Closing):
+class Runner(Closing):
     """Runs scenarios as `simulate` does, with the controller FMU instead of the Python controller.
 
     It is a context manager for use in one thread. Results do not depend on earlier runs.
@@ -70,7 +70,7 @@ class Walker(Closing):
     ) -> None:
         self._given_controller, self._everything = controller, everything
         self._open = ExitStack()
-        self._folder = self._open.enter_context(TemporaryFolder("walker"))
+        self._folder = self._open.enter_context(TemporaryFolder("runner"))
         self._fmus = PlantFmus(self._folder, given=fmu)
         # by plant FMU and recorded columns, of the built-in controls
         self._masters: dict[tuple[Path, tuple[str, ...] | None], NativeMaster] = {}
@@ -203,7 +203,7 @@ class Walker(Closing):
         return plant, self._masters[key]
 
     def _open_plant(self, path: Path) -> Fmu:
-        """Returns a plant FMU, which stays open until the walker is closed."""
+        """Returns a plant FMU, which stays open until the runner is closed."""
         if path not in self._plants:
             self._plants[path] = self._open.enter_context(Fmu(path))
         return self._plants[path]

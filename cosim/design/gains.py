@@ -15,7 +15,7 @@ from hexapod_cosim.controller.size import requirements_for
 from hexapod_cosim.cosim.common.temporary import TemporaryFolder
 from hexapod_cosim.cosim.design.linearise import Motion, linearise
 from hexapod_cosim.cosim.design.standing import StanceError, rest
-from hexapod_cosim.cosim.export.plant_export import export_fmu
+from hexapod_cosim.cosim.export.plant import export_fmu
 from hexapod_cosim.cosim.master.fmu import Fmu
 from hexapod_cosim.models import LEG_NAMES, Robot, unknown_name
 from hexapod_cosim.models.records import Array

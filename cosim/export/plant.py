@@ -32,13 +32,13 @@ from hexapod_cosim.cosim.export.platforms import (
 from hexapod_cosim.cosim.export.reference import reference_members
 from hexapod_cosim.cosim.export.start_values import start_values
 from hexapod_cosim.cosim.export.starts import with_starts
-from hexapod_cosim.cosim.interface.controller_interface import (
+from hexapod_cosim.cosim.interface.controller import (
     ControllerSetup,
     load_controller_interface,
 )
 from hexapod_cosim.cosim.interface.model_description import render_fmi2
 from hexapod_cosim.cosim.interface.model_description3 import render_build_description, render_fmi3
-from hexapod_cosim.cosim.interface.plant_interface import Interface, load_interface
+from hexapod_cosim.cosim.interface.plant import Interface, load_interface
 from hexapod_cosim.cosim.interface.variants import for_binaries
 from hexapod_cosim.models.errors import FmuError
 from hexapod_cosim.models.ground.faces import surface_of
