@@ -17,11 +17,11 @@ from numpy.typing import NDArray
 
 from hexapod_cosim.cosim.report.packing import STEPS
 from hexapod_cosim.cosim.results.footprints import Footprint
-from hexapod_cosim.models.ground.catalogue import CATALOGUE
 from hexapod_cosim.models.ground.faces import surface_heights
 from hexapod_cosim.models.ground.patches import PROPERTIES
 from hexapod_cosim.models.ground.smooth import RUN_OUT
 from hexapod_cosim.models.ground.surface import LAW, MU, Surface
+from hexapod_cosim.models.ground.table import CATALOGUE
 from hexapod_cosim.models.soil.presets import list_soils, soil_preset
 
 FINE = 0.0125  # m    spacing of the samples of a smooth surface, if it is not too large for it

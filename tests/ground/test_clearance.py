@@ -10,7 +10,7 @@ from plant import Plant
 from states import changed, lopsided, random_pose
 
 from hexapod_cosim.models import load_robot
-from hexapod_cosim.models.contact.clearance import clearances, leg_points, line_distance
+from hexapod_cosim.models.contact.pairs import clearances, leg_points, line_distance
 from hexapod_cosim.models.kinematics import body_states
 from hexapod_cosim.models.records import Array
 

@@ -13,7 +13,7 @@ from hexapod_cosim.cosim.run.runner import Runner
 from hexapod_cosim.cosim.run.single_run import simulate
 from hexapod_cosim.cosim.scenario.reading import load_scenario
 from hexapod_cosim.models import load_robot
-from hexapod_cosim.models.ground.catalogue import make_surface
+from hexapod_cosim.models.ground.table import make_surface
 
 RUBBLE = ("terrain.kind=rubble", "terrain.max_height=20 mm")
 

@@ -11,12 +11,12 @@ import numpy as np
 import pytest
 
 from hexapod_cosim.models import load_robot
-from hexapod_cosim.models.ground.catalogue import make_surface
 from hexapod_cosim.models.ground.smooth import height_and_slopes
 from hexapod_cosim.models.ground.surface import Surface
+from hexapod_cosim.models.ground.table import make_surface
 from hexapod_cosim.models.ground.valleys import Valley, tightest_valley
 from hexapod_cosim.models.records import Array, Robot, Terrain
-from hexapod_cosim.models.validation.robot import check_settings
+from hexapod_cosim.models.validation.bodies import check_settings
 
 ALL = 100.0  # m    a limit that no valley here reaches
 BRUTE = 0.01  # of the radius, of a search with places 1/30 cell apart

@@ -14,7 +14,7 @@ from hexapod_cosim.models import BodyContact, RobotError, load_robot
 from hexapod_cosim.models.mjcf import robot_to_mjcf
 from hexapod_cosim.models.records import Robot
 from hexapod_cosim.models.urdf.writer import robot_to_urdf
-from hexapod_cosim.models.validation.robot import check_robot
+from hexapod_cosim.models.validation.bodies import check_robot
 
 
 def without_body(text: str) -> ET.Element:

@@ -23,7 +23,7 @@ from hexapod_cosim.extensions.identify.experiment import (
 )
 from hexapod_cosim.extensions.identify.fitting import workers
 from hexapod_cosim.extensions.identify.fitting.covariance import Series
-from hexapod_cosim.extensions.identify.fitting.differences import (
+from hexapod_cosim.extensions.identify.fitting.least_squares import (
     FINE,
     ROUGH,
     Differences,
@@ -32,7 +32,7 @@ from hexapod_cosim.extensions.identify.fitting.differences import (
 )
 from hexapod_cosim.extensions.identify.log import CHANNELS, LogError
 from hexapod_cosim.extensions.identify.log_plant import LogPlant
-from hexapod_cosim.extensions.identify.numbers.unknown import Unknown
+from hexapod_cosim.extensions.identify.numbers import Unknown
 from hexapod_cosim.extensions.identify.unknowns import is_delay
 from hexapod_cosim.models import FmuError, Robot
 
