@@ -227,7 +227,7 @@ def open_plant(
     _own.append((LogPlant(fmu, parameters), robot, experiments))
 
 
-def simulate(
+def simulate_in_worker(
     values: Mapping[str, float], seconds: float, parameters: Mapping[str, float]
 ) -> list[NDArray[np.float64]] | None:
     """Returns the outputs of each experiment in a worker process; None where the plant refuses.

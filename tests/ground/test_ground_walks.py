@@ -1,4 +1,4 @@
-"""Walks on the bundled scenarios of uneven ground, with both controls."""
+"""Walks on the bundled scenarios of uneven ground with both controls, and on grids in FMUs."""
 
 from __future__ import annotations
 
@@ -8,9 +8,13 @@ from pathlib import Path
 
 import pytest
 
+from hexapod_cosim.cosim.export.plant import export_fmu
+from hexapod_cosim.cosim.results.result import Result
 from hexapod_cosim.cosim.run.runner import Runner
 from hexapod_cosim.cosim.run.single_run import simulate
 from hexapod_cosim.cosim.scenario.reading import load_scenario
+from hexapod_cosim.models import load_robot
+from hexapod_cosim.models.ground.table import make_surface
 
 CONTROLS = ("kinematic", "compliant")  # the paper's control does not climb the stairs
 ENERGY = 1e-4  # of the motors' work
@@ -28,7 +32,7 @@ def runner(plant_build: Path) -> Iterator[Runner]:
 @pytest.mark.parametrize("name", WAYS)
 @pytest.mark.parametrize("control", CONTROLS)
 def test_both_controls_walk_it_upright(runner: Runner, name: str, control: str) -> None:
-    result = runner.simulate(load_scenario(name, overrides=["control=compliant"]))
+    result = runner.simulate(load_scenario(name, overrides=[f"control={control}"]))
     walk = result.facts.walk
     assert result.completed
     assert walk.upright
@@ -55,3 +59,31 @@ def test_feet_that_find_no_ground_neither_end_the_run_nor_its_metrics() -> None:
         assert math.isfinite(result.metrics[name])
     assert result.surface is not None
     assert result.surface.recipe["kind"] == "gaps"
+
+
+RUBBLE = ("terrain.kind=rubble", "terrain.max_height=20 mm")
+
+
+def walk(*overrides: str, fmu: Path | None = None) -> Result:
+    settings = ["duration=4", "outputs.plots=false", *overrides]
+    return simulate(load_scenario("walk_flat", overrides=settings), fmu=fmu)
+
+
+def figures(result: Result) -> dict[str, float]:
+    """Returns the metrics that have a value, but for the real-time factor."""
+    found = {key: value for key, value in result.metrics.items() if not math.isnan(value)}
+    del found["realtime_factor"]
+    return found
+
+
+def test_a_packed_grid_a_given_fmu_and_the_compiled_loop_give_the_same_figures(
+    plant_build: Path, tmp_path: Path
+) -> None:
+    surfaces = [make_surface("dune", {}), make_surface("rubble", {"max_height": 0.02})]
+    fmu = export_fmu(load_robot("athena"), tmp_path / "two.fmu", terrains=surfaces)
+    own, given = walk(*RUBBLE), walk(*RUBBLE, fmu=fmu)
+    assert figures(own) == figures(given)
+    with Runner() as runner:
+        scenario = load_scenario("walk_flat", overrides=["duration=4", *RUBBLE])
+        compiled = runner.simulate(scenario)
+    assert figures(compiled) == pytest.approx(figures(own), rel=1e-6)

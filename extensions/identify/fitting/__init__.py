@@ -4,5 +4,4 @@ least_squares.py: bounded least squares with Huber's loss, and derivatives by di
 problem.py: residuals of the readings and their derivatives, as functions of the numbers.
 search.py: the search. judging.py: what the readings say of its result.
 misfit.py, covariance.py: noise of readings, which numbers are determined, and intervals.
-workers.py: simulations in worker processes.
 """
